@@ -1,0 +1,122 @@
+//! A bump allocator over bytes that the caller owns. It hands out typed slices and never frees:
+//! whoever owns the bytes decides how long everything in them lives.
+
+use bytemuck::{AnyBitPattern, NoUninit, Pod, Zeroable};
+use core::fmt;
+
+/// Every slice starts at a multiple of this many bytes: a cache line, and an AVX-512 register.
+pub const ALIGNMENT: usize = 64;
+
+/// One aligned cache line. A `static` array or a `Vec` of lines is memory that an [`Arena`] uses whole.
+#[derive(Clone, Copy, Pod, Zeroable)]
+#[repr(C, align(64))]
+pub struct Line(pub [u8; ALIGNMENT]);
+
+/// The arena is too small: how many bytes were asked for, and how many were left.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct OutOfMemory {
+    /// Bytes that the structure needs, its padding included. `usize::MAX` where it cannot be counted.
+    pub needed: usize,
+    /// Bytes that were left in the arena.
+    pub available: usize,
+}
+
+impl fmt::Display for OutOfMemory {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "out of memory: {} bytes needed, {} available", self.needed, self.available)
+    }
+}
+
+impl core::error::Error for OutOfMemory {}
+
+/// A bump allocator over borrowed bytes.
+///
+/// ```
+/// use halflight_core::memory::{Arena, Line};
+/// let mut lines = [Line([0; 64]); 4];
+/// let mut arena = Arena::new(bytemuck::cast_slice_mut(&mut lines));
+/// let numbers: &mut [u32] = arena.slice(16)?;
+/// assert_eq!((numbers.len(), arena.available()), (16, 192));
+/// # Ok::<(), halflight_core::memory::OutOfMemory>(())
+/// ```
+pub struct Arena<'m> {
+    rest: &'m mut [u8],
+}
+
+impl<'m> Arena<'m> {
+    /// An arena over `bytes`. Bytes before the first multiple of [`ALIGNMENT`] stay unused, so that a
+    /// [`Footprint`](super::Footprint) holds exactly for memory made of [`Line`]s.
+    pub fn new(bytes: &'m mut [u8]) -> Self {
+        let skip = bytes.as_ptr().align_offset(ALIGNMENT).min(bytes.len());
+        Self { rest: &mut bytes[skip..] }
+    }
+
+    /// Bytes not handed out yet.
+    pub fn available(&self) -> usize {
+        self.rest.len()
+    }
+
+    /// A slice of `count` values, zero or left over from an earlier use of the bytes: the caller
+    /// overwrites it. Takes `size_of::<T>() * count` bytes rounded up to [`ALIGNMENT`].
+    ///
+    /// # Errors
+    /// [`OutOfMemory`] when that is more than is left; the arena is unchanged.
+    pub fn slice<T: NoUninit + AnyBitPattern>(&mut self, count: usize) -> Result<&'m mut [T], OutOfMemory> {
+        let available = self.rest.len();
+        let failed = |needed| OutOfMemory { needed, available };
+        let padded = padded_bytes::<T>(count).ok_or(failed(usize::MAX))?;
+        let rest = core::mem::take(&mut self.rest);
+        if padded > available {
+            self.rest = rest;
+            return Err(failed(padded));
+        }
+        let (taken, rest) = rest.split_at_mut(padded);
+        self.rest = rest;
+        bytemuck::try_cast_slice_mut(&mut taken[..count * size_of::<T>()]).map_err(|_| failed(padded))
+    }
+
+    /// Lends the unused bytes as a second arena: what is built there is gone when the loan ends.
+    /// For working memory that is needed during a build and not after it.
+    pub fn scratch(&mut self) -> Arena<'_> {
+        Arena { rest: self.rest }
+    }
+}
+
+/// Bytes of `count` values of `T`, rounded up to [`ALIGNMENT`]; `None` where they cannot be counted.
+pub(super) const fn padded_bytes<T>(count: usize) -> Option<usize> {
+    match count.checked_mul(size_of::<T>()) {
+        Some(bytes) => bytes.checked_next_multiple_of(ALIGNMENT),
+        None => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn exact_bytes_suffice_and_one_less_is_an_error() {
+        let mut lines = [Line([0; 64]); 3];
+        let bytes: &mut [u8] = bytemuck::cast_slice_mut(&mut lines);
+        assert_eq!(Arena::new(bytes).slice::<u32>(48).map(|s| s.len()), Ok(48));
+        let short = Arena::new(&mut bytes[..191]).slice::<u32>(48).map(|s| s.len());
+        assert_eq!(short, Err(OutOfMemory { needed: 192, available: 191 }));
+    }
+
+    #[test]
+    fn a_failed_request_takes_nothing() {
+        let mut lines = [Line([0; 64]); 2];
+        let mut arena = Arena::new(bytemuck::cast_slice_mut(&mut lines));
+        assert!(arena.slice::<u64>(usize::MAX).is_err());
+        assert!(arena.slice::<u8>(129).is_err());
+        assert_eq!(arena.available(), 128);
+    }
+
+    #[test]
+    fn unaligned_bytes_are_skipped() {
+        let mut lines = [Line([0; 64]); 2];
+        let bytes: &mut [u8] = bytemuck::cast_slice_mut(&mut lines);
+        assert_eq!(Arena::new(&mut bytes[1..]).available(), 64);
+        assert_eq!(Arena::new(&mut bytes[..0]).available(), 0);
+    }
+}

@@ -1,0 +1,30 @@
+//! What to render: borrowed views of meshes, materials, textures, lights and the camera.
+//! A scene owns nothing; the app's buffers or a microcontroller's flash do.
+
+mod material;
+mod mesh;
+mod texture;
+
+pub use material::{ColorInput, Material, NormalMap, ScalarInput, Surface};
+pub use mesh::{Mesh, Triangle};
+pub use texture::{Texels, Texture, TextureId, Wrap};
+
+pub use crate::camera::Camera;
+pub use crate::light::{Environment, PointLight};
+
+/// All that a picture is made of.
+#[derive(Clone, Copy, Debug)]
+pub struct Scene<'a> {
+    /// Every triangle, in one mesh, in world space.
+    pub mesh: Mesh<'a>,
+    /// Referred to by [`Triangle::material`].
+    pub materials: &'a [Material],
+    /// Referred to by [`TextureId`].
+    pub textures: &'a [Texture<'a>],
+    /// Lights without surface: point, spot, directional. Emissive triangles are found through `materials`.
+    pub lights: &'a [PointLight],
+    /// What a ray sees that leaves the scene; `None` is black.
+    pub environment: Option<Environment>,
+    /// Who looks.
+    pub camera: Camera,
+}

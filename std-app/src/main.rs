@@ -1,0 +1,4 @@
+//! The command line. See `halflight --help`.
+#![forbid(unsafe_code)]
+
+fn main() {}
