@@ -26,7 +26,7 @@ pub mod sampling;
 pub mod scene;
 pub mod transport;
 
-pub use halflight_simd::Level;
+pub use halflight_simd::{Level, Tier};
 
 /// Linear sRGB triple: radiance in W/(m² sr), reflectance, throughput; one meaning per use.
 pub type Rgb = glam::Vec3;

@@ -1,12 +1,23 @@
 //! SIMD lanes, run-time levels and batch kernels.
 //!
 //! The only crate of the project with `unsafe`: everything above it forbids it. A kernel is written
-//! once, generic over lanes, and entered once per batch through [`Level::dispatch`].
+//! once, generic over a [`Simd`] token, and entered once per batch through [`Level::dispatch`]: that
+//! call holds the only `#[target_feature]` functions, so everything inlined below it is compiled for
+//! the level. The lanes of a level can only be made from its token, and the token only by `dispatch`:
+//! safe code cannot execute an instruction that the processor lacks.
 #![no_std]
 
 #[cfg(any(test, feature = "std"))]
 extern crate std;
 
+mod baseline;
+mod lanes;
 mod level;
+#[cfg(target_arch = "x86_64")]
+mod x86;
 
-pub use level::Level;
+pub mod kernels;
+
+pub use baseline::{Baseline, F8, M8, Pair};
+pub use lanes::{Lanes, Mask, Simd};
+pub use level::{Kernel, Level, Tier};

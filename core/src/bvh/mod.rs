@@ -1,8 +1,6 @@
 //! The bounding volume hierarchy: build, and trace for the nearest hit or any hit.
 
-mod brute;
-
-pub use brute::intersect;
+pub mod brute;
 
 use crate::Level;
 use crate::geometry::{Hit, Ray};

@@ -1,0 +1,239 @@
+//! Lanes of the build target, through `wide`: SSE2, AVX (where the build says so), NEON, simd128 or
+//! plain scalar code. Sixteen lanes are two registers of eight.
+
+use crate::lanes::{Lanes, Mask, Simd};
+use core::ops::{Add, BitAnd, BitOr, Div, Mul, Neg, Not, Sub};
+use wide::f32x8;
+
+/// The token of the baseline: every processor of the build target has it.
+#[derive(Clone, Copy, Debug)]
+pub struct Baseline;
+
+/// Eight lanes of the build target.
+#[derive(Clone, Copy)]
+pub struct F8(f32x8);
+
+/// The mask of [`F8`]: all bits of a lane, or none.
+#[derive(Clone, Copy)]
+pub struct M8(f32x8);
+
+/// Two registers as one of twice the lanes.
+#[derive(Clone, Copy)]
+pub struct Pair<T>(pub(crate) T, pub(crate) T);
+
+macro_rules! lane_operators {
+    ($type:ident, $($trait:ident $method:ident $op:tt),*) => {
+        $(impl $trait for $type {
+            type Output = Self;
+            #[inline(always)]
+            fn $method(self, other: Self) -> Self {
+                Self(self.0 $op other.0)
+            }
+        })*
+    };
+}
+lane_operators!(F8, Add add +, Sub sub -, Mul mul *, Div div /);
+lane_operators!(M8, BitAnd bitand &, BitOr bitor |);
+
+impl Neg for F8 {
+    type Output = Self;
+    #[inline(always)]
+    fn neg(self) -> Self {
+        Self(-self.0)
+    }
+}
+
+impl Not for M8 {
+    type Output = Self;
+    #[inline(always)]
+    fn not(self) -> Self {
+        Self(!self.0)
+    }
+}
+
+impl Mask for M8 {
+    #[inline(always)]
+    fn bits(self) -> u32 {
+        self.0.to_bitmask()
+    }
+}
+
+impl Lanes for F8 {
+    type Array = [f32; 8];
+    type Mask = M8;
+    const N: usize = 8;
+
+    #[inline(always)]
+    fn min(self, other: Self) -> Self {
+        Self(self.0.fast_min(other.0))
+    }
+    #[inline(always)]
+    fn max(self, other: Self) -> Self {
+        Self(self.0.fast_max(other.0))
+    }
+    #[inline(always)]
+    fn abs(self) -> Self {
+        Self(self.0.abs())
+    }
+    #[inline(always)]
+    fn lt(self, other: Self) -> M8 {
+        M8(self.0.simd_lt(other.0))
+    }
+    #[inline(always)]
+    fn le(self, other: Self) -> M8 {
+        M8(self.0.simd_le(other.0))
+    }
+    #[inline(always)]
+    fn eq(self, other: Self) -> M8 {
+        M8(self.0.simd_eq(other.0))
+    }
+    #[inline(always)]
+    fn select(self, mask: M8, other: Self) -> Self {
+        Self(mask.0.select(self.0, other.0))
+    }
+    #[inline(always)]
+    fn to_array(self) -> [f32; 8] {
+        self.0.to_array()
+    }
+}
+
+macro_rules! pair_operators {
+    ($($trait:ident $method:ident),*) => {
+        $(impl<T: $trait<Output = T>> $trait for Pair<T> {
+            type Output = Self;
+            #[inline(always)]
+            fn $method(self, other: Self) -> Self {
+                Self(self.0.$method(other.0), self.1.$method(other.1))
+            }
+        })*
+    };
+}
+pair_operators!(Add add, Sub sub, Mul mul, Div div, BitAnd bitand, BitOr bitor);
+
+impl<T: Neg<Output = T>> Neg for Pair<T> {
+    type Output = Self;
+    #[inline(always)]
+    fn neg(self) -> Self {
+        Self(-self.0, -self.1)
+    }
+}
+
+impl<T: Not<Output = T>> Not for Pair<T> {
+    type Output = Self;
+    #[inline(always)]
+    fn not(self) -> Self {
+        Self(!self.0, !self.1)
+    }
+}
+
+impl<M: Mask> Mask for Pair<M> {
+    #[inline(always)]
+    fn bits(self) -> u32 {
+        self.0.bits() | self.1.bits() << 8
+    }
+}
+
+impl<L: Lanes<Array = [f32; 8]>> Lanes for Pair<L> {
+    type Array = [f32; 16];
+    type Mask = Pair<L::Mask>;
+    const N: usize = 16;
+
+    #[inline(always)]
+    fn min(self, other: Self) -> Self {
+        Self(self.0.min(other.0), self.1.min(other.1))
+    }
+    #[inline(always)]
+    fn max(self, other: Self) -> Self {
+        Self(self.0.max(other.0), self.1.max(other.1))
+    }
+    #[inline(always)]
+    fn abs(self) -> Self {
+        Self(self.0.abs(), self.1.abs())
+    }
+    #[inline(always)]
+    fn lt(self, other: Self) -> Self::Mask {
+        Pair(self.0.lt(other.0), self.1.lt(other.1))
+    }
+    #[inline(always)]
+    fn le(self, other: Self) -> Self::Mask {
+        Pair(self.0.le(other.0), self.1.le(other.1))
+    }
+    #[inline(always)]
+    fn eq(self, other: Self) -> Self::Mask {
+        Pair(self.0.eq(other.0), self.1.eq(other.1))
+    }
+    #[inline(always)]
+    fn select(self, mask: Self::Mask, other: Self) -> Self {
+        Self(self.0.select(mask.0, other.0), self.1.select(mask.1, other.1))
+    }
+    #[inline(always)]
+    fn to_array(self) -> [f32; 16] {
+        let (a, b) = (self.0.to_array(), self.1.to_array());
+        core::array::from_fn(|i| if i < 8 { a[i & 7] } else { b[i & 7] })
+    }
+}
+
+/// Both halves of sixteen values.
+#[inline(always)]
+pub(crate) fn halves(values: &[f32; 16]) -> (&[f32; 8], &[f32; 8]) {
+    let (low, high) = values.split_at(8);
+    // Both are eight long; the fallback is never taken.
+    (low.first_chunk().unwrap_or(&[0.0; 8]), high.first_chunk().unwrap_or(&[0.0; 8]))
+}
+
+/// Whether `load8x9` with these arguments stays inside `length` values.
+#[inline(always)]
+pub(crate) fn fits8x9(length: usize, start: usize, stride: usize) -> bool {
+    stride <= 8 && start <= length && length - start >= 8 * stride + 8
+}
+
+impl Simd for Baseline {
+    type F8 = F8;
+    type F16 = Pair<F8>;
+
+    #[inline(always)]
+    fn splat8(self, value: f32) -> F8 {
+        F8(f32x8::splat(value))
+    }
+    #[inline(always)]
+    fn splat16(self, value: f32) -> Pair<F8> {
+        Pair(self.splat8(value), self.splat8(value))
+    }
+    #[inline(always)]
+    fn load8(self, values: &[f32; 8]) -> F8 {
+        F8(f32x8::from(*values))
+    }
+    #[inline(always)]
+    fn load16(self, values: &[f32; 16]) -> Pair<F8> {
+        let (low, high) = halves(values);
+        Pair(self.load8(low), self.load8(high))
+    }
+    #[inline(always)]
+    fn first8(self, n: u32) -> M8 {
+        self.mask8(if n >= 8 { 0xff } else { (1 << n) - 1 })
+    }
+    #[inline(always)]
+    fn mask16(self, bits: u32) -> Pair<M8> {
+        Pair(self.mask8(bits), self.mask8(bits >> 8))
+    }
+    #[inline(always)]
+    fn load8x9(self, values: &[f32], start: usize, stride: usize) -> Option<[F8; 9]> {
+        if !fits8x9(values.len(), start, stride) {
+            return None;
+        }
+        let at = |k: usize| values.get(start + k * stride..).and_then(|rest| rest.first_chunk::<8>());
+        let mut loaded = [self.splat8(0.0); 9];
+        for (k, lanes) in loaded.iter_mut().enumerate() {
+            *lanes = self.load8(at(k)?);
+        }
+        Some(loaded)
+    }
+}
+
+impl Baseline {
+    #[inline(always)]
+    fn mask8(self, bits: u32) -> M8 {
+        let lane = |i: u32| f32::from_bits(0u32.wrapping_sub(bits >> i & 1));
+        M8(f32x8::from(core::array::from_fn(|i| lane(i as u32))))
+    }
+}

@@ -1,0 +1,176 @@
+//! AVX2 lanes: thin newtypes over `__m256`. They exist only through the token [`Avx2`], and the token
+//! only inside `with_avx2`; that is what every SAFETY line here rests on.
+
+use crate::baseline::{Pair, fits8x9, halves};
+use crate::lanes::{Lanes, Mask, Simd};
+use core::arch::x86_64::*;
+use core::ops::{Add, BitAnd, BitOr, Div, Mul, Neg, Not, Sub};
+
+/// Proof of AVX2.
+#[derive(Clone, Copy)]
+pub(super) struct Avx2(());
+
+impl Avx2 {
+    /// Only for functions that enable the level's features.
+    pub(super) fn new() -> Self {
+        Self(())
+    }
+}
+
+/// Eight lanes.
+#[derive(Clone, Copy)]
+pub(crate) struct F8(pub(super) __m256);
+
+/// The mask of [`F8`].
+#[derive(Clone, Copy)]
+pub(crate) struct M8(__m256);
+
+macro_rules! operators {
+    ($type:ident, $($trait:ident $method:ident $intrinsic:ident),*) => {
+        $(impl $trait for $type {
+            type Output = Self;
+            #[inline(always)]
+            fn $method(self, other: Self) -> Self {
+                // SAFETY: the value was made through the token, so the processor has the level.
+                Self(unsafe { $intrinsic(self.0, other.0) })
+            }
+        })*
+    };
+}
+operators!(F8, Add add _mm256_add_ps, Sub sub _mm256_sub_ps, Mul mul _mm256_mul_ps, Div div _mm256_div_ps);
+operators!(M8, BitAnd bitand _mm256_and_ps, BitOr bitor _mm256_or_ps);
+
+impl Neg for F8 {
+    type Output = Self;
+    #[inline(always)]
+    fn neg(self) -> Self {
+        // SAFETY: as above.
+        Self(unsafe { _mm256_xor_ps(self.0, _mm256_set1_ps(-0.0)) })
+    }
+}
+
+impl Not for M8 {
+    type Output = Self;
+    #[inline(always)]
+    fn not(self) -> Self {
+        // SAFETY: as above.
+        Self(unsafe { _mm256_xor_ps(self.0, _mm256_castsi256_ps(_mm256_set1_epi32(-1))) })
+    }
+}
+
+impl Mask for M8 {
+    #[inline(always)]
+    fn bits(self) -> u32 {
+        // SAFETY: as above.
+        unsafe { _mm256_movemask_ps(self.0) as u32 }
+    }
+}
+
+macro_rules! compare {
+    ($a:expr, $b:expr, $how:ident) => {
+        // SAFETY: as above.
+        M8(unsafe { _mm256_cmp_ps::<$how>($a.0, $b.0) })
+    };
+}
+
+impl Lanes for F8 {
+    type Array = [f32; 8];
+    type Mask = M8;
+    const N: usize = 8;
+
+    #[inline(always)]
+    fn min(self, other: Self) -> Self {
+        // SAFETY: as above.
+        Self(unsafe { _mm256_min_ps(self.0, other.0) })
+    }
+    #[inline(always)]
+    fn max(self, other: Self) -> Self {
+        // SAFETY: as above.
+        Self(unsafe { _mm256_max_ps(self.0, other.0) })
+    }
+    #[inline(always)]
+    fn abs(self) -> Self {
+        // SAFETY: as above.
+        Self(unsafe { _mm256_andnot_ps(_mm256_set1_ps(-0.0), self.0) })
+    }
+    #[inline(always)]
+    fn lt(self, other: Self) -> M8 {
+        compare!(self, other, _CMP_LT_OQ)
+    }
+    #[inline(always)]
+    fn le(self, other: Self) -> M8 {
+        compare!(self, other, _CMP_LE_OQ)
+    }
+    #[inline(always)]
+    fn eq(self, other: Self) -> M8 {
+        compare!(self, other, _CMP_EQ_OQ)
+    }
+    #[inline(always)]
+    fn select(self, mask: M8, other: Self) -> Self {
+        // SAFETY: as above.
+        Self(unsafe { _mm256_blendv_ps(other.0, self.0, mask.0) })
+    }
+    #[inline(always)]
+    fn to_array(self) -> [f32; 8] {
+        let mut out = [0.0; 8];
+        // SAFETY: as above; eight floats are written to an array of eight.
+        unsafe { _mm256_storeu_ps(out.as_mut_ptr(), self.0) };
+        out
+    }
+}
+
+impl Simd for Avx2 {
+    type F8 = F8;
+    type F16 = Pair<F8>;
+
+    #[inline(always)]
+    fn splat8(self, value: f32) -> F8 {
+        // SAFETY: the token proves the level.
+        F8(unsafe { _mm256_set1_ps(value) })
+    }
+    #[inline(always)]
+    fn splat16(self, value: f32) -> Pair<F8> {
+        Pair(self.splat8(value), self.splat8(value))
+    }
+    #[inline(always)]
+    fn load8(self, values: &[f32; 8]) -> F8 {
+        // SAFETY: the token proves the level; eight floats are read from an array of eight.
+        F8(unsafe { _mm256_loadu_ps(values.as_ptr()) })
+    }
+    #[inline(always)]
+    fn load16(self, values: &[f32; 16]) -> Pair<F8> {
+        let (low, high) = halves(values);
+        Pair(self.load8(low), self.load8(high))
+    }
+    #[inline(always)]
+    fn first8(self, n: u32) -> M8 {
+        self.mask8(if n >= 8 { 0xff } else { (1 << n) - 1 })
+    }
+    #[inline(always)]
+    fn mask16(self, bits: u32) -> Pair<M8> {
+        Pair(self.mask8(bits), self.mask8(bits >> 8))
+    }
+    #[inline(always)]
+    fn load8x9(self, values: &[f32], start: usize, stride: usize) -> Option<[F8; 9]> {
+        if !fits8x9(values.len(), start, stride) {
+            return None;
+        }
+        // SAFETY: the token proves the level; `fits8x9` proves that start + 8 * stride + 8 <= length.
+        Some(unsafe {
+            let base = values.as_ptr().add(start);
+            core::array::from_fn(|k| F8(_mm256_loadu_ps(base.add(k * stride))))
+        })
+    }
+}
+
+impl Avx2 {
+    #[inline(always)]
+    fn mask8(self, bits: u32) -> M8 {
+        // SAFETY: the token proves the level.
+        unsafe {
+            let lane_bits = _mm256_setr_epi32(1, 2, 4, 8, 16, 32, 64, 128);
+            let set = _mm256_and_si256(_mm256_set1_epi32(bits as i32), lane_bits);
+            M8(_mm256_castsi256_ps(_mm256_cmpeq_epi32(set, lane_bits)))
+        }
+    }
+}
