@@ -1,0 +1,127 @@
+//! A piecewise constant density over the unit square, given by weights on a grid: rows by their sums, then
+//! the cell in the row. Cumulative sums are 32-bit integers, so that the density is exactly what is sampled.
+
+use crate::memory::{Arena, Footprint, OutOfMemory};
+
+/// Probabilities of cells, in the arena's memory.
+#[derive(Clone, Copy, Debug)]
+pub struct Distribution2d<'m> {
+    width: usize,
+    height: usize,
+    /// For each row the ends of its cells, in 2^-32 of the row; the last end is `u32::MAX`.
+    cells: &'m [u32],
+    /// Ends of the rows.
+    rows: &'m [u32],
+}
+
+/// A sampled cell and where in it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Cell {
+    /// Column.
+    pub x: u32,
+    /// Row.
+    pub y: u32,
+    /// Place in the cell, [0, 1)².
+    pub offset: [f32; 2],
+    /// Density over the unit square; its integral is 1.
+    pub pdf: f32,
+}
+
+impl<'m> Distribution2d<'m> {
+    /// Bytes that [`Distribution2d::build`] takes.
+    pub fn footprint(width: usize, height: usize) -> Footprint {
+        Footprint::default().slice::<u32>(width.saturating_mul(height)).slice::<u32>(height)
+    }
+
+    /// From `weight(x, y)`, called once for each cell. Weights that are negative or not finite count as
+    /// zero; where all are zero, all cells are alike.
+    pub fn build(
+        width: usize,
+        height: usize,
+        mut weight: impl FnMut(usize, usize) -> f32,
+        arena: &mut Arena<'m>,
+    ) -> Result<Self, OutOfMemory> {
+        let cells: &mut [u32] = arena.slice(width.saturating_mul(height))?;
+        let rows: &mut [u32] = arena.slice(height)?;
+        if width > 0 {
+            for (y, (row, sum)) in cells.chunks_exact_mut(width).zip(rows.iter_mut()).enumerate() {
+                for (x, cell) in row.iter_mut().enumerate() {
+                    let w = weight(x, y);
+                    *cell = if w > 0.0 && w.is_finite() { w } else { 0.0 }.to_bits();
+                }
+                *sum = ((accumulate(row) / width as f64) as f32).to_bits();
+            }
+        }
+        accumulate(rows);
+        Ok(Self { width, height, cells, rows })
+    }
+
+    /// The cell at `u`, monotone in both coordinates. `None` where there are no cells.
+    #[inline]
+    pub fn sample(&self, u: [f32; 2]) -> Option<Cell> {
+        let (y, v, row_probability) = pick(self.rows, u[1])?;
+        let (x, u, cell_probability) = pick(self.row(y), u[0])?;
+        let pdf = row_probability * cell_probability * (self.width as f32 * self.height as f32);
+        Some(Cell { x: x as u32, y: y as u32, offset: [u, v], pdf })
+    }
+
+    /// The density over the unit square in cell (x, y); zero outside.
+    #[inline]
+    pub fn pdf(&self, x: usize, y: usize) -> f32 {
+        let probability = probability(self.rows, y) * probability(self.row(y), x);
+        probability * (self.width as f32 * self.height as f32)
+    }
+
+    #[inline]
+    fn row(&self, y: usize) -> &[u32] {
+        let start = y * self.width;
+        self.cells.get(start..start + self.width).unwrap_or(&[])
+    }
+}
+
+/// Turns weights (as bits of floats) into cumulative sums in units of 2^-32 of their total. Returns the total.
+fn accumulate(weights: &mut [u32]) -> f64 {
+    let total: f64 = weights.iter().map(|&w| f64::from(f32::from_bits(w))).sum();
+    let scale = if total > 0.0 { 4_294_967_296.0 / total } else { 4_294_967_296.0 / weights.len() as f64 };
+    let mut sum = 0.0;
+    let mut last_with_weight = weights.len().saturating_sub(1);
+    for (i, w) in weights.iter_mut().enumerate() {
+        let weight = if total > 0.0 { f64::from(f32::from_bits(*w)) } else { 1.0 };
+        if weight > 0.0 {
+            last_with_weight = i;
+        }
+        sum += weight;
+        *w = (sum * scale + 0.5) as u32;
+    }
+    // All that rounding left over belongs to the last cell that has weight; casts have saturated the rest.
+    for w in weights.iter_mut().skip(last_with_weight) {
+        *w = u32::MAX;
+    }
+    total
+}
+
+/// Start and end of bin `i`, the end of the last one being 2^32.
+#[inline]
+fn interval(ends: &[u32], i: usize) -> Option<(u64, u64)> {
+    let end = *ends.get(i)?;
+    let start = if i == 0 { 0 } else { ends[i - 1] };
+    let whole = |end: u32| if end == u32::MAX { 1 << 32 } else { u64::from(end) };
+    Some((whole(start), whole(end)))
+}
+
+#[inline]
+fn probability(ends: &[u32], i: usize) -> f32 {
+    interval(ends, i).map_or(0.0, |(start, end)| (end - start) as f32 / 4_294_967_296.0)
+}
+
+/// The bin at `u`, where in it, and its probability.
+#[inline]
+fn pick(ends: &[u32], u: f32) -> Option<(usize, f32, f32)> {
+    // 24 bits of u: at most 2^32 - 256, below the last end.
+    let target = (u.clamp(0.0, super::ONE_MINUS_EPSILON) * 4_294_967_296.0) as u32;
+    let i = ends.partition_point(|&end| end <= target);
+    let (start, end) = interval(ends, i)?;
+    let width = (end - start) as f32;
+    let offset = (u64::from(target) - start) as f32 / width;
+    Some((i, offset.min(super::ONE_MINUS_EPSILON), width / 4_294_967_296.0))
+}

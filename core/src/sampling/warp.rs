@@ -1,0 +1,73 @@
+//! Warps of the unit square to the shapes of light transport, each with the density of what it makes.
+//! Continuous and of low distortion, so that the stratification of the square survives.
+
+use super::trigonometry::{sin_cos_octant, sin_cos_turns};
+use core::f32::consts::{FRAC_1_PI, FRAC_PI_4, TAU};
+use glam::{Vec2, Vec3};
+
+/// A point of the unit disk, uniform (Shirley and Chiu 1997, concentric map). Density 1/π.
+#[inline]
+pub fn concentric_disk(u: [f32; 2]) -> Vec2 {
+    let (x, y) = (2.0 * u[0] - 1.0, 2.0 * u[1] - 1.0);
+    let steep = y.abs() > x.abs();
+    let (radius, other) = if steep { (y, x) } else { (x, y) };
+    if radius == 0.0 {
+        return Vec2::ZERO;
+    }
+    let (sin, cos) = sin_cos_octant(FRAC_PI_4 * (other / radius));
+    if steep { radius * Vec2::new(sin, cos) } else { radius * Vec2::new(cos, sin) }
+}
+
+/// A direction of the upper hemisphere with density [`cosine_hemisphere_pdf`].
+#[inline]
+pub fn cosine_hemisphere(u: [f32; 2]) -> Vec3 {
+    let d = concentric_disk(u);
+    d.extend(libm::sqrtf((1.0 - d.length_squared()).max(0.0)))
+}
+
+/// cos θ / π.
+#[inline]
+pub fn cosine_hemisphere_pdf(cos: f32) -> f32 {
+    cos.max(0.0) * FRAC_1_PI
+}
+
+/// A uniform direction. Density 1 / 4π.
+#[inline]
+pub fn uniform_sphere(u: [f32; 2]) -> Vec3 {
+    let z = 1.0 - 2.0 * u[0];
+    let radius = 2.0 * libm::sqrtf(u[0] * (1.0 - u[0]));
+    let (sin, cos) = sin_cos_turns(u[1]);
+    Vec3::new(radius * cos, radius * sin, z)
+}
+
+/// Density of [`uniform_sphere`].
+pub const UNIFORM_SPHERE_PDF: f32 = 0.25 * FRAC_1_PI;
+
+/// A uniform direction of the cone around +z; `one_minus_cos` is 1 − the cosine of its half-angle, which
+/// keeps its precision where the cone is narrow. Density [`uniform_cone_pdf`].
+#[inline]
+pub fn uniform_cone(u: [f32; 2], one_minus_cos: f32) -> Vec3 {
+    let h = u[0] * one_minus_cos;
+    let radius = libm::sqrtf((h * (2.0 - h)).max(0.0));
+    let (sin, cos) = sin_cos_turns(u[1]);
+    Vec3::new(radius * cos, radius * sin, 1.0 - h)
+}
+
+/// 1 / solid angle of the cone.
+#[inline]
+pub fn uniform_cone_pdf(one_minus_cos: f32) -> f32 {
+    1.0 / (TAU * one_minus_cos)
+}
+
+/// Barycentric weights of the second and third vertex, uniform over a triangle (Heitz 2019, "A Low-Distortion
+/// Map Between Triangle and Square"). Density 1 / area.
+#[inline]
+pub fn uniform_triangle(u: [f32; 2]) -> (f32, f32) {
+    if u[1] > u[0] {
+        let b1 = 0.5 * u[0];
+        (b1, u[1] - b1)
+    } else {
+        let b2 = 0.5 * u[1];
+        (u[0] - b2, b2)
+    }
+}
