@@ -1,6 +1,11 @@
-//! The camera: pinhole or thin lens.
+//! The camera: pinhole or thin lens. Raster coordinates are continuous, x to the right and y down; the
+//! middle of the first pixel is (0.5, 0.5).
 
-use glam::Vec3;
+mod framing;
+
+use crate::geometry::Ray;
+use crate::sampling::warp::concentric_disk;
+use glam::{Vec2, Vec3};
 
 /// A perspective camera. `aperture` 0 is a pinhole.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -19,4 +24,128 @@ pub struct Camera {
     pub lens_radius: f32,
     /// Distance along `forward` of what is sharp; of no effect for a pinhole.
     pub focus_distance: f32,
+}
+
+/// Where the camera sees a point, for light that is traced towards it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Projection {
+    /// Continuous raster coordinates.
+    pub raster: Vec2,
+    /// Unit direction from the lens to the point.
+    pub direction: Vec3,
+    /// Distance from the lens to the point.
+    pub distance: f32,
+    /// Density in solid angle, seen from the lens, of the rays of one uniformly sampled picture
+    /// (`width * height` pixels of raster area).
+    pub pdf: f32,
+}
+
+impl Camera {
+    /// A pinhole at `eye` that looks at `target`, with `up` to the top. Directions that do not span a
+    /// frame are replaced by the nearest ones that do.
+    pub fn look_at(eye: Vec3, target: Vec3, up: Vec3, vertical_fov_degrees: f32) -> Self {
+        let forward = direction(target - eye).unwrap_or(Vec3::NEG_Z);
+        let right = direction(up)
+            .and_then(|up| direction_unless_tiny(forward.cross(up)))
+            .unwrap_or_else(|| forward.any_orthonormal_vector());
+        let half = (0.5 * vertical_fov_degrees).clamp(1e-3, 89.0).to_radians();
+        Self {
+            eye,
+            right,
+            up: right.cross(forward),
+            forward,
+            tan_half_fov: libm::tanf(half),
+            lens_radius: 0.0,
+            focus_distance: 1.0,
+        }
+    }
+
+    /// The ray through (`x`, `y`) of a picture of `width` by `height` pixels, of unit direction. `lens` in
+    /// [0, 1)² chooses the point of the lens.
+    #[inline]
+    pub fn ray(&self, width: u32, height: u32, x: f32, y: f32, lens: [f32; 2]) -> Ray {
+        let pixel = 2.0 * self.tan_half_fov / height as f32;
+        let film = Vec2::new(x - 0.5 * width as f32, 0.5 * height as f32 - y) * pixel;
+        let through = self.forward + film.x * self.right + film.y * self.up;
+        if self.lens_radius > 0.0 {
+            let p = self.lens_radius * concentric_disk(lens);
+            let offset = p.x * self.right + p.y * self.up;
+            let focus = self.focus_distance * through - offset;
+            return Ray::new(self.eye + offset, focus.normalize());
+        }
+        Ray::new(self.eye, through.normalize())
+    }
+
+    /// The inverse of [`Camera::ray`]: where `point` is seen through the point `lens` of the lens. `None`
+    /// behind the camera; the raster coordinates may lie outside the picture.
+    #[inline]
+    pub fn project(&self, width: u32, height: u32, point: Vec3, lens: [f32; 2]) -> Option<Projection> {
+        let mut offset = Vec2::ZERO;
+        if self.lens_radius > 0.0 {
+            offset = self.lens_radius * concentric_disk(lens);
+        }
+        let to_point = point - self.eye - offset.x * self.right - offset.y * self.up;
+        let distance = to_point.length();
+        let depth = to_point.dot(self.forward);
+        if !(depth > 0.0 && distance < f32::INFINITY) {
+            return None;
+        }
+        // On the plane at depth 1: what is sharp lies where the ray meets the plane of focus.
+        let focus = if self.lens_radius > 0.0 { self.focus_distance } else { 1.0 };
+        let at_focus = Vec2::new(to_point.dot(self.right), to_point.dot(self.up)) / depth * focus + offset;
+        let film = at_focus / focus;
+        let pixel = 2.0 * self.tan_half_fov / height as f32;
+        let raster = Vec2::new(0.5 * width as f32 + film.x / pixel, 0.5 * height as f32 - film.y / pixel);
+        let cos = depth / distance;
+        let film_area = pixel * pixel * (width as f32 * height as f32);
+        let pdf = 1.0 / (film_area * cos * cos * cos);
+        Some(Projection { raster, direction: to_point / distance, distance, pdf })
+    }
+}
+
+/// The unit vector along `v`, of whatever length.
+fn direction(v: Vec3) -> Option<Vec3> {
+    let size = v.abs().max_element();
+    if size > 0.0 && size < f32::INFINITY { (v / size).try_normalize() } else { None }
+}
+
+/// The unit vector along the cross product of two unit vectors, unless they are as good as parallel.
+fn direction_unless_tiny(v: Vec3) -> Option<Vec3> {
+    if v.length_squared() > PARALLEL { v.try_normalize() } else { None }
+}
+
+/// Squared sine below which two directions count as parallel: above rounding, far below any camera's.
+const PARALLEL: f32 = 1e-10;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_picture_is_upright_and_its_centre_is_the_target() {
+        let camera =
+            Camera::look_at(Vec3::new(278.0, 273.0, -800.0), Vec3::new(278.0, 273.0, 0.0), Vec3::Y, 39.3);
+        let ray = |x, y| Vec3::from(camera.ray(64, 48, x, y, [0.0; 2]).direction);
+        assert!(ray(32.0, 24.0).distance(Vec3::Z) < 1e-6);
+        assert!(
+            ray(32.0, 0.0).y > 0.3 && ray(0.0, 24.0).x > 0.3,
+            "up is up, +x is left of a camera along +z"
+        );
+        let top = ray(32.0, 0.0);
+        assert!((top.y / top.z - libm::tanf(39.3f32.to_radians() / 2.0)).abs() < 1e-6);
+    }
+
+    #[test]
+    fn projection_inverts_the_ray_for_both_cameras() {
+        let mut camera = Camera::look_at(Vec3::new(1.0, 2.0, 3.0), Vec3::ZERO, Vec3::Z, 50.0);
+        camera.focus_distance = 4.0;
+        for radius in [0.0, 0.3] {
+            camera.lens_radius = radius;
+            let lens = [0.8, 0.3];
+            let ray = camera.ray(100, 50, 12.5, 40.25, lens);
+            let seen = camera.project(100, 50, ray.at(7.0), lens);
+            assert!(seen.is_some_and(|s| s.raster.distance(Vec2::new(12.5, 40.25)) < 1e-3));
+        }
+        assert_eq!(camera.project(100, 50, Vec3::new(2.0, 4.0, 6.0), [0.5; 2]), None);
+    }
 }
