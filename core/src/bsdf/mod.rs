@@ -1,1 +1,141 @@
-//! To be written.
+//! How light scatters at a point: one file per kind behind the closed enum [`Bsdf`].
+//!
+//! Directions are local: z is the shading normal on the side of the viewer, `wo` looks to the viewer and
+//! `wi` to where the light comes from; both point away from the surface. What is transmitted is radiance,
+//! so it carries the factor (n_o/n_i)² (Veach 1997, §5.2); [`BsdfSample::eta`] takes it back where
+//! something else, a photon's power, is carried.
+
+#![allow(clippy::neg_cmp_op_on_partial_ord, reason = "!(x > 0) is meant: it catches NaN as well")]
+
+mod coated;
+mod conductor;
+mod dielectric;
+mod diffuse;
+mod features;
+pub mod fresnel;
+pub mod ggx;
+mod glossy;
+mod mirror;
+mod plastic;
+mod resolve;
+mod rough_dielectric;
+
+pub use conductor::Conductor;
+pub use dielectric::Dielectric;
+pub use diffuse::Diffuse;
+pub use features::{All, DiffuseOnly, DiffuseTextured, Features, Only, Opaque, OpaquePlain, Plain};
+pub use glossy::Glossy;
+pub use mirror::Mirror;
+pub use plastic::Plastic;
+pub use rough_dielectric::RoughDielectric;
+
+use crate::Rgb;
+use glam::Vec3;
+
+/// A material at a hit point: textures looked up, indices turned to the side of the viewer.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Bsdf {
+    /// Lambert.
+    Diffuse(Diffuse),
+    /// Perfect mirror.
+    Mirror(Mirror),
+    /// Metal, smooth or rough.
+    Conductor(Conductor),
+    /// Coat over a base by Schlick's formula.
+    Glossy(Glossy),
+    /// Dielectric coat over a base.
+    Plastic(Plastic),
+    /// Smooth glass.
+    Dielectric(Dielectric),
+    /// Rough glass.
+    RoughDielectric(RoughDielectric),
+}
+
+/// A direction that [`Bsdf::sample`] chose.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BsdfSample {
+    /// Unit direction, local.
+    pub direction: Vec3,
+    /// f |cos| / pdf, the factor on the path's throughput.
+    pub weight: Rgb,
+    /// Density in solid angle, of all lobes together; the probability of the choice where `delta`.
+    pub pdf: f32,
+    /// The direction was the only one possible: no other technique can find it.
+    pub delta: bool,
+    /// The direction leads to the other side of the surface.
+    pub transmitted: bool,
+    /// Index of refraction on the side of `direction` over that of the viewer; 1 where reflected.
+    pub eta: f32,
+}
+
+impl BsdfSample {
+    #[inline]
+    fn reflection(direction: Vec3, weight: Rgb, pdf: f32) -> Self {
+        Self { direction, weight, pdf, delta: false, transmitted: false, eta: 1.0 }
+    }
+
+    #[inline]
+    fn mirrored(wo: Vec3, weight: Rgb, probability: f32) -> Self {
+        let direction = Vec3::new(-wo.x, -wo.y, wo.z);
+        Self { direction, weight, pdf: probability, delta: true, transmitted: false, eta: 1.0 }
+    }
+}
+
+impl Bsdf {
+    /// Chooses where the light that leaves to `wo` (`wo.z` > 0) came from; `u` in [0, 1), `u[2]` picks the
+    /// lobe. `None`: absorbed.
+    #[inline]
+    pub fn sample<F: Features>(&self, wo: Vec3, u: [f32; 3]) -> Option<BsdfSample> {
+        match self {
+            Bsdf::Diffuse(b) => b.sample([u[0], u[1]]),
+            Bsdf::Mirror(b) if F::GLOSSY => b.sample(wo),
+            Bsdf::Conductor(b) if F::GLOSSY => b.sample(wo, [u[0], u[1]]),
+            Bsdf::Glossy(b) if F::GLOSSY => coated::sample(b, wo, u),
+            Bsdf::Plastic(b) if F::GLOSSY => coated::sample(b, wo, u),
+            Bsdf::Dielectric(b) if F::DIELECTRIC => b.sample(wo, u[2]),
+            Bsdf::RoughDielectric(b) if F::DIELECTRIC => b.sample(wo, u),
+            _ => None,
+        }
+    }
+
+    /// f(wo, wi) |cos θ_i| and the density with which [`Bsdf::sample`] chooses `wi`. Zeros for directions
+    /// that only a delta lobe connects.
+    #[inline]
+    pub fn evaluate<F: Features>(&self, wo: Vec3, wi: Vec3) -> (Rgb, f32) {
+        match self {
+            Bsdf::Diffuse(b) => b.evaluate(wi),
+            Bsdf::Conductor(b) if F::GLOSSY => b.evaluate(wo, wi),
+            Bsdf::Glossy(b) if F::GLOSSY => coated::evaluate(b, wo, wi),
+            Bsdf::Plastic(b) if F::GLOSSY => coated::evaluate(b, wo, wi),
+            Bsdf::RoughDielectric(b) if F::DIELECTRIC => b.evaluate(wo, wi),
+            _ => (Rgb::ZERO, 0.0),
+        }
+    }
+
+    /// Whether every lobe is a delta lobe: to connect it to a light is in vain.
+    #[inline]
+    pub fn is_delta(&self) -> bool {
+        match self {
+            Bsdf::Diffuse(_) | Bsdf::RoughDielectric(_) => false,
+            Bsdf::Mirror(_) | Bsdf::Dielectric(_) => true,
+            Bsdf::Conductor(b) => b.alpha == 0.0,
+            Bsdf::Glossy(b) => b.is_delta(),
+            Bsdf::Plastic(b) => b.is_delta(),
+        }
+    }
+
+    /// Whether light passes to the other side.
+    #[inline]
+    pub fn transmits(&self) -> bool {
+        matches!(self, Bsdf::Dielectric(_) | Bsdf::RoughDielectric(_))
+    }
+}
+
+// A hit carries one through the shading stages: keep it within a cache line.
+const _: () = assert!(size_of::<Bsdf>() <= 64);
+
+/// Square root, correctly rounded: one instruction where the processor has one.
+#[inline]
+fn sqrt(x: f32) -> f32 {
+    libm::sqrtf(x)
+}

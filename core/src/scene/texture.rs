@@ -1,4 +1,7 @@
-//! Borrowed texels and how they are looked up: bilinear, wrapped, decoded to linear.
+//! Borrowed texels and how they are looked up: bilinear, wrapped, decoded to linear. No input, however
+//! wild, panics: coordinates that are not finite count as 0, a texture without texels is white.
+
+use glam::{Vec2, Vec3, Vec4};
 
 /// Index into the textures of the scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -35,4 +38,195 @@ pub struct Texture<'a> {
     pub texels: Texels<'a>,
     /// Beyond the edge.
     pub wrap: Wrap,
+}
+
+impl Texture<'_> {
+    /// Linear RGBA at texture coordinates `uv`: bilinear between texel centres, v up. Alpha is 1 where the
+    /// texels have none.
+    #[inline]
+    pub fn lookup(&self, uv: Vec2) -> [f32; 4] {
+        let (x0, x1, fx) = self.wrap.neighbours(uv.x, self.width);
+        let (y0, y1, fy) = self.wrap.neighbours(1.0 - uv.y, self.height);
+        let (top, bottom) = (y0 as usize * self.width as usize, y1 as usize * self.width as usize);
+        let (x0, x1) = (x0 as usize, x1 as usize);
+        let upper = self.texel(top + x0).lerp(self.texel(top + x1), fx);
+        let lower = self.texel(bottom + x0).lerp(self.texel(bottom + x1), fx);
+        upper.lerp(lower, fy).to_array()
+    }
+
+    /// Slope (∂/∂u, ∂/∂v) of the luminance at `uv`, per unit of texture coordinates: central differences
+    /// over one texel, hence continuous. For height maps.
+    pub fn gradient(&self, uv: Vec2) -> Vec2 {
+        let size = Vec2::new(self.width as f32, self.height as f32);
+        let half = 0.5 / size.max(Vec2::ONE);
+        let height = |du: f32, dv: f32| luminance(self.lookup(uv + Vec2::new(du, dv)));
+        Vec2::new(height(half.x, 0.0) - height(-half.x, 0.0), height(0.0, half.y) - height(0.0, -half.y))
+            * size
+    }
+
+    /// The texel at `index`, linear; white where there is none.
+    #[inline]
+    fn texel(&self, index: usize) -> Vec4 {
+        match self.texels {
+            Texels::Srgb8(texels) => match texels.get(index) {
+                Some(&[r, g, b, a]) => Vec4::new(
+                    SRGB_TO_LINEAR[r as usize],
+                    SRGB_TO_LINEAR[g as usize],
+                    SRGB_TO_LINEAR[b as usize],
+                    f32::from(a) / 255.0,
+                ),
+                None => Vec4::ONE,
+            },
+            Texels::Linear8(texels) => match texels.get(index) {
+                Some(&[r, g, b, a]) => Vec4::new(r.into(), g.into(), b.into(), a.into()) / 255.0,
+                None => Vec4::ONE,
+            },
+            Texels::Float(texels) => texels.get(index).map_or(Vec4::ONE, |&rgb| Vec3::from(rgb).extend(1.0)),
+        }
+    }
+}
+
+impl Wrap {
+    /// The two texels around coordinate `x` (0 … 1 spans `size` texels) and the weight of the second.
+    #[inline]
+    fn neighbours(self, x: f32, size: u32) -> (u32, u32, f32) {
+        // Beyond 2^23 coordinates are whole numbers; NaN fails the comparison as well.
+        const WHOLE: f32 = 8_388_608.0;
+        let x = if x.abs() < WHOLE { x } else { 0.0 };
+        let last = size.saturating_sub(1);
+        match self {
+            Wrap::Repeat => {
+                let texel = (x - floor(x)) * size as f32 - 0.5;
+                let below = floor(texel);
+                let index = below as i32;
+                let first = if index < 0 { last } else { (index as u32).min(last) };
+                let second = if first == last { 0 } else { first + 1 };
+                (first, second, texel - below)
+            }
+            Wrap::Clamp => {
+                let texel = (x.clamp(0.0, 1.0) * size as f32 - 0.5).clamp(0.0, last as f32);
+                let first = (texel as u32).min(last);
+                (first, (first + 1).min(last), texel - first as f32)
+            }
+        }
+    }
+}
+
+/// The largest whole number not above `x`, for |x| < 2^31: two instructions where `libm` calls a function.
+#[inline]
+fn floor(x: f32) -> f32 {
+    let whole = x as i32 as f32;
+    if whole > x { whole - 1.0 } else { whole }
+}
+
+/// Rec. 709 luminance.
+#[inline]
+fn luminance([r, g, b, _]: [f32; 4]) -> f32 {
+    0.2126 * r + 0.7152 * g + 0.0722 * b
+}
+
+/// The sRGB curve (IEC 61966-2-1) of every byte.
+static SRGB_TO_LINEAR: [f32; 256] = {
+    let mut table = [0.0; 256];
+    let mut i = 0;
+    while i < 256 {
+        let encoded = i as f64 / 255.0;
+        table[i] = if encoded <= 0.04045 {
+            (encoded / 12.92) as f32
+        } else {
+            power_12_5((encoded + 0.055) / 1.055) as f32
+        };
+        i += 1;
+    }
+    table
+};
+
+/// x^2.4 for `x` in 0.05 … 1, at compile time: the twelfth power of Newton's fifth root.
+const fn power_12_5(x: f64) -> f64 {
+    let mut root = 1.0;
+    let mut step = 0;
+    while step < 40 {
+        root -= (root - x / (root * root * root * root)) / 5.0;
+        step += 1;
+    }
+    let cube = root * root * root;
+    cube * cube * cube * cube
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const RGBW: [[f32; 3]; 4] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 1.0, 1.0]];
+
+    fn texture(wrap: Wrap) -> Texture<'static> {
+        Texture { width: 2, height: 2, texels: Texels::Float(&RGBW), wrap }
+    }
+
+    #[test]
+    fn texel_centres_are_exact_and_v_points_up() {
+        for wrap in [Wrap::Repeat, Wrap::Clamp] {
+            let t = texture(wrap);
+            assert_eq!(t.lookup(Vec2::new(0.25, 0.75)), [1.0, 0.0, 0.0, 1.0]);
+            assert_eq!(t.lookup(Vec2::new(0.75, 0.75)), [0.0, 1.0, 0.0, 1.0]);
+            assert_eq!(t.lookup(Vec2::new(0.25, 0.25)), [0.0, 0.0, 1.0, 1.0]);
+            assert_eq!(t.lookup(Vec2::new(0.5, 0.5)), [0.5, 0.5, 0.5, 1.0]);
+        }
+    }
+
+    #[test]
+    fn edges_repeat_or_hold() {
+        assert_eq!(texture(Wrap::Repeat).lookup(Vec2::new(0.0, 0.75)), [0.5, 0.5, 0.0, 1.0]);
+        assert_eq!(texture(Wrap::Repeat).lookup(Vec2::new(-2.75, 3.75)), [1.0, 0.0, 0.0, 1.0]);
+        assert_eq!(texture(Wrap::Clamp).lookup(Vec2::new(-5.0, 0.75)), [1.0, 0.0, 0.0, 1.0]);
+        assert_eq!(texture(Wrap::Clamp).lookup(Vec2::new(9.0, -9.0)), [1.0, 1.0, 1.0, 1.0]);
+    }
+
+    #[test]
+    fn the_srgb_curve() {
+        for (byte, &linear) in SRGB_TO_LINEAR.iter().enumerate() {
+            let e = byte as f64 / 255.0;
+            let expected = if e <= 0.04045 { e / 12.92 } else { ((e + 0.055) / 1.055).powf(2.4) };
+            assert_eq!(linear, expected as f32, "{byte}");
+        }
+        let texels = [[188, 0, 255, 51]];
+        let t = Texture { width: 1, height: 1, texels: Texels::Srgb8(&texels), wrap: Wrap::Repeat };
+        let [r, g, b, a] = t.lookup(Vec2::ZERO);
+        assert!((r - 0.502_886).abs() < 1e-5 && g == 0.0 && b == 1.0 && a == 0.2);
+        let t = Texture { texels: Texels::Linear8(&texels), ..t };
+        assert_eq!(t.lookup(Vec2::ZERO), [188.0 / 255.0, 0.0, 1.0, 0.2]);
+    }
+
+    #[test]
+    fn a_ramp_has_a_constant_slope() {
+        let ramp: [[f32; 3]; 32] = core::array::from_fn(|i| [(i % 8) as f32 * 0.5 - (i / 8) as f32; 3]);
+        let t = Texture { width: 8, height: 4, texels: Texels::Float(&ramp), wrap: Wrap::Clamp };
+        let slope = t.gradient(Vec2::new(0.5, 0.5));
+        // Half a unit a texel, 8 texels a unit of u; minus one a row downwards, 4 rows a unit of v.
+        assert!(slope.distance(Vec2::new(4.0, 4.0)) < 1e-4, "{slope}");
+    }
+
+    #[test]
+    fn wild_coordinates_and_broken_textures() {
+        let wild =
+            [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, 1e30, -1e30, 8_388_607.5, -1e-9, 1.0 - 1e-8, 0.0];
+        let sizes = [(2, 2), (0, 0), (1, 0), (u32::MAX, 1), (1, u32::MAX), (3, 2)];
+        for wrap in [Wrap::Repeat, Wrap::Clamp] {
+            for (width, height) in sizes {
+                let t = Texture { width, height, ..texture(wrap) };
+                for u in wild {
+                    for v in wild {
+                        let rgba = t.lookup(Vec2::new(u, v));
+                        assert!(
+                            rgba.iter().all(|c| (0.0..=1.0).contains(c)),
+                            "{width} {height} {u} {v} {rgba:?}"
+                        );
+                        assert!(t.gradient(Vec2::new(u, v)).is_finite());
+                    }
+                }
+            }
+        }
+        let none = Texture { width: 4, height: 4, texels: Texels::Float(&[]), wrap: Wrap::Repeat };
+        assert_eq!(none.lookup(Vec2::splat(0.3)), [1.0; 4]);
+    }
 }

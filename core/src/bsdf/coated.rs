@@ -1,0 +1,95 @@
+//! A rough or smooth coat over a diffuse base: what the coat does not reflect, on the way in and on the way
+//! out, meets the base (Ashikhmin et al. 2000, §2.4; Kelemen and Szirmay-Kalos 2001):
+//!
+//! f = D G2 F / (4 cos θ_o cos θ_i) + base · T(θ_o) T(θ_i) / π
+//!
+//! Symmetric in the directions, hence reciprocal. [`super::Glossy`] and [`super::Plastic`] say what F, T and
+//! base are, and why no energy is gained.
+
+use super::BsdfSample;
+use super::conductor::half_cosine;
+use super::ggx::Ggx;
+use crate::Rgb;
+use crate::sampling::warp::cosine_hemisphere;
+use core::f32::consts::FRAC_1_PI;
+use glam::Vec3;
+
+/// A kind of coat.
+pub(super) trait Coat {
+    /// GGX alpha; 0 is smooth.
+    fn alpha(&self) -> f32;
+    /// F: reflectance of a microfacet at the cosine `c`.
+    fn reflectance(&self, c: f32) -> Rgb;
+    /// T: the share of light from a direction of cosine `c` that passes the coat.
+    fn transmittance(&self, c: f32) -> Rgb;
+    /// What the coat reflects of light from `c`, where `transmittance` is T there. An estimate.
+    fn specular_albedo(&self, c: f32, transmittance: Rgb) -> Rgb;
+    /// Factor of the base.
+    fn base(&self) -> Rgb;
+    /// ∫ 2c T(c) dc: how much of the light that leaves the base evenly gets out. An estimate.
+    fn mean_transmittance(&self) -> Rgb;
+
+    /// Probability of the coat's lobe: its part of the energy that leaves to `wo`.
+    #[inline]
+    fn coat_probability(&self, c: f32, transmittance: Rgb) -> f32 {
+        let coat = self.specular_albedo(c, transmittance).element_sum();
+        let base = (self.base() * transmittance * self.mean_transmittance()).element_sum();
+        if base > 0.0 { (coat / (coat + base)).clamp(0.0, 1.0) } else { 1.0 }
+    }
+}
+
+/// See [`super::Bsdf::sample`].
+#[inline]
+pub(super) fn sample(coat: &impl Coat, wo: Vec3, u: [f32; 3]) -> Option<BsdfSample> {
+    let transmittance_o = coat.transmittance(wo.z);
+    let p = coat.coat_probability(wo.z, transmittance_o);
+    let smooth = coat.alpha() == 0.0;
+    if u[2] < p {
+        if smooth {
+            return Some(BsdfSample::mirrored(wo, coat.reflectance(wo.z) / p, p));
+        }
+        let wi = Ggx::new(coat.alpha()).sample_reflection(wo, [u[0], u[1]]);
+        return weighted(coat, wo, wi, transmittance_o, p);
+    }
+    let wi = cosine_hemisphere([u[0], u[1]]);
+    if smooth {
+        // D, the cosine and π cancel.
+        let weight = coat.base() * transmittance_o * coat.transmittance(wi.z) / (1.0 - p);
+        return Some(BsdfSample::reflection(wi, weight, (1.0 - p) * wi.z * FRAC_1_PI));
+    }
+    weighted(coat, wo, wi, transmittance_o, p)
+}
+
+/// See [`super::Bsdf::evaluate`].
+#[inline]
+pub(super) fn evaluate(coat: &impl Coat, wo: Vec3, wi: Vec3) -> (Rgb, f32) {
+    if !(wi.z > 0.0) {
+        return (Rgb::ZERO, 0.0);
+    }
+    let transmittance_o = coat.transmittance(wo.z);
+    both_lobes(coat, wo, wi, transmittance_o, coat.coat_probability(wo.z, transmittance_o))
+}
+
+#[inline]
+fn weighted(coat: &impl Coat, wo: Vec3, wi: Vec3, transmittance_o: Rgb, p: f32) -> Option<BsdfSample> {
+    if !(wi.z > 0.0) {
+        return None;
+    }
+    let (value, pdf) = both_lobes(coat, wo, wi, transmittance_o, p);
+    (pdf > 0.0).then(|| BsdfSample::reflection(wi, value / pdf, pdf))
+}
+
+/// f cos θ_i and the density, of base and rough coat together.
+#[inline]
+fn both_lobes(coat: &impl Coat, wo: Vec3, wi: Vec3, transmittance_o: Rgb, p: f32) -> (Rgb, f32) {
+    let cosine = wi.z * FRAC_1_PI;
+    let base = coat.base() * transmittance_o * coat.transmittance(wi.z) * cosine;
+    let base_pdf = (1.0 - p) * cosine;
+    if coat.alpha() == 0.0 {
+        return (base, base_pdf);
+    }
+    let ggx = Ggx::new(coat.alpha());
+    let h = wo + wi;
+    let lobe = coat.reflectance(half_cosine(wo, h)) * (ggx.density(h) * ggx.visibility(wo, wi) * wi.z);
+    (base + lobe, base_pdf + p * ggx.reflection_density(wo, h))
+}

@@ -1,0 +1,54 @@
+//! What a scene needs of the shading code, as constants: every branch for a feature that the census does
+//! not find is removed at compile time.
+
+/// Which kinds of shading a build of a method can meet. The code of an absent one is not compiled in.
+pub trait Features: Copy + Send + Sync + 'static {
+    /// Colours and numbers may come from textures.
+    const TEXTURES: bool;
+    /// Surfaces that reflect other than diffusely: mirror, conductor, glossy, plastic.
+    const GLOSSY: bool;
+    /// Surfaces that transmit: smooth and rough dielectrics.
+    const DIELECTRIC: bool;
+    /// Normal and bump maps.
+    const NORMAL_MAPS: bool;
+    /// Opacity below one.
+    const CUTOUT: bool;
+}
+
+/// Exactly the features whose parameter is `true`.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Only<
+    const TEXTURES: bool,
+    const GLOSSY: bool,
+    const DIELECTRIC: bool,
+    const NORMAL_MAPS: bool,
+    const CUTOUT: bool,
+>;
+
+impl<
+    const TEXTURES: bool,
+    const GLOSSY: bool,
+    const DIELECTRIC: bool,
+    const NORMAL_MAPS: bool,
+    const CUTOUT: bool,
+> Features for Only<TEXTURES, GLOSSY, DIELECTRIC, NORMAL_MAPS, CUTOUT>
+{
+    const TEXTURES: bool = TEXTURES;
+    const GLOSSY: bool = GLOSSY;
+    const DIELECTRIC: bool = DIELECTRIC;
+    const NORMAL_MAPS: bool = NORMAL_MAPS;
+    const CUTOUT: bool = CUTOUT;
+}
+
+/// Every feature on: right for any scene.
+pub type All = Only<true, true, true, true, true>;
+/// Diffuse surfaces of one colour each.
+pub type DiffuseOnly = Only<false, false, false, false, false>;
+/// Diffuse surfaces with textures.
+pub type DiffuseTextured = Only<true, false, false, false, false>;
+/// Everything that reflects, of one colour each: no glass, no textures.
+pub type OpaquePlain = Only<false, true, false, false, false>;
+/// Everything that reflects, with every kind of texture: no glass.
+pub type Opaque = Only<true, true, false, true, true>;
+/// Every surface, no texture of any kind.
+pub type Plain = Only<false, true, true, false, false>;

@@ -1,0 +1,90 @@
+//! Fresnel's equations for a dielectric boundary, and Schlick's approximation for the rest.
+
+use super::sqrt;
+use crate::Rgb;
+
+/// Reflectance of unpolarised light at a boundary of relative index `eta` = n_t / n_i, for the cosine of
+/// incidence `c` > 0; 1 where everything is reflected inside. (Cook and Torrance 1982, eq. 16, with
+/// g = eta cos θ_t.)
+#[inline]
+pub fn dielectric(c: f32, eta: f32) -> f32 {
+    // (eta - 1)(eta + 1) keeps the digits that eta² - 1 loses near 1.
+    let g2 = (eta - 1.0) * (eta + 1.0) + c * c;
+    if !(g2 > 0.0) {
+        return 1.0;
+    }
+    let g = sqrt(g2);
+    let r_s = (c - g) / (c + g);
+    let eta2_c = eta * eta * c;
+    let r_p = (eta2_c - g) / (eta2_c + g);
+    0.5 * (r_s * r_s + r_p * r_p)
+}
+
+/// (1 - c)^5, the weight of white in Schlick's approximation; `c` in 0 … 1.
+#[inline]
+pub fn schlick_weight(c: f32) -> f32 {
+    let m = (1.0 - c).clamp(0.0, 1.0);
+    let m2 = m * m;
+    m2 * m2 * m
+}
+
+/// Schlick 1994, eq. 24: from `f0` at normal incidence to white at grazing incidence.
+#[inline]
+pub fn schlick(f0: Rgb, c: f32) -> Rgb {
+    f0 + (Rgb::ONE - f0) * schlick_weight(c)
+}
+
+/// Reflectance at normal incidence of a boundary of relative index `eta`.
+#[inline]
+pub fn normal_incidence(eta: f32) -> f32 {
+    let r = (eta - 1.0) / (eta + 1.0);
+    r * r
+}
+
+/// Mean over the hemisphere, weighted by the cosine, of [`dielectric`] for `eta` >= 1: a polynomial in the
+/// amplitude (η - 1)/(η + 1), right to 6e-4 up to η = 10 (the exact integral needs logarithms).
+#[inline]
+pub fn mean_external_reflectance(eta: f32) -> f32 {
+    let r = (eta - 1.0) / (eta + 1.0);
+    let p = 7.973_348 - 2.666_957_2 * r;
+    r * (0.579_872_35 + r * (-1.437_609_5 + r * (5.702_148 + r * (-9.190_549 + r * p))))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn known_values() {
+        assert!((dielectric(1.0, 1.5) - 0.04).abs() < 1e-7);
+        assert_eq!(dielectric(0.3, 1.0), 0.0);
+        // Brewster's angle of glass: only r_s is left, ((1 - 2.25) / (1 + 2.25))².
+        let brewster = 1.0 / (1.0f32 + 2.25).sqrt();
+        assert!((dielectric(brewster, 1.5) - 0.5 * (1.25f32 / 3.25).powi(2)).abs() < 1e-6);
+        // From inside beyond the critical angle, sin θ = 1/1.5.
+        assert_eq!(dielectric((1.0 - 1.0f32 / 2.25).sqrt() - 1e-4, 1.0 / 1.5), 1.0);
+        assert!(dielectric(1e-6, 1.5) > 0.9999);
+    }
+
+    #[test]
+    fn the_same_from_both_sides() {
+        for eta in [1.0 + 1e-6, 1.33, 1.5, 10.0f32] {
+            for c in [0.01f32, 0.2, 0.5, 0.9, 1.0] {
+                let c_t = (1.0 - (1.0 - c * c) / (eta * eta)).sqrt();
+                let (a, b) = (dielectric(c, eta), dielectric(c_t, 1.0 / eta));
+                // The rounding of c_t grows by eta² / c on the way back.
+                assert!((a - b).abs() < 5e-7 * eta * eta / c, "{eta} {c}: {a} {b}");
+            }
+        }
+    }
+
+    #[test]
+    fn stays_within_zero_and_one() {
+        for eta in [0.1, 1.0 - 1e-6, 1.0, 1.0 + 1e-6, 1.5, 10.0, 1e4f32] {
+            for c in [1e-30, 1e-6, 1e-3, 0.5, 1.0f32] {
+                let f = dielectric(c, eta);
+                assert!((0.0..=1.0).contains(&f), "{eta} {c}: {f}");
+            }
+        }
+    }
+}

@@ -1,0 +1,78 @@
+//! What MTL's Kd + Ks and Pm mean: a coat of Schlick's reflectance over a diffuse base, fading to metal.
+//!
+//! With E the directional albedo of the coat and Ē its mean, T = 1 - E and base = colour / (1 - Ē): the base
+//! returns colour · (1 - E(θ_o)), so coat and base together return at most E + (1 - E) = 1 for every colour
+//! up to white (Kelemen and Szirmay-Kalos 2001, eq. 5; Kulla and Conty 2017). The mix with metal is a
+//! weighted mean of two such surfaces.
+
+use super::coated::Coat;
+use super::{fresnel, resolve::unit};
+use crate::Rgb;
+
+/// A coat over a base, mixed with metal. See the module.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Glossy {
+    /// Colour of the base, over the mean transmittance of the coat, times 1 - metallic.
+    base: Rgb,
+    /// Reflectance of the coat at normal incidence.
+    specular: Rgb,
+    /// Of coat and metal mixed: Schlick's formula is linear in it.
+    f0: Rgb,
+    /// GGX alpha; 0 is smooth.
+    alpha: f32,
+}
+
+/// Mean of (1 - c)^5 over the hemisphere, weighted by the cosine.
+const MEAN_SCHLICK: f32 = 1.0 / 21.0;
+
+impl Glossy {
+    /// From colours in 0 … 1, alpha as in [`super::Conductor`], `metallic` 0 … 1.
+    #[inline]
+    pub fn new(color: Rgb, specular: Rgb, alpha: f32, metallic: f32) -> Self {
+        let metallic = unit(metallic);
+        let mean = (Rgb::ONE - specular) * (1.0 - MEAN_SCHLICK);
+        Self {
+            // A coat that reflects all leaves nothing to divide.
+            base: color * (1.0 - metallic) / mean.max(Rgb::splat(f32::MIN_POSITIVE)),
+            specular,
+            f0: specular.lerp(color, metallic),
+            alpha,
+        }
+    }
+
+    pub(super) fn is_delta(&self) -> bool {
+        self.alpha == 0.0 && self.base == Rgb::ZERO
+    }
+}
+
+impl Coat for Glossy {
+    #[inline]
+    fn alpha(&self) -> f32 {
+        self.alpha
+    }
+
+    #[inline]
+    fn reflectance(&self, c: f32) -> Rgb {
+        fresnel::schlick(self.f0, c)
+    }
+
+    #[inline]
+    fn transmittance(&self, c: f32) -> Rgb {
+        (Rgb::ONE - self.specular) * (1.0 - fresnel::schlick_weight(c))
+    }
+
+    #[inline]
+    fn specular_albedo(&self, c: f32, _: Rgb) -> Rgb {
+        fresnel::schlick(self.f0, c)
+    }
+
+    #[inline]
+    fn base(&self) -> Rgb {
+        self.base
+    }
+
+    #[inline]
+    fn mean_transmittance(&self) -> Rgb {
+        (Rgb::ONE - self.specular) * (1.0 - MEAN_SCHLICK)
+    }
+}

@@ -1,0 +1,92 @@
+//! A dielectric coat over a diffuse base: plastic, varnish, glazed tiles. Light that the base sends back is
+//! reflected inside the coat, meets the base again, and so on; the series has the sum
+//!
+//! base = colour / (1 - colour · R_i) / η²
+//!
+//! with R_i the mean internal reflectance: 1 - R_i = (1 - R_e) / η² by reciprocity. (The model of Mitsuba's
+//! `plastic` and `roughplastic` with `nonlinear` set.) White stays white: T(θ_o) is all that comes back.
+
+use super::coated::Coat;
+use super::{fresnel, resolve::unit};
+use crate::Rgb;
+
+/// A dielectric coat over a diffuse base, mixed with metal. See the module.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Plastic {
+    /// Factor of the base; includes 1 - metallic.
+    base: Rgb,
+    /// Factor on the coat's Fresnel reflectance; includes 1 - metallic.
+    coat: Rgb,
+    /// Reflectance of the metal at normal incidence; includes metallic.
+    metal: Rgb,
+    metallic: f32,
+    /// GGX alpha; 0 is smooth.
+    alpha: f32,
+    /// Index of refraction of the coat, at least 1.
+    eta: f32,
+    mean_transmittance: f32,
+}
+
+impl Plastic {
+    /// From the base's colour, the coat's reflectance at normal incidence (what it would have by `eta`, times
+    /// a tint), alpha as in [`super::Conductor`], `metallic` 0 … 1, the index of refraction.
+    #[inline]
+    pub fn new(color: Rgb, specular: Rgb, alpha: f32, metallic: f32, eta: f32) -> Self {
+        let metallic = unit(metallic);
+        let eta = if eta.is_finite() { eta.max(1.0) } else { 1.0 };
+        let f0 = fresnel::normal_incidence(eta);
+        let tint = if f0 > 0.0 { (specular / f0).min(Rgb::ONE) } else { Rgb::ONE };
+        let external = fresnel::mean_external_reflectance(eta);
+        let internal = 1.0 - (1.0 - external) / (eta * eta);
+        Self {
+            base: color * (1.0 - metallic) / ((Rgb::ONE - color * internal) * (eta * eta)),
+            coat: tint * (1.0 - metallic),
+            metal: color * metallic,
+            metallic,
+            alpha,
+            eta,
+            mean_transmittance: 1.0 - external,
+        }
+    }
+
+    pub(super) fn is_delta(&self) -> bool {
+        self.alpha == 0.0 && self.base == Rgb::ZERO
+    }
+
+    #[inline]
+    fn mix(&self, coat: f32, schlick: f32) -> Rgb {
+        self.coat * coat + self.metal + (Rgb::splat(self.metallic) - self.metal) * schlick
+    }
+}
+
+impl Coat for Plastic {
+    #[inline]
+    fn alpha(&self) -> f32 {
+        self.alpha
+    }
+
+    #[inline]
+    fn reflectance(&self, c: f32) -> Rgb {
+        self.mix(fresnel::dielectric(c, self.eta), fresnel::schlick_weight(c))
+    }
+
+    #[inline]
+    fn transmittance(&self, c: f32) -> Rgb {
+        Rgb::splat(1.0 - fresnel::dielectric(c, self.eta))
+    }
+
+    #[inline]
+    fn specular_albedo(&self, c: f32, transmittance: Rgb) -> Rgb {
+        self.mix(1.0 - transmittance.x, fresnel::schlick_weight(c))
+    }
+
+    #[inline]
+    fn base(&self) -> Rgb {
+        self.base
+    }
+
+    #[inline]
+    fn mean_transmittance(&self) -> Rgb {
+        Rgb::splat(self.mean_transmittance)
+    }
+}

@@ -1,0 +1,95 @@
+//! The rough boundary between two media: GGX microfacets, each a smooth dielectric (Walter et al. 2007).
+
+use super::dielectric::{reflection_probability, refract};
+use super::ggx::Ggx;
+use super::{BsdfSample, fresnel};
+use crate::Rgb;
+use glam::Vec3;
+
+/// Frosted glass, seen from one of its sides. Masking and shadowing are correlated by height where light is
+/// reflected, independent where it is transmitted (closer there to the exact Beta function of Heitz 2014,
+/// eq. 101, than the formula of reflection).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RoughDielectric {
+    /// Index of refraction beyond the surface over that on the side of the viewer; not 1.
+    pub eta: f32,
+    /// GGX alpha.
+    pub alpha: f32,
+    /// Factor on what is transmitted, 0 … 1.
+    pub tint: Rgb,
+}
+
+impl RoughDielectric {
+    #[inline]
+    pub(super) fn sample(&self, wo: Vec3, u: [f32; 3]) -> Option<BsdfSample> {
+        let ggx = Ggx::new(self.alpha);
+        let m = ggx.sample_visible(wo, [u[0], u[1]]);
+        let c = wo.dot(m);
+        if !(c > 0.0) {
+            return None;
+        }
+        let reflectance = fresnel::dielectric(c, self.eta);
+        let p = reflection_probability(reflectance, self.tint);
+        let normals = ggx.visible_density(wo, m, c);
+        if u[2] < p {
+            let wi = 2.0 * c * m - wo;
+            if !(wi.z > 0.0) {
+                return None;
+            }
+            // G2 / G1(wo), with G2 = 4 cos θ_o cos θ_i visibility.
+            let shadowing = 4.0 * wo.z * wi.z * ggx.visibility(wo, wi) / ggx.masking(wo);
+            let weight = Rgb::splat(reflectance / p * shadowing);
+            return Some(BsdfSample::reflection(wi, weight, p * normals / (4.0 * c)));
+        }
+        let wi = refract(wo, m, c, self.eta);
+        let c_i = -wi.dot(m);
+        if !(wi.z < 0.0 && c_i > 0.0 && p < 1.0) {
+            return None;
+        }
+        let scale = (1.0 - reflectance) / ((1.0 - p) * self.eta * self.eta);
+        Some(BsdfSample {
+            direction: wi,
+            weight: self.tint * (scale * ggx.masking(wi)),
+            pdf: (1.0 - p) * normals * self.refraction_jacobian(c, c_i),
+            delta: false,
+            transmitted: true,
+            eta: self.eta,
+        })
+    }
+
+    #[inline]
+    pub(super) fn evaluate(&self, wo: Vec3, wi: Vec3) -> (Rgb, f32) {
+        let ggx = Ggx::new(self.alpha);
+        if wi.z > 0.0 {
+            let h = wo + wi;
+            let length = h.length();
+            let c = wo.dot(h) / length;
+            let reflectance = fresnel::dielectric(c, self.eta);
+            let p = reflection_probability(reflectance, self.tint);
+            let lobe = ggx.density(h) * ggx.visibility(wo, wi) * wi.z;
+            return (Rgb::splat(reflectance * lobe), p * ggx.visible_density(wo, h, c) / (4.0 * c));
+        }
+        // The normal that refracts wo to wi (Walter 2007, eq. 16), turned to the side of the viewer.
+        let h = -(wo + self.eta * wi);
+        let h = if h.z < 0.0 { -h } else { h };
+        let length = h.length();
+        let (c, c_i) = (wo.dot(h) / length, -wi.dot(h) / length);
+        if !(wi.z < 0.0 && c > 0.0 && c_i > 0.0) {
+            return (Rgb::ZERO, 0.0);
+        }
+        let reflectance = fresnel::dielectric(c, self.eta);
+        let p = reflection_probability(reflectance, self.tint);
+        let density = ggx.visible_density(wo, h, c) * self.refraction_jacobian(c, c_i);
+        // Walter 2007, eq. 21, over eta²: radiance.
+        let transmitted = (1.0 - reflectance) * ggx.masking(wi) * density / (self.eta * self.eta);
+        (self.tint * transmitted, (1.0 - p) * density)
+    }
+
+    /// Solid angle of normals per solid angle of refracted directions (Walter 2007, eq. 17).
+    #[inline]
+    fn refraction_jacobian(&self, c: f32, c_i: f32) -> f32 {
+        // η c_i - c without its cancellation where η is near 1: (η c_i)² - c² = η² - 1.
+        let sum = (self.eta - 1.0) * (self.eta + 1.0) / (self.eta * c_i + c);
+        self.eta * self.eta * c_i / (sum * sum)
+    }
+}
