@@ -3,10 +3,12 @@
 
 mod material;
 mod mesh;
+mod surface;
 mod texture;
 
 pub use material::{ColorInput, Material, NormalMap, ScalarInput, Surface};
 pub use mesh::{Mesh, Triangle};
+pub use surface::SurfacePoint;
 pub use texture::{Texels, Texture, TextureId, Wrap};
 
 pub use crate::camera::Camera;
