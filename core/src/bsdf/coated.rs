@@ -22,8 +22,8 @@ pub(super) trait Coat {
     fn reflectance(&self, c: f32) -> Rgb;
     /// T: the share of light from a direction of cosine `c` that passes the coat.
     fn transmittance(&self, c: f32) -> Rgb;
-    /// What the coat reflects of light from `c`, where `transmittance` is T there. An estimate.
-    fn specular_albedo(&self, c: f32, transmittance: Rgb) -> Rgb;
+    /// What the coat reflects of light from `c`. An estimate.
+    fn specular_albedo(&self, c: f32) -> Rgb;
     /// Factor of the base.
     fn base(&self) -> Rgb;
     /// ∫ 2c T(c) dc: how much of the light that leaves the base evenly gets out. An estimate.
@@ -32,7 +32,7 @@ pub(super) trait Coat {
     /// Probability of the coat's lobe: its part of the energy that leaves to `wo`.
     #[inline]
     fn coat_probability(&self, c: f32, transmittance: Rgb) -> f32 {
-        let coat = self.specular_albedo(c, transmittance).element_sum();
+        let coat = self.specular_albedo(c).element_sum();
         let base = (self.base() * transmittance * self.mean_transmittance()).element_sum();
         if base > 0.0 { (coat / (coat + base)).clamp(0.0, 1.0) } else { 1.0 }
     }

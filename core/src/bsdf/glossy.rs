@@ -5,6 +5,7 @@
 //! up to white (Kelemen and Szirmay-Kalos 2001, eq. 5; Kulla and Conty 2017). The mix with metal is a
 //! weighted mean of two such surfaces.
 
+use super::albedo::SchlickAlbedo;
 use super::coated::Coat;
 use super::{fresnel, resolve::unit};
 use crate::Rgb;
@@ -22,18 +23,18 @@ pub struct Glossy {
     alpha: f32,
 }
 
-/// Mean of (1 - c)^5 over the hemisphere, weighted by the cosine.
-const MEAN_SCHLICK: f32 = 1.0 / 21.0;
+/// Guards a division; below what f32 leaves of 1 - Ē.
+const LEAST_MEAN: f32 = 1e-8;
 
 impl Glossy {
     /// From colours in 0 … 1, alpha as in [`super::Conductor`], `metallic` 0 … 1.
     #[inline]
     pub fn new(color: Rgb, specular: Rgb, alpha: f32, metallic: f32) -> Self {
         let metallic = unit(metallic);
-        let mean = (Rgb::ONE - specular) * (1.0 - MEAN_SCHLICK);
+        let mean = Rgb::ONE - SchlickAlbedo::mean(alpha).of(specular);
         Self {
-            // A coat that reflects all leaves nothing to divide.
-            base: color * (1.0 - metallic) / mean.max(Rgb::splat(f32::MIN_POSITIVE)),
+            // Nothing passes a coat that reflects all: any base will do.
+            base: color * (1.0 - metallic) / mean.max(Rgb::splat(LEAST_MEAN)),
             specular,
             f0: specular.lerp(color, metallic),
             alpha,
@@ -58,12 +59,12 @@ impl Coat for Glossy {
 
     #[inline]
     fn transmittance(&self, c: f32) -> Rgb {
-        (Rgb::ONE - self.specular) * (1.0 - fresnel::schlick_weight(c))
+        Rgb::ONE - SchlickAlbedo::directional(c, self.alpha).of(self.specular)
     }
 
     #[inline]
-    fn specular_albedo(&self, c: f32, _: Rgb) -> Rgb {
-        fresnel::schlick(self.f0, c)
+    fn specular_albedo(&self, c: f32) -> Rgb {
+        SchlickAlbedo::directional(c, self.alpha).of(self.f0)
     }
 
     #[inline]
@@ -73,6 +74,6 @@ impl Coat for Glossy {
 
     #[inline]
     fn mean_transmittance(&self) -> Rgb {
-        (Rgb::ONE - self.specular) * (1.0 - MEAN_SCHLICK)
+        Rgb::ONE - SchlickAlbedo::mean(self.alpha).of(self.specular)
     }
 }

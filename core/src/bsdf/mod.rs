@@ -7,6 +7,7 @@
 
 #![allow(clippy::neg_cmp_op_on_partial_ord, reason = "!(x > 0) is meant: it catches NaN as well")]
 
+mod albedo;
 mod coated;
 mod conductor;
 mod dielectric;

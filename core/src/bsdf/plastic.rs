@@ -6,6 +6,7 @@
 //! with R_i the mean internal reflectance: 1 - R_i = (1 - R_e) / η² by reciprocity. (The model of Mitsuba's
 //! `plastic` and `roughplastic` with `nonlinear` set.) White stays white: T(θ_o) is all that comes back.
 
+use super::albedo::{self, SchlickAlbedo};
 use super::coated::Coat;
 use super::{fresnel, resolve::unit};
 use crate::Rgb;
@@ -24,7 +25,8 @@ pub struct Plastic {
     alpha: f32,
     /// Index of refraction of the coat, at least 1.
     eta: f32,
-    mean_transmittance: f32,
+    /// Reflectance of the coat at normal incidence by `eta` alone.
+    f0: f32,
 }
 
 impl Plastic {
@@ -36,8 +38,7 @@ impl Plastic {
         let eta = if eta.is_finite() { eta.max(1.0) } else { 1.0 };
         let f0 = fresnel::normal_incidence(eta);
         let tint = if f0 > 0.0 { (specular / f0).min(Rgb::ONE) } else { Rgb::ONE };
-        let external = fresnel::mean_external_reflectance(eta);
-        let internal = 1.0 - (1.0 - external) / (eta * eta);
+        let internal = albedo::internal_reflectance(alpha, eta);
         Self {
             base: color * (1.0 - metallic) / ((Rgb::ONE - color * internal) * (eta * eta)),
             coat: tint * (1.0 - metallic),
@@ -45,7 +46,7 @@ impl Plastic {
             metallic,
             alpha,
             eta,
-            mean_transmittance: 1.0 - external,
+            f0,
         }
     }
 
@@ -72,12 +73,17 @@ impl Coat for Plastic {
 
     #[inline]
     fn transmittance(&self, c: f32) -> Rgb {
-        Rgb::splat(1.0 - fresnel::dielectric(c, self.eta))
+        Rgb::splat(albedo::transmittance(c, self.alpha, self.eta))
     }
 
     #[inline]
-    fn specular_albedo(&self, c: f32, transmittance: Rgb) -> Rgb {
-        self.mix(1.0 - transmittance.x, fresnel::schlick_weight(c))
+    fn specular_albedo(&self, c: f32) -> Rgb {
+        if self.alpha == 0.0 {
+            return self.reflectance(c);
+        }
+        // Schlick's albedo serves for the dielectric coat too.
+        let of = SchlickAlbedo::directional(c, self.alpha);
+        self.mix(of.edge + self.f0 * (of.white - of.edge), of.edge)
     }
 
     #[inline]
@@ -87,6 +93,6 @@ impl Coat for Plastic {
 
     #[inline]
     fn mean_transmittance(&self) -> Rgb {
-        Rgb::splat(self.mean_transmittance)
+        Rgb::splat(1.0 - fresnel::mean_external_reflectance(self.eta))
     }
 }
