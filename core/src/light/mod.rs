@@ -1,5 +1,37 @@
 //! Lights: what a scene file can name, and how transport samples all of them together.
 
+mod bounds;
+mod emitter;
+mod environment;
+mod lights;
+mod rectangle;
 mod source;
+mod tree;
+mod triangle;
 
+pub use lights::{LightPoint, LightSample, Lights};
 pub use source::{Environment, PointLight};
+
+use crate::Rgb;
+use crate::bsdf::All;
+use crate::scene::Scene;
+use glam::Vec2;
+
+/// The radiance that `triangle` emits at texture coordinates `uv`, to its front or its back.
+#[inline]
+pub fn emitted(scene: &Scene, triangle: u32, uv: Vec2, front: bool) -> Rgb {
+    let material = scene.mesh.triangles.get(triangle as usize).map(|t| t.material as usize);
+    match material.and_then(|m| scene.materials.get(m)) {
+        Some(material) if front || material.two_sided => {
+            // Maps may hold anything; light is never negative.
+            material.emission.at::<All>(scene, uv).max(Rgb::ZERO)
+        }
+        _ => Rgb::ZERO,
+    }
+}
+
+/// Relative luminance of linear sRGB (BT.709).
+#[inline]
+fn luminance(color: Rgb) -> f32 {
+    color.dot(Rgb::new(0.2126, 0.7152, 0.0722))
+}

@@ -72,6 +72,19 @@ impl<'m> Distribution2d<'m> {
         probability * (self.width as f32 * self.height as f32)
     }
 
+    /// The density over the unit square at a point of [0, 1]².
+    #[inline]
+    pub fn pdf_at(&self, [u, v]: [f32; 2]) -> f32 {
+        let cell = |x: f32, count: usize| ((x * count as f32) as usize).min(count.saturating_sub(1));
+        self.pdf(cell(u, self.width), cell(v, self.height))
+    }
+
+    /// Edges of a cell in the unit square.
+    #[inline]
+    pub fn cell_size(&self) -> [f32; 2] {
+        [1.0 / self.width as f32, 1.0 / self.height as f32]
+    }
+
     #[inline]
     fn row(&self, y: usize) -> &[u32] {
         let start = y * self.width;

@@ -1,0 +1,244 @@
+//! Emissive surfaces as lights: a triangle, or two that make a parallelogram and are sampled as one. Near
+//! lights are sampled by solid angle, far ones by area; the choice depends on the shaded point only, so that
+//! [`Emitter::pdf`] gives the density of [`Emitter::sample`] whoever found the point.
+
+use super::bounds::Cone;
+use super::rectangle::SphericalRectangle;
+use super::triangle::SphericalTriangle;
+use crate::sampling::warp::uniform_triangle;
+use crate::scene::Mesh;
+use bytemuck::{Pod, Zeroable};
+use glam::Vec3;
+
+/// A light whose radius is less than this fraction of its distance is sampled by area: its solid angle is
+/// uniform in area to a tenth then, and the square root of that is what the error sees.
+const FAR: f32 = 0.05;
+
+/// Steradians below which solid angles are too small to divide in single precision: a light may be near
+/// and still a sliver.
+const SLIVER: f32 = 1e-3;
+
+/// Largest deviation from a parallelogram and from a right angle, as a fraction of the edges: far below what
+/// a density can show, far above the rounding of coordinates.
+const SHAPE_TOLERANCE: f32 = 1e-5;
+
+/// How the unit square lies on the light.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Shape {
+    Triangle,
+    Parallelogram,
+    Rectangle,
+}
+
+/// A flat light of one or two triangles: `origin + a * edges[0] + b * edges[1]`.
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C)]
+pub(super) struct Emitter {
+    pub(super) origin: [f32; 3],
+    pub(super) edges: [[f32; 3]; 2],
+    /// Unit, to the side that emits.
+    pub(super) normal: [f32; 3],
+    pub(super) area: f32,
+    /// Index in the mesh; the other half of a parallelogram is the next one.
+    pub(super) triangle: u32,
+    /// Squared distance up to which the light is near.
+    near: f32,
+    /// Bits 0-1 shape, 2-3 and 4-5 the corners at `origin` and opposite to it, 6 two-sided, 7 textured.
+    flags: u32,
+}
+
+/// Where on a light.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Place {
+    pub(super) position: Vec3,
+    pub(super) triangle: u32,
+    /// Weights of the second and third vertex.
+    pub(super) barycentric: [f32; 2],
+}
+
+impl Emitter {
+    /// The light of triangle `index`, together with the one after it where `pairs` says that it emits the
+    /// same and the two make a parallelogram. `None` where there is no area.
+    pub(super) fn new(mesh: &Mesh, index: u32, pairs: bool, two_sided: bool, textured: bool) -> Option<Self> {
+        let flags = u32::from(two_sided) << 6 | u32::from(textured) << 7;
+        let pair = if pairs { Self::parallelogram(mesh, index) } else { None };
+        let (corners, shape, turns) = match pair {
+            Some((first, second, shape)) => {
+                (rotated(mesh.corners(index), first), shape, first << 2 | second << 4)
+            }
+            None => (mesh.corners(index), Shape::Triangle, 0),
+        };
+        let edges = [corners[1] - corners[0], corners[2] - corners[0]];
+        let size = edges[0].abs().max(edges[1].abs()).max_element();
+        if !(size > 0.0 && size < f32::INFINITY && corners[0].is_finite()) {
+            return None;
+        }
+        // In units of its size: products of tiny edges would underflow.
+        let cross = (edges[0] / size).cross(edges[1] / size);
+        let normal = cross.try_normalize()?;
+        let halves = if shape == Shape::Triangle { 0.5 } else { 1.0 };
+        let area = cross.length() * size * size * halves;
+        let radius = 0.5 * (edges[0].distance(edges[1])).max(edges[0].length()).max(edges[1].length());
+        if !(area > 0.0 && area < f32::INFINITY) {
+            return None;
+        }
+        Some(Self {
+            origin: corners[0].to_array(),
+            edges: edges.map(Into::into),
+            normal: normal.to_array(),
+            area,
+            triangle: index,
+            near: (radius / FAR) * (radius / FAR),
+            flags: flags | shape as u32 | turns,
+        })
+    }
+
+    /// If triangles `index` and `index + 1` make a parallelogram: which corner of the first is not shared,
+    /// which of the second, and the shape.
+    fn parallelogram(mesh: &Mesh, index: u32) -> Option<(u32, u32, Shape)> {
+        let (first, second) = (mesh.corners(index), mesh.corners(index.checked_add(1)?));
+        for turn in 0..3 {
+            let [o, a, b] = rotated(first, turn);
+            for other in 0..3 {
+                let [c, d, e] = rotated(second, other);
+                let (u, v) = (a - o, b - o);
+                let tolerance = SHAPE_TOLERANCE * u.length().min(v.length());
+                // The shared edge runs a → b in one and b → a in the other.
+                if d == b && e == a && (c - (o + u + v)).length() <= tolerance {
+                    let right = u.dot(v).abs() <= SHAPE_TOLERANCE * u.length() * v.length();
+                    let shape = if right { Shape::Rectangle } else { Shape::Parallelogram };
+                    return Some((turn, other, shape));
+                }
+            }
+        }
+        None
+    }
+
+    pub(super) fn corners(&self) -> impl Iterator<Item = Vec3> {
+        let [o, u, v] = [self.origin, self.edges[0], self.edges[1]].map(Vec3::from);
+        let count = if self.shape() == Shape::Triangle { 3 } else { 4 };
+        [o, o + u, o + v, o + u + v].into_iter().take(count)
+    }
+
+    pub(super) fn cone(&self) -> Cone {
+        if self.is_two_sided() { Cone::ALL } else { Cone { axis: self.normal, cos: 1.0 } }
+    }
+
+    pub(super) fn is_pair(&self) -> bool {
+        self.shape() != Shape::Triangle
+    }
+
+    pub(super) fn is_two_sided(&self) -> bool {
+        self.flags & 1 << 6 != 0
+    }
+
+    pub(super) fn is_textured(&self) -> bool {
+        self.flags & 1 << 7 != 0
+    }
+
+    #[inline]
+    fn shape(&self) -> Shape {
+        match self.flags & 3 {
+            0 => Shape::Triangle,
+            1 => Shape::Parallelogram,
+            _ => Shape::Rectangle,
+        }
+    }
+
+    /// Height of `point` over the plane, positive in front.
+    #[inline]
+    fn height(&self, point: Vec3) -> f32 {
+        (point - Vec3::from(self.origin)).dot(self.normal.into())
+    }
+
+    #[inline]
+    fn is_near(&self, point: Vec3) -> bool {
+        let [o, u, v] = [self.origin, self.edges[0], self.edges[1]].map(Vec3::from);
+        let share = if self.shape() == Shape::Triangle { 1.0 / 3.0 } else { 0.5 };
+        (point - (o + share * (u + v))).length_squared() < self.near
+    }
+
+    /// A point of the light as seen from `from`, and its density if that is one of solid angle; density
+    /// of area otherwise. `None` where the light turns its back.
+    #[inline]
+    pub(super) fn sample(&self, from: Vec3, u: [f32; 2]) -> Option<(Place, Option<f32>)> {
+        let height = self.height(from);
+        if !(height > 0.0 || self.is_two_sided() && height < 0.0) {
+            return None;
+        }
+        if self.is_near(from) {
+            let sampled = match self.shape() {
+                Shape::Rectangle => SphericalRectangle::new(self, from).map(|r| (r.sample(u), r.solid_angle)),
+                Shape::Triangle => SphericalTriangle::new(self, from).map(|t| (t.sample(u), t.solid_angle)),
+                Shape::Parallelogram => None,
+            };
+            if let Some((at, solid_angle)) = sampled.filter(|s| s.1 > SLIVER) {
+                return Some((self.place(at), Some(1.0 / solid_angle)));
+            }
+        }
+        let at = if self.shape() == Shape::Triangle { uniform_triangle(u).into() } else { u };
+        Some((self.place(at), None))
+    }
+
+    /// Density in solid angle of [`Emitter::sample`] for a point of the light that is seen from `from` in
+    /// unit `direction` at `distance`.
+    #[inline]
+    pub(super) fn pdf(&self, from: Vec3, direction: Vec3, distance: f32) -> f32 {
+        let height = self.height(from);
+        if !(height > 0.0 || self.is_two_sided() && height < 0.0) {
+            return 0.0;
+        }
+        if self.is_near(from) {
+            let solid_angle = match self.shape() {
+                Shape::Rectangle => SphericalRectangle::new(self, from).map(|r| r.solid_angle),
+                Shape::Triangle => SphericalTriangle::new(self, from).map(|t| t.solid_angle),
+                Shape::Parallelogram => None,
+            };
+            if let Some(solid_angle) = solid_angle.filter(|&s| s > SLIVER) {
+                return 1.0 / solid_angle;
+            }
+        }
+        self.area_pdf(direction, distance)
+    }
+
+    /// Uniform density of area, turned into one of solid angle.
+    #[inline]
+    pub(super) fn area_pdf(&self, direction: Vec3, distance: f32) -> f32 {
+        let cos = direction.dot(self.normal.into()).abs();
+        // In this order neither a tiny area nor a large distance overflows before the other meets it.
+        if cos > 0.0 { distance / (self.area * cos) * distance } else { 0.0 }
+    }
+
+    /// The point at edge coordinates `[a, b]`, and the triangle it lies on.
+    #[inline]
+    pub(super) fn place(&self, [a, b]: [f32; 2]) -> Place {
+        let [o, u, v] = [self.origin, self.edges[0], self.edges[1]].map(Vec3::from);
+        let position = o + a * u + b * v;
+        if self.shape() == Shape::Triangle || a + b <= 1.0 {
+            let weights = unrotated([1.0 - a - b, a, b], self.flags >> 2 & 3);
+            return Place { position, triangle: self.triangle, barycentric: [weights[1], weights[2]] };
+        }
+        // The second half: around its unshared corner, with the edges run backwards.
+        let weights = unrotated([a + b - 1.0, 1.0 - a, 1.0 - b], self.flags >> 4 & 3);
+        Place { position, triangle: self.triangle + 1, barycentric: [weights[1], weights[2]] }
+    }
+}
+
+/// Corner `turn` first, the cyclic order kept.
+fn rotated<T: Copy>(c: [T; 3], turn: u32) -> [T; 3] {
+    match turn {
+        0 => c,
+        1 => [c[1], c[2], c[0]],
+        _ => [c[2], c[0], c[1]],
+    }
+}
+
+/// The inverse of [`rotated`].
+#[inline]
+fn unrotated<T: Copy>(c: [T; 3], turn: u32) -> [T; 3] {
+    match turn {
+        0 => c,
+        1 => [c[2], c[0], c[1]],
+        _ => [c[1], c[2], c[0]],
+    }
+}

@@ -1,0 +1,440 @@
+//! All lights of a scene together: choose one, sample it, and give the density of both.
+//!
+//! Three kinds take part: lights at finite places (emissive triangles, points, spots), which a light tree
+//! chooses among; the environment; directional lights. Which kind is decided by estimates of the irradiance
+//! they bring, with a floor for each, since nobody knows yet what is hidden.
+
+use super::bounds::Cone;
+use super::emitter::{Emitter, Place};
+use super::environment::EnvironmentSampler;
+use super::tree::{Item, Tree};
+use super::{PointLight, emitted, luminance};
+use crate::Rgb;
+use crate::bsdf::All;
+use crate::geometry::Bounds;
+use crate::memory::{Arena, Footprint, OutOfMemory};
+use crate::sampling::{AliasTable, ONE_MINUS_EPSILON, Sampler, warp::uniform_triangle};
+use crate::scene::{Material, Scene};
+use glam::{Vec2, Vec3};
+
+/// The least share of each kind of light that is there.
+const FLOOR: f32 = 0.1;
+
+/// Least weight of a light, relative to the strongest: none that shines is ever left out.
+const LEAST_POWER: f64 = 1e-30;
+
+/// Points at which the mean of a textured emission is taken.
+const TEXTURE_SAMPLES: u32 = 16;
+
+/// One direction from which light may come.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LightSample {
+    /// Unit, towards the light.
+    pub direction: Vec3,
+    /// To the light; infinite for the environment and directional lights.
+    pub distance: f32,
+    /// The point on an area light, to end the shadow ray safely.
+    pub target: Option<LightPoint>,
+    /// What arrives if nothing is in the way: radiance; for a light without surface the irradiance on a
+    /// surface that faces it.
+    pub radiance: Rgb,
+    /// Density in solid angle, the choice of the light included. For a light without surface the
+    /// probability of its choice.
+    pub pdf: f32,
+    /// Whether the light has no surface: no ray can find it by chance.
+    pub delta: bool,
+}
+
+/// A point on an area light.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LightPoint {
+    /// Where.
+    pub position: Vec3,
+    /// Unit normal, to the side from which it is seen.
+    pub normal: Vec3,
+    /// Bound of the rounding error in each coordinate of `position`.
+    pub error: f32,
+}
+
+/// The lights of a scene, ready to be sampled.
+#[derive(Clone, Copy, Debug)]
+pub struct Lights<'m> {
+    /// Emissive triangles and parallelograms, in the order of the mesh. Light `i` of the tree is emitter
+    /// `i`; then come the points and spots.
+    emitters: &'m [Emitter],
+    /// Indices into the scene's lights: points and spots.
+    points: &'m [u32],
+    tree: Tree<'m>,
+    environment: Option<EnvironmentSampler<'m>>,
+    /// Indices into the scene's lights: directional.
+    distant: &'m [u32],
+    distant_table: AliasTable<'m>,
+    /// Irradiance by environment and directional lights, in the unit of the tree's powers.
+    environment_weight: f32,
+    distant_weight: f32,
+}
+
+/// What [`Lights::build`] is about to hold.
+#[derive(Clone, Copy, Default)]
+struct Counts {
+    emitters: usize,
+    points: usize,
+    distant: usize,
+}
+
+impl Counts {
+    fn of(scene: &Scene) -> Self {
+        let shines = |light: &&PointLight| strength(light) > 0.0;
+        let all = scene.lights.iter().filter(shines);
+        let distant = all.clone().filter(|l| matches!(l, PointLight::Directional { .. })).count();
+        Self { emitters: emitters(scene).count(), points: all.count() - distant, distant }
+    }
+
+    fn in_tree(&self) -> usize {
+        self.emitters + self.points
+    }
+}
+
+/// Kinds of lights, and the probability of each.
+struct Shares {
+    tree: f32,
+    environment: f32,
+    distant: f32,
+}
+
+impl<'m> Lights<'m> {
+    /// Bytes that [`Lights::build`] takes and keeps.
+    pub fn footprint(scene: &Scene) -> Footprint {
+        let counts = Counts::of(scene);
+        Footprint::default()
+            .slice::<Emitter>(counts.emitters)
+            .slice::<u32>(counts.points)
+            .slice::<u32>(counts.distant)
+            .and(Tree::footprint(counts.in_tree()))
+            .and(AliasTable::footprint(counts.distant))
+            .and(EnvironmentSampler::footprint(scene))
+    }
+
+    /// Bytes beyond the footprint that must be free in the arena during [`Lights::build`].
+    pub fn scratch(scene: &Scene) -> Footprint {
+        Footprint::default().slice::<Item>(Counts::of(scene).in_tree())
+    }
+
+    /// Finds and orders the lights of `scene`.
+    ///
+    /// # Errors
+    /// [`OutOfMemory`] where the arena has less than [`Lights::footprint`] and [`Lights::scratch`] ask for.
+    pub fn build(scene: &Scene, arena: &mut Arena<'m>) -> Result<Self, OutOfMemory> {
+        let counts = Counts::of(scene);
+        let kept: &mut [Emitter] = arena.slice(counts.emitters)?;
+        for (slot, emitter) in kept.iter_mut().zip(emitters(scene)) {
+            *slot = emitter;
+        }
+        let points: &mut [u32] = arena.slice(counts.points)?;
+        let distant: &mut [u32] = arena.slice(counts.distant)?;
+        fill(points, scene, |light| !matches!(light, PointLight::Directional { .. }));
+        fill(distant, scene, |light| matches!(light, PointLight::Directional { .. }));
+        let (nodes, trails) = Tree::memory(counts.in_tree(), arena)?;
+        let distant_strength = |i: usize| distant.get(i).map_or(0.0, |&light| strength_of(scene, light));
+        let distant_table = AliasTable::build(distant.len(), |i| distant_strength(i) as f32, arena)?;
+        let environment = EnvironmentSampler::build(scene, arena)?;
+
+        let mut scratch = arena.scratch();
+        let items: &mut [Item] = scratch.slice(counts.in_tree())?;
+        let area_powers = kept.iter().map(|e| mean_luminance(scene, e) * f64::from(e.area));
+        let point_powers = points.iter().map(|&light| strength_of(scene, light));
+        let unit = area_powers.clone().chain(point_powers.clone()).fold(0.0, f64::max);
+        let unit = if unit > 0.0 { unit } else { 1.0 };
+        let relative = |power: f64| (power / unit).max(LEAST_POWER) as f32;
+        let emitters = kept.iter().map(|e| (Bounds::around(e.corners()), e.cone()));
+        let without_surface = points.iter().map(|&light| place_of(scene, light));
+        for (i, ((slot, (bounds, cone)), power)) in items
+            .iter_mut()
+            .zip(emitters.chain(without_surface))
+            .zip(area_powers.chain(point_powers))
+            .enumerate()
+        {
+            *slot = Item::new(&bounds, cone, relative(power), i as u32);
+        }
+        let tree = Tree::build(items, nodes, trails);
+
+        let sky = environment.map_or(0.0, |e| f64::from(e.mean) * core::f64::consts::PI);
+        let sun = (0..distant.len()).map(distant_strength).sum::<f64>();
+        let finite = |weight: f64| relative(weight).min(f32::MAX);
+        Ok(Self {
+            emitters: kept,
+            points,
+            tree,
+            environment,
+            distant,
+            distant_table,
+            environment_weight: if environment.is_some() { finite(sky) } else { 0.0 },
+            distant_weight: if distant.is_empty() { 0.0 } else { finite(sun) },
+        })
+    }
+
+    /// Whether there is nothing that shines.
+    pub fn is_empty(&self) -> bool {
+        self.in_tree() == 0 && self.environment.is_none() && self.distant.is_empty()
+    }
+
+    /// A direction from which light may reach `position`; of a surface only the side of `normal` counts,
+    /// unless it is zero. `u[2]` chooses the light. `None` where no light was found: it counts as a sample
+    /// of nothing.
+    #[inline]
+    pub fn sample(&self, scene: &Scene, position: Vec3, normal: Vec3, u: [f32; 3]) -> Option<LightSample> {
+        let shares = self.shares(position, normal);
+        let [u0, u1, choice] = u;
+        if choice < shares.tree {
+            let rescaled = (choice / shares.tree).min(ONE_MINUS_EPSILON);
+            let (light, probability, _) = self.tree.sample(position, normal, rescaled)?;
+            let probability = probability * shares.tree;
+            return match self.emitters.get(light as usize) {
+                Some(emitter) => sample_emitter(scene, emitter, position, normal, [u0, u1], probability),
+                None => self.sample_point(scene, light, position, probability),
+            };
+        }
+        let choice = choice - shares.tree;
+        if choice < shares.environment {
+            let (sampler, environment) = (self.environment?, scene.environment.as_ref()?);
+            let (direction, pdf) = sampler.sample(environment, normal, [u0, u1])?;
+            return Some(LightSample {
+                direction,
+                distance: f32::INFINITY,
+                target: None,
+                radiance: environment.radiance(scene, direction),
+                pdf: pdf * shares.environment,
+                delta: false,
+            });
+        }
+        let choice = ((choice - shares.environment) / shares.distant).clamp(0.0, ONE_MINUS_EPSILON);
+        let (index, probability, _) = self.distant_table.sample(choice)?;
+        match scene.lights.get(*self.distant.get(index)? as usize)? {
+            PointLight::Directional { direction, irradiance } => Some(LightSample {
+                direction: -*direction,
+                distance: f32::INFINITY,
+                target: None,
+                radiance: *irradiance,
+                pdf: probability * shares.distant,
+                delta: true,
+            }),
+            _ => None,
+        }
+    }
+
+    /// The density of [`Lights::sample`] for a point of emissive `triangle` that is seen from `position` in
+    /// unit `direction` at `hit_distance`. Zero for a triangle that does not shine this way.
+    #[inline]
+    pub fn pdf_hit(
+        &self,
+        _scene: &Scene,
+        position: Vec3,
+        normal: Vec3,
+        triangle: u32,
+        hit_distance: f32,
+        direction: Vec3,
+    ) -> f32 {
+        let after = self.emitters.partition_point(|e| e.triangle <= triangle);
+        let Some(index) = after.checked_sub(1) else { return 0.0 };
+        let Some(emitter) = self.emitters.get(index) else { return 0.0 };
+        if triangle - emitter.triangle > u32::from(emitter.is_pair()) {
+            return 0.0;
+        }
+        let pdf = emitter.pdf(position, direction, hit_distance);
+        if pdf <= 0.0 || !faces(normal, direction) {
+            return 0.0;
+        }
+        let share = self.shares(position, normal).tree;
+        pdf * share * self.tree.pdf(position, normal, index as u32)
+    }
+
+    /// The density of [`Lights::sample`] for the environment in unit `direction`.
+    #[inline]
+    pub fn pdf_escape(&self, scene: &Scene, position: Vec3, normal: Vec3, direction: Vec3) -> f32 {
+        match (&self.environment, &scene.environment) {
+            (Some(sampler), Some(environment)) => {
+                self.shares(position, normal).environment * sampler.pdf(environment, normal, direction)
+            }
+            _ => 0.0,
+        }
+    }
+
+    fn in_tree(&self) -> usize {
+        self.emitters.len() + self.points.len()
+    }
+
+    /// Probabilities of the kinds at a point. Where there is only one kind nothing is computed.
+    #[inline]
+    fn shares(&self, position: Vec3, normal: Vec3) -> Shares {
+        let (sky, sun) = (self.environment_weight, self.distant_weight);
+        if sky + sun == 0.0 {
+            return Shares { tree: 1.0, environment: 0.0, distant: 0.0 };
+        }
+        let near = if self.in_tree() == 0 { 0.0 } else { self.tree.importance(position, normal) };
+        let kinds = [near, sky, sun].map(|weight| if weight > 0.0 { 1.0 } else { 0.0 });
+        let count = kinds[0] + kinds[1] + kinds[2];
+        // Divided before they are added: the sum of three large floats must not overflow.
+        let largest = near.max(sky).max(sun);
+        let relative = [near, sky, sun].map(|weight| weight / largest);
+        let by_weight = (1.0 - FLOOR * count) / (relative[0] + relative[1] + relative[2]);
+        let share =
+            |i: usize| if count == 1.0 { kinds[i] } else { kinds[i] * FLOOR + by_weight * relative[i] };
+        Shares { tree: share(0), environment: share(1), distant: share(2) }
+    }
+
+    fn sample_point(&self, scene: &Scene, light: u32, from: Vec3, probability: f32) -> Option<LightSample> {
+        let index = *self.points.get(light as usize - self.emitters.len())?;
+        let (position, intensity) = match scene.lights.get(index as usize)? {
+            PointLight::Point { position, intensity } => (*position, *intensity),
+            PointLight::Spot { position, direction, intensity, cos_inner, cos_outer } => {
+                let cos = (from - *position).normalize_or_zero().dot(*direction);
+                (*position, *intensity * spot_falloff(cos, *cos_inner, *cos_outer))
+            }
+            PointLight::Directional { .. } => return None,
+        };
+        let to_light = position - from;
+        let distance = to_light.length();
+        let radiance = intensity / distance / distance;
+        if !(distance > 0.0 && radiance.max_element() > 0.0) {
+            return None;
+        }
+        let direction = to_light / distance;
+        Some(LightSample { direction, distance, target: None, radiance, pdf: probability, delta: true })
+    }
+}
+
+fn sample_emitter(
+    scene: &Scene,
+    emitter: &Emitter,
+    from: Vec3,
+    normal: Vec3,
+    u: [f32; 2],
+    probability: f32,
+) -> Option<LightSample> {
+    let (place, density) = emitter.sample(from, u)?;
+    let to_light = place.position - from;
+    let distance = to_light.length();
+    let direction = to_light / distance;
+    if !(distance > 0.0 && faces(normal, direction)) {
+        return None;
+    }
+    let plane = Vec3::from(emitter.normal);
+    let front = plane.dot(direction) < 0.0;
+    let pdf = probability * density.unwrap_or_else(|| emitter.area_pdf(direction, distance));
+    let radiance = emitted_at(scene, emitter, &place, front);
+    if !(pdf > 0.0 && pdf < f32::INFINITY && radiance.max_element() > 0.0) {
+        return None;
+    }
+    let target = LightPoint {
+        position: place.position,
+        normal: if front { plane } else { -plane },
+        // Three products and two sums of numbers no larger than the corners.
+        error: 4.0
+            * f32::EPSILON
+            * (Vec3::from(emitter.origin).abs().max(place.position.abs())).max_element(),
+    };
+    Some(LightSample { direction, distance, target: Some(target), radiance, pdf, delta: false })
+}
+
+/// Whether a surface with `normal` can be lit from `direction`.
+#[inline]
+fn faces(normal: Vec3, direction: Vec3) -> bool {
+    normal == Vec3::ZERO || normal.dot(direction) > 0.0
+}
+
+/// What the light emits at a place; of a cut-out surface, what is left of it.
+#[inline]
+fn emitted_at(scene: &Scene, emitter: &Emitter, place: &Place, front: bool) -> Rgb {
+    if !emitter.is_textured() {
+        return emitted(scene, place.triangle, Vec2::ZERO, front);
+    }
+    let [a, b, c] = scene.mesh.corner_texcoords(place.triangle);
+    let [u, v] = place.barycentric;
+    let uv = (1.0 - u - v) * a + u * b + v * c;
+    let opacity = material_of(scene, place.triangle).map_or(1.0, |m| m.opacity.at::<All>(scene, uv));
+    emitted(scene, place.triangle, uv, front) * opacity.clamp(0.0, 1.0)
+}
+
+/// The mean luminance of a light, positive where its material emits at all.
+fn mean_luminance(scene: &Scene, emitter: &Emitter) -> f64 {
+    let Some(material) = material_of(scene, emitter.triangle) else { return 0.0 };
+    let constant = f64::from(luminance(material.emission.value));
+    if !emitter.is_textured() {
+        return constant;
+    }
+    let samples = (0..TEXTURE_SAMPLES).map(|i| {
+        let u = Sampler::new(0, 0, i).pair(0);
+        let place = emitter.place(if emitter.is_pair() { u } else { uniform_triangle(u).into() });
+        f64::from(luminance(emitted_at(scene, emitter, &place, true)))
+    });
+    let mean = samples.filter(|l| l.is_finite()).sum::<f64>() / f64::from(TEXTURE_SAMPLES);
+    // What sixteen points have missed may still be there.
+    mean.max(1e-3 * constant)
+}
+
+fn material_of<'s>(scene: &'s Scene, triangle: u32) -> Option<&'s Material> {
+    scene.materials.get(scene.mesh.triangles.get(triangle as usize)?.material as usize)
+}
+
+/// The emissive triangles of `scene`, two that make a parallelogram as one.
+fn emitters(scene: &Scene) -> impl Iterator<Item = Emitter> {
+    let mut next = 0u32;
+    core::iter::from_fn(move || {
+        while let Some(triangle) = scene.mesh.triangles.get(next as usize) {
+            let index = next;
+            next += 1;
+            let Some(material) = scene.materials.get(triangle.material as usize).filter(|m| m.emits()) else {
+                continue;
+            };
+            let same =
+                scene.mesh.triangles.get(next as usize).is_some_and(|t| t.material == triangle.material);
+            let textured = material.emission.texture.is_some() || material.has_cutout();
+            if let Some(emitter) = Emitter::new(&scene.mesh, index, same, material.two_sided, textured) {
+                next += u32::from(emitter.is_pair());
+                return Some(emitter);
+            }
+        }
+        None
+    })
+}
+
+fn fill(indices: &mut [u32], scene: &Scene, which: impl Fn(&PointLight) -> bool) {
+    let chosen = scene.lights.iter().enumerate().filter(|(_, light)| strength(light) > 0.0 && which(light));
+    for (slot, (index, _)) in indices.iter_mut().zip(chosen) {
+        *slot = index as u32;
+    }
+}
+
+fn strength_of(scene: &Scene, light: u32) -> f64 {
+    scene.lights.get(light as usize).map_or(0.0, strength)
+}
+
+/// Luminance of the intensity or irradiance; zero where it is no number.
+fn strength(light: &PointLight) -> f64 {
+    let color = match light {
+        PointLight::Point { intensity, .. } | PointLight::Spot { intensity, .. } => intensity,
+        PointLight::Directional { irradiance, .. } => irradiance,
+    };
+    let strength = f64::from(luminance(*color));
+    if strength.is_finite() { strength.max(0.0) } else { 0.0 }
+}
+
+fn place_of(scene: &Scene, light: u32) -> (Bounds, Cone) {
+    match scene.lights.get(light as usize) {
+        Some(PointLight::Point { position, .. }) => (Bounds::around([*position]), Cone::ALL),
+        Some(PointLight::Spot { position, direction, cos_outer, .. }) => (
+            Bounds::around([*position]),
+            Cone { axis: direction.to_array(), cos: cos_outer.clamp(-1.0, 1.0) },
+        ),
+        _ => (Bounds::EMPTY, Cone::ALL),
+    }
+}
+
+/// 1 inside the inner cone, 0 outside the outer one, and a smooth step in between.
+fn spot_falloff(cos: f32, cos_inner: f32, cos_outer: f32) -> f32 {
+    if cos >= cos_inner {
+        return 1.0;
+    }
+    let t = ((cos - cos_outer) / (cos_inner - cos_outer)).max(0.0);
+    t * t * (3.0 - 2.0 * t)
+}
