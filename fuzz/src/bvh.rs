@@ -1,0 +1,90 @@
+//! Build over any triangles and trace any rays, by every entry point at every level: the answers must be
+//! those of the brute force over all triangles, to the bit.
+
+use crate::numbers::point;
+use arbitrary::{Result, Unstructured};
+use glam::Vec3;
+use halflight_core::Level;
+use halflight_core::bvh::{Bvh, Coherence, brute};
+use halflight_core::geometry::{Hit, Ray};
+use halflight_core::memory::{Arena, Line};
+use halflight_core::scene::{Mesh, Triangle};
+
+const MAX_TRIANGLES: usize = 300;
+const MAX_RAYS: usize = 40;
+
+/// One input.
+pub fn run(data: &[u8]) {
+    // An input that is too short ends somewhere in here, as an error that means nothing.
+    let _ = attempt(&mut Unstructured::new(data));
+}
+
+fn attempt(input: &mut Unstructured) -> Result<()> {
+    let [vertices, triangles] = input.arbitrary::<[u8; 2]>()?;
+    let positions = (0..1 + vertices % 64).map(|_| point(input)).collect::<Result<Vec<_>>>()?;
+    let mut indices = |_| -> Result<Triangle> {
+        let corner = |v: u8| u32::from(v) % positions.len() as u32;
+        Ok(Triangle { vertices: input.arbitrary::<[u8; 3]>()?.map(corner), material: 0 })
+    };
+    let mut triangles = (0..triangles % 64).map(&mut indices).collect::<Result<Vec<_>>>()?;
+    // The same again, many times over: duplicates in one place are what stops a split.
+    let copies = 1 + usize::from(input.arbitrary::<u8>()? % 8);
+    triangles = triangles.repeat(copies);
+    triangles.truncate(MAX_TRIANGLES);
+    let mesh = Mesh { positions: &positions, triangles: &triangles, ..Mesh::default() };
+    let mut rays = Vec::new();
+    while rays.len() < MAX_RAYS && !input.is_empty() {
+        rays.push(ray(input, &mesh)?);
+    }
+
+    let mut lines = vec![Line([0; 64]); Bvh::footprint(triangles.len()).bytes().div_ceil(64)];
+    let mut arena = Arena::new(bytemuck::cast_slice_mut(&mut lines));
+    let bvh = Bvh::build(&mesh, &mut arena).expect("the footprint was granted");
+    for level in Level::detect().and_below() {
+        trace(&bvh, &mesh, level, &rays);
+    }
+    Ok(())
+}
+
+/// A ray from anywhere, or one that aims at a corner, an edge or the inside of a triangle.
+fn ray(input: &mut Unstructured, mesh: &Mesh) -> Result<Ray> {
+    let origin = Vec3::from(point(input)?);
+    let [kind, triangle, u, v, end] = input.arbitrary::<[u8; 5]>()?;
+    let direction = match kind % 4 {
+        0 => Vec3::from(point(input)?),
+        1 => [Vec3::X, Vec3::NEG_Y, Vec3::Z, Vec3::NEG_X][usize::from(u % 4)],
+        _ if mesh.triangles.is_empty() => Vec3::Z,
+        _ => {
+            let [a, b, c] = mesh.corners(u32::from(triangle) % mesh.triangles.len() as u32);
+            let (u, v) = (f32::from(u % 5) / 4.0, f32::from(v % 5) / 4.0);
+            a + u * (b - a) + v * (c - a) - origin
+        }
+    };
+    let t_max = match end {
+        0..200 => f32::INFINITY,
+        200..220 => 1.0,
+        220..240 => f32::from(end - 219) * 0.25,
+        240..250 => f32::NAN,
+        _ => -1.0,
+    };
+    Ok(Ray::segment(origin, direction, t_max))
+}
+
+fn trace(bvh: &Bvh, mesh: &Mesh, level: Level, rays: &[Ray]) {
+    let singles: Vec<Hit> = rays.iter().map(|ray| bvh.nearest(level, ray)).collect();
+    for (ray, hit) in rays.iter().zip(&singles) {
+        assert_eq!(&brute::nearest(mesh, ray), hit, "{level:?} nearest {ray:?}");
+        assert_eq!(bvh.occluded(level, ray), hit.is_some(), "{level:?} occluded {ray:?}");
+    }
+    let mut scratch = vec![0; Bvh::batch_scratch(rays.len()).div_ceil(4)];
+    for coherence in [Coherence::Coherent, Coherence::Incoherent] {
+        let mut hits = vec![Hit::NONE; rays.len()];
+        bvh.nearest_batch(level, rays, coherence, &mut scratch, &mut hits);
+        let mut hidden = vec![7; rays.len()];
+        bvh.occluded_batch(level, rays, coherence, &mut scratch, &mut hidden);
+        for (((ray, single), hit), hidden) in rays.iter().zip(&singles).zip(&hits).zip(&hidden) {
+            assert_eq!(single, hit, "{level:?} {coherence:?} {ray:?}");
+            assert_eq!(hidden, &u8::from(single.is_some()), "{level:?} {coherence:?} {ray:?}");
+        }
+    }
+}

@@ -1,0 +1,38 @@
+//! Numbers that hurt: most of them ordinary and on a coarse grid, so that things coincide; some from the
+//! far ends of f32.
+
+use arbitrary::{Result, Unstructured};
+
+/// A coordinate.
+pub(crate) fn coordinate(input: &mut Unstructured) -> Result<f32> {
+    let [kind, value] = input.arbitrary::<[u8; 2]>()?;
+    let grid = f32::from(value as i8);
+    Ok(match kind {
+        0..200 => grid * 0.25,
+        200..210 => grid * 1e-20,
+        210..220 => grid * 1e15,
+        220..230 => 100_000.0 + grid * 0.0078125,
+        230..240 => f32::from_bits(input.arbitrary()?),
+        _ => SPECIAL[usize::from(value) % SPECIAL.len()],
+    })
+}
+
+/// A point.
+pub(crate) fn point(input: &mut Unstructured) -> Result<[f32; 3]> {
+    Ok([coordinate(input)?, coordinate(input)?, coordinate(input)?])
+}
+
+const SPECIAL: [f32; 12] = [
+    0.0,
+    -0.0,
+    f32::NAN,
+    f32::INFINITY,
+    f32::NEG_INFINITY,
+    f32::MAX,
+    f32::MIN,
+    f32::MIN_POSITIVE,
+    1e-45,
+    f32::EPSILON,
+    1.0,
+    -1.0,
+];
