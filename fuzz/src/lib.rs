@@ -5,5 +5,13 @@
 pub mod bvh;
 mod numbers;
 
-/// Every target by name.
-pub const TARGETS: &[(&str, fn(&[u8]))] = &[("bvh", bvh::run)];
+/// What is fuzzed: a name and its function.
+pub struct Target {
+    /// As on the command line.
+    pub name: &'static str,
+    /// Runs one input.
+    pub run: fn(&[u8]),
+}
+
+/// Every target.
+pub const TARGETS: &[Target] = &[Target { name: "bvh", run: bvh::run }];

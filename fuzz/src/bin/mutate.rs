@@ -3,6 +3,7 @@
 //! The input that failed is left in `fuzz/artifacts/TARGET/`.
 #![forbid(unsafe_code)]
 
+use halflight_fuzz::{TARGETS, Target};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
@@ -19,8 +20,8 @@ fn main() -> ExitCode {
         value.and_then(|value| value.parse().ok()).unwrap_or(otherwise)
     };
     let name = arguments.first().map_or("", |name| name);
-    let Some((name, target)) = halflight_fuzz::TARGETS.iter().find(|(known, _)| known == &name) else {
-        let names: Vec<_> = halflight_fuzz::TARGETS.iter().map(|(name, _)| *name).collect();
+    let Some(Target { name, run }) = TARGETS.iter().find(|target| target.name == name) else {
+        let names: Vec<_> = TARGETS.iter().map(|target| target.name).collect();
         eprintln!("mutate TARGET [--seconds N] [--seed N]; targets: {}", names.join(", "));
         return ExitCode::from(2);
     };
@@ -33,7 +34,7 @@ fn main() -> ExitCode {
     let mut inputs = corpus.iter().cloned();
     while runs < corpus.len() as u64 || Instant::now() < end {
         let input = inputs.next().unwrap_or_else(|| mutated(&corpus, &mut random));
-        if panic::catch_unwind(|| target(&input)).is_err() {
+        if panic::catch_unwind(|| run(&input)).is_err() {
             let folder = home.join("artifacts").join(name);
             let path = folder.join(format!("crash-run-{runs}"));
             let saved = fs::create_dir_all(&folder).and_then(|()| fs::write(&path, &input));

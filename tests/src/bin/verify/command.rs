@@ -1,0 +1,60 @@
+//! Running other programs: what is run is printed, and a failure names it.
+
+use crate::{Failure, Outcome};
+use std::path::Path;
+use std::process::{Command, Stdio};
+
+/// `program arguments…` in `directory`; arguments are separated by spaces.
+pub(crate) fn command(directory: &Path, line: &str) -> Command {
+    let mut words = line.split_whitespace();
+    let mut command = Command::new(words.next().unwrap_or_default());
+    command.args(words).current_dir(directory);
+    command
+}
+
+/// Cargo (of another toolchain where `line` says so) without what the outer cargo told this program.
+pub(crate) fn fresh_cargo(directory: &Path, line: &str) -> Command {
+    let mut command = command(directory, line);
+    for (name, _) in std::env::vars_os() {
+        let name_text = name.to_string_lossy();
+        let package = name_text.starts_with("CARGO_PKG_") || name_text.starts_with("CARGO_MANIFEST_");
+        if package || ["CARGO", "RUSTUP_TOOLCHAIN", "LD_LIBRARY_PATH", "RUSTFLAGS"].contains(&&*name_text) {
+            command.env_remove(name);
+        }
+    }
+    command
+}
+
+/// Runs to the end with the output on the terminal.
+pub(crate) fn run(command: &mut Command) -> Result<(), Failure> {
+    let shown = show(command);
+    println!("$ {shown}");
+    match command.stdin(Stdio::null()).status() {
+        Ok(status) if status.success() => Ok(()),
+        Ok(status) => Err(Failure::Failed(format!("`{shown}`: {status}"))),
+        Err(error) => Err(Failure::Missing(format!("`{shown}` does not start: {error}"))),
+    }
+}
+
+/// Runs to the end; what it wrote to standard output, trimmed.
+pub(crate) fn output(command: &mut Command) -> Outcome {
+    let shown = show(command);
+    match command.stdin(Stdio::null()).stderr(Stdio::inherit()).output() {
+        Ok(out) if out.status.success() => Ok(String::from_utf8_lossy(&out.stdout).trim().to_owned()),
+        Ok(out) => Err(Failure::Failed(format!("`{shown}`: {}", out.status))),
+        Err(error) => Err(Failure::Missing(format!("`{shown}` does not start: {error}"))),
+    }
+}
+
+/// Whether a program can be started at all.
+pub(crate) fn exists(program: &str) -> bool {
+    let quiet = |mut c: Command| c.stdout(Stdio::null()).stderr(Stdio::null()).stdin(Stdio::null()).status();
+    let mut version = Command::new(program);
+    version.arg("--version");
+    quiet(version).is_ok()
+}
+
+fn show(command: &Command) -> String {
+    let words = core::iter::once(command.get_program()).chain(command.get_args());
+    words.map(|word| word.to_string_lossy()).collect::<Vec<_>>().join(" ")
+}

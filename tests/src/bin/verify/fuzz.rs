@@ -1,0 +1,51 @@
+//! A short run of every fuzz target from its corpus: through cargo-fuzz where it and a nightly toolchain
+//! are installed, else through the stable driver of `fuzz/`.
+
+use crate::command::{fresh_cargo, output, run};
+use crate::{Failure, Outcome, Project};
+use std::fs;
+use std::process::{Command, Stdio};
+
+/// For each target.
+const SECONDS: u32 = 20;
+
+pub(crate) fn smoke(project: &Project) -> Outcome {
+    let folder = project.root.join("fuzz");
+    let io = |error: std::io::Error| Failure::Failed(format!("{}: {error}", folder.display()));
+    let mut targets = Vec::new();
+    for entry in fs::read_dir(folder.join("fuzz_targets")).map_err(io)? {
+        targets.extend(entry.map_err(io)?.path().file_stem().map(|name| name.to_string_lossy().into_owned()));
+    }
+    targets.sort();
+
+    let coverage = has_cargo_fuzz();
+    for target in &targets {
+        if coverage {
+            // What libFuzzer finds goes to the first folder; the second is the one in the repository.
+            fs::create_dir_all(folder.join("corpus-run").join(target)).map_err(io)?;
+            let line = format!(
+                "cargo +nightly fuzz run --fuzz-dir . {target} corpus-run/{target} corpus/{target} -- \
+                 -seed=1 -max_total_time={SECONDS} -timeout=10 -verbosity=0 -print_final_stats=1"
+            );
+            run(&mut fresh_cargo(&folder, &line))?;
+        } else {
+            let line = format!(
+                "cargo run --quiet --release --locked --no-default-features --bin mutate -- \
+                 {target} --seconds {SECONDS} --seed 1"
+            );
+            println!("{}", output(&mut fresh_cargo(&folder, &line))?);
+        }
+    }
+    let driver = if coverage { "libFuzzer" } else { "the stable driver (no cargo-fuzz or no nightly here)" };
+    Ok(format!("{} targets, {SECONDS} s each, by {driver}", targets.len()))
+}
+
+fn has_cargo_fuzz() -> bool {
+    let answers = |arguments: &[&str]| {
+        let mut cargo = Command::new("cargo");
+        cargo.args(arguments).env_remove("RUSTUP_TOOLCHAIN").env_remove("CARGO");
+        let quiet = cargo.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
+        quiet.status().is_ok_and(|status| status.success())
+    };
+    answers(&["+nightly", "--version"]) && answers(&["fuzz", "--version"])
+}

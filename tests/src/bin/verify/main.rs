@@ -1,0 +1,92 @@
+//! Every check of the project in one program, the same for a person and for CI:
+//! `cargo verify [STEP…] [--allow-missing]`, all steps when none is named.
+#![forbid(unsafe_code)]
+
+mod command;
+mod fuzz;
+mod quality;
+mod source;
+mod targets;
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::time::Instant;
+
+/// A check by name.
+struct Step {
+    name: &'static str,
+    what: &'static str,
+    run: fn(&Project) -> Outcome,
+}
+
+/// One line that says what was done, or why it went wrong.
+type Outcome = Result<String, Failure>;
+
+/// Why a step did not pass.
+enum Failure {
+    /// A tool is not on this machine: how to get it. Passes with `--allow-missing`.
+    Missing(String),
+    /// The check failed.
+    Failed(String),
+}
+
+/// What the steps need to know.
+struct Project {
+    root: PathBuf,
+}
+
+const STEPS: &[Step] = &[
+    Step { name: "source", what: "house rules that no compiler checks", run: source::check },
+    Step { name: "fmt", what: "rustfmt leaves every workspace as it is", run: quality::fmt },
+    Step { name: "clippy", what: "no warning in any workspace", run: quality::clippy },
+    Step { name: "test", what: "cargo test --release --workspace", run: quality::test },
+    Step { name: "docs", what: "rustdoc without a warning", run: quality::docs },
+    Step { name: "targets", what: "the tiny render on every target: same bits", run: targets::check },
+    Step { name: "fuzz", what: "a short run of every fuzz target", run: fuzz::smoke },
+];
+
+fn main() -> ExitCode {
+    let mut allow_missing = false;
+    let mut names = Vec::new();
+    for argument in std::env::args().skip(1) {
+        match argument.as_str() {
+            "--allow-missing" => allow_missing = true,
+            name if STEPS.iter().any(|step| step.name == name) => names.push(argument),
+            _ => return usage(&argument),
+        }
+    }
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+    let project = Project { root: root.canonicalize().unwrap_or(root) };
+
+    let chosen = STEPS.iter().filter(|step| names.is_empty() || names.iter().any(|name| name == step.name));
+    let results: Vec<_> = chosen.map(|step| run(step, &project, allow_missing)).collect();
+    println!("\nverify:");
+    for (line, _) in &results {
+        println!("  {line}");
+    }
+    if results.iter().all(|(_, good)| *good) { ExitCode::SUCCESS } else { ExitCode::FAILURE }
+}
+
+/// Runs one step; its line of the summary, and whether it passed.
+fn run(step: &Step, project: &Project, allow_missing: bool) -> (String, bool) {
+    println!("\n== {}: {}", step.name, step.what);
+    let start = Instant::now();
+    let (verdict, text, good) = match (step.run)(project) {
+        Ok(text) => ("ok", text, true),
+        Err(Failure::Missing(text)) if allow_missing => ("skipped", text, true),
+        Err(Failure::Missing(text)) => ("MISSING", text, false),
+        Err(Failure::Failed(text)) => ("FAILED", text, false),
+    };
+    let line = format!("{:<8} {verdict:<8} {:>6.1} s  {text}", step.name, start.elapsed().as_secs_f32());
+    println!("{line}");
+    (line, good)
+}
+
+fn usage(argument: &str) -> ExitCode {
+    eprintln!("verify: no step or option is called `{argument}`\n\ncargo verify [STEP…] [--allow-missing]\n");
+    for step in STEPS {
+        eprintln!("  {:<8} {}", step.name, step.what);
+    }
+    eprintln!("\n--allow-missing: a step whose tool is not on this machine is skipped instead of failing.");
+    ExitCode::from(2)
+}

@@ -1,0 +1,139 @@
+//! The house rules that no compiler checks, by reading the source line by line.
+
+use crate::{Failure, Outcome, Project};
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// Words that must not stand in the code of some folders. Tests and comments are not looked at.
+struct Rule {
+    folders: &'static [&'static str],
+    words: &'static [&'static str],
+    unless: &'static [&'static str],
+    because: &'static str,
+}
+
+const RULES: &[Rule] = &[
+    Rule {
+        folders: &["core/src"],
+        words: &[
+            ".unwrap()",
+            ".expect(",
+            "panic!",
+            "todo!",
+            "unimplemented!",
+            "unreachable!",
+            "assert!(",
+            "assert_eq!(",
+            "assert_ne!(",
+        ],
+        // Those that the compiler evaluates.
+        unless: &["const _", "const {", "debug_assert"],
+        because: "the core returns values, it does not panic",
+    },
+    Rule {
+        folders: &["core/src", "simd/src"],
+        words: &["std::", "alloc::"],
+        unless: &[],
+        because: "core and simd have neither std nor alloc",
+    },
+    Rule {
+        folders: &["core/src", "std-app/src", "tests/src", "tests/tests"],
+        words: &["unsafe ", "unsafe{"],
+        unless: &["\"unsafe"],
+        because: "only simd/ may be unsafe",
+    },
+    Rule {
+        folders: &["core/src"],
+        words: &[".mul_add(", "::mul_add("],
+        unless: &[],
+        because: "fused operations differ between targets",
+    },
+];
+
+/// No file is longer: one idea per file.
+const MAX_LINES: usize = 700;
+
+pub(crate) fn check(project: &Project) -> Outcome {
+    let mut complaints = Vec::new();
+    let mut files = Vec::new();
+    for folder in ["simd", "core", "std-app", "tests", "fuzz"] {
+        rust_files(&project.root.join(folder), &mut files);
+    }
+    files.sort();
+    for path in &files {
+        let name = path.strip_prefix(&project.root).unwrap_or(path).to_string_lossy().replace('\\', "/");
+        let text = fs::read_to_string(path).map_err(|e| Failure::Failed(format!("{name}: {e}")))?;
+        let lines = text.lines().count();
+        if lines > MAX_LINES {
+            complaints.push(format!("{name}: {lines} lines, {MAX_LINES} at most"));
+        }
+        if !text.starts_with("//!") {
+            complaints.push(format!("{name}:1: the file does not open with `//!` and what lives in it"));
+        }
+        let tests = ["core/src", "simd/src"].iter().any(|folder| name.starts_with(folder))
+            && (name.ends_with("tests.rs") || name.contains("/tests/"));
+        for (number, line) in if tests { Vec::new() } else { code(&text) } {
+            for rule in RULES.iter().filter(|rule| rule.folders.iter().any(|folder| name.starts_with(folder)))
+            {
+                let found = rule.words.iter().find(|word| line.contains(**word));
+                if let Some(word) = found.filter(|_| !rule.unless.iter().any(|word| line.contains(word))) {
+                    complaints.push(format!("{name}:{number}: `{}`: {}", word.trim(), rule.because));
+                }
+            }
+        }
+    }
+    complaints.iter().for_each(|complaint| println!("{complaint}"));
+    match complaints.len() {
+        0 => Ok(format!("{} files", files.len())),
+        count => Err(Failure::Failed(format!("{count} complaints"))),
+    }
+}
+
+/// The numbered lines of code: without comments, and without what only tests or `std` builds have.
+fn code(text: &str) -> Vec<(usize, &str)> {
+    let bare = |line: &'_ str| line.split("//").next().unwrap_or_default().trim_end().len();
+    let mut lines = text.lines().enumerate().map(|(index, line)| (index + 1, &line[..bare(line)]));
+    let mut kept = Vec::new();
+    while let Some((number, line)) = lines.next() {
+        let attribute = |line: &str| line.trim_start().starts_with("#[");
+        if !(attribute(line)
+            && (line.contains("cfg(test") || line.contains("(test,") || line.contains("\"std\"")))
+        {
+            kept.push((number, line));
+            continue;
+        }
+        // The item below, with its body where it has one.
+        let item = lines.find(|(_, line)| !line.is_empty() && !attribute(line)).map_or("", |(_, item)| item);
+        let indent = |line: &str| line.len() - line.trim_start().len();
+        if item.ends_with('{') {
+            lines.find(|(_, line)| !line.is_empty() && indent(line) == indent(item));
+        }
+    }
+    kept
+}
+
+/// Every `.rs` file below `folder`, but for build products and files of tests.
+fn rust_files(folder: &Path, files: &mut Vec<PathBuf>) {
+    let Ok(entries) = fs::read_dir(folder) else { return };
+    for path in entries.flatten().map(|entry| entry.path()) {
+        let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        match path.is_dir() {
+            true if ["target", "corpus", "artifacts", "venv", "output"].contains(&&*name) => {}
+            true => rust_files(&path, files),
+            false if name.ends_with(".rs") => files.push(path),
+            false => {}
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn comments_and_tests_are_not_code() {
+        let text =
+            "let a = 1; // panic!\n#[cfg(test)]\nmod tests {\n    panic!()\n}\n#[cfg(test)]\nuse x;\nlet b;";
+        assert_eq!(code(text), [(1, "let a = 1;"), (8, "let b;")]);
+    }
+}

@@ -1,0 +1,175 @@
+//! The tiny render (`core/examples/tiny_render.rs`) on every constrained target: it must build there,
+//! and where it can be run it must give the bits of the ordinary example.
+
+use crate::command::{command, exists, fresh_cargo, output, run};
+use crate::{Failure, Outcome, Project};
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+/// One build of the tiny render.
+struct Build {
+    name: &'static str,
+    /// Member of the workspace `tests/targets`.
+    package: &'static str,
+    triple: &'static str,
+    features: &'static str,
+    run: Run,
+    /// Whether a WebAssembly module may hold SIMD instructions: then it must, else it must not.
+    simd: Option<bool>,
+}
+
+/// How its result is seen.
+enum Run {
+    /// As a program of this machine.
+    Here,
+    /// Under node.
+    Node,
+    /// Under QEMU where that is installed; a build that links is enough elsewhere.
+    Board,
+}
+
+const BUILDS: &[Build] = &[
+    Build {
+        name: "x86-64, neither std nor libc",
+        package: "host",
+        triple: "x86_64-unknown-linux-gnu",
+        features: "",
+        run: Run::Here,
+        simd: None,
+    },
+    Build {
+        name: "wasm32",
+        package: "wasm",
+        triple: "wasm32-unknown-unknown",
+        features: "",
+        run: Run::Node,
+        simd: Some(false),
+    },
+    Build {
+        name: "wasm32 with simd128",
+        package: "wasm",
+        triple: "wasm32-unknown-unknown",
+        features: "+simd128",
+        run: Run::Node,
+        simd: Some(true),
+    },
+    Build {
+        name: "Cortex-M4F",
+        package: "cortexm",
+        triple: "thumbv7em-none-eabihf",
+        features: "",
+        run: Run::Board,
+        simd: None,
+    },
+];
+
+pub(crate) fn check(project: &Project) -> Outcome {
+    let example = "cargo run --quiet --release --locked -p halflight-core --example tiny_render";
+    let picture = output(&mut command(&project.root, example))?;
+    println!("{picture}");
+    let expected = picture.lines().last().unwrap_or_default();
+
+    // Every build is tried, so that one missing tool does not hide a failure elsewhere.
+    let results: Vec<_> = BUILDS.iter().map(|build| (build, one(project, build, expected))).collect();
+    for (build, result) in &results {
+        let text = match result {
+            Ok(text) | Err(Failure::Missing(text)) | Err(Failure::Failed(text)) => text,
+        };
+        println!("  {:<30} {text}", build.name);
+    }
+    let failed = |result: &Outcome| matches!(result, Err(Failure::Failed(_)));
+    let mut errors: Vec<_> = results.into_iter().filter(|(_, result)| result.is_err()).collect();
+    errors.sort_by_key(|(_, result)| !failed(result));
+    match errors.into_iter().next() {
+        Some((_, error)) => error,
+        None => Ok(format!("{} builds and the example agree: {expected}", BUILDS.len())),
+    }
+}
+
+/// Builds, runs and compares one.
+fn one(project: &Project, build: &Build, expected: &str) -> Outcome {
+    let folder = project.root.join("tests/targets");
+    let target = folder.join("target").join(format!("{}{}", build.package, build.features.replace('+', "-")));
+    let mut cargo = match build.run {
+        Run::Here if cfg!(all(target_arch = "x86_64", target_os = "linux")) => {
+            command(&folder, "cargo build")
+        }
+        Run::Here => return Err(Failure::Missing("needs an x86-64 machine with Linux".to_owned())),
+        _ => cross_cargo(&folder, build.triple)?,
+    };
+    cargo.args(["--release", "--quiet", "--locked", "--package", build.package, "--target", build.triple]);
+    cargo.arg("--target-dir").arg(&target);
+    if !build.features.is_empty() {
+        cargo.env("RUSTFLAGS", format!("-Ctarget-feature={}", build.features));
+    }
+    run(&mut cargo)?;
+
+    let products = target.join(build.triple).join("release");
+    let (file, seen) = match build.run {
+        Run::Here => (products.join(build.package), output(&mut Command::new(products.join(build.package)))?),
+        Run::Node => {
+            let module = products.join(format!("{}.wasm", build.package));
+            let mut node = command(&folder, "node wasm/run.mjs");
+            let seen = output(node.arg(&module))?;
+            (module, seen)
+        }
+        Run::Board => {
+            let program = products.join(build.package);
+            if !exists("qemu-system-arm") {
+                return Ok(format!("links ({}); no qemu-system-arm here to run it", size(&program)));
+            }
+            let line = "qemu-system-arm -M mps2-an386 -display none -monitor none -serial none \
+                        -chardev stdio,id=host -semihosting-config enable=on,target=native,chardev=host -kernel";
+            let seen = output(command(&folder, line).arg(&program))?;
+            (program, seen)
+        }
+    };
+    if let Some(simd) = build.simd {
+        instructions_as_promised(&file, simd)?;
+    }
+    match seen == expected {
+        true => Ok(format!("{seen} ({})", size(&file))),
+        false => Err(Failure::Failed(format!("{}: {seen}, the example gives {expected}", build.name))),
+    }
+}
+
+/// A cargo that can build for `triple`: rustup's where it has the target, else Debian's compiler with the
+/// source of `core` (packages rustc-web, cargo-web, rust-web-src) and rustup's linker.
+fn cross_cargo(folder: &Path, triple: &str) -> Result<Command, Failure> {
+    let libraries = output(command(folder, "rustc --print target-libdir --target").arg(triple))?;
+    if Path::new(&libraries).exists() {
+        return Ok(command(folder, "cargo build"));
+    }
+    let debian = ["/usr/bin/rustc", "/usr/bin/cargo", "/usr/lib/rustlib/src/rust/library/core/src/lib.rs"];
+    if let Some(absent) = debian.iter().find(|path| !Path::new(path).exists()) {
+        let advice =
+            format!("rustup target add {triple}, or apt-get install rustc-web cargo-web rust-web-src");
+        return Err(Failure::Missing(format!("{absent} is not there: {advice}")));
+    }
+    let sysroot = PathBuf::from(output(&mut command(folder, "rustc --print sysroot"))?);
+    let linker = sysroot.join("lib/rustlib/x86_64-unknown-linux-gnu/bin/rust-lld");
+    let mut cargo = fresh_cargo(folder, "/usr/bin/cargo build -Zbuild-std=core");
+    cargo.env("RUSTC", "/usr/bin/rustc").env("RUSTC_BOOTSTRAP", "1");
+    for name in ["THUMBV7EM_NONE_EABIHF", "WASM32_UNKNOWN_UNKNOWN"] {
+        cargo.env(format!("CARGO_TARGET_{name}_LINKER"), &linker);
+    }
+    Ok(cargo)
+}
+
+/// A module built without simd128 must be valid for a parser that knows no SIMD; one with must not.
+fn instructions_as_promised(module: &Path, simd: bool) -> Result<(), Failure> {
+    let failed = |text: String| Failure::Failed(format!("{}: {text}", module.display()));
+    let bytes = fs::read(module).map_err(|error| failed(error.to_string()))?;
+    let features = wasmparser::WasmFeatures::default().difference(wasmparser::WasmFeatures::SIMD);
+    let plain = wasmparser::Validator::new_with_features(features).validate_all(&bytes);
+    match (plain, simd) {
+        (Ok(_), true) => Err(failed("no SIMD instruction in a build that asks for them".to_owned())),
+        (Err(error), false) => Err(failed(format!("not plain WebAssembly: {error}"))),
+        _ => Ok(()),
+    }
+}
+
+fn size(path: &Path) -> String {
+    fs::metadata(path).map_or(String::new(), |file| format!("{} bytes", file.len()))
+}
