@@ -430,11 +430,14 @@ fn place_of(scene: &Scene, light: u32) -> (Bounds, Cone) {
     }
 }
 
-/// 1 inside the inner cone, 0 outside the outer one, and a smooth step in between.
+/// 1 inside the inner cone, 0 outside the outer one, and linear in the angle in between.
 fn spot_falloff(cos: f32, cos_inner: f32, cos_outer: f32) -> f32 {
     if cos >= cos_inner {
         return 1.0;
     }
-    let t = ((cos - cos_outer) / (cos_inner - cos_outer)).max(0.0);
-    t * t * (3.0 - 2.0 * t)
+    if cos <= cos_outer {
+        return 0.0;
+    }
+    let [inside, angle, outside] = [cos_inner, cos, cos_outer].map(libm::acosf);
+    (outside - angle) / (outside - inside)
 }

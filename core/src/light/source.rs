@@ -13,7 +13,8 @@ pub enum PointLight {
         /// Radiant intensity, W/sr.
         intensity: Rgb,
     },
-    /// Shines into a cone, full inside `cos_inner` and falling smoothly to nothing at `cos_outer`.
+    /// Shines into a cone, full inside `cos_inner` and falling to nothing at `cos_outer`, evenly in
+    /// the angle.
     Spot {
         /// Where.
         position: Vec3,
