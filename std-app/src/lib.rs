@@ -1,2 +1,5 @@
 //! halflight, the app: files in, pictures and reports out, with the core's passes run on all cores.
 #![forbid(unsafe_code)]
+
+pub mod compare;
+pub mod save;

@@ -1,4 +1,8 @@
-//! The command line. See `halflight --help`.
+//! The command line. See `halflight --help`, and docs/cli.md for what scripts may rely on.
 #![forbid(unsafe_code)]
 
-fn main() {}
+mod cli;
+
+fn main() -> std::process::ExitCode {
+    cli::main()
+}

@@ -1,0 +1,38 @@
+//! How a command ends when it cannot do what was asked: one block of text that names the file, the reason
+//! and, where there is one, the way out.
+
+use core::fmt;
+
+/// Bad input or usage: exit code 2.
+#[derive(Debug)]
+pub(super) struct Failure {
+    reason: String,
+    advice: Option<String>,
+}
+
+impl Failure {
+    pub(super) fn new(reason: impl fmt::Display) -> Self {
+        Self { reason: reason.to_string(), advice: None }
+    }
+
+    /// What to do about it.
+    pub(super) fn advice(self, advice: impl fmt::Display) -> Self {
+        Self { advice: Some(advice.to_string()), ..self }
+    }
+}
+
+impl fmt::Display for Failure {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "error: {}", self.reason.replace('\n', "\n       "))?;
+        match &self.advice {
+            Some(advice) => write!(f, "\n  tip: {}", advice.replace('\n', "\n       ")),
+            None => Ok(()),
+        }
+    }
+}
+
+impl<E: core::error::Error> From<E> for Failure {
+    fn from(error: E) -> Self {
+        Self::new(error)
+    }
+}

@@ -1,0 +1,221 @@
+//! LDR-FLIP: the difference that an eye sees when it alternates between two pictures on a display.
+//!
+//! Andersson, Nilsson, Akenine-Möller, Oskarsson, Åström, Fairchild: "FLIP: A Difference Evaluator for
+//! Alternating Images", HPG 2020. Pictures are shown as our PNGs are, clamped to [0, 1], at 67 pixels a
+//! degree of vision: a display of 3840 pixels on 0.7 m seen from 0.7 m, the paper's default.
+//!
+//! 1. Colour: opponent channels blurred by the eye's contrast sensitivity, then the HyAB distance of
+//!    Hunt-adjusted L*a*b*, compressed to [0, 1].
+//! 2. Features: first and second derivatives of the achromatic channel at the scale of visible detail.
+//! 3. The colour error to the power of one minus the feature error.
+//!
+//! All kernels are products of a function of x and one of y (of the two-term blue-yellow one, each term
+//! is), so they run along rows and then along columns. Pictures continue with their outermost pixels.
+
+use super::Image;
+use crate::save::{from_srgb, to_srgb};
+use core::f64::consts::PI;
+use rayon::prelude::*;
+
+type Colour = [f32; 3];
+
+/// The FLIP error of each pixel, in [0, 1]. The pictures are of one size. NaN is seen as black.
+pub fn flip(image: &Image, reference: &Image) -> Vec<f32> {
+    let degree = 0.7 * 3840.0 / 0.7 * PI / 180.0;
+    let eye = Eye::new(degree);
+    let seen = [reference, image].map(|picture| eye.look(picture));
+    let largest = hyab(hunt(to_lab([0.0, 1.0, 0.0])), hunt(to_lab([0.0, 0.0, 1.0]))).powf(QC);
+    let error = |index: usize| {
+        let [r, t] = [&seen[0], &seen[1]];
+        let colour = redistribute(hyab(r.lab[index], t.lab[index]).powf(QC), largest);
+        let edge = (r.edge[index] - t.edge[index]).abs();
+        let point = (r.point[index] - t.point[index]).abs();
+        let feature = (edge.max(point) * core::f32::consts::FRAC_1_SQRT_2).powf(QF);
+        colour.powf(1.0 - feature)
+    };
+    (0..image.pixels.len()).into_par_iter().map(error).collect()
+}
+
+/// Exponent on the colour difference (section 4.1.3), and on the feature difference (section 4.2).
+const QC: f32 = 0.7;
+const QF: f32 = 0.5;
+
+/// Differences below `PC` of the largest take the range up to `PT`, the rest is for the extremes.
+const PC: f32 = 0.4;
+const PT: f32 = 0.95;
+
+fn redistribute(difference: f32, largest: f32) -> f32 {
+    let knee = PC * largest;
+    if difference < knee {
+        difference * PT / knee
+    } else {
+        PT + (difference - knee) / (largest - knee) * (1.0 - PT)
+    }
+}
+
+/// Contrast sensitivity (table 1): weights and widths a and b of the sums of Gaussians.
+const ACHROMATIC: [(f64, f64); 1] = [(1.0, 0.0047)];
+const RED_GREEN: [(f64, f64); 1] = [(1.0, 0.0053)];
+const BLUE_YELLOW: [(f64, f64); 2] = [(34.1, 0.04), (13.5, 0.025)];
+
+/// Full width, in degrees, of the smallest feature that counts.
+const FEATURE: f64 = 0.082;
+
+/// The filters of an observer.
+struct Eye {
+    /// For each opponent channel: Gaussians along an axis, whose outer products add up to the filter.
+    sensitivity: [Vec<Vec<f32>>; 3],
+    smooth: Vec<f32>,
+    edge: Vec<f32>,
+    point: Vec<f32>,
+}
+
+/// What the eye makes of one picture.
+struct Seen {
+    lab: Vec<Colour>,
+    edge: Vec<f32>,
+    point: Vec<f32>,
+}
+
+impl Eye {
+    fn new(pixels_per_degree: f64) -> Self {
+        // Three standard deviations of the widest Gaussian.
+        let reach = (3.0 * (0.04 / (2.0 * PI * PI)).sqrt() * pixels_per_degree).ceil() as i32;
+        let sensitivity = |terms: &[(f64, f64)]| {
+            let axis = |&(a, b): &(f64, f64)| -> Vec<f64> {
+                let weight = (a * (PI / b).sqrt()).sqrt();
+                let at = |x: i32| f64::from(x) / pixels_per_degree;
+                (-reach..=reach).map(|x| weight * (-PI * PI * at(x) * at(x) / b).exp()).collect()
+            };
+            let axes: Vec<Vec<f64>> = terms.iter().map(axis).collect();
+            let total: f64 = axes.iter().map(|axis| axis.iter().sum::<f64>().powi(2)).sum();
+            axes.iter().map(|axis| axis.iter().map(|w| (w / total.sqrt()) as f32).collect()).collect()
+        };
+
+        let deviation = 0.5 * FEATURE * pixels_per_degree;
+        let reach = (3.0 * deviation).ceil() as i32;
+        let along = |weight: fn(f64, f64) -> f64| -> Vec<f64> {
+            let gauss = |x: f64| (-x * x / (2.0 * deviation * deviation)).exp();
+            (-reach..=reach).map(|x| weight(x.into(), deviation) * gauss(x.into())).collect()
+        };
+        Self {
+            sensitivity: [sensitivity(&ACHROMATIC), sensitivity(&RED_GREEN), sensitivity(&BLUE_YELLOW)],
+            smooth: balanced(&along(|_, _| 1.0)),
+            edge: balanced(&along(|x, _| -x)),
+            point: balanced(&along(|x, deviation| x * x / (deviation * deviation) - 1.0)),
+        }
+    }
+
+    fn look(&self, picture: &Image) -> Seen {
+        let width = picture.width as usize;
+        let opponent: Vec<Colour> = picture
+            .pixels
+            .par_iter()
+            .map(|pixel| to_opponent(pixel.map(|c| from_srgb(to_srgb(c)))))
+            .collect();
+        let channel = |c: usize| opponent.iter().map(|colour| colour[c]).collect::<Vec<f32>>();
+
+        let blurred: [Vec<f32>; 3] = core::array::from_fn(|c| {
+            let channel = channel(c);
+            let terms = self.sensitivity[c].iter().map(|axis| filter(&channel, width, axis, axis));
+            terms.reduce(|a, b| a.iter().zip(&b).map(|(a, b)| a + b).collect()).unwrap_or(channel)
+        });
+        let lab = |i: usize| {
+            let linear = from_opponent([blurred[0][i], blurred[1][i], blurred[2][i]]);
+            hunt(to_lab(linear.map(|c| c.clamp(0.0, 1.0))))
+        };
+
+        // The achromatic channel, from [-16, 100] to [0, 1].
+        let luma: Vec<f32> = channel(0).into_iter().map(|y| (y + 16.0) / 116.0).collect();
+        let strength = |across: &[f32]| -> Vec<f32> {
+            let x = filter(&luma, width, across, &self.smooth);
+            let y = filter(&luma, width, &self.smooth, across);
+            x.iter().zip(&y).map(|(x, y)| x.hypot(*y)).collect()
+        };
+        Seen {
+            lab: (0..opponent.len()).into_par_iter().map(lab).collect(),
+            edge: strength(&self.edge),
+            point: strength(&self.point),
+        }
+    }
+}
+
+/// Scales the positive weights to a sum of 1, and the negative ones to −1.
+fn balanced(weights: &[f64]) -> Vec<f32> {
+    let positive: f64 = weights.iter().filter(|&&w| w > 0.0).sum();
+    let negative: f64 = -weights.iter().filter(|&&w| w < 0.0).sum::<f64>();
+    weights.iter().map(|&w| (w / if w > 0.0 { positive } else { negative.max(1e-30) }) as f32).collect()
+}
+
+/// `values` filtered by `across` along the rows and by `down` along the columns.
+fn filter(values: &[f32], width: usize, across: &[f32], down: &[f32]) -> Vec<f32> {
+    let height = values.len() / width;
+    // Tap `k` of a kernel looks at position `at + k - reach`, or at the border where that is outside.
+    let clamped = |at: usize, k: usize, kernel: &[f32], end: usize| {
+        (at + k).saturating_sub(kernel.len() / 2).min(end - 1)
+    };
+    let mut rows = vec![0.0; values.len()];
+    rows.par_chunks_mut(width).zip(values.par_chunks(width)).for_each(|(to, from)| {
+        for (x, to) in to.iter_mut().enumerate() {
+            *to = across.iter().enumerate().map(|(k, w)| w * from[clamped(x, k, across, width)]).sum();
+        }
+    });
+    let mut columns = vec![0.0; values.len()];
+    columns.par_chunks_mut(width).enumerate().for_each(|(y, to)| {
+        for (k, w) in down.iter().enumerate() {
+            let from = &rows[clamped(y, k, down, height) * width..][..width];
+            to.iter_mut().zip(from).for_each(|(to, from)| *to += w * from);
+        }
+    });
+    columns
+}
+
+/// Linear sRGB to XYZ, and what it makes of white (D65).
+const TO_XYZ: [[f32; 3]; 3] = [
+    [0.412_386_56, 0.357_591_5, 0.180_450_49],
+    [0.212_636_82, 0.715_183, 0.072_180_2],
+    [0.019_330_63, 0.119_197_16, 0.950_372_6],
+];
+const FROM_XYZ: [[f32; 3]; 3] = [
+    [3.241_003_3, -1.537_399, -0.498_615_86],
+    [-0.969_224_33, 1.875_930_1, 0.041_554_224],
+    [0.055_639_423, -0.204_011_2, 1.057_148_9],
+];
+const WHITE: Colour = [0.950_428_54, 1.0, 1.088_900_4];
+
+fn times(matrix: &[[f32; 3]; 3], v: Colour) -> Colour {
+    matrix.map(|row| row[0] * v[0] + row[1] * v[1] + row[2] * v[2])
+}
+
+/// Linear sRGB to the linearised opponent space YCxCz.
+fn to_opponent(linear: Colour) -> Colour {
+    let xyz = times(&TO_XYZ, linear);
+    let [x, y, z] = [xyz[0] / WHITE[0], xyz[1] / WHITE[1], xyz[2] / WHITE[2]];
+    [116.0 * y - 16.0, 500.0 * (x - y), 200.0 * (y - z)]
+}
+
+fn from_opponent([luma, cx, cz]: Colour) -> Colour {
+    let y = (luma + 16.0) / 116.0;
+    times(&FROM_XYZ, [(y + cx / 500.0) * WHITE[0], y * WHITE[1], (y - cz / 200.0) * WHITE[2]])
+}
+
+/// Linear sRGB to CIE L*a*b*.
+fn to_lab(linear: Colour) -> Colour {
+    const DELTA: f32 = 6.0 / 29.0;
+    let compress = |t: f32| {
+        if t > DELTA.powi(3) { t.cbrt() } else { t / (3.0 * DELTA * DELTA) + 4.0 / 29.0 }
+    };
+    let xyz = times(&TO_XYZ, linear);
+    let [x, y, z] = core::array::from_fn(|c| compress(xyz[c] / WHITE[c]));
+    [116.0 * y - 16.0, 500.0 * (x - y), 200.0 * (y - z)]
+}
+
+/// Colours look more colourful where it is bright (the Hunt effect).
+fn hunt([l, a, b]: Colour) -> Colour {
+    [l, 0.01 * l * a, 0.01 * l * b]
+}
+
+/// City-block in lightness, Euclidean in chroma: fit for large differences (Abasi et al. 2020).
+fn hyab(r: Colour, t: Colour) -> f32 {
+    (r[0] - t[0]).abs() + (r[1] - t[1]).hypot(r[2] - t[2])
+}

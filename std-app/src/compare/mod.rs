@@ -1,0 +1,77 @@
+//! Two pictures side by side: errors in linear light and as an eye would see them, and a picture of the
+//! difference.
+
+mod flip;
+mod heat;
+
+pub use flip::flip;
+
+use crate::save::{Format, Image, from_srgb};
+use core::fmt;
+use halflight_core::estimate::Difference;
+
+/// What [`compare`] finds.
+#[derive(Clone, Debug)]
+pub struct Comparison {
+    /// MSE, relMSE, means, and the pixels that are not finite.
+    pub linear: Difference,
+    /// Mean of the LDR-FLIP map: 0 is no visible difference, 1 the largest.
+    pub flip: f64,
+    /// Pixels in a row.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    flip_map: Vec<f32>,
+}
+
+/// Pictures of two sizes have no difference.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct SizeMismatch {
+    /// Width and height of the first.
+    pub image: [u32; 2],
+    /// Width and height of the second.
+    pub reference: [u32; 2],
+}
+
+impl fmt::Display for SizeMismatch {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let ([a, b], [c, d]) = (self.image, self.reference);
+        write!(f, "the pictures differ in size: {a}x{b} and {c}x{d}")
+    }
+}
+
+impl core::error::Error for SizeMismatch {}
+
+/// Compares `image` with `reference`.
+///
+/// # Errors
+/// When their sizes differ.
+pub fn compare(image: &Image, reference: &Image) -> Result<Comparison, SizeMismatch> {
+    if (image.width, image.height) != (reference.width, reference.height) {
+        return Err(SizeMismatch {
+            image: [image.width, image.height],
+            reference: [reference.width, reference.height],
+        });
+    }
+    let flip_map = flip(image, reference);
+    Ok(Comparison {
+        linear: Difference::between(image.colours(), reference.colours()),
+        flip: flip_map.iter().map(|&error| f64::from(error)).sum::<f64>() / flip_map.len().max(1) as f64,
+        width: image.width,
+        height: image.height,
+        flip_map,
+    })
+}
+
+impl Comparison {
+    /// A picture of the difference: |A − B| for a linear `format`, the FLIP map in false colours for PNG.
+    pub fn picture(&self, image: &Image, reference: &Image, format: Format) -> Image {
+        let pixels = if format.is_linear() {
+            let pairs = image.pixels.iter().zip(&reference.pixels);
+            pairs.map(|(a, b)| core::array::from_fn(|c| (a[c] - b[c]).abs())).collect()
+        } else {
+            self.flip_map.iter().map(|&error| heat::colour(error).map(from_srgb)).collect()
+        };
+        Image { width: self.width, height: self.height, pixels }
+    }
+}

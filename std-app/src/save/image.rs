@@ -1,0 +1,39 @@
+//! A picture in memory: linear RGB, rows from the top.
+
+use halflight_core::Rgb;
+
+/// Linear radiance, `width * height` pixels, row by row from the top left.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Image {
+    /// Pixels in a row.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    /// Red, green, blue.
+    pub pixels: Vec<[f32; 3]>,
+}
+
+impl Image {
+    /// A black picture.
+    pub fn black(width: u32, height: u32) -> Self {
+        Self { width, height, pixels: vec![[0.0; 3]; width as usize * height as usize] }
+    }
+
+    /// The pixels as the core's colours.
+    pub fn colours(&self) -> impl Iterator<Item = Rgb> + Clone + '_ {
+        self.pixels.iter().map(|&pixel| Rgb::from_array(pixel))
+    }
+
+    /// Mean of each channel over the pixels that are finite.
+    pub fn mean(&self) -> [f64; 3] {
+        let mut sum = [0.0; 3];
+        let mut count = 0u64;
+        for pixel in self.pixels.iter().filter(|pixel| pixel.iter().all(|c| c.is_finite())) {
+            count += 1;
+            for (sum, &channel) in sum.iter_mut().zip(pixel) {
+                *sum += f64::from(channel);
+            }
+        }
+        sum.map(|sum| sum / count.max(1) as f64)
+    }
+}
