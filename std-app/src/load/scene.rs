@@ -1,0 +1,88 @@
+//! A loaded scene: the buffers that the core borrows, and what is known of where they came from.
+
+use super::settings::RenderSettings;
+use super::texture_set::TextureSet;
+use super::transform::SceneTransform;
+use glam::Vec3;
+use halflight_core::scene::{Camera, Environment, Material, Mesh, PointLight, Scene, Texture, Triangle};
+
+/// Everything of a scene, owned, in the coordinates of the core.
+#[derive(Clone, Debug)]
+pub struct LoadedScene {
+    /// Vertex positions.
+    pub positions: Vec<[f32; 3]>,
+    /// Unit normals or zeros; as long as `positions`, or empty.
+    pub normals: Vec<[f32; 3]>,
+    /// Texture coordinates; as long as `positions`, or empty.
+    pub texcoords: Vec<[f32; 2]>,
+    /// All triangles.
+    pub triangles: Vec<Triangle>,
+    /// Referred to by the triangles.
+    pub materials: Vec<Material>,
+    /// Names of the materials, one for each.
+    pub material_names: Vec<String>,
+    /// Referred to by the materials and the environment.
+    pub textures: TextureSet,
+    /// Lights without surface.
+    pub lights: Vec<PointLight>,
+    /// What is seen where nothing is.
+    pub environment: Option<Environment>,
+    /// The camera of the scene file.
+    pub camera: Option<Camera>,
+    /// Settings of the scene file.
+    pub settings: RenderSettings,
+    /// From the coordinates of the file to those of the buffers.
+    pub transform: SceneTransform,
+    /// What was repaired or left out, a sentence for each kind.
+    pub repairs: Vec<String>,
+}
+
+/// The scene with the texture views that [`Scene`] borrows.
+#[derive(Debug)]
+pub struct SceneViews<'a> {
+    loaded: &'a LoadedScene,
+    textures: Vec<Texture<'a>>,
+}
+
+impl LoadedScene {
+    /// Views for the core.
+    pub fn views(&self) -> SceneViews<'_> {
+        SceneViews { loaded: self, textures: self.textures.views() }
+    }
+
+    /// The triangles.
+    pub fn mesh(&self) -> Mesh<'_> {
+        Mesh {
+            positions: &self.positions,
+            normals: &self.normals,
+            texcoords: &self.texcoords,
+            triangles: &self.triangles,
+        }
+    }
+
+    /// The camera of the scene file, else one that frames everything.
+    pub fn camera_or_default(&self) -> Camera {
+        self.camera.unwrap_or_else(|| Camera::framing(&self.mesh()))
+    }
+
+    /// A pinhole in the coordinates of the file, for flags of the command line.
+    pub fn camera_at(&self, eye: [f64; 3], look_at: [f64; 3], up: [f64; 3], fov_degrees: f64) -> Camera {
+        let up = Vec3::from(up.map(|x| x as f32));
+        Camera::look_at(self.transform.point(eye), self.transform.point(look_at), up, fov_degrees as f32)
+    }
+}
+
+impl SceneViews<'_> {
+    /// The scene as the core sees it, looked at by `camera`.
+    pub fn scene(&self, camera: Camera) -> Scene<'_> {
+        let loaded = self.loaded;
+        Scene {
+            mesh: loaded.mesh(),
+            materials: &loaded.materials,
+            textures: &self.textures,
+            lights: &loaded.lights,
+            environment: loaded.environment,
+            camera,
+        }
+    }
+}
