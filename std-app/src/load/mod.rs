@@ -11,6 +11,7 @@ pub mod mtl;
 mod notes;
 pub mod obj;
 mod scene;
+pub mod scene_file;
 mod settings;
 mod surface;
 mod text;
@@ -26,9 +27,10 @@ pub use texture_set::TextureSet;
 pub use transform::SceneTransform;
 
 use geometry::{Placed, Placement};
-use halflight_core::scene::Material;
+use halflight_core::scene::{Environment, Material};
 use mtl::MtlMaterial;
-use std::collections::HashMap;
+use scene_file::{EnvironmentChange, MaterialChange};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::path::{Path, PathBuf};
 
 /// What to load of a scene.
@@ -48,10 +50,11 @@ impl Default for LoadOptions {
 pub fn load(path: &Path, options: &LoadOptions) -> Result<LoadedScene, LoadError> {
     let extension = path.extension().map(|extension| extension.to_string_lossy().to_ascii_lowercase());
     match extension.as_deref() {
+        Some("toml") => scene_file::load(path, options),
         Some("obj") => {
             let mut builder = SceneBuilder::default();
             builder.add_mesh(path, Placement::IDENTITY, None)?;
-            Ok(builder.build(options))
+            Ok(builder.build(options, None))
         }
         _ => Err(LoadError::of_file(path, "unknown kind of scene", "scenes are .obj or .toml files")),
     }
@@ -76,7 +79,11 @@ struct SceneBuilder {
     files: HashMap<PathBuf, usize>,
     objs: Vec<obj::Obj>,
     materials: Vec<MtlMaterial>,
-    by_name: HashMap<(usize, String), u32>,
+    /// By file (none for materials of the scene file) and name.
+    by_name: HashMap<(Option<usize>, String), u32>,
+    /// Changes by the scene file, by name of the material.
+    overrides: BTreeMap<String, MaterialChange>,
+    used_overrides: BTreeSet<String>,
     notes: Notes,
 }
 
@@ -110,7 +117,7 @@ impl SceneBuilder {
         let mut materials = Vec::with_capacity(names.len() + 1);
         for name in names.iter().map(Some).chain([None]) {
             materials.push(match material {
-                Some(material) => self.material(usize::MAX, material, None),
+                Some(material) => self.material(None, material, None),
                 None => self.file_material(number, name.map(String::as_str), &library, path),
             });
         }
@@ -126,25 +133,29 @@ impl SceneBuilder {
         path: &Path,
     ) -> u32 {
         let Some(name) = name else {
-            return self.material(usize::MAX, "", None);
+            return self.material(None, "", None);
         };
         let found = library.get(name);
-        if found.is_none() {
+        if found.is_none() && !self.overrides.contains_key(name) {
             let what =
                 format!("material `{name}` of {} is not in its material libraries: grey", path.display());
             self.notes.add(1, what);
         }
-        self.material(file, name, found)
+        self.material(Some(file), name, found)
     }
 
     /// The number of a material; a new one unless this name of this file has one.
-    fn material(&mut self, file: usize, name: &str, found: Option<&MtlMaterial>) -> u32 {
+    fn material(&mut self, file: Option<usize>, name: &str, found: Option<&MtlMaterial>) -> u32 {
         let key = (file, name.to_string());
         if let Some(&number) = self.by_name.get(&key) {
             return number;
         }
         let blank = || MtlMaterial { name: name.into(), ..MtlMaterial::default() };
-        let material = found.cloned().unwrap_or_else(blank);
+        let mut material = found.cloned().unwrap_or_else(blank);
+        if let Some(change) = self.overrides.get(name) {
+            change.apply(&mut material);
+            self.used_overrides.insert(name.to_string());
+        }
         let number = self.materials.len() as u32;
         self.materials.push(material);
         self.by_name.insert(key, number);
@@ -210,14 +221,28 @@ impl SceneBuilder {
     }
 
     /// Buffers for the core.
-    fn build(mut self, options: &LoadOptions) -> LoadedScene {
-        let files = self.materials.iter().flat_map(surface::maps).filter_map(|map| map.found.clone());
-        let mut textures = TextureSet::decode(files.filter(|_| options.textures), &mut self.notes);
+    fn build(mut self, options: &LoadOptions, environment: Option<EnvironmentChange>) -> LoadedScene {
+        for name in self.overrides.keys().filter(|name| !self.used_overrides.contains(*name)) {
+            self.notes.add(
+                1,
+                format!("no mesh has a material `{name}`: what the scene file says of it is not used"),
+            );
+        }
+        let maps =
+            self.materials.iter().flat_map(surface::maps).chain(environment.iter().flat_map(|e| &e.map));
+        let files = maps.filter_map(|map| map.found.clone()).filter(|_| options.textures);
+        let mut textures = TextureSet::decode(files, &mut self.notes);
         let notes = &mut self.notes;
         let materials: Vec<Material> =
             self.materials.iter().map(|mtl| surface::resolve(mtl, &mut textures, notes)).collect();
         let texcoords: Vec<_> =
             self.materials.iter().map(|mtl| surface::texcoord_transform(mtl, notes)).collect();
+
+        let environment = environment.map(|entry| Environment {
+            radiance: entry.radiance,
+            map: textures.colour(entry.map.as_ref()),
+            to_map: entry.to_map,
+        });
 
         let mut parts = Vec::new();
         for mesh in &self.meshes {
@@ -240,7 +265,7 @@ impl SceneBuilder {
             material_names: self.materials.into_iter().map(|mtl| mtl.name).collect(),
             textures,
             lights: Vec::new(),
-            environment: None,
+            environment,
             camera: None,
             settings: RenderSettings::default(),
             transform,

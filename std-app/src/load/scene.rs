@@ -3,7 +3,6 @@
 use super::settings::RenderSettings;
 use super::texture_set::TextureSet;
 use super::transform::SceneTransform;
-use glam::Vec3;
 use halflight_core::scene::{Camera, Environment, Material, Mesh, PointLight, Scene, Texture, Triangle};
 
 /// Everything of a scene, owned, in the coordinates of the core.
@@ -63,12 +62,6 @@ impl LoadedScene {
     /// The camera of the scene file, else one that frames everything.
     pub fn camera_or_default(&self) -> Camera {
         self.camera.unwrap_or_else(|| Camera::framing(&self.mesh()))
-    }
-
-    /// A pinhole in the coordinates of the file, for flags of the command line.
-    pub fn camera_at(&self, eye: [f64; 3], look_at: [f64; 3], up: [f64; 3], fov_degrees: f64) -> Camera {
-        let up = Vec3::from(up.map(|x| x as f32));
-        Camera::look_at(self.transform.point(eye), self.transform.point(look_at), up, fov_degrees as f32)
     }
 }
 

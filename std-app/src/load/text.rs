@@ -214,6 +214,13 @@ fn not_finite(word: &[u8]) -> Numeral {
     }
 }
 
+/// Whether a well-formed number is zero: no digit but 0 before its exponent.
+#[inline]
+pub(super) fn is_zero(word: &[u8]) -> bool {
+    let mantissa = word.iter().take_while(|b| !matches!(b, b'e' | b'E'));
+    mantissa.clone().all(|b| !matches!(b, b'1'..=b'9' | b'n'))
+}
+
 /// Reads a number; `None` where it is malformed or not finite.
 pub(super) fn number(word: &[u8]) -> Option<f64> {
     let text = core::str::from_utf8(word).ok()?;

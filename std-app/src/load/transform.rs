@@ -3,6 +3,7 @@
 //! a scene scaled by a power of two gives the same bits.
 
 use glam::Vec3;
+use halflight_core::scene::Camera;
 
 /// `core = (user - offset) / 2^exponent`, in f64 until the last step.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -37,6 +38,12 @@ impl SceneTransform {
     pub fn point_f64(&self, user: [f64; 3]) -> [f64; 3] {
         let factor = self.factor();
         core::array::from_fn(|i| (user[i] - self.offset[i]) * factor)
+    }
+
+    /// A pinhole that stands and looks as said in the coordinates of the files.
+    pub fn camera(&self, eye: [f64; 3], look_at: [f64; 3], up: [f64; 3], fov_degrees: f64) -> Camera {
+        let up = Vec3::from(up.map(|x| x as f32));
+        Camera::look_at(self.point(eye), self.point(look_at), up, fov_degrees as f32)
     }
 
     /// A length.

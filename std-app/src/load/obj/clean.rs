@@ -7,7 +7,7 @@
 
 use crate::load::error::LoadError;
 use crate::load::notes::Notes;
-use crate::load::text::{Lines, Numeral, Words, numeral, words};
+use crate::load::text::{Lines, Numeral, Words, is_zero, number, numeral, words};
 use std::path::Path;
 
 /// Numbers of `v`, `vt` and `vn` statements.
@@ -168,9 +168,12 @@ impl Cleaner<'_> {
         };
         let out = &mut self.out.vertices;
         out.extend_from_slice(KEYWORDS[kind].as_bytes());
-        if kept == 4 && !numbers[3].iter().any(|digit| matches!(digit, b'1'..=b'9')) {
-            numbers = [b"nan", b"nan", b"nan", b"1"]; // w = 0: a point at infinity
+        if kept == 4 && number(numbers[3]).is_none_or(|w| w == 0.0) {
+            numbers = [b"nan", b"nan", b"nan", b"1"]; // a point at infinity
             self.out.notes.at(line, "vertex with w = 0, its faces are left out");
+        }
+        if kind == 2 && numbers[..3].iter().all(|number| is_zero(number)) {
+            self.out.notes.at(line, "zero normal, its faces are shaded flat there");
         }
         for number in &numbers[..kept] {
             out.push(b' ');

@@ -1,0 +1,244 @@
+//! The scene file: TOML that places meshes and adds materials, camera, lights, environment and settings.
+//! `docs/scene-file.md` describes it. Every error names line and column; an unknown key is an error, with the
+//! keys that there are.
+
+mod light;
+mod material;
+mod values;
+
+pub(super) use light::EnvironmentChange;
+pub use light::{EnvironmentEntry, LightEntry, LightKind};
+pub(super) use material::MaterialChange;
+pub use material::{MaterialEntry, MaterialKind};
+pub use values::{Colour, Degrees, Factors, FieldOfView, Matrix, Number, Positive, Rotation};
+
+use super::error::LoadError;
+use super::geometry::Placement;
+use super::mtl::Map;
+use super::scene::LoadedScene;
+use super::settings::RenderSettings;
+use super::transform::SceneTransform;
+use super::{LoadOptions, SceneBuilder, read};
+use glam::{DMat3, DVec3};
+use halflight_core::scene::Camera;
+use serde::Deserialize;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use toml::Spanned;
+
+/// What a scene file says, as written.
+#[derive(Clone, Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SceneFile {
+    /// `[[mesh]]`: what to place where.
+    #[serde(default)]
+    pub mesh: Vec<MeshEntry>,
+    /// `[material.NAME]`: new materials, and changes to those of the meshes.
+    #[serde(default)]
+    pub material: BTreeMap<String, Spanned<MaterialEntry>>,
+    /// `[camera]`.
+    pub camera: Option<Spanned<CameraEntry>>,
+    /// `[[light]]`: lights without surface.
+    #[serde(default)]
+    pub light: Vec<Spanned<LightEntry>>,
+    /// `[environment]`: light from infinitely far.
+    pub environment: Option<EnvironmentEntry>,
+    /// `[render]`.
+    #[serde(default)]
+    pub render: RenderSettings,
+}
+
+/// A mesh and where it stands: scaled, then rotated, then translated; or by a matrix.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct MeshEntry {
+    /// An OBJ file, relative to the scene file.
+    pub file: Spanned<PathBuf>,
+    /// One factor or three.
+    #[serde(default)]
+    pub scale: Factors,
+    /// Around an axis through the origin.
+    pub rotate: Option<Rotation>,
+    /// In units of the scene.
+    #[serde(default)]
+    pub translate: [Number; 3],
+    /// Three or four rows of four, instead of all the above.
+    pub matrix: Option<Matrix>,
+    /// Name of the `[material.NAME]` that replaces all materials of the file.
+    pub material: Option<Spanned<String>>,
+}
+
+/// Who looks.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CameraEntry {
+    /// Where from.
+    pub eye: [Number; 3],
+    /// Where to.
+    pub look_at: [Number; 3],
+    /// Up in the picture; +y.
+    pub up: Option<[Number; 3]>,
+    /// Vertical field of view; 40 degrees.
+    pub fov: Option<FieldOfView>,
+    /// Radius of the lens; 0 is a pinhole.
+    #[serde(default)]
+    pub lens_radius: Number,
+    /// Distance of what is sharp; that of `look_at`.
+    pub focus_distance: Option<Positive>,
+}
+
+/// Reads the text of a scene file; opens nothing. `file` is for messages.
+pub fn parse(text: &str, file: &Path) -> Result<SceneFile, LoadError> {
+    toml::from_str(text).map_err(|error| {
+        // serde says `unknown field ..., expected one of ...`: the second half is the help.
+        let message = error.message().replace('\n', " ");
+        let (problem, help) = match message.split_once(", expected ") {
+            Some((problem, expected)) => (problem.to_string(), format!("expected {expected}")),
+            None => (message, "docs/scene-file.md describes the scene file".into()),
+        };
+        Source { text, file }.error(error.span().unwrap_or_default(), problem, help)
+    })
+}
+
+/// The text of a scene file, for errors that point into it.
+#[derive(Clone, Copy)]
+struct Source<'a> {
+    text: &'a str,
+    file: &'a Path,
+}
+
+impl Source<'_> {
+    fn error(
+        &self,
+        span: core::ops::Range<usize>,
+        problem: impl Into<String>,
+        help: impl Into<String>,
+    ) -> LoadError {
+        let before = self.text.get(..span.start).unwrap_or(self.text);
+        let line = before.matches('\n').count() as u32 + 1;
+        let column = before.rsplit('\n').next().unwrap_or_default().chars().count() as u32 + 1;
+        LoadError { column, ..LoadError::at(self.file, line, problem, help) }
+    }
+
+    /// The file that a path of the scene file means.
+    fn resolve(&self, path: &Spanned<PathBuf>) -> Result<PathBuf, LoadError> {
+        let file = self.file.parent().unwrap_or(Path::new("")).join(path.get_ref());
+        if file.is_file() {
+            return Ok(file);
+        }
+        let problem = format!("there is no file {}", file.display());
+        Err(self.error(path.span(), problem, "paths are relative to the scene file"))
+    }
+
+    /// A texture that has to be there.
+    fn map(&self, path: &Spanned<PathBuf>) -> Result<Map, LoadError> {
+        Ok(Map { found: Some(self.resolve(path)?), ..Map::plain(path.get_ref()) })
+    }
+}
+
+/// Loads a scene file with all that it names.
+pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<LoadedScene, LoadError> {
+    let bytes = read(path)?;
+    let text = String::from_utf8(bytes).map_err(|error| {
+        let line =
+            error.as_bytes()[..error.utf8_error().valid_up_to()].iter().filter(|&&b| b == b'\n').count();
+        LoadError::at(path, line as u32 + 1, "this is not UTF-8 text", "save the scene file as UTF-8")
+    })?;
+    let text = text.strip_prefix('\u{feff}').unwrap_or(&text);
+    let source = Source { text, file: path };
+    let scene = parse(text, path)?;
+
+    let mut builder = SceneBuilder::default();
+    for (name, entry) in &scene.material {
+        let material = entry.get_ref().resolved(&source)?;
+        builder.overrides.insert(name.clone(), material);
+    }
+    for mesh in &scene.mesh {
+        let file = source.resolve(&mesh.file)?;
+        if let Some(name) = mesh.material.as_ref().filter(|name| !scene.material.contains_key(name.get_ref()))
+        {
+            let problem = format!("there is no material `{}` in this scene file", name.get_ref());
+            return Err(source.error(name.span(), problem, format!("add a [material.{}]", name.get_ref())));
+        }
+        let material = mesh.material.as_ref().map(|name| name.get_ref().as_str());
+        builder.add_mesh(&file, mesh.placement(&source)?, material)?;
+    }
+    let environment = scene.environment.as_ref().map(|entry| entry.resolved(&source)).transpose()?;
+    let mut loaded = builder.build(options, environment);
+    let transform = loaded.transform;
+    loaded.lights =
+        scene.light.iter().map(|light| light::light(light, &transform, &source)).collect::<Result<_, _>>()?;
+    loaded.camera = scene.camera.as_ref().map(|camera| camera_in(camera, &transform, &source)).transpose()?;
+    loaded.settings = scene.render;
+    Ok(loaded)
+}
+
+impl MeshEntry {
+    fn placement(&self, source: &Source) -> Result<Placement, LoadError> {
+        let is_default = self.scale == Factors::default()
+            && self.rotate.is_none()
+            && self.translate == <[Number; 3]>::default();
+        if let Some(matrix) = &self.matrix {
+            if is_default {
+                return Ok(matrix.placement());
+            }
+            let help = "give either `matrix`, or `scale`, `rotate` and `translate`";
+            return Err(source.error(self.file.span(), "this mesh is placed in two ways", help));
+        }
+        let rotation = self.rotate.as_ref().map_or(DMat3::IDENTITY, Rotation::matrix);
+        let linear = rotation * DMat3::from_diagonal(self.scale.axes().into());
+        Ok(Placement { linear, offset: DVec3::from(self.translate.map(f64::from)) })
+    }
+}
+
+fn camera_in(
+    entry: &Spanned<CameraEntry>,
+    transform: &SceneTransform,
+    source: &Source,
+) -> Result<Camera, LoadError> {
+    const DEFAULT_FOV: f64 = 40.0;
+    let camera = entry.get_ref();
+    let (eye, look_at) = (camera.eye.map(f64::from), camera.look_at.map(f64::from));
+    let distance = DVec3::from(look_at).distance(eye.into());
+    if distance == 0.0 {
+        return Err(source.error(entry.span(), "`eye` and `look_at` are the same point", "move one of them"));
+    }
+    let up = camera.up.map_or([0.0, 1.0, 0.0], |up| up.map(f64::from));
+    let fov = camera.fov.map_or(DEFAULT_FOV, f64::from);
+    let focus = camera.focus_distance.map_or(distance, f64::from);
+    Ok(Camera {
+        lens_radius: transform.length(f64::from(camera.lens_radius).max(0.0)) as f32,
+        focus_distance: transform.length(focus) as f32,
+        ..transform.camera(eye, look_at, up, fov)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn error(text: &str) -> String {
+        parse(text, Path::new("a.toml")).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn errors_name_line_and_column() {
+        let place = |text: &str, line: u32, says: &str| {
+            let error = error(text);
+            assert!(error.starts_with(&format!("a.toml:{line}:")) && error.contains(says), "{error}");
+        };
+        place(
+            "[camera]\neyes = [0, 0, 0]\n",
+            2,
+            "unknown field `eyes`\n  help: expected one of `eye`, `look_at`",
+        );
+        place("\n  [render\n", 2, "");
+        place("[camera]\neye = [0, 0]\nlook_at = [0, 0, 1]", 2, "");
+        place("[camera]\neye = [0, 0, nan]\nlook_at = [0, 0, 1]", 2, "must be finite");
+        place("[camera]\neye = [0, 0, 0]\nlook_at = [0, 0, 1]\nfov = 180", 4, "between 0 and 180");
+        place("[[mesh]]\nfile = \"a.obj\"\nscale = \"big\"", 3, "a number or three numbers");
+        place("[render]\nspp = -1", 2, "");
+        place("[[light]]\nkind = \"laser\"", 2, "`point`, `spot`");
+        place("[[mesh]]\nfile = \"a.obj\"\nmatrix = [[1, 0, 0, 0]]", 3, "three or four rows");
+    }
+}
