@@ -101,6 +101,13 @@ impl<'a> SurfacePoint<'a> {
         Some(Self { position, error, geometric_normal, frame, uv, front, material, triangle: hit.triangle })
     }
 
+    /// Whether a direction, given in the shading frame and in the world, is on the same side of the triangle as
+    /// of its shading normal: no light passes where the two disagree.
+    #[inline]
+    pub fn sides_agree(&self, local: Vec3, world: Vec3) -> bool {
+        local.z * world.dot(self.geometric_normal) > 0.0
+    }
+
     /// The ray that leaves the surface into `direction`, on the side to which that points.
     #[inline]
     pub fn spawn(&self, direction: Vec3) -> Ray {

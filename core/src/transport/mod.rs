@@ -1,1 +1,13 @@
-//! To be written.
+//! Light transport: one file per method, each readable beside its paper.
+//!
+//! [`path`] is the path tracer that renders, a wavefront over a tile; [`reference`] is the same estimator as a
+//! textbook has it, one path at a time, kept to test the other against.
+
+mod estimator;
+pub mod path;
+pub mod reference;
+mod shadow;
+mod wave;
+
+pub use estimator::{Counters, PathSettings, UNLIMITED};
+pub use path::PathTracer;

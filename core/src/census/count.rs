@@ -1,0 +1,173 @@
+//! The count: one walk over the triangles, nothing allocated.
+
+use super::Plan;
+use crate::geometry::Bounds;
+use crate::light::PointLight;
+use crate::scene::{ColorInput, Material, ScalarInput, Scene, Surface};
+use glam::Vec3;
+
+/// How many of each kind of surface.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Kinds {
+    /// Lambert.
+    pub diffuse: u64,
+    /// Perfect mirrors.
+    pub mirror: u64,
+    /// Metals.
+    pub conductor: u64,
+    /// Coats over a base.
+    pub glossy: u64,
+    /// Smooth glass.
+    pub dielectric: u64,
+    /// Rough glass.
+    pub rough_dielectric: u64,
+}
+
+/// What lights from infinitely far.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum EnvironmentKind {
+    /// Nothing.
+    #[default]
+    None,
+    /// The same radiance from everywhere.
+    Constant,
+    /// A map.
+    Map,
+}
+
+/// What the triangles, materials and lights of a scene are. Materials count where a triangle has them.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Census {
+    /// All triangles.
+    pub triangles: u64,
+    /// Triangles without area: never hit.
+    pub degenerate: u64,
+    /// Materials of the scene, used or not.
+    pub materials: u64,
+    /// Triangles by kind of surface.
+    pub surfaces: Kinds,
+    /// Triangles whose material looks into a texture.
+    pub textured: u64,
+    /// Triangles with a normal or bump map.
+    pub normal_mapped: u64,
+    /// Triangles with holes or translucency by opacity.
+    pub cutout: u64,
+    /// Triangles that reflect or refract into one direction only: what caustics come from.
+    pub specular: u64,
+    /// Triangles that emit.
+    pub emissive: u64,
+    /// Of those, triangles that emit to one side where nothing is.
+    pub emitters_facing_nothing: u64,
+    /// Point lights.
+    pub point_lights: u64,
+    /// Spot lights.
+    pub spot_lights: u64,
+    /// Directional lights.
+    pub directional_lights: u64,
+    /// Light from infinitely far.
+    pub environment: EnvironmentKind,
+    /// Textures of the scene, used or not.
+    pub textures: u64,
+    /// Whether the camera has a lens.
+    pub thin_lens: bool,
+}
+
+impl Census {
+    /// Counts.
+    pub fn of(scene: &Scene) -> Census {
+        let mut census = Census {
+            triangles: scene.mesh.triangles.len() as u64,
+            materials: scene.materials.len() as u64,
+            textures: scene.textures.len() as u64,
+            thin_lens: scene.camera.lens_radius > 0.0,
+            environment: match &scene.environment {
+                None => EnvironmentKind::None,
+                Some(environment) if environment.map.is_some() => EnvironmentKind::Map,
+                Some(_) => EnvironmentKind::Constant,
+            },
+            ..Census::default()
+        };
+        for light in scene.lights {
+            match light {
+                PointLight::Point { .. } => census.point_lights += 1,
+                PointLight::Spot { .. } => census.spot_lights += 1,
+                PointLight::Directional { .. } => census.directional_lights += 1,
+            }
+        }
+        let bounds = Bounds::around(scene.mesh.positions.iter().map(|&p| p.into()));
+        for (index, triangle) in scene.mesh.triangles.iter().enumerate() {
+            if let Some(material) = scene.materials.get(triangle.material as usize) {
+                let corners = scene.mesh.corners(index as u32);
+                census.count_triangle(material, corners, &bounds, scene.camera.eye);
+            }
+        }
+        census
+    }
+
+    fn count_triangle(&mut self, material: &Material, [a, b, c]: [Vec3; 3], bounds: &Bounds, eye: Vec3) {
+        let normal = (b - a).cross(c - a);
+        self.degenerate += u64::from(normal == Vec3::ZERO);
+        self.textured += u64::from(has_texture(material));
+        self.normal_mapped += u64::from(material.normal_map.is_some());
+        self.cutout += u64::from(material.has_cutout());
+        let smooth = |roughness: &ScalarInput| roughness.value == 0.0;
+        let mut specular = false;
+        let kind = match &material.surface {
+            Surface::Diffuse { .. } => &mut self.surfaces.diffuse,
+            Surface::Mirror { .. } => {
+                specular = true;
+                &mut self.surfaces.mirror
+            }
+            Surface::Conductor { roughness, .. } => {
+                specular = smooth(roughness);
+                &mut self.surfaces.conductor
+            }
+            Surface::Glossy { roughness, .. } => {
+                specular = smooth(roughness);
+                &mut self.surfaces.glossy
+            }
+            Surface::Dielectric { roughness, .. } => {
+                specular = smooth(roughness);
+                if specular { &mut self.surfaces.dielectric } else { &mut self.surfaces.rough_dielectric }
+            }
+        };
+        *kind += 1;
+        self.specular += u64::from(specular);
+        if material.emits() {
+            self.emissive += 1;
+            // The farthest that anything reaches into the half-space that the triangle shines into.
+            let farthest = Vec3::select(normal.cmpgt(Vec3::ZERO), bounds.max, bounds.min);
+            let sees = |p: Vec3| normal.dot(p - a) > FLAT * normal.length() * bounds.diagonal();
+            let lonely = !material.two_sided && !sees(farthest) && !sees(eye);
+            self.emitters_facing_nothing += u64::from(lonely);
+        }
+    }
+
+    /// Lights of any kind that the picture can get its light from.
+    pub fn has_light(&self) -> bool {
+        self.emissive + self.point_lights + self.spot_lights + self.directional_lights > 0
+            || self.environment != EnvironmentKind::None
+    }
+
+    /// What to render with, and what that can do without.
+    pub fn plan(&self) -> Plan {
+        Plan::new(self)
+    }
+}
+
+/// Height over a plane, in sizes of the scene, that counts as lying in it.
+const FLAT: f32 = 1e-5;
+
+fn has_texture(material: &Material) -> bool {
+    let color = |input: &ColorInput| input.texture.is_some();
+    let scalar = |input: &ScalarInput| input.texture.is_some();
+    let surface = match &material.surface {
+        Surface::Diffuse { reflectance } | Surface::Mirror { reflectance } => color(reflectance),
+        Surface::Conductor { reflectance, roughness } => color(reflectance) || scalar(roughness),
+        Surface::Glossy { base, specular, roughness, metallic, .. } => {
+            color(base) || color(specular) || scalar(roughness) || scalar(metallic)
+        }
+        Surface::Dielectric { roughness, .. } => scalar(roughness),
+    };
+    surface || color(&material.emission) || scalar(&material.opacity) || material.normal_map.is_some()
+}

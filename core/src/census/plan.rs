@@ -1,0 +1,146 @@
+//! The plan: the smallest build of the method that holds all the scene has, and what it leaves out.
+
+use super::{Census, EnvironmentKind};
+use crate::bsdf::{All, DiffuseOnly, DiffuseTextured, Features, Opaque, OpaquePlain, Plain};
+
+/// The builds of a method, smallest first.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FeatureSet {
+    /// Diffuse surfaces of one colour each.
+    DiffuseOnly,
+    /// Diffuse surfaces with textures.
+    DiffuseTextured,
+    /// All that reflects, of one colour each.
+    OpaquePlain,
+    /// All that reflects, with every kind of texture.
+    Opaque,
+    /// Every surface, no texture of any kind.
+    Plain,
+    /// Everything.
+    All,
+}
+
+/// Work that is compiled once for each [`FeatureSet`].
+pub trait WithFeatures {
+    /// What it returns.
+    type Out;
+    /// The work.
+    fn run<F: Features>(self) -> Self::Out;
+}
+
+/// What a build can do: the constants of its [`Features`].
+#[derive(Clone, Copy)]
+struct Able {
+    textures: bool,
+    glossy: bool,
+    dielectric: bool,
+    normal_maps: bool,
+    cutout: bool,
+}
+
+struct AbilitiesOf;
+
+impl WithFeatures for AbilitiesOf {
+    type Out = Able;
+
+    fn run<F: Features>(self) -> Able {
+        Able {
+            textures: F::TEXTURES,
+            glossy: F::GLOSSY,
+            dielectric: F::DIELECTRIC,
+            normal_maps: F::NORMAL_MAPS,
+            cutout: F::CUTOUT,
+        }
+    }
+}
+
+impl FeatureSet {
+    const SMALLEST_FIRST: [FeatureSet; 6] = [
+        FeatureSet::DiffuseOnly,
+        FeatureSet::DiffuseTextured,
+        FeatureSet::OpaquePlain,
+        FeatureSet::Opaque,
+        FeatureSet::Plain,
+        FeatureSet::All,
+    ];
+
+    /// Runs `work` in the build for this set.
+    pub fn dispatch<W: WithFeatures>(self, work: W) -> W::Out {
+        match self {
+            FeatureSet::DiffuseOnly => work.run::<DiffuseOnly>(),
+            FeatureSet::DiffuseTextured => work.run::<DiffuseTextured>(),
+            FeatureSet::OpaquePlain => work.run::<OpaquePlain>(),
+            FeatureSet::Opaque => work.run::<Opaque>(),
+            FeatureSet::Plain => work.run::<Plain>(),
+            FeatureSet::All => work.run::<All>(),
+        }
+    }
+
+    /// Its name in reports.
+    pub const fn name(self) -> &'static str {
+        match self {
+            FeatureSet::DiffuseOnly => "diffuse",
+            FeatureSet::DiffuseTextured => "diffuse, textured",
+            FeatureSet::OpaquePlain => "opaque",
+            FeatureSet::Opaque => "opaque, textured",
+            FeatureSet::Plain => "all surfaces",
+            FeatureSet::All => "all",
+        }
+    }
+}
+
+/// How a scene is going to be rendered.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Plan {
+    /// Name of the method.
+    pub method: &'static str,
+    /// Which build of it.
+    pub features: FeatureSet,
+    left_out: [Option<(&'static str, &'static str)>; 8],
+}
+
+impl Plan {
+    pub(super) fn new(census: &Census) -> Plan {
+        let kinds = &census.surfaces;
+        let needed = Able {
+            textures: census.textured > 0,
+            glossy: kinds.mirror + kinds.conductor + kinds.glossy > 0,
+            dielectric: kinds.dielectric + kinds.rough_dielectric > 0,
+            normal_maps: census.normal_mapped > 0,
+            cutout: census.cutout > 0,
+        };
+        let features = FeatureSet::SMALLEST_FIRST
+            .into_iter()
+            .find(|set| set.dispatch(AbilitiesOf).covers(&needed))
+            .unwrap_or(FeatureSet::All);
+        let able = features.dispatch(AbilitiesOf);
+        let out = |absent: bool, what, why| absent.then_some((what, why));
+        let left_out = [
+            out(!able.textures, "texture lookup", "no surface has a texture"),
+            out(!able.glossy, "specular and glossy reflection", "no mirror, metal or coated surface"),
+            out(!able.dielectric, "refraction", "no glass or water"),
+            out(!able.normal_maps, "normal and bump mapping", "no normal or bump map"),
+            out(!able.cutout, "cut-out opacity", "every surface is opaque"),
+            out(census.environment != EnvironmentKind::Map, "environment map sampling", "no environment map"),
+            out(!census.thin_lens, "lens sampling", "the camera is a pinhole"),
+            out(!census.has_light(), "light sampling", "the scene has no light"),
+        ];
+        Plan { method: "path", features, left_out }
+    }
+
+    /// What is left out and why.
+    pub fn left_out(&self) -> impl Iterator<Item = (&'static str, &'static str)> + '_ {
+        self.left_out.iter().copied().flatten()
+    }
+}
+
+impl Able {
+    fn covers(&self, needed: &Able) -> bool {
+        let has = |able: bool, needed: bool| able || !needed;
+        has(self.textures, needed.textures)
+            && has(self.glossy, needed.glossy)
+            && has(self.dielectric, needed.dielectric)
+            && has(self.normal_maps, needed.normal_maps)
+            && has(self.cutout, needed.cutout)
+    }
+}

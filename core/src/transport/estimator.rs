@@ -1,0 +1,103 @@
+//! What both path tracers agree on: which random number is used for what, how two techniques share a path,
+//! when a path ends.
+
+use crate::Rgb;
+use crate::film::Dropped;
+
+/// No limit on the length of paths.
+pub const UNLIMITED: u32 = u32::MAX;
+
+/// What a picture by path tracing is made with.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct PathSettings {
+    /// Pixels across.
+    pub width: u32,
+    /// Pixels down.
+    pub height: u32,
+    /// Another seed, another picture of the same thing.
+    pub seed: u32,
+    /// The largest number of segments between camera and light: 1 shows what emits, 2 adds direct light,
+    /// 3 one bounce, [`UNLIMITED`] all.
+    pub max_depth: u32,
+}
+
+/// What was done, for reports.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Counters {
+    /// Paths started: samples of pixels.
+    pub paths: u64,
+    /// Rays traced for the nearest hit: camera rays and bounces.
+    pub rays: u64,
+    /// Rays traced for any hit, to lights.
+    pub shadow_rays: u64,
+    /// Samples that did not reach the picture.
+    pub dropped: Dropped,
+}
+
+impl core::ops::AddAssign for Counters {
+    fn add_assign(&mut self, other: Self) {
+        self.paths += other.paths;
+        self.rays += other.rays;
+        self.shadow_rays += other.shadow_rays;
+        self.dropped += other.dropped;
+    }
+}
+
+/// Dimensions of the sampler.
+pub(super) mod dimension {
+    /// Where in the pixel.
+    pub(in crate::transport) const PIXEL: u32 = 0;
+    /// Where on the lens.
+    pub(in crate::transport) const LENS: u32 = 1;
+    /// Whether the `n`th surface with a cut-out is met: `CROSSING + n`.
+    pub(in crate::transport) const CROSSING: u32 = 1 << 31;
+
+    // At every vertex, from `vertex(n)` on:
+    /// Where on the light.
+    pub(in crate::transport) const LIGHT: u32 = 0;
+    /// Which light.
+    pub(in crate::transport) const LIGHT_CHOICE: u32 = 1;
+    /// Where the path goes on.
+    pub(in crate::transport) const BSDF: u32 = 2;
+    /// By which lobe.
+    pub(in crate::transport) const LOBE: u32 = 3;
+    /// Whether it goes on.
+    pub(in crate::transport) const ROULETTE: u32 = 4;
+
+    /// The first dimension of the vertex at the end of the `n`th segment.
+    #[inline]
+    pub(in crate::transport) const fn vertex(n: u32) -> u32 {
+        2 + 5 * (n - 1)
+    }
+}
+
+/// Surfaces passed through by cut-out, and vertices, after which a path is cut and counted as unfinished.
+/// Roulette makes both as good as unreachable; this makes termination a fact.
+pub(super) const MAX_CROSSINGS: u32 = 1024;
+/// See [`MAX_CROSSINGS`].
+pub(super) const MAX_VERTICES: u32 = 1024;
+
+/// Weight of a sample that was drawn with density `own` where another technique has density `other`: the power
+/// heuristic (Veach and Guibas 1995, §4.1), for any two numbers but two zeros.
+#[inline]
+pub(super) fn power_heuristic(own: f32, other: f32) -> f32 {
+    let ratio = other / own;
+    1.0 / (1.0 + ratio * ratio)
+}
+
+/// Paths of fewer segments than this always go on.
+const ROULETTE_FROM: u32 = 3;
+
+/// From this many segments on nothing survives for certain, so that paths end even between perfect mirrors.
+const CERTAIN_BELOW: u32 = 16;
+
+/// The probability with which a path of `segments` segments goes on, which carries `throughput` (without the
+/// factor of refraction, which comes back where the light leaves the glass).
+#[inline]
+pub(super) fn survival(segments: u32, throughput: Rgb) -> f32 {
+    if segments < ROULETTE_FROM {
+        return 1.0;
+    }
+    let most = if segments < CERTAIN_BELOW { 1.0 } else { 0.95 };
+    throughput.max_element().min(most)
+}

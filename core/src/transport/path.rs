@@ -1,0 +1,385 @@
+//! The path tracer that renders: unidirectional, with next-event estimation and multiple importance sampling
+//! (Kajiya 1986; Veach 1997, chapter 9).
+//!
+//! The plain algorithm is [`super::reference`]. Departures from it:
+//! 1. All paths of a wave advance together, one segment at a time, so that the tracer sees batches of rays:
+//!    first alike (camera rays along the Z-curve of a tile), then in no order (bounces).
+//! 2. Queues are compacted in place: the ray of a path that goes on overwrites one that was already shaded.
+//! 3. Shadow rays are traced after all vertices of the wave are shaded; light is added to the path then.
+//! 4. Code for what the scene does not have is not compiled in ([`Features`]).
+//!
+//! The price: about 200 bytes for each path of a wave. What a path sees depends on (seed, pixel, sample) only and
+//! samples are summed in their order, so the picture has the same bits for any size of wave and any
+//! distribution of tasks.
+
+use super::estimator::{
+    Counters, MAX_CROSSINGS, MAX_VERTICES, PathSettings, dimension, power_heuristic, survival,
+};
+use super::shadow::{pass_cutout, shadow_ray};
+use super::wave::{Path, Wave};
+use crate::bsdf::{Bsdf, Features};
+use crate::bvh::{Bvh, Coherence};
+use crate::film::{PIXELS_PER_TILE, Pixel, Tile};
+use crate::geometry::{Hit, Ray};
+use crate::light::{Lights, emitted};
+use crate::memory::{Arena, Footprint, OutOfMemory};
+use crate::sampling::Sampler;
+use crate::scene::{Scene, SurfacePoint};
+use crate::{Level, Rgb};
+use core::marker::PhantomData;
+use core::ops::Range;
+use glam::Vec3;
+
+/// Paths that advance together where memory allows: enough to fill the tracer's batches, few enough to
+/// stay in the second cache.
+pub const WAVE: usize = 2048;
+
+/// Path tracing of one scene: a pass whose tasks are the tiles of the picture.
+#[derive(Clone, Copy)]
+pub struct PathTracer<'a, F> {
+    scene: &'a Scene<'a>,
+    bvh: &'a Bvh<'a>,
+    lights: &'a Lights<'a>,
+    settings: PathSettings,
+    level: Level,
+    features: PhantomData<F>,
+}
+
+impl<'a, F: Features> PathTracer<'a, F> {
+    /// A path tracer over frozen structures. `F` has at least the features of the scene
+    /// ([`crate::census`] tells which).
+    pub fn new(
+        scene: &'a Scene<'a>,
+        bvh: &'a Bvh<'a>,
+        lights: &'a Lights<'a>,
+        settings: PathSettings,
+        level: Level,
+    ) -> Self {
+        Self { scene, bvh, lights, settings, level, features: PhantomData }
+    }
+
+    /// Number of tasks: tiles of the film.
+    pub fn tasks(&self) -> usize {
+        Tile::count(self.settings.width, self.settings.height)
+    }
+
+    /// Working memory of one task that advances `wave` paths together.
+    pub fn scratch(wave: usize) -> Footprint {
+        Wave::footprint(wave)
+    }
+
+    /// Traces `samples` of every pixel of tile `task` and adds them to `out`, the tile's pixels of the film.
+    ///
+    /// # Errors
+    /// [`OutOfMemory`] where `scratch` has less than [`PathTracer::scratch`] bytes.
+    pub fn run(
+        &self,
+        task: usize,
+        samples: Range<u32>,
+        wave: usize,
+        scratch: &mut Arena,
+        out: &mut [Pixel],
+    ) -> Result<Counters, OutOfMemory> {
+        let mut arena = scratch.scratch();
+        let mut wave = Wave::new(wave.max(1), &mut arena)?;
+        let tile = Tile::new(self.settings.width, self.settings.height, task);
+        let mut counters = Counters::default();
+        // All (pixel, sample) of the tile, samples of a pixel side by side: `next` is the first not started.
+        let mut next = (0, samples.start);
+        while next.0 < PIXELS_PER_TILE && !samples.is_empty() {
+            let first = next;
+            let count = self.start(tile, &samples, &mut next, &mut wave);
+            counters.paths += count as u64;
+            self.advance(&mut wave, count, &mut counters);
+            self.finish(tile, &samples, first, &wave.paths[..count], out, &mut counters);
+        }
+        Ok(counters)
+    }
+
+    /// Fills the wave with camera rays; returns how many.
+    fn start(&self, tile: Tile, samples: &Range<u32>, next: &mut (usize, u32), wave: &mut Wave) -> usize {
+        let PathSettings { width, height, seed, .. } = self.settings;
+        let mut count = 0;
+        for (path, ray) in wave.paths.iter_mut().zip(wave.rays.iter_mut()) {
+            let Some((pixel, x, y)) = advance_to_pixel(tile, samples, next) else { break };
+            let sample = next.1;
+            next.1 += 1;
+            debug_assert!(pixel < PIXELS_PER_TILE);
+            let index = y * width + x;
+            let sampler = Sampler::new(seed, index, sample);
+            let [dx, dy] = sampler.pair(dimension::PIXEL);
+            let lens =
+                if self.scene.camera.lens_radius > 0.0 { sampler.pair(dimension::LENS) } else { [0.0; 2] };
+            *ray = self.scene.camera.ray(width, height, x as f32 + dx, y as f32 + dy, lens);
+            ray.tag = count as u32;
+            *path = Path {
+                throughput: [1.0; 3],
+                pdf: f32::INFINITY,
+                pixel: index,
+                sample,
+                segments: 1,
+                triangle: crate::geometry::MISS,
+                eta_squared: 1.0,
+                ..Path::default()
+            };
+            count += 1;
+        }
+        count
+    }
+
+    /// Traces the first `count` rays of the wave and all that follows from them.
+    fn advance(&self, wave: &mut Wave, count: usize, counters: &mut Counters) {
+        let mut active = count;
+        let mut coherence = Coherence::Coherent;
+        while active > 0 {
+            counters.rays += active as u64;
+            let rays = &wave.rays[..active];
+            self.bvh.nearest_batch(self.level, rays, coherence, wave.words, &mut wave.hits[..active]);
+            coherence = Coherence::Incoherent;
+
+            let (mut going_on, mut shadows) = (0, 0);
+            for i in 0..active {
+                let (ray, hit) = (wave.rays[i], wave.hits[i]);
+                let Some(path) = wave.paths.get_mut(ray.tag as usize) else { continue };
+                let step = self.shade(path, &ray, &hit, counters);
+                if let Some((mut shadow, light)) = step.light {
+                    shadow.tag = ray.tag;
+                    wave.shadow_rays[shadows] = shadow;
+                    wave.shadow_light[shadows] = light.to_array();
+                    shadows += 1;
+                }
+                if let Some(mut next) = step.next {
+                    next.tag = ray.tag;
+                    wave.rays[going_on] = next;
+                    going_on += 1;
+                }
+            }
+            active = going_on;
+            counters.shadow_rays += shadows as u64;
+            if F::CUTOUT {
+                self.connect_through_cutouts(wave, shadows, counters);
+            } else {
+                self.connect(wave, shadows);
+            }
+        }
+    }
+
+    /// Adds the samples of finished paths to their pixels, in order.
+    fn finish(
+        &self,
+        tile: Tile,
+        samples: &Range<u32>,
+        mut place: (usize, u32),
+        paths: &[Path],
+        out: &mut [Pixel],
+        counters: &mut Counters,
+    ) {
+        for path in paths {
+            let Some((pixel, ..)) = advance_to_pixel(tile, samples, &mut place) else { break };
+            place.1 += 1;
+            if let Some(out) = out.get_mut(pixel) {
+                out.add(path.sample, path.radiance.into(), &mut counters.dropped);
+            }
+        }
+    }
+
+    /// Adds the light at the end of the first `shadows` shadow rays to the paths of those that arrive.
+    fn connect(&self, wave: &mut Wave, shadows: usize) {
+        let rays = &wave.shadow_rays[..shadows];
+        let hidden = &mut wave.hidden[..shadows];
+        self.bvh.occluded_batch(self.level, rays, Coherence::Incoherent, wave.words, hidden);
+        for ((ray, light), hidden) in rays.iter().zip(&*wave.shadow_light).zip(&*hidden) {
+            if *hidden == 0
+                && let Some(path) = wave.paths.get_mut(ray.tag as usize)
+            {
+                path.radiance = (Rgb::from(path.radiance) + Rgb::from(*light)).to_array();
+            }
+        }
+    }
+
+    /// The same where some surfaces let a part of the light through: round after round, each ray to
+    /// its next surface.
+    fn connect_through_cutouts(&self, wave: &mut Wave, mut shadows: usize, counters: &mut Counters) {
+        for round in 0..=MAX_CROSSINGS {
+            if shadows == 0 {
+                return;
+            }
+            if round > 0 {
+                counters.shadow_rays += shadows as u64;
+            }
+            let rays = &wave.shadow_rays[..shadows];
+            let hits = &mut wave.hits[..shadows];
+            self.bvh.nearest_batch(self.level, rays, Coherence::Incoherent, wave.words, hits);
+            let mut left = 0;
+            for i in 0..shadows {
+                let (ray, light) = (wave.shadow_rays[i], Rgb::from(wave.shadow_light[i]));
+                let hit = wave.hits[i];
+                if !hit.is_some() {
+                    if let Some(path) = wave.paths.get_mut(ray.tag as usize) {
+                        path.radiance = (Rgb::from(path.radiance) + light).to_array();
+                    }
+                } else if let Some((through, transmittance)) = pass_cutout::<F>(self.scene, &ray, &hit) {
+                    wave.shadow_rays[left] = through;
+                    wave.shadow_light[left] = (light * transmittance).to_array();
+                    left += 1;
+                }
+            }
+            shadows = left;
+        }
+        counters.dropped.unfinished += shadows as u64;
+    }
+
+    /// One vertex: what the ray of `path` met.
+    #[inline]
+    fn shade(&self, path: &mut Path, ray: &Ray, hit: &Hit, counters: &mut Counters) -> Step {
+        let scene = self.scene;
+        let throughput = Rgb::from(path.throughput);
+        let segments = u32::from(path.segments);
+        let direction = Vec3::from(ray.direction);
+        let position = Vec3::from(path.position);
+        let normal = Vec3::from(path.normal);
+
+        if !hit.is_some() {
+            if let Some(environment) = &scene.environment {
+                let radiance = environment.radiance(scene, direction);
+                let mut weight = 1.0;
+                if path.pdf < f32::INFINITY && radiance != Rgb::ZERO {
+                    let pdf = self.lights.pdf_escape(scene, position, normal, direction);
+                    weight = power_heuristic(path.pdf, pdf);
+                }
+                path.add(throughput * radiance * weight);
+            }
+            return Step::END;
+        }
+        let Some(point) = SurfacePoint::at::<F>(scene, ray, hit) else { return Step::END };
+
+        // A ray cannot meet the plane that it started on: rounding on a needle.
+        if hit.triangle == path.triangle {
+            return path.cross(point.spawn(direction), hit, counters);
+        }
+        if point.material.emits() {
+            let radiance = emitted(scene, hit.triangle, point.uv, point.front);
+            if radiance != Rgb::ZERO {
+                let mut weight = 1.0;
+                if path.pdf < f32::INFINITY {
+                    let distance = position.distance(point.position);
+                    let pdf = self.lights.pdf_hit(scene, position, normal, hit.triangle, distance, direction);
+                    weight = power_heuristic(path.pdf, pdf);
+                }
+                path.add(throughput * radiance * weight);
+            }
+        }
+        let sampler = Sampler::new(self.settings.seed, path.pixel, path.sample);
+        if F::CUTOUT && point.material.has_cutout() {
+            let opacity = point.material.opacity.at::<F>(scene, point.uv);
+            if sampler.single(dimension::CROSSING + u32::from(path.crossings)) >= opacity {
+                return path.cross(point.spawn(direction), hit, counters);
+            }
+        }
+        if segments >= self.settings.max_depth {
+            return Step::END;
+        }
+
+        let bsdf = Bsdf::at::<F>(scene, point.material, point.uv, point.front);
+        let wo = point.frame.to_local(-direction);
+        let first = dimension::vertex(segments);
+        // Lights behind an opaque surface need not be asked.
+        let normal = if F::DIELECTRIC && bsdf.transmits() { Vec3::ZERO } else { point.frame.normal };
+
+        let mut light = None;
+        if !self.lights.is_empty() && !bsdf.is_delta() {
+            let [u, v] = sampler.pair(first + dimension::LIGHT);
+            let choice = sampler.single(first + dimension::LIGHT_CHOICE);
+            light = self.lights.sample(scene, point.position, normal, [u, v, choice]).and_then(|sample| {
+                let wi = point.frame.to_local(sample.direction);
+                if !point.sides_agree(wi, sample.direction) {
+                    return None;
+                }
+                let (f, pdf) = bsdf.evaluate::<F>(wo, wi);
+                if f == Rgb::ZERO {
+                    return None;
+                }
+                let weight = if sample.delta { 1.0 } else { power_heuristic(sample.pdf, pdf) };
+                let contribution = throughput * f * sample.radiance * (weight / sample.pdf);
+                Some((shadow_ray(&point, &sample), contribution))
+            });
+        }
+
+        let [u, v] = sampler.pair(first + dimension::BSDF);
+        let lobe = if F::GLOSSY || F::DIELECTRIC { sampler.single(first + dimension::LOBE) } else { 0.0 };
+        let Some(sample) = bsdf.sample::<F>(wo, [u, v, lobe]) else { return Step { light, next: None } };
+        let direction = point.frame.to_world(sample.direction);
+        if !point.sides_agree(sample.direction, direction) {
+            return Step { light, next: None };
+        }
+        let mut throughput = throughput * sample.weight;
+        path.eta_squared *= sample.eta * sample.eta;
+        let survival = survival(segments, throughput * path.eta_squared);
+        if survival < 1.0 {
+            if sampler.single(first + dimension::ROULETTE) >= survival {
+                return Step { light, next: None };
+            }
+            throughput /= survival;
+        }
+        if throughput == Rgb::ZERO {
+            return Step { light, next: None };
+        }
+        if segments >= MAX_VERTICES {
+            counters.dropped.unfinished += 1;
+            return Step { light, next: None };
+        }
+        path.throughput = throughput.to_array();
+        path.pdf = if sample.delta { f32::INFINITY } else { sample.pdf };
+        path.position = point.position.to_array();
+        path.normal = normal.to_array();
+        path.segments += 1;
+        path.triangle = hit.triangle;
+        Step { light, next: Some(point.spawn(direction)) }
+    }
+}
+
+/// What follows from a vertex.
+struct Step {
+    /// A shadow ray, and what arrives at the camera if nothing is in its way.
+    light: Option<(Ray, Rgb)>,
+    /// The next segment of the path.
+    next: Option<Ray>,
+}
+
+impl Step {
+    const END: Step = Step { light: None, next: None };
+}
+
+impl Path {
+    #[inline]
+    fn add(&mut self, radiance: Rgb) {
+        self.radiance = (Rgb::from(self.radiance) + radiance).to_array();
+    }
+
+    /// Goes on behind the triangle of `hit` as if it were not there.
+    #[cold]
+    fn cross(&mut self, next: Ray, hit: &Hit, counters: &mut Counters) -> Step {
+        if u32::from(self.crossings) >= MAX_CROSSINGS {
+            counters.dropped.unfinished += 1;
+            return Step::END;
+        }
+        self.crossings += 1;
+        self.triangle = hit.triangle;
+        Step { light: None, next: Some(next) }
+    }
+}
+
+/// The first pixel from `next` on of which samples are left, with its column and row.
+#[inline]
+fn advance_to_pixel(tile: Tile, samples: &Range<u32>, next: &mut (usize, u32)) -> Option<(usize, u32, u32)> {
+    if next.1 >= samples.end {
+        *next = (next.0 + 1, samples.start);
+    }
+    while next.0 < PIXELS_PER_TILE {
+        if let Some((x, y)) = tile.pixel(next.0) {
+            return Some((next.0, x, y));
+        }
+        next.0 += 1;
+    }
+    None
+}

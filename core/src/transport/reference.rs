@@ -1,0 +1,140 @@
+//! The path tracer of the textbook: one path at a time, one ray at a time. It is what [`super::path`] is tested
+//! against, and it says in order what that does in pieces.
+
+use super::estimator::{MAX_CROSSINGS, MAX_VERTICES, PathSettings, dimension, power_heuristic, survival};
+use super::shadow::{pass_cutout, shadow_ray};
+use crate::bsdf::{All, Bsdf};
+use crate::bvh::Bvh;
+use crate::geometry::{MISS, Ray};
+use crate::light::{Lights, emitted};
+use crate::sampling::Sampler;
+use crate::scene::{Scene, SurfacePoint};
+use crate::{Level, Rgb};
+use glam::Vec3;
+
+/// The radiance that sample number `sample` of the pixel in column `x` and row `y` sees.
+pub fn radiance(
+    scene: &Scene,
+    bvh: &Bvh,
+    lights: &Lights,
+    settings: &PathSettings,
+    [x, y]: [u32; 2],
+    sample: u32,
+) -> Rgb {
+    let PathSettings { width, height, seed, max_depth } = *settings;
+    let sampler = Sampler::new(seed, y * width + x, sample);
+    let [dx, dy] = sampler.pair(dimension::PIXEL);
+    let lens = sampler.pair(dimension::LENS);
+    let mut ray = scene.camera.ray(width, height, x as f32 + dx, y as f32 + dy, lens);
+
+    let mut radiance = Rgb::ZERO; // L
+    let mut throughput = Rgb::ONE; // β
+    let mut eta_squared = 1.0;
+    // The vertex before: where it is, its normal, the density with which it chose the ray, its triangle.
+    let (mut from, mut from_normal, mut pdf, mut left) = (Vec3::ZERO, Vec3::ZERO, f32::INFINITY, MISS);
+    let (mut segments, mut crossings) = (1, 0);
+
+    while segments <= MAX_VERTICES && crossings <= MAX_CROSSINGS {
+        let direction = Vec3::from(ray.direction);
+        let hit = bvh.nearest(Level::BASELINE, &ray);
+
+        // Light from infinitely far.
+        if !hit.is_some() {
+            if let Some(environment) = &scene.environment {
+                let light_pdf = lights.pdf_escape(scene, from, from_normal, direction);
+                let weight = if pdf == f32::INFINITY { 1.0 } else { power_heuristic(pdf, light_pdf) };
+                let seen = environment.radiance(scene, direction);
+                radiance += throughput * seen * if seen == Rgb::ZERO { 0.0 } else { weight };
+            }
+            break;
+        }
+        let Some(point) = SurfacePoint::at::<All>(scene, &ray, &hit) else { break };
+
+        // Rounding, or a hole in the surface: on in the same direction.
+        let opacity = point.material.opacity.at::<All>(scene, point.uv);
+        let met_again = hit.triangle == left;
+
+        // Light from the surface itself.
+        let seen = emitted(scene, hit.triangle, point.uv, point.front);
+        if seen != Rgb::ZERO && !met_again {
+            let distance = from.distance(point.position);
+            let light_pdf = lights.pdf_hit(scene, from, from_normal, hit.triangle, distance, direction);
+            let weight = if pdf == f32::INFINITY { 1.0 } else { power_heuristic(pdf, light_pdf) };
+            radiance += throughput * seen * weight;
+        }
+        let transparent =
+            point.material.has_cutout() && sampler.single(dimension::CROSSING + crossings) >= opacity;
+        if met_again || transparent {
+            ray = point.spawn(direction);
+            left = hit.triangle;
+            crossings += 1;
+            continue;
+        }
+        if segments >= max_depth {
+            break;
+        }
+
+        let bsdf = Bsdf::at::<All>(scene, point.material, point.uv, point.front);
+        let wo = point.frame.to_local(-direction);
+        let normal = if bsdf.transmits() { Vec3::ZERO } else { point.frame.normal };
+        let first = dimension::vertex(segments);
+
+        // Next-event estimation: light that a shadow ray reaches.
+        if !bsdf.is_delta() && !lights.is_empty() {
+            let [u, v] = sampler.pair(first + dimension::LIGHT);
+            let choice = sampler.single(first + dimension::LIGHT_CHOICE);
+            if let Some(light) = lights.sample(scene, point.position, normal, [u, v, choice]) {
+                let wi = point.frame.to_local(light.direction);
+                let (f, pdf) = bsdf.evaluate::<All>(wo, wi);
+                let same_side = point.sides_agree(wi, light.direction);
+                if same_side && f != Rgb::ZERO {
+                    let weight = if light.delta { 1.0 } else { power_heuristic(light.pdf, pdf) };
+                    let sent = throughput * f * light.radiance * (weight / light.pdf);
+                    radiance += arriving(scene, bvh, shadow_ray(&point, &light), sent);
+                }
+            }
+        }
+
+        // The path goes on where the BSDF sends it.
+        let [u, v] = sampler.pair(first + dimension::BSDF);
+        let lobe = sampler.single(first + dimension::LOBE);
+        let Some(scattered) = bsdf.sample::<All>(wo, [u, v, lobe]) else { break };
+        let direction = point.frame.to_world(scattered.direction);
+        if !point.sides_agree(scattered.direction, direction) {
+            break;
+        }
+        throughput *= scattered.weight;
+        eta_squared *= scattered.eta * scattered.eta;
+
+        // Roulette.
+        let survival = survival(segments, throughput * eta_squared);
+        if survival < 1.0 {
+            if sampler.single(first + dimension::ROULETTE) >= survival {
+                break;
+            }
+            throughput /= survival;
+        }
+        if throughput == Rgb::ZERO {
+            break;
+        }
+        pdf = if scattered.delta { f32::INFINITY } else { scattered.pdf };
+        (from, from_normal, left) = (point.position, normal, hit.triangle);
+        ray = point.spawn(direction);
+        segments += 1;
+    }
+    radiance
+}
+
+/// What of `light` passes along a shadow ray.
+fn arriving(scene: &Scene, bvh: &Bvh, mut ray: Ray, mut light: Rgb) -> Rgb {
+    for _ in 0..=MAX_CROSSINGS {
+        let hit = bvh.nearest(Level::BASELINE, &ray);
+        if !hit.is_some() {
+            return light;
+        }
+        let Some((rest, transmittance)) = pass_cutout::<All>(scene, &ray, &hit) else { break };
+        light *= transmittance;
+        ray = rest;
+    }
+    Rgb::ZERO
+}

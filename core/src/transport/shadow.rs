@@ -1,0 +1,39 @@
+//! Rays from a surface point to a light, and what cut-outs on their way let through.
+
+use crate::bsdf::Features;
+use crate::geometry::{Hit, Ray};
+use crate::light::LightSample;
+use crate::scene::{Scene, SurfacePoint};
+use glam::Vec3;
+
+/// The ray that meets what hides the light of `sample` from `point`, and neither end.
+#[inline]
+pub(super) fn shadow_ray(point: &SurfacePoint, sample: &LightSample) -> Ray {
+    if let Some(target) = sample.target {
+        // Off the light's surface, to the side from which it is seen.
+        let step = target.error.copysign(-target.normal.dot(sample.direction));
+        return point.spawn_to(target.position + step * target.normal);
+    }
+    if sample.distance < f32::INFINITY {
+        return point.spawn_to(point.position + sample.distance * sample.direction);
+    }
+    point.spawn(sample.direction)
+}
+
+/// Behind the surface that a shadow ray met: the rest of the ray, and the factor on its light. `None` where
+/// nothing passes.
+pub(super) fn pass_cutout<F: Features>(scene: &Scene, ray: &Ray, hit: &Hit) -> Option<(Ray, f32)> {
+    let point = SurfacePoint::at::<F>(scene, ray, hit)?;
+    let opacity = point.material.opacity.at::<F>(scene, point.uv);
+    let transmittance = 1.0 - opacity.clamp(0.0, 1.0);
+    if !(point.material.has_cutout() && transmittance > 0.0) {
+        return None;
+    }
+    let direction = Vec3::from(ray.direction);
+    let rest = if ray.t_max == f32::INFINITY {
+        point.spawn(direction)
+    } else {
+        point.spawn_to(Vec3::from(ray.origin) + direction)
+    };
+    Some((Ray { tag: ray.tag, ..rest }, transmittance))
+}

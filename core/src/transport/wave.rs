@@ -1,0 +1,71 @@
+//! The working memory of a wavefront: the state of every path of the wave, and queues of rays.
+
+use crate::bvh::Bvh;
+use crate::geometry::{Hit, Ray};
+use crate::memory::{Arena, Footprint, OutOfMemory};
+use bytemuck::{Pod, Zeroable};
+
+/// A path between two of its vertices.
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[repr(C)]
+pub(super) struct Path {
+    /// β: what radiance at the end of the ray is worth in the pixel.
+    pub(super) throughput: [f32; 3],
+    /// Density in solid angle with which the ray was chosen; infinite where no other technique could.
+    pub(super) pdf: f32,
+    /// L: what the path has gathered.
+    pub(super) radiance: [f32; 3],
+    /// Which pixel of the picture.
+    pub(super) pixel: u32,
+    /// The last vertex at which the path was scattered.
+    pub(super) position: [f32; 3],
+    /// Which sample of the pixel.
+    pub(super) sample: u32,
+    /// The normal there, as the light sampling knows it.
+    pub(super) normal: [f32; 3],
+    /// Segments traced, the one under way included.
+    pub(super) segments: u16,
+    /// Surfaces passed through by cut-out.
+    pub(super) crossings: u16,
+    /// The triangle that the ray starts on, which it cannot meet again.
+    pub(super) triangle: u32,
+    /// Product of the squared relative indices of refraction passed so far.
+    pub(super) eta_squared: f32,
+}
+
+/// Slices for up to `capacity` paths. Rays know their path by their tag.
+pub(super) struct Wave<'m> {
+    pub(super) paths: &'m mut [Path],
+    pub(super) rays: &'m mut [Ray],
+    pub(super) hits: &'m mut [Hit],
+    pub(super) shadow_rays: &'m mut [Ray],
+    /// What arrives at the camera from the light at the end of the shadow ray.
+    pub(super) shadow_light: &'m mut [[f32; 3]],
+    pub(super) hidden: &'m mut [u8],
+    pub(super) words: &'m mut [u32],
+}
+
+impl<'m> Wave<'m> {
+    pub(super) fn footprint(capacity: usize) -> Footprint {
+        Footprint::default()
+            .slice::<Path>(capacity)
+            .slice::<Ray>(capacity)
+            .slice::<Hit>(capacity)
+            .slice::<Ray>(capacity)
+            .slice::<[f32; 3]>(capacity)
+            .slice::<u8>(capacity)
+            .slice::<u32>(Bvh::batch_scratch(capacity).div_ceil(4))
+    }
+
+    pub(super) fn new(capacity: usize, arena: &mut Arena<'m>) -> Result<Self, OutOfMemory> {
+        Ok(Self {
+            paths: arena.slice(capacity)?,
+            rays: arena.slice(capacity)?,
+            hits: arena.slice(capacity)?,
+            shadow_rays: arena.slice(capacity)?,
+            shadow_light: arena.slice(capacity)?,
+            hidden: arena.slice(capacity)?,
+            words: arena.slice(Bvh::batch_scratch(capacity).div_ceil(4))?,
+        })
+    }
+}

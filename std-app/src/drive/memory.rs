@@ -1,0 +1,76 @@
+//! The bytes behind the arenas: counted, held against the limit, asked of the system without aborting.
+
+use super::RenderError;
+use halflight_core::memory::{ALIGNMENT, Footprint, Line};
+use halflight_core::scene::{Scene, Texels};
+
+/// Bytes of one structure.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct MemoryUse {
+    /// Its name.
+    pub structure: &'static str,
+    /// Its bytes.
+    pub bytes: usize,
+}
+
+/// What was taken so far.
+pub(super) struct Memory {
+    limit: Option<usize>,
+    uses: Vec<MemoryUse>,
+}
+
+impl Memory {
+    /// Counts the buffers of `scene` as taken.
+    pub(super) fn new(scene: &Scene, limit: Option<usize>) -> Self {
+        Self { limit, uses: vec![MemoryUse { structure: "scene", bytes: scene_bytes(scene) }] }
+    }
+
+    /// Lines of `footprint` bytes for `structure`.
+    pub(super) fn take(
+        &mut self,
+        structure: &'static str,
+        footprint: Footprint,
+    ) -> Result<Vec<Line>, RenderError> {
+        let bytes = footprint.bytes();
+        let needed = self.total().saturating_add(bytes);
+        if let Some(limit) = self.limit
+            && needed > limit
+        {
+            return Err(RenderError::Memory { needed, available: limit });
+        }
+        let count = bytes.div_ceil(ALIGNMENT);
+        let mut lines = Vec::new();
+        let failed = |_| RenderError::Memory { needed, available: self.total() };
+        lines.try_reserve_exact(count).map_err(failed)?;
+        lines.resize(count, Line([0; ALIGNMENT]));
+        match self.uses.iter_mut().find(|other| other.structure == structure) {
+            Some(other) => other.bytes += bytes,
+            None => self.uses.push(MemoryUse { structure, bytes }),
+        }
+        Ok(lines)
+    }
+
+    /// Bytes of each structure.
+    pub(super) fn uses(&self) -> Vec<MemoryUse> {
+        self.uses.clone()
+    }
+
+    fn total(&self) -> usize {
+        self.uses.iter().fold(0, |sum, other| sum.saturating_add(other.bytes))
+    }
+}
+
+fn scene_bytes(scene: &Scene) -> usize {
+    let mesh = &scene.mesh;
+    let textures = scene.textures.iter().map(|texture| match texture.texels {
+        Texels::Srgb8(texels) | Texels::Linear8(texels) => size_of_val(texels),
+        Texels::Float(texels) => size_of_val(texels),
+    });
+    size_of_val(mesh.positions)
+        + size_of_val(mesh.normals)
+        + size_of_val(mesh.texcoords)
+        + size_of_val(mesh.triangles)
+        + size_of_val(scene.materials)
+        + size_of_val(scene.lights)
+        + textures.sum::<usize>()
+}

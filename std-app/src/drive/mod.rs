@@ -1,0 +1,252 @@
+//! Runs the core's passes: memory, threads, rounds, stop rules. [`render`] is all that a program needs.
+//!
+//! A picture is made in rounds; a round adds the same number of samples to every pixel. How the samples are
+//! cut into rounds, and how many threads there are, leaves the bits of the picture as they are.
+
+mod error;
+mod memory;
+mod rounds;
+mod workers;
+
+pub use error::ErrorEstimate;
+pub use memory::MemoryUse;
+pub use rounds::Stop;
+
+use crate::save::Image;
+use core::sync::atomic::{AtomicBool, Ordering};
+use halflight_core::Level;
+use halflight_core::bsdf::Features;
+use halflight_core::bvh::Bvh;
+use halflight_core::census::{Census, WithFeatures};
+use halflight_core::film::Film;
+use halflight_core::light::Lights;
+use halflight_core::memory::{Arena, OutOfMemory};
+use halflight_core::scene::Scene;
+use halflight_core::transport::{Counters, PathSettings, PathTracer, UNLIMITED, path::WAVE};
+use memory::Memory;
+use rounds::Rounds;
+use std::time::Instant;
+use workers::Workers;
+
+/// How to render.
+#[derive(Clone, Debug)]
+pub struct Settings {
+    /// Pixels across.
+    pub width: u32,
+    /// Pixels down.
+    pub height: u32,
+    /// Another seed, another picture of the same thing.
+    pub seed: u32,
+    /// The largest number of segments of a path; 1 is light that is seen directly. `None`: no limit.
+    pub max_depth: Option<u32>,
+    /// Number of threads; `None`: as many as the machine runs at once.
+    pub threads: Option<usize>,
+    /// Most bytes that the scene and all structures may take together; `None`: no limit.
+    pub memory: Option<usize>,
+    /// The instruction set of the kernels.
+    pub level: Level,
+    /// When to stop.
+    pub stop: Stop,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            width: 512,
+            height: 512,
+            seed: 0,
+            max_depth: None,
+            threads: None,
+            memory: None,
+            level: Level::detect(),
+            stop: Stop::default(),
+        }
+    }
+}
+
+/// What is known while a picture is made, after each round.
+#[derive(Clone, Copy, Debug)]
+pub struct Progress {
+    /// Seconds of rendering so far.
+    pub seconds: f64,
+    /// Seconds that are left, if all goes on as before. `None` where nothing is known yet.
+    pub seconds_left: Option<f64>,
+    /// Samples of each pixel so far.
+    pub spp: u32,
+    /// Rounds so far.
+    pub rounds: u32,
+    /// The error so far.
+    pub error: Option<ErrorEstimate>,
+}
+
+/// Why rendering ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Ending {
+    /// A stop rule held.
+    Done,
+    /// The interrupt flag was raised: the picture is valid, with fewer samples.
+    Interrupted,
+}
+
+/// Seconds of wall-clock time.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Seconds {
+    /// Building the hierarchy and the light structures.
+    pub build: f64,
+    /// Tracing paths.
+    pub render: f64,
+}
+
+/// A picture and all that is known of it.
+#[derive(Clone, Debug)]
+pub struct RenderResult {
+    /// The picture.
+    pub image: Image,
+    /// Samples of each pixel (of the least sampled one after an interrupt).
+    pub spp: u32,
+    /// Rounds completed.
+    pub rounds: u32,
+    /// Threads used.
+    pub threads: usize,
+    /// Where the time went.
+    pub seconds: Seconds,
+    /// Paths, rays and dropped samples.
+    pub counters: Counters,
+    /// The error, estimated from the two half-films; `None` for fewer than two samples.
+    pub error: Option<ErrorEstimate>,
+    /// Bytes of each structure.
+    pub memory: Vec<MemoryUse>,
+    /// Why rendering ended.
+    pub ending: Ending,
+}
+
+/// Why there is no picture.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum RenderError {
+    /// The picture has no pixels, or more than can be counted.
+    Size,
+    /// The memory allowed does not suffice.
+    Memory {
+        /// Bytes that are needed.
+        needed: usize,
+        /// Bytes that were allowed, or that the system gave.
+        available: usize,
+    },
+    /// The threads could not be started.
+    Threads(String),
+}
+
+impl core::fmt::Display for RenderError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self {
+            Self::Size => write!(f, "the picture must have between 1 and 2^28 pixels"),
+            Self::Memory { needed, available } => {
+                write!(f, "not enough memory: {needed} bytes needed, {available} available")
+            }
+            Self::Threads(why) => write!(f, "the threads could not be started: {why}"),
+        }
+    }
+}
+
+impl core::error::Error for RenderError {}
+
+impl From<OutOfMemory> for RenderError {
+    fn from(error: OutOfMemory) -> Self {
+        Self::Memory { needed: error.needed, available: error.available }
+    }
+}
+
+/// Pixels that a picture may have.
+const MOST_PIXELS: u64 = 1 << 28;
+
+/// Renders `scene` until a rule of `settings.stop` holds or `interrupt` is raised. `progress` is called
+/// after each round, on the calling thread.
+pub fn render(
+    scene: &Scene,
+    settings: &Settings,
+    progress: &mut dyn FnMut(&Progress),
+    interrupt: &AtomicBool,
+) -> Result<RenderResult, RenderError> {
+    let pixels = u64::from(settings.width) * u64::from(settings.height);
+    if !(1..=MOST_PIXELS).contains(&pixels) {
+        return Err(RenderError::Size);
+    }
+    let plan = Census::of(scene).plan();
+    plan.features.dispatch(Render { scene, settings, progress, interrupt })
+}
+
+/// A render to be compiled for the features of its scene.
+struct Render<'a> {
+    scene: &'a Scene<'a>,
+    settings: &'a Settings,
+    progress: &'a mut dyn FnMut(&Progress),
+    interrupt: &'a AtomicBool,
+}
+
+impl WithFeatures for Render<'_> {
+    type Out = Result<RenderResult, RenderError>;
+
+    fn run<F: Features>(self) -> Self::Out {
+        let Render { scene, settings, progress, interrupt } = self;
+        let (width, height) = (settings.width, settings.height);
+        let workers = Workers::new(settings.threads)?;
+        let mut memory = Memory::new(scene, settings.memory);
+
+        let build_start = Instant::now();
+        let mut film_lines = memory.take("film", Film::footprint(width, height))?;
+        let scratch = PathTracer::<F>::scratch(WAVE);
+        let mut scratch_lines =
+            (0..workers.count()).map(|_| memory.take("paths", scratch)).collect::<Result<Vec<_>, _>>()?;
+        let mut lights_lines = memory.take("lights", Lights::footprint(scene).and(Lights::scratch(scene)))?;
+        let lights = Lights::build(scene, &mut Arena::new(bytemuck::cast_slice_mut(&mut lights_lines)))?;
+        let mut bvh_lines = memory.take("bvh", Bvh::footprint(scene.mesh.triangles.len()))?;
+        let bvh = Bvh::build(&scene.mesh, &mut Arena::new(bytemuck::cast_slice_mut(&mut bvh_lines)))?;
+        let build = build_start.elapsed().as_secs_f64();
+
+        let mut film = Film::new(width, height, &mut Arena::new(bytemuck::cast_slice_mut(&mut film_lines)))?;
+        let max_depth = settings.max_depth.unwrap_or(UNLIMITED);
+        let path_settings = PathSettings { width, height, seed: settings.seed, max_depth };
+        let tracer = PathTracer::<F>::new(scene, &bvh, &lights, path_settings, settings.level);
+
+        let start = Instant::now();
+        let mut rounds = Rounds::new(settings.stop);
+        let mut counters = Counters::default();
+        let mut error = None;
+        while let Some(samples) = rounds.next(start.elapsed().as_secs_f64(), error) {
+            counters += workers.run(&tracer, samples.clone(), &mut film, &mut scratch_lines, interrupt)?;
+            if interrupt.load(Ordering::Relaxed) {
+                break;
+            }
+            rounds.completed(samples, start.elapsed().as_secs_f64());
+            error = ErrorEstimate::of(&film);
+            progress(&Progress {
+                seconds: start.elapsed().as_secs_f64(),
+                seconds_left: rounds.seconds_left(start.elapsed().as_secs_f64(), error),
+                spp: rounds.spp(),
+                rounds: rounds.count(),
+                error,
+            });
+        }
+        let interrupted = interrupt.load(Ordering::Relaxed);
+        Ok(RenderResult {
+            image: image(&film),
+            spp: rounds.spp(),
+            rounds: rounds.count(),
+            threads: workers.count(),
+            seconds: Seconds { build, render: start.elapsed().as_secs_f64() },
+            counters,
+            error: ErrorEstimate::of(&film),
+            memory: memory.uses(),
+            ending: if interrupted { Ending::Interrupted } else { Ending::Done },
+        })
+    }
+}
+
+fn image(film: &Film) -> Image {
+    let mut image = Image::black(film.width(), film.height());
+    let places = (0..film.height()).flat_map(|y| (0..film.width()).map(move |x| (x, y)));
+    for (pixel, (x, y)) in image.pixels.iter_mut().zip(places) {
+        *pixel = film.mean(x, y).to_array();
+    }
+    image
+}

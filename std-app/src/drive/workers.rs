@@ -1,0 +1,73 @@
+//! The threads: each takes the next tile when it is done with one, and has working memory of its own.
+
+use super::RenderError;
+use core::ops::Range;
+use core::sync::atomic::{AtomicBool, Ordering};
+use halflight_core::bsdf::Features;
+use halflight_core::film::{Film, PIXELS_PER_TILE};
+use halflight_core::memory::{Arena, Line, OutOfMemory};
+use halflight_core::transport::{Counters, PathTracer, path::WAVE};
+use rayon::{ThreadPool, ThreadPoolBuilder};
+use std::sync::Mutex;
+
+/// A pool of threads.
+pub(super) struct Workers {
+    pool: ThreadPool,
+}
+
+impl Workers {
+    /// `threads` threads; as many as the machine runs at once where `None`.
+    pub(super) fn new(threads: Option<usize>) -> Result<Self, RenderError> {
+        let pool = ThreadPoolBuilder::new().num_threads(threads.unwrap_or(0)).build();
+        pool.map(|pool| Self { pool }).map_err(|error| RenderError::Threads(error.to_string()))
+    }
+
+    /// How many there are.
+    pub(super) fn count(&self) -> usize {
+        self.pool.current_num_threads()
+    }
+
+    /// One round: `samples` of every pixel. When `interrupt` is raised, tiles not yet begun are left out.
+    pub(super) fn run<F: Features>(
+        &self,
+        tracer: &PathTracer<F>,
+        samples: Range<u32>,
+        film: &mut Film,
+        scratch: &mut [Vec<Line>],
+        interrupt: &AtomicBool,
+    ) -> Result<Counters, OutOfMemory> {
+        let tiles = Mutex::new(film.pixels_mut().chunks_mut(PIXELS_PER_TILE).enumerate());
+        let total = Mutex::new(Ok(Counters::default()));
+        self.pool.scope(|scope| {
+            for lines in scratch {
+                scope.spawn(|_| {
+                    let mut arena = Arena::new(bytemuck::cast_slice_mut(lines));
+                    let mut counters = Counters::default();
+                    while !interrupt.load(Ordering::Relaxed) {
+                        let next = tiles.lock().ok().and_then(|mut tiles| tiles.next());
+                        let Some((task, pixels)) = next else { break };
+                        match tracer.run(task, samples.clone(), WAVE, &mut arena, pixels) {
+                            Ok(done) => counters += done,
+                            Err(error) => {
+                                store(&total, |total| *total = Err(error));
+                                return;
+                            }
+                        }
+                    }
+                    store(&total, |total| {
+                        if let Ok(total) = total {
+                            *total += counters;
+                        }
+                    });
+                });
+            }
+        });
+        total.into_inner().unwrap_or_else(|poisoned| poisoned.into_inner())
+    }
+}
+
+type Total = Result<Counters, OutOfMemory>;
+
+fn store(total: &Mutex<Total>, change: impl FnOnce(&mut Total)) {
+    change(&mut total.lock().unwrap_or_else(|poisoned| poisoned.into_inner()));
+}

@@ -1,0 +1,184 @@
+//! Small scenes made by hand, whose pictures are known or can be reasoned about.
+
+use glam::{Mat3, Vec3};
+use halflight_core::Rgb;
+use halflight_core::scene::{
+    Camera, ColorInput, Environment, Material, Mesh, PointLight, Scene, Texture, Triangle,
+};
+
+/// Buffers of a scene, and a camera.
+#[derive(Clone, Debug)]
+pub struct SceneBuffers {
+    /// Vertex positions.
+    pub positions: Vec<[f32; 3]>,
+    /// Normals; empty, or one for each position.
+    pub normals: Vec<[f32; 3]>,
+    /// Texture coordinates; empty, or one for each position.
+    pub texcoords: Vec<[f32; 2]>,
+    /// Triangles.
+    pub triangles: Vec<Triangle>,
+    /// Materials.
+    pub materials: Vec<Material>,
+    /// Lights without surface.
+    pub lights: Vec<PointLight>,
+    /// Light from infinitely far.
+    pub environment: Option<Environment>,
+    /// Who looks.
+    pub camera: Camera,
+}
+
+impl SceneBuffers {
+    /// Nothing but a camera.
+    pub fn new(camera: Camera) -> Self {
+        Self {
+            positions: Vec::new(),
+            normals: Vec::new(),
+            texcoords: Vec::new(),
+            triangles: Vec::new(),
+            materials: Vec::new(),
+            lights: Vec::new(),
+            environment: None,
+            camera,
+        }
+    }
+
+    /// The scene as the core sees it.
+    pub fn scene(&self) -> Scene<'_> {
+        self.textured(&[])
+    }
+
+    /// The scene with textures.
+    pub fn textured<'a>(&'a self, textures: &'a [Texture<'a>]) -> Scene<'a> {
+        Scene {
+            mesh: Mesh {
+                positions: &self.positions,
+                normals: &self.normals,
+                texcoords: &self.texcoords,
+                triangles: &self.triangles,
+            },
+            materials: &self.materials,
+            textures,
+            lights: &self.lights,
+            environment: self.environment,
+            camera: self.camera,
+        }
+    }
+
+    /// Adds a material and returns its number.
+    pub fn material(&mut self, material: Material) -> u32 {
+        self.materials.push(material);
+        self.materials.len() as u32 - 1
+    }
+
+    /// Adds a quadrilateral, counter-clockwise seen from its front.
+    pub fn quad(&mut self, corners: [Vec3; 4], material: u32) {
+        let first = self.positions.len() as u32;
+        self.positions.extend(corners.map(|p| p.to_array()));
+        let mut face = |corners: [u32; 3]| {
+            self.triangles.push(Triangle { vertices: corners.map(|i| first + i), material });
+        };
+        face([0, 1, 2]);
+        face([0, 2, 3]);
+    }
+
+    /// Adds the unit square around `center` that faces `normal`, times `size`.
+    pub fn square(&mut self, center: Vec3, normal: Vec3, size: f32, material: u32) {
+        let (u, v) = normal.any_orthonormal_pair();
+        let (u, v) = if u.cross(v).dot(normal) > 0.0 { (u, v) } else { (v, u) };
+        let corner = |a: f32, b: f32| center + 0.5 * size * (a * u + b * v);
+        self.quad([corner(-1.0, -1.0), corner(1.0, -1.0), corner(1.0, 1.0), corner(-1.0, 1.0)], material);
+    }
+
+    /// Adds a closed box from `min` to `max` whose faces look outwards, or inwards.
+    pub fn cuboid(&mut self, min: Vec3, max: Vec3, inwards: bool, material: u32) {
+        let at = |i: usize| {
+            Vec3::new(
+                if i & 1 == 0 { min.x } else { max.x },
+                if i & 2 == 0 { min.y } else { max.y },
+                if i & 4 == 0 { min.z } else { max.z },
+            )
+        };
+        let faces = [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
+        for mut face in faces {
+            if inwards {
+                face.reverse();
+            }
+            self.quad(face.map(at), material);
+        }
+    }
+
+    /// Adds a sphere of `2 * rings²` quadrilaterals or so, with smooth normals where the scene has normals.
+    pub fn sphere(&mut self, center: Vec3, radius: f32, rings: u32, material: u32) {
+        let first = self.positions.len() as u32;
+        let segments = 2 * rings;
+        for ring in 0..=rings {
+            let theta = core::f32::consts::PI * ring as f32 / rings as f32;
+            for segment in 0..=segments {
+                let phi = core::f32::consts::TAU * (segment % segments) as f32 / segments as f32;
+                let normal =
+                    Vec3::new(theta.sin() * phi.cos(), theta.cos(), theta.sin() * phi.sin()).normalize();
+                self.positions.push((center + radius * normal).to_array());
+                self.normals.push(normal.to_array());
+            }
+        }
+        let mut face = |vertices: [u32; 3]| self.triangles.push(Triangle { vertices, material });
+        for ring in 0..rings {
+            for segment in 0..segments {
+                let a = first + ring * (segments + 1) + segment;
+                let (b, c, d) = (a + 1, a + segments + 2, a + segments + 1);
+                if ring > 0 {
+                    face([a, b, c]);
+                }
+                if ring + 1 < rings {
+                    face([a, c, d]);
+                }
+            }
+        }
+    }
+}
+
+/// A diffuse surface that emits.
+pub fn emitter(reflectance: f32, radiance: f32) -> Material {
+    Material {
+        emission: ColorInput::from(Rgb::splat(radiance)),
+        ..Material::diffuse(Rgb::splat(reflectance))
+    }
+}
+
+/// The same radiance from everywhere.
+pub fn constant_environment(radiance: f32) -> Option<Environment> {
+    Some(Environment { radiance: Rgb::splat(radiance), map: None, to_map: Mat3::IDENTITY })
+}
+
+/// The Cornell box: walls from the published measurements, in units of 555.2 mm, two blocks, a lamp.
+pub fn cornell_box() -> SceneBuffers {
+    const UNIT: f32 = 1.0 / 555.2;
+    let eye = Vec3::new(278.0, 273.0, -800.0) * UNIT;
+    let mut scene = SceneBuffers::new(Camera::look_at(eye, eye + Vec3::Z, Vec3::Y, 39.3));
+    let white = scene.material(Material::diffuse(Rgb::new(0.73, 0.735, 0.729)));
+    let red = scene.material(Material::diffuse(Rgb::new(0.611, 0.0555, 0.062)));
+    let green = scene.material(Material::diffuse(Rgb::new(0.117, 0.4125, 0.115)));
+    let lamp = scene.material(Material {
+        emission: ColorInput::from(Rgb::new(18.387, 13.9873, 6.75357)),
+        ..Material::diffuse(Rgb::splat(0.78))
+    });
+    let mut quad = |corners: [[f32; 3]; 4], material: u32| {
+        scene.quad(corners.map(|p| Vec3::from(p) * UNIT), material);
+    };
+    quad([[552.8, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 559.2], [549.6, 0.0, 559.2]], white);
+    quad([[556.0, 548.8, 0.0], [556.0, 548.8, 559.2], [0.0, 548.8, 559.2], [0.0, 548.8, 0.0]], white);
+    quad([[549.6, 0.0, 559.2], [0.0, 0.0, 559.2], [0.0, 548.8, 559.2], [556.0, 548.8, 559.2]], white);
+    quad([[0.0, 0.0, 559.2], [0.0, 0.0, 0.0], [0.0, 548.8, 0.0], [0.0, 548.8, 559.2]], green);
+    quad([[552.8, 0.0, 0.0], [549.6, 0.0, 559.2], [556.0, 548.8, 559.2], [556.0, 548.8, 0.0]], red);
+    quad([[343.0, 548.7, 227.0], [343.0, 548.7, 332.0], [213.0, 548.7, 332.0], [213.0, 548.7, 227.0]], lamp);
+    let short = [[130.0, 65.0], [82.0, 225.0], [240.0, 272.0], [290.0, 114.0]];
+    let tall = [[423.0, 247.0], [265.0, 296.0], [314.0, 456.0], [472.0, 406.0]];
+    for (base, top) in [(short, 165.0), (tall, 330.0)] {
+        quad(base.map(|[x, z]| [x, top, z]), white);
+        for i in 0..4 {
+            let ([ax, az], [bx, bz]) = (base[i], base[(i + 1) % 4]);
+            quad([[ax, 0.0, az], [bx, 0.0, bz], [bx, top, bz], [ax, top, az]].map(|p| p), white);
+        }
+    }
+    scene
+}
