@@ -219,3 +219,59 @@ fn hunt([l, a, b]: Colour) -> Colour {
 fn hyab(r: Colour, t: Colour) -> f32 {
     (r[0] - t[0]).abs() + (r[1] - t[1]).hypot(r[2] - t[2])
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Our filters are computed in another order of f32 operations than those of the published program.
+    const TOLERANCE: f64 = 1e-4;
+
+    const WIDTH: u32 = 61;
+    const HEIGHT: u32 = 43;
+
+    fn picture(value: impl Fn(u32, u32, u32) -> u32) -> Image {
+        let channel = |x, y, c| from_srgb((value(x, y, c) % 256) as f32 / 255.0);
+        let pixel = |x, y| [channel(x, y, 0), channel(x, y, 1), channel(x, y, 2)];
+        let pixels = (0..HEIGHT).flat_map(|y| (0..WIDTH).map(move |x| (x, y)));
+        Image { width: WIDTH, height: HEIGHT, pixels: pixels.map(|(x, y)| pixel(x, y)).collect() }
+    }
+
+    fn ramp(x: u32, y: u32, c: u32) -> u32 {
+        (x * 3 + y * 2 * c) % 256
+    }
+
+    fn noise(x: u32, y: u32, c: u32) -> u32 {
+        let hash = x.wrapping_mul(73856093) ^ y.wrapping_mul(19349663) ^ c.wrapping_mul(83492791);
+        ((hash ^ (hash >> 15)).wrapping_mul(2246822519) >> 13) & 255
+    }
+
+    /// The values are those of the authors' program (Python package `flip-evaluator` 1.7, numpy arrays of
+    /// these pictures divided by 255): `evaluate(reference, test, "LDR", applyMagma=False)` gives the map,
+    /// here at column 30 of row 20, and its mean.
+    #[test]
+    fn agrees_with_the_authors_program() {
+        let noisy = |x, y, c| (ramp(x, y, c) + noise(x, y, c) / 8).min(255);
+        let checkers = |moved: u32| move |x: u32, y: u32, _| 40 + 160 * (((x + moved) / 8 + y / 8) % 2);
+        let pairs = [
+            (picture(ramp), picture(noisy), 0.286_040_54, 0.294_854_5),
+            (picture(|_, _, c| 255 * (c == 1) as u32), picture(|_, _, c| 255 * (c == 2) as u32), 1.0, 1.0),
+            (picture(checkers(0)), picture(checkers(1)), 0.220_201_25, 0.415_078_22),
+            (picture(noise), picture(|_, _, _| 128), 0.480_670_87, 0.494_359_7),
+        ];
+        for (number, (reference, test, mean, middle)) in pairs.into_iter().enumerate() {
+            let map = flip(&test, &reference);
+            let ours = map.iter().map(|&e| f64::from(e)).sum::<f64>() / map.len() as f64;
+            assert!((ours - mean).abs() < TOLERANCE, "pair {number}: {ours} and {mean}");
+            let ours = f64::from(map[20 * WIDTH as usize + 30]);
+            assert!((ours - middle).abs() < TOLERANCE, "pair {number}, middle: {ours} and {middle}");
+        }
+    }
+
+    #[test]
+    fn equal_pictures_do_not_differ_and_one_pixel_is_a_picture() {
+        assert!(flip(&picture(noise), &picture(noise)).iter().all(|&error| error == 0.0));
+        let dot = |value| Image { width: 1, height: 1, pixels: vec![[value; 3]] };
+        assert!(flip(&dot(f32::NAN), &dot(f32::INFINITY)).iter().all(|error| error.is_finite()));
+    }
+}
