@@ -8,7 +8,8 @@
 
 use super::albedo::{self, SchlickAlbedo};
 use super::coated::Coat;
-use super::{fresnel, resolve::unit};
+use super::fresnel;
+use super::resolve::{GREATEST_INDEX, unit};
 use crate::Rgb;
 
 /// A dielectric coat over a diffuse base, mixed with metal. See the module.
@@ -35,7 +36,7 @@ impl Plastic {
     #[inline]
     pub fn new(color: Rgb, specular: Rgb, alpha: f32, metallic: f32, eta: f32) -> Self {
         let metallic = unit(metallic);
-        let eta = if eta.is_finite() { eta.max(1.0) } else { 1.0 };
+        let eta = if eta.is_finite() { eta.clamp(1.0, GREATEST_INDEX) } else { 1.0 };
         let f0 = fresnel::normal_incidence(eta);
         let tint = if f0 > 0.0 { (specular / f0).min(Rgb::ONE) } else { Rgb::ONE };
         let internal = albedo::internal_reflectance(alpha, eta);
@@ -48,6 +49,11 @@ impl Plastic {
             eta,
             f0,
         }
+    }
+
+    /// GGX alpha of the coat; 0 is smooth.
+    pub fn alpha(&self) -> f32 {
+        self.alpha
     }
 
     pub(super) fn is_delta(&self) -> bool {
