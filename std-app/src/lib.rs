@@ -2,6 +2,6 @@
 #![forbid(unsafe_code)]
 
 pub mod compare;
-pub mod load;
 pub mod drive;
+pub mod load;
 pub mod save;
