@@ -4,7 +4,8 @@
 //! base = colour / (1 - colour · R_i) / η²
 //!
 //! with R_i the mean internal reflectance: 1 - R_i = (1 - R_e) / η² by reciprocity. (The model of Mitsuba's
-//! `plastic` and `roughplastic` with `nonlinear` set.) White stays white: T(θ_o) is all that comes back.
+//! `plastic` and `roughplastic` with `nonlinear` set.) Smooth, a white base returns exactly the T(θ_o)
+//! that reached it; rough, less, as every model of one bounce between microfacets does.
 
 use super::albedo::{self, SchlickAlbedo};
 use super::coated::Coat;
