@@ -17,9 +17,7 @@ impl Diffuse {
     #[inline]
     pub(super) fn sample(&self, u: [f32; 2]) -> Option<BsdfSample> {
         let direction = cosine_hemisphere(u);
-        // The very rim of the hemisphere has no density.
-        (direction.z > 0.0)
-            .then(|| BsdfSample::reflection(direction, self.reflectance, direction.z * FRAC_1_PI))
+        Some(BsdfSample::reflection(direction, self.reflectance, direction.z * FRAC_1_PI))
     }
 
     #[inline]

@@ -18,11 +18,13 @@ pub fn concentric_disk(u: [f32; 2]) -> Vec2 {
     if steep { radius * Vec2::new(sin, cos) } else { radius * Vec2::new(cos, sin) }
 }
 
-/// A direction of the upper hemisphere with density [`cosine_hemisphere_pdf`].
+/// A direction of the upper hemisphere with density [`cosine_hemisphere_pdf`]. Never in the horizon, where
+/// that is zero: z² is at least the rounding of 1 - x² - y².
 #[inline]
 pub fn cosine_hemisphere(u: [f32; 2]) -> Vec3 {
+    const LEAST: f32 = f32::EPSILON / 2.0;
     let d = concentric_disk(u);
-    d.extend(libm::sqrtf((1.0 - d.length_squared()).max(0.0)))
+    d.extend(libm::sqrtf((1.0 - d.length_squared()).max(LEAST)))
 }
 
 /// cos θ / π.
