@@ -2,8 +2,19 @@
 //! A target panics where something is wrong, and returns otherwise.
 #![forbid(unsafe_code)]
 
+pub mod bsdf;
 pub mod bvh;
+#[cfg(feature = "app")]
+pub mod image_input;
+pub mod lanes;
+#[cfg(feature = "app")]
+pub mod mtl;
 mod numbers;
+#[cfg(feature = "app")]
+pub mod obj;
+pub mod sampling;
+#[cfg(feature = "app")]
+pub mod scene_file;
 
 /// What is fuzzed: a name and its function.
 pub struct Target {
@@ -14,4 +25,17 @@ pub struct Target {
 }
 
 /// Every target.
-pub const TARGETS: &[Target] = &[Target { name: "bvh", run: bvh::run }];
+pub const TARGETS: &[Target] = &[
+    Target { name: "bsdf", run: bsdf::run },
+    Target { name: "bvh", run: bvh::run },
+    #[cfg(feature = "app")]
+    Target { name: "image_input", run: image_input::run },
+    Target { name: "lanes", run: lanes::run },
+    #[cfg(feature = "app")]
+    Target { name: "mtl", run: mtl::run },
+    #[cfg(feature = "app")]
+    Target { name: "obj", run: obj::run },
+    Target { name: "sampling", run: sampling::run },
+    #[cfg(feature = "app")]
+    Target { name: "scene_file", run: scene_file::run },
+];

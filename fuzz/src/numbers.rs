@@ -36,3 +36,13 @@ const SPECIAL: [f32; 12] = [
     1.0,
     -1.0,
 ];
+
+/// A number in [0, 1), often at the ends.
+pub(crate) fn fraction(input: &mut Unstructured) -> Result<f32> {
+    const BELOW_ONE: f32 = 1.0 - f32::EPSILON / 2.0;
+    let bits: u16 = input.arbitrary()?;
+    Ok(match bits % 16 {
+        0 => [0.0, BELOW_ONE, 0.5, 1e-10][usize::from(bits >> 4) % 4],
+        _ => f32::from(bits) / 65536.0,
+    })
+}
