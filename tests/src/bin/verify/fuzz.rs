@@ -30,7 +30,7 @@ pub(crate) fn smoke(project: &Project) -> Outcome {
             run(&mut fresh_cargo(&folder, &line))?;
         } else {
             let line = format!(
-                "cargo run --quiet --release --locked --no-default-features --bin mutate -- \
+                "cargo run --quiet --release --locked --target-dir target/stable --no-default-features --features app --bin mutate -- \
                  {target} --seconds {SECONDS} --seed 1"
             );
             println!("{}", output(&mut fresh_cargo(&folder, &line))?);

@@ -12,7 +12,7 @@ const CLIPPY: &[(&str, &str)] = &[
     // Without the default features: what a microcontroller gets.
     (".", "-p halflight-core -p halflight-simd --lib"),
     ("tests/targets", "-p tiny -p host"),
-    ("fuzz", "--no-default-features --lib --bins"),
+    ("fuzz", "--no-default-features --features app --lib --bins"),
 ];
 
 pub(crate) fn fmt(project: &Project) -> Outcome {

@@ -54,15 +54,22 @@ const RULES: &[Rule] = &[
 const MAX_LINES: usize = 700;
 
 pub(crate) fn check(project: &Project) -> Outcome {
-    let mut complaints = Vec::new();
     let mut files = Vec::new();
     for folder in ["simd", "core", "std-app", "tests", "fuzz"] {
         rust_files(&project.root.join(folder), &mut files);
     }
     files.sort();
+    let mut texts = Vec::new();
     for path in &files {
+        let text = fs::read_to_string(path);
+        texts.push(text.map_err(|error| Failure::Failed(format!("{}: {error}", path.display())))?);
+    }
+    let test_modules: Vec<PathBuf> =
+        files.iter().zip(&texts).flat_map(|(path, text)| test_modules(path, text)).collect();
+
+    let mut complaints = Vec::new();
+    for (path, text) in files.iter().zip(&texts) {
         let name = path.strip_prefix(&project.root).unwrap_or(path).to_string_lossy().replace('\\', "/");
-        let text = fs::read_to_string(path).map_err(|e| Failure::Failed(format!("{name}: {e}")))?;
         let lines = text.lines().count();
         if lines > MAX_LINES {
             complaints.push(format!("{name}: {lines} lines, {MAX_LINES} at most"));
@@ -70,16 +77,9 @@ pub(crate) fn check(project: &Project) -> Outcome {
         if !text.starts_with("//!") {
             complaints.push(format!("{name}:1: the file does not open with `//!` and what lives in it"));
         }
-        let tests = ["core/src", "simd/src"].iter().any(|folder| name.starts_with(folder))
-            && (name.ends_with("tests.rs") || name.contains("/tests/"));
-        for (number, line) in if tests { Vec::new() } else { code(&text) } {
-            for rule in RULES.iter().filter(|rule| rule.folders.iter().any(|folder| name.starts_with(folder)))
-            {
-                let found = rule.words.iter().find(|word| line.contains(**word));
-                if let Some(word) = found.filter(|_| !rule.unless.iter().any(|word| line.contains(word))) {
-                    complaints.push(format!("{name}:{number}: `{}`: {}", word.trim(), rule.because));
-                }
-            }
+        if !test_modules.iter().any(|module| path.starts_with(module) || *path == module.with_extension("rs"))
+        {
+            complaints.extend(broken_rules(&name, text));
         }
     }
     complaints.iter().for_each(|complaint| println!("{complaint}"));
@@ -87,6 +87,35 @@ pub(crate) fn check(project: &Project) -> Outcome {
         0 => Ok(format!("{} files", files.len())),
         count => Err(Failure::Failed(format!("{count} complaints"))),
     }
+}
+
+/// A complaint for each line of the file that breaks a rule.
+fn broken_rules(name: &str, text: &str) -> Vec<String> {
+    let mut complaints = Vec::new();
+    let rules = RULES.iter().filter(|rule| rule.folders.iter().any(|folder| name.starts_with(folder)));
+    for rule in rules {
+        for (number, line) in code(text) {
+            let found = rule.words.iter().find(|word| line.contains(**word));
+            if let Some(word) = found.filter(|_| !rule.unless.iter().any(|word| line.contains(word))) {
+                complaints.push(format!("{name}:{number}: `{}`: {}", word.trim(), rule.because));
+            }
+        }
+    }
+    complaints
+}
+
+/// Modules in files of their own that only tests have: their paths without `.rs`.
+fn test_modules(path: &Path, text: &str) -> Vec<PathBuf> {
+    let stem = path.file_stem().unwrap_or_default();
+    let own = path.parent().unwrap_or(path);
+    let root = ["mod", "lib", "main"].iter().any(|name| stem == *name);
+    let folder = if root { own.to_owned() } else { own.join(stem) };
+    let lines: Vec<&str> = text.lines().map(str::trim).collect();
+    let pairs = lines.windows(2).filter(|pair| pair[0] == "#[cfg(test)]");
+    pairs
+        .filter_map(|pair| pair[1].strip_prefix("mod ")?.strip_suffix(';'))
+        .map(|name| folder.join(name))
+        .collect()
 }
 
 /// The numbered lines of code: without comments, and without what only tests or `std` builds have.
@@ -135,5 +164,12 @@ mod tests {
         let text =
             "let a = 1; // panic!\n#[cfg(test)]\nmod tests {\n    panic!()\n}\n#[cfg(test)]\nuse x;\nlet b;";
         assert_eq!(code(text), [(1, "let a = 1;"), (8, "let b;")]);
+    }
+
+    #[test]
+    fn a_module_of_tests_in_its_own_file_is_found() {
+        let text = "mod a;\n#[cfg(test)]\nmod b;\n#[cfg(test)]\nmod tests {\n}\n";
+        assert_eq!(test_modules(Path::new("x/mod.rs"), text), [Path::new("x/b")]);
+        assert_eq!(test_modules(Path::new("x/y.rs"), text), [Path::new("x/y/b")]);
     }
 }
