@@ -59,8 +59,8 @@ const MASKS: [Binary<bool>; 6] = [
     ("le", |a, b| a <= b),
     ("eq", |a, b| a == b),
     ("not lt", |a, b| !matches!(a.partial_cmp(&b), Some(core::cmp::Ordering::Less))),
-    ("lt or eq", |a, b| a < b || a == b),
-    ("le and eq", |a, b| a <= b && a == b),
+    ("lt or eq", |a, b| a <= b),
+    ("le and eq", |a, b| a == b),
 ];
 
 #[inline(always)]
