@@ -1,2 +1,3 @@
 //! Shared helpers of the cross-crate tests.
 pub mod scenes;
+pub mod statistics;

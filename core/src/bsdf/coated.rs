@@ -52,7 +52,7 @@ pub(super) fn sample(coat: &impl Coat, wo: Vec3, u: [f32; 3]) -> Option<BsdfSamp
         return weighted(coat, wo, wi, transmittance_o, p);
     }
     let wi = cosine_hemisphere([u[0], u[1]]);
-    if smooth {
+    if smooth && wi.z > 0.0 {
         // D, the cosine and π cancel.
         let weight = coat.base() * transmittance_o * coat.transmittance(wi.z) / (1.0 - p);
         return Some(BsdfSample::reflection(wi, weight, (1.0 - p) * wi.z * FRAC_1_PI));

@@ -17,7 +17,9 @@ impl Diffuse {
     #[inline]
     pub(super) fn sample(&self, u: [f32; 2]) -> Option<BsdfSample> {
         let direction = cosine_hemisphere(u);
-        Some(BsdfSample::reflection(direction, self.reflectance, direction.z * FRAC_1_PI))
+        // The very rim of the hemisphere has no density.
+        (direction.z > 0.0)
+            .then(|| BsdfSample::reflection(direction, self.reflectance, direction.z * FRAC_1_PI))
     }
 
     #[inline]

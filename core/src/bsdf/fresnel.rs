@@ -13,7 +13,12 @@ pub fn dielectric(c: f32, eta: f32) -> f32 {
     if !(g2 > 0.0) {
         return 1.0;
     }
-    let g = sqrt(g2);
+    between(c, sqrt(g2), eta)
+}
+
+/// The same where g = eta cos θ_t is known: no cancellation near the edge of total reflection.
+#[inline]
+pub fn between(c: f32, g: f32, eta: f32) -> f32 {
     let r_s = (c - g) / (c + g);
     let eta2_c = eta * eta * c;
     let r_p = (eta2_c - g) / (eta2_c + g);

@@ -23,8 +23,8 @@ pub struct Glossy {
     alpha: f32,
 }
 
-/// Guards a division; below what f32 leaves of 1 - Ē.
-const LEAST_MEAN: f32 = 1e-8;
+/// Less than this passes the coat at grazing angles only: what the base would add there is noise, and is lost.
+const LEAST_MEAN: f32 = 0.02;
 
 impl Glossy {
     /// From colours in 0 … 1, alpha as in [`super::Conductor`], `metallic` 0 … 1.
@@ -33,12 +33,16 @@ impl Glossy {
         let metallic = unit(metallic);
         let mean = Rgb::ONE - SchlickAlbedo::mean(alpha).of(specular);
         Self {
-            // Nothing passes a coat that reflects all: any base will do.
             base: color * (1.0 - metallic) / mean.max(Rgb::splat(LEAST_MEAN)),
             specular,
             f0: specular.lerp(color, metallic),
             alpha,
         }
+    }
+
+    /// GGX alpha of the coat; 0 is smooth.
+    pub fn alpha(&self) -> f32 {
+        self.alpha
     }
 
     pub(super) fn is_delta(&self) -> bool {

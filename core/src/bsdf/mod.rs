@@ -87,6 +87,7 @@ impl Bsdf {
     /// lobe. `None`: absorbed.
     #[inline]
     pub fn sample<F: Features>(&self, wo: Vec3, u: [f32; 3]) -> Option<BsdfSample> {
+        let wo = above_horizon(wo);
         match self {
             Bsdf::Diffuse(b) => b.sample([u[0], u[1]]),
             Bsdf::Mirror(b) if F::GLOSSY => b.sample(wo),
@@ -103,6 +104,7 @@ impl Bsdf {
     /// that only a delta lobe connects.
     #[inline]
     pub fn evaluate<F: Features>(&self, wo: Vec3, wi: Vec3) -> (Rgb, f32) {
+        let wo = above_horizon(wo);
         match self {
             Bsdf::Diffuse(b) => b.evaluate(wi),
             Bsdf::Conductor(b) if F::GLOSSY => b.evaluate(wo, wi),
@@ -134,6 +136,13 @@ impl Bsdf {
 
 // A hit carries one through the shading stages: keep it within a cache line.
 const _: () = assert!(size_of::<Bsdf>() <= 64);
+
+/// `wo` no nearer to the horizon than directions in f32 are known: the squares of half-vectors stay normal.
+#[inline]
+fn above_horizon(wo: Vec3) -> Vec3 {
+    const RESOLUTION: f32 = 1e-7;
+    Vec3::new(wo.x, wo.y, wo.z.max(RESOLUTION))
+}
 
 /// Square root, correctly rounded: one instruction where the processor has one.
 #[inline]

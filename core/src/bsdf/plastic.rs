@@ -4,11 +4,13 @@
 //! base = colour / (1 - colour · R_i) / η²
 //!
 //! with R_i the mean internal reflectance: 1 - R_i = (1 - R_e) / η² by reciprocity. (The model of Mitsuba's
-//! `plastic` and `roughplastic` with `nonlinear` set.) White stays white: T(θ_o) is all that comes back.
+//! `plastic` and `roughplastic` with `nonlinear` set.) Smooth, a white base returns exactly the T(θ_o)
+//! that reached it; rough, less, as every model of one bounce between microfacets does.
 
 use super::albedo::{self, SchlickAlbedo};
 use super::coated::Coat;
-use super::{fresnel, resolve::unit};
+use super::fresnel;
+use super::resolve::{GREATEST_INDEX, unit};
 use crate::Rgb;
 
 /// A dielectric coat over a diffuse base, mixed with metal. See the module.
@@ -35,7 +37,7 @@ impl Plastic {
     #[inline]
     pub fn new(color: Rgb, specular: Rgb, alpha: f32, metallic: f32, eta: f32) -> Self {
         let metallic = unit(metallic);
-        let eta = if eta.is_finite() { eta.clamp(1.0, 100.0) } else { 1.0 };
+        let eta = if eta.is_finite() { eta.clamp(1.0, GREATEST_INDEX) } else { 1.0 };
         let f0 = fresnel::normal_incidence(eta);
         let tint = if f0 > 0.0 { (specular / f0).min(Rgb::ONE) } else { Rgb::ONE };
         let internal = albedo::internal_reflectance(alpha, eta);
@@ -48,6 +50,11 @@ impl Plastic {
             eta,
             f0,
         }
+    }
+
+    /// GGX alpha of the coat; 0 is smooth.
+    pub fn alpha(&self) -> f32 {
+        self.alpha
     }
 
     pub(super) fn is_delta(&self) -> bool {

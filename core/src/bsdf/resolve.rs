@@ -74,7 +74,8 @@ fn alpha(roughness: f32) -> f32 {
 
 #[inline]
 fn dielectric(ior: f32, front: bool, tint: Rgb, alpha: f32) -> Bsdf {
-    let ior = if ior > 0.0 && ior.is_finite() { ior.clamp(0.01, 100.0) } else { 1.0 };
+    let ior =
+        if ior > 0.0 && ior.is_finite() { ior.clamp(1.0 / GREATEST_INDEX, GREATEST_INDEX) } else { 1.0 };
     let eta = if front { ior } else { 1.0 / ior };
     // A rough boundary scatters what it transmits by alpha (eta - 1) only.
     if alpha * (eta - 1.0).abs() < MIN_SCATTER {
@@ -83,6 +84,9 @@ fn dielectric(ior: f32, front: bool, tint: Rgb, alpha: f32) -> Bsdf {
         Bsdf::RoughDielectric(RoughDielectric { eta, alpha, tint })
     }
 }
+
+/// Nothing transparent comes near; beyond, refraction from inside multiplies the rounding of a direction.
+pub(super) const GREATEST_INDEX: f32 = 20.0;
 
 /// The narrowest lobe of transmitted light that still counts as rough: its half-vector is a difference
 /// whose error, 1e-7, must be small against it.

@@ -77,7 +77,7 @@ impl RoughDielectric {
         if !(wi.z < 0.0 && c > 0.0 && c_i > 0.0) {
             return (Rgb::ZERO, 0.0);
         }
-        let reflectance = fresnel::dielectric(c, self.eta);
+        let reflectance = fresnel::between(c, self.eta * c_i, self.eta);
         let p = reflection_probability(reflectance, self.tint);
         let density = ggx.visible_density(wo, h, c) * self.refraction_jacobian(c, c_i);
         // Walter 2007, eq. 21, over eta²: radiance.

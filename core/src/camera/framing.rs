@@ -3,7 +3,7 @@
 use super::Camera;
 use crate::geometry::Bounds;
 use crate::scene::Mesh;
-use glam::Vec3;
+use glam::{Vec2, Vec3};
 
 /// Vertical field of view in degrees: that of the camera of the measured Cornell box (a lens of 35 mm
 /// over a film of 25 mm).
@@ -22,38 +22,79 @@ const VIEWS: [(Vec3, Vec3); 6] = [
     (Vec3::Y, Vec3::Z),
 ];
 
+/// Pixels across and down of the pictures that views are judged by.
+const GRID: usize = 24;
+
+/// A later view must see this much more than an earlier one.
+const CLEARLY: f32 = 1.05;
+
+/// What a view along the vertical is worth: people stand.
+const VERTICAL: f32 = 0.6;
+
 impl Camera {
-    /// Frames all of `mesh`, looking along one of the six axis directions: the one for which the area of
-    /// the triangles that face the camera exceeds most the area of those that turn their back and hide
-    /// what is behind them. An open box is seen through its opening.
+    /// Frames all of `mesh`, looking along one of the six axis directions: the one from which the largest
+    /// area of surface is visible. An open box is seen through its opening, whichever way its walls are
+    /// wound.
     pub fn framing(mesh: &Mesh) -> Camera {
         let bounds =
             Bounds::around(mesh.positions.iter().map(|&p| p.into()).filter(|p: &Vec3| p.is_finite()));
         if bounds.is_empty() {
             return Camera::look_at(Vec3::Z, Vec3::ZERO, Vec3::Y, FIELD_OF_VIEW);
         }
-        let cameras = VIEWS.map(|(forward, up)| in_front_of(&bounds, forward, up));
-        let mut seen = [0.0f64; VIEWS.len()];
-        let size = bounds.extent().max_element().max(f32::MIN_POSITIVE);
-        for index in 0..mesh.triangles.len() as u32 {
-            let [a, b, c] = mesh.corners(index).map(|p| (p - bounds.center()) / size);
-            let normal = (b - a).cross(c - a);
-            if normal.is_finite() {
-                for (seen, camera) in seen.iter_mut().zip(&cameras) {
-                    let to_camera = (camera.eye - bounds.center()) / size - a;
-                    *seen += f64::from(normal.length().copysign(normal.dot(to_camera)));
-                }
+        let mut best = (0.0, in_front_of(&bounds, VIEWS[0].0, VIEWS[0].1));
+        for (forward, up) in VIEWS {
+            let camera = in_front_of(&bounds, forward, up);
+            let worth = if forward.y == 0.0 { 1.0 } else { VERTICAL };
+            let seen = worth * visible_area(&camera, mesh, &bounds);
+            if seen > CLEARLY * best.0 {
+                best = (seen, camera);
             }
         }
-        // A later view must see clearly more than an earlier one, not more by rounding.
-        let best = (1..VIEWS.len())
-            .fold(0, |best, i| if seen[i] > seen[best] + TIE * seen[best].abs() { i } else { best });
-        cameras[best]
+        best.1
     }
 }
 
-/// Relative difference of areas below which two views see the same.
-const TIE: f64 = 1e-3;
+/// Area of what `camera`, which stands outside `bounds`, sees first, in squares of their longest edge: a small
+/// depth buffer.
+fn visible_area(camera: &Camera, mesh: &Mesh, bounds: &Bounds) -> f32 {
+    let size = bounds.extent().max_element().max(f32::MIN_POSITIVE);
+    let half = 0.5 * GRID as f32;
+    let focal = half / camera.tan_half_fov;
+    let mut nearest = [(0.0f32, 0.0f32); GRID * GRID]; // (1 / depth, area)
+    for index in 0..mesh.triangles.len() as u32 {
+        let [a, b, c] = mesh.corners(index).map(|p| (p - camera.eye) / size);
+        let Some(normal) = (b - a).cross(c - a).try_normalize() else { continue };
+        let height = normal.dot(a).abs();
+        let inverse = [a, b, c].map(|v| 1.0 / v.dot(camera.forward));
+        let at = |v: Vec3, i: f32| Vec2::new(v.dot(camera.right), -v.dot(camera.up)) * (focal * i) + half;
+        let [p, q, r] = [at(a, inverse[0]), at(b, inverse[1]), at(c, inverse[2])];
+        let whole = (q - p).perp_dot(r - p);
+        if whole == 0.0 || !whole.is_finite() || inverse.iter().any(|&i| i <= 0.0) {
+            continue;
+        }
+        let (low, high) = (p.min(q).min(r).max(Vec2::ZERO), p.max(q).max(r));
+        // Casts saturate; one pixel more than needed is tested and found outside.
+        for y in low.y as usize..(high.y as usize + 1).min(GRID) {
+            for x in low.x as usize..(high.x as usize + 1).min(GRID) {
+                let pixel = Vec2::new(x as f32 + 0.5, y as f32 + 0.5);
+                let u = (pixel - p).perp_dot(r - p) / whole;
+                let v = (q - p).perp_dot(pixel - p) / whole;
+                if u < 0.0 || v < 0.0 || u + v > 1.0 {
+                    continue;
+                }
+                let inverse_depth = (1.0 - u - v) * inverse[0] + u * inverse[1] + v * inverse[2];
+                let place = &mut nearest[y * GRID + x];
+                if inverse_depth > place.0 {
+                    // A pixel of area 1 / focal² at depth 1 shows z³ / height of a plane; of one that is
+                    // seen at a grazing angle no more than ten times its own cross section.
+                    let depth = 1.0 / inverse_depth;
+                    *place = (inverse_depth, depth * depth * depth / height.max(0.1 * depth));
+                }
+            }
+        }
+    }
+    nearest.iter().map(|(_, area)| area).sum::<f32>() / (focal * focal)
+}
 
 fn in_front_of(bounds: &Bounds, forward: Vec3, up: Vec3) -> Camera {
     let camera = Camera::look_at(-forward, Vec3::ZERO, up, FIELD_OF_VIEW);
@@ -72,12 +113,12 @@ mod tests {
     use crate::scene::Triangle;
     use std::vec::Vec;
 
-    /// Five walls of the unit cube that face inwards; the sixth, towards -z or +z, is open.
-    fn open_box(open: f32) -> (Vec<[f32; 3]>, Vec<Triangle>) {
+    /// Five walls of the unit cube; the sixth, towards -z or +z, is open.
+    fn open_box(open: f32, inwards: bool) -> (Vec<[f32; 3]>, Vec<Triangle>) {
         let (mut positions, mut triangles) = (Vec::new(), Vec::new());
         for axis in [Vec3::X, Vec3::NEG_X, Vec3::Y, Vec3::NEG_Y, Vec3::Z * -open] {
             let (u, v) = axis.any_orthonormal_pair();
-            let (u, v) = if u.cross(v).dot(axis) > 0.0 { (v, u) } else { (u, v) };
+            let (u, v) = if (u.cross(v).dot(axis) > 0.0) == inwards { (v, u) } else { (u, v) };
             let first = positions.len() as u32;
             positions.extend([-u - v, u - v, u + v, v - u].map(|p| ((p + axis) * 0.5 + 3.0).to_array()));
             let quad = [[0, 1, 2], [0, 2, 3]];
@@ -88,8 +129,8 @@ mod tests {
 
     #[test]
     fn an_open_box_is_seen_through_its_opening() {
-        for open in [-1.0, 1.0] {
-            let (positions, triangles) = open_box(open);
+        for (open, inwards) in [(-1.0, true), (1.0, true), (-1.0, false), (1.0, false)] {
+            let (positions, triangles) = open_box(open, inwards);
             let mesh = Mesh { positions: &positions, triangles: &triangles, ..Mesh::default() };
             let camera = Camera::framing(&mesh);
             assert!(camera.forward.distance(Vec3::Z * -open) < 1e-6, "{camera:?}");

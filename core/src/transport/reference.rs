@@ -96,7 +96,7 @@ pub fn radiance(
         }
 
         // The path goes on where the BSDF sends it.
-        let [u, v] = sampler.pair(first + dimension::BSDF);
+        let [u, v] = dimension::scattering(&sampler, segments);
         let lobe = sampler.single(first + dimension::LOBE);
         let Some(scattered) = bsdf.sample::<All>(wo, [u, v, lobe]) else { break };
         let direction = point.frame.to_world(scattered.direction);

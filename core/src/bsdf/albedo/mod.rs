@@ -33,6 +33,16 @@ fn place(x: f32, nodes: usize) -> Place {
     (below, at - below as f32)
 }
 
+/// Where `alpha` lies among the roughnesses. The differences begin with alpha², the fourth power of the
+/// axis: so does the way from the smooth coat to the first node.
+#[inline]
+fn roughness(alpha: f32) -> Place {
+    match place(sqrt(alpha), ROUGHNESSES) {
+        (0, t) => (0, t * t * t * t),
+        other => other,
+    }
+}
+
 #[inline]
 fn lerp(a: f32, b: f32, t: f32) -> f32 {
     a + (b - a) * t
@@ -68,7 +78,7 @@ impl SchlickAlbedo {
         if alpha == 0.0 {
             return Self { white: 1.0, edge: smooth };
         }
-        let at = (place(sqrt(alpha), ROUGHNESSES), place(sqrt(c), COSINES));
+        let at = (roughness(alpha), place(sqrt(c), COSINES));
         Self {
             white: unit(1.0 + STEP * across(&data::WHITE, at.0, at.1)),
             edge: unit(smooth + STEP * across(&data::EDGE, at.0, at.1)),
@@ -83,7 +93,7 @@ impl SchlickAlbedo {
         if alpha == 0.0 {
             return Self { white: 1.0, edge: SMOOTH };
         }
-        let at = place(sqrt(alpha), ROUGHNESSES);
+        let at = roughness(alpha);
         Self {
             white: unit(1.0 + STEP * along(&data::WHITE_MEAN, at)),
             edge: unit(SMOOTH + STEP * along(&data::EDGE_MEAN, at)),
@@ -106,7 +116,7 @@ pub(super) fn transmittance(c: f32, alpha: f32, eta: f32) -> f32 {
         return smooth;
     }
     let (k, t) = amplitude(eta);
-    let at = (place(sqrt(alpha), ROUGHNESSES), place(sqrt(c), COSINES));
+    let at = (roughness(alpha), place(sqrt(c), COSINES));
     let table = |k: usize| data::TRANSMITTANCE.get(k).map_or(0.0, |table| across(table, at.0, at.1));
     unit(smooth + STEP * lerp(table(k), table(k + 1), t))
 }
@@ -120,8 +130,7 @@ pub(super) fn internal_reflectance(alpha: f32, eta: f32) -> f32 {
     if alpha == 0.0 {
         return smooth;
     }
-    let place = place(sqrt(alpha), ROUGHNESSES);
-    unit(smooth + STEP * across(&data::INTERNAL, amplitude(eta), place))
+    unit(smooth + STEP * across(&data::INTERNAL, amplitude(eta), roughness(alpha)))
 }
 
 #[inline]
