@@ -1,4 +1,21 @@
 //! halflight, the app: files in, pictures and reports out, with the core's passes run on all cores.
+//!
+//! A picture takes four steps: [`load`] a scene, choose a camera, [`drive`] the render, [`save`] the image;
+//! [`compare`] says how far two images are apart.
+//!
+//! ```no_run
+//! use core::sync::atomic::AtomicBool;
+//! use halflight::drive::{Settings, render};
+//! use halflight::{load, save};
+//!
+//! let loaded = load::load("scenes/cornell/cornell.obj".as_ref(), &load::LoadOptions::default())?;
+//! let views = loaded.views();
+//! let scene = views.scene(loaded.camera_or_default());
+//! let interrupt = AtomicBool::new(false);
+//! let result = render(&scene, &Settings::default(), &mut |_| {}, &interrupt)?;
+//! save::write("cornell.png".as_ref(), &result.image)?;
+//! # Ok::<(), Box<dyn core::error::Error>>(())
+//! ```
 #![forbid(unsafe_code)]
 
 pub mod compare;

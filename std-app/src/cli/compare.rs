@@ -1,6 +1,7 @@
 //! `halflight compare`: two picture files, their errors, and a picture of the difference.
 
 use super::failure::Failure;
+use super::say;
 use clap::Args;
 use halflight::compare::{Comparison, compare};
 use halflight::save::{self, Format};
@@ -41,11 +42,7 @@ impl Compare {
         if let Some(output) = &self.output {
             save::write(output, &comparison.picture(&a, &b, Format::of(output)?))?;
         }
-        if self.json {
-            println!("{}", object(&comparison));
-        } else {
-            print!("{}", text(&comparison));
-        }
+        say(&if self.json { object(&comparison).to_string() } else { text(&comparison) });
         Ok(ExitCode::SUCCESS)
     }
 }
@@ -71,7 +68,7 @@ pub(super) fn object(comparison: &Comparison) -> Value {
 pub(super) fn text(comparison: &Comparison) -> String {
     let linear = &comparison.linear;
     let mut text = format!(
-        "relMSE {:.6e}\nMSE    {:.6e}\nRMSE   {:.6e}\nFLIP   {:.6}\nmean   {:.6} against {:.6}{}\n",
+        "relMSE {:.6e}\nMSE    {:.6e}\nRMSE   {:.6e}\nFLIP   {:.6}\nmean   {:.6} against {:.6}{}",
         linear.relmse,
         linear.mse,
         linear.rmse(),
@@ -82,7 +79,7 @@ pub(super) fn text(comparison: &Comparison) -> String {
     );
     for (count, which) in [(linear.non_finite, "picture"), (linear.reference_non_finite, "reference")] {
         if count > 0 {
-            text += &format!("left out: {count} pixels of the {which} are infinite or not a number\n");
+            text += &format!("\nleft out: {count} pixels of the {which} are infinite or not a number");
         }
     }
     text

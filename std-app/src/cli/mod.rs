@@ -2,9 +2,15 @@
 
 mod compare;
 mod failure;
+mod info;
+mod progress;
+mod render;
+mod report;
+mod values;
+mod view;
 
 use clap::{Parser, Subcommand};
-use failure::Failure;
+use std::io::{Write, stdout};
 use std::panic;
 use std::process::ExitCode;
 
@@ -18,23 +24,36 @@ struct Cli {
 
 #[derive(Subcommand)]
 enum Command {
+    Render(Box<render::Render>),
     Compare(compare::Compare),
+    Info(info::Info),
 }
 
 /// Runs the program. The exit codes are a contract: 0 done, 2 usage or bad input, 3 stopped early with a
 /// valid picture saved.
 pub(crate) fn main() -> ExitCode {
-    // Clap prints its own message, and exits with 2 on wrong usage, 0 after help.
-    let Command::Compare(command) = Cli::parse().command;
-    let outcome = panic::catch_unwind(|| command.run()).unwrap_or_else(|_| {
-        Err(Failure::new("the program met an error of its own; the message above says where")
-            .advice("please report it, with the command and the scene"))
-    });
+    // Clap prints its own messages, and exits with 2 on wrong usage, 0 after help.
+    let command = Cli::parse().command;
+    panic::set_hook(Box::new(|panic| eprintln!("halflight met an error of its own: {panic}")));
+    let outcome = panic::catch_unwind(panic::AssertUnwindSafe(|| match command {
+        Command::Render(command) => command.run(),
+        Command::Compare(command) => command.run(),
+        Command::Info(command) => command.run(),
+    }));
     match outcome {
-        Ok(code) => code,
-        Err(failure) => {
-            eprintln!("{failure}");
-            ExitCode::from(2)
-        }
+        Ok(Ok(code)) => return code,
+        Ok(Err(failure)) => eprintln!("{failure}"),
+        Err(_) => eprintln!("  tip: please report it, with the command and the scene; no file was changed"),
     }
+    ExitCode::from(2)
+}
+
+/// Prints a result. Nobody is listening any more where that fails.
+fn say(text: &str) {
+    let _ = writeln!(stdout(), "{text}");
+}
+
+/// Prints what a person should know, on stderr.
+fn warn(text: &str) {
+    eprintln!("note: {text}");
 }

@@ -213,8 +213,11 @@ impl WithFeatures for Render<'_> {
         let mut counters = Counters::default();
         let mut error = None;
         while let Some(samples) = rounds.next(start.elapsed().as_secs_f64(), error) {
-            counters += workers.run(&tracer, samples.clone(), &mut film, &mut scratch_lines, interrupt)?;
-            if interrupt.load(Ordering::Relaxed) {
+            // The first round is finished whatever happens, so that every pixel has something to show.
+            let first = samples.start == 0;
+            let heeded = if first { &AtomicBool::new(false) } else { interrupt };
+            counters += workers.run(&tracer, samples.clone(), &mut film, &mut scratch_lines, heeded)?;
+            if interrupt.load(Ordering::Relaxed) && !first {
                 break;
             }
             rounds.completed(samples, start.elapsed().as_secs_f64());

@@ -1,0 +1,57 @@
+//! Progress on stderr: a bar with the time left on a terminal, a plain line every few seconds elsewhere.
+
+use super::values::readable_seconds;
+use halflight::drive::Progress;
+use indicatif::{ProgressBar, ProgressStyle};
+use std::io::{IsTerminal, stderr};
+
+/// Seconds between plain lines.
+const EVERY: f64 = 5.0;
+
+/// Steps of the bar.
+const STEPS: u64 = 1000;
+
+/// Tells how a render goes.
+pub(super) struct Teller {
+    bar: Option<ProgressBar>,
+    told: f64,
+}
+
+impl Teller {
+    pub(super) fn new() -> Self {
+        let style = ProgressStyle::with_template("{bar:30} {percent:>3} %  {msg}");
+        let bar = stderr().is_terminal().then(|| ProgressBar::new(STEPS));
+        Self { bar: bar.map(|bar| bar.with_style(style.unwrap_or(ProgressStyle::default_bar()))), told: 0.0 }
+    }
+
+    /// After each round.
+    pub(super) fn tell(&mut self, progress: &Progress) {
+        let share = progress.seconds_left.map(|left| progress.seconds / (progress.seconds + left).max(1e-9));
+        if let Some(bar) = &self.bar {
+            bar.set_position((share.unwrap_or(0.0) * STEPS as f64) as u64);
+            bar.set_message(words(progress));
+        } else if progress.seconds >= self.told + EVERY {
+            self.told = progress.seconds;
+            eprintln!("{:>3.0} %  {}", 100.0 * share.unwrap_or(0.0), words(progress));
+        }
+    }
+
+    /// Takes the bar away.
+    pub(super) fn end(self) {
+        if let Some(bar) = self.bar {
+            bar.finish_and_clear();
+        }
+    }
+}
+
+fn words(progress: &Progress) -> String {
+    let mut words = format!("{} spp", progress.spp);
+    if let Some(error) = progress.error {
+        words += &format!(", relMSE {:.2e}", error.relmse);
+    }
+    words += &format!(", {}", readable_seconds(progress.seconds));
+    if let Some(left) = progress.seconds_left {
+        words += &format!(", {} left", readable_seconds(left));
+    }
+    words
+}

@@ -1,0 +1,133 @@
+//! What is said when a render is done: the object of `--json`, which scripts rely on (docs/cli.md), and the
+//! lines for a person.
+
+use super::compare as comparing;
+use super::values::{readable_bytes, readable_seconds};
+use halflight::compare::Comparison;
+use halflight::drive::{Ending, ErrorEstimate, RenderResult, Settings};
+use halflight_core::census::Census;
+use halflight_core::scene::Scene;
+use serde_json::{Map, Value, json};
+use std::path::PathBuf;
+
+/// A render that is done.
+pub(super) struct Report<'a> {
+    pub(super) scene: &'a Scene<'a>,
+    pub(super) settings: &'a Settings,
+    pub(super) result: &'a RenderResult,
+    pub(super) comparison: Option<&'a Comparison>,
+    pub(super) outputs: &'a [PathBuf],
+    pub(super) load_seconds: f64,
+    pub(super) total_seconds: f64,
+}
+
+impl Report<'_> {
+    pub(super) fn object(&self) -> Value {
+        let (result, settings) = (self.result, self.settings);
+        let plan = Census::of(self.scene).plan();
+        let left_out: Vec<Value> =
+            plan.left_out().map(|(what, why)| json!({ "what": what, "why": why })).collect();
+        let memory: Map<String, Value> =
+            result.memory.iter().map(|part| (part.structure.into(), part.bytes.into())).collect();
+        let dropped = &result.counters.dropped;
+        json!({
+            "method": plan.method,
+            "width": settings.width,
+            "height": settings.height,
+            "spp": result.spp,
+            "rounds": result.rounds,
+            "seed": settings.seed,
+            "threads": result.threads,
+            "level": settings.level.name(),
+            "ending": match result.ending {
+                Ending::Done => "done",
+                Ending::Interrupted => "interrupted",
+            },
+            "seconds": {
+                "load": self.load_seconds,
+                "build": result.seconds.build,
+                "render": result.seconds.render,
+                "total": self.total_seconds,
+            },
+            "rays": result.counters.rays + result.counters.shadow_rays,
+            "shadow_rays": result.counters.shadow_rays,
+            "paths": result.counters.paths,
+            "mean_radiance": result.image.mean(),
+            "error": self.error(),
+            "dropped": {
+                "nan": dropped.nan,
+                "infinite": dropped.infinite,
+                "negative": dropped.negative,
+                "unfinished": dropped.unfinished,
+            },
+            "memory": memory,
+            "left_out": left_out,
+            "outputs": self.outputs,
+        })
+    }
+
+    /// Against the reference where there is one, else as estimated; then `estimate` has the estimate too.
+    fn error(&self) -> Value {
+        let estimate = |against| match self.result.error {
+            Some(ErrorEstimate { relmse, lower, upper }) => {
+                json!({ "relmse": relmse, "interval": [lower, upper], "against": against })
+            }
+            None => json!({ "relmse": null, "interval": null, "against": against }),
+        };
+        let Some(comparison) = self.comparison else { return estimate("estimate") };
+        let mut error = comparing::object(comparison);
+        error["interval"] = Value::Null;
+        error["against"] = "reference".into();
+        error["estimate"] = estimate("estimate");
+        error
+    }
+
+    pub(super) fn text(&self) -> String {
+        let (result, settings) = (self.result, self.settings);
+        let mut lines = Vec::new();
+        for output in self.outputs {
+            lines.push(format!("saved  {}", output.display()));
+        }
+        let early = if result.ending == Ending::Interrupted { ", stopped early" } else { "" };
+        let (width, height, spp) = (settings.width, settings.height, result.spp);
+        lines.push(format!("image  {width}x{height}, {spp} samples per pixel{early}"));
+        lines.push(match result.error {
+            Some(ErrorEstimate { relmse, lower, upper }) => {
+                format!("error  relMSE {relmse:.3e} (95 %: {lower:.3e} to {upper:.3e}), estimated from its own noise")
+            }
+            None => "error  unknown: it takes two samples per pixel and some light".into(),
+        });
+        if let Some(comparison) = self.comparison {
+            lines.extend(comparing::text(comparison).lines().map(|line| format!("       {line}")));
+        }
+        let rays = result.counters.rays + result.counters.shadow_rays;
+        lines.push(format!(
+            "time   {} rendering, {} building, {} loading; {:.1} million rays/s on {} ({}, {})",
+            readable_seconds(result.seconds.render),
+            readable_seconds(result.seconds.build),
+            readable_seconds(self.load_seconds),
+            rays as f64 / result.seconds.render.max(1e-9) * 1e-6,
+            plural(result.threads, "thread"),
+            Census::of(self.scene).plan().method,
+            settings.level.name(),
+        ));
+        lines.push(format!("memory {}", readable_bytes(result.memory.iter().map(|part| part.bytes).sum())));
+        let dropped = &result.counters.dropped;
+        if dropped.total() > 0 {
+            lines.push(format!(
+                "dropped {} of {} samples: {} not a number, {} infinite, {} negative, {} unfinished",
+                dropped.total(),
+                result.counters.paths,
+                dropped.nan,
+                dropped.infinite,
+                dropped.negative,
+                dropped.unfinished
+            ));
+        }
+        lines.join("\n")
+    }
+}
+
+fn plural(count: usize, noun: &str) -> String {
+    format!("{count} {noun}{}", if count == 1 { "" } else { "s" })
+}

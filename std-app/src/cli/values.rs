@@ -1,0 +1,164 @@
+//! Values of flags as people write them: `1,2,3`, `640x480`, `90s`, `512M`.
+
+use core::str::FromStr;
+
+/// Three numbers, `X,Y,Z`.
+pub(super) fn vector(text: &str) -> Result<[f64; 3], String> {
+    let numbers = text.split(',').map(|number| finite(number.trim())).collect::<Result<Vec<_>, _>>()?;
+    numbers.try_into().map_err(|_| "three numbers are expected, as in 0,1.5,-2".into())
+}
+
+/// Radius of the lens and, where given, the distance of what is sharp: `RADIUS[,DISTANCE]`.
+pub(super) fn lens(text: &str) -> Result<Lens, String> {
+    let (radius, distance) = match text.split_once(',') {
+        Some((radius, distance)) => (radius, Some(positive(distance.trim())?)),
+        None => (text, None),
+    };
+    let radius = finite(radius.trim())?;
+    if radius < 0.0 {
+        return Err("a lens has no negative radius".into());
+    }
+    Ok(Lens { radius, distance })
+}
+
+/// See [`lens`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Lens {
+    pub(super) radius: f64,
+    pub(super) distance: Option<f64>,
+}
+
+/// Vertical field of view in degrees.
+pub(super) fn degrees(text: &str) -> Result<f64, String> {
+    let degrees = finite(text)?;
+    let usable = degrees > 0.0 && degrees < 178.0;
+    usable.then_some(degrees).ok_or("a field of view is more than 0 and less than 178 degrees".into())
+}
+
+/// Width and height in pixels, `WxH`.
+pub(super) fn size(text: &str) -> Result<[u32; 2], String> {
+    let side = |text: &str| text.parse().ok().filter(|side| (1..=MAX_SIDE).contains(side));
+    text.split_once(['x', 'X'])
+        .and_then(|(width, height)| Some([side(width)?, side(height)?]))
+        .filter(|[width, height]| *width as usize * *height as usize <= halflight::save::MAX_PIXELS)
+        .ok_or(format!(
+            "width and height are expected, as in 640x480; at most {MAX_SIDE} a side and 2^28 pixels"
+        ))
+}
+
+/// Longest side of a picture in pixels: what formats and raster coordinates hold.
+const MAX_SIDE: u32 = 1 << 20;
+
+/// Seconds: `30s`, `2m`, `1.5h`, `250ms`, or a bare number of seconds.
+pub(super) fn duration(text: &str) -> Result<f64, String> {
+    let units = [("ms", 1e-3), ("s", 1.0), ("m", 60.0), ("h", 3600.0), ("", 1.0)];
+    with_unit(text, &units)
+        .filter(|seconds| *seconds > 0.0)
+        .ok_or("a time is expected, as in 30s, 2m or 1h".into())
+}
+
+/// Bytes: `512M`, `2G`, `64K`, in powers of 1024, or a bare number of bytes.
+pub(super) fn bytes(text: &str) -> Result<usize, String> {
+    let plain = text.strip_suffix("iB").or(text.strip_suffix('B')).unwrap_or(text);
+    let units =
+        [("K", 1024.0), ("M", 1024f64.powi(2)), ("G", 1024f64.powi(3)), ("T", 1024f64.powi(4)), ("", 1.0)];
+    with_unit(plain, &units)
+        .filter(|bytes| *bytes >= 1.0)
+        .map(|bytes| bytes as usize)
+        .ok_or("a number of bytes is expected, as in 512M or 2G".into())
+}
+
+/// A number above 0.
+pub(super) fn positive(text: &str) -> Result<f64, String> {
+    let number = finite(text)?;
+    (number > 0.0).then_some(number).ok_or("a number above 0 is expected".into())
+}
+
+fn finite(text: &str) -> Result<f64, String> {
+    f64::from_str(text).ok().filter(|number| number.is_finite()).ok_or(format!("`{text}` is not a number"))
+}
+
+/// A finite number and one of the units; the first that fits counts.
+fn with_unit(text: &str, units: &[(&str, f64)]) -> Option<f64> {
+    units.iter().find_map(|(unit, factor)| {
+        let number = finite(text.strip_suffix(unit)?).ok()? * factor;
+        number.is_finite().then_some(number)
+    })
+}
+
+/// Bytes as people read them.
+pub(super) fn readable_bytes(bytes: usize) -> String {
+    let units = ["KiB", "MiB", "GiB", "TiB"];
+    let mut value = bytes as f64 / 1024.0;
+    let mut unit = units[0];
+    for larger in &units[1..] {
+        if value >= 1000.0 {
+            value /= 1024.0;
+            unit = larger;
+        }
+    }
+    if bytes < 1024 { format!("{bytes} bytes") } else { format!("{value:.1} {unit}") }
+}
+
+/// Seconds as people read them.
+pub(super) fn readable_seconds(seconds: f64) -> String {
+    match seconds {
+        s if s < 0.0995 => format!("{:.0} ms", s * 1e3),
+        s if s < 99.95 => format!("{s:.1} s"),
+        s if s < 5400.0 => format!("{} min {:02} s", (s / 60.0) as u64, (s % 60.0) as u64),
+        s => format!("{} h {:02} min", (s / 3600.0) as u64, (s / 60.0 % 60.0) as u64),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn values_as_people_write_them() {
+        assert_eq!(vector("-1,2.5,3e2"), Ok([-1.0, 2.5, 300.0]));
+        assert_eq!(size("640x480"), Ok([640, 480]));
+        assert_eq!(
+            [duration("30s"), duration("2m"), duration("1h"), duration("90")],
+            [30.0, 120.0, 3600.0, 90.0].map(Ok)
+        );
+        assert_eq!(duration("250ms"), Ok(0.25));
+        assert_eq!(
+            [bytes("512M"), bytes("2G"), bytes("1KiB"), bytes("77")],
+            [512 << 20, 2 << 30, 1024, 77].map(Ok)
+        );
+        assert_eq!(lens("0.1,3"), Ok(Lens { radius: 0.1, distance: Some(3.0) }));
+        assert_eq!((degrees("40"), positive("0.01")), (Ok(40.0), Ok(0.01)));
+    }
+
+    #[test]
+    fn values_that_make_no_sense() {
+        for text in ["", "1,2", "1,2,3,4", "a,b,c", "1,nan,3", "1,2,inf"] {
+            assert!(vector(text).is_err(), "{text}");
+        }
+        for text in ["", "640", "0x480", "640x", "-1x5", "1.5x2", "2000000x1", "1000000x1000000"] {
+            assert!(size(text).is_err(), "{text}");
+        }
+        for text in ["", "s", "0", "-1s", "5d", "nan", "inf", "1e300h1"] {
+            assert!(duration(text).is_err(), "{text}");
+        }
+        for text in ["", "M", "0", "-5M", "1Q", "0.5"] {
+            assert!(bytes(text).is_err(), "{text}");
+        }
+        for text in ["0", "178", "-40", "wide"] {
+            assert!(degrees(text).is_err(), "{text}");
+        }
+    }
+
+    #[test]
+    fn amounts_as_people_read_them() {
+        assert_eq!(
+            [0, 1023, 1024, 90 << 20].map(readable_bytes),
+            ["0 bytes", "1023 bytes", "1.0 KiB", "90.0 MiB"]
+        );
+        assert_eq!(
+            [0.012, 3.21, 125.0, 7260.0].map(readable_seconds),
+            ["12 ms", "3.2 s", "2 min 05 s", "2 h 01 min"]
+        );
+    }
+}

@@ -1,0 +1,76 @@
+//! The camera flags, which `render`, `info` and `bench` share: each replaces its part of the camera of the
+//! scene file, or of the one that frames everything.
+
+use super::failure::Failure;
+use super::values::{self, Lens};
+use clap::Args;
+use glam::Vec3;
+use halflight::load::LoadedScene;
+use halflight_core::geometry::Bounds;
+use halflight_core::scene::Camera;
+
+/// Where to look from, in the units of the scene.
+#[derive(Args)]
+#[command(next_help_heading = "Camera (of the scene file, else one that frames everything)")]
+pub(super) struct View {
+    /// Where the camera stands
+    #[arg(long, value_name = "X,Y,Z", value_parser = values::vector, allow_hyphen_values = true)]
+    eye: Option<[f64; 3]>,
+    /// The point it looks at; with --eye alone, the middle of the scene
+    #[arg(long, value_name = "X,Y,Z", value_parser = values::vector, allow_hyphen_values = true)]
+    look_at: Option<[f64; 3]>,
+    /// What is up in the picture; 0,1,0 where the view is changed
+    #[arg(long, value_name = "X,Y,Z", value_parser = values::vector, allow_hyphen_values = true)]
+    up: Option<[f64; 3]>,
+    /// Vertical field of view in degrees
+    #[arg(long, value_name = "DEG", value_parser = values::degrees)]
+    fov: Option<f64>,
+    /// Radius of the lens, 0 for a pinhole, and the distance of what is sharp (else that of --look-at)
+    #[arg(long, value_name = "RADIUS[,DISTANCE]", value_parser = values::lens)]
+    lens: Option<Lens>,
+}
+
+impl View {
+    /// The camera that looks at `scene`, in the coordinates of the core.
+    pub(super) fn camera(&self, scene: &LoadedScene) -> Result<Camera, Failure> {
+        let mut camera = scene.camera_or_default();
+        if self.eye.is_some() || self.look_at.is_some() || self.up.is_some() {
+            camera = self.turned(&camera, scene)?;
+        }
+        if let Some(degrees) = self.fov {
+            camera.tan_half_fov = (0.5 * degrees).to_radians().tan() as f32;
+        }
+        if let Some(lens) = self.lens {
+            camera.lens_radius = scene.transform.length(lens.radius) as f32;
+            if let Some(distance) = lens.distance {
+                camera.focus_distance = scene.transform.length(distance) as f32;
+            }
+        }
+        Ok(camera)
+    }
+
+    fn turned(&self, old: &Camera, scene: &LoadedScene) -> Result<Camera, Failure> {
+        let eye = self.eye.map_or(old.eye, |eye| scene.transform.point(eye));
+        let target = match (self.look_at, self.eye) {
+            (Some(target), _) => scene.transform.point(target),
+            (None, Some(_)) => Bounds::around(scene.positions.iter().map(|&p| p.into())).center(),
+            (None, None) => eye + old.forward * old.focus_distance,
+        };
+        let up = Vec3::from(self.up.unwrap_or([0.0, 1.0, 0.0]).map(|x| x as f32));
+        let along = target - eye;
+        if !along.is_finite() || along == Vec3::ZERO {
+            return Err(Failure::new("the camera stands at the point it looks at")
+                .advice("give --eye and --look-at two different points"));
+        }
+        if along.normalize().cross(up.normalize_or_zero()).length() < PARALLEL {
+            return Err(Failure::new("the camera looks along its up vector")
+                .advice("give another one, as in --up 0,0,1"));
+        }
+        let turned = Camera::look_at(eye, target, up, 1.0);
+        let Camera { tan_half_fov, lens_radius, .. } = *old;
+        Ok(Camera { tan_half_fov, lens_radius, focus_distance: along.length(), ..turned })
+    }
+}
+
+/// Sine of the angle between view and up below which the picture would turn with rounding errors.
+const PARALLEL: f32 = 1e-4;
