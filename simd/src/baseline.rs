@@ -1,7 +1,7 @@
 //! Lanes of the build target, through `wide`: SSE2, AVX (where the build says so), NEON, simd128 or
 //! plain scalar code. Sixteen lanes are two registers of eight.
 
-use crate::lanes::{Lanes, Mask, Simd};
+use crate::lanes::{Lanes, Mask, Simd, Stacks};
 use core::ops::{Add, BitAnd, BitOr, Div, Mul, Neg, Not, Sub};
 use wide::f32x8;
 
@@ -92,6 +92,11 @@ impl Lanes for F8 {
         Self(mask.0.select(self.0, other.0))
     }
     #[inline(always)]
+    fn largest(self) -> f32 {
+        let [a, b, c, d, e, f, g, h] = self.0.to_array();
+        a.max(b).max(c.max(d)).max(e.max(f).max(g.max(h)))
+    }
+    #[inline(always)]
     fn to_array(self) -> [f32; 8] {
         self.0.to_array()
     }
@@ -167,9 +172,16 @@ impl<L: Lanes<Array = [f32; 8]>> Lanes for Pair<L> {
         Self(self.0.select(mask.0, other.0), self.1.select(mask.1, other.1))
     }
     #[inline(always)]
+    fn largest(self) -> f32 {
+        self.0.max(self.1).largest()
+    }
+    #[inline(always)]
     fn to_array(self) -> [f32; 16] {
-        let (a, b) = (self.0.to_array(), self.1.to_array());
-        core::array::from_fn(|i| if i < 8 { a[i & 7] } else { b[i & 7] })
+        let mut both = [0.0; 16];
+        let (low, high) = both.split_at_mut(8);
+        low.copy_from_slice(&self.0.to_array());
+        high.copy_from_slice(&self.1.to_array());
+        both
     }
 }
 
@@ -217,16 +229,32 @@ impl Simd for Baseline {
         Pair(self.mask8(bits), self.mask8(bits >> 8))
     }
     #[inline(always)]
-    fn load8x9(self, values: &[f32], start: usize, stride: usize) -> Option<[F8; 9]> {
+    fn push8(
+        self,
+        order: u32,
+        entry: F8,
+        exit: F8,
+        items: &[f32; 8],
+        stacks: &mut Stacks,
+        height: usize,
+    ) -> usize {
+        crate::kernels::push::push(order, &entry.to_array(), &exit.to_array(), items, stacks, height)
+    }
+    #[inline(always)]
+    fn prefetch<T>(self, _items: &[T], _values: &[f32], _second: bool, _index: usize) {}
+    #[inline(always)]
+    fn load8x9(self, values: &[f32], start: usize, stride: usize, axes: [usize; 3]) -> Option<[[F8; 3]; 3]> {
         if !fits8x9(values.len(), start, stride) {
             return None;
         }
-        let at = |k: usize| values.get(start + k * stride..).and_then(|rest| rest.first_chunk::<8>());
-        let mut loaded = [self.splat8(0.0); 9];
-        for (k, lanes) in loaded.iter_mut().enumerate() {
-            *lanes = self.load8(at(k)?);
+        let at = |run: usize| values.get(start + run * stride..).and_then(|rest| rest.first_chunk::<8>());
+        let mut corners = [[self.splat8(0.0); 3]; 3];
+        for (c, corner) in corners.iter_mut().enumerate() {
+            for (lanes, axis) in corner.iter_mut().zip(axes) {
+                *lanes = self.load8(at(3 * c + axis.min(2))?);
+            }
         }
-        Some(loaded)
+        Some(corners)
     }
 }
 

@@ -42,8 +42,42 @@ pub trait Lanes:
     fn eq(self, other: Self) -> Self::Mask;
     /// `self` where `mask` is set, `other` elsewhere.
     fn select(self, mask: Self::Mask, other: Self) -> Self;
+    /// The largest lane; unspecified where a lane is NaN.
+    fn largest(self) -> f32;
     /// The lanes as an array.
     fn to_array(self) -> Self::Array;
+}
+
+/// Entries of a traversal stack.
+pub const STACK: usize = 704;
+
+/// A traversal stack: what was put aside, and where the ray enters it.
+#[derive(Clone, Debug)]
+pub struct Stacks {
+    /// Bits of the items.
+    pub items: [u32; STACK],
+    /// Their entry distances.
+    pub entries: [f32; STACK],
+}
+
+impl Stacks {
+    /// Empty.
+    pub const fn new() -> Self {
+        Self { items: [0; STACK], entries: [0.0; STACK] }
+    }
+
+    /// The item and entry at `at`; `at` beyond the end counts as the last slot.
+    #[inline(always)]
+    pub fn get(&self, at: usize) -> (u32, f32) {
+        let at = at.min(STACK - 1);
+        (self.items[at], self.entries[at])
+    }
+}
+
+impl Default for Stacks {
+    fn default() -> Self {
+        Self::new()
+    }
 }
 
 /// Proof that the processor has a level, and the only maker of its lanes.
@@ -66,7 +100,31 @@ pub trait Simd: Copy {
     /// A mask from its bits.
     fn mask16(self, bits: u32) -> <Self::F16 as Lanes>::Mask;
 
-    /// Nine registers from `values[start + k * stride ..][.. 8]`, k = 0 … 8: the leaf layout of triangles.
-    /// `None` where that leaves the slice.
-    fn load8x9(self, values: &[f32], start: usize, stride: usize) -> Option<[Self::F8; 9]>;
+    /// Of the lanes named by the nibbles of `order`, lowest nibble first, appends those with
+    /// `entry <= exit` to both stacks from `height` on, and returns the new height. Lanes are named by the low three bits of
+    /// a nibble; eight slots from `height` on are overwritten. Nothing is pushed where they do not exist.
+    fn push8(
+        self,
+        order: u32,
+        entry: Self::F8,
+        exit: Self::F8,
+        items: &[f32; 8],
+        stacks: &mut Stacks,
+        height: usize,
+    ) -> usize;
+
+    /// Asks for the four cache lines from `items[index]` on, or from `values[index]` on where `second`. Only a hint:
+    /// an index beyond the end is harmless, and which of the two it is costs no branch.
+    fn prefetch<T>(self, items: &[T], values: &[f32], second: bool, index: usize);
+
+    /// Three corners by three coordinates from nine runs of `stride` floats at `values[start..]`, run `3 c + k`
+    /// holding coordinate `k` of corner `c`; coordinates in the order of `axes` (each below 3). `None` where
+    /// eight floats from the start of a run are not all in the slice.
+    fn load8x9(
+        self,
+        values: &[f32],
+        start: usize,
+        stride: usize,
+        axes: [usize; 3],
+    ) -> Option<[[Self::F8; 3]; 3]>;
 }

@@ -19,5 +19,5 @@ mod x86;
 pub mod kernels;
 
 pub use baseline::{Baseline, F8, M8, Pair};
-pub use lanes::{Lanes, Mask, Simd};
+pub use lanes::{Lanes, Mask, STACK, Simd, Stacks};
 pub use level::{Kernel, Level, Tier};

@@ -1,11 +1,29 @@
-//! The bounding volume hierarchy: build, and trace for the nearest hit or any hit.
+//! The bounding volume hierarchy: built over a mesh in the caller's memory, traced for the nearest hit or
+//! any hit by single rays and by batches. What is hit never depends on how: all ways agree to the bit.
 
+mod batch;
+mod binary;
 pub mod brute;
+mod build;
+mod collapse;
+mod join;
+mod layout;
+mod packet;
+mod references;
+mod split;
+mod stream;
+mod walk;
+
+pub use join::{Join, Serial};
 
 use crate::Level;
-use crate::geometry::{Hit, Ray};
+use crate::geometry::{Bounds, Hit, Ray};
 use crate::memory::{Arena, Footprint, OutOfMemory};
 use crate::scene::Mesh;
+use batch::{Batch, Hidden, Nearest};
+use halflight_simd::{Kernel, Simd};
+use layout::Node;
+use walk::Walk;
 
 /// How alike the rays of a batch are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -17,49 +35,97 @@ pub enum Coherence {
 }
 
 /// A hierarchy over the triangles of a mesh, in the memory of an arena.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug)]
 pub struct Bvh<'m> {
-    mesh: Mesh<'m>,
+    nodes: &'m [Node],
+    /// Runs of corner coordinates, leaf by leaf.
+    coordinates: &'m [f32],
+    /// The mesh's index of each triangle in the leaves.
+    triangles: &'m [u32],
+    bounds: Bounds,
 }
 
 impl<'m> Bvh<'m> {
-    /// Bytes that [`Bvh::build`] takes from the arena.
-    pub fn footprint(_triangles: usize) -> Footprint {
-        Footprint::default()
+    /// Bytes that [`Bvh::build`] wants of the arena. What it keeps of them is [`Bvh::kept_footprint`]; the rest
+    /// is working memory, free again when it returns.
+    pub fn footprint(triangles: usize) -> Footprint {
+        build::kept_footprint(triangles).and(build::working_footprint(triangles))
     }
 
-    /// Builds over `mesh`.
-    pub fn build(mesh: &Mesh<'m>, _arena: &mut Arena<'m>) -> Result<Self, OutOfMemory> {
-        Ok(Self { mesh: *mesh })
+    /// Bytes that stay taken from the arena after [`Bvh::build`].
+    pub fn kept_footprint(triangles: usize) -> Footprint {
+        build::kept_footprint(triangles)
+    }
+
+    /// Builds over `mesh`, on one core.
+    ///
+    /// # Errors
+    /// [`OutOfMemory`] when the arena is smaller than [`Bvh::footprint`].
+    pub fn build(mesh: &Mesh, arena: &mut Arena<'m>) -> Result<Self, OutOfMemory> {
+        build::build(mesh, arena, &Serial)
+    }
+
+    /// Builds over `mesh` on the cores that `join` brings. The same tree, to the bit.
+    ///
+    /// # Errors
+    /// [`OutOfMemory`] when the arena is smaller than [`Bvh::footprint`].
+    pub fn build_with<J: Join>(mesh: &Mesh, arena: &mut Arena<'m>, join: &J) -> Result<Self, OutOfMemory> {
+        build::build(mesh, arena, join)
+    }
+
+    /// Bytes that the hierarchy really uses, its copy of the triangles included: what
+    /// [`Bvh::copied`] takes from an arena.
+    pub fn used(&self) -> Footprint {
+        Footprint::default()
+            .slice::<Node>(self.nodes.len())
+            .slice::<f32>(self.coordinates.len())
+            .slice::<u32>(self.triangles.len())
+    }
+
+    /// A copy in another arena, of exactly [`Bvh::used`] bytes: the memory of the build can go.
+    ///
+    /// # Errors
+    /// [`OutOfMemory`] when the arena is smaller.
+    pub fn copied<'n>(&self, arena: &mut Arena<'n>) -> Result<Bvh<'n>, OutOfMemory> {
+        let nodes = arena.slice(self.nodes.len())?;
+        let coordinates = arena.slice(self.coordinates.len())?;
+        let triangles = arena.slice(self.triangles.len())?;
+        nodes.copy_from_slice(self.nodes);
+        coordinates.copy_from_slice(self.coordinates);
+        triangles.copy_from_slice(self.triangles);
+        Ok(Bvh { nodes, coordinates, triangles, bounds: self.bounds })
+    }
+
+    /// The box around all that can be hit.
+    pub fn bounds(&self) -> Bounds {
+        self.bounds
     }
 
     /// The nearest hit of one ray.
-    pub fn nearest(&self, _level: Level, ray: &Ray) -> Hit {
-        brute::nearest(&self.mesh, ray)
+    pub fn nearest(&self, level: Level, ray: &Ray) -> Hit {
+        level.dispatch(Single::<false> { bvh: self, ray })
     }
 
     /// Whether the ray meets anything.
     pub fn occluded(&self, level: Level, ray: &Ray) -> bool {
-        self.nearest(level, ray).is_some()
+        level.dispatch(Single::<true> { bvh: self, ray }).is_some()
     }
 
-    /// Bytes of `scratch` that a batch of `rays` rays wants.
-    pub const fn batch_scratch(rays: usize) -> usize {
-        rays * 8
+    /// Bytes of scratch that a batch of rays wants.
+    pub const fn batch_scratch(_rays: usize) -> usize {
+        0
     }
 
-    /// The nearest hit of each ray. `scratch` holds at least [`Bvh::batch_scratch`] / 4 words.
+    /// The nearest hit of each ray.
     pub fn nearest_batch(
         &self,
         level: Level,
         rays: &[Ray],
-        _: Coherence,
+        coherence: Coherence,
         _scratch: &mut [u32],
         hits: &mut [Hit],
     ) {
-        for (ray, hit) in rays.iter().zip(hits) {
-            *hit = self.nearest(level, ray);
-        }
+        level.dispatch(Batch::<_, false> { bvh: self, rays, coherence, sink: Nearest(hits) });
     }
 
     /// For each ray 1 where something is in the way and 0 where not.
@@ -67,12 +133,29 @@ impl<'m> Bvh<'m> {
         &self,
         level: Level,
         rays: &[Ray],
-        _: Coherence,
+        coherence: Coherence,
         _scratch: &mut [u32],
         hidden: &mut [u8],
     ) {
-        for (ray, hidden) in rays.iter().zip(hidden) {
-            *hidden = self.occluded(level, ray) as u8;
-        }
+        level.dispatch(Batch::<_, true> { bvh: self, rays, coherence, sink: Hidden(hidden) });
     }
 }
+
+/// One ray.
+struct Single<'a, 'm, const ANY: bool> {
+    bvh: &'a Bvh<'m>,
+    ray: &'a Ray,
+}
+
+impl<const ANY: bool> Kernel for Single<'_, '_, ANY> {
+    type Out = Hit;
+
+    #[inline(always)]
+    fn run<S: Simd>(self, simd: S) -> Hit {
+        let mut walk = Walk::IDLE;
+        walk.trace::<S, ANY>(simd, self.bvh, self.ray)
+    }
+}
+
+#[cfg(test)]
+mod tests;

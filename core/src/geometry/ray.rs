@@ -56,6 +56,15 @@ impl Hit {
     /// No hit.
     pub const NONE: Hit = Hit { t: f32::INFINITY, u: 0.0, v: 0.0, triangle: MISS };
 
+    /// Becomes `other` where that is nearer, or as near and of a lower index: the order in which hits
+    /// are offered does not matter.
+    #[inline(always)]
+    pub fn take(&mut self, other: Hit) {
+        if other.t < self.t || (other.t == self.t && other.triangle < self.triangle) {
+            *self = other;
+        }
+    }
+
     /// Whether a triangle was hit.
     pub fn is_some(&self) -> bool {
         self.triangle != MISS

@@ -1,1 +1,15 @@
-//! Batch kernels.
+//! Batch kernels of ray traversal, each beside its plain scalar reference.
+
+pub mod boxes;
+pub mod push;
+pub mod triangles;
+
+/// The largest finite reciprocal of a direction: `0 * inf` never reaches a slab test.
+pub const RECIPROCAL_MAX: f32 = f32::MAX;
+
+/// Reciprocal of a direction component, clamped to finite values; zero counts as positive zero or
+/// negative zero by its sign.
+#[inline(always)]
+pub fn safe_reciprocal(d: f32) -> f32 {
+    (1.0 / d).clamp(-RECIPROCAL_MAX, RECIPROCAL_MAX)
+}

@@ -2,7 +2,7 @@
 //! only inside `with_avx2`; that is what every SAFETY line here rests on.
 
 use crate::baseline::{Pair, fits8x9, halves};
-use crate::lanes::{Lanes, Mask, Simd};
+use crate::lanes::{Lanes, Mask, STACK, Simd, Stacks};
 use core::arch::x86_64::*;
 use core::ops::{Add, BitAnd, BitOr, Div, Mul, Neg, Not, Sub};
 
@@ -111,6 +111,15 @@ impl Lanes for F8 {
         Self(unsafe { _mm256_blendv_ps(other.0, self.0, mask.0) })
     }
     #[inline(always)]
+    fn largest(self) -> f32 {
+        // SAFETY: as above.
+        unsafe {
+            let four = _mm_max_ps(_mm256_castps256_ps128(self.0), _mm256_extractf128_ps::<1>(self.0));
+            let two = _mm_max_ps(four, _mm_movehl_ps(four, four));
+            _mm_cvtss_f32(_mm_max_ss(two, _mm_shuffle_ps::<1>(two, two)))
+        }
+    }
+    #[inline(always)]
     fn to_array(self) -> [f32; 8] {
         let mut out = [0.0; 8];
         // SAFETY: as above; eight floats are written to an array of eight.
@@ -151,14 +160,78 @@ impl Simd for Avx2 {
         Pair(self.mask8(bits), self.mask8(bits >> 8))
     }
     #[inline(always)]
-    fn load8x9(self, values: &[f32], start: usize, stride: usize) -> Option<[F8; 9]> {
+    fn push8(
+        self,
+        order: u32,
+        entry: F8,
+        exit: F8,
+        items: &[f32; 8],
+        stacks: &mut Stacks,
+        height: usize,
+    ) -> usize {
+        if height > STACK - 8 {
+            return height;
+        }
+        // SAFETY: the token proves the level; eight slots from `height` are inside both stacks.
+        unsafe {
+            let nibbles = _mm256_setr_epi32(0, 4, 8, 12, 16, 20, 24, 28);
+            let lanes = _mm256_srlv_epi32(_mm256_set1_epi32(order as i32), nibbles);
+            let entry = _mm256_permutevar8x32_ps(entry.0, lanes);
+            let exit = _mm256_permutevar8x32_ps(exit.0, lanes);
+            let items = _mm256_permutevar8x32_ps(_mm256_loadu_ps(items.as_ptr()), lanes);
+            let met = _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LE_OQ>(entry, exit)) as u32;
+            let packed = _mm_cvtsi64_si128(PACK[met as usize & 255] as i64);
+            let pack = _mm256_cvtepu8_epi32(packed);
+            _mm256_storeu_ps(
+                stacks.items.as_mut_ptr().add(height).cast(),
+                _mm256_permutevar8x32_ps(items, pack),
+            );
+            _mm256_storeu_ps(stacks.entries.as_mut_ptr().add(height), _mm256_permutevar8x32_ps(entry, pack));
+            height + met.count_ones() as usize
+        }
+    }
+    #[inline(always)]
+    fn prefetch<T>(self, items: &[T], values: &[f32], second: bool, index: usize) {
+        let first = items.as_ptr().wrapping_add(index).cast::<i8>();
+        let other = values.as_ptr().wrapping_add(index).cast::<i8>();
+        let start = core::hint::select_unpredictable(second, other, first);
+        // SAFETY: a prefetch has no effect but on the cache, whatever the address.
+        unsafe {
+            _mm_prefetch::<_MM_HINT_T0>(start);
+            _mm_prefetch::<_MM_HINT_T0>(start.wrapping_add(64));
+            _mm_prefetch::<_MM_HINT_T0>(start.wrapping_add(128));
+            _mm_prefetch::<_MM_HINT_T0>(start.wrapping_add(192));
+        }
+    }
+    #[inline(always)]
+    fn load8x9(self, values: &[f32], start: usize, stride: usize, axes: [usize; 3]) -> Option<[[F8; 3]; 3]> {
         if !fits8x9(values.len(), start, stride) {
             return None;
         }
-        // SAFETY: the token proves the level; `fits8x9` proves that start + 8 * stride + 8 <= length.
+        let [kx, ky, kz] = axes;
+        let (kx, ky, kz) = (kx.min(2) * stride, ky.min(2) * stride, kz.min(2) * stride);
+        // SAFETY: the token proves the level; `fits8x9` proves that start + 8 * stride + 8 <= length, and
+        // no run is beyond 3 * 2 + 2 = 8.
         Some(unsafe {
-            let base = values.as_ptr().add(start);
-            core::array::from_fn(|k| F8(_mm256_loadu_ps(base.add(k * stride))))
+            let a = values.as_ptr().add(start);
+            let (b, c) = (a.add(3 * stride), a.add(6 * stride));
+            [
+                [
+                    F8(_mm256_loadu_ps(a.add(kx))),
+                    F8(_mm256_loadu_ps(a.add(ky))),
+                    F8(_mm256_loadu_ps(a.add(kz))),
+                ],
+                [
+                    F8(_mm256_loadu_ps(b.add(kx))),
+                    F8(_mm256_loadu_ps(b.add(ky))),
+                    F8(_mm256_loadu_ps(b.add(kz))),
+                ],
+                [
+                    F8(_mm256_loadu_ps(c.add(kx))),
+                    F8(_mm256_loadu_ps(c.add(ky))),
+                    F8(_mm256_loadu_ps(c.add(kz))),
+                ],
+            ]
         })
     }
 }
@@ -174,3 +247,21 @@ impl Avx2 {
         }
     }
 }
+
+/// For each set of lanes the bytes that name them one after the other.
+static PACK: [u64; 256] = {
+    let mut table = [0; 256];
+    let mut set = 0;
+    while set < 256 {
+        let (mut lane, mut at) = (0, 0);
+        while lane < 8 {
+            if set >> lane & 1 == 1 {
+                table[set] |= lane << (8 * at);
+                at += 1;
+            }
+            lane += 1;
+        }
+        set += 1;
+    }
+    table
+};

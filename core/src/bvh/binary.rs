@@ -1,0 +1,96 @@
+//! The binary tree on the way to the wide one: divided down to single references, in preorder.
+//!
+//! A range of `n` references makes a subtree of exactly `2 n - 1` nodes: the node, its left subtree, its
+//! right subtree. So every subtree knows its slice of the nodes before it is built, and two of them can be
+//! built at the same time.
+
+use super::join::Join;
+use super::layout::DEPTH_MAX;
+use super::references::Reference;
+use super::split::{Box4, Extent, divide, halve};
+use bytemuck::{Pod, Zeroable};
+use glam::Vec4;
+
+/// A box with the number of references under it (bits of `hi.w`).
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C)]
+pub(super) struct BinaryNode {
+    pub lo: Vec4,
+    pub hi: Vec4,
+}
+
+impl BinaryNode {
+    fn new(boxes: &Box4, count: usize) -> Self {
+        let mut node = Self { lo: boxes.lo, hi: boxes.hi };
+        node.hi.w = f32::from_bits(count as u32);
+        node
+    }
+
+    /// References under this node.
+    #[inline(always)]
+    pub(super) fn count(&self) -> usize {
+        self.hi.w.to_bits() as usize
+    }
+
+    #[inline(always)]
+    pub(super) fn half_area(&self) -> f32 {
+        let e = self.hi - self.lo;
+        e.x * (e.y + e.z) + e.y * e.z
+    }
+}
+
+/// Index of the left child of node `index`; its right child is at `right_child`.
+#[inline(always)]
+pub(super) fn left_child(index: usize) -> usize {
+    index + 1
+}
+
+/// Index of the right child.
+#[inline(always)]
+pub(super) fn right_child(nodes: &[BinaryNode], index: usize) -> usize {
+    index + 2 * nodes[index + 1].count()
+}
+
+/// Nodes of a tree over so many references.
+pub(super) const fn nodes_of(references: usize) -> usize {
+    if references == 0 { 0 } else { 2 * references - 1 }
+}
+
+/// Ranges shorter than this are not worth another core.
+const PARALLEL_MIN: usize = 4096;
+
+/// Depth from which ranges are halved by count, which ends within 28 more levels.
+const HALVE_FROM: usize = DEPTH_MAX - 32;
+
+/// Sorts `references` and fills `nodes`, which holds [`nodes_of`] them.
+pub(super) fn build<J: Join>(references: &mut [Reference], nodes: &mut [BinaryNode], join: &J) {
+    let extent = Extent::of(references);
+    subtree(references, nodes, &extent, 0, join);
+}
+
+fn subtree<J: Join>(
+    references: &mut [Reference],
+    nodes: &mut [BinaryNode],
+    extent: &Extent,
+    depth: usize,
+    join: &J,
+) {
+    let n = references.len();
+    let Some((node, below)) = nodes.split_first_mut() else { return };
+    *node = BinaryNode::new(&extent.boxes, n);
+    if n < 2 {
+        return;
+    }
+    let (mid, left, right) = if depth < HALVE_FROM { divide(references, extent) } else { halve(references) };
+    let (left_references, right_references) = references.split_at_mut(mid);
+    let (left_nodes, right_nodes) = below.split_at_mut(nodes_of(mid).min(below.len()));
+    if n < PARALLEL_MIN {
+        subtree(left_references, left_nodes, &left, depth + 1, join);
+        subtree(right_references, right_nodes, &right, depth + 1, join);
+    } else {
+        join.join(
+            || subtree(left_references, left_nodes, &left, depth + 1, join),
+            || subtree(right_references, right_nodes, &right, depth + 1, join),
+        );
+    }
+}

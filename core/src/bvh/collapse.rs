@@ -1,0 +1,202 @@
+//! From the binary tree to the wide one: which binary nodes become children of which wide node, and where
+//! leaves begin, is chosen by dynamic programming over the surface area cost (Ylitie, Karras, Laine 2017,
+//! "Efficient Incoherent Ray Traversal on GPUs Through Compressed Wide BVHs", section 3.1).
+//!
+//! cost[i - 1] of a binary node is the least cost of the forest of at most `i` roots that stands for it.
+
+use super::binary::{BinaryNode, left_child, right_child};
+use super::layout::{Child, LEAF_MAX, Node, WIDTH};
+use super::references::Reference;
+use crate::scene::Mesh;
+use glam::Vec4Swizzles;
+
+/// Cost of visiting a node, in the unit of the area heuristic.
+const NODE_COST: f32 = 1.0;
+/// Cost of opening a leaf,
+const LEAF_COST: f32 = 0.9;
+/// and of each triangle in it.
+const TRIANGLE_COST: f32 = 0.12;
+
+/// Least costs of a forest of 1 … 7 roots; the eighth entry is that of a leaf or infinite.
+pub(super) type Costs = [f32; 8];
+
+fn leaf_cost(node: &BinaryNode) -> f32 {
+    let n = node.count();
+    if n > LEAF_MAX { f32::INFINITY } else { node.half_area() * (LEAF_COST + TRIANGLE_COST * n as f32) }
+}
+
+/// Least cost of dividing `roots` roots between two subtrees, and how many go left.
+#[inline(always)]
+fn distribute(left: &Costs, right: &Costs, roots: usize) -> (f32, usize) {
+    let mut best = (f32::INFINITY, 1);
+    for k in 1..roots {
+        let cost = left[k - 1] + right[roots - k - 1];
+        if cost < best.0 {
+            best = (cost, k);
+        }
+    }
+    best
+}
+
+/// Fills `costs` for every node, children before parents.
+pub(super) fn evaluate(nodes: &[BinaryNode], costs: &mut [Costs]) {
+    for index in (0..nodes.len()).rev() {
+        let node = &nodes[index];
+        let leaf = leaf_cost(node);
+        costs[index] = if node.count() == 1 {
+            [leaf; 8]
+        } else {
+            let (left, right) = (&costs[left_child(index)], &costs[right_child(nodes, index)]);
+            let inner = node.half_area() * NODE_COST + distribute(left, right, WIDTH).0;
+            let mut own = [leaf.min(inner); 8];
+            for roots in 2..WIDTH {
+                own[roots - 1] = own[roots - 2].min(distribute(left, right, roots).0);
+            }
+            own[7] = leaf;
+            own
+        };
+    }
+}
+
+/// Where the wide tree is written.
+pub(super) struct Output<'a> {
+    pub nodes: &'a mut [Node],
+    pub coordinates: &'a mut [f32],
+    pub triangles: &'a mut [u32],
+    /// Nodes and triangles written.
+    pub used: (usize, usize),
+}
+
+/// Binary nodes chosen as children of one wide node, with their first references.
+struct Children {
+    chosen: [(usize, usize); WIDTH],
+    count: usize,
+}
+
+pub(super) struct Emitter<'a> {
+    pub mesh: Mesh<'a>,
+    pub references: &'a [Reference],
+    pub binary: &'a [BinaryNode],
+    pub costs: &'a [Costs],
+    /// By how much boxes are widened.
+    pub slack: f32,
+    /// Prefer leaves wherever one fits and divide the largest box first: a tree of at most one node for
+    /// seven references, whatever the scene.
+    pub frugal: bool,
+}
+
+impl Emitter<'_> {
+    /// Writes the whole tree; `false` where it does not fit.
+    pub(super) fn emit(&self, out: &mut Output) -> bool {
+        out.used = (0, 0);
+        self.node(0, 0, out).is_some()
+    }
+
+    /// Writes the wide node that stands for binary node `index`, and all below it.
+    fn node(&self, index: usize, first: usize, out: &mut Output) -> Option<u32> {
+        let at = out.used.0;
+        *out.nodes.get_mut(at)? = Node::EMPTY;
+        out.used.0 += 1;
+        let children =
+            if self.frugal { self.largest_first(index, first) } else { self.cheapest(index, first) };
+        for (slot, &(child, first)) in children.chosen[..children.count].iter().enumerate() {
+            let content = if self.is_leaf(child) {
+                self.leaf(child, first, out)?
+            } else {
+                Child::node(self.node(child, first, out)?)
+            };
+            let binary = &self.binary[child];
+            let (lo, hi) = (binary.lo.xyz() - self.slack, binary.hi.xyz() + self.slack);
+            out.nodes[at].set(slot, lo.to_array(), hi.to_array(), content);
+        }
+        out.nodes[at].order();
+        Some(at as u32)
+    }
+
+    fn is_leaf(&self, index: usize) -> bool {
+        let node = &self.binary[index];
+        let [cheapest, .., leaf] = self.costs[index];
+        node.count() == 1 || (node.count() <= LEAF_MAX && (self.frugal || leaf <= cheapest))
+    }
+
+    fn leaf(&self, index: usize, first: usize, out: &mut Output) -> Option<Child> {
+        let count = self.binary[index].count();
+        let at = out.used.1;
+        let references = self.references.get(first..first + count)?;
+        // Parts of one triangle that ended in one leaf are tested once.
+        let mut ids = [u32::MAX; LEAF_MAX];
+        let mut kept = 0;
+        for r in references {
+            if !ids[..kept].contains(&r.triangle()) {
+                ids[kept] = r.triangle();
+                kept += 1;
+            }
+        }
+        out.triangles.get_mut(at..at + kept)?.copy_from_slice(&ids[..kept]);
+        let runs = out.coordinates.get_mut(9 * at..9 * (at + kept))?;
+        for (i, &id) in ids[..kept].iter().enumerate() {
+            for (c, corner) in self.mesh.corners(id).iter().enumerate() {
+                for axis in 0..3 {
+                    runs[(3 * c + axis) * kept + i] = corner[axis];
+                }
+            }
+        }
+        out.used.1 += kept;
+        Some(Child::leaf(at as u32, kept as u32))
+    }
+
+    /// The children that the costs were evaluated for.
+    fn cheapest(&self, index: usize, first: usize) -> Children {
+        let mut children = Children { chosen: [(0, 0); WIDTH], count: 0 };
+        if self.is_leaf(index) {
+            // Only at the root: a tree of one leaf.
+            children.chosen[0] = (index, first);
+            children.count = 1;
+        } else {
+            self.divide(index, first, WIDTH, &mut children);
+        }
+        children
+    }
+
+    fn divide(&self, index: usize, first: usize, roots: usize, children: &mut Children) {
+        let (left, right) = (left_child(index), right_child(self.binary, index));
+        let (_, k) = distribute(&self.costs[left], &self.costs[right], roots);
+        let middle = first + self.binary[left].count();
+        self.choose(left, first, k, children);
+        self.choose(right, middle, roots - k, children);
+    }
+
+    /// Adds the cheapest forest of at most `roots` roots for `index`.
+    fn choose(&self, index: usize, first: usize, roots: usize, children: &mut Children) {
+        let costs = &self.costs[index];
+        // The fewest roots that reach the least cost.
+        let mut roots = roots;
+        while roots > 1 && costs[roots - 2] <= costs[roots - 1] {
+            roots -= 1;
+        }
+        if roots == 1 {
+            children.chosen[children.count % WIDTH] = (index, first);
+            children.count += 1;
+        } else {
+            self.divide(index, first, roots, children);
+        }
+    }
+
+    fn largest_first(&self, index: usize, first: usize) -> Children {
+        let mut children = Children { chosen: [(index, first); WIDTH], count: 1 };
+        // The node itself is divided even if it would fit a leaf, unless it is a single reference.
+        let mut next = (!self.is_leaf(index)).then_some(0);
+        while let Some(slot) = next {
+            let (node, first) = children.chosen[slot];
+            let (left, right) = (left_child(node), right_child(self.binary, node));
+            children.chosen[slot] = (left, first);
+            children.chosen[children.count] = (right, first + self.binary[left].count());
+            children.count += 1;
+            let area = |i: &usize| self.binary[children.chosen[*i].0].half_area();
+            next = (0..children.count)
+                .filter(|&i| children.count < WIDTH && !self.is_leaf(children.chosen[i].0))
+                .max_by(|a, b| area(a).total_cmp(&area(b)));
+        }
+        children
+    }
+}

@@ -1,0 +1,101 @@
+//! The hierarchy as it lies in memory: nodes of eight boxes, and leaves of up to eight triangles whose
+//! coordinates stand in runs, so that one load fills a register and no lane is padded.
+
+use bytemuck::{Pod, Zeroable};
+use halflight_simd::kernels::boxes::Boxes8;
+
+/// Most triangles in a leaf: one register of them.
+pub(super) const LEAF_MAX: usize = 8;
+
+/// Children per node.
+pub(super) const WIDTH: usize = 8;
+
+/// Deepest path from the root; the build turns to halving by count before it gets there.
+pub(super) const DEPTH_MAX: usize = 96;
+
+pub(super) use halflight_simd::STACK;
+
+const _: () = assert!(STACK >= (WIDTH - 1) * DEPTH_MAX + 2 * WIDTH);
+
+/// Eight boxes (rows 0 … 5), what is in them (row 6, the bits of a [`Child`] each), and for each octant of
+/// directions their order from far to near (row 7, a nibble each). Four cache lines.
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C, align(64))]
+pub(super) struct Node {
+    pub rows: Boxes8,
+}
+
+impl Node {
+    /// A node without children: no ray meets an empty box.
+    pub(super) const EMPTY: Node = {
+        let (lo, hi) = ([f32::INFINITY; 8], [f32::NEG_INFINITY; 8]);
+        Node { rows: [lo, hi, lo, hi, lo, hi, [f32::from_bits(Child::NONE.0); 8], [0.0; 8]] }
+    };
+
+    pub(super) fn set(&mut self, i: usize, lo: [f32; 3], hi: [f32; 3], child: Child) {
+        for axis in 0..3 {
+            self.rows[2 * axis][i] = lo[axis];
+            self.rows[2 * axis + 1][i] = hi[axis];
+        }
+        self.rows[6][i] = f32::from_bits(child.0);
+    }
+
+    /// Fills row 7: along the diagonal of an octant, the box with the farthest centre comes first.
+    pub(super) fn order(&mut self) {
+        for octant in 0..8 {
+            let mut lanes: [u32; 8] = [0, 1, 2, 3, 4, 5, 6, 7];
+            let along = |lane: u32| {
+                (0..3).fold(0.0, |sum, axis| {
+                    let twice = self.rows[2 * axis][lane as usize] + self.rows[2 * axis + 1][lane as usize];
+                    if octant >> axis & 1 == 1 { sum - twice } else { sum + twice }
+                })
+            };
+            lanes.sort_unstable_by(|&a, &b| along(b).total_cmp(&along(a)).then(a.cmp(&b)));
+            let packed = lanes.iter().rev().fold(0u32, |packed, lane| packed << 4 | lane);
+            self.rows[7][octant] = f32::from_bits(packed);
+        }
+    }
+
+    #[inline(always)]
+    pub(super) fn order_of(&self, octant: usize) -> u32 {
+        self.rows[7][octant & 7].to_bits()
+    }
+
+    #[inline(always)]
+    pub(super) fn child(&self, i: usize) -> Child {
+        Child(self.rows[6][i & 7].to_bits())
+    }
+}
+
+/// What a box holds: a node by its index, or a leaf by its first reference and their count.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Child(pub(super) u32);
+
+impl Child {
+    const LEAF: u32 = 1 << 31;
+
+    /// Most references: what a leaf's 28 bits can name.
+    pub(super) const REFERENCES_MAX: usize = 1 << 28;
+
+    /// An empty leaf far outside: found nowhere.
+    pub(super) const NONE: Child = Child(u32::MAX);
+
+    pub(super) fn node(index: u32) -> Self {
+        Child(index)
+    }
+
+    pub(super) fn leaf(first: u32, count: u32) -> Self {
+        Child(Self::LEAF | (count - 1) << 28 | first)
+    }
+
+    #[inline(always)]
+    pub(super) fn is_leaf(self) -> bool {
+        self.0 & Self::LEAF != 0
+    }
+
+    /// First reference and count (1 … 8) of a leaf.
+    #[inline(always)]
+    pub(super) fn triangles(self) -> (usize, usize) {
+        ((self.0 & 0x0fff_ffff) as usize, (self.0 >> 28 & 7) as usize + 1)
+    }
+}

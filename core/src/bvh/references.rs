@@ -1,0 +1,231 @@
+//! What the build sorts: boxes of triangles, or of parts of large triangles.
+
+use super::layout::Child;
+use crate::geometry::Bounds;
+use crate::scene::Mesh;
+use bytemuck::{Pod, Zeroable};
+use glam::{Vec3, Vec4, Vec4Swizzles};
+
+/// The box of a triangle or of a part of it. `lo.w` holds the bits of the triangle's index, `hi.w` how much
+/// would be gained by cutting it.
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C)]
+pub(super) struct Reference {
+    pub lo: Vec4,
+    pub hi: Vec4,
+}
+
+impl Reference {
+    pub(super) fn new(bounds: Bounds, triangle: u32) -> Self {
+        Self { lo: bounds.min.extend(f32::from_bits(triangle)), hi: bounds.max.extend(0.0) }
+    }
+
+    pub(super) fn triangle(&self) -> u32 {
+        self.lo.w.to_bits()
+    }
+
+    pub(super) fn bounds(&self) -> Bounds {
+        Bounds { min: self.lo.xyz(), max: self.hi.xyz() }
+    }
+}
+
+/// Parts that large triangles may be cut into, for each `SPLIT_SHARE` triangles one.
+const SPLIT_SHARE: usize = 3;
+
+/// Most references that a mesh of so many triangles is built over.
+pub(super) fn capacity(triangles: usize) -> usize {
+    triangles.saturating_add(triangles / SPLIT_SHARE).min(Child::REFERENCES_MAX)
+}
+
+/// Corners of a triangle that a ray can hit: finite, and no two of them the same.
+fn hittable(mesh: &Mesh, triangle: u32) -> Option<[Vec3; 3]> {
+    let [a, b, c] = mesh.corners(triangle);
+    let finite = a.is_finite() && b.is_finite() && c.is_finite();
+    (finite && a != b && b != c && c != a).then_some([a, b, c])
+}
+
+/// Fills `references` with the hittable triangles, and the rest of it with parts of the largest of them.
+/// Returns how many there are.
+///
+/// Which triangles are cut follows Karras, Aila 2013, "Fast Parallel Construction of High-Quality Bounding
+/// Volume Hierarchies", section 4.3: those whose box is much larger than they are, and that cross the
+/// planes on which the hierarchy will divide space early.
+pub(super) fn collect(mesh: &Mesh, references: &mut [Reference]) -> usize {
+    let mut count = 0;
+    let mut scene = Bounds::EMPTY;
+    for triangle in 0..mesh.triangles.len() as u32 {
+        if let (Some(corners), Some(slot)) = (hittable(mesh, triangle), references.get_mut(count)) {
+            let bounds = Bounds::around(corners);
+            scene = scene.union(bounds);
+            *slot = Reference::new(bounds, triangle);
+            count += 1;
+        }
+    }
+    let spare = (count / SPLIT_SHARE).min(references.len() - count);
+    count + split_large(mesh, scene, references, count, spare)
+}
+
+/// Cuts of the largest triangles, into the `spare` references behind the first `count`.
+fn split_large(
+    mesh: &Mesh,
+    scene: Bounds,
+    references: &mut [Reference],
+    count: usize,
+    spare: usize,
+) -> usize {
+    let grid = Grid::new(scene);
+    let mut total = 0.0;
+    for r in &mut references[..count] {
+        r.hi.w = priority(mesh, &grid, r);
+        total += r.hi.w;
+    }
+    if !(total > 0.0 && total.is_finite()) || spare == 0 {
+        return 0;
+    }
+    // The largest scale whose rounded-down shares still fit, by bisection over a factor of two each way.
+    let shares = |scale: f32| -> usize {
+        references[..count].iter().map(|r| share(scale, r.hi.w)).fold(0, usize::saturating_add)
+    };
+    let (mut low, mut high) = (spare as f32 / total, 2.0 * spare as f32 / total);
+    for _ in 0..4 {
+        let middle = 0.5 * (low + high);
+        if shares(middle) <= spare { low = middle } else { high = middle }
+    }
+
+    let mut free = count;
+    for i in 0..count {
+        let r = references[i];
+        let cuts = share(low, r.hi.w).min(count + spare - free);
+        if cuts > 0 {
+            let corners = mesh.corners(r.triangle());
+            free = cut(&grid, corners, r.bounds(), r.triangle(), cuts, i, free, references);
+        }
+    }
+    free - count
+}
+
+/// Most cuts of one triangle.
+const CUTS_MAX: usize = 31;
+
+fn share(scale: f32, priority: f32) -> usize {
+    ((scale * priority) as usize).min(CUTS_MAX)
+}
+
+/// Replaces reference `slot` by `cuts + 1` parts of the box `bounds` of a triangle; the new ones go to
+/// `free` and after. Returns the next free index.
+#[allow(clippy::too_many_arguments)]
+fn cut(
+    grid: &Grid,
+    corners: [Vec3; 3],
+    bounds: Bounds,
+    triangle: u32,
+    cuts: usize,
+    slot: usize,
+    free: usize,
+    references: &mut [Reference],
+) -> usize {
+    let whole = Reference::new(bounds, triangle);
+    let Some((axis, plane)) = (if cuts == 0 { None } else { grid.dividing_plane(bounds) }) else {
+        references[slot] = whole;
+        return free;
+    };
+    let (left, right) = divide(corners, bounds, axis, plane);
+    if left.is_empty() || right.is_empty() {
+        references[slot] = whole;
+        return free;
+    }
+    let (wl, wr) = (left.extent().max_element(), right.extent().max_element());
+    let rest = cuts - 1;
+    let left_cuts = ((rest as f32 * wl / (wl + wr) + 0.5) as usize).min(rest);
+    let next = cut(grid, corners, left, triangle, left_cuts, slot, free + 1, references);
+    cut(grid, corners, right, triangle, rest - left_cuts, free, next, references)
+}
+
+/// The boxes of the parts of a triangle inside `bounds` on either side of a plane.
+pub(super) fn divide(corners: [Vec3; 3], bounds: Bounds, axis: usize, plane: f32) -> (Bounds, Bounds) {
+    let (mut left, mut right) = (Bounds::EMPTY, Bounds::EMPTY);
+    for i in 0..3 {
+        let (p, q) = (corners[i], corners[(i + 1) % 3]);
+        let (a, b) = (p[axis], q[axis]);
+        if a <= plane {
+            left = left.including(p);
+        }
+        if a >= plane {
+            right = right.including(p);
+        }
+        if (a < plane && b > plane) || (a > plane && b < plane) {
+            // Interpolated the same way for both directions of the edge, and put on the plane exactly.
+            let (p, q, a, b) = if a < b { (p, q, a, b) } else { (q, p, b, a) };
+            let mut x = p.lerp(q, ((plane - a) / (b - a)).clamp(0.0, 1.0));
+            x[axis] = plane;
+            // The interpolated point is off the edge by the rounding of the weight and of the sum: widen by both.
+            let slack = (p.abs().max(q.abs())) * (4.0 * f32::EPSILON);
+            left = left.union(Bounds { min: x - slack, max: x + slack });
+            right = right.union(Bounds { min: x - slack, max: x + slack });
+        }
+    }
+    left.max[axis] = left.max[axis].min(plane);
+    right.min[axis] = right.min[axis].max(plane);
+    let inside = |b: Bounds| Bounds { min: b.min.max(bounds.min), max: b.max.min(bounds.max) };
+    (inside(left), inside(right))
+}
+
+/// The planes of a midpoint octree over the scene.
+struct Grid {
+    origin: Vec3,
+    to_cells: Vec3,
+    to_world: Vec3,
+}
+
+/// Levels of the octree.
+const LEVELS: u32 = 20;
+
+impl Grid {
+    fn new(scene: Bounds) -> Self {
+        let extent = scene.extent();
+        let cells = (1u32 << LEVELS) as f32;
+        let safe = Vec3::select(extent.cmpgt(Vec3::ZERO), extent, Vec3::ONE);
+        Self { origin: scene.min, to_cells: cells / safe, to_world: safe / cells }
+    }
+
+    /// The plane highest in the octree that crosses the box, its axis and coordinate; of equals the one
+    /// across the longest edge.
+    fn dividing_plane(&self, bounds: Bounds) -> Option<(usize, f32)> {
+        let (level, axis, cell) = self.crossing(bounds)?;
+        let plane = self.origin[axis] + (cell >> level << level) as f32 * self.to_world[axis];
+        (plane > bounds.min[axis] && plane < bounds.max[axis]).then_some((axis, plane))
+    }
+
+    /// Height of the highest plane that crosses the box (`LEVELS - 1` is the middle of the scene), its axis,
+    /// and the cell of the box's maximum.
+    fn crossing(&self, bounds: Bounds) -> Option<(u32, usize, u32)> {
+        let lo = (bounds.min - self.origin) * self.to_cells;
+        let hi = (bounds.max - self.origin) * self.to_cells;
+        let extent = bounds.extent();
+        let mut best: Option<(u32, usize, u32)> = None;
+        for axis in 0..3 {
+            let last = (1u32 << LEVELS) - 1;
+            let (a, b) = ((lo[axis] as u32).min(last), (hi[axis] as u32).min(last));
+            if a != b {
+                let level = 31 - (a ^ b).leading_zeros();
+                if best.is_none_or(|(l, k, _)| level > l || (level == l && extent[axis] > extent[k])) {
+                    best = Some((level, axis, b));
+                }
+            }
+        }
+        best
+    }
+}
+
+/// How much is gained by cutting: cube root of the box's superfluous area, weighted by the height of the
+/// plane that it crosses (Karras, Aila, equation 3).
+fn priority(mesh: &Mesh, grid: &Grid, r: &Reference) -> f32 {
+    let bounds = r.bounds();
+    let Some((level, _, _)) = grid.crossing(bounds) else { return 0.0 };
+    let [a, b, c] = mesh.corners(r.triangle());
+    let cross = (b - a).cross(c - a).abs();
+    // Twice the triangle's projected areas is the least area of boxes around its parts.
+    let superfluous = bounds.half_area() - 0.5 * (cross.x + cross.y + cross.z);
+    let weight = libm::ldexpf(superfluous.max(0.0), level as i32 - LEVELS as i32);
+    libm::cbrtf(weight)
+}

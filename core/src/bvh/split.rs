@@ -1,0 +1,176 @@
+//! One step of the build: a range of references is divided in two where the surface area heuristic
+//! (Goldsmith, Salmon 1987) over binned centroids (Wald 2007) is least.
+
+use super::references::Reference;
+use glam::{Vec3, Vec4, Vec4Swizzles};
+
+/// A box in registers; `w` is of no meaning.
+#[derive(Clone, Copy)]
+pub(super) struct Box4 {
+    pub lo: Vec4,
+    pub hi: Vec4,
+}
+
+impl Box4 {
+    pub(super) const EMPTY: Box4 = Box4 { lo: Vec4::INFINITY, hi: Vec4::NEG_INFINITY };
+
+    #[inline(always)]
+    fn grow(&mut self, other: &Box4) {
+        self.lo = self.lo.min(other.lo);
+        self.hi = self.hi.max(other.hi);
+    }
+
+    #[inline(always)]
+    fn half_area(&self) -> f32 {
+        let e = (self.hi - self.lo).xyz();
+        e.x * (e.y + e.z) + e.y * e.z
+    }
+}
+
+/// Boxes of some references and of their centroids (twice them: lo + hi).
+#[derive(Clone, Copy)]
+pub(super) struct Extent {
+    pub boxes: Box4,
+    pub centroids: Box4,
+}
+
+impl Extent {
+    pub(super) const EMPTY: Extent = Extent { boxes: Box4::EMPTY, centroids: Box4::EMPTY };
+
+    #[inline(always)]
+    fn grow(&mut self, r: &Reference) {
+        let centroid = r.lo + r.hi;
+        self.boxes.grow(&Box4 { lo: r.lo, hi: r.hi });
+        self.centroids.grow(&Box4 { lo: centroid, hi: centroid });
+    }
+
+    pub(super) fn of(references: &[Reference]) -> Self {
+        let mut extent = Self::EMPTY;
+        references.iter().for_each(|r| extent.grow(r));
+        extent
+    }
+}
+
+/// Where references go: the left side gets the bins below `bin` of `axis`.
+#[derive(Clone, Copy)]
+struct Cut {
+    cost: f32,
+    axis: usize,
+    bin: usize,
+}
+
+/// From a centroid to its bin, on all axes.
+#[derive(Clone, Copy)]
+struct Binning {
+    origin: Vec4,
+    scale: Vec3,
+}
+
+impl Binning {
+    fn new(centroids: &Box4, bins: usize) -> Self {
+        let extent = (centroids.hi - centroids.lo).xyz();
+        // A little under the number of bins, so that the largest centroid falls into the last one.
+        let scale = bins as f32 * (1.0 - 1e-5) / extent;
+        let usable = scale.is_finite_mask() & extent.cmpgt(Vec3::ZERO);
+        Self { origin: centroids.lo, scale: Vec3::select(usable, scale, Vec3::ZERO) }
+    }
+
+    #[inline(always)]
+    fn bin(&self, r: &Reference, axis: usize, bins: usize) -> usize {
+        let along = ((r.lo[axis] + r.hi[axis]) - self.origin[axis]) * self.scale[axis];
+        (along as usize).min(bins - 1)
+    }
+}
+
+/// Divides `references` and returns how many went left, with the extents of both sides. At least one
+/// reference is on either side of two or more.
+pub(super) fn divide(references: &mut [Reference], extent: &Extent) -> (usize, Extent, Extent) {
+    let n = references.len();
+    if n == 2 {
+        return halve(references);
+    }
+    if n <= 32 { divide_binned::<8>(references, extent) } else { divide_binned::<16>(references, extent) }
+}
+
+fn divide_binned<const BINS: usize>(
+    references: &mut [Reference],
+    extent: &Extent,
+) -> (usize, Extent, Extent) {
+    let binning = Binning::new(&extent.centroids, BINS);
+    match best_cut::<BINS>(references, &binning) {
+        Some(cut) => partition::<BINS>(references, &binning, cut),
+        None => halve(references),
+    }
+}
+
+/// Bins all references on all axes and sweeps for the least cost.
+#[inline(always)]
+fn best_cut<const BINS: usize>(references: &[Reference], binning: &Binning) -> Option<Cut> {
+    let mut bins = [[(Box4::EMPTY, 0u32); BINS]; 3];
+    for r in references {
+        let along = (r.lo + r.hi - binning.origin).xyz() * binning.scale;
+        let boxed = Box4 { lo: r.lo, hi: r.hi };
+        for axis in 0..3 {
+            let (bounds, count) = &mut bins[axis][(along[axis] as usize).min(BINS - 1)];
+            bounds.grow(&boxed);
+            *count += 1;
+        }
+    }
+
+    let mut best: Option<Cut> = None;
+    for (axis, bins) in bins.iter().enumerate() {
+        if binning.scale[axis] == 0.0 {
+            continue;
+        }
+        let mut right_cost = [0.0f32; BINS];
+        let (mut side, mut count) = (Box4::EMPTY, 0);
+        for bin in (1..BINS).rev() {
+            side.grow(&bins[bin].0);
+            count += bins[bin].1;
+            right_cost[bin] = if count > 0 { count as f32 * side.half_area() } else { f32::NAN };
+        }
+        (side, count) = (Box4::EMPTY, 0);
+        for bin in 1..BINS {
+            side.grow(&bins[bin - 1].0);
+            count += bins[bin - 1].1;
+            if count == 0 {
+                continue;
+            }
+            // NaN where the right side is empty: never the best.
+            let cost = count as f32 * side.half_area() + right_cost[bin];
+            if best.map_or(cost < f32::INFINITY, |b| cost < b.cost) {
+                best = Some(Cut { cost, axis, bin });
+            }
+        }
+    }
+    best
+}
+
+/// Moves the left side of a cut to the front.
+#[inline(always)]
+fn partition<const BINS: usize>(
+    references: &mut [Reference],
+    binning: &Binning,
+    cut: Cut,
+) -> (usize, Extent, Extent) {
+    let (mut left, mut right) = (Extent::EMPTY, Extent::EMPTY);
+    let (mut i, mut j) = (0, references.len());
+    while i < j {
+        let r = references[i];
+        if binning.bin(&r, cut.axis, BINS) < cut.bin {
+            left.grow(&r);
+            i += 1;
+        } else {
+            right.grow(&r);
+            j -= 1;
+            references.swap(i, j);
+        }
+    }
+    if i == 0 || i == references.len() { halve(references) } else { (i, left, right) }
+}
+
+/// The last resort: half by count, for references that no plane tells apart.
+pub(super) fn halve(references: &[Reference]) -> (usize, Extent, Extent) {
+    let (left, right) = references.split_at(references.len() / 2);
+    (left.len(), Extent::of(left), Extent::of(right))
+}

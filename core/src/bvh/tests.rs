@@ -1,0 +1,241 @@
+//! Every way of tracing against brute force, on scenes that are hard on a hierarchy.
+
+use super::*;
+use crate::memory::Line;
+use crate::scene::Triangle;
+use glam::Vec3;
+use std::vec::Vec;
+
+/// A plain generator for scenes and rays.
+struct Random(u32);
+
+impl Random {
+    fn bits(&mut self) -> u32 {
+        self.0 = self.0.wrapping_mul(747_796_405).wrapping_add(2_891_336_453);
+        let word = (self.0 >> (self.0 >> 28).wrapping_add(4) ^ self.0).wrapping_mul(277_803_737);
+        word >> 22 ^ word
+    }
+    fn unit(&mut self) -> f32 {
+        (self.bits() >> 8) as f32 / (1 << 24) as f32
+    }
+    fn point(&mut self, size: f32) -> Vec3 {
+        Vec3::new(self.unit() - 0.5, self.unit() - 0.5, self.unit() - 0.5) * size
+    }
+}
+
+struct Soup {
+    positions: Vec<[f32; 3]>,
+    triangles: Vec<Triangle>,
+}
+
+impl Soup {
+    fn of(corners: impl IntoIterator<Item = [Vec3; 3]>) -> Self {
+        let mut soup = Soup { positions: Vec::new(), triangles: Vec::new() };
+        for triangle in corners {
+            let first = soup.positions.len() as u32;
+            soup.positions.extend(triangle.map(|p| p.to_array()));
+            soup.triangles.push(Triangle { vertices: [first, first + 1, first + 2], material: 0 });
+        }
+        soup
+    }
+    fn mesh(&self) -> Mesh<'_> {
+        Mesh { positions: &self.positions, normals: &[], texcoords: &[], triangles: &self.triangles }
+    }
+}
+
+fn lines(bytes: usize) -> Vec<Line> {
+    std::vec![Line([0xa5; 64]); bytes.div_ceil(64)]
+}
+
+fn random_soup(count: usize, size: f32, offset: Vec3) -> Soup {
+    let mut random = Random(count as u32);
+    Soup::of((0..count).map(|_| {
+        let middle = random.point(10.0);
+        [(); 3].map(|()| offset + middle + random.point(size))
+    }))
+}
+
+/// A wavy sheet: shared edges, so that every ray through it must hit.
+fn sheet(n: usize) -> Soup {
+    let at = |x: usize, z: usize| {
+        let (x, z) = (x as f32 / n as f32 * 2.0 - 1.0, z as f32 / n as f32 * 2.0 - 1.0);
+        Vec3::new(x, 0.1 * (x * x - z * z), z)
+    };
+    Soup::of((0..n * n).flat_map(|i| {
+        let (x, z) = (i % n, i / n);
+        let [a, b, c, d] = [at(x, z), at(x + 1, z), at(x + 1, z + 1), at(x, z + 1)];
+        [[a, b, c], [a, c, d]]
+    }))
+}
+
+/// Traces random rays in all ways at all levels and holds them to brute force, to the bit.
+fn agrees(soup: &Soup, rays: &[Ray]) {
+    let mesh = soup.mesh();
+    let mut memory = lines(Bvh::footprint(mesh.triangles.len()).bytes());
+    let bvh =
+        Bvh::build(&mesh, &mut Arena::new(bytemuck::cast_slice_mut(&mut memory))).expect("exact footprint");
+    let truth: Vec<Hit> = rays.iter().map(|ray| brute::nearest(&mesh, ray)).collect();
+    for level in Level::detect().and_below() {
+        for coherence in [Coherence::Coherent, Coherence::Incoherent] {
+            let mut hits = std::vec![Hit::NONE; rays.len()];
+            bvh.nearest_batch(level, rays, coherence, &mut [], &mut hits);
+            let mut hidden = std::vec![7u8; rays.len()];
+            bvh.occluded_batch(level, rays, coherence, &mut [], &mut hidden);
+            for (i, ray) in rays.iter().enumerate() {
+                assert_eq!(hits[i], truth[i], "{} {coherence:?} ray {i} {ray:?}", level.name());
+                assert_eq!(
+                    hidden[i],
+                    truth[i].is_some() as u8,
+                    "{} {coherence:?} any {i} {ray:?}",
+                    level.name()
+                );
+            }
+        }
+        for (ray, truth) in rays.iter().zip(&truth) {
+            assert_eq!(bvh.nearest(level, ray), *truth);
+            assert_eq!(bvh.occluded(level, ray), truth.is_some());
+        }
+    }
+}
+
+fn random_rays(count: usize, offset: Vec3) -> Vec<Ray> {
+    let mut random = Random(99);
+    (0..count)
+        .map(|i| {
+            let (origin, direction) = (offset + random.point(12.0), random.point(2.0));
+            let t_max = if i % 3 == 0 { 3.0 * random.unit() } else { f32::INFINITY };
+            Ray::segment(origin, direction, t_max)
+        })
+        .collect()
+}
+
+#[test]
+fn random_triangles_from_one_to_a_thousand() {
+    for count in [1, 2, 3, 8, 9, 17, 100, 1000] {
+        agrees(&random_soup(count, 1.5, Vec3::ZERO), &random_rays(300, Vec3::ZERO));
+    }
+}
+
+#[test]
+fn far_from_the_origin() {
+    let offset = Vec3::new(148_376.0, 1_234.0, -223_423.0);
+    agrees(&random_soup(200, 2.0, offset), &random_rays(300, offset));
+}
+
+#[test]
+fn no_triangles() {
+    agrees(&Soup::of([]), &random_rays(10, Vec3::ZERO));
+}
+
+#[test]
+fn duplicates_slivers_and_points() {
+    let mut random = Random(5);
+    let mut corners = Vec::new();
+    for i in 0..300 {
+        let (a, b) = (random.point(4.0), random.point(4.0));
+        corners.push(match i % 4 {
+            0 => [a, b, a.lerp(b, 0.5) + random.point(1e-5)],
+            1 => [a, a, b],
+            2 => [a, a, a],
+            _ => [Vec3::ZERO, Vec3::X * 3.0, Vec3::Y * 3.0],
+        });
+    }
+    agrees(&Soup::of(corners), &random_rays(300, Vec3::ZERO));
+}
+
+#[test]
+fn what_is_not_finite_is_never_hit() {
+    let bad = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, f32::MAX];
+    let mut corners: Vec<[Vec3; 3]> = Vec::new();
+    for x in bad {
+        corners.push([Vec3::ZERO, Vec3::X, Vec3::new(0.0, x, 0.0)]);
+    }
+    corners.push([Vec3::ZERO, Vec3::X, Vec3::Y]);
+    let soup = Soup::of(corners);
+    let mut rays = random_rays(50, Vec3::ZERO);
+    for x in bad {
+        rays.push(Ray::new(Vec3::new(x, 0.0, 1.0), Vec3::NEG_Z));
+        rays.push(Ray::new(Vec3::new(0.2, 0.2, 1.0), Vec3::new(x, 0.0, -1.0)));
+        rays.push(Ray::segment(Vec3::new(0.2, 0.2, 1.0), Vec3::NEG_Z, x));
+    }
+    rays.push(Ray::new(Vec3::new(0.2, 0.2, 1.0), Vec3::ZERO));
+    rays.push(Ray::segment(Vec3::new(0.2, 0.2, 1.0), Vec3::NEG_Z, -1.0));
+    agrees(&soup, &rays);
+}
+
+#[test]
+fn a_sheet_has_no_holes() {
+    let (n, offset) = (24, Vec3::Y * 2.0);
+    let soup = sheet(n);
+    let mut rays = Vec::new();
+    // Through every vertex and the middle of every edge, straight down and slanted.
+    for i in 1..2 * n {
+        for k in 1..2 * n {
+            let target = Vec3::new(i as f32 / n as f32 - 1.0, 0.0, k as f32 / n as f32 - 1.0);
+            let target = target + Vec3::Y * 0.1 * (target.x * target.x - target.z * target.z);
+            rays.push(Ray::new(target + offset, Vec3::NEG_Y));
+            rays.push(Ray::new(target * 0.5 + offset, target * 0.5 - offset));
+        }
+    }
+    agrees(&soup, &rays);
+    let mesh = soup.mesh();
+    for ray in &rays {
+        assert!(brute::nearest(&mesh, ray).is_some(), "a ray slips through at {ray:?}");
+    }
+}
+
+#[test]
+fn axis_parallel_rays_in_the_planes_of_boxes() {
+    let soup = Soup::of((0..60).map(|i| {
+        let o = Vec3::new((i % 4) as f32, (i / 4 % 4) as f32, (i / 16) as f32);
+        [o, o + Vec3::X, o + Vec3::Y]
+    }));
+    let mut rays = Vec::new();
+    for x in 0..9 {
+        for y in 0..9 {
+            let o = Vec3::new(x as f32 * 0.5, y as f32 * 0.5, -1.0);
+            rays.push(Ray::new(o, Vec3::Z));
+            rays.push(Ray::new(Vec3::new(o.z, o.x, o.y), Vec3::X));
+            rays.push(Ray::new(Vec3::new(o.x, 9.0, o.y), Vec3::NEG_Y));
+        }
+    }
+    agrees(&soup, &rays);
+}
+
+#[test]
+fn identical_centroids_are_halved() {
+    let soup = Soup::of((0..5000).map(|_| [Vec3::ZERO, Vec3::X, Vec3::Y]));
+    agrees(&soup, &[Ray::new(Vec3::new(0.2, 0.2, 1.0), Vec3::NEG_Z), Ray::new(Vec3::ONE, Vec3::X)]);
+}
+
+#[test]
+fn exact_memory_suffices_and_one_byte_less_is_an_error() {
+    for count in [0, 1, 7, 100, 1000] {
+        let soup = random_soup(count, 1.0, Vec3::ZERO);
+        let bytes = Bvh::footprint(count).bytes();
+        let mut memory = lines(bytes);
+        let memory: &mut [u8] = bytemuck::cast_slice_mut(&mut memory);
+        let bvh = Bvh::build(&soup.mesh(), &mut Arena::new(&mut memory[..bytes]));
+        let used = bvh.expect("exact footprint").used().bytes();
+        assert!(used <= Bvh::kept_footprint(count).bytes());
+        if bytes > 0 {
+            let short = Bvh::build(&soup.mesh(), &mut Arena::new(&mut memory[..bytes - 1]));
+            assert!(short.is_err(), "{count} triangles");
+        }
+    }
+}
+
+#[test]
+fn a_copy_takes_exactly_what_it_says() {
+    let soup = random_soup(500, 1.0, Vec3::ZERO);
+    let mut memory = lines(Bvh::footprint(500).bytes());
+    let bvh = Bvh::build(&soup.mesh(), &mut Arena::new(bytemuck::cast_slice_mut(&mut memory))).expect("fits");
+    let bytes = bvh.used().bytes();
+    let mut copy = lines(bytes);
+    let copy: &mut [u8] = bytemuck::cast_slice_mut(&mut copy);
+    assert!(bvh.copied(&mut Arena::new(&mut copy[..bytes - 1])).is_err());
+    let copy = bvh.copied(&mut Arena::new(&mut copy[..bytes])).expect("exact");
+    for ray in random_rays(100, Vec3::ZERO) {
+        assert_eq!(bvh.nearest(Level::BASELINE, &ray), copy.nearest(Level::BASELINE, &ray));
+    }
+}

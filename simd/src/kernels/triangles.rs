@@ -1,0 +1,209 @@
+//! Watertight ray/triangle tests (Woop, Benthin, Wald 2013, "Watertight Ray/Triangle Intersection"):
+//! the scalar reference, one ray against eight triangles, sixteen rays against one triangle.
+//!
+//! Plainly: move the origin to zero, shear space so that the ray runs along +z, and take the signed areas
+//! U, V, W of the three edges against the z axis; the ray hits where none has another sign than the rest.
+//! 1. Two triangles that share an edge compute the same area with opposite sign, so no ray slips between:
+//!    nothing is fused, for a fused product difference is not antisymmetric.
+//! 2. An area of exactly zero in f32 is computed again in f64, where products of f32 are exact.
+//! 3. All forms do the same operations in the same order: their hits agree to the bit.
+//!
+//! The price: no fused multiply-add, and rays of one packet must agree in their dominant axis.
+
+use crate::lanes::{Lanes, Mask, Simd};
+
+/// The shear that turns a ray into the +z axis.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Shear {
+    /// Axes that become x, y, z: z is where the direction is largest; x and y are swapped where that
+    /// component is negative, to keep the winding.
+    pub axes: [usize; 3],
+    /// Shear in x and in y, scale of z.
+    pub factors: [f32; 3],
+}
+
+impl Shear {
+    /// The shear of a direction that is not zero.
+    #[inline(always)]
+    pub fn new(d: [f32; 3]) -> Self {
+        let z = dominant_axis(d);
+        let (x, y) = ((z + 1) % 3, (z + 2) % 3);
+        let (x, y) = if d[z] < 0.0 { (y, x) } else { (x, y) };
+        Self { axes: [x, y, z], factors: [d[x] / d[z], d[y] / d[z], 1.0 / d[z]] }
+    }
+}
+
+/// The axis along which `d` is largest in magnitude.
+#[inline(always)]
+pub fn dominant_axis(d: [f32; 3]) -> usize {
+    let [x, y, z] = d.map(f32::abs);
+    if x > y {
+        if x > z { 0 } else { 2 }
+    } else if y > z {
+        1
+    } else {
+        2
+    }
+}
+
+/// Scalar reference: `(t, u, v)` where the ray meets the triangle at `0 <= t <= t_max`, with the
+/// barycentric weights of the second and third corner.
+#[inline(always)]
+pub fn intersect(
+    origin: [f32; 3],
+    shear: &Shear,
+    t_max: f32,
+    corners: [[f32; 3]; 3],
+) -> Option<(f32, f32, f32)> {
+    let [kx, ky, kz] = shear.axes;
+    let [sx, sy, sz] = shear.factors;
+    let [a, b, c] = corners.map(|p| {
+        let z = p[kz] - origin[kz];
+        [(p[kx] - origin[kx]) - sx * z, (p[ky] - origin[ky]) - sy * z, z]
+    });
+    // Twice the signed areas opposite to a, b, c.
+    let mut u = c[0] * b[1] - c[1] * b[0];
+    let mut v = a[0] * c[1] - a[1] * c[0];
+    let mut w = b[0] * a[1] - b[1] * a[0];
+    if u == 0.0 || v == 0.0 || w == 0.0 {
+        let area = |p: [f32; 3], q: [f32; 3]| (p[0] as f64 * q[1] as f64 - p[1] as f64 * q[0] as f64) as f32;
+        (u, v, w) = (area(c, b), area(a, c), area(b, a));
+    }
+    let inside = (u >= 0.0 && v >= 0.0 && w >= 0.0) || (u <= 0.0 && v <= 0.0 && w <= 0.0);
+    let det = (u + v) + w;
+    if !inside || det == 0.0 {
+        return None;
+    }
+    let t = ((u * (sz * a[2]) + v * (sz * b[2])) + w * (sz * c[2])) / det;
+    (t >= 0.0 && t <= t_max).then(|| (t, v / det, w / det))
+}
+
+/// What a batch test finds: lanes outside `hits` hold garbage.
+#[derive(Clone, Copy)]
+pub struct Found<L> {
+    /// Distance.
+    pub t: L,
+    /// Barycentric weight of the second corner.
+    pub u: L,
+    /// Barycentric weight of the third corner.
+    pub v: L,
+    /// Bits of the lanes that hit.
+    pub hits: u32,
+    /// Bits of the lanes on an edge in f32: theirs is for the scalar reference to say.
+    pub doubtful: u32,
+}
+
+impl<L: Lanes> Found<L> {
+    /// Nothing found; the lanes are left as they are given.
+    #[inline(always)]
+    fn nothing(garbage: L, doubtful: u32) -> Self {
+        Self { t: garbage, u: garbage, v: garbage, hits: 0, doubtful }
+    }
+}
+
+/// A corner, its coordinates in the order of the axes, moved and sheared so that the ray is the +z axis.
+#[inline(always)]
+fn sheared<L: Lanes>([x, y, z]: [L; 3], [ox, oy, oz]: [L; 3], [sx, sy, _]: [L; 3]) -> [L; 3] {
+    let z = z - oz;
+    [(x - ox) - sx * z, (y - oy) - sy * z, z]
+}
+
+/// The test itself, over lanes of triangles or lanes of rays: sheared corners `[x, y, z]` of a, b, c.
+#[inline(always)]
+fn areas<L: Lanes>(zero: L, sz: L, [a, b, c]: [[L; 3]; 3], t_max: L, wanted: u32) -> Found<L> {
+    let u = c[0] * b[1] - c[1] * b[0];
+    let v = a[0] * c[1] - a[1] * c[0];
+    let w = b[0] * a[1] - b[1] * a[0];
+    let low = u.min(v).min(w);
+    let high = u.max(v).max(w);
+    let det = (u + v) + w;
+    let inside = (zero.le(low) | high.le(zero)).bits() & wanted;
+    if inside == 0 {
+        return Found::nothing(det, 0);
+    }
+    // A zero area among those of one sign: u v w = 0 is where one of the extremes is zero.
+    let doubtful = (low.eq(zero) | high.eq(zero)).bits() & inside;
+    let t = ((u * (sz * a[2]) + v * (sz * b[2])) + w * (sz * c[2])) / det;
+    let hits = (zero.le(t) & t.le(t_max)).bits() & inside & !doubtful;
+    if hits == 0 {
+        return Found::nothing(det, doubtful);
+    }
+    Found { t, u: v / det, v: w / det, hits, doubtful }
+}
+
+/// A ray in all lanes, for tests against eight triangles at once.
+#[derive(Clone, Copy)]
+pub struct ShearRay8<S: Simd> {
+    axes: [usize; 3],
+    origin: [S::F8; 3],
+    factors: [S::F8; 3],
+}
+
+impl<S: Simd> ShearRay8<S> {
+    /// Broadcasts the ray.
+    #[inline(always)]
+    pub fn new(simd: S, origin: [f32; 3], shear: &Shear) -> Self {
+        let [kx, ky, kz] = shear.axes;
+        let [sx, sy, sz] = shear.factors;
+        Self {
+            axes: shear.axes,
+            origin: [simd.splat8(origin[kx % 3]), simd.splat8(origin[ky % 3]), simd.splat8(origin[kz % 3])],
+            factors: [simd.splat8(sx), simd.splat8(sy), simd.splat8(sz)],
+        }
+    }
+
+    /// Tests the `count` (1 … 8) triangles whose coordinates stand in `values` from `start`, nine runs of
+    /// `count` floats: x of all first corners, y, z, then the second corners, then the third. Eight floats
+    /// must be readable from every run. `None` where they are not.
+    #[inline(always)]
+    pub fn meets(
+        &self,
+        simd: S,
+        values: &[f32],
+        start: usize,
+        count: usize,
+        t_max: f32,
+    ) -> Option<Found<S::F8>> {
+        let [a, b, c] = simd.load8x9(values, start, count, self.axes)?;
+        let [_, _, sz] = self.factors;
+        let sheared = [
+            sheared(a, self.origin, self.factors),
+            sheared(b, self.origin, self.factors),
+            sheared(c, self.origin, self.factors),
+        ];
+        let wanted = (1u32 << count) - 1;
+        Some(areas(simd.splat8(0.0), sz, sheared, simd.splat8(t_max), wanted))
+    }
+}
+
+/// Sixteen rays of the same [`Shear::axes`], for tests against one triangle at a time.
+#[derive(Clone, Copy)]
+pub struct ShearRays16<S: Simd> {
+    /// Axes that become x, y, z, for all of them.
+    pub axes: [usize; 3],
+    /// Origins along those axes.
+    pub origin: [S::F16; 3],
+    /// Shear in x and y, scale of z.
+    pub factors: [S::F16; 3],
+}
+
+impl<S: Simd> ShearRays16<S> {
+    /// Tests the rays `wanted` against one triangle.
+    #[inline(always)]
+    pub fn meets(&self, simd: S, corners: [[f32; 3]; 3], t_max: S::F16, wanted: u32) -> Found<S::F16> {
+        let [_, _, sz] = self.factors;
+        let [a, b, c] = corners;
+        let sheared = [
+            sheared(self.broadcast(simd, a), self.origin, self.factors),
+            sheared(self.broadcast(simd, b), self.origin, self.factors),
+            sheared(self.broadcast(simd, c), self.origin, self.factors),
+        ];
+        areas(simd.splat16(0.0), sz, sheared, t_max, wanted)
+    }
+
+    #[inline(always)]
+    fn broadcast(&self, simd: S, p: [f32; 3]) -> [S::F16; 3] {
+        let [kx, ky, kz] = self.axes;
+        [simd.splat16(p[kx % 3]), simd.splat16(p[ky % 3]), simd.splat16(p[kz % 3])]
+    }
+}
