@@ -330,6 +330,57 @@ fn a_scene_file_that_is_wrong_says_where() {
     assert!(empty.triangles.is_empty() && empty.camera.is_none());
 }
 
+/// A deterministic stream of bytes to damage files with.
+struct Noise(u64);
+
+impl Noise {
+    fn below(&mut self, limit: usize) -> usize {
+        self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+        ((self.0 >> 33) as usize) % limit
+    }
+
+    /// Overwrites, removes or repeats a few bytes.
+    fn damage(&mut self, bytes: &[u8]) -> Vec<u8> {
+        const ALPHABET: &[u8] = b"0123456789-+./#e\\\n\r nif";
+        let mut bytes = bytes.to_vec();
+        for _ in 0..=self.below(4) {
+            let at = self.below(bytes.len());
+            match self.below(4) {
+                0 => bytes[at] = self.below(256) as u8,
+                1 => bytes[at] = ALPHABET[self.below(ALPHABET.len())],
+                2 => drop(bytes.drain(at..(at + 1 + self.below(8)).min(bytes.len()))),
+                _ => bytes.extend_from_within(at..),
+            }
+            if bytes.is_empty() {
+                bytes.push(b'v');
+            }
+        }
+        bytes
+    }
+}
+
+#[test]
+fn damaged_files_load_or_are_refused() {
+    const ROUNDS: usize = 400;
+    let mut noise = Noise(1);
+    let mtl = b"newmtl a\nKd 0.5 0.5 0.5\nKs 0.04 0.04 0.04\nNi 1.5\nillum 2\nPr 0.2\nmap_Kd -s 2 2 t.bmp\nbump -bm 0.1 t.bmp\n";
+    let obj = format!(
+        "mtllib a.mtl\n{SQUARE}v 2 1 0\nvt 0 1\nvn 0 0 1\nusemtl a\nf 1/1/1 2/1/1 3/1/1\nf -1//1 -2//1 -3//1\nf 1 5 2 3 4\n"
+    );
+    let toml = b"[[mesh]]\nfile = \"a.obj\"\nscale = 2\n[camera]\neye = [1, 2, 3]\nlook_at = [0, 0, 0]\n[material.a]\ncolor_map = \"t.bmp\"\n";
+    let picture = bmp([1, 2, 3]);
+    for _ in 0..ROUNDS {
+        let (obj, mtl, toml) = (noise.damage(obj.as_bytes()), noise.damage(mtl), noise.damage(toml));
+        let picture = noise.damage(&picture);
+        let files = Files::new(&[("a.obj", &obj), ("a.mtl", &mtl), ("a.toml", &toml), ("t.bmp", &picture)]);
+        for name in ["a.obj", "a.toml"] {
+            let Ok(scene) = files.load(name) else { continue };
+            assert_eq!(scene.mesh().validate(scene.materials.len()), Ok(()));
+            assert!(scene.positions.iter().flatten().all(|x| x.is_finite()));
+        }
+    }
+}
+
 #[test]
 fn every_prefix_of_a_file_loads_or_is_refused() {
     let text = format!(

@@ -54,7 +54,7 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<LoadedScene, LoadError
         Some("obj") => {
             let mut builder = SceneBuilder::default();
             builder.add_mesh(path, Placement::IDENTITY, None)?;
-            Ok(builder.build(options, None))
+            builder.build(path, options, None)
         }
         _ => Err(LoadError::of_file(path, "unknown kind of scene", "scenes are .obj or .toml files")),
     }
@@ -221,7 +221,12 @@ impl SceneBuilder {
     }
 
     /// Buffers for the core.
-    fn build(mut self, options: &LoadOptions, environment: Option<EnvironmentChange>) -> LoadedScene {
+    fn build(
+        mut self,
+        path: &Path,
+        options: &LoadOptions,
+        environment: Option<EnvironmentChange>,
+    ) -> Result<LoadedScene, LoadError> {
         for name in self.overrides.keys().filter(|name| !self.used_overrides.contains(*name)) {
             self.notes.add(
                 1,
@@ -253,10 +258,15 @@ impl SceneBuilder {
                 parts.push(Placed { group, placement: mesh.placement, material, texcoords });
             }
         }
+        let vertices: usize = parts.iter().map(|part| part.group.positions.len()).sum();
+        if u32::try_from(vertices).is_err() {
+            let problem = format!("the scene has {vertices} vertices, more than 32 bits can count");
+            return Err(LoadError::of_file(path, problem, "leave out some of its meshes"));
+        }
         let (min, max) = geometry::bounds(&parts);
         let transform = SceneTransform::fitting(min, max);
         let geometry = geometry::assemble(&parts, &transform, notes);
-        LoadedScene {
+        Ok(LoadedScene {
             positions: geometry.positions,
             normals: geometry.normals,
             texcoords: geometry.texcoords,
@@ -270,7 +280,7 @@ impl SceneBuilder {
             settings: RenderSettings::default(),
             transform,
             repairs: self.notes.sentences(),
-        }
+        })
     }
 }
 

@@ -7,6 +7,9 @@ use crate::load::notes::Notes;
 /// Beyond this many corners the quadratic time of ear clipping is not worth it: a fan, and a note.
 const MOST_CORNERS: usize = 4096;
 
+/// A polygon that has no ear so often crosses itself all over, and looking further is wasted.
+const MOST_GUESSES: usize = 16;
+
 /// Triangles of the faces whose corners follow each other in `indices`; `arities` holds their numbers of
 /// corners, or nothing where all are triangles.
 pub(super) fn triangulate(
@@ -93,7 +96,7 @@ fn turn(a: [f64; 2], b: [f64; 2], c: [f64; 2]) -> f64 {
 /// Cuts ears off until a triangle is left; `false` where the polygon is not simple and some cut was a guess.
 fn clip_ears(ring: &[u32], points: &[[f64; 2]], triangles: &mut Vec<[u32; 3]>) -> bool {
     let mut left: Vec<usize> = (0..ring.len()).collect();
-    let mut simple = true;
+    let mut guesses = 0;
     let mut at = 0; // the corner tried next
     let mut tried = 0;
     while left.len() > 3 {
@@ -102,7 +105,11 @@ fn clip_ears(ring: &[u32], points: &[[f64; 2]], triangles: &mut Vec<[u32; 3]>) -
         let flat = turn(points[a], points[b], points[c]) == 0.0;
         let guess = tried >= count;
         if guess || is_ear(points, &left, [a, b, c]) {
-            simple &= !guess;
+            guesses += usize::from(guess);
+            if guesses > MOST_GUESSES {
+                fan(&left.iter().map(|&i| ring[i]).collect::<Vec<_>>(), triangles);
+                return false;
+            }
             if !flat || guess {
                 triangles.push([ring[a], ring[b], ring[c]]);
             }
@@ -117,7 +124,7 @@ fn clip_ears(ring: &[u32], points: &[[f64; 2]], triangles: &mut Vec<[u32; 3]>) -
     if let [a, b, c] = left[..] {
         triangles.push([ring[a], ring[b], ring[c]]);
     }
-    simple
+    guesses == 0
 }
 
 /// Whether the corner `b` sticks out and no other corner lies in the triangle that it makes with its

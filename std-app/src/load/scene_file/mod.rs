@@ -164,7 +164,7 @@ pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<LoadedScene, Lo
         builder.add_mesh(&file, mesh.placement(&source)?, material)?;
     }
     let environment = scene.environment.as_ref().map(|entry| entry.resolved(&source)).transpose()?;
-    let mut loaded = builder.build(options, environment);
+    let mut loaded = builder.build(path, options, environment)?;
     let transform = loaded.transform;
     loaded.lights =
         scene.light.iter().map(|light| light::light(light, &transform, &source)).collect::<Result<_, _>>()?;
