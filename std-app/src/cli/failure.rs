@@ -23,9 +23,9 @@ impl Failure {
 
 impl fmt::Display for Failure {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "error: {}", self.reason.replace('\n', "\n       "))?;
+        write!(f, "error: {}", self.reason)?;
         match &self.advice {
-            Some(advice) => write!(f, "\n  tip: {}", advice.replace('\n', "\n       ")),
+            Some(advice) => write!(f, "\n  help: {advice}"),
             None => Ok(()),
         }
     }

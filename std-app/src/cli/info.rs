@@ -40,7 +40,8 @@ impl Info {
         let [width, height] = self.size.or(loaded.settings.size).unwrap_or([512, 512]);
         let facts = Facts {
             footprints: [
-                ("bvh", Bvh::footprint(scene.mesh.triangles.len()).bytes()),
+                ("bvh", Bvh::kept_footprint(scene.mesh.triangles.len()).bytes()),
+                ("bvh_build", Bvh::footprint(scene.mesh.triangles.len()).bytes()),
                 ("lights", Lights::footprint(&scene).bytes()),
                 ("film", Film::footprint(width, height).bytes()),
             ],
@@ -59,7 +60,7 @@ struct Facts<'a> {
     camera: Camera,
     counts: Vec<(&'static str, u64)>,
     plan: Plan,
-    footprints: [(&'static str, usize); 3],
+    footprints: [(&'static str, usize); 4],
 }
 
 /// The census by name, in the order in which it is told.
@@ -141,9 +142,9 @@ impl Facts<'_> {
         for (what, why) in self.plan.left_out() {
             lines.push(format!("  left out: {what} ({why})"));
         }
-        lines.push("memory".into());
+        lines.push("memory, at most".into());
         for (name, bytes) in self.footprints {
-            lines.push(format!("  {name:<24} {}", readable_bytes(bytes)));
+            lines.push(format!("  {:<24} {}", name.replace('_', " "), readable_bytes(bytes)));
         }
         if !self.loaded.repairs.is_empty() {
             lines.push("repaired".into());

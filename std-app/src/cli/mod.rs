@@ -43,7 +43,7 @@ pub(crate) fn main() -> ExitCode {
     match outcome {
         Ok(Ok(code)) => return code,
         Ok(Err(failure)) => eprintln!("{failure}"),
-        Err(_) => eprintln!("  tip: please report it, with the command and the scene; no file was changed"),
+        Err(_) => eprintln!("  help: please report it, with the command and the scene; no file was changed"),
     }
     ExitCode::from(2)
 }

@@ -89,8 +89,9 @@ impl Report<'_> {
             lines.push(format!("saved  {}", output.display()));
         }
         let early = if result.ending == Ending::Interrupted { ", stopped early" } else { "" };
-        let (width, height, spp) = (settings.width, settings.height, result.spp);
-        lines.push(format!("image  {width}x{height}, {spp} samples per pixel{early}"));
+        let (width, height, samples) =
+            (settings.width, settings.height, plural(result.spp as usize, "sample"));
+        lines.push(format!("image  {width}x{height}, {samples} per pixel{early}"));
         lines.push(match result.error {
             Some(ErrorEstimate { relmse, lower, upper }) => {
                 format!("error  relMSE {relmse:.3e} (95 %: {lower:.3e} to {upper:.3e}), estimated from its own noise")

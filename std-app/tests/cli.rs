@@ -1,0 +1,232 @@
+//! The command line as a contract: the program as scripts and people run it.
+
+use halflight::save::{Image, read, write};
+use serde_json::Value;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+/// A lamp over a floor.
+const SCENE: &str = "mtllib scene.mtl\n\
+    v -1 0 -1\nv 1 0 -1\nv 1 0 1\nv -1 0 1\nv -1 2 -1\nv 1 2 -1\nv 1 2 1\nv -1 2 1\n\
+    usemtl floor\nf 4 3 2 1\nusemtl lamp\nf 5 6 7 8\n";
+const MATERIALS: &str = "newmtl floor\nKd 0.5 0.5 0.5\nnewmtl lamp\nKd 0 0 0\nKe 1 1 1\n";
+
+/// A folder of its own for each test, with the scene in it; gone when the test ends well.
+struct Folder(PathBuf);
+
+impl Folder {
+    fn new(name: &str) -> Self {
+        let folder = std::env::temp_dir().join(format!("halflight-cli-{name}-{}", std::process::id()));
+        std::fs::create_dir_all(&folder).unwrap();
+        std::fs::write(folder.join("scene.obj"), SCENE).unwrap();
+        std::fs::write(folder.join("scene.mtl"), MATERIALS).unwrap();
+        Self(folder)
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.0.join(name)
+    }
+
+    fn command(&self, arguments: &str) -> Command {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_halflight"));
+        command.current_dir(&self.0).args(arguments.split_whitespace());
+        command
+    }
+
+    fn run(&self, arguments: &str) -> Output {
+        self.command(arguments).output().unwrap()
+    }
+
+    /// Runs what must succeed, and returns the object that it prints.
+    fn object(&self, arguments: &str) -> Value {
+        let output = self.run(arguments);
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(0), "{arguments}: {said}");
+        serde_json::from_slice(&output.stdout).unwrap()
+    }
+
+    /// Runs what must be refused with exit code 2, and returns what is said.
+    fn refused(&self, arguments: &str) -> String {
+        let output = self.run(arguments);
+        let said = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(2), "{arguments}: {said}");
+        assert!(output.stdout.is_empty(), "{arguments}: results go to stdout, complaints do not");
+        assert!(!said.contains("panicked"), "{said}");
+        said
+    }
+}
+
+impl Drop for Folder {
+    fn drop(&mut self) {
+        if !std::thread::panicking() {
+            let _ = std::fs::remove_dir_all(&self.0);
+        }
+    }
+}
+
+fn files(folder: &Path) -> usize {
+    std::fs::read_dir(folder).unwrap().count()
+}
+
+#[test]
+fn help_and_version_are_no_errors() {
+    let folder = Folder::new("help");
+    for arguments in ["--help", "render --help", "compare --help", "info --help", "--version"] {
+        let output = folder.run(arguments);
+        assert_eq!(output.status.code(), Some(0), "{arguments}");
+        assert!(!output.stdout.is_empty(), "{arguments}");
+    }
+    let help = String::from_utf8(folder.run("render --help").stdout).unwrap();
+    for flag in ["--eye", "--look-at", "--up", "--fov", "--size", "--method", "--caustics", "--spp", "--time"]
+    {
+        assert!(help.contains(flag), "{flag}");
+    }
+}
+
+#[test]
+fn wrong_usage_is_refused_before_anything_is_written() {
+    let folder = Folder::new("usage");
+    for (arguments, reason) in [
+        ("", "Usage"),
+        ("paint scene.obj", "unrecognized subcommand"),
+        ("render scene.obj --method photons", "possible values: auto, path"),
+        ("render scene.obj --size 640", "640x480"),
+        ("render scene.obj --size 0x5", "640x480"),
+        ("render scene.obj --eye 1,2", "three numbers"),
+        ("render scene.obj --time soon", "30s, 2m or 1h"),
+        ("render scene.obj --spp 0", "0 is not in"),
+        ("render scene.obj --simd mmx", "baseline, avx2, avx512"),
+        ("render scene.obj --sparkle", "unexpected argument"),
+        ("render scene.obj --eye 1,1,1 --look-at 1,1,1", "stands at the point"),
+        ("render scene.obj --eye 0,9,0 --look-at 0,0,0", "--up 0,0,1"),
+        ("render scene.obj --memory 1K --size 64x64", "raise --memory"),
+        ("render missing.obj", "missing.obj"),
+        ("render scene.mtl", "scene.mtl"),
+        ("render scene.obj -o picture.gif", "picture.gif"),
+        ("render scene.obj -o no/such/folder.png", "no folder"),
+        ("render scene.obj --reference missing.exr", "missing.exr"),
+        ("compare missing.exr missing.exr", "missing.exr"),
+        ("compare scene.obj scene.obj", ".exr"),
+        ("info missing.toml", "missing.toml"),
+    ] {
+        let said = folder.refused(arguments);
+        assert!(said.contains(reason), "{arguments}: {said}");
+    }
+    assert_eq!(files(&folder.0), 2);
+}
+
+#[test]
+fn a_render_writes_every_picture_and_says_the_contract() {
+    let folder = Folder::new("render");
+    let object = folder.object(
+        "render scene.obj -o a.png -o a.exr -o a.hdr -o a.pfm --size 24x16 --spp 4 --seed 7 --threads 1 \
+         --simd baseline --eye -0.5,1,4 --look-at 0,1,0 --fov 45 --json",
+    );
+    for name in ["a.png", "a.exr", "a.hdr", "a.pfm"] {
+        let image = read(&folder.path(name)).unwrap();
+        assert_eq!((image.width, image.height), (24, 16), "{name}");
+        assert!(image.mean()[0] > 0.01, "{name} is not black");
+    }
+    assert_eq!(files(&folder.0), 6, "nothing else is left");
+
+    for key in ["rays", "paths", "rounds"] {
+        assert!(object[key].as_u64().unwrap() > 0, "{key}");
+    }
+    for key in ["load", "build", "render", "total"] {
+        assert!(object["seconds"][key].as_f64().unwrap() >= 0.0, "{key}");
+    }
+    assert_eq!(object["paths"], 24 * 16 * 4);
+    for (key, value) in [("width", 24), ("height", 16), ("spp", 4), ("seed", 7), ("threads", 1)] {
+        assert_eq!(object[key], value, "{key}");
+    }
+    assert_eq!((object["method"].as_str(), object["level"].as_str()), (Some("path"), Some("baseline")));
+    assert_eq!(object["error"]["against"], "estimate");
+    assert!(object["error"]["relmse"].is_number() && object["error"]["interval"].is_array());
+    assert!(object["dropped"].is_object() && object["memory"]["bvh"].is_number());
+    assert_eq!(object["mean_radiance"].as_array().unwrap().len(), 3);
+    let left_out = object["left_out"].as_array().unwrap();
+    assert!(left_out.iter().all(|entry| entry["what"].is_string() && entry["why"].is_string()));
+}
+
+#[test]
+fn threads_leave_the_bits_alone() {
+    let folder = Folder::new("bits");
+    for (name, threads) in [("one", 1), ("three", 3)] {
+        folder.object(&format!(
+            "render scene.obj -o {name}.pfm --size 40x30 --spp 5 --threads {threads} --json"
+        ));
+    }
+    let bytes = |name| std::fs::read(folder.path(name)).unwrap();
+    assert!(bytes("one.pfm") == bytes("three.pfm"));
+}
+
+#[test]
+fn without_output_the_picture_has_the_name_of_the_scene() {
+    let folder = Folder::new("default");
+    folder.object("render scene.obj --size 8x8 --spp 1 --json");
+    assert_eq!(read(&folder.path("scene.png")).unwrap().pixels.len(), 64);
+}
+
+#[test]
+fn a_reference_is_compared_with_and_its_size_is_checked_first() {
+    let folder = Folder::new("reference");
+    folder.object("render scene.obj -o r.exr --size 16x16 --spp 64 --json");
+    let object =
+        folder.object("render scene.obj -o a.exr --size 16x16 --spp 4 --seed 1 --reference r.exr --json");
+    assert_eq!(object["error"]["against"], "reference");
+    for key in ["relmse", "mse", "rmse", "flip"] {
+        assert!(object["error"][key].as_f64().unwrap() > 0.0, "{key}");
+    }
+    assert!(object["error"]["estimate"]["relmse"].is_number());
+    let said = folder.refused("render scene.obj -o b.exr --size 9x9 --reference r.exr");
+    assert!(said.contains("--size 16x16") && !folder.path("b.exr").exists(), "{said}");
+}
+
+#[test]
+fn compare_prints_known_values() {
+    let folder = Folder::new("compare");
+    let flat = |value: f32| Image { width: 2, height: 1, pixels: vec![[value; 3]; 2] };
+    write(&folder.path("a.exr"), &flat(1.5)).unwrap();
+    write(&folder.path("b.pfm"), &flat(1.0)).unwrap();
+    let object = folder.object("compare a.exr b.pfm --json -o d.pfm");
+    assert_eq!((object["mse"].as_f64(), object["rmse"].as_f64()), (Some(0.25), Some(0.5)));
+    assert_eq!(object["relmse"].as_f64(), Some(0.25 / 1.01));
+    assert_eq!(object["flip"].as_f64(), Some(0.0), "both are white on a display");
+    assert_eq!(read(&folder.path("d.pfm")).unwrap(), flat(0.5));
+
+    write(&folder.path("c.exr"), &Image::black(3, 1)).unwrap();
+    assert!(folder.refused("compare a.exr c.exr").contains("2x1 and 3x1"));
+    write(&folder.path("nan.pfm"), &flat(f32::NAN)).unwrap();
+    let text = String::from_utf8(folder.run("compare nan.pfm b.pfm").stdout).unwrap();
+    assert!(text.contains("2 pixels of the picture are infinite or not a number"), "{text}");
+}
+
+#[test]
+fn info_counts_what_is_there() {
+    let folder = Folder::new("info");
+    let object = folder.object("info scene.obj --json");
+    assert_eq!(
+        (object["census"]["triangles"].as_u64(), object["census"]["emissive"].as_u64()),
+        (Some(4), Some(2))
+    );
+    assert!(object["memory"]["bvh"].is_number() && !object["left_out"].as_array().unwrap().is_empty());
+    let text = String::from_utf8(folder.run("info scene.obj").stdout).unwrap();
+    assert!(text.contains("triangles") && text.contains("left out"), "{text}");
+}
+
+/// Ctrl-C, as a terminal sends it.
+#[cfg(unix)]
+#[test]
+fn an_interrupt_saves_what_there_is_and_exits_with_3() {
+    use std::process::Stdio;
+    let folder = Folder::new("interrupt");
+    let mut command = folder.command("render scene.obj -o a.png --size 64x64 --time 1h --json");
+    let child = command.stdout(Stdio::piped()).stderr(Stdio::null()).spawn().unwrap();
+    std::thread::sleep(core::time::Duration::from_secs(2));
+    assert!(Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success());
+    let output = child.wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(3));
+    let object: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(object["ending"], "interrupted");
+    assert_eq!(read(&folder.path("a.png")).unwrap().pixels.len(), 64 * 64);
+}
