@@ -50,6 +50,11 @@ impl Memory {
         Ok(lines)
     }
 
+    /// Says that what `structure` took is free again.
+    pub(super) fn give_back(&mut self, structure: &'static str) {
+        self.uses.retain(|other| other.structure != structure);
+    }
+
     /// Bytes of each structure.
     pub(super) fn uses(&self) -> Vec<MemoryUse> {
         self.uses.clone()

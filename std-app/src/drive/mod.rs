@@ -20,7 +20,7 @@ use halflight_core::bvh::Bvh;
 use halflight_core::census::{Census, WithFeatures};
 use halflight_core::film::Film;
 use halflight_core::light::Lights;
-use halflight_core::memory::{Arena, OutOfMemory};
+use halflight_core::memory::{Arena, Line, OutOfMemory};
 use halflight_core::scene::Scene;
 use halflight_core::transport::{Counters, PathSettings, PathTracer, UNLIMITED, path::WAVE};
 use memory::Memory;
@@ -199,8 +199,8 @@ impl WithFeatures for Render<'_> {
             (0..workers.count()).map(|_| memory.take("paths", scratch)).collect::<Result<Vec<_>, _>>()?;
         let mut lights_lines = memory.take("lights", Lights::footprint(scene).and(Lights::scratch(scene)))?;
         let lights = Lights::build(scene, &mut Arena::new(bytemuck::cast_slice_mut(&mut lights_lines)))?;
-        let mut bvh_lines = memory.take("bvh", Bvh::footprint(scene.mesh.triangles.len()))?;
-        let bvh = Bvh::build(&scene.mesh, &mut Arena::new(bytemuck::cast_slice_mut(&mut bvh_lines)))?;
+        let mut bvh_lines = Vec::new();
+        let bvh = build_bvh(scene, &workers, &mut memory, &mut bvh_lines)?;
         let build = build_start.elapsed().as_secs_f64();
 
         let mut film = Film::new(width, height, &mut Arena::new(bytemuck::cast_slice_mut(&mut film_lines)))?;
@@ -243,6 +243,21 @@ impl WithFeatures for Render<'_> {
             ending: if interrupted { Ending::Interrupted } else { Ending::Done },
         })
     }
+}
+
+/// The hierarchy, built on all cores, then moved out of the working memory of its build into `lines`.
+fn build_bvh<'m>(
+    scene: &Scene,
+    workers: &Workers,
+    memory: &mut Memory,
+    lines: &'m mut Vec<Line>,
+) -> Result<Bvh<'m>, RenderError> {
+    let mut working = memory.take("bvh build", Bvh::footprint(scene.mesh.triangles.len()))?;
+    let built = workers.build_bvh(&scene.mesh, &mut Arena::new(bytemuck::cast_slice_mut(&mut working)))?;
+    *lines = memory.take("bvh", built.used())?;
+    let bvh = built.copied(&mut Arena::new(bytemuck::cast_slice_mut(lines)))?;
+    memory.give_back("bvh build");
+    Ok(bvh)
 }
 
 fn image(film: &Film) -> Image {

@@ -4,8 +4,10 @@ use super::RenderError;
 use core::ops::Range;
 use core::sync::atomic::{AtomicBool, Ordering};
 use halflight_core::bsdf::Features;
+use halflight_core::bvh::{Bvh, Join};
 use halflight_core::film::{Film, PIXELS_PER_TILE};
 use halflight_core::memory::{Arena, Line, OutOfMemory};
+use halflight_core::scene::Mesh;
 use halflight_core::transport::{Counters, PathTracer, path::WAVE};
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use std::sync::Mutex;
@@ -25,6 +27,11 @@ impl Workers {
     /// How many there are.
     pub(super) fn count(&self) -> usize {
         self.pool.current_num_threads()
+    }
+
+    /// Builds the hierarchy over `mesh` on all threads.
+    pub(super) fn build_bvh<'m>(&self, mesh: &Mesh, arena: &mut Arena<'m>) -> Result<Bvh<'m>, OutOfMemory> {
+        self.pool.install(|| Bvh::build_with(mesh, arena, &Fork))
     }
 
     /// One round: `samples` of every pixel. When `interrupt` is raised, tiles not yet begun are left out.
@@ -63,6 +70,15 @@ impl Workers {
             }
         });
         total.into_inner().unwrap_or_else(|poisoned| poisoned.into_inner())
+    }
+}
+
+/// Forks on the pool that runs it.
+struct Fork;
+
+impl Join for Fork {
+    fn join(&self, a: impl FnOnce() + Send, b: impl FnOnce() + Send) {
+        rayon::join(a, b);
     }
 }
 
