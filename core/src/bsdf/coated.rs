@@ -1,7 +1,7 @@
 //! A rough or smooth coat over a diffuse base: what the coat does not reflect, on the way in and on the way
 //! out, meets the base (Ashikhmin et al. 2000, §2.4; Kelemen and Szirmay-Kalos 2001):
 //!
-//! f = D G2 F / (4 cos θ_o cos θ_i) + base · T(θ_o) T(θ_i) / π
+//! f = D G F / (4 cos θ_o cos θ_i) + base · T(θ_o) T(θ_i) / π
 //!
 //! Symmetric in the directions, hence reciprocal. [`super::Glossy`] and [`super::Plastic`] say what F, T and
 //! base are, and why no energy is gained.

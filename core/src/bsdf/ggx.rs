@@ -48,11 +48,12 @@ impl Ggx {
         2.0 * c / (c + self.stretch(v))
     }
 
-    /// G2 / (4 cos θ_o cos θ_i) of a reflection, masking and shadowing correlated by height
-    /// (Heitz 2014, eq. 99): 1/(1 + Λ_o + Λ_i) without the cosines that cancel.
+    /// G / (4 cos θ_o cos θ_i) of a reflection, masking and shadowing independent (Walter 2007, eq. 23), as in
+    /// the renderers that published scenes were made for. Correlating them by height (Heitz 2014, eq. 99) would
+    /// return a little more at grazing angles.
     #[inline]
     pub fn visibility(&self, wo: Vec3, wi: Vec3) -> f32 {
-        0.5 / (wo.z * self.stretch(wi) + wi.z * self.stretch(wo))
+        1.0 / ((wo.z + self.stretch(wo)) * (wi.z + self.stretch(wi)))
     }
 
     /// A normal of density D(m) G1(wo) (wo·m)⁺ / cos θ_o: visible normals by spherical caps
@@ -83,13 +84,12 @@ impl Ggx {
         0.5 * self.density(h) / (self.cap_bound(wo) * wo.z + self.stretch(wo))
     }
 
-    /// G2 |cos θ_i| D / (4 cos θ_o cos θ_i) over the density of [`Ggx::sample_reflection`]: D cancels, what
-    /// is left lies in 0 … 1.
+    /// G |cos θ_i| D / (4 cos θ_o cos θ_i) over the density of [`Ggx::sample_reflection`]: D cancels, what is
+    /// left lies in 0 … 1.
     #[inline]
     pub fn reflection_weight(&self, wo: Vec3, wi: Vec3) -> f32 {
-        let stretch_o = self.stretch(wo);
-        let sum = wo.z * self.stretch(wi) + wi.z * stretch_o;
-        wi.z * (self.cap_bound(wo) * wo.z + stretch_o) / sum
+        let stretch = self.stretch(wo);
+        self.masking(wi) * (self.cap_bound(wo) * wo.z + stretch) / (wo.z + stretch)
     }
 
     /// k of Eto and Tokuyoshi (2023, eq. 5): by how much the cap's lower bound rises.

@@ -6,9 +6,7 @@ use super::{BsdfSample, fresnel};
 use crate::Rgb;
 use glam::Vec3;
 
-/// Frosted glass, seen from one of its sides. Masking and shadowing are correlated by height where light is
-/// reflected, independent where it is transmitted (closer there to the exact Beta function of Heitz 2014,
-/// eq. 101, than the formula of reflection).
+/// Frosted glass, seen from one of its sides. Masking and shadowing are independent.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RoughDielectric {
     /// Index of refraction beyond the surface over that on the side of the viewer; not 1.
@@ -36,9 +34,7 @@ impl RoughDielectric {
             if !(wi.z > 0.0) {
                 return None;
             }
-            // G2 / G1(wo), with G2 = 4 cos θ_o cos θ_i visibility.
-            let shadowing = 4.0 * wo.z * wi.z * ggx.visibility(wo, wi) / ggx.masking(wo);
-            let weight = Rgb::splat(reflectance / p * shadowing);
+            let weight = Rgb::splat(reflectance / p * ggx.masking(wi));
             return Some(BsdfSample::reflection(wi, weight, p * normals / (4.0 * c)));
         }
         let wi = refract(wo, m, c, self.eta);

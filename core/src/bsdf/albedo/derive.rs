@@ -42,10 +42,8 @@ impl Tables {
                 units(nodes.iter().map(|&(x, w)| w * 4.0 * x.powi(3) * f(x * x, alpha(j))).sum())
             })
         };
-        let white = |c: f64, a: f64| reflectance(&nodes, c, a, &|_| 1.0, correlated) - 1.0;
-        let edge = |c: f64, a: f64| {
-            reflectance(&nodes, c, a, &|c| (1.0 - c).powi(5), correlated) - (1.0 - c).powi(5)
-        };
+        let white = |c: f64, a: f64| reflectance(&nodes, c, a, &|_| 1.0) - 1.0;
+        let edge = |c: f64, a: f64| reflectance(&nodes, c, a, &|c| (1.0 - c).powi(5)) - (1.0 - c).powi(5);
         let transmitted =
             |eta: f64| move |c: f64, a: f64, nodes: &Nodes| transmittance(nodes, c, a, eta) - smooth(c, eta);
         Self {
@@ -92,14 +90,9 @@ fn lambda(c: f64, alpha: f64) -> f64 {
     0.5 * ((1.0 + alpha * alpha * (1.0 - c * c) / (c * c)).sqrt() - 1.0)
 }
 
-/// G2 / G1 of reflection, by height (Heitz 2014).
-fn correlated(c_o: f64, c_i: f64, alpha: f64) -> f64 {
-    (1.0 + lambda(c_o, alpha)) / (1.0 + lambda(c_o, alpha) + lambda(c_i, alpha))
-}
-
-/// G2 / G1 of independent masking and shadowing.
-fn separable(_: f64, c_i: f64, alpha: f64) -> f64 {
-    1.0 / (1.0 + lambda(c_i, alpha))
+/// Smith's shadowing G1 = 1 / (1 + Λ), independent of masking.
+fn shadowing(c: f64, alpha: f64) -> f64 {
+    1.0 / (1.0 + lambda(c, alpha))
 }
 
 /// Mean of `f(viewer, normal)` over the normals that are visible from the cosine `c`.
@@ -127,17 +120,11 @@ fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
 }
 
 /// Directional albedo of microfacets of Fresnel term `f`.
-fn reflectance(
-    nodes: &Nodes,
-    c: f64,
-    alpha: f64,
-    f: &dyn Fn(f64) -> f64,
-    shadowing: fn(f64, f64, f64) -> f64,
-) -> f64 {
+fn reflectance(nodes: &Nodes, c: f64, alpha: f64, f: &dyn Fn(f64) -> f64) -> f64 {
     over_visible_normals(nodes, c, alpha, &|wo, m| {
         let c = dot(wo, m);
         let z = 2.0 * c * m[2] - wo[2];
-        if z > 0.0 { f(c.min(1.0)) * shadowing(wo[2], z, alpha) } else { 0.0 }
+        if z > 0.0 { f(c.min(1.0)) * shadowing(z, alpha) } else { 0.0 }
     })
 }
 
@@ -146,7 +133,7 @@ fn transmittance(nodes: &Nodes, c: f64, alpha: f64, eta: f64) -> f64 {
     over_visible_normals(nodes, c, alpha, &|wo, m| {
         let c = dot(wo, m).min(1.0);
         let z = ((c - (eta * eta - 1.0 + c * c).sqrt()) * m[2] - wo[2]) / eta;
-        if z < 0.0 { (1.0 - fresnel(c, eta)) * separable(wo[2], -z, alpha) } else { 0.0 }
+        if z < 0.0 { (1.0 - fresnel(c, eta)) * shadowing(-z, alpha) } else { 0.0 }
     })
 }
 
@@ -154,7 +141,7 @@ fn transmittance(nodes: &Nodes, c: f64, alpha: f64, eta: f64) -> f64 {
 fn internal(nodes: &Nodes, alpha: f64, eta: f64) -> f64 {
     let sum: f64 = (0..64)
         .map(|i| (f64::from(i) / 63.0).max(GRAZING))
-        .map(|c| c * reflectance(nodes, c, alpha, &|c| fresnel(c, 1.0 / eta), separable))
+        .map(|c| c * reflectance(nodes, c, alpha, &|c| fresnel(c, 1.0 / eta)))
         .sum();
     2.0 * sum / 64.0
 }
