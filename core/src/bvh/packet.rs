@@ -14,7 +14,7 @@ use super::batch::Sink;
 use super::layout::{Child, STACK};
 use super::walk::leaf_corners;
 use crate::geometry::{Hit, MISS, Ray};
-use halflight_simd::kernels::boxes::{SlabInterval, SlabInterval8, SlabRays16};
+use halflight_simd::kernels::boxes::{ROBUST, SlabInterval, SlabInterval8, SlabRays16};
 use halflight_simd::kernels::safe_reciprocal;
 use halflight_simd::kernels::triangles::{Found, Shear, ShearRays16, intersect};
 use halflight_simd::{Lanes, Mask, Simd};
@@ -197,7 +197,7 @@ fn walk<S: Simd, const K: usize, const ANY: bool>(
             }
             height -= 1;
             let (bits, from, entry) = stack[height.min(STACK - 1)];
-            if entry <= t_max {
+            if entry <= t_max * ROBUST {
                 (child, holder) = (Child(bits), from);
                 break;
             }

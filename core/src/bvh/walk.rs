@@ -12,7 +12,7 @@
 use super::Bvh;
 use super::layout::Child;
 use crate::geometry::{Hit, MISS, Ray};
-use halflight_simd::kernels::boxes::{SlabRay, SlabRay8};
+use halflight_simd::kernels::boxes::{ROBUST, SlabRay, SlabRay8};
 use halflight_simd::kernels::triangles::{Found, Shear, ShearRay8, intersect};
 use halflight_simd::{Lanes, Simd, Stacks};
 
@@ -83,7 +83,7 @@ impl Walk {
         self.height -= 1;
         let (bits, entry) = self.stacks.get(self.height);
         let child = Child(bits);
-        if entry > self.best.t {
+        if entry > self.best.t * ROBUST {
             return true;
         }
         if !child.is_leaf() {

@@ -12,8 +12,9 @@
 use super::safe_reciprocal;
 use crate::lanes::{Lanes, Mask, Simd};
 
-/// 1 + 2 gamma(3): what the roundings of subtraction, reciprocal and product can amount to.
-pub const ROBUST: f32 = 1.000_000_4;
+/// 1 + 2 gamma(3), what the roundings of subtraction, reciprocal and product can amount to, and as much again
+/// for the roundings of the distance of a hit, with which entries are compared.
+pub const ROBUST: f32 = 1.000_001;
 
 /// Planes of eight boxes: rows `[lo x, hi x, lo y, hi y, lo z, hi z]`, each for the eight boxes.
 /// Two more rows are the caller's: eight rows make any row index safe by a mask.

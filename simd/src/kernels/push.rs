@@ -20,9 +20,10 @@ pub fn push(
     for i in 0..8 {
         let lane = (order >> (4 * i) & 7) as usize;
         // One slot too far is harmless: eight are there.
-        stacks.items[height] = items[lane].to_bits();
-        stacks.entries[height] = entry[lane];
-        height = (height + (entry[lane] <= exit[lane]) as usize).min(STACK - 1);
+        let slot = height.min(STACK - 1);
+        stacks.items[slot] = items[lane].to_bits();
+        stacks.entries[slot] = entry[lane];
+        height += (entry[lane] <= exit[lane]) as usize;
     }
     height
 }
