@@ -6,6 +6,7 @@ pub mod bsdf;
 pub mod bvh;
 #[cfg(feature = "app")]
 pub mod image_input;
+pub mod kernels;
 pub mod lanes;
 #[cfg(feature = "app")]
 pub mod mtl;
@@ -30,6 +31,7 @@ pub const TARGETS: &[Target] = &[
     Target { name: "bvh", run: bvh::run },
     #[cfg(feature = "app")]
     Target { name: "image_input", run: image_input::run },
+    Target { name: "kernels", run: kernels::run },
     Target { name: "lanes", run: lanes::run },
     #[cfg(feature = "app")]
     Target { name: "mtl", run: mtl::run },

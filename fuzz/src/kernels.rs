@@ -1,0 +1,217 @@
+//! The kernels of traversal at every level against their scalar references, lane by lane and to the bit.
+
+use crate::numbers::{coordinate, point};
+use arbitrary::{Result, Unstructured};
+use halflight_simd::kernels::boxes::{Boxes8, SlabRay, SlabRay8, SlabRays16};
+use halflight_simd::kernels::push::push;
+use halflight_simd::kernels::triangles::{Shear, ShearRay8, ShearRays16, intersect};
+use halflight_simd::{Kernel, Lanes, Level, STACK, Simd, Stacks};
+
+fn finite(point: [f32; 3]) -> [f32; 3] {
+    point.map(|x| if x.is_finite() { x } else { 0.0 })
+}
+
+/// One input.
+pub fn run(data: &[u8]) {
+    let _ = attempt(&mut Unstructured::new(data));
+}
+
+fn attempt(input: &mut Unstructured) -> Result<()> {
+    let count = input.int_in_range(1..=8)?;
+    let t_max = coordinate(input)?.abs();
+    let direction = finite(point(input)?);
+    if direction == [0.0; 3] {
+        return Ok(());
+    }
+    let mut origins = [[0.0; 3]; 16];
+    for origin in &mut origins {
+        *origin = finite(point(input)?);
+    }
+    let mut boxes: Boxes8 = [[0.0; 8]; 8];
+    for axis in boxes.chunks_exact_mut(2).take(3) {
+        let [low, high] = axis else { continue };
+        for (low, high) in low.iter_mut().zip(high) {
+            let [a, b] = [coordinate(input)?, coordinate(input)?].map(|x| if x.is_nan() { 0.0 } else { x });
+            (*low, *high) = (a.min(b), a.max(b));
+        }
+    }
+    let mut corners = [[[0.0; 3]; 3]; 8];
+    for corner in corners.as_flattened_mut() {
+        *corner = finite(point(input)?);
+    }
+    let work = Work {
+        count,
+        t_max: if t_max.is_nan() { f32::INFINITY } else { t_max },
+        direction,
+        origins,
+        boxes,
+        corners,
+    };
+    let push =
+        Push { order: input.arbitrary()?, height: input.arbitrary::<u16>()? as usize % (STACK + 8), boxes };
+    for level in Level::detect().and_below() {
+        work.check(level, &level.dispatch(&work));
+        push.check(level);
+    }
+    Ok(())
+}
+
+/// Sixteen rays of one direction, eight boxes, `count` triangles.
+#[derive(Debug)]
+struct Work {
+    count: usize,
+    t_max: f32,
+    direction: [f32; 3],
+    origins: [[f32; 3]; 16],
+    boxes: Boxes8,
+    corners: [[[f32; 3]; 3]; 8],
+}
+
+/// Distances with the bits of the lanes that hit, of which those on an edge are left to the reference.
+struct Seen<const N: usize> {
+    t: [f32; N],
+    u: [f32; N],
+    v: [f32; N],
+    hits: u32,
+    doubtful: u32,
+}
+
+/// What the kernels give: the first ray against all, and all rays against the first box and triangle.
+struct Answers {
+    boxes: ([f32; 8], u32),
+    triangles: Seen<8>,
+    rays_box: ([f32; 16], u32),
+    rays_triangle: Seen<16>,
+}
+
+impl Kernel for &Work {
+    type Out = Answers;
+
+    #[inline(always)]
+    fn run<S: Simd>(self, simd: S) -> Answers {
+        let slab = SlabRay::new(self.origins[0], self.direction);
+        let shear = Shear::new(self.direction);
+        let (entry, bits) = SlabRay8::new(simd, &slab).enters(simd, &self.boxes, self.t_max);
+        // Nine runs of `count` floats, and room to read eight from the last.
+        let mut values = [0.0; 80];
+        for (triangle, corners) in self.corners.iter().take(self.count).enumerate() {
+            for (run, value) in corners.as_flattened().iter().enumerate() {
+                values[run * self.count + triangle] = *value;
+            }
+        }
+        let found =
+            ShearRay8::new(simd, self.origins[0], &shear).meets(simd, &values, 0, self.count, self.t_max);
+        let found = found.expect("eight floats can be read from every run");
+        let axis = |k: usize| simd.load16(&self.origins.map(|origin| origin[k]));
+        let rays = SlabRays16 {
+            origin: [axis(0), axis(1), axis(2)],
+            reciprocal: slab.reciprocal.map(|r| simd.splat16(r)),
+            near: slab.near,
+        };
+        let (rays_entry, rays_bits) = rays.enters(simd, &self.boxes, 0, simd.splat16(self.t_max));
+        let rays = ShearRays16 {
+            axes: shear.axes,
+            origin: shear.axes.map(axis),
+            factors: shear.factors.map(|f| simd.splat16(f)),
+        };
+        let all = rays.meets(simd, self.corners[0], simd.splat16(self.t_max), 0xffff);
+        Answers {
+            boxes: (entry.to_array(), bits),
+            triangles: Seen {
+                t: found.t.to_array(),
+                u: found.u.to_array(),
+                v: found.v.to_array(),
+                hits: found.hits,
+                doubtful: found.doubtful,
+            },
+            rays_box: (rays_entry.to_array(), rays_bits),
+            rays_triangle: Seen {
+                t: all.t.to_array(),
+                u: all.u.to_array(),
+                v: all.v.to_array(),
+                hits: all.hits,
+                doubtful: all.doubtful,
+            },
+        }
+    }
+}
+
+impl Work {
+    fn check(&self, level: Level, answers: &Answers) {
+        for i in 0..8 {
+            self.entered(level, i, 0, answers.boxes.0[i], answers.boxes.1 >> i & 1 == 1);
+        }
+        for ray in 0..16 {
+            self.entered(level, 0, ray, answers.rays_box.0[ray], answers.rays_box.1 >> ray & 1 == 1);
+        }
+        for triangle in 0..8 {
+            if triangle < self.count {
+                self.met(level, triangle, 0, &answers.triangles, triangle);
+            } else {
+                assert_eq!(
+                    (answers.triangles.hits | answers.triangles.doubtful) >> triangle & 1,
+                    0,
+                    "{level:?}"
+                );
+            }
+        }
+        for ray in 0..16 {
+            self.met(level, 0, ray, &answers.rays_triangle, ray);
+        }
+    }
+
+    fn entered(&self, level: Level, i: usize, ray: usize, entry: f32, met: bool) {
+        let reference = SlabRay::new(self.origins[ray], self.direction).enters(&self.boxes, i, self.t_max);
+        assert_eq!(reference.is_some(), met, "{level:?} box {i} ray {ray} of {self:?}");
+        if let Some(reference) = reference {
+            assert_eq!(reference, entry, "{level:?} box {i} ray {ray} of {self:?}");
+        }
+    }
+
+    fn met<const N: usize>(&self, level: Level, triangle: usize, ray: usize, seen: &Seen<N>, lane: usize) {
+        if seen.doubtful >> lane & 1 == 1 {
+            return assert_eq!(seen.hits >> lane & 1, 0, "a doubtful lane is no hit: {level:?} {self:?}");
+        }
+        let shear = Shear::new(self.direction);
+        let reference = intersect(self.origins[ray], &shear, self.t_max, self.corners[triangle]);
+        let hit = (seen.hits >> lane & 1 == 1).then(|| (seen.t[lane], seen.u[lane], seen.v[lane]));
+        let bits = |hit: Option<(f32, f32, f32)>| hit.map(|(t, u, v)| [t, u, v].map(f32::to_bits));
+        assert_eq!(bits(reference), bits(hit), "{level:?} triangle {triangle} ray {ray} of {self:?}");
+    }
+}
+
+/// The children of rows 0 and 1 of the boxes, taken as entries and exits, onto a stack of some height.
+#[derive(Clone, Copy)]
+struct Push {
+    order: u32,
+    height: usize,
+    boxes: Boxes8,
+}
+
+/// The same, with the stacks.
+struct PushOnto<'a>(Push, &'a mut Stacks);
+
+impl Kernel for PushOnto<'_> {
+    type Out = usize;
+
+    #[inline(always)]
+    fn run<S: Simd>(self, simd: S) -> usize {
+        let PushOnto(Push { order, height, boxes }, stacks) = self;
+        simd.push8(order, simd.load8(&boxes[0]), simd.load8(&boxes[1]), &boxes[2], stacks, height)
+    }
+}
+
+impl Push {
+    fn check(self, level: Level) {
+        let (mut stacks, mut reference) = (Stacks::new(), Stacks::new());
+        let height = level.dispatch(PushOnto(self, &mut stacks));
+        let [entry, exit, items, ..] = &self.boxes;
+        let expected = push(self.order, entry, exit, items, &mut reference, self.height);
+        assert_eq!(height, expected, "{level:?} order {:x} {:?}", self.order, self.boxes);
+        for at in self.height..height {
+            let [got, wanted] =
+                [stacks.get(at), reference.get(at)].map(|(item, entry)| (item, entry.to_bits()));
+            assert_eq!(got, wanted, "{level:?} order {:x} {:?}", self.order, self.boxes);
+        }
+    }
+}
