@@ -99,8 +99,8 @@ pub(super) fn power_heuristic(own: f32, other: f32) -> f32 {
     1.0 / (1.0 + ratio * ratio)
 }
 
-/// Paths of fewer segments than this always go on. On the Cornell box 3 costs a fifth fewer rays and half as much
-/// error again: 5 has a fifth more of 1 / (relMSE · seconds).
+/// Paths of fewer segments than this always go on. On the Cornell box 3 gives a fifth fewer rays and half as
+/// much error again: 5 has a fifth more of 1 / (relMSE · seconds).
 const ROULETTE_FROM: u32 = 5;
 
 /// From this many segments on nothing survives for certain, so that paths end even between perfect mirrors.
