@@ -243,6 +243,16 @@ impl Simd for Baseline {
     #[inline(always)]
     fn prefetch<T>(self, _items: &[T], _values: &[f32], _second: bool, _index: usize) {}
     #[inline(always)]
+    fn splat16x9(
+        self,
+        values: &[f32],
+        start: usize,
+        stride: usize,
+        axes: [usize; 3],
+    ) -> Option<[[Pair<F8>; 3]; 3]> {
+        splat_corners!(self, gather9(values, start, stride, axes)?)
+    }
+    #[inline(always)]
     fn load8x9(self, values: &[f32], start: usize, stride: usize, axes: [usize; 3]) -> Option<[[F8; 3]; 3]> {
         if !fits8x9(values.len(), start, stride) {
             return None;
@@ -257,6 +267,41 @@ impl Simd for Baseline {
         Some(corners)
     }
 }
+
+/// The floats at the starts of nine runs, coordinates in the order of `axes`; `None` where not all are there.
+#[inline(always)]
+pub(crate) fn gather9(
+    values: &[f32],
+    start: usize,
+    stride: usize,
+    axes: [usize; 3],
+) -> Option<[[f32; 3]; 3]> {
+    let runs = values.get(start..)?;
+    if stride > 8 || runs.len() < 8 * stride + 1 {
+        return None;
+    }
+    let [kx, ky, kz] = [axes[0].min(2), axes[1].min(2), axes[2].min(2)];
+    let (mut corners, mut run) = ([[0.0; 3]; 3], 0);
+    for corner in &mut corners {
+        *corner =
+            [*runs.get(run + kx * stride)?, *runs.get(run + ky * stride)?, *runs.get(run + kz * stride)?];
+        run += 3 * stride;
+    }
+    Some(corners)
+}
+
+/// Nine values, each in all lanes.
+macro_rules! splat_corners {
+    ($simd:expr, $corners:expr) => {{
+        let [a, b, c] = $corners;
+        Some([
+            [$simd.splat16(a[0]), $simd.splat16(a[1]), $simd.splat16(a[2])],
+            [$simd.splat16(b[0]), $simd.splat16(b[1]), $simd.splat16(b[2])],
+            [$simd.splat16(c[0]), $simd.splat16(c[1]), $simd.splat16(c[2])],
+        ])
+    }};
+}
+pub(crate) use splat_corners;
 
 impl Baseline {
     #[inline(always)]

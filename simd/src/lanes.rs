@@ -44,6 +44,11 @@ pub trait Lanes:
     fn select(self, mask: Self::Mask, other: Self) -> Self;
     /// The largest lane; unspecified where a lane is NaN.
     fn largest(self) -> f32;
+    /// The smallest lane; unspecified where a lane is NaN.
+    #[inline(always)]
+    fn smallest(self) -> f32 {
+        -(-self).largest()
+    }
     /// The lanes as an array.
     fn to_array(self) -> Self::Array;
 }
@@ -127,4 +132,13 @@ pub trait Simd: Copy {
         stride: usize,
         axes: [usize; 3],
     ) -> Option<[[Self::F8; 3]; 3]>;
+
+    /// One of the triangles of [`Simd::load8x9`] in all of sixteen lanes: the floats at the start of its runs.
+    fn splat16x9(
+        self,
+        values: &[f32],
+        start: usize,
+        stride: usize,
+        axes: [usize; 3],
+    ) -> Option<[[Self::F16; 3]; 3]>;
 }

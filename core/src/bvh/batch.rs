@@ -1,38 +1,84 @@
-//! Batches of rays: coherent ones as packets, in the order they come; incoherent ones interleaved.
+//! Batches of rays: neighbours that go the same way as packets, what is left over interleaved.
+//!
+//! Rays are taken in windows, in the order they come: near ones in the slice are expected to start near each
+//! other. Within a window they are sorted by class (octant and dominant axis), and each class is cut into
+//! packets.
 
-use super::packet::{self, PacketStack, class};
+use super::packet::{self, CLASSES, Jobs, PacketStack, class};
 use super::stream::{self, Walks};
-use super::walk::{Walk, traceable};
+use super::walk::traceable;
 use super::{Bvh, Coherence};
 use crate::geometry::{Hit, Ray};
 use halflight_simd::{Kernel, Simd};
 
-/// What a batch does with the hit of each ray.
+/// Rays of a window of incoherent rays: enough to fill packets of most classes.
+const WINDOW: usize = 512;
+
+/// Rays of a tile of coherent rays.
+const TILE: usize = 64;
+
+/// Packets of fewer rays than this are not worth it.
+const PACKET_MIN: usize = 6;
+
+/// What a batch does with the hits of its rays. All start as [`Hit::NONE`].
 pub(super) trait Sink {
+    /// No hit for any of `count` rays from `base` on.
+    fn clear(&mut self, base: u32, count: usize);
+    /// Takes over a hit that is not farther than any before, or none.
     fn put(&mut self, index: u32, hit: Hit);
+    /// The hit so far; of distance `t_max` where there is none.
+    fn found(&self, index: u32, t_max: f32) -> Hit;
 }
 
+/// Keeps the hits.
 pub(super) struct Nearest<'a>(pub &'a mut [Hit]);
+
+/// Keeps whether there was one.
 pub(super) struct Hidden<'a>(pub &'a mut [u8]);
 
 impl Sink for Nearest<'_> {
     #[inline(always)]
+    fn clear(&mut self, base: u32, count: usize) {
+        self.0.iter_mut().skip(base as usize).take(count).for_each(|hit| *hit = Hit::NONE);
+    }
+
+    #[inline(always)]
     fn put(&mut self, index: u32, hit: Hit) {
         if let Some(slot) = self.0.get_mut(index as usize) {
-            *slot = hit;
+            slot.take(hit);
+        }
+    }
+
+    #[inline(always)]
+    fn found(&self, index: u32, t_max: f32) -> Hit {
+        match self.0.get(index as usize) {
+            Some(hit) if hit.is_some() => *hit,
+            _ => Hit { t: t_max, ..Hit::NONE },
         }
     }
 }
 
 impl Sink for Hidden<'_> {
     #[inline(always)]
+    fn clear(&mut self, base: u32, count: usize) {
+        self.0.iter_mut().skip(base as usize).take(count).for_each(|hidden| *hidden = 0);
+    }
+
+    #[inline(always)]
     fn put(&mut self, index: u32, hit: Hit) {
         if let Some(slot) = self.0.get_mut(index as usize) {
-            *slot = hit.is_some() as u8;
+            *slot |= hit.is_some() as u8;
         }
+    }
+
+    #[inline(always)]
+    fn found(&self, index: u32, t_max: f32) -> Hit {
+        let hidden = self.0.get(index as usize).is_some_and(|&hidden| hidden != 0);
+        if hidden { Hit { triangle: 0, ..Hit::NONE } } else { Hit { t: t_max, ..Hit::NONE } }
     }
 }
 
+/// A batch, for one level.
 pub(super) struct Batch<'a, 'm, T, const ANY: bool> {
     pub bvh: &'a Bvh<'m>,
     pub rays: &'a [Ray],
@@ -45,75 +91,95 @@ impl<T: Sink, const ANY: bool> Kernel for Batch<'_, '_, T, ANY> {
 
     #[inline(always)]
     fn run<S: Simd>(mut self, simd: S) {
-        match self.coherence {
-            Coherence::Coherent => {
-                let mut stacks = (PacketStack::new(), Walk::IDLE);
-                let mut base = 0;
-                for rays in self.rays.chunks(64) {
-                    tile::<S, T, ANY>(simd, self.bvh, rays, base, &mut stacks, &mut self.sink);
-                    base += 64;
+        let mut stack = PacketStack::new();
+        let mut walks = Walks::new();
+        let mut jobs = Jobs::new();
+        let mut sorted = Sorted { order: [0; WINDOW] };
+        let coherent = self.coherence == Coherence::Coherent;
+        let size = if coherent { TILE } else { WINDOW };
+        let mut base = 0;
+        for rays in self.rays.chunks(size) {
+            self.sink.clear(base, rays.len());
+            if !coherent && !ANY {
+                // Bounces on their way to the nearest hit part company too early for packets to pay.
+                for (ray, i) in rays.iter().zip(0..) {
+                    if traceable(ray) {
+                        jobs.push_root(i);
+                    }
+                }
+                stream::trace::<S, T, ANY>(
+                    simd,
+                    self.bvh,
+                    rays,
+                    jobs.take(),
+                    base,
+                    &mut walks,
+                    &mut self.sink,
+                );
+                base += rays.len() as u32;
+                continue;
+            }
+            let ends = sorted.sort(rays);
+            let mut from = 0;
+            for to in ends {
+                let mut order = sorted.order.get(from..to).unwrap_or(&[]);
+                from = to;
+                while order.len() >= PACKET_MIN {
+                    let most = if coherent { 64 } else { 16 };
+                    let (packet, others) = order.split_at(order.len().min(most));
+                    order = others;
+                    let sink = &mut self.sink;
+                    if packet.len() <= 16 {
+                        packet::trace::<S, T, 1, ANY>(
+                            simd, self.bvh, rays, packet, base, &mut stack, &mut jobs, sink,
+                        );
+                    } else {
+                        packet::trace::<S, T, 4, ANY>(
+                            simd, self.bvh, rays, packet, base, &mut stack, &mut jobs, sink,
+                        );
+                    }
+                    if jobs.is_crowded() {
+                        stream::trace::<S, T, ANY>(simd, self.bvh, rays, jobs.take(), base, &mut walks, sink);
+                    }
+                }
+                for &i in order {
+                    jobs.push_root(i);
                 }
             }
-            Coherence::Incoherent => {
-                let mut walks = Walks::new();
-                stream::trace::<S, T, ANY>(simd, self.bvh, self.rays, &mut walks, &mut self.sink);
-            }
+            stream::trace::<S, T, ANY>(simd, self.bvh, rays, jobs.take(), base, &mut walks, &mut self.sink);
+            base += rays.len() as u32;
         }
     }
 }
 
-/// Up to 64 neighbours, one class after the other.
-#[inline(always)]
-fn tile<S: Simd, T: Sink, const ANY: bool>(
-    simd: S,
-    bvh: &Bvh,
-    rays: &[Ray],
-    base: u32,
-    stacks: &mut (PacketStack, Walk),
-    sink: &mut T,
-) {
-    let mut classes = [u32::MAX; 64];
-    for (i, (class_of, ray)) in classes.iter_mut().zip(rays).enumerate() {
-        if traceable(ray) {
-            *class_of = class(ray.direction);
-        } else {
-            sink.put(base + i as u32, Hit::NONE);
-        }
-    }
-    let mut order = [0u32; 64];
-    while let Some(&next) = classes.iter().find(|&&c| c != u32::MAX) {
-        let mut count = 0;
-        for (i, class_of) in classes.iter_mut().enumerate() {
-            if *class_of == next {
-                *class_of = u32::MAX;
-                order[count & 63] = i as u32;
-                count += 1;
-            }
-        }
-        group::<S, T, ANY>(simd, bvh, rays, &order[..count.min(64)], base, stacks, sink);
-    }
+/// The rays of a window by class.
+struct Sorted {
+    order: [u32; WINDOW],
 }
 
-/// Up to 64 rays of one class.
-#[inline(always)]
-fn group<S: Simd, T: Sink, const ANY: bool>(
-    simd: S,
-    bvh: &Bvh,
-    rays: &[Ray],
-    order: &[u32],
-    base: u32,
-    stacks: &mut (PacketStack, Walk),
-    sink: &mut T,
-) {
-    match order.len() {
-        0..3 => {
-            for &i in order {
-                if let Some(ray) = rays.get(i as usize) {
-                    sink.put(base + i, stacks.1.trace::<S, ANY>(simd, bvh, ray));
-                }
+impl Sorted {
+    /// Fills `order` with the rays that can be traced and returns where each class ends.
+    #[inline(always)]
+    fn sort(&mut self, rays: &[Ray]) -> [usize; CLASSES] {
+        let mut classes = [u8::MAX; WINDOW];
+        let mut ends = [0usize; CLASSES];
+        for (ray, class_of) in rays.iter().zip(&mut classes) {
+            if traceable(ray) {
+                let c = class(ray.direction);
+                *class_of = c as u8;
+                ends[c % CLASSES] += 1;
             }
         }
-        3..17 => packet::trace::<S, T, 1, ANY>(simd, bvh, rays, order, base, &mut stacks.0, sink),
-        _ => packet::trace::<S, T, 4, ANY>(simd, bvh, rays, order, base, &mut stacks.0, sink),
+        let mut sum = 0;
+        for end in &mut ends {
+            (*end, sum) = (sum, sum + *end);
+        }
+        for (i, &c) in classes.iter().take(rays.len()).enumerate() {
+            if let Some(end) = ends.get_mut(c as usize) {
+                self.order[*end & (WINDOW - 1)] = i as u32;
+                *end += 1;
+            }
+        }
+        ends
     }
 }

@@ -50,7 +50,7 @@ pub(super) fn build<'m, J: Join>(
     let binary = &mut working.slice::<BinaryNode>(nodes_of(r))?[..nodes_of(count)];
     let costs = &mut working.slice::<Costs>(nodes_of(r))?[..nodes_of(count)];
     if count == 0 {
-        return Ok(Bvh { nodes: &[], coordinates: &[], triangles: &[], bounds: Bounds::EMPTY });
+        return Ok(Bvh { nodes: &[], coordinates: &[], triangles: &[], bounds: Bounds::EMPTY, slack: 0.0 });
     }
 
     binary::build(references, binary, join);
@@ -69,5 +69,6 @@ pub(super) fn build<'m, J: Join>(
         coordinates: &out.coordinates[..9 * triangles_used + PADDING],
         triangles: &out.triangles[..triangles_used],
         bounds,
+        slack,
     })
 }

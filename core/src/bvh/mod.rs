@@ -43,6 +43,8 @@ pub struct Bvh<'m> {
     /// The mesh's index of each triangle in the leaves.
     triangles: &'m [u32],
     bounds: Bounds,
+    /// By how much boxes are wider than what is in them.
+    slack: f32,
 }
 
 impl<'m> Bvh<'m> {
@@ -93,7 +95,7 @@ impl<'m> Bvh<'m> {
         nodes.copy_from_slice(self.nodes);
         coordinates.copy_from_slice(self.coordinates);
         triangles.copy_from_slice(self.triangles);
-        Ok(Bvh { nodes, coordinates, triangles, bounds: self.bounds })
+        Ok(Bvh { nodes, coordinates, triangles, ..*self })
     }
 
     /// The box around all that can be hit.

@@ -6,9 +6,10 @@
 
 use super::Bvh;
 use super::batch::Sink;
-use super::walk::{Walk, traceable};
-use crate::geometry::{Hit, Ray};
+use super::walk::Walk;
+use crate::geometry::{MISS, Ray};
 use halflight_simd::Simd;
+use halflight_simd::kernels::boxes::ROBUST;
 
 /// Rays in flight.
 const WALKS: usize = 6;
@@ -24,24 +25,27 @@ impl Walks {
     }
 }
 
-/// Traces `rays` and puts their hits.
+/// Walks the subtrees of `jobs` (ray of the window, child, entry) and puts what is nearer than what the rays
+/// have found so far.
 #[inline(always)]
 pub(super) fn trace<S: Simd, T: Sink, const ANY: bool>(
     simd: S,
     bvh: &Bvh,
     rays: &[Ray],
+    jobs: &[(u32, u32, f32)],
+    base: u32,
     walks: &mut Walks,
     sink: &mut T,
 ) {
-    let mut waiting = rays.iter().zip(0u32..);
+    let mut waiting = jobs.iter();
     let mut active = 0;
     for walk in &mut walks.walks {
-        if !next::<T>(&mut waiting, walk, sink) {
+        if !next::<T, ANY>(rays, &mut waiting, base, walk, sink) {
             break;
         }
         active += 1;
     }
-    // Walks that have found no ray to take over are swapped behind the active ones.
+    // Walks that have found no job to take over are swapped behind the active ones.
     while active > 0 {
         let mut i = 0;
         while i < active {
@@ -51,7 +55,7 @@ pub(super) fn trace<S: Simd, T: Sink, const ANY: bool>(
                 continue;
             }
             sink.put(walk.index, walk.hit());
-            if !next::<T>(&mut waiting, walk, sink) {
+            if !next::<T, ANY>(rays, &mut waiting, base, walk, sink) {
                 active -= 1;
                 walks.walks.swap(i - 1, active);
                 i -= 1;
@@ -60,19 +64,22 @@ pub(super) fn trace<S: Simd, T: Sink, const ANY: bool>(
     }
 }
 
-/// Gives the walk the next ray that can be traced; whether there is one.
+/// Gives the walk the next job that is still worth it; whether there is one.
 #[inline(always)]
-fn next<'r, T: Sink>(
-    waiting: &mut impl Iterator<Item = (&'r Ray, u32)>,
+fn next<T: Sink, const ANY: bool>(
+    rays: &[Ray],
+    waiting: &mut core::slice::Iter<(u32, u32, f32)>,
+    base: u32,
     walk: &mut Walk,
-    sink: &mut T,
+    sink: &T,
 ) -> bool {
-    for (ray, index) in waiting {
-        if traceable(ray) {
-            walk.start(ray, index);
+    for &(i, child, entry) in waiting {
+        let Some(ray) = rays.get(i as usize) else { continue };
+        let best = sink.found(base + i, ray.t_max);
+        if entry <= best.t * ROBUST && !(ANY && best.triangle != MISS) {
+            walk.start(ray, base + i, child, entry, best);
             return true;
         }
-        sink.put(index, Hit::NONE);
     }
     false
 }

@@ -21,7 +21,6 @@ pub(super) struct Walk {
     slab: SlabRay,
     shear: Shear,
     octant: usize,
-    ray: Ray,
     best: Hit,
     /// Of the ray in its batch.
     pub(super) index: u32,
@@ -35,7 +34,6 @@ impl Walk {
         slab: SlabRay { origin: [0.0; 3], reciprocal: [0.0; 3], near: [0; 3] },
         shear: Shear { axes: [0, 1, 2], factors: [0.0; 3] },
         octant: 0,
-        ray: Ray { origin: [0.0; 3], t_max: -1.0, direction: [0.0; 3], tag: 0 },
         best: Hit::NONE,
         index: 0,
         height: 0,
@@ -48,7 +46,7 @@ impl Walk {
         if !traceable(ray) {
             return Hit::NONE;
         }
-        self.start(ray, 0);
+        self.start(ray, 0, Child::node(0).0, 0.0, Hit { t: ray.t_max, u: 0.0, v: 0.0, triangle: MISS });
         while self.step::<S, ANY>(simd, bvh) {}
         self.hit()
     }
@@ -59,18 +57,17 @@ impl Walk {
         if self.best.triangle == MISS { Hit::NONE } else { self.best }
     }
 
-    /// Sets out with the ray: the root is all that is on the stack.
+    /// Sets out into the subtree `child`, which the ray enters at `entry`, with what it has found so far.
     #[inline(always)]
-    pub(super) fn start(&mut self, ray: &Ray, index: u32) {
+    pub(super) fn start(&mut self, ray: &Ray, index: u32, child: u32, entry: f32, best: Hit) {
         self.slab = SlabRay::new(ray.origin, ray.direction);
         self.shear = Shear::new(ray.direction);
         let [x, y, z] = self.slab.near;
         self.octant = (x & 1) | (y & 1) << 1 | (z & 1) << 2;
-        self.ray = *ray;
-        self.best = Hit { t: ray.t_max, u: 0.0, v: 0.0, triangle: MISS };
+        self.best = best;
         self.index = index;
-        self.stacks.items[0] = Child::node(0).0;
-        self.stacks.entries[0] = 0.0;
+        self.stacks.items[0] = child;
+        self.stacks.entries[0] = entry;
         self.height = 1;
     }
 
@@ -93,11 +90,11 @@ impl Walk {
             self.height = simd.push8(order, entry, exit, &node.rows[6], &mut self.stacks, self.height);
         } else {
             let (first, count) = child.triangles();
-            let shear_ray = ShearRay8::new(simd, self.ray.origin, &self.shear);
+            let shear_ray = ShearRay8::new(simd, self.slab.origin, &self.shear);
             if let Some(found) = shear_ray.meets(simd, bvh.coordinates, 9 * first, count, self.best.t)
                 && found.hits | found.doubtful != 0
             {
-                take(bvh, &self.ray, &self.shear, first, count, &found, &mut self.best);
+                take(bvh, self.slab.origin, &self.shear, first, count, &found, &mut self.best);
                 if ANY && self.best.triangle != MISS {
                     return false;
                 }
@@ -110,31 +107,36 @@ impl Walk {
     }
 }
 
-/// Whether the ray can be traced at all: finite, and going somewhere.
+/// Whether the ray can be traced at all: finite, and going somewhere. Without branches.
 #[inline(always)]
 pub(super) fn traceable(ray: &Ray) -> bool {
-    let finite = |v: [f32; 3]| v.iter().all(|x| x.is_finite());
-    finite(ray.origin) && finite(ray.direction) && ray.direction != [0.0; 3] && ray.t_max >= 0.0
+    let magnitude = |x: f32| x.to_bits() & 0x7fff_ffff;
+    let [ox, oy, oz] = ray.origin;
+    let [dx, dy, dz] = ray.direction;
+    let direction = magnitude(dx).max(magnitude(dy)).max(magnitude(dz));
+    let largest = direction.max(magnitude(ox)).max(magnitude(oy)).max(magnitude(oz));
+    (largest < f32::INFINITY.to_bits()) & (direction > 0) & (ray.t_max >= 0.0)
 }
 
-/// The corners of triangle `i` of a leaf of `count` at `first`.
+/// The corners of triangle `i` of a leaf of `count`, from its runs of coordinates.
 #[inline(always)]
-pub(super) fn leaf_corners(
-    coordinates: &[f32],
-    first: usize,
-    count: usize,
-    i: usize,
-) -> Option<[[f32; 3]; 3]> {
-    let runs = coordinates.get(9 * first..9 * (first + count))?;
-    let at = |run: usize| runs.get(run * count + i).copied().unwrap_or(f32::NAN);
-    Some(core::array::from_fn(|c| core::array::from_fn(|axis| at(3 * c + axis))))
+pub(super) fn corners_of(runs: &[f32], count: usize, i: usize) -> [[f32; 3]; 3] {
+    let mut corners = [[f32::NAN; 3]; 3];
+    let mut at = i;
+    for corner in &mut corners {
+        for x in corner {
+            *x = runs.get(at).copied().unwrap_or(f32::NAN);
+            at += count;
+        }
+    }
+    corners
 }
 
 /// Takes over what a leaf test found, nearest first and of equals the lowest index.
 #[inline(always)]
 fn take<L: Lanes<Array = [f32; 8]>>(
     bvh: &Bvh,
-    ray: &Ray,
+    origin: [f32; 3],
     shear: &Shear,
     first: usize,
     count: usize,
@@ -157,8 +159,9 @@ fn take<L: Lanes<Array = [f32; 8]>>(
     while doubtful != 0 {
         let i = doubtful.trailing_zeros() as usize & 7;
         doubtful &= doubtful - 1;
-        if let (Some(&triangle), Some(corners)) = (ids.get(i), leaf_corners(bvh.coordinates, first, count, i))
-            && let Some((t, u, v)) = intersect(ray.origin, shear, best.t, corners)
+        let runs = bvh.coordinates.get(9 * first..9 * (first + count)).unwrap_or(&[]);
+        if let Some(&triangle) = ids.get(i)
+            && let Some((t, u, v)) = intersect(origin, shear, best.t, corners_of(runs, count, i))
         {
             best.take(Hit { t, u, v, triangle });
         }

@@ -182,27 +182,62 @@ impl<S: Simd> SlabInterval8<S> {
         }
     }
 
-    /// Lower bounds of the entry distances into eight boxes, and the bits of those that some ray may meet
-    /// before `t_max`.
+    /// Bounds of the entry and (lengthened) exit distances of eight boxes; a box that some ray meets before
+    /// `t_max` has `entry <= exit`.
     #[inline(always)]
-    pub fn may_enter(&self, simd: S, boxes: &Boxes8, t_max: f32) -> (S::F8, u32) {
+    pub fn interval(&self, simd: S, boxes: &Boxes8, t_max: f32) -> (S::F8, S::F8) {
         let [x, y, z] = self.near;
         let entry = self.entry(simd, boxes, x, 0).max(self.entry(simd, boxes, y, 1));
         let entry = entry.max(self.entry(simd, boxes, z, 2).max(simd.splat8(0.0)));
         let exit = self.exit(simd, boxes, x ^ 1, 0).min(self.exit(simd, boxes, y ^ 1, 1));
         let exit = exit.min(self.exit(simd, boxes, z ^ 1, 2).min(simd.splat8(t_max)));
-        (entry, entry.le(exit * simd.splat8(ROBUST)).bits())
+        (entry, exit * simd.splat8(ROBUST))
+    }
+
+    /// Bits of the triangles that some ray may meet before `t_max`, by their boxes widened by `slack`. The
+    /// triangles stand in `values` as [`super::triangles::ShearRay8::meets`] wants them.
+    #[inline(always)]
+    pub fn may_meet(
+        &self,
+        simd: S,
+        values: &[f32],
+        start: usize,
+        count: usize,
+        slack: f32,
+        t_max: f32,
+    ) -> u32 {
+        let Some([a, b, c]) = simd.load8x9(values, start, count, [0, 1, 2]) else { return 0 };
+        let slack = simd.splat8(slack);
+        let (mut entry, mut exit) = (simd.splat8(0.0), simd.splat8(t_max));
+        for axis in 0..3 {
+            let lo = a[axis].min(b[axis]).min(c[axis]) - slack;
+            let hi = a[axis].max(b[axis]).max(c[axis]) + slack;
+            let (near, far) = if self.near[axis] & 1 == 0 { (lo, hi) } else { (hi, lo) };
+            entry = entry.max(self.entry_at(near, axis));
+            exit = exit.min(self.exit_at(far, axis));
+        }
+        entry.le(exit * simd.splat8(ROBUST)).bits()
     }
 
     #[inline(always)]
     fn entry(&self, simd: S, boxes: &Boxes8, row: usize, axis: usize) -> S::F8 {
-        let way = simd.load8(&boxes[row & 7]) - self.entry_origin[axis];
-        (way * self.least[axis]).min(way * self.most[axis])
+        self.entry_at(simd.load8(&boxes[row & 7]), axis)
     }
 
     #[inline(always)]
     fn exit(&self, simd: S, boxes: &Boxes8, row: usize, axis: usize) -> S::F8 {
-        let way = simd.load8(&boxes[row & 7]) - self.exit_origin[axis];
+        self.exit_at(simd.load8(&boxes[row & 7]), axis)
+    }
+
+    #[inline(always)]
+    fn entry_at(&self, planes: S::F8, axis: usize) -> S::F8 {
+        let way = planes - self.entry_origin[axis];
+        (way * self.least[axis]).min(way * self.most[axis])
+    }
+
+    #[inline(always)]
+    fn exit_at(&self, planes: S::F8, axis: usize) -> S::F8 {
+        let way = planes - self.exit_origin[axis];
         (way * self.least[axis]).max(way * self.most[axis])
     }
 }

@@ -29,21 +29,18 @@ impl Shear {
         let z = dominant_axis(d);
         let (x, y) = ((z + 1) % 3, (z + 2) % 3);
         let (x, y) = if d[z] < 0.0 { (y, x) } else { (x, y) };
-        Self { axes: [x, y, z], factors: [d[x] / d[z], d[y] / d[z], 1.0 / d[z]] }
+        let scale = 1.0 / d[z];
+        Self { axes: [x, y, z], factors: [d[x] * scale, d[y] * scale, scale] }
     }
 }
 
 /// The axis along which `d` is largest in magnitude.
 #[inline(always)]
 pub fn dominant_axis(d: [f32; 3]) -> usize {
-    let [x, y, z] = d.map(f32::abs);
-    if x > y {
-        if x > z { 0 } else { 2 }
-    } else if y > z {
-        1
-    } else {
-        2
-    }
+    let [x, y, z] = [d[0].abs(), d[1].abs(), d[2].abs()];
+    // Selections, not branches: the directions of bounces are not to be guessed.
+    let (most, axis) = if x > y { (x, 0) } else { (y, 1) };
+    if most > z { axis } else { 2 }
 }
 
 /// Scalar reference: `(t, u, v)` where the ray meets the triangle at `0 <= t <= t_max`, with the
@@ -188,22 +185,25 @@ pub struct ShearRays16<S: Simd> {
 }
 
 impl<S: Simd> ShearRays16<S> {
-    /// Tests the rays `wanted` against one triangle.
+    /// Tests the rays `wanted` against the triangle whose first coordinate stands at `values[start]`, in runs of
+    /// `stride` as [`ShearRay8::meets`] has them. `None` where they leave the slice.
     #[inline(always)]
-    pub fn meets(&self, simd: S, corners: [[f32; 3]; 3], t_max: S::F16, wanted: u32) -> Found<S::F16> {
+    pub fn meets(
+        &self,
+        simd: S,
+        values: &[f32],
+        start: usize,
+        stride: usize,
+        t_max: S::F16,
+        wanted: u32,
+    ) -> Option<Found<S::F16>> {
         let [_, _, sz] = self.factors;
-        let [a, b, c] = corners;
+        let [a, b, c] = simd.splat16x9(values, start, stride, self.axes)?;
         let sheared = [
-            sheared(self.broadcast(simd, a), self.origin, self.factors),
-            sheared(self.broadcast(simd, b), self.origin, self.factors),
-            sheared(self.broadcast(simd, c), self.origin, self.factors),
+            sheared(a, self.origin, self.factors),
+            sheared(b, self.origin, self.factors),
+            sheared(c, self.origin, self.factors),
         ];
-        areas(simd.splat16(0.0), sz, sheared, t_max, wanted)
-    }
-
-    #[inline(always)]
-    fn broadcast(&self, simd: S, p: [f32; 3]) -> [S::F16; 3] {
-        let [kx, ky, kz] = self.axes;
-        [simd.splat16(p[kx % 3]), simd.splat16(p[ky % 3]), simd.splat16(p[kz % 3])]
+        Some(areas(simd.splat16(0.0), sz, sheared, t_max, wanted))
     }
 }

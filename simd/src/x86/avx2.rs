@@ -1,7 +1,7 @@
 //! AVX2 lanes: thin newtypes over `__m256`. They exist only through the token [`Avx2`], and the token
 //! only inside `with_avx2`; that is what every SAFETY line here rests on.
 
-use crate::baseline::{Pair, fits8x9, halves};
+use crate::baseline::{Pair, fits8x9, gather9, halves, splat_corners};
 use crate::lanes::{Lanes, Mask, STACK, Simd, Stacks};
 use core::arch::x86_64::*;
 use core::ops::{Add, BitAnd, BitOr, Div, Mul, Neg, Not, Sub};
@@ -202,6 +202,16 @@ impl Simd for Avx2 {
             _mm_prefetch::<_MM_HINT_T0>(start.wrapping_add(128));
             _mm_prefetch::<_MM_HINT_T0>(start.wrapping_add(192));
         }
+    }
+    #[inline(always)]
+    fn splat16x9(
+        self,
+        values: &[f32],
+        start: usize,
+        stride: usize,
+        axes: [usize; 3],
+    ) -> Option<[[Pair<F8>; 3]; 3]> {
+        splat_corners!(self, gather9(values, start, stride, axes)?)
     }
     #[inline(always)]
     fn load8x9(self, values: &[f32], start: usize, stride: usize, axes: [usize; 3]) -> Option<[[F8; 3]; 3]> {

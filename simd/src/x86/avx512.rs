@@ -1,7 +1,7 @@
 //! AVX-512 lanes: eight in a `__m256`, sixteen in a `__m512`, masks in mask registers. They exist only
 //! through the token [`Avx512`], and the token only inside `with_avx512`; every SAFETY line rests on that.
 
-use crate::baseline::fits8x9;
+use crate::baseline::{fits8x9, gather9, splat_corners};
 use crate::lanes::{Lanes, Mask, STACK, Simd, Stacks};
 use core::arch::x86_64::*;
 use core::ops::{Add, BitAnd, BitOr, Div, Mul, Neg, Not, Sub};
@@ -233,6 +233,16 @@ impl Simd for Avx512 {
             _mm_prefetch::<_MM_HINT_T0>(start.wrapping_add(128));
             _mm_prefetch::<_MM_HINT_T0>(start.wrapping_add(192));
         }
+    }
+    #[inline(always)]
+    fn splat16x9(
+        self,
+        values: &[f32],
+        start: usize,
+        stride: usize,
+        axes: [usize; 3],
+    ) -> Option<[[F16; 3]; 3]> {
+        splat_corners!(self, gather9(values, start, stride, axes)?)
     }
     #[inline(always)]
     fn load8x9(self, values: &[f32], start: usize, stride: usize, axes: [usize; 3]) -> Option<[[F8; 3]; 3]> {
