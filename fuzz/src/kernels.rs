@@ -114,7 +114,8 @@ impl Kernel for &Work {
             origin: shear.axes.map(axis),
             factors: shear.factors.map(|f| simd.splat16(f)),
         };
-        let all = rays.meets(simd, self.corners[0], simd.splat16(self.t_max), 0xffff);
+        let all = rays.meets(simd, &values, 0, self.count, simd.splat16(self.t_max), 0xffff);
+        let all = all.expect("the floats of the first triangle are there");
         Answers {
             boxes: (entry.to_array(), bits),
             triangles: Seen {

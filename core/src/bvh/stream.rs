@@ -38,6 +38,8 @@ pub(super) fn trace<S: Simd, T: Sink, const ANY: bool>(
     sink: &mut T,
 ) {
     let mut waiting = jobs.iter();
+    // Slots of the active walks come first; a walk that finds no job to take over trades places.
+    let mut slots: [usize; WALKS] = core::array::from_fn(|i| i);
     let mut active = 0;
     for walk in &mut walks.walks {
         if !next::<T, ANY>(rays, &mut waiting, base, walk, sink) {
@@ -45,11 +47,10 @@ pub(super) fn trace<S: Simd, T: Sink, const ANY: bool>(
         }
         active += 1;
     }
-    // Walks that have found no job to take over are swapped behind the active ones.
     while active > 0 {
         let mut i = 0;
         while i < active {
-            let walk = &mut walks.walks[i];
+            let walk = &mut walks.walks[slots[i] % WALKS];
             i += 1;
             if walk.step::<S, ANY>(simd, bvh) {
                 continue;
@@ -57,8 +58,8 @@ pub(super) fn trace<S: Simd, T: Sink, const ANY: bool>(
             sink.put(walk.index, walk.hit());
             if !next::<T, ANY>(rays, &mut waiting, base, walk, sink) {
                 active -= 1;
-                walks.walks.swap(i - 1, active);
                 i -= 1;
+                slots.swap(i, active);
             }
         }
     }

@@ -29,12 +29,12 @@ pub(super) struct Walk {
 }
 
 impl Walk {
-    /// Not on its way.
+    /// Not on its way. All zeros: cheap to make.
     pub(super) const IDLE: Walk = Walk {
         slab: SlabRay { origin: [0.0; 3], reciprocal: [0.0; 3], near: [0; 3] },
-        shear: Shear { axes: [0, 1, 2], factors: [0.0; 3] },
+        shear: Shear { axes: [0; 3], factors: [0.0; 3] },
         octant: 0,
-        best: Hit::NONE,
+        best: Hit { t: 0.0, u: 0.0, v: 0.0, triangle: 0 },
         index: 0,
         height: 0,
         stacks: Stacks::new(),
