@@ -1,5 +1,6 @@
 //! The scalar truth: one ray against every triangle of a mesh. All tracing is tested against it.
 
+use super::references::hittable;
 use super::walk::traceable;
 use crate::geometry::{Hit, MISS, Ray};
 use crate::scene::Mesh;
@@ -18,8 +19,7 @@ pub fn nearest(mesh: &Mesh, ray: &Ray) -> Hit {
         return Hit::NONE;
     }
     for triangle in 0..mesh.triangles.len() as u32 {
-        let corners = mesh.corners(triangle);
-        if corners.iter().all(|p| p.is_finite())
+        if let Some(corners) = hittable(mesh, triangle)
             && let Some((t, u, v)) = intersect(ray, corners.map(|p| p.to_array()))
         {
             best.take(Hit { t, u, v, triangle });

@@ -37,11 +37,19 @@ pub(super) fn capacity(triangles: usize) -> usize {
     triangles.saturating_add(triangles / SPLIT_SHARE).min(Child::REFERENCES_MAX)
 }
 
-/// Corners of a triangle that a ray can hit: finite, and no two of them the same.
-fn hittable(mesh: &Mesh, triangle: u32) -> Option<[Vec3; 3]> {
+/// Corners of a triangle that a ray can hit: finite, and not all on one line. Areas of a triangle without area
+/// are rounding alone, so that a ray might meet it anywhere.
+pub(super) fn hittable(mesh: &Mesh, triangle: u32) -> Option<[Vec3; 3]> {
     let [a, b, c] = mesh.corners(triangle);
     let finite = a.is_finite() && b.is_finite() && c.is_finite();
-    (finite && a != b && b != c && c != a).then_some([a, b, c])
+    (finite && has_area([a, b, c])).then_some([a, b, c])
+}
+
+/// Whether the corners span a plane. In f64, where it is exact for coordinates of 24 bits on one grid.
+fn has_area([a, b, c]: [Vec3; 3]) -> bool {
+    let [p, q] = [b, c].map(|corner| core::array::from_fn(|i| f64::from(corner[i]) - f64::from(a[i])));
+    let [p, q]: [[f64; 3]; 2] = [p, q];
+    (0..3).any(|i| p[i] * q[(i + 1) % 3] != p[(i + 1) % 3] * q[i])
 }
 
 /// Fills `references` with the hittable triangles, and the rest of it with parts of the largest of them.
