@@ -1,6 +1,6 @@
 //! The kernels of traversal at every level against their scalar references, lane by lane and to the bit.
 
-use crate::numbers::{coordinate, point};
+use crate::numbers::{coordinate, traceable_point as point};
 use arbitrary::{Result, Unstructured};
 use halflight_simd::kernels::boxes::{Boxes8, SlabRay, SlabRay8, SlabRays16};
 use halflight_simd::kernels::push::push;

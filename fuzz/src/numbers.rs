@@ -22,6 +22,15 @@ pub(crate) fn point(input: &mut Unstructured) -> Result<[f32; 3]> {
     Ok([coordinate(input)?, coordinate(input)?, coordinate(input)?])
 }
 
+/// A point where the ray tracer's arithmetic holds, or one that is not finite: products of three coordinates
+/// must neither overflow nor vanish, as the doubt of a zero area would. Scenes are scaled to the order of 1
+/// before they are traced.
+pub(crate) fn traceable_point(input: &mut Unstructured) -> Result<[f32; 3]> {
+    const RANGE: core::ops::RangeInclusive<f32> = 1e-10..=1e10;
+    let within = |x: f32| if RANGE.contains(&x.abs()) || !x.is_finite() { x } else { 0.0f32.copysign(x) };
+    Ok(point(input)?.map(within))
+}
+
 const SPECIAL: [f32; 12] = [
     0.0,
     -0.0,
