@@ -175,6 +175,19 @@ fn memory_that_does_not_suffice_is_named() {
 }
 
 #[test]
+fn memory_of_the_build_is_given_back() {
+    let mut scene = cornell_box();
+    scene.normals = vec![[0.0; 3]; scene.positions.len()];
+    scene.sphere(Vec3::splat(0.5), 0.3, 64, 0);
+    let result = render(&scene.scene(), 16, 1, |_| ());
+    let bytes = |name| result.memory.iter().find(|part| part.structure == name).map(|part| part.bytes);
+    let sum = result.memory.iter().map(|part| part.bytes).sum::<usize>();
+    let build = Bvh::footprint(scene.triangles.len()).bytes();
+    assert!(bytes("bvh").is_some_and(|bytes| bytes < build / 2), "{:?}", result.memory);
+    assert!(result.memory_peak >= sum && result.memory_peak > build);
+}
+
+#[test]
 fn an_interrupted_picture_is_valid() {
     let flag = AtomicBool::new(false);
     let settings = Settings { width: 32, height: 32, ..Settings::default() };

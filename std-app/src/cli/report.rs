@@ -61,6 +61,7 @@ impl Report<'_> {
                 "unfinished": dropped.unfinished,
             },
             "memory": memory,
+            "memory_peak": result.memory_peak,
             "left_out": left_out,
             "outputs": self.outputs,
         })
@@ -112,7 +113,11 @@ impl Report<'_> {
             Census::of(self.scene).plan().method,
             settings.level.name(),
         ));
-        lines.push(format!("memory {}", readable_bytes(result.memory.iter().map(|part| part.bytes).sum())));
+        lines.push(format!(
+            "memory {}, {} at its peak",
+            readable_bytes(result.memory.iter().map(|part| part.bytes).sum()),
+            readable_bytes(result.memory_peak),
+        ));
         let dropped = &result.counters.dropped;
         if dropped.total() > 0 {
             lines.push(format!(

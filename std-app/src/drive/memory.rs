@@ -13,16 +13,18 @@ pub struct MemoryUse {
     pub bytes: usize,
 }
 
-/// What was taken so far.
+/// What is taken now, and the most that ever was.
 pub(super) struct Memory {
     limit: Option<usize>,
     uses: Vec<MemoryUse>,
+    peak: usize,
 }
 
 impl Memory {
     /// Counts the buffers of `scene` as taken.
     pub(super) fn new(scene: &Scene, limit: Option<usize>) -> Self {
-        Self { limit, uses: vec![MemoryUse { structure: "scene", bytes: scene_bytes(scene) }] }
+        let bytes = scene_bytes(scene);
+        Self { limit, uses: vec![MemoryUse { structure: "scene", bytes }], peak: bytes }
     }
 
     /// Lines of `footprint` bytes for `structure`.
@@ -47,12 +49,18 @@ impl Memory {
             Some(other) => other.bytes += bytes,
             None => self.uses.push(MemoryUse { structure, bytes }),
         }
+        self.peak = self.peak.max(needed);
         Ok(lines)
     }
 
     /// Says that what `structure` took is free again.
     pub(super) fn give_back(&mut self, structure: &'static str) {
         self.uses.retain(|other| other.structure != structure);
+    }
+
+    /// The most bytes that were taken at any time.
+    pub(super) fn peak(&self) -> usize {
+        self.peak
     }
 
     /// Bytes of each structure.

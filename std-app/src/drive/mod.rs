@@ -114,8 +114,10 @@ pub struct RenderResult {
     pub counters: Counters,
     /// The error, estimated from the two half-films; `None` for fewer than two samples.
     pub error: Option<ErrorEstimate>,
-    /// Bytes of each structure.
+    /// Bytes of each structure, while paths are traced.
     pub memory: Vec<MemoryUse>,
+    /// The most bytes at any time: building the hierarchy takes more than keeping it.
+    pub memory_peak: usize,
     /// Why rendering ended.
     pub ending: Ending,
 }
@@ -193,14 +195,15 @@ impl WithFeatures for Render<'_> {
         let mut memory = Memory::new(scene, settings.memory);
 
         let build_start = Instant::now();
+        // First, for the working memory of its build is free again for the others.
+        let mut bvh_lines = Vec::new();
+        let bvh = build_bvh(scene, &workers, &mut memory, &mut bvh_lines)?;
         let mut film_lines = memory.take("film", Film::footprint(width, height))?;
         let scratch = PathTracer::<F>::scratch(WAVE);
         let mut scratch_lines =
             (0..workers.count()).map(|_| memory.take("paths", scratch)).collect::<Result<Vec<_>, _>>()?;
         let mut lights_lines = memory.take("lights", Lights::footprint(scene).and(Lights::scratch(scene)))?;
         let lights = Lights::build(scene, &mut Arena::new(bytemuck::cast_slice_mut(&mut lights_lines)))?;
-        let mut bvh_lines = Vec::new();
-        let bvh = build_bvh(scene, &workers, &mut memory, &mut bvh_lines)?;
         let build = build_start.elapsed().as_secs_f64();
 
         let mut film = Film::new(width, height, &mut Arena::new(bytemuck::cast_slice_mut(&mut film_lines)))?;
@@ -240,6 +243,7 @@ impl WithFeatures for Render<'_> {
             counters,
             error: ErrorEstimate::of(&film),
             memory: memory.uses(),
+            memory_peak: memory.peak(),
             ending: if interrupted { Ending::Interrupted } else { Ending::Done },
         })
     }

@@ -87,3 +87,35 @@ type Total = Result<Counters, OutOfMemory>;
 fn store(total: &Mutex<Total>, change: impl FnOnce(&mut Total)) {
     change(&mut total.lock().unwrap_or_else(|poisoned| poisoned.into_inner()));
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use halflight_core::scene::Triangle;
+
+    /// The bytes of the hierarchy over a wavy sheet of 2 * `side`² triangles.
+    fn built(side: u32, threads: usize) -> Vec<u8> {
+        let places = (0..=side).flat_map(|y| (0..=side).map(move |x| (x as f32, y as f32)));
+        let positions: Vec<[f32; 3]> = places.map(|(x, y)| [x, y, (0.1 * x).sin() * y.sqrt()]).collect();
+        let corners = (0..side * side).map(|cell| cell / side * (side + 1) + cell % side);
+        let halves = corners.flat_map(|a| [[a, a + 1, a + side + 2], [a, a + side + 2, a + side + 1]]);
+        let triangles: Vec<Triangle> = halves.map(|vertices| Triangle { vertices, material: 0 }).collect();
+        let mesh = Mesh { positions: &positions, normals: &[], texcoords: &[], triangles: &triangles };
+
+        let mut lines = vec![Line([0; 64]); Bvh::footprint(triangles.len()).bytes() / 64];
+        let mut arena = Arena::new(bytemuck::cast_slice_mut(&mut lines));
+        let bvh = Workers::new(Some(threads)).unwrap().build_bvh(&mesh, &mut arena).unwrap();
+        let mut kept = vec![Line([0; 64]); bvh.used().bytes() / 64];
+        bvh.copied(&mut Arena::new(bytemuck::cast_slice_mut(&mut kept))).unwrap();
+        bytemuck::cast_slice(&kept).to_vec()
+    }
+
+    #[test]
+    fn any_number_of_threads_builds_the_same_bytes() {
+        let one = built(150, 1);
+        assert!(one.len() > 45_000 * 36);
+        for threads in [2, 5] {
+            assert!(built(150, threads) == one, "{threads} threads");
+        }
+    }
+}
