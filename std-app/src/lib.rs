@@ -18,6 +18,7 @@
 //! ```
 #![forbid(unsafe_code)]
 
+pub mod bench;
 pub mod compare;
 pub mod drive;
 pub mod load;

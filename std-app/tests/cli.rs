@@ -108,6 +108,9 @@ fn wrong_usage_is_refused_before_anything_is_written() {
         ("compare missing.exr missing.exr", "missing.exr"),
         ("compare scene.obj scene.obj", ".exr"),
         ("info missing.toml", "missing.toml"),
+        ("bench", "rays"),
+        ("bench rays missing.obj", "missing.obj"),
+        ("bench rays scene.obj --simd mmx", "baseline, avx2, avx512"),
     ] {
         let said = folder.refused(arguments);
         assert!(said.contains(reason), "{arguments}: {said}");
@@ -229,4 +232,27 @@ fn an_interrupt_saves_what_there_is_and_exits_with_3() {
     let object: Value = serde_json::from_slice(&output.stdout).unwrap();
     assert_eq!(object["ending"], "interrupted");
     assert_eq!(read(&folder.path("a.png")).unwrap().pixels.len(), 64 * 64);
+}
+
+#[test]
+fn bench_rays_measures_the_cornell_box() {
+    let folder = Folder::new("bench");
+    let cornell = concat!(env!("CARGO_MANIFEST_DIR"), "/../scenes/cornell/cornell.obj");
+    let object = folder.object(&format!(
+        "bench rays {cornell} --eye 278,273,-800 --look-at 278,273,0 --fov 39.3 --simd baseline --json"
+    ));
+    assert_eq!(object["level"], "baseline");
+    assert!(object["build_seconds"].as_f64().unwrap() > 0.0);
+    assert!(object["bytes_per_triangle"].as_f64().unwrap() > 36.0, "three corners at least");
+    for class in ["primary", "diffuse", "shadow"] {
+        assert!(object["mrays_per_second"][class].as_f64().unwrap() > 0.0, "{class}");
+    }
+    assert_eq!(object["rays"]["primary"], 1024 * 1024);
+    assert_eq!(object["hits"]["primary"], object["rays"]["diffuse"], "one bounce from each hit");
+    assert_eq!(files(&folder.0), 2, "nothing is written");
+
+    let away = "bench rays scene.obj --eye 0,0,9 --look-at 0,0,10 --json";
+    let object = folder.object(away);
+    assert_eq!(object["hits"]["primary"], 0);
+    assert!(object["mrays_per_second"]["diffuse"].is_null(), "no rays, no speed");
 }

@@ -1,5 +1,6 @@
 //! The command line: what was asked for, who does it, and how it ends.
 
+mod bench;
 mod compare;
 mod failure;
 mod info;
@@ -27,6 +28,7 @@ enum Command {
     Render(Box<render::Render>),
     Compare(compare::Compare),
     Info(info::Info),
+    Bench(bench::Bench),
 }
 
 /// Runs the program. The exit codes are a contract: 0 done, 2 usage or bad input, 3 stopped early with a
@@ -39,6 +41,7 @@ pub(crate) fn main() -> ExitCode {
         Command::Render(command) => command.run(),
         Command::Compare(command) => command.run(),
         Command::Info(command) => command.run(),
+        Command::Bench(command) => command.run(),
     }));
     match outcome {
         Ok(Ok(code)) => return code,

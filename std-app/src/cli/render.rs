@@ -67,7 +67,7 @@ pub(super) struct Render {
     #[arg(long, value_name = "BYTES", value_parser = values::bytes, help_heading = "How to run")]
     memory: Option<usize>,
     /// Highest instruction set to use: baseline, avx2 or avx512 [default: the processor's]
-    #[arg(long, value_name = "LEVEL", value_parser = tier, help_heading = "How to run")]
+    #[arg(long, value_name = "LEVEL", value_parser = values::tier, help_heading = "How to run")]
     simd: Option<Tier>,
     /// The same bits on every processor: the instruction set that all have
     #[arg(long, help_heading = "How to run")]
@@ -95,11 +95,6 @@ enum Caustics {
     Auto,
     /// Never
     Off,
-}
-
-fn tier(name: &str) -> Result<Tier, String> {
-    let names = Tier::ALL.map(Tier::name).join(", ");
-    Tier::named(name).ok_or(format!("the levels are {names}"))
 }
 
 /// Raised by Ctrl-C.

@@ -1,6 +1,7 @@
 //! Values of flags as people write them: `1,2,3`, `640x480`, `90s`, `512M`.
 
 use core::str::FromStr;
+use halflight_simd::Tier;
 
 /// Three numbers, `X,Y,Z`.
 pub(super) fn vector(text: &str) -> Result<[f64; 3], String> {
@@ -66,6 +67,12 @@ pub(super) fn bytes(text: &str) -> Result<usize, String> {
         .filter(|bytes| *bytes >= 1.0)
         .map(|bytes| bytes as usize)
         .ok_or("a number of bytes is expected, as in 512M or 2G".into())
+}
+
+/// An instruction set by its name.
+pub(super) fn tier(name: &str) -> Result<Tier, String> {
+    let names = Tier::ALL.map(Tier::name).join(", ");
+    Tier::named(name).ok_or(format!("the levels are {names}"))
 }
 
 /// A number above 0.

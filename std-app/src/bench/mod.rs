@@ -1,0 +1,55 @@
+//! How fast the kernels are on this machine, on one thread, beside a rival where the build has one.
+
+pub mod rays;
+
+use core::fmt;
+use halflight_core::memory::OutOfMemory;
+
+/// Times that everything is measured; the median counts.
+pub const REPETITIONS: usize = 7;
+
+/// Why there is no measurement.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum BenchError {
+    /// The system does not give the memory.
+    Memory(OutOfMemory),
+    /// The rival does not start, or does not take the scene.
+    Rival(String),
+}
+
+impl fmt::Display for BenchError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Memory(error) => error.fmt(f),
+            Self::Rival(why) => f.write_str(why),
+        }
+    }
+}
+
+impl core::error::Error for BenchError {}
+
+impl From<OutOfMemory> for BenchError {
+    fn from(error: OutOfMemory) -> Self {
+        Self::Memory(error)
+    }
+}
+
+/// The middle one of `values`, or the mean of the two in the middle; NaN where there are none.
+fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    let middle = |i: usize| values.get(i).copied().unwrap_or(f64::NAN);
+    let half = values.len() / 2;
+    if values.len() % 2 == 1 { middle(half) } else { 0.5 * (middle(half) + middle(half.wrapping_sub(1))) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::median;
+
+    #[test]
+    fn medians() {
+        assert_eq!(median(vec![3.0, 1.0, 2.0]), 2.0);
+        assert_eq!(median(vec![4.0, 1.0, 2.0, 3.0]), 2.5);
+        assert!(median(vec![]).is_nan());
+    }
+}

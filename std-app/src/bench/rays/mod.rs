@@ -1,0 +1,141 @@
+//! Rays per second of building and tracing the hierarchy on one thread: camera rays, diffuse bounces and
+//! shadow rays.
+//!
+//! Everything is timed [`REPETITIONS`] times by the wall clock, and the median counts; ours and the rival's
+//! repetitions alternate, so that whatever else the machine does meets both. Rays come in batches; what it
+//! takes to bring a batch into the form that a tracer reads is not timed, for nobody.
+
+mod classes;
+#[cfg(feature = "embree")]
+mod embree;
+mod ours;
+#[cfg(feature = "embree")]
+mod packets;
+mod report;
+
+pub use classes::{Class, SIDE};
+pub use report::{ClassReport, RaysReport, RivalClass, RivalReport, geometric_mean};
+
+use super::{BenchError, REPETITIONS, median};
+use classes::Rays;
+use core::hint::black_box;
+use halflight_core::Level;
+use halflight_core::geometry::Ray;
+use halflight_core::scene::{Mesh, Scene};
+use std::time::Instant;
+
+/// Rays of a batch: what a tile's wavefront may hold, and more than any packet.
+pub const BATCH: usize = 65536;
+
+/// One way of tracing rays.
+trait Entry {
+    /// What its library calls it.
+    fn name(&self) -> &'static str;
+    /// Takes over the rays to be traced next. Not timed.
+    fn load(&mut self, rays: &[Ray]);
+    /// Traces them.
+    fn trace(&mut self);
+    /// How many of them met something.
+    fn hits(&self) -> usize;
+}
+
+/// Somebody else's tracer.
+trait Rival {
+    /// Its name and version.
+    fn name(&self) -> String;
+    /// Builds its hierarchy anew.
+    fn build(&mut self, mesh: &Mesh) -> Result<(), BenchError>;
+    /// All its ways of tracing rays of `class`.
+    fn entries(&self, class: Class) -> Vec<Box<dyn Entry + '_>>;
+}
+
+/// The rival that this program was built with.
+fn rival() -> Result<Option<Box<dyn Rival>>, BenchError> {
+    #[cfg(feature = "embree")]
+    return Ok(Some(Box::new(embree::Embree::new()?)));
+    #[cfg(not(feature = "embree"))]
+    Ok(None)
+}
+
+/// Measures `scene` from its camera, with the kernels of `level`.
+///
+/// # Errors
+/// [`BenchError`] where memory is missing or the rival refuses.
+pub fn run(scene: &Scene, level: Level) -> Result<RaysReport, BenchError> {
+    let mesh = &scene.mesh;
+    let mut rival = rival()?;
+    let (mut build, mut rival_build) = (Vec::new(), Vec::new());
+    for _ in 0..REPETITIONS {
+        let mut memory = Vec::new();
+        let start = Instant::now();
+        black_box(ours::build(mesh, &mut memory)?);
+        build.push(start.elapsed().as_secs_f64());
+        if let Some(rival) = &mut rival {
+            let start = Instant::now();
+            rival.build(mesh)?;
+            rival_build.push(start.elapsed().as_secs_f64());
+        }
+    }
+
+    let mut memory = Vec::new();
+    let bvh = ours::build(mesh, &mut memory)?;
+    let rays = Rays::of(scene, &bvh, level);
+    let mut classes = Vec::new();
+    let mut rival_classes = Vec::new();
+    for class in Class::ALL {
+        let mut entries = vec![ours::entry(&bvh, level, class)];
+        entries.extend(rival.iter().flat_map(|rival| rival.entries(class)));
+        let measured = measure(&mut entries, rays.of_class(class));
+        if let Some((ours, theirs)) = measured.split_first() {
+            classes.push(ClassReport {
+                class,
+                rays: rays.of_class(class).len(),
+                hits: ours.hits,
+                mrays_per_second: ours.mrays_per_second,
+            });
+            let best = theirs.iter().max_by(|a, b| a.mrays_per_second.total_cmp(&b.mrays_per_second));
+            rival_classes.extend(best.cloned());
+        }
+    }
+    Ok(RaysReport {
+        level,
+        triangles: mesh.triangles.len(),
+        build_seconds: median(build),
+        bytes: bvh.used().bytes(),
+        classes,
+        rival: rival.map(|rival| RivalReport {
+            name: rival.name(),
+            build_seconds: median(rival_build),
+            classes: rival_classes,
+        }),
+    })
+}
+
+/// Traces `rays` by each entry in turn, again and again.
+fn measure(entries: &mut [Box<dyn Entry + '_>], rays: &[Ray]) -> Vec<RivalClass> {
+    let mut seconds = vec![Vec::new(); entries.len()];
+    let mut hits = vec![0; entries.len()];
+    for _ in 0..REPETITIONS {
+        for (i, entry) in entries.iter_mut().enumerate() {
+            let (mut sum, mut met) = (0.0, 0);
+            for batch in rays.chunks(BATCH) {
+                entry.load(batch);
+                let start = Instant::now();
+                entry.trace();
+                sum += start.elapsed().as_secs_f64();
+                met += entry.hits();
+            }
+            seconds[i].push(sum);
+            hits[i] = met;
+        }
+    }
+    let mut measured = Vec::new();
+    for ((entry, seconds), hits) in entries.iter().zip(seconds).zip(hits) {
+        let mrays_per_second = rays.len() as f64 / median(seconds) * 1e-6;
+        measured.push(RivalClass { entry: entry.name(), hits, mrays_per_second });
+    }
+    measured
+}
+
+#[cfg(test)]
+mod tests;

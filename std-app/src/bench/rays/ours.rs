@@ -1,0 +1,106 @@
+//! Our tracer as the bench drives it.
+
+use super::{BATCH, BenchError, Class, Entry};
+use halflight_core::Level;
+use halflight_core::bvh::{Bvh, Coherence};
+use halflight_core::geometry::{Hit, Ray};
+use halflight_core::memory::{Arena, Footprint, Line, OutOfMemory};
+use halflight_core::scene::Mesh;
+
+/// The hierarchy as a render keeps it: built in fresh memory, copied to `kept`, the memory of the build
+/// given back.
+pub(super) fn build<'m>(mesh: &Mesh, kept: &'m mut Vec<Line>) -> Result<Bvh<'m>, BenchError> {
+    let mut working = lines(Bvh::footprint(mesh.triangles.len()))?;
+    let built = Bvh::build(mesh, &mut Arena::new(bytemuck::cast_slice_mut(&mut working)))?;
+    *kept = lines(built.used())?;
+    Ok(built.copied(&mut Arena::new(bytemuck::cast_slice_mut(kept)))?)
+}
+
+fn lines(footprint: Footprint) -> Result<Vec<Line>, OutOfMemory> {
+    let mut lines = Vec::new();
+    let needed = footprint.bytes();
+    let count = needed.div_ceil(size_of::<Line>());
+    lines.try_reserve_exact(count).map_err(|_| OutOfMemory { needed, available: 0 })?;
+    lines.resize(count, Line([0; size_of::<Line>()]));
+    Ok(lines)
+}
+
+/// Our way of tracing rays of `class`.
+pub(super) fn entry<'a>(bvh: &'a Bvh<'a>, level: Level, class: Class) -> Box<dyn Entry + 'a> {
+    let scratch = vec![0; Bvh::batch_scratch(BATCH).div_ceil(4)];
+    let rays = Vec::with_capacity(BATCH);
+    match class {
+        Class::Primary => {
+            Box::new(Nearest { bvh, level, coherence: Coherence::Coherent, rays, scratch, hits: Vec::new() })
+        }
+        Class::Diffuse => Box::new(Nearest {
+            bvh,
+            level,
+            coherence: Coherence::Incoherent,
+            rays,
+            scratch,
+            hits: Vec::new(),
+        }),
+        Class::Shadow => Box::new(Occluded { bvh, level, rays, scratch, hidden: Vec::new() }),
+    }
+}
+
+struct Nearest<'a> {
+    bvh: &'a Bvh<'a>,
+    level: Level,
+    coherence: Coherence,
+    rays: Vec<Ray>,
+    scratch: Vec<u32>,
+    hits: Vec<Hit>,
+}
+
+impl Entry for Nearest<'_> {
+    fn name(&self) -> &'static str {
+        "nearest_batch"
+    }
+
+    fn load(&mut self, rays: &[Ray]) {
+        self.rays.clear();
+        self.rays.extend_from_slice(rays);
+        self.hits.clear();
+        self.hits.resize(rays.len(), Hit::NONE);
+    }
+
+    fn trace(&mut self) {
+        self.bvh.nearest_batch(self.level, &self.rays, self.coherence, &mut self.scratch, &mut self.hits);
+    }
+
+    fn hits(&self) -> usize {
+        self.hits.iter().filter(|hit| hit.is_some()).count()
+    }
+}
+
+struct Occluded<'a> {
+    bvh: &'a Bvh<'a>,
+    level: Level,
+    rays: Vec<Ray>,
+    scratch: Vec<u32>,
+    hidden: Vec<u8>,
+}
+
+impl Entry for Occluded<'_> {
+    fn name(&self) -> &'static str {
+        "occluded_batch"
+    }
+
+    fn load(&mut self, rays: &[Ray]) {
+        self.rays.clear();
+        self.rays.extend_from_slice(rays);
+        self.hidden.clear();
+        self.hidden.resize(rays.len(), 0);
+    }
+
+    fn trace(&mut self) {
+        let coherence = Coherence::Incoherent;
+        self.bvh.occluded_batch(self.level, &self.rays, coherence, &mut self.scratch, &mut self.hidden);
+    }
+
+    fn hits(&self) -> usize {
+        self.hidden.iter().filter(|&&hidden| hidden != 0).count()
+    }
+}

@@ -1,0 +1,74 @@
+//! What was measured, and how it compares.
+
+use super::Class;
+use halflight_core::Level;
+
+/// Our numbers, and the rival's.
+#[derive(Clone, Debug)]
+pub struct RaysReport {
+    /// The instruction set of our kernels.
+    pub level: Level,
+    /// Triangles of the scene.
+    pub triangles: usize,
+    /// Seconds to build the hierarchy, the memory for it included.
+    pub build_seconds: f64,
+    /// Bytes that the hierarchy keeps, its copy of the triangles included.
+    pub bytes: usize,
+    /// One for each of [`Class::ALL`].
+    pub classes: Vec<ClassReport>,
+    /// Where the program was built with one.
+    pub rival: Option<RivalReport>,
+}
+
+/// Rays of one class, traced by us.
+#[derive(Clone, Debug)]
+pub struct ClassReport {
+    /// Which.
+    pub class: Class,
+    /// How many there are.
+    pub rays: usize,
+    /// How many met something.
+    pub hits: usize,
+    /// Millions of rays per second; NaN where there are none.
+    pub mrays_per_second: f64,
+}
+
+/// The rival's numbers.
+#[derive(Clone, Debug)]
+pub struct RivalReport {
+    /// Its name and version.
+    pub name: String,
+    /// Seconds to build its best hierarchy.
+    pub build_seconds: f64,
+    /// One for each of [`Class::ALL`]: the fastest of its ways.
+    pub classes: Vec<RivalClass>,
+}
+
+/// Rays of one class, traced in one way.
+#[derive(Clone, Debug)]
+pub struct RivalClass {
+    /// The function of the library, and what it was told of the rays.
+    pub entry: &'static str,
+    /// How many rays met something.
+    pub hits: usize,
+    /// Millions of rays per second; NaN where there are none.
+    pub mrays_per_second: f64,
+}
+
+impl RaysReport {
+    /// Bytes that the hierarchy keeps for each triangle.
+    pub fn bytes_per_triangle(&self) -> f64 {
+        self.bytes as f64 / self.triangles as f64
+    }
+
+    /// Our speed over that of `rival`, class by class.
+    pub fn ratios(&self, rival: &RivalReport) -> Vec<f64> {
+        let pairs = self.classes.iter().zip(&rival.classes);
+        pairs.map(|(ours, theirs)| ours.mrays_per_second / theirs.mrays_per_second).collect()
+    }
+}
+
+/// The geometric mean; NaN of nothing.
+pub fn geometric_mean(values: &[f64]) -> f64 {
+    (values.iter().map(|value| value.ln()).sum::<f64>() / values.len() as f64).exp()
+}

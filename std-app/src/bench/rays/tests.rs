@@ -1,0 +1,87 @@
+//! The rays are what they say, and the rival meets what we meet.
+
+use super::*;
+use crate::load::{LoadOptions, load};
+use halflight_core::scene::Camera;
+
+/// Checks of the repository's own Cornell box, seen as it was measured.
+fn in_the_box(check: impl FnOnce(&Scene, &halflight_core::bvh::Bvh)) {
+    let file = concat!(env!("CARGO_MANIFEST_DIR"), "/../scenes/cornell/cornell.obj");
+    let loaded = load(file.as_ref(), &LoadOptions::default()).unwrap();
+    let views = loaded.views();
+    let camera: Camera = loaded.camera_or_default();
+    let mut memory = Vec::new();
+    let scene = views.scene(camera);
+    let bvh = ours::build(&scene.mesh, &mut memory).unwrap();
+    check(&scene, &bvh);
+}
+
+#[test]
+fn bounces_leave_the_surface_cosine_distributed() {
+    in_the_box(|scene, bvh| {
+        let level = Level::detect();
+        let rays = Rays::of(scene, bvh, level);
+        let [primary, diffuse, shadow] = Class::ALL.map(|class| rays.of_class(class));
+        let mut bounces = diffuse.iter();
+        let (mut cosines, mut count) = (0.0, 0);
+        for ray in primary {
+            let hit = bvh.nearest(level, ray);
+            if !hit.is_some() {
+                continue;
+            }
+            let bounce = bounces.next().unwrap();
+            let [a, b, c] = scene.mesh.corners(hit.triangle);
+            let normal = (b - a).cross(c - a).normalize();
+            let cosine = normal.dot(bounce.direction.into()).abs();
+            cosines += f64::from(cosine);
+            count += 1;
+            if count % 101 == 0 {
+                assert!(bvh.nearest(level, bounce).triangle != hit.triangle, "it meets where it left");
+            }
+        }
+        assert!(bounces.next().is_none());
+        // E[cos] = 2/3, Var[cos] = 1/18; five standard deviations: one failure in two million tries.
+        let deviation = (1.0 / 18.0 / f64::from(count)).sqrt();
+        assert!((cosines / f64::from(count) - 2.0 / 3.0).abs() < 5.0 * deviation);
+        let quarter = 0.25 * bvh.bounds().diagonal();
+        assert!(shadow.len() == diffuse.len() && shadow.iter().all(|ray| ray.t_max == quarter));
+    });
+}
+
+#[test]
+fn tiles_cover_the_picture() {
+    let mut seen = vec![false; (SIDE * SIDE) as usize];
+    for [x, y] in classes::pixels() {
+        seen[(y * SIDE + x) as usize] = true;
+    }
+    assert!(seen.into_iter().all(|seen| seen));
+    assert_eq!(classes::pixels().nth(64 + 9), Some([9, 1]));
+}
+
+/// Share of rays that may differ: Embree's test of a triangle is not watertight, and rounds otherwise.
+#[cfg(feature = "embree")]
+const DIFFERENT: f64 = 1e-4;
+
+#[cfg(feature = "embree")]
+#[test]
+fn embree_meets_what_we_meet_by_every_entry_point() {
+    in_the_box(|scene, bvh| {
+        let level = Level::detect();
+        let rays = Rays::of(scene, bvh, level);
+        let mut rival = embree::Embree::new().unwrap();
+        rival.build(&scene.mesh).unwrap();
+        for class in Class::ALL {
+            // Not a multiple of any packet.
+            let rays = &rays.of_class(class)[..9999];
+            let mut ours = ours::entry(bvh, level, class);
+            ours.load(rays);
+            ours.trace();
+            for mut entry in rival.entries(class) {
+                entry.load(rays);
+                entry.trace();
+                let difference = entry.hits().abs_diff(ours.hits()) as f64;
+                assert!(difference <= DIFFERENT * rays.len() as f64, "{}: {difference}", entry.name());
+            }
+        }
+    });
+}

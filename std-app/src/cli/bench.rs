@@ -1,0 +1,142 @@
+//! `halflight bench`: how fast the kernels are on this machine, beside the rival that the build has.
+
+use super::failure::Failure;
+use super::view::View;
+use super::{say, values, warn};
+use clap::{Args, Subcommand};
+use halflight::bench::REPETITIONS;
+use halflight::bench::rays::{self, RaysReport, RivalReport, SIDE, geometric_mean};
+use halflight::load::{self, LoadOptions};
+use halflight_simd::{Level, Tier};
+use serde_json::{Map, Value, json};
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+/// Measure the kernels on this machine
+#[derive(Args)]
+#[command(arg_required_else_help = true)]
+pub(super) struct Bench {
+    #[command(subcommand)]
+    kernel: Kernel,
+}
+
+#[derive(Subcommand)]
+enum Kernel {
+    Rays(Box<Rays>),
+}
+
+/// Rays per second on one thread
+///
+/// Camera rays of a square picture in tiles, one cosine-distributed bounce from each point that they meet,
+/// and shadow rays: the same, at most a quarter of the diagonal of the scene long. A program built with the
+/// feature `embree` measures Embree in turn.
+#[derive(Args)]
+struct Rays {
+    /// The scene: a mesh (.obj) or a scene file (.toml)
+    scene: PathBuf,
+    #[command(flatten)]
+    view: View,
+    /// Highest instruction set to use: baseline, avx2 or avx512 [default: the processor's]
+    #[arg(long, value_name = "LEVEL", value_parser = values::tier, help_heading = "How to run")]
+    simd: Option<Tier>,
+    /// Print one JSON object instead of text
+    #[arg(long, help_heading = "Results")]
+    json: bool,
+}
+
+impl Bench {
+    pub(super) fn run(&self) -> Result<ExitCode, Failure> {
+        match &self.kernel {
+            Kernel::Rays(rays) => rays.run(),
+        }
+    }
+}
+
+impl Rays {
+    fn run(&self) -> Result<ExitCode, Failure> {
+        let loaded = load::load(&self.scene, &LoadOptions { textures: false })?;
+        for repair in &loaded.repairs {
+            warn(repair);
+        }
+        let views = loaded.views();
+        let scene = views.scene(self.view.camera(&loaded)?);
+        let level = Level::detect();
+        let level = self.simd.map_or(level, |tier| level.capped(tier));
+        let report = rays::run(&scene, level)?;
+        say(&if self.json { object(&report).to_string() } else { text(&report) });
+        Ok(ExitCode::SUCCESS)
+    }
+}
+
+/// The object of `--json`. Speeds of no rays are `null`.
+fn object(report: &RaysReport) -> Value {
+    let by_class = |values: Vec<Value>| -> Value {
+        let names = report.classes.iter().map(|class| class.class.name().to_string());
+        names.zip(values).collect::<Map<_, _>>().into()
+    };
+    let mut object = json!({
+        "level": report.level.name(),
+        "build_seconds": report.build_seconds,
+        "bytes_per_triangle": report.bytes_per_triangle(),
+        "mrays_per_second": by_class(report.classes.iter().map(|c| c.mrays_per_second.into()).collect()),
+        "triangles": report.triangles,
+        "repetitions": REPETITIONS,
+        "rays": by_class(report.classes.iter().map(|c| c.rays.into()).collect()),
+        "hits": by_class(report.classes.iter().map(|c| c.hits.into()).collect()),
+    });
+    if let Some(rival) = &report.rival {
+        let ratios = report.ratios(rival);
+        object["rival"] = json!({
+            "name": rival.name,
+            "build_seconds": rival.build_seconds,
+            "mrays_per_second": by_class(rival.classes.iter().map(|c| c.mrays_per_second.into()).collect()),
+            "entry_points": by_class(rival.classes.iter().map(|c| c.entry.into()).collect()),
+            "hits": by_class(rival.classes.iter().map(|c| c.hits.into()).collect()),
+        });
+        object["ratios"] = by_class(ratios.iter().map(|&ratio| ratio.into()).collect());
+        object["ratios"]["build"] = (rival.build_seconds / report.build_seconds).into();
+        object["geometric_mean"] = geometric_mean(&ratios).into();
+    }
+    object
+}
+
+/// The lines for a person.
+fn text(report: &RaysReport) -> String {
+    let mut lines = vec![
+        format!(
+            "{} triangles, one thread, {}; medians of {REPETITIONS}, Mray/s; {SIDE}x{SIDE} camera rays",
+            report.triangles,
+            report.level.name()
+        ),
+        row("", report.classes.iter().map(|class| class.class.name().to_string())) + "      build",
+        row("halflight", report.classes.iter().map(|class| format!("{:.2}", class.mrays_per_second)))
+            + &format!("{:>9.3} s{:>8.1} bytes/triangle", report.build_seconds, report.bytes_per_triangle()),
+    ];
+    if let Some(rival) = &report.rival {
+        lines.extend(beside(report, rival));
+    }
+    let share = |hits: usize, rays: usize| format!("{:.1} %", 100.0 * hits as f64 / rays.max(1) as f64);
+    lines.push(row("met something", report.classes.iter().map(|class| share(class.hits, class.rays))));
+    lines.join("\n")
+}
+
+fn beside(report: &RaysReport, rival: &RivalReport) -> Vec<String> {
+    let ratios = report.ratios(rival);
+    let mut lines = vec![
+        row(&rival.name, rival.classes.iter().map(|class| format!("{:.2}", class.mrays_per_second)))
+            + &format!("{:>9.3} s", rival.build_seconds),
+        row("ratio", ratios.iter().map(|ratio| format!("{ratio:.2}")))
+            + &format!(
+                "{:>9.2}    geometric mean of rays {:.2}",
+                rival.build_seconds / report.build_seconds,
+                geometric_mean(&ratios)
+            ),
+    ];
+    let best: Vec<&str> = rival.classes.iter().map(|class| class.entry).collect();
+    lines.push(format!("{} was fastest by {}", rival.name, best.join(", ")));
+    lines
+}
+
+fn row(name: &str, cells: impl Iterator<Item = String>) -> String {
+    cells.fold(format!("{name:<14}"), |line, cell| line + &format!("{cell:>10}"))
+}
