@@ -5,7 +5,7 @@
 //! packets.
 
 use super::packet::{self, CLASSES, Jobs, PacketStack, class};
-use super::stream::{self, Walks};
+use super::stream::{self, Rays, Subtrees, Walks};
 use super::walk::traceable;
 use super::{Bvh, Coherence};
 use crate::geometry::{Hit, Ray};
@@ -100,25 +100,6 @@ impl<T: Sink, const ANY: bool> Kernel for Batch<'_, '_, T, ANY> {
         let mut base = 0;
         for rays in self.rays.chunks(size) {
             self.sink.clear(base, rays.len());
-            if !coherent && !ANY {
-                // Bounces on their way to the nearest hit part company too early for packets to pay.
-                for (ray, i) in rays.iter().zip(0..) {
-                    if traceable(ray) {
-                        jobs.push_root(i);
-                    }
-                }
-                stream::trace::<S, T, ANY>(
-                    simd,
-                    self.bvh,
-                    rays,
-                    jobs.take(),
-                    base,
-                    &mut walks,
-                    &mut self.sink,
-                );
-                base += rays.len() as u32;
-                continue;
-            }
             let ends = sorted.sort(rays);
             let mut from = 0;
             for to in ends {
@@ -139,16 +120,36 @@ impl<T: Sink, const ANY: bool> Kernel for Batch<'_, '_, T, ANY> {
                         );
                     }
                     if jobs.is_crowded() {
-                        stream::trace::<S, T, ANY>(simd, self.bvh, rays, jobs.take(), base, &mut walks, sink);
+                        let subtrees = Subtrees::<ANY> { rays, base, jobs: jobs.take().iter() };
+                        stream::trace::<S, T, ANY>(simd, self.bvh, subtrees, &mut walks, sink);
                     }
                 }
                 for &i in order {
                     jobs.push_root(i);
                 }
             }
-            stream::trace::<S, T, ANY>(simd, self.bvh, rays, jobs.take(), base, &mut walks, &mut self.sink);
+            let subtrees = Subtrees::<ANY> { rays, base, jobs: jobs.take().iter() };
+            stream::trace::<S, T, ANY>(simd, self.bvh, subtrees, &mut walks, &mut self.sink);
             base += rays.len() as u32;
         }
+    }
+}
+
+/// A batch of rays that part company too early for packets to pay: bounces on their way to the nearest hit.
+pub(super) struct Lone<'a, 'm> {
+    pub bvh: &'a Bvh<'m>,
+    pub rays: &'a [Ray],
+    pub sink: Nearest<'a>,
+}
+
+impl Kernel for Lone<'_, '_> {
+    type Out = ();
+
+    #[inline(always)]
+    fn run<S: Simd>(mut self, simd: S) {
+        self.sink.clear(0, self.rays.len());
+        let rays = Rays { rays: self.rays, taken: 0 };
+        stream::trace::<S, _, false>(simd, self.bvh, rays, &mut Walks::new(), &mut self.sink);
     }
 }
 

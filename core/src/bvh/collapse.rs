@@ -13,9 +13,9 @@ use glam::Vec4Swizzles;
 /// Cost of visiting a node, in the unit of the area heuristic.
 const NODE_COST: f32 = 1.0;
 /// Cost of opening a leaf,
-const LEAF_COST: f32 = 0.9;
+const LEAF_COST: f32 = 1.3;
 /// and of each triangle in it.
-const TRIANGLE_COST: f32 = 0.12;
+const TRIANGLE_COST: f32 = 0.08;
 
 /// Least costs of a forest of 1 … 7 roots; the eighth entry is that of a leaf or infinite.
 pub(super) type Costs = [f32; 8];

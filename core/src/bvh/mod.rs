@@ -20,7 +20,7 @@ use crate::Level;
 use crate::geometry::{Bounds, Hit, Ray};
 use crate::memory::{Arena, Footprint, OutOfMemory};
 use crate::scene::Mesh;
-use batch::{Batch, Hidden, Nearest};
+use batch::{Batch, Hidden, Lone, Nearest};
 use halflight_simd::{Kernel, Simd};
 use layout::Node;
 use walk::Walk;
@@ -127,7 +127,11 @@ impl<'m> Bvh<'m> {
         _scratch: &mut [u32],
         hits: &mut [Hit],
     ) {
-        level.dispatch(Batch::<_, false> { bvh: self, rays, coherence, sink: Nearest(hits) });
+        let sink = Nearest(hits);
+        match coherence {
+            Coherence::Coherent => level.dispatch(Batch::<_, false> { bvh: self, rays, coherence, sink }),
+            Coherence::Incoherent => level.dispatch(Lone { bvh: self, rays, sink }),
+        }
     }
 
     /// For each ray 1 where something is in the way and 0 where not.

@@ -6,8 +6,9 @@
 
 use super::Bvh;
 use super::batch::Sink;
-use super::walk::Walk;
-use crate::geometry::{MISS, Ray};
+use super::layout::Child;
+use super::walk::{Walk, traceable};
+use crate::geometry::{Hit, MISS, Ray};
 use halflight_simd::Simd;
 use halflight_simd::kernels::boxes::ROBUST;
 
@@ -25,62 +26,77 @@ impl Walks {
     }
 }
 
-/// Walks the subtrees of `jobs` (ray of the window, child, entry) and puts what is nearer than what the rays
-/// have found so far.
+/// Where walks come from.
+pub(super) trait Source<T> {
+    /// Sets the walk out on the next way there is; `false` when there is none.
+    fn next(&mut self, walk: &mut Walk, sink: &T) -> bool;
+}
+
+/// Rays one after the other, the whole tree for each.
+pub(super) struct Rays<'a> {
+    pub rays: &'a [Ray],
+    pub taken: usize,
+}
+
+impl<T: Sink> Source<T> for Rays<'_> {
+    #[inline(always)]
+    fn next(&mut self, walk: &mut Walk, _: &T) -> bool {
+        while let Some(ray) = self.rays.get(self.taken) {
+            let index = self.taken as u32;
+            self.taken += 1;
+            if traceable(ray) {
+                walk.start(ray, index, Child::node(0).0, 0.0, Hit { t: ray.t_max, ..Hit::NONE });
+                return true;
+            }
+        }
+        false
+    }
+}
+
+/// Subtrees (ray of the window, child, entry), for rays that may have found something already.
+pub(super) struct Subtrees<'a, const ANY: bool> {
+    pub rays: &'a [Ray],
+    pub base: u32,
+    pub jobs: core::slice::Iter<'a, (u32, u32, f32)>,
+}
+
+impl<T: Sink, const ANY: bool> Source<T> for Subtrees<'_, ANY> {
+    #[inline(always)]
+    fn next(&mut self, walk: &mut Walk, sink: &T) -> bool {
+        for &(i, child, entry) in self.jobs.by_ref() {
+            let Some(ray) = self.rays.get(i as usize) else { continue };
+            let best = sink.found(self.base + i, ray.t_max);
+            if entry <= best.t * ROBUST && !(ANY && best.triangle != MISS) {
+                walk.start(ray, self.base + i, child, entry, best);
+                return true;
+            }
+        }
+        false
+    }
+}
+
+/// Walks all that `source` has, and puts what is found.
 #[inline(always)]
 pub(super) fn trace<S: Simd, T: Sink, const ANY: bool>(
     simd: S,
     bvh: &Bvh,
-    rays: &[Ray],
-    jobs: &[(u32, u32, f32)],
-    base: u32,
+    mut source: impl Source<T>,
     walks: &mut Walks,
     sink: &mut T,
 ) {
-    let mut waiting = jobs.iter();
-    // Slots of the active walks come first; a walk that finds no job to take over trades places.
-    let mut slots: [usize; WALKS] = core::array::from_fn(|i| i);
     let mut active = 0;
     for walk in &mut walks.walks {
-        if !next::<T, ANY>(rays, &mut waiting, base, walk, sink) {
-            break;
-        }
-        active += 1;
+        walk.idle = !source.next(walk, sink);
+        active += !walk.idle as usize;
     }
     while active > 0 {
-        let mut i = 0;
-        while i < active {
-            let walk = &mut walks.walks[slots[i] % WALKS];
-            i += 1;
-            if walk.step::<S, ANY>(simd, bvh) {
+        for walk in &mut walks.walks {
+            if walk.idle || walk.step::<S, ANY>(simd, bvh) {
                 continue;
             }
             sink.put(walk.index, walk.hit());
-            if !next::<T, ANY>(rays, &mut waiting, base, walk, sink) {
-                active -= 1;
-                i -= 1;
-                slots.swap(i, active);
-            }
+            walk.idle = !source.next(walk, sink);
+            active -= walk.idle as usize;
         }
     }
-}
-
-/// Gives the walk the next job that is still worth it; whether there is one.
-#[inline(always)]
-fn next<T: Sink, const ANY: bool>(
-    rays: &[Ray],
-    waiting: &mut core::slice::Iter<(u32, u32, f32)>,
-    base: u32,
-    walk: &mut Walk,
-    sink: &T,
-) -> bool {
-    for &(i, child, entry) in waiting {
-        let Some(ray) = rays.get(i as usize) else { continue };
-        let best = sink.found(base + i, ray.t_max);
-        if entry <= best.t * ROBUST && !(ANY && best.triangle != MISS) {
-            walk.start(ray, base + i, child, entry, best);
-            return true;
-        }
-    }
-    false
 }

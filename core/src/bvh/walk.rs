@@ -22,6 +22,8 @@ pub(super) struct Walk {
     shear: Shear,
     octant: usize,
     best: Hit,
+    /// Whether it has nowhere to go.
+    pub(super) idle: bool,
     /// Of the ray in its batch.
     pub(super) index: u32,
     height: usize,
@@ -35,6 +37,7 @@ impl Walk {
         shear: Shear { axes: [0; 3], factors: [0.0; 3] },
         octant: 0,
         best: Hit { t: 0.0, u: 0.0, v: 0.0, triangle: 0 },
+        idle: false,
         index: 0,
         height: 0,
         stacks: Stacks::new(),
