@@ -1,6 +1,6 @@
 //! Light transport: one file per method, each readable beside its paper.
 //!
-//! [`path`] is the path tracer that renders, a wavefront over a tile; [`reference`] is the same estimator as a
+//! [`path`] is the path tracer that renders, a wavefront over a tile; [`mod@reference`] is the same estimator as a
 //! textbook has it, one path at a time, kept to test the other against.
 
 mod estimator;

@@ -51,7 +51,7 @@ pub fn write(path: &Path, image: &Image) -> Result<(), PictureError> {
     written.map_err(about)
 }
 
-/// Finds out, before a long render, whether [`write`] will find its way: the extension is known, the
+/// Finds out, before a long render, whether [`write()`] will find its way: the extension is known, the
 /// folder is there and takes files, and the file may be replaced.
 ///
 /// # Errors

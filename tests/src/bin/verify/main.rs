@@ -52,7 +52,14 @@ fn main() -> ExitCode {
         match argument.as_str() {
             "--allow-missing" => allow_missing = true,
             name if STEPS.iter().any(|step| step.name == name) => names.push(argument),
-            _ => return usage(&argument),
+            "--help" | "-h" => {
+                println!("{}", usage());
+                return ExitCode::SUCCESS;
+            }
+            _ => {
+                eprintln!("verify: no step or option is called `{argument}`\n\n{}", usage());
+                return ExitCode::from(2);
+            }
         }
     }
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
@@ -82,11 +89,10 @@ fn run(step: &Step, project: &Project, allow_missing: bool) -> (String, bool) {
     (line, good)
 }
 
-fn usage(argument: &str) -> ExitCode {
-    eprintln!("verify: no step or option is called `{argument}`\n\ncargo verify [STEP…] [--allow-missing]\n");
+fn usage() -> String {
+    let mut text = "cargo verify [STEP…] [--allow-missing]\n\n".to_owned();
     for step in STEPS {
-        eprintln!("  {:<8} {}", step.name, step.what);
+        text += &format!("  {:<8} {}\n", step.name, step.what);
     }
-    eprintln!("\n--allow-missing: a step whose tool is not on this machine is skipped instead of failing.");
-    ExitCode::from(2)
+    text + "\n--allow-missing: a step whose tool is not on this machine is skipped instead of failing."
 }

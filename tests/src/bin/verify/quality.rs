@@ -37,6 +37,8 @@ pub(crate) fn test(project: &Project) -> Outcome {
 
 pub(crate) fn docs(project: &Project) -> Outcome {
     let line = "cargo doc --quiet --workspace --no-deps --document-private-items --locked";
-    run(command(&project.root, line).env("RUSTDOCFLAGS", "-D warnings"))?;
+    // Links to private modules are for those who read the code, and work in these pages.
+    let flags = "-D warnings -A rustdoc::private_intra_doc_links";
+    run(command(&project.root, line).env("RUSTDOCFLAGS", flags))?;
     Ok("no warnings".to_owned())
 }
