@@ -47,7 +47,7 @@ fn irradiance(stage: &Stage, point: Vec3, normal: Vec3, samples: u32) -> (f64, f
 }
 
 fn check_irradiance(name: &str, lamp: &Lamp, point: Vec3, normal: Vec3) {
-    let stage = Stage::of(std::slice::from_ref(lamp));
+    let stage = Stage::of(core::slice::from_ref(lamp));
     let expected = lambert(point.as_dvec3(), normal.as_dvec3(), &lamp.outline()) * f64::from(lamp.radiance);
     let (mean, error) = irradiance(&stage, point, normal, 20_000);
     let off = (mean - expected).abs();

@@ -38,7 +38,7 @@ fn the_sky_has_its_sun_where_the_convention_says() {
     let scene = stage.scene();
     let environment = scene.environment.expect("set above");
     // Texel (5, 2): phi = 2 pi 5.5 / 16, theta = pi 2.5 / 8.
-    let (phi, theta) = (std::f32::consts::TAU * 5.5 / 16.0, std::f32::consts::PI * 2.5 / 8.0);
+    let (phi, theta) = (core::f32::consts::TAU * 5.5 / 16.0, core::f32::consts::PI * 2.5 / 8.0);
     let on_map = Vec3::new(theta.sin() * phi.cos(), theta.cos(), theta.sin() * phi.sin());
     let radiance = environment.radiance(&scene, environment.to_map.transpose() * on_map);
     assert!((radiance / Rgb::new(150.0, 140.0, 100.0) - Rgb::ONE).abs().max_element() < 1e-4, "{radiance}");
@@ -65,14 +65,14 @@ fn environment_samples_have_the_density_that_is_stated() {
             edges += u32::from((pdf / sample.pdf - 1.0).abs() > 1e-4);
             let d = sample.direction;
             let ring = ((0.5 * d.z + 0.5) * 8.0).min(7.0) as usize;
-            let slice = ((d.y.atan2(d.x) / std::f32::consts::TAU + 0.5) * 16.0).min(15.0) as usize;
+            let slice = ((d.y.atan2(d.x) / core::f32::consts::TAU + 0.5) * 16.0).min(15.0) as usize;
             let weight = 1.0 / f64::from(sample.pdf);
             cells[ring * 16 + slice][0] += weight;
             cells[ring * 16 + slice][1] += weight * weight;
         }
         assert!(edges <= n >> 14, "{edges} of {n} samples have another density when looked up");
         let n = f64::from(n);
-        let exact = 4.0 * std::f64::consts::PI / 128.0;
+        let exact = 4.0 * core::f64::consts::PI / 128.0;
         for [sum, squares] in cells {
             let mean = sum / n;
             let sigma = ((squares / n - mean * mean) / n).sqrt();
@@ -103,7 +103,7 @@ fn environment_irradiance_is_that_of_uniform_directions() {
                     });
                 let d = warp::uniform_sphere(sampler.pair(2));
                 let radiance = f64::from(environment.radiance(scene, d).x);
-                let by_chance = radiance * f64::from(d.dot(normal).max(0.0)) * 4.0 * std::f64::consts::PI;
+                let by_chance = radiance * f64::from(d.dot(normal).max(0.0)) * 4.0 * core::f64::consts::PI;
                 for (i, value) in [by_light, by_chance].into_iter().enumerate() {
                     sums[i] += value;
                     squares[i] += value * value;

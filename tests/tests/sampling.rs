@@ -50,7 +50,7 @@ fn every_power_of_two_prefix_is_a_net() {
                 for [x, y] in &points[..n] {
                     let cell = (x * across) as usize + ((y * down) as usize) * across as usize;
                     assert!(
-                        !std::mem::replace(&mut seen[cell], true),
+                        !core::mem::replace(&mut seen[cell], true),
                         "key {key}: {n} points, {log_x} splits of x"
                     );
                 }
@@ -58,7 +58,7 @@ fn every_power_of_two_prefix_is_a_net() {
             let mut seen = vec![false; n];
             for x in &singles[..n] {
                 assert!(
-                    !std::mem::replace(&mut seen[(x * n as f32) as usize], true),
+                    !core::mem::replace(&mut seen[(x * n as f32) as usize], true),
                     "key {key}: {n} singles"
                 );
             }
@@ -73,7 +73,7 @@ fn later_blocks_and_the_last_samples_are_nets_as_well() {
         for i in 0..256 {
             let [x, y] = Sampler::new(1, 2, start + i).pair(3);
             let cell = (x * 16.0) as usize + 16 * (y * 16.0) as usize;
-            assert!(!std::mem::replace(&mut seen[cell], true), "block at {start}");
+            assert!(!core::mem::replace(&mut seen[cell], true), "block at {start}");
         }
     }
 }
@@ -85,14 +85,14 @@ fn quads_are_nets_in_every_coordinate_and_in_both_pairs() {
         for axis in 0..4 {
             let mut seen = [false; 256];
             for p in &points {
-                assert!(!std::mem::replace(&mut seen[(p[axis] * 256.0) as usize], true), "axis {axis}");
+                assert!(!core::mem::replace(&mut seen[(p[axis] * 256.0) as usize], true), "axis {axis}");
             }
         }
         for pair in [0, 2] {
             let mut seen = [false; 256];
             for p in &points {
                 let cell = (p[pair] * 16.0) as usize + 16 * (p[pair + 1] * 16.0) as usize;
-                assert!(!std::mem::replace(&mut seen[cell], true), "pair {pair}");
+                assert!(!core::mem::replace(&mut seen[cell], true), "pair {pair}");
             }
         }
     }
@@ -133,7 +133,8 @@ fn each_point_is_uniform_over_keys() {
 
 #[test]
 fn dimensions_pixels_and_seeds_are_independent() {
-    let streams: [(&str, fn(u32) -> [f32; 2]); 5] = [
+    type Stream = (&'static str, fn(u32) -> [f32; 2]);
+    let streams: [Stream; 5] = [
         ("dimensions", |i| {
             [Sampler::new(0, i / 16, i % 16).pair(0)[0], Sampler::new(0, i / 16, i % 16).pair(1)[0]]
         }),
@@ -174,8 +175,9 @@ fn mean_squared_error(n: u32, exact: f64, sample: impl Fn(u32, u32) -> f64) -> f
 fn errors_fall_faster_than_those_of_independent_samples() {
     let smooth = |[x, y]: [f32; 2]| f64::from(x) * f64::from(y) * 4.0;
     let disk = |[x, y]: [f32; 2]| f64::from(u8::from(x * x + y * y < 1.0));
-    let integrands: [(&str, &dyn Fn([f32; 2]) -> f64, f64, f64); 2] =
-        [("smooth", &smooth, 1.0, 2_000.0), ("disk", &disk, std::f64::consts::FRAC_PI_4, 10.0)];
+    type Integrand<'a> = (&'a str, &'a dyn Fn([f32; 2]) -> f64, f64, f64);
+    let integrands: [Integrand; 2] =
+        [("smooth", &smooth, 1.0, 2_000.0), ("disk", &disk, core::f64::consts::FRAC_PI_4, 10.0)];
     for (name, f, exact, gain) in integrands {
         let n = 256;
         let sobol = mean_squared_error(n, exact, |pixel, i| f(Sampler::new(4, pixel, i).pair(0)));
@@ -212,7 +214,7 @@ fn warps_have_their_densities() {
     let (mut disk, mut hemisphere, mut sphere, mut cone, mut triangle) =
         (vec![0; 64], vec![0; 64], vec![0; 64], vec![0; 64], vec![0; 64]);
     let eighth = |x: f32| ((x * 8.0) as usize).min(7);
-    let azimuth = |x: f32, y: f32| eighth(y.atan2(x) / std::f32::consts::TAU + 0.5);
+    let azimuth = |x: f32, y: f32| eighth(y.atan2(x) / core::f32::consts::TAU + 0.5);
     for i in 0..n {
         let random = Random::new(1, i);
         let u = [random.single(0), random.single(1)];
@@ -246,7 +248,7 @@ fn memory(bytes: usize) -> Vec<Line> {
 #[test]
 fn alias_tables_pick_by_weight() {
     let heavy_tail = |i: usize| 1.0 / (1.0 + i as f32).powi(2);
-    let holes = |i: usize| if i % 3 == 0 { 0.0 } else { i as f32 };
+    let holes = |i: usize| if i.is_multiple_of(3) { 0.0 } else { i as f32 };
     let one = |i: usize| if i == 37 { 5.0 } else { 0.0 };
     let broken = |i: usize| [f32::NAN, -1.0, f32::INFINITY, 2.0][i % 4];
     let weights: [(&str, &dyn Fn(usize) -> f32); 4] =
