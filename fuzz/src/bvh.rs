@@ -10,8 +10,9 @@ use halflight_core::geometry::{Hit, Ray};
 use halflight_core::memory::{Arena, Line};
 use halflight_core::scene::{Mesh, Triangle};
 
-const MAX_TRIANGLES: usize = 300;
-const MAX_RAYS: usize = 40;
+const MAX_TRIANGLES: usize = 128;
+/// One packet of sixteen, and some more.
+const MAX_RAYS: usize = 20;
 
 /// Of hits whose distances differ by less than the rounding of a distance, relative, any may be the nearest:
 /// the box of one may be entered a rounding behind the hit of the other.
@@ -39,11 +40,12 @@ fn attempt(input: &mut Unstructured) -> Result<()> {
     triangles = triangles.repeat(copies);
     triangles.truncate(MAX_TRIANGLES);
     let mesh = Mesh { positions: &positions, triangles: &triangles, ..Mesh::default() };
-    let mut rays = Vec::new();
+    let (mut rays, mut expected) = (Vec::new(), Vec::new());
     while rays.len() < MAX_RAYS && !input.is_empty() {
         let ray = ray(input, &mesh)?;
         if well_conditioned(&mesh, &ray) {
             rays.push(ray);
+            expected.push(brute::nearest(&mesh, &ray));
         }
     }
 
@@ -51,7 +53,7 @@ fn attempt(input: &mut Unstructured) -> Result<()> {
     let mut arena = Arena::new(bytemuck::cast_slice_mut(&mut lines));
     let bvh = Bvh::build(&mesh, &mut arena).expect("the footprint was granted");
     for level in Level::detect().and_below() {
-        trace(&bvh, &mesh, level, &rays);
+        trace(&bvh, &mesh, level, &rays, &expected);
     }
     Ok(())
 }
@@ -80,10 +82,10 @@ fn ray(input: &mut Unstructured, mesh: &Mesh) -> Result<Ray> {
     Ok(Ray::segment(origin, direction, t_max))
 }
 
-fn trace(bvh: &Bvh, mesh: &Mesh, level: Level, rays: &[Ray]) {
+fn trace(bvh: &Bvh, mesh: &Mesh, level: Level, rays: &[Ray], expected: &[Hit]) {
     let singles: Vec<Hit> = rays.iter().map(|ray| bvh.nearest(level, ray)).collect();
-    for (ray, hit) in rays.iter().zip(&singles) {
-        against_brute_force(mesh, level, ray, hit);
+    for ((ray, hit), expected) in rays.iter().zip(&singles).zip(expected) {
+        against_brute_force(mesh, level, ray, hit, expected);
         assert_eq!(bvh.occluded(level, ray), hit.is_some(), "{level:?} occluded {ray:?}");
     }
     let mut scratch = vec![0; Bvh::batch_scratch(rays.len()).div_ceil(4)];
@@ -99,9 +101,8 @@ fn trace(bvh: &Bvh, mesh: &Mesh, level: Level, rays: &[Ray]) {
     }
 }
 
-fn against_brute_force(mesh: &Mesh, level: Level, ray: &Ray, hit: &Hit) {
-    let best = brute::nearest(mesh, ray);
-    if best == *hit {
+fn against_brute_force(mesh: &Mesh, level: Level, ray: &Ray, hit: &Hit, best: &Hit) {
+    if best == hit {
         return;
     }
     let context = || format!("{level:?} {ray:?}: {hit:?}, brute force {best:?}");

@@ -6,11 +6,9 @@ use crate::{Failure, Outcome, Project};
 use std::fs;
 use std::process::{Command, Stdio};
 
-/// For each target.
-const SECONDS: u32 = 20;
-
 pub(crate) fn smoke(project: &Project) -> Outcome {
     let folder = project.root.join("fuzz");
+    let seconds = project.fuzz_seconds;
     let io = |error: std::io::Error| Failure::Failed(format!("{}: {error}", folder.display()));
     let mut targets = Vec::new();
     for entry in fs::read_dir(folder.join("fuzz_targets")).map_err(io)? {
@@ -25,20 +23,20 @@ pub(crate) fn smoke(project: &Project) -> Outcome {
             fs::create_dir_all(folder.join("corpus-run").join(target)).map_err(io)?;
             let line = format!(
                 "cargo +nightly fuzz run --fuzz-dir . {target} corpus-run/{target} corpus/{target} -- \
-                 -seed=1 -max_total_time={SECONDS} -timeout=10 -verbosity=0 -print_final_stats=1"
+                 -seed=1 -max_total_time={seconds} -timeout=10 -verbosity=0 -print_final_stats=1"
             );
             // Leaks are not what is looked for, and looking for them needs ptrace, which sandboxes forbid.
             run(fresh_cargo(&folder, &line).env("ASAN_OPTIONS", "detect_leaks=0"))?;
         } else {
             let line = format!(
                 "cargo run --quiet --release --locked --target-dir target/stable --no-default-features --features app --bin mutate -- \
-                 {target} --seconds {SECONDS} --seed 1"
+                 {target} --seconds {seconds} --seed 1"
             );
             println!("{}", output(&mut fresh_cargo(&folder, &line))?);
         }
     }
     let driver = if coverage { "libFuzzer" } else { "the stable driver (no cargo-fuzz or no nightly here)" };
-    Ok(format!("{} targets, {SECONDS} s each, by {driver}", targets.len()))
+    Ok(format!("{} targets, {seconds} s each, by {driver}", targets.len()))
 }
 
 fn has_cargo_fuzz() -> bool {

@@ -1,5 +1,5 @@
 //! Every check of the project in one program, the same for a person and for CI:
-//! `cargo verify [STEP…] [--allow-missing]`, all steps when none is named.
+//! `cargo verify [STEP…] [--allow-missing] [--fuzz-seconds N]`, all steps when none is named.
 #![forbid(unsafe_code)]
 
 mod command;
@@ -33,6 +33,8 @@ enum Failure {
 /// What the steps need to know.
 struct Project {
     root: PathBuf,
+    /// How long each fuzz target runs.
+    fuzz_seconds: u32,
 }
 
 const STEPS: &[Step] = &[
@@ -47,9 +49,18 @@ const STEPS: &[Step] = &[
 
 fn main() -> ExitCode {
     let mut allow_missing = false;
+    let mut fuzz_seconds = 20;
     let mut names = Vec::new();
-    for argument in std::env::args().skip(1) {
+    let mut arguments = std::env::args().skip(1);
+    while let Some(argument) = arguments.next() {
         match argument.as_str() {
+            "--fuzz-seconds" => match arguments.next().and_then(|seconds| seconds.parse().ok()) {
+                Some(seconds) => fuzz_seconds = seconds,
+                None => {
+                    eprintln!("verify: --fuzz-seconds wants a number\n\n{}", usage());
+                    return ExitCode::from(2);
+                }
+            },
             "--allow-missing" => allow_missing = true,
             name if STEPS.iter().any(|step| step.name == name) => names.push(argument),
             "--help" | "-h" => {
@@ -63,7 +74,7 @@ fn main() -> ExitCode {
         }
     }
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
-    let project = Project { root: root.canonicalize().unwrap_or(root) };
+    let project = Project { root: root.canonicalize().unwrap_or(root), fuzz_seconds };
 
     let chosen = STEPS.iter().filter(|step| names.is_empty() || names.iter().any(|name| name == step.name));
     let results: Vec<_> = chosen.map(|step| run(step, &project, allow_missing)).collect();
@@ -90,9 +101,10 @@ fn run(step: &Step, project: &Project, allow_missing: bool) -> (String, bool) {
 }
 
 fn usage() -> String {
-    let mut text = "cargo verify [STEP…] [--allow-missing]\n\n".to_owned();
+    let mut text = "cargo verify [STEP…] [--allow-missing] [--fuzz-seconds N]\n\n".to_owned();
     for step in STEPS {
         text += &format!("  {:<8} {}\n", step.name, step.what);
     }
-    text + "\n--allow-missing: a step whose tool is not on this machine is skipped instead of failing."
+    text + "\n--allow-missing    a step whose tool is not on this machine is skipped instead of failing\n\
+            --fuzz-seconds N   how long each fuzz target runs; 20 if not said, 600 for a campaign"
 }
