@@ -259,6 +259,13 @@ impl<'m> Lights<'m> {
         }
     }
 
+    /// Whether there is more than one light to choose from; otherwise `u[2]` of [`Lights::sample`] does
+    /// not matter.
+    #[inline]
+    pub fn have_choice(&self) -> bool {
+        self.in_tree() > 1 || self.environment_weight + self.distant_weight > 0.0
+    }
+
     fn in_tree(&self) -> usize {
         self.emitters.len() + self.points.len()
     }
@@ -303,6 +310,7 @@ impl<'m> Lights<'m> {
     }
 }
 
+#[inline]
 fn sample_emitter(
     scene: &Scene,
     emitter: &Emitter,

@@ -143,7 +143,7 @@ fn texture_corners(texcoords: &[[f32; 2]], vertices: [u32; 3]) -> [Vec2; 3] {
 
 /// The unit normal of a triangle with edges `e1` and `e2`, and how slender it is: the square of its length
 /// over twice its area.
-#[inline]
+#[inline(always)]
 fn unit_normal(e1: Vec3, e2: Vec3) -> Option<(Vec3, f32)> {
     let cross = e1.cross(e2);
     let square = cross.length_squared();
@@ -151,7 +151,12 @@ fn unit_normal(e1: Vec3, e2: Vec3) -> Option<(Vec3, f32)> {
         let inverse = 1.0 / libm::sqrtf(square);
         return Some((cross * inverse, e1.length_squared().max(e2.length_squared()) * inverse));
     }
-    // Very small, very large, very slender or no triangle: the same in units of its size, twice.
+    rescaled_unit_normal(e1, e2)
+}
+
+/// The same for a very small, very large, very slender or no triangle: in units of its size, twice.
+#[cold]
+fn rescaled_unit_normal(e1: Vec3, e2: Vec3) -> Option<(Vec3, f32)> {
     let size = power_of_two_near(e1.abs().max(e2.abs()).max_element())?;
     let (e1, e2) = (e1 * size, e2 * size);
     let cross = e1.cross(e2);

@@ -289,7 +289,8 @@ impl<'a, F: Features> PathTracer<'a, F> {
         let mut light = None;
         if !self.lights.is_empty() && !bsdf.is_delta() {
             let [u, v] = sampler.pair(first + dimension::LIGHT);
-            let choice = sampler.single(first + dimension::LIGHT_CHOICE);
+            let choice =
+                if self.lights.have_choice() { sampler.single(first + dimension::LIGHT_CHOICE) } else { 0.0 };
             light = self.lights.sample(scene, point.position, normal, [u, v, choice]).and_then(|sample| {
                 let wi = point.frame.to_local(sample.direction);
                 if !point.sides_agree(wi, sample.direction) {
