@@ -6,6 +6,12 @@ use crate::{Failure, Outcome, Project};
 use std::fs;
 use std::process::{Command, Stdio};
 
+/// Longest smoke run of a target; what is asked to run longer is a campaign.
+pub(crate) const SMOKE_SECONDS: u32 = 20;
+
+/// Runs of each target in a smoke run.
+const SMOKE_RUNS: i32 = 4000;
+
 pub(crate) fn smoke(project: &Project) -> Outcome {
     let folder = project.root.join("fuzz");
     let seconds = project.fuzz_seconds;
@@ -17,13 +23,15 @@ pub(crate) fn smoke(project: &Project) -> Outcome {
     targets.sort();
 
     let coverage = has_cargo_fuzz();
+    // A smoke run ends after the same runs on every machine, so that it says the same; a campaign by the clock.
+    let runs = if seconds <= SMOKE_SECONDS { SMOKE_RUNS } else { -1 };
     for target in &targets {
         if coverage {
             // What libFuzzer finds goes to the first folder; the second is the one in the repository.
             fs::create_dir_all(folder.join("corpus-run").join(target)).map_err(io)?;
             let line = format!(
                 "cargo +nightly fuzz run --fuzz-dir . {target} corpus-run/{target} corpus/{target} -- \
-                 -seed=1 -max_total_time={seconds} -timeout=10 -verbosity=0 -print_final_stats=1"
+                 -seed=1 -runs={runs} -max_total_time={seconds} -timeout=10 -verbosity=0 -print_final_stats=1"
             );
             // Leaks are not what is looked for, and looking for them needs ptrace, which sandboxes forbid.
             run(fresh_cargo(&folder, &line).env("ASAN_OPTIONS", "detect_leaks=0"))?;

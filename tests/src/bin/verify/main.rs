@@ -49,7 +49,7 @@ const STEPS: &[Step] = &[
 
 fn main() -> ExitCode {
     let mut allow_missing = false;
-    let mut fuzz_seconds = 20;
+    let mut fuzz_seconds = fuzz::SMOKE_SECONDS;
     let mut names = Vec::new();
     let mut arguments = std::env::args().skip(1);
     while let Some(argument) = arguments.next() {
