@@ -181,6 +181,16 @@ fn a_reference_is_compared_with_and_its_size_is_checked_first() {
         assert!(object["error"][key].as_f64().unwrap() > 0.0, "{key}");
     }
     assert!(object["error"]["estimate"]["relmse"].is_number());
+    let history = object["history"].as_array().unwrap();
+    assert_eq!(history.len() as u64, object["rounds"].as_u64().unwrap());
+    for keys in history.windows(2) {
+        assert!(keys[0]["seconds"].as_f64() < keys[1]["seconds"].as_f64());
+        assert!(keys[0]["rays"].as_u64() < keys[1]["rays"].as_u64());
+    }
+    let last = &history[history.len() - 1];
+    assert_eq!((&last["spp"], &last["relmse"]), (&object["spp"], &object["error"]["estimate"]["relmse"]));
+    assert_eq!(last["reference"]["mse"], object["error"]["mse"]);
+    assert!(history[0]["reference"]["flip"].is_number());
     let said = folder.refused("render scene.obj -o b.exr --size 9x9 --reference r.exr");
     assert!(said.contains("--size 16x16") && !folder.path("b.exr").exists(), "{said}");
 }

@@ -76,6 +76,21 @@ impl Pixel {
         let count = self.count();
         if count == 0 { Rgb::ZERO } else { (self.even.sum() + self.odd.sum()) / count as f32 }
     }
+
+    /// Estimated variance of [`Pixel::mean`]: what the halves disagree by, with one degree of freedom. 0 where
+    /// a half is empty.
+    ///
+    /// With independent halves A and B of n_A and n_B samples and variance σ² of one sample, (A − B)² has the
+    /// expectation σ² (1/n_A + 1/n_B), and their common mean the variance σ² / (n_A + n_B).
+    pub fn variance(&self) -> Rgb {
+        let (even, odd) = (self.even.count as f32, self.odd.count as f32);
+        if even == 0.0 || odd == 0.0 {
+            return Rgb::ZERO;
+        }
+        let share = (even / (even + odd)) * (odd / (even + odd));
+        let difference = self.even.mean() - self.odd.mean();
+        share * difference * difference
+    }
 }
 
 /// Samples that did not reach the picture, by cause.
@@ -135,6 +150,17 @@ mod tests {
         let mean = f64::from(pixel.mean().y);
         assert!((mean * 1e6 / exact - 1.0).abs() < 1.5e-7, "{mean} {exact}");
         assert_eq!((pixel.count(), dropped.total()), (1_000_000, 0));
+    }
+
+    #[test]
+    fn the_halves_tell_the_variance() {
+        let mut pixel = Pixel::default();
+        for (index, sample) in [1.0, 4.0, 3.0].into_iter().enumerate() {
+            pixel.add(index as u32, Rgb::splat(sample), &mut Dropped::default());
+            assert_eq!(index > 0, pixel.variance() != Rgb::ZERO);
+        }
+        // Halves of means 2 and 4: (2 − 4)² times 2/3 · 1/3.
+        assert!((pixel.variance().x - 8.0 / 9.0).abs() < 1e-6);
     }
 
     #[test]

@@ -15,6 +15,7 @@ use halflight::save::{self, Image};
 use halflight_simd::{Level, Tier};
 use std::path::PathBuf;
 use std::process::ExitCode;
+use std::sync::Arc;
 use std::time::Instant;
 
 /// Render a scene to pictures
@@ -73,7 +74,8 @@ pub(super) struct Render {
     #[arg(long, help_heading = "How to run")]
     precise: bool,
 
-    /// A reference picture of the same size; the error against it is reported
+    /// A reference picture of the same size; the error against it is reported, that of each round with
+    /// --json. Comparing does not count as time of rendering
     #[arg(long, value_name = "FILE", help_heading = "Results")]
     reference: Option<PathBuf>,
     /// Print one JSON object instead of text
@@ -109,7 +111,7 @@ impl Render {
         for output in &outputs {
             save::check_writable(output)?;
         }
-        let reference = self.reference.as_deref().map(save::read).transpose()?;
+        let reference = self.reference.as_deref().map(save::read).transpose()?.map(Arc::new);
 
         let loading = Instant::now();
         let loaded = load::load(&self.scene, &LoadOptions::default())?;
@@ -117,8 +119,8 @@ impl Render {
         for repair in &loaded.repairs {
             warn(repair);
         }
-        let settings = self.settings(&loaded)?;
-        self.check_reference(reference.as_ref(), &settings)?;
+        let settings = Settings { reference: reference.clone(), ..self.settings(&loaded)? };
+        self.check_reference(reference.as_deref(), &settings)?;
         let views = loaded.views();
         let scene = views.scene(self.view.camera(&loaded)?);
 
@@ -183,6 +185,7 @@ impl Render {
             memory: self.memory,
             level: self.simd.map_or(level, |tier| level.capped(tier)),
             stop: if flags == Stop::default() { rules } else { flags },
+            reference: None,
         })
     }
 

@@ -4,7 +4,7 @@
 use super::compare as comparing;
 use super::values::{readable_bytes, readable_seconds};
 use halflight::compare::Comparison;
-use halflight::drive::{Ending, ErrorEstimate, RenderResult, Settings};
+use halflight::drive::{Against, Ending, ErrorEstimate, RenderResult, Round, Settings};
 use halflight_core::census::Census;
 use halflight_core::scene::Scene;
 use serde_json::{Map, Value, json};
@@ -54,6 +54,7 @@ impl Report<'_> {
             "paths": result.counters.paths,
             "mean_radiance": result.image.mean(),
             "error": self.error(),
+            "history": self.result.history.iter().map(round).collect::<Vec<_>>(),
             "dropped": {
                 "nan": dropped.nan,
                 "infinite": dropped.infinite,
@@ -132,6 +133,22 @@ impl Report<'_> {
         }
         lines.join("\n")
     }
+}
+
+/// An entry of `history`.
+fn round(round: &Round) -> Value {
+    let mut object = json!({
+        "seconds": round.seconds,
+        "spp": round.spp,
+        "rays": round.rays,
+        "relmse": round.error.map(|error| error.relmse),
+        "interval": round.error.map(|error| [error.lower, error.upper]),
+    });
+    if let Some(Against { linear, flip }) = round.reference {
+        object["reference"] =
+            json!({ "relmse": linear.relmse, "mse": linear.mse, "rmse": linear.rmse(), "flip": flip });
+    }
+    object
 }
 
 fn plural(count: usize, noun: &str) -> String {
