@@ -11,7 +11,7 @@ use serde_json::{Map, Value, json};
 use std::path::PathBuf;
 
 /// A render that is done.
-pub(super) struct Report<'a> {
+pub(super) struct Summary<'a> {
     pub(super) scene: &'a Scene<'a>,
     pub(super) settings: &'a Settings,
     pub(super) result: &'a RenderResult,
@@ -21,7 +21,7 @@ pub(super) struct Report<'a> {
     pub(super) total_seconds: f64,
 }
 
-impl Report<'_> {
+impl Summary<'_> {
     pub(super) fn object(&self) -> Value {
         let (result, settings) = (self.result, self.settings);
         let plan = Census::of(self.scene).plan();
