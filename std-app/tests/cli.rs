@@ -107,6 +107,9 @@ fn wrong_usage_is_refused_before_anything_is_written() {
         ("render scene.obj --reference missing.exr", "missing.exr"),
         ("compare missing.exr missing.exr", "missing.exr"),
         ("compare scene.obj scene.obj", ".exr"),
+        ("compare missing.exr missing.exr --difference signed", "--output"),
+        ("compare missing.exr missing.exr -o d.hdr --difference relative", "no values below zero"),
+        ("compare missing.exr missing.exr -o d.png --difference loud", "signed, absolute, relative, flip"),
         ("info missing.toml", "missing.toml"),
         ("bench", "rays"),
         ("bench rays missing.obj", "missing.obj"),
@@ -206,6 +209,13 @@ fn compare_prints_known_values() {
     assert_eq!(object["relmse"].as_f64(), Some(0.25 / 1.01));
     assert_eq!(object["flip"].as_f64(), Some(0.0), "both are white on a display");
     assert_eq!(read(&folder.path("d.pfm")).unwrap(), flat(0.5));
+    let object = folder.object("compare b.pfm a.exr --json -o d.pfm -o d.png --difference signed");
+    assert_eq!(read(&folder.path("d.pfm")).unwrap(), flat(-0.5));
+    assert_eq!(
+        object["outputs"][0],
+        serde_json::json!({"file": "d.pfm", "difference": "signed", "scale": null})
+    );
+    assert_eq!(object["outputs"][1]["scale"], serde_json::json!([-0.5, 0.5]));
 
     write(&folder.path("c.exr"), &Image::black(3, 1)).unwrap();
     assert!(folder.refused("compare a.exr c.exr").contains("2x1 and 3x1"));
