@@ -3,13 +3,12 @@
 //! A picture is made in rounds; a round adds the same number of samples to every pixel. How the samples are
 //! cut into rounds, and how many threads there are, leaves the bits of the picture as they are.
 
-mod error;
 mod history;
 mod memory;
 mod rounds;
 mod workers;
 
-pub use error::ErrorEstimate;
+pub use halflight_core::estimate::ErrorEstimate;
 pub use history::{Against, Round};
 pub use memory::MemoryUse;
 pub use rounds::Stop;
@@ -126,7 +125,7 @@ pub struct RenderResult {
     pub seconds: Seconds,
     /// Paths, rays and dropped samples.
     pub counters: Counters,
-    /// The error, estimated from the two half-films; `None` for fewer than two samples.
+    /// The error, estimated from the two half-films; `None` for fewer than four samples, and for a black picture.
     pub error: Option<ErrorEstimate>,
     /// Bytes of each structure, while paths are traced.
     pub memory: Vec<MemoryUse>,
@@ -247,7 +246,7 @@ impl WithFeatures for Render<'_> {
                 break;
             }
             rounds.completed(samples, clock.seconds());
-            error = ErrorEstimate::of(&film);
+            error = workers.estimate(&film);
             let seconds = clock.seconds();
             let against = reference.as_mut().map(|r| clock.pause(|| r.compare(&image(&film), seconds)));
             let (spp, rays) = (rounds.spp(), counters.rays + counters.shadow_rays);
@@ -272,7 +271,7 @@ impl WithFeatures for Render<'_> {
             threads: workers.count(),
             seconds: Seconds { build, render },
             counters,
-            error: ErrorEstimate::of(&film),
+            error: workers.estimate(&film),
             memory: memory.uses(),
             memory_peak: memory.peak(),
             ending: if interrupted { Ending::Interrupted } else { Ending::Done },
