@@ -98,7 +98,7 @@ impl Summary<'_> {
             Some(ErrorEstimate { relmse, lower, upper }) => {
                 format!("error  relMSE {relmse:.3e} (95 %: {lower:.3e} to {upper:.3e}), estimated from its own noise")
             }
-            None => "error  unknown: it takes two samples per pixel and some light".into(),
+            None => "error  unknown: it takes four samples per pixel and some light".into(),
         });
         if let Some(comparison) = self.comparison {
             lines.extend(comparing::text(comparison).lines().map(|line| format!("       {line}")));
