@@ -3,9 +3,9 @@
 use crate::numbers::{coordinate, traceable_point as point};
 use arbitrary::{Result, Unstructured};
 use halflight_simd::kernels::boxes::{Boxes8, SlabRay, SlabRay8, SlabRays16};
-use halflight_simd::kernels::push::push;
+use halflight_simd::kernels::push::{keep, push};
 use halflight_simd::kernels::triangles::{Shear, ShearRay8, ShearRays16, intersect};
-use halflight_simd::{Kernel, Lanes, Level, STACK, Simd, Stacks};
+use halflight_simd::{Kernel, Lanes, Level, STACK, Simd, Stack};
 
 fn finite(point: [f32; 3]) -> [f32; 3] {
     point.map(|x| if x.is_finite() { x } else { 0.0 })
@@ -102,6 +102,15 @@ impl Kernel for &Work {
         let found =
             ShearRay8::new(simd, self.origins[0], &shear).meets(simd, &values, 0, self.count, self.t_max);
         let found = found.expect("eight floats can be read from every run");
+        let areas = ShearRay8::along(simd, shear.axes, shear.axes.map(|k| self.origins[0][k]), shear.factors);
+        let areas = areas.areas(simd, &values, 0, self.count, self.t_max);
+        let areas = areas.expect("eight floats can be read from every run");
+        assert_eq!((areas.hits, areas.doubtful), (found.hits, found.doubtful));
+        let [t, u, v] = [found.t.to_array(), found.u.to_array(), found.v.to_array()];
+        for i in (0..8).filter(|i| found.hits >> i & 1 == 1) {
+            let divided = [areas.t[i], areas.v[i] / areas.det[i], areas.w[i] / areas.det[i]];
+            assert_eq!(divided.map(f32::to_bits), [t[i], u[i], v[i]].map(f32::to_bits));
+        }
         let axis = |k: usize| simd.load16(&self.origins.map(|origin| origin[k]));
         let rays = SlabRays16 {
             origin: [axis(0), axis(1), axis(2)],
@@ -181,7 +190,8 @@ impl Work {
     }
 }
 
-/// The children of rows 0 and 1 of the boxes, taken as entries and exits, onto a stack of some height.
+/// The children of rows 0 and 1 of the boxes, taken as entries and exits, onto a stack of some height; of which
+/// then only those up to the first entry of row 3 are kept.
 #[derive(Clone, Copy)]
 struct Push {
     order: u32,
@@ -189,29 +199,43 @@ struct Push {
     boxes: Boxes8,
 }
 
-/// The same, with the stacks.
-struct PushOnto<'a>(Push, &'a mut Stacks);
+/// The same, with the stack.
+struct PushOnto<'a>(Push, &'a mut Stack);
 
 impl Kernel for PushOnto<'_> {
-    type Out = usize;
+    type Out = ();
 
     #[inline(always)]
-    fn run<S: Simd>(self, simd: S) -> usize {
-        let PushOnto(Push { order, height, boxes }, stacks) = self;
-        simd.push8(order, simd.load8(&boxes[0]), simd.load8(&boxes[1]), &boxes[2], stacks, height)
+    fn run<S: Simd>(self, simd: S) {
+        let PushOnto(Push { order, boxes, .. }, stack) = self;
+        let (entry, exit) = (simd.load8(&boxes[0]), simd.load8(&boxes[1]));
+        simd.push8(order, entry, exit, &boxes[2], stack);
+        simd.keep(boxes[3][0], stack);
+        let lowest = stack.height();
+        simd.push8_unordered(entry, exit, &boxes[2], stack);
+        assert!(stack.height() <= lowest + 8);
     }
 }
 
 impl Push {
     fn check(self, level: Level) {
-        let (mut stacks, mut reference) = (Stacks::new(), Stacks::new());
-        let height = level.dispatch(PushOnto(self, &mut stacks));
+        let (mut stack, mut reference) = (Stack::new(), Stack::new());
+        for at in 0..self.height {
+            for stack in [&mut stack, &mut reference] {
+                stack.push_if(true, at as u32, self.boxes[4 + at % 4][at / 4 % 8]);
+            }
+        }
+        level.dispatch(PushOnto(self, &mut stack));
         let [entry, exit, items, ..] = &self.boxes;
-        let expected = push(self.order, entry, exit, items, &mut reference, self.height);
-        assert_eq!(height, expected, "{level:?} order {:x} {:?}", self.order, self.boxes);
-        for at in self.height..height {
-            let [got, wanted] =
-                [stacks.get(at), reference.get(at)].map(|(item, entry)| (item, entry.to_bits()));
+        push(self.order, entry, exit, items, &mut reference);
+        keep(self.boxes[3][0], &mut reference);
+        let ordered = reference.height();
+        push(0x7654_3210, entry, exit, items, &mut reference);
+        assert_eq!(stack.height(), reference.height(), "{level:?} order {:x} {:?}", self.order, self.boxes);
+        for at in 0..stack.height() {
+            let [got, wanted] = [&stack, &reference].map(|stack| {
+                stack.get(at).map(|(item, entry)| (item, if at < ordered { entry.to_bits() } else { 0 }))
+            });
             assert_eq!(got, wanted, "{level:?} order {:x} {:?}", self.order, self.boxes);
         }
     }

@@ -1,7 +1,9 @@
 //! Lanes of the build target, through `wide`: SSE2, AVX (where the build says so), NEON, simd128 or
 //! plain scalar code. Sixteen lanes are two registers of eight.
 
-use crate::lanes::{Lanes, Mask, Simd, Stacks};
+use crate::kernels::push::{keep, push};
+use crate::lanes::{Lanes, Mask, Simd};
+use crate::stack::Stack;
 use core::ops::{Add, BitAnd, BitOr, Div, Mul, Neg, Not, Sub};
 use wide::f32x8;
 
@@ -88,6 +90,10 @@ impl Lanes for F8 {
         M8(self.0.simd_eq(other.0))
     }
     #[inline(always)]
+    fn signs(self) -> u32 {
+        self.0.to_bitmask()
+    }
+    #[inline(always)]
     fn select(self, mask: M8, other: Self) -> Self {
         Self(mask.0.select(self.0, other.0))
     }
@@ -168,6 +174,10 @@ impl<L: Lanes<Array = [f32; 8]>> Lanes for Pair<L> {
         Pair(self.0.eq(other.0), self.1.eq(other.1))
     }
     #[inline(always)]
+    fn signs(self) -> u32 {
+        self.0.signs() | self.1.signs() << 8
+    }
+    #[inline(always)]
     fn select(self, mask: Self::Mask, other: Self) -> Self {
         Self(self.0.select(mask.0, other.0), self.1.select(mask.1, other.1))
     }
@@ -196,7 +206,7 @@ pub(crate) fn halves(values: &[f32; 16]) -> (&[f32; 8], &[f32; 8]) {
 /// Whether `load8x9` with these arguments stays inside `length` values.
 #[inline(always)]
 pub(crate) fn fits8x9(length: usize, start: usize, stride: usize) -> bool {
-    stride <= 8 && start <= length && length - start >= 8 * stride + 8
+    stride <= 8 && start <= length && length - start >= 9 * stride + 8
 }
 
 impl Simd for Baseline {
@@ -229,16 +239,16 @@ impl Simd for Baseline {
         Pair(self.mask8(bits), self.mask8(bits >> 8))
     }
     #[inline(always)]
-    fn push8(
-        self,
-        order: u32,
-        entry: F8,
-        exit: F8,
-        items: &[f32; 8],
-        stacks: &mut Stacks,
-        height: usize,
-    ) -> usize {
-        crate::kernels::push::push(order, &entry.to_array(), &exit.to_array(), items, stacks, height)
+    fn push8(self, order: u32, entry: F8, exit: F8, items: &[f32; 8], stack: &mut Stack) {
+        push(order, &entry.to_array(), &exit.to_array(), items, stack);
+    }
+    #[inline(always)]
+    fn push8_unordered(self, entry: F8, exit: F8, items: &[f32; 8], stack: &mut Stack) {
+        push(0x7654_3210, &entry.to_array(), &exit.to_array(), items, stack);
+    }
+    #[inline(always)]
+    fn keep(self, limit: f32, stack: &mut Stack) {
+        keep(limit, stack);
     }
     #[inline(always)]
     fn prefetch<T>(self, _items: &[T], _values: &[f32], _second: bool, _index: usize) {}

@@ -3,6 +3,7 @@
 //! No operation here fuses or reduces: each lane does what the scalar operation does, to the bit, on
 //! every level. What a kernel does with them is therefore the same everywhere.
 
+use crate::stack::Stack;
 use core::ops::{Add, BitAnd, BitOr, Div, Mul, Neg, Not, Sub};
 
 /// One truth value per lane.
@@ -40,6 +41,8 @@ pub trait Lanes:
     fn le(self, other: Self) -> Self::Mask;
     /// `self == other`.
     fn eq(self, other: Self) -> Self::Mask;
+    /// Bits of the lanes with a minus sign, zeros and NaN included.
+    fn signs(self) -> u32;
     /// `self` where `mask` is set, `other` elsewhere.
     fn select(self, mask: Self::Mask, other: Self) -> Self;
     /// The largest lane; unspecified where a lane is NaN.
@@ -51,38 +54,6 @@ pub trait Lanes:
     }
     /// The lanes as an array.
     fn to_array(self) -> Self::Array;
-}
-
-/// Entries of a traversal stack.
-pub const STACK: usize = 704;
-
-/// A traversal stack: what was put aside, and where the ray enters it.
-#[derive(Clone, Debug)]
-pub struct Stacks {
-    /// Bits of the items.
-    pub items: [u32; STACK],
-    /// Their entry distances.
-    pub entries: [f32; STACK],
-}
-
-impl Stacks {
-    /// Empty.
-    pub const fn new() -> Self {
-        Self { items: [0; STACK], entries: [0.0; STACK] }
-    }
-
-    /// The item and entry at `at`; `at` beyond the end counts as the last slot.
-    #[inline(always)]
-    pub fn get(&self, at: usize) -> (u32, f32) {
-        let at = at.min(STACK - 1);
-        (self.items[at], self.entries[at])
-    }
-}
-
-impl Default for Stacks {
-    fn default() -> Self {
-        Self::new()
-    }
 }
 
 /// Proof that the processor has a level, and the only maker of its lanes.
@@ -105,18 +76,48 @@ pub trait Simd: Copy {
     /// A mask from its bits.
     fn mask16(self, bits: u32) -> <Self::F16 as Lanes>::Mask;
 
-    /// Of the lanes named by the nibbles of `order`, lowest nibble first, appends those with
-    /// `entry <= exit` to both stacks from `height` on, and returns the new height. Lanes are named by the low three bits of
-    /// a nibble; eight slots from `height` on are overwritten. Nothing is pushed where they do not exist.
-    fn push8(
-        self,
-        order: u32,
-        entry: Self::F8,
-        exit: Self::F8,
-        items: &[f32; 8],
-        stacks: &mut Stacks,
-        height: usize,
-    ) -> usize;
+    /// Of the lanes named by the nibbles of `order`, lowest nibble first, puts those with `entry <= exit` on the
+    /// stack. Lanes are named by the low three bits of a nibble. Nothing happens where there is no room for eight.
+    fn push8(self, order: u32, entry: Self::F8, exit: Self::F8, items: &[f32; 8], stack: &mut Stack);
+
+    /// The same in the order of the lanes; the entries on the stack are unspecified.
+    fn push8_unordered(self, entry: Self::F8, exit: Self::F8, items: &[f32; 8], stack: &mut Stack);
+
+    /// Takes all that is entered beyond `limit` off the stack.
+    fn keep(self, limit: f32, stack: &mut Stack);
+
+    /// Sixteen records of eight floats, as eight registers of sixteen: register `k` holds float `k` of each.
+    #[inline(always)]
+    fn columns16(self, records: &[[f32; 8]; 16]) -> [Self::F16; 8] {
+        let mut columns = [[0.0; 16]; 8];
+        for (i, record) in records.iter().enumerate() {
+            for (column, value) in columns.iter_mut().zip(record) {
+                column[i] = *value;
+            }
+        }
+        let [a, b, c, d, e, f, g, h] = &columns;
+        [
+            self.load16(a),
+            self.load16(b),
+            self.load16(c),
+            self.load16(d),
+            self.load16(e),
+            self.load16(f),
+            self.load16(g),
+            self.load16(h),
+        ]
+    }
+
+    /// Four registers of sixteen, as sixteen records of four floats.
+    #[inline(always)]
+    fn records16(self, [a, b, c, d]: [Self::F16; 4]) -> [[f32; 4]; 16] {
+        let (a, b, c, d) = (a.to_array(), b.to_array(), c.to_array(), d.to_array());
+        let mut records = [[0.0; 4]; 16];
+        for (i, record) in records.iter_mut().enumerate() {
+            *record = [a[i], b[i], c[i], d[i]];
+        }
+        records
+    }
 
     /// Asks for the four cache lines from `items[index]` on, or from `values[index]` on where `second`. Only a hint:
     /// an index beyond the end is harmless, and which of the two it is costs no branch.

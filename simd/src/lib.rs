@@ -13,11 +13,13 @@ extern crate std;
 mod baseline;
 mod lanes;
 mod level;
+mod stack;
 #[cfg(target_arch = "x86_64")]
 mod x86;
 
 pub mod kernels;
 
 pub use baseline::{Baseline, F8, M8, Pair};
-pub use lanes::{Lanes, Mask, STACK, Simd, Stacks};
+pub use lanes::{Lanes, Mask, Simd};
 pub use level::{Kernel, Level, Tier};
+pub use stack::{STACK, Stack};

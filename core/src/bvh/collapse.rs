@@ -92,13 +92,16 @@ impl Emitter<'_> {
         self.node(0, 0, out).is_some()
     }
 
-    /// Writes the wide node that stands for binary node `index`, and all below it.
+    /// Writes the wide node that stands for binary node `index`, and all below it. Last among its children is
+    /// that of the least cost for its area: any-hit rays take it from the stack first.
     fn node(&self, index: usize, first: usize, out: &mut Output) -> Option<u32> {
         let at = out.used.0;
         *out.nodes.get_mut(at)? = Node::EMPTY;
         out.used.0 += 1;
-        let children =
+        let mut children =
             if self.frugal { self.largest_first(index, first) } else { self.cheapest(index, first) };
+        let effort = |&(child, _): &(usize, usize)| self.costs[child][0] / self.binary[child].half_area();
+        children.chosen[..children.count].sort_unstable_by(|a, b| effort(b).total_cmp(&effort(a)));
         for (slot, &(child, first)) in children.chosen[..children.count].iter().enumerate() {
             let content = if self.is_leaf(child) {
                 self.leaf(child, first, out)?

@@ -8,7 +8,9 @@ mod build;
 mod collapse;
 mod join;
 mod layout;
+mod leaf;
 mod packet;
+mod ready;
 mod references;
 mod split;
 mod stream;
@@ -20,10 +22,9 @@ use crate::Level;
 use crate::geometry::{Bounds, Hit, Ray};
 use crate::memory::{Arena, Footprint, OutOfMemory};
 use crate::scene::Mesh;
-use batch::{Batch, Hidden, Lone, Nearest};
+use batch::{Hidden, Nearest, Stream, Tiles};
 use halflight_simd::{Kernel, Simd};
 use layout::Node;
-use walk::Walk;
 
 /// How alike the rays of a batch are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -129,8 +130,8 @@ impl<'m> Bvh<'m> {
     ) {
         let sink = Nearest(hits);
         match coherence {
-            Coherence::Coherent => level.dispatch(Batch::<_, false> { bvh: self, rays, coherence, sink }),
-            Coherence::Incoherent => level.dispatch(Lone { bvh: self, rays, sink }),
+            Coherence::Coherent => level.dispatch(Tiles { bvh: self, rays, sink }),
+            Coherence::Incoherent => level.dispatch(Stream::<_, false> { bvh: self, rays, sink }),
         }
     }
 
@@ -139,11 +140,11 @@ impl<'m> Bvh<'m> {
         &self,
         level: Level,
         rays: &[Ray],
-        coherence: Coherence,
+        _coherence: Coherence,
         _scratch: &mut [u32],
         hidden: &mut [u8],
     ) {
-        level.dispatch(Batch::<_, true> { bvh: self, rays, coherence, sink: Hidden(hidden) });
+        level.dispatch(Stream::<_, true> { bvh: self, rays, sink: Hidden(hidden) });
     }
 }
 
@@ -158,8 +159,7 @@ impl<const ANY: bool> Kernel for Single<'_, '_, ANY> {
 
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) -> Hit {
-        let mut walk = Walk::IDLE;
-        walk.trace::<S, ANY>(simd, self.bvh, self.ray)
+        walk::trace::<S, ANY>(simd, self.bvh, self.ray)
     }
 }
 

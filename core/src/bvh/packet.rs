@@ -1,85 +1,31 @@
-//! Packets of rays that go about the same way: up to `K` registers of sixteen.
+//! Packets of rays that go about the same way: camera rays of a tile, as [`REGISTERS`] registers of sixteen.
 //!
 //! Plainly: all rays of the packet walk the tree together, so a node is fetched and tested once for all.
-//! 1. A node's eight boxes are tested at once against the interval of all rays. A packet of one register
-//!    then tests its rays against each box that is left; a larger one goes down without.
-//! 2. Boxes are visited in the order that the build has prepared for the octant of the directions.
-//! 3. At a leaf one triangle is tested against sixteen rays at a time.
-//! 4. The rays of a packet agree in the signs of their directions and in their dominant axis: the caller
-//!    sorts them so.
+//! 1. A node's eight boxes are tested at once against the interval of all rays, and visited in the order that
+//!    the build has prepared for the octant of the directions.
+//! 2. At a leaf the rays are tested against its box, sixteen at a time. The interval of all rays leaves out the
+//!    triangles that none can meet, and the rest is tested against sixteen rays at a time.
+//! 3. The rays of a packet agree in the signs of their directions and in their dominant axis: the caller sorts
+//!    them so ([`class`]).
+//! 4. Where all start at the same point, as those of a pinhole do, that is subtracted once for all.
 //!
 //! The price: a packet whose rays diverge visits nodes that few rays of it meet.
 
 use super::Bvh;
-use super::batch::Sink;
-use super::layout::{Child, STACK};
-use super::walk::corners_of;
+use super::batch::{Nearest, Sink};
+use super::layout::Child;
+use super::leaf::corners_of;
 use crate::geometry::{Hit, MISS, Ray};
 use halflight_simd::kernels::RECIPROCAL_MAX;
 use halflight_simd::kernels::boxes::{ROBUST, SlabInterval, SlabInterval8, SlabRays16};
 use halflight_simd::kernels::triangles::{Found, Shear, ShearRays16, dominant_axis, intersect};
-use halflight_simd::{Lanes, Mask, Simd, Stacks};
+use halflight_simd::{Lanes, Mask, Simd, Stack};
 
-/// Boxes put aside, and for each the rays that meet it (one register) or where the box is (more).
-pub(super) struct PacketStack {
-    boxes: Stacks,
-    rays: [u32; STACK],
-}
+/// Registers of sixteen rays.
+const REGISTERS: usize = 4;
 
-impl PacketStack {
-    pub(super) const fn new() -> Self {
-        Self { boxes: Stacks::new(), rays: [0; STACK] }
-    }
-}
-
-/// So few rays of a packet go on alone.
-const ALONE: u32 = 4;
-
-/// Most subtrees that wait for a ray to go on alone.
-const JOBS: usize = 1024;
-
-/// Subtrees with the ray (of the window) that is yet to walk them, and where it enters.
-pub(super) struct Jobs {
-    waiting: [(u32, u32, f32); JOBS],
-    count: usize,
-}
-
-impl Jobs {
-    pub(super) const fn new() -> Self {
-        Self { waiting: [(0, 0, 0.0); JOBS], count: 0 }
-    }
-
-    #[inline(always)]
-    fn room(&self) -> usize {
-        JOBS - self.count
-    }
-
-    #[inline(always)]
-    fn push(&mut self, ray: u32, child: u32, entry: f32) {
-        if let Some(slot) = self.waiting.get_mut(self.count) {
-            *slot = (ray, child, entry);
-            self.count += 1;
-        }
-    }
-
-    /// The whole tree, for a ray that found no company.
-    #[inline(always)]
-    pub(super) fn push_root(&mut self, ray: u32) {
-        self.push(ray, Child::node(0).0, 0.0);
-    }
-
-    /// All that wait, and none after that.
-    #[inline(always)]
-    pub(super) fn take(&mut self) -> &[(u32, u32, f32)] {
-        let count = core::mem::take(&mut self.count);
-        self.waiting.get(..count).unwrap_or(&[])
-    }
-
-    /// Whether the next packet may run out of room.
-    pub(super) fn is_crowded(&self) -> bool {
-        self.count > JOBS / 2
-    }
-}
+/// Most rays of a packet.
+pub(super) const RAYS_MAX: usize = 16 * REGISTERS;
 
 /// Sixteen rays and their best hits.
 #[derive(Clone, Copy)]
@@ -91,8 +37,15 @@ struct Lane16<S: Simd> {
     v: S::F16,
     /// Bits of the triangle's index.
     triangle: S::F16,
-    /// Rays that still look for a hit.
+    /// Lanes that hold a ray.
     active: u32,
+}
+
+/// The rays of a packet, and where they are in the batch.
+struct Packet<'a, S: Simd> {
+    lanes: [Lane16<S>; REGISTERS],
+    rays: &'a [Ray],
+    order: &'a [u8],
 }
 
 /// Signs of the direction (three bits) and dominant axis: what rays of one packet share. Below [`CLASSES`].
@@ -105,86 +58,78 @@ pub(super) fn class(direction: [f32; 3]) -> usize {
 /// How many classes of rays there are.
 pub(super) const CLASSES: usize = 24;
 
-/// Origins, directions and ends of the rays of a packet, one row of sixteen each.
-type Rows = [[f32; 16]; 7];
-
-/// Traces the rays `order` of `rays` (1 … `16 K`, all of one class and traceable) and puts their hits.
+/// Traces the rays `order` of `rays` (1 … [`RAYS_MAX`], all of one class and traceable) and puts their hits.
 #[inline(always)]
-#[allow(clippy::too_many_arguments, clippy::needless_range_loop)]
-pub(super) fn trace<S: Simd, T: Sink, const K: usize, const ANY: bool>(
+pub(super) fn trace<S: Simd>(
     simd: S,
     bvh: &Bvh,
     rays: &[Ray],
-    order: &[u32],
+    order: &[u8],
     base: u32,
-    stack: &mut PacketStack,
-    jobs: &mut Jobs,
-    sink: &mut T,
+    stack: &mut Stack,
+    sink: &mut Nearest,
 ) {
-    let mut rows: [Rows; K] = [[[0.0; 16]; 7]; K];
-    let Some(first) = order.first().and_then(|&i| rays.get(i as usize)) else { return };
+    let Some(first) = order.first().and_then(|&i| rays.get(usize::from(i))) else { return };
     let axes = Shear::new(first.direction).axes;
-    for (k, rows) in rows.iter_mut().enumerate() {
-        for l in 0..16 {
-            // Lanes without a ray repeat the first one: they change no interval.
-            let ray = order.get(16 * k + l).and_then(|&i| rays.get(i as usize)).unwrap_or(first);
-            for axis in 0..3 {
-                rows[axis][l] = ray.origin[axis];
-                rows[3 + axis][l] = ray.direction[axis];
-            }
-            rows[6][l] = ray.t_max;
-        }
-    }
     let class = class(first.direction);
     let near = [class & 1, 2 | (class >> 1 & 1), 4 | (class >> 2 & 1)];
 
-    let mut packet = [Lane16::new(simd, &rows[0], near, axes); K];
-    for (k, (lane, rows)) in packet.iter_mut().zip(&rows).enumerate() {
+    let records = records_of(rays, order, first, 0);
+    let mut lanes = [Lane16::new(simd, &records, near, axes); REGISTERS];
+    for (k, lane) in lanes.iter_mut().enumerate() {
         if k > 0 {
-            *lane = Lane16::new(simd, rows, near, axes);
+            *lane = Lane16::new(simd, &records_of(rays, order, first, 16 * k), near, axes);
         }
         let count = order.len().saturating_sub(16 * k).min(16) as u32;
         lane.active = (1u32 << count) - 1;
     }
-    let interval = SlabInterval8::new(simd, &interval(&packet, near));
-    let t_max = farthest::<S, K, ANY>(simd, &packet);
+    let mut packet = Packet { lanes, rays, order };
+    let (interval, pinhole) = packet.interval(near);
+    let interval = SlabInterval8::new(simd, &interval);
+    if pinhole {
+        packet.walk::<true>(simd, bvh, class & 7, &interval, stack);
+    } else {
+        packet.walk::<false>(simd, bvh, class & 7, &interval, stack);
+    }
 
-    walk::<S, K, ANY>(simd, bvh, rays, order, class & 7, &interval, &mut packet, t_max, stack, jobs);
-
-    for (lane, order) in packet.iter().zip(order.chunks(16)) {
-        let (t, u, v, triangle) =
-            (lane.t.to_array(), lane.u.to_array(), lane.v.to_array(), lane.triangle.to_array());
-        for (l, &index) in order.iter().enumerate() {
-            let hit = Hit { t: t[l & 15], u: u[l & 15], v: v[l & 15], triangle: triangle[l & 15].to_bits() };
-            sink.put(base + index, if hit.triangle == MISS { Hit::NONE } else { hit });
+    for (lane, order) in packet.lanes.iter().zip(order.chunks(16)) {
+        let records = simd.records16([lane.t, lane.u, lane.v, lane.triangle]);
+        for (&[t, u, v, triangle], &i) in records.iter().zip(order) {
+            let hit = Hit { t, u, v, triangle: triangle.to_bits() };
+            sink.put(base + u32::from(i), if hit.triangle == MISS { Hit::NONE } else { hit });
         }
     }
 }
 
+/// Sixteen rays from place `from` of the order on. Lanes without a ray repeat the first one: they change no
+/// interval.
+#[inline(always)]
+fn records_of(rays: &[Ray], order: &[u8], first: &Ray, from: usize) -> [[f32; 8]; 16] {
+    let mut records = [[0.0; 8]; 16];
+    for (l, record) in records.iter_mut().enumerate() {
+        let ray = order.get(from + l).and_then(|&i| rays.get(usize::from(i))).unwrap_or(first);
+        *record = bytemuck::cast(*ray);
+    }
+    records
+}
+
 impl<S: Simd> Lane16<S> {
     #[inline(always)]
-    fn new(simd: S, rows: &Rows, near: [usize; 3], axes: [usize; 3]) -> Self {
-        let origin = [simd.load16(&rows[0]), simd.load16(&rows[1]), simd.load16(&rows[2])];
-        let direction = [simd.load16(&rows[3]), simd.load16(&rows[4]), simd.load16(&rows[5])];
+    fn new(simd: S, records: &[[f32; 8]; 16], near: [usize; 3], axes: [usize; 3]) -> Self {
+        let [ox, oy, oz, t, dx, dy, dz, _] = simd.columns16(records);
+        let (origin, direction) = ([ox, oy, oz], [dx, dy, dz]);
         let [kx, ky, kz] = axes;
         let scale = simd.splat16(1.0) / direction[kz % 3];
         let zero = simd.splat16(0.0);
+        let reciprocal = [reciprocal(simd, dx), reciprocal(simd, dy), reciprocal(simd, dz)];
         Self {
-            slab: SlabRays16 {
-                origin,
-                reciprocal: [
-                    reciprocal(simd, direction[0]),
-                    reciprocal(simd, direction[1]),
-                    reciprocal(simd, direction[2]),
-                ],
-                near,
-            },
+            slab: SlabRays16 { origin, reciprocal, near },
             shear: ShearRays16 {
                 axes,
                 origin: [origin[kx % 3], origin[ky % 3], origin[kz % 3]],
                 factors: [direction[kx % 3] * scale, direction[ky % 3] * scale, scale],
             },
-            t: simd.load16(&rows[6]),
+            t,
             u: zero,
             v: zero,
             triangle: simd.splat16(f32::from_bits(MISS)),
@@ -200,192 +145,125 @@ fn reciprocal<S: Simd>(simd: S, d: S::F16) -> S::F16 {
     (simd.splat16(1.0) / d).min(limit).max(-limit)
 }
 
-/// What the rays of a packet have in common.
-#[inline(always)]
-fn interval<S: Simd, const K: usize>(packet: &[Lane16<S>; K], near: [usize; 3]) -> SlabInterval {
-    let (mut origin, mut reciprocal) = ([[0.0; 3]; 2], [[0.0; 3]; 2]);
-    for axis in 0..3 {
-        let (o, r) = (packet[0].slab.origin[axis], packet[0].slab.reciprocal[axis]);
-        let (mut least, mut most) = ((o, r), (o, r));
-        for lane in &packet[1..] {
-            if lane.active != 0 {
+impl<S: Simd> Packet<'_, S> {
+    /// What the rays have in common, and whether that is their origin.
+    #[inline(always)]
+    fn interval(&self, near: [usize; 3]) -> (SlabInterval, bool) {
+        let (mut origin, mut reciprocal) = ([[0.0; 3]; 2], [[0.0; 3]; 2]);
+        for axis in 0..3 {
+            let SlabRays16 { origin: o, reciprocal: r, .. } = self.lanes[0].slab;
+            let (mut least, mut most) = ((o[axis], r[axis]), (o[axis], r[axis]));
+            for lane in &self.lanes[1..] {
                 let (o, r) = (lane.slab.origin[axis], lane.slab.reciprocal[axis]);
                 least = (least.0.min(o), least.1.min(r));
                 most = (most.0.max(o), most.1.max(r));
             }
+            (origin[0][axis], origin[1][axis]) = (least.0.smallest(), most.0.largest());
+            (reciprocal[0][axis], reciprocal[1][axis]) = (least.1.smallest(), most.1.largest());
         }
-        (origin[0][axis], origin[1][axis]) = (least.0.smallest(), most.0.largest());
-        (reciprocal[0][axis], reciprocal[1][axis]) = (least.1.smallest(), most.1.largest());
+        (SlabInterval::new(near, origin, reciprocal), origin[0] == origin[1])
     }
-    SlabInterval::new(near, origin, reciprocal)
-}
 
-/// The farthest that any ray still looks; negative when none does.
-#[inline(always)]
-fn farthest<S: Simd, const K: usize, const ANY: bool>(simd: S, packet: &[Lane16<S>; K]) -> f32 {
-    let mut t_max = simd.splat16(-1.0);
-    for lane in packet {
-        if lane.active != 0 {
-            let t = if ANY { lane.t.select(simd.mask16(lane.active), simd.splat16(-1.0)) } else { lane.t };
-            t_max = t_max.max(t);
+    /// The farthest that any ray still looks.
+    #[inline(always)]
+    fn farthest(&self) -> f32 {
+        let [a, b, c, d] = &self.lanes;
+        a.t.max(b.t).max(c.t.max(d.t)).largest()
+    }
+
+    #[inline(always)]
+    fn walk<const PINHOLE: bool>(
+        &mut self,
+        simd: S,
+        bvh: &Bvh,
+        octant: usize,
+        interval: &SlabInterval8<S>,
+        stack: &mut Stack,
+    ) {
+        let mut t_max = self.farthest();
+        stack.truncate(0);
+        let (mut child, mut place) = (Child::node(0), 0);
+        loop {
+            if !child.is_leaf() {
+                let Some(node) = bvh.nodes.get(child.0 as usize) else { return };
+                let (entry, exit) = interval.interval(simd, &node.rows, t_max);
+                // On the stack are places of boxes: node and slot.
+                let mut places = [0.0; 8];
+                for (slot, place) in places.iter_mut().enumerate() {
+                    *place = f32::from_bits(child.0 << 3 | slot as u32);
+                }
+                simd.push8(node.order_of(octant), entry, exit, &places, stack);
+            } else if self.leaf::<PINHOLE>(simd, bvh, child, place, interval, t_max) {
+                t_max = self.farthest();
+                simd.keep(t_max * ROBUST, stack);
+            }
+            let Some(top) = stack.pop() else { return };
+            place = top;
+            let Some(node) = bvh.nodes.get((place >> 3) as usize) else { return };
+            child = node.child(place as usize & 7);
         }
     }
-    t_max.largest()
-}
 
-#[inline(always)]
-#[allow(clippy::too_many_arguments)]
-fn walk<S: Simd, const K: usize, const ANY: bool>(
-    simd: S,
-    bvh: &Bvh,
-    rays: &[Ray],
-    order: &[u32],
-    octant: usize,
-    interval: &SlabInterval8<S>,
-    packet: &mut [Lane16<S>; K],
-    mut t_max: f32,
-    stack: &mut PacketStack,
-    jobs: &mut Jobs,
-) {
-    stack.boxes.items[0] = Child::node(0).0;
-    stack.boxes.entries[0] = 0.0;
-    stack.rays[0] = u32::MAX;
-    let mut height = 1;
-    while height > 0 {
-        height -= 1;
-        let (bits, entry) = stack.boxes.get(height);
-        if entry > t_max * ROBUST {
-            continue;
+    /// Tests the rays that meet the leaf's box, which is at `place`, against its triangles; whether a hit was
+    /// taken.
+    #[inline(always)]
+    fn leaf<const PINHOLE: bool>(
+        &mut self,
+        simd: S,
+        bvh: &Bvh,
+        leaf: Child,
+        place: u32,
+        interval: &SlabInterval8<S>,
+        t_max: f32,
+    ) -> bool {
+        let (first, count) = leaf.triangles();
+        let Some(ids) = bvh.triangles.get(first..first + count) else { return false };
+        let Some(runs) = bvh.coordinates.get(9 * first..9 * (first + count)) else { return false };
+        let Some(node) = bvh.nodes.get((place >> 3) as usize) else { return false };
+        let mut met = [0u32; REGISTERS];
+        let mut planes = self.lanes[0].slab.moved(simd, &node.rows, place as usize & 7);
+        for (lane, met) in self.lanes.iter().zip(&mut met) {
+            if !PINHOLE {
+                planes = lane.slab.moved(simd, &node.rows, place as usize & 7);
+            }
+            *met = lane.slab.enters_moved(simd, &planes, lane.t).1 & lane.active;
         }
-        let child = Child(bits);
-        let mut wanted = stack.rays[height.min(STACK - 1)];
-        if K == 1 {
-            wanted &= packet[0].active;
-            if wanted.count_ones() <= ALONE {
-                if jobs.room() >= ALONE as usize {
-                    while wanted != 0 {
-                        let l = wanted.trailing_zeros() as usize;
-                        wanted &= wanted - 1;
-                        jobs.push(order.get(l).copied().unwrap_or(0), bits, entry);
+        if met == [0; REGISTERS] {
+            return false;
+        }
+        let mut taken = false;
+        let mut candidates =
+            interval.may_meet(simd, bvh.coordinates, 9 * first, count, bvh.slack, t_max) & ((1 << count) - 1);
+        while candidates != 0 {
+            let i = candidates.trailing_zeros() as usize;
+            candidates &= candidates - 1;
+            let id = ids.get(i).copied().unwrap_or(MISS);
+            let Some(mut corners) = self.lanes[0].shear.moved(simd, runs, i, count) else { continue };
+            for (k, (lane, &met)) in self.lanes.iter_mut().zip(&met).enumerate() {
+                if met == 0 {
+                    continue;
+                }
+                if !PINHOLE && let Some(moved) = lane.shear.moved(simd, runs, i, count) {
+                    corners = moved;
+                }
+                let found = lane.shear.meets_moved(simd, &corners, lane.t, met);
+                if found.hits | found.doubtful != 0 {
+                    taken |= take(simd, lane, &found, id);
+                    if found.doubtful != 0 {
+                        let order = self.order.get(16 * k..).unwrap_or(&[]);
+                        let corners = corners_of(runs, count, i);
+                        taken |= take_doubtful(simd, lane, found.doubtful, id, corners, self.rays, order);
                     }
-                    continue;
-                }
-                if wanted == 0 {
-                    continue;
                 }
             }
         }
-        if !child.is_leaf() {
-            let Some(node) = bvh.nodes.get(child.0 as usize) else { return };
-            let (entry, exit) = interval.interval(simd, &node.rows, t_max);
-            let met = simd.push8(node.order_of(octant), entry, exit, &SLOTS, &mut stack.boxes, height);
-            let mut kept = height;
-            for at in height..met {
-                let (slot, entry) = stack.boxes.get(at);
-                let slot = slot as usize & 7;
-                let meeting = if K == 1 {
-                    let lane = &packet[0];
-                    lane.slab.enters(simd, &node.rows, slot, lane.t).1 & lane.active & wanted
-                } else {
-                    // The box of a leaf is tested when its turn comes.
-                    child.0 << 3 | slot as u32
-                };
-                let to = kept.min(STACK - 1);
-                stack.boxes.items[to] = node.child(slot).0;
-                stack.boxes.entries[to] = entry;
-                stack.rays[to] = meeting;
-                kept += (K > 1 || meeting != 0) as usize;
-            }
-            height = kept;
-        } else if leaf::<S, K, ANY>(simd, bvh, rays, order, child, wanted, interval, t_max, packet) {
-            t_max = farthest::<S, K, ANY>(simd, packet);
-        }
+        taken
     }
 }
 
-/// The lanes of a node by their own numbers.
-const SLOTS: [f32; 8] = {
-    let mut slots = [0.0; 8];
-    let mut i = 0;
-    while i < 8 {
-        slots[i] = f32::from_bits(i as u32);
-        i += 1;
-    }
-    slots
-};
-
-/// Tests the rays that meet the leaf's box against its triangles; whether a hit was taken. `wanted` are the
-/// rays of a packet of one register, and for larger ones the node and slot of the leaf's box.
+/// Takes over what a triangle test found; whether a ray has a better hit now.
 #[inline(always)]
-#[allow(clippy::too_many_arguments)]
-fn leaf<S: Simd, const K: usize, const ANY: bool>(
-    simd: S,
-    bvh: &Bvh,
-    rays: &[Ray],
-    order: &[u32],
-    child: Child,
-    wanted: u32,
-    interval: &SlabInterval8<S>,
-    t_max: f32,
-    packet: &mut [Lane16<S>; K],
-) -> bool {
-    let (first, count) = child.triangles();
-    let Some(ids) = bvh.triangles.get(first..first + count) else { return false };
-    let Some(runs) = bvh.coordinates.get(9 * first..9 * (first + count)) else { return false };
-    let mut met = [0u32; K];
-    if K == 1 {
-        met[0] = wanted & packet[0].active;
-    } else {
-        let Some(node) = bvh.nodes.get((wanted >> 3) as usize) else { return false };
-        for (lane, met) in packet.iter().zip(&mut met) {
-            if lane.active != 0 {
-                *met = lane.slab.enters(simd, &node.rows, wanted as usize & 7, lane.t).1 & lane.active;
-            }
-        }
-    }
-    if met == [0; K] {
-        return false;
-    }
-    let mut taken = false;
-    let mut candidates = if K == 1 {
-        (1u32 << count) - 1
-    } else {
-        interval.may_meet(simd, bvh.coordinates, 9 * first, count, bvh.slack, t_max) & ((1 << count) - 1)
-    };
-    while candidates != 0 {
-        let i = candidates.trailing_zeros() as usize;
-        candidates &= candidates - 1;
-        let id = ids.get(i).copied().unwrap_or(MISS);
-        for (k, (lane, met)) in packet.iter_mut().zip(&mut met).enumerate() {
-            if *met == 0 {
-                continue;
-            }
-            let Some(found) = lane.shear.meets(simd, runs, i, count, lane.t, *met) else { continue };
-            if found.hits | found.doubtful != 0 {
-                let order = order.get(16 * k..).unwrap_or(&[]);
-                let hits = take(simd, lane, &found, id, (runs, count, i), rays, order);
-                taken |= hits != 0;
-                if ANY {
-                    lane.active &= !hits;
-                    *met &= !hits;
-                }
-            }
-        }
-    }
-    taken
-}
-
-/// Takes over what a triangle test found; the bits of the rays that have a better hit now.
-#[inline(always)]
-fn take<S: Simd>(
-    simd: S,
-    lane: &mut Lane16<S>,
-    found: &Found<S::F16>,
-    id: u32,
-    triangle: (&[f32], usize, usize),
-    rays: &[Ray],
-    order: &[u32],
-) -> u32 {
+fn take<S: Simd>(simd: S, lane: &mut Lane16<S>, found: &Found<S::F16>, id: u32) -> bool {
     let nearer = found.t.lt(lane.t).bits() & found.hits;
     let same = found.hits & !nearer;
     let mut hits = nearer;
@@ -401,11 +279,7 @@ fn take<S: Simd>(
     lane.u = found.u.select(mask, lane.u);
     lane.v = found.v.select(mask, lane.v);
     lane.triangle = simd.splat16(f32::from_bits(id)).select(mask, lane.triangle);
-    if found.doubtful != 0 {
-        hits | take_doubtful(simd, lane, found.doubtful, id, triangle, rays, order)
-    } else {
-        hits
-    }
+    hits != 0
 }
 
 /// The rays on an edge in f32, by the scalar reference.
@@ -415,19 +289,17 @@ fn take_doubtful<S: Simd>(
     lane: &mut Lane16<S>,
     mut doubtful: u32,
     id: u32,
-    triangle: (&[f32], usize, usize),
+    corners: [[f32; 3]; 3],
     rays: &[Ray],
-    order: &[u32],
-) -> u32 {
+    order: &[u8],
+) -> bool {
     let (mut t, mut u, mut v, mut ids) =
         (lane.t.to_array(), lane.u.to_array(), lane.v.to_array(), lane.triangle.to_array());
-    let (runs, count, i) = triangle;
-    let corners = corners_of(runs, count, i);
-    let mut hits = 0;
+    let mut taken = false;
     while doubtful != 0 {
         let l = doubtful.trailing_zeros() as usize & 15;
         doubtful &= doubtful - 1;
-        let Some(ray) = order.get(l).and_then(|&i| rays.get(i as usize)) else { continue };
+        let Some(ray) = order.get(l).and_then(|&i| rays.get(usize::from(i))) else { continue };
         let mut best = Hit { t: t[l], u: u[l], v: v[l], triangle: ids[l].to_bits() };
         let before = best;
         if let Some((t, u, v)) = intersect(ray.origin, &Shear::new(ray.direction), best.t, corners) {
@@ -435,12 +307,12 @@ fn take_doubtful<S: Simd>(
         }
         if best != before {
             (t[l], u[l], v[l], ids[l]) = (best.t, best.u, best.v, f32::from_bits(best.triangle));
-            hits |= 1 << l;
+            taken = true;
         }
     }
     lane.t = simd.load16(&t);
     lane.u = simd.load16(&u);
     lane.v = simd.load16(&v);
     lane.triangle = simd.load16(&ids);
-    hits
+    taken
 }

@@ -1,102 +1,190 @@
-//! Incoherent rays, several at a time but each on its own: the walks of `WALKS` rays are interleaved step by
-//! step, so that while one waits for a node the others compute.
+//! Rays in no order, each on its own way but in step: of [`SLOTS`] rays in flight, first all those at a node take
+//! a step, then all those at a leaf, then those that found something, and those that are done make room.
 //!
-//! A walk is a chain of dependent steps (fetch, test, choose, fetch …) that leaves the processor idle most of
-//! the time. What a step of one ray waits for is there when its turn comes again.
+//! A walk alone is a chain of dependent steps with branches that cannot be guessed. In step, the same is done for
+//! one independent walk after the other:
+//! 1. Which walks do the same next is a set of bits. What is guessed wrong is the end of a set, not every step.
+//! 2. Nothing on a stack needs a test when it is taken: a new best hit has taken off all that is farther.
+//! 3. Rays are set up in a loop of their own, [`AHEAD`] at a time.
+//! 4. Any-hit walks visit what is cheap for its size first ([`super::collapse`] lays the children out so): near
+//!    boxes first was slower.
 
 use super::Bvh;
 use super::batch::Sink;
 use super::layout::Child;
-use super::walk::{Walk, traceable};
-use crate::geometry::{Hit, MISS, Ray};
-use halflight_simd::Simd;
+use super::leaf::{meets_doubtful, take};
+use super::ready::{Ready, traceable};
+use crate::geometry::{Hit, Ray};
 use halflight_simd::kernels::boxes::ROBUST;
+use halflight_simd::kernels::triangles::Areas;
+use halflight_simd::{Simd, Stack};
 
-/// Rays in flight.
-const WALKS: usize = 6;
+/// Rays in flight. Few on small machines: each has a stack.
+const SLOTS: usize = if cfg!(target_pointer_width = "64") { 32 } else { 4 };
 
-/// The memory of the interleaved walks.
-pub(super) struct Walks {
-    walks: [Walk; WALKS],
+/// Rays set up at a time.
+const AHEAD: usize = 64;
+
+/// A ray in flight.
+#[repr(C, align(64))]
+struct Slot {
+    ray: Ready,
+    hit: Hit,
+    stack: Stack,
 }
 
-impl Walks {
-    pub(super) const fn new() -> Self {
-        Self { walks: [const { Walk::IDLE }; WALKS] }
-    }
+/// At the bottom of every stack.
+const DONE: Child = Child::NONE;
+
+/// The rays to be traced, set up some time ahead.
+struct Queue<'a, I> {
+    rays: &'a [Ray],
+    indices: I,
+    ahead: [Ready; AHEAD],
+    count: usize,
+    taken: usize,
 }
 
-/// Where walks come from.
-pub(super) trait Source<T> {
-    /// Sets the walk out on the next way there is; `false` when there is none.
-    fn next(&mut self, walk: &mut Walk, sink: &T) -> bool;
-}
-
-/// Rays one after the other, the whole tree for each.
-pub(super) struct Rays<'a> {
-    pub rays: &'a [Ray],
-    pub taken: usize,
-}
-
-impl<T: Sink> Source<T> for Rays<'_> {
+impl<I: Iterator<Item = u32>> Queue<'_, I> {
     #[inline(always)]
-    fn next(&mut self, walk: &mut Walk, _: &T) -> bool {
-        while let Some(ray) = self.rays.get(self.taken) {
-            let index = self.taken as u32;
-            self.taken += 1;
-            if traceable(ray) {
-                walk.start(ray, index, Child::node(0).0, 0.0, Hit { t: ray.t_max, ..Hit::NONE });
-                return true;
-            }
+    fn next(&mut self) -> Option<&Ready> {
+        if self.taken == self.count {
+            self.fill();
         }
-        false
+        if self.taken == self.count {
+            return None;
+        }
+        self.taken += 1;
+        self.ahead.get(self.taken - 1)
     }
-}
 
-/// Subtrees (ray of the window, child, entry), for rays that may have found something already.
-pub(super) struct Subtrees<'a, const ANY: bool> {
-    pub rays: &'a [Ray],
-    pub base: u32,
-    pub jobs: core::slice::Iter<'a, (u32, u32, f32)>,
-}
-
-impl<T: Sink, const ANY: bool> Source<T> for Subtrees<'_, ANY> {
+    /// Sets up the next rays; leaves out those that cannot be traced.
     #[inline(always)]
-    fn next(&mut self, walk: &mut Walk, sink: &T) -> bool {
-        for &(i, child, entry) in self.jobs.by_ref() {
-            let Some(ray) = self.rays.get(i as usize) else { continue };
-            let best = sink.found(self.base + i, ray.t_max);
-            if entry <= best.t * ROBUST && !(ANY && best.triangle != MISS) {
-                walk.start(ray, self.base + i, child, entry, best);
-                return true;
-            }
+    fn fill(&mut self) {
+        (self.count, self.taken) = (0, 0);
+        while self.count < AHEAD {
+            let Some(index) = self.indices.next() else { return };
+            let Some(ray) = self.rays.get(index as usize) else { continue };
+            self.ahead[self.count & (AHEAD - 1)] = Ready::new(ray, index);
+            self.count += traceable(ray) as usize;
         }
-        false
     }
 }
 
-/// Walks all that `source` has, and puts what is found.
+/// Traces the rays `indices` of `rays` and puts what is found.
 #[inline(always)]
 pub(super) fn trace<S: Simd, T: Sink, const ANY: bool>(
     simd: S,
     bvh: &Bvh,
-    mut source: impl Source<T>,
-    walks: &mut Walks,
+    rays: &[Ray],
+    indices: impl Iterator<Item = u32>,
     sink: &mut T,
 ) {
-    let mut active = 0;
-    for walk in &mut walks.walks {
-        walk.idle = !source.next(walk, sink);
-        active += !walk.idle as usize;
+    if bvh.nodes.is_empty() {
+        return;
     }
-    while active > 0 {
-        for walk in &mut walks.walks {
-            if walk.idle || walk.step::<S, ANY>(simd, bvh) {
-                continue;
+    let mut queue = Queue { rays, indices, ahead: [Ready::NONE; AHEAD], count: 0, taken: 0 };
+    let mut slots: [Slot; SLOTS] =
+        core::array::from_fn(|_| Slot { ray: Ready::NONE, hit: Hit::NONE, stack: Stack::new() });
+    let mut next = [DONE.0; SLOTS];
+    let mut found = [Areas::NONE; SLOTS];
+    let mut empty = 0u32;
+    loop {
+        let (mut leaves, mut done) = (0u32, 0u32);
+        for (i, &child) in next.iter().enumerate() {
+            leaves |= (child >> 31) << i;
+            done |= ((child == DONE.0) as u32) << i;
+        }
+        let mut nodes = !leaves & (u32::MAX >> (32 - SLOTS));
+        leaves &= !done;
+
+        let mut vacant = done & !empty;
+        while let Some(i) = pop(&mut vacant) {
+            let Slot { ray, hit, stack } = &mut slots[i];
+            sink.put(ray.index, *hit);
+            match queue.next() {
+                Some(ready) => *ray = *ready,
+                None => {
+                    empty |= 1 << i;
+                    continue;
+                }
             }
-            sink.put(walk.index, walk.hit());
-            walk.idle = !source.next(walk, sink);
-            active -= walk.idle as usize;
+            *hit = Hit::NONE;
+            stack.restart(DONE.0);
+            next[i] = Child::node(0).0;
+            nodes |= 1 << i;
+        }
+        if nodes | leaves == 0 {
+            return;
+        }
+
+        while let Some(i) = pop(&mut nodes) {
+            let Slot { ray, stack, .. } = &mut slots[i];
+            let Some(node) = bvh.nodes.get(next[i] as usize) else { return };
+            let (entry, exit) = ray.slab8(simd).interval(simd, &node.rows, ray.t_max);
+            if ANY {
+                simd.push8_unordered(entry, exit, &node.rows[6], stack);
+            } else {
+                simd.push8(node.order_of(ray.octant()), entry, exit, &node.rows[6], stack);
+            }
+            next[i] = take_next(simd, bvh, stack);
+        }
+
+        let (mut at_leaf, mut met) = (leaves, 0u32);
+        while let Some(i) = pop(&mut at_leaf) {
+            let Slot { ray, hit, stack } = &mut slots[i];
+            let leaf = Child(next[i]);
+            let (first, count) = leaf.triangles();
+            let Some(areas) = ray.shear8(simd).areas(simd, bvh.coordinates, 9 * first, count, ray.t_max)
+            else {
+                return;
+            };
+            if ANY {
+                let mut any = areas.hits != 0;
+                if areas.doubtful != 0 {
+                    any |= meets_doubtful(bvh, ray, leaf, areas.doubtful);
+                }
+                hit.triangle = if any { 0 } else { hit.triangle };
+                stack.truncate(if any { 1 } else { usize::MAX });
+                next[i] = take_next(simd, bvh, stack);
+            } else {
+                found[i] = areas;
+                met |= ((areas.hits | areas.doubtful != 0) as u32) << i;
+            }
+        }
+        if ANY {
+            continue;
+        }
+        while let Some(i) = pop(&mut met) {
+            let Slot { ray, hit, stack } = &mut slots[i];
+            take(simd, bvh, ray, Child(next[i]), &found[i], hit);
+            if hit.is_some() {
+                ray.t_max = hit.t;
+                simd.keep(hit.t * ROBUST, stack);
+            }
+        }
+        while let Some(i) = pop(&mut leaves) {
+            next[i] = take_next(simd, bvh, &mut slots[i].stack);
         }
     }
+}
+
+/// Takes the lowest slot out of a set of them.
+#[inline(always)]
+fn pop(slots: &mut u32) -> Option<usize> {
+    if *slots == 0 {
+        return None;
+    }
+    let lowest = slots.trailing_zeros() as usize & (SLOTS - 1);
+    *slots &= *slots - 1;
+    Some(lowest)
+}
+
+/// Takes a child from the stack, and asks the memory for what is in it.
+#[inline(always)]
+fn take_next<S: Simd>(simd: S, bvh: &Bvh, stack: &mut Stack) -> u32 {
+    let child = Child(stack.pop().unwrap_or(DONE.0));
+    let index = if child.is_leaf() { 9 * child.triangles().0 } else { child.0 as usize };
+    simd.prefetch(bvh.nodes, bvh.coordinates, child.is_leaf(), index);
+    child.0
 }

@@ -57,20 +57,21 @@ impl SlabRay {
 pub struct SlabRay8<S: Simd> {
     origin: [S::F8; 3],
     reciprocal: [S::F8; 3],
-    near: [usize; 3],
+    octant: usize,
 }
 
 impl<S: Simd> SlabRay8<S> {
     /// Broadcasts the ray.
     #[inline(always)]
     pub fn new(simd: S, ray: &SlabRay) -> Self {
-        let [ox, oy, oz] = ray.origin;
-        let [rx, ry, rz] = ray.reciprocal;
-        Self {
-            origin: [simd.splat8(ox), simd.splat8(oy), simd.splat8(oz)],
-            reciprocal: [simd.splat8(rx), simd.splat8(ry), simd.splat8(rz)],
-            near: ray.near,
-        }
+        let [x, y, z] = ray.near;
+        Self::towards(simd, ray.origin, ray.reciprocal, (x & 1) | (y & 1) << 1 | (z & 1) << 2)
+    }
+
+    /// From an origin, clamped reciprocals, and the signs of the direction as bits of `octant`.
+    #[inline(always)]
+    pub fn towards(simd: S, origin: [f32; 3], reciprocal: [f32; 3], octant: usize) -> Self {
+        Self { origin: splat3(simd, origin), reciprocal: splat3(simd, reciprocal), octant }
     }
 
     /// Entry distances into eight boxes, and the bits of those that are met before `t_max`.
@@ -83,18 +84,21 @@ impl<S: Simd> SlabRay8<S> {
     /// Entry and (lengthened) exit distances of eight boxes; a box is met where `entry <= exit`.
     #[inline(always)]
     pub fn interval(&self, simd: S, boxes: &Boxes8, t_max: f32) -> (S::F8, S::F8) {
-        let [x, y, z] = self.near;
-        let entry = self.at(simd, boxes, x, 0).max(self.at(simd, boxes, y, 1));
-        let entry = entry.max(self.at(simd, boxes, z, 2).max(simd.splat8(0.0)));
-        let exit = self.at(simd, boxes, x ^ 1, 0).min(self.at(simd, boxes, y ^ 1, 1));
-        let exit = exit.min(self.at(simd, boxes, z ^ 1, 2).min(simd.splat8(t_max)));
+        let planes: &[f32; 64] = boxes.as_flattened().first_chunk().unwrap_or(&[0.0; 64]);
+        // The near plane of an axis stands one row further where the direction is negative.
+        let [x, y, z] = [(self.octant << 3) & 8, (self.octant << 2) & 8, (self.octant << 1) & 8];
+        let entry = self.at(simd, planes, x, 0).max(self.at(simd, planes, 16 + y, 1));
+        let entry = entry.max(self.at(simd, planes, 32 + z, 2).max(simd.splat8(0.0)));
+        let exit = self.at(simd, planes, x ^ 8, 0).min(self.at(simd, planes, 16 + (y ^ 8), 1));
+        let exit = exit.min(self.at(simd, planes, 32 + (z ^ 8), 2).min(simd.splat8(t_max)));
         (entry, exit * simd.splat8(ROBUST))
     }
 
-    /// Where the ray crosses the planes of a row.
+    /// Where the ray crosses the planes from index `first` on.
     #[inline(always)]
-    fn at(&self, simd: S, boxes: &Boxes8, row: usize, axis: usize) -> S::F8 {
-        (simd.load8(&boxes[row & 7]) - self.origin[axis]) * self.reciprocal[axis]
+    fn at(&self, simd: S, planes: &[f32; 64], first: usize, axis: usize) -> S::F8 {
+        let row = planes.get(first..).and_then(|rest| rest.first_chunk()).unwrap_or(&[0.0; 8]);
+        (simd.load8(row) - self.origin[axis]) * self.reciprocal[axis]
     }
 }
 
@@ -113,18 +117,29 @@ impl<S: Simd> SlabRays16<S> {
     /// Entry distances of the rays into box `i`, and the bits of those that meet it before `t_max`.
     #[inline(always)]
     pub fn enters(&self, simd: S, boxes: &Boxes8, i: usize, t_max: S::F16) -> (S::F16, u32) {
-        let [x, y, z] = self.near;
-        let entry = self.at(simd, boxes, x, i, 0).max(self.at(simd, boxes, y, i, 1));
-        let entry = entry.max(self.at(simd, boxes, z, i, 2).max(simd.splat16(0.0)));
-        let exit = self.at(simd, boxes, x ^ 1, i, 0).min(self.at(simd, boxes, y ^ 1, i, 1));
-        let exit = exit.min(self.at(simd, boxes, z ^ 1, i, 2).min(t_max));
-        (entry, entry.le(exit * simd.splat16(ROBUST)).bits())
+        self.enters_moved(simd, &self.moved(simd, boxes, i), t_max)
     }
 
-    /// Where the rays cross a plane.
+    /// The near and far planes of box `i`, with the origins at zero: the same for all rays of the same origin.
     #[inline(always)]
-    fn at(&self, simd: S, boxes: &Boxes8, row: usize, i: usize, axis: usize) -> S::F16 {
-        (simd.splat16(boxes[row & 7][i & 7]) - self.origin[axis]) * self.reciprocal[axis]
+    pub fn moved(&self, simd: S, boxes: &Boxes8, i: usize) -> [[S::F16; 3]; 2] {
+        let [x, y, z] = self.near;
+        let [ox, oy, oz] = self.origin;
+        let plane = [x, y, z, x ^ 1, y ^ 1, z ^ 1].map(|row| boxes[row & 7][i & 7]);
+        [
+            [simd.splat16(plane[0]) - ox, simd.splat16(plane[1]) - oy, simd.splat16(plane[2]) - oz],
+            [simd.splat16(plane[3]) - ox, simd.splat16(plane[4]) - oy, simd.splat16(plane[5]) - oz],
+        ]
+    }
+
+    /// [`Self::enters`] for what [`Self::moved`] gives.
+    #[inline(always)]
+    pub fn enters_moved(&self, simd: S, planes: &[[S::F16; 3]; 2], t_max: S::F16) -> (S::F16, u32) {
+        let [near, far] = planes;
+        let [rx, ry, rz] = self.reciprocal;
+        let entry = (near[0] * rx).max(near[1] * ry).max((near[2] * rz).max(simd.splat16(0.0)));
+        let exit = (far[0] * rx).min(far[1] * ry).min((far[2] * rz).min(t_max));
+        (entry, entry.le(exit * simd.splat16(ROBUST)).bits())
     }
 }
 

@@ -1,29 +1,33 @@
-//! Putting the children that a ray meets on its stack in the order of the walk: the scalar reference.
-//! [`crate::Simd::push8`] does the same without a branch.
+//! What happens to the stack of a traversal, item by item: the scalar references of [`crate::Simd::push8`],
+//! [`crate::Simd::push8_unordered`] and [`crate::Simd::keep`], which do the same without a branch.
 
-use crate::lanes::{STACK, Stacks};
+use crate::stack::{STACK, Stack};
 
-/// Of the lanes named by the nibbles of `order`, lowest nibble first, appends those with `entry <= exit`.
-/// Returns the new height.
+/// Of the lanes named by the nibbles of `order`, lowest nibble first, puts those with `entry <= exit` on the stack.
 #[inline(always)]
-pub fn push(
-    order: u32,
-    entry: &[f32; 8],
-    exit: &[f32; 8],
-    items: &[f32; 8],
-    stacks: &mut Stacks,
-    mut height: usize,
-) -> usize {
-    if height > STACK - 8 {
-        return height;
+pub fn push(order: u32, entry: &[f32; 8], exit: &[f32; 8], items: &[f32; 8], stack: &mut Stack) {
+    if stack.height() > STACK - 8 {
+        return;
     }
     for i in 0..8 {
         let lane = (order >> (4 * i) & 7) as usize;
-        // One slot too far is harmless: eight are there.
-        let slot = height.min(STACK - 1);
-        stacks.items[slot] = items[lane].to_bits();
-        stacks.entries[slot] = entry[lane];
-        height += (entry[lane] <= exit[lane]) as usize;
+        stack.push_if(entry[lane] <= exit[lane], items[lane].to_bits(), entry[lane]);
     }
-    height
+}
+
+/// Takes all that is entered beyond `limit` off the stack.
+#[inline(always)]
+pub fn keep(limit: f32, stack: &mut Stack) {
+    let height = stack.height();
+    stack.height = 0;
+    for at in 0..height {
+        // SAFETY: below the former height, so it was written; nothing above `at` has been written since.
+        let (item, entry) = unsafe {
+            (
+                stack.items.as_ptr().cast::<u32>().add(at).read(),
+                stack.entries.as_ptr().cast::<f32>().add(at).read(),
+            )
+        };
+        stack.push_if(entry <= limit, item, entry);
+    }
 }

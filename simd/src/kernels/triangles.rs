@@ -98,11 +98,22 @@ impl<L: Lanes> Found<L> {
     }
 }
 
-/// A corner, its coordinates in the order of the axes, moved and sheared so that the ray is the +z axis.
+/// A corner, its coordinates in the order of the axes, moved so that the ray starts at zero.
 #[inline(always)]
-fn sheared<L: Lanes>([x, y, z]: [L; 3], [ox, oy, oz]: [L; 3], [sx, sy, _]: [L; 3]) -> [L; 3] {
-    let z = z - oz;
-    [(x - ox) - sx * z, (y - oy) - sy * z, z]
+fn moved<L: Lanes>([x, y, z]: [L; 3], [ox, oy, oz]: [L; 3]) -> [L; 3] {
+    [x - ox, y - oy, z - oz]
+}
+
+/// A moved corner sheared so that the ray is the +z axis.
+#[inline(always)]
+fn turned<L: Lanes>([x, y, z]: [L; 3], [sx, sy, _]: [L; 3]) -> [L; 3] {
+    [x - sx * z, y - sy * z, z]
+}
+
+/// Both.
+#[inline(always)]
+fn sheared<L: Lanes>(corner: [L; 3], origin: [L; 3], factors: [L; 3]) -> [L; 3] {
+    turned(moved(corner, origin), factors)
 }
 
 /// The test itself, over lanes of triangles or lanes of rays: sheared corners `[x, y, z]` of a, b, c.
@@ -128,6 +139,36 @@ fn areas<L: Lanes>(zero: L, sz: L, [a, b, c]: [[L; 3]; 3], t_max: L, wanted: u32
     Found { t, u: v / det, v: w / det, hits, doubtful }
 }
 
+/// What [`ShearRay8::areas`] finds, with the divisions left to do for the hit that counts.
+#[derive(Clone, Copy, Debug)]
+pub struct Areas {
+    /// Distance; infinite in lanes that do not hit.
+    pub t: [f32; 8],
+    /// Twice the area opposite to the second corner,
+    pub v: [f32; 8],
+    /// to the third,
+    pub w: [f32; 8],
+    /// and of the whole triangle, as the ray sees it.
+    pub det: [f32; 8],
+    /// Bits of the lanes that hit.
+    pub hits: u32,
+    /// Bits of the lanes on an edge in f32: theirs is for the scalar reference to say.
+    pub doubtful: u32,
+}
+
+impl Areas {
+    /// Nothing found.
+    pub const NONE: Areas =
+        Areas { t: [f32::INFINITY; 8], v: [0.0; 8], w: [0.0; 8], det: [0.0; 8], hits: 0, doubtful: 0 };
+
+    /// Bits of the lanes of the nearest hit: one, but where several triangles are hit at the same distance.
+    #[inline(always)]
+    pub fn nearest<S: Simd>(&self, simd: S) -> u32 {
+        let t = simd.load8(&self.t);
+        t.eq(simd.splat8(t.smallest())).bits() & self.hits
+    }
+}
+
 /// A ray in all lanes, for tests against eight triangles at once.
 #[derive(Clone, Copy)]
 pub struct ShearRay8<S: Simd> {
@@ -147,6 +188,44 @@ impl<S: Simd> ShearRay8<S> {
             origin: [simd.splat8(origin[kx % 3]), simd.splat8(origin[ky % 3]), simd.splat8(origin[kz % 3])],
             factors: [simd.splat8(sx), simd.splat8(sy), simd.splat8(sz)],
         }
+    }
+
+    /// From its origin along the axes, and its factors.
+    #[inline(always)]
+    pub fn along(simd: S, axes: [usize; 3], [ox, oy, oz]: [f32; 3], [sx, sy, sz]: [f32; 3]) -> Self {
+        Self {
+            axes,
+            origin: [simd.splat8(ox), simd.splat8(oy), simd.splat8(oz)],
+            factors: [simd.splat8(sx), simd.splat8(sy), simd.splat8(sz)],
+        }
+    }
+
+    /// Like [`Self::meets`], without a branch on what is found.
+    #[inline(always)]
+    pub fn areas(&self, simd: S, values: &[f32], start: usize, count: usize, t_max: f32) -> Option<Areas> {
+        let corners = simd.load8x9(values, start, count, self.axes)?;
+        let [_, _, sz] = self.factors;
+        let [a, b, c] = [
+            sheared(corners[0], self.origin, self.factors),
+            sheared(corners[1], self.origin, self.factors),
+            sheared(corners[2], self.origin, self.factors),
+        ];
+        let zero = simd.splat8(0.0);
+        let u = c[0] * b[1] - c[1] * b[0];
+        let v = a[0] * c[1] - a[1] * c[0];
+        let w = b[0] * a[1] - b[1] * a[0];
+        let low = u.min(v).min(w);
+        let high = u.max(v).max(w);
+        let det = (u + v) + w;
+        let inside = zero.le(low) | high.le(zero);
+        let edge = low.eq(zero) | high.eq(zero);
+        let t = ((u * (sz * a[2]) + v * (sz * b[2])) + w * (sz * c[2])) / det;
+        let met = inside & zero.le(t) & t.le(simd.splat8(t_max)) & simd.first8(count as u32);
+        let wanted = (1u32 << count) - 1;
+        let doubtful = (inside & edge).bits() & wanted;
+        let hits = met.bits() & !doubtful;
+        let t = t.select(met, simd.splat8(f32::INFINITY));
+        Some(Areas { t: t.to_array(), v: v.to_array(), w: w.to_array(), det: det.to_array(), hits, doubtful })
     }
 
     /// Tests the `count` (1 … 8) triangles whose coordinates stand in `values` from `start`, nine runs of
@@ -197,13 +276,29 @@ impl<S: Simd> ShearRays16<S> {
         t_max: S::F16,
         wanted: u32,
     ) -> Option<Found<S::F16>> {
-        let [_, _, sz] = self.factors;
+        let corners = self.moved(simd, values, start, stride)?;
+        Some(self.meets_moved(simd, &corners, t_max, wanted))
+    }
+
+    /// The corners of that triangle with the origins at zero: the same for all rays of the same origin and axes.
+    #[inline(always)]
+    pub fn moved(&self, simd: S, values: &[f32], start: usize, stride: usize) -> Option<[[S::F16; 3]; 3]> {
         let [a, b, c] = simd.splat16x9(values, start, stride, self.axes)?;
-        let sheared = [
-            sheared(a, self.origin, self.factors),
-            sheared(b, self.origin, self.factors),
-            sheared(c, self.origin, self.factors),
-        ];
-        Some(areas(simd.splat16(0.0), sz, sheared, t_max, wanted))
+        Some([moved(a, self.origin), moved(b, self.origin), moved(c, self.origin)])
+    }
+
+    /// [`Self::meets`] for what [`Self::moved`] gives.
+    #[inline(always)]
+    pub fn meets_moved(
+        &self,
+        simd: S,
+        corners: &[[S::F16; 3]; 3],
+        t_max: S::F16,
+        wanted: u32,
+    ) -> Found<S::F16> {
+        let [a, b, c] = *corners;
+        let [_, _, sz] = self.factors;
+        let sheared = [turned(a, self.factors), turned(b, self.factors), turned(c, self.factors)];
+        areas(simd.splat16(0.0), sz, sheared, t_max, wanted)
     }
 }

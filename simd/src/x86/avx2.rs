@@ -2,7 +2,8 @@
 //! only inside `with_avx2`; that is what every SAFETY line here rests on.
 
 use crate::baseline::{Pair, fits8x9, gather9, halves, splat_corners};
-use crate::lanes::{Lanes, Mask, STACK, Simd, Stacks};
+use crate::lanes::{Lanes, Mask, Simd};
+use crate::stack::{STACK, Stack};
 use core::arch::x86_64::*;
 use core::ops::{Add, BitAnd, BitOr, Div, Mul, Neg, Not, Sub};
 
@@ -106,6 +107,11 @@ impl Lanes for F8 {
         compare!(self, other, _CMP_EQ_OQ)
     }
     #[inline(always)]
+    fn signs(self) -> u32 {
+        // SAFETY: as above.
+        unsafe { _mm256_movemask_ps(self.0) as u32 }
+    }
+    #[inline(always)]
     fn select(self, mask: M8, other: Self) -> Self {
         // SAFETY: as above.
         Self(unsafe { _mm256_blendv_ps(other.0, self.0, mask.0) })
@@ -160,34 +166,39 @@ impl Simd for Avx2 {
         Pair(self.mask8(bits), self.mask8(bits >> 8))
     }
     #[inline(always)]
-    fn push8(
-        self,
-        order: u32,
-        entry: F8,
-        exit: F8,
-        items: &[f32; 8],
-        stacks: &mut Stacks,
-        height: usize,
-    ) -> usize {
-        if height > STACK - 8 {
-            return height;
-        }
-        // SAFETY: the token proves the level; eight slots from `height` are inside both stacks.
+    fn push8(self, order: u32, entry: F8, exit: F8, items: &[f32; 8], stack: &mut Stack) {
+        // SAFETY: the token proves the level.
         unsafe {
             let nibbles = _mm256_setr_epi32(0, 4, 8, 12, 16, 20, 24, 28);
             let lanes = _mm256_srlv_epi32(_mm256_set1_epi32(order as i32), nibbles);
             let entry = _mm256_permutevar8x32_ps(entry.0, lanes);
             let exit = _mm256_permutevar8x32_ps(exit.0, lanes);
             let items = _mm256_permutevar8x32_ps(_mm256_loadu_ps(items.as_ptr()), lanes);
-            let met = _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LE_OQ>(entry, exit)) as u32;
-            let packed = _mm_cvtsi64_si128(PACK[met as usize & 255] as i64);
-            let pack = _mm256_cvtepu8_epi32(packed);
-            _mm256_storeu_ps(
-                stacks.items.as_mut_ptr().add(height).cast(),
-                _mm256_permutevar8x32_ps(items, pack),
-            );
-            _mm256_storeu_ps(stacks.entries.as_mut_ptr().add(height), _mm256_permutevar8x32_ps(entry, pack));
-            height + met.count_ones() as usize
+            push_met(entry, exit, items, stack);
+        }
+    }
+    #[inline(always)]
+    fn push8_unordered(self, entry: F8, exit: F8, items: &[f32; 8], stack: &mut Stack) {
+        // SAFETY: the token proves the level; eight floats are read from an array of eight.
+        unsafe { push_met(entry.0, exit.0, _mm256_loadu_ps(items.as_ptr()), stack) }
+    }
+    #[inline(always)]
+    fn keep(self, limit: f32, stack: &mut Stack) {
+        const { assert!(STACK.is_multiple_of(8)) };
+        let height = core::mem::take(&mut stack.height);
+        // SAFETY: the token proves the level; eight slots from `at` are inside the stack, those below the former
+        // height were written, and what is stored goes where it was read or below.
+        unsafe {
+            let limit = _mm256_set1_ps(limit);
+            for at in (0..height).step_by(8) {
+                let lanes = _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7);
+                let there = _mm256_cmpgt_epi32(_mm256_set1_epi32((height - at) as i32), lanes);
+                let items = _mm256_maskload_ps(stack.items.as_ptr().cast::<f32>().add(at), there);
+                let entries = _mm256_maskload_ps(stack.entries.as_ptr().cast::<f32>().add(at), there);
+                let near = _mm256_cmp_ps::<_CMP_LE_OQ>(entries, limit);
+                let near = _mm256_movemask_ps(_mm256_and_ps(near, _mm256_castsi256_ps(there))) as u32;
+                store_packed(near, items, entries, stack);
+            }
         }
     }
     #[inline(always)]
@@ -219,9 +230,9 @@ impl Simd for Avx2 {
             return None;
         }
         let [kx, ky, kz] = axes;
-        let (kx, ky, kz) = (kx.min(2) * stride, ky.min(2) * stride, kz.min(2) * stride);
-        // SAFETY: the token proves the level; `fits8x9` proves that start + 8 * stride + 8 <= length, and
-        // no run is beyond 3 * 2 + 2 = 8.
+        let (kx, ky, kz) = ((kx & 3) * stride, (ky & 3) * stride, (kz & 3) * stride);
+        // SAFETY: the token proves the level; `fits8x9` proves that start + 9 * stride + 8 <= length, and
+        // no run is beyond 3 * 2 + 3 = 9.
         Some(unsafe {
             let a = values.as_ptr().add(start);
             let (b, c) = (a.add(3 * stride), a.add(6 * stride));
@@ -256,6 +267,38 @@ impl Avx2 {
             M8(_mm256_castsi256_ps(_mm256_cmpeq_epi32(set, lane_bits)))
         }
     }
+}
+
+/// Puts the lanes with `entry <= exit` on the stack, if there is room for eight.
+///
+/// # Safety
+/// The processor has AVX2.
+#[inline(always)]
+unsafe fn push_met(entry: __m256, exit: __m256, items: __m256, stack: &mut Stack) {
+    if stack.height <= STACK - 8 {
+        // SAFETY: the caller's, and there is room.
+        unsafe {
+            let met = _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LE_OQ>(entry, exit)) as u32;
+            store_packed(met, items, entry, stack);
+        }
+    }
+}
+
+/// Puts the lanes of the set `wanted` on the stack.
+///
+/// # Safety
+/// The processor has AVX2, and eight slots from the height on are inside the stack.
+#[inline(always)]
+unsafe fn store_packed(wanted: u32, items: __m256, entries: __m256, stack: &mut Stack) {
+    // SAFETY: the caller's.
+    unsafe {
+        let pack = _mm256_cvtepu8_epi32(_mm_cvtsi64_si128(PACK[wanted as usize & 255] as i64));
+        let (items, entries) =
+            (_mm256_permutevar8x32_ps(items, pack), _mm256_permutevar8x32_ps(entries, pack));
+        _mm256_storeu_ps(stack.items.as_mut_ptr().cast::<f32>().add(stack.height), items);
+        _mm256_storeu_ps(stack.entries.as_mut_ptr().cast::<f32>().add(stack.height), entries);
+    }
+    stack.height += wanted.count_ones() as usize;
 }
 
 /// For each set of lanes the bytes that name them one after the other.

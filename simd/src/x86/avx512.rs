@@ -2,7 +2,8 @@
 //! through the token [`Avx512`], and the token only inside `with_avx512`; every SAFETY line rests on that.
 
 use crate::baseline::{fits8x9, gather9, splat_corners};
-use crate::lanes::{Lanes, Mask, STACK, Simd, Stacks};
+use crate::lanes::{Lanes, Mask, Simd};
+use crate::stack::{STACK, Stack};
 use core::arch::x86_64::*;
 use core::ops::{Add, BitAnd, BitOr, Div, Mul, Neg, Not, Sub};
 
@@ -20,7 +21,8 @@ impl Avx512 {
 macro_rules! lanes {
     ($lanes:ident, $mask:ident, $bits:ty, $n:literal, $register:ty,
      $add:ident $sub:ident $mul:ident $div:ident $xor:ident $and_not:ident $splat:ident
-     $min:ident $max:ident $compare:ident $blend:ident $store:ident $largest:ident) => {
+     $min:ident $max:ident $compare:ident $blend:ident $store:ident $largest:ident
+     $signs:ident $bits_of:ident) => {
         /// Lanes of a register.
         #[derive(Clone, Copy)]
         pub(crate) struct $lanes($register);
@@ -110,6 +112,11 @@ macro_rules! lanes {
                 $mask(unsafe { $compare::<_CMP_EQ_OQ>(self.0, other.0) })
             }
             #[inline(always)]
+            fn signs(self) -> u32 {
+                // SAFETY: as above.
+                unsafe { $signs($bits_of(self.0)) as u32 }
+            }
+            #[inline(always)]
             fn select(self, mask: $mask, other: Self) -> Self {
                 // SAFETY: as above.
                 Self(unsafe { $blend(mask.0, other.0, self.0) })
@@ -154,10 +161,64 @@ unsafe fn largest8(lanes: __m256) -> f32 {
 
 lanes!(F8, M8, __mmask8, 8, __m256,
     _mm256_add_ps _mm256_sub_ps _mm256_mul_ps _mm256_div_ps _mm256_xor_ps _mm256_andnot_ps _mm256_set1_ps
-    _mm256_min_ps _mm256_max_ps _mm256_cmp_ps_mask _mm256_mask_blend_ps _mm256_storeu_ps largest8);
+    _mm256_min_ps _mm256_max_ps _mm256_cmp_ps_mask _mm256_mask_blend_ps _mm256_storeu_ps largest8
+    _mm256_movepi32_mask _mm256_castps_si256);
 lanes!(F16, M16, __mmask16, 16, __m512,
     _mm512_add_ps _mm512_sub_ps _mm512_mul_ps _mm512_div_ps _mm512_xor_ps _mm512_andnot_ps _mm512_set1_ps
-    _mm512_min_ps _mm512_max_ps _mm512_cmp_ps_mask _mm512_mask_blend_ps _mm512_storeu_ps _mm512_reduce_max_ps);
+    _mm512_min_ps _mm512_max_ps _mm512_cmp_ps_mask _mm512_mask_blend_ps _mm512_storeu_ps _mm512_reduce_max_ps
+    _mm512_movepi32_mask _mm512_castps_si512);
+
+/// Of records `i`, `i + 4`, `i + 8` and `i + 12` (`i` below 4) the four floats from `from` (0 or 4) on.
+///
+/// # Safety
+/// The processor has AVX-512 F and DQ.
+#[inline(always)]
+unsafe fn quarters(records: &[[f32; 8]; 16], i: usize, from: usize) -> __m512 {
+    // SAFETY: the caller's; a record has eight floats.
+    unsafe {
+        let low = _mm256_set_m128(
+            _mm_loadu_ps(records[i + 4].as_ptr().add(from)),
+            _mm_loadu_ps(records[i].as_ptr().add(from)),
+        );
+        let high = _mm256_set_m128(
+            _mm_loadu_ps(records[i + 12].as_ptr().add(from)),
+            _mm_loadu_ps(records[i + 8].as_ptr().add(from)),
+        );
+        _mm512_insertf32x8::<1>(_mm512_castps256_ps512(low), high)
+    }
+}
+
+/// In each quarter of the registers, rows become columns.
+///
+/// # Safety
+/// The processor has AVX-512 F.
+#[inline(always)]
+unsafe fn transposed([a, b, c, d]: [__m512; 4]) -> [__m512; 4] {
+    // SAFETY: the caller's.
+    unsafe {
+        let (ab_low, ab_high) = (_mm512_unpacklo_ps(a, b), _mm512_unpackhi_ps(a, b));
+        let (cd_low, cd_high) = (_mm512_unpacklo_ps(c, d), _mm512_unpackhi_ps(c, d));
+        [
+            _mm512_shuffle_ps::<0x44>(ab_low, cd_low),
+            _mm512_shuffle_ps::<0xee>(ab_low, cd_low),
+            _mm512_shuffle_ps::<0x44>(ab_high, cd_high),
+            _mm512_shuffle_ps::<0xee>(ab_high, cd_high),
+        ]
+    }
+}
+
+/// Eight items and entries from the height of the stack on.
+///
+/// # Safety
+/// The processor has AVX, and eight slots from the height on are inside the stack.
+#[inline(always)]
+unsafe fn store(stack: &mut Stack, items: __m256, entries: __m256) {
+    // SAFETY: the caller's.
+    unsafe {
+        _mm256_storeu_ps(stack.items.as_mut_ptr().cast::<f32>().add(stack.height), items);
+        _mm256_storeu_ps(stack.entries.as_mut_ptr().cast::<f32>().add(stack.height), entries);
+    }
+}
 
 impl Simd for Avx512 {
     type F8 = F8;
@@ -192,19 +253,11 @@ impl Simd for Avx512 {
         M16(bits as u16)
     }
     #[inline(always)]
-    fn push8(
-        self,
-        order: u32,
-        entry: F8,
-        exit: F8,
-        items: &[f32; 8],
-        stacks: &mut Stacks,
-        height: usize,
-    ) -> usize {
-        if height > STACK - 8 {
-            return height;
+    fn push8(self, order: u32, entry: F8, exit: F8, items: &[f32; 8], stack: &mut Stack) {
+        if stack.height > STACK - 8 {
+            return;
         }
-        // SAFETY: the token proves the level; eight slots from `height` are inside both stacks.
+        // SAFETY: the token proves the level; eight slots from the height on are inside the stack.
         // (Compressed in registers and stored whole: compressing stores are slow on Zen 4.)
         unsafe {
             let nibbles = _mm256_setr_epi32(0, 4, 8, 12, 16, 20, 24, 28);
@@ -213,13 +266,73 @@ impl Simd for Avx512 {
             let exit = _mm256_permutexvar_ps(lanes, exit.0);
             let items = _mm256_permutexvar_ps(lanes, _mm256_loadu_ps(items.as_ptr()));
             let met = _mm256_cmp_ps_mask::<_CMP_LE_OQ>(entry, exit);
-            _mm256_storeu_ps(
-                stacks.items.as_mut_ptr().add(height).cast(),
-                _mm256_maskz_compress_ps(met, items),
-            );
-            _mm256_storeu_ps(stacks.entries.as_mut_ptr().add(height), _mm256_maskz_compress_ps(met, entry));
-            height + met.count_ones() as usize
+            store(stack, _mm256_maskz_compress_ps(met, items), _mm256_maskz_compress_ps(met, entry));
+            stack.height += met.count_ones() as usize;
         }
+    }
+    #[inline(always)]
+    fn push8_unordered(self, entry: F8, exit: F8, items: &[f32; 8], stack: &mut Stack) {
+        if stack.height > STACK - 8 {
+            return;
+        }
+        // SAFETY: as above.
+        unsafe {
+            let met = _mm256_cmp_ps_mask::<_CMP_LE_OQ>(entry.0, exit.0);
+            let items = _mm256_maskz_compress_ps(met, _mm256_loadu_ps(items.as_ptr()));
+            store(stack, items, entry.0);
+            stack.height += met.count_ones() as usize;
+        }
+    }
+    #[inline(always)]
+    fn keep(self, limit: f32, stack: &mut Stack) {
+        const { assert!(STACK.is_multiple_of(8)) };
+        let height = core::mem::take(&mut stack.height);
+        // SAFETY: the token proves the level; eight slots from `at` are inside the stack, those below the former
+        // height were written, and what is stored goes where it was read or below.
+        unsafe {
+            let limit = _mm256_set1_ps(limit);
+            for at in (0..height).step_by(8) {
+                let there = _bzhi_u32(0xff, (height - at).min(8) as u32) as __mmask8;
+                let items = _mm256_maskz_loadu_ps(there, stack.items.as_ptr().cast::<f32>().add(at));
+                let entries = _mm256_maskz_loadu_ps(there, stack.entries.as_ptr().cast::<f32>().add(at));
+                let near = _mm256_mask_cmp_ps_mask::<_CMP_LE_OQ>(there, entries, limit);
+                store(stack, _mm256_maskz_compress_ps(near, items), _mm256_maskz_compress_ps(near, entries));
+                stack.height += near.count_ones() as usize;
+            }
+        }
+    }
+    #[inline(always)]
+    fn columns16(self, records: &[[f32; 8]; 16]) -> [F16; 8] {
+        // SAFETY: the token proves the level; four floats are read from either half of a record.
+        unsafe {
+            let [a, b, c, d] = transposed([
+                quarters(records, 0, 0),
+                quarters(records, 1, 0),
+                quarters(records, 2, 0),
+                quarters(records, 3, 0),
+            ]);
+            let [e, f, g, h] = transposed([
+                quarters(records, 0, 4),
+                quarters(records, 1, 4),
+                quarters(records, 2, 4),
+                quarters(records, 3, 4),
+            ]);
+            [F16(a), F16(b), F16(c), F16(d), F16(e), F16(f), F16(g), F16(h)]
+        }
+    }
+    #[inline(always)]
+    fn records16(self, [a, b, c, d]: [F16; 4]) -> [[f32; 4]; 16] {
+        let mut records = [[0.0; 4]; 16];
+        // SAFETY: the token proves the level; four floats are written to each record.
+        unsafe {
+            for (i, rows) in transposed([a.0, b.0, c.0, d.0]).into_iter().enumerate() {
+                _mm_storeu_ps(records[i].as_mut_ptr(), _mm512_castps512_ps128(rows));
+                _mm_storeu_ps(records[i + 4].as_mut_ptr(), _mm512_extractf32x4_ps::<1>(rows));
+                _mm_storeu_ps(records[i + 8].as_mut_ptr(), _mm512_extractf32x4_ps::<2>(rows));
+                _mm_storeu_ps(records[i + 12].as_mut_ptr(), _mm512_extractf32x4_ps::<3>(rows));
+            }
+        }
+        records
     }
     #[inline(always)]
     fn prefetch<T>(self, items: &[T], values: &[f32], second: bool, index: usize) {
@@ -250,9 +363,9 @@ impl Simd for Avx512 {
             return None;
         }
         let [kx, ky, kz] = axes;
-        let (kx, ky, kz) = (kx.min(2) * stride, ky.min(2) * stride, kz.min(2) * stride);
-        // SAFETY: the token proves the level; `fits8x9` proves that start + 8 * stride + 8 <= length, and
-        // no run is beyond 3 * 2 + 2 = 8.
+        let (kx, ky, kz) = ((kx & 3) * stride, (ky & 3) * stride, (kz & 3) * stride);
+        // SAFETY: the token proves the level; `fits8x9` proves that start + 9 * stride + 8 <= length, and
+        // no run is beyond 3 * 2 + 3 = 9.
         Some(unsafe {
             let a = values.as_ptr().add(start);
             let (b, c) = (a.add(3 * stride), a.add(6 * stride));

@@ -4,11 +4,9 @@ mod bench;
 mod compare;
 mod failure;
 mod info;
-mod interrupt;
 mod progress;
 mod render;
-mod shot;
-mod summary;
+mod report;
 mod values;
 mod view;
 

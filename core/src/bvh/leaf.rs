@@ -1,0 +1,74 @@
+//! Taking over what the test of a leaf has found.
+
+use super::Bvh;
+use super::layout::Child;
+use super::ready::Ready;
+use crate::geometry::{Hit, MISS};
+use halflight_simd::Simd;
+use halflight_simd::kernels::triangles::{Areas, intersect};
+
+/// The corners of triangle `i` of a leaf of `count`, from its runs of coordinates.
+#[inline(always)]
+pub(super) fn corners_of(runs: &[f32], count: usize, i: usize) -> [[f32; 3]; 3] {
+    let mut corners = [[f32::NAN; 3]; 3];
+    let mut at = i;
+    for corner in &mut corners {
+        for x in corner {
+            *x = runs.get(at).copied().unwrap_or(f32::NAN);
+            at += count;
+        }
+    }
+    corners
+}
+
+/// Takes over the best hit of a leaf into `best`: the nearest, and of equals that of the lowest index. `best` is
+/// no hit, or no nearer than where `ray` ends.
+#[inline(always)]
+pub(super) fn take<S: Simd>(simd: S, bvh: &Bvh, ray: &Ready, leaf: Child, areas: &Areas, best: &mut Hit) {
+    let (first, count) = leaf.triangles();
+    let Some(ids) = bvh.triangles.get(first..first + count) else { return };
+    let mut lanes = areas.nearest(simd);
+    while lanes != 0 {
+        let i = lanes.trailing_zeros() as usize & 7;
+        lanes &= lanes - 1;
+        if let Some(&triangle) = ids.get(i) {
+            let det = areas.det[i];
+            best.take(Hit { t: areas.t[i], u: areas.v[i] / det, v: areas.w[i] / det, triangle });
+        }
+    }
+    if areas.doubtful != 0 {
+        take_doubtful(bvh, ray, first, ids, areas.doubtful, best);
+    }
+}
+
+/// Whether one of the triangles on whose edge the ray is in f32 is met.
+pub(super) fn meets_doubtful(bvh: &Bvh, ray: &Ready, leaf: Child, doubtful: u32) -> bool {
+    let (first, count) = leaf.triangles();
+    let mut best = Hit::NONE;
+    take_doubtful(
+        bvh,
+        ray,
+        first,
+        bvh.triangles.get(first..first + count).unwrap_or(&[]),
+        doubtful,
+        &mut best,
+    );
+    best.is_some()
+}
+
+/// By the scalar reference.
+#[cold]
+fn take_doubtful(bvh: &Bvh, ray: &Ready, first: usize, ids: &[u32], mut doubtful: u32, best: &mut Hit) {
+    let count = ids.len();
+    let runs = bvh.coordinates.get(9 * first..9 * (first + count)).unwrap_or(&[]);
+    while doubtful != 0 {
+        let i = doubtful.trailing_zeros() as usize & 7;
+        doubtful &= doubtful - 1;
+        let limit = if best.triangle == MISS { ray.t_max } else { best.t };
+        if let Some(&triangle) = ids.get(i)
+            && let Some((t, u, v)) = intersect(ray.origin, &ray.shear(), limit, corners_of(runs, count, i))
+        {
+            best.take(Hit { t, u, v, triangle });
+        }
+    }
+}
