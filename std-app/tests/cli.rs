@@ -107,6 +107,9 @@ fn wrong_usage_is_refused_before_anything_is_written() {
         ("render scene.obj --reference missing.exr", "missing.exr"),
         ("compare missing.exr missing.exr", "missing.exr"),
         ("compare scene.obj scene.obj", ".exr"),
+        ("compare missing.exr missing.exr --difference signed", "--output"),
+        ("compare missing.exr missing.exr -o d.hdr --difference relative", "no values below zero"),
+        ("compare missing.exr missing.exr -o d.png --difference loud", "signed, absolute, relative, flip"),
         ("info missing.toml", "missing.toml"),
         ("bench", "rays"),
         ("bench rays missing.obj", "missing.obj"),
@@ -181,6 +184,16 @@ fn a_reference_is_compared_with_and_its_size_is_checked_first() {
         assert!(object["error"][key].as_f64().unwrap() > 0.0, "{key}");
     }
     assert!(object["error"]["estimate"]["relmse"].is_number());
+    let history = object["history"].as_array().unwrap();
+    assert_eq!(history.len() as u64, object["rounds"].as_u64().unwrap());
+    for keys in history.windows(2) {
+        assert!(keys[0]["seconds"].as_f64() < keys[1]["seconds"].as_f64());
+        assert!(keys[0]["rays"].as_u64() < keys[1]["rays"].as_u64());
+    }
+    let last = &history[history.len() - 1];
+    assert_eq!((&last["spp"], &last["relmse"]), (&object["spp"], &object["error"]["estimate"]["relmse"]));
+    assert_eq!(last["reference"]["mse"], object["error"]["mse"]);
+    assert!(history[0]["reference"]["flip"].is_number());
     let said = folder.refused("render scene.obj -o b.exr --size 9x9 --reference r.exr");
     assert!(said.contains("--size 16x16") && !folder.path("b.exr").exists(), "{said}");
 }
@@ -196,6 +209,13 @@ fn compare_prints_known_values() {
     assert_eq!(object["relmse"].as_f64(), Some(0.25 / 1.01));
     assert_eq!(object["flip"].as_f64(), Some(0.0), "both are white on a display");
     assert_eq!(read(&folder.path("d.pfm")).unwrap(), flat(0.5));
+    let object = folder.object("compare b.pfm a.exr --json -o d.pfm -o d.png --difference signed");
+    assert_eq!(read(&folder.path("d.pfm")).unwrap(), flat(-0.5));
+    assert_eq!(
+        object["outputs"][0],
+        serde_json::json!({"file": "d.pfm", "difference": "signed", "scale": null})
+    );
+    assert_eq!(object["outputs"][1]["scale"], serde_json::json!([-0.5, 0.5]));
 
     write(&folder.path("c.exr"), &Image::black(3, 1)).unwrap();
     assert!(folder.refused("compare a.exr c.exr").contains("2x1 and 3x1"));

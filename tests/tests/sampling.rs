@@ -38,7 +38,7 @@ fn assert_expected(name: &str, counts: &[u32], expected: &[f64]) {
 #[test]
 fn every_power_of_two_prefix_is_a_net() {
     for key in 0..64u32 {
-        let samplers = |i| Sampler::new(key / 8, key * 977, i);
+        let samplers = |i| Sampler::replicate(key / 8, key * 977, key & 1, i);
         let dimension = key % 5;
         let points: Vec<[f32; 2]> = (0..1024).map(|i| samplers(i).pair(dimension)).collect();
         let singles: Vec<f32> = (0..1024).map(|i| samplers(i).single(dimension + 9)).collect();
@@ -71,7 +71,7 @@ fn later_blocks_and_the_last_samples_are_nets_as_well() {
     for start in [1024u32, 3 << 20, u32::MAX - 255] {
         let mut seen = [false; 256];
         for i in 0..256 {
-            let [x, y] = Sampler::new(1, 2, start + i).pair(3);
+            let [x, y] = Sampler::replicate(1, 2, 0, start + i).pair(3);
             let cell = (x * 16.0) as usize + 16 * (y * 16.0) as usize;
             assert!(!core::mem::replace(&mut seen[cell], true), "block at {start}");
         }
@@ -81,7 +81,7 @@ fn later_blocks_and_the_last_samples_are_nets_as_well() {
 #[test]
 fn quads_are_nets_in_every_coordinate_and_in_both_pairs() {
     for key in 0..32 {
-        let points: Vec<[f32; 4]> = (0..256).map(|i| Sampler::new(5, key, i).quad(2)).collect();
+        let points: Vec<[f32; 4]> = (0..256).map(|i| Sampler::replicate(5, key, 0, i).quad(2)).collect();
         for axis in 0..4 {
             let mut seen = [false; 256];
             for p in &points {
@@ -104,7 +104,7 @@ fn mixed_projections_of_quads_are_nets_but_for_a_factor_of_two() {
     for (log, [a, b]) in
         [4, 6, 8].into_iter().flat_map(|l| [[0, 2], [0, 3], [1, 2], [1, 3]].map(|axes| (l, axes)))
     {
-        let points: Vec<[f32; 4]> = (0..1 << log).map(|i| Sampler::new(5, 6, i).quad(2)).collect();
+        let points: Vec<[f32; 4]> = (0..1 << log).map(|i| Sampler::replicate(5, 6, 0, i).quad(2)).collect();
         for log_x in 0..log {
             let (across, down) = ((1 << log_x) as f32, (1 << (log - 1 - log_x)) as f32);
             let mut seen = vec![0; 1 << (log - 1)];
@@ -121,7 +121,7 @@ fn each_point_is_uniform_over_keys() {
     // Of Owen-scrambled points every single one is uniform: sample 3 of many pixels, in 2 and in 4 dimensions.
     let (mut squares, mut tesseracts) = (vec![0; 1024], vec![0; 4096]);
     for pixel in 0..200_000 {
-        let sampler = Sampler::new(9, pixel, 3);
+        let sampler = Sampler::new(9, pixel, 6);
         let [x, y] = sampler.pair(1);
         squares[(x * 32.0) as usize + 32 * (y * 32.0) as usize] += 1;
         let cell = sampler.quad(7).iter().fold(0, |cell, u| cell * 8 + (u * 8.0) as usize);
@@ -134,7 +134,7 @@ fn each_point_is_uniform_over_keys() {
 #[test]
 fn dimensions_pixels_and_seeds_are_independent() {
     type Stream = (&'static str, fn(u32) -> [f32; 2]);
-    let streams: [Stream; 5] = [
+    let streams: [Stream; 6] = [
         ("dimensions", |i| {
             [Sampler::new(0, i / 16, i % 16).pair(0)[0], Sampler::new(0, i / 16, i % 16).pair(1)[0]]
         }),
@@ -146,6 +146,12 @@ fn dimensions_pixels_and_seeds_are_independent() {
         }),
         ("seeds", |i| {
             [Sampler::new(0, i / 16, i % 16).pair(0)[1], Sampler::new(1, i / 16, i % 16).pair(0)[1]]
+        }),
+        ("replicates", |i| {
+            [
+                Sampler::new(0, i / 16, 2 * (i % 16)).pair(0)[0],
+                Sampler::new(0, i / 16, 2 * (i % 16) + 1).pair(0)[0],
+            ]
         }),
         ("hash", |i| [Random::new(0, i).single(0), Random::new(0, i).single(1)]),
     ];
@@ -180,7 +186,7 @@ fn errors_fall_faster_than_those_of_independent_samples() {
         [("smooth", &smooth, 1.0, 2_000.0), ("disk", &disk, core::f64::consts::FRAC_PI_4, 10.0)];
     for (name, f, exact, gain) in integrands {
         let n = 256;
-        let sobol = mean_squared_error(n, exact, |pixel, i| f(Sampler::new(4, pixel, i).pair(0)));
+        let sobol = mean_squared_error(n, exact, |pixel, i| f(Sampler::replicate(4, pixel, 0, i).pair(0)));
         let independent = mean_squared_error(n, exact, |pixel, i| {
             let random = Random::new(4, pixel * n + i);
             f([random.single(0), random.single(1)])
@@ -198,11 +204,12 @@ fn four_dimensions_at_once_are_better_than_two_pairs() {
     let coupled = |p: [f32; 4]| f64::from((p[0] + p[1]) * (p[2] + p[3]));
     for n in [16, 64, 256] {
         let pairs = mean_squared_error(n, 1.0, |pixel, i| {
-            let sampler = Sampler::new(6, pixel, i);
+            let sampler = Sampler::replicate(6, pixel, 0, i);
             let ([a, b], [c, d]) = (sampler.pair(0), sampler.pair(1));
             coupled([a, b, c, d])
         });
-        let quads = mean_squared_error(n, 1.0, |pixel, i| coupled(Sampler::new(6, pixel, i).quad(0)));
+        let quads =
+            mean_squared_error(n, 1.0, |pixel, i| coupled(Sampler::replicate(6, pixel, 0, i).quad(0)));
         println!("{n} samples: pairs {pairs:.3e}, quads {quads:.3e}, gain {:.2}", pairs / quads);
         assert!(quads < pairs);
     }

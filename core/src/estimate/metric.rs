@@ -5,7 +5,7 @@
 use crate::Rgb;
 
 /// Share of the squared mean that keeps relMSE finite where the reference is dark.
-const DARK: f64 = 0.01;
+pub(super) const DARK: f64 = 0.01;
 
 /// How a picture differs from a reference of the same size, over pixels and channels.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

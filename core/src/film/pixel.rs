@@ -1,44 +1,60 @@
 //! One pixel: precise sums of its even and odd samples, and what is done with samples that are no light.
+//!
+//! Each half keeps its own even and odd samples apart. The halves tell the error of their mean; what the quarters
+//! add is said in [`crate::estimate`].
 
 use crate::Rgb;
 use bytemuck::{Pod, Zeroable};
 
-/// The sum of half of the samples. Each addition keeps its rounding error (Neumaier 1974), so that a
-/// million samples in f32 are as good as in twice its precision.
+/// 2^96: from here on radiance counts as infinite, so that sums of 2^31 samples are finite.
+const BRIGHTEST: f32 = 79_228_162_514_264_337_593_543_950_336.0;
+
+/// The sum of half of the samples, in two parts. Each addition keeps its rounding error (Neumaier 1974), so
+/// that a million samples in f32 are as good as in twice its precision.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct Half {
-    sum: [f32; 3],
+    sums: [[f32; 3]; 2],
     lost: [f32; 3],
-    count: u32,
+    counts: [u32; 2],
 }
 
 impl Half {
     #[inline]
-    fn add(&mut self, sample: Rgb) {
-        for ((sum, lost), x) in self.sum.iter_mut().zip(&mut self.lost).zip(sample.to_array()) {
+    fn add(&mut self, part: usize, sample: Rgb) {
+        let part = part & 1;
+        for ((sum, lost), x) in self.sums[part].iter_mut().zip(&mut self.lost).zip(sample.to_array()) {
             // Knuth's two-sum: exact whichever is larger.
             let total = *sum + x;
             let back = total - *sum;
             *lost += (*sum - (total - back)) + (x - back);
             *sum = total;
         }
-        self.count += 1;
+        self.counts[part] += 1;
     }
 
     /// Number of samples.
     pub fn count(&self) -> u32 {
-        self.count
+        self.counts[0] + self.counts[1]
     }
 
     /// Their sum.
     pub fn sum(&self) -> Rgb {
-        Rgb::from(self.sum) + Rgb::from(self.lost)
+        Rgb::from(self.sums[0]) + Rgb::from(self.sums[1]) + Rgb::from(self.lost)
     }
 
     /// Their mean; black where there are none.
     pub fn mean(&self) -> Rgb {
-        if self.count == 0 { Rgb::ZERO } else { self.sum() / self.count as f32 }
+        if self.count() == 0 { Rgb::ZERO } else { self.sum() / self.count() as f32 }
+    }
+
+    /// The means of its own even and odd samples; `None` where there are none.
+    #[inline]
+    pub fn parts(&self) -> Option<[Rgb; 2]> {
+        if self.counts.contains(&0) {
+            return None;
+        }
+        Some([0, 1].map(|i| Rgb::from(self.sums[i]) / self.counts[i] as f32))
     }
 }
 
@@ -53,14 +69,14 @@ pub struct Pixel {
 }
 
 impl Pixel {
-    /// Adds the radiance that sample number `index` saw. What is not a finite, non-negative number is
-    /// counted in `dropped` and does not reach the picture.
+    /// Adds the radiance that sample number `index` saw. What is not a non-negative number below 2^96, the
+    /// most that sums can hold, is counted in `dropped` and does not reach the picture.
     #[inline]
     pub fn add(&mut self, index: u32, radiance: Rgb, dropped: &mut Dropped) {
         // False for NaN as well.
-        if radiance.cmpge(Rgb::ZERO).all() && radiance.cmplt(Rgb::INFINITY).all() {
+        if radiance.cmpge(Rgb::ZERO).all() && radiance.cmplt(Rgb::splat(BRIGHTEST)).all() {
             let half = if index & 1 == 0 { &mut self.even } else { &mut self.odd };
-            half.add(radiance);
+            half.add((index >> 1) as usize, radiance);
         } else {
             dropped.record(radiance);
         }
@@ -68,13 +84,33 @@ impl Pixel {
 
     /// Number of samples.
     pub fn count(&self) -> u32 {
-        self.even.count + self.odd.count
+        self.even.count() + self.odd.count()
     }
 
     /// The mean of all samples; black where there are none.
     pub fn mean(&self) -> Rgb {
         let count = self.count();
         if count == 0 { Rgb::ZERO } else { (self.even.sum() + self.odd.sum()) / count as f32 }
+    }
+
+    /// Estimated variance of [`Pixel::mean`]: what the halves disagree by, with one degree of freedom. 0 where
+    /// a half is empty.
+    ///
+    /// With independent halves A and B of n_A and n_B samples and variance σ² of one sample, (A − B)² has the
+    /// expectation σ² (1/n_A + 1/n_B), and their common mean the variance σ² / (n_A + n_B).
+    pub fn variance(&self) -> Rgb {
+        self.scaled_variance(1.0)
+    }
+
+    /// The same of a picture that is `scale` times as bright, also where it would not be a finite number itself.
+    pub(crate) fn scaled_variance(&self, scale: f32) -> Rgb {
+        let (even, odd) = (self.even.count() as f32, self.odd.count() as f32);
+        if even == 0.0 || odd == 0.0 {
+            return Rgb::ZERO;
+        }
+        let share = (even / (even + odd)) * (odd / (even + odd));
+        let difference = (self.even.mean() - self.odd.mean()) * scale;
+        share * difference * difference
     }
 }
 
@@ -83,7 +119,7 @@ impl Pixel {
 pub struct Dropped {
     /// A channel was not a number.
     pub nan: u64,
-    /// A channel was infinite.
+    /// A channel was infinite, or as good as: 2^96 and more.
     pub infinite: u64,
     /// A channel was negative.
     pub negative: u64,
@@ -96,7 +132,7 @@ impl Dropped {
     fn record(&mut self, radiance: Rgb) {
         if radiance.is_nan() {
             self.nan += 1;
-        } else if !radiance.is_finite() {
+        } else if radiance.cmpge(Rgb::splat(BRIGHTEST)).any() || !radiance.is_finite() {
             self.infinite += 1;
         } else {
             self.negative += 1;
@@ -138,14 +174,25 @@ mod tests {
     }
 
     #[test]
+    fn the_halves_tell_the_variance() {
+        let mut pixel = Pixel::default();
+        for (index, sample) in [1.0, 4.0, 3.0].into_iter().enumerate() {
+            pixel.add(index as u32, Rgb::splat(sample), &mut Dropped::default());
+            assert_eq!(index > 0, pixel.variance() != Rgb::ZERO);
+        }
+        // Halves of means 2 and 4: (2 − 4)² times 2/3 · 1/3.
+        assert!((pixel.variance().x - 8.0 / 9.0).abs() < 1e-6);
+    }
+
+    #[test]
     fn what_is_no_light_is_counted_and_kept_out() {
         let mut pixel = Pixel::default();
         let mut dropped = Dropped::default();
-        for (i, bad) in [f32::NAN, f32::INFINITY, -1.0, f32::NEG_INFINITY].into_iter().enumerate() {
+        for (i, bad) in [f32::NAN, f32::INFINITY, -1.0, f32::NEG_INFINITY, f32::MAX].into_iter().enumerate() {
             pixel.add(i as u32, Rgb::new(1.0, bad, 1.0), &mut dropped);
         }
-        pixel.add(4, Rgb::ONE, &mut dropped);
+        pixel.add(5, Rgb::ONE, &mut dropped);
         assert_eq!(pixel.mean(), Rgb::ONE);
-        assert_eq!(dropped, Dropped { nan: 1, infinite: 2, negative: 1, unfinished: 0 });
+        assert_eq!(dropped, Dropped { nan: 1, infinite: 3, negative: 1, unfinished: 0 });
     }
 }

@@ -28,10 +28,17 @@ impl Tile {
         Self { left: (index % across) as u32 * TILE, top: (index / across) as u32 * TILE, width, height }
     }
 
+    /// Column and row of the `i`th pixel, counted from the upper left of its tile.
+    #[inline]
+    pub const fn place(i: usize) -> (u32, u32) {
+        (even_bits(i as u32), even_bits(i as u32 >> 1))
+    }
+
     /// Column and row of the `i`th pixel of the tile; `None` outside of the picture.
     #[inline]
     pub const fn pixel(&self, i: usize) -> Option<(u32, u32)> {
-        let (x, y) = (self.left + even_bits(i as u32), self.top + even_bits(i as u32 >> 1));
+        let (x, y) = Self::place(i);
+        let (x, y) = (self.left + x, self.top + y);
         if x < self.width && y < self.height { Some((x, y)) } else { None }
     }
 

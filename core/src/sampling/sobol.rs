@@ -5,6 +5,9 @@
 //! every power-of-two prefix stays a net), then both coordinates are Owen-scrambled. Pairs are thereby
 //! independent of each other (padding), and there are as many as anybody asks for.
 //!
+//! Even and odd samples of a pixel come from two such sequences with keys of their own: independent replicates,
+//! without which the error of their mean could not be estimated (docs/decisions/0009).
+//!
 //! Departures from the paper:
 //! 1. The Laine-Karras hash has Vegdahl's constants (2021, "Building a Better LK Hash"), which come closer
 //!    to a true Owen scramble.
@@ -21,7 +24,7 @@ use super::hash::{GOLDEN, mix};
 use super::unit_float;
 
 /// The streams of one sample of one pixel. Dimensions are names: the same one always gives the same
-/// numbers, and any two are independent. 2^32 samples.
+/// numbers, and any two are independent. 2^32 samples of pixels below 2^31.
 ///
 /// ```
 /// use halflight_core::sampling::Sampler;
@@ -36,21 +39,28 @@ pub struct Sampler {
 }
 
 impl Sampler {
-    /// Sample number `sample` of `pixel` in the picture of `seed`.
+    /// Sample number `sample` of `pixel` in the picture of `seed`: even ones are the points of replicate 0, odd
+    /// ones those of replicate 1.
     #[inline]
     pub const fn new(seed: u32, pixel: u32, sample: u32) -> Self {
-        let key = mix(((seed as u64) << 32 | pixel as u64).wrapping_add(GOLDEN));
-        Self { key, reversed_index: sample.reverse_bits() }
+        Self::replicate(seed, pixel, sample & 1, sample >> 1)
     }
 
-    /// One number in [0, 1): every power-of-two prefix of the samples has one in each of its equal parts.
+    /// Point number `index` of a sequence, 0 or 1, of `pixel` in the picture of `seed`. The two are independent.
+    #[inline]
+    pub const fn replicate(seed: u32, pixel: u32, replicate: u32, index: u32) -> Self {
+        let place = (seed as u64) << 32 | (pixel ^ replicate << 31) as u64;
+        Self { key: mix(place.wrapping_add(GOLDEN)), reversed_index: index.reverse_bits() }
+    }
+
+    /// One number in [0, 1): every power-of-two prefix of a replicate has one in each of its equal parts.
     #[inline]
     pub fn single(&self, dimension: u32) -> f32 {
         let keys = self.keys(dimension);
         unit_float(owen(self.shuffled_index(keys), (keys >> 32) as u32))
     }
 
-    /// A point of [0, 1)²: every power-of-two prefix of the samples is a (0,2)-net.
+    /// A point of [0, 1)²: every power-of-two prefix of a replicate is a (0,2)-net.
     #[inline]
     pub fn pair(&self, dimension: u32) -> [f32; 2] {
         let keys = self.keys(dimension);
@@ -60,7 +70,7 @@ impl Sampler {
         [unit_float(x), unit_float(y)]
     }
 
-    /// A point of [0, 1)⁴: both halves are (0,2)-sequences over the samples, and all four numbers together
+    /// A point of [0, 1)⁴: both halves are (0,2)-sequences over a replicate, and all four numbers together
     /// fill space more evenly than two independent pairs.
     #[inline]
     pub fn quad(&self, dimension: u32) -> [f32; 4] {

@@ -2,8 +2,8 @@
 
 use super::failure::Failure;
 use super::say;
-use clap::Args;
-use halflight::compare::{Comparison, compare};
+use clap::{Args, ValueEnum};
+use halflight::compare::{Comparison, Shown, compare, false_colours};
 use halflight::save::{self, Format};
 use serde_json::{Value, json};
 use std::path::PathBuf;
@@ -21,30 +21,109 @@ pub(super) struct Compare {
     a: PathBuf,
     /// The reference (.exr, .hdr, .pfm or .png)
     b: PathBuf,
-    /// Also write a picture of the difference: |A - B|, or, as .png, the FLIP map in false colours
+    /// Also write a picture of the difference: its values, or, as .png, in false colours; may be given
+    /// several times
     #[arg(short, long, value_name = "FILE")]
-    output: Option<PathBuf>,
+    output: Vec<PathBuf>,
+    /// What it shows [default: flip as .png, absolute in the linear formats]
+    #[arg(long, requires = "output")]
+    difference: Option<Difference>,
     /// Print one JSON object instead of text
     #[arg(long)]
     json: bool,
 }
 
+#[derive(Clone, Copy, ValueEnum)]
+enum Difference {
+    /// A - B; as .png blue where A is too dark, red where it is too bright
+    Signed,
+    /// |A - B|
+    Absolute,
+    /// (A - B) / sqrt(B^2 + 0.01 m^2), whose mean square is the relMSE
+    Relative,
+    /// The FLIP error of each pixel
+    Flip,
+}
+
 impl Compare {
     pub(super) fn run(&self) -> Result<ExitCode, Failure> {
-        if let Some(output) = &self.output {
-            save::check_writable(output)?;
-        }
+        let plan = self.output.iter().map(|file| self.plan(file)).collect::<Result<Vec<_>, _>>()?;
         let (a, b) = (save::read(&self.a)?, save::read(&self.b)?);
         let comparison = compare(&a, &b).map_err(|mismatch| {
             Failure::new(format!("{}: {mismatch}", self.a.display()))
                 .advice("render both with the same --size; nothing is resampled")
         })?;
-        if let Some(output) = &self.output {
-            save::write(output, &comparison.picture(&a, &b, Format::of(output)?))?;
+        let mut saved = Vec::new();
+        for (file, shown) in plan {
+            let values = comparison.values(&a, &b, shown);
+            let scale = if Format::of(file)?.is_linear() {
+                save::write(file, &values)?;
+                None
+            } else {
+                let (colours, end) = false_colours(&values, shown);
+                save::write(file, &colours)?;
+                Some([if shown.is_signed() { -end } else { 0.0 }, end])
+            };
+            saved.push(Saved { file, shown, scale });
         }
-        say(&if self.json { object(&comparison).to_string() } else { text(&comparison) });
+        say(&if self.json { told(&comparison, &saved).to_string() } else { page(&comparison, &saved) });
         Ok(ExitCode::SUCCESS)
     }
+
+    /// What `file` is going to show, where that can be written.
+    fn plan<'a>(&self, file: &'a PathBuf) -> Result<(&'a PathBuf, Shown), Failure> {
+        save::check_writable(file)?;
+        let format = Format::of(file)?;
+        let shown = match self.difference {
+            Some(Difference::Signed) => Shown::Signed,
+            Some(Difference::Absolute) => Shown::Absolute,
+            Some(Difference::Relative) => Shown::Relative,
+            Some(Difference::Flip) => Shown::Flip,
+            None if format.is_linear() => Shown::Absolute,
+            None => Shown::Flip,
+        };
+        if format == Format::Hdr && shown.is_signed() {
+            return Err(Failure::new(format!("{}: .hdr holds no values below zero", file.display()))
+                .advice("write a signed difference as .exr, .pfm or .png"));
+        }
+        Ok((file, shown))
+    }
+}
+
+/// A picture of the difference that was written.
+struct Saved<'a> {
+    file: &'a PathBuf,
+    shown: Shown,
+    /// The values of the first and the last of its false colours.
+    scale: Option<[f32; 2]>,
+}
+
+impl Saved<'_> {
+    fn name(&self) -> &'static str {
+        match self.shown {
+            Shown::Signed => "signed",
+            Shown::Absolute => "absolute",
+            Shown::Relative => "relative",
+            Shown::Flip => "flip",
+        }
+    }
+}
+
+fn told(comparison: &Comparison, saved: &[Saved]) -> Value {
+    let mut object = object(comparison);
+    let outputs = saved
+        .iter()
+        .map(|saved| json!({ "file": saved.file, "difference": saved.name(), "scale": saved.scale }));
+    object["outputs"] = outputs.collect();
+    object
+}
+
+fn page(comparison: &Comparison, saved: &[Saved]) -> String {
+    saved.iter().fold(text(comparison), |text, saved| {
+        let scale = saved.scale.map(|[from, to]| format!(", colours from {from:.3e} to {to:.3e}"));
+        let scale = scale.unwrap_or_default();
+        format!("{text}\nsaved  {}: {} difference{scale}", saved.file.display(), saved.name())
+    })
 }
 
 /// The object of `--json`. Errors that are infinite are `null`: JSON has no infinity.

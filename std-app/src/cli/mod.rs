@@ -4,9 +4,11 @@ mod bench;
 mod compare;
 mod failure;
 mod info;
+mod interrupt;
 mod progress;
 mod render;
-mod report;
+mod shot;
+mod summary;
 mod values;
 mod view;
 

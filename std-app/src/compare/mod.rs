@@ -2,11 +2,13 @@
 //! difference.
 
 mod flip;
-mod heat;
+pub(crate) mod heat;
+mod picture;
 
 pub use flip::flip;
+pub use picture::{Shown, false_colours};
 
-use crate::save::{Format, Image, from_srgb};
+use crate::save::Image;
 use core::fmt;
 use halflight_core::estimate::Difference;
 
@@ -61,17 +63,4 @@ pub fn compare(image: &Image, reference: &Image) -> Result<Comparison, SizeMisma
         height: image.height,
         flip_map,
     })
-}
-
-impl Comparison {
-    /// A picture of the difference: |A − B| for a linear `format`, the FLIP map in false colours for PNG.
-    pub fn picture(&self, image: &Image, reference: &Image, format: Format) -> Image {
-        let pixels = if format.is_linear() {
-            let pairs = image.pixels.iter().zip(&reference.pixels);
-            pairs.map(|(a, b)| core::array::from_fn(|c| (a[c] - b[c]).abs())).collect()
-        } else {
-            self.flip_map.iter().map(|&error| heat::colour(error).map(from_srgb)).collect()
-        };
-        Image { width: self.width, height: self.height, pixels }
-    }
 }

@@ -3,12 +3,13 @@
 //! A picture is made in rounds; a round adds the same number of samples to every pixel. How the samples are
 //! cut into rounds, and how many threads there are, leaves the bits of the picture as they are.
 
-mod error;
+mod history;
 mod memory;
 mod rounds;
 mod workers;
 
-pub use error::ErrorEstimate;
+pub use halflight_core::estimate::ErrorEstimate;
+pub use history::{Against, Round};
 pub use memory::MemoryUse;
 pub use rounds::Stop;
 
@@ -18,13 +19,15 @@ use halflight_core::Level;
 use halflight_core::bsdf::Features;
 use halflight_core::bvh::Bvh;
 use halflight_core::census::{Census, WithFeatures};
-use halflight_core::film::Film;
+use halflight_core::film::{Film, Pixel};
 use halflight_core::light::Lights;
 use halflight_core::memory::{Arena, Line, OutOfMemory};
 use halflight_core::scene::Scene;
 use halflight_core::transport::{Counters, PathSettings, PathTracer, UNLIMITED, path::WAVE};
+use history::{Clock, Reference};
 use memory::Memory;
 use rounds::Rounds;
+use std::sync::Arc;
 use std::time::Instant;
 use workers::Workers;
 
@@ -47,6 +50,9 @@ pub struct Settings {
     pub level: Level,
     /// When to stop.
     pub stop: Stop,
+    /// What the picture should be, of the same size: each round is compared with it, and the time that this
+    /// takes does not count.
+    pub reference: Option<Arc<Image>>,
 }
 
 impl Default for Settings {
@@ -60,6 +66,7 @@ impl Default for Settings {
             memory: None,
             level: Level::detect(),
             stop: Stop::default(),
+            reference: None,
         }
     }
 }
@@ -93,7 +100,7 @@ pub enum Ending {
 pub struct Seconds {
     /// Building the hierarchy and the light structures.
     pub build: f64,
-    /// Tracing paths.
+    /// Tracing paths, without the comparisons with a reference.
     pub render: f64,
 }
 
@@ -106,13 +113,19 @@ pub struct RenderResult {
     pub spp: u32,
     /// Rounds completed.
     pub rounds: u32,
+    /// What was known after each of them.
+    pub history: Vec<Round>,
+    /// Estimated variance of the mean of each pixel and channel, from the two half-films.
+    pub variance: Image,
+    /// Samples of each pixel, row by row.
+    pub samples: Vec<u32>,
     /// Threads used.
     pub threads: usize,
     /// Where the time went.
     pub seconds: Seconds,
     /// Paths, rays and dropped samples.
     pub counters: Counters,
-    /// The error, estimated from the two half-films; `None` for fewer than two samples.
+    /// The error, estimated from the two half-films; `None` for fewer than four samples, and for a black picture.
     pub error: Option<ErrorEstimate>,
     /// Bytes of each structure, while paths are traced.
     pub memory: Vec<MemoryUse>,
@@ -127,6 +140,8 @@ pub struct RenderResult {
 pub enum RenderError {
     /// The picture has no pixels, or more than can be counted.
     Size,
+    /// The reference has another size.
+    Reference,
     /// The memory allowed does not suffice.
     Memory {
         /// Bytes that are needed.
@@ -142,6 +157,7 @@ impl core::fmt::Display for RenderError {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         match self {
             Self::Size => write!(f, "the picture must have between 1 and 2^28 pixels"),
+            Self::Reference => write!(f, "the reference has not the size of the picture"),
             Self::Memory { needed, available } => {
                 write!(f, "not enough memory: {needed} bytes needed, {available} available")
             }
@@ -172,6 +188,10 @@ pub fn render(
     let pixels = u64::from(settings.width) * u64::from(settings.height);
     if !(1..=MOST_PIXELS).contains(&pixels) {
         return Err(RenderError::Size);
+    }
+    let size = [settings.width, settings.height];
+    if settings.reference.as_ref().is_some_and(|reference| [reference.width, reference.height] != size) {
+        return Err(RenderError::Reference);
     }
     let plan = Census::of(scene).plan();
     plan.features.dispatch(Render { scene, settings, progress, interrupt })
@@ -211,11 +231,13 @@ impl WithFeatures for Render<'_> {
         let path_settings = PathSettings { width, height, seed: settings.seed, max_depth };
         let tracer = PathTracer::<F>::new(scene, &bvh, &lights, path_settings, settings.level);
 
-        let start = Instant::now();
+        let mut clock = Clock::start();
         let mut rounds = Rounds::new(settings.stop);
         let mut counters = Counters::default();
+        let mut history = Vec::<Round>::new();
+        let mut reference = settings.reference.as_deref().map(Reference::new);
         let mut error = None;
-        while let Some(samples) = rounds.next(start.elapsed().as_secs_f64(), error) {
+        while let Some(samples) = rounds.next(clock.seconds(), error) {
             // The first round is finished whatever happens, so that every pixel has something to show.
             let first = samples.start == 0;
             let heeded = if first { &AtomicBool::new(false) } else { interrupt };
@@ -223,25 +245,33 @@ impl WithFeatures for Render<'_> {
             if interrupt.load(Ordering::Relaxed) && !first {
                 break;
             }
-            rounds.completed(samples, start.elapsed().as_secs_f64());
-            error = ErrorEstimate::of(&film);
+            rounds.completed(samples, clock.seconds());
+            error = workers.estimate(&film);
+            let seconds = clock.seconds();
+            let against = reference.as_mut().map(|r| clock.pause(|| r.compare(&image(&film), seconds)));
+            let (spp, rays) = (rounds.spp(), counters.rays + counters.shadow_rays);
+            history.push(Round { seconds, spp, rays, error, reference: against });
             progress(&Progress {
-                seconds: start.elapsed().as_secs_f64(),
-                seconds_left: rounds.seconds_left(start.elapsed().as_secs_f64(), error),
-                spp: rounds.spp(),
+                seconds,
+                seconds_left: rounds.seconds_left(seconds, error),
+                spp,
                 rounds: rounds.count(),
                 error,
             });
         }
         let interrupted = interrupt.load(Ordering::Relaxed);
+        let render = clock.seconds();
         Ok(RenderResult {
             image: image(&film),
             spp: rounds.spp(),
             rounds: rounds.count(),
+            history,
+            variance: map(&film, |pixel| pixel.variance().to_array()),
+            samples: by_rows(&film).map(|pixel| pixel.count()).collect(),
             threads: workers.count(),
-            seconds: Seconds { build, render: start.elapsed().as_secs_f64() },
+            seconds: Seconds { build, render },
             counters,
-            error: ErrorEstimate::of(&film),
+            error: workers.estimate(&film),
             memory: memory.uses(),
             memory_peak: memory.peak(),
             ending: if interrupted { Ending::Interrupted } else { Ending::Done },
@@ -265,10 +295,13 @@ fn build_bvh<'m>(
 }
 
 fn image(film: &Film) -> Image {
-    let mut image = Image::black(film.width(), film.height());
-    let places = (0..film.height()).flat_map(|y| (0..film.width()).map(move |x| (x, y)));
-    for (pixel, (x, y)) in image.pixels.iter_mut().zip(places) {
-        *pixel = film.mean(x, y).to_array();
-    }
-    image
+    map(film, |pixel| pixel.mean().to_array())
+}
+
+fn map(film: &Film, value: impl Fn(Pixel) -> [f32; 3]) -> Image {
+    Image { width: film.width(), height: film.height(), pixels: by_rows(film).map(value).collect() }
+}
+
+fn by_rows(film: &Film) -> impl Iterator<Item = Pixel> {
+    (0..film.height()).flat_map(move |y| (0..film.width()).map(move |x| film.pixel(x, y)))
 }

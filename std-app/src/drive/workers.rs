@@ -5,10 +5,12 @@ use core::ops::Range;
 use core::sync::atomic::{AtomicBool, Ordering};
 use halflight_core::bsdf::Features;
 use halflight_core::bvh::{Bvh, Join};
+use halflight_core::estimate::{ErrorEstimate, TileError, TileLight};
 use halflight_core::film::{Film, PIXELS_PER_TILE};
 use halflight_core::memory::{Arena, Line, OutOfMemory};
 use halflight_core::scene::Mesh;
 use halflight_core::transport::{Counters, PathTracer, path::WAVE};
+use rayon::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use std::sync::Mutex;
 
@@ -32,6 +34,23 @@ impl Workers {
     /// Builds the hierarchy over `mesh` on all threads.
     pub(super) fn build_bvh<'m>(&self, mesh: &Mesh, arena: &mut Arena<'m>) -> Result<Bvh<'m>, OutOfMemory> {
         self.pool.install(|| Bvh::build_with(mesh, arena, &Fork))
+    }
+
+    /// What `film` tells of its own error; `None` for fewer than four samples, and for a black picture.
+    pub(super) fn estimate(&self, film: &Film) -> Option<ErrorEstimate> {
+        let tiles = || film.pixels().par_chunks(PIXELS_PER_TILE);
+        self.pool.install(|| {
+            let mut light = TileLight::default();
+            for tile in tiles().map(TileLight::of).collect::<Vec<_>>() {
+                light += tile;
+            }
+            let mean = light.mean();
+            if mean.is_nan() || mean <= 0.0 {
+                return None;
+            }
+            let errors: Vec<_> = tiles().map(|tile| TileError::of(tile, mean)).collect();
+            ErrorEstimate::of(errors.into_iter())
+        })
     }
 
     /// One round: `samples` of every pixel. When `interrupt` is raised, tiles not yet begun are left out.

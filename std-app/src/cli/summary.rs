@@ -4,14 +4,14 @@
 use super::compare as comparing;
 use super::values::{readable_bytes, readable_seconds};
 use halflight::compare::Comparison;
-use halflight::drive::{Ending, ErrorEstimate, RenderResult, Settings};
+use halflight::drive::{Against, Ending, ErrorEstimate, RenderResult, Round, Settings};
 use halflight_core::census::Census;
 use halflight_core::scene::Scene;
 use serde_json::{Map, Value, json};
 use std::path::PathBuf;
 
 /// A render that is done.
-pub(super) struct Report<'a> {
+pub(super) struct Summary<'a> {
     pub(super) scene: &'a Scene<'a>,
     pub(super) settings: &'a Settings,
     pub(super) result: &'a RenderResult,
@@ -21,7 +21,7 @@ pub(super) struct Report<'a> {
     pub(super) total_seconds: f64,
 }
 
-impl Report<'_> {
+impl Summary<'_> {
     pub(super) fn object(&self) -> Value {
         let (result, settings) = (self.result, self.settings);
         let plan = Census::of(self.scene).plan();
@@ -54,6 +54,7 @@ impl Report<'_> {
             "paths": result.counters.paths,
             "mean_radiance": result.image.mean(),
             "error": self.error(),
+            "history": self.result.history.iter().map(round).collect::<Vec<_>>(),
             "dropped": {
                 "nan": dropped.nan,
                 "infinite": dropped.infinite,
@@ -97,7 +98,7 @@ impl Report<'_> {
             Some(ErrorEstimate { relmse, lower, upper }) => {
                 format!("error  relMSE {relmse:.3e} (95 %: {lower:.3e} to {upper:.3e}), estimated from its own noise")
             }
-            None => "error  unknown: it takes two samples per pixel and some light".into(),
+            None => "error  unknown: it takes four samples per pixel and some light".into(),
         });
         if let Some(comparison) = self.comparison {
             lines.extend(comparing::text(comparison).lines().map(|line| format!("       {line}")));
@@ -132,6 +133,22 @@ impl Report<'_> {
         }
         lines.join("\n")
     }
+}
+
+/// An entry of `history`.
+fn round(round: &Round) -> Value {
+    let mut object = json!({
+        "seconds": round.seconds,
+        "spp": round.spp,
+        "rays": round.rays,
+        "relmse": round.error.map(|error| error.relmse),
+        "interval": round.error.map(|error| [error.lower, error.upper]),
+    });
+    if let Some(Against { linear, flip }) = round.reference {
+        object["reference"] =
+            json!({ "relmse": linear.relmse, "mse": linear.mse, "rmse": linear.rmse(), "flip": flip });
+    }
+    object
 }
 
 fn plural(count: usize, noun: &str) -> String {

@@ -1,0 +1,136 @@
+//! The flags of a picture that `render` and `race` share, and the settings that follow from them.
+
+use super::failure::Failure;
+use super::values;
+use super::view::View;
+use clap::{Args, ValueEnum};
+use halflight::drive::{RenderError, Settings, Stop};
+use halflight::load::LoadedScene;
+use halflight::save::{self, Image};
+use halflight_simd::{Level, Tier};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// The picture, whatever the method.
+#[derive(Args)]
+pub(super) struct Shot {
+    /// Width and height in pixels [default: 512x512]
+    #[arg(long, value_name = "WxH", value_parser = values::size)]
+    size: Option<[u32; 2]>,
+    /// A reference picture of the same size; the error against it is reported, that of each round with
+    /// --json. Comparing does not count as time of rendering
+    #[arg(long, value_name = "FILE", help_heading = "Results")]
+    reference: Option<PathBuf>,
+    #[command(flatten)]
+    pub(super) view: View,
+    /// Threads [default: all that the machine runs at once]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=4096),
+        help_heading = "How to run")]
+    threads: Option<u32>,
+    /// Most memory for the scene and all structures, as in 512M or 2G [default: no limit]
+    #[arg(long, value_name = "BYTES", value_parser = values::bytes, help_heading = "How to run")]
+    memory: Option<usize>,
+}
+
+/// How a method does its work: what may differ between the methods of a race.
+#[derive(Args)]
+pub(super) struct Options {
+    /// Whether caustics get a map of their own where they need one [default: auto]; `path` never needs one
+    #[arg(long)]
+    caustics: Option<Caustics>,
+    /// Longest path in segments: 1 is light seen directly, 2 adds direct light [default: no limit]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    max_depth: Option<u32>,
+    /// Another seed, another noise [default: 0]
+    #[arg(long, value_name = "N", help_heading = "How to run")]
+    seed: Option<u32>,
+    /// Highest instruction set to use: baseline, avx2 or avx512 [default: the processor's]
+    #[arg(long, value_name = "LEVEL", value_parser = values::tier, help_heading = "How to run")]
+    simd: Option<Tier>,
+    /// The same bits on every processor: the instruction set that all have
+    #[arg(long, help_heading = "How to run")]
+    precise: bool,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+pub(super) enum Method {
+    /// What fits the scene; today, path
+    Auto,
+    /// Path tracing with next-event estimation and multiple importance sampling
+    Path,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+pub(super) enum Caustics {
+    /// Where the method needs it
+    Auto,
+    /// Never
+    Off,
+}
+
+impl Options {
+    fn level(&self) -> Level {
+        let level = if self.precise { Level::BASELINE } else { Level::detect() };
+        self.simd.map_or(level, |tier| level.capped(tier))
+    }
+}
+
+impl Shot {
+    /// The reference picture. To be read before the scene: a wrong name should not cost a minute.
+    pub(super) fn reference(&self) -> Result<Option<Arc<Image>>, Failure> {
+        Ok(self.reference.as_deref().map(save::read).transpose()?.map(Arc::new))
+    }
+
+    /// The settings of `method` with `options`, completed by those of the scene file.
+    pub(super) fn settings(
+        &self,
+        loaded: &LoadedScene,
+        method: Method,
+        options: &Options,
+        stop: Stop,
+        reference: Option<Arc<Image>>,
+    ) -> Result<Settings, Failure> {
+        // Both are the same for path tracing, the only method there is.
+        let (Method::Auto | Method::Path) = method;
+        let (None | Some(Caustics::Auto | Caustics::Off)) = options.caustics;
+        let file = &loaded.settings;
+        let defaults = Settings::default();
+        let [width, height] = self.size.or(file.size).unwrap_or([defaults.width, defaults.height]);
+        self.check_reference(reference.as_deref(), [width, height])?;
+        Ok(Settings {
+            width,
+            height,
+            seed: options.seed.or(file.seed).unwrap_or(defaults.seed),
+            max_depth: options.max_depth.or(file.max_depth),
+            threads: self.threads.map(|threads| threads as usize),
+            memory: self.memory,
+            level: options.level(),
+            stop,
+            reference,
+        })
+    }
+
+    /// Before the render, not after it.
+    fn check_reference(&self, reference: Option<&Image>, size: [u32; 2]) -> Result<(), Failure> {
+        let (Some(file), Some(reference)) = (&self.reference, reference) else { return Ok(()) };
+        let Image { width, height, .. } = *reference;
+        if [width, height] == size {
+            return Ok(());
+        }
+        let asked = format!("{}x{}", size[0], size[1]);
+        Err(Failure::new(format!("{} has {width}x{height} pixels, the render {asked}", file.display()))
+            .advice(format!("render with --size {width}x{height}; nothing is resampled")))
+    }
+}
+
+/// Why there is no picture of `scene`, and what to do about it.
+pub(super) fn explain(scene: &Path, error: &RenderError) -> Failure {
+    let failure = Failure::new(format!("{}: {error}", scene.display()));
+    match error {
+        RenderError::Memory { needed, .. } => failure.advice(format!(
+            "{} are needed: raise --memory, or lower --size or --threads",
+            values::readable_bytes(*needed)
+        )),
+        _ => failure,
+    }
+}
