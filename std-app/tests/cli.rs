@@ -1,68 +1,12 @@
 //! The command line as a contract: the program as scripts and people run it.
 
+mod support;
+
 use halflight::save::{Image, read, write};
 use serde_json::Value;
-use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
-
-/// A lamp over a floor.
-const SCENE: &str = "mtllib scene.mtl\n\
-    v -1 0 -1\nv 1 0 -1\nv 1 0 1\nv -1 0 1\nv -1 2 -1\nv 1 2 -1\nv 1 2 1\nv -1 2 1\n\
-    usemtl floor\nf 4 3 2 1\nusemtl lamp\nf 5 6 7 8\n";
-const MATERIALS: &str = "newmtl floor\nKd 0.5 0.5 0.5\nnewmtl lamp\nKd 0 0 0\nKe 1 1 1\n";
-
-/// A folder of its own for each test, with the scene in it; gone when the test ends well.
-struct Folder(PathBuf);
-
-impl Folder {
-    fn new(name: &str) -> Self {
-        let folder = std::env::temp_dir().join(format!("halflight-cli-{name}-{}", std::process::id()));
-        std::fs::create_dir_all(&folder).unwrap();
-        std::fs::write(folder.join("scene.obj"), SCENE).unwrap();
-        std::fs::write(folder.join("scene.mtl"), MATERIALS).unwrap();
-        Self(folder)
-    }
-
-    fn path(&self, name: &str) -> PathBuf {
-        self.0.join(name)
-    }
-
-    fn command(&self, arguments: &str) -> Command {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_halflight"));
-        command.current_dir(&self.0).args(arguments.split_whitespace());
-        command
-    }
-
-    fn run(&self, arguments: &str) -> Output {
-        self.command(arguments).output().unwrap()
-    }
-
-    /// Runs what must succeed, and returns the object that it prints.
-    fn object(&self, arguments: &str) -> Value {
-        let output = self.run(arguments);
-        let said = String::from_utf8_lossy(&output.stderr);
-        assert_eq!(output.status.code(), Some(0), "{arguments}: {said}");
-        serde_json::from_slice(&output.stdout).unwrap()
-    }
-
-    /// Runs what must be refused with exit code 2, and returns what is said.
-    fn refused(&self, arguments: &str) -> String {
-        let output = self.run(arguments);
-        let said = String::from_utf8(output.stderr).unwrap();
-        assert_eq!(output.status.code(), Some(2), "{arguments}: {said}");
-        assert!(output.stdout.is_empty(), "{arguments}: results go to stdout, complaints do not");
-        assert!(!said.contains("panicked"), "{said}");
-        said
-    }
-}
-
-impl Drop for Folder {
-    fn drop(&mut self) {
-        if !std::thread::panicking() {
-            let _ = std::fs::remove_dir_all(&self.0);
-        }
-    }
-}
+use std::path::Path;
+use std::process::Command;
+use support::Folder;
 
 fn files(folder: &Path) -> usize {
     std::fs::read_dir(folder).unwrap().count()

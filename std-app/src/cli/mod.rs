@@ -5,6 +5,8 @@ mod compare;
 mod failure;
 mod info;
 mod interrupt;
+mod ledger;
+mod merge;
 mod progress;
 mod render;
 mod shot;
@@ -29,6 +31,7 @@ struct Cli {
 enum Command {
     Render(Box<render::Render>),
     Compare(compare::Compare),
+    Merge(merge::Merge),
     Info(info::Info),
     Bench(bench::Bench),
 }
@@ -42,6 +45,7 @@ pub(crate) fn main() -> ExitCode {
     let outcome = panic::catch_unwind(panic::AssertUnwindSafe(|| match command {
         Command::Render(command) => command.run(),
         Command::Compare(command) => command.run(),
+        Command::Merge(command) => command.run(),
         Command::Info(command) => command.run(),
         Command::Bench(command) => command.run(),
     }));

@@ -8,7 +8,7 @@ use super::summary::Summary;
 use super::{say, values, warn};
 use clap::{Args, ValueEnum};
 use halflight::compare::compare;
-use halflight::drive::{self, Ending, Stop};
+use halflight::drive::{self, Checkpoint, Ending, Settings, Shard, Stop};
 use halflight::load::{self, LoadOptions, LoadedScene};
 use halflight::save;
 use std::path::PathBuf;
@@ -42,9 +42,25 @@ pub(super) struct Render {
     /// Time of rendering, as in 30s, 2m, 1h
     #[arg(long, value_name = "TIME", value_parser = values::duration, help_heading = "When to stop")]
     time: Option<f64>,
-    /// relMSE: stop when the upper end of its interval is below
+    /// relMSE: stop when the upper end of its interval is not above
     #[arg(long, value_name = "RELMSE", value_parser = values::positive, help_heading = "When to stop")]
     error: Option<f64>,
+
+    /// Keep the film in a file while it grows, for --resume and `halflight merge`
+    #[arg(long, value_name = "FILE", help_heading = "In parts")]
+    checkpoint: Option<PathBuf>,
+    /// Time between two checkpoints; there is one at the end as well [default: 60s]
+    #[arg(long, value_name = "TIME", value_parser = values::duration, requires = "checkpoint",
+        help_heading = "In parts")]
+    checkpoint_every: Option<f64>,
+    /// Go on with the film of a checkpoint; all other flags as they were, but for those of when to stop
+    #[arg(long, value_name = "FILE", help_heading = "In parts")]
+    resume: Option<PathBuf>,
+    /// Render only part I of N, counted from 1, into the film of --checkpoint, for `halflight merge`; without -o
+    /// no picture is written
+    #[arg(long, value_name = "I/N", value_parser = values::shard, requires = "checkpoint",
+        conflicts_with_all = ["time", "error"], help_heading = "In parts")]
+    shard: Option<Shard>,
 
     /// Print one JSON object instead of text
     #[arg(long, help_heading = "Results")]
@@ -58,6 +74,9 @@ impl Render {
         for output in &outputs {
             save::check_writable(output)?;
         }
+        if let Some(film) = &self.checkpoint {
+            drive::check_film_writable(film)?;
+        }
         let reference = self.shot.reference()?;
 
         let loading = Instant::now();
@@ -68,7 +87,14 @@ impl Render {
         }
         self.check_method(&loaded)?;
         let settings =
-            self.shot.settings(&loaded, self.method, &self.options, self.stop(&loaded), reference)?;
+            self.shot.settings(&loaded, self.method, &self.options, self.stop(&loaded)?, reference)?;
+        let every = self.checkpoint_every.unwrap_or(Checkpoint::EVERY);
+        let settings = Settings {
+            shard: self.shard.unwrap_or(Shard::WHOLE),
+            checkpoint: self.checkpoint.clone().map(|path| Checkpoint { path, every }),
+            resume: self.resume.clone(),
+            ..settings
+        };
         let views = loaded.views();
         let scene = views.scene(self.shot.view.camera(&loaded)?);
 
@@ -102,6 +128,9 @@ impl Render {
     }
 
     fn outputs(&self) -> Vec<PathBuf> {
+        if self.output.is_empty() && self.shard.is_some() {
+            return Vec::new();
+        }
         if self.output.is_empty() {
             let name = self.scene.file_stem().unwrap_or("picture".as_ref());
             let mut name = PathBuf::from(name).into_os_string();
@@ -122,10 +151,15 @@ impl Render {
         }
     }
 
-    fn stop(&self, loaded: &LoadedScene) -> Stop {
+    fn stop(&self, loaded: &LoadedScene) -> Result<Stop, Failure> {
         let file = &loaded.settings;
         let flags = Stop { spp: self.spp, seconds: self.time, error: self.error };
         let rules = Stop { spp: file.spp, seconds: file.time, error: file.error };
-        if flags == Stop::default() { rules } else { flags }
+        let stop = if flags == Stop::default() { rules } else { flags };
+        if self.shard.is_some() && (stop.seconds.is_some() || stop.error.is_some()) {
+            let why = "the scene file stops by time or error, but shards must have the same samples";
+            return Err(Failure::new(format!("{}: {why}", self.scene.display())).advice("say --spp N"));
+        }
+        Ok(stop)
     }
 }

@@ -107,6 +107,7 @@ impl Shot {
             level: options.level(),
             stop,
             reference,
+            ..defaults
         })
     }
 

@@ -2,9 +2,10 @@
 //! lines for a person.
 
 use super::compare as comparing;
+use super::ledger;
 use super::values::{readable_bytes, readable_seconds};
 use halflight::compare::Comparison;
-use halflight::drive::{Against, Ending, ErrorEstimate, RenderResult, Round, Settings};
+use halflight::drive::{Against, Ending, ErrorEstimate, RenderResult, Round, Settings, Shard};
 use halflight_core::census::Census;
 use halflight_core::scene::Scene;
 use serde_json::{Map, Value, json};
@@ -29,7 +30,7 @@ impl Summary<'_> {
             plan.left_out().map(|(what, why)| json!({ "what": what, "why": why })).collect();
         let memory: Map<String, Value> =
             result.memory.iter().map(|part| (part.structure.into(), part.bytes.into())).collect();
-        let dropped = &result.counters.dropped;
+        let shard = settings.shard;
         json!({
             "method": plan.method,
             "width": settings.width,
@@ -55,27 +56,19 @@ impl Summary<'_> {
             "mean_radiance": result.image.mean(),
             "error": self.error(),
             "history": self.result.history.iter().map(round).collect::<Vec<_>>(),
-            "dropped": {
-                "nan": dropped.nan,
-                "infinite": dropped.infinite,
-                "negative": dropped.negative,
-                "unfinished": dropped.unfinished,
-            },
+            "dropped": ledger::object(&result.counters.dropped, &result.places, result.empty_pixels),
             "memory": memory,
             "memory_peak": result.memory_peak,
             "left_out": left_out,
             "outputs": self.outputs,
+            "checkpoint": settings.checkpoint.as_ref().map(|checkpoint| &checkpoint.path),
+            "shard": (shard != Shard::WHOLE).then(|| [shard.index + 1, shard.count]),
         })
     }
 
     /// Against the reference where there is one, else as estimated; then `estimate` has the estimate too.
     fn error(&self) -> Value {
-        let estimate = |against| match self.result.error {
-            Some(ErrorEstimate { relmse, lower, upper }) => {
-                json!({ "relmse": relmse, "interval": [lower, upper], "against": against })
-            }
-            None => json!({ "relmse": null, "interval": null, "against": against }),
-        };
+        let estimate = |against| estimate(self.result.error, against);
         let Some(comparison) = self.comparison else { return estimate("estimate") };
         let mut error = comparing::object(comparison);
         error["interval"] = Value::Null;
@@ -94,12 +87,7 @@ impl Summary<'_> {
         let (width, height, samples) =
             (settings.width, settings.height, plural(result.spp as usize, "sample"));
         lines.push(format!("image  {width}x{height}, {samples} per pixel{early}"));
-        lines.push(match result.error {
-            Some(ErrorEstimate { relmse, lower, upper }) => {
-                format!("error  relMSE {relmse:.3e} (95 %: {lower:.3e} to {upper:.3e}), estimated from its own noise")
-            }
-            None => "error  unknown: it takes four samples per pixel and some light".into(),
-        });
+        lines.push(estimate_text(result.error));
         if let Some(comparison) = self.comparison {
             lines.extend(comparing::text(comparison).lines().map(|line| format!("       {line}")));
         }
@@ -119,19 +107,30 @@ impl Summary<'_> {
             readable_bytes(result.memory.iter().map(|part| part.bytes).sum()),
             readable_bytes(result.memory_peak),
         ));
-        let dropped = &result.counters.dropped;
-        if dropped.total() > 0 {
-            lines.push(format!(
-                "dropped {} of {} samples: {} not a number, {} infinite, {} negative, {} unfinished",
-                dropped.total(),
-                result.counters.paths,
-                dropped.nan,
-                dropped.infinite,
-                dropped.negative,
-                dropped.unfinished
-            ));
-        }
+        lines.extend(ledger::text(&result.counters, &result.places, result.empty_pixels));
         lines.join("\n")
+    }
+}
+
+/// The object of an estimate.
+pub(super) fn estimate(error: Option<ErrorEstimate>, against: &str) -> Value {
+    match error {
+        Some(ErrorEstimate { relmse, lower, upper }) => {
+            json!({ "relmse": relmse, "interval": [lower, upper], "against": against })
+        }
+        None => json!({ "relmse": null, "interval": null, "against": against }),
+    }
+}
+
+/// The line of an estimate.
+pub(super) fn estimate_text(error: Option<ErrorEstimate>) -> String {
+    match error {
+        Some(ErrorEstimate { relmse, lower, upper }) => {
+            format!(
+                "error  relMSE {relmse:.3e} (95 %: {lower:.3e} to {upper:.3e}), estimated from its own noise"
+            )
+        }
+        None => "error  unknown: it takes four samples per pixel and some light".into(),
     }
 }
 
@@ -151,6 +150,6 @@ fn round(round: &Round) -> Value {
     object
 }
 
-fn plural(count: usize, noun: &str) -> String {
+pub(super) fn plural(count: usize, noun: &str) -> String {
     format!("{count} {noun}{}", if count == 1 { "" } else { "s" })
 }

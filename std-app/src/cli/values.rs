@@ -1,6 +1,7 @@
 //! Values of flags as people write them: `1,2,3`, `640x480`, `90s`, `512M`.
 
 use core::str::FromStr;
+use halflight::drive::Shard;
 use halflight_simd::Tier;
 
 /// Three numbers, `X,Y,Z`.
@@ -75,6 +76,16 @@ pub(super) fn tier(name: &str) -> Result<Tier, String> {
     Tier::named(name).ok_or(format!("the levels are {names}"))
 }
 
+/// A part of a picture: `I/N`, counted from 1.
+pub(super) fn shard(text: &str) -> Result<Shard, String> {
+    let numbers =
+        text.split_once('/').and_then(|(i, n)| Some((i.parse::<u32>().ok()?, n.parse::<u32>().ok()?)));
+    let (index, count) = numbers
+        .filter(|(index, count)| (1..=*count).contains(index))
+        .ok_or("a part of the whole is expected, as in 1/4, the first of four")?;
+    Ok(Shard { index: index - 1, count })
+}
+
 /// A number above 0.
 pub(super) fn positive(text: &str) -> Result<f64, String> {
     let number = finite(text)?;
@@ -135,6 +146,10 @@ mod tests {
             [512 << 20, 2 << 30, 1024, 77].map(Ok)
         );
         assert_eq!(lens("0.1,3"), Ok(Lens { radius: 0.1, distance: Some(3.0) }));
+        assert_eq!(
+            [shard("1/1"), shard("3/4")],
+            [(0, 1), (2, 4)].map(|(index, count)| Ok(Shard { index, count }))
+        );
         assert_eq!((degrees("40"), positive("0.01")), (Ok(40.0), Ok(0.01)));
     }
 
@@ -151,6 +166,9 @@ mod tests {
         }
         for text in ["", "M", "0", "-5M", "1Q", "0.5"] {
             assert!(bytes(text).is_err(), "{text}");
+        }
+        for text in ["", "0/4", "5/4", "4", "1/0", "-1/2", "a/b"] {
+            assert!(shard(text).is_err(), "{text}");
         }
         for text in ["0", "178", "-40", "wide"] {
             assert!(degrees(text).is_err(), "{text}");

@@ -17,7 +17,7 @@ pub struct Round {
     pub spp: u32,
     /// Rays of every kind.
     pub rays: u64,
-    /// The error as estimated.
+    /// The error as estimated; of the last round, and of each that has an eighth more samples than the last with it.
     pub error: Option<ErrorEstimate>,
     /// The error against the reference, where there is one.
     pub reference: Option<Against>,
@@ -63,15 +63,17 @@ impl<'a> Reference<'a> {
 pub(super) struct Clock {
     start: Instant,
     paused: Duration,
+    before: f64,
 }
 
 impl Clock {
-    pub(super) fn start() -> Self {
-        Self { start: Instant::now(), paused: Duration::ZERO }
+    /// `before` seconds were spent in earlier runs.
+    pub(super) fn start(before: f64) -> Self {
+        Self { start: Instant::now(), paused: Duration::ZERO, before }
     }
 
     pub(super) fn seconds(&self) -> f64 {
-        self.start.elapsed().saturating_sub(self.paused).as_secs_f64()
+        self.before + self.start.elapsed().saturating_sub(self.paused).as_secs_f64()
     }
 
     /// Runs `work` while the clock stands still.
@@ -89,7 +91,7 @@ mod tests {
 
     #[test]
     fn the_clock_stands_still_in_a_pause() {
-        let mut clock = Clock::start();
+        let mut clock = Clock::start(0.0);
         clock.pause(|| std::thread::sleep(Duration::from_millis(60)));
         assert!(clock.seconds() < 0.05);
     }

@@ -1,35 +1,39 @@
 //! Runs the core's passes: memory, threads, rounds, stop rules. [`render`] is all that a program needs.
 //!
 //! A picture is made in rounds; a round adds the same number of samples to every pixel. How the samples are
-//! cut into rounds, and how many threads there are, leaves the bits of the picture as they are.
+//! cut into rounds, and how many threads there are, leaves the bits of the picture as they are; so does an end in the
+//! middle, where the film is kept in a file and the render resumed from it.
 
+mod canvas;
+mod error;
+mod film_file;
 mod history;
+mod ledger;
 mod memory;
+mod merge;
 mod rounds;
+mod run;
 mod workers;
 
+pub use canvas::Shard;
+pub use error::{FilmError, RenderError};
+pub use film_file::check_writable as check_film_writable;
 pub use halflight_core::estimate::ErrorEstimate;
 pub use history::{Against, Round};
+pub use ledger::Place;
 pub use memory::MemoryUse;
+pub use merge::{Merged, merge};
 pub use rounds::Stop;
 
 use crate::save::Image;
-use core::sync::atomic::{AtomicBool, Ordering};
+use core::sync::atomic::AtomicBool;
 use halflight_core::Level;
-use halflight_core::bsdf::Features;
-use halflight_core::bvh::Bvh;
-use halflight_core::census::{Census, WithFeatures};
-use halflight_core::film::{Film, Pixel};
-use halflight_core::light::Lights;
-use halflight_core::memory::{Arena, Line, OutOfMemory};
+use halflight_core::census::Census;
+use halflight_core::film::Tile;
 use halflight_core::scene::Scene;
-use halflight_core::transport::{Counters, PathSettings, PathTracer, UNLIMITED, path::WAVE};
-use history::{Clock, Reference};
-use memory::Memory;
-use rounds::Rounds;
+use halflight_core::transport::Counters;
+use std::path::PathBuf;
 use std::sync::Arc;
-use std::time::Instant;
-use workers::Workers;
 
 /// How to render.
 #[derive(Clone, Debug)]
@@ -53,6 +57,26 @@ pub struct Settings {
     /// What the picture should be, of the same size: each round is compared with it, and the time that this
     /// takes does not count.
     pub reference: Option<Arc<Image>>,
+    /// Which part of the picture to render.
+    pub shard: Shard,
+    /// Where to keep the film while it grows.
+    pub checkpoint: Option<Checkpoint>,
+    /// A film to go on with: a checkpoint of the same picture.
+    pub resume: Option<PathBuf>,
+}
+
+/// A film file that is written every so often, and at the end. The time that this takes does not count.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Checkpoint {
+    /// The file.
+    pub path: PathBuf,
+    /// Seconds from one to the next.
+    pub every: f64,
+}
+
+impl Checkpoint {
+    /// Seconds between checkpoints where nothing else is asked for.
+    pub const EVERY: f64 = 60.0;
 }
 
 impl Default for Settings {
@@ -67,6 +91,9 @@ impl Default for Settings {
             level: Level::detect(),
             stop: Stop::default(),
             reference: None,
+            shard: Shard::WHOLE,
+            checkpoint: None,
+            resume: None,
         }
     }
 }
@@ -100,7 +127,7 @@ pub enum Ending {
 pub struct Seconds {
     /// Building the hierarchy and the light structures.
     pub build: f64,
-    /// Tracing paths, without the comparisons with a reference.
+    /// Tracing paths, before a resumption too; without comparisons with a reference and without checkpoints.
     pub render: f64,
 }
 
@@ -109,9 +136,9 @@ pub struct Seconds {
 pub struct RenderResult {
     /// The picture.
     pub image: Image,
-    /// Samples of each pixel (of the least sampled one after an interrupt).
+    /// Samples of each pixel; of the least sampled one where the last round was cut.
     pub spp: u32,
-    /// Rounds completed.
+    /// Rounds begun, those before a resumption included.
     pub rounds: u32,
     /// What was known after each of them.
     pub history: Vec<Round>,
@@ -125,6 +152,10 @@ pub struct RenderResult {
     pub seconds: Seconds,
     /// Paths, rays and dropped samples.
     pub counters: Counters,
+    /// Where samples were dropped, the worst first.
+    pub places: Vec<Place>,
+    /// Pixels that are black because all of their samples were dropped.
+    pub empty_pixels: u64,
     /// The error, estimated from the two half-films; `None` for fewer than four samples, and for a black picture.
     pub error: Option<ErrorEstimate>,
     /// Bytes of each structure, while paths are traced.
@@ -133,45 +164,6 @@ pub struct RenderResult {
     pub memory_peak: usize,
     /// Why rendering ended.
     pub ending: Ending,
-}
-
-/// Why there is no picture.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum RenderError {
-    /// The picture has no pixels, or more than can be counted.
-    Size,
-    /// The reference has another size.
-    Reference,
-    /// The memory allowed does not suffice.
-    Memory {
-        /// Bytes that are needed.
-        needed: usize,
-        /// Bytes that were allowed, or that the system gave.
-        available: usize,
-    },
-    /// The threads could not be started.
-    Threads(String),
-}
-
-impl core::fmt::Display for RenderError {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        match self {
-            Self::Size => write!(f, "the picture must have between 1 and 2^28 pixels"),
-            Self::Reference => write!(f, "the reference has not the size of the picture"),
-            Self::Memory { needed, available } => {
-                write!(f, "not enough memory: {needed} bytes needed, {available} available")
-            }
-            Self::Threads(why) => write!(f, "the threads could not be started: {why}"),
-        }
-    }
-}
-
-impl core::error::Error for RenderError {}
-
-impl From<OutOfMemory> for RenderError {
-    fn from(error: OutOfMemory) -> Self {
-        Self::Memory { needed: error.needed, available: error.available }
-    }
 }
 
 /// Pixels that a picture may have.
@@ -193,115 +185,10 @@ pub fn render(
     if settings.reference.as_ref().is_some_and(|reference| [reference.width, reference.height] != size) {
         return Err(RenderError::Reference);
     }
-    let plan = Census::of(scene).plan();
-    plan.features.dispatch(Render { scene, settings, progress, interrupt })
-}
-
-/// A render to be compiled for the features of its scene.
-struct Render<'a> {
-    scene: &'a Scene<'a>,
-    settings: &'a Settings,
-    progress: &'a mut dyn FnMut(&Progress),
-    interrupt: &'a AtomicBool,
-}
-
-impl WithFeatures for Render<'_> {
-    type Out = Result<RenderResult, RenderError>;
-
-    fn run<F: Features>(self) -> Self::Out {
-        let Render { scene, settings, progress, interrupt } = self;
-        let (width, height) = (settings.width, settings.height);
-        let workers = Workers::new(settings.threads)?;
-        let mut memory = Memory::new(scene, settings.memory);
-
-        let build_start = Instant::now();
-        // First, for the working memory of its build is free again for the others.
-        let mut bvh_lines = Vec::new();
-        let bvh = build_bvh(scene, &workers, &mut memory, &mut bvh_lines)?;
-        let mut film_lines = memory.take("film", Film::footprint(width, height))?;
-        let scratch = PathTracer::<F>::scratch(WAVE);
-        let mut scratch_lines =
-            (0..workers.count()).map(|_| memory.take("paths", scratch)).collect::<Result<Vec<_>, _>>()?;
-        let mut lights_lines = memory.take("lights", Lights::footprint(scene).and(Lights::scratch(scene)))?;
-        let lights = Lights::build(scene, &mut Arena::new(bytemuck::cast_slice_mut(&mut lights_lines)))?;
-        let build = build_start.elapsed().as_secs_f64();
-
-        let mut film = Film::new(width, height, &mut Arena::new(bytemuck::cast_slice_mut(&mut film_lines)))?;
-        let max_depth = settings.max_depth.unwrap_or(UNLIMITED);
-        let path_settings = PathSettings { width, height, seed: settings.seed, max_depth };
-        let tracer = PathTracer::<F>::new(scene, &bvh, &lights, path_settings, settings.level);
-
-        let mut clock = Clock::start();
-        let mut rounds = Rounds::new(settings.stop);
-        let mut counters = Counters::default();
-        let mut history = Vec::<Round>::new();
-        let mut reference = settings.reference.as_deref().map(Reference::new);
-        let mut error = None;
-        while let Some(samples) = rounds.next(clock.seconds(), error) {
-            // The first round is finished whatever happens, so that every pixel has something to show.
-            let first = samples.start == 0;
-            let heeded = if first { &AtomicBool::new(false) } else { interrupt };
-            counters += workers.run(&tracer, samples.clone(), &mut film, &mut scratch_lines, heeded)?;
-            if interrupt.load(Ordering::Relaxed) && !first {
-                break;
-            }
-            rounds.completed(samples, clock.seconds());
-            error = workers.estimate(&film);
-            let seconds = clock.seconds();
-            let against = reference.as_mut().map(|r| clock.pause(|| r.compare(&image(&film), seconds)));
-            let (spp, rays) = (rounds.spp(), counters.rays + counters.shadow_rays);
-            history.push(Round { seconds, spp, rays, error, reference: against });
-            progress(&Progress {
-                seconds,
-                seconds_left: rounds.seconds_left(seconds, error),
-                spp,
-                rounds: rounds.count(),
-                error,
-            });
-        }
-        let interrupted = interrupt.load(Ordering::Relaxed);
-        let render = clock.seconds();
-        Ok(RenderResult {
-            image: image(&film),
-            spp: rounds.spp(),
-            rounds: rounds.count(),
-            history,
-            variance: map(&film, |pixel| pixel.variance().to_array()),
-            samples: by_rows(&film).map(|pixel| pixel.count()).collect(),
-            threads: workers.count(),
-            seconds: Seconds { build, render },
-            counters,
-            error: workers.estimate(&film),
-            memory: memory.uses(),
-            memory_peak: memory.peak(),
-            ending: if interrupted { Ending::Interrupted } else { Ending::Done },
-        })
+    let Shard { index, count } = settings.shard;
+    if index >= count || count as usize > Tile::count(settings.width, settings.height) {
+        return Err(RenderError::Shard);
     }
-}
-
-/// The hierarchy, built on all cores, then moved out of the working memory of its build into `lines`.
-fn build_bvh<'m>(
-    scene: &Scene,
-    workers: &Workers,
-    memory: &mut Memory,
-    lines: &'m mut Vec<Line>,
-) -> Result<Bvh<'m>, RenderError> {
-    let mut working = memory.take("bvh build", Bvh::footprint(scene.mesh.triangles.len()))?;
-    let built = workers.build_bvh(&scene.mesh, &mut Arena::new(bytemuck::cast_slice_mut(&mut working)))?;
-    *lines = memory.take("bvh", built.used())?;
-    let bvh = built.copied(&mut Arena::new(bytemuck::cast_slice_mut(lines)))?;
-    memory.give_back("bvh build");
-    Ok(bvh)
-}
-
-fn image(film: &Film) -> Image {
-    map(film, |pixel| pixel.mean().to_array())
-}
-
-fn map(film: &Film, value: impl Fn(Pixel) -> [f32; 3]) -> Image {
-    Image { width: film.width(), height: film.height(), pixels: by_rows(film).map(value).collect() }
-}
-
-fn by_rows(film: &Film) -> impl Iterator<Item = Pixel> {
-    (0..film.height()).flat_map(move |y| (0..film.width()).map(move |x| film.pixel(x, y)))
+    let plan = Census::of(scene).plan();
+    plan.features.dispatch(run::Render { scene, settings, method: plan.method, progress, interrupt })
 }

@@ -1,7 +1,7 @@
 //! The threads: each takes the next tile when it is done with one, and has working memory of its own.
 
 use super::RenderError;
-use core::ops::Range;
+use super::canvas::Canvas;
 use core::sync::atomic::{AtomicBool, Ordering};
 use halflight_core::bsdf::Features;
 use halflight_core::bvh::{Bvh, Join};
@@ -13,6 +13,7 @@ use halflight_core::transport::{Counters, PathTracer, path::WAVE};
 use rayon::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use std::sync::Mutex;
+use std::time::Instant;
 
 /// A pool of threads.
 pub(super) struct Workers {
@@ -53,43 +54,99 @@ impl Workers {
         })
     }
 
-    /// One round: `samples` of every pixel. When `interrupt` is raised, tiles not yet begun are left out.
+    /// One round: every tile of `canvas` is brought to `round.target` samples, unless the round is cut.
     pub(super) fn run<F: Features>(
         &self,
         tracer: &PathTracer<F>,
-        samples: Range<u32>,
-        film: &mut Film,
+        round: &Round,
+        canvas: &mut Canvas,
         scratch: &mut [Vec<Line>],
-        interrupt: &AtomicBool,
-    ) -> Result<Counters, OutOfMemory> {
-        let tiles = Mutex::new(film.pixels_mut().chunks_mut(PIXELS_PER_TILE).enumerate());
-        let total = Mutex::new(Ok(Counters::default()));
+    ) -> Result<(), OutOfMemory> {
+        let shard = canvas.shard;
+        let tiles = canvas.film.pixels_mut().chunks_mut(PIXELS_PER_TILE).zip(&mut canvas.taken).enumerate();
+        let open = tiles.filter(|(task, (_, taken))| shard.owns(*task) && **taken < round.target);
+        let queue = Mutex::new(scattered(open.collect()));
+        let done = Mutex::new(Ok((&mut canvas.counters, &mut canvas.ledger)));
         self.pool.scope(|scope| {
             for lines in scratch {
                 scope.spawn(|_| {
                     let mut arena = Arena::new(bytemuck::cast_slice_mut(lines));
                     let mut counters = Counters::default();
-                    while !interrupt.load(Ordering::Relaxed) {
-                        let next = tiles.lock().ok().and_then(|mut tiles| tiles.next());
-                        let Some((task, pixels)) = next else { break };
-                        match tracer.run(task, samples.clone(), WAVE, &mut arena, pixels) {
-                            Ok(done) => counters += done,
-                            Err(error) => {
-                                store(&total, |total| *total = Err(error));
-                                return;
+                    let mut dropped = Vec::new();
+                    let mut result = Ok(());
+                    'tiles: while let Some((task, (pixels, taken))) = next(&queue) {
+                        while *taken < round.target {
+                            if round.is_over() {
+                                break 'tiles;
                             }
+                            let end = taken.saturating_add(round.step).min(round.target);
+                            match tracer.run(task, *taken..end, WAVE, &mut arena, pixels) {
+                                Ok(more) => {
+                                    counters += more;
+                                    dropped.push((task, more.dropped));
+                                }
+                                Err(error) => {
+                                    result = Err(error);
+                                    break 'tiles;
+                                }
+                            }
+                            *taken = end;
                         }
+                        dropped.retain(|(_, dropped)| dropped.total() > 0);
                     }
-                    store(&total, |total| {
-                        if let Ok(total) = total {
-                            *total += counters;
-                        }
-                    });
+                    let mut done = done.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
+                    if let Ok((total, ledger)) = &mut *done {
+                        **total += counters;
+                        dropped.into_iter().for_each(|(task, dropped)| ledger.add(task, dropped));
+                    }
+                    if let Err(error) = result {
+                        *done = Err(error);
+                    }
                 });
             }
         });
-        total.into_inner().unwrap_or_else(|poisoned| poisoned.into_inner())
+        done.into_inner().unwrap_or_else(|poisoned| poisoned.into_inner()).map(|_| ())
     }
+}
+
+/// What one round does.
+pub(super) struct Round<'a> {
+    /// Samples that each pixel has in the end.
+    pub(super) target: u32,
+    /// Samples after which a thread looks at the clock, and at the flag.
+    pub(super) step: u32,
+    /// When it is cut.
+    pub(super) deadline: Option<Instant>,
+    /// Cuts it when raised.
+    pub(super) interrupt: Option<&'a AtomicBool>,
+}
+
+impl Round<'_> {
+    fn is_over(&self) -> bool {
+        self.interrupt.is_some_and(|flag| flag.load(Ordering::Relaxed))
+            || self.deadline.is_some_and(|deadline| Instant::now() >= deadline)
+    }
+}
+
+fn next<T>(queue: &Mutex<Vec<T>>) -> Option<T> {
+    queue.lock().unwrap_or_else(|poisoned| poisoned.into_inner()).pop()
+}
+
+/// The items in an order that jumps about by the golden ratio, so that tiles that a cut round has reached lie all over
+/// the picture.
+fn scattered<T>(items: Vec<T>) -> Vec<T> {
+    let count = items.len();
+    let mut step = (count as f64 * 0.618_034) as usize;
+    while step > 1 && greatest_common_divisor(step, count) > 1 {
+        step -= 1;
+    }
+    let step = step.max(1);
+    let mut items: Vec<Option<T>> = items.into_iter().map(Some).collect();
+    (0..count).filter_map(|i| items[(i as u64 * step as u64 % count as u64) as usize].take()).collect()
+}
+
+fn greatest_common_divisor(a: usize, b: usize) -> usize {
+    if b == 0 { a } else { greatest_common_divisor(b, a % b) }
 }
 
 /// Forks on the pool that runs it.
@@ -99,12 +156,6 @@ impl Join for Fork {
     fn join(&self, a: impl FnOnce() + Send, b: impl FnOnce() + Send) {
         rayon::join(a, b);
     }
-}
-
-type Total = Result<Counters, OutOfMemory>;
-
-fn store(total: &Mutex<Total>, change: impl FnOnce(&mut Total)) {
-    change(&mut total.lock().unwrap_or_else(|poisoned| poisoned.into_inner()));
 }
 
 #[cfg(test)]
@@ -127,6 +178,15 @@ mod tests {
         let mut kept = vec![Line([0; 64]); bvh.used().bytes() / 64];
         bvh.copied(&mut Arena::new(bytemuck::cast_slice_mut(&mut kept))).unwrap();
         bytemuck::cast_slice(&kept).to_vec()
+    }
+
+    #[test]
+    fn scattering_keeps_every_item() {
+        for count in [0, 1, 2, 3, 12, 1000] {
+            let mut items = scattered((0..count).collect::<Vec<u32>>());
+            items.sort_unstable();
+            assert_eq!(items, (0..count).collect::<Vec<u32>>());
+        }
     }
 
     #[test]

@@ -1,0 +1,70 @@
+//! `halflight merge`: the films of shards, put together to a picture.
+
+use super::failure::Failure;
+use super::summary::{estimate, estimate_text};
+use super::{ledger, say};
+use clap::Args;
+use halflight::drive::{self, Merged};
+use halflight::save;
+use serde_json::{Value, json};
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+/// Merge the films of all shards of a picture
+///
+/// The films are those of `halflight render --shard I/N --checkpoint FILE`, in any order. The picture has the same
+/// bits as one render. Films of other scenes, settings or numbers of samples are refused.
+#[derive(Args)]
+pub(super) struct Merge {
+    /// The films: one of each shard
+    #[arg(required = true)]
+    films: Vec<PathBuf>,
+    /// Where the picture goes (.png, .exr, .hdr or .pfm); may be given several times
+    #[arg(short, long, value_name = "FILE", required = true)]
+    output: Vec<PathBuf>,
+    /// Print one JSON object instead of text
+    #[arg(long)]
+    json: bool,
+}
+
+impl Merge {
+    pub(super) fn run(&self) -> Result<ExitCode, Failure> {
+        for output in &self.output {
+            save::check_writable(output)?;
+        }
+        let merged = drive::merge(&self.films)?;
+        for output in &self.output {
+            save::write(output, &merged.image)?;
+        }
+        say(&if self.json { self.object(&merged).to_string() } else { self.text(&merged) });
+        Ok(ExitCode::SUCCESS)
+    }
+
+    fn object(&self, merged: &Merged) -> Value {
+        let counters = &merged.counters;
+        json!({
+            "width": merged.image.width,
+            "height": merged.image.height,
+            "shards": self.films.len(),
+            "spp": merged.spp,
+            "seconds": { "render": merged.seconds },
+            "rays": counters.rays + counters.shadow_rays,
+            "shadow_rays": counters.shadow_rays,
+            "paths": counters.paths,
+            "mean_radiance": merged.image.mean(),
+            "error": estimate(merged.error, "estimate"),
+            "dropped": ledger::object(&counters.dropped, &merged.places, merged.empty_pixels),
+            "outputs": self.output,
+        })
+    }
+
+    fn text(&self, merged: &Merged) -> String {
+        let saved = |output: &PathBuf| format!("saved  {}", output.display());
+        let mut lines: Vec<String> = self.output.iter().map(saved).collect();
+        let (width, height) = (merged.image.width, merged.image.height);
+        lines.push(format!("image  {width}x{height}, {} samples per pixel", merged.spp));
+        lines.push(estimate_text(merged.error));
+        lines.extend(ledger::text(&merged.counters, &merged.places, merged.empty_pixels));
+        lines.join("\n")
+    }
+}

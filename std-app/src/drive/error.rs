@@ -1,0 +1,88 @@
+//! Why there is no picture.
+
+use halflight_core::memory::OutOfMemory;
+use std::io;
+use std::path::{Path, PathBuf};
+
+/// Why there is no picture.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum RenderError {
+    /// The picture has no pixels, or more than can be counted.
+    Size,
+    /// The reference has another size.
+    Reference,
+    /// The memory allowed does not suffice.
+    Memory {
+        /// Bytes that are needed.
+        needed: usize,
+        /// Bytes that were allowed, or that the system gave.
+        available: usize,
+    },
+    /// The threads could not be started.
+    Threads(String),
+    /// There are not as many tiles as shards, or no such shard.
+    Shard,
+    /// A film file cannot be used.
+    Film(FilmError),
+}
+
+impl core::fmt::Display for RenderError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self {
+            Self::Size => write!(f, "the picture must have between 1 and 2^28 pixels"),
+            Self::Reference => write!(f, "the reference has not the size of the picture"),
+            Self::Memory { needed, available } => {
+                write!(f, "not enough memory: {needed} bytes needed, {available} available")
+            }
+            Self::Threads(why) => write!(f, "the threads could not be started: {why}"),
+            Self::Shard => write!(f, "the picture cannot be cut into so many shards"),
+            Self::Film(error) => error.fmt(f),
+        }
+    }
+}
+
+impl core::error::Error for RenderError {}
+
+impl From<OutOfMemory> for RenderError {
+    fn from(error: OutOfMemory) -> Self {
+        Self::Memory { needed: error.needed, available: error.available }
+    }
+}
+
+impl From<FilmError> for RenderError {
+    fn from(error: FilmError) -> Self {
+        Self::Film(error)
+    }
+}
+
+/// A film file that cannot be read, written, continued or merged, and why.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct FilmError {
+    file: PathBuf,
+    reason: String,
+}
+
+impl FilmError {
+    pub(super) fn new(file: &Path, reason: impl Into<String>) -> Self {
+        Self { file: file.to_owned(), reason: reason.into() }
+    }
+
+    /// An error of reading.
+    pub(super) fn io(file: &Path, error: &io::Error) -> Self {
+        let reason = match error.kind() {
+            io::ErrorKind::NotFound => "no such file".into(),
+            io::ErrorKind::PermissionDenied => "permission denied".into(),
+            io::ErrorKind::UnexpectedEof => "is damaged: it is too short".into(),
+            _ => error.to_string(),
+        };
+        Self::new(file, reason)
+    }
+}
+
+impl core::fmt::Display for FilmError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        write!(f, "{}: {}", self.file.display(), self.reason)
+    }
+}
+
+impl core::error::Error for FilmError {}

@@ -1,0 +1,99 @@
+//! The header of a film file: one JSON object, which a person can read with `head -c`.
+
+use super::identity::Identity;
+use crate::drive::canvas::{Canvas, Shard};
+use crate::drive::ledger::Ledger;
+use crate::drive::rounds::{Estimates, Rounds};
+use crate::drive::{ErrorEstimate, Round};
+use halflight_core::film::Dropped;
+use halflight_core::transport::Counters;
+use serde::{Deserialize, Serialize};
+
+/// What is known of a film beside its pixels.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(in crate::drive) struct Header {
+    pub(super) identity: Identity,
+    /// Which of how many, counted from 1.
+    shard: [u32; 2],
+    pub(in crate::drive) spp: u32,
+    pub(in crate::drive) rounds: u32,
+    pub(in crate::drive) estimates: Estimates,
+    pub(in crate::drive) seconds: f64,
+    paths: u64,
+    rays: u64,
+    shadow_rays: u64,
+    dropped: Causes,
+    /// Tiles and what they dropped.
+    ledger: Vec<(u32, Causes)>,
+    history: Vec<Entry>,
+}
+
+/// Not a number, infinite, negative, unfinished.
+type Causes = [u64; 4];
+
+/// A round: seconds, samples, rays, and the estimated error with its interval.
+type Entry = (f64, u32, u64, Option<[f64; 3]>);
+
+impl Header {
+    pub(in crate::drive) fn new(
+        identity: Identity,
+        canvas: &Canvas,
+        rounds: &Rounds,
+        seconds: f64,
+        history: &[Round],
+    ) -> Self {
+        let Canvas { shard, counters, ledger, .. } = canvas;
+        let error = |e: ErrorEstimate| [e.relmse, e.lower, e.upper];
+        Self {
+            identity,
+            shard: [shard.index + 1, shard.count],
+            spp: canvas.spp(),
+            rounds: rounds.count(),
+            estimates: rounds.estimates(),
+            seconds,
+            paths: counters.paths,
+            rays: counters.rays,
+            shadow_rays: counters.shadow_rays,
+            dropped: causes(counters.dropped),
+            ledger: ledger.tiles().map(|(task, dropped)| (task, causes(dropped))).collect(),
+            history: history.iter().map(|r| (r.seconds, r.spp, r.rays, r.error.map(error))).collect(),
+        }
+    }
+
+    /// Pixels across and down.
+    pub(in crate::drive) fn size(&self) -> [u32; 2] {
+        [self.identity.width, self.identity.height]
+    }
+
+    pub(in crate::drive) fn shard(&self) -> Shard {
+        Shard { index: self.shard[0].wrapping_sub(1), count: self.shard[1] }
+    }
+
+    pub(in crate::drive) fn counters(&self) -> Counters {
+        let dropped = dropped(self.dropped);
+        Counters { paths: self.paths, rays: self.rays, shadow_rays: self.shadow_rays, dropped }
+    }
+
+    pub(in crate::drive) fn ledger(&self) -> Ledger {
+        let mut ledger = Ledger::default();
+        self.ledger.iter().for_each(|(task, causes)| ledger.add(*task as usize, dropped(*causes)));
+        ledger
+    }
+
+    pub(in crate::drive) fn history(&self) -> Vec<Round> {
+        let error = |[relmse, lower, upper]: [f64; 3]| ErrorEstimate { relmse, lower, upper };
+        let round = |&(seconds, spp, rays, estimate): &Entry| {
+            let error = estimate.map(error);
+            Round { seconds, spp, rays, error, reference: None }
+        };
+        self.history.iter().map(round).collect()
+    }
+}
+
+fn causes(dropped: Dropped) -> Causes {
+    [dropped.nan, dropped.infinite, dropped.negative, dropped.unfinished]
+}
+
+fn dropped([nan, infinite, negative, unfinished]: Causes) -> Dropped {
+    Dropped { nan, infinite, negative, unfinished }
+}

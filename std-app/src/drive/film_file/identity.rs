@@ -1,0 +1,97 @@
+//! Which picture a film is of: films can be continued and merged only where all of this is the same.
+
+use super::hash::Hash;
+use halflight_core::camera::Camera;
+use halflight_core::scene::{Scene, Texels};
+use halflight_core::transport::PathSettings;
+use serde::{Deserialize, Serialize};
+
+/// All that the bits of a film follow from, but the samples.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub(in crate::drive) struct Identity {
+    /// Of the program.
+    version: String,
+    method: String,
+    pub(super) width: u32,
+    pub(super) height: u32,
+    seed: u32,
+    max_depth: Option<u32>,
+    /// Everything that the method is told.
+    settings: String,
+    /// Fingerprint of all that is in the scene.
+    scene: String,
+    camera: String,
+}
+
+impl Identity {
+    pub(in crate::drive) fn of(
+        scene: &Scene,
+        method: &str,
+        settings: &PathSettings,
+        max_depth: Option<u32>,
+    ) -> Self {
+        Self {
+            version: env!("CARGO_PKG_VERSION").into(),
+            method: method.into(),
+            width: settings.width,
+            height: settings.height,
+            seed: settings.seed,
+            max_depth,
+            settings: format!("{settings:?}"),
+            scene: format!("{:016x}", fingerprint(scene)),
+            camera: camera(&scene.camera),
+        }
+    }
+
+    /// In what `self`, that of a film, is not `other`, in words.
+    pub(super) fn difference(&self, other: &Self) -> Option<String> {
+        let depth = |depth: Option<u32>| depth.map_or("no limit of".into(), |depth| depth.to_string());
+        let size = |identity: &Self| format!("{}x{} pixels", identity.width, identity.height);
+        let said =
+            |what: &str, of: String, is: String| (of != is).then(|| format!("of {what}{of}, not {is}"));
+        said("version ", self.version.clone(), other.version.clone())
+            .or(said("method ", self.method.clone(), other.method.clone()))
+            .or(said("", size(self), size(other)))
+            .or(said("seed ", self.seed.to_string(), other.seed.to_string()))
+            .or(said("max-depth ", depth(self.max_depth), depth(other.max_depth)))
+            .or((self.scene != other.scene)
+                .then(|| "of another scene, or the scene has changed since".into()))
+            .or((self.camera != other.camera).then(|| "seen by another camera".into()))
+            .or(said("settings ", self.settings.clone(), other.settings.clone()))
+    }
+}
+
+/// Debug formatting tells floats apart to the last bit.
+fn camera(camera: &Camera) -> String {
+    let mut hash = Hash::default();
+    hash.section(format!("{camera:?}").as_bytes());
+    format!("{:016x}", hash.value())
+}
+
+fn fingerprint(scene: &Scene) -> u64 {
+    let mut hash = Hash::default();
+    let mesh = &scene.mesh;
+    hash.section(bytemuck::cast_slice(mesh.positions));
+    hash.section(bytemuck::cast_slice(mesh.normals));
+    hash.section(bytemuck::cast_slice(mesh.texcoords));
+    hash.section(bytemuck::cast_slice(mesh.triangles));
+    for material in scene.materials {
+        hash.section(format!("{material:?}").as_bytes());
+    }
+    for texture in scene.textures {
+        hash.section(format!("{} {} {:?}", texture.width, texture.height, texture.wrap).as_bytes());
+        match texture.texels {
+            Texels::Srgb8(texels) => hash.section(bytemuck::cast_slice(texels)),
+            Texels::Linear8(texels) => {
+                hash.section(b"linear");
+                hash.section(bytemuck::cast_slice(texels));
+            }
+            Texels::Float(texels) => {
+                hash.section(b"float");
+                hash.section(bytemuck::cast_slice(texels));
+            }
+        }
+    }
+    hash.section(format!("{:?} {:?}", scene.lights, scene.environment).as_bytes());
+    hash.value()
+}

@@ -1,0 +1,76 @@
+//! Shards of one picture put together: the same bits as one render.
+
+use super::ErrorEstimate;
+use super::canvas::{Canvas, Shard};
+use super::error::{FilmError, RenderError};
+use super::film_file::Reader;
+use super::ledger::{Place, empty_pixels};
+use super::run::image;
+use super::workers::Workers;
+use crate::save::Image;
+use halflight_core::film::Film;
+use halflight_core::memory::{ALIGNMENT, Arena, Line};
+use halflight_core::transport::Counters;
+use std::path::PathBuf;
+
+/// A picture from shards, and what is known of it.
+#[derive(Clone, Debug)]
+pub struct Merged {
+    /// The picture.
+    pub image: Image,
+    /// Samples of each pixel.
+    pub spp: u32,
+    /// Seconds of rendering of all shards together.
+    pub seconds: f64,
+    /// Paths, rays and dropped samples.
+    pub counters: Counters,
+    /// Where samples were dropped, the worst first.
+    pub places: Vec<Place>,
+    /// Pixels that are black because all of their samples were dropped.
+    pub empty_pixels: u64,
+    /// The error, estimated from the two half-films.
+    pub error: Option<ErrorEstimate>,
+}
+
+/// Merges the films in `files`, in any order.
+///
+/// # Errors
+/// Names the file that does not belong to the first one and why, or the shards that are missing or there twice.
+pub fn merge(files: &[PathBuf]) -> Result<Merged, RenderError> {
+    let films = files.iter().map(|file| Reader::open(file)).collect::<Result<Vec<_>, _>>()?;
+    let (Some(first), Some(name)) = (films.first(), files.first()) else { return Err(RenderError::Shard) };
+    films.iter().try_for_each(|film| film.check_sibling(first))?;
+    let count = first.header.shard().count;
+    for index in 0..count {
+        let found = films.iter().filter(|film| film.header.shard().index == index).count();
+        if found != 1 {
+            let how = if found == 0 { "missing" } else { "there more than once" };
+            let reason = format!("is one of {count} shards, of which shard {}/{count} is {how}", index + 1);
+            return Err(FilmError::new(name, reason).into());
+        }
+    }
+
+    let [width, height] = first.header.size();
+    let spp = first.header.spp;
+    let mut lines = Vec::new();
+    let needed = Film::footprint(width, height).bytes();
+    let count = needed.div_ceil(ALIGNMENT);
+    lines.try_reserve_exact(count).map_err(|_| RenderError::Memory { needed, available: 0 })?;
+    lines.resize(count, Line([0; ALIGNMENT]));
+    let film = Film::new(width, height, &mut Arena::new(bytemuck::cast_slice_mut(&mut lines)))?;
+    let mut canvas = Canvas::new(film, Shard::WHOLE);
+    let mut seconds = 0.0;
+    for film in films {
+        seconds += film.header.seconds;
+        film.read_into(&mut canvas)?;
+    }
+    Ok(Merged {
+        image: image(&canvas.film),
+        spp,
+        seconds,
+        counters: canvas.counters,
+        places: canvas.ledger.places(width, height),
+        empty_pixels: empty_pixels(&canvas.film, |_| true),
+        error: Workers::new(None)?.estimate(&canvas.film),
+    })
+}

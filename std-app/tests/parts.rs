@@ -1,0 +1,196 @@
+//! Renders in parts: killed and resumed, cut into shards and merged; the same bits, or a refusal with a reason.
+//! And renders that end by time or error.
+
+mod support;
+
+use core::time::Duration;
+use halflight::save::read;
+use serde_json::Value;
+use std::fs;
+use std::process::Stdio;
+use std::time::Instant;
+use support::Folder;
+
+/// Seconds by which a render may be late: a fiftieth, or this. More than the 50 ms of an idle machine, for tests run on
+/// machines that do other things.
+const LATE: f64 = 0.25;
+
+/// Times that a render is killed.
+const KILLS: u32 = 50;
+
+/// Kills a render again and again, each time resuming from the last checkpoint.
+#[test]
+fn a_render_killed_fifty_times_gives_the_same_bits() {
+    let folder = Folder::new("killed");
+    let render = "render scene.obj --size 40x56 --spp 700 --seed 3 -o";
+    folder.object(&format!("{render} whole.pfm --json"));
+    let whole = fs::read(folder.path("whole.pfm")).unwrap();
+
+    let mut random = 1u32;
+    let (mut kills, mut resumed, mut finished) = (0, 0, 0);
+    while kills < KILLS || finished == 0 {
+        let resume = if folder.path("film").exists() { "--resume film" } else { "" };
+        let arguments = format!("{render} parts.pfm --checkpoint film --checkpoint-every 1ms {resume}");
+        let mut child =
+            folder.command(&arguments).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
+        if kills < KILLS {
+            random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            std::thread::sleep(Duration::from_micros(u64::from(5_000 + random % 90_000)));
+            let _ = child.kill();
+        }
+        let status = child.wait().unwrap();
+        if status.success() {
+            assert!(fs::read(folder.path("parts.pfm")).unwrap() == whole, "after {kills} kills");
+            fs::remove_file(folder.path("film")).unwrap();
+            finished += 1;
+        } else {
+            assert_eq!(status.code(), None, "killed, not refused");
+            kills += 1;
+            resumed += u32::from(!resume.is_empty());
+        }
+    }
+    println!("{kills} kills, {resumed} of them of resumed renders, {finished} renders finished");
+    assert!(resumed > KILLS / 4, "{resumed} of {kills}");
+}
+
+#[test]
+fn a_finished_film_goes_on_to_more_samples() {
+    let folder = Folder::new("more");
+    folder.object("render scene.obj --size 33x20 --spp 40 -o whole.pfm --json");
+    let first = folder.object("render scene.obj --size 33x20 --spp 13 -o a.pfm --checkpoint film --json");
+    let second = folder.object("render scene.obj --size 33x20 --spp 40 -o b.pfm --resume film --json");
+    assert!(fs::read(folder.path("whole.pfm")).unwrap() == fs::read(folder.path("b.pfm")).unwrap());
+    assert_eq!((first["paths"].as_u64(), second["paths"].as_u64()), (Some(33 * 20 * 13), Some(33 * 20 * 40)));
+    let render = |object: &Value| object["seconds"]["render"].as_f64().unwrap();
+    assert!(render(&second) > render(&first), "the time before counts");
+    // Nothing to do: the picture of the film.
+    let same = folder.object("render scene.obj --size 33x20 --spp 5 -o c.pfm --resume film --json");
+    assert_eq!(same["spp"], 13);
+    assert!(fs::read(folder.path("a.pfm")).unwrap() == fs::read(folder.path("c.pfm")).unwrap());
+}
+
+#[test]
+fn shards_merge_to_the_bits_of_one_render() {
+    let folder = Folder::new("shards");
+    let render = "render scene.obj --size 70x50 --spp 12 --json";
+    let whole = folder.object(&format!("{render} -o whole.exr"));
+    for shard in 1..=3 {
+        folder.object(&format!("{render} --shard {shard}/3 --checkpoint {shard}.film"));
+    }
+    let merged = folder.object("merge 3.film 1.film 2.film -o merged.exr --json");
+    assert_eq!(read(&folder.path("whole.exr")).unwrap(), read(&folder.path("merged.exr")).unwrap());
+    for key in ["spp", "rays", "shadow_rays", "paths", "mean_radiance", "error"] {
+        assert_eq!(whole[key], merged[key], "{key}");
+    }
+
+    folder.object(&format!("{render} --seed 9 --shard 2/3 --checkpoint seed.film"));
+    folder.object(&format!("{render} --shard 2/4 --checkpoint four.film"));
+    folder.object("render scene.obj --size 70x50 --spp 11 --shard 2/3 --checkpoint few.film --json");
+    for (films, reason) in [
+        ("1.film 2.film", "shard 3/3 is missing"),
+        ("1.film 2.film 2.film 3.film", "shard 2/3 is there more than once"),
+        ("1.film seed.film 3.film", "seed.film: does not belong to 1.film: it is a film of seed 9, not 0"),
+        ("1.film four.film 3.film", "one of 4 shards, not of 3"),
+        ("1.film few.film 3.film", "a film of 11 samples, not of 12"),
+        ("1.film scene.obj", "scene.obj: is no film file"),
+    ] {
+        let said = folder.refused(&format!("merge {films} -o no.png"));
+        assert!(said.contains(reason), "{films}: {said}");
+    }
+    assert!(!folder.path("no.png").exists());
+    let said = folder.refused(&format!("{render} --shard 9/99 --checkpoint no.film"));
+    assert!(said.contains("so many shards"), "{said}");
+}
+
+#[test]
+fn a_film_of_something_else_is_refused_with_the_reason() {
+    let folder = Folder::new("else");
+    folder.object("render scene.obj --size 20x20 --spp 4 -o a.png --checkpoint film --json");
+    let resume = "render scene.obj --spp 8 -o b.png --size 20x20 --resume";
+    for (more, reason) in [
+        ("film --seed 1", "a film of seed 0, not 1"),
+        ("film --max-depth 3", "a film of max-depth no limit of, not 3"),
+        ("film --fov 12", "seen by another camera"),
+        ("missing", "missing: no such file"),
+    ] {
+        let said = folder.refused(&format!("{resume} {more}"));
+        assert!(said.contains(reason), "{more}: {said}");
+    }
+    let said = folder.refused("render scene.obj --spp 8 -o b.png --size 20x21 --resume film");
+    assert!(said.contains("a film of 20x20 pixels, not 20x21 pixels"), "{said}");
+    let whole = fs::read(folder.path("film")).unwrap();
+    for (name, bytes, reason) in [
+        ("short", whole[..whole.len() - 100].to_vec(), "damaged"),
+        ("header", whole[..40].to_vec(), "damaged"),
+        ("long", [whole.as_slice(), b"!"].concat(), "checksum"),
+        (
+            "flipped",
+            whole.iter().enumerate().map(|(i, b)| b ^ u8::from(i == whole.len() / 2)).collect(),
+            "checksum",
+        ),
+        ("empty", Vec::new(), "damaged"),
+    ] {
+        fs::write(folder.path(name), bytes).unwrap();
+        let said = folder.refused(&format!("{resume} {name}"));
+        assert!(said.contains(reason), "{name}: {said}");
+    }
+    fs::write(folder.path("scene.mtl"), "newmtl floor\nKd 0.6 0.5 0.5\nnewmtl lamp\nKd 0 0 0\nKe 1 1 1\n")
+        .unwrap();
+    let said = folder.refused(&format!("{resume} film"));
+    assert!(said.contains("another scene"), "{said}");
+    assert!(!folder.path("b.png").exists());
+}
+
+#[test]
+fn time_is_kept() {
+    let folder = Folder::new("time");
+    for (size, seconds) in [("64x64", 0.3), ("640x480", 1.5)] {
+        let start = Instant::now();
+        let object =
+            folder.object(&format!("render scene.obj --size {size} --time {seconds} -o a.pfm --json"));
+        let render = object["seconds"]["render"].as_f64().unwrap();
+        assert!(render > 0.9 * seconds && render < seconds + LATE, "{render} s of {seconds} s");
+        assert!(start.elapsed().as_secs_f64() >= render);
+        assert_eq!(object["ending"], "done");
+        assert!(object["spp"].as_u64().unwrap() > 0);
+    }
+}
+
+#[test]
+fn the_error_is_reached_with_the_same_bits_however_fast() {
+    let folder = Folder::new("error");
+    let render = |name: &str, threads: u32, more: &str| {
+        folder.object(&format!(
+            "render scene.obj --size 48x48 --error 0.0001 --threads {threads} -o {name}.pfm {more} --json"
+        ))
+    };
+    let one = render("one", 1, "");
+    let upper = one["error"]["interval"][1].as_f64().unwrap();
+    assert!(upper <= 1e-4 && upper > 2e-5, "{upper}");
+    render("many", 5, "--checkpoint film");
+    // A film that has reached the error is done.
+    render("again", 2, "--resume film");
+    let bytes = |name| fs::read(folder.path(name)).unwrap();
+    assert!(bytes("one.pfm") == bytes("many.pfm") && bytes("one.pfm") == bytes("again.pfm"));
+}
+
+#[test]
+fn what_is_dropped_is_told_with_its_place() {
+    let folder = Folder::new("ledger");
+    // Brighter than numbers can be summed.
+    fs::write(folder.path("scene.mtl"), "newmtl floor\nKd 0.5 0.5 0.5\nnewmtl lamp\nKd 0 0 0\nKe 1e30 1 1\n")
+        .unwrap();
+    let object =
+        folder.object("render scene.obj --size 64x64 --spp 4 --eye 0,1,4 --look-at 0,1,0 -o a.pfm --json");
+    let dropped = &object["dropped"];
+    let total = dropped["infinite"].as_u64().unwrap();
+    assert!(total > 100, "{dropped}");
+    let places = dropped["places"].as_array().unwrap();
+    assert_eq!(dropped["tiles"].as_u64().unwrap(), places.len() as u64);
+    assert_eq!(places.iter().map(|place| place["infinite"].as_u64().unwrap()).sum::<u64>(), total);
+    assert!(places[0]["infinite"].as_u64() >= places[1]["infinite"].as_u64());
+    assert_eq!((&places[0]["width"], &places[0]["height"]), (&16.into(), &16.into()));
+    assert!(dropped["empty_pixels"].as_u64().unwrap() > 0);
+    let picture = read(&folder.path("a.pfm")).unwrap();
+    assert!(picture.pixels.iter().flatten().all(|value| value.is_finite()));
+}
