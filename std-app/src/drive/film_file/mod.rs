@@ -20,7 +20,10 @@ use std::io::{self, BufReader, BufWriter, Read, Write};
 use std::path::{Path, PathBuf};
 
 /// The first bytes: what it is, the version of the format, and a word that tells the order of bytes.
-const MAGIC: [u8; 12] = *b"HLFILM\x00\x01\x04\x03\x02\x01";
+const MAGIC: [u8; 12] = {
+    let [a, b, c, d] = 0x0102_0304u32.to_ne_bytes();
+    [b'H', b'L', b'F', b'I', b'L', b'M', 0, 1, a, b, c, d]
+};
 
 /// A header is no longer than this, in bytes.
 const LONGEST_HEADER: u32 = 1 << 28;
