@@ -1,7 +1,7 @@
 //! Batches of rays: tiles of neighbours that go the same way as packets, all others in step.
 
 use super::Bvh;
-use super::packet::{self, CLASSES, RAYS_MAX, class};
+use super::packet::{CLASSES, Columns, Packet, RAYS_MAX, class};
 use super::ready::traceable;
 use super::stream;
 use crate::geometry::{Hit, Ray};
@@ -9,8 +9,8 @@ use halflight_simd::{Kernel, Simd, Stack};
 
 /// What a batch does with the hits of its rays. All start as [`Hit::NONE`].
 pub(super) trait Sink {
-    /// No hit for any ray.
-    fn clear(&mut self);
+    /// No hit for any of `count` rays from `base` on.
+    fn clear(&mut self, base: u32, count: usize);
     /// Takes the hit of a ray, or none. An index beyond the end is harmless.
     fn put(&mut self, index: u32, hit: Hit);
 }
@@ -23,8 +23,8 @@ pub(super) struct Hidden<'a>(pub &'a mut [u8]);
 
 impl Sink for Nearest<'_> {
     #[inline(always)]
-    fn clear(&mut self) {
-        self.0.fill(Hit::NONE);
+    fn clear(&mut self, base: u32, count: usize) {
+        self.0.iter_mut().skip(base as usize).take(count).for_each(|hit| *hit = Hit::NONE);
     }
 
     #[inline(always)]
@@ -35,10 +35,21 @@ impl Sink for Nearest<'_> {
     }
 }
 
+impl Nearest<'_> {
+    /// Takes the hits of as many rays from `base` on; whether there is room.
+    #[inline(always)]
+    pub(super) fn put_all(&mut self, base: u32, hits: &[Hit]) -> bool {
+        let from = base as usize;
+        let Some(slots) = self.0.get_mut(from..from + hits.len()) else { return false };
+        slots.copy_from_slice(hits);
+        true
+    }
+}
+
 impl Sink for Hidden<'_> {
     #[inline(always)]
-    fn clear(&mut self) {
-        self.0.fill(0);
+    fn clear(&mut self, base: u32, count: usize) {
+        self.0.iter_mut().skip(base as usize).take(count).for_each(|hidden| *hidden = 0);
     }
 
     #[inline(always)]
@@ -61,7 +72,7 @@ impl<T: Sink, const ANY: bool> Kernel for Stream<'_, '_, T, ANY> {
 
     #[inline(always)]
     fn run<S: Simd>(mut self, simd: S) {
-        self.sink.clear();
+        self.sink.clear(0, self.rays.len());
         let indices = 0..self.rays.len() as u32;
         stream::trace::<S, T, ANY>(simd, self.bvh, self.rays, indices, &mut self.sink);
     }
@@ -89,7 +100,6 @@ impl Kernel for Tiles<'_, '_> {
 
     #[inline(always)]
     fn run<S: Simd>(mut self, simd: S) {
-        self.sink.clear();
         let mut stack = Stack::new();
         let mut alone = ([0u32; ALONE], 0);
         let mut tiles = self.rays.chunks(TILE);
@@ -97,15 +107,23 @@ impl Kernel for Tiles<'_, '_> {
         loop {
             let tile = tiles.next();
             if let Some(rays) = tile {
-                let Sorted { order, ends } = Sorted::new(rays);
-                let mut from = 0;
-                for to in ends {
-                    let class = order.get(from..to).unwrap_or(&[]);
-                    from = to;
-                    if class.len() >= PACKET_MIN {
-                        packet::trace(simd, self.bvh, rays, class, base, &mut stack, &mut self.sink);
+                // Mostly all rays of a tile are of one class.
+                let whole = Columns::whole(simd, rays);
+                let mut classes = Classes::ALL;
+                if whole.is_none() {
+                    classes = Classes::new(rays);
+                    self.sink.clear(base, rays.len());
+                }
+                while let Some(order) = classes.next() {
+                    if order.len() >= PACKET_MIN {
+                        let columns = match whole {
+                            Some(columns) => columns,
+                            None => Columns::gathered(simd, rays, order),
+                        };
+                        let packet = Packet { columns, rays, order, base, whole: whole.is_some() };
+                        packet.trace(simd, self.bvh, &mut stack, &mut self.sink);
                     } else {
-                        for &i in class {
+                        for &i in order {
                             alone.0[alone.1 & (ALONE - 1)] = base + u32::from(i);
                             alone.1 += 1;
                         }
@@ -126,18 +144,32 @@ impl Kernel for Tiles<'_, '_> {
 }
 
 /// The rays of a tile by class.
-struct Sorted {
+struct Classes {
     order: [u8; TILE],
     /// Where each class ends in the order.
-    ends: [usize; CLASSES],
+    ends: [u8; CLASSES],
+    /// The class that comes next.
+    class: usize,
+    from: usize,
 }
 
-impl Sorted {
-    /// Those that can be traced.
+impl Classes {
+    /// A full tile of one class.
+    const ALL: Classes = {
+        let mut order = [0; TILE];
+        let mut i = 0;
+        while i < TILE {
+            order[i] = i as u8;
+            i += 1;
+        }
+        Classes { order, ends: [TILE as u8; CLASSES], class: CLASSES - 1, from: 0 }
+    };
+
+    /// Of the rays that can be traced.
     #[inline(always)]
     fn new(rays: &[Ray]) -> Self {
         let mut classes = [u8::MAX; TILE];
-        let mut ends = [0usize; CLASSES];
+        let mut ends = [0u8; CLASSES];
         for (ray, class_of) in rays.iter().zip(&mut classes) {
             if traceable(ray) {
                 let c = class(ray.direction);
@@ -151,11 +183,25 @@ impl Sorted {
         }
         let mut order = [0; TILE];
         for (i, &c) in classes.iter().take(rays.len()).enumerate() {
-            if let Some(end) = ends.get_mut(c as usize) {
-                order[*end & (TILE - 1)] = i as u8;
+            if let Some(end) = ends.get_mut(usize::from(c)) {
+                order[usize::from(*end) & (TILE - 1)] = i as u8;
                 *end += 1;
             }
         }
-        Self { order, ends }
+        Self { order, ends, class: 0, from: 0 }
+    }
+
+    /// The rays of the next class that has some.
+    #[inline(always)]
+    fn next(&mut self) -> Option<&[u8]> {
+        while let Some(&end) = self.ends.get(self.class) {
+            self.class += 1;
+            let to = usize::from(end);
+            if to > self.from {
+                let from = core::mem::replace(&mut self.from, to);
+                return self.order.get(from..to);
+            }
+        }
+        None
     }
 }

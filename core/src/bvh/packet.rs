@@ -37,12 +37,26 @@ struct Lane16<S: Simd> {
     v: S::F16,
     /// Bits of the triangle's index.
     triangle: S::F16,
+    /// Lanes whose ray has hit something.
+    found: u32,
     /// Lanes that hold a ray.
     active: u32,
 }
 
-/// The rays of a packet, and where they are in the batch.
-struct Packet<'a, S: Simd> {
+/// Rays on their way to be traced together: 1 … [`RAYS_MAX`], all of one class and traceable.
+pub(super) struct Packet<'a, S: Simd> {
+    pub columns: Columns<S>,
+    /// The tile, and which of its rays these are.
+    pub rays: &'a [Ray],
+    pub order: &'a [u8],
+    /// Index of the tile's first ray in the batch.
+    pub base: u32,
+    /// Whether it is all rays of the tile in their order.
+    pub whole: bool,
+}
+
+/// A packet under way.
+struct Walk<'a, S: Simd> {
     lanes: [Lane16<S>; REGISTERS],
     rays: &'a [Ray],
     order: &'a [u8],
@@ -58,65 +72,109 @@ pub(super) fn class(direction: [f32; 3]) -> usize {
 /// How many classes of rays there are.
 pub(super) const CLASSES: usize = 24;
 
-/// Traces the rays `order` of `rays` (1 … [`RAYS_MAX`], all of one class and traceable) and puts their hits.
-#[inline(always)]
-pub(super) fn trace<S: Simd>(
-    simd: S,
-    bvh: &Bvh,
-    rays: &[Ray],
-    order: &[u8],
-    base: u32,
-    stack: &mut Stack,
-    sink: &mut Nearest,
-) {
-    let Some(first) = order.first().and_then(|&i| rays.get(usize::from(i))) else { return };
-    let axes = Shear::new(first.direction).axes;
-    let class = class(first.direction);
-    let near = [class & 1, 2 | (class >> 1 & 1), 4 | (class >> 2 & 1)];
+/// The floats of rays, one register for each kind of them and for sixteen rays.
+#[derive(Clone, Copy)]
+pub(super) struct Columns<S: Simd>([[S::F16; 8]; REGISTERS]);
 
-    let records = records_of(rays, order, first, 0);
-    let mut lanes = [Lane16::new(simd, &records, near, axes); REGISTERS];
-    for (k, lane) in lanes.iter_mut().enumerate() {
-        if k > 0 {
-            *lane = Lane16::new(simd, &records_of(rays, order, first, 16 * k), near, axes);
-        }
-        let count = order.len().saturating_sub(16 * k).min(16) as u32;
-        lane.active = (1u32 << count) - 1;
-    }
-    let mut packet = Packet { lanes, rays, order };
-    let (interval, pinhole) = packet.interval(near);
-    let interval = SlabInterval8::new(simd, &interval);
-    if pinhole {
-        packet.walk::<true>(simd, bvh, class & 7, &interval, stack);
-    } else {
-        packet.walk::<false>(simd, bvh, class & 7, &interval, stack);
+impl<S: Simd> Columns<S> {
+    /// Of a full tile whose rays are all traceable and of one class.
+    #[inline(always)]
+    pub(super) fn whole(simd: S, rays: &[Ray]) -> Option<Self> {
+        let records: &[[f32; 8]] = bytemuck::cast_slice(rays);
+        let records: &[[f32; 8]; RAYS_MAX] = records.try_into().ok()?;
+        let ([a, b, c, d], _) = records.as_chunks::<16>() else { return None };
+        let columns = Self([simd.columns16(a), simd.columns16(b), simd.columns16(c), simd.columns16(d)]);
+        columns.agree(simd).then_some(columns)
     }
 
-    for (lane, order) in packet.lanes.iter().zip(order.chunks(16)) {
-        let records = simd.records16([lane.t, lane.u, lane.v, lane.triangle]);
-        for (&[t, u, v, triangle], &i) in records.iter().zip(order) {
-            let hit = Hit { t, u, v, triangle: triangle.to_bits() };
-            sink.put(base + u32::from(i), if hit.triangle == MISS { Hit::NONE } else { hit });
+    /// Of the rays `order`. Lanes without a ray repeat the first one: they change no interval.
+    #[inline(always)]
+    pub(super) fn gathered(simd: S, rays: &[Ray], order: &[u8]) -> Self {
+        let mut records = [[[0.0; 8]; 16]; REGISTERS];
+        let first = order.first().copied().unwrap_or(0);
+        for (l, record) in records.as_flattened_mut().iter_mut().enumerate() {
+            let i = order.get(l).copied().unwrap_or(first);
+            if let Some(ray) = rays.get(usize::from(i)) {
+                *record = bytemuck::cast(*ray);
+            }
         }
+        let [a, b, c, d] = &records;
+        Self([simd.columns16(a), simd.columns16(b), simd.columns16(c), simd.columns16(d)])
+    }
+
+    /// Whether all rays are traceable (as [`super::ready::traceable`] has it) and of one [`class`].
+    #[inline(always)]
+    fn agree(&self, simd: S) -> bool {
+        const ALL: u32 = 0xffff;
+        let (zero, limit) = (simd.splat16(0.0), simd.splat16(f32::INFINITY));
+        let (mut minus, mut plus) = ([ALL; 3], [ALL; 3]);
+        let (mut along, mut traceable) = ([ALL; 3], ALL);
+        for [ox, oy, oz, t, dx, dy, dz, _] in self.0 {
+            let signs = [dx.signs(), dy.signs(), dz.signs()];
+            let (x, y, z) = (dx.abs(), dy.abs(), dz.abs());
+            let (y_x, z_x, z_y) = (y.lt(x).bits(), z.lt(x).bits(), z.lt(y).bits());
+            let (is_x, is_y) = (y_x & z_x, !y_x & z_y & ALL);
+            let dominant = [is_x, is_y, !(is_x | is_y)];
+            for axis in 0..3 {
+                minus[axis] &= signs[axis];
+                plus[axis] &= !signs[axis] & ALL;
+                along[axis] &= dominant[axis];
+            }
+            // No comparison is true of NaN; a maximum may lose one.
+            traceable &= (x.lt(limit) & y.lt(limit) & z.lt(limit) & zero.lt(x.max(y).max(z))).bits();
+            traceable &= (ox.abs().lt(limit) & oy.abs().lt(limit) & oz.abs().lt(limit) & zero.le(t)).bits();
+        }
+        let [x, y, z] = [minus[0].max(plus[0]), minus[1].max(plus[1]), minus[2].max(plus[2])];
+        let dominant = along[0].max(along[1]).max(along[2]);
+        (x & y & z & dominant & traceable) == ALL
     }
 }
 
-/// Sixteen rays from place `from` of the order on. Lanes without a ray repeat the first one: they change no
-/// interval.
-#[inline(always)]
-fn records_of(rays: &[Ray], order: &[u8], first: &Ray, from: usize) -> [[f32; 8]; 16] {
-    let mut records = [[0.0; 8]; 16];
-    for (l, record) in records.iter_mut().enumerate() {
-        let ray = order.get(from + l).and_then(|&i| rays.get(usize::from(i))).unwrap_or(first);
-        *record = bytemuck::cast(*ray);
+impl<'a, S: Simd> Packet<'a, S> {
+    /// Traces the rays and puts their hits.
+    #[inline(always)]
+    pub(super) fn trace(self, simd: S, bvh: &Bvh, stack: &mut Stack, sink: &mut Nearest) {
+        let Self { columns, rays, order, base, whole } = self;
+        let Some(first) = order.first().and_then(|&i| rays.get(usize::from(i))) else { return };
+        let axes = Shear::new(first.direction).axes;
+        let class = class(first.direction);
+        let near = [class & 1, 2 | (class >> 1 & 1), 4 | (class >> 2 & 1)];
+
+        let [a, b, c, d] = &columns.0;
+        let lanes = [
+            Lane16::new(simd, a, near, axes, order.len()),
+            Lane16::new(simd, b, near, axes, order.len().saturating_sub(16)),
+            Lane16::new(simd, c, near, axes, order.len().saturating_sub(32)),
+            Lane16::new(simd, d, near, axes, order.len().saturating_sub(48)),
+        ];
+        let mut walk = Walk { lanes, rays, order };
+        let (interval, pinhole) = walk.interval(near);
+        let interval = SlabInterval8::new(simd, &interval);
+        if pinhole {
+            walk.run::<true>(simd, bvh, class & 7, &interval, stack);
+        } else {
+            walk.run::<false>(simd, bvh, class & 7, &interval, stack);
+        }
+
+        let mut base_of_lane = base;
+        for (lane, order) in walk.lanes.iter().zip(order.chunks(16)) {
+            let t = lane.t.select(simd.mask16(lane.found), simd.splat16(f32::INFINITY));
+            let hits: [Hit; 16] = bytemuck::cast(simd.records16([t, lane.u, lane.v, lane.triangle]));
+            if !(whole && sink.put_all(base_of_lane, &hits)) {
+                for (hit, &i) in hits.iter().zip(order) {
+                    sink.put(base + u32::from(i), *hit);
+                }
+            }
+            base_of_lane += 16;
+        }
     }
-    records
 }
 
 impl<S: Simd> Lane16<S> {
+    /// Of the first `count` of sixteen rays.
     #[inline(always)]
-    fn new(simd: S, records: &[[f32; 8]; 16], near: [usize; 3], axes: [usize; 3]) -> Self {
-        let [ox, oy, oz, t, dx, dy, dz, _] = simd.columns16(records);
+    fn new(simd: S, columns: &[S::F16; 8], near: [usize; 3], axes: [usize; 3], count: usize) -> Self {
+        let [ox, oy, oz, t, dx, dy, dz, _] = *columns;
         let (origin, direction) = ([ox, oy, oz], [dx, dy, dz]);
         let [kx, ky, kz] = axes;
         let scale = simd.splat16(1.0) / direction[kz % 3];
@@ -133,7 +191,8 @@ impl<S: Simd> Lane16<S> {
             u: zero,
             v: zero,
             triangle: simd.splat16(f32::from_bits(MISS)),
-            active: 0,
+            found: 0,
+            active: (1u32 << count.min(16)) - 1,
         }
     }
 }
@@ -145,7 +204,7 @@ fn reciprocal<S: Simd>(simd: S, d: S::F16) -> S::F16 {
     (simd.splat16(1.0) / d).min(limit).max(-limit)
 }
 
-impl<S: Simd> Packet<'_, S> {
+impl<S: Simd> Walk<'_, S> {
     /// What the rays have in common, and whether that is their origin.
     #[inline(always)]
     fn interval(&self, near: [usize; 3]) -> (SlabInterval, bool) {
@@ -172,7 +231,7 @@ impl<S: Simd> Packet<'_, S> {
     }
 
     #[inline(always)]
-    fn walk<const PINHOLE: bool>(
+    fn run<const PINHOLE: bool>(
         &mut self,
         simd: S,
         bvh: &Bvh,
@@ -248,12 +307,14 @@ impl<S: Simd> Packet<'_, S> {
                 }
                 let found = lane.shear.meets_moved(simd, &corners, lane.t, met);
                 if found.hits | found.doubtful != 0 {
-                    taken |= take(simd, lane, &found, id);
+                    let mut hits = take(simd, lane, &found, id);
                     if found.doubtful != 0 {
                         let order = self.order.get(16 * k..).unwrap_or(&[]);
                         let corners = corners_of(runs, count, i);
-                        taken |= take_doubtful(simd, lane, found.doubtful, id, corners, self.rays, order);
+                        hits |= take_doubtful(simd, lane, found.doubtful, id, corners, self.rays, order);
                     }
+                    lane.found |= hits;
+                    taken |= hits != 0;
                 }
             }
         }
@@ -261,9 +322,9 @@ impl<S: Simd> Packet<'_, S> {
     }
 }
 
-/// Takes over what a triangle test found; whether a ray has a better hit now.
+/// Takes over what a triangle test found; the bits of the rays that have a better hit now.
 #[inline(always)]
-fn take<S: Simd>(simd: S, lane: &mut Lane16<S>, found: &Found<S::F16>, id: u32) -> bool {
+fn take<S: Simd>(simd: S, lane: &mut Lane16<S>, found: &Found<S::F16>, id: u32) -> u32 {
     let nearer = found.t.lt(lane.t).bits() & found.hits;
     let same = found.hits & !nearer;
     let mut hits = nearer;
@@ -279,7 +340,7 @@ fn take<S: Simd>(simd: S, lane: &mut Lane16<S>, found: &Found<S::F16>, id: u32) 
     lane.u = found.u.select(mask, lane.u);
     lane.v = found.v.select(mask, lane.v);
     lane.triangle = simd.splat16(f32::from_bits(id)).select(mask, lane.triangle);
-    hits != 0
+    hits
 }
 
 /// The rays on an edge in f32, by the scalar reference.
@@ -292,10 +353,10 @@ fn take_doubtful<S: Simd>(
     corners: [[f32; 3]; 3],
     rays: &[Ray],
     order: &[u8],
-) -> bool {
+) -> u32 {
     let (mut t, mut u, mut v, mut ids) =
         (lane.t.to_array(), lane.u.to_array(), lane.v.to_array(), lane.triangle.to_array());
-    let mut taken = false;
+    let mut hits = 0;
     while doubtful != 0 {
         let l = doubtful.trailing_zeros() as usize & 15;
         doubtful &= doubtful - 1;
@@ -307,12 +368,12 @@ fn take_doubtful<S: Simd>(
         }
         if best != before {
             (t[l], u[l], v[l], ids[l]) = (best.t, best.u, best.v, f32::from_bits(best.triangle));
-            taken = true;
+            hits |= 1 << l;
         }
     }
     lane.t = simd.load16(&t);
     lane.u = simd.load16(&u);
     lane.v = simd.load16(&v);
     lane.triangle = simd.load16(&ids);
-    taken
+    hits
 }

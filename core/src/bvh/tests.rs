@@ -123,6 +123,29 @@ fn far_from_the_origin() {
 }
 
 #[test]
+fn tiles_of_a_pinhole_and_of_a_lens() {
+    let soup = random_soup(400, 3.0, Vec3::ZERO);
+    for lens in [0.0, 0.5] {
+        let mut random = Random(3);
+        let mut rays: Vec<Ray> = (0..640)
+            .map(|i| {
+                // Most tiles lie on one side of the axes, some across them.
+                let (x, y) = ((i / 64 % 5 * 8 + i % 8) as f32, (i / 320 * 8 + i % 64 / 8) as f32);
+                let origin = Vec3::new(0.0, 0.0, 9.0) + random.point(lens);
+                Ray::new(origin, Vec3::new(x / 20.0 - 0.7, y / 10.0 - 0.6, -1.0))
+            })
+            .collect();
+        agrees(&soup, &rays);
+        // One ray that cannot be traced, one that is off and one that ends early do not spoil their tiles.
+        rays[3].origin[1] = f32::NAN;
+        rays[70].t_max = -1.0;
+        rays[200].t_max = 8.0;
+        rays[300].direction = [0.0, -0.0, 0.0];
+        agrees(&soup, &rays[..600]);
+    }
+}
+
+#[test]
 fn no_triangles() {
     agrees(&Soup::of([]), &random_rays(10, Vec3::ZERO));
 }
