@@ -1,7 +1,7 @@
 //! halflight, the app: files in, pictures and reports out, with the core's passes run on all cores.
 //!
 //! A picture takes four steps: [`load`] a scene, choose a camera, [`drive`] the render, [`save`] the image;
-//! [`compare`] says how far two images are apart.
+//! [`compare`] says how far two images are apart, [`report`] tells a person how it went.
 //!
 //! ```no_run
 //! use core::sync::atomic::AtomicBool;
@@ -22,4 +22,5 @@ pub mod bench;
 pub mod compare;
 pub mod drive;
 pub mod load;
+pub mod report;
 pub mod save;

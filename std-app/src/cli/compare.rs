@@ -4,6 +4,7 @@ use super::failure::Failure;
 use super::say;
 use clap::{Args, ValueEnum};
 use halflight::compare::{Comparison, Shown, compare, false_colours};
+use halflight::report::comparison_object;
 use halflight::save::{self, Format};
 use serde_json::{Value, json};
 use std::path::PathBuf;
@@ -110,7 +111,7 @@ impl Saved<'_> {
 }
 
 fn told(comparison: &Comparison, saved: &[Saved]) -> Value {
-    let mut object = object(comparison);
+    let mut object = comparison_object(comparison);
     let outputs = saved
         .iter()
         .map(|saved| json!({ "file": saved.file, "difference": saved.name(), "scale": saved.scale }));
@@ -123,23 +124,6 @@ fn page(comparison: &Comparison, saved: &[Saved]) -> String {
         let scale = saved.scale.map(|[from, to]| format!(", colours from {from:.3e} to {to:.3e}"));
         let scale = scale.unwrap_or_default();
         format!("{text}\nsaved  {}: {} difference{scale}", saved.file.display(), saved.name())
-    })
-}
-
-/// The object of `--json`. Errors that are infinite are `null`: JSON has no infinity.
-pub(super) fn object(comparison: &Comparison) -> Value {
-    let linear = &comparison.linear;
-    json!({
-        "width": comparison.width,
-        "height": comparison.height,
-        "relmse": linear.relmse,
-        "mse": linear.mse,
-        "rmse": linear.rmse(),
-        "flip": comparison.flip,
-        "mean": linear.mean,
-        "reference_mean": linear.reference_mean,
-        "non_finite": linear.non_finite,
-        "reference_non_finite": linear.reference_non_finite,
     })
 }
 

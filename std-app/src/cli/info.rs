@@ -3,15 +3,17 @@
 
 use super::failure::Failure;
 use super::say;
-use super::values::{self, readable_bytes};
+use super::values;
 use super::view::View;
 use clap::Args;
 use halflight::load::{self, LoadOptions, LoadedScene};
+use halflight::report::counts;
+use halflight::report::words::readable_bytes;
 use halflight_core::bvh::Bvh;
-use halflight_core::census::{Census, EnvironmentKind, Plan};
+use halflight_core::census::{Census, Plan};
 use halflight_core::film::Film;
 use halflight_core::light::Lights;
-use halflight_core::scene::{Camera, Scene};
+use halflight_core::scene::Camera;
 use serde_json::{Map, Value, json};
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -61,34 +63,6 @@ struct Facts<'a> {
     counts: Vec<(&'static str, u64)>,
     plan: Plan,
     footprints: [(&'static str, usize); 4],
-}
-
-/// The census by name, in the order in which it is told.
-fn counts(census: &Census, scene: &Scene) -> Vec<(&'static str, u64)> {
-    let kinds = &census.surfaces;
-    vec![
-        ("vertices", scene.mesh.positions.len() as u64),
-        ("triangles", census.triangles),
-        ("degenerate", census.degenerate),
-        ("materials", census.materials),
-        ("textures", census.textures),
-        ("diffuse", kinds.diffuse),
-        ("mirror", kinds.mirror),
-        ("conductor", kinds.conductor),
-        ("glossy", kinds.glossy),
-        ("dielectric", kinds.dielectric),
-        ("rough_dielectric", kinds.rough_dielectric),
-        ("textured", census.textured),
-        ("normal_mapped", census.normal_mapped),
-        ("cutout", census.cutout),
-        ("specular", census.specular),
-        ("emissive", census.emissive),
-        ("emitters_facing_nothing", census.emitters_facing_nothing),
-        ("point_lights", census.point_lights),
-        ("spot_lights", census.spot_lights),
-        ("directional_lights", census.directional_lights),
-        ("environment", u64::from(census.environment != EnvironmentKind::None)),
-    ]
 }
 
 impl Facts<'_> {

@@ -1,10 +1,10 @@
 //! `halflight merge`: the films of shards, put together to a picture.
 
 use super::failure::Failure;
-use super::summary::{estimate, estimate_text};
-use super::{ledger, say};
+use super::{ledger, say, summary};
 use clap::Args;
 use halflight::drive::{self, Merged};
+use halflight::report::{dropped_object, estimate_object};
 use halflight::save;
 use serde_json::{Value, json};
 use std::path::PathBuf;
@@ -52,8 +52,8 @@ impl Merge {
             "shadow_rays": counters.shadow_rays,
             "paths": counters.paths,
             "mean_radiance": merged.image.mean(),
-            "error": estimate(merged.error, "estimate"),
-            "dropped": ledger::object(&counters.dropped, &merged.places, merged.empty_pixels),
+            "error": estimate_object(merged.error, "estimate"),
+            "dropped": dropped_object(&counters.dropped, &merged.places, merged.empty_pixels),
             "outputs": self.output,
         })
     }
@@ -63,7 +63,7 @@ impl Merge {
         let mut lines: Vec<String> = self.output.iter().map(saved).collect();
         let (width, height) = (merged.image.width, merged.image.height);
         lines.push(format!("image  {width}x{height}, {} samples per pixel", merged.spp));
-        lines.push(estimate_text(merged.error));
+        lines.push(summary::estimate(merged.error));
         lines.extend(ledger::text(&merged.counters, &merged.places, merged.empty_pixels));
         lines.join("\n")
     }

@@ -8,6 +8,8 @@ mod interrupt;
 mod ledger;
 mod merge;
 mod progress;
+mod race;
+mod racer;
 mod render;
 mod shot;
 mod summary;
@@ -32,6 +34,7 @@ enum Command {
     Render(Box<render::Render>),
     Compare(compare::Compare),
     Merge(merge::Merge),
+    Race(Box<race::Race>),
     Info(info::Info),
     Bench(bench::Bench),
 }
@@ -46,6 +49,7 @@ pub(crate) fn main() -> ExitCode {
         Command::Render(command) => command.run(),
         Command::Compare(command) => command.run(),
         Command::Merge(command) => command.run(),
+        Command::Race(command) => command.run(),
         Command::Info(command) => command.run(),
         Command::Bench(command) => command.run(),
     }));

@@ -1,7 +1,7 @@
 //! Progress on stderr: a bar with the time left on a terminal, a plain line every few seconds elsewhere.
 
-use super::values::readable_seconds;
 use halflight::drive::Progress;
+use halflight::report::words::readable_seconds;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::io::{IsTerminal, stderr};
 
@@ -26,13 +26,22 @@ impl Teller {
 
     /// After each round.
     pub(super) fn tell(&mut self, progress: &Progress) {
+        self.tell_words(progress, words(progress));
+    }
+
+    /// After each round of one of several.
+    pub(super) fn tell_of(&mut self, name: &str, progress: &Progress) {
+        self.tell_words(progress, format!("{name}: {}", words(progress)));
+    }
+
+    fn tell_words(&mut self, progress: &Progress, words: String) {
         let share = progress.seconds_left.map(|left| progress.seconds / (progress.seconds + left).max(1e-9));
         if let Some(bar) = &self.bar {
             bar.set_position((share.unwrap_or(0.0) * STEPS as f64) as u64);
-            bar.set_message(words(progress));
+            bar.set_message(words);
         } else if progress.seconds >= self.told + EVERY {
             self.told = progress.seconds;
-            eprintln!("{:>3.0} %  {}", 100.0 * share.unwrap_or(0.0), words(progress));
+            eprintln!("{:>3.0} %  {words}", 100.0 * share.unwrap_or(0.0));
         }
     }
 

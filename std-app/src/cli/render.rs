@@ -4,12 +4,12 @@ use super::failure::Failure;
 use super::interrupt::{self, INTERRUPT};
 use super::progress::Teller;
 use super::shot::{self, Method, Options, Shot};
-use super::summary::Summary;
-use super::{say, values, warn};
+use super::{say, summary, values, warn};
 use clap::{Args, ValueEnum};
 use halflight::compare::compare;
 use halflight::drive::{self, Checkpoint, Ending, Settings, Shard, Stop};
 use halflight::load::{self, LoadOptions, LoadedScene};
+use halflight::report::{self, Maker, Run};
 use halflight::save;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -62,6 +62,9 @@ pub(super) struct Render {
         conflicts_with_all = ["time", "error"], help_heading = "In parts")]
     shard: Option<Shard>,
 
+    /// Write a report into this folder: index.html, which needs nothing else, curve.csv and run.json
+    #[arg(long, value_name = "DIR", help_heading = "Results")]
+    report: Option<PathBuf>,
     /// Print one JSON object instead of text
     #[arg(long, help_heading = "Results")]
     json: bool,
@@ -76,6 +79,9 @@ impl Render {
         }
         if let Some(film) = &self.checkpoint {
             drive::check_film_writable(film)?;
+        }
+        if let Some(folder) = &self.report {
+            report::check_folder(folder)?;
         }
         let reference = self.shot.reference()?;
 
@@ -111,16 +117,23 @@ impl Render {
             Some(reference) => Some(compare(&result.image, reference)?),
             None => None,
         };
-        let summary = Summary {
+        let maker = Maker::here();
+        let run = Run {
             scene: &scene,
+            name: &shot::name(&self.scene),
+            repairs: &loaded.repairs,
             settings: &settings,
             result: &result,
             comparison: comparison.as_ref(),
             outputs: &outputs,
             load_seconds,
             total_seconds: start.elapsed().as_secs_f64(),
+            maker: &maker,
         };
-        say(&if self.json { summary.object().to_string() } else { summary.text() });
+        if let Some(folder) = &self.report {
+            report::write_folder(folder, &run.files())?;
+        }
+        say(&if self.json { run.object().to_string() } else { summary::text(&run, self.report.as_deref()) });
         Ok(match result.ending {
             Ending::Done => ExitCode::SUCCESS,
             Ending::Interrupted => ExitCode::from(3),

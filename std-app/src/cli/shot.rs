@@ -6,6 +6,7 @@ use super::view::View;
 use clap::{Args, ValueEnum};
 use halflight::drive::{RenderError, Settings, Stop};
 use halflight::load::LoadedScene;
+use halflight::report::words::readable_bytes;
 use halflight::save::{self, Image};
 use halflight_simd::{Level, Tier};
 use std::path::{Path, PathBuf};
@@ -33,7 +34,7 @@ pub(super) struct Shot {
 }
 
 /// How a method does its work: what may differ between the methods of a race.
-#[derive(Args)]
+#[derive(Args, Clone, Debug)]
 pub(super) struct Options {
     /// Whether caustics get a map of their own where they need one [default: auto]; `path` never needs one
     #[arg(long)]
@@ -52,7 +53,7 @@ pub(super) struct Options {
     precise: bool,
 }
 
-#[derive(Clone, Copy, ValueEnum)]
+#[derive(Clone, Copy, Debug, ValueEnum)]
 pub(super) enum Method {
     /// What fits the scene; today, path
     Auto,
@@ -60,7 +61,7 @@ pub(super) enum Method {
     Path,
 }
 
-#[derive(Clone, Copy, ValueEnum)]
+#[derive(Clone, Copy, Debug, ValueEnum)]
 pub(super) enum Caustics {
     /// Where the method needs it
     Auto,
@@ -69,6 +70,17 @@ pub(super) enum Caustics {
 }
 
 impl Options {
+    /// These, and those of `base` where these say nothing.
+    pub(super) fn over(&self, base: &Options) -> Options {
+        Options {
+            caustics: self.caustics.or(base.caustics),
+            max_depth: self.max_depth.or(base.max_depth),
+            seed: self.seed.or(base.seed),
+            simd: self.simd.or(base.simd),
+            precise: self.precise || base.precise,
+        }
+    }
+
     fn level(&self) -> Level {
         let level = if self.precise { Level::BASELINE } else { Level::detect() };
         self.simd.map_or(level, |tier| level.capped(tier))
@@ -124,13 +136,18 @@ impl Shot {
     }
 }
 
+/// The name of the file of a scene, without its folder.
+pub(super) fn name(scene: &Path) -> String {
+    scene.file_name().unwrap_or(scene.as_os_str()).to_string_lossy().into_owned()
+}
+
 /// Why there is no picture of `scene`, and what to do about it.
 pub(super) fn explain(scene: &Path, error: &RenderError) -> Failure {
     let failure = Failure::new(format!("{}: {error}", scene.display()));
     match error {
         RenderError::Memory { needed, .. } => failure.advice(format!(
             "{} are needed: raise --memory, or lower --size or --threads",
-            values::readable_bytes(*needed)
+            readable_bytes(*needed)
         )),
         _ => failure,
     }

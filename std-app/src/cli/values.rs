@@ -104,30 +104,6 @@ fn with_unit(text: &str, units: &[(&str, f64)]) -> Option<f64> {
     })
 }
 
-/// Bytes as people read them.
-pub(super) fn readable_bytes(bytes: usize) -> String {
-    let units = ["KiB", "MiB", "GiB", "TiB"];
-    let mut value = bytes as f64 / 1024.0;
-    let mut unit = units[0];
-    for larger in &units[1..] {
-        if value >= 1000.0 {
-            value /= 1024.0;
-            unit = larger;
-        }
-    }
-    if bytes < 1024 { format!("{bytes} bytes") } else { format!("{value:.1} {unit}") }
-}
-
-/// Seconds as people read them.
-pub(super) fn readable_seconds(seconds: f64) -> String {
-    match seconds {
-        s if s < 0.0995 => format!("{:.0} ms", s * 1e3),
-        s if s < 99.95 => format!("{s:.1} s"),
-        s if s < 5400.0 => format!("{} min {:02} s", (s / 60.0) as u64, (s % 60.0) as u64),
-        s => format!("{} h {:02} min", (s / 3600.0) as u64, (s / 60.0 % 60.0) as u64),
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -173,17 +149,5 @@ mod tests {
         for text in ["0", "178", "-40", "wide"] {
             assert!(degrees(text).is_err(), "{text}");
         }
-    }
-
-    #[test]
-    fn amounts_as_people_read_them() {
-        assert_eq!(
-            [0, 1023, 1024, 90 << 20].map(readable_bytes),
-            ["0 bytes", "1023 bytes", "1.0 KiB", "90.0 MiB"]
-        );
-        assert_eq!(
-            [0.012, 3.21, 125.0, 7260.0].map(readable_seconds),
-            ["12 ms", "3.2 s", "2 min 05 s", "2 h 01 min"]
-        );
     }
 }

@@ -13,6 +13,7 @@ mod memory;
 mod merge;
 mod rounds;
 mod run;
+mod turns;
 mod workers;
 
 pub use canvas::Shard;
@@ -24,6 +25,7 @@ pub use ledger::Place;
 pub use memory::MemoryUse;
 pub use merge::{Merged, merge};
 pub use rounds::Stop;
+pub use turns::{Turn, Turns};
 
 use crate::save::Image;
 use core::sync::atomic::AtomicBool;
@@ -127,7 +129,8 @@ pub enum Ending {
 pub struct Seconds {
     /// Building the hierarchy and the light structures.
     pub build: f64,
-    /// Tracing paths, before a resumption too; without comparisons with a reference and without checkpoints.
+    /// Tracing paths, before a resumption too; without comparisons with a reference, checkpoints and calls of
+    /// `progress`.
     pub render: f64,
 }
 
@@ -170,7 +173,7 @@ pub struct RenderResult {
 const MOST_PIXELS: u64 = 1 << 28;
 
 /// Renders `scene` until a rule of `settings.stop` holds or `interrupt` is raised. `progress` is called
-/// after each round, on the calling thread.
+/// after each round, on the calling thread; the time that it takes does not count.
 pub fn render(
     scene: &Scene,
     settings: &Settings,

@@ -113,13 +113,14 @@ impl WithFeatures for Render<'_> {
                 reference.as_mut().map(|r| clock.pause(|| r.compare(&image(&canvas.film), seconds)));
             let (spp, rays) = (rounds.spp(), canvas.counters.rays + canvas.counters.shadow_rays);
             history.push(Round { seconds, spp, rays, error, reference: against });
-            progress(&Progress {
+            let known = Progress {
                 seconds,
                 seconds_left: rounds.seconds_left(seconds, latest),
                 spp,
                 rounds: rounds.count(),
                 error: latest,
-            });
+            };
+            clock.pause(|| progress(&known));
             let due =
                 settings.checkpoint.as_ref().map(|checkpoint| Duration::from_secs_f64(checkpoint.every));
             if plan.first || due.is_some_and(|due| saved.elapsed() >= due) {

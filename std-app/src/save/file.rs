@@ -29,20 +29,20 @@ pub fn read(path: &Path) -> Result<Image, PictureError> {
 /// # Errors
 /// Names the file and why it cannot be written.
 pub fn write(path: &Path, image: &Image) -> Result<(), PictureError> {
-    let bytes = encode(image, Format::of(path)?).map_err(|error| error.at(path))?;
+    replace(path, &encode(image, Format::of(path)?).map_err(|error| error.at(path))?)
+}
+
+/// Writes a file, which appears whole or not at all.
+pub(crate) fn replace(path: &Path, bytes: &[u8]) -> Result<(), PictureError> {
     let about =
         |error: io::Error| PictureError::new(format!("cannot be written: {}", words(&error))).at(path);
     if is_special(path) {
-        return OpenOptions::new()
-            .write(true)
-            .open(path)
-            .and_then(|mut f| f.write_all(&bytes))
-            .map_err(about);
+        return OpenOptions::new().write(true).open(path).and_then(|mut f| f.write_all(bytes)).map_err(about);
     }
     let target = place(path);
     let beside = temporary(&target);
     let written = File::create_new(&beside)
-        .and_then(|mut file| file.write_all(&bytes).and_then(|()| file.sync_all()))
+        .and_then(|mut file| file.write_all(bytes).and_then(|()| file.sync_all()))
         .and_then(|()| fs::rename(&beside, &target));
     if written.is_err() {
         // Of no use to anybody; if even this fails the first error says why.
@@ -103,7 +103,7 @@ fn temporary(path: &Path) -> PathBuf {
 }
 
 /// The error without the number of the operating system.
-fn words(error: &io::Error) -> String {
+pub(crate) fn words(error: &io::Error) -> String {
     match error.kind() {
         io::ErrorKind::NotFound => "no such file".into(),
         io::ErrorKind::PermissionDenied => "permission denied".into(),

@@ -13,6 +13,7 @@ mod png;
 
 pub use error::PictureError;
 pub use file::{check_writable, read, write};
+pub(crate) use file::{replace, words};
 pub use image::Image;
 pub use png::{from_srgb, to_srgb};
 

@@ -1,0 +1,32 @@
+//! The census in the order in which it is told, by name.
+
+use halflight_core::census::{Census, EnvironmentKind};
+use halflight_core::scene::Scene;
+
+/// What `scene` holds: name and number. The names are JSON keys, and words with spaces for underscores.
+pub fn counts(census: &Census, scene: &Scene) -> Vec<(&'static str, u64)> {
+    let kinds = &census.surfaces;
+    vec![
+        ("vertices", scene.mesh.positions.len() as u64),
+        ("triangles", census.triangles),
+        ("degenerate", census.degenerate),
+        ("materials", census.materials),
+        ("textures", census.textures),
+        ("diffuse", kinds.diffuse),
+        ("mirror", kinds.mirror),
+        ("conductor", kinds.conductor),
+        ("glossy", kinds.glossy),
+        ("dielectric", kinds.dielectric),
+        ("rough_dielectric", kinds.rough_dielectric),
+        ("textured", census.textured),
+        ("normal_mapped", census.normal_mapped),
+        ("cutout", census.cutout),
+        ("specular", census.specular),
+        ("emissive", census.emissive),
+        ("emitters_facing_nothing", census.emitters_facing_nothing),
+        ("point_lights", census.point_lights),
+        ("spot_lights", census.spot_lights),
+        ("directional_lights", census.directional_lights),
+        ("environment", u64::from(census.environment != EnvironmentKind::None)),
+    ]
+}

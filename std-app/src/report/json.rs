@@ -1,0 +1,169 @@
+//! The objects of `--json`, which scripts rely on (docs/cli.md). `run.json` is the same.
+
+use super::{Maker, Race, Run};
+use crate::compare::Comparison;
+use crate::drive::{Against, Ending, ErrorEstimate, Place, Round, Shard};
+use halflight_core::census::Census;
+use halflight_core::film::Dropped;
+use serde_json::{Map, Value, json};
+
+/// A render.
+pub(super) fn run(run: &Run) -> Value {
+    let (result, settings) = (run.result, run.settings);
+    let plan = Census::of(run.scene).plan();
+    let left_out: Vec<Value> =
+        plan.left_out().map(|(what, why)| json!({ "what": what, "why": why })).collect();
+    let memory: Map<String, Value> =
+        result.memory.iter().map(|part| (part.structure.into(), part.bytes.into())).collect();
+    let shard = settings.shard;
+    json!({
+        "method": plan.method,
+        "width": settings.width,
+        "height": settings.height,
+        "spp": result.spp,
+        "rounds": result.rounds,
+        "seed": settings.seed,
+        "threads": result.threads,
+        "level": settings.level.name(),
+        "ending": match result.ending {
+            Ending::Done => "done",
+            Ending::Interrupted => "interrupted",
+        },
+        "seconds": {
+            "load": run.load_seconds,
+            "build": result.seconds.build,
+            "render": result.seconds.render,
+            "total": run.total_seconds,
+        },
+        "rays": result.counters.rays + result.counters.shadow_rays,
+        "shadow_rays": result.counters.shadow_rays,
+        "paths": result.counters.paths,
+        "mean_radiance": result.image.mean(),
+        "error": error(run),
+        "history": result.history.iter().map(round).collect::<Vec<_>>(),
+        "dropped": dropped_object(&result.counters.dropped, &result.places, result.empty_pixels),
+        "memory": memory,
+        "memory_peak": result.memory_peak,
+        "left_out": left_out,
+        "outputs": run.outputs,
+        "checkpoint": settings.checkpoint.as_ref().map(|checkpoint| &checkpoint.path),
+        "shard": (shard != Shard::WHOLE).then(|| [shard.index + 1, shard.count]),
+        "made": made(run.maker),
+    })
+}
+
+/// A race.
+pub(super) fn race(race: &Race) -> Value {
+    let racers = race.racers.iter().enumerate().map(|(index, racer)| {
+        let mut object = run(&racer.run);
+        object["name"] = racer.name.clone().into();
+        object["efficiency"] = race.efficiency(index).into();
+        object["ratio"] = race.ratio(index).map(|ratio| ratio.value).into();
+        object["ratio_interval"] = race.ratio(index).and_then(|ratio| ratio.interval).into();
+        object
+    });
+    let name = |index: usize| race.racers[index].name.as_str();
+    let leads = race.leads();
+    let leads =
+        leads.iter().map(|lead| json!({ "from": lead.from, "to": lead.to, "name": lead.who.map(name) }));
+    json!({
+        "time": race.seconds,
+        "against": if race.has_reference() { "reference" } else { "estimate" },
+        "methods": racers.collect::<Vec<_>>(),
+        "leads": leads.collect::<Vec<_>>(),
+        "made": made(race.maker),
+    })
+}
+
+fn made(maker: &Maker) -> Value {
+    json!({
+        "command": maker.command,
+        "version": maker.version,
+        "machine": maker.machine,
+        "processors": maker.processors,
+        "date": maker.date,
+    })
+}
+
+/// Against the reference where there is one, else as estimated; then `estimate` has the estimate too.
+fn error(run: &Run) -> Value {
+    let estimate = |against| estimate_object(run.result.error, against);
+    let Some(comparison) = run.comparison else { return estimate("estimate") };
+    let mut error = comparison_object(comparison);
+    error["interval"] = Value::Null;
+    error["against"] = "reference".into();
+    error["estimate"] = estimate("estimate");
+    error
+}
+
+/// The object of an estimate.
+pub fn estimate_object(error: Option<ErrorEstimate>, against: &str) -> Value {
+    match error {
+        Some(ErrorEstimate { relmse, lower, upper }) => {
+            json!({ "relmse": relmse, "interval": [lower, upper], "against": against })
+        }
+        None => json!({ "relmse": null, "interval": null, "against": against }),
+    }
+}
+
+/// An entry of `history`.
+fn round(round: &Round) -> Value {
+    let mut object = json!({
+        "seconds": round.seconds,
+        "spp": round.spp,
+        "rays": round.rays,
+        "relmse": round.error.map(|error| error.relmse),
+        "interval": round.error.map(|error| [error.lower, error.upper]),
+    });
+    if let Some(Against { linear, flip }) = round.reference {
+        object["reference"] =
+            json!({ "relmse": linear.relmse, "mse": linear.mse, "rmse": linear.rmse(), "flip": flip });
+    }
+    object
+}
+
+/// The object of `compare --json`. Errors that are infinite are `null`: JSON has no infinity.
+pub fn comparison_object(comparison: &Comparison) -> Value {
+    let linear = &comparison.linear;
+    json!({
+        "width": comparison.width,
+        "height": comparison.height,
+        "relmse": linear.relmse,
+        "mse": linear.mse,
+        "rmse": linear.rmse(),
+        "flip": comparison.flip,
+        "mean": linear.mean,
+        "reference_mean": linear.reference_mean,
+        "non_finite": linear.non_finite,
+        "reference_non_finite": linear.reference_non_finite,
+    })
+}
+
+/// Places that are listed: those with the most.
+const LISTED: usize = 64;
+
+/// The object `dropped`.
+pub fn dropped_object(dropped: &Dropped, places: &[Place], empty_pixels: u64) -> Value {
+    let mut object = causes(dropped);
+    object["empty_pixels"] = empty_pixels.into();
+    object["tiles"] = places.len().into();
+    let place = |place: &Place| {
+        let mut object = causes(&place.dropped);
+        object["x"] = place.x.into();
+        object["y"] = place.y.into();
+        object["width"] = place.width.into();
+        object["height"] = place.height.into();
+        object
+    };
+    object["places"] = places.iter().take(LISTED).map(place).collect();
+    object
+}
+
+fn causes(dropped: &Dropped) -> Value {
+    json!({
+        "nan": dropped.nan,
+        "infinite": dropped.infinite,
+        "negative": dropped.negative,
+        "unfinished": dropped.unfinished,
+    })
+}

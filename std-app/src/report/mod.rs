@@ -1,0 +1,94 @@
+//! Reports: one page that a person likes to read, `curve.csv` and `run.json` for programs. The page is a
+//! single file that asks for nothing else: pictures are in it as data, charts as SVG.
+
+mod census;
+mod curve;
+mod fit;
+mod folder;
+mod json;
+mod maker;
+mod page;
+mod race;
+pub mod words;
+
+pub use census::counts;
+pub use folder::{check_folder, write_folder};
+pub use json::{comparison_object, dropped_object, estimate_object};
+pub use maker::Maker;
+pub use race::{Race, Racer};
+
+use crate::compare::Comparison;
+use crate::drive::{RenderResult, Settings};
+use crate::save::Image;
+use halflight_core::scene::Scene;
+use serde_json::Value;
+use std::path::PathBuf;
+
+/// A render that is done, and all that is told about it.
+pub struct Run<'a> {
+    /// What was rendered.
+    pub scene: &'a Scene<'a>,
+    /// The name of its file.
+    pub name: &'a str,
+    /// What the loader repaired.
+    pub repairs: &'a [String],
+    /// How it was rendered.
+    pub settings: &'a Settings,
+    /// What came out.
+    pub result: &'a RenderResult,
+    /// How it differs from the reference of the settings.
+    pub comparison: Option<&'a Comparison>,
+    /// The pictures that were saved.
+    pub outputs: &'a [PathBuf],
+    /// Seconds of loading.
+    pub load_seconds: f64,
+    /// Seconds from the start of the program to the last picture saved.
+    pub total_seconds: f64,
+    /// Who made it.
+    pub maker: &'a Maker,
+}
+
+/// The files of a report by name.
+pub type Files = Vec<(&'static str, Vec<u8>)>;
+
+impl Run<'_> {
+    /// The object of `--json`, which scripts rely on (docs/cli.md).
+    pub fn object(&self) -> Value {
+        json::run(self)
+    }
+
+    /// The files of its report: `index.html`, `curve.csv`, `run.json`.
+    pub fn files(&self) -> Files {
+        files(page::run(self), curve::csv(&[(None, &self.result.history)]), &self.object())
+    }
+
+    fn reference(&self) -> Option<&Image> {
+        self.settings.reference.as_deref()
+    }
+}
+
+impl Race<'_> {
+    /// The object of `--json`, which scripts rely on (docs/cli.md).
+    pub fn object(&self) -> Value {
+        json::race(self)
+    }
+
+    /// The files of its report: `index.html`, `curve.csv`, `run.json`.
+    pub fn files(&self) -> Files {
+        let curves: Vec<_> = self
+            .racers
+            .iter()
+            .map(|racer| (Some(racer.name.as_str()), racer.run.result.history.as_slice()))
+            .collect();
+        files(page::race(self), curve::csv(&curves), &self.object())
+    }
+}
+
+fn files(page: String, curve: String, object: &Value) -> Files {
+    let object = format!("{object:#}\n");
+    vec![
+        ("index.html", page.into_bytes()),
+        ("curve.csv", curve.into_bytes()),
+        ("run.json", object.into_bytes()),
+    ]
+}

@@ -1,0 +1,145 @@
+//! What the pages of renders and of races share: where time and memory went, what the scene holds and what was
+//! left out, the ledger of dropped samples, and how the picture was made.
+
+use super::escape;
+use crate::report::words::{grouped, number, plural, readable_bytes, readable_seconds};
+use crate::report::{Maker, Run, counts};
+use core::fmt::Write;
+use halflight_core::census::Census;
+
+/// Rows of a name, an amount in words, and a bar of its share of the largest.
+fn bars(caption: &str, rows: &[(String, String, f64)]) -> String {
+    let most = rows.iter().map(|row| row.2).fold(f64::MIN_POSITIVE, f64::max);
+    let row = |(name, amount, value): &(String, String, f64)| {
+        let width = 100.0 * value / most;
+        format!(
+            "<tr><th scope=\"row\">{}</th><td>{amount}</td>\
+             <td class=\"bar\" aria-hidden=\"true\"><i style=\"width:{width:.2}%\"></i></td></tr>",
+            escape(name)
+        )
+    };
+    let rows: String = rows.iter().map(row).collect();
+    format!("<table class=\"bars\"><caption>{caption}</caption><tbody>{rows}</tbody></table>")
+}
+
+/// Seconds of each phase.
+pub(super) fn time(run: &Run) -> String {
+    let seconds = &run.result.seconds;
+    let rest = run.total_seconds - run.load_seconds - seconds.build - seconds.render;
+    let other = if run.comparison.is_some() { "comparing and saving" } else { "saving and the rest" };
+    let rows = [
+        ("loading", run.load_seconds),
+        ("building", seconds.build),
+        ("rendering", seconds.render),
+        (other, rest.max(0.0)),
+    ];
+    bars("Time", &rows.map(|(name, seconds)| (name.into(), readable_seconds(seconds), seconds)))
+}
+
+/// Bytes of each structure.
+pub(super) fn memory(run: &Run) -> String {
+    let row = |name: &str, bytes: usize| (name.into(), readable_bytes(bytes), bytes as f64);
+    let mut rows: Vec<_> = run.result.memory.iter().map(|part| row(part.structure, part.bytes)).collect();
+    rows.push(row("at the peak", run.result.memory_peak));
+    bars("Memory", &rows)
+}
+
+/// What the scene holds, as a table.
+pub(super) fn census(run: &Run) -> String {
+    let census = Census::of(run.scene);
+    let mut rows = String::new();
+    for (name, count) in counts(&census, run.scene).into_iter().filter(|(_, count)| *count > 0) {
+        let name = name.replace('_', " ");
+        // Writing to a string does not fail.
+        let _ = write!(rows, "<tr><th scope=\"row\">{name}</th><td>{}</td></tr>", grouped(count));
+    }
+    format!("<table class=\"counts\"><caption>The scene holds</caption><tbody>{rows}</tbody></table>")
+}
+
+/// What was left out and why.
+pub(super) fn left_out(run: &Run) -> String {
+    let plan = Census::of(run.scene).plan();
+    let rows: String = plan
+        .left_out()
+        .map(|(what, why)| {
+            format!("<tr><th scope=\"row\">{}</th><td>{}</td></tr>", escape(what), escape(why))
+        })
+        .collect();
+    if rows.is_empty() {
+        return "<p>Nothing was left out: the scene needs all of it.</p>".into();
+    }
+    format!("<table class=\"counts\"><caption>Left out, and why</caption><tbody>{rows}</tbody></table>")
+}
+
+/// What the loader repaired.
+pub(super) fn repairs(run: &Run) -> String {
+    if run.repairs.is_empty() {
+        return String::new();
+    }
+    let items: String = run.repairs.iter().map(|repair| format!("<li>{}</li>", escape(repair))).collect();
+    format!("<h3>Repaired while loading</h3><ul>{items}</ul>")
+}
+
+/// The samples that did not reach the picture.
+pub(super) fn ledger(run: &Run) -> String {
+    let (dropped, paths) = (&run.result.counters.dropped, run.result.counters.paths);
+    if dropped.total() == 0 {
+        return format!("<p>Not one of {} samples had to be dropped.</p>", grouped(paths));
+    }
+    let row = |(cause, what, count): &(&str, &str, u64)| {
+        let share = number(100.0 * *count as f64 / paths.max(1) as f64, 2);
+        format!(
+            "<tr><th scope=\"row\">{cause}</th><td>{}</td><td>{share} %</td><td class=\"text\">{what}</td></tr>",
+            grouped(*count)
+        )
+    };
+    let rows: String = [
+        ("not a number", "left out of the picture", dropped.nan),
+        ("infinite", "left out of the picture", dropped.infinite),
+        ("negative", "left out of the picture", dropped.negative),
+        (
+            "unfinished",
+            "cut at the technical limit of paths; what they saw up to there is in the picture",
+            dropped.unfinished,
+        ),
+    ]
+    .iter()
+    .map(row)
+    .collect();
+    format!(
+        "<p>{} of {} samples did not reach the picture whole.</p><div class=\"scroll\" tabindex=\"0\" role=\"region\" \
+         aria-label=\"Dropped samples\"><table class=\"numbers\"><thead><tr><th scope=\"col\">cause</th>\
+         <th scope=\"col\">samples</th><th scope=\"col\">of all</th><th scope=\"col\" class=\"text\">and then</th></tr></thead>\
+         <tbody>{rows}</tbody></table></div>",
+        grouped(dropped.total()),
+        grouped(paths)
+    )
+}
+
+/// Name and value pairs of a `dl`. The values are HTML.
+pub(super) fn facts(pairs: &[(&str, String)]) -> String {
+    pairs.iter().map(|(name, value)| format!("<div><dt>{name}</dt><dd>{value}</dd></div>")).collect()
+}
+
+/// Command, machine and settings.
+pub(super) fn made(maker: &Maker, run: &Run) -> String {
+    let (settings, result) = (run.settings, run.result);
+    let plan = Census::of(run.scene).plan();
+    let depth = settings.max_depth.map_or("no limit".into(), |depth| plural(depth.into(), "segment"));
+    let pairs = [
+        ("Method", format!("{}, compiled for: {}", plan.method, plan.features.name())),
+        ("Size", format!("{} × {} pixels", settings.width, settings.height)),
+        ("Longest path", depth),
+        ("Seed", settings.seed.to_string()),
+        ("Threads", format!("{} of {}", result.threads, maker.processors)),
+        ("Instructions", settings.level.name().to_owned()),
+        ("Machine", escape(&maker.machine)),
+        ("Program", maker.version.to_owned()),
+        ("Date", maker.date.clone()),
+    ];
+    format!(
+        "<pre class=\"scroll\" tabindex=\"0\"><code>{}</code></pre><dl class=\"made\">{}</dl>",
+        escape(&maker.shell()),
+        facts(&pairs)
+    )
+}

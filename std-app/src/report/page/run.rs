@@ -1,0 +1,183 @@
+//! The page of one render.
+
+use super::map::{Map, difference};
+use super::picture::{exposable, reduced};
+use super::{error, escape, fill, parts, shell};
+use crate::compare::Shown;
+use crate::drive::Ending;
+use crate::report::Run;
+use crate::report::words::{grouped, number, readable_bytes, readable_seconds};
+use crate::save::Image;
+
+/// Pixels on each side over which the maps of the error are averaged for the eye: a variance from two halves
+/// is itself off by a factor.
+const SMOOTHING: usize = 2;
+
+/// The whole page.
+pub(in crate::report) fn page(run: &Run) -> String {
+    let (picture, factor) = reduced(&run.result.image);
+    let chart = error::chart(run);
+    let body = fill(
+        include_str!("run.html"),
+        &[
+            ("name", &escape(run.name)),
+            ("layout", layout(&picture)),
+            ("lead", &error::lead(run)),
+            ("early", early(run)),
+            ("picture", &exposable(&picture, &format!("The picture of {}", run.name))),
+            ("smaller", &smaller(factor)),
+            ("facts", &parts::facts(&facts(run))),
+            ("slopes", &error::slopes(&chart)),
+            ("chart", &chart.figure()),
+            ("rounds", &error::rounds(run)),
+            ("maps", &maps(run)),
+            ("note", &note(run)),
+            ("reference", &reference(run)),
+            ("time", &parts::time(run)),
+            ("memory", &parts::memory(run)),
+            ("census", &parts::census(run)),
+            ("left_out", &parts::left_out(run)),
+            ("repairs", &parts::repairs(run)),
+            ("ledger", &parts::ledger(run)),
+            ("made", &parts::made(run.maker, run)),
+        ],
+    );
+    shell(&format!("{} – halflight", run.name), &body)
+}
+
+fn early(run: &Run) -> &'static str {
+    match run.result.ending {
+        Ending::Done => "",
+        Ending::Interrupted => " It was stopped early.",
+    }
+}
+
+/// Whether there is room for words beside a picture: its class in the style sheet.
+pub(super) fn layout(image: &Image) -> &'static str {
+    if image.width > image.height / 5 * 7 { "wide" } else { "tall" }
+}
+
+/// What is said of a picture that is shown smaller.
+pub(super) fn smaller(factor: u32) -> String {
+    if factor == 1 { String::new() } else { format!("<p>Shown at 1/{factor} of its size.</p>") }
+}
+
+fn facts(run: &Run) -> Vec<(&'static str, String)> {
+    let result = run.result;
+    let rays = result.counters.rays + result.counters.shadow_rays;
+    let speed = rays as f64 / result.seconds.render.max(1e-9) * 1e-6;
+    let dropped = match result.counters.dropped.total() {
+        0 => "none".into(),
+        count => grouped(count),
+    };
+    vec![
+        ("Samples per pixel", grouped(result.spp.into())),
+        ("Rendering", readable_seconds(result.seconds.render)),
+        ("Rays per second", format!("{} million", number(speed, 2))),
+        ("Memory at the peak", readable_bytes(result.memory_peak)),
+        ("Dropped samples", dropped),
+    ]
+}
+
+/// The maps of what is known of each pixel.
+fn maps(run: &Run) -> String {
+    let result = run.result;
+    let mut maps = String::new();
+    if result.error.is_some() {
+        let width = result.image.width;
+        let mean = |pixel: &[f32; 3]| pixel.iter().sum::<f32>() / 3.0;
+        let map = |values: Vec<f32>| Map { width, values }.smoothed(SMOOTHING);
+        let root = |map: Map| Map { values: map.values.iter().map(|value| value.sqrt()).collect(), ..map };
+        let variance: Vec<f32> = result.variance.pixels.iter().map(mean).collect();
+        let whole = result.image.mean().iter().sum::<f64>() / 3.0;
+        let floor = (0.01 * whole * whole) as f32;
+        let pixels = result.variance.pixels.iter().zip(&result.image.pixels);
+        let relative = pixels.map(|(v, i)| mean(&core::array::from_fn(|c| v[c] / (i[c] * i[c] + floor))));
+        let each = variance.iter().zip(&result.samples).map(|(v, &n)| v * n as f32);
+        maps += &root(map(variance.clone())).figure(
+            "Standard error",
+            "How far each pixel is likely to be from the truth: the standard deviation of its mean, in W/(m² sr).",
+        );
+        maps += &root(map(relative.collect())).figure(
+            "Relative error",
+            "The same over the brightness of the pixel, as relMSE counts it: where this is bright, the error is made.",
+        );
+        maps += &map(each.collect()).figure(
+            "Variance of a sample",
+            "How noisy the light is there, however many samples are taken, in (W/(m² sr))².",
+        );
+    }
+    maps + &samples(run)
+}
+
+/// The map of samples, where they differ from pixel to pixel.
+fn samples(run: &Run) -> String {
+    let samples = &run.result.samples;
+    let (least, most) = (samples.iter().min().copied(), samples.iter().max().copied());
+    match (least, most) {
+        (Some(least), Some(most)) if least != most => {
+            let values = samples.iter().map(|&count| count as f32).collect();
+            Map { width: run.result.image.width, values }.figure(
+                "Samples",
+                &format!(
+                    "Samples of each pixel, from {} to {}.",
+                    grouped(least.into()),
+                    grouped(most.into())
+                ),
+            )
+        }
+        _ => String::new(),
+    }
+}
+
+/// The words under the maps.
+fn note(run: &Run) -> String {
+    let samples = &run.result.samples;
+    let even = samples.first().filter(|first| samples.iter().all(|count| count == *first));
+    let samples =
+        even.map(|&count| format!("Every pixel has the same number of samples: {}. ", grouped(count.into())));
+    let maps = run.result.error.map(|_| {
+        let side = 2 * SMOOTHING + 1;
+        format!(
+            "Estimated from the halves of each pixel, and averaged over {side} × {side} pixels for the eye. Scales are \
+             logarithmic and leave out the lowest hundredth and the highest two-hundredth of the pixels."
+        )
+    });
+    samples.unwrap_or_default() + &maps.unwrap_or_default()
+}
+
+/// The section that lays the picture beside its reference.
+fn reference(run: &Run) -> String {
+    let (Some(reference), Some(comparison)) = (run.reference(), run.comparison) else { return String::new() };
+    let image = &run.result.image;
+    let values = |shown| comparison.values(image, reference, shown);
+    let maps = difference(
+        &values(Shown::Relative),
+        Shown::Relative,
+        "Relative difference",
+        "Blue where the picture is too dark, red where it is too bright; the mean of the square is the relMSE.",
+    ) + &difference(
+        &values(Shown::Flip),
+        Shown::Flip,
+        "FLIP",
+        "How different it looks at 67 pixels per degree, as a PNG shows it: 0 not at all, 1 as much as can be.",
+    );
+    let linear = &comparison.linear;
+    let percent = 100.0 * (linear.mean / linear.reference_mean - 1.0);
+    let facts = [
+        ("relMSE", number(linear.relmse, 3)),
+        ("RMSE", number(linear.rmse(), 3)),
+        ("FLIP", number(comparison.flip, 3)),
+        ("Mean, against the reference", format!("{}&#8239;%", number(percent, 2))),
+    ];
+    fill(
+        include_str!("reference.html"),
+        &[
+            ("layout", layout(image)),
+            ("picture", &exposable(&reduced(image).0, "The picture")),
+            ("reference", &exposable(&reduced(reference).0, "The reference")),
+            ("facts", &parts::facts(&facts)),
+            ("maps", &maps),
+        ],
+    )
+}
