@@ -15,7 +15,8 @@ fn files(folder: &Path) -> usize {
 #[test]
 fn help_and_version_are_no_errors() {
     let folder = Folder::new("help");
-    for arguments in ["--help", "render --help", "compare --help", "info --help", "--version"] {
+    for arguments in ["--help", "render --help", "compare --help", "race --help", "info --help", "--version"]
+    {
         let output = folder.run(arguments);
         assert_eq!(output.status.code(), Some(0), "{arguments}");
         assert!(!output.stdout.is_empty(), "{arguments}");
@@ -54,6 +55,17 @@ fn wrong_usage_is_refused_before_anything_is_written() {
         ("compare missing.exr missing.exr --difference signed", "--output"),
         ("compare missing.exr missing.exr -o d.hdr --difference relative", "no values below zero"),
         ("compare missing.exr missing.exr -o d.png --difference loud", "signed, absolute, relative, flip"),
+        ("render scene.obj --report no/such/report", "no/such/report"),
+        ("render scene.obj --report scene.obj", "it is a file, not a folder"),
+        ("race scene.obj --time 1s", "--methods"),
+        ("race scene.obj --methods path", "--time"),
+        ("race scene.obj --methods path --time never", "30s, 2m or 1h"),
+        ("race scene.obj --methods path,photons --time 1s", "the methods are auto, path"),
+        ("race scene.obj --methods path:sparkle=1 --time 1s", "there is no option `sparkle`"),
+        ("race scene.obj --methods path:seed=x --time 1s", "seed"),
+        ("race scene.obj --methods path,path --time 1s", "path is in the race twice"),
+        ("race scene.obj --methods path --time 1s --report scene.mtl", "it is a file, not a folder"),
+        ("race missing.obj --methods path --time 1s", "missing.obj"),
         ("info missing.toml", "missing.toml"),
         ("bench", "rays"),
         ("bench rays missing.obj", "missing.obj"),
@@ -96,6 +108,57 @@ fn a_render_writes_every_picture_and_says_the_contract() {
     assert_eq!(object["mean_radiance"].as_array().unwrap().len(), 3);
     let left_out = object["left_out"].as_array().unwrap();
     assert!(left_out.iter().all(|entry| entry["what"].is_string() && entry["why"].is_string()));
+}
+
+#[test]
+fn a_report_is_a_page_a_curve_and_the_same_object() {
+    let folder = Folder::new("report");
+    let object = folder.object("render scene.obj -o a.png --size 20x16 --spp 16 --report out --json");
+    let text = |name: &str| std::fs::read_to_string(folder.path("out").join(name)).unwrap();
+    assert_eq!(serde_json::from_str::<Value>(&text("run.json")).unwrap(), object);
+    assert_eq!(text("curve.csv").lines().count(), 1 + object["history"].as_array().unwrap().len());
+    let page = text("index.html");
+    assert!(page.starts_with("<!doctype html>") && page.ends_with("</html>\n"));
+    for words in ["scene.obj", "Error against run time", "Standard error", "emissive", "--report out"] {
+        assert!(page.contains(words), "{words}");
+    }
+    assert_eq!(files(&folder.path("out")), 3);
+    assert_eq!(object["made"]["command"][1], "render");
+
+    // Again into the same folder; and of what has no error to draw.
+    folder.object("render scene.obj -o a.png --size 3x5 --spp 1 --report out --json");
+    folder.object(
+        "render scene.obj -o a.png --size 1x1 --spp 4 --eye 0,50,0 --look-at 0,90,1 --report out --json",
+    );
+}
+
+#[test]
+fn a_race_tells_who_is_ahead() {
+    let folder = Folder::new("race");
+    let object = folder.object(
+        "race scene.obj --methods path,path:max-depth=1:seed=4 --time 400ms --size 16x16 --report out --json",
+    );
+    let methods = object["methods"].as_array().unwrap();
+    assert_eq!(methods.len(), 2);
+    assert_eq!((&methods[1]["name"], &methods[1]["seed"]), (&"path:max-depth=1:seed=4".into(), &4.into()));
+    for method in methods {
+        let (error, seconds) = (&method["error"]["relmse"], &method["seconds"]["render"]);
+        assert!(seconds.as_f64().unwrap() > 0.1, "{seconds}");
+        let efficiency = 1.0 / (error.as_f64().unwrap() * seconds.as_f64().unwrap());
+        assert!((method["efficiency"].as_f64().unwrap() / efficiency - 1.0).abs() < 1e-9);
+    }
+    assert_eq!(methods[0]["ratio"], 1.0);
+    assert_eq!(object["against"], "estimate");
+    let csv = std::fs::read_to_string(folder.path("out/curve.csv")).unwrap();
+    assert!(csv.starts_with("method,seconds,") && csv.contains("\npath:max-depth=1:seed=4,"), "{csv}");
+    let page = std::fs::read_to_string(folder.path("out/index.html")).unwrap();
+    assert!(page.contains("a race of 2 methods") && page.contains("<option>path:max-depth=1:seed=4"));
+
+    folder.object("render scene.obj -o r.exr --size 16x16 --spp 256 --seed 9 --json");
+    let text =
+        folder.run("race scene.obj --methods path,auto --time 200ms --size 16x16 --reference r.exr").stdout;
+    let text = String::from_utf8(text).unwrap();
+    assert!(text.contains("against the reference") && text.contains("efficiency"), "{text}");
 }
 
 #[test]

@@ -6,6 +6,8 @@
 //! correlation √(s/t), and their squares s/t. That is a Markov chain in log t; subtracting from each point
 //! what the one before foretells leaves independent ones, to which ordinary least squares applies.
 
+use crate::drive::ErrorEstimate;
+
 /// A point of a curve.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Point {
@@ -13,9 +15,21 @@ pub(super) struct Point {
     pub(super) seconds: f64,
     /// The error.
     pub(super) error: f64,
-    /// Its standard deviation over the error; the scale, common to all points, does not matter.
+    /// Standard deviation of its logarithm; the scale, common to all points, does not matter.
     pub(super) spread: f64,
 }
+
+/// Standard deviation of the logarithm of an error, from its interval.
+pub(super) fn log_deviation(error: &ErrorEstimate) -> f64 {
+    if error.lower > 0.0 {
+        (error.upper / error.lower).ln() / (2.0 * NORMAL_95)
+    } else {
+        (error.upper / error.relmse).ln() / NORMAL_95
+    }
+}
+
+/// Standard deviations on both sides of a normal mean that hold 95 %.
+pub(super) const NORMAL_95: f64 = 1.96;
 
 /// The line error = exp(level) · seconds^slope.
 #[derive(Clone, Copy, Debug)]

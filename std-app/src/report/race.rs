@@ -1,5 +1,6 @@
 //! Several methods on one scene for the same time: who is ahead when, and by how much in the end.
 
+use super::fit::{NORMAL_95, log_deviation};
 use super::{Maker, Run};
 use crate::drive::Round;
 
@@ -40,9 +41,6 @@ pub struct Lead {
     /// Index of the method with the smallest error; `None` where the intervals do not tell.
     pub who: Option<usize>,
 }
-
-/// Standard deviations on both sides of a normal mean that hold 95 %.
-const NORMAL_95: f64 = 1.96;
 
 /// What is known of the error after a round: ln relMSE, and its standard deviation, 0 against a reference.
 #[derive(Clone, Copy)]
@@ -85,19 +83,25 @@ impl Race<'_> {
 
     /// Who is ahead, from the first picture of any to the last of all.
     pub fn leads(&self) -> Vec<Lead> {
-        let histories: Vec<&[Round]> =
-            self.racers.iter().map(|racer| racer.run.result.history.as_slice()).collect();
-        leads(&histories)
+        let curves: Vec<Curve> = self.racers.iter().map(|racer| curve(&racer.run.result.history)).collect();
+        leads(&curves)
     }
+}
+
+/// Seconds, and what is known then.
+type Curve = Vec<(f64, Known)>;
+
+fn curve(history: &[Round]) -> Curve {
+    history.iter().filter_map(|round| Some((round.seconds, known(round)?))).collect()
 }
 
 /// Times at which the leader is asked for, evenly on a logarithmic axis.
 const MOMENTS: u32 = 200;
 
-fn leads(histories: &[&[Round]]) -> Vec<Lead> {
-    let known_rounds = || histories.iter().flat_map(|rounds| rounds.iter()).filter(|r| known(r).is_some());
-    let first = known_rounds().map(|round| round.seconds).fold(f64::INFINITY, f64::min);
-    let last = known_rounds().map(|round| round.seconds).fold(0.0, f64::max);
+fn leads(curves: &[Curve]) -> Vec<Lead> {
+    let first =
+        curves.iter().filter_map(|curve| curve.first()).map(|(at, _)| *at).fold(f64::INFINITY, f64::min);
+    let last = curves.iter().filter_map(|curve| curve.last()).map(|(at, _)| *at).fold(0.0, f64::max);
     if first >= last {
         return Vec::new();
     }
@@ -105,7 +109,7 @@ fn leads(histories: &[&[Round]]) -> Vec<Lead> {
     let mut leads: Vec<Lead> = Vec::new();
     for i in 0..MOMENTS {
         let (from, to) = (moment(i), moment(i + 1));
-        let who = leader(histories, (from * to).sqrt());
+        let who = leader(curves, (from * to).sqrt());
         match leads.last_mut() {
             Some(lead) if lead.who == who => lead.to = to,
             _ => leads.push(Lead { from, to, who }),
@@ -115,12 +119,9 @@ fn leads(histories: &[&[Round]]) -> Vec<Lead> {
 }
 
 /// Who has the smallest error after `seconds`, among those who have a picture by then.
-fn leader(histories: &[&[Round]], seconds: f64) -> Option<usize> {
-    let mut standing: Vec<(usize, Known)> = histories
-        .iter()
-        .enumerate()
-        .filter_map(|(index, rounds)| Some((index, at(rounds, seconds)?)))
-        .collect();
+fn leader(curves: &[Curve], seconds: f64) -> Option<usize> {
+    let mut standing: Vec<(usize, Known)> =
+        curves.iter().enumerate().filter_map(|(index, curve)| Some((index, at(curve, seconds)?))).collect();
     standing.sort_by(|a, b| a.1.log.total_cmp(&b.1.log));
     match standing.as_slice() {
         [] => None,
@@ -134,14 +135,11 @@ fn leader(histories: &[&[Round]], seconds: f64) -> Option<usize> {
 
 /// What is known after `seconds`: a straight line between rounds, on logarithmic axes; after the last round,
 /// that.
-fn at(rounds: &[Round], seconds: f64) -> Option<Known> {
-    let after = rounds.partition_point(|round| round.seconds <= seconds);
-    let before = known(rounds.get(after.checked_sub(1)?)?)?;
-    let Some((round, next)) = rounds.get(after).and_then(|round| Some((round, known(round)?))) else {
-        return Some(before);
-    };
-    let start = rounds[after - 1].seconds;
-    let share = (seconds / start).ln() / (round.seconds / start).ln();
+fn at(curve: &[(f64, Known)], seconds: f64) -> Option<Known> {
+    let after = curve.partition_point(|(at, _)| *at <= seconds);
+    let (start, before) = *curve.get(after.checked_sub(1)?)?;
+    let Some(&(end, next)) = curve.get(after) else { return Some(before) };
+    let share = (seconds / start).ln() / (end / start).ln();
     let mix = |a: f64, b: f64| a + share * (b - a);
     Some(Known { log: mix(before.log, next.log), deviation: mix(before.deviation, next.deviation) })
 }
@@ -150,10 +148,7 @@ fn at(rounds: &[Round], seconds: f64) -> Option<Known> {
 fn known(round: &Round) -> Option<Known> {
     let known = match (round.reference, round.error) {
         (Some(reference), _) => Known { log: reference.linear.relmse.ln(), deviation: 0.0 },
-        (None, Some(error)) => Known {
-            log: error.relmse.ln(),
-            deviation: (error.upper - error.lower) / (2.0 * NORMAL_95 * error.relmse),
-        },
+        (None, Some(error)) => Known { log: error.relmse.ln(), deviation: log_deviation(&error) },
         (None, None) => return None,
     };
     (known.log.is_finite() && known.deviation.is_finite()).then_some(known)
@@ -164,7 +159,7 @@ mod tests {
     use super::*;
     use crate::drive::ErrorEstimate;
 
-    fn rounds(error: impl Fn(f64) -> f64, spread: f64) -> Vec<Round> {
+    fn rounds(error: impl Fn(f64) -> f64, spread: f64) -> Curve {
         let times = (0..10).map(|i| f64::from(1 << i) * 0.1);
         let round = |seconds: f64| {
             let relmse = error(seconds);
@@ -172,13 +167,13 @@ mod tests {
             let error = Some(ErrorEstimate { relmse, lower, upper });
             Round { seconds, spp: 1, rays: 1, error, reference: None }
         };
-        times.map(round).collect()
+        curve(&times.map(round).collect::<Vec<_>>())
     }
 
     #[test]
     fn the_lead_changes_where_the_curves_cross() {
         let (slow, fast) = (rounds(|t| 0.1 * t.powf(-0.5), 0.001), rounds(|t| 0.2 / t, 0.001));
-        let leads = leads(&[&slow, &fast]);
+        let leads = leads(&[slow, fast]);
         let who: Vec<_> = leads.iter().map(|lead| lead.who).collect();
         assert_eq!(who.first(), Some(&Some(0)));
         assert_eq!(who.last(), Some(&Some(1)));
@@ -190,9 +185,9 @@ mod tests {
     #[test]
     fn intervals_that_overlap_leave_it_open() {
         let (a, b) = (rounds(|t| 1.0 / t, 0.2), rounds(|t| 1.1 / t, 0.2));
-        assert!(leads(&[&a, &b]).iter().all(|lead| lead.who.is_none()));
-        assert!(leads(&[&a, &rounds(|t| 9.0 / t, 0.2)]).iter().all(|lead| lead.who == Some(0)));
-        assert!(leads(&[&a]).iter().all(|lead| lead.who == Some(0)), "nobody else");
-        assert!(leads(&[&a[..1]]).is_empty() && leads(&[]).is_empty());
+        assert!(leads(&[a.clone(), b]).iter().all(|lead| lead.who.is_none()));
+        assert!(leads(&[a.clone(), rounds(|t| 9.0 / t, 0.2)]).iter().all(|lead| lead.who == Some(0)));
+        assert!(leads(core::slice::from_ref(&a)).iter().all(|lead| lead.who == Some(0)), "nobody else");
+        assert!(leads(&[a[..1].into()]).is_empty() && leads(&[]).is_empty());
     }
 }

@@ -3,11 +3,8 @@
 use super::chart::{Chart, Series};
 use crate::drive::{ErrorEstimate, Round};
 use crate::report::Run;
-use crate::report::fit::{Fit, Point};
+use crate::report::fit::{Fit, Point, log_deviation};
 use crate::report::words::{grouped, number, readable_seconds};
-
-/// Standard deviations on both sides of a normal mean that hold 95 %.
-const NORMAL_95: f64 = 1.96;
 
 /// `a × 10⁻³`, in 2 digits.
 fn short(value: f64) -> String {
@@ -85,7 +82,7 @@ pub(super) fn estimated(history: &[Round], name: &str, style: usize) -> Series {
     let point = |(seconds, error): (f64, ErrorEstimate)| Point {
         seconds,
         error: error.relmse,
-        spread: spread(error),
+        spread: log_deviation(&error),
     };
     Series {
         name: name.into(),
@@ -100,12 +97,8 @@ pub(super) fn estimated(history: &[Round], name: &str, style: usize) -> Series {
 pub(super) fn measured(history: &[Round], name: &str, style: usize) -> Series {
     let known = || history.iter().filter_map(|round| Some((round, round.reference?.linear.relmse)));
     let known = || known().filter(|(_, relmse)| *relmse > 0.0 && relmse.is_finite());
-    // The true error of a round strays from its mean as the estimate does.
-    let point = |(round, error): (&Round, f64)| Point {
-        seconds: round.seconds,
-        error,
-        spread: round.error.map_or(1.0, spread),
-    };
+    // No interval is known; the errors of all rounds stray from their means by about the same factor.
+    let point = |(round, error): (&Round, f64)| Point { seconds: round.seconds, error, spread: 1.0 };
     Series {
         name: name.into(),
         style,
@@ -113,11 +106,6 @@ pub(super) fn measured(history: &[Round], name: &str, style: usize) -> Series {
         band: Vec::new(),
         fit: Fit::through(known().map(point)),
     }
-}
-
-/// Standard deviation of an estimate over the estimate.
-fn spread(error: ErrorEstimate) -> f64 {
-    (error.upper - error.lower) / (2.0 * NORMAL_95 * error.relmse)
 }
 
 /// What the slope of the curves is, and what it promises.

@@ -4,7 +4,7 @@ use super::picture::{img, reduced};
 use super::{escape, fill};
 use crate::compare::heat::{HEAT, SIGNED, heat};
 use crate::compare::{Shown, false_colours};
-use crate::report::words::number;
+use crate::report::words::{grouped, number};
 use crate::save::{Image, from_srgb};
 
 /// Widest scale that is shown.
@@ -43,12 +43,22 @@ impl Map {
             );
         };
         let low = low.max(high / MOST_RANGE).min(high / LEAST_RANGE);
-        let place = |value: f32| (value / low).ln() / (high / low).ln();
-        let colour = |&value: &f32| heat(if value > 0.0 { place(value) } else { 0.0 }).map(from_srgb);
-        let height = (self.values.len() / self.width.max(1) as usize) as u32;
-        let colours = Image { width: self.width, height, pixels: self.values.iter().map(colour).collect() };
+        let place = |value: f32| if value > 0.0 { (value / low).ln() / (high / low).ln() } else { 0.0 };
         let labels = [low, (low * high).sqrt(), high].map(|value| number(value.into(), 2));
-        figure(&colours, title, words, &HEAT, &labels)
+        figure(&self.coloured(place), title, words, &HEAT, &labels)
+    }
+
+    /// A figure of counts, on a linear scale from the least to the most.
+    pub(super) fn counts_figure(&self, title: &str, words: &str, least: u32, most: u32) -> String {
+        let (low, high) = (least as f32, most as f32);
+        let labels = [least, least + (most - least) / 2, most].map(|count| grouped(count.into()));
+        figure(&self.coloured(|value| (value - low) / (high - low)), title, words, &HEAT, &labels)
+    }
+
+    fn coloured(&self, place: impl Fn(f32) -> f32) -> Image {
+        let height = (self.values.len() / self.width.max(1) as usize) as u32;
+        let pixels = self.values.iter().map(|&value| heat(place(value)).map(from_srgb)).collect();
+        Image { width: self.width, height, pixels }
     }
 }
 

@@ -80,39 +80,79 @@ pub(super) fn repairs(run: &Run) -> String {
     format!("<h3>Repaired while loading</h3><ul>{items}</ul>")
 }
 
-/// The samples that did not reach the picture.
+/// The samples that did not reach the picture: how many, why, where.
 pub(super) fn ledger(run: &Run) -> String {
     let (dropped, paths) = (&run.result.counters.dropped, run.result.counters.paths);
     if dropped.total() == 0 {
         return format!("<p>Not one of {} samples had to be dropped.</p>", grouped(paths));
     }
-    let row = |(cause, what, count): &(&str, &str, u64)| {
-        let share = number(100.0 * *count as f64 / paths.max(1) as f64, 2);
-        format!(
-            "<tr><th scope=\"row\">{cause}</th><td>{}</td><td>{share} %</td><td class=\"text\">{what}</td></tr>",
-            grouped(*count)
-        )
+    let outside = "left out of the picture";
+    let cut = "cut at the technical limit of paths; what they saw up to there is in the picture";
+    let rows = [
+        ("not a number", outside, dropped.nan),
+        ("infinite", outside, dropped.infinite),
+        ("negative", outside, dropped.negative),
+        ("unfinished", cut, dropped.unfinished),
+    ];
+    let rows = rows.map(|(cause, then, count)| {
+        let share = number(100.0 * count as f64 / paths.max(1) as f64, 2);
+        vec![cause.into(), grouped(count), format!("{share}&#8239;%"), then.into()]
+    });
+    let causes = table("Dropped samples", &["cause", "samples", "of all", "and then"], &rows);
+    let black = match run.result.empty_pixels {
+        0 => String::new(),
+        count => format!(" {} are black for want of any sample.", grouped(count) + " pixels"),
     };
-    let rows: String = [
-        ("not a number", "left out of the picture", dropped.nan),
-        ("infinite", "left out of the picture", dropped.infinite),
-        ("negative", "left out of the picture", dropped.negative),
-        (
-            "unfinished",
-            "cut at the technical limit of paths; what they saw up to there is in the picture",
-            dropped.unfinished,
-        ),
-    ]
-    .iter()
-    .map(row)
-    .collect();
     format!(
-        "<p>{} of {} samples did not reach the picture whole.</p><div class=\"scroll\" tabindex=\"0\" role=\"region\" \
-         aria-label=\"Dropped samples\"><table class=\"numbers\"><thead><tr><th scope=\"col\">cause</th>\
-         <th scope=\"col\">samples</th><th scope=\"col\">of all</th><th scope=\"col\" class=\"text\">and then</th></tr></thead>\
-         <tbody>{rows}</tbody></table></div>",
+        "<p>{} of {} samples did not reach the picture whole.{black}</p>{causes}{}",
         grouped(dropped.total()),
-        grouped(paths)
+        grouped(paths),
+        places(run)
+    )
+}
+
+/// Tiles of the ledger that are listed.
+const WORST: usize = 12;
+
+/// Where samples were dropped, the worst first.
+fn places(run: &Run) -> String {
+    let all = &run.result.places;
+    let rows: Vec<Vec<String>> = all
+        .iter()
+        .take(WORST)
+        .map(|place| {
+            let (right, bottom) = (place.x + place.width - 1, place.y + place.height - 1);
+            let tile = format!("columns {} to {right}, rows {} to {bottom}", place.x, place.y);
+            vec![tile, grouped(place.dropped.total())]
+        })
+        .collect();
+    let most = if rows.len() < all.len() {
+        format!(", the worst {WORST} of {}", grouped(all.len() as u64))
+    } else {
+        String::new()
+    };
+    format!(
+        "<h3>Where{most}</h3>{}",
+        table("Where samples were dropped", &["tile of the picture", "samples"], &rows)
+    )
+}
+
+/// A table of numbers; the first cell of each row is its head, a fourth one text. Cells are HTML.
+fn table(label: &str, head: &[&str], rows: &[Vec<String>]) -> String {
+    let class = |column: usize| if column == 3 { " class=\"text\"" } else { "" };
+    let head = head.iter().enumerate().map(|(i, name)| format!("<th scope=\"col\"{}>{name}</th>", class(i)));
+    let row = |cells: &Vec<String>| {
+        let cells = cells.iter().enumerate().map(|(i, cell)| match i {
+            0 => format!("<th scope=\"row\">{cell}</th>"),
+            _ => format!("<td{}>{cell}</td>", class(i)),
+        });
+        format!("<tr>{}</tr>", cells.collect::<String>())
+    };
+    format!(
+        "<div class=\"scroll\" tabindex=\"0\" role=\"region\" aria-label=\"{label}\"><table class=\"numbers\">\
+         <thead><tr>{}</tr></thead><tbody>{}</tbody></table></div>",
+        head.collect::<String>(),
+        rows.iter().map(row).collect::<String>()
     )
 }
 

@@ -117,14 +117,9 @@ fn samples(run: &Run) -> String {
     match (least, most) {
         (Some(least), Some(most)) if least != most => {
             let values = samples.iter().map(|&count| count as f32).collect();
-            Map { width: run.result.image.width, values }.figure(
-                "Samples",
-                &format!(
-                    "Samples of each pixel, from {} to {}.",
-                    grouped(least.into()),
-                    grouped(most.into())
-                ),
-            )
+            let words =
+                "How many each pixel has. Where the time is over in a round, some tiles have had theirs.";
+            Map { width: run.result.image.width, values }.counts_figure("Samples", words, least, most)
         }
         _ => String::new(),
     }

@@ -1,0 +1,187 @@
+//! Reports in a real browser: nothing in the console, names that stay text, and an exposure slider that shows
+//! the radiance. Skipped, and said so, where there is no Chromium.
+
+use core::sync::atomic::AtomicBool;
+use halflight::compare::compare;
+use halflight::drive::{RenderResult, Settings, Stop, render};
+use halflight::load::{self, LoadOptions, LoadedScene};
+use halflight::report::{Maker, Race, Racer, Run};
+use halflight::save::to_srgb;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::sync::Arc;
+
+/// A name that would be seen in the console if it were not taken as text.
+const EVIL: &str =
+    "<script>console.error('name')</script>\"'><img src=x onerror=console.error(1)>{{body}}.obj";
+
+/// Display values may differ by this much: the radiance of the page has eight bits, and is rounded twice.
+const TOLERANCE: f32 = 2.5;
+
+/// Where the test looks into the picture.
+const PIXEL: [u32; 2] = [11, 7];
+
+const SIZE: u32 = 24;
+
+fn cornell() -> LoadedScene {
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../scenes/cornell/cornell.obj");
+    load::load(path.as_ref(), &LoadOptions::default()).unwrap()
+}
+
+fn picture(loaded: &LoadedScene, settings: &Settings) -> RenderResult {
+    let views = loaded.views();
+    let scene = views.scene(loaded.camera_or_default());
+    render(&scene, settings, &mut |_| (), &AtomicBool::new(false)).unwrap()
+}
+
+/// Settings of 64 samples, against a reference of 256 with another seed.
+fn settings(loaded: &LoadedScene, seed: u32) -> Settings {
+    let stop = |spp| Stop { spp: Some(spp), ..Stop::default() };
+    let base = Settings { width: SIZE, height: SIZE, seed, stop: stop(64), ..Settings::default() };
+    let reference = picture(loaded, &Settings { seed: seed + 9, stop: stop(256), ..base.clone() }).image;
+    Settings { reference: Some(Arc::new(reference)), ..base }
+}
+
+fn run_page(loaded: &LoadedScene, settings: &Settings, result: &RenderResult) -> String {
+    let views = loaded.views();
+    let maker = Maker { command: vec!["halflight".into(), EVIL.into()], ..Maker::here() };
+    let comparison = compare(&result.image, settings.reference.as_ref().unwrap()).unwrap();
+    let run = Run {
+        scene: &views.scene(loaded.camera_or_default()),
+        name: EVIL,
+        repairs: &[EVIL.into()],
+        settings,
+        result,
+        comparison: Some(&comparison),
+        outputs: &[],
+        load_seconds: 0.1,
+        total_seconds: 1.0,
+        maker: &maker,
+    };
+    index(run.files())
+}
+
+fn race_page(loaded: &LoadedScene, settings: &Settings, result: &RenderResult) -> String {
+    let views = loaded.views();
+    let scene = views.scene(loaded.camera_or_default());
+    let maker = Maker::here();
+    let racer = |name: &str| Racer {
+        name: name.into(),
+        run: Run {
+            scene: &scene,
+            name: EVIL,
+            repairs: &[],
+            settings,
+            result,
+            comparison: None,
+            outputs: &[],
+            load_seconds: 0.1,
+            total_seconds: 1.0,
+            maker: &maker,
+        },
+    };
+    let race = Race { racers: vec![racer("path"), racer(EVIL)], seconds: 1.0, maker: &maker };
+    index(race.files())
+}
+
+fn index(files: halflight::report::Files) -> String {
+    let (_, page) = files.into_iter().find(|(name, _)| *name == "index.html").unwrap();
+    String::from_utf8(page).unwrap()
+}
+
+/// The browser, where there is one.
+fn browser() -> Option<&'static str> {
+    ["chromium", "chromium-browser", "google-chrome"].into_iter().find(|name| {
+        let version =
+            Command::new(name).arg("--version").stdout(Stdio::null()).stderr(Stdio::null()).status();
+        version.is_ok_and(|status| status.success())
+    })
+}
+
+/// A folder of its own, gone when the test ends well.
+struct Folder(PathBuf);
+
+impl Drop for Folder {
+    fn drop(&mut self) {
+        if !std::thread::panicking() {
+            let _ = std::fs::remove_dir_all(&self.0);
+        }
+    }
+}
+
+/// What is in the console after `page` with `script` at its end was opened, and the document then.
+fn opened(browser: &str, folder: &Path, page: &str, script: &str) -> (Vec<String>, String) {
+    let file = folder.join("page.html");
+    std::fs::write(&file, page.replace("</body>", &format!("<script>{script}</script></body>"))).unwrap();
+    let output = Command::new(browser)
+        .args(["--headless", "--no-sandbox", "--disable-gpu", "--enable-logging=stderr"])
+        .args(["--virtual-time-budget=10000", "--window-size=1200,900", "--dump-dom"])
+        .arg(format!("--user-data-dir={}", folder.join("profile").display()))
+        .arg(format!("file://{}", file.display()))
+        .output()
+        .unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let said = String::from_utf8_lossy(&output.stderr);
+    let console = said.lines().filter(|line| line.contains("CONSOLE")).map(String::from).collect();
+    (console, String::from_utf8_lossy(&output.stdout).into_owned())
+}
+
+#[test]
+fn pages_open_in_a_browser_without_an_error() {
+    let Some(browser) = browser() else {
+        println!("skipped: no Chromium on this machine");
+        return;
+    };
+    let folder = Folder(std::env::temp_dir().join(format!("halflight-report-{}", std::process::id())));
+    std::fs::create_dir_all(&folder.0).unwrap();
+    let loaded = cornell();
+    let settings = settings(&loaded, 1);
+    let result = picture(&loaded, &settings);
+    let page = run_page(&loaded, &settings, &result);
+
+    let (console, _) = opened(browser, &folder.0, &page, "console.error('heard')");
+    assert!(matches!(console.as_slice(), [one] if one.contains("heard")), "{console:?}");
+
+    let [x, y] = PIXEL;
+    let brighter = format!(
+        "(async () => {{
+            const figure = document.querySelector('figure.picture');
+            figure.querySelector('input').value = 1;
+            await figure.expose();
+            const context = figure.querySelector('canvas').getContext('2d');
+            document.body.dataset.probe = [...context.getImageData({x}, {y}, 1, 1).data].join();
+        }})();"
+    );
+    let (console, document) = opened(browser, &folder.0, &page, &brighter);
+    assert!(console.is_empty(), "{console:?}");
+    let probe = document.split("data-probe=\"").nth(1).and_then(|rest| rest.split('"').next()).unwrap();
+    let seen: Vec<f32> = probe.split(',').map(|byte| byte.parse().unwrap()).collect();
+    let expected = result.image.pixels[(y * SIZE + x) as usize].map(|value| 255.0 * to_srgb(2.0 * value));
+    for (seen, expected) in seen.iter().zip(expected) {
+        assert!((seen - expected).abs() < TOLERANCE, "{probe}: {expected:?}");
+    }
+    assert!(document.contains("&lt;script&gt;console.error('name')&lt;/script&gt;"), "names are text");
+
+    let swap = "document.querySelectorAll('select').forEach((select) => {
+            select.selectedIndex = 1 - select.selectedIndex;
+            select.dispatchEvent(new Event('change'));
+        });";
+    let (console, document) = opened(browser, &folder.0, &race_page(&loaded, &settings, &result), swap);
+    assert!(console.is_empty(), "{console:?}");
+    let compared = document.split("compared").nth(1).and_then(|rest| rest.split("</figure>").next()).unwrap();
+    assert_eq!(compared.matches("<img").count(), 2, "two pictures side by side");
+}
+
+#[test]
+fn pages_ask_for_nothing_else() {
+    let loaded = cornell();
+    let settings = settings(&loaded, 2);
+    let result = picture(&loaded, &settings);
+    for page in [run_page(&loaded, &settings, &result), race_page(&loaded, &settings, &result)] {
+        for needle in ["http://", "https://", "<link rel=\"stylesheet", "@import", "src=\"/", "url("] {
+            assert!(!page.contains(needle), "{needle}");
+        }
+        assert!(page.matches("src=\"").count() == page.matches("src=\"data:image/png;base64,").count());
+        assert!(!page.contains("{{style}}") && page.contains("default-src 'none'"));
+    }
+}
