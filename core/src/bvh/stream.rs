@@ -15,6 +15,7 @@ use super::layout::Child;
 use super::leaf::{meets_doubtful, take};
 use super::ready::{Ready, traceable};
 use crate::geometry::{Hit, Ray};
+use core::hint::select_unpredictable;
 use halflight_simd::kernels::boxes::ROBUST;
 use halflight_simd::kernels::triangles::Areas;
 use halflight_simd::{Simd, Stack};
@@ -144,8 +145,9 @@ pub(super) fn trace<S: Simd, T: Sink, const ANY: bool>(
                 if areas.doubtful != 0 {
                     any |= meets_doubtful(bvh, ray, leaf, areas.doubtful);
                 }
-                hit.triangle = if any { 0 } else { hit.triangle };
-                stack.truncate(if any { 1 } else { usize::MAX });
+                // A hit is as likely as not: not to be guessed.
+                hit.triangle = select_unpredictable(any, 0, hit.triangle);
+                stack.truncate(select_unpredictable(any, 1, usize::MAX));
                 next[i] = take_next(simd, bvh, stack);
             } else {
                 found[i] = areas;

@@ -246,7 +246,8 @@ impl Simd for Avx512 {
     }
     #[inline(always)]
     fn first8(self, n: u32) -> M8 {
-        M8(if n >= 8 { 0xff } else { (1 << n) - 1 })
+        // SAFETY: the token proves the level.
+        M8(unsafe { _bzhi_u32(0xff, n.min(8)) } as u8)
     }
     #[inline(always)]
     fn mask16(self, bits: u32) -> M16 {
