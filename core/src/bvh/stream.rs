@@ -128,7 +128,7 @@ pub(super) fn trace<S: Simd, T: Sink, const ANY: bool>(
             } else {
                 simd.push8(node.order_of(ray.octant()), entry, exit, &node.rows[6], stack);
             }
-            next[i] = take_next(simd, bvh, stack);
+            next[i] = take_next::<S, ANY>(simd, bvh, stack);
         }
 
         let (mut at_leaf, mut met) = (leaves, 0u32);
@@ -148,7 +148,7 @@ pub(super) fn trace<S: Simd, T: Sink, const ANY: bool>(
                 // A hit is as likely as not: not to be guessed.
                 hit.triangle = select_unpredictable(any, 0, hit.triangle);
                 stack.truncate(select_unpredictable(any, 1, usize::MAX));
-                next[i] = take_next(simd, bvh, stack);
+                next[i] = take_next::<S, ANY>(simd, bvh, stack);
             } else {
                 found[i] = areas;
                 met |= ((areas.hits | areas.doubtful != 0) as u32) << i;
@@ -166,7 +166,7 @@ pub(super) fn trace<S: Simd, T: Sink, const ANY: bool>(
             }
         }
         while let Some(i) = pop(&mut leaves) {
-            next[i] = take_next(simd, bvh, &mut slots[i].stack);
+            next[i] = take_next::<S, ANY>(simd, bvh, &mut slots[i].stack);
         }
     }
 }
@@ -182,11 +182,14 @@ fn pop(slots: &mut u32) -> Option<usize> {
     Some(lowest)
 }
 
-/// Takes a child from the stack, and asks the memory for what is in it.
+/// Takes a child from the stack, and asks the memory for what is in it; for any-hit rays, which take fewer steps,
+/// that costs more than it brings.
 #[inline(always)]
-fn take_next<S: Simd>(simd: S, bvh: &Bvh, stack: &mut Stack) -> u32 {
+fn take_next<S: Simd, const ANY: bool>(simd: S, bvh: &Bvh, stack: &mut Stack) -> u32 {
     let child = Child(stack.pop().unwrap_or(DONE.0));
-    let index = if child.is_leaf() { 9 * child.triangles().0 } else { child.0 as usize };
-    simd.prefetch(bvh.nodes, bvh.coordinates, child.is_leaf(), index);
+    if !ANY {
+        let index = if child.is_leaf() { 9 * child.triangles().0 } else { child.0 as usize };
+        simd.prefetch(bvh.nodes, bvh.coordinates, child.is_leaf(), index);
+    }
     child.0
 }
