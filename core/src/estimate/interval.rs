@@ -12,7 +12,7 @@
 //! 3. What filtering and ratio have moved the estimate by, as a logarithm δ, is known to first order only. The lower
 //!    end goes further down by as much as would undo it where δ is large, and by δ² where it is small.
 //!
-//! The price: about as much time as a fiftieth of a sample for each pixel.
+//! The price: about as much time as a twentieth of a sample for each pixel.
 
 use super::TileError;
 use libm::{exp, expm1, fmax, log, sqrt};

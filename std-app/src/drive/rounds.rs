@@ -117,17 +117,20 @@ impl Rounds {
         self.spp >= self.next_estimate
     }
 
-    /// Takes note of an estimate. The next is due after an eighth more samples; where the error is to stop the
-    /// render, when it can be reached at the earliest (errors fall with the square of the samples at best), after a
-    /// sixteenth at least and twice as many at most.
+    /// Takes note of an estimate, which takes as long as a twentieth of a sample. The next is due after an eighth more
+    /// samples, eight at least; where the error is to stop the render, when it can be reached at the earliest (errors
+    /// fall with the square of the samples at best), after a sixteenth at least and twice as many at most.
     pub(super) fn estimated(&mut self, error: Option<ErrorEstimate>) {
-        let spp = f64::from(self.spp);
-        let growth = match (self.stop.error, error) {
-            (Some(wanted), Some(error)) => (error.upper / wanted).sqrt().clamp(1.0 + 1.0 / 16.0, 2.0),
-            _ => 1.0 + 1.0 / 8.0,
+        let spp = self.spp;
+        let next = match (self.stop.error, error) {
+            (Some(wanted), Some(error)) => {
+                let growth = (error.upper / wanted).sqrt().clamp(1.0 + 1.0 / 16.0, 2.0);
+                (f64::from(spp) * growth) as u32
+            }
+            _ => spp + (spp / 8).max(spp.min(8)),
         };
-        self.next_estimate = ((spp * growth) as u32).max(self.spp + 1).next_multiple_of(4);
-        self.decision = error.map(|error| (self.spp, error));
+        self.next_estimate = next.max(spp + 1).next_multiple_of(4);
+        self.decision = error.map(|error| (spp, error));
     }
 
     /// What to do at `seconds`; `None` when it is time to stop. Rounds double the samples until they last long enough.
