@@ -88,12 +88,11 @@ fn trace(bvh: &Bvh, mesh: &Mesh, level: Level, rays: &[Ray], expected: &[Hit]) {
         against_brute_force(mesh, level, ray, hit, expected);
         assert_eq!(bvh.occluded(level, ray), hit.is_some(), "{level:?} occluded {ray:?}");
     }
-    let mut scratch = vec![0; Bvh::batch_scratch(rays.len()).div_ceil(4)];
     for coherence in [Coherence::Coherent, Coherence::Incoherent] {
         let mut hits = vec![Hit::NONE; rays.len()];
-        bvh.nearest_batch(level, rays, coherence, &mut scratch, &mut hits);
+        bvh.nearest_batch(level, rays, coherence, &mut hits);
         let mut hidden = vec![7; rays.len()];
-        bvh.occluded_batch(level, rays, coherence, &mut scratch, &mut hidden);
+        bvh.occluded_batch(level, rays, &mut hidden);
         for (((ray, single), hit), hidden) in rays.iter().zip(&singles).zip(&hits).zip(&hidden) {
             assert_eq!(single, hit, "{level:?} {coherence:?} {ray:?}");
             assert_eq!(hidden, &u8::from(single.is_some()), "{level:?} {coherence:?} {ray:?}");

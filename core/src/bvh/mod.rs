@@ -114,20 +114,8 @@ impl<'m> Bvh<'m> {
         level.dispatch(Single::<true> { bvh: self, ray }).is_some()
     }
 
-    /// Bytes of scratch that a batch of rays wants.
-    pub const fn batch_scratch(_rays: usize) -> usize {
-        0
-    }
-
     /// The nearest hit of each ray.
-    pub fn nearest_batch(
-        &self,
-        level: Level,
-        rays: &[Ray],
-        coherence: Coherence,
-        _scratch: &mut [u32],
-        hits: &mut [Hit],
-    ) {
+    pub fn nearest_batch(&self, level: Level, rays: &[Ray], coherence: Coherence, hits: &mut [Hit]) {
         let sink = Nearest(hits);
         match coherence {
             Coherence::Coherent => level.dispatch(Tiles { bvh: self, rays, sink }),
@@ -136,14 +124,7 @@ impl<'m> Bvh<'m> {
     }
 
     /// For each ray 1 where something is in the way and 0 where not.
-    pub fn occluded_batch(
-        &self,
-        level: Level,
-        rays: &[Ray],
-        _coherence: Coherence,
-        _scratch: &mut [u32],
-        hidden: &mut [u8],
-    ) {
+    pub fn occluded_batch(&self, level: Level, rays: &[Ray], hidden: &mut [u8]) {
         level.dispatch(Stream::<_, true> { bvh: self, rays, sink: Hidden(hidden) });
     }
 }

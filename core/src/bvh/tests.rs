@@ -78,9 +78,9 @@ fn agrees(soup: &Soup, rays: &[Ray]) {
     for level in Level::detect().and_below() {
         for coherence in [Coherence::Coherent, Coherence::Incoherent] {
             let mut hits = std::vec![Hit::NONE; rays.len()];
-            bvh.nearest_batch(level, rays, coherence, &mut [], &mut hits);
+            bvh.nearest_batch(level, rays, coherence, &mut hits);
             let mut hidden = std::vec![7u8; rays.len()];
-            bvh.occluded_batch(level, rays, coherence, &mut [], &mut hidden);
+            bvh.occluded_batch(level, rays, &mut hidden);
             for (i, ray) in rays.iter().enumerate() {
                 assert_eq!(hits[i], truth[i], "{} {coherence:?} ray {i} {ray:?}", level.name());
                 assert_eq!(

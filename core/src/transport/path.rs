@@ -134,7 +134,7 @@ impl<'a, F: Features> PathTracer<'a, F> {
         while active > 0 {
             counters.rays += active as u64;
             let rays = &wave.rays[..active];
-            self.bvh.nearest_batch(self.level, rays, coherence, wave.words, &mut wave.hits[..active]);
+            self.bvh.nearest_batch(self.level, rays, coherence, &mut wave.hits[..active]);
             coherence = Coherence::Incoherent;
 
             let (mut going_on, mut shadows) = (0, 0);
@@ -187,7 +187,7 @@ impl<'a, F: Features> PathTracer<'a, F> {
     fn connect(&self, wave: &mut Wave, shadows: usize) {
         let rays = &wave.shadow_rays[..shadows];
         let hidden = &mut wave.hidden[..shadows];
-        self.bvh.occluded_batch(self.level, rays, Coherence::Incoherent, wave.words, hidden);
+        self.bvh.occluded_batch(self.level, rays, hidden);
         for ((ray, light), hidden) in rays.iter().zip(&*wave.shadow_light).zip(&*hidden) {
             if *hidden == 0
                 && let Some(path) = wave.paths.get_mut(ray.tag as usize)
@@ -209,7 +209,7 @@ impl<'a, F: Features> PathTracer<'a, F> {
             }
             let rays = &wave.shadow_rays[..shadows];
             let hits = &mut wave.hits[..shadows];
-            self.bvh.nearest_batch(self.level, rays, Coherence::Incoherent, wave.words, hits);
+            self.bvh.nearest_batch(self.level, rays, Coherence::Incoherent, hits);
             let mut left = 0;
             for i in 0..shadows {
                 let (ray, light) = (wave.shadow_rays[i], Rgb::from(wave.shadow_light[i]));

@@ -1,6 +1,5 @@
 //! The working memory of a wavefront: the state of every path of the wave, and queues of rays.
 
-use crate::bvh::Bvh;
 use crate::geometry::{Hit, Ray};
 use crate::memory::{Arena, Footprint, OutOfMemory};
 use bytemuck::{Pod, Zeroable};
@@ -42,7 +41,6 @@ pub(super) struct Wave<'m> {
     /// What arrives at the camera from the light at the end of the shadow ray.
     pub(super) shadow_light: &'m mut [[f32; 3]],
     pub(super) hidden: &'m mut [u8],
-    pub(super) words: &'m mut [u32],
 }
 
 impl<'m> Wave<'m> {
@@ -54,7 +52,6 @@ impl<'m> Wave<'m> {
             .slice::<Ray>(capacity)
             .slice::<[f32; 3]>(capacity)
             .slice::<u8>(capacity)
-            .slice::<u32>(Bvh::batch_scratch(capacity).div_ceil(4))
     }
 
     pub(super) fn new(capacity: usize, arena: &mut Arena<'m>) -> Result<Self, OutOfMemory> {
@@ -65,7 +62,6 @@ impl<'m> Wave<'m> {
             shadow_rays: arena.slice(capacity)?,
             shadow_light: arena.slice(capacity)?,
             hidden: arena.slice(capacity)?,
-            words: arena.slice(Bvh::batch_scratch(capacity).div_ceil(4))?,
         })
     }
 }

@@ -54,8 +54,7 @@ impl Rays {
     pub(super) fn of(scene: &Scene, bvh: &Bvh, level: Level) -> Self {
         let primary: Vec<Ray> = pixels().map(|[x, y]| primary(scene, x, y)).collect();
         let mut hits = vec![Hit::NONE; primary.len()];
-        let mut scratch = vec![0; Bvh::batch_scratch(primary.len()).div_ceil(4)];
-        bvh.nearest_batch(level, &primary, Coherence::Coherent, &mut scratch, &mut hits);
+        bvh.nearest_batch(level, &primary, Coherence::Coherent, &mut hits);
         let seen = pixels().zip(primary.iter().zip(&hits)).filter(|(_, (_, hit))| hit.is_some());
         let diffuse: Vec<Ray> =
             seen.filter_map(|([x, y], (ray, hit))| bounce(scene, ray, hit, y * SIDE + x)).collect();

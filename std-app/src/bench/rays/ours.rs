@@ -27,21 +27,15 @@ fn lines(footprint: Footprint) -> Result<Vec<Line>, OutOfMemory> {
 
 /// Our way of tracing rays of `class`.
 pub(super) fn entry<'a>(bvh: &'a Bvh<'a>, level: Level, class: Class) -> Box<dyn Entry + 'a> {
-    let scratch = vec![0; Bvh::batch_scratch(BATCH).div_ceil(4)];
     let rays = Vec::with_capacity(BATCH);
     match class {
         Class::Primary => {
-            Box::new(Nearest { bvh, level, coherence: Coherence::Coherent, rays, scratch, hits: Vec::new() })
+            Box::new(Nearest { bvh, level, coherence: Coherence::Coherent, rays, hits: Vec::new() })
         }
-        Class::Diffuse => Box::new(Nearest {
-            bvh,
-            level,
-            coherence: Coherence::Incoherent,
-            rays,
-            scratch,
-            hits: Vec::new(),
-        }),
-        Class::Shadow => Box::new(Occluded { bvh, level, rays, scratch, hidden: Vec::new() }),
+        Class::Diffuse => {
+            Box::new(Nearest { bvh, level, coherence: Coherence::Incoherent, rays, hits: Vec::new() })
+        }
+        Class::Shadow => Box::new(Occluded { bvh, level, rays, hidden: Vec::new() }),
     }
 }
 
@@ -50,7 +44,6 @@ struct Nearest<'a> {
     level: Level,
     coherence: Coherence,
     rays: Vec<Ray>,
-    scratch: Vec<u32>,
     hits: Vec<Hit>,
 }
 
@@ -67,7 +60,7 @@ impl Entry for Nearest<'_> {
     }
 
     fn trace(&mut self) {
-        self.bvh.nearest_batch(self.level, &self.rays, self.coherence, &mut self.scratch, &mut self.hits);
+        self.bvh.nearest_batch(self.level, &self.rays, self.coherence, &mut self.hits);
     }
 
     fn hits(&self) -> usize {
@@ -79,7 +72,6 @@ struct Occluded<'a> {
     bvh: &'a Bvh<'a>,
     level: Level,
     rays: Vec<Ray>,
-    scratch: Vec<u32>,
     hidden: Vec<u8>,
 }
 
@@ -96,8 +88,7 @@ impl Entry for Occluded<'_> {
     }
 
     fn trace(&mut self) {
-        let coherence = Coherence::Incoherent;
-        self.bvh.occluded_batch(self.level, &self.rays, coherence, &mut self.scratch, &mut self.hidden);
+        self.bvh.occluded_batch(self.level, &self.rays, &mut self.hidden);
     }
 
     fn hits(&self) -> usize {
