@@ -115,16 +115,18 @@ impl Axis {
         (value / self.low).ln() / (self.high / self.low).ln()
     }
 
-    /// Values of the grid, and whether each has a label: every decade, and 2 and 5 where there are few.
+    /// Values of the grid, and whether each has a label: every decade, 2 and 5 where there are few, and all digits
+    /// within one.
     fn ticks(&self) -> Vec<(f64, bool)> {
         let decades = (self.high / self.low).log10();
         let first = self.low.log10().floor() as i32;
         let last = self.high.log10().ceil() as i32;
         let every = (decades / 8.0).ceil().max(1.0) as i32;
+        let digits = (1..10).filter(|digit| [1, 2, 5].contains(digit) || decades < 0.8);
         let ticks = (first..=last).flat_map(|decade| {
-            [1.0, 2.0, 5.0].map(|digit| {
-                let labelled = if digit == 1.0 { decade % every == 0 } else { decades < 2.3 };
-                (digit * 10f64.powi(decade), labelled)
+            digits.clone().map(move |digit| {
+                let labelled = if digit == 1 { decade % every == 0 } else { decades < 2.3 };
+                (f64::from(digit) * 10f64.powi(decade), labelled)
             })
         });
         let inside = |value: f64| value >= self.low * (1.0 - 1e-9) && value <= self.high * (1.0 + 1e-9);

@@ -16,6 +16,9 @@ pub(super) fn between(lower: f64, upper: f64) -> String {
     format!("{} to {}", number(lower, 3), number(upper, 3))
 }
 
+/// An interval is vague whose ends differ by more than this factor.
+const VAGUE: f64 = 10.0;
+
 /// The first sentences of the page, as HTML.
 pub(super) fn lead(run: &Run) -> String {
     let interval = |error: ErrorEstimate| {
@@ -36,6 +39,12 @@ pub(super) fn lead(run: &Run) -> String {
                 typical(relmse)
             )
         }
+        (None, Some(error)) if error.upper > VAGUE * error.lower => format!(
+            "The relMSE of this picture is not well known: with 95&#8239;% confidence it lies in {}, and is \
+             estimated at <strong>{}</strong>. A few samples that are far brighter than the others decide.",
+            between(error.lower, error.upper),
+            number(error.relmse, 2)
+        ),
         (None, Some(error)) => format!(
             "This picture has a relMSE of about {}, as its own noise tells{}.",
             interval(error),
@@ -147,7 +156,7 @@ fn promise(series: &Series, fit: &Fit) -> String {
     let Some([now, error]) = series.points.last().copied() else { return String::new() };
     let goal = 10f64.powf((0.99 * error).log10().floor());
     let seconds = fit.when(goal);
-    if !(now..now * FURTHEST).contains(&seconds) {
+    if fit.interval[1] >= 0.0 || !(now..now * FURTHEST).contains(&seconds) {
         return String::new();
     }
     format!(" At this pace a relMSE of {} would take {}.", number(goal, 1), time(seconds))

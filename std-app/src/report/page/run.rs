@@ -6,12 +6,12 @@ use super::{error, escape, fill, parts, shell};
 use crate::compare::Shown;
 use crate::drive::Ending;
 use crate::report::Run;
-use crate::report::words::{grouped, number, readable_bytes, readable_seconds};
+use crate::report::words::{grouped, number, plural, readable_bytes, readable_seconds};
 use crate::save::Image;
 
 /// Pixels on each side over which the maps of the error are averaged for the eye: a variance from two halves
 /// is itself off by a factor.
-const SMOOTHING: usize = 2;
+const SMOOTHING: usize = 1;
 
 /// The whole page.
 pub(in crate::report) fn page(run: &Run) -> String {
@@ -86,7 +86,8 @@ fn maps(run: &Run) -> String {
     if result.error.is_some() {
         let width = result.image.width;
         let mean = |pixel: &[f32; 3]| pixel.iter().sum::<f32>() / 3.0;
-        let map = |values: Vec<f32>| Map { width, values }.smoothed(SMOOTHING);
+        // Twice, so that a bright pixel becomes a soft spot and not a square.
+        let map = |values: Vec<f32>| Map { width, values }.smoothed(SMOOTHING).smoothed(SMOOTHING);
         let root = |map: Map| Map { values: map.values.iter().map(|value| value.sqrt()).collect(), ..map };
         let variance: Vec<f32> = result.variance.pixels.iter().map(mean).collect();
         let whole = result.image.mean().iter().sum::<f64>() / 3.0;
@@ -96,7 +97,7 @@ fn maps(run: &Run) -> String {
         let each = variance.iter().zip(&result.samples).map(|(v, &n)| v * n as f32);
         maps += &root(map(variance.clone())).figure(
             "Standard error",
-            "How far each pixel is likely to be from the truth: the standard deviation of its mean, in W/(m² sr).",
+            "How far each pixel is likely to be from the truth: the standard deviation of its mean, in W/(m²\u{a0}sr).",
         );
         maps += &root(map(relative.collect())).figure(
             "Relative error",
@@ -104,41 +105,45 @@ fn maps(run: &Run) -> String {
         );
         maps += &map(each.collect()).figure(
             "Variance of a sample",
-            "How noisy the light is there, however many samples are taken, in (W/(m² sr))².",
+            "How noisy the light is there, however many samples are taken, in (W/(m²\u{a0}sr))².",
         );
     }
     maps + &samples(run)
 }
 
-/// The map of samples, where they differ from pixel to pixel.
+/// The map of samples, where they differ by more than the end of the last round.
 fn samples(run: &Run) -> String {
-    let samples = &run.result.samples;
-    let (least, most) = (samples.iter().min().copied(), samples.iter().max().copied());
-    match (least, most) {
-        (Some(least), Some(most)) if least != most => {
-            let values = samples.iter().map(|&count| count as f32).collect();
-            let words =
-                "How many each pixel has. Where the time is over in a round, some tiles have had theirs.";
-            Map { width: run.result.image.width, values }.counts_figure("Samples", words, least, most)
+    match least_and_most(run) {
+        Some((least, most)) if most > least + 1 => {
+            let values = run.result.samples.iter().map(|&count| count as f32).collect();
+            let map = Map { width: run.result.image.width, values };
+            map.counts_figure("Samples", "How many samples each pixel has.", least, most)
         }
         _ => String::new(),
     }
 }
 
+fn least_and_most(run: &Run) -> Option<(u32, u32)> {
+    let samples = &run.result.samples;
+    Some((*samples.iter().min()?, *samples.iter().max()?))
+}
+
 /// The words under the maps.
 fn note(run: &Run) -> String {
-    let samples = &run.result.samples;
-    let even = samples.first().filter(|first| samples.iter().all(|count| count == *first));
-    let samples =
-        even.map(|&count| format!("Every pixel has the same number of samples: {}. ", grouped(count.into())));
-    let maps = run.result.error.map(|_| {
-        let side = 2 * SMOOTHING + 1;
-        format!(
-            "Estimated from the halves of each pixel, and averaged over {side} × {side} pixels for the eye. Scales are \
-             logarithmic and leave out the lowest hundredth and the highest two-hundredth of the pixels."
-        )
+    let samples = match least_and_most(run) {
+        Some((least, most)) if least == most => {
+            format!("Every pixel has {}. ", plural(least.into(), "sample"))
+        }
+        Some((least, most)) if most == least + 1 => {
+            format!("Every pixel has {} or {most} samples: the time was over within a round. ", least)
+        }
+        _ => String::new(),
+    };
+    let maps = run.result.error.map_or("", |_| {
+        "Errors are estimated from the halves of each pixel and averaged over a few pixels for the eye. Their scales \
+         are logarithmic and leave out the lowest hundredth and the highest two-hundredth of the pixels."
     });
-    samples.unwrap_or_default() + &maps.unwrap_or_default()
+    samples + maps
 }
 
 /// The section that lays the picture beside its reference.
@@ -163,7 +168,10 @@ fn reference(run: &Run) -> String {
         ("relMSE", number(linear.relmse, 3)),
         ("RMSE", number(linear.rmse(), 3)),
         ("FLIP", number(comparison.flip, 3)),
-        ("Mean, against the reference", format!("{}&#8239;%", number(percent, 2))),
+        (
+            "Mean, against the reference",
+            format!("{}{}&#8239;%", if percent > 0.0 { "+" } else { "" }, number(percent, 2)),
+        ),
     ];
     fill(
         include_str!("reference.html"),
