@@ -4,9 +4,8 @@
 //! The points of a curve are not independent: each picture holds the samples of all before it. The error of a
 //! mean of samples over the time t is W(t)/t, W a random walk, so two of them, at times s < t, have the
 //! correlation √(s/t), and their squares s/t. That is a Markov chain in log t; subtracting from each point
-//! what the one before foretells leaves independent ones, to which ordinary least squares applies.
-
-use crate::drive::ErrorEstimate;
+//! what the one before foretells leaves independent ones, to which ordinary least squares applies. Logarithms of
+//! errors stray equally, whatever the error: all points have the same weight.
 
 /// A point of a curve.
 #[derive(Clone, Copy, Debug)]
@@ -15,21 +14,7 @@ pub(super) struct Point {
     pub(super) seconds: f64,
     /// The error.
     pub(super) error: f64,
-    /// Standard deviation of its logarithm; the scale, common to all points, does not matter.
-    pub(super) spread: f64,
 }
-
-/// Standard deviation of the logarithm of an error, from its interval.
-pub(super) fn log_deviation(error: &ErrorEstimate) -> f64 {
-    if error.lower > 0.0 {
-        (error.upper / error.lower).ln() / (2.0 * NORMAL_95)
-    } else {
-        (error.upper / error.relmse).ln() / NORMAL_95
-    }
-}
-
-/// Standard deviations on both sides of a normal mean that hold 95 %.
-pub(super) const NORMAL_95: f64 = 1.96;
 
 /// The line error = exp(level) · seconds^slope.
 #[derive(Clone, Copy, Debug)]
@@ -53,24 +38,23 @@ impl Fit {
     /// and not of a pace. The points are in the order of time; those that have no logarithm are left out. `None`
     /// where there are fewer than five.
     pub(super) fn through(points: impl Iterator<Item = Point>) -> Option<Fit> {
-        let usable = |p: &Point| p.seconds > 0.0 && p.error > 0.0 && p.spread > 0.0;
-        let finite = |p: &Point| p.seconds.is_finite() && p.error.is_finite() && p.spread.is_finite();
-        let mut points: Vec<Point> = points.filter(|p| usable(p) && finite(p)).collect();
+        let positive = |value: f64| value > 0.0 && value.is_finite();
+        let mut points: Vec<Point> = points.filter(|p| positive(p.seconds) && positive(p.error)).collect();
         let decade = points.last()?.seconds / DECADE;
         let first = points.partition_point(|point| point.seconds < decade);
         points.drain(..first.min(points.len().saturating_sub(FEWEST + 1)));
         if points.len() < FEWEST {
             return None;
         }
-        let scaled = |p: &Point| [1.0, p.seconds.ln(), p.error.ln()].map(|value| value / p.spread);
+        let values = |p: &Point| [1.0, p.seconds.ln(), p.error.ln()];
         // [Σ a², Σ a b, Σ b²], [Σ a y, Σ b y, Σ y²] of the independent rows (a, b, y).
         let (mut xx, mut xy) = ([0.0; 3], [0.0; 3]);
         let mut before: Option<&Point> = None;
         for point in &points {
-            let mut row = scaled(point);
+            let mut row = values(point);
             if let Some(before) = before {
                 let correlation = (before.seconds / point.seconds).min(MOST_ALIKE);
-                let foretold = scaled(before);
+                let foretold = values(before);
                 let rest = (1.0 - correlation * correlation).sqrt();
                 row = core::array::from_fn(|i| (row[i] - correlation * foretold[i]) / rest);
             }
@@ -121,13 +105,13 @@ fn student_95(freedom: f64) -> f64 {
 mod tests {
     use super::*;
 
-    fn point(seconds: f64, error: f64, spread: f64) -> Point {
-        Point { seconds, error, spread }
+    fn point(seconds: f64, error: f64) -> Point {
+        Point { seconds, error }
     }
 
     #[test]
     fn a_power_law_is_found_again() {
-        let points = (0..12).map(|i| f64::from(1 << i)).map(|t| point(t, 0.3 * t.powf(-0.8), 0.1));
+        let points = (0..12).map(|i| f64::from(1 << i)).map(|t| point(t, 0.3 * t.powf(-0.8)));
         let fit = Fit::through(points).unwrap();
         assert!((fit.slope + 0.8).abs() < 1e-9 && (fit.at(1.0) - 0.3).abs() < 1e-9);
         assert!(fit.interval[1] - fit.interval[0] < 1e-6);
@@ -136,12 +120,12 @@ mod tests {
 
     #[test]
     fn what_has_no_slope_has_no_fit() {
-        let falling = |n: i32| (1..=n).map(|i| point(f64::from(i), 1.0 / f64::from(i), 0.1));
+        let falling = |n: i32| (1..=n).map(|i| point(f64::from(i), 1.0 / f64::from(i)));
         assert!(Fit::through(falling(4)).is_none() && Fit::through(falling(5)).is_some());
-        assert!(Fit::through((0..9).map(|_| point(1.0, 0.5, 0.1))).is_none(), "all at one time");
-        assert!(Fit::through((1..9).map(|i| point(f64::from(i), 0.0, 0.1))).is_none(), "no error");
-        assert!(Fit::through((1..9).map(|i| point(f64::from(i), f64::NAN, 0.1))).is_none());
-        let rising = Fit::through((1..9).map(|i| point(f64::from(i), f64::from(i), 0.1))).unwrap();
+        assert!(Fit::through((0..9).map(|_| point(1.0, 0.5))).is_none(), "all at one time");
+        assert!(Fit::through((1..9).map(|i| point(f64::from(i), 0.0))).is_none(), "no error");
+        assert!(Fit::through((1..9).map(|i| point(f64::from(i), f64::NAN))).is_none());
+        let rising = Fit::through((1..9).map(|i| point(f64::from(i), f64::from(i)))).unwrap();
         assert_eq!(rising.when(0.1), f64::INFINITY);
     }
 
@@ -173,7 +157,7 @@ mod tests {
                 let step = f64::sqrt(time - now);
                 walks.iter_mut().for_each(|walk| *walk += step * normal());
                 let error = walks.iter().map(|walk| (walk / time).powi(2)).sum::<f64>() / 200.0;
-                curve.push(point(time, error, 0.1));
+                curve.push(point(time, error));
                 now = time;
             }
             let [lower, upper] = Fit::through(curve.into_iter()).unwrap().interval;

@@ -1,8 +1,7 @@
 //! Several methods on one scene for the same time: who is ahead when, and by how much in the end.
 
-use super::fit::{NORMAL_95, log_deviation};
 use super::{Maker, Run};
-use crate::drive::Round;
+use crate::drive::{ErrorEstimate, Round};
 
 /// A race that is over.
 pub struct Race<'a> {
@@ -154,10 +153,21 @@ fn known(round: &Round) -> Option<Known> {
     (known.log.is_finite() && known.deviation.is_finite()).then_some(known)
 }
 
+/// Standard deviation of the logarithm of an error, from its interval.
+fn log_deviation(error: &ErrorEstimate) -> f64 {
+    if error.lower > 0.0 {
+        (error.upper / error.lower).ln() / (2.0 * NORMAL_95)
+    } else {
+        (error.upper / error.relmse).ln() / NORMAL_95
+    }
+}
+
+/// Standard deviations on both sides of a normal mean that hold 95 %.
+const NORMAL_95: f64 = 1.96;
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::drive::ErrorEstimate;
 
     fn rounds(error: impl Fn(f64) -> f64, spread: f64) -> Curve {
         let times = (0..10).map(|i| f64::from(1 << i) * 0.1);

@@ -3,7 +3,7 @@
 use super::chart::{Chart, Series};
 use crate::drive::{ErrorEstimate, Round};
 use crate::report::Run;
-use crate::report::fit::{Fit, Point, log_deviation};
+use crate::report::fit::{Fit, Point};
 use crate::report::words::{grouped, number, readable_seconds};
 
 /// `a × 10⁻³`, in 2 digits.
@@ -88,11 +88,7 @@ pub(super) fn chart(run: &Run) -> Chart {
 pub(super) fn estimated(history: &[Round], name: &str, style: usize) -> Series {
     let known = || history.iter().filter_map(|round| Some((round.seconds, round.error?)));
     let known = || known().filter(|(_, error)| error.relmse > 0.0);
-    let point = |(seconds, error): (f64, ErrorEstimate)| Point {
-        seconds,
-        error: error.relmse,
-        spread: log_deviation(&error),
-    };
+    let point = |(seconds, error): (f64, ErrorEstimate)| Point { seconds, error: error.relmse };
     Series {
         name: name.into(),
         style,
@@ -106,8 +102,7 @@ pub(super) fn estimated(history: &[Round], name: &str, style: usize) -> Series {
 pub(super) fn measured(history: &[Round], name: &str, style: usize) -> Series {
     let known = || history.iter().filter_map(|round| Some((round, round.reference?.linear.relmse)));
     let known = || known().filter(|(_, relmse)| *relmse > 0.0 && relmse.is_finite());
-    // No interval is known; the errors of all rounds stray from their means by about the same factor.
-    let point = |(round, error): (&Round, f64)| Point { seconds: round.seconds, error, spread: 1.0 };
+    let point = |(round, error): (&Round, f64)| Point { seconds: round.seconds, error };
     Series {
         name: name.into(),
         style,
