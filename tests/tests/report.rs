@@ -3,10 +3,11 @@
 
 use core::sync::atomic::AtomicBool;
 use halflight::compare::compare;
-use halflight::drive::{RenderResult, Settings, Stop, render};
+use halflight::drive::{Place, RenderResult, Settings, Stop, render};
 use halflight::load::{self, LoadOptions, LoadedScene};
 use halflight::report::{Maker, Race, Racer, Run};
 use halflight::save::to_srgb;
+use halflight_core::film::Dropped;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::sync::Arc;
@@ -170,6 +171,27 @@ fn pages_open_in_a_browser_without_an_error() {
     assert!(console.is_empty(), "{console:?}");
     let compared = document.split("compared").nth(1).and_then(|rest| rest.split("</figure>").next()).unwrap();
     assert_eq!(compared.matches("<img").count(), 2, "two pictures side by side");
+}
+
+#[test]
+fn the_ledger_tells_how_many_why_and_where() {
+    let loaded = cornell();
+    let settings = settings(&loaded, 3);
+    let mut result = picture(&loaded, &settings);
+    assert!(run_page(&loaded, &settings, &result).contains("samples had to be dropped"));
+    let dropped = Dropped { nan: 3, unfinished: 40_000, ..Dropped::default() };
+    result.counters.dropped = dropped;
+    result.places = vec![Place { x: 16, y: 0, width: 8, height: 16, dropped }];
+    result.empty_pixels = 2;
+    let page = run_page(&loaded, &settings, &result);
+    for words in [
+        "40\u{202f}003 of 36\u{202f}864 samples",
+        "2 pixels are black",
+        "<th scope=\"row\">not a number</th><td>3</td>",
+        "columns 16 to 23, rows 0 to 15",
+    ] {
+        assert!(page.contains(words), "{words}");
+    }
 }
 
 #[test]

@@ -139,7 +139,7 @@ fn note(run: &Run) -> String {
         }
         _ => String::new(),
     };
-    let maps = run.result.error.map_or("", |_| {
+    let maps = run.result.error.map_or("What its error is would take four samples to tell.", |_| {
         "Errors are estimated from the halves of each pixel and averaged over a few pixels for the eye. Their scales \
          are logarithmic and leave out the lowest hundredth and the highest two-hundredth of the pixels."
     });
