@@ -77,7 +77,7 @@ pub(super) fn repairs(run: &Run) -> String {
         return String::new();
     }
     let items: String = run.repairs.iter().map(|repair| format!("<li>{}</li>", escape(repair))).collect();
-    format!("<h3>Repaired while loading</h3><ul>{items}</ul>")
+    format!("<h3>Repaired while loading</h3><ul class=\"plain\">{items}</ul>")
 }
 
 /// The samples that did not reach the picture: how many, why, where.
