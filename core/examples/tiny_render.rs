@@ -52,7 +52,8 @@ pub fn render(memory: &mut [Line; LINES], pixels: &mut [Rgb; SIZE * SIZE]) -> Re
     let bvh = Bvh::build(&scene.mesh, &mut arena)?;
     let lights = Lights::build(&scene, &mut arena)?;
     let mut film = Film::new(SIZE as u32, SIZE as u32, &mut arena)?;
-    let settings = PathSettings { width: SIZE as u32, height: SIZE as u32, seed: 1, max_depth: 8 };
+    let settings =
+        PathSettings { width: SIZE as u32, height: SIZE as u32, seed: 1, max_depth: 8, reuse: true };
     let tracer = PathTracer::<DiffuseOnly>::new(&scene, &bvh, &lights, settings, Level::BASELINE);
     for (task, tile) in film.pixels_mut().chunks_mut(PIXELS_PER_TILE).enumerate() {
         tracer.run(task, 0..PATHS, 64, &mut arena, tile)?;

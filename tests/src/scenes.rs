@@ -3,7 +3,7 @@
 use glam::{Mat3, Vec3};
 use halflight_core::Rgb;
 use halflight_core::scene::{
-    Camera, ColorInput, Environment, Material, Mesh, PointLight, Scene, Texture, Triangle,
+    Camera, ColorInput, Environment, Material, Mesh, PointLight, Scene, Surface, Texture, Triangle,
 };
 
 /// Buffers of a scene, and a camera.
@@ -180,5 +180,37 @@ pub fn cornell_box() -> SceneBuffers {
             quad([[ax, 0.0, az], [bx, 0.0, bz], [bx, top, bz], [ax, top, az]].map(|p| p), white);
         }
     }
+    scene
+}
+
+/// The Cornell box with a mirror, glass, a coat, a cut-out, smooth normals, a lens, a sky and a point light.
+pub fn everything() -> SceneBuffers {
+    let mut scene = cornell_box();
+    scene.normals = vec![[0.0; 3]; scene.positions.len()];
+    let mut add = |surface| scene.material(Material { surface, ..Material::GREY });
+    let glass = add(Surface::Dielectric { ior: 1.5, tint: Rgb::ONE, roughness: 0.0.into() });
+    let frosted = add(Surface::Dielectric { ior: 1.3, tint: Rgb::ONE, roughness: 0.4.into() });
+    let mirror = add(Surface::Mirror { reflectance: Rgb::splat(0.9).into() });
+    let metal =
+        add(Surface::Conductor { reflectance: Rgb::new(0.9, 0.7, 0.4).into(), roughness: 0.5.into() });
+    let coat = add(Surface::Glossy {
+        base: Rgb::new(0.2, 0.3, 0.7).into(),
+        specular: Rgb::splat(0.05).into(),
+        roughness: 0.3.into(),
+        metallic: 0.0.into(),
+        ior: None,
+    });
+    let veil = scene.material(Material { opacity: 0.4.into(), ..Material::GREY });
+    for (i, material) in [glass, frosted, mirror, metal, coat].into_iter().enumerate() {
+        scene.sphere(Vec3::new(0.15 + 0.17 * i as f32, 0.45, 0.25), 0.08, 6, material);
+    }
+    let corners = [[0.2, 0.1], [0.8, 0.1], [0.8, 0.7], [0.2, 0.7]].map(|[x, y]| Vec3::new(x, y, 0.1));
+    let before = scene.positions.len();
+    scene.quad(corners, veil);
+    scene.normals.resize(scene.normals.len() + scene.positions.len() - before, [0.0; 3]);
+    scene.camera.lens_radius = 0.02;
+    scene.camera.focus_distance = 1.7;
+    scene.environment = constant_environment(0.1);
+    scene.lights.push(PointLight::Point { position: Vec3::new(0.5, 0.2, -0.3), intensity: Rgb::splat(0.2) });
     scene
 }

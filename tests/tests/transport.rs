@@ -3,15 +3,15 @@
 use core::sync::atomic::AtomicBool;
 use glam::Vec3;
 use halflight::drive::{self, RenderResult, Settings, Stop};
+use halflight_core::Level;
 use halflight_core::bsdf::All;
 use halflight_core::bvh::Bvh;
 use halflight_core::film::Film;
-use halflight_core::light::{Lights, PointLight};
+use halflight_core::light::Lights;
 use halflight_core::memory::{Arena, Footprint, Line};
-use halflight_core::scene::{Material, Scene, Surface};
+use halflight_core::scene::Scene;
 use halflight_core::transport::{PathSettings, PathTracer, UNLIMITED, reference};
-use halflight_core::{Level, Rgb};
-use halflight_tests::scenes::{SceneBuffers, constant_environment, cornell_box};
+use halflight_tests::scenes::{cornell_box, everything};
 
 /// Mean radiance of the box, from 4 million paths that sampled the lamp uniformly by area.
 const CORNELL_MEAN: [f64; 3] = [0.2123, 0.1509, 0.0652];
@@ -21,38 +21,6 @@ fn render(scene: &Scene, size: u32, spp: u32, change: impl FnOnce(&mut Settings)
     let mut settings = Settings { width: size, height: size, stop, ..Settings::default() };
     change(&mut settings);
     drive::render(scene, &settings, &mut |_| (), &AtomicBool::new(false)).unwrap()
-}
-
-/// The Cornell box with a mirror, glass, a coat, a cut-out, smooth normals, a lens, a sky and a point light.
-fn everything() -> SceneBuffers {
-    let mut scene = cornell_box();
-    scene.normals = vec![[0.0; 3]; scene.positions.len()];
-    let mut add = |surface| scene.material(Material { surface, ..Material::GREY });
-    let glass = add(Surface::Dielectric { ior: 1.5, tint: Rgb::ONE, roughness: 0.0.into() });
-    let frosted = add(Surface::Dielectric { ior: 1.3, tint: Rgb::ONE, roughness: 0.4.into() });
-    let mirror = add(Surface::Mirror { reflectance: Rgb::splat(0.9).into() });
-    let metal =
-        add(Surface::Conductor { reflectance: Rgb::new(0.9, 0.7, 0.4).into(), roughness: 0.5.into() });
-    let coat = add(Surface::Glossy {
-        base: Rgb::new(0.2, 0.3, 0.7).into(),
-        specular: Rgb::splat(0.05).into(),
-        roughness: 0.3.into(),
-        metallic: 0.0.into(),
-        ior: None,
-    });
-    let veil = scene.material(Material { opacity: 0.4.into(), ..Material::GREY });
-    for (i, material) in [glass, frosted, mirror, metal, coat].into_iter().enumerate() {
-        scene.sphere(Vec3::new(0.15 + 0.17 * i as f32, 0.45, 0.25), 0.08, 6, material);
-    }
-    let corners = [[0.2, 0.1], [0.8, 0.1], [0.8, 0.7], [0.2, 0.7]].map(|[x, y]| Vec3::new(x, y, 0.1));
-    let before = scene.positions.len();
-    scene.quad(corners, veil);
-    scene.normals.resize(scene.normals.len() + scene.positions.len() - before, [0.0; 3]);
-    scene.camera.lens_radius = 0.02;
-    scene.camera.focus_distance = 1.7;
-    scene.environment = constant_environment(0.1);
-    scene.lights.push(PointLight::Point { position: Vec3::new(0.5, 0.2, -0.3), intensity: Rgb::splat(0.2) });
-    scene
 }
 
 fn lines(footprint: Footprint) -> Vec<Line> {
@@ -87,7 +55,7 @@ fn bits_do_not_depend_on_threads_or_level() {
 fn the_wavefront_is_the_textbook_to_the_bit_for_any_wave() {
     for buffers in [cornell_box(), everything()] {
         let scene = buffers.scene();
-        let settings = PathSettings { width: 24, height: 20, seed: 3, max_depth: UNLIMITED };
+        let settings = PathSettings { width: 24, height: 20, seed: 3, max_depth: UNLIMITED, reuse: false };
         let samples = 0..3;
         let mut bvh_lines = lines(Bvh::footprint(scene.mesh.triangles.len()));
         let bvh = Bvh::build(&scene.mesh, &mut Arena::new(bytemuck::cast_slice_mut(&mut bvh_lines))).unwrap();
@@ -118,7 +86,7 @@ fn the_wavefront_is_the_textbook_to_the_bit_for_any_wave() {
 fn scratch_is_exactly_what_it_says() {
     let buffers = cornell_box();
     let scene = buffers.scene();
-    let settings = PathSettings { width: 16, height: 16, seed: 0, max_depth: UNLIMITED };
+    let settings = PathSettings { width: 16, height: 16, seed: 0, max_depth: UNLIMITED, reuse: false };
     let mut bvh_lines = lines(Bvh::footprint(scene.mesh.triangles.len()));
     let bvh = Bvh::build(&scene.mesh, &mut Arena::new(bytemuck::cast_slice_mut(&mut bvh_lines))).unwrap();
     let mut light_lines = lines(Lights::footprint(&scene).and(Lights::scratch(&scene)));

@@ -1,5 +1,7 @@
 //! A piecewise constant density over the unit square, given by weights on a grid: rows by their sums, then
-//! the cell in the row. Cumulative sums are 32-bit integers, so that the density is exactly what is sampled.
+//! the cell in the row. Cumulative sums are 32-bit integers, so that the density is exactly what is sampled;
+//! a coarse index into each says where to look (Chen and Asau 1974), so that a sample costs two or three
+//! lines of memory however large the grid is.
 
 use crate::memory::{Arena, Footprint, OutOfMemory};
 
@@ -12,7 +14,14 @@ pub struct Distribution2d<'m> {
     cells: &'m [u32],
     /// Ends of the rows.
     rows: &'m [u32],
+    /// For each row, where to look for its cells: see [`index`].
+    cell_index: &'m [u32],
+    /// Where to look for rows.
+    row_index: &'m [u32],
 }
+
+/// Bins for each entry of an index.
+const BINS_PER_ENTRY: usize = 8;
 
 /// A sampled cell and where in it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -30,7 +39,11 @@ pub struct Cell {
 impl<'m> Distribution2d<'m> {
     /// Bytes that [`Distribution2d::build`] takes.
     pub fn footprint(width: usize, height: usize) -> Footprint {
-        Footprint::default().slice::<u32>(width.saturating_mul(height)).slice::<u32>(height)
+        Footprint::default()
+            .slice::<u32>(width.saturating_mul(height))
+            .slice::<u32>(height)
+            .slice::<u32>(entries(width).saturating_mul(height))
+            .slice::<u32>(entries(height))
     }
 
     /// From `weight(x, y)`, called once for each cell. Weights that are negative or not finite count as
@@ -53,14 +66,24 @@ impl<'m> Distribution2d<'m> {
             }
         }
         accumulate(rows);
-        Ok(Self { width, height, cells, rows })
+        let cell_index: &mut [u32] = arena.slice(entries(width).saturating_mul(height))?;
+        let row_index: &mut [u32] = arena.slice(entries(height))?;
+        if width > 0 {
+            for (row, places) in cells.chunks_exact(width).zip(cell_index.chunks_exact_mut(entries(width))) {
+                index(row, places);
+            }
+        }
+        index(rows, row_index);
+        Ok(Self { width, height, cells, rows, cell_index, row_index })
     }
 
     /// The cell at `u`, monotone in both coordinates. `None` where there are no cells.
     #[inline]
     pub fn sample(&self, u: [f32; 2]) -> Option<Cell> {
-        let (y, v, row_probability) = pick(self.rows, u[1])?;
-        let (x, u, cell_probability) = pick(self.row(y), u[0])?;
+        let (y, v, row_probability) = pick(self.rows, self.row_index, u[1])?;
+        let first = y * entries(self.width);
+        let cell_index = self.cell_index.get(first..first + entries(self.width))?;
+        let (x, u, cell_probability) = pick(self.row(y), cell_index, u[0])?;
         let pdf = row_probability * cell_probability * (self.width as f32 * self.height as f32);
         Some(Cell { x: x as u32, y: y as u32, offset: [u, v], pdf })
     }
@@ -113,6 +136,24 @@ fn accumulate(weights: &mut [u32]) -> f64 {
     total
 }
 
+/// Entries of an index of `bins` bins.
+const fn entries(bins: usize) -> usize {
+    bins.div_ceil(BINS_PER_ENTRY)
+}
+
+/// Fills `places`: entry e is the first bin whose end lies beyond e/n of the whole, n being the number of entries.
+fn index(ends: &[u32], places: &mut [u32]) {
+    let mut bin = 0;
+    let count = places.len() as u64;
+    for (entry, place) in places.iter_mut().enumerate() {
+        let start = ((entry as u64) << 32).div_ceil(count);
+        while ends.get(bin).is_some_and(|&end| u64::from(end) <= start) && bin + 1 < ends.len() {
+            bin += 1;
+        }
+        *place = bin as u32;
+    }
+}
+
 /// Start and end of bin `i`, the end of the last one being 2^32.
 #[inline]
 fn interval(ends: &[u32], i: usize) -> Option<(u64, u64)> {
@@ -129,10 +170,13 @@ fn probability(ends: &[u32], i: usize) -> f32 {
 
 /// The bin at `u`, where in it, and its probability.
 #[inline]
-fn pick(ends: &[u32], u: f32) -> Option<(usize, f32, f32)> {
+fn pick(ends: &[u32], places: &[u32], u: f32) -> Option<(usize, f32, f32)> {
     // 24 bits of u: at most 2^32 - 256, below the last end.
     let target = (u.clamp(0.0, super::ONE_MINUS_EPSILON) * 4_294_967_296.0) as u32;
-    let i = ends.partition_point(|&end| end <= target);
+    let entry = ((u64::from(target) * places.len() as u64) >> 32) as usize;
+    let first = *places.get(entry)? as usize;
+    let last = places.get(entry + 1).map_or(ends.len(), |&place| place as usize + 1);
+    let i = first + ends.get(first..last)?.partition_point(|&end| end <= target);
     let (start, end) = interval(ends, i)?;
     let width = (end - start) as f32;
     let offset = (u64::from(target) - start) as f32 / width;

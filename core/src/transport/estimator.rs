@@ -19,6 +19,8 @@ pub struct PathSettings {
     /// The largest number of segments between camera and light: 1 shows what emits, 2 adds direct light,
     /// 3 one bounce, [`UNLIMITED`] all.
     pub max_depth: u32,
+    /// Whether neighbouring pixels share what their paths find.
+    pub reuse: bool,
 }
 
 /// What was done, for reports.
@@ -101,7 +103,7 @@ pub(super) fn power_heuristic(own: f32, other: f32) -> f32 {
 
 /// Paths of fewer segments than this always go on. On the Cornell box 3 gives a fifth fewer rays and half as
 /// much error again: 5 has a fifth more of 1 / (relMSE · seconds).
-const ROULETTE_FROM: u32 = 5;
+pub(super) const ROULETTE_FROM: u32 = 5;
 
 /// From this many segments on nothing survives for certain, so that paths end even between perfect mirrors.
 const CERTAIN_BELOW: u32 = 16;

@@ -5,9 +5,13 @@
 
 mod estimator;
 pub mod path;
+mod pilot;
+mod places;
 pub mod reference;
+mod reuse;
 mod shadow;
 mod wave;
 
 pub use estimator::{Counters, PathSettings, UNLIMITED};
 pub use path::PathTracer;
+pub use pilot::Pilot;

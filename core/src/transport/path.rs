@@ -13,18 +13,21 @@
 //! distribution of tasks.
 
 use super::estimator::{
-    Counters, MAX_CROSSINGS, MAX_VERTICES, PathSettings, dimension, power_heuristic, survival,
+    Counters, MAX_CROSSINGS, MAX_VERTICES, PathSettings, ROULETTE_FROM, UNLIMITED, dimension,
+    power_heuristic, survival,
 };
-use super::shadow::{pass_cutout, shadow_ray};
+use super::places::Places;
+use super::reuse::{Exchange, GROUP};
+use super::shadow::{FEW, pass_cutout, passing, shadow_ray};
 use super::wave::{Path, Wave};
 use crate::bsdf::{Bsdf, Features};
 use crate::bvh::{Bvh, Coherence};
-use crate::film::{PIXELS_PER_TILE, Pixel, Tile};
+use crate::film::{Pixel, Tile};
 use crate::geometry::{Hit, Ray};
 use crate::light::{Lights, emitted};
 use crate::memory::{Arena, Footprint, OutOfMemory};
 use crate::sampling::Sampler;
-use crate::scene::{Scene, SurfacePoint};
+use crate::scene::{Material, Scene, SurfacePoint};
 use crate::{Level, Rgb};
 use core::marker::PhantomData;
 use core::ops::Range;
@@ -37,11 +40,13 @@ pub const WAVE: usize = 2048;
 /// Path tracing of one scene: a pass whose tasks are the tiles of the picture.
 #[derive(Clone, Copy)]
 pub struct PathTracer<'a, F> {
-    scene: &'a Scene<'a>,
-    bvh: &'a Bvh<'a>,
+    pub(super) scene: &'a Scene<'a>,
+    pub(super) bvh: &'a Bvh<'a>,
     lights: &'a Lights<'a>,
-    settings: PathSettings,
-    level: Level,
+    pub(super) settings: PathSettings,
+    pub(super) level: Level,
+    /// Some surfaces let a part of the light through, so that a shadow ray may go on behind a hit.
+    pub(super) has_cutouts: bool,
     features: PhantomData<F>,
 }
 
@@ -55,7 +60,18 @@ impl<'a, F: Features> PathTracer<'a, F> {
         settings: PathSettings,
         level: Level,
     ) -> Self {
-        Self { scene, bvh, lights, settings, level, features: PhantomData }
+        let has_cutouts = scene.materials.iter().any(Material::has_cutout);
+        Self { scene, bvh, lights, settings, level, has_cutouts, features: PhantomData }
+    }
+
+    /// The same, where pixels share what their paths find, or do not.
+    pub fn with_reuse(&self, reuse: bool) -> Self {
+        Self { settings: PathSettings { reuse, ..self.settings }, ..*self }
+    }
+
+    /// Whether paths have a limit of depth.
+    pub(super) fn is_limited(&self) -> bool {
+        self.settings.max_depth != UNLIMITED
     }
 
     /// Number of tasks: tiles of the film.
@@ -84,51 +100,60 @@ impl<'a, F: Features> PathTracer<'a, F> {
         let mut wave = Wave::new(wave.max(1), &mut arena)?;
         let tile = Tile::new(self.settings.width, self.settings.height, task);
         let mut counters = Counters::default();
-        // All (pixel, sample) of the tile, samples of a pixel side by side: `next` is the first not started.
-        let mut next = (0, samples.start);
-        while next.0 < PIXELS_PER_TILE && !samples.is_empty() {
-            let first = next;
-            let count = self.start(tile, &samples, &mut next, &mut wave);
+        let mut places = Places::new(tile, samples);
+        loop {
+            let count = self.start(&mut places, &mut wave);
+            if count == 0 {
+                return Ok(counters);
+            }
             counters.paths += count as u64;
             self.advance(&mut wave, count, &mut counters);
-            self.finish(tile, &samples, first, &wave.paths[..count], out, &mut counters);
+            if self.settings.reuse {
+                self.share(&mut wave, count, &mut counters);
+            }
+            for (path, exchange) in wave.paths.iter().zip(&*wave.exchanges).take(count) {
+                if let Some(pixel) = out.get_mut(path.place as usize) {
+                    pixel.add(path.sample, exchange.seen(path), &mut counters.dropped);
+                }
+            }
         }
-        Ok(counters)
     }
 
-    /// Fills the wave with camera rays; returns how many.
-    fn start(&self, tile: Tile, samples: &Range<u32>, next: &mut (usize, u32), wave: &mut Wave) -> usize {
+    /// Fills the wave with camera rays; returns how many. Groups stay together.
+    pub(super) fn start(&self, places: &mut Places, wave: &mut Wave) -> usize {
         let PathSettings { width, height, seed, .. } = self.settings;
         let mut count = 0;
-        for (path, ray) in wave.paths.iter_mut().zip(wave.rays.iter_mut()) {
-            let Some((pixel, x, y)) = advance_to_pixel(tile, samples, next) else { break };
-            let sample = next.1;
-            next.1 += 1;
-            debug_assert!(pixel < PIXELS_PER_TILE);
-            let index = y * width + x;
-            let sampler = Sampler::new(seed, index, sample);
-            let [dx, dy] = sampler.pair(dimension::PIXEL);
-            let lens =
-                if self.scene.camera.lens_radius > 0.0 { sampler.pair(dimension::LENS) } else { [0.0; 2] };
-            *ray = self.scene.camera.ray(width, height, x as f32 + dx, y as f32 + dy, lens);
-            ray.tag = count as u32;
-            *path = Path {
-                throughput: [1.0; 3],
-                pdf: f32::INFINITY,
-                pixel: index,
-                sample,
-                segments: 1,
-                triangle: crate::geometry::MISS,
-                eta_squared: 1.0,
-                ..Path::default()
-            };
-            count += 1;
+        while count + GROUP <= wave.paths.len()
+            && let Some(group) = places.next_group()
+        {
+            for (place, x, y) in places.pixels(group) {
+                let index = y * width + x;
+                let sampler = Sampler::new(seed, index, group.sample);
+                let [dx, dy] = sampler.pair(dimension::PIXEL);
+                let has_lens = self.scene.camera.lens_radius > 0.0;
+                let lens = if has_lens { sampler.pair(dimension::LENS) } else { [0.0; 2] };
+                let ray = self.scene.camera.ray(width, height, x as f32 + dx, y as f32 + dy, lens);
+                wave.rays[count] = Ray { tag: count as u32, ..ray };
+                wave.paths[count] = Path {
+                    throughput: [1.0; 3],
+                    pdf: f32::INFINITY,
+                    pixel: index,
+                    place: place as u32,
+                    sample: group.sample,
+                    segments: 1,
+                    triangle: crate::geometry::MISS,
+                    eta_squared: 1.0,
+                    ..Path::default()
+                };
+                wave.exchanges[count] = Exchange::new(group.number());
+                count += 1;
+            }
         }
         count
     }
 
     /// Traces the first `count` rays of the wave and all that follows from them.
-    fn advance(&self, wave: &mut Wave, count: usize, counters: &mut Counters) {
+    pub(super) fn advance(&self, wave: &mut Wave, count: usize, counters: &mut Counters) {
         let mut active = count;
         let mut coherence = Coherence::Coherent;
         while active > 0 {
@@ -141,7 +166,8 @@ impl<'a, F: Features> PathTracer<'a, F> {
             for i in 0..active {
                 let (ray, hit) = (wave.rays[i], wave.hits[i]);
                 let Some(path) = wave.paths.get_mut(ray.tag as usize) else { continue };
-                let step = self.shade(path, &ray, &hit, counters);
+                let Some(exchange) = wave.exchanges.get_mut(ray.tag as usize) else { continue };
+                let step = self.shade(path, exchange, &ray, &hit, counters);
                 if let Some((mut shadow, light)) = step.light {
                     shadow.tag = ray.tag;
                     wave.shadow_rays[shadows] = shadow;
@@ -155,30 +181,11 @@ impl<'a, F: Features> PathTracer<'a, F> {
                 }
             }
             active = going_on;
-            counters.shadow_rays += shadows as u64;
-            if F::CUTOUT {
+            if F::CUTOUT && self.has_cutouts {
                 self.connect_through_cutouts(wave, shadows, counters);
             } else {
+                counters.shadow_rays += shadows as u64;
                 self.connect(wave, shadows);
-            }
-        }
-    }
-
-    /// Adds the samples of finished paths to their pixels, in order.
-    fn finish(
-        &self,
-        tile: Tile,
-        samples: &Range<u32>,
-        mut place: (usize, u32),
-        paths: &[Path],
-        out: &mut [Pixel],
-        counters: &mut Counters,
-    ) {
-        for path in paths {
-            let Some((pixel, ..)) = advance_to_pixel(tile, samples, &mut place) else { break };
-            place.1 += 1;
-            if let Some(out) = out.get_mut(pixel) {
-                out.add(path.sample, path.radiance.into(), &mut counters.dropped);
             }
         }
     }
@@ -192,7 +199,7 @@ impl<'a, F: Features> PathTracer<'a, F> {
             if *hidden == 0
                 && let Some(path) = wave.paths.get_mut(ray.tag as usize)
             {
-                path.radiance = (Rgb::from(path.radiance) + Rgb::from(*light)).to_array();
+                path.add(Rgb::from(*light));
             }
         }
     }
@@ -200,13 +207,11 @@ impl<'a, F: Features> PathTracer<'a, F> {
     /// The same where some surfaces let a part of the light through: round after round, each ray to
     /// its next surface.
     fn connect_through_cutouts(&self, wave: &mut Wave, mut shadows: usize, counters: &mut Counters) {
-        for round in 0..=MAX_CROSSINGS {
-            if shadows == 0 {
-                return;
+        for _ in 0..=MAX_CROSSINGS {
+            if shadows <= FEW {
+                break;
             }
-            if round > 0 {
-                counters.shadow_rays += shadows as u64;
-            }
+            counters.shadow_rays += shadows as u64;
             let rays = &wave.shadow_rays[..shadows];
             let hits = &mut wave.hits[..shadows];
             self.bvh.nearest_batch(self.level, rays, Coherence::Incoherent, hits);
@@ -216,7 +221,7 @@ impl<'a, F: Features> PathTracer<'a, F> {
                 let hit = wave.hits[i];
                 if !hit.is_some() {
                     if let Some(path) = wave.paths.get_mut(ray.tag as usize) {
-                        path.radiance = (Rgb::from(path.radiance) + light).to_array();
+                        path.add(light);
                     }
                 } else if let Some((through, transmittance)) = pass_cutout::<F>(self.scene, &ray, &hit) {
                     wave.shadow_rays[left] = through;
@@ -226,14 +231,28 @@ impl<'a, F: Features> PathTracer<'a, F> {
             }
             shadows = left;
         }
-        counters.dropped.unfinished += shadows as u64;
+        for (ray, light) in wave.shadow_rays[..shadows].iter().zip(&*wave.shadow_light) {
+            let rays = &mut counters.shadow_rays;
+            let light = passing::<F>(self.scene, self.bvh, self.level, *ray, Rgb::from(*light), rays);
+            counters.dropped.unfinished += u64::from(light.is_none());
+            if let (Some(light), Some(path)) = (light, wave.paths.get_mut(ray.tag as usize)) {
+                path.add(light);
+            }
+        }
     }
 
     /// One vertex: what the ray of `path` met.
     #[inline]
-    fn shade(&self, path: &mut Path, ray: &Ray, hit: &Hit, counters: &mut Counters) -> Step {
+    fn shade(
+        &self,
+        path: &mut Path,
+        exchange: &mut Exchange,
+        ray: &Ray,
+        hit: &Hit,
+        counters: &mut Counters,
+    ) -> Step {
         let scene = self.scene;
-        let throughput = Rgb::from(path.throughput);
+        let mut throughput = Rgb::from(path.throughput);
         let segments = u32::from(path.segments);
         let direction = Vec3::from(ray.direction);
         let position = Vec3::from(path.position);
@@ -281,6 +300,11 @@ impl<'a, F: Features> PathTracer<'a, F> {
         }
 
         let bsdf = Bsdf::at::<F>(scene, point.material, point.uv, point.front);
+        let is_diffuse = matches!(bsdf, Bsdf::Diffuse(_));
+        if self.settings.reuse {
+            exchange.arrive(&point, is_diffuse, path);
+            throughput = Rgb::from(path.throughput);
+        }
         let wo = point.frame.to_local(-direction);
         let first = dimension::vertex(segments);
         // Lights behind an opaque surface need not be asked.
@@ -309,13 +333,16 @@ impl<'a, F: Features> PathTracer<'a, F> {
         let [u, v] = dimension::scattering(&sampler, segments);
         let lobe = if F::GLOSSY || F::DIELECTRIC { sampler.single(first + dimension::LOBE) } else { 0.0 };
         let Some(sample) = bsdf.sample::<F>(wo, [u, v, lobe]) else { return Step { light, next: None } };
+        let mut throughput = throughput * sample.weight;
+        if self.settings.reuse && is_diffuse && segments < ROULETTE_FROM {
+            exchange.leave(&point, throughput, segments);
+        }
         let direction = point.frame.to_world(sample.direction);
         if !point.sides_agree(sample.direction, direction) {
             return Step { light, next: None };
         }
-        let mut throughput = throughput * sample.weight;
         path.eta_squared *= sample.eta * sample.eta;
-        let survival = survival(segments, throughput * path.eta_squared);
+        let survival = survival(segments, exchange.worth(throughput) * path.eta_squared);
         if survival < 1.0 {
             if sampler.single(first + dimension::ROULETTE) >= survival {
                 return Step { light, next: None };
@@ -368,19 +395,4 @@ impl Path {
         self.triangle = hit.triangle;
         Step { light: None, next: Some(next) }
     }
-}
-
-/// The first pixel from `next` on of which samples are left, with its column and row.
-#[inline]
-fn advance_to_pixel(tile: Tile, samples: &Range<u32>, next: &mut (usize, u32)) -> Option<(usize, u32, u32)> {
-    if next.1 >= samples.end {
-        *next = (next.0 + 1, samples.start);
-    }
-    while next.0 < PIXELS_PER_TILE {
-        if let Some((x, y)) = tile.pixel(next.0) {
-            return Some((next.0, x, y));
-        }
-        next.0 += 1;
-    }
-    None
 }

@@ -2,10 +2,10 @@
 //! against, and it says in order what that does in pieces.
 
 use super::estimator::{MAX_CROSSINGS, MAX_VERTICES, PathSettings, dimension, power_heuristic, survival};
-use super::shadow::{pass_cutout, shadow_ray};
+use super::shadow::{passing, shadow_ray};
 use crate::bsdf::{All, Bsdf};
 use crate::bvh::Bvh;
-use crate::geometry::{MISS, Ray};
+use crate::geometry::MISS;
 use crate::light::{Lights, emitted};
 use crate::sampling::Sampler;
 use crate::scene::{Scene, SurfacePoint};
@@ -21,7 +21,7 @@ pub fn radiance(
     [x, y]: [u32; 2],
     sample: u32,
 ) -> Rgb {
-    let PathSettings { width, height, seed, max_depth } = *settings;
+    let PathSettings { width, height, seed, max_depth, .. } = *settings;
     let sampler = Sampler::new(seed, y * width + x, sample);
     let [dx, dy] = sampler.pair(dimension::PIXEL);
     let lens = sampler.pair(dimension::LENS);
@@ -90,7 +90,9 @@ pub fn radiance(
                 if same_side && f != Rgb::ZERO {
                     let weight = if light.delta { 1.0 } else { power_heuristic(light.pdf, pdf) };
                     let sent = throughput * f * light.radiance * (weight / light.pdf);
-                    radiance += arriving(scene, bvh, shadow_ray(&point, &light), sent);
+                    let ray = shadow_ray(&point, &light);
+                    radiance +=
+                        passing::<All>(scene, bvh, Level::BASELINE, ray, sent, &mut 0).unwrap_or_default();
                 }
             }
         }
@@ -123,18 +125,4 @@ pub fn radiance(
         segments += 1;
     }
     radiance
-}
-
-/// What of `light` passes along a shadow ray.
-fn arriving(scene: &Scene, bvh: &Bvh, mut ray: Ray, mut light: Rgb) -> Rgb {
-    for _ in 0..=MAX_CROSSINGS {
-        let hit = bvh.nearest(Level::BASELINE, &ray);
-        if !hit.is_some() {
-            return light;
-        }
-        let Some((rest, transmittance)) = pass_cutout::<All>(scene, &ray, &hit) else { break };
-        light *= transmittance;
-        ray = rest;
-    }
-    Rgb::ZERO
 }

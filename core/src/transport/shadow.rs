@@ -1,9 +1,12 @@
 //! Rays from a surface point to a light, and what cut-outs on their way let through.
 
+use super::estimator::MAX_CROSSINGS;
 use crate::bsdf::Features;
+use crate::bvh::Bvh;
 use crate::geometry::{Hit, Ray};
 use crate::light::LightSample;
 use crate::scene::{Scene, SurfacePoint};
+use crate::{Level, Rgb};
 use glam::Vec3;
 
 /// The ray that meets what hides the light of `sample` from `point`, and neither end.
@@ -18,6 +21,32 @@ pub(super) fn shadow_ray(point: &SurfacePoint, sample: &LightSample) -> Ray {
         return point.spawn_to(point.position + sample.distance * sample.direction);
     }
     point.spawn(sample.direction)
+}
+
+/// Fewer rays than this are followed one by one: a batch takes some time to set up.
+pub(super) const FEW: usize = 32;
+
+/// What of `light` passes along `ray`, cut-outs included. `None` where there are too many of them. Counts the rays
+/// that this takes.
+pub(super) fn passing<F: Features>(
+    scene: &Scene,
+    bvh: &Bvh,
+    level: Level,
+    mut ray: Ray,
+    mut light: Rgb,
+    rays: &mut u64,
+) -> Option<Rgb> {
+    for _ in 0..=MAX_CROSSINGS {
+        *rays += 1;
+        let hit = bvh.nearest(level, &ray);
+        if !hit.is_some() {
+            return Some(light);
+        }
+        let Some((rest, transmittance)) = pass_cutout::<F>(scene, &ray, &hit) else { return Some(Rgb::ZERO) };
+        light *= transmittance;
+        ray = rest;
+    }
+    None
 }
 
 /// Behind the surface that a shadow ray met: the rest of the ray, and the factor on its light. `None` where

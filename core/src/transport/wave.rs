@@ -1,5 +1,6 @@
 //! The working memory of a wavefront: the state of every path of the wave, and queues of rays.
 
+use super::reuse::{Exchange, GROUP, Pair};
 use crate::geometry::{Hit, Ray};
 use crate::memory::{Arena, Footprint, OutOfMemory};
 use bytemuck::{Pod, Zeroable};
@@ -18,6 +19,8 @@ pub(super) struct Path {
     pub(super) pixel: u32,
     /// The last vertex at which the path was scattered.
     pub(super) position: [f32; 3],
+    /// Which pixel of the tile.
+    pub(super) place: u32,
     /// Which sample of the pixel.
     pub(super) sample: u32,
     /// The normal there, as the light sampling knows it.
@@ -35,6 +38,9 @@ pub(super) struct Path {
 /// Slices for up to `capacity` paths. Rays know their path by their tag.
 pub(super) struct Wave<'m> {
     pub(super) paths: &'m mut [Path],
+    /// What the paths share with their neighbours.
+    pub(super) exchanges: &'m mut [Exchange],
+    pub(super) pairs: &'m mut [Pair],
     pub(super) rays: &'m mut [Ray],
     pub(super) hits: &'m mut [Hit],
     pub(super) shadow_rays: &'m mut [Ray],
@@ -44,9 +50,13 @@ pub(super) struct Wave<'m> {
 }
 
 impl<'m> Wave<'m> {
+    /// `capacity` paths, or the fewest that can share.
     pub(super) fn footprint(capacity: usize) -> Footprint {
+        let capacity = capacity.max(GROUP);
         Footprint::default()
             .slice::<Path>(capacity)
+            .slice::<Exchange>(capacity)
+            .slice::<Pair>(capacity)
             .slice::<Ray>(capacity)
             .slice::<Hit>(capacity)
             .slice::<Ray>(capacity)
@@ -55,8 +65,11 @@ impl<'m> Wave<'m> {
     }
 
     pub(super) fn new(capacity: usize, arena: &mut Arena<'m>) -> Result<Self, OutOfMemory> {
+        let capacity = capacity.max(GROUP);
         Ok(Self {
             paths: arena.slice(capacity)?,
+            exchanges: arena.slice(capacity)?,
+            pairs: arena.slice(capacity)?,
             rays: arena.slice(capacity)?,
             hits: arena.slice(capacity)?,
             shadow_rays: arena.slice(capacity)?,

@@ -39,6 +39,10 @@ pub(super) struct Options {
     /// Whether caustics get a map of their own where they need one [default: auto]; `path` never needs one
     #[arg(long)]
     caustics: Option<Caustics>,
+    /// Whether neighbouring pixels share what their paths find: less noise for the same time where much of the
+    /// light is indirect; the noise that is left is alike in pixels near each other [default: auto]
+    #[arg(long, value_name = "WHEN")]
+    reuse: Option<Reuse>,
     /// Longest path in segments: 1 is light seen directly, 2 adds direct light [default: no limit]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     max_depth: Option<u32>,
@@ -69,11 +73,22 @@ pub(super) enum Caustics {
     Off,
 }
 
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub(super) enum Reuse {
+    /// Where a look at a few tiles says that it pays
+    Auto,
+    /// Always
+    On,
+    /// Never
+    Off,
+}
+
 impl Options {
     /// These, and those of `base` where these say nothing.
     pub(super) fn over(&self, base: &Options) -> Options {
         Options {
             caustics: self.caustics.or(base.caustics),
+            reuse: self.reuse.or(base.reuse),
             max_depth: self.max_depth.or(base.max_depth),
             seed: self.seed.or(base.seed),
             simd: self.simd.or(base.simd),
@@ -114,6 +129,11 @@ impl Shot {
             height,
             seed: options.seed.or(file.seed).unwrap_or(defaults.seed),
             max_depth: options.max_depth.or(file.max_depth),
+            reuse: match options.reuse {
+                None | Some(Reuse::Auto) => None,
+                Some(Reuse::On) => Some(true),
+                Some(Reuse::Off) => Some(false),
+            },
             threads: self.threads.map(|threads| threads as usize),
             memory: self.memory,
             level: options.level(),

@@ -33,7 +33,7 @@ use halflight_core::Level;
 use halflight_core::census::Census;
 use halflight_core::film::Tile;
 use halflight_core::scene::Scene;
-use halflight_core::transport::Counters;
+use halflight_core::transport::{Counters, Pilot};
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -48,6 +48,9 @@ pub struct Settings {
     pub seed: u32,
     /// The largest number of segments of a path; 1 is light that is seen directly. `None`: no limit.
     pub max_depth: Option<u32>,
+    /// Whether neighbouring pixels share what their paths find; `None`: where a look at a few tiles says that it
+    /// pays.
+    pub reuse: Option<bool>,
     /// Number of threads; `None`: as many as the machine runs at once.
     pub threads: Option<usize>,
     /// Most bytes that the scene and all structures may take together; `None`: no limit.
@@ -88,6 +91,7 @@ impl Default for Settings {
             height: 512,
             seed: 0,
             max_depth: None,
+            reuse: None,
             threads: None,
             memory: None,
             level: Level::detect(),
@@ -134,6 +138,15 @@ pub struct Seconds {
     pub render: f64,
 }
 
+/// Whether neighbouring pixels shared what their paths found.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Reuse {
+    /// They did.
+    pub used: bool,
+    /// What a look at a few tiles said, where it was asked.
+    pub pilot: Option<Pilot>,
+}
+
 /// A picture and all that is known of it.
 #[derive(Clone, Debug)]
 pub struct RenderResult {
@@ -155,6 +168,8 @@ pub struct RenderResult {
     pub seconds: Seconds,
     /// Paths, rays and dropped samples.
     pub counters: Counters,
+    /// Whether pixels shared what their paths found, and why.
+    pub reuse: Reuse,
     /// Where samples were dropped, the worst first.
     pub places: Vec<Place>,
     /// Pixels that are black because all of their samples were dropped.

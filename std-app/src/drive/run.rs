@@ -7,7 +7,9 @@ use super::ledger::empty_pixels;
 use super::memory::Memory;
 use super::rounds::{Plan, Rounds};
 use super::workers::{self, Workers};
-use super::{Ending, ErrorEstimate, FilmError, Progress, RenderError, RenderResult, Seconds, Settings};
+use super::{
+    Ending, ErrorEstimate, FilmError, Progress, RenderError, RenderResult, Reuse, Seconds, Settings,
+};
 use crate::save::Image;
 use core::sync::atomic::{AtomicBool, Ordering};
 use core::time::Duration;
@@ -43,8 +45,8 @@ impl WithFeatures for Render<'_> {
         let Render { scene, settings, method, progress, interrupt } = self;
         let (width, height) = (settings.width, settings.height);
         let max_depth = settings.max_depth.unwrap_or(UNLIMITED);
-        let path_settings = PathSettings { width, height, seed: settings.seed, max_depth };
-        let identity = Identity::of(scene, method, &path_settings, settings.max_depth);
+        let path_settings = PathSettings { width, height, seed: settings.seed, max_depth, reuse: false };
+        let identity = Identity::of(scene, method, &path_settings, settings);
         // A film of something else should not cost the time of building.
         let resumed = settings.resume.as_deref().map(Reader::open).transpose()?;
         if let Some(film) = &resumed {
@@ -80,6 +82,14 @@ impl WithFeatures for Render<'_> {
             }
         };
         let mut clock = Clock::start(before);
+        let reuse = match settings.reuse {
+            Some(used) => Reuse { used, pilot: None },
+            None => {
+                let pilot = workers.pilot(&tracer, &mut scratch_lines)?;
+                Reuse { used: pilot.pays(), pilot: Some(pilot) }
+            }
+        };
+        let tracer = tracer.with_reuse(reuse.used);
         let mut reference = settings.reference.as_deref().map(Reference::new);
         let mut latest = history.iter().rev().find_map(|round: &Round| round.error);
         let mut estimating = 0.0;
@@ -149,6 +159,7 @@ impl WithFeatures for Render<'_> {
             threads: workers.count(),
             seconds: Seconds { build, render },
             counters: canvas.counters,
+            reuse,
             places: canvas.ledger.places(width, height),
             empty_pixels: empty_pixels(film, |task| canvas.shard.owns(task)),
             error,

@@ -2,14 +2,14 @@
 
 use super::RenderError;
 use super::canvas::Canvas;
-use core::sync::atomic::{AtomicBool, Ordering};
+use core::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use halflight_core::bsdf::Features;
 use halflight_core::bvh::{Bvh, Join};
 use halflight_core::estimate::{ErrorEstimate, TileError, TileLight};
 use halflight_core::film::{Film, PIXELS_PER_TILE};
 use halflight_core::memory::{Arena, Line, OutOfMemory};
 use halflight_core::scene::Mesh;
-use halflight_core::transport::{Counters, PathTracer, path::WAVE};
+use halflight_core::transport::{Counters, PathTracer, Pilot, path::WAVE};
 use rayon::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use std::sync::Mutex;
@@ -52,6 +52,45 @@ impl Workers {
             let errors: Vec<_> = tiles().map(|tile| TileError::of(tile, mean)).collect();
             ErrorEstimate::of(errors.into_iter())
         })
+    }
+
+    /// A look at a few tiles before the picture.
+    pub(super) fn pilot<F: Features>(
+        &self,
+        tracer: &PathTracer<F>,
+        scratch: &mut [Vec<Line>],
+    ) -> Result<Pilot, OutOfMemory> {
+        let tasks: Vec<usize> = tracer.pilot_tasks().collect();
+        let means = self.each(&tasks, scratch, |task, arena| tracer.pilot_mean(task, WAVE, arena))?;
+        let mean = means.iter().sum::<f32>() / means.len().max(1) as f32;
+        let mut pilot = Pilot::default();
+        for tile in self.each(&tasks, scratch, |task, arena| tracer.pilot(task, mean, WAVE, arena))? {
+            pilot += tile;
+        }
+        Ok(pilot)
+    }
+
+    /// What `look` says of each of `tasks`, in their order.
+    fn each<T: Send>(
+        &self,
+        tasks: &[usize],
+        scratch: &mut [Vec<Line>],
+        look: impl Fn(usize, &mut Arena) -> Result<T, OutOfMemory> + Sync,
+    ) -> Result<Vec<T>, OutOfMemory> {
+        let next = AtomicUsize::new(0);
+        let work = |lines: &mut Vec<Line>| {
+            let mut arena = Arena::new(bytemuck::cast_slice_mut(lines));
+            let mut seen = Vec::new();
+            loop {
+                let index = next.fetch_add(1, Ordering::Relaxed);
+                let Some(&task) = tasks.get(index) else { return Ok(seen) };
+                seen.push((index, look(task, &mut arena)?));
+            }
+        };
+        let seen = || scratch.par_iter_mut().map(work).collect::<Result<Vec<_>, _>>();
+        let mut seen: Vec<(usize, T)> = self.pool.install(seen)?.into_iter().flatten().collect();
+        seen.sort_by_key(|(index, _)| *index);
+        Ok(seen.into_iter().map(|(_, value)| value).collect())
     }
 
     /// One round: every tile of `canvas` is brought to `round.target` samples, unless the round is cut.

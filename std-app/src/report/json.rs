@@ -12,7 +12,7 @@ pub(super) fn run(run: &Run) -> Value {
     let (result, settings) = (run.result, run.settings);
     let plan = Census::of(run.scene).plan();
     let left_out: Vec<Value> =
-        plan.left_out().map(|(what, why)| json!({ "what": what, "why": why })).collect();
+        run.left_out().iter().map(|(what, why)| json!({ "what": what, "why": why })).collect();
     let memory: Map<String, Value> =
         result.memory.iter().map(|part| (part.structure.into(), part.bytes.into())).collect();
     let shard = settings.shard;
@@ -44,6 +44,11 @@ pub(super) fn run(run: &Run) -> Value {
         "dropped": dropped_object(&result.counters.dropped, &result.places, result.empty_pixels),
         "memory": memory,
         "memory_peak": result.memory_peak,
+        "reuse": {
+            "used": result.reuse.used,
+            "gain": result.reuse.pilot.map(|pilot| pilot.gain()),
+            "cost": result.reuse.pilot.map(|pilot| pilot.cost()),
+        },
         "left_out": left_out,
         "outputs": run.outputs,
         "checkpoint": settings.checkpoint.as_ref().map(|checkpoint| &checkpoint.path),

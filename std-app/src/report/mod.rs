@@ -20,6 +20,7 @@ pub use race::{Race, Racer};
 use crate::compare::Comparison;
 use crate::drive::{RenderResult, Settings};
 use crate::save::Image;
+use halflight_core::census::Census;
 use halflight_core::scene::Scene;
 use serde_json::Value;
 use std::path::PathBuf;
@@ -46,6 +47,19 @@ pub struct Run<'a> {
     pub total_seconds: f64,
     /// Who made it.
     pub maker: &'a Maker,
+}
+
+impl Run<'_> {
+    /// What was left out and why.
+    fn left_out(&self) -> Vec<(&'static str, &'static str)> {
+        let mut left_out: Vec<_> = Census::of(self.scene).plan().left_out().collect();
+        if !self.result.reuse.used {
+            let measured = self.result.reuse.pilot.is_some();
+            let why = if measured { "it would cost more than it gains" } else { "it was not asked for" };
+            left_out.push(("reuse of paths by neighbouring pixels", why));
+        }
+        left_out
+    }
 }
 
 /// The files of a report by name.

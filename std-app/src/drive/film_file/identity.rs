@@ -1,6 +1,7 @@
 //! Which picture a film is of: films can be continued and merged only where all of this is the same.
 
 use super::hash::Hash;
+use crate::drive::Settings;
 use halflight_core::camera::Camera;
 use halflight_core::scene::{Scene, Texels};
 use halflight_core::transport::PathSettings;
@@ -16,6 +17,8 @@ pub(in crate::drive) struct Identity {
     pub(super) height: u32,
     seed: u32,
     max_depth: Option<u32>,
+    /// What was asked for; what comes of it follows from the scene.
+    reuse: Option<bool>,
     /// Everything that the method is told.
     settings: String,
     /// Fingerprint of all that is in the scene.
@@ -28,7 +31,7 @@ impl Identity {
         scene: &Scene,
         method: &str,
         settings: &PathSettings,
-        max_depth: Option<u32>,
+        Settings { max_depth, reuse, .. }: &Settings,
     ) -> Self {
         Self {
             version: env!("CARGO_PKG_VERSION").into(),
@@ -36,7 +39,8 @@ impl Identity {
             width: settings.width,
             height: settings.height,
             seed: settings.seed,
-            max_depth,
+            max_depth: *max_depth,
+            reuse: *reuse,
             settings: format!("{settings:?}"),
             scene: format!("{:016x}", fingerprint(scene)),
             camera: camera(&scene.camera),
@@ -46,6 +50,11 @@ impl Identity {
     /// In what `self`, that of a film, is not `other`, in words.
     pub(super) fn difference(&self, other: &Self) -> Option<String> {
         let depth = |depth: Option<u32>| depth.map_or("no limit of".into(), |depth| depth.to_string());
+        let choice = |asked: Option<bool>| match asked {
+            None => "auto".into(),
+            Some(true) => "on".into(),
+            Some(false) => "off".into(),
+        };
         let size = |identity: &Self| format!("{}x{} pixels", identity.width, identity.height);
         let said =
             |what: &str, of: String, is: String| (of != is).then(|| format!("of {what}{of}, not {is}"));
@@ -54,6 +63,7 @@ impl Identity {
             .or(said("", size(self), size(other)))
             .or(said("seed ", self.seed.to_string(), other.seed.to_string()))
             .or(said("max-depth ", depth(self.max_depth), depth(other.max_depth)))
+            .or(said("reuse ", choice(self.reuse), choice(other.reuse)))
             .or((self.scene != other.scene)
                 .then(|| "of another scene, or the scene has changed since".into()))
             .or((self.camera != other.camera).then(|| "seen by another camera".into()))

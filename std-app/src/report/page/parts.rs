@@ -58,9 +58,9 @@ pub(super) fn census(run: &Run) -> String {
 
 /// What was left out and why.
 pub(super) fn left_out(run: &Run) -> String {
-    let plan = Census::of(run.scene).plan();
-    let rows: String = plan
+    let rows: String = run
         .left_out()
+        .iter()
         .map(|(what, why)| {
             format!("<tr><th scope=\"row\">{}</th><td>{}</td></tr>", escape(what), escape(why))
         })

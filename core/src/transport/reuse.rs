@@ -1,0 +1,293 @@
+//! Paths of neighbouring pixels share what they find (Bekaert, Sbert and Halton, "Accelerating path tracing by
+//! re-using paths", 2002).
+//!
+//! Path j starts from a diffuse point x_j in its pixel and meets a diffuse point y_j, which reflects L_j. From
+//! every x_i of the group y_j could have been met as well. The balance heuristic over all of them gives pixel i
+//! a share w_ij of what path j found:
+//!
+//!   w_ij = V_ij g_ij / Σ_k V_kj g_kj,    g_kj = cos θ_k cos θ_y / |x_k - y_j|²
+//!
+//! with V the visibility between the two. The shares of one y_j add up to one: nothing is lost and nothing is
+//! counted twice, whatever V and g are, so the picture stays right in the mean. The price is one shadow ray for
+//! each pair, and errors that neighbours have in common.
+
+use super::estimator::{Counters, MAX_CROSSINGS};
+use super::path::PathTracer;
+use super::shadow::{FEW, pass_cutout, passing};
+use super::wave::{Path, Wave};
+use crate::Rgb;
+use crate::bsdf::Features;
+use crate::bvh::Coherence;
+use crate::geometry::Ray;
+use crate::scene::SurfacePoint;
+use bytemuck::{Pod, Zeroable};
+use glam::Vec3;
+
+/// Paths that share: a compact block of pixels, or what the border of the picture leaves of it.
+pub(super) const GROUP: usize = 16;
+
+/// Below this cosine of the viewer the shading normal may have been turned to him: no two viewers then see the
+/// same surface.
+const HORIZON: f32 = 2e-3;
+
+/// One end of a connection. Both normals are on the side of the other end.
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[repr(C)]
+pub(super) struct End {
+    position: [f32; 3],
+    /// Bound of the error of `position`.
+    error: f32,
+    /// The shading normal.
+    normal: [f32; 3],
+    geometric_normal: [f32; 3],
+}
+
+impl End {
+    pub(super) fn of(point: &SurfacePoint) -> Self {
+        Self {
+            position: point.position.to_array(),
+            error: point.error,
+            normal: point.frame.normal.to_array(),
+            geometric_normal: point.geometric_normal.to_array(),
+        }
+    }
+
+    /// The position, moved off the surface.
+    #[inline]
+    fn outside(&self) -> Vec3 {
+        Vec3::from(self.position) + self.error * Vec3::from(self.geometric_normal)
+    }
+
+    /// The ray from here to `other` that meets neither surface.
+    #[inline]
+    fn ray_to(&self, other: &End) -> Ray {
+        let origin = self.outside();
+        Ray::segment(origin, other.outside() - origin, 1.0 - f32::EPSILON)
+    }
+}
+
+/// g = cos θ_x cos θ_y / |x - y|²: density per area, up to π, with which a path from the diffuse point `x` meets
+/// `y`. Zero where the two are not on the same side of each other.
+#[inline]
+fn density(x: &End, y: &End) -> f32 {
+    let between = Vec3::from(y.position) - Vec3::from(x.position);
+    let square = between.length_squared();
+    let leaving = between.dot(x.normal.into());
+    let arriving = -between.dot(y.geometric_normal.into());
+    let shading = -between.dot(y.normal.into());
+    let faces = leaving > 0.0
+        && arriving > 0.0
+        && shading > 0.0
+        && between.dot(x.geometric_normal.into()) > 0.0
+        && shading * shading > HORIZON * HORIZON * square;
+    if faces { leaving * arriving / square / square } else { 0.0 }
+}
+
+/// What a path offers to its group, and what it gets.
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[repr(C)]
+pub(super) struct Exchange {
+    x: End,
+    y: End,
+    /// β behind x: what radiance from y is worth in the pixel.
+    throughput: [f32; 3],
+    /// What the path gathered before y, and its shares of all L_j.
+    radiance: [f32; 3],
+    /// Which group the path belongs to.
+    group: u32,
+    /// Segments up to x: under a limit of depth only equals can share.
+    segments: u16,
+    /// [`ALONE`] and so on.
+    stage: u16,
+}
+
+/// The path has met no diffuse point yet.
+const ALONE: u16 = 0;
+/// It has left x; what it meets is not known yet.
+const LEAVING: u16 = 1;
+/// It met nothing that others can use, but takes part in what they offer.
+const TAKING: u16 = 2;
+/// It has met y, and gathers L.
+const OFFERING: u16 = 3;
+
+impl Exchange {
+    pub(super) fn new(group: u32) -> Self {
+        Self { group, ..Self::default() }
+    }
+
+    /// The path scatters at a diffuse `point`, its x if it has none, and goes on for certain if it carries
+    /// any `throughput` from there.
+    #[inline]
+    pub(super) fn leave(&mut self, point: &SurfacePoint, throughput: Rgb, segments: u32) {
+        if self.stage != ALONE || throughput == Rgb::ZERO {
+            return;
+        }
+        self.x = End::of(point);
+        self.throughput = throughput.to_array();
+        self.segments = segments as u16;
+        self.stage = LEAVING;
+    }
+
+    /// The path is about to scatter at the next surface after x. Where that is fit to be met from elsewhere, it
+    /// becomes y: the path then gathers for all its group, with throughput 1.
+    #[inline]
+    pub(super) fn arrive(&mut self, point: &SurfacePoint, diffuse: bool, path: &mut Path) {
+        if self.stage != LEAVING {
+            return;
+        }
+        self.y = End::of(point);
+        let density = density(&self.x, &self.y);
+        if diffuse && density > 0.0 && density < f32::INFINITY {
+            self.stage = OFFERING;
+            self.radiance = core::mem::take(&mut path.radiance);
+            path.throughput = [1.0; 3];
+        } else {
+            self.stage = TAKING;
+        }
+    }
+
+    /// What a throughput is worth in the pixel.
+    #[inline]
+    pub(super) fn worth(&self, throughput: Rgb) -> Rgb {
+        if self.stage == OFFERING { throughput * Rgb::from(self.throughput) } else { throughput }
+    }
+
+    /// What the pixel sees in the end, `path` being what the path gathered.
+    #[inline]
+    pub(super) fn seen(&self, path: &Path) -> Rgb {
+        let own = if self.stage == OFFERING { Rgb::ZERO } else { Rgb::from(path.radiance) };
+        own + Rgb::from(self.radiance)
+    }
+
+    /// What the pixel would see if nothing were shared, before it is.
+    pub(super) fn alone(&self, path: &Path) -> Rgb {
+        let worth = if self.stage == OFFERING { Rgb::from(self.throughput) } else { Rgb::ONE };
+        Rgb::from(self.radiance) + worth * Rgb::from(path.radiance)
+    }
+
+    #[inline]
+    fn take(&mut self, share: f32, light: Rgb) {
+        self.radiance = (Rgb::from(self.radiance) + share * (Rgb::from(self.throughput) * light)).to_array();
+    }
+}
+
+/// That path `taking` might have met what path `offering` did.
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[repr(C)]
+pub(super) struct Pair {
+    offering: u32,
+    taking: u32,
+    /// V g.
+    density: f32,
+}
+
+impl<F: Features> PathTracer<'_, F> {
+    /// Deals out what the first `count` paths of the wave have gathered behind their y.
+    pub(super) fn share(&self, wave: &mut Wave, count: usize, counters: &mut Counters) {
+        let (mut pairs, mut rays, mut group) = (0, 0, 0..0);
+        for j in 0..count {
+            if j >= group.end {
+                group = j..end_of_group(&wave.exchanges[..count], j);
+            }
+            let offer = wave.exchanges[j];
+            if offer.stage != OFFERING {
+                continue;
+            }
+            if pairs + GROUP > wave.pairs.len() {
+                self.deal(wave, pairs, rays, counters);
+                (pairs, rays) = (0, 0);
+            }
+            for k in group.clone() {
+                let taker = &wave.exchanges[k];
+                if taker.stage == ALONE || (self.is_limited() && taker.segments != offer.segments) {
+                    continue;
+                }
+                let density = density(&taker.x, &offer.y);
+                if density > 0.0 && density < f32::INFINITY {
+                    wave.pairs[pairs] = Pair { offering: j as u32, taking: k as u32, density };
+                    if k != j {
+                        wave.shadow_rays[rays] = Ray { tag: pairs as u32, ..offer.y.ray_to(&taker.x) };
+                        rays += 1;
+                    }
+                    pairs += 1;
+                }
+            }
+        }
+        self.deal(wave, pairs, rays, counters);
+    }
+
+    /// Traces the first `rays` connections of the first `pairs` pairs and gives each path its shares.
+    fn deal(&self, wave: &mut Wave, pairs: usize, rays: usize, counters: &mut Counters) {
+        self.see(wave, rays, counters);
+        let mut rest = &wave.pairs[..pairs];
+        while let Some(first) = rest.first() {
+            let count = rest.iter().take_while(|pair| pair.offering == first.offering).count();
+            let (takers, others) = rest.split_at(count);
+            rest = others;
+            let light = Rgb::from(wave.paths[first.offering as usize].radiance);
+            if light == Rgb::ZERO {
+                continue;
+            }
+            // What is no light spoils, and is counted in, one pixel only.
+            if !light.is_finite() {
+                wave.exchanges[first.offering as usize].take(1.0, light);
+                continue;
+            }
+            let total: f32 = takers.iter().map(|pair| pair.density).sum();
+            for pair in takers.iter().filter(|pair| pair.density > 0.0) {
+                wave.exchanges[pair.taking as usize].take(pair.density / total, light);
+            }
+        }
+    }
+
+    /// Multiplies the densities of the pairs with what the rays between them let pass: V.
+    fn see(&self, wave: &mut Wave, mut rays: usize, counters: &mut Counters) {
+        if !(F::CUTOUT && self.has_cutouts) {
+            counters.shadow_rays += rays as u64;
+            let (shadow_rays, hidden) = (&wave.shadow_rays[..rays], &mut wave.hidden[..rays]);
+            self.bvh.occluded_batch(self.level, shadow_rays, hidden);
+            for (ray, _) in shadow_rays.iter().zip(&*hidden).filter(|(_, hidden)| **hidden != 0) {
+                wave.pairs[ray.tag as usize].density = 0.0;
+            }
+            return;
+        }
+        for _ in 0..=MAX_CROSSINGS {
+            if rays <= FEW {
+                break;
+            }
+            counters.shadow_rays += rays as u64;
+            let (shadow_rays, hits) = (&wave.shadow_rays[..rays], &mut wave.hits[..rays]);
+            self.bvh.nearest_batch(self.level, shadow_rays, Coherence::Incoherent, hits);
+            let mut left = 0;
+            for i in 0..rays {
+                let (ray, hit) = (wave.shadow_rays[i], wave.hits[i]);
+                if !hit.is_some() {
+                    continue;
+                }
+                let pair = &mut wave.pairs[ray.tag as usize];
+                match pass_cutout::<F>(self.scene, &ray, &hit) {
+                    Some((through, transmittance)) => {
+                        pair.density *= transmittance;
+                        wave.shadow_rays[left] = through;
+                        left += 1;
+                    }
+                    None => pair.density = 0.0,
+                }
+            }
+            rays = left;
+        }
+        for ray in &wave.shadow_rays[..rays] {
+            let density = &mut wave.pairs[ray.tag as usize].density;
+            let light = Rgb::splat(*density);
+            let rays = &mut counters.shadow_rays;
+            let passed = passing::<F>(self.scene, self.bvh, self.level, *ray, light, rays);
+            *density = passed.unwrap_or_default().x;
+        }
+    }
+}
+
+/// Where the group of path `first` ends.
+fn end_of_group(exchanges: &[Exchange], first: usize) -> usize {
+    let members = |other: &&Exchange| other.group == exchanges[first].group;
+    first + exchanges[first..].iter().take_while(members).count()
+}

@@ -1,0 +1,175 @@
+//! Pixels that share what their paths find: the picture is right in the mean, the noise is less, and nothing hangs on
+//! threads, waves or rounds.
+
+use core::sync::atomic::AtomicBool;
+use glam::Vec3;
+use halflight::drive::{self, RenderResult, Settings, Stop};
+use halflight_core::bsdf::All;
+use halflight_core::bvh::Bvh;
+use halflight_core::film::Film;
+use halflight_core::light::Lights;
+use halflight_core::memory::{Arena, Footprint, Line};
+use halflight_core::scene::{Material, Scene, Surface};
+use halflight_core::transport::{PathSettings, PathTracer, UNLIMITED};
+use halflight_core::{Level, Rgb};
+use halflight_tests::scenes::{SceneBuffers, cornell_box, everything};
+
+/// Pixels across and down: four tiles, the outer ones cut by the border.
+const SIZE: u32 = 28;
+
+/// Blocks of so many pixels are judged together: groups share within 8 × 8.
+const BLOCK: u32 = 7;
+
+/// Independent pictures of each kind.
+const SEEDS: u32 = 24;
+
+/// Normal quantile for one error in ten thousand over all blocks and channels of all scenes (Šidák; 5 scenes of 48
+/// values), with Student's wider tails of 2 × 23 degrees of freedom.
+const WIDEST: f64 = 6.2;
+
+fn render(scene: &Scene, spp: u32, change: impl FnOnce(&mut Settings)) -> RenderResult {
+    let stop = Stop { spp: Some(spp), ..Stop::default() };
+    let mut settings = Settings { width: SIZE, height: SIZE, stop, ..Settings::default() };
+    change(&mut settings);
+    drive::render(scene, &settings, &mut |_| (), &AtomicBool::new(false)).unwrap()
+}
+
+/// The means of blocks of pixels, all channels.
+fn blocks(result: &RenderResult) -> Vec<f64> {
+    let across = SIZE / BLOCK;
+    let mut sums = vec![0.0; (across * across * 3) as usize];
+    for (i, pixel) in result.image.pixels.iter().enumerate() {
+        let (x, y) = (i as u32 % SIZE / BLOCK, i as u32 / SIZE / BLOCK);
+        for (channel, value) in pixel.iter().enumerate() {
+            sums[(y * across + x) as usize * 3 + channel] += f64::from(*value);
+        }
+    }
+    sums
+}
+
+/// Mean and variance of the mean of each value.
+fn moments(pictures: &[Vec<f64>]) -> Vec<(f64, f64)> {
+    let count = pictures.len() as f64;
+    let of = |i: usize| {
+        let mean = pictures.iter().map(|p| p[i]).sum::<f64>() / count;
+        let squares = pictures.iter().map(|p| (p[i] - mean).powi(2)).sum::<f64>();
+        (mean, squares / (count * (count - 1.0)))
+    };
+    (0..pictures[0].len()).map(of).collect()
+}
+
+/// Black boxes among white ones: who has no light to take must not take part.
+fn black_and_white() -> SceneBuffers {
+    let mut scene = cornell_box();
+    let black = scene
+        .material(Material { surface: Surface::Diffuse { reflectance: Rgb::ZERO.into() }, ..Material::GREY });
+    for i in 0..6 {
+        let min = Vec3::new(0.1 + 0.14 * i as f32, 0.0, 0.3);
+        scene.cuboid(min, min + Vec3::new(0.07, 0.3, 0.3), false, black);
+    }
+    scene
+}
+
+fn is_right_in_the_mean(name: &str, buffers: &SceneBuffers, max_depth: Option<u32>) {
+    let scene = buffers.scene();
+    let pictures = |reuse: bool, first: u32| -> Vec<Vec<f64>> {
+        let one = |seed| {
+            let result = render(&scene, 16, |s| {
+                (s.seed, s.reuse, s.max_depth) = (first + seed, Some(reuse), max_depth);
+            });
+            assert_eq!(result.counters.dropped.total(), 0);
+            blocks(&result)
+        };
+        (0..SEEDS).map(one).collect()
+    };
+    let (with, without) = (moments(&pictures(true, 0)), moments(&pictures(false, SEEDS)));
+    for (i, ((a, va), (b, vb))) in with.iter().zip(&without).enumerate() {
+        // Blocks that nothing reaches are equal without any noise.
+        let deviation = (a - b).abs() / (va + vb).sqrt().max(1e-6 * (a + b));
+        assert!(a == b || deviation < WIDEST, "{name}, value {i}: {a} and {b}, {deviation:.1} deviations");
+    }
+}
+
+#[test]
+fn sharing_is_right_in_the_mean() {
+    is_right_in_the_mean("box", &cornell_box(), None);
+    is_right_in_the_mean("black and white", &black_and_white(), None);
+    is_right_in_the_mean("everything", &everything(), None);
+    is_right_in_the_mean("one bounce", &cornell_box(), Some(3));
+    is_right_in_the_mean("everything, three bounces", &everything(), Some(5));
+}
+
+#[test]
+fn sharing_makes_less_noise() {
+    let buffers = cornell_box();
+    let scene = buffers.scene();
+    // Relative, so that the few pixels on the edge of the lamp do not speak for all.
+    let variance = |reuse| {
+        let result = render(&scene, 64, |s| s.reuse = Some(reuse));
+        let relative = |(variance, mean): (&[f32; 3], &[f32; 3])| -> f32 {
+            variance.iter().zip(mean).map(|(variance, mean)| variance / (mean * mean + 1e-4)).sum()
+        };
+        result.variance.pixels.iter().zip(&result.image.pixels).map(relative).sum::<f32>()
+    };
+    let (with, without) = (variance(true), variance(false));
+    assert!(with < 0.5 * without, "{with} {without}");
+}
+
+#[test]
+fn bits_hang_on_neither_threads_nor_waves_nor_rounds() {
+    for buffers in [cornell_box(), everything()] {
+        let scene = buffers.scene();
+        let image = render(&scene, 8, |s| (s.threads, s.reuse) = (Some(1), Some(true))).image;
+        for threads in [2, 5] {
+            let other = render(&scene, 8, |s| (s.threads, s.reuse) = (Some(threads), Some(true))).image;
+            assert_eq!(other, image, "{threads} threads");
+        }
+        for level in Level::detect().and_below() {
+            let other = render(&scene, 8, |s| (s.level, s.reuse) = (level, Some(true))).image;
+            assert_eq!(other, image, "{level:?}");
+        }
+
+        let settings = PathSettings { width: SIZE, height: SIZE, seed: 3, max_depth: UNLIMITED, reuse: true };
+        let mut bvh_lines = lines(Bvh::footprint(scene.mesh.triangles.len()));
+        let bvh = Bvh::build(&scene.mesh, &mut Arena::new(bytemuck::cast_slice_mut(&mut bvh_lines))).unwrap();
+        let mut light_lines = lines(Lights::footprint(&scene).and(Lights::scratch(&scene)));
+        let lights =
+            Lights::build(&scene, &mut Arena::new(bytemuck::cast_slice_mut(&mut light_lines))).unwrap();
+        let tracer = PathTracer::<All>::new(&scene, &bvh, &lights, settings, Level::detect());
+        let picture = |wave: usize, cuts: &[u32]| {
+            let mut scratch = lines(PathTracer::<All>::scratch(wave));
+            let mut scratch = Arena::new(bytemuck::cast_slice_mut(&mut scratch));
+            let mut film_lines = lines(Film::footprint(SIZE, SIZE));
+            let mut film =
+                Film::new(SIZE, SIZE, &mut Arena::new(bytemuck::cast_slice_mut(&mut film_lines))).unwrap();
+            for (task, pixels) in film.pixels_mut().chunks_mut(256).enumerate() {
+                for cut in cuts.windows(2) {
+                    tracer.run(task, cut[0]..cut[1], wave, &mut scratch, pixels).unwrap();
+                }
+            }
+            film.pixels().to_vec()
+        };
+        let all = picture(2048, &[0, 6]);
+        for (wave, cuts) in [(1, [0, 6].as_slice()), (100, &[0, 1, 6]), (5000, &[0, 3, 4, 6])] {
+            assert!(picture(wave, cuts) == all, "waves of {wave}, rounds {cuts:?}");
+        }
+    }
+}
+
+fn lines(footprint: Footprint) -> Vec<Line> {
+    vec![Line([0; 64]); footprint.bytes() / 64]
+}
+
+#[test]
+fn a_look_at_a_few_tiles_tells_whether_it_pays() {
+    let buffers = cornell_box();
+    let scene = buffers.scene();
+    let indirect = render(&scene, 4, |_| ()).reuse;
+    assert!(indirect.used && indirect.pilot.is_some_and(|pilot| pilot.gain() > 3.0));
+    // Direct light alone: there is nothing to share.
+    let direct = render(&scene, 4, |s| s.max_depth = Some(2)).reuse;
+    assert!(!direct.used && direct.pilot.is_some_and(|pilot| pilot.gain() == 1.0));
+    // What is asked for is done, and nobody looks.
+    let asked = render(&scene, 4, |s| s.reuse = Some(false)).reuse;
+    assert!(!asked.used && asked.pilot.is_none());
+}
