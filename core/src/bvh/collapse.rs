@@ -5,7 +5,7 @@
 //! cost[i - 1] of a binary node is the least cost of the forest of at most `i` roots that stands for it.
 
 use super::binary::{BinaryNode, left_child, right_child};
-use super::layout::{Child, LEAF_MAX, Node, WIDTH};
+use super::layout::{Child, LEAF_MAX, Node, WIDTH, ranks};
 use super::references::Reference;
 use crate::scene::Mesh;
 use glam::Vec4Swizzles;
@@ -98,10 +98,9 @@ impl Emitter<'_> {
         let at = out.used.0;
         *out.nodes.get_mut(at)? = Node::EMPTY;
         out.used.0 += 1;
-        let mut children =
+        let children =
             if self.frugal { self.largest_first(index, first) } else { self.cheapest(index, first) };
-        let effort = |&(child, _): &(usize, usize)| self.costs[child][0] / self.binary[child].half_area();
-        children.chosen[..children.count].sort_unstable_by(|a, b| effort(b).total_cmp(&effort(a)));
+        let children = self.by_effort(&children);
         for (slot, &(child, first)) in children.chosen[..children.count].iter().enumerate() {
             let content = if self.is_leaf(child) {
                 self.leaf(child, first, out)?
@@ -114,6 +113,19 @@ impl Emitter<'_> {
         }
         out.nodes[at].order();
         Some(at as u32)
+    }
+
+    /// The same children, those of the least cost for their area last.
+    fn by_effort(&self, children: &Children) -> Children {
+        let mut efforts = [f32::NEG_INFINITY; WIDTH];
+        for (effort, &(child, _)) in efforts.iter_mut().zip(&children.chosen[..children.count]) {
+            *effort = self.costs[child][0] / self.binary[child].half_area();
+        }
+        let mut sorted = Children { chosen: [(0, 0); WIDTH], count: children.count };
+        for (rank, child) in ranks(efforts).into_iter().zip(children.chosen) {
+            sorted.chosen[rank as usize % WIDTH] = child;
+        }
+        sorted
     }
 
     fn is_leaf(&self, index: usize) -> bool {

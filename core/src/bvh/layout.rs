@@ -42,16 +42,24 @@ impl Node {
 
     /// Fills row 7: along the diagonal of an octant, the box with the farthest centre comes first.
     pub(super) fn order(&mut self) {
+        let mut twice = [[0.0; WIDTH]; 3];
+        for (axis, twice) in twice.iter_mut().enumerate() {
+            for (lane, twice) in twice.iter_mut().enumerate() {
+                *twice = self.rows[2 * axis][lane] + self.rows[2 * axis + 1][lane];
+            }
+        }
         for octant in 0..8 {
-            let mut lanes: [u32; 8] = [0, 1, 2, 3, 4, 5, 6, 7];
-            let along = |lane: u32| {
-                (0..3).fold(0.0, |sum, axis| {
-                    let twice = self.rows[2 * axis][lane as usize] + self.rows[2 * axis + 1][lane as usize];
-                    if octant >> axis & 1 == 1 { sum - twice } else { sum + twice }
-                })
-            };
-            lanes.sort_unstable_by(|&a, &b| along(b).total_cmp(&along(a)).then(a.cmp(&b)));
-            let packed = lanes.iter().rev().fold(0u32, |packed, lane| packed << 4 | lane);
+            let mut along = [0.0; WIDTH];
+            for (axis, twice) in twice.iter().enumerate() {
+                let sign = if octant >> axis & 1 == 1 { -1.0 } else { 1.0 };
+                for (along, twice) in along.iter_mut().zip(twice) {
+                    *along += sign * twice;
+                }
+            }
+            let mut packed = 0;
+            for (lane, rank) in ranks(along).into_iter().enumerate() {
+                packed |= (lane as u32) << (4 * rank);
+            }
             self.rows[7][octant] = f32::from_bits(packed);
         }
     }
@@ -65,6 +73,20 @@ impl Node {
     pub(super) fn child(&self, i: usize) -> Child {
         Child(self.rows[6][i & 7].to_bits())
     }
+}
+
+/// The place of each key when the largest comes first, and of equals the first. NaN counts as infinite.
+pub(super) fn ranks(mut keys: [f32; WIDTH]) -> [u32; WIDTH] {
+    for key in &mut keys {
+        *key = if key.is_nan() { f32::INFINITY } else { *key };
+    }
+    let mut ranks = [0; WIDTH];
+    for (j, other) in keys.iter().enumerate() {
+        for (i, (rank, key)) in ranks.iter_mut().zip(&keys).enumerate() {
+            *rank += ((other > key) | ((other == key) & (j < i))) as u32;
+        }
+    }
+    ranks
 }
 
 /// What a box holds: a node by its index, or a leaf by its first reference and their count.
@@ -97,5 +119,17 @@ impl Child {
     #[inline(always)]
     pub(super) fn triangles(self) -> (usize, usize) {
         ((self.0 & 0x0fff_ffff) as usize, (self.0 >> 28 & 7) as usize + 1)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ranks_put_the_largest_first_and_never_two_at_one_place() {
+        assert_eq!(ranks([1.0, 3.0, 2.0, 3.0, -1.0, 0.0, -0.0, f32::NEG_INFINITY]), [3, 0, 2, 1, 6, 4, 5, 7]);
+        let odd = [f32::NAN, f32::INFINITY, 1.0, -f32::NAN, 1.0, f32::NEG_INFINITY, f32::NAN, 2.0];
+        assert_eq!(ranks(odd), [0, 1, 5, 2, 6, 7, 3, 4]);
     }
 }
