@@ -58,7 +58,9 @@ fn a_finished_film_goes_on_to_more_samples() {
     let folder = Folder::new("more");
     folder.object("render scene.obj --size 33x20 --spp 40 -o whole.pfm --json");
     let first = folder.object("render scene.obj --size 33x20 --spp 13 -o a.pfm --checkpoint film --json");
-    let second = folder.object("render scene.obj --size 33x20 --spp 40 -o b.pfm --resume film --json");
+    // A time that no clock can tell does not end it.
+    let second = folder
+        .object("render scene.obj --size 33x20 --spp 40 --time 1e300 --checkpoint b --checkpoint-every 1e300 -o b.pfm --resume film --json");
     assert!(fs::read(folder.path("whole.pfm")).unwrap() == fs::read(folder.path("b.pfm")).unwrap());
     assert_eq!((first["paths"].as_u64(), second["paths"].as_u64()), (Some(33 * 20 * 13), Some(33 * 20 * 40)));
     let render = |object: &Value| object["seconds"]["render"].as_f64().unwrap();
