@@ -100,6 +100,11 @@ impl TileError {
         }
         sums
     }
+
+    /// Relative variance of a value of the tile, in the mean: its share of the picture's relMSE.
+    pub fn noise(&self) -> f64 {
+        self.halves / self.values.max(1) as f64
+    }
 }
 
 /// A₁, A₂, B₁, B₂ of a pixel.

@@ -46,6 +46,9 @@ pub(super) struct Render {
     #[arg(long, value_name = "RELMSE", value_parser = values::positive, help_heading = "When to stop")]
     error: Option<f64>,
 
+    /// Whether tiles get their samples by the noise around them (auto), or all the same number (off)
+    #[arg(long, default_value = "off", help_heading = "When to stop")]
+    adaptive: Adaptive,
     /// Keep the film in a file while it grows, for --resume and `halflight merge`
     #[arg(long, value_name = "FILE", help_heading = "In parts")]
     checkpoint: Option<PathBuf>,
@@ -59,7 +62,7 @@ pub(super) struct Render {
     /// Render only part I of N, counted from 1, into the film of --checkpoint, for `halflight merge`; without -o
     /// no picture is written
     #[arg(long, value_name = "I/N", value_parser = values::shard, requires = "checkpoint",
-        conflicts_with_all = ["time", "error"], help_heading = "In parts")]
+        conflicts_with_all = ["time", "error", "adaptive"], help_heading = "In parts")]
     shard: Option<Shard>,
 
     /// Write a report into this folder: index.html, which needs nothing else, curve.csv and run.json
@@ -68,6 +71,14 @@ pub(super) struct Render {
     /// Print one JSON object instead of text
     #[arg(long, help_heading = "Results")]
     json: bool,
+}
+
+#[derive(Clone, Copy, PartialEq, ValueEnum)]
+enum Adaptive {
+    /// By the noise
+    Auto,
+    /// All the same
+    Off,
 }
 
 impl Render {
@@ -96,6 +107,7 @@ impl Render {
             self.shot.settings(&loaded, self.method, &self.options, self.stop(&loaded)?, reference)?;
         let every = self.checkpoint_every.unwrap_or(Checkpoint::EVERY);
         let settings = Settings {
+            adaptive: self.adaptive == Adaptive::Auto,
             shard: self.shard.unwrap_or(Shard::WHOLE),
             checkpoint: self.checkpoint.clone().map(|path| Checkpoint { path, every }),
             resume: self.resume.clone(),

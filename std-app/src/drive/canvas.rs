@@ -1,5 +1,6 @@
 //! What a render has done so far: the film, how far each tile is, what was counted. All that a film file keeps.
 
+use super::adapt;
 use super::ledger::Ledger;
 use halflight_core::film::{Film, PIXELS_PER_TILE};
 use halflight_core::transport::Counters;
@@ -30,6 +31,8 @@ pub(super) struct Canvas<'m> {
     /// Samples that each pixel of a tile has had; 0 for tiles of other shards.
     pub(super) taken: Vec<u32>,
     pub(super) shard: Shard,
+    /// How many samples tiles should have over their mean; `None` where all should have the same.
+    pub(super) weights: Option<Vec<f32>>,
     pub(super) counters: Counters,
     pub(super) ledger: Ledger,
 }
@@ -38,7 +41,7 @@ impl<'m> Canvas<'m> {
     pub(super) fn new(film: Film<'m>, shard: Shard) -> Self {
         let tiles = film.pixels().len() / PIXELS_PER_TILE;
         let (counters, ledger) = (Counters::default(), Ledger::default());
-        Self { film, taken: vec![0; tiles], shard, counters, ledger }
+        Self { film, taken: vec![0; tiles], shard, weights: None, counters, ledger }
     }
 
     /// Tiles of this shard.
@@ -46,9 +49,21 @@ impl<'m> Canvas<'m> {
         (0..self.taken.len()).filter(|&task| self.shard.owns(task)).count()
     }
 
-    /// Samples of each pixel; of the least sampled one where a round was cut.
+    /// Samples that tiles should have when each pixel has `target` of them in the mean.
+    pub(super) fn targets(&self, target: u32) -> Vec<u32> {
+        match &self.weights {
+            Some(weights) => adapt::targets(weights, &self.taken, target),
+            None => vec![target; self.taken.len()],
+        }
+    }
+
+    /// Samples of each pixel: of the least sampled one, or in the mean where tiles should have different numbers.
     pub(super) fn spp(&self) -> u32 {
         let own = self.taken.iter().enumerate().filter(|(task, _)| self.shard.owns(*task));
-        own.map(|(_, taken)| *taken).min().unwrap_or(0)
+        let own = own.map(|(_, taken)| *taken);
+        if self.weights.is_none() {
+            return own.min().unwrap_or(0);
+        }
+        (own.map(u64::from).sum::<u64>() / self.taken.len().max(1) as u64) as u32
     }
 }

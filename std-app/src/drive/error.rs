@@ -20,7 +20,7 @@ pub enum RenderError {
     },
     /// The threads could not be started.
     Threads(String),
-    /// There are not as many tiles as shards, or no such shard.
+    /// There are not as many tiles as shards, or no such shard; or sampling is adaptive, which needs all tiles.
     Shard,
     /// A film file cannot be used.
     Film(FilmError),
@@ -35,7 +35,7 @@ impl core::fmt::Display for RenderError {
                 write!(f, "not enough memory: {needed} bytes needed, {available} available")
             }
             Self::Threads(why) => write!(f, "the threads could not be started: {why}"),
-            Self::Shard => write!(f, "the picture cannot be cut into so many shards"),
+            Self::Shard => write!(f, "the picture cannot be cut into such shards"),
             Self::Film(error) => error.fmt(f),
         }
     }

@@ -4,6 +4,7 @@
 //! cut into rounds, and how many threads there are, leaves the bits of the picture as they are; so does an end in the
 //! middle, where the film is kept in a file and the render resumed from it.
 
+mod adapt;
 mod canvas;
 mod error;
 mod film_file;
@@ -62,6 +63,8 @@ pub struct Settings {
     /// What the picture should be, of the same size: each round is compared with it, and the time that this
     /// takes does not count.
     pub reference: Option<Arc<Image>>,
+    /// Whether tiles get their samples by the noise around them; all the same otherwise. Not with shards.
+    pub adaptive: bool,
     /// Which part of the picture to render.
     pub shard: Shard,
     /// Where to keep the film while it grows.
@@ -97,6 +100,7 @@ impl Default for Settings {
             level: Level::detect(),
             stop: Stop::default(),
             reference: None,
+            adaptive: false,
             shard: Shard::WHOLE,
             checkpoint: None,
             resume: None,
@@ -152,7 +156,8 @@ pub struct Reuse {
 pub struct RenderResult {
     /// The picture.
     pub image: Image,
-    /// Samples of each pixel; of the least sampled one where the last round was cut.
+    /// Samples of each pixel; of the least sampled one where the last round was cut, in the mean where sampling is
+    /// adaptive.
     pub spp: u32,
     /// Rounds begun, those before a resumption included.
     pub rounds: u32,
@@ -204,7 +209,8 @@ pub fn render(
         return Err(RenderError::Reference);
     }
     let Shard { index, count } = settings.shard;
-    if index >= count || count as usize > Tile::count(settings.width, settings.height) {
+    let many = count as usize > Tile::count(settings.width, settings.height);
+    if index >= count || many || (settings.adaptive && count > 1) {
         return Err(RenderError::Shard);
     }
     let plan = Census::of(scene).plan();

@@ -8,7 +8,7 @@ use super::memory::Memory;
 use super::rounds::{Plan, Rounds};
 use super::workers::{self, Workers};
 use super::{
-    Ending, ErrorEstimate, FilmError, Progress, RenderError, RenderResult, Reuse, Seconds, Settings,
+    Ending, ErrorEstimate, FilmError, Progress, RenderError, RenderResult, Reuse, Seconds, Settings, adapt,
 };
 use crate::save::Image;
 use core::sync::atomic::{AtomicBool, Ordering};
@@ -76,6 +76,7 @@ impl WithFeatures for Render<'_> {
             Some(film) => {
                 let header = film.header.clone();
                 film.read_into(&mut canvas)?;
+                canvas.weights = header.weights(canvas.taken.len());
                 let Header { spp, rounds, seconds, estimates, .. } = header;
                 let rounds = Rounds::new(settings.stop).resumed(spp, rounds, seconds, estimates);
                 (rounds, header.history(), seconds)
@@ -102,20 +103,27 @@ impl WithFeatures for Render<'_> {
 
         while let Some(plan) = rounds.next(clock.seconds(), estimating) {
             let now = clock.seconds();
-            let deadline =
-                plan.deadline.map(|at| Instant::now() + Duration::from_secs_f64((at - now).max(0.0)));
+            // Later than any clock can tell is never.
+            let later = |at: f64| Duration::try_from_secs_f64((at - now).max(0.0)).ok();
+            let deadline = plan.deadline.and_then(later).and_then(|later| Instant::now().checked_add(later));
             let round = workers::Round {
-                target: plan.target,
+                targets: canvas.targets(plan.target),
                 step: step(&plan, canvas.tiles(), workers.count()),
                 deadline,
                 interrupt: (!plan.first).then_some(interrupt),
             };
             workers.run(&tracer, &round, &mut canvas, &mut scratch_lines)?;
-            rounds.completed(canvas.spp(), clock.seconds());
+            rounds.completed(canvas.spp().min(plan.target), clock.seconds());
             let mut error = None;
             if rounds.estimate_is_due() {
-                (error, estimating) = timed(|| workers.estimate(&canvas.film));
+                let start = Instant::now();
+                let tiles = workers.errors(&canvas.film);
+                error = tiles.as_ref().and_then(|tiles| ErrorEstimate::of(tiles.iter().copied()));
+                if let (true, Some(tiles)) = (settings.adaptive && rounds.spp() >= adapt::FROM, tiles) {
+                    canvas.weights = Some(adapt::weights(&tiles, &canvas.taken, width));
+                }
                 rounds.estimated(error);
+                estimating = start.elapsed().as_secs_f64();
                 latest = error;
             }
             let seconds = clock.seconds();
@@ -131,9 +139,8 @@ impl WithFeatures for Render<'_> {
                 error: latest,
             };
             clock.pause(|| progress(&known));
-            let due =
-                settings.checkpoint.as_ref().map(|checkpoint| Duration::from_secs_f64(checkpoint.every));
-            if plan.first || due.is_some_and(|due| saved.elapsed() >= due) {
+            let due = |every: f64| saved.elapsed().as_secs_f64() >= every;
+            if plan.first || settings.checkpoint.as_ref().is_some_and(|checkpoint| due(checkpoint.every)) {
                 clock.pause(|| save(&canvas, &rounds, seconds, &history))?;
                 saved = Instant::now();
             }
@@ -176,11 +183,6 @@ fn step(plan: &Plan, tiles: usize, threads: usize) -> u32 {
     let tile = each * threads as f64 / tiles.max(1) as f64;
     let step = (STEP_SECONDS / tile) as u32;
     if step >= FULL_STEP { step / FULL_STEP * FULL_STEP } else { step.max(1) }
-}
-
-fn timed(estimate: impl FnOnce() -> Option<ErrorEstimate>) -> (Option<ErrorEstimate>, f64) {
-    let start = Instant::now();
-    (estimate(), start.elapsed().as_secs_f64())
 }
 
 /// The hierarchy, built on all cores, then moved out of the working memory of its build into `lines`.

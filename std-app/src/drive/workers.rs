@@ -37,8 +37,8 @@ impl Workers {
         self.pool.install(|| Bvh::build_with(mesh, arena, &Fork))
     }
 
-    /// What `film` tells of its own error; `None` for fewer than four samples, and for a black picture.
-    pub(super) fn estimate(&self, film: &Film) -> Option<ErrorEstimate> {
+    /// What the tiles of `film` tell of its error; `None` for a black picture.
+    pub(super) fn errors(&self, film: &Film) -> Option<Vec<TileError>> {
         let tiles = || film.pixels().par_chunks(PIXELS_PER_TILE);
         self.pool.install(|| {
             let mut light = TileLight::default();
@@ -49,8 +49,7 @@ impl Workers {
             if mean.is_nan() || mean <= 0.0 {
                 return None;
             }
-            let errors: Vec<_> = tiles().map(|tile| TileError::of(tile, mean)).collect();
-            ErrorEstimate::of(errors.into_iter())
+            Some(tiles().map(|tile| TileError::of(tile, mean)).collect())
         })
     }
 
@@ -93,7 +92,12 @@ impl Workers {
         Ok(seen.into_iter().map(|(_, value)| value).collect())
     }
 
-    /// One round: every tile of `canvas` is brought to `round.target` samples, unless the round is cut.
+    /// The error of `film`; `None` for fewer than four samples as well.
+    pub(super) fn estimate(&self, film: &Film) -> Option<ErrorEstimate> {
+        ErrorEstimate::of(self.errors(film)?.into_iter())
+    }
+
+    /// One round: every tile of `canvas` is brought to its target, unless the round is cut.
     pub(super) fn run<F: Features>(
         &self,
         tracer: &PathTracer<F>,
@@ -103,7 +107,8 @@ impl Workers {
     ) -> Result<(), OutOfMemory> {
         let shard = canvas.shard;
         let tiles = canvas.film.pixels_mut().chunks_mut(PIXELS_PER_TILE).zip(&mut canvas.taken).enumerate();
-        let open = tiles.filter(|(task, (_, taken))| shard.owns(*task) && **taken < round.target);
+        let tiles = tiles.zip(&round.targets).map(|((task, tile), target)| (task, tile, *target));
+        let open = tiles.filter(|(task, (_, taken), target)| shard.owns(*task) && **taken < *target);
         let queue = Mutex::new(scattered(open.collect()));
         let done = Mutex::new(Ok((&mut canvas.counters, &mut canvas.ledger)));
         self.pool.scope(|scope| {
@@ -113,12 +118,12 @@ impl Workers {
                     let mut counters = Counters::default();
                     let mut dropped = Vec::new();
                     let mut result = Ok(());
-                    'tiles: while let Some((task, (pixels, taken))) = next(&queue) {
-                        while *taken < round.target {
+                    'tiles: while let Some((task, (pixels, taken), target)) = next(&queue) {
+                        while *taken < target {
                             if round.is_over() {
                                 break 'tiles;
                             }
-                            let end = taken.saturating_add(round.step).min(round.target);
+                            let end = taken.saturating_add(round.step).min(target);
                             match tracer.run(task, *taken..end, WAVE, &mut arena, pixels) {
                                 Ok(more) => {
                                     counters += more;
@@ -150,8 +155,8 @@ impl Workers {
 
 /// What one round does.
 pub(super) struct Round<'a> {
-    /// Samples that each pixel has in the end.
-    pub(super) target: u32,
+    /// Samples that each pixel of a tile has in the end.
+    pub(super) targets: Vec<u32>,
     /// Samples after which a thread looks at the clock, and at the flag.
     pub(super) step: u32,
     /// When it is cut.

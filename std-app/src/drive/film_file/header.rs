@@ -26,6 +26,8 @@ pub(in crate::drive) struct Header {
     /// Tiles and what they dropped.
     ledger: Vec<(u32, Causes)>,
     history: Vec<Entry>,
+    /// Of adaptive sampling.
+    weights: Option<Vec<f32>>,
 }
 
 /// Not a number, infinite, negative, unfinished.
@@ -57,6 +59,7 @@ impl Header {
             dropped: causes(counters.dropped),
             ledger: ledger.tiles().map(|(task, dropped)| (task, causes(dropped))).collect(),
             history: history.iter().map(|r| (r.seconds, r.spp, r.rays, r.error.map(error))).collect(),
+            weights: canvas.weights.clone(),
         }
     }
 
@@ -78,6 +81,11 @@ impl Header {
         let mut ledger = Ledger::default();
         self.ledger.iter().for_each(|(task, causes)| ledger.add(*task as usize, dropped(*causes)));
         ledger
+    }
+
+    /// Of `tiles` tiles.
+    pub(in crate::drive) fn weights(&self, tiles: usize) -> Option<Vec<f32>> {
+        self.weights.clone().filter(|weights| weights.len() == tiles)
     }
 
     pub(in crate::drive) fn history(&self) -> Vec<Round> {

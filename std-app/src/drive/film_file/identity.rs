@@ -30,18 +30,18 @@ impl Identity {
     pub(in crate::drive) fn of(
         scene: &Scene,
         method: &str,
-        settings: &PathSettings,
-        Settings { max_depth, reuse, .. }: &Settings,
+        paths: &PathSettings,
+        settings: &Settings,
     ) -> Self {
         Self {
             version: env!("CARGO_PKG_VERSION").into(),
             method: method.into(),
-            width: settings.width,
-            height: settings.height,
-            seed: settings.seed,
-            max_depth: *max_depth,
-            reuse: *reuse,
-            settings: format!("{settings:?}"),
+            width: paths.width,
+            height: paths.height,
+            seed: paths.seed,
+            max_depth: settings.max_depth,
+            reuse: settings.reuse,
+            settings: format!("{paths:?}, adaptive: {}", settings.adaptive),
             scene: format!("{:016x}", fingerprint(scene)),
             camera: camera(&scene.camera),
         }
