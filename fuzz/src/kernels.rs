@@ -106,6 +106,9 @@ impl Kernel for &Work {
         let areas = areas.areas(simd, &values, 0, self.count, self.t_max);
         let areas = areas.expect("eight floats can be read from every run");
         assert_eq!((areas.hits, areas.doubtful), (found.hits, found.doubtful));
+        for i in (0..8).filter(|i| areas.hits >> i & 1 == 0) {
+            assert_eq!(areas.t[i], f32::INFINITY, "a lane that does not hit is never the nearest");
+        }
         let [t, u, v] = [found.t.to_array(), found.u.to_array(), found.v.to_array()];
         for i in (0..8).filter(|i| found.hits >> i & 1 == 1) {
             let divided = [areas.t[i], areas.v[i] / areas.det[i], areas.w[i] / areas.det[i]];

@@ -220,10 +220,11 @@ impl<S: Simd> ShearRay8<S> {
         let inside = zero.le(low) | high.le(zero);
         let edge = low.eq(zero) | high.eq(zero);
         let t = ((u * (sz * a[2]) + v * (sz * b[2])) + w * (sz * c[2])) / det;
-        let met = inside & zero.le(t) & t.le(simd.splat8(t_max)) & simd.first8(count as u32);
-        let wanted = (1u32 << count) - 1;
-        let doubtful = (inside & edge).bits() & wanted;
-        let hits = met.bits() & !doubtful;
+        let inside = inside & simd.first8(count as u32);
+        let doubtful = (inside & edge).bits();
+        let met = inside & !edge & zero.le(t) & t.le(simd.splat8(t_max));
+        let hits = met.bits();
+        // A doubtful lane may be no hit at all: it must not be the nearest.
         let t = t.select(met, simd.splat8(f32::INFINITY));
         Some(Areas { t: t.to_array(), v: v.to_array(), w: w.to_array(), det: det.to_array(), hits, doubtful })
     }
