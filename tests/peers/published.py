@@ -6,7 +6,9 @@ from pathlib import Path
 
 import numpy as np
 
-SCENES = Path(os.environ.get("HALFLIGHT_SCENES", "/work/shared/scenes"))
+if "HALFLIGHT_SCENES" not in os.environ:
+    raise SystemExit("name the folder of the published scenes in HALFLIGHT_SCENES (see README.md beside this script)")
+SCENES = Path(os.environ["HALFLIGHT_SCENES"])
 
 
 def published(name, size, limit_depth=False):
