@@ -10,7 +10,7 @@
 //!    exactly. Products of differences within the halves have the same variance; sums over tiles are its independent
 //!    samples, however errors within a tile hang together.
 //! 3. What filtering and ratio have moved the estimate by, as a logarithm δ, is known to first order only. The lower
-//!    end goes further down by as much as would undo it where δ is large, and by δ² where it is small.
+//!    end goes further down by as much as would undo it where δ is large, and by 2 δ² where it is small.
 //!
 //! The price: about as much time as a twentieth of a sample for each pixel.
 
@@ -58,7 +58,7 @@ impl ErrorEstimate {
         }
         let corrected = sum.halves * (sum.crossed / sum.parts);
         let delta = fmax(log(corrected / sum.plain), 0.0);
-        let doubt = -delta * expm1(-delta);
+        let doubt = -delta * expm1(-2.0 * delta);
 
         // Parts of one half are stratified together: their products are scaled to the noise that is there.
         let scale = if within2 > 0.0 { halves2 / within2 } else { 1.0 };
