@@ -79,3 +79,56 @@ impl Default for Stack {
         Self::new()
     }
 }
+
+/// Memory for `N` stacks, untouched: a stack is large, and to make many by value would copy them all.
+pub struct StackMemory<const N: usize>(MaybeUninit<[Stack; N]>);
+
+impl<const N: usize> StackMemory<N> {
+    /// Untouched memory.
+    #[inline(always)]
+    pub const fn new() -> Self {
+        Self(MaybeUninit::uninit())
+    }
+
+    /// `N` empty stacks, made in place.
+    #[inline(always)]
+    pub fn stacks(&mut self) -> &mut [Stack; N] {
+        let first = self.0.as_mut_ptr().cast::<Stack>();
+        for i in 0..N {
+            // SAFETY: stack `i` is inside, and a height may be written over whatever is there.
+            unsafe { (&raw mut (*first.add(i)).height).write(0) };
+        }
+        // SAFETY: all heights are written, and no other part of a stack needs to be.
+        unsafe { self.0.assume_init_mut() }
+    }
+}
+
+impl<const N: usize> Default for StackMemory<N> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn stacks_made_in_place_are_empty_and_apart() {
+        let mut memory = StackMemory::<3>::new();
+        for round in 0..2 {
+            let stacks = memory.stacks();
+            for (i, stack) in stacks.iter_mut().enumerate() {
+                assert_eq!(stack.height(), 0);
+                stack.restart(i as u32 + 10 * round);
+                stack.push_if(true, 7, 0.5);
+            }
+            for (i, stack) in stacks.iter_mut().enumerate() {
+                assert_eq!(
+                    (stack.pop(), stack.pop(), stack.pop()),
+                    (Some(7), Some(i as u32 + 10 * round), None)
+                );
+            }
+        }
+    }
+}

@@ -18,7 +18,7 @@ use crate::geometry::{Hit, Ray};
 use core::hint::select_unpredictable;
 use halflight_simd::kernels::boxes::ROBUST;
 use halflight_simd::kernels::triangles::Areas;
-use halflight_simd::{Simd, Stack};
+use halflight_simd::{Simd, Stack, StackMemory};
 
 /// Rays in flight. Few on small machines: each has a stack.
 const SLOTS: usize = if cfg!(target_pointer_width = "64") { 32 } else { 4 };
@@ -27,11 +27,15 @@ const SLOTS: usize = if cfg!(target_pointer_width = "64") { 32 } else { 4 };
 const AHEAD: usize = 64;
 
 /// A ray in flight.
+#[derive(Clone, Copy)]
 #[repr(C, align(64))]
 struct Slot {
     ray: Ready,
     hit: Hit,
-    stack: Stack,
+}
+
+impl Slot {
+    const EMPTY: Slot = Slot { ray: Ready::NONE, hit: Hit::NONE };
 }
 
 /// At the bottom of every stack.
@@ -85,8 +89,9 @@ pub(super) fn trace<S: Simd, T: Sink, const ANY: bool>(
         return;
     }
     let mut queue = Queue { rays, indices, ahead: [Ready::NONE; AHEAD], count: 0, taken: 0 };
-    let mut slots: [Slot; SLOTS] =
-        core::array::from_fn(|_| Slot { ray: Ready::NONE, hit: Hit::NONE, stack: Stack::new() });
+    let mut slots = [Slot::EMPTY; SLOTS];
+    let mut memory = StackMemory::<SLOTS>::new();
+    let stacks = memory.stacks();
     let mut next = [DONE.0; SLOTS];
     let mut found = [Areas::NONE; SLOTS];
     let mut empty = 0u32;
@@ -101,7 +106,7 @@ pub(super) fn trace<S: Simd, T: Sink, const ANY: bool>(
 
         let mut vacant = done & !empty;
         while let Some(i) = pop(&mut vacant) {
-            let Slot { ray, hit, stack } = &mut slots[i];
+            let (Slot { ray, hit }, stack) = (&mut slots[i], &mut stacks[i]);
             sink.put(ray.index, *hit);
             match queue.next() {
                 Some(ready) => *ray = *ready,
@@ -120,7 +125,7 @@ pub(super) fn trace<S: Simd, T: Sink, const ANY: bool>(
         }
 
         while let Some(i) = pop(&mut nodes) {
-            let Slot { ray, stack, .. } = &mut slots[i];
+            let (Slot { ray, .. }, stack) = (&mut slots[i], &mut stacks[i]);
             let Some(node) = bvh.nodes.get(next[i] as usize) else { return };
             let (entry, exit) = ray.slab8(simd).interval(simd, &node.rows, ray.t_max);
             if ANY {
@@ -133,7 +138,7 @@ pub(super) fn trace<S: Simd, T: Sink, const ANY: bool>(
 
         let (mut at_leaf, mut met) = (leaves, 0u32);
         while let Some(i) = pop(&mut at_leaf) {
-            let Slot { ray, hit, stack } = &mut slots[i];
+            let (Slot { ray, hit }, stack) = (&mut slots[i], &mut stacks[i]);
             let leaf = Child(next[i]);
             let (first, count) = leaf.triangles();
             let Some(areas) = ray.shear8(simd).areas(simd, bvh.coordinates, 9 * first, count, ray.t_max)
@@ -158,7 +163,7 @@ pub(super) fn trace<S: Simd, T: Sink, const ANY: bool>(
             continue;
         }
         while let Some(i) = pop(&mut met) {
-            let Slot { ray, hit, stack } = &mut slots[i];
+            let (Slot { ray, hit }, stack) = (&mut slots[i], &mut stacks[i]);
             take(simd, bvh, ray, Child(next[i]), &found[i], hit);
             if hit.is_some() {
                 ray.t_max = hit.t;
@@ -166,7 +171,7 @@ pub(super) fn trace<S: Simd, T: Sink, const ANY: bool>(
             }
         }
         while let Some(i) = pop(&mut leaves) {
-            next[i] = take_next::<S, ANY>(simd, bvh, &mut slots[i].stack);
+            next[i] = take_next::<S, ANY>(simd, bvh, &mut stacks[i]);
         }
     }
 }
