@@ -83,7 +83,7 @@ mod tests {
         for (text, reason) in [
             ("", "the methods are auto, path"),
             ("paths", "the methods are auto, path"),
-            ("path:sparkle=1", "there is no option `sparkle`; the options are caustics, max-depth"),
+            ("path:sparkle=1", "there is no option `sparkle`; the options are caustics, reuse, max-depth"),
             ("path:", "no option"),
             ("path:max-depth=0", "max-depth"),
             ("path:max-depth", "max-depth"),
