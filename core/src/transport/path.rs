@@ -7,10 +7,11 @@
 //! 2. Queues are compacted in place: the ray of a path that goes on overwrites one that was already shaded.
 //! 3. Shadow rays are traced after all vertices of the wave are shaded; light is added to the path then.
 //! 4. Code for what the scene does not have is not compiled in ([`Features`]).
+//! 5. Where that pays, pixels of a group share what their paths find (`reuse.rs`).
 //!
-//! The price: about 200 bytes for each path of a wave. What a path sees depends on (seed, pixel, sample) only and
-//! samples are summed in their order, so the picture has the same bits for any size of wave and any
-//! distribution of tasks.
+//! The price: about 300 bytes for each path of a wave. What a pixel sees depends on (seed, sample) and the pixels of
+//! its group only, no wave cuts a group, and samples are summed in their order: the picture has the same bits for
+//! any size of wave and any distribution of tasks.
 
 use super::estimator::{
     Counters, MAX_CROSSINGS, MAX_VERTICES, PathSettings, ROULETTE_FROM, UNLIMITED, dimension,
@@ -97,7 +98,7 @@ impl<'a, F: Features> PathTracer<'a, F> {
         out: &mut [Pixel],
     ) -> Result<Counters, OutOfMemory> {
         let mut arena = scratch.scratch();
-        let mut wave = Wave::new(wave.max(1), &mut arena)?;
+        let mut wave = Wave::new(wave, &mut arena)?;
         let tile = Tile::new(self.settings.width, self.settings.height, task);
         let mut counters = Counters::default();
         let mut places = Places::new(tile, samples);
