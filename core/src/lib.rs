@@ -4,9 +4,9 @@
 //! [`memory::Footprint`] before it is built and lives in an [`memory::Arena`] over the caller's bytes.
 //!
 //! Data meets the rooms in this order: [`scene`] borrowed views of what to render; [`census`] what the
-//! scene holds and hence what can be left out; [`bvh`] and [`light`] structures built over it;
-//! [`transport`] the methods, written against [`bsdf`], [`camera`] and [`sampling`]; [`film`] what
-//! they fill; [`estimate`] what is known of the error.
+//! scene holds and hence what can be left out; [`bvh`] and [`light`] structures built over it; [`cache`]
+//! irradiance kept with its derivatives; [`transport`] the methods, written against [`bsdf`], [`camera`]
+//! and [`sampling`]; [`film`] what they fill; [`estimate`] what is known of the error.
 #![no_std]
 #![forbid(unsafe_code)]
 
@@ -15,6 +15,7 @@ extern crate std;
 
 pub mod bsdf;
 pub mod bvh;
+pub mod cache;
 pub mod camera;
 pub mod census;
 pub mod estimate;

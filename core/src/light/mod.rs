@@ -32,6 +32,6 @@ pub fn emitted(scene: &Scene, triangle: u32, uv: Vec2, front: bool) -> Rgb {
 
 /// Relative luminance of linear sRGB (BT.709).
 #[inline]
-fn luminance(color: Rgb) -> f32 {
+pub(crate) fn luminance(color: Rgb) -> f32 {
     color.dot(Rgb::new(0.2126, 0.7152, 0.0722))
 }

@@ -1,6 +1,7 @@
-//! Batch kernels of ray traversal, each beside its plain scalar reference.
+//! Batch kernels of ray traversal and of derivatives of irradiance, each beside its plain scalar reference.
 
 pub mod boxes;
+pub mod edge;
 pub mod push;
 pub mod triangles;
 

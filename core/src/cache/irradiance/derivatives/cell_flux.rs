@@ -1,0 +1,202 @@
+//! Derivatives from the borders between strata: the default.
+//!
+//! The strata of the concentric map never move; what they see does. Between two of radiance L₁ and L₂ runs the
+//! boundary of a surface, which belongs to the nearer of both and moves with its inverse distance u. By the
+//! boundary integrals of [`halflight_simd::kernels::edge`], with u the same at both ends of a border,
+//!
+//!   grad E = Σ (L₁ - L₂) u g,   Hess E = Σ (L₁ - L₂) u² h,   grad_n E = Σ (L₁ - L₂) r,
+//!
+//! where g, h, r depend on the border alone: tables. No triangulation, so no diagonal and no rule for the radiance
+//! of a triangle; no open rim, for the rim of the hemisphere lies in the horizon, where nothing flows; and all of
+//! it is of the same strata as the unbiased E. With polar strata the first sum is Ward and Heckbert's (1992).
+
+use super::{Derivatives, Hessian};
+use crate::cache::irradiance::hemisphere::{Hemisphere, SIDE_MAX};
+use crate::light::luminance;
+use crate::memory::{Arena, Footprint, OutOfMemory};
+use crate::sampling::warp::concentric_disk;
+use crate::{Level, Rgb};
+use glam::Vec2;
+use halflight_simd::kernels::edge::{Flux, flux_of};
+
+/// Pieces of a border, which is no great circle but the map's image of a segment.
+const PIECES: usize = 4;
+
+/// Borders of up to sixteen strata of a row, with their neighbours of the next column or the next row: rows of
+/// gradient x, y, rotation x, y, Hessian xx, xy, yy. Zero where there is no neighbour.
+type Borders = [[f32; 16]; 7];
+
+/// Two inverse distances that differ by less than this factor are of the same surface, and what divides them
+/// stands between; where they differ by more the nearer surface ends there.
+const SAME_SURFACE: f32 = 1.6;
+
+/// The tables of N × N strata, and the estimator over them.
+#[derive(Clone, Copy, Debug)]
+pub struct CellFlux<'m> {
+    n: usize,
+    /// For each row, for each sixteen of its columns: borders to the next column, borders to the next row.
+    borders: &'m [Borders],
+}
+
+impl<'m> CellFlux<'m> {
+    /// Bytes of the tables for n × n strata.
+    pub fn footprint(n: usize) -> Footprint {
+        Footprint::default().slice::<Borders>(2 * n.saturating_mul(n.div_ceil(16)))
+    }
+
+    /// Builds the tables for n × n strata.
+    ///
+    /// # Errors
+    /// [`OutOfMemory`] where the arena has less than the footprint, or n is not in 1 ..= [`SIDE_MAX`].
+    pub fn build(n: usize, arena: &mut Arena<'m>) -> Result<Self, OutOfMemory> {
+        if !(1..=SIDE_MAX).contains(&n) {
+            return Err(OutOfMemory { needed: usize::MAX, available: arena.available() });
+        }
+        let chunks = n.div_ceil(16);
+        let borders: &mut [Borders] = arena.slice(2 * n * chunks)?;
+        for (at, table) in borders.iter_mut().enumerate() {
+            *table = [[0.0; 16]; 7];
+            let (i, chunk, below) = (at / (2 * chunks), at / 2 % chunks, at % 2 == 1);
+            for lane in 0..16 {
+                let j = 16 * chunk + lane;
+                // Counter-clockwise around the stratum (i, j).
+                let ends = match below {
+                    false if j + 1 < n => [[j + 1, i], [j + 1, i + 1]],
+                    true if i + 1 < n && j < n => [[j + 1, i + 1], [j, i + 1]],
+                    _ => continue,
+                };
+                let Flux { gradient: [gx, gy], rotation: [rx, ry], hessian: [xx, xy, yy] } = border(n, ends);
+                for (row, value) in table.iter_mut().zip([gx, gy, rx, ry, xx, xy, yy]) {
+                    row[lane] = value;
+                }
+            }
+        }
+        Ok(Self { n, borders })
+    }
+
+    /// Strata along a side.
+    pub fn n(&self) -> usize {
+        self.n
+    }
+
+    /// Irradiance and all its derivatives. `None` where the hemisphere has another number of strata.
+    pub fn derivatives(&self, _level: Level, hemisphere: &Hemisphere) -> Option<Derivatives> {
+        let n = self.n;
+        if hemisphere.n() != n {
+            return None;
+        }
+        let chunks = n.div_ceil(16);
+        let (radiance, inverse) = (hemisphere.radiance(), hemisphere.inverse_distance());
+        let mut found = Derivatives::still(hemisphere);
+        for at in 0..n * n {
+            let (i, j) = (at / n, at % n);
+            for (below, next) in [(0, at + 1), (1, at + n)] {
+                if (below == 0 && j + 1 == n) || (below == 1 && i + 1 == n) {
+                    continue;
+                }
+                let table = self.borders.get(2 * (i * chunks + j / 16) + below)?;
+                let [gx, gy, rx, ry, xx, xy, yy] = table.map(|row| row[j % 16]);
+                let jump = Rgb::from(*radiance.get(at)?) - Rgb::from(*radiance.get(next)?);
+                let u = between(*inverse.get(at)?, *inverse.get(next)?);
+                for channel in 0..3 {
+                    found.gradient[channel] += jump[channel] * u * Vec2::new(gx, gy);
+                    found.rotation[channel] += jump[channel] * Vec2::new(rx, ry);
+                }
+                let weight = luminance(jump) * u * u;
+                let Hessian { xx: sxx, xy: sxy, yy: syy } = found.hessian;
+                found.hessian =
+                    Hessian { xx: sxx + weight * xx, xy: sxy + weight * xy, yy: syy + weight * yy };
+            }
+        }
+        Some(found)
+    }
+}
+
+/// Inverse distance of the border between two strata.
+#[inline]
+fn between(u: f32, v: f32) -> f32 {
+    let (near, far) = (u.max(v), u.min(v));
+    if near < SAME_SURFACE * far { 0.5 * (near + far) } else { near }
+}
+
+/// What the border between two corners of the grid adds, at distance 1.
+fn border(n: usize, [from, to]: [[usize; 2]; 2]) -> Flux<f32> {
+    let along = |piece: usize| {
+        let at = |k: usize| (from[k] * (PIECES - piece) + to[k] * piece) as f32 / (n * PIECES) as f32;
+        direction([at(0), at(1)])
+    };
+    (0..PIECES).fold(Flux::default(), |sum, piece| sum + flux_of(along(piece), 1.0, along(piece + 1), 1.0))
+}
+
+/// The direction that the concentric map makes of a point of the unit square, without loss near the horizon.
+fn direction(u: [f32; 2]) -> [f32; 3] {
+    let disk = concentric_disk(u);
+    let radius = (2.0 * u[0] - 1.0).abs().max((2.0 * u[1] - 1.0).abs());
+    [disk.x, disk.y, libm::sqrtf((1.0 - radius) * (1.0 + radius))]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::memory::Line;
+    use std::vec;
+    use std::vec::Vec;
+
+    fn lines(n: usize) -> Vec<Line> {
+        vec![Line([0; 64]); CellFlux::footprint(n).bytes() / 64]
+    }
+
+    #[test]
+    fn the_footprint_is_exact() {
+        for n in [1, 2, 16, 17, 32] {
+            let mut lines = lines(n);
+            let bytes: &mut [u8] = bytemuck::cast_slice_mut(&mut lines);
+            let short = bytes.len() - 1;
+            assert!(CellFlux::build(n, &mut Arena::new(bytes)).is_ok());
+            assert!(CellFlux::build(n, &mut Arena::new(&mut bytes[..short])).is_err());
+        }
+        let mut lines = lines(1);
+        for n in [0, SIDE_MAX + 1, usize::MAX] {
+            assert!(CellFlux::build(n, &mut Arena::new(bytemuck::cast_slice_mut(&mut lines))).is_err());
+        }
+    }
+
+    /// A room of one radiance is the same from everywhere, whatever its walls.
+    #[test]
+    fn one_radiance_has_no_derivatives() {
+        let n = 16;
+        let mut lines = lines(n);
+        let tables = CellFlux::build(n, &mut Arena::new(bytemuck::cast_slice_mut(&mut lines))).unwrap();
+        let inverse: Vec<f32> = (0..n * n).map(|i| 1.0 + (i * 7 % 5) as f32).collect();
+        let (radiance, directions) = (vec![[0.5; 3]; n * n], vec![[0.0, 0.0, 1.0]; n * n]);
+        let hemisphere = Hemisphere::new(n, &radiance, &inverse, &directions).unwrap();
+        let found = tables.derivatives(Level::BASELINE, &hemisphere).unwrap();
+        assert_eq!((found.gradient, found.rotation), ([Vec2::ZERO; 3], [Vec2::ZERO; 3]));
+        assert_eq!(found.hessian, Hessian::default());
+        assert!((found.irradiance.x - 0.5 * core::f32::consts::PI).abs() < 1e-6);
+        assert_eq!(found.min_distance, 0.2);
+    }
+
+    /// The sky of radiance 1 + s · w: its rotational gradient is n × ∫ s · w w dω = n × 2π/3 s, and its irradiance
+    /// 2π/3 s_z + π; a sky does not move.
+    #[test]
+    fn a_sky_with_a_slope_turns_and_does_not_move() {
+        let n = 64;
+        let mut lines = lines(n);
+        let tables = CellFlux::build(n, &mut Arena::new(bytemuck::cast_slice_mut(&mut lines))).unwrap();
+        let directions: Vec<_> = (0..n * n)
+            .map(|i| direction([((i % n) as f32 + 0.5) / n as f32, ((i / n) as f32 + 0.5) / n as f32]))
+            .collect();
+        let radiance: Vec<_> = directions.iter().map(|w| [1.0 + 0.3 * w[0], 1.0 + 0.3 * w[1], 1.0]).collect();
+        let inverse = vec![0.0; n * n];
+        let hemisphere = Hemisphere::new(n, &radiance, &inverse, &directions).unwrap();
+        let found = tables.derivatives(Level::BASELINE, &hemisphere).unwrap();
+        assert_eq!((found.gradient, found.hessian), ([Vec2::ZERO; 3], Hessian::default()));
+        let slope = 0.3 * core::f32::consts::TAU / 3.0;
+        // n × x = y, n × y = -x. The strata are 1/64 of the hemisphere wide.
+        let wanted = [Vec2::new(0.0, slope), Vec2::new(-slope, 0.0), Vec2::ZERO];
+        for (found, wanted) in found.rotation.iter().zip(wanted) {
+            assert!((*found - wanted).length() < 0.01 * slope, "{found} {wanted}");
+        }
+    }
+}

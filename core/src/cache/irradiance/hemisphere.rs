@@ -1,0 +1,97 @@
+//! What one place sees: radiance and distance for each stratum of its hemisphere, in the frame of its normal (+z).
+
+use crate::Rgb;
+use core::f32::consts::PI;
+
+/// The most strata along a side.
+pub const SIDE_MAX: usize = 128;
+
+/// N × N strata of the concentric map (Shirley and Chiu 1997), so of equal shares of irradiance. Row-major:
+/// the stratum of row i and column j holds the directions that the map makes of the square
+/// [j/N, (j+1)/N] × [i/N, (i+1)/N], of which one was traced.
+#[derive(Clone, Copy, Debug)]
+pub struct Hemisphere<'a> {
+    n: usize,
+    radiance: &'a [[f32; 3]],
+    inverse_distance: &'a [f32],
+    directions: &'a [[f32; 3]],
+    normals: Option<&'a [[f32; 3]]>,
+}
+
+impl<'a> Hemisphere<'a> {
+    /// From n² strata: incident radiance, 1/distance of what is seen (0 where nothing is) and the direction that
+    /// was traced (unit, local: z is the cosine). `None` where n is not in 1 ..= [`SIDE_MAX`] or a slice does not
+    /// hold n² values. What they hold is not checked: a value that is not finite spoils the derivatives, no more.
+    pub fn new(
+        n: usize,
+        radiance: &'a [[f32; 3]],
+        inverse_distance: &'a [f32],
+        directions: &'a [[f32; 3]],
+    ) -> Option<Self> {
+        let lengths = [radiance.len(), inverse_distance.len(), directions.len()];
+        let fits = (1..=SIDE_MAX).contains(&n) && lengths == [n * n; 3];
+        fits.then_some(Self { n, radiance, inverse_distance, directions, normals: None })
+    }
+
+    /// With the unit normals (local frame, either side) of what is seen, anything where nothing is: only the
+    /// Hessians that do not know of occlusion need them. `None` where these are not n².
+    pub fn with_normals(self, normals: &'a [[f32; 3]]) -> Option<Self> {
+        (normals.len() == self.radiance.len()).then_some(Self { normals: Some(normals), ..self })
+    }
+
+    /// Strata along a side.
+    pub fn n(&self) -> usize {
+        self.n
+    }
+
+    /// Radiance of each stratum.
+    pub fn radiance(&self) -> &'a [[f32; 3]] {
+        self.radiance
+    }
+
+    /// 1/distance of each stratum, 0 where nothing is hit.
+    pub fn inverse_distance(&self) -> &'a [f32] {
+        self.inverse_distance
+    }
+
+    /// Traced directions, in the local frame.
+    pub fn directions(&self) -> &'a [[f32; 3]] {
+        self.directions
+    }
+
+    /// Normals of what is seen, where they are known.
+    pub fn normals(&self) -> Option<&'a [[f32; 3]]> {
+        self.normals
+    }
+
+    /// Irradiance: π/N² Σ L, for the strata have equal shares of it. In rows, so that rounding stays small.
+    pub fn irradiance(&self) -> Rgb {
+        let rows = self.radiance.chunks_exact(self.n);
+        let sum: Rgb = rows.map(|row| row.iter().map(|&l| Rgb::from(l)).sum::<Rgb>()).sum();
+        sum * (PI / (self.n * self.n) as f32)
+    }
+
+    /// What the distances say.
+    pub(super) fn distances(&self) -> Distances {
+        let (mut sum, mut squares, mut largest) = (0.0, 0.0, 0.0f32);
+        for row in self.inverse_distance.chunks_exact(self.n) {
+            sum += row.iter().sum::<f32>();
+            squares += row.iter().map(|u| u * u).sum::<f32>();
+            largest = row.iter().fold(largest, |largest, &u| largest.max(u));
+        }
+        let count = (self.n * self.n) as f32;
+        Distances {
+            mean_inverse: sum / count,
+            mean_square_inverse: squares / count,
+            largest_inverse: largest,
+        }
+    }
+}
+
+/// Statistics of the inverse distances.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Distances {
+    pub(super) mean_inverse: f32,
+    pub(super) mean_square_inverse: f32,
+    pub(super) largest_inverse: f32,
+}

@@ -1,0 +1,3 @@
+//! Light that is computed at few places and reused at many.
+
+pub mod irradiance;
