@@ -2,7 +2,7 @@
 //! plain scalar code. Sixteen lanes are two registers of eight.
 
 use crate::kernels::push::{keep, push};
-use crate::lanes::{Lanes, Mask, Simd};
+use crate::lanes::{EXPONENT, Lanes, Mask, Simd};
 use crate::stack::Stack;
 use core::ops::{Add, BitAnd, BitOr, Div, Mul, Neg, Not, Sub};
 use wide::f32x8;
@@ -76,6 +76,26 @@ impl Lanes for F8 {
     #[inline(always)]
     fn abs(self) -> Self {
         Self(self.0.abs())
+    }
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        Self(self.0.sqrt())
+    }
+    #[inline(always)]
+    fn power_of_two(self) -> Self {
+        Self(self.0 & f32x8::splat(f32::from_bits(EXPONENT)))
+    }
+    #[inline(always)]
+    fn product(self, other: Self) -> (Self, Self) {
+        // Dekker 1971: halves of twelve bits, of which all products are exact.
+        let split = |x: Self| {
+            let shifted = x * F8(f32x8::splat(4097.0));
+            let high = shifted - (shifted - x);
+            (high, x - high)
+        };
+        let product = self * other;
+        let ((a, b), (c, d)) = (split(self), split(other));
+        (product, ((a * c - product) + a * d + b * c) + b * d)
     }
     #[inline(always)]
     fn lt(self, other: Self) -> M8 {
@@ -160,6 +180,19 @@ impl<L: Lanes<Array = [f32; 8]>> Lanes for Pair<L> {
     #[inline(always)]
     fn abs(self) -> Self {
         Self(self.0.abs(), self.1.abs())
+    }
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        Self(self.0.sqrt(), self.1.sqrt())
+    }
+    #[inline(always)]
+    fn power_of_two(self) -> Self {
+        Self(self.0.power_of_two(), self.1.power_of_two())
+    }
+    #[inline(always)]
+    fn product(self, other: Self) -> (Self, Self) {
+        let ((low, low_rest), (high, high_rest)) = (self.0.product(other.0), self.1.product(other.1));
+        (Self(low, high), Self(low_rest, high_rest))
     }
     #[inline(always)]
     fn lt(self, other: Self) -> Self::Mask {

@@ -1,7 +1,8 @@
 //! The lane trait: only the operations that the kernels use, and the token that makes lanes.
 //!
 //! No operation here fuses or reduces: each lane does what the scalar operation does, to the bit, on
-//! every level. What a kernel does with them is therefore the same everywhere.
+//! every level. What a kernel does with them is therefore the same everywhere. A single f32 is lanes as
+//! well, so that a kernel of pure arithmetic is its own scalar reference.
 
 use crate::stack::Stack;
 use core::ops::{Add, BitAnd, BitOr, Div, Mul, Neg, Not, Sub};
@@ -35,6 +36,13 @@ pub trait Lanes:
     fn max(self, other: Self) -> Self;
     /// Lane by lane without sign.
     fn abs(self) -> Self;
+    /// Lane by lane the square root, correctly rounded.
+    fn sqrt(self) -> Self;
+    /// Lane by lane the largest power of two not above the magnitude, of a normal number; of smaller ones zero.
+    fn power_of_two(self) -> Self;
+    /// The product as rounded, and what the rounding took from it: their sum is exact where the magnitudes of both
+    /// factors are zero or 1e-14 to 1e30, and of the product 1e-30 to 1e38.
+    fn product(self, other: Self) -> (Self, Self);
     /// `self < other`.
     fn lt(self, other: Self) -> Self::Mask;
     /// `self <= other`.
@@ -55,6 +63,76 @@ pub trait Lanes:
     /// The lanes as an array.
     fn to_array(self) -> Self::Array;
 }
+
+impl Mask for bool {
+    #[inline(always)]
+    fn bits(self) -> u32 {
+        self.into()
+    }
+}
+
+impl Lanes for f32 {
+    type Array = [f32; 1];
+    type Mask = bool;
+    const N: usize = 1;
+
+    #[inline(always)]
+    fn min(self, other: Self) -> Self {
+        f32::min(self, other)
+    }
+    #[inline(always)]
+    fn max(self, other: Self) -> Self {
+        f32::max(self, other)
+    }
+    #[inline(always)]
+    fn abs(self) -> Self {
+        f32::abs(self)
+    }
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        libm::sqrtf(self)
+    }
+    #[inline(always)]
+    fn power_of_two(self) -> Self {
+        f32::from_bits(self.to_bits() & EXPONENT)
+    }
+    #[inline(always)]
+    fn product(self, other: Self) -> (Self, Self) {
+        let product = self * other;
+        (product, (f64::from(self) * f64::from(other) - f64::from(product)) as f32)
+    }
+    #[inline(always)]
+    fn lt(self, other: Self) -> bool {
+        self < other
+    }
+    #[inline(always)]
+    fn le(self, other: Self) -> bool {
+        self <= other
+    }
+    #[inline(always)]
+    fn eq(self, other: Self) -> bool {
+        self == other
+    }
+    #[inline(always)]
+    fn signs(self) -> u32 {
+        self.is_sign_negative().into()
+    }
+    #[inline(always)]
+    fn select(self, mask: bool, other: Self) -> Self {
+        if mask { self } else { other }
+    }
+    #[inline(always)]
+    fn largest(self) -> f32 {
+        self
+    }
+    #[inline(always)]
+    fn to_array(self) -> [f32; 1] {
+        [self]
+    }
+}
+
+/// The bits of an exponent.
+pub(crate) const EXPONENT: u32 = 0x7f80_0000;
 
 /// Proof that the processor has a level, and the only maker of its lanes.
 pub trait Simd: Copy {

@@ -19,7 +19,6 @@
 //! The price: an edge longer than a right angle is beyond the polynomial and must be halved first.
 //! Edges in the horizon add nothing: a polygon may be left open there.
 
-use core::array;
 use core::ops::{Add, Div, Mul, Sub};
 
 /// k₁(z) for 0 <= z <= 1, lowest power first; relative error 1.2e-7, and it is damped where it is used.
@@ -59,10 +58,12 @@ impl<T: Copy + Add<Output = T> + Sub<Output = T> + Mul<Output = T> + Div<Output 
 #[inline(always)]
 pub fn flux<T: Number>(all: impl Fn(f32) -> T, a: [T; 3], u: T, b: [T; 3], v: T) -> Flux<T> {
     let [half, two] = [all(0.5), all(2.0)];
-    let e: [T; 3] = array::from_fn(|i| b[i] - a[i]);
+    let e = [b[0] - a[0], b[1] - a[1], b[2] - a[2]];
     let z = half * (e[0] * e[0] + e[1] * e[1] + e[2] * e[2]);
-    let (first, rest) = (all(K1[8]), &K1[..8]);
-    let k1 = rest.iter().rev().fold(first, |sum, &coefficient| sum * z + all(coefficient));
+    let mut k1 = all(K1[8]);
+    for coefficient in K1[..8].iter().rev() {
+        k1 = k1 * z + all(*coefficient);
+    }
     let k = all(1.0 / 3.0) + z * k1;
     let g = all(1.0) + z * k;
     let inverse = all(1.0) / (two - z);
@@ -98,7 +99,7 @@ pub fn flux_of(a: [f32; 3], u: f32, b: [f32; 3], v: f32) -> Flux<f32> {
     if cos >= 0.0 {
         return flux(|x| x, a, u, b, v);
     }
-    let m: [f32; 3] = array::from_fn(|i| a[i] + b[i]);
+    let m = [a[0] + b[0], a[1] + b[1], a[2] + b[2]];
     let length = libm::sqrtf(m[0] * m[0] + m[1] * m[1] + m[2] * m[2]);
     if length < f32::EPSILON {
         return Flux::default();
@@ -112,10 +113,11 @@ impl<T: Number> Add for Flux<T> {
     type Output = Self;
     #[inline(always)]
     fn add(self, other: Self) -> Self {
+        let (Flux { gradient: g, rotation: r, hessian: h }, o) = (self, other);
         Self {
-            gradient: array::from_fn(|i| self.gradient[i] + other.gradient[i]),
-            rotation: array::from_fn(|i| self.rotation[i] + other.rotation[i]),
-            hessian: array::from_fn(|i| self.hessian[i] + other.hessian[i]),
+            gradient: [g[0] + o.gradient[0], g[1] + o.gradient[1]],
+            rotation: [r[0] + o.rotation[0], r[1] + o.rotation[1]],
+            hessian: [h[0] + o.hessian[0], h[1] + o.hessian[1], h[2] + o.hessian[2]],
         }
     }
 }

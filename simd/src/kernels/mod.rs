@@ -2,6 +2,7 @@
 
 pub mod boxes;
 pub mod edge;
+pub mod eigen;
 pub mod push;
 pub mod triangles;
 

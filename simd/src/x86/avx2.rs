@@ -2,7 +2,7 @@
 //! only inside `with_avx2`; that is what every SAFETY line here rests on.
 
 use crate::baseline::{Pair, fits8x9, gather9, halves, splat_corners};
-use crate::lanes::{Lanes, Mask, Simd};
+use crate::lanes::{EXPONENT, Lanes, Mask, Simd};
 use crate::stack::{STACK, Stack};
 use core::arch::x86_64::*;
 use core::ops::{Add, BitAnd, BitOr, Div, Mul, Neg, Not, Sub};
@@ -93,6 +93,22 @@ impl Lanes for F8 {
     fn abs(self) -> Self {
         // SAFETY: as above.
         Self(unsafe { _mm256_andnot_ps(_mm256_set1_ps(-0.0), self.0) })
+    }
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        // SAFETY: as above.
+        Self(unsafe { _mm256_sqrt_ps(self.0) })
+    }
+    #[inline(always)]
+    fn power_of_two(self) -> Self {
+        // SAFETY: as above.
+        Self(unsafe { _mm256_and_ps(self.0, _mm256_set1_ps(f32::from_bits(EXPONENT))) })
+    }
+    #[inline(always)]
+    fn product(self, other: Self) -> (Self, Self) {
+        let product = self * other;
+        // SAFETY: as above.
+        (product, Self(unsafe { _mm256_fmsub_ps(self.0, other.0, product.0) }))
     }
     #[inline(always)]
     fn lt(self, other: Self) -> M8 {

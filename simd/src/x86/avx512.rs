@@ -2,7 +2,7 @@
 //! through the token [`Avx512`], and the token only inside `with_avx512`; every SAFETY line rests on that.
 
 use crate::baseline::{fits8x9, gather9, splat_corners};
-use crate::lanes::{Lanes, Mask, Simd};
+use crate::lanes::{EXPONENT, Lanes, Mask, Simd};
 use crate::stack::{STACK, Stack};
 use core::arch::x86_64::*;
 use core::ops::{Add, BitAnd, BitOr, Div, Mul, Neg, Not, Sub};
@@ -22,7 +22,7 @@ macro_rules! lanes {
     ($lanes:ident, $mask:ident, $bits:ty, $n:literal, $register:ty,
      $add:ident $sub:ident $mul:ident $div:ident $xor:ident $and_not:ident $splat:ident
      $min:ident $max:ident $compare:ident $blend:ident $store:ident $largest:ident
-     $signs:ident $bits_of:ident) => {
+     $signs:ident $bits_of:ident $sqrt:ident $and:ident $fused:ident) => {
         /// Lanes of a register.
         #[derive(Clone, Copy)]
         pub(crate) struct $lanes($register);
@@ -97,6 +97,22 @@ macro_rules! lanes {
                 Self(unsafe { $and_not($splat(-0.0), self.0) })
             }
             #[inline(always)]
+            fn sqrt(self) -> Self {
+                // SAFETY: as above.
+                Self(unsafe { $sqrt(self.0) })
+            }
+            #[inline(always)]
+            fn power_of_two(self) -> Self {
+                // SAFETY: as above.
+                Self(unsafe { $and(self.0, $splat(f32::from_bits(EXPONENT))) })
+            }
+            #[inline(always)]
+            fn product(self, other: Self) -> (Self, Self) {
+                let product = self * other;
+                // SAFETY: as above.
+                (product, Self(unsafe { $fused(self.0, other.0, product.0) }))
+            }
+            #[inline(always)]
             fn lt(self, other: Self) -> $mask {
                 // SAFETY: as above.
                 $mask(unsafe { $compare::<_CMP_LT_OQ>(self.0, other.0) })
@@ -162,11 +178,11 @@ unsafe fn largest8(lanes: __m256) -> f32 {
 lanes!(F8, M8, __mmask8, 8, __m256,
     _mm256_add_ps _mm256_sub_ps _mm256_mul_ps _mm256_div_ps _mm256_xor_ps _mm256_andnot_ps _mm256_set1_ps
     _mm256_min_ps _mm256_max_ps _mm256_cmp_ps_mask _mm256_mask_blend_ps _mm256_storeu_ps largest8
-    _mm256_movepi32_mask _mm256_castps_si256);
+    _mm256_movepi32_mask _mm256_castps_si256 _mm256_sqrt_ps _mm256_and_ps _mm256_fmsub_ps);
 lanes!(F16, M16, __mmask16, 16, __m512,
     _mm512_add_ps _mm512_sub_ps _mm512_mul_ps _mm512_div_ps _mm512_xor_ps _mm512_andnot_ps _mm512_set1_ps
     _mm512_min_ps _mm512_max_ps _mm512_cmp_ps_mask _mm512_mask_blend_ps _mm512_storeu_ps _mm512_reduce_max_ps
-    _mm512_movepi32_mask _mm512_castps_si512);
+    _mm512_movepi32_mask _mm512_castps_si512 _mm512_sqrt_ps _mm512_and_ps _mm512_fmsub_ps);
 
 /// Of records `i`, `i + 4`, `i + 8` and `i + 12` (`i` below 4) the four floats from `from` (0 or 4) on.
 ///

@@ -1,8 +1,10 @@
 //! Irradiance caching: a [`Hemisphere`] is what one place sees, [`derivatives`] what its irradiance does when the
-//! place moves or turns.
+//! place moves or turns, and a [`Metric`] how far around it that may be relied upon.
 
 pub mod derivatives;
 mod hemisphere;
+pub mod metric;
 
 pub use derivatives::{CellFlux, Derivatives, Hessian};
 pub use hemisphere::{Hemisphere, SIDE_MAX};
+pub use metric::{Metric, Reach, reach};
