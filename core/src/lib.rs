@@ -5,8 +5,9 @@
 //!
 //! Data meets the rooms in this order: [`scene`] borrowed views of what to render; [`census`] what the
 //! scene holds and hence what can be left out; [`bvh`] and [`light`] structures built over it; [`cache`]
-//! irradiance kept with its derivatives; [`transport`] the methods, written against [`bsdf`], [`camera`]
-//! and [`sampling`]; [`film`] what they fill; [`estimate`] what is known of the error.
+//! irradiance kept with its derivatives; [`photon`] light that was left on surfaces; [`transport`] the methods,
+//! written against [`bsdf`], [`camera`] and [`sampling`]; [`film`] what they fill; [`estimate`] what is known of
+//! the error.
 #![no_std]
 #![forbid(unsafe_code)]
 
@@ -23,6 +24,7 @@ pub mod film;
 pub mod geometry;
 pub mod light;
 pub mod memory;
+pub mod photon;
 pub mod sampling;
 pub mod scene;
 pub mod transport;

@@ -284,6 +284,34 @@ impl Simd for Baseline {
         keep(limit, stack);
     }
     #[inline(always)]
+    fn pack16(self, wanted: Pair<M8>, lanes: Pair<F8>, out: &mut [f32; 16]) {
+        let (lanes, mut bits) = (lanes.to_array(), wanted.bits());
+        for slot in out {
+            if bits == 0 {
+                return;
+            }
+            *slot = lanes[bits.trailing_zeros() as usize & 15];
+            bits &= bits - 1;
+        }
+    }
+    #[inline(always)]
+    fn numbers16(self, first: u32) -> Pair<F8> {
+        self.load16(&core::array::from_fn(|i| f32::from_bits(first.wrapping_add(i as u32))))
+    }
+    #[inline(always)]
+    fn field16(self, words: &[u32; 16], from: u32, width: u32) -> Pair<F8> {
+        // Signed, because that is what SSE2 converts.
+        self.load16(&words.map(|word| ((word >> from) & ((1 << width) - 1)) as i32 as f32))
+    }
+    #[inline(always)]
+    fn bytes16(self, bytes: &[u8; 16]) -> Pair<F8> {
+        self.load16(&bytes.map(|byte| i32::from(byte) as f32))
+    }
+    #[inline(always)]
+    fn powers16(self, words: &[u32; 16]) -> Pair<F8> {
+        self.load16(&words.map(|word| f32::from_bits(word >> 24 << 23)))
+    }
+    #[inline(always)]
     fn prefetch<T>(self, _items: &[T], _values: &[f32], _second: bool, _index: usize) {}
     #[inline(always)]
     fn splat16x9(

@@ -197,6 +197,22 @@ pub trait Simd: Copy {
         records
     }
 
+    /// Of sixteen lanes the `wanted` ones, one after the other from the start of `out`; what follows them there is
+    /// unspecified.
+    fn pack16(self, wanted: <Self::F16 as Lanes>::Mask, lanes: Self::F16, out: &mut [f32; 16]);
+
+    /// `first + i` in lane `i`, as the bits of a float.
+    fn numbers16(self, first: u32) -> Self::F16;
+
+    /// Of each word the `width` (below 25) bits from bit `from` on, as a number.
+    fn field16(self, words: &[u32; 16], from: u32, width: u32) -> Self::F16;
+
+    /// Bytes as numbers.
+    fn bytes16(self, bytes: &[u8; 16]) -> Self::F16;
+
+    /// Two to the power of `e - 127`, where `e` are the highest eight bits of each word; zero where they are zero.
+    fn powers16(self, words: &[u32; 16]) -> Self::F16;
+
     /// Asks for the four cache lines from `items[index]` on, or from `values[index]` on where `second`. Only a hint:
     /// an index beyond the end is harmless, and which of the two it is costs no branch.
     fn prefetch<T>(self, items: &[T], values: &[f32], second: bool, index: usize);

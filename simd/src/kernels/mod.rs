@@ -1,9 +1,12 @@
-//! Batch kernels of ray traversal and of derivatives of irradiance, each beside its plain scalar reference.
+//! Batch kernels of ray traversal, of derivatives of irradiance and of photon maps, each beside its plain scalar
+//! reference.
 
 pub mod boxes;
 pub mod edge;
 pub mod eigen;
+pub mod points;
 pub mod push;
+pub mod select;
 pub mod triangles;
 
 /// The largest finite reciprocal of a direction: `0 * inf` never reaches a slab test.

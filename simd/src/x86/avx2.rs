@@ -218,6 +218,60 @@ impl Simd for Avx2 {
         }
     }
     #[inline(always)]
+    fn pack16(self, wanted: Pair<M8>, lanes: Pair<F8>, out: &mut [f32; 16]) {
+        let (low, high) = (wanted.0.bits(), wanted.1.bits());
+        // SAFETY: the token proves the level; eight floats from at most the ninth on are inside the array.
+        unsafe {
+            _mm256_storeu_ps(out.as_mut_ptr(), packed(low, lanes.0.0));
+            let second = out.as_mut_ptr().add(low.count_ones() as usize);
+            _mm256_storeu_ps(second, packed(high, lanes.1.0));
+        }
+    }
+    #[inline(always)]
+    fn numbers16(self, first: u32) -> Pair<F8> {
+        // SAFETY: the token proves the level.
+        unsafe {
+            let lanes = _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7);
+            let low = _mm256_add_epi32(_mm256_set1_epi32(first as i32), lanes);
+            let high = _mm256_add_epi32(low, _mm256_set1_epi32(8));
+            Pair(F8(_mm256_castsi256_ps(low)), F8(_mm256_castsi256_ps(high)))
+        }
+    }
+    #[inline(always)]
+    fn field16(self, words: &[u32; 16], from: u32, width: u32) -> Pair<F8> {
+        let half = |words: *const u32| {
+            // SAFETY: the token proves the level; eight words are read from either half of sixteen.
+            unsafe {
+                let shifted =
+                    _mm256_srl_epi32(_mm256_loadu_si256(words.cast()), _mm_cvtsi32_si128(from as i32));
+                let field = _mm256_and_si256(shifted, _mm256_set1_epi32((1 << width) - 1));
+                F8(_mm256_cvtepi32_ps(field))
+            }
+        };
+        Pair(half(words.as_ptr()), half(words[8..].as_ptr()))
+    }
+    #[inline(always)]
+    fn bytes16(self, bytes: &[u8; 16]) -> Pair<F8> {
+        // SAFETY: the token proves the level; eight bytes are read from either half of sixteen.
+        unsafe {
+            let half = |bytes: *const u8| {
+                F8(_mm256_cvtepi32_ps(_mm256_cvtepu8_epi32(_mm_loadl_epi64(bytes.cast()))))
+            };
+            Pair(half(bytes.as_ptr()), half(bytes[8..].as_ptr()))
+        }
+    }
+    #[inline(always)]
+    fn powers16(self, words: &[u32; 16]) -> Pair<F8> {
+        // SAFETY: the token proves the level; eight words are read from either half of sixteen.
+        unsafe {
+            let half = |words: *const u32| {
+                let exponent = _mm256_srli_epi32::<24>(_mm256_loadu_si256(words.cast()));
+                F8(_mm256_castsi256_ps(_mm256_slli_epi32::<23>(exponent)))
+            };
+            Pair(half(words.as_ptr()), half(words[8..].as_ptr()))
+        }
+    }
+    #[inline(always)]
     fn prefetch<T>(self, items: &[T], values: &[f32], second: bool, index: usize) {
         let first = items.as_ptr().wrapping_add(index).cast::<i8>();
         let other = values.as_ptr().wrapping_add(index).cast::<i8>();
@@ -308,13 +362,24 @@ unsafe fn push_met(entry: __m256, exit: __m256, items: __m256, stack: &mut Stack
 unsafe fn store_packed(wanted: u32, items: __m256, entries: __m256, stack: &mut Stack) {
     // SAFETY: the caller's.
     unsafe {
-        let pack = _mm256_cvtepu8_epi32(_mm_cvtsi64_si128(PACK[wanted as usize & 255] as i64));
-        let (items, entries) =
-            (_mm256_permutevar8x32_ps(items, pack), _mm256_permutevar8x32_ps(entries, pack));
+        let (items, entries) = (packed(wanted, items), packed(wanted, entries));
         _mm256_storeu_ps(stack.items.as_mut_ptr().cast::<f32>().add(stack.height), items);
         _mm256_storeu_ps(stack.entries.as_mut_ptr().cast::<f32>().add(stack.height), entries);
     }
     stack.height += wanted.count_ones() as usize;
+}
+
+/// The lanes of the set `wanted`, lowest first.
+///
+/// # Safety
+/// The processor has AVX2.
+#[inline(always)]
+unsafe fn packed(wanted: u32, lanes: __m256) -> __m256 {
+    // SAFETY: the caller's.
+    unsafe {
+        let pack = _mm256_cvtepu8_epi32(_mm_cvtsi64_si128(PACK[wanted as usize & 255] as i64));
+        _mm256_permutevar8x32_ps(lanes, pack)
+    }
 }
 
 /// For each set of lanes the bytes that name them one after the other.

@@ -21,7 +21,7 @@ impl Avx512 {
 macro_rules! lanes {
     ($lanes:ident, $mask:ident, $bits:ty, $n:literal, $register:ty,
      $add:ident $sub:ident $mul:ident $div:ident $xor:ident $and_not:ident $splat:ident
-     $min:ident $max:ident $compare:ident $blend:ident $store:ident $largest:ident
+     $min:ident $max:ident $compare:ident $blend:ident $store:ident $largest:ident $smallest:ident
      $signs:ident $bits_of:ident $sqrt:ident $and:ident $fused:ident) => {
         /// Lanes of a register.
         #[derive(Clone, Copy)]
@@ -143,6 +143,11 @@ macro_rules! lanes {
                 unsafe { $largest(self.0) }
             }
             #[inline(always)]
+            fn smallest(self) -> f32 {
+                // SAFETY: as above.
+                unsafe { $smallest(self.0) }
+            }
+            #[inline(always)]
             fn to_array(self) -> [f32; $n] {
                 let mut out = [0.0; $n];
                 // SAFETY: as above; as many floats are written as the array holds.
@@ -175,14 +180,26 @@ unsafe fn largest8(lanes: __m256) -> f32 {
     }
 }
 
+/// # Safety
+/// The processor has AVX2.
+#[inline(always)]
+unsafe fn smallest8(lanes: __m256) -> f32 {
+    // SAFETY: the caller's.
+    unsafe {
+        let four = _mm_min_ps(_mm256_castps256_ps128(lanes), _mm256_extractf128_ps::<1>(lanes));
+        let two = _mm_min_ps(four, _mm_movehl_ps(four, four));
+        _mm_cvtss_f32(_mm_min_ss(two, _mm_shuffle_ps::<1>(two, two)))
+    }
+}
+
 lanes!(F8, M8, __mmask8, 8, __m256,
     _mm256_add_ps _mm256_sub_ps _mm256_mul_ps _mm256_div_ps _mm256_xor_ps _mm256_andnot_ps _mm256_set1_ps
-    _mm256_min_ps _mm256_max_ps _mm256_cmp_ps_mask _mm256_mask_blend_ps _mm256_storeu_ps largest8
+    _mm256_min_ps _mm256_max_ps _mm256_cmp_ps_mask _mm256_mask_blend_ps _mm256_storeu_ps largest8 smallest8
     _mm256_movepi32_mask _mm256_castps_si256 _mm256_sqrt_ps _mm256_and_ps _mm256_fmsub_ps);
 lanes!(F16, M16, __mmask16, 16, __m512,
     _mm512_add_ps _mm512_sub_ps _mm512_mul_ps _mm512_div_ps _mm512_xor_ps _mm512_andnot_ps _mm512_set1_ps
     _mm512_min_ps _mm512_max_ps _mm512_cmp_ps_mask _mm512_mask_blend_ps _mm512_storeu_ps _mm512_reduce_max_ps
-    _mm512_movepi32_mask _mm512_castps_si512 _mm512_sqrt_ps _mm512_and_ps _mm512_fmsub_ps);
+    _mm512_reduce_min_ps _mm512_movepi32_mask _mm512_castps_si512 _mm512_sqrt_ps _mm512_and_ps _mm512_fmsub_ps);
 
 /// Of records `i`, `i + 4`, `i + 8` and `i + 12` (`i` below 4) the four floats from `from` (0 or 4) on.
 ///
@@ -350,6 +367,41 @@ impl Simd for Avx512 {
             }
         }
         records
+    }
+    #[inline(always)]
+    fn pack16(self, wanted: M16, lanes: F16, out: &mut [f32; 16]) {
+        // SAFETY: the token proves the level; sixteen floats are written to an array of sixteen.
+        unsafe { _mm512_storeu_ps(out.as_mut_ptr(), _mm512_maskz_compress_ps(wanted.0, lanes.0)) }
+    }
+    #[inline(always)]
+    fn numbers16(self, first: u32) -> F16 {
+        // SAFETY: the token proves the level.
+        unsafe {
+            let lanes = _mm512_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
+            F16(_mm512_castsi512_ps(_mm512_add_epi32(_mm512_set1_epi32(first as i32), lanes)))
+        }
+    }
+    #[inline(always)]
+    fn field16(self, words: &[u32; 16], from: u32, width: u32) -> F16 {
+        // SAFETY: the token proves the level; sixteen words are read from an array of sixteen.
+        unsafe {
+            let words = _mm512_loadu_si512(words.as_ptr().cast());
+            let shifted = _mm512_srl_epi32(words, _mm_cvtsi32_si128(from as i32));
+            F16(_mm512_cvtepi32_ps(_mm512_and_si512(shifted, _mm512_set1_epi32((1 << width) - 1))))
+        }
+    }
+    #[inline(always)]
+    fn bytes16(self, bytes: &[u8; 16]) -> F16 {
+        // SAFETY: the token proves the level; sixteen bytes are read from an array of sixteen.
+        F16(unsafe { _mm512_cvtepi32_ps(_mm512_cvtepu8_epi32(_mm_loadu_si128(bytes.as_ptr().cast()))) })
+    }
+    #[inline(always)]
+    fn powers16(self, words: &[u32; 16]) -> F16 {
+        // SAFETY: the token proves the level; sixteen words are read from an array of sixteen.
+        unsafe {
+            let exponent = _mm512_srli_epi32::<24>(_mm512_loadu_si512(words.as_ptr().cast()));
+            F16(_mm512_castsi512_ps(_mm512_slli_epi32::<23>(exponent)))
+        }
     }
     #[inline(always)]
     fn prefetch<T>(self, items: &[T], values: &[f32], second: bool, index: usize) {

@@ -1,0 +1,133 @@
+//! The build, in the bytes of the photons themselves: they are brought into the order of the leaves by selection,
+//! level by level (Bentley 1975, with leaves; the halves are chosen so that all leaves but the last are full),
+//! then each leaf is turned from rows to columns in its place, and boxes are put around them from below.
+
+use super::PhotonMap;
+use super::layout::{LEAF, Leaf, Levels, Node, WIDTH};
+use super::record::Photon;
+use super::space::Space;
+use crate::bvh::Join;
+
+/// Ranges shorter than this are not worth another core.
+const PARALLEL_MIN: usize = 8192;
+
+/// Builds over the first `count` photons of `leaves`; `nodes` holds what [`Levels`] says.
+pub(super) fn build<'m, J: Join>(
+    leaves: &'m mut [Leaf],
+    count: usize,
+    nodes: &'m mut [Node],
+    join: &J,
+) -> PhotonMap<'m> {
+    let photons: &mut [Photon] = bytemuck::cast_slice_mut(leaves);
+    let offered = count.min(photons.len());
+    let (kept, space) = admit(&mut photons[..offered]);
+    let photons = &mut photons[..kept];
+    let levels = Levels::of(kept.div_ceil(LEAF));
+    if let Some(top) = levels.count.checked_sub(1) {
+        order(photons, top, join);
+    }
+
+    let leaves = &mut leaves[..kept.div_ceil(LEAF)];
+    for (i, leaf) in leaves.iter_mut().enumerate() {
+        let rows: [Photon; LEAF] = bytemuck::cast(*leaf);
+        leaf.set(&rows[..LEAF.min(kept - i * LEAF)]);
+    }
+    let nodes = &mut nodes[..levels.nodes];
+    bound(leaves, nodes, &levels);
+    PhotonMap { leaves, nodes, levels, count: kept, refused: offered - kept, space }
+}
+
+/// Brings the photons of finite places to the front, in units of the map. How many those are.
+fn admit(photons: &mut [Photon]) -> (usize, Space) {
+    let (mut kept, mut largest) = (0, 0.0f32);
+    for i in 0..photons.len() {
+        let position = photons[i].position();
+        if position.is_finite() {
+            largest = largest.max(position.abs().max_element());
+            photons.swap(kept, i);
+            kept += 1;
+        }
+    }
+    let space = Space::of(largest);
+    for photon in &mut photons[..kept] {
+        let position = photon.position;
+        photon.position = space.enter(position);
+    }
+    (kept, space)
+}
+
+/// Orders what is under a node of `level`.
+fn order<J: Join>(photons: &mut [Photon], level: usize, join: &J) {
+    let child = LEAF * WIDTH.pow(level as u32);
+    if photons.len() > child {
+        // All children but the last are full, and the left half of them goes left.
+        let children = photons.len().div_ceil(child);
+        let middle = children.div_ceil(2) * child;
+        let axis = widest_axis(photons);
+        photons.select_nth_unstable_by(middle, |a, b| {
+            let (a, b) = (a.position, b.position);
+            a[axis].total_cmp(&b[axis])
+        });
+        let parallel = photons.len() >= PARALLEL_MIN;
+        let (left, right) = photons.split_at_mut(middle);
+        if parallel {
+            join.join(|| order(left, level, join), || order(right, level, join));
+        } else {
+            order(left, level, join);
+            order(right, level, join);
+        }
+    } else if let Some(below) = level.checked_sub(1) {
+        order(photons, below, join);
+    }
+}
+
+/// The axis along which the photons extend most.
+fn widest_axis(photons: &[Photon]) -> usize {
+    let (mut lo, mut hi) = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
+    for photon in photons {
+        let position = photon.position;
+        for axis in 0..3 {
+            lo[axis] = if position[axis] < lo[axis] { position[axis] } else { lo[axis] };
+            hi[axis] = if position[axis] > hi[axis] { position[axis] } else { hi[axis] };
+        }
+    }
+    let extent = [hi[0] - lo[0], hi[1] - lo[1], hi[2] - lo[2]];
+    if extent[0] >= extent[1].max(extent[2]) {
+        0
+    } else if extent[1] >= extent[2] {
+        1
+    } else {
+        2
+    }
+}
+
+/// Puts boxes around the leaves, and around the nodes.
+fn bound(leaves: &[Leaf], nodes: &mut [Node], levels: &Levels) {
+    for level in 0..levels.count {
+        let (below, here) = nodes.split_at_mut(levels.at(level, 0));
+        let here = &mut here[..levels.at(level + 1, 0) - levels.at(level, 0)];
+        here.fill(Node::EMPTY);
+        let mut set = |i: usize, lo: [f32; 3], hi: [f32; 3]| {
+            for axis in 0..3 {
+                here[i / WIDTH].boxes[axis][i % WIDTH] = lo[axis];
+                here[i / WIDTH].boxes[3 + axis][i % WIDTH] = hi[axis];
+            }
+        };
+        if level == 0 {
+            for (i, leaf) in leaves.iter().enumerate() {
+                let column =
+                    |axis: usize| leaf.position[axis].as_flattened().iter().filter(|x| x.is_finite());
+                let lo = [0, 1, 2].map(|axis| column(axis).fold(f32::INFINITY, |a, &b| a.min(b)));
+                let hi = [0, 1, 2].map(|axis| column(axis).fold(f32::NEG_INFINITY, |a, &b| a.max(b)));
+                set(i, lo, hi);
+            }
+        } else {
+            for (i, node) in below[levels.at(level - 1, 0)..].iter().enumerate() {
+                let lo = [0, 1, 2].map(|axis| node.boxes[axis].iter().fold(f32::INFINITY, |a, &b| a.min(b)));
+                let hi =
+                    [3, 4, 5].map(|row| node.boxes[row].iter().fold(f32::NEG_INFINITY, |a, &b| a.max(b)));
+                set(i, lo, hi);
+            }
+        }
+    }
+}

@@ -1,0 +1,125 @@
+//! The photon map (Jensen 1996): photons on surfaces, sorted so that those near a place are found quickly, and the
+//! density estimate over them. Built in the bytes of the photons; with its tree it takes less than 24 of them for
+//! each photon.
+//!
+//! Searches are exact: they find what brute force finds, by the same distances to the bit, and of photons at the
+//! same distance those with the lower index. An index is a photon's place in the map, which is the same for the
+//! same photons in the same order, on any number of threads and at any level.
+
+pub mod brute;
+mod build;
+mod layout;
+mod nearest;
+mod range;
+mod record;
+mod space;
+
+pub use nearest::Neighbours;
+pub use record::Photon;
+
+use crate::Level;
+use crate::bvh::{Join, Serial};
+use crate::memory::{Arena, Footprint, OutOfMemory};
+use glam::Vec3;
+use layout::{LEAF, Leaf, Levels, Node};
+use space::Space;
+
+/// Most photons of a map: what an index can name.
+pub const PHOTONS_MAX: usize = u32::MAX as usize;
+
+/// Memory for photons and for the map over them: filled first, then built.
+pub struct Photons<'m> {
+    leaves: &'m mut [Leaf],
+    nodes: &'m mut [Node],
+    capacity: usize,
+}
+
+impl<'m> Photons<'m> {
+    /// Bytes for `capacity` photons, and for the map over them.
+    pub fn footprint(capacity: usize) -> Footprint {
+        let leaves = capacity.div_ceil(LEAF);
+        Footprint::default().slice::<Leaf>(leaves).slice::<Node>(Levels::of(leaves).nodes)
+    }
+
+    /// Memory for `capacity` photons, at most [`PHOTONS_MAX`].
+    ///
+    /// # Errors
+    /// [`OutOfMemory`] when the arena is smaller than [`Photons::footprint`].
+    pub fn new(capacity: usize, arena: &mut Arena<'m>) -> Result<Self, OutOfMemory> {
+        let capacity = capacity.min(PHOTONS_MAX);
+        let leaves = capacity.div_ceil(LEAF);
+        Ok(Self { leaves: arena.slice(leaves)?, nodes: arena.slice(Levels::of(leaves).nodes)?, capacity })
+    }
+
+    /// Where the photons go.
+    pub fn as_mut_slice(&mut self) -> &mut [Photon] {
+        let all: &mut [Photon] = bytemuck::cast_slice_mut(self.leaves);
+        all.get_mut(..self.capacity).unwrap_or_default()
+    }
+
+    /// Builds the map over the first `count` photons, on one core.
+    pub fn build(self, count: usize) -> PhotonMap<'m> {
+        self.build_with(count, &Serial)
+    }
+
+    /// Builds it on the cores that `join` brings. The same map, to the bit.
+    pub fn build_with<J: Join>(self, count: usize, join: &J) -> PhotonMap<'m> {
+        build::build(self.leaves, count.min(self.capacity), self.nodes, join)
+    }
+}
+
+/// Photons that can be searched.
+#[derive(Clone, Copy, Debug)]
+pub struct PhotonMap<'m> {
+    leaves: &'m [Leaf],
+    nodes: &'m [Node],
+    levels: Levels,
+    count: usize,
+    refused: usize,
+    space: Space,
+}
+
+impl PhotonMap<'_> {
+    /// How many photons there are.
+    pub fn len(&self) -> usize {
+        self.count
+    }
+
+    /// Whether there is none.
+    pub fn is_empty(&self) -> bool {
+        self.count == 0
+    }
+
+    /// How many were left out because their place is not finite.
+    pub fn refused(&self) -> usize {
+        self.refused
+    }
+
+    /// A photon by its index.
+    pub fn get(&self, index: u32) -> Option<Photon> {
+        let index = index as usize;
+        let leaf = self.leaves.get(index / LEAF).filter(|_| index < self.count)?;
+        let photon = leaf.photon(index % LEAF);
+        Some(Photon { position: self.space.leave(photon.position), ..photon })
+    }
+
+    /// Finds the nearest photons of `place` within `radius`, as many as `neighbours` was made for. Infinity is a
+    /// radius; nothing is found within a negative one or one that is NaN, or from a place that is.
+    pub fn nearest(&self, level: Level, place: Vec3, radius: f32, neighbours: &mut Neighbours) {
+        let place = self.space.enter(place.to_array());
+        // Nothing is at a negative squared distance.
+        let squared_radius = self.space.squared(radius).unwrap_or(-1.0);
+        level.dispatch(nearest::Search { map: self, place, squared_radius, neighbours });
+    }
+
+    /// Finds all photons within `radius` of `place`: how many they are, and in `found` their indices in rising
+    /// order, as many as there is room for; what is in the rest of it is unspecified.
+    pub fn within(&self, level: Level, place: Vec3, radius: f32, found: &mut [u32]) -> usize {
+        let place = self.space.enter(place.to_array());
+        let Some(squared_radius) = self.space.squared(radius) else { return 0 };
+        level.dispatch(range::Range { map: self, place, squared_radius, found })
+    }
+}
+
+#[cfg(test)]
+mod tests;

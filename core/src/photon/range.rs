@@ -1,0 +1,89 @@
+//! All leaves within a radius, one after the other in the order of the map: what range queries and gathering have
+//! in common.
+
+use super::PhotonMap;
+use super::layout::{HALVES, LEAF, LEVELS, WIDTH};
+use halflight_simd::kernels::points::Place16;
+use halflight_simd::{Kernel, Lanes, Mask, Simd};
+
+/// Calls `visit` with the index of every leaf that has a box within the squared radius (below infinity) of a place.
+#[inline(always)]
+pub(super) fn leaves_within<S: Simd>(
+    simd: S,
+    map: &PhotonMap,
+    place: &Place16<S>,
+    squared_radius: f32,
+    mut visit: impl FnMut(usize),
+) {
+    let Some(top) = map.levels.count.checked_sub(1) else { return };
+    let limit = simd.splat16(squared_radius);
+    // Of each node on the way down: its index on its level, and the set of its children that are left.
+    let mut path = [(0, 0u32); LEVELS];
+    let (mut level, mut index) = (top, 0);
+    loop {
+        let Some(node) = map.nodes.get(map.levels.at(level, index)) else { return };
+        let mut left = place.squared_distances_to_boxes(simd, &node.boxes).le(limit).bits();
+        if level == 0 {
+            while left != 0 {
+                visit(WIDTH * index + left.trailing_zeros() as usize);
+                left &= left - 1;
+            }
+        }
+        while left == 0 {
+            level += 1;
+            if level > top || level >= LEVELS {
+                return;
+            }
+            (index, left) = path[level];
+        }
+        path[level] = (index, left & (left - 1));
+        index = WIDTH * index + left.trailing_zeros() as usize;
+        level -= 1;
+    }
+}
+
+/// All photons within a squared radius of a place in units of the map: their indices, in rising order, to `found`
+/// as far as there is room, and how many there are.
+pub(super) struct Range<'a, 'm> {
+    pub map: &'a PhotonMap<'m>,
+    pub place: [f32; 3],
+    pub squared_radius: f32,
+    pub found: &'a mut [u32],
+}
+
+impl Kernel for Range<'_, '_> {
+    type Out = usize;
+
+    #[inline(always)]
+    fn run<S: Simd>(self, simd: S) -> usize {
+        let Self { map, squared_radius, found, .. } = self;
+        let place = Place16::new(simd, self.place);
+        let limit = simd.splat16(squared_radius);
+        let found: &mut [f32] = bytemuck::cast_slice_mut(found);
+        let mut count = 0;
+        leaves_within(simd, map, &place, squared_radius, |index| {
+            let Some(leaf) = map.leaves.get(index) else { return };
+            for half in 0..HALVES {
+                let near = place.squared_distances(simd, leaf.half(half)).le(limit);
+                let numbers = simd.numbers16((LEAF * index + 16 * half) as u32);
+                put(simd, near, numbers, found, count);
+                count += near.bits().count_ones() as usize;
+            }
+        });
+        count
+    }
+}
+
+/// Packs the numbers `wanted` to `found[at..]`, as many as there is room for.
+#[inline(always)]
+fn put<S: Simd>(simd: S, wanted: <S::F16 as Lanes>::Mask, numbers: S::F16, found: &mut [f32], at: usize) {
+    let Some(rest) = found.get_mut(at..) else { return };
+    if let Some(out) = rest.first_chunk_mut() {
+        simd.pack16(wanted, numbers, out);
+    } else {
+        let mut out = [0.0; 16];
+        simd.pack16(wanted, numbers, &mut out);
+        let room = rest.len().min(wanted.bits().count_ones() as usize);
+        rest[..room].copy_from_slice(&out[..room]);
+    }
+}

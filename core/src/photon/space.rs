@@ -1,0 +1,49 @@
+//! The units of a map: coordinates are scaled by a power of two, which is exact, so that the largest is about
+//! 2^40. Squares of distances then neither overflow nor vanish, whatever the units of the scene: from its extent
+//! down to 1e-30 of it.
+
+/// Binary exponent of the largest coordinate of a map.
+const LARGEST: i32 = 40;
+
+/// Where places asked for are held: four million times the extent of the map, beyond which all photons are equally
+/// far in f32 anyway.
+const EDGE: f32 = (1u64 << 62) as f32;
+
+/// From the units of the scene to those of the map.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Space {
+    scale: f32,
+}
+
+impl Space {
+    /// For photons of which `largest` is the largest coordinate in magnitude.
+    pub(super) fn of(largest: f32) -> Self {
+        let exponent = (largest.to_bits() >> 23) as i32 - 127;
+        let scale = (LARGEST - exponent).clamp(-126, 127);
+        Self { scale: if largest > 0.0 { f32::from_bits(((scale + 127) as u32) << 23) } else { 1.0 } }
+    }
+
+    /// A place in units of the map.
+    #[inline(always)]
+    pub(super) fn enter(self, place: [f32; 3]) -> [f32; 3] {
+        place.map(|coordinate| (coordinate * self.scale).clamp(-EDGE, EDGE))
+    }
+
+    /// The square of a radius in units of the map, below infinity; `None` where it is negative or NaN.
+    #[inline(always)]
+    pub(super) fn squared(self, radius: f32) -> Option<f32> {
+        let radius = radius * self.scale;
+        (radius >= 0.0).then(|| (radius * radius).min(f32::MAX))
+    }
+
+    /// A place in units of the scene.
+    pub(super) fn leave(self, place: [f32; 3]) -> [f32; 3] {
+        place.map(|coordinate| coordinate / self.scale)
+    }
+
+    /// A squared distance in units of the scene; infinite or zero where those cannot hold it.
+    #[inline(always)]
+    pub(super) fn leave_squared(self, distance: f32) -> f32 {
+        distance / self.scale / self.scale
+    }
+}

@@ -1,0 +1,207 @@
+//! Searches against brute force, on point sets that are known to break trees; and the memory they take.
+
+use super::*;
+use crate::Rgb;
+use crate::memory::Line;
+use std::vec;
+use std::vec::Vec;
+
+/// A source of numbers that needs nothing.
+pub(super) struct Random(pub u64);
+
+impl Random {
+    pub(super) fn bits(&mut self) -> u32 {
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (self.0 >> 33) as u32 ^ (self.0 >> 48) as u32
+    }
+
+    pub(super) fn unit(&mut self) -> f32 {
+        (self.bits() >> 7) as f32 / (1 << 24) as f32
+    }
+
+    pub(super) fn point(&mut self) -> Vec3 {
+        Vec3::new(self.unit(), self.unit(), self.unit())
+    }
+}
+
+pub(super) fn lines(footprint: Footprint) -> Vec<Line> {
+    vec![Line([0; 64]); footprint.bytes() / size_of::<Line>()]
+}
+
+/// Builds over photons at `places` and checks the map.
+pub(super) fn with_map(places: &[Vec3], check: impl FnOnce(&PhotonMap)) {
+    let mut memory = lines(Photons::footprint(places.len()));
+    let mut arena = Arena::new(bytemuck::cast_slice_mut(&mut memory));
+    let mut photons = Photons::new(places.len(), &mut arena).unwrap();
+    for (photon, &place) in photons.as_mut_slice().iter_mut().zip(places) {
+        *photon = Photon::new(place, Vec3::Z, Vec3::Z, Rgb::ONE);
+    }
+    check(&photons.build(places.len()));
+}
+
+/// What the nearest should be: bits of squared distances in units of the map, and indices, sorted.
+fn expected(map: &PhotonMap, place: Vec3, radius: f32, k: usize) -> Vec<(u32, u32)> {
+    let mut all: Vec<_> = brute::within(map, place, radius).map(|(i, d)| (d.to_bits(), i)).collect();
+    all.sort_unstable();
+    all.truncate(k);
+    all
+}
+
+fn check_searches(map: &PhotonMap, place: Vec3, radius: f32) {
+    for level in Level::detect().and_below() {
+        for k in [0, 1, 8, 50, 200] {
+            let mut memory = lines(Neighbours::footprint(k));
+            let mut arena = Arena::new(bytemuck::cast_slice_mut(&mut memory));
+            let mut neighbours = Neighbours::new(k, &mut arena).unwrap();
+            map.nearest(level, place, radius, &mut neighbours);
+            let expected = expected(map, place, radius, k);
+            let mut found: Vec<_> = neighbours.iter().map(|(i, _)| i).collect();
+            found.sort_unstable();
+            let mut indices: Vec<_> = expected.iter().map(|&(_, i)| i).collect();
+            indices.sort_unstable();
+            assert_eq!(found, indices, "{level:?} k {k} of {} at {place} within {radius}", map.len());
+            let last =
+                if k > 0 && expected.len() == k { f32::from_bits(expected[k - 1].0) } else { f32::INFINITY };
+            assert_eq!(neighbours.squared_radius(), map.space.leave_squared(last));
+        }
+        let all: Vec<_> = brute::within(map, place, radius).map(|(i, _)| i).collect();
+        for room in [all.len(), 0, all.len() / 2, all.len() + 40] {
+            let mut found = vec![u32::MAX; room];
+            assert_eq!(map.within(level, place, radius, &mut found), all.len(), "{level:?}");
+            let known = room.min(all.len());
+            assert_eq!(found[..known], all[..known], "{level:?}");
+        }
+    }
+}
+
+/// Point sets of `n` points.
+fn sets(n: usize) -> Vec<(&'static str, Vec<Vec3>)> {
+    let mut random = Random(n as u64);
+    let mut set = |make: &mut dyn FnMut(usize, &mut Random) -> Vec3| -> Vec<Vec3> {
+        (0..n).map(|i| make(i, &mut random)).collect()
+    };
+    let wide = |random: &mut Random| libm::exp10f(-20.0 + 40.0 * random.unit());
+    vec![
+        ("volume", set(&mut |_, random| random.point())),
+        ("wall", set(&mut |_, random| random.point().with_y(0.5))),
+        ("line", set(&mut |_, random| Vec3::new(0.25, random.unit(), -1.0))),
+        ("one place", set(&mut |_, _| Vec3::new(0.1, 0.2, 0.3))),
+        ("grid", set(&mut |_, random| (random.point() * 4.0).floor() * 0.25)),
+        ("focus", set(&mut |i, random| random.point() * if i % 3 == 0 { 1.0 } else { 1e-3 })),
+        ("spans", set(&mut |_, random| (random.point() - 0.5) * wide(random))),
+        ("far", set(&mut |_, random| random.point() + 1e5)),
+        ("large", set(&mut |_, random| random.point() * 1e38)),
+        ("small", set(&mut |_, random| random.point() * 1e-36)),
+    ]
+}
+
+#[test]
+fn searches_find_what_brute_force_finds() {
+    for n in [0, 1, 2, 31, 32, 33, 512, 513, 3000] {
+        for (name, places) in sets(n) {
+            std::println!("{name} {n}");
+            with_map(&places, |map| {
+                assert_eq!((map.len(), map.refused()), (n, 0));
+                let mut random = Random(99);
+                let extent = places.iter().fold(0.0, |most: f32, place| most.max(place.abs().max_element()));
+                for i in 0..6 {
+                    let near = places.get(random.bits() as usize % n.max(1)).copied().unwrap_or(Vec3::ONE);
+                    let place =
+                        [near, near + random.point() * (0.1 * extent), random.point() * extent][i % 3];
+                    for radius in [f32::INFINITY, 0.0, 0.1 * extent, random.unit() * extent] {
+                        check_searches(map, place, radius);
+                    }
+                }
+            });
+        }
+    }
+}
+
+#[test]
+fn what_is_not_a_number_is_refused_or_finds_nothing() {
+    let mut random = Random(3);
+    let mut places: Vec<_> = (0..200).map(|_| random.point()).collect();
+    for (i, odd) in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY].into_iter().enumerate() {
+        places[7 + 60 * i][i] = odd;
+    }
+    with_map(&places, |map| {
+        assert_eq!((map.len(), map.refused()), (197, 3));
+        check_searches(map, Vec3::splat(0.5), f32::INFINITY);
+        for place in [Vec3::NAN, Vec3::new(0.0, f32::NAN, 0.0), Vec3::INFINITY, Vec3::NEG_INFINITY] {
+            check_searches(map, place, f32::INFINITY);
+        }
+        for radius in [f32::NAN, -1.0, f32::NEG_INFINITY, -0.0, f32::MAX] {
+            check_searches(map, Vec3::splat(0.5), radius);
+        }
+        let mut found = [0; 256];
+        assert_eq!(map.within(Level::detect(), Vec3::NAN, f32::INFINITY, &mut found), 0);
+        assert_eq!(map.within(Level::detect(), Vec3::ONE, f32::INFINITY, &mut found), 197);
+    });
+    with_map(&[Vec3::NAN; 70], |map| {
+        assert!(map.is_empty() && map.refused() == 70 && map.get(0).is_none());
+        check_searches(map, Vec3::ZERO, f32::INFINITY);
+    });
+}
+
+#[test]
+fn photons_come_back_as_they_were_put() {
+    let mut random = Random(11);
+    let places: Vec<_> = (0..1000).map(|_| random.point() * 1e-3 - 5e-4).collect();
+    let mut memory = lines(Photons::footprint(1000));
+    let mut photons = Photons::new(1000, &mut Arena::new(bytemuck::cast_slice_mut(&mut memory))).unwrap();
+    let put: Vec<_> = places
+        .iter()
+        .map(|&place| Photon::new(place, random.point() - 0.5, random.point() - 0.5, random.point()))
+        .collect();
+    photons.as_mut_slice().copy_from_slice(&put);
+    let map = photons.build(1000);
+    let bytes = |photon: &Photon| bytemuck::bytes_of(photon).to_vec();
+    let mut got: Vec<_> = (0..1000).map(|i| bytes(&map.get(i).unwrap())).collect();
+    let mut put: Vec<_> = put.iter().map(bytes).collect();
+    got.sort_unstable();
+    put.sort_unstable();
+    assert_eq!(got, put);
+    assert!(map.get(1000).is_none());
+}
+
+#[test]
+fn exact_bytes_suffice_and_one_less_is_an_error() {
+    for capacity in [0, 1, 32, 33, 600, 10_000] {
+        let bytes = Photons::footprint(capacity).bytes();
+        let mut memory = lines(Photons::footprint(capacity));
+        let memory: &mut [u8] = bytemuck::cast_slice_mut(&mut memory);
+        let mut arena = Arena::new(memory);
+        let mut photons = Photons::new(capacity, &mut arena).unwrap();
+        assert_eq!((photons.as_mut_slice().len(), arena.available()), (capacity, 0));
+        if bytes > 0 {
+            assert!(Photons::new(capacity, &mut Arena::new(&mut memory[..bytes - 1])).is_err());
+        }
+    }
+    for k in [0, 1, 50] {
+        let bytes = Neighbours::footprint(k).bytes();
+        let mut memory = lines(Neighbours::footprint(k));
+        let memory: &mut [u8] = bytemuck::cast_slice_mut(&mut memory);
+        let mut arena = Arena::new(memory);
+        assert!(Neighbours::new(k, &mut arena).is_ok());
+        assert_eq!(arena.available(), 0);
+        assert!(Neighbours::new(k, &mut Arena::new(&mut memory[..bytes - 1])).is_err());
+    }
+    assert!(Photons::new(usize::MAX, &mut Arena::new(&mut [])).is_err());
+    assert!(Neighbours::new(usize::MAX, &mut Arena::new(&mut [])).is_err());
+}
+
+#[test]
+fn a_photon_takes_less_than_24_bytes_with_the_tree() {
+    for count in [100_000, 1_000_000, 10_000_000] {
+        assert!(Photons::footprint(count).bytes() < 23 * count);
+    }
+}
+
+#[test]
+fn a_million_photons_on_a_wall_or_in_one_place_are_searched_like_any_others() {
+    let mut random = Random(5);
+    let wall: Vec<_> = (0..1_000_000).map(|_| random.point().with_y(-3.0)).collect();
+    for places in [wall, vec![Vec3::new(1.0, -2.0, 3.0); 1_000_000]] {
+        with_map(&places, |map| check_searches(map, places[77_777], 1e-3));
+    }
+}

@@ -1,0 +1,273 @@
+//! The smallest of a list that grows: candidates of a nearest-neighbour search.
+//!
+//! Plainly: keep the `k` smallest under a total order, by value and among equals by number. A heap would do it, a
+//! branch and some swaps for each. Instead:
+//! 1. Candidates are only appended, sixteen lanes packed at a time.
+//! 2. Now and then the list is cut back to `k` by quickselect, a register at a time: what is less than a pivot is
+//!    packed to the front in place, the rest to a spare list, of which only the part still in doubt is looked at
+//!    again.
+//!
+//! The price: twice the memory, and a limit that is late by the candidates since the last cut.
+
+use crate::lanes::{Lanes, Mask, Simd};
+
+/// Room behind the last candidate that packing sixteen lanes may overwrite.
+pub const OVERRUN: usize = 16;
+
+/// Values with their numbers (as bits of floats): the list, and a spare one of the same length.
+pub struct Candidates<'a> {
+    values: &'a mut [f32],
+    numbers: &'a mut [f32],
+    spare_values: &'a mut [f32],
+    spare_numbers: &'a mut [f32],
+    count: usize,
+}
+
+impl<'a> Candidates<'a> {
+    /// No candidates, in memory for as many as the shortest of the slices holds, less [`OVERRUN`]. What is in
+    /// them is not looked at.
+    #[inline(always)]
+    pub fn new(values: [&'a mut [f32]; 2], numbers: [&'a mut [f32]; 2]) -> Self {
+        let ([values, spare_values], [numbers, spare_numbers]) = (values, numbers);
+        Self { values, numbers, spare_values, spare_numbers, count: 0 }
+    }
+
+    /// How many there are.
+    #[inline(always)]
+    pub fn count(&self) -> usize {
+        self.count
+    }
+
+    /// Appends the lanes `wanted`. They are lost where there is no room for sixteen.
+    #[inline(always)]
+    pub fn push16<S: Simd>(
+        &mut self,
+        simd: S,
+        wanted: <S::F16 as Lanes>::Mask,
+        values: S::F16,
+        numbers: S::F16,
+    ) {
+        let Some(out) = chunk(self.values, self.count) else { return };
+        simd.pack16(wanted, values, out);
+        let Some(out) = chunk(self.numbers, self.count) else { return };
+        simd.pack16(wanted, numbers, out);
+        self.count += wanted.bits().count_ones() as usize;
+    }
+
+    /// Cuts back to the `k` smallest, in no order. Gives the largest of them, or infinity where there are fewer
+    /// than `k`.
+    #[inline(always)]
+    pub fn keep_smallest<S: Simd>(&mut self, simd: S, k: usize) -> f32 {
+        if self.count < k || k == 0 {
+            self.count = self.count.min(k);
+            return f32::INFINITY;
+        }
+        // Of the list, `kept` are among the smallest for certain, and those up to `end` may be.
+        let (mut kept, mut end, mut seed) = (0, self.count, self.count as u32);
+        let last = loop {
+            if kept + 1 >= k || end <= k {
+                break self.rest(simd, kept, end, k);
+            }
+            let pivot = self.pivot(kept, end, &mut seed);
+            let less = self.part(simd, kept, end, |values| values.lt(simd.splat16(pivot)));
+            if kept + less >= k {
+                end = kept + less;
+                continue;
+            }
+            self.unspare(simd, kept + less, end);
+            kept += less;
+            if less == 0 {
+                // Nothing is less than the pivot: those equal to it come first.
+                let equal = self.part(simd, kept, end, |values| values.le(simd.splat16(pivot)));
+                if kept + equal >= k {
+                    self.lowest_numbers(kept, kept + equal, k);
+                    break pivot;
+                }
+                self.unspare(simd, kept + equal, end);
+                kept += equal;
+            }
+        };
+        self.count = k;
+        last
+    }
+
+    /// The candidates, as values and the bits of numbers.
+    #[inline(always)]
+    pub fn get(&self) -> (&[f32], &[f32]) {
+        (self.values.get(..self.count).unwrap_or(&[]), self.numbers.get(..self.count).unwrap_or(&[]))
+    }
+
+    /// The end of the selection: either all up to `end` are among the `k` smallest, or one is still wanted.
+    #[inline(always)]
+    fn rest<S: Simd>(&mut self, simd: S, kept: usize, end: usize, k: usize) -> f32 {
+        if end <= k {
+            return self.extreme(simd, 0, end, f32::NEG_INFINITY, |a, b| a.max(b)).largest();
+        }
+        let least = self.extreme(simd, kept, end, f32::INFINITY, |a, b| a.min(b)).smallest();
+        let equal = self.part(simd, kept, end, |values| values.le(simd.splat16(least)));
+        self.lowest_numbers(kept, kept + equal, k);
+        least
+    }
+
+    /// Lane by lane the extreme of the values from `start` to `end`.
+    #[inline(always)]
+    fn extreme<S: Simd>(
+        &self,
+        simd: S,
+        start: usize,
+        end: usize,
+        none: f32,
+        of: impl Fn(S::F16, S::F16) -> S::F16,
+    ) -> S::F16 {
+        let none = simd.splat16(none);
+        let mut extreme = none;
+        for at in (start..end).step_by(16) {
+            let Some(values) = self.values.get(at..).and_then(|rest| rest.first_chunk()) else { break };
+            extreme = of(extreme, simd.load16(values).select(first(simd, end - at), none));
+        }
+        extreme
+    }
+
+    /// The middle one of three values from anywhere between `start` and `end`.
+    #[inline(always)]
+    fn pivot(&self, start: usize, end: usize, seed: &mut u32) -> f32 {
+        let mut any = || {
+            *seed = seed.wrapping_mul(747_796_405).wrapping_add(2_891_336_453);
+            let at = start + ((u64::from(*seed) * (end - start) as u64) >> 32) as usize;
+            self.values.get(at).copied().unwrap_or(0.0)
+        };
+        let [a, b, c] = [any(), any(), any()];
+        a.min(b).max(a.max(b).min(c))
+    }
+
+    /// Packs those from `start` to `end` that `goes_first` to `start`, and the rest to the spare list, at the
+    /// places that they would have behind them. How many go first.
+    #[inline(always)]
+    fn part<S: Simd>(
+        &mut self,
+        simd: S,
+        start: usize,
+        end: usize,
+        goes_first: impl Fn(S::F16) -> <S::F16 as Lanes>::Mask,
+    ) -> usize {
+        let (mut front, mut back) = (start, 0);
+        for at in (start..end).step_by(16) {
+            let (Some(values), Some(numbers)) = (chunk(self.values, at), chunk(self.numbers, at)) else {
+                break;
+            };
+            let (values, numbers) = (simd.load16(values), simd.load16(numbers));
+            let (there, goes_first) = (first(simd, end - at), goes_first(values));
+            let (before, behind) = (there & goes_first, there & !goes_first);
+            // What is written to the front has been read: the front is never ahead of `at`.
+            let (Some(v), Some(n)) = (chunk(self.values, front), chunk(self.numbers, front)) else { break };
+            simd.pack16(before, values, v);
+            simd.pack16(before, numbers, n);
+            front += before.bits().count_ones() as usize;
+            let (Some(v), Some(n)) = (chunk(self.spare_values, back), chunk(self.spare_numbers, back)) else {
+                break;
+            };
+            simd.pack16(behind, values, v);
+            simd.pack16(behind, numbers, n);
+            back += behind.bits().count_ones() as usize;
+        }
+        front - start
+    }
+
+    /// Brings the spare list back to where it goes: from `start` to `end`.
+    #[inline(always)]
+    fn unspare<S: Simd>(&mut self, _: S, start: usize, end: usize) {
+        let n = end - start;
+        let values = self.values.get_mut(start..end).zip(self.spare_values.get(..n));
+        let numbers = self.numbers.get_mut(start..end).zip(self.spare_numbers.get(..n));
+        if let (Some((values, spare_values)), Some((numbers, spare_numbers))) = (values, numbers) {
+            values.copy_from_slice(spare_values);
+            numbers.copy_from_slice(spare_numbers);
+        }
+    }
+
+    /// Of the equal values from `start` to `end`, brings those of the lowest numbers before `k`.
+    #[inline(always)]
+    fn lowest_numbers(&mut self, start: usize, end: usize, k: usize) {
+        if end > k
+            && let Some(numbers) = self.numbers.get_mut(start..end)
+        {
+            numbers.select_nth_unstable_by_key(k - start - 1, |number| number.to_bits());
+        }
+    }
+}
+
+/// Sixteen floats from `at` on.
+#[inline(always)]
+fn chunk(slice: &mut [f32], at: usize) -> Option<&mut [f32; 16]> {
+    slice.get_mut(at..).and_then(|rest| rest.first_chunk_mut())
+}
+
+/// Lanes `i < n` set.
+#[inline(always)]
+fn first<S: Simd>(simd: S, n: usize) -> <S::F16 as Lanes>::Mask {
+    simd.mask16(if n >= 16 { 0xffff } else { (1 << n) - 1 })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Kernel, Level};
+    use std::vec;
+    use std::vec::Vec;
+
+    struct Smallest<'a> {
+        values: &'a [f32],
+        k: usize,
+    }
+
+    impl Kernel for Smallest<'_> {
+        type Out = (f32, Vec<(f32, u32)>);
+
+        #[inline(always)]
+        fn run<S: Simd>(self, simd: S) -> Self::Out {
+            let room = self.values.len() + OVERRUN;
+            let [mut a, mut b, mut c, mut d] = core::array::from_fn(|_| vec![0.0; room]);
+            let mut candidates = Candidates::new([&mut a, &mut b], [&mut c, &mut d]);
+            for (i, values) in self.values.chunks(16).enumerate() {
+                let mut lanes = [0.0; 16];
+                lanes[..values.len()].copy_from_slice(values);
+                let there = simd.mask16((1u32 << values.len()) - 1);
+                // Numbers fall, so that they are in no order in which ties would come out right by chance.
+                let numbers = simd.load16(&core::array::from_fn(|lane| {
+                    f32::from_bits((self.values.len() - 16 * i).wrapping_sub(lane) as u32)
+                }));
+                candidates.push16(simd, there, simd.load16(&lanes), numbers);
+            }
+            let last = candidates.keep_smallest(simd, self.k);
+            let (values, numbers) = candidates.get();
+            (last, values.iter().zip(numbers).map(|(&value, number)| (value, number.to_bits())).collect())
+        }
+    }
+
+    #[test]
+    fn the_smallest_are_those_of_a_sort() {
+        let mut state = 7u32;
+        for round in 0..600usize {
+            let n = round % 151;
+            let kinds = [1, 3, 40, 1 << 20][round % 4];
+            let values: Vec<f32> = (0..n)
+                .map(|_| {
+                    state = state.wrapping_mul(747_796_405).wrapping_add(2_891_336_453);
+                    ((state >> 10) % kinds) as f32
+                })
+                .collect();
+            let k = (round * 7) % 67;
+            let mut sorted: Vec<_> =
+                values.iter().enumerate().map(|(i, &value)| (value, (n - i) as u32)).collect();
+            sorted.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+            sorted.truncate(k);
+            for level in Level::detect().and_below() {
+                let (last, mut found) = level.dispatch(Smallest { values: &values, k });
+                found.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+                assert_eq!(found, sorted, "{level:?} {k} of {n}");
+                let expected = if n < k || k == 0 { f32::INFINITY } else { sorted[k - 1].0 };
+                assert_eq!(last, expected, "{level:?} {k} of {n}");
+            }
+        }
+    }
+}
