@@ -39,11 +39,7 @@ impl ErrorEstimate {
         let mut sum = TileError::default();
         let (mut halves2, mut within2, mut product2, mut product4) = (0.0, 0.0, 0.0, 0.0);
         for tile in tiles {
-            sum.values += tile.values;
-            sum.plain += tile.plain;
-            sum.halves += tile.halves;
-            sum.parts += tile.parts;
-            sum.crossed += tile.crossed;
+            sum += tile;
             halves2 += tile.halves * tile.halves;
             within2 += tile.within * tile.within;
             let squared = tile.product * tile.product;

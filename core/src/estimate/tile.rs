@@ -107,6 +107,19 @@ impl TileError {
     }
 }
 
+/// Tiles whose errors hang together count as one.
+impl core::ops::AddAssign for TileError {
+    fn add_assign(&mut self, other: Self) {
+        self.values += other.values;
+        self.plain += other.plain;
+        self.halves += other.halves;
+        self.parts += other.parts;
+        self.crossed += other.crossed;
+        self.within += other.within;
+        self.product += other.product;
+    }
+}
+
 /// A₁, A₂, B₁, B₂ of a pixel.
 fn parts(pixel: &Pixel, scale: f32) -> Option<[Vec4; 4]> {
     let ([a1, a2], [b1, b2]) = (pixel.even.parts()?, pixel.odd.parts()?);

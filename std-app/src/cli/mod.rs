@@ -7,6 +7,7 @@ mod info;
 mod interrupt;
 mod ledger;
 mod merge;
+mod method;
 mod progress;
 mod race;
 mod racer;

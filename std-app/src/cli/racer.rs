@@ -1,7 +1,8 @@
 //! A method of a race, `NAME[:OPTION[=VALUE]]…` as in `path:max-depth=2:seed=7`. The options are the flags of
 //! `render` that say how a method works, without their dashes, so that a new flag is a new option at once.
 
-use super::shot::{Method, Options};
+use super::method::{self, Choice};
+use super::shot::Options;
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{CommandFactory, Parser, ValueEnum};
 
@@ -10,7 +11,7 @@ use clap::{CommandFactory, Parser, ValueEnum};
 pub(super) struct Racer {
     /// As it was written.
     pub(super) name: String,
-    pub(super) method: Method,
+    pub(super) method: Choice,
     pub(super) options: Options,
 }
 
@@ -26,18 +27,13 @@ struct Flags {
 pub(super) fn racer(text: &str) -> Result<Racer, String> {
     let mut parts = text.split(':').map(str::trim);
     let name = parts.next().unwrap_or_default();
-    let method = Method::from_str(name, false).map_err(|_| format!("the methods are {}", methods()))?;
+    let method = Choice::from_str(name, false).map_err(|_| format!("the methods are {}", method::names()))?;
     let flags: Vec<String> = parts.map(|option| format!("--{option}")).collect();
     if flags.iter().any(|flag| flag == "--") {
         return Err("no option follows the colon".into());
     }
     let options = Flags::try_parse_from(&flags).map_err(|error| explain(&error))?.options;
     Ok(Racer { name: text.trim().into(), method, options })
-}
-
-fn methods() -> String {
-    let names = Method::value_variants().iter().filter_map(ValueEnum::to_possible_value);
-    names.map(|value| value.get_name().to_owned()).collect::<Vec<_>>().join(", ")
 }
 
 fn explain(error: &clap::Error) -> String {

@@ -2,8 +2,9 @@
 
 use super::failure::Failure;
 use super::interrupt::{self, INTERRUPT};
+use super::method::{self, Choice};
 use super::progress::Teller;
-use super::shot::{self, Method, Options, Shot};
+use super::shot::{self, Options, Shot};
 use super::{say, summary, values, warn};
 use clap::{Args, ValueEnum};
 use halflight::compare::compare;
@@ -29,7 +30,7 @@ pub(super) struct Render {
     output: Vec<PathBuf>,
     /// How light is transported
     #[arg(long, default_value = "auto")]
-    method: Method,
+    method: Choice,
     #[command(flatten)]
     options: Options,
     #[command(flatten)]
@@ -168,9 +169,9 @@ impl Render {
     /// The method that the scene file asks for.
     fn check_method(&self, loaded: &LoadedScene) -> Result<(), Failure> {
         match loaded.settings.method.as_deref() {
-            Some(method) if Method::from_str(method, true).is_err() => {
+            Some(method) if Choice::from_str(method, true).is_err() => {
                 Err(Failure::new(format!("{}: there is no method `{method}`", self.scene.display()))
-                    .advice("the methods are auto and path"))
+                    .advice(format!("the methods are {}", method::names())))
             }
             _ => Ok(()),
         }

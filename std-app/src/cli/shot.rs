@@ -1,6 +1,7 @@
 //! The flags of a picture that `render` and `race` share, and the settings that follow from them.
 
 use super::failure::Failure;
+use super::method::{self, Choice};
 use super::values;
 use super::view::View;
 use clap::{Args, ValueEnum};
@@ -58,14 +59,6 @@ pub(super) struct Options {
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
-pub(super) enum Method {
-    /// What fits the scene; today, path
-    Auto,
-    /// Path tracing with next-event estimation and multiple importance sampling
-    Path,
-}
-
-#[derive(Clone, Copy, Debug, ValueEnum)]
 pub(super) enum Caustics {
     /// Where the method needs it
     Auto,
@@ -112,19 +105,19 @@ impl Shot {
     pub(super) fn settings(
         &self,
         loaded: &LoadedScene,
-        method: Method,
+        method: Choice,
         options: &Options,
         stop: Stop,
         reference: Option<Arc<Image>>,
     ) -> Result<Settings, Failure> {
-        // Both are the same for path tracing, the only method there is.
-        let (Method::Auto | Method::Path) = method;
+        // No method has a caustic map yet.
         let (None | Some(Caustics::Auto | Caustics::Off)) = options.caustics;
         let file = &loaded.settings;
         let defaults = Settings::default();
         let [width, height] = self.size.or(file.size).unwrap_or([defaults.width, defaults.height]);
         self.check_reference(reference.as_deref(), [width, height])?;
         Ok(Settings {
+            method: method.0.or(method::of_file(file)),
             width,
             height,
             seed: options.seed.or(file.seed).unwrap_or(defaults.seed),

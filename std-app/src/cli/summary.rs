@@ -5,7 +5,6 @@ use super::ledger;
 use halflight::drive::{Ending, ErrorEstimate};
 use halflight::report::Run;
 use halflight::report::words::{plural, readable_bytes, readable_seconds};
-use halflight_core::census::Census;
 use std::path::Path;
 
 /// What is said of `run`, and of its `report`.
@@ -33,7 +32,7 @@ pub(super) fn text(run: &Run, report: Option<&Path>) -> String {
         readable_seconds(run.load_seconds),
         rays as f64 / result.seconds.render.max(1e-9) * 1e-6,
         plural(result.threads as u64, "thread"),
-        Census::of(run.scene).plan().method,
+        result.method.name(),
         settings.level.name(),
     ));
     lines.push(format!(

@@ -53,6 +53,16 @@ impl Memory {
         Ok(lines)
     }
 
+    /// The same `count` times over: working memory for each thread.
+    pub(super) fn take_each(
+        &mut self,
+        structure: &'static str,
+        footprint: Footprint,
+        count: usize,
+    ) -> Result<Vec<Vec<Line>>, RenderError> {
+        (0..count).map(|_| self.take(structure, footprint)).collect()
+    }
+
     /// Says that what `structure` took is free again.
     pub(super) fn give_back(&mut self, structure: &'static str) {
         self.uses.retain(|other| other.structure != structure);

@@ -5,7 +5,8 @@ use super::canvas::{Canvas, Shard};
 use super::error::{FilmError, RenderError};
 use super::film_file::Reader;
 use super::ledger::{Place, empty_pixels};
-use super::run::image;
+use super::method::Method;
+use super::picture::image;
 use super::workers::Workers;
 use crate::save::Image;
 use halflight_core::film::Film;
@@ -52,6 +53,7 @@ pub fn merge(files: &[PathBuf]) -> Result<Merged, RenderError> {
 
     let [width, height] = first.header.size();
     let spp = first.header.spp;
+    let shares = first.header.method().is_some_and(Method::shares);
     let mut lines = Vec::new();
     let needed = Film::footprint(width, height).bytes();
     let count = needed.div_ceil(ALIGNMENT);
@@ -71,6 +73,6 @@ pub fn merge(files: &[PathBuf]) -> Result<Merged, RenderError> {
         counters: canvas.counters,
         places: canvas.ledger.places(width, height),
         empty_pixels: empty_pixels(&canvas.film, |_| true),
-        error: Workers::new(None)?.estimate(&canvas.film),
+        error: Workers::new(None)?.estimate(&canvas.film, shares),
     })
 }

@@ -6,12 +6,16 @@
 
 mod adapt;
 mod canvas;
+mod crew;
 mod error;
 mod film_file;
 mod history;
 mod ledger;
 mod memory;
 mod merge;
+mod method;
+mod picture;
+mod regions;
 mod rounds;
 mod run;
 mod turns;
@@ -25,6 +29,7 @@ pub use history::{Against, Round};
 pub use ledger::Place;
 pub use memory::MemoryUse;
 pub use merge::{Merged, merge};
+pub use method::Method;
 pub use rounds::Stop;
 pub use turns::{Turn, Turns};
 
@@ -41,6 +46,8 @@ use std::sync::Arc;
 /// How to render.
 #[derive(Clone, Debug)]
 pub struct Settings {
+    /// How to make the picture; `None`: what fits the scene.
+    pub method: Option<Method>,
     /// Pixels across.
     pub width: u32,
     /// Pixels down.
@@ -90,6 +97,7 @@ impl Checkpoint {
 impl Default for Settings {
     fn default() -> Self {
         Self {
+            method: None,
             width: 512,
             height: 512,
             seed: 0,
@@ -154,6 +162,8 @@ pub struct Reuse {
 /// A picture and all that is known of it.
 #[derive(Clone, Debug)]
 pub struct RenderResult {
+    /// How it was made.
+    pub method: Method,
     /// The picture.
     pub image: Image,
     /// Samples of each pixel; of the least sampled one where the last round was cut, in the mean where sampling is
@@ -214,5 +224,6 @@ pub fn render(
         return Err(RenderError::Shard);
     }
     let plan = Census::of(scene).plan();
-    plan.features.dispatch(run::Render { scene, settings, method: plan.method, progress, interrupt })
+    let method = settings.method.or(Method::named(plan.method)).unwrap_or(Method::Path);
+    plan.features.dispatch(run::Render { scene, settings, method, progress, interrupt })
 }

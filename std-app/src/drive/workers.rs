@@ -1,19 +1,16 @@
-//! The threads: each takes the next tile when it is done with one, and has working memory of its own.
+//! The threads: each takes the next task when it is done with one, and has working memory of its own.
 
-use super::RenderError;
-use super::canvas::Canvas;
-use core::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use super::{RenderError, regions};
+use core::sync::atomic::{AtomicUsize, Ordering};
 use halflight_core::bsdf::Features;
 use halflight_core::bvh::{Bvh, Join};
 use halflight_core::estimate::{ErrorEstimate, TileError, TileLight};
 use halflight_core::film::{Film, PIXELS_PER_TILE};
 use halflight_core::memory::{Arena, Line, OutOfMemory};
 use halflight_core::scene::Mesh;
-use halflight_core::transport::{Counters, PathTracer, Pilot, path::WAVE};
+use halflight_core::transport::{PathTracer, Pilot, path::WAVE};
 use rayon::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
-use std::sync::Mutex;
-use std::time::Instant;
 
 /// A pool of threads.
 pub(super) struct Workers {
@@ -69,6 +66,16 @@ impl Workers {
         Ok(pilot)
     }
 
+    /// Runs `work` once on every thread, each with working memory of its own.
+    pub(super) fn on_all<T: Send>(
+        &self,
+        scratch: &mut [Vec<Line>],
+        work: impl Fn(&mut Arena) -> Result<T, OutOfMemory> + Sync,
+    ) -> Result<Vec<T>, OutOfMemory> {
+        let one = |lines: &mut Vec<Line>| work(&mut Arena::new(bytemuck::cast_slice_mut(lines)));
+        self.pool.install(|| scratch.par_iter_mut().with_max_len(1).map(one).collect())
+    }
+
     /// What `look` says of each of `tasks`, in their order.
     fn each<T: Send>(
         &self,
@@ -77,120 +84,23 @@ impl Workers {
         look: impl Fn(usize, &mut Arena) -> Result<T, OutOfMemory> + Sync,
     ) -> Result<Vec<T>, OutOfMemory> {
         let next = AtomicUsize::new(0);
-        let work = |lines: &mut Vec<Line>| {
-            let mut arena = Arena::new(bytemuck::cast_slice_mut(lines));
+        let seen = self.on_all(scratch, |arena| {
             let mut seen = Vec::new();
             loop {
                 let index = next.fetch_add(1, Ordering::Relaxed);
                 let Some(&task) = tasks.get(index) else { return Ok(seen) };
-                seen.push((index, look(task, &mut arena)?));
+                seen.push((index, look(task, arena)?));
             }
-        };
-        let seen = || scratch.par_iter_mut().map(work).collect::<Result<Vec<_>, _>>();
-        let mut seen: Vec<(usize, T)> = self.pool.install(seen)?.into_iter().flatten().collect();
+        });
+        let mut seen: Vec<(usize, T)> = seen?.into_iter().flatten().collect();
         seen.sort_by_key(|(index, _)| *index);
         Ok(seen.into_iter().map(|(_, value)| value).collect())
     }
 
     /// The error of `film`; `None` for fewer than four samples as well.
-    pub(super) fn estimate(&self, film: &Film) -> Option<ErrorEstimate> {
-        ErrorEstimate::of(self.errors(film)?.into_iter())
+    pub(super) fn estimate(&self, film: &Film, shares: bool) -> Option<ErrorEstimate> {
+        regions::estimate(&self.errors(film)?, film.width(), shares)
     }
-
-    /// One round: every tile of `canvas` is brought to its target, unless the round is cut.
-    pub(super) fn run<F: Features>(
-        &self,
-        tracer: &PathTracer<F>,
-        round: &Round,
-        canvas: &mut Canvas,
-        scratch: &mut [Vec<Line>],
-    ) -> Result<(), OutOfMemory> {
-        let shard = canvas.shard;
-        let tiles = canvas.film.pixels_mut().chunks_mut(PIXELS_PER_TILE).zip(&mut canvas.taken).enumerate();
-        let tiles = tiles.zip(&round.targets).map(|((task, tile), target)| (task, tile, *target));
-        let open = tiles.filter(|(task, (_, taken), target)| shard.owns(*task) && **taken < *target);
-        let queue = Mutex::new(scattered(open.collect()));
-        let done = Mutex::new(Ok((&mut canvas.counters, &mut canvas.ledger)));
-        self.pool.scope(|scope| {
-            for lines in scratch {
-                scope.spawn(|_| {
-                    let mut arena = Arena::new(bytemuck::cast_slice_mut(lines));
-                    let mut counters = Counters::default();
-                    let mut dropped = Vec::new();
-                    let mut result = Ok(());
-                    'tiles: while let Some((task, (pixels, taken), target)) = next(&queue) {
-                        while *taken < target {
-                            if round.is_over() {
-                                break 'tiles;
-                            }
-                            let end = taken.saturating_add(round.step).min(target);
-                            match tracer.run(task, *taken..end, WAVE, &mut arena, pixels) {
-                                Ok(more) => {
-                                    counters += more;
-                                    dropped.push((task, more.dropped));
-                                }
-                                Err(error) => {
-                                    result = Err(error);
-                                    break 'tiles;
-                                }
-                            }
-                            *taken = end;
-                        }
-                        dropped.retain(|(_, dropped)| dropped.total() > 0);
-                    }
-                    let mut done = done.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
-                    if let Ok((total, ledger)) = &mut *done {
-                        **total += counters;
-                        dropped.into_iter().for_each(|(task, dropped)| ledger.add(task, dropped));
-                    }
-                    if let Err(error) = result {
-                        *done = Err(error);
-                    }
-                });
-            }
-        });
-        done.into_inner().unwrap_or_else(|poisoned| poisoned.into_inner()).map(|_| ())
-    }
-}
-
-/// What one round does.
-pub(super) struct Round<'a> {
-    /// Samples that each pixel of a tile has in the end.
-    pub(super) targets: Vec<u32>,
-    /// Samples after which a thread looks at the clock, and at the flag.
-    pub(super) step: u32,
-    /// When it is cut.
-    pub(super) deadline: Option<Instant>,
-    /// Cuts it when raised.
-    pub(super) interrupt: Option<&'a AtomicBool>,
-}
-
-impl Round<'_> {
-    fn is_over(&self) -> bool {
-        self.interrupt.is_some_and(|flag| flag.load(Ordering::Relaxed))
-            || self.deadline.is_some_and(|deadline| Instant::now() >= deadline)
-    }
-}
-
-fn next<T>(queue: &Mutex<Vec<T>>) -> Option<T> {
-    queue.lock().unwrap_or_else(|poisoned| poisoned.into_inner()).pop()
-}
-
-/// The items in an order that jumps about by the golden ratio, so that tiles that a cut round has reached lie all over
-/// the picture.
-fn scattered<T>(items: Vec<T>) -> Vec<T> {
-    let count = items.len();
-    let mut step = (count as f64 * 0.618_034) as usize;
-    while step > 1 && greatest_common_divisor(step, count) > 1 {
-        step -= 1;
-    }
-    let step = step.max(1);
-    let mut items: Vec<Option<T>> = items.into_iter().map(Some).collect();
-    (0..count).filter_map(|i| items[(i as u64 * step as u64 % count as u64) as usize].take()).collect()
-}
-
-fn greatest_common_divisor(a: usize, b: usize) -> usize {
-    if b == 0 { a } else { greatest_common_divisor(b, a % b) }
 }
 
 /// Forks on the pool that runs it.
@@ -222,15 +132,6 @@ mod tests {
         let mut kept = vec![Line([0; 64]); bvh.used().bytes() / 64];
         bvh.copied(&mut Arena::new(bytemuck::cast_slice_mut(&mut kept))).unwrap();
         bytemuck::cast_slice(&kept).to_vec()
-    }
-
-    #[test]
-    fn scattering_keeps_every_item() {
-        for count in [0, 1, 2, 3, 12, 1000] {
-            let mut items = scattered((0..count).collect::<Vec<u32>>());
-            items.sort_unstable();
-            assert_eq!(items, (0..count).collect::<Vec<u32>>());
-        }
     }
 
     #[test]

@@ -3,21 +3,19 @@
 use super::{Maker, Race, Run};
 use crate::compare::Comparison;
 use crate::drive::{Against, Ending, ErrorEstimate, Place, Round, Shard};
-use halflight_core::census::Census;
 use halflight_core::film::Dropped;
 use serde_json::{Map, Value, json};
 
 /// A render.
 pub(super) fn run(run: &Run) -> Value {
     let (result, settings) = (run.result, run.settings);
-    let plan = Census::of(run.scene).plan();
     let left_out: Vec<Value> =
         run.left_out().iter().map(|(what, why)| json!({ "what": what, "why": why })).collect();
     let memory: Map<String, Value> =
         result.memory.iter().map(|part| (part.structure.into(), part.bytes.into())).collect();
     let shard = settings.shard;
     json!({
-        "method": plan.method,
+        "method": result.method.name(),
         "width": settings.width,
         "height": settings.height,
         "spp": result.spp,

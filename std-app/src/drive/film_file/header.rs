@@ -4,7 +4,7 @@ use super::identity::Identity;
 use crate::drive::canvas::{Canvas, Shard};
 use crate::drive::ledger::Ledger;
 use crate::drive::rounds::{Estimates, Rounds};
-use crate::drive::{ErrorEstimate, Round};
+use crate::drive::{ErrorEstimate, Method, Round};
 use halflight_core::film::Dropped;
 use halflight_core::transport::Counters;
 use serde::{Deserialize, Serialize};
@@ -66,6 +66,11 @@ impl Header {
     /// Pixels across and down.
     pub(in crate::drive) fn size(&self) -> [u32; 2] {
         [self.identity.width, self.identity.height]
+    }
+
+    /// `None` for one of another version.
+    pub(in crate::drive) fn method(&self) -> Option<Method> {
+        Method::named(&self.identity.method)
     }
 
     pub(in crate::drive) fn shard(&self) -> Shard {

@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 pub(in crate::drive) struct Identity {
     /// Of the program.
     version: String,
-    method: String,
+    pub(super) method: String,
     pub(super) width: u32,
     pub(super) height: u32,
     seed: u32,

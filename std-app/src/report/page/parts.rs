@@ -167,7 +167,7 @@ pub(super) fn made(maker: &Maker, run: &Run) -> String {
     let plan = Census::of(run.scene).plan();
     let depth = settings.max_depth.map_or("no limit".into(), |depth| plural(depth.into(), "segment"));
     let pairs = [
-        ("Method", format!("{}, compiled for: {}", plan.method, plan.features.name())),
+        ("Method", format!("{}, compiled for: {}", result.method.name(), plan.features.name())),
         ("Size", format!("{} × {} pixels", settings.width, settings.height)),
         ("Longest path", depth),
         ("Seed", settings.seed.to_string()),

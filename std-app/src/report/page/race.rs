@@ -8,7 +8,6 @@ use super::{escape, fill, parts, shell};
 use crate::report::race::Lead;
 use crate::report::words::{grouped, number, plural, readable_seconds};
 use crate::report::{Race, Racer};
-use halflight_core::census::Census;
 
 /// The whole page.
 pub(in crate::report) fn page(race: &Race) -> String {
@@ -135,7 +134,7 @@ fn options(race: &Race) -> String {
 fn pictures(race: &Race) -> String {
     let figure = |racer: &Racer| {
         let (picture, factor) = reduced(&racer.run.result.image);
-        let method = Census::of(racer.run.scene).plan().method;
+        let method = racer.run.result.method.name();
         format!(
             "<figure>{}<figcaption><h3>{}</h3><p>{} samples per pixel by {method}</p>{}</figcaption></figure>",
             exposable(&picture, &format!("The picture by {}", racer.name)),

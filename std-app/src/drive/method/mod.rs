@@ -1,0 +1,103 @@
+//! The methods: ways to make a picture. One file each; this one says what a method is, and sets it up.
+//!
+//! A round of a method is made of passes over its structures and of tiles of the picture, all of which the
+//! [`Crew`] runs in parallel ("The unit of work" in docs/architecture.md). To add a method: a variant of [`Method`]
+//! with its words, a file with its [`Renderer`], a line in [`Method::with`].
+
+mod path;
+
+use super::crew::Crew;
+use super::memory::Memory;
+use super::workers::Workers;
+use super::{RenderError, Reuse, Settings};
+use halflight_core::bsdf::Features;
+use halflight_core::bvh::Bvh;
+use halflight_core::light::Lights;
+use halflight_core::scene::Scene;
+
+/// A way to make a picture.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Method {
+    /// Path tracing with next-event estimation and multiple importance sampling.
+    Path,
+}
+
+impl Method {
+    /// All of them.
+    pub const ALL: [Method; 1] = [Method::Path];
+
+    /// Its name on the command line, in films and in reports.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Method::Path => "path",
+        }
+    }
+
+    /// What it does, in half a line.
+    pub const fn about(self) -> &'static str {
+        match self {
+            Method::Path => "Path tracing with next-event estimation and multiple importance sampling",
+        }
+    }
+
+    /// The method of that name.
+    pub fn named(name: &str) -> Option<Method> {
+        Method::ALL.into_iter().find(|method| method.name() == name)
+    }
+
+    /// Whether its pictures converge to another one than that of the scene: no noise of their own tells of that.
+    pub const fn is_biased(self) -> bool {
+        match self {
+            Method::Path => false,
+        }
+    }
+
+    /// Whether samples of pixels far from each other err together, through a structure that they share: their errors
+    /// are independent between even and odd samples then, not between tiles.
+    pub const fn shares(self) -> bool {
+        match self {
+            Method::Path => false,
+        }
+    }
+
+    /// Takes the memory that it needs, sets it up on `stage`, and hands it to `then`.
+    pub(super) fn with<F: Features, T>(
+        self,
+        stage: &Stage,
+        memory: &mut Memory,
+        then: impl FnOnce(&mut dyn Renderer, &mut Memory) -> Result<T, RenderError>,
+    ) -> Result<T, RenderError> {
+        match self {
+            Method::Path => then(&mut path::Paths::<F>::new(stage, memory)?, memory),
+        }
+    }
+}
+
+/// What all methods stand on.
+#[derive(Clone, Copy)]
+pub(super) struct Stage<'a> {
+    pub(super) scene: &'a Scene<'a>,
+    pub(super) bvh: &'a Bvh<'a>,
+    pub(super) lights: &'a Lights<'a>,
+    pub(super) settings: &'a Settings,
+    pub(super) workers: &'a Workers,
+}
+
+/// A method at work on one scene. Its structures are its own; the film is the crew's.
+pub(super) trait Renderer {
+    /// One round: brings the tiles of `crew` to their targets, or less where the round is cut.
+    ///
+    /// What sample `n` of a pixel sees follows from the scene, the settings, and `n`: neither from how samples are cut
+    /// into rounds, nor from threads, nor from what was rendered before a film was resumed. What samples of several
+    /// pixels share is drawn anew, or kept twice, for even and odd `n`: the halves of the film stay independent, and
+    /// their difference tells of all that is random.
+    ///
+    /// # Errors
+    /// Memory that does not suffice.
+    fn round(&mut self, crew: &mut Crew) -> Result<(), RenderError>;
+
+    /// Whether neighbouring pixels share what their paths find.
+    fn reuse(&self) -> Reuse {
+        Reuse::default()
+    }
+}

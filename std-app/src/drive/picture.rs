@@ -1,0 +1,158 @@
+//! The rounds of a picture, from the first sample to the last estimate.
+
+use super::canvas::Canvas;
+use super::crew::{self, Crew};
+use super::film_file::{self, Header, Identity, Reader};
+use super::history::{Clock, Reference, Round};
+use super::ledger::empty_pixels;
+use super::method::{Method, Renderer, Stage};
+use super::rounds::{Plan, Rounds};
+use super::{Ending, FilmError, Progress, RenderError, RenderResult, Seconds, adapt, regions};
+use crate::save::Image;
+use core::sync::atomic::{AtomicBool, Ordering};
+use core::time::Duration;
+use halflight_core::film::{Film, Pixel};
+use std::time::Instant;
+
+/// A thread looks at the clock, and at the flag, after about so many seconds.
+const STEP_SECONDS: f64 = 0.01;
+
+/// Samples of a tile that fill a wave: steps are multiples of it where time allows.
+const FULL_STEP: u32 = 8;
+
+/// A picture to be rendered.
+pub(super) struct Picture<'a> {
+    pub(super) method: Method,
+    pub(super) stage: Stage<'a>,
+    pub(super) film: Film<'a>,
+    pub(super) identity: Identity,
+    pub(super) resumed: Option<Reader>,
+    pub(super) clock: Clock,
+    pub(super) progress: &'a mut dyn FnMut(&Progress),
+    pub(super) interrupt: &'a AtomicBool,
+}
+
+impl Picture<'_> {
+    /// Renders until a stop rule holds. What was built, and the memory of it, is for the caller to tell.
+    pub(super) fn render(self, renderer: &mut dyn Renderer) -> Result<RenderResult, RenderError> {
+        let Picture { method, stage, film, identity, resumed, mut clock, progress, interrupt } = self;
+        let Stage { settings, workers, .. } = stage;
+        let (width, height) = (settings.width, settings.height);
+        let mut canvas = Canvas::new(film, settings.shard);
+        let (mut rounds, mut history) = match resumed {
+            None => (Rounds::new(settings.stop), Vec::new()),
+            Some(film) => {
+                let header = film.header.clone();
+                clock.pause(|| film.read_into(&mut canvas))?;
+                canvas.weights = header.weights(canvas.taken.len());
+                let Header { spp, rounds, seconds, estimates, .. } = header;
+                let rounds = Rounds::new(settings.stop).resumed(spp, rounds, seconds, estimates);
+                (rounds, header.history())
+            }
+        };
+        let mut reference = settings.reference.as_deref().map(Reference::new);
+        let mut latest = history.iter().rev().find_map(|round: &Round| round.error);
+        let mut estimating = 0.0;
+        let mut saved = Instant::now();
+        let save = |canvas: &Canvas, rounds: &Rounds, seconds: f64, history: &[Round]| {
+            let Some(checkpoint) = &settings.checkpoint else { return Ok::<(), FilmError>(()) };
+            let header = Header::new(identity.clone(), canvas, rounds, seconds, history);
+            film_file::write(&checkpoint.path, &header, canvas)
+        };
+
+        while let Some(plan) = rounds.next(clock.seconds(), estimating) {
+            let now = clock.seconds();
+            // Later than any clock can tell is never.
+            let later = |at: f64| Duration::try_from_secs_f64((at - now).max(0.0)).ok();
+            let deadline = plan.deadline.and_then(later).and_then(|later| Instant::now().checked_add(later));
+            let round = crew::Round {
+                targets: canvas.targets(plan.target),
+                step: step(&plan, canvas.tiles(), workers.count()),
+                deadline,
+                interrupt: (!plan.first).then_some(interrupt),
+            };
+            renderer.round(&mut Crew { workers, round: &round, canvas: &mut canvas })?;
+            rounds.completed(canvas.spp().min(plan.target), clock.seconds());
+            let mut error = None;
+            if rounds.estimate_is_due() {
+                let start = Instant::now();
+                let tiles = workers.errors(&canvas.film);
+                error = tiles.as_ref().and_then(|tiles| regions::estimate(tiles, width, method.shares()));
+                if let (true, Some(tiles)) = (settings.adaptive && rounds.spp() >= adapt::FROM, tiles) {
+                    canvas.weights = Some(adapt::weights(&tiles, &canvas.taken, width));
+                }
+                rounds.estimated(error);
+                estimating = start.elapsed().as_secs_f64();
+                latest = error;
+            }
+            let seconds = clock.seconds();
+            let against =
+                reference.as_mut().map(|r| clock.pause(|| r.compare(&image(&canvas.film), seconds)));
+            let (spp, rays) = (rounds.spp(), canvas.counters.rays + canvas.counters.shadow_rays);
+            history.push(Round { seconds, spp, rays, error, reference: against });
+            let known = Progress {
+                seconds,
+                seconds_left: rounds.seconds_left(seconds, latest),
+                spp,
+                rounds: rounds.count(),
+                error: latest,
+            };
+            clock.pause(|| progress(&known));
+            let due = |every: f64| saved.elapsed().as_secs_f64() >= every;
+            if plan.first || settings.checkpoint.as_ref().is_some_and(|checkpoint| due(checkpoint.every)) {
+                clock.pause(|| save(&canvas, &rounds, seconds, &history))?;
+                saved = Instant::now();
+            }
+            if interrupt.load(Ordering::Relaxed) && !plan.first {
+                break;
+            }
+        }
+        let interrupted = interrupt.load(Ordering::Relaxed);
+        let render = clock.seconds();
+        let error = workers.estimate(&canvas.film, method.shares());
+        if let Some(last) = history.last_mut() {
+            last.error = error;
+        }
+        save(&canvas, &rounds, render, &history)?;
+        let film = &canvas.film;
+        Ok(RenderResult {
+            method,
+            image: image(film),
+            spp: rounds.spp(),
+            rounds: rounds.count(),
+            history,
+            variance: map(film, |pixel| pixel.variance().to_array()),
+            samples: by_rows(film).map(|pixel| pixel.count()).collect(),
+            threads: workers.count(),
+            seconds: Seconds { build: 0.0, render },
+            counters: canvas.counters,
+            reuse: renderer.reuse(),
+            places: canvas.ledger.places(width, height),
+            empty_pixels: empty_pixels(film, |task| canvas.shard.owns(task)),
+            error,
+            memory: Vec::new(),
+            memory_peak: 0,
+            ending: if interrupted { Ending::Interrupted } else { Ending::Done },
+        })
+    }
+}
+
+/// Samples of a tile between two looks at the clock.
+fn step(plan: &Plan, tiles: usize, threads: usize) -> u32 {
+    let Some(each) = plan.each else { return FULL_STEP };
+    let tile = each * threads as f64 / tiles.max(1) as f64;
+    let step = (STEP_SECONDS / tile) as u32;
+    if step >= FULL_STEP { step / FULL_STEP * FULL_STEP } else { step.max(1) }
+}
+
+pub(super) fn image(film: &Film) -> Image {
+    map(film, |pixel| pixel.mean().to_array())
+}
+
+fn map(film: &Film, value: impl Fn(Pixel) -> [f32; 3]) -> Image {
+    Image { width: film.width(), height: film.height(), pixels: by_rows(film).map(value).collect() }
+}
+
+fn by_rows(film: &Film) -> impl Iterator<Item = Pixel> {
+    (0..film.height()).flat_map(move |y| (0..film.width()).map(move |x| film.pixel(x, y)))
+}

@@ -1,0 +1,57 @@
+//! Parts of a picture whose errors count as independent of each other: its tiles; larger regions where a method shares
+//! between pixels far apart. The error itself comes from independent halves whatever is shared between pixels; only how
+//! sure it is follows from the parts.
+
+use halflight_core::estimate::{ErrorEstimate, TileError};
+use halflight_core::film::TILE;
+
+/// Regions along each side of a picture, at most: enough to tell how far they differ, so large that what is shared is
+/// mostly shared within them.
+const SIDE: usize = 8;
+
+/// The error of a picture `width` pixels across from all of its tiles.
+pub(super) fn estimate(tiles: &[TileError], width: u32, shares: bool) -> Option<ErrorEstimate> {
+    if shares {
+        ErrorEstimate::of(merged(tiles, width).into_iter())
+    } else {
+        ErrorEstimate::of(tiles.iter().copied())
+    }
+}
+
+/// The sums of tiles over regions of tiles.
+fn merged(tiles: &[TileError], width: u32) -> Vec<TileError> {
+    let across = (width.div_ceil(TILE) as usize).max(1);
+    let down = tiles.len().div_ceil(across);
+    let side = across.max(down).div_ceil(SIDE).max(1);
+    let columns = across.div_ceil(side);
+    let mut regions = vec![TileError::default(); columns * down.div_ceil(side)];
+    for (task, tile) in tiles.iter().enumerate() {
+        regions[task / across / side * columns + task % across / side] += *tile;
+    }
+    regions
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use halflight_core::Rgb;
+    use halflight_core::film::{Dropped, PIXELS_PER_TILE, Pixel};
+
+    #[test]
+    fn regions_cover_the_picture_and_change_the_interval_alone() {
+        let tile = |task: u32| {
+            let mut pixel = Pixel::default();
+            for sample in 0..8u32 {
+                let light = 1.0 + (task * 31 + sample * 17) as f32 % 5.0;
+                pixel.add(sample, Rgb::splat(light), &mut Dropped::default());
+            }
+            TileError::of(&[pixel; PIXELS_PER_TILE], 3.0)
+        };
+        // 20 x 5 tiles are 7 x 2 regions of 3 x 3.
+        let tiles: Vec<_> = (0..100).map(tile).collect();
+        assert_eq!(merged(&tiles, 320).len(), 14);
+        let [alone, together] = [false, true].map(|shares| estimate(&tiles, 320, shares).unwrap());
+        assert!((alone.relmse / together.relmse - 1.0).abs() < 1e-9);
+        assert_eq!(merged(&tiles[..4], 64), &tiles[..4]);
+    }
+}
