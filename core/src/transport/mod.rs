@@ -1,9 +1,12 @@
 //! Light transport: one file per method, each readable beside its paper.
 //!
 //! [`path`] is the path tracer that renders, a wavefront over a tile; [`mod@reference`] is the same estimator as a
-//! textbook has it, one path at a time, kept to test the other against.
+//! textbook has it, one path at a time, kept to test the other against. For the irradiance cache [`overture`] finds the
+//! places where it lacks a record, and [`gather`] makes one.
 
 mod estimator;
+pub mod gather;
+pub mod overture;
 pub mod path;
 mod pilot;
 mod places;

@@ -8,6 +8,8 @@
 //! 3. Shadow rays are traced after all vertices of the wave are shaded; light is added to the path then.
 //! 4. Code for what the scene does not have is not compiled in ([`Features`]).
 //! 5. Where that pays, pixels of a group share what their paths find (`reuse.rs`).
+//! 6. Where an irradiance cache knows the indirect light of a diffuse point, the path need not find it
+//!    (`irradiance_cache.rs`).
 //!
 //! The price: about 300 bytes for each path of a wave. What a pixel sees depends on (seed, sample) and the pixels of
 //! its group only, no wave cuts a group, and samples are summed in their order: the picture has the same bits for
@@ -20,9 +22,10 @@ use super::estimator::{
 use super::places::Places;
 use super::reuse::{Exchange, GROUP};
 use super::shadow::{FEW, pass_cutout, passing, shadow_ray};
-use super::wave::{Path, Wave};
+use super::wave::{Path, Share, Wave};
 use crate::bsdf::{Bsdf, Features};
 use crate::bvh::{Bvh, Coherence};
+use crate::cache::irradiance::IrradianceCache;
 use crate::film::{Pixel, Tile};
 use crate::geometry::{Hit, Ray};
 use crate::light::{Lights, emitted};
@@ -30,6 +33,7 @@ use crate::memory::{Arena, Footprint, OutOfMemory};
 use crate::sampling::Sampler;
 use crate::scene::{Material, Scene, SurfacePoint};
 use crate::{Level, Rgb};
+use core::f32::consts::FRAC_1_PI;
 use core::marker::PhantomData;
 use core::ops::Range;
 use glam::Vec3;
@@ -48,6 +52,8 @@ pub struct PathTracer<'a, F> {
     pub(super) level: Level,
     /// Some surfaces let a part of the light through, so that a shadow ray may go on behind a hit.
     pub(super) has_cutouts: bool,
+    /// Frozen; of even and of odd samples.
+    caches: Option<[&'a IrradianceCache<'a>; 2]>,
     features: PhantomData<F>,
 }
 
@@ -62,7 +68,14 @@ impl<'a, F: Features> PathTracer<'a, F> {
         level: Level,
     ) -> Self {
         let has_cutouts = scene.materials.iter().any(Material::has_cutout);
-        Self { scene, bvh, lights, settings, level, has_cutouts, features: PhantomData }
+        Self { scene, bvh, lights, settings, level, has_cutouts, caches: None, features: PhantomData }
+    }
+
+    /// The same, where diffuse points have their indirect light from a cache as far as it reaches: even samples from the
+    /// first, odd ones from the second. Pixels must not share their paths as well. Where depth is limited only the
+    /// first point of a path is served, for records do not know how far they are from the camera.
+    pub fn with_caches(&self, caches: [&'a IrradianceCache<'a>; 2]) -> Self {
+        Self { caches: Some(caches), ..*self }
     }
 
     /// The same, where pixels share what their paths find, or do not.
@@ -122,7 +135,7 @@ impl<'a, F: Features> PathTracer<'a, F> {
 
     /// Fills the wave with camera rays; returns how many. Groups stay together.
     pub(super) fn start(&self, places: &mut Places, wave: &mut Wave) -> usize {
-        let PathSettings { width, height, seed, .. } = self.settings;
+        let PathSettings { width, seed, .. } = self.settings;
         let mut count = 0;
         while count + GROUP <= wave.paths.len()
             && let Some(group) = places.next_group()
@@ -130,10 +143,7 @@ impl<'a, F: Features> PathTracer<'a, F> {
             for (place, x, y) in places.pixels(group) {
                 let index = y * width + x;
                 let sampler = Sampler::new(seed, index, group.sample);
-                let [dx, dy] = sampler.pair(dimension::PIXEL);
-                let has_lens = self.scene.camera.lens_radius > 0.0;
-                let lens = if has_lens { sampler.pair(dimension::LENS) } else { [0.0; 2] };
-                let ray = self.scene.camera.ray(width, height, x as f32 + dx, y as f32 + dy, lens);
+                let ray = self.camera_ray([x, y], &sampler);
                 wave.rays[count] = Ray { tag: count as u32, ..ray };
                 wave.paths[count] = Path {
                     throughput: [1.0; 3],
@@ -153,42 +163,67 @@ impl<'a, F: Features> PathTracer<'a, F> {
         count
     }
 
+    /// The camera ray of a sample of the pixel in column `x` and row `y`.
+    #[inline]
+    pub(super) fn camera_ray(&self, [x, y]: [u32; 2], sampler: &Sampler) -> Ray {
+        let PathSettings { width, height, .. } = self.settings;
+        let [dx, dy] = sampler.pair(dimension::PIXEL);
+        let has_lens = self.scene.camera.lens_radius > 0.0;
+        let lens = if has_lens { sampler.pair(dimension::LENS) } else { [0.0; 2] };
+        self.scene.camera.ray(width, height, x as f32 + dx, y as f32 + dy, lens)
+    }
+
     /// Traces the first `count` rays of the wave and all that follows from them.
     pub(super) fn advance(&self, wave: &mut Wave, count: usize, counters: &mut Counters) {
         let mut active = count;
         let mut coherence = Coherence::Coherent;
         while active > 0 {
-            counters.rays += active as u64;
-            let rays = &wave.rays[..active];
-            self.bvh.nearest_batch(self.level, rays, coherence, &mut wave.hits[..active]);
+            self.trace(wave, active, coherence, counters);
+            active = self.go_on(wave, active, counters);
             coherence = Coherence::Incoherent;
+        }
+    }
 
-            let (mut going_on, mut shadows) = (0, 0);
-            for i in 0..active {
-                let (ray, hit) = (wave.rays[i], wave.hits[i]);
-                let Some(path) = wave.paths.get_mut(ray.tag as usize) else { continue };
-                let Some(exchange) = wave.exchanges.get_mut(ray.tag as usize) else { continue };
-                let step = self.shade(path, exchange, &ray, &hit, counters);
-                if let Some((mut shadow, light)) = step.light {
-                    shadow.tag = ray.tag;
-                    wave.shadow_rays[shadows] = shadow;
-                    wave.shadow_light[shadows] = light.to_array();
-                    shadows += 1;
-                }
-                if let Some(mut next) = step.next {
-                    next.tag = ray.tag;
-                    wave.rays[going_on] = next;
-                    going_on += 1;
-                }
+    /// Finds what the first `active` rays of the wave meet.
+    pub(super) fn trace(
+        &self,
+        wave: &mut Wave,
+        active: usize,
+        coherence: Coherence,
+        counters: &mut Counters,
+    ) {
+        counters.rays += active as u64;
+        let rays = &wave.rays[..active];
+        self.bvh.nearest_batch(self.level, rays, coherence, &mut wave.hits[..active]);
+    }
+
+    /// Shades what they met; returns how many rays there are now.
+    pub(super) fn go_on(&self, wave: &mut Wave, active: usize, counters: &mut Counters) -> usize {
+        let (mut going_on, mut shadows) = (0, 0);
+        for i in 0..active {
+            let (ray, hit) = (wave.rays[i], wave.hits[i]);
+            let Some(path) = wave.paths.get_mut(ray.tag as usize) else { continue };
+            let Some(exchange) = wave.exchanges.get_mut(ray.tag as usize) else { continue };
+            let step = self.shade(path, exchange, &ray, &hit, counters);
+            if let Some((mut shadow, light)) = step.light {
+                shadow.tag = ray.tag;
+                wave.shadow_rays[shadows] = shadow;
+                wave.shadow_light[shadows] = light.to_array();
+                shadows += 1;
             }
-            active = going_on;
-            if F::CUTOUT && self.has_cutouts {
-                self.connect_through_cutouts(wave, shadows, counters);
-            } else {
-                counters.shadow_rays += shadows as u64;
-                self.connect(wave, shadows);
+            if let Some(mut next) = step.next {
+                next.tag = ray.tag;
+                wave.rays[going_on] = next;
+                going_on += 1;
             }
         }
+        if F::CUTOUT && self.has_cutouts {
+            self.connect_through_cutouts(wave, shadows, counters);
+        } else {
+            counters.shadow_rays += shadows as u64;
+            self.connect(wave, shadows);
+        }
+        going_on
     }
 
     /// Adds the light at the end of the first `shadows` shadow rays to the paths of those that arrive.
@@ -260,7 +295,9 @@ impl<'a, F: Features> PathTracer<'a, F> {
         let normal = Vec3::from(path.normal);
 
         if !hit.is_some() {
-            if let Some(environment) = &scene.environment {
+            if let Some(environment) = &scene.environment
+                && path.share != Share::REFLECTED
+            {
                 let radiance = environment.radiance(scene, direction);
                 let mut weight = 1.0;
                 if path.pdf < f32::INFINITY && radiance != Rgb::ZERO {
@@ -277,7 +314,7 @@ impl<'a, F: Features> PathTracer<'a, F> {
         if hit.triangle == path.triangle {
             return path.cross(point.spawn(direction), hit, counters);
         }
-        if point.material.emits() {
+        if point.material.emits() && path.share != Share::REFLECTED {
             let radiance = emitted(scene, hit.triangle, point.uv, point.front);
             if radiance != Rgb::ZERO {
                 let mut weight = 1.0;
@@ -301,6 +338,10 @@ impl<'a, F: Features> PathTracer<'a, F> {
         }
 
         let bsdf = Bsdf::at::<F>(scene, point.material, point.uv, point.front);
+        if path.share.ends_at(&bsdf) {
+            return Step::END;
+        }
+        path.share = Share::ALL;
         let is_diffuse = matches!(bsdf, Bsdf::Diffuse(_));
         if self.settings.reuse {
             exchange.arrive(&point, is_diffuse, path);
@@ -329,6 +370,14 @@ impl<'a, F: Features> PathTracer<'a, F> {
                 let contribution = throughput * f * sample.radiance * (weight / sample.pdf);
                 Some((shadow_ray(&point, &sample), contribution))
             });
+        }
+
+        if let (Some(caches), Bsdf::Diffuse(diffuse)) = (self.caches, &bsdf)
+            && (segments == 1 || !self.is_limited())
+            && let Some(irradiance) = caches[path.sample as usize & 1].irradiance(point.position, normal)
+        {
+            path.add(throughput * diffuse.reflectance * irradiance * FRAC_1_PI);
+            path.share = Share::DIRECT;
         }
 
         let [u, v] = dimension::scattering(&sampler, segments);

@@ -1,6 +1,7 @@
 //! The working memory of a wavefront: the state of every path of the wave, and queues of rays.
 
 use super::reuse::{Exchange, GROUP, Pair};
+use crate::bsdf::Bsdf;
 use crate::geometry::{Hit, Ray};
 use crate::memory::{Arena, Footprint, OutOfMemory};
 use bytemuck::{Pod, Zeroable};
@@ -33,6 +34,27 @@ pub(super) struct Path {
     pub(super) triangle: u32,
     /// Product of the squared relative indices of refraction passed so far.
     pub(super) eta_squared: f32,
+    /// What of the light at the end of the ray belongs to the path.
+    pub(super) share: Share,
+}
+
+/// Light that comes to a diffuse point is either direct, from emitters and from what mirrors or refracts them; or it
+/// was reflected by something rough. A cache knows the second, so that a path from there is to find the first only;
+/// rays that gather for the cache the other way round.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
+#[repr(transparent)]
+pub(super) struct Share(u32);
+
+impl Share {
+    pub(super) const ALL: Share = Share(0);
+    pub(super) const DIRECT: Share = Share(1);
+    pub(super) const REFLECTED: Share = Share(2);
+
+    /// Whether what `bsdf` reflects or transmits belongs to the other share.
+    #[inline]
+    pub(super) fn ends_at(self, bsdf: &Bsdf) -> bool {
+        self != Self::ALL && bsdf.is_delta() == (self == Self::REFLECTED)
+    }
 }
 
 /// Slices for up to `capacity` paths. Rays know their path by their tag.

@@ -1,10 +1,16 @@
 //! Irradiance caching: a [`Hemisphere`] is what one place sees, [`derivatives`] what its irradiance does when the
-//! place moves or turns, and a [`Metric`] how far around it that may be relied upon.
+//! place moves or turns, and a [`Metric`] how far around it that may be relied upon. A [`Record`] keeps all this, and
+//! the [`IrradianceCache`] all records.
 
 pub mod derivatives;
 mod hemisphere;
 pub mod metric;
+mod octree;
+mod record;
+mod store;
 
 pub use derivatives::{CellFlux, Derivatives, Hessian};
 pub use hemisphere::{Hemisphere, SIDE_MAX};
 pub use metric::{Metric, Reach, reach};
+pub use record::{Record, SECTORS};
+pub use store::{GREATEST_DEVIATION, IrradianceCache};

@@ -1,0 +1,301 @@
+//! An octree over the supports of records: each is linked from the cells that its box touches, at the depth where cells
+//! are just larger than it, so that a point finds all records that reach it on one way down (Ward, Rubinstein and
+//! Clear 1988, §3, with boxes in place of spheres).
+//!
+//! Supports may shrink later, never grow: what the tree finds is then more than what reaches.
+
+use crate::geometry::Bounds;
+use crate::memory::{Arena, Footprint, OutOfMemory};
+use bytemuck::{Pod, Zeroable};
+use glam::Vec3;
+
+/// The deepest level: cells are counted in `1 << DEPTH` along a side.
+const DEPTH: u32 = 16;
+
+/// A box no larger than a cell touches this many at most.
+const CELLS: usize = 8;
+
+/// Nodes that there is memory for, for each record. Where they run out, records stay higher up: found more often than
+/// they would have to be, never less.
+const NODES_PER_RECORD: usize = 3;
+
+/// Nodes for the first few records: a record makes a whole way down.
+const FIRST_NODES: usize = 1 + CELLS * DEPTH as usize;
+
+/// Columns, rows and layers from the lowest corner of the root.
+type Cell = [u32; 3];
+
+/// Children by octant, and the first link of the list of records; 0 where there is none.
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[repr(C)]
+struct Node {
+    children: [u32; 8],
+    /// One more than the index of a link.
+    first: u32,
+}
+
+/// A record in a cell, and the next in that cell.
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[repr(C)]
+struct Link {
+    record: u32,
+    next: u32,
+}
+
+/// See the file.
+#[derive(Debug)]
+pub(super) struct Octree<'m> {
+    min: Vec3,
+    /// Length of the sides of the root.
+    size: f32,
+    nodes: &'m mut [Node],
+    used_nodes: usize,
+    links: &'m mut [Link],
+    used_links: usize,
+}
+
+impl<'m> Octree<'m> {
+    /// Bytes for `records` records.
+    pub(super) fn footprint(records: usize) -> Footprint {
+        let nodes = records.saturating_mul(NODES_PER_RECORD).saturating_add(FIRST_NODES);
+        Footprint::default().slice::<Node>(nodes).slice::<Link>(records.saturating_mul(CELLS))
+    }
+
+    /// An empty tree around `bounds`.
+    pub(super) fn new(bounds: &Bounds, records: usize, arena: &mut Arena<'m>) -> Result<Self, OutOfMemory> {
+        let nodes = arena.slice(records.saturating_mul(NODES_PER_RECORD).saturating_add(FIRST_NODES))?;
+        let links = arena.slice(records.saturating_mul(CELLS))?;
+        if let Some(root) = nodes.first_mut() {
+            *root = Node::default();
+        }
+        let size = bounds.extent().max_element();
+        Ok(Self { min: bounds.center() - 0.5 * size, size, nodes, used_nodes: 1, links, used_links: 0 })
+    }
+
+    /// The deepest cell of a point; of the nearest point of the root where that is outside.
+    #[inline]
+    fn cell(&self, point: Vec3) -> Cell {
+        let scaled = (point - self.min) * ((1u32 << DEPTH) as f32 / self.size);
+        // Floats that are negative or not a number become 0.
+        scaled.to_array().map(|x| (x as u32).min((1 << DEPTH) - 1))
+    }
+
+    /// Links `record`, whose support lies within `extent` of `center`, from all cells that it touches.
+    pub(super) fn insert(&mut self, record: u32, center: Vec3, extent: Vec3) {
+        let (low, high) = (self.cell(center - extent), self.cell(center + extent));
+        // The deepest level at which the box touches no more than two cells along each side.
+        let mut level = DEPTH;
+        let touches = |level: u32, i: usize| (high[i] >> (DEPTH - level)) - (low[i] >> (DEPTH - level));
+        while level > 0 && (0..3).any(|i| touches(level, i) > 1) {
+            level -= 1;
+        }
+        // Where nodes may run out on the way down, one link has to do: two on the same way would count twice.
+        if self.used_nodes + CELLS * level as usize > self.nodes.len() {
+            while level > 0 && (0..3).any(|i| touches(level, i) > 0) {
+                level -= 1;
+            }
+        }
+        for child in 0..CELLS as u32 {
+            let far = corner(child);
+            if (0..3).all(|i| far[i] <= touches(level, i)) {
+                let cell = [0, 1, 2].map(|i| (low[i] >> (DEPTH - level)) + far[i]);
+                self.insert_at(record, cell, level);
+            }
+        }
+    }
+
+    fn insert_at(&mut self, record: u32, cell: Cell, level: u32) {
+        let mut at = 0;
+        for depth in (0..level).rev() {
+            let Some(child) = self.nodes.get(at).and_then(|node| node.children.get(octant(cell, depth)))
+            else {
+                return;
+            };
+            let mut child = *child as usize;
+            if child == 0 {
+                let Some(node) = self.nodes.get_mut(self.used_nodes) else { break };
+                *node = Node::default();
+                child = self.used_nodes;
+                self.used_nodes += 1;
+                if let Some(slot) =
+                    self.nodes.get_mut(at).and_then(|n| n.children.get_mut(octant(cell, depth)))
+                {
+                    *slot = child as u32;
+                }
+            }
+            at = child;
+        }
+        let Some(node) = self.nodes.get_mut(at) else { return };
+        if let Some(link) = self.links.get_mut(self.used_links) {
+            *link = Link { record, next: node.first };
+            self.used_links += 1;
+            node.first = self.used_links as u32;
+        }
+    }
+
+    /// Calls `visit` with the records whose boxes the cell of `point` touches, each once, until it says no.
+    #[inline]
+    pub(super) fn at(&self, point: Vec3, mut visit: impl FnMut(u32) -> bool) {
+        let cell = self.cell(point);
+        let mut node = self.nodes.first();
+        let mut depth = DEPTH;
+        while let Some(here) = node {
+            let mut link = here.first;
+            while let Some(entry) = (link as usize).checked_sub(1).and_then(|link| self.links.get(link)) {
+                if !visit(entry.record) {
+                    return;
+                }
+                link = entry.next;
+            }
+            if depth == 0 {
+                return;
+            }
+            depth -= 1;
+            let child = here.children.get(octant(cell, depth)).copied().unwrap_or(0);
+            node = if child == 0 { None } else { self.nodes.get(child as usize) };
+        }
+    }
+
+    /// Calls `visit` with all records whose boxes touch the box around `center`, some of them several times.
+    pub(super) fn around(&self, center: Vec3, extent: f32, mut visit: impl FnMut(u32)) {
+        let (low, high) = (self.cell(center - extent), self.cell(center + extent));
+        // Nodes to visit: index, level, cell. A level leaves seven open at most.
+        let mut open = [(0u32, 0u32, [0u32; 3]); 7 * DEPTH as usize + 1];
+        let mut count = 1;
+        while count > 0 {
+            count -= 1;
+            let Some(&(index, level, cell)) = open.get(count) else { return };
+            let Some(node) = self.nodes.get(index as usize) else { continue };
+            let mut link = node.first;
+            while let Some(entry) = (link as usize).checked_sub(1).and_then(|link| self.links.get(link)) {
+                visit(entry.record);
+                link = entry.next;
+            }
+            if level == DEPTH {
+                continue;
+            }
+            let shift = DEPTH - level - 1;
+            for (i, &child) in node.children.iter().enumerate() {
+                let far = corner(i as u32);
+                let cell = [0, 1, 2].map(|i| 2 * cell[i] + far[i]);
+                let touched = (0..3).all(|i| (low[i] >> shift..=high[i] >> shift).contains(&cell[i]));
+                if child != 0
+                    && touched
+                    && let Some(slot) = open.get_mut(count)
+                {
+                    *slot = (child, level + 1, cell);
+                    count += 1;
+                }
+            }
+        }
+    }
+}
+
+/// Which child of the node `depth` levels above the deepest holds a cell.
+#[inline]
+fn octant([x, y, z]: Cell, depth: u32) -> usize {
+    ((x >> depth & 1) | (y >> depth & 1) << 1 | (z >> depth & 1) << 2) as usize
+}
+
+/// Where in its parent a child lies.
+#[inline]
+fn corner(child: u32) -> Cell {
+    [child & 1, child >> 1 & 1, child >> 2 & 1]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::memory::Line;
+    use crate::sampling::Random;
+    use std::vec;
+    use std::vec::Vec;
+
+    fn random_point(random: &Random, i: u32) -> Vec3 {
+        Vec3::new(random.single(3 * i), random.single(3 * i + 1), random.single(3 * i + 2))
+    }
+
+    /// Boxes of very different sizes, some of them partly outside.
+    fn boxes(count: u32) -> Vec<(Vec3, Vec3)> {
+        let random = Random::new(1, 2);
+        let size = |i| 0.7 * libm::powf(random.single(7_000_000 + i), 6.0);
+        let extent = |i| (0.1 + random_point(&random, 1_000_000 + i)) * size(i);
+        (0..count).map(|i| (random_point(&random, i), extent(i))).collect()
+    }
+
+    fn holds((center, extent): (Vec3, Vec3), point: Vec3) -> bool {
+        (point - center).abs().cmple(extent).all()
+    }
+
+    /// A tree that has memory for `capacity` records and gets all of `boxes`.
+    fn with_tree(boxes: &[(Vec3, Vec3)], capacity: usize, nodes: usize, check: impl Fn(&Octree)) {
+        let bounds = Bounds { min: Vec3::ZERO, max: Vec3::new(1.0, 0.9, 0.5) };
+        let mut lines = vec![Line([0xff; 64]); Octree::footprint(capacity).bytes() / 64];
+        let mut arena = Arena::new(bytemuck::cast_slice_mut(&mut lines));
+        let mut tree = Octree::new(&bounds, capacity, &mut arena).unwrap();
+        assert_eq!(arena.available(), 0);
+        let nodes = nodes.min(tree.nodes.len());
+        tree.nodes = &mut core::mem::take(&mut tree.nodes)[..nodes];
+        for (i, &(center, extent)) in boxes.iter().enumerate() {
+            tree.insert(i as u32, center, extent);
+        }
+        check(&tree);
+    }
+
+    #[test]
+    fn a_point_finds_every_box_that_holds_it_once_also_where_nodes_run_out() {
+        let boxes = boxes(400);
+        for nodes in [usize::MAX, 300, 9, 1] {
+            with_tree(&boxes, 400, nodes, |tree| {
+                let random = Random::new(3, 4);
+                for i in 0..2000 {
+                    let point = random_point(&random, i) * 1.2 - 0.1;
+                    let mut found = Vec::new();
+                    tree.at(point, |record| {
+                        found.push(record);
+                        true
+                    });
+                    let (length, mut once) = (found.len(), found.clone());
+                    once.sort_unstable();
+                    once.dedup();
+                    assert_eq!(once.len(), length);
+                    let wanted = (0..400).filter(|&i| holds(boxes[i as usize], point));
+                    assert!(wanted.into_iter().all(|i| once.contains(&i)), "{point} with {nodes} nodes");
+                }
+            });
+        }
+    }
+
+    #[test]
+    fn a_region_finds_every_box_that_touches_it() {
+        let boxes = boxes(400);
+        with_tree(&boxes, 400, usize::MAX, |tree| {
+            let random = Random::new(5, 6);
+            for i in 0..500 {
+                let (center, extent) = (random_point(&random, i), 0.2 * random.single(9_000_000 + i));
+                let mut found = vec![false; 400];
+                tree.around(center, extent, |record| found[record as usize] = true);
+                for (other, &(c, e)) in boxes.iter().enumerate() {
+                    let touches = (c - center).abs().cmple(e + extent).all();
+                    assert!(found[other] || !touches, "{other} at {center}");
+                }
+            }
+        });
+    }
+
+    #[test]
+    fn a_tree_without_records_or_extent_is_harmless() {
+        with_tree(&[], 0, usize::MAX, |tree| tree.at(Vec3::splat(0.3), |_| panic!("nothing is there")));
+        let mut lines = vec![Line([0; 64]); Octree::footprint(1).bytes() / 64];
+        let bounds = Bounds { min: Vec3::ZERO, max: Vec3::ZERO };
+        let mut tree =
+            Octree::new(&bounds, 1, &mut Arena::new(bytemuck::cast_slice_mut(&mut lines))).unwrap();
+        tree.insert(0, Vec3::ZERO, Vec3::NAN);
+        let mut found = 0;
+        tree.at(Vec3::NAN, |_| {
+            found += 1;
+            true
+        });
+        assert_eq!(found, 1);
+    }
+}

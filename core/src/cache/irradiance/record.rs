@@ -1,0 +1,241 @@
+//! One place where the indirect irradiance is known: how it changes around, and how far that may be trusted.
+//!
+//! The support of a record is an ellipsoid: the two radii R1 ≤ R2 that an error metric gives along the surface, and R1
+//! across it (Schwarzhaupt, Jensen and Jarosz 2012, §5). A fence cuts out of it what lies behind a wall.
+
+use super::{Derivatives, Reach};
+use crate::Rgb;
+use crate::geometry::Frame;
+use crate::sampling::ONE_MINUS_EPSILON;
+use bytemuck::{Pod, Zeroable};
+use glam::{Vec2, Vec3};
+
+/// Azimuths for each of which a record knows how far it is to the next wall.
+pub const SECTORS: usize = 16;
+
+/// A point lies in front of a record, and is not to use it, where it is so much below the mean of both tangent planes,
+/// in radii: light that the record sees from above may be hidden from it.
+const IN_FRONT: f32 = 0.05;
+
+/// Extrapolation stays within these factors of what was gathered.
+const LEAST_FACTOR: f32 = 0.05;
+const GREATEST_FACTOR: f32 = 20.0;
+
+/// See the file. Two cache lines.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[repr(C, align(64))]
+pub struct Record {
+    /// x_i.
+    pub position: [f32; 3],
+    /// n_i, unit: the shading normal.
+    pub normal: [f32; 3],
+    /// Unit tangent along which the radius is R1; along the normal times it it is R2.
+    pub axis: [f32; 3],
+    /// E_i in W/m², without what emitters send directly.
+    pub irradiance: [f32; 3],
+    /// ∇E_i of each channel along the two axes, in W/m² per unit of length.
+    pub gradient: [[f32; 2]; 3],
+    /// ∇_n E_i of each channel along the two axes: E changes by it times n_i × n.
+    pub rotation: [[f32; 2]; 3],
+    /// R1 ≤ R2.
+    pub radii: [f32; 2],
+    /// What the fence counts in: R2 as it was at first.
+    pub reach: f32,
+    /// Mean relative error over the support, as its metric predicts.
+    pub error: f32,
+    /// How far it is to a wall in each sector, in 255ths of `reach`; 255: as far as it reaches.
+    pub fence: [u8; SECTORS],
+}
+
+impl Record {
+    /// What `derivatives` say at `position`, whose tangent frame is `frame`, as far as `reach`. Gradients are kept so small
+    /// that no channel falls below zero within the support.
+    pub fn new(position: Vec3, frame: &Frame, derivatives: &Derivatives, reach: &Reach) -> Self {
+        let axis = reach.axis;
+        let along = |v: Vec2| Vec2::new(v.dot(axis), axis.perp_dot(v));
+        let radii = Vec2::from(reach.radii);
+        let limited = |gradient: Vec2, irradiance: f32| {
+            let gradient = gradient * reach.gradient_scale;
+            let change = (gradient * radii).length();
+            if change > irradiance { gradient * (irradiance / change) } else { gradient }
+        };
+        let irradiance = derivatives.irradiance.to_array();
+        let gradient = [0, 1, 2].map(|i| limited(along(derivatives.gradient[i]), irradiance[i]).to_array());
+        // The mean of (x² l1 + y² l2) / 2 over the ellipse.
+        let error = (radii * radii).dot(Vec2::from(reach.curvature)) / 8.0;
+        Self {
+            position: position.to_array(),
+            normal: frame.normal.to_array(),
+            axis: frame.to_world(axis.extend(0.0)).to_array(),
+            irradiance,
+            gradient,
+            rotation: derivatives.rotation.map(|rotation| along(rotation).to_array()),
+            radii: reach.radii,
+            reach: reach.radii[1],
+            error,
+            fence: [u8::MAX; SECTORS],
+        }
+    }
+
+    /// Position and gradient are given in these axes: R1, R2, normal.
+    #[inline]
+    fn local(&self, offset: Vec3) -> Vec3 {
+        let (axis, normal) = (Vec3::from(self.axis), Vec3::from(self.normal));
+        Vec3::new(offset.dot(axis), offset.dot(normal.cross(axis)), offset.dot(normal))
+    }
+
+    /// Half of the edges of the box around the support.
+    pub fn extent(&self) -> Vec3 {
+        let (axis, normal) = (Vec3::from(self.axis), Vec3::from(self.normal));
+        let [r1, r2] = self.radii;
+        let (a, b, c) = (r1 * axis, r2 * normal.cross(axis), r1 * normal);
+        let square = a * a + b * b + c * c;
+        Vec3::new(libm::sqrtf(square.x), libm::sqrtf(square.y), libm::sqrtf(square.z))
+    }
+
+    /// What this record says of E at `position` with `normal`, and its weight w_i > 0 (equations 12 to 14 of the
+    /// paper). `least_cos` is the cosine of the greatest deviation of the normal. `None` outside of the support.
+    #[inline]
+    pub fn at(&self, position: Vec3, normal: Vec3, least_cos: f32) -> Option<(Rgb, f32)> {
+        let offset = position - Vec3::from(self.position);
+        let [r1, r2] = self.radii;
+        if offset.length_squared() >= r2 * r2 {
+            return None;
+        }
+        let cos = normal.dot(Vec3::from(self.normal));
+        if cos <= least_cos {
+            return None;
+        }
+        let place = self.local(offset);
+        let scaled = place / Vec3::new(r1, r2, r1);
+        let square = scaled.length_squared();
+        // A support without extent holds nothing.
+        if square.is_nan() || square >= 1.0 {
+            return None;
+        }
+        let middle = 0.5 * (normal + Vec3::from(self.normal));
+        if offset.dot(middle) < -IN_FRONT * r1 || self.is_fenced_off(place.truncate()) {
+            return None;
+        }
+        let weight = (1.0 - libm::sqrtf(square)) * (cos - least_cos) / (1.0 - least_cos);
+        Some((self.extrapolated(place.truncate(), normal), weight))
+    }
+
+    /// E_i + ∇E_i · Δx + ∇_n E_i · (n_i × n), within limits.
+    #[inline]
+    fn extrapolated(&self, place: Vec2, normal: Vec3) -> Rgb {
+        let turned = self.local(Vec3::from(self.normal).cross(normal)).truncate();
+        let channel = |i: usize| {
+            let change = Vec2::from(self.gradient[i]).dot(place) + Vec2::from(self.rotation[i]).dot(turned);
+            let here = self.irradiance[i];
+            (here + change).max(LEAST_FACTOR * here).min(GREATEST_FACTOR * here)
+        };
+        Rgb::new(channel(0), channel(1), channel(2))
+    }
+
+    /// Whether a wall stands between the record and the point at `place` along its axes.
+    #[inline]
+    fn is_fenced_off(&self, place: Vec2) -> bool {
+        let free = self.fence.get(sector(place)).copied().unwrap_or(u8::MAX);
+        if free == u8::MAX {
+            return false;
+        }
+        let distance = self.reach * (f32::from(free) / 255.0);
+        place.length_squared() > distance * distance
+    }
+
+    /// Notes a wall at `distance` from the record, in the direction of `place` along its axes.
+    pub fn fence_off(&mut self, place: Vec2, distance: f32) {
+        let share = (distance / self.reach).clamp(0.0, 1.0);
+        if let Some(fence) = self.fence.get_mut(sector(place)) {
+            *fence = (*fence).min((share * 255.0) as u8);
+        }
+    }
+
+    /// The direction of the middle of a sector, in the world; not of unit length.
+    pub fn towards(&self, sector: f32) -> (Vec2, Vec3) {
+        // The inverse of `sector`: a walk around the diamond |x| + |y| = 1.
+        let angle = sector * (4.0 / SECTORS as f32);
+        let x = if angle < 2.0 { 1.0 - angle } else { angle - 3.0 };
+        let y = (1.0 - x.abs()).copysign(2.0 - angle);
+        let (axis, normal) = (Vec3::from(self.axis), Vec3::from(self.normal));
+        (Vec2::new(x, y), x * axis + y * normal.cross(axis))
+    }
+}
+
+/// The sector of a direction: an angle of four quadrants, linear along |x| + |y| = 1.
+#[inline]
+fn sector(place: Vec2) -> usize {
+    let x = place.x / (place.x.abs() + place.y.abs()).max(f32::MIN_POSITIVE);
+    let angle = if place.y >= 0.0 { 1.0 - x } else { 3.0 + x };
+    (angle * (0.25 * ONE_MINUS_EPSILON * SECTORS as f32)) as usize
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn record() -> Record {
+        Record {
+            normal: [0.0, 0.0, 1.0],
+            axis: [1.0, 0.0, 0.0],
+            irradiance: [2.0; 3],
+            gradient: [[0.5, -1.0]; 3],
+            rotation: [[0.0, 3.0]; 3],
+            radii: [1.0, 2.0],
+            reach: 2.0,
+            fence: [u8::MAX; SECTORS],
+            ..Record::default()
+        }
+    }
+
+    const LEAST_COS: f32 = 0.98;
+
+    #[test]
+    fn it_extrapolates_along_its_axes_and_weighs_by_the_tent() {
+        let (e, w) = record().at(Vec3::new(0.5, 0.0, 0.0), Vec3::Z, LEAST_COS).unwrap();
+        assert!((e.x - 2.25).abs() < 1e-6 && (w - 0.5).abs() < 1e-6, "{e} {w}");
+        let (e, w) = record().at(Vec3::new(0.0, 1.0, 0.0), Vec3::Z, LEAST_COS).unwrap();
+        assert!((e.x - 1.0).abs() < 1e-6 && (w - 0.5).abs() < 1e-6, "{e} {w}");
+        // Turned about x by 0.1: n_i × n = (sin, 0, 0) reversed; about y: along the second axis.
+        let normal = Vec3::new(0.1f32.sin(), 0.0, 0.1f32.cos());
+        let (e, w) = record().at(Vec3::ZERO, normal, LEAST_COS).unwrap();
+        assert!((e.x - (2.0 + 3.0 * 0.1f32.sin())).abs() < 1e-6, "{e}");
+        assert!((w - (0.1f32.cos() - LEAST_COS) / (1.0 - LEAST_COS)).abs() < 1e-4, "{w}");
+    }
+
+    #[test]
+    fn outside_of_its_support_it_says_nothing() {
+        let record = record();
+        for (x, y, z) in
+            [(1.0, 0.0, 0.0), (0.0, 2.0, 0.0), (0.0, 0.0, 1.0), (0.8, 1.3, 0.0), (0.0, 0.0, -0.2)]
+        {
+            assert!(record.at(Vec3::new(x, y, z), Vec3::Z, LEAST_COS).is_none(), "{x} {y} {z}");
+        }
+        assert!(record.at(Vec3::ZERO, Vec3::new(0.3, 0.0, 0.954), LEAST_COS).is_none());
+        assert!(record.at(Vec3::ZERO, Vec3::NEG_Z, LEAST_COS).is_none());
+        assert!(Record { radii: [0.0; 2], ..record }.at(Vec3::ZERO, Vec3::Z, LEAST_COS).is_none());
+    }
+
+    #[test]
+    fn what_it_says_stays_between_limits() {
+        let steep = Record { gradient: [[100.0, 0.0]; 3], ..record() };
+        let at = |x| steep.at(Vec3::new(x, 0.0, 0.0), Vec3::Z, LEAST_COS).unwrap().0.x;
+        assert_eq!((at(0.9), at(-0.9)), (40.0, 0.1));
+    }
+
+    #[test]
+    fn a_fence_hides_what_is_behind_it_and_nothing_else() {
+        let mut record = record();
+        for i in 0..SECTORS {
+            let (place, world) = record.towards(i as f32 + 0.5);
+            assert_eq!(sector(place), i);
+            assert!(place.extend(0.0).distance(world) < 1e-6);
+        }
+        record.fence_off(Vec2::new(0.0, 1.0), 0.5);
+        let at = |x, y| record.at(Vec3::new(x, y, 0.0), Vec3::Z, LEAST_COS).is_some();
+        assert!(at(0.01, 0.49) && !at(0.01, 0.51) && at(-0.01, 0.51) && at(0.01, -0.51) && at(0.51, 0.0));
+        let bounds = record.extent();
+        assert_eq!(bounds, Vec3::new(1.0, 2.0, 1.0));
+    }
+}

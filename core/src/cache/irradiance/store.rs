@@ -1,0 +1,244 @@
+//! The cache: records, the octree that finds them, and what they say together of the irradiance at a point.
+
+use super::octree::Octree;
+use super::record::Record;
+use crate::Rgb;
+use crate::geometry::Bounds;
+use crate::memory::{Arena, Footprint, OutOfMemory};
+use glam::Vec3;
+
+/// Normals that deviate by more than this many radians are not served: what rises over the turned horizon was not
+/// sampled (Schwarzhaupt et al. 2012, §4.3).
+pub const GREATEST_DEVIATION: f32 = 0.2;
+
+/// Records of surfaces that face the same way to within 60 degrees clamp each other.
+const ALIKE: f32 = 0.5;
+
+/// Records in the caller's memory. Frozen while pictures are made; grows by [`IrradianceCache::insert`].
+#[derive(Debug)]
+pub struct IrradianceCache<'m> {
+    records: &'m mut [Record],
+    used: usize,
+    tree: Octree<'m>,
+    least_cos: f32,
+    /// Records that there was no memory for.
+    refused: u64,
+}
+
+impl<'m> IrradianceCache<'m> {
+    /// Bytes for `capacity` records.
+    pub fn footprint(capacity: usize) -> Footprint {
+        Footprint::default().slice::<Record>(capacity).and(Octree::footprint(capacity))
+    }
+
+    /// How many records fit into `bytes`.
+    pub fn capacity_of(bytes: usize) -> usize {
+        let each = Self::footprint(1 << 20).bytes() >> 20;
+        let mut capacity = bytes / each.max(1);
+        while capacity > 0 && Self::footprint(capacity).bytes() > bytes {
+            capacity -= 1 + capacity / 64;
+        }
+        capacity
+    }
+
+    /// An empty cache of a scene within `bounds`, with memory for `capacity` records.
+    ///
+    /// # Errors
+    /// [`OutOfMemory`] where the arena has less than [`IrradianceCache::footprint`].
+    pub fn new(bounds: &Bounds, capacity: usize, arena: &mut Arena<'m>) -> Result<Self, OutOfMemory> {
+        let records = arena.slice(capacity)?;
+        let tree = Octree::new(bounds, capacity, arena)?;
+        Ok(Self { records, used: 0, tree, least_cos: libm::cosf(GREATEST_DEVIATION), refused: 0 })
+    }
+
+    /// The records, in the order in which they came.
+    pub fn records(&self) -> &[Record] {
+        self.records.get(..self.used).unwrap_or_default()
+    }
+
+    /// Whether there is no memory for another record.
+    pub fn is_full(&self) -> bool {
+        self.used == self.records.len()
+    }
+
+    /// Records that came when the cache was full, and were lost.
+    pub fn refused(&self) -> u64 {
+        self.refused
+    }
+
+    /// The indirect irradiance at `position` on a surface of unit `normal`; `None` where no record reaches.
+    ///
+    /// E = Σ w_i (E_i + ∇E_i · Δx_i + ∇_n E_i · (n_i × n)) / Σ w_i (Schwarzhaupt et al. 2012, equation 12).
+    #[inline]
+    pub fn irradiance(&self, position: Vec3, normal: Vec3) -> Option<Rgb> {
+        let (mut sum, mut weights) = (Rgb::ZERO, 0.0);
+        self.tree.at(position, |index| {
+            if let Some(record) = self.records.get(index as usize)
+                && let Some((irradiance, weight)) = record.at(position, normal, self.least_cos)
+            {
+                sum += weight * irradiance;
+                weights += weight;
+            }
+            true
+        });
+        (weights > 0.0).then(|| sum / weights)
+    }
+
+    /// Whether records of more than `least` weight together reach the point.
+    #[inline]
+    pub fn reaches(&self, position: Vec3, normal: Vec3, least: f32) -> bool {
+        let mut weights = 0.0;
+        self.tree.at(position, |index| {
+            if let Some(record) = self.records.get(index as usize)
+                && let Some((_, weight)) = record.at(position, normal, self.least_cos)
+            {
+                weights += weight;
+            }
+            weights <= least
+        });
+        weights > least
+    }
+
+    /// Adds a record, after it and its neighbours have clamped each other. Whether there was memory for it.
+    pub fn insert(&mut self, mut record: Record) -> bool {
+        if self.is_full() {
+            self.refused += 1;
+            return false;
+        }
+        self.clamp(&mut record);
+        if let Some(slot) = self.records.get_mut(self.used) {
+            *slot = record;
+        }
+        self.tree.insert(self.used as u32, Vec3::from(record.position), record.extent());
+        self.used += 1;
+        true
+    }
+
+    /// Neighbour clamping (Krivanek, Bouatouch, Pattanaik and Zara 2006, §4): what limits the radius of one record
+    /// is by the distance farther from the other, so no radius is larger than that of a neighbour and the distance
+    /// to it. Complete: all records that the new one could shrink it by, and all that it could shrink, are asked.
+    fn clamp(&mut self, new: &mut Record) {
+        let (position, normal) = (Vec3::from(new.position), Vec3::from(new.normal));
+        let records = &mut *self.records;
+        let distance_to = |other: &Record| {
+            let alike = normal.dot(Vec3::from(other.normal)) > ALIKE;
+            alike.then(|| position.distance(Vec3::from(other.position)))
+        };
+        let mut least = new.radii[0];
+        self.tree.around(position, new.radii[0], |index| {
+            if let Some(other) = records.get(index as usize)
+                && let Some(distance) = distance_to(other)
+            {
+                least = least.min(other.radii[0] + distance);
+            }
+        });
+        new.shrink(least);
+        self.tree.at(position, |index| {
+            if let Some(other) = records.get_mut(index as usize)
+                && let Some(distance) = distance_to(other)
+            {
+                other.shrink(least + distance);
+            }
+            true
+        });
+    }
+}
+
+impl Record {
+    /// Makes the support smaller in both directions, so that R1 is not above `radius`.
+    fn shrink(&mut self, radius: f32) {
+        let [r1, r2] = self.radii;
+        if radius < r1 {
+            self.radii = [radius, r2 * (radius / r1)];
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cache::irradiance::SECTORS;
+    use crate::memory::Line;
+    use crate::sampling::Random;
+    use std::vec;
+
+    const BOUNDS: Bounds = Bounds { min: Vec3::ZERO, max: Vec3::ONE };
+
+    fn with_cache<T>(capacity: usize, then: impl FnOnce(&mut IrradianceCache) -> T) -> T {
+        let mut lines = vec![Line([0xff; 64]); IrradianceCache::footprint(capacity).bytes() / 64];
+        let mut arena = Arena::new(bytemuck::cast_slice_mut(&mut lines));
+        then(&mut IrradianceCache::new(&BOUNDS, capacity, &mut arena).unwrap())
+    }
+
+    /// On the plane z = 1/2, where E = 1 + x in red, 2 in the other channels.
+    fn record(x: f32, y: f32, radius: f32) -> Record {
+        Record {
+            position: [x, y, 0.5],
+            normal: [0.0, 0.0, 1.0],
+            axis: [1.0, 0.0, 0.0],
+            irradiance: [1.0 + x, 2.0, 2.0],
+            gradient: [[1.0, 0.0], [0.0; 2], [0.0; 2]],
+            radii: [radius, 1.5 * radius],
+            reach: 1.5 * radius,
+            fence: [u8::MAX; SECTORS],
+            ..Record::default()
+        }
+    }
+
+    #[test]
+    fn the_footprint_is_exact_and_a_full_cache_says_so() {
+        for capacity in [0, 1, 100] {
+            let bytes = IrradianceCache::footprint(capacity).bytes();
+            let mut lines = vec![Line([0; 64]); bytes / 64];
+            let memory: &mut [u8] = bytemuck::cast_slice_mut(&mut lines);
+            assert!(
+                IrradianceCache::new(&BOUNDS, capacity, &mut Arena::new(&mut memory[..bytes - 1])).is_err()
+            );
+            assert!(IrradianceCache::new(&BOUNDS, capacity, &mut Arena::new(memory)).is_ok());
+            assert!(IrradianceCache::footprint(IrradianceCache::capacity_of(bytes)).bytes() <= bytes);
+            assert!(IrradianceCache::capacity_of(bytes) <= capacity);
+        }
+        with_cache(2, |cache| {
+            let inserted = [0.1, 0.2, 0.3].map(|x| cache.insert(record(x, 0.5, 0.1)));
+            assert_eq!((inserted, cache.is_full(), cache.refused()), ([true, true, false], true, 1));
+            assert_eq!(cache.records().len(), 2);
+        });
+    }
+
+    #[test]
+    fn a_plane_of_linear_irradiance_is_what_it_is_everywhere() {
+        with_cache(300, |cache| {
+            let random = Random::new(1, 1);
+            for i in 0..300 {
+                let radius = 0.1 + 0.1 * random.single(3 * i);
+                assert!(cache.insert(record(random.single(3 * i + 1), random.single(3 * i + 2), radius)));
+            }
+            for i in 0..1000 {
+                let (x, y) = (random.single(10_000 + 2 * i), random.single(10_001 + 2 * i));
+                let e = cache.irradiance(Vec3::new(x, y, 0.5), Vec3::Z).unwrap();
+                assert!(e.distance(Vec3::new(1.0 + x, 2.0, 2.0)) < 1e-5, "{x} {y}: {e}");
+                assert!(cache.reaches(Vec3::new(x, y, 0.5), Vec3::Z, 0.0));
+                assert_eq!(cache.irradiance(Vec3::new(x, y, 0.5), Vec3::NEG_Z), None);
+                assert_eq!(cache.irradiance(Vec3::new(x, y, 0.9), Vec3::Z), None);
+            }
+        });
+    }
+
+    #[test]
+    fn no_radius_is_larger_than_a_neighbours_and_the_distance_to_it() {
+        with_cache(400, |cache| {
+            let random = Random::new(2, 2);
+            for i in 0..400 {
+                let radius = 0.3 * libm::powf(random.single(3 * i), 4.0);
+                cache.insert(record(random.single(3 * i + 1), random.single(3 * i + 2), radius));
+            }
+            for a in cache.records() {
+                for b in cache.records() {
+                    let distance = Vec3::from(a.position).distance(b.position.into());
+                    assert!(a.radii[0] <= b.radii[0] + distance + 1e-6);
+                }
+                assert!((a.radii[1] / a.radii[0] - 1.5).abs() < 1e-5);
+            }
+        });
+    }
+}

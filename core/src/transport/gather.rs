@@ -1,0 +1,250 @@
+//! Final gathering for the irradiance cache: what a diffuse point sees, stratum by stratum, and the record made of it.
+//!
+//! A gather ray finds the light that what it meets reflects, by path tracing on from there; what it meets emits or
+//! mirrors is direct light, which each path of the picture finds for itself ([`Share`]). All N² rays of a point make
+//! one wave, or several; blocks of 8 × 8 strata go together, so that neighbours reach the hierarchy together.
+
+use super::estimator::{Counters, dimension};
+use super::path::{PathTracer, WAVE};
+use super::wave::{Path, Share, Wave};
+use crate::bsdf::Features;
+use crate::bvh::Coherence;
+use crate::cache::irradiance::{CellFlux, Hemisphere, Record, SECTORS, metric, reach};
+use crate::geometry::{Frame, Hit, MISS, Ray};
+use crate::memory::{Arena, Footprint, OutOfMemory};
+use crate::sampling::Sampler;
+use crate::sampling::warp::cosine_hemisphere;
+use crate::scene::SurfacePoint;
+use bytemuck::{Pod, Zeroable};
+use glam::Vec3;
+
+/// Gatherings have numbers of pixels that no picture has.
+const NO_PIXEL: u32 = 1 << 30;
+
+/// Rays along the surface for each sector of a record's fence.
+const RAYS_PER_SECTOR: usize = 2;
+
+/// By how much they rise: low enough for low walls, high enough for the surface's own roundness.
+const FENCE_SLOPE: f32 = 0.05;
+
+/// A diffuse point where the irradiance is wanted. Both normals are on the side of the viewer.
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[repr(C)]
+pub struct Place {
+    pub(super) position: [f32; 3],
+    /// Bound of the error of `position`.
+    pub(super) error: f32,
+    /// The shading normal, of which the hemisphere is gathered.
+    pub(super) normal: [f32; 3],
+    pub(super) geometric_normal: [f32; 3],
+    pub(super) triangle: u32,
+    /// How wide a pixel is here.
+    pub(super) pixel: f32,
+}
+
+impl Place {
+    /// No place.
+    pub const NONE: Place = Place {
+        position: [0.0; 3],
+        error: 0.0,
+        normal: [0.0; 3],
+        geometric_normal: [0.0; 3],
+        triangle: MISS,
+        pixel: 0.0,
+    };
+
+    /// Whether it is a place.
+    pub fn is_some(&self) -> bool {
+        self.triangle != MISS
+    }
+
+    /// The place of `point`, on which a pixel is as wide as `pixel`.
+    pub(super) fn of(point: &SurfacePoint, pixel: f32) -> Self {
+        Self {
+            position: point.position.to_array(),
+            error: point.error,
+            normal: point.frame.normal.to_array(),
+            geometric_normal: point.geometric_normal.to_array(),
+            triangle: point.triangle,
+            pixel,
+        }
+    }
+
+    /// Where it is.
+    pub fn position(&self) -> Vec3 {
+        self.position.into()
+    }
+
+    /// The shading normal.
+    pub fn normal(&self) -> Vec3 {
+        self.normal.into()
+    }
+
+    /// The width of a pixel here.
+    pub fn pixel(&self) -> f32 {
+        self.pixel
+    }
+
+    /// A ray of local `direction`, and its cosine on the triangle.
+    fn ray(&self, frame: &Frame, direction: Vec3) -> (Ray, f32) {
+        let geometric = Vec3::from(self.geometric_normal);
+        let world = frame.to_world(direction);
+        (Ray::new(self.position() + self.error * geometric, world), world.dot(geometric))
+    }
+}
+
+/// How records are made.
+#[derive(Clone, Copy)]
+pub struct Gathering<'a> {
+    /// The estimator of derivatives, for as many strata as are gathered.
+    pub flux: &'a CellFlux<'a>,
+    /// How far they are relied upon.
+    pub metric: metric::Settings,
+    /// The least radius of a record, in pixels.
+    pub least_pixels: f32,
+}
+
+impl<F: Features> PathTracer<'_, F> {
+    /// Working memory of [`PathTracer::gather`] with n × n strata.
+    pub fn gather_scratch(n: usize) -> Footprint {
+        let strata = n.saturating_mul(n);
+        let rays =
+            Footprint::default().slice::<[f32; 3]>(strata).slice::<f32>(strata).slice::<[f32; 3]>(strata);
+        Wave::footprint(strata.min(WAVE)).and(rays)
+    }
+
+    /// Gathers at `place`. `number` names the gathering: another one, other rays. `None` where what was found is not
+    /// a number; it is counted as dropped.
+    ///
+    /// # Errors
+    /// [`OutOfMemory`] where `scratch` has less than [`PathTracer::gather_scratch`].
+    pub fn gather(
+        &self,
+        place: &Place,
+        number: u32,
+        gathering: &Gathering,
+        scratch: &mut Arena,
+        counters: &mut Counters,
+    ) -> Result<Option<Record>, OutOfMemory> {
+        let n = gathering.flux.n();
+        let strata = n * n;
+        let mut arena = scratch.scratch();
+        let mut wave = Wave::new(strata.min(WAVE), &mut arena)?;
+        let radiance: &mut [[f32; 3]] = arena.slice(strata)?;
+        let inverse_distance: &mut [f32] = arena.slice(strata)?;
+        let directions: &mut [[f32; 3]] = arena.slice(strata)?;
+
+        let frame = Frame::from_normal(place.normal());
+        let mut next = 0;
+        while next < strata {
+            let count = (strata - next).min(wave.paths.len());
+            for i in 0..count {
+                let stratum = stratum(n, next + i);
+                let pixel = NO_PIXEL | number;
+                let sample = (next + i) as u32;
+                let [u, v] = Sampler::new(self.settings.seed, pixel, sample).pair(dimension::PIXEL);
+                let (row, column) = (stratum / n, stratum % n);
+                let side = n as f32;
+                let direction = cosine_hemisphere([(column as f32 + u) / side, (row as f32 + v) / side]);
+                if let Some(slot) = directions.get_mut(stratum) {
+                    *slot = direction.to_array();
+                }
+                let (mut ray, cos) = place.ray(&frame, direction);
+                if cos <= 0.0 {
+                    // Under the surface: no light comes from there.
+                    ray.t_max = -1.0;
+                }
+                wave.rays[i] = Ray { tag: i as u32, ..ray };
+                wave.paths[i] = Path {
+                    throughput: [1.0; 3],
+                    pdf: f32::INFINITY,
+                    pixel,
+                    place: stratum as u32,
+                    sample,
+                    segments: 2,
+                    triangle: place.triangle,
+                    eta_squared: 1.0,
+                    share: Share::REFLECTED,
+                    ..Path::default()
+                };
+            }
+            counters.paths += count as u64;
+            self.trace(&mut wave, count, Coherence::Coherent, counters);
+            for (path, hit) in wave.paths.iter().zip(&*wave.hits).take(count) {
+                if let Some(slot) = inverse_distance.get_mut(path.place as usize) {
+                    *slot = 1.0 / hit.t;
+                }
+            }
+            let mut active = self.go_on(&mut wave, count, counters);
+            while active > 0 {
+                self.trace(&mut wave, active, Coherence::Incoherent, counters);
+                active = self.go_on(&mut wave, active, counters);
+            }
+            for path in wave.paths.iter().take(count) {
+                if let Some(slot) = radiance.get_mut(path.place as usize) {
+                    *slot = path.radiance;
+                }
+            }
+            next += count;
+        }
+
+        let hemisphere = Hemisphere::new(n, radiance, inverse_distance, directions);
+        let derivatives = hemisphere.and_then(|h| gathering.flux.derivatives(self.level, &h));
+        let Some(derivatives) = derivatives.filter(|d| d.irradiance.is_finite()) else {
+            counters.dropped.nan += 1;
+            return Ok(None);
+        };
+        let least = gathering.least_pixels * place.pixel;
+        let reach = reach(&metric::Settings { least, ..gathering.metric }, &derivatives);
+        let mut record = Record::new(place.position(), &frame, &derivatives, &reach);
+        self.fence(&mut record, place, counters);
+        Ok(Some(record))
+    }
+
+    /// Looks for walls around a record.
+    fn fence(&self, record: &mut Record, place: &Place, counters: &mut Counters) {
+        const COUNT: usize = SECTORS * RAYS_PER_SECTOR;
+        let sector = |i: usize| (i as f32 + 0.5) / RAYS_PER_SECTOR as f32;
+        let origin = place.position() + place.error * Vec3::from(place.geometric_normal);
+        let rays: [Ray; COUNT] = core::array::from_fn(|i| {
+            let along = record.towards(sector(i)).1.normalize_or_zero();
+            Ray::segment(origin, along + FENCE_SLOPE * place.normal(), record.reach)
+        });
+        let mut hits = [Hit::NONE; COUNT];
+        counters.rays += rays.len() as u64;
+        self.bvh.nearest_batch(self.level, &rays, Coherence::Incoherent, &mut hits);
+        for (i, hit) in hits.iter().enumerate() {
+            if hit.is_some() && hit.triangle != place.triangle {
+                let (along, _) = record.towards(sector(i));
+                record.fence_off(along, hit.t);
+            }
+        }
+    }
+}
+
+/// The stratum of the `i`th ray: blocks of 8 × 8 one after the other where the side allows.
+#[inline]
+fn stratum(n: usize, i: usize) -> usize {
+    if !n.is_multiple_of(8) {
+        return i;
+    }
+    let (block, within) = (i / 64, i % 64);
+    let (row, column) = (block / (n / 8) * 8 + within / 8, block % (n / 8) * 8 + within % 8);
+    row * n + column
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::vec;
+
+    #[test]
+    fn every_stratum_has_one_ray() {
+        for n in [1, 5, 8, 16, 24] {
+            let mut seen = vec![false; n * n];
+            for i in 0..n * n {
+                assert!(!core::mem::replace(&mut seen[stratum(n, i)], true));
+            }
+        }
+    }
+}

@@ -1,0 +1,159 @@
+//! The overture of the irradiance cache: a look over the picture, from coarse to fine, for places that no record reaches
+//! yet (Krivanek, Bouatouch, Pattanaik and Zara 2006, §5).
+//!
+//! It goes over the pixels in an order in which the first n of them are spread evenly, whatever n is, in steps. A step
+//! has two passes: tasks find the diffuse points that its pixels see, directly or through mirrors and glass; then tasks
+//! gather where no record reaches, some places at a time, and each time all records are committed in their order.
+
+use super::estimator::{Counters, dimension};
+use super::gather::Place;
+use super::path::PathTracer;
+use crate::bsdf::{Bsdf, Features};
+use crate::bvh::Coherence;
+use crate::geometry::{Hit, MISS, Ray};
+use crate::sampling::Sampler;
+use crate::scene::SurfacePoint;
+use glam::Vec3;
+
+/// Pixels that a task looks through.
+pub const PIXELS: usize = 64;
+
+/// Mirrors, panes and cut-outs behind each other that it looks through.
+const MOST_BOUNCES: usize = 16;
+
+/// Where the shading normal deviates by more than this from that of the surface (a cosine), it is of details that no
+/// record could serve.
+const SMOOTH: f32 = 0.9;
+
+/// The pixels of a picture, evenly spread from the first on: every other of every `stride`th column and row last.
+#[derive(Clone, Copy, Debug)]
+pub struct Order {
+    width: u32,
+    height: u32,
+    stride: u32,
+    /// Bits of a column or row, in strides.
+    bits: u32,
+}
+
+impl Order {
+    /// Every `stride`th pixel across and down of `width` by `height`; the stride is brought up to a power of two.
+    pub fn new(width: u32, height: u32, stride: u32) -> Self {
+        let stride = stride.clamp(1, 1 << 15).next_power_of_two();
+        let longest = width.max(height).div_ceil(stride).max(1);
+        Self { width, height, stride, bits: longest.next_power_of_two().trailing_zeros() }
+    }
+
+    /// Steps of the order; some have no pixel.
+    pub fn len(&self) -> u64 {
+        1 << (2 * self.bits)
+    }
+
+    /// Never: there is always one step.
+    pub fn is_empty(&self) -> bool {
+        false
+    }
+
+    /// Column and row of step `i`, where there is such a pixel: the bits of i, dealt out from the highest of the column
+    /// and the row down.
+    pub fn pixel(&self, i: u64) -> Option<(u32, u32)> {
+        let (mut x, mut y) = (0, 0);
+        for bit in 0..self.bits {
+            x |= (i >> (2 * bit) & 1) << (self.bits - 1 - bit);
+            y |= (i >> (2 * bit + 1) & 1) << (self.bits - 1 - bit);
+        }
+        let (x, y) = (x as u32 * self.stride, y as u32 * self.stride);
+        (i < self.len() && x < self.width && y < self.height).then_some((x, y))
+    }
+}
+
+impl<F: Features> PathTracer<'_, F> {
+    /// What sample `sample` of the pixels of [`PIXELS`] steps from `first` on sees first that is diffuse; into `out`,
+    /// in their order. Places without triangle ([`Place::is_some`]) where there is no pixel or nothing diffuse.
+    pub fn places(&self, order: &Order, first: u64, sample: u32, out: &mut [Place], counters: &mut Counters) {
+        let mut rays = [Ray::segment(Vec3::ZERO, Vec3::Z, -1.0); PIXELS];
+        let mut hits = [Hit::NONE; PIXELS];
+        let (width, height) = (self.settings.width, self.settings.height);
+        for (i, ray) in rays.iter_mut().enumerate() {
+            if let Some((x, y)) = order.pixel(first + i as u64) {
+                *ray = self.camera_ray([x, y], &Sampler::new(self.settings.seed, y * width + x, sample));
+                counters.rays += 1;
+            }
+        }
+        self.bvh.nearest_batch(self.level, &rays, Coherence::Incoherent, &mut hits);
+        let pixel = 2.0 * self.scene.camera.tan_half_fov / height as f32;
+        for (i, place) in out.iter_mut().enumerate().take(PIXELS) {
+            *place = Place::NONE;
+            if let Some((x, y)) = order.pixel(first + i as u64) {
+                let sampler = Sampler::new(self.settings.seed, y * width + x, sample);
+                let found = self.first_diffuse(rays[i], hits[i], &sampler, counters);
+                *place = found.map_or(Place::NONE, |(point, distance)| Place::of(&point, pixel * distance));
+            }
+        }
+    }
+
+    /// The diffuse point that a camera ray comes to from `hit` on, and the length of its way.
+    fn first_diffuse(
+        &self,
+        mut ray: Ray,
+        mut hit: Hit,
+        sampler: &Sampler,
+        counters: &mut Counters,
+    ) -> Option<(SurfacePoint<'_>, f32)> {
+        let (mut segments, mut crossings, mut distance, mut left) = (1, 0, 0.0, MISS);
+        for _ in 0..MOST_BOUNCES {
+            let point = SurfacePoint::at::<F>(self.scene, &ray, &hit)?;
+            let direction = Vec3::from(ray.direction);
+            distance += hit.t;
+            let opacity = point.material.opacity.at::<F>(self.scene, point.uv);
+            let through = F::CUTOUT
+                && point.material.has_cutout()
+                && sampler.single(dimension::CROSSING + crossings) >= opacity;
+            if hit.triangle == left || through {
+                crossings += 1;
+                ray = point.spawn(direction);
+            } else {
+                let bsdf = Bsdf::at::<F>(self.scene, point.material, point.uv, point.front);
+                if let Bsdf::Diffuse(_) = bsdf {
+                    let smooth = point.frame.normal.dot(point.geometric_normal) > SMOOTH;
+                    return smooth.then_some((point, distance));
+                }
+                let wo = point.frame.to_local(-direction);
+                let [u, v] = dimension::scattering(sampler, segments);
+                let lobe = sampler.single(dimension::vertex(segments) + dimension::LOBE);
+                let sample = bsdf.sample::<F>(wo, [u, v, lobe]).filter(|sample| sample.delta)?;
+                let next = point.frame.to_world(sample.direction);
+                if !point.sides_agree(sample.direction, next) {
+                    return None;
+                }
+                segments += 1;
+                ray = point.spawn(next);
+            }
+            left = hit.triangle;
+            counters.rays += 1;
+            hit = self.bvh.nearest(self.level, &ray);
+        }
+        None
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::BTreeSet;
+    use std::vec::Vec;
+
+    #[test]
+    fn the_order_has_every_pixel_once_and_spreads_them() {
+        for (width, height, stride) in [(1, 1, 1), (37, 20, 1), (64, 64, 4), (5, 300, 2), (33, 9, 64)] {
+            let order = Order::new(width, height, stride);
+            let pixels: Vec<_> = (0..order.len()).filter_map(|i| order.pixel(i)).collect();
+            let wanted = width.div_ceil(stride) * height.div_ceil(stride);
+            assert_eq!(pixels.len(), wanted as usize, "{width} {height} {stride}");
+            assert_eq!(pixels.iter().collect::<BTreeSet<_>>().len(), pixels.len());
+        }
+        let order = Order::new(64, 64, 1);
+        let coarse: BTreeSet<_> = (0..16).filter_map(|i| order.pixel(i)).collect();
+        assert!(coarse.iter().all(|(x, y)| x % 16 == 0 && y % 16 == 0) && coarse.len() == 16);
+        assert_eq!(order.pixel(order.len()), None);
+    }
+}
