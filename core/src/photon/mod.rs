@@ -6,14 +6,19 @@
 //! same distance those with the lower index. An index is a photon's place in the map, which is the same for the
 //! same photons in the same order, on any number of threads and at any level.
 
+mod batch;
 pub mod brute;
 mod build;
+mod curve;
+mod gather;
 mod layout;
 mod nearest;
 mod range;
 mod record;
 mod space;
 
+pub use curve::Turn;
+pub use gather::{ALIKE, Density, Disc, FLATNESS, Falloff, Response, Uniform};
 pub use nearest::Neighbours;
 pub use record::Photon;
 
@@ -118,6 +123,47 @@ impl PhotonMap<'_> {
         let place = self.space.enter(place.to_array());
         let Some(squared_radius) = self.space.squared(radius) else { return 0 };
         level.dispatch(range::Range { map: self, place, squared_radius, found })
+    }
+
+    /// Estimates the density of photons on a disc, each with the response of the surface.
+    pub fn gather<R: Response>(&self, level: Level, disc: &Disc, response: &R) -> Density {
+        level.dispatch(gather::Gather { map: self, disc, response })
+    }
+
+    /// [`PhotonMap::nearest`] for many places, of which `each` gets the index and what was found; in an order in
+    /// which neighbours follow each other. `turns` is working memory, one for each place: those beyond are left out.
+    pub fn nearest_batch(
+        &self,
+        level: Level,
+        places: &[Vec3],
+        radius: f32,
+        turns: &mut [Turn],
+        neighbours: &mut Neighbours,
+        each: impl FnMut(usize, &Neighbours),
+    ) {
+        let squared_radius = self.space.squared(radius).unwrap_or(-1.0);
+        level.dispatch(batch::Searches { map: self, places, squared_radius, turns, neighbours, each });
+    }
+
+    /// [`PhotonMap::gather`] for many discs, in such an order. `turns` is working memory, one for each disc: those
+    /// beyond are left out, as are those for which there is no density.
+    pub fn gather_batch<R: Response>(
+        &self,
+        level: Level,
+        discs: &[Disc],
+        response: &R,
+        turns: &mut [Turn],
+        densities: &mut [Density],
+    ) {
+        level.dispatch(batch::Gathers { map: self, discs, response, turns, densities });
+    }
+
+    /// Lowest and highest corner of the box around the photons, in units of the map; empty where there are none.
+    fn bounds(&self) -> [[f32; 3]; 2] {
+        let boxes = self.nodes.last().unwrap_or(&Node::EMPTY).boxes;
+        let lo = [0, 1, 2].map(|row| boxes[row].iter().fold(f32::INFINITY, |a, &b| a.min(b)));
+        let hi = [3, 4, 5].map(|row| boxes[row].iter().fold(f32::NEG_INFINITY, |a, &b| a.max(b)));
+        [lo, hi]
     }
 }
 

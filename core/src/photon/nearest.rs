@@ -66,6 +66,11 @@ impl<'m> Neighbours<'m> {
         found.map(|(&value, number)| (number.to_bits(), self.space.leave_squared(value)))
     }
 
+    /// That in units of the map.
+    pub(super) fn limit(&self) -> f32 {
+        self.limit
+    }
+
     /// The square of the distance of the last of `k` photons; infinite where fewer were found.
     pub fn squared_radius(&self) -> f32 {
         self.space.leave_squared(self.limit)

@@ -205,3 +205,191 @@ fn a_million_photons_on_a_wall_or_in_one_place_are_searched_like_any_others() {
         with_map(&places, |map| check_searches(map, places[77_777], 1e-3));
     }
 }
+
+/// A map of photons of all directions, normals and powers, at `places`.
+fn with_light(places: &[Vec3], check: impl FnOnce(&PhotonMap)) {
+    let mut random = Random(21);
+    let mut memory = lines(Photons::footprint(places.len()));
+    let mut photons =
+        Photons::new(places.len(), &mut Arena::new(bytemuck::cast_slice_mut(&mut memory))).unwrap();
+    for (photon, &place) in photons.as_mut_slice().iter_mut().zip(places) {
+        let normal = Vec3::new(0.2, 0.2, 1.0) + random.point() - 0.5;
+        *photon = Photon::new(place, random.point() - Vec3::new(0.5, 0.5, 0.2), normal, random.point());
+    }
+    check(&photons.build(places.len()));
+}
+
+/// Relative; thousands of photons are added in another order.
+const ROUNDING: f32 = 2e-5;
+
+#[test]
+fn what_is_gathered_is_what_brute_force_gathers() {
+    let mut random = Random(77);
+    let places: Vec<_> = (0..20_000).map(|_| random.point() * Vec3::new(1.0, 1.0, 0.1)).collect();
+    let glossy = |direction: Vec3| Rgb::new(direction.z, direction.x * direction.x, 1.0);
+    with_light(&places, |map| {
+        let mut most = 0;
+        for i in 0..40 {
+            let disc = Disc {
+                place: places[i * 100] + random.point() * 0.01,
+                normal: (Vec3::Z + 0.5 * random.point()).normalize(),
+                radius: 0.3 * random.unit(),
+                falloff: [Falloff::Constant, Falloff::Cone, Falloff::Epanechnikov][i % 3],
+            };
+            let expected = brute::gather(map, &disc, &Uniform(Rgb::new(0.5, 1.0, 2.0)));
+            let expected_glossy = brute::gather(map, &disc, &glossy);
+            most = most.max(expected.photons);
+            let uniform = Uniform(Rgb::new(0.5, 1.0, 2.0));
+            let baseline = map.gather(Level::BASELINE, &disc, &uniform);
+            for level in Level::detect().and_below() {
+                let found = map.gather(level, &disc, &uniform);
+                assert_eq!(found, baseline, "{level:?}");
+                assert_eq!(found.photons, expected.photons, "{disc:?}");
+                let error = (found.radiance - expected.radiance).abs();
+                assert!(error.cmple(expected.radiance * ROUNDING).all(), "{found:?} {expected:?}");
+                let found = map.gather(level, &disc, &glossy);
+                assert_eq!(found.photons, expected_glossy.photons);
+                let error = (found.radiance - expected_glossy.radiance).abs().max_element();
+                assert!(
+                    error <= expected_glossy.radiance.max_element() * ROUNDING,
+                    "{found:?} {expected_glossy:?}"
+                );
+            }
+        }
+        assert!(most > 500, "the discs hold something: at most {most}");
+        let disc = Disc { place: Vec3::ONE, normal: Vec3::Z, radius: 1.0, falloff: Falloff::Cone };
+        for radius in [0.0, -1.0, f32::NAN, f32::INFINITY] {
+            let found = map.gather(Level::detect(), &Disc { radius, ..disc }, &Uniform(Rgb::ONE));
+            assert_eq!(found, Density::default());
+        }
+        let odd = Disc { normal: Vec3::NAN, ..disc };
+        assert_eq!(map.gather(Level::detect(), &odd, &Uniform(Rgb::ONE)), Density::default());
+    });
+}
+
+#[test]
+fn an_even_floor_has_the_irradiance_that_was_put_there_by_every_falloff() {
+    let mut random = Random(31);
+    let count = 400_000;
+    let places: Vec<_> = (0..count).map(|_| random.point().with_z(0.0)).collect();
+    with_map(&places, |map| {
+        for falloff in [Falloff::Constant, Falloff::Cone, Falloff::Epanechnikov] {
+            let disc = Disc { place: Vec3::new(0.5, 0.5, 0.0), normal: Vec3::Z, radius: 0.2, falloff };
+            let found = map.gather(Level::detect(), &disc, &Uniform(Rgb::ONE));
+            // One watt each on one square metre; about 50 000 photons, four standard deviations of the least even
+            // weights (E[k²] = 3/2): 2 %.
+            assert!(
+                (found.radiance / count as f32 - 1.0).abs().max_element() < 0.022,
+                "{falloff:?} {found:?}"
+            );
+        }
+    });
+}
+
+#[test]
+fn nothing_leaks_through_a_thin_wall_or_around_an_edge() {
+    // Light on one side of a wall a thousandth thick, and on a floor that meets it.
+    let mut random = Random(41);
+    let mut memory = lines(Photons::footprint(40_000));
+    let mut photons = Photons::new(40_000, &mut Arena::new(bytemuck::cast_slice_mut(&mut memory))).unwrap();
+    for (i, photon) in photons.as_mut_slice().iter_mut().enumerate() {
+        let (a, b) = (random.unit() - 0.5, random.unit());
+        *photon = match i % 2 {
+            0 => Photon::new(Vec3::new(0.0, a, b), Vec3::new(1.0, 0.2, 0.3), Vec3::X, Rgb::ONE),
+            _ => Photon::new(Vec3::new(b, a, 0.0), Vec3::new(0.4, 0.2, 1.0), Vec3::Z, Rgb::ONE),
+        };
+    }
+    let map = photons.build(40_000);
+    let at = |place: Vec3, normal: Vec3| {
+        let disc = Disc { place, normal, radius: 0.1, falloff: Falloff::Epanechnikov };
+        map.gather(Level::detect(), &disc, &Uniform(Rgb::ONE)).photons
+    };
+    assert!(at(Vec3::new(0.0, 0.0, 0.5), Vec3::X) > 500, "the lit side");
+    assert!(at(Vec3::new(0.5, 0.0, 0.0), Vec3::Z) > 500, "the lit floor");
+    assert_eq!(at(Vec3::new(-1e-3, 0.0, 0.5), Vec3::NEG_X), 0, "the dark side");
+    assert_eq!(at(Vec3::new(-0.05, 0.0, 0.0), Vec3::NEG_Z), 0, "the floor from below");
+    // In the corner the floor does not see the photons of the wall, and the other way about.
+    let corner = at(Vec3::ZERO, Vec3::Z);
+    let mut expected = 0;
+    for (index, _) in brute::within(&map, Vec3::ZERO, 0.1) {
+        expected += u32::from(map.get(index).unwrap().normal() == Vec3::Z);
+    }
+    assert_eq!(corner, expected);
+}
+
+#[test]
+fn batches_find_what_single_searches_find() {
+    for (name, places) in sets(2000) {
+        with_light(&places, |map| {
+            let level = Level::detect();
+            let mut random = Random(13);
+            let extent = places.iter().fold(0.0, |most: f32, place| most.max(place.abs().max_element()));
+            let mut asked: Vec<_> =
+                (0..300).map(|i| places[i * 5] + random.point() * (0.01 * extent)).collect();
+            asked[7] = Vec3::NAN;
+            asked[70] = Vec3::INFINITY;
+            for (k, radius) in
+                [(1, f32::INFINITY), (8, f32::INFINITY), (60, f32::INFINITY), (60, 0.05 * extent)]
+            {
+                let mut memory = [lines(Neighbours::footprint(k)), lines(Neighbours::footprint(k))];
+                let [mut one, mut many] = memory.each_mut().map(|memory| {
+                    Neighbours::new(k, &mut Arena::new(bytemuck::cast_slice_mut(memory))).unwrap()
+                });
+                let mut seen = vec![false; asked.len()];
+                let mut turns = vec![Turn::default(); asked.len()];
+                map.nearest_batch(level, &asked, radius, &mut turns, &mut many, |i, found| {
+                    seen[i] = true;
+                    map.nearest(level, asked[i], radius, &mut one);
+                    let sorted = |neighbours: &Neighbours| {
+                        let mut all: Vec<_> = neighbours.iter().map(|(i, d)| (i, d.to_bits())).collect();
+                        all.sort_unstable();
+                        all
+                    };
+                    assert_eq!(sorted(found), sorted(&one), "{name} {k} {radius} {}", asked[i]);
+                });
+                assert!(seen.into_iter().all(|seen| seen));
+            }
+            let disc =
+                |&place: &Vec3| Disc { place, normal: Vec3::Z, radius: 0.1 * extent, falloff: Falloff::Cone };
+            let discs: Vec<_> = asked.iter().map(disc).collect();
+            let mut turns = vec![Turn::default(); discs.len()];
+            let mut densities = vec![Density::default(); discs.len()];
+            map.gather_batch(level, &discs, &Uniform(Rgb::ONE), &mut turns, &mut densities);
+            for (disc, density) in discs.iter().zip(&densities) {
+                let bits =
+                    |density: Density| (density.radiance.to_array().map(f32::to_bits), density.photons);
+                assert_eq!(bits(*density), bits(map.gather(level, disc, &Uniform(Rgb::ONE))), "{name}");
+            }
+        });
+    }
+}
+
+/// Both at once, on two threads.
+struct Threads;
+
+impl Join for Threads {
+    fn join(&self, a: impl FnOnce() + Send, b: impl FnOnce() + Send) {
+        std::thread::scope(|scope| {
+            scope.spawn(a);
+            b();
+        });
+    }
+}
+
+#[test]
+fn the_map_is_the_same_on_any_number_of_threads() {
+    let mut random = Random(51);
+    let places: Vec<_> = (0..50_000).map(|_| random.point().with_x(0.0)).collect();
+    let build = |join: bool| {
+        let mut memory = lines(Photons::footprint(places.len()));
+        let mut photons =
+            Photons::new(places.len(), &mut Arena::new(bytemuck::cast_slice_mut(&mut memory))).unwrap();
+        for (photon, &place) in photons.as_mut_slice().iter_mut().zip(&places) {
+            *photon = Photon::new(place, Vec3::Z, Vec3::Z, Rgb::ONE);
+        }
+        let count = places.len();
+        let map = if join { photons.build_with(count, &Threads) } else { photons.build(count) };
+        (0..count as u32).map(|i| map.get(i).unwrap().position().to_array()).collect::<Vec<_>>()
+    };
+    assert_eq!(build(false), build(true));
+}

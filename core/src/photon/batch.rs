@@ -1,0 +1,74 @@
+//! Searches for many places, in an order of our own.
+
+use super::PhotonMap;
+use super::curve::{self, Turn};
+use super::gather::{Density, Disc, Response, gather};
+use super::nearest::{Neighbours, search};
+use glam::Vec3;
+use halflight_simd::{Kernel, Simd};
+
+/// What roundings can add to a distance, relative, and as much again.
+const ROUNDING: f32 = 1.0 + 8.0 * f32::EPSILON;
+
+/// And to the square of one that is too small for relative roundings.
+const TINY: f32 = f32::MIN_POSITIVE;
+
+/// The nearest photons of each place.
+pub(super) struct Searches<'a, 'm, 'n, F> {
+    pub map: &'a PhotonMap<'m>,
+    pub places: &'a [Vec3],
+    pub squared_radius: f32,
+    pub turns: &'a mut [Turn],
+    pub neighbours: &'a mut Neighbours<'n>,
+    pub each: F,
+}
+
+impl<F: FnMut(usize, &Neighbours)> Kernel for Searches<'_, '_, '_, F> {
+    type Out = ();
+
+    #[inline(always)]
+    fn run<S: Simd>(mut self, simd: S) {
+        let map = self.map;
+        // Where the search before was, and how far its k-th photon.
+        let mut last: Option<([f32; 3], f32)> = None;
+        for turn in curve::along(map, self.places.iter().copied(), self.turns) {
+            let index = turn.index as usize;
+            let Some(place) = self.places.get(index) else { continue };
+            let place = map.space.enter(place.to_array());
+            // The k photons of the last search are no farther from here than this, by the triangle's inequality.
+            let near = last.map_or(f32::MAX, |(last, distance)| {
+                let way = Vec3::from_array(last).distance(Vec3::from_array(place));
+                let most = (way + distance) * ROUNDING;
+                (most * most + TINY).min(f32::MAX)
+            });
+            search(simd, map, place, self.squared_radius.min(near), self.neighbours);
+            let limit = self.neighbours.limit();
+            // A place that is not a number tells nothing to the next.
+            last = (limit < f32::INFINITY).then(|| (place, libm::sqrtf(limit)));
+            (self.each)(index, self.neighbours);
+        }
+    }
+}
+
+/// The density at each disc, with one response for all.
+pub(super) struct Gathers<'a, 'm, R> {
+    pub map: &'a PhotonMap<'m>,
+    pub discs: &'a [Disc],
+    pub response: &'a R,
+    pub turns: &'a mut [Turn],
+    pub densities: &'a mut [Density],
+}
+
+impl<R: Response> Kernel for Gathers<'_, '_, R> {
+    type Out = ();
+
+    #[inline(always)]
+    fn run<S: Simd>(self, simd: S) {
+        for turn in curve::along(self.map, self.discs.iter().map(|disc| disc.place), self.turns) {
+            let index = turn.index as usize;
+            if let (Some(disc), Some(density)) = (self.discs.get(index), self.densities.get_mut(index)) {
+                *density = gather(simd, self.map, disc, self.response);
+            }
+        }
+    }
+}

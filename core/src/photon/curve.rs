@@ -1,0 +1,62 @@
+//! Places in an order in which neighbours follow each other: along the Z curve (Morton 1966). A search then finds in
+//! the cache what the one before it has read, and how far the k-th photon can be at most.
+
+use super::PhotonMap;
+use bytemuck::{Pod, Zeroable};
+use glam::Vec3;
+
+/// Bits of a code for each axis.
+const BITS: u32 = 10;
+
+/// When it is the turn of a place.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Pod, Zeroable)]
+#[repr(C)]
+pub struct Turn {
+    code: u32,
+    /// Which place it is.
+    pub index: u32,
+}
+
+/// Fills `turns` with the first so many of `places`, along the curve. Gives those that it filled.
+pub(super) fn along<'t>(
+    map: &PhotonMap,
+    places: impl ExactSizeIterator<Item = Vec3>,
+    turns: &'t mut [Turn],
+) -> &'t mut [Turn] {
+    let [lo, hi] = map.bounds();
+    let cells = (1u32 << BITS) as f32;
+    let count = places.len().min(turns.len());
+    let turns = &mut turns[..count];
+    for (index, (turn, place)) in turns.iter_mut().zip(places).enumerate() {
+        let place = map.space.enter(place.to_array());
+        let cell = [0, 1, 2].map(|axis| {
+            // From anywhere, NaN included, to one of the cells: floats saturate when they become whole numbers.
+            ((place[axis] - lo[axis]) / (hi[axis] - lo[axis]) * cells) as u32
+        });
+        let [x, y, z] = cell.map(|cell| spread(cell.min((1 << BITS) - 1)));
+        *turn = Turn { code: x | y << 1 | z << 2, index: index as u32 };
+    }
+    turns.sort_unstable();
+    turns
+}
+
+/// Ten bits, with two zeros after each.
+fn spread(bits: u32) -> u32 {
+    let bits = (bits | bits << 16) & 0x0300_00ff;
+    let bits = (bits | bits << 8) & 0x0300_f00f;
+    let bits = (bits | bits << 4) & 0x030c_30c3;
+    (bits | bits << 2) & 0x0924_9249
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bits_are_spread() {
+        for bits in 0..1 << BITS {
+            let slow = (0..BITS).fold(0, |code, i| code | (bits >> i & 1) << (3 * i));
+            assert_eq!(spread(bits), slow);
+        }
+    }
+}

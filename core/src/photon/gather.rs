@@ -1,0 +1,245 @@
+//! The density estimate, fused with the walk: photons are weighed where they lie, sixteen at a time, and no list of
+//! them is made (Jensen 1996, with the disc of Jensen 2001, section 7.2).
+//!
+//! L = sum over photons of f(w_p) Phi_p k(d / r) / (pi r²). The sphere around a place also holds photons of other
+//! surfaces: behind a thin wall, around an edge, on the other side of a leaf. They are left out by three tests:
+//! 1. a photon lies in a flat disc, near the plane of the place;
+//! 2. the normal where it lies is much like that of the place;
+//! 3. it came from the side to which the normal points.
+//!
+//! Unit vectors are not normalised for that: a photon's grid holds whole numbers, which are compared squared.
+
+use super::PhotonMap;
+use super::layout::{HALVES, Leaf};
+use super::range::leaves_within;
+use super::record::{DIRECTION_BITS, DIRECTION_STEPS, NORMAL_STEPS, POWER_BITS};
+use crate::Rgb;
+use core::f32::consts::PI;
+use glam::Vec3;
+use halflight_simd::kernels::points::{Place16, squared};
+use halflight_simd::{Kernel, Lanes, Mask, Simd};
+
+/// How far from the plane of a disc its photons may lie, in radii: what a surface bends in it, when its radius of
+/// curvature is two and a half times as large.
+pub const FLATNESS: f32 = 0.2;
+
+/// Cosine of the largest angle between the normal of a disc and that of a photon in it.
+pub const ALIKE: f32 = 0.7;
+
+/// How the weight of a photon falls with its distance from the middle of the disc. All of them integrate to one
+/// over it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Falloff {
+    /// The same everywhere.
+    Constant,
+    /// 3 (1 - d / r).
+    Cone,
+    /// 2 (1 - d² / r²): the least variance for its width (Epanechnikov 1969).
+    #[default]
+    Epanechnikov,
+}
+
+/// Where the density of photons is asked for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Disc {
+    /// Its middle.
+    pub place: Vec3,
+    /// Its normal, of unit length, on the side from which light is looked for.
+    pub normal: Vec3,
+    /// Its radius; finite and above zero, or nothing is found.
+    pub radius: f32,
+    /// How its photons are weighed.
+    pub falloff: Falloff,
+}
+
+/// What a surface makes of the light from a direction: its BSDF towards the eye, without a cosine.
+pub trait Response {
+    /// Whether it is one for all directions.
+    const UNIFORM: bool = false;
+    /// The response to light from `direction`, which points away from the surface and is of unit length.
+    fn of(&self, direction: Vec3) -> Rgb;
+}
+
+impl<F: Fn(Vec3) -> Rgb> Response for F {
+    fn of(&self, direction: Vec3) -> Rgb {
+        self(direction)
+    }
+}
+
+/// The same for all directions: a diffuse surface of albedo `a` has a / pi, and one makes the sum an irradiance.
+#[derive(Clone, Copy, Debug)]
+pub struct Uniform(pub Rgb);
+
+impl Response for Uniform {
+    const UNIFORM: bool = true;
+    fn of(&self, _: Vec3) -> Rgb {
+        self.0
+    }
+}
+
+/// What is gathered from a disc.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Density {
+    /// Responses times power per area: W/(m² sr), or W/m² for a response of one.
+    pub radiance: Rgb,
+    /// Photons that were weighed.
+    pub photons: u32,
+}
+
+/// One gathering.
+pub(super) struct Gather<'a, 'm, R> {
+    pub map: &'a PhotonMap<'m>,
+    pub disc: &'a Disc,
+    pub response: &'a R,
+}
+
+impl<R: Response> Kernel for Gather<'_, '_, R> {
+    type Out = Density;
+
+    #[inline(always)]
+    fn run<S: Simd>(self, simd: S) -> Density {
+        gather(simd, self.map, self.disc, self.response)
+    }
+}
+
+/// Gathers from a disc.
+#[inline(always)]
+pub(super) fn gather<S: Simd, R: Response>(simd: S, map: &PhotonMap, disc: &Disc, response: &R) -> Density {
+    let squared_radius = map.space.squared(disc.radius).unwrap_or(-1.0);
+    if !(squared_radius > 0.0 && squared_radius < f32::MAX) {
+        return Density::default();
+    }
+    let place = Place16::new(simd, map.space.enter(disc.place.to_array()));
+    let [x, y, z] = disc.normal.to_array();
+    let mut sum = Sum {
+        place,
+        normal: [simd.splat16(x), simd.splat16(y), simd.splat16(z)],
+        limit: simd.splat16(squared_radius),
+        thickness: simd.splat16(FLATNESS * libm::sqrtf(squared_radius)),
+        nearness: Nearness { reciprocal: simd.splat16(1.0 / squared_radius), falloff: disc.falloff },
+        response,
+        lanes: [simd.splat16(0.0); 3],
+        singles: Rgb::ZERO,
+        photons: 0,
+    };
+    leaves_within(simd, map, &place, squared_radius, |index| {
+        if let Some(leaf) = map.leaves.get(index) {
+            for half in 0..HALVES {
+                sum.add(simd, leaf, half);
+            }
+        }
+    });
+    // Lane after lane, so that the bits are those of every level.
+    let total = sum.lanes.map(|lanes| lanes.to_array().iter().fold(0.0, |sum, lane| sum + lane));
+    let responded = if R::UNIFORM { Rgb::from_array(total) * response.of(disc.normal) } else { sum.singles };
+    let per_area = 1.0 / (PI * disc.radius) / disc.radius;
+    Density { radiance: responded * per_area, photons: sum.photons }
+}
+
+/// Everything of a gathering, in lanes.
+struct Sum<'a, S: Simd, R> {
+    place: Place16<S>,
+    normal: [S::F16; 3],
+    limit: S::F16,
+    thickness: S::F16,
+    nearness: Nearness<S>,
+    response: &'a R,
+    /// Weighed power: where the response is uniform,
+    lanes: [S::F16; 3],
+    /// and where it is not, with the response.
+    singles: Rgb,
+    photons: u32,
+}
+
+impl<S: Simd, R: Response> Sum<'_, S, R> {
+    /// Adds the photons of half a leaf.
+    #[inline(always)]
+    fn add(&mut self, simd: S, leaf: &Leaf, half: usize) {
+        let offset = self.place.less(simd, leaf.half(half));
+        let distance = squared(offset);
+        let in_sphere = distance.le(self.limit);
+        if !in_sphere.any() {
+            return;
+        }
+        let zero = simd.splat16(0.0);
+        let in_disc = in_sphere & dot(offset, self.normal).abs().le(self.thickness);
+
+        let [a, b] = leaf.normal.map(|column| simd.bytes16(&column[half % HALVES]));
+        let surface = unfolded(simd, a, b, NORMAL_STEPS);
+        let along = dot(surface, self.normal);
+        let alike = zero.lt(along) & (squared(surface) * simd.splat16(ALIKE * ALIKE)).le(along * along);
+
+        let light = &leaf.light[half % HALVES];
+        let side = |i: u32| simd.field16(light, i * DIRECTION_BITS, DIRECTION_BITS);
+        let came = unfolded(simd, side(0), side(1), DIRECTION_STEPS);
+        let counted = in_disc & alike & zero.lt(dot(came, self.normal));
+        let bits = counted.bits();
+        if bits == 0 {
+            return;
+        }
+        self.photons += bits.count_ones();
+        let weight = self.nearness.weight(simd, distance) * simd.powers16(light);
+        let weight = weight.select(counted, zero);
+        let channel = |i: u32, bits: u32| simd.field16(&leaf.power[half % HALVES], i * POWER_BITS, bits);
+        let blue = channel(2, POWER_BITS - 1);
+        let power =
+            [channel(0, POWER_BITS) * weight, channel(1, POWER_BITS) * weight, (blue + blue) * weight];
+        if R::UNIFORM {
+            let [r, g, b] = self.lanes;
+            self.lanes = [r + power[0], g + power[1], b + power[2]];
+        } else {
+            self.respond(power.map(|lanes| lanes.to_array()), came.map(|lanes| lanes.to_array()), bits);
+        }
+    }
+
+    /// Adds photons one by one.
+    #[inline(always)]
+    fn respond<A: AsRef<[f32]>>(&mut self, power: [A; 3], came: [A; 3], mut bits: u32) {
+        let at = |columns: &[A; 3], lane: usize| {
+            columns.each_ref().map(|column| column.as_ref().get(lane).copied().unwrap_or(0.0))
+        };
+        while bits != 0 {
+            let lane = bits.trailing_zeros() as usize;
+            let direction = Vec3::from_array(at(&came, lane)).normalize_or(Vec3::Z);
+            self.singles += Rgb::from_array(at(&power, lane)) * self.response.of(direction);
+            bits &= bits - 1;
+        }
+    }
+}
+
+/// Weights by distance.
+struct Nearness<S: Simd> {
+    /// Of the squared radius.
+    reciprocal: S::F16,
+    falloff: Falloff,
+}
+
+impl<S: Simd> Nearness<S> {
+    #[inline(always)]
+    fn weight(&self, simd: S, distance: S::F16) -> S::F16 {
+        let one = simd.splat16(1.0);
+        // Rounding must not make a weight negative.
+        let squared = (distance * self.reciprocal).min(one);
+        match self.falloff {
+            Falloff::Constant => one,
+            Falloff::Cone => simd.splat16(3.0) * (one - squared.sqrt()),
+            Falloff::Epanechnikov => simd.splat16(2.0) * (one - squared),
+        }
+    }
+}
+
+#[inline(always)]
+fn dot<L: Lanes>([a, b, c]: [L; 3], [x, y, z]: [L; 3]) -> L {
+    (a * x + b * y) + c * z
+}
+
+/// The directions of points of an octahedral grid, in whole numbers of its steps.
+#[inline(always)]
+fn unfolded<S: Simd>(simd: S, u: S::F16, v: S::F16, steps: f32) -> [S::F16; 3] {
+    let (zero, steps) = (simd.splat16(0.0), simd.splat16(steps));
+    let (u, v) = (u - steps, v - steps);
+    let z = (steps - u.abs()) - v.abs();
+    let folded = (-z).max(zero);
+    let towards = |side: S::F16| (side + folded).select(side.lt(zero), side - folded);
+    [towards(u), towards(v), z]
+}
