@@ -121,3 +121,6 @@ impl<T: Number> Add for Flux<T> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests;
