@@ -2,8 +2,11 @@
 //! reference.
 
 pub mod boxes;
+pub mod cells;
 pub mod edge;
 pub mod eigen;
+pub mod jumps;
+pub mod mesh;
 pub mod points;
 pub mod push;
 pub mod select;

@@ -3,8 +3,7 @@
 use crate::Rgb;
 use core::f32::consts::PI;
 
-/// The most strata along a side.
-pub const SIDE_MAX: usize = 128;
+pub use halflight_simd::kernels::jumps::SIDE_MAX;
 
 /// N × N strata of the concentric map (Shirley and Chiu 1997), so of equal shares of irradiance. Row-major:
 /// the stratum of row i and column j holds the directions that the map makes of the square

@@ -6,7 +6,9 @@
 //! (Schwarzhaupt, Jensen, Jarosz 2012). ε is an integral over an area: we measure it in the square of the scene's
 //! extent, so that a scene in millimetres is cached as the same in kilometres.
 
-use super::derivatives::{Derivatives, Hessian};
+use super::derivatives::{CellFlux, Derivatives, Hessian, triangulated, unoccluded};
+use super::hemisphere::Hemisphere;
+use crate::Level;
 use core::f32::consts::PI;
 use glam::Vec2;
 use halflight_simd::kernels::eigen::{Eigen2, symmetric2};
@@ -59,6 +61,32 @@ impl Metric {
     /// The metric of that name.
     pub fn named(name: &str) -> Option<Metric> {
         Metric::ALL.into_iter().find(|metric| metric.name() == name)
+    }
+
+    /// Whether it needs the normals of what the hemisphere sees.
+    pub const fn takes_normals(self) -> bool {
+        matches!(self, Metric::RadiometricHessian | Metric::GeometricHessian)
+    }
+
+    /// The derivatives that it is made for: those of the borders of strata (so that all metrics extrapolate by the
+    /// same gradients) with its own Hessian; of [`Metric::OcclusionHessian`] all as in the paper. `None` where the
+    /// tables are of another number of strata, or normals are missing.
+    pub fn derivatives(
+        self,
+        level: Level,
+        tables: &CellFlux,
+        hemisphere: &Hemisphere,
+    ) -> Option<Derivatives> {
+        if self == Metric::OcclusionHessian {
+            return Some(triangulated(level, hemisphere));
+        }
+        let found = tables.derivatives(level, hemisphere)?;
+        let hessian = match self {
+            Metric::RadiometricHessian => unoccluded(hemisphere)?.radiometric,
+            Metric::GeometricHessian => unoccluded(hemisphere)?.geometric,
+            _ => found.hessian,
+        };
+        Some(Derivatives { hessian, ..found })
     }
 }
 
@@ -121,8 +149,7 @@ pub struct Reach {
     pub curvature: [f32; 2],
 }
 
-/// The reach of a record of these derivatives. For [`Metric::RadiometricHessian`] and [`Metric::GeometricHessian`]
-/// the Hessian must be the one without occlusion.
+/// The reach of a record of these derivatives, which should be those of [`Metric::derivatives`].
 pub fn reach(settings: &Settings, derivatives: &Derivatives) -> Reach {
     let irradiance = derivatives.luminance();
     let slope = derivatives.luminance_gradient().length();

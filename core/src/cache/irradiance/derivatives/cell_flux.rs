@@ -10,25 +10,16 @@
 //! of a triangle; no open rim, for the rim of the hemisphere lies in the horizon, where nothing flows; and all of
 //! it is of the same strata as the unbiased E. With polar strata the first sum is Ward and Heckbert's (1992).
 
-use super::{Derivatives, Hessian};
+use super::Derivatives;
+use crate::Level;
 use crate::cache::irradiance::hemisphere::{Hemisphere, SIDE_MAX};
-use crate::light::luminance;
 use crate::memory::{Arena, Footprint, OutOfMemory};
 use crate::sampling::warp::concentric_disk;
-use crate::{Level, Rgb};
-use glam::Vec2;
+use halflight_simd::kernels::cells::{Borders, Cells};
 use halflight_simd::kernels::edge::{Flux, flux_of};
 
 /// Pieces of a border, which is no great circle but the map's image of a segment.
 const PIECES: usize = 4;
-
-/// Borders of up to sixteen strata of a row, with their neighbours of the next column or the next row: rows of
-/// gradient x, y, rotation x, y, Hessian xx, xy, yy. Zero where there is no neighbour.
-type Borders = [[f32; 16]; 7];
-
-/// Two inverse distances that differ by less than this factor are of the same surface, and what divides them
-/// stands between; where they differ by more the nearer surface ends there.
-const SAME_SURFACE: f32 = 1.6;
 
 /// The tables of N × N strata, and the estimator over them.
 #[derive(Clone, Copy, Debug)]
@@ -80,43 +71,17 @@ impl<'m> CellFlux<'m> {
     }
 
     /// Irradiance and all its derivatives. `None` where the hemisphere has another number of strata.
-    pub fn derivatives(&self, _level: Level, hemisphere: &Hemisphere) -> Option<Derivatives> {
-        let n = self.n;
-        if hemisphere.n() != n {
-            return None;
-        }
-        let chunks = n.div_ceil(16);
-        let (radiance, inverse) = (hemisphere.radiance(), hemisphere.inverse_distance());
-        let mut found = Derivatives::still(hemisphere);
-        for at in 0..n * n {
-            let (i, j) = (at / n, at % n);
-            for (below, next) in [(0, at + 1), (1, at + n)] {
-                if (below == 0 && j + 1 == n) || (below == 1 && i + 1 == n) {
-                    continue;
-                }
-                let table = self.borders.get(2 * (i * chunks + j / 16) + below)?;
-                let [gx, gy, rx, ry, xx, xy, yy] = table.map(|row| row[j % 16]);
-                let jump = Rgb::from(*radiance.get(at)?) - Rgb::from(*radiance.get(next)?);
-                let u = between(*inverse.get(at)?, *inverse.get(next)?);
-                for channel in 0..3 {
-                    found.gradient[channel] += jump[channel] * u * Vec2::new(gx, gy);
-                    found.rotation[channel] += jump[channel] * Vec2::new(rx, ry);
-                }
-                let weight = luminance(jump) * u * u;
-                let Hessian { xx: sxx, xy: sxy, yy: syy } = found.hessian;
-                found.hessian =
-                    Hessian { xx: sxx + weight * xx, xy: sxy + weight * xy, yy: syy + weight * yy };
-            }
-        }
-        Some(found)
+    pub fn derivatives(&self, level: Level, hemisphere: &Hemisphere) -> Option<Derivatives> {
+        (hemisphere.n() == self.n).then(|| {
+            let cells = Cells {
+                n: self.n,
+                radiance: hemisphere.radiance(),
+                inverse_distance: hemisphere.inverse_distance(),
+                borders: self.borders,
+            };
+            Derivatives::of(hemisphere, &cells.sums(level))
+        })
     }
-}
-
-/// Inverse distance of the border between two strata.
-#[inline]
-fn between(u: f32, v: f32) -> f32 {
-    let (near, far) = (u.max(v), u.min(v));
-    if near < SAME_SURFACE * far { 0.5 * (near + far) } else { near }
 }
 
 /// What the border between two corners of the grid adds, at distance 1.
@@ -137,8 +102,10 @@ fn direction(u: [f32; 2]) -> [f32; 3] {
 
 #[cfg(test)]
 mod tests {
+    use super::super::Hessian;
     use super::*;
     use crate::memory::Line;
+    use glam::Vec2;
     use std::vec;
     use std::vec::Vec;
 

@@ -1,14 +1,27 @@
 //! How irradiance changes when the receiver steps aside or turns: gradients and Hessian from one hemisphere.
+//!
+//! [`CellFlux`] is what to use. [`triangulated`], [`closed_mesh`], [`ward_heckbert`] and [`unoccluded`] are other
+//! answers to the same question, to be compared with; each names its paper.
 
 mod cell_flux;
+mod closed_mesh;
+mod triangulated;
+mod unoccluded;
+mod ward_heckbert;
 
 pub use cell_flux::CellFlux;
+pub use closed_mesh::closed_mesh;
+pub use triangulated::triangulated;
+pub use unoccluded::{GRAZING, Unoccluded, unoccluded};
+pub use ward_heckbert::ward_heckbert;
 
 use super::hemisphere::Hemisphere;
 use crate::Rgb;
 use crate::light::luminance;
+use core::f32::consts::PI;
 use core::ops::{Add, Mul};
 use glam::Vec2;
+use halflight_simd::kernels::jumps::Sums;
 
 /// Irradiance and its derivatives at a place, in the tangent frame of its normal. A derivative by a length in m.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -69,14 +82,14 @@ impl Derivatives {
         Vec2::new(of(0), of(1))
     }
 
-    /// What is known without derivatives: these are zero.
-    fn still(hemisphere: &Hemisphere) -> Self {
+    /// From the hemisphere and the sums over the edges of its environment.
+    fn of(hemisphere: &Hemisphere, sums: &Sums) -> Self {
         let distances = hemisphere.distances();
         Self {
             irradiance: hemisphere.irradiance(),
-            gradient: [Vec2::ZERO; 3],
-            rotation: [Vec2::ZERO; 3],
-            hessian: Hessian::default(),
+            gradient: sums.gradient.map(Vec2::from),
+            rotation: sums.rotation.map(Vec2::from),
+            hessian: Hessian { xx: sums.hessian[0], xy: sums.hessian[1], yy: sums.hessian[2] },
             open_hessian: Hessian::default(),
             mean_square_inverse_distance: distances.mean_square_inverse,
             harmonic_mean_distance: 1.0 / distances.mean_inverse,
@@ -84,3 +97,20 @@ impl Derivatives {
         }
     }
 }
+
+/// The rotational gradient by the samples themselves (Ward, Heckbert 1992): π/N² Σ L (n × w)/cos, with the cosine
+/// kept above 0.05, for near the horizon it has no bound.
+fn rotation_by_samples(hemisphere: &Hemisphere) -> [Vec2; 3] {
+    const LOW: f32 = 0.05;
+    let share = PI / (hemisphere.n() * hemisphere.n()) as f32;
+    let mut rotation = [Vec2::ZERO; 3];
+    for (radiance, &[x, y, z]) in hemisphere.radiance().iter().zip(hemisphere.directions()) {
+        for (sum, radiance) in rotation.iter_mut().zip(radiance) {
+            *sum += *radiance * share / z.max(LOW) * Vec2::new(-y, x);
+        }
+    }
+    rotation
+}
+
+#[cfg(test)]
+mod tests;

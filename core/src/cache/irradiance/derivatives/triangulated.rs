@@ -1,0 +1,51 @@
+//! Derivatives from the triangulated environment of Schwarzhaupt, Jensen and Jarosz (2012), as printed: each quad of
+//! neighbouring samples is two triangles of their farthest vertex's radiance, and the mesh ends at the outermost
+//! samples. For comparison, and as an oracle of the others.
+//!
+//! That open rim is the boundary of a false light before a black sky: a room of radiance 1 does not come out flat.
+//! [`Derivatives::open_hessian`] says by how much, which is what the paper's rules for black surroundings rest on.
+
+use super::{Derivatives, Hessian, rotation_by_samples};
+use crate::Level;
+use crate::cache::irradiance::hemisphere::Hemisphere;
+use core::ops::Add;
+use halflight_simd::kernels::edge::{Flux, flux_of};
+use halflight_simd::kernels::mesh::{Mesh, Rule};
+
+/// Irradiance and all its derivatives; the rotational gradient by samples, for the mesh lacks what is near the
+/// horizon.
+pub fn triangulated(level: Level, hemisphere: &Hemisphere) -> Derivatives {
+    let mesh = Mesh {
+        n: hemisphere.n(),
+        radiance: hemisphere.radiance(),
+        inverse_distance: hemisphere.inverse_distance(),
+        directions: hemisphere.directions(),
+        rule: Rule::Farthest,
+    };
+    let mut found = Derivatives::of(hemisphere, &mesh.sums(level));
+    found.rotation = rotation_by_samples(hemisphere);
+    found.open_hessian = rim(hemisphere);
+    found
+}
+
+/// The Hessian of the mesh with radiance 1 everywhere: all that does not cancel is its rim, counter-clockwise.
+fn rim(hemisphere: &Hemisphere) -> Hessian {
+    let n = hemisphere.n();
+    let last = n - 1;
+    let vertex = |i: usize, j: usize| {
+        let at = i * n + j;
+        (hemisphere.directions().get(at).copied(), hemisphere.inverse_distance().get(at).copied())
+    };
+    let edge = |from: (usize, usize), to: (usize, usize)| match (vertex(from.0, from.1), vertex(to.0, to.1)) {
+        ((Some(a), Some(u)), (Some(b), Some(v))) => flux_of(a, u, b, v),
+        _ => Flux::default(),
+    };
+    let steps = (0..last).map(|k| {
+        edge((0, k), (0, k + 1))
+            + edge((k, last), (k + 1, last))
+            + edge((last, k + 1), (last, k))
+            + edge((k + 1, 0), (k, 0))
+    });
+    let [xx, xy, yy] = steps.fold(Flux::default(), Flux::add).hessian;
+    Hessian { xx, xy, yy }
+}
