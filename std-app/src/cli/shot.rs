@@ -5,10 +5,11 @@ use super::method::{self, Choice};
 use super::values;
 use super::view::View;
 use clap::{Args, ValueEnum};
-use halflight::drive::{RenderError, Settings, Stop};
+use halflight::drive::{CacheSettings, RenderError, Settings, Stop};
 use halflight::load::LoadedScene;
 use halflight::report::words::readable_bytes;
 use halflight::save::{self, Image};
+use halflight_core::cache::irradiance::Metric;
 use halflight_simd::{Level, Tier};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -56,6 +57,17 @@ pub(super) struct Options {
     /// The same bits on every processor: the instruction set that all have
     #[arg(long, help_heading = "How to run")]
     precise: bool,
+    /// By which rule the records of an irradiance cache know how far they reach [default: halflight]
+    #[arg(long, value_name = "METRIC", value_parser = values::metric, help_heading = "Irradiance cache")]
+    cache_metric: Option<Metric>,
+    /// Error allowed between records. Metrics with a Hessian: the error within the reach of a record over its
+    /// irradiance, times the area in squares of the scene's radius [default: 1e-4]; the others: the radius over the
+    /// distance that they take [default: 0.3]
+    #[arg(long, value_name = "ERROR", value_parser = values::positive, help_heading = "Irradiance cache")]
+    cache_error: Option<f64>,
+    /// Rays that are gathered for a record: 256, 1024 or 4096 [default: 1024]
+    #[arg(long, value_name = "N", value_parser = values::gather_rays, help_heading = "Irradiance cache")]
+    cache_rays: Option<u32>,
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
@@ -82,10 +94,22 @@ impl Options {
         Options {
             caustics: self.caustics.or(base.caustics),
             reuse: self.reuse.or(base.reuse),
+            cache_metric: self.cache_metric.or(base.cache_metric),
+            cache_error: self.cache_error.or(base.cache_error),
+            cache_rays: self.cache_rays.or(base.cache_rays),
             max_depth: self.max_depth.or(base.max_depth),
             seed: self.seed.or(base.seed),
             simd: self.simd.or(base.simd),
             precise: self.precise || base.precise,
+        }
+    }
+
+    fn cache(&self) -> CacheSettings {
+        let defaults = CacheSettings::default();
+        CacheSettings {
+            metric: self.cache_metric.unwrap_or(defaults.metric),
+            error: self.cache_error.map(|error| error as f32),
+            strata: self.cache_rays.map_or(defaults.strata, u32::isqrt),
         }
     }
 
@@ -127,6 +151,7 @@ impl Shot {
                 Some(Reuse::On) => Some(true),
                 Some(Reuse::Off) => Some(false),
             },
+            cache: options.cache(),
             threads: self.threads.map(|threads| threads as usize),
             memory: self.memory,
             level: options.level(),

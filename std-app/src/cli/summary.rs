@@ -35,6 +35,18 @@ pub(super) fn text(run: &Run, report: Option<&Path>) -> String {
         result.method.name(),
         settings.level.name(),
     ));
+    if let Some(cache) = result.cache {
+        let lost = match cache.refused {
+            0 => String::new(),
+            refused => format!("; {refused} more had no memory"),
+        };
+        lines.push(format!(
+            "cache  {} in {} by {}{lost}",
+            plural(cache.records, "record"),
+            readable_seconds(cache.seconds),
+            settings.cache.metric.name(),
+        ));
+    }
     lines.push(format!(
         "memory {}, {} at its peak",
         readable_bytes(result.memory.iter().map(|part| part.bytes).sum()),

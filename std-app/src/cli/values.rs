@@ -2,6 +2,7 @@
 
 use core::str::FromStr;
 use halflight::drive::Shard;
+use halflight_core::cache::irradiance::Metric;
 use halflight_simd::Tier;
 
 /// Three numbers, `X,Y,Z`.
@@ -74,6 +75,18 @@ pub(super) fn bytes(text: &str) -> Result<usize, String> {
 pub(super) fn tier(name: &str) -> Result<Tier, String> {
     let names = Tier::ALL.map(Tier::name).join(", ");
     Tier::named(name).ok_or(format!("the levels are {names}"))
+}
+
+/// An error metric of the irradiance cache by its name.
+pub(super) fn metric(name: &str) -> Result<Metric, String> {
+    let names = Metric::ALL.map(Metric::name).join(", ");
+    Metric::named(name).ok_or(format!("the metrics are {names}"))
+}
+
+/// Rays of a record: strata in blocks of 8 x 8.
+pub(super) fn gather_rays(text: &str) -> Result<u32, String> {
+    let known = text.parse().ok().filter(|rays| [256, 1024, 4096].contains(rays));
+    known.ok_or("256, 1024 or 4096 rays are expected".into())
 }
 
 /// A part of a picture: `I/N`, counted from 1.

@@ -63,6 +63,11 @@ impl Memory {
         (0..count).map(|_| self.take(structure, footprint)).collect()
     }
 
+    /// Bytes that are left of the limit.
+    pub(super) fn available(&self) -> usize {
+        self.limit.map_or(usize::MAX, |limit| limit.saturating_sub(self.total()))
+    }
+
     /// Says that what `structure` took is free again.
     pub(super) fn give_back(&mut self, structure: &'static str) {
         self.uses.retain(|other| other.structure != structure);

@@ -29,7 +29,7 @@ pub use history::{Against, Round};
 pub use ledger::Place;
 pub use memory::MemoryUse;
 pub use merge::{Merged, merge};
-pub use method::Method;
+pub use method::{CacheSettings, CacheUse, Method};
 pub use rounds::Stop;
 pub use turns::{Turn, Turns};
 
@@ -59,6 +59,8 @@ pub struct Settings {
     /// Whether neighbouring pixels share what their paths find; `None`: where a look at a few tiles says that it
     /// pays.
     pub reuse: Option<bool>,
+    /// How an irradiance cache is filled, where the method has one.
+    pub cache: CacheSettings,
     /// Number of threads; `None`: as many as the machine runs at once.
     pub threads: Option<usize>,
     /// Most bytes that the scene and all structures may take together; `None`: no limit.
@@ -103,6 +105,7 @@ impl Default for Settings {
             seed: 0,
             max_depth: None,
             reuse: None,
+            cache: CacheSettings::default(),
             threads: None,
             memory: None,
             level: Level::detect(),
@@ -185,6 +188,8 @@ pub struct RenderResult {
     pub counters: Counters,
     /// Whether pixels shared what their paths found, and why.
     pub reuse: Reuse,
+    /// What became of the irradiance cache, where the method has one.
+    pub cache: Option<CacheUse>,
     /// Where samples were dropped, the worst first.
     pub places: Vec<Place>,
     /// Pixels that are black because all of their samples were dropped.

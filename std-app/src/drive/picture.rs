@@ -127,6 +127,7 @@ impl Picture<'_> {
             seconds: Seconds { build: 0.0, render },
             counters: canvas.counters,
             reuse: renderer.reuse(),
+            cache: renderer.cache(),
             places: canvas.ledger.places(width, height),
             empty_pixels: empty_pixels(film, |task| canvas.shard.owns(task)),
             error,

@@ -56,6 +56,11 @@ impl<'m> IrradianceCache<'m> {
         self.records.get(..self.used).unwrap_or_default()
     }
 
+    /// The most records that there is memory for.
+    pub fn capacity(&self) -> usize {
+        self.records.len()
+    }
+
     /// Whether there is no memory for another record.
     pub fn is_full(&self) -> bool {
         self.used == self.records.len()

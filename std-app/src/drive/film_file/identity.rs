@@ -1,7 +1,7 @@
 //! Which picture a film is of: films can be continued and merged only where all of this is the same.
 
 use super::hash::Hash;
-use crate::drive::Settings;
+use crate::drive::{Method, Settings};
 use halflight_core::camera::Camera;
 use halflight_core::scene::{Scene, Texels};
 use halflight_core::transport::PathSettings;
@@ -33,6 +33,8 @@ impl Identity {
         paths: &PathSettings,
         settings: &Settings,
     ) -> Self {
+        let cached = method == Method::IrradianceCache.name();
+        let cache = if cached { format!(", {:?}", settings.cache) } else { String::new() };
         Self {
             version: env!("CARGO_PKG_VERSION").into(),
             method: method.into(),
@@ -41,7 +43,7 @@ impl Identity {
             seed: paths.seed,
             max_depth: settings.max_depth,
             reuse: settings.reuse,
-            settings: format!("{paths:?}, adaptive: {}", settings.adaptive),
+            settings: format!("{paths:?}{cache}, adaptive: {}", settings.adaptive),
             scene: format!("{:016x}", fingerprint(scene)),
             camera: camera(&scene.camera),
         }

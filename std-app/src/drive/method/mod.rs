@@ -4,7 +4,10 @@
 //! [`Crew`] runs in parallel ("The unit of work" in docs/architecture.md). To add a method: a variant of [`Method`]
 //! with its words, a file with its [`Renderer`], a line in [`Method::with`].
 
+mod irradiance_cache;
 mod path;
+
+pub use irradiance_cache::{CacheSettings, CacheUse};
 
 use super::crew::Crew;
 use super::memory::Memory;
@@ -20,16 +23,19 @@ use halflight_core::scene::Scene;
 pub enum Method {
     /// Path tracing with next-event estimation and multiple importance sampling.
     Path,
+    /// Indirect light of diffuse surfaces from an irradiance cache.
+    IrradianceCache,
 }
 
 impl Method {
     /// All of them.
-    pub const ALL: [Method; 1] = [Method::Path];
+    pub const ALL: [Method; 2] = [Method::Path, Method::IrradianceCache];
 
     /// Its name on the command line, in films and in reports.
     pub const fn name(self) -> &'static str {
         match self {
             Method::Path => "path",
+            Method::IrradianceCache => "irradiance-cache",
         }
     }
 
@@ -37,6 +43,9 @@ impl Method {
     pub const fn about(self) -> &'static str {
         match self {
             Method::Path => "Path tracing with next-event estimation and multiple importance sampling",
+            Method::IrradianceCache => {
+                "Path tracing, but for the indirect light of diffuse surfaces, which is interpolated"
+            }
         }
     }
 
@@ -49,6 +58,7 @@ impl Method {
     pub const fn is_biased(self) -> bool {
         match self {
             Method::Path => false,
+            Method::IrradianceCache => true,
         }
     }
 
@@ -57,6 +67,7 @@ impl Method {
     pub const fn shares(self) -> bool {
         match self {
             Method::Path => false,
+            Method::IrradianceCache => true,
         }
     }
 
@@ -69,6 +80,7 @@ impl Method {
     ) -> Result<T, RenderError> {
         match self {
             Method::Path => then(&mut path::Paths::<F>::new(stage, memory)?, memory),
+            Method::IrradianceCache => irradiance_cache::with::<F, T>(stage, memory, then),
         }
     }
 }
@@ -99,5 +111,10 @@ pub(super) trait Renderer {
     /// Whether neighbouring pixels share what their paths find.
     fn reuse(&self) -> Reuse {
         Reuse::default()
+    }
+
+    /// What became of its irradiance cache.
+    fn cache(&self) -> Option<CacheUse> {
+        None
     }
 }
