@@ -34,7 +34,7 @@ fn wrong_usage_is_refused_before_anything_is_written() {
     for (arguments, reason) in [
         ("", "Usage"),
         ("paint scene.obj", "unrecognized subcommand"),
-        ("render scene.obj --method photons", "possible values: auto, path"),
+        ("render scene.obj --method photons", "possible values: auto, path, irradiance-cache"),
         ("render scene.obj --size 640", "640x480"),
         ("render scene.obj --size 0x5", "640x480"),
         ("render scene.obj --eye 1,2", "three numbers"),
@@ -60,7 +60,7 @@ fn wrong_usage_is_refused_before_anything_is_written() {
         ("race scene.obj --time 1s", "--methods"),
         ("race scene.obj --methods path", "--time"),
         ("race scene.obj --methods path --time never", "30s, 2m or 1h"),
-        ("race scene.obj --methods path,photons --time 1s", "the methods are auto, path"),
+        ("race scene.obj --methods path,photons --time 1s", "the methods are auto, path, irradiance-cache"),
         ("race scene.obj --methods path:sparkle=1 --time 1s", "there is no option `sparkle`"),
         ("race scene.obj --methods path:seed=x --time 1s", "seed"),
         ("race scene.obj --methods path,path --time 1s", "path is in the race twice"),

@@ -77,8 +77,8 @@ mod tests {
     #[test]
     fn methods_that_make_no_sense() {
         for (text, reason) in [
-            ("", "the methods are auto, path"),
-            ("paths", "the methods are auto, path"),
+            ("", "the methods are auto, path, irradiance-cache"),
+            ("paths", "the methods are auto, path, irradiance-cache"),
             ("path:sparkle=1", "there is no option `sparkle`; the options are caustics, reuse, max-depth"),
             ("path:", "no option"),
             ("path:max-depth=0", "max-depth"),

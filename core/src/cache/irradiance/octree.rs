@@ -57,13 +57,12 @@ pub(super) struct Octree<'m> {
 impl<'m> Octree<'m> {
     /// Bytes for `records` records.
     pub(super) fn footprint(records: usize) -> Footprint {
-        let nodes = records.saturating_mul(NODES_PER_RECORD).saturating_add(FIRST_NODES);
-        Footprint::default().slice::<Node>(nodes).slice::<Link>(records.saturating_mul(CELLS))
+        Footprint::default().slice::<Node>(nodes(records)).slice::<Link>(records.saturating_mul(CELLS))
     }
 
     /// An empty tree around `bounds`.
     pub(super) fn new(bounds: &Bounds, records: usize, arena: &mut Arena<'m>) -> Result<Self, OutOfMemory> {
-        let nodes = arena.slice(records.saturating_mul(NODES_PER_RECORD).saturating_add(FIRST_NODES))?;
+        let nodes = arena.slice(nodes(records))?;
         let links = arena.slice(records.saturating_mul(CELLS))?;
         if let Some(root) = nodes.first_mut() {
             *root = Node::default();
@@ -189,6 +188,11 @@ impl<'m> Octree<'m> {
             }
         }
     }
+}
+
+/// Nodes for so many records.
+fn nodes(records: usize) -> usize {
+    if records == 0 { 0 } else { records.saturating_mul(NODES_PER_RECORD).saturating_add(FIRST_NODES) }
 }
 
 /// Which child of the node `depth` levels above the deepest holds a cell.

@@ -1,0 +1,148 @@
+//! The irradiance cache as a method of the renderer: its light against that of the path tracer, its bits against
+//! threads, its records against the unit of the scene, and what it does without memory.
+
+use core::sync::atomic::AtomicBool;
+use glam::Vec3;
+use halflight::drive::{self, CacheUse, Method, RenderResult, Settings, Stop};
+use halflight::save::Image;
+use halflight_core::scene::Scene;
+use halflight_tests::scenes::{SceneBuffers, cornell_box, emitter, everything};
+
+/// Rays of a record are 16² in these tests: one percent of noise in each record, at worst.
+const STRATA: u32 = 16;
+
+fn render(
+    scene: &Scene,
+    method: Method,
+    size: u32,
+    spp: u32,
+    change: impl FnOnce(&mut Settings),
+) -> RenderResult {
+    let stop = Stop { spp: Some(spp), ..Stop::default() };
+    let method = Some(method);
+    let mut settings = Settings { method, width: size, height: size, stop, ..Settings::default() };
+    settings.cache.strata = STRATA;
+    change(&mut settings);
+    drive::render(scene, &settings, &mut |_| (), &AtomicBool::new(false)).unwrap()
+}
+
+fn cached(scene: &Scene, size: u32, spp: u32, change: impl FnOnce(&mut Settings)) -> RenderResult {
+    render(scene, Method::IrradianceCache, size, spp, change)
+}
+
+fn cache(result: &RenderResult) -> CacheUse {
+    CacheUse { seconds: 0.0, ..result.cache.unwrap() }
+}
+
+/// Mean over 4 × 4 pixels: what is left of noise is a quarter.
+fn blocks(image: &Image) -> Vec<[f32; 3]> {
+    let side = image.width as usize / 4;
+    let block = |i: usize| {
+        let (x, y) = (i % side * 4, i / side * 4);
+        let pixels = (0..16).map(|p| image.pixels[(y + p / 4) * image.width as usize + x + p % 4]);
+        pixels.fold([0.0; 3], |sum, p| [0, 1, 2].map(|c| sum[c] + p[c] / 16.0))
+    };
+    (0..side * side).map(block).collect()
+}
+
+/// Root of the mean squared difference of blocks over the mean.
+fn difference(a: &Image, b: &Image) -> f64 {
+    let (a, b) = (blocks(a), blocks(b));
+    let squares: f64 = a.iter().zip(&b).map(|(a, b)| f64::from((a[1] - b[1]).powi(2))).sum();
+    let mean: f64 = b.iter().map(|b| f64::from(b[1])).sum::<f64>() / b.len() as f64;
+    (squares / b.len() as f64).sqrt() / mean
+}
+
+#[test]
+fn the_cornell_box_is_that_of_the_path_tracer_at_any_depth() {
+    let buffers = cornell_box();
+    let scene = buffers.scene();
+    for depth in [Some(3), None] {
+        let path = render(&scene, Method::Path, 64, 512, |s| s.max_depth = depth);
+        let cache = cached(&scene, 64, 128, |s| s.max_depth = depth);
+        assert!(cache.cache.unwrap().records > 100 && cache.counters.dropped.total() == 0);
+        // The noise of both leaves 0.3 %; the rest is for interpolation.
+        for (a, b) in cache.image.mean().into_iter().zip(path.image.mean()) {
+            assert!((a / b - 1.0).abs() < 0.01, "{depth:?}: {a} {b}");
+        }
+        let difference = difference(&cache.image, &path.image);
+        assert!(difference < 0.03, "{depth:?}: {difference}");
+        let seen = cached(&scene, 64, 1, |s| s.max_depth = Some(2));
+        assert_eq!(seen.cache.unwrap().records, 0);
+    }
+}
+
+#[test]
+fn in_a_furnace_all_is_one_light() {
+    // Reflectance a half, emission 1: radiance 2 everywhere.
+    let camera =
+        halflight_core::scene::Camera::look_at(Vec3::splat(0.3), Vec3::new(0.9, 0.5, 0.8), Vec3::Y, 60.0);
+    let mut buffers = SceneBuffers::new(camera);
+    let wall = buffers.material(emitter(0.5, 1.0));
+    buffers.cuboid(Vec3::ZERO, Vec3::ONE, true, wall);
+    let image = cached(&buffers.scene(), 32, 64, |_| ()).image;
+    assert!(image.mean().into_iter().all(|mean| (mean / 2.0 - 1.0).abs() < 0.005), "{:?}", image.mean());
+    // Errors of a record are shared by many pixels: 16² rays whose last bounces come and go.
+    assert!(blocks(&image).into_iter().all(|block| (block[1] / 2.0 - 1.0).abs() < 0.05));
+}
+
+#[test]
+fn bits_do_not_depend_on_threads_or_rounds() {
+    for buffers in [cornell_box(), everything()] {
+        let scene = buffers.scene();
+        let one = cached(&scene, 40, 4, |s| s.threads = Some(1));
+        assert!(one.cache.unwrap().records > 20);
+        for threads in [2, 5] {
+            let other = cached(&scene, 40, 4, |s| s.threads = Some(threads));
+            assert!(other.image == one.image, "{threads} threads");
+            assert_eq!(cache(&other), cache(&one));
+        }
+    }
+}
+
+#[test]
+fn the_unit_of_the_scene_does_not_matter() {
+    let records = |unit: f32| {
+        let mut buffers = cornell_box();
+        buffers.positions.iter_mut().for_each(|p| *p = p.map(|x| x * unit));
+        buffers.camera.eye *= unit;
+        cached(&buffers.scene(), 64, 1, |_| ()).cache.unwrap().records as f64
+    };
+    let metres = records(1.0);
+    for unit in [1e-3, 1e3, 0.37] {
+        let other = records(unit);
+        assert!((other / metres - 1.0).abs() < 0.01, "{other} records, not {metres}");
+    }
+}
+
+#[test]
+fn without_memory_for_records_the_rest_is_path_traced() {
+    let buffers = cornell_box();
+    let scene = buffers.scene();
+    let whole = cached(&scene, 32, 64, |_| ());
+    let total: usize = whole.memory.iter().map(|part| part.bytes).sum();
+    let caches = whole.memory.iter().find(|part| part.structure == "cache").unwrap().bytes;
+    for left in [0, 1000, 20_000] {
+        let tiny = cached(&scene, 32, 64, |s| {
+            s.memory = Some((total - caches + left).max(whole.memory_peak - caches));
+            s.threads = Some(whole.threads);
+        });
+        let (used, all) = (tiny.cache.unwrap(), whole.cache.unwrap());
+        assert!(used.capacity < all.records && used.records <= used.capacity, "{used:?}");
+        for (a, b) in tiny.image.mean().into_iter().zip(whole.image.mean()) {
+            assert!((a / b - 1.0).abs() < 0.02, "{a} {b}");
+        }
+    }
+}
+
+#[test]
+fn mirrors_and_glass_keep_their_light() {
+    let buffers = everything();
+    let scene = buffers.scene();
+    let path = render(&scene, Method::Path, 64, 512, |_| ());
+    let cache = cached(&scene, 64, 128, |_| ());
+    assert_eq!(cache.counters.dropped.total(), 0);
+    for (a, b) in cache.image.mean().into_iter().zip(path.image.mean()) {
+        assert!((a / b - 1.0).abs() < 0.02, "{a} {b}");
+    }
+}
