@@ -92,53 +92,63 @@ pub fn symmetric3<L: Lanes>(all: impl Fn(f32) -> L + Copy, entries: [L; 6]) -> E
     let [xx, xy, xz, yy, yz, zz] = entries;
     let largest = xx.abs().max(yy.abs()).max(zz.abs()).max(xy.abs()).max(xz.abs()).max(yz.abs());
     let ([lift, scale], [unscale, lower]) = scales(all, largest);
-    let mut d = [xx * lift * scale, yy * lift * scale, zz * lift * scale];
-    // Entry k stands in row and column k + 1 and k + 2.
-    let mut off = [yz * lift * scale, xz * lift * scale, xy * lift * scale];
+    let (mut xx, mut yy, mut zz) = (xx * lift * scale, yy * lift * scale, zz * lift * scale);
+    let (mut xy, mut xz, mut yz) = (xy * lift * scale, xz * lift * scale, yz * lift * scale);
     let (zero, one) = (all(0.0), all(1.0));
-    let mut vectors = [[one, zero, zero], [zero, one, zero], [zero, zero, one]];
+    let (mut u, mut v, mut w) = ([one, zero, zero], [zero, one, zero], [zero, zero, one]);
     for _ in 0..4 {
-        for (p, q, r) in [(0, 1, 2), (0, 2, 1), (1, 2, 0)] {
-            rotate(all, &mut d, &mut off, &mut vectors, [p, q, r]);
-        }
+        ([xx, yy], [xz, yz], [u, v]) = rotated(all, [xx, yy], xy, [xz, yz], [u, v]);
+        ([xx, zz], [xy, yz], [u, w]) = rotated(all, [xx, zz], xz, [zero, yz], [u, w]);
+        ([yy, zz], [xy, xz], [v, w]) = rotated(all, [yy, zz], yz, [xy, zero], [v, w]);
+        yz = zero;
     }
-    for (p, q) in [(0, 1), (0, 2), (1, 2)] {
-        let swap = d[p].abs().lt(d[q].abs());
-        (d[p], d[q]) = (d[q].select(swap, d[p]), d[p].select(swap, d[q]));
-        let ([a, b, c], [d, e, f]) = (vectors[p], vectors[q]);
-        vectors[p] = [d.select(swap, a), e.select(swap, b), f.select(swap, c)];
-        vectors[q] = [a.select(swap, d), b.select(swap, e), c.select(swap, f)];
-    }
-    let [x, y, z] = d;
-    Eigen3 { values: [x * unscale * lower, y * unscale * lower, z * unscale * lower], vectors }
+    ([xx, yy], [u, v]) = sorted([xx, yy], [u, v]);
+    ([xx, zz], [u, w]) = sorted([xx, zz], [u, w]);
+    ([yy, zz], [v, w]) = sorted([yy, zz], [v, w]);
+    Eigen3 { values: [xx * unscale * lower, yy * unscale * lower, zz * unscale * lower], vectors: [u, v, w] }
 }
 
-/// One Jacobi rotation in the plane of axes p and q: makes the entry pq zero.
+/// What a Jacobi rotation in the plane of axes p and q makes of the entries pp and qq, of those in the third row,
+/// rp and rq, and of the vectors p and q; the entry pq becomes zero.
 #[inline(always)]
-fn rotate<L: Lanes>(
-    all: impl Fn(f32) -> L + Copy,
-    d: &mut [L; 3],
-    off: &mut [L; 3],
-    vectors: &mut [[L; 3]; 3],
-    [p, q, r]: [usize; 3],
-) {
+fn rotated<L: Lanes>(
+    all: impl Fn(f32) -> L,
+    [pp, qq]: [L; 2],
+    pq: L,
+    [rp, rq]: [L; 2],
+    [u, v]: [[L; 3]; 2],
+) -> ([L; 2], [L; 2], [[L; 3]; 2]) {
     let (zero, one) = (all(0.0), all(1.0));
-    let twice = off[r] + off[r];
-    // t = tan of the smaller angle: 2 pq / (difference ± √(difference² + 4 pq²)).
-    let difference = d[q] - d[p];
+    // tan of the smaller angle: 2 pq / (difference ± √(difference² + 4 pq²)).
+    let (difference, twice) = (qq - pp, pq + pq);
     let root = (difference * difference + twice * twice).sqrt();
     let denominator = difference + (-root).select(difference.lt(zero), root);
-    let t = twice / one.select(denominator.eq(zero), denominator);
-    let cos = one / (one + t * t).sqrt();
-    let sin = t * cos;
-    d[p] = d[p] - t * off[r];
-    d[q] = d[q] + t * off[r];
-    off[r] = zero;
-    // Entry pr stands in off[q], entry qr in off[p].
-    (off[q], off[p]) = (cos * off[q] - sin * off[p], sin * off[q] + cos * off[p]);
-    let ([a, b, c], [d, e, f]) = (vectors[p], vectors[q]);
-    vectors[p] = [cos * a - sin * d, cos * b - sin * e, cos * c - sin * f];
-    vectors[q] = [sin * a + cos * d, sin * b + cos * e, sin * c + cos * f];
+    let tan = twice / one.select(denominator.eq(zero), denominator);
+    let cos = one / (one + tan * tan).sqrt();
+    let sin = tan * cos;
+    let ([a, b, c], [d, e, f]) = (u, v);
+    (
+        [pp - tan * pq, qq + tan * pq],
+        [cos * rp - sin * rq, sin * rp + cos * rq],
+        [
+            [cos * a - sin * d, cos * b - sin * e, cos * c - sin * f],
+            [sin * a + cos * d, sin * b + cos * e, sin * c + cos * f],
+        ],
+    )
+}
+
+/// Two values and their vectors, the larger magnitude first.
+#[inline(always)]
+fn sorted<L: Lanes>([x, y]: [L; 2], [u, v]: [[L; 3]; 2]) -> ([L; 2], [[L; 3]; 2]) {
+    let swap = x.abs().lt(y.abs());
+    let ([a, b, c], [d, e, f]) = (u, v);
+    (
+        [y.select(swap, x), x.select(swap, y)],
+        [
+            [d.select(swap, a), e.select(swap, b), f.select(swap, c)],
+            [a.select(swap, d), b.select(swap, e), c.select(swap, f)],
+        ],
+    )
 }
 
 /// Sixteen 2×2 matrices: entries xx, xy, yy of each.

@@ -1,5 +1,7 @@
 //! `halflight bench`: how fast the kernels are on this machine, beside the rival that the build has.
 
+mod eigen;
+
 use super::failure::Failure;
 use super::view::View;
 use super::{say, values, warn};
@@ -23,6 +25,7 @@ pub(super) struct Bench {
 #[derive(Subcommand)]
 enum Kernel {
     Rays(Box<Rays>),
+    Eigen(eigen::Eigen),
 }
 
 /// Rays per second on one thread
@@ -48,6 +51,7 @@ impl Bench {
     pub(super) fn run(&self) -> Result<ExitCode, Failure> {
         match &self.kernel {
             Kernel::Rays(rays) => rays.run(),
+            Kernel::Eigen(eigen) => eigen.run(),
         }
     }
 }

@@ -1,0 +1,142 @@
+//! Eigen decompositions per second of symmetric matrices on one thread: 2×2, as the radii of irradiance records want
+//! them, and 3×3.
+//!
+//! A batch of [`BATCH`] random matrices stays in the first-level cache with its results and is decomposed again and
+//! again, for [`SECONDS`] at a time; that [`REPETITIONS`] times, ours and the rival's in turn, and the median counts.
+//! Values and vectors of all are computed and stored, of ours sorted by magnitude.
+
+#[cfg(feature = "nalgebra")]
+mod nalgebra;
+
+use super::{REPETITIONS, median};
+use core::hint::black_box;
+use halflight_core::Level;
+use halflight_core::sampling::{mix, unit_float};
+use halflight_simd::kernels::eigen::{
+    Decomposed2, Decomposed3, Matrices2, Matrices3, decompose2, decompose3,
+};
+use std::time::Instant;
+
+/// Matrices of a batch.
+pub const BATCH: usize = 512;
+/// How long each measurement lasts at least.
+pub const SECONDS: f64 = 0.02;
+
+/// Matrices per second.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Speeds {
+    /// Of 2×2.
+    pub sym2: f64,
+    /// Of 3×3.
+    pub sym3: f64,
+}
+
+/// What was measured.
+#[derive(Clone, Debug, PartialEq)]
+pub struct EigenReport {
+    /// Level of our kernels.
+    pub level: Level,
+    /// Ours.
+    pub ours: Speeds,
+    /// Name and speeds of the rival that this program was built with.
+    pub rival: Option<(&'static str, Speeds)>,
+}
+
+/// One way of decomposing batches.
+trait Entry {
+    /// What its library is called.
+    fn name(&self) -> &'static str;
+    /// Decomposes 2×2 matrices.
+    fn sym2(&mut self, matrices: &[Matrices2]);
+    /// Decomposes 3×3 matrices.
+    fn sym3(&mut self, matrices: &[Matrices3]);
+}
+
+/// Measures the kernels of `level`.
+pub fn run(level: Level) -> EigenReport {
+    let numbers: Vec<f32> = numbers().take(6 * BATCH).collect();
+    let (rows, _) = numbers.as_chunks::<16>();
+    let (small, large): (&[Matrices2], &[Matrices3]) =
+        (rows[..3 * BATCH / 16].as_chunks().0, rows.as_chunks().0);
+    let mut entries: Vec<Box<dyn Entry>> = vec![Box::new(Ours::new(level))];
+    #[cfg(feature = "nalgebra")]
+    entries.push(Box::new(nalgebra::Nalgebra::default()));
+    let mut speeds = vec![(Vec::new(), Vec::new()); entries.len()];
+    for _ in 0..REPETITIONS {
+        for (entry, speeds) in entries.iter_mut().zip(&mut speeds) {
+            speeds.0.push(per_second(|| entry.sym2(black_box(small))));
+            speeds.1.push(per_second(|| entry.sym3(black_box(large))));
+        }
+    }
+    let mut measured = entries
+        .iter()
+        .zip(speeds)
+        .map(|(entry, (sym2, sym3))| (entry.name(), Speeds { sym2: median(sym2), sym3: median(sym3) }));
+    let nothing = Speeds { sym2: f64::NAN, sym3: f64::NAN };
+    let (_, ours) = measured.next().unwrap_or(("", nothing));
+    EigenReport { level, ours, rival: measured.next() }
+}
+
+/// Numbers from -1 to 1.
+fn numbers() -> impl Iterator<Item = f32> {
+    (0..).map(|i| 2.0 * unit_float((mix(i) >> 32) as u32) - 1.0)
+}
+
+/// Matrices per second of something that decomposes a batch.
+fn per_second(mut batch: impl FnMut()) -> f64 {
+    let start = Instant::now();
+    let mut batches = 0.0;
+    loop {
+        for _ in 0..64 {
+            batch();
+        }
+        batches += 64.0;
+        let seconds = start.elapsed().as_secs_f64();
+        if seconds >= SECONDS {
+            return batches * BATCH as f64 / seconds;
+        }
+    }
+}
+
+struct Ours {
+    level: Level,
+    small: Vec<Decomposed2>,
+    large: Vec<Decomposed3>,
+}
+
+impl Ours {
+    fn new(level: Level) -> Self {
+        Self { level, small: vec![[[0.0; 16]; 4]; BATCH / 16], large: vec![[[0.0; 16]; 12]; BATCH / 16] }
+    }
+}
+
+impl Entry for Ours {
+    fn name(&self) -> &'static str {
+        "halflight"
+    }
+
+    fn sym2(&mut self, matrices: &[Matrices2]) {
+        decompose2(self.level, matrices, &mut self.small);
+        black_box(&self.small);
+    }
+
+    fn sym3(&mut self, matrices: &[Matrices3]) {
+        decompose3(self.level, matrices, &mut self.large);
+        black_box(&self.large);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_level_is_measured() {
+        for level in Level::detect().and_below() {
+            let report = run(level);
+            assert_eq!(report.level, level);
+            assert!(report.ours.sym2 > 0.0 && report.ours.sym3 > 0.0, "{report:?}");
+            assert_eq!(report.rival.is_some(), cfg!(feature = "nalgebra"));
+        }
+    }
+}
