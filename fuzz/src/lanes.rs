@@ -21,6 +21,8 @@ fn attempt(input: &mut Unstructured) -> Result<()> {
         let (eight, sixteen) = level.dispatch(operands);
         check(level, &operands, (1 << operands.first) - 1, &eight);
         check(level, &operands, operands.chosen, &sixteen);
+        let words = operands.a.map(f32::to_bits);
+        level.dispatch(Packing { operands, words }).check(level, &operands, &words);
     }
     Ok(())
 }
@@ -118,4 +120,67 @@ fn check<const N: usize>(level: Level, operands: &Operands, chosen: u32, results
         results.masks.iter().all(|&bits| u64::from(bits) < 1 << N),
         "{level:?} ×{N}: bits beyond the lanes"
     );
+}
+
+/// What only kernels of photon maps use: lanes packed, and fields of words.
+struct Packing {
+    operands: Operands,
+    words: [u32; 16],
+}
+
+struct Packed {
+    lanes: [f32; 16],
+    numbers: [f32; 16],
+    fields: [[f32; 16]; 3],
+    bytes: [f32; 16],
+    powers: [f32; 16],
+    smallest: f32,
+}
+
+/// Where fields of a word start, and how wide they are.
+const FIELDS: [(u32, u32); 3] = [(0, 12), (22, 10), (8, 24)];
+
+fn low_bytes(words: &[u32; 16]) -> [u8; 16] {
+    words.map(|word| word as u8)
+}
+
+impl Kernel for Packing {
+    type Out = Packed;
+
+    #[inline(always)]
+    fn run<S: Simd>(self, simd: S) -> Packed {
+        let Self { operands, words } = self;
+        let mut lanes = [0.0; 16];
+        simd.pack16(simd.mask16(operands.chosen), simd.load16(&operands.b), &mut lanes);
+        Packed {
+            lanes,
+            numbers: simd.numbers16(words[0]).to_array(),
+            fields: FIELDS.map(|(from, width)| simd.field16(&words, from, width).to_array()),
+            bytes: simd.bytes16(&low_bytes(&words)).to_array(),
+            powers: simd.powers16(&words).to_array(),
+            smallest: simd.load16(&operands.a).smallest(),
+        }
+    }
+}
+
+impl Packed {
+    fn check(&self, level: Level, operands: &Operands, words: &[u32; 16]) {
+        let wanted = (0..16).filter(|i| operands.chosen >> i & 1 == 1).map(|i| operands.b[i].to_bits());
+        let packed: Vec<u32> = wanted.collect();
+        let got: Vec<u32> = self.lanes.iter().take(packed.len()).map(|lane| lane.to_bits()).collect();
+        assert_eq!(got, packed, "{level:?} pack of {:b}", operands.chosen);
+        let bits = |lanes: &[f32; 16]| lanes.map(f32::to_bits);
+        let counted = core::array::from_fn(|i| words[0].wrapping_add(i as u32));
+        assert_eq!(bits(&self.numbers), counted, "{level:?} numbers");
+        for ((from, width), field) in FIELDS.into_iter().zip(&self.fields) {
+            let expected = words.map(|word| ((word >> from) & ((1 << width) - 1)) as f32);
+            assert_eq!(*field, expected, "{level:?} field of {width} from {from}");
+        }
+        assert_eq!(self.bytes, low_bytes(words).map(f32::from), "{level:?} bytes");
+        assert_eq!(bits(&self.powers), words.map(|word| word >> 24 << 23), "{level:?} powers");
+        if operands.a.iter().all(|a| !a.is_nan()) {
+            let smallest = operands.a.iter().copied().fold(f32::INFINITY, f32::min);
+            assert_eq!(self.smallest, smallest, "{level:?} smallest");
+        }
+    }
 }

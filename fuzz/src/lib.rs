@@ -13,6 +13,7 @@ pub mod mtl;
 mod numbers;
 #[cfg(feature = "app")]
 pub mod obj;
+pub mod photons;
 pub mod sampling;
 #[cfg(feature = "app")]
 pub mod scene_file;
@@ -37,6 +38,7 @@ pub const TARGETS: &[Target] = &[
     Target { name: "mtl", run: mtl::run },
     #[cfg(feature = "app")]
     Target { name: "obj", run: obj::run },
+    Target { name: "photons", run: photons::run },
     Target { name: "sampling", run: sampling::run },
     #[cfg(feature = "app")]
     Target { name: "scene_file", run: scene_file::run },

@@ -1,7 +1,6 @@
 //! The reference: every photon of a map is looked at. For tests, and for those who doubt.
 
 use super::{ALIKE, Density, Disc, FLATNESS, Falloff, PhotonMap, Response, layout::LEAF};
-use crate::Rgb;
 use core::f32::consts::PI;
 use glam::Vec3;
 use halflight_simd::kernels::points::squared_distance;
@@ -18,29 +17,32 @@ pub fn within(map: &PhotonMap, place: Vec3, radius: f32) -> impl Iterator<Item =
     all.filter(move |&(_, distance)| distance <= squared_radius)
 }
 
-/// What [`PhotonMap::gather`] estimates, photon by photon in unit vectors: to rounding the same, but for photons
-/// that a rounding puts in or out of the disc.
+/// What [`PhotonMap::gather`] estimates, photon by photon: the same photons, their sum in another order.
 pub fn gather<R: Response>(map: &PhotonMap, disc: &Disc, response: &R) -> Density {
     let mut density = Density::default();
-    if !(disc.radius > 0.0 && disc.radius < f32::INFINITY) {
+    let squared_radius = map.space.squared(disc.radius).unwrap_or(0.0);
+    if !(squared_radius > 0.0 && squared_radius < f32::MAX) {
         return density;
     }
-    for (index, _) in within(map, disc.place, disc.radius) {
-        let Some(photon) = map.get(index) else { continue };
-        let offset = disc.place - photon.position();
-        let flat = offset.dot(disc.normal).abs() <= FLATNESS * disc.radius;
-        let alike = photon.normal().dot(disc.normal) >= ALIKE;
-        if flat && alike && photon.direction().dot(disc.normal) > 0.0 {
-            let ratio = (offset.length() / disc.radius).min(1.0);
+    let place = Vec3::from_array(map.space.enter(disc.place.to_array()));
+    let thickness = FLATNESS * libm::sqrtf(squared_radius);
+    for (index, distance) in within(map, disc.place, disc.radius) {
+        let leaf = map.leaves.get(index as usize / LEAF);
+        let Some(photon) = leaf.map(|leaf| leaf.photon(index as usize % LEAF)) else { continue };
+        let along = photon.normal_in_steps().dot(disc.normal);
+        let flat = (place - photon.position()).dot(disc.normal).abs() <= thickness;
+        let alike = photon.normal_in_steps().length_squared() * (ALIKE * ALIKE) <= along * along;
+        if flat && alike && along > 0.0 && photon.direction_in_steps().dot(disc.normal) > 0.0 {
+            let squared = (distance * (1.0 / squared_radius)).min(1.0);
             let weight = match disc.falloff {
                 Falloff::Constant => 1.0,
-                Falloff::Cone => 3.0 * (1.0 - ratio),
-                Falloff::Epanechnikov => 2.0 * (1.0 - ratio * ratio),
+                Falloff::Cone => 3.0 * (1.0 - libm::sqrtf(squared)),
+                Falloff::Epanechnikov => 2.0 * (1.0 - squared),
             };
             density.radiance += photon.power() * response.of(photon.direction()) * weight;
             density.photons += 1;
         }
     }
-    density.radiance = density.radiance / (PI * disc.radius) / disc.radius;
-    if density.photons == 0 { Density { radiance: Rgb::ZERO, ..density } } else { density }
+    density.radiance *= 1.0 / (PI * disc.radius) / disc.radius;
+    density
 }

@@ -56,15 +56,25 @@ impl Photon {
 
     /// Where it came from; of unit length.
     pub fn direction(&self) -> Vec3 {
-        let side = (1 << DIRECTION_BITS) - 1;
-        let [u, v] = [self.light & side, self.light >> DIRECTION_BITS & side];
-        unfolded(u as f32, v as f32, DIRECTION_STEPS).normalize_or(Vec3::Z)
+        self.direction_in_steps().normalize_or(Vec3::Z)
     }
 
     /// The normal of the surface where it lies; of unit length.
     pub fn normal(&self) -> Vec3 {
+        self.normal_in_steps().normalize_or(Vec3::Z)
+    }
+
+    /// Its direction in whole numbers, of no particular length.
+    pub(super) fn direction_in_steps(&self) -> Vec3 {
+        let side = (1 << DIRECTION_BITS) - 1;
+        let [u, v] = [self.light & side, self.light >> DIRECTION_BITS & side];
+        unfolded(u as f32, v as f32, DIRECTION_STEPS)
+    }
+
+    /// The normal in whole numbers, of no particular length.
+    pub(super) fn normal_in_steps(&self) -> Vec3 {
         let [a, b] = self.normal;
-        unfolded(f32::from(a), f32::from(b), NORMAL_STEPS).normalize_or(Vec3::Z)
+        unfolded(f32::from(a), f32::from(b), NORMAL_STEPS)
     }
 
     /// Its power.

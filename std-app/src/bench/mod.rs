@@ -1,6 +1,7 @@
 //! How fast the kernels are on this machine, on one thread, beside a rival where the build has one.
 
 pub mod eigen;
+pub mod knn;
 pub mod rays;
 
 use core::fmt;

@@ -1,6 +1,7 @@
 //! `halflight bench`: how fast the kernels are on this machine, beside the rival that the build has.
 
 mod eigen;
+mod knn;
 
 use super::failure::Failure;
 use super::view::View;
@@ -26,6 +27,7 @@ pub(super) struct Bench {
 enum Kernel {
     Rays(Box<Rays>),
     Eigen(eigen::Eigen),
+    Knn(knn::Knn),
 }
 
 /// Rays per second on one thread
@@ -52,6 +54,7 @@ impl Bench {
         match &self.kernel {
             Kernel::Rays(rays) => rays.run(),
             Kernel::Eigen(eigen) => eigen.run(),
+            Kernel::Knn(knn) => knn.run(),
         }
     }
 }

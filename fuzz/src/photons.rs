@@ -1,0 +1,135 @@
+//! Build over photons in any places and search from anywhere, by every entry point at every level: what is found
+//! must be what brute force finds, ties included; and a density the same to the bit at every level.
+
+use crate::numbers::{coordinate, fraction, point};
+use arbitrary::{Result, Unstructured};
+use glam::Vec3;
+use halflight_core::memory::{Arena, Footprint, Line};
+use halflight_core::photon::{
+    Density, Disc, Falloff, Neighbours, Photon, PhotonMap, Photons, Response, Turn, Uniform, brute,
+};
+use halflight_core::{Level, Rgb};
+
+/// More than the leaves under one node.
+const MAX_PHOTONS: usize = 1024;
+
+/// Relative; a thousand terms are added in another order.
+const ROUNDING: f32 = 1e-4;
+
+/// One input.
+pub fn run(data: &[u8]) {
+    let _ = attempt(&mut Unstructured::new(data));
+}
+
+fn attempt(input: &mut Unstructured) -> Result<()> {
+    let mut photons = Vec::new();
+    let (count, copies) = (1 + input.arbitrary::<u8>()? % 64, 1 + usize::from(input.arbitrary::<u8>()? % 40));
+    for _ in 0..count {
+        photons.push(photon(input)?);
+    }
+    let places: Vec<Vec3> = photons.iter().map(Photon::position).collect();
+    // The same again, many times over: then it is for the order of the photons to say which are nearer.
+    photons = photons.repeat(copies);
+    photons.truncate(MAX_PHOTONS);
+
+    let mut memory = lines(Photons::footprint(photons.len()));
+    let mut place = Photons::new(photons.len(), &mut Arena::new(bytemuck::cast_slice_mut(&mut memory)))
+        .expect("the footprint was granted");
+    place.as_mut_slice().copy_from_slice(&photons);
+    let map = place.build(photons.len());
+    let finite = photons.iter().filter(|photon| photon.position().is_finite()).count();
+    assert_eq!((map.len(), map.len() + map.refused()), (finite, photons.len()));
+
+    let mut asked = Vec::new();
+    while asked.len() < 6 && !input.is_empty() {
+        let near = places[usize::from(input.arbitrary::<u8>()?) % places.len()];
+        asked.push(if input.arbitrary::<u8>()? < 128 { near } else { Vec3::from(point(input)?) });
+    }
+    let radius = if input.arbitrary::<u8>()? < 100 { f32::INFINITY } else { coordinate(input)? };
+    let k = usize::from(input.arbitrary::<u8>()?);
+    let normal = Vec3::from(point(input)?).normalize_or(Vec3::Z);
+    let falloff =
+        [Falloff::Constant, Falloff::Cone, Falloff::Epanechnikov][usize::from(input.arbitrary::<u8>()? % 3)];
+    for level in Level::detect().and_below() {
+        search(&map, level, &asked, radius, k);
+        for &place in &asked {
+            gather(&map, level, &Disc { place, normal, radius, falloff });
+        }
+    }
+    Ok(())
+}
+
+fn photon(input: &mut Unstructured) -> Result<Photon> {
+    let place = Vec3::from(point(input)?);
+    let (direction, normal) = (Vec3::from(point(input)?), Vec3::from(point(input)?));
+    let power = Rgb::new(fraction(input)?, fraction(input)?, fraction(input)?);
+    Ok(Photon::new(place, direction, normal, power))
+}
+
+fn lines(footprint: Footprint) -> Vec<Line> {
+    vec![Line([0; 64]); footprint.bytes() / 64]
+}
+
+/// By rising distance and index.
+fn expected(map: &PhotonMap, place: Vec3, radius: f32) -> Vec<u32> {
+    let mut all: Vec<_> = brute::within(map, place, radius).map(|(i, d)| (d.to_bits(), i)).collect();
+    all.sort_unstable();
+    all.into_iter().map(|(_, index)| index).collect()
+}
+
+fn search(map: &PhotonMap, level: Level, asked: &[Vec3], radius: f32, k: usize) {
+    let mut memory = lines(Neighbours::footprint(k));
+    let mut neighbours = Neighbours::new(k, &mut Arena::new(bytemuck::cast_slice_mut(&mut memory)))
+        .expect("the footprint was granted");
+    let sorted = |mut indices: Vec<u32>| {
+        indices.sort_unstable();
+        indices
+    };
+    let check = |place: Vec3, neighbours: &Neighbours| {
+        let mut expected = expected(map, place, radius);
+        expected.truncate(k);
+        let found = neighbours.iter().map(|(index, _)| index).collect();
+        assert_eq!(
+            sorted(found),
+            sorted(expected),
+            "{level:?} {k} of {} at {place} within {radius}",
+            map.len()
+        );
+    };
+    for &place in asked {
+        map.nearest(level, place, radius, &mut neighbours);
+        check(place, &neighbours);
+        let expected = sorted(expected(map, place, radius));
+        let mut found = vec![0; expected.len()];
+        assert_eq!(map.within(level, place, radius, &mut found), expected.len());
+        assert_eq!(found, expected, "{level:?} at {place} within {radius}");
+    }
+    let mut turns = vec![Turn::default(); asked.len()];
+    let mut seen = 0;
+    map.nearest_batch(level, asked, radius, &mut turns, &mut neighbours, |index, neighbours| {
+        seen += 1;
+        check(asked[index], neighbours);
+    });
+    assert_eq!(seen, asked.len());
+}
+
+fn gather(map: &PhotonMap, level: Level, disc: &Disc) {
+    let glossy = |direction: Vec3| Rgb::new(1.0 + direction.x, direction.y * direction.y, 0.5);
+    same(map, level, disc, &Uniform(Rgb::new(1.0, 0.5, 0.25)));
+    same(map, level, disc, &glossy);
+}
+
+fn same<R: Response>(map: &PhotonMap, level: Level, disc: &Disc, response: &R) {
+    let (found, expected) = (map.gather(level, disc, response), brute::gather(map, disc, response));
+    assert_eq!(found.photons, expected.photons, "{level:?} {disc:?}");
+    if expected.radiance.is_finite() {
+        let error = (found.radiance - expected.radiance).abs();
+        let most = expected.radiance * ROUNDING + f32::MIN_POSITIVE;
+        assert!(error.cmple(most).all(), "{level:?} {disc:?}: {found:?}, brute force {expected:?}");
+    }
+    let bits = |density: Density| density.radiance.to_array().map(f32::to_bits);
+    let baseline = map.gather(Level::BASELINE, disc, response);
+    if baseline.radiance.is_finite() {
+        assert_eq!(bits(found), bits(baseline), "{level:?} {disc:?}");
+    }
+}

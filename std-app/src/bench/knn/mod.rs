@@ -1,0 +1,178 @@
+//! Searches per second of the photon map on one thread: the k nearest, with and without a radius, and the density
+//! estimate.
+//!
+//! Everything is timed [`REPETITIONS`] times by the wall clock, and the median counts; ours and the rival's
+//! repetitions alternate, so that whatever else the machine does meets both.
+
+mod data;
+#[cfg(feature = "kiddo")]
+mod kiddo;
+mod ours;
+mod report;
+#[cfg(test)]
+mod tests;
+
+pub use data::{Data, Surfel};
+pub use report::{KnnReport, KnnRival, Speed};
+
+use super::{BenchError, REPETITIONS, median};
+use core::hint::black_box;
+use halflight_core::Level;
+use halflight_core::photon::Photons;
+use std::time::Instant;
+
+/// How much is searched, and how often.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Amount {
+    /// Photons in the map.
+    pub photons: usize,
+    /// Searches for the nearest; a tenth of it for gathering.
+    pub queries: usize,
+}
+
+impl Amount {
+    /// What results are told of.
+    pub const FULL: Amount = Amount { photons: 1_000_000, queries: 200_000 };
+}
+
+/// What is looked for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Task {
+    /// The `k` nearest within a radius.
+    Nearest {
+        /// How many.
+        k: usize,
+        /// Infinite where there is none.
+        radius: f32,
+    },
+    /// All within a radius: the density estimate.
+    Gather {
+        /// Of the disc.
+        radius: f32,
+    },
+}
+
+/// Radius of bounded searches: about what holds fifty photons away from the focus.
+const WITHIN: f32 = 0.01;
+
+impl Task {
+    /// Everything that is measured.
+    pub const ALL: [Task; 10] = {
+        const fn nearest(k: usize, radius: f32) -> Task {
+            Task::Nearest { k, radius }
+        }
+        [
+            nearest(8, f32::INFINITY),
+            nearest(50, f32::INFINITY),
+            nearest(100, f32::INFINITY),
+            nearest(200, f32::INFINITY),
+            nearest(8, WITHIN),
+            nearest(50, WITHIN),
+            nearest(100, WITHIN),
+            nearest(200, WITHIN),
+            Task::Gather { radius: 0.045 },
+            Task::Gather { radius: 0.075 },
+        ]
+    };
+
+    /// Its name in reports.
+    pub fn name(self) -> String {
+        match self {
+            Task::Nearest { k, radius } if radius.is_finite() => format!("k{k}_within"),
+            Task::Nearest { k, .. } => format!("k{k}"),
+            Task::Gather { radius } => format!("gather_{radius}"),
+        }
+    }
+
+    /// The queries that it takes of the data.
+    pub fn queries(self, data: &Data) -> &[Surfel] {
+        match self {
+            Task::Nearest { .. } => &data.queries,
+            Task::Gather { .. } => &data.queries[..data.queries.len() / 10],
+        }
+    }
+}
+
+/// One way of searching.
+trait Searcher {
+    /// Does it for every query, and says how many photons were found in all.
+    fn run(&mut self, task: Task, data: &Data) -> Result<u64, BenchError>;
+}
+
+/// Measures with the kernels of `level`.
+///
+/// # Errors
+/// [`BenchError`] where memory is missing or the rival refuses.
+pub fn run(amount: Amount, level: Level) -> Result<KnnReport, BenchError> {
+    let data = Data::new(amount.photons, amount.queries);
+    let records = ours::records(&data.photons);
+    #[cfg(feature = "kiddo")]
+    let points = kiddo::points(&data.photons);
+    let (mut build, mut rival_build) = (Vec::new(), Vec::new());
+    for _ in 0..REPETITIONS {
+        let mut memory = Vec::new();
+        build.push(seconds(|| ours::build(&records, &mut memory).map(|map| map.len()))?.0);
+        #[cfg(feature = "kiddo")]
+        rival_build.push(seconds(|| kiddo::build(&points))?.0);
+        #[cfg(not(feature = "kiddo"))]
+        rival_build.push(f64::NAN);
+    }
+
+    let mut memory = Vec::new();
+    let map = ours::build(&records, &mut memory)?;
+    let bytes = Photons::footprint(records.len()).bytes();
+    let (mut singly, mut together) = (ours::Singly { map: &map, level }, ours::Together { map: &map, level });
+    let mut searchers: Vec<&mut dyn Searcher> = vec![&mut singly, &mut together];
+    #[cfg(feature = "kiddo")]
+    let mut rival = kiddo::Kiddo(kiddo::build(&points)?);
+    #[cfg(feature = "kiddo")]
+    searchers.push(&mut rival);
+
+    let mut speeds: Vec<Vec<Speed>> = searchers.iter().map(|_| Vec::new()).collect();
+    for task in Task::ALL {
+        for (speeds, speed) in speeds.iter_mut().zip(measure(&mut searchers, task, &data)?) {
+            speeds.push(speed);
+        }
+    }
+    let mut speeds = speeds.into_iter();
+    Ok(KnnReport {
+        level,
+        amount,
+        build_seconds: median(build),
+        bytes,
+        singly: speeds.next().unwrap_or_default(),
+        together: speeds.next().unwrap_or_default(),
+        rival: speeds.next().map(|speeds| KnnRival {
+            name: "kiddo 6 ImmutableKdTree".into(),
+            build_seconds: median(rival_build),
+            speeds,
+        }),
+    })
+}
+
+/// What `work` gives, and how long it takes.
+fn seconds<T>(work: impl FnOnce() -> Result<T, BenchError>) -> Result<(f64, T), BenchError> {
+    let start = Instant::now();
+    let result = black_box(work()?);
+    Ok((start.elapsed().as_secs_f64(), result))
+}
+
+/// Runs a task by each searcher in turn, again and again.
+fn measure(searchers: &mut [&mut dyn Searcher], task: Task, data: &Data) -> Result<Vec<Speed>, BenchError> {
+    let mut times = vec![Vec::new(); searchers.len()];
+    let mut found = vec![0; searchers.len()];
+    for _ in 0..REPETITIONS {
+        for ((searcher, times), found) in searchers.iter_mut().zip(&mut times).zip(&mut found) {
+            let (time, count) = seconds(|| searcher.run(task, data))?;
+            times.push(time);
+            *found = count;
+        }
+    }
+    let queries = task.queries(data).len() as f64;
+    let speed = |(times, found): (Vec<f64>, u64)| Speed {
+        task,
+        queries_per_second: queries / median(times),
+        found: found as f64 / queries,
+    };
+    Ok(times.into_iter().zip(found).map(speed).collect())
+}

@@ -1,0 +1,60 @@
+//! What was measured, and how it compares.
+
+use super::{Amount, Task};
+use halflight_core::Level;
+
+/// Our numbers, and the rival's.
+#[derive(Clone, Debug)]
+pub struct KnnReport {
+    /// The instruction set of our kernels.
+    pub level: Level,
+    /// How much was searched.
+    pub amount: Amount,
+    /// Seconds to put the photons into memory and build the map there.
+    pub build_seconds: f64,
+    /// Bytes of the map, its photons included.
+    pub bytes: usize,
+    /// One search after the other, one for each of [`Task::ALL`].
+    pub singly: Vec<Speed>,
+    /// All searches in one call.
+    pub together: Vec<Speed>,
+    /// Where the program was built with one.
+    pub rival: Option<KnnRival>,
+}
+
+/// The rival's numbers.
+#[derive(Clone, Debug)]
+pub struct KnnRival {
+    /// Its name and version.
+    pub name: String,
+    /// Seconds to build its tree.
+    pub build_seconds: f64,
+    /// One for each of [`Task::ALL`].
+    pub speeds: Vec<Speed>,
+}
+
+/// How fast a task is done.
+#[derive(Clone, Copy, Debug)]
+pub struct Speed {
+    /// Which.
+    pub task: Task,
+    /// Searches; NaN where there are none.
+    pub queries_per_second: f64,
+    /// Photons found by a search, on average: of a density estimate, those that were weighed.
+    pub found: f64,
+}
+
+impl KnnReport {
+    /// Bytes of the map for each photon.
+    pub fn bytes_per_photon(&self) -> f64 {
+        self.bytes as f64 / self.amount.photons as f64
+    }
+}
+
+impl KnnRival {
+    /// The speeds of `ours` over the rival's, task by task.
+    pub fn ratios(&self, ours: &[Speed]) -> Vec<f64> {
+        let pairs = ours.iter().zip(&self.speeds);
+        pairs.map(|(ours, theirs)| ours.queries_per_second / theirs.queries_per_second).collect()
+    }
+}
