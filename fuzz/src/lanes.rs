@@ -40,12 +40,13 @@ struct Operands {
 struct Results<A> {
     numbers: [A; NUMBERS.len()],
     picked: A,
+    product: [A; 2],
     masks: [u32; MASKS.len()],
 }
 
 type Binary<T> = (&'static str, fn(f32, f32) -> T);
 
-const NUMBERS: [Binary<f32>; 8] = [
+const NUMBERS: [Binary<f32>; 10] = [
     ("add", |a, b| a + b),
     ("sub", |a, b| a - b),
     ("mul", |a, b| a * b),
@@ -54,6 +55,8 @@ const NUMBERS: [Binary<f32>; 8] = [
     ("abs", |a, _| a.abs()),
     ("min", f32::min),
     ("max", f32::max),
+    ("sqrt", |a, _| a.sqrt()),
+    ("power of two", |a, _| f32::from_bits(a.to_bits() & f32::INFINITY.to_bits())),
 ];
 
 const MASKS: [Binary<bool>; 6] = [
@@ -67,11 +70,13 @@ const MASKS: [Binary<bool>; 6] = [
 
 #[inline(always)]
 fn operate<L: Lanes>(a: L, b: L, chosen: L::Mask) -> Results<L::Array> {
-    let numbers = [a + b, a - b, a * b, a / b, -a, a.abs(), a.min(b), a.max(b)];
+    let numbers = [a + b, a - b, a * b, a / b, -a, a.abs(), a.min(b), a.max(b), a.sqrt(), a.power_of_two()];
+    let (product, rest) = a.product(b);
     let masks = [a.lt(b), a.le(b), a.eq(b), !a.lt(b), a.lt(b) | a.eq(b), a.le(b) & a.eq(b)];
     Results {
         numbers: numbers.map(L::to_array),
         picked: a.select(chosen, b).to_array(),
+        product: [product.to_array(), rest.to_array()],
         masks: masks.map(|mask| {
             assert_eq!(mask.any(), mask.bits() != 0);
             mask.bits()
@@ -108,6 +113,13 @@ fn check<const N: usize>(level: Level, operands: &Operands, chosen: u32, results
         }
         for ((name, scalar), bits) in MASKS.iter().zip(results.masks) {
             assert_eq!(bits >> i & 1 == 1, scalar(a, b), "{level:?} ×{N} {name}({a:e}, {b:e})");
+        }
+        let exact = f64::from(a) * f64::from(b);
+        let factor = |x: f32| x == 0.0 || (1e-14..=1e30).contains(&x.abs());
+        if factor(a) && factor(b) && (exact == 0.0 || (1e-30..=1e38).contains(&exact.abs())) {
+            let [product, rest] = &results.product;
+            let sum = f64::from(product[i]) + f64::from(rest[i]);
+            assert!(product[i] == a * b && sum == exact, "{level:?} ×{N} product({a:e}, {b:e}) = {sum:e}");
         }
         let expected = if chosen >> i & 1 == 1 { a } else { b };
         assert_eq!(

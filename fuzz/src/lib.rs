@@ -4,6 +4,7 @@
 
 pub mod bsdf;
 pub mod bvh;
+pub mod derivatives;
 #[cfg(feature = "app")]
 pub mod image_input;
 pub mod kernels;
@@ -30,6 +31,7 @@ pub struct Target {
 pub const TARGETS: &[Target] = &[
     Target { name: "bsdf", run: bsdf::run },
     Target { name: "bvh", run: bvh::run },
+    Target { name: "derivatives", run: derivatives::run },
     #[cfg(feature = "app")]
     Target { name: "image_input", run: image_input::run },
     Target { name: "kernels", run: kernels::run },

@@ -80,9 +80,9 @@ pub fn symmetric2<L: Lanes>(all: impl Fn(f32) -> L + Copy, [xx, xy, yy]: [L; 3])
     let (x, y) = (one.select(isotropic, x), zero.select(isotropic, y));
     let inverse = one / (x * x + y * y).sqrt();
     // Of a diagonal matrix the values stand there, and may be too far apart to have passed through the scale.
-    let swapped = xx.abs().lt(yy.abs());
-    let large = yy.select(swapped, xx).select(diagonal, large * unscale * lower);
-    let small = xx.select(swapped, yy).select(diagonal, small * unscale * lower);
+    let (low, high) = (xx.min(yy), xx.max(yy));
+    let large = low.select(negative, high).select(diagonal, large * unscale * lower);
+    let small = high.select(negative, low).select(diagonal, small * unscale * lower);
     Eigen2 { values: [large, small], axis: [x * inverse, y * inverse] }
 }
 

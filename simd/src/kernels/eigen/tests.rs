@@ -126,6 +126,9 @@ fn known_matrices() {
     assert_eq!(of([-3.0, 0.0, 1.0]), Eigen2 { values: [-3.0, 1.0], axis: [-1.0, 0.0] });
     assert_eq!(of([1.0, 0.0, -3.0]), Eigen2 { values: [-3.0, 1.0], axis: [-0.0, 1.0] });
     assert_eq!(of([0.0; 3]), Eigen2 { values: [0.0; 2], axis: [1.0, 0.0] });
+    // Where both are as large, value and axis still belong together.
+    assert_eq!(of([-12.0, 0.0, 12.0]), Eigen2 { values: [12.0, -12.0], axis: [0.0, 1.0] });
+    assert_eq!(of([12.0, 0.0, -12.0]), Eigen2 { values: [12.0, -12.0], axis: [1.0, 0.0] });
     // Variation along one axis only.
     assert_eq!(of([1.0, 1.0, 1.0]).values, [2.0, 0.0]);
 }
