@@ -96,21 +96,52 @@ impl Place {
 /// How records are made.
 #[derive(Clone, Copy)]
 pub struct Gathering<'a> {
-    /// The estimator of derivatives, for as many strata as are gathered.
+    /// Tables for as many strata as are gathered.
     pub flux: &'a CellFlux<'a>,
-    /// How far they are relied upon.
+    /// How far records are relied upon.
     pub metric: metric::Settings,
     /// The least radius of a record, in pixels.
     pub least_pixels: f32,
 }
 
+/// What the strata of a hemisphere see.
+struct Strata<'m> {
+    n: usize,
+    radiance: &'m mut [[f32; 3]],
+    inverse_distance: &'m mut [f32],
+    directions: &'m mut [[f32; 3]],
+    /// Of what is seen, local; empty where the metric does not ask for them.
+    normals: &'m mut [[f32; 3]],
+}
+
+impl<'m> Strata<'m> {
+    fn footprint(n: usize) -> Footprint {
+        let strata = n.saturating_mul(n);
+        let triples = Footprint::default().slice::<[f32; 3]>(strata);
+        triples.and(triples).and(triples).slice::<f32>(strata)
+    }
+
+    fn new(n: usize, normals: bool, arena: &mut Arena<'m>) -> Result<Self, OutOfMemory> {
+        let strata = n.saturating_mul(n);
+        Ok(Self {
+            n,
+            radiance: arena.slice(strata)?,
+            inverse_distance: arena.slice(strata)?,
+            directions: arena.slice(strata)?,
+            normals: arena.slice(if normals { strata } else { 0 })?,
+        })
+    }
+
+    fn hemisphere(&self) -> Option<Hemisphere<'_>> {
+        let hemisphere = Hemisphere::new(self.n, self.radiance, self.inverse_distance, self.directions)?;
+        if self.normals.is_empty() { Some(hemisphere) } else { hemisphere.with_normals(self.normals) }
+    }
+}
+
 impl<F: Features> PathTracer<'_, F> {
     /// Working memory of [`PathTracer::gather`] with n × n strata.
     pub fn gather_scratch(n: usize) -> Footprint {
-        let strata = n.saturating_mul(n);
-        let rays =
-            Footprint::default().slice::<[f32; 3]>(strata).slice::<f32>(strata).slice::<[f32; 3]>(strata);
-        Wave::footprint(strata.min(WAVE)).and(rays)
+        Wave::footprint(n.saturating_mul(n).min(WAVE)).and(Strata::footprint(n))
     }
 
     /// Gathers at `place`. `number` names the gathering: another one, other rays. `None` where what was found is not
@@ -126,54 +157,24 @@ impl<F: Features> PathTracer<'_, F> {
         scratch: &mut Arena,
         counters: &mut Counters,
     ) -> Result<Option<Record>, OutOfMemory> {
-        let n = gathering.flux.n();
-        let strata = n * n;
+        let Gathering { flux, metric, least_pixels } = *gathering;
+        let n = flux.n();
         let mut arena = scratch.scratch();
-        let mut wave = Wave::new(strata.min(WAVE), &mut arena)?;
-        let radiance: &mut [[f32; 3]] = arena.slice(strata)?;
-        let inverse_distance: &mut [f32] = arena.slice(strata)?;
-        let directions: &mut [[f32; 3]] = arena.slice(strata)?;
-
+        let mut wave = Wave::new((n * n).min(WAVE), &mut arena)?;
+        let mut strata = Strata::new(n, metric.metric.takes_normals(), &mut arena)?;
         let frame = Frame::from_normal(place.normal());
-        let mut next = 0;
-        while next < strata {
-            let count = (strata - next).min(wave.paths.len());
+        let mut first = 0;
+        while first < n * n {
+            let count = (n * n - first).min(wave.paths.len());
             for i in 0..count {
-                let stratum = stratum(n, next + i);
-                let pixel = NO_PIXEL | number;
-                let sample = (next + i) as u32;
-                let [u, v] = Sampler::new(self.settings.seed, pixel, sample).pair(dimension::PIXEL);
-                let (row, column) = (stratum / n, stratum % n);
-                let side = n as f32;
-                let direction = cosine_hemisphere([(column as f32 + u) / side, (row as f32 + v) / side]);
-                if let Some(slot) = directions.get_mut(stratum) {
-                    *slot = direction.to_array();
-                }
-                let (mut ray, cos) = place.ray(&frame, direction);
-                if cos <= 0.0 {
-                    // Under the surface: no light comes from there.
-                    ray.t_max = -1.0;
-                }
+                let (ray, path) = self.aim(place, &frame, number, first + i, &mut strata);
                 wave.rays[i] = Ray { tag: i as u32, ..ray };
-                wave.paths[i] = Path {
-                    throughput: [1.0; 3],
-                    pdf: f32::INFINITY,
-                    pixel,
-                    place: stratum as u32,
-                    sample,
-                    segments: 2,
-                    triangle: place.triangle,
-                    eta_squared: 1.0,
-                    share: Share::REFLECTED,
-                    ..Path::default()
-                };
+                wave.paths[i] = path;
             }
             counters.paths += count as u64;
             self.trace(&mut wave, count, Coherence::Coherent, counters);
             for (path, hit) in wave.paths.iter().zip(&*wave.hits).take(count) {
-                if let Some(slot) = inverse_distance.get_mut(path.place as usize) {
-                    *slot = 1.0 / hit.t;
-                }
+                self.note(path.place as usize, hit, &frame, &mut strata);
             }
             let mut active = self.go_on(&mut wave, count, counters);
             while active > 0 {
@@ -181,24 +182,65 @@ impl<F: Features> PathTracer<'_, F> {
                 active = self.go_on(&mut wave, active, counters);
             }
             for path in wave.paths.iter().take(count) {
-                if let Some(slot) = radiance.get_mut(path.place as usize) {
+                if let Some(slot) = strata.radiance.get_mut(path.place as usize) {
                     *slot = path.radiance;
                 }
             }
-            next += count;
+            first += count;
         }
 
-        let hemisphere = Hemisphere::new(n, radiance, inverse_distance, directions);
-        let derivatives = hemisphere.and_then(|h| gathering.flux.derivatives(self.level, &h));
-        let Some(derivatives) = derivatives.filter(|d| d.irradiance.is_finite()) else {
+        let derivatives = strata.hemisphere().and_then(|h| metric.metric.derivatives(self.level, flux, &h));
+        let Some(derivatives) = derivatives.filter(|found| found.irradiance.is_finite()) else {
             counters.dropped.nan += 1;
             return Ok(None);
         };
-        let least = gathering.least_pixels * place.pixel;
-        let reach = reach(&metric::Settings { least, ..gathering.metric }, &derivatives);
+        let least = least_pixels * place.pixel;
+        let reach = reach(&metric::Settings { least, ..metric }, &derivatives);
         let mut record = Record::new(place.position(), &frame, &derivatives, &reach);
         self.fence(&mut record, place, counters);
         Ok(Some(record))
+    }
+
+    /// The `i`th ray of a gathering, and its path.
+    fn aim(&self, place: &Place, frame: &Frame, number: u32, i: usize, strata: &mut Strata) -> (Ray, Path) {
+        let n = strata.n;
+        let stratum = stratum(n, i);
+        let (pixel, sample) = (NO_PIXEL | number, i as u32);
+        let [u, v] = Sampler::new(self.settings.seed, pixel, sample).pair(dimension::PIXEL);
+        let (row, column) = (stratum / n, stratum % n);
+        let direction = cosine_hemisphere([(column as f32 + u) / n as f32, (row as f32 + v) / n as f32]);
+        if let Some(slot) = strata.directions.get_mut(stratum) {
+            *slot = direction.to_array();
+        }
+        let (mut ray, cos) = place.ray(frame, direction);
+        if cos <= 0.0 {
+            // Under the surface: no light comes from there.
+            ray.t_max = -1.0;
+        }
+        let path = Path {
+            throughput: [1.0; 3],
+            pdf: f32::INFINITY,
+            pixel,
+            place: stratum as u32,
+            sample,
+            segments: 2,
+            triangle: place.triangle,
+            eta_squared: 1.0,
+            share: Share::REFLECTED,
+            ..Path::default()
+        };
+        (ray, path)
+    }
+
+    /// Notes what the ray of a stratum met.
+    fn note(&self, stratum: usize, hit: &Hit, frame: &Frame, strata: &mut Strata) {
+        if let Some(slot) = strata.inverse_distance.get_mut(stratum) {
+            *slot = 1.0 / hit.t;
+        }
+        if let Some(slot) = strata.normals.get_mut(stratum) {
+            let [a, b, c] = self.scene.mesh.corners(hit.triangle);
+            *slot = frame.to_local((b - a).cross(c - a).normalize_or_zero()).to_array();
+        }
     }
 
     /// Looks for walls around a record.

@@ -181,6 +181,11 @@ impl<F: Features> Cached<'_, F> {
                 let batch: Vec<Place> = missing.drain(..missing.len().min(GATHERED)).collect();
                 let mut records: Vec<Option<Record>> = vec![None; batch.len()];
                 let gathered = half.gathered;
+                let tracer = if std::env::var_os("IC_REC").is_some() {
+                    tracer.with_caches([&half.cache, &half.cache])
+                } else {
+                    *tracer
+                };
                 let gather = |task: usize, arena: &mut Arena, out: &mut [Option<Record>]| {
                     let mut counters = Counters::default();
                     let number = 2 * (gathered + task as u32) + index as u32;
