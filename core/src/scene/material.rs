@@ -3,6 +3,7 @@
 
 use super::TextureId;
 use crate::Rgb;
+use crate::bsdf::ggx::SMOOTH_ALPHA;
 
 /// A colour, multiplied by a texture where there is one.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -78,6 +79,19 @@ pub enum Surface {
         /// sqrt(alpha).
         roughness: ScalarInput,
     },
+}
+
+impl Surface {
+    /// Whether it may reflect or refract into one direction only, somewhere.
+    pub fn may_be_smooth(&self) -> bool {
+        match self {
+            Surface::Diffuse { .. } => false,
+            Surface::Mirror { .. } | Surface::Dielectric { .. } => true,
+            Surface::Conductor { roughness, .. } | Surface::Glossy { roughness, .. } => {
+                roughness.texture.is_some() || roughness.value * roughness.value < SMOOTH_ALPHA
+            }
+        }
+    }
 }
 
 /// A map that bends the shading normal.

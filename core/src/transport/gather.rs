@@ -112,6 +112,8 @@ struct Strata<'m> {
     directions: &'m mut [[f32; 3]],
     /// Of what is seen, local; empty where the metric does not ask for them.
     normals: &'m mut [[f32; 3]],
+    /// How many of them see light directly.
+    shining: u32,
 }
 
 impl<'m> Strata<'m> {
@@ -129,6 +131,7 @@ impl<'m> Strata<'m> {
             inverse_distance: arena.slice(strata)?,
             directions: arena.slice(strata)?,
             normals: arena.slice(if normals { strata } else { 0 })?,
+            shining: 0,
         })
     }
 
@@ -197,6 +200,7 @@ impl<F: Features> PathTracer<'_, F> {
         let least = least_pixels * place.pixel;
         let reach = reach(&metric::Settings { least, ..metric }, &derivatives);
         let mut record = Record::new(place.position(), &frame, &derivatives, &reach);
+        record.shining = strata.shining as f32 / (n * n) as f32;
         self.fence(&mut record, place, counters);
         Ok(Some(record))
     }
@@ -237,6 +241,13 @@ impl<F: Features> PathTracer<'_, F> {
         if let Some(slot) = strata.inverse_distance.get_mut(stratum) {
             *slot = 1.0 / hit.t;
         }
+        let triangle = self.scene.mesh.triangles.get(hit.triangle as usize);
+        let shines = match triangle.and_then(|triangle| self.scene.materials.get(triangle.material as usize))
+        {
+            Some(material) => material.emits(),
+            None => self.scene.environment.is_some(),
+        };
+        strata.shining += u32::from(shines);
         if let Some(slot) = strata.normals.get_mut(stratum) {
             let [a, b, c] = self.scene.mesh.corners(hit.triangle);
             *slot = frame.to_local((b - a).cross(c - a).normalize_or_zero()).to_array();

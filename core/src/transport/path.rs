@@ -42,6 +42,10 @@ use glam::Vec3;
 /// stay in the second cache.
 pub const WAVE: usize = 2048;
 
+/// Lights that fill a smaller share of a hemisphere, weighted by cosines, are found by shadow rays alone as well as with
+/// the help of rays that find them by chance.
+const SMALL: f32 = 0.1;
+
 /// Path tracing of one scene: a pass whose tasks are the tiles of the picture.
 #[derive(Clone, Copy)]
 pub struct PathTracer<'a, F> {
@@ -52,6 +56,8 @@ pub struct PathTracer<'a, F> {
     pub(super) level: Level,
     /// Some surfaces let a part of the light through, so that a shadow ray may go on behind a hit.
     pub(super) has_cutouts: bool,
+    /// Some surfaces may reflect or refract into one direction only.
+    has_mirrors: bool,
     /// Frozen; of even and of odd samples.
     caches: Option<[&'a IrradianceCache<'a>; 2]>,
     features: PhantomData<F>,
@@ -68,7 +74,18 @@ impl<'a, F: Features> PathTracer<'a, F> {
         level: Level,
     ) -> Self {
         let has_cutouts = scene.materials.iter().any(Material::has_cutout);
-        Self { scene, bvh, lights, settings, level, has_cutouts, caches: None, features: PhantomData }
+        let has_mirrors = scene.materials.iter().any(|material| material.surface.may_be_smooth());
+        Self {
+            scene,
+            bvh,
+            lights,
+            settings,
+            level,
+            has_cutouts,
+            has_mirrors,
+            caches: None,
+            features: PhantomData,
+        }
     }
 
     /// The same, where diffuse points have their indirect light from a cache as far as it reaches: even samples from the
@@ -352,6 +369,17 @@ impl<'a, F: Features> PathTracer<'a, F> {
         // Lights behind an opaque surface need not be asked.
         let normal = if F::DIELECTRIC && bsdf.transmits() { Vec3::ZERO } else { point.frame.normal };
 
+        // Where lights are small all around, and nothing mirrors them, a shadow ray alone finds the direct light.
+        let mut ends = false;
+        if let (Some(caches), Bsdf::Diffuse(diffuse)) = (self.caches, &bsdf)
+            && (segments == 1 || !self.is_limited())
+            && let Some(indirect) = caches[path.sample as usize & 1].at(point.position, normal)
+        {
+            path.add(throughput * diffuse.reflectance * indirect.irradiance * FRAC_1_PI);
+            path.share = Share::DIRECT;
+            ends = indirect.shining < SMALL && !self.has_mirrors;
+        }
+
         let mut light = None;
         if !self.lights.is_empty() && !bsdf.is_delta() {
             let [u, v] = sampler.pair(first + dimension::LIGHT);
@@ -366,20 +394,16 @@ impl<'a, F: Features> PathTracer<'a, F> {
                 if f == Rgb::ZERO {
                     return None;
                 }
-                let weight = if sample.delta { 1.0 } else { power_heuristic(sample.pdf, pdf) };
+                let alone = sample.delta || ends;
+                let weight = if alone { 1.0 } else { power_heuristic(sample.pdf, pdf) };
                 let contribution = throughput * f * sample.radiance * (weight / sample.pdf);
                 Some((shadow_ray(&point, &sample), contribution))
             });
         }
 
-        if let (Some(caches), Bsdf::Diffuse(diffuse)) = (self.caches, &bsdf)
-            && (segments == 1 || !self.is_limited())
-            && let Some(irradiance) = caches[path.sample as usize & 1].irradiance(point.position, normal)
-        {
-            path.add(throughput * diffuse.reflectance * irradiance * FRAC_1_PI);
-            path.share = Share::DIRECT;
+        if ends {
+            return Step { light, next: None };
         }
-
         let [u, v] = dimension::scattering(&sampler, segments);
         let lobe = if F::GLOSSY || F::DIELECTRIC { sampler.single(first + dimension::LOBE) } else { 0.0 };
         let Some(sample) = bsdf.sample::<F>(wo, [u, v, lobe]) else { return Step { light, next: None } };

@@ -13,4 +13,4 @@ pub use derivatives::{CellFlux, Derivatives, Hessian};
 pub use hemisphere::{Hemisphere, SIDE_MAX};
 pub use metric::{Metric, Reach, reach};
 pub use record::{Record, SECTORS};
-pub use store::{GREATEST_DEVIATION, IrradianceCache};
+pub use store::{GREATEST_DEVIATION, Indirect, IrradianceCache};

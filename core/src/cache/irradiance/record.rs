@@ -11,7 +11,7 @@ use bytemuck::{Pod, Zeroable};
 use glam::{Vec2, Vec3};
 
 /// Azimuths for each of which a record knows how far it is to the next wall.
-pub const SECTORS: usize = 16;
+pub const SECTORS: usize = 12;
 
 /// A point lies in front of a record, and is not to use it, where it is so much below the mean of both tangent planes,
 /// in radii: light that the record sees from above may be hidden from it.
@@ -43,6 +43,8 @@ pub struct Record {
     pub reach: f32,
     /// Mean relative error over the support, as its metric predicts.
     pub error: f32,
+    /// Share of the strata in which light shines directly.
+    pub shining: f32,
     /// How far it is to a wall in each sector, in 255ths of `reach`; 255: as far as it reaches.
     pub fence: [u8; SECTORS],
 }
@@ -73,6 +75,7 @@ impl Record {
             radii: reach.radii,
             reach: reach.radii[1],
             error,
+            shining: 0.0,
             fence: [u8::MAX; SECTORS],
         }
     }

@@ -14,6 +14,15 @@ pub const GREATEST_DEVIATION: f32 = 0.2;
 /// Records of surfaces that face the same way to within 60 degrees clamp each other.
 const ALIKE: f32 = 0.5;
 
+/// What a cache knows of a point.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Indirect {
+    /// Irradiance without what emitters send directly, in W/m².
+    pub irradiance: Rgb,
+    /// Share of the hemisphere, weighted by cosines, in which light shines directly.
+    pub shining: f32,
+}
+
 /// Records in the caller's memory. Frozen while pictures are made; grows by [`IrradianceCache::insert`].
 #[derive(Debug)]
 pub struct IrradianceCache<'m> {
@@ -71,22 +80,23 @@ impl<'m> IrradianceCache<'m> {
         self.refused
     }
 
-    /// The indirect irradiance at `position` on a surface of unit `normal`; `None` where no record reaches.
+    /// What is known at `position` on a surface of unit `normal`; `None` where no record reaches.
     ///
     /// E = Σ w_i (E_i + ∇E_i · Δx_i + ∇_n E_i · (n_i × n)) / Σ w_i (Schwarzhaupt et al. 2012, equation 12).
     #[inline]
-    pub fn irradiance(&self, position: Vec3, normal: Vec3) -> Option<Rgb> {
-        let (mut sum, mut weights) = (Rgb::ZERO, 0.0);
+    pub fn at(&self, position: Vec3, normal: Vec3) -> Option<Indirect> {
+        let (mut sum, mut shining, mut weights) = (Rgb::ZERO, 0.0, 0.0);
         self.tree.at(position, |index| {
             if let Some(record) = self.records.get(index as usize)
                 && let Some((irradiance, weight)) = record.at(position, normal, self.least_cos)
             {
                 sum += weight * irradiance;
+                shining += weight * record.shining;
                 weights += weight;
             }
             true
         });
-        (weights > 0.0).then(|| sum / weights)
+        (weights > 0.0).then(|| Indirect { irradiance: sum / weights, shining: shining / weights })
     }
 
     /// Whether records of more than `least` weight together reach the point.
@@ -220,11 +230,11 @@ mod tests {
             }
             for i in 0..1000 {
                 let (x, y) = (random.single(10_000 + 2 * i), random.single(10_001 + 2 * i));
-                let e = cache.irradiance(Vec3::new(x, y, 0.5), Vec3::Z).unwrap();
+                let e = cache.at(Vec3::new(x, y, 0.5), Vec3::Z).unwrap().irradiance;
                 assert!(e.distance(Vec3::new(1.0 + x, 2.0, 2.0)) < 1e-5, "{x} {y}: {e}");
                 assert!(cache.reaches(Vec3::new(x, y, 0.5), Vec3::Z, 0.0));
-                assert_eq!(cache.irradiance(Vec3::new(x, y, 0.5), Vec3::NEG_Z), None);
-                assert_eq!(cache.irradiance(Vec3::new(x, y, 0.9), Vec3::Z), None);
+                assert_eq!(cache.at(Vec3::new(x, y, 0.5), Vec3::NEG_Z), None);
+                assert_eq!(cache.at(Vec3::new(x, y, 0.9), Vec3::Z), None);
             }
         });
     }
