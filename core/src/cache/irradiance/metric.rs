@@ -141,6 +141,12 @@ pub struct Reach {
     pub axis: Vec2,
     /// The shorter and the longer radius, m.
     pub radii: [f32; 2],
+    /// How much farther than the radii the record still has weight where others reach: 1, or more to average over
+    /// more of them.
+    pub overlap: f32,
+    /// Second derivatives along the axes to extrapolate by, of the irradiance relative to itself, so that at (x, y)
+    /// along them it is (x² bend[0] + y² bend[1])/2 of it more. Zero where the rule extrapolates to first order.
+    pub bend: [f32; 2],
     /// By what the gradients are to be multiplied, so that extrapolation within the reach takes the irradiance
     /// (luminance) neither below zero nor above its double. 1 where the metric's own radii hold.
     pub gradient_scale: f32,
@@ -149,27 +155,35 @@ pub struct Reach {
     pub curvature: [f32; 2],
 }
 
+/// How far [`Metric::Halflight`] averages, in radii.
+const OVERLAP: f32 = 2.0;
+
 /// The reach of a record of these derivatives, which should be those of [`Metric::derivatives`].
+///
+/// Of [`Metric::Halflight`] a place gets a record where it is in the radii of none, and is interpolated of all within
+/// twice their radii: four times as many, whose independent errors average out. That is not to be had to first order,
+/// for extrapolation twice as far is wrong by four times as much; but the Hessian is known, and is added to it.
 pub fn reach(settings: &Settings, derivatives: &Derivatives) -> Reach {
     let irradiance = derivatives.luminance();
     let slope = derivatives.luminance_gradient().length();
     // A black or a broken record has no gradient to speak of.
     let lit = irradiance > 0.0 && irradiance.is_finite() && slope.is_finite();
     let flat = if lit && slope > 0.0 { irradiance / slope } else { f32::INFINITY };
-    let circle = |distance: f32| (Vec2::X, [settings.error * distance; 2], [0.0; 2]);
-    let (axis, radii, curvature) = match settings.metric {
+    let circle = |distance: f32| (Bent::default(), [settings.error * distance; 2]);
+    let (bent, radii) = match settings.metric {
         Metric::SplitSphere => circle(derivatives.harmonic_mean_distance),
         Metric::BoundedSplitSphere => circle(derivatives.harmonic_mean_distance.min(flat)),
         Metric::MinDistance => circle(derivatives.min_distance),
         _ => {
-            let (axis, curvature) = curvatures(settings, derivatives, lit);
+            let bent = curvatures(settings, derivatives, lit);
             let allowed = settings.error * settings.extent * settings.extent;
-            let [short, long] = curvature.map(|l| libm::sqrtf(libm::sqrtf(4.0 / PI * allowed / l)));
+            let [short, long] = bent.curvature.map(|l| libm::sqrtf(libm::sqrtf(4.0 / PI * allowed / l)));
             // What the Hessian cannot see (a radiance edge behind an occluder's) the gradient may.
             let bound = if settings.metric == Metric::Halflight { flat } else { f32::INFINITY };
-            (axis, [short.min(bound), long], curvature)
+            (bent, [short.min(bound), long])
         }
     };
+    let Bent { axis, curvature, signed } = bent;
     let radii = clamped(settings, radii);
     // An extrapolation reaches |∇E · dx|, largest at the rim of the ellipse.
     let gradient = derivatives.luminance_gradient();
@@ -179,11 +193,35 @@ pub fn reach(settings: &Settings, derivatives: &Derivatives) -> Reach {
         true if rise > irradiance => irradiance / rise,
         true => 1.0,
     };
-    Reach { axis, radii, gradient_scale, curvature }
+    let second = lit && settings.metric == Metric::Halflight;
+    let overlap = if settings.metric == Metric::Halflight { OVERLAP } else { 1.0 };
+    let bend = [0, 1].map(|k| {
+        // Where radii are larger than the curvature allows, the second order is to change it by no more than all.
+        let most = 2.0 / (overlap * radii[k] * overlap * radii[k]);
+        let bend = signed[k] / irradiance;
+        if second && bend.is_finite() { bend.max(-most).min(most) } else { 0.0 }
+    });
+    Reach { axis, radii, overlap, bend, gradient_scale, curvature }
+}
+
+/// Eigenvalues of a Hessian and what they come to.
+struct Bent {
+    /// Axis of the larger.
+    axis: Vec2,
+    /// Magnitudes relative to the irradiance, the larger first, with the metric's rules applied.
+    curvature: [f32; 2],
+    /// As they are.
+    signed: [f32; 2],
+}
+
+impl Default for Bent {
+    fn default() -> Self {
+        Self { axis: Vec2::X, curvature: [0.0; 2], signed: [0.0; 2] }
+    }
 }
 
 /// Relative curvatures of the irradiance along the axes, the larger first, by the Hessian and the metric's rules.
-fn curvatures(settings: &Settings, derivatives: &Derivatives, lit: bool) -> (Vec2, [f32; 2]) {
+fn curvatures(settings: &Settings, derivatives: &Derivatives, lit: bool) -> Bent {
     let irradiance = derivatives.luminance();
     let against = settings.against.unwrap_or(irradiance);
     match settings.metric {
@@ -196,12 +234,13 @@ fn curvatures(settings: &Settings, derivatives: &Derivatives, lit: bool) -> (Vec
         Metric::OcclusionHessian => relative(derivatives.open_hessian, PI),
         Metric::Halflight => {
             let near = derivatives.mean_square_inverse_distance;
-            let (axis, [large, small]) = relative(derivatives.hessian, against);
+            let bent = relative(derivatives.hessian, against);
+            let [large, small] = bent.curvature;
             let floor = settings.floor * near;
             match lit && large.is_finite() {
-                true => (axis, [large + floor, small + floor]),
+                true => Bent { curvature: [large + floor, small + floor], ..bent },
                 // Whatever comes into sight there, the distances bound how fast.
-                false => (Vec2::X, [near; 2]),
+                false => Bent { curvature: [near; 2], ..Bent::default() },
             }
         }
         _ => relative(derivatives.hessian, against),
@@ -210,11 +249,11 @@ fn curvatures(settings: &Settings, derivatives: &Derivatives, lit: bool) -> (Vec
 
 /// Axis and magnitudes of the eigenvalues of `hessian`/`irradiance`. Where nothing is bent, nothing is bent
 /// relative to nothing either.
-fn relative(hessian: Hessian, irradiance: f32) -> (Vec2, [f32; 2]) {
+fn relative(hessian: Hessian, irradiance: f32) -> Bent {
     let Eigen2 { values, axis } = symmetric2(|x| x, [hessian.xx, hessian.xy, hessian.yy]);
     let axis = Vec2::from(axis);
     let curvature = values.map(|l| if l == 0.0 { 0.0 } else { l.abs() / irradiance });
-    (if axis.is_finite() { axis } else { Vec2::X }, curvature)
+    Bent { axis: if axis.is_finite() { axis } else { Vec2::X }, curvature, signed: values }
 }
 
 /// Radii within the limits: the longer at most `aspect` times the shorter, then both from `least` to `most`; what
@@ -320,6 +359,11 @@ mod tests {
         let radius = (0.16 / PI / 0.0025f32).powf(0.25);
         near(flat.radii[0], radius);
         near(flat.radii[1], radius);
+        assert_eq!((flat.overlap, flat.bend), (2.0, [0.0; 2]));
+        // A saddle is extrapolated by what it is bent: -4 and 0.25 of 2.
+        let saddle = reach(&settings(Metric::Halflight), &record([0.25, 0.0, -4.0], Vec2::ZERO));
+        assert_eq!((saddle.bend, saddle.axis.abs()), ([-2.0, 0.125], Vec2::Y));
+        assert_eq!(reach(&settings(Metric::OcclusionHessian), &record([1.0; 3], Vec2::ZERO)).bend, [0.0; 2]);
         // A steep slope: E/|∇E| = 0.5 is less.
         let steep = reach(&settings(Metric::Halflight), &record([0.0; 3], Vec2::new(0.0, 4.0)));
         near(steep.radii[0], 0.5);
@@ -369,10 +413,12 @@ mod tests {
                 };
                 for metric in Metric::ALL {
                     let settings = Settings { least: 0.125, ..settings(metric) };
-                    let Reach { axis, radii: [short, long], gradient_scale, .. } = reach(&settings, &record);
+                    let Reach { axis, radii: [short, long], gradient_scale, bend, .. } =
+                        reach(&settings, &record);
                     let ordered = 0.125 <= short && short <= long && long <= 100.0;
                     assert!(ordered, "{metric:?} of {record:?}: {short} {long}");
                     assert!((0.0..=1.0).contains(&gradient_scale), "{metric:?} of {record:?}");
+                    assert!(bend.iter().all(|bend| bend.is_finite()), "{metric:?} of {record:?}: {bend:?}");
                     assert!((axis.length() - 1.0).abs() < TOLERANCE, "{metric:?} of {record:?}: {axis}");
                 }
             }

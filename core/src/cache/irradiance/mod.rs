@@ -14,3 +14,6 @@ pub use hemisphere::{Hemisphere, SIDE_MAX};
 pub use metric::{Metric, Reach, reach};
 pub use record::{Record, SECTORS};
 pub use store::{GREATEST_DEVIATION, Indirect, IrradianceCache};
+
+#[cfg(test)]
+mod rooms;
