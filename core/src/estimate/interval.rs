@@ -75,7 +75,7 @@ impl ErrorEstimate {
 
 /// Student's t of `freedom` degrees lies between this and its negative with 95 % (expansion of Cornish and Fisher;
 /// too small by a tenth for two degrees, and taken at one for fewer).
-fn student_95(freedom: f64) -> f64 {
+pub(super) fn student_95(freedom: f64) -> f64 {
     const Z: f64 = 1.959_963_984_540_054;
     const FIRST: f64 = (Z * Z * Z + Z) / 4.0;
     const SECOND: f64 = (5.0 * Z * Z * Z * Z * Z + 16.0 * Z * Z * Z + 3.0 * Z) / 96.0;

@@ -1,10 +1,12 @@
 //! What is known of the error of a picture.
 
+mod audit;
 mod filter;
 mod interval;
 mod metric;
 mod tile;
 
+pub use audit::{BiasEstimate, Deviation, Finding};
 pub use interval::ErrorEstimate;
 pub use metric::{Difference, mse, relmse, rmse};
-pub use tile::{TileError, TileLight};
+pub use tile::{TileError, TileLight, filtered};

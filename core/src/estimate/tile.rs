@@ -2,6 +2,7 @@
 
 use super::filter::lee;
 use super::metric::DARK;
+use crate::Rgb;
 use crate::film::{PIXELS_PER_TILE, Pixel, TILE, Tile};
 use glam::Vec4;
 
@@ -118,6 +119,18 @@ impl core::ops::AddAssign for TileError {
         self.within += other.within;
         self.product += other.product;
     }
+}
+
+/// What the pixels of a tile of a picture of mean `mean` probably are: filtered, in the order of the tile's pixels.
+pub fn filtered(pixels: &[Pixel], mean: f64) -> [Rgb; PIXELS_PER_TILE] {
+    let scale = (1.0 / mean) as f32;
+    let [mut picture, mut noise, mut out] = [[Vec4::ZERO; PIXELS_PER_TILE]; 3];
+    for (i, pixel) in pixels.iter().enumerate().take(PIXELS_PER_TILE).filter(|(_, pixel)| pixel.count() > 0) {
+        picture[raster(i)] = (scale * colour(pixel.mean())).with_w(1.0);
+        noise[raster(i)] = colour(pixel.scaled_variance(scale));
+    }
+    lee(&picture, &noise, &mut out);
+    core::array::from_fn(|i| out[raster(i)].truncate() / scale)
 }
 
 /// A₁, A₂, B₁, B₂ of a pixel.

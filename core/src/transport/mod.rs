@@ -10,6 +10,7 @@ pub mod overture;
 pub mod path;
 mod pilot;
 mod places;
+mod probe;
 pub mod reference;
 mod reuse;
 mod shadow;

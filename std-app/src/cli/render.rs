@@ -149,7 +149,7 @@ impl Render {
         say(&if self.json { run.object().to_string() } else { summary::text(&run, self.report.as_deref()) });
         Ok(match result.ending {
             Ending::Done => ExitCode::SUCCESS,
-            Ending::Interrupted => ExitCode::from(3),
+            Ending::Interrupted | Ending::Biased => ExitCode::from(3),
         })
     }
 

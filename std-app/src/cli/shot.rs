@@ -48,6 +48,10 @@ pub(super) struct Options {
     /// Longest path in segments: 1 is light seen directly, 2 adds direct light [default: no limit]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     max_depth: Option<u32>,
+    /// Share of the work for an audit of the bias: a few pixels are path traced as well [default: 5% where the method
+    /// is biased, otherwise off]
+    #[arg(long, value_name = "SHARE|off", value_parser = values::audit)]
+    audit: Option<f64>,
     /// Another seed, another noise [default: 0]
     #[arg(long, value_name = "N", help_heading = "How to run")]
     seed: Option<u32>,
@@ -98,6 +102,7 @@ impl Options {
             cache_error: self.cache_error.or(base.cache_error),
             cache_rays: self.cache_rays.or(base.cache_rays),
             max_depth: self.max_depth.or(base.max_depth),
+            audit: self.audit.or(base.audit),
             seed: self.seed.or(base.seed),
             simd: self.simd.or(base.simd),
             precise: self.precise || base.precise,
@@ -152,6 +157,7 @@ impl Shot {
                 Some(Reuse::Off) => Some(false),
             },
             cache: options.cache(),
+            audit: options.audit,
             threads: self.threads.map(|threads| threads as usize),
             memory: self.memory,
             level: options.level(),

@@ -2,7 +2,7 @@
 
 use super::compare as comparing;
 use super::ledger;
-use halflight::drive::{Ending, ErrorEstimate};
+use halflight::drive::{Audited, BiasEstimate, Ending, ErrorEstimate};
 use halflight::report::Run;
 use halflight::report::words::{plural, readable_bytes, readable_seconds};
 use std::path::Path;
@@ -20,7 +20,15 @@ pub(super) fn text(run: &Run, report: Option<&Path>) -> String {
     let early = if result.ending == Ending::Interrupted { ", stopped early" } else { "" };
     let (width, height, samples) = (settings.width, settings.height, plural(result.spp.into(), "sample"));
     lines.push(format!("image  {width}x{height}, {samples} per pixel{early}"));
-    lines.push(estimate(result.error));
+    match &result.audit {
+        None => lines.push(estimate(result.error)),
+        Some(audit) => lines.extend(audited(audit)),
+    }
+    if result.ending == Ending::Biased {
+        lines.push(
+            "       the bias alone is larger than the error asked for: more samples would not help".into(),
+        );
+    }
     if let Some(comparison) = run.comparison {
         lines.extend(comparing::text(comparison).lines().map(|line| format!("       {line}")));
     }
@@ -54,6 +62,28 @@ pub(super) fn text(run: &Run, report: Option<&Path>) -> String {
     ));
     lines.extend(ledger::text(&result.counters, &result.places, result.empty_pixels));
     lines.join("\n")
+}
+
+/// The lines of an audited estimate.
+fn audited(audit: &Audited) -> [String; 3] {
+    let ErrorEstimate { relmse, lower, upper } = audit.total;
+    let BiasEstimate { relmse: bias, lower: least, upper: most, detectable } = audit.bias;
+    let found = if audit.is_biased() { "bias found" } else { "no bias found" };
+    [
+        format!("error  relMSE {relmse:.3e} (95 %: {lower:.3e} to {upper:.3e}), noise and bias"),
+        format!(
+            "       {:.3e} of it is noise; bias {:.3e} (95 %: {least:.3e} to {most:.3e})",
+            audit.noise.relmse,
+            bias.max(0.0)
+        ),
+        format!(
+            "audit  {found}: {} with {} each, off by {:+.2} % ± {:.2} % as a whole; {detectable:.1e} would show",
+            plural(audit.pixels.into(), "pixel"),
+            plural(audit.samples.into(), "sample"),
+            100.0 * audit.whole.mean,
+            100.0 * audit.whole.error,
+        ),
+    ]
 }
 
 /// The line of an estimate.

@@ -99,6 +99,19 @@ pub(super) fn shard(text: &str) -> Result<Shard, String> {
     Ok(Shard { index: index - 1, count })
 }
 
+/// A share of the work for the audit: `5%`, `0.05`, or `off`.
+pub(super) fn audit(text: &str) -> Result<f64, String> {
+    if text == "off" {
+        return Ok(0.0);
+    }
+    let share = match text.strip_suffix('%') {
+        Some(percent) => finite(percent.trim())? / 100.0,
+        None => finite(text)?,
+    };
+    let usable = share > 0.0 && share <= 0.5;
+    usable.then_some(share).ok_or("a share up to a half is expected, as in 5%, or off".into())
+}
+
 /// A number above 0.
 pub(super) fn positive(text: &str) -> Result<f64, String> {
     let number = finite(text)?;
@@ -140,6 +153,7 @@ mod tests {
             [(0, 1), (2, 4)].map(|(index, count)| Ok(Shard { index, count }))
         );
         assert_eq!((degrees("40"), positive("0.01")), (Ok(40.0), Ok(0.01)));
+        assert_eq!([audit("5%"), audit("0.25"), audit("off")], [Ok(0.05), Ok(0.25), Ok(0.0)]);
     }
 
     #[test]
@@ -158,6 +172,9 @@ mod tests {
         }
         for text in ["", "0/4", "5/4", "4", "1/0", "-1/2", "a/b"] {
             assert!(shard(text).is_err(), "{text}");
+        }
+        for text in ["", "%", "0%", "51%", "-1%", "nan", "none"] {
+            assert!(audit(text).is_err(), "{text}");
         }
         for text in ["0", "178", "-40", "wide"] {
             assert!(degrees(text).is_err(), "{text}");

@@ -67,23 +67,10 @@ impl Crew<'_, '_> {
         scratch: &mut [Vec<Line>],
         task: &Task<T>,
     ) -> Result<bool, OutOfMemory> {
-        let tasks = out.len().div_ceil(size.max(1));
-        let queue = Mutex::new(out.chunks_mut(size.max(1)).enumerate());
-        let next = || queue.lock().unwrap_or_else(|poisoned| poisoned.into_inner()).next();
-        let counted = self.workers.on_all(scratch, |arena| {
-            let (mut counters, mut done) = (Counters::default(), 0);
-            while let Some((index, out)) = next() {
-                if self.round.is_over() {
-                    break;
-                }
-                counters += task(index, arena, out)?;
-                done += 1;
-            }
-            Ok((counters, done))
-        })?;
-        let done: usize = counted.iter().map(|(_, done)| done).sum();
-        counted.into_iter().for_each(|(counters, _)| self.canvas.counters += counters);
-        Ok(done == tasks)
+        let is_over = || self.round.is_over();
+        let (counters, all) = self.workers.pass(out, size, scratch, &is_over, task)?;
+        self.canvas.counters += counters;
+        Ok(all)
     }
 
     /// Brings every tile to its target, or to `end` samples where that is less, unless the round is cut.

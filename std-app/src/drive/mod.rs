@@ -5,6 +5,7 @@
 //! middle, where the film is kept in a file and the render resumed from it.
 
 mod adapt;
+mod audit;
 mod canvas;
 mod crew;
 mod error;
@@ -21,10 +22,11 @@ mod run;
 mod turns;
 mod workers;
 
+pub use audit::{Audited, Region};
 pub use canvas::Shard;
 pub use error::{FilmError, RenderError};
 pub use film_file::check_writable as check_film_writable;
-pub use halflight_core::estimate::ErrorEstimate;
+pub use halflight_core::estimate::{BiasEstimate, Deviation, ErrorEstimate};
 pub use history::{Against, Round};
 pub use ledger::Place;
 pub use memory::MemoryUse;
@@ -74,6 +76,9 @@ pub struct Settings {
     pub reference: Option<Arc<Image>>,
     /// Whether tiles get their samples by the noise around them; all the same otherwise. Not with shards.
     pub adaptive: bool,
+    /// The share of the work that goes into an audit of the picture, between 0, no audit, and 1. `None`: a twentieth
+    /// where the method is biased. Not with shards.
+    pub audit: Option<f64>,
     /// Which part of the picture to render.
     pub shard: Shard,
     /// Where to keep the film while it grows.
@@ -112,6 +117,7 @@ impl Default for Settings {
             stop: Stop::default(),
             reference: None,
             adaptive: false,
+            audit: None,
             shard: Shard::WHOLE,
             checkpoint: None,
             resume: None,
@@ -141,6 +147,8 @@ pub enum Ending {
     Done,
     /// The interrupt flag was raised: the picture is valid, with fewer samples.
     Interrupted,
+    /// The error that was asked for is out of reach: the bias alone is larger, and more samples leave it as it is.
+    Biased,
 }
 
 /// Seconds of wall-clock time.
@@ -194,8 +202,11 @@ pub struct RenderResult {
     pub places: Vec<Place>,
     /// Pixels that are black because all of their samples were dropped.
     pub empty_pixels: u64,
-    /// The error, estimated from the two half-films; `None` for fewer than four samples, and for a black picture.
+    /// The error, estimated from the two half-films, and from the audit where there is one; `None` for fewer than four
+    /// samples, and for a black picture.
     pub error: Option<ErrorEstimate>,
+    /// What the audit has found.
+    pub audit: Option<Audited>,
     /// Bytes of each structure, while paths are traced.
     pub memory: Vec<MemoryUse>,
     /// The most bytes at any time: building the hierarchy takes more than keeping it.

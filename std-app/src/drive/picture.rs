@@ -1,5 +1,6 @@
 //! The rounds of a picture, from the first sample to the last estimate.
 
+use super::audit::Audit;
 use super::canvas::Canvas;
 use super::crew::{self, Crew};
 use super::film_file::{self, Header, Identity, Reader};
@@ -25,6 +26,7 @@ pub(super) struct Picture<'a> {
     pub(super) method: Method,
     pub(super) stage: Stage<'a>,
     pub(super) film: Film<'a>,
+    pub(super) audit: Option<Audit<'a>>,
     pub(super) identity: Identity,
     pub(super) resumed: Option<Reader>,
     pub(super) clock: Clock,
@@ -35,7 +37,8 @@ pub(super) struct Picture<'a> {
 impl Picture<'_> {
     /// Renders until a stop rule holds. What was built, and the memory of it, is for the caller to tell.
     pub(super) fn render(self, renderer: &mut dyn Renderer) -> Result<RenderResult, RenderError> {
-        let Picture { method, stage, film, identity, resumed, mut clock, progress, interrupt } = self;
+        let Picture { method, stage, film, mut audit, identity, resumed, mut clock, progress, interrupt } =
+            self;
         let Stage { settings, workers, .. } = stage;
         let (width, height) = (settings.width, settings.height);
         let mut canvas = Canvas::new(film, settings.shard);
@@ -46,6 +49,9 @@ impl Picture<'_> {
                 clock.pause(|| film.read_into(&mut canvas))?;
                 canvas.weights = header.weights(canvas.taken.len());
                 let Header { spp, rounds, seconds, estimates, .. } = header;
+                if let (Some(audit), Some(state)) = (&mut audit, header.audit()) {
+                    audit.resume(state);
+                }
                 let rounds = Rounds::new(settings.stop).resumed(spp, rounds, seconds, estimates);
                 (rounds, header.history())
             }
@@ -54,11 +60,13 @@ impl Picture<'_> {
         let mut latest = history.iter().rev().find_map(|round: &Round| round.error);
         let mut estimating = 0.0;
         let mut saved = Instant::now();
-        let save = |canvas: &Canvas, rounds: &Rounds, seconds: f64, history: &[Round]| {
-            let Some(checkpoint) = &settings.checkpoint else { return Ok::<(), FilmError>(()) };
-            let header = Header::new(identity.clone(), canvas, rounds, seconds, history);
-            film_file::write(&checkpoint.path, &header, canvas)
-        };
+        let mut is_lost = false;
+        let save =
+            |canvas: &Canvas, rounds: &Rounds, audit: Option<&Audit>, seconds: f64, history: &[Round]| {
+                let Some(checkpoint) = &settings.checkpoint else { return Ok::<(), FilmError>(()) };
+                let header = Header::new(identity.clone(), canvas, rounds, audit, seconds, history);
+                film_file::write(&checkpoint.path, &header, canvas)
+            };
 
         while let Some(plan) = rounds.next(clock.seconds(), estimating) {
             let now = clock.seconds();
@@ -75,12 +83,20 @@ impl Picture<'_> {
             rounds.completed(canvas.spp().min(plan.target), clock.seconds());
             let mut error = None;
             if rounds.estimate_is_due() {
+                if let Some(audit) = &mut audit {
+                    let left = settings.stop.seconds.map(|limit| limit - estimating - clock.seconds());
+                    audit.step(workers, &canvas.film, rays(&canvas), clock.seconds(), left)?;
+                }
                 let start = Instant::now();
                 let tiles = workers.errors(&canvas.film);
                 error = tiles.as_ref().and_then(|tiles| regions::estimate(tiles, width, method.shares()));
+                let audited = error.and_then(|noise| audit.as_ref()?.verdict(workers, &canvas.film, noise));
                 if let (true, Some(tiles)) = (settings.adaptive && rounds.spp() >= adapt::FROM, tiles) {
                     canvas.weights = Some(adapt::weights(&tiles, &canvas.taken, width));
                 }
+                error = audited.as_ref().map(|audited| audited.total).or(error);
+                is_lost = !method.converges()
+                    && audited.is_some_and(|audited| rounds.is_out_of_reach(audited.bias.least()));
                 rounds.estimated(error);
                 estimating = start.elapsed().as_secs_f64();
                 latest = error;
@@ -88,8 +104,8 @@ impl Picture<'_> {
             let seconds = clock.seconds();
             let against =
                 reference.as_mut().map(|r| clock.pause(|| r.compare(&image(&canvas.film), seconds)));
-            let (spp, rays) = (rounds.spp(), canvas.counters.rays + canvas.counters.shadow_rays);
-            history.push(Round { seconds, spp, rays, error, reference: against });
+            let spp = rounds.spp();
+            history.push(Round { seconds, spp, rays: rays(&canvas), error, reference: against });
             let known = Progress {
                 seconds,
                 seconds_left: rounds.seconds_left(seconds, latest),
@@ -100,20 +116,28 @@ impl Picture<'_> {
             clock.pause(|| progress(&known));
             let due = |every: f64| saved.elapsed().as_secs_f64() >= every;
             if plan.first || settings.checkpoint.as_ref().is_some_and(|checkpoint| due(checkpoint.every)) {
-                clock.pause(|| save(&canvas, &rounds, seconds, &history))?;
+                clock.pause(|| save(&canvas, &rounds, audit.as_ref(), seconds, &history))?;
                 saved = Instant::now();
             }
-            if interrupt.load(Ordering::Relaxed) && !plan.first {
+            if is_lost || interrupt.load(Ordering::Relaxed) && !plan.first {
                 break;
             }
         }
         let interrupted = interrupt.load(Ordering::Relaxed);
+        // Before the last steps of the audit, which a render that goes on would not take here.
+        save(&canvas, &rounds, audit.as_ref(), clock.seconds(), &history)?;
+        let is_known = history.last().is_some_and(|last| last.error.is_some());
+        if let (Some(audit), false) = (&mut audit, interrupted || is_known) {
+            let left = settings.stop.seconds.map(|limit| limit - estimating - clock.seconds());
+            audit.step(workers, &canvas.film, rays(&canvas), clock.seconds(), left)?;
+        }
         let render = clock.seconds();
-        let error = workers.estimate(&canvas.film, method.shares());
+        let noise = workers.estimate(&canvas.film, method.shares());
+        let audited = noise.and_then(|noise| audit.as_ref()?.verdict(workers, &canvas.film, noise));
+        let error = audited.as_ref().map(|audited| audited.total).or(noise);
         if let Some(last) = history.last_mut() {
             last.error = error;
         }
-        save(&canvas, &rounds, render, &history)?;
         let film = &canvas.film;
         Ok(RenderResult {
             method,
@@ -131,11 +155,21 @@ impl Picture<'_> {
             places: canvas.ledger.places(width, height),
             empty_pixels: empty_pixels(film, |task| canvas.shard.owns(task)),
             error,
+            audit: audited,
             memory: Vec::new(),
             memory_peak: 0,
-            ending: if interrupted { Ending::Interrupted } else { Ending::Done },
+            ending: match (interrupted, is_lost) {
+                (true, _) => Ending::Interrupted,
+                (_, true) => Ending::Biased,
+                _ => Ending::Done,
+            },
         })
     }
+}
+
+/// Rays of every kind.
+fn rays(canvas: &Canvas) -> u64 {
+    canvas.counters.rays + canvas.counters.shadow_rays
 }
 
 /// Samples of a tile between two looks at the clock.

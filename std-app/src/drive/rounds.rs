@@ -179,6 +179,11 @@ impl Rounds {
         [by_samples, by_time, by_error].into_iter().flatten().reduce(f64::min).map(|left| left.max(0.0))
     }
 
+    /// Whether the error that was asked for is less than `error`.
+    pub(super) fn is_out_of_reach(&self, error: f64) -> bool {
+        self.stop.error.is_some_and(|wanted| error > wanted)
+    }
+
     fn error_reached(&self) -> bool {
         let (Some(wanted), Some((spp, error))) = (self.stop.error, self.decision) else { return false };
         self.spp == spp && spp >= FEWEST_FOR_ERROR && error.upper <= wanted

@@ -1,5 +1,6 @@
 //! One render from the first structure to the last round.
 
+use super::audit::Audit;
 use super::film_file::{Identity, Reader};
 use super::history::Clock;
 use super::memory::Memory;
@@ -55,7 +56,9 @@ impl WithFeatures for Render<'_> {
         let film = Film::new(width, height, &mut Arena::new(bytemuck::cast_slice_mut(&mut film_lines)))?;
         let stage = Stage { scene, bvh: &bvh, lights: &lights, settings, workers: &workers };
         method.with::<F, _>(&stage, &mut memory, |renderer, memory| {
-            let picture = Picture { method, stage, film, identity, resumed, clock, progress, interrupt };
+            let audit = Audit::new::<F>(&stage, memory, method.is_biased())?;
+            let picture =
+                Picture { method, stage, film, audit, identity, resumed, clock, progress, interrupt };
             let done = picture.render(renderer)?;
             let seconds = Seconds { build, ..done.seconds };
             Ok(RenderResult { memory: memory.uses(), memory_peak: memory.peak(), seconds, ..done })

@@ -1,5 +1,6 @@
 //! The threads: each takes the next task when it is done with one, and has working memory of its own.
 
+use super::crew::Task;
 use super::{RenderError, regions};
 use core::sync::atomic::{AtomicUsize, Ordering};
 use halflight_core::bsdf::Features;
@@ -8,9 +9,10 @@ use halflight_core::estimate::{ErrorEstimate, TileError, TileLight};
 use halflight_core::film::{Film, PIXELS_PER_TILE};
 use halflight_core::memory::{Arena, Line, OutOfMemory};
 use halflight_core::scene::Mesh;
-use halflight_core::transport::{PathTracer, Pilot, path::WAVE};
+use halflight_core::transport::{Counters, PathTracer, Pilot, path::WAVE};
 use rayon::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
+use std::sync::Mutex;
 
 /// A pool of threads.
 pub(super) struct Workers {
@@ -36,18 +38,20 @@ impl Workers {
 
     /// What the tiles of `film` tell of its error; `None` for a black picture.
     pub(super) fn errors(&self, film: &Film) -> Option<Vec<TileError>> {
-        let tiles = || film.pixels().par_chunks(PIXELS_PER_TILE);
-        self.pool.install(|| {
-            let mut light = TileLight::default();
-            for tile in tiles().map(TileLight::of).collect::<Vec<_>>() {
-                light += tile;
-            }
-            let mean = light.mean();
-            if mean.is_nan() || mean <= 0.0 {
-                return None;
-            }
-            Some(tiles().map(|tile| TileError::of(tile, mean)).collect())
-        })
+        let mean = self.mean(film)?;
+        let tiles = film.pixels().par_chunks(PIXELS_PER_TILE);
+        Some(self.pool.install(|| tiles.map(|tile| TileError::of(tile, mean)).collect()))
+    }
+
+    /// The mean radiance of `film`; `None` where it is black.
+    pub(super) fn mean(&self, film: &Film) -> Option<f64> {
+        let tiles = film.pixels().par_chunks(PIXELS_PER_TILE);
+        let mut light = TileLight::default();
+        self.pool
+            .install(|| tiles.map(TileLight::of).collect::<Vec<_>>())
+            .into_iter()
+            .for_each(|tile| light += tile);
+        Some(light.mean()).filter(|mean| *mean > 0.0)
     }
 
     /// A look at a few tiles before the picture.
@@ -74,6 +78,38 @@ impl Workers {
     ) -> Result<Vec<T>, OutOfMemory> {
         let one = |lines: &mut Vec<Line>| work(&mut Arena::new(bytemuck::cast_slice_mut(lines)));
         self.pool.install(|| scratch.par_iter_mut().with_max_len(1).map(one).collect())
+    }
+
+    /// A pass: task `i` writes to the `i`th piece of `size` values of `out`. Returns what they counted, and whether all
+    /// of them ran before it `is_over`.
+    pub(super) fn pass<T: Send>(
+        &self,
+        out: &mut [T],
+        size: usize,
+        scratch: &mut [Vec<Line>],
+        is_over: &(dyn Fn() -> bool + Sync),
+        task: &Task<T>,
+    ) -> Result<(Counters, bool), OutOfMemory> {
+        let tasks = out.len().div_ceil(size.max(1));
+        let queue = Mutex::new(out.chunks_mut(size.max(1)).enumerate());
+        let next = || queue.lock().unwrap_or_else(|poisoned| poisoned.into_inner()).next();
+        let counted = self.on_all(scratch, |arena| {
+            let (mut counters, mut done) = (Counters::default(), 0);
+            while let Some((index, out)) = next() {
+                if is_over() {
+                    break;
+                }
+                counters += task(index, arena, out)?;
+                done += 1;
+            }
+            Ok((counters, done))
+        })?;
+        let (mut counters, mut done) = (Counters::default(), 0);
+        for (more, tasks) in counted {
+            counters += more;
+            done += tasks;
+        }
+        Ok((counters, done == tasks))
     }
 
     /// What `look` says of each of `tasks`, in their order.

@@ -2,7 +2,7 @@
 
 use super::{Maker, Race, Run};
 use crate::compare::Comparison;
-use crate::drive::{Against, Ending, ErrorEstimate, Place, Round, Shard};
+use crate::drive::{Against, Audited, Deviation, Ending, ErrorEstimate, Place, Region, Round, Shard};
 use halflight_core::film::Dropped;
 use serde_json::{Map, Value, json};
 
@@ -26,6 +26,7 @@ pub(super) fn run(run: &Run) -> Value {
         "ending": match result.ending {
             Ending::Done => "done",
             Ending::Interrupted => "interrupted",
+            Ending::Biased => "biased",
         },
         "seconds": {
             "load": run.load_seconds,
@@ -99,12 +100,51 @@ fn made(maker: &Maker) -> Value {
 /// Against the reference where there is one, else as estimated; then `estimate` has the estimate too.
 fn error(run: &Run) -> Value {
     let estimate = |against| estimate_object(run.result.error, against);
-    let Some(comparison) = run.comparison else { return estimate("estimate") };
-    let mut error = comparison_object(comparison);
-    error["interval"] = Value::Null;
-    error["against"] = "reference".into();
-    error["estimate"] = estimate("estimate");
+    let mut error = match run.comparison {
+        None => estimate("estimate"),
+        Some(comparison) => {
+            let mut error = comparison_object(comparison);
+            error["interval"] = Value::Null;
+            error["against"] = "reference".into();
+            error["estimate"] = estimate("estimate");
+            error
+        }
+    };
+    if let Some(audit) = &run.result.audit {
+        error["noise"] = estimate_object(Some(audit.noise), "estimate");
+        error["bias"] = bias(audit);
+    }
     error
+}
+
+/// What an audit has found.
+fn bias(audit: &Audited) -> Value {
+    let deviation = |deviation: &Deviation| json!({ "mean": deviation.mean, "error": deviation.error });
+    let region = |region: &Region| {
+        let mut object = deviation(&region.deviation);
+        for (name, value) in
+            [("x", region.x), ("y", region.y), ("width", region.width), ("height", region.height)]
+        {
+            object[name] = value.into();
+        }
+        object["found"] = region.is_biased.into();
+        object
+    };
+    json!({
+        "found": audit.is_biased(),
+        "relmse": audit.bias.relmse,
+        "interval": [audit.bias.lower, audit.bias.upper],
+        "detectable": audit.bias.detectable,
+        "deviation": deviation(&audit.whole),
+        "regions": audit.regions.iter().map(region).collect::<Vec<_>>(),
+        "audit": {
+            "share": audit.share,
+            "pixels": audit.pixels,
+            "samples": audit.samples,
+            "rays": audit.rays,
+            "seconds": audit.seconds,
+        },
+    })
 }
 
 /// The object of an estimate.

@@ -1,6 +1,7 @@
 //! The header of a film file: one JSON object, which a person can read with `head -c`.
 
 use super::identity::Identity;
+use crate::drive::audit::{self, Audit};
 use crate::drive::canvas::{Canvas, Shard};
 use crate::drive::ledger::Ledger;
 use crate::drive::rounds::{Estimates, Rounds};
@@ -28,6 +29,7 @@ pub(in crate::drive) struct Header {
     history: Vec<Entry>,
     /// Of adaptive sampling.
     weights: Option<Vec<f32>>,
+    audit: Option<audit::State>,
 }
 
 /// Not a number, infinite, negative, unfinished.
@@ -41,6 +43,7 @@ impl Header {
         identity: Identity,
         canvas: &Canvas,
         rounds: &Rounds,
+        audit: Option<&Audit>,
         seconds: f64,
         history: &[Round],
     ) -> Self {
@@ -60,6 +63,7 @@ impl Header {
             ledger: ledger.tiles().map(|(task, dropped)| (task, causes(dropped))).collect(),
             history: history.iter().map(|r| (r.seconds, r.spp, r.rays, r.error.map(error))).collect(),
             weights: canvas.weights.clone(),
+            audit: audit.map(|audit| audit.state().clone()),
         }
     }
 
@@ -91,6 +95,11 @@ impl Header {
     /// Of `tiles` tiles.
     pub(in crate::drive) fn weights(&self, tiles: usize) -> Option<Vec<f32>> {
         self.weights.clone().filter(|weights| weights.len() == tiles)
+    }
+
+    /// How far the audit is, where there is one.
+    pub(in crate::drive) fn audit(&self) -> Option<audit::State> {
+        self.audit.clone().filter(audit::State::is_whole)
     }
 
     pub(in crate::drive) fn history(&self) -> Vec<Round> {

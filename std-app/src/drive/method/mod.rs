@@ -6,6 +6,8 @@
 
 mod irradiance_cache;
 mod path;
+#[cfg(test)]
+mod wrong;
 
 pub use irradiance_cache::{CacheSettings, CacheUse};
 
@@ -25,6 +27,9 @@ pub enum Method {
     Path,
     /// Indirect light of diffuse surfaces from an irradiance cache.
     IrradianceCache,
+    /// Path tracing that is wrong on purpose.
+    #[cfg(test)]
+    Wrong,
 }
 
 impl Method {
@@ -36,6 +41,8 @@ impl Method {
         match self {
             Method::Path => "path",
             Method::IrradianceCache => "irradiance-cache",
+            #[cfg(test)]
+            Method::Wrong => "wrong",
         }
     }
 
@@ -46,6 +53,8 @@ impl Method {
             Method::IrradianceCache => {
                 "Path tracing, but for the indirect light of diffuse surfaces, which is interpolated"
             }
+            #[cfg(test)]
+            Method::Wrong => "Wrong on purpose",
         }
     }
 
@@ -59,6 +68,18 @@ impl Method {
         match self {
             Method::Path => false,
             Method::IrradianceCache => true,
+            #[cfg(test)]
+            Method::Wrong => true,
+        }
+    }
+
+    /// Whether enough samples bring its pictures as near to that of the scene as anybody wishes.
+    pub const fn converges(self) -> bool {
+        match self {
+            Method::Path => true,
+            Method::IrradianceCache => false,
+            #[cfg(test)]
+            Method::Wrong => false,
         }
     }
 
@@ -68,6 +89,8 @@ impl Method {
         match self {
             Method::Path => false,
             Method::IrradianceCache => true,
+            #[cfg(test)]
+            Method::Wrong => false,
         }
     }
 
@@ -81,6 +104,8 @@ impl Method {
         match self {
             Method::Path => then(&mut path::Paths::<F>::new(stage, memory)?, memory),
             Method::IrradianceCache => irradiance_cache::with::<F, T>(stage, memory, then),
+            #[cfg(test)]
+            Method::Wrong => then(&mut wrong::Wrong::<F>::new(stage, memory)?, memory),
         }
     }
 }

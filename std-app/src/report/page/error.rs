@@ -34,9 +34,10 @@ pub(super) fn lead(run: &Run) -> String {
             let estimate = estimate.map_or("unknown".into(), interval);
             format!(
                 "Against the reference this picture has a relMSE of <strong>{}</strong>{}. \
-                 Estimated from its own noise it would be {estimate}.",
+                 Estimated from its own noise{} it would be {estimate}.",
                 number(relmse, 3),
-                typical(relmse)
+                typical(relmse),
+                if run.result.audit.is_some() { " and an audit of its bias" } else { "" },
             )
         }
         (None, Some(error)) if error.upper > VAGUE * error.lower => format!(
@@ -46,8 +47,9 @@ pub(super) fn lead(run: &Run) -> String {
             number(error.relmse, 2)
         ),
         (None, Some(error)) => format!(
-            "This picture has a relMSE of about {}, as its own noise tells{}.",
+            "This picture has a relMSE of about {}, as its own noise {}{}.",
             interval(error),
+            if run.result.audit.is_some() { "and an audit of its bias tell" } else { "tells" },
             typical(error.relmse)
         ),
         (None, None) => {

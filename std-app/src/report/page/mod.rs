@@ -1,6 +1,7 @@
 //! Pages: templates that are read as HTML, filled with what was measured. Whatever comes from outside (names of
 //! scenes and files, repairs, the command) passes through [`escape`].
 
+mod audit;
 mod chart;
 mod error;
 mod map;

@@ -2,7 +2,7 @@
 
 use super::map::{Map, difference};
 use super::picture::{exposable, reduced};
-use super::{error, escape, fill, parts, shell};
+use super::{audit, error, escape, fill, parts, shell};
 use crate::compare::Shown;
 use crate::drive::Ending;
 use crate::report::Run;
@@ -32,6 +32,7 @@ pub(in crate::report) fn page(run: &Run) -> String {
             ("rounds", &error::rounds(run)),
             ("maps", &maps(run)),
             ("note", &note(run)),
+            ("audit", &audit::section(run)),
             ("reference", &reference(run)),
             ("time", &parts::time(run)),
             ("memory", &parts::memory(run)),
@@ -49,6 +50,10 @@ fn early(run: &Run) -> &'static str {
     match run.result.ending {
         Ending::Done => "",
         Ending::Interrupted => " It was stopped early.",
+        Ending::Biased => {
+            " It was stopped because its bias alone is larger than the error that was asked for: more samples would \
+             not help, another method would."
+        }
     }
 }
 
@@ -108,7 +113,7 @@ fn maps(run: &Run) -> String {
             "How noisy the light is there, however many samples are taken, in (W/(m²\u{a0}sr))².",
         );
     }
-    maps + &samples(run)
+    maps + &audit::map(run) + &samples(run)
 }
 
 /// The map of samples, where they differ by more than the end of the last round.

@@ -1,0 +1,247 @@
+//! The audit: what a biased picture is off by, from a few of its pixels that an unbiased estimator renders as well
+//! (docs/decisions/0011).
+//!
+//! A and B are a pixel's halves in the picture, U and V those of the audit, all independent of each other. (A − U) and
+//! (B − V) both have the pixel's bias for their mean and share no noise, so their product has the square of the bias
+//! for its mean, whatever the noise of either is. With the mean of both halves in place of A and B it would be the
+//! squared error of the pixel: the difference, ((A − B) / 2)², is the variance that the picture tells of itself, in all
+//! of its pixels instead of a few.
+
+use super::interval::student_95;
+use super::metric::DARK;
+use crate::Rgb;
+use crate::film::Pixel;
+use libm::{erfc, fabs, log, sqrt};
+
+/// The unknown reference in a denominator comes from the part of the audit that is not in the numerator: what made a
+/// pixel of the picture bright by chance must not make its error small. Where light is rare the part may lack it, so
+/// that the reference is taken for no darker than the filtered picture over this; a pixel that shines where it should
+/// not is off by as much at most.
+const DOUBT: f64 = 4.0;
+
+/// Relative differences of pictures that add up the same light in another order.
+const ROUNDING: f64 = 1e-6;
+
+/// What an audited pixel says.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Finding {
+    /// Estimate of its squared bias over R² + 0.01 m², in the mean of its channels; may be negative.
+    pub bias: f64,
+    /// By how much it is too bright, over the root of that.
+    pub deviation: f64,
+}
+
+impl Finding {
+    /// Of a pixel of the `picture`, its `truth`, and what it is after filtering, in a picture of mean `mean`. `None`
+    /// where the picture has no two samples, or the truth no four.
+    pub fn of(picture: &Pixel, truth: &Pixel, filtered: Rgb, mean: f64) -> Option<Self> {
+        if picture.even.count() == 0 || picture.odd.count() == 0 {
+            return None;
+        }
+        let ([u1, u2], [v1, v2]) = (truth.even.parts()?, truth.odd.parts()?);
+        let scaled = |colour: Rgb| colour.to_array().map(|value| f64::from(value) / mean);
+        let [a, b, both, filtered] =
+            [picture.even.mean(), picture.odd.mean(), picture.mean(), filtered].map(scaled);
+        let [u1, u2, v1, v2] = [u1, u2, v1, v2].map(scaled);
+        let (mut bias, mut deviation) = (0.0, 0.0);
+        for c in 0..3 {
+            // Numerator from one part of the truth, denominator from the other, and the other way round.
+            for (u, v, other) in [(u1[c], v1[c], u2[c] + v2[c]), (u2[c], v2[c], u1[c] + v1[c])] {
+                let r = (0.5 * other).max(filtered[c] / DOUBT);
+                let weight = 1.0 / (r * r + DARK);
+                bias += 0.5 * ((a[c] - u) * (b[c] - v) + (a[c] - v) * (b[c] - u)) * weight;
+                deviation += (both[c] - 0.5 * (u + v)) * sqrt(weight);
+            }
+        }
+        Some(Self { bias: bias / 6.0, deviation: deviation / 6.0 })
+            .filter(|finding| finding.bias.is_finite() && finding.deviation.is_finite())
+    }
+}
+
+/// The squared bias of a picture in units of relMSE, which its own noise knows nothing of.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BiasEstimate {
+    /// Estimate; below 0 where there is none, or none that is larger than noise.
+    pub relmse: f64,
+    /// Lower end of the interval of 95 %, not below 0.
+    pub lower: f64,
+    /// Upper end, not below 0.
+    pub upper: f64,
+    /// The smallest that would have been told from none.
+    pub detectable: f64,
+}
+
+impl BiasEstimate {
+    /// From the findings of all strata, one of each, in an order in which neighbours are alike; with the share of the
+    /// picture that each stands for, over the mean share. `None` for fewer than eight.
+    ///
+    /// What neighbours differ by is taken for chance: too much where strata differ, so that the interval is rather too
+    /// wide than too narrow.
+    pub fn of(findings: impl Iterator<Item = (Finding, f64)>) -> Option<Self> {
+        let (mut count, mut sum, mut squares, mut fourths) = (0.0, 0.0, 0.0, 0.0);
+        let mut before = None;
+        for (finding, share) in findings {
+            let value = finding.bias * share;
+            if let Some(before) = before {
+                let squared = (value - before) * (value - before);
+                squares += squared;
+                fourths += squared * squared;
+            }
+            before = Some(value);
+            count += 1.0;
+            sum += value;
+        }
+        if count < 8.0 {
+            return None;
+        }
+        let relmse = sum / count;
+        // Neighbouring differences share a value: three of them are worth two that do not.
+        let freedom = if fourths > 0.0 { squares * squares / fourths / 1.5 } else { 1.0 };
+        let reach = student_95(freedom) * sqrt(squares / (2.0 * (count - 1.0) * count));
+        let detectable = reach.max(ROUNDING * ROUNDING);
+        let lower = if relmse > detectable { relmse - reach } else { 0.0 };
+        Some(Self { relmse, lower, upper: (relmse + reach).max(0.0), detectable })
+    }
+
+    /// A lower end that holds however often it is looked at: about four standard errors below.
+    pub fn least(&self) -> f64 {
+        (self.relmse - 2.0 * (self.relmse - self.lower)).max(0.0)
+    }
+
+    /// Whether there is a bias, at a level of 2.5 %.
+    pub fn is_found(&self) -> bool {
+        self.lower > 0.0
+    }
+}
+
+/// By how much a part of a picture is too bright, relative to the truth, in the mean.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Deviation {
+    /// Its estimate; negative: too dark.
+    pub mean: f64,
+    /// Its standard error.
+    pub error: f64,
+    /// From how many pixels.
+    pub pixels: u32,
+}
+
+impl Deviation {
+    /// From the deviations of some pixels.
+    pub fn of(values: impl Iterator<Item = f64>) -> Self {
+        // Welford 1962.
+        let (mut pixels, mut mean, mut squares) = (0, 0.0, 0.0);
+        for value in values {
+            pixels += 1;
+            let before = value - mean;
+            mean += before / f64::from(pixels);
+            squares += before * (value - mean);
+        }
+        let n = f64::from(pixels);
+        let error =
+            if pixels > 1 { sqrt(squares / (n * (n - 1.0)) + ROUNDING * ROUNDING) } else { f64::INFINITY };
+        Self { mean, error, pixels }
+    }
+
+    /// The probability to see as much or more where there is nothing: the two tails of Student's t, after Wallace
+    /// (1959), right to a few hundredths of itself from three degrees of freedom on.
+    pub fn chance(&self) -> f64 {
+        if self.pixels < 4 || !self.error.is_finite() {
+            return 1.0;
+        }
+        let freedom = f64::from(self.pixels - 1);
+        let t = fabs(self.mean) / self.error;
+        let z = (8.0 * freedom + 1.0) / (8.0 * freedom + 3.0) * sqrt(freedom * log(1.0 + t * t / freedom));
+        erfc(z * core::f64::consts::FRAC_1_SQRT_2)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::film::Dropped;
+    use crate::sampling::Random;
+    use std::vec::Vec;
+
+    /// A pixel of `light` and uniform noise of ± 1 a sample.
+    fn pixel(light: f32, samples: u32, random: Random) -> Pixel {
+        let mut pixel = Pixel::default();
+        for sample in 0..samples {
+            let noise = |channel| 2.0 * random.single(3 * sample + channel) - 1.0;
+            let colour = Rgb::splat(light) + Rgb::new(noise(0), noise(1), noise(2));
+            pixel.add(sample, colour, &mut Dropped::default());
+        }
+        pixel
+    }
+
+    /// Findings of `count` pixels of light 2 in a picture of mean 2, `bias` too bright.
+    fn findings(count: u32, bias: f32, seed: u32) -> Vec<Finding> {
+        let of = |i: u32| {
+            let picture = pixel(2.0 + bias, 8, Random::new(seed, 2 * i));
+            let truth = pixel(2.0, 16, Random::new(seed, 2 * i + 1));
+            Finding::of(&picture, &truth, Rgb::splat(2.0 + bias), 2.0).unwrap()
+        };
+        (0..count).map(of).collect()
+    }
+
+    fn estimate(findings: &[Finding]) -> BiasEstimate {
+        BiasEstimate::of(findings.iter().map(|finding| (*finding, 1.0))).unwrap()
+    }
+
+    #[test]
+    fn no_bias_is_found_where_there_is_none() {
+        let (mut found, mut strange, runs) = (0, 0, 400);
+        for seed in 0..runs {
+            let findings = findings(64, 0.0, seed);
+            found += u32::from(estimate(&findings).is_found());
+            let deviation = Deviation::of(findings.iter().map(|finding| finding.deviation));
+            strange += u32::from(deviation.chance() < 0.05);
+        }
+        // 2.5 % of 400 are 10, more than 20 have a chance of 0.2 %; 5 % are 20, more than 35 one of 0.1 %.
+        assert!(found <= 20, "{found} of {runs}");
+        assert!((8..=35).contains(&strange), "{strange} of {runs}");
+    }
+
+    #[test]
+    fn the_interval_holds_the_bias() {
+        // 10 % too bright: 0.2² / (2² + 0.01 · 2²).
+        let truth = 0.04 / 4.04;
+        let (mut held, mut sum, runs) = (0, 0.0, 200);
+        for seed in 0..runs {
+            let bias = estimate(&findings(64, 0.2, seed));
+            held += u32::from((bias.lower..=bias.upper).contains(&truth));
+            sum += bias.relmse;
+        }
+        // The noise of a denominator makes its inverse larger by three times its square, 3 %; what is left is chance.
+        let mean = sum / f64::from(runs);
+        assert!((0.93..1.13).contains(&(mean / truth)), "{mean} {truth}");
+        // 95 % of 200 are 190; fewer than 180 have a chance of 0.2 %.
+        assert!(held >= 180, "{held} of {runs}");
+    }
+
+    #[test]
+    fn a_leak_does_not_hide_behind_its_own_brightness() {
+        let (picture, truth) = (pixel(40.0, 8, Random::new(0, 0)), pixel(2.0, 400, Random::new(0, 1)));
+        let finding = Finding::of(&picture, &truth, Rgb::splat(40.0), 2.0).unwrap();
+        // (40 − 2)² over (40 / 4)² instead of 40².
+        assert!(finding.bias > 14.0 && finding.deviation > 3.5, "{finding:?}");
+    }
+
+    #[test]
+    fn too_little_to_say_anything() {
+        assert!(BiasEstimate::of([].into_iter()).is_none());
+        let truth = pixel(2.0, 3, Random::new(0, 1));
+        assert!(Finding::of(&pixel(2.0, 8, Random::new(0, 0)), &truth, Rgb::ONE, 1.0).is_none());
+        assert_eq!(Deviation::of([1.0].into_iter()).chance(), 1.0);
+        // Two pictures of the same lamp, added up in another order.
+        let same = [1e-7, -1e-7, 1e-7, 1e-7].into_iter();
+        assert!(Deviation::of(same).chance() > 0.5);
+    }
+
+    #[test]
+    fn chances_are_those_of_the_tables() {
+        for (freedom, t, chance) in [(4, 2.776, 0.05), (15, 4.073, 0.001), (60, 2.0, 0.05)] {
+            let found = Deviation { mean: t, error: 1.0, pixels: freedom + 1 }.chance();
+            assert!((found / chance - 1.0).abs() < 0.06, "{found} {chance}");
+        }
+    }
+}

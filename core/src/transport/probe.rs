@@ -1,0 +1,68 @@
+//! Path tracing of single pixels, far apart: what an audit asks ([`crate::estimate`]).
+
+use super::estimator::Counters;
+use super::path::PathTracer;
+use super::reuse::Exchange;
+use super::wave::{Path, Wave};
+use crate::bsdf::Features;
+use crate::film::Pixel;
+use crate::geometry::{MISS, Ray};
+use crate::memory::{Arena, OutOfMemory};
+use crate::sampling::Sampler;
+use core::ops::Range;
+
+impl<F: Features> PathTracer<'_, F> {
+    /// Traces `samples` of the pixels in these columns and rows, and adds them to `out`, one for one. Pixels share
+    /// nothing, whatever the settings say.
+    ///
+    /// # Errors
+    /// [`OutOfMemory`] where `scratch` has less than [`PathTracer::scratch`] bytes.
+    pub fn probe(
+        &self,
+        pixels: &[[u32; 2]],
+        samples: Range<u32>,
+        wave: usize,
+        scratch: &mut Arena,
+        out: &mut [Pixel],
+    ) -> Result<Counters, OutOfMemory> {
+        let alone = self.with_reuse(false);
+        let mut arena = scratch.scratch();
+        let mut wave = Wave::new(wave, &mut arena)?;
+        let mut counters = Counters::default();
+        let all = pixels
+            .iter()
+            .enumerate()
+            .flat_map(|(place, pixel)| samples.clone().map(move |sample| (place as u32, *pixel, sample)));
+        let mut all = all.peekable();
+        while all.peek().is_some() {
+            let mut count = 0;
+            let slots = wave.paths.iter_mut().zip(wave.rays.iter_mut()).zip(wave.exchanges.iter_mut());
+            for (((path, ray), exchange), (place, [x, y], sample)) in slots.zip(&mut all) {
+                let pixel = y * self.settings.width + x;
+                let sampler = Sampler::new(self.settings.seed, pixel, sample);
+                *ray = Ray { tag: count as u32, ..self.camera_ray([x, y], &sampler) };
+                *path = Path {
+                    throughput: [1.0; 3],
+                    pdf: f32::INFINITY,
+                    pixel,
+                    place,
+                    sample,
+                    segments: 1,
+                    triangle: MISS,
+                    eta_squared: 1.0,
+                    ..Path::default()
+                };
+                *exchange = Exchange::new(0);
+                count += 1;
+            }
+            counters.paths += count as u64;
+            alone.advance(&mut wave, count, &mut counters);
+            for (path, exchange) in wave.paths.iter().zip(&*wave.exchanges).take(count) {
+                if let Some(pixel) = out.get_mut(path.place as usize) {
+                    pixel.add(path.sample, exchange.seen(path), &mut counters.dropped);
+                }
+            }
+        }
+        Ok(counters)
+    }
+}

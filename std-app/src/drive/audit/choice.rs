@@ -1,0 +1,182 @@
+//! Which pixels are audited: one of each stratum, at random. Strata are equal parts of the picture in an order in which
+//! neighbours are alike: region by region, within each by brightness. So dark corners, bright patches, and whatever a
+//! region holds have pixels in the audit by their share.
+//!
+//! Every pixel of a stratum has the same chance, whatever its own noise has put it there: the choice has no bias.
+
+use halflight_core::Rgb;
+use halflight_core::estimate::filtered;
+use halflight_core::film::{Film, PIXELS_PER_TILE, Tile};
+use halflight_core::sampling::Random;
+
+/// Fewest pixels that are audited, where the picture has as many.
+const FEWEST: usize = 256;
+
+/// Most pixels that are audited.
+const MOST: usize = 8192;
+
+/// A region has so many of them at least, and so has a signed deviation with an error.
+const PER_REGION: usize = 12;
+
+/// Regions along each side at most.
+const SIDE: u32 = 8;
+
+/// The regions of a picture: a grid of `side` x `side`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Grid {
+    size: [u32; 2],
+    pub(super) side: u32,
+}
+
+impl Grid {
+    /// For `pixels` audited pixels.
+    pub(super) fn new(size: [u32; 2], pixels: usize) -> Self {
+        let side = ((pixels / PER_REGION).isqrt() as u32).clamp(1, SIDE).min(size[0]).min(size[1]);
+        Self { size, side }
+    }
+
+    /// The region of a pixel, row by row from the upper left.
+    pub(super) fn region(&self, pixel: [u32; 2]) -> usize {
+        let [column, row] =
+            [0, 1].map(|i| (u64::from(pixel[i]) * u64::from(self.side) / u64::from(self.size[i])) as usize);
+        row * self.side as usize + column
+    }
+
+    /// First and last column and row, those after the last.
+    pub(super) fn bounds(&self, region: usize) -> [[u32; 2]; 2] {
+        let place = [region as u32 % self.side, region as u32 / self.side];
+        let border =
+            |i: usize, n: u32| (u64::from(n) * u64::from(self.size[i])).div_ceil(u64::from(self.side)) as u32;
+        [0, 1].map(|i| [border(i, place[i]), border(i, place[i] + 1)])
+    }
+}
+
+/// How many pixels of a picture are audited.
+pub(super) fn count(width: u32, height: u32) -> usize {
+    Tile::count(width, height).clamp(FEWEST, MOST).min(width as usize * height as usize)
+}
+
+/// The pixels, and the size of the stratum of each over the mean size, in the order of the strata.
+pub(super) fn choose(film: &Film, mean: f64, seed: u32) -> (Vec<[u32; 2]>, Vec<f32>) {
+    let (width, height) = (film.width(), film.height());
+    let strata = count(width, height);
+    let grid = Grid::new([width, height], strata);
+    let mut order: Vec<(usize, f32, [u32; 2])> = Vec::with_capacity(width as usize * height as usize);
+    for (task, pixels) in film.pixels().chunks(PIXELS_PER_TILE).enumerate() {
+        let tile = Tile::new(width, height, task);
+        let colours = filtered(pixels, mean);
+        for (i, colour) in colours.into_iter().enumerate() {
+            if let Some((x, y)) = tile.pixel(i) {
+                let region = grid.region([x, y]);
+                order.push((region, brightness(colour, region), [x, y]));
+            }
+        }
+    }
+    order.sort_unstable_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)).then(a.2.cmp(&b.2)));
+
+    let random = Random::new(seed, STREAM);
+    let border = |i: usize| (i as u64 * order.len() as u64 / strata as u64) as usize;
+    let stratum = |i: usize| {
+        let (first, end) = (border(i), border(i + 1));
+        let pick = (f64::from(random.single(i as u32)) * (end - first) as f64) as usize;
+        (order[(first + pick).min(end - 1)].2, ((end - first) * strata) as f32 / order.len() as f32)
+    };
+    (0..strata).map(stratum).unzip()
+}
+
+/// Of the choice of pixels, among the streams of its seed.
+const STREAM: u32 = 0x6175_6469;
+
+/// Rising in one region and falling in the next: the last stratum of a region is like the first of the next.
+fn brightness(colour: Rgb, region: usize) -> f32 {
+    let sum = colour.element_sum();
+    if region.is_multiple_of(2) { sum } else { -sum }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use halflight_core::film::Dropped;
+    use halflight_core::memory::{Arena, Line};
+
+    fn film<T>(width: u32, height: u32, light: impl Fn(u32, u32) -> f32, work: impl FnOnce(&Film) -> T) -> T {
+        let mut lines = vec![Line([0; 64]); Film::footprint(width, height).bytes() / 64];
+        let mut film =
+            Film::new(width, height, &mut Arena::new(bytemuck::cast_slice_mut(&mut lines))).unwrap();
+        for y in 0..height {
+            for x in 0..width {
+                let place = Tile::position(width, x, y);
+                for sample in 0..4 {
+                    let colour = Rgb::splat(light(x, y));
+                    film.pixels_mut()[place].add(sample, colour, &mut Dropped::default());
+                }
+            }
+        }
+        work(&film)
+    }
+
+    #[test]
+    fn every_pixel_has_its_chance_and_strata_add_up() {
+        let light = |x: u32, y: u32| 1.0 + ((x * 7 + y * 3) % 11) as f32;
+        let mut times = vec![0; 40 * 30];
+        for seed in 0..400 {
+            film(40, 30, light, |film| {
+                let (pixels, shares) = choose(film, 5.0, seed);
+                assert_eq!(pixels.len(), 256);
+                assert!((shares.iter().sum::<f32>() / 256.0 - 1.0).abs() < 1e-5);
+                for ([x, y], share) in pixels.into_iter().zip(shares) {
+                    times[(y * 40 + x) as usize] += 1;
+                    assert!((0.8..1.2).contains(&share));
+                }
+            });
+        }
+        // Strata of 4 and 5: 80 to 100 times of 400. Less than 40 or more than 150: five standard deviations.
+        assert!(times.iter().all(|count| (40..150).contains(count)), "{:?}", times.iter().min());
+    }
+
+    #[test]
+    fn what_is_rare_has_its_share() {
+        // A bright stripe of a hundredth of the picture: 16 of 1600 rows of strata… of 256 audited pixels 2 or 3.
+        film(
+            100,
+            100,
+            |x, _| if x == 17 { 50.0 } else { 1.0 },
+            |film| {
+                let (pixels, _) = choose(film, 1.5, 3);
+                let stripe = pixels.iter().filter(|[x, _]| *x == 17).count();
+                assert!((1..=5).contains(&stripe), "{stripe}");
+            },
+        );
+    }
+
+    #[test]
+    fn small_pictures_are_audited_whole() {
+        film(
+            5,
+            3,
+            |_, _| 1.0,
+            |film| {
+                let (mut pixels, shares) = choose(film, 1.0, 0);
+                pixels.sort_unstable();
+                pixels.dedup();
+                assert_eq!((pixels.len(), shares), (15, vec![1.0; 15]));
+            },
+        );
+    }
+
+    #[test]
+    fn regions_tile_the_picture() {
+        let grid = Grid::new([37, 21], 256);
+        let mut area = 0;
+        for region in 0..(grid.side * grid.side) as usize {
+            let [columns, rows] = grid.bounds(region);
+            for y in rows[0]..rows[1] {
+                for x in columns[0]..columns[1] {
+                    assert_eq!(grid.region([x, y]), region);
+                    area += 1;
+                }
+            }
+        }
+        assert_eq!((grid.side, area), (4, 37 * 21));
+    }
+}

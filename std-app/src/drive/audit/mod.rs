@@ -1,0 +1,181 @@
+//! The audit of a picture: a few of its pixels are rendered by the unbiased path tracer as well, in step with it. What
+//! both differ by beyond their noise is bias (docs/decisions/0011).
+
+mod choice;
+mod verdict;
+
+pub use verdict::{Audited, Region};
+
+use super::memory::Memory;
+use super::method::Stage;
+use super::run::path_settings;
+use super::workers::Workers;
+use super::{ErrorEstimate, RenderError, Settings};
+use choice::Grid;
+use core::ops::Range;
+use halflight_core::bsdf::Features;
+use halflight_core::film::{Film, Pixel};
+use halflight_core::memory::{Arena, Footprint, Line, OutOfMemory};
+use halflight_core::transport::{Counters, PathSettings, PathTracer, path::WAVE};
+use serde::{Deserialize, Serialize};
+use std::time::Instant;
+
+/// The share of the work of a biased picture that goes into its audit where nothing else is asked for.
+pub(super) const SHARE: f64 = 0.05;
+
+/// Pixels are audited so many samples at a time, which keeps the parts of their halves equal.
+const STEP: u32 = 4;
+
+/// Audited pixels of one task.
+const PIXELS_PER_TASK: usize = 8;
+
+/// Makes the random numbers of the audit others than those of the picture.
+const OTHER_SEED: u32 = 0x5eed_a0d1;
+
+/// Samples of single pixels by the path tracer.
+type Truth<'a> =
+    dyn Fn(&[[u32; 2]], Range<u32>, &mut Arena, &mut [Pixel]) -> Result<Counters, OutOfMemory> + Sync + 'a;
+
+/// See the file.
+pub(super) struct Audit<'a> {
+    truth: Box<Truth<'a>>,
+    /// Of the work of picture and audit together.
+    share: f64,
+    /// Whether work is time. Otherwise it is rays, which are the same each time.
+    by_clock: bool,
+    seed: u32,
+    scratch: Vec<Vec<Line>>,
+    state: State,
+}
+
+/// All that a film file keeps of an audit.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub(super) struct State {
+    places: Vec<[u32; 2]>,
+    shares: Vec<f32>,
+    /// The bits of the audited pixels.
+    pixels: Vec<[u32; size_of::<Pixel>() / 4]>,
+    taken: u32,
+    rays: u64,
+    seconds: f64,
+}
+
+impl State {
+    /// Whether it is one that was written.
+    pub(super) fn is_whole(&self) -> bool {
+        self.places.len() == self.pixels.len() && self.places.len() == self.shares.len()
+    }
+}
+
+/// The share of the work that the audit of a picture has; `None` where there is none.
+fn share(settings: &Settings, is_biased: bool) -> Option<f64> {
+    let share = settings.audit.unwrap_or(if is_biased { SHARE } else { 0.0 });
+    (share > 0.0 && settings.shard.count == 1).then_some(share)
+}
+
+impl<'a> Audit<'a> {
+    /// The audit that the settings ask for.
+    pub(super) fn new<F: Features>(
+        stage: &Stage<'a>,
+        memory: &mut Memory,
+        is_biased: bool,
+    ) -> Result<Option<Self>, RenderError> {
+        let Stage { scene, bvh, lights, settings, workers } = *stage;
+        let Some(share) = share(settings, is_biased) else { return Ok(None) };
+        let scratch = memory.take_each("audit", PathTracer::<F>::scratch(WAVE), workers.count())?;
+        // The pixels themselves are counted and not taken: they are kept where a film file can find them.
+        drop(memory.take(
+            "audit",
+            Footprint::default().slice::<Pixel>(choice::count(settings.width, settings.height)),
+        )?);
+        let paths = path_settings(settings);
+        let other = PathSettings { seed: paths.seed ^ OTHER_SEED, ..paths };
+        let tracer = PathTracer::<F>::new(scene, bvh, lights, other, settings.level);
+        Ok(Some(Self {
+            truth: Box::new(move |places, samples, arena, out| {
+                tracer.probe(places, samples, WAVE, arena, out)
+            }),
+            share,
+            by_clock: settings.stop.error.is_none(),
+            seed: other.seed,
+            scratch,
+            state: State::default(),
+        }))
+    }
+
+    /// What a film file keeps.
+    pub(super) fn state(&self) -> &State {
+        &self.state
+    }
+
+    /// Goes on where a film file ended.
+    pub(super) fn resume(&mut self, state: State) {
+        self.state = state;
+    }
+
+    /// Takes the samples that are due after so many `rays` of the picture, or `seconds` of picture and audit; fewer where
+    /// there is no time for all of them. Pixels are chosen in the first step, by the film.
+    pub(super) fn step(
+        &mut self,
+        workers: &Workers,
+        film: &Film,
+        rays: u64,
+        seconds: f64,
+        time_left: Option<f64>,
+    ) -> Result<(), RenderError> {
+        let start = Instant::now();
+        if self.state.places.is_empty() {
+            let Some(mean) = workers.mean(film) else { return Ok(()) };
+            (self.state.places, self.state.shares) = choice::choose(film, mean, self.seed);
+            self.state.pixels = vec![bytemuck::cast(Pixel::default()); self.state.places.len()];
+        }
+        let before = self.state.seconds;
+        let per_picture = self.share / (1.0 - self.share);
+        loop {
+            let (spent, due) = match self.by_clock {
+                true => (self.state.seconds, per_picture * (seconds - before)),
+                false => (self.state.rays as f64, per_picture * rays as f64),
+            };
+            let State { taken, .. } = self.state;
+            // What a sample costs is known better and better.
+            let samples = match taken {
+                0 => STEP,
+                _ => (((due - spent) * f64::from(taken) / spent) as u32).min(3 * taken) / STEP * STEP,
+            };
+            let spare = time_left.map(|left| left - start.elapsed().as_secs_f64());
+            let cost = f64::from(samples) * self.state.seconds / f64::from(taken.max(1));
+            if samples == 0 || spare.is_some_and(|spare| spare < cost) {
+                return Ok(());
+            }
+            self.run(workers, taken..taken + samples)?;
+            self.state.seconds = before + start.elapsed().as_secs_f64();
+        }
+    }
+
+    fn run(&mut self, workers: &Workers, samples: Range<u32>) -> Result<(), OutOfMemory> {
+        let Self { truth, scratch, state, .. } = self;
+        let places = &state.places;
+        let pixels: &mut [Pixel] = bytemuck::cast_slice_mut(&mut state.pixels);
+        let (counters, _) =
+            workers.pass(pixels, PIXELS_PER_TASK, scratch, &|| false, &|task, arena, out| {
+                let first = task * PIXELS_PER_TASK;
+                truth(&places[first..first + out.len()], samples.clone(), arena, out)
+            })?;
+        state.taken = samples.end;
+        state.rays += counters.rays + counters.shadow_rays;
+        Ok(())
+    }
+
+    /// What is known of the bias of `film`, whose own noise tells `noise`.
+    pub(super) fn verdict(&self, workers: &Workers, film: &Film, noise: ErrorEstimate) -> Option<Audited> {
+        let State { places, shares, pixels, taken, rays, seconds } = &self.state;
+        let truth: &[Pixel] = bytemuck::cast_slice(pixels);
+        let grid = Grid::new([film.width(), film.height()], places.len());
+        let findings = verdict::findings(film, workers.mean(film)?, places, truth);
+        let audited = verdict::verdict(&findings, shares, places, grid, noise)?;
+        Some(Audited { share: self.share, samples: *taken, rays: *rays, seconds: *seconds, ..audited })
+    }
+}
+
+#[cfg(test)]
+mod tests;

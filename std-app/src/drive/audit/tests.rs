@@ -1,0 +1,117 @@
+//! The audit finds what is wrong, and only that.
+
+use super::*;
+use crate::drive::{Audited, Ending, Method, RenderResult, Stop, render};
+use crate::load::{LoadOptions, load};
+use core::sync::atomic::AtomicBool;
+use halflight_core::estimate::Difference;
+
+const SIZE: u32 = 64;
+
+fn picture(settings: Settings) -> RenderResult {
+    let scene = concat!(env!("CARGO_MANIFEST_DIR"), "/../scenes/cornell/cornell.obj");
+    let loaded = load(scene.as_ref(), &LoadOptions::default()).unwrap();
+    let views = loaded.views();
+    let scene = views.scene(loaded.camera_or_default());
+    let settings = Settings { width: SIZE, height: SIZE, ..settings };
+    render(&scene, &settings, &mut |_| {}, &AtomicBool::new(false)).unwrap()
+}
+
+fn settings(method: Method, spp: u32, seed: u32, audit: f64) -> Settings {
+    let stop = Stop { spp: Some(spp), ..Stop::default() };
+    Settings {
+        method: Some(method),
+        stop,
+        seed,
+        audit: Some(audit),
+        reuse: Some(false),
+        ..Settings::default()
+    }
+}
+
+fn audited(settings: Settings) -> Audited {
+    picture(settings).audit.unwrap()
+}
+
+#[test]
+fn a_region_that_is_a_tenth_too_bright_is_found() {
+    let (mut held, mut sum) = (0, 0.0);
+    let mut truth = 0.0;
+    for seed in 2..6 {
+        let result = picture(settings(Method::Wrong, 128, seed, 0.3));
+        let (image, audit) = (&result.image, result.audit.as_ref().unwrap());
+        assert!(audit.is_biased(), "{audit:?}");
+        // The same samples without the factor are as good as the truth here.
+        let path = picture(settings(Method::Path, 128, seed, 0.0)).image;
+        truth = Difference::between(image.colours(), path.colours()).relmse;
+        held += u32::from((audit.bias.lower..audit.bias.upper).contains(&truth));
+        sum += audit.bias.relmse;
+        for region in &audit.regions {
+            let deviation = region.deviation;
+            let expected = if 2 * region.x >= SIZE { 0.1 } else { 0.0 };
+            // Five standard errors, and what a denominator that is too large takes off.
+            assert!((deviation.mean - expected).abs() < 5.0 * deviation.error + 0.02, "{region:?}");
+            assert!(!region.is_biased || 2 * region.x >= SIZE, "{region:?}");
+        }
+        assert!(audit.regions.iter().filter(|region| region.is_biased).count() >= 2, "{:?}", audit.regions);
+    }
+    // Two of four out of an interval of 95 % have a chance of 1.4 %; a mean that is off by a half, one of 0.1 %.
+    assert!(held >= 3, "{held}");
+    assert!((0.5..1.5).contains(&(sum / 4.0 / truth)), "{sum} {truth}");
+}
+
+#[test]
+fn path_tracing_is_found_unbiased() {
+    let runs = 60;
+    let found = (0..runs).filter(|&seed| audited(settings(Method::Path, 16, seed, 0.2)).is_biased()).count();
+    // At a level of 5 % three of 60 are expected; more than 8 have a chance of 0.4 %.
+    assert!(found <= 8, "{found} of {runs}");
+}
+
+#[test]
+fn an_error_below_the_bias_is_out_of_reach() {
+    let stop = Stop { spp: Some(4096), error: Some(0.001), ..Stop::default() };
+    let result = picture(Settings { stop, ..settings(Method::Wrong, 0, 5, 0.2) });
+    assert_eq!(result.ending, Ending::Biased);
+    assert!(result.spp < 1024 && result.error.unwrap().upper > 0.001, "{} {:?}", result.spp, result.error);
+}
+
+#[test]
+fn an_error_above_the_bias_is_the_sum_of_both() {
+    let stop = Stop { spp: Some(4096), error: Some(0.02), ..Stop::default() };
+    let result = picture(Settings { stop, ..settings(Method::Wrong, 0, 5, 0.2) });
+    let (audit, error) = (result.audit.unwrap(), result.error.unwrap());
+    assert_eq!((result.ending, error), (Ending::Done, audit.total));
+    assert!(error.upper <= 0.02 && audit.noise.relmse <= error.relmse, "{} {audit:?}", result.spp);
+}
+
+#[test]
+fn any_number_of_threads_finds_the_same() {
+    let stop = Stop { error: Some(0.03), ..Stop::default() };
+    let [one, three] = [1, 3].map(|threads| {
+        let result = picture(Settings { stop, threads: Some(threads), ..settings(Method::Wrong, 0, 2, 0.1) });
+        (result.image, result.audit.map(|audit| Audited { seconds: 0.0, ..audit }))
+    });
+    assert!(one == three);
+}
+
+#[test]
+fn the_share_of_the_work_is_kept() {
+    let result = picture(settings(Method::Wrong, 256, 3, 0.05));
+    let audit = result.audit.unwrap();
+    let rays = (result.counters.rays + result.counters.shadow_rays) as f64;
+    let stop = Stop { error: Some(1e-9), spp: Some(128), ..Stop::default() };
+    let by_rays = picture(Settings { stop, audit: Some(0.05), ..settings(Method::Path, 0, 3, 0.05) });
+    let exact =
+        by_rays.audit.unwrap().rays as f64 / (by_rays.counters.rays + by_rays.counters.shadow_rays) as f64;
+    assert!((0.045..0.0535).contains(&exact), "{exact}");
+    // By the clock, on a machine with other work: a factor.
+    assert!((0.01..0.25).contains(&(audit.rays as f64 / rays)), "{audit:?}");
+}
+
+#[test]
+fn no_audit_where_none_is_asked_for() {
+    assert!(picture(Settings { audit: None, ..settings(Method::Path, 8, 0, 0.1) }).audit.is_none());
+    assert!(picture(settings(Method::Wrong, 8, 0, 0.0)).audit.is_none());
+    assert!(picture(Settings { audit: None, ..settings(Method::Wrong, 8, 0, 0.1) }).audit.is_some());
+}

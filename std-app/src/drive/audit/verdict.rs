@@ -1,0 +1,146 @@
+//! What the audited pixels say together: how large the bias is, and where.
+
+use super::choice::Grid;
+use crate::drive::ErrorEstimate;
+use halflight_core::estimate::{BiasEstimate, Deviation, Finding, filtered};
+use halflight_core::film::{Film, PIXELS_PER_TILE, Pixel, Tile};
+
+/// A region is told to be biased where chance alone would say so of any of them in one picture of so many.
+const LEVEL: f64 = 0.025;
+
+/// What an audit has found.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Audited {
+    /// Its share of the work that was asked for.
+    pub share: f64,
+    /// Audited pixels.
+    pub pixels: u32,
+    /// Samples of each of them.
+    pub samples: u32,
+    /// Rays of the audit; those of the picture do not count them.
+    pub rays: u64,
+    /// Seconds of the audit; those of rendering have them in.
+    pub seconds: f64,
+    /// The error that the picture's own noise tells of.
+    pub noise: ErrorEstimate,
+    /// The squared bias.
+    pub bias: BiasEstimate,
+    /// The sum of both.
+    pub total: ErrorEstimate,
+    /// By how much the whole picture is too bright.
+    pub whole: Deviation,
+    /// By how much its parts are, row by row.
+    pub regions: Vec<Region>,
+}
+
+/// A part of the picture.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Region {
+    /// Column of its upper left pixel.
+    pub x: u32,
+    /// Row of its upper left pixel.
+    pub y: u32,
+    /// Pixels across.
+    pub width: u32,
+    /// Pixels down.
+    pub height: u32,
+    /// By how much it is too bright.
+    pub deviation: Deviation,
+    /// Whether chance can be ruled out, at a level of 2.5 % for all regions and the whole together.
+    pub is_biased: bool,
+}
+
+impl Audited {
+    /// Whether there is a bias. Where there is none, this says so in 5 % of all pictures at most.
+    pub fn is_biased(&self) -> bool {
+        self.bias.is_found() || self.whole_is_biased() || self.regions.iter().any(|region| region.is_biased)
+    }
+
+    /// Whether the whole picture is too bright or too dark.
+    pub fn whole_is_biased(&self) -> bool {
+        self.whole.chance() < LEVEL / (self.regions.len() + 1) as f64
+    }
+}
+
+/// What each audited pixel says, with its number.
+pub(super) fn findings(
+    film: &Film,
+    mean: f64,
+    places: &[[u32; 2]],
+    truth: &[Pixel],
+) -> Vec<(usize, Finding)> {
+    let position = |index: &usize| Tile::position(film.width(), places[*index][0], places[*index][1]);
+    // Each tile is filtered once.
+    let mut order: Vec<usize> = (0..places.len()).collect();
+    order.sort_unstable_by_key(position);
+    let mut findings = Vec::with_capacity(places.len());
+    for tile in order.chunk_by(|a, b| position(a) / PIXELS_PER_TILE == position(b) / PIXELS_PER_TILE) {
+        let first = position(&tile[0]) / PIXELS_PER_TILE * PIXELS_PER_TILE;
+        let Some(pixels) = film.pixels().get(first..first + PIXELS_PER_TILE) else { continue };
+        let colours = filtered(pixels, mean);
+        for index in tile {
+            let place = position(index) - first;
+            let finding = Finding::of(&pixels[place], &truth[*index], colours[place], mean);
+            findings.extend(finding.map(|finding| (*index, finding)));
+        }
+    }
+    findings.sort_unstable_by_key(|(index, _)| *index);
+    findings
+}
+
+/// All but what the audit has cost. `None` for fewer findings than say anything.
+pub(super) fn verdict(
+    findings: &[(usize, Finding)],
+    shares: &[f32],
+    places: &[[u32; 2]],
+    grid: Grid,
+    noise: ErrorEstimate,
+) -> Option<Audited> {
+    let bias = BiasEstimate::of(findings.iter().map(|(i, finding)| (*finding, f64::from(shares[*i]))))?;
+    let count = (grid.side * grid.side) as usize;
+    let region = |index: usize| {
+        let inside = findings.iter().filter(|(i, _)| grid.region(places[*i]) == index);
+        let deviation = Deviation::of(inside.map(|(_, finding)| finding.deviation));
+        let [[x, right], [y, bottom]] = grid.bounds(index);
+        let is_biased = deviation.chance() < LEVEL / (count + 1) as f64;
+        Region { x, y, width: right - x, height: bottom - y, deviation, is_biased }
+    };
+    Some(Audited {
+        share: 0.0,
+        pixels: findings.len() as u32,
+        samples: 0,
+        rays: 0,
+        seconds: 0.0,
+        noise,
+        bias,
+        total: total(noise, bias),
+        whole: Deviation::of(findings.iter().map(|(_, finding)| finding.deviation)),
+        regions: (0..count).map(region).collect(),
+    })
+}
+
+/// Noise and bias add up, and so do the squares of how unsure they are.
+fn total(noise: ErrorEstimate, bias: BiasEstimate) -> ErrorEstimate {
+    let squared = bias.relmse.max(0.0);
+    let relmse = noise.relmse + squared;
+    let below = (noise.relmse - noise.lower).hypot(squared - bias.lower);
+    let above = (noise.upper - noise.relmse).hypot(bias.upper - squared);
+    ErrorEstimate { relmse, lower: (relmse - below).max(0.0), upper: relmse + above }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn noise_and_bias_add_up() {
+        let noise = ErrorEstimate { relmse: 0.01, lower: 0.008, upper: 0.013 };
+        let bias = BiasEstimate { relmse: 0.02, lower: 0.016, upper: 0.024, detectable: 0.004 };
+        let sum = total(noise, bias);
+        assert!((sum.relmse - 0.03).abs() < 1e-12 && (sum.upper - 0.035).abs() < 1e-12, "{sum:?}");
+        let none = BiasEstimate { relmse: -0.001, lower: 0.0, upper: 0.002, detectable: 0.003 };
+        let sum = total(noise, none);
+        assert_eq!((sum.relmse, sum.lower), (0.01, 0.008));
+        assert!(sum.upper > 0.0135 && sum.upper < 0.014);
+    }
+}

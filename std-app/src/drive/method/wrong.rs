@@ -1,0 +1,51 @@
+//! A method that is wrong on purpose: the right half of the picture is a tenth too bright, as if a cache had irradiance
+//! that is 10 % too large there. No noise of its own tells of it.
+
+use super::{Renderer, Stage};
+use crate::drive::RenderError;
+use crate::drive::crew::Crew;
+use crate::drive::memory::Memory;
+use crate::drive::run::path_settings;
+use halflight_core::bsdf::Features;
+use halflight_core::film::{Dropped, PIXELS_PER_TILE, Pixel, Tile};
+use halflight_core::memory::Line;
+use halflight_core::transport::{Counters, PathTracer, path::WAVE};
+
+pub(in crate::drive) const FACTOR: f32 = 1.1;
+
+pub(super) struct Wrong<'a, F> {
+    tracer: PathTracer<'a, F>,
+    scratch: Vec<Vec<Line>>,
+    size: [u32; 2],
+}
+
+impl<'a, F: Features> Wrong<'a, F> {
+    pub(super) fn new(stage: &Stage<'a>, memory: &mut Memory) -> Result<Self, RenderError> {
+        let Stage { scene, bvh, lights, settings, workers } = *stage;
+        let scratch = memory.take_each("paths", PathTracer::<F>::scratch(WAVE), workers.count())?;
+        let tracer = PathTracer::<F>::new(scene, bvh, lights, path_settings(settings), settings.level);
+        Ok(Self { tracer, scratch, size: [settings.width, settings.height] })
+    }
+}
+
+impl<F: Features> Renderer for Wrong<'_, F> {
+    fn round(&mut self, crew: &mut Crew) -> Result<(), RenderError> {
+        let Self { tracer, scratch, size: [width, height] } = self;
+        crew.tiles(u32::MAX, scratch, &|task, samples, arena, pixels| {
+            let tile = Tile::new(*width, *height, task);
+            let mut counters = Counters::default();
+            for sample in samples {
+                let mut one = [Pixel::default(); PIXELS_PER_TILE];
+                counters += tracer.run(task, sample..sample + 1, WAVE, arena, &mut one)?;
+                for (i, pixel) in pixels.iter_mut().enumerate() {
+                    if let Some((x, _)) = tile.pixel(i) {
+                        let factor = if 2 * x >= *width { FACTOR } else { 1.0 };
+                        pixel.add(sample, factor * one[i].mean(), &mut Dropped::default());
+                    }
+                }
+            }
+            Ok(counters)
+        })?;
+        Ok(())
+    }
+}
