@@ -11,7 +11,7 @@
 
 use super::PhotonMap;
 use super::layout::{HALVES, Leaf};
-use super::range::leaves_within;
+use super::range::{Visit, leaves_within};
 use super::record::{DIRECTION_BITS, DIRECTION_STEPS, NORMAL_STEPS, POWER_BITS};
 use crate::Rgb;
 use core::f32::consts::PI;
@@ -122,18 +122,18 @@ pub(super) fn gather<S: Simd, R: Response>(simd: S, map: &PhotonMap, disc: &Disc
         singles: Rgb::ZERO,
         photons: 0,
     };
-    leaves_within(simd, map, &place, squared_radius, |index| {
-        if let Some(leaf) = map.leaves.get(index) {
-            for half in 0..HALVES {
-                sum.add(simd, leaf, half);
-            }
-        }
-    });
-    // Lane after lane, so that the bits are those of every level.
-    let total = sum.lanes.map(|lanes| lanes.to_array().iter().fold(0.0, |sum, lane| sum + lane));
-    let responded = if R::UNIFORM { Rgb::from_array(total) * response.of(disc.normal) } else { sum.singles };
+    leaves_within(simd, map, &place, squared_radius, &mut sum);
+    let [r, g, b] = sum.lanes;
+    let total = Rgb::new(added(r.to_array()), added(g.to_array()), added(b.to_array()));
+    let responded = if R::UNIFORM { total * response.of(disc.normal) } else { sum.singles };
     let per_area = 1.0 / (PI * disc.radius) / disc.radius;
     Density { radiance: responded * per_area, photons: sum.photons }
+}
+
+/// Lane after lane, so that the bits are those of every level.
+#[inline(always)]
+fn added(lanes: [f32; 16]) -> f32 {
+    lanes.iter().fold(0.0, |sum, lane| sum + lane)
 }
 
 /// Everything of a gathering, in lanes.
@@ -151,6 +151,15 @@ struct Sum<'a, S: Simd, R> {
     photons: u32,
 }
 
+impl<S: Simd, R: Response> Visit<S> for Sum<'_, S, R> {
+    #[inline(always)]
+    fn leaf(&mut self, simd: S, _: usize, leaf: &Leaf) {
+        for half in 0..HALVES {
+            self.add(simd, leaf, half);
+        }
+    }
+}
+
 impl<S: Simd, R: Response> Sum<'_, S, R> {
     /// Adds the photons of half a leaf.
     #[inline(always)]
@@ -164,14 +173,16 @@ impl<S: Simd, R: Response> Sum<'_, S, R> {
         let zero = simd.splat16(0.0);
         let in_disc = in_sphere & dot(offset, self.normal).abs().le(self.thickness);
 
-        let [a, b] = leaf.normal.map(|column| simd.bytes16(&column[half % HALVES]));
+        let [a, b] = &leaf.normal;
+        let (a, b) = (simd.bytes16(&a[half % HALVES]), simd.bytes16(&b[half % HALVES]));
         let surface = unfolded(simd, a, b, NORMAL_STEPS);
         let along = dot(surface, self.normal);
         let alike = zero.lt(along) & (squared(surface) * simd.splat16(ALIKE * ALIKE)).le(along * along);
 
         let light = &leaf.light[half % HALVES];
-        let side = |i: u32| simd.field16(light, i * DIRECTION_BITS, DIRECTION_BITS);
-        let came = unfolded(simd, side(0), side(1), DIRECTION_STEPS);
+        let u = simd.field16(light, 0, DIRECTION_BITS);
+        let v = simd.field16(light, DIRECTION_BITS, DIRECTION_BITS);
+        let came = unfolded(simd, u, v, DIRECTION_STEPS);
         let counted = in_disc & alike & zero.lt(dot(came, self.normal));
         let bits = counted.bits();
         if bits == 0 {
@@ -180,28 +191,28 @@ impl<S: Simd, R: Response> Sum<'_, S, R> {
         self.photons += bits.count_ones();
         let weight = self.nearness.weight(simd, distance) * simd.powers16(light);
         let weight = weight.select(counted, zero);
-        let channel = |i: u32, bits: u32| simd.field16(&leaf.power[half % HALVES], i * POWER_BITS, bits);
-        let blue = channel(2, POWER_BITS - 1);
-        let power =
-            [channel(0, POWER_BITS) * weight, channel(1, POWER_BITS) * weight, (blue + blue) * weight];
+        let power = &leaf.power[half % HALVES];
+        let red = simd.field16(power, 0, POWER_BITS) * weight;
+        let green = simd.field16(power, POWER_BITS, POWER_BITS) * weight;
+        let blue = simd.field16(power, 2 * POWER_BITS, POWER_BITS - 1);
+        let blue = (blue + blue) * weight;
         if R::UNIFORM {
             let [r, g, b] = self.lanes;
-            self.lanes = [r + power[0], g + power[1], b + power[2]];
+            self.lanes = [r + red, g + green, b + blue];
         } else {
-            self.respond(power.map(|lanes| lanes.to_array()), came.map(|lanes| lanes.to_array()), bits);
+            let [x, y, z] = came;
+            let power = [red.to_array(), green.to_array(), blue.to_array()];
+            self.respond(power, [x.to_array(), y.to_array(), z.to_array()], bits);
         }
     }
 
     /// Adds photons one by one.
     #[inline(always)]
-    fn respond<A: AsRef<[f32]>>(&mut self, power: [A; 3], came: [A; 3], mut bits: u32) {
-        let at = |columns: &[A; 3], lane: usize| {
-            columns.each_ref().map(|column| column.as_ref().get(lane).copied().unwrap_or(0.0))
-        };
+    fn respond(&mut self, [r, g, b]: [[f32; 16]; 3], [x, y, z]: [[f32; 16]; 3], mut bits: u32) {
         while bits != 0 {
-            let lane = bits.trailing_zeros() as usize;
-            let direction = Vec3::from_array(at(&came, lane)).normalize_or(Vec3::Z);
-            self.singles += Rgb::from_array(at(&power, lane)) * self.response.of(direction);
+            let lane = bits.trailing_zeros() as usize % 16;
+            let direction = Vec3::new(x[lane], y[lane], z[lane]).normalize_or(Vec3::Z);
+            self.singles += Rgb::new(r[lane], g[lane], b[lane]) * self.response.of(direction);
             bits &= bits - 1;
         }
     }
@@ -240,6 +251,5 @@ fn unfolded<S: Simd>(simd: S, u: S::F16, v: S::F16, steps: f32) -> [S::F16; 3] {
     let (u, v) = (u - steps, v - steps);
     let z = (steps - u.abs()) - v.abs();
     let folded = (-z).max(zero);
-    let towards = |side: S::F16| (side + folded).select(side.lt(zero), side - folded);
-    [towards(u), towards(v), z]
+    [(u + folded).select(u.lt(zero), u - folded), (v + folded).select(v.lt(zero), v - folded), z]
 }

@@ -2,18 +2,24 @@
 //! in common.
 
 use super::PhotonMap;
-use super::layout::{HALVES, LEAF, LEVELS, WIDTH};
+use super::layout::{HALVES, LEAF, LEVELS, Leaf, WIDTH};
 use halflight_simd::kernels::points::Place16;
 use halflight_simd::{Kernel, Lanes, Mask, Simd};
 
-/// Calls `visit` with the index of every leaf that has a box within the squared radius (below infinity) of a place.
+/// What is done with leaves. A trait, for a closure might be compiled apart, without the instructions of the level.
+pub(super) trait Visit<S: Simd> {
+    /// One leaf, and its index. To be inlined always.
+    fn leaf(&mut self, simd: S, index: usize, leaf: &Leaf);
+}
+
+/// Shows every leaf to `visitor` that has a box within the squared radius (below infinity) of a place.
 #[inline(always)]
 pub(super) fn leaves_within<S: Simd>(
     simd: S,
     map: &PhotonMap,
     place: &Place16<S>,
     squared_radius: f32,
-    mut visit: impl FnMut(usize),
+    visitor: &mut impl Visit<S>,
 ) {
     let Some(top) = map.levels.count.checked_sub(1) else { return };
     let limit = simd.splat16(squared_radius);
@@ -25,7 +31,9 @@ pub(super) fn leaves_within<S: Simd>(
         let mut left = place.squared_distances_to_boxes(simd, &node.boxes).le(limit).bits();
         if level == 0 {
             while left != 0 {
-                visit(WIDTH * index + left.trailing_zeros() as usize);
+                let index = WIDTH * index + left.trailing_zeros() as usize;
+                let Some(leaf) = map.leaves.get(index) else { return };
+                visitor.leaf(simd, index, leaf);
                 left &= left - 1;
             }
         }
@@ -58,19 +66,30 @@ impl Kernel for Range<'_, '_> {
     fn run<S: Simd>(self, simd: S) -> usize {
         let Self { map, squared_radius, found, .. } = self;
         let place = Place16::new(simd, self.place);
-        let limit = simd.splat16(squared_radius);
         let found: &mut [f32] = bytemuck::cast_slice_mut(found);
-        let mut count = 0;
-        leaves_within(simd, map, &place, squared_radius, |index| {
-            let Some(leaf) = map.leaves.get(index) else { return };
-            for half in 0..HALVES {
-                let near = place.squared_distances(simd, leaf.half(half)).le(limit);
-                let numbers = simd.numbers16((LEAF * index + 16 * half) as u32);
-                put(simd, near, numbers, found, count);
-                count += near.bits().count_ones() as usize;
-            }
-        });
-        count
+        let mut list = List { place, limit: simd.splat16(squared_radius), found, count: 0 };
+        leaves_within(simd, map, &place, squared_radius, &mut list);
+        list.count
+    }
+}
+
+/// The photons that were found.
+struct List<'a, S: Simd> {
+    place: Place16<S>,
+    limit: S::F16,
+    found: &'a mut [f32],
+    count: usize,
+}
+
+impl<S: Simd> Visit<S> for List<'_, S> {
+    #[inline(always)]
+    fn leaf(&mut self, simd: S, index: usize, leaf: &Leaf) {
+        for half in 0..HALVES {
+            let near = self.place.squared_distances(simd, leaf.half(half)).le(self.limit);
+            let numbers = simd.numbers16((LEAF * index + 16 * half) as u32);
+            put(simd, near, numbers, self.found, self.count);
+            self.count += near.bits().count_ones() as usize;
+        }
     }
 }
 

@@ -50,11 +50,14 @@ impl<S: Simd> Place16<S> {
     /// Squared distances to sixteen boxes; infinite for those without a point, which have infinite planes.
     #[inline(always)]
     pub fn squared_distances_to_boxes(&self, simd: S, boxes: &Boxes16) -> S::F16 {
-        let missing = |axis: usize| {
-            let (lo, hi) = (simd.load16(&boxes[axis]), simd.load16(&boxes[3 + axis]));
-            (lo - self.0[axis]).max(self.0[axis] - hi).max(simd.splat16(0.0))
-        };
-        squared([missing(0), missing(1), missing(2)])
+        squared([self.missing(simd, boxes, 0), self.missing(simd, boxes, 1), self.missing(simd, boxes, 2)])
+    }
+
+    /// How far it is outside of the boxes along an axis.
+    #[inline(always)]
+    fn missing(&self, simd: S, boxes: &Boxes16, axis: usize) -> S::F16 {
+        let (lo, hi) = (simd.load16(&boxes[axis]), simd.load16(&boxes[3 + axis]));
+        (lo - self.0[axis]).max(self.0[axis] - hi).max(simd.splat16(0.0))
     }
 }
 

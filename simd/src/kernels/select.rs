@@ -69,7 +69,7 @@ impl<'a> Candidates<'a> {
                 break self.rest(simd, kept, end, k);
             }
             let pivot = self.pivot(kept, end, &mut seed);
-            let less = self.part(simd, kept, end, |values| values.lt(simd.splat16(pivot)));
+            let less = self.part::<S, false>(simd, kept, end, pivot);
             if kept + less >= k {
                 end = kept + less;
                 continue;
@@ -78,7 +78,7 @@ impl<'a> Candidates<'a> {
             kept += less;
             if less == 0 {
                 // Nothing is less than the pivot: those equal to it come first.
-                let equal = self.part(simd, kept, end, |values| values.le(simd.splat16(pivot)));
+                let equal = self.part::<S, true>(simd, kept, end, pivot);
                 if kept + equal >= k {
                     self.lowest_numbers(kept, kept + equal, k);
                     break pivot;
@@ -101,31 +101,24 @@ impl<'a> Candidates<'a> {
     #[inline(always)]
     fn rest<S: Simd>(&mut self, simd: S, kept: usize, end: usize, k: usize) -> f32 {
         if end <= k {
-            return self.extreme(simd, 0, end, f32::NEG_INFINITY, |a, b| a.max(b)).largest();
+            return -self.least(simd, 0, end, -1.0);
         }
-        let least = self.extreme(simd, kept, end, f32::INFINITY, |a, b| a.min(b)).smallest();
-        let equal = self.part(simd, kept, end, |values| values.le(simd.splat16(least)));
+        let least = self.least(simd, kept, end, 1.0);
+        let equal = self.part::<S, true>(simd, kept, end, least);
         self.lowest_numbers(kept, kept + equal, k);
         least
     }
 
-    /// Lane by lane the extreme of the values from `start` to `end`.
+    /// The least of the values from `start` to `end`, each multiplied by `sign`, 1 or -1.
     #[inline(always)]
-    fn extreme<S: Simd>(
-        &self,
-        simd: S,
-        start: usize,
-        end: usize,
-        none: f32,
-        of: impl Fn(S::F16, S::F16) -> S::F16,
-    ) -> S::F16 {
-        let none = simd.splat16(none);
-        let mut extreme = none;
+    fn least<S: Simd>(&self, simd: S, start: usize, end: usize, sign: f32) -> f32 {
+        let (none, sign) = (simd.splat16(f32::INFINITY), simd.splat16(sign));
+        let mut least = none;
         for at in (start..end).step_by(16) {
             let Some(values) = self.values.get(at..).and_then(|rest| rest.first_chunk()) else { break };
-            extreme = of(extreme, simd.load16(values).select(first(simd, end - at), none));
+            least = least.min((simd.load16(values) * sign).select(first(simd, end - at), none));
         }
-        extreme
+        least.smallest()
     }
 
     /// The middle one of three values from anywhere between `start` and `end`.
@@ -140,23 +133,19 @@ impl<'a> Candidates<'a> {
         a.min(b).max(a.max(b).min(c))
     }
 
-    /// Packs those from `start` to `end` that `goes_first` to `start`, and the rest to the spare list, at the
-    /// places that they would have behind them. How many go first.
+    /// Packs those from `start` to `end` that are less than the pivot, or equal to it where `EQUAL`, to `start`, and
+    /// the rest to the spare list. How many go first.
     #[inline(always)]
-    fn part<S: Simd>(
-        &mut self,
-        simd: S,
-        start: usize,
-        end: usize,
-        goes_first: impl Fn(S::F16) -> <S::F16 as Lanes>::Mask,
-    ) -> usize {
+    fn part<S: Simd, const EQUAL: bool>(&mut self, simd: S, start: usize, end: usize, pivot: f32) -> usize {
         let (mut front, mut back) = (start, 0);
+        let pivot = simd.splat16(pivot);
         for at in (start..end).step_by(16) {
             let (Some(values), Some(numbers)) = (chunk(self.values, at), chunk(self.numbers, at)) else {
                 break;
             };
             let (values, numbers) = (simd.load16(values), simd.load16(numbers));
-            let (there, goes_first) = (first(simd, end - at), goes_first(values));
+            let there = first(simd, end - at);
+            let goes_first = if EQUAL { values.le(pivot) } else { values.lt(pivot) };
             let (before, behind) = (there & goes_first, there & !goes_first);
             // What is written to the front has been read: the front is never ahead of `at`.
             let (Some(v), Some(n)) = (chunk(self.values, front), chunk(self.numbers, front)) else { break };

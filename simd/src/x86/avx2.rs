@@ -239,37 +239,18 @@ impl Simd for Avx2 {
     }
     #[inline(always)]
     fn field16(self, words: &[u32; 16], from: u32, width: u32) -> Pair<F8> {
-        let half = |words: *const u32| {
-            // SAFETY: the token proves the level; eight words are read from either half of sixteen.
-            unsafe {
-                let shifted =
-                    _mm256_srl_epi32(_mm256_loadu_si256(words.cast()), _mm_cvtsi32_si128(from as i32));
-                let field = _mm256_and_si256(shifted, _mm256_set1_epi32((1 << width) - 1));
-                F8(_mm256_cvtepi32_ps(field))
-            }
-        };
-        Pair(half(words.as_ptr()), half(words[8..].as_ptr()))
+        // SAFETY: the token proves the level; eight words can be read from either half of sixteen.
+        unsafe { Pair(field8(words.as_ptr(), from, width), field8(words[8..].as_ptr(), from, width)) }
     }
     #[inline(always)]
     fn bytes16(self, bytes: &[u8; 16]) -> Pair<F8> {
-        // SAFETY: the token proves the level; eight bytes are read from either half of sixteen.
-        unsafe {
-            let half = |bytes: *const u8| {
-                F8(_mm256_cvtepi32_ps(_mm256_cvtepu8_epi32(_mm_loadl_epi64(bytes.cast()))))
-            };
-            Pair(half(bytes.as_ptr()), half(bytes[8..].as_ptr()))
-        }
+        // SAFETY: the token proves the level; eight bytes can be read from either half of sixteen.
+        unsafe { Pair(bytes8(bytes.as_ptr()), bytes8(bytes[8..].as_ptr())) }
     }
     #[inline(always)]
     fn powers16(self, words: &[u32; 16]) -> Pair<F8> {
-        // SAFETY: the token proves the level; eight words are read from either half of sixteen.
-        unsafe {
-            let half = |words: *const u32| {
-                let exponent = _mm256_srli_epi32::<24>(_mm256_loadu_si256(words.cast()));
-                F8(_mm256_castsi256_ps(_mm256_slli_epi32::<23>(exponent)))
-            };
-            Pair(half(words.as_ptr()), half(words[8..].as_ptr()))
-        }
+        // SAFETY: the token proves the level; eight words can be read from either half of sixteen.
+        unsafe { Pair(powers8(words.as_ptr()), powers8(words[8..].as_ptr())) }
     }
     #[inline(always)]
     fn prefetch<T>(self, items: &[T], values: &[f32], second: bool, index: usize) {
@@ -336,6 +317,36 @@ impl Avx2 {
             let set = _mm256_and_si256(_mm256_set1_epi32(bits as i32), lane_bits);
             M8(_mm256_castsi256_ps(_mm256_cmpeq_epi32(set, lane_bits)))
         }
+    }
+}
+
+/// # Safety
+/// The processor has AVX2, and eight words can be read.
+#[inline(always)]
+unsafe fn field8(words: *const u32, from: u32, width: u32) -> F8 {
+    // SAFETY: the caller's.
+    unsafe {
+        let shifted = _mm256_srl_epi32(_mm256_loadu_si256(words.cast()), _mm_cvtsi32_si128(from as i32));
+        F8(_mm256_cvtepi32_ps(_mm256_and_si256(shifted, _mm256_set1_epi32((1 << width) - 1))))
+    }
+}
+
+/// # Safety
+/// The processor has AVX2, and eight bytes can be read.
+#[inline(always)]
+unsafe fn bytes8(bytes: *const u8) -> F8 {
+    // SAFETY: the caller's.
+    unsafe { F8(_mm256_cvtepi32_ps(_mm256_cvtepu8_epi32(_mm_loadl_epi64(bytes.cast())))) }
+}
+
+/// # Safety
+/// The processor has AVX2, and eight words can be read.
+#[inline(always)]
+unsafe fn powers8(words: *const u32) -> F8 {
+    // SAFETY: the caller's.
+    unsafe {
+        let exponent = _mm256_srli_epi32::<24>(_mm256_loadu_si256(words.cast()));
+        F8(_mm256_castsi256_ps(_mm256_slli_epi32::<23>(exponent)))
     }
 }
 
