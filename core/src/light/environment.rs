@@ -1,10 +1,13 @@
 //! Light from infinitely far: what a ray sees that leaves the scene, and how to find its bright parts.
 
 use super::Environment;
+use super::window::Window;
 use crate::Rgb;
 use crate::geometry::Frame;
 use crate::memory::{Arena, Footprint, OutOfMemory};
-use crate::sampling::warp::{UNIFORM_SPHERE_PDF, cosine_hemisphere, cosine_hemisphere_pdf, uniform_sphere};
+use crate::sampling::warp::{
+    UNIFORM_SPHERE_PDF, cosine_hemisphere, cosine_hemisphere_pdf, uniform_sphere, uniform_sphere_square,
+};
 use crate::sampling::{Distribution2d, sin_cos_turns};
 use crate::scene::{Scene, Texture};
 use core::f32::consts::{PI, TAU};
@@ -44,6 +47,52 @@ fn square(d: Vec3) -> Vec2 {
     Vec2::new(if azimuth < 0.0 { azimuth + 1.0 } else { azimuth }, polar)
 }
 
+/// Cells that are too many for the second cache.
+const MANY_CELLS: usize = 1 << 16;
+
+/// By how much larger cells may raise the second moment of the light.
+const LOSS: f64 = 0.02;
+
+/// Texels along a side of a cell of the density: as many as lose next to nothing, for a density that stays in the
+/// cache is several times as fast. A sky may have large cells, one with a sun may not.
+fn block(texture: &Texture) -> usize {
+    let (width, height) = (texture.width as usize, texture.height as usize);
+    let mut block = 1;
+    while width * height / (block * block) > MANY_CELLS {
+        let next = 2 * block;
+        if !width.is_multiple_of(next) || !height.is_multiple_of(next) || loss(texture, next) > LOSS {
+            break;
+        }
+        block = next;
+    }
+    block
+}
+
+/// By which part the second moment of the light grows where cells of `block`² texels are sampled by their means.
+fn loss(texture: &Texture, block: usize) -> f64 {
+    let (width, height) = (texture.width as usize, texture.height as usize);
+    let (mut by_texels, mut by_cells) = (0.0, 0.0);
+    for y in (0..height).step_by(block) {
+        let sine = f64::from(sin_cos_turns(0.5 * (y as f32 + 0.5 * block as f32) / height as f32).0);
+        for x in (0..width).step_by(block) {
+            let (mut sum, mut squares) = (0.0, 0.0);
+            for i in 0..block * block {
+                let [r, g, b, _] = texture.texel_at(x + i % block, y + i / block);
+                let light = f64::from(super::luminance(Rgb::new(r, g, b)));
+                if light > 0.0 && light.is_finite() {
+                    sum += light;
+                    squares += light * light;
+                }
+            }
+            if sum > 0.0 {
+                by_texels += sine * sum;
+                by_cells += sine * squares / sum * (block * block) as f64;
+            }
+        }
+    }
+    if by_texels > 0.0 { by_cells / by_texels - 1.0 } else { 0.0 }
+}
+
 /// Samples an environment: a map by its luminance, a constant one by the cosine of the receiver.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct EnvironmentSampler<'m> {
@@ -56,7 +105,10 @@ pub(super) struct EnvironmentSampler<'m> {
 impl<'m> EnvironmentSampler<'m> {
     pub(super) fn footprint(scene: &Scene) -> Footprint {
         match scene.environment.as_ref().and_then(|e| e.texture(scene)) {
-            Some(t) => Distribution2d::footprint(t.width as usize, t.height as usize),
+            Some(texture) => {
+                let block = block(texture);
+                Distribution2d::footprint(texture.width as usize / block, texture.height as usize / block)
+            }
             None => Footprint::default(),
         }
     }
@@ -71,7 +123,7 @@ impl<'m> EnvironmentSampler<'m> {
         let (width, height) = (texture.width as usize, texture.height as usize);
         let texel = Vec2::new(1.0 / width as f32, 1.0 / height as f32);
         let (mut sum, mut sines) = (0.0, 0.0);
-        let weight = |x: usize, y: usize| {
+        let mut weight = |x: usize, y: usize| {
             // The mean over the texel's square of the bilinear map is the mean of its values at the
             // middles of the four quarters.
             let center = Vec2::new(x as f32 + 0.5, y as f32 + 0.5);
@@ -88,9 +140,45 @@ impl<'m> EnvironmentSampler<'m> {
             sines += f64::from(sine);
             mean * sine
         };
-        let map = Distribution2d::build(width, height, weight, arena)?;
+        let block = block(texture);
+        let weight = |x: usize, y: usize| {
+            let texels = (0..block * block).map(|i| (block * x + i % block, block * y + i / block));
+            texels.map(|(x, y)| weight(x, y)).sum()
+        };
+        let map = Distribution2d::build(width / block, height / block, weight, arena)?;
         let mean = (sum / sines) as f32;
         Ok((mean > 0.0).then_some(Self { map: Some(map), mean }))
+    }
+
+    /// A direction and its density in solid angle, by what is seen through `window`.
+    #[inline]
+    pub(super) fn sample_through(
+        &self,
+        environment: &Environment,
+        window: &Window,
+        u: [f32; 2],
+    ) -> Option<(Vec3, f32)> {
+        let (u, density) = window.warp(u);
+        let (direction, pdf) = self.sample(environment, Vec3::ZERO, u)?;
+        Some((direction, pdf * density))
+    }
+
+    /// The density of [`EnvironmentSampler::sample_through`] for unit `direction`.
+    #[inline]
+    pub(super) fn pdf_through(&self, environment: &Environment, window: &Window, direction: Vec3) -> f32 {
+        let Some(map) = &self.map else {
+            return UNIFORM_SPHERE_PDF * window.density(uniform_sphere_square(direction));
+        };
+        let d = environment.to_map * direction;
+        match map.invert(square(d).to_array()) {
+            Some((u, pdf)) => solid_angle_pdf(pdf, libm::sqrtf(d.x * d.x + d.z * d.z)) * window.density(u),
+            None => 0.0,
+        }
+    }
+
+    /// Whether the radiance of `environment` is constant.
+    pub(super) fn is_constant(&self) -> bool {
+        self.map.is_none()
     }
 
     /// A direction and its density in solid angle.

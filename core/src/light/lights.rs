@@ -8,6 +8,7 @@ use super::bounds::Cone;
 use super::emitter::{Emitter, Place};
 use super::environment::EnvironmentSampler;
 use super::tree::{Item, Tree};
+use super::window::{Window, Windows};
 use super::{PointLight, emitted, luminance};
 use crate::Rgb;
 use crate::bsdf::All;
@@ -66,6 +67,8 @@ pub struct Lights<'m> {
     points: &'m [u32],
     tree: Tree<'m>,
     environment: Option<EnvironmentSampler<'m>>,
+    /// What of the environment each place sees, where that has been learned.
+    windows: Option<Windows<'m>>,
     /// Indices into the scene's lights: directional.
     distant: &'m [u32],
     distant_table: AliasTable<'m>,
@@ -166,11 +169,33 @@ impl<'m> Lights<'m> {
             points,
             tree,
             environment,
+            windows: None,
             distant,
             distant_table,
             environment_weight: if environment.is_some() { finite(sky) } else { 0.0 },
             distant_weight: if distant.is_empty() { 0.0 } else { finite(sun) },
         })
+    }
+
+    /// The same lights, the environment sampled through `windows`.
+    pub fn with_windows(&self, windows: Option<Windows<'m>>) -> Self {
+        Self { windows, ..*self }
+    }
+
+    /// Whether there is an environment that shines, and whether its radiance is constant.
+    pub fn environment_is_constant(&self) -> Option<bool> {
+        self.environment.as_ref().map(EnvironmentSampler::is_constant)
+    }
+
+    /// A direction in which the environment is found at `u`, by its own light alone; not any surface's.
+    pub fn sample_environment(&self, scene: &Scene, u: [f32; 2]) -> Option<Vec3> {
+        let sample = self.environment?.sample(scene.environment.as_ref()?, Vec3::ZERO, u)?;
+        Some(sample.0)
+    }
+
+    #[inline]
+    fn window(&self, position: Vec3, normal: Vec3) -> Option<&Window> {
+        self.windows.as_ref()?.at(position, normal)
     }
 
     /// Whether there is nothing that shines.
@@ -183,41 +208,54 @@ impl<'m> Lights<'m> {
     /// of nothing.
     #[inline]
     pub fn sample(&self, scene: &Scene, position: Vec3, normal: Vec3, u: [f32; 3]) -> Option<LightSample> {
+        let (sample, later) = self.draw(scene, position, normal, u)?;
+        let environment = scene.environment.as_ref().filter(|_| later);
+        let radiance = environment.map_or(Rgb::ONE, |e| e.radiance(scene, sample.direction));
+        Some(LightSample { radiance: sample.radiance * radiance, ..sample })
+    }
+
+    /// The same, but whether the radiance is still to be multiplied with that of the environment in this direction:
+    /// looking it up is only worth it where nothing is in the way.
+    #[inline]
+    pub fn draw(
+        &self,
+        scene: &Scene,
+        position: Vec3,
+        normal: Vec3,
+        u: [f32; 3],
+    ) -> Option<(LightSample, bool)> {
         let shares = self.shares(position, normal);
         let [u0, u1, choice] = u;
         if choice < shares.tree {
             let rescaled = (choice / shares.tree).min(ONE_MINUS_EPSILON);
             let (light, probability, _) = self.tree.sample(position, normal, rescaled)?;
             let probability = probability * shares.tree;
-            return match self.emitters.get(light as usize) {
+            let sample = match self.emitters.get(light as usize) {
                 Some(emitter) => sample_emitter(scene, emitter, position, normal, [u0, u1], probability),
                 None => self.sample_point(scene, light, position, probability),
             };
+            return Some((sample?, false));
         }
         let choice = choice - shares.tree;
         if choice < shares.environment {
             let (sampler, environment) = (self.environment?, scene.environment.as_ref()?);
-            let (direction, pdf) = sampler.sample(environment, normal, [u0, u1])?;
-            return Some(LightSample {
-                direction,
-                distance: f32::INFINITY,
-                target: None,
-                radiance: environment.radiance(scene, direction),
-                pdf: pdf * shares.environment,
-                delta: false,
-            });
+            let (direction, pdf) = match self.window(position, normal) {
+                Some(window) => sampler.sample_through(environment, window, [u0, u1])?,
+                None => sampler.sample(environment, normal, [u0, u1])?,
+            };
+            let (distance, pdf) = (f32::INFINITY, pdf * shares.environment);
+            let sample =
+                LightSample { direction, distance, target: None, radiance: Rgb::ONE, pdf, delta: false };
+            return Some((sample, true));
         }
         let choice = ((choice - shares.environment) / shares.distant).clamp(0.0, ONE_MINUS_EPSILON);
         let (index, probability, _) = self.distant_table.sample(choice)?;
         match scene.lights.get(*self.distant.get(index)? as usize)? {
-            PointLight::Directional { direction, irradiance } => Some(LightSample {
-                direction: -*direction,
-                distance: f32::INFINITY,
-                target: None,
-                radiance: *irradiance,
-                pdf: probability * shares.distant,
-                delta: true,
-            }),
+            PointLight::Directional { direction, irradiance } => {
+                let (direction, distance) = (-*direction, f32::INFINITY);
+                let (radiance, pdf) = (*irradiance, probability * shares.distant);
+                Some((LightSample { direction, distance, target: None, radiance, pdf, delta: true }, false))
+            }
             _ => None,
         }
     }
@@ -253,7 +291,11 @@ impl<'m> Lights<'m> {
     pub fn pdf_escape(&self, scene: &Scene, position: Vec3, normal: Vec3, direction: Vec3) -> f32 {
         match (&self.environment, &scene.environment) {
             (Some(sampler), Some(environment)) => {
-                self.shares(position, normal).environment * sampler.pdf(environment, normal, direction)
+                let pdf = match self.window(position, normal) {
+                    Some(window) => sampler.pdf_through(environment, window, direction),
+                    None => sampler.pdf(environment, normal, direction),
+                };
+                self.shares(position, normal).environment * pdf
             }
             _ => 0.0,
         }

@@ -8,9 +8,11 @@ mod rectangle;
 mod source;
 mod tree;
 mod triangle;
+mod window;
 
 pub use lights::{LightPoint, LightSample, Lights};
 pub use source::{Environment, PointLight};
+pub use window::{Bins, Grid, Window, Windows};
 
 use crate::Rgb;
 use crate::bsdf::All;

@@ -102,6 +102,15 @@ impl<'m> Distribution2d<'m> {
         self.pdf(cell(u, self.width), cell(v, self.height))
     }
 
+    /// The `u` that [`Distribution2d::sample`] takes to a point of [0, 1]², and the density there. `None` where
+    /// it takes none there.
+    #[inline]
+    pub fn invert(&self, [x, y]: [f32; 2]) -> Option<([f32; 2], f32)> {
+        let (y, v, row_probability) = unpick(self.rows, y * self.height as f32)?;
+        let (_, u, cell_probability) = unpick(self.row(y), x * self.width as f32)?;
+        Some(([u, v], row_probability * cell_probability * (self.width as f32 * self.height as f32)))
+    }
+
     /// Edges of a cell in the unit square.
     #[inline]
     pub fn cell_size(&self) -> [f32; 2] {
@@ -168,6 +177,16 @@ fn probability(ends: &[u32], i: usize) -> f32 {
     interval(ends, i).map_or(0.0, |(start, end)| (end - start) as f32 / 4_294_967_296.0)
 }
 
+/// The bin that holds place `x` in bins, the `u` at which [`pick`] finds that place, and the bin's probability.
+#[inline]
+fn unpick(ends: &[u32], x: f32) -> Option<(usize, f32, f32)> {
+    let i = (x as usize).min(ends.len().saturating_sub(1));
+    let (start, end) = interval(ends, i)?;
+    let width = (end - start) as f32;
+    let u = (start as f32 + (x - i as f32) * width) / 4_294_967_296.0;
+    (width > 0.0).then_some((i, u.min(super::ONE_MINUS_EPSILON), width / 4_294_967_296.0))
+}
+
 /// The bin at `u`, where in it, and its probability.
 #[inline]
 fn pick(ends: &[u32], places: &[u32], u: f32) -> Option<(usize, f32, f32)> {
@@ -181,4 +200,36 @@ fn pick(ends: &[u32], places: &[u32], u: f32) -> Option<(usize, f32, f32)> {
     let width = (end - start) as f32;
     let offset = (u64::from(target) - start) as f32 / width;
     Some((i, offset.min(super::ONE_MINUS_EPSILON), width / 4_294_967_296.0))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::memory::Line;
+    use crate::sampling::Random;
+
+    #[test]
+    fn inverting_undoes_sampling() {
+        let (width, height) = (13, 7);
+        let bytes = Distribution2d::footprint(width, height).bytes();
+        let mut lines = std::vec![Line([0; 64]); bytes / 64];
+        let mut arena = Arena::new(bytemuck::cast_slice_mut(&mut lines));
+        // A row of nothing, and cells of nothing in the others.
+        let weight = |x: usize, y: usize| if y == 3 { 0.0 } else { (x * y % 5) as f32 };
+        let distribution =
+            Distribution2d::build(width, height, weight, &mut arena).expect("it is the footprint");
+        let random = Random::new(3, 0);
+        for i in 0..1000 {
+            let u = [random.single(2 * i), random.single(2 * i + 1)];
+            let cell = distribution.sample(u).expect("there are cells");
+            let at = [(cell.x as f32 + cell.offset[0]) / 13.0, (cell.y as f32 + cell.offset[1]) / 7.0];
+            let (back, pdf) = distribution.invert(at).expect("it was sampled");
+            let near = |a: f32, b: f32| (a - b).abs() < 1e-4;
+            // At a border rounding may lead to the cell beside, of another density.
+            let inside = cell.offset.iter().all(|x| (0.001..0.999).contains(x));
+            assert!(!inside || near(back[0], u[0]) && near(back[1], u[1]), "{u:?} {back:?}");
+            assert!(!inside || near(pdf, cell.pdf), "{u:?} {pdf} {}", cell.pdf);
+        }
+        assert!(distribution.invert([0.5, 3.5 / 7.0]).is_none(), "a row of nothing");
+    }
 }

@@ -42,6 +42,13 @@ pub fn uniform_sphere(u: [f32; 2]) -> Vec3 {
     Vec3::new(radius * cos, radius * sin, z)
 }
 
+/// The `u` that [`uniform_sphere`] takes to a unit direction.
+#[inline]
+pub fn uniform_sphere_square(direction: Vec3) -> [f32; 2] {
+    let turns = libm::atan2f(direction.y, direction.x) / TAU;
+    [0.5 * (1.0 - direction.z), if turns < 0.0 { turns + 1.0 } else { turns }]
+}
+
 /// Density of [`uniform_sphere`].
 pub const UNIFORM_SPHERE_PDF: f32 = 0.25 * FRAC_1_PI;
 

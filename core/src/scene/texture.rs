@@ -64,6 +64,11 @@ impl Texture<'_> {
             * size
     }
 
+    /// Linear RGBA of the texel in column `x` of row `y` from the top; white where there is none.
+    pub fn texel_at(&self, x: usize, y: usize) -> [f32; 4] {
+        self.texel(y.saturating_mul(self.width as usize).saturating_add(x)).to_array()
+    }
+
     /// The texel at `index`, linear; white where there is none.
     #[inline]
     fn texel(&self, index: usize) -> Vec4 {

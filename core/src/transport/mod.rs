@@ -6,6 +6,7 @@
 
 mod estimator;
 pub mod gather;
+mod outlook;
 pub mod overture;
 pub mod path;
 mod pilot;
@@ -17,5 +18,6 @@ mod shadow;
 mod wave;
 
 pub use estimator::{Counters, PathSettings, UNLIMITED};
+pub use outlook::{Outlook, Vertex, WindowGain};
 pub use path::PathTracer;
 pub use pilot::Pilot;

@@ -46,12 +46,16 @@ pub const WAVE: usize = 2048;
 /// the help of rays that find them by chance.
 const SMALL: f32 = 0.1;
 
+/// In the tag of a shadow ray: it goes to the environment, whose radiance is looked up when it has arrived. Most are
+/// hidden, and a map is large.
+const TO_ENVIRONMENT: u32 = 1 << 31;
+
 /// Path tracing of one scene: a pass whose tasks are the tiles of the picture.
 #[derive(Clone, Copy)]
 pub struct PathTracer<'a, F> {
     pub(super) scene: &'a Scene<'a>,
     pub(super) bvh: &'a Bvh<'a>,
-    lights: &'a Lights<'a>,
+    pub(super) lights: &'a Lights<'a>,
     pub(super) settings: PathSettings,
     pub(super) level: Level,
     /// Some surfaces let a part of the light through, so that a shadow ray may go on behind a hit.
@@ -223,7 +227,7 @@ impl<'a, F: Features> PathTracer<'a, F> {
             let Some(exchange) = wave.exchanges.get_mut(ray.tag as usize) else { continue };
             let step = self.shade(path, exchange, &ray, &hit, counters);
             if let Some((mut shadow, light)) = step.light {
-                shadow.tag = ray.tag;
+                shadow.tag |= ray.tag;
                 wave.shadow_rays[shadows] = shadow;
                 wave.shadow_light[shadows] = light.to_array();
                 shadows += 1;
@@ -249,11 +253,23 @@ impl<'a, F: Features> PathTracer<'a, F> {
         let hidden = &mut wave.hidden[..shadows];
         self.bvh.occluded_batch(self.level, rays, hidden);
         for ((ray, light), hidden) in rays.iter().zip(&*wave.shadow_light).zip(&*hidden) {
-            if *hidden == 0
-                && let Some(path) = wave.paths.get_mut(ray.tag as usize)
-            {
-                path.add(Rgb::from(*light));
+            if *hidden == 0 {
+                self.receive(wave.paths, ray, Rgb::from(*light));
             }
+        }
+    }
+
+    /// Adds `light`, which has arrived along `ray`, to its path.
+    #[inline]
+    fn receive(&self, paths: &mut [Path], ray: &Ray, light: Rgb) {
+        let light = match &self.scene.environment {
+            Some(environment) if ray.tag & TO_ENVIRONMENT != 0 => {
+                light * environment.radiance(self.scene, ray.direction.into())
+            }
+            _ => light,
+        };
+        if let Some(path) = paths.get_mut((ray.tag & !TO_ENVIRONMENT) as usize) {
+            path.add(light);
         }
     }
 
@@ -273,9 +289,7 @@ impl<'a, F: Features> PathTracer<'a, F> {
                 let (ray, light) = (wave.shadow_rays[i], Rgb::from(wave.shadow_light[i]));
                 let hit = wave.hits[i];
                 if !hit.is_some() {
-                    if let Some(path) = wave.paths.get_mut(ray.tag as usize) {
-                        path.add(light);
-                    }
+                    self.receive(wave.paths, &ray, light);
                 } else if let Some((through, transmittance)) = pass_cutout::<F>(self.scene, &ray, &hit) {
                     wave.shadow_rays[left] = through;
                     wave.shadow_light[left] = (light * transmittance).to_array();
@@ -288,8 +302,8 @@ impl<'a, F: Features> PathTracer<'a, F> {
             let rays = &mut counters.shadow_rays;
             let light = passing::<F>(self.scene, self.bvh, self.level, *ray, Rgb::from(*light), rays);
             counters.dropped.unfinished += u64::from(light.is_none());
-            if let (Some(light), Some(path)) = (light, wave.paths.get_mut(ray.tag as usize)) {
-                path.add(light);
+            if let Some(light) = light.filter(|light| *light != Rgb::ZERO) {
+                self.receive(wave.paths, ray, light);
             }
         }
     }
@@ -385,7 +399,8 @@ impl<'a, F: Features> PathTracer<'a, F> {
             let [u, v] = sampler.pair(first + dimension::LIGHT);
             let choice =
                 if self.lights.have_choice() { sampler.single(first + dimension::LIGHT_CHOICE) } else { 0.0 };
-            light = self.lights.sample(scene, point.position, normal, [u, v, choice]).and_then(|sample| {
+            let drawn = self.lights.draw(scene, point.position, normal, [u, v, choice]);
+            light = drawn.and_then(|(sample, later)| {
                 let wi = point.frame.to_local(sample.direction);
                 if !point.sides_agree(wi, sample.direction) {
                     return None;
@@ -397,7 +412,8 @@ impl<'a, F: Features> PathTracer<'a, F> {
                 let alone = sample.delta || ends;
                 let weight = if alone { 1.0 } else { power_heuristic(sample.pdf, pdf) };
                 let contribution = throughput * f * sample.radiance * (weight / sample.pdf);
-                Some((shadow_ray(&point, &sample), contribution))
+                let tag = if later { TO_ENVIRONMENT } else { 0 };
+                Some((Ray { tag, ..shadow_ray(&point, &sample) }, contribution))
             });
         }
 

@@ -83,7 +83,7 @@ pub fn radiance(
         if !bsdf.is_delta() && !lights.is_empty() {
             let [u, v] = sampler.pair(first + dimension::LIGHT);
             let choice = sampler.single(first + dimension::LIGHT_CHOICE);
-            if let Some(light) = lights.sample(scene, point.position, normal, [u, v, choice]) {
+            if let Some((light, later)) = lights.draw(scene, point.position, normal, [u, v, choice]) {
                 let wi = point.frame.to_local(light.direction);
                 let (f, pdf) = bsdf.evaluate::<All>(wo, wi);
                 let same_side = point.sides_agree(wi, light.direction);
@@ -91,8 +91,10 @@ pub fn radiance(
                     let weight = if light.delta { 1.0 } else { power_heuristic(light.pdf, pdf) };
                     let sent = throughput * f * light.radiance * (weight / light.pdf);
                     let ray = shadow_ray(&point, &light);
-                    radiance +=
-                        passing::<All>(scene, bvh, Level::BASELINE, ray, sent, &mut 0).unwrap_or_default();
+                    let arriving = passing::<All>(scene, bvh, Level::BASELINE, ray, sent, &mut 0);
+                    let environment = scene.environment.as_ref().filter(|_| later);
+                    let seen = environment.map_or(Rgb::ONE, |e| e.radiance(scene, light.direction));
+                    radiance += arriving.unwrap_or_default() * seen;
                 }
             }
         }

@@ -79,7 +79,10 @@ mod tests {
         for (text, reason) in [
             ("", "the methods are auto, path, irradiance-cache"),
             ("paths", "the methods are auto, path, irradiance-cache"),
-            ("path:sparkle=1", "there is no option `sparkle`; the options are caustics, reuse, max-depth"),
+            (
+                "path:sparkle=1",
+                "there is no option `sparkle`; the options are caustics, reuse, windows, max-depth",
+            ),
             ("path:", "no option"),
             ("path:max-depth=0", "max-depth"),
             ("path:max-depth", "max-depth"),

@@ -44,7 +44,11 @@ pub(super) struct Options {
     /// Whether neighbouring pixels share what their paths find: less noise for the same time where much of the
     /// light is indirect; the noise that is left is alike in pixels near each other [default: auto]
     #[arg(long, value_name = "WHEN")]
-    reuse: Option<Reuse>,
+    reuse: Option<When>,
+    /// Whether a first look finds which part of the environment each place sees, and light is then asked for there:
+    /// less noise in rooms lit through windows [default: auto]
+    #[arg(long, value_name = "WHEN")]
+    windows: Option<When>,
     /// Longest path in segments: 1 is light seen directly, 2 adds direct light [default: no limit]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     max_depth: Option<u32>,
@@ -83,13 +87,24 @@ pub(super) enum Caustics {
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
-pub(super) enum Reuse {
-    /// Where a look at a few tiles says that it pays
+pub(super) enum When {
+    /// Where a first look says that it pays
     Auto,
     /// Always
     On,
     /// Never
     Off,
+}
+
+impl When {
+    /// `None` where the renderer is to tell.
+    fn choice(asked: Option<Self>) -> Option<bool> {
+        match asked? {
+            When::Auto => None,
+            When::On => Some(true),
+            When::Off => Some(false),
+        }
+    }
 }
 
 impl Options {
@@ -101,6 +116,7 @@ impl Options {
             cache_metric: self.cache_metric.or(base.cache_metric),
             cache_error: self.cache_error.or(base.cache_error),
             cache_rays: self.cache_rays.or(base.cache_rays),
+            windows: self.windows.or(base.windows),
             max_depth: self.max_depth.or(base.max_depth),
             audit: self.audit.or(base.audit),
             seed: self.seed.or(base.seed),
@@ -151,11 +167,8 @@ impl Shot {
             height,
             seed: options.seed.or(file.seed).unwrap_or(defaults.seed),
             max_depth: options.max_depth.or(file.max_depth),
-            reuse: match options.reuse {
-                None | Some(Reuse::Auto) => None,
-                Some(Reuse::On) => Some(true),
-                Some(Reuse::Off) => Some(false),
-            },
+            reuse: When::choice(options.reuse),
+            windows: When::choice(options.windows),
             cache: options.cache(),
             audit: options.audit,
             threads: self.threads.map(|threads| threads as usize),

@@ -68,6 +68,11 @@ impl Memory {
         self.limit.map_or(usize::MAX, |limit| limit.saturating_sub(self.total()))
     }
 
+    /// Whether `bytes` more are within the limit.
+    pub(super) fn has(&self, bytes: usize) -> bool {
+        self.limit.is_none_or(|limit| self.total().saturating_add(bytes) <= limit)
+    }
+
     /// Says that what `structure` took is free again.
     pub(super) fn give_back(&mut self, structure: &'static str) {
         self.uses.retain(|other| other.structure != structure);

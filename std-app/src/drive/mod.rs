@@ -20,6 +20,7 @@ mod regions;
 mod rounds;
 mod run;
 mod turns;
+mod windows;
 mod workers;
 
 pub use audit::{Audited, Region};
@@ -34,6 +35,7 @@ pub use merge::{Merged, merge};
 pub use method::{CacheSettings, CacheUse, Method};
 pub use rounds::Stop;
 pub use turns::{Turn, Turns};
+pub use windows::WindowUse;
 
 use crate::save::Image;
 use core::sync::atomic::AtomicBool;
@@ -63,6 +65,8 @@ pub struct Settings {
     pub reuse: Option<bool>,
     /// How an irradiance cache is filled, where the method has one.
     pub cache: CacheSettings,
+    /// Whether the environment is sampled through windows that a first look finds; `None` where it is to tell.
+    pub windows: Option<bool>,
     /// Number of threads; `None`: as many as the machine runs at once.
     pub threads: Option<usize>,
     /// Most bytes that the scene and all structures may take together; `None`: no limit.
@@ -111,6 +115,7 @@ impl Default for Settings {
             max_depth: None,
             reuse: None,
             cache: CacheSettings::default(),
+            windows: None,
             threads: None,
             memory: None,
             level: Level::detect(),
@@ -198,6 +203,8 @@ pub struct RenderResult {
     pub reuse: Reuse,
     /// What became of the irradiance cache, where the method has one.
     pub cache: Option<CacheUse>,
+    /// Whether the sky was sampled through windows.
+    pub windows: WindowUse,
     /// Where samples were dropped, the worst first.
     pub places: Vec<Place>,
     /// Pixels that are black because all of their samples were dropped.

@@ -8,7 +8,7 @@ use super::history::{Clock, Reference, Round};
 use super::ledger::empty_pixels;
 use super::method::{Method, Renderer, Stage};
 use super::rounds::{Plan, Rounds};
-use super::{Ending, FilmError, Progress, RenderError, RenderResult, Seconds, adapt, regions};
+use super::{Ending, FilmError, Progress, RenderError, RenderResult, Seconds, WindowUse, adapt, regions};
 use crate::save::Image;
 use core::sync::atomic::{AtomicBool, Ordering};
 use core::time::Duration;
@@ -152,6 +152,7 @@ impl Picture<'_> {
             counters: canvas.counters,
             reuse: renderer.reuse(),
             cache: renderer.cache(),
+            windows: WindowUse::default(),
             places: canvas.ledger.places(width, height),
             empty_pixels: empty_pixels(film, |task| canvas.shard.owns(task)),
             error,

@@ -7,7 +7,7 @@ use super::memory::Memory;
 use super::method::{Method, Stage};
 use super::picture::Picture;
 use super::workers::Workers;
-use super::{Progress, RenderError, RenderResult, Seconds, Settings};
+use super::{Progress, RenderError, RenderResult, Seconds, Settings, windows};
 use core::sync::atomic::AtomicBool;
 use halflight_core::bsdf::Features;
 use halflight_core::bvh::Bvh;
@@ -16,7 +16,7 @@ use halflight_core::film::Film;
 use halflight_core::light::Lights;
 use halflight_core::memory::{Arena, Line};
 use halflight_core::scene::Scene;
-use halflight_core::transport::{PathSettings, UNLIMITED};
+use halflight_core::transport::{PathSettings, PathTracer, UNLIMITED};
 use std::time::Instant;
 
 /// A render to be compiled for the features of its scene.
@@ -54,6 +54,10 @@ impl WithFeatures for Render<'_> {
 
         let clock = Clock::start(resumed.as_ref().map_or(0.0, |film| film.header.seconds));
         let film = Film::new(width, height, &mut Arena::new(bytemuck::cast_slice_mut(&mut film_lines)))?;
+        let mut window_lines = Vec::new();
+        let paths = PathTracer::<F>::new(scene, &bvh, &lights, path_settings(settings), settings.level);
+        let (lights, windows) =
+            windows::learn(&paths, &lights, settings.windows, &workers, &mut memory, &mut window_lines)?;
         let stage = Stage { scene, bvh: &bvh, lights: &lights, settings, workers: &workers };
         method.with::<F, _>(&stage, &mut memory, |renderer, memory| {
             let audit = Audit::new::<F>(&stage, memory, method.is_biased())?;
@@ -61,7 +65,7 @@ impl WithFeatures for Render<'_> {
                 Picture { method, stage, film, audit, identity, resumed, clock, progress, interrupt };
             let done = picture.render(renderer)?;
             let seconds = Seconds { build, ..done.seconds };
-            Ok(RenderResult { memory: memory.uses(), memory_peak: memory.peak(), seconds, ..done })
+            Ok(RenderResult { memory: memory.uses(), memory_peak: memory.peak(), seconds, windows, ..done })
         })
     }
 }

@@ -2,7 +2,6 @@
 
 use super::crew::Task;
 use super::{RenderError, regions};
-use core::sync::atomic::{AtomicUsize, Ordering};
 use halflight_core::bsdf::Features;
 use halflight_core::bvh::{Bvh, Join};
 use halflight_core::estimate::{ErrorEstimate, TileError, TileLight};
@@ -60,11 +59,11 @@ impl Workers {
         tracer: &PathTracer<F>,
         scratch: &mut [Vec<Line>],
     ) -> Result<Pilot, OutOfMemory> {
-        let tasks: Vec<usize> = tracer.pilot_tasks().collect();
-        let means = self.each(&tasks, scratch, |task, arena| tracer.pilot_mean(task, WAVE, arena))?;
+        let tasks = || tracer.pilot_tasks();
+        let means = self.each(tasks(), scratch, |task, arena| tracer.pilot_mean(task, WAVE, arena))?;
         let mean = means.iter().sum::<f32>() / means.len().max(1) as f32;
         let mut pilot = Pilot::default();
-        for tile in self.each(&tasks, scratch, |task, arena| tracer.pilot(task, mean, WAVE, arena))? {
+        for tile in self.each(tasks(), scratch, |task, arena| tracer.pilot(task, mean, WAVE, arena))? {
             pilot += tile;
         }
         Ok(pilot)
@@ -113,20 +112,20 @@ impl Workers {
     }
 
     /// What `look` says of each of `tasks`, in their order.
-    fn each<T: Send>(
+    pub(super) fn each<P: Send, T: Send>(
         &self,
-        tasks: &[usize],
+        tasks: impl Iterator<Item = P> + Send,
         scratch: &mut [Vec<Line>],
-        look: impl Fn(usize, &mut Arena) -> Result<T, OutOfMemory> + Sync,
+        look: impl Fn(P, &mut Arena) -> Result<T, OutOfMemory> + Sync,
     ) -> Result<Vec<T>, OutOfMemory> {
-        let next = AtomicUsize::new(0);
+        let queue = Mutex::new(tasks.enumerate());
+        let next = || queue.lock().unwrap_or_else(|poisoned| poisoned.into_inner()).next();
         let seen = self.on_all(scratch, |arena| {
             let mut seen = Vec::new();
-            loop {
-                let index = next.fetch_add(1, Ordering::Relaxed);
-                let Some(&task) = tasks.get(index) else { return Ok(seen) };
+            while let Some((index, task)) = next() {
                 seen.push((index, look(task, arena)?));
             }
+            Ok(seen)
         });
         let mut seen: Vec<(usize, T)> = seen?.into_iter().flatten().collect();
         seen.sort_by_key(|(index, _)| *index);

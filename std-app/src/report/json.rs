@@ -43,6 +43,10 @@ pub(super) fn run(run: &Run) -> Value {
         "dropped": dropped_object(&result.counters.dropped, &result.places, result.empty_pixels),
         "memory": memory,
         "memory_peak": result.memory_peak,
+        "windows": {
+            "used": result.windows.used,
+            "gain": result.windows.gain.map(|gain| gain.factor()),
+        },
         "reuse": {
             "used": result.reuse.used,
             "gain": result.reuse.pilot.map(|pilot| pilot.gain()),

@@ -58,6 +58,9 @@ impl Run<'_> {
             let why = if measured { "it would cost more than it gains" } else { "it was not asked for" };
             left_out.push(("reuse of paths by neighbouring pixels", why));
         }
+        if let (false, Some(_)) = (self.result.windows.used, self.result.windows.gain) {
+            left_out.push(("windows to the environment", "each place sees enough of it"));
+        }
         left_out
     }
 }

@@ -19,6 +19,7 @@ pub(in crate::drive) struct Identity {
     max_depth: Option<u32>,
     /// What was asked for; what comes of it follows from the scene.
     reuse: Option<bool>,
+    windows: Option<bool>,
     /// Everything that the method is told.
     settings: String,
     /// Fingerprint of all that is in the scene.
@@ -43,6 +44,7 @@ impl Identity {
             seed: paths.seed,
             max_depth: settings.max_depth,
             reuse: settings.reuse,
+            windows: settings.windows,
             settings: format!("{paths:?}{cache}, adaptive: {}", settings.adaptive),
             scene: format!("{:016x}", fingerprint(scene)),
             camera: camera(&scene.camera),
@@ -66,6 +68,7 @@ impl Identity {
             .or(said("seed ", self.seed.to_string(), other.seed.to_string()))
             .or(said("max-depth ", depth(self.max_depth), depth(other.max_depth)))
             .or(said("reuse ", choice(self.reuse), choice(other.reuse)))
+            .or(said("windows ", choice(self.windows), choice(other.windows)))
             .or((self.scene != other.scene)
                 .then(|| "of another scene, or the scene has changed since".into()))
             .or((self.camera != other.camera).then(|| "seen by another camera".into()))
