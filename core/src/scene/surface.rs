@@ -114,6 +114,13 @@ impl<'a> SurfacePoint<'a> {
         Ray::new(self.origin(direction), direction)
     }
 
+    /// Whether `ray`, which met this point, started on the surface as far as rounding can tell, and leaves its front. A
+    /// camera on a wall stands before it.
+    #[inline]
+    pub fn is_left_by(&self, ray: &Ray) -> bool {
+        !self.front && Vec3::from(ray.origin).distance(self.position) <= STARTS_HERE * self.error
+    }
+
     /// The ray from here to `target`, a point without extent or one already moved off its surface: `t_max`
     /// is just below 1 at the target.
     #[inline]
@@ -129,6 +136,10 @@ impl<'a> SurfacePoint<'a> {
         self.position + step * self.geometric_normal
     }
 }
+
+/// Bounds of the error of a point, within which a ray starts at it: its own, that of the origin, and as much for a
+/// corner, where the ray has left another surface just before.
+const STARTS_HERE: f32 = 4.0;
 
 #[inline]
 fn corners(positions: &[[f32; 3]], [a, b, c]: [u32; 3]) -> Option<[Vec3; 3]> {

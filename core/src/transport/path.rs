@@ -341,8 +341,8 @@ impl<'a, F: Features> PathTracer<'a, F> {
         }
         let Some(point) = SurfacePoint::at::<F>(scene, ray, hit) else { return Step::END };
 
-        // A ray cannot meet the plane that it started on: rounding on a needle.
-        if hit.triangle == path.triangle {
+        // A ray cannot meet the plane that it started on: rounding on a needle. Nor does a camera on a surface see its back.
+        if hit.triangle == path.triangle || (segments == 1 && point.is_left_by(ray)) {
             return path.cross(point.spawn(direction), hit, counters);
         }
         if point.material.emits() && path.share != Share::REFLECTED {

@@ -52,7 +52,7 @@ pub fn radiance(
 
         // Rounding, or a hole in the surface: on in the same direction.
         let opacity = point.material.opacity.at::<All>(scene, point.uv);
-        let met_again = hit.triangle == left;
+        let met_again = hit.triangle == left || (segments == 1 && point.is_left_by(&ray));
 
         // Light from the surface itself.
         let seen = emitted(scene, hit.triangle, point.uv, point.front);

@@ -250,7 +250,7 @@ fn curvatures(settings: &Settings, derivatives: &Derivatives, lit: bool) -> Bent
 /// Axis and magnitudes of the eigenvalues of `hessian`/`irradiance`. Where nothing is bent, nothing is bent
 /// relative to nothing either.
 fn relative(hessian: Hessian, irradiance: f32) -> Bent {
-    let Eigen2 { values, axis } = symmetric2([hessian.xx, hessian.xy, hessian.yy]);
+    let Eigen2 { values, axis } = symmetric2(|x| x, [hessian.xx, hessian.xy, hessian.yy]);
     let axis = Vec2::from(axis);
     let curvature = values.map(|l| if l == 0.0 { 0.0 } else { l.abs() / irradiance });
     Bent { axis: if axis.is_finite() { axis } else { Vec2::X }, curvature, signed: values }

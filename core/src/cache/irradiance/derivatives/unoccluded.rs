@@ -62,7 +62,8 @@ pub fn unoccluded(hemisphere: &Hemisphere) -> Option<Unoccluded> {
 
 /// The matrix of the same axes and the absolute values.
 fn magnitude(hessian: Hessian) -> Hessian {
-    let Eigen2 { values: [large, small], axis: [x, y] } = symmetric2([hessian.xx, hessian.xy, hessian.yy]);
+    let Eigen2 { values: [large, small], axis: [x, y] } =
+        symmetric2(|x| x, [hessian.xx, hessian.xy, hessian.yy]);
     let (large, small) = (large.abs(), small.abs());
     Hessian {
         xx: large * x * x + small * y * y,
