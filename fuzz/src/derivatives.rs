@@ -36,14 +36,14 @@ fn eigen(input: &mut Unstructured) -> Result<()> {
         decompose3(level, &[large], &mut found3);
         for i in 0..16 {
             let matrix = small.map(|row| row[i]);
-            let Eigen2 { values, axis } = symmetric2(matrix);
+            let Eigen2 { values, axis } = symmetric2(|x| x, matrix);
             if matrix.iter().all(|x| x.is_finite()) {
                 same(level, &matrix, values.into_iter().chain(axis), found[0].iter().map(|row| row[i]));
                 check2(matrix, values, axis);
             }
             let matrix = large.map(|row| row[i]);
             if matrix.iter().all(|x| x.is_finite()) {
-                let Eigen3 { values, vectors } = symmetric3(matrix);
+                let Eigen3 { values, vectors } = symmetric3(|x| x, matrix);
                 let wanted = values.into_iter().chain(vectors.as_flattened().iter().copied());
                 same(level, &matrix, wanted, found3[0].iter().map(|row| row[i]));
                 check3(matrix, values, vectors);

@@ -2,7 +2,7 @@
 //! plain scalar code. Sixteen lanes are two registers of eight.
 
 use crate::kernels::push::{keep, push};
-use crate::lanes::{EXPONENT, Lanes, Mask, Number, Simd};
+use crate::lanes::{EXPONENT, Lanes, Mask, Simd};
 use crate::stack::Stack;
 use core::ops::{Add, BitAnd, BitOr, Div, Mul, Neg, Not, Sub};
 use wide::f32x8;
@@ -57,13 +57,6 @@ impl Mask for M8 {
     #[inline(always)]
     fn bits(self) -> u32 {
         self.0.to_bitmask()
-    }
-}
-
-impl Number for F8 {
-    #[inline(always)]
-    fn same(self, value: f32) -> Self {
-        Self(f32x8::splat(value))
     }
 }
 
@@ -168,13 +161,6 @@ impl<M: Mask> Mask for Pair<M> {
     #[inline(always)]
     fn bits(self) -> u32 {
         self.0.bits() | self.1.bits() << 8
-    }
-}
-
-impl<L: Number> Number for Pair<L> {
-    #[inline(always)]
-    fn same(self, value: f32) -> Self {
-        Self(self.0.same(value), self.1.same(value))
     }
 }
 

@@ -19,30 +19,10 @@ pub trait Mask: Copy + BitAnd<Output = Self> + BitOr<Output = Self> + Not<Output
     }
 }
 
-/// A number or a register of numbers.
-pub trait Number:
-    Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self>
-{
-    /// The constant `value`, in all lanes. `self` is there to prove the level, whatever it holds.
-    fn same(self, value: f32) -> Self;
-}
-
-impl Number for f32 {
-    #[inline(always)]
-    fn same(self, value: f32) -> Self {
-        value
-    }
-}
-
-impl Number for f64 {
-    #[inline(always)]
-    fn same(self, value: f32) -> Self {
-        value.into()
-    }
-}
-
 /// A register of f32 lanes.
-pub trait Lanes: Number + Neg<Output = Self> {
+pub trait Lanes:
+    Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self> + Neg<Output = Self>
+{
     /// `[f32; N]`.
     type Array: Copy;
     /// What comparisons give.

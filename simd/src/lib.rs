@@ -20,6 +20,6 @@ mod x86;
 pub mod kernels;
 
 pub use baseline::{Baseline, F8, M8, Pair};
-pub use lanes::{Lanes, Mask, Number, Simd};
+pub use lanes::{Lanes, Mask, Simd};
 pub use level::{Kernel, Level, Tier};
 pub use stack::{STACK, Stack, StackMemory};

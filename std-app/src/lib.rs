@@ -24,3 +24,4 @@ pub mod drive;
 pub mod load;
 pub mod report;
 pub mod save;
+pub mod stability;

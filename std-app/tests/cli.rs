@@ -283,3 +283,15 @@ fn bench_rays_measures_the_cornell_box() {
     assert_eq!(object["hits"]["primary"], 0);
     assert!(object["mrays_per_second"]["diffuse"].is_null(), "no rays, no speed");
 }
+
+#[test]
+fn stability_prints_its_table() {
+    let folder = Folder::new("stability");
+    let object = folder.object("stability --only grazing --json");
+    assert_eq!((object["passed"].as_u64(), object["failed"].as_u64()), (Some(7), Some(0)));
+    for key in ["group", "case", "expected", "measured", "passed"] {
+        assert!(!object["cases"][0][key].is_null(), "{key}");
+    }
+    let text = folder.run("stability --only grazing");
+    assert!(String::from_utf8(text.stdout).unwrap().contains("7 cases, 0 not as expected"));
+}

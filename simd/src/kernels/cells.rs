@@ -19,9 +19,9 @@ pub const SAME_SURFACE: f32 = 1.6;
 
 /// Inverse distance of the border between two strata.
 #[inline(always)]
-pub fn between<L: Lanes>(u: L, v: L) -> L {
+pub fn between<L: Lanes>(all: impl Fn(f32) -> L, u: L, v: L) -> L {
     let (near, far) = (u.max(v), u.min(v));
-    (u.same(0.5) * (near + far)).select(near.lt(u.same(SAME_SURFACE) * far), near)
+    (all(0.5) * (near + far)).select(near.lt(all(SAME_SURFACE) * far), near)
 }
 
 /// Strata of n × n, row by row, and the tables of their borders: for each row, for each sixteen of its columns,
@@ -54,7 +54,7 @@ impl Cells<'_> {
                 for (table, next) in tables.iter().zip([at + 1, at + n]) {
                     let cell = |at: usize| Some((*self.radiance.get(at)?, *self.inverse_distance.get(at)?));
                     let (Some((here, u)), Some((there, v))) = (cell(at), cell(next)) else { continue };
-                    let u = between(u, v);
+                    let u = between(|x| x, u, v);
                     let [gx, gy, rx, ry, xx, xy, yy] = table.map(|row| row[lane]);
                     let flux = Flux {
                         gradient: [u * gx, u * gy],
@@ -113,16 +113,17 @@ fn border<S: Simd>(
     [here, there]: [&[Row; 4]; 2],
     [first, second]: [usize; 2],
 ) {
+    let all = |value: f32| simd.splat16(value);
     let [r, g, b, u] = strata(simd, here, first);
     let [s, h, c, v] = strata(simd, there, second);
-    let u = between(u, v);
+    let u = between(all, u, v);
     let uu = u * u;
     let flux = Flux {
         gradient: [u * simd.load16(&table[0]), u * simd.load16(&table[1])],
         rotation: [simd.load16(&table[2]), simd.load16(&table[3])],
         hessian: [uu * simd.load16(&table[4]), uu * simd.load16(&table[5]), uu * simd.load16(&table[6])],
     };
-    sums.add([r - s, g - h, b - c], &flux);
+    sums.add(all, [r - s, g - h, b - c], &flux);
 }
 
 /// Sixteen strata of a row.

@@ -19,8 +19,7 @@
 //! The price: an edge longer than a right angle is beyond the polynomial and must be halved first.
 //! Edges in the horizon add nothing: a polygon may be left open there.
 
-use crate::lanes::Number;
-use core::ops::Add;
+use core::ops::{Add, Div, Mul, Sub};
 
 /// k₁(z) for 0 <= z <= 1, lowest power first; relative error 1.2e-7, and it is damped where it is used.
 const K1: [f32; 9] = [
@@ -47,27 +46,34 @@ pub struct Flux<T> {
     pub hessian: [T; 3],
 }
 
+/// A number or a register of numbers.
+pub trait Number:
+    Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self>
+{
+}
+impl<T: Copy + Add<Output = T> + Sub<Output = T> + Mul<Output = T> + Div<Output = T>> Number for T {}
+
 /// The edge from `a` to `b` (unit directions, at most a right angle apart) at inverse distances `u` and `v`, with
-/// the polygon on its left as the receiver sees it.
+/// the polygon on its left as the receiver sees it. `all` makes a number of a constant.
 #[inline(always)]
-pub fn flux<T: Number>(a: [T; 3], u: T, b: [T; 3], v: T) -> Flux<T> {
-    let [half, two] = [u.same(0.5), u.same(2.0)];
+pub fn flux<T: Number>(all: impl Fn(f32) -> T, a: [T; 3], u: T, b: [T; 3], v: T) -> Flux<T> {
+    let [half, two] = [all(0.5), all(2.0)];
     let e = [b[0] - a[0], b[1] - a[1], b[2] - a[2]];
     let z = half * (e[0] * e[0] + e[1] * e[1] + e[2] * e[2]);
-    let mut k1 = u.same(K1[8]);
+    let mut k1 = all(K1[8]);
     for coefficient in K1[..8].iter().rev() {
-        k1 = k1 * z + u.same(*coefficient);
+        k1 = k1 * z + all(*coefficient);
     }
-    let k = u.same(1.0 / 3.0) + z * k1;
-    let g = u.same(1.0) + z * k;
-    let inverse = u.same(1.0) / (two - z);
-    let sum = (g + u.same(1.0)) * inverse;
+    let k = all(1.0 / 3.0) + z * k1;
+    let g = all(1.0) + z * k;
+    let inverse = all(1.0) / (two - z);
+    let sum = (g + all(1.0)) * inverse;
     let (p, q) = (half * (sum + k), half * (sum - k));
     // U22 = (2/3 (1 + z) + k₁ (3 - 4z + 2z²)) / 8 (2 - z)²; the other two by integration in parts.
-    let numerator = u.same(2.0 / 3.0) * (u.same(1.0) + z) + k1 * (u.same(3.0) - z * (u.same(4.0) - two * z));
-    let u22 = u.same(0.125) * numerator * (inverse * inverse);
-    let c = u.same(1.0) - z;
-    let u31 = u.same(0.25) * q - c * u22;
+    let numerator = all(2.0 / 3.0) * (all(1.0) + z) + k1 * (all(3.0) - z * (all(4.0) - two * z));
+    let u22 = all(0.125) * numerator * (inverse * inverse);
+    let c = all(1.0) - z;
+    let u31 = all(0.25) * q - c * u22;
     let u40 = half * p - u22 - two * c * u31;
     // a × b, of which the length is s.
     let (cx, cy) = (a[1] * e[2] - a[2] * e[1], a[2] * e[0] - a[0] * e[2]);
@@ -82,8 +88,8 @@ pub fn flux<T: Number>(a: [T; 3], u: T, b: [T; 3], v: T) -> Flux<T> {
     let turn = half * g;
     Flux {
         gradient: [cx * slope, cy * slope],
-        rotation: [u.same(-0.5) * g * cy, turn * cx],
-        hessian: [u.same(4.0) * (cx * wx), two * (cx * wy + cy * wx), u.same(4.0) * (cy * wy)],
+        rotation: [all(-0.5) * g * cy, turn * cx],
+        hessian: [all(4.0) * (cx * wx), two * (cx * wy + cy * wx), all(4.0) * (cy * wy)],
     }
 }
 
@@ -91,7 +97,7 @@ pub fn flux<T: Number>(a: [T; 3], u: T, b: [T; 3], v: T) -> Flux<T> {
 pub fn flux_of(a: [f32; 3], u: f32, b: [f32; 3], v: f32) -> Flux<f32> {
     let cos = a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
     if cos >= 0.0 {
-        return flux(a, u, b, v);
+        return flux(|x| x, a, u, b, v);
     }
     let m = [a[0] + b[0], a[1] + b[1], a[2] + b[2]];
     let length = libm::sqrtf(m[0] * m[0] + m[1] * m[1] + m[2] * m[2]);
@@ -100,7 +106,7 @@ pub fn flux_of(a: [f32; 3], u: f32, b: [f32; 3], v: f32) -> Flux<f32> {
     }
     // The inverse distance of a line in space is linear in the direction.
     let (m, w) = (m.map(|x| x / length), (u + v) / length);
-    flux(a, u, m, w) + flux(m, w, b, v)
+    flux(|x| x, a, u, m, w) + flux(|x| x, m, w, b, v)
 }
 
 impl<T: Number> Add for Flux<T> {

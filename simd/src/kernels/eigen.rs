@@ -47,24 +47,21 @@ const NEGLIGIBLE: f32 = 1.0 / (1u64 << 50) as f32;
 /// Powers of two that bring entries to the order of [`SCALED`], to be multiplied one after the other, and those
 /// that bring them back.
 #[inline(always)]
-fn scales<L: Lanes>(largest: L) -> ([L; 2], [L; 2]) {
-    let small = largest.lt(largest.same(SMALL));
-    let lift = largest.same(LIFT).select(small, largest.same(1.0));
-    let power = (largest * lift).max(largest.same(SMALL)).power_of_two();
-    (
-        [lift, largest.same(SCALED) / power],
-        [power * largest.same(SMALL), largest.same(1.0 / LIFT).select(small, largest.same(1.0))],
-    )
+fn scales<L: Lanes>(all: impl Fn(f32) -> L, largest: L) -> ([L; 2], [L; 2]) {
+    let small = largest.lt(all(SMALL));
+    let lift = all(LIFT).select(small, all(1.0));
+    let power = (largest * lift).max(all(SMALL)).power_of_two();
+    ([lift, all(SCALED) / power], [power * all(SMALL), all(1.0 / LIFT).select(small, all(1.0))])
 }
 
-/// Decomposes [xx xy; xy yy]. Values and axes of matrices that are not finite
+/// Decomposes [xx xy; xy yy]; `all` makes lanes of a constant. Values and axes of matrices that are not finite
 /// are anything.
 #[inline(always)]
-pub fn symmetric2<L: Lanes>([xx, xy, yy]: [L; 3]) -> Eigen2<L> {
-    let [zero, half, one] = [xx.same(0.0), xx.same(0.5), xx.same(1.0)];
-    let ([lift, scale], [unscale, lower]) = scales(xx.abs().max(xy.abs()).max(yy.abs()));
+pub fn symmetric2<L: Lanes>(all: impl Fn(f32) -> L + Copy, [xx, xy, yy]: [L; 3]) -> Eigen2<L> {
+    let [zero, half, one] = [all(0.0), all(0.5), all(1.0)];
+    let ([lift, scale], [unscale, lower]) = scales(all, xx.abs().max(xy.abs()).max(yy.abs()));
     let [a, b, c] = [xx * lift * scale, xy * lift * scale, yy * lift * scale];
-    let diagonal = b.abs().lt(xx.same(NEGLIGIBLE));
+    let diagonal = b.abs().lt(all(NEGLIGIBLE));
     let b = zero.select(diagonal, b);
 
     let (mean, difference) = (half * (a + c), half * (a - c));
@@ -91,18 +88,18 @@ pub fn symmetric2<L: Lanes>([xx, xy, yy]: [L; 3]) -> Eigen2<L> {
 
 /// Decomposes the symmetric matrix of the entries xx, xy, xz, yy, yz, zz, to 5e-7 of its largest value.
 #[inline(always)]
-pub fn symmetric3<L: Lanes>(entries: [L; 6]) -> Eigen3<L> {
+pub fn symmetric3<L: Lanes>(all: impl Fn(f32) -> L + Copy, entries: [L; 6]) -> Eigen3<L> {
     let [xx, xy, xz, yy, yz, zz] = entries;
     let largest = xx.abs().max(yy.abs()).max(zz.abs()).max(xy.abs()).max(xz.abs()).max(yz.abs());
-    let ([lift, scale], [unscale, lower]) = scales(largest);
+    let ([lift, scale], [unscale, lower]) = scales(all, largest);
     let (mut xx, mut yy, mut zz) = (xx * lift * scale, yy * lift * scale, zz * lift * scale);
     let (mut xy, mut xz, mut yz) = (xy * lift * scale, xz * lift * scale, yz * lift * scale);
-    let (zero, one) = (xx.same(0.0), xx.same(1.0));
+    let (zero, one) = (all(0.0), all(1.0));
     let (mut u, mut v, mut w) = ([one, zero, zero], [zero, one, zero], [zero, zero, one]);
     for _ in 0..4 {
-        ([xx, yy], [xz, yz], [u, v]) = rotated([xx, yy], xy, [xz, yz], [u, v]);
-        ([xx, zz], [xy, yz], [u, w]) = rotated([xx, zz], xz, [zero, yz], [u, w]);
-        ([yy, zz], [xy, xz], [v, w]) = rotated([yy, zz], yz, [xy, zero], [v, w]);
+        ([xx, yy], [xz, yz], [u, v]) = rotated(all, [xx, yy], xy, [xz, yz], [u, v]);
+        ([xx, zz], [xy, yz], [u, w]) = rotated(all, [xx, zz], xz, [zero, yz], [u, w]);
+        ([yy, zz], [xy, xz], [v, w]) = rotated(all, [yy, zz], yz, [xy, zero], [v, w]);
         yz = zero;
     }
     ([xx, yy], [u, v]) = sorted([xx, yy], [u, v]);
@@ -115,12 +112,13 @@ pub fn symmetric3<L: Lanes>(entries: [L; 6]) -> Eigen3<L> {
 /// rp and rq, and of the vectors p and q; the entry pq becomes zero.
 #[inline(always)]
 fn rotated<L: Lanes>(
+    all: impl Fn(f32) -> L,
     [pp, qq]: [L; 2],
     pq: L,
     [rp, rq]: [L; 2],
     [u, v]: [[L; 3]; 2],
 ) -> ([L; 2], [L; 2], [[L; 3]; 2]) {
-    let (zero, one) = (pq.same(0.0), pq.same(1.0));
+    let (zero, one) = (all(0.0), all(1.0));
     // tan of the smaller angle: 2 pq / (difference ± √(difference² + 4 pq²)).
     let (difference, twice) = (qq - pp, pq + pq);
     let root = (difference * difference + twice * twice).sqrt();
@@ -182,7 +180,8 @@ impl Kernel for Batch2<'_> {
         for (matrices, result) in self.0.iter().zip(self.1) {
             let [xx, xy, yy] = matrices;
             let entries = [simd.load16(xx), simd.load16(xy), simd.load16(yy)];
-            let Eigen2 { values: [large, small], axis: [x, y] } = symmetric2(entries);
+            let Eigen2 { values: [large, small], axis: [x, y] } =
+                symmetric2(|value| simd.splat16(value), entries);
             *result = [large.to_array(), small.to_array(), x.to_array(), y.to_array()];
         }
     }
@@ -205,7 +204,7 @@ impl Kernel for Batch3<'_> {
                 simd.load16(yz),
                 simd.load16(zz),
             ];
-            let Eigen3 { values, vectors } = symmetric3(entries);
+            let Eigen3 { values, vectors } = symmetric3(|value| simd.splat16(value), entries);
             let columns = values.iter().chain(vectors.as_flattened());
             for (row, lanes) in result.iter_mut().zip(columns) {
                 *row = lanes.to_array();

@@ -49,14 +49,13 @@ impl<L: Lanes<Array = [f32; 16]>> Lanes16<L> {
 
     /// With an edge more in each lane, of which the left side is brighter by `jump`.
     #[inline(always)]
-    pub fn add(&mut self, jump: [L; 3], flux: &Flux<L>) {
+    pub fn add(&mut self, all: impl Fn(f32) -> L, jump: [L; 3], flux: &Flux<L>) {
         for ((gradient, rotation), jump) in self.gradient.iter_mut().zip(&mut self.rotation).zip(jump) {
             *gradient = [gradient[0] + jump * flux.gradient[0], gradient[1] + jump * flux.gradient[1]];
             *rotation = [rotation[0] + jump * flux.rotation[0], rotation[1] + jump * flux.rotation[1]];
         }
         let [r, g, b] = LUMINANCE;
-        let [red, green, blue] = jump;
-        let jump = red.same(r) * red + green.same(g) * green + blue.same(b) * blue;
+        let jump = all(r) * jump[0] + all(g) * jump[1] + all(b) * jump[2];
         for (sum, flux) in self.hessian.iter_mut().zip(flux.hessian) {
             *sum = *sum + jump * flux;
         }

@@ -15,7 +15,7 @@
 
 use super::edge::{Flux, flux, flux_of};
 use super::jumps::{Lanes16, Row, SIDE_MAX, Sums, sixteen};
-use crate::lanes::{Lanes, Mask, Number, Simd};
+use crate::lanes::{Lanes, Mask, Simd};
 use crate::level::{Kernel, Level};
 
 /// What the triangles of the mesh are like.
@@ -50,12 +50,16 @@ type Vertex<L> = ([L; 3], L, [L; 3]);
 
 /// The radiance of the triangle of three vertices.
 #[inline(always)]
-fn radiance<L: Lanes>(rule: Rule, [(_, u, p), (_, v, q), (_, w, r)]: [&Vertex<L>; 3]) -> [L; 3] {
+fn radiance<L: Lanes>(
+    all: impl Fn(f32) -> L,
+    rule: Rule,
+    [(_, u, p), (_, v, q), (_, w, r)]: [&Vertex<L>; 3],
+) -> [L; 3] {
     let farthest = u.min(*v).min(*w);
-    let (zero, one) = (u.same(0.0), u.same(1.0));
+    let (zero, one) = (all(0.0), all(1.0));
     let limit = match rule {
         Rule::Farthest => farthest,
-        Rule::DepthAware => farthest * u.same(AS_FAR),
+        Rule::DepthAware => farthest * all(AS_FAR),
     };
     let (first, second, third) = (u.le(limit), v.le(limit), w.le(limit));
     let (mut a, mut b, mut c) = (one.select(first, zero), one.select(second, zero), one.select(third, zero));
@@ -94,7 +98,7 @@ impl Mesh<'_> {
             for (p, q, r) in [(0, 1, 2), (0, 2, 3)] {
                 let places = [corners[p], corners[q], corners[r]];
                 let [Some(a), Some(b), Some(c)] = places.map(|(i, j)| self.vertex(i, j)) else { continue };
-                let radiance = radiance(self.rule, [&a, &b, &c]);
+                let radiance = radiance(|x| x, self.rule, [&a, &b, &c]);
                 for (from, to) in [(0, 1), (1, 2), (2, 0)] {
                     let (places, [a, b]) = ([places[from], places[to]], [[a, b, c][from], [a, b, c][to]]);
                     let along = |side: usize| {
@@ -211,10 +215,11 @@ impl<S: Simd> Work<S> {
         start: usize,
         [right, left]: [&mut Triangles; 2],
     ) {
+        let all = |value| self.simd.splat16(value);
         let (a, b) = (self.vertex(here, start), self.vertex(here, start + 1));
         let (c, d) = (self.vertex(above, start + 1), self.vertex(above, start));
-        store(right, start, radiance(rule, [&a, &b, &c]));
-        store(left, start, radiance(rule, [&a, &c, &d]));
+        store(right, start, radiance(all, rule, [&a, &b, &c]));
+        store(left, start, radiance(all, rule, [&a, &c, &d]));
     }
 
     /// Adds sixteen edges, from vertices of one row to vertices of another, between triangles on both sides.
@@ -228,6 +233,7 @@ impl<S: Simd> Work<S> {
         (left, l): (&Triangles, usize),
         (right, r): (&Triangles, usize),
     ) {
+        let all = |value| self.simd.splat16(value);
         let jump = [
             self.load(&left[0], l) - self.load(&right[0], r),
             self.load(&left[1], l) - self.load(&right[1], r),
@@ -235,7 +241,7 @@ impl<S: Simd> Work<S> {
         ];
         let ((a, u, _), (b, v, _)) = (self.vertex(from, first), self.vertex(to, second));
         let cos = a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-        let long = cos.lt(cos.same(0.0));
+        let long = cos.lt(all(0.0));
         if long.any() {
             for lane in (0..16).filter(|lane| long.bits() >> lane & 1 == 1) {
                 let at = |rows: &Vertices, at: usize| {
@@ -253,8 +259,8 @@ impl<S: Simd> Work<S> {
         }
         // A long edge is none here.
         let b = [a[0].select(long, b[0]), a[1].select(long, b[1]), a[2].select(long, b[2])];
-        let flux: Flux<S::F16> = flux(a, u, b, v);
-        self.sums.add(jump, &flux);
+        let flux: Flux<S::F16> = flux(all, a, u, b, v);
+        self.sums.add(all, jump, &flux);
     }
 
     #[inline(always)]

@@ -2,7 +2,7 @@
 //! only inside `with_avx2`; that is what every SAFETY line here rests on.
 
 use crate::baseline::{Pair, fits8x9, gather9, halves, splat_corners};
-use crate::lanes::{EXPONENT, Lanes, Mask, Number, Simd};
+use crate::lanes::{EXPONENT, Lanes, Mask, Simd};
 use crate::stack::{STACK, Stack};
 use core::arch::x86_64::*;
 use core::ops::{Add, BitAnd, BitOr, Div, Mul, Neg, Not, Sub};
@@ -72,14 +72,6 @@ macro_rules! compare {
         // SAFETY: as above.
         M8(unsafe { _mm256_cmp_ps::<$how>($a.0, $b.0) })
     };
-}
-
-impl Number for F8 {
-    #[inline(always)]
-    fn same(self, value: f32) -> Self {
-        // SAFETY: as above.
-        Self(unsafe { _mm256_set1_ps(value) })
-    }
 }
 
 impl Lanes for F8 {

@@ -2,7 +2,7 @@
 //! through the token [`Avx512`], and the token only inside `with_avx512`; every SAFETY line rests on that.
 
 use crate::baseline::{fits8x9, gather9, splat_corners};
-use crate::lanes::{EXPONENT, Lanes, Mask, Number, Simd};
+use crate::lanes::{EXPONENT, Lanes, Mask, Simd};
 use crate::stack::{STACK, Stack};
 use core::arch::x86_64::*;
 use core::ops::{Add, BitAnd, BitOr, Div, Mul, Neg, Not, Sub};
@@ -73,14 +73,6 @@ macro_rules! lanes {
             #[inline(always)]
             fn bits(self) -> u32 {
                 self.0 as u32
-            }
-        }
-
-        impl Number for $lanes {
-            #[inline(always)]
-            fn same(self, value: f32) -> Self {
-                // SAFETY: as above.
-                Self(unsafe { $splat(value) })
             }
         }
 

@@ -13,6 +13,7 @@ mod race;
 mod racer;
 mod render;
 mod shot;
+mod stability;
 mod summary;
 mod values;
 mod view;
@@ -38,6 +39,7 @@ enum Command {
     Race(Box<race::Race>),
     Info(info::Info),
     Bench(bench::Bench),
+    Stability(stability::Stability),
 }
 
 /// Runs the program. The exit codes are a contract: 0 done, 2 usage or bad input, 3 stopped early with a
@@ -53,6 +55,7 @@ pub(crate) fn main() -> ExitCode {
         Command::Race(command) => command.run(),
         Command::Info(command) => command.run(),
         Command::Bench(command) => command.run(),
+        Command::Stability(command) => command.run(),
     }));
     match outcome {
         Ok(Ok(code)) => return code,

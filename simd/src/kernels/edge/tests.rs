@@ -248,8 +248,10 @@ fn derivatives_are_those_of_lamberts_formula() {
     const STEP: f64 = 1e-3;
     let corners: Vec<(Wide, f64)> = quad.iter().map(|&p| (unit(p), 1.0 / dot(p, p).sqrt())).collect();
     let next = corners.iter().cycle().skip(1);
-    let Flux { gradient, rotation, hessian } =
-        corners.iter().zip(next).fold(Flux::default(), |sum, (a, b)| sum + flux(a.0, a.1, b.0, b.1));
+    let Flux { gradient, rotation, hessian } = corners
+        .iter()
+        .zip(next)
+        .fold(Flux::default(), |sum, (a, b)| sum + flux(f64::from, a.0, a.1, b.0, b.1));
     let (h, e) = (STEP, moved(0.0, 0.0));
     let close = |found: f64, wanted: f64| assert!((found - wanted).abs() < TOLERANCE, "{found} {wanted}");
     close(gradient[0], (moved(h, 0.0) - moved(-h, 0.0)) / (2.0 * h));
@@ -302,7 +304,8 @@ impl Kernel for Sixteen<'_> {
             let at = |e: &(Corner, Corner)| if end == 0 { e.0 } else { e.1 };
             ([0, 1, 2].map(|i: usize| lanes(&|e| at(e).0[i])), lanes(&|e| at(e).1))
         });
-        let Flux { gradient: [gx, gy], rotation: [rx, ry], hessian: [xx, xy, yy] } = flux(a.0, a.1, b.0, b.1);
+        let Flux { gradient: [gx, gy], rotation: [rx, ry], hessian: [xx, xy, yy] } =
+            flux(|x| simd.splat16(x), a.0, a.1, b.0, b.1);
         [gx, gy, rx, ry, xx, xy, yy].map(|lanes| lanes.to_array())
     }
 }
@@ -319,7 +322,7 @@ fn every_level_agrees_with_the_single_lane_to_the_bit() {
             let found = level.dispatch(Sixteen(&edges));
             for (i, (a, b)) in edges.iter().enumerate() {
                 let Flux { gradient: [gx, gy], rotation: [rx, ry], hessian: [xx, xy, yy] } =
-                    flux(a.0, a.1, b.0, b.1);
+                    flux(|x| x, a.0, a.1, b.0, b.1);
                 for (row, wanted) in found.iter().zip([gx, gy, rx, ry, xx, xy, yy]) {
                     assert_eq!(row[i].to_bits(), wanted.to_bits(), "{level:?} {name} {a:?} {b:?}");
                 }

@@ -161,7 +161,7 @@ fn mesh_in_f64(view: &View, rule: Rule) -> Wide {
                     (p.0 == q.0 && (p.0 == 0 || p.0 == n - 1)) || (p.1 == q.1 && (p.1 == 0 || p.1 == n - 1));
                 if rule == Rule::Farthest || !rim {
                     let (a, b) = (corners[from], corners[to]);
-                    wide.add(light, &flux(a.0, a.1, b.0, b.1));
+                    wide.add(light, &flux(f64::from, a.0, a.1, b.0, b.1));
                 }
             }
         }
@@ -179,7 +179,7 @@ fn cells_in_f64(view: &View) -> Wide {
         }
         let table = &view.borders[2 * (i * n.div_ceil(16) + j / 16) + below];
         let [gx, gy, rx, ry, xx, xy, yy] = table.map(|row| f64::from(row[j % 16]));
-        let u = f64::from(between(view.inverse[at], view.inverse[next]));
+        let u = f64::from(between(|x| x, view.inverse[at], view.inverse[next]));
         let jump =
             core::array::from_fn(|k| f64::from(view.radiance[at][k]) - f64::from(view.radiance[next][k]));
         let hessian = [xx, xy, yy].map(|h| u * u * h);

@@ -53,13 +53,13 @@ mod tests {
             let mut theirs: Vec<f32> =
                 Matrix2::new(xx, xy, xy, yy).symmetric_eigen().eigenvalues.iter().copied().collect();
             theirs.sort_by(|a, b| b.abs().total_cmp(&a.abs()));
-            for (ours, theirs) in symmetric2([xx, xy, yy]).values.into_iter().zip(theirs) {
+            for (ours, theirs) in symmetric2(|x| x, [xx, xy, yy]).values.into_iter().zip(theirs) {
                 assert!((ours.abs() - theirs.abs()).abs() < TOLERANCE, "{m:?}: {ours} {theirs}");
             }
             let matrix = Matrix3::from_row_slice(&[xx, xy, xz, xy, yy, yz, xz, yz, zz]);
             let mut theirs: Vec<f32> = matrix.symmetric_eigen().eigenvalues.iter().copied().collect();
             theirs.sort_by(|a, b| b.abs().total_cmp(&a.abs()));
-            for (ours, theirs) in symmetric3([xx, xy, xz, yy, yz, zz]).values.into_iter().zip(theirs) {
+            for (ours, theirs) in symmetric3(|x| x, [xx, xy, xz, yy, yz, zz]).values.into_iter().zip(theirs) {
                 assert!((ours.abs() - theirs.abs()).abs() < TOLERANCE, "{m:?}: {ours} {theirs}");
             }
         }
