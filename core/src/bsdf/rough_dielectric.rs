@@ -17,6 +17,9 @@ pub struct RoughDielectric {
     pub tint: Rgb,
 }
 
+/// Bound of the rounding in a sum of two unit vectors.
+const ROUNDING: f32 = 4.0 * f32::EPSILON;
+
 impl RoughDielectric {
     #[inline]
     pub(super) fn sample(&self, wo: Vec3, u: [f32; 3]) -> Option<BsdfSample> {
@@ -65,9 +68,13 @@ impl RoughDielectric {
             let lobe = ggx.density(h) * ggx.visibility(wo, wi) * wi.z;
             return (Rgb::splat(reflectance * lobe), p * ggx.visible_density(wo, h, c) / (4.0 * c));
         }
-        // The normal that refracts wo to wi (Walter 2007, eq. 16), turned to the side of the viewer.
-        let h = -(wo + self.eta * wi);
-        let h = if h.z < 0.0 { -h } else { h };
+        // The normal that refracts wo to wi (Walter 2007, eq. 16) points to where the index is lower; turned to the
+        // viewer. One in the surface may seem to be below it.
+        let h = (wo + self.eta * wi) * 1f32.copysign(1.0 - self.eta);
+        if h.z < -ROUNDING {
+            return (Rgb::ZERO, 0.0);
+        }
+        let h = h.with_z(h.z.max(0.0));
         let length = h.length();
         let (c, c_i) = (wo.dot(h) / length, -wi.dot(h) / length);
         if !(wi.z < 0.0 && c > 0.0 && c_i > 0.0) {
