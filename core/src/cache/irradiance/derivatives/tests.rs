@@ -2,8 +2,11 @@
 
 use super::*;
 use crate::Level;
+use crate::cache::irradiance::metric::{Metric, Settings, reach};
 use crate::cache::irradiance::rooms::{Gather, LIGHT, OPEN, Random, Room, SHADOW, WALLS, with_tables};
+use core::hint::black_box;
 use std::println;
+use std::time::Instant;
 
 fn five(found: &Derivatives) -> [f64; 5] {
     let (g, h) = (found.gradient[1], found.hessian);
@@ -147,4 +150,36 @@ fn rotational_gradients_turn_the_receiver() {
     println!("rotation: {cells:.4} {closed:.4} {samples:.4}");
     // A third above what was measured.
     assert!(cells < 0.007 && closed < 0.15 && samples < 0.06, "{cells} {closed} {samples}");
+}
+
+/// Microseconds of each way on this machine, tables excluded; to be run in release.
+#[test]
+#[ignore = "prints times"]
+fn print_times() {
+    for n in [16, 32, 64] {
+        let gather = Gather::new(n, &mut Random(2), |w| WALLS.look([0.3, 0.4], w));
+        let hemisphere = gather.hemisphere();
+        let settings = Settings::new(Metric::Halflight, 1.0);
+        with_tables(n, |tables| {
+            for level in Level::detect().and_below() {
+                let time = |work: &dyn Fn()| {
+                    let mut best = f64::INFINITY;
+                    for _ in 0..40 {
+                        let start = Instant::now();
+                        (0..10).for_each(|_| work());
+                        best = best.min(1e5 * start.elapsed().as_secs_f64());
+                    }
+                    best
+                };
+                let borders = time(&|| {
+                    let found = black_box(tables).derivatives(level, black_box(&hemisphere)).unwrap();
+                    black_box(reach(&settings, &found));
+                });
+                let mesh = time(&|| {
+                    black_box(closed_mesh(level, black_box(&hemisphere)));
+                });
+                println!("{n:3} {:9} borders and radii {borders:6.2}, mesh {mesh:7.2} µs", level.name());
+            }
+        });
+    }
 }
