@@ -209,6 +209,13 @@ impl Emitter {
         if cos > 0.0 { distance / (self.area * cos) * distance } else { 0.0 }
     }
 
+    /// Bound of the rounding error in each coordinate of a point of the light.
+    #[inline]
+    pub(super) fn error(&self, position: Vec3) -> f32 {
+        // Three products and two sums of numbers no larger than the corners.
+        4.0 * f32::EPSILON * (Vec3::from(self.origin).abs().max(position.abs())).max_element()
+    }
+
     /// The point at edge coordinates `[a, b]`, and the triangle it lies on.
     #[inline]
     pub(super) fn place(&self, [a, b]: [f32; 2]) -> Place {

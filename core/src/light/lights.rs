@@ -62,15 +62,15 @@ pub struct LightPoint {
 pub struct Lights<'m> {
     /// Emissive triangles and parallelograms, in the order of the mesh. Light `i` of the tree is emitter
     /// `i`; then come the points and spots.
-    emitters: &'m [Emitter],
+    pub(super) emitters: &'m [Emitter],
     /// Indices into the scene's lights: points and spots.
-    points: &'m [u32],
+    pub(super) points: &'m [u32],
     tree: Tree<'m>,
-    environment: Option<EnvironmentSampler<'m>>,
+    pub(super) environment: Option<EnvironmentSampler<'m>>,
     /// What of the environment each place sees, where that has been learned.
     windows: Option<Windows<'m>>,
     /// Indices into the scene's lights: directional.
-    distant: &'m [u32],
+    pub(super) distant: &'m [u32],
     distant_table: AliasTable<'m>,
     /// Irradiance by environment and directional lights, in the unit of the tree's powers.
     environment_weight: f32,
@@ -378,10 +378,7 @@ fn sample_emitter(
     let target = LightPoint {
         position: place.position,
         normal: if front { plane } else { -plane },
-        // Three products and two sums of numbers no larger than the corners.
-        error: 4.0
-            * f32::EPSILON
-            * (Vec3::from(emitter.origin).abs().max(place.position.abs())).max_element(),
+        error: emitter.error(place.position),
     };
     Some(LightSample { direction, distance, target: Some(target), radiance, pdf, delta: false })
 }
@@ -394,7 +391,7 @@ fn faces(normal: Vec3, direction: Vec3) -> bool {
 
 /// What the light emits at a place; of a cut-out surface, what is left of it.
 #[inline]
-fn emitted_at(scene: &Scene, emitter: &Emitter, place: &Place, front: bool) -> Rgb {
+pub(super) fn emitted_at(scene: &Scene, emitter: &Emitter, place: &Place, front: bool) -> Rgb {
     if !emitter.is_textured() {
         return emitted(scene, place.triangle, Vec2::ZERO, front);
     }
@@ -406,7 +403,7 @@ fn emitted_at(scene: &Scene, emitter: &Emitter, place: &Place, front: bool) -> R
 }
 
 /// The mean luminance of a light, positive where its material emits at all.
-fn mean_luminance(scene: &Scene, emitter: &Emitter) -> f64 {
+pub(super) fn mean_luminance(scene: &Scene, emitter: &Emitter) -> f64 {
     let Some(material) = material_of(scene, emitter.triangle) else { return 0.0 };
     let constant = f64::from(luminance(material.emission.value));
     if !emitter.is_textured() {
@@ -460,7 +457,7 @@ fn strength_of(scene: &Scene, light: u32) -> f64 {
 }
 
 /// Luminance of the intensity or irradiance; zero where it is no number.
-fn strength(light: &PointLight) -> f64 {
+pub(super) fn strength(light: &PointLight) -> f64 {
     let color = match light {
         PointLight::Point { intensity, .. } | PointLight::Spot { intensity, .. } => intensity,
         PointLight::Directional { irradiance, .. } => irradiance,
@@ -481,7 +478,7 @@ fn place_of(scene: &Scene, light: u32) -> (Bounds, Cone) {
 }
 
 /// 1 inside the inner cone, 0 outside the outer one, and linear in the angle in between.
-fn spot_falloff(cos: f32, cos_inner: f32, cos_outer: f32) -> f32 {
+pub(super) fn spot_falloff(cos: f32, cos_inner: f32, cos_outer: f32) -> f32 {
     if cos >= cos_inner {
         return 1.0;
     }

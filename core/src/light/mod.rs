@@ -1,6 +1,7 @@
 //! Lights: what a scene file can name, and how transport samples all of them together.
 
 mod bounds;
+mod emission;
 mod emitter;
 mod environment;
 mod lights;
@@ -10,6 +11,7 @@ mod tree;
 mod triangle;
 mod window;
 
+pub use emission::{DIMENSIONS as EMISSION_DIMENSIONS, Emission, Emitted};
 pub use lights::{LightPoint, LightSample, Lights};
 pub use source::{Environment, PointLight};
 pub use window::{Bins, Grid, Window, Windows};

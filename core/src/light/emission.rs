@@ -1,0 +1,282 @@
+//! Light as it leaves: all lights together as the source of photons. One is chosen by its power, a place on it and a
+//! direction by what it emits there; what a photon carries is the power over the density of all that, so that the
+//! powers of photons sum up to that of the lights.
+//!
+//! Light from infinitely far is sent through the disc that the scene's bounding sphere shows to it.
+
+use super::PointLight;
+use super::emitter::Emitter;
+use super::lights::{Lights, emitted_at, mean_luminance, spot_falloff, strength};
+use crate::Rgb;
+use crate::geometry::{Bounds, Frame, MISS, Ray};
+use crate::memory::{Arena, Footprint, OutOfMemory};
+use crate::sampling::warp::{
+    UNIFORM_SPHERE_PDF, concentric_disk, cosine_hemisphere, uniform_cone, uniform_cone_pdf, uniform_sphere,
+    uniform_triangle,
+};
+use crate::sampling::{AliasTable, Sampler};
+use crate::scene::Scene;
+use core::f32::consts::PI;
+use glam::Vec3;
+
+/// Dimensions of the sampler of a photon that its emission takes: from 0 on so many.
+pub const DIMENSIONS: u32 = 3;
+const CHOICE: u32 = 0;
+const PLACE: u32 = 1;
+const DIRECTION: u32 = 2;
+
+/// By how much the bounding sphere is larger than the scene, so that rounding puts nothing outside of it.
+const AROUND: f32 = 1.0 + 1e-5;
+
+/// A photon on its way from a light.
+#[derive(Clone, Copy, Debug)]
+pub struct Emitted {
+    /// From the light.
+    pub ray: Ray,
+    /// W: what it carries if it is the only one.
+    pub power: Rgb,
+    /// The triangle that it leaves; [`MISS`] where it is none.
+    pub triangle: u32,
+}
+
+/// The lights of a scene as a source of photons.
+#[derive(Clone, Copy, Debug)]
+pub struct Emission<'m> {
+    /// Emitters, points and spots, directional lights, the environment, by their power.
+    table: AliasTable<'m>,
+    center: Vec3,
+    /// Of the bounding sphere.
+    radius: f32,
+}
+
+impl<'m> Emission<'m> {
+    /// Bytes that [`Emission::build`] takes.
+    pub fn footprint(lights: &Lights) -> Footprint {
+        AliasTable::footprint(count(lights))
+    }
+
+    /// For the lights of a scene within `bounds`.
+    ///
+    /// # Errors
+    /// [`OutOfMemory`] where the arena has less than [`Emission::footprint`].
+    pub fn build(
+        scene: &Scene,
+        lights: &Lights,
+        bounds: &Bounds,
+        arena: &mut Arena<'m>,
+    ) -> Result<Self, OutOfMemory> {
+        let empty = bounds.is_empty();
+        let (center, diagonal) = if empty { (Vec3::ZERO, 0.0) } else { (bounds.center(), bounds.diagonal()) };
+        let radius = 0.5 * diagonal * AROUND;
+        let power = |i| power(scene, lights, radius, i);
+        let largest = (0..count(lights)).map(power).fold(0.0, f64::max);
+        // Relative, so that f32 holds them.
+        let relative = |i| if largest > 0.0 { (power(i) / largest) as f32 } else { 0.0 };
+        Ok(Self { table: AliasTable::build(count(lights), relative, arena)?, center, radius })
+    }
+
+    /// The photon of `sampler`. `None` where it leaves no light, or none shines.
+    pub fn emit(&self, scene: &Scene, lights: &Lights, sampler: &Sampler) -> Option<Emitted> {
+        let (light, probability, _) = self.table.sample(sampler.single(CHOICE))?;
+        let (place, direction) = (sampler.pair(PLACE), sampler.pair(DIRECTION));
+        let emitted = if let Some(emitter) = lights.emitters.get(light) {
+            from_surface(scene, emitter, place, direction)
+        } else if light < lights.emitters.len() + lights.points.len() + lights.distant.len() {
+            let light = light - lights.emitters.len();
+            let index = lights.points.iter().chain(lights.distant).nth(light)?;
+            self.without_surface(scene.lights.get(*index as usize)?, place, direction)
+        } else {
+            let (environment, sky) = (scene.environment.as_ref()?, lights.environment.as_ref()?);
+            let (towards, pdf) = sky.sample(environment, Vec3::ZERO, direction)?;
+            let radiance = environment.radiance(scene, towards).max(Rgb::ZERO);
+            self.parallel(-towards, radiance / pdf, place)
+        }?;
+        let power = emitted.power / probability;
+        (power.is_finite() && power.max_element() > 0.0).then_some(Emitted { power, ..emitted })
+    }
+
+    fn without_surface(&self, light: &PointLight, place: [f32; 2], direction: [f32; 2]) -> Option<Emitted> {
+        let from = |position, way, power| Emitted { ray: Ray::new(position, way), power, triangle: MISS };
+        match *light {
+            PointLight::Point { position, intensity } => {
+                Some(from(position, uniform_sphere(direction), intensity / UNIFORM_SPHERE_PDF))
+            }
+            PointLight::Spot { position, direction: axis, intensity, cos_inner, cos_outer } => {
+                let local = uniform_cone(direction, 1.0 - cos_outer);
+                let falloff = spot_falloff(local.z, cos_inner, cos_outer);
+                let power = intensity * falloff / uniform_cone_pdf(1.0 - cos_outer);
+                Some(from(position, Frame::from_normal(axis).to_world(local), power))
+            }
+            PointLight::Directional { direction, irradiance } => self.parallel(direction, irradiance, place),
+        }
+    }
+
+    /// Parallel light of `irradiance`, through a point of the disc that the scene shows to it.
+    fn parallel(&self, direction: Vec3, irradiance: Rgb, place: [f32; 2]) -> Option<Emitted> {
+        let disk = concentric_disk(place) * self.radius;
+        let across = Frame::from_normal(direction).to_world(Vec3::new(disk.x, disk.y, -self.radius));
+        let power = irradiance * (PI * self.radius * self.radius);
+        Some(Emitted { ray: Ray::new(self.center + across, direction), power, triangle: MISS })
+    }
+}
+
+fn from_surface(scene: &Scene, emitter: &Emitter, [a, b]: [f32; 2], direction: [f32; 2]) -> Option<Emitted> {
+    // Of a two-sided light the first half of the numbers is for its front.
+    let sides = if emitter.is_two_sided() { 2.0 } else { 1.0 };
+    let front = sides * a < 1.0 || sides == 1.0;
+    let a = if sides == 1.0 { a } else { 2.0 * a - if front { 0.0 } else { 1.0 } };
+    let at = if emitter.is_pair() { [a, b] } else { uniform_triangle([a, b]).into() };
+    let place = emitter.place(at);
+    let radiance = emitted_at(scene, emitter, &place, front);
+    let plane = Vec3::from(emitter.normal);
+    let normal = if front { plane } else { -plane };
+    let error = emitter.error(place.position);
+    let way = Frame::from_normal(normal).to_world(cosine_hemisphere(direction));
+    let ray = Ray::new(place.position + error * normal, way);
+    Some(Emitted { ray, power: radiance * (PI * emitter.area * sides), triangle: place.triangle })
+}
+
+fn count(lights: &Lights) -> usize {
+    lights.emitters.len()
+        + lights.points.len()
+        + lights.distant.len()
+        + usize::from(lights.environment.is_some())
+}
+
+/// The luminance of the power of light `i`, or about that.
+fn power(scene: &Scene, lights: &Lights, radius: f32, i: usize) -> f64 {
+    const PI: f64 = core::f64::consts::PI;
+    let disc = PI * f64::from(radius) * f64::from(radius);
+    if let Some(emitter) = lights.emitters.get(i) {
+        let sides = if emitter.is_two_sided() { 2.0 } else { 1.0 };
+        return PI * mean_luminance(scene, emitter) * f64::from(emitter.area) * sides;
+    }
+    let index = lights.points.iter().chain(lights.distant).nth(i - lights.emitters.len());
+    match index.and_then(|&index| scene.lights.get(index as usize)) {
+        Some(light @ PointLight::Point { .. }) => 4.0 * PI * strength(light),
+        Some(light @ PointLight::Spot { cos_outer, .. }) => {
+            2.0 * PI * (1.0 - f64::from(*cos_outer)) * strength(light)
+        }
+        Some(light @ PointLight::Directional { .. }) => disc * strength(light),
+        None => 4.0 * PI * disc * lights.environment.map_or(0.0, |sky| f64::from(sky.mean)),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::light::Environment;
+    use crate::memory::Line;
+    use crate::scene::{Camera, Material, Mesh, Triangle};
+    use std::vec;
+
+    /// A unit square light that faces +z, with `material`.
+    fn with_square(material: Material, check: impl FnOnce(&Scene)) {
+        let positions = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]];
+        let triangles = [[0, 1, 2], [0, 2, 3]].map(|vertices| Triangle { vertices, material: 0 });
+        let materials = [material];
+        let mesh = Mesh { positions: &positions, triangles: &triangles, ..Mesh::default() };
+        check(&Scene {
+            mesh,
+            materials: &materials,
+            textures: &[],
+            lights: &[],
+            environment: None,
+            camera: Camera::look_at(Vec3::ZERO, Vec3::Z, Vec3::Y, 40.0),
+        });
+    }
+
+    /// The mean power of photons, each of which is shown to `look`.
+    fn mean_power(scene: &Scene, mut look: impl FnMut(&Emitted)) -> Rgb {
+        const PHOTONS: u32 = 1 << 16;
+        let bounds = Bounds { min: Vec3::splat(-1.0), max: Vec3::splat(1.0) };
+        let bytes = Lights::footprint(scene).and(Lights::scratch(scene));
+        let mut memory = vec![Line([0; 64]); bytes.bytes() / 64];
+        let lights = Lights::build(scene, &mut Arena::new(bytemuck::cast_slice_mut(&mut memory))).unwrap();
+        let mut memory = vec![Line([0; 64]); Emission::footprint(&lights).bytes() / 64];
+        let mut arena = Arena::new(bytemuck::cast_slice_mut(&mut memory));
+        let emission = Emission::build(scene, &lights, &bounds, &mut arena).unwrap();
+        assert_eq!(arena.available(), 0);
+        let mut sum = [0.0f64; 3];
+        for photon in 0..PHOTONS {
+            let sampler = Sampler::replicate(5, 1, 0, photon);
+            if let Some(emitted) = emission.emit(scene, &lights, &sampler) {
+                look(&emitted);
+                sum.iter_mut()
+                    .zip(emitted.power.to_array())
+                    .for_each(|(sum, power)| *sum += f64::from(power));
+            }
+        }
+        Rgb::from_array(sum.map(|sum| (sum / f64::from(PHOTONS)) as f32))
+    }
+
+    /// Relative, of the mean of 65 536 stratified photons.
+    const NOISE: f32 = 2e-3;
+
+    fn assert_near(power: Rgb, expected: Rgb) {
+        assert!((power - expected).abs().cmple(expected * NOISE).all(), "{power}, not {expected}");
+    }
+
+    #[test]
+    fn a_surface_emits_pi_times_area_to_its_front_or_to_both_sides() {
+        let emission = Rgb::new(3.0, 2.0, 1.0);
+        let material = Material { emission: emission.into(), ..Material::GREY };
+        with_square(material, |scene| {
+            let (mut count, mut cosines) = (0, 0.0);
+            let power = mean_power(scene, |emitted| {
+                assert!(emitted.ray.direction[2] >= 0.0 && emitted.ray.origin[2] > 0.0);
+                cosines += emitted.ray.direction[2];
+                count += 1;
+            });
+            assert_near(power, emission * PI);
+            assert!((cosines / count as f32 - 2.0 / 3.0).abs() < NOISE, "by the cosine");
+        });
+        with_square(Material { two_sided: true, ..material }, |scene| {
+            let mut backwards = 0;
+            let power = mean_power(scene, |emitted| backwards += u32::from(emitted.ray.direction[2] < 0.0));
+            assert_near(power, emission * 2.0 * PI);
+            assert_eq!(backwards, 1 << 15);
+        });
+    }
+
+    #[test]
+    fn lights_without_surface_emit_their_intensity_and_those_far_away_what_meets_the_sphere() {
+        let color = Rgb::new(0.5, 1.0, 2.0);
+        let (cos_inner, cos_outer) = (0.9, 0.8);
+        let direction = Vec3::new(0.6, 0.0, 0.8);
+        // The integral over the cone where intensity falls linearly in the angle, by small steps.
+        let (inner, outer) = (0.9f32.acos(), 0.8f32.acos());
+        let step = (outer - inner) / 4096.0;
+        let falling: f32 = (0..4096)
+            .map(|i| inner + (i as f32 + 0.5) * step)
+            .map(|angle| 2.0 * PI * angle.sin() * (outer - angle) / (outer - inner) * step)
+            .sum();
+        let disc = PI * 3.0;
+        let cases = [
+            (PointLight::Point { position: Vec3::ONE, intensity: color }, 4.0 * PI),
+            (
+                PointLight::Spot { position: Vec3::ONE, direction, intensity: color, cos_inner, cos_outer },
+                2.0 * PI * (1.0 - cos_inner) + falling,
+            ),
+            (PointLight::Directional { direction, irradiance: color }, disc),
+        ];
+        let mut all = 0.0;
+        with_square(Material::GREY, |scene| {
+            for (light, expected) in cases {
+                let lights = [light];
+                assert_near(mean_power(&Scene { lights: &lights, ..*scene }, |_| {}), color * expected);
+                all += expected;
+            }
+            let environment = Environment { radiance: color, map: None, to_map: glam::Mat3::IDENTITY };
+            let scene = Scene { environment: Some(environment), ..*scene };
+            let from_sky = 4.0 * PI * disc;
+            assert_near(mean_power(&scene, |_| {}), color * from_sky);
+            // All of them together, each by its share.
+            let lights = cases.map(|(light, _)| light);
+            let power = mean_power(&Scene { lights: &lights, ..scene }, |emitted| {
+                assert!(emitted.ray.origin.iter().all(|x| x.abs() < 3.0));
+            });
+            assert_near(power, color * (all + from_sky));
+        });
+    }
+}
