@@ -67,7 +67,7 @@ impl<R: Response> Kernel for Gathers<'_, '_, R> {
         for turn in curve::along(self.map, self.discs.iter().map(|disc| disc.place), self.turns) {
             let index = turn.index as usize;
             if let (Some(disc), Some(density)) = (self.discs.get(index), self.densities.get_mut(index)) {
-                *density = gather(simd, self.map, disc, self.response);
+                *density = gather(simd, self.map, disc, None, self.response);
             }
         }
     }

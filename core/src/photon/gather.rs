@@ -10,6 +10,7 @@
 //! Unit vectors are not normalised for that: a photon's grid holds whole numbers, which are compared squared.
 
 use super::PhotonMap;
+use super::fence::Fence;
 use super::layout::{HALVES, Leaf};
 use super::range::{Visit, leaves_within};
 use super::record::{DIRECTION_BITS, DIRECTION_STEPS, NORMAL_STEPS, POWER_BITS};
@@ -90,6 +91,7 @@ pub struct Density {
 pub(super) struct Gather<'a, 'm, R> {
     pub map: &'a PhotonMap<'m>,
     pub disc: &'a Disc,
+    pub fence: Option<&'a Fence>,
     pub response: &'a R,
 }
 
@@ -98,13 +100,19 @@ impl<R: Response> Kernel for Gather<'_, '_, R> {
 
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) -> Density {
-        gather(simd, self.map, self.disc, self.response)
+        gather(simd, self.map, self.disc, self.fence, self.response)
     }
 }
 
 /// Gathers from a disc.
 #[inline(always)]
-pub(super) fn gather<S: Simd, R: Response>(simd: S, map: &PhotonMap, disc: &Disc, response: &R) -> Density {
+pub(super) fn gather<S: Simd, R: Response>(
+    simd: S,
+    map: &PhotonMap,
+    disc: &Disc,
+    fence: Option<&Fence>,
+    response: &R,
+) -> Density {
     let squared_radius = map.space.squared(disc.radius).unwrap_or(-1.0);
     if !(squared_radius > 0.0 && squared_radius < f32::MAX) {
         return Density::default();
@@ -115,6 +123,8 @@ pub(super) fn gather<S: Simd, R: Response>(simd: S, map: &PhotonMap, disc: &Disc
         place,
         normal: [simd.splat16(x), simd.splat16(y), simd.splat16(z)],
         limit: simd.splat16(squared_radius),
+        fence,
+        squared_radius,
         thickness: simd.splat16(FLATNESS * libm::sqrtf(squared_radius)),
         nearness: Nearness { reciprocal: simd.splat16(1.0 / squared_radius), falloff: disc.falloff },
         response,
@@ -126,7 +136,8 @@ pub(super) fn gather<S: Simd, R: Response>(simd: S, map: &PhotonMap, disc: &Disc
     let [r, g, b] = sum.lanes;
     let total = Rgb::new(added(r.to_array()), added(g.to_array()), added(b.to_array()));
     let responded = if R::UNIFORM { total * response.of(disc.normal) } else { sum.singles };
-    let per_area = 1.0 / (PI * disc.radius) / disc.radius;
+    let seen = fence.map_or(1.0, |fence| fence.share(disc.falloff));
+    let per_area = if seen > 0.0 { 1.0 / (PI * seen * disc.radius) / disc.radius } else { 0.0 };
     Density { radiance: responded * per_area, photons: sum.photons }
 }
 
@@ -141,6 +152,8 @@ struct Sum<'a, S: Simd, R> {
     place: Place16<S>,
     normal: [S::F16; 3],
     limit: S::F16,
+    fence: Option<&'a Fence>,
+    squared_radius: f32,
     thickness: S::F16,
     nearness: Nearness<S>,
     response: &'a R,
@@ -184,6 +197,10 @@ impl<S: Simd, R: Response> Sum<'_, S, R> {
         let v = simd.field16(light, DIRECTION_BITS, DIRECTION_BITS);
         let came = unfolded(simd, u, v, DIRECTION_STEPS);
         let counted = in_disc & alike & zero.lt(dot(came, self.normal));
+        let counted = match self.fence {
+            Some(fence) => counted & fence.sees(simd, offset, distance, self.squared_radius),
+            None => counted,
+        };
         let bits = counted.bits();
         if bits == 0 {
             return;

@@ -10,6 +10,7 @@ mod batch;
 pub mod brute;
 mod build;
 mod curve;
+mod fence;
 mod gather;
 mod layout;
 mod nearest;
@@ -18,6 +19,7 @@ mod record;
 mod space;
 
 pub use curve::Turn;
+pub use fence::{Fence, PROBES};
 pub use gather::{ALIKE, Density, Disc, FLATNESS, Falloff, Response, Uniform};
 pub use nearest::Neighbours;
 pub use record::Photon;
@@ -127,7 +129,19 @@ impl PhotonMap<'_> {
 
     /// Estimates the density of photons on a disc, each with the response of the surface.
     pub fn gather<R: Response>(&self, level: Level, disc: &Disc, response: &R) -> Density {
-        level.dispatch(gather::Gather { map: self, disc, response })
+        level.dispatch(gather::Gather { map: self, disc, fence: None, response })
+    }
+
+    /// The same from what is seen of the disc.
+    pub fn gather_within<R: Response>(
+        &self,
+        level: Level,
+        disc: &Disc,
+        fence: &Fence,
+        response: &R,
+    ) -> Density {
+        let fence = Some(fence).filter(|fence| !fence.is_open());
+        level.dispatch(gather::Gather { map: self, disc, fence, response })
     }
 
     /// [`PhotonMap::nearest`] for many places, of which `each` gets the index and what was found; in an order in

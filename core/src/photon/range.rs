@@ -31,10 +31,12 @@ pub(super) fn leaves_within<S: Simd>(
         let mut left = place.squared_distances_to_boxes(simd, &node.boxes).le(limit).bits();
         if level == 0 {
             while left != 0 {
-                let index = WIDTH * index + left.trailing_zeros() as usize;
-                let Some(leaf) = map.leaves.get(index) else { return };
-                visitor.leaf(simd, index, leaf);
+                let at = WIDTH * index + left.trailing_zeros() as usize;
                 left &= left - 1;
+                // The memory is asked for the next one while this one is visited.
+                prefetch(simd, map, WIDTH * index + left.trailing_zeros() as usize % WIDTH);
+                let Some(leaf) = map.leaves.get(at) else { return };
+                visitor.leaf(simd, at, leaf);
             }
         }
         while left == 0 {
@@ -47,6 +49,16 @@ pub(super) fn leaves_within<S: Simd>(
         path[level] = (index, left & (left - 1));
         index = WIDTH * index + left.trailing_zeros() as usize;
         level -= 1;
+    }
+}
+
+/// Asks the memory for a leaf: three times four cache lines.
+#[inline(always)]
+fn prefetch<S: Simd>(simd: S, map: &PhotonMap, leaf: usize) {
+    const LINES: usize = size_of::<Leaf>() / 64;
+    let lines: &[[u8; 64]] = bytemuck::cast_slice(map.leaves);
+    for first in [0, 4, 8] {
+        simd.prefetch(lines, &[], false, LINES * leaf + first);
     }
 }
 

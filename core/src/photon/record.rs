@@ -35,6 +35,9 @@ pub struct Photon {
 const _: () = assert!(size_of::<Photon>() == 22);
 
 impl Photon {
+    /// A photon of no place, which maps refuse.
+    pub const NONE: Photon = Photon { position: [f32::NAN; 3], light: 0, power: 0, normal: [0; 2] };
+
     /// A photon of `power` (W, for each channel; negative and NaN count as none, less than 1e-35 is none) that
     /// came from `direction`, which points away from the surface of `normal`. Neither need be of unit length.
     pub fn new(position: Vec3, direction: Vec3, normal: Vec3, power: Rgb) -> Self {

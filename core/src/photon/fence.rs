@@ -1,0 +1,146 @@
+//! What of a disc is on this side of the walls around it. A wall that is thinner than the disc has photons of another
+//! room behind it, on the same floor, which no test of planes and normals tells apart; and in a corner a part of the
+//! disc is no surface at all, so that its photons are too few for its area.
+//!
+//! Eight probes along the surface say how far it is to the next wall. What lies between two of them is seen as far as
+//! the nearer, less what a straight wall comes nearer in between. Photons beyond are left out, and the weights of the
+//! rest divided by what they integrate to over what is seen.
+
+use super::gather::Falloff;
+use crate::geometry::Frame;
+use crate::sampling::sin_cos_turns;
+use glam::Vec3;
+use halflight_simd::{Lanes, Mask, Simd};
+
+/// Probes, and parts of a disc between them.
+pub const PROBES: usize = 8;
+
+/// The cosine of half the angle between two probes: a wall that both meet at one is at least so far away between them.
+const BETWEEN: f32 = 0.923_879_5;
+
+/// For each part: whether the first coordinate of its places is below zero, the second, and whether the second is
+/// larger in magnitude.
+const PARTS: [[bool; 3]; PROBES] = [
+    [false, false, false],
+    [false, false, true],
+    [true, false, true],
+    [true, false, false],
+    [true, true, false],
+    [true, true, true],
+    [false, true, true],
+    [false, true, false],
+];
+
+/// How far a disc is seen, part by part.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Fence {
+    axes: [Vec3; 2],
+    /// Shares of the radius.
+    reach: [f32; PROBES],
+}
+
+impl Fence {
+    /// How far probes must go, in shares of the radius, so that no wall slips between two of them.
+    pub const FARTHEST: f32 = 1.0 / BETWEEN;
+
+    /// Around `normal`, turned by `turns`: the directions of the probes, of unit length, and what a fence will be when
+    /// it is known how far they get: in shares of the radius, infinite where they meet nothing. They must go as far as
+    /// [`Fence::FARTHEST`] of them.
+    pub fn probes(normal: Vec3, turns: f32) -> ([Vec3; PROBES], impl FnOnce([f32; PROBES]) -> Fence) {
+        let frame = Frame::from_normal(normal);
+        let (sin, cos) = sin_cos_turns(turns);
+        let x = cos * frame.tangent + sin * frame.bitangent;
+        let y = cos * frame.bitangent - sin * frame.tangent;
+        let diagonal = core::f32::consts::FRAC_1_SQRT_2;
+        let (up, down) = (diagonal * (x + y), diagonal * (x - y));
+        ([x, up, y, -down, -x, -up, -y, down], move |shares| Fence::new([x, y], shares))
+    }
+
+    /// From the shares of the radius that probes get along, infinite where they meet nothing.
+    fn new(axes: [Vec3; 2], shares: [f32; PROBES]) -> Self {
+        let mut reach = [1.0; PROBES];
+        for (i, reach) in reach.iter_mut().enumerate() {
+            let nearer = shares[i].min(shares[(i + 1) % PROBES]);
+            *reach = (BETWEEN * nearer).clamp(0.0, 1.0);
+        }
+        Self { axes, reach }
+    }
+
+    /// Whether the whole disc is seen.
+    #[inline]
+    pub fn is_open(&self) -> bool {
+        self.reach.iter().all(|&reach| reach == 1.0)
+    }
+
+    /// What the weights integrate to over what is seen of the disc, of 1.
+    pub(super) fn share(&self, falloff: Falloff) -> f32 {
+        let parts = self.reach.iter().map(|&r| match falloff {
+            Falloff::Constant => r * r,
+            Falloff::Cone => r * r * (3.0 - 2.0 * r),
+            Falloff::Epanechnikov => r * r * (2.0 - r * r),
+        });
+        parts.sum::<f32>() / PROBES as f32
+    }
+
+    /// Which photons are seen: `offset` leads from each to the middle of the disc, `distance` is squared, and the
+    /// limit of it `squared_radius`.
+    #[inline(always)]
+    pub(super) fn sees<S: Simd>(
+        &self,
+        simd: S,
+        [x, y, z]: [S::F16; 3],
+        distance: S::F16,
+        squared_radius: f32,
+    ) -> <S::F16 as Lanes>::Mask {
+        let [a, b] = self.axes;
+        // Backwards, for offsets are.
+        let u = -((x * simd.splat16(a.x) + y * simd.splat16(a.y)) + z * simd.splat16(a.z));
+        let v = -((x * simd.splat16(b.x) + y * simd.splat16(b.y)) + z * simd.splat16(b.z));
+        let zero = simd.splat16(0.0);
+        let (left, below, steep) = (u.lt(zero), v.lt(zero), u.abs().lt(v.abs()));
+        let mut hidden = simd.mask16(0);
+        for (part, reach) in PARTS.iter().zip(&self.reach) {
+            if *reach < 1.0 {
+                let here = if part[0] { left } else { !left };
+                let here = here & if part[1] { below } else { !below };
+                let here = here & if part[2] { steep } else { !steep };
+                hidden = hidden | (here & simd.splat16(reach * reach * squared_radius).lt(distance));
+            }
+        }
+        debug_assert!(hidden.bits() <= 0xffff);
+        !hidden
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn parts_lie_between_their_probes() {
+        for turns in [0.0, 0.1, 0.77] {
+            let (ways, _) = Fence::probes(Vec3::Z, turns);
+            let (x, y) = (ways[0], ways[2]);
+            for i in 0..PROBES {
+                let next = ways[(i + 1) % PROBES];
+                assert!((ways[i].dot(next) - core::f32::consts::FRAC_1_SQRT_2).abs() < 1e-6);
+                let middle = ways[i] + next;
+                let (u, v) = (middle.dot(x), middle.dot(y));
+                assert_eq!(PARTS[i], [u < 0.0, v < 0.0, u.abs() < v.abs()], "{i}");
+            }
+        }
+    }
+
+    #[test]
+    fn what_is_seen_of_a_disc_is_what_weights_integrate_to() {
+        let (_, fence) = Fence::probes(Vec3::Y, 0.3);
+        let open = fence([f32::INFINITY; PROBES]);
+        let half = Fence { reach: [0.5; PROBES], ..open };
+        assert!(open.is_open() && !half.is_open());
+        for (falloff, expected) in
+            [(Falloff::Constant, 0.25), (Falloff::Cone, 0.5), (Falloff::Epanechnikov, 0.4375)]
+        {
+            assert_eq!((open.share(falloff), half.share(falloff)), (1.0, expected));
+        }
+    }
+}
