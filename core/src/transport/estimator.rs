@@ -56,6 +56,9 @@ pub(super) mod dimension {
     /// Whether the `n`th surface with a cut-out is met: `CROSSING + n`.
     pub(in crate::transport) const CROSSING: u32 = 1 << 31;
 
+    /// How probes for walls are turned at the vertex at the end of the `n`th segment: `PROBES + n`.
+    pub(in crate::transport) const PROBES: u32 = 1 << 30;
+
     // At every vertex, from `vertex(n)` on:
     /// Where on the light.
     pub(in crate::transport) const LIGHT: u32 = 0;

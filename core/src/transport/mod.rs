@@ -2,8 +2,9 @@
 //!
 //! [`path`] is the path tracer that renders, a wavefront over a tile; [`mod@reference`] is the same estimator as a
 //! textbook has it, one path at a time, kept to test the other against. For the irradiance cache [`overture`] finds the
-//! places where it lacks a record, and [`gather`] makes one.
+//! places where it lacks a record, and [`gather`] makes one; [`shoot`] leaves the photons that [`PhotonLight`] gathers.
 
+mod density;
 mod estimator;
 pub mod gather;
 mod outlook;
@@ -15,8 +16,10 @@ mod probe;
 pub mod reference;
 mod reuse;
 mod shadow;
+pub mod shoot;
 mod wave;
 
+pub use density::PhotonLight;
 pub use estimator::{Counters, PathSettings, UNLIMITED};
 pub use outlook::{Outlook, Vertex, WindowGain};
 pub use path::PathTracer;

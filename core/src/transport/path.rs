@@ -9,12 +9,13 @@
 //! 4. Code for what the scene does not have is not compiled in ([`Features`]).
 //! 5. Where that pays, pixels of a group share what their paths find (`reuse.rs`).
 //! 6. Where an irradiance cache knows the indirect light of a diffuse point, the path need not find it
-//!    (`irradiance_cache.rs`).
+//!    (`irradiance_cache.rs`); nor where photons tell it (`density.rs`).
 //!
 //! The price: about 300 bytes for each path of a wave. What a pixel sees depends on (seed, sample) and the pixels of
 //! its group only, no wave cuts a group, and samples are summed in their order: the picture has the same bits for
 //! any size of wave and any distribution of tasks.
 
+use super::density::PhotonLight;
 use super::estimator::{
     Counters, MAX_CROSSINGS, MAX_VERTICES, PathSettings, ROULETTE_FROM, UNLIMITED, dimension,
     power_heuristic, survival,
@@ -64,6 +65,7 @@ pub struct PathTracer<'a, F> {
     has_mirrors: bool,
     /// Frozen; of even and of odd samples.
     caches: Option<[&'a IrradianceCache<'a>; 2]>,
+    photons: Option<PhotonLight<'a>>,
     features: PhantomData<F>,
 }
 
@@ -88,6 +90,7 @@ impl<'a, F: Features> PathTracer<'a, F> {
             has_cutouts,
             has_mirrors,
             caches: None,
+            photons: None,
             features: PhantomData,
         }
     }
@@ -97,6 +100,13 @@ impl<'a, F: Features> PathTracer<'a, F> {
     /// first point of a path is served, for records do not know how far they are from the camera.
     pub fn with_caches(&self, caches: [&'a IrradianceCache<'a>; 2]) -> Self {
         Self { caches: Some(caches), ..*self }
+    }
+
+    /// The same, where surfaces with a diffuse part have from photons what light is reflected onto them. Pixels must
+    /// not share their paths as well. Where depth is limited only the first point of a path is served, for photons do
+    /// not know how far they are from their light.
+    pub fn with_photons(&self, photons: PhotonLight<'a>) -> Self {
+        Self { photons: Some(photons), ..*self }
     }
 
     /// The same, where pixels share what their paths find, or do not.
@@ -420,9 +430,23 @@ impl<'a, F: Features> PathTracer<'a, F> {
         if ends {
             return Step { light, next: None };
         }
+
+        let mut reflected = None;
+        if let Some(photons) = &self.photons
+            && (segments == 1 || !self.is_limited())
+        {
+            let turns = sampler.single(dimension::PROBES + segments);
+            reflected = photons.reflected::<F>((self.bvh, self.level), &point, &bsdf, wo, turns);
+            path.add(throughput * reflected.unwrap_or_default());
+        }
+
         let [u, v] = dimension::scattering(&sampler, segments);
         let lobe = if F::GLOSSY || F::DIELECTRIC { sampler.single(first + dimension::LOBE) } else { 0.0 };
         let Some(sample) = bsdf.sample::<F>(wo, [u, v, lobe]) else { return Step { light, next: None } };
+        // What a smooth coat mirrors was not gathered.
+        if reflected.is_some() && !sample.delta {
+            path.share = Share::EMITTED;
+        }
         let mut throughput = throughput * sample.weight;
         if self.settings.reuse && is_diffuse && segments < ROULETTE_FROM {
             exchange.leave(&point, throughput, segments);

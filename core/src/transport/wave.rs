@@ -49,11 +49,13 @@ impl Share {
     pub(super) const ALL: Share = Share(0);
     pub(super) const DIRECT: Share = Share(1);
     pub(super) const REFLECTED: Share = Share(2);
+    /// Light straight from emitters: photons have the rest.
+    pub(super) const EMITTED: Share = Share(3);
 
     /// Whether what `bsdf` reflects or transmits belongs to the other share.
     #[inline]
     pub(super) fn ends_at(self, bsdf: &Bsdf) -> bool {
-        self != Self::ALL && bsdf.is_delta() == (self == Self::REFLECTED)
+        self == Self::EMITTED || self != Self::ALL && bsdf.is_delta() == (self == Self::REFLECTED)
     }
 }
 

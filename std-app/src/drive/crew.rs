@@ -49,7 +49,6 @@ pub(super) struct Crew<'r, 'm> {
 impl Crew<'_, '_> {
     /// The first sample that a tile lacks; `None` where all have theirs, or the round is over. For methods that need
     /// something new for every sample, before its tiles.
-    #[allow(dead_code, reason = "for methods whose structures change with samples")]
     pub(super) fn next_sample(&self) -> Option<u32> {
         let Canvas { shard, taken, .. } = &*self.canvas;
         let tiles = taken.iter().zip(&self.round.targets).enumerate();
@@ -59,7 +58,6 @@ impl Crew<'_, '_> {
 
     /// A pass: task `i` writes to the `i`th piece of `size` values of `out`, and what they count is the round's. Returns
     /// whether all of them ran: if not, the round is over, and nothing of it may be committed.
-    #[allow(dead_code, reason = "for methods with structures of their own")]
     pub(super) fn pass<T: Send>(
         &mut self,
         out: &mut [T],

@@ -7,6 +7,7 @@ use halflight_core::bvh::{Bvh, Join};
 use halflight_core::estimate::{ErrorEstimate, TileError, TileLight};
 use halflight_core::film::{Film, PIXELS_PER_TILE};
 use halflight_core::memory::{Arena, Line, OutOfMemory};
+use halflight_core::photon::{PhotonMap, Photons};
 use halflight_core::scene::Mesh;
 use halflight_core::transport::{Counters, PathTracer, Pilot, path::WAVE};
 use rayon::prelude::*;
@@ -67,6 +68,11 @@ impl Workers {
             pilot += tile;
         }
         Ok(pilot)
+    }
+
+    /// Builds the map over the first `count` of `photons` on all cores.
+    pub(super) fn build_photons<'m>(&self, photons: Photons<'m>, count: usize) -> PhotonMap<'m> {
+        self.pool.install(|| photons.build_with(count, &Fork))
     }
 
     /// Runs `work` once on every thread, each with working memory of its own.

@@ -6,6 +6,7 @@
 
 mod irradiance_cache;
 mod path;
+mod sppm;
 #[cfg(test)]
 mod wrong;
 
@@ -27,6 +28,8 @@ pub enum Method {
     Path,
     /// Indirect light of diffuse surfaces from an irradiance cache.
     IrradianceCache,
+    /// Stochastic progressive photon mapping.
+    ProgressivePhotons,
     /// Path tracing that is wrong on purpose.
     #[cfg(test)]
     Wrong,
@@ -34,13 +37,14 @@ pub enum Method {
 
 impl Method {
     /// All of them.
-    pub const ALL: [Method; 2] = [Method::Path, Method::IrradianceCache];
+    pub const ALL: [Method; 3] = [Method::Path, Method::IrradianceCache, Method::ProgressivePhotons];
 
     /// Its name on the command line, in films and in reports.
     pub const fn name(self) -> &'static str {
         match self {
             Method::Path => "path",
             Method::IrradianceCache => "irradiance-cache",
+            Method::ProgressivePhotons => "sppm",
             #[cfg(test)]
             Method::Wrong => "wrong",
         }
@@ -52,6 +56,9 @@ impl Method {
             Method::Path => "Path tracing with next-event estimation and multiple importance sampling",
             Method::IrradianceCache => {
                 "Path tracing, but for the indirect light of diffuse surfaces, which is interpolated"
+            }
+            Method::ProgressivePhotons => {
+                "Stochastic progressive photon mapping: reflected light from photons, blurred ever less"
             }
             #[cfg(test)]
             Method::Wrong => "Wrong on purpose",
@@ -67,7 +74,7 @@ impl Method {
     pub const fn is_biased(self) -> bool {
         match self {
             Method::Path => false,
-            Method::IrradianceCache => true,
+            Method::IrradianceCache | Method::ProgressivePhotons => true,
             #[cfg(test)]
             Method::Wrong => true,
         }
@@ -76,7 +83,7 @@ impl Method {
     /// Whether enough samples bring its pictures as near to that of the scene as anybody wishes.
     pub const fn converges(self) -> bool {
         match self {
-            Method::Path => true,
+            Method::Path | Method::ProgressivePhotons => true,
             Method::IrradianceCache => false,
             #[cfg(test)]
             Method::Wrong => false,
@@ -88,7 +95,7 @@ impl Method {
     pub const fn shares(self) -> bool {
         match self {
             Method::Path => false,
-            Method::IrradianceCache => true,
+            Method::IrradianceCache | Method::ProgressivePhotons => true,
             #[cfg(test)]
             Method::Wrong => false,
         }
@@ -104,6 +111,9 @@ impl Method {
         match self {
             Method::Path => then(&mut path::Paths::<F>::new(stage, memory)?, memory),
             Method::IrradianceCache => irradiance_cache::with::<F, T>(stage, memory, then),
+            Method::ProgressivePhotons => {
+                then(&mut sppm::ProgressivePhotons::<F>::new(stage, memory)?, memory)
+            }
             #[cfg(test)]
             Method::Wrong => then(&mut wrong::Wrong::<F>::new(stage, memory)?, memory),
         }

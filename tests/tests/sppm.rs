@@ -1,0 +1,209 @@
+//! Progressive photon mapping: the energy of photons, its light against that of the path tracer, its bits against
+//! threads and rounds, and what must stay dark.
+
+use core::sync::atomic::AtomicBool;
+use glam::Vec3;
+use halflight::drive::{self, Method, RenderResult, Settings, Stop};
+use halflight::save::Image;
+use halflight_core::bsdf::All;
+use halflight_core::bvh::Bvh;
+use halflight_core::light::{Emission, Lights};
+use halflight_core::memory::{Arena, Footprint, Line};
+use halflight_core::photon::{Photon, Photons};
+use halflight_core::scene::{Camera, Material, Scene, Surface};
+use halflight_core::transport::UNLIMITED;
+use halflight_core::transport::shoot::{PATHS, ROOM, ShootSettings, Shooter};
+use halflight_core::{Level, Rgb};
+use halflight_tests::scenes::{SceneBuffers, cornell_box, emitter, everything};
+
+fn render(
+    scene: &Scene,
+    method: Method,
+    size: u32,
+    spp: u32,
+    change: impl FnOnce(&mut Settings),
+) -> RenderResult {
+    let stop = Stop { spp: Some(spp), ..Stop::default() };
+    let method = Some(method);
+    let mut settings = Settings { method, width: size, height: size, stop, ..Settings::default() };
+    change(&mut settings);
+    drive::render(scene, &settings, &mut |_| (), &AtomicBool::new(false)).unwrap()
+}
+
+fn sppm(scene: &Scene, size: u32, spp: u32, change: impl FnOnce(&mut Settings)) -> RenderResult {
+    render(scene, Method::ProgressivePhotons, size, spp, change)
+}
+
+fn lines(footprint: Footprint) -> Vec<Line> {
+    vec![Line([0; 64]); footprint.bytes() / 64]
+}
+
+/// All photons of a map of `scene`, and the power of its lights in the same units.
+fn photons(scene: &Scene, tasks: usize) -> Vec<Photon> {
+    let mut bvh_lines = lines(Bvh::footprint(scene.mesh.triangles.len()));
+    let bvh = Bvh::build(&scene.mesh, &mut Arena::new(bytemuck::cast_slice_mut(&mut bvh_lines))).unwrap();
+    let mut light_lines = lines(Lights::footprint(scene).and(Lights::scratch(scene)));
+    let lights = Lights::build(scene, &mut Arena::new(bytemuck::cast_slice_mut(&mut light_lines))).unwrap();
+    let mut emission_lines = lines(Emission::footprint(&lights));
+    let mut arena = Arena::new(bytemuck::cast_slice_mut(&mut emission_lines));
+    let emission = Emission::build(scene, &lights, &bvh.bounds(), &mut arena).unwrap();
+    let settings = ShootSettings { seed: 1, paths: (tasks * PATHS) as u32, max_depth: UNLIMITED };
+    let shooter = Shooter::<All>::new(scene, &bvh, &lights, &emission, settings, Level::detect());
+    let mut scratch = lines(Shooter::<All>::scratch());
+    let mut scratch = Arena::new(bytemuck::cast_slice_mut(&mut scratch));
+    let mut all = vec![Photon::NONE; tasks * ROOM];
+    for (task, out) in all.chunks_mut(ROOM).enumerate() {
+        let counters = shooter.run(task, 0, &mut scratch, out).unwrap();
+        assert_eq!(counters.dropped.total(), 0);
+    }
+    all.retain(|photon| photon.position().is_finite());
+    all
+}
+
+/// The inside of a unit cube, all of it of `reflectance`, with a lamp of one square tenth under its ceiling that shines
+/// down.
+fn lit_room(reflectance: f32) -> SceneBuffers {
+    let camera = Camera::look_at(Vec3::splat(0.1), Vec3::splat(0.9), Vec3::Y, 60.0);
+    let mut buffers = SceneBuffers::new(camera);
+    let wall = buffers.material(Material::diffuse(Rgb::splat(reflectance)));
+    let lamp = buffers.material(emitter(0.0, 1.0));
+    buffers.cuboid(Vec3::ZERO, Vec3::ONE, true, wall);
+    buffers.square(Vec3::new(0.5, 0.95, 0.5), Vec3::NEG_Y, 0.1, lamp);
+    buffers
+}
+
+#[test]
+fn photons_carry_the_power_that_surfaces_reflect() {
+    for reflectance in [0.5, 0.9] {
+        let buffers = lit_room(reflectance);
+        let photons = photons(&buffers.scene(), 64);
+        let power: f64 = photons.iter().map(|photon| f64::from(photon.power().x)).sum();
+        // The lamp is black and small: the room keeps what it reflects, ρ + ρ² + ..., but for what the lamp takes.
+        let emitted = core::f64::consts::PI * 0.01;
+        let kept = f64::from(reflectance) / (1.0 - f64::from(reflectance));
+        let expected = emitted * kept;
+        // Both sides of the lamp are 0.02 of 6 square metres: a share 0.0033 of what is on its way at each turn.
+        let lost = (1.0 + kept) * 0.0033;
+        let ratio = power / expected;
+        assert!(ratio < 1.01 && ratio > 0.99 - lost, "{reflectance}: {ratio}");
+        assert!(photons.len() < 64 * ROOM * 4 / 5, "there is room left: {}", photons.len());
+    }
+}
+
+/// Mean over 4 × 4 pixels.
+fn blocks(image: &Image) -> Vec<f64> {
+    let side = image.width as usize / 4;
+    let block = |i: usize| {
+        let (x, y) = (i % side * 4, i / side * 4);
+        let pixels = (0..16).map(|p| image.pixels[(y + p / 4) * image.width as usize + x + p % 4]);
+        pixels.map(|pixel| f64::from(pixel[1]) / 16.0).sum()
+    };
+    (0..side * side).map(block).collect()
+}
+
+/// Root of the mean squared difference of blocks over the mean.
+fn difference(a: &Image, b: &Image) -> f64 {
+    let (a, b) = (blocks(a), blocks(b));
+    let squares: f64 = a.iter().zip(&b).map(|(a, b)| (a - b).powi(2)).sum();
+    (squares / b.len() as f64).sqrt() / (b.iter().sum::<f64>() / b.len() as f64)
+}
+
+fn assert_means(a: &Image, b: &Image, tolerance: f64) {
+    for (a, b) in a.mean().into_iter().zip(b.mean()) {
+        assert!((a / b - 1.0).abs() < tolerance, "{a} {b}");
+    }
+}
+
+#[test]
+fn the_cornell_box_goes_to_that_of_the_path_tracer_at_any_depth() {
+    let buffers = cornell_box();
+    let scene = buffers.scene();
+    for depth in [Some(3), None] {
+        let path = render(&scene, Method::Path, 64, 1024, |s| s.max_depth = depth).image;
+        let few = sppm(&scene, 64, 8, |s| s.max_depth = depth).image;
+        let many = sppm(&scene, 64, 256, |s| s.max_depth = depth).image;
+        let (first, last) = (difference(&few, &path), difference(&many, &path));
+        // The path tracer's own noise is below half a percent; discs still reach over edges.
+        assert!(last < 0.5 * first && last < 0.02, "{depth:?}: {first} {last}");
+        assert_means(&many, &path, 0.01);
+    }
+    let direct = sppm(&scene, 64, 64, |s| s.max_depth = Some(2)).image;
+    assert_means(&direct, &render(&scene, Method::Path, 64, 64, |s| s.max_depth = Some(2)).image, 0.01);
+}
+
+#[test]
+fn every_kind_of_surface_and_light_has_the_light_that_the_path_tracer_finds() {
+    let buffers = everything();
+    let scene = buffers.scene();
+    let path = render(&scene, Method::Path, 64, 1024, |_| ()).image;
+    let many = sppm(&scene, 64, 256, |_| ()).image;
+    assert_means(&many, &path, 0.02);
+    assert!(difference(&many, &path) < 0.06, "{}", difference(&many, &path));
+}
+
+#[test]
+fn a_caustic_has_its_power() {
+    // A lamp that faces a mirror, which throws its light onto the floor: photons alone find it, but the lamp is so
+    // large that paths do as well.
+    let camera = Camera::look_at(Vec3::new(0.0, 2.5, 3.0), Vec3::new(0.0, 0.0, 0.5), Vec3::Y, 40.0);
+    let mut buffers = SceneBuffers::new(camera);
+    let floor = buffers.material(Material::diffuse(Rgb::splat(0.7)));
+    let mirror = Surface::Mirror { reflectance: Rgb::splat(0.9).into() };
+    let mirror = buffers.material(Material { surface: mirror, ..Material::GREY });
+    let lamp = buffers.material(emitter(0.0, 5.0));
+    buffers.square(Vec3::ZERO, Vec3::Y, 4.0, floor);
+    buffers.square(Vec3::new(0.0, 1.0, -1.0), Vec3::Z, 1.0, mirror);
+    buffers.square(Vec3::new(0.0, 1.0, -0.5), Vec3::NEG_Z, 0.6, lamp);
+    let scene = buffers.scene();
+    let path = render(&scene, Method::Path, 64, 2048, |_| ()).image;
+    let found = sppm(&scene, 64, 256, |_| ()).image;
+    assert_means(&found, &path, 0.01);
+    assert!(difference(&found, &path) < 0.03, "{}", difference(&found, &path));
+}
+
+#[test]
+fn nothing_leaks_through_a_thin_wall() {
+    // A bright room and a dark one, with a wall between them that is as thin as a thousandth.
+    let camera = Camera::look_at(Vec3::new(0.52, 0.5, 0.95), Vec3::new(0.52, 0.45, 0.0), Vec3::Y, 80.0);
+    let mut buffers = SceneBuffers::new(camera);
+    let wall = buffers.material(Material::diffuse(Rgb::splat(0.8)));
+    let lamp = buffers.material(emitter(0.0, 20.0));
+    buffers.cuboid(Vec3::ZERO, Vec3::new(0.5, 1.0, 1.0), true, wall);
+    buffers.cuboid(Vec3::new(0.501, 0.0, 0.0), Vec3::ONE, true, wall);
+    buffers.square(Vec3::new(0.25, 0.9, 0.5), Vec3::NEG_Y, 0.2, lamp);
+    let image = sppm(&buffers.scene(), 64, 8, |_| ()).image;
+    let lit = image.pixels.iter().filter(|pixel| **pixel != [0.0; 3]).count();
+    assert_eq!((lit, image.mean()), (0, [0.0; 3]), "the camera is in the dark room");
+    let camera = Camera { eye: Vec3::new(0.48, 0.5, 0.95), ..camera };
+    let bright = sppm(&Scene { camera, ..buffers.scene() }, 64, 8, |_| ()).image;
+    assert!(bright.mean()[1] > 0.1);
+}
+
+#[test]
+fn bits_do_not_depend_on_threads_rounds_or_level() {
+    let buffers = cornell_box();
+    let scene = buffers.scene();
+    let one = sppm(&scene, 40, 6, |s| s.threads = Some(1)).image;
+    for threads in [2, 5] {
+        assert_eq!(sppm(&scene, 40, 6, |s| s.threads = Some(threads)).image, one);
+    }
+    for level in Level::detect().and_below() {
+        assert_eq!(sppm(&scene, 40, 6, |s| s.level = level).image, one, "{level:?}");
+    }
+}
+
+#[test]
+fn memory_is_the_same_for_any_number_of_samples_and_less_where_less_is_given() {
+    let buffers = cornell_box();
+    let scene = buffers.scene();
+    let bytes = |result: &RenderResult| {
+        result.memory.iter().find(|one| one.structure == "photons").map_or(0, |one| one.bytes)
+    };
+    let (few, many) = (sppm(&scene, 64, 2, |_| ()), sppm(&scene, 64, 32, |_| ()));
+    assert_eq!((bytes(&few), few.memory_peak), (bytes(&many), many.memory_peak));
+    assert!(bytes(&few) >= Photons::footprint(16 * ROOM).bytes());
+    let tight = few.memory_peak - bytes(&few) / 2;
+    let less = sppm(&scene, 64, 32, |s| s.memory = Some(tight));
+    assert!(less.memory_peak <= tight && bytes(&less) < bytes(&few));
+    assert_means(&less.image, &many.image, 0.03);
+}
