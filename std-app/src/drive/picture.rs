@@ -95,8 +95,8 @@ impl Picture<'_> {
                     canvas.weights = Some(adapt::weights(&tiles, &canvas.taken, width));
                 }
                 error = audited.as_ref().map(|audited| audited.total).or(error);
-                is_lost = !method.converges()
-                    && audited.is_some_and(|audited| rounds.is_out_of_reach(audited.bias.least()));
+                is_lost =
+                    !method.converges() && audited.is_some_and(|audited| rounds.is_out_of_reach(&audited));
                 rounds.estimated(error);
                 estimating = start.elapsed().as_secs_f64();
                 latest = error;

@@ -1,6 +1,6 @@
 //! How many samples the next round takes, and whether there is one: the stop rules.
 
-use super::ErrorEstimate;
+use super::{Audited, ErrorEstimate};
 use serde::{Deserialize, Serialize};
 
 /// When to stop: the first rule that holds. Without any rule, [`Stop::DEFAULT_SPP`] samples.
@@ -30,6 +30,9 @@ const FIRST_ESTIMATE: u32 = 4;
 
 /// Below this many samples an error estimate is too vague to stop on.
 const FEWEST_FOR_ERROR: u32 = 16;
+
+/// Below this many samples of each audited pixel its light is too rarely seen to end a render for its bias.
+const FEWEST_FOR_BIAS: u32 = 64;
 
 /// The rounds of a picture.
 pub(super) struct Rounds {
@@ -179,9 +182,10 @@ impl Rounds {
         [by_samples, by_time, by_error].into_iter().flatten().reduce(f64::min).map(|left| left.max(0.0))
     }
 
-    /// Whether the error that was asked for is less than `error`.
-    pub(super) fn is_out_of_reach(&self, error: f64) -> bool {
-        self.stop.error.is_some_and(|wanted| error > wanted)
+    /// Whether the error that was asked for is less than the bias, as far as enough samples tell.
+    pub(super) fn is_out_of_reach(&self, audited: &Audited) -> bool {
+        let enough = self.spp >= FEWEST_FOR_ERROR && audited.samples >= FEWEST_FOR_BIAS;
+        enough && self.stop.error.is_some_and(|wanted| audited.bias.least() > wanted)
     }
 
     fn error_reached(&self) -> bool {
