@@ -14,6 +14,7 @@ mod racer;
 mod render;
 mod shot;
 mod stability;
+mod study;
 mod summary;
 mod values;
 mod view;
@@ -40,6 +41,7 @@ enum Command {
     Info(info::Info),
     Bench(bench::Bench),
     Stability(stability::Stability),
+    Study(study::Study),
 }
 
 /// Runs the program. The exit codes are a contract: 0 done, 2 usage or bad input, 3 stopped early with a
@@ -56,6 +58,7 @@ pub(crate) fn main() -> ExitCode {
         Command::Info(command) => command.run(),
         Command::Bench(command) => command.run(),
         Command::Stability(command) => command.run(),
+        Command::Study(command) => command.run(),
     }));
     match outcome {
         Ok(Ok(code)) => return code,

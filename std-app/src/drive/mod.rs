@@ -19,6 +19,7 @@ mod picture;
 mod regions;
 mod rounds;
 mod run;
+mod study;
 mod turns;
 mod windows;
 mod workers;
@@ -34,6 +35,7 @@ pub use memory::MemoryUse;
 pub use merge::{Merged, merge};
 pub use method::{CacheSettings, CacheUse, Method};
 pub use rounds::Stop;
+pub use study::{IrradianceStudy, MetricError, study_irradiance};
 pub use turns::{Turn, Turns};
 pub use windows::WindowUse;
 

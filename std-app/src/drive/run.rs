@@ -77,7 +77,7 @@ pub(super) fn path_settings(settings: &Settings) -> PathSettings {
 }
 
 /// The hierarchy, built on all cores, then moved out of the working memory of its build into `lines`.
-fn build_bvh<'m>(
+pub(super) fn build_bvh<'m>(
     scene: &Scene,
     workers: &Workers,
     memory: &mut Memory,

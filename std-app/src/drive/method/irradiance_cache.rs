@@ -5,17 +5,18 @@
 //! The first round begins with the overture of both. Then caches are frozen; a point that no record reaches is path
 //! traced, as is every surface that is not diffuse.
 
+use super::overture::{Growing, Overture};
 use super::{Renderer, Stage};
 use crate::drive::crew::Crew;
 use crate::drive::memory::Memory;
 use crate::drive::run::path_settings;
 use crate::drive::{RenderError, Settings};
 use halflight_core::bsdf::Features;
-use halflight_core::cache::irradiance::{CellFlux, IrradianceCache, Metric, Record, metric};
+use halflight_core::cache::irradiance::{CellFlux, IrradianceCache, Metric, metric};
 use halflight_core::memory::{Arena, Line};
-use halflight_core::transport::gather::{Gathering, Place};
-use halflight_core::transport::overture::{Order, PIXELS};
-use halflight_core::transport::{Counters, PathTracer, path::WAVE};
+use halflight_core::transport::gather::Gathering;
+use halflight_core::transport::{PathTracer, path::WAVE};
+use std::time::Instant;
 
 /// How an irradiance cache is filled.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -47,23 +48,14 @@ pub struct CacheUse {
     pub seconds: f64,
 }
 
-/// The overture looks at every other pixel of every other row: what lies between is reached from there, or path traced.
-const STRIDE: u32 = 2;
-
-/// Pixels that are looked at before it is gathered where records are missing: tasks of [`PIXELS`].
-const LOOKED_AT: usize = 16 * PIXELS;
-
-/// Places that are gathered at before their records are committed.
-const GATHERED: usize = 32;
-
 /// Pixels for each record that a cache has memory for, where that is not limited.
 const PIXELS_PER_RECORD: usize = 8;
 
 /// The fewest, for small pictures.
 const FEWEST_RECORDS: usize = 4096;
 
-/// Least radius of a record in pixels.
-const LEAST_PIXELS: f32 = 1.0;
+/// Least radius of a record in pixels: neighbouring pixels of the overture reach each other.
+pub(in crate::drive) const LEAST_PIXELS: f32 = 2.0;
 
 /// Takes the memory, sets the method up, and hands it to `then`.
 pub(super) fn with<F: Features, T>(
@@ -87,20 +79,20 @@ pub(super) fn with<F: Features, T>(
     let cache = |lines| {
         IrradianceCache::new(&bvh.bounds(), capacity, &mut Arena::new(bytemuck::cast_slice_mut(lines)))
     };
-    let caches = [cache(even)?, cache(odd)?];
+    let (even, odd) = (cache(even)?, cache(odd)?);
 
     let usual = metric::Settings::new(metric, 0.5 * bvh.bounds().diagonal());
     let metric = metric::Settings { error: error.unwrap_or(usual.error), ..usual };
     let mut method = Cached {
         tracer: PathTracer::<F>::new(scene, bvh, lights, path_settings(settings), settings.level),
         gathering: Gathering { flux: &flux, metric, least_pixels: LEAST_PIXELS },
-        order: Order::new(settings.width, settings.height, STRIDE),
-        halves: caches.map(|cache| Half { cache, next: 0, gathered: 0 }),
+        size: [settings.width, settings.height],
+        halves: [Growing::new(even, 0), Growing::new(odd, 1)],
         scratch,
         seconds: 0.0,
     };
     if !has_indirect_light(settings) {
-        method.halves.iter_mut().for_each(|half| half.next = u64::MAX);
+        method.halves.iter_mut().for_each(Growing::finish);
     }
     then(&mut method, memory)
 }
@@ -114,29 +106,24 @@ fn has_indirect_light(settings: &Settings) -> bool {
 struct Cached<'a, F> {
     tracer: PathTracer<'a, F>,
     gathering: Gathering<'a>,
-    order: Order,
-    halves: [Half<'a>; 2],
+    size: [u32; 2],
+    halves: [Growing<'a>; 2],
     scratch: Vec<Vec<Line>>,
     seconds: f64,
 }
 
-/// The cache of the even or the odd samples.
-struct Half<'a> {
-    cache: IrradianceCache<'a>,
-    /// How far the overture is in its order.
-    next: u64,
-    /// Places at which it has gathered.
-    gathered: u32,
-}
-
 impl<F: Features> Renderer for Cached<'_, F> {
     fn round(&mut self, crew: &mut Crew) -> Result<(), RenderError> {
-        for half in 0..2 {
-            if !self.overture(half, crew)? {
+        let Self { tracer, gathering, size, halves, scratch, seconds } = self;
+        let start = Instant::now();
+        let overture = Overture { tracer, gathering, size: *size };
+        for half in halves.iter_mut() {
+            if !overture.fill(half, crew, scratch)? {
                 return Ok(());
             }
         }
-        let Self { tracer, halves: [even, odd], scratch, .. } = self;
+        *seconds += start.elapsed().as_secs_f64();
+        let [even, odd] = halves;
         let tracer = tracer.with_caches([&even.cache, &odd.cache]);
         crew.tiles(u32::MAX, scratch, &|task, samples, arena, pixels| {
             tracer.run(task, samples, WAVE, arena, pixels)
@@ -153,61 +140,4 @@ impl<F: Features> Renderer for Cached<'_, F> {
             seconds: self.seconds,
         })
     }
-}
-
-impl<F: Features> Cached<'_, F> {
-    /// Fills the cache of a half, or goes on with it. Whether it is done: not where the round is over.
-    fn overture(&mut self, index: usize, crew: &mut Crew) -> Result<bool, RenderError> {
-        let start = std::time::Instant::now();
-        let Self { tracer, gathering, order, halves, scratch, seconds } = self;
-        let Some(half) = halves.get_mut(index) else { return Ok(true) };
-        let mut places = vec![Place::NONE; LOOKED_AT];
-        while half.next < order.len() && !half.cache.is_full() {
-            let (first, cache) = (half.next, &half.cache);
-            let look = |task: usize, _: &mut Arena, out: &mut [Place]| {
-                let mut counters = Counters::default();
-                tracer.places(order, first + (task * PIXELS) as u64, index as u32, out, &mut counters);
-                for place in out.iter_mut().filter(|place| is_served(cache, place)) {
-                    *place = Place::NONE;
-                }
-                Ok(counters)
-            };
-            if !crew.pass(&mut places, PIXELS, scratch, &look)? {
-                return Ok(false);
-            }
-            let mut missing: Vec<Place> = places.iter().copied().filter(Place::is_some).collect();
-            while !missing.is_empty() {
-                missing.retain(|place| !is_served(&half.cache, place));
-                let batch: Vec<Place> = missing.drain(..missing.len().min(GATHERED)).collect();
-                let mut records: Vec<Option<Record>> = vec![None; batch.len()];
-                let gathered = half.gathered;
-                let tracer = if std::env::var_os("IC_REC").is_some() {
-                    tracer.with_caches([&half.cache, &half.cache])
-                } else {
-                    *tracer
-                };
-                let gather = |task: usize, arena: &mut Arena, out: &mut [Option<Record>]| {
-                    let mut counters = Counters::default();
-                    let number = 2 * (gathered + task as u32) + index as u32;
-                    if let (Some(out), Some(place)) = (out.first_mut(), batch.get(task)) {
-                        *out = tracer.gather(place, number, gathering, arena, &mut counters)?;
-                    }
-                    Ok(counters)
-                };
-                if !crew.pass(&mut records, 1, scratch, &gather)? {
-                    return Ok(false);
-                }
-                half.gathered += batch.len() as u32;
-                records.into_iter().flatten().for_each(|record| _ = half.cache.insert(record));
-            }
-            half.next += LOOKED_AT as u64;
-        }
-        *seconds += start.elapsed().as_secs_f64();
-        Ok(true)
-    }
-}
-
-/// Whether nothing is to be gathered at `place`.
-fn is_served(cache: &IrradianceCache, place: &Place) -> bool {
-    cache.is_full() || cache.reaches(place.position(), place.normal(), 0.0)
 }

@@ -5,12 +5,15 @@
 //! with its words, a file with its [`Renderer`], a line in [`Method::with`].
 
 mod irradiance_cache;
+mod overture;
 mod path;
 mod sppm;
 #[cfg(test)]
 mod wrong;
 
+pub(super) use irradiance_cache::LEAST_PIXELS;
 pub use irradiance_cache::{CacheSettings, CacheUse};
+pub(super) use overture::{Growing, Overture};
 
 use super::crew::Crew;
 use super::memory::Memory;

@@ -1,0 +1,270 @@
+//! Studies of the irradiance cache: what each error metric makes of the same number of records, against irradiance that
+//! is gathered at points of the picture that no cache has seen.
+
+use super::canvas::{Canvas, Shard};
+use super::crew::{Crew, Round};
+use super::memory::Memory;
+use super::method::{Growing, LEAST_PIXELS, Overture};
+use super::run::{build_bvh, path_settings};
+use super::workers::Workers;
+use super::{RenderError, Settings};
+use halflight_core::Rgb;
+use halflight_core::bsdf::Features;
+use halflight_core::cache::irradiance::{CellFlux, IrradianceCache, Metric, Record, metric};
+use halflight_core::census::{Census, WithFeatures};
+use halflight_core::film::Film;
+use halflight_core::light::Lights;
+use halflight_core::memory::{Arena, Line};
+use halflight_core::scene::Scene;
+use halflight_core::transport::gather::{Gathering, Place};
+use halflight_core::transport::overture::{Order, PIXELS};
+use halflight_core::transport::{Counters, PathTracer};
+
+/// What to study.
+#[derive(Clone, Debug)]
+pub struct IrradianceStudy {
+    /// The metrics.
+    pub metrics: Vec<Metric>,
+    /// Records that each is to make do with.
+    pub records: u64,
+    /// Points at which the irradiance is held against the exact one, about.
+    pub points: u32,
+}
+
+/// What came of a metric.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MetricError {
+    /// The metric.
+    pub metric: Metric,
+    /// The error that it was to allow, in its unit, for so many records.
+    pub error: f32,
+    /// Records.
+    pub records: u64,
+    /// Root mean square of the error of the indirect irradiance (luminance), over its mean.
+    pub rmse: f64,
+    /// The error, relative to the irradiance or a tenth of its mean, that one point of a hundred exceeds.
+    pub worst: f64,
+    /// Share of the points that records reach; the errors are of these.
+    pub reached: f64,
+    /// Mean of the errors of records as the metric predicts, over the irradiance; 0 where it knows none.
+    pub predicted: f64,
+    /// Mean of the errors over the irradiance (or a tenth of its mean).
+    pub achieved: f64,
+}
+
+/// Records are as many as asked for within this share.
+const TOLERANCE: f64 = 0.02;
+
+/// Attempts at that.
+const ATTEMPTS: usize = 9;
+
+/// Rays along a side where the irradiance counts as exact.
+const EXACT: usize = 64;
+
+/// A sample of its own for the points of comparison.
+const HELD_OUT: u32 = 1000;
+
+/// Runs `study` on the picture of `settings`; `tell` hears of each metric when it is done.
+pub fn study_irradiance(
+    scene: &Scene,
+    settings: &Settings,
+    study: &IrradianceStudy,
+    tell: &mut dyn FnMut(&MetricError),
+) -> Result<(), RenderError> {
+    Census::of(scene).plan().features.dispatch(Study { scene, settings, study, tell })
+}
+
+struct Study<'a> {
+    scene: &'a Scene<'a>,
+    settings: &'a Settings,
+    study: &'a IrradianceStudy,
+    tell: &'a mut dyn FnMut(&MetricError),
+}
+
+impl WithFeatures for Study<'_> {
+    type Out = Result<(), RenderError>;
+
+    fn run<F: Features>(self) -> Self::Out {
+        let Study { scene, settings, study, tell } = self;
+        let workers = Workers::new(settings.threads)?;
+        let mut memory = Memory::new(scene, settings.memory);
+        let mut bvh_lines = Vec::new();
+        let bvh = build_bvh(scene, &workers, &mut memory, &mut bvh_lines)?;
+        let mut lights_lines = memory.take("lights", Lights::footprint(scene).and(Lights::scratch(scene)))?;
+        let lights = Lights::build(scene, &mut arena(&mut lights_lines))?;
+        let tracer = PathTracer::<F>::new(scene, &bvh, &lights, path_settings(settings), settings.level);
+        let strata = settings.cache.strata as usize;
+        let scratch = PathTracer::<F>::gather_scratch(strata).or(PathTracer::<F>::gather_scratch(EXACT));
+        let mut scratch = memory.take_each("paths", scratch, workers.count())?;
+
+        // Passes count what they do on a canvas, of which there is no picture.
+        let mut film_lines = memory.take("film", Film::footprint(1, 1))?;
+        let film = Film::new(1, 1, &mut arena(&mut film_lines))?;
+        let mut canvas = Canvas::new(film, Shard::WHOLE);
+        let round = Round { targets: vec![0], step: 1, deadline: None, interrupt: None };
+        let mut crew = Crew { workers: &workers, round: &round, canvas: &mut canvas };
+
+        let size = [settings.width, settings.height];
+        let extent = 0.5 * bvh.bounds().diagonal();
+        let points = held_out(&tracer, size, study.points, &mut crew, &mut scratch)?;
+        let mut tables = memory.take("gathering", CellFlux::footprint(strata))?;
+        let flux = CellFlux::build(strata, &mut arena(&mut tables))?;
+        let capacity = (study.records as usize).saturating_mul(4);
+        let mut lines = memory.take("cache", IrradianceCache::footprint(capacity))?;
+        for &metric in &study.metrics {
+            let usual = metric::Settings::new(metric, extent);
+            let mut search = Search::new(study.records, usual.error);
+            loop {
+                let settings = metric::Settings { error: search.error, ..usual };
+                let gathering = Gathering { flux: &flux, metric: settings, least_pixels: LEAST_PIXELS };
+                let cache = IrradianceCache::new(&bvh.bounds(), capacity, &mut arena(&mut lines))?;
+                let mut growing = Growing::new(cache, 0);
+                Overture { tracer: &tracer, gathering: &gathering, size }.fill(
+                    &mut growing,
+                    &mut crew,
+                    &mut scratch,
+                )?;
+                let error = search.error;
+                if search.is_done(growing.cache.records().len() as u64) {
+                    tell(&judge(metric, error, &growing.cache, &points));
+                    break;
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+fn arena(lines: &mut [Line]) -> Arena<'_> {
+    Arena::new(bytemuck::cast_slice_mut(lines))
+}
+
+/// Points of the picture, and the exact indirect irradiance there.
+fn held_out<F: Features>(
+    tracer: &PathTracer<F>,
+    [width, height]: [u32; 2],
+    points: u32,
+    crew: &mut Crew,
+    scratch: &mut [Vec<Line>],
+) -> Result<Vec<(Place, Rgb)>, RenderError> {
+    let each = f64::from(width) * f64::from(height) / f64::from(points.max(1));
+    let order = Order::new(width, height, each.sqrt() as u32);
+    let mut places = vec![Place::NONE; order.len() as usize];
+    let look = |task: usize, _: &mut Arena, out: &mut [Place]| {
+        let mut counters = Counters::default();
+        tracer.places(&order, (task * PIXELS) as u64, HELD_OUT, out, &mut counters);
+        Ok(counters)
+    };
+    crew.pass(&mut places, PIXELS, scratch, &look)?;
+    places.retain(Place::is_some);
+    let mut tables = vec![Line([0; 64]); CellFlux::footprint(EXACT).bytes() / 64];
+    let flux = CellFlux::build(EXACT, &mut arena(&mut tables))?;
+    let gathering =
+        Gathering { flux: &flux, metric: metric::Settings::new(Metric::MinDistance, 1.0), least_pixels: 0.0 };
+    let mut records: Vec<Option<Record>> = vec![None; places.len()];
+    let gather = |task: usize, arena: &mut Arena, out: &mut [Option<Record>]| {
+        let mut counters = Counters::default();
+        if let (Some(out), Some(place)) = (out.first_mut(), places.get(task)) {
+            // Numbers that no record has.
+            *out = tracer.gather(place, 1 << 29 | task as u32, &gathering, arena, &mut counters)?;
+        }
+        Ok(counters)
+    };
+    crew.pass(&mut records, 1, scratch, &gather)?;
+    let known = places.into_iter().zip(records);
+    Ok(known.filter_map(|(place, record)| Some((place, Rgb::from(record?.irradiance)))).collect())
+}
+
+/// Holds a cache against what is known.
+fn judge(metric: Metric, error: f32, cache: &IrradianceCache, points: &[(Place, Rgb)]) -> MetricError {
+    let luminance = |light: Rgb| f64::from(light.dot(Rgb::new(0.2126, 0.7152, 0.0722)));
+    let mean = points.iter().map(|(_, exact)| luminance(*exact)).sum::<f64>() / points.len().max(1) as f64;
+    let (mut squares, mut relative) = (0.0, Vec::new());
+    for (place, exact) in points {
+        let Some(found) = cache.at(place.position(), place.normal()) else { continue };
+        let exact = luminance(*exact);
+        let difference = luminance(found.irradiance) - exact;
+        squares += difference * difference;
+        relative.push(difference.abs() / exact.max(0.1 * mean));
+    }
+    relative.sort_by(f64::total_cmp);
+    let reached = relative.len();
+    let count = reached.max(1) as f64;
+    let records = cache.records();
+    let predicted = records.iter().map(|record| f64::from(record.error)).sum::<f64>();
+    MetricError {
+        metric,
+        error,
+        records: records.len() as u64,
+        rmse: (squares / count).sqrt() / mean.max(f64::MIN_POSITIVE),
+        worst: relative.get(reached * 99 / 100).copied().unwrap_or(0.0),
+        reached: reached as f64 / points.len().max(1) as f64,
+        predicted: predicted / records.len().max(1) as f64,
+        achieved: relative.iter().sum::<f64>() / count,
+    }
+}
+
+/// The search for the error that makes so many records: straight lines on logarithmic axes, kept between what was too
+/// many and what was too few.
+struct Search {
+    wanted: f64,
+    error: f32,
+    attempts: usize,
+    /// Errors, as logarithms, that made too many and too few records, with the logarithm of how many.
+    too_many: Option<[f64; 2]>,
+    too_few: Option<[f64; 2]>,
+}
+
+impl Search {
+    fn new(wanted: u64, error: f32) -> Self {
+        Self { wanted: wanted.max(1) as f64, error, attempts: 0, too_many: None, too_few: None }
+    }
+
+    /// Takes note that the error made so many records; whether that will do, or has to.
+    fn is_done(&mut self, records: u64) -> bool {
+        self.attempts += 1;
+        let records = records.max(1) as f64;
+        if (records / self.wanted - 1.0).abs() <= TOLERANCE || self.attempts >= ATTEMPTS {
+            return true;
+        }
+        let here = [f64::from(self.error).ln(), records.ln()];
+        if records > self.wanted {
+            self.too_many = Some(here)
+        } else {
+            self.too_few = Some(here)
+        }
+        let wanted = self.wanted.ln();
+        let next = match (self.too_many, self.too_few) {
+            (Some([a, many]), Some([b, few])) => {
+                let share = ((many - wanted) / (many - few)).clamp(0.1, 0.9);
+                a + share * (b - a)
+            }
+            // Areas of supports grow with the square of the radius, or with the root of the error.
+            _ => here[0] + 2.0 * (here[1] - wanted),
+        };
+        self.error = next.exp() as f32;
+        false
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_search_finds_the_error_for_any_power() {
+        for power in [-0.4, -0.5, -1.0, -2.0] {
+            for wanted in [100, 1700, 50_000] {
+                let mut search = Search::new(wanted, 1e-4);
+                let mut records = 0;
+                for _ in 0..ATTEMPTS {
+                    records = (20.0 * f64::from(search.error).powf(power)) as u64;
+                    if search.is_done(records) {
+                        break;
+                    }
+                }
+                assert!((records as f64 / wanted as f64 - 1.0).abs() < 0.05, "{power} {wanted}: {records}");
+            }
+        }
+    }
+}
