@@ -69,7 +69,7 @@ impl Irradiance {
         let study = IrradianceStudy { metrics, records: self.records, points: self.points };
         if !self.json {
             say(
-                "metric                  error     records     RMSE   1 in 100  reached  predicted   achieved",
+                "metric                    error   records       RMSE     noise  1 in 100  reached  predicted   achieved",
             );
         }
         let mut rows = Vec::new();
@@ -90,11 +90,12 @@ impl Irradiance {
 
 fn text(row: &MetricError) -> String {
     format!(
-        "{:<21} {:>9.2e} {:>9} {:>10.5} {:>9.4} {:>7.1} % {:>10.5} {:>10.5}",
+        "{:<21} {:>9.2e} {:>9} {:>10.5} {:>9.5} {:>9.4} {:>6.1} % {:>10.5} {:>10.5}",
         row.metric.name(),
         row.error,
         row.records,
         row.rmse,
+        row.noise,
         row.worst,
         100.0 * row.reached,
         row.predicted,
@@ -108,6 +109,7 @@ fn object(row: &MetricError) -> Value {
         "error": row.error,
         "records": row.records,
         "rmse": row.rmse,
+        "noise": row.noise,
         "worst": row.worst,
         "reached": row.reached,
         "predicted": row.predicted,

@@ -10,7 +10,7 @@ use super::workers::Workers;
 use super::{RenderError, Settings};
 use halflight_core::Rgb;
 use halflight_core::bsdf::Features;
-use halflight_core::cache::irradiance::{CellFlux, IrradianceCache, Metric, Record, metric};
+use halflight_core::cache::irradiance::{CellFlux, IrradianceCache, Metric, metric};
 use halflight_core::census::{Census, WithFeatures};
 use halflight_core::film::Film;
 use halflight_core::light::Lights;
@@ -40,8 +40,11 @@ pub struct MetricError {
     pub error: f32,
     /// Records.
     pub records: u64,
-    /// Root mean square of the error of the indirect irradiance (luminance), over its mean.
+    /// Root mean square of the error of the indirect irradiance (luminance), over its mean; what the noise of the exact
+    /// one adds to it is taken off.
     pub rmse: f64,
+    /// That noise, over the mean.
+    pub noise: f64,
     /// The error, relative to the irradiance or a tenth of its mean, that one point of a hundred exceeds.
     pub worst: f64,
     /// Share of the points that records reach; the errors are of these.
@@ -58,8 +61,9 @@ const TOLERANCE: f64 = 0.02;
 /// Attempts at that.
 const ATTEMPTS: usize = 9;
 
-/// Rays along a side where the irradiance counts as exact.
+/// Rays along a side of a gathering at a point of comparison, and gatherings there.
 const EXACT: usize = 64;
+const REPEATS: u32 = 4;
 
 /// A sample of its own for the points of comparison.
 const HELD_OUT: u32 = 1000;
@@ -139,14 +143,27 @@ fn arena(lines: &mut [Line]) -> Arena<'_> {
     Arena::new(bytemuck::cast_slice_mut(lines))
 }
 
-/// Points of the picture, and the exact indirect irradiance there.
+/// A point of the picture, and the exact indirect irradiance there.
+struct Point {
+    place: Place,
+    /// Luminance.
+    exact: f64,
+    /// Variance of `exact`.
+    variance: f64,
+}
+
+fn luminance(light: Rgb) -> f64 {
+    f64::from(light.dot(Rgb::new(0.2126, 0.7152, 0.0722)))
+}
+
+/// Points that are spread evenly over the picture.
 fn held_out<F: Features>(
     tracer: &PathTracer<F>,
     [width, height]: [u32; 2],
     points: u32,
     crew: &mut Crew,
     scratch: &mut [Vec<Line>],
-) -> Result<Vec<(Place, Rgb)>, RenderError> {
+) -> Result<Vec<Point>, RenderError> {
     let each = f64::from(width) * f64::from(height) / f64::from(points.max(1));
     let order = Order::new(width, height, each.sqrt() as u32);
     let mut places = vec![Place::NONE; order.len() as usize];
@@ -161,42 +178,55 @@ fn held_out<F: Features>(
     let flux = CellFlux::build(EXACT, &mut arena(&mut tables))?;
     let gathering =
         Gathering { flux: &flux, metric: metric::Settings::new(Metric::MinDistance, 1.0), least_pixels: 0.0 };
-    let mut records: Vec<Option<Record>> = vec![None; places.len()];
-    let gather = |task: usize, arena: &mut Arena, out: &mut [Option<Record>]| {
+    let mut known: Vec<Option<[f64; REPEATS as usize]>> = vec![None; places.len()];
+    let gather = |task: usize, arena: &mut Arena, out: &mut [Option<[f64; REPEATS as usize]>]| {
         let mut counters = Counters::default();
-        if let (Some(out), Some(place)) = (out.first_mut(), places.get(task)) {
+        let (Some(out), Some(place)) = (out.first_mut(), places.get(task)) else { return Ok(counters) };
+        let mut found = [0.0; REPEATS as usize];
+        for (repeat, found) in (0..REPEATS).zip(&mut found) {
             // Numbers that no record has.
-            *out = tracer.gather(place, 1 << 29 | task as u32, &gathering, arena, &mut counters)?;
+            let number = 1 << 29 | (REPEATS * task as u32 + repeat);
+            let Some(record) = tracer.gather(place, number, &gathering, arena, &mut counters)? else {
+                return Ok(counters);
+            };
+            *found = luminance(record.irradiance.into());
         }
+        *out = Some(found);
         Ok(counters)
     };
-    crew.pass(&mut records, 1, scratch, &gather)?;
-    let known = places.into_iter().zip(records);
-    Ok(known.filter_map(|(place, record)| Some((place, Rgb::from(record?.irradiance)))).collect())
+    crew.pass(&mut known, 1, scratch, &gather)?;
+    let point = |(place, found): (Place, Option<[f64; REPEATS as usize]>)| {
+        let (found, count) = (found?, f64::from(REPEATS));
+        let exact = found.iter().sum::<f64>() / count;
+        let squares: f64 = found.iter().map(|found| (found - exact).powi(2)).sum();
+        Some(Point { place, exact, variance: squares / (count * (count - 1.0)) })
+    };
+    Ok(places.into_iter().zip(known).filter_map(point).collect())
 }
 
 /// Holds a cache against what is known.
-fn judge(metric: Metric, error: f32, cache: &IrradianceCache, points: &[(Place, Rgb)]) -> MetricError {
-    let luminance = |light: Rgb| f64::from(light.dot(Rgb::new(0.2126, 0.7152, 0.0722)));
-    let mean = points.iter().map(|(_, exact)| luminance(*exact)).sum::<f64>() / points.len().max(1) as f64;
-    let (mut squares, mut relative) = (0.0, Vec::new());
-    for (place, exact) in points {
+fn judge(metric: Metric, error: f32, cache: &IrradianceCache, points: &[Point]) -> MetricError {
+    let mean = points.iter().map(|point| point.exact).sum::<f64>() / points.len().max(1) as f64;
+    let (mut squares, mut variance, mut relative) = (0.0, 0.0, Vec::new());
+    for Point { place, exact, variance: noise } in points {
         let Some(found) = cache.at(place.position(), place.normal()) else { continue };
-        let exact = luminance(*exact);
         let difference = luminance(found.irradiance) - exact;
-        squares += difference * difference;
+        squares += difference * difference - noise;
+        variance += noise;
         relative.push(difference.abs() / exact.max(0.1 * mean));
     }
     relative.sort_by(f64::total_cmp);
     let reached = relative.len();
     let count = reached.max(1) as f64;
+    let over_mean = |squares: f64| (squares.max(0.0) / count).sqrt() / mean.max(f64::MIN_POSITIVE);
     let records = cache.records();
     let predicted = records.iter().map(|record| f64::from(record.error)).sum::<f64>();
     MetricError {
         metric,
         error,
         records: records.len() as u64,
-        rmse: (squares / count).sqrt() / mean.max(f64::MIN_POSITIVE),
+        rmse: over_mean(squares),
+        noise: over_mean(variance),
         worst: relative.get(reached * 99 / 100).copied().unwrap_or(0.0),
         reached: reached as f64 / points.len().max(1) as f64,
         predicted: predicted / records.len().max(1) as f64,
