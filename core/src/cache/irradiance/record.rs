@@ -1,7 +1,8 @@
 //! One place where the indirect irradiance is known: how it changes around, and how far that may be trusted.
 //!
-//! The support of a record is an ellipsoid: the two radii R1 ≤ R2 that an error metric gives along the surface, and R1
-//! across it (Schwarzhaupt, Jensen and Jarosz 2012, §5). A fence cuts out of it what lies behind a wall.
+//! A record covers an ellipsoid: the two radii R1 ≤ R2 that an error metric gives along the surface, and R1 across it
+//! (Schwarzhaupt, Jensen and Jarosz 2012, §5). Its support may be wider, by the overlap that the metric allows. A fence
+//! cuts out of both what lies behind a wall.
 
 use super::{Derivatives, Reach};
 use crate::Rgb;
@@ -11,7 +12,7 @@ use bytemuck::{Pod, Zeroable};
 use glam::{Vec2, Vec3};
 
 /// Azimuths for each of which a record knows how far it is to the next wall.
-pub const SECTORS: usize = 12;
+pub const SECTORS: usize = 16;
 
 /// A point lies in front of a record, and is not to use it, where it is so much below the mean of both tangent planes,
 /// in radii: light that the record sees from above may be hidden from it.
@@ -21,9 +22,9 @@ const IN_FRONT: f32 = 0.05;
 const LEAST_FACTOR: f32 = 0.05;
 const GREATEST_FACTOR: f32 = 20.0;
 
-/// See the file. Two cache lines.
+/// See the file.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
-#[repr(C, align(64))]
+#[repr(C, align(16))]
 pub struct Record {
     /// x_i.
     pub position: [f32; 3],
@@ -37,9 +38,13 @@ pub struct Record {
     pub gradient: [[f32; 2]; 3],
     /// ∇_n E_i of each channel along the two axes: E changes by it times n_i × n.
     pub rotation: [[f32; 2]; 3],
-    /// R1 ≤ R2.
+    /// Half of the second derivatives of E along the two axes, over E.
+    pub bend: [f32; 2],
+    /// R1 ≤ R2: what it covers.
     pub radii: [f32; 2],
-    /// What the fence counts in: R2 as it was at first.
+    /// Radii of the support over those.
+    pub overlap: f32,
+    /// What the fence counts in: the longer radius of the support as it was at first.
     pub reach: f32,
     /// Mean relative error over the support, as its metric predicts.
     pub error: f32,
@@ -72,8 +77,10 @@ impl Record {
             irradiance,
             gradient,
             rotation: derivatives.rotation.map(|rotation| along(rotation).to_array()),
+            bend: reach.bend.map(|bend| 0.5 * bend),
             radii: reach.radii,
-            reach: reach.radii[1],
+            overlap: reach.overlap,
+            reach: reach.radii[1] * reach.overlap,
             error,
             shining: 0.0,
             fence: [u8::MAX; SECTORS],
@@ -91,7 +98,7 @@ impl Record {
     pub fn extent(&self) -> Vec3 {
         let (axis, normal) = (Vec3::from(self.axis), Vec3::from(self.normal));
         let [r1, r2] = self.radii;
-        let (a, b, c) = (r1 * axis, r2 * normal.cross(axis), r1 * normal);
+        let (a, b, c) = (self.overlap * r1 * axis, self.overlap * r2 * normal.cross(axis), r1 * normal);
         let square = a * a + b * b + c * c;
         Vec3::new(libm::sqrtf(square.x), libm::sqrtf(square.y), libm::sqrtf(square.z))
     }
@@ -100,9 +107,23 @@ impl Record {
     /// paper). `least_cos` is the cosine of the greatest deviation of the normal. `None` outside of the support.
     #[inline]
     pub fn at(&self, position: Vec3, normal: Vec3, least_cos: f32) -> Option<(Rgb, f32)> {
+        let (place, weight) = self.weight(position, normal, least_cos, self.overlap)?;
+        Some((self.extrapolated(place, normal), weight))
+    }
+
+    /// Whether it covers the point.
+    #[inline]
+    pub fn covers(&self, position: Vec3, normal: Vec3, least_cos: f32) -> bool {
+        self.weight(position, normal, least_cos, 1.0).is_some()
+    }
+
+    /// Where the point lies along the axes, and its weight in a support of so many radii.
+    #[inline]
+    fn weight(&self, position: Vec3, normal: Vec3, least_cos: f32, overlap: f32) -> Option<(Vec2, f32)> {
         let offset = position - Vec3::from(self.position);
         let [r1, r2] = self.radii;
-        if offset.length_squared() >= r2 * r2 {
+        let farthest = r2 * overlap;
+        if offset.length_squared() >= farthest * farthest {
             return None;
         }
         let cos = normal.dot(Vec3::from(self.normal));
@@ -110,8 +131,7 @@ impl Record {
             return None;
         }
         let place = self.local(offset);
-        let scaled = place / Vec3::new(r1, r2, r1);
-        let square = scaled.length_squared();
+        let square = (place / Vec3::new(r1 * overlap, farthest, r1)).length_squared();
         // A support without extent holds nothing.
         if square.is_nan() || square >= 1.0 {
             return None;
@@ -121,17 +141,18 @@ impl Record {
             return None;
         }
         let weight = (1.0 - libm::sqrtf(square)) * (cos - least_cos) / (1.0 - least_cos);
-        Some((self.extrapolated(place.truncate(), normal), weight))
+        Some((place.truncate(), weight))
     }
 
-    /// E_i + ∇E_i · Δx + ∇_n E_i · (n_i × n), within limits.
+    /// E_i + ∇E_i · Δx + Δxᵀ H Δx / 2 + ∇_n E_i · (n_i × n), within limits.
     #[inline]
     fn extrapolated(&self, place: Vec2, normal: Vec3) -> Rgb {
         let turned = self.local(Vec3::from(self.normal).cross(normal)).truncate();
+        let bend = (place * place).dot(Vec2::from(self.bend));
         let channel = |i: usize| {
             let change = Vec2::from(self.gradient[i]).dot(place) + Vec2::from(self.rotation[i]).dot(turned);
             let here = self.irradiance[i];
-            (here + change).max(LEAST_FACTOR * here).min(GREATEST_FACTOR * here)
+            (here + bend * here + change).max(LEAST_FACTOR * here).min(GREATEST_FACTOR * here)
         };
         Rgb::new(channel(0), channel(1), channel(2))
     }
@@ -186,6 +207,7 @@ mod tests {
             gradient: [[0.5, -1.0]; 3],
             rotation: [[0.0, 3.0]; 3],
             radii: [1.0, 2.0],
+            overlap: 1.0,
             reach: 2.0,
             fence: [u8::MAX; SECTORS],
             ..Record::default()
@@ -205,6 +227,17 @@ mod tests {
         let (e, w) = record().at(Vec3::ZERO, normal, LEAST_COS).unwrap();
         assert!((e.x - (2.0 + 3.0 * 0.1f32.sin())).abs() < 1e-6, "{e}");
         assert!((w - (0.1f32.cos() - LEAST_COS) / (1.0 - LEAST_COS)).abs() < 1e-4, "{w}");
+    }
+
+    #[test]
+    fn it_overlaps_others_and_bends() {
+        let record = Record { overlap: 2.0, bend: [0.0, 0.25], reach: 4.0, ..record() };
+        let (e, w) = record.at(Vec3::new(0.0, 3.0, 0.0), Vec3::Z, LEAST_COS).unwrap();
+        assert!((e.x - (2.0 - 3.0 + 2.0 * 0.25 * 9.0)).abs() < 1e-5 && (w - 0.25).abs() < 1e-6, "{e} {w}");
+        assert!(record.at(Vec3::new(0.0, 4.0, 0.0), Vec3::Z, LEAST_COS).is_none());
+        let covers = |y| record.covers(Vec3::new(0.0, y, 0.0), Vec3::Z, LEAST_COS);
+        assert!(covers(1.9) && !covers(2.1));
+        assert_eq!(record.extent(), Vec3::new(2.0, 4.0, 1.0));
     }
 
     #[test]

@@ -82,7 +82,8 @@ impl<'m> IrradianceCache<'m> {
 
     /// What is known at `position` on a surface of unit `normal`; `None` where no record reaches.
     ///
-    /// E = Σ w_i (E_i + ∇E_i · Δx_i + ∇_n E_i · (n_i × n)) / Σ w_i (Schwarzhaupt et al. 2012, equation 12).
+    /// E = Σ w_i (E_i + ∇E_i · Δx_i + ∇_n E_i · (n_i × n)) / Σ w_i (Schwarzhaupt et al. 2012, equation 12), with the
+    /// second order where a metric has it.
     #[inline]
     pub fn at(&self, position: Vec3, normal: Vec3) -> Option<Indirect> {
         let (mut sum, mut shining, mut weights) = (Rgb::ZERO, 0.0, 0.0);
@@ -99,19 +100,16 @@ impl<'m> IrradianceCache<'m> {
         (weights > 0.0).then(|| Indirect { irradiance: sum / weights, shining: shining / weights })
     }
 
-    /// Whether records of more than `least` weight together reach the point.
+    /// Whether some record covers the point.
     #[inline]
-    pub fn reaches(&self, position: Vec3, normal: Vec3, least: f32) -> bool {
-        let mut weights = 0.0;
+    pub fn covers(&self, position: Vec3, normal: Vec3) -> bool {
+        let mut covered = false;
         self.tree.at(position, |index| {
-            if let Some(record) = self.records.get(index as usize)
-                && let Some((_, weight)) = record.at(position, normal, self.least_cos)
-            {
-                weights += weight;
-            }
-            weights <= least
+            let record = self.records.get(index as usize);
+            covered = record.is_some_and(|record| record.covers(position, normal, self.least_cos));
+            !covered
         });
-        weights > least
+        covered
     }
 
     /// Adds a record, after it and its neighbours have clamped each other. Whether there was memory for it.
@@ -194,6 +192,7 @@ mod tests {
             irradiance: [1.0 + x, 2.0, 2.0],
             gradient: [[1.0, 0.0], [0.0; 2], [0.0; 2]],
             radii: [radius, 1.5 * radius],
+            overlap: 1.0,
             reach: 1.5 * radius,
             fence: [u8::MAX; SECTORS],
             ..Record::default()
@@ -232,7 +231,7 @@ mod tests {
                 let (x, y) = (random.single(10_000 + 2 * i), random.single(10_001 + 2 * i));
                 let e = cache.at(Vec3::new(x, y, 0.5), Vec3::Z).unwrap().irradiance;
                 assert!(e.distance(Vec3::new(1.0 + x, 2.0, 2.0)) < 1e-5, "{x} {y}: {e}");
-                assert!(cache.reaches(Vec3::new(x, y, 0.5), Vec3::Z, 0.0));
+                assert!(cache.covers(Vec3::new(x, y, 0.5), Vec3::Z));
                 assert_eq!(cache.at(Vec3::new(x, y, 0.5), Vec3::NEG_Z), None);
                 assert_eq!(cache.at(Vec3::new(x, y, 0.9), Vec3::Z), None);
             }

@@ -43,7 +43,7 @@ impl<'a> Growing<'a> {
 
     /// Whether nothing is to be gathered at `place`.
     fn is_served(&self, place: &Place) -> bool {
-        self.cache.is_full() || self.cache.reaches(place.position(), place.normal(), 0.0)
+        self.cache.is_full() || self.cache.covers(place.position(), place.normal())
     }
 }
 
