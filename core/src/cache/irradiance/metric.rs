@@ -156,13 +156,13 @@ pub struct Reach {
 }
 
 /// How far [`Metric::Halflight`] averages, in radii.
-const OVERLAP: f32 = 2.0;
+const OVERLAP: f32 = 1.5;
 
 /// The reach of a record of these derivatives, which should be those of [`Metric::derivatives`].
 ///
 /// Of [`Metric::Halflight`] a place gets a record where it is in the radii of none, and is interpolated of all within
-/// twice their radii: four times as many, whose independent errors average out. That is not to be had to first order,
-/// for extrapolation twice as far is wrong by four times as much; but the Hessian is known, and is added to it.
+/// [`OVERLAP`] times their radii: twice as many, whose independent errors average out. That is not to be had to first order,
+/// for the error of extrapolation grows with the square of the distance; but the Hessian is known, and is added to it.
 pub fn reach(settings: &Settings, derivatives: &Derivatives) -> Reach {
     let irradiance = derivatives.luminance();
     let slope = derivatives.luminance_gradient().length();
@@ -359,7 +359,7 @@ mod tests {
         let radius = (0.16 / PI / 0.0025f32).powf(0.25);
         near(flat.radii[0], radius);
         near(flat.radii[1], radius);
-        assert_eq!((flat.overlap, flat.bend), (2.0, [0.0; 2]));
+        assert_eq!((flat.overlap, flat.bend), (OVERLAP, [0.0; 2]));
         // A saddle is extrapolated by what it is bent: -4 and 0.25 of 2.
         let saddle = reach(&settings(Metric::Halflight), &record([0.25, 0.0, -4.0], Vec2::ZERO));
         assert_eq!((saddle.bend, saddle.axis.abs()), ([-2.0, 0.125], Vec2::Y));
