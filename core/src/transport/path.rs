@@ -393,7 +393,8 @@ impl<'a, F: Features> PathTracer<'a, F> {
         // Lights behind an opaque surface need not be asked.
         let normal = if F::DIELECTRIC && bsdf.transmits() { Vec3::ZERO } else { point.frame.normal };
 
-        // Where lights are small all around, and nothing mirrors them, a shadow ray alone finds the direct light.
+        // Where lights are small all around, and nothing mirrors them, a shadow ray alone finds the direct light. Not
+        // that of an environment, which is not drawn from where it seemed to be hidden.
         let mut ends = false;
         if let (Some(caches), Bsdf::Diffuse(diffuse)) = (self.caches, &bsdf)
             && (segments == 1 || !self.is_limited())
@@ -401,7 +402,7 @@ impl<'a, F: Features> PathTracer<'a, F> {
         {
             path.add(throughput * diffuse.reflectance * indirect.irradiance * FRAC_1_PI);
             path.share = Share::DIRECT;
-            ends = indirect.shining < SMALL && !self.has_mirrors;
+            ends = indirect.shining < SMALL && !self.has_mirrors && scene.environment.is_none();
         }
 
         let mut light = None;

@@ -103,6 +103,17 @@ impl<'a> Audit<'a> {
         }))
     }
 
+    /// Bytes that it is going to take: a method that takes what it can get leaves so many.
+    pub(super) fn bytes<F: Features>(stage: &Stage, is_biased: bool) -> usize {
+        let Stage { settings, workers, .. } = *stage;
+        if share(settings, is_biased).is_none() {
+            return 0;
+        }
+        let pixels = Footprint::default().slice::<Pixel>(choice::count(settings.width, settings.height));
+        let threads = PathTracer::<F>::scratch(WAVE).bytes().saturating_mul(workers.count());
+        threads.saturating_add(pixels.bytes())
+    }
+
     /// What a film file keeps.
     pub(super) fn state(&self) -> &State {
         &self.state

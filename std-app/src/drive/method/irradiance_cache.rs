@@ -6,7 +6,8 @@
 //! traced, as is every surface that is not diffuse.
 
 use super::overture::{Growing, Overture};
-use super::{Renderer, Stage};
+use super::{Method, Renderer, Stage};
+use crate::drive::audit::Audit;
 use crate::drive::crew::Crew;
 use crate::drive::memory::Memory;
 use crate::drive::run::path_settings;
@@ -72,7 +73,9 @@ pub(super) fn with<F: Features, T>(
     let flux = CellFlux::build(strata, &mut Arena::new(bytemuck::cast_slice_mut(&mut tables)))?;
     let pixels = settings.width as usize * settings.height as usize;
     let wanted = (pixels / PIXELS_PER_RECORD).max(FEWEST_RECORDS);
-    let capacity = wanted.min(IrradianceCache::capacity_of(memory.available() / 2));
+    let others = Audit::bytes::<F>(stage, Method::IrradianceCache.is_biased());
+    let available = memory.available().saturating_sub(others);
+    let capacity = wanted.min(IrradianceCache::capacity_of(available / 2));
     let footprint = IrradianceCache::footprint(capacity);
     let mut lines = [memory.take("cache", footprint)?, memory.take("cache", footprint)?];
     let [even, odd] = &mut lines;
