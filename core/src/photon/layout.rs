@@ -18,7 +18,7 @@ pub(super) const WIDTH: usize = 16;
 /// Most levels of nodes: enough for all photons that a u32 can name.
 pub(super) const LEVELS: usize = 7;
 
-const _: () = assert!(LEAF * WIDTH.pow(LEVELS as u32) >= 1 << 32);
+const _: () = assert!((LEAF as u64) * (WIDTH as u64).pow(LEVELS as u32) >= 1 << 32);
 
 /// Columns of a leaf, each in halves: the bytes of so many [`Photon`]s in another order. Eleven cache lines.
 /// Places without a photon are infinitely far.
