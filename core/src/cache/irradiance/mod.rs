@@ -16,4 +16,6 @@ pub use record::{Record, SECTORS};
 pub use store::{GREATEST_DEVIATION, Indirect, IrradianceCache};
 
 #[cfg(test)]
+mod placement;
+#[cfg(test)]
 mod rooms;
