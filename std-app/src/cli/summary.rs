@@ -22,7 +22,11 @@ pub(super) fn text(run: &Run, report: Option<&Path>) -> String {
     lines.push(format!("image  {width}x{height}, {samples} per pixel{early}"));
     match &result.audit {
         None => lines.push(estimate(result.error)),
-        Some(audit) => lines.extend(audited(audit)),
+        Some(audit) => {
+            lines.extend(audited(audit));
+            let doubt = run.doubt().filter(|_| audit.is_biased());
+            lines.extend(doubt.map(|doubt| format!("       but {doubt}")));
+        }
     }
     if result.ending == Ending::Biased {
         lines.push(

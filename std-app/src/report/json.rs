@@ -117,6 +117,7 @@ fn error(run: &Run) -> Value {
     if let Some(audit) = &run.result.audit {
         error["noise"] = estimate_object(Some(audit.noise), "estimate");
         error["bias"] = bias(audit);
+        error["bias"]["doubt"] = run.doubt().into();
     }
     error
 }

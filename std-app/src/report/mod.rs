@@ -50,6 +50,12 @@ pub struct Run<'a> {
 }
 
 impl Run<'_> {
+    /// Why what an audit has found may not be a bias; `None` where path tracing can be trusted.
+    pub fn doubt(&self) -> Option<&'static str> {
+        let caustics = self.result.method.finds_caustics() && Census::of(self.scene).specular > 0;
+        caustics.then_some("path tracing, the judge, may miss light through mirrors and glass")
+    }
+
     /// What was left out and why.
     fn left_out(&self) -> Vec<(&'static str, &'static str)> {
         let mut left_out: Vec<_> = Census::of(self.scene).plan().left_out().collect();

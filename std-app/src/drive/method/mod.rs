@@ -93,6 +93,11 @@ impl Method {
         }
     }
 
+    /// Whether it finds light that path tracing may miss: that of small lamps through mirrors and glass.
+    pub const fn finds_caustics(self) -> bool {
+        matches!(self, Method::ProgressivePhotons)
+    }
+
     /// Whether samples of pixels far from each other err together, through a structure that they share: their errors
     /// are independent between even and odd samples then, not between tiles.
     pub const fn shares(self) -> bool {

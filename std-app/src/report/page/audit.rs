@@ -22,12 +22,12 @@ pub(super) fn section(run: &Run) -> String {
         plural(audit.pixels.into(), "pixel") + ", with " + &plural(audit.samples.into(), "sample") + " each,";
     fill(
         include_str!("audit.html"),
-        &[("words", &words(audit)), ("facts", &parts::facts(&facts)), ("pixels", &pixels)],
+        &[("words", &words(audit, run.doubt())), ("facts", &parts::facts(&facts)), ("pixels", &pixels)],
     )
 }
 
 /// The verdict.
-fn words(audit: &Audited) -> String {
+fn words(audit: &Audited, doubt: Option<&str>) -> String {
     if !audit.is_biased() {
         let least = number(audit.bias.detectable, 1);
         return format!("No bias was found. One of less than {least} in relMSE might not have been.");
@@ -47,6 +47,9 @@ fn words(audit: &Audited) -> String {
         }
         None if audit.whole_is_biased() => words += &format!(": by {} as a whole.", percent(&audit.whole)),
         None => words += ", by too little to say where.",
+    }
+    if let Some(doubt) = doubt {
+        words += &format!(" Or not: {doubt}.");
     }
     words
 }
