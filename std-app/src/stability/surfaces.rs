@@ -7,7 +7,7 @@ use halflight_core::Rgb;
 use halflight_core::scene::{Material, Surface};
 
 pub(super) fn cases(table: &mut Table) {
-    for reflectance in [0.0f32, 0.5, 0.9, 0.97] {
+    for reflectance in [0.0f32, 0.5, 0.9, 0.97, 0.99, 0.999] {
         let expected = 1.0 / (1.0 - f64::from(reflectance));
         let world = World { spp: 256, ..World::furnace(reflectance, 1.0) };
         table.radiance("albedo", format!("a box that reflects {reflectance} and emits 1"), &world, expected);
@@ -114,7 +114,7 @@ fn corridor(bounces: u32) -> World {
 }
 
 fn mirrors(table: &mut Table) {
-    for bounces in [1, 10, 100] {
+    for bounces in [1, 10, 100, 1000] {
         let world = corridor(bounces);
         table.radiance("mirrors", format!("{bounces} bounces between two that are perfect"), &world, 1.0);
     }
