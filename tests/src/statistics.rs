@@ -30,6 +30,46 @@ pub fn judge(replicas: &[Vec<f64>], expected: &[f64]) -> Result<(), String> {
     test("mean of the picture", &|replica| mean(replica), mean(expected))
 }
 
+/// The sums of blocks of `size` × `size` pixels of a picture that is `width` pixels across, all channels.
+pub fn blocks(pixels: &[[f32; 3]], width: u32, size: u32) -> Vec<f64> {
+    let (across, down) = (width / size, pixels.len() as u32 / width / size);
+    let mut sums = vec![0.0; (across * down * 3) as usize];
+    for (i, pixel) in (0u32..).zip(pixels) {
+        let block = i / width / size * across + i % width / size;
+        for (channel, value) in pixel.iter().enumerate() {
+            sums[block as usize * 3 + channel] += f64::from(*value);
+        }
+    }
+    sums
+}
+
+/// Judges whether two lots of pictures have the same means: none of their values may be more than `widest` deviations
+/// apart (Welch's t).
+///
+/// # Errors
+/// The first value that is, in words.
+pub fn agree(a: &[Vec<f64>], b: &[Vec<f64>], widest: f64) -> Result<(), String> {
+    for (i, ((a, va), (b, vb))) in moments(a).into_iter().zip(moments(b)).enumerate() {
+        // Values without any noise are equal up to rounding.
+        let deviation = (a - b).abs() / (va + vb).sqrt().max(1e-6 * (a + b));
+        if !(a == b || deviation < widest) {
+            return Err(format!("value {i}: {a} and {b}, {deviation:.1} deviations"));
+        }
+    }
+    Ok(())
+}
+
+/// Mean and variance of the mean of each value.
+fn moments(pictures: &[Vec<f64>]) -> Vec<(f64, f64)> {
+    let count = pictures.len() as f64;
+    let of = |i: usize| {
+        let mean = pictures.iter().map(|p| p[i]).sum::<f64>() / count;
+        let squares = pictures.iter().map(|p| (p[i] - mean).powi(2)).sum::<f64>();
+        (mean, squares / (count * (count - 1.0)))
+    };
+    (0..pictures[0].len()).map(of).collect()
+}
+
 /// The value that Student's t with `freedom` degrees exceeds with probability `tail`, by the expansion of
 /// Cornish and Fisher; good to a percent from 15 degrees on.
 fn student_quantile(tail: f64, freedom: f64) -> f64 {

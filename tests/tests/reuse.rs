@@ -13,6 +13,7 @@ use halflight_core::scene::{Material, Scene, Surface};
 use halflight_core::transport::{PathSettings, PathTracer, UNLIMITED};
 use halflight_core::{Level, Rgb};
 use halflight_tests::scenes::{SceneBuffers, cornell_box, everything};
+use halflight_tests::statistics::{agree, blocks};
 
 /// Pixels across and down: four tiles, the outer ones cut by the border.
 const SIZE: u32 = 28;
@@ -32,30 +33,6 @@ fn render(scene: &Scene, spp: u32, change: impl FnOnce(&mut Settings)) -> Render
     let mut settings = Settings { width: SIZE, height: SIZE, stop, ..Settings::default() };
     change(&mut settings);
     drive::render(scene, &settings, &mut |_| (), &AtomicBool::new(false)).unwrap()
-}
-
-/// The means of blocks of pixels, all channels.
-fn blocks(result: &RenderResult) -> Vec<f64> {
-    let across = SIZE / BLOCK;
-    let mut sums = vec![0.0; (across * across * 3) as usize];
-    for (i, pixel) in result.image.pixels.iter().enumerate() {
-        let (x, y) = (i as u32 % SIZE / BLOCK, i as u32 / SIZE / BLOCK);
-        for (channel, value) in pixel.iter().enumerate() {
-            sums[(y * across + x) as usize * 3 + channel] += f64::from(*value);
-        }
-    }
-    sums
-}
-
-/// Mean and variance of the mean of each value.
-fn moments(pictures: &[Vec<f64>]) -> Vec<(f64, f64)> {
-    let count = pictures.len() as f64;
-    let of = |i: usize| {
-        let mean = pictures.iter().map(|p| p[i]).sum::<f64>() / count;
-        let squares = pictures.iter().map(|p| (p[i] - mean).powi(2)).sum::<f64>();
-        (mean, squares / (count * (count - 1.0)))
-    };
-    (0..pictures[0].len()).map(of).collect()
 }
 
 /// Black boxes among white ones: who has no light to take must not take part.
@@ -78,16 +55,12 @@ fn is_right_in_the_mean(name: &str, buffers: &SceneBuffers, max_depth: Option<u3
                 (s.seed, s.reuse, s.max_depth) = (first + seed, Some(reuse), max_depth);
             });
             assert_eq!(result.counters.dropped.total(), 0);
-            blocks(&result)
+            blocks(&result.image.pixels, SIZE, BLOCK)
         };
         (0..SEEDS).map(one).collect()
     };
-    let (with, without) = (moments(&pictures(true, 0)), moments(&pictures(false, SEEDS)));
-    for (i, ((a, va), (b, vb))) in with.iter().zip(&without).enumerate() {
-        // Blocks that nothing reaches are equal without any noise.
-        let deviation = (a - b).abs() / (va + vb).sqrt().max(1e-6 * (a + b));
-        assert!(a == b || deviation < WIDEST, "{name}, value {i}: {a} and {b}, {deviation:.1} deviations");
-    }
+    let agreed = agree(&pictures(true, 0), &pictures(false, SEEDS), WIDEST);
+    agreed.unwrap_or_else(|why| panic!("{name}, {why}"));
 }
 
 #[test]

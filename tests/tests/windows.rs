@@ -9,6 +9,7 @@ use halflight_core::light::Environment;
 use halflight_core::scene::{Material, Scene, Texels, Texture, TextureId, Wrap};
 use halflight_core::{Level, Rgb};
 use halflight_tests::scenes::{SceneBuffers, constant_environment, everything};
+use halflight_tests::statistics::{agree, blocks};
 
 /// Pixels across and down: four tiles.
 const SIZE: u32 = 32;
@@ -79,29 +80,6 @@ fn render(scene: &Scene, spp: u32, change: impl FnOnce(&mut Settings)) -> Render
     drive::render(scene, &settings, &mut |_| (), &AtomicBool::new(false)).unwrap()
 }
 
-/// The means of blocks of 8 × 8 pixels, all channels.
-fn blocks(result: &RenderResult) -> Vec<f64> {
-    let mut sums = vec![0.0; (SIZE * SIZE / 64 * 3) as usize];
-    for (i, pixel) in result.image.pixels.iter().enumerate() {
-        let block = (i as u32 / SIZE / 8) * (SIZE / 8) + i as u32 % SIZE / 8;
-        for (channel, value) in pixel.iter().enumerate() {
-            sums[block as usize * 3 + channel] += f64::from(*value);
-        }
-    }
-    sums
-}
-
-/// Mean and variance of the mean of each value.
-fn moments(pictures: &[Vec<f64>]) -> Vec<(f64, f64)> {
-    let count = pictures.len() as f64;
-    let of = |i: usize| {
-        let mean = pictures.iter().map(|p| p[i]).sum::<f64>() / count;
-        let squares = pictures.iter().map(|p| (p[i] - mean).powi(2)).sum::<f64>();
-        (mean, squares / (count * (count - 1.0)))
-    };
-    (0..pictures[0].len()).map(of).collect()
-}
-
 fn is_right_in_the_mean(name: &str, scene: &Scene, max_depth: Option<u32>) {
     let pictures = |windows: bool, first: u32| -> Vec<Vec<f64>> {
         let one = |seed| {
@@ -110,16 +88,12 @@ fn is_right_in_the_mean(name: &str, scene: &Scene, max_depth: Option<u32>) {
             });
             assert_eq!(result.windows.used, windows);
             assert_eq!(result.counters.dropped.total(), 0);
-            blocks(&result)
+            blocks(&result.image.pixels, SIZE, 8)
         };
         (0..SEEDS).map(one).collect()
     };
-    let (with, without) = (moments(&pictures(true, 0)), moments(&pictures(false, SEEDS)));
-    for (i, ((a, va), (b, vb))) in with.iter().zip(&without).enumerate() {
-        // Blocks that nothing reaches are equal without any noise.
-        let deviation = (a - b).abs() / (va + vb).sqrt().max(1e-6 * (a + b));
-        assert!(a == b || deviation < WIDEST, "{name}, value {i}: {a} and {b}, {deviation:.1} deviations");
-    }
+    let agreed = agree(&pictures(true, 0), &pictures(false, SEEDS), WIDEST);
+    agreed.unwrap_or_else(|why| panic!("{name}, {why}"));
 }
 
 #[test]
