@@ -61,6 +61,9 @@ const TOLERANCE: f64 = 0.02;
 /// Attempts at that.
 const ATTEMPTS: usize = 9;
 
+/// The longest step of an attempt, as the logarithm of the error: to a hundred times as much.
+const FARTHEST: f64 = 4.605;
+
 /// Rays along a side of a gathering at a point of comparison, and gatherings there.
 const EXACT: usize = 64;
 const REPEATS: u32 = 4;
@@ -269,8 +272,9 @@ impl Search {
                 let share = ((many - wanted) / (many - few)).clamp(0.1, 0.9);
                 a + share * (b - a)
             }
-            // Areas of supports grow with the square of the radius, or with the root of the error.
-            _ => here[0] + 2.0 * (here[1] - wanted),
+            // Areas of supports grow with the square of the radius, or with the root of the error; far away that may
+            // not hold.
+            _ => here[0] + (2.0 * (here[1] - wanted)).clamp(-FARTHEST, FARTHEST),
         };
         self.error = next.exp() as f32;
         false
