@@ -145,13 +145,13 @@ pub struct Reach {
     /// more of them.
     pub overlap: f32,
     /// Second derivatives along the axes to extrapolate by, of the irradiance relative to itself, so that at (x, y)
-    /// along them it is (x² bend[0] + y² bend[1])/2 of it more. Zero where the rule extrapolates to first order.
+    /// along them it is (x² bend₀ + y² bend₁)/2 of it more. Zero where the rule extrapolates to first order.
     pub bend: [f32; 2],
     /// By what the gradients are to be multiplied, so that extrapolation within the reach takes the irradiance
     /// (luminance) neither below zero nor above its double. 1 where the metric's own radii hold.
     pub gradient_scale: f32,
     /// Curvatures along the axes that the radii were made for: at (x, y) along them the error of extrapolation is
-    /// expected to be (x² curvature[0] + y² curvature[1])/2 of the irradiance. Zero where the rule knows none.
+    /// expected to be (x² curvature₀ + y² curvature₁)/2 of the irradiance. Zero where the rule knows none.
     pub curvature: [f32; 2],
 }
 

@@ -1,7 +1,7 @@
 //! How irradiance changes when the receiver steps aside or turns: gradients and Hessian from one hemisphere.
 //!
-//! [`CellFlux`] is what to use. [`triangulated`], [`closed_mesh`], [`ward_heckbert`] and [`unoccluded`] are other
-//! answers to the same question, to be compared with; each names its paper.
+//! [`CellFlux`] is what to use. [`mod@triangulated`], [`mod@closed_mesh`], [`mod@ward_heckbert`] and
+//! [`mod@unoccluded`] are other answers to the same question, to be compared with; each names its paper.
 
 mod cell_flux;
 mod closed_mesh;
