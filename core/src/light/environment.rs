@@ -143,7 +143,8 @@ impl<'m> EnvironmentSampler<'m> {
         let block = block(texture);
         let weight = |x: usize, y: usize| {
             let texels = (0..block * block).map(|i| (block * x + i % block, block * y + i / block));
-            texels.map(|(x, y)| weight(x, y)).sum()
+            // A texel that is no number darkens its cell no more than itself.
+            texels.map(|(x, y)| weight(x, y)).filter(|weight| weight.is_finite()).sum()
         };
         let map = Distribution2d::build(width / block, height / block, weight, arena)?;
         let mean = (sum / sines) as f32;
