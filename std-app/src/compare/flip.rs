@@ -13,7 +13,6 @@
 //! is), so they run along rows and then along columns. Pictures continue with their outermost pixels.
 
 use super::Image;
-use crate::save::{from_srgb, to_srgb};
 use core::f64::consts::PI;
 use rayon::prelude::*;
 
@@ -21,24 +20,48 @@ type Colour = [f32; 3];
 
 /// The FLIP error of each pixel, in [0, 1]. The pictures are of one size. NaN is seen as black.
 pub fn flip(image: &Image, reference: &Image) -> Vec<f32> {
-    let degree = 0.7 * 3840.0 / 0.7 * PI / 180.0;
-    let eye = Eye::new(degree);
-    let seen = [reference, image].map(|picture| eye.look(picture));
-    let largest = hyab(hunt(to_lab([0.0, 1.0, 0.0])), hunt(to_lab([0.0, 0.0, 1.0]))).powf(QC);
-    let error = |index: usize| {
-        let [r, t] = [&seen[0], &seen[1]];
-        let colour = redistribute(hyab(r.lab[index], t.lab[index]).powf(QC), largest);
-        let edge = (r.edge[index] - t.edge[index]).abs();
-        let point = (r.point[index] - t.point[index]).abs();
-        let feature = (edge.max(point) * core::f32::consts::FRAC_1_SQRT_2).powf(QF);
-        colour.powf(1.0 - feature)
-    };
-    (0..image.pixels.len()).into_par_iter().map(error).collect()
+    Observer::of(reference).flip(image)
 }
 
-/// Exponent on the colour difference (section 4.1.3), and on the feature difference (section 4.2).
+/// An observer who has looked at the reference, and compares pictures of its size with it.
+pub struct Observer {
+    eye: Eye,
+    reference: Seen,
+}
+
+impl Observer {
+    /// Looks at `reference`.
+    pub fn of(reference: &Image) -> Self {
+        let degree = 0.7 * 3840.0 / 0.7 * PI / 180.0;
+        let eye = Eye::new(degree);
+        let reference = eye.look(reference);
+        Self { eye, reference }
+    }
+
+    /// The FLIP error of each pixel of `image`.
+    pub fn flip(&self, image: &Image) -> Vec<f32> {
+        let (r, t) = (&self.reference, self.eye.look(image));
+        let largest = hyab(hunt(to_lab([0.0, 1.0, 0.0])), hunt(to_lab([0.0, 0.0, 1.0]))).powf(QC);
+        let error = |index: usize| {
+            let colour = redistribute(hyab(r.lab[index], t.lab[index]).powf(QC), largest);
+            let edge = (r.edge[index] - t.edge[index]).abs();
+            let point = (r.point[index] - t.point[index]).abs();
+            // To the power of a half (section 4.2).
+            let feature = (edge.max(point) * core::f32::consts::FRAC_1_SQRT_2).sqrt();
+            colour.powf(1.0 - feature)
+        };
+        (0..image.pixels.len().min(r.lab.len())).into_par_iter().map(error).collect()
+    }
+
+    /// Their mean.
+    pub fn mean(&self, image: &Image) -> f64 {
+        let map = self.flip(image);
+        map.iter().map(|&error| f64::from(error)).sum::<f64>() / map.len().max(1) as f64
+    }
+}
+
+/// Exponent on the colour difference (section 4.1.3).
 const QC: f32 = 0.7;
-const QF: f32 = 0.5;
 
 /// Differences below `PC` of the largest take the range up to `PT`, the rest is for the extremes.
 const PC: f32 = 0.4;
@@ -108,11 +131,9 @@ impl Eye {
 
     fn look(&self, picture: &Image) -> Seen {
         let width = picture.width as usize;
-        let opponent: Vec<Colour> = picture
-            .pixels
-            .par_iter()
-            .map(|pixel| to_opponent(pixel.map(|c| from_srgb(to_srgb(c)))))
-            .collect();
+        // What a display can show; `clamp` keeps a NaN, `max` drops it.
+        let shown = |pixel: &Colour| to_opponent(pixel.map(|c| c.clamp(0.0, 1.0).max(0.0)));
+        let opponent: Vec<Colour> = picture.pixels.par_iter().map(shown).collect();
         let channel = |c: usize| opponent.iter().map(|colour| colour[c]).collect::<Vec<f32>>();
 
         let blurred: [Vec<f32>; 3] = core::array::from_fn(|c| {
@@ -147,28 +168,39 @@ fn balanced(weights: &[f64]) -> Vec<f32> {
     weights.iter().map(|&w| (w / if w > 0.0 { positive } else { negative.max(1e-30) }) as f32).collect()
 }
 
-/// `values` filtered by `across` along the rows and by `down` along the columns.
+/// `values` filtered by `across` along the rows and by `down` along the columns. All pixels of a row take one tap after
+/// the other, so that they fill registers.
 fn filter(values: &[f32], width: usize, across: &[f32], down: &[f32]) -> Vec<f32> {
     let height = values.len() / width;
-    // Tap `k` of a kernel looks at position `at + k - reach`, or at the border where that is outside.
-    let clamped = |at: usize, k: usize, kernel: &[f32], end: usize| {
-        (at + k).saturating_sub(kernel.len() / 2).min(end - 1)
-    };
     let mut rows = vec![0.0; values.len()];
-    rows.par_chunks_mut(width).zip(values.par_chunks(width)).for_each(|(to, from)| {
-        for (x, to) in to.iter_mut().enumerate() {
-            *to = across.iter().enumerate().map(|(k, w)| w * from[clamped(x, k, across, width)]).sum();
+    let filter_row = |wide: &mut Vec<f32>, (to, from): (&mut [f32], &[f32])| {
+        let (left, right) = (from[0], from[width - 1]);
+        let reach = across.len() / 2;
+        wide.clear();
+        wide.resize(reach, left);
+        wide.extend_from_slice(from);
+        wide.resize(width + 2 * reach, right);
+        for (k, w) in across.iter().enumerate() {
+            to.iter_mut().zip(&wide[k..]).for_each(|(to, from)| *to += w * from);
         }
-    });
+    };
+    rows.par_chunks_mut(width)
+        .with_min_len(ROWS)
+        .zip(values.par_chunks(width))
+        .for_each_init(Vec::new, filter_row);
     let mut columns = vec![0.0; values.len()];
-    columns.par_chunks_mut(width).enumerate().for_each(|(y, to)| {
+    columns.par_chunks_mut(width).with_min_len(ROWS).enumerate().for_each(|(y, to)| {
         for (k, w) in down.iter().enumerate() {
-            let from = &rows[clamped(y, k, down, height) * width..][..width];
-            to.iter_mut().zip(from).for_each(|(to, from)| *to += w * from);
+            // Rows outside are those of the border.
+            let row = (y + k).saturating_sub(down.len() / 2).min(height - 1);
+            to.iter_mut().zip(&rows[row * width..][..width]).for_each(|(to, from)| *to += w * from);
         }
     });
     columns
 }
+
+/// Rows that are worth a task.
+const ROWS: usize = 16;
 
 /// Linear sRGB to XYZ, and what it makes of white (D65).
 const TO_XYZ: [[f32; 3]; 3] = [
@@ -223,6 +255,7 @@ fn hyab(r: Colour, t: Colour) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::save::from_srgb;
 
     /// Our filters are computed in another order of f32 operations than those of the published program.
     const TOLERANCE: f64 = 1e-4;
@@ -266,6 +299,15 @@ mod tests {
             let ours = f64::from(map[20 * WIDTH as usize + 30]);
             assert!((ours - middle).abs() < TOLERANCE, "pair {number}, middle: {ours} and {middle}");
         }
+    }
+
+    #[test]
+    fn an_observer_remembers_the_reference() {
+        let observer = Observer::of(&picture(ramp));
+        let other = picture(noise);
+        let map = flip(&other, &picture(ramp));
+        assert_eq!(observer.flip(&other), map);
+        assert_eq!(observer.mean(&picture(ramp)), 0.0);
     }
 
     #[test]

@@ -5,7 +5,7 @@ mod flip;
 pub(crate) mod heat;
 mod picture;
 
-pub use flip::flip;
+pub use flip::{Observer, flip};
 pub use picture::{Shown, false_colours};
 
 use crate::save::Image;

@@ -2,7 +2,7 @@
 //! rendering, so the clock stands still meanwhile.
 
 use super::ErrorEstimate;
-use crate::compare::compare;
+use crate::compare::Observer;
 use crate::save::Image;
 use core::time::Duration;
 use halflight_core::estimate::Difference;
@@ -28,34 +28,25 @@ pub struct Round {
 pub struct Against {
     /// MSE and relMSE.
     pub linear: Difference,
-    /// Mean LDR-FLIP error; of every round whose time is a tenth longer than that of the last one with it.
-    pub flip: Option<f64>,
+    /// Mean LDR-FLIP error.
+    pub flip: f64,
 }
 
-/// FLIP is computed again when this many times as much time has passed: more would not be seen on
-/// logarithmic axes, and it takes as long as a short round.
-const FLIP_EVERY: f64 = 1.1;
-
-/// A reference, and when FLIP was last taken against it.
+/// A reference, and what the observer of FLIP has seen of it.
 pub(super) struct Reference<'a> {
     image: &'a Image,
-    flip_at: f64,
+    observer: Observer,
 }
 
 impl<'a> Reference<'a> {
     pub(super) fn new(image: &'a Image) -> Self {
-        Self { image, flip_at: 0.0 }
+        Self { image, observer: Observer::of(image) }
     }
 
-    /// The error of `image`, of the size of the reference, after `seconds`.
-    pub(super) fn compare(&mut self, image: &Image, seconds: f64) -> Against {
-        if seconds >= self.flip_at
-            && let Ok(comparison) = compare(image, self.image)
-        {
-            self.flip_at = seconds * FLIP_EVERY;
-            return Against { linear: comparison.linear, flip: Some(comparison.flip) };
-        }
-        Against { linear: Difference::between(image.colours(), self.image.colours()), flip: None }
+    /// The error of `image`, of the size of the reference.
+    pub(super) fn compare(&self, image: &Image) -> Against {
+        let linear = Difference::between(image.colours(), self.image.colours());
+        Against { linear, flip: self.observer.mean(image) }
     }
 }
 
@@ -97,14 +88,12 @@ mod tests {
     }
 
     #[test]
-    fn flip_is_taken_when_it_would_be_seen() {
+    fn a_picture_is_compared_in_linear_light_and_as_it_is_seen() {
         let white = Image { width: 4, height: 4, pixels: vec![[1.0; 3]; 16] };
-        let mut reference = Reference::new(&white);
-        let taken = [1.0, 1.05, 1.11, 1.2, 1.3].map(|seconds| {
-            let against = reference.compare(&Image::black(4, 4), seconds);
-            assert_eq!(against.linear.mse, 1.0);
-            against.flip.is_some()
-        });
-        assert_eq!(taken, [true, false, true, false, true]);
+        let reference = Reference::new(&white);
+        let black = reference.compare(&Image::black(4, 4));
+        assert_eq!(black.linear.mse, 1.0);
+        assert!(black.flip > 0.9, "{}", black.flip);
+        assert_eq!(reference.compare(&white).flip, 0.0);
     }
 }

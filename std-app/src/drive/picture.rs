@@ -56,7 +56,7 @@ impl Picture<'_> {
                 (rounds, header.history())
             }
         };
-        let mut reference = settings.reference.as_deref().map(Reference::new);
+        let reference = clock.pause(|| settings.reference.as_deref().map(Reference::new));
         let mut latest = history.iter().rev().find_map(|round: &Round| round.error);
         let mut estimating = 0.0;
         let mut saved = Instant::now();
@@ -102,8 +102,7 @@ impl Picture<'_> {
                 latest = error;
             }
             let seconds = clock.seconds();
-            let against =
-                reference.as_mut().map(|r| clock.pause(|| r.compare(&image(&canvas.film), seconds)));
+            let against = reference.as_ref().map(|r| clock.pause(|| r.compare(&image(&canvas.film))));
             let spp = rounds.spp();
             history.push(Round { seconds, spp, rays: rays(&canvas), error, reference: against });
             let known = Progress {

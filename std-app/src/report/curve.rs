@@ -22,7 +22,7 @@ pub(super) fn csv(histories: &[(Option<&str>, &[Round])]) -> String {
             for value in (0..3).map(|i| error.map(|error| error[i])).chain([
                 against.map(|(relmse, _, _)| relmse),
                 against.map(|(_, mse, _)| mse),
-                against.and_then(|(_, _, flip)| flip),
+                against.map(|(_, _, flip)| flip),
             ]) {
                 text.push(',');
                 let _ = value.map_or(Ok(()), |value| write!(text, "{value:e}"));

@@ -191,7 +191,7 @@ pub(super) fn rounds(run: &Run) -> String {
         if reference {
             let against = round.reference;
             cells.push(against.map_or_else(dash, |against| number(against.linear.relmse, 3)));
-            cells.push(against.and_then(|against| against.flip).map_or_else(dash, |flip| number(flip, 3)));
+            cells.push(against.map_or_else(dash, |against| number(against.flip, 3)));
         }
         let cells: String = cells.iter().map(|cell| format!("<td>{cell}</td>")).collect();
         format!("<tr>{cells}</tr>")
