@@ -64,11 +64,19 @@ impl<'m> Octree<'m> {
     pub(super) fn new(bounds: &Bounds, records: usize, arena: &mut Arena<'m>) -> Result<Self, OutOfMemory> {
         let nodes = arena.slice(nodes(records))?;
         let links = arena.slice(records.saturating_mul(CELLS))?;
-        if let Some(root) = nodes.first_mut() {
+        let size = bounds.extent().max_element();
+        let min = bounds.center() - 0.5 * size;
+        let mut tree = Self { min, size, nodes, used_nodes: 1, links, used_links: 0 };
+        tree.clear();
+        Ok(tree)
+    }
+
+    /// Forgets all records.
+    pub(super) fn clear(&mut self) {
+        if let Some(root) = self.nodes.first_mut() {
             *root = Node::default();
         }
-        let size = bounds.extent().max_element();
-        Ok(Self { min: bounds.center() - 0.5 * size, size, nodes, used_nodes: 1, links, used_links: 0 })
+        (self.used_nodes, self.used_links) = (1, 0);
     }
 
     /// The deepest cell of a point; of the nearest point of the root where that is outside.

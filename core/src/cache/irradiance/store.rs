@@ -127,6 +127,27 @@ impl<'m> IrradianceCache<'m> {
         true
     }
 
+    /// Links all records anew, by their supports as they are now: what was clamped is found less often. The order in
+    /// which a place finds its records, and so the last bit of what they say, then follows from the records alone.
+    pub fn settle(&mut self) {
+        let Self { records, used, tree, .. } = self;
+        tree.clear();
+        for (index, record) in (0..).zip(records.iter().take(*used)) {
+            tree.insert(index, Vec3::from(record.position), record.extent());
+        }
+    }
+
+    /// Takes over `records`, those of another cache of the same scene, as they are; what was here is gone. As many as
+    /// there is memory for; the others are refused.
+    pub fn restore(&mut self, records: &[Record]) {
+        self.used = records.len().min(self.records.len());
+        self.refused = (records.len() - self.used) as u64;
+        for (slot, record) in self.records.iter_mut().zip(records) {
+            *slot = *record;
+        }
+        self.settle();
+    }
+
     /// Neighbour clamping (Krivanek, Bouatouch, Pattanaik and Zara 2006, §4): what limits the radius of one record
     /// is by the distance farther from the other, so no radius is larger than that of a neighbour and the distance
     /// to it. Complete: all records that the new one could shrink it by, and all that it could shrink, are asked.
@@ -235,6 +256,33 @@ mod tests {
                 assert_eq!(cache.at(Vec3::new(x, y, 0.5), Vec3::NEG_Z), None);
                 assert_eq!(cache.at(Vec3::new(x, y, 0.9), Vec3::Z), None);
             }
+        });
+    }
+
+    #[test]
+    fn records_that_are_restored_say_the_same_to_the_bit() {
+        let random = Random::new(3, 3);
+        let point = |i: u32| Vec3::new(random.single(7_000 + 2 * i), random.single(7_001 + 2 * i), 0.5);
+        with_cache(300, |cache| {
+            for i in 0..300 {
+                let radius = 0.3 * libm::powf(random.single(3 * i), 4.0);
+                let bent = Record { bend: [radius; 2], ..record(random.single(3 * i + 1), 0.5, radius) };
+                cache.insert(Record { position: point(9_000 + i).to_array(), ..bent });
+            }
+            let covered = |cache: &IrradianceCache, i| cache.covers(point(i), Vec3::Z);
+            let before: vec::Vec<_> = (0..500).map(|i| covered(cache, i)).collect();
+            cache.settle();
+            assert!((0..500).all(|i| covered(cache, i) == before[i as usize]));
+            with_cache(300, |other| {
+                other.insert(record(0.5, 0.5, 0.5));
+                other.restore(cache.records());
+                assert_eq!((other.records(), other.refused()), (cache.records(), 0));
+                assert!((0..500).all(|i| other.at(point(i), Vec3::Z) == cache.at(point(i), Vec3::Z)));
+            });
+            with_cache(200, |other| {
+                other.restore(cache.records());
+                assert_eq!((other.records().len(), other.refused()), (200, 100));
+            });
         });
     }
 
