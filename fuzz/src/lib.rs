@@ -4,6 +4,8 @@
 
 pub mod bsdf;
 pub mod bvh;
+#[cfg(feature = "app")]
+pub mod cache_file;
 pub mod derivatives;
 #[cfg(feature = "app")]
 pub mod image_input;
@@ -31,6 +33,8 @@ pub struct Target {
 pub const TARGETS: &[Target] = &[
     Target { name: "bsdf", run: bsdf::run },
     Target { name: "bvh", run: bvh::run },
+    #[cfg(feature = "app")]
+    Target { name: "cache_file", run: cache_file::run },
     Target { name: "derivatives", run: derivatives::run },
     #[cfg(feature = "app")]
     Target { name: "image_input", run: image_input::run },

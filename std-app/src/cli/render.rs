@@ -66,6 +66,13 @@ pub(super) struct Render {
         conflicts_with_all = ["time", "error", "adaptive"], help_heading = "In parts")]
     shard: Option<Shard>,
 
+    /// Begin with the irradiance caches of a file: of the same scene and settings, of any view
+    #[arg(long, value_name = "FILE", help_heading = "Irradiance cache")]
+    load_cache: Option<PathBuf>,
+    /// Keep the irradiance caches in a file when they are filled, for --load-cache
+    #[arg(long, value_name = "FILE", help_heading = "Irradiance cache")]
+    save_cache: Option<PathBuf>,
+
     /// Write a report into this folder: index.html, which needs nothing else, curve.csv and run.json
     #[arg(long, value_name = "DIR", help_heading = "Results")]
     report: Option<PathBuf>,
@@ -90,7 +97,10 @@ impl Render {
             save::check_writable(output)?;
         }
         if let Some(film) = &self.checkpoint {
-            drive::check_film_writable(film)?;
+            drive::check_writable(film)?;
+        }
+        if let Some(cache) = &self.save_cache {
+            drive::check_writable(cache)?;
         }
         if let Some(folder) = &self.report {
             report::check_folder(folder)?;
@@ -112,6 +122,8 @@ impl Render {
             shard: self.shard.unwrap_or(Shard::WHOLE),
             checkpoint: self.checkpoint.clone().map(|path| Checkpoint { path, every }),
             resume: self.resume.clone(),
+            load_cache: self.load_cache.clone(),
+            save_cache: self.save_cache.clone(),
             ..settings
         };
         let views = loaded.views();

@@ -52,8 +52,12 @@ pub(super) fn text(run: &Run, report: Option<&Path>) -> String {
             0 => String::new(),
             refused => format!("; {refused} more had no memory"),
         };
+        let loaded = match cache.loaded {
+            0 => String::new(),
+            loaded => format!(", {loaded} of them loaded,"),
+        };
         lines.push(format!(
-            "cache  {} in {} by {}{lost}",
+            "cache  {}{loaded} in {} by {}{lost}",
             plural(cache.records, "record"),
             readable_seconds(cache.seconds),
             settings.cache.metric.name(),

@@ -22,8 +22,10 @@ pub enum RenderError {
     Threads(String),
     /// There are not as many tiles as shards, or no such shard; or sampling is adaptive, which needs all tiles.
     Shard,
-    /// A film file cannot be used.
-    Film(FilmError),
+    /// A cache is to be loaded or saved, and the method has none.
+    NoCache,
+    /// A file of a film or a cache cannot be used.
+    File(FileError),
 }
 
 impl core::fmt::Display for RenderError {
@@ -36,7 +38,8 @@ impl core::fmt::Display for RenderError {
             }
             Self::Threads(why) => write!(f, "the threads could not be started: {why}"),
             Self::Shard => write!(f, "the picture cannot be cut into such shards"),
-            Self::Film(error) => error.fmt(f),
+            Self::NoCache => write!(f, "only method irradiance-cache has a cache to load or save"),
+            Self::File(error) => error.fmt(f),
         }
     }
 }
@@ -49,20 +52,20 @@ impl From<OutOfMemory> for RenderError {
     }
 }
 
-impl From<FilmError> for RenderError {
-    fn from(error: FilmError) -> Self {
-        Self::Film(error)
+impl From<FileError> for RenderError {
+    fn from(error: FileError) -> Self {
+        Self::File(error)
     }
 }
 
-/// A film file that cannot be read, written, continued or merged, and why.
+/// A film or a cache that cannot be read, written, continued or merged, and why.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct FilmError {
+pub struct FileError {
     file: PathBuf,
     reason: String,
 }
 
-impl FilmError {
+impl FileError {
     pub(super) fn new(file: &Path, reason: impl Into<String>) -> Self {
         Self { file: file.to_owned(), reason: reason.into() }
     }
@@ -79,10 +82,10 @@ impl FilmError {
     }
 }
 
-impl core::fmt::Display for FilmError {
+impl core::fmt::Display for FileError {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         write!(f, "{}: {}", self.file.display(), self.reason)
     }
 }
 
-impl core::error::Error for FilmError {}
+impl core::error::Error for FileError {}

@@ -2,7 +2,7 @@
 
 use super::ErrorEstimate;
 use super::canvas::{Canvas, Shard};
-use super::error::{FilmError, RenderError};
+use super::error::{FileError, RenderError};
 use super::film_file::Reader;
 use super::ledger::{Place, empty_pixels};
 use super::method::Method;
@@ -47,7 +47,7 @@ pub fn merge(files: &[PathBuf]) -> Result<Merged, RenderError> {
         if found != 1 {
             let how = if found == 0 { "missing" } else { "there more than once" };
             let reason = format!("is one of {count} shards, of which shard {}/{count} is {how}", index + 1);
-            return Err(FilmError::new(name, reason).into());
+            return Err(FileError::new(name, reason).into());
         }
     }
 

@@ -6,10 +6,12 @@
 
 mod adapt;
 mod audit;
+mod cache_file;
 mod canvas;
 mod crew;
 mod error;
 mod film_file;
+mod fingerprint;
 mod history;
 mod ledger;
 mod memory;
@@ -19,15 +21,16 @@ mod picture;
 mod regions;
 mod rounds;
 mod run;
+mod sealed;
 mod study;
 mod turns;
 mod windows;
 mod workers;
 
 pub use audit::{Audited, Region};
+pub use cache_file::inspect as inspect_cache;
 pub use canvas::Shard;
-pub use error::{FilmError, RenderError};
-pub use film_file::check_writable as check_film_writable;
+pub use error::{FileError, RenderError};
 pub use halflight_core::estimate::{BiasEstimate, Deviation, ErrorEstimate};
 pub use history::{Against, Round};
 pub use ledger::Place;
@@ -46,7 +49,7 @@ use halflight_core::census::Census;
 use halflight_core::film::Tile;
 use halflight_core::scene::Scene;
 use halflight_core::transport::{Counters, Pilot};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// How to render.
@@ -91,6 +94,10 @@ pub struct Settings {
     pub checkpoint: Option<Checkpoint>,
     /// A film to go on with: a checkpoint of the same picture.
     pub resume: Option<PathBuf>,
+    /// A file of irradiance caches to begin with: of the same scene and settings, of any view.
+    pub load_cache: Option<PathBuf>,
+    /// Where to keep the irradiance caches when they are filled.
+    pub save_cache: Option<PathBuf>,
 }
 
 /// A film file that is written every so often, and at the end. The time that this takes does not count.
@@ -128,6 +135,8 @@ impl Default for Settings {
             shard: Shard::WHOLE,
             checkpoint: None,
             resume: None,
+            load_cache: None,
+            save_cache: None,
         }
     }
 }
@@ -224,6 +233,14 @@ pub struct RenderResult {
     pub ending: Ending,
 }
 
+/// Whether a film or a cache will find its way to `path`: the folder is there and takes files.
+///
+/// # Errors
+/// Names the file and why not.
+pub fn check_writable(path: &Path) -> Result<(), FileError> {
+    sealed::check_writable(path)
+}
+
 /// Pixels that a picture may have.
 const MOST_PIXELS: u64 = 1 << 28;
 
@@ -249,6 +266,10 @@ pub fn render(
         return Err(RenderError::Shard);
     }
     let plan = Census::of(scene).plan();
+    let keeps_cache = settings.load_cache.is_some() || settings.save_cache.is_some();
     let method = settings.method.or(Method::named(plan.method)).unwrap_or(Method::Path);
+    if keeps_cache && method != Method::IrradianceCache {
+        return Err(RenderError::NoCache);
+    }
     plan.features.dispatch(run::Render { scene, settings, method, progress, interrupt })
 }

@@ -8,7 +8,7 @@ use super::history::{Clock, Reference, Round};
 use super::ledger::empty_pixels;
 use super::method::{Method, Renderer, Stage};
 use super::rounds::{Plan, Rounds};
-use super::{Ending, FilmError, Progress, RenderError, RenderResult, Seconds, WindowUse, adapt, regions};
+use super::{Ending, FileError, Progress, RenderError, RenderResult, Seconds, WindowUse, adapt, regions};
 use crate::save::Image;
 use core::sync::atomic::{AtomicBool, Ordering};
 use core::time::Duration;
@@ -63,7 +63,7 @@ impl Picture<'_> {
         let mut is_lost = false;
         let save =
             |canvas: &Canvas, rounds: &Rounds, audit: Option<&Audit>, seconds: f64, history: &[Round]| {
-                let Some(checkpoint) = &settings.checkpoint else { return Ok::<(), FilmError>(()) };
+                let Some(checkpoint) = &settings.checkpoint else { return Ok::<(), FileError>(()) };
                 let header = Header::new(identity.clone(), canvas, rounds, audit, seconds, history);
                 film_file::write(&checkpoint.path, &header, canvas)
             };

@@ -7,7 +7,7 @@ use super::memory::Memory;
 use super::method::{Method, Stage};
 use super::picture::Picture;
 use super::workers::Workers;
-use super::{Progress, RenderError, RenderResult, Seconds, Settings, windows};
+use super::{Progress, RenderError, RenderResult, Seconds, Settings, cache_file, windows};
 use core::sync::atomic::AtomicBool;
 use halflight_core::bsdf::Features;
 use halflight_core::bvh::Bvh;
@@ -34,8 +34,9 @@ impl WithFeatures for Render<'_> {
     fn run<F: Features>(self) -> Self::Out {
         let Render { scene, settings, method, progress, interrupt } = self;
         let (width, height) = (settings.width, settings.height);
-        let identity = Identity::of(scene, method.name(), &path_settings(settings), settings);
-        // A film of something else should not cost the time of building.
+        // What is of something else should not cost the time of building.
+        let cache = cache_file::open(scene, settings)?.map(|file| file.header.fingerprint());
+        let identity = Identity::of(scene, method.name(), &path_settings(settings), settings, cache);
         let resumed = settings.resume.as_deref().map(Reader::open).transpose()?;
         if let Some(film) = &resumed {
             film.check(&identity, settings.shard)?;

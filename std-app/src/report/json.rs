@@ -58,6 +58,8 @@ pub(super) fn run(run: &Run) -> Value {
             "records": cache.records,
             "capacity": cache.capacity,
             "refused": cache.refused,
+            "loaded": cache.loaded,
+            "gathered": cache.gathered,
             "seconds": cache.seconds,
         })),
         "left_out": left_out,

@@ -1,9 +1,7 @@
 //! Which picture a film is of: films can be continued and merged only where all of this is the same.
 
-use super::hash::Hash;
-use crate::drive::{Method, Settings};
-use halflight_core::camera::Camera;
-use halflight_core::scene::{Scene, Texels};
+use crate::drive::{Method, Settings, fingerprint};
+use halflight_core::scene::Scene;
 use halflight_core::transport::PathSettings;
 use serde::{Deserialize, Serialize};
 
@@ -28,14 +26,19 @@ pub(in crate::drive) struct Identity {
 }
 
 impl Identity {
+    /// `loaded` tells of the cache that the render begins with.
     pub(in crate::drive) fn of(
         scene: &Scene,
         method: &str,
         paths: &PathSettings,
         settings: &Settings,
+        loaded: Option<String>,
     ) -> Self {
         let cached = method == Method::IrradianceCache.name();
-        let cache = if cached { format!(", {:?}", settings.cache) } else { String::new() };
+        let mut cache = if cached { format!(", {:?}", settings.cache) } else { String::new() };
+        if let Some(loaded) = loaded {
+            cache += &format!(", loaded {loaded}");
+        }
         Self {
             version: env!("CARGO_PKG_VERSION").into(),
             method: method.into(),
@@ -46,8 +49,8 @@ impl Identity {
             reuse: settings.reuse,
             windows: settings.windows,
             settings: format!("{paths:?}{cache}, adaptive: {}", settings.adaptive),
-            scene: format!("{:016x}", fingerprint(scene)),
-            camera: camera(&scene.camera),
+            scene: fingerprint::scene(scene),
+            camera: fingerprint::camera(&scene.camera),
         }
     }
 
@@ -74,39 +77,4 @@ impl Identity {
             .or((self.camera != other.camera).then(|| "seen by another camera".into()))
             .or(said("settings ", self.settings.clone(), other.settings.clone()))
     }
-}
-
-/// Debug formatting tells floats apart to the last bit.
-fn camera(camera: &Camera) -> String {
-    let mut hash = Hash::default();
-    hash.section(format!("{camera:?}").as_bytes());
-    format!("{:016x}", hash.value())
-}
-
-fn fingerprint(scene: &Scene) -> u64 {
-    let mut hash = Hash::default();
-    let mesh = &scene.mesh;
-    hash.section(bytemuck::cast_slice(mesh.positions));
-    hash.section(bytemuck::cast_slice(mesh.normals));
-    hash.section(bytemuck::cast_slice(mesh.texcoords));
-    hash.section(bytemuck::cast_slice(mesh.triangles));
-    for material in scene.materials {
-        hash.section(format!("{material:?}").as_bytes());
-    }
-    for texture in scene.textures {
-        hash.section(format!("{} {} {:?}", texture.width, texture.height, texture.wrap).as_bytes());
-        match texture.texels {
-            Texels::Srgb8(texels) => hash.section(bytemuck::cast_slice(texels)),
-            Texels::Linear8(texels) => {
-                hash.section(b"linear");
-                hash.section(bytemuck::cast_slice(texels));
-            }
-            Texels::Float(texels) => {
-                hash.section(b"float");
-                hash.section(bytemuck::cast_slice(texels));
-            }
-        }
-    }
-    hash.section(format!("{:?} {:?}", scene.lights, scene.environment).as_bytes());
-    hash.value()
 }

@@ -3,11 +3,13 @@
 //! that the halves of the film tell the errors of records too.
 //!
 //! The first round begins with the overture of both. Then caches are frozen; a point that no record reaches is path
-//! traced, as is every surface that is not diffuse.
+//! traced, as is every surface that is not diffuse. Caches can be kept in a file, and be the first records of another
+//! picture of the same scene.
 
 use super::overture::{Growing, Overture};
 use super::{Method, Renderer, Stage};
 use crate::drive::audit::Audit;
+use crate::drive::cache_file::{self, Half, Header, View};
 use crate::drive::crew::Crew;
 use crate::drive::memory::Memory;
 use crate::drive::run::path_settings;
@@ -17,6 +19,7 @@ use halflight_core::cache::irradiance::{CellFlux, IrradianceCache, Metric, metri
 use halflight_core::memory::{Arena, Line};
 use halflight_core::transport::gather::Gathering;
 use halflight_core::transport::{PathTracer, path::WAVE};
+use std::path::Path;
 use std::time::Instant;
 
 /// How an irradiance cache is filled.
@@ -28,6 +31,13 @@ pub struct CacheSettings {
     pub error: Option<f32>,
     /// Strata along a side of the hemisphere that is gathered: its square is the number of rays of a record.
     pub strata: u32,
+}
+
+impl CacheSettings {
+    /// The error allowed.
+    pub fn allowed(&self) -> f32 {
+        self.error.unwrap_or(metric::Settings::new(self.metric, 1.0).error)
+    }
 }
 
 impl Default for CacheSettings {
@@ -45,6 +55,10 @@ pub struct CacheUse {
     pub capacity: u64,
     /// Records that found no memory: their surroundings are path traced.
     pub refused: u64,
+    /// Records of both that a file had.
+    pub loaded: u64,
+    /// Places at which light was gathered: as many times the rays of a record.
+    pub gathered: u64,
     /// Seconds of the overture.
     pub seconds: f64,
 }
@@ -65,17 +79,20 @@ pub(super) fn with<F: Features, T>(
     then: impl FnOnce(&mut dyn Renderer, &mut Memory) -> Result<T, RenderError>,
 ) -> Result<T, RenderError> {
     let Stage { scene, bvh, lights, settings, workers } = *stage;
-    let CacheSettings { metric, error, strata } = settings.cache;
-    let strata = strata as usize;
+    let strata = settings.cache.strata as usize;
     let scratch = PathTracer::<F>::scratch(WAVE).or(PathTracer::<F>::gather_scratch(strata));
     let scratch = memory.take_each("paths", scratch, workers.count())?;
     let mut tables = memory.take("gathering", CellFlux::footprint(strata))?;
     let flux = CellFlux::build(strata, &mut Arena::new(bytemuck::cast_slice_mut(&mut tables)))?;
     let pixels = settings.width as usize * settings.height as usize;
-    let wanted = (pixels / PIXELS_PER_RECORD).max(FEWEST_RECORDS);
+    let file = cache_file::open(scene, settings)?;
+    let header = file.as_ref().map_or_else(|| Header::new(scene, settings), |file| file.header.clone());
+    let loaded = file.map(cache_file::Reader::records).transpose()?.unwrap_or_default();
+    let fewest = loaded.iter().map(Vec::len).max().unwrap_or(0);
+    let wanted = (pixels / PIXELS_PER_RECORD).max(FEWEST_RECORDS).saturating_add(fewest);
     let others = Audit::bytes::<F>(stage, Method::IrradianceCache.is_biased());
     let available = memory.available().saturating_sub(others);
-    let capacity = wanted.min(IrradianceCache::capacity_of(available / 2));
+    let capacity = wanted.min(IrradianceCache::capacity_of(available / 2)).max(fewest);
     let footprint = IrradianceCache::footprint(capacity);
     let mut lines = [memory.take("cache", footprint)?, memory.take("cache", footprint)?];
     let [even, odd] = &mut lines;
@@ -84,19 +101,29 @@ pub(super) fn with<F: Features, T>(
     };
     let (even, odd) = (cache(even)?, cache(odd)?);
 
-    let usual = metric::Settings::new(metric, 0.5 * bvh.bounds().diagonal());
-    let metric = metric::Settings { error: error.unwrap_or(usual.error), ..usual };
+    let usual = metric::Settings::new(settings.cache.metric, 0.5 * bvh.bounds().diagonal());
+    let metric = metric::Settings { error: settings.cache.allowed(), ..usual };
     let mut method = Cached {
         tracer: PathTracer::<F>::new(scene, bvh, lights, path_settings(settings), settings.level),
         gathering: Gathering { flux: &flux, metric, least_pixels: LEAST_PIXELS },
         size: [settings.width, settings.height],
         halves: [Growing::new(even, 0), Growing::new(odd, 1)],
         scratch,
+        view: View::of(scene, settings),
+        loaded: header.halves,
+        header,
+        save: settings.save_cache.as_deref(),
+        is_filled: false,
         seconds: 0.0,
     };
-    if !has_indirect_light(settings) {
-        method.halves.iter_mut().for_each(Growing::finish);
+    let is_served = !has_indirect_light(settings) || method.header.serves(&method.view);
+    for ((growing, records), half) in method.halves.iter_mut().zip(&loaded).zip(method.loaded) {
+        growing.restore(records, half.gathered);
+        if is_served {
+            growing.finish();
+        }
     }
+    drop(loaded);
     then(&mut method, memory)
 }
 
@@ -112,21 +139,55 @@ struct Cached<'a, F> {
     size: [u32; 2],
     halves: [Growing<'a>; 2],
     scratch: Vec<Vec<Line>>,
+    /// What a file of both halves says of them.
+    header: Header,
+    view: View,
+    /// What came from a file.
+    loaded: [Half; 2],
+    /// Where they are kept.
+    save: Option<&'a Path>,
+    is_filled: bool,
     seconds: f64,
+}
+
+impl<F: Features> Cached<'_, F> {
+    /// Fills both halves, or goes on with it, and keeps them; whether that is done: not where the round is over.
+    fn fill(&mut self, crew: &mut Crew) -> Result<bool, RenderError> {
+        let Self { tracer, gathering, size, halves, scratch, .. } = self;
+        let start = Instant::now();
+        let overture = Overture { tracer, gathering, size: *size };
+        let mut all = true;
+        for half in halves.iter_mut() {
+            all = all && overture.fill(half, crew, scratch)?;
+        }
+        if all {
+            halves.iter_mut().for_each(|half| half.cache.settle());
+            self.header.is_filled_for(self.view.clone());
+        }
+        self.save()?;
+        self.seconds += start.elapsed().as_secs_f64();
+        Ok(all)
+    }
+
+    fn save(&mut self) -> Result<(), RenderError> {
+        let Some(path) = self.save else { return Ok(()) };
+        for (half, growing) in self.header.halves.iter_mut().zip(&self.halves) {
+            *half = Half { records: growing.cache.records().len() as u32, gathered: growing.gathered() };
+        }
+        let [even, odd] = &self.halves;
+        Ok(cache_file::write(path, &self.header, [&even.cache, &odd.cache])?)
+    }
 }
 
 impl<F: Features> Renderer for Cached<'_, F> {
     fn round(&mut self, crew: &mut Crew) -> Result<(), RenderError> {
-        let Self { tracer, gathering, size, halves, scratch, seconds } = self;
-        let start = Instant::now();
-        let overture = Overture { tracer, gathering, size: *size };
-        for half in halves.iter_mut() {
-            if !overture.fill(half, crew, scratch)? {
-                return Ok(());
-            }
+        if !self.is_filled {
+            self.is_filled = self.fill(crew)?;
         }
-        *seconds += start.elapsed().as_secs_f64();
-        let [even, odd] = halves;
+        if !self.is_filled {
+            return Ok(());
+        }
+        let Self { tracer, halves: [even, odd], scratch, .. } = self;
         let tracer = tracer.with_caches([&even.cache, &odd.cache]);
         crew.tiles(u32::MAX, scratch, &|task, samples, arena, pixels| {
             tracer.run(task, samples, WAVE, arena, pixels)
@@ -136,10 +197,13 @@ impl<F: Features> Renderer for Cached<'_, F> {
 
     fn cache(&self) -> Option<CacheUse> {
         let sum = |of: fn(&IrradianceCache) -> u64| self.halves.iter().map(|half| of(&half.cache)).sum();
+        let gathered = |halves: [u32; 2]| halves.into_iter().map(u64::from).sum::<u64>();
         Some(CacheUse {
             records: sum(|cache| cache.records().len() as u64),
             capacity: sum(|cache| cache.capacity() as u64),
             refused: sum(|cache| cache.refused()),
+            loaded: gathered(self.loaded.map(|half| half.records)),
+            gathered: gathered([0, 1].map(|i| self.halves[i].gathered() - self.loaded[i].gathered)),
             seconds: self.seconds,
         })
     }

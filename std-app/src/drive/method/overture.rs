@@ -36,6 +36,17 @@ impl<'a> Growing<'a> {
         Self { cache, index, next: 0, gathered: 0 }
     }
 
+    /// Takes over the records of a file, which were gathered at so many places.
+    pub(in crate::drive) fn restore(&mut self, records: &[Record], gathered: u32) {
+        self.cache.restore(records);
+        self.gathered = gathered;
+    }
+
+    /// Places at which it has gathered.
+    pub(in crate::drive) fn gathered(&self) -> u32 {
+        self.gathered
+    }
+
     /// Leaves the cache as it is.
     pub(in crate::drive) fn finish(&mut self) {
         self.next = u64::MAX;

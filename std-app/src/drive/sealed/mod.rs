@@ -1,0 +1,195 @@
+//! Sealed files, which films and caches are kept in: a name and a version, a header in JSON, sections of bytes, and a
+//! checksum over all of it (docs/film-file.md).
+//!
+//! A file is written beside its place and renamed into it when all of it is on the disk: whenever the program is
+//! killed, the old file or the new one is there, whole.
+
+mod hash;
+
+pub(super) use hash::Hash;
+
+use super::error::FileError;
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+use std::fs::{self, File};
+use std::io::{self, BufReader, BufWriter, Read, Write};
+use std::path::{Path, PathBuf};
+
+/// What is in a file.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Kind {
+    /// The first bytes.
+    pub(super) magic: [u8; 6],
+    /// Of the format.
+    pub(super) version: u8,
+    /// In a word.
+    pub(super) name: &'static str,
+}
+
+impl Kind {
+    /// The first bytes, the version, and a word that tells the order of bytes.
+    fn opening(&self) -> [u8; 12] {
+        let mut opening = [0; 12];
+        opening[..6].copy_from_slice(&self.magic);
+        opening[7] = self.version;
+        opening[8..].copy_from_slice(&0x0102_0304u32.to_ne_bytes());
+        opening
+    }
+}
+
+/// A header is no longer than this, in bytes.
+const LONGEST_HEADER: u32 = 1 << 28;
+
+/// A file that is being written.
+pub(super) struct Writer {
+    file: BufWriter<File>,
+    hash: Hash,
+}
+
+impl Writer {
+    /// A section.
+    pub(super) fn put(&mut self, bytes: &[u8]) -> io::Result<()> {
+        self.hash.section(bytes);
+        self.file.write_all(bytes)
+    }
+}
+
+/// Writes a file of `kind` to `path`, whole or not at all: `header`, and what `sections` puts after it.
+pub(super) fn write(
+    path: &Path,
+    kind: &Kind,
+    header: &impl Serialize,
+    sections: impl FnOnce(&mut Writer) -> io::Result<()>,
+) -> Result<(), FileError> {
+    let part = part(path);
+    let written = write_part(&part, kind, header, sections).and_then(|()| fs::rename(&part, path));
+    // The new name is on the disk when the folder is. Where folders cannot be opened there is nothing to do.
+    if let (Ok(()), Ok(folder)) = (&written, File::open(folder(path))) {
+        let _ = folder.sync_all();
+    }
+    written.map_err(|error| {
+        let _ = fs::remove_file(&part);
+        FileError::new(path, format!("cannot be written: {error}"))
+    })
+}
+
+fn write_part(
+    part: &Path,
+    kind: &Kind,
+    header: &impl Serialize,
+    sections: impl FnOnce(&mut Writer) -> io::Result<()>,
+) -> io::Result<()> {
+    let file = BufWriter::with_capacity(1 << 20, File::create(part)?);
+    let mut writer = Writer { file, hash: Hash::default() };
+    writer.put(&kind.opening())?;
+    let header = serde_json::to_vec(header)?;
+    writer.put(&(header.len() as u32).to_le_bytes())?;
+    writer.put(&header)?;
+    sections(&mut writer)?;
+    let Writer { mut file, hash } = writer;
+    file.write_all(&hash.value().to_le_bytes())?;
+    file.into_inner().map_err(io::IntoInnerError::into_error)?.sync_all()
+}
+
+/// Whether a file will find its way to `path`: the folder is there and takes files.
+pub(super) fn check_writable(path: &Path) -> Result<(), FileError> {
+    if path.is_dir() {
+        return Err(FileError::new(path, "cannot be written: it is a folder"));
+    }
+    let part = part(path);
+    let created = File::create(&part).map(|_| ());
+    let _ = fs::remove_file(&part);
+    created.map_err(|error| FileError::new(path, format!("cannot be written: {error}")))
+}
+
+/// A file whose header has been read, and whose sections are to be.
+pub(super) struct Reader<'r> {
+    path: PathBuf,
+    file: Box<dyn Read + 'r>,
+    hash: Hash,
+}
+
+impl<'r> Reader<'r> {
+    /// Opens the file of `kind` at `path` and reads its header.
+    pub(super) fn open<H: DeserializeOwned>(path: &Path, kind: &Kind) -> Result<(Self, H), FileError> {
+        let file = File::open(path).map_err(|error| FileError::io(path, &error))?;
+        Self::read(path, kind, Box::new(BufReader::with_capacity(1 << 20, file)))
+    }
+
+    /// The same of bytes from anywhere; `path` is what errors name.
+    pub(super) fn read<H: DeserializeOwned>(
+        path: &Path,
+        kind: &Kind,
+        file: Box<dyn Read + 'r>,
+    ) -> Result<(Self, H), FileError> {
+        let mut reader = Self { path: path.to_owned(), file, hash: Hash::default() };
+        let mut opening = [0; 12];
+        reader.get(&mut opening)?;
+        if opening[..6] != kind.magic {
+            return Err(reader.refusal(format!("is no {} file", kind.name)));
+        }
+        if opening != kind.opening() {
+            let what = format!("is a {} of another format: of another version or machine", kind.name);
+            return Err(reader.refusal(what));
+        }
+        let mut length = [0; 4];
+        reader.get(&mut length)?;
+        let length = u32::from_le_bytes(length);
+        if length > LONGEST_HEADER {
+            return Err(reader.damage("its header has no sensible length"));
+        }
+        let mut text = Vec::new();
+        let limited = reader.file.by_ref().take(u64::from(length)).read_to_end(&mut text);
+        limited.map_err(|error| FileError::io(path, &error))?;
+        if text.len() != length as usize {
+            return Err(reader.damage("it is too short"));
+        }
+        reader.hash.section(&text);
+        let header = serde_json::from_slice(&text);
+        let header = header.map_err(|error| reader.damage(format!("its header: {error}")))?;
+        Ok((reader, header))
+    }
+
+    /// The next section, of as many bytes.
+    pub(super) fn get(&mut self, bytes: &mut [u8]) -> Result<(), FileError> {
+        self.file.read_exact(bytes).map_err(|error| FileError::io(&self.path, &error))?;
+        self.hash.section(bytes);
+        Ok(())
+    }
+
+    /// The end: the checksum, and nothing after it.
+    pub(super) fn finish(mut self) -> Result<(), FileError> {
+        let mut sum = [0; 8];
+        self.file.read_exact(&mut sum).map_err(|error| FileError::io(&self.path, &error))?;
+        let more = self.file.read(&mut [0]).map_err(|error| FileError::io(&self.path, &error))?;
+        if u64::from_le_bytes(sum) != self.hash.value() || more > 0 {
+            return Err(self.damage("its checksum is wrong"));
+        }
+        Ok(())
+    }
+
+    /// Where the file is.
+    pub(super) fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Why the file is not used.
+    pub(super) fn refusal(&self, reason: impl Into<String>) -> FileError {
+        FileError::new(&self.path, reason)
+    }
+
+    /// The same of a file that is not as it was written.
+    pub(super) fn damage(&self, what: impl core::fmt::Display) -> FileError {
+        self.refusal(format!("is damaged: {what}"))
+    }
+}
+
+fn folder(path: &Path) -> &Path {
+    path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
+}
+
+/// Where a file is while it is written: always the same, so that what a killed program leaves is used again.
+fn part(path: &Path) -> PathBuf {
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    folder(path).join(format!(".{name}.part"))
+}
