@@ -13,6 +13,7 @@ extern crate std;
 mod baseline;
 mod lanes;
 mod level;
+mod prefetch;
 mod stack;
 #[cfg(target_arch = "x86_64")]
 mod x86;
@@ -22,4 +23,5 @@ pub mod kernels;
 pub use baseline::{Baseline, F8, M8, Pair};
 pub use lanes::{Lanes, Mask, Simd};
 pub use level::{Kernel, Level, Tier};
+pub use prefetch::prefetch;
 pub use stack::{STACK, Stack, StackMemory};

@@ -198,6 +198,15 @@ impl<'m> Lights<'m> {
         self.windows.as_ref()?.at(position, normal)
     }
 
+    /// Asks for what [`Lights::draw`] is about to read: called twice for each of several points, the second time with
+    /// what `u[1]` will be.
+    #[inline]
+    pub(crate) fn prefetch(&self, position: Vec3, normal: Vec3, v: Option<f32>) {
+        if let Some(windows) = &self.windows {
+            windows.prefetch(position, normal, v);
+        }
+    }
+
     /// Whether there is nothing that shines.
     pub fn is_empty(&self) -> bool {
         self.in_tree() == 0 && self.environment.is_none() && self.distant.is_empty()

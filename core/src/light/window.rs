@@ -10,6 +10,7 @@ use crate::geometry::Bounds;
 use crate::memory::{Arena, Footprint, OutOfMemory};
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
+use halflight_simd::prefetch;
 
 /// Bins across: most of the light of a sky comes from a few rows, and windows are upright.
 const COLUMNS: usize = 64;
@@ -64,6 +65,15 @@ impl Window {
         let (x, u, cell) = pick(self.cells.get(y).unwrap_or(&self.cells[0]), u);
         let warped = [(x as f32 + u) / COLUMNS as f32, (y as f32 + v) / ROWS as f32];
         (warped.map(|u| u.min(crate::sampling::ONE_MINUS_EPSILON)), row * cell * (COLUMNS * ROWS) as f32)
+    }
+
+    /// Asks for what [`Window::warp`] reads at `v`, once its rows have arrived.
+    #[inline]
+    fn prefetch_row(&self, v: f32) {
+        let (y, ..) = pick(&self.rows, v);
+        // Two cache lines.
+        prefetch(self.cells.as_flattened(), y * COLUMNS);
+        prefetch(self.cells.as_flattened(), y * COLUMNS + COLUMNS / 2);
     }
 
     /// How much denser samples are at a point of the environment's square than without the window.
@@ -220,6 +230,17 @@ impl<'m> Windows<'m> {
     /// Of what [`Windows::memory`] gave.
     pub fn new(grid: Grid, slots: &'m [u16], windows: &'m [Window]) -> Self {
         Self { grid, slots, windows }
+    }
+
+    /// Asks for the window of a surface that is about to be lit: first for its rows, then, at a known `v`, for the row
+    /// that [`Window::warp`] reads there.
+    #[inline]
+    pub fn prefetch(&self, position: Vec3, normal: Vec3, v: Option<f32>) {
+        match (self.at(position, normal), v) {
+            (Some(window), None) => prefetch(&window.rows, 0),
+            (Some(window), Some(v)) => window.prefetch_row(v),
+            _ => (),
+        }
     }
 
     /// The window of a surface with unit `normal`; `None` where nothing is known.

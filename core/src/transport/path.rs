@@ -27,7 +27,7 @@ use super::wave::{Path, Share, Wave};
 use crate::bsdf::{Bsdf, Features};
 use crate::bvh::{Bvh, Coherence};
 use crate::cache::irradiance::IrradianceCache;
-use crate::film::{Pixel, Tile};
+use crate::film::{PIXELS_PER_TILE, Pixel, Tile};
 use crate::geometry::{Hit, Ray};
 use crate::light::{Lights, emitted};
 use crate::memory::{Arena, Footprint, OutOfMemory};
@@ -37,11 +37,14 @@ use crate::{Level, Rgb};
 use core::f32::consts::FRAC_1_PI;
 use core::marker::PhantomData;
 use core::ops::Range;
-use glam::Vec3;
+use glam::{Vec2, Vec3};
 
 /// Paths that advance together where memory allows: enough to fill the tracer's batches, few enough to
 /// stay in the second cache.
 pub const WAVE: usize = 2048;
+
+/// Vertices that are looked at together before they are shaded.
+const BLOCK: usize = 16;
 
 /// Lights that fill a smaller share of a hemisphere, weighted by cosines, are found by shadow rays alone as well as with
 /// the help of rays that find them by chance.
@@ -142,7 +145,9 @@ impl<'a, F: Features> PathTracer<'a, F> {
         out: &mut [Pixel],
     ) -> Result<Counters, OutOfMemory> {
         let mut arena = scratch.scratch();
-        let mut wave = Wave::new(wave, &mut arena)?;
+        // No larger than there are paths: the memory of a wave is cleared.
+        let paths = samples.len().saturating_mul(PIXELS_PER_TILE);
+        let mut wave = Wave::new(wave.min(paths), &mut arena)?;
         let tile = Tile::new(self.settings.width, self.settings.height, task);
         let mut counters = Counters::default();
         let mut places = Places::new(tile, samples);
@@ -231,11 +236,15 @@ impl<'a, F: Features> PathTracer<'a, F> {
     /// Shades what they met; returns how many rays there are now.
     pub(super) fn go_on(&self, wave: &mut Wave, active: usize, counters: &mut Counters) -> usize {
         let (mut going_on, mut shadows) = (0, 0);
+        let mut block = [None; BLOCK];
         for i in 0..active {
+            if i % BLOCK == 0 {
+                self.look_at(wave, i..active.min(i + BLOCK), &mut block);
+            }
             let (ray, hit) = (wave.rays[i], wave.hits[i]);
             let Some(path) = wave.paths.get_mut(ray.tag as usize) else { continue };
             let Some(exchange) = wave.exchanges.get_mut(ray.tag as usize) else { continue };
-            let step = self.shade(path, exchange, &ray, &hit, counters);
+            let step = self.shade(path, exchange, &ray, &hit, block[i % BLOCK], counters);
             if let Some((mut shadow, light)) = step.light {
                 shadow.tag |= ray.tag;
                 wave.shadow_rays[shadows] = shadow;
@@ -257,35 +266,52 @@ impl<'a, F: Features> PathTracer<'a, F> {
         going_on
     }
 
+    /// What the rays of `range` have met. All that is read next, of these and of those after them, is asked for first:
+    /// the memory that vertices need is scattered over the scene, and waiting for it would be half of the time.
+    #[inline]
+    fn look_at(&self, wave: &Wave, range: Range<usize>, block: &mut [Option<Met<'a>>; BLOCK]) {
+        let mesh = &self.scene.mesh;
+        for hit in wave.hits.iter().skip(range.end + BLOCK).take(BLOCK) {
+            mesh.prefetch_triangle(hit.triangle);
+        }
+        for hit in wave.hits.iter().skip(range.end).take(BLOCK) {
+            mesh.prefetch_corners(hit.triangle);
+        }
+        let met = wave.rays[range.clone()].iter().zip(&wave.hits[range]);
+        for ((ray, hit), met) in met.zip(block.iter_mut()) {
+            let point = SurfacePoint::at::<F>(self.scene, ray, hit);
+            *met = point.zip(wave.paths.get(ray.tag as usize)).map(|(point, path)| {
+                if F::TEXTURES {
+                    point.material.prefetch(self.scene, point.uv);
+                }
+                self.lights.prefetch(point.position, point.frame.normal, None);
+                let sampler = Sampler::new(self.settings.seed, path.pixel, path.sample);
+                Met { point, light: sampler.pair(dimension::vertex(path.segments.into()) + dimension::LIGHT) }
+            });
+        }
+        for met in block.iter().flatten() {
+            self.lights.prefetch(met.point.position, met.point.frame.normal, Some(met.light[1]));
+        }
+    }
+
     /// Adds the light at the end of the first `shadows` shadow rays to the paths of those that arrive.
     fn connect(&self, wave: &mut Wave, shadows: usize) {
         let rays = &wave.shadow_rays[..shadows];
         let hidden = &mut wave.hidden[..shadows];
         self.bvh.occluded_batch(self.level, rays, hidden);
+        let mut arrivals = Arrivals::default();
         for ((ray, light), hidden) in rays.iter().zip(&*wave.shadow_light).zip(&*hidden) {
             if *hidden == 0 {
-                self.receive(wave.paths, ray, Rgb::from(*light));
+                arrivals.push(self.scene, wave.paths, ray, Rgb::from(*light));
             }
         }
-    }
-
-    /// Adds `light`, which has arrived along `ray`, to its path.
-    #[inline]
-    fn receive(&self, paths: &mut [Path], ray: &Ray, light: Rgb) {
-        let light = match &self.scene.environment {
-            Some(environment) if ray.tag & TO_ENVIRONMENT != 0 => {
-                light * environment.radiance(self.scene, ray.direction.into())
-            }
-            _ => light,
-        };
-        if let Some(path) = paths.get_mut((ray.tag & !TO_ENVIRONMENT) as usize) {
-            path.add(light);
-        }
+        arrivals.receive(self.scene, wave.paths);
     }
 
     /// The same where some surfaces let a part of the light through: round after round, each ray to
     /// its next surface.
     fn connect_through_cutouts(&self, wave: &mut Wave, mut shadows: usize, counters: &mut Counters) {
+        let mut arrivals = Arrivals::default();
         for _ in 0..=MAX_CROSSINGS {
             if shadows <= FEW {
                 break;
@@ -299,7 +325,7 @@ impl<'a, F: Features> PathTracer<'a, F> {
                 let (ray, light) = (wave.shadow_rays[i], Rgb::from(wave.shadow_light[i]));
                 let hit = wave.hits[i];
                 if !hit.is_some() {
-                    self.receive(wave.paths, &ray, light);
+                    arrivals.push(self.scene, wave.paths, &ray, light);
                 } else if let Some((through, transmittance)) = pass_cutout::<F>(self.scene, &ray, &hit) {
                     wave.shadow_rays[left] = through;
                     wave.shadow_light[left] = (light * transmittance).to_array();
@@ -313,9 +339,10 @@ impl<'a, F: Features> PathTracer<'a, F> {
             let light = passing::<F>(self.scene, self.bvh, self.level, *ray, Rgb::from(*light), rays);
             counters.dropped.unfinished += u64::from(light.is_none());
             if let Some(light) = light.filter(|light| *light != Rgb::ZERO) {
-                self.receive(wave.paths, ray, light);
+                arrivals.push(self.scene, wave.paths, ray, light);
             }
         }
+        arrivals.receive(self.scene, wave.paths);
     }
 
     /// One vertex: what the ray of `path` met.
@@ -326,6 +353,7 @@ impl<'a, F: Features> PathTracer<'a, F> {
         exchange: &mut Exchange,
         ray: &Ray,
         hit: &Hit,
+        met: Option<Met<'a>>,
         counters: &mut Counters,
     ) -> Step {
         let scene = self.scene;
@@ -349,7 +377,7 @@ impl<'a, F: Features> PathTracer<'a, F> {
             }
             return Step::END;
         }
-        let Some(point) = SurfacePoint::at::<F>(scene, ray, hit) else { return Step::END };
+        let Some(Met { point, light: [u, v] }) = met else { return Step::END };
 
         // A ray cannot meet the plane that it started on: rounding on a needle. Nor does a camera on a surface see its back.
         if hit.triangle == path.triangle || (segments == 1 && point.is_left_by(ray)) {
@@ -407,7 +435,6 @@ impl<'a, F: Features> PathTracer<'a, F> {
 
         let mut light = None;
         if !self.lights.is_empty() && !bsdf.is_delta() {
-            let [u, v] = sampler.pair(first + dimension::LIGHT);
             let choice =
                 if self.lights.have_choice() { sampler.single(first + dimension::LIGHT_CHOICE) } else { 0.0 };
             let drawn = self.lights.draw(scene, point.position, normal, [u, v, choice]);
@@ -479,6 +506,49 @@ impl<'a, F: Features> PathTracer<'a, F> {
         path.triangle = hit.triangle;
         Step { light, next: Some(point.spawn(direction)) }
     }
+}
+
+/// Light that has arrived and is about to be added to its paths. What comes from a map is looked up for several at
+/// once, after all of it has been asked for.
+#[derive(Default)]
+struct Arrivals {
+    count: usize,
+    /// Path, place on the map where light comes from there, what it is multiplied with.
+    light: [(u32, Vec2, Rgb); BLOCK],
+}
+
+impl Arrivals {
+    #[inline]
+    fn push(&mut self, scene: &Scene, paths: &mut [Path], ray: &Ray, light: Rgb) {
+        let environment = scene.environment.as_ref().filter(|_| ray.tag & TO_ENVIRONMENT != 0);
+        let place = environment.map_or(Vec2::ZERO, |e| e.place(scene, ray.direction.into()));
+        if let Some(slot) = self.light.get_mut(self.count) {
+            *slot = (ray.tag, place, light);
+            self.count += 1;
+        }
+        if self.count == BLOCK {
+            self.receive(scene, paths);
+        }
+    }
+
+    fn receive(&mut self, scene: &Scene, paths: &mut [Path]) {
+        for (tag, place, light) in self.light.into_iter().take(self.count) {
+            let environment = scene.environment.as_ref().filter(|_| tag & TO_ENVIRONMENT != 0);
+            let radiance = environment.map_or(Rgb::ONE, |e| e.radiance_at(scene, place));
+            if let Some(path) = paths.get_mut((tag & !TO_ENVIRONMENT) as usize) {
+                path.add(light * radiance);
+            }
+        }
+        self.count = 0;
+    }
+}
+
+/// A vertex that is about to be shaded.
+#[derive(Clone, Copy)]
+struct Met<'a> {
+    point: SurfacePoint<'a>,
+    /// Where light is looked for.
+    light: [f32; 2],
 }
 
 /// What follows from a vertex.

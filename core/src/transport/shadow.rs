@@ -52,17 +52,22 @@ pub(super) fn passing<F: Features>(
 /// Behind the surface that a shadow ray met: the rest of the ray, and the factor on its light. `None` where
 /// nothing passes.
 pub(super) fn pass_cutout<F: Features>(scene: &Scene, ray: &Ray, hit: &Hit) -> Option<(Ray, f32)> {
+    // Most are opaque, which is known before anything is computed.
+    let triangle = scene.mesh.triangles.get(hit.triangle as usize)?;
+    if !scene.materials.get(triangle.material as usize)?.has_cutout() {
+        return None;
+    }
     let point = SurfacePoint::at::<F>(scene, ray, hit)?;
     let opacity = point.material.opacity.at::<F>(scene, point.uv);
     let transmittance = 1.0 - opacity.clamp(0.0, 1.0);
-    if !(point.material.has_cutout() && transmittance > 0.0) {
-        return None;
-    }
-    let direction = Vec3::from(ray.direction);
-    let rest = if ray.t_max == f32::INFINITY {
-        point.spawn(direction)
-    } else {
-        point.spawn_to(Vec3::from(ray.origin) + direction)
-    };
-    Some((Ray { tag: ray.tag, ..rest }, transmittance))
+    // What is no number lets nothing pass.
+    (transmittance > 0.0).then(|| {
+        let direction = Vec3::from(ray.direction);
+        let rest = if ray.t_max == f32::INFINITY {
+            point.spawn(direction)
+        } else {
+            point.spawn_to(Vec3::from(ray.origin) + direction)
+        };
+        (Ray { tag: ray.tag, ..rest }, transmittance)
+    })
 }
