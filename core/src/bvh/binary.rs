@@ -8,6 +8,7 @@ use super::join::Join;
 use super::layout::DEPTH_MAX;
 use super::references::Reference;
 use super::split::{Box4, Extent, divide, halve};
+use crate::Level;
 use bytemuck::{Pod, Zeroable};
 use glam::Vec4;
 
@@ -63,34 +64,36 @@ const PARALLEL_MIN: usize = 4096;
 const HALVE_FROM: usize = DEPTH_MAX - 32;
 
 /// Sorts `references` and fills `nodes`, which holds [`nodes_of`] them.
-pub(super) fn build<J: Join>(references: &mut [Reference], nodes: &mut [BinaryNode], join: &J) {
+pub(super) fn build<J: Join>(level: Level, references: &mut [Reference], nodes: &mut [BinaryNode], join: &J) {
     let extent = Extent::of(references);
-    subtree(references, nodes, &extent, 0, join);
+    Division { level, join }.subtree(references, nodes, &extent, 0);
 }
 
-fn subtree<J: Join>(
-    references: &mut [Reference],
-    nodes: &mut [BinaryNode],
-    extent: &Extent,
-    depth: usize,
-    join: &J,
-) {
-    let n = references.len();
-    let Some((node, below)) = nodes.split_first_mut() else { return };
-    *node = BinaryNode::new(&extent.boxes, n);
-    if n < 2 {
-        return;
-    }
-    let (mid, left, right) = if depth < HALVE_FROM { divide(references, extent) } else { halve(references) };
-    let (left_references, right_references) = references.split_at_mut(mid);
-    let (left_nodes, right_nodes) = below.split_at_mut(nodes_of(mid).min(below.len()));
-    if n < PARALLEL_MIN {
-        subtree(left_references, left_nodes, &left, depth + 1, join);
-        subtree(right_references, right_nodes, &right, depth + 1, join);
-    } else {
-        join.join(
-            || subtree(left_references, left_nodes, &left, depth + 1, join),
-            || subtree(right_references, right_nodes, &right, depth + 1, join),
-        );
+/// How ranges are divided.
+struct Division<'j, J> {
+    level: Level,
+    join: &'j J,
+}
+
+impl<J: Join> Division<'_, J> {
+    fn subtree(&self, references: &mut [Reference], nodes: &mut [BinaryNode], extent: &Extent, depth: usize) {
+        let n = references.len();
+        let Some((node, below)) = nodes.split_first_mut() else { return };
+        *node = BinaryNode::new(&extent.boxes, n);
+        if n < 2 {
+            return;
+        }
+        let (mid, left, right) =
+            if depth < HALVE_FROM { divide(self.level, references, extent) } else { halve(references) };
+        let (left_references, right_references) = references.split_at_mut(mid);
+        let (left_nodes, right_nodes) = below.split_at_mut(nodes_of(mid).min(below.len()));
+        let mut on_the_left = || self.subtree(left_references, left_nodes, &left, depth + 1);
+        let mut on_the_right = || self.subtree(right_references, right_nodes, &right, depth + 1);
+        if n < PARALLEL_MIN {
+            on_the_left();
+            on_the_right();
+        } else {
+            self.join.join(on_the_left, on_the_right);
+        }
     }
 }

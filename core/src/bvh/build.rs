@@ -6,6 +6,7 @@ use super::collapse::{Costs, Emitter, Output, evaluate};
 use super::join::Join;
 use super::layout::{LEAF_MAX, Node};
 use super::references::{self, Reference, capacity};
+use crate::Level;
 use crate::geometry::Bounds;
 use crate::memory::{Arena, Footprint, OutOfMemory};
 use crate::scene::Mesh;
@@ -36,6 +37,7 @@ pub(super) fn working_footprint(triangles: usize) -> Footprint {
 pub(super) fn build<'m, J: Join>(
     mesh: &Mesh,
     arena: &mut Arena<'m>,
+    level: Level,
     join: &J,
 ) -> Result<Bvh<'m>, OutOfMemory> {
     let r = capacity(mesh.triangles.len());
@@ -53,7 +55,7 @@ pub(super) fn build<'m, J: Join>(
         return Ok(Bvh { nodes: &[], coordinates: &[], triangles: &[], bounds: Bounds::EMPTY, slack: 0.0 });
     }
 
-    binary::build(references, binary, join);
+    binary::build(level, references, binary, join);
     evaluate(binary, costs);
     let bounds = Bounds { min: binary[0].lo.xyz(), max: binary[0].hi.xyz() };
     let mut out = Output { nodes, coordinates, triangles, used: (0, 0) };

@@ -60,20 +60,25 @@ impl<'m> Bvh<'m> {
         build::kept_footprint(triangles)
     }
 
-    /// Builds over `mesh`, on one core.
+    /// Builds over `mesh`, on one core with the instructions that every processor has.
     ///
     /// # Errors
     /// [`OutOfMemory`] when the arena is smaller than [`Bvh::footprint`].
     pub fn build(mesh: &Mesh, arena: &mut Arena<'m>) -> Result<Self, OutOfMemory> {
-        build::build(mesh, arena, &Serial)
+        build::build(mesh, arena, Level::BASELINE, &Serial)
     }
 
-    /// Builds over `mesh` on the cores that `join` brings. The same tree, to the bit.
+    /// Builds over `mesh` with the instructions of `level` on the cores that `join` brings. The same tree, to the bit.
     ///
     /// # Errors
     /// [`OutOfMemory`] when the arena is smaller than [`Bvh::footprint`].
-    pub fn build_with<J: Join>(mesh: &Mesh, arena: &mut Arena<'m>, join: &J) -> Result<Self, OutOfMemory> {
-        build::build(mesh, arena, join)
+    pub fn build_with<J: Join>(
+        mesh: &Mesh,
+        arena: &mut Arena<'m>,
+        level: Level,
+        join: &J,
+    ) -> Result<Self, OutOfMemory> {
+        build::build(mesh, arena, level, join)
     }
 
     /// Bytes that the hierarchy really uses, its copy of the triangles included: what

@@ -3,6 +3,7 @@
 
 use super::references::Reference;
 use glam::{Vec3, Vec4, Vec4Swizzles};
+use halflight_simd::{Kernel, Level, Simd};
 
 /// A box in registers; `w` is of no meaning.
 #[derive(Clone, Copy)]
@@ -44,9 +45,12 @@ impl Extent {
         self.centroids.grow(&Box4 { lo: centroid, hi: centroid });
     }
 
+    #[inline(always)]
     pub(super) fn of(references: &[Reference]) -> Self {
         let mut extent = Self::EMPTY;
-        references.iter().for_each(|r| extent.grow(r));
+        for r in references {
+            extent.grow(r);
+        }
         extent
     }
 }
@@ -67,6 +71,7 @@ struct Binning {
 }
 
 impl Binning {
+    #[inline(always)]
     fn new(centroids: &Box4, bins: usize) -> Self {
         let extent = (centroids.hi - centroids.lo).xyz();
         // A little under the number of bins, so that the largest centroid falls into the last one.
@@ -84,14 +89,34 @@ impl Binning {
 
 /// Divides `references` and returns how many went left, with the extents of both sides. At least one
 /// reference is on either side of two or more.
-pub(super) fn divide(references: &mut [Reference], extent: &Extent) -> (usize, Extent, Extent) {
-    let n = references.len();
-    if n == 2 {
+pub(super) fn divide(level: Level, references: &mut [Reference], extent: &Extent) -> (usize, Extent, Extent) {
+    if references.len() == 2 {
         return halve(references);
     }
-    if n <= 32 { divide_binned::<8>(references, extent) } else { divide_binned::<16>(references, extent) }
+    level.dispatch(Divide { references, extent })
 }
 
+/// The same instructions at every level, hence the same tree; only their encoding gets shorter.
+struct Divide<'a> {
+    references: &'a mut [Reference],
+    extent: &'a Extent,
+}
+
+impl Kernel for Divide<'_> {
+    type Out = (usize, Extent, Extent);
+
+    #[inline(always)]
+    fn run<S: Simd>(self, _simd: S) -> Self::Out {
+        let Self { references, extent } = self;
+        if references.len() <= 32 {
+            divide_binned::<8>(references, extent)
+        } else {
+            divide_binned::<16>(references, extent)
+        }
+    }
+}
+
+#[inline(always)]
 fn divide_binned<const BINS: usize>(
     references: &mut [Reference],
     extent: &Extent,
@@ -170,6 +195,7 @@ fn partition<const BINS: usize>(
 }
 
 /// The last resort: half by count, for references that no plane tells apart.
+#[inline(always)]
 pub(super) fn halve(references: &[Reference]) -> (usize, Extent, Extent) {
     let (left, right) = references.split_at(references.len() / 2);
     (left.len(), Extent::of(left), Extent::of(right))

@@ -249,6 +249,22 @@ fn exact_memory_suffices_and_one_byte_less_is_an_error() {
 }
 
 #[test]
+fn every_level_builds_the_same_tree() {
+    let soup = random_soup(3000, 1.0, Vec3::ZERO);
+    let bytes = Bvh::footprint(3000).bytes();
+    let build = |level: Level| {
+        let mut memory = lines(bytes);
+        let mut arena = Arena::new(bytemuck::cast_slice_mut(&mut memory));
+        let bvh = Bvh::build_with(&soup.mesh(), &mut arena, level, &Serial).expect("exact footprint");
+        (bytemuck::cast_slice(bvh.nodes).to_vec() as std::vec::Vec<u8>, bvh.triangles.to_vec())
+    };
+    let plain = build(Level::BASELINE);
+    for level in Level::detect().and_below() {
+        assert!(build(level) == plain, "{}", level.name());
+    }
+}
+
+#[test]
 fn a_copy_takes_exactly_what_it_says() {
     let soup = random_soup(500, 1.0, Vec3::ZERO);
     let mut memory = lines(Bvh::footprint(500).bytes());

@@ -9,6 +9,7 @@ use super::picture::Picture;
 use super::workers::Workers;
 use super::{Progress, RenderError, RenderResult, Seconds, Settings, cache_file, windows};
 use core::sync::atomic::AtomicBool;
+use halflight_core::Level;
 use halflight_core::bsdf::Features;
 use halflight_core::bvh::Bvh;
 use halflight_core::census::WithFeatures;
@@ -47,7 +48,7 @@ impl WithFeatures for Render<'_> {
         let build_start = Instant::now();
         // First, for the working memory of its build is free again for the others.
         let mut bvh_lines = Vec::new();
-        let bvh = build_bvh(scene, &workers, &mut memory, &mut bvh_lines)?;
+        let bvh = build_bvh(scene, settings.level, &workers, &mut memory, &mut bvh_lines)?;
         let mut film_lines = memory.take("film", Film::footprint(width, height))?;
         let mut lights_lines = memory.take("lights", Lights::footprint(scene).and(Lights::scratch(scene)))?;
         let lights = Lights::build(scene, &mut Arena::new(bytemuck::cast_slice_mut(&mut lights_lines)))?;
@@ -80,12 +81,14 @@ pub(super) fn path_settings(settings: &Settings) -> PathSettings {
 /// The hierarchy, built on all cores, then moved out of the working memory of its build into `lines`.
 pub(super) fn build_bvh<'m>(
     scene: &Scene,
+    level: Level,
     workers: &Workers,
     memory: &mut Memory,
     lines: &'m mut Vec<Line>,
 ) -> Result<Bvh<'m>, RenderError> {
     let mut working = memory.take("bvh build", Bvh::footprint(scene.mesh.triangles.len()))?;
-    let built = workers.build_bvh(&scene.mesh, &mut Arena::new(bytemuck::cast_slice_mut(&mut working)))?;
+    let mut arena = Arena::new(bytemuck::cast_slice_mut(&mut working));
+    let built = workers.build_bvh(&scene.mesh, level, &mut arena)?;
     *lines = memory.take("bvh", built.used())?;
     let bvh = built.copied(&mut Arena::new(bytemuck::cast_slice_mut(lines)))?;
     memory.give_back("bvh build");

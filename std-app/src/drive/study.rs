@@ -96,7 +96,7 @@ impl WithFeatures for Study<'_> {
         let workers = Workers::new(settings.threads)?;
         let mut memory = Memory::new(scene, settings.memory);
         let mut bvh_lines = Vec::new();
-        let bvh = build_bvh(scene, &workers, &mut memory, &mut bvh_lines)?;
+        let bvh = build_bvh(scene, settings.level, &workers, &mut memory, &mut bvh_lines)?;
         let mut lights_lines = memory.take("lights", Lights::footprint(scene).and(Lights::scratch(scene)))?;
         let lights = Lights::build(scene, &mut arena(&mut lights_lines))?;
         let tracer = PathTracer::<F>::new(scene, &bvh, &lights, path_settings(settings), settings.level);

@@ -2,6 +2,7 @@
 
 use super::crew::Task;
 use super::{RenderError, regions};
+use halflight_core::Level;
 use halflight_core::bsdf::Features;
 use halflight_core::bvh::{Bvh, Join};
 use halflight_core::estimate::{ErrorEstimate, TileError, TileLight};
@@ -32,8 +33,13 @@ impl Workers {
     }
 
     /// Builds the hierarchy over `mesh` on all threads.
-    pub(super) fn build_bvh<'m>(&self, mesh: &Mesh, arena: &mut Arena<'m>) -> Result<Bvh<'m>, OutOfMemory> {
-        self.pool.install(|| Bvh::build_with(mesh, arena, &Fork))
+    pub(super) fn build_bvh<'m>(
+        &self,
+        mesh: &Mesh,
+        level: Level,
+        arena: &mut Arena<'m>,
+    ) -> Result<Bvh<'m>, OutOfMemory> {
+        self.pool.install(|| Bvh::build_with(mesh, arena, level, &Fork))
     }
 
     /// What the tiles of `film` tell of its error; `None` for a black picture.
@@ -169,7 +175,7 @@ mod tests {
 
         let mut lines = vec![Line([0; 64]); Bvh::footprint(triangles.len()).bytes() / 64];
         let mut arena = Arena::new(bytemuck::cast_slice_mut(&mut lines));
-        let bvh = Workers::new(Some(threads)).unwrap().build_bvh(&mesh, &mut arena).unwrap();
+        let bvh = Workers::new(Some(threads)).unwrap().build_bvh(&mesh, Level::detect(), &mut arena).unwrap();
         let mut kept = vec![Line([0; 64]); bvh.used().bytes() / 64];
         bvh.copied(&mut Arena::new(bytemuck::cast_slice_mut(&mut kept))).unwrap();
         bytemuck::cast_slice(&kept).to_vec()

@@ -68,7 +68,7 @@ pub fn run(scene: &Scene, level: Level) -> Result<RaysReport, BenchError> {
     for _ in 0..REPETITIONS {
         let mut memory = Vec::new();
         let start = Instant::now();
-        black_box(ours::build(mesh, &mut memory)?);
+        black_box(ours::build(mesh, level, &mut memory)?);
         build.push(start.elapsed().as_secs_f64());
         if let Some(rival) = &mut rival {
             let start = Instant::now();
@@ -78,7 +78,7 @@ pub fn run(scene: &Scene, level: Level) -> Result<RaysReport, BenchError> {
     }
 
     let mut memory = Vec::new();
-    let bvh = ours::build(mesh, &mut memory)?;
+    let bvh = ours::build(mesh, level, &mut memory)?;
     let rays = Rays::of(scene, &bvh, level);
     let mut classes = Vec::new();
     let mut rival_classes = Vec::new();

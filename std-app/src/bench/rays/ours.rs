@@ -2,16 +2,17 @@
 
 use super::{BATCH, BenchError, Class, Entry};
 use halflight_core::Level;
-use halflight_core::bvh::{Bvh, Coherence};
+use halflight_core::bvh::{Bvh, Coherence, Serial};
 use halflight_core::geometry::{Hit, Ray};
 use halflight_core::memory::{Arena, Footprint, Line, OutOfMemory};
 use halflight_core::scene::Mesh;
 
 /// The hierarchy as a render keeps it: built in fresh memory, copied to `kept`, the memory of the build
 /// given back.
-pub(super) fn build<'m>(mesh: &Mesh, kept: &'m mut Vec<Line>) -> Result<Bvh<'m>, BenchError> {
+pub(super) fn build<'m>(mesh: &Mesh, level: Level, kept: &'m mut Vec<Line>) -> Result<Bvh<'m>, BenchError> {
     let mut working = lines(Bvh::footprint(mesh.triangles.len()))?;
-    let built = Bvh::build(mesh, &mut Arena::new(bytemuck::cast_slice_mut(&mut working)))?;
+    let mut arena = Arena::new(bytemuck::cast_slice_mut(&mut working));
+    let built = Bvh::build_with(mesh, &mut arena, level, &Serial)?;
     *kept = lines(built.used())?;
     Ok(built.copied(&mut Arena::new(bytemuck::cast_slice_mut(kept)))?)
 }

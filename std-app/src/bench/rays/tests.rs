@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::load::{LoadOptions, load};
+use halflight_core::Level;
 use halflight_core::scene::Camera;
 
 /// Checks of the repository's own Cornell box, seen as it was measured.
@@ -12,7 +13,7 @@ fn in_the_box(check: impl FnOnce(&Scene, &halflight_core::bvh::Bvh)) {
     let camera: Camera = loaded.camera_or_default();
     let mut memory = Vec::new();
     let scene = views.scene(camera);
-    let bvh = ours::build(&scene.mesh, &mut memory).unwrap();
+    let bvh = ours::build(&scene.mesh, Level::detect(), &mut memory).unwrap();
     check(&scene, &bvh);
 }
 
