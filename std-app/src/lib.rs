@@ -22,6 +22,7 @@ pub mod bench;
 pub mod compare;
 pub mod drive;
 pub mod load;
+mod pages;
 pub mod report;
 pub mod save;
 pub mod stability;

@@ -1,6 +1,7 @@
 //! The bytes behind the arenas: counted, held against the limit, asked of the system without aborting.
 
 use super::RenderError;
+use crate::pages::Pages;
 use halflight_core::memory::{ALIGNMENT, Footprint, Line};
 use halflight_core::scene::{Scene, Texels};
 
@@ -33,24 +34,45 @@ impl Memory {
         structure: &'static str,
         footprint: Footprint,
     ) -> Result<Vec<Line>, RenderError> {
-        let bytes = footprint.bytes();
-        let needed = self.total().saturating_add(bytes);
-        if let Some(limit) = self.limit
-            && needed > limit
-        {
-            return Err(RenderError::Memory { needed, available: limit });
-        }
-        let count = bytes.div_ceil(ALIGNMENT);
+        let needed = self.needed(footprint)?;
+        let count = footprint.bytes().div_ceil(ALIGNMENT);
         let mut lines = Vec::new();
         let failed = |_| RenderError::Memory { needed, available: self.total() };
         lines.try_reserve_exact(count).map_err(failed)?;
         lines.resize(count, Line([0; ALIGNMENT]));
+        self.count(structure, footprint);
+        Ok(lines)
+    }
+
+    /// The same, for what is read in no order.
+    pub(super) fn take_pages(
+        &mut self,
+        structure: &'static str,
+        footprint: Footprint,
+    ) -> Result<Pages, RenderError> {
+        let needed = self.needed(footprint)?;
+        let failed = |_| RenderError::Memory { needed, available: self.total() };
+        let pages = Pages::new(footprint).map_err(failed)?;
+        self.count(structure, footprint);
+        Ok(pages)
+    }
+
+    /// All that is taken once `footprint` is as well.
+    fn needed(&self, footprint: Footprint) -> Result<usize, RenderError> {
+        let needed = self.total().saturating_add(footprint.bytes());
+        match self.limit {
+            Some(limit) if needed > limit => Err(RenderError::Memory { needed, available: limit }),
+            _ => Ok(needed),
+        }
+    }
+
+    fn count(&mut self, structure: &'static str, footprint: Footprint) {
+        let bytes = footprint.bytes();
         match self.uses.iter_mut().find(|other| other.structure == structure) {
             Some(other) => other.bytes += bytes,
             None => self.uses.push(MemoryUse { structure, bytes }),
         }
-        self.peak = self.peak.max(needed);
-        Ok(lines)
+        self.peak = self.peak.max(self.total());
     }
 
     /// The same `count` times over: working memory for each thread.

@@ -8,6 +8,7 @@ use super::method::{Method, Stage};
 use super::picture::Picture;
 use super::workers::Workers;
 use super::{Progress, RenderError, RenderResult, Seconds, Settings, cache_file, windows};
+use crate::pages::Pages;
 use core::sync::atomic::AtomicBool;
 use halflight_core::Level;
 use halflight_core::bsdf::Features;
@@ -15,7 +16,7 @@ use halflight_core::bvh::Bvh;
 use halflight_core::census::WithFeatures;
 use halflight_core::film::Film;
 use halflight_core::light::Lights;
-use halflight_core::memory::{Arena, Line};
+use halflight_core::memory::Arena;
 use halflight_core::scene::Scene;
 use halflight_core::transport::{PathSettings, PathTracer, UNLIMITED};
 use std::time::Instant;
@@ -47,7 +48,7 @@ impl WithFeatures for Render<'_> {
         let mut memory = Memory::new(scene, settings.memory);
         let build_start = Instant::now();
         // First, for the working memory of its build is free again for the others.
-        let mut bvh_lines = Vec::new();
+        let mut bvh_lines = Pages::default();
         let bvh = build_bvh(scene, settings.level, &workers, &mut memory, &mut bvh_lines)?;
         let mut film_lines = memory.take("film", Film::footprint(width, height))?;
         let mut lights_lines = memory.take("lights", Lights::footprint(scene).and(Lights::scratch(scene)))?;
@@ -84,12 +85,12 @@ pub(super) fn build_bvh<'m>(
     level: Level,
     workers: &Workers,
     memory: &mut Memory,
-    lines: &'m mut Vec<Line>,
+    lines: &'m mut Pages,
 ) -> Result<Bvh<'m>, RenderError> {
-    let mut working = memory.take("bvh build", Bvh::footprint(scene.mesh.triangles.len()))?;
+    let mut working = memory.take_pages("bvh build", Bvh::footprint(scene.mesh.triangles.len()))?;
     let mut arena = Arena::new(bytemuck::cast_slice_mut(&mut working));
     let built = workers.build_bvh(&scene.mesh, level, &mut arena)?;
-    *lines = memory.take("bvh", built.used())?;
+    *lines = memory.take_pages("bvh", built.used())?;
     let bvh = built.copied(&mut Arena::new(bytemuck::cast_slice_mut(lines)))?;
     memory.give_back("bvh build");
     Ok(bvh)

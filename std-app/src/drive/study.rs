@@ -8,6 +8,7 @@ use super::method::{Growing, LEAST_PIXELS, Overture};
 use super::run::{build_bvh, path_settings};
 use super::workers::Workers;
 use super::{RenderError, Settings};
+use crate::pages::Pages;
 use halflight_core::Rgb;
 use halflight_core::bsdf::Features;
 use halflight_core::cache::irradiance::{CellFlux, IrradianceCache, Metric, metric};
@@ -95,7 +96,7 @@ impl WithFeatures for Study<'_> {
         let Study { scene, settings, study, tell } = self;
         let workers = Workers::new(settings.threads)?;
         let mut memory = Memory::new(scene, settings.memory);
-        let mut bvh_lines = Vec::new();
+        let mut bvh_lines = Pages::default();
         let bvh = build_bvh(scene, settings.level, &workers, &mut memory, &mut bvh_lines)?;
         let mut lights_lines = memory.take("lights", Lights::footprint(scene).and(Lights::scratch(scene)))?;
         let lights = Lights::build(scene, &mut arena(&mut lights_lines))?;

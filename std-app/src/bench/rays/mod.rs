@@ -17,6 +17,7 @@ pub use classes::{Class, SIDE};
 pub use report::{ClassReport, RaysReport, RivalClass, RivalReport, geometric_mean};
 
 use super::{BenchError, REPETITIONS, median};
+use crate::pages::Pages;
 use classes::Rays;
 use core::hint::black_box;
 use halflight_core::Level;
@@ -66,7 +67,7 @@ pub fn run(scene: &Scene, level: Level) -> Result<RaysReport, BenchError> {
     let mut rival = rival()?;
     let (mut build, mut rival_build) = (Vec::new(), Vec::new());
     for _ in 0..REPETITIONS {
-        let mut memory = Vec::new();
+        let mut memory = Pages::default();
         let start = Instant::now();
         black_box(ours::build(mesh, level, &mut memory)?);
         build.push(start.elapsed().as_secs_f64());
@@ -77,7 +78,7 @@ pub fn run(scene: &Scene, level: Level) -> Result<RaysReport, BenchError> {
         }
     }
 
-    let mut memory = Vec::new();
+    let mut memory = Pages::default();
     let bvh = ours::build(mesh, level, &mut memory)?;
     let rays = Rays::of(scene, &bvh, level);
     let mut classes = Vec::new();

@@ -1,29 +1,21 @@
 //! Our tracer as the bench drives it.
 
 use super::{BATCH, BenchError, Class, Entry};
+use crate::pages::Pages;
 use halflight_core::Level;
 use halflight_core::bvh::{Bvh, Coherence, Serial};
 use halflight_core::geometry::{Hit, Ray};
-use halflight_core::memory::{Arena, Footprint, Line, OutOfMemory};
+use halflight_core::memory::Arena;
 use halflight_core::scene::Mesh;
 
 /// The hierarchy as a render keeps it: built in fresh memory, copied to `kept`, the memory of the build
 /// given back.
-pub(super) fn build<'m>(mesh: &Mesh, level: Level, kept: &'m mut Vec<Line>) -> Result<Bvh<'m>, BenchError> {
-    let mut working = lines(Bvh::footprint(mesh.triangles.len()))?;
+pub(super) fn build<'m>(mesh: &Mesh, level: Level, kept: &'m mut Pages) -> Result<Bvh<'m>, BenchError> {
+    let mut working = Pages::new(Bvh::footprint(mesh.triangles.len()))?;
     let mut arena = Arena::new(bytemuck::cast_slice_mut(&mut working));
     let built = Bvh::build_with(mesh, &mut arena, level, &Serial)?;
-    *kept = lines(built.used())?;
+    *kept = Pages::new(built.used())?;
     Ok(built.copied(&mut Arena::new(bytemuck::cast_slice_mut(kept)))?)
-}
-
-fn lines(footprint: Footprint) -> Result<Vec<Line>, OutOfMemory> {
-    let mut lines = Vec::new();
-    let needed = footprint.bytes();
-    let count = needed.div_ceil(size_of::<Line>());
-    lines.try_reserve_exact(count).map_err(|_| OutOfMemory { needed, available: 0 })?;
-    lines.resize(count, Line([0; size_of::<Line>()]));
-    Ok(lines)
 }
 
 /// Our way of tracing rays of `class`.

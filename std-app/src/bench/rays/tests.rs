@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::load::{LoadOptions, load};
+use crate::pages::Pages;
 use halflight_core::Level;
 use halflight_core::scene::Camera;
 
@@ -11,7 +12,7 @@ fn in_the_box(check: impl FnOnce(&Scene, &halflight_core::bvh::Bvh)) {
     let loaded = load(file.as_ref(), &LoadOptions::default()).unwrap();
     let views = loaded.views();
     let camera: Camera = loaded.camera_or_default();
-    let mut memory = Vec::new();
+    let mut memory = Pages::default();
     let scene = views.scene(camera);
     let bvh = ours::build(&scene.mesh, Level::detect(), &mut memory).unwrap();
     check(&scene, &bvh);
