@@ -3,7 +3,7 @@
 
 use core::sync::atomic::AtomicBool;
 use glam::Vec3;
-use halflight::drive::{self, CacheUse, Method, RenderResult, Settings, Stop};
+use halflight::drive::{self, CacheUse, Mark, Method, RenderResult, Settings, Stop};
 use halflight::save::Image;
 use halflight_core::scene::Scene;
 use halflight_tests::scenes::{SceneBuffers, cornell_box, emitter, everything};
@@ -145,4 +145,22 @@ fn mirrors_and_glass_keep_their_light() {
     for (a, b) in cache.image.mean().into_iter().zip(path.image.mean()) {
         assert!((a / b - 1.0).abs() < 0.02, "{a} {b}");
     }
+}
+
+#[test]
+fn a_survey_tells_where_records_are_and_how_wrong_they_are() {
+    let buffers = cornell_box();
+    let scene = buffers.scene();
+    let plain = cached(&scene, 64, 2, |_| ());
+    let done = cached(&scene, 64, 2, |s| s.survey = Some(60));
+    assert_eq!((plain.image.pixels, plain.survey.is_none()), (done.image.pixels, true));
+    let survey = done.survey.unwrap();
+    assert_eq!((survey.step, survey.width, survey.looks.len()), (1, 64, 64 * 64));
+    assert!(survey.points >= 40 && survey.checks.len() as u64 <= survey.points);
+    let served = survey.looks.iter().filter(|look| look.radius > 0.0).count();
+    assert!(served > 3000 && survey.looks.iter().filter(|look| look.mark == Mark::Record).count() > 50);
+    // 256 rays a record: a few percent of noise, of which half is left where records overlap.
+    assert!(survey.achieved > 1e-4 && survey.achieved < 0.1, "{}", survey.achieved);
+    assert!(survey.predicted > 1e-4 && survey.predicted < 1.0, "{}", survey.predicted);
+    assert!(cached(&scene, 64, 2, |s| s.max_depth = Some(2)).survey.is_none());
 }

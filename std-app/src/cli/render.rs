@@ -81,6 +81,9 @@ pub(super) struct Render {
     json: bool,
 }
 
+/// Points at which a report holds irradiance caches against exact values, about.
+const SURVEY: u32 = 1000;
+
 #[derive(Clone, Copy, PartialEq, ValueEnum)]
 enum Adaptive {
     /// By the noise
@@ -124,6 +127,7 @@ impl Render {
             resume: self.resume.clone(),
             load_cache: self.load_cache.clone(),
             save_cache: self.save_cache.clone(),
+            survey: self.report.is_some().then_some(SURVEY),
             ..settings
         };
         let views = loaded.views();

@@ -12,6 +12,7 @@ mod crew;
 mod error;
 mod film_file;
 mod fingerprint;
+mod held_out;
 mod history;
 mod ledger;
 mod memory;
@@ -23,6 +24,7 @@ mod rounds;
 mod run;
 mod sealed;
 mod study;
+mod survey;
 mod turns;
 mod windows;
 mod workers;
@@ -39,6 +41,7 @@ pub use merge::{Merged, merge};
 pub use method::{CacheSettings, CacheUse, Method};
 pub use rounds::Stop;
 pub use study::{IrradianceStudy, MetricError, study_irradiance};
+pub use survey::{Check, Look, Mark, Survey};
 pub use turns::{Turn, Turns};
 pub use windows::WindowUse;
 
@@ -98,6 +101,9 @@ pub struct Settings {
     pub load_cache: Option<PathBuf>,
     /// Where to keep the irradiance caches when they are filled.
     pub save_cache: Option<PathBuf>,
+    /// About how many points the irradiance caches are held against exact values at, after the render; `None`: no
+    /// survey.
+    pub survey: Option<u32>,
 }
 
 /// A film file that is written every so often, and at the end. The time that this takes does not count.
@@ -137,6 +143,7 @@ impl Default for Settings {
             resume: None,
             load_cache: None,
             save_cache: None,
+            survey: None,
         }
     }
 }
@@ -214,6 +221,9 @@ pub struct RenderResult {
     pub reuse: Reuse,
     /// What became of the irradiance cache, where the method has one.
     pub cache: Option<CacheUse>,
+    /// What the irradiance cache looks like and how wrong it is, where that was asked for, the method has one and there
+    /// is memory for it.
+    pub survey: Option<Survey>,
     /// Whether the sky was sampled through windows.
     pub windows: WindowUse,
     /// Where samples were dropped, the worst first.

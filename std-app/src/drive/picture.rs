@@ -151,6 +151,7 @@ impl Picture<'_> {
             counters: canvas.counters,
             reuse: renderer.reuse(),
             cache: renderer.cache(),
+            survey: if interrupted { None } else { renderer.survey(workers)? },
             windows: WindowUse::default(),
             places: canvas.ledger.places(width, height),
             empty_pixels: empty_pixels(film, |task| canvas.shard.owns(task)),

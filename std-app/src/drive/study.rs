@@ -3,13 +3,13 @@
 
 use super::canvas::{Canvas, Shard};
 use super::crew::{Crew, Round};
+use super::held_out::{EXACT, Point, held_out, luminance};
 use super::memory::Memory;
 use super::method::{Growing, LEAST_PIXELS, Overture};
 use super::run::{build_bvh, path_settings};
 use super::workers::Workers;
 use super::{RenderError, Settings};
 use crate::pages::Pages;
-use halflight_core::Rgb;
 use halflight_core::bsdf::Features;
 use halflight_core::cache::irradiance::{CellFlux, IrradianceCache, Metric, metric};
 use halflight_core::census::{Census, WithFeatures};
@@ -17,9 +17,8 @@ use halflight_core::film::Film;
 use halflight_core::light::Lights;
 use halflight_core::memory::{Arena, Line};
 use halflight_core::scene::Scene;
-use halflight_core::transport::gather::{Gathering, Place};
-use halflight_core::transport::overture::{Order, PIXELS};
-use halflight_core::transport::{Counters, PathTracer};
+use halflight_core::transport::PathTracer;
+use halflight_core::transport::gather::Gathering;
 
 /// What to study.
 #[derive(Clone, Debug)]
@@ -65,12 +64,8 @@ const ATTEMPTS: usize = 9;
 /// The longest step of an attempt, as the logarithm of the error: to a hundred times as much.
 const FARTHEST: f64 = 4.605;
 
-/// Rays along a side of a gathering at a point of comparison, and gatherings there.
-const EXACT: usize = 64;
+/// Gatherings at a point of comparison.
 const REPEATS: u32 = 4;
-
-/// A sample of its own for the points of comparison.
-const HELD_OUT: u32 = 1000;
 
 /// Runs `study` on the picture of `settings`; `tell` hears of each metric when it is done.
 pub fn study_irradiance(
@@ -114,7 +109,7 @@ impl WithFeatures for Study<'_> {
 
         let size = [settings.width, settings.height];
         let extent = 0.5 * bvh.bounds().diagonal();
-        let points = held_out(&tracer, size, study.points, &mut crew, &mut scratch)?;
+        let points = held_out(&tracer, size, [study.points, REPEATS], &workers, &mut scratch)?;
         let mut tables = memory.take("gathering", CellFlux::footprint(strata))?;
         let flux = CellFlux::build(strata, &mut arena(&mut tables))?;
         let capacity = (study.records as usize).saturating_mul(4);
@@ -147,72 +142,11 @@ fn arena(lines: &mut [Line]) -> Arena<'_> {
     Arena::new(bytemuck::cast_slice_mut(lines))
 }
 
-/// A point of the picture, and the exact indirect irradiance there.
-struct Point {
-    place: Place,
-    /// Luminance.
-    exact: f64,
-    /// Variance of `exact`.
-    variance: f64,
-}
-
-fn luminance(light: Rgb) -> f64 {
-    f64::from(light.dot(Rgb::new(0.2126, 0.7152, 0.0722)))
-}
-
-/// Points that are spread evenly over the picture.
-fn held_out<F: Features>(
-    tracer: &PathTracer<F>,
-    [width, height]: [u32; 2],
-    points: u32,
-    crew: &mut Crew,
-    scratch: &mut [Vec<Line>],
-) -> Result<Vec<Point>, RenderError> {
-    let each = f64::from(width) * f64::from(height) / f64::from(points.max(1));
-    let order = Order::new(width, height, each.sqrt() as u32);
-    let mut places = vec![Place::NONE; order.len() as usize];
-    let look = |task: usize, _: &mut Arena, out: &mut [Place]| {
-        let mut counters = Counters::default();
-        tracer.places(&order, (task * PIXELS) as u64, HELD_OUT, out, &mut counters);
-        Ok(counters)
-    };
-    crew.pass(&mut places, PIXELS, scratch, &look)?;
-    places.retain(Place::is_some);
-    let mut tables = vec![Line([0; 64]); CellFlux::footprint(EXACT).bytes() / 64];
-    let flux = CellFlux::build(EXACT, &mut arena(&mut tables))?;
-    let gathering =
-        Gathering { flux: &flux, metric: metric::Settings::new(Metric::MinDistance, 1.0), least_pixels: 0.0 };
-    let mut known: Vec<Option<[f64; REPEATS as usize]>> = vec![None; places.len()];
-    let gather = |task: usize, arena: &mut Arena, out: &mut [Option<[f64; REPEATS as usize]>]| {
-        let mut counters = Counters::default();
-        let (Some(out), Some(place)) = (out.first_mut(), places.get(task)) else { return Ok(counters) };
-        let mut found = [0.0; REPEATS as usize];
-        for (repeat, found) in (0..REPEATS).zip(&mut found) {
-            // Numbers that no record has.
-            let number = 1 << 29 | (REPEATS * task as u32 + repeat);
-            let Some(record) = tracer.gather(place, number, &gathering, arena, &mut counters)? else {
-                return Ok(counters);
-            };
-            *found = luminance(record.irradiance.into());
-        }
-        *out = Some(found);
-        Ok(counters)
-    };
-    crew.pass(&mut known, 1, scratch, &gather)?;
-    let point = |(place, found): (Place, Option<[f64; REPEATS as usize]>)| {
-        let (found, count) = (found?, f64::from(REPEATS));
-        let exact = found.iter().sum::<f64>() / count;
-        let squares: f64 = found.iter().map(|found| (found - exact).powi(2)).sum();
-        Some(Point { place, exact, variance: squares / (count * (count - 1.0)) })
-    };
-    Ok(places.into_iter().zip(known).filter_map(point).collect())
-}
-
 /// Holds a cache against what is known.
 fn judge(metric: Metric, error: f32, cache: &IrradianceCache, points: &[Point]) -> MetricError {
     let mean = points.iter().map(|point| point.exact).sum::<f64>() / points.len().max(1) as f64;
     let (mut squares, mut variance, mut relative) = (0.0, 0.0, Vec::new());
-    for Point { place, exact, variance: noise } in points {
+    for Point { place, exact, variance: noise, .. } in points {
         let Some(found) = cache.at(place.position(), place.normal()) else { continue };
         let difference = luminance(found.irradiance) - exact;
         squares += difference * difference - noise;

@@ -94,6 +94,12 @@ impl Record {
         Vec3::new(offset.dot(axis), offset.dot(normal.cross(axis)), offset.dot(normal))
     }
 
+    /// How far a point is, in radii: 1 on the rim of what the record covers.
+    pub fn radii_to(&self, position: Vec3) -> f32 {
+        let [r1, r2] = self.radii;
+        (self.local(position - Vec3::from(self.position)) / Vec3::new(r1, r2, r1)).length()
+    }
+
     /// Half of the edges of the box around the support.
     pub fn extent(&self) -> Vec3 {
         let (axis, normal) = (Vec3::from(self.axis), Vec3::from(self.normal));
@@ -236,6 +242,7 @@ mod tests {
         assert!((e.x - (2.0 - 3.0 + 2.0 * 0.25 * 9.0)).abs() < 1e-5 && (w - 0.25).abs() < 1e-6, "{e} {w}");
         assert!(record.at(Vec3::new(0.0, 4.0, 0.0), Vec3::Z, LEAST_COS).is_none());
         let covers = |y| record.covers(Vec3::new(0.0, y, 0.0), Vec3::Z, LEAST_COS);
+        assert_eq!((record.radii_to(Vec3::new(0.0, 3.0, 0.0)), record.radii_to(Vec3::X)), (1.5, 1.0));
         assert!(covers(1.9) && !covers(2.1));
         assert_eq!(record.extent(), Vec3::new(2.0, 4.0, 1.0));
     }

@@ -100,6 +100,18 @@ impl<'m> IrradianceCache<'m> {
         (weights > 0.0).then(|| Indirect { irradiance: sum / weights, shining: shining / weights })
     }
 
+    /// Calls `visit` with the records that speak for a point, and their weights.
+    pub fn visit(&self, position: Vec3, normal: Vec3, mut visit: impl FnMut(&Record, f32)) {
+        self.tree.at(position, |index| {
+            if let Some(record) = self.records.get(index as usize)
+                && let Some((_, weight)) = record.at(position, normal, self.least_cos)
+            {
+                visit(record, weight);
+            }
+            true
+        });
+    }
+
     /// Whether some record covers the point.
     #[inline]
     pub fn covers(&self, position: Vec3, normal: Vec3) -> bool {
@@ -183,7 +195,10 @@ impl Record {
     fn shrink(&mut self, radius: f32) {
         let [r1, r2] = self.radii;
         if radius < r1 {
-            self.radii = [radius, r2 * (radius / r1)];
+            let share = radius / r1;
+            self.radii = [radius, r2 * share];
+            // The mean of a square over the ellipse.
+            self.error *= share * share;
         }
     }
 }
@@ -292,7 +307,11 @@ mod tests {
             let random = Random::new(2, 2);
             for i in 0..400 {
                 let radius = 0.3 * libm::powf(random.single(3 * i), 4.0);
-                cache.insert(record(random.single(3 * i + 1), random.single(3 * i + 2), radius));
+                let bent = Record {
+                    error: radius * radius,
+                    ..record(random.single(3 * i + 1), random.single(3 * i + 2), radius)
+                };
+                cache.insert(bent);
             }
             for a in cache.records() {
                 for b in cache.records() {
@@ -300,6 +319,7 @@ mod tests {
                     assert!(a.radii[0] <= b.radii[0] + distance + 1e-6);
                 }
                 assert!((a.radii[1] / a.radii[0] - 1.5).abs() < 1e-5);
+                assert!((a.error / (a.radii[0] * a.radii[0]) - 1.0).abs() < 1e-5);
             }
         });
     }

@@ -11,8 +11,11 @@ use super::{Method, Renderer, Stage};
 use crate::drive::audit::Audit;
 use crate::drive::cache_file::{self, Half, Header, View};
 use crate::drive::crew::Crew;
+use crate::drive::held_out::EXACT;
 use crate::drive::memory::Memory;
 use crate::drive::run::path_settings;
+use crate::drive::survey::{self, Survey};
+use crate::drive::workers::Workers;
 use crate::drive::{RenderError, Settings};
 use halflight_core::bsdf::Features;
 use halflight_core::cache::irradiance::{CellFlux, IrradianceCache, Metric, metric};
@@ -101,6 +104,12 @@ pub(super) fn with<F: Features, T>(
     };
     let (even, odd) = (cache(even)?, cache(odd)?);
 
+    let exact = PathTracer::<F>::gather_scratch(EXACT);
+    let surveying = settings.survey.filter(|_| memory.has(exact.bytes() * workers.count() + others));
+    let survey = match surveying {
+        Some(points) => Some((points, memory.take_each("survey", exact, workers.count())?)),
+        None => None,
+    };
     let usual = metric::Settings::new(settings.cache.metric, 0.5 * bvh.bounds().diagonal());
     let metric = metric::Settings { error: settings.cache.allowed(), ..usual };
     let mut method = Cached {
@@ -109,6 +118,7 @@ pub(super) fn with<F: Features, T>(
         size: [settings.width, settings.height],
         halves: [Growing::new(even, 0), Growing::new(odd, 1)],
         scratch,
+        survey,
         view: View::of(scene, settings),
         loaded: header.halves,
         header,
@@ -139,6 +149,8 @@ struct Cached<'a, F> {
     size: [u32; 2],
     halves: [Growing<'a>; 2],
     scratch: Vec<Vec<Line>>,
+    /// Points, and memory for gathering there.
+    survey: Option<(u32, Vec<Vec<Line>>)>,
     /// What a file of both halves says of them.
     header: Header,
     view: View,
@@ -193,6 +205,13 @@ impl<F: Features> Renderer for Cached<'_, F> {
             tracer.run(task, samples, WAVE, arena, pixels)
         })?;
         Ok(())
+    }
+
+    fn survey(&mut self, workers: &Workers) -> Result<Option<Survey>, RenderError> {
+        let Self { tracer, size, halves: [even, odd], survey, .. } = self;
+        let Some((points, scratch)) = survey else { return Ok(None) };
+        let caches = [&even.cache, &odd.cache];
+        survey::survey(tracer, caches, *size, *points, workers, scratch).map(Some)
     }
 
     fn cache(&self) -> Option<CacheUse> {

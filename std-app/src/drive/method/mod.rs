@@ -17,6 +17,7 @@ pub(super) use overture::{Growing, Overture};
 
 use super::crew::Crew;
 use super::memory::Memory;
+use super::survey::Survey;
 use super::workers::Workers;
 use super::{RenderError, Reuse, Settings};
 use halflight_core::bsdf::Features;
@@ -154,6 +155,14 @@ pub(super) trait Renderer {
     /// Whether neighbouring pixels share what their paths find.
     fn reuse(&self) -> Reuse {
         Reuse::default()
+    }
+
+    /// What its irradiance cache looks like and how wrong it is, where the settings ask for that.
+    ///
+    /// # Errors
+    /// Memory that does not suffice.
+    fn survey(&mut self, _workers: &Workers) -> Result<Option<Survey>, RenderError> {
+        Ok(None)
     }
 
     /// What became of its irradiance cache.

@@ -2,6 +2,7 @@
 //! scenes and files, repairs, the command) passes through [`escape`].
 
 mod audit;
+mod cache;
 mod chart;
 mod error;
 mod map;

@@ -2,7 +2,7 @@
 
 use super::map::{Map, difference};
 use super::picture::{exposable, reduced};
-use super::{audit, error, escape, fill, parts, shell};
+use super::{audit, cache, error, escape, fill, parts, shell};
 use crate::compare::Shown;
 use crate::drive::Ending;
 use crate::report::Run;
@@ -33,6 +33,7 @@ pub(in crate::report) fn page(run: &Run) -> String {
             ("maps", &maps(run)),
             ("note", &note(run)),
             ("audit", &audit::section(run)),
+            ("cache", &cache::section(run)),
             ("reference", &reference(run)),
             ("time", &parts::time(run)),
             ("memory", &parts::memory(run)),

@@ -1,0 +1,91 @@
+//! Points of a picture that no record was made for, and the exact indirect irradiance there.
+
+use super::RenderError;
+use super::workers::Workers;
+use halflight_core::Rgb;
+use halflight_core::bsdf::Features;
+use halflight_core::cache::irradiance::{CellFlux, Metric, metric};
+use halflight_core::memory::{Arena, Line};
+use halflight_core::transport::gather::{Gathering, Place};
+use halflight_core::transport::overture::{Order, PIXELS};
+use halflight_core::transport::{Counters, PathTracer};
+
+/// Rays along a side of a gathering at such a point.
+pub(super) const EXACT: usize = 64;
+
+/// A sample of its own for the points.
+const SAMPLE: u32 = 1000;
+
+/// See the file.
+pub(super) struct Point {
+    pub(super) place: Place,
+    /// Column and row.
+    pub(super) pixel: [u32; 2],
+    /// Luminance of the irradiance.
+    pub(super) exact: f64,
+    /// Variance of `exact`.
+    pub(super) variance: f64,
+}
+
+pub(super) fn luminance(light: Rgb) -> f64 {
+    f64::from(light.dot(Rgb::new(0.2126, 0.7152, 0.0722)))
+}
+
+/// The picture in so many squares: pixels along the side of one, a power of two.
+pub(super) fn stride([width, height]: [u32; 2], points: u32) -> u32 {
+    let each = f64::from(width) * f64::from(height) / f64::from(points.max(1));
+    (each.sqrt() as u32).max(1).next_power_of_two()
+}
+
+/// About `points` points, spread evenly over the picture; at each is gathered `repeats` times, at least twice.
+pub(super) fn held_out<F: Features>(
+    tracer: &PathTracer<F>,
+    size: [u32; 2],
+    [points, repeats]: [u32; 2],
+    workers: &Workers,
+    scratch: &mut [Vec<Line>],
+) -> Result<Vec<Point>, RenderError> {
+    let [width, height] = size;
+    let order = Order::new(width, height, stride(size, points));
+    let mut places = vec![Place::NONE; order.len() as usize];
+    let look = |task: usize, _: &mut Arena, out: &mut [Place]| {
+        let mut counters = Counters::default();
+        tracer.places(&order, (task * PIXELS) as u64, SAMPLE, out, &mut counters);
+        Ok(counters)
+    };
+    workers.pass(&mut places, PIXELS, scratch, &|| false, &look)?;
+    let pixel = |i: usize| order.pixel(i as u64).map_or([0; 2], |(x, y)| [x, y]);
+    let places = places.into_iter().enumerate().filter(|(_, place)| place.is_some());
+    let places: Vec<_> = places.map(|(i, place)| (place, pixel(i))).collect();
+
+    let mut tables = vec![Line([0; 64]); CellFlux::footprint(EXACT).bytes() / 64];
+    let flux = CellFlux::build(EXACT, &mut Arena::new(bytemuck::cast_slice_mut(&mut tables)))?;
+    let gathering =
+        Gathering { flux: &flux, metric: metric::Settings::new(Metric::MinDistance, 1.0), least_pixels: 0.0 };
+    // Mean and variance of the mean.
+    let mut known: Vec<Option<[f64; 2]>> = vec![None; places.len()];
+    let repeats = repeats.max(2);
+    let gather = |task: usize, arena: &mut Arena, out: &mut [Option<[f64; 2]>]| {
+        let mut counters = Counters::default();
+        let (Some(out), Some((place, _))) = (out.first_mut(), places.get(task)) else { return Ok(counters) };
+        let mut found = Vec::new();
+        for repeat in 0..repeats {
+            // Numbers that no record has.
+            let number = 1 << 29 | (repeats * task as u32 + repeat);
+            let Some(record) = tracer.gather(place, number, &gathering, arena, &mut counters)? else {
+                return Ok(counters);
+            };
+            found.push(luminance(record.irradiance.into()));
+        }
+        let count = f64::from(repeats);
+        let mean = found.iter().sum::<f64>() / count;
+        let squares: f64 = found.iter().map(|found| (found - mean).powi(2)).sum();
+        *out = Some([mean, squares / (count * (count - 1.0))]);
+        Ok(counters)
+    };
+    workers.pass(&mut known, 1, scratch, &|| false, &gather)?;
+    let point = |((place, pixel), known): ((Place, [u32; 2]), Option<[f64; 2]>)| {
+        known.map(|[exact, variance]| Point { place, pixel, exact, variance })
+    };
+    Ok(places.into_iter().zip(known).filter_map(point).collect())
+}
