@@ -211,6 +211,9 @@ impl<F: Features> Renderer for Cached<'_, F> {
         let Self { tracer, size, halves: [even, odd], survey, .. } = self;
         let Some((points, scratch)) = survey else { return Ok(None) };
         let caches = [&even.cache, &odd.cache];
+        if caches.iter().all(|cache| cache.records().is_empty()) {
+            return Ok(None);
+        }
         survey::survey(tracer, caches, *size, *points, workers, scratch).map(Some)
     }
 
