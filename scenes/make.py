@@ -64,14 +64,14 @@ class Mesh:
         path.write_text("\n".join(lines) + "\n")
 
 
-def cornell():
+def cornell(name="cornell", back="white"):
     """The measured box; x to the left of the picture, z into it. The lamp hangs half a unit below the ceiling,
-    which would hide it otherwise."""
+    which would hide it otherwise. `back` is the material of the wall at the back."""
     mesh = Mesh()
     for material, corners in [
         ("white", "552.8 0 0  0 0 0  0 0 559.2  549.6 0 559.2"),
         ("white", "556 548.8 0  556 548.8 559.2  0 548.8 559.2  0 548.8 0"),
-        ("white", "549.6 0 559.2  0 0 559.2  0 548.8 559.2  556 548.8 559.2"),
+        (back, "549.6 0 559.2  0 0 559.2  0 548.8 559.2  556 548.8 559.2"),
         ("green", "0 0 559.2  0 0 0  0 548.8 0  0 548.8 559.2"),
         ("red", "552.8 0 0  549.6 0 559.2  556 548.8 559.2  556 548.8 0"),
         ("lamp", "343 548.3 227  343 548.3 332  213 548.3 332  213 548.3 227"),
@@ -84,7 +84,8 @@ def cornell():
         mesh.face("white", [(x, height, z) for x, z in base])
         for (x0, z0), (x1, z1) in zip(base, base[1:] + base[:1]):
             mesh.face("white", [(x0, 0, z0), (x1, 0, z1), (x1, height, z1), (x0, height, z0)])
-    mesh.write(HERE / "cornell/cornell.obj", "cornell.mtl", "The Cornell box as measured.")
+    as_what = "as measured" if back == "white" else f"with a {back} back wall"
+    mesh.write(HERE / f"cornell/{name}.obj", f"{name}.mtl", f"The Cornell box {as_what}.")
 
 
 def sphere(subdivisions=3):
@@ -167,6 +168,7 @@ def mesh_is_at(mesh, face, x):
 
 if __name__ == "__main__":
     cornell()
+    cornell("dark-wall", back="black")
     sphere()
     caustic()
     glossy()
