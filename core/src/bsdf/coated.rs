@@ -14,6 +14,11 @@ use crate::sampling::warp::cosine_hemisphere;
 use core::f32::consts::FRAC_1_PI;
 use glam::Vec3;
 
+/// How much more a direction from the coat is worth than one from the base. Shadow rays find the lamps that the base
+/// reflects; those that show in the coat it has to find alone. In a room whose floor mirrors its windows 2 takes a
+/// seventh off the variance of the floor and 3.5 a fifth.
+const ALONE: f32 = 2.0;
+
 /// A kind of coat.
 pub(super) trait Coat {
     /// GGX alpha; 0 is smooth.
@@ -29,10 +34,10 @@ pub(super) trait Coat {
     /// ∫ 2c T(c) dc: how much of the light that leaves the base evenly gets out. An estimate.
     fn mean_transmittance(&self) -> Rgb;
 
-    /// Probability of the coat's lobe: its part of the energy that leaves to `wo`.
+    /// Probability of the coat's lobe: its part of the energy that leaves to `wo`, weighted by [`ALONE`].
     #[inline]
     fn coat_probability(&self, c: f32, transmittance: Rgb) -> f32 {
-        let coat = self.specular_albedo(c).element_sum();
+        let coat = ALONE * self.specular_albedo(c).element_sum();
         let base = (self.base() * transmittance * self.mean_transmittance()).element_sum();
         if base > 0.0 { (coat / (coat + base)).clamp(0.0, 1.0) } else { 1.0 }
     }
