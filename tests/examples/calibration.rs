@@ -1,114 +1,156 @@
 //! Does the interval hold the error, and does a render that stops by its error have it? Renders scenes with many
-//! seeds, counts in how many renders the estimated interval of 95 % holds the error against a reference of 100 times
-//! the samples, and by which factor renders miss the error that they were asked for. Prints the tables of
-//! docs/validation.md: `cargo run --release -p halflight-tests --example calibration [RENDERS [SCENE…]]`, of our own
-//! scenes by name or of any scene file.
+//! seeds until they say that they have the error asked for; each round is compared with a reference of many times the
+//! samples, whose own noise is taken off. Prints the tables of docs/validation.md:
+//!
+//! `cargo run --release -p halflight-tests --example calibration -- [--renders 40] [--size 64] [--error 0.001]
+//! [--spp 4096] [--times 100] [--method path] [--adaptive] [SCENE…]`, of our own scenes by name or of any scene file.
 
 use core::sync::atomic::AtomicBool;
-use halflight::drive::{RenderResult, Settings, Stop, render};
+use halflight::drive::{ErrorEstimate, Method, RenderResult, Round, Settings, Stop, render};
 use halflight::load::{self, LoadOptions};
-use halflight::save::Image;
-use halflight_core::estimate::Difference;
-use halflight_core::scene::Scene;
 use std::path::{Path, PathBuf};
-
-/// Pixels across and down: 16 tiles.
-const SIZE: u32 = 64;
-
-/// Samples of each pixel.
-const SAMPLES: [u32; 2] = [16, 64];
-
-/// The error to stop at, and the most samples for it.
-const WANTED: f64 = 0.01;
-const MOST: u32 = 2048;
-
-/// A reference has this many times the samples.
-const REFERENCE: u32 = 100;
+use std::sync::Arc;
 
 /// Seeds of renders count from 0.
 const REFERENCE_SEED: u32 = u32::MAX;
 
 const SCENES: [&str; 4] = ["cornell.obj", "glossy.toml", "two-rooms.toml", "caustic.toml"];
 
+/// What is asked for.
+struct Wanted {
+    renders: u32,
+    size: u32,
+    error: f64,
+    spp: u32,
+    /// Samples of the reference over those of a render.
+    times: u32,
+    method: Option<Method>,
+    adaptive: bool,
+}
+
 fn main() {
+    let mut wanted =
+        Wanted { renders: 40, size: 64, error: 0.001, spp: 4096, times: 100, method: None, adaptive: false };
+    let mut scenes = Vec::new();
     let mut arguments = std::env::args().skip(1);
-    let renders: u32 = arguments.next().map_or(100, |count| count.parse().expect("a number of renders"));
-    let chosen: Vec<String> = arguments.collect();
-    println!(
-        "| scene | samples | relMSE, median | estimate / error: 3 %, median, 97 % | interval / estimate, median | held |"
-    );
-    println!("|---|---|---|---|---|---|");
-    for scene in SCENES.iter().filter(|name| chosen.is_empty() || chosen.iter().any(|c| name.contains(&**c)))
-    {
-        calibrate(&find(scene), renders);
+    while let Some(argument) = arguments.next() {
+        let mut value = || arguments.next().expect("a value after the flag");
+        match argument.as_str() {
+            "--renders" => wanted.renders = value().parse().expect("a number of renders"),
+            "--size" => wanted.size = value().parse().expect("a number of pixels"),
+            "--error" => wanted.error = value().parse().expect("an error"),
+            "--spp" => wanted.spp = value().parse().expect("a number of samples"),
+            "--times" => wanted.times = value().parse().expect("a number of times"),
+            "--method" => wanted.method = Some(Method::named(&value()).expect("a method")),
+            "--adaptive" => wanted.adaptive = true,
+            scene => scenes.push(scene.to_owned()),
+        }
     }
-    for scene in chosen.iter().map(Path::new).filter(|path| path.exists()) {
-        calibrate(scene, renders);
+    println!("| scene | samples | relMSE | estimate / error | upper end / estimate | held | below, above |");
+    println!("|---|---|---|---|---|---|---|");
+    if scenes.is_empty() {
+        scenes.extend(SCENES.map(String::from));
+    }
+    for scene in &scenes {
+        calibrate(&find(scene), &wanted);
     }
 }
 
 fn find(name: &str) -> PathBuf {
+    if Path::new(name).exists() {
+        return name.into();
+    }
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../scenes");
-    let stem = name.split('.').next().unwrap_or(name);
-    folder.join(stem).join(name)
+    let file = SCENES.into_iter().find(|scene| scene.starts_with(name)).unwrap_or(name);
+    folder.join(file.split('.').next().unwrap_or(file)).join(file)
 }
 
-fn calibrate(file: &Path, renders: u32) {
-    let loaded = load::load(file, &LoadOptions::default()).expect("a scene of our own");
+fn calibrate(file: &Path, wanted: &Wanted) {
+    let loaded = load::load(file, &LoadOptions::default()).expect("a scene");
     let views = loaded.views();
     let scene = views.scene(loaded.camera_or_default());
-    let most = SAMPLES.into_iter().max().unwrap_or(1);
-    let reference = picture(&scene, REFERENCE * most, REFERENCE_SEED).image;
     let name = file.file_stem().unwrap_or_default().to_string_lossy();
-    for samples in SAMPLES {
-        let (mut errors, mut ratios, mut widths, mut held) = (Vec::new(), Vec::new(), Vec::new(), 0);
-        for seed in 0..renders {
-            let result = picture(&scene, samples, seed);
-            let error = error_of(&result, &reference);
-            let estimate = result.error.expect("the scene is lit");
-            held += u32::from((estimate.lower..=estimate.upper).contains(&error));
-            errors.push(error);
-            ratios.push(estimate.relmse / error);
-            widths.push((estimate.upper - estimate.lower) / estimate.relmse);
-        }
-        let [low, middle, high] = [0.03, 0.5, 0.97].map(|share| quantile(&mut ratios, share));
-        println!(
-            "| {} | {samples} | {:.2e} | {low:.2}, {middle:.2}, {high:.2} | {:.2} | {held} of {renders} |",
-            name,
-            quantile(&mut errors, 0.5),
-            quantile(&mut widths, 0.5),
+    let run =
+        |settings| render(&scene, &settings, &mut |_| (), &AtomicBool::new(false)).expect("enough memory");
+
+    let stop = Stop { error: Some(wanted.error), spp: Some(wanted.spp), seconds: None };
+    let settings = |seed| settings(wanted, seed, stop);
+    let first = run(settings(REFERENCE_SEED - 1));
+    // By path tracing: what is judged may be biased.
+    let most = Stop { spp: Some(first.spp.max(16) * wanted.times), ..Stop::default() };
+    let reference = Settings { stop: most, seed: REFERENCE_SEED, method: Some(Method::Path), ..settings(0) };
+    let reference = run(Settings { adaptive: false, ..reference });
+    let noise = reference.error.map_or(0.0, |error| error.relmse);
+    let image = Arc::new(reference.image);
+
+    let results: Vec<RenderResult> = (0..wanted.renders)
+        .map(|seed| run(Settings { reference: Some(image.clone()), ..settings(seed) }))
+        .collect();
+    let error = |round: &Round| round.reference.map_or(f64::NAN, |against| against.linear.relmse) - noise;
+    // The first estimate of each render from so many samples on, and those at the end.
+    for octave in 4..12 {
+        let from = 1 << octave;
+        let rounds = results.iter().filter_map(|result| {
+            let known = |round: &&Round| round.error.is_some() && (from..2 * from).contains(&round.spp);
+            result.history.iter().find(known)
+        });
+        row(
+            &name,
+            &format!("{from}+"),
+            rounds.filter_map(|round| Some((error(round), round.error?))).collect(),
         );
     }
+    let last = || results.iter().filter_map(|result| result.history.last());
+    row(&name, "at the end", last().filter_map(|round| Some((error(round), round.error?))).collect());
 
-    let (mut ratios, mut samples, mut near, mut late) = (Vec::new(), Vec::new(), 0, 0);
-    for seed in 0..renders {
-        let stop = Stop { error: Some(WANTED), spp: Some(MOST), ..Stop::default() };
-        let result = stopped(&scene, stop, seed);
-        let ratio = error_of(&result, &reference) / WANTED;
-        near += u32::from((1.0 / 1.5..=1.5).contains(&ratio));
-        late += u32::from(result.spp == MOST);
-        ratios.push(ratio);
-        samples.push(f64::from(result.spp));
-    }
-    let [low, middle, high] = [0.03, 0.5, 0.97].map(|share| quantile(&mut ratios, share));
+    let mut ratios: Vec<f64> = last().map(|round| error(round) / wanted.error).collect();
+    let near = ratios.iter().filter(|ratio| (1.0 / 1.5..=1.5).contains(*ratio)).count();
+    let above = ratios.iter().filter(|ratio| **ratio > 1.0).count();
+    let late = results.iter().filter(|result| result.spp >= wanted.spp).count();
+    let mut samples: Vec<f64> = results.iter().map(|result| f64::from(result.spp)).collect();
+    let mut seconds: Vec<f64> = results.iter().map(|result| result.seconds.render).collect();
     println!(
-        "  {name}, stopped at {WANTED}: error / wanted {low:.2}, {middle:.2}, {high:.2}; within a factor of 1.5 in {near} of \
-         {renders}; {} samples (median), not reached by {MOST} in {late}",
-        quantile(&mut samples, 0.5)
+        "  {name}, {size} x {size}, stopped at {wanted}: error / wanted {:.2}, {:.2}, {:.2}; within a factor of 1.5 in {near} \
+         of {renders}, above in {above}; {} samples, {:.2} s (medians), not reached by {most} in {late}; reference of {} \
+         samples, relMSE {noise:.1e}",
+        quantile(&mut ratios, 0.03),
+        quantile(&mut ratios, 0.5),
+        quantile(&mut ratios, 0.97),
+        quantile(&mut samples, 0.5),
+        quantile(&mut seconds, 0.5),
+        reference.spp,
+        size = wanted.size,
+        wanted = wanted.error,
+        renders = wanted.renders,
+        most = wanted.spp,
     );
 }
 
-fn error_of(result: &RenderResult, reference: &Image) -> f64 {
-    Difference::between(result.image.colours(), reference.colours()).relmse
+fn settings(wanted: &Wanted, seed: u32, stop: Stop) -> Settings {
+    let Wanted { size, method, adaptive, .. } = *wanted;
+    Settings { width: size, height: size, seed, stop, method, adaptive, ..Settings::default() }
 }
 
-fn picture(scene: &Scene, samples: u32, seed: u32) -> RenderResult {
-    stopped(scene, Stop { spp: Some(samples), ..Stop::default() }, seed)
-}
-
-fn stopped(scene: &Scene, stop: Stop, seed: u32) -> RenderResult {
-    let settings = Settings { width: SIZE, height: SIZE, seed, stop, ..Settings::default() };
-    render(scene, &settings, &mut |_| (), &AtomicBool::new(false)).expect("memory for a small picture")
+/// One line of the table: true errors and their estimates.
+fn row(name: &str, samples: &str, known: Vec<(f64, ErrorEstimate)>) {
+    if known.len() < 8 {
+        return;
+    }
+    let mut errors: Vec<f64> = known.iter().map(|(error, _)| *error).collect();
+    let mut ratios: Vec<f64> = known.iter().map(|(error, estimate)| estimate.relmse / error).collect();
+    let mut ends: Vec<f64> = known.iter().map(|(_, estimate)| estimate.upper / estimate.relmse).collect();
+    let below = known.iter().filter(|(error, estimate)| *error < estimate.lower).count();
+    let above = known.iter().filter(|(error, estimate)| *error > estimate.upper).count();
+    println!(
+        "| {name} | {samples} | {:.2e} | {:.2}, {:.2}, {:.2} | {:.2} | {} of {} | {below}, {above} |",
+        quantile(&mut errors, 0.5),
+        quantile(&mut ratios, 0.03),
+        quantile(&mut ratios, 0.5),
+        quantile(&mut ratios, 0.97),
+        quantile(&mut ends, 0.5),
+        known.len() - below - above,
+        known.len(),
+    );
 }
 
 fn quantile(values: &mut [f64], share: f64) -> f64 {

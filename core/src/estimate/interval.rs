@@ -3,20 +3,19 @@
 //! The plain algorithm: half-pictures A and B are independent and unbiased, so ((A − B) / 2)² has the variance of
 //! their mean I for its mean; over I² + 0.01 m² its mean over pixels is the relMSE. Departures:
 //! 1. I is not R. Where a sample is far too bright it makes its own denominator large and hides itself; where samples
-//!    missed the light the denominator is too small. So denominators come from a filtered picture ([`super::filter`]),
-//!    and what is left is corrected by a ratio: variance of the first parts of both halves over the square of the
-//!    second parts, where nothing hides itself, to the same over the common square.
-//! 2. The error that this picture has and its estimate differ by the mean of the product of both halves' errors,
-//!    exactly. Products of differences within the halves have the same variance; sums over tiles are its independent
-//!    samples, however errors within a tile hang together.
-//! 3. What filtering and ratio have moved the estimate by, as a logarithm δ, is known to first order only, and where
-//!    samples are few or errors of neighbours are the same it is too much. So the lower end goes down by it once more,
-//!    to about where the plain algorithm is.
+//!    missed the light the denominator is too small. So denominators come from a filtered picture ([`super::filter`]).
+//! 2. What is left of that is known from below and from above: the estimate over the mean of both filtered parts is
+//!    nearly always too small, and the same times a ratio in which nothing hides itself (the variance of one pair of
+//!    parts over the square of the other, to the same over the common square) too large. With δ the logarithm of their
+//!    quotient, the estimate goes up by δ / (1 + 2 δ), and is as uncertain as that.
+//! 3. The error that this picture has and its estimate differ by the mean of the product of both halves' errors,
+//!    exactly. For a pixel of variance V the product has the variance 4 V², and the estimate squared the mean 3 V² (more
+//!    with heavy tails). How errors hang together between pixels is seen in products of differences within the halves.
 //!
 //! The price: about as much time as a twentieth of a sample for each pixel.
 
 use super::TileError;
-use libm::{exp, fmax, log, sqrt};
+use libm::{exp, fmax, hypot, log, sqrt};
 
 /// An estimate of the relMSE with the interval that holds it with 95 % confidence, as far as one picture can
 /// tell: what no sample has met is not in it.
@@ -30,53 +29,61 @@ pub struct ErrorEstimate {
     pub upper: f64,
 }
 
-/// Share of the doubt about departures 1 that also goes upwards: they nearly always overdo it.
-const UPWARDS: f64 = 0.1;
+/// The normal distribution lies between this and its negative with 95 %.
+const Z: f64 = 1.959_963_984_540_054;
 
 impl ErrorEstimate {
-    /// From all tiles of a picture; `None` where no pixel has four samples.
+    /// From all tiles of a picture whose pixels share nothing, or paths within blocks of 8 x 8; `None` where no pixel has
+    /// four samples.
     pub fn of(tiles: impl Iterator<Item = TileError>) -> Option<Self> {
         let mut sum = TileError::default();
-        let (mut halves2, mut within2, mut product2, mut product4) = (0.0, 0.0, 0.0, 0.0);
-        for tile in tiles {
-            sum += tile;
-            halves2 += tile.halves * tile.halves;
-            within2 += tile.within * tile.within;
-            let squared = tile.product * tile.product;
-            product2 += squared;
-            product4 += squared * squared;
+        tiles.for_each(|tile| sum += tile);
+        Self::with_reach(&sum, Z * sqrt(together(sum.blocks, sum.pixels)))
+    }
+
+    /// From the sums over regions, where a method shares between pixels far apart: regions count as independent. They
+    /// are few, so the interval is wider by Student's t.
+    pub fn of_regions(regions: impl Iterator<Item = TileError>) -> Option<Self> {
+        let (mut sum, mut squares, mut fourths) = (TileError::default(), 0.0, 0.0);
+        for region in regions {
+            sum += region;
+            let squared = region.product * region.product;
+            squares += squared;
+            fourths += squared * squared;
         }
+        let freedom = if fourths > 0.0 { squares * squares / fourths } else { 1.0 };
+        Self::with_reach(&sum, student_95(freedom) * sqrt(together(squares, sum.pixels)))
+    }
+
+    /// `reach`: standard errors from the estimate to an end of its interval, as if pixels were independent.
+    fn with_reach(sum: &TileError, reach: f64) -> Option<Self> {
         if sum.values == 0 {
             return None;
         }
-        if !(sum.halves > 0.0 && sum.parts > 0.0) {
+        if !(sum.filtered > 0.0 && sum.parts > 0.0) {
             // Without noise; unless what there is of it cannot be counted.
-            return (sum.halves == 0.0).then_some(Self { relmse: 0.0, lower: 0.0, upper: 0.0 });
+            return (sum.filtered == 0.0).then_some(Self { relmse: 0.0, lower: 0.0, upper: 0.0 });
         }
-        let corrected = sum.halves * (sum.crossed / sum.parts);
-        let delta = fmax(log(corrected / sum.plain), 0.0);
-
-        // Parts of one half are stratified together: their products are scaled to the noise that is there.
-        let scale = if within2 > 0.0 { halves2 / within2 } else { 1.0 };
-        let freedom = if product4 > 0.0 { product2 * product2 / product4 } else { 1.0 };
-        let noise = student_95(freedom) * sqrt(product2 * scale) / sum.halves;
-
-        let corrected = corrected / sum.values as f64;
-        let back = delta / (1.0 + delta);
-        let relmse = corrected * exp(-0.5 * back * back);
-        Some(Self {
-            relmse,
-            lower: relmse.min(corrected * exp(-sqrt(noise * noise + delta * delta))),
-            upper: corrected * exp(noise + UPWARDS * delta),
-        })
-        .filter(|estimate| estimate.upper.is_finite())
+        let most = sum.halves * (sum.crossed / sum.parts);
+        let delta = fmax(log(most / sum.filtered), 0.0);
+        let shift = delta / (1.0 + 2.0 * delta);
+        let relmse = sum.filtered / sum.values as f64 * exp(shift);
+        let noise = sqrt(4.0 / 3.0 * sum.squares) / (0.5 * (sum.filtered + sum.halves));
+        let reach = hypot(reach * noise, shift);
+        Some(Self { relmse, lower: relmse * exp(-reach), upper: relmse * exp(reach) })
+            .filter(|estimate| estimate.upper.is_finite())
     }
+}
+
+/// By how much errors that hang together make a sum over pixels vary more: from the squares of sums over parts of the
+/// picture and of pixels.
+fn together(parts: f64, pixels: f64) -> f64 {
+    if pixels > 0.0 { fmax(parts / pixels, 1.0) } else { 1.0 }
 }
 
 /// Student's t of `freedom` degrees lies between this and its negative with 95 % (expansion of Cornish and Fisher;
 /// too small by a tenth for two degrees, and taken at one for fewer).
 pub(super) fn student_95(freedom: f64) -> f64 {
-    const Z: f64 = 1.959_963_984_540_054;
     const FIRST: f64 = (Z * Z * Z + Z) / 4.0;
     const SECOND: f64 = (5.0 * Z * Z * Z * Z * Z + 16.0 * Z * Z * Z + 3.0 * Z) / 96.0;
     let freedom = fmax(freedom, 1.0);

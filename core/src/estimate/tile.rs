@@ -40,25 +40,33 @@ impl core::ops::AddAssign for TileLight {
     }
 }
 
+/// Pixels whose paths may be shared lie within blocks of 8 x 8, a quarter of a tile and of its Z-curve each.
+const BLOCK: usize = PIXELS_PER_TILE / 4;
+
 /// Sums over the pixels and channels of one tile, of squared differences over R² + 0.01 m². A and B are the means of
-/// the halves, A₁, A₂, B₁, B₂ of their parts; R comes from the whole picture, or filtered from one part of each half.
+/// the halves, A₁, A₂, B₁, B₂ of their parts; the R of each pair, of A₁ and B₁ and of A₂ and B₂, is filtered.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct TileError {
     /// Values: three for each pixel.
     pub(super) values: u64,
-    /// Variance of the picture by (A − B)² over its own noisy square: too small, for what made the difference
-    /// made the picture bright.
-    pub(super) plain: f64,
-    /// The same over the filtered square.
+    /// Variance of the picture by (A − B)² over the square of the mean of both R: too small where light is rare, for
+    /// what made the difference made R bright.
+    pub(super) filtered: f64,
+    /// The same over the squares of both R: the mean of both quotients.
     pub(super) halves: f64,
-    /// Variance of the pictures of A₁ and B₁, and of A₂ and B₂, over the filtered square.
+    /// Variance of the pictures of both pairs over the squares of both R.
     pub(super) parts: f64,
-    /// The same, each over the filtered square of the other: numerator and denominator are independent.
+    /// The same, each over the square of the other R: numerator and denominator are independent. Too large where a pair
+    /// saw nothing of a light that the other met.
     pub(super) crossed: f64,
-    /// Variance of the picture by (A₁ − A₂)² and (B₁ − B₂)², as if parts were independent.
-    pub(super) within: f64,
-    /// (A₁ − A₂)(B₁ − B₂) / 4: has the mean 0, and the variance of what the estimate is off by.
+    /// Squares of the variances of pixels, of the mean of `filtered` and `halves`.
+    pub(super) squares: f64,
+    /// Sum of (A₁ − A₂)(B₁ − B₂) / 4, which has the mean 0 and hangs together between pixels as the errors do.
     pub(super) product: f64,
+    /// Squares of that sum in blocks of 8 x 8 pixels.
+    pub(super) blocks: f64,
+    /// Squares of that sum in pixels.
+    pub(super) pixels: f64,
 }
 
 impl TileError {
@@ -80,31 +88,39 @@ impl TileError {
         lee(&second, &second_noise, &mut other);
 
         let mut sums = Self::default();
+        let mut blocks = [0.0; 4];
         for (i, pixel) in pixels.iter().enumerate().take(PIXELS_PER_TILE) {
             let Some([a1, a2, b1, b2]) = parts(pixel, scale) else { continue };
             let place = raster(i);
             // Light that two quarters have seen is there, even if its neighbours have not.
             let second_largest = a1.max(a2).min(b1.max(b2)).max(a1.min(a2).max(b1.min(b2)));
             let least = second_largest / SEEN_TWICE;
-            let [by_first, by_second] = [weight[place], other[place]].map(|r| over_square(r.max(least)));
+            let [first, second] = [weight[place].max(least), other[place].max(least)];
+            let (by_first, by_second) = (over_square(first), over_square(second));
             let by_both = 0.5 * (by_first + by_second);
+            let by_mean = over_square(0.5 * (first + second));
             let [noise1, noise2] = [first_noise[place], second_noise[place]];
             let variance = colour(pixel.scaled_variance(scale));
             sums.values += 3;
-            sums.plain += total(variance * over_square(scale * colour(pixel.mean())));
-            sums.halves += total(variance * by_both);
+            let (filtered, halves) = (total(variance * by_mean), total(variance * by_both));
+            sums.filtered += filtered;
+            sums.halves += halves;
+            let middle = 0.5 * (filtered + halves);
+            sums.squares += middle * middle;
             sums.parts += total(0.5 * (noise1 + noise2) * by_both);
             sums.crossed += total(0.5 * (noise1 * by_second + noise2 * by_first));
-            let (a, b) = (a1 - a2, b1 - b2);
-            sums.within += total((a * a + b * b) * by_both) / 16.0;
-            sums.product += total(a * b * by_both) / 4.0;
+            let product = total((a1 - a2) * (b1 - b2) * (by_both + by_mean)) / 8.0;
+            sums.product += product;
+            sums.pixels += product * product;
+            blocks[i / BLOCK % 4] += product;
         }
+        sums.blocks = blocks.iter().map(|block| block * block).sum();
         sums
     }
 
     /// Relative variance of a value of the tile, in the mean: its share of the picture's relMSE.
     pub fn noise(&self) -> f64 {
-        self.halves / self.values.max(1) as f64
+        self.filtered / self.values.max(1) as f64
     }
 }
 
@@ -112,12 +128,14 @@ impl TileError {
 impl core::ops::AddAssign for TileError {
     fn add_assign(&mut self, other: Self) {
         self.values += other.values;
-        self.plain += other.plain;
+        self.filtered += other.filtered;
         self.halves += other.halves;
         self.parts += other.parts;
         self.crossed += other.crossed;
-        self.within += other.within;
+        self.squares += other.squares;
         self.product += other.product;
+        self.blocks += other.blocks;
+        self.pixels += other.pixels;
     }
 }
 

@@ -12,7 +12,7 @@ const SIDE: usize = 8;
 /// The error of a picture `width` pixels across from all of its tiles.
 pub(super) fn estimate(tiles: &[TileError], width: u32, shares: bool) -> Option<ErrorEstimate> {
     if shares {
-        ErrorEstimate::of(merged(tiles, width).into_iter())
+        ErrorEstimate::of_regions(merged(tiles, width).into_iter())
     } else {
         ErrorEstimate::of(tiles.iter().copied())
     }

@@ -122,12 +122,13 @@ impl Rounds {
 
     /// Takes note of an estimate, which takes as long as a twentieth of a sample. The next is due after an eighth more
     /// samples, eight at least; where the error is to stop the render, when it can be reached at the earliest (errors
-    /// fall with the square of the samples at best), after a sixteenth at least and twice as many at most.
+    /// fall with the square of the samples at best, and intervals become narrower), after a thirty-second at least and
+    /// twice as many at most.
     pub(super) fn estimated(&mut self, error: Option<ErrorEstimate>) {
         let spp = self.spp;
         let next = match (self.stop.error, error) {
             (Some(wanted), Some(error)) => {
-                let growth = (error.upper / wanted).sqrt().clamp(1.0 + 1.0 / 16.0, 2.0);
+                let growth = (error.upper / wanted).cbrt().clamp(1.0 + 1.0 / 32.0, 2.0);
                 (f64::from(spp) * growth) as u32
             }
             _ => spp + (spp / 8).max(spp.min(8)),
