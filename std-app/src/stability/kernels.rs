@@ -12,7 +12,7 @@ use halflight_simd::kernels::eigen::decompose2;
 use halflight_simd::kernels::triangles::{Shear, intersect};
 
 /// The distance from f32 `exact` to the next.
-fn unit(exact: f64) -> f64 {
+pub(super) fn unit(exact: f64) -> f64 {
     let exponent = exact.abs().max(f64::from(f32::MIN_POSITIVE)).log2().floor();
     (exponent - 23.0).exp2()
 }
@@ -26,7 +26,7 @@ fn units_of_one(found: f32, exact: f64) -> f64 {
     (f64::from(found) - exact).abs() / unit(exact.abs().max(1.0))
 }
 
-fn worst(errors: impl Iterator<Item = f64>) -> f64 {
+pub(super) fn worst(errors: impl Iterator<Item = f64>) -> f64 {
     errors.fold(0.0, |worst, error| if error.is_nan() { f64::INFINITY } else { worst.max(error) })
 }
 

@@ -3,9 +3,11 @@
 //! Every expectation is a known answer (a furnace, a formula, an invariance, an f64 reference), none a recorded result. A
 //! random picture may be off by [`SIGMAS`] of its standard errors; what has no noise by rounding alone.
 
+mod derivatives;
 mod geometry;
 mod kernels;
 mod light;
+mod searches;
 mod surfaces;
 mod view;
 mod world;
@@ -42,6 +44,8 @@ pub fn run(wanted: &dyn Fn(&str) -> bool, tell: &mut dyn FnMut(&Outcome)) -> Vec
     surfaces::cases(&mut table);
     view::cases(&mut table);
     kernels::cases(&mut table);
+    derivatives::cases(&mut table);
+    searches::cases(&mut table);
     table.outcomes
 }
 
@@ -105,6 +109,16 @@ impl Table<'_> {
             measured: format!("{measured:.2} ulp"),
             passed: measured <= most,
         });
+    }
+
+    /// A kernel whose answers are right or wrong: `wrong` of `all` are. Less than a thousand would say nothing.
+    fn exact(&mut self, case: impl Into<String>, wrong: u32, all: u32) {
+        let case = case.into();
+        if !self.wants("kernels", &case) {
+            return;
+        }
+        let (expected, measured) = ("none wrong".into(), format!("{wrong} of {all} wrong"));
+        self.add(Outcome { group: "kernels", case, expected, measured, passed: wrong == 0 && all > 1000 });
     }
 }
 
