@@ -182,6 +182,8 @@ pub struct Seconds {
     /// Tracing paths, before a resumption too; without comparisons with a reference, checkpoints and calls of
     /// `progress`.
     pub render: f64,
+    /// Estimating the noise, a part of that; not before a resumption.
+    pub estimate: f64,
 }
 
 /// Whether neighbouring pixels shared what their paths found.

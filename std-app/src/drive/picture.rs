@@ -58,7 +58,7 @@ impl Picture<'_> {
         };
         let reference = clock.pause(|| settings.reference.as_deref().map(Reference::new));
         let mut latest = history.iter().rev().find_map(|round: &Round| round.error);
-        let mut estimating = 0.0;
+        let (mut estimating, mut estimate) = (0.0, 0.0);
         let mut saved = Instant::now();
         let mut is_lost = false;
         let save =
@@ -90,6 +90,7 @@ impl Picture<'_> {
                 let start = Instant::now();
                 let tiles = workers.errors(&canvas.film);
                 error = tiles.as_ref().and_then(|tiles| regions::estimate(tiles, width, method.shares()));
+                estimate += start.elapsed().as_secs_f64();
                 let audited = error.and_then(|noise| audit.as_ref()?.verdict(workers, &canvas.film, noise));
                 if let (true, Some(tiles)) = (settings.adaptive && rounds.spp() >= adapt::FROM, tiles) {
                     canvas.weights = Some(adapt::weights(&tiles, &canvas.taken, width));
@@ -130,8 +131,10 @@ impl Picture<'_> {
             let left = settings.stop.seconds.map(|limit| limit - estimating - clock.seconds());
             audit.step(workers, &canvas.film, rays(&canvas), clock.seconds(), left)?;
         }
-        let render = clock.seconds();
+        let start = Instant::now();
         let noise = workers.estimate(&canvas.film, method.shares());
+        estimate += start.elapsed().as_secs_f64();
+        let render = clock.seconds();
         let audited = noise.and_then(|noise| audit.as_ref()?.verdict(workers, &canvas.film, noise));
         let error = audited.as_ref().map(|audited| audited.total).or(noise);
         if let Some(last) = history.last_mut() {
@@ -147,7 +150,7 @@ impl Picture<'_> {
             variance: map(film, |pixel| pixel.variance().to_array()),
             samples: by_rows(film).map(|pixel| pixel.count()).collect(),
             threads: workers.count(),
-            seconds: Seconds { build: 0.0, render },
+            seconds: Seconds { build: 0.0, render, estimate },
             counters: canvas.counters,
             reuse: renderer.reuse(),
             cache: renderer.cache(),

@@ -32,6 +32,7 @@ pub(super) fn run(run: &Run) -> Value {
             "load": run.load_seconds,
             "build": result.seconds.build,
             "render": result.seconds.render,
+            "estimate": result.seconds.estimate,
             "total": run.total_seconds,
         },
         "rays": result.counters.rays + result.counters.shadow_rays,

@@ -79,6 +79,7 @@ fn facts(run: &Run) -> Vec<(&'static str, String)> {
     vec![
         ("Samples per pixel", grouped(result.spp.into())),
         ("Rendering", readable_seconds(result.seconds.render)),
+        ("Estimating its error", readable_seconds(result.seconds.estimate)),
         ("Rays per second", format!("{} million", number(speed, 2))),
         ("Memory at the peak", readable_bytes(result.memory_peak)),
         ("Dropped samples", dropped),
