@@ -31,21 +31,19 @@ SCENES = {
         "obj": "scenes/cornell/cornell.obj",
         "size": (512, 512),
         "camera": {"eye": (278, 273, -800), "look-at": (278, 273, 279), "up": (0, 1, 0), "fov": 37.5},
-        # -ar is in units of the whole scene.
-        "sweep": [(aa, ar) for aa in (0.3, 0.2, 0.15, 0.1, 0.07) for ar in (64, 256)],
         "target": 1e-3,
     },
     "two-rooms": {
         "obj": "scenes/two-rooms/two-rooms.obj",
         "size": (320, 240),
         "camera": {"eye": (0.6, 1.5, 3.8), "look-at": (3, 0.9, 0.6), "up": (0, 1, 0), "fov": 55},
-        "sweep": [(aa, ar) for aa in (0.3, 0.2, 0.15, 0.1, 0.07) for ar in (64, 256)],
         "target": 2e-3,
     },
 }
-DIVISIONS = (512, 2048)
-OVERSAMPLING = (2, 3, 4)
-BOUNCES = 8
+# -aa, -ar, -ad, from coarse to fine.
+SWEEP = [(0.4, 32, 256), (0.3, 32, 256), (0.3, 64, 512), (0.2, 32, 512), (0.2, 64, 1024), (0.15, 128, 1024), (0.1, 128, 2048)]
+OVERSAMPLING = (2, 4)
+BOUNCES = 5
 OURS = [(rays, error, spp) for rays in (256, 1024) for error in (1e-4, 3e-4) for spp in (4, 16, 64)]
 FIRST_REFERENCE_SEED = 1000
 CHUNK = 128
@@ -197,7 +195,7 @@ def reference(program, name, scene, spp):
 
 
 def compare(name, arguments, program, bin_folder):
-    scene = SCENES[name]
+    scene = SCENES[name] | ({"size": tuple(arguments.size)} if arguments.size else {})
     write_scene(name, workbench.ROOT / scene["obj"])
     with open(FOLDER / f"{name}.oct", "wb") as octree:
         subprocess.check_call([bin_folder / "oconv", "-w", FOLDER / f"{name}.rad"], stdout=octree)
@@ -217,17 +215,14 @@ def compare(name, arguments, program, bin_folder):
         extra = ["--audit", "off", "--cache-rays", rays, "--cache-error", error]
         picture, seconds = halflight(program, name, scene, "irradiance-cache", spp, 1, 1, extra)
         note("halflight", f"{rays} rays, error {error:g}, {spp} spp", picture, seconds)
-    for accuracy, resolution in scene["sweep"]:
-        for divisions in DIVISIONS:
-            # What is slow at two is not to be asked for four.
-            for oversampling in OVERSAMPLING:
-                settings = f"-aa {accuracy:g} -ar {resolution} -ad {divisions}, {oversampling}² pixels"
-                picture, seconds = rpict(bin_folder, name, scene, accuracy, resolution, divisions, oversampling)
-                note("rpict", settings, picture, seconds)
-                if seconds > arguments.most_seconds:
-                    break
+    for accuracy, resolution, divisions in SWEEP[: arguments.sweep]:
+        for oversampling in OVERSAMPLING[: arguments.oversampling]:
+            settings = f"-aa {accuracy:g} -ar {resolution} -ad {divisions}, {oversampling}² pixels"
+            picture, seconds = rpict(bin_folder, name, scene, accuracy, resolution, divisions, oversampling)
+            note("rpict", settings, picture, seconds)
     target = arguments.target or scene["target"]
-    best = {who: min((row[1], row[2], row[0]) for row in of if row[0] <= target) if any(row[0] <= target for row in of) else None for who, of in rows.items()}
+    fastest = lambda of: min(((row[1], row[2], row[0]) for row in of if row[0] <= target), default=None)
+    best = {who: fastest(of) for who, of in rows.items()}
     print(f"\nFastest with relMSE of at most {target:g}:")
     for who, row in best.items():
         print(f"- {who}: " + (f"{row[0]:.2f} s with {row[1]}, {row[2]:.2e}" if row else "none"))
@@ -240,7 +235,9 @@ def main():
     parser.add_argument("scenes", nargs="*", default=list(SCENES))
     parser.add_argument("--reference-spp", type=int, default=1024)
     parser.add_argument("--target", type=float, help="relMSE [default: of the scene]")
-    parser.add_argument("--most-seconds", type=float, default=60, help="no more pixels for settings slower than this")
+    parser.add_argument("--size", type=int, nargs=2, metavar=("W", "H"), help="pixels [default: of the scene]")
+    parser.add_argument("--sweep", type=int, default=len(SWEEP), help="only so many settings of rpict, the coarsest")
+    parser.add_argument("--oversampling", type=int, default=len(OVERSAMPLING), help="only so many numbers of its pixels")
     arguments = parser.parse_args()
     program, bin_folder = workbench.halflight_program(), programs()
     print(f"{workbench.machine()}; {PYRADIANCE}; one thread each", file=sys.stdout)
