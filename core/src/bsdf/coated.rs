@@ -75,6 +75,12 @@ pub(super) fn evaluate(coat: &impl Coat, wo: Vec3, wi: Vec3) -> (Rgb, f32) {
     both_lobes(coat, wo, wi, transmittance_o, coat.coat_probability(wo.z, transmittance_o))
 }
 
+/// The part of f cos θ_i that the base reflects.
+#[inline]
+pub(super) fn of_base(coat: &impl Coat, wo: Vec3, wi: Vec3) -> Rgb {
+    coat.base() * coat.transmittance(wo.z) * coat.transmittance(wi.z) * (wi.z.max(0.0) * FRAC_1_PI)
+}
+
 #[inline]
 fn weighted(coat: &impl Coat, wo: Vec3, wi: Vec3, transmittance_o: Rgb, p: f32) -> Option<BsdfSample> {
     if !(wi.z > 0.0) {

@@ -5,6 +5,7 @@
 //! up to white (Kelemen and Szirmay-Kalos 2001, eq. 5; Kulla and Conty 2017). The mix with metal is a
 //! weighted mean of two such surfaces.
 
+use super::Cover;
 use super::albedo::SchlickAlbedo;
 use super::coated::Coat;
 use super::{fresnel, resolve::unit};
@@ -43,6 +44,10 @@ impl Glossy {
     /// GGX alpha of the coat; 0 is smooth.
     pub fn alpha(&self) -> f32 {
         self.alpha
+    }
+
+    pub(super) fn cover(&self) -> Option<Cover> {
+        (self.base != Rgb::ZERO).then(|| Cover::schlick(self.alpha, self.specular))
     }
 
     pub(super) fn is_delta(&self) -> bool {

@@ -8,6 +8,7 @@
 #![allow(clippy::neg_cmp_op_on_partial_ord, reason = "!(x > 0) is meant: it catches NaN as well")]
 
 mod albedo;
+mod base;
 mod coated;
 mod conductor;
 mod dielectric;
@@ -21,6 +22,7 @@ mod plastic;
 mod resolve;
 mod rough_dielectric;
 
+pub(crate) use base::Cover;
 pub use conductor::Conductor;
 pub use dielectric::Dielectric;
 pub use diffuse::Diffuse;

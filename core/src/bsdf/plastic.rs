@@ -7,6 +7,7 @@
 //! `plastic` and `roughplastic` with `nonlinear` set.) Smooth, a white base returns exactly the T(θ_o)
 //! that reached it; rough, less, as every model of one bounce between microfacets does.
 
+use super::Cover;
 use super::albedo::{self, SchlickAlbedo};
 use super::coated::Coat;
 use super::fresnel;
@@ -55,6 +56,10 @@ impl Plastic {
     /// GGX alpha of the coat; 0 is smooth.
     pub fn alpha(&self) -> f32 {
         self.alpha
+    }
+
+    pub(super) fn cover(&self) -> Option<Cover> {
+        (self.base != Rgb::ZERO).then(|| Cover::dielectric(self.alpha, self.eta))
     }
 
     pub(super) fn is_delta(&self) -> bool {

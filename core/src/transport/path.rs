@@ -357,6 +357,9 @@ impl<'a, F: Features> PathTracer<'a, F> {
         counters: &mut Counters,
     ) -> Step {
         let scene = self.scene;
+        if self.settings.reuse {
+            exchange.go_behind(path);
+        }
         let mut throughput = Rgb::from(path.throughput);
         let segments = u32::from(path.segments);
         let direction = Vec3::from(ray.direction);
@@ -413,7 +416,7 @@ impl<'a, F: Features> PathTracer<'a, F> {
         path.share = Share::ALL;
         let is_diffuse = matches!(bsdf, Bsdf::Diffuse(_));
         if self.settings.reuse {
-            exchange.arrive(&point, is_diffuse, path);
+            exchange.arrive(&point, bsdf.cover(), path);
             throughput = Rgb::from(path.throughput);
         }
         let wo = point.frame.to_local(-direction);
@@ -447,6 +450,9 @@ impl<'a, F: Features> PathTracer<'a, F> {
                 if f == Rgb::ZERO {
                     return None;
                 }
+                if self.settings.reuse && exchange.is_lit() {
+                    exchange.light_is_of_base(bsdf.base_part(wo, wi, f));
+                }
                 let alone = sample.delta || ends;
                 let weight = if alone { 1.0 } else { power_heuristic(sample.pdf, pdf) };
                 let contribution = throughput * f * sample.radiance * (weight / sample.pdf);
@@ -474,6 +480,14 @@ impl<'a, F: Features> PathTracer<'a, F> {
         // What a smooth coat mirrors was not gathered.
         if reflected.is_some() && !sample.delta {
             path.share = Share::EMITTED;
+        }
+        if self.settings.reuse && exchange.is_lit() {
+            let f = sample.weight * sample.pdf;
+            exchange.path_is_of_base(if sample.delta {
+                Rgb::ZERO
+            } else {
+                bsdf.base_part(wo, sample.direction, f)
+            });
         }
         let mut throughput = throughput * sample.weight;
         if self.settings.reuse && is_diffuse && segments < ROULETTE_FROM {

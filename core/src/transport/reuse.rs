@@ -10,13 +10,16 @@
 //! with V the visibility between the two. The shares of one y_j add up to one: nothing is lost and nothing is
 //! counted twice, whatever V and g are, so the picture stays right in the mean. The price is one shadow ray for
 //! each pair, and errors that neighbours have in common.
+//!
+//! Where y has a coat, what its diffuse part sends back is shared, times T(to x_i) / T(to x_j), the shares that pass the
+//! coat; what the coat mirrors belongs to path j alone.
 
 use super::estimator::{Counters, MAX_CROSSINGS};
 use super::path::PathTracer;
 use super::shadow::{FEW, pass_cutout, passing};
 use super::wave::{Path, Wave};
 use crate::Rgb;
-use crate::bsdf::Features;
+use crate::bsdf::{Cover, Features};
 use crate::bvh::Coherence;
 use crate::geometry::Ray;
 use crate::scene::SurfacePoint;
@@ -83,6 +86,20 @@ fn density(x: &End, y: &End) -> f32 {
     if faces { leaving * arriving / square / square } else { 0.0 }
 }
 
+/// What covers the diffuse part of y. Only the light of that part is shared: what leaves y elsewhere is known from what
+/// left it here. The light of a coat is for the path alone that found it.
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[repr(C)]
+struct Coated {
+    cover: Cover,
+    /// The part of the base in the light that a shadow ray brings to y.
+    of_light: [f32; 3],
+    /// The part of the base in what the path finds behind y.
+    of_path: [f32; 3],
+    /// What of all this is known to be of the base.
+    base: [f32; 3],
+}
+
 /// What a path offers to its group, and what it gets.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C)]
@@ -99,6 +116,7 @@ pub(super) struct Exchange {
     segments: u16,
     /// [`ALONE`] and so on.
     stage: u16,
+    coated: Coated,
 }
 
 /// The path has met no diffuse point yet.
@@ -109,6 +127,10 @@ const LEAVING: u16 = 1;
 const TAKING: u16 = 2;
 /// It has met y, and gathers L.
 const OFFERING: u16 = 3;
+/// The same, y being coated: what the path has gathered came from a light.
+const LIT: u16 = 4;
+/// The same, but it came from behind y.
+const BEHIND: u16 = 5;
 
 impl Exchange {
     pub(super) fn new(group: u32) -> Self {
@@ -131,38 +153,95 @@ impl Exchange {
     /// The path is about to scatter at the next surface after x. Where that is fit to be met from elsewhere, it
     /// becomes y: the path then gathers for all its group, with throughput 1.
     #[inline]
-    pub(super) fn arrive(&mut self, point: &SurfacePoint, diffuse: bool, path: &mut Path) {
+    pub(super) fn arrive(&mut self, point: &SurfacePoint, cover: Option<Cover>, path: &mut Path) {
         if self.stage != LEAVING {
             return;
         }
         self.y = End::of(point);
         let density = density(&self.x, &self.y);
-        if diffuse && density > 0.0 && density < f32::INFINITY {
-            self.stage = OFFERING;
-            self.radiance = core::mem::take(&mut path.radiance);
-            path.throughput = [1.0; 3];
-        } else {
-            self.stage = TAKING;
+        match cover {
+            Some(cover) if density > 0.0 && density < f32::INFINITY => {
+                self.stage = if cover == Cover::NONE { OFFERING } else { LIT };
+                self.coated = Coated { cover, ..Coated::default() };
+                self.radiance = core::mem::take(&mut path.radiance);
+                path.throughput = [1.0; 3];
+            }
+            _ => self.stage = TAKING,
         }
+    }
+
+    /// Whether the path is at a coated y.
+    #[inline]
+    pub(super) fn is_lit(&self) -> bool {
+        self.stage == LIT
+    }
+
+    /// At a coated y: which part of the light that a shadow ray brings is the base's.
+    #[inline]
+    pub(super) fn light_is_of_base(&mut self, part: Rgb) {
+        self.coated.of_light = part.to_array();
+    }
+
+    /// At a coated y: which part of what is found behind it is the base's.
+    #[inline]
+    pub(super) fn path_is_of_base(&mut self, part: Rgb) {
+        self.coated.of_path = part.to_array();
+    }
+
+    /// The path has left y: what it has gathered so far came from a light.
+    #[inline]
+    pub(super) fn go_behind(&mut self, path: &mut Path) {
+        if self.stage == LIT {
+            self.divide(self.coated.of_light, path);
+            self.stage = BEHIND;
+        }
+    }
+
+    /// The path has ended: what it offers is what it has gathered, less what is its own.
+    #[inline]
+    fn finish(&mut self, path: &mut Path) {
+        match self.stage {
+            LIT => self.divide(self.coated.of_light, path),
+            BEHIND => self.divide(self.coated.of_path, path),
+            _ => return,
+        }
+        path.radiance = core::mem::take(&mut self.coated.base);
+        self.stage = OFFERING;
+    }
+
+    /// Divides what the path has gathered between base and coat.
+    fn divide(&mut self, part: [f32; 3], path: &mut Path) {
+        let light = Rgb::from(core::mem::take(&mut path.radiance));
+        let base = light * Rgb::from(part);
+        self.coated.base = (Rgb::from(self.coated.base) + base).to_array();
+        self.take(1.0, light - base);
+    }
+
+    /// What T of y at `x` is.
+    #[inline]
+    fn transmittance(&self, x: &End) -> Rgb {
+        let to_x = Vec3::from(x.position) - Vec3::from(self.y.position);
+        let cosine = to_x.dot(self.y.normal.into()) / to_x.length();
+        self.coated.cover.transmittance(cosine.clamp(0.0, 1.0))
     }
 
     /// What a throughput is worth in the pixel.
     #[inline]
     pub(super) fn worth(&self, throughput: Rgb) -> Rgb {
-        if self.stage == OFFERING { throughput * Rgb::from(self.throughput) } else { throughput }
+        if self.stage >= OFFERING { throughput * Rgb::from(self.throughput) } else { throughput }
     }
 
     /// What the pixel sees in the end, `path` being what the path gathered.
     #[inline]
     pub(super) fn seen(&self, path: &Path) -> Rgb {
-        let own = if self.stage == OFFERING { Rgb::ZERO } else { Rgb::from(path.radiance) };
+        let own = if self.stage >= OFFERING { Rgb::ZERO } else { Rgb::from(path.radiance) };
         own + Rgb::from(self.radiance)
     }
 
     /// What the pixel would see if nothing were shared, before it is.
     pub(super) fn alone(&self, path: &Path) -> Rgb {
-        let worth = if self.stage == OFFERING { Rgb::from(self.throughput) } else { Rgb::ONE };
-        Rgb::from(self.radiance) + worth * Rgb::from(path.radiance)
+        let worth = if self.stage >= OFFERING { Rgb::from(self.throughput) } else { Rgb::ONE };
+        Rgb::from(self.radiance) + worth * (Rgb::from(path.radiance) + Rgb::from(self.coated.base))
     }
 
     #[inline]
@@ -184,6 +263,9 @@ pub(super) struct Pair {
 impl<F: Features> PathTracer<'_, F> {
     /// Deals out what the first `count` paths of the wave have gathered behind their y.
     pub(super) fn share(&self, wave: &mut Wave, count: usize, counters: &mut Counters) {
+        for (exchange, path) in wave.exchanges.iter_mut().zip(wave.paths.iter_mut()).take(count) {
+            exchange.finish(path);
+        }
         let (mut pairs, mut rays, mut group) = (0, 0, 0..0);
         for j in 0..count {
             if j >= group.end {
@@ -234,8 +316,14 @@ impl<F: Features> PathTracer<'_, F> {
                 continue;
             }
             let total: f32 = takers.iter().map(|pair| pair.density).sum();
+            let offer = wave.exchanges[first.offering as usize];
+            let coated = offer.coated.cover != Cover::NONE;
+            let here = if coated { offer.transmittance(&offer.x) } else { Rgb::ONE };
             for pair in takers.iter().filter(|pair| pair.density > 0.0) {
-                wave.exchanges[pair.taking as usize].take(pair.density / total, light);
+                let taker = &mut wave.exchanges[pair.taking as usize];
+                let there = if coated { offer.transmittance(&taker.x) } else { Rgb::ONE };
+                let light = Rgb::select(here.cmpgt(Rgb::ZERO), light * there / here, Rgb::ZERO);
+                taker.take(pair.density / total, light);
             }
         }
     }
