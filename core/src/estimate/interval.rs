@@ -178,6 +178,52 @@ mod tests {
     }
 
     #[test]
+    fn light_that_few_samples_meet() {
+        // A row of pixels of 0.1 touches a lamp of 20 with a hundredth of its area, beside rows that are all lamp: in most
+        // pixels one of both pairs has not met it. The row has most of the error.
+        const LAMP: f32 = 20.0;
+        let (share, samples, pictures) = (0.01, 128, 60);
+        let (mut ratios, mut held) = (Vec::new(), 0);
+        for seed in 0..pictures {
+            let tile = |tile: u32| {
+                (0..PIXELS_PER_TILE).map(move |i| {
+                    let random = Random::new(seed, tile << 8 | i as u32);
+                    let row = crate::film::Tile::place(i).1;
+                    let mut pixel = Pixel::default();
+                    for sample in 0..samples {
+                        let met = row == 8 && random.single(2 * sample) < share;
+                        let noise = 0.05 * (2.0 * random.single(2 * sample + 1) - 1.0);
+                        let light = if met || row == 7 { LAMP } else { 0.1 + noise };
+                        pixel.add(sample, Rgb::splat(light), &mut Dropped::default());
+                    }
+                    pixel
+                })
+            };
+            let picture: Vec<Vec<Pixel>> = (0..4).map(|i| tile(i).collect()).collect();
+            let found = estimate(&picture).unwrap();
+            let light = |row: u32| match row {
+                7 => LAMP,
+                8 => share * LAMP + (1.0 - share) * 0.1,
+                _ => 0.1,
+            };
+            let mean = (0..16).map(|row| f64::from(light(row)) / 16.0).sum::<f64>();
+            let errors = picture.iter().flat_map(|tile| tile.iter().enumerate()).map(|(i, pixel)| {
+                let truth = f64::from(light(crate::film::Tile::place(i).1));
+                let error = f64::from(pixel.mean().x) - truth;
+                error * error / (truth * truth + 0.01 * mean * mean)
+            });
+            let error = errors.sum::<f64>() / (4.0 * 256.0);
+            ratios.push(found.relmse / error);
+            held += u32::from((found.lower..=found.upper).contains(&error));
+        }
+        ratios.sort_by(f64::total_cmp);
+        // Over the squares of single pairs it would be several times the error.
+        assert!((0.6..1.6).contains(&ratios[30]), "{ratios:?}");
+        // 90 % of 60 are 54; fewer than 48 have a chance of 1 %.
+        assert!(held >= 48, "{held} of {pictures}");
+    }
+
+    #[test]
     fn quantiles_are_those_of_the_tables() {
         for (freedom, table) in [(4.0, 2.776), (10.0, 2.228), (100.0, 1.984)] {
             assert!((student_95(freedom) / table - 1.0).abs() < 0.02);
