@@ -40,9 +40,9 @@ SCENES = {
         "target": 2e-3,
     },
 }
-# -aa, -ar, -ad, from coarse to fine.
-SWEEP = [(0.4, 32, 256), (0.3, 32, 256), (0.3, 64, 512), (0.2, 32, 512), (0.2, 64, 1024), (0.15, 128, 1024), (0.1, 128, 2048)]
-OVERSAMPLING = (2, 4)
+# -aa, -ar, -ad.
+SWEEP = [(0.6, 16, 64), (0.5, 16, 128), (0.5, 8, 256), (0.5, 16, 256), (0.4, 8, 512), (0.4, 16, 256), (0.3, 8, 512), (0.4, 32, 256)]
+OVERSAMPLING = (3, 4)
 BOUNCES = 5
 OURS = [(rays, error, spp) for rays in (256, 1024) for error in (1e-4, 3e-4) for spp in (4, 16, 64)]
 FIRST_REFERENCE_SEED = 1000
@@ -236,7 +236,7 @@ def main():
     parser.add_argument("--reference-spp", type=int, default=1024)
     parser.add_argument("--target", type=float, help="relMSE [default: of the scene]")
     parser.add_argument("--size", type=int, nargs=2, metavar=("W", "H"), help="pixels [default: of the scene]")
-    parser.add_argument("--sweep", type=int, default=len(SWEEP), help="only so many settings of rpict, the coarsest")
+    parser.add_argument("--sweep", type=int, default=len(SWEEP), help="only so many settings of rpict, the first")
     parser.add_argument("--oversampling", type=int, default=len(OVERSAMPLING), help="only so many numbers of its pixels")
     arguments = parser.parse_args()
     program, bin_folder = workbench.halflight_program(), programs()
