@@ -28,12 +28,9 @@ pub(super) fn build<'m, J: Join>(
     }
 
     let leaves = &mut leaves[..kept.div_ceil(LEAF)];
-    for (i, leaf) in leaves.iter_mut().enumerate() {
-        let rows: [Photon; LEAF] = bytemuck::cast(*leaf);
-        leaf.set(&rows[..LEAF.min(kept - i * LEAF)]);
-    }
     let nodes = &mut nodes[..levels.nodes];
-    bound(leaves, nodes, &levels);
+    turn(leaves, kept, &mut nodes[..levels.at(1, 0).min(levels.nodes)], join);
+    bound(nodes, &levels);
     PhotonMap { leaves, nodes, levels, count: kept, refused: offered - kept, space }
 }
 
@@ -101,33 +98,48 @@ fn widest_axis(photons: &[Photon]) -> usize {
     }
 }
 
-/// Puts boxes around the leaves, and around the nodes.
-fn bound(leaves: &[Leaf], nodes: &mut [Node], levels: &Levels) {
-    for level in 0..levels.count {
+/// Turns the leaves of `count` photons from rows to columns, and puts boxes around them: into `nodes`, those above.
+fn turn<J: Join>(leaves: &mut [Leaf], count: usize, nodes: &mut [Node], join: &J) {
+    if count > PARALLEL_MIN && nodes.len() > 1 {
+        let half = nodes.len() / 2;
+        let middle = half * WIDTH;
+        let (left, right) = leaves.split_at_mut(middle);
+        let (above_left, above_right) = nodes.split_at_mut(half);
+        join.join(
+            || turn(left, middle * LEAF, above_left, join),
+            || turn(right, count - middle * LEAF, above_right, join),
+        );
+        return;
+    }
+    nodes.fill(Node::EMPTY);
+    for (i, leaf) in leaves.iter_mut().enumerate() {
+        let rows: [Photon; LEAF] = bytemuck::cast(*leaf);
+        leaf.set(&rows[..LEAF.min(count - i * LEAF)]);
+        let column = |axis: usize| leaf.position[axis].as_flattened().iter().filter(|x| x.is_finite());
+        let lo = [0, 1, 2].map(|axis| column(axis).fold(f32::INFINITY, |a, &b| a.min(b)));
+        let hi = [0, 1, 2].map(|axis| column(axis).fold(f32::NEG_INFINITY, |a, &b| a.max(b)));
+        put(nodes, i, lo, hi);
+    }
+}
+
+/// Puts boxes around nodes, in the levels above the lowest.
+fn bound(nodes: &mut [Node], levels: &Levels) {
+    for level in 1..levels.count {
         let (below, here) = nodes.split_at_mut(levels.at(level, 0));
         let here = &mut here[..levels.at(level + 1, 0) - levels.at(level, 0)];
         here.fill(Node::EMPTY);
-        let mut set = |i: usize, lo: [f32; 3], hi: [f32; 3]| {
-            for axis in 0..3 {
-                here[i / WIDTH].boxes[axis][i % WIDTH] = lo[axis];
-                here[i / WIDTH].boxes[3 + axis][i % WIDTH] = hi[axis];
-            }
-        };
-        if level == 0 {
-            for (i, leaf) in leaves.iter().enumerate() {
-                let column =
-                    |axis: usize| leaf.position[axis].as_flattened().iter().filter(|x| x.is_finite());
-                let lo = [0, 1, 2].map(|axis| column(axis).fold(f32::INFINITY, |a, &b| a.min(b)));
-                let hi = [0, 1, 2].map(|axis| column(axis).fold(f32::NEG_INFINITY, |a, &b| a.max(b)));
-                set(i, lo, hi);
-            }
-        } else {
-            for (i, node) in below[levels.at(level - 1, 0)..].iter().enumerate() {
-                let lo = [0, 1, 2].map(|axis| node.boxes[axis].iter().fold(f32::INFINITY, |a, &b| a.min(b)));
-                let hi =
-                    [3, 4, 5].map(|row| node.boxes[row].iter().fold(f32::NEG_INFINITY, |a, &b| a.max(b)));
-                set(i, lo, hi);
-            }
+        for (i, node) in below[levels.at(level - 1, 0)..].iter().enumerate() {
+            let lo = [0, 1, 2].map(|axis| node.boxes[axis].iter().fold(f32::INFINITY, |a, &b| a.min(b)));
+            let hi = [3, 4, 5].map(|row| node.boxes[row].iter().fold(f32::NEG_INFINITY, |a, &b| a.max(b)));
+            put(here, i, lo, hi);
         }
+    }
+}
+
+/// The box of child `i` of a level.
+fn put(nodes: &mut [Node], i: usize, lo: [f32; 3], hi: [f32; 3]) {
+    for axis in 0..3 {
+        nodes[i / WIDTH].boxes[axis][i % WIDTH] = lo[axis];
+        nodes[i / WIDTH].boxes[3 + axis][i % WIDTH] = hi[axis];
     }
 }

@@ -2,7 +2,7 @@
 //! room behind it, on the same floor, which no test of planes and normals tells apart; and in a corner a part of the
 //! disc is no surface at all, so that its photons are too few for its area.
 //!
-//! Eight probes along the surface say how far it is to the next wall. What lies between two of them is seen as far as
+//! Eight probes along the surface say how far it is to the next wall, or to its own edge. What lies between two of them is seen as far as
 //! the nearer, less what a straight wall comes nearer in between. Photons beyond are left out, and the weights of the
 //! rest divided by what they integrate to over what is seen.
 
@@ -73,7 +73,7 @@ impl Fence {
     }
 
     /// What the weights integrate to over what is seen of the disc, of 1.
-    pub(super) fn share(&self, falloff: Falloff) -> f32 {
+    pub fn share(&self, falloff: Falloff) -> f32 {
         let parts = self.reach.iter().map(|&r| match falloff {
             Falloff::Constant => r * r,
             Falloff::Cone => r * r * (3.0 - 2.0 * r),

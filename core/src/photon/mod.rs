@@ -86,6 +86,39 @@ pub struct PhotonMap<'m> {
     space: Space,
 }
 
+/// What a map is besides the bytes that it lies in.
+#[derive(Clone, Copy, Debug)]
+pub struct MapShape {
+    levels: Levels,
+    count: usize,
+    refused: usize,
+    space: Space,
+}
+
+impl<'m> PhotonMap<'m> {
+    /// All that [`PhotonMap::again`] needs.
+    pub fn shape(&self) -> MapShape {
+        let Self { levels, count, refused, space, .. } = *self;
+        MapShape { levels, count, refused, space }
+    }
+
+    /// The map of this shape that was built in the bytes of `arena`, over [`Photons`] with room for `capacity`, and left
+    /// there. Over other bytes it is a map of anything.
+    ///
+    /// # Errors
+    /// [`OutOfMemory`] when the arena is smaller than [`Photons::footprint`], or than the shape.
+    pub fn again(shape: &MapShape, capacity: usize, arena: &mut Arena<'m>) -> Result<Self, OutOfMemory> {
+        let available = arena.available();
+        let short = OutOfMemory { needed: usize::MAX, available };
+        let Photons { leaves, nodes, .. } = Photons::new(capacity, arena)?;
+        let MapShape { levels, count, refused, space } = *shape;
+        let (leaves, nodes): (&[Leaf], &[Node]) = (leaves, nodes);
+        let leaves = leaves.get(..count.div_ceil(LEAF)).ok_or(short)?;
+        let nodes = nodes.get(..levels.nodes).ok_or(short)?;
+        Ok(Self { leaves, nodes, levels, count, refused, space })
+    }
+}
+
 impl PhotonMap<'_> {
     /// How many photons there are.
     pub fn len(&self) -> usize {
@@ -117,6 +150,28 @@ impl PhotonMap<'_> {
         // Nothing is at a negative squared distance.
         let squared_radius = self.space.squared(radius).unwrap_or(-1.0);
         level.dispatch(nearest::Search { map: self, place, squared_radius, neighbours });
+    }
+
+    /// The disc of the photons that are nearest to `place` by a search of `neighbours`, but of no larger radius than
+    /// `farthest`, and a factor on densities there. The last of k photons says how far the disc reaches, so that only
+    /// k - 1 of them are chance: E\[(k - 1) / (pi r²)\] is the density, E\[k / (pi r²)\] is larger. Where weights are zero
+    /// on the edge of the disc, the last photon leaves itself out.
+    pub fn disc_of_nearest(
+        &self,
+        level: Level,
+        (place, normal): (Vec3, Vec3),
+        farthest: f32,
+        falloff: Falloff,
+        neighbours: &mut Neighbours,
+    ) -> (Disc, f32) {
+        self.nearest(level, place, farthest, neighbours);
+        let squared = neighbours.squared_radius();
+        let k = neighbours.len() as f32;
+        let is_full = squared < f32::INFINITY && k > 1.0;
+        let factor = if is_full && falloff == Falloff::Constant { (k - 1.0) / k } else { 1.0 };
+        // Rounding must not decide about the last one.
+        let radius = if is_full { libm::sqrtf(squared) * (1.0 + 2.0 * f32::EPSILON) } else { farthest };
+        (Disc { place, normal, radius: radius.max(f32::MIN_POSITIVE), falloff }, factor)
     }
 
     /// Finds all photons within `radius` of `place`: how many they are, and in `found` their indices in rising

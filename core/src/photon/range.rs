@@ -12,6 +12,9 @@ pub(super) trait Visit<S: Simd> {
     fn leaf(&mut self, simd: S, index: usize, leaf: &Leaf);
 }
 
+/// How many leaves ahead of the one that is visited the memory is asked for.
+const AHEAD: usize = 4;
+
 /// Shows every leaf to `visitor` that has a box within the squared radius (below infinity) of a place.
 #[inline(always)]
 pub(super) fn leaves_within<S: Simd>(
@@ -22,33 +25,71 @@ pub(super) fn leaves_within<S: Simd>(
     visitor: &mut impl Visit<S>,
 ) {
     let Some(top) = map.levels.count.checked_sub(1) else { return };
-    let limit = simd.splat16(squared_radius);
-    // Of each node on the way down: its index on its level, and the set of its children that are left.
-    let mut path = [(0, 0u32); LEVELS];
-    let (mut level, mut index) = (top, 0);
+    let mut walk = Walk::new(simd, map, place, squared_radius, top);
+    // Leaves wait in a ring until their bytes have come.
+    let mut ring = [0; AHEAD];
+    let (mut put, mut taken) = (0, 0);
     loop {
-        let Some(node) = map.nodes.get(map.levels.at(level, index)) else { return };
-        let mut left = place.squared_distances_to_boxes(simd, &node.boxes).le(limit).bits();
-        if level == 0 {
-            while left != 0 {
-                let at = WIDTH * index + left.trailing_zeros() as usize;
-                left &= left - 1;
-                // The memory is asked for the next one while this one is visited.
-                prefetch(simd, map, WIDTH * index + left.trailing_zeros() as usize % WIDTH);
-                let Some(leaf) = map.leaves.get(at) else { return };
-                visitor.leaf(simd, at, leaf);
+        if let Some(at) = walk.next(simd) {
+            prefetch(simd, map, at);
+            ring[put % AHEAD] = at;
+            put += 1;
+            if put - taken < AHEAD {
+                continue;
             }
+        } else if taken == put {
+            return;
         }
-        while left == 0 {
-            level += 1;
-            if level > top || level >= LEVELS {
-                return;
+        let at = ring[taken % AHEAD];
+        taken += 1;
+        let Some(leaf) = map.leaves.get(at) else { return };
+        visitor.leaf(simd, at, leaf);
+    }
+}
+
+/// On the way through the nodes.
+struct Walk<'a, 'm, S: Simd> {
+    map: &'a PhotonMap<'m>,
+    place: &'a Place16<S>,
+    limit: S::F16,
+    /// Of each node on the way down: its index on its level, and the set of its children that are left.
+    path: [(usize, u32); LEVELS + 1],
+    level: usize,
+    top: usize,
+}
+
+impl<'a, 'm, S: Simd> Walk<'a, 'm, S> {
+    #[inline(always)]
+    fn new(simd: S, map: &'a PhotonMap<'m>, place: &'a Place16<S>, squared_radius: f32, top: usize) -> Self {
+        let limit = simd.splat16(squared_radius);
+        // Above the root, whose only child it is.
+        let mut path = [(0, 0); LEVELS + 1];
+        path[(top + 1) % (LEVELS + 1)] = (0, 1);
+        Self { map, place, limit, path, level: top + 1, top: top + 1 }
+    }
+
+    /// The next leaf.
+    #[inline(always)]
+    fn next(&mut self, simd: S) -> Option<usize> {
+        loop {
+            let (index, left) = self.path[self.level % (LEVELS + 1)];
+            if left == 0 {
+                if self.level >= self.top {
+                    return None;
+                }
+                self.level += 1;
+                continue;
             }
-            (index, left) = path[level];
+            self.path[self.level % (LEVELS + 1)].1 = left & (left - 1);
+            let child = WIDTH * index + left.trailing_zeros() as usize;
+            if self.level == 0 {
+                return Some(child);
+            }
+            self.level -= 1;
+            let node = self.map.nodes.get(self.map.levels.at(self.level, child))?;
+            let left = self.place.squared_distances_to_boxes(simd, &node.boxes).le(self.limit).bits();
+            self.path[self.level % (LEVELS + 1)] = (child, left);
         }
-        path[level] = (index, left & (left - 1));
-        index = WIDTH * index + left.trailing_zeros() as usize;
-        level -= 1;
     }
 }
 
