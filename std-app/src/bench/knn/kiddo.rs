@@ -1,15 +1,11 @@
 //! kiddo as the rival: its immutable tree, and the query that suits the task best. Where we gather, it only finds.
 
-use super::{Data, Searcher, Surfel, Task};
+use super::{Data, Searcher, Task};
 use crate::bench::BenchError;
 use core::num::NonZero;
 use kiddo::{ImmutableKdTree, SquaredEuclidean};
 
 pub(super) type Tree = ImmutableKdTree<f32, 3>;
-
-pub(super) fn points(photons: &[Surfel]) -> Vec<[f32; 3]> {
-    photons.iter().map(|surfel| surfel.place.to_array()).collect()
-}
 
 pub(super) fn build(points: &[[f32; 3]]) -> Result<Tree, BenchError> {
     Tree::new_from_slice(points).map_err(|error| BenchError::Rival(format!("kiddo refuses: {error:?}")))

@@ -1,12 +1,16 @@
 //! Searches per second of the photon map on one thread: the k nearest, with and without a radius, and the density
 //! estimate.
 //!
+//! The build is timed on two threads as well.
+//!
 //! Everything is timed [`REPETITIONS`] times by the wall clock, and the median counts; ours and the rival's
 //! repetitions alternate, so that whatever else the machine does meets both.
 
 mod data;
 #[cfg(feature = "kiddo")]
 mod kiddo;
+#[cfg(feature = "nanoflann")]
+mod nanoflann;
 mod ours;
 mod report;
 #[cfg(test)]
@@ -18,7 +22,9 @@ pub use report::{KnnReport, KnnRival, Speed};
 use super::{BenchError, REPETITIONS, median};
 use core::hint::black_box;
 use halflight_core::Level;
+use halflight_core::bvh::{Join, Serial};
 use halflight_core::photon::Photons;
+use rayon::{ThreadPool, ThreadPoolBuilder};
 use std::time::Instant;
 
 /// How much is searched, and how often.
@@ -106,27 +112,38 @@ trait Searcher {
 pub fn run(amount: Amount, level: Level) -> Result<KnnReport, BenchError> {
     let data = Data::new(amount.photons, amount.queries);
     let records = ours::records(&data.photons);
-    #[cfg(feature = "kiddo")]
-    let points = kiddo::points(&data.photons);
-    let (mut build, mut rival_build) = (Vec::new(), Vec::new());
+    let two = Two::new()?;
+    #[cfg(any(feature = "kiddo", feature = "nanoflann"))]
+    let points: Vec<[f32; 3]> = data.photons.iter().map(|surfel| surfel.place.to_array()).collect();
+    let (mut build, mut build_on_two) = (Vec::new(), Vec::new());
+    #[allow(unused_mut, reason = "without rivals")]
+    let (mut kiddo_build, mut nanoflann_build) = (Vec::<f64>::new(), Vec::<f64>::new());
     for _ in 0..REPETITIONS {
         let mut memory = Vec::new();
-        build.push(seconds(|| ours::build(&records, &mut memory).map(|map| map.len()))?.0);
+        build.push(seconds(|| ours::build(&records, &mut memory, &Serial).map(|map| map.len()))?.0);
+        let mut memory = Vec::new();
+        let time =
+            two.0.install(|| seconds(|| ours::build(&records, &mut memory, &two).map(|map| map.len())));
+        build_on_two.push(time?.0);
         #[cfg(feature = "kiddo")]
-        rival_build.push(seconds(|| kiddo::build(&points))?.0);
-        #[cfg(not(feature = "kiddo"))]
-        rival_build.push(f64::NAN);
+        kiddo_build.push(seconds(|| kiddo::build(&points))?.0);
+        #[cfg(feature = "nanoflann")]
+        nanoflann_build.push(seconds(|| nanoflann::build(&points))?.0);
     }
 
     let mut memory = Vec::new();
-    let map = ours::build(&records, &mut memory)?;
+    let map = ours::build(&records, &mut memory, &Serial)?;
     let bytes = Photons::footprint(records.len()).bytes();
     let (mut singly, mut together) = (ours::Singly { map: &map, level }, ours::Together { map: &map, level });
     let mut searchers: Vec<&mut dyn Searcher> = vec![&mut singly, &mut together];
     #[cfg(feature = "kiddo")]
-    let mut rival = kiddo::Kiddo(kiddo::build(&points)?);
+    let mut kiddo = kiddo::Kiddo(kiddo::build(&points)?);
     #[cfg(feature = "kiddo")]
-    searchers.push(&mut rival);
+    searchers.push(&mut kiddo);
+    #[cfg(feature = "nanoflann")]
+    let mut nanoflann = nanoflann::Nanoflann(nanoflann::build(&points)?);
+    #[cfg(feature = "nanoflann")]
+    searchers.push(&mut nanoflann);
 
     let mut speeds: Vec<Vec<Speed>> = searchers.iter().map(|_| Vec::new()).collect();
     for task in Task::ALL {
@@ -135,19 +152,44 @@ pub fn run(amount: Amount, level: Level) -> Result<KnnReport, BenchError> {
         }
     }
     let mut speeds = speeds.into_iter();
+    let (singly, together) = (speeds.next().unwrap_or_default(), speeds.next().unwrap_or_default());
+    let rivals = [
+        (cfg!(feature = "kiddo"), "kiddo", "kiddo 6 ImmutableKdTree", kiddo_build),
+        (cfg!(feature = "nanoflann"), "nanoflann", "nanoflann KDTreeSingleIndexAdaptor", nanoflann_build),
+    ];
+    let rivals = rivals.into_iter().filter(|(is_here, ..)| *is_here);
+    let rivals = rivals.map(|(_, key, name, builds)| KnnRival {
+        key,
+        name: name.into(),
+        build_seconds: median(builds),
+        speeds: speeds.next().unwrap_or_default(),
+    });
     Ok(KnnReport {
         level,
         amount,
         build_seconds: median(build),
+        build_seconds_on_two: median(build_on_two),
         bytes,
-        singly: speeds.next().unwrap_or_default(),
-        together: speeds.next().unwrap_or_default(),
-        rival: speeds.next().map(|speeds| KnnRival {
-            name: "kiddo 6 ImmutableKdTree".into(),
-            build_seconds: median(rival_build),
-            speeds,
-        }),
+        singly,
+        together,
+        rivals: rivals.collect(),
     })
+}
+
+/// Two threads.
+struct Two(ThreadPool);
+
+impl Two {
+    fn new() -> Result<Self, BenchError> {
+        let pool = ThreadPoolBuilder::new().num_threads(2).build();
+        pool.map(Self).map_err(|error| BenchError::Rival(format!("no threads: {error}")))
+    }
+}
+
+impl Join for Two {
+    fn join(&self, a: impl FnOnce() + Send, b: impl FnOnce() + Send) {
+        rayon::join(a, b);
+    }
 }
 
 /// What `work` gives, and how long it takes.

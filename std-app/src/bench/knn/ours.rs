@@ -3,6 +3,7 @@
 use super::{Data, Searcher, Surfel, Task};
 use crate::bench::BenchError;
 use glam::Vec3;
+use halflight_core::bvh::Join;
 use halflight_core::memory::{Arena, Footprint, Line, OutOfMemory};
 use halflight_core::photon::{Density, Disc, Falloff, Neighbours, Photon, PhotonMap, Photons, Turn, Uniform};
 use halflight_core::{Level, Rgb};
@@ -14,11 +15,15 @@ pub(super) fn records(photons: &[Surfel]) -> Vec<Photon> {
 }
 
 /// Puts the records into fresh memory and builds the map there.
-pub(super) fn build<'m>(records: &[Photon], memory: &'m mut Vec<Line>) -> Result<PhotonMap<'m>, BenchError> {
+pub(super) fn build<'m>(
+    records: &[Photon],
+    memory: &'m mut Vec<Line>,
+    join: &impl Join,
+) -> Result<PhotonMap<'m>, BenchError> {
     *memory = lines(Photons::footprint(records.len()))?;
     let mut photons = Photons::new(records.len(), &mut Arena::new(bytemuck::cast_slice_mut(memory)))?;
     photons.as_mut_slice().copy_from_slice(records);
-    Ok(photons.build(records.len()))
+    Ok(photons.build_with(records.len(), join))
 }
 
 fn lines(footprint: Footprint) -> Result<Vec<Line>, OutOfMemory> {

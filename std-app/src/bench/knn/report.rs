@@ -3,7 +3,7 @@
 use super::{Amount, Task};
 use halflight_core::Level;
 
-/// Our numbers, and the rival's.
+/// Our numbers, and the rivals'.
 #[derive(Clone, Debug)]
 pub struct KnnReport {
     /// The instruction set of our kernels.
@@ -12,19 +12,23 @@ pub struct KnnReport {
     pub amount: Amount,
     /// Seconds to put the photons into memory and build the map there.
     pub build_seconds: f64,
+    /// The same on two threads.
+    pub build_seconds_on_two: f64,
     /// Bytes of the map, its photons included.
     pub bytes: usize,
     /// One search after the other, one for each of [`Task::ALL`].
     pub singly: Vec<Speed>,
     /// All searches in one call.
     pub together: Vec<Speed>,
-    /// Where the program was built with one.
-    pub rival: Option<KnnRival>,
+    /// Those that the program was built with.
+    pub rivals: Vec<KnnRival>,
 }
 
-/// The rival's numbers.
+/// The numbers of a rival.
 #[derive(Clone, Debug)]
 pub struct KnnRival {
+    /// Its name in one word.
+    pub key: &'static str,
     /// Its name and version.
     pub name: String,
     /// Seconds to build its tree.

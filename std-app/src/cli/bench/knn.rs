@@ -18,7 +18,7 @@ const QUERIES: NonZero<usize> = NonZero::new(Amount::FULL.queries).unwrap();
 ///
 /// A million photons on the surfaces of a room, three tenths of them in the focus of a caustic; the 8, 50, 100 and
 /// 200 nearest of places on the surfaces, with and without a radius, and the density estimate. A program built with
-/// the feature `kiddo` measures kiddo's immutable tree in turn.
+/// the feature `kiddo` measures kiddo's immutable tree in turn, one with `nanoflann` nanoflann's.
 #[derive(Args)]
 pub(super) struct Knn {
     /// Photons in the map
@@ -55,6 +55,7 @@ fn object(report: &KnnReport) -> Value {
     let mut object = json!({
         "level": report.level.name(),
         "build_seconds": report.build_seconds,
+        "build_seconds_on_two_threads": report.build_seconds_on_two,
         "bytes_per_photon": report.bytes_per_photon(),
         "queries_per_second": by_task(&report.singly, speed),
         "queries_per_second_in_batches": by_task(&report.together, speed),
@@ -63,20 +64,21 @@ fn object(report: &KnnReport) -> Value {
         "queries": report.amount.queries,
         "repetitions": REPETITIONS,
     });
-    if let Some(rival) = &report.rival {
+    for rival in &report.rivals {
         let ratios = |ours: &[Speed]| -> Map<String, Value> {
             let names = ours.iter().map(|speed| speed.task.name());
             names.zip(rival.ratios(ours).into_iter().map(Value::from)).collect()
         };
-        object["rival"] = json!({
+        let mut singly = ratios(&report.singly);
+        singly.insert("build".into(), (rival.build_seconds / report.build_seconds).into());
+        object["rivals"][rival.key] = json!({
             "name": rival.name,
             "build_seconds": rival.build_seconds,
             "queries_per_second": by_task(&rival.speeds, speed),
             "found": by_task(&rival.speeds, found),
+            "ratios": singly,
+            "ratios_in_batches": ratios(&report.together),
         });
-        object["ratios"] = ratios(&report.singly).into();
-        object["ratios"]["build"] = (rival.build_seconds / report.build_seconds).into();
-        object["ratios_in_batches"] = ratios(&report.together).into();
     }
     object
 }
@@ -90,19 +92,25 @@ fn text(report: &KnnReport) -> String {
             report.amount.queries,
             report.level.name()
         ),
-        format!("build {:.3} s, {:.1} bytes a photon", report.build_seconds, report.bytes_per_photon()),
+        format!(
+            "build {:.3} s, {:.3} s on two threads, {:.1} bytes a photon",
+            report.build_seconds,
+            report.build_seconds_on_two,
+            report.bytes_per_photon()
+        ),
     ];
-    if let Some(rival) = &report.rival {
+    let mut beside = String::new();
+    for rival in &report.rivals {
         let ratio = rival.build_seconds / report.build_seconds;
         lines.push(format!("{}: build {:.3} s, ratio {ratio:.2}", rival.name, rival.build_seconds));
+        beside += &format!(" {:>9}{:>9}{:>9}", rival.key, "ratio", "batches");
     }
-    let beside = if report.rival.is_some() { "     rival    ratio  batches" } else { "" };
     lines.push(format!("{:<14}{:>9}{:>9}{:>9}{beside}", "", "found", "singly", "batches"));
     for (i, (one, all)) in report.singly.iter().zip(&report.together).enumerate() {
         let thousands = |speed: &Speed| format!("{:>9.1}", 1e-3 * speed.queries_per_second);
         let mut line =
             format!("{:<14}{:>9.1}{}{}", one.task.name(), one.found, thousands(one), thousands(all));
-        if let Some(theirs) = report.rival.as_ref().and_then(|rival| rival.speeds.get(i)) {
+        for theirs in report.rivals.iter().filter_map(|rival| rival.speeds.get(i)) {
             let ratio = |ours: &Speed| ours.queries_per_second / theirs.queries_per_second;
             line += &format!(" {}{:>9.2}{:>9.2}", thousands(theirs), ratio(one), ratio(all));
         }
