@@ -12,7 +12,7 @@ use halflight_core::memory::{Arena, Footprint, Line};
 use halflight_core::photon::{Photon, Photons};
 use halflight_core::scene::{Camera, Material, Scene, Surface};
 use halflight_core::transport::UNLIMITED;
-use halflight_core::transport::shoot::{PATHS, ROOM, ShootSettings, Shooter};
+use halflight_core::transport::shoot::{Keep, PATHS, ROOM, ShootSettings, Shooter};
 use halflight_core::{Level, Rgb};
 use halflight_tests::scenes::{SceneBuffers, cornell_box, emitter, everything};
 
@@ -47,7 +47,8 @@ fn photons(scene: &Scene, tasks: usize) -> Vec<Photon> {
     let mut emission_lines = lines(Emission::footprint(&lights));
     let mut arena = Arena::new(bytemuck::cast_slice_mut(&mut emission_lines));
     let emission = Emission::build(scene, &lights, &bvh.bounds(), &mut arena).unwrap();
-    let settings = ShootSettings { seed: 1, paths: (tasks * PATHS) as u32, max_depth: UNLIMITED };
+    let settings =
+        ShootSettings { keep: Keep::Reflected, seed: 1, paths: (tasks * PATHS) as u32, max_depth: UNLIMITED };
     let shooter = Shooter::<All>::new(scene, &bvh, &lights, &emission, settings, Level::detect());
     let mut scratch = lines(Shooter::<All>::scratch());
     let mut scratch = Arena::new(bytemuck::cast_slice_mut(&mut scratch));

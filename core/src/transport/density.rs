@@ -5,7 +5,7 @@ use crate::bsdf::{Bsdf, Features};
 use crate::bvh::{Bvh, Coherence};
 use crate::camera::Camera;
 use crate::geometry::{Hit, Ray};
-use crate::photon::{Disc, Falloff, Fence, PROBES, PhotonMap, Uniform};
+use crate::photon::{Disc, FLATNESS, Falloff, Fence, PROBES, PhotonMap, Uniform};
 use crate::scene::SurfacePoint;
 use crate::{Level, Rgb};
 use core::f32::consts::FRAC_1_PI;
@@ -22,6 +22,12 @@ const NEAREST: f32 = 0.05;
 /// surface bends less is none either.
 const LIFT: f32 = 0.1;
 
+/// How far of the way to a wall its foot is looked for.
+const BEFORE: f32 = 0.99;
+
+/// Steps by which the edge of a surface is found: to a sixteenth of the radius.
+const HALVINGS: u32 = 4;
+
 /// A photon map as paths from the eye use it.
 #[derive(Clone, Copy)]
 pub struct PhotonLight<'a> {
@@ -30,13 +36,33 @@ pub struct PhotonLight<'a> {
     /// Of discs, at distance one from the eye.
     radius: f32,
     nearest: f32,
+    falloff: Falloff,
+    /// Most discs have no photon, so that to look for one first is worth it.
+    is_sparse: bool,
 }
 
 impl<'a> PhotonLight<'a> {
     /// For a picture of `height` rows of a scene of that `diagonal`. Discs are `pixels` in radius.
     pub fn new(map: &'a PhotonMap<'a>, camera: &Camera, height: u32, diagonal: f32, pixels: f32) -> Self {
         let radius = pixels * 2.0 * camera.tan_half_fov / height.max(1) as f32;
-        Self { map, eye: camera.eye, radius, nearest: NEAREST * diagonal }
+        Self {
+            map,
+            eye: camera.eye,
+            radius,
+            nearest: NEAREST * diagonal,
+            falloff: Falloff::default(),
+            is_sparse: false,
+        }
+    }
+
+    /// The same, with photons weighed by `falloff`.
+    pub fn with_falloff(self, falloff: Falloff) -> Self {
+        Self { falloff, ..self }
+    }
+
+    /// The same for a map of caustics, which are on few surfaces.
+    pub fn of_caustics(self) -> Self {
+        Self { is_sparse: true, ..self }
     }
 
     /// The reflected light that `point` sends to `wo`, itself reflected; `None` where no photons are left on such a
@@ -58,34 +84,78 @@ impl<'a> PhotonLight<'a> {
             place: point.position,
             normal: point.geometric_normal,
             radius: self.radius * distance,
-            falloff: Falloff::Epanechnikov,
+            falloff: self.falloff,
         };
-        let fence = fence(bvh, level, point, disc.radius, turns);
-        let is_flat = point.frame.normal == point.geometric_normal;
-        if let (Bsdf::Diffuse(diffuse), true) = (bsdf, is_flat) {
-            let response = Uniform(diffuse.reflectance * FRAC_1_PI);
-            return Some(self.map.gather_within(level, &disc, &fence, &response).radiance);
+        if self.is_sparse && self.map.gather(level, &disc, &Uniform(Rgb::ONE)).photons == 0 {
+            return Some(Rgb::ZERO);
         }
-        // A photon's power has met the triangle: the cosine is in it already, and that of the triangle's normal.
-        let response = |from: Vec3| {
-            let wi = point.frame.to_local(from);
-            if !point.sides_agree(wi, from) {
-                return Rgb::ZERO;
-            }
-            bsdf.evaluate::<F>(wo, wi).0 / from.dot(point.geometric_normal).abs().max(GRAZING)
-        };
-        Some(self.map.gather_within(level, &disc, &fence, &response).radiance)
+        Some(reflected::<F>(self.map, (bvh, level), &disc, point, bsdf, wo, turns))
     }
 }
 
-/// Looks for walls around `point`, up to `radius`.
-fn fence(bvh: &Bvh, level: Level, point: &SurfacePoint, radius: f32, turns: f32) -> Fence {
-    let (ways, fence) = Fence::probes(point.geometric_normal, turns);
-    let probe = |way: Vec3| {
-        let way = way + LIFT * point.geometric_normal;
-        Ray { t_max: Fence::FARTHEST * radius, ..point.spawn(way) }
+/// What `point` reflects to `wo` of the light of the photons on `disc`, as far as it is seen from there.
+#[inline]
+pub(super) fn reflected<F: Features>(
+    map: &PhotonMap,
+    (bvh, level): (&Bvh, Level),
+    disc: &Disc,
+    point: &SurfacePoint,
+    bsdf: &Bsdf,
+    wo: Vec3,
+    turns: f32,
+) -> Rgb {
+    let origin = point.position + point.error * point.geometric_normal;
+    let fence = fence(bvh, level, origin, disc, turns);
+    let is_flat = point.frame.normal == point.geometric_normal;
+    if let (Bsdf::Diffuse(diffuse), true) = (bsdf, is_flat) {
+        let response = Uniform(diffuse.reflectance * FRAC_1_PI);
+        return map.gather_within(level, disc, &fence, &response).radiance;
+    }
+    // A photon's power has met the triangle: the cosine is in it already, and that of the triangle's normal.
+    let response = |from: Vec3| {
+        let wi = point.frame.to_local(from);
+        if !point.sides_agree(wi, from) {
+            return Rgb::ZERO;
+        }
+        bsdf.evaluate::<F>(wo, wi).0 / from.dot(point.geometric_normal).abs().max(GRAZING)
     };
+    map.gather_within(level, disc, &fence, &response).radiance
+}
+
+/// Looks for walls on `disc`, and for its edges, by probes from `origin`, just above its middle.
+pub(super) fn fence(bvh: &Bvh, level: Level, origin: Vec3, disc: &Disc, turns: f32) -> Fence {
+    let (ways, fence) = Fence::probes(disc.normal, turns);
+    let radius = disc.radius;
+    let probe = |way: Vec3| Ray::segment(origin, way + LIFT * disc.normal, Fence::FARTHEST * radius);
     let mut hits = [Hit::NONE; PROBES];
     bvh.nearest_batch(level, &ways.map(probe), Coherence::Incoherent, &mut hits);
-    fence(hits.map(|hit| if hit.is_some() { hit.t / radius } else { f32::INFINITY }))
+    let mut reach = hits.map(|hit| if hit.is_some() { hit.t / radius } else { f32::INFINITY });
+
+    // Where there is no surface within the thickness of the disc, there are no photons, and no area.
+    let depth = FLATNESS * radius;
+    let down = |way: Vec3, share: f32| {
+        let above = origin + share * radius * way + depth * disc.normal;
+        Ray::segment(above, -disc.normal, 2.0 * depth)
+    };
+    let mut rays = [Ray::segment(Vec3::ZERO, Vec3::Z, -1.0); PROBES];
+    for ((ray, way), reach) in rays.iter_mut().zip(&ways).zip(&reach) {
+        *ray = down(*way, BEFORE * reach.min(Fence::FARTHEST));
+    }
+    let mut is_there = [0; PROBES];
+    bvh.occluded_batch(level, &rays, &mut is_there);
+    for ((way, reach), _) in
+        ways.iter().zip(&mut reach).zip(&is_there).filter(|(_, is_there)| **is_there == 0)
+    {
+        let (mut low, mut high) = (0.0, reach.min(Fence::FARTHEST));
+        for _ in 0..HALVINGS {
+            let middle = 0.5 * (low + high);
+            if bvh.occluded(level, &down(*way, middle)) {
+                low = middle;
+            } else {
+                high = middle;
+            }
+        }
+        *reach = 0.5 * (low + high);
+    }
+    fence(reach)
 }

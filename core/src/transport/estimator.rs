@@ -23,6 +23,13 @@ pub struct PathSettings {
     pub reuse: bool,
 }
 
+impl PathSettings {
+    /// Whether paths have a limit of depth.
+    pub fn is_limited(&self) -> bool {
+        self.max_depth != UNLIMITED
+    }
+}
+
 /// What was done, for reports.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Counters {

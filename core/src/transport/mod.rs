@@ -2,11 +2,13 @@
 //!
 //! [`path`] is the path tracer that renders, a wavefront over a tile; [`mod@reference`] is the same estimator as a
 //! textbook has it, one path at a time, kept to test the other against. For the irradiance cache [`overture`] finds the
-//! places where it lacks a record, and [`gather`] makes one; [`shoot`] leaves the photons that [`PhotonLight`] gathers.
+//! places where it lacks a record, and [`gather`] makes one; [`shoot`] leaves the photons that [`PhotonLight`] gathers, and
+//! [`maps`] makes of them what gather rays end in.
 
 mod density;
 mod estimator;
 pub mod gather;
+pub mod maps;
 mod outlook;
 pub mod overture;
 pub mod path;

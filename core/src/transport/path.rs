@@ -9,7 +9,7 @@
 //! 4. Code for what the scene does not have is not compiled in ([`Features`]).
 //! 5. Where that pays, pixels of a group share what their paths find (`reuse.rs`).
 //! 6. Where an irradiance cache knows the indirect light of a diffuse point, the path need not find it
-//!    (`irradiance_cache.rs`); nor where photons tell it (`density.rs`).
+//!    (`irradiance_cache.rs`); nor where photons tell it (`density.rs`, `maps.rs`).
 //!
 //! The price: about 300 bytes for each path of a wave. What a pixel sees depends on (seed, sample) and the pixels of
 //! its group only, no wave cuts a group, and samples are summed in their order: the picture has the same bits for
@@ -17,9 +17,9 @@
 
 use super::density::PhotonLight;
 use super::estimator::{
-    Counters, MAX_CROSSINGS, MAX_VERTICES, PathSettings, ROULETTE_FROM, UNLIMITED, dimension,
-    power_heuristic, survival,
+    Counters, MAX_CROSSINGS, MAX_VERTICES, PathSettings, ROULETTE_FROM, dimension, power_heuristic, survival,
 };
+use super::maps::{PhotonMaps, Said};
 use super::places::Places;
 use super::reuse::{Exchange, GROUP};
 use super::shadow::{FEW, pass_cutout, passing, shadow_ray};
@@ -69,6 +69,8 @@ pub struct PathTracer<'a, F> {
     /// Frozen; of even and of odd samples.
     caches: Option<[&'a IrradianceCache<'a>; 2]>,
     photons: Option<PhotonLight<'a>>,
+    /// Of even and of odd samples.
+    maps: Option<&'a [PhotonMaps<'a>; 2]>,
     features: PhantomData<F>,
 }
 
@@ -94,6 +96,7 @@ impl<'a, F: Features> PathTracer<'a, F> {
             has_mirrors,
             caches: None,
             photons: None,
+            maps: None,
             features: PhantomData,
         }
     }
@@ -112,6 +115,13 @@ impl<'a, F: Features> PathTracer<'a, F> {
         Self { photons: Some(photons), ..*self }
     }
 
+    /// The same, where surfaces with a diffuse part have caustics from photons, and rays that gather from there end in a
+    /// map of photons: even samples in the first, odd ones in the second. Pixels must not share their paths as well.
+    /// Where depth is limited only the first point of a path is served.
+    pub fn with_maps(&self, maps: &'a [PhotonMaps<'a>; 2]) -> Self {
+        Self { maps: Some(maps), ..*self }
+    }
+
     /// The same, where pixels share what their paths find, or do not.
     pub fn with_reuse(&self, reuse: bool) -> Self {
         Self { settings: PathSettings { reuse, ..self.settings }, ..*self }
@@ -119,7 +129,7 @@ impl<'a, F: Features> PathTracer<'a, F> {
 
     /// Whether paths have a limit of depth.
     pub(super) fn is_limited(&self) -> bool {
-        self.settings.max_depth != UNLIMITED
+        self.settings.is_limited()
     }
 
     /// Number of tasks: tiles of the film.
@@ -368,7 +378,7 @@ impl<'a, F: Features> PathTracer<'a, F> {
 
         if !hit.is_some() {
             if let Some(environment) = &scene.environment
-                && path.share != Share::REFLECTED
+                && path.share.sees_emitters()
             {
                 let radiance = environment.radiance(scene, direction);
                 let mut weight = 1.0;
@@ -386,7 +396,7 @@ impl<'a, F: Features> PathTracer<'a, F> {
         if hit.triangle == path.triangle || (segments == 1 && point.is_left_by(ray)) {
             return path.cross(point.spawn(direction), hit, counters);
         }
-        if point.material.emits() && path.share != Share::REFLECTED {
+        if point.material.emits() && path.share.sees_emitters() {
             let radiance = emitted(scene, hit.triangle, point.uv, point.front);
             if radiance != Rgb::ZERO {
                 let mut weight = 1.0;
@@ -413,6 +423,7 @@ impl<'a, F: Features> PathTracer<'a, F> {
         if path.share.ends_at(&bsdf) {
             return Step::END;
         }
+        let came = path.share;
         path.share = Share::ALL;
         let is_diffuse = matches!(bsdf, Bsdf::Diffuse(_));
         if self.settings.reuse {
@@ -424,20 +435,32 @@ impl<'a, F: Features> PathTracer<'a, F> {
         // Lights behind an opaque surface need not be asked.
         let normal = if F::DIELECTRIC && bsdf.transmits() { Vec3::ZERO } else { point.frame.normal };
 
+        let mut said = Said::default();
+        if let Some(maps) = self.maps {
+            let turns = sampler.single(dimension::PROBES + segments);
+            let limit = if self.is_limited() { segments } else { 0 };
+            let maps = &maps[path.sample as usize & 1];
+            let from = position.distance(point.position);
+            said = maps.ask::<F>((self.bvh, self.level), (came, limit, from), &point, &bsdf, wo, turns);
+            path.add(throughput * said.light);
+        }
+
         // Where lights are small all around, and nothing mirrors them, a shadow ray alone finds the direct light. Not
         // that of an environment, which is not drawn from where it seemed to be hidden.
         let mut ends = false;
         if let (Some(caches), Bsdf::Diffuse(diffuse)) = (self.caches, &bsdf)
             && (segments == 1 || !self.is_limited())
+            && !said.is_all
             && let Some(indirect) = caches[path.sample as usize & 1].at(point.position, normal)
         {
             path.add(throughput * diffuse.reflectance * indirect.irradiance * FRAC_1_PI);
             path.share = Share::DIRECT;
+            said.next = Share::DIRECT;
             ends = indirect.shining < SMALL && !self.has_mirrors && scene.environment.is_none();
         }
 
         let mut light = None;
-        if !self.lights.is_empty() && !bsdf.is_delta() {
+        if !self.lights.is_empty() && !bsdf.is_delta() && !said.is_lit {
             let choice =
                 if self.lights.have_choice() { sampler.single(first + dimension::LIGHT_CHOICE) } else { 0.0 };
             let drawn = self.lights.draw(scene, point.position, normal, [u, v, choice]);
@@ -488,6 +511,12 @@ impl<'a, F: Features> PathTracer<'a, F> {
             } else {
                 bsdf.base_part(wo, sample.direction, f)
             });
+        }
+        if self.maps.is_some() {
+            if said.is_all && !sample.delta {
+                return Step { light, next: None };
+            }
+            path.share = if sample.delta { said.mirrored } else { said.next };
         }
         let mut throughput = throughput * sample.weight;
         if self.settings.reuse && is_diffuse && segments < ROULETTE_FROM {

@@ -1,11 +1,11 @@
 //! Light paths: photons from the lights, left on every rough surface that they meet after the first (Jensen 1996).
 //!
-//! What they leave is the light that surfaces reflect onto each other, and that mirrors and glass throw onto surfaces;
-//! light straight from a light is for shadow rays to find. All photons of a task advance together, so that the tracer
+//! What they leave is, by [`Keep`], the light that surfaces reflect onto each other, and that mirrors and glass throw onto
+//! surfaces, where light straight from a light is for shadow rays to find; all light; or caustics alone. All photons of a task advance together, so that the tracer
 //! sees batches of rays. Photon `i` of map `n` follows from (seed, n, i) alone.
 //!
 //! Departures from the plain algorithm:
-//! 1. After a photon was left, its path goes on with a probability of at most [`MOST`]. A path then leaves four photons
+//! 1. After a photon was left, its path goes on with a probability of at most [`MOST`]. A path then leaves five photons
 //!    on average at most, wherever it runs, so that [`ROOM`] for a task is enough: to be 14 standard deviations above
 //!    the mean it would have to live through as many ends as no sequence of random numbers holds.
 //! 2. The price: where surfaces are lighter than that, photons differ in power.
@@ -18,7 +18,7 @@ use crate::light::{EMISSION_DIMENSIONS, Emission, Lights};
 use crate::memory::{Arena, Footprint, OutOfMemory};
 use crate::photon::Photon;
 use crate::sampling::{Sampler, mix};
-use crate::scene::{Scene, SurfacePoint};
+use crate::scene::{Material, Scene, Surface, SurfacePoint};
 use crate::{Level, Rgb};
 use bytemuck::{Pod, Zeroable};
 use core::marker::PhantomData;
@@ -53,9 +53,49 @@ pub(super) fn holds_photons(bsdf: &Bsdf) -> bool {
     matches!(bsdf, Bsdf::Diffuse(_) | Bsdf::Glossy(_) | Bsdf::Plastic(_)) && !bsdf.is_delta()
 }
 
+/// Smooth enough to throw light onto something else in a pattern that gathering would not find: largest GGX alpha.
+const FOCUSING: f32 = 0.1;
+
+/// Whether such a surface makes caustics: it mirrors or refracts, and has no diffuse part.
+#[inline]
+pub(super) fn focuses(bsdf: &Bsdf) -> bool {
+    match bsdf {
+        Bsdf::Mirror(_) | Bsdf::Dielectric(_) => true,
+        Bsdf::Conductor(conductor) => conductor.alpha < FOCUSING,
+        Bsdf::RoughDielectric(glass) => glass.alpha < FOCUSING,
+        Bsdf::Diffuse(_) | Bsdf::Glossy(_) | Bsdf::Plastic(_) => bsdf.is_delta(),
+    }
+}
+
+/// Whether `material` may be such a surface somewhere.
+pub(super) fn may_focus(material: &Material) -> bool {
+    match &material.surface {
+        Surface::Diffuse { .. } => false,
+        Surface::Mirror { .. } => true,
+        Surface::Dielectric { roughness, .. } | Surface::Conductor { roughness, .. } => {
+            roughness.texture.is_some() || roughness.value * roughness.value < FOCUSING
+        }
+        Surface::Glossy { .. } => material.surface.may_be_smooth(),
+    }
+}
+
+/// Which photons are left.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Keep {
+    /// All but those that come straight from a light.
+    #[default]
+    Reflected,
+    /// All.
+    All,
+    /// Those that came from a light by mirrors and glass alone, at least one of them. Their paths end there.
+    Caustic,
+}
+
 /// What is shot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ShootSettings {
+    /// Which photons are left.
+    pub keep: Keep,
     /// Another seed, other photons.
     pub seed: u32,
     /// Light paths for each map.
@@ -132,8 +172,13 @@ impl<'a, F: Features> Shooter<'a, F> {
         Footprint::default().slice::<State>(PATHS).slice::<Ray>(PATHS).slice::<Hit>(PATHS)
     }
 
+    /// Photons that a task needs room for.
+    pub fn room(&self) -> usize {
+        if self.settings.keep == Keep::Caustic { PATHS } else { ROOM }
+    }
+
     /// Shoots the photons of task `task` of map number `map` (below 2^31). All of `out` is written; what is not needed,
-    /// with photons of no place, which a map refuses. Room for [`ROOM`] is enough.
+    /// with photons of no place, which a map refuses. Room for [`Shooter::room`] is enough.
     ///
     /// # Errors
     /// [`OutOfMemory`] where `scratch` has less than [`Shooter::scratch`] bytes.
@@ -222,12 +267,14 @@ impl<'a, F: Features> Shooter<'a, F> {
         }
         let bsdf = Bsdf::at::<F>(scene, point.material, point.uv, point.front);
         let power = Rgb::from(state.power);
-        let leaves = holds_photons(&bsdf) && state.segments > 1;
+        let holds = holds_photons(&bsdf);
+        let leaves = holds && (state.segments > 1 || self.settings.keep == Keep::All);
         if leaves {
             let photon = Photon::new(point.position, -direction, point.geometric_normal, power);
             pile.leave(photon, counters);
         }
-        if state.segments + 1 >= max_depth {
+        let ends = self.settings.keep == Keep::Caustic && (holds || !focuses(&bsdf));
+        if ends || state.segments + 1 >= max_depth {
             return None;
         }
 

@@ -51,11 +51,34 @@ impl Share {
     pub(super) const REFLECTED: Share = Share(2);
     /// Light straight from emitters: photons have the rest.
     pub(super) const EMITTED: Share = Share(3);
+    /// With photon maps: all but caustics. From a surface with a diffuse part; what is next that has one may end the path.
+    pub(super) const NO_CAUSTIC: Share = Share(4);
+    /// The same behind a mirror or glass, where emitters are caustics.
+    pub(super) const BEHIND_MIRROR: Share = Share(5);
+    /// With photon maps: all light, but the next surface with a diffuse part may end the path.
+    pub(super) const GATHERED: Share = Share(6);
 
     /// Whether what `bsdf` reflects or transmits belongs to the other share.
     #[inline]
     pub(super) fn ends_at(self, bsdf: &Bsdf) -> bool {
-        self == Self::EMITTED || self != Self::ALL && bsdf.is_delta() == (self == Self::REFLECTED)
+        match self {
+            Self::EMITTED => true,
+            Self::DIRECT => !bsdf.is_delta(),
+            Self::REFLECTED => bsdf.is_delta(),
+            _ => false,
+        }
+    }
+
+    /// Whether light of emitters at the end of the ray belongs to it.
+    #[inline]
+    pub(super) fn sees_emitters(self) -> bool {
+        self != Self::REFLECTED && self != Self::BEHIND_MIRROR
+    }
+
+    /// Whether the path may end in a map of photons.
+    #[inline]
+    pub(super) fn gathers(self) -> bool {
+        matches!(self, Self::REFLECTED | Self::NO_CAUSTIC | Self::BEHIND_MIRROR | Self::GATHERED)
     }
 }
 

@@ -128,6 +128,7 @@ impl Render {
             load_cache: self.load_cache.clone(),
             save_cache: self.save_cache.clone(),
             survey: self.report.is_some().then_some(SURVEY),
+            photon_view: self.report.is_some(),
             ..settings
         };
         let views = loaded.views();

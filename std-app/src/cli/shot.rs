@@ -5,11 +5,12 @@ use super::method::{self, Choice};
 use super::values;
 use super::view::View;
 use clap::{Args, ValueEnum};
-use halflight::drive::{CacheSettings, RenderError, Settings, Stop};
+use halflight::drive::{CacheSettings, Gather, PhotonSettings, RenderError, Settings, Stop};
 use halflight::load::LoadedScene;
 use halflight::report::words::readable_bytes;
 use halflight::save::{self, Image};
 use halflight_core::cache::irradiance::Metric;
+use halflight_core::photon::Falloff;
 use halflight_simd::{Level, Tier};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -76,6 +77,41 @@ pub(super) struct Options {
     /// Rays that are gathered for a record: 256, 1024 or 4096 [default: 1024]
     #[arg(long, value_name = "N", value_parser = values::gather_rays, help_heading = "Irradiance cache")]
     cache_rays: Option<u32>,
+    /// Where the rays of a record find light: on paths, or in a map of photons [default: paths]
+    #[arg(long, help_heading = "Irradiance cache")]
+    gather: Option<GatherBy>,
+    /// How the weight of a photon falls with its distance from where light is asked for [default: epanechnikov]
+    #[arg(long, value_name = "KERNEL", help_heading = "Photons")]
+    photon_kernel: Option<Kernel>,
+    /// Light paths of a global map of photons; those of a sample where the method is sppm [default: half as many as
+    /// pixels; as many]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1 << 28),
+        help_heading = "Photons")]
+    global_photons: Option<u32>,
+    /// Light paths of a map of caustics [default: half as many as pixels]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1 << 28),
+        help_heading = "Photons")]
+    caustic_photons: Option<u32>,
+}
+
+/// Where the rays of a record find light.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub(super) enum GatherBy {
+    /// On paths that go on from their ends
+    Paths,
+    /// In a map of photons
+    Photons,
+}
+
+/// How the weight of a photon falls.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub(super) enum Kernel {
+    /// The same everywhere
+    Constant,
+    /// Linearly
+    Cone,
+    /// With the square of the distance
+    Epanechnikov,
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
@@ -116,6 +152,10 @@ impl Options {
             cache_metric: self.cache_metric.or(base.cache_metric),
             cache_error: self.cache_error.or(base.cache_error),
             cache_rays: self.cache_rays.or(base.cache_rays),
+            gather: self.gather.or(base.gather),
+            photon_kernel: self.photon_kernel.or(base.photon_kernel),
+            global_photons: self.global_photons.or(base.global_photons),
+            caustic_photons: self.caustic_photons.or(base.caustic_photons),
             windows: self.windows.or(base.windows),
             max_depth: self.max_depth.or(base.max_depth),
             audit: self.audit.or(base.audit),
@@ -131,7 +171,22 @@ impl Options {
             metric: self.cache_metric.unwrap_or(defaults.metric),
             error: self.cache_error.map(|error| error as f32),
             strata: self.cache_rays.map_or(defaults.strata, u32::isqrt),
+            gather: match self.gather {
+                None => defaults.gather,
+                Some(GatherBy::Paths) => Gather::Paths,
+                Some(GatherBy::Photons) => Gather::Photons,
+            },
         }
+    }
+
+    fn photons(&self) -> PhotonSettings {
+        let falloff = match self.photon_kernel {
+            None => Falloff::default(),
+            Some(Kernel::Constant) => Falloff::Constant,
+            Some(Kernel::Cone) => Falloff::Cone,
+            Some(Kernel::Epanechnikov) => Falloff::Epanechnikov,
+        };
+        PhotonSettings { falloff, global: self.global_photons, caustic: self.caustic_photons }
     }
 
     fn level(&self) -> Level {
@@ -170,6 +225,7 @@ impl Shot {
             reuse: When::choice(options.reuse),
             windows: When::choice(options.windows),
             cache: options.cache(),
+            photons: options.photons(),
             audit: options.audit,
             threads: self.threads.map(|threads| threads as usize),
             memory: self.memory,

@@ -2,7 +2,7 @@
 
 use super::compare as comparing;
 use super::ledger;
-use halflight::drive::{Audited, BiasEstimate, Ending, ErrorEstimate};
+use halflight::drive::{Audited, BiasEstimate, Ending, ErrorEstimate, MapUse};
 use halflight::report::Run;
 use halflight::report::words::{plural, readable_bytes, readable_seconds};
 use std::path::Path;
@@ -63,6 +63,23 @@ pub(super) fn text(run: &Run, report: Option<&Path>) -> String {
             settings.cache.metric.name(),
         ));
     }
+    if let Some(photons) = result.photons {
+        lines.push(format!(
+            "light  {} for {} in {}{}",
+            map_text(&photons.global, "photon"),
+            plural(photons.maps, "map"),
+            readable_seconds(photons.seconds),
+            photons.caustic.map_or(String::new(), |map| format!("; {}", map_text(&map, "caustic photon"))),
+        ));
+        for (map, name) in [(Some(photons.global), "global"), (photons.caustic, "caustic")] {
+            if let Some(map) = map.filter(|map| map.given < map.wanted) {
+                lines.push(format!(
+                    "       for want of memory {} light paths of {} for a {name} map: the picture has more noise",
+                    map.given, map.wanted
+                ));
+            }
+        }
+    }
     lines.push(format!(
         "memory {}, {} at its peak",
         readable_bytes(result.memory.iter().map(|part| part.bytes).sum()),
@@ -104,4 +121,9 @@ pub(super) fn estimate(error: Option<ErrorEstimate>) -> String {
         }
         None => "error  unknown: it takes four samples per pixel and some light".into(),
     }
+}
+
+/// What became of the maps of one kind.
+fn map_text(map: &MapUse, name: &str) -> String {
+    format!("{} of {}", plural(map.stored, name), plural(map.shot, "light path"))
 }

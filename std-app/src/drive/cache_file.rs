@@ -2,7 +2,7 @@
 
 use super::error::FileError;
 use super::sealed::{self, Kind};
-use super::{Settings, fingerprint};
+use super::{Gather, Settings, fingerprint};
 use halflight_core::cache::irradiance::{IrradianceCache, Record};
 use halflight_core::scene::Scene;
 use serde::{Deserialize, Serialize};
@@ -36,7 +36,11 @@ impl Identity {
             version: env!("CARGO_PKG_VERSION").into(),
             scene: fingerprint::Parts::of(scene),
             max_depth: settings.max_depth,
-            metric: settings.cache.metric.name().into(),
+            // Records that were gathered from photons are others.
+            metric: match settings.cache.gather {
+                Gather::Paths => settings.cache.metric.name().into(),
+                Gather::Photons => format!("{} from photons", settings.cache.metric.name()),
+            },
             error: format!("{:e}", settings.cache.allowed()),
             rays: settings.cache.strata * settings.cache.strata,
         }

@@ -38,7 +38,9 @@ pub use history::{Against, Round};
 pub use ledger::Place;
 pub use memory::MemoryUse;
 pub use merge::{Merged, merge};
-pub use method::{CacheSettings, CacheUse, Method};
+pub use method::{
+    CacheSettings, CacheUse, Gather, MapUse, MapView, Method, PhotonSettings, PhotonUse, PhotonView,
+};
 pub use rounds::Stop;
 pub use study::{IrradianceStudy, MetricError, study_irradiance};
 pub use survey::{Check, Look, Mark, Survey};
@@ -73,6 +75,10 @@ pub struct Settings {
     pub reuse: Option<bool>,
     /// How an irradiance cache is filled, where the method has one.
     pub cache: CacheSettings,
+    /// How photons are used, where the method has any.
+    pub photons: PhotonSettings,
+    /// Whether maps of photons are looked at in the end, for a report. The time that this takes does not count.
+    pub photon_view: bool,
     /// Whether the environment is sampled through windows that a first look finds; `None` where it is to tell.
     pub windows: Option<bool>,
     /// Number of threads; `None`: as many as the machine runs at once.
@@ -130,6 +136,8 @@ impl Default for Settings {
             max_depth: None,
             reuse: None,
             cache: CacheSettings::default(),
+            photons: PhotonSettings::default(),
+            photon_view: false,
             windows: None,
             threads: None,
             memory: None,
@@ -226,6 +234,10 @@ pub struct RenderResult {
     /// What the irradiance cache looks like and how wrong it is, where that was asked for, the method has one and there
     /// is memory for it.
     pub survey: Option<Survey>,
+    /// What became of photons, where the method has any.
+    pub photons: Option<PhotonUse>,
+    /// The last maps of photons as the camera sees them, where that was asked for.
+    pub photon_view: Option<PhotonView>,
     /// Whether the sky was sampled through windows.
     pub windows: WindowUse,
     /// Where samples were dropped, the worst first.

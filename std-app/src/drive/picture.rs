@@ -155,6 +155,8 @@ impl Picture<'_> {
             reuse: renderer.reuse(),
             cache: renderer.cache(),
             survey: if interrupted { None } else { renderer.survey(workers)? },
+            photons: renderer.photons(),
+            photon_view: if settings.photon_view { renderer.photon_view()? } else { None },
             windows: WindowUse::default(),
             places: canvas.ledger.places(width, height),
             empty_pixels: empty_pixels(film, |task| canvas.shard.owns(task)),

@@ -2,7 +2,7 @@
 
 use super::{Maker, Race, Run};
 use crate::compare::Comparison;
-use crate::drive::{Against, Audited, Deviation, Ending, ErrorEstimate, Place, Region, Round, Shard};
+use crate::drive::{Against, Audited, Deviation, Ending, ErrorEstimate, MapUse, Place, Region, Round, Shard};
 use halflight_core::film::Dropped;
 use serde_json::{Map, Value, json};
 
@@ -73,6 +73,21 @@ pub(super) fn run(run: &Run) -> Value {
                 "seconds": survey.seconds,
             })),
         })),
+        "photons": result.photons.map(|photons| {
+            let map = |map: MapUse| json!({
+                "paths_wanted": map.wanted,
+                "paths_given": map.given,
+                "paths_shot": map.shot,
+                "stored": map.stored,
+            });
+            json!({
+                "maps": photons.maps,
+                "global": map(photons.global),
+                "caustic": photons.caustic.map(map),
+                "irradiances": photons.irradiances,
+                "seconds": photons.seconds,
+            })
+        }),
         "left_out": left_out,
         "outputs": run.outputs,
         "checkpoint": settings.checkpoint.as_ref().map(|checkpoint| &checkpoint.path),

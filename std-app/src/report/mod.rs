@@ -18,7 +18,7 @@ pub use maker::Maker;
 pub use race::{Race, Racer};
 
 use crate::compare::Comparison;
-use crate::drive::{RenderResult, Settings};
+use crate::drive::{Method, PhotonUse, RenderResult, Settings};
 use crate::save::Image;
 use halflight_core::census::Census;
 use halflight_core::scene::Scene;
@@ -66,6 +66,11 @@ impl Run<'_> {
         }
         if let (false, Some(_)) = (self.result.windows.used, self.result.windows.gain) {
             left_out.push(("windows to the environment", "each place sees enough of it"));
+        }
+        if let (Method::PhotonMap, Some(PhotonUse { caustic: None, .. })) =
+            (self.result.method, self.result.photons)
+        {
+            left_out.push(("map of caustics", "nothing is smooth enough to make any"));
         }
         left_out
     }

@@ -1,6 +1,6 @@
 //! Which picture a film is of: films can be continued and merged only where all of this is the same.
 
-use crate::drive::{Method, Settings, fingerprint};
+use crate::drive::{Gather, Method, Settings, fingerprint};
 use halflight_core::scene::Scene;
 use halflight_core::transport::PathSettings;
 use serde::{Deserialize, Serialize};
@@ -38,6 +38,14 @@ impl Identity {
         let mut cache = if cached { format!(", {:?}", settings.cache) } else { String::new() };
         if let Some(loaded) = loaded {
             cache += &format!(", loaded {loaded}");
+        }
+        let has_photons = match Method::named(method) {
+            Some(Method::PhotonMap | Method::ProgressivePhotons) => true,
+            Some(Method::IrradianceCache) => settings.cache.gather == Gather::Photons,
+            _ => false,
+        };
+        if has_photons {
+            cache += &format!(", {:?}", settings.photons);
         }
         Self {
             version: env!("CARGO_PKG_VERSION").into(),

@@ -7,6 +7,7 @@
 //! picture of the same scene.
 
 use super::overture::{Growing, Overture};
+use super::photons::{Laboratory, PhotonUse, Shelf};
 use super::{Method, Renderer, Stage};
 use crate::drive::audit::Audit;
 use crate::drive::cache_file::{self, Half, Header, View};
@@ -34,6 +35,8 @@ pub struct CacheSettings {
     pub error: Option<f32>,
     /// Strata along a side of the hemisphere that is gathered: its square is the number of rays of a record.
     pub strata: u32,
+    /// How the rays of a record find light.
+    pub gather: Gather,
 }
 
 impl CacheSettings {
@@ -45,8 +48,18 @@ impl CacheSettings {
 
 impl Default for CacheSettings {
     fn default() -> Self {
-        Self { metric: Metric::Halflight, error: None, strata: 32 }
+        Self { metric: Metric::Halflight, error: None, strata: 32, gather: Gather::Paths }
     }
+}
+
+/// How rays that are gathered for a record find the light that is reflected at their ends.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Gather {
+    /// By paths that go on from there, as far as the cache does not know it.
+    #[default]
+    Paths,
+    /// From a map of photons, where that is sure.
+    Photons,
 }
 
 /// What became of the caches.
@@ -82,8 +95,11 @@ pub(super) fn with<F: Features, T>(
     then: impl FnOnce(&mut dyn Renderer, &mut Memory) -> Result<T, RenderError>,
 ) -> Result<T, RenderError> {
     let Stage { scene, bvh, lights, settings, workers } = *stage;
-    let strata = settings.cache.strata as usize;
+    let CacheSettings { strata, gather, .. } = settings.cache;
+    let strata = strata as usize;
     let scratch = PathTracer::<F>::scratch(WAVE).or(PathTracer::<F>::gather_scratch(strata));
+    let by_photons = gather == Gather::Photons && has_indirect_light(settings);
+    let scratch = if by_photons { scratch.or(Laboratory::scratch::<F>()) } else { scratch };
     let scratch = memory.take_each("paths", scratch, workers.count())?;
     let mut tables = memory.take("gathering", CellFlux::footprint(strata))?;
     let flux = CellFlux::build(strata, &mut Arena::new(bytemuck::cast_slice_mut(&mut tables)))?;
@@ -94,6 +110,13 @@ pub(super) fn with<F: Features, T>(
     let fewest = loaded.iter().map(Vec::len).max().unwrap_or(0);
     let wanted = (pixels / PIXELS_PER_RECORD).max(FEWEST_RECORDS).saturating_add(fewest);
     let others = Audit::bytes::<F>(stage, Method::IrradianceCache.is_biased());
+    let laboratory = if by_photons {
+        // Half of the memory for photons at most: records need some as well.
+        let half = memory.available().saturating_sub(others) / 2;
+        Some(Laboratory::new(stage, memory, false, others.saturating_add(half))?)
+    } else {
+        None
+    };
     let available = memory.available().saturating_sub(others);
     let capacity = wanted.min(IrradianceCache::capacity_of(available / 2)).max(fewest);
     let footprint = IrradianceCache::footprint(capacity);
@@ -117,6 +140,7 @@ pub(super) fn with<F: Features, T>(
         gathering: Gathering { flux: &flux, metric, least_pixels: LEAST_PIXELS },
         size: [settings.width, settings.height],
         halves: [Growing::new(even, 0), Growing::new(odd, 1)],
+        laboratory,
         scratch,
         survey,
         view: View::of(scene, settings),
@@ -148,6 +172,7 @@ struct Cached<'a, F> {
     gathering: Gathering<'a>,
     size: [u32; 2],
     halves: [Growing<'a>; 2],
+    laboratory: Option<(Laboratory<'a>, [Shelf; 2])>,
     scratch: Vec<Vec<Line>>,
     /// Points, and memory for gathering there.
     survey: Option<(u32, Vec<Vec<Line>>)>,
@@ -165,12 +190,25 @@ struct Cached<'a, F> {
 impl<F: Features> Cached<'_, F> {
     /// Fills both halves, or goes on with it, and keeps them; whether that is done: not where the round is over.
     fn fill(&mut self, crew: &mut Crew) -> Result<bool, RenderError> {
-        let Self { tracer, gathering, size, halves, scratch, .. } = self;
+        let Self { tracer, gathering, size, halves, laboratory, scratch, .. } = self;
         let start = Instant::now();
         let overture = Overture { tracer, gathering, size: *size };
         let mut all = true;
-        for half in halves.iter_mut() {
-            all = all && overture.fill(half, crew, scratch)?;
+        for (i, half) in halves.iter_mut().enumerate() {
+            all = all
+                && match laboratory {
+                    Some((laboratory, shelves)) if !overture.is_done(half) => {
+                        match laboratory.build::<F>(&mut shelves[i], i as u32, crew, scratch)? {
+                            None => false,
+                            Some(built) => {
+                                let maps = [laboratory.light(&built, 0.0); 2];
+                                let tracer = &tracer.with_maps(&maps);
+                                Overture { tracer, ..overture }.fill(half, crew, scratch)?
+                            }
+                        }
+                    }
+                    _ => overture.fill(half, crew, scratch)?,
+                };
         }
         if all {
             halves.iter_mut().for_each(|half| half.cache.settle());
@@ -228,5 +266,9 @@ impl<F: Features> Renderer for Cached<'_, F> {
             gathered: gathered([0, 1].map(|i| self.halves[i].gathered() - self.loaded[i].gathered)),
             seconds: self.seconds,
         })
+    }
+
+    fn photons(&self) -> Option<PhotonUse> {
+        self.laboratory.as_ref().map(|(laboratory, _)| laboratory.used)
     }
 }

@@ -7,13 +7,18 @@
 mod irradiance_cache;
 mod overture;
 mod path;
+mod photon_map;
+mod photon_view;
+mod photons;
 mod sppm;
 #[cfg(test)]
 mod wrong;
 
 pub(super) use irradiance_cache::LEAST_PIXELS;
-pub use irradiance_cache::{CacheSettings, CacheUse};
+pub use irradiance_cache::{CacheSettings, CacheUse, Gather};
 pub(super) use overture::{Growing, Overture};
+pub use photon_view::{MapView, PhotonView};
+pub use photons::{MapUse, PhotonSettings, PhotonUse};
 
 use super::crew::Crew;
 use super::memory::Memory;
@@ -32,6 +37,8 @@ pub enum Method {
     Path,
     /// Indirect light of diffuse surfaces from an irradiance cache.
     IrradianceCache,
+    /// Photon mapping in two passes, with final gathering.
+    PhotonMap,
     /// Stochastic progressive photon mapping.
     ProgressivePhotons,
     /// Path tracing that is wrong on purpose.
@@ -41,13 +48,15 @@ pub enum Method {
 
 impl Method {
     /// All of them.
-    pub const ALL: [Method; 3] = [Method::Path, Method::IrradianceCache, Method::ProgressivePhotons];
+    pub const ALL: [Method; 4] =
+        [Method::Path, Method::IrradianceCache, Method::PhotonMap, Method::ProgressivePhotons];
 
     /// Its name on the command line, in films and in reports.
     pub const fn name(self) -> &'static str {
         match self {
             Method::Path => "path",
             Method::IrradianceCache => "irradiance-cache",
+            Method::PhotonMap => "photon-map",
             Method::ProgressivePhotons => "sppm",
             #[cfg(test)]
             Method::Wrong => "wrong",
@@ -60,6 +69,9 @@ impl Method {
             Method::Path => "Path tracing with next-event estimation and multiple importance sampling",
             Method::IrradianceCache => {
                 "Path tracing, but for the indirect light of diffuse surfaces, which is interpolated"
+            }
+            Method::PhotonMap => {
+                "Photon mapping: caustics from photons, indirect light by gather rays that end in a map of photons"
             }
             Method::ProgressivePhotons => {
                 "Stochastic progressive photon mapping: reflected light from photons, blurred ever less"
@@ -78,7 +90,7 @@ impl Method {
     pub const fn is_biased(self) -> bool {
         match self {
             Method::Path => false,
-            Method::IrradianceCache | Method::ProgressivePhotons => true,
+            Method::IrradianceCache | Method::PhotonMap | Method::ProgressivePhotons => true,
             #[cfg(test)]
             Method::Wrong => true,
         }
@@ -88,7 +100,7 @@ impl Method {
     pub const fn converges(self) -> bool {
         match self {
             Method::Path | Method::ProgressivePhotons => true,
-            Method::IrradianceCache => false,
+            Method::IrradianceCache | Method::PhotonMap => false,
             #[cfg(test)]
             Method::Wrong => false,
         }
@@ -96,7 +108,7 @@ impl Method {
 
     /// Whether it finds light that path tracing may miss: that of small lamps through mirrors and glass.
     pub const fn finds_caustics(self) -> bool {
-        matches!(self, Method::ProgressivePhotons)
+        matches!(self, Method::PhotonMap | Method::ProgressivePhotons)
     }
 
     /// Whether samples of pixels far from each other err together, through a structure that they share: their errors
@@ -104,7 +116,7 @@ impl Method {
     pub const fn shares(self) -> bool {
         match self {
             Method::Path => false,
-            Method::IrradianceCache | Method::ProgressivePhotons => true,
+            Method::IrradianceCache | Method::PhotonMap | Method::ProgressivePhotons => true,
             #[cfg(test)]
             Method::Wrong => false,
         }
@@ -120,6 +132,7 @@ impl Method {
         match self {
             Method::Path => then(&mut path::Paths::<F>::new(stage, memory)?, memory),
             Method::IrradianceCache => irradiance_cache::with::<F, T>(stage, memory, then),
+            Method::PhotonMap => then(&mut photon_map::TwoPasses::<F>::new(stage, memory)?, memory),
             Method::ProgressivePhotons => {
                 then(&mut sppm::ProgressivePhotons::<F>::new(stage, memory)?, memory)
             }
@@ -167,6 +180,19 @@ pub(super) trait Renderer {
 
     /// What became of its irradiance cache.
     fn cache(&self) -> Option<CacheUse> {
+        None
+    }
+
+    /// Its last maps of photons, as the camera sees them.
+    ///
+    /// # Errors
+    /// Memory that does not suffice.
+    fn photon_view(&mut self) -> Result<Option<PhotonView>, RenderError> {
+        Ok(None)
+    }
+
+    /// What became of its photons.
+    fn photons(&self) -> Option<PhotonUse> {
         None
     }
 }

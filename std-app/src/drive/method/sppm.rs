@@ -7,6 +7,8 @@
 //! No pixel keeps anything but its sum, and memory is the same for any number of samples. Even and odd samples count
 //! their radii apart, so that the halves of the film are two such pictures of their own.
 
+use super::photon_view::{self, PhotonView};
+use super::photons::{Drawer, MapUse, PhotonUse};
 use super::{Renderer, Stage};
 use crate::drive::RenderError;
 use crate::drive::crew::Crew;
@@ -16,11 +18,12 @@ use halflight_core::bsdf::Features;
 use halflight_core::light::Emission;
 use halflight_core::memory::{Arena, Line};
 use halflight_core::photon::Photons;
-use halflight_core::transport::shoot::{PATHS, ROOM, ShootSettings, Shooter};
+use halflight_core::transport::shoot::{Keep, PATHS, ROOM, ShootSettings, Shooter};
 use halflight_core::transport::{PathTracer, PhotonLight, path::WAVE};
+use std::time::Instant;
 
 /// Radius of the discs of the first sample, in pixels.
-const FIRST_RADIUS: f64 = 3.0;
+pub(super) const FIRST_RADIUS: f64 = 3.0;
 
 /// How fast radii shrink, a: with 2/3 the variance and the squared bias fall alike, as n^(-2/3).
 const ALPHA: f64 = 2.0 / 3.0;
@@ -34,7 +37,10 @@ pub(super) struct ProgressivePhotons<'a, F> {
     stage: Stage<'a>,
     tracer: PathTracer<'a, F>,
     paths: usize,
-    photons: Vec<Line>,
+    used: PhotonUse,
+    photons: Drawer,
+    /// The sample that they are of.
+    sample: Option<u32>,
     emission: Vec<Line>,
     scratch: Vec<Vec<Line>>,
 }
@@ -46,50 +52,82 @@ impl<'a, F: Features> ProgressivePhotons<'a, F> {
         let scratch = memory.take_each("paths", scratch, workers.count())?;
         let emission = memory.take("emission", Emission::footprint(lights))?;
         let pixels = settings.width as usize * settings.height as usize;
-        let wanted = pixels.clamp(FEWEST_PATHS, MOST_PATHS).div_ceil(PATHS);
+        let usual = pixels.clamp(FEWEST_PATHS, MOST_PATHS);
+        let wanted = settings.photons.global.map_or(usual, |paths| paths as usize).div_ceil(PATHS).max(1);
         let of_task = Photons::footprint(ROOM).bytes();
         let tasks = wanted.min(memory.available() / 4 / of_task).max(1);
-        let photons = memory.take("photons", Photons::footprint(tasks * ROOM))?;
+        let photons = Drawer::new(tasks * ROOM, memory)?;
         let tracer = PathTracer::<F>::new(scene, bvh, lights, path_settings(settings), settings.level);
-        Ok(Self { stage: *stage, tracer, paths: tasks * PATHS, photons, emission, scratch })
+        let [wanted, given] = [wanted, tasks].map(|tasks| (tasks * PATHS) as u64);
+        let global = MapUse { wanted, given, ..MapUse::default() };
+        let used = PhotonUse { global, ..PhotonUse::default() };
+        Ok(Self {
+            stage: *stage,
+            tracer,
+            paths: tasks * PATHS,
+            used,
+            photons,
+            sample: None,
+            emission,
+            scratch,
+        })
     }
 }
 
 impl<F: Features> Renderer for ProgressivePhotons<'_, F> {
     fn round(&mut self, crew: &mut Crew) -> Result<(), RenderError> {
-        let Self { stage, tracer, paths, photons, emission, scratch } = self;
-        let Stage { scene, bvh, lights, settings, workers } = *stage;
+        let Self { stage, tracer, paths, used, photons, sample: shot_for, emission, scratch } = self;
+        let Stage { scene, bvh, lights, settings, .. } = *stage;
         let bounds = bvh.bounds();
         let mut arena = Arena::new(bytemuck::cast_slice_mut(emission));
         let emission = Emission::build(scene, lights, &bounds, &mut arena)?;
         let shot = ShootSettings {
+            keep: Keep::Reflected,
             seed: settings.seed,
             paths: *paths as u32,
             max_depth: path_settings(settings).max_depth,
         };
         let shooter = Shooter::<F>::new(scene, bvh, lights, &emission, shot, settings.level);
-        let room = *paths / PATHS * ROOM;
         while let Some(sample) = crew.next_sample() {
-            let mut map = Photons::new(room, &mut Arena::new(bytemuck::cast_slice_mut(photons)))?;
-            let shoot = |task: usize, arena: &mut Arena, out: &mut [_]| shooter.run(task, sample, arena, out);
-            if !crew.pass(map.as_mut_slice(), ROOM, scratch, &shoot)? {
-                return Ok(());
+            // A round that was cut in the middle of a sample has left its photons.
+            if *shot_for != Some(sample) {
+                let start = Instant::now();
+                *shot_for = None;
+                let shoot =
+                    |task: usize, arena: &mut Arena, out: &mut [_]| shooter.run(task, sample, arena, out);
+                if !photons.fill(ROOM, crew, scratch, &shoot)? {
+                    return Ok(());
+                }
+                *shot_for = Some(sample);
+                used.maps += 1;
+                used.global.shot += *paths as u64;
+                used.global.stored += photons.map()?.map_or(0, |map| map.len()) as u64;
+                used.seconds += start.elapsed().as_secs_f64();
             }
-            let map = workers.build_photons(map, room);
+            let Some(map) = photons.map()? else { return Ok(()) };
             let pixels = FIRST_RADIUS * shrunk(sample / 2).sqrt();
             let light =
                 PhotonLight::new(&map, &scene.camera, settings.height, bounds.diagonal(), pixels as f32);
-            let tracer = tracer.with_photons(light);
+            let tracer = tracer.with_photons(light.with_falloff(settings.photons.falloff));
             crew.tiles(sample + 1, scratch, &|task, samples, arena, pixels| {
                 tracer.run(task, samples, WAVE, arena, pixels)
             })?;
         }
         Ok(())
     }
+
+    fn photon_view(&mut self) -> Result<Option<PhotonView>, RenderError> {
+        let Some(map) = self.photons.map()? else { return Ok(None) };
+        Ok(Some(photon_view::look::<F>(&self.stage, &map, None)?))
+    }
+
+    fn photons(&self) -> Option<PhotonUse> {
+        Some(self.used)
+    }
 }
 
 /// What is left of the squared radius after `samples`.
-fn shrunk(samples: u32) -> f64 {
+pub(super) fn shrunk(samples: u32) -> f64 {
     (1..=samples).map(f64::from).fold(1.0, |squared, i| squared * (i + ALPHA) / (i + 1.0))
 }
 

@@ -7,6 +7,7 @@ mod chart;
 mod error;
 mod map;
 mod parts;
+mod photons;
 mod picture;
 mod race;
 mod run;

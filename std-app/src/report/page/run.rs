@@ -2,7 +2,7 @@
 
 use super::map::{Map, difference};
 use super::picture::{exposable, reduced};
-use super::{audit, cache, error, escape, fill, parts, shell};
+use super::{audit, cache, error, escape, fill, parts, photons, shell};
 use crate::compare::Shown;
 use crate::drive::Ending;
 use crate::report::Run;
@@ -35,6 +35,7 @@ pub(in crate::report) fn page(run: &Run) -> String {
             ("audit", &audit::section(run)),
             ("cache", &cache::section(run)),
             ("reference", &reference(run)),
+            ("photons", &photons::section(run)),
             ("time", &parts::time(run)),
             ("memory", &parts::memory(run)),
             ("census", &parts::census(run)),

@@ -1,0 +1,269 @@
+//! The light of photon maps for final gathering (Jensen 1996): a gather ray that meets a surface with a diffuse part
+//! ends there, with the light that the global map says is reflected. Of every [`STRIDE`]th photon the irradiance is
+//! worked out beforehand, from the photons nearest to it; a gather ray then takes that of the nearest such photon
+//! (Christensen 1999, "Faster Photon Map Global Illumination").
+//!
+//! Departures:
+//! 1. A gather ray ends in the map only where that is sure. It goes on, as a path does, where it is shorter than the
+//!    blur of the map at its end is wide (Jensen's secondary gathering, by a measured distance), where there are few
+//!    photons, where none lies on a surface like that of the point, or where a wall is in between.
+//! 2. A photon knows whether there is a wall within the disc of its estimate. If not, it need not be asked for again.
+
+use super::PhotonLight;
+use super::density::{fence, reflected};
+use super::estimator::Counters;
+use super::shoot::{focuses, holds_photons, may_focus};
+use super::wave::Share;
+use crate::bsdf::{Bsdf, Features};
+use crate::bvh::Bvh;
+use crate::geometry::Ray;
+use crate::memory::{Arena, Footprint, Line, OutOfMemory};
+use crate::photon::{ALIKE, Disc, FLATNESS, Falloff, Neighbours, Photon, PhotonMap, Uniform};
+use crate::sampling::mix;
+use crate::scene::{Scene, SurfacePoint};
+use crate::{Level, Rgb};
+use core::f32::consts::{FRAC_1_PI, SQRT_2};
+use glam::Vec3;
+
+/// Of so many photons one gets an irradiance.
+pub const STRIDE: usize = 4;
+
+/// Irradiances of one task.
+pub const IRRADIANCES: usize = 256;
+
+/// Photons that an irradiance is estimated from.
+const NEAREST: usize = 64;
+
+/// Irradiances that a gather ray chooses from, and whose distance tells how wide the blur of the map is: the photons of
+/// an estimate reach [`BLUR`] times as far.
+const CHOICE: usize = 8;
+
+/// sqrt(NEAREST / (CHOICE · STRIDE)), as photons lie on surfaces.
+const BLUR: f32 = SQRT_2;
+
+/// The least length of a gather ray that ends in the map, in radii of the discs there.
+const SHORTEST: f32 = 1.5;
+
+/// Largest squared distance of the nearest irradiance in that of the last of [`CHOICE`]: among even ones it is less in 99
+/// of 100 places. Where it is more, the place is beside a bright spot, not in it.
+const BESIDE: f32 = 0.5;
+
+/// Working memory for a choice, on the stack: [`Neighbours::footprint`] of [`CHOICE`].
+const LINES: usize = 32;
+
+/// The least share of a disc that must be seen: in a slit a few photons would tell of all of it.
+const LEAST_SEEN: f32 = 0.1;
+
+/// How far above its surface a photon looks for walls, in radii of its disc: what is lower is no wall.
+const ABOVE: f32 = 1e-3;
+
+/// Works out the irradiance of photons: a pass over tasks of [`IRRADIANCES`].
+#[derive(Clone, Copy)]
+pub struct Irradiances<'a> {
+    bvh: &'a Bvh<'a>,
+    global: &'a PhotonMap<'a>,
+    /// Largest radius of a disc.
+    farthest: f32,
+    falloff: Falloff,
+    level: Level,
+}
+
+impl<'a> Irradiances<'a> {
+    /// For a map of all photons; discs of at most `farthest`.
+    pub fn new(
+        bvh: &'a Bvh<'a>,
+        global: &'a PhotonMap<'a>,
+        farthest: f32,
+        falloff: Falloff,
+        level: Level,
+    ) -> Self {
+        Self { bvh, global, farthest, falloff, level }
+    }
+
+    /// How many there are.
+    pub fn count(&self) -> usize {
+        self.global.len().div_ceil(STRIDE)
+    }
+
+    /// Working memory of one task.
+    pub fn scratch() -> Footprint {
+        Neighbours::footprint(NEAREST)
+    }
+
+    /// Those of task `task`: photons whose power is an irradiance, and which came from where their normal points if no
+    /// wall is near, otherwise from the other side. What is not needed of `out` is filled with photons of no place.
+    ///
+    /// # Errors
+    /// [`OutOfMemory`] where `scratch` has less than [`Irradiances::scratch`] bytes.
+    pub fn run(&self, task: usize, scratch: &mut Arena, out: &mut [Photon]) -> Result<Counters, OutOfMemory> {
+        let mut arena = scratch.scratch();
+        let mut neighbours = Neighbours::new(NEAREST, &mut arena)?;
+        for (i, slot) in out.iter_mut().enumerate() {
+            let index = (task * IRRADIANCES + i) * STRIDE;
+            let photon = u32::try_from(index).ok().and_then(|index| self.global.get(index));
+            *slot = photon.map_or(Photon::NONE, |photon| self.at(&photon, index, &mut neighbours));
+        }
+        Ok(Counters::default())
+    }
+
+    fn at(&self, photon: &Photon, index: usize, neighbours: &mut Neighbours) -> Photon {
+        let (place, normal) = (photon.position(), photon.normal());
+        let (disc, factor) =
+            self.global.disc_of_nearest(self.level, (place, normal), self.farthest, self.falloff, neighbours);
+        let above = ABOVE * disc.radius + 16.0 * f32::EPSILON * place.abs().max_element();
+        let turns = (mix(index as u64) >> 40) as f32 / (1u64 << 24) as f32;
+        let fence = fence(self.bvh, self.level, place + above * normal, &disc, turns);
+        if fence.share(self.falloff) < LEAST_SEEN {
+            return Photon::NONE;
+        }
+        let response = Uniform(Rgb::splat(factor));
+        let density = self.global.gather_within(self.level, &disc, &fence, &response);
+        let tells = if fence.is_open() { normal } else { -normal };
+        Photon::new(place, tells, normal, density.radiance)
+    }
+}
+
+/// Photons as gather rays use them.
+#[derive(Clone, Copy)]
+pub struct GatherLight<'a> {
+    global: &'a PhotonMap<'a>,
+    irradiances: &'a PhotonMap<'a>,
+    farthest: f32,
+    falloff: Falloff,
+}
+
+impl<'a> GatherLight<'a> {
+    /// With the map of the [`Irradiances`] of `global`, and what those were made with.
+    pub fn new(
+        global: &'a PhotonMap<'a>,
+        irradiances: &'a PhotonMap<'a>,
+        farthest: f32,
+        falloff: Falloff,
+    ) -> Self {
+        Self { global, irradiances, farthest, falloff }
+    }
+
+    /// The light that `point`, at the end of a gather ray of length `distance`, reflects to `wo`, but for what a smooth
+    /// coat mirrors. `None` where the map should not tell. `turns`, from 0 to 1, turns probes for walls.
+    pub(super) fn reflected<F: Features>(
+        &self,
+        (bvh, level): (&Bvh, Level),
+        point: &SurfacePoint,
+        bsdf: &Bsdf,
+        wo: Vec3,
+        distance: f32,
+        turns: f32,
+    ) -> Option<Rgb> {
+        // A ray that cannot be long enough need not look.
+        let within = self.farthest.min(distance / (SHORTEST * BLUR));
+        let mut lines = [Line([0; 64]); LINES];
+        let mut neighbours =
+            Neighbours::new(CHOICE, &mut Arena::new(bytemuck::cast_slice_mut(&mut lines))).ok()?;
+        self.irradiances.nearest(level, point.position, within, &mut neighbours);
+        let squared = neighbours.squared_radius();
+        if squared.is_infinite() {
+            return None;
+        }
+        let radius = BLUR * libm::sqrtf(squared);
+        let normal = point.geometric_normal;
+        let mut nearest: Option<(Photon, (f32, u32))> = None;
+        for (index, squared) in neighbours.iter() {
+            let Some(photon) = self.irradiances.get(index) else { continue };
+            let is_alike = photon.normal().dot(normal) >= ALIKE
+                && (photon.position() - point.position).dot(normal).abs() <= FLATNESS * radius;
+            if is_alike && nearest.is_none_or(|(_, least)| (squared, index) < least) {
+                nearest = Some((photon, (squared, index)));
+            }
+        }
+        let (photon, _) = nearest.filter(|(_, (least, _))| *least <= BESIDE * squared)?;
+        if photon.direction().dot(photon.normal()) < 0.0 {
+            let from = point.position + point.error * normal;
+            let above = ABOVE * radius + 16.0 * f32::EPSILON * from.abs().max_element();
+            let to = photon.position() + above * photon.normal();
+            if bvh.occluded(level, &Ray::segment(from + above * normal, to - from - above * normal, 1.0)) {
+                return None;
+            }
+        }
+        if let Bsdf::Diffuse(diffuse) = bsdf {
+            return Some(photon.power() * diffuse.reflectance * FRAC_1_PI);
+        }
+        let disc =
+            Disc { place: point.position, normal, radius: radius.min(self.farthest), falloff: self.falloff };
+        Some(reflected::<F>(self.global, (bvh, level), &disc, point, bsdf, wo, turns))
+    }
+}
+
+/// The maps that the samples of a picture share.
+#[derive(Clone, Copy)]
+pub struct PhotonMaps<'a> {
+    /// Light that mirrors and glass throw onto surfaces; `None` where paths find it for themselves, or there is none.
+    pub caustic: Option<PhotonLight<'a>>,
+    /// All light.
+    pub global: GatherLight<'a>,
+}
+
+/// What maps say of a vertex of a path.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Said {
+    /// Reflected light.
+    pub(super) light: Rgb,
+    /// Whether that is all light but what a smooth coat mirrors.
+    pub(super) is_all: bool,
+    /// Whether no light need be asked for by a shadow ray.
+    pub(super) is_lit: bool,
+    /// What a path finds that goes on from here,
+    pub(super) next: Share,
+    /// and what it finds by a smooth coat.
+    pub(super) mirrored: Share,
+}
+
+impl PhotonMaps<'_> {
+    /// Asks the maps about a vertex that a path which was to find `came` reached by a ray of length `distance`.
+    /// `limited` is the number of its segments where depth is limited, otherwise zero.
+    #[inline]
+    pub(super) fn ask<F: Features>(
+        &self,
+        tracer: (&Bvh, Level),
+        (came, limited, distance): (Share, u32, f32),
+        point: &SurfacePoint,
+        bsdf: &Bsdf,
+        wo: Vec3,
+        turns: f32,
+    ) -> Said {
+        // What was scattered by something with a diffuse part stays so.
+        let rest = if came.gathers() { Share::GATHERED } else { Share::ALL };
+        let all = Said { next: rest, mirrored: rest, ..Said::default() };
+        if !holds_photons(bsdf) {
+            return match came {
+                Share::NO_CAUSTIC | Share::BEHIND_MIRROR if focuses(bsdf) => Said {
+                    is_lit: true,
+                    next: Share::BEHIND_MIRROR,
+                    mirrored: Share::BEHIND_MIRROR,
+                    ..Said::default()
+                },
+                _ => all,
+            };
+        }
+        if came.gathers()
+            && (limited == 0 || limited == 2)
+            && let Some(light) = self.global.reflected::<F>(tracer, point, bsdf, wo, distance, turns)
+        {
+            return Said { light, is_all: true, is_lit: true, ..all };
+        }
+        if limited > 1 {
+            return Said::default();
+        }
+        match &self.caustic {
+            Some(caustic) => {
+                let light = caustic.reflected::<F>(tracer, point, bsdf, wo, turns).unwrap_or_default();
+                Said { light, next: Share::NO_CAUSTIC, ..all }
+            }
+            None => Said { next: Share::GATHERED, ..all },
+        }
+    }
+}
+
+/// Whether something in `scene` may make caustics.
+pub fn may_have_caustics(scene: &Scene) -> bool {
+    scene.materials.iter().any(may_focus)
+}

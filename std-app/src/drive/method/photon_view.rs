@@ -1,0 +1,117 @@
+//! Pictures of photon maps for a report: where photons lie, how dense they are, how far an estimate must reach, and how
+//! many of them lie where the camera sees them.
+
+use super::Stage;
+use halflight_core::bsdf::Features;
+use halflight_core::geometry::Ray;
+use halflight_core::memory::{Arena, Line, OutOfMemory};
+use halflight_core::photon::{Falloff, Neighbours, PhotonMap};
+use halflight_core::scene::SurfacePoint;
+
+/// The last maps, as the camera sees them.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct PhotonView {
+    /// Pixels across; all pictures have the same size.
+    pub width: u32,
+    /// Of all photons, or of those that were reflected.
+    pub global: MapView,
+    /// Of caustics.
+    pub caustic: Option<MapView>,
+}
+
+/// One map, as the camera sees it.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct MapView {
+    /// Photons seen in each pixel.
+    pub positions: Vec<f32>,
+    /// Photons per area, 1/m², from the nearest [`NEAREST`].
+    pub density: Vec<f32>,
+    /// Radius of the disc of those.
+    pub radius: Vec<f32>,
+    /// Share of the photons that the camera sees, directly.
+    pub seen: f64,
+}
+
+/// Photons that a density is estimated from.
+const NEAREST: usize = 64;
+
+/// Most pixels across and down.
+const MOST_PIXELS: u32 = 256;
+
+/// Most photons that are looked at.
+const MOST_PHOTONS: usize = 1 << 18;
+
+/// How much nearer than a photon something must be to hide it, relative.
+const BEFORE: f32 = 1e-3;
+
+/// Looks at the maps of `stage`.
+pub(super) fn look<F: Features>(
+    stage: &Stage,
+    global: &PhotonMap,
+    caustic: Option<&PhotonMap>,
+) -> Result<PhotonView, OutOfMemory> {
+    let Stage { settings, .. } = *stage;
+    let (width, height) = (settings.width, settings.height);
+    let factor = width.max(height).div_ceil(MOST_PIXELS);
+    let size = [width.div_ceil(factor), height.div_ceil(factor)];
+    let of = |map: &PhotonMap| look_at::<F>(stage, map, size);
+    Ok(PhotonView { width: size[0], global: of(global)?, caustic: caustic.map(of).transpose()? })
+}
+
+fn look_at<F: Features>(
+    stage: &Stage,
+    map: &PhotonMap,
+    [width, height]: [u32; 2],
+) -> Result<MapView, OutOfMemory> {
+    let Stage { scene, bvh, settings, .. } = *stage;
+    let (camera, level) = (&scene.camera, settings.level);
+    let pixels = width as usize * height as usize;
+    let mut view = MapView { positions: vec![0.0; pixels], ..MapView::default() };
+
+    let every = map.len().div_ceil(MOST_PHOTONS).max(1);
+    let (mut looked_at, mut seen) = (0u32, 0u32);
+    for photon in (0..map.len()).step_by(every).filter_map(|index| map.get(index as u32)) {
+        looked_at += 1;
+        let Some(at) = camera.project(width, height, photon.position(), [0.5; 2]) else { continue };
+        let is_inside = at.raster.x >= 0.0
+            && at.raster.y >= 0.0
+            && at.raster.x < width as f32
+            && at.raster.y < height as f32;
+        // Its surface must face the camera as well.
+        if !is_inside || at.direction.dot(photon.normal()) >= 0.0 {
+            continue;
+        }
+        let origin = photon.position() - at.distance * at.direction;
+        if bvh.occluded(level, &Ray::segment(origin, at.direction, (1.0 - BEFORE) * at.distance)) {
+            continue;
+        }
+        seen += 1;
+        let pixel = at.raster.y as usize * width as usize + at.raster.x as usize;
+        if let Some(count) = view.positions.get_mut(pixel) {
+            *count += every as f32;
+        }
+    }
+    view.seen = f64::from(seen) / f64::from(looked_at.max(1));
+
+    let mut lines = vec![Line([0; 64]); Neighbours::footprint(NEAREST).bytes() / size_of::<Line>()];
+    let mut neighbours = Neighbours::new(NEAREST, &mut Arena::new(bytemuck::cast_slice_mut(&mut lines)))?;
+    let farthest = bvh.bounds().diagonal();
+    for pixel in 0..pixels as u32 {
+        let (x, y) = (pixel % width, pixel / width);
+        let ray = camera.ray(width, height, x as f32 + 0.5, y as f32 + 0.5, [0.5; 2]);
+        let point = SurfacePoint::at::<F>(scene, &ray, &bvh.nearest(level, &ray));
+        let (mut density, mut radius) = (0.0, 0.0);
+        if let Some(point) = point {
+            let place = (point.position, point.geometric_normal);
+            let falloff = Falloff::Constant;
+            let (disc, factor) = map.disc_of_nearest(level, place, farthest, falloff, &mut neighbours);
+            if neighbours.len() == NEAREST {
+                radius = disc.radius;
+                density = factor * NEAREST as f32 / (core::f32::consts::PI * radius * radius);
+            }
+        }
+        view.density.push(density);
+        view.radius.push(radius);
+    }
+    Ok(view)
+}

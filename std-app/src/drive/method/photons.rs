@@ -1,0 +1,295 @@
+//! Photon maps of one scene: how many photons there is memory for, how they are shot and built on all threads, and what
+//! became of them.
+
+use super::Stage;
+use super::photon_view::{self, PhotonView};
+use crate::drive::RenderError;
+use crate::drive::crew::{Crew, Task};
+use crate::drive::memory::Memory;
+use crate::drive::run::path_settings;
+use halflight_core::bsdf::Features;
+use halflight_core::light::Emission;
+use halflight_core::memory::{Arena, Footprint, Line};
+use halflight_core::photon::{Falloff, MapShape, Photon, PhotonMap, Photons};
+use halflight_core::transport::maps::{
+    GatherLight, IRRADIANCES, Irradiances, PhotonMaps, STRIDE, may_have_caustics,
+};
+use halflight_core::transport::shoot::{Keep, PATHS, ROOM, ShootSettings, Shooter};
+use halflight_core::transport::{PathTracer, PhotonLight};
+use std::time::Instant;
+
+/// How photons are used.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct PhotonSettings {
+    /// How the weight of a photon falls with its distance.
+    pub falloff: Falloff,
+    /// Light paths of a map of all photons; `None`: by the number of pixels.
+    pub global: Option<u32>,
+    /// Light paths of a map of caustics; `None`: by the number of pixels.
+    pub caustic: Option<u32>,
+}
+
+/// What became of the maps of one kind.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct MapUse {
+    /// Light paths wanted for each map.
+    pub wanted: u64,
+    /// Light paths that there was memory for.
+    pub given: u64,
+    /// Light paths shot, for all maps.
+    pub shot: u64,
+    /// Photons that they left.
+    pub stored: u64,
+}
+
+/// What became of photons.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct PhotonUse {
+    /// Maps made.
+    pub maps: u64,
+    /// Of reflected light, or of all light.
+    pub global: MapUse,
+    /// Of caustics alone; `None` where nothing in the scene makes any.
+    pub caustic: Option<MapUse>,
+    /// Irradiances worked out beforehand.
+    pub irradiances: u64,
+    /// Seconds of shooting and building.
+    pub seconds: f64,
+}
+
+/// Pixels of the picture for each light path of a map.
+const PIXELS_PER_PATH: usize = 2;
+
+/// Tasks of a map, at least and at most, where their number follows from the picture.
+const FEWEST: usize = 16;
+const MOST: usize = 1024;
+
+/// Largest radius of a disc of the global map, in diagonals of the scene.
+const FARTHEST: f32 = 0.03;
+
+/// Other random numbers for maps of caustics.
+const CAUSTIC_SEED: u32 = 0x6361_7573;
+
+/// Shoots photons and builds maps.
+pub(super) struct Laboratory<'a> {
+    stage: Stage<'a>,
+    emission: Vec<Line>,
+    global: usize,
+    caustic: usize,
+    pub(super) used: PhotonUse,
+}
+
+/// The maps of one half of the film, and their memory.
+#[derive(Default)]
+pub(super) struct Shelf {
+    global: Drawer,
+    irradiances: Drawer,
+    caustic: Drawer,
+    /// Which maps they are.
+    number: Option<u32>,
+}
+
+/// One map and its memory.
+#[derive(Default)]
+pub(super) struct Drawer {
+    lines: Vec<Line>,
+    capacity: usize,
+    shape: Option<MapShape>,
+}
+
+impl Drawer {
+    pub(super) fn new(capacity: usize, memory: &mut Memory) -> Result<Self, RenderError> {
+        let lines = memory.take("photons", Photons::footprint(capacity))?;
+        Ok(Self { lines, capacity, shape: None })
+    }
+
+    pub(super) fn fill(
+        &mut self,
+        size: usize,
+        crew: &mut Crew,
+        scratch: &mut [Vec<Line>],
+        task: &Task<Photon>,
+    ) -> Result<bool, RenderError> {
+        let capacity = self.capacity;
+        let mut photons = Photons::new(capacity, &mut Arena::new(bytemuck::cast_slice_mut(&mut self.lines)))?;
+        if !crew.pass(photons.as_mut_slice(), size, scratch, task)? {
+            return Ok(false);
+        }
+        self.shape = Some(crew.workers.build_photons(photons, capacity).shape());
+        Ok(true)
+    }
+
+    pub(super) fn map(&mut self) -> Result<Option<PhotonMap<'_>>, RenderError> {
+        let mut arena = Arena::new(bytemuck::cast_slice_mut(&mut self.lines));
+        Ok(self.shape.map(|shape| PhotonMap::again(&shape, self.capacity, &mut arena)).transpose()?)
+    }
+}
+
+/// The maps of one half of the film.
+pub(super) struct Built<'m> {
+    global: PhotonMap<'m>,
+    irradiances: PhotonMap<'m>,
+    caustic: Option<PhotonMap<'m>>,
+}
+
+/// Bytes of the maps of one half.
+fn bytes(global: usize, caustic: usize) -> usize {
+    let irradiances = Photons::footprint(global * ROOM / STRIDE).bytes();
+    let both = Photons::footprint(global * ROOM).bytes().saturating_add(irradiances);
+    both.saturating_add(Photons::footprint(caustic * PATHS).bytes())
+}
+
+impl<'a> Laboratory<'a> {
+    /// For maps of the scene, with one of caustics where those are `wanted` and there may be any; and the memory for
+    /// both halves, of which so many `others` bytes are left free.
+    pub(super) fn new(
+        stage: &Stage<'a>,
+        memory: &mut Memory,
+        wants_caustics: bool,
+        others: usize,
+    ) -> Result<(Self, [Shelf; 2]), RenderError> {
+        let Stage { scene, lights, settings, .. } = *stage;
+        let emission = memory.take("emission", Emission::footprint(lights))?;
+        let pixels = settings.width as usize * settings.height as usize;
+        let usual = (pixels / PIXELS_PER_PATH).div_ceil(PATHS).clamp(FEWEST, MOST);
+        let tasks = |asked: Option<u32>| asked.map_or(usual, |paths| (paths as usize).div_ceil(PATHS).max(1));
+        let has_caustics = wants_caustics && may_have_caustics(scene);
+        let wanted =
+            [tasks(settings.photons.global), if has_caustics { tasks(settings.photons.caustic) } else { 0 }];
+        // Where memory is short, both get the same share of what they want.
+        let available = memory.available().saturating_sub(others) / 2;
+        let share = (available as f64 / bytes(wanted[0], wanted[1]) as f64).min(1.0);
+        let [global, caustic] =
+            wanted.map(|tasks| ((share * tasks as f64) as usize).max(usize::from(tasks > 0)));
+        let shelf = |memory: &mut Memory| -> Result<Shelf, RenderError> {
+            Ok(Shelf {
+                global: Drawer::new(global * ROOM, memory)?,
+                irradiances: Drawer::new(global * ROOM / STRIDE, memory)?,
+                caustic: Drawer::new(caustic * PATHS, memory)?,
+                number: None,
+            })
+        };
+        let shelves = [shelf(memory)?, shelf(memory)?];
+        let used = |wanted: usize, given: usize| MapUse {
+            wanted: (wanted * PATHS) as u64,
+            given: (given * PATHS) as u64,
+            ..MapUse::default()
+        };
+        let used = PhotonUse {
+            global: used(wanted[0], global),
+            caustic: has_caustics.then(|| used(wanted[1], caustic)),
+            ..PhotonUse::default()
+        };
+        Ok((Self { stage: *stage, emission, global, caustic, used }, shelves))
+    }
+
+    /// Working memory of each thread.
+    pub(super) fn scratch<F: Features>() -> Footprint {
+        Shooter::<F>::scratch().or(Irradiances::scratch())
+    }
+
+    /// The maps of number `map`, made where they are not yet on the shelf. `None` where the round is over before they are
+    /// done.
+    pub(super) fn build<'m, F: Features>(
+        &mut self,
+        shelf: &'m mut Shelf,
+        map: u32,
+        crew: &mut Crew,
+        scratch: &mut [Vec<Line>],
+    ) -> Result<Option<Built<'m>>, RenderError> {
+        if shelf.number != Some(map) {
+            shelf.number = None;
+            if !self.fill::<F>(shelf, map, crew, scratch)? {
+                return Ok(None);
+            }
+            shelf.number = Some(map);
+        }
+        let (Some(global), Some(irradiances)) = (shelf.global.map()?, shelf.irradiances.map()?) else {
+            return Ok(None);
+        };
+        Ok(Some(Built { global, irradiances, caustic: shelf.caustic.map()? }))
+    }
+
+    fn fill<F: Features>(
+        &mut self,
+        shelf: &mut Shelf,
+        map: u32,
+        crew: &mut Crew,
+        scratch: &mut [Vec<Line>],
+    ) -> Result<bool, RenderError> {
+        let Stage { scene, bvh, lights, settings, .. } = self.stage;
+        let start = Instant::now();
+        let farthest = self.farthest();
+        let mut arena = Arena::new(bytemuck::cast_slice_mut(&mut self.emission));
+        let emission = Emission::build(scene, lights, &bvh.bounds(), &mut arena)?;
+        let paths = path_settings(settings);
+        // One segment more is to come after the global map: that of the gather ray.
+        let short = if paths.is_limited() { paths.max_depth - 1 } else { paths.max_depth };
+        let shooter = |tasks: usize, keep: Keep, seed: u32, max_depth: u32| {
+            let shot = ShootSettings { keep, seed, paths: (tasks * PATHS) as u32, max_depth };
+            Shooter::<F>::new(scene, bvh, lights, &emission, shot, settings.level)
+        };
+        let shoot = [
+            (&mut shelf.global, shooter(self.global, Keep::All, settings.seed, short)),
+            (
+                &mut shelf.caustic,
+                shooter(self.caustic, Keep::Caustic, settings.seed ^ CAUSTIC_SEED, paths.max_depth),
+            ),
+        ];
+        for (drawer, shooter) in shoot.into_iter().filter(|(drawer, _)| drawer.capacity > 0) {
+            let task = |task: usize, arena: &mut Arena, out: &mut [_]| shooter.run(task, map, arena, out);
+            if !drawer.fill(shooter.room(), crew, scratch, &task)? {
+                return Ok(false);
+            }
+        }
+        let Some(global) = shelf.global.map()? else { return Ok(false) };
+        let all = Irradiances::new(bvh, &global, farthest, settings.photons.falloff, settings.level);
+        let task = |task: usize, arena: &mut Arena, out: &mut [_]| all.run(task, arena, out);
+        if !shelf.irradiances.fill(IRRADIANCES, crew, scratch, &task)? {
+            return Ok(false);
+        }
+
+        let used = &mut self.used;
+        used.maps += 1;
+        used.global.shot += (self.global * PATHS) as u64;
+        used.global.stored += global.len() as u64;
+        used.irradiances += all.count() as u64;
+        if let (Some(used), Some(map)) = (&mut used.caustic, shelf.caustic.map()?) {
+            used.shot += (self.caustic * PATHS) as u64;
+            used.stored += map.len() as u64;
+        }
+        used.seconds += start.elapsed().as_secs_f64();
+        Ok(true)
+    }
+
+    /// What the camera sees of the maps of a shelf, where there are any.
+    pub(super) fn view<F: Features>(&self, shelf: &mut Shelf) -> Result<Option<PhotonView>, RenderError> {
+        let Shelf { global, caustic, .. } = shelf;
+        let (Some(global), caustic) = (global.map()?, caustic.map()?) else { return Ok(None) };
+        Ok(Some(photon_view::look::<F>(&self.stage, &global, caustic.as_ref())?))
+    }
+
+    fn farthest(&self) -> f32 {
+        FARTHEST * self.stage.bvh.bounds().diagonal()
+    }
+
+    /// What paths see of the maps; caustics in discs of `pixels`.
+    pub(super) fn light<'m>(&self, built: &'m Built<'m>, pixels: f32) -> PhotonMaps<'m> {
+        let Stage { scene, bvh, settings, .. } = self.stage;
+        let falloff = settings.photons.falloff;
+        let light = |map| {
+            let diagonal = bvh.bounds().diagonal();
+            let light = PhotonLight::new(map, &scene.camera, settings.height, diagonal, pixels);
+            light.with_falloff(falloff).of_caustics()
+        };
+        PhotonMaps {
+            caustic: built.caustic.as_ref().map(light),
+            global: GatherLight::new(&built.global, &built.irradiances, self.farthest(), falloff),
+        }
+    }
+}
+
+/// Working memory of a thread that traces paths as well.
+pub(super) fn scratch<F: Features>(wave: usize) -> Footprint {
+    PathTracer::<F>::scratch(wave).or(Laboratory::scratch::<F>())
+}
