@@ -26,6 +26,17 @@ def published(name, size, limit_depth=False):
         integrator = facts["integrator"]
         description["render"]["max_depth"] = int(integrator.get("max_depth", integrator.get("maxdepth", 65)))
     for light in facts["lights"]:
+        if light["type"] == "spot":
+            # Of pbrt: a cone of 30 degrees that fades over its last 5.
+            cone = {"outer_degrees": 30.0, "inner_degrees": 25.0}
+            direction = [to - at for to, at in zip(light["to"], light["from"])]
+            place = {"position": light["from"], "direction": direction, "intensity": [light["scale"]] * 3}
+            description.setdefault("light", []).append({"kind": "spot", **place, **cone})
+            continue
+        if light["type"] == "directional":
+            sun = {"direction": light["direction"], "irradiance": light["irradiance"]}
+            description.setdefault("light", []).append({"kind": "directional", **sun})
+            continue
         if light["type"] != "envmap":
             raise ValueError(f"{name}: no description for a light of type {light['type']}")
         # Their map has u = atan2(x, -z) / 2 pi (Mitsuba's envmap), ours u = atan2(z, x) / 2 pi.

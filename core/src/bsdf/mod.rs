@@ -129,6 +129,17 @@ impl Bsdf {
         }
     }
 
+    /// The colour of what is scattered evenly; black where all is glossy.
+    #[inline]
+    pub(crate) fn base(&self) -> Rgb {
+        match self {
+            Bsdf::Diffuse(b) => b.reflectance,
+            Bsdf::Glossy(b) => coated::Coat::base(b),
+            Bsdf::Plastic(b) => coated::Coat::base(b),
+            _ => Rgb::ZERO,
+        }
+    }
+
     /// Whether light passes to the other side.
     #[inline]
     pub fn transmits(&self) -> bool {

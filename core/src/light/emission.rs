@@ -6,17 +6,18 @@
 
 use super::PointLight;
 use super::emitter::Emitter;
+use super::guide::{self, Guide};
 use super::lights::{Lights, emitted_at, mean_luminance, spot_falloff, strength};
 use crate::Rgb;
 use crate::geometry::{Bounds, Frame, MISS, Ray};
 use crate::memory::{Arena, Footprint, OutOfMemory};
 use crate::sampling::warp::{
     UNIFORM_SPHERE_PDF, concentric_disk, cosine_hemisphere, uniform_cone, uniform_cone_pdf, uniform_sphere,
-    uniform_triangle,
+    uniform_sphere_square, uniform_triangle,
 };
 use crate::sampling::{AliasTable, Sampler};
 use crate::scene::Scene;
-use core::f32::consts::PI;
+use core::f32::consts::{PI, TAU};
 use glam::Vec3;
 
 /// Dimensions of the sampler of a photon that its emission takes: from 0 on so many.
@@ -37,22 +38,28 @@ pub struct Emitted {
     pub power: Rgb,
     /// The triangle that it leaves; [`MISS`] where it is none.
     pub triangle: u32,
+    /// Which light it leaves, in the order of the table.
+    pub(crate) light: u32,
+    /// From which cell of the guide, where there is one.
+    pub(crate) cell: u32,
 }
 
 /// The lights of a scene as a source of photons.
 #[derive(Clone, Copy, Debug)]
 pub struct Emission<'m> {
     /// Emitters, points and spots, directional lights, the environment, by their power.
-    table: AliasTable<'m>,
-    center: Vec3,
+    pub(super) table: AliasTable<'m>,
+    pub(super) center: Vec3,
     /// Of the bounding sphere.
-    radius: f32,
+    pub(super) radius: f32,
+    /// Where photons are wanted.
+    pub(super) guide: Option<Guide<'m>>,
 }
 
 impl<'m> Emission<'m> {
     /// Bytes that [`Emission::build`] takes.
     pub fn footprint(lights: &Lights) -> Footprint {
-        AliasTable::footprint(count(lights))
+        AliasTable::footprint(lights.count())
     }
 
     /// For the lights of a scene within `bounds`.
@@ -69,19 +76,29 @@ impl<'m> Emission<'m> {
         let (center, diagonal) = if empty { (Vec3::ZERO, 0.0) } else { (bounds.center(), bounds.diagonal()) };
         let radius = 0.5 * diagonal * AROUND;
         let power = |i| power(scene, lights, radius, i);
-        let largest = (0..count(lights)).map(power).fold(0.0, f64::max);
+        let largest = (0..lights.count()).map(power).fold(0.0, f64::max);
         // Relative, so that f32 holds them.
         let relative = |i| if largest > 0.0 { (power(i) / largest) as f32 } else { 0.0 };
-        Ok(Self { table: AliasTable::build(count(lights), relative, arena)?, center, radius })
+        Ok(Self { table: AliasTable::build(lights.count(), relative, arena)?, center, radius, guide: None })
     }
 
     /// The photon of `sampler`. `None` where it leaves no light, or none shines.
     pub fn emit(&self, scene: &Scene, lights: &Lights, sampler: &Sampler) -> Option<Emitted> {
-        let (light, probability, _) = self.table.sample(sampler.single(CHOICE))?;
-        let (place, direction) = (sampler.pair(PLACE), sampler.pair(DIRECTION));
+        let choice = sampler.single(CHOICE);
+        let (mut place, mut direction) = (sampler.pair(PLACE), sampler.pair(DIRECTION));
+        let (light, cell, probability) = match &self.guide {
+            None => self.table.sample(choice).map(|(light, probability, _)| (light, 0, probability))?,
+            Some(guide) => {
+                let (cell, guided, density) = guide.sample(choice, direction)?;
+                let light = guide.light(cell);
+                // Light from infinitely far goes its way; what is aimed is where it comes through.
+                *if light < lights.near() { &mut direction } else { &mut place } = guided;
+                (light, cell, density)
+            }
+        };
         let emitted = if let Some(emitter) = lights.emitters.get(light) {
             from_surface(scene, emitter, place, direction)
-        } else if light < lights.emitters.len() + lights.points.len() + lights.distant.len() {
+        } else if light < lights.near() + lights.distant.len() {
             let light = light - lights.emitters.len();
             let index = lights.points.iter().chain(lights.distant).nth(light)?;
             self.without_surface(scene.lights.get(*index as usize)?, place, direction)
@@ -92,11 +109,91 @@ impl<'m> Emission<'m> {
             self.parallel(-towards, radiance / pdf, place)
         }?;
         let power = emitted.power / probability;
-        (power.is_finite() && power.max_element() > 0.0).then_some(Emitted { power, ..emitted })
+        (power.is_finite() && power.max_element() > 0.0).then_some(Emitted {
+            power,
+            light: light as u32,
+            cell: cell as u32,
+            ..emitted
+        })
+    }
+
+    /// The density of light `light`, in the order of the table, times that of the numbers that aim its photon; 1 / area
+    /// and the like are not in it. The photon comes to `to` along unit `way`.
+    pub(super) fn density(&self, scene: &Scene, lights: &Lights, light: usize, way: Vec3, to: Vec3) -> f32 {
+        match &self.guide {
+            None => self.table.pdf(light),
+            Some(guide) => {
+                self.square(scene, lights, light, way, to).map_or(0.0, |square| guide.density(light, square))
+            }
+        }
+    }
+
+    /// The numbers that aim a photon of light `light` along unit `way` through `to`.
+    fn square(&self, scene: &Scene, lights: &Lights, light: usize, way: Vec3, to: Vec3) -> Option<[f32; 2]> {
+        if let Some(emitter) = lights.emitters.get(light) {
+            let plane = Vec3::from(emitter.normal);
+            let normal = if way.dot(plane) > 0.0 || !emitter.is_two_sided() { plane } else { -plane };
+            let local = Frame::from_normal(normal).to_local(way);
+            return (local.z > 0.0).then(|| guide::disk_square(local.truncate()));
+        }
+        let through = || {
+            let local = Frame::from_normal(way).to_local(to - self.center);
+            (local.truncate().length() <= self.radius)
+                .then(|| guide::disk_square(local.truncate() / self.radius))
+        };
+        let mut without = lights.points.iter().chain(lights.distant);
+        let own = without.nth(light - lights.emitters.len()).and_then(|&own| scene.lights.get(own as usize));
+        match own {
+            Some(PointLight::Point { .. }) => Some(uniform_sphere_square(way)),
+            Some(PointLight::Spot { direction, cos_outer, .. }) => {
+                let local = Frame::from_normal(*direction).to_local(way);
+                let turns = libm::atan2f(local.y, local.x) / TAU;
+                let square =
+                    [(1.0 - local.z) / (1.0 - cos_outer), if turns < 0.0 { turns + 1.0 } else { turns }];
+                (square[0] < 1.0).then_some(square)
+            }
+            Some(PointLight::Directional { .. }) | None => through(),
+        }
+    }
+
+    /// The numbers that aim a photon of light `light` at `target`, from anywhere on it; `None` where it does not shine
+    /// there.
+    pub(super) fn aim(
+        &self,
+        scene: &Scene,
+        lights: &Lights,
+        light: usize,
+        target: Vec3,
+        sampler: &Sampler,
+    ) -> Option<[f32; 2]> {
+        if let Some(emitter) = lights.emitters.get(light) {
+            let u = sampler.pair(PLACE);
+            let from = emitter.place(if emitter.is_pair() { u } else { uniform_triangle(u).into() });
+            return self.square(scene, lights, light, (target - from.position).try_normalize()?, target);
+        }
+        let mut without = lights.points.iter().chain(lights.distant);
+        let own = without.nth(light - lights.emitters.len()).and_then(|&own| scene.lights.get(own as usize));
+        let way = match own {
+            Some(PointLight::Point { position, .. } | PointLight::Spot { position, .. }) => {
+                (target - *position).try_normalize()?
+            }
+            Some(PointLight::Directional { direction, .. }) => *direction,
+            None => {
+                let sky = lights.environment.as_ref()?;
+                -sky.sample(scene.environment.as_ref()?, Vec3::ZERO, sampler.pair(DIRECTION))?.0
+            }
+        };
+        self.square(scene, lights, light, way, target)
     }
 
     fn without_surface(&self, light: &PointLight, place: [f32; 2], direction: [f32; 2]) -> Option<Emitted> {
-        let from = |position, way, power| Emitted { ray: Ray::new(position, way), power, triangle: MISS };
+        let from = |position, way, power| Emitted {
+            ray: Ray::new(position, way),
+            power,
+            triangle: MISS,
+            light: 0,
+            cell: 0,
+        };
         match *light {
             PointLight::Point { position, intensity } => {
                 Some(from(position, uniform_sphere(direction), intensity / UNIFORM_SPHERE_PDF))
@@ -116,7 +213,13 @@ impl<'m> Emission<'m> {
         let disk = concentric_disk(place) * self.radius;
         let across = Frame::from_normal(direction).to_world(Vec3::new(disk.x, disk.y, -self.radius));
         let power = irradiance * (PI * self.radius * self.radius);
-        Some(Emitted { ray: Ray::new(self.center + across, direction), power, triangle: MISS })
+        Some(Emitted {
+            ray: Ray::new(self.center + across, direction),
+            power,
+            triangle: MISS,
+            light: 0,
+            cell: 0,
+        })
     }
 }
 
@@ -133,14 +236,13 @@ fn from_surface(scene: &Scene, emitter: &Emitter, [a, b]: [f32; 2], direction: [
     let error = emitter.error(place.position);
     let way = Frame::from_normal(normal).to_world(cosine_hemisphere(direction));
     let ray = Ray::new(place.position + error * normal, way);
-    Some(Emitted { ray, power: radiance * (PI * emitter.area * sides), triangle: place.triangle })
-}
-
-fn count(lights: &Lights) -> usize {
-    lights.emitters.len()
-        + lights.points.len()
-        + lights.distant.len()
-        + usize::from(lights.environment.is_some())
+    Some(Emitted {
+        ray,
+        power: radiance * (PI * emitter.area * sides),
+        triangle: place.triangle,
+        light: 0,
+        cell: 0,
+    })
 }
 
 /// The luminance of the power of light `i`, or about that.

@@ -44,6 +44,14 @@ pub struct LightSample {
     pub pdf: f32,
     /// Whether the light has no surface: no ray can find it by chance.
     pub delta: bool,
+    /// Which light: emitters, points and spots, directional lights, the environment, in this order.
+    pub(super) light: u32,
+}
+
+impl LightSample {
+    fn far(direction: Vec3, radiance: Rgb, pdf: f32, light: u32) -> Self {
+        Self { direction, distance: f32::INFINITY, target: None, radiance, pdf, delta: false, light }
+    }
 }
 
 /// A point on an area light.
@@ -243,7 +251,7 @@ impl<'m> Lights<'m> {
                 Some(emitter) => sample_emitter(scene, emitter, position, normal, [u0, u1], probability),
                 None => self.sample_point(scene, light, position, probability),
             };
-            return Some((sample?, false));
+            return Some((LightSample { light, ..sample? }, false));
         }
         let choice = choice - shares.tree;
         if choice < shares.environment {
@@ -252,18 +260,17 @@ impl<'m> Lights<'m> {
                 Some(window) => sampler.sample_through(environment, window, [u0, u1])?,
                 None => sampler.sample(environment, normal, [u0, u1])?,
             };
-            let (distance, pdf) = (f32::INFINITY, pdf * shares.environment);
-            let sample =
-                LightSample { direction, distance, target: None, radiance: Rgb::ONE, pdf, delta: false };
-            return Some((sample, true));
+            let pdf = pdf * shares.environment;
+            let light = (self.in_tree() + self.distant.len()) as u32;
+            return Some((LightSample::far(direction, Rgb::ONE, pdf, light), true));
         }
         let choice = ((choice - shares.environment) / shares.distant).clamp(0.0, ONE_MINUS_EPSILON);
         let (index, probability, _) = self.distant_table.sample(choice)?;
         match scene.lights.get(*self.distant.get(index)? as usize)? {
             PointLight::Directional { direction, irradiance } => {
-                let (direction, distance) = (-*direction, f32::INFINITY);
-                let (radiance, pdf) = (*irradiance, probability * shares.distant);
-                Some((LightSample { direction, distance, target: None, radiance, pdf, delta: true }, false))
+                let (pdf, light) = (probability * shares.distant, (self.in_tree() + index) as u32);
+                let sample = LightSample::far(-*direction, *irradiance, pdf, light);
+                Some((LightSample { delta: true, ..sample }, false))
             }
             _ => None,
         }
@@ -281,18 +288,36 @@ impl<'m> Lights<'m> {
         hit_distance: f32,
         direction: Vec3,
     ) -> f32 {
-        let after = self.emitters.partition_point(|e| e.triangle <= triangle);
-        let Some(index) = after.checked_sub(1) else { return 0.0 };
-        let Some(emitter) = self.emitters.get(index) else { return 0.0 };
-        if triangle - emitter.triangle > u32::from(emitter.is_pair()) {
-            return 0.0;
-        }
+        let Some((index, emitter)) = self.emitter_of(triangle) else { return 0.0 };
         let pdf = emitter.pdf(position, direction, hit_distance);
         if pdf <= 0.0 || !faces(normal, direction) {
             return 0.0;
         }
         let share = self.shares(position, normal).tree;
         pdf * share * self.tree.pdf(position, normal, index as u32)
+    }
+
+    /// The emitter that `triangle` is a part of, and its index.
+    #[inline]
+    pub(super) fn emitter_of(&self, triangle: u32) -> Option<(usize, &Emitter)> {
+        let index = self.emitters.partition_point(|e| e.triangle <= triangle).checked_sub(1)?;
+        let emitter = self.emitters.get(index)?;
+        (triangle - emitter.triangle <= u32::from(emitter.is_pair())).then_some((index, emitter))
+    }
+
+    /// A triangle of emitter `light`.
+    pub(crate) fn triangle_of(&self, light: u32) -> Option<u32> {
+        self.emitters.get(light as usize).map(|emitter| emitter.triangle)
+    }
+
+    /// The probability of [`Lights::sample`] for light `light`, one without surface, in the order of emission.
+    pub(crate) fn probability(&self, light: u32, position: Vec3, normal: Vec3) -> f32 {
+        let index = light as usize;
+        let shares = self.shares(position, normal);
+        match index.checked_sub(self.in_tree()) {
+            None => shares.tree * self.tree.pdf(position, normal, light),
+            Some(distant) => shares.distant * self.distant_table.pdf(distant),
+        }
     }
 
     /// The density of [`Lights::sample`] for the environment in unit `direction`.
@@ -315,6 +340,16 @@ impl<'m> Lights<'m> {
     #[inline]
     pub fn have_choice(&self) -> bool {
         self.in_tree() > 1 || self.environment_weight + self.distant_weight > 0.0
+    }
+
+    /// Lights of all kinds, in the order of emission.
+    pub(super) fn count(&self) -> usize {
+        self.near() + self.distant.len() + usize::from(self.environment.is_some())
+    }
+
+    /// Those that are not infinitely far.
+    pub(super) fn near(&self) -> usize {
+        self.in_tree()
     }
 
     fn in_tree(&self) -> usize {
@@ -357,7 +392,8 @@ impl<'m> Lights<'m> {
             return None;
         }
         let direction = to_light / distance;
-        Some(LightSample { direction, distance, target: None, radiance, pdf: probability, delta: true })
+        let sample = LightSample::far(direction, radiance, probability, light);
+        Some(LightSample { distance, delta: true, ..sample })
     }
 }
 
@@ -389,7 +425,7 @@ fn sample_emitter(
         normal: if front { plane } else { -plane },
         error: emitter.error(place.position),
     };
-    Some(LightSample { direction, distance, target: Some(target), radiance, pdf, delta: false })
+    Some(LightSample { distance, target: Some(target), ..LightSample::far(direction, radiance, pdf, 0) })
 }
 
 /// Whether a surface with `normal` can be lit from `direction`.

@@ -4,6 +4,8 @@ mod bounds;
 mod emission;
 mod emitter;
 mod environment;
+mod etendue;
+mod guide;
 mod lights;
 mod rectangle;
 mod source;
@@ -12,6 +14,9 @@ mod triangle;
 mod window;
 
 pub use emission::{DIMENSIONS as EMISSION_DIMENSIONS, Emission, Emitted};
+pub(crate) use etendue::Found;
+pub use guide::Worth;
+pub(crate) use guide::throws;
 pub use lights::{LightPoint, LightSample, Lights};
 pub use source::{Environment, PointLight};
 pub use window::{Bins, Grid, Window, Windows};

@@ -5,10 +5,12 @@
 //! places where it lacks a record, and [`gather`] makes one; [`shoot`] leaves the photons that [`PhotonLight`] gathers, and
 //! [`maps`] makes of them what gather rays end in.
 
+pub mod caustics;
 mod density;
 mod estimator;
 pub mod gather;
 pub mod maps;
+mod merge;
 mod outlook;
 pub mod overture;
 pub mod path;
@@ -23,6 +25,7 @@ mod wave;
 
 pub use density::PhotonLight;
 pub use estimator::{Counters, PathSettings, UNLIMITED};
+pub use merge::{Discs, Merging};
 pub use outlook::{Outlook, Vertex, WindowGain};
 pub use path::PathTracer;
 pub use pilot::Pilot;

@@ -10,6 +10,7 @@
 //! 5. Where that pays, pixels of a group share what their paths find (`reuse.rs`).
 //! 6. Where an irradiance cache knows the indirect light of a diffuse point, the path need not find it
 //!    (`irradiance_cache.rs`); nor where photons tell it (`density.rs`, `maps.rs`).
+//! 7. Where photons of caustics lie, paths and photons share the light that both find (`merge.rs`).
 //!
 //! The price: about 300 bytes for each path of a wave. What a pixel sees depends on (seed, sample) and the pixels of
 //! its group only, no wave cuts a group, and samples are summed in their order: the picture has the same bits for
@@ -20,6 +21,7 @@ use super::estimator::{
     Counters, MAX_CROSSINGS, MAX_VERTICES, PathSettings, ROULETTE_FROM, dimension, power_heuristic, survival,
 };
 use super::maps::{PhotonMaps, Said};
+use super::merge::{ChainLink, Merging, ends_chain};
 use super::places::Places;
 use super::reuse::{Exchange, GROUP};
 use super::shadow::{FEW, pass_cutout, passing, shadow_ray};
@@ -71,6 +73,7 @@ pub struct PathTracer<'a, F> {
     photons: Option<PhotonLight<'a>>,
     /// Of even and of odd samples.
     maps: Option<&'a [PhotonMaps<'a>; 2]>,
+    merging: Option<Merging<'a>>,
     features: PhantomData<F>,
 }
 
@@ -97,6 +100,7 @@ impl<'a, F: Features> PathTracer<'a, F> {
             caches: None,
             photons: None,
             maps: None,
+            merging: None,
             features: PhantomData,
         }
     }
@@ -120,6 +124,11 @@ impl<'a, F: Features> PathTracer<'a, F> {
     /// Where depth is limited only the first point of a path is served.
     pub fn with_maps(&self, maps: &'a [PhotonMaps<'a>; 2]) -> Self {
         Self { maps: Some(maps), ..*self }
+    }
+
+    /// The same, joined with photons of caustics.
+    pub fn with_caustics(&self, merging: Merging<'a>) -> Self {
+        Self { merging: Some(merging), ..*self }
     }
 
     /// The same, where pixels share what their paths find, or do not.
@@ -386,6 +395,11 @@ impl<'a, F: Features> PathTracer<'a, F> {
                     let pdf = self.lights.pdf_escape(scene, position, normal, direction);
                     weight = power_heuristic(path.pdf, pdf);
                 }
+                if let Some(merging) = &self.merging {
+                    weight = merging.beside(weight, path.chain, || {
+                        merging.emission.density_of_sky(scene, self.lights, direction, position)
+                    });
+                }
                 path.add(throughput * radiance * weight);
             }
             return Step::END;
@@ -404,6 +418,11 @@ impl<'a, F: Features> PathTracer<'a, F> {
                     let distance = position.distance(point.position);
                     let pdf = self.lights.pdf_hit(scene, position, normal, hit.triangle, distance, direction);
                     weight = power_heuristic(path.pdf, pdf);
+                }
+                if let Some(merging) = &self.merging {
+                    weight = merging.beside(weight, path.chain, || {
+                        merging.emission.density_of_surface(scene, self.lights, hit.triangle, -direction)
+                    });
                 }
                 path.add(throughput * radiance * weight);
             }
@@ -477,7 +496,16 @@ impl<'a, F: Features> PathTracer<'a, F> {
                     exchange.light_is_of_base(bsdf.base_part(wo, wi, f));
                 }
                 let alone = sample.delta || ends;
-                let weight = if alone { 1.0 } else { power_heuristic(sample.pdf, pdf) };
+                let mut weight = if alone { 1.0 } else { power_heuristic(sample.pdf, pdf) };
+                if let Some(merging) = &self.merging
+                    && !ends_chain(&bsdf)
+                {
+                    let there = ChainLink { point: &point, bsdf: &bsdf, near: wo, far: wi };
+                    let to_light = there.reverse::<F>(scene) / sample.pdf;
+                    weight = merging.beside(weight, path.chain.abs() * to_light, || {
+                        merging.emission.density_of_sample(scene, self.lights, &sample, point.position)
+                    });
+                }
                 let contribution = throughput * f * sample.radiance * (weight / sample.pdf);
                 let tag = if later { TO_ENVIRONMENT } else { 0 };
                 Some((Ray { tag, ..shadow_ray(&point, &sample) }, contribution))
@@ -495,6 +523,18 @@ impl<'a, F: Features> PathTracer<'a, F> {
             let turns = sampler.single(dimension::PROBES + segments);
             reflected = photons.reflected::<F>((self.bvh, self.level), &point, &bsdf, wo, turns);
             path.add(throughput * reflected.unwrap_or_default());
+        }
+
+        let merges = segments == 1 || !self.is_limited();
+        if let Some(merging) = self.merging.as_ref().filter(|_| merges) {
+            let turns = || sampler.single(dimension::PROBES + segments);
+            let light =
+                merging.reflected::<F>((self.bvh, self.level), path.sample, (&point, &bsdf), wo, turns);
+            if self.settings.reuse && exchange.is_lit() {
+                exchange.keep(throughput * light);
+            } else {
+                path.add(throughput * light);
+            }
         }
 
         let [u, v] = dimension::scattering(&sampler, segments);
@@ -540,6 +580,16 @@ impl<'a, F: Features> PathTracer<'a, F> {
         if segments >= MAX_VERTICES {
             counters.dropped.unfinished += 1;
             return Step { light, next: None };
+        }
+        if let Some(merging) = &self.merging {
+            let there = ChainLink { point: &point, bsdf: &bsdf, near: wo, far: sample.direction };
+            path.chain = match path.chain {
+                _ if ends_chain(&bsdf) && !sample.delta && merges => -merging.begun(point.position),
+                _ if ends_chain(&bsdf) && !sample.delta => 0.0,
+                0.0 => 0.0,
+                chain if sample.delta => chain.abs() / (sample.eta * sample.eta),
+                chain => chain.abs() * there.reverse::<F>(scene) / sample.pdf,
+            };
         }
         path.throughput = throughput.to_array();
         path.pdf = if sample.delta { f32::INFINITY } else { sample.pdf };

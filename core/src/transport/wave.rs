@@ -36,6 +36,10 @@ pub(super) struct Path {
     pub(super) eta_squared: f32,
     /// What of the light at the end of the ray belongs to the path.
     pub(super) share: Share,
+    /// Of a path that came by mirrors and glass from a rough surface: how much denser photons come from a light to
+    /// there than paths from there to the light, but for what the light has to do with it ([`super::merge`]). Negative
+    /// on the way to the first mirror or glass; zero where photons could not find the path.
+    pub(super) chain: f32,
 }
 
 /// Light that comes to a diffuse point is either direct, from emitters and from what mirrors or refracts them; or it

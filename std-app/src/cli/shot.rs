@@ -39,7 +39,7 @@ pub(super) struct Shot {
 /// How a method does its work: what may differ between the methods of a race.
 #[derive(Args, Clone, Debug)]
 pub(super) struct Options {
-    /// Whether caustics get a map of their own where they need one [default: auto]; `path` never needs one
+    /// Whether `path` is joined with photons of caustics where a first look finds any [default: auto]
     #[arg(long)]
     caustics: Option<Caustics>,
     /// Whether neighbouring pixels share what their paths find: less noise for the same time where much of the
@@ -116,7 +116,7 @@ pub(super) enum Kernel {
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
 pub(super) enum Caustics {
-    /// Where the method needs it
+    /// Where they are found
     Auto,
     /// Never
     Off,
@@ -210,8 +210,6 @@ impl Shot {
         stop: Stop,
         reference: Option<Arc<Image>>,
     ) -> Result<Settings, Failure> {
-        // No method has a caustic map yet.
-        let (None | Some(Caustics::Auto | Caustics::Off)) = options.caustics;
         let file = &loaded.settings;
         let defaults = Settings::default();
         let [width, height] = self.size.or(file.size).unwrap_or([defaults.width, defaults.height]);
@@ -223,6 +221,7 @@ impl Shot {
             seed: options.seed.or(file.seed).unwrap_or(defaults.seed),
             max_depth: options.max_depth.or(file.max_depth),
             reuse: When::choice(options.reuse),
+            caustics: !matches!(options.caustics, Some(Caustics::Off)),
             windows: When::choice(options.windows),
             cache: options.cache(),
             photons: options.photons(),

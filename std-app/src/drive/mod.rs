@@ -39,7 +39,8 @@ pub use ledger::Place;
 pub use memory::MemoryUse;
 pub use merge::{Merged, merge};
 pub use method::{
-    CacheSettings, CacheUse, Gather, MapUse, MapView, Method, PhotonSettings, PhotonUse, PhotonView,
+    CacheSettings, CacheUse, CausticUse, Gather, MapUse, MapView, Method, PhotonSettings, PhotonUse,
+    PhotonView,
 };
 pub use rounds::Stop;
 pub use study::{IrradianceStudy, MetricError, study_irradiance};
@@ -73,6 +74,8 @@ pub struct Settings {
     /// Whether neighbouring pixels share what their paths find; `None`: where a look at a few tiles says that it
     /// pays.
     pub reuse: Option<bool>,
+    /// Whether paths are joined with photons of caustics, where a first look finds any.
+    pub caustics: bool,
     /// How an irradiance cache is filled, where the method has one.
     pub cache: CacheSettings,
     /// How photons are used, where the method has any.
@@ -135,6 +138,7 @@ impl Default for Settings {
             seed: 0,
             max_depth: None,
             reuse: None,
+            caustics: true,
             cache: CacheSettings::default(),
             photons: PhotonSettings::default(),
             photon_view: false,
@@ -229,6 +233,8 @@ pub struct RenderResult {
     pub counters: Counters,
     /// Whether pixels shared what their paths found, and why.
     pub reuse: Reuse,
+    /// Whether paths were joined with photons of caustics, and why.
+    pub caustics: CausticUse,
     /// What became of the irradiance cache, where the method has one.
     pub cache: Option<CacheUse>,
     /// What the irradiance cache looks like and how wrong it is, where that was asked for, the method has one and there

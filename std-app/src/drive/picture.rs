@@ -59,6 +59,8 @@ impl Picture<'_> {
         let reference = clock.pause(|| settings.reference.as_deref().map(Reference::new));
         let mut latest = history.iter().rev().find_map(|round: &Round| round.error);
         let (mut estimating, mut estimate) = (0.0, 0.0);
+        // Photons, too, are shared.
+        let shares = method.shares() || renderer.caustics().used;
         let mut saved = Instant::now();
         let mut is_lost = false;
         let save =
@@ -89,7 +91,7 @@ impl Picture<'_> {
                 }
                 let start = Instant::now();
                 let tiles = workers.errors(&canvas.film);
-                error = tiles.as_ref().and_then(|tiles| regions::estimate(tiles, width, method.shares()));
+                error = tiles.as_ref().and_then(|tiles| regions::estimate(tiles, width, shares));
                 estimate += start.elapsed().as_secs_f64();
                 let audited = error.and_then(|noise| audit.as_ref()?.verdict(workers, &canvas.film, noise));
                 if let (true, Some(tiles)) = (settings.adaptive && rounds.spp() >= adapt::FROM, tiles) {
@@ -132,7 +134,7 @@ impl Picture<'_> {
             audit.step(workers, &canvas.film, rays(&canvas), clock.seconds(), left)?;
         }
         let start = Instant::now();
-        let noise = workers.estimate(&canvas.film, method.shares());
+        let noise = workers.estimate(&canvas.film, shares);
         estimate += start.elapsed().as_secs_f64();
         let render = clock.seconds();
         let audited = noise.and_then(|noise| audit.as_ref()?.verdict(workers, &canvas.film, noise));
@@ -153,6 +155,7 @@ impl Picture<'_> {
             seconds: Seconds { build: 0.0, render, estimate },
             counters: canvas.counters,
             reuse: renderer.reuse(),
+            caustics: renderer.caustics(),
             cache: renderer.cache(),
             survey: if interrupted { None } else { renderer.survey(workers)? },
             photons: renderer.photons(),

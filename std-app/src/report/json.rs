@@ -2,12 +2,21 @@
 
 use super::{Maker, Race, Run};
 use crate::compare::Comparison;
-use crate::drive::{Against, Audited, Deviation, Ending, ErrorEstimate, MapUse, Place, Region, Round, Shard};
+use crate::drive::{
+    Against, Audited, CausticUse, Deviation, Ending, ErrorEstimate, MapUse, Place, Region, Round, Shard,
+};
 use halflight_core::film::Dropped;
 use serde_json::{Map, Value, json};
 
 /// A render.
 pub(super) fn run(run: &Run) -> Value {
+    let CausticUse { used, share, paths, photons } = run.result.caustics;
+    let mut object = most(run);
+    object["caustics"] = json!({ "used": used, "share": share, "paths": paths, "photons": photons });
+    object
+}
+
+fn most(run: &Run) -> Value {
     let (result, settings) = (run.result, run.settings);
     let left_out: Vec<Value> =
         run.left_out().iter().map(|(what, why)| json!({ "what": what, "why": why })).collect();

@@ -64,6 +64,9 @@ impl Run<'_> {
             let why = if measured { "it would cost more than it gains" } else { "it was not asked for" };
             left_out.push(("reuse of paths by neighbouring pixels", why));
         }
+        if let (false, Some(_)) = (self.result.caustics.used, self.result.caustics.share) {
+            left_out.push(("photons of caustics", "they would bring next to no light"));
+        }
         if let (false, Some(_)) = (self.result.windows.used, self.result.windows.gain) {
             left_out.push(("windows to the environment", "each place sees enough of it"));
         }

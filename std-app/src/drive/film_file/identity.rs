@@ -47,6 +47,8 @@ impl Identity {
         if has_photons {
             cache += &format!(", {:?}", settings.photons);
         }
+        let joined = method == Method::Path.name() && settings.caustics;
+        let caustics = if joined { ", caustics" } else { "" };
         Self {
             version: env!("CARGO_PKG_VERSION").into(),
             method: method.into(),
@@ -56,7 +58,7 @@ impl Identity {
             max_depth: settings.max_depth,
             reuse: settings.reuse,
             windows: settings.windows,
-            settings: format!("{paths:?}{cache}, adaptive: {}", settings.adaptive),
+            settings: format!("{paths:?}{cache}{caustics}, adaptive: {}", settings.adaptive),
             scene: fingerprint::scene(scene),
             camera: fingerprint::camera(&scene.camera),
         }

@@ -4,6 +4,7 @@
 //! [`Crew`] runs in parallel ("The unit of work" in docs/architecture.md). To add a method: a variant of [`Method`]
 //! with its words, a file with its [`Renderer`], a line in [`Method::with`].
 
+mod caustics;
 mod irradiance_cache;
 mod overture;
 mod path;
@@ -14,6 +15,7 @@ mod sppm;
 #[cfg(test)]
 mod wrong;
 
+pub use caustics::CausticUse;
 pub(super) use irradiance_cache::LEAST_PIXELS;
 pub use irradiance_cache::{CacheSettings, CacheUse, Gather};
 pub(super) use overture::{Growing, Overture};
@@ -130,6 +132,7 @@ impl Method {
         then: impl FnOnce(&mut dyn Renderer, &mut Memory) -> Result<T, RenderError>,
     ) -> Result<T, RenderError> {
         match self {
+            Method::Path if caustics::are_possible(stage) => caustics::with::<F, T>(stage, memory, then),
             Method::Path => then(&mut path::Paths::<F>::new(stage, memory)?, memory),
             Method::IrradianceCache => irradiance_cache::with::<F, T>(stage, memory, then),
             Method::PhotonMap => then(&mut photon_map::TwoPasses::<F>::new(stage, memory)?, memory),
@@ -176,6 +179,11 @@ pub(super) trait Renderer {
     /// Memory that does not suffice.
     fn survey(&mut self, _workers: &Workers) -> Result<Option<Survey>, RenderError> {
         Ok(None)
+    }
+
+    /// Whether paths are joined with photons of caustics, and what came of it.
+    fn caustics(&self) -> CausticUse {
+        CausticUse::default()
     }
 
     /// What became of its irradiance cache.

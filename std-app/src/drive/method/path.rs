@@ -1,25 +1,36 @@
 //! Path tracing: no structure beyond the hierarchy, so a round is its tiles.
 
-use super::{Renderer, Stage};
+use super::{CausticUse, Renderer, Stage};
 use crate::drive::crew::Crew;
 use crate::drive::memory::Memory;
 use crate::drive::run::path_settings;
 use crate::drive::{RenderError, Reuse};
 use halflight_core::bsdf::Features;
-use halflight_core::memory::Line;
+use halflight_core::memory::{Footprint, Line};
 use halflight_core::transport::{PathTracer, path::WAVE};
 
 /// See the file.
 pub(super) struct Paths<'a, F> {
-    tracer: PathTracer<'a, F>,
-    scratch: Vec<Vec<Line>>,
+    pub(super) tracer: PathTracer<'a, F>,
+    pub(super) scratch: Vec<Vec<Line>>,
     reuse: Reuse,
+    /// Where photons of caustics were looked for in vain.
+    pub(super) caustics: CausticUse,
 }
 
 impl<'a, F: Features> Paths<'a, F> {
     pub(super) fn new(stage: &Stage<'a>, memory: &mut Memory) -> Result<Self, RenderError> {
+        Self::with_scratch(stage, memory, PathTracer::<F>::scratch(WAVE))
+    }
+
+    /// With working memory for more than paths.
+    pub(super) fn with_scratch(
+        stage: &Stage<'a>,
+        memory: &mut Memory,
+        scratch: Footprint,
+    ) -> Result<Self, RenderError> {
         let Stage { scene, bvh, lights, settings, workers } = *stage;
-        let mut scratch = memory.take_each("paths", PathTracer::<F>::scratch(WAVE), workers.count())?;
+        let mut scratch = memory.take_each("paths", scratch, workers.count())?;
         let tracer = PathTracer::<F>::new(scene, bvh, lights, path_settings(settings), settings.level);
         let reuse = match settings.reuse {
             Some(used) => Reuse { used, pilot: None },
@@ -28,7 +39,7 @@ impl<'a, F: Features> Paths<'a, F> {
                 Reuse { used: pilot.pays(), pilot: Some(pilot) }
             }
         };
-        Ok(Self { tracer: tracer.with_reuse(reuse.used), scratch, reuse })
+        Ok(Self { tracer: tracer.with_reuse(reuse.used), scratch, reuse, caustics: CausticUse::default() })
     }
 }
 
@@ -43,5 +54,9 @@ impl<F: Features> Renderer for Paths<'_, F> {
 
     fn reuse(&self) -> Reuse {
         self.reuse
+    }
+
+    fn caustics(&self) -> CausticUse {
+        self.caustics
     }
 }

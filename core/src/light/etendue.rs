@@ -1,0 +1,115 @@
+//! How densely emission covers what paths from the eye find: what multiple importance sampling between the two needs.
+//!
+//! A light path leaves its light at x₀ into ω with density p(x₀) p(ω), of which the étendue dA cos θ dω takes
+//! p(x₀) p(ω) / cos θ. The étendue is kept on the way, so the same number, over the density of the direction in which
+//! a path from the eye meets x₀, tells how much likelier one is than the other (`transport/merge.rs`).
+
+use super::PointLight;
+use super::emission::Emission;
+use super::lights::{LightSample, Lights};
+use crate::sampling::warp::{UNIFORM_SPHERE_PDF, uniform_cone_pdf};
+use crate::scene::Scene;
+use core::f32::consts::{FRAC_1_PI, PI};
+use glam::Vec3;
+
+/// How paths from the eye can find a light.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Found {
+    /// By chance, or by next-event estimation: it has a surface.
+    OnSurface,
+    /// The same, in the sky.
+    InSky,
+    /// By next-event estimation alone: it has no extent.
+    ByChoice,
+}
+
+impl Emission<'_> {
+    /// Of an emissive `triangle` in unit direction `way`: per m² sr of étendue.
+    pub(crate) fn density_of_surface(&self, scene: &Scene, lights: &Lights, triangle: u32, way: Vec3) -> f32 {
+        lights
+            .emitter_of(triangle)
+            .map_or(0.0, |(index, _)| self.density_of_emitter(scene, lights, index, way))
+    }
+
+    /// Of emitter `index` in unit direction `way`: per m² sr of étendue.
+    pub(crate) fn density_of_emitter(&self, scene: &Scene, lights: &Lights, index: usize, way: Vec3) -> f32 {
+        let Some(emitter) = lights.emitters.get(index) else { return 0.0 };
+        let sides = if emitter.is_two_sided() { 2.0 } else { 1.0 };
+        self.density(scene, lights, index, way, Vec3::ZERO) * FRAC_1_PI / (emitter.area * sides)
+    }
+
+    /// Of the environment in unit `direction`, seen from `position`: per m² sr of étendue.
+    pub(crate) fn density_of_sky(
+        &self,
+        scene: &Scene,
+        lights: &Lights,
+        direction: Vec3,
+        position: Vec3,
+    ) -> f32 {
+        match (&lights.environment, &scene.environment) {
+            (Some(sampler), Some(environment)) => {
+                let index = lights.near() + lights.distant.len();
+                let density = self.density(scene, lights, index, -direction, position);
+                density * sampler.pdf(environment, Vec3::ZERO, direction) * self.per_disc()
+            }
+            _ => 0.0,
+        }
+    }
+
+    /// Of a light without extent, seen from `position`: per m² of surface that faces it.
+    pub(crate) fn density_of_choice(
+        &self,
+        scene: &Scene,
+        lights: &Lights,
+        light: u32,
+        position: Vec3,
+    ) -> f32 {
+        let index = light as usize;
+        let mut all = lights.points.iter().chain(lights.distant);
+        let own = index.checked_sub(lights.emitters.len()).and_then(|i| all.nth(i));
+        let (way, density) = match own.and_then(|&own| scene.lights.get(own as usize)) {
+            Some(PointLight::Point { position: from, .. }) => {
+                (position - *from, UNIFORM_SPHERE_PDF / from.distance_squared(position))
+            }
+            Some(PointLight::Spot { position: from, cos_outer, .. }) => {
+                (position - *from, uniform_cone_pdf(1.0 - cos_outer) / from.distance_squared(position))
+            }
+            Some(PointLight::Directional { direction, .. }) => (*direction, self.per_disc()),
+            None => return 0.0,
+        };
+        self.density(scene, lights, index, way.normalize_or_zero(), position) * density
+    }
+
+    /// Of the light of `sample`, which was drawn at `position`: for each density of the sample.
+    pub(crate) fn density_of_sample(
+        &self,
+        scene: &Scene,
+        lights: &Lights,
+        sample: &LightSample,
+        position: Vec3,
+    ) -> f32 {
+        let (light, direction) = (sample.light, sample.direction);
+        match self.found(lights, light) {
+            Found::OnSurface => self.density_of_emitter(scene, lights, light as usize, -direction),
+            Found::InSky => self.density_of_sky(scene, lights, direction, position),
+            Found::ByChoice => self.density_of_choice(scene, lights, light, position),
+        }
+    }
+
+    /// How light `light`, in the order of the table, is found.
+    pub(crate) fn found(&self, lights: &Lights, light: u32) -> Found {
+        let index = light as usize;
+        if index < lights.emitters.len() {
+            Found::OnSurface
+        } else if index < lights.near() + lights.distant.len() {
+            Found::ByChoice
+        } else {
+            Found::InSky
+        }
+    }
+
+    /// Per area of the disc through which light from infinitely far is sent.
+    fn per_disc(&self) -> f32 {
+        1.0 / (PI * self.radius * self.radius)
+    }
+}

@@ -1,0 +1,265 @@
+//! Emission aimed at what throws caustics: the square of random numbers that decides where a photon goes is cut into
+//! cells for each light, and cells are chosen by what they are worth (guided emission in primary sample space, as in
+//! Grittmann et al. 2018). What leads nowhere is still chosen now and then: nothing that shines has no photons.
+
+use super::emission::Emission;
+use super::lights::Lights;
+use crate::Rgb;
+use crate::memory::{Arena, Footprint, OutOfMemory};
+use crate::sampling::{AliasTable, ONE_MINUS_EPSILON, Sampler};
+use crate::scene::{Material, Scene, Surface};
+use core::f32::consts::FRAC_PI_4;
+use glam::{Vec2, Vec3};
+
+/// Cells along a side of the square of a light, at most, and of all squares together where there are many lights.
+const MOST_SIDE: usize = 64;
+const MOST_CELLS: usize = 1 << 16;
+
+/// Shares of emission: aimed nowhere; where mirrors and glass are; the rest where photons were seen to be useful.
+const DEFENSIVE: f32 = 0.1;
+const AIMED: f32 = 0.2;
+
+/// What a cell gets of what each of its neighbours was worth.
+const BESIDE: f32 = 0.125;
+
+/// Points on mirrors and glass that are aimed at, over all lights together, and for each light.
+const AIMS: usize = 1 << 19;
+const MOST_AIMS: usize = 1 << 14;
+const FEWEST_AIMS: usize = 1 << 8;
+
+/// Cells around a point that count as aimed at with it.
+const AROUND: isize = 1;
+
+/// Cells by what they are worth.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Guide<'m> {
+    table: AliasTable<'m>,
+    side: usize,
+}
+
+impl Guide<'_> {
+    /// A cell, the numbers that decide where its photon goes, and how dense they are, the choice of the light included.
+    pub(super) fn sample(&self, choice: f32, within: [f32; 2]) -> Option<(usize, [f32; 2], f32)> {
+        let (cell, probability, _) = self.table.sample(choice)?;
+        let (cells, side) = (self.side * self.side, self.side as f32);
+        let (x, y) = (cell % cells % self.side, cell % cells / self.side);
+        let place = [x as f32 + within[0], y as f32 + within[1]].map(|u| (u / side).min(ONE_MINUS_EPSILON));
+        Some((cell, place, probability * cells as f32))
+    }
+
+    /// The light of a cell.
+    pub(super) fn light(&self, cell: usize) -> usize {
+        cell / (self.side * self.side)
+    }
+
+    /// How dense [`Guide::sample`] is there.
+    pub(super) fn density(&self, light: usize, place: [f32; 2]) -> f32 {
+        self.table.pdf(cell(light, self.side, place)) * (self.side * self.side) as f32
+    }
+}
+
+/// What the cells of all lights are worth, while that is being learned.
+pub struct Worth<'m> {
+    /// Where mirrors and glass are: 1.
+    aimed: &'m mut [f32],
+    /// What photons were worth.
+    learned: &'m mut [f32],
+    side: usize,
+}
+
+impl<'m> Worth<'m> {
+    /// Bytes that [`Worth::aimed`] takes.
+    pub fn footprint(lights: &Lights) -> Footprint {
+        let cells = cells(lights);
+        Footprint::default().slice::<f32>(cells).slice::<f32>(cells)
+    }
+
+    /// Aims at everything that mirrors or refracts. `None` where there is nothing such, or no light.
+    ///
+    /// # Errors
+    /// [`OutOfMemory`] where the arena has less than [`Worth::footprint`].
+    pub fn aimed(
+        scene: &Scene,
+        lights: &Lights,
+        emission: &Emission,
+        arena: &mut Arena<'m>,
+    ) -> Result<Option<Self>, OutOfMemory> {
+        let side = side(lights.count());
+        let (aimed, learned) = (arena.slice::<f32>(cells(lights))?, arena.slice::<f32>(cells(lights))?);
+        aimed.fill(0.0);
+        learned.fill(0.0);
+        let lots = lights.count().max(1);
+        let points = (AIMS / lots).clamp(FEWEST_AIMS, MOST_AIMS);
+        let mut any = false;
+        throwing_points(scene, points, |number, point| {
+            for light in 0..lights.count() {
+                let sampler = Sampler::new(0x6775_6964, light as u32, number);
+                let Some([u, v]) = emission.aim(scene, lights, light, point, &sampler) else { continue };
+                any = true;
+                let middle = [u, v].map(|u| (u * side as f32) as isize);
+                for y in middle[1] - AROUND..=middle[1] + AROUND {
+                    for x in middle[0] - AROUND..=middle[0] + AROUND {
+                        let inside = (0..side as isize).contains(&x) && (0..side as isize).contains(&y);
+                        let index = light * side * side + (y * side as isize + x).unsigned_abs();
+                        if let Some(cell) = aimed.get_mut(index).filter(|_| inside) {
+                            *cell = 1.0;
+                        }
+                    }
+                }
+            }
+        });
+        Ok(any.then_some(Self { aimed, learned, side }))
+    }
+
+    /// A photon from `cell` was worth so much.
+    pub fn learn(&mut self, cell: u32, worth: f32) {
+        if let Some(slot) = self.learned.get_mut(cell as usize).filter(|_| worth.is_finite()) {
+            *slot += worth;
+        }
+    }
+
+    /// Whether any photon was worth anything.
+    pub fn is_any(&self) -> bool {
+        self.learned.iter().any(|&worth| worth > 0.0)
+    }
+
+    /// `emission` by what is known so far. `arena` needs [`Worth::guide_footprint`].
+    ///
+    /// # Errors
+    /// [`OutOfMemory`] where it has less.
+    pub fn guide<'g>(
+        &self,
+        emission: &Emission<'g>,
+        arena: &mut Arena<'g>,
+    ) -> Result<Emission<'g>, OutOfMemory> {
+        let Self { side, .. } = *self;
+        let squares = side * side;
+        let power = |i: usize| emission.table.pdf(i / squares) / squares as f32;
+        let sum = |of: &dyn Fn(usize) -> f32| {
+            let total = (0..self.aimed.len()).map(|i| f64::from(of(i))).sum::<f64>();
+            if total > 0.0 { (1.0 / total) as f32 } else { 0.0 }
+        };
+        let aimed = |i: usize| self.aimed.get(i).map_or(0.0, |aimed| aimed * power(i));
+        let learned = |i: usize| self.spread(i);
+        let (per_aimed, per_learned) = (sum(&aimed), sum(&learned));
+        let seen = if per_learned > 0.0 { 1.0 - DEFENSIVE - AIMED } else { 0.0 };
+        let at = 1.0 - DEFENSIVE - seen;
+        let weight = |i| DEFENSIVE * power(i) + at * per_aimed * aimed(i) + seen * per_learned * learned(i);
+        let table = AliasTable::build(self.aimed.len(), weight, arena)?;
+        Ok(Emission { guide: Some(Guide { table, side }), ..*emission })
+    }
+
+    /// What was learned around cell `i`: what few photons have seen may go on beside it.
+    fn spread(&self, i: usize) -> f32 {
+        let side = self.side;
+        let (first, x, y) = (i / (side * side) * side * side, i % side, i / side % side);
+        let mut sum = 0.0;
+        for v in y.saturating_sub(1)..(y + 2).min(side) {
+            for u in x.saturating_sub(1)..(x + 2).min(side) {
+                let own = if (u, v) == (x, y) { 1.0 } else { BESIDE };
+                sum += own * self.learned.get(first + v * side + u).copied().unwrap_or(0.0);
+            }
+        }
+        sum
+    }
+
+    /// Bytes that [`Worth::guide`] takes.
+    pub fn guide_footprint(lights: &Lights) -> Footprint {
+        AliasTable::footprint(cells(lights))
+    }
+}
+
+/// Cells along a side, for so many lights.
+fn side(lights: usize) -> usize {
+    let mut side = MOST_SIDE;
+    while side > 1 && lights.saturating_mul(side * side) > MOST_CELLS {
+        side /= 2;
+    }
+    side
+}
+
+fn cells(lights: &Lights) -> usize {
+    let side = side(lights.count());
+    lights.count() * side * side
+}
+
+pub(super) fn cell(light: usize, side: usize, place: [f32; 2]) -> usize {
+    let [x, y] = place.map(|u| ((u * side as f32) as usize).min(side - 1));
+    (light * side + y) * side + x
+}
+
+/// Whether light may leave `material` for few directions only, as photons of caustics do.
+pub(crate) fn throws(material: &Material) -> bool {
+    match &material.surface {
+        Surface::Diffuse { .. } => false,
+        Surface::Mirror { .. } | Surface::Dielectric { .. } | Surface::Conductor { .. } => true,
+        Surface::Glossy { base, metallic, .. } => {
+            // What has no base to speak of mirrors, as far as it can be told without its textures.
+            let base =
+                if metallic.texture.is_some() { Rgb::ZERO } else { base.value * (1.0 - metallic.value) };
+            material.surface.may_be_smooth() || base.max_element() < LEAST_BASE
+        }
+    }
+}
+
+/// Below this a base may be black to the paths (`transport/merge.rs`), with a margin for what its textures say.
+const LEAST_BASE: f32 = 0.05;
+
+/// Shows about `count` points, evenly spread over all surfaces that throw caustics.
+fn throwing_points(scene: &Scene, count: usize, mut show: impl FnMut(u32, Vec3)) {
+    let area = |index: u32| {
+        let [a, b, c] = scene.mesh.corners(index);
+        let area = 0.5 * f64::from((b - a).cross(c - a).length());
+        if area.is_finite() { area } else { 0.0 }
+    };
+    let throwing = |index: &u32| {
+        let triangle = scene.mesh.triangles.get(*index as usize);
+        triangle.and_then(|t| scene.materials.get(t.material as usize)).is_some_and(throws)
+    };
+    let triangles = || (0..scene.mesh.triangles.len() as u32).filter(throwing);
+    let step = triangles().map(area).sum::<f64>() / count as f64;
+    if step <= 0.0 || step.is_nan() {
+        return;
+    }
+    let (mut passed, mut number) = (0.5 * step, 0);
+    for index in triangles() {
+        passed += area(index);
+        let [a, b, c] = scene.mesh.corners(index);
+        while passed >= step && (number as usize) < 2 * count {
+            passed -= step;
+            let at = Sampler::new(0x6169_6d73, 0, number).pair(0);
+            let (u, v) = crate::sampling::warp::uniform_triangle(at);
+            show(number, a + u * (b - a) + v * (c - a));
+            number += 1;
+        }
+    }
+}
+
+/// The numbers that `warp::concentric_disk` takes to a point of the unit disk.
+pub(super) fn disk_square(disk: Vec2) -> [f32; 2] {
+    let length = disk.length();
+    let other = |a: f32, b: f32| libm::atan2f(a, b) / FRAC_PI_4;
+    let (x, y) = if disk.y.abs() > disk.x.abs() {
+        let y = length.copysign(disk.y);
+        (y * other(disk.x * y.signum(), disk.y.abs()), y)
+    } else {
+        let x = length.copysign(disk.x);
+        (x, x * other(disk.y * x.signum(), disk.x.abs()))
+    };
+    [x, y].map(|at| (0.5 * (at + 1.0)).clamp(0.0, ONE_MINUS_EPSILON))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sampling::warp::concentric_disk;
+
+    #[test]
+    fn the_disk_goes_back_to_its_square() {
+        for i in 0..4096 {
+            let u = Sampler::new(3, 0, i).pair(0);
+            let [x, y] = disk_square(concentric_disk(u));
+            assert!((x - u[0]).abs() < 1e-5 && (y - u[1]).abs() < 1e-5, "{u:?} {x} {y}");
+        }
+    }
+}

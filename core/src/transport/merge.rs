@@ -1,0 +1,170 @@
+//! Paths joined with photons of caustics: vertex merging (Georgiev et al. 2012) for light that comes to a rough surface
+//! by mirrors and glass, and multiple importance sampling over all that finds such light.
+//!
+//! Let x₀ be on a light, x₁ … x₍ⱼ₋₁₎ on surfaces that are not rough, x = xⱼ the first rough one, behind which the path
+//! goes on to the eye in whatever way. It can be found
+//! 1. by the path tracer, which goes from x by chance to x₀;
+//! 2. by the path tracer, which goes to x₁ and chooses x₀, where x₁ reflects into more than one direction;
+//! 3. by a photon that comes from x₀ and lies within a disc around x.
+//!
+//! Every other path is found by the path tracer alone. So a path has one vertex at most at which it can be merged, and
+//! three densities, which have all that lies behind x in common. With étendue in place of areas (`light/etendue.rs`)
+//! distances cancel, and the third over the first is
+//!
+//!   R = N π r² cos θⱼ / p(xⱼ → x₍ⱼ₋₁₎) · Π ρᵢ · p(x₀) p(ω₀) / cos θ₀
+//!   ρᵢ = p(x₍ᵢ₋₁₎ → xᵢ → x₍ᵢ₊₁₎) cos θ(x₍ᵢ₋₁₎) / (p(x₍ᵢ₊₁₎ → xᵢ → x₍ᵢ₋₁₎) cos θ(x₍ᵢ₊₁₎))
+//!
+//! of N light paths and discs of radius r. At a mirror ρ = 1; where light is refracted, the squared ratio of the
+//! indices; elsewhere densities of both ways. Both ends know all of it when they meet: nobody needs to be traced back.
+//!
+//! Weights are those of the power heuristic. For them p(xⱼ → x₍ⱼ₋₁₎) is that of a diffuse surface, cos θⱼ / π, whatever
+//! else x reflects, and r is that of the place of the photon, or of the point. So R = π² r² N ..., the weight of a
+//! photon is known when it is left, its power is multiplied with it, and a map needs no more than power. Photons that
+//! paths find more easily are hardly ever left. Ends of paths by roulette count for none of the densities.
+
+use super::density::reflected;
+use super::shoot::holds_photons;
+use crate::bsdf::{Bsdf, Features};
+use crate::bvh::Bvh;
+use crate::camera::Camera;
+use crate::light::Emission;
+use crate::photon::{Disc, Falloff, PhotonMap, Uniform};
+use crate::scene::{Scene, SurfacePoint};
+use crate::{Level, Rgb};
+use core::f32::consts::PI;
+use glam::Vec3;
+
+/// The least distance from the eye by which radii are reckoned, in diagonals of the scene: what is seen through a
+/// mirror may lie near the eye.
+const NEAREST: f32 = 0.05;
+
+/// Of a coated surface, the colour of the base from which on it is a rough one. Below, it mirrors and little else, and
+/// would make spikes of photons.
+const BASE: f32 = 0.02;
+
+/// Whether light that `bsdf` does not mirror is found by photons: it is a rough surface.
+#[inline]
+pub(super) fn ends_chain(bsdf: &Bsdf) -> bool {
+    holds_photons(bsdf) && bsdf.base().max_element() >= BASE
+}
+
+/// The radii of discs: as far on a surface as so many pixels at that distance from the eye.
+#[derive(Clone, Copy, Debug)]
+pub struct Discs {
+    eye: Vec3,
+    /// At distance one.
+    radius: f32,
+    nearest: f32,
+}
+
+impl Discs {
+    /// Of `pixels` in radius, for a picture of `height` rows of a scene of that `diagonal`.
+    pub fn new(camera: &Camera, height: u32, diagonal: f32, pixels: f32) -> Self {
+        let radius = pixels * 2.0 * camera.tan_half_fov / height.max(1) as f32;
+        Self { eye: camera.eye, radius, nearest: NEAREST * diagonal }
+    }
+
+    /// The radius around `place`.
+    #[inline]
+    pub fn radius(&self, place: Vec3) -> f32 {
+        self.radius * place.distance(self.eye).max(self.nearest)
+    }
+
+    /// π² r² N: R where nothing lies between, and light is emitted with a density of one.
+    #[inline]
+    pub(super) fn reach(&self, place: Vec3, paths: f32) -> f32 {
+        let radius = PI * self.radius(place);
+        radius * radius * paths
+    }
+}
+
+/// Photons of caustics as paths from the eye use them.
+#[derive(Clone, Copy)]
+pub struct Merging<'a> {
+    /// Of even and of odd samples.
+    maps: [&'a PhotonMap<'a>; 2],
+    pub(super) emission: &'a Emission<'a>,
+    discs: Discs,
+    /// Light paths of each map.
+    paths: f32,
+}
+
+/// A surface of a chain: where light goes from `far`, the side of the light, to `near`, the side of the eye.
+pub(super) struct ChainLink<'p> {
+    pub(super) point: &'p SurfacePoint<'p>,
+    /// As seen from one of the two.
+    pub(super) bsdf: &'p Bsdf,
+    /// The one from which it is seen; local, as `far`.
+    pub(super) near: Vec3,
+    pub(super) far: Vec3,
+}
+
+impl ChainLink<'_> {
+    /// The density with which who comes from `far` goes on to `near`, times the ratio of the cosines of `far` and of
+    /// `near`. Over the density of the other way it is ρ.
+    pub(super) fn reverse<F: Features>(&self, scene: &Scene) -> f32 {
+        self.density::<F>(scene) * (self.far.z / self.near.z).abs()
+    }
+
+    /// The density alone.
+    pub(super) fn density<F: Features>(&self, scene: &Scene) -> f32 {
+        let Self { point, bsdf, near, far } = *self;
+        if far.z > 0.0 {
+            return bsdf.evaluate::<F>(far, near).1;
+        }
+        let turned = |way: Vec3| Vec3::new(way.x, way.y, -way.z);
+        let behind = Bsdf::at::<F>(scene, point.material, point.uv, !point.front);
+        behind.evaluate::<F>(turned(far), turned(near)).1
+    }
+}
+
+impl<'a> Merging<'a> {
+    /// `maps` for even and odd samples, of `paths` light paths each, which were left for the same `discs`.
+    pub fn new(maps: [&'a PhotonMap<'a>; 2], emission: &'a Emission<'a>, discs: Discs, paths: u32) -> Self {
+        Self { maps, emission, discs, paths: paths as f32 }
+    }
+
+    /// R as far as a path knows it that begins its chain at `place`.
+    #[inline]
+    pub(super) fn begun(&self, place: Vec3) -> f32 {
+        self.discs.reach(place, self.paths)
+    }
+
+    /// The `weight` of what the path tracer found, where photons might have found it as well: R is `chain` times what
+    /// the light has to do with it. No chain, no photons.
+    #[inline]
+    pub(super) fn beside(&self, weight: f32, chain: f32, of_light: impl FnOnce() -> f32) -> f32 {
+        if chain <= 0.0 || chain.is_nan() {
+            return weight;
+        }
+        let ratio = chain * of_light();
+        weight / (1.0 + weight * ratio * ratio)
+    }
+
+    /// What `point` sends to `wo` of the light of photons around it. `turns` turns the probes for walls.
+    #[inline]
+    pub(super) fn reflected<F: Features>(
+        &self,
+        (bvh, level): (&Bvh, Level),
+        sample: u32,
+        (point, bsdf): (&SurfacePoint, &Bsdf),
+        wo: Vec3,
+        turns: impl FnOnce() -> f32,
+    ) -> Rgb {
+        let map = self.maps[sample as usize & 1];
+        if map.is_empty() || !ends_chain(bsdf) {
+            return Rgb::ZERO;
+        }
+        let disc = Disc {
+            place: point.position,
+            normal: point.geometric_normal,
+            radius: self.discs.radius(point.position),
+            falloff: Falloff::Epanechnikov,
+        };
+        // Most places have no photon near them, and need not look for walls.
+        if map.gather(level, &disc, &Uniform(Rgb::ONE)).photons == 0 {
+            return Rgb::ZERO;
+        }
+        reflected::<F>(map, (bvh, level), &disc, point, bsdf, wo, turns())
+    }
+}

@@ -1,0 +1,266 @@
+//! Path tracing joined with photons of caustics (`halflight_core::transport::caustics`). Photons are shot anew for every
+//! few samples, into two maps, of even and of odd ones, so that the halves of the film stay independent; and discs
+//! shrink from one to the next as those of progressive photon mapping do, so that the blur vanishes.
+//!
+//! A first look shoots some photons at all that mirrors or refracts, and learns which of them show in the picture: where
+//! next to nothing does, the picture is path traced alone, as if photons had never been asked for. Otherwise it is where
+//! most of them go from then on.
+
+use super::path::Paths;
+use super::{Renderer, Stage};
+use crate::drive::crew::Crew;
+use crate::drive::memory::Memory;
+use crate::drive::run::path_settings;
+use crate::drive::{RenderError, Reuse};
+use halflight_core::bsdf::Features;
+use halflight_core::census::Census;
+use halflight_core::light::{Emission, Worth};
+use halflight_core::memory::{Arena, Line};
+use halflight_core::photon::{MapShape, PhotonMap, Photons};
+use halflight_core::transport::caustics::{CausticShooter, Find, PATHS, ROOM};
+use halflight_core::transport::shoot::{Keep, ShootSettings};
+use halflight_core::transport::{Discs, Merging, PathTracer, path::WAVE};
+
+/// Radius of the discs of the first sample, in pixels.
+const FIRST_RADIUS: f64 = 1.5;
+
+/// How fast radii shrink: with 2/3 the variance and the squared bias fall alike (Knaus and Zwicker 2011).
+const ALPHA: f64 = 2.0 / 3.0;
+
+/// Light paths of a map for each pixel of the picture and each sample that the map serves, but no fewer and no more
+/// than these.
+const PATHS_PER_SAMPLE: f64 = 1.0;
+const FEWEST_PATHS: usize = 16 * PATHS;
+const MOST_PATHS: usize = 4096 * PATHS;
+
+/// Samples that share their photons, even ones and odd ones apart, at most: less would not fill the waves of a tile.
+const MOST_SAMPLES: u32 = 8;
+
+/// Light paths of the first look, and of one by what that has learned.
+const LOOK: usize = 32 * PATHS;
+
+/// The share of the picture's light that photons must bring, of what paths find badly, or they are left out.
+const LEAST_SHARE: f64 = 1e-4;
+
+/// Whether paths were joined with photons of caustics.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct CausticUse {
+    /// They were.
+    pub used: bool,
+    /// About what share of the picture's light photons bring that paths find badly, by a first look; `None` where nobody
+    /// looked.
+    pub share: Option<f64>,
+    /// Light paths that were shot, and photons that they left.
+    pub paths: u64,
+    /// See `paths`.
+    pub photons: u64,
+}
+
+/// Whether anything could throw a caustic.
+pub(super) fn are_possible(stage: &Stage) -> bool {
+    let census = Census::of(stage.scene);
+    let kinds = &census.surfaces;
+    let mirrors = kinds.mirror + kinds.conductor + kinds.glossy + kinds.dielectric + kinds.rough_dielectric;
+    stage.settings.caustics && mirrors > 0 && kinds.diffuse + kinds.glossy > 0 && census.has_light()
+}
+
+/// Takes the memory, sets the method up, and hands it to `then`.
+pub(super) fn with<F: Features, T>(
+    stage: &Stage,
+    memory: &mut Memory,
+    then: impl FnOnce(&mut dyn Renderer, &mut Memory) -> Result<T, RenderError>,
+) -> Result<T, RenderError> {
+    let Stage { scene, bvh, lights, settings, .. } = *stage;
+    let scratch = PathTracer::<F>::scratch(WAVE).or(CausticShooter::<F>::scratch());
+    let mut paths = Paths::<F>::with_scratch(stage, memory, scratch)?;
+    let guide = Worth::guide_footprint(lights);
+    let emission = Emission::footprint(lights).and(guide).and(Worth::footprint(lights)).and(guide).and(guide);
+    // Where memory is short, paths go without.
+    if !memory.has(emission.bytes() + 2 * Photons::footprint(ROOM).bytes()) {
+        return then(&mut paths, memory);
+    }
+    let mut lines = memory.take("emission", emission)?;
+    let mut arena = Arena::new(bytemuck::cast_slice_mut(&mut lines));
+    let plain = Emission::build(scene, lights, &bvh.bounds(), &mut arena)?;
+    let emission = match Worth::aimed(scene, lights, &plain, &mut arena)? {
+        Some(mut worth) => {
+            let aimed = worth.guide(&plain, &mut arena)?;
+            look::<F>(stage, &mut paths, &aimed, 0, &mut worth)?;
+            let learned = worth.guide(&plain, &mut arena)?;
+            let share = look::<F>(stage, &mut paths, &learned, 1, &mut worth)?;
+            paths.caustics.share = Some(share);
+            (share >= LEAST_SHARE).then(|| worth.guide(&plain, &mut arena)).transpose()?
+        }
+        None => None,
+    };
+    let Some(emission) = emission else {
+        drop(lines);
+        memory.give_back("emission");
+        return then(&mut paths, memory);
+    };
+    let pixels = f64::from(settings.width) * f64::from(settings.height);
+    let each = ((PATHS_PER_SAMPLE * pixels) as usize).clamp(FEWEST_PATHS, MOST_PATHS);
+    let wanted = (each * (MOST_SAMPLES / 2) as usize).min(MOST_PATHS).div_ceil(PATHS);
+    let of_task = Photons::footprint(ROOM).bytes();
+    let tasks = wanted.min(memory.available() / 4 / 2 / of_task).max(1);
+    let footprint = Photons::footprint(tasks * ROOM);
+    let photons = [memory.take("photons", footprint)?, memory.take("photons", footprint)?];
+    let most = tasks * PATHS;
+    paths.caustics.used = true;
+    then(&mut Joined { stage: *stage, paths, emission, photons, each, most, kept: None }, memory)
+}
+
+/// A shooter of `paths` photons by `emission`, for the discs of `sample`.
+fn shooter<'a, F: Features>(
+    stage: &Stage<'a>,
+    emission: &'a Emission<'a>,
+    paths: usize,
+    sample: u32,
+) -> (CausticShooter<'a, F>, Discs) {
+    let Stage { scene, bvh, lights, settings, .. } = *stage;
+    let pixels = FIRST_RADIUS * shrunk(sample / 2).sqrt();
+    let discs = Discs::new(&scene.camera, settings.height, bvh.bounds().diagonal(), pixels as f32);
+    let max_depth = path_settings(settings).max_depth;
+    let shot = ShootSettings { keep: Keep::Caustic, seed: settings.seed, paths: paths as u32, max_depth };
+    let frame = (discs, [settings.width, settings.height]);
+    (CausticShooter::new((scene, bvh, lights), emission, shot, frame, settings.level), discs)
+}
+
+/// Learns what photons of `emission`, those of map `map`, are worth; returns about what share of the picture's light they bring.
+fn look<F: Features>(
+    stage: &Stage,
+    paths: &mut Paths<F>,
+    emission: &Emission,
+    map: u32,
+    worth: &mut Worth,
+) -> Result<f64, RenderError> {
+    let Stage { settings, workers, .. } = *stage;
+    let Paths { tracer, scratch, .. } = paths;
+    let (shooter, _) = shooter::<F>(stage, emission, LOOK, 0);
+    let mut finds = vec![Find::default(); LOOK];
+    let look = |task: usize, arena: &mut Arena, out: &mut [Find]| shooter.look(task, map, arena, out);
+    workers.pass(&mut finds, PATHS, scratch, &|| false, &look)?;
+    finds.iter().for_each(|find| worth.learn(find.cell, find.worth));
+    // Power over the area of a disc, from a surface that reflects half of it evenly.
+    let found = finds.iter().map(|find| f64::from(find.worth)).sum::<f64>();
+    let pixels = f64::from(settings.width) * f64::from(settings.height);
+    let radiance = 0.5 / core::f64::consts::PI * found * FIRST_RADIUS.powi(2) / pixels;
+    let tiles = tracer.pilot_tasks();
+    let means = workers.each(tiles, scratch, |task, arena| tracer.pilot_mean(task, WAVE, arena))?;
+    let mean = means.iter().map(|&mean| f64::from(mean)).sum::<f64>() / means.len().max(1) as f64;
+    Ok(if radiance > 0.0 { radiance / (mean + radiance) } else { 0.0 })
+}
+
+/// See the file.
+struct Joined<'a, F> {
+    stage: Stage<'a>,
+    paths: Paths<'a, F>,
+    emission: Emission<'a>,
+    /// Of even and of odd samples.
+    photons: [Vec<Line>; 2],
+    /// Light paths of a map for each sample that it serves, and at most.
+    each: usize,
+    most: usize,
+    /// The maps that are in the photons' memory: of which samples.
+    kept: Option<(Block, [MapShape; 2])>,
+}
+
+/// Samples that share their photons.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Block {
+    first: u32,
+    end: u32,
+}
+
+impl Block {
+    /// The one of `sample`: of 2, 2, 4, and then always [`MOST_SAMPLES`].
+    fn of(sample: u32) -> Self {
+        let length = match sample {
+            0..MOST_SAMPLES => (sample + 1).next_power_of_two().max(4) / 2,
+            _ => MOST_SAMPLES,
+        };
+        let first = sample / length * length;
+        Self { first, end: first.saturating_add(length) }
+    }
+
+    /// Samples of each map.
+    fn samples(&self) -> u32 {
+        (self.end - self.first) / 2
+    }
+}
+
+impl<F: Features> Renderer for Joined<'_, F> {
+    fn round(&mut self, crew: &mut Crew) -> Result<(), RenderError> {
+        let Self { stage, paths, emission, photons, each, most, kept } = self;
+        let Paths { tracer, scratch, caustics, .. } = paths;
+        let workers = stage.workers;
+        while let Some(sample) = crew.next_sample() {
+            let block = Block::of(sample);
+            let light_paths = (*each * block.samples() as usize).min(*most);
+            let (shooter, discs) = shooter::<F>(stage, emission, light_paths, block.first);
+            let room = shooter.tasks() * ROOM;
+            let [even, odd] = &mut *photons;
+            let maps = match *kept {
+                Some((of, shapes)) if of == block => {
+                    let again = |shape: &MapShape, lines| {
+                        PhotonMap::again(shape, room, &mut Arena::new(bytemuck::cast_slice_mut(lines)))
+                    };
+                    [again(&shapes[0], even)?, again(&shapes[1], odd)?]
+                }
+                _ => {
+                    *kept = None;
+                    let open = |lines| Photons::new(room, &mut Arena::new(bytemuck::cast_slice_mut(lines)));
+                    let mut maps = [open(even)?, open(odd)?];
+                    for (map, half) in maps.iter_mut().zip(0..) {
+                        let shoot = |task: usize, arena: &mut Arena, out: &mut [_]| {
+                            shooter.run(task, block.first + half, arena, out)
+                        };
+                        if !crew.pass(map.as_mut_slice(), ROOM, scratch, &shoot)? {
+                            return Ok(());
+                        }
+                    }
+                    let maps = maps.map(|map| workers.build_photons(map, room));
+                    *kept = Some((block, [maps[0].shape(), maps[1].shape()]));
+                    caustics.paths += 2 * light_paths as u64;
+                    caustics.photons += maps.iter().map(|map| map.len() as u64).sum::<u64>();
+                    maps
+                }
+            };
+            let merging = Merging::new([&maps[0], &maps[1]], emission, discs, light_paths as u32);
+            let tracer = tracer.with_caustics(merging);
+            crew.tiles(block.end, scratch, &|task, samples, arena, pixels| {
+                tracer.run(task, samples, WAVE, arena, pixels)
+            })?;
+        }
+        Ok(())
+    }
+
+    fn reuse(&self) -> Reuse {
+        self.paths.reuse()
+    }
+
+    fn caustics(&self) -> CausticUse {
+        self.paths.caustics
+    }
+}
+
+/// What is left of the squared radius after `samples`.
+fn shrunk(samples: u32) -> f64 {
+    (1..=samples).map(f64::from).fold(1.0, |squared, i| squared * (i + ALPHA) / (i + 1.0))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn blocks_follow_each_other() {
+        let mut next = 0;
+        while next < 64 {
+            let block = Block::of(next);
+            assert!(block.first == next && block.samples() > 0 && block.end <= 8 || block.samples() == 4);
+            assert!((block.first..block.end).all(|sample| Block::of(sample) == block), "{block:?}");
+            next = block.end;
+        }
+    }
+}

@@ -1,0 +1,308 @@
+//! Path tracing joined with photons of caustics: right in the mean whatever the surfaces and lights, nothing counted
+//! twice, the same bits on any number of threads, and none of it where there is no caustic.
+
+use core::sync::atomic::AtomicBool;
+use glam::Vec3;
+use halflight::drive::{self, RenderResult, Settings, Stop};
+use halflight_core::bsdf::All;
+use halflight_core::bvh::Bvh;
+use halflight_core::film::Film;
+use halflight_core::light::{Emission, Lights, PointLight, Worth};
+use halflight_core::memory::{Arena, Footprint, Line};
+use halflight_core::photon::{Photon, Photons};
+use halflight_core::scene::{Camera, Material, Scene, Surface};
+use halflight_core::transport::caustics::{CausticShooter, Find, PATHS, ROOM};
+use halflight_core::transport::shoot::{Keep, ShootSettings};
+use halflight_core::transport::{Discs, Merging, PathSettings, PathTracer, UNLIMITED};
+use halflight_core::{Level, Rgb};
+use halflight_tests::scenes::{SceneBuffers, constant_environment, cornell_box, emitter, everything};
+use halflight_tests::statistics::{agree, blocks};
+
+/// Pixels across and down.
+const SIZE: u32 = 28;
+
+/// Blocks of so many pixels are judged together.
+const BLOCK: u32 = 7;
+
+/// Independent pictures of each kind.
+const SEEDS: u32 = 16;
+
+/// Normal quantile for one error in ten thousand over all blocks and channels of all scenes (Šidák; 12 comparisons of 48
+/// values), with Student's wider tails of 2 × 15 degrees of freedom.
+const WIDEST: f64 = 6.8;
+
+fn lines(footprint: Footprint) -> Vec<Line> {
+    vec![Line([0; 64]); footprint.bytes() / 64]
+}
+
+fn arena(lines: &mut [Line]) -> Arena<'_> {
+    Arena::new(bytemuck::cast_slice_mut(lines))
+}
+
+/// Blocks of pictures of `scene` by 16 samples, joined with photons of `tasks` and discs of so many pixels if there
+/// are any.
+fn pictures(scene: &Scene, first: u32, tasks: usize, pixels: f32, max_depth: u32) -> Vec<Vec<f64>> {
+    let level = Level::detect();
+    let mut bvh_lines = lines(Bvh::footprint(scene.mesh.triangles.len()));
+    let bvh = Bvh::build(&scene.mesh, &mut arena(&mut bvh_lines)).unwrap();
+    let mut light_lines = lines(Lights::footprint(scene).and(Lights::scratch(scene)));
+    let lights = Lights::build(scene, &mut arena(&mut light_lines)).unwrap();
+    let mut emission_lines = lines(Emission::footprint(&lights));
+    let emission = Emission::build(scene, &lights, &bvh.bounds(), &mut arena(&mut emission_lines)).unwrap();
+    let mut scratch = lines(PathTracer::<All>::scratch(2048).or(CausticShooter::<All>::scratch()));
+    let mut scratch = arena(&mut scratch);
+    let mut film_lines = lines(Film::footprint(SIZE, SIZE));
+    let mut photon_lines = [0, 1].map(|_| lines(Photons::footprint(tasks * ROOM)));
+    let one = |seed: u32| {
+        let paths = (tasks * PATHS) as u32;
+        let discs = Discs::new(&scene.camera, SIZE, bvh.bounds().diagonal(), pixels);
+        let shot = ShootSettings { keep: Keep::Caustic, seed, paths, max_depth };
+        let shooter =
+            CausticShooter::<All>::new((scene, &bvh, &lights), &emission, shot, (discs, [SIZE; 2]), level);
+        let [even, odd] = &mut photon_lines;
+        let mut map = 0;
+        let mut shoot = |lines| {
+            let mut photons = Photons::new(tasks * ROOM, &mut arena(lines)).unwrap();
+            for (task, out) in photons.as_mut_slice().chunks_mut(ROOM).enumerate() {
+                assert_eq!(shooter.run(task, map, &mut scratch, out).unwrap().dropped.total(), 0);
+            }
+            map += 1;
+            photons.build(tasks * ROOM)
+        };
+        let maps = [shoot(even), shoot(odd)];
+        let settings = PathSettings { width: SIZE, height: SIZE, seed, max_depth, reuse: false };
+        let mut tracer = PathTracer::<All>::new(scene, &bvh, &lights, settings, level);
+        if tasks > 0 {
+            assert!(tasks == 1 || !maps[0].is_empty());
+            tracer = tracer.with_caustics(Merging::new([&maps[0], &maps[1]], &emission, discs, paths));
+        }
+        let mut film = Film::new(SIZE, SIZE, &mut arena(&mut film_lines)).unwrap();
+        film.pixels_mut().fill(Default::default());
+        for (task, out) in film.pixels_mut().chunks_mut(halflight_core::film::PIXELS_PER_TILE).enumerate() {
+            let counters = tracer.run(task, 0..16, 2048, &mut scratch, out).unwrap();
+            assert_eq!(counters.dropped.total(), 0);
+        }
+        let all = (0..SIZE * SIZE).map(|i| film.pixel(i % SIZE, i / SIZE).mean().to_array());
+        blocks(&all.collect::<Vec<_>>(), SIZE, BLOCK)
+    };
+    (first..first + SEEDS).map(one).collect()
+}
+
+/// A lamp of `size` that faces something at its back, and a floor that both shine on.
+fn lamp_before(surface: Surface, size: f32) -> SceneBuffers {
+    let camera = Camera::look_at(Vec3::new(0.0, 2.5, 3.0), Vec3::new(0.0, 0.0, 0.5), Vec3::Y, 40.0);
+    let mut buffers = SceneBuffers::new(camera);
+    let floor = buffers.material(Material::diffuse(Rgb::splat(0.7)));
+    let thing = buffers.material(Material { surface, ..Material::GREY });
+    let lamp = buffers.material(emitter(0.0, 5.0));
+    buffers.square(Vec3::ZERO, Vec3::Y, 4.0, floor);
+    buffers.square(Vec3::new(0.0, 1.0, -1.0), Vec3::Z, 1.0, thing);
+    buffers.square(Vec3::new(0.0, 1.0, -0.5), Vec3::NEG_Z, size, lamp);
+    buffers
+}
+
+/// A ball between floor and lamp.
+fn lamp_over_ball(surface: Surface) -> SceneBuffers {
+    let camera = Camera::look_at(Vec3::new(0.0, 2.0, 3.5), Vec3::new(0.0, 0.3, 0.0), Vec3::Y, 40.0);
+    let mut buffers = SceneBuffers::new(camera);
+    let floor = buffers.material(Material::diffuse(Rgb::splat(0.7)));
+    let ball = buffers.material(Material { surface, ..Material::GREY });
+    let lamp = buffers.material(emitter(0.0, 2.0));
+    buffers.square(Vec3::ZERO, Vec3::Y, 4.0, floor);
+    buffers.normals = vec![[0.0; 3]; buffers.positions.len()];
+    buffers.sphere(Vec3::new(0.0, 0.6, 0.0), 0.5, 24, ball);
+    buffers.square(Vec3::new(0.0, 3.0, 0.0), Vec3::NEG_Y, 2.0, lamp);
+    buffers.normals.resize(buffers.positions.len(), [0.0; 3]);
+    buffers
+}
+
+fn is_right_in_the_mean(name: &str, buffers: &SceneBuffers, max_depth: u32) {
+    let scene = buffers.scene();
+    let off = pictures(&scene, 0, 0, 0.3, max_depth);
+    // Photons against paths from a hundredth to a hundred and more.
+    for (tasks, pixels, first) in [(1, 0.15, 100), (16, 0.3, 200)] {
+        let joined = pictures(&scene, first, tasks, pixels, max_depth);
+        agree(&joined, &off, WIDEST).unwrap_or_else(|why| panic!("{name}, {tasks} tasks, {why}"));
+    }
+}
+
+fn metal(roughness: f32) -> Surface {
+    Surface::Conductor { reflectance: Rgb::splat(0.9).into(), roughness: roughness.into() }
+}
+
+fn glass(roughness: f32) -> Surface {
+    Surface::Dielectric { ior: 1.5, tint: Rgb::ONE, roughness: roughness.into() }
+}
+
+#[test]
+fn what_a_mirror_throws_is_right_in_the_mean() {
+    is_right_in_the_mean("mirror", &lamp_before(metal(0.0), 0.6), UNLIMITED);
+    is_right_in_the_mean("mirror, limited", &lamp_before(metal(0.0), 0.6), 3);
+    is_right_in_the_mean("rough metal", &lamp_before(metal(0.5), 0.3), UNLIMITED);
+}
+
+#[test]
+fn what_glass_throws_is_right_in_the_mean() {
+    is_right_in_the_mean("glass", &lamp_over_ball(glass(0.0)), UNLIMITED);
+    is_right_in_the_mean("frosted glass", &lamp_over_ball(glass(0.4)), UNLIMITED);
+}
+
+#[test]
+fn every_kind_of_surface_and_light_is_right_in_the_mean() {
+    let mut buffers = everything();
+    is_right_in_the_mean("everything", &buffers, UNLIMITED);
+    // Lights that rough metal and frosted glass alone can throw without photons.
+    buffers = lamp_before(metal(0.5), 0.3);
+    buffers.environment = constant_environment(0.3);
+    let at = Vec3::new(0.0, 1.5, 0.5);
+    buffers.lights.push(PointLight::Point { position: at, intensity: Rgb::splat(1.0) });
+    let direction = Vec3::new(0.0, -0.6, -0.8);
+    buffers.lights.push(PointLight::Directional { direction, irradiance: Rgb::splat(1.0) });
+    is_right_in_the_mean("lights without surface", &buffers, UNLIMITED);
+}
+
+fn render(scene: &Scene, spp: u32, change: impl FnOnce(&mut Settings)) -> RenderResult {
+    let stop = Stop { spp: Some(spp), ..Stop::default() };
+    let mut settings = Settings { width: 40, height: 40, stop, ..Settings::default() };
+    change(&mut settings);
+    drive::render(scene, &settings, &mut |_| (), &AtomicBool::new(false)).unwrap()
+}
+
+fn has_photons(result: &RenderResult) -> bool {
+    result.memory.iter().any(|one| one.structure == "photons" && one.bytes > 0)
+}
+
+#[test]
+fn bits_do_not_depend_on_threads_or_level_and_off_is_off() {
+    let buffers = everything();
+    let scene = buffers.scene();
+    let one = render(&scene, 11, |s| s.threads = Some(1));
+    assert!(has_photons(&one));
+    assert_eq!(render(&scene, 11, |s| s.threads = Some(2)).image, one.image);
+    for level in Level::detect().and_below() {
+        assert_eq!(render(&scene, 11, |s| s.level = level).image, one.image, "{level:?}");
+    }
+    let off = render(&scene, 11, |s| s.caustics = false);
+    assert!(!has_photons(&off) && off.image != one.image);
+}
+
+#[test]
+fn where_there_is_no_caustic_the_picture_is_that_without_photons() {
+    let boxed = cornell_box();
+    // A mirror that no light reaches: it stands behind the wall.
+    let mut hidden = cornell_box();
+    let mirror = hidden.material(Material { surface: metal(0.0), ..Material::GREY });
+    hidden.square(Vec3::new(0.5, 0.5, 3.0), Vec3::Z, 0.5, mirror);
+    for buffers in [&boxed, &hidden] {
+        let scene = buffers.scene();
+        let joined = render(&scene, 9, |_| ());
+        assert_eq!(joined.image, render(&scene, 9, |s| s.caustics = false).image);
+        assert!(!has_photons(&joined));
+    }
+}
+
+#[test]
+fn no_caustic_leaks_through_a_thin_wall() {
+    // A bright room with a mirror and a dark one, with a wall between them that is as thin as a thousandth.
+    let camera = Camera::look_at(Vec3::new(0.52, 0.5, 0.95), Vec3::new(0.52, 0.45, 0.0), Vec3::Y, 80.0);
+    let mut buffers = SceneBuffers::new(camera);
+    let wall = buffers.material(Material::diffuse(Rgb::splat(0.8)));
+    let lamp = buffers.material(emitter(0.0, 20.0));
+    let mirror = buffers.material(Material { surface: metal(0.0), ..Material::GREY });
+    buffers.cuboid(Vec3::ZERO, Vec3::new(0.5, 1.0, 1.0), true, wall);
+    buffers.cuboid(Vec3::new(0.501, 0.0, 0.0), Vec3::ONE, true, wall);
+    buffers.square(Vec3::new(0.25, 0.9, 0.5), Vec3::NEG_Y, 0.2, lamp);
+    buffers.square(Vec3::new(0.1, 0.3, 0.5), Vec3::new(1.0, 1.0, 0.0).normalize(), 0.2, mirror);
+    let image = render(&buffers.scene(), 8, |_| ()).image;
+    assert_eq!(image.mean(), [0.0; 3], "the camera is in the dark room");
+    let camera = Camera { eye: Vec3::new(0.48, 0.5, 0.95), ..camera };
+    let bright = render(&Scene { camera, ..buffers.scene() }, 8, |_| ());
+    assert!(has_photons(&bright) && bright.image.mean()[1] > 0.1);
+}
+
+/// A hall with fifty lamps, of which a wall hides all but one from a small mirror on the floor.
+fn stadium() -> SceneBuffers {
+    let camera = Camera::look_at(Vec3::new(47.5, 1.0, 20.0), Vec3::new(47.5, 10.0, 25.0), Vec3::Y, 60.0);
+    let mut buffers = SceneBuffers::new(camera);
+    let wall = buffers.material(Material::diffuse(Rgb::splat(0.5)));
+    let reflectance = Rgb::splat(MIRRORED).into();
+    let mirror = buffers.material(Material { surface: Surface::Mirror { reflectance }, ..Material::GREY });
+    buffers.cuboid(Vec3::ZERO, Vec3::new(50.0, 10.0, 50.0), true, wall);
+    buffers
+        .quad([[0.0, 0.0], [0.0, 50.0], [10.0, 50.0], [10.0, 0.0]].map(|[y, z]| Vec3::new(45.0, y, z)), wall);
+    buffers.square(Vec3::new(47.5, 0.01, 25.0), Vec3::Y, MIRROR, mirror);
+    for i in 0..50 {
+        let elsewhere = Vec3::new(2.0 + (i % 7) as f32 * 6.0, 9.0, 3.0 + (i / 7) as f32 * 6.0);
+        let position = if i == 23 { Vec3::new(47.5, 9.0, 25.0) } else { elsewhere };
+        buffers.lights.push(PointLight::Point { position, intensity: Rgb::ONE });
+    }
+    buffers
+}
+
+/// The side of the mirror in the stadium, and what it reflects.
+const MIRROR: f32 = 1.0;
+const MIRRORED: f32 = 0.9;
+
+#[test]
+fn in_a_stadium_photons_go_to_the_glass_and_their_power_is_right() {
+    let buffers = stadium();
+    let scene = buffers.scene();
+    let level = Level::detect();
+    let mut bvh_lines = lines(Bvh::footprint(scene.mesh.triangles.len()));
+    let bvh = Bvh::build(&scene.mesh, &mut arena(&mut bvh_lines)).unwrap();
+    let mut light_lines = lines(Lights::footprint(&scene).and(Lights::scratch(&scene)));
+    let lights = Lights::build(&scene, &mut arena(&mut light_lines)).unwrap();
+    let guided = Worth::guide_footprint(&lights);
+    let mut all = lines(
+        Emission::footprint(&lights).and(Worth::footprint(&lights)).and(guided).and(guided).and(guided),
+    );
+    let mut memory = arena(&mut all);
+    let plain = Emission::build(&scene, &lights, &bvh.bounds(), &mut memory).unwrap();
+    let mut worth = Worth::aimed(&scene, &lights, &plain, &mut memory).unwrap().unwrap();
+    let aimed = worth.guide(&plain, &mut memory).unwrap();
+    let mut scratch = lines(CausticShooter::<All>::scratch());
+    let mut scratch = arena(&mut scratch);
+    const TASKS: usize = 64;
+    const MAPS: u32 = 16;
+    let shot =
+        ShootSettings { keep: Keep::Caustic, seed: 3, paths: (TASKS * PATHS) as u32, max_depth: UNLIMITED };
+    let discs = Discs::new(&scene.camera, SIZE, bvh.bounds().diagonal(), 1.0);
+    let shooter = |emission| {
+        let frame = (discs, [SIZE; 2]);
+        CausticShooter::<All>::new((&scene, &bvh, &lights), emission, shot, frame, level)
+    };
+    let look = |emission, map, worth: &mut Worth, scratch: &mut Arena| {
+        let shooter = shooter(emission);
+        for task in 0..TASKS / 2 {
+            let mut finds = [Find::default(); PATHS];
+            shooter.look(task, map, scratch, &mut finds).unwrap();
+            finds.iter().for_each(|find| worth.learn(find.cell, find.worth));
+        }
+    };
+    look(&aimed, 0, &mut worth, &mut scratch);
+    let once = worth.guide(&plain, &mut memory).unwrap();
+    look(&once, 1, &mut worth, &mut scratch);
+    let learned = worth.guide(&plain, &mut memory).unwrap();
+    assert_eq!(memory.available(), 0, "footprints are exact");
+    assert!(Worth::aimed(&scene, &lights, &plain, &mut memory).is_err());
+
+    let last = shooter(&learned);
+    let (mut rays, mut useful, mut power) = (0, 0u32, 0.0);
+    for (map, task) in (2..2 + MAPS).flat_map(|map| (0..TASKS).map(move |task| (map, task))) {
+        let mut photons = [Photon::NONE; ROOM];
+        rays += last.run(task, map, &mut scratch, &mut photons).unwrap().rays;
+        let left = photons.iter().filter(|photon| photon.position().is_finite());
+        left.for_each(|photon| (useful, power) = (useful + 1, power + f64::from(photon.power().x)));
+    }
+    let power = power / f64::from(MAPS);
+    // The solid angle of a square over its middle.
+    let (half, height) = (f64::from(MIRROR) / 2.0, 8.99f64);
+    let angle = 4.0 * (half * half / (height * (height * height + 2.0 * half * half).sqrt())).atan();
+    let expected = f64::from(MIRRORED) * angle;
+    // More than three standard deviations of the number of photons; those of one cell have the same power.
+    assert!((power / expected - 1.0).abs() < 0.01, "{power} W, not {expected}");
+    // An unguided path takes one ray, and leads to the mirror by chance.
+    let unguided = angle / (4.0 * core::f64::consts::PI) / 50.0;
+    let gain = f64::from(useful) / rays as f64 / unguided;
+    assert!(gain > 10.0, "useful photons per ray are {gain} times as many");
+}
