@@ -79,14 +79,7 @@ fn expected(map: &PhotonMap, place: Vec3, radius: f32) -> Vec<u32> {
     all.into_iter().map(|(_, index)| index).collect()
 }
 
-fn search(
-    map: &PhotonMap,
-    level: Level,
-    asked: &[Vec3],
-    orders: &[Vec<u32>],
-    radius: f32,
-    k: usize,
-) {
+fn search(map: &PhotonMap, level: Level, asked: &[Vec3], orders: &[Vec<u32>], radius: f32, k: usize) {
     let mut memory = lines(Neighbours::footprint(k));
     let mut neighbours = Neighbours::new(k, &mut Arena::new(bytemuck::cast_slice_mut(&mut memory)))
         .expect("the footprint was granted");
