@@ -200,6 +200,9 @@ impl<F: Features> PathTracer<'_, F> {
         let least = least_pixels * place.pixel;
         let reach = reach(&metric::Settings { least, ..metric }, &derivatives);
         let mut record = Record::new(place.position(), &frame, &derivatives, &reach);
+        let luminance = derivatives.luminance();
+        let variance = strata.hemisphere().map_or(0.0, |hemisphere| hemisphere.variance());
+        record.note_noise(if luminance > 0.0 { variance / (luminance * luminance) } else { 0.0 });
         record.shining = strata.shining as f32 / (n * n) as f32;
         self.fence(&mut record, place, counters);
         Ok(Some(record))

@@ -7,6 +7,7 @@ use super::held_out::{EXACT, Point, held_out, luminance};
 use super::memory::Memory;
 use super::method::{Growing, LEAST_PIXELS, Overture};
 use super::run::{build_bvh, path_settings};
+use super::survey::means;
 use super::workers::Workers;
 use super::{RenderError, Settings};
 use crate::pages::Pages;
@@ -49,7 +50,7 @@ pub struct MetricError {
     pub worst: f64,
     /// Share of the points that records reach; the errors are of these.
     pub reached: f64,
-    /// Mean of the errors of records as the metric predicts, over the irradiance; 0 where it knows none.
+    /// Mean of the errors that records predict at the points, over the irradiance.
     pub predicted: f64,
     /// Mean of the errors over the irradiance (or a tenth of its mean).
     pub achieved: f64,
@@ -145,12 +146,14 @@ fn arena(lines: &mut [Line]) -> Arena<'_> {
 /// Holds a cache against what is known.
 fn judge(metric: Metric, error: f32, cache: &IrradianceCache, points: &[Point]) -> MetricError {
     let mean = points.iter().map(|point| point.exact).sum::<f64>() / points.len().max(1) as f64;
-    let (mut squares, mut variance, mut relative) = (0.0, 0.0, Vec::new());
+    let (mut squares, mut variance, mut predicted, mut relative) = (0.0, 0.0, 0.0, Vec::new());
     for Point { place, exact, variance: noise, .. } in points {
         let Some(found) = cache.at(place.position(), place.normal()) else { continue };
         let difference = luminance(found.irradiance) - exact;
         squares += difference * difference - noise;
         variance += noise;
+        let [expected, _] = means(place, [cache; 2], |record| [record.predicted(), 0.0]);
+        predicted += f64::from(expected);
         relative.push(difference.abs() / exact.max(0.1 * mean));
     }
     relative.sort_by(f64::total_cmp);
@@ -158,7 +161,6 @@ fn judge(metric: Metric, error: f32, cache: &IrradianceCache, points: &[Point]) 
     let count = reached.max(1) as f64;
     let over_mean = |squares: f64| (squares.max(0.0) / count).sqrt() / mean.max(f64::MIN_POSITIVE);
     let records = cache.records();
-    let predicted = records.iter().map(|record| f64::from(record.error)).sum::<f64>();
     MetricError {
         metric,
         error,
@@ -167,7 +169,7 @@ fn judge(metric: Metric, error: f32, cache: &IrradianceCache, points: &[Point]) 
         noise: over_mean(variance),
         worst: relative.get(reached * 99 / 100).copied().unwrap_or(0.0),
         reached: reached as f64 / points.len().max(1) as f64,
-        predicted: predicted / records.len().max(1) as f64,
+        predicted: predicted / count,
         achieved: relative.iter().sum::<f64>() / count,
     }
 }

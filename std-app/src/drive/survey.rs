@@ -160,17 +160,16 @@ fn look_at(place: &Place, caches: [&IrradianceCache; 2], step: u32) -> Look {
     });
     let radius =
         |record: &Record| (record.radii[0] * record.radii[1] / (place.pixel() * place.pixel())).sqrt();
-    let [radius, predicted] = means(place, caches, |record| [radius(record).ln(), predicted(record)]);
+    let [radius, predicted] = means(place, caches, |record| [radius(record).ln(), record.predicted()]);
     Look { radius: if radius.is_finite() { radius.exp() } else { 0.0 }, predicted, mark }
 }
 
-/// What a record predicts, and no more than all: extrapolation is kept within limits.
-fn predicted(record: &Record) -> f32 {
-    record.error.min(1.0)
-}
-
 /// Means over the records that speak for a place, by their weights; not a number where there are none.
-fn means(place: &Place, caches: [&IrradianceCache; 2], of: impl Fn(&Record) -> [f32; 2]) -> [f32; 2] {
+pub(super) fn means(
+    place: &Place,
+    caches: [&IrradianceCache; 2],
+    of: impl Fn(&Record) -> [f32; 2],
+) -> [f32; 2] {
     let (mut sums, mut weights) = ([0.0; 2], 0.0);
     for cache in caches {
         cache.visit(place.position(), place.normal(), |record, weight| {
@@ -193,7 +192,7 @@ fn check(point: &Point, mean: f64, caches: [&IrradianceCache; 2]) -> Option<(Che
     }
     let found = said.iter().sum::<f64>() / said.len() as f64;
     let against = exact.max(DARK * mean).max(f64::MIN_POSITIVE);
-    let [predicted, _] = means(place, caches, |record| [predicted(record), 0.0]);
+    let [predicted, _] = means(place, caches, |record| [record.predicted(), 0.0]);
     let error = ((found - exact) / against) as f32;
     Some((Check { pixel: *pixel, error, predicted }, variance / (against * against)))
 }

@@ -153,9 +153,14 @@ pub struct Reach {
     /// Curvatures along the axes that the radii were made for: at (x, y) along them the error of extrapolation is
     /// expected to be (x² curvature₀ + y² curvature₁)/2 of the irradiance. Zero where the rule knows none.
     pub curvature: [f32; 2],
+    /// Error allowed over the reach, an integral over its area, m²: where neighbours show that it is more, the reach is
+    /// to shrink. Zero where the metric does not ask them.
+    pub allowed: f32,
+    /// The least that it may shrink to, m.
+    pub least: f32,
 }
 
-/// How far [`Metric::Halflight`] averages, in radii.
+/// How far [`Metric::Halflight`] averages, in radii, where nothing is known of the noise of a record.
 const OVERLAP: f32 = 1.5;
 
 /// The reach of a record of these derivatives, which should be those of [`Metric::derivatives`].
@@ -177,7 +182,7 @@ pub fn reach(settings: &Settings, derivatives: &Derivatives) -> Reach {
         _ => {
             let bent = curvatures(settings, derivatives, lit);
             let allowed = settings.error * settings.extent * settings.extent;
-            let [short, long] = bent.curvature.map(|l| libm::sqrtf(libm::sqrtf(4.0 / PI * allowed / l)));
+            let [short, long] = bent.curvature.map(|l| radius(allowed, l));
             // What the Hessian cannot see (a radiance edge behind an occluder's) the gradient may.
             let bound = if settings.metric == Metric::Halflight { flat } else { f32::INFINITY };
             (bent, [short.min(bound), long])
@@ -201,7 +206,13 @@ pub fn reach(settings: &Settings, derivatives: &Derivatives) -> Reach {
         let bend = signed[k] / irradiance;
         if second && bend.is_finite() { bend.max(-most).min(most) } else { 0.0 }
     });
-    Reach { axis, radii, overlap, bend, gradient_scale, curvature }
+    let allowed = if second { settings.error * settings.extent * settings.extent } else { 0.0 };
+    Reach { axis, radii, overlap, bend, gradient_scale, curvature, allowed, least: settings.least }
+}
+
+/// R = (4 ε/π|l|)^¼: how far a record of curvature `l`, relative to its irradiance, makes the error `allowed`.
+pub(super) fn radius(allowed: f32, l: f32) -> f32 {
+    libm::sqrtf(libm::sqrtf(4.0 / PI * allowed / l))
 }
 
 /// Eigenvalues of a Hessian and what they come to.

@@ -22,6 +22,16 @@ const IN_FRONT: f32 = 0.05;
 const LEAST_FACTOR: f32 = 0.05;
 const GREATEST_FACTOR: f32 = 20.0;
 
+/// Overlap over the cube root of the relative noise, and the most of it: least errors in the Cornell box with 256 and 4096
+/// rays and with 500 to 5000 records.
+const NOISE_TO_OVERLAP: f32 = 5.4;
+const MOST_OVERLAP: f32 = 2.5;
+
+/// Of what the Hessian says that extrapolation misses, the part that is missed where several records speak; and the most
+/// of it, for extrapolation is kept within limits.
+const MISSED: f32 = 0.5;
+const MOST_MISSED: f32 = 0.3;
+
 /// See the file.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[repr(C, align(16))]
@@ -46,10 +56,19 @@ pub struct Record {
     pub overlap: f32,
     /// What the fence counts in: the longer radius of the support as it was at first.
     pub reach: f32,
-    /// Mean relative error over the support, as its metric predicts.
+    /// Mean relative error of extrapolation over the radii, as its metric predicts.
     pub error: f32,
     /// Share of the strata in which light shines directly.
     pub shining: f32,
+    /// Variance of E_i (luminance) by the noise of its rays, over its square.
+    pub noise: f32,
+    /// Mean of 1/t² over the strata, in 1/m².
+    pub nearness: f32,
+    /// Error allowed over its support, relative to E_i: an integral over an area, m². Zero where it does not learn from
+    /// its neighbours.
+    pub allowed: f32,
+    /// The least that R1 may be, m, whatever neighbours say.
+    pub least: f32,
     /// How far it is to a wall in each sector, in 255ths of `reach`; 255: as far as it reaches.
     pub fence: [u8; SECTORS],
 }
@@ -83,8 +102,32 @@ impl Record {
             reach: reach.radii[1] * reach.overlap,
             error,
             shining: 0.0,
+            noise: 0.0,
+            nearness: derivatives.mean_square_inverse_distance,
+            allowed: reach.allowed,
+            least: reach.least,
             fence: [u8::MAX; SECTORS],
         }
+    }
+
+    /// Takes note of the variance of E_i by noise, over its square. Where supports may overlap, they do so by what that
+    /// asks for: averaging over s radii leaves a noise of σ/s, and extrapolation over them an error that grows with s²,
+    /// so that their sum is least at an s that goes with the cube root of σ.
+    pub fn note_noise(&mut self, noise: f32) {
+        self.noise = noise;
+        if self.allowed > 0.0 {
+            self.overlap = (NOISE_TO_OVERLAP * libm::cbrtf(libm::sqrtf(noise))).clamp(1.0, MOST_OVERLAP);
+            self.reach = self.radii[1] * self.overlap;
+        }
+    }
+
+    /// The magnitude of the relative error that is expected on average where this record speaks: by its noise, of which
+    /// that of its neighbours takes away as much as supports overlap, and by extrapolation. A normal deviate of variance
+    /// 1 has the magnitude √(2/π).
+    pub fn predicted(&self) -> f32 {
+        let missed = MISSED * self.error.min(MOST_MISSED);
+        let variance = self.noise / (self.overlap * self.overlap) + missed * missed;
+        libm::sqrtf(core::f32::consts::FRAC_2_PI * variance)
     }
 
     /// Position and gradient are given in these axes: R1, R2, normal.
@@ -265,6 +308,29 @@ mod tests {
         let steep = Record { gradient: [[100.0, 0.0]; 3], ..record() };
         let at = |x| steep.at(Vec3::new(x, 0.0, 0.0), Vec3::Z, LEAST_COS).unwrap().0.x;
         assert_eq!((at(0.9), at(-0.9)), (40.0, 0.1));
+    }
+
+    #[test]
+    fn the_noisier_a_record_the_wider_its_support() {
+        let overlap = |noise, allowed| {
+            let mut record = Record { allowed, ..record() };
+            record.note_noise(noise);
+            assert_eq!(record.reach, record.radii[1] * record.overlap);
+            record.overlap
+        };
+        assert_eq!((overlap(0.0, 1.0), overlap(1.0, 1.0), overlap(1.0, 0.0)), (1.0, MOST_OVERLAP, 1.0));
+        // 0.027 is the cube of 0.3.
+        assert!((overlap(0.027 * 0.027, 1.0) - 0.3 * NOISE_TO_OVERLAP).abs() < 1e-5);
+        assert_eq!(overlap(f32::MAX, 1.0), MOST_OVERLAP);
+    }
+
+    #[test]
+    fn it_predicts_its_noise_and_what_it_misses() {
+        let predicted = |noise, error, overlap| Record { noise, error, overlap, ..record() }.predicted();
+        let normal = libm::sqrtf(core::f32::consts::FRAC_2_PI);
+        assert!((predicted(0.04, 0.0, 2.0) - 0.1 * normal).abs() < 1e-6);
+        assert!((predicted(0.0, 0.2, 1.0) - 0.1 * normal).abs() < 1e-6);
+        assert!((predicted(0.0, 9.0, 1.0) - 0.15 * normal).abs() < 1e-6);
     }
 
     #[test]

@@ -1,9 +1,11 @@
 //! The cache: records, the octree that finds them, and what they say together of the irradiance at a point.
 
+use super::metric::radius;
 use super::octree::Octree;
 use super::record::Record;
 use crate::Rgb;
 use crate::geometry::Bounds;
+use crate::light::luminance;
 use crate::memory::{Arena, Footprint, OutOfMemory};
 use glam::Vec3;
 
@@ -13,6 +15,15 @@ pub const GREATEST_DEVIATION: f32 = 0.2;
 
 /// Records of surfaces that face the same way to within 60 degrees clamp each other.
 const ALIKE: f32 = 0.5;
+
+/// Standard deviations of noise within which records that disagree may both be right.
+const EXCUSED: f32 = 3.0;
+
+/// The variance of a gradient over that of the irradiance and the mean of 1/t².
+const STEEP: f32 = 16.0;
+
+/// Neighbours that a new record is compared with.
+const MOST_COMPARED: usize = 32;
 
 /// What a cache knows of a point.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -124,12 +135,14 @@ impl<'m> IrradianceCache<'m> {
         covered
     }
 
-    /// Adds a record, after it and its neighbours have clamped each other. Whether there was memory for it.
+    /// Adds a record, after it and its neighbours have learnt from each other and clamped each other. Whether there was
+    /// memory for it.
     pub fn insert(&mut self, mut record: Record) -> bool {
         if self.is_full() {
             self.refused += 1;
             return false;
         }
+        self.compare(&mut record);
         self.clamp(&mut record);
         if let Some(slot) = self.records.get_mut(self.used) {
             *slot = record;
@@ -160,30 +173,64 @@ impl<'m> IrradianceCache<'m> {
         self.settle();
     }
 
+    /// What no hemisphere tells, as that a surface comes into sight a step farther, neighbours do: where one says of the
+    /// place of the new record what this did not find, and noise is no excuse, the error is that of a curvature, and the
+    /// radii of both become those of that curvature.
+    fn compare(&mut self, new: &mut Record) {
+        if new.allowed <= 0.0 {
+            return;
+        }
+        let (position, normal) = (Vec3::from(new.position), Vec3::from(new.normal));
+        let mut shrunk = [(0u32, 0.0f32); MOST_COMPARED];
+        let mut count = 0;
+        let (records, least_cos) = (&*self.records, self.least_cos);
+        self.tree.at(position, |index| {
+            if let Some(other) = records.get(index as usize)
+                && let Some((said, _)) = other.at(position, normal, least_cos)
+                && let Some(radius) = new.disagrees(other, said)
+                && let Some(slot) = shrunk.get_mut(count)
+            {
+                *slot = (index, radius);
+                count += 1;
+            }
+            count < MOST_COMPARED
+        });
+        for &(index, radius) in shrunk.iter().take(count) {
+            new.shrink(radius.max(new.least));
+            if let Some(other) = self.records.get_mut(index as usize) {
+                other.shrink(radius.max(other.least));
+                let (position, normal, radius) = (other.position.into(), other.normal.into(), other.radii[0]);
+                self.clamp_around(position, normal, radius);
+            }
+        }
+    }
+
     /// Neighbour clamping (Krivanek, Bouatouch, Pattanaik and Zara 2006, §4): what limits the radius of one record
     /// is by the distance farther from the other, so no radius is larger than that of a neighbour and the distance
     /// to it. Complete: all records that the new one could shrink it by, and all that it could shrink, are asked.
     fn clamp(&mut self, new: &mut Record) {
         let (position, normal) = (Vec3::from(new.position), Vec3::from(new.normal));
-        let records = &mut *self.records;
-        let distance_to = |other: &Record| {
-            let alike = normal.dot(Vec3::from(other.normal)) > ALIKE;
-            alike.then(|| position.distance(Vec3::from(other.position)))
-        };
+        let records = &*self.records;
         let mut least = new.radii[0];
         self.tree.around(position, new.radii[0], |index| {
             if let Some(other) = records.get(index as usize)
-                && let Some(distance) = distance_to(other)
+                && let Some(distance) = other.distance_to(position, normal)
             {
                 least = least.min(other.radii[0] + distance);
             }
         });
         new.shrink(least);
+        self.clamp_around(position, normal, least);
+    }
+
+    /// Clamps all records by one of that radius.
+    fn clamp_around(&mut self, position: Vec3, normal: Vec3, radius: f32) {
+        let records = &mut *self.records;
         self.tree.at(position, |index| {
             if let Some(other) = records.get_mut(index as usize)
-                && let Some(distance) = distance_to(other)
+                && let Some(distance) = other.distance_to(position, normal)
             {
-                other.shrink(least + distance);
+                other.shrink(radius + distance);
             }
             true
         });
@@ -191,6 +238,26 @@ impl<'m> IrradianceCache<'m> {
 }
 
 impl Record {
+    /// The distance to a place, where that is on a surface that faces the same way.
+    fn distance_to(&self, position: Vec3, normal: Vec3) -> Option<f32> {
+        let alike = normal.dot(Vec3::from(self.normal)) > ALIKE;
+        alike.then(|| position.distance(Vec3::from(self.position)))
+    }
+
+    /// The radius that both records may have where `other` said that of the place of this one; `None` where nothing is
+    /// against theirs.
+    fn disagrees(&self, other: &Record, said: Rgb) -> Option<f32> {
+        let (here, there) = (luminance(self.irradiance.into()), luminance(other.irradiance.into()));
+        let square = Vec3::from(self.position).distance_squared(other.position.into());
+        // The gradient has noise too.
+        let noise =
+            here * here * self.noise + there * there * other.noise * (1.0 + STEEP * other.nearness * square);
+        let excess = (here - luminance(said)).abs() - EXCUSED * libm::sqrtf(noise);
+        let curvature = 2.0 * excess / (square * here.max(there));
+        let found = radius(self.allowed, curvature);
+        (excess > 0.0 && found < self.radii[0].max(other.radii[0])).then_some(found)
+    }
+
     /// Makes the support smaller in both directions, so that R1 is not above `radius`.
     fn shrink(&mut self, radius: f32) {
         let [r1, r2] = self.radii;
@@ -299,6 +366,29 @@ mod tests {
                 assert_eq!((other.records().len(), other.refused()), (200, 100));
             });
         });
+    }
+
+    /// E = 1 and 1.5 at a distance of 0.1: a curvature of 2 · 0.5 / 0.1² over 1.5. Excused if the noise is a quarter of
+    /// each, for their difference is then no more than three deviations.
+    #[test]
+    fn records_that_disagree_shrink_unless_noise_is_an_excuse() {
+        let pair = |noise| {
+            with_cache(2, |cache| {
+                for (x, e) in [(0.4, 1.0), (0.5, 1.5)] {
+                    let flat =
+                        Record { gradient: [[0.0; 2]; 3], noise, allowed: 1e-4, ..record(x, 0.5, 0.2) };
+                    cache.insert(Record { irradiance: [e; 3], ..flat });
+                }
+                [0, 1].map(|i: usize| cache.records()[i].radii[0])
+            })
+        };
+        let wanted = radius(1e-4, 2.0 * 0.5 / 0.01 / 1.5);
+        assert!(
+            pair(0.0).iter().all(|found| (found / wanted - 1.0).abs() < 1e-5),
+            "{:?} {wanted}",
+            pair(0.0)
+        );
+        assert_eq!(pair(0.0625), [0.2; 2]);
     }
 
     #[test]

@@ -16,6 +16,11 @@ const STRIDE: u32 = 2;
 /// Pixels that are looked at before it is gathered where records are missing: tasks of [`PIXELS`].
 const LOOKED_AT: usize = 16 * PIXELS;
 
+/// Records shrink when later ones clamp them or know better, so the overture looks again: so many times, or until a sweep
+/// adds less than one record in so many.
+const SWEEPS: u32 = 4;
+const FEW: usize = 50;
+
 /// Places that are gathered at before their records are committed.
 const GATHERED: usize = 32;
 
@@ -26,6 +31,9 @@ pub(in crate::drive) struct Growing<'a> {
     index: u32,
     /// How far the overture is in its order.
     next: u64,
+    /// Sweeps that are done, and how many records there were before this one.
+    sweeps: u32,
+    before: usize,
     /// Places at which it has gathered.
     gathered: u32,
 }
@@ -33,7 +41,7 @@ pub(in crate::drive) struct Growing<'a> {
 impl<'a> Growing<'a> {
     /// Number 0 or 1.
     pub(in crate::drive) fn new(cache: IrradianceCache<'a>, index: u32) -> Self {
-        Self { cache, index, next: 0, gathered: 0 }
+        Self { cache, index, next: 0, sweeps: 0, before: 0, gathered: 0 }
     }
 
     /// Takes over the records of a file, which were gathered at so many places.
@@ -49,7 +57,7 @@ impl<'a> Growing<'a> {
 
     /// Leaves the cache as it is.
     pub(in crate::drive) fn finish(&mut self) {
-        self.next = u64::MAX;
+        self.sweeps = SWEEPS;
     }
 
     /// Whether nothing is to be gathered at `place`.
@@ -81,7 +89,17 @@ impl<F: Features> Overture<'_, '_, F> {
     ) -> Result<bool, RenderError> {
         let [width, height] = self.size;
         let order = Order::new(width, height, STRIDE);
-        while growing.next < order.len() && !growing.cache.is_full() {
+        while growing.sweeps < SWEEPS && !growing.cache.is_full() {
+            if growing.next >= order.len() {
+                growing.next = 0;
+                growing.sweeps += 1;
+                let records = growing.cache.records().len();
+                if (records - growing.before) * FEW < records {
+                    growing.sweeps = SWEEPS;
+                }
+                growing.before = records;
+                continue;
+            }
             let mut places = vec![Place::NONE; LOOKED_AT];
             let look = |task: usize, _: &mut Arena, out: &mut [Place]| {
                 let mut counters = Counters::default();
