@@ -4,7 +4,7 @@
 use halflight::drive::inspect_cache;
 
 /// Bytes of a record in a file.
-const RECORD: usize = 144;
+const RECORD: usize = 160;
 
 /// One input.
 pub fn run(data: &[u8]) {
