@@ -78,8 +78,8 @@ mod tests {
     #[test]
     fn methods_that_make_no_sense() {
         for (text, reason) in [
-            ("", "the methods are auto, path, irradiance-cache, sppm"),
-            ("paths", "the methods are auto, path, irradiance-cache, sppm"),
+            ("", "the methods are auto, path, irradiance-cache, photon-map, sppm"),
+            ("paths", "the methods are auto, path, irradiance-cache, photon-map, sppm"),
             (
                 "path:sparkle=1",
                 "there is no option `sparkle`; the options are caustics, reuse, windows, max-depth",
