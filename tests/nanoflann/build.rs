@@ -1,6 +1,12 @@
 //! Compiles the shim over nanoflann's header, for the processor that it is going to be measured on.
 
 fn main() {
+    #[cfg(feature = "shim")]
+    compile();
+}
+
+#[cfg(feature = "shim")]
+fn compile() {
     println!("cargo::rerun-if-changed=src/shim.cpp");
     cc::Build::new()
         .cpp(true)

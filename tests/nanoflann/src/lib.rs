@@ -1,4 +1,5 @@
 //! nanoflann's kd-tree behind a safe interface: build, the k nearest, all within a radius.
+#![cfg(feature = "shim")]
 
 use core::ffi::c_void;
 use core::marker::PhantomData;
