@@ -111,9 +111,10 @@ pub(super) fn power_heuristic(own: f32, other: f32) -> f32 {
     1.0 / (1.0 + ratio * ratio)
 }
 
-/// Paths of fewer segments than this always go on. On the Cornell box 3 gives a fifth fewer rays and half as
-/// much error again: 5 has a fifth more of 1 / (relMSE · seconds).
-pub(super) const ROULETTE_FROM: u32 = 5;
+/// A path that carries at least this much goes on for certain; one that carries half of it, every other time. The fewest
+/// segments do not matter: to let the dark ones go at once is what pays
+/// (docs/decisions/0023-roulette-from-the-first-bounce.md).
+const CERTAIN_FROM: f32 = 0.25;
 
 /// From this many segments on nothing survives for certain, so that paths end even between perfect mirrors: of those
 /// that lose nothing 1 / n come to n times this length, and carry n times the light. Any fixed probability would
@@ -127,13 +128,10 @@ const ENDLESS: u32 = 2048;
 /// factor of refraction, which comes back where the light leaves the glass).
 #[inline]
 pub(super) fn survival(segments: u32, throughput: Rgb) -> f32 {
-    if segments < ROULETTE_FROM {
-        return 1.0;
-    }
     let most = match segments {
         0..CERTAIN_BELOW => 1.0,
         CERTAIN_BELOW..ENDLESS => 1.0 - 1.0 / segments as f32,
         _ => 0.99,
     };
-    throughput.max_element().min(most)
+    (throughput.max_element() / CERTAIN_FROM).min(most)
 }

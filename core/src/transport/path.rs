@@ -18,7 +18,7 @@
 
 use super::density::PhotonLight;
 use super::estimator::{
-    Counters, MAX_CROSSINGS, MAX_VERTICES, PathSettings, ROULETTE_FROM, dimension, power_heuristic, survival,
+    Counters, MAX_CROSSINGS, MAX_VERTICES, PathSettings, dimension, power_heuristic, survival,
 };
 use super::maps::{PhotonMaps, Said};
 use super::merge::{ChainLink, Merging, ends_chain};
@@ -559,15 +559,14 @@ impl<'a, F: Features> PathTracer<'a, F> {
             path.share = if sample.delta { said.mirrored } else { said.next };
         }
         let mut throughput = throughput * sample.weight;
-        if self.settings.reuse && is_diffuse && segments < ROULETTE_FROM {
-            exchange.leave(&point, throughput, segments);
-        }
+        let certain = self.settings.reuse && is_diffuse && exchange.leave(&point, throughput, segments);
         let direction = point.frame.to_world(sample.direction);
         if !point.sides_agree(sample.direction, direction) {
             return Step { light, next: None };
         }
         path.eta_squared *= sample.eta * sample.eta;
-        let survival = survival(segments, exchange.worth(throughput) * path.eta_squared);
+        let worth = exchange.worth(throughput) * path.eta_squared;
+        let survival = if certain { 1.0 } else { survival(segments, worth) };
         if survival < 1.0 {
             if sampler.single(first + dimension::ROULETTE) >= survival {
                 return Step { light, next: None };

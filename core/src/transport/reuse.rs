@@ -137,17 +137,18 @@ impl Exchange {
         Self { group, ..Self::default() }
     }
 
-    /// The path scatters at a diffuse `point`, its x if it has none, and goes on for certain if it carries
-    /// any `throughput` from there.
+    /// The path scatters at a diffuse `point`, its x if it has none. Whether it has become that: it must go on for
+    /// certain then, if it carries any `throughput` from there.
     #[inline]
-    pub(super) fn leave(&mut self, point: &SurfacePoint, throughput: Rgb, segments: u32) {
+    pub(super) fn leave(&mut self, point: &SurfacePoint, throughput: Rgb, segments: u32) -> bool {
         if self.stage != ALONE || throughput == Rgb::ZERO {
-            return;
+            return false;
         }
         self.x = End::of(point);
         self.throughput = throughput.to_array();
         self.segments = segments as u16;
         self.stage = LEAVING;
+        true
     }
 
     /// The path is about to scatter at the next surface after x. Where that is fit to be met from elsewhere, it
