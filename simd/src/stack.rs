@@ -95,8 +95,9 @@ impl<const N: usize> StackMemory<N> {
     pub fn stacks(&mut self) -> &mut [Stack; N] {
         let first = self.0.as_mut_ptr().cast::<Stack>();
         for i in 0..N {
+            // Volatile: plain writes the compiler makes one of the whole memory, 180 kB for 32 stacks.
             // SAFETY: stack `i` is inside, and a height may be written over whatever is there.
-            unsafe { (&raw mut (*first.add(i)).height).write(0) };
+            unsafe { (&raw mut (*first.add(i)).height).write_volatile(0) };
         }
         // SAFETY: all heights are written, and no other part of a stack needs to be.
         unsafe { self.0.assume_init_mut() }
