@@ -2,10 +2,10 @@
 
 use super::shoot::holds_photons;
 use crate::bsdf::{Bsdf, Features};
-use crate::bvh::{Bvh, Coherence};
+use crate::bvh::Bvh;
 use crate::camera::Camera;
-use crate::geometry::{Hit, Ray};
-use crate::photon::{Disc, FLATNESS, Falloff, Fence, PROBES, PhotonMap, Uniform};
+use crate::geometry::Ray;
+use crate::photon::{Disc, FLATNESS, Falloff, Fence, PhotonMap, Uniform};
 use crate::scene::SurfacePoint;
 use crate::{Level, Rgb};
 use core::f32::consts::FRAC_1_PI;
@@ -126,36 +126,31 @@ pub(super) fn reflected<F: Features>(
 pub(super) fn fence(bvh: &Bvh, level: Level, origin: Vec3, disc: &Disc, turns: f32) -> Fence {
     let (ways, fence) = Fence::probes(disc.normal, turns);
     let radius = disc.radius;
-    let probe = |way: Vec3| Ray::segment(origin, way + LIFT * disc.normal, Fence::FARTHEST * radius);
-    let mut hits = [Hit::NONE; PROBES];
-    bvh.nearest_batch(level, &ways.map(probe), Coherence::Incoherent, &mut hits);
-    let mut reach = hits.map(|hit| if hit.is_some() { hit.t / radius } else { f32::INFINITY });
-
     // Where there is no surface within the thickness of the disc, there are no photons, and no area.
     let depth = FLATNESS * radius;
-    let down = |way: Vec3, share: f32| {
-        let above = origin + share * radius * way + depth * disc.normal;
-        Ray::segment(above, -disc.normal, 2.0 * depth)
-    };
-    let mut rays = [Ray::segment(Vec3::ZERO, Vec3::Z, -1.0); PROBES];
-    for ((ray, way), reach) in rays.iter_mut().zip(&ways).zip(&reach) {
-        *ray = down(*way, BEFORE * reach.min(Fence::FARTHEST));
-    }
-    let mut is_there = [0; PROBES];
-    bvh.occluded_batch(level, &rays, &mut is_there);
-    for ((way, reach), _) in
-        ways.iter().zip(&mut reach).zip(&is_there).filter(|(_, is_there)| **is_there == 0)
-    {
-        let (mut low, mut high) = (0.0, reach.min(Fence::FARTHEST));
+    let reach = ways.map(|way| {
+        // One by one: the setup of a batch costs more than it gains for eight.
+        let along = Ray::segment(origin, way + LIFT * disc.normal, Fence::FARTHEST * radius);
+        let hit = bvh.nearest(level, &along);
+        let reach = if hit.is_some() { hit.t / radius } else { f32::INFINITY };
+        let is_there = |share: f32| {
+            let above = origin + share * radius * way + depth * disc.normal;
+            bvh.occluded(level, &Ray::segment(above, -disc.normal, 2.0 * depth))
+        };
+        let farthest = reach.min(Fence::FARTHEST);
+        if is_there(BEFORE * farthest) {
+            return reach;
+        }
+        let (mut low, mut high) = (0.0, farthest);
         for _ in 0..HALVINGS {
             let middle = 0.5 * (low + high);
-            if bvh.occluded(level, &down(*way, middle)) {
+            if is_there(middle) {
                 low = middle;
             } else {
                 high = middle;
             }
         }
-        *reach = 0.5 * (low + high);
-    }
+        0.5 * (low + high)
+    });
     fence(reach)
 }

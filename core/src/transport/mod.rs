@@ -8,6 +8,7 @@
 pub mod caustics;
 mod density;
 mod estimator;
+mod flight;
 pub mod gather;
 pub mod maps;
 mod merge;

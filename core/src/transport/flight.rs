@@ -1,0 +1,284 @@
+//! Light paths under way: from the lights, over surfaces, until they end. What is done where they meet one is for a
+//! [`Visitor`] to say: `shoot.rs` leaves photons of all light, `caustics.rs` those of caustics.
+//!
+//! All paths of a task advance together, so that the tracer sees batches of rays. Path `i` of map `n` follows from
+//! (seed, n, i) alone.
+
+use super::estimator::{Counters, MAX_CROSSINGS, MAX_VERTICES};
+use crate::bsdf::{Bsdf, BsdfSample, Features};
+use crate::bvh::{Bvh, Coherence};
+use crate::geometry::{Hit, Ray};
+use crate::light::{EMISSION_DIMENSIONS, Emission, Lights};
+use crate::memory::{Arena, Footprint, OutOfMemory};
+use crate::photon::Photon;
+use crate::sampling::{Sampler, mix};
+use crate::scene::{Scene, SurfacePoint};
+use crate::{Level, Rgb};
+use bytemuck::{Pod, Zeroable};
+use core::marker::PhantomData;
+use glam::Vec3;
+
+/// Light paths of a task.
+pub const PATHS: usize = 1024;
+
+/// Dimensions of the sampler at a vertex: where the path goes on, by which lobe, whether it does; and one that a visitor
+/// may have.
+const SCATTERING: u32 = 0;
+const LOBE: u32 = 1;
+const ROULETTE: u32 = 2;
+const OWN: u32 = 3;
+
+/// Whether the `n`th surface with a cut-out is met: `CROSSING + n`.
+const CROSSING: u32 = 1 << 31;
+
+/// A path between two of its vertices.
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[repr(C)]
+pub(super) struct State {
+    pub power: [f32; 3],
+    /// Which path of the map.
+    pub number: u32,
+    /// Segments traced, the one under way included.
+    pub segments: u32,
+    /// Surfaces passed through by cut-out.
+    crossings: u32,
+    /// The triangle that the ray starts on, which it cannot meet again.
+    triangle: u32,
+    /// Which light it left, and where.
+    pub light: u32,
+    pub origin: [f32; 3],
+    /// From which cell of the guide.
+    pub cell: u32,
+    /// R / (π² r² N) so far, for visitors that weigh photons (`merge.rs`).
+    pub chain: f32,
+    /// Root of the sum of squares of the densities of the path tracer's techniques, over that of which `chain` tells:
+    /// 1 where that is the only one, 0 where there is none.
+    pub others: f32,
+}
+
+/// Where a path meets a surface.
+pub(super) struct Vertex<'v> {
+    pub point: &'v SurfacePoint<'v>,
+    pub bsdf: &'v Bsdf,
+    /// Unit direction to where the light comes from.
+    pub to_light: Vec3,
+    sampler: &'v Sampler,
+    /// Its first dimension.
+    first: u32,
+}
+
+impl Vertex<'_> {
+    /// The visitor's own random number.
+    pub(super) fn own(&self) -> f32 {
+        self.sampler.single(self.first + OWN)
+    }
+
+    /// The photon of light of such power that has come here.
+    pub(super) fn photon(&self, power: Rgb) -> Photon {
+        Photon::new(self.point.position, self.to_light, self.point.geometric_normal, power)
+    }
+}
+
+/// How a path goes on.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Onward {
+    /// With this probability at most.
+    pub most: f32,
+    /// Only where it is mirrored.
+    pub mirrored: bool,
+}
+
+/// What is done with light paths.
+pub(super) trait Visitor {
+    /// Dimensions of the sampler at a vertex.
+    const DIMENSIONS: u32 = 3;
+    /// Distinguishes its random numbers from those of others, and of pixels.
+    const SEED: u64;
+
+    /// A path has met a surface. `None` ends it.
+    fn meet(&mut self, state: &State, vertex: &Vertex, counters: &mut Counters) -> Option<Onward>;
+
+    /// It is about to leave it by `sample`, having come from `from`, local.
+    #[inline]
+    fn leave(&self, _state: &mut State, _vertex: &Vertex, _from: Vec3, _sample: &BsdfSample) {}
+}
+
+/// What is shot: all but its visitor.
+#[derive(Clone, Copy)]
+pub(super) struct Flight<'a, F> {
+    pub scene: &'a Scene<'a>,
+    pub bvh: &'a Bvh<'a>,
+    pub lights: &'a Lights<'a>,
+    pub emission: &'a Emission<'a>,
+    pub seed: u32,
+    /// Light paths of a map.
+    pub paths: u32,
+    pub max_depth: u32,
+    pub level: Level,
+    pub features: PhantomData<F>,
+}
+
+impl<F: Features> Flight<'_, F> {
+    /// Number of tasks of a map.
+    pub(super) fn tasks(&self) -> usize {
+        (self.paths as usize).div_ceil(PATHS)
+    }
+
+    /// Working memory of one task.
+    pub(super) fn scratch() -> Footprint {
+        Footprint::default().slice::<State>(PATHS).slice::<Ray>(PATHS).slice::<Hit>(PATHS)
+    }
+
+    /// Follows the paths of task `task` of map number `map`.
+    pub(super) fn follow<V: Visitor>(
+        &self,
+        task: usize,
+        map: u32,
+        scratch: &mut Arena,
+        visitor: &mut V,
+    ) -> Result<Counters, OutOfMemory> {
+        let mut arena = scratch.scratch();
+        let states = arena.slice::<State>(PATHS)?;
+        let rays = arena.slice::<Ray>(PATHS)?;
+        let hits = arena.slice::<Hit>(PATHS)?;
+        let mut counters = Counters::default();
+        let seed = mix(V::SEED ^ u64::from(self.seed)) as u32;
+        let sampler = |number: u32| Sampler::replicate(seed, map >> 1, map & 1, number);
+        let first = task * PATHS;
+        let paths = (self.paths as usize).saturating_sub(first).min(PATHS);
+        let mut active = 0;
+        for (i, state) in states.iter_mut().enumerate().take(paths) {
+            let number = (first + i) as u32;
+            if let Some(emitted) = self.emission.emit(self.scene, self.lights, &sampler(number)) {
+                *state = State {
+                    power: (emitted.power / self.paths as f32).to_array(),
+                    number,
+                    segments: 1,
+                    triangle: emitted.triangle,
+                    light: emitted.light,
+                    cell: emitted.cell,
+                    origin: emitted.ray.origin,
+                    ..State::default()
+                };
+                rays[active] = Ray { tag: i as u32, ..emitted.ray };
+                active += 1;
+            }
+        }
+        while active > 0 {
+            counters.rays += active as u64;
+            self.bvh.nearest_batch(self.level, &rays[..active], Coherence::Incoherent, &mut hits[..active]);
+            let mut going_on = 0;
+            for i in 0..active {
+                let (ray, hit) = (rays[i], hits[i]);
+                let Some(state) = states.get_mut(ray.tag as usize) else { continue };
+                let sampler = sampler(state.number);
+                if let Some(next) = self.step(state, &sampler, &ray, &hit, visitor, &mut counters) {
+                    rays[going_on] = Ray { tag: ray.tag, ..next };
+                    going_on += 1;
+                }
+            }
+            active = going_on;
+        }
+        Ok(counters)
+    }
+
+    /// One vertex: what the path of `ray` met. The ray by which it goes on.
+    fn step<V: Visitor>(
+        &self,
+        state: &mut State,
+        sampler: &Sampler,
+        ray: &Ray,
+        hit: &Hit,
+        visitor: &mut V,
+        counters: &mut Counters,
+    ) -> Option<Ray> {
+        let scene = self.scene;
+        let point = SurfacePoint::at::<F>(scene, ray, hit).filter(|_| hit.is_some())?;
+        let direction = Vec3::from(ray.direction);
+        let passes = F::CUTOUT && point.material.has_cutout() && {
+            let opacity = point.material.opacity.at::<F>(scene, point.uv);
+            sampler.single(CROSSING + state.crossings) >= opacity
+        };
+        if passes || hit.triangle == state.triangle {
+            if state.crossings >= MAX_CROSSINGS {
+                counters.dropped.unfinished += 1;
+                return None;
+            }
+            state.crossings += 1;
+            state.triangle = hit.triangle;
+            return Some(point.spawn(direction));
+        }
+        if state.segments >= self.max_depth {
+            return None;
+        }
+        let bsdf = Bsdf::at::<F>(scene, point.material, point.uv, point.front);
+        let first = EMISSION_DIMENSIONS + V::DIMENSIONS * (state.segments - 1);
+        let vertex = Vertex { point: &point, bsdf: &bsdf, to_light: -direction, sampler, first };
+        let onward = visitor.meet(state, &vertex, counters)?;
+        if state.segments + 1 >= self.max_depth {
+            return None;
+        }
+
+        let from = point.frame.to_local(-direction);
+        let [u, v] = sampler.pair(first + SCATTERING);
+        let lobe = if F::GLOSSY || F::DIELECTRIC { sampler.single(first + LOBE) } else { 0.0 };
+        let sample =
+            bsdf.sample::<F>(from, [u, v, lobe]).filter(|sample| sample.delta || !onward.mirrored)?;
+        let towards = point.frame.to_world(sample.direction);
+        if !point.sides_agree(sample.direction, towards) {
+            return None;
+        }
+        visitor.leave(state, &vertex, from, &sample);
+        // Power is not squeezed by refraction, as radiance is; and where the shading normal is not that of the
+        // triangle, it is the other cosine that counts (Veach 1997, sections 5.2 and 5.3).
+        let power = Rgb::from(state.power);
+        let mut next = power * sample.weight * (sample.eta * sample.eta);
+        if point.frame.normal != point.geometric_normal {
+            let flat = |way: Vec3| way.dot(point.geometric_normal).abs();
+            next *= from.z * flat(towards) / (flat(direction) * sample.direction.z.abs());
+        }
+        // Power that goes on is the same where it can be: what is absorbed ends paths.
+        let survival = (next.max_element() / power.max_element()).min(onward.most);
+        if !(survival > 0.0 && sampler.single(first + ROULETTE) < survival && next.is_finite()) {
+            return None;
+        }
+        if state.segments >= MAX_VERTICES {
+            counters.dropped.unfinished += 1;
+            return None;
+        }
+        state.power = (next / survival).to_array();
+        state.segments += 1;
+        state.triangle = hit.triangle;
+        Some(point.spawn(towards))
+    }
+}
+
+/// Where the photons of a task go.
+pub(super) struct Pile<'p> {
+    photons: &'p mut [Photon],
+    count: usize,
+}
+
+impl<'p> Pile<'p> {
+    pub(super) fn new(photons: &'p mut [Photon]) -> Self {
+        Self { photons, count: 0 }
+    }
+
+    pub(super) fn leave(&mut self, photon: Photon, counters: &mut Counters) {
+        match self.photons.get_mut(self.count) {
+            Some(slot) => {
+                *slot = photon;
+                self.count += 1;
+            }
+            None => counters.dropped.unfinished += 1,
+        }
+    }
+
+    /// What is left of it has photons of no place, which a map refuses.
+    pub(super) fn finish(self) {
+        let Self { photons, count } = self;
+        if let Some(rest) = photons.get_mut(count..) {
+            rest.fill(Photon::NONE);
+        }
+    }
+}
