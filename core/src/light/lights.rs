@@ -201,18 +201,10 @@ impl<'m> Lights<'m> {
         Some(sample.0)
     }
 
+    /// What a surface sees the environment through, where that is known.
     #[inline]
-    fn window(&self, position: Vec3, normal: Vec3) -> Option<&Window> {
+    pub(crate) fn window(&self, position: Vec3, normal: Vec3) -> Option<&'m Window> {
         self.windows.as_ref()?.at(position, normal)
-    }
-
-    /// Asks for what [`Lights::draw`] is about to read: called twice for each of several points, the second time with
-    /// what `u[1]` will be.
-    #[inline]
-    pub(crate) fn prefetch(&self, position: Vec3, normal: Vec3, v: Option<f32>) {
-        if let Some(windows) = &self.windows {
-            windows.prefetch(position, normal, v);
-        }
     }
 
     /// Whether there is nothing that shines.

@@ -67,9 +67,15 @@ impl Window {
         (warped.map(|u| u.min(crate::sampling::ONE_MINUS_EPSILON)), row * cell * (COLUMNS * ROWS) as f32)
     }
 
-    /// Asks for what [`Window::warp`] reads at `v`, once its rows have arrived.
+    /// Asks for what [`Window::warp`] reads first.
     #[inline]
-    fn prefetch_row(&self, v: f32) {
+    pub(crate) fn prefetch_rows(&self) {
+        prefetch(&self.rows, 0);
+    }
+
+    /// Asks for what [`Window::warp`] reads then, at `v`, once its rows have arrived.
+    #[inline]
+    pub(crate) fn prefetch_row(&self, v: f32) {
         let (y, ..) = pick(&self.rows, v);
         // Two cache lines.
         prefetch(self.cells.as_flattened(), y * COLUMNS);
@@ -230,17 +236,6 @@ impl<'m> Windows<'m> {
     /// Of what [`Windows::memory`] gave.
     pub fn new(grid: Grid, slots: &'m [u16], windows: &'m [Window]) -> Self {
         Self { grid, slots, windows }
-    }
-
-    /// Asks for the window of a surface that is about to be lit: first for its rows, then, at a known `v`, for the row
-    /// that [`Window::warp`] reads there.
-    #[inline]
-    pub fn prefetch(&self, position: Vec3, normal: Vec3, v: Option<f32>) {
-        match (self.at(position, normal), v) {
-            (Some(window), None) => prefetch(&window.rows, 0),
-            (Some(window), Some(v)) => window.prefetch_row(v),
-            _ => (),
-        }
     }
 
     /// The window of a surface with unit `normal`; `None` where nothing is known.

@@ -31,7 +31,7 @@ use crate::bvh::{Bvh, Coherence};
 use crate::cache::irradiance::IrradianceCache;
 use crate::film::{PIXELS_PER_TILE, Pixel, Tile};
 use crate::geometry::{Hit, Ray};
-use crate::light::{Lights, emitted};
+use crate::light::{Lights, Window, emitted};
 use crate::memory::{Arena, Footprint, OutOfMemory};
 use crate::sampling::Sampler;
 use crate::scene::{Material, Scene, SurfacePoint};
@@ -303,13 +303,19 @@ impl<'a, F: Features> PathTracer<'a, F> {
                 if F::TEXTURES {
                     point.material.prefetch(self.scene, point.uv);
                 }
-                self.lights.prefetch(point.position, point.frame.normal, None);
+                let window = self.lights.window(point.position, point.frame.normal);
+                if let Some(window) = window {
+                    window.prefetch_rows();
+                }
                 let sampler = Sampler::new(self.settings.seed, path.pixel, path.sample);
-                Met { point, light: sampler.pair(dimension::vertex(path.segments.into()) + dimension::LIGHT) }
+                let light = sampler.pair(dimension::vertex(path.segments.into()) + dimension::LIGHT);
+                Met { point, window, light }
             });
         }
         for met in block.iter().flatten() {
-            self.lights.prefetch(met.point.position, met.point.frame.normal, Some(met.light[1]));
+            if let Some(window) = met.window {
+                window.prefetch_row(met.light[1]);
+            }
         }
     }
 
@@ -404,7 +410,7 @@ impl<'a, F: Features> PathTracer<'a, F> {
             }
             return Step::END;
         }
-        let Some(Met { point, light: [u, v] }) = met else { return Step::END };
+        let Some(Met { point, light: [u, v], .. }) = met else { return Step::END };
 
         // A ray cannot meet the plane that it started on: rounding on a needle. Nor does a camera on a surface see its back.
         if hit.triangle == path.triangle || (segments == 1 && point.is_left_by(ray)) {
@@ -639,6 +645,7 @@ impl Arrivals {
 #[derive(Clone, Copy)]
 struct Met<'a> {
     point: SurfacePoint<'a>,
+    window: Option<&'a Window>,
     /// Where light is looked for.
     light: [f32; 2],
 }
