@@ -74,7 +74,7 @@ fn a_finished_film_goes_on_to_more_samples() {
 #[test]
 fn adaptive_samples_are_the_same_in_parts() {
     let folder = Folder::new("adaptive");
-    let render = "render scene.obj --size 100x70 --adaptive auto --json";
+    let render = "render scene.obj --size 100x70 --adaptive on --json";
     let whole = folder.object(&format!("{render} --spp 40 --threads 1 -o whole.pfm"));
     folder.object(&format!("{render} --spp 22 --threads 3 -o a.pfm --checkpoint film"));
     folder.object(&format!("{render} --spp 40 --threads 2 -o b.pfm --resume film"));

@@ -3,7 +3,7 @@
 //! samples, whose own noise is taken off. Prints the tables of docs/validation.md:
 //!
 //! `cargo run --release -p halflight-tests --example calibration -- [--renders 40] [--size 64] [--error 0.001]
-//! [--spp 4096] [--times 100] [--method path] [--adaptive] [SCENE…]`, of our own scenes by name or of any scene file.
+//! [--spp 4096] [--times 100] [--method path] [--uniform] [SCENE…]`, of our own scenes by name or of any scene file.
 
 use core::sync::atomic::AtomicBool;
 use halflight::drive::{ErrorEstimate, Method, RenderResult, Round, Settings, Stop, render};
@@ -25,12 +25,12 @@ struct Wanted {
     /// Samples of the reference over those of a render.
     times: u32,
     method: Option<Method>,
-    adaptive: bool,
+    adaptive: Option<bool>,
 }
 
 fn main() {
     let mut wanted =
-        Wanted { renders: 40, size: 64, error: 0.001, spp: 4096, times: 100, method: None, adaptive: false };
+        Wanted { renders: 40, size: 64, error: 0.001, spp: 4096, times: 100, method: None, adaptive: None };
     let mut scenes = Vec::new();
     let mut arguments = std::env::args().skip(1);
     while let Some(argument) = arguments.next() {
@@ -42,7 +42,7 @@ fn main() {
             "--spp" => wanted.spp = value().parse().expect("a number of samples"),
             "--times" => wanted.times = value().parse().expect("a number of times"),
             "--method" => wanted.method = Some(Method::named(&value()).expect("a method")),
-            "--adaptive" => wanted.adaptive = true,
+            "--uniform" => wanted.adaptive = Some(false),
             scene => scenes.push(scene.to_owned()),
         }
     }
@@ -79,7 +79,7 @@ fn calibrate(file: &Path, wanted: &Wanted) {
     // By path tracing: what is judged may be biased.
     let most = Stop { spp: Some(first.spp.max(16) * wanted.times), ..Stop::default() };
     let reference = Settings { stop: most, seed: REFERENCE_SEED, method: Some(Method::Path), ..settings(0) };
-    let reference = run(Settings { adaptive: false, ..reference });
+    let reference = run(Settings { adaptive: Some(false), ..reference });
     let noise = reference.error.map_or(0.0, |error| error.relmse);
     let image = Arc::new(reference.image);
 

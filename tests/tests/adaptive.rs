@@ -15,7 +15,8 @@ const SIGMAS: f64 = 3.8;
 fn tiles(spp: u32, seed: u32, adaptive: bool) -> (Vec<f64>, u64) {
     let scene = cornell_box();
     let stop = Stop { spp: Some(spp), ..Stop::default() };
-    let settings = Settings { width: SIZE, height: SIZE, seed, stop, adaptive, ..Settings::default() };
+    let settings =
+        Settings { width: SIZE, height: SIZE, seed, stop, adaptive: Some(adaptive), ..Settings::default() };
     let result = render(&scene.scene(), &settings, &mut |_| (), &AtomicBool::new(false)).unwrap();
     let mut means = vec![0.0; TILES];
     for (i, pixel) in result.image.pixels.iter().enumerate() {

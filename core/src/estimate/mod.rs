@@ -4,9 +4,11 @@ mod audit;
 mod filter;
 mod interval;
 mod metric;
+mod noise;
 mod tile;
 
 pub use audit::{BiasEstimate, Deviation, Finding};
 pub use interval::ErrorEstimate;
 pub use metric::{Difference, mse, relmse, rmse};
+pub use noise::{BLOCKS, BlockNoise, Noise};
 pub use tile::{TileError, TileLight, filtered};

@@ -117,11 +117,6 @@ impl TileError {
         sums.blocks = blocks.iter().map(|block| block * block).sum();
         sums
     }
-
-    /// Relative variance of a value of the tile, in the mean: its share of the picture's relMSE.
-    pub fn noise(&self) -> f64 {
-        self.filtered / self.values.max(1) as f64
-    }
 }
 
 /// Tiles whose errors hang together count as one.

@@ -1,9 +1,11 @@
 //! The film: what the samples of every pixel add up to, tile after tile, in two independent halves.
 
 mod pixel;
+mod samples;
 mod tile;
 
 pub use pixel::{Dropped, Half, Pixel};
+pub use samples::{GROUP, GROUPS, Samples};
 pub use tile::{PIXELS_PER_TILE, TILE, Tile};
 
 use crate::Rgb;

@@ -23,13 +23,13 @@ use super::estimator::{
 use super::maps::{PhotonMaps, Said};
 use super::merge::{ChainLink, Merging, ends_chain};
 use super::places::Places;
-use super::reuse::{Exchange, GROUP};
+use super::reuse::Exchange;
 use super::shadow::{FEW, pass_cutout, passing, shadow_ray};
 use super::wave::{Path, Share, Wave};
 use crate::bsdf::{Bsdf, Features};
 use crate::bvh::{Bvh, Coherence};
 use crate::cache::irradiance::IrradianceCache;
-use crate::film::{PIXELS_PER_TILE, Pixel, Tile};
+use crate::film::{GROUP, Pixel, Samples, Tile};
 use crate::geometry::{Hit, Ray};
 use crate::light::{Lights, Window, emitted};
 use crate::memory::{Arena, Footprint, OutOfMemory};
@@ -151,22 +151,24 @@ impl<'a, F: Features> PathTracer<'a, F> {
         Wave::footprint(wave)
     }
 
-    /// Traces `samples` of every pixel of tile `task` and adds them to `out`, the tile's pixels of the film.
+    /// Traces `samples` of tile `task` and adds them to `out`, the tile's pixels of the film.
     ///
     /// # Errors
     /// [`OutOfMemory`] where `scratch` has less than [`PathTracer::scratch`] bytes.
     pub fn run(
         &self,
         task: usize,
-        samples: Range<u32>,
+        samples: impl Into<Samples>,
         wave: usize,
         scratch: &mut Arena,
         out: &mut [Pixel],
     ) -> Result<Counters, OutOfMemory> {
         let mut arena = scratch.scratch();
         // No larger than there are paths: the memory of a wave is cleared.
-        let paths = samples.len().saturating_mul(PIXELS_PER_TILE);
-        let mut wave = Wave::new(wave.min(paths), &mut arena)?;
+        let samples = samples.into();
+        let paths = samples.count().saturating_mul(GROUP as u64);
+        let wave = usize::try_from(paths).map_or(wave, |paths| wave.min(paths));
+        let mut wave = Wave::new(wave, &mut arena)?;
         let tile = Tile::new(self.settings.width, self.settings.height, task);
         let mut counters = Counters::default();
         let mut places = Places::new(tile, samples);

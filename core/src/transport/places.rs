@@ -1,59 +1,53 @@
 //! In which order the samples of a tile are taken, and which of them share: layer after layer, one sample of each
-//! pixel, cut into groups.
-//!
-//! A group is every other pixel, across and down, of a block of 8 × 8: neighbours belong to different groups, so
-//! that the errors that a group has in common do not show as squares.
+//! pixel of each group that is to have any more.
 
-use super::reuse::GROUP;
-use crate::film::{PIXELS_PER_TILE, Tile};
-use core::ops::Range;
-
-/// Groups of one layer.
-const GROUPS: u32 = (PIXELS_PER_TILE / GROUP) as u32;
+use crate::film::{GROUP, GROUPS, Samples, Tile};
 
 /// Pixels that share, one sample of each.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Group {
     pub(super) sample: u32,
-    index: u32,
+    index: usize,
 }
 
 impl Group {
     /// Another number for each group that a wave can hold.
     pub(super) fn number(self) -> u32 {
-        self.sample.wrapping_mul(GROUPS) + self.index
+        self.sample.wrapping_mul(GROUPS as u32) + self.index as u32
     }
 }
 
 /// All samples of a tile that are still to be taken.
 pub(super) struct Places {
     tile: Tile,
-    next: Group,
-    end: u32,
+    left: Samples,
+    index: usize,
 }
 
 impl Places {
-    pub(super) fn new(tile: Tile, samples: Range<u32>) -> Self {
-        Self { tile, next: Group { sample: samples.start, index: 0 }, end: samples.end }
+    pub(super) fn new(tile: Tile, samples: Samples) -> Self {
+        Self { tile, left: samples, index: 0 }
     }
 
     pub(super) fn next_group(&mut self) -> Option<Group> {
-        let group = self.next;
-        if group.sample >= self.end {
-            return None;
+        for _ in 0..GROUPS {
+            let index = self.index;
+            self.index = (index + 1) % GROUPS;
+            let (next, end) = (self.left.from.get_mut(index)?, *self.left.to.get(index)?);
+            if *next < end {
+                let sample = *next;
+                *next += 1;
+                return Some(Group { sample, index });
+            }
         }
-        self.next.index += 1;
-        if self.next.index == GROUPS {
-            self.next = Group { sample: group.sample + 1, index: 0 };
-        }
-        Some(group)
+        None
     }
 
     /// The pixels of a group: where the film keeps them in the tile, column and row.
     pub(super) fn pixels(&self, group: Group) -> impl Iterator<Item = (usize, u32, u32)> + use<> {
         let tile = self.tile;
         (0..GROUP).filter_map(move |member| {
-            let place = (group.index as usize / 4) * 64 + member * 4 + group.index as usize % 4;
+            let place = Tile::member(group.index, member);
             tile.pixel(place).map(|(x, y)| (place, x, y))
         })
     }

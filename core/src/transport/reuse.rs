@@ -21,13 +21,11 @@ use super::wave::{Path, Wave};
 use crate::Rgb;
 use crate::bsdf::{Cover, Features};
 use crate::bvh::Coherence;
+use crate::film::GROUP;
 use crate::geometry::Ray;
 use crate::scene::SurfacePoint;
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
-
-/// Paths that share: a compact block of pixels, or what the border of the picture leaves of it.
-pub(super) const GROUP: usize = 16;
 
 /// Below this cosine of the viewer the shading normal may have been turned to him: no two viewers then see the
 /// same surface.

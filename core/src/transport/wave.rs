@@ -1,7 +1,8 @@
 //! The working memory of a wavefront: the state of every path of the wave, and queues of rays.
 
-use super::reuse::{Exchange, GROUP, Pair};
+use super::reuse::{Exchange, Pair};
 use crate::bsdf::Bsdf;
+use crate::film::GROUP;
 use crate::geometry::{Hit, Ray};
 use crate::memory::{Arena, Footprint, OutOfMemory};
 use bytemuck::{Pod, Zeroable};

@@ -4,7 +4,7 @@ use super::failure::Failure;
 use super::interrupt::{self, INTERRUPT};
 use super::method::{self, Choice};
 use super::progress::Teller;
-use super::shot::{self, Options, Shot};
+use super::shot::{self, Options, Shot, When};
 use super::{say, summary, values, warn};
 use clap::{Args, ValueEnum};
 use halflight::compare::compare;
@@ -47,9 +47,10 @@ pub(super) struct Render {
     #[arg(long, value_name = "RELMSE", value_parser = values::positive, help_heading = "When to stop")]
     error: Option<f64>,
 
-    /// Whether tiles get their samples by the noise around them (auto), or all the same number (off)
-    #[arg(long, default_value = "off", help_heading = "When to stop")]
-    adaptive: Adaptive,
+    /// Whether pixels get their samples by the noise around them, or all the same number; auto: by the noise where
+    /// path tracing stops by --error, or by --time without --spp
+    #[arg(long, help_heading = "When to stop")]
+    adaptive: Option<When>,
     /// Keep the film in a file while it grows, for --resume and `halflight merge`
     #[arg(long, value_name = "FILE", help_heading = "In parts")]
     checkpoint: Option<PathBuf>,
@@ -84,14 +85,6 @@ pub(super) struct Render {
 /// Points at which a report holds irradiance caches against exact values, about.
 const SURVEY: u32 = 1000;
 
-#[derive(Clone, Copy, PartialEq, ValueEnum)]
-enum Adaptive {
-    /// By the noise
-    Auto,
-    /// All the same
-    Off,
-}
-
 impl Render {
     pub(super) fn run(&self) -> Result<ExitCode, Failure> {
         let start = Instant::now();
@@ -121,7 +114,7 @@ impl Render {
             self.shot.settings(&loaded, self.method, &self.options, self.stop(&loaded)?, reference)?;
         let every = self.checkpoint_every.unwrap_or(Checkpoint::EVERY);
         let settings = Settings {
-            adaptive: self.adaptive == Adaptive::Auto,
+            adaptive: When::choice(self.adaptive),
             shard: self.shard.unwrap_or(Shard::WHOLE),
             checkpoint: self.checkpoint.clone().map(|path| Checkpoint { path, every }),
             resume: self.resume.clone(),

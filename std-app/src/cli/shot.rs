@@ -124,7 +124,7 @@ pub(super) enum Caustics {
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
 pub(super) enum When {
-    /// Where a first look says that it pays
+    /// Where it pays
     Auto,
     /// Always
     On,
@@ -134,7 +134,7 @@ pub(super) enum When {
 
 impl When {
     /// `None` where the renderer is to tell.
-    fn choice(asked: Option<Self>) -> Option<bool> {
+    pub(super) fn choice(asked: Option<Self>) -> Option<bool> {
         match asked? {
             When::Auto => None,
             When::On => Some(true),

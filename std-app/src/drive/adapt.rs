@@ -1,77 +1,191 @@
 //! Adaptive sampling: more samples where the noise is, without a bias.
 //!
-//! The error of a picture falls fastest where each tile has samples in proportion to the root of its noise. But a pixel
-//! whose own samples decide how many it gets has a biased mean: what looks bright by chance is corrected, what looks
-//! dark is left (Kirk and Arvo 1991, "Unbiased sampling techniques for image synthesis"). So a tile gets its samples by
-//! the noise of the tiles around it, whose samples are independent of its own.
+//! The error of a picture falls fastest where samples are in proportion to the root of noise over cost. How many a group
+//! of pixels gets is told by the other groups of its block of 8 x 8 pixels and, less, by the blocks around it; its cost by
+//! the tiles around: by samples that are independent of its own, which would bias it (docs/decisions/0026).
 
-use halflight_core::estimate::TileError;
-use halflight_core::film::TILE;
+use super::canvas::Canvas;
+use core::ops::Range;
+use halflight_core::estimate::{BLOCKS, BlockNoise};
+use halflight_core::film::{GROUPS, TILE};
 
 /// Below this many samples of each pixel the noise is not known well enough.
 pub(super) const FROM: u32 = 16;
 
-/// The least weight: no tile is left behind where its neighbours know nothing of its noise.
+/// What a pixel of a block around counts, next to one of the same block.
+const AROUND: f64 = 1.0 / 16.0;
+
+/// The least weight: nothing is left behind where its neighbours know nothing of its noise.
 const LEAST: f64 = 0.3;
 
 /// The greatest weight.
 const MOST: f64 = 4.0;
 
-/// How many samples each tile of a picture `width` pixels across should have, over their mean. `taken` is what each has.
-pub(super) fn weights(tiles: &[TileError], taken: &[u32], width: u32) -> Vec<f32> {
-    // Noise of one sample.
-    let noise: Vec<f64> =
-        tiles.iter().zip(taken).map(|(tile, taken)| tile.noise() * f64::from(*taken)).collect();
+/// The least gain for which it is done unasked.
+pub(super) const PAYS: f64 = 1.15;
+
+/// Groups of a block.
+const ASKING: usize = GROUPS / BLOCKS;
+
+/// Rays for a sample around each tile of a picture `width` pixels across.
+pub(super) fn costs(canvas: &Canvas, width: u32) -> Vec<f64> {
     let across = width.div_ceil(TILE) as usize;
-    let down = tiles.len().div_ceil(across.max(1));
-    let around = |task: usize| {
-        let (x, y) = (task % across, task / across);
-        let near = |c: usize, end: usize| c.saturating_sub(1)..(c + 2).min(end);
-        let others = near(y, down).flat_map(|row| near(x, across).map(move |column| row * across + column));
-        let others = others.filter(|other| *other != task).filter_map(|other| noise.get(other));
-        let (sum, count) = others.fold((0.0, 0u32), |(sum, count), noise| (sum + noise, count + 1));
-        (sum / f64::from(count.max(1))).sqrt()
+    let samples =
+        |tile: usize| canvas.taken.get(tile).map(|taken| taken.iter().map(|n| u64::from(*n)).sum::<u64>());
+    let cost = |tile: usize| Some((*canvas.rays.get(tile)? as f64, samples(tile)? as f64));
+    let around = |tile: usize| {
+        let (x, y) = (tile % across, tile / across);
+        let others = near(y).flat_map(|row| near(x).map(move |column| (column, row)));
+        let others = others.filter(|(column, row)| *column < across && (*column, *row) != (x, y));
+        let all = others.filter_map(|(column, row)| cost(row * across + column));
+        let (rays, samples) = all.fold((0.0, 0.0), |sum, more| (sum.0 + more.0, sum.1 + more.1));
+        if rays > 0.0 { rays / samples } else { 1.0 }
     };
-    let wanted: Vec<f64> = (0..tiles.len()).map(around).collect();
-    let mean = wanted.iter().sum::<f64>() / wanted.len().max(1) as f64;
-    if mean.is_nan() || mean <= 0.0 {
-        return vec![1.0; tiles.len()];
-    }
-    wanted.iter().map(|wanted| (LEAST + (1.0 - LEAST) * wanted / mean).min(MOST) as f32).collect()
+    (0..canvas.taken.len()).map(around).collect()
 }
 
-/// Samples for each tile: in proportion to `weights`, not fewer than are `taken`, `target` for a tile in the mean.
-pub(super) fn targets(weights: &[f32], taken: &[u32], target: u32) -> Vec<u32> {
+/// A row or column and those beside it.
+fn near(c: usize) -> Range<usize> {
+    c.saturating_sub(1)..c + 2
+}
+
+/// How many samples groups should have.
+pub(super) struct Spread {
+    /// Of each group, over their mean; 0 for groups that lie outside of the picture.
+    pub(super) weights: Vec<[f32; GROUPS]>,
+    /// By which factor error times cost are smaller than with the same number for all.
+    pub(super) gain: f64,
+}
+
+impl Spread {
+    /// For a picture `width` pixels across. `costs` are those of a sample of each tile.
+    pub(super) fn of(tiles: &[[BlockNoise; BLOCKS]], costs: &[f64], width: u32) -> Self {
+        let across = 2 * width.div_ceil(TILE) as usize;
+        let block = |x: usize, y: usize| {
+            let tile = tiles.get(y / 2 * (across / 2) + x / 2).filter(|_| x < across);
+            tile.map(|tile| tile[y % 2 * 2 + x % 2])
+        };
+        let cost = |tile: usize| costs.get(tile).copied().unwrap_or(1.0);
+        let wanted = |tile: usize, group: usize| {
+            let (number, asking) = (group / ASKING, group % ASKING);
+            let (x, y) = (tile % (across / 2) * 2 + number % 2, tile / (across / 2) * 2 + number / 2);
+            let own = block(x, y).unwrap_or_default();
+            if own.own[asking].pixels == 0 {
+                return 0.0;
+            }
+            let around = near(y).flat_map(|row| near(x).map(move |column| (column, row)));
+            let around = around.filter(|place| *place != (x, y)).filter_map(|(x, y)| block(x, y));
+            let (mut sum, mut pixels) = (own.others[asking].sum, f64::from(own.others[asking].pixels));
+            for other in around.map(|block| block.all()) {
+                sum += AROUND * other.sum;
+                pixels += AROUND * f64::from(other.pixels);
+            }
+            // Where there is nobody to tell, as if it were quiet.
+            (sum / pixels.max(1.0) / cost(tile)).sqrt().max(f64::MIN_POSITIVE)
+        };
+        let wanted: Vec<[f64; GROUPS]> =
+            (0..tiles.len()).map(|tile| core::array::from_fn(|group| wanted(tile, group))).collect();
+        let inside = || wanted.iter().flatten().filter(|wanted| **wanted > 0.0);
+        let mean = inside().sum::<f64>() / inside().count().max(1) as f64;
+        let weight = |wanted: f64| match wanted > 0.0 {
+            true if mean > f64::MIN_POSITIVE => (LEAST + (1.0 - LEAST) * wanted / mean).min(MOST) as f32,
+            true => 1.0,
+            false => 0.0,
+        };
+        let weights: Vec<[f32; GROUPS]> = wanted.iter().map(|groups| groups.map(weight)).collect();
+
+        // What groups see themselves has had no part in their weights, so that it may judge them.
+        let (mut even, mut spread, mut even_cost, mut spread_cost) = (0.0, 0.0, 0.0, 0.0);
+        for (tile, (weights, blocks)) in weights.iter().zip(tiles).enumerate() {
+            let own = blocks.iter().flat_map(|block| block.own);
+            for (weight, own) in weights.iter().zip(own).filter(|(weight, _)| **weight > 0.0) {
+                let (weight, cost) = (f64::from(*weight), cost(tile) * f64::from(own.pixels));
+                even += own.sum;
+                spread += own.sum / weight;
+                even_cost += cost;
+                spread_cost += weight * cost;
+            }
+        }
+        let gain = if spread > 0.0 { even * even_cost / (spread * spread_cost) } else { 1.0 };
+        Self { weights, gain }
+    }
+}
+
+/// Samples for each group: in proportion to `weights`, not fewer than are `taken`, `target` for a group in the mean.
+pub(super) fn targets(weights: &[[f32; GROUPS]], taken: &[[u32; GROUPS]], target: u32) -> Vec<[u32; GROUPS]> {
     let at = |scale: f64| {
-        let tile = move |(weight, taken): (&f32, &u32)| ((f64::from(*weight) * scale) as u32).max(*taken);
-        weights.iter().zip(taken).map(tile)
+        weights.iter().zip(taken).map(move |(weights, taken)| {
+            core::array::from_fn(|group| ((f64::from(weights[group]) * scale) as u32).max(taken[group]))
+        })
     };
-    let wanted = u64::from(target) * weights.len() as u64;
     let (mut low, mut high) = (0.0, f64::from(target) / LEAST + 1.0);
     for _ in 0..50 {
         let middle = 0.5 * (low + high);
-        if at(middle).map(u64::from).sum::<u64>() < wanted { low = middle } else { high = middle }
+        if mean(weights, at(middle)) < target { low = middle } else { high = middle }
     }
     at(high).collect()
+}
+
+/// How many samples pixels have in the mean, those outside of the picture, without a weight, not counted.
+pub(super) fn mean(
+    weights: &[[f32; GROUPS]],
+    taken: impl IntoIterator<Item = impl core::borrow::Borrow<[u32; GROUPS]>>,
+) -> u32 {
+    let (mut sum, mut count) = (0u64, 0u64);
+    for (weights, taken) in weights.iter().zip(taken) {
+        for (_, taken) in weights.iter().zip(taken.borrow()).filter(|(weight, _)| **weight > 0.0) {
+            sum += u64::from(*taken);
+            count += 1;
+        }
+    }
+    (sum / count.max(1)) as u32
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use halflight_core::estimate::Noise;
 
     #[test]
     fn targets_add_up_and_take_nothing_back() {
-        let weights = [0.3, 0.5, 1.0, 2.2, 1.0];
-        let taken = [16, 16, 40, 16, 16];
+        let mut weights = [[1.0; GROUPS]; 2];
+        weights[0][..5].copy_from_slice(&[0.3, 0.5, 1.0, 2.2, 0.0]);
+        let mut taken = [[16; GROUPS]; 2];
+        taken[0][2] = 40;
         let targets = targets(&weights, &taken, 32);
-        let sum: u32 = targets.iter().sum();
-        assert!((5 * 32..5 * 32 + 5).contains(&sum), "{targets:?}");
-        assert!(targets.iter().zip(&taken).all(|(target, taken)| target >= taken));
-        assert!(targets[3] > 2 * targets[4] && targets[2] == 40);
+        assert_eq!(mean(&weights, &targets), 32);
+        assert!(targets.iter().flatten().zip(taken.iter().flatten()).all(|(target, taken)| target >= taken));
+        assert!(targets[0][3] > 2 * targets[1][4] && targets[0][2] == 40 && targets[0][4] == 16);
+    }
+
+    /// A block in which each pixel has so much noise.
+    fn block(noise: f64) -> BlockNoise {
+        let of = |pixels: u32| Noise { sum: noise * f64::from(pixels), pixels };
+        BlockNoise { own: [of(16); ASKING], others: [of(48); ASKING] }
     }
 
     #[test]
     fn without_noise_all_are_equal() {
-        assert_eq!(weights(&[TileError::default(); 6], &[16; 6], 40), [1.0; 6]);
+        let spread = Spread::of(&[[block(0.0); BLOCKS]; 6], &[7.0; 6], 40);
+        assert_eq!((spread.weights, spread.gain), (vec![[1.0; GROUPS]; 6], 1.0));
+    }
+
+    #[test]
+    fn blocks_hear_of_their_neighbours() {
+        let mut tiles = [[block(1.0); BLOCKS]; 4];
+        // The lower right block of the upper left tile.
+        tiles[0][3] = block(100.0);
+        let Spread { weights, gain } = Spread::of(&tiles, &[1.0; 4], 32);
+        let far = weights[3][12];
+        assert!(weights[0][12..].iter().all(|weight| *weight > 3.0 * far), "{weights:?}");
+        assert!([weights[3][0], weights[1][8], weights[1][0]].iter().all(|near| *near > 1.3 * far));
+        assert_eq!(weights[1][4], far);
+        assert!(gain > 1.5, "{gain}");
+    }
+
+    #[test]
+    fn what_costs_more_gets_less() {
+        let Spread { weights, gain } = Spread::of(&[[block(1.0); BLOCKS]; 2], &[1.0, 9.0], 32);
+        assert!(weights[0][0] > 1.4 * weights[1][0] && gain > 1.05, "{weights:?} {gain}");
     }
 }

@@ -2,7 +2,7 @@
 
 use super::adapt;
 use super::ledger::Ledger;
-use halflight_core::film::{Film, PIXELS_PER_TILE};
+use halflight_core::film::{Film, GROUPS, PIXELS_PER_TILE};
 use halflight_core::transport::Counters;
 
 /// A part of a picture: every `count`th tile from tile `index` on. Shards of one picture are rendered apart and
@@ -28,11 +28,13 @@ impl Shard {
 /// See the file.
 pub(super) struct Canvas<'m> {
     pub(super) film: Film<'m>,
-    /// Samples that each pixel of a tile has had; 0 for tiles of other shards.
-    pub(super) taken: Vec<u32>,
+    /// Samples that each pixel of the groups of a tile has had; 0 for tiles of other shards.
+    pub(super) taken: Vec<[u32; GROUPS]>,
+    /// Rays of every kind that each tile took.
+    pub(super) rays: Vec<u64>,
     pub(super) shard: Shard,
-    /// How many samples tiles should have over their mean; `None` where all should have the same.
-    pub(super) weights: Option<Vec<f32>>,
+    /// How many samples groups should have over their mean; `None` where all should have the same.
+    pub(super) weights: Option<Vec<[f32; GROUPS]>>,
     pub(super) counters: Counters,
     pub(super) ledger: Ledger,
 }
@@ -41,7 +43,15 @@ impl<'m> Canvas<'m> {
     pub(super) fn new(film: Film<'m>, shard: Shard) -> Self {
         let tiles = film.pixels().len() / PIXELS_PER_TILE;
         let (counters, ledger) = (Counters::default(), Ledger::default());
-        Self { film, taken: vec![0; tiles], shard, weights: None, counters, ledger }
+        Self {
+            film,
+            taken: vec![[0; GROUPS]; tiles],
+            rays: vec![0; tiles],
+            shard,
+            weights: None,
+            counters,
+            ledger,
+        }
     }
 
     /// Tiles of this shard.
@@ -49,21 +59,22 @@ impl<'m> Canvas<'m> {
         (0..self.taken.len()).filter(|&task| self.shard.owns(task)).count()
     }
 
-    /// Samples that tiles should have when each pixel has `target` of them in the mean.
-    pub(super) fn targets(&self, target: u32) -> Vec<u32> {
+    /// Samples that groups should have when each pixel has `target` of them in the mean.
+    pub(super) fn targets(&self, target: u32) -> Vec<[u32; GROUPS]> {
         match &self.weights {
             Some(weights) => adapt::targets(weights, &self.taken, target),
-            None => vec![target; self.taken.len()],
+            None => vec![[target; GROUPS]; self.taken.len()],
         }
     }
 
-    /// Samples of each pixel: of the least sampled one, or in the mean where tiles should have different numbers.
+    /// Samples of each pixel: of the least sampled one, or in the mean where groups should have different numbers.
     pub(super) fn spp(&self) -> u32 {
-        let own = self.taken.iter().enumerate().filter(|(task, _)| self.shard.owns(*task));
-        let own = own.map(|(_, taken)| *taken);
-        if self.weights.is_none() {
-            return own.min().unwrap_or(0);
+        match &self.weights {
+            Some(weights) => adapt::mean(weights, &self.taken),
+            None => {
+                let own = self.taken.iter().enumerate().filter(|(task, _)| self.shard.owns(*task));
+                own.flat_map(|(_, taken)| *taken).min().unwrap_or(0)
+            }
         }
-        (own.map(u64::from).sum::<u64>() / self.taken.len().max(1) as u64) as u32
     }
 }

@@ -4,9 +4,8 @@
 
 use super::canvas::Canvas;
 use super::workers::Workers;
-use core::ops::Range;
 use core::sync::atomic::{AtomicBool, Ordering};
-use halflight_core::film::{PIXELS_PER_TILE, Pixel};
+use halflight_core::film::{GROUPS, PIXELS_PER_TILE, Pixel, Samples};
 use halflight_core::memory::{Arena, Line, OutOfMemory};
 use halflight_core::transport::Counters;
 use std::sync::Mutex;
@@ -14,8 +13,8 @@ use std::time::Instant;
 
 /// What one round does.
 pub(super) struct Round<'a> {
-    /// Samples that each pixel of a tile has in the end.
-    pub(super) targets: Vec<u32>,
+    /// Samples that each pixel of the groups of a tile has in the end.
+    pub(super) targets: Vec<[u32; GROUPS]>,
     /// Samples after which a thread looks at the clock, and at the flag.
     pub(super) step: u32,
     /// When it is cut.
@@ -37,7 +36,7 @@ pub(super) type Task<'t, T> =
 
 /// A task on a tile: its number, samples, working memory, pixels.
 pub(super) type TileTask<'t> =
-    dyn Fn(usize, Range<u32>, &mut Arena, &mut [Pixel]) -> Result<Counters, OutOfMemory> + Sync + 't;
+    dyn Fn(usize, Samples, &mut Arena, &mut [Pixel]) -> Result<Counters, OutOfMemory> + Sync + 't;
 
 /// The threads, and the round that they are in.
 pub(super) struct Crew<'r, 'm> {
@@ -47,13 +46,15 @@ pub(super) struct Crew<'r, 'm> {
 }
 
 impl Crew<'_, '_> {
-    /// The first sample that a tile lacks; `None` where all have theirs, or the round is over. For methods that need
+    /// The first sample that a pixel lacks; `None` where all have theirs, or the round is over. For methods that need
     /// something new for every sample, before its tiles.
     pub(super) fn next_sample(&self) -> Option<u32> {
         let Canvas { shard, taken, .. } = &*self.canvas;
         let tiles = taken.iter().zip(&self.round.targets).enumerate();
-        let open = tiles.filter(|(task, (taken, target))| shard.owns(*task) && taken < target);
-        open.map(|(_, (taken, _))| *taken).min().filter(|_| !self.round.is_over())
+        let own = tiles.filter(|(task, _)| shard.owns(*task));
+        let groups = own.flat_map(|(_, (taken, target))| taken.iter().zip(target));
+        let open = groups.filter(|(taken, target)| taken < target);
+        open.map(|(taken, _)| *taken).min().filter(|_| !self.round.is_over())
     }
 
     /// A pass: task `i` writes to the `i`th piece of `size` values of `out`, and what they count is the round's. Returns
@@ -71,7 +72,7 @@ impl Crew<'_, '_> {
         Ok(all)
     }
 
-    /// Brings every tile to its target, or to `end` samples where that is less, unless the round is cut.
+    /// Brings every group to its target, or to `end` samples where that is less, unless the round is cut.
     pub(super) fn tiles(
         &mut self,
         end: u32,
@@ -80,26 +81,33 @@ impl Crew<'_, '_> {
     ) -> Result<(), OutOfMemory> {
         let Self { workers, round, canvas } = self;
         let shard = canvas.shard;
-        let tiles = canvas.film.pixels_mut().chunks_mut(PIXELS_PER_TILE).zip(&mut canvas.taken).enumerate();
-        let tiles = tiles.zip(&round.targets).map(|((task, tile), target)| (task, tile, (*target).min(end)));
-        let open = tiles.filter(|(task, (_, taken), target)| shard.owns(*task) && **taken < *target);
+        let tiles = canvas.film.pixels_mut().chunks_mut(PIXELS_PER_TILE);
+        let tiles = tiles.zip(&mut canvas.taken).zip(&mut canvas.rays).enumerate();
+        let own = tiles.zip(&round.targets).filter(|((task, _), _)| shard.owns(*task));
+        let open = own.filter_map(|((task, ((pixels, taken), rays)), target)| {
+            let left = Samples { from: *taken, to: target.map(|target| target.min(end)) };
+            (left.count() > 0).then_some((task, pixels, taken, rays, left))
+        });
         let queue = Mutex::new(scattered(open.collect()));
         let next = || queue.lock().unwrap_or_else(|poisoned| poisoned.into_inner()).pop();
         let counted = workers.on_all(scratch, |arena| {
             let mut counters = Counters::default();
             let mut dropped = Vec::new();
-            while let Some((index, (pixels, taken), target)) = next() {
-                while *taken < target {
+            let step = u64::from(round.step) * GROUPS as u64;
+            while let Some((index, pixels, taken, rays, mut left)) = next() {
+                while left.count() > 0 {
                     if round.is_over() {
                         return Ok((counters, dropped));
                     }
-                    let end = taken.saturating_add(round.step).min(target);
-                    let more = task(index, *taken..end, arena, pixels)?;
+                    let samples = left.first(left.count().div_ceil(step.max(1)));
+                    let more = task(index, samples, arena, pixels)?;
                     counters += more;
                     if more.dropped.total() > 0 {
                         dropped.push((index, more.dropped));
                     }
-                    *taken = end;
+                    *rays += more.rays + more.shadow_rays;
+                    left.from = samples.ends();
+                    *taken = left.from;
                 }
             }
             Ok((counters, dropped))
@@ -148,7 +156,12 @@ mod tests {
         let film = Film::new(40, 40, &mut Arena::new(bytemuck::cast_slice_mut(&mut lines))).unwrap();
         let mut canvas = Canvas::new(film, Shard::WHOLE);
         let interrupt = AtomicBool::new(cut);
-        let round = Round { targets: vec![target; 9], step: 2, deadline: None, interrupt: Some(&interrupt) };
+        let round = Round {
+            targets: vec![[target; GROUPS]; 9],
+            step: 2,
+            deadline: None,
+            interrupt: Some(&interrupt),
+        };
         let mut scratch = vec![vec![Line([0; 64]); 1]; threads];
         work(&mut Crew { workers: &workers, round: &round, canvas: &mut canvas }, &mut scratch)
     }
@@ -187,14 +200,14 @@ mod tests {
 
     #[test]
     fn sample_after_sample_or_all_at_once_the_film_is_the_same() {
-        let tile = |task: usize, samples: Range<u32>, _: &mut Arena, pixels: &mut [Pixel]| {
+        let tile = |task: usize, samples: Samples, _: &mut Arena, pixels: &mut [Pixel]| {
             for (i, pixel) in pixels.iter_mut().enumerate() {
-                for sample in samples.clone() {
+                for sample in samples.from[0]..samples.to[0] {
                     let light = (task * 7 + i) as f32 / (1.0 + sample as f32);
                     pixel.add(sample, Rgb::splat(light), &mut Dropped::default());
                 }
             }
-            Ok(Counters { paths: u64::from(samples.end - samples.start), ..Counters::default() })
+            Ok(Counters { paths: samples.count() / 16, ..Counters::default() })
         };
         let at_once = crew(3, 7, false, |crew, scratch| {
             crew.tiles(u32::MAX, scratch, &tile).unwrap();
@@ -216,7 +229,7 @@ mod tests {
     #[test]
     fn a_task_without_memory_ends_the_round() {
         let short = OutOfMemory { needed: 2, available: 1 };
-        let tile = |task: usize, _: Range<u32>, _: &mut Arena, _: &mut [Pixel]| {
+        let tile = |task: usize, _: Samples, _: &mut Arena, _: &mut [Pixel]| {
             if task == 4 { Err(short) } else { Ok(Counters::default()) }
         };
         crew(2, 7, false, |crew, scratch| assert_eq!(crew.tiles(1, scratch, &tile), Err(short)));

@@ -95,8 +95,9 @@ pub struct Settings {
     /// What the picture should be, of the same size: each round is compared with it, and the time that this
     /// takes does not count.
     pub reference: Option<Arc<Image>>,
-    /// Whether tiles get their samples by the noise around them; all the same otherwise. Not with shards.
-    pub adaptive: bool,
+    /// Whether pixels get their samples by the noise around them; all the same otherwise. `None`: where that pays in
+    /// path tracing that is to stop by its error, or by time and not by samples. Not with shards.
+    pub adaptive: Option<bool>,
     /// The share of the work that goes into an audit of the picture, between 0, no audit, and 1. `None`: a twentieth
     /// where the method is biased. Not with shards.
     pub audit: Option<f64>,
@@ -129,6 +130,15 @@ impl Checkpoint {
     pub const EVERY: f64 = 60.0;
 }
 
+impl Settings {
+    /// Whether a picture by `method` may be sampled adaptively.
+    fn may_adapt(&self, method: Method) -> bool {
+        let Stop { spp, seconds, error } = self.stop;
+        let is_free = || error.is_some() || (seconds.is_some() && spp.is_none());
+        self.shard == Shard::WHOLE && self.adaptive.unwrap_or_else(|| method == Method::Path && is_free())
+    }
+}
+
 impl Default for Settings {
     fn default() -> Self {
         Self {
@@ -148,7 +158,7 @@ impl Default for Settings {
             level: Level::detect(),
             stop: Stop::default(),
             reference: None,
-            adaptive: false,
+            adaptive: None,
             audit: None,
             shard: Shard::WHOLE,
             checkpoint: None,
@@ -198,6 +208,16 @@ pub struct Seconds {
     pub estimate: f64,
 }
 
+/// Whether pixels got their samples by the noise around them.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct AdaptiveUse {
+    /// They did.
+    pub used: bool,
+    /// By which factor that makes the error after the same work smaller, as the noise last told; `None` where nobody
+    /// looked.
+    pub gain: Option<f64>,
+}
+
 /// Whether neighbouring pixels shared what their paths found.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Reuse {
@@ -231,6 +251,8 @@ pub struct RenderResult {
     pub seconds: Seconds,
     /// Paths, rays and dropped samples.
     pub counters: Counters,
+    /// Whether sampling was adaptive, and why.
+    pub adaptive: AdaptiveUse,
     /// Whether pixels shared what their paths found, and why.
     pub reuse: Reuse,
     /// Whether paths were joined with photons of caustics, and why.
@@ -292,7 +314,7 @@ pub fn render(
     }
     let Shard { index, count } = settings.shard;
     let many = count as usize > Tile::count(settings.width, settings.height);
-    if index >= count || many || (settings.adaptive && count > 1) {
+    if index >= count || many || (settings.adaptive == Some(true) && count > 1) {
         return Err(RenderError::Shard);
     }
     let plan = Census::of(scene).plan();

@@ -1,5 +1,6 @@
 //! The rounds of a picture, from the first sample to the last estimate.
 
+use super::adapt::{self, Spread};
 use super::audit::Audit;
 use super::canvas::Canvas;
 use super::crew::{self, Crew};
@@ -8,7 +9,9 @@ use super::history::{Clock, Reference, Round};
 use super::ledger::empty_pixels;
 use super::method::{Method, Renderer, Stage};
 use super::rounds::{Plan, Rounds};
-use super::{Ending, FileError, Progress, RenderError, RenderResult, Seconds, WindowUse, adapt, regions};
+use super::{
+    AdaptiveUse, Ending, FileError, Progress, RenderError, RenderResult, Seconds, WindowUse, regions,
+};
 use crate::save::Image;
 use core::sync::atomic::{AtomicBool, Ordering};
 use core::time::Duration;
@@ -61,6 +64,7 @@ impl Picture<'_> {
         let (mut estimating, mut estimate) = (0.0, 0.0);
         // Photons, too, are shared.
         let shares = method.shares() || renderer.caustics().used;
+        let mut gain = None;
         let mut saved = Instant::now();
         let mut is_lost = false;
         let save =
@@ -94,8 +98,14 @@ impl Picture<'_> {
                 error = tiles.as_ref().and_then(|tiles| regions::estimate(tiles, width, shares));
                 estimate += start.elapsed().as_secs_f64();
                 let audited = error.and_then(|noise| audit.as_ref()?.verdict(workers, &canvas.film, noise));
-                if let (true, Some(tiles)) = (settings.adaptive && rounds.spp() >= adapt::FROM, tiles) {
-                    canvas.weights = Some(adapt::weights(&tiles, &canvas.taken, width));
+                if settings.may_adapt(method) && rounds.spp() >= adapt::FROM {
+                    let noise = workers.noise(&canvas.film);
+                    let spread = noise.map(|noise| Spread::of(&noise, &adapt::costs(&canvas, width), width));
+                    gain = spread.as_ref().map(|spread| spread.gain);
+                    let is_asked = settings.adaptive == Some(true) || canvas.weights.is_some();
+                    if let Some(spread) = spread.filter(|spread| is_asked || spread.gain >= adapt::PAYS) {
+                        canvas.weights = Some(spread.weights);
+                    }
                 }
                 error = audited.as_ref().map(|audited| audited.total).or(error);
                 is_lost =
@@ -154,6 +164,7 @@ impl Picture<'_> {
             threads: workers.count(),
             seconds: Seconds { build: 0.0, render, estimate },
             counters: canvas.counters,
+            adaptive: AdaptiveUse { used: canvas.weights.is_some(), gain },
             reuse: renderer.reuse(),
             caustics: renderer.caustics(),
             cache: renderer.cache(),

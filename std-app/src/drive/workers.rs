@@ -5,7 +5,7 @@ use super::{RenderError, regions};
 use halflight_core::Level;
 use halflight_core::bsdf::Features;
 use halflight_core::bvh::{Bvh, Join};
-use halflight_core::estimate::{ErrorEstimate, TileError, TileLight};
+use halflight_core::estimate::{BLOCKS, BlockNoise, ErrorEstimate, TileError, TileLight};
 use halflight_core::film::{Film, PIXELS_PER_TILE};
 use halflight_core::memory::{Arena, Line, OutOfMemory};
 use halflight_core::photon::{PhotonMap, Photons};
@@ -47,6 +47,13 @@ impl Workers {
         let mean = self.mean(film)?;
         let tiles = film.pixels().par_chunks(PIXELS_PER_TILE);
         Some(self.pool.install(|| tiles.map(|tile| TileError::of(tile, mean)).collect()))
+    }
+
+    /// Where the noise of `film` is; `None` for a black picture.
+    pub(super) fn noise(&self, film: &Film) -> Option<Vec<[BlockNoise; BLOCKS]>> {
+        let mean = self.mean(film)?;
+        let tiles = film.pixels().par_chunks(PIXELS_PER_TILE);
+        Some(self.pool.install(|| tiles.map(|tile| BlockNoise::of(tile, mean)).collect()))
     }
 
     /// The mean radiance of `film`; `None` where it is black.

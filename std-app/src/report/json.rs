@@ -57,31 +57,13 @@ fn most(run: &Run) -> Value {
             "used": result.windows.used,
             "gain": result.windows.gain.map(|gain| gain.factor()),
         },
+        "adaptive": { "used": result.adaptive.used, "gain": result.adaptive.gain },
         "reuse": {
             "used": result.reuse.used,
             "gain": result.reuse.pilot.map(|pilot| pilot.gain()),
             "cost": result.reuse.pilot.map(|pilot| pilot.cost()),
         },
-        "cache": result.cache.map(|cache| json!({
-            "metric": settings.cache.metric.name(),
-            "rays_per_record": settings.cache.strata * settings.cache.strata,
-            "records": cache.records,
-            "capacity": cache.capacity,
-            "refused": cache.refused,
-            "loaded": cache.loaded,
-            "gathered": cache.gathered,
-            "seconds": cache.seconds,
-            "allowed": settings.cache.allowed(),
-            "survey": result.survey.as_ref().map(|survey| json!({
-                "points": survey.points,
-                "reached": survey.checks.len() as f64 / survey.points.max(1) as f64,
-                "predicted": survey.predicted,
-                "achieved": survey.achieved,
-                "rms": survey.rms,
-                "noise": survey.noise,
-                "seconds": survey.seconds,
-            })),
-        })),
+        "cache": cache(run),
         "photons": result.photons.map(|photons| {
             let map = |map: MapUse| json!({
                 "paths_wanted": map.wanted,
@@ -103,6 +85,31 @@ fn most(run: &Run) -> Value {
         "shard": (shard != Shard::WHOLE).then(|| [shard.index + 1, shard.count]),
         "made": made(run.maker),
     })
+}
+
+/// What became of the irradiance cache.
+fn cache(run: &Run) -> Value {
+    let (result, settings) = (run.result, run.settings);
+    json!(result.cache.map(|cache| json!({
+        "metric": settings.cache.metric.name(),
+        "rays_per_record": settings.cache.strata * settings.cache.strata,
+        "records": cache.records,
+        "capacity": cache.capacity,
+        "refused": cache.refused,
+        "loaded": cache.loaded,
+        "gathered": cache.gathered,
+        "seconds": cache.seconds,
+        "allowed": settings.cache.allowed(),
+        "survey": result.survey.as_ref().map(|survey| json!({
+            "points": survey.points,
+            "reached": survey.checks.len() as f64 / survey.points.max(1) as f64,
+            "predicted": survey.predicted,
+            "achieved": survey.achieved,
+            "rms": survey.rms,
+            "noise": survey.noise,
+            "seconds": survey.seconds,
+        })),
+    })))
 }
 
 /// A race.

@@ -6,7 +6,7 @@ use crate::drive::canvas::{Canvas, Shard};
 use crate::drive::ledger::Ledger;
 use crate::drive::rounds::{Estimates, Rounds};
 use crate::drive::{ErrorEstimate, Method, Round};
-use halflight_core::film::Dropped;
+use halflight_core::film::{Dropped, GROUPS};
 use halflight_core::transport::Counters;
 use serde::{Deserialize, Serialize};
 
@@ -27,8 +27,10 @@ pub(in crate::drive) struct Header {
     /// Tiles and what they dropped.
     ledger: Vec<(u32, Causes)>,
     history: Vec<Entry>,
+    /// Rays of each tile.
+    tiles: Vec<u64>,
     /// Of adaptive sampling.
-    weights: Option<Vec<f32>>,
+    weights: Option<Vec<[f32; GROUPS]>>,
     audit: Option<audit::State>,
 }
 
@@ -62,6 +64,7 @@ impl Header {
             dropped: causes(counters.dropped),
             ledger: ledger.tiles().map(|(task, dropped)| (task, causes(dropped))).collect(),
             history: history.iter().map(|r| (r.seconds, r.spp, r.rays, r.error.map(error))).collect(),
+            tiles: canvas.rays.clone(),
             weights: canvas.weights.clone(),
             audit: audit.map(|audit| audit.state().clone()),
         }
@@ -92,8 +95,13 @@ impl Header {
         ledger
     }
 
+    /// Rays of each tile.
+    pub(in crate::drive) fn tiles(&self) -> &[u64] {
+        &self.tiles
+    }
+
     /// Of `tiles` tiles.
-    pub(in crate::drive) fn weights(&self, tiles: usize) -> Option<Vec<f32>> {
+    pub(in crate::drive) fn weights(&self, tiles: usize) -> Option<Vec<[f32; GROUPS]>> {
         self.weights.clone().filter(|weights| weights.len() == tiles)
     }
 

@@ -18,6 +18,7 @@ pub(in crate::drive) struct Identity {
     /// What was asked for; what comes of it follows from the scene.
     reuse: Option<bool>,
     windows: Option<bool>,
+    adaptive: Option<bool>,
     /// Everything that the method is told.
     settings: String,
     /// Fingerprint of all that is in the scene.
@@ -58,7 +59,8 @@ impl Identity {
             max_depth: settings.max_depth,
             reuse: settings.reuse,
             windows: settings.windows,
-            settings: format!("{paths:?}{cache}{caustics}, adaptive: {}", settings.adaptive),
+            adaptive: settings.adaptive,
+            settings: format!("{paths:?}{cache}{caustics}"),
             scene: fingerprint::scene(scene),
             camera: fingerprint::camera(&scene.camera),
         }
@@ -82,6 +84,7 @@ impl Identity {
             .or(said("max-depth ", depth(self.max_depth), depth(other.max_depth)))
             .or(said("reuse ", choice(self.reuse), choice(other.reuse)))
             .or(said("windows ", choice(self.windows), choice(other.windows)))
+            .or(said("adaptive ", choice(self.adaptive), choice(other.adaptive)))
             .or((self.scene != other.scene)
                 .then(|| "of another scene, or the scene has changed since".into()))
             .or((self.camera != other.camera).then(|| "seen by another camera".into()))

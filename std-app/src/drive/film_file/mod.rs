@@ -10,23 +10,28 @@ use super::MOST_PIXELS;
 use super::canvas::{Canvas, Shard};
 use super::error::FileError;
 use super::sealed::{self, Kind};
-use halflight_core::film::{PIXELS_PER_TILE, Pixel, Tile};
+use halflight_core::film::{GROUPS, PIXELS_PER_TILE, Pixel, Tile};
 use std::path::Path;
 
-const KIND: Kind = Kind { magic: *b"HLFILM", version: 1, name: "film" };
+const KIND: Kind = Kind { magic: *b"HLFILM", version: 2, name: "film" };
 
 /// Writes `canvas` to `path`, whole or not at all.
 pub(super) fn write(path: &Path, header: &Header, canvas: &Canvas) -> Result<(), FileError> {
     sealed::write(path, &KIND, header, |file| {
         file.put(bytemuck::cast_slice(&canvas.taken))?;
         let tiles = tiles(canvas.film.pixels(), &canvas.taken);
-        tiles.into_iter().try_for_each(|(pixels, _)| file.put(bytemuck::cast_slice(pixels)))
+        tiles.into_iter().try_for_each(|pixels| file.put(bytemuck::cast_slice(pixels)))
     })
 }
 
 /// Tiles that have samples: the others are not stored.
-fn tiles<'a>(pixels: &'a [Pixel], taken: &'a [u32]) -> impl Iterator<Item = (&'a [Pixel], u32)> {
-    pixels.chunks(PIXELS_PER_TILE).zip(taken.iter().copied()).filter(|(_, taken)| *taken > 0)
+fn tiles<'a>(pixels: &'a [Pixel], taken: &'a [[u32; GROUPS]]) -> impl Iterator<Item = &'a [Pixel]> {
+    let tiles = pixels.chunks(PIXELS_PER_TILE).zip(taken);
+    tiles.filter(|(_, taken)| has_samples(taken)).map(|(pixels, _)| pixels)
+}
+
+fn has_samples(taken: &[u32; GROUPS]) -> bool {
+    taken.iter().any(|taken| *taken > 0)
 }
 
 /// A film file whose header has been read.
@@ -79,14 +84,14 @@ impl Reader {
     /// Reads the pixels of its tiles into those of `canvas`, a film of the same size.
     pub(super) fn read_into(mut self, canvas: &mut Canvas) -> Result<(), FileError> {
         let [width, height] = self.header.size();
-        let mut taken = vec![0u32; Tile::count(width, height)];
+        let mut taken = vec![[0u32; GROUPS]; Tile::count(width, height)];
         if taken.len() != canvas.taken.len() {
             return Err(self.file.damage("it has another size than it says"));
         }
         self.file.get(bytemuck::cast_slice_mut(&mut taken))?;
         let shard = self.header.shard();
         for (task, pixels) in canvas.film.pixels_mut().chunks_mut(PIXELS_PER_TILE).enumerate() {
-            if taken[task] == 0 {
+            if !has_samples(&taken[task]) {
                 continue;
             }
             if !shard.owns(task) {
@@ -96,6 +101,7 @@ impl Reader {
             canvas.taken[task] = taken[task];
         }
         self.file.finish()?;
+        canvas.rays.iter_mut().zip(self.header.tiles()).for_each(|(rays, more)| *rays += more);
         canvas.counters += self.header.counters();
         canvas.ledger.merge(&self.header.ledger());
         Ok(())
