@@ -1,8 +1,9 @@
 //! What adaptive sampling gains at equal time: relMSE times processor seconds, without and with it, in turns. Each
 //! picture is held against the mean of all others of its scene, of both kinds. Prints the table of docs/validation.md:
 //!
-//! `cargo run --release -p halflight-tests --example adaptive -- [--renders 16] [--size 128] [--spp 64]
-//! SCENE…`, scene files. Processor seconds are read from /proc, with one thread for each render.
+//! `cargo run --release -p halflight-tests --example adaptive -- [--renders 16] [--size 128] [--spp 64 | --error 0.001]
+//! SCENE…`, scene files. With `--error` renders stop by themselves; how many had that error within a factor of 1.5, and how
+//! many had more, is printed besides. Processor seconds are read from /proc, with one thread for each render.
 
 use core::sync::atomic::AtomicBool;
 use halflight::drive::{RenderResult, Settings, Stop, render};
@@ -16,19 +17,24 @@ struct Kind {
     seconds: Vec<f64>,
     estimates: Vec<f64>,
     held: usize,
+    spp: Vec<f64>,
+    gains: Vec<f64>,
     errors: Vec<f64>,
 }
 
 fn main() {
-    let (mut renders, mut size, mut spp, mut scenes) = (16, 128, 64, Vec::new());
+    let (mut renders, mut size, mut scenes) = (16, 128, Vec::new());
+    let mut stop = Stop { spp: Some(64), ..Stop::default() };
     let mut arguments = std::env::args().skip(1);
     while let Some(argument) = arguments.next() {
-        let mut value =
-            || arguments.next().and_then(|value| value.parse().ok()).expect("a number after the flag");
+        let mut value = || -> f64 {
+            arguments.next().and_then(|value| value.parse().ok()).expect("a number after the flag")
+        };
         match argument.as_str() {
-            "--renders" => renders = value(),
-            "--size" => size = value(),
-            "--spp" => spp = value(),
+            "--renders" => renders = value() as u32,
+            "--size" => size = value() as u32,
+            "--spp" => stop = Stop { spp: Some(value() as u32), ..Stop::default() },
+            "--error" => stop = Stop { error: Some(value()), ..Stop::default() },
             _ => scenes.push(argument),
         }
     }
@@ -37,15 +43,14 @@ fn main() {
     );
     println!("|---|---|---|---|---|---|---|---|---|");
     for scene in scenes {
-        measure(Path::new(&scene), renders, size, spp);
+        measure(Path::new(&scene), renders, size, stop);
     }
 }
 
-fn measure(file: &Path, renders: u32, size: u32, spp: u32) {
+fn measure(file: &Path, renders: u32, size: u32, stop: Stop) {
     let loaded = load::load(file, &LoadOptions::default()).expect("a scene");
     let views = loaded.views();
     let scene = views.scene(loaded.camera_or_default());
-    let stop = Stop { spp: Some(spp), ..Stop::default() };
     let mut kinds = [Kind::default(), Kind::default()];
     let mut intervals = [Vec::new(), Vec::new()];
     for seed in 0..renders {
@@ -65,6 +70,8 @@ fn measure(file: &Path, renders: u32, size: u32, spp: u32) {
                 render(&scene, &settings, &mut |_| (), &AtomicBool::new(false)).expect("enough memory");
             kind.seconds.push(processor_seconds() - before - result.seconds.build);
             intervals[index].extend(result.error);
+            kind.spp.push(f64::from(result.spp));
+            kind.gains.extend(result.adaptive.gain);
             kind.pictures.push(result.image.pixels.iter().flatten().map(|v| f64::from(*v)).collect());
         }
     }
@@ -107,6 +114,25 @@ fn measure(file: &Path, renders: u32, size: u32, spp: u32) {
         tiles[0],
         tiles.len() - 1,
     );
+    let name = ["uniform", "adaptive"];
+    for (kind, name) in kinds.iter().zip(name).filter(|_| stop.error.is_some()) {
+        let wanted = stop.error.unwrap_or(f64::NAN);
+        let mut ratios: Vec<f64> = kind.errors.iter().map(|error| error / wanted).collect();
+        ratios.sort_by(f64::total_cmp);
+        let near = ratios.iter().filter(|ratio| (1.0 / 1.5..=1.5).contains(*ratio)).count();
+        println!(
+            "  {name}: error / wanted {:.2}, {:.2}, {:.2}; within a factor of 1.5 in {near} of {renders}, above in {}; \
+             {} samples (median)",
+            ratios[0],
+            median(&ratios),
+            ratios[ratios.len() - 1],
+            ratios.iter().filter(|ratio| **ratio > 1.0).count(),
+            median(&kind.spp),
+        );
+    }
+    if !adaptive.gains.is_empty() {
+        println!("  gain as told: {:.3}", median(&adaptive.gains));
+    }
 }
 
 /// How far the means of both kinds are apart, in standard errors: of the picture, and of blocks of 16 x 16 pixels.
