@@ -1,3 +1,4 @@
 //! Shared helpers of the cross-crate tests.
+pub mod render;
 pub mod scenes;
 pub mod statistics;

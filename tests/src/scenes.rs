@@ -183,6 +183,35 @@ pub fn cornell_box() -> SceneBuffers {
     scene
 }
 
+/// A lamp of `size` that faces something of `surface` at its back, and a floor that both shine on: a caustic where that
+/// throws the light, so large that paths find it as well.
+pub fn lamp_before(surface: Surface, size: f32) -> SceneBuffers {
+    let camera = Camera::look_at(Vec3::new(0.0, 2.5, 3.0), Vec3::new(0.0, 0.0, 0.5), Vec3::Y, 40.0);
+    let mut buffers = SceneBuffers::new(camera);
+    let floor = buffers.material(Material::diffuse(Rgb::splat(0.7)));
+    let thing = buffers.material(Material { surface, ..Material::GREY });
+    let lamp = buffers.material(emitter(0.0, 5.0));
+    buffers.square(Vec3::ZERO, Vec3::Y, 4.0, floor);
+    buffers.square(Vec3::new(0.0, 1.0, -1.0), Vec3::Z, 1.0, thing);
+    buffers.square(Vec3::new(0.0, 1.0, -0.5), Vec3::NEG_Z, size, lamp);
+    buffers
+}
+
+/// A bright room and a dark one, with a wall between them that is as thin as a thousandth; seen from the dark one.
+pub fn bright_and_dark() -> SceneBuffers {
+    let camera = Camera::look_at(Vec3::new(0.52, 0.5, 0.95), Vec3::new(0.52, 0.45, 0.0), Vec3::Y, 80.0);
+    let mut buffers = SceneBuffers::new(camera);
+    let wall = buffers.material(Material::diffuse(Rgb::splat(0.8)));
+    let lamp = buffers.material(emitter(0.0, 20.0));
+    buffers.cuboid(Vec3::ZERO, Vec3::new(0.5, 1.0, 1.0), true, wall);
+    buffers.cuboid(Vec3::new(0.501, 0.0, 0.0), Vec3::ONE, true, wall);
+    buffers.square(Vec3::new(0.25, 0.9, 0.5), Vec3::NEG_Y, 0.2, lamp);
+    buffers
+}
+
+/// Where the camera of [`bright_and_dark`] would be in the bright room.
+pub const IN_THE_BRIGHT_ROOM: Vec3 = Vec3::new(0.48, 0.5, 0.95);
+
 /// The Cornell box with a mirror, glass, a coat, a cut-out, smooth normals, a lens, a sky and a point light.
 pub fn everything() -> SceneBuffers {
     let mut scene = cornell_box();

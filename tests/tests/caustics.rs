@@ -1,9 +1,8 @@
 //! Path tracing joined with photons of caustics: right in the mean whatever the surfaces and lights, nothing counted
 //! twice, the same bits on any number of threads, and none of it where there is no caustic.
 
-use core::sync::atomic::AtomicBool;
 use glam::Vec3;
-use halflight::drive::{self, RenderResult, Settings, Stop};
+use halflight::drive::{Method, RenderResult, Settings};
 use halflight_core::bsdf::All;
 use halflight_core::bvh::Bvh;
 use halflight_core::film::Film;
@@ -15,7 +14,11 @@ use halflight_core::transport::caustics::{CausticShooter, Find, PATHS, ROOM};
 use halflight_core::transport::shoot::{Keep, ShootSettings};
 use halflight_core::transport::{Discs, Merging, PathSettings, PathTracer, UNLIMITED};
 use halflight_core::{Level, Rgb};
-use halflight_tests::scenes::{SceneBuffers, constant_environment, cornell_box, emitter, everything};
+use halflight_tests::render::render;
+use halflight_tests::scenes::{
+    IN_THE_BRIGHT_ROOM, SceneBuffers, bright_and_dark, constant_environment, cornell_box, emitter,
+    everything, lamp_before,
+};
 use halflight_tests::statistics::{agree, blocks};
 
 /// Pixels across and down.
@@ -88,19 +91,6 @@ fn pictures(scene: &Scene, first: u32, tasks: usize, pixels: f32, max_depth: u32
     (first..first + SEEDS).map(one).collect()
 }
 
-/// A lamp of `size` that faces something at its back, and a floor that both shine on.
-fn lamp_before(surface: Surface, size: f32) -> SceneBuffers {
-    let camera = Camera::look_at(Vec3::new(0.0, 2.5, 3.0), Vec3::new(0.0, 0.0, 0.5), Vec3::Y, 40.0);
-    let mut buffers = SceneBuffers::new(camera);
-    let floor = buffers.material(Material::diffuse(Rgb::splat(0.7)));
-    let thing = buffers.material(Material { surface, ..Material::GREY });
-    let lamp = buffers.material(emitter(0.0, 5.0));
-    buffers.square(Vec3::ZERO, Vec3::Y, 4.0, floor);
-    buffers.square(Vec3::new(0.0, 1.0, -1.0), Vec3::Z, 1.0, thing);
-    buffers.square(Vec3::new(0.0, 1.0, -0.5), Vec3::NEG_Z, size, lamp);
-    buffers
-}
-
 /// A ball between floor and lamp.
 fn lamp_over_ball(surface: Surface) -> SceneBuffers {
     let camera = Camera::look_at(Vec3::new(0.0, 2.0, 3.5), Vec3::new(0.0, 0.3, 0.0), Vec3::Y, 40.0);
@@ -161,11 +151,8 @@ fn every_kind_of_surface_and_light_is_right_in_the_mean() {
     is_right_in_the_mean("lights without surface", &buffers, UNLIMITED);
 }
 
-fn render(scene: &Scene, spp: u32, change: impl FnOnce(&mut Settings)) -> RenderResult {
-    let stop = Stop { spp: Some(spp), ..Stop::default() };
-    let mut settings = Settings { width: 40, height: 40, stop, ..Settings::default() };
-    change(&mut settings);
-    drive::render(scene, &settings, &mut |_| (), &AtomicBool::new(false)).unwrap()
+fn path(scene: &Scene, spp: u32, change: impl FnOnce(&mut Settings)) -> RenderResult {
+    render(scene, Method::Path, 40, spp, change)
 }
 
 fn has_photons(result: &RenderResult) -> bool {
@@ -176,13 +163,13 @@ fn has_photons(result: &RenderResult) -> bool {
 fn bits_do_not_depend_on_threads_or_level_and_off_is_off() {
     let buffers = everything();
     let scene = buffers.scene();
-    let one = render(&scene, 11, |s| s.threads = Some(1));
+    let one = path(&scene, 11, |s| s.threads = Some(1));
     assert!(has_photons(&one));
-    assert_eq!(render(&scene, 11, |s| s.threads = Some(2)).image, one.image);
+    assert_eq!(path(&scene, 11, |s| s.threads = Some(2)).image, one.image);
     for level in Level::detect().and_below() {
-        assert_eq!(render(&scene, 11, |s| s.level = level).image, one.image, "{level:?}");
+        assert_eq!(path(&scene, 11, |s| s.level = level).image, one.image, "{level:?}");
     }
-    let off = render(&scene, 11, |s| s.caustics = false);
+    let off = path(&scene, 11, |s| s.caustics = false);
     assert!(!has_photons(&off) && off.image != one.image);
 }
 
@@ -195,28 +182,21 @@ fn where_there_is_no_caustic_the_picture_is_that_without_photons() {
     hidden.square(Vec3::new(0.5, 0.5, 3.0), Vec3::Z, 0.5, mirror);
     for buffers in [&boxed, &hidden] {
         let scene = buffers.scene();
-        let joined = render(&scene, 9, |_| ());
-        assert_eq!(joined.image, render(&scene, 9, |s| s.caustics = false).image);
+        let joined = path(&scene, 9, |_| ());
+        assert_eq!(joined.image, path(&scene, 9, |s| s.caustics = false).image);
         assert!(!has_photons(&joined));
     }
 }
 
 #[test]
 fn no_caustic_leaks_through_a_thin_wall() {
-    // A bright room with a mirror and a dark one, with a wall between them that is as thin as a thousandth.
-    let camera = Camera::look_at(Vec3::new(0.52, 0.5, 0.95), Vec3::new(0.52, 0.45, 0.0), Vec3::Y, 80.0);
-    let mut buffers = SceneBuffers::new(camera);
-    let wall = buffers.material(Material::diffuse(Rgb::splat(0.8)));
-    let lamp = buffers.material(emitter(0.0, 20.0));
+    let mut buffers = bright_and_dark();
     let mirror = buffers.material(Material { surface: metal(0.0), ..Material::GREY });
-    buffers.cuboid(Vec3::ZERO, Vec3::new(0.5, 1.0, 1.0), true, wall);
-    buffers.cuboid(Vec3::new(0.501, 0.0, 0.0), Vec3::ONE, true, wall);
-    buffers.square(Vec3::new(0.25, 0.9, 0.5), Vec3::NEG_Y, 0.2, lamp);
     buffers.square(Vec3::new(0.1, 0.3, 0.5), Vec3::new(1.0, 1.0, 0.0).normalize(), 0.2, mirror);
-    let image = render(&buffers.scene(), 8, |_| ()).image;
+    let image = path(&buffers.scene(), 8, |_| ()).image;
     assert_eq!(image.mean(), [0.0; 3], "the camera is in the dark room");
-    let camera = Camera { eye: Vec3::new(0.48, 0.5, 0.95), ..camera };
-    let bright = render(&Scene { camera, ..buffers.scene() }, 8, |_| ());
+    let camera = Camera { eye: IN_THE_BRIGHT_ROOM, ..buffers.camera };
+    let bright = path(&Scene { camera, ..buffers.scene() }, 8, |_| ());
     assert!(has_photons(&bright) && bright.image.mean()[1] > 0.1);
 }
 

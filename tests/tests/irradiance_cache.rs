@@ -1,33 +1,21 @@
 //! The irradiance cache as a method of the renderer: its light against that of the path tracer, its bits against
 //! threads, its records against the unit of the scene, and what it does without memory.
 
-use core::sync::atomic::AtomicBool;
 use glam::Vec3;
-use halflight::drive::{self, CacheUse, Mark, Method, RenderResult, Settings, Stop};
+use halflight::drive::{CacheUse, Mark, Method, RenderResult, Settings};
 use halflight::save::Image;
 use halflight_core::scene::Scene;
+use halflight_tests::render::render;
 use halflight_tests::scenes::{SceneBuffers, cornell_box, emitter, everything};
 
 /// Rays of a record are 16² in these tests: one percent of noise in each record, at worst.
 const STRATA: u32 = 16;
 
-fn render(
-    scene: &Scene,
-    method: Method,
-    size: u32,
-    spp: u32,
-    change: impl FnOnce(&mut Settings),
-) -> RenderResult {
-    let stop = Stop { spp: Some(spp), ..Stop::default() };
-    let method = Some(method);
-    let mut settings = Settings { method, width: size, height: size, stop, ..Settings::default() };
-    settings.cache.strata = STRATA;
-    change(&mut settings);
-    drive::render(scene, &settings, &mut |_| (), &AtomicBool::new(false)).unwrap()
-}
-
 fn cached(scene: &Scene, size: u32, spp: u32, change: impl FnOnce(&mut Settings)) -> RenderResult {
-    render(scene, Method::IrradianceCache, size, spp, change)
+    render(scene, Method::IrradianceCache, size, spp, |settings| {
+        settings.cache.strata = STRATA;
+        change(settings);
+    })
 }
 
 fn cache(result: &RenderResult) -> CacheUse {

@@ -1,31 +1,15 @@
 //! Photon mapping in two passes: its light against that of the path tracer, within the bias that is stated here, its bits
 //! against threads, rounds and levels, what must stay dark, and what less memory does to it.
 
-use core::sync::atomic::AtomicBool;
-use glam::Vec3;
-use halflight::drive::{self, Method, PhotonUse, RenderResult, Settings, Stop};
+use halflight::drive::{Method, PhotonUse, RenderResult, Settings};
 use halflight::load::{self, LoadOptions};
 use halflight::save::Image;
 use halflight_core::Rgb;
 use halflight_core::photon::Falloff;
-use halflight_core::scene::{Camera, Material, Scene, Surface};
-use halflight_tests::scenes::{SceneBuffers, cornell_box, emitter, everything};
+use halflight_core::scene::{Camera, Scene, Surface};
+use halflight_tests::render::render;
+use halflight_tests::scenes::{IN_THE_BRIGHT_ROOM, bright_and_dark, cornell_box, everything, lamp_before};
 use std::path::Path;
-
-fn render(
-    scene: &Scene,
-    method: Method,
-    size: u32,
-    spp: u32,
-    change: impl FnOnce(&mut Settings),
-) -> RenderResult {
-    let stop = Stop { spp: Some(spp), ..Stop::default() };
-    let method = Some(method);
-    let mut settings = Settings { method, width: size, height: size, stop, ..Settings::default() };
-    settings.audit = Some(0.0);
-    change(&mut settings);
-    drive::render(scene, &settings, &mut |_| (), &AtomicBool::new(false)).unwrap()
-}
 
 fn mapped(scene: &Scene, size: u32, spp: u32, change: impl FnOnce(&mut Settings)) -> RenderResult {
     render(scene, Method::PhotonMap, size, spp, change)
@@ -93,16 +77,7 @@ fn every_kind_of_surface_and_light_has_the_light_that_the_path_tracer_finds() {
 
 #[test]
 fn a_caustic_has_its_power_and_its_map() {
-    // A lamp that faces a mirror, which throws its light onto the floor: so large that paths find it as well.
-    let camera = Camera::look_at(Vec3::new(0.0, 2.5, 3.0), Vec3::new(0.0, 0.0, 0.5), Vec3::Y, 40.0);
-    let mut buffers = SceneBuffers::new(camera);
-    let floor = buffers.material(Material::diffuse(Rgb::splat(0.7)));
-    let mirror = Surface::Mirror { reflectance: Rgb::splat(0.9).into() };
-    let mirror = buffers.material(Material { surface: mirror, ..Material::GREY });
-    let lamp = buffers.material(emitter(0.0, 5.0));
-    buffers.square(Vec3::ZERO, Vec3::Y, 4.0, floor);
-    buffers.square(Vec3::new(0.0, 1.0, -1.0), Vec3::Z, 1.0, mirror);
-    buffers.square(Vec3::new(0.0, 1.0, -0.5), Vec3::NEG_Z, 0.6, lamp);
+    let buffers = lamp_before(Surface::Mirror { reflectance: Rgb::splat(0.9).into() }, 0.6);
     let scene = buffers.scene();
     let path = render(&scene, Method::Path, 64, 2048, |_| ()).image;
     let found = mapped(&scene, 64, 256, |_| ());
@@ -114,18 +89,11 @@ fn a_caustic_has_its_power_and_its_map() {
 
 #[test]
 fn nothing_leaks_through_a_thin_wall() {
-    // A bright room and a dark one, with a wall between them that is as thin as a thousandth.
-    let camera = Camera::look_at(Vec3::new(0.52, 0.5, 0.95), Vec3::new(0.52, 0.45, 0.0), Vec3::Y, 80.0);
-    let mut buffers = SceneBuffers::new(camera);
-    let wall = buffers.material(Material::diffuse(Rgb::splat(0.8)));
-    let lamp = buffers.material(emitter(0.0, 20.0));
-    buffers.cuboid(Vec3::ZERO, Vec3::new(0.5, 1.0, 1.0), true, wall);
-    buffers.cuboid(Vec3::new(0.501, 0.0, 0.0), Vec3::ONE, true, wall);
-    buffers.square(Vec3::new(0.25, 0.9, 0.5), Vec3::NEG_Y, 0.2, lamp);
+    let buffers = bright_and_dark();
     let image = mapped(&buffers.scene(), 64, 8, |_| ()).image;
     let lit = image.pixels.iter().filter(|pixel| **pixel != [0.0; 3]).count();
     assert_eq!((lit, image.mean()), (0, [0.0; 3]), "the camera is in the dark room");
-    let camera = Camera { eye: Vec3::new(0.48, 0.5, 0.95), ..camera };
+    let camera = Camera { eye: IN_THE_BRIGHT_ROOM, ..buffers.camera };
     let bright = mapped(&Scene { camera, ..buffers.scene() }, 64, 8, |_| ()).image;
     assert!(bright.mean()[1] > 0.1);
 }

@@ -1,9 +1,8 @@
 //! Progressive photon mapping: the energy of photons, its light against that of the path tracer, its bits against
 //! threads and rounds, and what must stay dark.
 
-use core::sync::atomic::AtomicBool;
 use glam::Vec3;
-use halflight::drive::{self, Method, RenderResult, Settings, Stop};
+use halflight::drive::{Method, RenderResult, Settings};
 use halflight::save::Image;
 use halflight_core::bsdf::All;
 use halflight_core::bvh::Bvh;
@@ -14,21 +13,10 @@ use halflight_core::scene::{Camera, Material, Scene, Surface};
 use halflight_core::transport::UNLIMITED;
 use halflight_core::transport::shoot::{Keep, PATHS, ROOM, ShootSettings, Shooter};
 use halflight_core::{Level, Rgb};
-use halflight_tests::scenes::{SceneBuffers, cornell_box, emitter, everything};
-
-fn render(
-    scene: &Scene,
-    method: Method,
-    size: u32,
-    spp: u32,
-    change: impl FnOnce(&mut Settings),
-) -> RenderResult {
-    let stop = Stop { spp: Some(spp), ..Stop::default() };
-    let method = Some(method);
-    let mut settings = Settings { method, width: size, height: size, stop, ..Settings::default() };
-    change(&mut settings);
-    drive::render(scene, &settings, &mut |_| (), &AtomicBool::new(false)).unwrap()
-}
+use halflight_tests::render::render;
+use halflight_tests::scenes::{
+    IN_THE_BRIGHT_ROOM, SceneBuffers, bright_and_dark, cornell_box, emitter, everything, lamp_before,
+};
 
 fn sppm(scene: &Scene, size: u32, spp: u32, change: impl FnOnce(&mut Settings)) -> RenderResult {
     render(scene, Method::ProgressivePhotons, size, spp, change)
@@ -144,17 +132,7 @@ fn every_kind_of_surface_and_light_has_the_light_that_the_path_tracer_finds() {
 
 #[test]
 fn a_caustic_has_its_power() {
-    // A lamp that faces a mirror, which throws its light onto the floor: photons alone find it, but the lamp is so
-    // large that paths do as well.
-    let camera = Camera::look_at(Vec3::new(0.0, 2.5, 3.0), Vec3::new(0.0, 0.0, 0.5), Vec3::Y, 40.0);
-    let mut buffers = SceneBuffers::new(camera);
-    let floor = buffers.material(Material::diffuse(Rgb::splat(0.7)));
-    let mirror = Surface::Mirror { reflectance: Rgb::splat(0.9).into() };
-    let mirror = buffers.material(Material { surface: mirror, ..Material::GREY });
-    let lamp = buffers.material(emitter(0.0, 5.0));
-    buffers.square(Vec3::ZERO, Vec3::Y, 4.0, floor);
-    buffers.square(Vec3::new(0.0, 1.0, -1.0), Vec3::Z, 1.0, mirror);
-    buffers.square(Vec3::new(0.0, 1.0, -0.5), Vec3::NEG_Z, 0.6, lamp);
+    let buffers = lamp_before(Surface::Mirror { reflectance: Rgb::splat(0.9).into() }, 0.6);
     let scene = buffers.scene();
     let path = render(&scene, Method::Path, 64, 2048, |_| ()).image;
     let found = sppm(&scene, 64, 256, |_| ()).image;
@@ -164,18 +142,11 @@ fn a_caustic_has_its_power() {
 
 #[test]
 fn nothing_leaks_through_a_thin_wall() {
-    // A bright room and a dark one, with a wall between them that is as thin as a thousandth.
-    let camera = Camera::look_at(Vec3::new(0.52, 0.5, 0.95), Vec3::new(0.52, 0.45, 0.0), Vec3::Y, 80.0);
-    let mut buffers = SceneBuffers::new(camera);
-    let wall = buffers.material(Material::diffuse(Rgb::splat(0.8)));
-    let lamp = buffers.material(emitter(0.0, 20.0));
-    buffers.cuboid(Vec3::ZERO, Vec3::new(0.5, 1.0, 1.0), true, wall);
-    buffers.cuboid(Vec3::new(0.501, 0.0, 0.0), Vec3::ONE, true, wall);
-    buffers.square(Vec3::new(0.25, 0.9, 0.5), Vec3::NEG_Y, 0.2, lamp);
+    let buffers = bright_and_dark();
     let image = sppm(&buffers.scene(), 64, 8, |_| ()).image;
     let lit = image.pixels.iter().filter(|pixel| **pixel != [0.0; 3]).count();
     assert_eq!((lit, image.mean()), (0, [0.0; 3]), "the camera is in the dark room");
-    let camera = Camera { eye: Vec3::new(0.48, 0.5, 0.95), ..camera };
+    let camera = Camera { eye: IN_THE_BRIGHT_ROOM, ..buffers.camera };
     let bright = sppm(&Scene { camera, ..buffers.scene() }, 64, 8, |_| ()).image;
     assert!(bright.mean()[1] > 0.1);
 }
