@@ -22,15 +22,18 @@ const IN_FRONT: f32 = 0.05;
 const LEAST_FACTOR: f32 = 0.05;
 const GREATEST_FACTOR: f32 = 20.0;
 
-/// Overlap over the cube root of the relative noise, and the most of it: least errors in the Cornell box with 256 and 4096
-/// rays and with 500 to 5000 records.
-const NOISE_TO_OVERLAP: f32 = 5.4;
+/// Overlap over the cube root of the relative noise, and the most of it: least errors in the Cornell box with 4096 rays and
+/// with 500 to 5000 records.
+const NOISE_TO_OVERLAP: f32 = 8.0;
 const MOST_OVERLAP: f32 = 2.5;
 
 /// Of what the Hessian says that extrapolation misses, the part that is missed where several records speak; and the most
 /// of it, for extrapolation is kept within limits.
 const MISSED: f32 = 0.5;
 const MOST_MISSED: f32 = 0.3;
+
+/// The least variance that a record is taken to have, relative: one that knows itself without noise is not alone.
+const LEAST_NOISE: f32 = 1e-6;
 
 /// See the file.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
@@ -56,7 +59,7 @@ pub struct Record {
     pub overlap: f32,
     /// What the fence counts in: the longer radius of the support as it was at first.
     pub reach: f32,
-    /// Mean relative error of extrapolation over the radii, as its metric predicts.
+    /// Mean relative error of extrapolation over the radii, as its metric predicts or its neighbours show.
     pub error: f32,
     /// Share of the strata in which light shines directly.
     pub shining: f32,
@@ -112,11 +115,13 @@ impl Record {
 
     /// Takes note of the variance of E_i by noise, over its square. Where supports may overlap, they do so by what that
     /// asks for: averaging over s radii leaves a noise of σ/s, and extrapolation over them an error that grows with s²,
-    /// so that their sum is least at an s that goes with the cube root of σ.
+    /// so that their sum is least at an s that goes with the cube root of σ. Whose radii are already larger than its
+    /// metric wants, for they are the least that there are, does not overlap.
     pub fn note_noise(&mut self, noise: f32) {
         self.noise = noise;
         if self.allowed > 0.0 {
-            self.overlap = (NOISE_TO_OVERLAP * libm::cbrtf(libm::sqrtf(noise))).clamp(1.0, MOST_OVERLAP);
+            let wanted = (NOISE_TO_OVERLAP * libm::cbrtf(libm::sqrtf(noise))).clamp(1.0, MOST_OVERLAP);
+            self.overlap = if self.radii[0] > self.least { wanted } else { 1.0 };
             self.reach = self.radii[1] * self.overlap;
         }
     }
@@ -190,7 +195,18 @@ impl Record {
             return None;
         }
         let weight = (1.0 - libm::sqrtf(square)) * (cos - least_cos) / (1.0 - least_cos);
-        Some((place.truncate(), weight))
+        Some((place.truncate(), weight * self.trust(square * overlap * overlap)))
+    }
+
+    /// Its variance at the place where it is over that at the square of so many radii, which extrapolation adds to: weights
+    /// that go with it make the best of records that differ. 1 where the metric does not ask neighbours.
+    #[inline]
+    fn trust(&self, square: f32) -> f32 {
+        if self.allowed <= 0.0 {
+            return 1.0;
+        }
+        let (noise, missed) = (self.noise.max(LEAST_NOISE), self.error.min(1.0) * square);
+        noise / (noise + missed * missed)
     }
 
     /// E_i + ∇E_i · Δx + Δxᵀ H Δx / 2 + ∇_n E_i · (n_i × n), within limits.

@@ -174,30 +174,41 @@ impl<'m> IrradianceCache<'m> {
     }
 
     /// What no hemisphere tells, as that a surface comes into sight a step farther, neighbours do: where one says of the
-    /// place of the new record what this did not find, and noise is no excuse, the error is that of a curvature, and the
-    /// radii of both become those of that curvature.
+    /// place of the new record what this did not find, or the new one of its place, and noise is no excuse, the error is
+    /// that of a curvature: the radii of both become those of that curvature, and the one that was wrong counts for less.
     fn compare(&mut self, new: &mut Record) {
         if new.allowed <= 0.0 {
             return;
         }
-        let (position, normal) = (Vec3::from(new.position), Vec3::from(new.normal));
-        let mut shrunk = [(0u32, 0.0f32); MOST_COMPARED];
+        let position = Vec3::from(new.position);
+        let mut found = [(0u32, [0.0f32; 2]); MOST_COMPARED];
         let mut count = 0;
         let (records, least_cos) = (&*self.records, self.least_cos);
-        self.tree.at(position, |index| {
-            if let Some(other) = records.get(index as usize)
-                && let Some((said, _)) = other.at(position, normal, least_cos)
-                && let Some(radius) = new.disagrees(other, said)
-                && let Some(slot) = shrunk.get_mut(count)
+        // What another says of its place, and what it says of that of another.
+        let mut note = |index: u32, curvatures: [f32; 2]| {
+            if curvatures != [0.0; 2]
+                && let Some(slot) = found.get_mut(count)
             {
-                *slot = (index, radius);
+                *slot = (index, curvatures);
                 count += 1;
             }
             count < MOST_COMPARED
+        };
+        let this = *new;
+        self.tree.at(position, |index| {
+            let other = records.get(index as usize);
+            note(index, [0.0, other.map_or(0.0, |other| other.misses(&this, least_cos))])
         });
-        for &(index, radius) in shrunk.iter().take(count) {
+        self.tree.around(position, new.extent().max_element(), |index| {
+            let other = records.get(index as usize);
+            note(index, [other.map_or(0.0, |other| this.misses(other, least_cos)), 0.0]);
+        });
+        for &(index, [of_new, of_other]) in found.iter().take(count) {
+            let radius = radius(new.allowed, of_new.max(of_other));
+            new.learn(of_new);
             new.shrink(radius.max(new.least));
             if let Some(other) = self.records.get_mut(index as usize) {
+                other.learn(of_other);
                 other.shrink(radius.max(other.least));
                 let (position, normal, radius) = (other.position.into(), other.normal.into(), other.radii[0]);
                 self.clamp_around(position, normal, radius);
@@ -244,18 +255,26 @@ impl Record {
         alike.then(|| position.distance(Vec3::from(self.position)))
     }
 
-    /// The radius that both records may have where `other` said that of the place of this one; `None` where nothing is
-    /// against theirs.
-    fn disagrees(&self, other: &Record, said: Rgb) -> Option<f32> {
+    /// The curvature, relative to the irradiance, whose error this record makes at the place of `other`; zero where it makes
+    /// none, or one that noise explains or that the radii of both are made for.
+    fn misses(&self, other: &Record, least_cos: f32) -> f32 {
+        let (place, normal) = (Vec3::from(other.position), Vec3::from(other.normal));
+        let Some((said, _)) = self.at(place, normal, least_cos) else { return 0.0 };
         let (here, there) = (luminance(self.irradiance.into()), luminance(other.irradiance.into()));
-        let square = Vec3::from(self.position).distance_squared(other.position.into());
+        let square = place.distance_squared(self.position.into());
         // The gradient has noise too.
         let noise =
-            here * here * self.noise + there * there * other.noise * (1.0 + STEEP * other.nearness * square);
-        let excess = (here - luminance(said)).abs() - EXCUSED * libm::sqrtf(noise);
+            there * there * other.noise + here * here * self.noise * (1.0 + STEEP * self.nearness * square);
+        let excess = (there - luminance(said)).abs() - EXCUSED * libm::sqrtf(noise);
         let curvature = 2.0 * excess / (square * here.max(there));
-        let found = radius(self.allowed, curvature);
-        (excess > 0.0 && found < self.radii[0].max(other.radii[0])).then_some(found)
+        let shrinks = radius(self.allowed, curvature) < self.radii[0].max(other.radii[0]);
+        if excess > 0.0 && shrinks { curvature } else { 0.0 }
+    }
+
+    /// Takes note of a curvature that its extrapolation missed.
+    fn learn(&mut self, curvature: f32) {
+        let [r1, r2] = self.radii;
+        self.error = self.error.max(curvature * (r1 * r1 + r2 * r2) / 8.0);
     }
 
     /// Makes the support smaller in both directions, so that R1 is not above `radius`.
@@ -264,6 +283,9 @@ impl Record {
         if radius < r1 {
             let share = radius / r1;
             self.radii = [radius, r2 * share];
+            if radius <= self.least {
+                self.overlap = self.overlap.min(1.0);
+            }
             // The mean of a square over the ellipse.
             self.error *= share * share;
         }
