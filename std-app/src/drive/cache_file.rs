@@ -8,7 +8,7 @@ use halflight_core::scene::Scene;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
-const KIND: Kind = Kind { magic: *b"HLCACH", version: 1, name: "cache" };
+const KIND: Kind = Kind { magic: *b"HLCACH", version: 2, name: "cache" };
 
 /// A file that says it has more is damaged.
 const MOST_RECORDS: u32 = 1 << 28;

@@ -15,6 +15,12 @@ const DEPTH: u32 = 16;
 /// A box no larger than a cell touches this many at most.
 const CELLS: usize = 8;
 
+/// Levels that a record may be linked deeper than that where there is memory: points find fewer records in vain.
+const FINER: u32 = 2;
+
+/// The most cells that it is linked from then.
+const MOST_CELLS: usize = 128;
+
 /// Nodes that there is memory for, for each record. Where they run out, records stay higher up: found more often than
 /// they would have to be, never less.
 const NODES_PER_RECORD: usize = 3;
@@ -87,8 +93,14 @@ impl<'m> Octree<'m> {
         scaled.to_array().map(|x| (x as u32).min((1 << DEPTH) - 1))
     }
 
-    /// Links `record`, whose support lies within `extent` of `center`, from all cells that it touches.
-    pub(super) fn insert(&mut self, record: u32, center: Vec3, extent: Vec3) {
+    /// Whether there is memory for the links of another record.
+    pub(super) fn has_room(&self) -> bool {
+        self.links.len() - self.used_links >= CELLS
+    }
+
+    /// Links `record`, whose support lies within `extent` of `center`, from all cells that it touches: such as are larger than
+    /// the box, or a quarter of that where links are left for `others` records more.
+    pub(super) fn insert(&mut self, record: u32, center: Vec3, extent: Vec3, others: usize) {
         let (low, high) = (self.cell(center - extent), self.cell(center + extent));
         // The deepest level at which the box touches no more than two cells along each side.
         let mut level = DEPTH;
@@ -96,17 +108,29 @@ impl<'m> Octree<'m> {
         while level > 0 && (0..3).any(|i| touches(level, i) > 1) {
             level -= 1;
         }
+        let spare = self.links.len().saturating_sub(self.used_links + others.saturating_mul(CELLS));
+        for finer in (level + 1..=DEPTH.min(level + FINER)).rev() {
+            let cells = (0..3).map(|i| touches(finer, i) as usize + 1).product::<usize>();
+            // Of each level the way down has no more nodes than there are cells.
+            if cells <= spare.min(MOST_CELLS)
+                && self.used_nodes + CELLS * level as usize + 2 * cells <= self.nodes.len()
+            {
+                level = finer;
+                break;
+            }
+        }
         // Where nodes may run out on the way down, one link has to do: two on the same way would count twice.
         if self.used_nodes + CELLS * level as usize > self.nodes.len() {
             while level > 0 && (0..3).any(|i| touches(level, i) > 0) {
                 level -= 1;
             }
         }
-        for child in 0..CELLS as u32 {
-            let far = corner(child);
-            if (0..3).all(|i| far[i] <= touches(level, i)) {
-                let cell = [0, 1, 2].map(|i| (low[i] >> (DEPTH - level)) + far[i]);
-                self.insert_at(record, cell, level);
+        let first = [0, 1, 2].map(|i| low[i] >> (DEPTH - level));
+        for z in 0..=touches(level, 2) {
+            for y in 0..=touches(level, 1) {
+                for x in 0..=touches(level, 0) {
+                    self.insert_at(record, [first[0] + x, first[1] + y, first[2] + z], level);
+                }
             }
         }
     }
@@ -249,7 +273,7 @@ mod tests {
         let nodes = nodes.min(tree.nodes.len());
         tree.nodes = &mut core::mem::take(&mut tree.nodes)[..nodes];
         for (i, &(center, extent)) in boxes.iter().enumerate() {
-            tree.insert(i as u32, center, extent);
+            tree.insert(i as u32, center, extent, capacity - 1 - i);
         }
         check(&tree);
     }
@@ -302,7 +326,7 @@ mod tests {
         let bounds = Bounds { min: Vec3::ZERO, max: Vec3::ZERO };
         let mut tree =
             Octree::new(&bounds, 1, &mut Arena::new(bytemuck::cast_slice_mut(&mut lines))).unwrap();
-        tree.insert(0, Vec3::ZERO, Vec3::NAN);
+        tree.insert(0, Vec3::ZERO, Vec3::NAN, 0);
         let mut found = 0;
         tree.at(Vec3::NAN, |_| {
             found += 1;

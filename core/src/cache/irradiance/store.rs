@@ -147,7 +147,12 @@ impl<'m> IrradianceCache<'m> {
         if let Some(slot) = self.records.get_mut(self.used) {
             *slot = record;
         }
-        self.tree.insert(self.used as u32, Vec3::from(record.position), record.extent());
+        if self.used.is_power_of_two() {
+            self.link(2 * self.used);
+        } else if !self.tree.has_room() {
+            self.link(self.capacity());
+        }
+        self.tree.insert(self.used as u32, Vec3::from(record.position), record.extent(), usize::MAX);
         self.used += 1;
         true
     }
@@ -155,10 +160,17 @@ impl<'m> IrradianceCache<'m> {
     /// Links all records anew, by their supports as they are now: what was clamped is found less often. The order in
     /// which a place finds its records, and so the last bit of what they say, then follows from the records alone.
     pub fn settle(&mut self) {
+        self.link(self.used);
+    }
+
+    /// The same, with memory left for so many records in all.
+    fn link(&mut self, expected: usize) {
+        let expected = expected.min(self.capacity());
         let Self { records, used, tree, .. } = self;
         tree.clear();
         for (index, record) in (0..).zip(records.iter().take(*used)) {
-            tree.insert(index, Vec3::from(record.position), record.extent());
+            let others = expected.saturating_sub(index as usize + 1);
+            tree.insert(index, Vec3::from(record.position), record.extent(), others);
         }
     }
 
@@ -186,7 +198,10 @@ impl<'m> IrradianceCache<'m> {
         let (records, least_cos) = (&*self.records, self.least_cos);
         // What another says of its place, and what it says of that of another.
         let mut note = |index: u32, curvatures: [f32; 2]| {
+            // The tree may find one several times.
+            let is_new = !found.iter().take(count).any(|&known| known == (index, curvatures));
             if curvatures != [0.0; 2]
+                && is_new
                 && let Some(slot) = found.get_mut(count)
             {
                 *slot = (index, curvatures);

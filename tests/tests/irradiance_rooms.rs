@@ -1,0 +1,125 @@
+//! Rooms that are hard for an irradiance cache: its pictures against those of the path tracer where a wall is thin, where
+//! nothing reflects, where all light comes from one spot, and where a needle stands in the way.
+
+use core::sync::atomic::AtomicBool;
+use glam::Vec3;
+use halflight::drive::{self, Method, Settings, Stop};
+use halflight::save::Image;
+use halflight_core::Rgb;
+use halflight_core::scene::{Camera, Material, Scene};
+use halflight_tests::scenes::{SceneBuffers, emitter};
+
+const SIZE: usize = 64;
+
+/// Pixels along the side of a block, over which noise is averaged.
+const BLOCK: usize = 4;
+
+fn render(scene: &Scene, method: Method, spp: u32) -> Image {
+    let stop = Stop { spp: Some(spp), ..Stop::default() };
+    let (method, size) = (Some(method), SIZE as u32);
+    let mut settings = Settings { method, width: size, height: size, stop, ..Settings::default() };
+    settings.cache.strata = 16;
+    let result = drive::render(scene, &settings, &mut |_| (), &AtomicBool::new(false)).unwrap();
+    assert_eq!(result.counters.dropped.total(), 0);
+    result.image
+}
+
+/// Means of green over blocks.
+fn blocks(image: &Image) -> Vec<f64> {
+    let side = SIZE / BLOCK;
+    let block = |i: usize| {
+        let (x, y) = (i % side * BLOCK, i / side * BLOCK);
+        let at = |p: usize| image.pixels[(y + p / BLOCK) * SIZE + x + p % BLOCK];
+        (0..BLOCK * BLOCK).map(|p| f64::from(at(p)[1])).sum::<f64>() / (BLOCK * BLOCK) as f64
+    };
+    (0..side * side).map(block).collect()
+}
+
+/// The cache's picture is the path tracer's: in the mean to `mean`, and in no block is the difference above `most` of its
+/// light and of a tenth of the mean.
+#[track_caller]
+fn agrees(scene: &Scene, mean: f64, most: f64) {
+    let (path, cache) = (render(scene, Method::Path, 1024), render(scene, Method::IrradianceCache, 128));
+    let (path, cache) = (blocks(&path), blocks(&cache));
+    let average = |blocks: &[f64]| blocks.iter().sum::<f64>() / blocks.len() as f64;
+    let ratio = average(&cache) / average(&path);
+    let error = |(a, b): (&f64, &f64)| (a - b).abs() / (b + 0.1 * average(&path));
+    let worst = cache.iter().zip(&path).map(error).fold(0.0, f64::max);
+    println!("mean {ratio:.4}, worst block {worst:.3}");
+    assert!((ratio - 1.0).abs() < mean && worst < most, "mean {ratio}, worst block {worst}");
+}
+
+fn diffuse(reflectance: f32) -> Material {
+    Material::diffuse(Rgb::splat(reflectance))
+}
+
+/// A closed room from 0 to 1, seen from a corner.
+fn room(reflectance: f32) -> SceneBuffers {
+    let camera = Camera::look_at(Vec3::new(0.9, 0.8, 0.95), Vec3::new(0.3, 0.25, 0.0), Vec3::Y, 70.0);
+    let mut buffers = SceneBuffers::new(camera);
+    let wall = buffers.material(diffuse(reflectance));
+    buffers.cuboid(Vec3::ZERO, Vec3::ONE, true, wall);
+    buffers
+}
+
+fn lamp(buffers: &mut SceneBuffers, center: Vec3, normal: Vec3, size: f32, radiance: f32) {
+    let lamp = buffers.material(emitter(0.0, radiance));
+    buffers.square(center, normal, size, lamp);
+}
+
+#[test]
+fn nothing_leaks_through_a_thin_wall() {
+    for thickness in [1e-3, 1e-4] {
+        let camera = Camera::look_at(Vec3::new(0.95, 0.5, 0.9), Vec3::new(0.5, 0.3, 0.2), Vec3::Y, 70.0);
+        let mut buffers = SceneBuffers::new(camera);
+        let wall = buffers.material(diffuse(0.8));
+        buffers.cuboid(Vec3::ZERO, Vec3::new(0.5, 1.0, 1.0), true, wall);
+        buffers.cuboid(Vec3::new(0.5 + thickness, 0.0, 0.0), Vec3::ONE, true, wall);
+        lamp(&mut buffers, Vec3::new(0.25, 0.99, 0.5), Vec3::NEG_Y, 0.3, 10.0);
+        let image = render(&buffers.scene(), Method::IrradianceCache, 16);
+        assert!(image.pixels.iter().flatten().all(|&light| light == 0.0));
+    }
+}
+
+/// Light goes over a wall that is one sheet: records of both sides lie in the same place.
+#[test]
+fn a_sheet_between_light_and_dark_has_two_sides() {
+    let mut buffers = room(0.5);
+    let sheet = buffers.material(diffuse(0.5));
+    let corner = |x, y| Vec3::new(x, y, 0.5);
+    buffers.quad([corner(0.0, 0.0), corner(1.0, 0.0), corner(1.0, 0.7), corner(0.0, 0.7)], sheet);
+    lamp(&mut buffers, Vec3::new(0.5, 0.4, 0.02), Vec3::Z, 0.3, 10.0);
+    agrees(&buffers.scene(), 0.02, 0.25);
+}
+
+#[test]
+fn a_black_room_is_black_but_for_what_is_not() {
+    let mut buffers = room(0.0);
+    lamp(&mut buffers, Vec3::new(0.5, 0.99, 0.5), Vec3::NEG_Y, 0.2, 10.0);
+    let image = render(&buffers.scene(), Method::IrradianceCache, 16);
+    assert!(image.pixels.iter().flatten().all(|&light| light == 0.0));
+    // One box that reflects, between black walls.
+    let white = buffers.material(diffuse(0.8));
+    buffers.cuboid(Vec3::new(0.2, 0.0, 0.2), Vec3::new(0.5, 0.3, 0.5), false, white);
+    buffers.cuboid(Vec3::new(0.6, 0.0, 0.1), Vec3::new(0.8, 0.5, 0.3), false, white);
+    agrees(&buffers.scene(), 0.02, 0.25);
+}
+
+/// The spot fills a hundredth of a hemisphere, so few of the 256 rays of a record. Such as fill less than a ray's share
+/// make splotches (docs/decisions/0029).
+#[test]
+fn one_bright_spot_lights_a_room() {
+    let mut buffers = room(0.5);
+    lamp(&mut buffers, Vec3::new(0.1, 0.6, 0.6), Vec3::NEG_X, 0.05, 1e3);
+    agrees(&buffers.scene(), 0.02, 0.25);
+}
+
+#[test]
+fn a_needle_stands_in_the_way() {
+    let mut buffers = room(0.5);
+    let needle = buffers.material(diffuse(0.1));
+    buffers.cuboid(Vec3::new(0.4, 0.0, 0.3), Vec3::new(0.403, 0.9, 0.303), false, needle);
+    buffers.cuboid(Vec3::new(0.2, 0.3, 0.2), Vec3::new(0.8, 0.302, 0.202), false, needle);
+    lamp(&mut buffers, Vec3::new(0.5, 0.99, 0.5), Vec3::NEG_Y, 0.2, 10.0);
+    agrees(&buffers.scene(), 0.02, 0.25);
+}
