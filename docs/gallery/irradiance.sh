@@ -12,14 +12,14 @@ study() {
 box() {
     scene=$1
     shift
-    study "scenes/cornell/$scene.obj" --eye 278,273,-800 --look-at 278,273,279 --fov 37.5 --max-depth 3 --points 1000 "$@"
+    study "scenes/cornell/$scene.obj" --eye 278,273,-800 --look-at 278,273,279 --fov 37.5 --max-depth 3 --points 4000 "$@"
 }
 for part in ${*:-1700 256 500 1000 5000 dark sponza}; do
     case $part in
     1700) box cornell --records 1700 --cache-rays 4096 ;;
     256) box cornell --records 1700 --cache-rays 256 ;;
     500 | 1000) box cornell --records "$part" --cache-rays 4096 ;;
-    5000) box cornell --records 5000 --cache-rays 1024 --metrics bounded-split-sphere,occlusion-hessian,halflight ;;
+    5000) box cornell --records 5000 --cache-rays 4096 --metrics bounded-split-sphere,occlusion-hessian,halflight ;;
     dark) box dark-wall --records 1700 --cache-rays 1024 --metrics bounded-split-sphere,geometric-hessian,occlusion-hessian,halflight ;;
     sponza)
         study "$HALFLIGHT_SCENES/sponza-dabrovic/sponza-dabrovic.obj" --eye -3,1.2,-1.5 --look-at 2.5,1.9,4 --fov 50 \

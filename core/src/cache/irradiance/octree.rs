@@ -1,6 +1,6 @@
 //! An octree over the supports of records: each is linked from the cells that its box touches, at the depth where cells
-//! are just larger than it, so that a point finds all records that reach it on one way down (Ward, Rubinstein and
-//! Clear 1988, §3, with boxes in place of spheres).
+//! are just larger than it, or somewhat smaller where there is memory for more links, so that a point finds all records
+//! that reach it on one way down (Ward, Rubinstein and Clear 1988, §3, with boxes in place of spheres).
 //!
 //! Supports may shrink later, never grow: what the tree finds is then more than what reaches.
 
