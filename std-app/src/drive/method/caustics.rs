@@ -29,7 +29,7 @@ const ALPHA: f64 = 2.0 / 3.0;
 
 /// Light paths of a map for each pixel of the picture and each sample that the map serves, but no fewer and no more
 /// than these.
-const PATHS_PER_SAMPLE: f64 = 1.0;
+const PATHS_PER_SAMPLE: f64 = 0.5;
 const FEWEST_PATHS: usize = 16 * PATHS;
 const MOST_PATHS: usize = 4096 * PATHS;
 
@@ -40,7 +40,7 @@ const MOST_SAMPLES: u32 = 8;
 const LOOK: usize = 32 * PATHS;
 
 /// The share of the picture's light that photons must bring, of what paths find badly, or they are left out.
-const LEAST_SHARE: f64 = 1e-2;
+const LEAST_SHARE: f64 = 3e-2;
 
 /// Whether paths were joined with photons of caustics.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -87,7 +87,8 @@ pub(super) fn with<F: Features, T>(
             let aimed = worth.guide(&plain, &mut arena)?;
             look::<F>(stage, &mut paths, &aimed, 0, &mut worth)?;
             let learned = worth.guide(&plain, &mut arena)?;
-            let share = look::<F>(stage, &mut paths, &learned, 1, &mut worth)?;
+            let found = look::<F>(stage, &mut paths, &learned, 1, &mut worth)?;
+            let share = if found > 0.0 { found / (mean_radiance(stage, &mut paths)? + found) } else { 0.0 };
             paths.caustics.share = Some(share);
             (share >= LEAST_SHARE).then(|| worth.guide(&plain, &mut arena)).transpose()?
         }
@@ -126,7 +127,8 @@ fn shooter<'a, F: Features>(
     (CausticShooter::new((scene, bvh, lights), emission, shot, frame, settings.level), discs)
 }
 
-/// Learns what photons of `emission`, those of map `map`, are worth; returns about what share of the picture's light they bring.
+/// Learns what photons of `emission`, those of map `map`, are worth; returns about what they add to the mean radiance of the
+/// picture.
 fn look<F: Features>(
     stage: &Stage,
     paths: &mut Paths<F>,
@@ -135,7 +137,7 @@ fn look<F: Features>(
     worth: &mut Worth,
 ) -> Result<f64, RenderError> {
     let Stage { settings, workers, .. } = *stage;
-    let Paths { tracer, scratch, .. } = paths;
+    let scratch = &mut paths.scratch;
     let (shooter, _) = shooter::<F>(stage, emission, LOOK, 0);
     let mut finds = vec![Find::default(); LOOK];
     let look = |task: usize, arena: &mut Arena, out: &mut [Find]| shooter.look(task, map, arena, out);
@@ -144,11 +146,15 @@ fn look<F: Features>(
     // Power over the area of a disc, from a surface that reflects half of it evenly.
     let found = finds.iter().map(|find| f64::from(find.worth)).sum::<f64>();
     let pixels = f64::from(settings.width) * f64::from(settings.height);
-    let radiance = 0.5 / core::f64::consts::PI * found * FIRST_RADIUS.powi(2) / pixels;
+    Ok(0.5 / core::f64::consts::PI * found * FIRST_RADIUS.powi(2) / pixels)
+}
+
+/// The mean radiance of the picture, by a few of its tiles.
+fn mean_radiance<F: Features>(stage: &Stage, paths: &mut Paths<F>) -> Result<f64, RenderError> {
+    let Paths { tracer, scratch, .. } = paths;
     let tiles = tracer.pilot_tasks();
-    let means = workers.each(tiles, scratch, |task, arena| tracer.pilot_mean(task, WAVE, arena))?;
-    let mean = means.iter().map(|&mean| f64::from(mean)).sum::<f64>() / means.len().max(1) as f64;
-    Ok(if radiance > 0.0 { radiance / (mean + radiance) } else { 0.0 })
+    let means = stage.workers.each(tiles, scratch, |task, arena| tracer.pilot_mean(task, WAVE, arena))?;
+    Ok(means.iter().map(|&mean| f64::from(mean)).sum::<f64>() / means.len().max(1) as f64)
 }
 
 /// See the file.
