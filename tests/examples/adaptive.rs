@@ -6,7 +6,7 @@
 //! many had more, is printed besides. Processor seconds are read from /proc, with one thread for each render.
 
 use core::sync::atomic::AtomicBool;
-use halflight::drive::{RenderResult, Settings, Stop, render};
+use halflight::drive::{Progress, RenderResult, Settings, Stop, render};
 use halflight::load::{self, LoadOptions};
 use std::path::Path;
 
@@ -65,10 +65,14 @@ fn measure(file: &Path, renders: u32, size: u32, stop: Stop) {
                 threads: Some(1),
                 ..Settings::default()
             };
-            let before = processor_seconds();
+            // Of rendering alone, from the first sample on.
+            let mut before = None;
+            let mut begin = |_: &Progress| {
+                before.get_or_insert_with(processor_seconds);
+            };
             let result: RenderResult =
-                render(&scene, &settings, &mut |_| (), &AtomicBool::new(false)).expect("enough memory");
-            kind.seconds.push(processor_seconds() - before - result.seconds.build);
+                render(&scene, &settings, &mut begin, &AtomicBool::new(false)).expect("enough memory");
+            kind.seconds.push(processor_seconds() - before.unwrap_or_default());
             intervals[index].extend(result.error);
             kind.spp.push(f64::from(result.spp));
             kind.gains.extend(result.adaptive.gain);

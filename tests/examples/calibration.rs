@@ -3,7 +3,7 @@
 //! samples, whose own noise is taken off. Prints the tables of docs/validation.md:
 //!
 //! `cargo run --release -p halflight-tests --example calibration -- [--renders 40] [--size 64] [--error 0.001]
-//! [--spp 4096] [--times 100] [--method path] [--uniform] [SCENE…]`, of our own scenes by name or of any scene file.
+//! [--spp 4096] [--times 100] [--method path] [--adaptive] [SCENE…]`, of our own scenes by name or of any scene file.
 
 use core::sync::atomic::AtomicBool;
 use halflight::drive::{ErrorEstimate, Method, RenderResult, Round, Settings, Stop, render};
@@ -29,8 +29,15 @@ struct Wanted {
 }
 
 fn main() {
-    let mut wanted =
-        Wanted { renders: 40, size: 64, error: 0.001, spp: 4096, times: 100, method: None, adaptive: None };
+    let mut wanted = Wanted {
+        renders: 40,
+        size: 64,
+        error: 0.001,
+        spp: 4096,
+        times: 100,
+        method: None,
+        adaptive: Some(false),
+    };
     let mut scenes = Vec::new();
     let mut arguments = std::env::args().skip(1);
     while let Some(argument) = arguments.next() {
@@ -42,7 +49,7 @@ fn main() {
             "--spp" => wanted.spp = value().parse().expect("a number of samples"),
             "--times" => wanted.times = value().parse().expect("a number of times"),
             "--method" => wanted.method = Some(Method::named(&value()).expect("a method")),
-            "--uniform" => wanted.adaptive = Some(false),
+            "--adaptive" => wanted.adaptive = Some(true),
             scene => scenes.push(scene.to_owned()),
         }
     }

@@ -47,10 +47,10 @@ pub(super) struct Render {
     #[arg(long, value_name = "RELMSE", value_parser = values::positive, help_heading = "When to stop")]
     error: Option<f64>,
 
-    /// Whether pixels get their samples by the noise around them, or all the same number; auto: by the noise where
-    /// path tracing stops by --error, or by --time without --spp
-    #[arg(long, help_heading = "When to stop")]
-    adaptive: Option<When>,
+    /// Whether pixels get their samples by the noise around them, or all the same number; auto: where the noise says that it
+    /// pays
+    #[arg(long, default_value = "off", help_heading = "When to stop")]
+    adaptive: When,
     /// Keep the film in a file while it grows, for --resume and `halflight merge`
     #[arg(long, value_name = "FILE", help_heading = "In parts")]
     checkpoint: Option<PathBuf>,
@@ -114,7 +114,7 @@ impl Render {
             self.shot.settings(&loaded, self.method, &self.options, self.stop(&loaded)?, reference)?;
         let every = self.checkpoint_every.unwrap_or(Checkpoint::EVERY);
         let settings = Settings {
-            adaptive: When::choice(self.adaptive),
+            adaptive: When::choice(Some(self.adaptive)),
             shard: self.shard.unwrap_or(Shard::WHOLE),
             checkpoint: self.checkpoint.clone().map(|path| Checkpoint { path, every }),
             resume: self.resume.clone(),

@@ -95,8 +95,8 @@ pub struct Settings {
     /// What the picture should be, of the same size: each round is compared with it, and the time that this
     /// takes does not count.
     pub reference: Option<Arc<Image>>,
-    /// Whether pixels get their samples by the noise around them; all the same otherwise. `None`: where that pays in
-    /// path tracing that is to stop by its error, or by time and not by samples. Not with shards.
+    /// Whether pixels get their samples by the noise around them; all the same otherwise. `None`: where the noise
+    /// tells that it pays. Not with shards.
     pub adaptive: Option<bool>,
     /// The share of the work that goes into an audit of the picture, between 0, no audit, and 1. `None`: a twentieth
     /// where the method is biased. Not with shards.
@@ -131,11 +131,9 @@ impl Checkpoint {
 }
 
 impl Settings {
-    /// Whether a picture by `method` may be sampled adaptively.
-    fn may_adapt(&self, method: Method) -> bool {
-        let Stop { spp, seconds, error } = self.stop;
-        let is_free = || error.is_some() || (seconds.is_some() && spp.is_none());
-        self.shard == Shard::WHOLE && self.adaptive.unwrap_or_else(|| method == Method::Path && is_free())
+    /// Whether the picture may be sampled adaptively.
+    fn may_adapt(&self) -> bool {
+        self.shard == Shard::WHOLE && self.adaptive != Some(false)
     }
 }
 
@@ -158,7 +156,7 @@ impl Default for Settings {
             level: Level::detect(),
             stop: Stop::default(),
             reference: None,
-            adaptive: None,
+            adaptive: Some(false),
             audit: None,
             shard: Shard::WHOLE,
             checkpoint: None,

@@ -98,14 +98,15 @@ impl Picture<'_> {
                 error = tiles.as_ref().and_then(|tiles| regions::estimate(tiles, width, shares));
                 estimate += start.elapsed().as_secs_f64();
                 let audited = error.and_then(|noise| audit.as_ref()?.verdict(workers, &canvas.film, noise));
-                if settings.may_adapt(method) && rounds.spp() >= adapt::FROM {
+                // Once only: noise that is told later would know who asked for it.
+                let is_even = canvas.weights.is_none();
+                if is_even && settings.may_adapt() && rounds.spp() >= adapt::FROM {
                     let noise = workers.noise(&canvas.film);
                     let spread = noise.map(|noise| Spread::of(&noise, &adapt::costs(&canvas, width), width));
                     gain = spread.as_ref().map(|spread| spread.gain);
-                    let is_asked = settings.adaptive == Some(true) || canvas.weights.is_some();
-                    if let Some(spread) = spread.filter(|spread| is_asked || spread.gain >= adapt::PAYS) {
-                        canvas.weights = Some(spread.weights);
-                    }
+                    let is_asked = settings.adaptive == Some(true);
+                    let pays = |spread: &Spread| is_asked || spread.gain >= adapt::PAYS;
+                    canvas.weights = spread.filter(pays).map(|spread| spread.weights);
                 }
                 error = audited.as_ref().map(|audited| audited.total).or(error);
                 is_lost =
