@@ -1,12 +1,12 @@
 //! Rooms that are hard for an irradiance cache: its pictures against those of the path tracer where a wall is thin, where
 //! nothing reflects, where all light comes from one spot, and where a needle stands in the way.
 
-use core::sync::atomic::AtomicBool;
 use glam::Vec3;
-use halflight::drive::{self, Method, Settings, Stop};
+use halflight::drive::Method;
 use halflight::save::Image;
 use halflight_core::Rgb;
 use halflight_core::scene::{Camera, Material, Scene};
+use halflight_tests::render::render;
 use halflight_tests::scenes::{SceneBuffers, emitter};
 
 const SIZE: usize = 64;
@@ -14,12 +14,8 @@ const SIZE: usize = 64;
 /// Pixels along the side of a block, over which noise is averaged.
 const BLOCK: usize = 4;
 
-fn render(scene: &Scene, method: Method, spp: u32) -> Image {
-    let stop = Stop { spp: Some(spp), ..Stop::default() };
-    let (method, size) = (Some(method), SIZE as u32);
-    let mut settings = Settings { method, width: size, height: size, stop, ..Settings::default() };
-    settings.cache.strata = 16;
-    let result = drive::render(scene, &settings, &mut |_| (), &AtomicBool::new(false)).unwrap();
+fn picture(scene: &Scene, method: Method, spp: u32) -> Image {
+    let result = render(scene, method, SIZE as u32, spp, |settings| settings.cache.strata = 16);
     assert_eq!(result.counters.dropped.total(), 0);
     result.image
 }
@@ -39,7 +35,7 @@ fn blocks(image: &Image) -> Vec<f64> {
 /// light and of a tenth of the mean.
 #[track_caller]
 fn agrees(scene: &Scene, mean: f64, most: f64) {
-    let (path, cache) = (render(scene, Method::Path, 1024), render(scene, Method::IrradianceCache, 128));
+    let (path, cache) = (picture(scene, Method::Path, 1024), picture(scene, Method::IrradianceCache, 128));
     let (path, cache) = (blocks(&path), blocks(&cache));
     let average = |blocks: &[f64]| blocks.iter().sum::<f64>() / blocks.len() as f64;
     let ratio = average(&cache) / average(&path);
@@ -76,7 +72,7 @@ fn nothing_leaks_through_a_thin_wall() {
         buffers.cuboid(Vec3::ZERO, Vec3::new(0.5, 1.0, 1.0), true, wall);
         buffers.cuboid(Vec3::new(0.5 + thickness, 0.0, 0.0), Vec3::ONE, true, wall);
         lamp(&mut buffers, Vec3::new(0.25, 0.99, 0.5), Vec3::NEG_Y, 0.3, 10.0);
-        let image = render(&buffers.scene(), Method::IrradianceCache, 16);
+        let image = picture(&buffers.scene(), Method::IrradianceCache, 16);
         assert!(image.pixels.iter().flatten().all(|&light| light == 0.0));
     }
 }
@@ -96,7 +92,7 @@ fn a_sheet_between_light_and_dark_has_two_sides() {
 fn a_black_room_is_black_but_for_what_is_not() {
     let mut buffers = room(0.0);
     lamp(&mut buffers, Vec3::new(0.5, 0.99, 0.5), Vec3::NEG_Y, 0.2, 10.0);
-    let image = render(&buffers.scene(), Method::IrradianceCache, 16);
+    let image = picture(&buffers.scene(), Method::IrradianceCache, 16);
     assert!(image.pixels.iter().flatten().all(|&light| light == 0.0));
     // One box that reflects, between black walls.
     let white = buffers.material(diffuse(0.8));
