@@ -102,7 +102,7 @@ fn a_black_room_is_black_but_for_what_is_not() {
 }
 
 /// The spot fills a hundredth of a hemisphere, so few of the 256 rays of a record. Such as fill less than a ray's share
-/// make splotches (docs/decisions/0029).
+/// make splotches (docs/decisions/0025).
 #[test]
 fn one_bright_spot_lights_a_room() {
     let mut buffers = room(0.5);

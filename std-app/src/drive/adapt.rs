@@ -2,7 +2,7 @@
 //!
 //! The error of a picture falls fastest where samples are in proportion to the root of noise over cost. How many a group
 //! of pixels gets is told by the other groups of its block of 8 x 8 pixels and, less, by the blocks around it; its cost by
-//! the tiles around: by samples that are independent of its own, which would bias it (docs/decisions/0026).
+//! the tiles around: by samples that are independent of its own, which would bias it (docs/decisions/0024).
 
 use super::canvas::Canvas;
 use core::ops::Range;
