@@ -1,7 +1,9 @@
-//! Pictures by the renderer itself, with the settings that a test is about.
+//! Pictures by the renderer itself, with the settings that a test is about, and how far two of them are apart.
 
+use crate::statistics;
 use core::sync::atomic::AtomicBool;
 use halflight::drive::{self, Method, RenderResult, Settings, Stop};
+use halflight::save::Image;
 use halflight_core::scene::Scene;
 
 /// A square picture of `size` pixels across by `spp` samples, not audited; `change` has the last word on its settings.
@@ -20,4 +22,18 @@ pub fn render(
     let mut settings = Settings { method, width: size, height: size, stop, audit, ..Settings::default() };
     change(&mut settings);
     drive::render(scene, &settings, &mut |_| (), &AtomicBool::new(false)).expect("it can be rendered")
+}
+
+/// Means of green over blocks of 4 × 4 pixels: what is left of noise is a quarter.
+pub fn blocks(image: &Image) -> Vec<f64> {
+    const SIDE: u32 = 4;
+    let sums = statistics::blocks(&image.pixels, image.width, SIDE);
+    sums.chunks_exact(3).map(|sum| sum[1] / f64::from(SIDE * SIDE)).collect()
+}
+
+/// Root of the mean squared difference of blocks over their mean in `b`.
+pub fn difference(a: &Image, b: &Image) -> f64 {
+    let (a, b) = (blocks(a), blocks(b));
+    let squares: f64 = a.iter().zip(&b).map(|(a, b)| (a - b).powi(2)).sum();
+    (squares / b.len() as f64).sqrt() / (b.iter().sum::<f64>() / b.len() as f64)
 }

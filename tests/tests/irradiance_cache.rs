@@ -3,9 +3,8 @@
 
 use glam::Vec3;
 use halflight::drive::{CacheUse, Mark, Method, RenderResult, Settings};
-use halflight::save::Image;
 use halflight_core::scene::Scene;
-use halflight_tests::render::render;
+use halflight_tests::render::{blocks, difference, render};
 use halflight_tests::scenes::{SceneBuffers, cornell_box, emitter, everything};
 
 /// Rays of a record are 16² in these tests: one percent of noise in each record, at worst.
@@ -20,25 +19,6 @@ fn cached(scene: &Scene, size: u32, spp: u32, change: impl FnOnce(&mut Settings)
 
 fn cache(result: &RenderResult) -> CacheUse {
     CacheUse { seconds: 0.0, ..result.cache.unwrap() }
-}
-
-/// Mean over 4 × 4 pixels: what is left of noise is a quarter.
-fn blocks(image: &Image) -> Vec<[f32; 3]> {
-    let side = image.width as usize / 4;
-    let block = |i: usize| {
-        let (x, y) = (i % side * 4, i / side * 4);
-        let pixels = (0..16).map(|p| image.pixels[(y + p / 4) * image.width as usize + x + p % 4]);
-        pixels.fold([0.0; 3], |sum, p| [0, 1, 2].map(|c| sum[c] + p[c] / 16.0))
-    };
-    (0..side * side).map(block).collect()
-}
-
-/// Root of the mean squared difference of blocks over the mean.
-fn difference(a: &Image, b: &Image) -> f64 {
-    let (a, b) = (blocks(a), blocks(b));
-    let squares: f64 = a.iter().zip(&b).map(|(a, b)| f64::from((a[1] - b[1]).powi(2))).sum();
-    let mean: f64 = b.iter().map(|b| f64::from(b[1])).sum::<f64>() / b.len() as f64;
-    (squares / b.len() as f64).sqrt() / mean
 }
 
 #[test]
@@ -71,7 +51,7 @@ fn in_a_furnace_all_is_one_light() {
     let image = cached(&buffers.scene(), 32, 64, |_| ()).image;
     assert!(image.mean().into_iter().all(|mean| (mean / 2.0 - 1.0).abs() < 0.005), "{:?}", image.mean());
     // Errors of a record are shared by many pixels: 16² rays whose last bounces come and go.
-    assert!(blocks(&image).into_iter().all(|block| (block[1] / 2.0 - 1.0).abs() < 0.05));
+    assert!(blocks(&image).into_iter().all(|block| (block / 2.0 - 1.0).abs() < 0.05));
 }
 
 #[test]

@@ -6,29 +6,15 @@ use halflight::drive::Method;
 use halflight::save::Image;
 use halflight_core::Rgb;
 use halflight_core::scene::{Camera, Material, Scene};
-use halflight_tests::render::render;
+use halflight_tests::render::{blocks, render};
 use halflight_tests::scenes::{SceneBuffers, emitter};
 
-const SIZE: usize = 64;
-
-/// Pixels along the side of a block, over which noise is averaged.
-const BLOCK: usize = 4;
+const SIZE: u32 = 64;
 
 fn picture(scene: &Scene, method: Method, spp: u32) -> Image {
-    let result = render(scene, method, SIZE as u32, spp, |settings| settings.cache.strata = 16);
+    let result = render(scene, method, SIZE, spp, |settings| settings.cache.strata = 16);
     assert_eq!(result.counters.dropped.total(), 0);
     result.image
-}
-
-/// Means of green over blocks.
-fn blocks(image: &Image) -> Vec<f64> {
-    let side = SIZE / BLOCK;
-    let block = |i: usize| {
-        let (x, y) = (i % side * BLOCK, i / side * BLOCK);
-        let at = |p: usize| image.pixels[(y + p / BLOCK) * SIZE + x + p % BLOCK];
-        (0..BLOCK * BLOCK).map(|p| f64::from(at(p)[1])).sum::<f64>() / (BLOCK * BLOCK) as f64
-    };
-    (0..side * side).map(block).collect()
 }
 
 /// The cache's picture is the path tracer's: in the mean to `mean`, and in no block is the difference above `most` of its

@@ -13,7 +13,7 @@ use halflight_core::scene::{Camera, Material, Scene, Surface};
 use halflight_core::transport::UNLIMITED;
 use halflight_core::transport::shoot::{Keep, PATHS, ROOM, ShootSettings, Shooter};
 use halflight_core::{Level, Rgb};
-use halflight_tests::render::render;
+use halflight_tests::render::{difference, render};
 use halflight_tests::scenes::{
     IN_THE_BRIGHT_ROOM, SceneBuffers, bright_and_dark, cornell_box, emitter, everything, lamp_before,
 };
@@ -77,24 +77,6 @@ fn photons_carry_the_power_that_surfaces_reflect() {
         assert!(ratio < 1.01 && ratio > 0.99 - lost, "{reflectance}: {ratio}");
         assert!(photons.len() < 64 * ROOM * 4 / 5, "there is room left: {}", photons.len());
     }
-}
-
-/// Mean over 4 × 4 pixels.
-fn blocks(image: &Image) -> Vec<f64> {
-    let side = image.width as usize / 4;
-    let block = |i: usize| {
-        let (x, y) = (i % side * 4, i / side * 4);
-        let pixels = (0..16).map(|p| image.pixels[(y + p / 4) * image.width as usize + x + p % 4]);
-        pixels.map(|pixel| f64::from(pixel[1]) / 16.0).sum()
-    };
-    (0..side * side).map(block).collect()
-}
-
-/// Root of the mean squared difference of blocks over the mean.
-fn difference(a: &Image, b: &Image) -> f64 {
-    let (a, b) = (blocks(a), blocks(b));
-    let squares: f64 = a.iter().zip(&b).map(|(a, b)| (a - b).powi(2)).sum();
-    (squares / b.len() as f64).sqrt() / (b.iter().sum::<f64>() / b.len() as f64)
 }
 
 fn assert_means(a: &Image, b: &Image, tolerance: f64) {

@@ -164,11 +164,11 @@ impl<'a, F: Features> PathTracer<'a, F> {
         out: &mut [Pixel],
     ) -> Result<Counters, OutOfMemory> {
         let mut arena = scratch.scratch();
-        // No larger than there are paths: the memory of a wave is cleared.
         let samples = samples.into();
+        // No larger than there are paths: the memory of a wave is cleared.
         let paths = samples.count().saturating_mul(GROUP as u64);
-        let wave = usize::try_from(paths).map_or(wave, |paths| wave.min(paths));
-        let mut wave = Wave::new(wave, &mut arena)?;
+        let most = usize::try_from(paths).unwrap_or(usize::MAX);
+        let mut wave = Wave::new(wave.min(most), &mut arena)?;
         let tile = Tile::new(self.settings.width, self.settings.height, task);
         let mut counters = Counters::default();
         let mut places = Places::new(tile, samples);

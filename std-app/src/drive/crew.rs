@@ -207,7 +207,7 @@ mod tests {
                     pixel.add(sample, Rgb::splat(light), &mut Dropped::default());
                 }
             }
-            Ok(Counters { paths: samples.count() / 16, ..Counters::default() })
+            Ok(Counters { paths: samples.count() / GROUPS as u64, ..Counters::default() })
         };
         let at_once = crew(3, 7, false, |crew, scratch| {
             crew.tiles(u32::MAX, scratch, &tile).unwrap();

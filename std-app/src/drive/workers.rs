@@ -73,14 +73,24 @@ impl Workers {
         tracer: &PathTracer<F>,
         scratch: &mut [Vec<Line>],
     ) -> Result<Pilot, OutOfMemory> {
-        let tasks = || tracer.pilot_tasks();
-        let means = self.each(tasks(), scratch, |task, arena| tracer.pilot_mean(task, WAVE, arena))?;
-        let mean = means.iter().sum::<f32>() / means.len().max(1) as f32;
+        let mean = self.pilot_mean(tracer, scratch)?;
+        let tasks = tracer.pilot_tasks();
         let mut pilot = Pilot::default();
-        for tile in self.each(tasks(), scratch, |task, arena| tracer.pilot(task, mean, WAVE, arena))? {
+        for tile in self.each(tasks, scratch, |task, arena| tracer.pilot(task, mean, WAVE, arena))? {
             pilot += tile;
         }
         Ok(pilot)
+    }
+
+    /// The mean radiance of the picture, by a look at the same tiles.
+    pub(super) fn pilot_mean<F: Features>(
+        &self,
+        tracer: &PathTracer<F>,
+        scratch: &mut [Vec<Line>],
+    ) -> Result<f32, OutOfMemory> {
+        let tasks = tracer.pilot_tasks();
+        let means = self.each(tasks, scratch, |task, arena| tracer.pilot_mean(task, WAVE, arena))?;
+        Ok(means.iter().sum::<f32>() / means.len().max(1) as f32)
     }
 
     /// Builds the map over the first `count` of `photons` on all cores.

@@ -88,7 +88,11 @@ pub(super) fn with<F: Features, T>(
             look::<F>(stage, &mut paths, &aimed, 0, &mut worth)?;
             let learned = worth.guide(&plain, &mut arena)?;
             let found = look::<F>(stage, &mut paths, &learned, 1, &mut worth)?;
-            let share = if found > 0.0 { found / (mean_radiance(stage, &mut paths)? + found) } else { 0.0 };
+            let mut share = 0.0;
+            if found > 0.0 {
+                let mean = stage.workers.pilot_mean(&paths.tracer, &mut paths.scratch)?;
+                share = found / (f64::from(mean) + found);
+            }
             paths.caustics.share = Some(share);
             (share >= LEAST_SHARE).then(|| worth.guide(&plain, &mut arena)).transpose()?
         }
@@ -147,14 +151,6 @@ fn look<F: Features>(
     let found = finds.iter().map(|find| f64::from(find.worth)).sum::<f64>();
     let pixels = f64::from(settings.width) * f64::from(settings.height);
     Ok(0.5 / core::f64::consts::PI * found * FIRST_RADIUS.powi(2) / pixels)
-}
-
-/// The mean radiance of the picture, by a few of its tiles.
-fn mean_radiance<F: Features>(stage: &Stage, paths: &mut Paths<F>) -> Result<f64, RenderError> {
-    let Paths { tracer, scratch, .. } = paths;
-    let tiles = tracer.pilot_tasks();
-    let means = stage.workers.each(tiles, scratch, |task, arena| tracer.pilot_mean(task, WAVE, arena))?;
-    Ok(means.iter().map(|&mean| f64::from(mean)).sum::<f64>() / means.len().max(1) as f64)
 }
 
 /// See the file.
