@@ -28,6 +28,12 @@ impl Tile {
         Self { left: (index % across) as u32 * TILE, top: (index / across) as u32 * TILE, width, height }
     }
 
+    /// Column and row of its first pixel.
+    #[inline]
+    pub const fn corner(&self) -> [u32; 2] {
+        [self.left, self.top]
+    }
+
     /// Column and row of the `i`th pixel, counted from the upper left of its tile.
     #[inline]
     pub const fn place(i: usize) -> (u32, u32) {

@@ -120,6 +120,20 @@ impl Emitter {
         [o, o + u, o + v, o + u + v].into_iter().take(count)
     }
 
+    /// Its edges, one after the other.
+    pub(super) fn border(&self) -> impl Iterator<Item = [Vec3; 2]> + use<> {
+        let [o, u, v] = [self.origin, self.edges[0], self.edges[1]].map(Vec3::from);
+        let (last, count) = if self.is_pair() { (o + u + v, 4) } else { (o + v, 3) };
+        [[o, o + u], [o + u, last], [last, if count == 4 { o + v } else { o }], [o + v, o]]
+            .into_iter()
+            .take(count)
+    }
+
+    /// Whether any of its light goes towards `eye`.
+    pub(super) fn faces(&self, eye: Vec3) -> bool {
+        self.is_two_sided() || (eye - Vec3::from(self.origin)).dot(self.normal.into()) > 0.0
+    }
+
     pub(super) fn cone(&self) -> Cone {
         if self.is_two_sided() { Cone::ALL } else { Cone { axis: self.normal, cos: 1.0 } }
     }

@@ -297,6 +297,12 @@ impl<'m> Lights<'m> {
         (triangle - emitter.triangle <= u32::from(emitter.is_pair())).then_some((index, emitter))
     }
 
+    /// The borders of all emitters that shine towards `eye`; nothing where there are more than `most` emitters.
+    pub(crate) fn borders(&self, eye: Vec3, most: usize) -> impl Iterator<Item = [Vec3; 2]> {
+        let few = if self.emitters.len() <= most { self.emitters } else { &[] };
+        few.iter().filter(move |emitter| emitter.faces(eye)).flat_map(Emitter::border)
+    }
+
     /// A triangle of emitter `light`.
     pub(crate) fn triangle_of(&self, light: u32) -> Option<u32> {
         self.emitters.get(light as usize).map(|emitter| emitter.triangle)

@@ -66,6 +66,9 @@ pub(super) mod dimension {
     /// How probes for walls are turned at the vertex at the end of the `n`th segment: `PROBES + n`.
     pub(in crate::transport) const PROBES: u32 = 1 << 30;
 
+    /// Where in the pixel the rays are that look at lamps alone.
+    pub(in crate::transport) const OUTLINE: u32 = 1 << 29;
+
     // At every vertex, from `vertex(n)` on:
     /// Where on the light.
     pub(in crate::transport) const LIGHT: u32 = 0;

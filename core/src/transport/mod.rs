@@ -12,6 +12,7 @@ mod flight;
 pub mod gather;
 pub mod maps;
 mod merge;
+mod outline;
 mod outlook;
 pub mod overture;
 pub mod path;

@@ -10,7 +10,8 @@
 //! 5. Where that pays, pixels of a group share what their paths find (`reuse.rs`).
 //! 6. Where an irradiance cache knows the indirect light of a diffuse point, the path need not find it
 //!    (`irradiance_cache.rs`); nor where photons tell it (`density.rs`, `maps.rs`).
-//! 7. Where photons of caustics lie, paths and photons share the light that both find (`merge.rs`).
+//! 7. Pixels at the border of a lamp look at it with rays of their own (`outline.rs`).
+//! 8. Where photons of caustics lie, paths and photons share the light that both find (`merge.rs`).
 //!
 //! The price: about 300 bytes for each path of a wave. What a pixel sees depends on (seed, sample) and the pixels of
 //! its group only, no wave cuts a group, and samples are summed in their order: the picture has the same bits for
@@ -22,6 +23,7 @@ use super::estimator::{
 };
 use super::maps::{PhotonMaps, Said};
 use super::merge::{ChainLink, Merging, ends_chain};
+use super::outline::outlined;
 use super::places::Places;
 use super::reuse::Exchange;
 use super::shadow::{FEW, pass_cutout, passing, shadow_ray};
@@ -172,6 +174,7 @@ impl<'a, F: Features> PathTracer<'a, F> {
         let tile = Tile::new(self.settings.width, self.settings.height, task);
         let mut counters = Counters::default();
         let mut places = Places::new(tile, samples);
+        places.outlined = outlined(self.scene, self.lights, &self.settings, tile);
         loop {
             let count = self.start(&mut places, &mut wave);
             if count == 0 {
@@ -182,9 +185,11 @@ impl<'a, F: Features> PathTracer<'a, F> {
             if self.settings.reuse {
                 self.share(&mut wave, count, &mut counters);
             }
-            for (path, exchange) in wave.paths.iter().zip(&*wave.exchanges).take(count) {
+            let has_lamps = self.look_at_lamps(places.outlined, &mut wave, count, &mut counters);
+            for (i, (path, exchange)) in wave.paths.iter().zip(&*wave.exchanges).take(count).enumerate() {
                 if let Some(pixel) = out.get_mut(path.place as usize) {
-                    pixel.add(path.sample, exchange.seen(path), &mut counters.dropped);
+                    let lamps = if has_lamps { Rgb::from(wave.shadow_light[i]) } else { Rgb::ZERO };
+                    pixel.add(path.sample, exchange.seen(path) + lamps, &mut counters.dropped);
                 }
             }
         }
@@ -209,6 +214,7 @@ impl<'a, F: Features> PathTracer<'a, F> {
                     place: place as u32,
                     sample: group.sample,
                     segments: 1,
+                    share: if places.outlined.contains(place) { Share::BESIDE_LAMP } else { Share::ALL },
                     triangle: crate::geometry::MISS,
                     eta_squared: 1.0,
                     ..Path::default()
@@ -418,7 +424,7 @@ impl<'a, F: Features> PathTracer<'a, F> {
         if hit.triangle == path.triangle || (segments == 1 && point.is_left_by(ray)) {
             return path.cross(point.spawn(direction), hit, counters);
         }
-        if point.material.emits() && path.share.sees_emitters() {
+        if point.material.emits() && path.share.sees_lamps() {
             let radiance = emitted(scene, hit.triangle, point.uv, point.front);
             if radiance != Rgb::ZERO {
                 let mut weight = 1.0;

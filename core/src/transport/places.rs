@@ -1,6 +1,7 @@
 //! In which order the samples of a tile are taken, and which of them share: layer after layer, one sample of each
 //! pixel of each group that is to have any more.
 
+use super::outline::Outlined;
 use crate::film::{GROUP, GROUPS, Samples, Tile};
 
 /// Pixels that share, one sample of each.
@@ -22,11 +23,13 @@ pub(super) struct Places {
     tile: Tile,
     left: Samples,
     index: usize,
+    /// Pixels whose paths leave the lamp that they see to others.
+    pub(super) outlined: Outlined,
 }
 
 impl Places {
     pub(super) fn new(tile: Tile, samples: Samples) -> Self {
-        Self { tile, left: samples, index: 0 }
+        Self { tile, left: samples, index: 0, outlined: Outlined::default() }
     }
 
     pub(super) fn next_group(&mut self) -> Option<Group> {

@@ -2,9 +2,11 @@
 //! against, and it says in order what that does in pieces.
 
 use super::estimator::{MAX_CROSSINGS, MAX_VERTICES, PathSettings, dimension, power_heuristic, survival};
+use super::outline::{self, outlined};
 use super::shadow::{passing, shadow_ray};
 use crate::bsdf::{All, Bsdf};
 use crate::bvh::Bvh;
+use crate::film::{TILE, Tile};
 use crate::geometry::MISS;
 use crate::light::{Lights, emitted};
 use crate::sampling::Sampler;
@@ -26,6 +28,11 @@ pub fn radiance(
     let [dx, dy] = sampler.pair(dimension::PIXEL);
     let lens = sampler.pair(dimension::LENS);
     let mut ray = scene.camera.ray(width, height, x as f32 + dx, y as f32 + dy, lens);
+
+    // The border of a lamp is looked at by other rays.
+    let tile = Tile::new(width, height, (y / TILE * width.div_ceil(TILE) + x / TILE) as usize);
+    let is_outlined =
+        outlined(scene, lights, settings, tile).contains(Tile::position(TILE, x % TILE, y % TILE));
 
     let mut radiance = Rgb::ZERO; // L
     let mut throughput = Rgb::ONE; // β
@@ -56,7 +63,7 @@ pub fn radiance(
 
         // Light from the surface itself.
         let seen = emitted(scene, hit.triangle, point.uv, point.front);
-        if seen != Rgb::ZERO && !met_again {
+        if seen != Rgb::ZERO && !met_again && !(is_outlined && segments == 1) {
             let distance = from.distance(point.position);
             let light_pdf = lights.pdf_hit(scene, from, from_normal, hit.triangle, distance, direction);
             let weight = if pdf == f32::INFINITY { 1.0 } else { power_heuristic(pdf, light_pdf) };
@@ -126,5 +133,12 @@ pub fn radiance(
         ray = point.spawn(direction);
         segments += 1;
     }
-    radiance
+    let mut lamps = Rgb::ZERO;
+    if is_outlined {
+        for ray in outline::rays(scene, settings, [x, y], sample) {
+            let hit = bvh.nearest(Level::BASELINE, &ray);
+            lamps += outline::emission::<All>(scene, bvh, Level::BASELINE, ray, hit);
+        }
+    }
+    radiance + lamps
 }

@@ -62,6 +62,8 @@ impl Share {
     pub(super) const BEHIND_MIRROR: Share = Share(5);
     /// With photon maps: all light, but the next surface with a diffuse part may end the path.
     pub(super) const GATHERED: Share = Share(6);
+    /// All light but that of the lamp which a camera ray meets: its pixel has that from rays of their own.
+    pub(super) const BESIDE_LAMP: Share = Share(7);
 
     /// Whether what `bsdf` reflects or transmits belongs to the other share.
     #[inline]
@@ -78,6 +80,12 @@ impl Share {
     #[inline]
     pub(super) fn sees_emitters(self) -> bool {
         self != Self::REFLECTED && self != Self::BEHIND_MIRROR
+    }
+
+    /// The same of surfaces that emit.
+    #[inline]
+    pub(super) fn sees_lamps(self) -> bool {
+        self.sees_emitters() && self != Self::BESIDE_LAMP
     }
 
     /// Whether the path may end in a map of photons.

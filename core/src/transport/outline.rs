@@ -1,0 +1,228 @@
+//! Pixels that see the border of a lamp. A lamp that fills a hundredth of a pixel is met by few samples, and is then all
+//! that the pixel shows: a row of such pixels has most of the error of a picture, and hides it from estimates. So what they
+//! see of the lamp itself comes from many camera rays for each sample, which ask for nothing but emission; the path of
+//! the sample sees all else.
+//!
+//! Which pixels these are follows from the camera and the corners of the lamps alone, so that nothing is biased.
+
+use super::estimator::{Counters, MAX_CROSSINGS, PathSettings, dimension};
+use super::path::PathTracer;
+use super::wave::Wave;
+use crate::bsdf::Features;
+use crate::bvh::{Bvh, Coherence};
+use crate::film::{PIXELS_PER_TILE, TILE, Tile};
+use crate::geometry::{Hit, MISS, Ray};
+use crate::light::{Lights, emitted};
+use crate::sampling::Sampler;
+use crate::scene::{Material, Scene, SurfacePoint};
+use crate::{Level, Rgb};
+use glam::{Vec2, Vec3};
+
+/// Camera rays for each sample, a power of two: their places in the pixel stay a net. They take about as long as two
+/// samples, in a pixel of a hundred.
+const RAYS: u32 = 32;
+
+/// Where lamps are more than this the light of one is little, and to look at all borders would take its time.
+const MOST_LAMPS: usize = 64;
+
+/// Borders count as seen from so many pixels away: more than rounding.
+const MARGIN: f32 = 0.01;
+
+/// A border that begins behind the camera is seen from this share of its greatest depth on.
+const NEAR: f32 = 1e-3;
+
+/// Pixels of a tile, a bit for each.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct Outlined([u64; PIXELS_PER_TILE / 64]);
+
+impl Outlined {
+    pub(super) fn contains(&self, place: usize) -> bool {
+        self.0.get(place / 64).is_some_and(|word| word >> (place % 64) & 1 == 1)
+    }
+
+    /// Adds the pixels that the segment from `a` to `b` passes through, in raster coordinates from the tile's corner.
+    fn add(&mut self, a: Vec2, b: Vec2) {
+        let (a, b) = if a.y <= b.y { (a, b) } else { (b, a) };
+        let side = TILE as f32;
+        let (low, high) = (a.min(b) - MARGIN, a.max(b) + MARGIN);
+        if !(low.x < side && high.x >= 0.0 && low.y < side && high.y >= 0.0) {
+            return;
+        }
+        let slope = if b.y > a.y { (b.x - a.x) / (b.y - a.y) } else { 0.0 };
+        let at =
+            |y: f32| if slope == 0.0 { [a.x, b.x] } else { [a.x + slope * (y.clamp(a.y, b.y) - a.y); 2] };
+        // Casts saturate.
+        for y in low.y.max(0.0) as u32..=(high.y as u32).min(TILE - 1) {
+            let ([p, q], [r, s]) = (at(y as f32 - MARGIN), at(y as f32 + 1.0 + MARGIN));
+            let (left, right) = (p.min(q).min(r.min(s)) - MARGIN, p.max(q).max(r.max(s)) + MARGIN);
+            if right < 0.0 {
+                continue;
+            }
+            for x in left.max(0.0) as u32..=(right as u32).min(TILE - 1) {
+                let place = Tile::position(TILE, x, y);
+                self.0[place / 64] |= 1 << (place % 64);
+            }
+        }
+    }
+}
+
+/// The pixels of a tile that see the border of a lamp, as far as nothing is in the way. None where a sharp border is not
+/// seen: through a lens, or where surfaces have cut-outs.
+pub(super) fn outlined(scene: &Scene, lights: &Lights, settings: &PathSettings, tile: Tile) -> Outlined {
+    let camera = &scene.camera;
+    if camera.lens_radius > 0.0 {
+        return Outlined::default();
+    }
+    let mut pixels = Outlined::default();
+    let corner = Vec2::from(tile.corner().map(|c| c as f32));
+    let on_raster = |point| {
+        let seen = camera.project(settings.width, settings.height, point, [0.0; 2])?;
+        Some(seen.raster - corner)
+    };
+    for [a, b] in lights.borders(camera.eye, MOST_LAMPS) {
+        // What is behind the camera is cut off.
+        let [near, far] = [a, b].map(|point| (point - camera.eye).dot(camera.forward));
+        let least = NEAR * near.max(far);
+        let cut = |point: Vec3, depth: f32, other: Vec3, beyond: f32| {
+            if depth < least { point + (other - point) * ((least - depth) / (beyond - depth)) } else { point }
+        };
+        if let (Some(a), Some(b)) = (on_raster(cut(a, near, b, far)), on_raster(cut(b, far, a, near))) {
+            pixels.add(a, b);
+        }
+    }
+    let has_cutouts = || scene.materials.iter().any(Material::has_cutout);
+    if pixels == Outlined::default() || has_cutouts() { Outlined::default() } else { pixels }
+}
+
+/// The rays that look at lamps for one sample of the pixel in column `x` and row `y`.
+pub(super) fn rays(
+    scene: &Scene,
+    settings: &PathSettings,
+    [x, y]: [u32; 2],
+    sample: u32,
+) -> impl Iterator<Item = Ray> {
+    let PathSettings { width, height, seed, .. } = *settings;
+    let camera = scene.camera;
+    (0..RAYS).map(move |n| {
+        let index = (sample >> 1).wrapping_mul(RAYS).wrapping_add(n);
+        let sampler = Sampler::replicate(seed, y * width + x, sample & 1, index);
+        let [dx, dy] = sampler.pair(dimension::OUTLINE);
+        camera.ray(width, height, x as f32 + dx, y as f32 + dy, [0.0; 2])
+    })
+}
+
+/// The share of one of [`rays`], which met `hit`, in what its pixel sees of lamps. As a path does it passes a surface
+/// that the camera stands on.
+pub(super) fn emission<F: Features>(
+    scene: &Scene,
+    bvh: &Bvh,
+    level: Level,
+    mut ray: Ray,
+    mut hit: Hit,
+) -> Rgb {
+    let mut left = MISS;
+    for _ in 0..=MAX_CROSSINGS {
+        let Some(point) = SurfacePoint::at::<F>(scene, &ray, &hit) else { break };
+        if hit.triangle != left && !point.is_left_by(&ray) {
+            let emits = point.material.emits();
+            let light = if emits { emitted(scene, hit.triangle, point.uv, point.front) } else { Rgb::ZERO };
+            return light / RAYS as f32;
+        }
+        left = hit.triangle;
+        ray = point.spawn(ray.direction.into());
+        hit = bvh.nearest(level, &ray);
+    }
+    Rgb::ZERO
+}
+
+impl<F: Features> PathTracer<'_, F> {
+    /// What the first `count` paths of the wave see of lamps, in `wave.shadow_light`: those whose pixels are `outlined`;
+    /// nothing for the others. Whether there are any.
+    pub(super) fn look_at_lamps(
+        &self,
+        outlined: Outlined,
+        wave: &mut Wave,
+        count: usize,
+        counters: &mut Counters,
+    ) -> bool {
+        if outlined == Outlined::default() {
+            return false;
+        }
+        let (mut filled, capacity) = (0, wave.rays.len());
+        for i in 0..count {
+            wave.shadow_light[i] = [0.0; 3];
+            let path = wave.paths[i];
+            if !outlined.contains(path.place as usize) {
+                continue;
+            }
+            let place = [path.pixel % self.settings.width, path.pixel / self.settings.width];
+            for ray in rays(self.scene, &self.settings, place, path.sample) {
+                wave.rays[filled] = Ray { tag: i as u32, ..ray };
+                filled += 1;
+                if filled == capacity {
+                    self.gather_emission(wave, core::mem::take(&mut filled), counters);
+                }
+            }
+        }
+        self.gather_emission(wave, filled, counters);
+        true
+    }
+
+    /// Adds what the first `count` rays of the wave see.
+    fn gather_emission(&self, wave: &mut Wave, count: usize, counters: &mut Counters) {
+        self.trace(wave, count, Coherence::Coherent, counters);
+        for (ray, hit) in wave.rays.iter().zip(&*wave.hits).take(count) {
+            let light = emission::<F>(self.scene, self.bvh, self.level, *ray, *hit);
+            if let Some(sum) = wave.shadow_light.get_mut(ray.tag as usize) {
+                *sum = (Rgb::from(*sum) + light).to_array();
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sampling::Random;
+
+    #[test]
+    fn every_pixel_on_the_way_is_marked_and_few_others() {
+        for n in 0..200 {
+            let random = Random::new(7, n);
+            let at = |i: u32| Vec2::new(random.single(i), random.single(i + 1)) * 40.0 - 12.0;
+            let (a, mut b) = (at(0), at(2));
+            match n % 4 {
+                0 => b.y = a.y,
+                1 => b.x = a.x,
+                _ => (),
+            }
+            let mut pixels = Outlined::default();
+            pixels.add(a, b);
+            let mut near = Outlined::default();
+            for step in 0..=4000 {
+                let point = a.lerp(b, step as f32 / 4000.0);
+                for (x, y) in [(0, 0), (1, 0), (0, 1), (1, 1)] {
+                    let [x, y] = [point.x - 0.03 + 0.06 * x as f32, point.y - 0.03 + 0.06 * y as f32];
+                    if (0.0..TILE as f32).contains(&x) && (0.0..TILE as f32).contains(&y) {
+                        let place = Tile::position(TILE, x as u32, y as u32);
+                        near.0[place / 64] |= 1 << (place % 64);
+                    }
+                }
+                if point.cmpge(Vec2::ZERO).all() && point.cmplt(Vec2::splat(TILE as f32)).all() {
+                    let place = Tile::position(TILE, point.x as u32, point.y as u32);
+                    assert!(pixels.contains(place), "{a} {b} {point}");
+                }
+            }
+            assert!((0..PIXELS_PER_TILE).all(|i| near.contains(i) || !pixels.contains(i)), "{a} {b}");
+        }
+    }
+
+    #[test]
+    fn segments_that_are_no_numbers_are_none() {
+        let mut pixels = Outlined::default();
+        pixels.add(Vec2::splat(f32::NAN), Vec2::splat(3.0));
+        pixels.add(Vec2::new(f32::NEG_INFINITY, 3.0), Vec2::new(f32::INFINITY, f32::NAN));
+        pixels.add(Vec2::new(-1e30, -1e30), Vec2::new(1e30, 1e30));
+        pixels.add(Vec2::new(f32::NEG_INFINITY, 3.0), Vec2::new(f32::INFINITY, 3.5));
+    }
+}
