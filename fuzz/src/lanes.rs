@@ -145,12 +145,18 @@ struct Packed {
     numbers: [f32; 16],
     fields: [[f32; 16]; 3],
     bytes: [f32; 16],
+    picked: [f32; 16],
     powers: [f32; 16],
     smallest: f32,
 }
 
 /// Where fields of a word start, and how wide they are.
 const FIELDS: [(u32, u32); 3] = [(0, 12), (22, 10), (8, 24)];
+
+/// Numbers from 0 to below 16.
+fn places(words: &[u32; 16]) -> [f32; 16] {
+    words.map(|word| (word >> 8 & 0xffff) as f32 / 4096.0)
+}
 
 fn low_bytes(words: &[u32; 16]) -> [u8; 16] {
     words.map(|word| word as u8)
@@ -169,6 +175,7 @@ impl Kernel for Packing {
             numbers: simd.numbers16(words[0]).to_array(),
             fields: FIELDS.map(|(from, width)| simd.field16(&words, from, width).to_array()),
             bytes: simd.bytes16(&low_bytes(&words)).to_array(),
+            picked: simd.pick16(simd.load16(&operands.a), simd.load16(&places(&words))).to_array(),
             powers: simd.powers16(&words).to_array(),
             smallest: simd.load16(&operands.a).smallest(),
         }
@@ -189,6 +196,8 @@ impl Packed {
             assert_eq!(*field, expected, "{level:?} field of {width} from {from}");
         }
         assert_eq!(self.bytes, low_bytes(words).map(f32::from), "{level:?} bytes");
+        let picked = places(words).map(|place| operands.a[place as usize].to_bits());
+        assert_eq!(bits(&self.picked), picked, "{level:?} pick");
         assert_eq!(bits(&self.powers), words.map(|word| word >> 24 << 23), "{level:?} powers");
         if operands.a.iter().all(|a| !a.is_nan()) {
             let smallest = operands.a.iter().copied().fold(f32::INFINITY, f32::min);

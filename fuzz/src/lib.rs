@@ -17,6 +17,7 @@ mod numbers;
 #[cfg(feature = "app")]
 pub mod obj;
 pub mod photons;
+pub mod records;
 pub mod sampling;
 #[cfg(feature = "app")]
 pub mod scene_file;
@@ -45,6 +46,7 @@ pub const TARGETS: &[Target] = &[
     #[cfg(feature = "app")]
     Target { name: "obj", run: obj::run },
     Target { name: "photons", run: photons::run },
+    Target { name: "records", run: records::run },
     Target { name: "sampling", run: sampling::run },
     #[cfg(feature = "app")]
     Target { name: "scene_file", run: scene_file::run },

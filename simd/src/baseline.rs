@@ -304,6 +304,11 @@ impl Simd for Baseline {
         self.load16(&words.map(|word| ((word >> from) & ((1 << width) - 1)) as i32 as f32))
     }
     #[inline(always)]
+    fn pick16(self, table: Pair<F8>, which: Pair<F8>) -> Pair<F8> {
+        let (table, which) = (table.to_array(), which.to_array());
+        self.load16(&which.map(|which| table[which as usize & 15]))
+    }
+    #[inline(always)]
     fn bytes16(self, bytes: &[u8; 16]) -> Pair<F8> {
         self.load16(&bytes.map(|byte| i32::from(byte) as f32))
     }

@@ -207,6 +207,9 @@ pub trait Simd: Copy {
     /// Of each word the `width` (below 25) bits from bit `from` on, as a number.
     fn field16(self, words: &[u32; 16], from: u32, width: u32) -> Self::F16;
 
+    /// Lane by lane the lane of `table` that the whole part of `which`, 0 to 15, names.
+    fn pick16(self, table: Self::F16, which: Self::F16) -> Self::F16;
+
     /// Bytes as numbers.
     fn bytes16(self, bytes: &[u8; 16]) -> Self::F16;
 

@@ -83,6 +83,11 @@ pub enum Surface {
 }
 
 impl Surface {
+    /// Whether it may be diffuse alone, somewhere.
+    pub fn may_be_diffuse(&self) -> bool {
+        matches!(self, Surface::Diffuse { .. } | Surface::Glossy { ior: None, .. })
+    }
+
     /// Whether it may reflect or refract into one direction only, somewhere.
     pub fn may_be_smooth(&self) -> bool {
         match self {

@@ -17,6 +17,7 @@
 //! its group only, no wave cuts a group, and samples are summed in their order: the picture has the same bits for
 //! any size of wave and any distribution of tasks.
 
+use super::cached::Caches;
 use super::density::PhotonLight;
 use super::estimator::{
     Counters, MAX_CROSSINGS, MAX_VERTICES, PathSettings, dimension, power_heuristic, survival,
@@ -30,7 +31,7 @@ use super::shadow::{FEW, pass_cutout, passing, shadow_ray};
 use super::wave::{Path, Share, Wave};
 use crate::bsdf::{Bsdf, Features};
 use crate::bvh::{Bvh, Coherence};
-use crate::cache::irradiance::IrradianceCache;
+use crate::cache::irradiance::{Indirect, IrradianceCache, POINTS};
 use crate::film::{GROUP, Pixel, Samples, Tile};
 use crate::geometry::{Hit, Ray};
 use crate::light::{Lights, Window, emitted};
@@ -48,7 +49,7 @@ use glam::{Vec2, Vec3};
 pub const WAVE: usize = 2048;
 
 /// Vertices that are looked at together before they are shaded.
-const BLOCK: usize = 16;
+pub(super) const BLOCK: usize = POINTS;
 
 /// Lights that fill a smaller share of a hemisphere, weighted by cosines, are found by shadow rays alone as well as with
 /// the help of rays that find them by chance.
@@ -70,8 +71,7 @@ pub struct PathTracer<'a, F> {
     pub(super) has_cutouts: bool,
     /// Some surfaces may reflect or refract into one direction only.
     has_mirrors: bool,
-    /// Frozen; of even and of odd samples.
-    caches: Option<[&'a IrradianceCache<'a>; 2]>,
+    pub(super) caches: Option<Caches<'a>>,
     photons: Option<PhotonLight<'a>>,
     /// Of even and of odd samples.
     maps: Option<&'a [PhotonMaps<'a>; 2]>,
@@ -111,7 +111,12 @@ impl<'a, F: Features> PathTracer<'a, F> {
     /// first, odd ones from the second. Pixels must not share their paths as well. Where depth is limited only the
     /// first point of a path is served, for records do not know how far they are from the camera.
     pub fn with_caches(&self, caches: [&'a IrradianceCache<'a>; 2]) -> Self {
-        Self { caches: Some(caches), ..*self }
+        Self { caches: Some(Caches::Halves(caches)), ..*self }
+    }
+
+    /// The same, for rays that gather for the cache itself, as it is now.
+    pub fn with_growing_cache(&self, cache: &'a IrradianceCache<'a>) -> Self {
+        Self { caches: Some(Caches::Growing(cache)), ..*self }
     }
 
     /// The same, where surfaces with a diffuse part have from photons what light is reflected onto them. Pixels must
@@ -271,7 +276,7 @@ impl<'a, F: Features> PathTracer<'a, F> {
             let (ray, hit) = (wave.rays[i], wave.hits[i]);
             let Some(path) = wave.paths.get_mut(ray.tag as usize) else { continue };
             let Some(exchange) = wave.exchanges.get_mut(ray.tag as usize) else { continue };
-            let step = self.shade(path, exchange, &ray, &hit, block[i % BLOCK], counters);
+            let step = self.shade(path, exchange, &ray, &hit, block[i % BLOCK].as_ref(), counters);
             if let Some((mut shadow, light)) = step.light {
                 shadow.tag |= ray.tag;
                 wave.shadow_rays[shadows] = shadow;
@@ -304,7 +309,7 @@ impl<'a, F: Features> PathTracer<'a, F> {
         for hit in wave.hits.iter().skip(range.end).take(BLOCK) {
             mesh.prefetch_corners(hit.triangle);
         }
-        let met = wave.rays[range.clone()].iter().zip(&wave.hits[range]);
+        let met = wave.rays[range.clone()].iter().zip(&wave.hits[range.clone()]);
         for ((ray, hit), met) in met.zip(block.iter_mut()) {
             let point = SurfacePoint::at::<F>(self.scene, ray, hit);
             *met = point.zip(wave.paths.get(ray.tag as usize)).map(|(point, path)| {
@@ -317,13 +322,16 @@ impl<'a, F: Features> PathTracer<'a, F> {
                 }
                 let sampler = Sampler::new(self.settings.seed, path.pixel, path.sample);
                 let light = sampler.pair(dimension::vertex(path.segments.into()) + dimension::LIGHT);
-                Met { point, window, light }
+                Met { point, window, light, indirect: None }
             });
         }
         for met in block.iter().flatten() {
             if let Some(window) = met.window {
                 window.prefetch_row(met.light[1]);
             }
+        }
+        if let Some(caches) = self.caches {
+            self.ask(caches, wave, range, block);
         }
     }
 
@@ -386,7 +394,7 @@ impl<'a, F: Features> PathTracer<'a, F> {
         exchange: &mut Exchange,
         ray: &Ray,
         hit: &Hit,
-        met: Option<Met<'a>>,
+        met: Option<&Met<'a>>,
         counters: &mut Counters,
     ) -> Step {
         let scene = self.scene;
@@ -418,7 +426,7 @@ impl<'a, F: Features> PathTracer<'a, F> {
             }
             return Step::END;
         }
-        let Some(Met { point, light: [u, v], .. }) = met else { return Step::END };
+        let Some(&Met { ref point, light: [u, v], indirect, .. }) = met else { return Step::END };
 
         // A ray cannot meet the plane that it started on: rounding on a needle. Nor does a camera on a surface see its back.
         if hit.triangle == path.triangle || (segments == 1 && point.is_left_by(ray)) {
@@ -460,7 +468,7 @@ impl<'a, F: Features> PathTracer<'a, F> {
         path.share = Share::ALL;
         let is_diffuse = matches!(bsdf, Bsdf::Diffuse(_));
         if self.settings.reuse {
-            exchange.arrive(&point, bsdf.cover(), path);
+            exchange.arrive(point, bsdf.cover(), path);
             throughput = Rgb::from(path.throughput);
         }
         let wo = point.frame.to_local(-direction);
@@ -474,17 +482,15 @@ impl<'a, F: Features> PathTracer<'a, F> {
             let limit = if self.is_limited() { segments } else { 0 };
             let maps = &maps[path.sample as usize & 1];
             let from = position.distance(point.position);
-            said = maps.ask::<F>((self.bvh, self.level), (came, limit, from), &point, &bsdf, wo, turns);
+            said = maps.ask::<F>((self.bvh, self.level), (came, limit, from), point, &bsdf, wo, turns);
             path.add(throughput * said.light);
         }
 
         // Where lights are small all around, and nothing mirrors them, a shadow ray alone finds the direct light. Not
         // that of an environment, which is not drawn from where it seemed to be hidden.
         let mut ends = false;
-        if let (Some(caches), Bsdf::Diffuse(diffuse)) = (self.caches, &bsdf)
-            && (segments == 1 || !self.is_limited())
+        if let (Some(indirect), Bsdf::Diffuse(diffuse)) = (indirect, &bsdf)
             && !said.is_all
-            && let Some(indirect) = caches[path.sample as usize & 1].at(point.position, normal)
         {
             path.add(throughput * diffuse.reflectance * indirect.irradiance * FRAC_1_PI);
             path.share = Share::DIRECT;
@@ -514,7 +520,7 @@ impl<'a, F: Features> PathTracer<'a, F> {
                 if let Some(merging) = &self.merging
                     && !ends_chain(&bsdf)
                 {
-                    let there = ChainLink { point: &point, bsdf: &bsdf, near: wo, far: wi };
+                    let there = ChainLink { point, bsdf: &bsdf, near: wo, far: wi };
                     let to_light = there.reverse::<F>(scene) / sample.pdf;
                     weight = merging.beside(weight, path.chain.abs() * to_light, || {
                         merging.emission.density_of_sample(scene, self.lights, &sample, point.position)
@@ -522,7 +528,7 @@ impl<'a, F: Features> PathTracer<'a, F> {
                 }
                 let contribution = throughput * f * sample.radiance * (weight / sample.pdf);
                 let tag = if later { TO_ENVIRONMENT } else { 0 };
-                Some((Ray { tag, ..shadow_ray(&point, &sample) }, contribution))
+                Some((Ray { tag, ..shadow_ray(point, &sample) }, contribution))
             });
         }
 
@@ -535,7 +541,7 @@ impl<'a, F: Features> PathTracer<'a, F> {
             && (segments == 1 || !self.is_limited())
         {
             let turns = sampler.single(dimension::PROBES + segments);
-            reflected = photons.reflected::<F>((self.bvh, self.level), &point, &bsdf, wo, turns);
+            reflected = photons.reflected::<F>((self.bvh, self.level), point, &bsdf, wo, turns);
             path.add(throughput * reflected.unwrap_or_default());
         }
 
@@ -543,7 +549,7 @@ impl<'a, F: Features> PathTracer<'a, F> {
         if let Some(merging) = self.merging.as_ref().filter(|_| merges) {
             let turns = || sampler.single(dimension::PROBES + segments);
             let light =
-                merging.reflected::<F>((self.bvh, self.level), path.sample, (&point, &bsdf), wo, turns);
+                merging.reflected::<F>((self.bvh, self.level), path.sample, (point, &bsdf), wo, turns);
             if self.settings.reuse && exchange.is_lit() {
                 exchange.keep(throughput * light);
             } else {
@@ -573,7 +579,7 @@ impl<'a, F: Features> PathTracer<'a, F> {
             path.share = if sample.delta { said.mirrored } else { said.next };
         }
         let mut throughput = throughput * sample.weight;
-        let certain = self.settings.reuse && is_diffuse && exchange.leave(&point, throughput, segments);
+        let certain = self.settings.reuse && is_diffuse && exchange.leave(point, throughput, segments);
         let direction = point.frame.to_world(sample.direction);
         if !point.sides_agree(sample.direction, direction) {
             return Step { light, next: None };
@@ -595,7 +601,7 @@ impl<'a, F: Features> PathTracer<'a, F> {
             return Step { light, next: None };
         }
         if let Some(merging) = &self.merging {
-            let there = ChainLink { point: &point, bsdf: &bsdf, near: wo, far: sample.direction };
+            let there = ChainLink { point, bsdf: &bsdf, near: wo, far: sample.direction };
             path.chain = match path.chain {
                 _ if ends_chain(&bsdf) && !sample.delta && merges => -merging.begun(point.position),
                 _ if ends_chain(&bsdf) && !sample.delta => 0.0,
@@ -651,11 +657,13 @@ impl Arrivals {
 
 /// A vertex that is about to be shaded.
 #[derive(Clone, Copy)]
-struct Met<'a> {
-    point: SurfacePoint<'a>,
+pub(super) struct Met<'a> {
+    pub(super) point: SurfacePoint<'a>,
     window: Option<&'a Window>,
     /// Where light is looked for.
     light: [f32; 2],
+    /// What a cache says of it.
+    pub(super) indirect: Option<Indirect>,
 }
 
 /// What follows from a vertex.

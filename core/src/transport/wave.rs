@@ -76,6 +76,12 @@ impl Share {
         }
     }
 
+    /// Whether what a rough surface reflects belongs to it.
+    #[inline]
+    pub(super) fn goes_on_from_rough(self) -> bool {
+        self != Self::EMITTED && self != Self::DIRECT
+    }
+
     /// Whether light of emitters at the end of the ray belongs to it.
     #[inline]
     pub(super) fn sees_emitters(self) -> bool {

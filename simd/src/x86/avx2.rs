@@ -243,6 +243,11 @@ impl Simd for Avx2 {
         unsafe { Pair(field8(words.as_ptr(), from, width), field8(words[8..].as_ptr(), from, width)) }
     }
     #[inline(always)]
+    fn pick16(self, table: Pair<F8>, which: Pair<F8>) -> Pair<F8> {
+        // SAFETY: the token proves the level.
+        unsafe { Pair(pick8(table, which.0), pick8(table, which.1)) }
+    }
+    #[inline(always)]
     fn bytes16(self, bytes: &[u8; 16]) -> Pair<F8> {
         // SAFETY: the token proves the level; eight bytes can be read from either half of sixteen.
         unsafe { Pair(bytes8(bytes.as_ptr()), bytes8(bytes[8..].as_ptr())) }
@@ -328,6 +333,20 @@ unsafe fn field8(words: *const u32, from: u32, width: u32) -> F8 {
     unsafe {
         let shifted = _mm256_srl_epi32(_mm256_loadu_si256(words.cast()), _mm_cvtsi32_si128(from as i32));
         F8(_mm256_cvtepi32_ps(_mm256_and_si256(shifted, _mm256_set1_epi32((1 << width) - 1))))
+    }
+}
+
+/// # Safety
+/// The processor has AVX2.
+#[inline(always)]
+unsafe fn pick8(table: Pair<F8>, which: F8) -> F8 {
+    // SAFETY: the caller's.
+    unsafe {
+        let which = _mm256_cvttps_epi32(which.0);
+        let low = _mm256_permutevar8x32_ps(table.0.0, which);
+        let high = _mm256_permutevar8x32_ps(table.1.0, which);
+        // Bit 3 says which half.
+        F8(_mm256_blendv_ps(low, high, _mm256_castsi256_ps(_mm256_slli_epi32::<28>(which))))
     }
 }
 

@@ -391,6 +391,11 @@ impl Simd for Avx512 {
         }
     }
     #[inline(always)]
+    fn pick16(self, table: F16, which: F16) -> F16 {
+        // SAFETY: the token proves the level.
+        F16(unsafe { _mm512_permutexvar_ps(_mm512_cvttps_epi32(which.0), table.0) })
+    }
+    #[inline(always)]
     fn bytes16(self, bytes: &[u8; 16]) -> F16 {
         // SAFETY: the token proves the level; sixteen bytes are read from an array of sixteen.
         F16(unsafe { _mm512_cvtepi32_ps(_mm512_cvtepu8_epi32(_mm_loadu_si128(bytes.as_ptr().cast()))) })

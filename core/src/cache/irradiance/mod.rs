@@ -4,14 +4,17 @@
 
 pub mod derivatives;
 mod hemisphere;
+mod lanes;
 pub mod metric;
 mod octree;
+mod packet;
 mod record;
 mod store;
 
 pub use derivatives::{CellFlux, Derivatives, Hessian};
 pub use hemisphere::{Hemisphere, SIDE_MAX};
 pub use metric::{Metric, Reach, reach};
+pub use packet::{POINTS, Points};
 pub use record::{Record, SECTORS};
 pub use store::{GREATEST_DEVIATION, Indirect, IrradianceCache};
 

@@ -4,6 +4,7 @@
 //!
 //! Supports may shrink later, never grow: what the tree finds is then more than what reaches.
 
+use super::packet::POINTS;
 use crate::geometry::Bounds;
 use crate::memory::{Arena, Footprint, OutOfMemory};
 use bytemuck::{Pod, Zeroable};
@@ -46,6 +47,12 @@ struct Node {
 struct Link {
     record: u32,
     next: u32,
+}
+
+/// What is done with the records that points find together.
+pub(super) trait Visit {
+    /// Such a record, for these of the points, bit by bit.
+    fn visit(&mut self, record: u32, points: u32);
 }
 
 /// See the file.
@@ -184,6 +191,65 @@ impl<'m> Octree<'m> {
             depth -= 1;
             let child = here.children.get(octant(cell, depth)).copied().unwrap_or(0);
             node = if child == 0 { None } else { self.nodes.get(child as usize) };
+        }
+    }
+
+    /// Of sixteen points, coordinate by coordinate, the `wanted` ones (bit by bit) find what each finds by [`Octree::at`],
+    /// in the same order; those that are in the same cells together.
+    #[inline(always)]
+    pub(super) fn at_all<V: Visit>(&self, points: &[[f32; POINTS]; 3], wanted: u32, visitor: &mut V) {
+        let [x, y, z] = points;
+        let mut cells = [[0; 3]; POINTS];
+        for (cell, ((&x, &y), &z)) in cells.iter_mut().zip(x.iter().zip(y).zip(z)) {
+            *cell = self.cell(Vec3::new(x, y, z));
+        }
+        // Groups of points, and the node and the depth to which they have come: none of them is in two.
+        let mut open = [(0u32, DEPTH, 0u32); POINTS];
+        open[0].2 = wanted;
+        let mut count = usize::from(wanted != 0);
+        while count > 0 {
+            count -= 1;
+            let Some(&(mut node, mut depth, group)) = open.get(count) else { return };
+            let first = cells[group.trailing_zeros() as usize % POINTS];
+            // Down to this depth they are in the same cells.
+            let mut different = 0;
+            for (i, cell) in cells.iter().enumerate() {
+                let here = (cell[0] ^ first[0]) | (cell[1] ^ first[1]) | (cell[2] ^ first[2]);
+                different |= if group >> i & 1 == 1 { here } else { 0 };
+            }
+            let together = u32::BITS - different.leading_zeros();
+            while let Some(here) = self.nodes.get(node as usize) {
+                let mut link = here.first;
+                while let Some(entry) = (link as usize).checked_sub(1).and_then(|link| self.links.get(link)) {
+                    visitor.visit(entry.record, group);
+                    link = entry.next;
+                }
+                if depth == 0 {
+                    break;
+                }
+                depth -= 1;
+                if depth >= together {
+                    node = here.children.get(octant(first, depth)).copied().unwrap_or(0);
+                    if node == 0 {
+                        break;
+                    }
+                    continue;
+                }
+                let mut groups = [0u32; 8];
+                for (i, &cell) in cells.iter().enumerate() {
+                    groups[octant(cell, depth) & 7] |= group & 1 << i;
+                }
+                for (&child, group) in here.children.iter().zip(groups) {
+                    if child != 0
+                        && group != 0
+                        && let Some(slot) = open.get_mut(count)
+                    {
+                        *slot = (child, depth, group);
+                        count += 1;
+                    }
+                }
+                break;
+            }
         }
     }
 

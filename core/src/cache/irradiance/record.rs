@@ -4,12 +4,14 @@
 //! (Schwarzhaupt, Jensen and Jarosz 2012, §5). Its support may be wider, by the overlap that the metric allows. A fence
 //! cuts out of both what lies behind a wall.
 
+use super::lanes::{Asked, One, Voice, Width, dot};
 use super::{Derivatives, Reach};
 use crate::Rgb;
 use crate::geometry::Frame;
 use crate::sampling::ONE_MINUS_EPSILON;
 use bytemuck::{Pod, Zeroable};
 use glam::{Vec2, Vec3};
+use halflight_simd::{Lanes, Mask};
 
 /// Azimuths for each of which a record knows how far it is to the next wall.
 pub const SECTORS: usize = 16;
@@ -162,82 +164,114 @@ impl Record {
     /// paper). `least_cos` is the cosine of the greatest deviation of the normal. `None` outside of the support.
     #[inline]
     pub fn at(&self, position: Vec3, normal: Vec3, least_cos: f32) -> Option<(Rgb, f32)> {
-        let (place, weight) = self.weight(position, normal, least_cos, self.overlap)?;
-        Some((self.extrapolated(place, normal), weight))
+        let (speaks, voice) = self.listen(One, &Asked::of(position, normal), least_cos, self.overlap);
+        speaks.then(|| (Rgb::from(self.said(One, &voice)), voice.weight))
     }
 
     /// Whether it covers the point.
     #[inline]
     pub fn covers(&self, position: Vec3, normal: Vec3, least_cos: f32) -> bool {
-        self.weight(position, normal, least_cos, 1.0).is_some()
+        self.listen(One, &Asked::of(position, normal), least_cos, 1.0).0
     }
 
-    /// Where the point lies along the axes, and its weight in a support of so many radii.
-    #[inline]
-    fn weight(&self, position: Vec3, normal: Vec3, least_cos: f32, overlap: f32) -> Option<(Vec2, f32)> {
-        let offset = position - Vec3::from(self.position);
+    /// Which of the points lie in a support of so many radii, and with what weight.
+    #[inline(always)]
+    pub(super) fn listen<W: Width>(
+        &self,
+        width: W,
+        asked: &Asked<W::L>,
+        least_cos: f32,
+        overlap: f32,
+    ) -> (<W::L as Lanes>::Mask, Voice<W::L>) {
+        let all = |value: f32| width.all(value);
+        let (zero, one) = (all(0.0), all(1.0));
         let [r1, r2] = self.radii;
         let farthest = r2 * overlap;
-        if offset.length_squared() >= farthest * farthest {
-            return None;
+        let [px, py, pz] = self.position;
+        let [x, y, z] = asked.position;
+        let offset = [x - all(px), y - all(py), z - all(pz)];
+        let [nx, ny, nz] = self.normal;
+        let normal = [all(nx), all(ny), all(nz)];
+        let cos = dot(asked.normal, normal);
+        let near = dot(offset, offset).lt(all(farthest * farthest)) & all(least_cos).lt(cos);
+        let mut voice = Voice { place: [zero; 2], turned: [zero; 2], weight: zero };
+        if !near.any() {
+            return (near, voice);
         }
-        let cos = normal.dot(Vec3::from(self.normal));
-        if cos <= least_cos {
-            return None;
-        }
-        let place = self.local(offset);
-        let square = (place / Vec3::new(r1 * overlap, farthest, r1)).length_squared();
-        // A support without extent holds nothing.
-        if square.is_nan() || square >= 1.0 {
-            return None;
-        }
-        let middle = 0.5 * (normal + Vec3::from(self.normal));
-        if offset.dot(middle) < -IN_FRONT * r1 || self.is_fenced_off(place.truncate()) {
-            return None;
-        }
-        let weight = (1.0 - libm::sqrtf(square)) * (cos - least_cos) / (1.0 - least_cos);
-        Some((place.truncate(), weight * self.trust(square * overlap * overlap)))
+        let (axis, across) = (self.axis, self.across());
+        let axis = [all(axis[0]), all(axis[1]), all(axis[2])];
+        let across = [all(across.x), all(across.y), all(across.z)];
+        let (x, y, z) = (dot(offset, axis), dot(offset, across), dot(offset, normal));
+        let [u, v, w] = [x * all(1.0 / (r1 * overlap)), y * all(1.0 / farthest), z * all(1.0 / r1)];
+        // A support without extent holds nothing: the square is no number there.
+        let square = dot([u, v, w], [u, v, w]);
+        // Half of the sum of both normals, along the offset.
+        let height = all(0.5) * (dot(offset, asked.normal) + z);
+        let speaks = near & square.lt(one) & !height.lt(all(-IN_FRONT * r1));
+        voice.place = [x, y];
+        let speaks = if self.is_fenced() { speaks & !self.is_fenced_off(width, voice.place) } else { speaks };
+        // n_i × n along both axes.
+        voice.turned = [-dot(asked.normal, across), dot(asked.normal, axis)];
+        let tent = (one - square.sqrt()) * ((cos - all(least_cos)) * all(1.0 / (1.0 - least_cos)));
+        voice.weight = tent * self.trust(width, square * all(overlap * overlap));
+        (speaks, voice)
     }
 
     /// Its variance at the place where it is over that at the square of so many radii, which extrapolation adds to: weights
     /// that go with it make the best of records that differ. 1 where the metric does not ask neighbours.
-    #[inline]
-    fn trust(&self, square: f32) -> f32 {
+    #[inline(always)]
+    fn trust<W: Width>(&self, width: W, square: W::L) -> W::L {
         if self.allowed <= 0.0 {
-            return 1.0;
+            return width.all(1.0);
         }
-        let (noise, missed) = (self.noise.max(LEAST_NOISE), self.error.min(1.0) * square);
+        let noise = width.all(self.noise.max(LEAST_NOISE));
+        let missed = width.all(self.error.min(1.0)) * square;
         noise / (noise + missed * missed)
     }
 
-    /// E_i + ∇E_i · Δx + Δxᵀ H Δx / 2 + ∇_n E_i · (n_i × n), within limits.
-    #[inline]
-    fn extrapolated(&self, place: Vec2, normal: Vec3) -> Rgb {
-        let turned = self.local(Vec3::from(self.normal).cross(normal)).truncate();
-        let bend = (place * place).dot(Vec2::from(self.bend));
-        let channel = |i: usize| {
-            let change = Vec2::from(self.gradient[i]).dot(place) + Vec2::from(self.rotation[i]).dot(turned);
-            let here = self.irradiance[i];
-            (here + bend * here + change).max(LEAST_FACTOR * here).min(GREATEST_FACTOR * here)
-        };
-        Rgb::new(channel(0), channel(1), channel(2))
+    /// E_i + ∇E_i · Δx + Δxᵀ H Δx / 2 + ∇_n E_i · (n_i × n), within limits; of each channel.
+    #[inline(always)]
+    pub(super) fn said<W: Width>(&self, width: W, voice: &Voice<W::L>) -> [W::L; 3] {
+        let [x, y] = voice.place;
+        let [u, v] = voice.turned;
+        let bend = x * x * width.all(self.bend[0]) + y * y * width.all(self.bend[1]);
+        let mut channels = [width.all(0.0); 3];
+        for (channel, said) in channels.iter_mut().enumerate() {
+            let ([gx, gy], [ru, rv]) = (self.gradient[channel], self.rotation[channel]);
+            let change = (x * width.all(gx) + y * width.all(gy)) + (u * width.all(ru) + v * width.all(rv));
+            let here = self.irradiance[channel];
+            let (least, greatest) = (width.all(LEAST_FACTOR * here), width.all(GREATEST_FACTOR * here));
+            let here = width.all(here);
+            *said = (here + bend * here + change).max(least).min(greatest);
+        }
+        channels
     }
 
-    /// Whether a wall stands between the record and the point at `place` along its axes.
-    #[inline]
-    fn is_fenced_off(&self, place: Vec2) -> bool {
-        let free = self.fence.get(sector(place)).copied().unwrap_or(u8::MAX);
-        if free == u8::MAX {
-            return false;
-        }
-        let distance = self.reach * (f32::from(free) / 255.0);
-        place.length_squared() > distance * distance
+    /// The axis along which the radius is R2.
+    #[inline(always)]
+    fn across(&self) -> Vec3 {
+        Vec3::from(self.normal).cross(Vec3::from(self.axis))
+    }
+
+    /// Whether there is a wall anywhere within its support.
+    #[inline(always)]
+    fn is_fenced(&self) -> bool {
+        self.fence != [u8::MAX; SECTORS]
+    }
+
+    /// Whether a wall stands between the record and points at `place` along its axes.
+    #[inline(always)]
+    fn is_fenced_off<W: Width>(&self, width: W, place: [W::L; 2]) -> <W::L as Lanes>::Mask {
+        let free = width.pick(&self.fence, sector(width, place));
+        let distance = free * width.all(self.reach / f32::from(u8::MAX));
+        let [x, y] = place;
+        free.lt(width.all(f32::from(u8::MAX))) & (distance * distance).lt(x * x + y * y)
     }
 
     /// Notes a wall at `distance` from the record, in the direction of `place` along its axes.
     pub fn fence_off(&mut self, place: Vec2, distance: f32) {
         let share = (distance / self.reach).clamp(0.0, 1.0);
-        if let Some(fence) = self.fence.get_mut(sector(place)) {
+        if let Some(fence) = self.fence.get_mut(sector(One, place.to_array()) as usize) {
             *fence = (*fence).min((share * 255.0) as u8);
         }
     }
@@ -253,12 +287,12 @@ impl Record {
     }
 }
 
-/// The sector of a direction: an angle of four quadrants, linear along |x| + |y| = 1.
-#[inline]
-fn sector(place: Vec2) -> usize {
-    let x = place.x / (place.x.abs() + place.y.abs()).max(f32::MIN_POSITIVE);
-    let angle = if place.y >= 0.0 { 1.0 - x } else { 3.0 + x };
-    (angle * (0.25 * ONE_MINUS_EPSILON * SECTORS as f32)) as usize
+/// The sector of a direction, as the whole part: an angle of four quadrants, linear along |x| + |y| = 1.
+#[inline(always)]
+fn sector<W: Width>(width: W, [x, y]: [W::L; 2]) -> W::L {
+    let x = x / (x.abs() + y.abs()).max(width.all(f32::MIN_POSITIVE));
+    let angle = (width.all(1.0) - x).select(width.all(0.0).le(y), width.all(3.0) + x);
+    angle * width.all(0.25 * ONE_MINUS_EPSILON * SECTORS as f32)
 }
 
 #[cfg(test)]
@@ -355,7 +389,7 @@ mod tests {
         let mut record = record();
         for i in 0..SECTORS {
             let (place, world) = record.towards(i as f32 + 0.5);
-            assert_eq!(sector(place), i);
+            assert_eq!(sector(One, place.to_array()) as usize, i);
             assert!(place.extend(0.0).distance(world) < 1e-6);
         }
         record.fence_off(Vec2::new(0.0, 1.0), 0.5);

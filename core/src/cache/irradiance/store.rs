@@ -111,6 +111,27 @@ impl<'m> IrradianceCache<'m> {
         (weights > 0.0).then(|| Indirect { irradiance: sum / weights, shining: shining / weights })
     }
 
+    /// What one of the records says that [`IrradianceCache::at`] asks: enough where many points are averaged.
+    #[inline]
+    pub fn roughly(&self, position: Vec3, normal: Vec3) -> Option<Indirect> {
+        let mut found = None;
+        self.tree.at(position, |index| {
+            if let Some(record) = self.records.get(index as usize)
+                && let Some((irradiance, _)) = record.at(position, normal, self.least_cos)
+            {
+                found = Some(Indirect { irradiance, shining: record.shining });
+            }
+            found.is_none()
+        });
+        found
+    }
+
+    /// The octree, the records, and the cosine of the greatest deviation of a normal.
+    #[inline]
+    pub(super) fn parts(&self) -> (&Octree<'m>, &[Record], f32) {
+        (&self.tree, self.records(), self.least_cos)
+    }
+
     /// Calls `visit` with the records that speak for a point, and their weights.
     pub fn visit(&self, position: Vec3, normal: Vec3, mut visit: impl FnMut(&Record, f32)) {
         self.tree.at(position, |index| {

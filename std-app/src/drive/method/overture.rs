@@ -136,7 +136,7 @@ impl<F: Features> Overture<'_, '_, F> {
     ) -> Result<bool, RenderError> {
         let mut records: Vec<Option<Record>> = vec![None; places.len()];
         // What a gather ray meets may be lit by the cache already.
-        let tracer = self.tracer.with_caches([&growing.cache, &growing.cache]);
+        let tracer = self.tracer.with_growing_cache(&growing.cache);
         let first = growing.gathered;
         let task = |task: usize, arena: &mut Arena, out: &mut [Option<Record>]| {
             let mut counters = Counters::default();

@@ -1,0 +1,81 @@
+//! Points that ask for irradiance, one or sixteen at a time: what a record does with them is written once for both, so
+//! that one is the reference of sixteen, and the bits are the same.
+
+use glam::Vec3;
+use halflight_simd::{Lanes, Simd};
+
+/// Points, and the unit normals of their surfaces, coordinate by coordinate.
+#[derive(Clone, Copy)]
+pub(super) struct Asked<L> {
+    pub(super) position: [L; 3],
+    pub(super) normal: [L; 3],
+}
+
+impl Asked<f32> {
+    #[inline(always)]
+    pub(super) fn of(position: Vec3, normal: Vec3) -> Self {
+        Self { position: position.to_array(), normal: normal.to_array() }
+    }
+}
+
+/// What a record needs to know of points that are in its support.
+#[derive(Clone, Copy)]
+pub(super) struct Voice<L> {
+    /// Where they lie along its axes.
+    pub(super) place: [L; 2],
+    /// Its normal times theirs, along its axes.
+    pub(super) turned: [L; 2],
+    /// w_i.
+    pub(super) weight: L,
+}
+
+/// How many points there are, and what makes lanes for them.
+pub(super) trait Width: Copy {
+    type L: Lanes;
+    /// All lanes the same.
+    fn all(self, value: f32) -> Self::L;
+    /// Of `table` the bytes that whole parts name, as numbers.
+    fn pick(self, table: &[u8; 16], which: Self::L) -> Self::L;
+}
+
+/// One point.
+#[derive(Clone, Copy)]
+pub(super) struct One;
+
+impl Width for One {
+    type L = f32;
+
+    #[inline(always)]
+    fn all(self, value: f32) -> f32 {
+        value
+    }
+
+    #[inline(always)]
+    fn pick(self, table: &[u8; 16], which: f32) -> f32 {
+        f32::from(table[which as usize & 15])
+    }
+}
+
+/// Sixteen points.
+#[derive(Clone, Copy)]
+pub(super) struct Sixteen<S>(pub(super) S);
+
+impl<S: Simd> Width for Sixteen<S> {
+    type L = S::F16;
+
+    #[inline(always)]
+    fn all(self, value: f32) -> S::F16 {
+        self.0.splat16(value)
+    }
+
+    #[inline(always)]
+    fn pick(self, table: &[u8; 16], which: S::F16) -> S::F16 {
+        self.0.pick16(self.0.bytes16(table), which)
+    }
+}
+
+/// a · b
+#[inline(always)]
+pub(super) fn dot<L: Lanes>([a, b, c]: [L; 3], [x, y, z]: [L; 3]) -> L {
+    (a * x + b * y) + c * z
+}

@@ -1,0 +1,208 @@
+//! Sixteen points ask the cache at once. Neighbours in a picture are reached by the same records, so that all go down
+//! the octree together, as far as they are in the same cells, and each record is read once and weighed for all.
+//!
+//! Plainly: [`IrradianceCache::at`] for each of them. Here a point meets the same records in the same order, and all is
+//! done in lanes as it is done for one: the bits are the same. The price: points that are alone in their cells pay for
+//! sixteen lanes.
+
+use super::lanes::{Asked, Sixteen};
+use super::octree::Visit;
+use super::record::Record;
+use super::store::{Indirect, IrradianceCache};
+use crate::{Level, Rgb};
+use glam::Vec3;
+use halflight_simd::{Kernel, Lanes, Mask, Simd};
+
+/// Points that ask at once.
+pub const POINTS: usize = 16;
+
+/// Points, and the unit normals of their surfaces.
+#[derive(Clone, Copy, Debug)]
+pub struct Points {
+    position: [[f32; POINTS]; 3],
+    normal: [[f32; POINTS]; 3],
+    /// Bit `i`: there is a point `i`.
+    wanted: u32,
+}
+
+impl Points {
+    /// No point.
+    pub const NONE: Points = Points { position: [[0.0; POINTS]; 3], normal: [[0.0; POINTS]; 3], wanted: 0 };
+
+    /// Makes it point `i`, of [`POINTS`].
+    #[inline]
+    pub fn set(&mut self, i: usize, position: Vec3, normal: Vec3) {
+        let i = i % POINTS;
+        for axis in 0..3 {
+            self.position[axis][i] = position[axis];
+            self.normal[axis][i] = normal[axis];
+        }
+        self.wanted |= 1 << i;
+    }
+}
+
+impl IrradianceCache<'_> {
+    /// What is known at each of `points`: [`IrradianceCache::at`], to the bit. `known` keeps its other entries.
+    pub fn at_all(&self, level: Level, points: &Points, known: &mut [Option<Indirect>; POINTS]) {
+        if points.wanted == 0 {
+            return;
+        }
+        let [red, green, blue, shining, weights] = level.dispatch(Ask { cache: self, points });
+        let mut left = points.wanted;
+        while left != 0 {
+            let i = left.trailing_zeros() as usize % POINTS;
+            left &= left - 1;
+            let weight = weights[i];
+            known[i] = (weight > 0.0).then(|| Indirect {
+                irradiance: Rgb::new(red[i], green[i], blue[i]) / weight,
+                shining: shining[i] / weight,
+            });
+        }
+    }
+}
+
+/// The sums over all records: of the irradiance of each channel, of what shines, of weights.
+struct Ask<'a> {
+    cache: &'a IrradianceCache<'a>,
+    points: &'a Points,
+}
+
+impl Kernel for Ask<'_> {
+    type Out = [[f32; POINTS]; 5];
+
+    #[inline(always)]
+    fn run<S: Simd>(self, simd: S) -> Self::Out {
+        let Self { cache, points: Points { position, normal, wanted } } = self;
+        let ([x, y, z], [u, v, w]) = (position, normal);
+        let asked = Asked {
+            position: [simd.load16(x), simd.load16(y), simd.load16(z)],
+            normal: [simd.load16(u), simd.load16(v), simd.load16(w)],
+        };
+        let (tree, records, least_cos) = cache.parts();
+        let mut sums = Sums { simd, records, least_cos, asked, sums: [simd.splat16(0.0); 5] };
+        tree.at_all(position, *wanted, &mut sums);
+        let [a, b, c, d, e] = sums.sums;
+        [a.to_array(), b.to_array(), c.to_array(), d.to_array(), e.to_array()]
+    }
+}
+
+/// What has been asked, and what records have said of it so far.
+struct Sums<'a, S: Simd> {
+    simd: S,
+    records: &'a [Record],
+    least_cos: f32,
+    asked: Asked<S::F16>,
+    sums: [S::F16; 5],
+}
+
+impl<S: Simd> Visit for Sums<'_, S> {
+    #[inline(always)]
+    fn visit(&mut self, record: u32, points: u32) {
+        let Some(record) = self.records.get(record as usize) else { return };
+        let width = Sixteen(self.simd);
+        let (speaks, voice) = record.listen(width, &self.asked, self.least_cos, record.overlap);
+        let speaks = speaks & self.simd.mask16(points);
+        if !speaks.any() {
+            return;
+        }
+        let [red, green, blue] = record.said(width, &voice);
+        let terms = [red, green, blue, self.simd.splat16(record.shining), self.simd.splat16(1.0)];
+        for (sum, term) in self.sums.iter_mut().zip(terms) {
+            *sum = (*sum + voice.weight * term).select(speaks, *sum);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cache::irradiance::SECTORS;
+    use crate::geometry::Bounds;
+    use crate::memory::{Arena, Line};
+    use crate::sampling::Random;
+    use std::vec;
+
+    const RECORDS: u32 = 500;
+
+    /// Somewhere in the unit cube: one of the floors at z = 0, 1/2 and 1.
+    fn place(random: &Random, i: u32) -> Vec3 {
+        let [x, y, z] = [0, 1, 2].map(|k| random.single(3 * i + k));
+        Vec3::new(x, y, libm::floorf(3.0 * z) * 0.5)
+    }
+
+    /// Up to a tenth from upright.
+    fn normal(random: &Random, i: u32) -> Vec3 {
+        let [x, y] = [0, 1].map(|k| 0.2 * (random.single(2 * i + k) - 0.5));
+        Vec3::new(x, y, 1.0).normalize()
+    }
+
+    /// Of all sizes, fenced here and there, some of which weigh by what they know of themselves.
+    fn record(i: u32) -> Record {
+        let random = Random::new(7, i);
+        let number = |k: u32| random.single(1000 + k);
+        let (normal, axis) = (normal(&random, 1), Vec3::X);
+        let radius = 0.02 + 0.2 * number(1);
+        Record {
+            position: place(&random, 0).to_array(),
+            normal: normal.to_array(),
+            axis: (axis - axis.dot(normal) * normal).normalize().to_array(),
+            irradiance: [number(2), number(3), number(4)],
+            gradient: [[number(5) - 0.5, number(6)]; 3],
+            rotation: [[number(7), number(8) - 0.5]; 3],
+            bend: [number(9) - 0.5, number(10)],
+            radii: [radius, 1.5 * radius],
+            overlap: 1.0 + number(11),
+            reach: 1.5 * radius * (1.0 + number(11)),
+            allowed: if number(12) < 0.5 { 0.0 } else { 1e3 },
+            noise: 0.01 * number(13),
+            error: number(14),
+            shining: number(15),
+            fence: core::array::from_fn(|k| if number(16) < 0.3 { 255 } else { (200 + 4 * k) as u8 }),
+            ..Record::default()
+        }
+    }
+
+    /// What is known of `points` at all levels: of each as of it alone. How many are known.
+    #[track_caller]
+    fn check(cache: &IrradianceCache, points: &[(Vec3, Vec3)]) -> usize {
+        let mut asked = Points::NONE;
+        points.iter().enumerate().for_each(|(i, &(position, normal))| asked.set(i, position, normal));
+        let alone = |i: usize| points.get(i).and_then(|&(position, normal)| cache.at(position, normal));
+        let wanted: [Option<Indirect>; POINTS] = core::array::from_fn(alone);
+        for level in Level::detect().and_below() {
+            let mut known = [None; POINTS];
+            cache.at_all(level, &asked, &mut known);
+            assert_eq!(known, wanted, "{}", level.name());
+        }
+        wanted.iter().flatten().count()
+    }
+
+    #[test]
+    fn points_find_together_what_each_finds_alone() {
+        assert_eq!(SECTORS, 16);
+        let bounds = Bounds { min: Vec3::ZERO, max: Vec3::ONE };
+        let mut lines = vec![Line([0; 64]); IrradianceCache::footprint(RECORDS as usize).bytes() / 64];
+        let mut arena = Arena::new(bytemuck::cast_slice_mut(&mut lines));
+        let mut cache = IrradianceCache::new(&bounds, RECORDS as usize, &mut arena).unwrap();
+        assert_eq!(check(&cache, &[(Vec3::splat(0.5), Vec3::Z)]), 0);
+        (0..RECORDS).for_each(|i| _ = cache.insert(record(i)));
+        let random = Random::new(5, 5);
+        let mut known = 0;
+        for i in 0..500u32 {
+            // Neighbours, and points that have nothing to do with each other; also fewer than sixteen, and none.
+            let size = if i % 2 == 0 { 0.02 } else { 1.0 };
+            let middle = place(&random, i);
+            let points: vec::Vec<_> = (0..(i as usize * 7 % 17) as u32)
+                .map(|k| {
+                    let beside = place(&random, 10_000 + 16 * i + k);
+                    let position = middle + size * Vec3::new(beside.x - middle.x, beside.y - middle.y, 0.0);
+                    (position, normal(&random, 90_000 + 16 * i + k))
+                })
+                .collect();
+            known += check(&cache, &points);
+        }
+        assert!(known > 3000, "{known}");
+        let nowhere = [(Vec3::splat(2.0), Vec3::Z), (Vec3::NAN, Vec3::Z), (Vec3::NEG_INFINITY, Vec3::Z)];
+        assert_eq!(check(&cache, &nowhere), 0);
+    }
+}
