@@ -115,7 +115,8 @@ impl<'m> Octree<'m> {
         while level > 0 && (0..3).any(|i| touches(level, i) > 1) {
             level -= 1;
         }
-        let spare = self.links.len().saturating_sub(self.used_links + others.saturating_mul(CELLS));
+        let spare =
+            self.links.len().saturating_sub(self.used_links.saturating_add(others.saturating_mul(CELLS)));
         for finer in (level + 1..=DEPTH.min(level + FINER)).rev() {
             let cells = (0..3).map(|i| touches(finer, i) as usize + 1).product::<usize>();
             // Of each level the way down has no more nodes than there are cells.
