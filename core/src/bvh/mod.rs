@@ -14,6 +14,7 @@ mod ready;
 mod references;
 mod split;
 mod stream;
+pub mod survey;
 mod walk;
 
 pub use join::{Join, Serial};

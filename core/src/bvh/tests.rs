@@ -1,6 +1,8 @@
 //! Every way of tracing against brute force, on scenes that are hard on a hierarchy.
 
+use super::survey::{POINTS, Site, Survey};
 use super::*;
+use crate::geometry::Frame;
 use crate::memory::Line;
 use crate::scene::Triangle;
 use glam::Vec3;
@@ -277,4 +279,67 @@ fn a_copy_takes_exactly_what_it_says() {
     for ray in random_rays(100, Vec3::ZERO) {
         assert_eq!(bvh.nearest(Level::BASELINE, &ray), copy.nearest(Level::BASELINE, &ray));
     }
+}
+
+/// A survey's `points` are as far as this from the middle, along both axes.
+const ASIDE: f32 = 0.6;
+
+#[test]
+fn what_a_survey_is_sure_of_rays_find() {
+    let mut random = Random(7);
+    let (mut low, mut there) = (0, 0);
+    for soup in [random_soup(300, 3.0, Vec3::ZERO), random_soup(30, 9.0, Vec3::splat(50.0)), sheet(40)] {
+        let mesh = soup.mesh();
+        let mut memory = lines(Bvh::footprint(mesh.triangles.len()).bytes());
+        let bvh = Bvh::build(&mesh, &mut Arena::new(bytemuck::cast_slice_mut(&mut memory))).unwrap();
+        for _ in 0..3000 {
+            let [a, b, c] = mesh.corners(random.bits() % mesh.triangles.len() as u32);
+            let (u, v) = (0.5 * random.unit(), 0.5 * random.unit());
+            let frame = Frame::from_normal((b - a).cross(c - a).normalize());
+            let (radius, above) = (0.01 + random.unit(), 1e-4);
+            let place = a + u * (b - a) + v * (c - a) + above * frame.normal;
+            let points = [[ASIDE, -ASIDE].map(|x| x * radius); 2];
+            let points = [[points[0]; 4].as_flattened(), &points[1].map(|y| [y; 4]).concat()]
+                .map(|axis| core::array::from_fn(|i| axis[i]));
+            let site = Site { place, frame, reach: radius, points, depth: 0.3 * radius };
+            let survey = bvh.survey(&site);
+            let level = Level::detect();
+            low += u32::from(!survey.rises);
+            for _ in 0..if survey.rises { 0 } else { 16 } {
+                let local = random.point(2.0).with_z(random.unit());
+                let way = radius / 3f32.sqrt() * frame.to_world(local.normalize());
+                assert!(!bvh.occluded(level, &Ray::segment(place, way, 1.0)), "{site:?} {way}");
+            }
+            for i in (0..POINTS).filter(|i| survey.surface >> i & 1 != 0) {
+                let [x, y] = points.map(|axis| axis[i]);
+                let from = place + frame.to_world(Vec3::new(x, y, 1.001 * site.depth));
+                let down = Ray::segment(from, -frame.normal, 2.002 * site.depth);
+                assert!(bvh.occluded(level, &down), "{site:?} {i}");
+                there += 1;
+            }
+        }
+    }
+    assert!(low > 1000 && there > 10_000, "{low} {there}");
+}
+
+#[test]
+fn on_a_floor_of_many_triangles_a_survey_sees_it_all_but_at_the_edge_and_under_a_wall() {
+    let at = |x: i32, z: i32| Vec3::new(x as f32, 0.0, z as f32);
+    let squares = (0..64).flat_map(|i| {
+        let (x, z) = (i % 8, i / 8);
+        [[at(x, z), at(x, z + 1), at(x + 1, z)], [at(x + 1, z), at(x, z + 1), at(x + 1, z + 1)]]
+    });
+    let wall = [at(2, 0), at(2, 0) + Vec3::Y, at(2, 8)];
+    let soup = Soup::of(squares.chain([wall]));
+    let mut memory = lines(Bvh::footprint(soup.triangles.len()).bytes());
+    let bvh = Bvh::build(&soup.mesh(), &mut Arena::new(bytemuck::cast_slice_mut(&mut memory))).unwrap();
+    let frame = Frame { tangent: Vec3::X, bitangent: Vec3::NEG_Z, normal: Vec3::Y };
+    let points = [[0.9, -0.9, 0.9, -0.9, 0.9, -0.9, 0.9, -0.9], [0.8; POINTS]];
+    let look = |x: f32| {
+        let place = Vec3::new(x, 1e-3, 4.3);
+        bvh.survey(&Site { place, frame, reach: 1.0, points, depth: 0.1 })
+    };
+    assert_eq!(look(5.3), Survey::OPEN);
+    assert_eq!(look(7.3), Survey { rises: false, surface: 0xaa });
+    assert!(look(2.7).rises && look(1.3).rises);
 }

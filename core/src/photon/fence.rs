@@ -9,7 +9,7 @@
 use super::gather::Falloff;
 use crate::geometry::Frame;
 use crate::sampling::sin_cos_turns;
-use glam::Vec3;
+use glam::{Vec2, Vec3};
 use halflight_simd::{Lanes, Mask, Simd};
 
 /// Probes, and parts of a disc between them.
@@ -43,27 +43,43 @@ impl Fence {
     /// How far probes must go, in shares of the radius, so that no wall slips between two of them.
     pub const FARTHEST: f32 = 1.0 / BETWEEN;
 
-    /// Around `normal`, turned by `turns`: the directions of the probes, of unit length, and what a fence will be when
-    /// it is known how far they get: in shares of the radius, infinite where they meet nothing. They must go as far as
-    /// [`Fence::FARTHEST`] of them.
-    pub fn probes(normal: Vec3, turns: f32) -> ([Vec3; PROBES], impl FnOnce([f32; PROBES]) -> Fence) {
-        let frame = Frame::from_normal(normal);
+    /// The directions of the probes, of unit length, along the axes of [`Fence::frame`]. They must go as far as
+    /// [`Fence::FARTHEST`] of the radius.
+    pub const WAYS: [Vec2; PROBES] = {
+        const D: f32 = core::f32::consts::FRAC_1_SQRT_2;
+        let way = Vec2::new;
+        [
+            way(1.0, 0.0),
+            way(D, D),
+            way(0.0, 1.0),
+            way(-D, D),
+            way(-1.0, 0.0),
+            way(-D, -D),
+            way(0.0, -1.0),
+            way(D, -D),
+        ]
+    };
+
+    /// The frame around `normal` whose other axes, turned by `turns`, probes and parts go by.
+    pub fn frame(normal: Vec3, turns: f32) -> Frame {
+        let Frame { tangent, bitangent, .. } = Frame::from_normal(normal);
         let (sin, cos) = sin_cos_turns(turns);
-        let x = cos * frame.tangent + sin * frame.bitangent;
-        let y = cos * frame.bitangent - sin * frame.tangent;
-        let diagonal = core::f32::consts::FRAC_1_SQRT_2;
-        let (up, down) = (diagonal * (x + y), diagonal * (x - y));
-        ([x, up, y, -down, -x, -up, -y, down], move |shares| Fence::new([x, y], shares))
+        Frame { tangent: cos * tangent + sin * bitangent, bitangent: cos * bitangent - sin * tangent, normal }
     }
 
     /// From the shares of the radius that probes get along, infinite where they meet nothing.
-    fn new(axes: [Vec3; 2], shares: [f32; PROBES]) -> Self {
+    pub fn new(frame: &Frame, shares: [f32; PROBES]) -> Self {
         let mut reach = [1.0; PROBES];
         for (i, reach) in reach.iter_mut().enumerate() {
             let nearer = shares[i].min(shares[(i + 1) % PROBES]);
             *reach = (BETWEEN * nearer).clamp(0.0, 1.0);
         }
-        Self { axes, reach }
+        Self { axes: [frame.tangent, frame.bitangent], reach }
+    }
+
+    /// Of a disc that is seen all over.
+    pub fn open(frame: &Frame) -> Self {
+        Self::new(frame, [f32::INFINITY; PROBES])
     }
 
     /// Whether the whole disc is seen.
@@ -119,22 +135,20 @@ mod tests {
     #[test]
     fn parts_lie_between_their_probes() {
         for turns in [0.0, 0.1, 0.77] {
-            let (ways, _) = Fence::probes(Vec3::Z, turns);
-            let (x, y) = (ways[0], ways[2]);
-            for i in 0..PROBES {
-                let next = ways[(i + 1) % PROBES];
-                assert!((ways[i].dot(next) - core::f32::consts::FRAC_1_SQRT_2).abs() < 1e-6);
-                let middle = ways[i] + next;
-                let (u, v) = (middle.dot(x), middle.dot(y));
-                assert_eq!(PARTS[i], [u < 0.0, v < 0.0, u.abs() < v.abs()], "{i}");
-            }
+            let Frame { tangent, bitangent, normal } = Fence::frame(Vec3::Z, turns);
+            assert!((tangent.cross(bitangent) - normal).length() < 1e-6);
+        }
+        for i in 0..PROBES {
+            let [way, next] = [i, (i + 1) % PROBES].map(|i| Fence::WAYS[i]);
+            assert!((way.dot(next) - core::f32::consts::FRAC_1_SQRT_2).abs() < 1e-6);
+            let [u, v] = (way + next).to_array();
+            assert_eq!(PARTS[i], [u < 0.0, v < 0.0, u.abs() < v.abs()], "{i}");
         }
     }
 
     #[test]
     fn what_is_seen_of_a_disc_is_what_weights_integrate_to() {
-        let (_, fence) = Fence::probes(Vec3::Y, 0.3);
-        let open = fence([f32::INFINITY; PROBES]);
+        let open = Fence::open(&Fence::frame(Vec3::Y, 0.3));
         let half = Fence { reach: [0.5; PROBES], ..open };
         assert!(open.is_open() && !half.is_open());
         for (falloff, expected) in

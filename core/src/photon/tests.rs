@@ -405,9 +405,14 @@ fn a_fence_leaves_out_what_is_behind_it_and_makes_up_for_it() {
             let level = Level::detect();
             let open = map.gather(level, &disc, &Uniform(Rgb::ONE));
             // A wall along x = 0.55: probes get as far as it is on their way.
-            let (ways, fence) = Fence::probes(Vec3::Z, 0.2);
-            let wall = |way: Vec3| if way.x > 0.0 { 0.05 / way.x / 0.2 } else { f32::INFINITY };
-            let fence = fence(ways.map(wall));
+            let frame = Fence::frame(Vec3::Z, 0.2);
+            let fence = Fence::new(
+                &frame,
+                Fence::WAYS.map(|way| {
+                    let x = frame.to_world(way.extend(0.0)).x;
+                    if x > 0.0 { 0.05 / x / 0.2 } else { f32::INFINITY }
+                }),
+            );
             let fenced = map.gather_within(level, &disc, &fence, &Uniform(Rgb::ONE));
             assert!(fenced.photons < open.photons * 9 / 10, "{fenced:?} {open:?}");
             // As many as without a fence, less a third: 2.5 % is four standard deviations.

@@ -3,9 +3,10 @@
 use super::shoot::holds_photons;
 use crate::bsdf::{Bsdf, Features};
 use crate::bvh::Bvh;
+use crate::bvh::survey::{Site, Survey};
 use crate::camera::Camera;
 use crate::geometry::Ray;
-use crate::photon::{Disc, FLATNESS, Falloff, Fence, PhotonMap, Uniform};
+use crate::photon::{Density, Disc, FLATNESS, Falloff, Fence, PROBES, PhotonMap, Uniform};
 use crate::scene::SurfacePoint;
 use crate::{Level, Rgb};
 use core::f32::consts::FRAC_1_PI;
@@ -86,21 +87,22 @@ impl<'a> PhotonLight<'a> {
             radius: self.radius * distance,
             falloff: self.falloff,
         };
-        if self.is_sparse && self.map.gather(level, &disc, &Uniform(Rgb::ONE)).photons == 0 {
+        let density = self.is_sparse.then(|| self.map.gather(level, &disc, &Uniform(Rgb::ONE)));
+        if density.is_some_and(|density| density.photons == 0) {
             return Some(Rgb::ZERO);
         }
-        Some(reflected::<F>(self.map, (bvh, level), &disc, point, bsdf, wo, turns))
+        Some(reflected::<F>(self.map, (bvh, level), (&disc, density), (point, bsdf), wo, turns))
     }
 }
 
-/// What `point` reflects to `wo` of the light of the photons on `disc`, as far as it is seen from there.
+/// What `point` reflects to `wo` of the light of the photons on `disc`, as far as it is seen from there; `all` is the
+/// density of all of them, where it is known.
 #[inline]
 pub(super) fn reflected<F: Features>(
     map: &PhotonMap,
     (bvh, level): (&Bvh, Level),
-    disc: &Disc,
-    point: &SurfacePoint,
-    bsdf: &Bsdf,
+    (disc, all): (&Disc, Option<Density>),
+    (point, bsdf): (&SurfacePoint, &Bsdf),
     wo: Vec3,
     turns: f32,
 ) -> Rgb {
@@ -108,8 +110,11 @@ pub(super) fn reflected<F: Features>(
     let fence = fence(bvh, level, origin, disc, turns);
     let is_flat = point.frame.normal == point.geometric_normal;
     if let (Bsdf::Diffuse(diffuse), true) = (bsdf, is_flat) {
-        let response = Uniform(diffuse.reflectance * FRAC_1_PI);
-        return map.gather_within(level, disc, &fence, &response).radiance;
+        let response = diffuse.reflectance * FRAC_1_PI;
+        return match all {
+            Some(all) if fence.is_open() => all.radiance * response,
+            _ => map.gather_within(level, disc, &fence, &Uniform(response)).radiance,
+        };
     }
     // A photon's power has met the triangle: the cosine is in it already, and that of the triangle's normal.
     let response = |from: Vec3| {
@@ -124,22 +129,45 @@ pub(super) fn reflected<F: Features>(
 
 /// Looks for walls on `disc`, and for its edges, by probes from `origin`, just above its middle.
 pub(super) fn fence(bvh: &Bvh, level: Level, origin: Vec3, disc: &Disc, turns: f32) -> Fence {
-    let (ways, fence) = Fence::probes(disc.normal, turns);
+    let frame = Fence::frame(disc.normal, turns);
     let radius = disc.radius;
     // Where there is no surface within the thickness of the disc, there are no photons, and no area.
     let depth = FLATNESS * radius;
-    let reach = ways.map(|way| {
-        // One by one: the setup of a batch costs more than it gains for eight.
-        let along = Ray::segment(origin, way + LIFT * disc.normal, Fence::FARTHEST * radius);
-        let hit = bvh.nearest(level, &along);
-        let reach = if hit.is_some() { hit.t / radius } else { f32::INFINITY };
+    let reach = Fence::FARTHEST * radius;
+    // Most discs lie in the open, which one look around tells.
+    let site = Site {
+        place: origin,
+        frame,
+        reach: (1.0 + LIFT) * reach,
+        points: [
+            Fence::WAYS.map(|way| BEFORE * reach * way.x),
+            Fence::WAYS.map(|way| BEFORE * reach * way.y),
+        ],
+        depth,
+    };
+    let survey = bvh.survey(&site);
+    if survey == Survey::OPEN {
+        return Fence::open(&frame);
+    }
+    let mut shares = [f32::INFINITY; PROBES];
+    for (i, share) in shares.iter_mut().enumerate() {
+        let way = frame.to_world(Fence::WAYS[i].extend(0.0));
+        if survey.rises {
+            // One by one: the setup of a batch costs more than it gains for eight.
+            let hit = bvh.nearest(level, &Ray::segment(origin, way + LIFT * disc.normal, reach));
+            if hit.is_some() {
+                *share = hit.t / radius;
+            }
+        } else if survey.surface >> i & 1 != 0 {
+            continue;
+        }
         let is_there = |share: f32| {
             let above = origin + share * radius * way + depth * disc.normal;
             bvh.occluded(level, &Ray::segment(above, -disc.normal, 2.0 * depth))
         };
-        let farthest = reach.min(Fence::FARTHEST);
+        let farthest = share.min(Fence::FARTHEST);
         if is_there(BEFORE * farthest) {
-            return reach;
+            continue;
         }
         let (mut low, mut high) = (0.0, farthest);
         for _ in 0..HALVINGS {
@@ -150,7 +178,7 @@ pub(super) fn fence(bvh: &Bvh, level: Level, origin: Vec3, disc: &Disc, turns: f
                 high = middle;
             }
         }
-        0.5 * (low + high)
-    });
-    fence(reach)
+        *share = 0.5 * (low + high);
+    }
+    Fence::new(&frame, shares)
 }

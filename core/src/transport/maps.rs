@@ -189,7 +189,7 @@ impl<'a> GatherLight<'a> {
         }
         let disc =
             Disc { place: point.position, normal, radius: radius.min(self.farthest), falloff: self.falloff };
-        Some(reflected::<F>(self.global, (bvh, level), &disc, point, bsdf, wo, turns))
+        Some(reflected::<F>(self.global, (bvh, level), (&disc, None), (point, bsdf), wo, turns))
     }
 }
 

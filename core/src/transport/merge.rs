@@ -162,9 +162,10 @@ impl<'a> Merging<'a> {
             falloff: Falloff::Epanechnikov,
         };
         // Most places have no photon near them, and need not look for walls.
-        if map.gather(level, &disc, &Uniform(Rgb::ONE)).photons == 0 {
+        let density = map.gather(level, &disc, &Uniform(Rgb::ONE));
+        if density.photons == 0 {
             return Rgb::ZERO;
         }
-        reflected::<F>(map, (bvh, level), &disc, point, bsdf, wo, turns())
+        reflected::<F>(map, (bvh, level), (&disc, Some(density)), (point, bsdf), wo, turns())
     }
 }

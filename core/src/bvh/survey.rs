@@ -1,0 +1,130 @@
+//! What lies around a place on a surface, in one walk: whether anything rises above its plane, and where the surface
+//! goes on. Sixteen short rays tell the same (`transport/density.rs`), and cost ten times as much.
+//!
+//! It is sure where it says that nothing rises, and that the surface goes on. Where it says otherwise, rays may find
+//! that it is not so.
+
+use super::Bvh;
+use super::layout::{Node, WIDTH};
+use super::leaf::corners_of;
+use crate::geometry::Frame;
+use glam::Vec3;
+
+/// Points at which it is asked for the surface.
+pub const POINTS: usize = 8;
+
+/// Children that may wait. A place around which more do is too crowded to be sure of anything.
+const WAITING: usize = 64;
+
+/// Where to look.
+#[derive(Clone, Copy, Debug)]
+pub struct Site {
+    /// The middle.
+    pub place: Vec3,
+    /// Whose z axis is the normal.
+    pub frame: Frame,
+    /// Half the edge of the cube around it, along the axes of the world, of which all is looked at.
+    pub reach: f32,
+    /// Points on the plane, from the middle: their places along the other two axes of the frame.
+    pub points: [[f32; POINTS]; 2],
+    /// How far from the plane the surface may be there, as far as it is within the cube.
+    pub depth: f32,
+}
+
+/// What is there.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Survey {
+    /// Something may be above the plane.
+    pub rises: bool,
+    /// The surface is there: bit i for point i.
+    pub surface: u32,
+}
+
+impl Survey {
+    /// Nothing rises, and the surface is all there.
+    pub const OPEN: Survey = Survey { rises: false, surface: (1 << POINTS) - 1 };
+}
+
+impl Bvh<'_> {
+    /// What lies around `site`. As soon as something rises nothing else counts.
+    pub fn survey(&self, site: &Site) -> Survey {
+        let (lo, hi) = (site.place - Vec3::splat(site.reach), site.place + Vec3::splat(site.reach));
+        let mut waiting = [0u32; WAITING];
+        let mut count = 1usize;
+        let mut survey = Survey { rises: false, surface: 0 };
+        while let Some(&index) = count.checked_sub(1).and_then(|last| waiting.get(last)) {
+            count -= 1;
+            let Some(node) = self.nodes.get(index as usize) else { break };
+            let mut met = overlapping(node, lo, hi);
+            while met != 0 {
+                let child = node.child(met.trailing_zeros() as usize);
+                met &= met - 1;
+                if child.is_leaf() {
+                    let (first, of) = child.triangles();
+                    let runs = self.coordinates.get(9 * first..9 * (first + of)).unwrap_or(&[]);
+                    for i in 0..of {
+                        site.meet(corners_of(runs, of, i).map(Vec3::from), &mut survey);
+                    }
+                } else if let Some(slot) = waiting.get_mut(count) {
+                    *slot = child.0;
+                    count += 1;
+                } else {
+                    survey.rises = true;
+                }
+            }
+            if survey.rises {
+                break;
+            }
+        }
+        survey
+    }
+}
+
+/// Which children of a node have a part between `lo` and `hi`.
+#[inline]
+fn overlapping(node: &Node, lo: Vec3, hi: Vec3) -> u32 {
+    let mut inside = [1; WIDTH];
+    for (axis, (lo, hi)) in lo.to_array().into_iter().zip(hi.to_array()).enumerate() {
+        let (from, to) = (&node.rows[2 * axis], &node.rows[2 * axis + 1]);
+        for ((inside, from), to) in inside.iter_mut().zip(from).zip(to) {
+            *inside &= u32::from((*from <= hi) & (*to >= lo));
+        }
+    }
+    bits(inside)
+}
+
+#[inline]
+fn bits(lanes: [u32; 8]) -> u32 {
+    lanes.iter().rev().fold(0, |bits, lane| bits << 1 | lane)
+}
+
+impl Site {
+    /// Takes note of one triangle.
+    #[inline]
+    fn meet(&self, corners: [Vec3; 3], survey: &mut Survey) {
+        let [a, b, c] = corners;
+        let from = a.min(b).min(c) - self.place;
+        let to = a.max(b).max(c) - self.place;
+        if from.max_element() > self.reach || to.min_element() < -self.reach {
+            return;
+        }
+        let [a, b, c] = corners.map(|corner| self.frame.to_local(corner - self.place));
+        // What is not a number rises.
+        if !a.z.max(b.z).max(c.z).le(&0.0) {
+            survey.rises = true;
+            return;
+        }
+        // Twice the areas that a point makes with the sides, which are linear in it; and what these are in weights of
+        // the corners' heights.
+        let side = |from: Vec3, to: Vec3| [from.x * to.y - from.y * to.x, from.y - to.y, to.x - from.x];
+        let sides = [side(b, c), side(c, a), side(a, b)];
+        let mut surface = [0; POINTS];
+        for ((surface, x), y) in surface.iter_mut().zip(&self.points[0]).zip(&self.points[1]) {
+            let [u, v, w] = sides.map(|[at, along_x, along_y]| at + along_x * x + along_y * y);
+            let inside = (u > 0.0) & (v > 0.0) & (w > 0.0) | (u < 0.0) & (v < 0.0) & (w < 0.0);
+            let height = (u * a.z + v * b.z + w * c.z).abs();
+            *surface = u32::from(inside & (height <= self.depth * (u + v + w).abs()));
+        }
+        survey.surface |= bits(surface);
+    }
+}
