@@ -281,8 +281,9 @@ fn a_copy_takes_exactly_what_it_says() {
     }
 }
 
-/// A survey's `points` are as far as this from the middle, along both axes.
-const ASIDE: f32 = 0.6;
+/// Points of a survey, in radii.
+const POINTS_ASIDE: [[f32; POINTS]; 2] =
+    [[0.6, 0.0, -0.6, 0.0, 0.4, -0.4, 0.3, -0.1], [0.0, 0.6, 0.0, -0.6, 0.4, 0.4, -0.5, 0.0]];
 
 #[test]
 fn what_a_survey_is_sure_of_rays_find() {
@@ -298,9 +299,7 @@ fn what_a_survey_is_sure_of_rays_find() {
             let frame = Frame::from_normal((b - a).cross(c - a).normalize());
             let (radius, above) = (0.01 + random.unit(), 1e-4);
             let place = a + u * (b - a) + v * (c - a) + above * frame.normal;
-            let points = [[ASIDE, -ASIDE].map(|x| x * radius); 2];
-            let points = [[points[0]; 4].as_flattened(), &points[1].map(|y| [y; 4]).concat()]
-                .map(|axis| core::array::from_fn(|i| axis[i]));
+            let points = POINTS_ASIDE.map(|axis| axis.map(|at| at * radius));
             let site = Site { place, frame, reach: radius, points, depth: 0.3 * radius };
             let survey = bvh.survey(&site);
             let level = Level::detect();

@@ -138,11 +138,11 @@ mod tests {
             let Frame { tangent, bitangent, normal } = Fence::frame(Vec3::Z, turns);
             assert!((tangent.cross(bitangent) - normal).length() < 1e-6);
         }
-        for i in 0..PROBES {
+        for (i, part) in PARTS.into_iter().enumerate() {
             let [way, next] = [i, (i + 1) % PROBES].map(|i| Fence::WAYS[i]);
             assert!((way.dot(next) - core::f32::consts::FRAC_1_SQRT_2).abs() < 1e-6);
             let [u, v] = (way + next).to_array();
-            assert_eq!(PARTS[i], [u < 0.0, v < 0.0, u.abs() < v.abs()], "{i}");
+            assert_eq!(part, [u < 0.0, v < 0.0, u.abs() < v.abs()], "{i}");
         }
     }
 

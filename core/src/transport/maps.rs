@@ -17,6 +17,7 @@ use super::wave::Share;
 use crate::bsdf::{Bsdf, Features};
 use crate::bvh::Bvh;
 use crate::geometry::Ray;
+use crate::light::luminance;
 use crate::memory::{Arena, Footprint, Line, OutOfMemory};
 use crate::photon::{ALIKE, Disc, FLATNESS, Falloff, Neighbours, Photon, PhotonMap, Uniform};
 use crate::sampling::mix;
@@ -44,9 +45,11 @@ const BLUR: f32 = SQRT_2;
 /// The least length of a gather ray that ends in the map, in radii of the discs there.
 const SHORTEST: f32 = 1.5;
 
-/// Largest squared distance of the nearest irradiance in that of the last of [`CHOICE`]: among even ones it is less in 99
-/// of 100 places. Where it is more, the place is beside a bright spot, not in it.
-const BESIDE: f32 = 0.5;
+/// How far from the middle of a disc the centroid of the irradiances that a gather ray chooses from may be, and that of
+/// the light of the photons of an estimate, in radii. Chance puts one in thirteen of the first farther off where all is
+/// even, one in a hundred of the second; on a straight edge of light both are at 0.42.
+const EVEN_CHOICE: f32 = 0.4;
+const EVEN_LIGHT: f32 = 0.2;
 
 /// Working memory for a choice, on the stack: [`Neighbours::footprint`] of [`CHOICE`].
 const LINES: usize = 32;
@@ -116,10 +119,26 @@ impl<'a> Irradiances<'a> {
         if fence.share(self.falloff) < LEAST_SEEN {
             return Photon::NONE;
         }
+        if fence.is_open() && !self.is_even(&disc, neighbours) {
+            return Photon::NONE;
+        }
         let response = Uniform(Rgb::splat(factor));
         let density = self.global.gather_within(self.level, &disc, &fence, &response);
         let tells = if fence.is_open() { normal } else { -normal };
         Photon::new(place, tells, normal, density.radiance)
+    }
+
+    /// Whether light comes to `disc`, of those nearest photons, on all sides of its middle alike.
+    fn is_even(&self, disc: &Disc, neighbours: &Neighbours) -> bool {
+        let (mut sum, mut moment) = (0.0, Vec3::ZERO);
+        for photon in neighbours.iter().filter_map(|(index, _)| self.global.get(index)) {
+            if photon.normal().dot(disc.normal) >= ALIKE {
+                let power = luminance(photon.power());
+                sum += power;
+                moment += power * (photon.position() - disc.place);
+            }
+        }
+        moment.length() <= EVEN_LIGHT * disc.radius * sum
     }
 }
 
@@ -167,15 +186,22 @@ impl<'a> GatherLight<'a> {
         let radius = BLUR * libm::sqrtf(squared);
         let normal = point.geometric_normal;
         let mut nearest: Option<(Photon, (f32, u32))> = None;
+        let (mut count, mut moment) = (0.0, Vec3::ZERO);
         for (index, squared) in neighbours.iter() {
             let Some(photon) = self.irradiances.get(index) else { continue };
-            let is_alike = photon.normal().dot(normal) >= ALIKE
-                && (photon.position() - point.position).dot(normal).abs() <= FLATNESS * radius;
-            if is_alike && nearest.is_none_or(|(_, least)| (squared, index) < least) {
+            let offset = photon.position() - point.position;
+            if photon.normal().dot(normal) < ALIKE || offset.dot(normal).abs() > FLATNESS * radius {
+                continue;
+            }
+            count += 1.0;
+            moment += offset;
+            if nearest.is_none_or(|(_, least)| (squared, index) < least) {
                 nearest = Some((photon, (squared, index)));
             }
         }
-        let (photon, _) = nearest.filter(|(_, (least, _))| *least <= BESIDE * squared)?;
+        // Beside a bright spot all irradiances are of the spot.
+        let is_even = moment.length_squared() <= EVEN_CHOICE * EVEN_CHOICE * count * count * squared;
+        let (photon, _) = nearest.filter(|_| is_even)?;
         if photon.direction().dot(photon.normal()) < 0.0 {
             let from = point.position + point.error * normal;
             let above = ABOVE * radius + 16.0 * f32::EPSILON * from.abs().max_element();
