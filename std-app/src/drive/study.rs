@@ -59,8 +59,8 @@ pub struct MetricError {
 /// Records are as many as asked for within this share.
 const TOLERANCE: f64 = 0.02;
 
-/// Attempts at that.
-const ATTEMPTS: usize = 9;
+/// Attempts at that: near the end it is chance whether one more record fits, by some hundredths of few hundred records.
+const ATTEMPTS: usize = 20;
 
 /// The longest step of an attempt, as the logarithm of the error: to a hundred times as much.
 const FARTHEST: f64 = 4.605;
@@ -234,7 +234,8 @@ mod tests {
                         break;
                     }
                 }
-                assert!((records as f64 / wanted as f64 - 1.0).abs() < 0.05, "{power} {wanted}: {records}");
+                let off = (records as f64 / wanted as f64 - 1.0).abs();
+                assert!(off <= TOLERANCE, "{power} {wanted}: {records}");
             }
         }
     }
