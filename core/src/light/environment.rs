@@ -1,7 +1,7 @@
 //! Light from infinitely far: what a ray sees that leaves the scene, and how to find its bright parts.
 
 use super::Environment;
-use super::window::Window;
+use super::window::{Aim, Window};
 use crate::Rgb;
 use crate::geometry::Frame;
 use crate::memory::{Arena, Footprint, OutOfMemory};
@@ -166,20 +166,14 @@ impl<'m> EnvironmentSampler<'m> {
         Ok((mean > 0.0).then_some(Self { map: Some(map), mean }))
     }
 
-    /// A direction and its density in solid angle, by what is seen through `window`.
+    /// A direction and its density in solid angle, where a window has chosen.
     #[inline]
-    pub(super) fn sample_through(
-        &self,
-        environment: &Environment,
-        window: &Window,
-        u: [f32; 2],
-    ) -> Option<(Vec3, f32)> {
-        let (u, density) = window.warp(u);
-        let (direction, pdf) = self.sample(environment, Vec3::ZERO, u)?;
-        Some((direction, pdf * density))
+    pub(super) fn sample_at(&self, environment: &Environment, aim: Aim) -> Option<(Vec3, f32)> {
+        let (direction, pdf) = self.sample(environment, Vec3::ZERO, aim.place)?;
+        Some((direction, pdf * aim.density))
     }
 
-    /// The density of [`EnvironmentSampler::sample_through`] for unit `direction`.
+    /// The density of [`EnvironmentSampler::sample_at`] for unit `direction`, where `window` chose.
     #[inline]
     pub(super) fn pdf_through(&self, environment: &Environment, window: &Window, direction: Vec3) -> f32 {
         let Some(map) = &self.map else {

@@ -8,7 +8,7 @@ use super::bounds::Cone;
 use super::emitter::{Emitter, Place};
 use super::environment::EnvironmentSampler;
 use super::tree::{Item, Tree};
-use super::window::{Window, Windows};
+use super::window::{Aim, Window, Windows};
 use super::{PointLight, emitted, luminance};
 use crate::Rgb;
 use crate::bsdf::All;
@@ -201,6 +201,11 @@ impl<'m> Lights<'m> {
         Some(sample.0)
     }
 
+    /// Whether the environment is sampled through windows.
+    pub(crate) fn have_windows(&self) -> bool {
+        self.windows.is_some()
+    }
+
     /// What a surface sees the environment through, where that is known.
     #[inline]
     pub(crate) fn window(&self, position: Vec3, normal: Vec3) -> Option<&'m Window> {
@@ -217,14 +222,20 @@ impl<'m> Lights<'m> {
     /// of nothing.
     #[inline]
     pub fn sample(&self, scene: &Scene, position: Vec3, normal: Vec3, u: [f32; 3]) -> Option<LightSample> {
-        let (sample, later) = self.draw(scene, position, normal, u)?;
+        let (sample, later) = self.draw(scene, position, normal, u, self.aim(position, normal, u))?;
         let environment = scene.environment.as_ref().filter(|_| later);
         let radiance = environment.map_or(Rgb::ONE, |e| e.radiance(scene, sample.direction));
         Some(LightSample { radiance: sample.radiance * radiance, ..sample })
     }
 
-    /// The same, but whether the radiance is still to be multiplied with that of the environment in this direction:
-    /// looking it up is only worth it where nothing is in the way.
+    /// Where the window of a surface leads, if it has one.
+    #[inline]
+    pub(crate) fn aim(&self, position: Vec3, normal: Vec3, [u, v, _]: [f32; 3]) -> Option<Aim> {
+        Some(self.window(position, normal)?.warp([u, v]))
+    }
+
+    /// The same, but `aim` is what [`Lights::aim`] says, and whether the radiance is still to be multiplied with that of
+    /// the environment in this direction: looking it up is only worth it where nothing is in the way.
     #[inline]
     pub fn draw(
         &self,
@@ -232,6 +243,7 @@ impl<'m> Lights<'m> {
         position: Vec3,
         normal: Vec3,
         u: [f32; 3],
+        aim: Option<Aim>,
     ) -> Option<(LightSample, bool)> {
         let shares = self.shares(position, normal);
         let [u0, u1, choice] = u;
@@ -248,8 +260,8 @@ impl<'m> Lights<'m> {
         let choice = choice - shares.tree;
         if choice < shares.environment {
             let (sampler, environment) = (self.environment?, scene.environment.as_ref()?);
-            let (direction, pdf) = match self.window(position, normal) {
-                Some(window) => sampler.sample_through(environment, window, [u0, u1])?,
+            let (direction, pdf) = match aim {
+                Some(aim) => sampler.sample_at(environment, aim)?,
                 None => sampler.sample(environment, normal, [u0, u1])?,
             };
             let pdf = pdf * shares.environment;
@@ -337,7 +349,7 @@ impl<'m> Lights<'m> {
     /// not matter.
     #[inline]
     pub fn have_choice(&self) -> bool {
-        self.in_tree() > 1 || self.environment_weight + self.distant_weight > 0.0
+        self.count() > 1
     }
 
     /// Lights of all kinds, in the order of emission.

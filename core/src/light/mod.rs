@@ -19,7 +19,8 @@ pub use guide::Worth;
 pub(crate) use guide::throws;
 pub use lights::{LightPoint, LightSample, Lights};
 pub use source::{Environment, PointLight};
-pub use window::{Bins, Grid, Window, Windows};
+pub(crate) use window::Row;
+pub use window::{Aim, Bins, Grid, Window, Windows};
 
 use crate::Rgb;
 use crate::bsdf::All;

@@ -20,7 +20,7 @@ const ROWS: usize = 32;
 pub type Bins = [f32; COLUMNS * ROWS];
 
 /// What a first look may miss: the share of samples that all bins have alike.
-const DEFENCE: f32 = 0.2;
+const DEFENCE: f32 = 0.1;
 
 /// The density over the unit square that suits one place.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
@@ -30,6 +30,24 @@ pub struct Window {
     rows: [u16; ROWS],
     /// The last 65536th of each cell in its row.
     cells: [[u16; COLUMNS]; ROWS],
+}
+
+/// A point of the environment's square that a window chose.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Aim {
+    /// The point, in the unit square.
+    pub place: [f32; 2],
+    /// How much denser samples are there than without the window.
+    pub density: f32,
+}
+
+/// A row of a window, chosen.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Row {
+    y: usize,
+    /// Where in it.
+    v: f32,
+    share: f32,
 }
 
 impl Window {
@@ -57,29 +75,35 @@ impl Window {
         bins.map(|x| rest + share * finite(x))
     }
 
-    /// Where in the square of the environment a point of the unit square leads, and how much denser samples are
-    /// there than without the window.
+    /// Where in the square of the environment a point of the unit square leads, and how dense samples are there.
     #[inline]
-    pub fn warp(&self, [u, v]: [f32; 2]) -> ([f32; 2], f32) {
-        let (y, v, row) = pick(&self.rows, v);
-        let (x, u, cell) = pick(self.cells.get(y).unwrap_or(&self.cells[0]), u);
-        let warped = [(x as f32 + u) / COLUMNS as f32, (y as f32 + v) / ROWS as f32];
-        (warped.map(|u| u.min(crate::sampling::ONE_MINUS_EPSILON)), row * cell * (COLUMNS * ROWS) as f32)
+    pub fn warp(&self, [u, v]: [f32; 2]) -> Aim {
+        self.aim(u, self.row(v))
     }
 
-    /// Asks for what [`Window::warp`] reads first.
+    /// Asks for what [`Window::row`] reads.
     #[inline]
-    pub(crate) fn prefetch_rows(&self) {
+    pub(crate) fn prefetch(&self) {
         prefetch(&self.rows, 0);
     }
 
-    /// Asks for what [`Window::warp`] reads then, at `v`, once its rows have arrived.
+    /// The first half of [`Window::warp`]. Asks for what the second reads.
     #[inline]
-    pub(crate) fn prefetch_row(&self, v: f32) {
-        let (y, ..) = pick(&self.rows, v);
+    pub(crate) fn row(&self, v: f32) -> Row {
+        let (y, v, share) = pick(&self.rows, v);
         // Two cache lines.
         prefetch(self.cells.as_flattened(), y * COLUMNS);
         prefetch(self.cells.as_flattened(), y * COLUMNS + COLUMNS / 2);
+        Row { y, v, share }
+    }
+
+    /// The second half of [`Window::warp`].
+    #[inline]
+    pub(crate) fn aim(&self, u: f32, Row { y, v, share }: Row) -> Aim {
+        let (x, u, cell) = pick(self.cells.get(y).unwrap_or(&self.cells[0]), u);
+        let place = [(x as f32 + u) / COLUMNS as f32, (y as f32 + v) / ROWS as f32];
+        let density = share * cell * (COLUMNS * ROWS) as f32;
+        Aim { place: place.map(|u| u.min(crate::sampling::ONE_MINUS_EPSILON)), density }
     }
 
     /// How much denser samples are at a point of the environment's square than without the window.
@@ -89,6 +113,12 @@ impl Window {
         let x = ((u * COLUMNS as f32) as usize).min(COLUMNS - 1);
         let cell = |ends: &[u16], i: usize| (1 + last(ends, i) - start(ends, i)) as f32 / WHOLE;
         cell(&self.rows, y) * cell(&self.cells[y], x) * (COLUMNS * ROWS) as f32
+    }
+
+    /// Whether `bin` is black where bins are the squares of a chessboard. In [`Window::smoothed`] bins of both colours have
+    /// half of the weight, everywhere.
+    pub fn is_black(bin: usize) -> bool {
+        (bin % COLUMNS + bin / COLUMNS).is_multiple_of(2)
     }
 
     /// A point of the environment's square in `bin`, at `offset` of the bin's unit square.
@@ -216,7 +246,7 @@ pub struct Windows<'m> {
 
 impl<'m> Windows<'m> {
     /// Windows that there can be.
-    pub const MOST: usize = 1024;
+    pub const MOST: usize = 2048;
 
     /// Bytes of all that is kept.
     pub fn footprint() -> Footprint {
@@ -267,7 +297,7 @@ mod tests {
         let window = window();
         let (mut counts, count) = ([0.0f32; COLUMNS * ROWS], 1 << 18);
         for i in 0..count {
-            let (at, density) = window.warp(Sampler::new(7, 0, i).pair(0));
+            let Aim { place: at, density } = window.warp(Sampler::new(7, 0, i).pair(0));
             assert!(at.iter().all(|x| (0.0..1.0).contains(x)), "{at:?}");
             assert!((density / window.density(at) - 1.0).abs() < 1e-6, "{at:?}");
             counts[(at[1] * ROWS as f32) as usize * COLUMNS + (at[0] * COLUMNS as f32) as usize] += 1.0;
@@ -291,7 +321,7 @@ mod tests {
     fn nothing_known_is_the_square_as_it_is() {
         let plain = Window::new(&[0.0; COLUMNS * ROWS]);
         for u in [[0.0; 2], [0.3, 0.8], [crate::sampling::ONE_MINUS_EPSILON; 2]] {
-            let (at, density) = plain.warp(u);
+            let Aim { place: at, density } = plain.warp(u);
             assert!((density - 1.0).abs() < 1e-2, "{density}");
             assert!((at[0] - u[0]).abs() < 1e-3 && (at[1] - u[1]).abs() < 1e-3, "{at:?}");
         }

@@ -5,6 +5,7 @@
 //! places where it lacks a record, and [`gather`] makes one; [`shoot`] leaves the photons that [`PhotonLight`] gathers, and
 //! [`maps`] makes of them what gather rays end in.
 
+mod arrivals;
 mod cached;
 pub mod caustics;
 mod density;

@@ -3,7 +3,8 @@
 //!
 //! 1. Paths from the camera, few and in all of the picture, leave a vertex wherever they meet a surface that scatters.
 //! 2. Vertices are sorted by their place, a cell of a grid and the side that the surface faces.
-//! 3. From each place rays go to all bins of the sky, from one vertex after the other.
+//! 3. From each place rays go to the bins of the sky, from one vertex after the other: one to every other bin, then some
+//!    to each of those near which light was seen.
 //!
 //! Windows pay where most of the sky is hidden, as in a room, and cost a little where it is not: the same rays tell
 //! which it is.
@@ -32,10 +33,13 @@ const SURFACES: usize = 8;
 /// Places with fewer vertices have no window.
 const FEWEST: usize = 4;
 
-/// Rays to the sky: so many for each pixel, between these in all, and as many for each bin of a window.
-const RAYS_PER_PIXEL: usize = 16;
+/// Rays to the sky: so many for each pixel, between these in all, and at most as many for each bin of a window.
+const RAYS_PER_PIXEL: usize = 64;
 const RAYS: core::ops::Range<usize> = 1 << 18..1 << 22;
-const RAYS_PER_BIN: core::ops::Range<usize> = 1..4;
+const PASSES: usize = 4;
+
+/// Bins of a window.
+const BINS: usize = size_of::<Bins>() / size_of::<f32>();
 
 /// By how much the variance of the light from the sky has to fall.
 const LEAST_GAIN: f64 = 1.25;
@@ -65,6 +69,8 @@ const NOWHERE: u32 = u32::MAX;
 pub struct Outlook<'m> {
     vertices: &'m mut [Vertex],
     ranges: &'m mut [[u32; 2]],
+    /// For each pass, where in the sky each bin is looked at, from every place.
+    directions: &'m mut [[f32; 3]],
 }
 
 /// What windows make of the variance of light from the sky.
@@ -96,7 +102,10 @@ impl core::ops::AddAssign for WindowGain {
 impl<'m> Outlook<'m> {
     /// Bytes that [`Outlook::new`] takes.
     pub fn footprint() -> Footprint {
-        Footprint::default().slice::<Vertex>(TASKS * PATHS.end * VERTICES).slice::<[u32; 2]>(Windows::MOST)
+        Footprint::default()
+            .slice::<Vertex>(TASKS * PATHS.end * VERTICES)
+            .slice::<[u32; 2]>(Windows::MOST)
+            .slice::<[f32; 3]>(PASSES * BINS)
     }
 
     /// An empty one.
@@ -105,7 +114,8 @@ impl<'m> Outlook<'m> {
     /// [`OutOfMemory`] where the arena has less than [`Outlook::footprint`].
     pub fn new(arena: &mut Arena<'m>) -> Result<Self, OutOfMemory> {
         let vertices = arena.slice(TASKS * PATHS.end * VERTICES)?;
-        Ok(Self { vertices, ranges: arena.slice(Windows::MOST)? })
+        let ranges = arena.slice(Windows::MOST)?;
+        Ok(Self { vertices, ranges, directions: arena.slice(PASSES * BINS)? })
     }
 
     /// What each task of the look fills, by [`PathTracer::look`].
@@ -131,7 +141,7 @@ impl<'m> Outlook<'m> {
             fewest *= 2;
         }
         let mut count = 0;
-        let Self { vertices, ranges } = self;
+        let Self { vertices, ranges, .. } = self;
         let places = vertices.chunk_by(|a, b| a.place == b.place);
         let mut start = 0;
         for place in places {
@@ -156,6 +166,47 @@ impl<'m> Outlook<'m> {
     fn of_window(&self, window: usize) -> &[Vertex] {
         let [start, end] = self.ranges.get(window).copied().unwrap_or_default();
         self.vertices.get(start as usize..end as usize).unwrap_or(&[])
+    }
+}
+
+/// Rays from one place to the sky, at most one for each bin, which is their tag.
+struct Glances<'m> {
+    rays: &'m mut [Ray],
+    cosines: &'m mut [f32],
+    hits: &'m mut [Hit],
+    count: usize,
+}
+
+impl<'m> Glances<'m> {
+    fn new(arena: &mut Arena<'m>) -> Result<Self, OutOfMemory> {
+        let (rays, cosines) = (arena.slice(BINS)?, arena.slice(BINS)?);
+        Ok(Self { rays, cosines, hits: arena.slice(BINS)?, count: 0 })
+    }
+
+    /// A ray into each of `bins` above the horizon, from one of the `vertices` after the other.
+    fn ask(
+        &mut self,
+        bins: impl Iterator<Item = usize>,
+        pass: usize,
+        outlook: &Outlook,
+        vertices: &[Vertex],
+    ) {
+        self.count = 0;
+        for bin in bins {
+            let index = (bin * PASSES + pass) as u32;
+            // The golden ratio spreads neighbouring bins over the vertices.
+            let pick = (u64::from(index.wrapping_mul(0x9e37_79b9)) * vertices.len() as u64) >> 32;
+            let Some(vertex) = vertices.get(pick as usize) else { continue };
+            let Some(&direction) = outlook.directions.get(pass * BINS + bin) else { continue };
+            let (direction, normal) = (Vec3::from(direction), Vec3::from(vertex.geometric_normal));
+            let cosine = direction.dot(vertex.normal.into());
+            if cosine > 0.0 && direction.dot(normal) > 0.0 {
+                let origin = Vec3::from(vertex.position) + vertex.error * normal;
+                self.rays[self.count] = Ray { tag: bin as u32, ..Ray::new(origin, direction) };
+                self.cosines[self.count] = cosine;
+                self.count += 1;
+            }
+        }
     }
 }
 
@@ -215,10 +266,19 @@ impl<F: Features> PathTracer<'_, F> {
         }
     }
 
+    /// The directions in which a sky is asked for, into `outlook`. There is one.
+    pub fn aim_at_sky(&self, outlook: &mut Outlook) {
+        for (i, direction) in outlook.directions.iter_mut().enumerate() {
+            let (bin, pass) = (i % BINS, i / BINS);
+            let offset = Sampler::new(self.settings.seed ^ STREAM, 1 + bin as u32, pass as u32).pair(0);
+            let at = self.lights.sample_environment(self.scene, Window::place(bin, offset));
+            *direction = at.unwrap_or(Vec3::ZERO).to_array();
+        }
+    }
+
     /// Bytes of working memory of [`PathTracer::learn`].
     pub fn learn_scratch() -> Footprint {
-        let bins = size_of::<Bins>() / size_of::<f32>();
-        Footprint::default().slice::<Ray>(bins).slice::<f32>(bins).slice::<Hit>(bins)
+        Footprint::default().slice::<Ray>(BINS).slice::<f32>(BINS).slice::<Hit>(BINS)
     }
 
     /// Makes window number `number` of `count`. Returns what it does to the variance, by how much it matters.
@@ -233,43 +293,28 @@ impl<F: Features> PathTracer<'_, F> {
         scratch: &mut Arena,
         window: &mut Window,
     ) -> Result<WindowGain, OutOfMemory> {
-        let mut sums: Bins = [0.0; _];
-        let mut squares: Bins = [0.0; _];
         let mut arena = scratch.scratch();
-        let rays: &mut [Ray] = arena.slice(sums.len())?;
-        let cosines: &mut [f32] = arena.slice(sums.len())?;
-        let hits: &mut [Hit] = arena.slice(sums.len())?;
-
+        let mut glances = Glances::new(&mut arena)?;
         let vertices = outlook.of_window(number);
+
+        // Every other bin has a ray, which speaks for its neighbours. Where light may come from has more.
+        let mut squares: Bins = [0.0; _];
+        glances.ask((0..squares.len()).filter(|&bin| Window::is_black(bin)), 0, outlook, vertices);
+        self.send(&mut glances, |bin, light| squares[bin] = light);
+        let near = Window::smoothed(&Window::smoothed(&squares));
+        let open = || (0..near.len()).filter(|&bin| near[bin] > 0.0);
+
         let pixels = self.settings.width as usize * self.settings.height as usize;
         let all = (RAYS_PER_PIXEL * pixels).clamp(RAYS.start, RAYS.end);
-        let passes = (all / count.max(1) / sums.len()).clamp(RAYS_PER_BIN.start, RAYS_PER_BIN.end);
+        let passes = (all / count.max(1) / open().count().max(1)).clamp(1, PASSES);
+        let mut sums: Bins = [0.0; _];
+        squares.fill(0.0);
         for pass in 0..passes {
-            let mut asked = 0;
-            for bin in 0..sums.len() {
-                let index = (bin * passes + pass) as u32;
-                let sampler = Sampler::new(self.settings.seed ^ STREAM, 1 + number as u32, index);
-                // The golden ratio spreads neighbouring bins over the vertices.
-                let pick = (u64::from(index.wrapping_mul(0x9e37_79b9)) * vertices.len() as u64) >> 32;
-                let Some(vertex) = vertices.get(pick as usize) else { continue };
-                let at = Window::place(bin, sampler.pair(0));
-                let Some(direction) = self.lights.sample_environment(self.scene, at) else { continue };
-                let normal = Vec3::from(vertex.geometric_normal);
-                let cosine = direction.dot(vertex.normal.into());
-                if cosine > 0.0 && direction.dot(normal) > 0.0 {
-                    let origin = Vec3::from(vertex.position) + vertex.error * normal;
-                    rays[asked] = Ray { tag: bin as u32, ..Ray::new(origin, direction) };
-                    cosines[asked] = cosine;
-                    asked += 1;
-                }
-            }
-            let (rays, hits) = (&rays[..asked], &mut hits[..asked]);
-            self.bvh.nearest_batch(self.level, rays, Coherence::Incoherent, hits);
-            for ((ray, cosine), hit) in rays.iter().zip(&*cosines).zip(&*hits) {
-                let light = cosine * self.arriving(ray, hit);
-                sums[ray.tag as usize] += light / passes as f32;
-                squares[ray.tag as usize] += light * light / passes as f32;
-            }
+            glances.ask(open(), pass, outlook, vertices);
+            self.send(&mut glances, |bin, light| {
+                sums[bin] += light / passes as f32;
+                squares[bin] += light * light / passes as f32;
+            });
         }
         let smooth = Window::smoothed(&squares);
         let shares = smooth.map(libm::sqrtf);
@@ -285,10 +330,19 @@ impl<F: Features> PathTracer<'_, F> {
         let cosine_sampled = self.lights.environment_is_constant() == Some(true);
         let before = if cosine_sampled { seen / 4.0 } else { mean(&smooth) };
         let shares = Window::probabilities(&shares);
-        let each = |(&square, &share): (&f32, &f32)| f64::from(square) / f64::from(share);
-        let after = smooth.iter().zip(&shares).map(each).sum::<f64>() / bins / bins;
+        let moment = |(&square, &share): (&f32, &f32)| f64::from(square) / f64::from(share);
+        let after = smooth.iter().zip(&shares).map(moment).sum::<f64>() / bins / bins;
         let relative = |moment: f64| vertices.len() as f64 * (moment / seen / seen - 1.0).max(0.0);
         Ok(WindowGain { before: relative(before), after: relative(after) })
+    }
+
+    /// Follows all rays of `glances`; tells the light, times the cosine, of each bin.
+    fn send(&self, glances: &mut Glances, mut tell: impl FnMut(usize, f32)) {
+        let (rays, hits) = (&glances.rays[..glances.count], &mut glances.hits[..glances.count]);
+        self.bvh.nearest_batch(self.level, rays, Coherence::Incoherent, hits);
+        for ((ray, cosine), hit) in rays.iter().zip(&*glances.cosines).zip(&*hits) {
+            tell(ray.tag as usize, cosine * self.arriving(ray, hit));
+        }
     }
 
     /// Which part of the light at the end of `ray` arrives, where it first meets `hit`.

@@ -17,10 +17,12 @@
 //! its group only, no wave cuts a group, and samples are summed in their order: the picture has the same bits for
 //! any size of wave and any distribution of tasks.
 
+use super::arrivals::{Arrivals, TO_ENVIRONMENT};
 use super::cached::Caches;
 use super::density::PhotonLight;
 use super::estimator::{
-    Counters, MAX_CROSSINGS, MAX_VERTICES, PathSettings, dimension, power_heuristic, survival,
+    Counters, MAX_CROSSINGS, MAX_VERTICES, PathSettings, dimension, environment_heuristic, power_heuristic,
+    survival,
 };
 use super::maps::{PhotonMaps, Said};
 use super::merge::{ChainLink, Merging, ends_chain};
@@ -34,7 +36,7 @@ use crate::bvh::{Bvh, Coherence};
 use crate::cache::irradiance::{Indirect, IrradianceCache, POINTS};
 use crate::film::{GROUP, Pixel, Samples, Tile};
 use crate::geometry::{Hit, Ray};
-use crate::light::{Lights, Window, emitted};
+use crate::light::{Aim, Lights, Row, Window, emitted};
 use crate::memory::{Arena, Footprint, OutOfMemory};
 use crate::sampling::Sampler;
 use crate::scene::{Material, Scene, SurfacePoint};
@@ -42,7 +44,7 @@ use crate::{Level, Rgb};
 use core::f32::consts::FRAC_1_PI;
 use core::marker::PhantomData;
 use core::ops::Range;
-use glam::{Vec2, Vec3};
+use glam::Vec3;
 
 /// Paths that advance together where memory allows: enough to fill the tracer's batches, few enough to
 /// stay in the second cache.
@@ -54,10 +56,6 @@ pub(super) const BLOCK: usize = POINTS;
 /// Lights that fill a smaller share of a hemisphere, weighted by cosines, are found by shadow rays alone as well as with
 /// the help of rays that find them by chance.
 const SMALL: f32 = 0.1;
-
-/// In the tag of a shadow ray: it goes to the environment, whose radiance is looked up when it has arrived. Most are
-/// hidden, and a map is large.
-const TO_ENVIRONMENT: u32 = 1 << 31;
 
 /// Path tracing of one scene: a pass whose tasks are the tiles of the picture.
 #[derive(Clone, Copy)]
@@ -318,17 +316,18 @@ impl<'a, F: Features> PathTracer<'a, F> {
                 }
                 let window = self.lights.window(point.position, point.frame.normal);
                 if let Some(window) = window {
-                    window.prefetch_rows();
+                    window.prefetch();
                 }
                 let sampler = Sampler::new(self.settings.seed, path.pixel, path.sample);
                 let light = sampler.pair(dimension::vertex(path.segments.into()) + dimension::LIGHT);
-                Met { point, window, light, indirect: None }
+                Met { point, light, window, row: None, aim: None, indirect: None }
             });
         }
-        for met in block.iter().flatten() {
-            if let Some(window) = met.window {
-                window.prefetch_row(met.light[1]);
-            }
+        for met in block.iter_mut().flatten() {
+            met.row = met.window.map(|window| window.row(met.light[1]));
+        }
+        for met in block.iter_mut().flatten() {
+            met.aim = met.window.zip(met.row).map(|(window, row)| window.aim(met.light[0], row));
         }
         if let Some(caches) = self.caches {
             self.ask(caches, wave, range, block);
@@ -415,7 +414,7 @@ impl<'a, F: Features> PathTracer<'a, F> {
                 let mut weight = 1.0;
                 if path.pdf < f32::INFINITY && radiance != Rgb::ZERO {
                     let pdf = self.lights.pdf_escape(scene, position, normal, direction);
-                    weight = power_heuristic(path.pdf, pdf);
+                    weight = environment_heuristic(self.lights, path.pdf, pdf);
                 }
                 if let Some(merging) = &self.merging {
                     weight = merging.beside(weight, path.chain, || {
@@ -426,7 +425,7 @@ impl<'a, F: Features> PathTracer<'a, F> {
             }
             return Step::END;
         }
-        let Some(&Met { ref point, light: [u, v], indirect, .. }) = met else { return Step::END };
+        let Some(&Met { ref point, light: [u, v], aim, indirect, .. }) = met else { return Step::END };
 
         // A ray cannot meet the plane that it started on: rounding on a needle. Nor does a camera on a surface see its back.
         if hit.triangle == path.triangle || (segments == 1 && point.is_left_by(ray)) {
@@ -502,7 +501,9 @@ impl<'a, F: Features> PathTracer<'a, F> {
         if !self.lights.is_empty() && !bsdf.is_delta() && !said.is_lit {
             let choice =
                 if self.lights.have_choice() { sampler.single(first + dimension::LIGHT_CHOICE) } else { 0.0 };
-            let drawn = self.lights.draw(scene, point.position, normal, [u, v, choice]);
+            // What transmits is looked at from both sides, a window from one.
+            let aim = aim.filter(|_| normal != Vec3::ZERO);
+            let drawn = self.lights.draw(scene, point.position, normal, [u, v, choice], aim);
             light = drawn.and_then(|(sample, later)| {
                 let wi = point.frame.to_local(sample.direction);
                 if !point.sides_agree(wi, sample.direction) {
@@ -516,7 +517,11 @@ impl<'a, F: Features> PathTracer<'a, F> {
                     exchange.light_is_of_base(bsdf.base_part(wo, wi, f));
                 }
                 let alone = sample.delta || ends;
-                let mut weight = if alone { 1.0 } else { power_heuristic(sample.pdf, pdf) };
+                let mut weight = match alone {
+                    true => 1.0,
+                    false if later => environment_heuristic(self.lights, sample.pdf, pdf),
+                    false => power_heuristic(sample.pdf, pdf),
+                };
                 if let Some(merging) = &self.merging
                     && !ends_chain(&bsdf)
                 {
@@ -620,48 +625,16 @@ impl<'a, F: Features> PathTracer<'a, F> {
     }
 }
 
-/// Light that has arrived and is about to be added to its paths. What comes from a map is looked up for several at
-/// once, after all of it has been asked for.
-#[derive(Default)]
-struct Arrivals {
-    count: usize,
-    /// Path, place on the map where light comes from there, what it is multiplied with.
-    light: [(u32, Vec2, Rgb); BLOCK],
-}
-
-impl Arrivals {
-    #[inline]
-    fn push(&mut self, scene: &Scene, paths: &mut [Path], ray: &Ray, light: Rgb) {
-        let environment = scene.environment.as_ref().filter(|_| ray.tag & TO_ENVIRONMENT != 0);
-        let place = environment.map_or(Vec2::ZERO, |e| e.place(scene, ray.direction.into()));
-        if let Some(slot) = self.light.get_mut(self.count) {
-            *slot = (ray.tag, place, light);
-            self.count += 1;
-        }
-        if self.count == BLOCK {
-            self.receive(scene, paths);
-        }
-    }
-
-    fn receive(&mut self, scene: &Scene, paths: &mut [Path]) {
-        for (tag, place, light) in self.light.into_iter().take(self.count) {
-            let environment = scene.environment.as_ref().filter(|_| tag & TO_ENVIRONMENT != 0);
-            let radiance = environment.map_or(Rgb::ONE, |e| e.radiance_at(scene, place));
-            if let Some(path) = paths.get_mut((tag & !TO_ENVIRONMENT) as usize) {
-                path.add(light * radiance);
-            }
-        }
-        self.count = 0;
-    }
-}
-
 /// A vertex that is about to be shaded.
 #[derive(Clone, Copy)]
 pub(super) struct Met<'a> {
     pub(super) point: SurfacePoint<'a>,
-    window: Option<&'a Window>,
     /// Where light is looked for.
     light: [f32; 2],
+    /// The same through the window, found step by step, so that nobody waits for memory.
+    window: Option<&'a Window>,
+    row: Option<Row>,
+    aim: Option<Aim>,
     /// What a cache says of it.
     pub(super) indirect: Option<Indirect>,
 }
@@ -680,7 +653,7 @@ impl Step {
 
 impl Path {
     #[inline]
-    fn add(&mut self, radiance: Rgb) {
+    pub(super) fn add(&mut self, radiance: Rgb) {
         self.radiance = (Rgb::from(self.radiance) + radiance).to_array();
     }
 

@@ -1,7 +1,9 @@
 //! The path tracer of the textbook: one path at a time, one ray at a time. It is what [`super::path`] is tested
 //! against, and it says in order what that does in pieces.
 
-use super::estimator::{MAX_CROSSINGS, MAX_VERTICES, PathSettings, dimension, power_heuristic, survival};
+use super::estimator::{
+    MAX_CROSSINGS, MAX_VERTICES, PathSettings, dimension, environment_heuristic, power_heuristic, survival,
+};
 use super::outline::{self, outlined};
 use super::shadow::{passing, shadow_ray};
 use crate::bsdf::{All, Bsdf};
@@ -49,7 +51,8 @@ pub fn radiance(
         if !hit.is_some() {
             if let Some(environment) = &scene.environment {
                 let light_pdf = lights.pdf_escape(scene, from, from_normal, direction);
-                let weight = if pdf == f32::INFINITY { 1.0 } else { power_heuristic(pdf, light_pdf) };
+                let weight =
+                    if pdf == f32::INFINITY { 1.0 } else { environment_heuristic(lights, pdf, light_pdf) };
                 let seen = environment.radiance(scene, direction);
                 radiance += throughput * seen * if seen == Rgb::ZERO { 0.0 } else { weight };
             }
@@ -90,12 +93,18 @@ pub fn radiance(
         if !bsdf.is_delta() && !lights.is_empty() {
             let [u, v] = sampler.pair(first + dimension::LIGHT);
             let choice = sampler.single(first + dimension::LIGHT_CHOICE);
-            if let Some((light, later)) = lights.draw(scene, point.position, normal, [u, v, choice]) {
+            let u = [u, v, choice];
+            let aim = lights.aim(point.position, normal, u);
+            if let Some((light, later)) = lights.draw(scene, point.position, normal, u, aim) {
                 let wi = point.frame.to_local(light.direction);
                 let (f, pdf) = bsdf.evaluate::<All>(wo, wi);
                 let same_side = point.sides_agree(wi, light.direction);
                 if same_side && f != Rgb::ZERO {
-                    let weight = if light.delta { 1.0 } else { power_heuristic(light.pdf, pdf) };
+                    let weight = match light.delta {
+                        true => 1.0,
+                        false if later => environment_heuristic(lights, light.pdf, pdf),
+                        false => power_heuristic(light.pdf, pdf),
+                    };
                     let sent = throughput * f * light.radiance * (weight / light.pdf);
                     let ray = shadow_ray(&point, &light);
                     let arriving = passing::<All>(scene, bvh, Level::BASELINE, ray, sent, &mut 0);

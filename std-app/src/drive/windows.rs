@@ -47,6 +47,7 @@ pub(super) fn learn<'m, F: Features>(
         tracer.look(task, part);
         Ok(())
     })?;
+    tracer.aim_at_sky(&mut outlook);
     let mut gain = WindowGain::default();
     let settled = outlook.settle(slots);
     if let Some((_, count)) = settled {
