@@ -110,7 +110,8 @@ impl Site {
         }
         let [a, b, c] = corners.map(|corner| self.frame.to_local(corner - self.place));
         // What is not a number rises.
-        if !a.z.max(b.z).max(c.z).le(&0.0) {
+        let is_low = |corner: Vec3| corner.z <= 0.0;
+        if !(is_low(a) && is_low(b) && is_low(c)) {
             survey.rises = true;
             return;
         }

@@ -115,8 +115,7 @@ impl Window {
         cell(&self.rows, y) * cell(&self.cells[y], x) * (COLUMNS * ROWS) as f32
     }
 
-    /// Whether `bin` is black where bins are the squares of a chessboard. In [`Window::smoothed`] bins of both colours have
-    /// half of the weight, everywhere.
+    /// Whether `bin` is black where bins are the squares of a chessboard.
     pub fn is_black(bin: usize) -> bool {
         (bin % COLUMNS + bin / COLUMNS).is_multiple_of(2)
     }
