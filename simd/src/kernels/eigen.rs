@@ -119,7 +119,9 @@ fn rotated<L: Lanes>(
     [u, v]: [[L; 3]; 2],
 ) -> ([L; 2], [L; 2], [[L; 3]; 2]) {
     let (zero, one) = (all(0.0), all(1.0));
-    // tan of the smaller angle: 2 pq / (difference ± √(difference² + 4 pq²)).
+    // tan of the smaller angle: 2 pq / (difference ± √(difference² + 4 pq²)). Were pq there but not its square, what is
+    // left of the difference could make any angle of it.
+    let pq = zero.select(pq.abs().lt(all(NEGLIGIBLE)), pq);
     let (difference, twice) = (qq - pp, pq + pq);
     let root = (difference * difference + twice * twice).sqrt();
     let denominator = difference + (-root).select(difference.lt(zero), root);
