@@ -192,7 +192,7 @@ fn where_there_is_no_caustic_the_picture_is_that_without_photons() {
 fn no_caustic_leaks_through_a_thin_wall() {
     let mut buffers = bright_and_dark();
     let mirror = buffers.material(Material { surface: metal(0.0), ..Material::GREY });
-    buffers.square(Vec3::new(0.1, 0.3, 0.5), Vec3::new(1.0, 1.0, 0.0).normalize(), 0.2, mirror);
+    buffers.square(Vec3::new(0.1, 0.3, 0.5), Vec3::new(1.0, 1.0, 0.0).normalize(), 0.3, mirror);
     let image = path(&buffers.scene(), 8, |_| ()).image;
     assert_eq!(image.mean(), [0.0; 3], "the camera is in the dark room");
     let camera = Camera { eye: IN_THE_BRIGHT_ROOM, ..buffers.camera };

@@ -40,7 +40,7 @@ const MOST_SAMPLES: u32 = 8;
 const LOOK: usize = 32 * PATHS;
 
 /// The share of the picture's light that photons must bring, of what paths find badly, or they are left out.
-const LEAST_SHARE: f64 = 2e-2;
+const LEAST_SHARE: f64 = 3.5e-2;
 
 /// Whether paths were joined with photons of caustics.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
