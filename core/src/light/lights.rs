@@ -212,6 +212,12 @@ impl<'m> Lights<'m> {
         self.windows.as_ref()?.at(position, normal)
     }
 
+    /// Where the window of a surface leads, if it has one.
+    #[inline]
+    pub(crate) fn aim(&self, position: Vec3, normal: Vec3, [u, v, _]: [f32; 3]) -> Option<Aim> {
+        Some(self.window(position, normal)?.warp([u, v]))
+    }
+
     /// Whether there is nothing that shines.
     pub fn is_empty(&self) -> bool {
         self.in_tree() == 0 && self.environment.is_none() && self.distant.is_empty()
@@ -226,12 +232,6 @@ impl<'m> Lights<'m> {
         let environment = scene.environment.as_ref().filter(|_| later);
         let radiance = environment.map_or(Rgb::ONE, |e| e.radiance(scene, sample.direction));
         Some(LightSample { radiance: sample.radiance * radiance, ..sample })
-    }
-
-    /// Where the window of a surface leads, if it has one.
-    #[inline]
-    pub(crate) fn aim(&self, position: Vec3, normal: Vec3, [u, v, _]: [f32; 3]) -> Option<Aim> {
-        Some(self.window(position, normal)?.warp([u, v]))
     }
 
     /// The same, but `aim` is what [`Lights::aim`] says, and whether the radiance is still to be multiplied with that of
