@@ -3,6 +3,7 @@
 
 use glam::Vec3;
 use halflight::drive::{Method, RenderResult, Settings};
+use halflight::load::{self, LoadOptions};
 use halflight::save::Image;
 use halflight_core::bsdf::All;
 use halflight_core::bvh::Bvh;
@@ -17,6 +18,7 @@ use halflight_tests::render::{difference, render};
 use halflight_tests::scenes::{
     IN_THE_BRIGHT_ROOM, SceneBuffers, bright_and_dark, cornell_box, emitter, everything, lamp_before,
 };
+use std::path::Path;
 
 fn sppm(scene: &Scene, size: u32, spp: u32, change: impl FnOnce(&mut Settings)) -> RenderResult {
     render(scene, Method::ProgressivePhotons, size, spp, change)
@@ -120,6 +122,18 @@ fn a_caustic_has_its_power() {
     let found = sppm(&scene, 64, 256, |_| ()).image;
     assert_means(&found, &path, 0.01);
     assert!(difference(&found, &path) < 0.03, "{}", difference(&found, &path));
+}
+
+#[test]
+fn what_hangs_over_a_disc_keeps_the_light_beside_it_out() {
+    // The jamb is seen through a slit of a centimetre, in front of which discs of a decimetre had light of beyond the door:
+    // 5 % of the picture's.
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../scenes/two-rooms/two-rooms.toml");
+    let loaded = load::load(&file, &LoadOptions::default()).unwrap();
+    let views = loaded.views();
+    let scene = views.scene(loaded.camera.unwrap());
+    let path = render(&scene, Method::Path, 48, 1024, |s| s.caustics = false).image;
+    assert_means(&sppm(&scene, 48, 256, |_| ()).image, &path, 0.03);
 }
 
 #[test]

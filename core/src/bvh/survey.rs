@@ -1,8 +1,8 @@
-//! What lies around a place on a surface, in one walk: whether anything rises above its plane, and where the surface
-//! goes on. Sixteen short rays tell the same (`transport/density.rs`), and cost ten times as much.
+//! What lies around a place on a surface, in one walk: whether anything rises above its plane, or hangs over it, and
+//! where the surface goes on. Rays tell the same (`transport/density.rs`), and cost ten times as much.
 //!
-//! It is sure where it says that nothing rises, and that the surface goes on. Where it says otherwise, rays may find
-//! that it is not so.
+//! It is sure where it says that nothing rises or hangs, and that the surface goes on. Where it says otherwise, rays may
+//! find that it is not so.
 
 use super::Bvh;
 use super::layout::{Node, WIDTH};
@@ -15,6 +15,11 @@ pub const POINTS: usize = 8;
 
 /// Children that may wait. A place around which more do is too crowded to be sure of anything.
 const WAITING: usize = 64;
+
+/// What hangs over a place has a plane that is at least so high above it, in reaches, and at most sixty degrees steep.
+/// The planes of a surface that bends upwards pass below.
+const STEP: f32 = 0.01;
+const STEEPEST: f32 = 0.5;
 
 /// Where to look.
 #[derive(Clone, Copy, Debug)]
@@ -36,22 +41,24 @@ pub struct Site {
 pub struct Survey {
     /// Something may be above the plane.
     pub rises: bool,
+    /// Something may be above the place, across the plane: then nothing else was looked at.
+    pub hangs: bool,
     /// The surface is there: bit i for point i.
     pub surface: u32,
 }
 
 impl Survey {
     /// Nothing rises, and the surface is all there.
-    pub const OPEN: Survey = Survey { rises: false, surface: (1 << POINTS) - 1 };
+    pub const OPEN: Survey = Survey { rises: false, hangs: false, surface: (1 << POINTS) - 1 };
 }
 
 impl Bvh<'_> {
-    /// What lies around `site`. As soon as something rises nothing else counts.
+    /// What lies around `site`.
     pub fn survey(&self, site: &Site) -> Survey {
         let (lo, hi) = (site.place - Vec3::splat(site.reach), site.place + Vec3::splat(site.reach));
         let mut waiting = [0u32; WAITING];
         let mut count = 1usize;
-        let mut survey = Survey { rises: false, surface: 0 };
+        let mut survey = Survey { rises: false, hangs: false, surface: 0 };
         while let Some(&index) = count.checked_sub(1).and_then(|last| waiting.get(last)) {
             count -= 1;
             let Some(node) = self.nodes.get(index as usize) else { break };
@@ -69,10 +76,10 @@ impl Bvh<'_> {
                     *slot = child.0;
                     count += 1;
                 } else {
-                    survey.rises = true;
+                    (survey.rises, survey.hangs) = (true, true);
                 }
             }
-            if survey.rises {
+            if survey.hangs {
                 break;
             }
         }
@@ -113,6 +120,10 @@ impl Site {
         let is_low = |corner: Vec3| corner.z <= 0.0;
         if !(is_low(a) && is_low(b) && is_low(c)) {
             survey.rises = true;
+            let normal = (b - a).cross(c - a);
+            let is_steep = normal.z.abs() < STEEPEST * normal.length();
+            let passes_below = normal.dot(a) / normal.z <= STEP * self.reach;
+            survey.hangs |= !(is_steep || passes_below);
             return;
         }
         // Twice the areas that a point makes with the sides, which are linear in it; and what these are in weights of

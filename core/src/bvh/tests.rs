@@ -288,7 +288,7 @@ const POINTS_ASIDE: [[f32; POINTS]; 2] =
 #[test]
 fn what_a_survey_is_sure_of_rays_find() {
     let mut random = Random(7);
-    let (mut low, mut there) = (0, 0);
+    let (mut low, mut unhung, mut there) = (0, 0, 0);
     for soup in [random_soup(300, 3.0, Vec3::ZERO), random_soup(30, 9.0, Vec3::splat(50.0)), sheet(40)] {
         let mesh = soup.mesh();
         let mut memory = lines(Bvh::footprint(mesh.triangles.len()).bytes());
@@ -309,6 +309,19 @@ fn what_a_survey_is_sure_of_rays_find() {
                 let way = radius / 3f32.sqrt() * frame.to_world(local.normalize());
                 assert!(!bvh.occluded(level, &Ray::segment(place, way, 1.0)), "{site:?} {way}");
             }
+            unhung += u32::from(survey.rises && !survey.hangs);
+            for _ in 0..if survey.hangs { 0 } else { 16 } {
+                let local = random.point(2.0).with_z(1.0).normalize();
+                let way = radius / 3f32.sqrt() * frame.to_world(local);
+                let hit = bvh.nearest(level, &Ray::segment(place, way, 1.0));
+                if hit.is_some() {
+                    let [a, b, c] = mesh.corners(hit.triangle);
+                    let normal = (b - a).cross(c - a).normalize();
+                    let slope = normal.dot(frame.normal);
+                    let height = normal.dot(a - place) / slope;
+                    assert!(slope.abs() < 0.501 || height < 0.011 * radius, "{site:?} {way}");
+                }
+            }
             for i in (0..POINTS).filter(|i| survey.surface >> i & 1 != 0) {
                 let [x, y] = points.map(|axis| axis[i]);
                 let from = place + frame.to_world(Vec3::new(x, y, 1.001 * site.depth));
@@ -318,7 +331,7 @@ fn what_a_survey_is_sure_of_rays_find() {
             }
         }
     }
-    assert!(low > 1000 && there > 10_000, "{low} {there}");
+    assert!(low > 1000 && unhung > 500 && there > 10_000, "{low} {unhung} {there}");
 }
 
 #[test]
@@ -339,6 +352,6 @@ fn on_a_floor_of_many_triangles_a_survey_sees_it_all_but_at_the_edge_and_under_a
         bvh.survey(&Site { place, frame, reach: 1.0, points, depth: 0.1 })
     };
     assert_eq!(look(5.3), Survey::OPEN);
-    assert_eq!(look(7.3), Survey { rises: false, surface: 0xaa });
-    assert!(look(2.7).rises && look(1.3).rises);
+    assert_eq!(look(7.3), Survey { rises: false, hangs: false, surface: 0xaa });
+    assert!([2.7, 1.3].map(look).iter().all(|survey| survey.rises && !survey.hangs));
 }

@@ -23,6 +23,16 @@ const NEAREST: f32 = 0.05;
 /// surface bends less is none either.
 const LIFT: f32 = 0.1;
 
+/// Ways to look for what hangs over a disc: upwards, and at half a right angle to all sides.
+const UPWARDS: [Vec3; 5] = {
+    const D: f32 = core::f32::consts::FRAC_1_SQRT_2;
+    let way = Vec3::new;
+    [Vec3::Z, way(D, 0.0, D), way(0.0, D, D), way(-D, 0.0, D), way(0.0, -D, D)]
+};
+
+/// Less is not left of a disc for what hangs over it, as a share of its radius: a photon would be a spike.
+const LOWEST: f32 = 0.125;
+
 /// How far of the way to a wall its foot is looked for.
 const BEFORE: f32 = 0.99;
 
@@ -91,15 +101,23 @@ impl<'a> PhotonLight<'a> {
         if density.is_some_and(|density| density.photons == 0) {
             return Some(Rgb::ZERO);
         }
-        Some(reflected::<F>(self.map, (bvh, level), (&disc, density), (point, bsdf), wo, turns))
+        let light = Light { map: self.map, is_caustic: self.is_sparse };
+        Some(reflected::<F>(light, (bvh, level), (&disc, density), (point, bsdf), wo, turns))
     }
+}
+
+/// Photons, and whether they are those of caustics: what hangs over a disc may be what throws them there.
+#[derive(Clone, Copy)]
+pub(super) struct Light<'a> {
+    pub(super) map: &'a PhotonMap<'a>,
+    pub(super) is_caustic: bool,
 }
 
 /// What `point` reflects to `wo` of the light of the photons on `disc`, as far as it is seen from there; `all` is the
 /// density of all of them, where it is known.
 #[inline]
 pub(super) fn reflected<F: Features>(
-    map: &PhotonMap,
+    Light { map, is_caustic }: Light,
     (bvh, level): (&Bvh, Level),
     (disc, all): (&Disc, Option<Density>),
     (point, bsdf): (&SurfacePoint, &Bsdf),
@@ -107,7 +125,7 @@ pub(super) fn reflected<F: Features>(
     turns: f32,
 ) -> Rgb {
     let origin = point.position + point.error * point.geometric_normal;
-    let fence = fence(bvh, level, origin, disc, turns);
+    let fence = fence(bvh, level, (origin, is_caustic), disc, turns);
     let is_flat = point.frame.normal == point.geometric_normal;
     if let (Bsdf::Diffuse(diffuse), true) = (bsdf, is_flat) {
         let response = diffuse.reflectance * FRAC_1_PI;
@@ -127,8 +145,15 @@ pub(super) fn reflected<F: Features>(
     map.gather_within(level, disc, &fence, &response).radiance
 }
 
-/// Looks for walls on `disc`, and for its edges, by probes from `origin`, just above its middle.
-pub(super) fn fence(bvh: &Bvh, level: Level, origin: Vec3, disc: &Disc, turns: f32) -> Fence {
+/// Looks for walls on `disc`, and for its edges, by probes from `origin`, just above its middle; and for what hangs over
+/// it, but for caustics.
+pub(super) fn fence(
+    bvh: &Bvh,
+    level: Level,
+    (origin, is_caustic): (Vec3, bool),
+    disc: &Disc,
+    turns: f32,
+) -> Fence {
     let frame = Fence::frame(disc.normal, turns);
     let radius = disc.radius;
     // Where there is no surface within the thickness of the disc, there are no photons, and no area.
@@ -158,7 +183,8 @@ pub(super) fn fence(bvh: &Bvh, level: Level, origin: Vec3, disc: &Disc, turns: f
             if hit.is_some() {
                 *share = hit.t / radius;
             }
-        } else if survey.surface >> i & 1 != 0 {
+        }
+        if share.is_infinite() && survey.surface >> i & 1 != 0 {
             continue;
         }
         let is_there = |share: f32| {
@@ -179,6 +205,16 @@ pub(super) fn fence(bvh: &Bvh, level: Level, origin: Vec3, disc: &Disc, turns: f
             }
         }
         *share = 0.5 * (low + high);
+    }
+    if survey.hangs && !is_caustic {
+        // Under something that hangs lower than the disc is wide, the light changes over as little.
+        for way in UPWARDS {
+            let hit = bvh.nearest(level, &Ray::segment(origin, frame.to_world(way), radius / way.z));
+            if hit.is_some() {
+                let height = (hit.t * way.z / radius).max(LOWEST);
+                shares.iter_mut().for_each(|share| *share = share.min(height));
+            }
+        }
     }
     Fence::new(&frame, shares)
 }

@@ -10,7 +10,7 @@
 //! 2. A photon knows whether there is a wall within the disc of its estimate. If not, it need not be asked for again.
 
 use super::PhotonLight;
-use super::density::{fence, reflected};
+use super::density::{Light, fence, reflected};
 use super::estimator::Counters;
 use super::shoot::{focuses, holds_photons, may_focus};
 use super::wave::Share;
@@ -115,7 +115,7 @@ impl<'a> Irradiances<'a> {
             self.global.disc_of_nearest(self.level, (place, normal), self.farthest, self.falloff, neighbours);
         let above = ABOVE * disc.radius + 16.0 * f32::EPSILON * place.abs().max_element();
         let turns = (mix(index as u64) >> 40) as f32 / (1u64 << 24) as f32;
-        let fence = fence(self.bvh, self.level, place + above * normal, &disc, turns);
+        let fence = fence(self.bvh, self.level, (place + above * normal, false), &disc, turns);
         if fence.share(self.falloff) < LEAST_SEEN {
             return Photon::NONE;
         }
@@ -215,7 +215,8 @@ impl<'a> GatherLight<'a> {
         }
         let disc =
             Disc { place: point.position, normal, radius: radius.min(self.farthest), falloff: self.falloff };
-        Some(reflected::<F>(self.global, (bvh, level), (&disc, None), (point, bsdf), wo, turns))
+        let light = Light { map: self.global, is_caustic: false };
+        Some(reflected::<F>(light, (bvh, level), (&disc, None), (point, bsdf), wo, turns))
     }
 }
 

@@ -22,7 +22,7 @@
 //! photon is known when it is left, its power is multiplied with it, and a map needs no more than power. Photons that
 //! paths find more easily are hardly ever left. Ends of paths by roulette count for none of the densities.
 
-use super::density::reflected;
+use super::density::{Light, reflected};
 use super::shoot::holds_photons;
 use crate::bsdf::{Bsdf, Features};
 use crate::bvh::Bvh;
@@ -166,6 +166,7 @@ impl<'a> Merging<'a> {
         if density.photons == 0 {
             return Rgb::ZERO;
         }
-        reflected::<F>(map, (bvh, level), (&disc, Some(density)), (point, bsdf), wo, turns())
+        let light = Light { map, is_caustic: true };
+        reflected::<F>(light, (bvh, level), (&disc, Some(density)), (point, bsdf), wo, turns())
     }
 }
