@@ -200,6 +200,21 @@ fn no_caustic_leaks_through_a_thin_wall() {
     assert!(has_photons(&bright) && bright.image.mean()[1] > 0.1);
 }
 
+#[test]
+fn where_pixels_have_different_numbers_of_samples_photons_are_shot_as_often_as_elsewhere() {
+    let buffers = lamp_before(Surface::Mirror { reflectance: Rgb::splat(0.9).into() }, 0.02);
+    let of = |adaptive, threads| {
+        render(&buffers.scene(), Method::Path, 64, 64, |s| {
+            (s.adaptive, s.threads) = (Some(adaptive), Some(threads));
+        })
+    };
+    let (uniform, adaptive) = (of(false, 1), of(true, 1));
+    assert!(has_photons(&uniform) && adaptive.adaptive.used);
+    assert_eq!(uniform.caustics.paths, adaptive.caustics.paths);
+    assert!(adaptive.samples.iter().min() < adaptive.samples.iter().max());
+    assert_eq!(of(true, 3).image, adaptive.image);
+}
+
 /// A hall with fifty lamps, of which a wall hides all but one from a small mirror on the floor.
 fn stadium() -> SceneBuffers {
     let camera = Camera::look_at(Vec3::new(47.5, 1.0, 20.0), Vec3::new(47.5, 10.0, 25.0), Vec3::Y, 60.0);

@@ -49,12 +49,25 @@ impl Crew<'_, '_> {
     /// The first sample that a pixel lacks; `None` where all have theirs, or the round is over. For methods that need
     /// something new for every sample, before its tiles.
     pub(super) fn next_sample(&self) -> Option<u32> {
+        self.open().min().filter(|_| !self.round.is_over())
+    }
+
+    /// The same in the mean over all pixels, where they are to have different numbers: for methods that need something new
+    /// from time to time, whatever the numbers of the samples that are taken then.
+    pub(super) fn next_in_mean(&self) -> Option<u32> {
+        if self.canvas.weights.is_none() {
+            return self.next_sample();
+        }
+        self.open().next().filter(|_| !self.round.is_over()).map(|_| self.canvas.spp())
+    }
+
+    /// How many samples those groups have that lack some.
+    fn open(&self) -> impl Iterator<Item = u32> {
         let Canvas { shard, taken, .. } = &*self.canvas;
         let tiles = taken.iter().zip(&self.round.targets).enumerate();
         let own = tiles.filter(|(task, _)| shard.owns(*task));
         let groups = own.flat_map(|(_, (taken, target))| taken.iter().zip(target));
-        let open = groups.filter(|(taken, target)| taken < target);
-        open.map(|(taken, _)| *taken).min().filter(|_| !self.round.is_over())
+        groups.filter(|(taken, target)| taken < target).map(|(taken, _)| *taken)
     }
 
     /// A pass: task `i` writes to the `i`th piece of `size` values of `out`, and what they count is the round's. Returns
@@ -79,13 +92,37 @@ impl Crew<'_, '_> {
         scratch: &mut [Vec<Line>],
         task: &TileTask,
     ) -> Result<(), OutOfMemory> {
+        let ends = vec![[end; GROUPS]; self.canvas.taken.len()];
+        self.bring(&ends, scratch, task)
+    }
+
+    /// The same to where groups are when pixels have `end` samples in the mean.
+    pub(super) fn tiles_in_mean(
+        &mut self,
+        end: u32,
+        scratch: &mut [Vec<Line>],
+        task: &TileTask,
+    ) -> Result<(), OutOfMemory> {
+        let ends = self.canvas.targets(end);
+        self.bring(&ends, scratch, task)
+    }
+
+    /// Brings every group to its target, or to its end where that is less, unless the round is cut.
+    fn bring(
+        &mut self,
+        ends: &[[u32; GROUPS]],
+        scratch: &mut [Vec<Line>],
+        task: &TileTask,
+    ) -> Result<(), OutOfMemory> {
         let Self { workers, round, canvas } = self;
         let shard = canvas.shard;
         let tiles = canvas.film.pixels_mut().chunks_mut(PIXELS_PER_TILE);
         let tiles = tiles.zip(&mut canvas.taken).zip(&mut canvas.rays).enumerate();
-        let own = tiles.zip(&round.targets).filter(|((task, _), _)| shard.owns(*task));
-        let open = own.filter_map(|((task, ((pixels, taken), rays)), target)| {
-            let left = Samples { from: *taken, to: target.map(|target| target.min(end)) };
+        let tiles = tiles.zip(round.targets.iter().zip(ends));
+        let own = tiles.filter(|((task, _), _)| shard.owns(*task));
+        let open = own.filter_map(|((task, ((pixels, taken), rays)), (target, end))| {
+            let to = core::array::from_fn(|group| target[group].min(end[group]));
+            let left = Samples { from: *taken, to };
             (left.count() > 0).then_some((task, pixels, taken, rays, left))
         });
         let queue = Mutex::new(scattered(open.collect()));

@@ -196,7 +196,7 @@ impl<F: Features> Renderer for Joined<'_, F> {
         let Self { stage, paths, emission, photons, each, most, kept } = self;
         let Paths { tracer, scratch, caustics, .. } = paths;
         let workers = stage.workers;
-        while let Some(sample) = crew.next_sample() {
+        while let Some(sample) = crew.next_in_mean() {
             let block = Block::of(sample);
             let light_paths = (*each * block.samples() as usize).min(*most);
             let (shooter, discs) = shooter::<F>(stage, emission, light_paths, block.first);
@@ -230,7 +230,7 @@ impl<F: Features> Renderer for Joined<'_, F> {
             };
             let merging = Merging::new([&maps[0], &maps[1]], emission, discs, light_paths as u32);
             let tracer = tracer.with_caustics(merging);
-            crew.tiles(block.end, scratch, &|task, samples, arena, pixels| {
+            crew.tiles_in_mean(block.end, scratch, &|task, samples, arena, pixels| {
                 tracer.run(task, samples, WAVE, arena, pixels)
             })?;
         }
