@@ -2,8 +2,8 @@
 
     python3 tests/peers/caustics.py [--seconds 4] [--seeds 5] [--reference-seconds 240] [scene ...]
 
-Ours: `path` without and with photons of caustics, and `sppm`; Mitsuba's: `path` and `ptracer`, `llvm_ad_rgb`, with our
-materials. Two threads, no limit of depth. Seconds are those of the processors, so that a busy machine tells the same.
+Ours: `path` without and with photons of caustics, the latter with adaptive sampling as well, and `sppm`; Mitsuba's:
+`path` and `ptracer`, `llvm_ad_rgb`, with our materials. Two threads, no limit of depth. Seconds are those of the processors, so that a busy machine tells the same.
 Each renders for about `--seconds`: by the samples that a first, short picture says can be had in that time. All are measured against one reference, the mean of long pictures of our `path`
 with photons by other seeds, whose remaining noise is subtracted; the mean of each over that of the reference is printed as well. Medians of the
 seeds.
@@ -37,6 +37,7 @@ REFERENCE_PICTURES = 8
 OURS = {
     "path, off": ["--method", "path", "--caustics", "off"],
     "path, caustics": ["--method", "path", "--caustics", "auto"],
+    "path, adaptive": ["--method", "path", "--caustics", "auto", "--adaptive", "auto"],
     "sppm": ["--method", "sppm", "--audit", "off"],
 }
 

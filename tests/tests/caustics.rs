@@ -2,7 +2,7 @@
 //! twice, the same bits on any number of threads, and none of it where there is no caustic.
 
 use glam::Vec3;
-use halflight::drive::{Method, RenderResult, Settings};
+use halflight::drive::{Checkpoint, Method, RenderResult, Settings};
 use halflight_core::bsdf::All;
 use halflight_core::bvh::Bvh;
 use halflight_core::film::Film;
@@ -213,6 +213,49 @@ fn where_pixels_have_different_numbers_of_samples_photons_are_shot_as_often_as_e
     assert_eq!(uniform.caustics.paths, adaptive.caustics.paths);
     assert!(adaptive.samples.iter().min() < adaptive.samples.iter().max());
     assert_eq!(of(true, 3).image, adaptive.image);
+}
+
+#[test]
+fn where_all_light_is_caustics_photons_may_have_all_of_it_unless_paths_are_asked_for() {
+    let glass = Surface::Dielectric { ior: 1.5, tint: Rgb::ONE, roughness: 0.0.into() };
+    let auto = |buffers: &SceneBuffers, spp, change: fn(&mut Settings)| {
+        render(&buffers.scene(), Method::Path, 32, spp, |s| {
+            s.method = None;
+            change(s);
+        })
+    };
+    let some = auto(&lamp_over_ball(glass), 1, |_| ());
+    assert!(some.method == Method::Path && some.caustics.share < Some(0.5), "{:?}", some.caustics);
+
+    let camera = Camera::look_at(Vec3::new(0.0, 2.0, 3.5), Vec3::new(0.0, 0.3, 0.0), Vec3::Y, 40.0);
+    let mut all = SceneBuffers::new(camera);
+    let floor = all.material(Material::diffuse(Rgb::splat(0.7)));
+    let bulb = all.material(Material { surface: glass, ..Material::GREY });
+    all.square(Vec3::ZERO, Vec3::Y, 4.0, floor);
+    all.normals = vec![[0.0; 3]; all.positions.len()];
+    all.sphere(Vec3::new(0.0, 1.0, 0.0), 0.3, 24, bulb);
+    let position = Vec3::new(0.0, 1.0, 0.0);
+    all.lights.push(PointLight::Point { position, intensity: Rgb::ONE });
+    let chosen = auto(&all, 64, |_| ());
+    assert_eq!(chosen.method, Method::ProgressivePhotons);
+    let asked = path(&all.scene(), 64, |_| ());
+    assert!(asked.method == Method::Path && asked.caustics.share > Some(0.9), "{:?}", asked.caustics);
+    for (a, b) in chosen.image.mean().into_iter().zip(asked.image.mean()) {
+        assert!((a / b - 1.0).abs() < 0.02, "{a} {b}");
+    }
+
+    // A film that it was chosen for goes on with it.
+    let file = std::env::temp_dir().join(format!("caustics-{}.film", std::process::id()));
+    let keep = Some(Checkpoint { path: file.clone(), every: f64::INFINITY });
+    let resumed = |resume, spp| {
+        render(&all.scene(), Method::Path, 32, spp, |s| {
+            (s.method, s.checkpoint, s.resume) = (None, keep.clone(), resume);
+        })
+    };
+    let _ = resumed(None, 16);
+    let on = resumed(Some(file.clone()), 64);
+    std::fs::remove_file(file).unwrap();
+    assert_eq!((on.method, on.image), (Method::ProgressivePhotons, chosen.image));
 }
 
 /// A hall with fifty lamps, of which a wall hides all but one from a small mirror on the floor.

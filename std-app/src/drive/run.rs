@@ -38,10 +38,16 @@ impl WithFeatures for Render<'_> {
         let (width, height) = (settings.width, settings.height);
         // What is of something else should not cost the time of building.
         let cache = cache_file::open(scene, settings)?.map(|file| file.header.fingerprint());
-        let identity = Identity::of(scene, method.name(), &path_settings(settings), settings, cache);
         let resumed = settings.resume.as_deref().map(Reader::open).transpose()?;
+        // What a first look has chosen is in the film.
+        let chosen = |method: &Method| *method == Method::ProgressivePhotons;
+        let of_film = resumed.as_ref().and_then(|film| film.header.method()).filter(chosen);
+        let method = if settings.method.is_some() { method } else { of_film.unwrap_or(method) };
+        let identity = |method: Method| {
+            Identity::of(scene, method.name(), &path_settings(settings), settings, cache.clone())
+        };
         if let Some(film) = &resumed {
-            film.check(&identity, settings.shard)?;
+            film.check(&identity(method), settings.shard)?;
         }
 
         let workers = Workers::new(settings.threads)?;
@@ -63,6 +69,8 @@ impl WithFeatures for Render<'_> {
             windows::learn(&paths, &lights, settings.windows, &workers, &mut memory, &mut window_lines)?;
         let stage = Stage { scene, bvh: &bvh, lights: &lights, settings, workers: &workers };
         method.with::<F, _>(&stage, &mut memory, |renderer, memory| {
+            let method = renderer.chosen().unwrap_or(method);
+            let identity = identity(method);
             let audit = Audit::new::<F>(&stage, memory, method.is_biased())?;
             let picture =
                 Picture { method, stage, film, audit, identity, resumed, clock, progress, interrupt };

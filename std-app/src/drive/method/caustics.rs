@@ -7,6 +7,7 @@
 //! most of them go from then on.
 
 use super::path::Paths;
+use super::sppm::ProgressivePhotons;
 use super::{Renderer, Stage};
 use crate::drive::crew::Crew;
 use crate::drive::memory::Memory;
@@ -41,6 +42,9 @@ const LOOK: usize = 32 * PATHS;
 
 /// The share of the picture's light that photons must bring, of what paths find badly, or they are left out.
 const LEAST_SHARE: f64 = 3.5e-2;
+
+/// The share from which on photons may have all of the light, where the method is left to us: paths find next to none.
+const MOST_SHARE: f64 = 0.75;
 
 /// Whether paths were joined with photons of caustics.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -98,6 +102,12 @@ pub(super) fn with<F: Features, T>(
         }
         None => None,
     };
+    let is_open = settings.method.is_none() && settings.resume.is_none();
+    if is_open && paths.caustics.share.is_some_and(|share| share >= MOST_SHARE) {
+        drop((lines, paths));
+        ["emission", "paths"].into_iter().for_each(|structure| memory.give_back(structure));
+        return then(&mut ProgressivePhotons::<F>::new(stage, memory)?, memory);
+    }
     let Some(emission) = emission else {
         drop(lines);
         memory.give_back("emission");

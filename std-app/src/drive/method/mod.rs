@@ -157,6 +157,11 @@ pub(super) struct Stage<'a> {
 
 /// A method at work on one scene. Its structures are its own; the film is the crew's.
 pub(super) trait Renderer {
+    /// Another method than was thought, where a first look has chosen it.
+    fn chosen(&self) -> Option<Method> {
+        None
+    }
+
     /// One round: brings the tiles of `crew` to their targets, or less where the round is cut.
     ///
     /// What sample `n` of a pixel sees follows from the scene, the settings, and `n`: neither from how samples are cut

@@ -9,7 +9,7 @@
 
 use super::photon_view::{self, PhotonView};
 use super::photons::{Drawer, MapUse, PhotonUse};
-use super::{Renderer, Stage};
+use super::{Method, Renderer, Stage};
 use crate::drive::RenderError;
 use crate::drive::crew::Crew;
 use crate::drive::memory::Memory;
@@ -75,6 +75,10 @@ impl<'a, F: Features> ProgressivePhotons<'a, F> {
 }
 
 impl<F: Features> Renderer for ProgressivePhotons<'_, F> {
+    fn chosen(&self) -> Option<Method> {
+        Some(Method::ProgressivePhotons)
+    }
+
     fn round(&mut self, crew: &mut Crew) -> Result<(), RenderError> {
         let Self { stage, tracer, paths, used, photons, sample: shot_for, emission, scratch } = self;
         let Stage { scene, bvh, lights, settings, .. } = *stage;
