@@ -161,10 +161,16 @@ fn has_photons(result: &RenderResult) -> bool {
 
 #[test]
 fn bits_do_not_depend_on_threads_or_level_and_off_is_off() {
-    let buffers = everything();
+    let mut buffers = everything();
+    // Caustics that are worth photons: of a lamp that has no size, by a wide mirror.
+    let mirror = buffers.material(Material { surface: metal(0.0), ..Material::GREY });
+    buffers.square(Vec3::new(0.95, 0.4, 0.5), Vec3::NEG_X, 0.6, mirror);
+    buffers.normals.resize(buffers.positions.len(), [0.0; 3]);
+    let position = Vec3::new(0.5, 0.2, 0.3);
+    buffers.lights.push(PointLight::Point { position, intensity: Rgb::splat(0.2) });
     let scene = buffers.scene();
     let one = path(&scene, 11, |s| s.threads = Some(1));
-    assert!(has_photons(&one));
+    assert!(has_photons(&one), "{:?}", one.caustics);
     assert_eq!(path(&scene, 11, |s| s.threads = Some(2)).image, one.image);
     for level in Level::detect().and_below() {
         assert_eq!(path(&scene, 11, |s| s.level = level).image, one.image, "{level:?}");

@@ -22,10 +22,11 @@ const AIMED: f32 = 0.2;
 /// What a cell gets of what each of its neighbours was worth.
 const BESIDE: f32 = 0.125;
 
-/// Points on mirrors and glass that are aimed at, over all lights together, and for each light.
-const AIMS: usize = 1 << 19;
+/// Points on mirrors and glass that are aimed at, over all lights together, at most for each light, and at least for each
+/// of its cells: of thousands of lights each has a few cells only.
+const AIMS: usize = 1 << 17;
 const MOST_AIMS: usize = 1 << 14;
-const FEWEST_AIMS: usize = 1 << 8;
+const FEWEST_AIMS: usize = 2;
 
 /// Cells around a point that count as aimed at with it.
 const AROUND: isize = 1;
@@ -89,7 +90,7 @@ impl<'m> Worth<'m> {
         aimed.fill(0.0);
         learned.fill(0.0);
         let lots = lights.count().max(1);
-        let points = (AIMS / lots).clamp(FEWEST_AIMS, MOST_AIMS);
+        let points = (AIMS / lots).clamp(FEWEST_AIMS * side * side, MOST_AIMS);
         let mut any = false;
         throwing_points(scene, points, |number, point| {
             for light in 0..lights.count() {

@@ -67,13 +67,13 @@ impl Workers {
         Some(light.mean()).filter(|mean| *mean > 0.0)
     }
 
-    /// A look at a few tiles before the picture.
+    /// A look at a few tiles before the picture, whose mean radiance is about that.
     pub(super) fn pilot<F: Features>(
         &self,
         tracer: &PathTracer<F>,
+        mean: f32,
         scratch: &mut [Vec<Line>],
     ) -> Result<Pilot, OutOfMemory> {
-        let mean = self.pilot_mean(tracer, scratch)?;
         let tasks = tracer.pilot_tasks();
         let mut pilot = Pilot::default();
         for tile in self.each(tasks, scratch, |task, arena| tracer.pilot(task, mean, WAVE, arena))? {

@@ -94,8 +94,7 @@ pub(super) fn with<F: Features, T>(
             let found = look::<F>(stage, &mut paths, &learned, 1, &mut worth)?;
             let mut share = 0.0;
             if found > 0.0 {
-                let mean = stage.workers.pilot_mean(&paths.tracer, &mut paths.scratch)?;
-                share = found / (f64::from(mean) + found);
+                share = found / (f64::from(paths.mean(stage)?) + found);
             }
             paths.caustics.share = Some(share);
             (share >= LEAST_SHARE).then(|| worth.guide(&plain, &mut arena)).transpose()?

@@ -14,6 +14,8 @@ pub(super) struct Paths<'a, F> {
     pub(super) tracer: PathTracer<'a, F>,
     pub(super) scratch: Vec<Vec<Line>>,
     reuse: Reuse,
+    /// The mean radiance of the picture by a first look, where there was one.
+    mean: Option<f32>,
     /// Where photons of caustics were looked for in vain.
     pub(super) caustics: CausticUse,
 }
@@ -32,14 +34,25 @@ impl<'a, F: Features> Paths<'a, F> {
         let Stage { scene, bvh, lights, settings, workers } = *stage;
         let mut scratch = memory.take_each("paths", scratch, workers.count())?;
         let tracer = PathTracer::<F>::new(scene, bvh, lights, path_settings(settings), settings.level);
-        let reuse = match settings.reuse {
-            Some(used) => Reuse { used, pilot: None },
+        let (reuse, mean) = match settings.reuse {
+            Some(used) => (Reuse { used, pilot: None }, None),
             None => {
-                let pilot = workers.pilot(&tracer, &mut scratch)?;
-                Reuse { used: pilot.pays(), pilot: Some(pilot) }
+                let mean = workers.pilot_mean(&tracer, &mut scratch)?;
+                let pilot = workers.pilot(&tracer, mean, &mut scratch)?;
+                (Reuse { used: pilot.pays(), pilot: Some(pilot) }, Some(mean))
             }
         };
-        Ok(Self { tracer: tracer.with_reuse(reuse.used), scratch, reuse, caustics: CausticUse::default() })
+        let (tracer, caustics) = (tracer.with_reuse(reuse.used), CausticUse::default());
+        Ok(Self { tracer, scratch, reuse, mean, caustics })
+    }
+
+    /// About the mean radiance of the picture.
+    pub(super) fn mean(&mut self, stage: &Stage) -> Result<f32, RenderError> {
+        match self.mean {
+            Some(mean) => Ok(mean),
+            // What neighbours share is not in their paths.
+            None => Ok(stage.workers.pilot_mean(&self.tracer.with_reuse(false), &mut self.scratch)?),
+        }
     }
 }
 
