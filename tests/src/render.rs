@@ -26,9 +26,13 @@ pub fn render(
 
 /// Means of green over blocks of 4 × 4 pixels: what is left of noise is a quarter.
 pub fn blocks(image: &Image) -> Vec<f64> {
-    const SIDE: u32 = 4;
-    let sums = statistics::blocks(&image.pixels, image.width, SIDE);
-    sums.chunks_exact(3).map(|sum| sum[1] / f64::from(SIDE * SIDE)).collect()
+    blocks_of(image, 4)
+}
+
+/// Means of green over blocks of `side` × `side` pixels.
+pub fn blocks_of(image: &Image, side: u32) -> Vec<f64> {
+    let sums = statistics::blocks(&image.pixels, image.width, side);
+    sums.chunks_exact(3).map(|sum| sum[1] / f64::from(side * side)).collect()
 }
 
 /// Root of the mean squared difference of blocks over their mean in `b`.

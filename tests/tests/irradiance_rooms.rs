@@ -6,7 +6,7 @@ use halflight::drive::Method;
 use halflight::save::Image;
 use halflight_core::Rgb;
 use halflight_core::scene::{Camera, Material, Scene};
-use halflight_tests::render::{blocks, render};
+use halflight_tests::render::{blocks_of, render};
 use halflight_tests::scenes::{SceneBuffers, emitter};
 
 const SIZE: u32 = 64;
@@ -22,13 +22,20 @@ fn picture(scene: &Scene, method: Method, spp: u32) -> Image {
 #[track_caller]
 fn agrees(scene: &Scene, mean: f64, most: f64) {
     let (path, cache) = (picture(scene, Method::Path, 1024), picture(scene, Method::IrradianceCache, 128));
-    let (path, cache) = (blocks(&path), blocks(&cache));
-    let average = |blocks: &[f64]| blocks.iter().sum::<f64>() / blocks.len() as f64;
-    let ratio = average(&cache) / average(&path);
-    let error = |(a, b): (&f64, &f64)| (a - b).abs() / (b + 0.1 * average(&path));
-    let worst = cache.iter().zip(&path).map(error).fold(0.0, f64::max);
-    println!("mean {ratio:.4}, worst block {worst:.3}");
+    let [ratio, worst] = compared(&cache, &path, 4);
     assert!((ratio - 1.0).abs() < mean && worst < most, "mean {ratio}, worst block {worst}");
+}
+
+/// The mean over that of `reference`, and the largest difference of blocks over their light and a tenth of the mean.
+fn compared(image: &Image, reference: &Image, side: u32) -> [f64; 2] {
+    let (image, reference) = (blocks_of(image, side), blocks_of(reference, side));
+    let average = |blocks: &[f64]| blocks.iter().sum::<f64>() / blocks.len() as f64;
+    let mean = average(&reference);
+    let error = |(a, b): (&f64, &f64)| (a - b).abs() / (b + 0.1 * mean);
+    let worst = image.iter().zip(&reference).map(error).fold(0.0, f64::max);
+    let ratio = average(&image) / mean;
+    println!("mean {ratio:.4}, worst block {worst:.3}");
+    [ratio, worst]
 }
 
 fn diffuse(reflectance: f32) -> Material {
@@ -87,13 +94,31 @@ fn a_black_room_is_black_but_for_what_is_not() {
     agrees(&buffers.scene(), 0.02, 0.25);
 }
 
-/// The spot fills a hundredth of a hemisphere, so few of the 256 rays of a record. Such as fill less than a ray's share
-/// make splotches (docs/decisions/0025).
+/// The spot fills a hundredth of a hemisphere, so few of the 256 rays of a record.
 #[test]
 fn one_bright_spot_lights_a_room() {
     let mut buffers = room(0.5);
     lamp(&mut buffers, Vec3::new(0.1, 0.6, 0.6), Vec3::NEG_X, 0.05, 1e3);
     agrees(&buffers.scene(), 0.02, 0.25);
+}
+
+/// A lamp so near a wall that what it lights is the share of a ray, or a fifth of it: records that meet it by chance are
+/// too bright by as much, all others too dark (worst blocks of 2.5 and 4.3 before). Path tracing hardly finds it
+/// either, so that small blocks are compared with those of records of 4096 rays, and large ones with its picture.
+#[test]
+fn spots_smaller_than_the_share_of_a_ray_light_a_room() {
+    for size in [0.01, 0.005] {
+        let mut buffers = room(0.5);
+        lamp(&mut buffers, Vec3::new(2.0 * size, 0.6, 0.6), Vec3::NEG_X, size, 2.5 / (size * size));
+        let scene = buffers.scene();
+        let [few, many] = [16, 64].map(|strata| {
+            render(&scene, Method::IrradianceCache, SIZE, 64, |settings| settings.cache.strata = strata).image
+        });
+        let [ratio, worst] = compared(&few, &many, 4);
+        assert!((ratio - 1.0).abs() < 0.04 && worst < 0.5, "mean {ratio}, worst block {worst}");
+        let [ratio, worst] = compared(&few, &picture(&scene, Method::Path, 1024), 16);
+        assert!((ratio - 1.0).abs() < 0.05 && worst < 0.3, "mean {ratio}, worst block {worst}");
+    }
 }
 
 #[test]

@@ -73,7 +73,7 @@ pub struct BsdfSample {
 
 impl BsdfSample {
     #[inline]
-    fn reflection(direction: Vec3, weight: Rgb, pdf: f32) -> Self {
+    pub(crate) fn reflection(direction: Vec3, weight: Rgb, pdf: f32) -> Self {
         Self { direction, weight, pdf, delta: false, transmitted: false, eta: 1.0 }
     }
 

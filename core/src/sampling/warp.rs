@@ -18,6 +18,20 @@ pub fn concentric_disk(u: [f32; 2]) -> Vec2 {
     if steep { radius * Vec2::new(sin, cos) } else { radius * Vec2::new(cos, sin) }
 }
 
+/// The point of the square that [`concentric_disk`] takes to `point`.
+#[inline]
+pub fn concentric_square(point: Vec2) -> [f32; 2] {
+    let steep = point.y.abs() > point.x.abs();
+    let (far, near) = if steep { (point.y, point.x) } else { (point.x, point.y) };
+    if far == 0.0 {
+        return [0.5; 2];
+    }
+    let radius = point.length().copysign(far);
+    let other = radius * (libm::atanf(near / far) / FRAC_PI_4);
+    let (x, y) = if steep { (other, radius) } else { (radius, other) };
+    [0.5 * (x + 1.0), 0.5 * (y + 1.0)]
+}
+
 /// A direction of the upper hemisphere with density [`cosine_hemisphere_pdf`]. Never in the horizon, where
 /// that is zero: z² is at least the rounding of 1 - x² - y².
 #[inline]

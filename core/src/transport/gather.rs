@@ -6,6 +6,8 @@
 
 use super::estimator::{Counters, dimension};
 use super::path::{PathTracer, WAVE};
+use super::reuse::Exchange;
+use super::spots::Glint;
 use super::wave::{Path, Share, Wave};
 use crate::bsdf::Features;
 use crate::bvh::Coherence;
@@ -19,7 +21,7 @@ use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
 /// Gatherings have numbers of pixels that no picture has.
-const NO_PIXEL: u32 = 1 << 30;
+pub(super) const NO_PIXEL: u32 = 1 << 30;
 
 /// Rays along the surface for each sector of a record's fence.
 const RAYS_PER_SECTOR: usize = 2;
@@ -85,11 +87,28 @@ impl Place {
         self.pixel
     }
 
-    /// A ray of local `direction`, and its cosine on the triangle.
-    fn ray(&self, frame: &Frame, direction: Vec3) -> (Ray, f32) {
+    /// A ray into unit `direction` of the world.
+    pub(super) fn ray(&self, direction: Vec3) -> Ray {
         let geometric = Vec3::from(self.geometric_normal);
-        let world = frame.to_world(direction);
-        (Ray::new(self.position() + self.error * geometric, world), world.dot(geometric))
+        let ray = Ray::new(self.position() + self.error * geometric, direction);
+        // No light comes from under the surface.
+        if direction.dot(geometric) > 0.0 { ray } else { Ray { t_max: -1.0, ..ray } }
+    }
+
+    /// The path of a gather ray; `index` says where its light belongs.
+    pub(super) fn path(&self, pixel: u32, sample: u32, index: usize) -> Path {
+        Path {
+            throughput: [1.0; 3],
+            pdf: f32::INFINITY,
+            pixel,
+            place: index as u32,
+            sample,
+            segments: 2,
+            triangle: self.triangle,
+            eta_squared: 1.0,
+            share: Share::REFLECTED,
+            ..Path::default()
+        }
     }
 }
 
@@ -105,11 +124,13 @@ pub struct Gathering<'a> {
 }
 
 /// What the strata of a hemisphere see.
-struct Strata<'m> {
-    n: usize,
-    radiance: &'m mut [[f32; 3]],
-    inverse_distance: &'m mut [f32],
-    directions: &'m mut [[f32; 3]],
+pub(super) struct Strata<'m> {
+    pub(super) n: usize,
+    pub(super) radiance: &'m mut [[f32; 3]],
+    pub(super) inverse_distance: &'m mut [f32],
+    pub(super) directions: &'m mut [[f32; 3]],
+    /// What is seen in the cone of a spot.
+    pub(super) aimed: &'m mut [[f32; 3]],
     /// Of what is seen, local; empty where the metric does not ask for them.
     normals: &'m mut [[f32; 3]],
     /// How many of them see light directly.
@@ -120,7 +141,7 @@ impl<'m> Strata<'m> {
     fn footprint(n: usize) -> Footprint {
         let strata = n.saturating_mul(n);
         let triples = Footprint::default().slice::<[f32; 3]>(strata);
-        triples.and(triples).and(triples).slice::<f32>(strata)
+        triples.and(triples).and(triples).and(triples).slice::<f32>(strata)
     }
 
     fn new(n: usize, normals: bool, arena: &mut Arena<'m>) -> Result<Self, OutOfMemory> {
@@ -130,6 +151,7 @@ impl<'m> Strata<'m> {
             radiance: arena.slice(strata)?,
             inverse_distance: arena.slice(strata)?,
             directions: arena.slice(strata)?,
+            aimed: arena.slice(strata)?,
             normals: arena.slice(if normals { strata } else { 0 })?,
             shining: 0,
         })
@@ -147,8 +169,8 @@ impl<F: Features> PathTracer<'_, F> {
         Wave::footprint(n.saturating_mul(n).min(WAVE)).and(Strata::footprint(n))
     }
 
-    /// Gathers at `place`. `number` names the gathering: another one, other rays. `None` where what was found is not
-    /// a number; it is counted as dropped.
+    /// Gathers at `place`. `number` names the gathering: another one, other rays. Of what its rays meet the brightest is
+    /// left in `glints`. `None` where what was found is not a number; it is counted as dropped.
     ///
     /// # Errors
     /// [`OutOfMemory`] where `scratch` has less than [`PathTracer::gather_scratch`].
@@ -159,6 +181,7 @@ impl<F: Features> PathTracer<'_, F> {
         gathering: &Gathering,
         scratch: &mut Arena,
         counters: &mut Counters,
+        glints: &mut [Glint],
     ) -> Result<Option<Record>, OutOfMemory> {
         let Gathering { flux, metric, least_pixels } = *gathering;
         let n = flux.n();
@@ -173,17 +196,14 @@ impl<F: Features> PathTracer<'_, F> {
                 let (ray, path) = self.aim(place, &frame, number, first + i, &mut strata);
                 wave.rays[i] = Ray { tag: i as u32, ..ray };
                 wave.paths[i] = path;
+                wave.exchanges[i] = Exchange::new(0);
             }
             counters.paths += count as u64;
             self.trace(&mut wave, count, Coherence::Coherent, counters);
             for (path, hit) in wave.paths.iter().zip(&*wave.hits).take(count) {
                 self.note(path.place as usize, hit, &frame, &mut strata);
             }
-            let mut active = self.go_on(&mut wave, count, counters);
-            while active > 0 {
-                self.trace(&mut wave, active, Coherence::Incoherent, counters);
-                active = self.go_on(&mut wave, active, counters);
-            }
+            self.finish(&mut wave, count, counters);
             for path in wave.paths.iter().take(count) {
                 if let Some(slot) = strata.radiance.get_mut(path.place as usize) {
                     *slot = path.radiance;
@@ -191,6 +211,10 @@ impl<F: Features> PathTracer<'_, F> {
             }
             first += count;
         }
+        strata.glints(place, &frame, number, glints);
+        self.leave_out_spots(place, &frame, &mut strata);
+        let mut variance = strata.hemisphere().map_or(0.0, |hemisphere| hemisphere.variance());
+        variance += self.look_at_spots(place, &frame, number, &mut wave, &mut strata, counters);
 
         let derivatives = strata.hemisphere().and_then(|h| metric.metric.derivatives(self.level, flux, &h));
         let Some(derivatives) = derivatives.filter(|found| found.irradiance.is_finite()) else {
@@ -201,11 +225,19 @@ impl<F: Features> PathTracer<'_, F> {
         let reach = reach(&metric::Settings { least, ..metric }, &derivatives);
         let mut record = Record::new(place.position(), &frame, &derivatives, &reach);
         let luminance = derivatives.luminance();
-        let variance = strata.hemisphere().map_or(0.0, |hemisphere| hemisphere.variance());
         record.note_noise(if luminance > 0.0 { variance / (luminance * luminance) } else { 0.0 });
         record.shining = strata.shining as f32 / (n * n) as f32;
         self.fence(&mut record, place, counters);
         Ok(Some(record))
+    }
+
+    /// All that follows from the first `active` rays of the wave, which were traced.
+    pub(super) fn finish(&self, wave: &mut Wave, active: usize, counters: &mut Counters) {
+        let mut active = self.go_on(wave, active, counters);
+        while active > 0 {
+            self.trace(wave, active, Coherence::Incoherent, counters);
+            active = self.go_on(wave, active, counters);
+        }
     }
 
     /// The `i`th ray of a gathering, and its path.
@@ -219,24 +251,8 @@ impl<F: Features> PathTracer<'_, F> {
         if let Some(slot) = strata.directions.get_mut(stratum) {
             *slot = direction.to_array();
         }
-        let (mut ray, cos) = place.ray(frame, direction);
-        if cos <= 0.0 {
-            // Under the surface: no light comes from there.
-            ray.t_max = -1.0;
-        }
-        let path = Path {
-            throughput: [1.0; 3],
-            pdf: f32::INFINITY,
-            pixel,
-            place: stratum as u32,
-            sample,
-            segments: 2,
-            triangle: place.triangle,
-            eta_squared: 1.0,
-            share: Share::REFLECTED,
-            ..Path::default()
-        };
-        (ray, path)
+        let ray = place.ray(frame.to_world(direction));
+        (ray, place.path(pixel, sample, stratum))
     }
 
     /// Notes what the ray of a stratum met.

@@ -25,6 +25,7 @@ pub mod reference;
 mod reuse;
 mod shadow;
 pub mod shoot;
+pub mod spots;
 mod wave;
 
 pub use density::PhotonLight;

@@ -30,6 +30,7 @@ use super::outline::outlined;
 use super::places::Places;
 use super::reuse::Exchange;
 use super::shadow::{FEW, pass_cutout, passing, shadow_ray};
+use super::spots::{Cones, Spot};
 use super::wave::{Path, Share, Wave};
 use crate::bsdf::{Bsdf, Features};
 use crate::bvh::{Bvh, Coherence};
@@ -74,6 +75,7 @@ pub struct PathTracer<'a, F> {
     /// Of even and of odd samples.
     maps: Option<&'a [PhotonMaps<'a>; 2]>,
     merging: Option<Merging<'a>>,
+    pub(super) spots: &'a [Spot],
     features: PhantomData<F>,
 }
 
@@ -101,6 +103,7 @@ impl<'a, F: Features> PathTracer<'a, F> {
             photons: None,
             maps: None,
             merging: None,
+            spots: &[],
             features: PhantomData,
         }
     }
@@ -115,6 +118,12 @@ impl<'a, F: Features> PathTracer<'a, F> {
     /// The same, for rays that gather for the cache itself, as it is now.
     pub fn with_growing_cache(&self, cache: &'a IrradianceCache<'a>) -> Self {
         Self { caches: Some(Caches::Growing(cache)), ..*self }
+    }
+
+    /// The same, where rays that gather for a cache aim at `spots`, and so do paths that go on from what they meet. Paths of
+    /// the picture would, too.
+    pub fn with_spots(&self, spots: &'a [Spot]) -> Self {
+        Self { spots, ..*self }
     }
 
     /// The same, where surfaces with a diffuse part have from photons what light is reflected onto them. Pixels must
@@ -497,6 +506,10 @@ impl<'a, F: Features> PathTracer<'a, F> {
             ends = indirect.shining < SMALL && !self.has_mirrors && scene.environment.is_none();
         }
 
+        let cones = match bsdf {
+            Bsdf::Diffuse(_) if indirect.is_none() => Cones::around(self.spots, point.position, normal),
+            _ => None,
+        };
         let mut light = None;
         if !self.lights.is_empty() && !bsdf.is_delta() && !said.is_lit {
             let choice =
@@ -509,9 +522,12 @@ impl<'a, F: Features> PathTracer<'a, F> {
                 if !point.sides_agree(wi, sample.direction) {
                     return None;
                 }
-                let (f, pdf) = bsdf.evaluate::<F>(wo, wi);
+                let (f, mut pdf) = bsdf.evaluate::<F>(wo, wi);
                 if f == Rgb::ZERO {
                     return None;
+                }
+                if let Some(cones) = &cones {
+                    pdf = cones.density(sample.direction, pdf);
                 }
                 if self.settings.reuse && exchange.is_lit() {
                     exchange.light_is_of_base(bsdf.base_part(wo, wi, f));
@@ -564,7 +580,13 @@ impl<'a, F: Features> PathTracer<'a, F> {
 
         let [u, v] = dimension::scattering(&sampler, segments);
         let lobe = if F::GLOSSY || F::DIELECTRIC { sampler.single(first + dimension::LOBE) } else { 0.0 };
-        let Some(sample) = bsdf.sample::<F>(wo, [u, v, lobe]) else { return Step { light, next: None } };
+        let sample = match &cones {
+            Some(cones) => {
+                cones.sample::<F>(&bsdf, &point.frame, [u, v], sampler.single(first + dimension::LOBE))
+            }
+            None => bsdf.sample::<F>(wo, [u, v, lobe]),
+        };
+        let Some(sample) = sample else { return Step { light, next: None } };
         // What a smooth coat mirrors was not gathered.
         if reflected.is_some() && !sample.delta {
             path.share = Share::EMITTED;
@@ -591,7 +613,9 @@ impl<'a, F: Features> PathTracer<'a, F> {
         }
         path.eta_squared *= sample.eta * sample.eta;
         let worth = exchange.worth(throughput) * path.eta_squared;
-        let survival = if certain { 1.0 } else { survival(segments, worth) };
+        // What leads to a spot brings much light, little as it carries.
+        let is_aimed = cones.is_some_and(|cones| cones.hold(direction));
+        let survival = if certain || is_aimed { 1.0 } else { survival(segments, worth) };
         if survival < 1.0 {
             if sampler.single(first + dimension::ROULETTE) >= survival {
                 return Step { light, next: None };

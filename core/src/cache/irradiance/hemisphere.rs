@@ -74,20 +74,9 @@ impl<'a> Hemisphere<'a> {
     /// Variance of the luminance of [`Hemisphere::irradiance`], estimated from second differences along the rows: what
     /// changes evenly from one stratum to the next is no noise. A pattern finer than the strata is.
     pub fn variance(&self) -> f32 {
-        let (mut squares, mut count) = (0.0, 0usize);
-        for row in self.radiance.chunks_exact(self.n) {
-            let mut sum = 0.0;
-            for three in row.windows(3) {
-                let [a, b, c] =
-                    [0, 1, 2].map(|i: usize| three.get(i).map_or(0.0, |&l| luminance(Rgb::from(l))));
-                sum += (a - 2.0 * b + c) * (a - 2.0 * b + c);
-            }
-            squares += sum;
-            count += row.len().saturating_sub(2);
-        }
+        let [squares, count] = second_differences(self.radiance, self.n);
         let strata = (self.n * self.n) as f32;
-        // The variance of a second difference is six times that of each.
-        squares * (PI * PI / (6.0 * strata * count.max(1) as f32))
+        squares * (PI * PI / (6.0 * strata * count))
     }
 
     /// What the distances say.
@@ -105,6 +94,22 @@ impl<'a> Hemisphere<'a> {
             largest_inverse: largest,
         }
     }
+}
+
+/// The squares of second differences of luminance along rows of `side` values, summed; and how many there are. Where values
+/// are independent their mean is six times the variance of each.
+pub(crate) fn second_differences(values: &[[f32; 3]], side: usize) -> [f32; 2] {
+    let (mut squares, mut count) = (0.0, 0usize);
+    for row in values.chunks_exact(side.max(1)) {
+        let mut sum = 0.0;
+        for three in row.windows(3) {
+            let [a, b, c] = [0, 1, 2].map(|i: usize| three.get(i).map_or(0.0, |&l| luminance(Rgb::from(l))));
+            sum += (a - 2.0 * b + c) * (a - 2.0 * b + c);
+        }
+        squares += sum;
+        count += row.len().saturating_sub(2);
+    }
+    [squares, count.max(1) as f32]
 }
 
 /// Statistics of the inverse distances.

@@ -12,6 +12,7 @@ mod record;
 mod store;
 
 pub use derivatives::{CellFlux, Derivatives, Hessian};
+pub(crate) use hemisphere::second_differences;
 pub use hemisphere::{Hemisphere, SIDE_MAX};
 pub use metric::{Metric, Reach, reach};
 pub use packet::{POINTS, Points};

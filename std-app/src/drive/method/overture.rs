@@ -3,11 +3,14 @@
 
 use crate::drive::RenderError;
 use crate::drive::crew::Crew;
+use crate::drive::held_out::luminance;
+use core::f64::consts::FRAC_1_PI;
 use halflight_core::bsdf::Features;
 use halflight_core::cache::irradiance::{IrradianceCache, Record};
 use halflight_core::memory::{Arena, Line};
 use halflight_core::transport::gather::{Gathering, Place};
 use halflight_core::transport::overture::{Order, PIXELS};
+use halflight_core::transport::spots::{Glint, Spot};
 use halflight_core::transport::{Counters, PathTracer};
 
 /// It looks at every other pixel of every other row: what lies between is reached from there, or path traced.
@@ -24,6 +27,20 @@ const FEW: usize = 50;
 /// Places that are gathered at before their records are committed.
 const GATHERED: usize = 32;
 
+/// Glints that are kept of each record, and looked at closely of each batch; how many of these may be no spots.
+const GLINTS: usize = 4;
+const LOOKS: usize = 8;
+const MOST_IN_VAIN: usize = 32;
+
+/// A glint is a ray that brings this share of all that records have in the mean.
+const GLINT: f64 = 0.05;
+
+/// Spots that are aimed at, at most.
+const MOST_SPOTS: usize = 8;
+
+/// How often an overture begins anew because of a spot.
+const MOST_ATTEMPTS: u32 = 4;
+
 /// A cache that is being filled.
 pub(in crate::drive) struct Growing<'a> {
     pub(in crate::drive) cache: IrradianceCache<'a>,
@@ -36,17 +53,56 @@ pub(in crate::drive) struct Growing<'a> {
     before: usize,
     /// Places at which it has gathered.
     gathered: u32,
+    spots: Vec<Spot>,
+    /// Glints that were none.
+    in_vain: usize,
+    /// How often it began anew.
+    attempts: u32,
+    /// Records of a file.
+    loaded: usize,
+    /// Sum of the radiance that records see in the mean, and how many.
+    light: (f64, u32),
+}
+
+/// What came of gathering at a place.
+#[derive(Clone, Default)]
+struct Found {
+    record: Option<Record>,
+    glints: [Glint; GLINTS],
+}
+
+/// How gathering at some places ended.
+enum Gathered {
+    /// There are records of them.
+    All,
+    /// The round is over.
+    Cut,
+    /// All begins anew.
+    Nothing,
 }
 
 impl<'a> Growing<'a> {
     /// Number 0 or 1.
     pub(in crate::drive) fn new(cache: IrradianceCache<'a>, index: u32) -> Self {
-        Self { cache, index, next: 0, sweeps: 0, before: 0, gathered: 0 }
+        Self {
+            cache,
+            index,
+            next: 0,
+            sweeps: 0,
+            before: 0,
+            gathered: 0,
+            spots: Vec::new(),
+            in_vain: 0,
+            attempts: 0,
+            loaded: 0,
+            light: (0.0, 0),
+        }
     }
 
     /// Takes over the records of a file, which were gathered at so many places.
     pub(in crate::drive) fn restore(&mut self, records: &[Record], gathered: u32) {
         self.cache.restore(records);
+        self.loaded = self.cache.records().len();
         self.gathered = gathered;
     }
 
@@ -58,6 +114,37 @@ impl<'a> Growing<'a> {
     /// Leaves the cache as it is.
     pub(in crate::drive) fn finish(&mut self) {
         self.sweeps = SWEEPS;
+    }
+
+    fn is_known(&self, glint: &Glint) -> bool {
+        self.spots.iter().any(|spot| spot.holds(glint.position.into()))
+    }
+
+    /// Forgets the records that did not know of all spots, but for those of a file; whether there were any. Not again
+    /// and again.
+    fn begins_anew(&mut self) -> bool {
+        if self.cache.records().len() == self.loaded || self.attempts == MOST_ATTEMPTS {
+            return false;
+        }
+        let loaded = self.cache.records().get(..self.loaded).unwrap_or_default().to_vec();
+        self.cache.restore(&loaded);
+        (self.next, self.sweeps, self.before, self.light) = (0, 0, 0, (0.0, 0));
+        self.attempts += 1;
+        true
+    }
+
+    /// Glints of no known spot that are worth a closer look, each with the number of its place; the brightest first.
+    fn glints(&self, found: &[Found], strata: usize) -> Vec<(usize, Glint)> {
+        let lights = found.iter().flat_map(|found| &found.record).map(light);
+        let (sum, count) = lights.fold(self.light, |(sum, count), light| (sum + light, count + 1));
+        let least = GLINT * (strata * strata) as f64 * sum / f64::from(count.max(1));
+        let all = found.iter().enumerate().flat_map(|(i, found)| found.glints.map(|glint| (i, glint)));
+        let mut glints: Vec<_> =
+            all.filter(|(_, glint)| f64::from(glint.light) > least && !self.is_known(glint)).collect();
+        glints.sort_by(|(_, a), (_, b)| b.light.total_cmp(&a.light));
+        let left = if self.spots.len() < MOST_SPOTS { MOST_IN_VAIN.saturating_sub(self.in_vain) } else { 0 };
+        glints.truncate(LOOKS.min(left));
+        glints
     }
 
     /// Whether nothing is to be gathered at `place`.
@@ -89,7 +176,7 @@ impl<F: Features> Overture<'_, '_, F> {
     ) -> Result<bool, RenderError> {
         let [width, height] = self.size;
         let order = Order::new(width, height, STRIDE);
-        while growing.sweeps < SWEEPS && !growing.cache.is_full() {
+        'looks: while growing.sweeps < SWEEPS && !growing.cache.is_full() {
             if growing.next >= order.len() {
                 growing.next = 0;
                 growing.sweeps += 1;
@@ -117,8 +204,10 @@ impl<F: Features> Overture<'_, '_, F> {
             while !missing.is_empty() {
                 missing.retain(|place| !growing.is_served(place));
                 let batch: Vec<Place> = missing.drain(..missing.len().min(GATHERED)).collect();
-                if !self.gather(&batch, growing, crew, scratch)? {
-                    return Ok(false);
+                match self.gather(&batch, growing, crew, scratch)? {
+                    Gathered::All => (),
+                    Gathered::Cut => return Ok(false),
+                    Gathered::Nothing => continue 'looks,
                 }
             }
             growing.next += LOOKED_AT as u64;
@@ -126,31 +215,71 @@ impl<F: Features> Overture<'_, '_, F> {
         Ok(true)
     }
 
-    /// Gathers at all of `places`, then commits the records in their order. Whether it was done.
+    /// Gathers at all of `places`, again where spots are found, then commits the records in their order.
     fn gather(
         &self,
         places: &[Place],
         growing: &mut Growing,
         crew: &mut Crew,
         scratch: &mut [Vec<Line>],
-    ) -> Result<bool, RenderError> {
-        let mut records: Vec<Option<Record>> = vec![None; places.len()];
-        // What a gather ray meets may be lit by the cache already.
-        let tracer = self.tracer.with_growing_cache(&growing.cache);
+    ) -> Result<Gathered, RenderError> {
         let first = growing.gathered;
-        let task = |task: usize, arena: &mut Arena, out: &mut [Option<Record>]| {
-            let mut counters = Counters::default();
-            let number = 2 * (first + task as u32) + growing.index;
-            if let (Some(out), Some(place)) = (out.first_mut(), places.get(task)) {
-                *out = tracer.gather(place, number, self.gathering, arena, &mut counters)?;
+        loop {
+            // What a gather ray meets may be lit by the cache already.
+            let tracer = self.tracer.with_growing_cache(&growing.cache).with_spots(&growing.spots);
+            let mut all = vec![Found::default(); places.len()];
+            let task = |task: usize, arena: &mut Arena, out: &mut [Found]| {
+                let mut counters = Counters::default();
+                let number = 2 * (first + task as u32) + growing.index;
+                if let (Some(Found { record, glints }), Some(place)) = (out.first_mut(), places.get(task)) {
+                    *record = tracer.gather(place, number, self.gathering, arena, &mut counters, glints)?;
+                }
+                Ok(counters)
+            };
+            if !crew.pass(&mut all, 1, scratch, &task)? {
+                return Ok(Gathered::Cut);
             }
-            Ok(counters)
-        };
-        if !crew.pass(&mut records, 1, scratch, &task)? {
-            return Ok(false);
+            let strata = self.gathering.flux.n();
+            let glints = growing.glints(&all, strata);
+            let mut spots = vec![None; glints.len()];
+            let look = |task: usize, arena: &mut Arena, out: &mut [Option<Spot>]| {
+                let mut counters = Counters::default();
+                if let (Some(out), Some((place, glint))) = (out.first_mut(), glints.get(task)) {
+                    *out = tracer.spot_of(glint, &places[*place], strata, arena, &mut counters)?;
+                }
+                Ok(counters)
+            };
+            if !crew.pass(&mut spots, 1, scratch, &look)? {
+                return Ok(Gathered::Cut);
+            }
+            let known = growing.spots.len();
+            for ((_, glint), spot) in glints.iter().zip(spots) {
+                match spot {
+                    None => growing.in_vain += 1,
+                    // Not twice by two of its glints.
+                    Some(spot) if !growing.is_known(glint) && growing.spots.len() < MOST_SPOTS => {
+                        growing.spots.push(spot);
+                    }
+                    Some(_) => (),
+                }
+            }
+            if growing.spots.len() > known {
+                if growing.begins_anew() {
+                    return Ok(Gathered::Nothing);
+                }
+                continue;
+            }
+            growing.gathered += places.len() as u32;
+            for record in all.into_iter().filter_map(|found| found.record) {
+                growing.light = (growing.light.0 + light(&record), growing.light.1 + 1);
+                growing.cache.insert(record);
+            }
+            return Ok(Gathered::All);
         }
-        growing.gathered += places.len() as u32;
-        records.into_iter().flatten().for_each(|record| _ = growing.cache.insert(record));
-        Ok(true)
     }
+}
+
+/// The radiance that a record sees in the mean.
+fn light(record: &Record) -> f64 {
+    FRAC_1_PI * luminance(record.irradiance.into())
 }
