@@ -2,7 +2,9 @@
 //! threads, its records against the unit of the scene, and what it does without memory.
 
 use glam::Vec3;
-use halflight::drive::{CacheUse, Mark, Method, RenderResult, Settings};
+use halflight::compare::compare;
+use halflight::drive::{CacheUse, Ending, Mark, Method, RenderResult, Settings};
+use halflight::save::Image;
 use halflight_core::scene::Scene;
 use halflight_tests::render::{blocks, difference, render};
 use halflight_tests::scenes::{SceneBuffers, cornell_box, emitter, everything};
@@ -131,4 +133,36 @@ fn a_survey_tells_where_records_are_and_how_wrong_they_are() {
     assert!(survey.achieved > 1e-4 && survey.achieved < 0.1, "{}", survey.achieved);
     assert!(survey.predicted > 1e-4 && survey.predicted < 1.0, "{}", survey.predicted);
     assert!(cached(&scene, 64, 2, |s| s.max_depth = Some(2)).survey.is_none());
+}
+
+/// Sixteen rays a record, and no limit of its error: noise and bias that no number of samples takes away. Refined, the
+/// cache comes to the error that was asked for, in the same bits on any number of threads.
+#[test]
+fn caches_are_refined_until_the_error_asked_for_holds() {
+    const WANTED: f64 = 4e-3;
+    const SIDE: u32 = 64;
+    let buffers = cornell_box();
+    let scene = buffers.scene();
+    let coarse = |settings: &mut Settings| {
+        settings.cache.strata = 4;
+        settings.cache.error = Some(10.0);
+    };
+    let reference = render(&scene, Method::Path, SIDE, 2048, |_| ()).image;
+    let error = |image: &Image| compare(image, &reference).unwrap().linear.relmse;
+    let fixed = render(&scene, Method::IrradianceCache, SIDE, 1024, coarse);
+    let refined = |threads| {
+        render(&scene, Method::IrradianceCache, SIDE, 1 << 14, |settings| {
+            coarse(settings);
+            settings.stop.error = Some(WANTED);
+            settings.audit = None;
+            settings.threads = Some(threads);
+        })
+    };
+    let one = refined(1);
+    let (before, after) = (error(&fixed.image), error(&one.image));
+    println!("{before:.2e} without; {after:.2e} after {} samples, {:?}", one.spp, one.cache);
+    assert!(before > 1.5 * WANTED && after < WANTED, "{before} {after}");
+    assert!(one.ending == Ending::Done && one.spp < 1 << 14 && one.cache.unwrap().refined > 0);
+    let two = refined(2);
+    assert!(two.image == one.image && cache(&two) == cache(&one));
 }

@@ -56,8 +56,12 @@ pub(super) fn text(run: &Run, report: Option<&Path>) -> String {
             0 => String::new(),
             loaded => format!(", {loaded} of them loaded,"),
         };
+        let refined = match cache.refined {
+            0 => String::new(),
+            times => format!(", refined {}", plural(times.into(), "time")),
+        };
         lines.push(format!(
-            "cache  {}{loaded} in {} by {}{lost}",
+            "cache  {}{loaded} in {} by {}{refined}{lost}",
             plural(cache.records, "record"),
             readable_seconds(cache.seconds),
             settings.cache.metric.name(),

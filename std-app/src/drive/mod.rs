@@ -19,6 +19,7 @@ mod memory;
 mod merge;
 mod method;
 mod picture;
+mod refinement;
 mod regions;
 mod rounds;
 mod run;

@@ -8,6 +8,7 @@ use super::film_file::{self, Header, Identity, Reader};
 use super::history::{Clock, Reference, Round};
 use super::ledger::empty_pixels;
 use super::method::{Method, Renderer, Stage};
+use super::refinement::Refinements;
 use super::rounds::{Plan, Rounds};
 use super::{
     AdaptiveUse, Ending, FileError, Progress, RenderError, RenderResult, Seconds, WindowUse, regions,
@@ -45,18 +46,19 @@ impl Picture<'_> {
         let Stage { settings, workers, .. } = stage;
         let (width, height) = (settings.width, settings.height);
         let mut canvas = Canvas::new(film, settings.shard);
-        let (mut rounds, mut history) = match resumed {
-            None => (Rounds::new(settings.stop), Vec::new()),
+        let (mut rounds, mut history, mut refinements) = match resumed {
+            None => (Rounds::new(settings.stop), Vec::new(), Refinements::default()),
             Some(film) => {
                 let header = film.header.clone();
                 clock.pause(|| film.read_into(&mut canvas))?;
                 canvas.weights = header.weights(canvas.taken.len());
-                let Header { spp, rounds, seconds, estimates, .. } = header;
+                let Header { spp, rounds, seconds, estimates, ref refinements, .. } = header;
+                renderer.resume(&refinements.made);
                 if let (Some(audit), Some(state)) = (&mut audit, header.audit()) {
                     audit.resume(state);
                 }
                 let rounds = Rounds::new(settings.stop).resumed(spp, rounds, seconds, estimates);
-                (rounds, header.history())
+                (rounds, header.history(), header.refinements)
             }
         };
         let reference = clock.pause(|| settings.reference.as_deref().map(Reference::new));
@@ -67,12 +69,16 @@ impl Picture<'_> {
         let mut gain = None;
         let mut saved = Instant::now();
         let mut is_lost = false;
-        let save =
-            |canvas: &Canvas, rounds: &Rounds, audit: Option<&Audit>, seconds: f64, history: &[Round]| {
-                let Some(checkpoint) = &settings.checkpoint else { return Ok::<(), FileError>(()) };
-                let header = Header::new(identity.clone(), canvas, rounds, audit, seconds, history);
-                film_file::write(&checkpoint.path, &header, canvas)
-            };
+        let save = |canvas: &Canvas,
+                    rounds: &Rounds,
+                    audit: Option<&Audit>,
+                    refinements: &Refinements,
+                    seconds: f64,
+                    history: &[Round]| {
+            let Some(checkpoint) = &settings.checkpoint else { return Ok::<(), FileError>(()) };
+            let header = Header::new(identity.clone(), canvas, rounds, audit, refinements, seconds, history);
+            film_file::write(&checkpoint.path, &header, canvas)
+        };
 
         while let Some(plan) = rounds.next(clock.seconds(), estimating) {
             let now = clock.seconds();
@@ -108,9 +114,16 @@ impl Picture<'_> {
                     let pays = |spread: &Spread| is_asked || spread.gain >= adapt::PAYS;
                     canvas.weights = spread.filter(pays).map(|spread| spread.weights);
                 }
+                let short = settings.stop.error.zip(error).and_then(|(wanted, noise)| {
+                    refinements.shortfall(wanted, rounds.spp(), noise, audited.as_ref())
+                });
+                if let Some(refinement) = short.and_then(|short| renderer.refine(&short)) {
+                    refinements.add(refinement, rounds.spp());
+                }
                 error = audited.as_ref().map(|audited| audited.total).or(error);
-                is_lost =
-                    !method.converges() && audited.is_some_and(|audited| rounds.is_out_of_reach(&audited));
+                is_lost = !method.converges()
+                    && !refinements.are_young(rounds.spp())
+                    && audited.is_some_and(|audited| rounds.is_out_of_reach(&audited));
                 rounds.estimated(error);
                 estimating = start.elapsed().as_secs_f64();
                 latest = error;
@@ -129,7 +142,7 @@ impl Picture<'_> {
             clock.pause(|| progress(&known));
             let due = |every: f64| saved.elapsed().as_secs_f64() >= every;
             if plan.first || settings.checkpoint.as_ref().is_some_and(|checkpoint| due(checkpoint.every)) {
-                clock.pause(|| save(&canvas, &rounds, audit.as_ref(), seconds, &history))?;
+                clock.pause(|| save(&canvas, &rounds, audit.as_ref(), &refinements, seconds, &history))?;
                 saved = Instant::now();
             }
             if is_lost || interrupt.load(Ordering::Relaxed) && !plan.first {
@@ -138,7 +151,7 @@ impl Picture<'_> {
         }
         let interrupted = interrupt.load(Ordering::Relaxed);
         // Before the last steps of the audit, which a render that goes on would not take here.
-        save(&canvas, &rounds, audit.as_ref(), clock.seconds(), &history)?;
+        save(&canvas, &rounds, audit.as_ref(), &refinements, clock.seconds(), &history)?;
         let is_known = history.last().is_some_and(|last| last.error.is_some());
         if let (Some(audit), false) = (&mut audit, interrupted || is_known) {
             let left = settings.stop.seconds.map(|limit| limit - estimating - clock.seconds());

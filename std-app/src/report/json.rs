@@ -98,6 +98,7 @@ fn cache(run: &Run) -> Value {
         "refused": cache.refused,
         "loaded": cache.loaded,
         "gathered": cache.gathered,
+        "refined": cache.refined,
         "seconds": cache.seconds,
         "allowed": settings.cache.allowed(),
         "survey": result.survey.as_ref().map(|survey| json!({

@@ -63,6 +63,11 @@ impl Metric {
         Metric::ALL.into_iter().find(|metric| metric.name() == name)
     }
 
+    /// Whether its error is the radius over a distance.
+    pub const fn takes_distances(self) -> bool {
+        matches!(self, Metric::SplitSphere | Metric::BoundedSplitSphere | Metric::MinDistance)
+    }
+
     /// Whether it needs the normals of what the hemisphere sees.
     pub const fn takes_normals(self) -> bool {
         matches!(self, Metric::RadiometricHessian | Metric::GeometricHessian)

@@ -178,6 +178,13 @@ impl<'m> IrradianceCache<'m> {
         true
     }
 
+    /// Makes all radii smaller by a factor, as for an error allowed that is smaller by its fourth power. What records
+    /// then no longer cover is to be filled again.
+    pub fn tighten(&mut self, share: f32) {
+        self.records.iter_mut().take(self.used).for_each(|record| record.tighten(share));
+        self.settle();
+    }
+
     /// Links all records anew, by their supports as they are now: what was clamped is found less often. The order in
     /// which a place finds its records, and so the last bit of what they say, then follows from the records alone.
     pub fn settle(&mut self) {
@@ -311,6 +318,14 @@ impl Record {
     fn learn(&mut self, curvature: f32) {
         let [r1, r2] = self.radii;
         self.error = self.error.max(curvature * (r1 * r1 + r2 * r2) / 8.0);
+    }
+
+    /// See [`IrradianceCache::tighten`].
+    fn tighten(&mut self, share: f32) {
+        let square = share * share;
+        self.allowed *= square * square;
+        self.least *= share;
+        self.shrink(share * self.radii[0]);
     }
 
     /// Makes the support smaller in both directions, so that R1 is not above `radius`.

@@ -4,6 +4,7 @@ use super::identity::Identity;
 use crate::drive::audit::{self, Audit};
 use crate::drive::canvas::{Canvas, Shard};
 use crate::drive::ledger::Ledger;
+use crate::drive::refinement::Refinements;
 use crate::drive::rounds::{Estimates, Rounds};
 use crate::drive::{ErrorEstimate, Method, Round};
 use halflight_core::film::{Dropped, GROUPS};
@@ -32,6 +33,8 @@ pub(in crate::drive) struct Header {
     /// Of adaptive sampling.
     weights: Option<Vec<[f32; GROUPS]>>,
     audit: Option<audit::State>,
+    #[serde(default)]
+    pub(in crate::drive) refinements: Refinements,
 }
 
 /// Not a number, infinite, negative, unfinished.
@@ -46,6 +49,7 @@ impl Header {
         canvas: &Canvas,
         rounds: &Rounds,
         audit: Option<&Audit>,
+        refinements: &Refinements,
         seconds: f64,
         history: &[Round],
     ) -> Self {
@@ -67,6 +71,7 @@ impl Header {
             tiles: canvas.rays.clone(),
             weights: canvas.weights.clone(),
             audit: audit.map(|audit| audit.state().clone()),
+            refinements: refinements.clone(),
         }
     }
 

@@ -14,15 +14,18 @@ use crate::drive::cache_file::{self, Half, Header, View};
 use crate::drive::crew::Crew;
 use crate::drive::held_out::EXACT;
 use crate::drive::memory::Memory;
+use crate::drive::refinement::{Refinement, Shortfall};
 use crate::drive::run::path_settings;
 use crate::drive::survey::{self, Survey};
 use crate::drive::workers::Workers;
 use crate::drive::{RenderError, Settings};
+use core::f32::consts::FRAC_PI_2;
 use halflight_core::bsdf::Features;
 use halflight_core::cache::irradiance::{CellFlux, IrradianceCache, Metric, metric};
 use halflight_core::memory::{Arena, Line};
 use halflight_core::transport::gather::Gathering;
 use halflight_core::transport::{PathTracer, path::WAVE};
+use std::collections::VecDeque;
 use std::path::Path;
 use std::time::Instant;
 
@@ -75,9 +78,19 @@ pub struct CacheUse {
     pub loaded: u64,
     /// Places at which light was gathered: as many times the rays of a record.
     pub gathered: u64,
+    /// How often they were refined, because the error asked for was out of reach.
+    pub refined: u32,
     /// Seconds of the overture.
     pub seconds: f64,
 }
+
+/// The most strata along a side, where caches are refined, and how often they are.
+const FINEST: usize = 128;
+const MOST_REFINEMENTS: usize = 8;
+
+/// Radii become smaller by a factor between these: squared errors of extrapolation fall with its fourth power.
+const LEAST_SHARE: f32 = 0.35;
+const MOST_SHARE: f32 = 0.8;
 
 /// Pixels for each record that a cache has memory for, where that is not limited.
 const PIXELS_PER_RECORD: usize = 8;
@@ -97,12 +110,30 @@ pub(super) fn with<F: Features, T>(
     let Stage { scene, bvh, lights, settings, workers } = *stage;
     let CacheSettings { strata, gather, .. } = settings.cache;
     let strata = strata as usize;
-    let scratch = PathTracer::<F>::scratch(WAVE).or(PathTracer::<F>::gather_scratch(strata));
+    // Records of a file have one error and one number of rays.
+    let in_files = settings.save_cache.is_some() || settings.load_cache.is_some();
+    let is_refined = settings.stop.error.is_some() && !in_files && has_indirect_light(settings);
+    // As fine as half of the memory allows.
+    let has_memory = |n: usize| {
+        let scratch = PathTracer::<F>::gather_scratch(n).bytes().saturating_mul(workers.count());
+        is_refined && n <= FINEST && memory.available() / 2 > scratch + 2 * CellFlux::footprint(n).bytes()
+    };
+    let sizes: Vec<usize> = core::iter::successors(Some(strata), |n| Some(2 * n))
+        .take_while(|n| *n == strata || has_memory(*n))
+        .collect();
+    let finest = sizes.last().copied().unwrap_or(strata);
+    let scratch = PathTracer::<F>::scratch(WAVE).or(PathTracer::<F>::gather_scratch(finest));
     let by_photons = gather == Gather::Photons && has_indirect_light(settings);
     let scratch = if by_photons { scratch.or(Laboratory::scratch::<F>()) } else { scratch };
     let scratch = memory.take_each("paths", scratch, workers.count())?;
-    let mut tables = memory.take("gathering", CellFlux::footprint(strata))?;
-    let flux = CellFlux::build(strata, &mut Arena::new(bytemuck::cast_slice_mut(&mut tables)))?;
+    let mut tables = Vec::new();
+    for &n in &sizes {
+        tables.push(memory.take("gathering", CellFlux::footprint(n))?);
+    }
+    let tables = sizes.iter().zip(&mut tables);
+    let tables = tables
+        .map(|(&n, lines)| CellFlux::build(n, &mut Arena::new(bytemuck::cast_slice_mut(lines))))
+        .collect::<Result<Vec<_>, _>>()?;
     let pixels = settings.width as usize * settings.height as usize;
     let file = cache_file::open(scene, settings)?;
     let header = file.as_ref().map_or_else(|| Header::new(scene, settings), |file| file.header.clone());
@@ -137,7 +168,11 @@ pub(super) fn with<F: Features, T>(
     let metric = metric::Settings { error: settings.cache.allowed(), ..usual };
     let mut method = Cached {
         tracer: PathTracer::<F>::new(scene, bvh, lights, path_settings(settings), settings.level),
-        gathering: Gathering { flux: &flux, metric, least_pixels: LEAST_PIXELS },
+        gathering: Gathering { flux: &tables[0], metric, least_pixels: LEAST_PIXELS },
+        tables: &tables,
+        is_refined,
+        refined: 0,
+        pending: VecDeque::new(),
         size: [settings.width, settings.height],
         halves: [Growing::new(even, 0), Growing::new(odd, 1)],
         laboratory,
@@ -184,6 +219,13 @@ struct Cached<'a, F> {
     /// Where they are kept.
     save: Option<&'a Path>,
     is_filled: bool,
+    /// Of each number of strata that may be gathered, the fewest first.
+    tables: &'a [CellFlux<'a>],
+    /// Whether caches may be refined, and how often they were.
+    is_refined: bool,
+    refined: usize,
+    /// Refinements that wait until the caches of before are filled.
+    pending: VecDeque<Refinement>,
     seconds: f64,
 }
 
@@ -219,6 +261,34 @@ impl<F: Features> Cached<'_, F> {
         Ok(all)
     }
 
+    /// Begins caches that are better.
+    fn begin(&mut self, refinement: Refinement) {
+        let Refinement { share, is_finer } = refinement;
+        let n = self.gathering.flux.n();
+        let Gathering { flux, metric, least_pixels } = &mut self.gathering;
+        let by_curvature = !metric.metric.takes_distances();
+        metric.error *= if by_curvature { share.powi(4) } else { share };
+        *least_pixels *= share;
+        if let Some(finer) = self.tables.iter().find(|table| is_finer && table.n() > n) {
+            *flux = finer;
+        }
+        let keeps = by_curvature && !is_finer;
+        self.halves.iter_mut().for_each(|growing| growing.refine(keeps.then_some(share)));
+        self.refined += 1;
+        self.is_filled = false;
+    }
+
+    /// Whether records expect more error of the noise of their rays than of extrapolation.
+    fn is_noisy(&self) -> bool {
+        let records = self.halves.iter().flat_map(|half| half.cache.records());
+        let parts = records.map(|record| {
+            let noise = record.noise / (record.overlap * record.overlap);
+            [noise, FRAC_PI_2 * record.predicted() * record.predicted()].map(f64::from)
+        });
+        let [noise, all] = parts.fold([0.0; 2], |[a, b], [c, d]| [a + c, b + d]);
+        noise > 0.5 * all
+    }
+
     fn save(&mut self) -> Result<(), RenderError> {
         let Some(path) = self.save else { return Ok(()) };
         for (half, growing) in self.header.halves.iter_mut().zip(&self.halves) {
@@ -231,11 +301,14 @@ impl<F: Features> Cached<'_, F> {
 
 impl<F: Features> Renderer for Cached<'_, F> {
     fn round(&mut self, crew: &mut Crew) -> Result<(), RenderError> {
-        if !self.is_filled {
+        while !self.is_filled {
             self.is_filled = self.fill(crew)?;
-        }
-        if !self.is_filled {
-            return Ok(());
+            if !self.is_filled {
+                return Ok(());
+            }
+            if let Some(next) = self.pending.pop_front() {
+                self.begin(next);
+            }
         }
         let Self { tracer, halves: [even, odd], scratch, .. } = self;
         let tracer = tracer.with_caches([&even.cache, &odd.cache]);
@@ -243,6 +316,26 @@ impl<F: Features> Renderer for Cached<'_, F> {
             tracer.run(task, samples, WAVE, arena, pixels)
         })?;
         Ok(())
+    }
+
+    fn refine(&mut self, short: &Shortfall) -> Option<Refinement> {
+        if !self.is_refined || self.refined == MOST_REFINEMENTS {
+            return None;
+        }
+        let has_finer = self.tables.last().is_some_and(|table| table.n() > self.gathering.flux.n());
+        let is_finer = short.noise && has_finer && self.is_noisy();
+        let share = match short.bias {
+            Some(bias) => (bias.powf(-0.25) as f32).clamp(LEAST_SHARE, MOST_SHARE),
+            None if is_finer => 1.0,
+            None => MOST_SHARE,
+        };
+        let refinement = Refinement { share, is_finer };
+        self.begin(refinement);
+        Some(refinement)
+    }
+
+    fn resume(&mut self, refinements: &[Refinement]) {
+        self.pending = refinements.iter().copied().collect();
     }
 
     fn survey(&mut self, workers: &Workers) -> Result<Option<Survey>, RenderError> {
@@ -264,6 +357,7 @@ impl<F: Features> Renderer for Cached<'_, F> {
             refused: sum(|cache| cache.refused()),
             loaded: gathered(self.loaded.map(|half| half.records)),
             gathered: gathered([0, 1].map(|i| self.halves[i].gathered() - self.loaded[i].gathered)),
+            refined: self.refined as u32,
             seconds: self.seconds,
         })
     }

@@ -24,6 +24,7 @@ pub use photons::{MapUse, PhotonSettings, PhotonUse};
 
 use super::crew::Crew;
 use super::memory::Memory;
+use super::refinement::{Refinement, Shortfall};
 use super::survey::Survey;
 use super::workers::Workers;
 use super::{RenderError, Reuse, Settings};
@@ -172,6 +173,15 @@ pub(super) trait Renderer {
     /// # Errors
     /// Memory that does not suffice.
     fn round(&mut self, crew: &mut Crew) -> Result<(), RenderError>;
+
+    /// Asked where samples alone do not bring the error that was asked for: refines what its samples share, before the next
+    /// of them, and says how; `None` where that cannot be. Sample `n` then follows from what was refined before it, too.
+    fn refine(&mut self, _short: &Shortfall) -> Option<Refinement> {
+        None
+    }
+
+    /// Refines as it did before a film was kept, one after the other.
+    fn resume(&mut self, _refinements: &[Refinement]) {}
 
     /// Whether neighbouring pixels share what their paths find.
     fn reuse(&self) -> Reuse {

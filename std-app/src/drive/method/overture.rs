@@ -111,6 +111,16 @@ impl<'a> Growing<'a> {
         self.gathered
     }
 
+    /// Begins again, with the records that there are, their radii smaller by `share`, or with none.
+    pub(in crate::drive) fn refine(&mut self, share: Option<f32>) {
+        match share {
+            Some(share) => self.cache.tighten(share),
+            None => self.cache.restore(&[]),
+        }
+        self.loaded = self.cache.records().len();
+        (self.next, self.sweeps, self.before) = (0, 0, self.loaded);
+    }
+
     /// Leaves the cache as it is.
     pub(in crate::drive) fn finish(&mut self) {
         self.sweeps = SWEEPS;
