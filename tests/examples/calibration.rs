@@ -27,6 +27,7 @@ struct Wanted {
     times: u32,
     method: Option<Method>,
     adaptive: Option<bool>,
+    audit: Option<f64>,
 }
 
 fn main() {
@@ -38,6 +39,7 @@ fn main() {
         times: 100,
         method: None,
         adaptive: Some(false),
+        audit: None,
     };
     let mut scenes = Vec::new();
     let mut arguments = std::env::args().skip(1);
@@ -51,6 +53,7 @@ fn main() {
             "--times" => wanted.times = value().parse().expect("a number of times"),
             "--method" => wanted.method = Some(Method::named(&value()).expect("a method")),
             "--adaptive" => wanted.adaptive = Some(true),
+            "--audit" => wanted.audit = Some(value().parse().expect("a share")),
             scene => scenes.push(scene.to_owned()),
         }
     }
@@ -139,8 +142,8 @@ fn calibrate(file: &Path, wanted: &Wanted) {
 }
 
 fn settings(wanted: &Wanted, seed: u32, stop: Stop) -> Settings {
-    let Wanted { size, method, adaptive, .. } = *wanted;
-    Settings { width: size, height: size, seed, stop, method, adaptive, ..Settings::default() }
+    let Wanted { size, method, adaptive, audit, .. } = *wanted;
+    Settings { width: size, height: size, seed, stop, method, adaptive, audit, ..Settings::default() }
 }
 
 /// One line of the table: true errors and their estimates.

@@ -10,7 +10,8 @@
 //!    quotient, the estimate goes up by δ / (1 + 2 δ), and is as uncertain as that.
 //! 3. The error that this picture has and its estimate differ by the mean of the product of both halves' errors,
 //!    exactly. For a pixel of variance V the product has the variance 4 V², and the estimate squared the mean 3 V² (more
-//!    with heavy tails). How errors hang together between pixels is seen in products of differences within the halves.
+//!    with heavy tails); Student's t says what it is to know that from few pixels. How errors hang together between
+//!    pixels is seen in products of differences within the halves.
 //!
 //! The price: about as much time as a twentieth of a sample for each pixel.
 
@@ -38,7 +39,9 @@ impl ErrorEstimate {
     pub fn of(tiles: impl Iterator<Item = TileError>) -> Option<Self> {
         let mut sum = TileError::default();
         tiles.for_each(|tile| sum += tile);
-        Self::with_reach(&sum, Z * sqrt(together(sum.blocks, sum.pixels)))
+        let together = together(sum.blocks, sum.pixels);
+        let freedom = freedom(sum.squares, sum.fourths) / together;
+        Self::with_reach(&sum, student_95(freedom) * sqrt(together))
     }
 
     /// From the sums over regions, where a method shares between pixels far apart: regions count as independent. They
@@ -51,7 +54,7 @@ impl ErrorEstimate {
             squares += squared;
             fourths += squared * squared;
         }
-        let freedom = if fourths > 0.0 { squares * squares / fourths } else { 1.0 };
+        let freedom = freedom(squares, fourths);
         Self::with_reach(&sum, student_95(freedom) * sqrt(together(squares, sum.pixels)))
     }
 
@@ -79,6 +82,11 @@ impl ErrorEstimate {
 /// picture and of pixels.
 fn together(parts: f64, pixels: f64) -> f64 {
     if pixels > 0.0 { fmax(parts / pixels, 1.0) } else { 1.0 }
+}
+
+/// Degrees of freedom of a sum, from the sums of the squares and fourth powers of what is added up.
+fn freedom(squares: f64, fourths: f64) -> f64 {
+    if fourths > 0.0 { squares * squares / fourths } else { 1.0 }
 }
 
 /// Student's t of `freedom` degrees lies between this and its negative with 95 % (expansion of Cornish and Fisher;

@@ -61,6 +61,8 @@ pub struct TileError {
     pub(super) crossed: f64,
     /// Squares of the variances of pixels, of the mean of `filtered` and `halves`.
     pub(super) squares: f64,
+    /// The squares of those squares.
+    pub(super) fourths: f64,
     /// Sum of (A₁ − A₂)(B₁ − B₂) / 4, which has the mean 0 and hangs together between pixels as the errors do.
     pub(super) product: f64,
     /// Squares of that sum in blocks of 8 x 8 pixels.
@@ -106,7 +108,9 @@ impl TileError {
             sums.filtered += filtered;
             sums.halves += halves;
             let middle = 0.5 * (filtered + halves);
-            sums.squares += middle * middle;
+            let squared = middle * middle;
+            sums.squares += squared;
+            sums.fourths += squared * squared;
             sums.parts += total(0.5 * (noise1 + noise2) * by_both);
             sums.crossed += total(0.5 * (noise1 * by_second + noise2 * by_first));
             let product = total((a1 - a2) * (b1 - b2) * (by_both + by_mean)) / 8.0;
@@ -128,6 +132,7 @@ impl core::ops::AddAssign for TileError {
         self.parts += other.parts;
         self.crossed += other.crossed;
         self.squares += other.squares;
+        self.fourths += other.fourths;
         self.product += other.product;
         self.blocks += other.blocks;
         self.pixels += other.pixels;

@@ -94,6 +94,13 @@ pub(super) fn outlined(scene: &Scene, lights: &Lights, settings: &PathSettings, 
     if pixels == Outlined::default() || has_cutouts() { Outlined::default() } else { pixels }
 }
 
+/// Whether the pixel in column `x` and row `y` is one of [`outlined`].
+pub(super) fn is_outlined(scene: &Scene, lights: &Lights, settings: &PathSettings, [x, y]: [u32; 2]) -> bool {
+    let index = y / TILE * settings.width.div_ceil(TILE) + x / TILE;
+    let tile = Tile::new(settings.width, settings.height, index as usize);
+    outlined(scene, lights, settings, tile).contains(Tile::position(TILE, x % TILE, y % TILE))
+}
+
 /// The rays that look at lamps for one sample of the pixel in column `x` and row `y`.
 pub(super) fn rays(
     scene: &Scene,
@@ -136,23 +143,20 @@ pub(super) fn emission<F: Features>(
 }
 
 impl<F: Features> PathTracer<'_, F> {
-    /// What the first `count` paths of the wave see of lamps, in `wave.shadow_light`: those whose pixels are `outlined`;
-    /// nothing for the others. Whether there are any.
+    /// What the first `count` paths of the wave see of lamps, in `wave.shadow_light`: those whose pixel is `outlined`, by
+    /// its place; nothing for the others.
     pub(super) fn look_at_lamps(
         &self,
-        outlined: Outlined,
+        mut outlined: impl FnMut(u32) -> bool,
         wave: &mut Wave,
         count: usize,
         counters: &mut Counters,
-    ) -> bool {
-        if outlined == Outlined::default() {
-            return false;
-        }
+    ) {
         let (mut filled, capacity) = (0, wave.rays.len());
         for i in 0..count {
             wave.shadow_light[i] = [0.0; 3];
             let path = wave.paths[i];
-            if !outlined.contains(path.place as usize) {
+            if !outlined(path.place) {
                 continue;
             }
             let place = [path.pixel % self.settings.width, path.pixel / self.settings.width];
@@ -165,7 +169,6 @@ impl<F: Features> PathTracer<'_, F> {
             }
         }
         self.gather_emission(wave, filled, counters);
-        true
     }
 
     /// Adds what the first `count` rays of the wave see.

@@ -26,7 +26,7 @@ use super::estimator::{
 };
 use super::maps::{PhotonMaps, Said};
 use super::merge::{ChainLink, Merging, ends_chain};
-use super::outline::outlined;
+use super::outline::{Outlined, outlined};
 use super::places::Places;
 use super::reuse::Exchange;
 use super::shadow::{FEW, pass_cutout, passing, shadow_ray};
@@ -197,7 +197,11 @@ impl<'a, F: Features> PathTracer<'a, F> {
             if self.settings.reuse {
                 self.share(&mut wave, count, &mut counters);
             }
-            let has_lamps = self.look_at_lamps(places.outlined, &mut wave, count, &mut counters);
+            let has_lamps = places.outlined != Outlined::default();
+            if has_lamps {
+                let outlined = |place| places.outlined.contains(place as usize);
+                self.look_at_lamps(outlined, &mut wave, count, &mut counters);
+            }
             for (i, (path, exchange)) in wave.paths.iter().zip(&*wave.exchanges).take(count).enumerate() {
                 if let Some(pixel) = out.get_mut(path.place as usize) {
                     let lamps = if has_lamps { Rgb::from(wave.shadow_light[i]) } else { Rgb::ZERO };

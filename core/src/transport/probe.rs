@@ -1,9 +1,11 @@
 //! Path tracing of single pixels, far apart: what an audit asks ([`crate::estimate`]).
 
 use super::estimator::Counters;
+use super::outline::is_outlined;
 use super::path::PathTracer;
 use super::reuse::Exchange;
-use super::wave::{Path, Wave};
+use super::wave::{Path, Share, Wave};
+use crate::Rgb;
 use crate::bsdf::Features;
 use crate::film::Pixel;
 use crate::geometry::{MISS, Ray};
@@ -34,6 +36,16 @@ impl<F: Features> PathTracer<'_, F> {
             .enumerate()
             .flat_map(|(place, pixel)| samples.clone().map(move |sample| (place as u32, *pixel, sample)));
         let mut all = all.peekable();
+        // Asked for all samples of a pixel in turn.
+        let mut latest = (u32::MAX, false);
+        let mut outlined = |place: u32| {
+            if latest.0 != place
+                && let Some(pixel) = pixels.get(place as usize)
+            {
+                latest = (place, is_outlined(self.scene, self.lights, &self.settings, *pixel));
+            }
+            latest.1
+        };
         while all.peek().is_some() {
             let mut count = 0;
             let slots = wave.paths.iter_mut().zip(wave.rays.iter_mut()).zip(wave.exchanges.iter_mut());
@@ -48,6 +60,7 @@ impl<F: Features> PathTracer<'_, F> {
                     place,
                     sample,
                     segments: 1,
+                    share: if outlined(place) { Share::BESIDE_LAMP } else { Share::ALL },
                     triangle: MISS,
                     eta_squared: 1.0,
                     ..Path::default()
@@ -57,9 +70,12 @@ impl<F: Features> PathTracer<'_, F> {
             }
             counters.paths += count as u64;
             alone.advance(&mut wave, count, &mut counters);
-            for (path, exchange) in wave.paths.iter().zip(&*wave.exchanges).take(count) {
+            self.look_at_lamps(&mut outlined, &mut wave, count, &mut counters);
+            let ends = wave.paths.iter().zip(&*wave.exchanges).zip(&*wave.shadow_light);
+            for ((path, exchange), lamps) in ends.take(count) {
                 if let Some(pixel) = out.get_mut(path.place as usize) {
-                    pixel.add(path.sample, exchange.seen(path), &mut counters.dropped);
+                    let light = exchange.seen(path) + Rgb::from(*lamps);
+                    pixel.add(path.sample, light, &mut counters.dropped);
                 }
             }
         }

@@ -4,11 +4,10 @@
 use super::estimator::{
     MAX_CROSSINGS, MAX_VERTICES, PathSettings, dimension, environment_heuristic, power_heuristic, survival,
 };
-use super::outline::{self, outlined};
+use super::outline::{self, is_outlined};
 use super::shadow::{passing, shadow_ray};
 use crate::bsdf::{All, Bsdf};
 use crate::bvh::Bvh;
-use crate::film::{TILE, Tile};
 use crate::geometry::MISS;
 use crate::light::{Lights, emitted};
 use crate::sampling::Sampler;
@@ -32,9 +31,7 @@ pub fn radiance(
     let mut ray = scene.camera.ray(width, height, x as f32 + dx, y as f32 + dy, lens);
 
     // The border of a lamp is looked at by other rays.
-    let tile = Tile::new(width, height, (y / TILE * width.div_ceil(TILE) + x / TILE) as usize);
-    let is_outlined =
-        outlined(scene, lights, settings, tile).contains(Tile::position(TILE, x % TILE, y % TILE));
+    let is_outlined = is_outlined(scene, lights, settings, [x, y]);
 
     let mut radiance = Rgb::ZERO; // L
     let mut throughput = Rgb::ONE; // β
