@@ -2,7 +2,7 @@
 //! picture is held against the mean of all others of its scene, of both kinds. Prints the table of docs/validation.md:
 //!
 //! `cargo run --release -p halflight-tests --example adaptive -- [--renders 16] [--size 128] [--spp 64 | --error 0.001]
-//! SCENE…`, scene files. With `--error` renders stop by themselves; how many had that error within a factor of 1.5, and how
+//! [--auto] SCENE…`, scene files. With `--auto` the renderer tells whether it pays. With `--error` renders stop by themselves; how many had that error within a factor of 1.5, and how
 //! many had more, is printed besides. Processor seconds are read from /proc, with one thread for each render.
 
 use core::sync::atomic::AtomicBool;
@@ -25,6 +25,7 @@ struct Kind {
 fn main() {
     let (mut renders, mut size, mut scenes) = (16, 128, Vec::new());
     let mut stop = Stop { spp: Some(64), ..Stop::default() };
+    let mut adaptive = Some(true);
     let mut arguments = std::env::args().skip(1);
     while let Some(argument) = arguments.next() {
         let mut value = || -> f64 {
@@ -35,6 +36,7 @@ fn main() {
             "--size" => size = value() as u32,
             "--spp" => stop = Stop { spp: Some(value() as u32), ..Stop::default() },
             "--error" => stop = Stop { error: Some(value()), ..Stop::default() },
+            "--auto" => adaptive = None,
             _ => scenes.push(argument),
         }
     }
@@ -43,11 +45,11 @@ fn main() {
     );
     println!("|---|---|---|---|---|---|---|---|---|");
     for scene in scenes {
-        measure(Path::new(&scene), renders, size, stop);
+        measure(Path::new(&scene), renders, size, stop, adaptive);
     }
 }
 
-fn measure(file: &Path, renders: u32, size: u32, stop: Stop) {
+fn measure(file: &Path, renders: u32, size: u32, stop: Stop, adaptive: Option<bool>) {
     let loaded = load::load(file, &LoadOptions::default()).expect("a scene");
     let views = loaded.views();
     let scene = views.scene(loaded.camera_or_default());
@@ -55,13 +57,12 @@ fn measure(file: &Path, renders: u32, size: u32, stop: Stop) {
     let mut intervals = [Vec::new(), Vec::new()];
     for seed in 0..renders {
         for (index, kind) in kinds.iter_mut().enumerate() {
-            let adaptive = index == 1;
             let settings = Settings {
                 width: size,
                 height: size,
                 seed: 2 * seed + index as u32,
                 stop,
-                adaptive: Some(adaptive),
+                adaptive: if index == 1 { adaptive } else { Some(false) },
                 threads: Some(1),
                 ..Settings::default()
             };

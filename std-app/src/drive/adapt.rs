@@ -27,8 +27,14 @@ pub(super) const PAYS: f64 = 1.15;
 /// Groups of a block.
 const ASKING: usize = GROUPS / BLOCKS;
 
-/// Rays for a sample around each tile of a picture `width` pixels across.
-pub(super) fn costs(canvas: &Canvas, width: u32) -> Vec<f64> {
+/// What a sample of each tile costs, in rays: as the tiles around tell and as it is.
+pub(super) struct Costs {
+    told: Vec<f64>,
+    own: Vec<f64>,
+}
+
+/// Those of a picture `width` pixels across.
+pub(super) fn costs(canvas: &Canvas, width: u32) -> Costs {
     let across = width.div_ceil(TILE) as usize;
     let samples =
         |tile: usize| canvas.taken.get(tile).map(|taken| taken.iter().map(|n| u64::from(*n)).sum::<u64>());
@@ -41,7 +47,9 @@ pub(super) fn costs(canvas: &Canvas, width: u32) -> Vec<f64> {
         let (rays, samples) = all.fold((0.0, 0.0), |sum, more| (sum.0 + more.0, sum.1 + more.1));
         if rays > 0.0 { rays / samples } else { 1.0 }
     };
-    (0..canvas.taken.len()).map(around).collect()
+    let tiles = || 0..canvas.taken.len();
+    let own = |tile| cost(tile).map_or(1.0, |(rays, samples)| rays / f64::max(samples, 1.0));
+    Costs { told: tiles().map(around).collect(), own: tiles().map(own).collect() }
 }
 
 /// A row or column and those beside it.
@@ -58,14 +66,14 @@ pub(super) struct Spread {
 }
 
 impl Spread {
-    /// For a picture `width` pixels across. `costs` are those of a sample of each tile.
-    pub(super) fn of(tiles: &[[BlockNoise; BLOCKS]], costs: &[f64], width: u32) -> Self {
+    /// For a picture `width` pixels across.
+    pub(super) fn of(tiles: &[[BlockNoise; BLOCKS]], costs: &Costs, width: u32) -> Self {
         let across = 2 * width.div_ceil(TILE) as usize;
         let block = |x: usize, y: usize| {
             let tile = tiles.get(y / 2 * (across / 2) + x / 2).filter(|_| x < across);
             tile.map(|tile| tile[y % 2 * 2 + x % 2])
         };
-        let cost = |tile: usize| costs.get(tile).copied().unwrap_or(1.0);
+        let cost = |costs: &[f64], tile: usize| costs.get(tile).copied().unwrap_or(1.0);
         let wanted = |tile: usize, group: usize| {
             let (number, asking) = (group / ASKING, group % ASKING);
             let (x, y) = (tile % (across / 2) * 2 + number % 2, tile / (across / 2) * 2 + number / 2);
@@ -81,7 +89,7 @@ impl Spread {
                 pixels += AROUND * f64::from(other.pixels);
             }
             // Where there is nobody to tell, as if it were quiet.
-            (sum / pixels.max(1.0) / cost(tile)).sqrt().max(f64::MIN_POSITIVE)
+            (sum / pixels.max(1.0) / cost(&costs.told, tile)).sqrt().max(f64::MIN_POSITIVE)
         };
         let wanted: Vec<[f64; GROUPS]> =
             (0..tiles.len()).map(|tile| core::array::from_fn(|group| wanted(tile, group))).collect();
@@ -94,12 +102,12 @@ impl Spread {
         };
         let weights: Vec<[f32; GROUPS]> = wanted.iter().map(|groups| groups.map(weight)).collect();
 
-        // What groups see themselves has had no part in their weights, so that it may judge them.
+        // What groups see and cost themselves has had no part in their weights, so that it may judge them.
         let (mut even, mut spread, mut even_cost, mut spread_cost) = (0.0, 0.0, 0.0, 0.0);
         for (tile, (weights, blocks)) in weights.iter().zip(tiles).enumerate() {
             let own = blocks.iter().flat_map(|block| block.own);
             for (weight, own) in weights.iter().zip(own).filter(|(weight, _)| **weight > 0.0) {
-                let (weight, cost) = (f64::from(*weight), cost(tile) * f64::from(own.pixels));
+                let (weight, cost) = (f64::from(*weight), cost(&costs.own, tile) * f64::from(own.pixels));
                 even += own.sum;
                 spread += own.sum / weight;
                 even_cost += cost;
@@ -164,9 +172,13 @@ mod tests {
         BlockNoise { own: [of(16); ASKING], others: [of(48); ASKING] }
     }
 
+    fn even(costs: &[f64]) -> Costs {
+        Costs { told: costs.to_vec(), own: costs.to_vec() }
+    }
+
     #[test]
     fn without_noise_all_are_equal() {
-        let spread = Spread::of(&[[block(0.0); BLOCKS]; 6], &[7.0; 6], 40);
+        let spread = Spread::of(&[[block(0.0); BLOCKS]; 6], &even(&[7.0; 6]), 40);
         assert_eq!((spread.weights, spread.gain), (vec![[1.0; GROUPS]; 6], 1.0));
     }
 
@@ -175,7 +187,7 @@ mod tests {
         let mut tiles = [[block(1.0); BLOCKS]; 4];
         // The lower right block of the upper left tile.
         tiles[0][3] = block(100.0);
-        let Spread { weights, gain } = Spread::of(&tiles, &[1.0; 4], 32);
+        let Spread { weights, gain } = Spread::of(&tiles, &even(&[1.0; 4]), 32);
         let far = weights[3][12];
         assert!(weights[0][12..].iter().all(|weight| *weight > 3.0 * far), "{weights:?}");
         assert!([weights[3][0], weights[1][8], weights[1][0]].iter().all(|near| *near > 1.3 * far));
@@ -185,7 +197,11 @@ mod tests {
 
     #[test]
     fn what_costs_more_gets_less() {
-        let Spread { weights, gain } = Spread::of(&[[block(1.0); BLOCKS]; 2], &[1.0, 9.0], 32);
+        let tiles = [[block(1.0); BLOCKS]; 2];
+        let Spread { weights, gain } = Spread::of(&tiles, &even(&[1.0, 9.0]), 32);
         assert!(weights[0][0] > 1.4 * weights[1][0] && gain > 1.05, "{weights:?} {gain}");
+        // It is the other way round, in truth.
+        let wrong = Costs { told: vec![1.0, 9.0], own: vec![9.0, 1.0] };
+        assert!(Spread::of(&tiles, &wrong, 32).gain < 0.95);
     }
 }
