@@ -33,6 +33,10 @@ pub struct ErrorEstimate {
 /// The normal distribution lies between this and its negative with 95 %.
 const Z: f64 = 1.959_963_984_540_054;
 
+/// Degrees of freedom at the least, of independent pixels: where fewer of them have nearly all of the noise it has heavy
+/// tails, and their squares are too large already.
+const FEWEST: f64 = 8.0;
+
 impl ErrorEstimate {
     /// From all tiles of a picture whose pixels share nothing, or paths within blocks of 8 x 8; `None` where no pixel has
     /// four samples.
@@ -40,7 +44,7 @@ impl ErrorEstimate {
         let mut sum = TileError::default();
         tiles.for_each(|tile| sum += tile);
         let together = together(sum.blocks, sum.pixels);
-        let freedom = freedom(sum.squares, sum.fourths) / together;
+        let freedom = fmax(freedom(sum.squares, sum.fourths) / together, FEWEST);
         Self::with_reach(&sum, student_95(freedom) * sqrt(together))
     }
 
