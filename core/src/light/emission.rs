@@ -6,14 +6,14 @@
 
 use super::PointLight;
 use super::emitter::Emitter;
-use super::guide::{self, Guide};
+use super::guide::Guide;
 use super::lights::{Lights, emitted_at, mean_luminance, spot_falloff, strength};
 use crate::Rgb;
 use crate::geometry::{Bounds, Frame, MISS, Ray};
 use crate::memory::{Arena, Footprint, OutOfMemory};
 use crate::sampling::warp::{
-    UNIFORM_SPHERE_PDF, concentric_disk, cosine_hemisphere, uniform_cone, uniform_cone_pdf, uniform_sphere,
-    uniform_sphere_square, uniform_triangle,
+    UNIFORM_SPHERE_PDF, concentric_disk, concentric_square, cosine_hemisphere, uniform_cone,
+    uniform_cone_pdf, uniform_sphere, uniform_sphere_square, uniform_triangle,
 };
 use crate::sampling::{AliasTable, Sampler};
 use crate::scene::Scene;
@@ -134,12 +134,12 @@ impl<'m> Emission<'m> {
             let plane = Vec3::from(emitter.normal);
             let normal = if way.dot(plane) > 0.0 || !emitter.is_two_sided() { plane } else { -plane };
             let local = Frame::from_normal(normal).to_local(way);
-            return (local.z > 0.0).then(|| guide::disk_square(local.truncate()));
+            return (local.z > 0.0).then(|| concentric_square(local.truncate()));
         }
         let through = || {
             let local = Frame::from_normal(way).to_local(to - self.center);
             (local.truncate().length() <= self.radius)
-                .then(|| guide::disk_square(local.truncate() / self.radius))
+                .then(|| concentric_square(local.truncate() / self.radius))
         };
         let mut without = lights.points.iter().chain(lights.distant);
         let own = without.nth(light - lights.emitters.len()).and_then(|&own| scene.lights.get(own as usize));

@@ -8,8 +8,7 @@ use crate::Rgb;
 use crate::memory::{Arena, Footprint, OutOfMemory};
 use crate::sampling::{AliasTable, ONE_MINUS_EPSILON, Sampler};
 use crate::scene::{Material, Scene, Surface};
-use core::f32::consts::FRAC_PI_4;
-use glam::{Vec2, Vec3};
+use glam::Vec3;
 
 /// Cells along a side of the square of a light, at most, and of all squares together where there are many lights.
 const MOST_SIDE: usize = 64;
@@ -232,35 +231,6 @@ fn throwing_points(scene: &Scene, count: usize, mut show: impl FnMut(u32, Vec3))
             let (u, v) = crate::sampling::warp::uniform_triangle(at);
             show(number, a + u * (b - a) + v * (c - a));
             number += 1;
-        }
-    }
-}
-
-/// The numbers that `warp::concentric_disk` takes to a point of the unit disk.
-pub(super) fn disk_square(disk: Vec2) -> [f32; 2] {
-    let length = disk.length();
-    let other = |a: f32, b: f32| libm::atan2f(a, b) / FRAC_PI_4;
-    let (x, y) = if disk.y.abs() > disk.x.abs() {
-        let y = length.copysign(disk.y);
-        (y * other(disk.x * y.signum(), disk.y.abs()), y)
-    } else {
-        let x = length.copysign(disk.x);
-        (x, x * other(disk.y * x.signum(), disk.x.abs()))
-    };
-    [x, y].map(|at| (0.5 * (at + 1.0)).clamp(0.0, ONE_MINUS_EPSILON))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::sampling::warp::concentric_disk;
-
-    #[test]
-    fn the_disk_goes_back_to_its_square() {
-        for i in 0..4096 {
-            let u = Sampler::new(3, 0, i).pair(0);
-            let [x, y] = disk_square(concentric_disk(u));
-            assert!((x - u[0]).abs() < 1e-5 && (y - u[1]).abs() < 1e-5, "{u:?} {x} {y}");
         }
     }
 }

@@ -1,6 +1,7 @@
 //! Warps of the unit square to the shapes of light transport, each with the density of what it makes.
 //! Continuous and of low distortion, so that the stratification of the square survives.
 
+use super::ONE_MINUS_EPSILON;
 use super::trigonometry::{sin_cos_octant, sin_cos_turns};
 use core::f32::consts::{FRAC_1_PI, FRAC_PI_4, TAU};
 use glam::{Vec2, Vec3};
@@ -29,7 +30,7 @@ pub fn concentric_square(point: Vec2) -> [f32; 2] {
     let radius = point.length().copysign(far);
     let other = radius * (libm::atanf(near / far) / FRAC_PI_4);
     let (x, y) = if steep { (other, radius) } else { (radius, other) };
-    [0.5 * (x + 1.0), 0.5 * (y + 1.0)]
+    [x, y].map(|at| (0.5 * (at + 1.0)).clamp(0.0, ONE_MINUS_EPSILON))
 }
 
 /// A direction of the upper hemisphere with density [`cosine_hemisphere_pdf`]. Never in the horizon, where

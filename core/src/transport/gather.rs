@@ -7,7 +7,7 @@
 use super::estimator::{Counters, dimension};
 use super::path::{PathTracer, WAVE};
 use super::reuse::Exchange;
-use super::spots::Glint;
+use super::spots::{Glint, LOOK};
 use super::wave::{Path, Share, Wave};
 use crate::bsdf::Features;
 use crate::bvh::Coherence;
@@ -166,7 +166,7 @@ impl<'m> Strata<'m> {
 impl<F: Features> PathTracer<'_, F> {
     /// Working memory of [`PathTracer::gather`] with n × n strata.
     pub fn gather_scratch(n: usize) -> Footprint {
-        Wave::footprint(n.saturating_mul(n).min(WAVE)).and(Strata::footprint(n))
+        Wave::footprint(n.saturating_mul(n).clamp(LOOK * LOOK, WAVE)).and(Strata::footprint(n))
     }
 
     /// Gathers at `place`. `number` names the gathering: another one, other rays. Of what its rays meet the brightest is

@@ -254,13 +254,8 @@ impl<'a, F: Features> PathTracer<'a, F> {
 
     /// Traces the first `count` rays of the wave and all that follows from them.
     pub(super) fn advance(&self, wave: &mut Wave, count: usize, counters: &mut Counters) {
-        let mut active = count;
-        let mut coherence = Coherence::Coherent;
-        while active > 0 {
-            self.trace(wave, active, coherence, counters);
-            active = self.go_on(wave, active, counters);
-            coherence = Coherence::Incoherent;
-        }
+        self.trace(wave, count, Coherence::Coherent, counters);
+        self.finish(wave, count, counters);
     }
 
     /// Finds what the first `active` rays of the wave meet.

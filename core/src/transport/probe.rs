@@ -36,16 +36,11 @@ impl<F: Features> PathTracer<'_, F> {
             .enumerate()
             .flat_map(|(place, pixel)| samples.clone().map(move |sample| (place as u32, *pixel, sample)));
         let mut all = all.peekable();
-        // Asked for all samples of a pixel in turn.
-        let mut latest = (u32::MAX, false);
-        let mut outlined = |place: u32| {
-            if latest.0 != place
-                && let Some(pixel) = pixels.get(place as usize)
-            {
-                latest = (place, is_outlined(self.scene, self.lights, &self.settings, *pixel));
-            }
-            latest.1
-        };
+        // A bit for each of the first pixels; others are path traced alone.
+        let outlined = pixels.iter().take(u64::BITS as usize).enumerate().fold(0, |bits, (place, pixel)| {
+            bits | u64::from(is_outlined(self.scene, self.lights, &self.settings, *pixel)) << place
+        });
+        let outlined = |place: u32| u64::checked_shr(outlined, place).unwrap_or(0) & 1 == 1;
         while all.peek().is_some() {
             let mut count = 0;
             let slots = wave.paths.iter_mut().zip(wave.rays.iter_mut()).zip(wave.exchanges.iter_mut());
@@ -70,7 +65,7 @@ impl<F: Features> PathTracer<'_, F> {
             }
             counters.paths += count as u64;
             alone.advance(&mut wave, count, &mut counters);
-            self.look_at_lamps(&mut outlined, &mut wave, count, &mut counters);
+            self.look_at_lamps(outlined, &mut wave, count, &mut counters);
             let ends = wave.paths.iter().zip(&*wave.exchanges).zip(&*wave.shadow_light);
             for ((path, exchange), lamps) in ends.take(count) {
                 if let Some(pixel) = out.get_mut(path.place as usize) {

@@ -23,7 +23,6 @@ use crate::light::luminance;
 use crate::memory::{Arena, OutOfMemory};
 use crate::sampling::Sampler;
 use crate::sampling::warp::{concentric_square, uniform_cone, uniform_cone_pdf};
-use bytemuck::{Pod, Zeroable};
 use core::f32::consts::{FRAC_1_PI, PI};
 use glam::Vec3;
 
@@ -34,7 +33,7 @@ const WIDEST: f32 = 0.25;
 const AIMED: f32 = 0.5;
 
 /// Rays along a side of a closer look at a glint.
-const LOOK: usize = 8;
+pub(super) const LOOK: usize = 8;
 
 /// Sines of the half-angles of closer looks, times the strata along a side: from a hundredth of a stratum to four.
 const NARROW: [f32; 3] = [0.125, 0.5, 2.0];
@@ -52,8 +51,7 @@ const MARGIN: f32 = 2.0;
 const LARGEST: usize = 32;
 
 /// A bright end of a gather ray.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
-#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Glint {
     /// Where it is.
     pub position: [f32; 3],
@@ -64,8 +62,7 @@ pub struct Glint {
 }
 
 /// A sphere in which a spot lies.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
-#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Spot {
     /// Its middle.
     pub center: [f32; 3],

@@ -1,12 +1,9 @@
 //! What a cache lacks for the error that was asked for. Its bias, that the audit tells, and the noise of its records do
 //! not vanish with samples; where they are what is left, records have to be closer to each other, or to have more rays.
 
+use super::rounds::{FEWEST_FOR_BIAS, FEWEST_FOR_ERROR};
 use super::{Audited, ErrorEstimate};
 use serde::{Deserialize, Serialize};
-
-/// Below so many samples of a pixel, and of an audited one, nothing is known well enough.
-const FEWEST: u32 = 16;
-const FEWEST_OF_AUDIT: u32 = 64;
 
 /// The next refinement comes when the samples of before are so small a part of the picture.
 const PATIENCE: u32 = 3;
@@ -63,10 +60,10 @@ impl Refinements {
         noise: ErrorEstimate,
         audited: Option<&Audited>,
     ) -> Option<Shortfall> {
-        if spp < FEWEST || self.are_young(spp) {
+        if spp < FEWEST_FOR_ERROR || self.are_young(spp) {
             return None;
         }
-        let audited = audited.filter(|audited| audited.samples >= FEWEST_OF_AUDIT);
+        let audited = audited.filter(|audited| audited.samples >= FEWEST_FOR_BIAS);
         // A refinement for nothing costs less than samples that bring nothing; but if chance cannot be ruled out, a small one.
         let bias = audited.map(|audited| audited.bias).filter(|bias| bias.relmse > MOST * wanted);
         let bias = bias.map(|bias| if bias.is_found() { bias.relmse / (MOST * wanted) } else { 1.0 });

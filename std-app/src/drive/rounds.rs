@@ -29,10 +29,10 @@ const LONGEST_ROUND: f64 = 0.5;
 const FIRST_ESTIMATE: u32 = 4;
 
 /// Below this many samples an error estimate is too vague to stop on.
-const FEWEST_FOR_ERROR: u32 = 16;
+pub(super) const FEWEST_FOR_ERROR: u32 = 16;
 
 /// Below this many samples of each audited pixel its light is too rarely seen to end a render for its bias.
-const FEWEST_FOR_BIAS: u32 = 64;
+pub(super) const FEWEST_FOR_BIAS: u32 = 64;
 
 /// The rounds of a picture.
 pub(super) struct Rounds {

@@ -122,10 +122,7 @@ impl Settings {
     /// `metric` with its usual settings in a scene of that extent: axes up to 2 : 1, radii from 0 to a fifth of
     /// the extent.
     pub fn new(metric: Metric, extent: f32) -> Self {
-        let error = match metric {
-            Metric::SplitSphere | Metric::BoundedSplitSphere | Metric::MinDistance => 0.3,
-            _ => 1e-4,
-        };
+        let error = if metric.takes_distances() { 0.3 } else { 1e-4 };
         Self {
             metric,
             error,

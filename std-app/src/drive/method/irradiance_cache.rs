@@ -301,8 +301,8 @@ impl<F: Features> Cached<'_, F> {
 
 impl<F: Features> Renderer for Cached<'_, F> {
     fn round(&mut self, crew: &mut Crew) -> Result<(), RenderError> {
-        while !self.is_filled {
-            self.is_filled = self.fill(crew)?;
+        while !self.is_filled || !self.pending.is_empty() {
+            self.is_filled = self.is_filled || self.fill(crew)?;
             if !self.is_filled {
                 return Ok(());
             }
@@ -319,7 +319,7 @@ impl<F: Features> Renderer for Cached<'_, F> {
     }
 
     fn refine(&mut self, short: &Shortfall) -> Option<Refinement> {
-        if !self.is_refined || self.refined == MOST_REFINEMENTS {
+        if !self.is_refined || self.refined + self.pending.len() >= MOST_REFINEMENTS {
             return None;
         }
         let has_finer = self.tables.last().is_some_and(|table| table.n() > self.gathering.flux.n());
@@ -330,7 +330,8 @@ impl<F: Features> Renderer for Cached<'_, F> {
             None => MOST_SHARE,
         };
         let refinement = Refinement { share, is_finer };
-        self.begin(refinement);
+        // Where no round follows, the caches stay as the picture knows them.
+        self.pending.push_back(refinement);
         Some(refinement)
     }
 

@@ -165,7 +165,8 @@ pub(super) trait Renderer {
 
     /// One round: brings the tiles of `crew` to their targets, or less where the round is cut.
     ///
-    /// What sample `n` of a pixel sees follows from the scene, the settings, and `n`: neither from how samples are cut
+    /// What sample `n` of a pixel sees follows from the scene, the settings, and `n`, and from the weights and refinements
+    /// that a film keeps: neither from how samples are cut
     /// into rounds, nor from threads, nor from what was rendered before a film was resumed. What samples of several
     /// pixels share is drawn anew, or kept twice, for even and odd `n`: the halves of the film stay independent, and
     /// their difference tells of all that is random.

@@ -58,7 +58,7 @@ pub(in crate::drive) struct Growing<'a> {
     in_vain: usize,
     /// How often it began anew.
     attempts: u32,
-    /// Records of a file.
+    /// Records of a file, or of before a refinement.
     loaded: usize,
     /// Sum of the radiance that records see in the mean, and how many.
     light: (f64, u32),
@@ -130,15 +130,15 @@ impl<'a> Growing<'a> {
         self.spots.iter().any(|spot| spot.holds(glint.position.into()))
     }
 
-    /// Forgets the records that did not know of all spots, but for those of a file; whether there were any. Not again
-    /// and again.
+    /// Forgets the records that did not know of all spots, but for those of a file or of before a refinement; whether
+    /// there were any. Not again and again.
     fn begins_anew(&mut self) -> bool {
         if self.cache.records().len() == self.loaded || self.attempts == MOST_ATTEMPTS {
             return false;
         }
         let loaded = self.cache.records().get(..self.loaded).unwrap_or_default().to_vec();
         self.cache.restore(&loaded);
-        (self.next, self.sweeps, self.before, self.light) = (0, 0, 0, (0.0, 0));
+        (self.next, self.sweeps, self.before, self.light) = (0, 0, self.loaded, (0.0, 0));
         self.attempts += 1;
         true
     }
