@@ -6,11 +6,14 @@ use halflight::drive::{self, RenderResult, Settings, Stop};
 use halflight_core::Level;
 use halflight_core::bsdf::All;
 use halflight_core::bvh::Bvh;
+use halflight_core::cache::irradiance::{CellFlux, Metric, metric};
 use halflight_core::film::Film;
 use halflight_core::light::Lights;
 use halflight_core::memory::{Arena, Footprint, Line};
 use halflight_core::scene::Scene;
-use halflight_core::transport::{PathSettings, PathTracer, UNLIMITED, reference};
+use halflight_core::transport::gather::{Gathering, Place};
+use halflight_core::transport::overture::{Order, PIXELS};
+use halflight_core::transport::{Counters, PathSettings, PathTracer, UNLIMITED, reference};
 use halflight_tests::scenes::{cornell_box, everything};
 
 /// Mean radiance of the box, from 4 million paths that sampled the lamp uniformly by area.
@@ -98,6 +101,36 @@ fn scratch_is_exactly_what_it_says() {
     assert!(tracer.run(0, 0..1, 100, &mut Arena::new(bytes), &mut pixels).is_ok());
     let short = bytes.len() - 1;
     assert!(tracer.run(0, 0..1, 100, &mut Arena::new(&mut bytes[..short]), &mut pixels).is_err());
+}
+
+/// Paths that gather end by what they are worth: not by what the memory of their wave held before.
+#[test]
+fn a_gathering_does_not_know_what_its_memory_was() {
+    let buffers = cornell_box();
+    let scene = buffers.scene();
+    let settings = PathSettings { width: 16, height: 16, seed: 0, max_depth: UNLIMITED, reuse: false };
+    let mut bvh_lines = lines(Bvh::footprint(scene.mesh.triangles.len()));
+    let bvh = Bvh::build(&scene.mesh, &mut Arena::new(bytemuck::cast_slice_mut(&mut bvh_lines))).unwrap();
+    let mut light_lines = lines(Lights::footprint(&scene).and(Lights::scratch(&scene)));
+    let lights = Lights::build(&scene, &mut Arena::new(bytemuck::cast_slice_mut(&mut light_lines))).unwrap();
+    let tracer = PathTracer::<All>::new(&scene, &bvh, &lights, settings, Level::detect());
+    let mut places = [Place::NONE; PIXELS];
+    tracer.places(&Order::new(16, 16, 1), 0, 0, &mut places, &mut Counters::default());
+    let place = places.iter().find(|place| place.is_some()).unwrap();
+    for n in [8, 16, 64] {
+        let mut tables = lines(CellFlux::footprint(n));
+        let flux = CellFlux::build(n, &mut Arena::new(bytemuck::cast_slice_mut(&mut tables))).unwrap();
+        let metric = metric::Settings::new(Metric::Halflight, 1.0);
+        let gathering = Gathering { flux: &flux, metric, least_pixels: 1.0 };
+        let gather = |left_over: u8| {
+            let mut scratch = lines(PathTracer::<All>::gather_scratch(n));
+            scratch.fill(Line([left_over; 64]));
+            let mut arena = Arena::new(bytemuck::cast_slice_mut(&mut scratch));
+            let record = tracer.gather(place, 0, &gathering, &mut arena, &mut Counters::default(), &mut []);
+            record.unwrap().unwrap()
+        };
+        assert_eq!(gather(0), gather(1), "{n}");
+    }
 }
 
 #[test]
