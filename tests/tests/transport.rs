@@ -85,8 +85,8 @@ fn the_wavefront_is_the_textbook_to_the_bit_for_any_wave() {
     }
 }
 
-#[test]
-fn scratch_is_exactly_what_it_says() {
+/// A path tracer of the box, of 16 x 16 pixels.
+fn in_the_box(work: impl FnOnce(&PathTracer<All>)) {
     let buffers = cornell_box();
     let scene = buffers.scene();
     let settings = PathSettings { width: 16, height: 16, seed: 0, max_depth: UNLIMITED, reuse: false };
@@ -94,43 +94,44 @@ fn scratch_is_exactly_what_it_says() {
     let bvh = Bvh::build(&scene.mesh, &mut Arena::new(bytemuck::cast_slice_mut(&mut bvh_lines))).unwrap();
     let mut light_lines = lines(Lights::footprint(&scene).and(Lights::scratch(&scene)));
     let lights = Lights::build(&scene, &mut Arena::new(bytemuck::cast_slice_mut(&mut light_lines))).unwrap();
-    let tracer = PathTracer::<All>::new(&scene, &bvh, &lights, settings, Level::detect());
-    let mut scratch = lines(PathTracer::<All>::scratch(100));
-    let mut pixels = vec![Default::default(); 256];
-    let bytes: &mut [u8] = bytemuck::cast_slice_mut(&mut scratch);
-    assert!(tracer.run(0, 0..1, 100, &mut Arena::new(bytes), &mut pixels).is_ok());
-    let short = bytes.len() - 1;
-    assert!(tracer.run(0, 0..1, 100, &mut Arena::new(&mut bytes[..short]), &mut pixels).is_err());
+    work(&PathTracer::new(&scene, &bvh, &lights, settings, Level::detect()));
+}
+
+#[test]
+fn scratch_is_exactly_what_it_says() {
+    in_the_box(|tracer| {
+        let mut scratch = lines(PathTracer::<All>::scratch(100));
+        let mut pixels = vec![Default::default(); 256];
+        let bytes: &mut [u8] = bytemuck::cast_slice_mut(&mut scratch);
+        assert!(tracer.run(0, 0..1, 100, &mut Arena::new(bytes), &mut pixels).is_ok());
+        let short = bytes.len() - 1;
+        assert!(tracer.run(0, 0..1, 100, &mut Arena::new(&mut bytes[..short]), &mut pixels).is_err());
+    });
 }
 
 /// Paths that gather end by what they are worth: not by what the memory of their wave held before.
 #[test]
 fn a_gathering_does_not_know_what_its_memory_was() {
-    let buffers = cornell_box();
-    let scene = buffers.scene();
-    let settings = PathSettings { width: 16, height: 16, seed: 0, max_depth: UNLIMITED, reuse: false };
-    let mut bvh_lines = lines(Bvh::footprint(scene.mesh.triangles.len()));
-    let bvh = Bvh::build(&scene.mesh, &mut Arena::new(bytemuck::cast_slice_mut(&mut bvh_lines))).unwrap();
-    let mut light_lines = lines(Lights::footprint(&scene).and(Lights::scratch(&scene)));
-    let lights = Lights::build(&scene, &mut Arena::new(bytemuck::cast_slice_mut(&mut light_lines))).unwrap();
-    let tracer = PathTracer::<All>::new(&scene, &bvh, &lights, settings, Level::detect());
-    let mut places = [Place::NONE; PIXELS];
-    tracer.places(&Order::new(16, 16, 1), 0, 0, &mut places, &mut Counters::default());
-    let place = places.iter().find(|place| place.is_some()).unwrap();
-    for n in [8, 16, 64] {
-        let mut tables = lines(CellFlux::footprint(n));
-        let flux = CellFlux::build(n, &mut Arena::new(bytemuck::cast_slice_mut(&mut tables))).unwrap();
-        let metric = metric::Settings::new(Metric::Halflight, 1.0);
-        let gathering = Gathering { flux: &flux, metric, least_pixels: 1.0 };
-        let gather = |left_over: u8| {
-            let mut scratch = lines(PathTracer::<All>::gather_scratch(n));
-            scratch.fill(Line([left_over; 64]));
-            let mut arena = Arena::new(bytemuck::cast_slice_mut(&mut scratch));
-            let record = tracer.gather(place, 0, &gathering, &mut arena, &mut Counters::default(), &mut []);
-            record.unwrap().unwrap()
-        };
-        assert_eq!(gather(0), gather(1), "{n}");
-    }
+    in_the_box(|tracer| {
+        let mut places = [Place::NONE; PIXELS];
+        tracer.places(&Order::new(16, 16, 1), 0, 0, &mut places, &mut Counters::default());
+        let place = places.iter().find(|place| place.is_some()).unwrap();
+        for n in [8, 16, 64] {
+            let mut tables = lines(CellFlux::footprint(n));
+            let flux = CellFlux::build(n, &mut Arena::new(bytemuck::cast_slice_mut(&mut tables))).unwrap();
+            let metric = metric::Settings::new(Metric::Halflight, 1.0);
+            let gathering = Gathering { flux: &flux, metric, least_pixels: 1.0 };
+            let gather = |left_over: u8| {
+                let mut scratch = lines(PathTracer::<All>::gather_scratch(n));
+                scratch.fill(Line([left_over; 64]));
+                let mut arena = Arena::new(bytemuck::cast_slice_mut(&mut scratch));
+                let record =
+                    tracer.gather(place, 0, &gathering, &mut arena, &mut Counters::default(), &mut []);
+                record.unwrap().unwrap()
+            };
+            assert_eq!(gather(0), gather(1), "{n}");
+        }
+    });
 }
 
 #[test]

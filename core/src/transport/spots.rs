@@ -6,8 +6,9 @@
 //! from a path that was lucky later on its way. What is bright around it is a spot of its own, which holds the other.
 //!
 //! What a hemisphere holds is divided, so that nothing is found twice and nothing is lost: directions into the cone of
-//! a spot are sampled there, evenly in solid angle, all others by strata; where cones overlap, the first spot has them. Paths that go on from what gather rays meet
-//! aim at spots every other time, by one-sample multiple importance sampling (Veach 1997, §9.2.4).
+//! a spot are sampled there, evenly in solid angle, all others by strata; where cones overlap, the first spot has them.
+//! Paths that go on from what gather rays meet aim at spots every other time, by one-sample multiple importance sampling
+//! (Veach 1997, §9.2.4).
 
 use super::estimator::{Counters, dimension};
 use super::gather::{NO_PIXEL, Place, Strata};
@@ -86,6 +87,11 @@ impl Spot {
     }
 }
 
+/// The cones of those spots that are to be aimed at from `position` on a surface of that normal.
+fn cones(spots: &[Spot], position: Vec3, normal: Vec3) -> impl Iterator<Item = Cone> {
+    spots.iter().filter_map(move |spot| spot.cone(position, normal))
+}
+
 /// Directions around an axis.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Cone {
@@ -125,12 +131,12 @@ pub(super) struct Cones<'s> {
 impl<'s> Cones<'s> {
     /// `None` where none is to be aimed at.
     pub(super) fn around(spots: &'s [Spot], position: Vec3, normal: Vec3) -> Option<Self> {
-        let count = spots.iter().filter(|spot| spot.cone(position, normal).is_some()).count() as u32;
+        let count = cones(spots, position, normal).count() as u32;
         (count > 0).then_some(Self { spots, position, normal, count })
     }
 
     fn all(&self) -> impl Iterator<Item = Cone> {
-        self.spots.iter().filter_map(|spot| spot.cone(self.position, self.normal))
+        cones(self.spots, self.position, self.normal)
     }
 
     /// Whether unit `direction` leads to a spot.
@@ -270,8 +276,7 @@ impl<F: Features> PathTracer<'_, F> {
 
     /// The cones of the spots that rays from `place` aim at.
     fn cones(&self, place: &Place) -> impl Iterator<Item = Cone> {
-        let (position, normal) = (place.position(), place.normal());
-        self.spots.iter().filter_map(move |spot| spot.cone(position, normal))
+        cones(self.spots, place.position(), place.normal())
     }
 
     /// Takes out of the strata what they have of spots.
