@@ -20,6 +20,7 @@ use halflight_tests::scenes::{
     everything, lamp_before,
 };
 use halflight_tests::statistics::{agree, blocks};
+use std::time::Instant;
 
 /// Pixels across and down.
 const SIZE: u32 = 28;
@@ -159,15 +160,20 @@ fn has_photons(result: &RenderResult) -> bool {
     result.memory.iter().any(|one| one.structure == "photons" && one.bytes > 0)
 }
 
-#[test]
-fn bits_do_not_depend_on_threads_or_level_and_off_is_off() {
+/// Everything, and caustics that are worth photons: of a lamp that has no size, by a wide mirror.
+fn lit_by_a_mirror() -> SceneBuffers {
     let mut buffers = everything();
-    // Caustics that are worth photons: of a lamp that has no size, by a wide mirror.
     let mirror = buffers.material(Material { surface: metal(0.0), ..Material::GREY });
     buffers.square(Vec3::new(0.95, 0.4, 0.5), Vec3::NEG_X, 0.6, mirror);
     buffers.normals.resize(buffers.positions.len(), [0.0; 3]);
     let position = Vec3::new(0.5, 0.2, 0.3);
     buffers.lights.push(PointLight::Point { position, intensity: Rgb::splat(0.2) });
+    buffers
+}
+
+#[test]
+fn bits_do_not_depend_on_threads_or_level_and_off_is_off() {
+    let buffers = lit_by_a_mirror();
     let scene = buffers.scene();
     let one = path(&scene, 11, |s| s.threads = Some(1));
     assert!(has_photons(&one), "{:?}", one.caustics);
@@ -177,6 +183,32 @@ fn bits_do_not_depend_on_threads_or_level_and_off_is_off() {
     }
     let off = path(&scene, 11, |s| s.caustics = false);
     assert!(!has_photons(&off) && off.image != one.image);
+}
+
+#[test]
+fn little_memory_makes_few_photons_and_none_none_and_both_are_told() {
+    let buffers = lit_by_a_mirror();
+    let scene = buffers.scene();
+    let map = |result: &RenderResult| result.photons.unwrap().caustic.unwrap();
+    let bytes = |result: &RenderResult| {
+        result.memory.iter().find(|one| one.structure == "photons").map_or(0, |one| one.bytes)
+    };
+    // Windows are left out before photons are.
+    let limited = |bytes| path(&scene, 16, |s| (s.windows, s.memory) = (Some(false), bytes));
+    let whole = limited(None);
+    assert_eq!(map(&whole).given, map(&whole).wanted);
+    let enough = limited(Some(whole.memory_peak));
+    assert!(20 * map(&enough).given >= 19 * map(&whole).wanted, "{:?}", map(&enough));
+
+    let limit = whole.memory_peak - bytes(&whole) * 9 / 10;
+    let tenth = limited(Some(limit));
+    assert!(tenth.memory_peak <= limit && bytes(&tenth) > bytes(&whole) / 20);
+    assert!(map(&tenth).wanted == map(&whole).wanted && 10 * map(&tenth).given <= map(&whole).wanted);
+    assert!(map(&tenth).shot < map(&whole).shot);
+
+    let none = limited(Some(whole.memory_peak - bytes(&whole)));
+    assert!(none.caustics.lacks_memory && none.photons.is_none());
+    assert_eq!(none.image, path(&scene, 16, |s| (s.windows, s.caustics) = (Some(false), false)).image);
 }
 
 #[test]
@@ -216,7 +248,8 @@ fn where_pixels_have_different_numbers_of_samples_photons_are_shot_as_often_as_e
     };
     let (uniform, adaptive) = (of(false, 1), of(true, 1));
     assert!(has_photons(&uniform) && adaptive.adaptive.used);
-    assert_eq!(uniform.caustics.paths, adaptive.caustics.paths);
+    let shot = |result: &RenderResult| result.photons.unwrap().caustic.unwrap().shot;
+    assert_eq!(shot(&uniform), shot(&adaptive));
     assert!(adaptive.samples.iter().min() < adaptive.samples.iter().max());
     assert_eq!(of(true, 3).image, adaptive.image);
 }
@@ -330,14 +363,21 @@ fn in_a_stadium_photons_go_to_the_glass_and_their_power_is_right() {
     assert_eq!(memory.available(), 0, "footprints are exact");
     assert!(Worth::aimed(&scene, &lights, &plain, &mut memory).is_err());
 
-    let last = shooter(&learned);
-    let (mut rays, mut useful, mut power) = (0, 0u32, 0.0);
-    for (map, task) in (2..2 + MAPS).flat_map(|map| (0..TASKS).map(move |task| (map, task))) {
-        let mut photons = [Photon::NONE; ROOM];
-        rays += last.run(task, map, &mut scratch, &mut photons).unwrap().rays;
-        let left = photons.iter().filter(|photon| photon.position().is_finite());
-        left.for_each(|photon| (useful, power) = (useful + 1, power + f64::from(photon.power().x)));
-    }
+    // Photons that were left, their power, and the seconds that it took.
+    let mut shoot = |emission| {
+        let (mut useful, mut power) = (0, 0.0);
+        let start = Instant::now();
+        let shooter = shooter(emission);
+        for (map, task) in (2..2 + MAPS).flat_map(|map| (0..TASKS).map(move |task| (map, task))) {
+            let mut photons = [Photon::NONE; ROOM];
+            shooter.run(task, map, &mut scratch, &mut photons).unwrap();
+            let left = photons.iter().filter(|photon| photon.position().is_finite());
+            left.for_each(|photon| (useful, power) = (useful + 1, power + f64::from(photon.power().x)));
+        }
+        (f64::from(useful), power, start.elapsed().as_secs_f64())
+    };
+    let (useful, power, seconds) = shoot(&learned);
+    let (by_chance, _, unguided_seconds) = shoot(&plain);
     let power = power / f64::from(MAPS);
     // The solid angle of a square over its middle.
     let (half, height) = (f64::from(MIRROR) / 2.0, 8.99f64);
@@ -345,8 +385,9 @@ fn in_a_stadium_photons_go_to_the_glass_and_their_power_is_right() {
     let expected = f64::from(MIRRORED) * angle;
     // More than three standard deviations of the number of photons; those of one cell have the same power.
     assert!((power / expected - 1.0).abs() < 0.01, "{power} W, not {expected}");
-    // An unguided path takes one ray, and leads to the mirror by chance.
-    let unguided = angle / (4.0 * core::f64::consts::PI) / 50.0;
-    let gain = f64::from(useful) / rays as f64 / unguided;
-    assert!(gain > 10.0, "useful photons per ray are {gain} times as many");
+    let gain = useful / seconds / (by_chance / unguided_seconds);
+    assert!(gain > 10.0, "useful photons per second are {gain} times as many, {useful} and {by_chance}");
+    println!(
+        "{gain} times the useful photons per second, {useful} in {seconds} s, {by_chance} in {unguided_seconds} s; power {power} of {expected} W"
+    );
 }

@@ -133,7 +133,7 @@ fn a_tenth_of_the_memory_makes_noise_and_says_so() {
         s.photons.global = Some(1 << 17);
         s.memory = Some(limit);
     });
-    let (all, few) = (used(&whole).global, used(&tenth).global);
+    let (all, few) = (used(&whole).global.unwrap(), used(&tenth).global.unwrap());
     assert_eq!(all.wanted, all.given);
     assert!(few.wanted == all.wanted && few.given <= few.wanted / 10 && few.given > few.wanted / 20);
     assert!(tenth.memory_peak <= limit && bytes(&tenth) <= bytes(&whole) / 10);

@@ -68,14 +68,16 @@ pub(super) fn text(run: &Run, report: Option<&Path>) -> String {
         ));
     }
     if let Some(photons) = result.photons {
+        let kinds = [(photons.global, "photon"), (photons.caustic, "caustic photon")];
+        let stored: Vec<_> =
+            kinds.iter().filter_map(|(map, name)| Some(map_text(map.as_ref()?, name))).collect();
         lines.push(format!(
-            "light  {} for {} in {}{}",
-            map_text(&photons.global, "photon"),
+            "light  {} in {}: {}",
             plural(photons.maps, "map"),
             readable_seconds(photons.seconds),
-            photons.caustic.map_or(String::new(), |map| format!("; {}", map_text(&map, "caustic photon"))),
+            stored.join("; "),
         ));
-        for (map, name) in [(Some(photons.global), "global"), (photons.caustic, "caustic")] {
+        for (map, name) in [(photons.global, "global"), (photons.caustic, "caustic")] {
             if let Some(map) = map.filter(|map| map.given < map.wanted) {
                 lines.push(format!(
                     "       for want of memory {} light paths of {} for a {name} map: the picture has more noise",
@@ -83,6 +85,12 @@ pub(super) fn text(run: &Run, report: Option<&Path>) -> String {
                 ));
             }
         }
+    }
+    if result.windows.lacks_memory {
+        lines.push("light  no memory for windows to the environment: light of the sky is noisier".into());
+    }
+    if result.caustics.lacks_memory {
+        lines.push("light  no memory for photons of caustics: their light may be missing or noisy".into());
     }
     lines.push(format!(
         "memory {}, {} at its peak",

@@ -16,7 +16,7 @@ use halflight_core::bvh::Bvh;
 use halflight_core::census::WithFeatures;
 use halflight_core::film::Film;
 use halflight_core::light::Lights;
-use halflight_core::memory::Arena;
+use halflight_core::memory::{Arena, Footprint};
 use halflight_core::scene::Scene;
 use halflight_core::transport::{PathSettings, PathTracer, UNLIMITED};
 use std::time::Instant;
@@ -57,6 +57,10 @@ impl WithFeatures for Render<'_> {
         let mut bvh_lines = Pages::default();
         let bvh = build_bvh(scene, settings.level, &workers, &mut memory, &mut bvh_lines)?;
         let mut film_lines = memory.take("film", Film::footprint(width, height))?;
+        // What comes out is counted from the beginning, and taken in the end.
+        let pixels = width as usize * height as usize;
+        let picture = Footprint::default().slice::<[f32; 3]>(pixels).slice::<[f32; 3]>(pixels);
+        drop(memory.take("picture", picture.slice::<u32>(pixels))?);
         let mut lights_lines = memory.take("lights", Lights::footprint(scene).and(Lights::scratch(scene)))?;
         let lights = Lights::build(scene, &mut Arena::new(bytemuck::cast_slice_mut(&mut lights_lines)))?;
         let build = build_start.elapsed().as_secs_f64();

@@ -16,6 +16,8 @@ pub struct WindowUse {
     pub used: bool,
     /// What that does to the variance of its light; `None` where nobody looked.
     pub gain: Option<WindowGain>,
+    /// There was no memory to look.
+    pub lacks_memory: bool,
 }
 
 /// Learns the windows of `tracer`'s scene in `lines`, where it has a sky and they pay, or are `wanted`.
@@ -34,7 +36,7 @@ pub(super) fn learn<'m, F: Features>(
     let each = PathTracer::<F>::learn_scratch().and(PathTracer::<F>::scratch(WAVE)).bytes();
     let all = Outlook::footprint().and(Windows::footprint()).bytes();
     if wanted.is_none() && !memory.has(all.saturating_add(each.saturating_mul(workers.count()))) {
-        return Ok((*lights, WindowUse::default()));
+        return Ok((*lights, WindowUse { lacks_memory: true, ..WindowUse::default() }));
     }
     let mut look_lines = memory.take("look at the sky", Outlook::footprint())?;
     let mut outlook = Outlook::new(&mut Arena::new(bytemuck::cast_slice_mut(&mut look_lines)))?;
@@ -63,5 +65,8 @@ pub(super) fn learn<'m, F: Features>(
     if found.is_none() {
         memory.give_back("windows");
     }
-    Ok((lights.with_windows(found), WindowUse { used: found.is_some(), gain: Some(gain) }))
+    Ok((
+        lights.with_windows(found),
+        WindowUse { used: found.is_some(), gain: Some(gain), lacks_memory: false },
+    ))
 }

@@ -10,9 +10,16 @@ use serde_json::{Map, Value, json};
 
 /// A render.
 pub(super) fn run(run: &Run) -> Value {
-    let CausticUse { used, share, paths, photons } = run.result.caustics;
+    let CausticUse { used, share, lacks_memory } = run.result.caustics;
+    let map = run.result.photons.and_then(|photons| photons.caustic).filter(|_| used).unwrap_or_default();
     let mut object = most(run);
-    object["caustics"] = json!({ "used": used, "share": share, "paths": paths, "photons": photons });
+    object["caustics"] = json!({
+        "used": used,
+        "share": share,
+        "lacks_memory": lacks_memory,
+        "paths": map.shot,
+        "photons": map.stored,
+    });
     object
 }
 
@@ -56,6 +63,7 @@ fn most(run: &Run) -> Value {
         "windows": {
             "used": result.windows.used,
             "gain": result.windows.gain.map(|gain| gain.factor()),
+            "lacks_memory": result.windows.lacks_memory,
         },
         "adaptive": { "used": result.adaptive.used, "gain": result.adaptive.gain },
         "reuse": {
@@ -73,7 +81,7 @@ fn most(run: &Run) -> Value {
             });
             json!({
                 "maps": photons.maps,
-                "global": map(photons.global),
+                "global": photons.global.map(map),
                 "caustic": photons.caustic.map(map),
                 "irradiances": photons.irradiances,
                 "seconds": photons.seconds,

@@ -64,11 +64,22 @@ impl Run<'_> {
             let why = if measured { "it would cost more than it gains" } else { "it was not asked for" };
             left_out.push(("reuse of paths by neighbouring pixels", why));
         }
-        if let (false, Some(_)) = (self.result.caustics.used, self.result.caustics.share) {
+        let caustics = self.result.caustics;
+        if let (false, Some(_)) = (caustics.used, caustics.share) {
             left_out.push(("photons of caustics", "they would bring next to no light"));
+        }
+        if caustics.lacks_memory {
+            left_out
+                .push(("photons of caustics", "there was no memory for them: light may be missing or noisy"));
         }
         if let (false, Some(_)) = (self.result.windows.used, self.result.windows.gain) {
             left_out.push(("windows to the environment", "each place sees enough of it"));
+        }
+        if self.result.windows.lacks_memory {
+            left_out.push((
+                "windows to the environment",
+                "there was no memory for them: light of the sky is noisier",
+            ));
         }
         if let (Method::PhotonMap, Some(PhotonUse { caustic: None, .. })) =
             (self.result.method, self.result.photons)

@@ -7,8 +7,11 @@
 //! most of them go from then on.
 
 use super::path::Paths;
+use super::photon_view::{self, PhotonView};
+use super::photons::{MapUse, PhotonUse};
 use super::sppm::ProgressivePhotons;
-use super::{Renderer, Stage};
+use super::{Method, Renderer, Stage};
+use crate::drive::audit::Audit;
 use crate::drive::crew::Crew;
 use crate::drive::memory::Memory;
 use crate::drive::run::path_settings;
@@ -21,6 +24,7 @@ use halflight_core::photon::{MapShape, PhotonMap, Photons};
 use halflight_core::transport::caustics::{CausticShooter, Find, PATHS, ROOM};
 use halflight_core::transport::shoot::{Keep, ShootSettings};
 use halflight_core::transport::{Discs, Merging, PathTracer, path::WAVE};
+use std::time::Instant;
 
 /// Radius of the discs of the first sample, in pixels.
 const FIRST_RADIUS: f64 = 1.5;
@@ -54,10 +58,8 @@ pub struct CausticUse {
     /// About what share of the picture's light photons bring that paths find badly, by a first look; `None` where nobody
     /// looked.
     pub share: Option<f64>,
-    /// Light paths that were shot, and photons that they left.
-    pub paths: u64,
-    /// See `paths`.
-    pub photons: u64,
+    /// There was no memory to look for them.
+    pub lacks_memory: bool,
 }
 
 /// Whether anything could throw a caustic.
@@ -79,8 +81,11 @@ pub(super) fn with<F: Features, T>(
     let mut paths = Paths::<F>::with_scratch(stage, memory, scratch)?;
     let guide = Worth::guide_footprint(lights);
     let emission = Emission::footprint(lights).and(guide).and(Worth::footprint(lights)).and(guide).and(guide);
+    let of_task = Photons::footprint(ROOM).bytes();
+    let others = Audit::bytes::<F>(stage, Method::Path.is_biased());
     // Where memory is short, paths go without.
-    if !memory.has(emission.bytes() + 2 * Photons::footprint(ROOM).bytes()) {
+    if !memory.has((emission.bytes() + 2 * of_task).saturating_add(others)) {
+        paths.caustics.lacks_memory = true;
         return then(&mut paths, memory);
     }
     let mut lines = memory.take("emission", emission)?;
@@ -115,13 +120,14 @@ pub(super) fn with<F: Features, T>(
     let pixels = f64::from(settings.width) * f64::from(settings.height);
     let each = ((PATHS_PER_SAMPLE * pixels) as usize).clamp(FEWEST_PATHS, MOST_PATHS);
     let wanted = (each * (MOST_SAMPLES / 2) as usize).min(MOST_PATHS).div_ceil(PATHS);
-    let of_task = Photons::footprint(ROOM).bytes();
-    let tasks = wanted.min(memory.available() / 4 / 2 / of_task).max(1);
+    let tasks = wanted.min(memory.available().saturating_sub(others) / 2 / of_task).max(1);
     let footprint = Photons::footprint(tasks * ROOM);
     let photons = [memory.take("photons", footprint)?, memory.take("photons", footprint)?];
-    let most = tasks * PATHS;
     paths.caustics.used = true;
-    then(&mut Joined { stage: *stage, paths, emission, photons, each, most, kept: None }, memory)
+    let [wanted, given] = [wanted, tasks].map(|tasks| (tasks * PATHS) as u64);
+    let used = MapUse { wanted, given, ..MapUse::default() };
+    let used = PhotonUse { caustic: Some(used), ..PhotonUse::default() };
+    then(&mut Joined { stage: *stage, paths, emission, photons, each, used, kept: None }, memory)
 }
 
 /// A shooter of `paths` photons by `emission`, for the discs of `sample`.
@@ -169,11 +175,20 @@ struct Joined<'a, F> {
     emission: Emission<'a>,
     /// Of even and of odd samples.
     photons: [Vec<Line>; 2],
-    /// Light paths of a map for each sample that it serves, and at most.
+    /// Light paths of a map for each sample that it serves, as far as there is memory.
     each: usize,
-    most: usize,
-    /// The maps that are in the photons' memory: of which samples.
-    kept: Option<(Block, [MapShape; 2])>,
+    used: PhotonUse,
+    /// The maps that are in the photons' memory.
+    kept: Option<Kept>,
+}
+
+/// Maps that were made.
+#[derive(Clone, Copy)]
+struct Kept {
+    block: Block,
+    /// Photons that there is room for in each.
+    room: usize,
+    shapes: [MapShape; 2],
 }
 
 /// Samples that share their photons.
@@ -202,17 +217,18 @@ impl Block {
 
 impl<F: Features> Renderer for Joined<'_, F> {
     fn round(&mut self, crew: &mut Crew) -> Result<(), RenderError> {
-        let Self { stage, paths, emission, photons, each, most, kept } = self;
-        let Paths { tracer, scratch, caustics, .. } = paths;
+        let Self { stage, paths, emission, photons, each, used, kept } = self;
+        let Paths { tracer, scratch, .. } = paths;
         let workers = stage.workers;
         while let Some(sample) = crew.next_in_mean() {
             let block = Block::of(sample);
-            let light_paths = (*each * block.samples() as usize).min(*most);
+            let most = used.caustic.map_or(0, |map| map.given as usize);
+            let light_paths = (*each * block.samples() as usize).min(most);
             let (shooter, discs) = shooter::<F>(stage, emission, light_paths, block.first);
             let room = shooter.tasks() * ROOM;
             let [even, odd] = &mut *photons;
             let maps = match *kept {
-                Some((of, shapes)) if of == block => {
+                Some(Kept { block: of, shapes, .. }) if of == block => {
                     let again = |shape: &MapShape, lines| {
                         PhotonMap::again(shape, room, &mut Arena::new(bytemuck::cast_slice_mut(lines)))
                     };
@@ -220,6 +236,7 @@ impl<F: Features> Renderer for Joined<'_, F> {
                 }
                 _ => {
                     *kept = None;
+                    let start = Instant::now();
                     let open = |lines| Photons::new(room, &mut Arena::new(bytemuck::cast_slice_mut(lines)));
                     let mut maps = [open(even)?, open(odd)?];
                     for (map, half) in maps.iter_mut().zip(0..) {
@@ -231,9 +248,13 @@ impl<F: Features> Renderer for Joined<'_, F> {
                         }
                     }
                     let maps = maps.map(|map| workers.build_photons(map, room));
-                    *kept = Some((block, [maps[0].shape(), maps[1].shape()]));
-                    caustics.paths += 2 * light_paths as u64;
-                    caustics.photons += maps.iter().map(|map| map.len() as u64).sum::<u64>();
+                    *kept = Some(Kept { block, room, shapes: [maps[0].shape(), maps[1].shape()] });
+                    used.maps += 2;
+                    if let Some(used) = &mut used.caustic {
+                        used.shot += 2 * light_paths as u64;
+                        used.stored += maps.iter().map(|map| map.len() as u64).sum::<u64>();
+                    }
+                    used.seconds += start.elapsed().as_secs_f64();
                     maps
                 }
             };
@@ -252,6 +273,19 @@ impl<F: Features> Renderer for Joined<'_, F> {
 
     fn caustics(&self) -> CausticUse {
         self.paths.caustics
+    }
+
+    fn photon_view(&mut self) -> Result<Option<PhotonView>, RenderError> {
+        // The odd ones are the last that were made.
+        let (Some(Kept { room, shapes, .. }), [_, odd]) = (self.kept, &mut self.photons) else {
+            return Ok(None);
+        };
+        let map = PhotonMap::again(&shapes[1], room, &mut Arena::new(bytemuck::cast_slice_mut(odd)))?;
+        Ok(Some(photon_view::look::<F>(&self.stage, None, Some(&map))?))
+    }
+
+    fn photons(&self) -> Option<PhotonUse> {
+        Some(self.used)
     }
 }
 

@@ -13,8 +13,8 @@ use halflight_core::scene::SurfacePoint;
 pub struct PhotonView {
     /// Pixels across; all pictures have the same size.
     pub width: u32,
-    /// Of all photons, or of those that were reflected.
-    pub global: MapView,
+    /// Of all photons, or of those that were reflected, where there is such a map.
+    pub global: Option<MapView>,
     /// Of caustics.
     pub caustic: Option<MapView>,
 }
@@ -47,7 +47,7 @@ const BEFORE: f32 = 1e-3;
 /// Looks at the maps of `stage`.
 pub(super) fn look<F: Features>(
     stage: &Stage,
-    global: &PhotonMap,
+    global: Option<&PhotonMap>,
     caustic: Option<&PhotonMap>,
 ) -> Result<PhotonView, OutOfMemory> {
     let Stage { settings, .. } = *stage;
@@ -55,7 +55,11 @@ pub(super) fn look<F: Features>(
     let factor = width.max(height).div_ceil(MOST_PIXELS);
     let size = [width.div_ceil(factor), height.div_ceil(factor)];
     let of = |map: &PhotonMap| look_at::<F>(stage, map, size);
-    Ok(PhotonView { width: size[0], global: of(global)?, caustic: caustic.map(of).transpose()? })
+    Ok(PhotonView {
+        width: size[0],
+        global: global.map(of).transpose()?,
+        caustic: caustic.map(of).transpose()?,
+    })
 }
 
 fn look_at<F: Features>(

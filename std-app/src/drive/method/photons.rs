@@ -47,8 +47,8 @@ pub struct MapUse {
 pub struct PhotonUse {
     /// Maps made.
     pub maps: u64,
-    /// Of reflected light, or of all light.
-    pub global: MapUse,
+    /// Of reflected light, or of all light; `None` where paths find that.
+    pub global: Option<MapUse>,
     /// Of caustics alone; `None` where nothing in the scene makes any.
     pub caustic: Option<MapUse>,
     /// Irradiances worked out beforehand.
@@ -176,7 +176,7 @@ impl<'a> Laboratory<'a> {
             ..MapUse::default()
         };
         let used = PhotonUse {
-            global: used(wanted[0], global),
+            global: Some(used(wanted[0], global)),
             caustic: has_caustics.then(|| used(wanted[1], caustic)),
             ..PhotonUse::default()
         };
@@ -251,8 +251,10 @@ impl<'a> Laboratory<'a> {
 
         let used = &mut self.used;
         used.maps += 1;
-        used.global.shot += (self.global * PATHS) as u64;
-        used.global.stored += global.len() as u64;
+        if let Some(used) = &mut used.global {
+            used.shot += (self.global * PATHS) as u64;
+            used.stored += global.len() as u64;
+        }
         used.irradiances += all.count() as u64;
         if let (Some(used), Some(map)) = (&mut used.caustic, shelf.caustic.map()?) {
             used.shot += (self.caustic * PATHS) as u64;
@@ -266,7 +268,7 @@ impl<'a> Laboratory<'a> {
     pub(super) fn view<F: Features>(&self, shelf: &mut Shelf) -> Result<Option<PhotonView>, RenderError> {
         let Shelf { global, caustic, .. } = shelf;
         let (Some(global), caustic) = (global.map()?, caustic.map()?) else { return Ok(None) };
-        Ok(Some(photon_view::look::<F>(&self.stage, &global, caustic.as_ref())?))
+        Ok(Some(photon_view::look::<F>(&self.stage, Some(&global), caustic.as_ref())?))
     }
 
     fn farthest(&self) -> f32 {

@@ -11,6 +11,7 @@ use super::photon_view::{self, PhotonView};
 use super::photons::{Drawer, MapUse, PhotonUse};
 use super::{Method, Renderer, Stage};
 use crate::drive::RenderError;
+use crate::drive::audit::Audit;
 use crate::drive::crew::Crew;
 use crate::drive::memory::Memory;
 use crate::drive::run::path_settings;
@@ -55,11 +56,12 @@ impl<'a, F: Features> ProgressivePhotons<'a, F> {
         let usual = pixels.clamp(FEWEST_PATHS, MOST_PATHS);
         let wanted = settings.photons.global.map_or(usual, |paths| paths as usize).div_ceil(PATHS).max(1);
         let of_task = Photons::footprint(ROOM).bytes();
-        let tasks = wanted.min(memory.available() / 4 / of_task).max(1);
+        let others = Audit::bytes::<F>(stage, Method::ProgressivePhotons.is_biased());
+        let tasks = wanted.min(memory.available().saturating_sub(others) / of_task).max(1);
         let photons = Drawer::new(tasks * ROOM, memory)?;
         let tracer = PathTracer::<F>::new(scene, bvh, lights, path_settings(settings), settings.level);
         let [wanted, given] = [wanted, tasks].map(|tasks| (tasks * PATHS) as u64);
-        let global = MapUse { wanted, given, ..MapUse::default() };
+        let global = Some(MapUse { wanted, given, ..MapUse::default() });
         let used = PhotonUse { global, ..PhotonUse::default() };
         Ok(Self {
             stage: *stage,
@@ -104,8 +106,10 @@ impl<F: Features> Renderer for ProgressivePhotons<'_, F> {
                 }
                 *shot_for = Some(sample);
                 used.maps += 1;
-                used.global.shot += *paths as u64;
-                used.global.stored += photons.map()?.map_or(0, |map| map.len()) as u64;
+                if let Some(used) = &mut used.global {
+                    used.shot += *paths as u64;
+                    used.stored += photons.map()?.map_or(0, |map| map.len()) as u64;
+                }
                 used.seconds += start.elapsed().as_secs_f64();
             }
             let Some(map) = photons.map()? else { return Ok(()) };
@@ -122,7 +126,7 @@ impl<F: Features> Renderer for ProgressivePhotons<'_, F> {
 
     fn photon_view(&mut self) -> Result<Option<PhotonView>, RenderError> {
         let Some(map) = self.photons.map()? else { return Ok(None) };
-        Ok(Some(photon_view::look::<F>(&self.stage, &map, None)?))
+        Ok(Some(photon_view::look::<F>(&self.stage, Some(&map), None)?))
     }
 
     fn photons(&self) -> Option<PhotonUse> {

@@ -29,6 +29,9 @@ pub(super) fn section(run: &Run) -> String {
     if cache.loaded > 0 {
         facts.insert(1, ("of them loaded", grouped(cache.loaded)));
     }
+    if cache.refused > 0 {
+        facts.push(("Records that had no memory", grouped(cache.refused)));
+    }
     let (mut maps, mut note, mut words) = (String::new(), String::new(), String::new());
     if let Some(survey) = &run.result.survey {
         facts.push(("Error predicted", percent(survey.predicted)));

@@ -6,21 +6,31 @@ use crate::drive::{MapUse, MapView};
 use crate::report::Run;
 use crate::report::words::{grouped, number, readable_seconds};
 
-/// The section of photons; nothing where the method has none.
+/// The section of photons; nothing where the method has none and nobody looked for any.
 pub(super) fn section(run: &Run) -> String {
-    let Some(photons) = &run.result.photons else { return String::new() };
+    let caustics = run.result.caustics;
+    if run.result.photons.is_none() && caustics.share.is_none() && !caustics.lacks_memory {
+        return String::new();
+    }
+    let photons = run.result.photons.unwrap_or_default();
     let view = run.result.photon_view.as_ref();
-    let mut facts =
-        vec![("Maps", grouped(photons.maps)), ("Shooting and building", readable_seconds(photons.seconds))];
+    let mut facts = vec![("Maps", grouped(photons.maps))];
+    if photons.maps > 0 {
+        facts.push(("Shooting and building", readable_seconds(photons.seconds)));
+    }
+    if let Some(share) = caustics.share {
+        facts.push(("Light that they bring, by a first look", percent(share)));
+    }
     let mut maps = String::new();
     let kinds = [
-        ("", Some(&photons.global), view.map(|view| &view.global)),
-        (" of caustics", photons.caustic.as_ref(), view.and_then(|view| view.caustic.as_ref())),
+        (false, photons.global, view.and_then(|view| view.global.as_ref())),
+        (true, photons.caustic, view.and_then(|view| view.caustic.as_ref())),
     ];
-    let mut words = String::new();
-    for (kind, used, seen) in kinds {
+    let mut words = first_look(run);
+    for (is_caustic, used, seen) in kinds {
         let Some(used) = used else { continue };
-        facts.extend(numbers(kind, used, seen));
+        facts.extend(numbers(is_caustic, &used, seen));
+        let kind = if is_caustic { " of caustics" } else { "" };
         if used.given < used.wanted {
             words += &format!(
                 "There was memory for {} light paths of {} in a map{kind}: the picture has more noise for it. ",
@@ -32,35 +42,60 @@ pub(super) fn section(run: &Run) -> String {
             maps += &pictures(kind, view.width, seen);
         }
     }
-    let facts: Vec<(&str, String)> = facts.iter().map(|(name, value)| (&**name, value.clone())).collect();
     fill(
         include_str!("photons.html"),
         &[("facts", &parts::facts(&facts)), ("words", &words), ("maps", &maps)],
     )
 }
 
-fn numbers(kind: &'static str, used: &MapUse, seen: Option<&MapView>) -> Vec<(&'static str, String)> {
-    let is_caustic = !kind.is_empty();
+/// What a first look for caustics has decided, where there was one.
+fn first_look(run: &Run) -> String {
+    let caustics = run.result.caustics;
+    let words = match (caustics.used, caustics.share) {
+        _ if caustics.lacks_memory => {
+            "There was no memory to look for light that comes through mirrors or glass: where there is any, it is \
+             missing or noisy. "
+        }
+        (true, _) => {
+            "Paths find all other light, and share with photons what both find. Only photons that count are kept: each \
+             is left with the probability that is its weight beside paths, most where paths find next to nothing. "
+        }
+        (false, Some(_)) => {
+            "Photons of caustics were shot and thrown away: they bring too little light to pay for themselves, and paths \
+             find that, too. "
+        }
+        _ => "",
+    };
+    words.into()
+}
+
+fn numbers(is_caustic: bool, used: &MapUse, seen: Option<&MapView>) -> Vec<(&'static str, String)> {
     let [shot, stored, useful] = if is_caustic {
-        ["Light paths for caustics", "Caustic photons left", "Of those of the last map, seen by the camera"]
+        ["Light paths for caustics", "Caustic photons left", "Caustic photons in direct sight"]
     } else {
-        ["Light paths", "Photons left", "Of those of the last map, seen by the camera"]
+        ["Light paths", "Photons left", "Photons in direct sight"]
     };
     let mut facts = vec![(shot, grouped(used.shot)), (stored, grouped(used.stored))];
     if let Some(seen) = seen {
-        facts.push((useful, format!("{}&#8239;%", number(100.0 * seen.seen, 2))));
+        facts.push((useful, percent(seen.seen)));
     }
     facts
+}
+
+fn percent(share: f64) -> String {
+    format!("{}&#8239;%", number(100.0 * share, 2))
 }
 
 fn pictures(kind: &str, width: u32, seen: &MapView) -> String {
     let map = |values: &[f32]| Map { width, values: values.to_vec() };
     map(&seen.positions).figure(
         &format!("Photons{kind}"),
-        "How many photons of the last map the camera sees in each pixel: where they lie.",
+        "How many photons of the last map the camera sees in each pixel, but for those behind glass or in mirrors: where they \
+         lie.",
     ) + &map(&seen.density).figure(
         &format!("Density of photons{kind}"),
-        "Photons per square metre on the surface that a pixel sees, by the nearest 64 of them.",
+        "Photons per square metre on the surface that a pixel sees, by the nearest 64 of them. Glass and mirrors hold none: \
+         there it is that of what lies near.",
     ) + &map(&seen.radius).figure(
         &format!("Radius{kind}"),
         "How far those 64 reach, in metres: what an estimate from so many would blur.",
