@@ -3,13 +3,17 @@
     python3 tests/peers/caustics.py [--seconds 4] [--seeds 5] [--reference-seconds 240] [scene ...]
 
 Ours: `path` without and with photons of caustics, the latter with adaptive sampling as well, and `sppm`; Mitsuba's:
-`path` and `ptracer`, `llvm_ad_rgb`, with our materials. Two threads, no limit of depth. Seconds are those of the processors, so that a busy machine tells the same.
+`path` and `ptracer`, `llvm_ad_rgb`, with our materials; where `LUXCORE` names the python of a virtual environment with
+`pyluxcore` and `numpy`, LuxCore's `BIDIRVMCPU` and `PATHCPU` with its caustic cache, on scenes that it has the words for.
+Two threads, no limit of depth. Seconds are those of the processors, so that a busy machine tells the same.
 Each renders for about `--seconds`: by the samples that a first, short picture says can be had in that time. All are measured against one reference, the mean of long pictures of our `path`
 with photons by other seeds, whose remaining noise is subtracted; the mean of each over that of the reference is printed as well. Medians of the
 seeds.
 """
 
 import argparse
+import json
+import os
 import resource
 import subprocess
 import tempfile
@@ -21,6 +25,7 @@ from measure import Sums, relmse, relmse_of_noise
 from mitsuba_scene import mitsuba_scene
 from published import published
 from scene_file import write_scene
+from wavefront import read_obj
 from workbench import ROOT, dr, mi, np
 
 WIDTH = 256
@@ -34,6 +39,9 @@ SCENES = {
 FIRST_REFERENCE_SEED = 1000
 # Pictures that a reference is the mean of: their differences tell its noise.
 REFERENCE_PICTURES = 8
+LUX_METHODS = ("BiDirVM", "caustic cache")
+# Lookup radius of LuxCore's caustic cache, in diagonals of the scene.
+LUX_RADIUS = 0.003
 OURS = {
     "path, off": ["--method", "path", "--caustics", "off"],
     "path, caustics": ["--method", "path", "--caustics", "auto"],
@@ -42,22 +50,32 @@ OURS = {
 }
 
 
-def own_scene(size):
-    """The caustic scene of this repository, with absolute paths."""
-    folder = ROOT / "scenes"
+def baked(path, out, scale=1.0, translate=(0.0, 0.0, 0.0), material=None):
+    """An OBJ file written to `out` in triangles, scaled and moved, all of one material where that is said."""
+    lines = [] if material is None else [f"mtllib {material}.mtl", f"usemtl {material}"]
+    for line in path.read_text().splitlines():
+        kind, *words = line.split() or [""]
+        if kind == "v":
+            lines.append(" ".join(["v", *(repr(scale * float(x) + by) for x, by in zip(words, translate))]))
+        elif kind == "f":
+            lines += [f"f {words[0]} {words[i]} {words[i + 1]}" for i in range(1, len(words) - 1)]
+        elif kind == "mtllib" and material is None:
+            lines.append(f"mtllib {Path(path.parent, *words)}")
+        elif kind == "vn" or kind == "usemtl" and material is None:
+            lines.append(line)
+    out.write_text("\n".join(lines) + "\n")
+    return str(out)
+
+
+def own_scene(size, folder):
+    """The caustic scene of this repository as peers want it."""
+    scenes, folder = ROOT / "scenes", Path(folder)
+    (folder / "ball.mtl").write_text("newmtl ball\nKd 0 0 0\nTf 1 1 1\nNi 1.5\nillum 7\n")
+    ball = baked(scenes / "shapes" / "sphere.obj", folder / "ball.obj", 0.5, (-0.5, 0.6, 0.5), "ball")
     return {
         "render": {"size": list(size)},
-        "mesh": [
-            {"file": str(folder / "caustic" / "caustic.obj")},
-            {
-                "file": str(folder / "shapes" / "sphere.obj"),
-                "scale": 0.5,
-                "translate": [-0.5, 0.6, 0.5],
-                "material": "ball",
-            },
-        ],
-        "material.ball": {"kind": "glass", "ior": 1.5},
-        "camera": {"eye": [0.3, 2.2, 4.6], "look_at": [0.1, 0.5, 0], "fov": 36},
+        "mesh": [{"file": baked(scenes / "caustic" / "caustic.obj", folder / "box.obj")}, {"file": ball}],
+        "camera": {"eye": [0.3, 2.2, 4.6], "look_at": [0.1, 0.5, 0], "up": [0, 1, 0], "fov": 36},
     }
 
 
@@ -82,6 +100,47 @@ def theirs(scene, integrator, seed, spp):
     dr.eval(picture)
     dr.sync_thread()
     return np.array(picture).astype(np.float64), time.process_time() - start
+
+
+def lux_surface(said):
+    """A material of an MTL file in LuxCore's words; `None` where it has none for it."""
+    kind = int(said.get("illum", [1])[0])
+    surfaces = {1: ("diffuse", said.get("Kd", [0.0] * 3)), 3: ("mirror", said.get("Ks")), 7: ("glass", said.get("Ni", [1.5])[0])}
+    if kind not in surfaces:
+        return None
+    surface = dict([surfaces[kind]])
+    return surface | {"emission": said["Ke"]} if any(said.get("Ke", [0.0])) else surface
+
+
+def lux_scene(description, path):
+    """Writes what LuxCore has to know of a scene; `None` where it has other words than ours for a surface or a lamp."""
+    meshes = []
+    for mesh in description["mesh"]:
+        parts, materials = read_obj(Path(mesh["file"]))
+        for part in parts:
+            normals = None if part.normals is None else part.normals.tolist()
+            shape = {"positions": part.positions.tolist(), "faces": part.faces.tolist(), "normals": normals}
+            meshes.append(shape | {"material": lux_surface(materials[part.material])})
+    lights = description.get("light", [])
+    if any(light["kind"] != "directional" for light in lights) or any(mesh["material"] is None for mesh in meshes):
+        return None
+    corners = np.vstack([mesh["positions"] for mesh in meshes])
+    radius = LUX_RADIUS * float(np.linalg.norm(corners.max(0) - corners.min(0)))
+    said = {"size": description["render"]["size"], "camera": description["camera"], "meshes": meshes, "lights": lights}
+    path.write_text(json.dumps(said | {"radius": radius}))
+    return path
+
+
+def luxcore(scene, method, seconds, seed):
+    """LuxCore's picture after so many seconds; loading is not counted."""
+    with tempfile.TemporaryDirectory() as folder:
+        picture = Path(folder) / "picture.npy"
+        program = Path(__file__).with_name("luxcore_peer.py")
+        command = [os.environ["LUXCORE"], program, scene, method, seconds, seed, picture]
+        done = subprocess.run([str(word) for word in command], capture_output=True, text=True)
+        if done.returncode != 0:
+            raise RuntimeError(done.stderr)
+        return np.load(picture).astype(np.float64), float(done.stdout.split()[-1])
 
 
 def budgeted(render, seconds):
@@ -113,23 +172,29 @@ def reference(name, render, seconds):
 
 
 def compare(name, size, arguments, program, folder):
-    is_own = name == "caustic"
-    description = own_scene(size) if is_own else published(name, size)
+    description = own_scene(size, folder) if name == "caustic" else published(name, size)
     toml = Path(folder) / f"{name}.toml"
     write_scene(toml, description)
     renderers = {who: lambda spp, seed, extra=extra: ours(program, toml, extra, seed, spp) for who, extra in OURS.items()}
     converged = reference(name, renderers["path, caustics"], arguments.reference_seconds)
     noise = relmse_of_noise(converged.variance(), converged.mean)
-    if not is_own and not arguments.ours_only:
+    if not arguments.ours_only:
         scene = mitsuba_scene(description, folder)
         for kind in ("path", "ptracer"):
             integrator = mi.load_dict({"type": kind, "max_depth": -1})
             # The first render fills the kernel cache.
             theirs(scene, integrator, 0, 4)
             renderers[f"Mitsuba {kind}"] = lambda spp, seed, i=integrator: theirs(scene, i, seed, spp)
+    if "LUXCORE" in os.environ and not arguments.ours_only:
+        lux = lux_scene(description, Path(folder) / f"{name}.json")
+        for kind in LUX_METHODS if lux else ():
+            renderers[f"LuxCore {kind}"] = lambda seconds, seed, kind=kind: luxcore(lux, kind, seconds, seed)
     best = None
     for who, render in renderers.items():
-        spp = budgeted(render, arguments.seconds)
+        if best is not None and arguments.only and arguments.only not in who:
+            continue
+        # LuxCore is told the seconds themselves.
+        spp = arguments.seconds if who.startswith("LuxCore") else budgeted(render, arguments.seconds)
         runs = [render(spp, seed) for seed in range(1, arguments.seeds + 1)]
         values = [(max(relmse(picture, converged.mean) - noise, 1e-12), seconds) for picture, seconds in runs]
         mean = np.mean([picture.mean() for picture, _ in runs]) / converged.mean.mean()
@@ -147,7 +212,8 @@ def main():
     parser.add_argument("--seconds", type=float, default=4.0)
     parser.add_argument("--seeds", type=int, default=5)
     parser.add_argument("--reference-seconds", type=float, default=240.0)
-    parser.add_argument("--ours-only", action="store_true", help="without Mitsuba")
+    parser.add_argument("--ours-only", action="store_true", help="without peers")
+    parser.add_argument("--only", help="beside our path only methods whose name has this in it")
     arguments = parser.parse_args()
     program = workbench.halflight_program()
     print(f"{workbench.machine()}; about {arguments.seconds} s, medians of {arguments.seeds} seeds")
