@@ -255,7 +255,7 @@ impl<F: Features> PathTracer<'_, F> {
                 spot = Some(Spot { center: center.to_array(), radius: MARGIN * farthest });
             }
             if !is_full {
-                return Ok(spot.filter(|spot| Vec3::from(spot.center).is_finite()));
+                return Ok(spot.filter(|spot| spot.cone(place.position(), place.normal()).is_some()));
             }
         }
         Ok(None)

@@ -35,6 +35,10 @@ const MOST_IN_VAIN: usize = 32;
 /// A glint is a ray that brings this share of all that records have in the mean.
 const GLINT: f64 = 0.05;
 
+/// All spots together take as many rays as strata. One that makes less than so many times the variance of a diffuse
+/// scene, which is about 1 / strata², would be looked at for nothing.
+const WORTH: f64 = 4.0;
+
 /// Spots that are aimed at, at most.
 const MOST_SPOTS: usize = 8;
 
@@ -143,11 +147,25 @@ impl<'a> Growing<'a> {
         true
     }
 
-    /// Glints of no known spot that are worth a closer look, each with the number of its place; the brightest first.
-    fn glints(&self, found: &[Found], strata: usize) -> Vec<(usize, Glint)> {
+    /// The radiance that records see in the mean, those of `found` as well.
+    fn mean_light(&self, found: &[Found]) -> f64 {
         let lights = found.iter().flat_map(|found| &found.record).map(light);
         let (sum, count) = lights.fold(self.light, |(sum, count), light| (sum + light, count + 1));
-        let least = GLINT * (strata * strata) as f64 * sum / f64::from(count.max(1));
+        sum / f64::from(count.max(1))
+    }
+
+    /// Whether what the rays of `found` meet of a spot by chance makes much of the noise of their records.
+    fn is_worth_its_rays(&self, spot: &Spot, found: &[Found], strata: usize) -> bool {
+        let glints = found.iter().flat_map(|found| &found.glints);
+        let met = glints.filter(|glint| spot.holds(glint.position.into()));
+        let squares: f64 = met.map(|glint| f64::from(glint.light).powi(2)).sum();
+        let noise = strata as f64 * self.mean_light(found);
+        squares > WORTH * noise * noise * found.len() as f64
+    }
+
+    /// Glints of no known spot that are worth a closer look, each with the number of its place; the brightest first.
+    fn glints(&self, found: &[Found], strata: usize) -> Vec<(usize, Glint)> {
+        let least = GLINT * (strata * strata) as f64 * self.mean_light(found);
         let all = found.iter().enumerate().flat_map(|(i, found)| found.glints.map(|glint| (i, glint)));
         let mut glints: Vec<_> =
             all.filter(|(_, glint)| f64::from(glint.light) > least && !self.is_known(glint)).collect();
@@ -264,7 +282,7 @@ impl<F: Features> Overture<'_, '_, F> {
             }
             let known = growing.spots.len();
             for ((_, glint), spot) in glints.iter().zip(spots) {
-                match spot {
+                match spot.filter(|spot| growing.is_worth_its_rays(spot, &all, strata)) {
                     None => growing.in_vain += 1,
                     // Not twice by two of its glints.
                     Some(spot) if !growing.is_known(glint) && growing.spots.len() < MOST_SPOTS => {
