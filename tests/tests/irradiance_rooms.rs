@@ -134,6 +134,18 @@ fn what_many_rays_meet_is_no_spot() {
     assert!(rays < 2.7, "{rays} rays for one that is gathered");
 }
 
+/// The first records have nothing but paths, whose light is luck where it comes by many bounces: they are gathered again when
+/// there are others.
+#[test]
+fn the_first_records_are_gathered_again() {
+    let result = render(&cornell_box().scene(), Method::IrradianceCache, SIZE, 1, |settings| {
+        settings.cache.strata = 16;
+    });
+    let cache = result.cache.expect("a cache");
+    let again = cache.gathered as f64 / cache.records as f64 - 1.0;
+    assert!((0.05..0.5).contains(&again), "{again} of them");
+}
+
 #[test]
 fn a_needle_stands_in_the_way() {
     let mut buffers = room(0.5);

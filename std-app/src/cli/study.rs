@@ -42,6 +42,9 @@ struct Irradiance {
     /// Points at which the irradiance is compared, about
     #[arg(long, value_name = "N", default_value = "2000", value_parser = clap::value_parser!(u32).range(1..=1 << 20))]
     points: u32,
+    /// Fill caches progressively: first with four times the radii, then with twice, then with what the error allows
+    #[arg(long)]
+    progressive: bool,
     #[command(flatten)]
     shot: Shot,
     #[command(flatten)]
@@ -66,7 +69,8 @@ impl Irradiance {
         let views = loaded.views();
         let scene = views.scene(self.shot.view.camera(&loaded)?);
         let metrics = if self.metrics.is_empty() { Metric::ALL.to_vec() } else { self.metrics.clone() };
-        let study = IrradianceStudy { metrics, records: self.records, points: self.points };
+        let Self { records, points, progressive, .. } = *self;
+        let study = IrradianceStudy { metrics, records, points, progressive };
         if !self.json {
             say(
                 "metric                    error   records       RMSE     noise  1 in 100  reached  predicted   achieved",

@@ -30,6 +30,8 @@ pub struct IrradianceStudy {
     pub records: u64,
     /// Points at which the irradiance is held against the exact one, about.
     pub points: u32,
+    /// Whether caches are filled in passes, each with half of the radii of the one before (Křivánek et al. 2006, §5).
+    pub progressive: bool,
 }
 
 /// What came of a metric.
@@ -64,6 +66,9 @@ const ATTEMPTS: usize = 20;
 
 /// The longest step of an attempt, as the logarithm of the error: to a hundred times as much.
 const FARTHEST: f64 = 4.605;
+
+/// Passes of a progressive filling.
+const PASSES: i32 = 3;
 
 /// Gatherings at a point of comparison.
 const REPEATS: u32 = 4;
@@ -119,15 +124,21 @@ impl WithFeatures for Study<'_> {
             let usual = metric::Settings::new(metric, extent);
             let mut search = Search::new(study.records, usual.error);
             loop {
-                let settings = metric::Settings { error: search.error, ..usual };
-                let gathering = Gathering { flux: &flux, metric: settings, least_pixels: LEAST_PIXELS };
                 let cache = IrradianceCache::new(&bvh.bounds(), capacity, &mut arena(&mut lines))?;
                 let mut growing = Growing::new(cache, 0);
-                Overture { tracer: &tracer, gathering: &gathering, size }.fill(
-                    &mut growing,
-                    &mut crew,
-                    &mut scratch,
-                )?;
+                for pass in (0..if study.progressive { PASSES } else { 1 }).rev() {
+                    // Radii are in proportion to the error, or to its fourth root.
+                    let wider = 2f32.powi(pass);
+                    let looser = if metric.takes_distances() { wider } else { wider.powi(4) };
+                    let settings = metric::Settings { error: looser * search.error, ..usual };
+                    let least_pixels = wider * LEAST_PIXELS;
+                    let gathering = Gathering { flux: &flux, metric: settings, least_pixels };
+                    let overture = Overture { tracer: &tracer, gathering: &gathering, size };
+                    overture.fill(&mut growing, &mut crew, &mut scratch)?;
+                    if pass > 0 {
+                        growing.refine(Some(0.5));
+                    }
+                }
                 let error = search.error;
                 if search.is_done(growing.cache.records().len() as u64) {
                     tell(&judge(metric, error, &growing.cache, &points));

@@ -24,6 +24,10 @@ const LOOKED_AT: usize = 16 * PIXELS;
 const SWEEPS: u32 = 4;
 const FEW: usize = 50;
 
+/// The first records were gathered by paths alone, which no record ended. After the first sweep those that took more rays
+/// than this for each path, over the median, are forgotten: what follows finds its light where records are.
+const ALONE: f32 = 1.3;
+
 /// Places that are gathered at before their records are committed.
 const GATHERED: usize = 32;
 
@@ -64,6 +68,8 @@ pub(in crate::drive) struct Growing<'a> {
     attempts: u32,
     /// Records of a file, or of before a refinement.
     loaded: usize,
+    /// Rays for each path, of each of the records that came then.
+    efforts: Vec<f32>,
     /// Sum of the radiance that records see in the mean, and how many.
     light: (f64, u32),
 }
@@ -73,6 +79,8 @@ pub(in crate::drive) struct Growing<'a> {
 struct Found {
     record: Option<Record>,
     glints: [Glint; GLINTS],
+    /// Rays for each path.
+    effort: f32,
 }
 
 /// How gathering at some places ended.
@@ -99,6 +107,7 @@ impl<'a> Growing<'a> {
             in_vain: 0,
             attempts: 0,
             loaded: 0,
+            efforts: Vec::new(),
             light: (0.0, 0),
         }
     }
@@ -122,6 +131,7 @@ impl<'a> Growing<'a> {
             None => self.cache.restore(&[]),
         }
         self.loaded = self.cache.records().len();
+        self.efforts.clear();
         (self.next, self.sweeps, self.before) = (0, 0, self.loaded);
     }
 
@@ -142,9 +152,23 @@ impl<'a> Growing<'a> {
         }
         let loaded = self.cache.records().get(..self.loaded).unwrap_or_default().to_vec();
         self.cache.restore(&loaded);
+        self.efforts.clear();
         (self.next, self.sweeps, self.before, self.light) = (0, 0, self.loaded, (0.0, 0));
         self.attempts += 1;
         true
+    }
+
+    /// Forgets the records that were gathered before there were others. By their rays, and not by what they found, so that
+    /// no light is preferred.
+    fn forget_lonely(&mut self) {
+        let mut sorted = self.efforts.clone();
+        sorted.sort_by(f32::total_cmp);
+        let most = ALONE * sorted.get(sorted.len() / 2).copied().unwrap_or(f32::INFINITY);
+        let efforts = core::iter::repeat_n(0.0, self.loaded).chain(self.efforts.drain(..));
+        let records = self.cache.records().iter().zip(efforts);
+        let kept: Vec<Record> =
+            records.filter(|(_, effort)| *effort <= most).map(|(record, _)| *record).collect();
+        self.cache.restore(&kept);
     }
 
     /// The radiance that records see in the mean, those of `found` as well.
@@ -208,6 +232,11 @@ impl<F: Features> Overture<'_, '_, F> {
             if growing.next >= order.len() {
                 growing.next = 0;
                 growing.sweeps += 1;
+                if growing.sweeps == 1 {
+                    growing.forget_lonely();
+                    growing.before = growing.cache.records().len();
+                    continue;
+                }
                 let records = growing.cache.records().len();
                 if (records - growing.before) * FEW < records {
                     growing.sweeps = SWEEPS;
@@ -259,8 +288,11 @@ impl<F: Features> Overture<'_, '_, F> {
             let task = |task: usize, arena: &mut Arena, out: &mut [Found]| {
                 let mut counters = Counters::default();
                 let number = 2 * (first + task as u32) + growing.index;
-                if let (Some(Found { record, glints }), Some(place)) = (out.first_mut(), places.get(task)) {
+                if let (Some(Found { record, glints, effort }), Some(place)) =
+                    (out.first_mut(), places.get(task))
+                {
                     *record = tracer.gather(place, number, self.gathering, arena, &mut counters, glints)?;
+                    *effort = counters.rays as f32 / counters.paths.max(1) as f32;
                 }
                 Ok(counters)
             };
@@ -298,9 +330,12 @@ impl<F: Features> Overture<'_, '_, F> {
                 continue;
             }
             growing.gathered += places.len() as u32;
-            for record in all.into_iter().filter_map(|found| found.record) {
+            for Found { record, effort, .. } in all {
+                let Some(record) = record else { continue };
                 growing.light = (growing.light.0 + light(&record), growing.light.1 + 1);
-                growing.cache.insert(record);
+                if growing.cache.insert(record) {
+                    growing.efforts.push(effort);
+                }
             }
             return Ok(Gathered::All);
         }
