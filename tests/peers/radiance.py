@@ -7,7 +7,7 @@ Scenes of this repository with diffuse materials alone, and lamps that reflect n
 candelas; its pixels are watts). Both run on one thread; seconds are those of the processor, for the whole process. Errors
 are against our path tracer, whose own noise is subtracted; how far the means are apart is printed beside. `rpict` renders
 more pixels than are wanted, jittered, and squares of them are averaged: the time for that is not counted. Its settings
-are a sweep of `-aa`, `-ad`, `-as`, `-ar` and of the pixels; what counts is the fastest that is good enough, for the error
+are a sweep of `-aa`, `-ad`, `-as`, `-ar`, `-ab`, `-ds` and of the pixels; what counts is the fastest that is good enough, for the error
 asked for and for others that both reach.
 
 `RADIANCE` names a folder with the programs; without it pyradiance from PyPI is installed into `tests/peers/venv-radiance`.
@@ -41,12 +41,12 @@ SCENES = {
         "target": 2e-3,
     },
 }
-# -aa, -ar, -ad.
+# -aa, -ar, -ad, -ab, -ds.
 SWEEP = [(0.6, 16, 64), (0.5, 16, 128), (0.5, 8, 256), (0.5, 16, 256), (0.4, 8, 512), (0.4, 16, 256), (0.3, 8, 512), (0.4, 32, 256)]
-# Where little light comes through a slit, these are better.
-SWEEP += [(0.4, 32, 1024), (0.3, 32, 1024), (0.3, 64, 2048), (0.2, 64, 2048), (0.2, 128, 4096)]
+SWEEP = [(*settings, 5, 0.2) for settings in SWEEP]
+# Where light comes through a slit, finer shadows and more bounces are worth more than records.
+SWEEP += [(0.5, 16, 256, 8, 0.05), (0.4, 16, 512, 8, 0.05)]
 OVERSAMPLING = (3, 4)
-BOUNCES = 5
 OURS = [(rays, error, spp) for rays in (256, 1024) for error in (1e-4, 3e-4) for spp in (4, 16, 64)]
 OURS += [(1024, 1e-4, 256), (4096, 1e-4, 64), (4096, 1e-4, 256)]
 # Errors for which the fastest of both are told, besides the one asked for.
@@ -158,15 +158,16 @@ def read_hdr(data):
     return ((mantissa + 0.5) * scale[:, None]).transpose(0, 2, 1)
 
 
-def rpict(bin_folder, name, scene, accuracy, resolution, divisions, oversampling):
+def rpict(bin_folder, name, scene, settings, oversampling):
+    accuracy, resolution, divisions, bounces, substructuring = settings
     width, height = scene["size"]
     camera = scene["camera"]
     direction = np.subtract(camera["look-at"], camera["eye"])
     half = np.tan(np.radians(camera["fov"] / 2))
     across = 2 * np.degrees(np.arctan(half * width / height))
     view = ["-vtv", "-vp", *camera["eye"], "-vd", *direction, "-vu", *camera["up"], "-vh", across, "-vv", camera["fov"]]
-    quality = ["-ab", BOUNCES, "-aa", accuracy, "-ar", resolution, "-ad", divisions, "-as", divisions // 4]
-    limits = ["-lr", BOUNCES, "-lw", 1e-3, "-dj", 1, "-ds", 0.2, "-dt", 0, "-dc", 1, "-ps", 1, "-pj", 1, "-pa", 0]
+    quality = ["-ab", bounces, "-aa", accuracy, "-ar", resolution, "-ad", divisions, "-as", divisions // 4]
+    limits = ["-lr", bounces, "-lw", 1e-3, "-dj", 1, "-ds", substructuring, "-dt", 0, "-dc", 1, "-ps", 1, "-pj", 1, "-pa", 0]
     pixels = ["-x", width * oversampling, "-y", height * oversampling]
     command = [bin_folder / "rpict", *view, *quality, *limits, *pixels, FOLDER / f"{name}.oct"]
     data, seconds = timed(command)
@@ -221,11 +222,10 @@ def compare(name, arguments, program, bin_folder):
         extra = ["--audit", "off", "--cache-rays", rays, "--cache-error", error]
         picture, seconds = halflight(program, name, scene, "irradiance-cache", spp, 1, 1, extra)
         note("halflight", f"{rays} rays, error {error:g}, {spp} spp", picture, seconds)
-    for accuracy, resolution, divisions in SWEEP[arguments.sweep :]:
+    for settings in SWEEP[arguments.sweep :]:
         for oversampling in OVERSAMPLING[: arguments.oversampling]:
-            settings = f"-aa {accuracy:g} -ar {resolution} -ad {divisions}, {oversampling}² pixels"
-            picture, seconds = rpict(bin_folder, name, scene, accuracy, resolution, divisions, oversampling)
-            note("rpict", settings, picture, seconds)
+            told = "-aa {:g} -ar {} -ad {} -ab {} -ds {:g}".format(*settings) + f", {oversampling}² pixels"
+            note("rpict", told, *rpict(bin_folder, name, scene, settings, oversampling))
     print("\nFastest that are good enough:\n\n| relMSE | halflight | s | rpict | s | ratio |\n|---|---|---|---|---|---|")
     for target in sorted({arguments.target or scene["target"], *ROUND}, reverse=True):
         fastest = lambda of: min(((row[1], row[2]) for row in of if row[0] <= target), default=(None, "none"))
