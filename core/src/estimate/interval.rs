@@ -3,11 +3,11 @@
 //! The plain algorithm: half-pictures A and B are independent and unbiased, so ((A − B) / 2)² has the variance of
 //! their mean I for its mean; over I² + 0.01 m² its mean over pixels is the relMSE. Departures:
 //! 1. I is not R. Where a sample is far too bright it makes its own denominator large and hides itself; where samples
-//!    missed the light the denominator is too small. So denominators come from a filtered picture ([`super::filter`]).
-//! 2. What is left of that is known from below and from above: the estimate over the mean of both filtered parts is
-//!    nearly always too small, and the same times a ratio in which nothing hides itself (the variance of one pair of
-//!    parts over the square of the other, to the same over the common square) too large. With δ the logarithm of their
-//!    quotient, the estimate goes up by δ / (1 + 2 δ), and is as uncertain as that.
+//!    missed the light the denominator is too small. So denominators are what pixels that look alike are in the mean
+//!    ([`super::Shrinkage`]), the mean of the quotients by what each pair of quarters says.
+//! 2. What is left of that is seen where nothing hides itself: the variance of one pair over the square of what the
+//!    *other* says is too large, for where light is rare both are. With δ the logarithm of its quotient to the variance
+//!    of the pairs over the common squares, the estimate goes up by δ / (1 + 10 δ), and is as uncertain as δ.
 //! 3. The error that this picture has and its estimate differ by the mean of the product of both halves' errors,
 //!    exactly. For a pixel of variance V the product has the variance 4 V², and the estimate squared the mean 3 V² (more
 //!    with heavy tails); Student's t says what it is to know that from few pixels. How errors hang together between
@@ -36,6 +36,10 @@ const Z: f64 = 1.959_963_984_540_054;
 /// Degrees of freedom at the least, of independent pixels: where fewer of them have nearly all of the noise it has heavy
 /// tails, and their squares are too large already.
 const FEWEST: f64 = 8.0;
+
+/// How soon δ is doubted: all of it counts where it is small and both bounds are right to first order, a tenth at most
+/// where light is rare.
+const DOUBTED: f64 = 10.0;
 
 impl ErrorEstimate {
     /// From all tiles of a picture whose pixels share nothing, or paths within blocks of 8 x 8; `None` where no pixel has
@@ -67,16 +71,14 @@ impl ErrorEstimate {
         if sum.values == 0 {
             return None;
         }
-        if !(sum.filtered > 0.0 && sum.parts > 0.0) {
+        if !(sum.halves > 0.0 && sum.parts > 0.0) {
             // Without noise; unless what there is of it cannot be counted.
-            return (sum.filtered == 0.0).then_some(Self { relmse: 0.0, lower: 0.0, upper: 0.0 });
+            return (sum.halves == 0.0).then_some(Self { relmse: 0.0, lower: 0.0, upper: 0.0 });
         }
-        let most = sum.halves * (sum.crossed / sum.parts);
-        let delta = fmax(log(most / sum.filtered), 0.0);
-        let shift = delta / (1.0 + 2.0 * delta);
-        let relmse = sum.filtered / sum.values as f64 * exp(shift);
-        let noise = sqrt(4.0 / 3.0 * sum.squares) / (0.5 * (sum.filtered + sum.halves));
-        let reach = hypot(reach * noise, shift);
+        let delta = fmax(log(sum.crossed / sum.parts), 0.0);
+        let relmse = sum.halves / sum.values as f64 * exp(delta / (1.0 + DOUBTED * delta));
+        let noise = sqrt(4.0 / 3.0 * sum.squares) / sum.halves;
+        let reach = hypot(reach * noise, delta);
         Some(Self { relmse, lower: relmse * exp(-reach), upper: relmse * exp(reach) })
             .filter(|estimate| estimate.upper.is_finite())
     }
@@ -106,7 +108,7 @@ pub(super) fn student_95(freedom: f64) -> f64 {
 mod tests {
     use super::*;
     use crate::Rgb;
-    use crate::estimate::TileLight;
+    use crate::estimate::{Shrinkage, TileLight};
     use crate::film::{Dropped, PIXELS_PER_TILE, Pixel};
     use crate::sampling::Random;
     use std::vec::Vec;
@@ -130,7 +132,9 @@ mod tests {
     fn estimate(picture: &[Vec<Pixel>]) -> Option<ErrorEstimate> {
         let mut light = TileLight::default();
         picture.iter().for_each(|tile| light += TileLight::of(tile));
-        ErrorEstimate::of(picture.iter().map(|tile| TileError::of(tile, light.mean())))
+        let (mean, mut shrinkage) = (light.mean(), Shrinkage::default());
+        picture.iter().for_each(|tile| shrinkage.add(tile, mean));
+        ErrorEstimate::of(picture.iter().map(|tile| TileError::of(tile, mean, &shrinkage)))
     }
 
     #[test]

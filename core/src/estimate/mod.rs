@@ -5,10 +5,12 @@ mod filter;
 mod interval;
 mod metric;
 mod noise;
+mod shrinkage;
 mod tile;
 
 pub use audit::{BiasEstimate, Deviation, Finding};
 pub use interval::ErrorEstimate;
 pub use metric::{Difference, mse, relmse, rmse};
 pub use noise::{BLOCKS, BlockNoise, Noise};
+pub use shrinkage::Shrinkage;
 pub use tile::{TileError, TileLight, filtered};

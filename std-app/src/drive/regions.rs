@@ -35,6 +35,7 @@ fn merged(tiles: &[TileError], width: u32) -> Vec<TileError> {
 mod tests {
     use super::*;
     use halflight_core::Rgb;
+    use halflight_core::estimate::Shrinkage;
     use halflight_core::film::{Dropped, PIXELS_PER_TILE, Pixel};
 
     #[test]
@@ -45,7 +46,10 @@ mod tests {
                 let light = 1.0 + (task * 31 + sample * 17) as f32 % 5.0;
                 pixel.add(sample, Rgb::splat(light), &mut Dropped::default());
             }
-            TileError::of(&[pixel; PIXELS_PER_TILE], 3.0)
+            let pixels = [pixel; PIXELS_PER_TILE];
+            let mut shrinkage = Shrinkage::default();
+            shrinkage.add(&pixels, 3.0);
+            TileError::of(&pixels, 3.0, &shrinkage)
         };
         // 20 x 5 tiles are 7 x 2 regions of 3 x 3.
         let tiles: Vec<_> = (0..100).map(tile).collect();

@@ -5,8 +5,8 @@ use super::{RenderError, regions};
 use halflight_core::Level;
 use halflight_core::bsdf::Features;
 use halflight_core::bvh::{Bvh, Join};
-use halflight_core::estimate::{BLOCKS, BlockNoise, ErrorEstimate, TileError, TileLight};
-use halflight_core::film::{Film, PIXELS_PER_TILE};
+use halflight_core::estimate::{BLOCKS, BlockNoise, ErrorEstimate, Shrinkage, TileError, TileLight};
+use halflight_core::film::{Film, PIXELS_PER_TILE, Pixel};
 use halflight_core::memory::{Arena, Line, OutOfMemory};
 use halflight_core::photon::{PhotonMap, Photons};
 use halflight_core::scene::Mesh;
@@ -46,7 +46,18 @@ impl Workers {
     pub(super) fn errors(&self, film: &Film) -> Option<Vec<TileError>> {
         let mean = self.mean(film)?;
         let tiles = film.pixels().par_chunks(PIXELS_PER_TILE);
-        Some(self.pool.install(|| tiles.map(|tile| TileError::of(tile, mean)).collect()))
+        let learn = |mut known: Shrinkage, tile: &[Pixel]| {
+            known.add(tile, mean);
+            known
+        };
+        let both = |mut one: Shrinkage, other: Shrinkage| {
+            one += &other;
+            one
+        };
+        Some(self.pool.install(|| {
+            let shrinkage = tiles.clone().fold(Shrinkage::default, learn).reduce(Shrinkage::default, both);
+            tiles.map(|tile| TileError::of(tile, mean, &shrinkage)).collect()
+        }))
     }
 
     /// Where the noise of `film` is; `None` for a black picture.

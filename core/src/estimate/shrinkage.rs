@@ -1,0 +1,204 @@
+//! What a pixel probably is, learnt from the picture itself (Robbins 1956, "An empirical Bayes approach to statistics").
+//! Pixels of one class are so much brighter or darker than their neighbours, and their quarters in such disagreement, to one
+//! pair of quarters; how much of that the *other* pair finds is the share of it that is believed. A firefly that no
+//! other sample meets shrinks to its neighbours, a texture stays. What for: docs/decisions/0035.
+
+use super::metric::DARK;
+use crate::film::{PIXELS_PER_TILE, Pixel, TILE, Tile};
+use glam::Vec4;
+
+/// Light that is added to that of the neighbours before anything is divided by it, in units of the picture's mean.
+const FAINT: f32 = 0.01;
+
+/// Octaves of what a pixel has more than its neighbours, over theirs; less than the first is as good as nothing.
+const FIRST_OCTAVE: i32 = -5;
+const LAST_OCTAVE: i32 = 18;
+const BRIGHTER: usize = (LAST_OCTAVE - FIRST_OCTAVE + 1) as usize;
+
+/// The octaves below 1: nothing is darker than black.
+const DARKER: usize = -FIRST_OCTAVE as usize;
+
+/// Difference of the two quarters of a pair over their sum, between classes.
+const DISAGREEMENT: [f32; 5] = [0.1, 0.25, 0.5, 0.75, 0.9];
+
+const ALIKE: usize = DISAGREEMENT.len() + 1;
+
+const CLASSES: usize = (BRIGHTER + DARKER) * ALIKE;
+
+/// Before anything is learnt a class is known as well as by this many pixels: what is brighter is believed in half of
+/// its octaves, what is darker in full.
+const PRIOR: f64 = 4.0;
+
+/// Variance of what a pixel is, over the square, at most: where light is so rare that it is more, noise is where light is.
+const MOST_SPREAD: f64 = 0.2;
+
+/// Sums are whole numbers of these, so that they do not depend on the order of tiles.
+const UNIT: f64 = 1.0 / (1 << 20) as f64;
+
+/// Sums over the pixels of one class. x is what a pixel has more than its neighbours, over theirs.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+struct Class {
+    pixels: u64,
+    /// |x| to the pair that is asked.
+    own: i128,
+    /// x to the other pair, with the sign of the former.
+    other: i128,
+    /// x² to the pair that is asked.
+    own_squared: i128,
+    /// x² by the product of both quarters of the other pair, which are independent.
+    other_squared: i128,
+}
+
+/// What the pixels of a picture tell of each other.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Shrinkage {
+    classes: [Class; CLASSES],
+}
+
+impl Default for Shrinkage {
+    fn default() -> Self {
+        Self { classes: [Class::default(); CLASSES] }
+    }
+}
+
+impl core::ops::AddAssign<&Self> for Shrinkage {
+    fn add_assign(&mut self, other: &Self) {
+        for (class, other) in self.classes.iter_mut().zip(&other.classes) {
+            class.pixels += other.pixels;
+            class.own += other.own;
+            class.other += other.other;
+            class.own_squared += other.own_squared;
+            class.other_squared += other.other_squared;
+        }
+    }
+}
+
+impl Shrinkage {
+    /// Learns from one tile of a picture of mean `mean` > 0. Pixels whose halves have no two samples each are left out.
+    pub fn add(&mut self, pixels: &[Pixel], mean: f64) {
+        let scale = (1.0 / mean) as f32;
+        let around = surroundings(pixels, scale);
+        let whole = |value: f64| (value / UNIT) as i128;
+        for (i, pixel) in pixels.iter().enumerate().take(PIXELS_PER_TILE) {
+            let Some([first, second]) = quarters(pixel, scale).map(Pair::both) else { continue };
+            let around = around[raster(i)];
+            for (asked, other) in [(first, second), (second, first)] {
+                let own = asked.more(around);
+                let [x, a, b] = [more(other.light, around), more(other.a, around), more(other.b, around)]
+                    .map(|x| f64::from(x.min(MOST)));
+                let class = &mut self.classes[asked.class(own)];
+                let own = f64::from(own);
+                class.pixels += 1;
+                class.own += whole(libm::fabs(own));
+                class.other += whole(if own < 0.0 { -x } else { x });
+                class.own_squared += whole(own * own);
+                class.other_squared += whole(a * b);
+            }
+        }
+    }
+
+    /// The mean of 1 / (R² + 0.01) over what a pixel may be that `pair` saw, with neighbours of light `around`; m = 1.
+    pub(super) fn over_square(&self, pair: Pair, around: Vec4) -> Vec4 {
+        let more = pair.more(around);
+        let class = pair.class(more);
+        let darker = class / ALIKE >= BRIGHTER;
+        let octave = class / ALIKE - if darker { BRIGHTER } else { 0 };
+        let middle = core::f64::consts::SQRT_2 * libm::exp2((octave as i32 + FIRST_OCTAVE) as f64);
+        let before = if darker { middle } else { libm::sqrt(1.0 + middle) - 1.0 };
+
+        let Class { pixels, own, other, own_squared, other_squared } = self.classes[class];
+        let [own, other, own_squared, other_squared] =
+            [own, other, own_squared, other_squared].map(|sum| sum as f64 * UNIT);
+        let pixels = pixels as f64;
+        let believed = ((other + PRIOR * before) / (own + PRIOR * middle)).clamp(0.0, 1.0);
+        // V is nearly in proportion to R where light is rare, so that the mean of V / R² is that of V times ⟨R²⟩ / ⟨R⟩⁴.
+        let there = 1.0 + believed * own / pixels.max(1.0) * if darker { -1.0 } else { 1.0 };
+        let spread = (other_squared - believed * believed * own_squared) / ((pixels + PRIOR) * there * there);
+        let spread = spread.clamp(0.0, MOST_SPREAD) as f32;
+
+        let r = around + believed as f32 * (pair.light - around);
+        (1.0 + spread) * (r * r + DARK as f32).recip()
+    }
+}
+
+/// x is taken for no more than this.
+const MOST: f32 = (1 << LAST_OCTAVE) as f32;
+
+/// What `light` has more than the neighbours' `around`, over that.
+fn more(light: Vec4, around: Vec4) -> f32 {
+    brightness(light - around) / (brightness(around) + 3.0 * FAINT)
+}
+
+/// A pair of quarters of a pixel, one of each half.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Pair {
+    a: Vec4,
+    b: Vec4,
+    /// The mean of both.
+    light: Vec4,
+}
+
+impl Pair {
+    /// Both pairs of a pixel.
+    pub(super) fn both([a1, a2, b1, b2]: [Vec4; 4]) -> [Self; 2] {
+        [(a1, b1), (a2, b2)].map(|(a, b)| Self { a, b, light: 0.5 * (a + b) })
+    }
+
+    /// Variance of its mean.
+    pub(super) fn noise(&self) -> Vec4 {
+        0.25 * (self.a - self.b) * (self.a - self.b)
+    }
+
+    fn more(&self, around: Vec4) -> f32 {
+        more(self.light, around).min(MOST)
+    }
+
+    /// Its class, where it has that much `more` than its neighbours.
+    fn class(&self, more: f32) -> usize {
+        let exponent = (more.abs().to_bits() >> 23) as i32 - 127;
+        let octave = (exponent.clamp(FIRST_OCTAVE, LAST_OCTAVE) - FIRST_OCTAVE) as usize;
+        let octave = if more < 0.0 { BRIGHTER + octave.min(DARKER - 1) } else { octave };
+        let disagreement = brightness(self.a - self.b).abs() / (2.0 * brightness(self.light) + 3.0 * FAINT);
+        octave * ALIKE + DISAGREEMENT.iter().filter(|least| disagreement >= **least).count()
+    }
+}
+
+/// A₁, A₂, B₁, B₂ of a pixel times `scale`, the parts of its halves; `None` where one is empty.
+pub(super) fn quarters(pixel: &Pixel, scale: f32) -> Option<[Vec4; 4]> {
+    let ([a1, a2], [b1, b2]) = (pixel.even.parts()?, pixel.odd.parts()?);
+    Some([a1, a2, b1, b2].map(|mean| scale * mean.extend(0.0)))
+}
+
+/// The mean light of the eight neighbours of each pixel of a tile, row by row, times `scale`, as far as they lie in the tile; its
+/// own where there are none.
+pub(super) fn surroundings(pixels: &[Pixel], scale: f32) -> [Vec4; PIXELS_PER_TILE] {
+    const SIDE: usize = TILE as usize;
+    let near = |c: usize| c.saturating_sub(1)..(c + 2).min(SIDE);
+    let [mut picture, mut rows, mut around] = [[Vec4::ZERO; PIXELS_PER_TILE]; 3];
+    for (i, pixel) in pixels.iter().enumerate().take(PIXELS_PER_TILE).filter(|(_, pixel)| pixel.count() > 0) {
+        picture[raster(i)] = (scale * pixel.mean()).extend(1.0);
+    }
+    for (place, row) in rows.iter_mut().enumerate() {
+        *row = near(place % SIDE).map(|x| picture[place / SIDE * SIDE + x]).sum();
+    }
+    for (place, around) in around.iter_mut().enumerate() {
+        let (x, y) = (place % SIDE, place / SIDE);
+        // Subtracting the pixel itself would leave nothing but rounding beside a firefly.
+        let others: Vec4 = near(y).filter(|row| *row != y).map(|row| rows[row * SIDE + x]).sum();
+        let others =
+            others + near(x).filter(|column| *column != x).map(|x| picture[y * SIDE + x]).sum::<Vec4>();
+        *around = if others.w > 0.0 { others / others.w } else { picture[place] }.with_w(0.0);
+    }
+    around
+}
+
+/// Where the `i`th pixel of a tile stands in its rows.
+pub(super) fn raster(i: usize) -> usize {
+    let (x, y) = Tile::place(i);
+    (y * TILE + x) as usize
+}
+
+/// Of all channels.
+fn brightness(colour: Vec4) -> f32 {
+    colour.x + colour.y + colour.z
+}
