@@ -18,6 +18,10 @@ const BRIGHTER: usize = (LAST_OCTAVE - FIRST_OCTAVE + 1) as usize;
 /// The octaves below 1: nothing is darker than black.
 const DARKER: usize = -FIRST_OCTAVE as usize;
 
+/// A neighbour all of whose quarters are this many times as bright as the brightest of a pixel lies beyond an edge, and says
+/// nothing of what the pixel is.
+const SURELY: f32 = 2.0;
+
 /// Difference of the two quarters of a pair over their sum, between classes.
 const DISAGREEMENT: [f32; 5] = [0.1, 0.25, 0.5, 0.75, 0.9];
 
@@ -28,6 +32,10 @@ const CLASSES: usize = (BRIGHTER + DARKER) * ALIKE;
 /// Before anything is learnt a class is known as well as by this many pixels: what is brighter is believed in half of
 /// its octaves, what is darker in full.
 const PRIOR: f64 = 4.0;
+
+/// A pixel that is darker than its neighbours to one pair may be brighter to the other, where light is rare; by so many times
+/// that at most.
+const CONTRARY: f64 = 2.0;
 
 /// Variance of what a pixel is, over the square, at most: where light is so rare that it is more, noise is where light is.
 const MOST_SPREAD: f64 = 0.2;
@@ -110,7 +118,8 @@ impl Shrinkage {
         let [own, other, own_squared, other_squared] =
             [own, other, own_squared, other_squared].map(|sum| sum as f64 * UNIT);
         let pixels = pixels as f64;
-        let believed = ((other + PRIOR * before) / (own + PRIOR * middle)).clamp(0.0, 1.0);
+        let least = if darker { -CONTRARY } else { 0.0 };
+        let believed = ((other + PRIOR * before) / (own + PRIOR * middle)).clamp(least, 1.0);
         // V is nearly in proportion to R where light is rare, so that the mean of V / R² is that of V times ⟨R²⟩ / ⟨R⟩⁴.
         let there = 1.0 + believed * own / pixels.max(1.0) * if darker { -1.0 } else { 1.0 };
         let spread = (other_squared - believed * believed * own_squared) / ((pixels + PRIOR) * there * there);
@@ -169,24 +178,33 @@ pub(super) fn quarters(pixel: &Pixel, scale: f32) -> Option<[Vec4; 4]> {
     Some([a1, a2, b1, b2].map(|mean| scale * mean.extend(0.0)))
 }
 
-/// The mean light of the eight neighbours of each pixel of a tile, row by row, times `scale`, as far as they lie in the tile; its
-/// own where there are none.
+/// The mean light of the eight neighbours of each pixel of a tile, row by row, times `scale`, as far as they lie in the tile and
+/// are not surely brighter; its own where there are none.
 pub(super) fn surroundings(pixels: &[Pixel], scale: f32) -> [Vec4; PIXELS_PER_TILE] {
     const SIDE: usize = TILE as usize;
     let near = |c: usize| c.saturating_sub(1)..(c + 2).min(SIDE);
-    let [mut picture, mut rows, mut around] = [[Vec4::ZERO; PIXELS_PER_TILE]; 3];
+    let [mut picture, mut around] = [[Vec4::ZERO; PIXELS_PER_TILE]; 2];
+    // Of the quarters of a pixel, the darkest and the brightest.
+    let [mut darkest, mut brightest] = [[0.0f32; PIXELS_PER_TILE]; 2];
     for (i, pixel) in pixels.iter().enumerate().take(PIXELS_PER_TILE).filter(|(_, pixel)| pixel.count() > 0) {
-        picture[raster(i)] = (scale * pixel.mean()).extend(1.0);
-    }
-    for (place, row) in rows.iter_mut().enumerate() {
-        *row = near(place % SIDE).map(|x| picture[place / SIDE * SIDE + x]).sum();
+        let place = raster(i);
+        picture[place] = (scale * pixel.mean()).extend(1.0);
+        if let Some(quarters) = quarters(pixel, scale) {
+            let [a1, a2, b1, b2] = quarters.map(brightness);
+            darkest[place] = a1.min(a2).min(b1.min(b2));
+            brightest[place] = SURELY * (a1.max(a2).max(b1.max(b2)) + 3.0 * FAINT);
+        }
     }
     for (place, around) in around.iter_mut().enumerate() {
         let (x, y) = (place % SIDE, place / SIDE);
-        // Subtracting the pixel itself would leave nothing but rounding beside a firefly.
-        let others: Vec4 = near(y).filter(|row| *row != y).map(|row| rows[row * SIDE + x]).sum();
-        let others =
-            others + near(x).filter(|column| *column != x).map(|x| picture[y * SIDE + x]).sum::<Vec4>();
+        let mut others = Vec4::ZERO;
+        for row in near(y) {
+            for other in near(x).map(|x| row * SIDE + x) {
+                if other != place && darkest[other] <= brightest[place] {
+                    others += picture[other];
+                }
+            }
+        }
         *around = if others.w > 0.0 { others / others.w } else { picture[place] }.with_w(0.0);
     }
     around
@@ -201,4 +219,90 @@ pub(super) fn raster(i: usize) -> usize {
 /// Of all channels.
 fn brightness(colour: Vec4) -> f32 {
     colour.x + colour.y + colour.z
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Rgb;
+    use crate::film::Dropped;
+    use crate::sampling::Random;
+
+    /// A tile whose pixels have `light(x, y, sample)` in each of 16 samples.
+    fn tile(light: impl Fn(u32, u32, u32) -> f32) -> [Pixel; PIXELS_PER_TILE] {
+        core::array::from_fn(|i| {
+            let (x, y) = Tile::place(i);
+            let mut pixel = Pixel::default();
+            for sample in 0..16 {
+                pixel.add(sample, Rgb::splat(light(x, y, sample)), &mut Dropped::default());
+            }
+            pixel
+        })
+    }
+
+    /// What both pairs of each pixel take R² + 0.01 for, row by row.
+    fn squares(pixels: &[Pixel; PIXELS_PER_TILE]) -> [[f32; 2]; PIXELS_PER_TILE] {
+        let mut shrinkage = Shrinkage::default();
+        shrinkage.add(pixels, 1.0);
+        let around = surroundings(pixels, 1.0);
+        let mut squares = [[0.0; 2]; PIXELS_PER_TILE];
+        for (i, pixel) in pixels.iter().enumerate() {
+            let pairs = quarters(pixel, 1.0).map(Pair::both).unwrap();
+            squares[raster(i)] = pairs.map(|pair| shrinkage.over_square(pair, around[raster(i)]).x.recip());
+        }
+        squares
+    }
+
+    fn noise(x: u32, y: u32, sample: u32) -> f32 {
+        2.0 * Random::new(1, y << 8 | x).single(sample) - 1.0
+    }
+
+    #[test]
+    fn noise_shrinks_to_the_neighbours_and_texture_stays() {
+        // Both differ by a fifth or so from their neighbours.
+        let noisy = squares(&tile(|x, y, sample| 1.0 + 0.9 * noise(x, y, sample)));
+        let off = |square: f32, r: f32| (square / (r * r + 0.01) - 1.0).abs();
+        let mean = noisy.iter().flatten().map(|square| off(*square, 1.0)).sum::<f32>() / 512.0;
+        assert!(mean < 0.15, "{mean}");
+        let texture = |x: u32, y: u32| if (x / 3 + y / 3) % 2 == 0 { 0.8 } else { 1.2 };
+        let textured = squares(&tile(|x, y, _| texture(x, y)));
+        let off = textured.iter().enumerate().map(|(place, [square, _])| {
+            // The same to both pairs. In the corners are classes of few pixels.
+            off(*square, texture(place as u32 % TILE, place as u32 / TILE))
+        });
+        let (mean, most) = (off.clone().sum::<f32>() / 256.0, off.fold(0.0, f32::max));
+        assert!(mean < 0.03 && most < 0.2, "{mean} {most}");
+    }
+
+    #[test]
+    fn a_firefly_is_not_believed_by_the_pair_that_saw_it() {
+        let pixels = tile(|x, y, sample| if (x, y, sample) == (8, 5, 3) { 1e4 } else { 1.0 });
+        let [first, second] = squares(&pixels)[5 * TILE as usize + 8];
+        // The pair saw 1e4 / 8; nothing is known of such pixels but the prior.
+        assert!(first.max(second) < 1250.0 * 2.0 && first.min(second) < 1.5, "{first} {second}");
+    }
+
+    #[test]
+    fn a_lamp_next_door_does_not_brighten_a_wall() {
+        let pixels = tile(|x, y, sample| if y == 7 { 100.0 } else { 0.2 + 0.1 * noise(x, y, sample) });
+        for (place, pairs) in squares(&pixels).iter().enumerate().filter(|(place, _)| place / 16 != 7) {
+            assert!(pairs.iter().all(|square| (0.03..0.09).contains(square)), "{place} {pairs:?}");
+        }
+    }
+
+    #[test]
+    fn the_order_of_tiles_does_not_matter() {
+        let tiles =
+            [1, 2, 3].map(|seed| tile(|x, y, sample| (1.0 + noise(x + seed * 16, y, sample)).powi(8)));
+        let learnt = |order: [usize; 3]| {
+            let mut all = Shrinkage::default();
+            for i in order {
+                let mut one = Shrinkage::default();
+                one.add(&tiles[i], 30.0);
+                all += &one;
+            }
+            all
+        };
+        assert!(learnt([0, 1, 2]) == learnt([2, 0, 1]));
+    }
 }
