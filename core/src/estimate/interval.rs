@@ -108,7 +108,7 @@ pub(super) fn student_95(freedom: f64) -> f64 {
 mod tests {
     use super::*;
     use crate::Rgb;
-    use crate::estimate::{Shrinkage, TileLight};
+    use crate::estimate::{Lookalikes, TileLight};
     use crate::film::{Dropped, PIXELS_PER_TILE, Pixel};
     use crate::sampling::Random;
     use std::vec::Vec;
@@ -132,8 +132,9 @@ mod tests {
     fn estimate(picture: &[Vec<Pixel>]) -> Option<ErrorEstimate> {
         let mut light = TileLight::default();
         picture.iter().for_each(|tile| light += TileLight::of(tile));
-        let (mean, mut shrinkage) = (light.mean(), Shrinkage::default());
-        picture.iter().for_each(|tile| shrinkage.add(tile, mean));
+        let (mean, mut alike) = (light.mean(), Lookalikes::default());
+        picture.iter().for_each(|tile| alike.add(tile, mean));
+        let shrinkage = alike.shrinkage();
         ErrorEstimate::of(picture.iter().map(|tile| TileError::of(tile, mean, &shrinkage)))
     }
 

@@ -12,5 +12,5 @@ pub use audit::{BiasEstimate, Deviation, Finding};
 pub use interval::ErrorEstimate;
 pub use metric::{Difference, mse, relmse, rmse};
 pub use noise::{BLOCKS, BlockNoise, Noise};
-pub use shrinkage::Shrinkage;
+pub use shrinkage::{Lookalikes, Shrinkage};
 pub use tile::{TileError, TileLight, filtered};

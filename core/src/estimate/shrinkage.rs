@@ -43,33 +43,37 @@ const MOST_SPREAD: f64 = 0.2;
 /// Sums are whole numbers of these, so that they do not depend on the order of tiles.
 const UNIT: f64 = 1.0 / (1 << 20) as f64;
 
-/// Sums over the pixels of one class. x is what a pixel has more than its neighbours, over theirs.
+/// What is added up, in units of the middle of a class, is no more than this.
+const MOST: f64 = 4096.0;
+
+/// Sums over the pixels of one class. x is what a pixel has more than its neighbours, over theirs, in units of the middle of
+/// its class and with the sign that it has to the pair that is asked.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 struct Class {
     pixels: u64,
-    /// |x| to the pair that is asked.
-    own: i128,
-    /// x to the other pair, with the sign of the former.
-    other: i128,
+    /// x to the pair that is asked.
+    own: i64,
+    /// x to the other pair.
+    other: i64,
     /// x² to the pair that is asked.
-    own_squared: i128,
+    own_squared: i64,
     /// x² by the product of both quarters of the other pair, which are independent.
-    other_squared: i128,
+    other_squared: i64,
 }
 
-/// What the pixels of a picture tell of each other.
+/// What the pixels of a picture that look alike tell of each other.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Shrinkage {
+pub struct Lookalikes {
     classes: [Class; CLASSES],
 }
 
-impl Default for Shrinkage {
+impl Default for Lookalikes {
     fn default() -> Self {
         Self { classes: [Class::default(); CLASSES] }
     }
 }
 
-impl core::ops::AddAssign<&Self> for Shrinkage {
+impl core::ops::AddAssign<&Self> for Lookalikes {
     fn add_assign(&mut self, other: &Self) {
         for (class, other) in self.classes.iter_mut().zip(&other.classes) {
             class.pixels += other.pixels;
@@ -81,61 +85,103 @@ impl core::ops::AddAssign<&Self> for Shrinkage {
     }
 }
 
-impl Shrinkage {
+impl Lookalikes {
+    /// So many tiles know enough: twice 16,384 pixels in two hundred classes.
+    pub const ENOUGH: usize = 64;
+
     /// Learns from one tile of a picture of mean `mean` > 0. Pixels whose halves have no two samples each are left out.
     pub fn add(&mut self, pixels: &[Pixel], mean: f64) {
-        let scale = (1.0 / mean) as f32;
-        let around = surroundings(pixels, scale);
-        let whole = |value: f64| (value / UNIT) as i128;
-        for (i, pixel) in pixels.iter().enumerate().take(PIXELS_PER_TILE) {
-            let Some([first, second]) = quarters(pixel, scale).map(Pair::both) else { continue };
-            let around = around[raster(i)];
+        let seen = Seen::new(pixels, (1.0 / mean) as f32);
+        let whole = |value: f64| (value.clamp(-MOST, MOST) / UNIT) as i64;
+        for place in 0..PIXELS_PER_TILE {
+            let Some(quarters) = seen.quarters[place] else { continue };
+            let [first, second] = Pair::both(quarters);
+            let around = Around::new(seen.around[place]);
             for (asked, other) in [(first, second), (second, first)] {
-                let own = asked.more(around);
-                let [x, a, b] = [more(other.light, around), more(other.a, around), more(other.b, around)]
-                    .map(|x| f64::from(x.min(MOST)));
-                let class = &mut self.classes[asked.class(own)];
-                let own = f64::from(own);
+                let more = around.more(asked.light);
+                let class = asked.class(more);
+                let unit = f64::from(more.signum()) / middle(class);
+                let [own, x, a, b] =
+                    [more, around.more(other.light), around.more(other.a), around.more(other.b)]
+                        .map(|x| f64::from(x) * unit);
+                let class = &mut self.classes[class];
                 class.pixels += 1;
-                class.own += whole(libm::fabs(own));
-                class.other += whole(if own < 0.0 { -x } else { x });
+                class.own += whole(own);
+                class.other += whole(x);
                 class.own_squared += whole(own * own);
                 class.other_squared += whole(a * b);
             }
         }
     }
 
-    /// The mean of 1 / (R² + 0.01) over what a pixel may be that `pair` saw, with neighbours of light `around`; m = 1.
-    pub(super) fn over_square(&self, pair: Pair, around: Vec4) -> Vec4 {
-        let more = pair.more(around);
-        let class = pair.class(more);
-        let darker = class / ALIKE >= BRIGHTER;
-        let octave = class / ALIKE - if darker { BRIGHTER } else { 0 };
-        let middle = core::f64::consts::SQRT_2 * libm::exp2((octave as i32 + FIRST_OCTAVE) as f64);
-        let before = if darker { middle } else { libm::sqrt(1.0 + middle) - 1.0 };
-
-        let Class { pixels, own, other, own_squared, other_squared } = self.classes[class];
-        let [own, other, own_squared, other_squared] =
-            [own, other, own_squared, other_squared].map(|sum| sum as f64 * UNIT);
-        let pixels = pixels as f64;
-        let least = if darker { -CONTRARY } else { 0.0 };
-        let believed = ((other + PRIOR * before) / (own + PRIOR * middle)).clamp(least, 1.0);
-        // V is nearly in proportion to R where light is rare, so that the mean of V / R² is that of V times ⟨R²⟩ / ⟨R⟩⁴.
-        let there = 1.0 + believed * own / pixels.max(1.0) * if darker { -1.0 } else { 1.0 };
-        let spread = (other_squared - believed * believed * own_squared) / ((pixels + PRIOR) * there * there);
-        let spread = spread.clamp(0.0, MOST_SPREAD) as f32;
-
-        let r = around + believed as f32 * (pair.light - around);
-        (1.0 + spread) * (r * r + DARK as f32).recip()
+    /// What they say that pixels are.
+    pub fn shrinkage(&self) -> Shrinkage {
+        let mut shrinkage = Shrinkage { classes: [(0.0, 0.0); CLASSES] };
+        for (class, (Class { pixels, own, other, own_squared, other_squared }, out)) in
+            self.classes.into_iter().zip(&mut shrinkage.classes).enumerate()
+        {
+            let [own, other, own_squared, other_squared] =
+                [own, other, own_squared, other_squared].map(|sum| sum as f64 * UNIT);
+            let (middle, pixels) = (middle(class), pixels as f64);
+            let (before, least, sign) = if is_darker(class) {
+                (1.0, -CONTRARY, -1.0)
+            } else {
+                ((libm::sqrt(1.0 + middle) - 1.0) / middle, 0.0, 1.0)
+            };
+            let believed = ((other + PRIOR * before) / (own + PRIOR)).clamp(least, 1.0);
+            // V is nearly in proportion to R where light is rare, so that the mean of V / R² is that of V times ⟨R²⟩ / ⟨R⟩⁴.
+            let there = 1.0 + sign * middle * believed * own / pixels.max(1.0);
+            let spread = middle * middle * (other_squared - believed * believed * own_squared)
+                / ((pixels + PRIOR) * there * there);
+            *out = (believed as f32, 1.0 + spread.clamp(0.0, MOST_SPREAD) as f32);
+        }
+        shrinkage
     }
 }
 
-/// x is taken for no more than this.
-const MOST: f32 = (1 << LAST_OCTAVE) as f32;
+/// How far the pixels of a picture are to be believed.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Shrinkage {
+    /// Of each class the share of the difference to the neighbours that is believed, and ⟨R²⟩ / ⟨R⟩².
+    classes: [(f32, f32); CLASSES],
+}
 
-/// What `light` has more than the neighbours' `around`, over that.
-fn more(light: Vec4, around: Vec4) -> f32 {
-    brightness(light - around) / (brightness(around) + 3.0 * FAINT)
+impl Shrinkage {
+    /// The mean of 1 / (R² + 0.01) over what a pixel may be that `pair` saw, with neighbours of light `around`; m = 1.
+    pub(super) fn over_square(&self, pair: Pair, around: Vec4) -> Vec4 {
+        let (believed, spread) = self.classes[pair.class(Around::new(around).more(pair.light))];
+        let r = around + believed * (pair.light - around);
+        spread * (r * r + DARK as f32).recip()
+    }
+}
+
+/// The light of the neighbours of a pixel.
+struct Around {
+    brightness: f32,
+    reciprocal: f32,
+}
+
+impl Around {
+    fn new(around: Vec4) -> Self {
+        let brightness = brightness(around);
+        Self { brightness, reciprocal: (brightness + 3.0 * FAINT).recip() }
+    }
+
+    /// What `light` has more, over that of the neighbours.
+    fn more(&self, light: Vec4) -> f32 {
+        (brightness(light) - self.brightness) * self.reciprocal
+    }
+}
+
+/// The middle of what pixels of a class have more or less than their neighbours.
+fn middle(class: usize) -> f64 {
+    let octave = class / ALIKE - if is_darker(class) { BRIGHTER } else { 0 };
+    // 2^(octave + 1/2).
+    f64::from_bits(((octave as i32 + FIRST_OCTAVE + 1023) as u64) << 52) * core::f64::consts::SQRT_2
+}
+
+fn is_darker(class: usize) -> bool {
+    class / ALIKE >= BRIGHTER
 }
 
 /// A pair of quarters of a pixel, one of each half.
@@ -158,56 +204,57 @@ impl Pair {
         0.25 * (self.a - self.b) * (self.a - self.b)
     }
 
-    fn more(&self, around: Vec4) -> f32 {
-        more(self.light, around).min(MOST)
-    }
-
     /// Its class, where it has that much `more` than its neighbours.
     fn class(&self, more: f32) -> usize {
         let exponent = (more.abs().to_bits() >> 23) as i32 - 127;
         let octave = (exponent.clamp(FIRST_OCTAVE, LAST_OCTAVE) - FIRST_OCTAVE) as usize;
         let octave = if more < 0.0 { BRIGHTER + octave.min(DARKER - 1) } else { octave };
-        let disagreement = brightness(self.a - self.b).abs() / (2.0 * brightness(self.light) + 3.0 * FAINT);
-        octave * ALIKE + DISAGREEMENT.iter().filter(|least| disagreement >= **least).count()
+        let difference = brightness(self.a - self.b).abs();
+        let sum = 2.0 * brightness(self.light) + 3.0 * FAINT;
+        octave * ALIKE + DISAGREEMENT.iter().filter(|least| difference >= **least * sum).count()
     }
 }
 
-/// A₁, A₂, B₁, B₂ of a pixel times `scale`, the parts of its halves; `None` where one is empty.
-pub(super) fn quarters(pixel: &Pixel, scale: f32) -> Option<[Vec4; 4]> {
-    let ([a1, a2], [b1, b2]) = (pixel.even.parts()?, pixel.odd.parts()?);
-    Some([a1, a2, b1, b2].map(|mean| scale * mean.extend(0.0)))
+/// A tile, row by row, of a picture times some scale.
+pub(super) struct Seen {
+    /// A₁, A₂, B₁, B₂ of each pixel, the parts of its halves; `None` where one is empty.
+    pub(super) quarters: [Option<[Vec4; 4]>; PIXELS_PER_TILE],
+    /// The mean light of the eight neighbours of each pixel, as far as they lie in the tile and are not surely brighter; its own
+    /// where there are none.
+    pub(super) around: [Vec4; PIXELS_PER_TILE],
 }
 
-/// The mean light of the eight neighbours of each pixel of a tile, row by row, times `scale`, as far as they lie in the tile and
-/// are not surely brighter; its own where there are none.
-pub(super) fn surroundings(pixels: &[Pixel], scale: f32) -> [Vec4; PIXELS_PER_TILE] {
-    const SIDE: usize = TILE as usize;
-    let near = |c: usize| c.saturating_sub(1)..(c + 2).min(SIDE);
-    let [mut picture, mut around] = [[Vec4::ZERO; PIXELS_PER_TILE]; 2];
-    // Of the quarters of a pixel, the darkest and the brightest.
-    let [mut darkest, mut brightest] = [[0.0f32; PIXELS_PER_TILE]; 2];
-    for (i, pixel) in pixels.iter().enumerate().take(PIXELS_PER_TILE).filter(|(_, pixel)| pixel.count() > 0) {
-        let place = raster(i);
-        picture[place] = (scale * pixel.mean()).extend(1.0);
-        if let Some(quarters) = quarters(pixel, scale) {
-            let [a1, a2, b1, b2] = quarters.map(brightness);
+impl Seen {
+    /// Of the pixels of one tile, times `scale`.
+    pub(super) fn new(pixels: &[Pixel], scale: f32) -> Self {
+        const SIDE: usize = TILE as usize;
+        let mut quarters = [None; PIXELS_PER_TILE];
+        let [mut picture, mut around] = [[Vec4::ZERO; PIXELS_PER_TILE]; 2];
+        // Of the quarters of a pixel, the darkest and the brightest.
+        let [mut darkest, mut brightest] = [[0.0f32; PIXELS_PER_TILE]; 2];
+        for (i, pixel) in pixels.iter().enumerate().take(PIXELS_PER_TILE) {
+            let (Some([a1, a2]), Some([b1, b2])) = (pixel.even.parts(), pixel.odd.parts()) else { continue };
+            let place = raster(i);
+            let parts = [a1, a2, b1, b2].map(|mean| scale * mean.extend(0.0));
+            quarters[place] = Some(parts);
+            let [a1, a2, b1, b2] = parts;
+            picture[place] = (0.25 * (a1 + a2 + b1 + b2)).with_w(1.0);
+            let [a1, a2, b1, b2] = parts.map(brightness);
             darkest[place] = a1.min(a2).min(b1.min(b2));
             brightest[place] = SURELY * (a1.max(a2).max(b1.max(b2)) + 3.0 * FAINT);
         }
-    }
-    for (place, around) in around.iter_mut().enumerate() {
-        let (x, y) = (place % SIDE, place / SIDE);
-        let mut others = Vec4::ZERO;
-        for row in near(y) {
-            for other in near(x).map(|x| row * SIDE + x) {
-                if other != place && darkest[other] <= brightest[place] {
-                    others += picture[other];
-                }
+        let near = |c: usize| c.saturating_sub(1)..(c + 2).min(SIDE);
+        for (place, around) in around.iter_mut().enumerate() {
+            let (x, y) = (place % SIDE, place / SIDE);
+            let mut others = Vec4::ZERO;
+            for other in near(y).flat_map(|row| near(x).map(move |x| row * SIDE + x)) {
+                let counts = other != place && darkest[other] <= brightest[place];
+                others += if counts { picture[other] } else { Vec4::ZERO };
             }
+            *around = if others.w > 0.0 { others / others.w } else { picture[place] }.with_w(0.0);
         }
-        *around = if others.w > 0.0 { others / others.w } else { picture[place] }.with_w(0.0);
+        Self { quarters, around }
     }
-    around
 }
 
 /// Where the `i`th pixel of a tile stands in its rows.
@@ -242,15 +289,13 @@ mod tests {
 
     /// What both pairs of each pixel take R² + 0.01 for, row by row.
     fn squares(pixels: &[Pixel; PIXELS_PER_TILE]) -> [[f32; 2]; PIXELS_PER_TILE] {
-        let mut shrinkage = Shrinkage::default();
-        shrinkage.add(pixels, 1.0);
-        let around = surroundings(pixels, 1.0);
-        let mut squares = [[0.0; 2]; PIXELS_PER_TILE];
-        for (i, pixel) in pixels.iter().enumerate() {
-            let pairs = quarters(pixel, 1.0).map(Pair::both).unwrap();
-            squares[raster(i)] = pairs.map(|pair| shrinkage.over_square(pair, around[raster(i)]).x.recip());
-        }
-        squares
+        let mut alike = Lookalikes::default();
+        alike.add(pixels, 1.0);
+        let (shrinkage, seen) = (alike.shrinkage(), Seen::new(pixels, 1.0));
+        core::array::from_fn(|place| {
+            let pairs = seen.quarters[place].map(Pair::both).unwrap();
+            pairs.map(|pair| shrinkage.over_square(pair, seen.around[place]).x.recip())
+        })
     }
 
     fn noise(x: u32, y: u32, sample: u32) -> f32 {
@@ -295,9 +340,9 @@ mod tests {
         let tiles =
             [1, 2, 3].map(|seed| tile(|x, y, sample| (1.0 + noise(x + seed * 16, y, sample)).powi(8)));
         let learnt = |order: [usize; 3]| {
-            let mut all = Shrinkage::default();
+            let mut all = Lookalikes::default();
             for i in order {
-                let mut one = Shrinkage::default();
+                let mut one = Lookalikes::default();
                 one.add(&tiles[i], 30.0);
                 all += &one;
             }

@@ -1,7 +1,7 @@
 //! What the halves of one tile disagree by: sums from which [`super::ErrorEstimate`] is made.
 
 use super::filter::lee;
-use super::shrinkage::{Pair, Shrinkage, quarters, raster, surroundings};
+use super::shrinkage::{Pair, Seen, Shrinkage, raster};
 use crate::Rgb;
 use crate::film::{PIXELS_PER_TILE, Pixel};
 use glam::Vec4;
@@ -66,17 +66,18 @@ pub struct TileError {
 }
 
 impl TileError {
-    /// Of the pixels of one tile of a picture of mean `mean` > 0 and all of whose tiles `shrinkage` knows. Pixels whose
+    /// Of the pixels of one tile of a picture of mean `mean` > 0, with what all of its tiles tell of it. Pixels whose
     /// halves have no two samples each are left out.
     pub fn of(pixels: &[Pixel], mean: f64, shrinkage: &Shrinkage) -> Self {
         let scale = (1.0 / mean) as f32;
-        let around = surroundings(pixels, scale);
+        let seen = Seen::new(pixels, scale);
         let mut sums = Self::default();
         let mut blocks = [0.0; 4];
         for (i, pixel) in pixels.iter().enumerate().take(PIXELS_PER_TILE) {
-            let Some(quarters @ [a1, a2, b1, b2]) = quarters(pixel, scale) else { continue };
+            let place = raster(i);
+            let Some(quarters @ [a1, a2, b1, b2]) = seen.quarters[place] else { continue };
             let pairs = Pair::both(quarters);
-            let by = pairs.map(|pair| shrinkage.over_square(pair, around[raster(i)]));
+            let by = pairs.map(|pair| shrinkage.over_square(pair, seen.around[place]));
             let [first, second] = pairs.map(|pair| pair.noise());
             let by_both = 0.5 * (by[0] + by[1]);
             sums.values += 3;

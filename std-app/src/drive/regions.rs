@@ -35,7 +35,7 @@ fn merged(tiles: &[TileError], width: u32) -> Vec<TileError> {
 mod tests {
     use super::*;
     use halflight_core::Rgb;
-    use halflight_core::estimate::Shrinkage;
+    use halflight_core::estimate::Lookalikes;
     use halflight_core::film::{Dropped, PIXELS_PER_TILE, Pixel};
 
     #[test]
@@ -47,9 +47,9 @@ mod tests {
                 pixel.add(sample, Rgb::splat(light), &mut Dropped::default());
             }
             let pixels = [pixel; PIXELS_PER_TILE];
-            let mut shrinkage = Shrinkage::default();
-            shrinkage.add(&pixels, 3.0);
-            TileError::of(&pixels, 3.0, &shrinkage)
+            let mut alike = Lookalikes::default();
+            alike.add(&pixels, 3.0);
+            TileError::of(&pixels, 3.0, &alike.shrinkage())
         };
         // 20 x 5 tiles are 7 x 2 regions of 3 x 3.
         let tiles: Vec<_> = (0..100).map(tile).collect();

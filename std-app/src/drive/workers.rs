@@ -5,7 +5,7 @@ use super::{RenderError, regions};
 use halflight_core::Level;
 use halflight_core::bsdf::Features;
 use halflight_core::bvh::{Bvh, Join};
-use halflight_core::estimate::{BLOCKS, BlockNoise, ErrorEstimate, Shrinkage, TileError, TileLight};
+use halflight_core::estimate::{BLOCKS, BlockNoise, ErrorEstimate, Lookalikes, TileError, TileLight};
 use halflight_core::film::{Film, PIXELS_PER_TILE, Pixel};
 use halflight_core::memory::{Arena, Line, OutOfMemory};
 use halflight_core::photon::{PhotonMap, Photons};
@@ -46,16 +46,23 @@ impl Workers {
     pub(super) fn errors(&self, film: &Film) -> Option<Vec<TileError>> {
         let mean = self.mean(film)?;
         let tiles = film.pixels().par_chunks(PIXELS_PER_TILE);
-        let learn = |mut known: Shrinkage, tile: &[Pixel]| {
+        let learn = |mut known: Lookalikes, tile: &[Pixel]| {
             known.add(tile, mean);
             known
         };
-        let both = |mut one: Shrinkage, other: Shrinkage| {
+        let both = |mut one: Lookalikes, other: Lookalikes| {
             one += &other;
             one
         };
+        // Odd, so that it does not go down the same columns.
+        let stride = (tiles.len() / Lookalikes::ENOUGH).max(1) | 1;
         Some(self.pool.install(|| {
-            let shrinkage = tiles.clone().fold(Shrinkage::default, learn).reduce(Shrinkage::default, both);
+            let alike = tiles
+                .clone()
+                .step_by(stride)
+                .fold(Lookalikes::default, learn)
+                .reduce(Lookalikes::default, both);
+            let shrinkage = alike.shrinkage();
             tiles.map(|tile| TileError::of(tile, mean, &shrinkage)).collect()
         }))
     }
