@@ -1,4 +1,4 @@
-//! The error of a picture, from itself: relMSE and the interval that holds it (docs/decisions/0009).
+//! The error of a picture, from itself: relMSE and the interval that holds it (docs/decisions/0009, 0035).
 //!
 //! The plain algorithm: half-pictures A and B are independent and unbiased, so ((A − B) / 2)² has the variance of
 //! their mean I for its mean; over I² + 0.01 m² its mean over pixels is the relMSE. Departures:
@@ -7,13 +7,13 @@
 //!    ([`super::Shrinkage`]), the mean of the quotients by what each pair of quarters says.
 //! 2. What is left of that is seen where nothing hides itself: the variance of one pair over the square of what the
 //!    *other* says is too large, for where light is rare both are. With δ the logarithm of its quotient to the variance
-//!    of the pairs over the common squares, the estimate goes up by δ / (1 + 10 δ), and is as uncertain as δ.
+//!    of the pairs over the common squares, its logarithm goes up by δ / (1 + 10 δ), and is as uncertain as δ.
 //! 3. The error that this picture has and its estimate differ by the mean of the product of both halves' errors,
 //!    exactly. For a pixel of variance V the product has the variance 4 V², and the estimate squared the mean 3 V² (more
 //!    with heavy tails); Student's t says what it is to know that from few pixels. How errors hang together between
 //!    pixels is seen in products of differences within the halves.
 //!
-//! The price: about as much time as a twentieth of a sample for each pixel.
+//! The price: about as much time as a tenth of a sample for each pixel.
 
 use super::TileError;
 use libm::{exp, fmax, hypot, log, sqrt};
@@ -37,8 +37,8 @@ const Z: f64 = 1.959_963_984_540_054;
 /// tails, and their squares are too large already.
 const FEWEST: f64 = 8.0;
 
-/// How soon δ is doubted: all of it counts where it is small and both bounds are right to first order, a tenth at most
-/// where light is rare.
+/// How soon δ is doubted: all of it counts where it is small and both bounds are right to first order, at most a tenth
+/// of the estimate where light is rare.
 const DOUBTED: f64 = 10.0;
 
 impl ErrorEstimate {
@@ -234,7 +234,7 @@ mod tests {
             held += u32::from((found.lower..=found.upper).contains(&error));
         }
         ratios.sort_by(f64::total_cmp);
-        // Over the squares of single pairs it would be several times the error.
+        // With denominators of single quarters it would be several times the error.
         assert!((0.6..1.6).contains(&ratios[30]), "{ratios:?}");
         // 90 % of 60 are 54; fewer than 48 have a chance of 1 %.
         assert!(held >= 48, "{held} of {pictures}");

@@ -66,7 +66,7 @@ pub struct TileError {
 }
 
 impl TileError {
-    /// Of the pixels of one tile of a picture of mean `mean` > 0, with what all of its tiles tell of it. Pixels whose
+    /// Of the pixels of one tile of a picture of mean `mean` > 0, with what its tiles tell of it. Pixels whose
     /// halves have no two samples each are left out.
     pub fn of(pixels: &[Pixel], mean: f64, shrinkage: &Shrinkage) -> Self {
         let scale = (1.0 / mean) as f32;

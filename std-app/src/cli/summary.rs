@@ -87,7 +87,7 @@ pub(super) fn text(run: &Run, report: Option<&Path>) -> String {
         }
     }
     if result.windows.lacks_memory {
-        lines.push("light  no memory for windows to the environment: light of the sky is noisier".into());
+        lines.push("light  no memory for windows to the environment: light of the sky may be noisier".into());
     }
     if result.caustics.lacks_memory {
         lines.push("light  no memory for photons of caustics: their light may be missing or noisy".into());

@@ -13,7 +13,7 @@ pub enum RenderError {
     Reference,
     /// The memory allowed does not suffice.
     Memory {
-        /// Bytes that are needed.
+        /// Bytes that are needed by what was asked for until then.
         needed: usize,
         /// Bytes that were allowed, or that the system gave.
         available: usize,
@@ -34,7 +34,7 @@ impl core::fmt::Display for RenderError {
             Self::Size => write!(f, "the picture must have between 1 and 2^28 pixels"),
             Self::Reference => write!(f, "the reference has not the size of the picture"),
             Self::Memory { needed, available } => {
-                write!(f, "not enough memory: {needed} bytes needed, {available} available")
+                write!(f, "not enough memory: at least {needed} bytes needed, {available} available")
             }
             Self::Threads(why) => write!(f, "the threads could not be started: {why}"),
             Self::Shard => write!(f, "the picture cannot be cut into such shards"),

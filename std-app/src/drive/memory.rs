@@ -44,7 +44,18 @@ impl Memory {
         Ok(lines)
     }
 
-    /// The same, for what is read in no order.
+    /// Counts `footprint` bytes for `structure`, which takes them elsewhere.
+    pub(super) fn set_aside(
+        &mut self,
+        structure: &'static str,
+        footprint: Footprint,
+    ) -> Result<(), RenderError> {
+        self.needed(footprint)?;
+        self.count(structure, footprint);
+        Ok(())
+    }
+
+    /// As [`Self::take`], for what is read in no order.
     pub(super) fn take_pages(
         &mut self,
         structure: &'static str,

@@ -120,7 +120,7 @@ impl Rounds {
         self.spp >= self.next_estimate
     }
 
-    /// Takes note of an estimate, which takes as long as a twentieth of a sample. The next is due after an eighth more
+    /// Takes note of an estimate, which takes as long as a tenth of a sample. The next is due after an eighth more
     /// samples, eight at least; where the error is to stop the render, when it can be reached at the earliest (errors
     /// fall with the square of the samples at best, and intervals become narrower), after a thirty-second at least and
     /// twice as many at most.

@@ -60,7 +60,7 @@ impl WithFeatures for Render<'_> {
         // What comes out is counted from the beginning, and taken in the end.
         let pixels = width as usize * height as usize;
         let picture = Footprint::default().slice::<[f32; 3]>(pixels).slice::<[f32; 3]>(pixels);
-        drop(memory.take("picture", picture.slice::<u32>(pixels))?);
+        memory.set_aside("picture", picture.slice::<u32>(pixels))?;
         let mut lights_lines = memory.take("lights", Lights::footprint(scene).and(Lights::scratch(scene)))?;
         let lights = Lights::build(scene, &mut Arena::new(bytemuck::cast_slice_mut(&mut lights_lines)))?;
         let build = build_start.elapsed().as_secs_f64();

@@ -46,7 +46,7 @@ impl Workers {
     pub(super) fn errors(&self, film: &Film) -> Option<Vec<TileError>> {
         let mean = self.mean(film)?;
         let tiles = film.pixels().par_chunks(PIXELS_PER_TILE);
-        let learn = |mut known: Lookalikes, tile: &[Pixel]| {
+        let learn = |mut known: Lookalikes, (_, tile): (usize, &[Pixel])| {
             known.add(tile, mean);
             known
         };
@@ -54,14 +54,10 @@ impl Workers {
             one += &other;
             one
         };
-        // Odd, so that it does not go down the same columns.
-        let stride = (tiles.len() / Lookalikes::ENOUGH).max(1) | 1;
+        let count = tiles.len();
         Some(self.pool.install(|| {
-            let alike = tiles
-                .clone()
-                .step_by(stride)
-                .fold(Lookalikes::default, learn)
-                .reduce(Lookalikes::default, both);
+            let asked = tiles.clone().enumerate().filter(|(tile, _)| Lookalikes::asks(*tile, count));
+            let alike = asked.fold(Lookalikes::default, learn).reduce(Lookalikes::default, both);
             let shrinkage = alike.shrinkage();
             tiles.map(|tile| TileError::of(tile, mean, &shrinkage)).collect()
         }))

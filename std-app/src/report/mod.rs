@@ -78,7 +78,7 @@ impl Run<'_> {
         if self.result.windows.lacks_memory {
             left_out.push((
                 "windows to the environment",
-                "there was no memory for them: light of the sky is noisier",
+                "there was no memory for them: light of the sky may be noisier",
             ));
         }
         if let (Method::PhotonMap, Some(PhotonUse { caustic: None, .. })) =

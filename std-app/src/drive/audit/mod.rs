@@ -84,10 +84,8 @@ impl<'a> Audit<'a> {
         let Some(share) = share(settings, is_biased) else { return Ok(None) };
         let scratch = memory.take_each("audit", PathTracer::<F>::scratch(WAVE), workers.count())?;
         // The pixels themselves are counted and not taken: they are kept where a film file can find them.
-        drop(memory.take(
-            "audit",
-            Footprint::default().slice::<Pixel>(choice::count(settings.width, settings.height)),
-        )?);
+        let pixels = choice::count(settings.width, settings.height);
+        memory.set_aside("audit", Footprint::default().slice::<Pixel>(pixels))?;
         let paths = path_settings(settings);
         let other = PathSettings { seed: paths.seed ^ OTHER_SEED, ..paths };
         let tracer = PathTracer::<F>::new(scene, bvh, lights, other, settings.level);

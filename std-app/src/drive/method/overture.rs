@@ -62,6 +62,8 @@ pub(in crate::drive) struct Growing<'a> {
     /// Places at which it has gathered.
     gathered: u32,
     spots: Vec<Spot>,
+    /// Spots that are not worth rays of their own.
+    dismissed: Vec<Spot>,
     /// Glints that were none.
     in_vain: usize,
     /// How often it began anew.
@@ -104,6 +106,7 @@ impl<'a> Growing<'a> {
             before: 0,
             gathered: 0,
             spots: Vec::new(),
+            dismissed: Vec::new(),
             in_vain: 0,
             attempts: 0,
             loaded: 0,
@@ -141,7 +144,7 @@ impl<'a> Growing<'a> {
     }
 
     fn is_known(&self, glint: &Glint) -> bool {
-        self.spots.iter().any(|spot| spot.holds(glint.position.into()))
+        self.spots.iter().chain(&self.dismissed).any(|spot| spot.holds(glint.position.into()))
     }
 
     /// Forgets the records that did not know of all spots, but for those of a file or of before a refinement; whether
@@ -314,13 +317,18 @@ impl<F: Features> Overture<'_, '_, F> {
             }
             let known = growing.spots.len();
             for ((_, glint), spot) in glints.iter().zip(spots) {
-                match spot.filter(|spot| growing.is_worth_its_rays(spot, &all, strata)) {
-                    None => growing.in_vain += 1,
-                    // Not twice by two of its glints.
-                    Some(spot) if !growing.is_known(glint) && growing.spots.len() < MOST_SPOTS => {
-                        growing.spots.push(spot);
-                    }
-                    Some(_) => (),
+                let Some(spot) = spot else {
+                    growing.in_vain += 1;
+                    continue;
+                };
+                // Not twice by two of its glints.
+                if growing.is_known(glint) {
+                    continue;
+                }
+                if !growing.is_worth_its_rays(&spot, &all, strata) {
+                    growing.dismissed.push(spot);
+                } else if growing.spots.len() < MOST_SPOTS {
+                    growing.spots.push(spot);
                 }
             }
             if growing.spots.len() > known {
