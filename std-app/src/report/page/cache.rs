@@ -34,9 +34,9 @@ pub(super) fn section(run: &Run) -> String {
     }
     let (mut maps, mut note, mut words) = (String::new(), String::new(), String::new());
     if let Some(survey) = &run.result.survey {
-        facts.push(("Error predicted", percent(survey.predicted)));
-        facts.push(("Error achieved", percent(survey.achieved)));
-        facts.push(("Root mean square", percent(survey.rms)));
+        facts.push(("Error predicted", parts::percent(survey.predicted)));
+        facts.push(("Error achieved", parts::percent(survey.achieved)));
+        facts.push(("Root mean square", parts::percent(survey.rms)));
         words = verdict(survey);
         maps = self::maps(run, survey);
         note = remark(survey);
@@ -45,10 +45,6 @@ pub(super) fn section(run: &Run) -> String {
         include_str!("cache.html"),
         &[("words", &words), ("facts", &parts::facts(&facts)), ("maps", &maps), ("note", &note)],
     )
-}
-
-fn percent(share: f64) -> String {
-    format!("{}&#8239;%", number(100.0 * share, 2))
 }
 
 fn verdict(survey: &Survey) -> String {
@@ -62,7 +58,7 @@ fn verdict(survey: &Survey) -> String {
         ratio if ratio < 0.5 => format!("{} times what was predicted", number(1.0 / ratio, 2)),
         _ => "within a factor of two of what was predicted".into(),
     };
-    format!("Its indirect irradiance is wrong by {} in the mean: {so}.", percent(achieved))
+    format!("Its indirect irradiance is wrong by {} in the mean: {so}.", parts::percent(achieved))
 }
 
 fn remark(survey: &Survey) -> String {
@@ -74,7 +70,7 @@ fn remark(survey: &Survey) -> String {
          predicted is an error of interpolation between records, at most 100&#8239;%, without the noise of their rays. This took {}.",
         plural(survey.points, "point"),
         number(reached, 3),
-        percent(survey.noise),
+        parts::percent(survey.noise),
         readable_seconds(survey.seconds),
     )
 }

@@ -156,6 +156,11 @@ fn table(label: &str, head: &[&str], rows: &[Vec<String>]) -> String {
     )
 }
 
+/// A share as it is read.
+pub(super) fn percent(share: f64) -> String {
+    format!("{}&#8239;%", number(100.0 * share, 2))
+}
+
 /// Name and value pairs of a `dl`. The values are HTML.
 pub(super) fn facts(pairs: &[(&str, String)]) -> String {
     pairs.iter().map(|(name, value)| format!("<div><dt>{name}</dt><dd>{value}</dd></div>")).collect()

@@ -4,7 +4,7 @@ use super::map::Map;
 use super::{fill, parts};
 use crate::drive::{MapUse, MapView};
 use crate::report::Run;
-use crate::report::words::{grouped, number, readable_seconds};
+use crate::report::words::{grouped, readable_seconds};
 
 /// The section of photons; nothing where the method has none and nobody looked for any.
 pub(super) fn section(run: &Run) -> String {
@@ -19,7 +19,7 @@ pub(super) fn section(run: &Run) -> String {
         facts.push(("Shooting and building", readable_seconds(photons.seconds)));
     }
     if let Some(share) = caustics.share {
-        facts.push(("Light that they bring, by a first look", percent(share)));
+        facts.push(("Light that they bring, by a first look", parts::percent(share)));
     }
     let mut maps = String::new();
     let kinds = [
@@ -77,13 +77,9 @@ fn numbers(is_caustic: bool, used: &MapUse, seen: Option<&MapView>) -> Vec<(&'st
     };
     let mut facts = vec![(shot, grouped(used.shot)), (stored, grouped(used.stored))];
     if let Some(seen) = seen {
-        facts.push((useful, percent(seen.seen)));
+        facts.push((useful, parts::percent(seen.seen)));
     }
     facts
-}
-
-fn percent(share: f64) -> String {
-    format!("{}&#8239;%", number(100.0 * share, 2))
 }
 
 fn pictures(kind: &str, width: u32, seen: &MapView) -> String {
