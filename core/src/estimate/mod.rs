@@ -5,6 +5,7 @@ mod filter;
 mod interval;
 mod metric;
 mod noise;
+mod seen;
 mod shrinkage;
 mod tile;
 

@@ -4,11 +4,9 @@
 //! other sample meets shrinks to its neighbours, a texture stays. What for: docs/decisions/0035.
 
 use super::metric::DARK;
-use crate::film::{PIXELS_PER_TILE, Pixel, TILE, Tile};
+use super::seen::{FAINT, Seen, brightness};
+use crate::film::{PIXELS_PER_TILE, Pixel};
 use glam::Vec4;
-
-/// Light that is added to that of the neighbours before anything is divided by it, in units of the picture's mean.
-const FAINT: f32 = 0.01;
 
 /// Octaves of what a pixel has more than its neighbours, over theirs; less than the first is as good as nothing.
 const FIRST_OCTAVE: i32 = -5;
@@ -17,10 +15,6 @@ const BRIGHTER: usize = (LAST_OCTAVE - FIRST_OCTAVE + 1) as usize;
 
 /// The octaves below 1: nothing is darker than black.
 const DARKER: usize = -FIRST_OCTAVE as usize;
-
-/// A neighbour all of whose quarters are this many times as bright as the brightest of a pixel lies beyond an edge, and says
-/// nothing of what the pixel is.
-const SURELY: f32 = 2.0;
 
 /// Difference of the two quarters of a pair over their sum, between classes.
 const DISAGREEMENT: [f32; 5] = [0.1, 0.25, 0.5, 0.75, 0.9];
@@ -231,64 +225,11 @@ impl Pair {
     }
 }
 
-/// A tile, row by row, of a picture times some scale.
-pub(super) struct Seen {
-    /// A₁, A₂, B₁, B₂ of each pixel, the parts of its halves; `None` where one is empty.
-    pub(super) quarters: [Option<[Vec4; 4]>; PIXELS_PER_TILE],
-    /// The mean light of the eight neighbours of each pixel, as far as they lie in the tile and are not surely brighter; its own
-    /// where there are none.
-    pub(super) around: [Vec4; PIXELS_PER_TILE],
-}
-
-impl Seen {
-    /// Of the pixels of one tile, times `scale`.
-    pub(super) fn new(pixels: &[Pixel], scale: f32) -> Self {
-        const SIDE: usize = TILE as usize;
-        let mut quarters = [None; PIXELS_PER_TILE];
-        let [mut picture, mut around] = [[Vec4::ZERO; PIXELS_PER_TILE]; 2];
-        // Of the quarters of a pixel, the darkest and the brightest.
-        let [mut darkest, mut brightest] = [[0.0f32; PIXELS_PER_TILE]; 2];
-        for (i, pixel) in pixels.iter().enumerate().take(PIXELS_PER_TILE) {
-            let (Some([a1, a2]), Some([b1, b2])) = (pixel.even.parts(), pixel.odd.parts()) else { continue };
-            let place = raster(i);
-            let parts = [a1, a2, b1, b2].map(|mean| scale * mean.extend(0.0));
-            quarters[place] = Some(parts);
-            let [a1, a2, b1, b2] = parts;
-            picture[place] = (0.25 * (a1 + a2 + b1 + b2)).with_w(1.0);
-            let [a1, a2, b1, b2] = parts.map(brightness);
-            darkest[place] = a1.min(a2).min(b1.min(b2));
-            brightest[place] = SURELY * (a1.max(a2).max(b1.max(b2)) + 3.0 * FAINT);
-        }
-        let near = |c: usize| c.saturating_sub(1)..(c + 2).min(SIDE);
-        for (place, around) in around.iter_mut().enumerate() {
-            let (x, y) = (place % SIDE, place / SIDE);
-            let mut others = Vec4::ZERO;
-            for other in near(y).flat_map(|row| near(x).map(move |x| row * SIDE + x)) {
-                let counts = other != place && darkest[other] <= brightest[place];
-                others += if counts { picture[other] } else { Vec4::ZERO };
-            }
-            *around = if others.w > 0.0 { others / others.w } else { picture[place] }.with_w(0.0);
-        }
-        Self { quarters, around }
-    }
-}
-
-/// Where the `i`th pixel of a tile stands in its rows.
-pub(super) fn raster(i: usize) -> usize {
-    let (x, y) = Tile::place(i);
-    (y * TILE + x) as usize
-}
-
-/// Of all channels.
-fn brightness(colour: Vec4) -> f32 {
-    colour.x + colour.y + colour.z
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::Rgb;
-    use crate::film::Dropped;
+    use crate::film::{Dropped, TILE, Tile};
     use crate::sampling::Random;
     use std::vec::Vec;
 

@@ -1,7 +1,8 @@
 //! What the halves of one tile disagree by: sums from which [`super::ErrorEstimate`] is made.
 
 use super::filter::lee;
-use super::shrinkage::{Pair, Seen, Shrinkage, raster};
+use super::seen::{Seen, raster};
+use super::shrinkage::{Pair, Shrinkage};
 use crate::Rgb;
 use crate::film::{PIXELS_PER_TILE, Pixel};
 use glam::Vec4;
