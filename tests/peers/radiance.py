@@ -41,16 +41,16 @@ SCENES = {
         "target": 2e-3,
     },
 }
-# -aa, -ar, -ad, -ab, -ds.
-SWEEP = [(0.6, 16, 64), (0.5, 16, 128), (0.5, 8, 256), (0.5, 16, 256), (0.4, 8, 512), (0.4, 16, 256), (0.3, 8, 512), (0.4, 32, 256)]
-SWEEP = [(*settings, 5, 0.2) for settings in SWEEP]
+# -aa, -ar, -ad; and -ab, -ds.
+COARSE = [(0.6, 16, 64), (0.5, 16, 128), (0.5, 8, 256), (0.5, 16, 256), (0.4, 8, 512), (0.4, 16, 256), (0.3, 8, 512), (0.4, 32, 256)]
 # Where light comes through a slit, finer shadows and more bounces are worth more than records.
-SWEEP += [(0.5, 16, 256, 8, 0.05), (0.4, 16, 512, 8, 0.05)]
+FINE = [(0.5, 16, 256, 8, 0.05), (0.4, 16, 512, 8, 0.05)]
+SWEEP = [(*settings, 5, 0.2) for settings in COARSE] + FINE
 OVERSAMPLING = (3, 4)
 OURS = [(rays, error, spp) for rays in (256, 1024) for error in (1e-4, 3e-4) for spp in (4, 16, 64)]
 OURS += [(1024, 1e-4, 256), (4096, 1e-4, 64), (4096, 1e-4, 256)]
 # Errors for which the fastest of both are told, besides the one asked for.
-ROUND = [m * 10.0**e for e in range(-1, -4, -1) for m in (5, 2, 1)]
+ROUND_ERRORS = [m * 10.0**e for e in range(-1, -4, -1) for m in (5, 2, 1)]
 FIRST_REFERENCE_SEED = 1000
 CHUNK = 128
 
@@ -227,7 +227,7 @@ def compare(name, arguments, program, bin_folder):
             told = "-aa {:g} -ar {} -ad {} -ab {} -ds {:g}".format(*settings) + f", {oversampling}² pixels"
             note("rpict", told, *rpict(bin_folder, name, scene, settings, oversampling))
     print("\nFastest that are good enough:\n\n| relMSE | halflight | s | rpict | s | ratio |\n|---|---|---|---|---|---|")
-    for target in sorted({arguments.target or scene["target"], *ROUND}, reverse=True):
+    for target in sorted({arguments.target or scene["target"], *ROUND_ERRORS}, reverse=True):
         fastest = lambda of: min(((row[1], row[2]) for row in of if row[0] <= target), default=(None, "none"))
         (ours, how), (theirs, settings) = fastest(rows["halflight"]), fastest(rows["rpict"])
         if ours or theirs:

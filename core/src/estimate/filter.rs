@@ -3,7 +3,9 @@
 //! pixel its neighbours speak for it; where more differs than noise explains it speaks for itself. Between both the
 //! filter goes by roots, so that what is a hundred times as bright next door does not drown a dark pixel.
 
-use crate::film::{PIXELS_PER_TILE, TILE};
+use super::seen::raster;
+use crate::Rgb;
+use crate::film::{PIXELS_PER_TILE, Pixel, TILE};
 use glam::Vec4;
 
 /// Neighbours on each side: windows of 5 x 5 pixels, cut at the border of the tile.
@@ -16,10 +18,22 @@ const NOISE: f32 = 2.0;
 const SIDE: usize = TILE as usize;
 
 /// One tile, row by row: colours with a 1 in the fourth place, or all zero where there is no pixel.
-pub(super) type Raster = [Vec4; PIXELS_PER_TILE];
+type Raster = [Vec4; PIXELS_PER_TILE];
+
+/// What the pixels of a tile of a picture of mean `mean` probably are: filtered, in the order of the tile's pixels.
+pub fn filtered(pixels: &[Pixel], mean: f64) -> [Rgb; PIXELS_PER_TILE] {
+    let scale = (1.0 / mean) as f32;
+    let [mut picture, mut noise, mut out] = [[Vec4::ZERO; PIXELS_PER_TILE]; 3];
+    for (i, pixel) in pixels.iter().enumerate().take(PIXELS_PER_TILE).filter(|(_, pixel)| pixel.count() > 0) {
+        picture[raster(i)] = (scale * pixel.mean()).extend(1.0);
+        noise[raster(i)] = pixel.scaled_variance(scale).extend(0.0);
+    }
+    lee(&picture, &noise, &mut out);
+    core::array::from_fn(|i| out[raster(i)].truncate() / scale)
+}
 
 /// Filters `picture` of variance `variance` into `out`. A pixel's own value has its weight only there.
-pub(super) fn lee(picture: &Raster, variance: &Raster, out: &mut Raster) {
+fn lee(picture: &Raster, variance: &Raster, out: &mut Raster) {
     let [mut sums, mut squares, mut variances] = [[Vec4::ZERO; PIXELS_PER_TILE]; 3];
     for (place, ((sum, square), noise)) in
         sums.iter_mut().zip(squares.iter_mut()).zip(variances.iter_mut()).enumerate()

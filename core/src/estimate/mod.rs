@@ -10,8 +10,9 @@ mod shrinkage;
 mod tile;
 
 pub use audit::{BiasEstimate, Deviation, Finding};
+pub use filter::filtered;
 pub use interval::ErrorEstimate;
 pub use metric::{Difference, mse, relmse, rmse};
 pub use noise::{BLOCKS, BlockNoise, Noise};
 pub use shrinkage::{Lookalikes, Shrinkage};
-pub use tile::{TileError, TileLight, filtered};
+pub use tile::{TileError, TileLight};

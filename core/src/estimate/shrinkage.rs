@@ -5,7 +5,7 @@
 
 use super::metric::DARK;
 use super::seen::{FAINT, Seen, brightness};
-use crate::film::{PIXELS_PER_TILE, Pixel};
+use crate::film::Pixel;
 use glam::Vec4;
 
 /// Octaves of what a pixel has more than its neighbours, over theirs; less than the first is as good as nothing.
@@ -94,10 +94,9 @@ impl Lookalikes {
     pub fn add(&mut self, pixels: &[Pixel], mean: f64) {
         let seen = Seen::new(pixels, (1.0 / mean) as f32);
         let whole = |value: f64| (value.clamp(-MOST, MOST) / UNIT) as i64;
-        for place in 0..PIXELS_PER_TILE {
-            let Some(quarters) = seen.quarters[place] else { continue };
-            let [first, second] = Pair::both(quarters);
-            let around = Around::new(seen.around[place]);
+        for (quarters, around) in seen.quarters.iter().zip(&seen.around) {
+            let Some(quarters) = quarters else { continue };
+            let ([first, second], around) = (Pair::both(*quarters), Around::new(*around));
             for (asked, other) in [(first, second), (second, first)] {
                 let more = around.more(asked.light);
                 let class = asked.class(more);
@@ -156,25 +155,26 @@ pub struct Shrinkage {
 }
 
 impl Shrinkage {
-    /// The mean of 1 / (R² + 0.01) over what a pixel may be that `pair` saw, with neighbours of light `around`; m = 1.
-    pub(super) fn over_square(&self, pair: Pair, around: Vec4) -> Vec4 {
-        let Believed { share, spread } = self.classes[pair.class(Around::new(around).more(pair.light))];
+    /// The mean of 1 / (R² + 0.01) over what a pixel may be that `pair` saw, with such neighbours; m = 1.
+    pub(super) fn over_square(&self, pair: Pair, around: &Around) -> Vec4 {
+        let Believed { share, spread } = self.classes[pair.class(around.more(pair.light))];
         // Where it is darker in sum and brighter in a channel, a share below zero would lead through black.
-        let r = (around + share * (pair.light - around)).max(around.min(pair.light));
+        let r = (around.light + share * (pair.light - around.light)).max(around.light.min(pair.light));
         spread * (r * r + DARK as f32).recip()
     }
 }
 
 /// The light of the neighbours of a pixel.
-struct Around {
+pub(super) struct Around {
+    light: Vec4,
     brightness: f32,
     reciprocal: f32,
 }
 
 impl Around {
-    fn new(around: Vec4) -> Self {
-        let brightness = brightness(around);
-        Self { brightness, reciprocal: (brightness + 3.0 * FAINT).recip() }
+    pub(super) fn new(light: Vec4) -> Self {
+        let brightness = brightness(light);
+        Self { light, brightness, reciprocal: (brightness + 3.0 * FAINT).recip() }
     }
 
     /// What `light` has more, over that of the neighbours.
@@ -229,7 +229,7 @@ impl Pair {
 mod tests {
     use super::*;
     use crate::Rgb;
-    use crate::film::{Dropped, TILE, Tile};
+    use crate::film::{Dropped, PIXELS_PER_TILE, TILE, Tile};
     use crate::sampling::Random;
     use std::vec::Vec;
 
@@ -252,7 +252,7 @@ mod tests {
         let (shrinkage, seen) = (alike.shrinkage(), Seen::new(pixels, 1.0));
         core::array::from_fn(|place| {
             let pairs = seen.quarters[place].map(Pair::both).unwrap();
-            pairs.map(|pair| shrinkage.over_square(pair, seen.around[place]).x.recip())
+            pairs.map(|pair| shrinkage.over_square(pair, &Around::new(seen.around[place])).x.recip())
         })
     }
 
@@ -304,7 +304,7 @@ mod tests {
         let light = Vec4::new(0.1, 0.1, 1.0, 0.0);
         for believed in [-2.0, -0.3, 0.0, 1.0] {
             let shrinkage = Shrinkage { classes: [Believed { share: believed, spread: 1.0 }; CLASSES] };
-            let weight = shrinkage.over_square(Pair { a: light, b: light, light }, around);
+            let weight = shrinkage.over_square(Pair { a: light, b: light, light }, &Around::new(around));
             assert!(weight.truncate().max_element() <= 1.0 / (0.1f32.powi(2) + 0.01) * 1.0001, "{weight}");
         }
     }

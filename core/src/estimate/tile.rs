@@ -1,9 +1,7 @@
 //! What the halves of one tile disagree by: sums from which [`super::ErrorEstimate`] is made.
 
-use super::filter::lee;
-use super::seen::{Seen, raster};
-use super::shrinkage::{Pair, Shrinkage};
-use crate::Rgb;
+use super::seen::{Seen, brightness, raster};
+use super::shrinkage::{Around, Pair, Shrinkage};
 use crate::film::{PIXELS_PER_TILE, Pixel};
 use glam::Vec4;
 
@@ -77,8 +75,8 @@ impl TileError {
         for (i, pixel) in pixels.iter().enumerate().take(PIXELS_PER_TILE) {
             let place = raster(i);
             let Some(quarters @ [a1, a2, b1, b2]) = seen.quarters[place] else { continue };
-            let pairs = Pair::both(quarters);
-            let by = pairs.map(|pair| shrinkage.over_square(pair, seen.around[place]));
+            let (pairs, around) = (Pair::both(quarters), Around::new(seen.around[place]));
+            let by = pairs.map(|pair| shrinkage.over_square(pair, &around));
             let [first, second] = pairs.map(|pair| pair.noise());
             let by_both = 0.5 * (by[0] + by[1]);
             sums.values += 3;
@@ -114,18 +112,6 @@ impl core::ops::AddAssign for TileError {
     }
 }
 
-/// What the pixels of a tile of a picture of mean `mean` probably are: filtered, in the order of the tile's pixels.
-pub fn filtered(pixels: &[Pixel], mean: f64) -> [Rgb; PIXELS_PER_TILE] {
-    let scale = (1.0 / mean) as f32;
-    let [mut picture, mut noise, mut out] = [[Vec4::ZERO; PIXELS_PER_TILE]; 3];
-    for (i, pixel) in pixels.iter().enumerate().take(PIXELS_PER_TILE).filter(|(_, pixel)| pixel.count() > 0) {
-        picture[raster(i)] = (scale * pixel.mean()).extend(1.0);
-        noise[raster(i)] = pixel.scaled_variance(scale).extend(0.0);
-    }
-    lee(&picture, &noise, &mut out);
-    core::array::from_fn(|i| out[raster(i)].truncate() / scale)
-}
-
 fn total(values: Vec4) -> f64 {
-    f64::from(values.x + values.y + values.z)
+    f64::from(brightness(values))
 }

@@ -120,8 +120,8 @@ pub(super) fn verdict(
 }
 
 /// Noise and bias add up, and so do the squares of how unsure they are. A squared bias b counts as b − σ² / b, with
-/// σ half of what its interval reaches, and not at all below σ: one audited pixel with a firefly is enough for a b of many times the error, and
-/// for a σ larger than that. The sum is no less than what is certain of both.
+/// σ half of what its interval reaches, and not at all below σ: one audited pixel with a firefly is enough for a b of
+/// many times the error, and for a σ larger than that. The sum is no less than what is certain of both.
 fn total(noise: ErrorEstimate, bias: BiasEstimate) -> ErrorEstimate {
     let reach = bias.detectable;
     let squared = if bias.relmse > 0.0 { bias.relmse - 0.25 * reach * reach / bias.relmse } else { 0.0 };

@@ -125,8 +125,8 @@ pub(super) fn with<F: Features, T>(
     let photons = [memory.take("photons", footprint)?, memory.take("photons", footprint)?];
     paths.caustics.used = true;
     let [wanted, given] = [wanted, tasks].map(|tasks| (tasks * PATHS) as u64);
-    let used = MapUse { wanted, given, ..MapUse::default() };
-    let used = PhotonUse { caustic: Some(used), ..PhotonUse::default() };
+    let map = MapUse { wanted, given, ..MapUse::default() };
+    let used = PhotonUse { caustic: Some(map), ..PhotonUse::default() };
     then(&mut Joined { stage: *stage, paths, emission, photons, each, used, kept: None }, memory)
 }
 

@@ -26,7 +26,7 @@ pub(super) fn section(run: &Run) -> String {
         (false, photons.global, view.and_then(|view| view.global.as_ref())),
         (true, photons.caustic, view.and_then(|view| view.caustic.as_ref())),
     ];
-    let mut words = first_look(run);
+    let mut words = first_look(run).to_owned();
     for (is_caustic, used, seen) in kinds {
         let Some(used) = used else { continue };
         facts.extend(numbers(is_caustic, &used, seen));
@@ -49,9 +49,9 @@ pub(super) fn section(run: &Run) -> String {
 }
 
 /// What a first look for caustics has decided, where there was one.
-fn first_look(run: &Run) -> String {
+fn first_look(run: &Run) -> &'static str {
     let caustics = run.result.caustics;
-    let words = match (caustics.used, caustics.share) {
+    match (caustics.used, caustics.share) {
         _ if caustics.lacks_memory => {
             "There was no memory to look for light that comes through mirrors or glass: where there is any, it is \
              missing or noisy. "
@@ -65,8 +65,7 @@ fn first_look(run: &Run) -> String {
              find that, too. "
         }
         _ => "",
-    };
-    words.into()
+    }
 }
 
 fn numbers(is_caustic: bool, used: &MapUse, seen: Option<&MapView>) -> Vec<(&'static str, String)> {
