@@ -525,6 +525,7 @@ impl<'a, F: Features> PathTracer<'a, F> {
                 if f == Rgb::ZERO {
                     return None;
                 }
+                let ray = shadow_ray(point, &sample)?;
                 if let Some(cones) = &cones {
                     pdf = cones.density(sample.direction, pdf);
                 }
@@ -548,7 +549,7 @@ impl<'a, F: Features> PathTracer<'a, F> {
                 }
                 let contribution = throughput * f * sample.radiance * (weight / sample.pdf);
                 let tag = if later { TO_ENVIRONMENT } else { 0 };
-                Some((Ray { tag, ..shadow_ray(point, &sample) }, contribution))
+                Some((Ray { tag, ..ray }, contribution))
             });
         }
 

@@ -103,8 +103,8 @@ pub fn radiance(
                         false => power_heuristic(light.pdf, pdf),
                     };
                     let sent = throughput * f * light.radiance * (weight / light.pdf);
-                    let ray = shadow_ray(&point, &light);
-                    let arriving = passing::<All>(scene, bvh, Level::BASELINE, ray, sent, &mut 0);
+                    let arriving = shadow_ray(&point, &light)
+                        .and_then(|ray| passing::<All>(scene, bvh, Level::BASELINE, ray, sent, &mut 0));
                     let environment = scene.environment.as_ref().filter(|_| later);
                     let seen = environment.map_or(Rgb::ONE, |e| e.radiance(scene, light.direction));
                     radiance += arriving.unwrap_or_default() * seen;

@@ -9,18 +9,20 @@ use crate::scene::{Scene, SurfacePoint};
 use crate::{Level, Rgb};
 use glam::Vec3;
 
-/// The ray that meets what hides the light of `sample` from `point`, and neither end.
+/// The ray that meets what hides the light of `sample` from `point`, and neither end. `None` where the light, moved off
+/// its surface, is no longer on the side on which it was seen: rounding may put a point of a light's own back before it.
 #[inline]
-pub(super) fn shadow_ray(point: &SurfacePoint, sample: &LightSample) -> Ray {
+pub(super) fn shadow_ray(point: &SurfacePoint, sample: &LightSample) -> Option<Ray> {
     if let Some(target) = sample.target {
         // Off the light's surface, to the side from which it is seen.
-        let step = target.error.copysign(-target.normal.dot(sample.direction));
-        return point.spawn_to(target.position + step * target.normal);
+        let end = target.position + target.error * target.normal;
+        let heights = [end - point.position, sample.direction].map(|to| to.dot(point.geometric_normal));
+        return (heights[0] * heights[1] > 0.0).then(|| point.spawn_to(end));
     }
     if sample.distance < f32::INFINITY {
-        return point.spawn_to(point.position + sample.distance * sample.direction);
+        return Some(point.spawn_to(point.position + sample.distance * sample.direction));
     }
-    point.spawn(sample.direction)
+    Some(point.spawn(sample.direction))
 }
 
 /// Fewer rays than this are followed one by one: a batch takes some time to set up.

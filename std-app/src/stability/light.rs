@@ -3,7 +3,7 @@
 use super::Table;
 use super::world::{World, glowing};
 use core::f64::consts::PI;
-use glam::DVec3;
+use glam::{DQuat, DVec3};
 use halflight_core::Rgb;
 use halflight_core::scene::Material;
 
@@ -54,4 +54,22 @@ pub(super) fn cases(table: &mut Table) {
     world.square(-DVec3::Y, 1.0, false, bright);
     let expected = 0.6 / PI * 1e-3 * under_a_square(1.0);
     table.radiance("radiance", "1e-3 in front of a floor, 1e6 behind it", &world, expected);
+    backs(table);
+}
+
+/// Lamps whose backs reflect, in the dark: nothing of what the front emits may get there, however positions are rounded.
+fn backs(table: &mut Table) {
+    for (case, tilt) in
+        [("a level lamp", 0.0), ("a lamp tilted by 0.3 rad", 0.3), ("a lamp on edge", 0.5 * PI)]
+    {
+        let turned = DQuat::from_rotation_z(tilt);
+        let center = DVec3::new(-0.005, 1.98, -0.03);
+        let mut world = World::new(center + turned * DVec3::new(0.4, 0.9, 0.7), center, 30.0);
+        let lamp = world.material(glowing(0.78, 17.0));
+        world.square(DVec3::ZERO, 0.47, false, lamp);
+        for position in &mut world.positions {
+            *position = (center + turned * DVec3::from(*position)).to_array();
+        }
+        table.radiance("a light's own back", case, &world, 0.0);
+    }
 }
