@@ -5,9 +5,11 @@
 //! the tiles around: by samples that are independent of its own, which would bias it (docs/decisions/0024).
 
 use super::canvas::Canvas;
+use core::borrow::Borrow;
 use core::ops::Range;
 use halflight_core::estimate::{BLOCKS, BlockNoise};
 use halflight_core::film::{GROUPS, TILE};
+use serde::{Deserialize, Serialize};
 
 /// Below this many samples of each pixel the noise is not known well enough.
 pub(super) const FROM: u32 = 16;
@@ -119,34 +121,59 @@ impl Spread {
     }
 }
 
-/// Samples for each group: in proportion to `weights`, not fewer than are `taken`, `target` for a group in the mean.
-pub(super) fn targets(weights: &[[f32; GROUPS]], taken: &[[u32; GROUPS]], target: u32) -> Vec<[u32; GROUPS]> {
-    let at = |scale: f64| {
-        weights.iter().zip(taken).map(move |(weights, taken)| {
-            core::array::from_fn(|group| ((f64::from(weights[group]) * scale) as u32).max(taken[group]))
-        })
-    };
-    let (mut low, mut high) = (0.0, f64::from(target) / LEAST + 1.0);
-    for _ in 0..50 {
-        let middle = 0.5 * (low + high);
-        if mean(weights, at(middle)) < target { low = middle } else { high = middle }
-    }
-    at(high).collect()
+/// How many samples groups get. What has been taken is not asked: a render that is cut, at whatever place, goes on as if it
+/// had not been.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(super) struct Weights {
+    /// Samples over their mean; 0 for groups that lie outside of the picture.
+    of: Vec<[f32; GROUPS]>,
+    /// Samples that all had when this was found.
+    even: u32,
 }
 
-/// How many samples pixels have in the mean, those outside of the picture, without a weight, not counted.
-pub(super) fn mean(
-    weights: &[[f32; GROUPS]],
-    taken: impl IntoIterator<Item = impl core::borrow::Borrow<[u32; GROUPS]>>,
-) -> u32 {
-    let (mut sum, mut count) = (0u64, 0u64);
-    for (weights, taken) in weights.iter().zip(taken) {
-        for (_, taken) in weights.iter().zip(taken.borrow()).filter(|(weight, _)| **weight > 0.0) {
-            sum += u64::from(*taken);
-            count += 1;
-        }
+impl Weights {
+    pub(super) fn new(of: Vec<[f32; GROUPS]>, even: u32) -> Self {
+        Self { of, even }
     }
-    (sum / count.max(1)) as u32
+
+    pub(super) fn tiles(&self) -> usize {
+        self.of.len()
+    }
+
+    /// Samples for each group, `target` in the mean, none less than all had already.
+    pub(super) fn targets(&self, target: u32) -> Vec<[u32; GROUPS]> {
+        let at = |scale: f64| {
+            let samples = move |weight: f32| ((f64::from(weight) * scale) as u32).max(self.even);
+            self.of.iter().map(move |weights| weights.map(samples))
+        };
+        let (mut low, mut high) = (0.0, f64::from(target) / LEAST + 1.0);
+        for _ in 0..50 {
+            let middle = 0.5 * (low + high);
+            if self.mean(at(middle)) < target { low = middle } else { high = middle }
+        }
+        at(high).collect()
+    }
+
+    /// How many samples of those `taken` pixels have in the mean, those outside of the picture not counted.
+    pub(super) fn mean(&self, taken: impl IntoIterator<Item = impl Borrow<[u32; GROUPS]>>) -> u32 {
+        let (mut sum, mut count) = (0u64, 0u64);
+        for (weights, taken) in self.of.iter().zip(taken) {
+            for (_, taken) in weights.iter().zip(taken.borrow()).filter(|(weight, _)| **weight > 0.0) {
+                sum += u64::from(*taken);
+                count += 1;
+            }
+        }
+        (sum / count.max(1)) as u32
+    }
+
+    /// The target that is being worked on when so many samples are `taken`: all lower ones are reached.
+    pub(super) fn next(&self, taken: &[[u32; GROUPS]]) -> u32 {
+        let mean = self.mean(taken);
+        let targets = self.targets(mean);
+        let reached =
+            taken.iter().flatten().zip(targets.iter().flatten()).all(|(taken, target)| taken >= target);
+        if reached { mean } else { mean.saturating_sub(1) }
+    }
 }
 
 #[cfg(test)]
@@ -154,16 +181,35 @@ mod tests {
     use super::*;
     use halflight_core::estimate::Noise;
 
+    fn weights() -> Weights {
+        let mut of = vec![[1.0; GROUPS]; 2];
+        of[0][..5].copy_from_slice(&[0.3, 0.5, 1.0, 2.2, 0.0]);
+        Weights::new(of, 16)
+    }
+
     #[test]
     fn targets_add_up_and_take_nothing_back() {
-        let mut weights = [[1.0; GROUPS]; 2];
-        weights[0][..5].copy_from_slice(&[0.3, 0.5, 1.0, 2.2, 0.0]);
-        let mut taken = [[16; GROUPS]; 2];
-        taken[0][2] = 40;
-        let targets = targets(&weights, &taken, 32);
-        assert_eq!(mean(&weights, &targets), 32);
-        assert!(targets.iter().flatten().zip(taken.iter().flatten()).all(|(target, taken)| target >= taken));
-        assert!(targets[0][3] > 2 * targets[1][4] && targets[0][2] == 40 && targets[0][4] == 16);
+        let weights = weights();
+        let targets = weights.targets(32);
+        assert_eq!(weights.mean(&targets), 32);
+        assert!(targets.iter().flatten().all(|target| *target >= 16));
+        assert!(targets[0][3] > 2 * targets[1][4] && targets[0][4] == 16);
+    }
+
+    #[test]
+    fn the_last_group_belongs_to_the_others() {
+        let weights = weights();
+        for target in 17..200 {
+            let (before, after) = (weights.targets(target - 1), weights.targets(target));
+            assert_eq!(weights.next(&before), target - 1);
+            // Group after group, up to the last one that lacks a sample.
+            let mut taken = before.clone();
+            for (tile, group) in (0..2).flat_map(|tile| (0..GROUPS).map(move |group| (tile, group))) {
+                assert!(taken == after || weights.next(&taken) < target, "{target}");
+                taken[tile][group] = after[tile][group];
+            }
+            assert_eq!(weights.next(&taken), target);
+        }
     }
 
     /// A block in which each pixel has so much noise.

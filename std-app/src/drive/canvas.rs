@@ -1,6 +1,6 @@
 //! What a render has done so far: the film, how far each tile is, what was counted. All that a film file keeps.
 
-use super::adapt;
+use super::adapt::Weights;
 use super::ledger::Ledger;
 use halflight_core::film::{Film, GROUPS, PIXELS_PER_TILE};
 use halflight_core::transport::Counters;
@@ -33,8 +33,8 @@ pub(super) struct Canvas<'m> {
     /// Rays of every kind that each tile took.
     pub(super) rays: Vec<u64>,
     pub(super) shard: Shard,
-    /// How many samples groups should have over their mean; `None` where all should have the same.
-    pub(super) weights: Option<Vec<[f32; GROUPS]>>,
+    /// How many samples groups get; `None` where all get the same.
+    pub(super) weights: Option<Weights>,
     pub(super) counters: Counters,
     pub(super) ledger: Ledger,
 }
@@ -62,7 +62,7 @@ impl<'m> Canvas<'m> {
     /// Samples that groups should have when each pixel has `target` of them in the mean.
     pub(super) fn targets(&self, target: u32) -> Vec<[u32; GROUPS]> {
         match &self.weights {
-            Some(weights) => adapt::targets(weights, &self.taken, target),
+            Some(weights) => weights.targets(target),
             None => vec![[target; GROUPS]; self.taken.len()],
         }
     }
@@ -70,7 +70,7 @@ impl<'m> Canvas<'m> {
     /// Samples of each pixel: of the least sampled one, or in the mean where groups should have different numbers.
     pub(super) fn spp(&self) -> u32 {
         match &self.weights {
-            Some(weights) => adapt::mean(weights, &self.taken),
+            Some(weights) => weights.mean(&self.taken),
             None => {
                 let own = self.taken.iter().enumerate().filter(|(task, _)| self.shard.owns(*task));
                 own.flat_map(|(_, taken)| *taken).min().unwrap_or(0)

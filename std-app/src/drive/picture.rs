@@ -1,6 +1,6 @@
 //! The rounds of a picture, from the first sample to the last estimate.
 
-use super::adapt::{self, Spread};
+use super::adapt::{self, Spread, Weights};
 use super::audit::Audit;
 use super::canvas::Canvas;
 use super::crew::{self, Crew};
@@ -112,7 +112,8 @@ impl Picture<'_> {
                     gain = spread.as_ref().map(|spread| spread.gain);
                     let is_asked = settings.adaptive == Some(true);
                     let pays = |spread: &Spread| is_asked || spread.gain >= adapt::PAYS;
-                    canvas.weights = spread.filter(pays).map(|spread| spread.weights);
+                    let spp = rounds.spp();
+                    canvas.weights = spread.filter(pays).map(|spread| Weights::new(spread.weights, spp));
                 }
                 let short = settings.stop.error.zip(error).and_then(|(wanted, noise)| {
                     refinements.shortfall(wanted, rounds.spp(), noise, audited.as_ref())

@@ -1,13 +1,14 @@
 //! The header of a film file: one JSON object, which a person can read with `head -c`.
 
 use super::identity::Identity;
+use crate::drive::adapt::Weights;
 use crate::drive::audit::{self, Audit};
 use crate::drive::canvas::{Canvas, Shard};
 use crate::drive::ledger::Ledger;
 use crate::drive::refinement::Refinements;
 use crate::drive::rounds::{Estimates, Rounds};
 use crate::drive::{ErrorEstimate, Method, Round};
-use halflight_core::film::{Dropped, GROUPS};
+use halflight_core::film::Dropped;
 use halflight_core::transport::Counters;
 use serde::{Deserialize, Serialize};
 
@@ -31,7 +32,7 @@ pub(in crate::drive) struct Header {
     /// Rays of each tile.
     tiles: Vec<u64>,
     /// Of adaptive sampling.
-    weights: Option<Vec<[f32; GROUPS]>>,
+    weights: Option<Weights>,
     audit: Option<audit::State>,
     #[serde(default)]
     pub(in crate::drive) refinements: Refinements,
@@ -106,8 +107,8 @@ impl Header {
     }
 
     /// Of `tiles` tiles.
-    pub(in crate::drive) fn weights(&self, tiles: usize) -> Option<Vec<[f32; GROUPS]>> {
-        self.weights.clone().filter(|weights| weights.len() == tiles)
+    pub(in crate::drive) fn weights(&self, tiles: usize) -> Option<Weights> {
+        self.weights.clone().filter(|weights| weights.tiles() == tiles)
     }
 
     /// How far the audit is, where there is one.
