@@ -6,6 +6,7 @@ mod support;
 use core::time::Duration;
 use halflight::save::read;
 use std::fs;
+use std::path::Path;
 use std::process::Stdio;
 use std::time::Instant;
 use support::Folder;
@@ -116,6 +117,31 @@ fn shards_merge_to_the_bits_of_one_render() {
     assert!(!folder.path("no.png").exists());
     let said = folder.refused(&format!("{render} --shard 9/99 --checkpoint no.film"));
     assert!(said.contains("such shards"), "{said}");
+}
+
+#[test]
+fn a_merged_picture_knows_what_its_samples_share() {
+    let folder = Folder::new("shared");
+    // Photons reach pixels far apart: their errors hang together, whoever renders them.
+    let caustic = Path::new(env!("CARGO_MANIFEST_DIR")).join("../scenes/caustic/caustic.toml");
+    let render =
+        |scene: &str, method: &str| format!("render {scene} --size 64x64 --spp 8 --method {method} --json");
+    for (scene, method, biased) in [(caustic.to_str().unwrap(), "path", false), ("scene.obj", "sppm", true)] {
+        let render = render(scene, method);
+        let whole = folder.object(&format!("{render} --audit off -o whole.exr"));
+        for shard in 1..=2 {
+            folder.object(&format!("{render} --shard {shard}/2 --checkpoint {shard}.film"));
+        }
+        let merged = folder.object("merge 1.film 2.film -o merged.exr --json");
+        assert_eq!(
+            (&whole["error"], &merged["may_be_biased"]),
+            (&merged["error"], &biased.into()),
+            "{method}"
+        );
+        let said = folder.run("merge 1.film 2.film -o merged.exr").stdout;
+        let said = String::from_utf8_lossy(&said);
+        assert_eq!(said.contains("bias is not in it"), biased, "{said}");
+    }
 }
 
 #[test]

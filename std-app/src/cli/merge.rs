@@ -53,6 +53,7 @@ impl Merge {
             "paths": counters.paths,
             "mean_radiance": merged.image.mean(),
             "error": estimate_object(merged.error, "estimate"),
+            "may_be_biased": merged.is_biased,
             "dropped": dropped_object(&counters.dropped, &merged.places, merged.empty_pixels),
             "outputs": self.output,
         })
@@ -63,7 +64,7 @@ impl Merge {
         let mut lines: Vec<String> = self.output.iter().map(saved).collect();
         let (width, height) = (merged.image.width, merged.image.height);
         lines.push(format!("image  {width}x{height}, {} samples per pixel", merged.spp));
-        lines.push(summary::estimate(merged.error));
+        lines.push(summary::estimate(merged.error, merged.is_biased));
         lines.extend(ledger::text(&merged.counters, &merged.places, merged.empty_pixels));
         lines.join("\n")
     }

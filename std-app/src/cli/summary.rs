@@ -21,7 +21,7 @@ pub(super) fn text(run: &Run, report: Option<&Path>) -> String {
     let (width, height, samples) = (settings.width, settings.height, plural(result.spp.into(), "sample"));
     lines.push(format!("image  {width}x{height}, {samples} per pixel{early}"));
     match &result.audit {
-        None => lines.push(estimate(result.error)),
+        None => lines.push(estimate(result.error, result.method.is_biased())),
         Some(audit) => {
             lines.extend(audited(audit));
             let doubt = run.doubt().filter(|_| audit.is_biased());
@@ -123,12 +123,13 @@ fn audited(audit: &Audited) -> [String; 3] {
     ]
 }
 
-/// The line of an estimate.
-pub(super) fn estimate(error: Option<ErrorEstimate>) -> String {
+/// The line of an estimate that nobody audited, of a method that may have a bias.
+pub(super) fn estimate(error: Option<ErrorEstimate>, is_biased: bool) -> String {
+    let bias = if is_biased { "; bias is not in it" } else { "" };
     match error {
         Some(ErrorEstimate { relmse, lower, upper }) => {
             format!(
-                "error  relMSE {relmse:.3e} (95 %: {lower:.3e} to {upper:.3e}), estimated from its own noise"
+                "error  relMSE {relmse:.3e} (95 %: {lower:.3e} to {upper:.3e}), estimated from its own noise{bias}"
             )
         }
         None => "error  unknown: it takes four samples per pixel and some light".into(),

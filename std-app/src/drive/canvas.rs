@@ -33,6 +33,8 @@ pub(super) struct Canvas<'m> {
     /// Rays of every kind that each tile took.
     pub(super) rays: Vec<u64>,
     pub(super) shard: Shard,
+    /// Whether pixels far apart share what their samples find.
+    pub(super) shares: bool,
     /// How many samples groups get; `None` where all get the same.
     pub(super) weights: Option<Weights>,
     pub(super) counters: Counters,
@@ -48,6 +50,7 @@ impl<'m> Canvas<'m> {
             taken: vec![[0; GROUPS]; tiles],
             rays: vec![0; tiles],
             shard,
+            shares: false,
             weights: None,
             counters,
             ledger,

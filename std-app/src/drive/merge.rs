@@ -29,6 +29,8 @@ pub struct Merged {
     pub places: Vec<Place>,
     /// Pixels that are black because all of their samples were dropped.
     pub empty_pixels: u64,
+    /// Whether the method has a bias. Nobody looked for it, and it is not in the error.
+    pub is_biased: bool,
     /// The error, estimated from the two half-films.
     pub error: Option<ErrorEstimate>,
 }
@@ -53,7 +55,7 @@ pub fn merge(files: &[PathBuf]) -> Result<Merged, RenderError> {
 
     let [width, height] = first.header.size();
     let spp = first.header.spp;
-    let shares = first.header.method().is_some_and(Method::shares);
+    let is_biased = first.header.method().is_some_and(Method::is_biased);
     let mut lines = Vec::new();
     let needed = Film::footprint(width, height).bytes();
     let count = needed.div_ceil(ALIGNMENT);
@@ -61,6 +63,7 @@ pub fn merge(files: &[PathBuf]) -> Result<Merged, RenderError> {
     lines.resize(count, Line([0; ALIGNMENT]));
     let film = Film::new(width, height, &mut Arena::new(bytemuck::cast_slice_mut(&mut lines)))?;
     let mut canvas = Canvas::new(film, Shard::WHOLE);
+    canvas.shares = first.header.shares;
     let mut seconds = 0.0;
     for film in films {
         seconds += film.header.seconds;
@@ -73,6 +76,7 @@ pub fn merge(files: &[PathBuf]) -> Result<Merged, RenderError> {
         counters: canvas.counters,
         places: canvas.ledger.places(width, height),
         empty_pixels: empty_pixels(&canvas.film, |_| true),
-        error: Workers::new(None)?.estimate(&canvas.film, shares),
+        error: Workers::new(None)?.estimate(&canvas.film, canvas.shares),
+        is_biased,
     })
 }

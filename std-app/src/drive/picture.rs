@@ -46,6 +46,8 @@ impl Picture<'_> {
         let Stage { settings, workers, .. } = stage;
         let (width, height) = (settings.width, settings.height);
         let mut canvas = Canvas::new(film, settings.shard);
+        // Photons, too, are shared.
+        canvas.shares = method.shares() || renderer.caustics().used;
         let (mut rounds, mut history, mut refinements) = match resumed {
             None => (Rounds::new(settings.stop), Vec::new(), Refinements::default()),
             Some(film) => {
@@ -64,8 +66,6 @@ impl Picture<'_> {
         let reference = clock.pause(|| settings.reference.as_deref().map(Reference::new));
         let mut latest = history.iter().rev().find_map(|round: &Round| round.error);
         let (mut estimating, mut estimate) = (0.0, 0.0);
-        // Photons, too, are shared.
-        let shares = method.shares() || renderer.caustics().used;
         let mut gain = None;
         let mut saved = Instant::now();
         let mut is_lost = false;
@@ -101,7 +101,7 @@ impl Picture<'_> {
                 }
                 let start = Instant::now();
                 let tiles = workers.errors(&canvas.film);
-                error = tiles.as_ref().and_then(|tiles| regions::estimate(tiles, width, shares));
+                error = tiles.as_ref().and_then(|tiles| regions::estimate(tiles, width, canvas.shares));
                 estimate += start.elapsed().as_secs_f64();
                 let audited = error.and_then(|noise| audit.as_ref()?.verdict(workers, &canvas.film, noise));
                 // Once only: noise that is told later would know who asked for it.
@@ -159,7 +159,7 @@ impl Picture<'_> {
             audit.step(workers, &canvas.film, rays(&canvas), clock.seconds(), left)?;
         }
         let start = Instant::now();
-        let noise = workers.estimate(&canvas.film, shares);
+        let noise = workers.estimate(&canvas.film, canvas.shares);
         estimate += start.elapsed().as_secs_f64();
         let render = clock.seconds();
         let audited = noise.and_then(|noise| audit.as_ref()?.verdict(workers, &canvas.film, noise));

@@ -18,6 +18,7 @@ pub(in crate::drive) struct Header {
     pub(super) identity: Identity,
     /// Which of how many, counted from 1.
     shard: [u32; 2],
+    pub(in crate::drive) shares: bool,
     pub(in crate::drive) spp: u32,
     pub(in crate::drive) rounds: u32,
     pub(in crate::drive) estimates: Estimates,
@@ -59,6 +60,7 @@ impl Header {
         Self {
             identity,
             shard: [shard.index + 1, shard.count],
+            shares: canvas.shares,
             spp: canvas.spp(),
             rounds: rounds.count(),
             estimates: rounds.estimates(),
