@@ -7,15 +7,17 @@
 //!    ([`super::Shrinkage`]), the mean of the quotients by what each pair of quarters says.
 //! 2. What is left of that is seen where nothing hides itself: the variance of one pair over the square of what the
 //!    *other* says is too large, for where light is rare both are. With δ the logarithm of its quotient to the variance
-//!    of the pairs over the common squares, its logarithm goes up by δ / (1 + 10 δ), and is as uncertain as δ.
+//!    of the pairs over the common squares, its logarithm goes up by δ / (1 + 10 δ), and is as uncertain as δ, and as the
+//!    logarithm of what pixels add that may be other than they probably are.
 //! 3. The error that this picture has and its estimate differ by the mean of the product of both halves' errors,
 //!    exactly. For a pixel of variance V the product has the variance 4 V², and the estimate squared the mean 3 V² (more
 //!    with heavy tails); Student's t says what it is to know that from few pixels. How errors hang together between
-//!    pixels is seen in products of differences within the halves.
+//!    pixels that share paths is seen in the differences of the halves: products of errors go with the square of it.
 //!
 //! The price: about as much time as a tenth of a sample for each pixel.
 
 use super::TileError;
+use crate::film::GROUP;
 use libm::{exp, fmax, hypot, log, sqrt};
 
 /// An estimate of the relMSE with the interval that holds it with 95 % confidence, as far as one picture can
@@ -42,14 +44,13 @@ const FEWEST: f64 = 8.0;
 const DOUBTED: f64 = 10.0;
 
 impl ErrorEstimate {
-    /// From all tiles of a picture whose pixels share nothing, or paths within blocks of 8 x 8; `None` where no pixel has
+    /// From all tiles of a picture whose pixels share nothing, or paths within groups; `None` where no pixel has
     /// four samples.
     pub fn of(tiles: impl Iterator<Item = TileError>) -> Option<Self> {
         let mut sum = TileError::default();
         tiles.for_each(|tile| sum += tile);
-        let together = together(sum.blocks, sum.pixels);
-        let freedom = fmax(freedom(sum.squares, sum.fourths) / together, FEWEST);
-        Self::with_reach(&sum, student_95(freedom) * sqrt(together))
+        let freedom = fmax(freedom(sum.squares, sum.fourths), FEWEST);
+        Self::with_reach(&sum, student_95(freedom) * sqrt(shared(sum.groups, sum.differences)))
     }
 
     /// From the sums over regions, where a method shares between pixels far apart: regions count as independent. They
@@ -78,10 +79,19 @@ impl ErrorEstimate {
         let delta = fmax(log(sum.crossed / sum.parts), 0.0);
         let relmse = sum.halves / sum.values as f64 * exp(delta / (1.0 + DOUBTED * delta));
         let noise = sqrt(4.0 / 3.0 * sum.squares) / sum.halves;
-        let reach = hypot(reach * noise, delta);
+        let spread = fmax(log(sum.halves / sum.certain), 0.0);
+        let reach = hypot(reach * noise, hypot(delta, spread));
         Some(Self { relmse, lower: relmse * exp(-reach), upper: relmse * exp(reach) })
             .filter(|estimate| estimate.upper.is_finite())
     }
+}
+
+/// By how much errors that the pixels of a group share make the sum of their squares vary more: with the correlation ρ
+/// of each two in a group of n, from the squares of sums over groups and of pixels, 1 + (n − 1) ρ².
+fn shared(groups: f64, pixels: f64) -> f64 {
+    const OTHERS: f64 = GROUP as f64 - 1.0;
+    let rho = if pixels > 0.0 { fmax(groups / pixels - 1.0, 0.0) / OTHERS } else { 0.0 };
+    1.0 + OTHERS * rho * rho
 }
 
 /// By how much errors that hang together make a sum over pixels vary more: from the squares of sums over parts of the

@@ -32,7 +32,7 @@ const PRIOR: f64 = 4.0;
 const CONTRARY: f64 = 2.0;
 
 /// Variance of what a pixel is, over the square, at most: where light is so rare that it is more, noise is where light is.
-const MOST_SPREAD: f64 = 0.2;
+const MOST_SPREAD: f64 = 0.1;
 
 /// So many tiles know enough, with twice 16,384 pixels in two hundred classes.
 const ENOUGH: u64 = 64;
@@ -155,12 +155,13 @@ pub struct Shrinkage {
 }
 
 impl Shrinkage {
-    /// The mean of 1 / (R² + 0.01) over what a pixel may be that `pair` saw, with such neighbours; m = 1.
-    pub(super) fn over_square(&self, pair: Pair, around: &Around) -> Vec4 {
+    /// 1 / (R² + 0.01) of what a pixel probably is that `pair` saw, with such neighbours (m = 1), and by how much the mean over
+    /// what it may be is larger.
+    pub(super) fn over_square(&self, pair: Pair, around: &Around) -> (Vec4, f32) {
         let Believed { share, spread } = self.classes[pair.class(around.more(pair.light))];
         // Where it is darker in sum and brighter in a channel, a share below zero would lead through black.
         let r = (around.light + share * (pair.light - around.light)).max(around.light.min(pair.light));
-        spread * (r * r + DARK as f32).recip()
+        ((r * r + DARK as f32).recip(), spread)
     }
 }
 
@@ -252,7 +253,10 @@ mod tests {
         let (shrinkage, seen) = (alike.shrinkage(), Seen::new(pixels, 1.0));
         core::array::from_fn(|place| {
             let pairs = seen.quarters[place].map(Pair::both).unwrap();
-            pairs.map(|pair| shrinkage.over_square(pair, &Around::new(seen.around[place])).x.recip())
+            pairs.map(|pair| {
+                let (over_square, spread) = shrinkage.over_square(pair, &Around::new(seen.around[place]));
+                (spread * over_square.x).recip()
+            })
         })
     }
 
@@ -304,7 +308,7 @@ mod tests {
         let light = Vec4::new(0.1, 0.1, 1.0, 0.0);
         for believed in [-2.0, -0.3, 0.0, 1.0] {
             let shrinkage = Shrinkage { classes: [Believed { share: believed, spread: 1.0 }; CLASSES] };
-            let weight = shrinkage.over_square(Pair { a: light, b: light, light }, &Around::new(around));
+            let (weight, _) = shrinkage.over_square(Pair { a: light, b: light, light }, &Around::new(around));
             assert!(weight.truncate().max_element() <= 1.0 / (0.1f32.powi(2) + 0.01) * 1.0001, "{weight}");
         }
     }

@@ -2,7 +2,7 @@
 
 use super::seen::{Seen, brightness, raster};
 use super::shrinkage::{Around, Pair, Shrinkage};
-use crate::film::{PIXELS_PER_TILE, Pixel};
+use crate::film::{GROUPS, PIXELS_PER_TILE, Pixel, Tile};
 use glam::Vec4;
 
 /// The light of a tile: over all tiles it gives the m of relMSE.
@@ -35,9 +35,6 @@ impl core::ops::AddAssign for TileLight {
     }
 }
 
-/// Pixels whose paths may be shared lie within blocks of 8 x 8, a quarter of a tile and of its Z-curve each.
-const BLOCK: usize = PIXELS_PER_TILE / 4;
-
 /// Sums over the pixels and channels of one tile, of squared differences over R² + 0.01 m². A and B are the means of
 /// the halves, A₁, A₂, B₁, B₂ of their parts; the R of each pair, of A₁ and B₁ and of A₂ and B₂, is what
 /// the pair says that the pixel is ([`Shrinkage`]).
@@ -47,6 +44,8 @@ pub struct TileError {
     pub(super) values: u64,
     /// Variance of the picture by (A − B)² over the squares of both R: the mean of both quotients.
     pub(super) halves: f64,
+    /// The same, as if what pixels probably are was what they are.
+    pub(super) certain: f64,
     /// Variance of the pictures of both pairs over the squares of both R.
     pub(super) parts: f64,
     /// The same, each over the square of the other R: numerator and denominator are independent. Too large where a pair
@@ -58,10 +57,12 @@ pub struct TileError {
     pub(super) fourths: f64,
     /// Sum of (A₁ − A₂)(B₁ − B₂) / 4, which has the mean 0 and hangs together between pixels as the errors do.
     pub(super) product: f64,
-    /// Squares of that sum in blocks of 8 x 8 pixels.
-    pub(super) blocks: f64,
     /// Squares of that sum in pixels.
     pub(super) pixels: f64,
+    /// Squares of the sums of (A − B) / R over the pixels of groups, which may share their paths.
+    pub(super) groups: f64,
+    /// Squares of (A − B) / R in pixels.
+    pub(super) differences: f64,
 }
 
 impl TileError {
@@ -71,16 +72,19 @@ impl TileError {
         let scale = (1.0 / mean) as f32;
         let seen = Seen::new(pixels, scale);
         let mut sums = Self::default();
-        let mut blocks = [0.0; 4];
+        let mut groups = [0.0; GROUPS];
         for (i, pixel) in pixels.iter().enumerate().take(PIXELS_PER_TILE) {
             let place = raster(i);
             let Some(quarters @ [a1, a2, b1, b2]) = seen.quarters[place] else { continue };
             let (pairs, around) = (Pair::both(quarters), Around::new(seen.around[place]));
-            let by = pairs.map(|pair| shrinkage.over_square(pair, &around));
+            let likely = pairs.map(|pair| shrinkage.over_square(pair, &around));
+            let by = likely.map(|(over_square, spread)| spread * over_square);
             let [first, second] = pairs.map(|pair| pair.noise());
             let by_both = 0.5 * (by[0] + by[1]);
             sums.values += 3;
-            let variance = total(pixel.scaled_variance(scale).extend(0.0) * by_both);
+            let noise = pixel.scaled_variance(scale).extend(0.0);
+            sums.certain += total(noise * (likely[0].0 + likely[1].0) * 0.5);
+            let variance = total(noise * by_both);
             let squared = variance * variance;
             sums.halves += variance;
             sums.squares += squared;
@@ -90,9 +94,11 @@ impl TileError {
             let product = total((a1 - a2) * (b1 - b2) * by_both) / 4.0;
             sums.product += product;
             sums.pixels += product * product;
-            blocks[i / BLOCK % 4] += product;
+            let difference = total(a1 + a2 - b1 - b2) * libm::sqrt(total(by_both));
+            sums.differences += difference * difference;
+            groups[Tile::group(i)] += difference;
         }
-        sums.blocks = blocks.iter().map(|block| block * block).sum();
+        sums.groups = groups.iter().map(|group| group * group).sum();
         sums
     }
 }
@@ -102,13 +108,15 @@ impl core::ops::AddAssign for TileError {
     fn add_assign(&mut self, other: Self) {
         self.values += other.values;
         self.halves += other.halves;
+        self.certain += other.certain;
         self.parts += other.parts;
         self.crossed += other.crossed;
         self.squares += other.squares;
         self.fourths += other.fourths;
         self.product += other.product;
-        self.blocks += other.blocks;
         self.pixels += other.pixels;
+        self.groups += other.groups;
+        self.differences += other.differences;
     }
 }
 
