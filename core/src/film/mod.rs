@@ -6,7 +6,7 @@ mod tile;
 
 pub use pixel::{Dropped, Half, Pixel};
 pub use samples::{GROUP, GROUPS, Samples};
-pub use tile::{PIXELS_PER_TILE, TILE, Tile};
+pub use tile::{PIXELS_PER_TILE, PixelSet, TILE, Tile};
 
 use crate::Rgb;
 use crate::memory::{Arena, Footprint, OutOfMemory};

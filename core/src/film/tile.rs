@@ -70,3 +70,37 @@ const fn spread(x: u32) -> u32 {
     let x = (x | x << 2) & 0x33;
     (x | x << 1) & 0x55
 }
+
+/// Some pixels of a tile, a bit for each.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct PixelSet([u64; PIXELS_PER_TILE / 64]);
+
+impl PixelSet {
+    /// Whether the `i`th pixel of the tile is one of them.
+    #[inline]
+    pub fn contains(&self, i: usize) -> bool {
+        self.0.get(i / 64).is_some_and(|word| word >> (i % 64) & 1 == 1)
+    }
+
+    /// Adds the `i`th pixel of the tile.
+    pub fn insert(&mut self, i: usize) {
+        if let Some(word) = self.0.get_mut(i / 64) {
+            *word |= 1 << (i % 64);
+        }
+    }
+
+    /// Those that are not in `other` as well.
+    pub fn without(&self, other: &Self) -> Self {
+        Self(core::array::from_fn(|i| self.0[i] & !other.0[i]))
+    }
+
+    /// How many there are.
+    pub fn len(&self) -> u32 {
+        self.0.iter().map(|word| word.count_ones()).sum()
+    }
+
+    /// Whether there is none.
+    pub fn is_empty(&self) -> bool {
+        *self == Self::default()
+    }
+}

@@ -9,6 +9,7 @@ mod arrivals;
 mod cached;
 pub mod caustics;
 mod density;
+mod edges;
 mod estimator;
 mod flight;
 pub mod gather;

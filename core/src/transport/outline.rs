@@ -10,7 +10,7 @@ use super::path::PathTracer;
 use super::wave::Wave;
 use crate::bsdf::Features;
 use crate::bvh::{Bvh, Coherence};
-use crate::film::{PIXELS_PER_TILE, TILE, Tile};
+use crate::film::{PixelSet, TILE, Tile};
 use crate::geometry::{Hit, MISS, Ray};
 use crate::light::{Lights, emitted};
 use crate::sampling::Sampler;
@@ -31,49 +31,37 @@ const MARGIN: f32 = 0.01;
 /// A border that begins behind the camera is seen from this share of its greatest depth on.
 const NEAR: f32 = 1e-3;
 
-/// Pixels of a tile, a bit for each.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(super) struct Outlined([u64; PIXELS_PER_TILE / 64]);
-
-impl Outlined {
-    pub(super) fn contains(&self, place: usize) -> bool {
-        self.0.get(place / 64).is_some_and(|word| word >> (place % 64) & 1 == 1)
+/// Adds the pixels that the segment from `a` to `b` passes through, in raster coordinates from the tile's corner.
+fn add(pixels: &mut PixelSet, a: Vec2, b: Vec2) {
+    let (a, b) = if a.y <= b.y { (a, b) } else { (b, a) };
+    let side = TILE as f32;
+    let (low, high) = (a.min(b) - MARGIN, a.max(b) + MARGIN);
+    if !(low.x < side && high.x >= 0.0 && low.y < side && high.y >= 0.0) {
+        return;
     }
-
-    /// Adds the pixels that the segment from `a` to `b` passes through, in raster coordinates from the tile's corner.
-    fn add(&mut self, a: Vec2, b: Vec2) {
-        let (a, b) = if a.y <= b.y { (a, b) } else { (b, a) };
-        let side = TILE as f32;
-        let (low, high) = (a.min(b) - MARGIN, a.max(b) + MARGIN);
-        if !(low.x < side && high.x >= 0.0 && low.y < side && high.y >= 0.0) {
-            return;
+    let slope = if b.y > a.y { (b.x - a.x) / (b.y - a.y) } else { 0.0 };
+    let at = |y: f32| if slope == 0.0 { [a.x, b.x] } else { [a.x + slope * (y.clamp(a.y, b.y) - a.y); 2] };
+    // Casts saturate.
+    for y in low.y.max(0.0) as u32..=(high.y as u32).min(TILE - 1) {
+        let ([p, q], [r, s]) = (at(y as f32 - MARGIN), at(y as f32 + 1.0 + MARGIN));
+        let (left, right) = (p.min(q).min(r.min(s)) - MARGIN, p.max(q).max(r.max(s)) + MARGIN);
+        if right < 0.0 {
+            continue;
         }
-        let slope = if b.y > a.y { (b.x - a.x) / (b.y - a.y) } else { 0.0 };
-        let at =
-            |y: f32| if slope == 0.0 { [a.x, b.x] } else { [a.x + slope * (y.clamp(a.y, b.y) - a.y); 2] };
-        // Casts saturate.
-        for y in low.y.max(0.0) as u32..=(high.y as u32).min(TILE - 1) {
-            let ([p, q], [r, s]) = (at(y as f32 - MARGIN), at(y as f32 + 1.0 + MARGIN));
-            let (left, right) = (p.min(q).min(r.min(s)) - MARGIN, p.max(q).max(r.max(s)) + MARGIN);
-            if right < 0.0 {
-                continue;
-            }
-            for x in left.max(0.0) as u32..=(right as u32).min(TILE - 1) {
-                let place = Tile::position(TILE, x, y);
-                self.0[place / 64] |= 1 << (place % 64);
-            }
+        for x in left.max(0.0) as u32..=(right as u32).min(TILE - 1) {
+            pixels.insert(Tile::position(TILE, x, y));
         }
     }
 }
 
 /// The pixels of a tile that see the border of a lamp, as far as nothing is in the way. None where a sharp border is not
 /// seen: through a lens, or where surfaces have cut-outs.
-pub(super) fn outlined(scene: &Scene, lights: &Lights, settings: &PathSettings, tile: Tile) -> Outlined {
+pub(super) fn outlined(scene: &Scene, lights: &Lights, settings: &PathSettings, tile: Tile) -> PixelSet {
     let camera = &scene.camera;
     if camera.lens_radius > 0.0 {
-        return Outlined::default();
+        return PixelSet::default();
     }
-    let mut pixels = Outlined::default();
+    let mut pixels = PixelSet::default();
     let corner = Vec2::from(tile.corner().map(|c| c as f32));
     let on_raster = |point| {
         let seen = camera.project(settings.width, settings.height, point, [0.0; 2])?;
@@ -87,11 +75,11 @@ pub(super) fn outlined(scene: &Scene, lights: &Lights, settings: &PathSettings, 
             if depth < least { point + (other - point) * ((least - depth) / (beyond - depth)) } else { point }
         };
         if let (Some(a), Some(b)) = (on_raster(cut(a, near, b, far)), on_raster(cut(b, far, a, near))) {
-            pixels.add(a, b);
+            add(&mut pixels, a, b);
         }
     }
     let has_cutouts = || scene.materials.iter().any(Material::has_cutout);
-    if pixels == Outlined::default() || has_cutouts() { Outlined::default() } else { pixels }
+    if pixels.is_empty() || has_cutouts() { PixelSet::default() } else { pixels }
 }
 
 /// Whether the pixel in column `x` and row `y` is one of [`outlined`].
@@ -186,6 +174,7 @@ impl<F: Features> PathTracer<'_, F> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::film::PIXELS_PER_TILE;
     use crate::sampling::Random;
 
     #[test]
@@ -199,16 +188,16 @@ mod tests {
                 1 => b.x = a.x,
                 _ => (),
             }
-            let mut pixels = Outlined::default();
-            pixels.add(a, b);
-            let mut near = Outlined::default();
+            let mut pixels = PixelSet::default();
+            add(&mut pixels, a, b);
+            let mut near = PixelSet::default();
             for step in 0..=4000 {
                 let point = a.lerp(b, step as f32 / 4000.0);
                 for (x, y) in [(0, 0), (1, 0), (0, 1), (1, 1)] {
                     let [x, y] = [point.x - 0.03 + 0.06 * x as f32, point.y - 0.03 + 0.06 * y as f32];
                     if (0.0..TILE as f32).contains(&x) && (0.0..TILE as f32).contains(&y) {
                         let place = Tile::position(TILE, x as u32, y as u32);
-                        near.0[place / 64] |= 1 << (place % 64);
+                        near.insert(place);
                     }
                 }
                 if point.cmpge(Vec2::ZERO).all() && point.cmplt(Vec2::splat(TILE as f32)).all() {
@@ -222,10 +211,10 @@ mod tests {
 
     #[test]
     fn segments_that_are_no_numbers_are_none() {
-        let mut pixels = Outlined::default();
-        pixels.add(Vec2::splat(f32::NAN), Vec2::splat(3.0));
-        pixels.add(Vec2::new(f32::NEG_INFINITY, 3.0), Vec2::new(f32::INFINITY, f32::NAN));
-        pixels.add(Vec2::new(-1e30, -1e30), Vec2::new(1e30, 1e30));
-        pixels.add(Vec2::new(f32::NEG_INFINITY, 3.0), Vec2::new(f32::INFINITY, 3.5));
+        let mut pixels = PixelSet::default();
+        add(&mut pixels, Vec2::splat(f32::NAN), Vec2::splat(3.0));
+        add(&mut pixels, Vec2::new(f32::NEG_INFINITY, 3.0), Vec2::new(f32::INFINITY, f32::NAN));
+        add(&mut pixels, Vec2::new(-1e30, -1e30), Vec2::new(1e30, 1e30));
+        add(&mut pixels, Vec2::new(f32::NEG_INFINITY, 3.0), Vec2::new(f32::INFINITY, 3.5));
     }
 }

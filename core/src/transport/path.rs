@@ -12,6 +12,7 @@
 //!    (`irradiance_cache.rs`); nor where photons tell it (`density.rs`, `maps.rs`).
 //! 7. Pixels at the border of a lamp look at it with rays of their own (`outline.rs`).
 //! 8. Where photons of caustics lie, paths and photons share the light that both find (`merge.rs`).
+//! 9. Where all else is quiet, pixels that see an edge have several paths for each sample (`edges.rs`).
 //!
 //! The price: about 300 bytes for each path of a wave. What a pixel sees depends on (seed, sample) and the pixels of
 //! its group only, no wave cuts a group, and samples are summed in their order: the picture has the same bits for
@@ -26,8 +27,6 @@ use super::estimator::{
 };
 use super::maps::{PhotonMaps, Said};
 use super::merge::{ChainLink, Merging, ends_chain};
-use super::outline::{Outlined, outlined};
-use super::places::Places;
 use super::reuse::Exchange;
 use super::shadow::{FEW, pass_cutout, passing, shadow_ray};
 use super::spots::{Cones, Spot};
@@ -35,10 +34,10 @@ use super::wave::{Path, Share, Wave};
 use crate::bsdf::{Bsdf, Features};
 use crate::bvh::{Bvh, Coherence};
 use crate::cache::irradiance::{Indirect, IrradianceCache, POINTS};
-use crate::film::{GROUP, Pixel, Samples, Tile};
+use crate::film::{PixelSet, Tile};
 use crate::geometry::{Hit, Ray};
 use crate::light::{Aim, Lights, Row, Window, emitted};
-use crate::memory::{Arena, Footprint, OutOfMemory};
+use crate::memory::Footprint;
 use crate::sampling::Sampler;
 use crate::scene::{Material, Scene, SurfacePoint};
 use crate::{Level, Rgb};
@@ -58,6 +57,10 @@ pub(super) const BLOCK: usize = POINTS;
 /// the help of rays that find them by chance.
 const SMALL: f32 = 0.1;
 
+/// Points of lights that a path of the picture asks where a cache knows all other light: shadows are the noise that is left,
+/// and another point costs a third of a sample.
+pub(super) const LIGHTS: usize = 4;
+
 /// Path tracing of one scene: a pass whose tasks are the tiles of the picture.
 #[derive(Clone, Copy)]
 pub struct PathTracer<'a, F> {
@@ -76,6 +79,8 @@ pub struct PathTracer<'a, F> {
     maps: Option<&'a [PhotonMaps<'a>; 2]>,
     merging: Option<Merging<'a>>,
     pub(super) spots: &'a [Spot],
+    /// Tile by tile, or none.
+    pub(super) edges: &'a [PixelSet],
     features: PhantomData<F>,
 }
 
@@ -104,6 +109,7 @@ impl<'a, F: Features> PathTracer<'a, F> {
             maps: None,
             merging: None,
             spots: &[],
+            edges: &[],
             features: PhantomData,
         }
     }
@@ -124,6 +130,12 @@ impl<'a, F: Features> PathTracer<'a, F> {
     /// the picture would, too.
     pub fn with_spots(&self, spots: &'a [Spot]) -> Self {
         Self { spots, ..*self }
+    }
+
+    /// The same, where the pixels of `edges`, tile by tile, have several paths for each sample. Not where pixels share
+    /// their paths.
+    pub fn with_edges(&self, edges: &'a [PixelSet]) -> Self {
+        Self { edges, ..*self }
     }
 
     /// The same, where surfaces with a diffuse part have from photons what light is reflected onto them. Pixels must
@@ -165,83 +177,6 @@ impl<'a, F: Features> PathTracer<'a, F> {
         Wave::footprint(wave)
     }
 
-    /// Traces `samples` of tile `task` and adds them to `out`, the tile's pixels of the film.
-    ///
-    /// # Errors
-    /// [`OutOfMemory`] where `scratch` has less than [`PathTracer::scratch`] bytes.
-    pub fn run(
-        &self,
-        task: usize,
-        samples: impl Into<Samples>,
-        wave: usize,
-        scratch: &mut Arena,
-        out: &mut [Pixel],
-    ) -> Result<Counters, OutOfMemory> {
-        let mut arena = scratch.scratch();
-        let samples = samples.into();
-        // No larger than there are paths: the memory of a wave is cleared.
-        let paths = samples.count().saturating_mul(GROUP as u64);
-        let most = usize::try_from(paths).unwrap_or(usize::MAX);
-        let mut wave = Wave::new(wave.min(most), &mut arena)?;
-        let tile = Tile::new(self.settings.width, self.settings.height, task);
-        let mut counters = Counters::default();
-        let mut places = Places::new(tile, samples);
-        places.outlined = outlined(self.scene, self.lights, &self.settings, tile);
-        loop {
-            let count = self.start(&mut places, &mut wave);
-            if count == 0 {
-                return Ok(counters);
-            }
-            counters.paths += count as u64;
-            self.advance(&mut wave, count, &mut counters);
-            if self.settings.reuse {
-                self.share(&mut wave, count, &mut counters);
-            }
-            let has_lamps = places.outlined != Outlined::default();
-            if has_lamps {
-                let outlined = |place| places.outlined.contains(place as usize);
-                self.look_at_lamps(outlined, &mut wave, count, &mut counters);
-            }
-            for (i, (path, exchange)) in wave.paths.iter().zip(&*wave.exchanges).take(count).enumerate() {
-                if let Some(pixel) = out.get_mut(path.place as usize) {
-                    let lamps = if has_lamps { Rgb::from(wave.shadow_light[i]) } else { Rgb::ZERO };
-                    pixel.add(path.sample, exchange.seen(path) + lamps, &mut counters.dropped);
-                }
-            }
-        }
-    }
-
-    /// Fills the wave with camera rays; returns how many. Groups stay together.
-    pub(super) fn start(&self, places: &mut Places, wave: &mut Wave) -> usize {
-        let PathSettings { width, seed, .. } = self.settings;
-        let mut count = 0;
-        while count + GROUP <= wave.paths.len()
-            && let Some(group) = places.next_group()
-        {
-            for (place, x, y) in places.pixels(group) {
-                let index = y * width + x;
-                let sampler = Sampler::new(seed, index, group.sample);
-                let ray = self.camera_ray([x, y], &sampler);
-                wave.rays[count] = Ray { tag: count as u32, ..ray };
-                wave.paths[count] = Path {
-                    throughput: [1.0; 3],
-                    pdf: f32::INFINITY,
-                    pixel: index,
-                    place: place as u32,
-                    sample: group.sample,
-                    segments: 1,
-                    share: if places.outlined.contains(place) { Share::BESIDE_LAMP } else { Share::ALL },
-                    triangle: crate::geometry::MISS,
-                    eta_squared: 1.0,
-                    ..Path::default()
-                };
-                wave.exchanges[count] = Exchange::new(group.number());
-                count += 1;
-            }
-        }
-        count
-    }
-
     /// The camera ray of a sample of the pixel in column `x` and row `y`.
     #[inline]
     pub(super) fn camera_ray(&self, [x, y]: [u32; 2], sampler: &Sampler) -> Ray {
@@ -280,16 +215,19 @@ impl<'a, F: Features> PathTracer<'a, F> {
                 self.look_at(wave, i..active.min(i + BLOCK), &mut block);
             }
             let (ray, hit) = (wave.rays[i], wave.hits[i]);
-            let Some(path) = wave.paths.get_mut(ray.tag as usize) else { continue };
-            let Some(exchange) = wave.exchanges.get_mut(ray.tag as usize) else { continue };
-            let step = self.shade(path, exchange, &ray, &hit, block[i % BLOCK].as_ref(), counters);
-            if let Some((mut shadow, light)) = step.light {
-                shadow.tag |= ray.tag;
-                wave.shadow_rays[shadows] = shadow;
-                wave.shadow_light[shadows] = light.to_array();
-                shadows += 1;
+            // Several lights at a vertex have no place where all vertices are lit. Not through cut-outs, which have one each.
+            if shadows + LIGHTS > wave.shadow_rays.len() && !self.has_cutouts {
+                counters.shadow_rays += shadows as u64;
+                self.connect(wave, core::mem::take(&mut shadows));
             }
-            if let Some(mut next) = step.next {
+            let Wave { paths, exchanges, shadow_rays, shadow_light, .. } = wave;
+            let Some(path) = paths.get_mut(ray.tag as usize) else { continue };
+            let Some(exchange) = exchanges.get_mut(ray.tag as usize) else { continue };
+            let mut queue = Shadows { rays: shadow_rays, light: shadow_light, count: shadows };
+            let next =
+                self.shade(path, exchange, &ray, &hit, block[i % BLOCK].as_ref(), &mut queue, counters);
+            shadows = queue.count;
+            if let Some(mut next) = next {
                 next.tag = ray.tag;
                 wave.rays[going_on] = next;
                 going_on += 1;
@@ -393,7 +331,7 @@ impl<'a, F: Features> PathTracer<'a, F> {
         arrivals.receive(self.scene, wave.paths);
     }
 
-    /// One vertex: what the ray of `path` met.
+    /// One vertex: what the ray of `path` met. Where it goes on.
     #[inline]
     fn shade(
         &self,
@@ -402,8 +340,9 @@ impl<'a, F: Features> PathTracer<'a, F> {
         ray: &Ray,
         hit: &Hit,
         met: Option<&Met<'a>>,
+        shadows: &mut Shadows,
         counters: &mut Counters,
-    ) -> Step {
+    ) -> Option<Ray> {
         let scene = self.scene;
         if self.settings.reuse {
             exchange.go_behind(path);
@@ -431,9 +370,9 @@ impl<'a, F: Features> PathTracer<'a, F> {
                 }
                 path.add(throughput * radiance * weight);
             }
-            return Step::END;
+            return None;
         }
-        let Some(&Met { ref point, light: [u, v], aim, indirect, .. }) = met else { return Step::END };
+        let Some(&Met { ref point, light: [u, v], aim, indirect, .. }) = met else { return None };
 
         // A ray cannot meet the plane that it started on: rounding on a needle. Nor does a camera on a surface see its back.
         if hit.triangle == path.triangle || (segments == 1 && point.is_left_by(ray)) {
@@ -464,12 +403,12 @@ impl<'a, F: Features> PathTracer<'a, F> {
             }
         }
         if segments >= self.settings.max_depth {
-            return Step::END;
+            return None;
         }
 
         let bsdf = Bsdf::at::<F>(scene, point.material, point.uv, point.front);
         if path.share.ends_at(&bsdf) {
-            return Step::END;
+            return None;
         }
         let came = path.share;
         path.share = Share::ALL;
@@ -509,52 +448,62 @@ impl<'a, F: Features> PathTracer<'a, F> {
             Bsdf::Diffuse(_) if indirect.is_none() => Cones::around(self.spots, point.position, normal),
             _ => None,
         };
-        let mut light = None;
         if !self.lights.is_empty() && !bsdf.is_delta() && !said.is_lit {
-            let choice =
-                if self.lights.have_choice() { sampler.single(first + dimension::LIGHT_CHOICE) } else { 0.0 };
             // What transmits is looked at from both sides, a window from one.
             let aim = aim.filter(|_| normal != Vec3::ZERO);
-            let drawn = self.lights.draw(scene, point.position, normal, [u, v, choice], aim);
-            light = drawn.and_then(|(sample, later)| {
-                let wi = point.frame.to_local(sample.direction);
-                if !point.sides_agree(wi, sample.direction) {
-                    return None;
-                }
-                let (f, mut pdf) = bsdf.evaluate::<F>(wo, wi);
-                if f == Rgb::ZERO {
-                    return None;
-                }
-                let ray = shadow_ray(point, &sample)?;
-                if let Some(cones) = &cones {
-                    pdf = cones.density(sample.direction, pdf);
-                }
-                if self.settings.reuse && exchange.is_lit() {
-                    exchange.light_is_of_base(bsdf.base_part(wo, wi, f));
-                }
-                let alone = sample.delta || ends;
-                let mut weight = match alone {
-                    true => 1.0,
-                    false if later => environment_heuristic(self.lights, sample.pdf, pdf),
-                    false => power_heuristic(sample.pdf, pdf),
+            let wanted = if ends { path.lights.max(1) } else { 1 };
+            for part in 0..wanted {
+                let sampler = if wanted > 1 { path.part(self.settings.seed, part) } else { sampler };
+                let [u, v] = if wanted > 1 { sampler.pair(first + dimension::LIGHT) } else { [u, v] };
+                let choice = if self.lights.have_choice() {
+                    sampler.single(first + dimension::LIGHT_CHOICE)
+                } else {
+                    0.0
                 };
-                if let Some(merging) = &self.merging
-                    && !ends_chain(&bsdf)
-                {
-                    let there = ChainLink { point, bsdf: &bsdf, near: wo, far: wi };
-                    let to_light = there.reverse::<F>(scene) / sample.pdf;
-                    weight = merging.beside(weight, path.chain.abs() * to_light, || {
-                        merging.emission.density_of_sample(scene, self.lights, &sample, point.position)
-                    });
+                let drawn = self.lights.draw(scene, point.position, normal, [u, v, choice], aim);
+                let light = drawn.and_then(|(sample, later)| {
+                    let wi = point.frame.to_local(sample.direction);
+                    if !point.sides_agree(wi, sample.direction) {
+                        return None;
+                    }
+                    let (f, mut pdf) = bsdf.evaluate::<F>(wo, wi);
+                    if f == Rgb::ZERO {
+                        return None;
+                    }
+                    let shadow = shadow_ray(point, &sample)?;
+                    if let Some(cones) = &cones {
+                        pdf = cones.density(sample.direction, pdf);
+                    }
+                    if self.settings.reuse && exchange.is_lit() {
+                        exchange.light_is_of_base(bsdf.base_part(wo, wi, f));
+                    }
+                    let alone = sample.delta || ends;
+                    let mut weight = match alone {
+                        true => 1.0 / wanted as f32,
+                        false if later => environment_heuristic(self.lights, sample.pdf, pdf),
+                        false => power_heuristic(sample.pdf, pdf),
+                    };
+                    if let Some(merging) = &self.merging
+                        && !ends_chain(&bsdf)
+                    {
+                        let there = ChainLink { point, bsdf: &bsdf, near: wo, far: wi };
+                        let to_light = there.reverse::<F>(scene) / sample.pdf;
+                        weight = merging.beside(weight, path.chain.abs() * to_light, || {
+                            merging.emission.density_of_sample(scene, self.lights, &sample, point.position)
+                        });
+                    }
+                    let contribution = throughput * f * sample.radiance * (weight / sample.pdf);
+                    let tag = ray.tag | if later { TO_ENVIRONMENT } else { 0 };
+                    Some((Ray { tag, ..shadow }, contribution))
+                });
+                if let Some((shadow, light)) = light {
+                    shadows.push(shadow, light);
                 }
-                let contribution = throughput * f * sample.radiance * (weight / sample.pdf);
-                let tag = if later { TO_ENVIRONMENT } else { 0 };
-                Some((Ray { tag, ..ray }, contribution))
-            });
+            }
         }
 
         if ends {
-            return Step { light, next: None };
+            return None;
         }
 
         let mut reflected = None;
@@ -586,7 +535,7 @@ impl<'a, F: Features> PathTracer<'a, F> {
             }
             None => bsdf.sample::<F>(wo, [u, v, lobe]),
         };
-        let Some(sample) = sample else { return Step { light, next: None } };
+        let sample = sample?;
         // What a smooth coat mirrors was not gathered.
         if reflected.is_some() && !sample.delta {
             path.share = Share::EMITTED;
@@ -601,7 +550,7 @@ impl<'a, F: Features> PathTracer<'a, F> {
         }
         if self.maps.is_some() {
             if said.is_all && !sample.delta {
-                return Step { light, next: None };
+                return None;
             }
             path.share = if sample.delta { said.mirrored } else { said.next };
         }
@@ -609,7 +558,7 @@ impl<'a, F: Features> PathTracer<'a, F> {
         let certain = self.settings.reuse && is_diffuse && exchange.leave(point, throughput, segments);
         let direction = point.frame.to_world(sample.direction);
         if !point.sides_agree(sample.direction, direction) {
-            return Step { light, next: None };
+            return None;
         }
         path.eta_squared *= sample.eta * sample.eta;
         let worth = exchange.worth(throughput) * path.eta_squared;
@@ -618,16 +567,16 @@ impl<'a, F: Features> PathTracer<'a, F> {
         let survival = if certain || is_aimed { 1.0 } else { survival(segments, worth) };
         if survival < 1.0 {
             if sampler.single(first + dimension::ROULETTE) >= survival {
-                return Step { light, next: None };
+                return None;
             }
             throughput /= survival;
         }
         if throughput == Rgb::ZERO {
-            return Step { light, next: None };
+            return None;
         }
         if segments >= MAX_VERTICES {
             counters.dropped.unfinished += 1;
-            return Step { light, next: None };
+            return None;
         }
         if let Some(merging) = &self.merging {
             let there = ChainLink { point, bsdf: &bsdf, near: wo, far: sample.direction };
@@ -645,7 +594,7 @@ impl<'a, F: Features> PathTracer<'a, F> {
         path.normal = normal.to_array();
         path.segments += 1;
         path.triangle = hit.triangle;
-        Step { light, next: Some(point.spawn(direction)) }
+        Some(point.spawn(direction))
     }
 }
 
@@ -663,16 +612,21 @@ pub(super) struct Met<'a> {
     pub(super) indirect: Option<Indirect>,
 }
 
-/// What follows from a vertex.
-struct Step {
-    /// A shadow ray, and what arrives at the camera if nothing is in its way.
-    light: Option<(Ray, Rgb)>,
-    /// The next segment of the path.
-    next: Option<Ray>,
+/// Shadow rays, and what arrives at the camera from each if nothing is in its way.
+struct Shadows<'w> {
+    rays: &'w mut [Ray],
+    light: &'w mut [[f32; 3]],
+    count: usize,
 }
 
-impl Step {
-    const END: Step = Step { light: None, next: None };
+impl Shadows<'_> {
+    #[inline]
+    fn push(&mut self, ray: Ray, light: Rgb) {
+        if let (Some(slot), Some(arrives)) = (self.rays.get_mut(self.count), self.light.get_mut(self.count)) {
+            (*slot, *arrives) = (ray, light.to_array());
+            self.count += 1;
+        }
+    }
 }
 
 impl Path {
@@ -681,15 +635,22 @@ impl Path {
         self.radiance = (Rgb::from(self.radiance) + radiance).to_array();
     }
 
+    /// Random numbers for one of the points of lights that it asks where it ends: those of all its pixel's are a net.
+    #[inline]
+    fn part(&self, seed: u32, part: u32) -> Sampler {
+        let index = (self.sample >> 1).wrapping_mul(self.lights).wrapping_add(part);
+        Sampler::replicate(seed, self.pixel, self.sample & 1, index)
+    }
+
     /// Goes on behind the triangle of `hit` as if it were not there.
     #[cold]
-    fn cross(&mut self, next: Ray, hit: &Hit, counters: &mut Counters) -> Step {
+    fn cross(&mut self, next: Ray, hit: &Hit, counters: &mut Counters) -> Option<Ray> {
         if u32::from(self.crossings) >= MAX_CROSSINGS {
             counters.dropped.unfinished += 1;
-            return Step::END;
+            return None;
         }
         self.crossings += 1;
         self.triangle = hit.triangle;
-        Step { light: None, next: Some(next) }
+        Some(next)
     }
 }

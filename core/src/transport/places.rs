@@ -1,57 +1,203 @@
-//! In which order the samples of a tile are taken, and which of them share: layer after layer, one sample of each
-//! pixel of each group that is to have any more.
+//! The samples of a tile: in which order they are taken, how their paths begin, and what becomes of their light.
+//!
+//! Layer after layer, one sample of each pixel that is to have any more. Where pixels share their paths, those of a group
+//! stay together; else all go along the Z-curve, so that neighbours ask caches together. A pixel that sees an edge has
+//! [`PER_EDGE`] paths for each sample: it is sampled as if it had so many more, taken together.
 
-use super::outline::Outlined;
-use crate::film::{GROUP, GROUPS, Samples, Tile};
-
-/// Pixels that share, one sample of each.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Group {
-    pub(super) sample: u32,
-    index: usize,
-}
-
-impl Group {
-    /// Another number for each group that a wave can hold.
-    pub(super) fn number(self) -> u32 {
-        self.sample.wrapping_mul(GROUPS as u32) + self.index as u32
-    }
-}
+use super::edges::PER_EDGE;
+use super::estimator::{Counters, PathSettings};
+use super::outline::outlined;
+use super::path::{LIGHTS, PathTracer};
+use super::reuse::Exchange;
+use super::wave::{Path, Share, Wave};
+use crate::Rgb;
+use crate::bsdf::Features;
+use crate::film::{GROUP, GROUPS, PIXELS_PER_TILE, Pixel, PixelSet, Samples, Tile};
+use crate::geometry::{MISS, Ray};
+use crate::memory::{Arena, OutOfMemory};
+use crate::sampling::Sampler;
 
 /// All samples of a tile that are still to be taken.
 pub(super) struct Places {
     tile: Tile,
     left: Samples,
-    index: usize,
+    /// The next group of a layer; where nothing is shared, the next pixel, and how many layers are done.
+    next: usize,
+    layer: u32,
     /// Pixels whose paths leave the lamp that they see to others.
-    pub(super) outlined: Outlined,
+    outlined: PixelSet,
+    /// Pixels that have several paths for each sample.
+    edges: PixelSet,
 }
 
 impl Places {
     pub(super) fn new(tile: Tile, samples: Samples) -> Self {
-        Self { tile, left: samples, index: 0, outlined: Outlined::default() }
+        let none = PixelSet::default();
+        Self { tile, left: samples, next: 0, layer: 0, outlined: none, edges: none }
     }
 
-    pub(super) fn next_group(&mut self) -> Option<Group> {
+    /// The next group, and which sample of its pixels.
+    fn next_group(&mut self) -> Option<(usize, u32)> {
         for _ in 0..GROUPS {
-            let index = self.index;
-            self.index = (index + 1) % GROUPS;
+            let index = self.next;
+            self.next = (index + 1) % GROUPS;
             let (next, end) = (self.left.from.get_mut(index)?, *self.left.to.get(index)?);
             if *next < end {
                 let sample = *next;
                 *next += 1;
-                return Some(Group { sample, index });
+                return Some((index, sample));
             }
         }
         None
     }
 
-    /// The pixels of a group: where the film keeps them in the tile, column and row.
-    pub(super) fn pixels(&self, group: Group) -> impl Iterator<Item = (usize, u32, u32)> + use<> {
-        let tile = self.tile;
-        (0..GROUP).filter_map(move |member| {
-            let place = Tile::member(group.index, member);
-            tile.pixel(place).map(|(x, y)| (place, x, y))
-        })
+    /// The next pixel along the Z-curve, and which of its samples.
+    fn next_pixel(&mut self) -> Option<(usize, u32)> {
+        loop {
+            if self.next == PIXELS_PER_TILE {
+                (self.next, self.layer) = (0, self.layer + 1);
+            }
+            if self.next == 0 {
+                let layer = self.layer;
+                let mut groups = self.left.from.iter().zip(&self.left.to);
+                groups.find(|(from, to)| from.checked_add(layer).is_some_and(|sample| sample < **to))?;
+            }
+            let place = self.next;
+            self.next += 1;
+            let group = Tile::group(place);
+            let sample = self.left.from.get(group)?.checked_add(self.layer);
+            if let Some(sample) =
+                sample.filter(|sample| self.left.to.get(group).is_some_and(|to| sample < to))
+            {
+                return Some((place, sample));
+            }
+        }
+    }
+
+    /// How many paths a sample of a pixel has.
+    fn paths(&self, place: usize) -> u32 {
+        if self.edges.contains(place) { PER_EDGE } else { 1 }
+    }
+}
+
+impl<F: Features> PathTracer<'_, F> {
+    /// Traces `samples` of tile `task` and adds them to `out`, the tile's pixels of the film.
+    ///
+    /// # Errors
+    /// [`OutOfMemory`] where `scratch` has less than [`PathTracer::scratch`] bytes.
+    pub fn run(
+        &self,
+        task: usize,
+        samples: impl Into<Samples>,
+        wave: usize,
+        scratch: &mut Arena,
+        out: &mut [Pixel],
+    ) -> Result<Counters, OutOfMemory> {
+        let mut arena = scratch.scratch();
+        let samples = samples.into();
+        let tile = Tile::new(self.settings.width, self.settings.height, task);
+        let mut counters = Counters::default();
+        let mut places = Places::new(tile, samples);
+        places.outlined = outlined(self.scene, self.lights, &self.settings, tile);
+        places.edges = self.edges.get(task).copied().unwrap_or_default().without(&places.outlined);
+        // No larger than there are paths: the memory of a wave is cleared.
+        let most = if places.edges.is_empty() { 1 } else { u64::from(PER_EDGE) };
+        let paths = samples.count().saturating_mul(GROUP as u64).saturating_mul(most);
+        let most = usize::try_from(paths).unwrap_or(usize::MAX);
+        let mut wave = Wave::new(wave.min(most), &mut arena)?;
+        loop {
+            let count = self.start(&mut places, &mut wave);
+            if count == 0 {
+                return Ok(counters);
+            }
+            counters.paths += count as u64;
+            self.advance(&mut wave, count, &mut counters);
+            if self.settings.reuse {
+                self.share(&mut wave, count, &mut counters);
+            }
+            let has_lamps = !places.outlined.is_empty();
+            if has_lamps {
+                let outlined = |place| places.outlined.contains(place as usize);
+                self.look_at_lamps(outlined, &mut wave, count, &mut counters);
+            }
+            let mut light = Rgb::ZERO;
+            for (i, (path, exchange)) in wave.paths.iter().zip(&*wave.exchanges).take(count).enumerate() {
+                let lamps = if has_lamps { Rgb::from(wave.shadow_light[i]) } else { Rgb::ZERO };
+                let seen = exchange.seen(path) + lamps;
+                let Some(pixel) = out.get_mut(path.place as usize) else { continue };
+                if !places.edges.contains(path.place as usize) {
+                    pixel.add(path.sample, seen, &mut counters.dropped);
+                    continue;
+                }
+                // Those of a sample are together.
+                light += seen / PER_EDGE as f32;
+                let part = path.sample >> 1;
+                if part % PER_EDGE == PER_EDGE - 1 {
+                    let sample = ((part / PER_EDGE) << 1) | (path.sample & 1);
+                    pixel.add(sample, core::mem::take(&mut light), &mut counters.dropped);
+                }
+            }
+        }
+    }
+
+    /// Fills the wave with camera rays; returns how many. Groups that share stay together, and so do the paths of a sample.
+    pub(super) fn start(&self, places: &mut Places, wave: &mut Wave) -> usize {
+        let mut count = 0;
+        if self.settings.reuse {
+            while count + GROUP <= wave.paths.len()
+                && let Some((group, sample)) = places.next_group()
+            {
+                // Another number for each group that a wave can hold.
+                let exchange = Exchange::new(sample.wrapping_mul(GROUPS as u32) + group as u32);
+                for member in 0..GROUP {
+                    self.begin(places, Tile::member(group, member), sample, exchange, wave, &mut count);
+                }
+            }
+            return count;
+        }
+        while count + PER_EDGE as usize <= wave.paths.len()
+            && let Some((place, sample)) = places.next_pixel()
+        {
+            let paths = places.paths(place);
+            for part in 0..paths {
+                // The next points of the half of the samples that it belongs to.
+                let point = (sample >> 1).wrapping_mul(paths).wrapping_add(part);
+                self.begin(places, place, (point << 1) | (sample & 1), Exchange::new(0), wave, &mut count);
+            }
+        }
+        count
+    }
+
+    /// Puts a path into the wave, where there is such a pixel.
+    #[inline]
+    fn begin(
+        &self,
+        places: &Places,
+        place: usize,
+        sample: u32,
+        exchange: Exchange,
+        wave: &mut Wave,
+        count: &mut usize,
+    ) {
+        let PathSettings { width, seed, .. } = self.settings;
+        let Some((x, y)) = places.tile.pixel(place) else { return };
+        let index = y * width + x;
+        let ray = self.camera_ray([x, y], &Sampler::new(seed, index, sample));
+        wave.rays[*count] = Ray { tag: *count as u32, ..ray };
+        wave.paths[*count] = Path {
+            throughput: [1.0; 3],
+            pdf: f32::INFINITY,
+            pixel: index,
+            place: place as u32,
+            sample,
+            segments: 1,
+            share: if places.outlined.contains(place) { Share::BESIDE_LAMP } else { Share::ALL },
+            triangle: MISS,
+            eta_squared: 1.0,
+            lights: if places.edges.contains(place) || self.has_cutouts { 1 } else { LIGHTS as u32 },
+            ..Path::default()
+        };
+        wave.exchanges[*count] = exchange;
+        *count += 1;
     }
 }

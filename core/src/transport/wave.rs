@@ -41,6 +41,8 @@ pub(super) struct Path {
     /// there than paths from there to the light, but for what the light has to do with it ([`super::merge`]). Negative
     /// on the way to the first mirror or glass; zero where photons could not find the path.
     pub(super) chain: f32,
+    /// Points of lights that it asks for direct light where a shadow ray alone finds that; 0 stands for one.
+    pub(super) lights: u32,
 }
 
 /// Light that comes to a diffuse point is either direct, from emitters and from what mirrors or refracts them; or it

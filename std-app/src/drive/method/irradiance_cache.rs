@@ -22,9 +22,10 @@ use crate::drive::{RenderError, Settings};
 use core::f32::consts::FRAC_PI_2;
 use halflight_core::bsdf::Features;
 use halflight_core::cache::irradiance::{CellFlux, IrradianceCache, Metric, metric};
+use halflight_core::film::PixelSet;
 use halflight_core::memory::{Arena, Line};
 use halflight_core::transport::gather::Gathering;
-use halflight_core::transport::{PathTracer, path::WAVE};
+use halflight_core::transport::{Counters, PathTracer, path::WAVE};
 use std::collections::VecDeque;
 use std::path::Path;
 use std::time::Instant;
@@ -100,6 +101,9 @@ const FEWEST_RECORDS: usize = 4096;
 
 /// Least radius of a record in pixels: neighbouring pixels of the overture reach each other.
 pub(in crate::drive) const LEAST_PIXELS: f32 = 2.0;
+
+/// Pixels that see an edge have several paths for each sample, unless more than one in so many does.
+const FEW_EDGES: usize = 8;
 
 /// Takes the memory, sets the method up, and hands it to `then`.
 pub(super) fn with<F: Features, T>(
@@ -183,6 +187,7 @@ pub(super) fn with<F: Features, T>(
         header,
         save: settings.save_cache.as_deref(),
         is_filled: false,
+        edges: None,
         seconds: 0.0,
     };
     let is_served = !has_indirect_light(settings) || method.header.serves(&method.view);
@@ -226,6 +231,8 @@ struct Cached<'a, F> {
     refined: usize,
     /// Refinements that wait until the caches of before are filled.
     pending: VecDeque<Refinement>,
+    /// Pixels that see an edge, when they are known.
+    edges: Option<Vec<PixelSet>>,
     seconds: f64,
 }
 
@@ -259,6 +266,26 @@ impl<F: Features> Cached<'_, F> {
         self.save()?;
         self.seconds += start.elapsed().as_secs_f64();
         Ok(all)
+    }
+
+    /// Looks for pixels that see an edge; whether that is done.
+    fn find_edges(&mut self, crew: &mut Crew) -> Result<bool, RenderError> {
+        let Self { tracer, size: [width, height], scratch, .. } = self;
+        let mut edges = vec![PixelSet::default(); tracer.tasks()];
+        let look = |task: usize, _: &mut Arena, out: &mut [PixelSet]| {
+            let mut counters = Counters::default();
+            out.iter_mut().for_each(|edges| *edges = tracer.edges(task, &mut counters));
+            Ok(counters)
+        };
+        if !crew.pass(&mut edges, 1, scratch, &look)? {
+            return Ok(false);
+        }
+        let found: usize = edges.iter().map(|edges| edges.len() as usize).sum();
+        if found * FEW_EDGES > *width as usize * *height as usize {
+            edges.clear();
+        }
+        self.edges = Some(edges);
+        Ok(true)
     }
 
     /// Begins caches that are better.
@@ -310,8 +337,12 @@ impl<F: Features> Renderer for Cached<'_, F> {
                 self.begin(next);
             }
         }
-        let Self { tracer, halves: [even, odd], scratch, .. } = self;
-        let tracer = tracer.with_caches([&even.cache, &odd.cache]);
+        if self.edges.is_none() && !self.find_edges(crew)? {
+            return Ok(());
+        }
+        let Self { tracer, halves: [even, odd], scratch, edges, .. } = self;
+        let edges = edges.as_deref().unwrap_or_default();
+        let tracer = tracer.with_caches([&even.cache, &odd.cache]).with_edges(edges);
         crew.tiles(u32::MAX, scratch, &|task, samples, arena, pixels| {
             tracer.run(task, samples, WAVE, arena, pixels)
         })?;

@@ -28,8 +28,10 @@ const FEW: usize = 50;
 /// than this for each path, over the median, are forgotten: what follows finds its light where records are.
 const ALONE: f32 = 1.3;
 
-/// Places that are gathered at before their records are committed.
-const GATHERED: usize = 32;
+/// Places that are gathered at before their records are committed: the fewest and the most, and a part of the records that
+/// there are, so that the first ones soon serve others.
+const GATHERED: [usize; 2] = [8, 32];
+const GATHERED_PART: usize = 4;
 
 /// Glints that are kept of each record, and looked at closely of each batch; how many of these may be no spots.
 const GLINTS: usize = 4;
@@ -263,7 +265,9 @@ impl<F: Features> Overture<'_, '_, F> {
             let mut missing: Vec<Place> = places.into_iter().filter(Place::is_some).collect();
             while !missing.is_empty() {
                 missing.retain(|place| !growing.is_served(place));
-                let batch: Vec<Place> = missing.drain(..missing.len().min(GATHERED)).collect();
+                let [fewest, most] = GATHERED;
+                let most = (growing.cache.records().len() / GATHERED_PART).clamp(fewest, most);
+                let batch: Vec<Place> = missing.drain(..missing.len().min(most)).collect();
                 match self.gather(&batch, growing, crew, scratch)? {
                     Gathered::All => (),
                     Gathered::Cut => return Ok(false),
