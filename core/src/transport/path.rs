@@ -225,7 +225,7 @@ impl<'a, F: Features> PathTracer<'a, F> {
             let Some(exchange) = exchanges.get_mut(ray.tag as usize) else { continue };
             let mut queue = Shadows { rays: shadow_rays, light: shadow_light, count: shadows };
             let next =
-                self.shade(path, exchange, &ray, &hit, block[i % BLOCK].as_ref(), &mut queue, counters);
+                self.shade(path, exchange, (&ray, &hit), block[i % BLOCK].as_ref(), &mut queue, counters);
             shadows = queue.count;
             if let Some(mut next) = next {
                 next.tag = ray.tag;
@@ -337,8 +337,7 @@ impl<'a, F: Features> PathTracer<'a, F> {
         &self,
         path: &mut Path,
         exchange: &mut Exchange,
-        ray: &Ray,
-        hit: &Hit,
+        (ray, hit): (&Ray, &Hit),
         met: Option<&Met<'a>>,
         shadows: &mut Shadows,
         counters: &mut Counters,
@@ -372,7 +371,7 @@ impl<'a, F: Features> PathTracer<'a, F> {
             }
             return None;
         }
-        let Some(&Met { ref point, light: [u, v], aim, indirect, .. }) = met else { return None };
+        let &Met { ref point, light: [u, v], aim, indirect, .. } = met?;
 
         // A ray cannot meet the plane that it started on: rounding on a needle. Nor does a camera on a surface see its back.
         if hit.triangle == path.triangle || (segments == 1 && point.is_left_by(ray)) {
