@@ -7,8 +7,8 @@
 //!    ([`super::Shrinkage`]), the mean of the quotients by what each pair of quarters says.
 //! 2. What is left of that is seen where nothing hides itself: the variance of one pair over the square of what the
 //!    *other* says is too large, for where light is rare both are. With δ the logarithm of its quotient to the variance
-//!    of the pairs over the common squares, its logarithm goes up by δ / (1 + 10 δ), and is as uncertain as δ, and as the
-//!    logarithm of what pixels add that may be other than they probably are.
+//!    of the pairs over the common squares, its logarithm goes up by δ / (1 + 10 δ), and is as uncertain as δ, and as
+//!    what is added for pixels that may be other than they probably are.
 //! 3. The error that this picture has and its estimate differ by the mean of the product of both halves' errors,
 //!    exactly. For a pixel of variance V the product has the variance 4 V², and the estimate squared the mean 3 V² (more
 //!    with heavy tails); Student's t says what it is to know that from few pixels. How errors hang together between
