@@ -29,19 +29,24 @@ fn seen(scene: &SceneBuffers) -> Vec<f32> {
     picture.image.pixels.iter().map(|pixel| pixel[1] / RADIANCE).collect()
 }
 
-/// A lamp from a hundredth of a pixel before whole pixels to a hundredth behind them.
-fn lamp(camera: Camera) -> (SceneBuffers, [Vec2; 2]) {
+/// A lamp from a hundredth of a pixel before whole pixels to a hundredth behind them, of `pieces` by `pieces` squares.
+fn lamp(camera: Camera, pieces: u32) -> (SceneBuffers, [Vec2; 2]) {
     let mut scene = SceneBuffers::new(camera);
     let lamp = scene.material(emitter(0.0, RADIANCE));
     let (low, high) = (Vec2::new(4.986, 9.986), Vec2::new(21.014, 12.014));
-    let corners = [Vec2::new(low.x, high.y), high, Vec2::new(high.x, low.y), low];
-    scene.quad(corners.map(|corner| through(&camera, corner)), lamp);
+    let at = |x: u32, y: u32| {
+        let share = Vec2::new(x as f32, y as f32) / pieces as f32;
+        through(&camera, low + share * (high - low))
+    };
+    for (x, y) in (0..pieces * pieces).map(|piece| (piece % pieces, piece / pieces)) {
+        scene.quad([at(x, y + 1), at(x + 1, y + 1), at(x + 1, y), at(x, y)], lamp);
+    }
     (scene, [low, high])
 }
 
 #[test]
 fn an_audit_sees_borders_as_the_picture_does() {
-    let (scene, _) = lamp(camera());
+    let (scene, _) = lamp(camera(), 1);
     // With an error to reach, the work of an audit is counted in rays: the same each time.
     let picture = render(&scene.scene(), Method::Path, SIZE, 256, |settings| {
         settings.stop.error = Some(1e-9);
@@ -55,16 +60,19 @@ fn an_audit_sees_borders_as_the_picture_does() {
 #[test]
 fn a_hundredth_of_a_pixel_is_seen_by_every_pixel() {
     let camera = camera();
-    let (scene, [low, high]) = lamp(camera);
-    for (i, seen) in seen(&scene).into_iter().enumerate() {
-        let pixel = Vec2::new((i as u32 % SIZE) as f32, (i as u32 / SIZE) as f32);
-        let inside = (high.min(pixel + 1.0) - low.max(pixel)).max(Vec2::ZERO);
-        let share = inside.x * inside.y;
-        // In the corners a ten-thousandth.
-        if share < 0.001 {
-            assert!(seen < 0.003, "{pixel}: {seen} of {share}");
-        } else {
-            assert!((seen / share - 1.0).abs() < TOLERANCE, "{pixel}: {seen} of {share}");
+    // Of 1250 triangles as of two.
+    for pieces in [1, 25] {
+        let (scene, [low, high]) = lamp(camera, pieces);
+        for (i, seen) in seen(&scene).into_iter().enumerate() {
+            let pixel = Vec2::new((i as u32 % SIZE) as f32, (i as u32 / SIZE) as f32);
+            let inside = (high.min(pixel + 1.0) - low.max(pixel)).max(Vec2::ZERO);
+            let share = inside.x * inside.y;
+            // In the corners a ten-thousandth.
+            if share < 0.001 {
+                assert!(seen < 0.003, "{pixel}: {seen} of {share}");
+            } else {
+                assert!((seen / share - 1.0).abs() < TOLERANCE, "{pixel}: {seen} of {share}");
+            }
         }
     }
 }

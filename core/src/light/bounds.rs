@@ -53,6 +53,11 @@ impl Group {
         }
     }
 
+    /// What `meets` says of the sphere.
+    pub(super) fn lies_where(&self, meets: impl Fn(Vec3, f32) -> bool) -> bool {
+        meets(self.center.into(), self.radius)
+    }
+
     /// An estimate of the irradiance at `point` on a surface with `normal` (zero: facing everywhere). Zero
     /// only where no light of the group can reach the front of the surface.
     #[inline]

@@ -120,18 +120,20 @@ impl Emitter {
         [o, o + u, o + v, o + u + v].into_iter().take(count)
     }
 
-    /// Its edges, one after the other.
-    pub(super) fn border(&self) -> impl Iterator<Item = [Vec3; 2]> + use<> {
-        let [o, u, v] = [self.origin, self.edges[0], self.edges[1]].map(Vec3::from);
-        let (last, count) = if self.is_pair() { (o + u + v, 4) } else { (o + v, 3) };
-        [[o, o + u], [o + u, last], [last, if count == 4 { o + v } else { o }], [o + v, o]]
-            .into_iter()
-            .take(count)
+    /// Its edges, between corners of the mesh: those of its neighbours are the same to the bit.
+    pub(super) fn border(&self, mesh: &Mesh) -> impl Iterator<Item = [Vec3; 2]> + use<> {
+        let [o, a, b] = rotated(mesh.corners(self.triangle), self.flags >> 2 & 3);
+        let (last, count) = match self.is_pair() {
+            true => (rotated(mesh.corners(self.triangle + 1), self.flags >> 4 & 3)[0], 4),
+            false => (b, 3),
+        };
+        [[o, a], [a, last], [last, if count == 4 { b } else { o }], [b, o]].into_iter().take(count)
     }
 
-    /// Whether any of its light goes towards `eye`.
-    pub(super) fn faces(&self, eye: Vec3) -> bool {
-        self.is_two_sided() || (eye - Vec3::from(self.origin)).dot(self.normal.into()) > 0.0
+    /// Whether its front is seen from `eye`, if any of its light goes there.
+    pub(super) fn faces(&self, eye: Vec3) -> Option<bool> {
+        let front = self.height(eye) > 0.0;
+        (front || self.is_two_sided()).then_some(front)
     }
 
     pub(super) fn cone(&self) -> Cone {

@@ -4,6 +4,7 @@
 //! chooses among; the environment; directional lights. Which kind is decided by estimates of the irradiance
 //! they bring, with a floor for each, since nobody knows yet what is hidden.
 
+use super::border::Edges;
 use super::bounds::Cone;
 use super::emitter::{Emitter, Place};
 use super::environment::EnvironmentSampler;
@@ -15,7 +16,7 @@ use crate::bsdf::All;
 use crate::geometry::Bounds;
 use crate::memory::{Arena, Footprint, OutOfMemory};
 use crate::sampling::{AliasTable, ONE_MINUS_EPSILON, Sampler, warp::uniform_triangle};
-use crate::scene::{Material, Scene};
+use crate::scene::{Material, Mesh, Scene};
 use glam::{Vec2, Vec3};
 
 /// The least share of each kind of light that is there.
@@ -309,10 +310,34 @@ impl<'m> Lights<'m> {
         (triangle - emitter.triangle <= u32::from(emitter.is_pair())).then_some((index, emitter))
     }
 
-    /// The borders of all emitters that shine towards `eye`; nothing where there are more than `most` emitters.
-    pub(crate) fn borders(&self, eye: Vec3, most: usize) -> impl Iterator<Item = [Vec3; 2]> {
-        let few = if self.emitters.len() <= most { self.emitters } else { &[] };
-        few.iter().filter(move |emitter| emitter.faces(eye)).flat_map(Emitter::border)
+    /// Draws the borders of lamps that shine towards `eye`, of those that `meets` does not rule out by the centre and the
+    /// radius of spheres around them; nothing where they are more than `most` triangles and parallelograms.
+    pub(crate) fn borders(
+        &self,
+        mesh: &Mesh,
+        eye: Vec3,
+        most: usize,
+        meets: impl Fn(Vec3, f32) -> bool,
+        mut draw: impl FnMut([Vec3; 2]),
+    ) {
+        let visit = |each: &mut dyn FnMut(&Emitter, bool)| {
+            self.tree.visit(&meets, |light| {
+                let emitter = self.emitters.get(light as usize);
+                if let Some((emitter, front)) = emitter.and_then(|e| Some((e, e.faces(eye)?))) {
+                    each(emitter, front);
+                }
+            });
+        };
+        let mut count = 0;
+        visit(&mut |_, _| count += 1);
+        if count == 0 || count > most {
+            return;
+        }
+        let mut edges = Edges::new();
+        visit(&mut |emitter, front| emitter.border(mesh).for_each(|edge| edges.add(edge, front)));
+        visit(&mut |emitter, front| {
+            emitter.border(mesh).filter(|edge| edges.is_border(*edge, front)).for_each(&mut draw);
+        });
     }
 
     /// A triangle of emitter `light`.

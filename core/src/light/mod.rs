@@ -1,5 +1,6 @@
 //! Lights: what a scene file can name, and how transport samples all of them together.
 
+mod border;
 mod bounds;
 mod emission;
 mod emitter;

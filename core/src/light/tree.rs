@@ -148,6 +148,26 @@ impl<'m> Tree<'m> {
         probability
     }
 
+    /// Every light of a group that `meets` does not rule out, by the centre and the radius of a sphere around it.
+    pub(super) fn visit(&self, meets: impl Fn(Vec3, f32) -> bool, mut each: impl FnMut(u32)) {
+        // As deep as the tree, as both children of a node are taken at once.
+        let mut stack = [0; 65];
+        let mut waiting = usize::from(!self.nodes.is_empty());
+        while let Some(next) = waiting.checked_sub(1) {
+            waiting = next;
+            let Some(node) = stack.get(next).and_then(|node| self.nodes.get(*node)) else { return };
+            if !node.group.lies_where(&meets) {
+                continue;
+            }
+            if node.link & LEAF != 0 {
+                each(node.link & !LEAF);
+            } else if let Some(free) = stack.get_mut(next..next + 2) {
+                free.copy_from_slice(&[node.link as usize, node.link as usize + 1]);
+                waiting += 2;
+            }
+        }
+    }
+
     /// Both children of an inner node, and the probability of the left one. `None` where neither can reach.
     #[inline]
     fn children(&self, node: &Node, point: Vec3, normal: Vec3) -> Option<(&'m Node, &'m Node, f32)> {

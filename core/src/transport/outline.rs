@@ -14,7 +14,7 @@ use crate::film::{PixelSet, TILE, Tile};
 use crate::geometry::{Hit, MISS, Ray};
 use crate::light::{Lights, emitted};
 use crate::sampling::Sampler;
-use crate::scene::{Material, Scene, SurfacePoint};
+use crate::scene::{Camera, Material, Scene, SurfacePoint};
 use crate::{Level, Rgb};
 use glam::{Vec2, Vec3};
 
@@ -22,8 +22,9 @@ use glam::{Vec2, Vec3};
 /// samples, in a pixel of a hundred.
 const RAYS: u32 = 32;
 
-/// Where lamps are more than this the light of one is little, and to look at all borders would take its time.
-const MOST_LAMPS: usize = 64;
+/// Where a tile sees more triangles of lamps than this they are smaller than its pixels, and to look at all borders would
+/// take its time.
+const MOST_LAMPS: usize = 4096;
 
 /// Borders count as seen from so many pixels away: more than rounding.
 const MARGIN: f32 = 0.01;
@@ -54,6 +55,40 @@ fn add(pixels: &mut PixelSet, a: Vec2, b: Vec2) {
     }
 }
 
+/// A cone around what a tile sees.
+struct View {
+    eye: Vec3,
+    axis: Vec3,
+    cos: f32,
+    sin: f32,
+}
+
+impl View {
+    fn of(camera: &Camera, settings: &PathSettings, tile: Tile) -> Self {
+        let direction = |[x, y]: [f32; 2]| -> Vec3 {
+            camera.ray(settings.width, settings.height, x, y, [0.0; 2]).direction.into()
+        };
+        // A pixel more to each side.
+        let [near, far] = [-1.0, TILE as f32 + 1.0].map(|by| tile.corner().map(|c| c as f32 + by));
+        let axis = direction([0, 1].map(|i| 0.5 * (near[i] + far[i])));
+        let corners = [near, far, [near[0], far[1]], [far[0], near[1]]];
+        let cos = corners.map(|corner| direction(corner).dot(axis)).into_iter().fold(1.0, f32::min);
+        Self { eye: camera.eye, axis, cos, sin: libm::sqrtf((1.0 - cos * cos).max(0.0)) }
+    }
+
+    /// Whether a sphere reaches into the cone.
+    fn meets(&self, center: Vec3, radius: f32) -> bool {
+        let to = center - self.eye;
+        let distance = to.length();
+        if radius >= distance || !distance.is_finite() {
+            return true;
+        }
+        let sin = radius / distance;
+        let cos = libm::sqrtf((1.0 - sin * sin).max(0.0));
+        to.dot(self.axis) >= distance * (self.cos * cos - self.sin * sin - 1e-4)
+    }
+}
+
 /// The pixels of a tile that see the border of a lamp, as far as nothing is in the way. None where a sharp border is not
 /// seen: through a lens, or where surfaces have cut-outs.
 pub(super) fn outlined(scene: &Scene, lights: &Lights, settings: &PathSettings, tile: Tile) -> PixelSet {
@@ -67,7 +102,9 @@ pub(super) fn outlined(scene: &Scene, lights: &Lights, settings: &PathSettings, 
         let seen = camera.project(settings.width, settings.height, point, [0.0; 2])?;
         Some(seen.raster - corner)
     };
-    for [a, b] in lights.borders(camera.eye, MOST_LAMPS) {
+    let view = View::of(camera, settings, tile);
+    let meets = |center, radius| view.meets(center, radius);
+    lights.borders(&scene.mesh, camera.eye, MOST_LAMPS, meets, |[a, b]| {
         // What is behind the camera is cut off.
         let [near, far] = [a, b].map(|point| (point - camera.eye).dot(camera.forward));
         let least = NEAR * near.max(far);
@@ -77,7 +114,7 @@ pub(super) fn outlined(scene: &Scene, lights: &Lights, settings: &PathSettings, 
         if let (Some(a), Some(b)) = (on_raster(cut(a, near, b, far)), on_raster(cut(b, far, a, near))) {
             add(&mut pixels, a, b);
         }
-    }
+    });
     let has_cutouts = || scene.materials.iter().any(Material::has_cutout);
     if pixels.is_empty() || has_cutouts() { PixelSet::default() } else { pixels }
 }
