@@ -59,7 +59,7 @@ fn pictures(scene: &Scene, first: u32, tasks: usize, pixels: f32, max_depth: u32
     let mut photon_lines = [0, 1].map(|_| lines(Photons::footprint(tasks * ROOM)));
     let one = |seed: u32| {
         let paths = (tasks * PATHS) as u32;
-        let discs = Discs::new(&scene.camera, SIZE, bvh.bounds().diagonal(), pixels);
+        let discs = Discs::new((scene, &bvh), [SIZE; 2], level).of_pixels(pixels);
         let shot = ShootSettings { keep: Keep::Caustic, seed, paths, max_depth };
         let shooter =
             CausticShooter::<All>::new((scene, &bvh, &lights), &emission, shot, (discs, [SIZE; 2]), level);
@@ -149,6 +149,14 @@ fn every_kind_of_surface_and_light_is_right_in_the_mean() {
     buffers.lights.push(PointLight::Point { position: at, intensity: Rgb::splat(1.0) });
     let direction = Vec3::new(0.0, -0.6, -0.8);
     buffers.lights.push(PointLight::Directional { direction, irradiance: Rgb::splat(1.0) });
+    let (cos_inner, cos_outer) = (0.9, 0.7);
+    buffers.lights.push(PointLight::Spot {
+        position: at,
+        direction,
+        intensity: Rgb::ONE,
+        cos_inner,
+        cos_outer,
+    });
     is_right_in_the_mean("lights without surface", &buffers, UNLIMITED);
 }
 
@@ -297,8 +305,8 @@ fn where_all_light_is_caustics_photons_may_have_all_of_it_unless_paths_are_asked
     assert_eq!((on.method, on.image), (Method::ProgressivePhotons, chosen.image));
 }
 
-/// A hall with fifty lamps, of which a wall hides all but one from a small mirror on the floor.
-fn stadium() -> SceneBuffers {
+/// A hall with fifty lamps, of which a wall hides all but one from a mirror of such a side on the floor.
+fn stadium(side: f32) -> SceneBuffers {
     let camera = Camera::look_at(Vec3::new(47.5, 1.0, 20.0), Vec3::new(47.5, 10.0, 25.0), Vec3::Y, 60.0);
     let mut buffers = SceneBuffers::new(camera);
     let wall = buffers.material(Material::diffuse(Rgb::splat(0.5)));
@@ -307,7 +315,7 @@ fn stadium() -> SceneBuffers {
     buffers.cuboid(Vec3::ZERO, Vec3::new(50.0, 10.0, 50.0), true, wall);
     buffers
         .quad([[0.0, 0.0], [0.0, 50.0], [10.0, 50.0], [10.0, 0.0]].map(|[y, z]| Vec3::new(45.0, y, z)), wall);
-    buffers.square(Vec3::new(47.5, 0.01, 25.0), Vec3::Y, MIRROR, mirror);
+    buffers.square(Vec3::new(47.5, 0.01, 25.0), Vec3::Y, side, mirror);
     for i in 0..50 {
         let elsewhere = Vec3::new(2.0 + (i % 7) as f32 * 6.0, 9.0, 3.0 + (i / 7) as f32 * 6.0);
         let position = if i == 23 { Vec3::new(47.5, 9.0, 25.0) } else { elsewhere };
@@ -316,13 +324,21 @@ fn stadium() -> SceneBuffers {
     buffers
 }
 
-/// The side of the mirror in the stadium, and what it reflects.
-const MIRROR: f32 = 1.0;
+/// What the mirror in the stadium reflects.
 const MIRRORED: f32 = 0.9;
 
 #[test]
 fn in_a_stadium_photons_go_to_the_glass_and_their_power_is_right() {
-    let buffers = stadium();
+    photons_go_to_a_mirror_of(1.0);
+}
+
+#[test]
+fn so_they_do_where_it_takes_a_ten_millionth_of_all_directions() {
+    photons_go_to_a_mirror_of(0.005);
+}
+
+fn photons_go_to_a_mirror_of(side: f32) {
+    let buffers = stadium(side);
     let scene = buffers.scene();
     let level = Level::detect();
     let mut bvh_lines = lines(Bvh::footprint(scene.mesh.triangles.len()));
@@ -343,7 +359,7 @@ fn in_a_stadium_photons_go_to_the_glass_and_their_power_is_right() {
     const MAPS: u32 = 16;
     let shot =
         ShootSettings { keep: Keep::Caustic, seed: 3, paths: (TASKS * PATHS) as u32, max_depth: UNLIMITED };
-    let discs = Discs::new(&scene.camera, SIZE, bvh.bounds().diagonal(), 1.0);
+    let discs = Discs::new((&scene, &bvh), [SIZE; 2], level);
     let shooter = |emission| {
         let frame = (discs, [SIZE; 2]);
         CausticShooter::<All>::new((&scene, &bvh, &lights), emission, shot, frame, level)
@@ -380,16 +396,37 @@ fn in_a_stadium_photons_go_to_the_glass_and_their_power_is_right() {
     let (by_chance, _, unguided_rays, unguided_seconds) = shoot(&plain);
     let power = power / f64::from(MAPS);
     // The solid angle of a square over its middle.
-    let (half, height) = (f64::from(MIRROR) / 2.0, 8.99f64);
+    let (half, height) = (f64::from(side) / 2.0, 8.99f64);
     let angle = 4.0 * (half * half / (height * (height * height + 2.0 * half * half).sqrt())).atan();
     let expected = f64::from(MIRRORED) * angle;
     // More than three standard deviations of the number of photons; those of one cell have the same power.
     assert!((power / expected - 1.0).abs() < 0.01, "{power} W, not {expected}");
-    assert!(by_chance > 0.0);
-    let gain = useful / rays / (by_chance / unguided_rays);
+    // Of a millionth of all directions nothing is found by chance.
+    let gain = useful / rays / (by_chance.max(1.0) / unguided_rays);
     assert!(gain > 10.0, "useful photons per ray are {gain} times as many, {useful} and {by_chance}");
     println!(
         "{gain} times the useful photons per ray: {useful} in {seconds} s, {by_chance} in {unguided_seconds} s"
     );
     println!("{power} W of {expected} W");
+}
+
+#[test]
+fn a_small_glass_in_a_large_lit_room_is_worth_photons() {
+    let camera = Camera::look_at(Vec3::new(45.4, 0.4, 25.4), Vec3::new(45.0, 0.05, 25.0), Vec3::Y, 40.0);
+    let mut buffers = SceneBuffers::new(camera);
+    let wall = buffers.material(Material::diffuse(Rgb::splat(0.5)));
+    let lamp = buffers.material(emitter(0.0, 40.0));
+    let ball = buffers.material(Material { surface: glass(0.0), ..Material::GREY });
+    buffers.cuboid(Vec3::ZERO, Vec3::new(50.0, 10.0, 50.0), true, wall);
+    for i in 0..50 {
+        let elsewhere = Vec3::new(2.0 + (i % 7) as f32 * 5.2, 9.0, 3.0 + (i / 7) as f32 * 6.0);
+        let at = if i == 23 { Vec3::new(45.0, 4.0, 25.0) } else { elsewhere };
+        buffers.square(at, Vec3::NEG_Y, 0.1, lamp);
+    }
+    buffers.normals = vec![[0.0; 3]; buffers.positions.len()];
+    buffers.sphere(Vec3::new(45.0, 0.08, 25.0), 0.05, 24, ball);
+    let joined = path(&buffers.scene(), 4, |_| ());
+    assert!(has_photons(&joined) && joined.caustics.share < Some(0.035), "{:?}", joined.caustics);
+    let map = joined.photons.unwrap().caustic.unwrap();
+    assert!(4 * map.stored > map.shot, "most of them lie where the ball throws them: {map:?}");
 }

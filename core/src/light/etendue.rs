@@ -24,18 +24,30 @@ pub(crate) enum Found {
 }
 
 impl Emission<'_> {
-    /// Of an emissive `triangle` in unit direction `way`: per m² sr of étendue.
-    pub(crate) fn density_of_surface(&self, scene: &Scene, lights: &Lights, triangle: u32, way: Vec3) -> f32 {
+    /// Of an emissive `triangle` at `place` in unit direction `way`: per m² sr of étendue.
+    pub(crate) fn density_of_surface(
+        &self,
+        scene: &Scene,
+        lights: &Lights,
+        triangle: u32,
+        (place, way): (Vec3, Vec3),
+    ) -> f32 {
         lights
             .emitter_of(triangle)
-            .map_or(0.0, |(index, _)| self.density_of_emitter(scene, lights, index, way))
+            .map_or(0.0, |(index, _)| self.density_of_emitter(scene, lights, index, (place, way)))
     }
 
-    /// Of emitter `index` in unit direction `way`: per m² sr of étendue.
-    pub(crate) fn density_of_emitter(&self, scene: &Scene, lights: &Lights, index: usize, way: Vec3) -> f32 {
+    /// Of emitter `index` at `place` in unit direction `way`: per m² sr of étendue.
+    pub(crate) fn density_of_emitter(
+        &self,
+        scene: &Scene,
+        lights: &Lights,
+        index: usize,
+        (place, way): (Vec3, Vec3),
+    ) -> f32 {
         let Some(emitter) = lights.emitters.get(index) else { return 0.0 };
         let sides = if emitter.is_two_sided() { 2.0 } else { 1.0 };
-        self.density(scene, lights, index, way, Vec3::ZERO) * FRAC_1_PI / (emitter.area * sides)
+        self.density(scene, lights, index, way, place) * FRAC_1_PI / (emitter.area * sides)
     }
 
     /// Of the environment in unit `direction`, seen from `position`: per m² sr of étendue.
@@ -67,17 +79,18 @@ impl Emission<'_> {
         let index = light as usize;
         let mut all = lights.points.iter().chain(lights.distant);
         let own = index.checked_sub(lights.emitters.len()).and_then(|i| all.nth(i));
-        let (way, density) = match own.and_then(|&own| scene.lights.get(own as usize)) {
+        let ((way, on), density) = match own.and_then(|&own| scene.lights.get(own as usize)) {
             Some(PointLight::Point { position: from, .. }) => {
-                (position - *from, UNIFORM_SPHERE_PDF / from.distance_squared(position))
+                ((position - *from, *from), UNIFORM_SPHERE_PDF / from.distance_squared(position))
             }
             Some(PointLight::Spot { position: from, cos_outer, .. }) => {
-                (position - *from, uniform_cone_pdf(1.0 - cos_outer) / from.distance_squared(position))
+                let spread = uniform_cone_pdf(1.0 - cos_outer);
+                ((position - *from, *from), spread / from.distance_squared(position))
             }
-            Some(PointLight::Directional { direction, .. }) => (*direction, self.per_disc()),
+            Some(PointLight::Directional { direction, .. }) => ((*direction, position), self.per_disc()),
             None => return 0.0,
         };
-        self.density(scene, lights, index, way.normalize_or_zero(), position) * density
+        self.density(scene, lights, index, way.normalize_or_zero(), on) * density
     }
 
     /// Of the light of `sample`, which was drawn at `position`: for each density of the sample.
@@ -90,7 +103,10 @@ impl Emission<'_> {
     ) -> f32 {
         let (light, direction) = (sample.light, sample.direction);
         match self.found(lights, light) {
-            Found::OnSurface => self.density_of_emitter(scene, lights, light as usize, -direction),
+            Found::OnSurface => {
+                let place = position + sample.distance * direction;
+                self.density_of_emitter(scene, lights, light as usize, (place, -direction))
+            }
             Found::InSky => self.density_of_sky(scene, lights, direction, position),
             Found::ByChoice => self.density_of_choice(scene, lights, light, position),
         }

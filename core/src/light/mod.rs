@@ -10,6 +10,7 @@ mod guide;
 mod lights;
 mod rectangle;
 mod source;
+mod target;
 mod tree;
 mod triangle;
 mod window;

@@ -16,8 +16,9 @@ use crate::memory::{Arena, Footprint, OutOfMemory};
 use crate::photon::Photon;
 use crate::scene::{Scene, SurfacePoint};
 use crate::{Level, Rgb};
+use core::f32::consts::PI;
 use core::marker::PhantomData;
-use glam::Vec3;
+use glam::{Vec2, Vec3};
 
 /// Photons that a task has room for: coats that mirror let a path leave two on average at most.
 pub const ROOM: usize = 3 * PATHS;
@@ -30,6 +31,9 @@ const LEAST_WEIGHT: f32 = 0.1;
 
 /// What light outside of the picture, or hidden from the eye, counts: some of it comes back.
 const INDIRECT: f32 = 0.02;
+
+/// What a surface is thought to reflect.
+const REFLECTED: f32 = 0.5;
 
 /// Surfaces of glass between the eye and what it sees, at most, and how far from both ends it is looked for them, in
 /// shares of the distance.
@@ -52,7 +56,18 @@ pub struct Find {
     pub cell: u32,
     /// Zero where nothing was left.
     pub worth: f32,
+    /// The block of the picture, of [`BLOCKS`] across and down, where it shows, and
+    pub block: u32,
+    /// the radiance that its photons bring to each pixel of their disc, of that which paths find badly;
+    pub light: f32,
+    /// how often a sample of each of these pixels finds it, if paths alone are to, and
+    pub hits: f32,
+    /// the radiance that a sample has then; infinite where none does.
+    pub flash: f32,
 }
+
+/// Blocks of the picture, across and down, that tell where caustics are.
+pub const BLOCKS: u32 = 16;
 
 impl<'a, F: Features> CausticShooter<'a, F> {
     /// A shooter over frozen structures, for photons that will be gathered from `discs` in a picture of so many pixels
@@ -93,7 +108,7 @@ impl<'a, F: Features> CausticShooter<'a, F> {
         out: &mut [Photon],
     ) -> Result<Counters, OutOfMemory> {
         let mut pile = Pile::new(out);
-        let leave = |_: &State, photon, counters: &mut Counters| pile.leave(photon, counters);
+        let leave = |_: &State, photon, _, counters: &mut Counters| pile.leave(photon, counters);
         let counters = self.flight.follow(task, map, scratch, &mut Weigher { shooter: self, leave })?;
         pile.finish();
         Ok(counters)
@@ -113,53 +128,64 @@ impl<'a, F: Features> CausticShooter<'a, F> {
     ) -> Result<Counters, OutOfMemory> {
         let first = (task * PATHS) as u32;
         out.fill(Find::default());
-        let leave = |state: &State, photon: Photon, _: &mut Counters| {
+        let leave = |state: &State, photon: Photon, share: Share, _: &mut Counters| {
             if let Some(find) = out.get_mut((state.number - first) as usize) {
-                let worth = luminance(photon.power()) * self.importance(photon.position());
-                *find = Find { cell: state.cell, worth: find.worth + worth };
+                let place = photon.position();
+                let power = luminance(photon.power());
+                let radius = self.discs.radius(place);
+                let pixels = 1.0 / (radius * radius);
+                find.cell = state.cell;
+                let Some(block) = self.block(place) else {
+                    find.worth += power * pixels * INDIRECT;
+                    return;
+                };
+                find.worth += power * pixels;
+                find.block = block;
+                let light = REFLECTED / PI * power * pixels / PI;
+                let whole = light * share.chance / share.weight;
+                find.light += light;
+                (find.hits, find.flash) = (share.ratio / share.chance, whole / share.ratio);
             }
         };
         self.flight.follow(task, map, scratch, &mut Weigher { shooter: self, leave })
     }
 
-    /// About how much of the light at `place` gets into the picture, relative to others.
-    fn importance(&self, place: Vec3) -> f32 {
+    /// In which block of the picture light at `place` shows; `None` where it is outside, or hidden from the eye: some of
+    /// it comes back.
+    fn block(&self, place: Vec3) -> Option<u32> {
         let Flight { scene, bvh, level, .. } = self.flight;
         let camera = &scene.camera;
-        let to_eye = camera.eye - place;
-        let pixels = 1.0 / self.discs.radius(place);
-        let importance = pixels * pixels;
-        let seen = -to_eye;
-        let depth = seen.dot(camera.forward) * camera.tan_half_fov;
-        let [width, height] = [self.frame[0] as f32, self.frame[1] as f32];
-        let inside = depth > 0.0
-            && seen.dot(camera.up).abs() <= depth
-            && seen.dot(camera.right).abs() * height <= depth * width;
-        if !inside {
-            return importance * INDIRECT;
+        let [width, height] = self.frame;
+        let at = camera.project(width, height, place, [0.5; 2])?.raster;
+        let frame = Vec2::new(width as f32, height as f32);
+        if at.cmplt(Vec2::ZERO).any() || at.cmpge(frame).any() {
+            return None;
         }
         // What is seen through glass is seen.
+        let to_eye = camera.eye - place;
         let mut ray = Ray::segment(place + NEAR * to_eye, (1.0 - NEAR) * to_eye, 1.0);
-        for _ in 0..MOST_GLASS {
+        let mut crossed = 0;
+        loop {
             let hit = bvh.nearest(level, &ray);
             let Some(point) = SurfacePoint::at::<F>(scene, &ray, &hit).filter(|_| hit.is_some()) else {
-                return importance;
+                let [x, y] = (at / frame * BLOCKS as f32).to_array();
+                return Some((y as u32).min(BLOCKS - 1) * BLOCKS + (x as u32).min(BLOCKS - 1));
             };
-            if !throws(point.material) {
-                break;
+            crossed += 1;
+            if crossed > MOST_GLASS || !throws(point.material) {
+                return None;
             }
             ray = point.spawn_to(camera.eye);
         }
-        importance * INDIRECT
     }
 
-    /// The share that photons have in the light of this path at `place`, and the probability with which one is left.
-    fn weight(&self, state: &State, place: Vec3) -> (f32, f32) {
+    /// The share that photons have in the light of this path at `place`.
+    fn share(&self, state: &State, place: Vec3) -> Share {
         let ratio = state.others / (self.discs.reach(place, self.flight.paths as f32) * state.chain);
         let weight = 1.0 / (1.0 + ratio * ratio);
         // Zero over zero: without any other technique photons have it all.
         let weight = if state.others == 0.0 { 1.0 } else { weight };
-        (weight, (weight / LEAST_WEIGHT).min(1.0))
+        Share { weight, chance: (weight / LEAST_WEIGHT).min(1.0), ratio }
     }
 
     /// `chain` and `others` before the first surface: `back` is the density of the direction to the light, where it is
@@ -173,7 +199,8 @@ impl<'a, F: Features> CausticShooter<'a, F> {
         let by_chance = |chosen: f32| libm::sqrtf(1.0 + with(chosen) * with(chosen));
         match emission.found(lights, state.light) {
             Found::OnSurface => {
-                let density = emission.density_of_emitter(scene, lights, state.light as usize, -to_light);
+                let from = (state.origin.into(), -to_light);
+                let density = emission.density_of_emitter(scene, lights, state.light as usize, from);
                 let chosen = match (back, lights.triangle_of(state.light)) {
                     (Some(_), Some(triangle)) => {
                         let distance = position.distance(state.origin.into());
@@ -199,13 +226,24 @@ impl<'a, F: Features> CausticShooter<'a, F> {
     }
 }
 
+/// What is known of a photon beside its power.
+#[derive(Clone, Copy)]
+struct Share {
+    /// In the light of its path.
+    weight: f32,
+    /// With which it is left at all.
+    chance: f32,
+    /// How densely paths from the eye find its light, over how densely photons do.
+    ratio: f32,
+}
+
 /// Leaves photons with their weights.
 struct Weigher<'s, 'a, F, L> {
     shooter: &'s CausticShooter<'a, F>,
     leave: L,
 }
 
-impl<F: Features, L: FnMut(&State, Photon, &mut Counters)> Visitor for Weigher<'_, '_, F, L> {
+impl<F: Features, L: FnMut(&State, Photon, Share, &mut Counters)> Visitor for Weigher<'_, '_, F, L> {
     const DIMENSIONS: u32 = 4;
     const SEED: u64 = 0x6361_7573_7469_6373;
 
@@ -214,10 +252,10 @@ impl<F: Features, L: FnMut(&State, Photon, &mut Counters)> Visitor for Weigher<'
         let ends = ends_chain(vertex.bsdf);
         let leaves = ends && state.segments > 1;
         if leaves {
-            let (weight, chance) = self.shooter.weight(state, vertex.point.position);
-            if vertex.own() < chance {
-                let power = Rgb::from(state.power) * (weight / chance);
-                (self.leave)(state, vertex.photon(power), counters);
+            let share = self.shooter.share(state, vertex.point.position);
+            if vertex.own() < share.chance {
+                let power = Rgb::from(state.power) * (share.weight / share.chance);
+                (self.leave)(state, vertex.photon(power), share, counters);
             }
         }
         Some(Onward { most: if leaves { MOST } else { 1.0 }, mirrored: ends })

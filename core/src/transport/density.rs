@@ -1,10 +1,10 @@
 //! Paths that end where photons lie: reflected light by the density of photons, direct light by shadow rays.
 
+use super::merge::Discs;
 use super::shoot::holds_photons;
 use crate::bsdf::{Bsdf, Features};
 use crate::bvh::Bvh;
 use crate::bvh::survey::{Site, Survey};
-use crate::camera::Camera;
 use crate::geometry::Ray;
 use crate::photon::{Density, Disc, FLATNESS, Falloff, Fence, PROBES, PhotonMap, Uniform};
 use crate::scene::SurfacePoint;
@@ -14,10 +14,6 @@ use glam::Vec3;
 
 /// Cosine below which that of a photon counts as this: its direction is not known better.
 const GRAZING: f32 = 0.01;
-
-/// The least distance from the eye by which radii are reckoned, in diagonals of the scene: what is seen through a
-/// mirror may lie near the eye.
-const NEAREST: f32 = 0.05;
 
 /// How steeply probes for walls rise from the surface: what is lower than that is a step, not a wall, and what the
 /// surface bends less is none either.
@@ -43,27 +39,16 @@ const HALVINGS: u32 = 4;
 #[derive(Clone, Copy)]
 pub struct PhotonLight<'a> {
     map: &'a PhotonMap<'a>,
-    eye: Vec3,
-    /// Of discs, at distance one from the eye.
-    radius: f32,
-    nearest: f32,
+    discs: Discs,
     falloff: Falloff,
     /// Most discs have no photon, so that to look for one first is worth it.
     is_sparse: bool,
 }
 
 impl<'a> PhotonLight<'a> {
-    /// For a picture of `height` rows of a scene of that `diagonal`. Discs are `pixels` in radius.
-    pub fn new(map: &'a PhotonMap<'a>, camera: &Camera, height: u32, diagonal: f32, pixels: f32) -> Self {
-        let radius = pixels * 2.0 * camera.tan_half_fov / height.max(1) as f32;
-        Self {
-            map,
-            eye: camera.eye,
-            radius,
-            nearest: NEAREST * diagonal,
-            falloff: Falloff::default(),
-            is_sparse: false,
-        }
+    /// The photons of `map`, gathered from `discs`.
+    pub fn new(map: &'a PhotonMap<'a>, discs: Discs) -> Self {
+        Self { map, discs, falloff: Falloff::default(), is_sparse: false }
     }
 
     /// The same, with photons weighed by `falloff`.
@@ -90,11 +75,10 @@ impl<'a> PhotonLight<'a> {
         if !holds_photons(bsdf) {
             return None;
         }
-        let distance = point.position.distance(self.eye).max(self.nearest);
         let disc = Disc {
             place: point.position,
             normal: point.geometric_normal,
-            radius: self.radius * distance,
+            radius: self.discs.radius(point.position),
             falloff: self.falloff,
         };
         let density = self.is_sparse.then(|| self.map.gather(level, &disc, &Uniform(Rgb::ONE)));

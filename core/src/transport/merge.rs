@@ -26,7 +26,6 @@ use super::density::{Light, reflected};
 use super::shoot::holds_photons;
 use crate::bsdf::{Bsdf, Features};
 use crate::bvh::Bvh;
-use crate::camera::Camera;
 use crate::light::Emission;
 use crate::photon::{Disc, Falloff, PhotonMap, Uniform};
 use crate::scene::{Scene, SurfacePoint};
@@ -34,9 +33,13 @@ use crate::{Level, Rgb};
 use core::f32::consts::PI;
 use glam::Vec3;
 
-/// The least distance from the eye by which radii are reckoned, in diagonals of the scene: what is seen through a
-/// mirror may lie near the eye.
+/// The least distance from the eye by which radii are reckoned, as what is seen through a mirror may lie near the eye: in
+/// diagonals of the scene, or in distances of the nearest that is seen, where that is less.
 const NEAREST: f32 = 0.05;
+const NEAREST_SEEN: f32 = 0.5;
+
+/// Rays across and down that look for the nearest.
+const GLANCES: u32 = 32;
 
 /// Of a coated surface, the colour of the base from which on it is a rough one. Below, it mirrors and little else, and
 /// would make spikes of photons.
@@ -58,10 +61,26 @@ pub struct Discs {
 }
 
 impl Discs {
-    /// Of `pixels` in radius, for a picture of `height` rows of a scene of that `diagonal`.
-    pub fn new(camera: &Camera, height: u32, diagonal: f32, pixels: f32) -> Self {
-        let radius = pixels * 2.0 * camera.tan_half_fov / height.max(1) as f32;
-        Self { eye: camera.eye, radius, nearest: NEAREST * diagonal }
+    /// Of one pixel in radius, for a picture of `scene` that is `frame` pixels wide and high.
+    pub fn new((scene, bvh): (&Scene, &Bvh), frame: [u32; 2], level: Level) -> Self {
+        let camera = &scene.camera;
+        let mut seen = f32::INFINITY;
+        for i in 0..GLANCES * GLANCES {
+            let at = |i: u32, pixels: u32| (i as f32 + 0.5) * pixels as f32 / GLANCES as f32;
+            let (x, y) = (at(i % GLANCES, frame[0]), at(i / GLANCES, frame[1]));
+            let ray = camera.ray(frame[0], frame[1], x, y, [0.5; 2]);
+            let hit = bvh.nearest(level, &ray);
+            let distance = hit.t * Vec3::from(ray.direction).length();
+            seen = if hit.is_some() { seen.min(distance) } else { seen };
+        }
+        let nearest = (NEAREST * bvh.bounds().diagonal()).min(NEAREST_SEEN * seen);
+        let radius = 2.0 * camera.tan_half_fov / frame[1].max(1) as f32;
+        Self { eye: camera.eye, radius, nearest }
+    }
+
+    /// The same, of so many pixels in radius.
+    pub fn of_pixels(self, pixels: f32) -> Self {
+        Self { radius: pixels * self.radius, ..self }
     }
 
     /// The radius around `place`.

@@ -388,7 +388,8 @@ impl<'a, F: Features> PathTracer<'a, F> {
                 }
                 if let Some(merging) = &self.merging {
                     weight = merging.beside(weight, path.chain, || {
-                        merging.emission.density_of_surface(scene, self.lights, hit.triangle, -direction)
+                        let from = (point.position, -direction);
+                        merging.emission.density_of_surface(scene, self.lights, hit.triangle, from)
                     });
                 }
                 path.add(throughput * radiance * weight);

@@ -37,6 +37,8 @@ pub struct Pilot {
     rays: f64,
     /// Connections, in what they cost.
     connections: f64,
+    /// Pairs of samples that were compared.
+    pairs: f64,
 }
 
 impl Pilot {
@@ -48,6 +50,12 @@ impl Pilot {
     /// By which factor it makes the work larger.
     pub fn cost(&self) -> f32 {
         1.0 + (self.connections / self.rays.max(1.0)) as f32
+    }
+
+    /// The relative variance of a sample, as the relMSE has it; where no sample counts more than it has itself.
+    pub fn noise(&self, shared: bool) -> f64 {
+        // Of three channels, and twice that of one sample.
+        (if shared { self.shared } else { self.alone }) / (6.0 * self.pairs.max(1.0))
     }
 
     /// Whether pixels should share.
@@ -62,6 +70,7 @@ impl core::ops::AddAssign for Pilot {
         self.shared += other.shared;
         self.rays += other.rays;
         self.connections += other.connections;
+        self.pairs += other.pairs;
     }
 }
 
@@ -149,6 +158,7 @@ impl Pilot {
             if alone.is_finite() && shared.is_finite() {
                 self.alone += f64::from(alone);
                 self.shared += f64::from(shared);
+                self.pairs += 1.0;
             }
         }
     }

@@ -3,9 +3,10 @@
 //! shrink from one to the next as those of progressive photon mapping do, so that the blur vanishes.
 //!
 //! A first look shoots some photons at all that mirrors or refracts, and learns which of them show in the picture: where
-//! next to nothing does, the picture is path traced alone, as if photons had never been asked for. Otherwise it is where
-//! most of them go from then on.
+//! that is not worth it (`caustic_look.rs`), the picture is path traced alone, as if photons had never been asked for.
+//! Otherwise it is where most of them go from then on.
 
+use super::caustic_look::Looked;
 use super::path::Paths;
 use super::photon_view::{self, PhotonView};
 use super::photons::{MapUse, PhotonUse};
@@ -44,10 +45,8 @@ const MOST_SAMPLES: u32 = 8;
 /// Light paths of the first look, and of one by what that has learned.
 const LOOK: usize = 32 * PATHS;
 
-/// The share of the picture's light that photons must bring, of what paths find badly, or they are left out.
-const LEAST_SHARE: f64 = 3.5e-2;
-
-/// The share from which on photons may have all of the light, where the method is left to us: paths find next to none.
+/// The share of the picture's light from which on photons may have all of it, where the method is left to us: paths find
+/// next to none.
 const MOST_SHARE: f64 = 0.75;
 
 /// Whether paths were joined with photons of caustics.
@@ -91,18 +90,17 @@ pub(super) fn with<F: Features, T>(
     let mut lines = memory.take("emission", emission)?;
     let mut arena = Arena::new(bytemuck::cast_slice_mut(&mut lines));
     let plain = Emission::build(scene, lights, &bvh.bounds(), &mut arena)?;
+    let discs = stage.discs();
     let emission = match Worth::aimed(scene, lights, &plain, &mut arena)? {
         Some(mut worth) => {
             let aimed = worth.guide(&plain, &mut arena)?;
-            look::<F>(stage, &mut paths, &aimed, 0, &mut worth)?;
+            look::<F>(stage, &mut paths, &aimed, (discs, 0), &mut worth)?;
             let learned = worth.guide(&plain, &mut arena)?;
-            let found = look::<F>(stage, &mut paths, &learned, 1, &mut worth)?;
-            let mut share = 0.0;
-            if found > 0.0 {
-                share = found / (f64::from(paths.mean(stage)?) + found);
-            }
-            paths.caustics.share = Some(share);
-            (share >= LEAST_SHARE).then(|| worth.guide(&plain, &mut arena)).transpose()?
+            let finds = look::<F>(stage, &mut paths, &learned, (discs, 1), &mut worth)?;
+            let pixels = f64::from(settings.width) * f64::from(settings.height);
+            let looked = Looked::new(&finds, FIRST_RADIUS, pixels, f64::from(paths.mean(stage)?));
+            paths.caustics.share = Some(looked.share);
+            looked.pays(stage, &mut paths)?.then(|| worth.guide(&plain, &mut arena)).transpose()?
         }
         None => None,
     };
@@ -127,51 +125,49 @@ pub(super) fn with<F: Features, T>(
     let [wanted, given] = [wanted, tasks].map(|tasks| (tasks * PATHS) as u64);
     let map = MapUse { wanted, given, ..MapUse::default() };
     let used = PhotonUse { caustic: Some(map), ..PhotonUse::default() };
-    then(&mut Joined { stage: *stage, paths, emission, photons, each, used, kept: None }, memory)
+    then(&mut Joined { stage: *stage, paths, discs, emission, photons, each, used, kept: None }, memory)
 }
 
-/// A shooter of `paths` photons by `emission`, for the discs of `sample`.
+/// A shooter of `paths` photons by `emission`, for what is left of `discs` at `sample`.
 fn shooter<'a, F: Features>(
     stage: &Stage<'a>,
     emission: &'a Emission<'a>,
     paths: usize,
-    sample: u32,
+    (discs, sample): (Discs, u32),
 ) -> (CausticShooter<'a, F>, Discs) {
     let Stage { scene, bvh, lights, settings, .. } = *stage;
     let pixels = FIRST_RADIUS * shrunk(sample / 2).sqrt();
-    let discs = Discs::new(&scene.camera, settings.height, bvh.bounds().diagonal(), pixels as f32);
+    let discs = discs.of_pixels(pixels as f32);
     let max_depth = path_settings(settings).max_depth;
     let shot = ShootSettings { keep: Keep::Caustic, seed: settings.seed, paths: paths as u32, max_depth };
     let frame = (discs, [settings.width, settings.height]);
     (CausticShooter::new((scene, bvh, lights), emission, shot, frame, settings.level), discs)
 }
 
-/// Learns what photons of `emission`, those of map `map`, are worth; returns about what they add to the mean radiance of the
-/// picture.
+/// Learns what photons of `emission`, those of map `map`, are worth.
 fn look<F: Features>(
     stage: &Stage,
     paths: &mut Paths<F>,
     emission: &Emission,
-    map: u32,
+    (discs, map): (Discs, u32),
     worth: &mut Worth,
-) -> Result<f64, RenderError> {
-    let Stage { settings, workers, .. } = *stage;
+) -> Result<Vec<Find>, RenderError> {
+    let workers = stage.workers;
     let scratch = &mut paths.scratch;
-    let (shooter, _) = shooter::<F>(stage, emission, LOOK, 0);
+    let (shooter, _) = shooter::<F>(stage, emission, LOOK, (discs, 0));
     let mut finds = vec![Find::default(); LOOK];
     let look = |task: usize, arena: &mut Arena, out: &mut [Find]| shooter.look(task, map, arena, out);
     workers.pass(&mut finds, PATHS, scratch, &|| false, &look)?;
     finds.iter().for_each(|find| worth.learn(find.cell, find.worth));
-    // Power over the area of a disc, from a surface that reflects half of it evenly.
-    let found = finds.iter().map(|find| f64::from(find.worth)).sum::<f64>();
-    let pixels = f64::from(settings.width) * f64::from(settings.height);
-    Ok(0.5 / core::f64::consts::PI * found * FIRST_RADIUS.powi(2) / pixels)
+    Ok(finds)
 }
 
 /// See the file.
 struct Joined<'a, F> {
     stage: Stage<'a>,
     paths: Paths<'a, F>,
+    /// Of one pixel.
+    discs: Discs,
     emission: Emission<'a>,
     /// Of even and of odd samples.
     photons: [Vec<Line>; 2],
@@ -217,14 +213,14 @@ impl Block {
 
 impl<F: Features> Renderer for Joined<'_, F> {
     fn round(&mut self, crew: &mut Crew) -> Result<(), RenderError> {
-        let Self { stage, paths, emission, photons, each, used, kept } = self;
+        let Self { stage, paths, discs, emission, photons, each, used, kept } = self;
         let Paths { tracer, scratch, .. } = paths;
         let workers = stage.workers;
         while let Some(sample) = crew.next_in_mean() {
             let block = Block::of(sample);
             let most = used.caustic.map_or(0, |map| map.given as usize);
             let light_paths = (*each * block.samples() as usize).min(most);
-            let (shooter, discs) = shooter::<F>(stage, emission, light_paths, block.first);
+            let (shooter, discs) = shooter::<F>(stage, emission, light_paths, (*discs, block.first));
             let room = shooter.tasks() * ROOM;
             let [even, odd] = &mut *photons;
             let maps = match *kept {

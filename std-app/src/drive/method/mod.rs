@@ -4,6 +4,7 @@
 //! [`Crew`] runs in parallel ("The unit of work" in docs/architecture.md). To add a method: a variant of [`Method`]
 //! with its words, a file with its [`Renderer`], a line in [`Method::with`].
 
+mod caustic_look;
 mod caustics;
 mod irradiance_cache;
 mod overture;
@@ -32,6 +33,7 @@ use halflight_core::bsdf::Features;
 use halflight_core::bvh::Bvh;
 use halflight_core::light::Lights;
 use halflight_core::scene::Scene;
+use halflight_core::transport::Discs;
 
 /// A way to make a picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -154,6 +156,14 @@ pub(super) struct Stage<'a> {
     pub(super) lights: &'a Lights<'a>,
     pub(super) settings: &'a Settings,
     pub(super) workers: &'a Workers,
+}
+
+impl Stage<'_> {
+    /// Discs that photons are gathered from, of one pixel.
+    fn discs(&self) -> Discs {
+        let Self { scene, bvh, settings, .. } = self;
+        Discs::new((scene, bvh), [settings.width, settings.height], settings.level)
+    }
 }
 
 /// A method at work on one scene. Its structures are its own; the film is the crew's.

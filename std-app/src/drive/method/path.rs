@@ -48,11 +48,21 @@ impl<'a, F: Features> Paths<'a, F> {
 
     /// About the mean radiance of the picture.
     pub(super) fn mean(&mut self, stage: &Stage) -> Result<f32, RenderError> {
-        match self.mean {
-            Some(mean) => Ok(mean),
+        if self.mean.is_none() {
             // What neighbours share is not in their paths.
-            None => Ok(stage.workers.pilot_mean(&self.tracer.with_reuse(false), &mut self.scratch)?),
+            let tracer = self.tracer.with_reuse(false);
+            self.mean = Some(stage.workers.pilot_mean(&tracer, &mut self.scratch)?);
         }
+        Ok(self.mean.unwrap_or_default())
+    }
+
+    /// About the relative variance of a sample of the picture, which is of `mean` radiance.
+    pub(super) fn noise(&mut self, stage: &Stage, mean: f32) -> Result<f64, RenderError> {
+        let pilot = match self.reuse.pilot {
+            Some(pilot) => pilot,
+            None => stage.workers.pilot(&self.tracer, mean, &mut self.scratch)?,
+        };
+        Ok(pilot.noise(self.reuse.used))
     }
 }
 

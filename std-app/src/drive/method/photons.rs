@@ -15,7 +15,7 @@ use halflight_core::transport::maps::{
     GatherLight, IRRADIANCES, Irradiances, PhotonMaps, STRIDE, may_have_caustics,
 };
 use halflight_core::transport::shoot::{Keep, PATHS, ROOM, ShootSettings, Shooter};
-use halflight_core::transport::{PathTracer, PhotonLight};
+use halflight_core::transport::{Discs, PathTracer, PhotonLight};
 use std::time::Instant;
 
 /// How photons are used.
@@ -73,6 +73,7 @@ const CAUSTIC_SEED: u32 = 0x6361_7573;
 /// Shoots photons and builds maps.
 pub(super) struct Laboratory<'a> {
     stage: Stage<'a>,
+    discs: Discs,
     emission: Vec<Line>,
     global: usize,
     caustic: usize,
@@ -180,7 +181,7 @@ impl<'a> Laboratory<'a> {
             caustic: has_caustics.then(|| used(wanted[1], caustic)),
             ..PhotonUse::default()
         };
-        Ok((Self { stage: *stage, emission, global, caustic, used }, shelves))
+        Ok((Self { stage: *stage, discs: stage.discs(), emission, global, caustic, used }, shelves))
     }
 
     /// Working memory of each thread.
@@ -277,13 +278,9 @@ impl<'a> Laboratory<'a> {
 
     /// What paths see of the maps; caustics in discs of `pixels`.
     pub(super) fn light<'m>(&self, built: &'m Built<'m>, pixels: f32) -> PhotonMaps<'m> {
-        let Stage { scene, bvh, settings, .. } = self.stage;
-        let falloff = settings.photons.falloff;
-        let light = |map| {
-            let diagonal = bvh.bounds().diagonal();
-            let light = PhotonLight::new(map, &scene.camera, settings.height, diagonal, pixels);
-            light.with_falloff(falloff).of_caustics()
-        };
+        let falloff = self.stage.settings.photons.falloff;
+        let discs = self.discs.of_pixels(pixels);
+        let light = |map| PhotonLight::new(map, discs).with_falloff(falloff).of_caustics();
         PhotonMaps {
             caustic: built.caustic.as_ref().map(light),
             global: GatherLight::new(&built.global, &built.irradiances, self.farthest(), falloff),

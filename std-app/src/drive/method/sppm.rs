@@ -20,7 +20,7 @@ use halflight_core::light::Emission;
 use halflight_core::memory::{Arena, Line};
 use halflight_core::photon::Photons;
 use halflight_core::transport::shoot::{Keep, PATHS, ROOM, ShootSettings, Shooter};
-use halflight_core::transport::{PathTracer, PhotonLight, path::WAVE};
+use halflight_core::transport::{Discs, PathTracer, PhotonLight, path::WAVE};
 use std::time::Instant;
 
 /// Radius of the discs of the first sample, in pixels.
@@ -37,6 +37,7 @@ const MOST_PATHS: usize = 1024 * PATHS;
 pub(super) struct ProgressivePhotons<'a, F> {
     stage: Stage<'a>,
     tracer: PathTracer<'a, F>,
+    discs: Discs,
     paths: usize,
     used: PhotonUse,
     photons: Drawer,
@@ -66,6 +67,7 @@ impl<'a, F: Features> ProgressivePhotons<'a, F> {
         Ok(Self {
             stage: *stage,
             tracer,
+            discs: stage.discs(),
             paths: tasks * PATHS,
             used,
             photons,
@@ -82,11 +84,10 @@ impl<F: Features> Renderer for ProgressivePhotons<'_, F> {
     }
 
     fn round(&mut self, crew: &mut Crew) -> Result<(), RenderError> {
-        let Self { stage, tracer, paths, used, photons, sample: shot_for, emission, scratch } = self;
+        let Self { stage, tracer, discs, paths, used, photons, sample: shot_for, emission, scratch } = self;
         let Stage { scene, bvh, lights, settings, .. } = *stage;
-        let bounds = bvh.bounds();
         let mut arena = Arena::new(bytemuck::cast_slice_mut(emission));
-        let emission = Emission::build(scene, lights, &bounds, &mut arena)?;
+        let emission = Emission::build(scene, lights, &bvh.bounds(), &mut arena)?;
         let shot = ShootSettings {
             keep: Keep::Reflected,
             seed: settings.seed,
@@ -114,8 +115,7 @@ impl<F: Features> Renderer for ProgressivePhotons<'_, F> {
             }
             let Some(map) = photons.map()? else { return Ok(()) };
             let pixels = FIRST_RADIUS * shrunk(sample / 2).sqrt();
-            let light =
-                PhotonLight::new(&map, &scene.camera, settings.height, bounds.diagonal(), pixels as f32);
+            let light = PhotonLight::new(&map, discs.of_pixels(pixels as f32));
             let tracer = tracer.with_photons(light.with_falloff(settings.photons.falloff));
             crew.tiles(sample + 1, scratch, &|task, samples, arena, pixels| {
                 tracer.run(task, samples, WAVE, arena, pixels)

@@ -1,0 +1,91 @@
+//! The first look for caustics: what photons find out about the picture, and whether it is worth to go on with them. It is
+//! where they bring much of the light; and where they bring little of it that paths find so rarely that it would be most
+//! of the noise: a small glass in a large lit room.
+
+use super::Stage;
+use super::path::Paths;
+use crate::drive::RenderError;
+use core::f64::consts::PI;
+use halflight_core::bsdf::Features;
+use halflight_core::transport::caustics::{BLOCKS, Find};
+
+/// The share of the picture's light that photons must bring, of what paths find badly,
+const LEAST_SHARE: f64 = 3.5e-2;
+
+/// or by how much the relative variance that this light has by paths alone must be that of all other, if so many of the
+/// light paths show in the picture: few photons are noise as well.
+const LEAST_NOISE: f64 = 0.5;
+const LEAST_USEFUL: f64 = 0.2;
+
+/// Samples of a picture, and how often paths must find light in all of it to be noise: what they find more rarely is
+/// missing.
+const SAMPLES: f64 = 64.0;
+const LEAST_HITS: f64 = 4.0;
+
+const ALL: usize = (BLOCKS * BLOCKS) as usize;
+
+/// A block of the picture: means over its pixels.
+#[derive(Clone, Copy, Default)]
+struct Block {
+    /// The radiance that photons bring,
+    light: f64,
+    /// that part which paths alone never find,
+    missing: f64,
+    /// and the square of the other in a sample by paths alone.
+    square: f64,
+}
+
+/// What a look has found.
+pub(super) struct Looked {
+    /// Of the mean radiance of the picture.
+    pub(super) share: f64,
+    /// Light paths that show in it, as a share of all.
+    useful: f64,
+    /// The relative variance of one sample that their light has by paths alone.
+    noise: f64,
+    /// The mean radiance without them.
+    mean: f64,
+}
+
+impl Looked {
+    /// `finds` of discs of `radius` pixels in a picture of so many `pixels`, which is of `mean` radiance without them.
+    pub(super) fn new(finds: &[Find], radius: f64, pixels: f64, mean: f64) -> Self {
+        // Power over the area of a disc, from a surface that reflects half of it evenly.
+        let worth = finds.iter().map(|find| f64::from(find.worth)).sum::<f64>();
+        let found = 0.5 / PI * worth * radius * radius / pixels;
+        let share = if found > 0.0 { found / (mean + found) } else { 0.0 };
+
+        // What flashes brightest first.
+        let mut shown: Vec<_> = finds.iter().filter(|find| find.light > 0.0).collect();
+        shown.sort_by(|a, b| b.flash.total_cmp(&a.flash));
+        let useful = shown.len() as f64 / finds.len().max(1) as f64;
+        let mut blocks = [Block::default(); ALL];
+        let disc = PI * radius * radius;
+        let of_block = disc * ALL as f64 / pixels;
+        let mut hits = 0.0;
+        for find in shown {
+            let Some(block) = blocks.get_mut(find.block as usize) else { continue };
+            let light = of_block * f64::from(find.light);
+            hits += SAMPLES * disc * f64::from(find.hits);
+            block.light += light;
+            match hits < LEAST_HITS {
+                true => block.missing += light,
+                false => block.square += of_block * f64::from(find.hits) * f64::from(find.flash).powi(2),
+            }
+        }
+        let relative = |block: &Block| {
+            let square = block.square + SAMPLES * block.missing.powi(2);
+            if square > 0.0 { square / (mean + block.light).powi(2) } else { 0.0 }
+        };
+        let noise = blocks.iter().map(relative).sum::<f64>() / ALL as f64;
+        Self { share, useful, noise, mean }
+    }
+
+    /// Whether photons are worth it.
+    pub(super) fn pays<F: Features>(&self, stage: &Stage, paths: &mut Paths<F>) -> Result<bool, RenderError> {
+        if self.share >= LEAST_SHARE || self.useful < LEAST_USEFUL {
+            return Ok(self.share >= LEAST_SHARE);
+        }
+        Ok(self.noise >= LEAST_NOISE * paths.noise(stage, self.mean as f32)?)
+    }
+}
