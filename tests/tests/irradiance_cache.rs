@@ -43,6 +43,26 @@ fn the_cornell_box_is_that_of_the_path_tracer_at_any_depth() {
 }
 
 #[test]
+fn shadows_are_asked_for_several_times_where_that_is_what_is_noisy() {
+    let asked = |buffers: SceneBuffers| {
+        let scene = buffers.scene();
+        // In coarser pictures edges are most of the noise.
+        let [few, more] = [1, 3].map(|spp| cached(&scene, 128, spp, |_| ()).counters);
+        (more.shadow_rays - few.shadow_rays) as f64 / (more.paths - few.paths) as f64
+    };
+    let box_of_shadows = asked(cornell_box());
+    assert!(box_of_shadows > 2.0, "{box_of_shadows}");
+    // One light everywhere: no shadow.
+    let camera =
+        halflight_core::scene::Camera::look_at(Vec3::splat(0.3), Vec3::new(0.9, 0.5, 0.8), Vec3::Y, 60.0);
+    let mut furnace = SceneBuffers::new(camera);
+    let wall = furnace.material(emitter(0.5, 1.0));
+    furnace.cuboid(Vec3::ZERO, Vec3::ONE, true, wall);
+    let furnace = asked(furnace);
+    assert!(furnace < 2.0, "{furnace}");
+}
+
+#[test]
 fn in_a_furnace_all_is_one_light() {
     // Reflectance a half, emission 1: radiance 2 everywhere.
     let camera =

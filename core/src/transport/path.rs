@@ -57,9 +57,8 @@ pub(super) const BLOCK: usize = POINTS;
 /// the help of rays that find them by chance.
 const SMALL: f32 = 0.1;
 
-/// Points of lights that a path of the picture asks where a cache knows all other light: shadows are the noise that is left,
-/// and another point costs a third of a sample.
-pub(super) const LIGHTS: usize = 4;
+/// The most points of lights that a vertex asks.
+pub const LIGHTS: usize = 4;
 
 /// Path tracing of one scene: a pass whose tasks are the tiles of the picture.
 #[derive(Clone, Copy)]
@@ -79,6 +78,8 @@ pub struct PathTracer<'a, F> {
     maps: Option<&'a [PhotonMaps<'a>; 2]>,
     merging: Option<Merging<'a>>,
     pub(super) spots: &'a [Spot],
+    /// Points of lights that paths of the picture ask where a shadow ray alone finds direct light.
+    pub(super) asked: u32,
     /// Tile by tile, or none.
     pub(super) edges: &'a [PixelSet],
     features: PhantomData<F>,
@@ -109,6 +110,7 @@ impl<'a, F: Features> PathTracer<'a, F> {
             maps: None,
             merging: None,
             spots: &[],
+            asked: 1,
             edges: &[],
             features: PhantomData,
         }
@@ -130,6 +132,13 @@ impl<'a, F: Features> PathTracer<'a, F> {
     /// the picture would, too.
     pub fn with_spots(&self, spots: &'a [Spot]) -> Self {
         Self { spots, ..*self }
+    }
+
+    /// The same, where a path of the picture asks so many points of lights, [`LIGHTS`] at most, at a vertex whose other light a
+    /// cache knows. Not where surfaces have cut-outs.
+    pub fn with_lights(&self, count: usize) -> Self {
+        let most = if self.has_cutouts { 1 } else { LIGHTS };
+        Self { asked: count.clamp(1, most) as u32, ..*self }
     }
 
     /// The same, where the pixels of `edges`, tile by tile, have several paths for each sample. Not where pixels share

@@ -7,7 +7,7 @@
 use super::edges::PER_EDGE;
 use super::estimator::{Counters, PathSettings};
 use super::outline::outlined;
-use super::path::{LIGHTS, PathTracer};
+use super::path::PathTracer;
 use super::reuse::Exchange;
 use super::wave::{Path, Share, Wave};
 use crate::Rgb;
@@ -194,7 +194,7 @@ impl<F: Features> PathTracer<'_, F> {
             share: if places.outlined.contains(place) { Share::BESIDE_LAMP } else { Share::ALL },
             triangle: MISS,
             eta_squared: 1.0,
-            lights: if places.edges.contains(place) || self.has_cutouts { 1 } else { LIGHTS as u32 },
+            lights: if places.edges.contains(place) { 1 } else { self.asked },
             ..Path::default()
         };
         wave.exchanges[*count] = exchange;

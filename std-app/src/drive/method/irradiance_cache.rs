@@ -12,7 +12,7 @@ use super::{Method, Renderer, Stage};
 use crate::drive::audit::Audit;
 use crate::drive::cache_file::{self, Half, Header, View};
 use crate::drive::crew::Crew;
-use crate::drive::held_out::EXACT;
+use crate::drive::held_out::{EXACT, luminance};
 use crate::drive::memory::Memory;
 use crate::drive::refinement::{Refinement, Shortfall};
 use crate::drive::run::path_settings;
@@ -20,12 +20,14 @@ use crate::drive::survey::{self, Survey};
 use crate::drive::workers::Workers;
 use crate::drive::{RenderError, Settings};
 use core::f32::consts::FRAC_PI_2;
+use core::ops::Range;
 use halflight_core::bsdf::Features;
 use halflight_core::cache::irradiance::{CellFlux, IrradianceCache, Metric, metric};
-use halflight_core::film::PixelSet;
+use halflight_core::film::{PIXELS_PER_TILE, Pixel, PixelSet};
 use halflight_core::memory::{Arena, Line};
 use halflight_core::transport::gather::Gathering;
-use halflight_core::transport::{Counters, PathTracer, path::WAVE};
+use halflight_core::transport::path::{LIGHTS, WAVE};
+use halflight_core::transport::{Counters, PathTracer};
 use std::collections::VecDeque;
 use std::path::Path;
 use std::time::Instant;
@@ -104,6 +106,12 @@ pub(in crate::drive) const LEAST_PIXELS: f32 = 2.0;
 
 /// Pixels that see an edge have several paths for each sample, unless more than one in so many does.
 const FEW_EDGES: usize = 8;
+
+/// Samples by which it is judged whether more points of lights are worth their rays; none of the picture.
+const TRIALS: Range<u32> = 1 << 30..(1 << 30) + 2;
+
+/// By what factor one point of lights must leave more noise, for its rays, before several are asked.
+const WORTH: f64 = 1.25;
 
 /// Takes the memory, sets the method up, and hands it to `then`.
 pub(super) fn with<F: Features, T>(
@@ -188,6 +196,7 @@ pub(super) fn with<F: Features, T>(
         save: settings.save_cache.as_deref(),
         is_filled: false,
         edges: None,
+        lights: None,
         seconds: 0.0,
     };
     let is_served = !has_indirect_light(settings) || method.header.serves(&method.view);
@@ -233,6 +242,8 @@ struct Cached<'a, F> {
     pending: VecDeque<Refinement>,
     /// Pixels that see an edge, when they are known.
     edges: Option<Vec<PixelSet>>,
+    /// Points of lights that are asked, when that is known.
+    lights: Option<usize>,
     seconds: f64,
 }
 
@@ -288,6 +299,41 @@ impl<F: Features> Cached<'_, F> {
         Ok(true)
     }
 
+    /// Looks at a few tiles whether several points of lights leave less noise for their rays than one; whether that is done.
+    fn choose_lights(&mut self, crew: &mut Crew) -> Result<bool, RenderError> {
+        let Self { tracer, halves: [even, odd], scratch, .. } = self;
+        let tracer = tracer.with_caches([&even.cache, &odd.cache]);
+        let tiles: Vec<usize> = tracer.pilot_tasks().collect();
+        let mut noise = vec![[0.0; 2]; tiles.len()];
+        let look = |task: usize, arena: &mut Arena, out: &mut [[f64; 2]]| {
+            let (mut all, mut rays, mut pixels) =
+                (Counters::default(), [0; 2], [[Pixel::default(); PIXELS_PER_TILE]; 2]);
+            for ((rays, pixels), lights) in rays.iter_mut().zip(&mut pixels).zip([1, LIGHTS]) {
+                let counters = tracer.with_lights(lights).run(tiles[task], TRIALS, WAVE, arena, pixels)?;
+                *rays = counters.rays + counters.shadow_rays;
+                all += counters;
+            }
+            // Both by the light that the better one sees.
+            let [one, several] = pixels;
+            let light = several.map(|pixel| luminance(pixel.mean()));
+            let mean = light.iter().sum::<f64>() / light.len() as f64;
+            for (noise, (pixels, rays)) in out.iter_mut().flatten().zip([one, several].iter().zip(rays)) {
+                let relative = |(pixel, light): (&Pixel, f64)| {
+                    luminance(pixel.variance()) / (light * light + 0.01 * mean * mean)
+                };
+                let sum: f64 = pixels.iter().zip(light).map(relative).filter(|noise| noise.is_finite()).sum();
+                *noise = sum * rays as f64;
+            }
+            Ok(all)
+        };
+        if !crew.pass(&mut noise, 1, scratch, &look)? {
+            return Ok(false);
+        }
+        let [one, several] = noise.iter().fold([0.0; 2], |[a, b], [c, d]| [a + c, b + d]);
+        self.lights = Some(if WORTH * several < one { LIGHTS } else { 1 });
+        Ok(true)
+    }
+
     /// Begins caches that are better.
     fn begin(&mut self, refinement: Refinement) {
         let Refinement { share, is_finer } = refinement;
@@ -333,6 +379,10 @@ impl<F: Features> Renderer for Cached<'_, F> {
             if !self.is_filled {
                 return Ok(());
             }
+            // By the first caches, also where a film goes on with later ones.
+            if self.lights.is_none() && !self.choose_lights(crew)? {
+                return Ok(());
+            }
             if let Some(next) = self.pending.pop_front() {
                 self.begin(next);
             }
@@ -340,9 +390,10 @@ impl<F: Features> Renderer for Cached<'_, F> {
         if self.edges.is_none() && !self.find_edges(crew)? {
             return Ok(());
         }
-        let Self { tracer, halves: [even, odd], scratch, edges, .. } = self;
+        let Self { tracer, halves: [even, odd], scratch, edges, lights, .. } = self;
         let edges = edges.as_deref().unwrap_or_default();
-        let tracer = tracer.with_caches([&even.cache, &odd.cache]).with_edges(edges);
+        let tracer =
+            tracer.with_caches([&even.cache, &odd.cache]).with_edges(edges).with_lights(lights.unwrap_or(1));
         crew.tiles(u32::MAX, scratch, &|task, samples, arena, pixels| {
             tracer.run(task, samples, WAVE, arena, pixels)
         })?;
