@@ -49,8 +49,9 @@ impl ErrorEstimate {
     pub fn of(tiles: impl Iterator<Item = TileError>) -> Option<Self> {
         let mut sum = TileError::default();
         tiles.for_each(|tile| sum += tile);
-        let freedom = fmax(freedom(sum.squares, sum.fourths), FEWEST);
-        Self::with_reach(&sum, student_95(freedom) * sqrt(shared(sum.groups, sum.differences)))
+        let shared = shared(sum.groups, sum.differences);
+        let freedom = fmax(freedom(sum.squares, sum.fourths) / shared, FEWEST);
+        Self::with_reach(&sum, student_95(freedom) * sqrt(shared))
     }
 
     /// From the sums over regions, where a method shares between pixels far apart: regions count as independent. They

@@ -333,10 +333,17 @@ impl<'m> Lights<'m> {
         if count == 0 || count > most {
             return;
         }
+        let side = |emitter: &Emitter, front| {
+            let material = mesh.triangles.get(emitter.triangle as usize).map_or(0, |t| t.material);
+            u64::from(material) << 1 | u64::from(front)
+        };
         let mut edges = Edges::new();
-        visit(&mut |emitter, front| emitter.border(mesh).for_each(|edge| edges.add(edge, front)));
         visit(&mut |emitter, front| {
-            emitter.border(mesh).filter(|edge| edges.is_border(*edge, front)).for_each(&mut draw);
+            emitter.border(mesh).for_each(|edge| edges.add(edge, side(emitter, front)));
+        });
+        visit(&mut |emitter, front| {
+            let borders = emitter.border(mesh).filter(|edge| edges.is_border(*edge, side(emitter, front)));
+            borders.for_each(&mut draw);
         });
     }
 

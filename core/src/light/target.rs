@@ -5,7 +5,7 @@
 use super::guide::throws;
 use crate::geometry::{Bounds, Frame};
 use crate::sampling::warp::{concentric_disk, uniform_cone, uniform_sphere};
-use crate::scene::Scene;
+use crate::scene::{Scene, Triangle};
 use bytemuck::{Pod, Zeroable};
 use core::f32::consts::PI;
 use glam::Vec3;
@@ -136,14 +136,16 @@ impl Part {
 pub(super) fn fit(scene: &Scene, targets: &mut [Target]) {
     targets.fill(Target::NONE);
     let most = targets.len().min(MOST);
-    let all = || {
-        let throwing = |(_, triangle): &(u32, &crate::scene::Triangle)| {
+    let every = |step: usize| {
+        let throwing = |(_, triangle): &(usize, &Triangle)| {
             scene.materials.get(triangle.material as usize).is_some_and(throws)
         };
-        let corners = |(index, _)| scene.mesh.corners(index);
+        let corners = |(index, _)| scene.mesh.corners(index as u32);
         let finite = |corners: &[Vec3; 3]| corners.iter().all(|corner| corner.is_finite());
-        (0..).zip(scene.mesh.triangles).filter(throwing).map(corners).filter(finite)
+        let triangles = scene.mesh.triangles.iter().enumerate().step_by(step);
+        triangles.filter(throwing).map(corners).filter(finite)
     };
+    let all = || every(1);
     let count = all().count();
     if count == 0 || most == 0 {
         return;
@@ -160,7 +162,7 @@ pub(super) fn fit(scene: &Scene, targets: &mut [Target]) {
         part
     };
     loop {
-        for corners in all().step_by(step) {
+        for corners in every(step) {
             let part = &mut parts[part_of(&parts, &corners)];
             part.middles = part.middles.including(middle(&corners));
             part.bounds = part.bounds.union(Bounds::around(corners));

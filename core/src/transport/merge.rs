@@ -38,6 +38,9 @@ use glam::Vec3;
 const NEAREST: f32 = 0.05;
 const NEAREST_SEEN: f32 = 0.5;
 
+/// What is nearer than this share of the scene is what the camera stands on.
+const STANDS_ON: f32 = 1e-6;
+
 /// Rays across and down that look for the nearest.
 const GLANCES: u32 = 32;
 
@@ -71,7 +74,8 @@ impl Discs {
             let ray = camera.ray(frame[0], frame[1], x, y, [0.5; 2]);
             let hit = bvh.nearest(level, &ray);
             let distance = hit.t * Vec3::from(ray.direction).length();
-            seen = if hit.is_some() { seen.min(distance) } else { seen };
+            let stands_on = distance < STANDS_ON * bvh.bounds().diagonal();
+            seen = if hit.is_some() && !stands_on { seen.min(distance) } else { seen };
         }
         let nearest = (NEAREST * bvh.bounds().diagonal()).min(NEAREST_SEEN * seen);
         let radius = 2.0 * camera.tan_half_fov / frame[1].max(1) as f32;

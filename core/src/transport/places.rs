@@ -99,7 +99,9 @@ impl<F: Features> PathTracer<'_, F> {
         let mut counters = Counters::default();
         let mut places = Places::new(tile, samples);
         places.outlined = outlined(self.scene, self.lights, &self.settings, tile);
-        places.edges = self.edges.get(task).copied().unwrap_or_default().without(&places.outlined);
+        if !self.settings.reuse {
+            places.edges = self.edges.get(task).copied().unwrap_or_default().without(&places.outlined);
+        }
         // No larger than there are paths: the memory of a wave is cleared.
         let most = if places.edges.is_empty() { 1 } else { u64::from(PER_EDGE) };
         let paths = samples.count().saturating_mul(GROUP as u64).saturating_mul(most);

@@ -73,7 +73,7 @@ impl<'m> Canvas<'m> {
     /// Samples of each pixel: of the least sampled one, or in the mean where groups should have different numbers.
     pub(super) fn spp(&self) -> u32 {
         match &self.weights {
-            Some(weights) => weights.mean(&self.taken),
+            Some(weights) => weights.next(&self.taken),
             None => {
                 let own = self.taken.iter().enumerate().filter(|(task, _)| self.shard.owns(*task));
                 own.flat_map(|(_, taken)| *taken).min().unwrap_or(0)
