@@ -145,6 +145,29 @@ fn a_merged_picture_knows_what_its_samples_share() {
 }
 
 #[test]
+fn caches_are_made_again_as_they_were() {
+    let folder = Folder::new("caches");
+    let cornell = Path::new(env!("CARGO_MANIFEST_DIR")).join("../scenes/cornell/cornell.obj");
+    let view = "--eye 278,273,-800 --look-at 278,273,279 --fov 37.5 --size 128x128";
+    let method = "--method irradiance-cache --cache-rays 256 --audit off --json";
+    let render = format!("render {} {view} {method}", cornell.display());
+    let whole = folder.object(&format!("{render} --spp 6 -o whole.exr"));
+    folder.object(&format!("{render} --spp 2 --checkpoint part.film -o part.exr"));
+    let resumed = folder.object(&format!("{render} --spp 6 --resume part.film -o resumed.exr"));
+    for shard in 1..=2 {
+        folder.object(&format!("{render} --spp 6 --shard {shard}/2 --checkpoint {shard}.film"));
+    }
+    folder.object("merge 1.film 2.film -o merged.exr --json");
+    let bits = |name: &str| read(&folder.path(name)).unwrap();
+    assert_eq!(bits("whole.exr"), bits("resumed.exr"));
+    assert_eq!(bits("whole.exr"), bits("merged.exr"));
+    // What was learned before the first sample was learned again, and counts once.
+    for key in ["rays", "shadow_rays", "paths", "error"] {
+        assert_eq!(whole[key], resumed[key], "{key}");
+    }
+}
+
+#[test]
 fn a_film_of_something_else_is_refused_with_the_reason() {
     let folder = Folder::new("else");
     folder.object("render scene.obj --size 20x20 --spp 4 -o a.png --checkpoint film --json");

@@ -23,8 +23,8 @@ use core::f32::consts::FRAC_PI_2;
 use core::ops::Range;
 use halflight_core::bsdf::Features;
 use halflight_core::cache::irradiance::{CellFlux, IrradianceCache, Metric, metric};
-use halflight_core::film::{PIXELS_PER_TILE, Pixel, PixelSet};
-use halflight_core::memory::{Arena, Line};
+use halflight_core::film::{Dropped, PIXELS_PER_TILE, Pixel, PixelSet, Tile};
+use halflight_core::memory::{Arena, Footprint, Line};
 use halflight_core::transport::gather::Gathering;
 use halflight_core::transport::path::{LIGHTS, WAVE};
 use halflight_core::transport::{Counters, PathTracer};
@@ -107,8 +107,9 @@ pub(in crate::drive) const LEAST_PIXELS: f32 = 2.0;
 /// Pixels that see an edge have several paths for each sample, unless more than one in so many does.
 const FEW_EDGES: usize = 8;
 
-/// Samples by which it is judged whether more points of lights are worth their rays; none of the picture.
-const TRIALS: Range<u32> = 1 << 30..(1 << 30) + 2;
+/// Samples by which it is judged whether more points of lights are worth their rays: far from those of any picture, and
+/// the last whose rays to lamps have numbers of their own.
+const TRIALS: Range<u32> = (1 << 28) - 2..1 << 28;
 
 /// By what factor one point of lights must leave more noise, for its rays, before several are asked.
 const WORTH: f64 = 1.25;
@@ -138,6 +139,8 @@ pub(super) fn with<F: Features, T>(
     let by_photons = gather == Gather::Photons && has_indirect_light(settings);
     let scratch = if by_photons { scratch.or(Laboratory::scratch::<F>()) } else { scratch };
     let scratch = memory.take_each("paths", scratch, workers.count())?;
+    let tiles = Tile::count(settings.width, settings.height);
+    memory.set_aside("edges", Footprint::default().slice::<[u64; PIXELS_PER_TILE / 64]>(tiles))?;
     let mut tables = Vec::new();
     for &n in &sizes {
         tables.push(memory.take("gathering", CellFlux::footprint(n))?);
@@ -324,7 +327,8 @@ impl<F: Features> Cached<'_, F> {
                 let sum: f64 = pixels.iter().zip(light).map(relative).filter(|noise| noise.is_finite()).sum();
                 *noise = sum * rays as f64;
             }
-            Ok(all)
+            // What is dropped here is dropped from no picture.
+            Ok(Counters { dropped: Dropped::default(), ..all })
         };
         if !crew.pass(&mut noise, 1, scratch, &look)? {
             return Ok(false);
@@ -374,7 +378,10 @@ impl<F: Features> Cached<'_, F> {
 
 impl<F: Features> Renderer for Cached<'_, F> {
     fn round(&mut self, crew: &mut Crew) -> Result<(), RenderError> {
-        while !self.is_filled || !self.pending.is_empty() {
+        // A film that goes on has the rays of all this already.
+        let resumed = self.edges.is_none() && crew.canvas.spp() > 0;
+        let counted = crew.canvas.counters;
+        while !self.is_filled || self.lights.is_none() || !self.pending.is_empty() {
             self.is_filled = self.is_filled || self.fill(crew)?;
             if !self.is_filled {
                 return Ok(());
@@ -389,6 +396,9 @@ impl<F: Features> Renderer for Cached<'_, F> {
         }
         if self.edges.is_none() && !self.find_edges(crew)? {
             return Ok(());
+        }
+        if resumed {
+            crew.canvas.counters = counted;
         }
         let Self { tracer, halves: [even, odd], scratch, edges, lights, .. } = self;
         let edges = edges.as_deref().unwrap_or_default();
