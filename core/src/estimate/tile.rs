@@ -63,6 +63,8 @@ pub struct TileError {
     pub(super) groups: f64,
     /// Squares of (A − B) / R in pixels.
     pub(super) differences: f64,
+    /// Squares of the sums of the variances in `halves` over the pixels of groups.
+    pub(super) together: f64,
 }
 
 impl TileError {
@@ -72,7 +74,7 @@ impl TileError {
         let scale = (1.0 / mean) as f32;
         let seen = Seen::new(pixels, scale);
         let mut sums = Self::default();
-        let mut groups = [0.0; GROUPS];
+        let mut groups = [[0.0; 2]; GROUPS];
         for (i, pixel) in pixels.iter().enumerate().take(PIXELS_PER_TILE) {
             let place = raster(i);
             let Some(quarters @ [a1, a2, b1, b2]) = seen.quarters[place] else { continue };
@@ -96,9 +98,12 @@ impl TileError {
             sums.pixels += product * product;
             let difference = total(a1 + a2 - b1 - b2) * libm::sqrt(total(by_both));
             sums.differences += difference * difference;
-            groups[Tile::group(i)] += difference;
+            let group = &mut groups[Tile::group(i)];
+            group[0] += difference;
+            group[1] += variance;
         }
-        sums.groups = groups.iter().map(|group| group * group).sum();
+        sums.groups = groups.iter().map(|group| group[0] * group[0]).sum();
+        sums.together = groups.iter().map(|group| group[1] * group[1]).sum();
         sums
     }
 }
@@ -117,6 +122,7 @@ impl core::ops::AddAssign for TileError {
         self.pixels += other.pixels;
         self.groups += other.groups;
         self.differences += other.differences;
+        self.together += other.together;
     }
 }
 
