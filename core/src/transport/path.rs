@@ -5,17 +5,18 @@
 //! 1. All paths of a wave advance together, one segment at a time, so that the tracer sees batches of rays:
 //!    first alike (camera rays along the Z-curve of a tile), then in no order (bounces).
 //! 2. Queues are compacted in place: the ray of a path that goes on overwrites one that was already shaded.
-//! 3. Shadow rays are traced after all vertices of the wave are shaded; light is added to the path then.
+//! 3. Shadow rays are traced after all vertices of the wave are shaded, or as many as there is room for; light is added to
+//!    the path then.
 //! 4. Code for what the scene does not have is not compiled in ([`Features`]).
 //! 5. Where that pays, pixels of a group share what their paths find (`reuse.rs`).
 //! 6. Where an irradiance cache knows the indirect light of a diffuse point, the path need not find it
-//!    (`irradiance_cache.rs`); nor where photons tell it (`density.rs`, `maps.rs`).
+//!    (`cached.rs`), and may ask several points of lights; nor where photons tell it (`density.rs`, `maps.rs`).
 //! 7. Pixels at the border of a lamp look at it with rays of their own (`outline.rs`).
 //! 8. Where photons of caustics lie, paths and photons share the light that both find (`merge.rs`).
 //! 9. Where all else is quiet, pixels that see an edge have several paths for each sample (`edges.rs`).
 //!
 //! The price: about 300 bytes for each path of a wave. What a pixel sees depends on (seed, sample) and the pixels of
-//! its group only, no wave cuts a group, and samples are summed in their order: the picture has the same bits for
+//! its group only, no wave cuts a group that shares, and samples are summed in their order: the picture has the same bits for
 //! any size of wave and any distribution of tasks.
 
 use super::arrivals::{Arrivals, TO_ENVIRONMENT};
