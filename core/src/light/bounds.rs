@@ -53,9 +53,9 @@ impl Group {
         }
     }
 
-    /// What `meets` says of the sphere.
-    pub(super) fn lies_where(&self, meets: impl Fn(Vec3, f32) -> bool) -> bool {
-        meets(self.center.into(), self.radius)
+    /// The centre and the radius of the sphere.
+    pub(super) fn sphere(&self) -> (Vec3, f32) {
+        (self.center.into(), self.radius)
     }
 
     /// An estimate of the irradiance at `point` on a surface with `normal` (zero: facing everywhere). Zero

@@ -101,9 +101,7 @@ impl<'m> Emission<'m> {
         let emitted = if let Some(emitter) = lights.emitters.get(light) {
             from_surface(scene, emitter, place, direction, target)
         } else if light < lights.near() + lights.distant.len() {
-            let light = light - lights.emitters.len();
-            let index = lights.points.iter().chain(lights.distant).nth(light)?;
-            self.without_surface(scene.lights.get(*index as usize)?, place, direction, target)
+            self.without_surface(lights.without_surface(scene, light)?, place, direction, target)
         } else {
             let (environment, sky) = (scene.environment.as_ref()?, lights.environment.as_ref()?);
             let (towards, pdf) = sky.sample(environment, Vec3::ZERO, direction)?;
@@ -154,12 +152,9 @@ impl<'m> Emission<'m> {
         light: usize,
         (way, on): (Vec3, Vec3),
     ) -> impl Fn(&Target) -> f32 + use<> {
-        let mut without = lights.points.iter().chain(lights.distant);
-        let own = light.checked_sub(lights.emitters.len()).and_then(|own| without.nth(own));
-        let own = own.and_then(|&own| scene.lights.get(own as usize));
         // Of a line from infinitely far the size of the scene is told instead of a place to start at.
         let size = if light < lights.near() { None } else { Some(self.radius) };
-        let evenly = match (lights.emitters.get(light), own) {
+        let evenly = match (lights.emitters.get(light), lights.without_surface(scene, light)) {
             (Some(emitter), _) => {
                 let sides = if emitter.is_two_sided() { 2.0 } else { 1.0 };
                 way.dot(Vec3::from(emitter.normal)).abs().max(LEAST_COS) / (PI * sides)
@@ -184,9 +179,7 @@ impl<'m> Emission<'m> {
                 return 0.0;
             }
         }
-        let mut without = lights.points.iter().chain(lights.distant);
-        let own = light.checked_sub(lights.emitters.len()).and_then(|own| without.nth(own));
-        match own.and_then(|&own| scene.lights.get(own as usize)) {
+        match lights.without_surface(scene, light) {
             Some(PointLight::Point { position, .. }) => on = *position,
             Some(PointLight::Spot { position, direction, cos_outer, .. }) => {
                 on = *position;
@@ -215,9 +208,7 @@ impl<'m> Emission<'m> {
             (local.truncate().length() <= self.radius)
                 .then(|| concentric_square(local.truncate() / self.radius))
         };
-        let mut without = lights.points.iter().chain(lights.distant);
-        let own = without.nth(light - lights.emitters.len()).and_then(|&own| scene.lights.get(own as usize));
-        match own {
+        match lights.without_surface(scene, light) {
             Some(PointLight::Point { .. }) => Some(uniform_sphere_square(way)),
             Some(PointLight::Spot { direction, cos_outer, .. }) => {
                 let local = Frame::from_normal(*direction).to_local(way);
@@ -245,9 +236,7 @@ impl<'m> Emission<'m> {
             let from = emitter.place(if emitter.is_pair() { u } else { uniform_triangle(u).into() });
             return self.square(scene, lights, light, (target - from.position).try_normalize()?, target);
         }
-        let mut without = lights.points.iter().chain(lights.distant);
-        let own = without.nth(light - lights.emitters.len()).and_then(|&own| scene.lights.get(own as usize));
-        let way = match own {
+        let way = match lights.without_surface(scene, light) {
             Some(PointLight::Point { position, .. } | PointLight::Spot { position, .. }) => {
                 (target - *position).try_normalize()?
             }
@@ -360,8 +349,7 @@ fn power(scene: &Scene, lights: &Lights, radius: f32, i: usize) -> f64 {
         let sides = if emitter.is_two_sided() { 2.0 } else { 1.0 };
         return PI * mean_luminance(scene, emitter) * f64::from(emitter.area) * sides;
     }
-    let index = lights.points.iter().chain(lights.distant).nth(i - lights.emitters.len());
-    match index.and_then(|&index| scene.lights.get(index as usize)) {
+    match lights.without_surface(scene, i) {
         Some(light @ PointLight::Point { .. }) => 4.0 * PI * strength(light),
         Some(light @ PointLight::Spot { cos_outer, .. }) => {
             2.0 * PI * (1.0 - f64::from(*cos_outer)) * strength(light)

@@ -77,9 +77,7 @@ impl Emission<'_> {
         position: Vec3,
     ) -> f32 {
         let index = light as usize;
-        let mut all = lights.points.iter().chain(lights.distant);
-        let own = index.checked_sub(lights.emitters.len()).and_then(|i| all.nth(i));
-        let ((way, on), density) = match own.and_then(|&own| scene.lights.get(own as usize)) {
+        let ((way, on), density) = match lights.without_surface(scene, index) {
             Some(PointLight::Point { position: from, .. }) => {
                 ((position - *from, *from), UNIFORM_SPHERE_PDF / from.distance_squared(position))
             }

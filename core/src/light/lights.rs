@@ -352,6 +352,14 @@ impl<'m> Lights<'m> {
         self.emitters.get(light as usize).map(|emitter| emitter.triangle)
     }
 
+    /// Light number `light` in the order of emission, if it is a point, a spot or directional.
+    #[inline]
+    pub(super) fn without_surface<'s>(&self, scene: &Scene<'s>, light: usize) -> Option<&'s PointLight> {
+        let mut all = self.points.iter().chain(self.distant);
+        let index = light.checked_sub(self.emitters.len()).and_then(|own| all.nth(own))?;
+        scene.lights.get(*index as usize)
+    }
+
     /// The probability of [`Lights::sample`] for light `light`, one without surface, in the order of emission.
     pub(crate) fn probability(&self, light: u32, position: Vec3, normal: Vec3) -> f32 {
         let index = light as usize;

@@ -156,7 +156,8 @@ impl<'m> Tree<'m> {
         while let Some(next) = waiting.checked_sub(1) {
             waiting = next;
             let Some(node) = stack.get(next).and_then(|node| self.nodes.get(*node)) else { return };
-            if !node.group.lies_where(&meets) {
+            let (center, radius) = node.group.sphere();
+            if !meets(center, radius) {
                 continue;
             }
             if node.link & LEAF != 0 {

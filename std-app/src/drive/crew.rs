@@ -55,8 +55,10 @@ impl Crew<'_, '_> {
     /// The same in the mean over all pixels, where they are to have different numbers: for methods that need something new
     /// from time to time, whatever the numbers of the samples that are taken then.
     pub(super) fn next_in_mean(&self) -> Option<u32> {
-        let Some(weights) = &self.canvas.weights else { return self.next_sample() };
-        self.open().next().filter(|_| !self.round.is_over()).map(|_| weights.next(&self.canvas.taken))
+        if self.canvas.weights.is_none() {
+            return self.next_sample();
+        }
+        self.open().next().filter(|_| !self.round.is_over()).map(|_| self.canvas.spp())
     }
 
     /// How many samples those groups have that lack some.
