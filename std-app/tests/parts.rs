@@ -130,7 +130,7 @@ fn a_merged_picture_knows_what_its_samples_share() {
         let render = render(scene, method);
         let whole = folder.object(&format!("{render} --audit off -o whole.exr"));
         for shard in 1..=2 {
-            folder.object(&format!("{render} --shard {shard}/2 --checkpoint {shard}.film"));
+            folder.object(&format!("{render} --audit off --shard {shard}/2 --checkpoint {shard}.film"));
         }
         let merged = folder.object("merge 1.film 2.film -o merged.exr --json");
         assert_eq!(
@@ -142,6 +142,16 @@ fn a_merged_picture_knows_what_its_samples_share() {
         let said = String::from_utf8_lossy(&said);
         assert_eq!(said.contains("bias is not in it"), biased, "{said}");
     }
+    // Audited, they know their bias too.
+    for shard in 1..=2 {
+        let render = render("scene.obj", "sppm");
+        folder.object(&format!("{render} --shard {shard}/2 --checkpoint {shard}.film"));
+    }
+    let merged = folder.object("merge 2.film 1.film -o audited.exr --json");
+    assert_eq!(read(&folder.path("merged.exr")).unwrap(), read(&folder.path("audited.exr")).unwrap());
+    assert_eq!(merged["error"]["bias"]["audit"]["pixels"], 256);
+    let said = folder.run("merge 1.film 2.film -o merged.exr").stdout;
+    assert!(String::from_utf8_lossy(&said).contains("noise and bias"));
 }
 
 #[test]

@@ -4,7 +4,7 @@ use super::failure::Failure;
 use super::{ledger, say, summary};
 use clap::Args;
 use halflight::drive::{self, Merged};
-use halflight::report::{dropped_object, estimate_object};
+use halflight::report::{dropped_object, error_object};
 use halflight::save;
 use serde_json::{Value, json};
 use std::path::PathBuf;
@@ -52,7 +52,7 @@ impl Merge {
             "shadow_rays": counters.shadow_rays,
             "paths": counters.paths,
             "mean_radiance": merged.image.mean(),
-            "error": estimate_object(merged.error, "estimate"),
+            "error": error_object(merged.error, merged.audit.as_ref()),
             "may_be_biased": merged.is_biased,
             "dropped": dropped_object(&counters.dropped, &merged.places, merged.empty_pixels),
             "outputs": self.output,
@@ -64,7 +64,10 @@ impl Merge {
         let mut lines: Vec<String> = self.output.iter().map(saved).collect();
         let (width, height) = (merged.image.width, merged.image.height);
         lines.push(format!("image  {width}x{height}, {} samples per pixel", merged.spp));
-        lines.push(summary::estimate(merged.error, merged.is_biased));
+        match &merged.audit {
+            Some(audit) => lines.extend(summary::audited(audit)),
+            None => lines.push(summary::estimate(merged.error, merged.is_biased)),
+        }
         lines.extend(ledger::text(&merged.counters, &merged.places, merged.empty_pixels));
         lines.join("\n")
     }

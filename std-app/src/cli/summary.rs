@@ -102,7 +102,7 @@ pub(super) fn text(run: &Run, report: Option<&Path>) -> String {
 }
 
 /// The lines of an audited estimate.
-fn audited(audit: &Audited) -> [String; 3] {
+pub(super) fn audited(audit: &Audited) -> [String; 3] {
     let ErrorEstimate { relmse, lower, upper } = audit.total;
     let BiasEstimate { relmse: bias, lower: least, upper: most, detectable } = audit.bias;
     let found = if audit.is_biased() { "bias found" } else { "no bias found" };

@@ -1,6 +1,7 @@
 //! Shards of one picture put together: the same bits as one render.
 
 use super::ErrorEstimate;
+use super::audit::{self, Audited};
 use super::canvas::{Canvas, Shard};
 use super::error::{FileError, RenderError};
 use super::film_file::Reader;
@@ -29,10 +30,12 @@ pub struct Merged {
     pub places: Vec<Place>,
     /// Pixels that are black because all of their samples were dropped.
     pub empty_pixels: u64,
-    /// Whether the method has a bias. Nobody looked for it, and it is not in the error.
+    /// Whether the method has a bias. Where nobody looked for it, it is not in the error.
     pub is_biased: bool,
-    /// The error, estimated from the two half-films.
+    /// The error: estimated from the two half-films, and with the bias where all shards were audited.
     pub error: Option<ErrorEstimate>,
+    /// What their audits found together.
+    pub audit: Option<Audited>,
 }
 
 /// Merges the films in `files`, in any order.
@@ -65,10 +68,19 @@ pub fn merge(files: &[PathBuf]) -> Result<Merged, RenderError> {
     let mut canvas = Canvas::new(film, Shard::WHOLE);
     canvas.shares = first.header.shares;
     let mut seconds = 0.0;
+    let mut audits = Vec::new();
     for film in films {
         seconds += film.header.seconds;
+        audits.push(film.header.audit().map(|audit| (film.header.shard(), audit)));
         film.read_into(&mut canvas)?;
     }
+    let workers = Workers::new(None)?;
+    let noise = workers.estimate(&canvas.film, canvas.shares);
+    let audit = workers.mean(&canvas.film).zip(audits.into_iter().collect::<Option<Vec<_>>>()).and_then(
+        |(mean, audits)| {
+            audit::State::merged(audits, &canvas.film, mean)?.verdict(&canvas.film, mean, noise?)
+        },
+    );
     Ok(Merged {
         image: image(&canvas.film),
         spp,
@@ -76,7 +88,8 @@ pub fn merge(files: &[PathBuf]) -> Result<Merged, RenderError> {
         counters: canvas.counters,
         places: canvas.ledger.places(width, height),
         empty_pixels: empty_pixels(&canvas.film, |_| true),
-        error: Workers::new(None)?.estimate(&canvas.film, canvas.shares),
+        error: audit.as_ref().map(|audit| audit.total).or(noise),
+        audit,
         is_biased,
     })
 }

@@ -156,23 +156,33 @@ fn made(maker: &Maker) -> Value {
 
 /// Against the reference where there is one, else as estimated; then `estimate` has the estimate too.
 fn error(run: &Run) -> Value {
-    let estimate = |against| estimate_object(run.result.error, against);
-    let mut error = match run.comparison {
-        None => estimate("estimate"),
-        Some(comparison) => {
-            let mut error = comparison_object(comparison);
-            error["interval"] = Value::Null;
-            error["against"] = "reference".into();
-            error["estimate"] = estimate("estimate");
-            error
+    let audit = run.result.audit.as_ref();
+    let mut error = error_object(run.result.error, audit);
+    if let Some(comparison) = run.comparison {
+        let mut against = comparison_object(comparison);
+        against["interval"] = Value::Null;
+        against["against"] = "reference".into();
+        against["estimate"] = estimate_object(run.result.error, "estimate");
+        if audit.is_some() {
+            against["noise"] = error["noise"].take();
+            against["bias"] = error["bias"].take();
         }
-    };
-    if let Some(audit) = &run.result.audit {
-        error["noise"] = estimate_object(Some(audit.noise), "estimate");
-        error["bias"] = bias(audit);
+        error = against;
+    }
+    if audit.is_some() {
         error["bias"]["doubt"] = run.doubt().into();
     }
     error
+}
+
+/// The object of an estimate, with what an audit has found.
+pub fn error_object(error: Option<ErrorEstimate>, audit: Option<&Audited>) -> Value {
+    let mut object = estimate_object(error, "estimate");
+    if let Some(audit) = audit {
+        object["noise"] = estimate_object(Some(audit.noise), "estimate");
+        object["bias"] = bias(audit);
+    }
+    object
 }
 
 /// What an audit has found.
@@ -206,7 +216,7 @@ fn bias(audit: &Audited) -> Value {
 }
 
 /// The object of an estimate.
-pub fn estimate_object(error: Option<ErrorEstimate>, against: &str) -> Value {
+fn estimate_object(error: Option<ErrorEstimate>, against: &str) -> Value {
     match error {
         Some(ErrorEstimate { relmse, lower, upper }) => {
             json!({ "relmse": relmse, "interval": [lower, upper], "against": against })

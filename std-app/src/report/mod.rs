@@ -13,7 +13,7 @@ pub mod words;
 
 pub use census::counts;
 pub use folder::{check_folder, write_folder};
-pub use json::{comparison_object, dropped_object, estimate_object};
+pub use json::{comparison_object, dropped_object, error_object};
 pub use maker::Maker;
 pub use race::{Race, Racer};
 

@@ -4,6 +4,7 @@
 //!
 //! Every pixel of a stratum has the same chance, whatever its own noise has put it there: the choice has no bias.
 
+use crate::drive::Shard;
 use halflight_core::Rgb;
 use halflight_core::estimate::filtered;
 use halflight_core::film::{Film, PIXELS_PER_TILE, Tile};
@@ -56,13 +57,31 @@ pub(super) fn count(width: u32, height: u32) -> usize {
     Tile::count(width, height).clamp(FEWEST, MOST).min(width as usize * height as usize)
 }
 
-/// The pixels, and the size of the stratum of each over the mean size, in the order of the strata.
-pub(super) fn choose(film: &Film, mean: f64, seed: u32) -> (Vec<[u32; 2]>, Vec<f32>) {
+/// Pixels of the tiles of a shard that are audited, and the size of the stratum of each over the mean size, in the order of
+/// the strata.
+pub(super) fn choose(film: &Film, shard: Shard, mean: f64, seed: u32) -> (Vec<[u32; 2]>, Vec<f32>) {
     let (width, height) = (film.width(), film.height());
-    let strata = count(width, height);
-    let grid = Grid::new([width, height], strata);
+    let all = count(width, height);
+    let order = ordered(film, shard, mean, Grid::new([width, height], all));
+    let strata = (all * order.len()).div_ceil(width as usize * height as usize);
+
+    let random = Random::new(seed, STREAM);
+    let border = |i: usize| (i as u64 * order.len() as u64 / strata as u64) as usize;
+    let stratum = |i: usize| {
+        let (first, end) = (border(i), border(i + 1));
+        let number = i as u32 * shard.count + shard.index;
+        let pick = (f64::from(random.single(number)) * (end - first) as f64) as usize;
+        (order[(first + pick).min(end - 1)], ((end - first) * strata) as f32 / order.len() as f32)
+    };
+    (0..strata).map(stratum).unzip()
+}
+
+/// The pixels of a shard, region by region, within each by brightness.
+pub(super) fn ordered(film: &Film, shard: Shard, mean: f64, grid: Grid) -> Vec<[u32; 2]> {
+    let (width, height) = (film.width(), film.height());
     let mut order: Vec<(usize, f32, [u32; 2])> = Vec::with_capacity(width as usize * height as usize);
-    for (task, pixels) in film.pixels().chunks(PIXELS_PER_TILE).enumerate() {
+    let tiles = film.pixels().chunks(PIXELS_PER_TILE).enumerate();
+    for (task, pixels) in tiles.filter(|(task, _)| shard.owns(*task)) {
         let tile = Tile::new(width, height, task);
         let colours = filtered(pixels, mean);
         for (i, colour) in colours.into_iter().enumerate() {
@@ -73,15 +92,7 @@ pub(super) fn choose(film: &Film, mean: f64, seed: u32) -> (Vec<[u32; 2]>, Vec<f
         }
     }
     order.sort_unstable_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)).then(a.2.cmp(&b.2)));
-
-    let random = Random::new(seed, STREAM);
-    let border = |i: usize| (i as u64 * order.len() as u64 / strata as u64) as usize;
-    let stratum = |i: usize| {
-        let (first, end) = (border(i), border(i + 1));
-        let pick = (f64::from(random.single(i as u32)) * (end - first) as f64) as usize;
-        (order[(first + pick).min(end - 1)].2, ((end - first) * strata) as f32 / order.len() as f32)
-    };
-    (0..strata).map(stratum).unzip()
+    order.into_iter().map(|(_, _, place)| place).collect()
 }
 
 /// Of the choice of pixels, among the streams of its seed.
@@ -121,7 +132,7 @@ mod tests {
         let mut times = vec![0; 40 * 30];
         for seed in 0..400 {
             film(40, 30, light, |film| {
-                let (pixels, shares) = choose(film, 5.0, seed);
+                let (pixels, shares) = choose(film, Shard::WHOLE, 5.0, seed);
                 assert_eq!(pixels.len(), 256);
                 assert!((shares.iter().sum::<f32>() / 256.0 - 1.0).abs() < 1e-5);
                 for ([x, y], share) in pixels.into_iter().zip(shares) {
@@ -135,6 +146,26 @@ mod tests {
     }
 
     #[test]
+    fn shards_have_pixels_of_their_own() {
+        film(
+            50,
+            40,
+            |x, _| x as f32,
+            |film| {
+                for index in 0..3 {
+                    let shard = Shard { index, count: 3 };
+                    let (pixels, shares) = choose(film, shard, 25.0, 1);
+                    // A third of 256, as nearly as tiles of 16 x 16 divide 50 x 40.
+                    assert!((70..105).contains(&pixels.len()), "{}", pixels.len());
+                    assert!((shares.iter().sum::<f32>() / pixels.len() as f32 - 1.0).abs() < 1e-5);
+                    let tile = |[x, y]: [u32; 2]| Tile::position(50, x, y) / PIXELS_PER_TILE;
+                    assert!(pixels.into_iter().all(|pixel| shard.owns(tile(pixel))));
+                }
+            },
+        );
+    }
+
+    #[test]
     fn what_is_rare_has_its_share() {
         // A bright stripe of a hundredth of the picture: 16 of 1600 rows of strata… of 256 audited pixels 2 or 3.
         film(
@@ -142,7 +173,7 @@ mod tests {
             100,
             |x, _| if x == 17 { 50.0 } else { 1.0 },
             |film| {
-                let (pixels, _) = choose(film, 1.5, 3);
+                let (pixels, _) = choose(film, Shard::WHOLE, 1.5, 3);
                 let stripe = pixels.iter().filter(|[x, _]| *x == 17).count();
                 assert!((1..=5).contains(&stripe), "{stripe}");
             },
@@ -156,7 +187,7 @@ mod tests {
             3,
             |_, _| 1.0,
             |film| {
-                let (mut pixels, shares) = choose(film, 1.0, 0);
+                let (mut pixels, shares) = choose(film, Shard::WHOLE, 1.0, 0);
                 pixels.sort_unstable();
                 pixels.dedup();
                 assert_eq!((pixels.len(), shares), (15, vec![1.0; 15]));

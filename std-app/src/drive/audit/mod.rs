@@ -2,6 +2,7 @@
 //! both differ by beyond their noise is bias (docs/decisions/0011).
 
 mod choice;
+mod shards;
 mod verdict;
 
 pub use verdict::{Audited, Region};
@@ -10,7 +11,7 @@ use super::memory::Memory;
 use super::method::Stage;
 use super::run::path_settings;
 use super::workers::Workers;
-use super::{ErrorEstimate, RenderError, Settings};
+use super::{ErrorEstimate, RenderError, Settings, Shard};
 use choice::Grid;
 use core::ops::Range;
 use halflight_core::bsdf::Features;
@@ -39,8 +40,8 @@ type Truth<'a> =
 /// See the file.
 pub(super) struct Audit<'a> {
     truth: Box<Truth<'a>>,
-    /// Of the work of picture and audit together.
-    share: f64,
+    /// Whose pixels are audited.
+    shard: Shard,
     /// Whether work is time. Otherwise it is rays, which are the same each time.
     by_clock: bool,
     seed: u32,
@@ -51,6 +52,8 @@ pub(super) struct Audit<'a> {
 /// All that a film file keeps of an audit.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(super) struct State {
+    /// Of the work of picture and audit together.
+    share: f64,
     places: Vec<[u32; 2]>,
     shares: Vec<f32>,
     /// The bits of the audited pixels.
@@ -65,12 +68,22 @@ impl State {
     pub(super) fn is_whole(&self) -> bool {
         self.places.len() == self.pixels.len() && self.places.len() == self.shares.len()
     }
+
+    /// What is known of the bias of `film`, of mean `mean`, whose own noise tells `noise`.
+    pub(super) fn verdict(&self, film: &Film, mean: f64, noise: ErrorEstimate) -> Option<Audited> {
+        let Self { share, places, shares, pixels, taken, rays, seconds } = self;
+        let truth: &[Pixel] = bytemuck::cast_slice(pixels);
+        let grid = Grid::new([film.width(), film.height()], places.len());
+        let findings = verdict::findings(film, mean, places, truth);
+        let audited = verdict::verdict(&findings, shares, places, grid, noise)?;
+        Some(Audited { share: *share, samples: *taken, rays: *rays, seconds: *seconds, ..audited })
+    }
 }
 
 /// The share of the work that the audit of a picture has; `None` where there is none.
 fn share(settings: &Settings, is_biased: bool) -> Option<f64> {
     let share = settings.audit.unwrap_or(if is_biased { SHARE } else { 0.0 });
-    (share > 0.0 && settings.shard.count == 1).then_some(share)
+    (share > 0.0).then_some(share)
 }
 
 impl<'a> Audit<'a> {
@@ -93,11 +106,11 @@ impl<'a> Audit<'a> {
             truth: Box::new(move |places, samples, arena, out| {
                 tracer.probe(places, samples, WAVE, arena, out)
             }),
-            share,
+            shard: settings.shard,
             by_clock: settings.stop.error.is_none(),
             seed: other.seed,
             scratch,
-            state: State::default(),
+            state: State { share, ..State::default() },
         }))
     }
 
@@ -119,7 +132,7 @@ impl<'a> Audit<'a> {
 
     /// Goes on where a film file ended.
     pub(super) fn resume(&mut self, state: State) {
-        self.state = state;
+        self.state = State { share: self.state.share, ..state };
     }
 
     /// Takes the samples that are due after so many `rays` of the picture, or `seconds` of picture and audit; fewer where
@@ -135,11 +148,11 @@ impl<'a> Audit<'a> {
         let start = Instant::now();
         if self.state.places.is_empty() {
             let Some(mean) = workers.mean(film) else { return Ok(()) };
-            (self.state.places, self.state.shares) = choice::choose(film, mean, self.seed);
+            (self.state.places, self.state.shares) = choice::choose(film, self.shard, mean, self.seed);
             self.state.pixels = vec![bytemuck::cast(Pixel::default()); self.state.places.len()];
         }
         let before = self.state.seconds;
-        let per_picture = self.share / (1.0 - self.share);
+        let per_picture = self.state.share / (1.0 - self.state.share);
         loop {
             let (spent, due) = match self.by_clock {
                 true => (self.state.seconds, per_picture * (seconds - before)),
@@ -177,12 +190,7 @@ impl<'a> Audit<'a> {
 
     /// What is known of the bias of `film`, whose own noise tells `noise`.
     pub(super) fn verdict(&self, workers: &Workers, film: &Film, noise: ErrorEstimate) -> Option<Audited> {
-        let State { places, shares, pixels, taken, rays, seconds } = &self.state;
-        let truth: &[Pixel] = bytemuck::cast_slice(pixels);
-        let grid = Grid::new([film.width(), film.height()], places.len());
-        let findings = verdict::findings(film, workers.mean(film)?, places, truth);
-        let audited = verdict::verdict(&findings, shares, places, grid, noise)?;
-        Some(Audited { share: self.share, samples: *taken, rays: *rays, seconds: *seconds, ..audited })
+        self.state.verdict(film, workers.mean(film)?, noise)
     }
 }
 

@@ -1,7 +1,7 @@
 //! The audit finds what is wrong, and only that.
 
 use super::*;
-use crate::drive::{Audited, Ending, Method, RenderResult, Stop, render};
+use crate::drive::{Audited, Checkpoint, Ending, Method, RenderResult, Stop, merge, render};
 use crate::load::{LoadOptions, load};
 use core::sync::atomic::AtomicBool;
 use halflight_core::estimate::Difference;
@@ -114,4 +114,29 @@ fn no_audit_where_none_is_asked_for() {
     assert!(picture(Settings { audit: None, ..settings(Method::Path, 8, 0, 0.1) }).audit.is_none());
     assert!(picture(settings(Method::Wrong, 8, 0, 0.0)).audit.is_none());
     assert!(picture(Settings { audit: None, ..settings(Method::Wrong, 8, 0, 0.1) }).audit.is_some());
+}
+
+#[test]
+fn shards_are_audited_together() {
+    let folder = std::env::temp_dir().join(format!("halflight-audit-{}", std::process::id()));
+    std::fs::create_dir_all(&folder).unwrap();
+    let films: Vec<_> = (0..3).map(|shard| folder.join(format!("{shard}.film"))).collect();
+    let settings = settings(Method::Wrong, 128, 3, 0.3);
+    for (index, film) in films.iter().enumerate() {
+        let checkpoint = Some(Checkpoint { path: film.clone(), every: 60.0 });
+        let shard = Shard { index: index as u32, count: 3 };
+        picture(Settings { shard, checkpoint, ..settings.clone() });
+    }
+    let merged = merge(&films).unwrap();
+    std::fs::remove_dir_all(&folder).unwrap();
+    let (audit, whole) = (merged.audit.unwrap(), audited(settings));
+    // 256 of all, and no more than one a shard for what does not divide.
+    assert!((256..259).contains(&audit.pixels), "{audit:?}");
+    assert_eq!((audit.noise, merged.error), (whole.noise, Some(audit.total)));
+    for region in &audit.regions {
+        let expected = if 2 * region.x >= SIZE { 0.1 } else { 0.0 };
+        assert!((region.deviation.mean - expected).abs() < 5.0 * region.deviation.error + 0.02, "{region:?}");
+        assert!(!region.is_biased || 2 * region.x >= SIZE, "{region:?}");
+    }
+    assert!(audit.regions.iter().filter(|region| region.is_biased).count() >= 2, "{:?}", audit.regions);
 }
