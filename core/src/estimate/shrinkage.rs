@@ -116,7 +116,8 @@ impl Lookalikes {
 
     /// What they say that pixels are.
     pub fn shrinkage(&self) -> Shrinkage {
-        let mut shrinkage = Shrinkage { classes: [Believed { share: 0.0, spread: 1.0 }; CLASSES] };
+        let mut shrinkage =
+            Shrinkage { classes: [Believed { share: 0.0, spread: 1.0, doubt: 1.0 }; CLASSES] };
         for (class, (Class { pixels, own, other, own_squared, other_squared }, out)) in
             self.classes.into_iter().zip(&mut shrinkage.classes).enumerate()
         {
@@ -133,7 +134,8 @@ impl Lookalikes {
             let there = 1.0 + sign * middle * believed * own / pixels.max(1.0);
             let spread = middle * middle * (other_squared - believed * believed * own_squared)
                 / ((pixels + PRIOR) * there * there);
-            *out = Believed { share: believed as f32, spread: 1.0 + spread.clamp(0.0, MOST_SPREAD) as f32 };
+            let spread = 1.0 + spread.clamp(0.0, MOST_SPREAD) as f32;
+            *out = Believed { share: believed as f32, spread, doubt: (PRIOR / (pixels + PRIOR)) as f32 };
         }
         shrinkage
     }
@@ -146,6 +148,8 @@ struct Believed {
     share: f32,
     /// ⟨R²⟩ / ⟨R⟩².
     spread: f32,
+    /// How much of that is what was believed before anything was learnt.
+    doubt: f32,
 }
 
 /// How far the pixels of a picture are to be believed.
@@ -155,19 +159,33 @@ pub struct Shrinkage {
 }
 
 impl Shrinkage {
-    /// 1 / (R² + 0.01) of what a pixel probably is that `pair` saw, with such neighbours (m = 1), and by how much the mean over
-    /// what it may be is larger.
-    pub(super) fn over_square(&self, pair: Pair, around: &Around) -> (Vec4, f32) {
-        let Believed { share, spread } = self.classes[pair.class(around.more(pair.light))];
+    /// What a pixel probably is that `pair` saw, with such neighbours (m = 1).
+    pub(super) fn likely(&self, pair: Pair, around: &Around) -> Likely {
+        let Believed { share, spread, doubt } = self.classes[pair.class(around.more(pair.light))];
         // Where it is darker in sum and brighter in a channel, a share below zero would lead through black.
-        let r = (around.light + share * (pair.light - around.light)).max(around.light.min(pair.light));
-        ((r * r + DARK as f32).recip(), spread)
+        let light = (around.light + share * (pair.light - around.light)).max(around.light.min(pair.light));
+        Likely { light, over_square: (light * light + DARK as f32).recip(), spread, share, doubt }
     }
+}
+
+/// What a pixel probably is.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Likely {
+    /// R.
+    pub(super) light: Vec4,
+    /// 1 / (R² + 0.01).
+    pub(super) over_square: Vec4,
+    /// By how much the mean of that over what it may be is larger.
+    pub(super) spread: f32,
+    /// How much is believed of what it has more than its neighbours.
+    pub(super) share: f32,
+    /// How much of that nothing was learnt about.
+    pub(super) doubt: f32,
 }
 
 /// The light of the neighbours of a pixel.
 pub(super) struct Around {
-    light: Vec4,
+    pub(super) light: Vec4,
     brightness: f32,
     reciprocal: f32,
 }
@@ -254,8 +272,8 @@ mod tests {
         core::array::from_fn(|place| {
             let pairs = seen.quarters[place].map(Pair::both).unwrap();
             pairs.map(|pair| {
-                let (over_square, spread) = shrinkage.over_square(pair, &Around::new(seen.around[place]));
-                (spread * over_square.x).recip()
+                let likely = shrinkage.likely(pair, &Around::new(seen.around[place]));
+                (likely.spread * likely.over_square.x).recip()
             })
         })
     }
@@ -307,8 +325,10 @@ mod tests {
         let around = Vec4::new(1.0, 1.0, 0.1, 0.0);
         let light = Vec4::new(0.1, 0.1, 1.0, 0.0);
         for believed in [-2.0, -0.3, 0.0, 1.0] {
-            let shrinkage = Shrinkage { classes: [Believed { share: believed, spread: 1.0 }; CLASSES] };
-            let (weight, _) = shrinkage.over_square(Pair { a: light, b: light, light }, &Around::new(around));
+            let shrinkage =
+                Shrinkage { classes: [Believed { share: believed, spread: 1.0, doubt: 0.0 }; CLASSES] };
+            let pair = Pair { a: light, b: light, light };
+            let weight = shrinkage.likely(pair, &Around::new(around)).over_square;
             assert!(weight.truncate().max_element() <= 1.0 / (0.1f32.powi(2) + 0.01) * 1.0001, "{weight}");
         }
     }

@@ -1,7 +1,7 @@
 //! What the halves of one tile disagree by: sums from which [`super::ErrorEstimate`] is made.
 
 use super::seen::{Seen, brightness, raster};
-use super::shrinkage::{Around, Pair, Shrinkage};
+use super::shrinkage::{Around, Likely, Pair, Shrinkage};
 use crate::film::{GROUPS, PIXELS_PER_TILE, Pixel, Tile};
 use glam::Vec4;
 
@@ -55,6 +55,8 @@ pub struct TileError {
     pub(super) squares: f64,
     /// The squares of those squares.
     pub(super) fourths: f64,
+    /// Squares of what the errors of pixels may be above their variances ([`above`]).
+    pub(super) above: f64,
     /// Sum of (A₁ − A₂)(B₁ − B₂) / 4, which has the mean 0 and hangs together between pixels as the errors do.
     pub(super) product: f64,
     /// Squares of that sum in pixels.
@@ -79,18 +81,19 @@ impl TileError {
             let place = raster(i);
             let Some(quarters @ [a1, a2, b1, b2]) = seen.quarters[place] else { continue };
             let (pairs, around) = (Pair::both(quarters), Around::new(seen.around[place]));
-            let likely = pairs.map(|pair| shrinkage.over_square(pair, &around));
-            let by = likely.map(|(over_square, spread)| spread * over_square);
+            let likely = pairs.map(|pair| shrinkage.likely(pair, &around));
+            let by = likely.map(|likely| likely.spread * likely.over_square);
             let [first, second] = pairs.map(|pair| pair.noise());
             let by_both = 0.5 * (by[0] + by[1]);
             sums.values += 3;
             let noise = pixel.scaled_variance(scale).extend(0.0);
-            sums.certain += total(noise * (likely[0].0 + likely[1].0) * 0.5);
+            sums.certain += total(noise * (likely[0].over_square + likely[1].over_square) * 0.5);
             let variance = total(noise * by_both);
             let squared = variance * variance;
             sums.halves += variance;
             sums.squares += squared;
             sums.fourths += squared * squared;
+            sums.above += above(noise, 0.25 * (a1 + a2 + b1 + b2), likely, around.light);
             sums.parts += total((first + second) * by_both * 0.5);
             sums.crossed += total(0.5 * (first * by[1] + second * by[0]));
             let product = total((a1 - a2) * (b1 - b2) * by_both) / 4.0;
@@ -118,12 +121,43 @@ impl core::ops::AddAssign for TileError {
         self.crossed += other.crossed;
         self.squares += other.squares;
         self.fourths += other.fourths;
+        self.above += other.above;
         self.product += other.product;
         self.pixels += other.pixels;
         self.groups += other.groups;
         self.differences += other.differences;
         self.together += other.together;
     }
+}
+
+/// The square of what the error of a pixel may be above its variance V: 4 V² in the mean, and little where a single sample has
+/// nearly all of V. Such a flash is one too many, and the error is V; or one of the few that there should be, and it is
+/// less. `noise` is V before it is weighed, `mean` the pixel, `around` its neighbours.
+///
+/// With T = (A − R)(B − R) = (I − R)² − V for the difference, and v for what is not known of R: T² + 4 (I − R)² v, and 4/3 V²
+/// for as much as the pixel itself is believed. Where pixels like it are not known, R may be that of the darker pair.
+fn above(noise: Vec4, mean: Vec4, likely: [Likely; 2], around: Vec4) -> f64 {
+    /// (I − R)² over V at most: more comes from an edge that R does not follow.
+    const MOST: f64 = 3.0;
+    /// The mean of T² over 4 V², for normal noise, where that is the most.
+    const CUT: f64 = 0.563;
+    /// What is believed with 95 % is two standard errors.
+    const BELIEVED: f64 = 0.25;
+    let by = likely.map(|likely| likely.spread * likely.over_square);
+    let weights = 0.5 * (by[0] + by[1]);
+    let square = |light: Vec4| total(light * light * weights);
+    let variance = total(noise * weights);
+    let light = 0.5 * (likely[0].light + likely[1].light);
+    let share = f64::from(0.5 * (likely[0].share + likely[1].share)).clamp(0.0, 1.0);
+    let distance = square(mean - light).min(MOST * variance);
+    let unknown = square(light - around).min(share * variance);
+    let difference = distance - variance;
+    let darker =
+        f64::from(likely[0].doubt.max(likely[1].doubt)) * total(noise * (by[0].max(by[1]) - weights));
+    (1.0 - share) / CUT * difference * difference
+        + 4.0 / 3.0 * share * share * variance * variance
+        + 4.0 * distance * unknown
+        + BELIEVED * darker * darker
 }
 
 fn total(values: Vec4) -> f64 {
