@@ -333,7 +333,8 @@ impl Record {
         let [r1, r2] = self.radii;
         if radius < r1 {
             let share = radius / r1;
-            self.radii = [radius, r2 * share];
+            // Rounding does not make the longer the shorter.
+            self.radii = [radius, (r2 * share).max(radius)];
             if radius <= self.least {
                 self.overlap = self.overlap.min(1.0);
             }
@@ -462,6 +463,17 @@ mod tests {
             pair(0.0)
         );
         assert_eq!(pair(0.0625), [0.2; 2]);
+    }
+
+    #[test]
+    fn a_circle_that_shrinks_stays_one() {
+        let random = Random::new(4, 4);
+        for i in 0..1000 {
+            let radius = random.single(2 * i);
+            let mut circle = Record { radii: [radius; 2], ..record(0.5, 0.5, radius) };
+            circle.shrink(radius * random.single(2 * i + 1));
+            assert_eq!(circle.radii[0], circle.radii[1]);
+        }
     }
 
     #[test]
