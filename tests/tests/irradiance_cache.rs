@@ -3,7 +3,7 @@
 
 use glam::Vec3;
 use halflight::compare::compare;
-use halflight::drive::{CacheUse, Ending, Mark, Method, RenderResult, Settings};
+use halflight::drive::{CacheUse, Ending, Gather, Mark, Method, RenderResult, Settings};
 use halflight::save::Image;
 use halflight_core::scene::Scene;
 use halflight_tests::render::{blocks, difference, render};
@@ -40,6 +40,28 @@ fn the_cornell_box_is_that_of_the_path_tracer_at_any_depth() {
         let seen = cached(&scene, 64, 1, |s| s.max_depth = Some(2));
         assert_eq!(seen.cache.unwrap().records, 0);
     }
+}
+
+#[test]
+fn photons_tell_what_records_and_paths_do_not_know() {
+    let buffers = cornell_box();
+    let scene = buffers.scene();
+    for depth in [Some(4), None] {
+        let path = render(&scene, Method::Path, 64, 512, |s| s.max_depth = depth);
+        let [one, two] = [1, 2].map(|threads| {
+            cached(&scene, 64, 128, |s| {
+                (s.max_depth, s.cache.gather, s.threads) = (depth, Gather::Photons, Some(threads));
+            })
+        });
+        assert!(one.image == two.image && one.photons.is_some_and(|photons| photons.maps == 2));
+        for (a, b) in one.image.mean().into_iter().zip(path.image.mean()) {
+            assert!((a / b - 1.0).abs() < 0.01, "{depth:?}: {a} {b}");
+        }
+    }
+    // Direct light is for shadow rays.
+    let seen = |gather| cached(&scene, 32, 4, |s| (s.max_depth, s.cache.gather) = (Some(3), gather)).image;
+    let [paths, photons] = [Gather::Paths, Gather::Photons].map(seen);
+    assert!(paths == photons);
 }
 
 #[test]

@@ -173,6 +173,24 @@ impl<'a> GatherLight<'a> {
         distance: f32,
         turns: f32,
     ) -> Option<Rgb> {
+        let (irradiance, radius) = self.irradiance((bvh, level), point, distance)?;
+        if let Bsdf::Diffuse(diffuse) = bsdf {
+            return Some(irradiance * diffuse.reflectance * FRAC_1_PI);
+        }
+        let (place, normal) = (point.position, point.geometric_normal);
+        let disc = Disc { place, normal, radius: radius.min(self.farthest), falloff: self.falloff };
+        let light = Light { map: self.global, is_caustic: false };
+        Some(reflected::<F>(light, (bvh, level), (&disc, None), (point, bsdf), wo, turns))
+    }
+
+    /// The irradiance of the photons at `point`, at the end of a gather ray of length `distance`, and the radius of their
+    /// discs. `None` where the map should not tell.
+    pub(super) fn irradiance(
+        &self,
+        (bvh, level): (&Bvh, Level),
+        point: &SurfacePoint,
+        distance: f32,
+    ) -> Option<(Rgb, f32)> {
         // A ray that cannot be long enough need not look.
         let within = self.farthest.min(distance / (SHORTEST * BLUR));
         let mut lines = [Line([0; 64]); LINES];
@@ -210,13 +228,7 @@ impl<'a> GatherLight<'a> {
                 return None;
             }
         }
-        if let Bsdf::Diffuse(diffuse) = bsdf {
-            return Some(photon.power() * diffuse.reflectance * FRAC_1_PI);
-        }
-        let disc =
-            Disc { place: point.position, normal, radius: radius.min(self.farthest), falloff: self.falloff };
-        let light = Light { map: self.global, is_caustic: false };
-        Some(reflected::<F>(light, (bvh, level), (&disc, None), (point, bsdf), wo, turns))
+        Some((photon.power(), radius))
     }
 }
 

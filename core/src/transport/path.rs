@@ -10,7 +10,8 @@
 //! 4. Code for what the scene does not have is not compiled in ([`Features`]).
 //! 5. Where that pays, pixels of a group share what their paths find (`reuse.rs`).
 //! 6. Where an irradiance cache knows the indirect light of a diffuse point, the path need not find it
-//!    (`cached.rs`), and may ask several points of lights; nor where photons tell it (`density.rs`, `maps.rs`).
+//!    (`cached.rs`), or a map of photons does one bounce later, and may ask several points of lights; nor where photons tell
+//!    it (`density.rs`, `maps.rs`).
 //! 7. Pixels at the border of a lamp look at it with rays of their own (`outline.rs`).
 //! 8. Where photons of caustics lie, paths and photons share the light that both find (`merge.rs`).
 //! 9. Where all else is quiet, pixels that see an edge have several paths for each sample (`edges.rs`).
@@ -26,7 +27,7 @@ use super::estimator::{
     Counters, MAX_CROSSINGS, MAX_VERTICES, PathSettings, dimension, environment_heuristic, power_heuristic,
     survival,
 };
-use super::maps::{PhotonMaps, Said};
+use super::maps::{GatherLight, PhotonMaps, Said};
 use super::merge::{ChainLink, Merging, ends_chain};
 use super::reuse::Exchange;
 use super::shadow::{FEW, pass_cutout, passing, shadow_ray};
@@ -78,6 +79,8 @@ pub struct PathTracer<'a, F> {
     /// Of even and of odd samples.
     maps: Option<&'a [PhotonMaps<'a>; 2]>,
     merging: Option<Merging<'a>>,
+    /// Light that was reflected before, where caches do not know it: of even and of odd samples.
+    pub(super) bounced: Option<[GatherLight<'a>; 2]>,
     pub(super) spots: &'a [Spot],
     /// Points of lights that paths of the picture ask where a shadow ray alone finds direct light.
     pub(super) asked: u32,
@@ -110,6 +113,7 @@ impl<'a, F: Features> PathTracer<'a, F> {
             photons: None,
             maps: None,
             merging: None,
+            bounced: None,
             spots: &[],
             asked: 1,
             edges: &[],
@@ -127,6 +131,12 @@ impl<'a, F: Features> PathTracer<'a, F> {
     /// The same, for rays that gather for the cache itself, as it is now.
     pub fn with_growing_cache(&self, cache: &'a IrradianceCache<'a>) -> Self {
         Self { caches: Some(Caches::Growing(cache)), ..*self }
+    }
+
+    /// The same, where paths with caches that come by a diffuse bounce to a point that these do not know have its indirect
+    /// light from photons that were reflected before: even samples from the first, odd ones from the second.
+    pub fn with_bounced(&self, photons: [GatherLight<'a>; 2]) -> Self {
+        Self { bounced: Some(photons), ..*self }
     }
 
     /// The same, where rays that gather for a cache aim at `spots`, and so do paths that go on from what they meet. Paths of

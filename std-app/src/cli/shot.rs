@@ -84,7 +84,7 @@ pub(super) struct Options {
     #[arg(long, value_name = "KERNEL", help_heading = "Photons")]
     photon_kernel: Option<Kernel>,
     /// Light paths of a global map of photons; those of a sample where the method is sppm [default: half as many as
-    /// pixels; as many]
+    /// pixels, 262144 at least for records; as many]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1 << 28),
         help_heading = "Photons")]
     global_photons: Option<u32>,

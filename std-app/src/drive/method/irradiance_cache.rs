@@ -27,6 +27,7 @@ use halflight_core::film::{Dropped, PIXELS_PER_TILE, Pixel, PixelSet, Tile};
 use halflight_core::memory::{Arena, Footprint, Line};
 use halflight_core::transport::gather::Gathering;
 use halflight_core::transport::path::{LIGHTS, WAVE};
+use halflight_core::transport::shoot::Keep;
 use halflight_core::transport::{Counters, PathTracer};
 use std::collections::VecDeque;
 use std::path::Path;
@@ -159,7 +160,7 @@ pub(super) fn with<F: Features, T>(
     let laboratory = if by_photons {
         // Half of the memory for photons at most: records need some as well.
         let half = memory.available().saturating_sub(others) / 2;
-        Some(Laboratory::new(stage, memory, false, others.saturating_add(half))?)
+        Some(Laboratory::new(stage, memory, Keep::Reflected, others.saturating_add(half))?)
     } else {
         None
     };
@@ -260,17 +261,16 @@ impl<F: Features> Cached<'_, F> {
         for (i, half) in halves.iter_mut().enumerate() {
             all = all
                 && match laboratory {
-                    Some((laboratory, shelves)) if !overture.is_done(half) => {
+                    Some((laboratory, shelves)) => {
                         match laboratory.build::<F>(&mut shelves[i], i as u32, crew, scratch)? {
                             None => false,
                             Some(built) => {
-                                let maps = [laboratory.light(&built, 0.0); 2];
-                                let tracer = &tracer.with_maps(&maps);
+                                let tracer = &tracer.with_bounced([laboratory.gathered(&built); 2]);
                                 Overture { tracer, ..overture }.fill(half, crew, scratch)?
                             }
                         }
                     }
-                    _ => overture.fill(half, crew, scratch)?,
+                    None => overture.fill(half, crew, scratch)?,
                 };
         }
         if all {
@@ -400,10 +400,17 @@ impl<F: Features> Renderer for Cached<'_, F> {
         if resumed {
             crew.canvas.counters = counted;
         }
-        let Self { tracer, halves: [even, odd], scratch, edges, lights, .. } = self;
+        let Self { tracer, halves: [even, odd], scratch, edges, lights, laboratory, .. } = self;
         let edges = edges.as_deref().unwrap_or_default();
-        let tracer =
+        let mut tracer =
             tracer.with_caches([&even.cache, &odd.cache]).with_edges(edges).with_lights(lights.unwrap_or(1));
+        let built;
+        if let Some((laboratory, [even, odd])) = laboratory {
+            let Some(even) = laboratory.build::<F>(even, 0, crew, scratch)? else { return Ok(()) };
+            let Some(odd) = laboratory.build::<F>(odd, 1, crew, scratch)? else { return Ok(()) };
+            built = [even, odd];
+            tracer = tracer.with_bounced(built.each_ref().map(|built| laboratory.gathered(built)));
+        }
         crew.tiles(u32::MAX, scratch, &|task, samples, arena, pixels| {
             tracer.run(task, samples, WAVE, arena, pixels)
         })?;

@@ -218,12 +218,6 @@ pub(in crate::drive) struct Overture<'o, 'a, F> {
 }
 
 impl<F: Features> Overture<'_, '_, F> {
-    /// Whether there is nothing left to fill.
-    pub(in crate::drive) fn is_done(&self, growing: &Growing) -> bool {
-        let [width, height] = self.size;
-        growing.next >= Order::new(width, height, STRIDE).len() || growing.cache.is_full()
-    }
-
     /// Fills the cache, or goes on with it. Whether it is done: not where the round is over.
     pub(in crate::drive) fn fill(
         &self,

@@ -17,6 +17,7 @@ use crate::drive::memory::Memory;
 use crate::drive::run::path_settings;
 use halflight_core::bsdf::Features;
 use halflight_core::memory::Line;
+use halflight_core::transport::shoot::Keep;
 use halflight_core::transport::{PathTracer, path::WAVE};
 
 /// Samples that share two sets of maps: enough that maps are the smaller part of the work.
@@ -35,7 +36,7 @@ impl<'a, F: Features> TwoPasses<'a, F> {
         let Stage { scene, bvh, lights, settings, workers } = *stage;
         let scratch = memory.take_each("paths", scratch::<F>(WAVE), workers.count())?;
         let others = Audit::bytes::<F>(stage, Method::PhotonMap.is_biased());
-        let (laboratory, shelves) = Laboratory::new(stage, memory, true, others)?;
+        let (laboratory, shelves) = Laboratory::new(stage, memory, Keep::All, others)?;
         let tracer = PathTracer::<F>::new(scene, bvh, lights, path_settings(settings), settings.level);
         Ok(Self { tracer, laboratory, shelves, scratch })
     }

@@ -64,6 +64,9 @@ const PIXELS_PER_PATH: usize = 2;
 const FEWEST: usize = 16;
 const MOST: usize = 1024;
 
+/// The fewest where all records of a picture see the same map: its noise is in all of them.
+const FEWEST_FOR_RECORDS: usize = 256;
+
 /// Largest radius of a disc of the global map, in diagonals of the scene.
 const FARTHEST: f32 = 0.03;
 
@@ -74,6 +77,7 @@ const CAUSTIC_SEED: u32 = 0x6361_7573;
 pub(super) struct Laboratory<'a> {
     stage: Stage<'a>,
     discs: Discs,
+    keep: Keep,
     emission: Vec<Line>,
     global: usize,
     caustic: usize,
@@ -141,20 +145,21 @@ fn bytes(global: usize, caustic: usize) -> usize {
 }
 
 impl<'a> Laboratory<'a> {
-    /// For maps of the scene, with one of caustics where those are `wanted` and there may be any; and the memory for
-    /// both halves, of which so many `others` bytes are left free.
+    /// For maps of the scene, of the photons to `keep`; where those are all, with one of caustics if there may be any; and
+    /// the memory for both halves, of which so many `others` bytes are left free.
     pub(super) fn new(
         stage: &Stage<'a>,
         memory: &mut Memory,
-        wants_caustics: bool,
+        keep: Keep,
         others: usize,
     ) -> Result<(Self, [Shelf; 2]), RenderError> {
         let Stage { scene, lights, settings, .. } = *stage;
         let emission = memory.take("emission", Emission::footprint(lights))?;
         let pixels = settings.width as usize * settings.height as usize;
-        let usual = (pixels / PIXELS_PER_PATH).div_ceil(PATHS).clamp(FEWEST, MOST);
+        let fewest = if keep == Keep::All { FEWEST } else { FEWEST_FOR_RECORDS };
+        let usual = (pixels / PIXELS_PER_PATH).div_ceil(PATHS).clamp(fewest, MOST);
         let tasks = |asked: Option<u32>| asked.map_or(usual, |paths| (paths as usize).div_ceil(PATHS).max(1));
-        let has_caustics = wants_caustics && may_have_caustics(scene);
+        let has_caustics = keep == Keep::All && may_have_caustics(scene);
         let wanted =
             [tasks(settings.photons.global), if has_caustics { tasks(settings.photons.caustic) } else { 0 }];
         // Where memory is short, both get the same share of what they want.
@@ -181,7 +186,7 @@ impl<'a> Laboratory<'a> {
             caustic: has_caustics.then(|| used(wanted[1], caustic)),
             ..PhotonUse::default()
         };
-        Ok((Self { stage: *stage, discs: stage.discs(), emission, global, caustic, used }, shelves))
+        Ok((Self { stage: *stage, discs: stage.discs(), keep, emission, global, caustic, used }, shelves))
     }
 
     /// Working memory of each thread.
@@ -231,7 +236,7 @@ impl<'a> Laboratory<'a> {
             Shooter::<F>::new(scene, bvh, lights, &emission, shot, settings.level)
         };
         let shoot = [
-            (&mut shelf.global, shooter(self.global, Keep::All, settings.seed, short)),
+            (&mut shelf.global, shooter(self.global, self.keep, settings.seed, short)),
             (
                 &mut shelf.caustic,
                 shooter(self.caustic, Keep::Caustic, settings.seed ^ CAUSTIC_SEED, paths.max_depth),
@@ -280,11 +285,15 @@ impl<'a> Laboratory<'a> {
     pub(super) fn light<'m>(&self, built: &'m Built<'m>, pixels: f32) -> PhotonMaps<'m> {
         let falloff = self.stage.settings.photons.falloff;
         let discs = self.discs.of_pixels(pixels);
+        let global = self.gathered(built);
         let light = |map| PhotonLight::new(map, discs).with_falloff(falloff).of_caustics();
-        PhotonMaps {
-            caustic: built.caustic.as_ref().map(light),
-            global: GatherLight::new(&built.global, &built.irradiances, self.farthest(), falloff),
-        }
+        PhotonMaps { caustic: built.caustic.as_ref().map(light), global }
+    }
+
+    /// What gather rays find in the map.
+    pub(super) fn gathered<'m>(&self, built: &'m Built<'m>) -> GatherLight<'m> {
+        let falloff = self.stage.settings.photons.falloff;
+        GatherLight::new(&built.global, &built.irradiances, self.farthest(), falloff)
     }
 }
 
