@@ -1,7 +1,9 @@
 //! Light paths for caustics: from the lights by mirrors and glass to the first rough surface, where a photon is left
 //! (Jensen 1996), weighted for the paths from the eye that it shares its light with (`merge.rs`).
 //!
-//! A path ends at the first rough surface, but for what a smooth coat mirrors there. How it gets there is in `flight.rs`.
+//! From there paths go on in whatever way, and leave a photon on each rough surface, so that paths from the eye need not
+//! find the caustic by chance. A path that meets a rough surface first goes on by what a smooth coat mirrors there alone.
+//! How paths go is in `flight.rs`.
 
 use super::estimator::Counters;
 pub use super::flight::PATHS;
@@ -20,7 +22,7 @@ use core::f32::consts::PI;
 use core::marker::PhantomData;
 use glam::{Vec2, Vec3};
 
-/// Photons that a task has room for: coats that mirror let a path leave two on average at most.
+/// Photons that a task has room for: a path leaves two on average at most.
 pub const ROOM: usize = 3 * PATHS;
 
 /// Probability with which a path goes on, at most, where it leaves a photon.
@@ -109,7 +111,8 @@ impl<'a, F: Features> CausticShooter<'a, F> {
     ) -> Result<Counters, OutOfMemory> {
         let mut pile = Pile::new(out);
         let leave = |_: &State, photon, _, counters: &mut Counters| pile.leave(photon, counters);
-        let counters = self.flight.follow(task, map, scratch, &mut Weigher { shooter: self, leave })?;
+        let counters =
+            self.flight.follow(task, map, scratch, &mut Weigher { shooter: self, leave, goes_on: true })?;
         pile.finish();
         Ok(counters)
     }
@@ -147,7 +150,7 @@ impl<'a, F: Features> CausticShooter<'a, F> {
                 (find.hits, find.flash) = (share.ratio / share.chance, whole / share.ratio);
             }
         };
-        self.flight.follow(task, map, scratch, &mut Weigher { shooter: self, leave })
+        self.flight.follow(task, map, scratch, &mut Weigher { shooter: self, leave, goes_on: false })
     }
 
     /// In which block of the picture light at `place` shows; `None` where it is outside, or hidden from the eye: some of
@@ -237,10 +240,30 @@ struct Share {
     ratio: f32,
 }
 
+impl Share {
+    /// Of a photon that has its weight already.
+    const ALL: Share = Share { weight: 1.0, chance: 1.0, ratio: 0.0 };
+}
+
+/// `State::others` of a path that a rough surface has scattered: its power has its weight.
+const SCATTERED: f32 = -1.0;
+
 /// Leaves photons with their weights.
 struct Weigher<'s, 'a, F, L> {
     shooter: &'s CausticShooter<'a, F>,
     leave: L,
+    /// Whether paths go on from the first rough surface.
+    goes_on: bool,
+}
+
+impl<F: Features, L> Weigher<'_, '_, F, L> {
+    /// What is known of a photon at `vertex`, which is rough.
+    fn share(&self, state: &State, vertex: &Vertex) -> Share {
+        match state.others {
+            SCATTERED => Share::ALL,
+            _ => self.shooter.share(state, vertex.point.position),
+        }
+    }
 }
 
 impl<F: Features, L: FnMut(&State, Photon, Share, &mut Counters)> Visitor for Weigher<'_, '_, F, L> {
@@ -252,19 +275,30 @@ impl<F: Features, L: FnMut(&State, Photon, Share, &mut Counters)> Visitor for We
         let ends = ends_chain(vertex.bsdf);
         let leaves = ends && state.segments > 1;
         if leaves {
-            let share = self.shooter.share(state, vertex.point.position);
+            let share = self.share(state, vertex);
             if vertex.own() < share.chance {
                 let power = Rgb::from(state.power) * (share.weight / share.chance);
                 (self.leave)(state, vertex.photon(power), share, counters);
             }
         }
-        Some(Onward { most: if leaves { MOST } else { 1.0 }, mirrored: ends })
+        Some(Onward { most: if leaves { MOST } else { 1.0 }, mirrored: ends && !(leaves && self.goes_on) })
     }
 
     /// Takes note of what a surface does with the densities of both ways, at the first of a path also of how the path
     /// tracer finds its light.
     #[inline]
     fn leave(&self, state: &mut State, vertex: &Vertex, from: Vec3, sample: &BsdfSample) {
+        if state.others == SCATTERED {
+            return;
+        }
+        if ends_chain(vertex.bsdf) && !sample.delta {
+            // What goes on is what was left.
+            let share = self.share(state, vertex);
+            let kept = if vertex.own() < share.chance { share.weight / share.chance } else { 0.0 };
+            state.power = (Rgb::from(state.power) * kept).to_array();
+            state.others = SCATTERED;
+            return;
+        }
         // The way back, as the path tracer goes it.
         let there = ChainLink { point: vertex.point, bsdf: vertex.bsdf, near: from, far: sample.direction };
         let back = if sample.delta { 1.0 } else { there.density::<F>(self.shooter.flight.scene) };

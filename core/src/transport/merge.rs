@@ -5,11 +5,15 @@
 //! goes on to the eye in whatever way. It can be found
 //! 1. by the path tracer, which goes from x by chance to x₀;
 //! 2. by the path tracer, which goes to x₁ and chooses x₀, where x₁ reflects into more than one direction;
-//! 3. by a photon that comes from x₀ and lies within a disc around x.
+//! 3. by a photon that comes from x₀ by way of x, where it has its weight from, and lies within a disc around the first
+//!    rough surface on the way from the eye: x, or one that x lights.
 //!
-//! Every other path is found by the path tracer alone. So a path has one vertex at most at which it can be merged, and
-//! three densities, which have all that lies behind x in common. With étendue in place of areas (`light/etendue.rs`)
-//! distances cancel, and the third over the first is
+//! Every other path is found by the path tracer alone. So a path has one vertex at most at which it can be merged. Where the
+//! eye sees x, it has three densities, which have all that lies behind x in common. Else the third is reckoned as if photons
+//! were gathered at x: with discs of one size it is the same, as a diffuse surface leaves the ratio of both as it is, and
+//! weights are right as long as all agree on them. But gathered they are not at x, which paths from the eye may meet so rarely
+//! that each that does would be a spike (`docs/decisions/0042-focus-lights-by-photons.md`). With étendue in place of areas
+//! (`light/etendue.rs`) distances cancel, and the third over the first is
 //!
 //!   R = N π r² cos θⱼ / p(xⱼ → x₍ⱼ₋₁₎) · Π ρᵢ · p(x₀) p(ω₀) / cos θ₀
 //!   ρᵢ = p(x₍ᵢ₋₁₎ → xᵢ → x₍ᵢ₊₁₎) cos θ(x₍ᵢ₋₁₎) / (p(x₍ᵢ₊₁₎ → xᵢ → x₍ᵢ₋₁₎) cos θ(x₍ᵢ₊₁₎))
@@ -51,7 +55,7 @@ const BASE: f32 = 0.02;
 /// Whether light that `bsdf` does not mirror is found by photons: it is a rough surface.
 #[inline]
 pub(super) fn ends_chain(bsdf: &Bsdf) -> bool {
-    holds_photons(bsdf) && bsdf.base().max_element() >= BASE
+    matches!(bsdf, Bsdf::Diffuse(_)) || holds_photons(bsdf) && bsdf.base().max_element() >= BASE
 }
 
 /// The radii of discs: as far on a surface as so many pixels at that distance from the eye.

@@ -32,7 +32,7 @@ use super::merge::{ChainLink, Merging, ends_chain};
 use super::reuse::Exchange;
 use super::shadow::{FEW, pass_cutout, passing, shadow_ray};
 use super::spots::{Cones, Spot};
-use super::wave::{Path, Share, Wave};
+use super::wave::{Merged, Path, Share, Wave};
 use crate::bsdf::{Bsdf, Features};
 use crate::bvh::{Bvh, Coherence};
 use crate::cache::irradiance::{Indirect, IrradianceCache, POINTS};
@@ -471,7 +471,7 @@ impl<'a, F: Features> PathTracer<'a, F> {
         if !self.lights.is_empty() && !bsdf.is_delta() && !said.is_lit {
             // What transmits is looked at from both sides, a window from one.
             let aim = aim.filter(|_| normal != Vec3::ZERO);
-            let wanted = if ends { path.lights.max(1) } else { 1 };
+            let wanted = if ends { u32::from(path.lights.max(1)) } else { 1 };
             for part in 0..wanted {
                 let sampler = if wanted > 1 { path.part(self.settings.seed, part) } else { sampler };
                 let [u, v] = if wanted > 1 { sampler.pair(first + dimension::LIGHT) } else { [u, v] };
@@ -535,16 +535,12 @@ impl<'a, F: Features> PathTracer<'a, F> {
             path.add(throughput * reflected.unwrap_or_default());
         }
 
-        let merges = segments == 1 || !self.is_limited();
+        let merges = path.merged == Merged::LATER && (segments == 1 || !self.is_limited());
         if let Some(merging) = self.merging.as_ref().filter(|_| merges) {
             let turns = || sampler.single(dimension::PROBES + segments);
             let light =
                 merging.reflected::<F>((self.bvh, self.level), path.sample, (point, &bsdf), wo, turns);
-            if self.settings.reuse && exchange.is_lit() {
-                exchange.keep(throughput * light);
-            } else {
-                path.add(throughput * light);
-            }
+            path.add(throughput * light);
         }
 
         let [u, v] = dimension::scattering(&sampler, segments);
@@ -600,9 +596,13 @@ impl<'a, F: Features> PathTracer<'a, F> {
         }
         if let Some(merging) = &self.merging {
             let there = ChainLink { point, bsdf: &bsdf, near: wo, far: sample.direction };
+            let is_rough = ends_chain(&bsdf) && !sample.delta;
+            if is_rough && path.merged == Merged::LATER {
+                path.merged = if merges { Merged::DONE } else { Merged::NEVER };
+            }
             path.chain = match path.chain {
-                _ if ends_chain(&bsdf) && !sample.delta && merges => -merging.begun(point.position),
-                _ if ends_chain(&bsdf) && !sample.delta => 0.0,
+                _ if is_rough && path.merged == Merged::DONE => -merging.begun(point.position),
+                _ if is_rough => 0.0,
                 0.0 => 0.0,
                 chain if sample.delta => chain.abs() / (sample.eta * sample.eta),
                 chain => chain.abs() * there.reverse::<F>(scene) / sample.pdf,
@@ -658,7 +658,7 @@ impl Path {
     /// Random numbers for one of the points of lights that it asks where it ends: those of all its pixel's are a net.
     #[inline]
     fn part(&self, seed: u32, part: u32) -> Sampler {
-        let index = (self.sample >> 1).wrapping_mul(self.lights).wrapping_add(part);
+        let index = (self.sample >> 1).wrapping_mul(self.lights.into()).wrapping_add(part);
         Sampler::replicate(seed, self.pixel, self.sample & 1, index)
     }
 

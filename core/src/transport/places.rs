@@ -196,7 +196,7 @@ impl<F: Features> PathTracer<'_, F> {
             share: if places.outlined.contains(place) { Share::BESIDE_LAMP } else { Share::ALL },
             triangle: MISS,
             eta_squared: 1.0,
-            lights: if places.edges.contains(place) { 1 } else { self.asked },
+            lights: if places.edges.contains(place) { 1 } else { self.asked as u16 },
             ..Path::default()
         };
         wave.exchanges[*count] = exchange;

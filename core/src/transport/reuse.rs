@@ -175,12 +175,6 @@ impl Exchange {
         self.stage == LIT
     }
 
-    /// At a coated y: light of which nobody tells what is the base's. It stays with the path.
-    #[inline]
-    pub(super) fn keep(&mut self, light: Rgb) {
-        self.take(1.0, light);
-    }
-
     /// At a coated y: which part of the light that a shadow ray brings is the base's.
     #[inline]
     pub(super) fn light_is_of_base(&mut self, part: Rgb) {

@@ -42,7 +42,24 @@ pub(super) struct Path {
     /// on the way to the first mirror or glass; zero where photons could not find the path.
     pub(super) chain: f32,
     /// Points of lights that it asks for direct light where a shadow ray alone finds that; 0 stands for one.
-    pub(super) lights: u32,
+    pub(super) lights: u16,
+    /// Whether it has left a rough surface, and whether photons were asked there.
+    pub(super) merged: Merged,
+}
+
+/// What became of the one vertex of a path at which photons of caustics can be merged with it, its first rough one
+/// ([`super::merge`]).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
+#[repr(transparent)]
+pub(super) struct Merged(u16);
+
+impl Merged {
+    /// It is still to come.
+    pub(super) const LATER: Merged = Merged(0);
+    /// Photons were asked there.
+    pub(super) const DONE: Merged = Merged(1);
+    /// They were not.
+    pub(super) const NEVER: Merged = Merged(2);
 }
 
 /// Light that comes to a diffuse point is either direct, from emitters and from what mirrors or refracts them; or it
