@@ -21,7 +21,7 @@ pub(super) fn text(run: &Run, report: Option<&Path>) -> String {
     let (width, height, samples) = (settings.width, settings.height, plural(result.spp.into(), "sample"));
     lines.push(format!("image  {width}x{height}, {samples} per pixel{early}"));
     match &result.audit {
-        None => lines.push(estimate(result.error, result.method.is_biased())),
+        None => lines.push(estimate(result.error, result.method.is_biased() || result.caustics.used)),
         Some(audit) => {
             lines.extend(audited(audit));
             let doubt = run.doubt().filter(|_| audit.is_biased());

@@ -30,7 +30,7 @@ pub struct Merged {
     pub places: Vec<Place>,
     /// Pixels that are black because all of their samples were dropped.
     pub empty_pixels: u64,
-    /// Whether the method has a bias. Where nobody looked for it, it is not in the error.
+    /// Whether the method has a bias, as the blur of photons is one. Where nobody looked for it, it is not in the error.
     pub is_biased: bool,
     /// The error: estimated from the two half-films, and with the bias where all shards were audited.
     pub error: Option<ErrorEstimate>,
@@ -58,7 +58,8 @@ pub fn merge(files: &[PathBuf]) -> Result<Merged, RenderError> {
 
     let [width, height] = first.header.size();
     let spp = first.header.spp;
-    let is_biased = first.header.method().is_some_and(Method::is_biased);
+    // Paths that share what their samples find share photons.
+    let is_biased = first.header.method().is_some_and(Method::is_biased) || first.header.shares;
     let mut lines = Vec::new();
     let needed = Film::footprint(width, height).bytes();
     let count = needed.div_ceil(ALIGNMENT);

@@ -47,10 +47,11 @@ pub(super) fn lead(run: &Run) -> String {
             number(error.relmse, 2)
         ),
         (None, Some(error)) => format!(
-            "This picture has a relMSE of about {}, as its own noise {}{}.",
+            "This picture has a relMSE of about {}, as its own noise {}{}.{}",
             interval(error),
             if run.result.audit.is_some() { "and an audit of its bias tell" } else { "tells" },
-            typical(error.relmse)
+            typical(error.relmse),
+            if run.result.caustics.used { " What photons of caustics blur is not in it." } else { "" },
         ),
         (None, None) => {
             "The error of this picture is not known: it takes four samples of each pixel, and some light."
