@@ -54,6 +54,8 @@ pub(super) struct State {
     /// Root of the sum of squares of the densities of the path tracer's techniques, over that of which `chain` tells:
     /// 1 where that is the only one, 0 where there is none.
     pub others: f32,
+    /// 1 where the last surface only mirrors or refracts.
+    pub mirrored: u32,
 }
 
 /// Where a path meets a surface.
@@ -232,6 +234,9 @@ impl<F: Features> Flight<'_, F> {
         // Power is not squeezed by refraction, as radiance is; and where the shading normal is not that of the
         // triangle, it is the other cosine that counts (Veach 1997, sections 5.2 and 5.3).
         let power = Rgb::from(state.power);
+        if power.max_element() <= 0.0 {
+            return None;
+        }
         let mut next = power * sample.weight * (sample.eta * sample.eta);
         if point.frame.normal != point.geometric_normal {
             let flat = |way: Vec3| way.dot(point.geometric_normal).abs();

@@ -13,7 +13,7 @@
 use super::estimator::Counters;
 pub use super::flight::PATHS;
 use super::flight::{Flight, Onward, Pile, State, Vertex, Visitor};
-use crate::bsdf::{Bsdf, Features};
+use crate::bsdf::{Bsdf, BsdfSample, Features};
 use crate::bvh::Bvh;
 use crate::light::{Emission, Lights};
 use crate::memory::{Arena, Footprint, OutOfMemory};
@@ -21,6 +21,7 @@ use crate::photon::Photon;
 use crate::scene::{Material, Scene, Surface};
 use crate::{Level, Rgb};
 use core::marker::PhantomData;
+use glam::Vec3;
 
 /// Photons that a task has room for.
 pub const ROOM: usize = 6 * PATHS;
@@ -67,6 +68,8 @@ pub enum Keep {
     /// All but those that come straight from a light.
     #[default]
     Reflected,
+    /// Those that something rough has reflected last: what an irradiance cache knows.
+    Scattered,
     /// All.
     All,
     /// Those that came from a light by mirrors and glass alone, at least one of them. Their paths end there.
@@ -157,11 +160,21 @@ impl Visitor for Leaver<'_> {
     #[inline]
     fn meet(&mut self, state: &State, vertex: &Vertex, counters: &mut Counters) -> Option<Onward> {
         let holds = holds_photons(vertex.bsdf);
-        let leaves = holds && (state.segments > 1 || self.keep == Keep::All);
+        let leaves = holds
+            && match self.keep {
+                Keep::All => true,
+                Keep::Scattered => state.segments > 1 && state.mirrored == 0,
+                Keep::Reflected | Keep::Caustic => state.segments > 1,
+            };
         if leaves {
             self.pile.leave(vertex.photon(Rgb::from(state.power)), counters);
         }
         let ends = self.keep == Keep::Caustic && (holds || !focuses(vertex.bsdf));
         (!ends).then_some(Onward { most: if leaves { MOST } else { 1.0 }, mirrored: false })
+    }
+
+    #[inline]
+    fn leave(&self, state: &mut State, vertex: &Vertex, _from: Vec3, _sample: &BsdfSample) {
+        state.mirrored = vertex.bsdf.is_delta().into();
     }
 }

@@ -160,7 +160,7 @@ pub(super) fn with<F: Features, T>(
     let laboratory = if by_photons {
         // Half of the memory for photons at most: records need some as well.
         let half = memory.available().saturating_sub(others) / 2;
-        Some(Laboratory::new(stage, memory, Keep::Reflected, others.saturating_add(half))?)
+        Some(Laboratory::new(stage, memory, Keep::Scattered, others.saturating_add(half))?)
     } else {
         None
     };
