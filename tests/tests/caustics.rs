@@ -164,7 +164,6 @@ fn what_a_focus_lights_has_no_spikes() {
     let mut lit: Vec<_> = picture.image.pixels.iter().take(8 * 40).map(|pixel| pixel[1]).collect();
     lit.sort_by(f32::total_cmp);
     let (middle, brightest) = (lit[lit.len() / 2], lit[lit.len() - 1]);
-    println!("{middle} {brightest}");
     assert!(brightest < 3.0 * middle, "{brightest} beside {middle}");
 }
 

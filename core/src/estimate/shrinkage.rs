@@ -185,7 +185,7 @@ pub(super) struct Likely {
 
 /// The light of the neighbours of a pixel.
 pub(super) struct Around {
-    pub(super) light: Vec4,
+    light: Vec4,
     brightness: f32,
     reciprocal: f32,
 }

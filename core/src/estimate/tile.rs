@@ -93,7 +93,9 @@ impl TileError {
             sums.halves += variance;
             sums.squares += squared;
             sums.fourths += squared * squared;
-            sums.above += above(noise, 0.25 * (a1 + a2 + b1 + b2), likely, around.light);
+            let darker = total(noise * (by[0].max(by[1]) - by_both));
+            let (seen, around) = (0.25 * (a1 + a2 + b1 + b2), seen.around[place]);
+            sums.above += above([variance, darker], likely, seen, around, by_both);
             sums.parts += total((first + second) * by_both * 0.5);
             sums.crossed += total(0.5 * (first * by[1] + second * by[0]));
             let product = total((a1 - a2) * (b1 - b2) * by_both) / 4.0;
@@ -132,28 +134,25 @@ impl core::ops::AddAssign for TileError {
 
 /// The square of what the error of a pixel may be above its variance V: 4 V² in the mean, and little where a single sample has
 /// nearly all of V. Such a flash is one too many, and the error is V; or one of the few that there should be, and it is
-/// less. `noise` is V before it is weighed, `mean` the pixel, `around` its neighbours.
+/// less. `seen` is the pixel, `around` its neighbours; V and how much more it would be with the R of the `darker` pair are weighed
+/// by `weights`.
 ///
 /// With T = (A − R)(B − R) = (I − R)² − V for the difference, and v for what is not known of R: T² + 4 (I − R)² v, and 4/3 V²
 /// for as much as the pixel itself is believed. Where pixels like it are not known, R may be that of the darker pair.
-fn above(noise: Vec4, mean: Vec4, likely: [Likely; 2], around: Vec4) -> f64 {
+fn above([variance, darker]: [f64; 2], likely: [Likely; 2], seen: Vec4, around: Vec4, weights: Vec4) -> f64 {
     /// (I − R)² over V at most: more comes from an edge that R does not follow.
     const MOST: f64 = 3.0;
     /// The mean of T² over 4 V², for normal noise, where that is the most.
     const CUT: f64 = 0.563;
     /// What is believed with 95 % is two standard errors.
     const BELIEVED: f64 = 0.25;
-    let by = likely.map(|likely| likely.spread * likely.over_square);
-    let weights = 0.5 * (by[0] + by[1]);
     let square = |light: Vec4| total(light * light * weights);
-    let variance = total(noise * weights);
     let light = 0.5 * (likely[0].light + likely[1].light);
     let share = f64::from(0.5 * (likely[0].share + likely[1].share)).clamp(0.0, 1.0);
-    let distance = square(mean - light).min(MOST * variance);
+    let distance = square(seen - light).min(MOST * variance);
     let unknown = square(light - around).min(share * variance);
     let difference = distance - variance;
-    let darker =
-        f64::from(likely[0].doubt.max(likely[1].doubt)) * total(noise * (by[0].max(by[1]) - weights));
+    let darker = f64::from(likely[0].doubt.max(likely[1].doubt)) * darker;
     (1.0 - share) / CUT * difference * difference
         + 4.0 / 3.0 * share * share * variance * variance
         + 4.0 * distance * unknown

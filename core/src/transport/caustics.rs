@@ -243,6 +243,11 @@ struct Share {
 impl Share {
     /// Of a photon that has its weight already.
     const ALL: Share = Share { weight: 1.0, chance: 1.0, ratio: 0.0 };
+
+    /// What is left of the power of a path with a photon at `vertex`; `None` where that is not left.
+    fn kept(&self, vertex: &Vertex) -> Option<f32> {
+        (vertex.own() < self.chance).then(|| self.weight / self.chance)
+    }
 }
 
 /// `State::others` of a path that a rough surface has scattered: its power has its weight.
@@ -276,9 +281,8 @@ impl<F: Features, L: FnMut(&State, Photon, Share, &mut Counters)> Visitor for We
         let leaves = ends && state.segments > 1;
         if leaves {
             let share = self.share(state, vertex);
-            if vertex.own() < share.chance {
-                let power = Rgb::from(state.power) * (share.weight / share.chance);
-                (self.leave)(state, vertex.photon(power), share, counters);
+            if let Some(kept) = share.kept(vertex) {
+                (self.leave)(state, vertex.photon(Rgb::from(state.power) * kept), share, counters);
             }
         }
         Some(Onward { most: if leaves { MOST } else { 1.0 }, mirrored: ends && !(leaves && self.goes_on) })
@@ -293,8 +297,7 @@ impl<F: Features, L: FnMut(&State, Photon, Share, &mut Counters)> Visitor for We
         }
         if ends_chain(vertex.bsdf) && !sample.delta {
             // What goes on is what was left.
-            let share = self.share(state, vertex);
-            let kept = if vertex.own() < share.chance { share.weight / share.chance } else { 0.0 };
+            let kept = self.share(state, vertex).kept(vertex).unwrap_or(0.0);
             state.power = (Rgb::from(state.power) * kept).to_array();
             state.others = SCATTERED;
             return;

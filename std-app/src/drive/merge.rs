@@ -69,19 +69,17 @@ pub fn merge(files: &[PathBuf]) -> Result<Merged, RenderError> {
     let mut canvas = Canvas::new(film, Shard::WHOLE);
     canvas.shares = first.header.shares;
     let mut seconds = 0.0;
-    let mut audits = Vec::new();
+    let audits = films.iter().map(|film| Some((film.header.shard(), film.header.audit()?)));
+    let audits: Option<Vec<_>> = audits.collect();
     for film in films {
         seconds += film.header.seconds;
-        audits.push(film.header.audit().map(|audit| (film.header.shard(), audit)));
         film.read_into(&mut canvas)?;
     }
     let workers = Workers::new(None)?;
     let noise = workers.estimate(&canvas.film, canvas.shares);
-    let audit = workers.mean(&canvas.film).zip(audits.into_iter().collect::<Option<Vec<_>>>()).and_then(
-        |(mean, audits)| {
-            audit::State::merged(audits, &canvas.film, mean)?.verdict(&canvas.film, mean, noise?)
-        },
-    );
+    let audit = workers.mean(&canvas.film).zip(audits).and_then(|(mean, audits)| {
+        audit::State::merged(audits, &canvas.film, mean)?.verdict(&canvas.film, mean, noise?)
+    });
     Ok(Merged {
         image: image(&canvas.film),
         spp,

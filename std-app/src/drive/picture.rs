@@ -151,18 +151,16 @@ impl Picture<'_> {
             }
         }
         let interrupted = interrupt.load(Ordering::Relaxed);
-        // Without the last steps of the audit, which a render that goes on would not take here. A shard is merged with them.
-        let goes_on = settings.shard == Shard::WHOLE;
-        if goes_on {
-            save(&canvas, &rounds, audit.as_ref(), &refinements, clock.seconds(), &history)?;
-        }
+        // Before the last steps of the audit, which a render that goes on would not take here.
+        save(&canvas, &rounds, audit.as_ref(), &refinements, clock.seconds(), &history)?;
         let is_known = history.last().is_some_and(|last| last.error.is_some());
         if let (Some(audit), false) = (&mut audit, interrupted || is_known) {
             let left = settings.stop.seconds.map(|limit| limit - estimating - clock.seconds());
             audit.step(workers, &canvas.film, rays(&canvas), clock.seconds(), left)?;
-        }
-        if !goes_on {
-            save(&canvas, &rounds, audit.as_ref(), &refinements, clock.seconds(), &history)?;
+            // A shard is merged with them.
+            if settings.shard != Shard::WHOLE {
+                save(&canvas, &rounds, Some(audit), &refinements, clock.seconds(), &history)?;
+            }
         }
         let start = Instant::now();
         let noise = workers.estimate(&canvas.film, canvas.shares);

@@ -156,19 +156,17 @@ fn made(maker: &Maker) -> Value {
 
 /// Against the reference where there is one, else as estimated; then `estimate` has the estimate too.
 fn error(run: &Run) -> Value {
-    let audit = run.result.audit.as_ref();
-    let mut error = error_object(run.result.error, audit);
-    if let Some(comparison) = run.comparison {
-        let mut against = comparison_object(comparison);
-        against["interval"] = Value::Null;
-        against["against"] = "reference".into();
-        against["estimate"] = estimate_object(run.result.error, "estimate");
-        if audit.is_some() {
-            against["noise"] = error["noise"].take();
-            against["bias"] = error["bias"].take();
+    let (estimate, audit) = (run.result.error, run.result.audit.as_ref());
+    let mut error = match run.comparison {
+        None => error_object(estimate, audit),
+        Some(comparison) => {
+            let mut error = comparison_object(comparison);
+            error["interval"] = Value::Null;
+            error["against"] = "reference".into();
+            error["estimate"] = estimate_object(estimate, "estimate");
+            with_audit(error, audit)
         }
-        error = against;
-    }
+    };
     if audit.is_some() {
         error["bias"]["doubt"] = run.doubt().into();
     }
@@ -177,7 +175,11 @@ fn error(run: &Run) -> Value {
 
 /// The object of an estimate, with what an audit has found.
 pub fn error_object(error: Option<ErrorEstimate>, audit: Option<&Audited>) -> Value {
-    let mut object = estimate_object(error, "estimate");
+    with_audit(estimate_object(error, "estimate"), audit)
+}
+
+/// An error, with what an audit has found.
+fn with_audit(mut object: Value, audit: Option<&Audited>) -> Value {
     if let Some(audit) = audit {
         object["noise"] = estimate_object(Some(audit.noise), "estimate");
         object["bias"] = bias(audit);

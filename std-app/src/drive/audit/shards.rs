@@ -2,7 +2,7 @@
 
 use super::choice::{Grid, ordered};
 use super::{Shard, State};
-use halflight_core::film::Film;
+use halflight_core::film::{Film, PIXELS_PER_TILE, Tile};
 use std::collections::HashMap;
 
 impl State {
@@ -11,33 +11,35 @@ impl State {
         let count = states.iter().map(|(_, state)| state.places.len()).sum();
         let grid = Grid::new([film.width(), film.height()], count);
         let order = ordered(film, Shard::WHOLE, mean, grid);
-        let rank: HashMap<_, _> = order.iter().enumerate().map(|(rank, place)| (*place, rank)).collect();
+        let owner = |shard: Shard| {
+            move |[x, y]: &&[u32; 2]| shard.owns(Tile::position(film.width(), *x, *y) / PIXELS_PER_TILE)
+        };
         // Pixels of a stratum in the mean of all.
         let mean_size = order.len() as f64 / count as f64;
 
         let mut merged = Self { taken: u32::MAX, ..Self::default() };
-        let mut strata = Vec::with_capacity(count);
+        let mut strata = HashMap::with_capacity(count);
         for (shard, state) in states {
             if state.taken == 0 {
                 return None;
             }
-            let own = ordered(film, shard, mean, grid).len() as f64;
+            let own = order.iter().filter(owner(shard)).count() as f64;
             let size = (own / state.places.len() as f64 / mean_size) as f32;
             let shares = state.shares.iter().map(|share| share * size);
-            for ((place, share), pixel) in state.places.iter().zip(shares).zip(state.pixels) {
-                strata.push((*rank.get(place)?, *place, share, pixel));
-            }
+            strata.extend(state.places.into_iter().zip(shares.zip(state.pixels)));
             merged.share += state.share * own / order.len() as f64;
             merged.taken = merged.taken.min(state.taken);
             merged.rays += state.rays;
             merged.seconds += state.seconds;
         }
-        strata.sort_unstable_by_key(|(rank, ..)| *rank);
-        for (_, place, share, pixel) in strata {
-            merged.places.push(place);
-            merged.shares.push(share);
-            merged.pixels.push(pixel);
+        for place in order {
+            if let Some((share, pixel)) = strata.remove(&place) {
+                merged.places.push(place);
+                merged.shares.push(share);
+                merged.pixels.push(pixel);
+            }
         }
-        Some(merged)
+        // Places outside the picture are none that were written.
+        strata.is_empty().then_some(merged)
     }
 }

@@ -10,7 +10,7 @@ use super::caustic_look::Looked;
 use super::path::Paths;
 use super::photon_view::{self, PhotonView};
 use super::photons::{MapUse, PhotonUse};
-use super::sppm::ProgressivePhotons;
+use super::sppm::{ProgressivePhotons, shrunk};
 use super::{Method, Renderer, Stage};
 use crate::drive::audit::Audit;
 use crate::drive::crew::Crew;
@@ -29,9 +29,6 @@ use std::time::Instant;
 
 /// Radius of the discs of the first sample, in pixels.
 const FIRST_RADIUS: f64 = 1.5;
-
-/// How fast radii shrink: with 2/3 the variance and the squared bias fall alike (Knaus and Zwicker 2011).
-const ALPHA: f64 = 2.0 / 3.0;
 
 /// Light paths of a map for each pixel of the picture and each sample that the map serves, but no fewer and no more
 /// than these.
@@ -283,11 +280,6 @@ impl<F: Features> Renderer for Joined<'_, F> {
     fn photons(&self) -> Option<PhotonUse> {
         Some(self.used)
     }
-}
-
-/// What is left of the squared radius after `samples`.
-fn shrunk(samples: u32) -> f64 {
-    (1..=samples).map(f64::from).fold(1.0, |squared, i| squared * (i + ALPHA) / (i + 1.0))
 }
 
 #[cfg(test)]
