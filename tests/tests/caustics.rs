@@ -153,6 +153,19 @@ fn what_a_caustic_lights_is_right_in_the_mean() {
     is_right_in_the_mean("glass in a room", &in_a_room(lamp_over_ball(glass(0.0), 1.0)), UNLIMITED);
 }
 
+/// The same room, seen from a hundredth before its right wall.
+fn along_a_wall(mut buffers: SceneBuffers) -> SceneBuffers {
+    buffers.camera = Camera::look_at(Vec3::new(2.99, 1.5, 3.0), Vec3::new(1.5, 0.5, 0.0), Vec3::Y, 70.0);
+    buffers
+}
+
+#[test]
+fn what_a_caustic_lights_before_the_eye_is_right_in_the_mean() {
+    let room = along_a_wall(in_a_room(lamp_before(metal(0.0), 0.6)));
+    is_right_in_the_mean("along a wall", &room, UNLIMITED);
+    is_right_in_the_mean("along a wall, limited", &room, 4);
+}
+
 #[test]
 fn what_a_focus_lights_has_no_spikes() {
     let mut buffers = in_a_room(lamp_over_ball(glass(0.0), 0.1));
@@ -165,6 +178,38 @@ fn what_a_focus_lights_has_no_spikes() {
     lit.sort_by(f32::total_cmp);
     let (middle, brightest) = (lit[lit.len() / 2], lit[lit.len() - 1]);
     assert!(brightest < 3.0 * middle, "{brightest} beside {middle}");
+}
+
+/// How far blocks of pictures with few photons scatter, over their means, at worst.
+fn scatter(buffers: &SceneBuffers) -> f64 {
+    let pictures = pictures(&buffers.scene(), 0, 4, 0.5, UNLIMITED);
+    let of_block = |i: usize| {
+        let mean = pictures.iter().map(|one| one[i]).sum::<f64>() / f64::from(SEEDS);
+        let square = pictures.iter().map(|one| (one[i] - mean).powi(2)).sum::<f64>() / f64::from(SEEDS - 1);
+        square.sqrt() / mean
+    };
+    (0..pictures[0].len()).map(of_block).fold(0.0, f64::max)
+}
+
+#[test]
+fn nor_has_it_before_the_eye() {
+    let all = scatter(&along_a_wall(in_a_room(lamp_over_ball(glass(0.0), 0.1))));
+    // With discs as small as that wall is near: 0.20.
+    assert!(all < 0.1, "{all}");
+}
+
+#[test]
+fn nor_has_it_in_a_mirror() {
+    let mut buffers = in_a_room(lamp_over_ball(glass(0.0), 0.1));
+    let reflectance = Rgb::splat(0.9).into();
+    let mirror = buffers.material(Material { surface: Surface::Mirror { reflectance }, ..Material::GREY });
+    buffers.square(Vec3::new(0.0, 1.5, -2.9), Vec3::Z, 3.0, mirror);
+    buffers.normals.resize(buffers.positions.len(), [0.0; 3]);
+    // It shows the wall right behind the camera, between lamp and ball.
+    buffers.camera = Camera::look_at(Vec3::new(0.0, 2.0, 4.4), Vec3::new(0.0, 2.0, 0.0), Vec3::Y, 8.0);
+    let all = scatter(&buffers);
+    // With discs as small as that wall is near: 0.46.
+    assert!(all < 0.28, "{all}");
 }
 
 #[test]

@@ -5,10 +5,10 @@
 //! find the caustic by chance. A path that meets a rough surface first goes on by what a smooth coat mirrors there alone.
 //! How paths go is in `flight.rs`.
 
-use super::estimator::Counters;
+use super::estimator::{Counters, UNLIMITED};
 pub use super::flight::PATHS;
 use super::flight::{Flight, Onward, Pile, State, Vertex, Visitor};
-use super::merge::{ChainLink, Discs, ends_chain};
+use super::merge::{ChainLink, Discs, ends_chain, is_wide_enough};
 use super::shoot::ShootSettings;
 use crate::bsdf::{BsdfSample, Features};
 use crate::bvh::Bvh;
@@ -250,7 +250,8 @@ impl Share {
     }
 }
 
-/// `State::others` of a path that a rough surface has scattered: its power has its weight.
+/// `State::others` of a path that a rough surface has scattered: its power has its weight, and `State::chain` is the radius
+/// of discs at the last.
 const SCATTERED: f32 = -1.0;
 
 /// Leaves photons with their weights.
@@ -262,6 +263,13 @@ struct Weigher<'s, 'a, F, L> {
 }
 
 impl<F: Features, L> Weigher<'_, '_, F, L> {
+    /// Whether light is gathered at `vertex`, which is rough, and not where it was scattered last.
+    fn is_merged(&self, state: &State, vertex: &Vertex) -> bool {
+        let Flight { max_depth, .. } = self.shooter.flight;
+        let from = if state.others == SCATTERED && max_depth == UNLIMITED { state.chain } else { 0.0 };
+        is_wide_enough(self.shooter.discs.radius(vertex.point.position), from)
+    }
+
     /// What is known of a photon at `vertex`, which is rough.
     fn share(&self, state: &State, vertex: &Vertex) -> Share {
         match state.others {
@@ -279,7 +287,7 @@ impl<F: Features, L: FnMut(&State, Photon, Share, &mut Counters)> Visitor for We
     fn meet(&mut self, state: &State, vertex: &Vertex, counters: &mut Counters) -> Option<Onward> {
         let ends = ends_chain(vertex.bsdf);
         let leaves = ends && state.segments > 1;
-        if leaves {
+        if leaves && self.is_merged(state, vertex) {
             let share = self.share(state, vertex);
             if let Some(kept) = share.kept(vertex) {
                 (self.leave)(state, vertex.photon(Rgb::from(state.power) * kept), share, counters);
@@ -292,14 +300,15 @@ impl<F: Features, L: FnMut(&State, Photon, Share, &mut Counters)> Visitor for We
     /// tracer finds its light.
     #[inline]
     fn leave(&self, state: &mut State, vertex: &Vertex, from: Vec3, sample: &BsdfSample) {
-        if state.others == SCATTERED {
-            return;
-        }
         if ends_chain(vertex.bsdf) && !sample.delta {
-            // What goes on is what was left.
-            let kept = self.share(state, vertex).kept(vertex).unwrap_or(0.0);
-            state.power = (Rgb::from(state.power) * kept).to_array();
-            state.others = SCATTERED;
+            if state.others != SCATTERED {
+                // What goes on is what was left.
+                let kept = self.share(state, vertex).kept(vertex).unwrap_or(0.0);
+                state.power = (Rgb::from(state.power) * kept).to_array();
+            }
+            (state.others, state.chain) = (SCATTERED, self.shooter.discs.radius(vertex.point.position));
+        }
+        if state.others == SCATTERED {
             return;
         }
         // The way back, as the path tracer goes it.

@@ -61,15 +61,15 @@ impl<'a> PhotonLight<'a> {
         Self { is_sparse: true, ..self }
     }
 
-    /// The reflected light that `point` sends to `wo`, itself reflected; `None` where no photons are left on such a
-    /// surface. `turns`, from 0 to 1, turns the probes for walls. Those are not counted as rays.
+    /// The reflected light that `point` sends to `wo`, itself reflected, at the end of a path that has come so far from the
+    /// eye; `None` where no photons are left on such a surface. `turns`, from 0 to 1, turns the probes for walls. Those are not counted as rays.
     #[inline]
     pub(super) fn reflected<F: Features>(
         &self,
         (bvh, level): (&Bvh, Level),
         point: &SurfacePoint,
         bsdf: &Bsdf,
-        wo: Vec3,
+        (wo, travelled): (Vec3, f32),
         turns: f32,
     ) -> Option<Rgb> {
         if !holds_photons(bsdf) {
@@ -78,7 +78,7 @@ impl<'a> PhotonLight<'a> {
         let disc = Disc {
             place: point.position,
             normal: point.geometric_normal,
-            radius: self.discs.radius(point.position),
+            radius: self.discs.radius_after(travelled, point.position),
             falloff: self.falloff,
         };
         let density = self.is_sparse.then(|| self.map.gather(level, &disc, &Uniform(Rgb::ONE)));

@@ -49,7 +49,7 @@ pub(super) struct State {
     pub origin: [f32; 3],
     /// From which cell of the guide.
     pub cell: u32,
-    /// R / (π² r² N) so far, for visitors that weigh photons (`merge.rs`).
+    /// R / (π² r² N) so far, for visitors that weigh photons (`merge.rs`, `caustics.rs`).
     pub chain: f32,
     /// Root of the sum of squares of the densities of the path tracer's techniques, over that of which `chain` tells:
     /// 1 where that is the only one, 0 where there is none.

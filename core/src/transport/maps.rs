@@ -257,7 +257,8 @@ pub(super) struct Said {
 }
 
 impl PhotonMaps<'_> {
-    /// Asks the maps about a vertex that a path which was to find `came` reached by a ray of length `distance`.
+    /// Asks the maps about a vertex that a path which was to find `came` reached by a ray of length `distance`, having
+    /// `travelled` as far as that from the eye.
     /// `limited` is the number of its segments where depth is limited, otherwise zero.
     #[inline]
     pub(super) fn ask<F: Features>(
@@ -266,7 +267,7 @@ impl PhotonMaps<'_> {
         (came, limited, distance): (Share, u32, f32),
         point: &SurfacePoint,
         bsdf: &Bsdf,
-        wo: Vec3,
+        (wo, travelled): (Vec3, f32),
         turns: f32,
     ) -> Said {
         // What was scattered by something with a diffuse part stays so.
@@ -294,8 +295,8 @@ impl PhotonMaps<'_> {
         }
         match &self.caustic {
             Some(caustic) => {
-                let light = caustic.reflected::<F>(tracer, point, bsdf, wo, turns).unwrap_or_default();
-                Said { light, next: Share::NO_CAUSTIC, ..all }
+                let light = caustic.reflected::<F>(tracer, point, bsdf, (wo, travelled), turns);
+                Said { light: light.unwrap_or_default(), next: Share::NO_CAUSTIC, ..all }
             }
             None => Said { next: Share::GATHERED, ..all },
         }

@@ -6,13 +6,15 @@
 //! 1. by the path tracer, which goes from x by chance to x₀;
 //! 2. by the path tracer, which goes to x₁ and chooses x₀, where x₁ reflects into more than one direction;
 //! 3. by a photon that comes from x₀ by way of x, where it has its weight from, and lies within a disc around the first
-//!    rough surface on the way from the eye: x, or one that x lights.
+//!    rough surface on the way from the eye, x, or one that x lights; or the first whose disc is wide enough.
 //!
 //! Every other path is found by the path tracer alone. So a path has one vertex at most at which it can be merged. Where the
 //! eye sees x, it has three densities, which have all that lies behind x in common. Else the third is reckoned as if photons
 //! were gathered at x: with discs of one size it is the same, as a diffuse surface leaves the ratio of both as it is, and
 //! weights are right as long as all agree on them. But gathered they are not at x, which paths from the eye may meet so rarely
-//! that each that does would be a spike (`docs/decisions/0042-focus-lights-by-photons.md`). With étendue in place of areas
+//! that each that does would be a spike (`docs/decisions/0042-focus-lights-by-photons.md`). Nor is light gathered on a disc much
+//! smaller than that where it comes from, as right before the eye: there each photon would be one. Both ends know these two
+//! discs, and so where the one vertex is (`docs/decisions/0045-discs-before-the-eye.md`). With étendue in place of areas
 //! (`light/etendue.rs`) distances cancel, and the third over the first is
 //!
 //!   R = N π r² cos θⱼ / p(xⱼ → x₍ⱼ₋₁₎) · Π ρᵢ · p(x₀) p(ω₀) / cos θ₀
@@ -58,6 +60,16 @@ pub(super) fn ends_chain(bsdf: &Bsdf) -> bool {
     matches!(bsdf, Bsdf::Diffuse(_)) || holds_photons(bsdf) && bsdf.base().max_element() >= BASE
 }
 
+/// The least that the radius of a disc may be, times that of the disc from where something rough throws the light.
+const SMALLEST: f32 = 0.5;
+
+/// Whether light is merged on a disc of `radius` that comes from a rough surface with discs of radius `from`, or, where that is
+/// zero, by mirrors and glass alone. If not, it is merged there, or still before.
+#[inline]
+pub(super) fn is_wide_enough(radius: f32, from: f32) -> bool {
+    radius >= SMALLEST * from
+}
+
 /// The radii of discs: as far on a surface as so many pixels at that distance from the eye.
 #[derive(Clone, Copy, Debug)]
 pub struct Discs {
@@ -95,6 +107,13 @@ impl Discs {
     #[inline]
     pub fn radius(&self, place: Vec3) -> f32 {
         self.radius * place.distance(self.eye).max(self.nearest)
+    }
+
+    /// The same for a path that has come so far from the eye: what mirrors show of the place is as small in the picture
+    /// as the way to it is long. Weights know the place alone.
+    #[inline]
+    pub(super) fn radius_after(&self, travelled: f32, place: Vec3) -> f32 {
+        self.radius(place).max(self.radius * travelled)
     }
 
     /// π² r² N: R where nothing lies between, and light is emitted with a density of one.
@@ -151,6 +170,12 @@ impl<'a> Merging<'a> {
         Self { maps, emission, discs, paths: paths as f32 }
     }
 
+    /// The radius of discs around `place`.
+    #[inline]
+    pub(super) fn radius(&self, place: Vec3) -> f32 {
+        self.discs.radius(place)
+    }
+
     /// R as far as a path knows it that begins its chain at `place`.
     #[inline]
     pub(super) fn begun(&self, place: Vec3) -> f32 {
@@ -168,14 +193,15 @@ impl<'a> Merging<'a> {
         weight / (1.0 + weight * ratio * ratio)
     }
 
-    /// What `point` sends to `wo` of the light of photons around it. `turns` turns the probes for walls.
+    /// What `point` sends to `wo` of the light of photons around it, at the end of a path that has come so far from the eye, or
+    /// zero where something rough has thrown it on. `turns` turns the probes for walls.
     #[inline]
     pub(super) fn reflected<F: Features>(
         &self,
         (bvh, level): (&Bvh, Level),
         sample: u32,
         (point, bsdf): (&SurfacePoint, &Bsdf),
-        wo: Vec3,
+        (wo, travelled): (Vec3, f32),
         turns: impl FnOnce() -> f32,
     ) -> Rgb {
         let map = self.maps[sample as usize & 1];
@@ -185,7 +211,7 @@ impl<'a> Merging<'a> {
         let disc = Disc {
             place: point.position,
             normal: point.geometric_normal,
-            radius: self.discs.radius(point.position),
+            radius: self.discs.radius_after(travelled, point.position),
             falloff: Falloff::Epanechnikov,
         };
         // Most places have no photon near them, and need not look for walls.

@@ -28,7 +28,7 @@ use super::estimator::{
     survival,
 };
 use super::maps::{GatherLight, PhotonMaps, Said};
-use super::merge::{ChainLink, Merging, ends_chain};
+use super::merge::{ChainLink, Merging, ends_chain, is_wide_enough};
 use super::reuse::Exchange;
 use super::shadow::{FEW, pass_cutout, passing, shadow_ray};
 use super::spots::{Cones, Spot};
@@ -439,6 +439,9 @@ impl<'a, F: Features> PathTracer<'a, F> {
         }
         let wo = point.frame.to_local(-direction);
         let first = dimension::vertex(segments);
+        let near = if segments == 1 { scene.camera.eye } else { position };
+        let distance = near.distance(point.position);
+        let travelled = path.travelled + distance;
         // Lights behind an opaque surface need not be asked.
         let normal = if F::DIELECTRIC && bsdf.transmits() { Vec3::ZERO } else { point.frame.normal };
 
@@ -447,8 +450,8 @@ impl<'a, F: Features> PathTracer<'a, F> {
             let turns = sampler.single(dimension::PROBES + segments);
             let limit = if self.is_limited() { segments } else { 0 };
             let maps = &maps[path.sample as usize & 1];
-            let from = position.distance(point.position);
-            said = maps.ask::<F>((self.bvh, self.level), (came, limit, from), point, &bsdf, wo, turns);
+            let tracer = (self.bvh, self.level);
+            said = maps.ask::<F>(tracer, (came, limit, distance), point, &bsdf, (wo, travelled), turns);
             path.add(throughput * said.light);
         }
 
@@ -531,16 +534,26 @@ impl<'a, F: Features> PathTracer<'a, F> {
             && (segments == 1 || !self.is_limited())
         {
             let turns = sampler.single(dimension::PROBES + segments);
-            reflected = photons.reflected::<F>((self.bvh, self.level), point, &bsdf, wo, turns);
+            let tracer = (self.bvh, self.level);
+            reflected = photons.reflected::<F>(tracer, point, &bsdf, (wo, travelled), turns);
             path.add(throughput * reflected.unwrap_or_default());
         }
 
-        let merges = path.merged == Merged::LATER && (segments == 1 || !self.is_limited());
-        if let Some(merging) = self.merging.as_ref().filter(|_| merges) {
-            let turns = || sampler.single(dimension::PROBES + segments);
-            let light =
-                merging.reflected::<F>((self.bvh, self.level), path.sample, (point, &bsdf), wo, turns);
-            path.add(throughput * light);
+        let mut merged = path.merged;
+        if let Some(merging) = self.merging.as_ref().filter(|_| merged == Merged::LATER) {
+            // Where depth is limited the first point alone, for photons do not know how far they are from their light.
+            let is_first = path.disc == 0.0;
+            if !is_first && (self.is_limited() || is_wide_enough(path.disc, merging.radius(point.position))) {
+                merged = Merged::DONE;
+            } else if segments > 1 && self.is_limited() {
+                merged = Merged::NEVER;
+            } else {
+                let turns = || sampler.single(dimension::PROBES + segments);
+                let from = (wo, if is_first { travelled } else { 0.0 });
+                let tracer = (self.bvh, self.level);
+                let light = merging.reflected::<F>(tracer, path.sample, (point, &bsdf), from, turns);
+                path.add(throughput * light);
+            }
         }
 
         let [u, v] = dimension::scattering(&sampler, segments);
@@ -597,11 +610,11 @@ impl<'a, F: Features> PathTracer<'a, F> {
         if let Some(merging) = &self.merging {
             let there = ChainLink { point, bsdf: &bsdf, near: wo, far: sample.direction };
             let is_rough = ends_chain(&bsdf) && !sample.delta;
-            if is_rough && path.merged == Merged::LATER {
-                path.merged = if merges { Merged::DONE } else { Merged::NEVER };
+            if is_rough {
+                (path.merged, path.disc) = (merged, merging.radius(point.position));
             }
             path.chain = match path.chain {
-                _ if is_rough && path.merged == Merged::DONE => -merging.begun(point.position),
+                _ if is_rough && merged != Merged::NEVER => -merging.begun(point.position),
                 _ if is_rough => 0.0,
                 0.0 => 0.0,
                 chain if sample.delta => chain.abs() / (sample.eta * sample.eta),
@@ -612,6 +625,7 @@ impl<'a, F: Features> PathTracer<'a, F> {
         path.pdf = if sample.delta { f32::INFINITY } else { sample.pdf };
         path.position = point.position.to_array();
         path.normal = normal.to_array();
+        path.travelled = travelled;
         path.segments += 1;
         path.triangle = hit.triangle;
         Some(point.spawn(direction))

@@ -43,22 +43,25 @@ pub(super) struct Path {
     pub(super) chain: f32,
     /// Points of lights that it asks for direct light where a shadow ray alone finds that; 0 stands for one.
     pub(super) lights: u16,
-    /// Whether it has left a rough surface, and whether photons were asked there.
+    /// Whether photons are still to be asked, behind the rough surfaces that it has left.
     pub(super) merged: Merged,
+    /// The radius of discs at the last of them; zero before the first.
+    pub(super) disc: f32,
+    /// How long it is from the eye to its last vertex.
+    pub(super) travelled: f32,
 }
 
-/// What became of the one vertex of a path at which photons of caustics can be merged with it, its first rough one
-/// ([`super::merge`]).
+/// What became of the one vertex of a path at which a photon of caustics can be merged with it ([`super::merge`]).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
 #[repr(transparent)]
 pub(super) struct Merged(u16);
 
 impl Merged {
-    /// It is still to come.
+    /// It may be still to come.
     pub(super) const LATER: Merged = Merged(0);
-    /// Photons were asked there.
+    /// Photons were asked.
     pub(super) const DONE: Merged = Merged(1);
-    /// They were not.
+    /// They were not, and will not be.
     pub(super) const NEVER: Merged = Merged(2);
 }
 
