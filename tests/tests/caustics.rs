@@ -198,13 +198,18 @@ fn nor_has_it_before_the_eye() {
     assert!(all < 0.1, "{all}");
 }
 
+/// Before the wall at the back.
+fn hang_a_mirror(room: &mut SceneBuffers) {
+    let reflectance = Rgb::splat(0.9).into();
+    let mirror = room.material(Material { surface: Surface::Mirror { reflectance }, ..Material::GREY });
+    room.square(Vec3::new(0.0, 1.5, -2.9), Vec3::Z, 3.0, mirror);
+    room.normals.resize(room.positions.len(), [0.0; 3]);
+}
+
 #[test]
 fn nor_has_it_in_a_mirror() {
     let mut buffers = in_a_room(lamp_over_ball(glass(0.0), 0.1));
-    let reflectance = Rgb::splat(0.9).into();
-    let mirror = buffers.material(Material { surface: Surface::Mirror { reflectance }, ..Material::GREY });
-    buffers.square(Vec3::new(0.0, 1.5, -2.9), Vec3::Z, 3.0, mirror);
-    buffers.normals.resize(buffers.positions.len(), [0.0; 3]);
+    hang_a_mirror(&mut buffers);
     // It shows the wall right behind the camera, between lamp and ball.
     buffers.camera = Camera::look_at(Vec3::new(0.0, 2.0, 4.4), Vec3::new(0.0, 2.0, 0.0), Vec3::Y, 8.0);
     let all = scatter(&buffers);
@@ -306,6 +311,16 @@ fn where_there_is_no_caustic_the_picture_is_that_without_photons() {
         assert_eq!(joined.image, path(&scene, 9, |s| s.caustics = false).image);
         assert!(!has_photons(&joined));
     }
+}
+
+#[test]
+fn a_caustic_that_is_seen_in_a_mirror_alone_has_photons() {
+    let mut buffers = in_a_room(lamp_over_ball(glass(0.0), 0.1));
+    hang_a_mirror(&mut buffers);
+    // The ball is behind the camera.
+    buffers.camera = Camera::look_at(Vec3::new(0.0, 2.0, -1.5), Vec3::new(0.0, 1.5, -2.9), Vec3::Y, 60.0);
+    let seen = path(&buffers.scene(), 4, |_| ());
+    assert!(has_photons(&seen), "{:?}", seen.caustics);
 }
 
 #[test]

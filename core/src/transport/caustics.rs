@@ -8,6 +8,7 @@
 use super::estimator::{Counters, UNLIMITED};
 pub use super::flight::PATHS;
 use super::flight::{Flight, Onward, Pile, State, Vertex, Visitor};
+use super::glimpse::Glimpse;
 use super::merge::{ChainLink, Discs, ends_chain, is_wide_enough};
 use super::shoot::ShootSettings;
 use crate::bsdf::{BsdfSample, Features};
@@ -49,6 +50,7 @@ pub struct CausticShooter<'a, F> {
     discs: Discs,
     /// Pixels across and down.
     frame: [u32; 2],
+    glimpses: &'a [Glimpse],
 }
 
 /// What became of a light path: what its photons are worth, and from which cell of the guide it came.
@@ -84,7 +86,12 @@ impl<'a, F: Features> CausticShooter<'a, F> {
         let ShootSettings { seed, paths, max_depth, .. } = settings;
         let features = PhantomData;
         let flight = Flight { scene, bvh, lights, emission, seed, paths, max_depth, level, features };
-        Self { flight, discs, frame }
+        Self { flight, discs, frame, glimpses: &[] }
+    }
+
+    /// The same, which knows what is seen in mirrors when it looks.
+    pub fn with_glimpses(self, glimpses: &'a [Glimpse]) -> Self {
+        Self { glimpses, ..self }
     }
 
     /// Number of tasks of a map.
@@ -135,10 +142,11 @@ impl<'a, F: Features> CausticShooter<'a, F> {
             if let Some(find) = out.get_mut((state.number - first) as usize) {
                 let place = photon.position();
                 let power = luminance(photon.power());
-                let radius = self.discs.radius(place);
+                let (block, travelled) = self.shown(place, photon.normal());
+                let radius = self.discs.radius_after(travelled, place);
                 let pixels = 1.0 / (radius * radius);
                 find.cell = state.cell;
-                let Some(block) = self.block(place) else {
+                let Some(block) = block else {
                     find.worth += power * pixels * INDIRECT;
                     return;
                 };
@@ -153,8 +161,18 @@ impl<'a, F: Features> CausticShooter<'a, F> {
         self.flight.follow(task, map, scratch, &mut Weigher { shooter: self, leave, goes_on: false })
     }
 
-    /// In which block of the picture light at `place` shows; `None` where it is outside, or hidden from the eye: some of
-    /// it comes back.
+    /// In which block of the picture light at `place` shows, if it does, and how far from the eye, where that is by
+    /// mirrors.
+    fn shown(&self, place: Vec3, normal: Vec3) -> (Option<u32>, f32) {
+        let glimpse = || self.glimpses.iter().find(|glimpse| glimpse.shows(place, normal));
+        match self.block(place) {
+            None => glimpse().map_or((None, 0.0), |glimpse| (Some(glimpse.block), glimpse.travelled)),
+            block => (block, 0.0),
+        }
+    }
+
+    /// In which block of the picture light at `place` shows by itself; `None` where it is outside, or hidden from the eye: some
+    /// of it comes back.
     fn block(&self, place: Vec3) -> Option<u32> {
         let Flight { scene, bvh, level, .. } = self.flight;
         let camera = &scene.camera;

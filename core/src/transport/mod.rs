@@ -13,6 +13,7 @@ mod edges;
 mod estimator;
 mod flight;
 pub mod gather;
+mod glimpse;
 pub mod maps;
 mod merge;
 mod outline;
@@ -31,6 +32,7 @@ mod wave;
 
 pub use density::PhotonLight;
 pub use estimator::{Counters, PathSettings, UNLIMITED};
+pub use glimpse::{GLIMPSES, Glimpse};
 pub use merge::{Discs, Merging};
 pub use outlook::{Outlook, Vertex, WindowGain};
 pub use path::PathTracer;

@@ -24,7 +24,7 @@ use halflight_core::memory::{Arena, Line};
 use halflight_core::photon::{MapShape, PhotonMap, Photons};
 use halflight_core::transport::caustics::{CausticShooter, Find, PATHS, ROOM};
 use halflight_core::transport::shoot::{Keep, ShootSettings};
-use halflight_core::transport::{Discs, Merging, PathTracer, path::WAVE};
+use halflight_core::transport::{Discs, GLIMPSES, Glimpse, Merging, PathTracer, path::WAVE};
 use std::time::Instant;
 
 /// Radius of the discs of the first sample, in pixels.
@@ -90,10 +90,14 @@ pub(super) fn with<F: Features, T>(
     let discs = stage.discs();
     let emission = match Worth::aimed(scene, lights, &plain, &mut arena)? {
         Some(mut worth) => {
+            let mut glimpses = vec![Glimpse::default(); GLIMPSES];
+            let (seen, frame) = ((scene, bvh, settings.level), [settings.width, settings.height]);
+            let found = Glimpse::find::<F>(seen, frame, settings.seed, &mut glimpses);
+            let seen = (discs, &glimpses[..found]);
             let aimed = worth.guide(&plain, &mut arena)?;
-            look::<F>(stage, &mut paths, &aimed, (discs, 0), &mut worth)?;
+            look::<F>(stage, &mut paths, &aimed, (seen, 0), &mut worth)?;
             let learned = worth.guide(&plain, &mut arena)?;
-            let finds = look::<F>(stage, &mut paths, &learned, (discs, 1), &mut worth)?;
+            let finds = look::<F>(stage, &mut paths, &learned, (seen, 1), &mut worth)?;
             let pixels = f64::from(settings.width) * f64::from(settings.height);
             let looked = Looked::new(&finds, FIRST_RADIUS, pixels, f64::from(paths.mean(stage)?));
             paths.caustics.share = Some(looked.share);
@@ -146,13 +150,14 @@ fn look<F: Features>(
     stage: &Stage,
     paths: &mut Paths<F>,
     emission: &Emission,
-    (discs, map): (Discs, u32),
+    ((discs, glimpses), map): ((Discs, &[Glimpse]), u32),
     worth: &mut Worth,
 ) -> Result<Vec<Find>, RenderError> {
     let workers = stage.workers;
     let scratch = &mut paths.scratch;
     let (shooter, _) = shooter::<F>(stage, emission, LOOK, (discs, 0));
     let mut finds = vec![Find::default(); LOOK];
+    let shooter = shooter.with_glimpses(glimpses);
     let look = |task: usize, arena: &mut Arena, out: &mut [Find]| shooter.look(task, map, arena, out);
     workers.pass(&mut finds, PATHS, scratch, &|| false, &look)?;
     finds.iter().for_each(|find| worth.learn(find.cell, find.worth));
