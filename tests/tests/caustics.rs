@@ -394,6 +394,29 @@ fn where_all_light_is_caustics_photons_may_have_all_of_it_unless_paths_are_asked
     assert_eq!((on.method, on.image), (Method::ProgressivePhotons, chosen.image));
 }
 
+#[test]
+fn where_photons_of_all_light_would_miss_the_picture_paths_have_those_that_are_aimed() {
+    // A small window in a large roof under the sun.
+    let camera = Camera::look_at(Vec3::new(0.0, 1.0, 2.0), Vec3::ZERO, Vec3::Y, 40.0);
+    let mut buffers = SceneBuffers::new(camera);
+    let grey = buffers.material(Material::diffuse(Rgb::splat(0.7)));
+    let pane = buffers.material(Material { surface: glass(0.0), ..Material::GREY });
+    buffers.square(Vec3::ZERO, Vec3::Y, 30.0, grey);
+    for [x, z, to_x, to_z] in [
+        [-20.0, -20.0, -0.25, 20.0],
+        [0.25, -20.0, 20.0, 20.0],
+        [-0.25, -20.0, 0.25, -0.25],
+        [-0.25, 0.25, 0.25, 20.0],
+    ] {
+        buffers.cuboid(Vec3::new(x, 2.0, z), Vec3::new(to_x, 2.1, to_z), false, grey);
+    }
+    buffers.cuboid(Vec3::new(-0.3, 1.9, -0.3), Vec3::new(0.3, 1.95, 0.3), false, pane);
+    buffers.lights.push(PointLight::Directional { direction: Vec3::NEG_Y, irradiance: Rgb::ONE });
+    let picture = render(&buffers.scene(), Method::Path, 32, 4, |s| s.method = None);
+    assert!(picture.caustics.share > Some(0.9), "{:?}", picture.caustics);
+    assert!(picture.method == Method::Path && picture.caustics.used);
+}
+
 /// A hall with fifty lamps, of which a wall hides all but one from a mirror of such a side on the floor.
 fn stadium(side: f32) -> SceneBuffers {
     let camera = Camera::look_at(Vec3::new(47.5, 1.0, 20.0), Vec3::new(47.5, 10.0, 25.0), Vec3::Y, 60.0);

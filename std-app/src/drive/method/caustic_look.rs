@@ -40,11 +40,16 @@ pub(super) struct Looked {
     /// Of the mean radiance of the picture.
     pub(super) share: f64,
     /// Light paths that show in it, as a share of all.
-    useful: f64,
+    pub(super) useful: f64,
     /// The relative variance of one sample that their light has by paths alone.
     noise: f64,
     /// The mean radiance without them.
     mean: f64,
+}
+
+/// The share of light paths that show in the picture.
+pub(super) fn useful(finds: &[Find]) -> f64 {
+    finds.iter().filter(|find| find.light > 0.0).count() as f64 / finds.len().max(1) as f64
 }
 
 impl Looked {
@@ -58,7 +63,6 @@ impl Looked {
         // What flashes brightest first.
         let mut shown: Vec<_> = finds.iter().filter(|find| find.light > 0.0).collect();
         shown.sort_by(|a, b| b.flash.total_cmp(&a.flash));
-        let useful = shown.len() as f64 / finds.len().max(1) as f64;
         let mut blocks = [Block::default(); ALL];
         let disc = PI * radius * radius;
         let of_block = disc * ALL as f64 / pixels;
@@ -78,7 +82,7 @@ impl Looked {
             if square > 0.0 { square / (mean + block.light).powi(2) } else { 0.0 }
         };
         let noise = blocks.iter().map(relative).sum::<f64>() / ALL as f64;
-        Self { share, useful, noise, mean }
+        Self { share, useful: useful(finds), noise, mean }
     }
 
     /// Whether photons are worth it.

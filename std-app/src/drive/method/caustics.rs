@@ -6,7 +6,7 @@
 //! that is not worth it (`caustic_look.rs`), the picture is path traced alone, as if photons had never been asked for.
 //! Otherwise it is where most of them go from then on.
 
-use super::caustic_look::Looked;
+use super::caustic_look::{Looked, useful};
 use super::path::Paths;
 use super::photon_view::{self, PhotonView};
 use super::photons::{MapUse, PhotonUse};
@@ -43,8 +43,9 @@ const MOST_SAMPLES: u32 = 8;
 const LOOK: usize = 32 * PATHS;
 
 /// The share of the picture's light from which on photons may have all of it, where the method is left to us: paths find
-/// next to none.
+/// next to none. But those of `sppm` are not aimed: so many of them must show, to those that are.
 const MOST_SHARE: f64 = 0.75;
+const LEAST_BY_CHANCE: f64 = 0.25;
 
 /// Whether paths were joined with photons of caustics.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -88,6 +89,8 @@ pub(super) fn with<F: Features, T>(
     let mut arena = Arena::new(bytemuck::cast_slice_mut(&mut lines));
     let plain = Emission::build(scene, lights, &bvh.bounds(), &mut arena)?;
     let discs = stage.discs();
+    let is_open = settings.method.is_none() && settings.resume.is_none();
+    let mut is_all = false;
     let emission = match Worth::aimed(scene, lights, &plain, &mut arena)? {
         Some(mut worth) => {
             let mut glimpses = vec![Glimpse::default(); GLIMPSES];
@@ -95,18 +98,23 @@ pub(super) fn with<F: Features, T>(
             let found = Glimpse::find::<F>(seen, frame, settings.seed, &mut glimpses);
             let seen = (discs, &glimpses[..found]);
             let aimed = worth.guide(&plain, &mut arena)?;
-            look::<F>(stage, &mut paths, &aimed, (seen, 0), &mut worth)?;
+            let finds = look::<F>(stage, &mut paths, &aimed, (seen, 0))?;
+            finds.iter().for_each(|find| worth.learn(find.cell, find.worth));
             let learned = worth.guide(&plain, &mut arena)?;
-            let finds = look::<F>(stage, &mut paths, &learned, (seen, 1), &mut worth)?;
+            let finds = look::<F>(stage, &mut paths, &learned, (seen, 1))?;
+            finds.iter().for_each(|find| worth.learn(find.cell, find.worth));
             let pixels = f64::from(settings.width) * f64::from(settings.height);
             let looked = Looked::new(&finds, FIRST_RADIUS, pixels, f64::from(paths.mean(stage)?));
             paths.caustics.share = Some(looked.share);
+            if is_open && looked.share >= MOST_SHARE {
+                let by_chance = useful(&look::<F>(stage, &mut paths, &plain, (seen, 2))?);
+                is_all = by_chance > 0.0 && by_chance >= LEAST_BY_CHANCE * looked.useful;
+            }
             looked.pays(stage, &mut paths)?.then(|| worth.guide(&plain, &mut arena)).transpose()?
         }
         None => None,
     };
-    let is_open = settings.method.is_none() && settings.resume.is_none();
-    if is_open && paths.caustics.share.is_some_and(|share| share >= MOST_SHARE) {
+    if is_all {
         drop((lines, paths));
         ["emission", "paths"].into_iter().for_each(|structure| memory.give_back(structure));
         return then(&mut ProgressivePhotons::<F>::new(stage, memory)?, memory);
@@ -145,13 +153,12 @@ fn shooter<'a, F: Features>(
     (CausticShooter::new((scene, bvh, lights), emission, shot, frame, settings.level), discs)
 }
 
-/// Learns what photons of `emission`, those of map `map`, are worth.
+/// What photons of `emission`, those of map `map`, are worth.
 fn look<F: Features>(
     stage: &Stage,
     paths: &mut Paths<F>,
     emission: &Emission,
     ((discs, glimpses), map): ((Discs, &[Glimpse]), u32),
-    worth: &mut Worth,
 ) -> Result<Vec<Find>, RenderError> {
     let workers = stage.workers;
     let scratch = &mut paths.scratch;
@@ -160,7 +167,6 @@ fn look<F: Features>(
     let shooter = shooter.with_glimpses(glimpses);
     let look = |task: usize, arena: &mut Arena, out: &mut [Find]| shooter.look(task, map, arena, out);
     workers.pass(&mut finds, PATHS, scratch, &|| false, &look)?;
-    finds.iter().for_each(|find| worth.learn(find.cell, find.worth));
     Ok(finds)
 }
 
