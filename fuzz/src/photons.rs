@@ -124,14 +124,17 @@ fn gather(map: &PhotonMap, level: Level, disc: &Disc) {
 fn same<R: Response>(map: &PhotonMap, level: Level, disc: &Disc, response: &R) {
     let (found, expected) = (map.gather(level, disc, response), brute::gather(map, disc, response));
     assert_eq!(found.photons, expected.photons, "{level:?} {disc:?}");
-    if expected.radiance.is_finite() {
-        let error = (found.radiance - expected.radiance).abs();
-        let most = expected.radiance * ROUNDING + f32::MIN_POSITIVE;
-        assert!(error.cmple(most).all(), "{level:?} {disc:?}: {found:?}, brute force {expected:?}");
-    }
-    let bits = |density: Density| density.radiance.to_array().map(f32::to_bits);
     let baseline = map.gather(Level::BASELINE, disc, response);
-    if baseline.radiance.is_finite() {
-        assert_eq!(bits(found), bits(baseline), "{level:?} {disc:?}");
+    let radiances = |density: Density| [density.radiance].into_iter().chain(density.finer);
+    for ((found, expected), baseline) in radiances(found).zip(radiances(expected)).zip(radiances(baseline)) {
+        if expected.is_finite() {
+            let error = (found - expected).abs();
+            let most = expected * ROUNDING + f32::MIN_POSITIVE;
+            assert!(error.cmple(most).all(), "{level:?} {disc:?}: {found:?}, brute force {expected:?}");
+        }
+        if baseline.is_finite() {
+            let bits = |colour: Rgb| colour.to_array().map(f32::to_bits);
+            assert_eq!(bits(found), bits(baseline), "{level:?} {disc:?}");
+        }
     }
 }

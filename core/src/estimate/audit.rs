@@ -7,11 +7,11 @@
 //! squared error of the pixel: the difference, ((A − B) / 2)², is the variance that the picture tells of itself, in all
 //! of its pixels instead of a few.
 
-use super::interval::student_95;
+use super::interval::{ErrorEstimate, student_95};
 use super::metric::DARK;
 use crate::Rgb;
 use crate::film::Pixel;
-use libm::{erfc, fabs, log, sqrt};
+use libm::{erfc, fabs, hypot, log, sqrt};
 
 /// The unknown reference in a denominator comes from the part of the audit that is not in the numerator: what made a
 /// pixel of the picture bright by chance must not make its error small. Where light is rare the part may lack it, so
@@ -94,13 +94,19 @@ impl BiasEstimate {
         if count < 8.0 {
             return None;
         }
-        let relmse = sum / count;
         // Neighbouring differences share a value: three of them are worth two that do not.
         let freedom = if fourths > 0.0 { squares * squares / fourths / 1.5 } else { 1.0 };
-        let reach = student_95(freedom) * sqrt(squares / (2.0 * (count - 1.0) * count));
-        let detectable = reach.max(ROUNDING * ROUNDING);
-        let lower = if relmse > detectable { relmse - reach } else { 0.0 };
-        Some(Self { relmse, lower, upper: (relmse + reach).max(0.0), detectable })
+        Some(Self::known(sum / count, (squares / (2.0 * (count - 1.0) * count), freedom), 0.0))
+    }
+
+    /// From an estimate, its variance and how many degrees of freedom that has; `unsure` is what else is not known of it, as
+    /// a share of it.
+    pub(super) fn known(relmse: f64, (variance, freedom): (f64, f64), unsure: f64) -> Self {
+        let chance = student_95(freedom) * sqrt(variance);
+        let detectable = chance.max(ROUNDING * ROUNDING);
+        let reach = hypot(chance, unsure * relmse);
+        let lower = if relmse > detectable { (relmse - reach).max(0.0) } else { 0.0 };
+        Self { relmse, lower, upper: (relmse + reach).max(0.0), detectable }
     }
 
     /// A lower end that holds however often it is looked at: about four standard errors below.
@@ -111,6 +117,22 @@ impl BiasEstimate {
     /// Whether there is a bias, at a level of 2.5 %.
     pub fn is_found(&self) -> bool {
         self.lower > 0.0
+    }
+}
+
+impl ErrorEstimate {
+    /// Of noise and bias together: both add up, and so do the squares of how unsure they are. A squared bias b counts as
+    /// b − σ² / b, with σ half of what its interval reaches, and not at all below σ: one audited pixel with a firefly is enough
+    /// for a b of many times the error, and for a σ larger than that. The sum is no less than what is certain of both.
+    pub fn with_bias(self, bias: BiasEstimate) -> Self {
+        let reach = bias.detectable;
+        let squared = if bias.relmse > 0.0 { bias.relmse - 0.25 * reach * reach / bias.relmse } else { 0.0 };
+        let squared = squared.max(0.0);
+        let relmse = self.relmse + squared;
+        let below = hypot(self.relmse - self.lower, (squared - bias.relmse + reach).max(0.0));
+        let above = hypot(self.upper - self.relmse, bias.upper - squared);
+        let least = self.lower + bias.lower;
+        Self { relmse, lower: (relmse - below).max(least), upper: relmse + above }
     }
 }
 

@@ -13,11 +13,13 @@
 //!    exactly. For a pixel of variance V the product has the variance 4 V², and the estimate squared the mean 3 V² (more
 //!    with heavy tails); Student's t says what it is to know that from few pixels. How errors hang together between
 //!    pixels that share paths is seen in the differences of the halves. Upwards less is in doubt where single samples have
-//!    the noise: the error of a pixel that flashed is hardly more than its variance.
+//!    the noise: the error of a pixel that flashed is hardly more than its variance. Nor is the lower end above what the error
+//!    would be if all flashes belonged there.
 //!
 //! The price: about as much time as a tenth of a sample for each pixel.
 
 use super::TileError;
+use super::tile::Parts;
 use crate::film::GROUP;
 use libm::{exp, fmax, fmin, hypot, log, sqrt};
 
@@ -45,7 +47,7 @@ const FEWEST: f64 = 8.0;
 const DOUBTED: f64 = 10.0;
 
 impl ErrorEstimate {
-    /// From all tiles of a picture whose pixels share nothing, or paths within groups; `None` where no pixel has
+    /// From all tiles of a picture whose pixels share nothing, or paths within groups and photons with their neighbours; `None` where no pixel has
     /// four samples.
     pub fn of(tiles: impl Iterator<Item = TileError>) -> Option<Self> {
         let mut sum = TileError::default();
@@ -85,22 +87,26 @@ impl ErrorEstimate {
         let below = 4.0 / 3.0 * sum.squares;
         let doubt = hypot(delta, fmax(log(sum.halves / sum.certain), 0.0));
         let end = |square: f64| exp(hypot(reach * sqrt(square) / sum.halves, doubt));
-        Some(Self { relmse, lower: relmse / end(below), upper: relmse * end(fmin(above, below)) })
+        let lower = fmin(relmse / end(below), sum.least / sum.values as f64);
+        Some(Self { relmse, lower, upper: relmse * end(fmin(above, below)) })
             .filter(|estimate| estimate.upper.is_finite())
     }
 }
 
-/// By how much errors that the pixels of a group share make the sum of products of both halves' errors vary more. With
-/// the correlation ρ of each two of them, from the squares of sums over groups and of pixels, it is
-/// 1 + ρ² Σ V_p V_q / Σ V_p², of all p ≠ q of a group. Estimates have 1 + 2 ρ² times the former and 3 times the latter.
+/// By how much errors that the pixels of a group share, or those of a block, make the sum of products of both halves' errors
+/// vary more. With the correlation ρ of each two of them, from the squares of sums over parts and of pixels, it is
+/// 1 + ρ² Σ V_p V_q / Σ V_p², of all p ≠ q of a part. Estimates have 1 + 2 ρ² times the former and 3 times the latter.
 fn shared(sum: &TileError) -> f64 {
     const OTHERS: f64 = GROUP as f64 - 1.0;
     if !(sum.differences > 0.0 && sum.squares > 0.0) {
         return 1.0;
     }
-    let rho = fmax(sum.groups / sum.differences - 1.0, 0.0) / OTHERS;
-    let pairs = 3.0 * fmax(sum.together / sum.squares - 1.0, 0.0) / (1.0 + 2.0 * rho * rho);
-    1.0 + rho * rho * fmin(pairs, OTHERS)
+    let more = |parts: Parts| {
+        let rho = fmax(parts.differences / sum.differences - 1.0, 0.0) / OTHERS;
+        let pairs = 3.0 * fmax(parts.variances / sum.squares - 1.0, 0.0) / (1.0 + 2.0 * rho * rho);
+        rho * rho * fmin(pairs, OTHERS)
+    };
+    1.0 + more(sum.groups) + more(sum.blocks)
 }
 
 /// By how much errors that hang together make a sum over pixels vary more: from the squares of sums over parts of the

@@ -1,6 +1,7 @@
 //! What is known of the error of a picture.
 
 mod audit;
+mod blur;
 mod filter;
 mod interval;
 mod metric;
@@ -10,6 +11,7 @@ mod shrinkage;
 mod tile;
 
 pub use audit::{BiasEstimate, Deviation, Finding};
+pub use blur::TileBlur;
 pub use filter::filtered;
 pub use interval::ErrorEstimate;
 pub use metric::{Difference, mse, relmse, rmse};

@@ -1,8 +1,9 @@
 //! What the halves of one tile disagree by: sums from which [`super::ErrorEstimate`] is made.
 
+use super::metric::DARK;
 use super::seen::{Seen, brightness, raster};
 use super::shrinkage::{Around, Likely, Pair, Shrinkage};
-use crate::film::{GROUPS, PIXELS_PER_TILE, Pixel, Tile};
+use crate::film::{GROUP, GROUPS, PIXELS_PER_TILE, Pixel, Tile};
 use glam::Vec4;
 
 /// The light of a tile: over all tiles it gives the m of relMSE.
@@ -46,6 +47,8 @@ pub struct TileError {
     pub(super) halves: f64,
     /// The same, as if what pixels probably are was what they are.
     pub(super) certain: f64,
+    /// The same, as if pixels were what they look like: a flash hides itself.
+    pub(super) least: f64,
     /// Variance of the pictures of both pairs over the squares of both R.
     pub(super) parts: f64,
     /// The same, each over the square of the other R: numerator and denominator are independent. Too large where a pair
@@ -61,12 +64,36 @@ pub struct TileError {
     pub(super) product: f64,
     /// Squares of that sum in pixels.
     pub(super) pixels: f64,
-    /// Squares of the sums of (A − B) / R over the pixels of groups, which may share their paths.
-    pub(super) groups: f64,
     /// Squares of (A − B) / R in pixels.
     pub(super) differences: f64,
-    /// Squares of the sums of the variances in `halves` over the pixels of groups.
-    pub(super) together: f64,
+    /// Of groups, which may share their paths.
+    pub(super) groups: Parts,
+    /// Of blocks of 4 × 4 neighbours, which may share photons.
+    pub(super) blocks: Parts,
+}
+
+/// Sums over the parts of a tile, of sixteen pixels each, whose errors may hang together.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Parts {
+    /// Squares of the sums of (A − B) / R over their pixels.
+    pub(super) differences: f64,
+    /// Squares of the sums of the variances in `halves`.
+    pub(super) variances: f64,
+}
+
+impl Parts {
+    /// From both sums of each part.
+    fn of(parts: [[f64; 2]; GROUPS]) -> Self {
+        let [differences, variances] = [0, 1].map(|i| parts.iter().map(|part| part[i] * part[i]).sum());
+        Self { differences, variances }
+    }
+}
+
+impl core::ops::AddAssign for Parts {
+    fn add_assign(&mut self, other: Self) {
+        self.differences += other.differences;
+        self.variances += other.variances;
+    }
 }
 
 impl TileError {
@@ -76,7 +103,7 @@ impl TileError {
         let scale = (1.0 / mean) as f32;
         let seen = Seen::new(pixels, scale);
         let mut sums = Self::default();
-        let mut groups = [[0.0; 2]; GROUPS];
+        let [mut groups, mut blocks] = [[[0.0; 2]; GROUPS]; 2];
         for (i, pixel) in pixels.iter().enumerate().take(PIXELS_PER_TILE) {
             let place = raster(i);
             let Some(quarters @ [a1, a2, b1, b2]) = seen.quarters[place] else { continue };
@@ -95,6 +122,7 @@ impl TileError {
             sums.fourths += squared * squared;
             let darker = total(noise * (by[0].max(by[1]) - by_both));
             let (seen, around) = (0.25 * (a1 + a2 + b1 + b2), seen.around[place]);
+            sums.least += total(noise / (seen * seen + DARK as f32));
             sums.above += above([variance, darker], likely, seen, around, by_both);
             sums.parts += total((first + second) * by_both * 0.5);
             sums.crossed += total(0.5 * (first * by[1] + second * by[0]));
@@ -103,12 +131,12 @@ impl TileError {
             sums.pixels += product * product;
             let difference = total(a1 + a2 - b1 - b2) * libm::sqrt(total(by_both));
             sums.differences += difference * difference;
-            let group = &mut groups[Tile::group(i)];
-            group[0] += difference;
-            group[1] += variance;
+            for part in [&mut groups[Tile::group(i)], &mut blocks[i / GROUP]] {
+                part[0] += difference;
+                part[1] += variance;
+            }
         }
-        sums.groups = groups.iter().map(|group| group[0] * group[0]).sum();
-        sums.together = groups.iter().map(|group| group[1] * group[1]).sum();
+        (sums.groups, sums.blocks) = (Parts::of(groups), Parts::of(blocks));
         sums
     }
 }
@@ -119,6 +147,7 @@ impl core::ops::AddAssign for TileError {
         self.values += other.values;
         self.halves += other.halves;
         self.certain += other.certain;
+        self.least += other.least;
         self.parts += other.parts;
         self.crossed += other.crossed;
         self.squares += other.squares;
@@ -126,9 +155,9 @@ impl core::ops::AddAssign for TileError {
         self.above += other.above;
         self.product += other.product;
         self.pixels += other.pixels;
-        self.groups += other.groups;
         self.differences += other.differences;
-        self.together += other.together;
+        self.groups += other.groups;
+        self.blocks += other.blocks;
     }
 }
 

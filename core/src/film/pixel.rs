@@ -16,6 +16,7 @@ const BRIGHTEST: f32 = 79_228_162_514_264_337_593_543_950_336.0;
 pub struct Half {
     sums: [[f32; 3]; 2],
     lost: [f32; 3],
+    blur: f32,
     counts: [u32; 2],
 }
 
@@ -46,6 +47,11 @@ impl Half {
     /// Their mean; black where there are none.
     pub fn mean(&self) -> Rgb {
         if self.count() == 0 { Rgb::ZERO } else { self.sum() / self.count() as f32 }
+    }
+
+    /// By how much that is too bright in the mean of its channels, as far as samples told; negative: too dark.
+    pub fn blur(&self) -> f32 {
+        if self.count() == 0 { 0.0 } else { self.blur / self.count() as f32 }
     }
 
     /// The means of its own even and odd samples; `None` where there are none.
@@ -79,6 +85,17 @@ impl Pixel {
             half.add((index >> 1) as usize, radiance);
         } else {
             dropped.record(radiance);
+        }
+    }
+
+    /// Tells by how much sample number `index`, which was added, is too bright because photons blur. What is no number is
+    /// not counted.
+    #[inline]
+    pub fn add_blur(&mut self, index: u32, blur: Rgb) {
+        let blur = blur.element_sum() / 3.0;
+        if blur.abs() < BRIGHTEST {
+            let half = if index & 1 == 0 { &mut self.even } else { &mut self.odd };
+            half.blur += blur;
         }
     }
 

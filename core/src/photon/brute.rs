@@ -33,16 +33,32 @@ pub fn gather<R: Response>(map: &PhotonMap, disc: &Disc, response: &R) -> Densit
         let flat = (place - photon.position()).dot(disc.normal).abs() <= thickness;
         let alike = photon.normal_in_steps().length_squared() * (ALIKE * ALIKE) <= along * along;
         if flat && alike && along > 0.0 && photon.direction_in_steps().dot(disc.normal) > 0.0 {
-            let squared = (distance * (1.0 / squared_radius)).min(1.0);
-            let weight = match disc.falloff {
-                Falloff::Constant => 1.0,
-                Falloff::Cone => 3.0 * (1.0 - libm::sqrtf(squared)),
-                Falloff::Epanechnikov => 2.0 * (1.0 - squared),
+            let arrives = photon.power() * response.of(photon.direction());
+            let weight = |squared_radius: f32| {
+                let squared = (distance * (1.0 / squared_radius).min(f32::MAX)).min(1.0);
+                match disc.falloff {
+                    Falloff::Constant => 1.0,
+                    Falloff::Cone => 3.0 * (1.0 - libm::sqrtf(squared)),
+                    Falloff::Epanechnikov => 2.0 * (1.0 - squared),
+                }
             };
-            density.radiance += photon.power() * response.of(photon.direction()) * weight;
+            density.radiance += arrives * weight(squared_radius);
+            let mut squared_radius = squared_radius;
+            for finer in &mut density.finer {
+                squared_radius /= 4.0;
+                if distance <= squared_radius {
+                    *finer += arrives * weight(squared_radius);
+                }
+            }
             density.photons += 1;
         }
     }
-    density.radiance *= 1.0 / (PI * disc.radius) / disc.radius;
+    let per_area = |radius: f32| 1.0 / (PI * radius) / radius;
+    density.radiance *= per_area(disc.radius);
+    let mut radius = disc.radius;
+    for finer in &mut density.finer {
+        radius *= 0.5;
+        *finer *= per_area(radius);
+    }
     density
 }

@@ -88,9 +88,9 @@ impl Fence {
         self.reach.iter().all(|&reach| reach == 1.0)
     }
 
-    /// What the weights integrate to over what is seen of the disc, of 1.
-    pub fn share(&self, falloff: Falloff) -> f32 {
-        let parts = self.reach.iter().map(|&r| match falloff {
+    /// What the weights of a disc with that `part` of the radius integrate to over what is seen of it, of 1.
+    pub fn share(&self, falloff: Falloff, part: f32) -> f32 {
+        let parts = self.reach.iter().map(|&r| (r / part).min(1.0)).map(|r| match falloff {
             Falloff::Constant => r * r,
             Falloff::Cone => r * r * (3.0 - 2.0 * r),
             Falloff::Epanechnikov => r * r * (2.0 - r * r),
@@ -154,7 +154,8 @@ mod tests {
         for (falloff, expected) in
             [(Falloff::Constant, 0.25), (Falloff::Cone, 0.5), (Falloff::Epanechnikov, 0.4375)]
         {
-            assert_eq!((open.share(falloff), half.share(falloff)), (1.0, expected));
+            assert_eq!((open.share(falloff, 1.0), half.share(falloff, 1.0)), (1.0, expected));
+            assert_eq!((half.share(falloff, 0.5), half.share(falloff, 0.25)), (1.0, 1.0));
         }
     }
 }

@@ -8,6 +8,9 @@
 //! 3. it came from the side to which the normal points.
 //!
 //! Unit vectors are not normalised for that: a photon's grid holds whole numbers, which are compared squared.
+//!
+//! The same walk weighs the photons of finer discs once more, of half the radius and less, as if there were no others: for
+//! places where photons crowd, and to know what a disc blurs (`docs/decisions/0043-what-photons-blur.md`).
 
 use super::PhotonMap;
 use super::fence::Fence;
@@ -26,6 +29,9 @@ pub const FLATNESS: f32 = 0.2;
 
 /// Cosine of the largest angle between the normal of a disc and that of a photon in it.
 pub const ALIKE: f32 = 0.7;
+
+/// Finer discs in a disc, each of half the radius of the one before.
+pub const FINER: usize = 3;
 
 /// How the weight of a photon falls with its distance from the middle of the disc. All of them integrate to one
 /// over it.
@@ -83,8 +89,27 @@ impl Response for Uniform {
 pub struct Density {
     /// Responses times power per area: W/(m² sr), or W/m² for a response of one.
     pub radiance: Rgb,
+    /// The same by the photons of each finer disc alone: blurred less, and noisier.
+    pub finer: [Rgb; FINER],
     /// Photons that were weighed.
     pub photons: u32,
+}
+
+impl Density {
+    /// The radiance by the finest disc that has `enough` photons, if they lie evenly; and that by a disc of half the radius,
+    /// where there is one.
+    #[inline]
+    pub fn of_enough(&self, enough: f32) -> [Rgb; 2] {
+        let (mut chosen, mut photons) = (self.radiance, self.photons as f32);
+        for finer in self.finer {
+            photons *= 0.25;
+            if photons < enough {
+                return [chosen, finer];
+            }
+            chosen = finer;
+        }
+        [chosen; 2]
+    }
 }
 
 /// One gathering.
@@ -122,23 +147,26 @@ pub(super) fn gather<S: Simd, R: Response>(
     let mut sum = Sum {
         place,
         normal: [simd.splat16(x), simd.splat16(y), simd.splat16(z)],
-        limit: simd.splat16(squared_radius),
         fence,
         squared_radius,
         thickness: simd.splat16(FLATNESS * libm::sqrtf(squared_radius)),
-        nearness: Nearness { reciprocal: simd.splat16(1.0 / squared_radius), falloff: disc.falloff },
+        disc: Weighed::new(simd, squared_radius, disc.falloff),
+        finer: [
+            Weighed::new(simd, squared_radius / 4.0, disc.falloff),
+            Weighed::new(simd, squared_radius / 16.0, disc.falloff),
+            Weighed::new(simd, squared_radius / 64.0, disc.falloff),
+        ],
         response,
-        lanes: [simd.splat16(0.0); 3],
-        singles: Rgb::ZERO,
-        photons: 0,
     };
     leaves_within(simd, map, &place, squared_radius, &mut sum);
-    let [r, g, b] = sum.lanes;
-    let total = Rgb::new(added(r.to_array()), added(g.to_array()), added(b.to_array()));
-    let responded = if R::UNIFORM { total * response.of(disc.normal) } else { sum.singles };
-    let seen = fence.map_or(1.0, |fence| fence.share(disc.falloff));
-    let per_area = if seen > 0.0 { 1.0 / (PI * seen * disc.radius) / disc.radius } else { 0.0 };
-    Density { radiance: responded * per_area, photons: sum.photons }
+    let radiance = sum.disc.density((disc, 1.0), fence, response);
+    let mut density = Density { radiance, finer: [Rgb::ZERO; FINER], photons: sum.disc.photons };
+    let mut part = 1.0;
+    for (finer, radiance) in sum.finer.iter().zip(&mut density.finer) {
+        part *= 0.5;
+        *radiance = finer.density((disc, part), fence, response);
+    }
+    density
 }
 
 /// Lane after lane, so that the bits are those of every level.
@@ -151,12 +179,21 @@ fn added(lanes: [f32; 16]) -> f32 {
 struct Sum<'a, S: Simd, R> {
     place: Place16<S>,
     normal: [S::F16; 3],
-    limit: S::F16,
     fence: Option<&'a Fence>,
     squared_radius: f32,
     thickness: S::F16,
-    nearness: Nearness<S>,
+    disc: Weighed<S>,
+    finer: [Weighed<S>; FINER],
     response: &'a R,
+}
+
+/// Photons of a disc, weighed by distance.
+struct Weighed<S: Simd> {
+    /// The squared radius, and
+    limit: S::F16,
+    /// one over that.
+    reciprocal: S::F16,
+    falloff: Falloff,
     /// Weighed power: where the response is uniform,
     lanes: [S::F16; 3],
     /// and where it is not, with the response.
@@ -179,7 +216,7 @@ impl<S: Simd, R: Response> Sum<'_, S, R> {
     fn add(&mut self, simd: S, leaf: &Leaf, half: usize) {
         let offset = self.place.less(simd, leaf.half(half));
         let distance = squared(offset);
-        let in_sphere = distance.le(self.limit);
+        let in_sphere = distance.le(self.disc.limit);
         if !in_sphere.any() {
             return;
         }
@@ -201,50 +238,94 @@ impl<S: Simd, R: Response> Sum<'_, S, R> {
             Some(fence) => counted & fence.sees(simd, offset, distance, self.squared_radius),
             None => counted,
         };
-        let bits = counted.bits();
-        if bits == 0 {
+        if !counted.any() {
             return;
         }
-        self.photons += bits.count_ones();
-        let weight = self.nearness.weight(simd, distance) * simd.powers16(light);
-        let weight = weight.select(counted, zero);
         let power = &leaf.power[half % HALVES];
-        let red = simd.field16(power, 0, POWER_BITS) * weight;
-        let green = simd.field16(power, POWER_BITS, POWER_BITS) * weight;
+        let scale = simd.powers16(light);
         let blue = simd.field16(power, 2 * POWER_BITS, POWER_BITS - 1);
-        let blue = (blue + blue) * weight;
+        let photons = Photons16 {
+            distance,
+            scale,
+            power: [
+                simd.field16(power, 0, POWER_BITS),
+                simd.field16(power, POWER_BITS, POWER_BITS),
+                blue + blue,
+            ],
+            came,
+        };
+        self.disc.add(simd, &photons, counted, self.response);
+        let mut counted = counted;
+        for finer in &mut self.finer {
+            counted = counted & distance.le(finer.limit);
+            if !counted.any() {
+                return;
+            }
+            finer.add(simd, &photons, counted, self.response);
+        }
+    }
+}
+
+/// Sixteen photons.
+struct Photons16<S: Simd> {
+    /// Squared, to the middle of the disc.
+    distance: S::F16,
+    /// What the unit of their power is, and
+    scale: S::F16,
+    /// how many they have of it.
+    power: [S::F16; 3],
+    /// Where they came from.
+    came: [S::F16; 3],
+}
+
+impl<S: Simd> Weighed<S> {
+    /// Nothing yet, of a disc of this squared radius.
+    #[inline(always)]
+    fn new(simd: S, squared_radius: f32, falloff: Falloff) -> Self {
+        Self {
+            limit: simd.splat16(squared_radius),
+            reciprocal: simd.splat16((1.0 / squared_radius).min(f32::MAX)),
+            falloff,
+            lanes: [simd.splat16(0.0); 3],
+            singles: Rgb::ZERO,
+            photons: 0,
+        }
+    }
+
+    /// Adds those of `photons` that are `counted`.
+    #[inline(always)]
+    fn add<R: Response>(
+        &mut self,
+        simd: S,
+        photons: &Photons16<S>,
+        counted: <S::F16 as Lanes>::Mask,
+        response: &R,
+    ) {
+        let mut bits = counted.bits();
+        self.photons += bits.count_ones();
+        let weight = self.nearness(simd, photons.distance) * photons.scale;
+        let weight = weight.select(counted, simd.splat16(0.0));
+        let [red, green, blue] = photons.power;
+        let (red, green, blue) = (red * weight, green * weight, blue * weight);
         if R::UNIFORM {
             let [r, g, b] = self.lanes;
             self.lanes = [r + red, g + green, b + blue];
-        } else {
-            let [x, y, z] = came;
-            let power = [red.to_array(), green.to_array(), blue.to_array()];
-            self.respond(power, [x.to_array(), y.to_array(), z.to_array()], bits);
+            return;
         }
-    }
-
-    /// Adds photons one by one.
-    #[inline(always)]
-    fn respond(&mut self, [r, g, b]: [[f32; 16]; 3], [x, y, z]: [[f32; 16]; 3], mut bits: u32) {
+        let [x, y, z] = photons.came;
+        let (x, y, z) = (x.to_array(), y.to_array(), z.to_array());
+        let (r, g, b) = (red.to_array(), green.to_array(), blue.to_array());
         while bits != 0 {
             let lane = bits.trailing_zeros() as usize % 16;
             let direction = Vec3::new(x[lane], y[lane], z[lane]).normalize_or(Vec3::Z);
-            self.singles += Rgb::new(r[lane], g[lane], b[lane]) * self.response.of(direction);
+            self.singles += Rgb::new(r[lane], g[lane], b[lane]) * response.of(direction);
             bits &= bits - 1;
         }
     }
-}
 
-/// Weights by distance.
-struct Nearness<S: Simd> {
-    /// Of the squared radius.
-    reciprocal: S::F16,
-    falloff: Falloff,
-}
-
-impl<S: Simd> Nearness<S> {
+    /// The weights of photons by their squared distances.
     #[inline(always)]
-    fn weight(&self, simd: S, distance: S::F16) -> S::F16 {
+    fn nearness(&self, simd: S, distance: S::F16) -> S::F16 {
         let one = simd.splat16(1.0);
         // Rounding must not make a weight negative.
         let squared = (distance * self.reciprocal).min(one);
@@ -253,6 +334,21 @@ impl<S: Simd> Nearness<S> {
             Falloff::Cone => simd.splat16(3.0) * (one - squared.sqrt()),
             Falloff::Epanechnikov => simd.splat16(2.0) * (one - squared),
         }
+    }
+
+    /// Of so large a `part` of the radius of `disc`.
+    #[inline(always)]
+    fn density<R: Response>(&self, (disc, part): (&Disc, f32), fence: Option<&Fence>, response: &R) -> Rgb {
+        if self.photons == 0 {
+            return Rgb::ZERO;
+        }
+        let [r, g, b] = self.lanes;
+        let total = Rgb::new(added(r.to_array()), added(g.to_array()), added(b.to_array()));
+        let responded = if R::UNIFORM { total * response.of(disc.normal) } else { self.singles };
+        let seen = fence.map_or(1.0, |fence| fence.share(disc.falloff, part));
+        let radius = part * disc.radius;
+        let per_area = if seen > 0.0 { 1.0 / (PI * seen * radius) / radius } else { 0.0 };
+        responded * per_area
     }
 }
 

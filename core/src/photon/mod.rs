@@ -20,7 +20,7 @@ mod space;
 
 pub use curve::Turn;
 pub use fence::{Fence, PROBES};
-pub use gather::{ALIKE, Density, Disc, FLATNESS, Falloff, Response, Uniform};
+pub use gather::{ALIKE, Density, Disc, FINER, FLATNESS, Falloff, Response, Uniform};
 pub use nearest::Neighbours;
 pub use record::Photon;
 

@@ -245,15 +245,16 @@ fn what_is_gathered_is_what_brute_force_gathers() {
                 let found = map.gather(level, &disc, &uniform);
                 assert_eq!(found, baseline, "{level:?}");
                 assert_eq!(found.photons, expected.photons, "{disc:?}");
-                let error = (found.radiance - expected.radiance).abs();
-                assert!(error.cmple(expected.radiance * ROUNDING).all(), "{found:?} {expected:?}");
+                for (found, expected) in radiances(found).into_iter().zip(radiances(expected)) {
+                    let error = (found - expected).abs();
+                    assert!(error.cmple(expected * ROUNDING).all(), "{found:?} {expected:?}");
+                }
                 let found = map.gather(level, &disc, &glossy);
                 assert_eq!(found.photons, expected_glossy.photons);
-                let error = (found.radiance - expected_glossy.radiance).abs().max_element();
-                assert!(
-                    error <= expected_glossy.radiance.max_element() * ROUNDING,
-                    "{found:?} {expected_glossy:?}"
-                );
+                for (found, expected) in radiances(found).into_iter().zip(radiances(expected_glossy)) {
+                    let error = (found - expected).abs().max_element();
+                    assert!(error <= expected.max_element() * ROUNDING, "{found:?} {expected:?}");
+                }
             }
         }
         assert!(most > 500, "the discs hold something: at most {most}");
@@ -267,6 +268,28 @@ fn what_is_gathered_is_what_brute_force_gathers() {
     });
 }
 
+/// Of a disc and its finer ones.
+fn radiances(density: Density) -> [Rgb; 1 + FINER] {
+    let [half, quarter, eighth] = density.finer;
+    [density.radiance, half, quarter, eighth]
+}
+
+#[test]
+fn the_finest_disc_is_chosen_that_has_enough_photons() {
+    let [whole, half, quarter, eighth] = [1.0, 2.0, 3.0, 4.0].map(Rgb::splat);
+    for (photons, expected) in [
+        (31, [whole, half]),
+        (32, [half, quarter]),
+        (127, [half, quarter]),
+        (128, [quarter, eighth]),
+        (512, [eighth; 2]),
+    ] {
+        let density = Density { radiance: whole, finer: [half, quarter, eighth], photons };
+        assert_eq!(density.of_enough(8.0), expected, "{photons}");
+        assert_eq!(density.of_enough(f32::INFINITY), [whole, half]);
+    }
+}
+
 #[test]
 fn an_even_floor_has_the_irradiance_that_was_put_there_by_every_falloff() {
     let mut random = Random(31);
@@ -277,11 +300,13 @@ fn an_even_floor_has_the_irradiance_that_was_put_there_by_every_falloff() {
             let disc = Disc { place: Vec3::new(0.5, 0.5, 0.0), normal: Vec3::Z, radius: 0.2, falloff };
             let found = map.gather(Level::detect(), &disc, &Uniform(Rgb::ONE));
             // One watt each on one square metre; about 50 000 photons, four standard deviations of the least even
-            // weights (E[k²] = 3/2): 2 %.
-            assert!(
-                (found.radiance / count as f32 - 1.0).abs().max_element() < 0.022,
-                "{falloff:?} {found:?}"
-            );
+            // weights (E[k²] = 3/2): 2 %; and a quarter as many in each finer disc.
+            let mut most = 0.022;
+            for radiance in radiances(found) {
+                let off = (radiance / count as f32 - 1.0).abs().max_element();
+                assert!(off < most, "{falloff:?} {found:?}");
+                most *= 2.0;
+            }
         }
     });
 }

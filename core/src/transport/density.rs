@@ -43,17 +43,25 @@ pub struct PhotonLight<'a> {
     falloff: Falloff,
     /// Most discs have no photon, so that to look for one first is worth it.
     is_sparse: bool,
+    /// Photons that a disc needs.
+    enough: f32,
 }
 
 impl<'a> PhotonLight<'a> {
     /// The photons of `map`, gathered from `discs`.
     pub fn new(map: &'a PhotonMap<'a>, discs: Discs) -> Self {
-        Self { map, discs, falloff: Falloff::default(), is_sparse: false }
+        Self { map, discs, falloff: Falloff::default(), is_sparse: false, enough: f32::INFINITY }
     }
 
     /// The same, with photons weighed by `falloff`.
     pub fn with_falloff(self, falloff: Falloff) -> Self {
         Self { falloff, ..self }
+    }
+
+    /// The same, where discs are no wider than it takes for `enough` photons, if those lie evenly: where they crowd, an eighth of
+    /// the radius may do.
+    pub fn with_enough(self, enough: f32) -> Self {
+        Self { enough, ..self }
     }
 
     /// The same for a map of caustics, which are on few surfaces.
@@ -71,7 +79,7 @@ impl<'a> PhotonLight<'a> {
         bsdf: &Bsdf,
         (wo, travelled): (Vec3, f32),
         turns: f32,
-    ) -> Option<Rgb> {
+    ) -> Option<Gathered> {
         if !holds_photons(bsdf) {
             return None;
         }
@@ -83,10 +91,27 @@ impl<'a> PhotonLight<'a> {
         };
         let density = self.is_sparse.then(|| self.map.gather(level, &disc, &Uniform(Rgb::ONE)));
         if density.is_some_and(|density| density.photons == 0) {
-            return Some(Rgb::ZERO);
+            return Some(Gathered::default());
         }
-        let light = Light { map: self.map, is_caustic: self.is_sparse };
+        let light = Light { map: self.map, is_caustic: self.is_sparse, enough: self.enough };
         Some(reflected::<F>(light, (bvh, level), (&disc, density), (point, bsdf), wo, turns))
+    }
+}
+
+/// What a disc of photons sends to the eye.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Gathered {
+    pub(super) light: Rgb,
+    /// By how much that is too bright for its width, in the mean: what it differs by from a disc of half the radius, and
+    /// what that blurs itself, a quarter of it all where light is smooth.
+    pub(super) blur: Rgb,
+}
+
+impl Gathered {
+    /// By a disc that is no wider than it takes for `enough` photons.
+    fn of(density: Density, enough: f32, response: Rgb) -> Self {
+        let [chosen, finer] = density.of_enough(enough);
+        Self { light: chosen * response, blur: (chosen - finer) * (4.0 / 3.0) * response }
     }
 }
 
@@ -95,27 +120,29 @@ impl<'a> PhotonLight<'a> {
 pub(super) struct Light<'a> {
     pub(super) map: &'a PhotonMap<'a>,
     pub(super) is_caustic: bool,
+    /// Discs are no wider than it takes for so many photons.
+    pub(super) enough: f32,
 }
 
 /// What `point` reflects to `wo` of the light of the photons on `disc`, as far as it is seen from there; `all` is the
 /// density of all of them, where it is known.
 #[inline]
 pub(super) fn reflected<F: Features>(
-    Light { map, is_caustic }: Light,
+    Light { map, is_caustic, enough }: Light,
     (bvh, level): (&Bvh, Level),
     (disc, all): (&Disc, Option<Density>),
     (point, bsdf): (&SurfacePoint, &Bsdf),
     wo: Vec3,
     turns: f32,
-) -> Rgb {
+) -> Gathered {
     let origin = point.position + point.error * point.geometric_normal;
     let fence = fence(bvh, level, (origin, is_caustic), disc, turns);
     let is_flat = point.frame.normal == point.geometric_normal;
     if let (Bsdf::Diffuse(diffuse), true) = (bsdf, is_flat) {
         let response = diffuse.reflectance * FRAC_1_PI;
         return match all {
-            Some(all) if fence.is_open() => all.radiance * response,
-            _ => map.gather_within(level, disc, &fence, &Uniform(response)).radiance,
+            Some(all) if fence.is_open() => Gathered::of(all, enough, response),
+            _ => Gathered::of(map.gather_within(level, disc, &fence, &Uniform(response)), enough, Rgb::ONE),
         };
     }
     // A photon's power has met the triangle: the cosine is in it already, and that of the triangle's normal.
@@ -126,7 +153,7 @@ pub(super) fn reflected<F: Features>(
         }
         bsdf.evaluate::<F>(wo, wi).0 / from.dot(point.geometric_normal).abs().max(GRAZING)
     };
-    map.gather_within(level, disc, &fence, &response).radiance
+    Gathered::of(map.gather_within(level, disc, &fence, &response), enough, Rgb::ONE)
 }
 
 /// Looks for walls on `disc`, and for its edges, by probes from `origin`, just above its middle; and for what hangs over

@@ -10,7 +10,7 @@
 //! 2. A photon knows whether there is a wall within the disc of its estimate. If not, it need not be asked for again.
 
 use super::PhotonLight;
-use super::density::{Light, fence, reflected};
+use super::density::{Gathered, Light, fence, reflected};
 use super::estimator::Counters;
 use super::shoot::{focuses, holds_photons, may_focus};
 use super::wave::Share;
@@ -116,7 +116,7 @@ impl<'a> Irradiances<'a> {
         let above = ABOVE * disc.radius + 16.0 * f32::EPSILON * place.abs().max_element();
         let turns = (mix(index as u64) >> 40) as f32 / (1u64 << 24) as f32;
         let fence = fence(self.bvh, self.level, (place + above * normal, false), &disc, turns);
-        if fence.share(self.falloff) < LEAST_SEEN {
+        if fence.share(self.falloff, 1.0) < LEAST_SEEN {
             return Photon::NONE;
         }
         if fence.is_open() && !self.is_even(&disc, neighbours) {
@@ -179,8 +179,8 @@ impl<'a> GatherLight<'a> {
         }
         let (place, normal) = (point.position, point.geometric_normal);
         let disc = Disc { place, normal, radius: radius.min(self.farthest), falloff: self.falloff };
-        let light = Light { map: self.global, is_caustic: false };
-        Some(reflected::<F>(light, (bvh, level), (&disc, None), (point, bsdf), wo, turns))
+        let light = Light { map: self.global, is_caustic: false, enough: f32::INFINITY };
+        Some(reflected::<F>(light, (bvh, level), (&disc, None), (point, bsdf), wo, turns).light)
     }
 
     /// The irradiance of the photons at `point`, at the end of a gather ray of length `distance`, and the radius of their
@@ -245,7 +245,7 @@ pub struct PhotonMaps<'a> {
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Said {
     /// Reflected light.
-    pub(super) light: Rgb,
+    pub(super) gathered: Gathered,
     /// Whether that is all light but what a smooth coat mirrors.
     pub(super) is_all: bool,
     /// Whether no light need be asked for by a shadow ray.
@@ -288,15 +288,16 @@ impl PhotonMaps<'_> {
             && (limited == 0 || limited == 2)
             && let Some(light) = self.global.reflected::<F>(tracer, point, bsdf, wo, distance, turns)
         {
-            return Said { light, is_all: true, is_lit: true, ..all };
+            let gathered = Gathered { light, ..Gathered::default() };
+            return Said { gathered, is_all: true, is_lit: true, ..all };
         }
         if limited > 1 {
             return Said::default();
         }
         match &self.caustic {
             Some(caustic) => {
-                let light = caustic.reflected::<F>(tracer, point, bsdf, (wo, travelled), turns);
-                Said { light: light.unwrap_or_default(), next: Share::NO_CAUSTIC, ..all }
+                let gathered = caustic.reflected::<F>(tracer, point, bsdf, (wo, travelled), turns);
+                Said { gathered: gathered.unwrap_or_default(), next: Share::NO_CAUSTIC, ..all }
             }
             None => Said { next: Share::GATHERED, ..all },
         }

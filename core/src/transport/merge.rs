@@ -28,7 +28,7 @@
 //! photon is known when it is left, its power is multiplied with it, and a map needs no more than power. Photons that
 //! paths find more easily are hardly ever left. Ends of paths by roulette count for none of the densities.
 
-use super::density::{Light, reflected};
+use super::density::{Gathered, Light, reflected};
 use super::shoot::holds_photons;
 use crate::bsdf::{Bsdf, Features};
 use crate::bvh::Bvh;
@@ -203,10 +203,10 @@ impl<'a> Merging<'a> {
         (point, bsdf): (&SurfacePoint, &Bsdf),
         (wo, travelled): (Vec3, f32),
         turns: impl FnOnce() -> f32,
-    ) -> Rgb {
+    ) -> Gathered {
         let map = self.maps[sample as usize & 1];
         if map.is_empty() || !ends_chain(bsdf) {
-            return Rgb::ZERO;
+            return Gathered::default();
         }
         let disc = Disc {
             place: point.position,
@@ -217,9 +217,9 @@ impl<'a> Merging<'a> {
         // Most places have no photon near them, and need not look for walls.
         let density = map.gather(level, &disc, &Uniform(Rgb::ONE));
         if density.photons == 0 {
-            return Rgb::ZERO;
+            return Gathered::default();
         }
-        let light = Light { map, is_caustic: true };
+        let light = Light { map, is_caustic: true, enough: f32::INFINITY };
         reflected::<F>(light, (bvh, level), (&disc, Some(density)), (point, bsdf), wo, turns())
     }
 }

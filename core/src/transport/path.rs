@@ -22,7 +22,7 @@
 
 use super::arrivals::{Arrivals, TO_ENVIRONMENT};
 use super::cached::Caches;
-use super::density::PhotonLight;
+use super::density::{Gathered, PhotonLight};
 use super::estimator::{
     Counters, MAX_CROSSINGS, MAX_VERTICES, PathSettings, dimension, environment_heuristic, power_heuristic,
     survival,
@@ -452,7 +452,7 @@ impl<'a, F: Features> PathTracer<'a, F> {
             let maps = &maps[path.sample as usize & 1];
             let tracer = (self.bvh, self.level);
             said = maps.ask::<F>(tracer, (came, limit, distance), point, &bsdf, (wo, travelled), turns);
-            path.add(throughput * said.light);
+            path.gather(throughput, exchange, said.gathered);
         }
 
         // Where lights are small all around, and nothing mirrors them, a shadow ray alone finds the direct light. Not
@@ -536,7 +536,7 @@ impl<'a, F: Features> PathTracer<'a, F> {
             let turns = sampler.single(dimension::PROBES + segments);
             let tracer = (self.bvh, self.level);
             reflected = photons.reflected::<F>(tracer, point, &bsdf, (wo, travelled), turns);
-            path.add(throughput * reflected.unwrap_or_default());
+            path.gather(throughput, exchange, reflected.unwrap_or_default());
         }
 
         let mut merged = path.merged;
@@ -551,8 +551,8 @@ impl<'a, F: Features> PathTracer<'a, F> {
                 let turns = || sampler.single(dimension::PROBES + segments);
                 let from = (wo, if is_first { travelled } else { 0.0 });
                 let tracer = (self.bvh, self.level);
-                let light = merging.reflected::<F>(tracer, path.sample, (point, &bsdf), from, turns);
-                path.add(throughput * light);
+                let gathered = merging.reflected::<F>(tracer, path.sample, (point, &bsdf), from, turns);
+                path.gather(throughput, exchange, gathered);
             }
         }
 
@@ -667,6 +667,12 @@ impl Path {
     #[inline]
     pub(super) fn add(&mut self, radiance: Rgb) {
         self.radiance = (Rgb::from(self.radiance) + radiance).to_array();
+    }
+
+    #[inline]
+    fn gather(&mut self, throughput: Rgb, exchange: &Exchange, Gathered { light, blur }: Gathered) {
+        self.add(throughput * light);
+        self.blur = (Rgb::from(self.blur) + exchange.worth(throughput) * blur).to_array();
     }
 
     /// Random numbers for one of the points of lights that it asks where it ends: those of all its pixel's are a net.

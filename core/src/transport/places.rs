@@ -122,21 +122,24 @@ impl<F: Features> PathTracer<'_, F> {
                 let outlined = |place| places.outlined.contains(place as usize);
                 self.look_at_lamps(outlined, &mut wave, count, &mut counters);
             }
-            let mut light = Rgb::ZERO;
+            let (mut light, mut blur) = (Rgb::ZERO, Rgb::ZERO);
             for (i, (path, exchange)) in wave.paths.iter().zip(&*wave.exchanges).take(count).enumerate() {
                 let lamps = if has_lamps { Rgb::from(wave.shadow_light[i]) } else { Rgb::ZERO };
                 let seen = exchange.seen(path) + lamps;
                 let Some(pixel) = out.get_mut(path.place as usize) else { continue };
                 if !places.edges.contains(path.place as usize) {
                     pixel.add(path.sample, seen, &mut counters.dropped);
+                    pixel.add_blur(path.sample, Rgb::from(path.blur));
                     continue;
                 }
                 // Those of a sample are together.
                 light += seen / PER_EDGE as f32;
+                blur += Rgb::from(path.blur) / PER_EDGE as f32;
                 let part = path.sample >> 1;
                 if part % PER_EDGE == PER_EDGE - 1 {
                     let sample = ((part / PER_EDGE) << 1) | (path.sample & 1);
                     pixel.add(sample, core::mem::take(&mut light), &mut counters.dropped);
+                    pixel.add_blur(sample, core::mem::take(&mut blur));
                 }
             }
         }

@@ -17,6 +17,8 @@ pub(super) struct Path {
     pub(super) pdf: f32,
     /// L: what the path has gathered.
     pub(super) radiance: [f32; 3],
+    /// What photons blur of it.
+    pub(super) blur: [f32; 3],
     /// Which pixel of the picture.
     pub(super) pixel: u32,
     /// The last vertex at which the path was scattered.

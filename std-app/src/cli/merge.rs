@@ -52,7 +52,7 @@ impl Merge {
             "shadow_rays": counters.shadow_rays,
             "paths": counters.paths,
             "mean_radiance": merged.image.mean(),
-            "error": error_object(merged.error, merged.audit.as_ref()),
+            "error": error_object(merged.error, merged.blurred, merged.audit.as_ref()),
             "may_be_biased": merged.is_biased,
             "dropped": dropped_object(&counters.dropped, &merged.places, merged.empty_pixels),
             "outputs": self.output,
@@ -66,7 +66,7 @@ impl Merge {
         lines.push(format!("image  {width}x{height}, {} samples per pixel", merged.spp));
         match &merged.audit {
             Some(audit) => lines.extend(summary::audited(audit)),
-            None => lines.push(summary::estimate(merged.error, merged.is_biased)),
+            None => lines.extend(summary::estimate(merged.error, merged.blurred, merged.is_biased)),
         }
         lines.extend(ledger::text(&merged.counters, &merged.places, merged.empty_pixels));
         lines.join("\n")

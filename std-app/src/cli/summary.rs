@@ -2,7 +2,7 @@
 
 use super::compare as comparing;
 use super::ledger;
-use halflight::drive::{Audited, BiasEstimate, Ending, ErrorEstimate, MapUse};
+use halflight::drive::{Audited, BiasEstimate, Blurred, Ending, ErrorEstimate, MapUse};
 use halflight::report::Run;
 use halflight::report::words::{plural, readable_bytes, readable_seconds};
 use std::path::Path;
@@ -21,7 +21,7 @@ pub(super) fn text(run: &Run, report: Option<&Path>) -> String {
     let (width, height, samples) = (settings.width, settings.height, plural(result.spp.into(), "sample"));
     lines.push(format!("image  {width}x{height}, {samples} per pixel{early}"));
     match &result.audit {
-        None => lines.push(estimate(result.error, result.method.is_biased() || result.caustics.used)),
+        None => lines.extend(estimate(result.error, result.blurred, result.method.is_biased())),
         Some(audit) => {
             lines.extend(audited(audit));
             let doubt = run.doubt().filter(|_| audit.is_biased());
@@ -123,17 +123,32 @@ pub(super) fn audited(audit: &Audited) -> [String; 3] {
     ]
 }
 
-/// The line of an estimate that nobody audited, of a method that may have a bias.
-pub(super) fn estimate(error: Option<ErrorEstimate>, is_biased: bool) -> String {
-    let bias = if is_biased { "; bias is not in it" } else { "" };
-    match error {
-        Some(ErrorEstimate { relmse, lower, upper }) => {
-            format!(
-                "error  relMSE {relmse:.3e} (95 %: {lower:.3e} to {upper:.3e}), estimated from its own noise{bias}"
-            )
-        }
-        None => "error  unknown: it takes four samples per pixel and some light".into(),
-    }
+/// The lines of an estimate that nobody audited, of a method that may have a bias.
+pub(super) fn estimate(
+    error: Option<ErrorEstimate>,
+    blurred: Option<Blurred>,
+    is_biased: bool,
+) -> Vec<String> {
+    let Some(ErrorEstimate { relmse, lower, upper }) = error else {
+        return vec!["error  unknown: it takes four samples per pixel and some light".into()];
+    };
+    let bias = match (is_biased, blurred) {
+        (true, Some(_)) => "; other bias is not in it",
+        (true, None) => "; bias is not in it",
+        (false, _) => "",
+    };
+    let from = if blurred.is_some() { "noise and what photons blur" } else { "estimated from its own noise" };
+    let mut lines =
+        vec![format!("error  relMSE {relmse:.3e} (95 %: {lower:.3e} to {upper:.3e}), {from}{bias}")];
+    lines.extend(blurred.map(|Blurred { noise, blur, .. }| {
+        let BiasEstimate { relmse: bias, lower, upper, .. } = blur;
+        let bias = bias.max(0.0);
+        format!(
+            "       {:.3e} of it is noise; blur {bias:.3e} (95 %: {lower:.3e} to {upper:.3e})",
+            noise.relmse
+        )
+    }));
+    lines
 }
 
 /// What became of the maps of one kind.

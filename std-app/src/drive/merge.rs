@@ -2,6 +2,7 @@
 
 use super::ErrorEstimate;
 use super::audit::{self, Audited};
+use super::blurred::Blurred;
 use super::canvas::{Canvas, Shard};
 use super::error::{FileError, RenderError};
 use super::film_file::Reader;
@@ -34,6 +35,8 @@ pub struct Merged {
     pub is_biased: bool,
     /// The error: estimated from the two half-films, and with the bias where all shards were audited.
     pub error: Option<ErrorEstimate>,
+    /// Noise and what photons blur, where there are photons and no audit.
+    pub blurred: Option<Blurred>,
     /// What their audits found together.
     pub audit: Option<Audited>,
 }
@@ -58,8 +61,7 @@ pub fn merge(files: &[PathBuf]) -> Result<Merged, RenderError> {
 
     let [width, height] = first.header.size();
     let spp = first.header.spp;
-    // Paths that share what their samples find share photons.
-    let is_biased = first.header.method().is_some_and(Method::is_biased) || first.header.shares;
+    let is_biased = first.header.method().is_some_and(Method::is_biased);
     let mut lines = Vec::new();
     let needed = Film::footprint(width, height).bytes();
     let count = needed.div_ceil(ALIGNMENT);
@@ -80,6 +82,7 @@ pub fn merge(files: &[PathBuf]) -> Result<Merged, RenderError> {
     let audit = workers.mean(&canvas.film).zip(audits).and_then(|(mean, audits)| {
         audit::State::merged(audits, &canvas.film, mean)?.verdict(&canvas.film, mean, noise?)
     });
+    let blurred = if audit.is_none() { Blurred::of(&workers, &canvas.film, noise) } else { None };
     Ok(Merged {
         image: image(&canvas.film),
         spp,
@@ -87,7 +90,8 @@ pub fn merge(files: &[PathBuf]) -> Result<Merged, RenderError> {
         counters: canvas.counters,
         places: canvas.ledger.places(width, height),
         empty_pixels: empty_pixels(&canvas.film, |_| true),
-        error: audit.as_ref().map(|audit| audit.total).or(noise),
+        error: audit.as_ref().map(|audit| audit.total).or(blurred.map(|blurred| blurred.total)).or(noise),
+        blurred,
         audit,
         is_biased,
     })

@@ -6,6 +6,7 @@
 
 mod adapt;
 mod audit;
+mod blurred;
 mod cache_file;
 mod canvas;
 mod crew;
@@ -31,6 +32,7 @@ mod windows;
 mod workers;
 
 pub use audit::{Audited, Region};
+pub use blurred::Blurred;
 pub use cache_file::inspect as inspect_cache;
 pub use canvas::Shard;
 pub use error::{FileError, RenderError};
@@ -271,9 +273,11 @@ pub struct RenderResult {
     pub places: Vec<Place>,
     /// Pixels that are black because all of their samples were dropped.
     pub empty_pixels: u64,
-    /// The error, estimated from the two half-films, and from the audit where there is one; `None` for fewer than four
-    /// samples, and for a black picture.
+    /// The error, estimated from the two half-films, and from the audit where there is one or from what photons blur; `None` for
+    /// fewer than four samples, and for a black picture.
     pub error: Option<ErrorEstimate>,
+    /// Noise and what photons blur, where there are photons and no audit.
+    pub blurred: Option<Blurred>,
     /// What the audit has found.
     pub audit: Option<Audited>,
     /// Bytes of each structure, while paths are traced.

@@ -2,6 +2,7 @@
 
 use super::adapt::{self, Spread, Weights};
 use super::audit::Audit;
+use super::blurred::Blurred;
 use super::canvas::{Canvas, Shard};
 use super::crew::{self, Crew};
 use super::film_file::{self, Header, Identity, Reader};
@@ -46,8 +47,7 @@ impl Picture<'_> {
         let Stage { settings, workers, .. } = stage;
         let (width, height) = (settings.width, settings.height);
         let mut canvas = Canvas::new(film, settings.shard);
-        // Photons, too, are shared.
-        canvas.shares = method.shares() || renderer.caustics().used;
+        canvas.shares = method.shares();
         let (mut rounds, mut history, mut refinements) = match resumed {
             None => (Rounds::new(settings.stop), Vec::new(), Refinements::default()),
             Some(film) => {
@@ -121,7 +121,8 @@ impl Picture<'_> {
                 if let Some(refinement) = short.and_then(|short| renderer.refine(&short)) {
                     refinements.add(refinement, rounds.spp());
                 }
-                error = audited.as_ref().map(|audited| audited.total).or(error);
+                let unaudited = || Blurred::of(workers, &canvas.film, error).map(|blurred| blurred.total);
+                error = audited.as_ref().map(|audited| audited.total).or_else(unaudited).or(error);
                 is_lost = !method.converges()
                     && !refinements.are_young(rounds.spp())
                     && audited.is_some_and(|audited| rounds.is_out_of_reach(&audited));
@@ -167,7 +168,9 @@ impl Picture<'_> {
         estimate += start.elapsed().as_secs_f64();
         let render = clock.seconds();
         let audited = noise.and_then(|noise| audit.as_ref()?.verdict(workers, &canvas.film, noise));
-        let error = audited.as_ref().map(|audited| audited.total).or(noise);
+        let blurred = if audited.is_none() { Blurred::of(workers, &canvas.film, noise) } else { None };
+        let error = audited.as_ref().map(|audited| audited.total);
+        let error = error.or(blurred.map(|blurred| blurred.total)).or(noise);
         if let Some(last) = history.last_mut() {
             last.error = error;
         }
@@ -194,6 +197,7 @@ impl Picture<'_> {
             places: canvas.ledger.places(width, height),
             empty_pixels: empty_pixels(film, |task| canvas.shard.owns(task)),
             error,
+            blurred,
             audit: audited,
             memory: Vec::new(),
             memory_peak: 0,

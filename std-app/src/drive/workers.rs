@@ -5,7 +5,9 @@ use super::{RenderError, regions};
 use halflight_core::Level;
 use halflight_core::bsdf::Features;
 use halflight_core::bvh::{Bvh, Join};
-use halflight_core::estimate::{BLOCKS, BlockNoise, ErrorEstimate, Lookalikes, TileError, TileLight};
+use halflight_core::estimate::{
+    BLOCKS, BiasEstimate, BlockNoise, ErrorEstimate, Lookalikes, TileBlur, TileError, TileLight,
+};
 use halflight_core::film::{Film, PIXELS_PER_TILE, Pixel};
 use halflight_core::memory::{Arena, Line, OutOfMemory};
 use halflight_core::photon::{PhotonMap, Photons};
@@ -61,6 +63,14 @@ impl Workers {
             let shrinkage = alike.shrinkage();
             tiles.map(|tile| TileError::of(tile, mean, &shrinkage)).collect()
         }))
+    }
+
+    /// What photons blur of `film`; `None` where there are none.
+    pub(super) fn blur(&self, film: &Film) -> Option<BiasEstimate> {
+        let mean = self.mean(film)?;
+        let tiles = film.pixels().par_chunks(PIXELS_PER_TILE);
+        let tiles: Vec<_> = self.pool.install(|| tiles.map(|tile| TileBlur::of(tile, mean)).collect());
+        BiasEstimate::of_blur(tiles.into_iter())
     }
 
     /// Where the noise of `film` is; `None` for a black picture.

@@ -3,7 +3,8 @@
 use super::{Maker, Race, Run};
 use crate::compare::Comparison;
 use crate::drive::{
-    Against, Audited, CausticUse, Deviation, Ending, ErrorEstimate, MapUse, Place, Region, Round, Shard,
+    Against, Audited, Blurred, CausticUse, Deviation, Ending, ErrorEstimate, MapUse, Place, Region,
+    RenderResult, Round, Shard,
 };
 use halflight_core::film::Dropped;
 use serde_json::{Map, Value, json};
@@ -156,15 +157,16 @@ fn made(maker: &Maker) -> Value {
 
 /// Against the reference where there is one, else as estimated; then `estimate` has the estimate too.
 fn error(run: &Run) -> Value {
-    let (estimate, audit) = (run.result.error, run.result.audit.as_ref());
+    let RenderResult { error: estimate, blurred, audit, .. } = run.result;
+    let (blurred, audit) = (*blurred, audit.as_ref());
     let mut error = match run.comparison {
-        None => error_object(estimate, audit),
+        None => error_object(*estimate, blurred, audit),
         Some(comparison) => {
             let mut error = comparison_object(comparison);
             error["interval"] = Value::Null;
             error["against"] = "reference".into();
-            error["estimate"] = estimate_object(estimate, "estimate");
-            with_audit(error, audit)
+            error["estimate"] = estimate_object(*estimate, "estimate");
+            with_bias(error, blurred, audit)
         }
     };
     if audit.is_some() {
@@ -173,13 +175,21 @@ fn error(run: &Run) -> Value {
     error
 }
 
-/// The object of an estimate, with what an audit has found.
-pub fn error_object(error: Option<ErrorEstimate>, audit: Option<&Audited>) -> Value {
-    with_audit(estimate_object(error, "estimate"), audit)
+/// The object of an estimate, with what photons blur, or an audit has found.
+pub fn error_object(
+    error: Option<ErrorEstimate>,
+    blurred: Option<Blurred>,
+    audit: Option<&Audited>,
+) -> Value {
+    with_bias(estimate_object(error, "estimate"), blurred, audit)
 }
 
-/// An error, with what an audit has found.
-fn with_audit(mut object: Value, audit: Option<&Audited>) -> Value {
+/// An error, with what photons blur, or an audit has found.
+fn with_bias(mut object: Value, blurred: Option<Blurred>, audit: Option<&Audited>) -> Value {
+    if let Some(Blurred { noise, blur, .. }) = blurred {
+        object["noise"] = estimate_object(Some(noise), "estimate");
+        object["blur"] = json!({ "relmse": blur.relmse, "interval": [blur.lower, blur.upper] });
+    }
     if let Some(audit) = audit {
         object["noise"] = estimate_object(Some(audit.noise), "estimate");
         object["bias"] = bias(audit);

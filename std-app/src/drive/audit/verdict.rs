@@ -113,24 +113,10 @@ pub(super) fn verdict(
         seconds: 0.0,
         noise,
         bias,
-        total: total(noise, bias),
+        total: noise.with_bias(bias),
         whole: Deviation::of(findings.iter().map(|(_, finding)| finding.deviation)),
         regions: (0..count).map(region).collect(),
     })
-}
-
-/// Noise and bias add up, and so do the squares of how unsure they are. A squared bias b counts as b − σ² / b, with
-/// σ half of what its interval reaches, and not at all below σ: one audited pixel with a firefly is enough for a b of
-/// many times the error, and for a σ larger than that. The sum is no less than what is certain of both.
-fn total(noise: ErrorEstimate, bias: BiasEstimate) -> ErrorEstimate {
-    let reach = bias.detectable;
-    let squared = if bias.relmse > 0.0 { bias.relmse - 0.25 * reach * reach / bias.relmse } else { 0.0 };
-    let squared = squared.max(0.0);
-    let relmse = noise.relmse + squared;
-    let below = (noise.relmse - noise.lower).hypot((squared - bias.relmse + reach).max(0.0));
-    let above = (noise.upper - noise.relmse).hypot(bias.upper - squared);
-    let least = noise.lower + bias.lower;
-    ErrorEstimate { relmse, lower: (relmse - below).max(least), upper: relmse + above }
 }
 
 #[cfg(test)]
@@ -141,13 +127,13 @@ mod tests {
     fn noise_and_bias_add_up() {
         let noise = ErrorEstimate { relmse: 0.01, lower: 0.008, upper: 0.013 };
         let bias = BiasEstimate { relmse: 0.02, lower: 0.016, upper: 0.024, detectable: 0.004 };
-        let sum = total(noise, bias);
+        let sum = noise.with_bias(bias);
         // 0.03, less the square of 0.002 over 0.02; the distance to the ends of both.
         assert!((sum.relmse - 0.0298).abs() < 1e-12, "{sum:?}");
         assert!((sum.lower - (0.0298 - 0.002f64.hypot(0.0038))).abs() < 1e-12, "{sum:?}");
         assert!((sum.upper - (0.0298 + 0.003f64.hypot(0.0042))).abs() < 1e-12, "{sum:?}");
         let none = BiasEstimate { relmse: -0.001, lower: 0.0, upper: 0.002, detectable: 0.003 };
-        let sum = total(noise, none);
+        let sum = noise.with_bias(none);
         assert_eq!((sum.relmse, sum.lower), (0.01, 0.008));
         assert!(sum.upper > 0.0135 && sum.upper < 0.014);
     }
@@ -159,7 +145,7 @@ mod tests {
         let others = (0..255).map(|i| finding(if i % 2 == 0 { 0.01 } else { -0.01 }));
         let bias = BiasEstimate::of(others.chain([finding(200.0)])).unwrap();
         assert!(bias.relmse > 0.7, "{bias:?}");
-        let sum = total(noise, bias);
+        let sum = noise.with_bias(bias);
         assert_eq!((sum.relmse, sum.lower), (0.01, 0.008));
         assert!(sum.upper > 2.0, "{sum:?}");
     }

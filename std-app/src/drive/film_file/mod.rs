@@ -13,7 +13,7 @@ use super::sealed::{self, Kind};
 use halflight_core::film::{GROUPS, PIXELS_PER_TILE, Pixel, Tile};
 use std::path::Path;
 
-const KIND: Kind = Kind { magic: *b"HLFILM", version: 4, name: "film" };
+const KIND: Kind = Kind { magic: *b"HLFILM", version: 5, name: "film" };
 
 /// Writes `canvas` to `path`, whole or not at all.
 pub(super) fn write(path: &Path, header: &Header, canvas: &Canvas) -> Result<(), FileError> {

@@ -28,7 +28,7 @@ use halflight_core::transport::{Discs, GLIMPSES, Glimpse, Merging, PathTracer, p
 use std::time::Instant;
 
 /// Radius of the discs of the first sample, in pixels.
-const FIRST_RADIUS: f64 = 1.5;
+const FIRST_RADIUS: f64 = 0.8;
 
 /// Light paths of a map for each pixel of the picture and each sample that the map serves, but no fewer and no more
 /// than these.

@@ -8,7 +8,6 @@
 
 use super::photon_view::PhotonView;
 use super::photons::{Laboratory, PhotonUse, Shelf, scratch};
-use super::sppm::{FIRST_RADIUS, shrunk};
 use super::{Method, Renderer, Stage};
 use crate::drive::RenderError;
 use crate::drive::audit::Audit;
@@ -49,8 +48,7 @@ impl<F: Features> Renderer for TwoPasses<'_, F> {
             let group = sample / GROUP;
             let Some(even) = laboratory.build::<F>(even, 2 * group, crew, scratch)? else { return Ok(()) };
             let Some(odd) = laboratory.build::<F>(odd, 2 * group + 1, crew, scratch)? else { return Ok(()) };
-            let pixels = (FIRST_RADIUS * shrunk(group).sqrt()) as f32;
-            let maps = [laboratory.light(&even, pixels), laboratory.light(&odd, pixels)];
+            let maps = [laboratory.light(&even, group), laboratory.light(&odd, group)];
             let tracer = tracer.with_maps(&maps);
             crew.tiles((group + 1) * GROUP, scratch, &|task, samples, arena, pixels| {
                 tracer.run(task, samples, WAVE, arena, pixels)

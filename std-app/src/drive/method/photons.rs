@@ -3,6 +3,7 @@
 
 use super::Stage;
 use super::photon_view::{self, PhotonView};
+use super::sppm::progressive;
 use crate::drive::RenderError;
 use crate::drive::crew::{Crew, Task};
 use crate::drive::memory::Memory;
@@ -15,7 +16,7 @@ use halflight_core::transport::maps::{
     GatherLight, IRRADIANCES, Irradiances, PhotonMaps, STRIDE, may_have_caustics,
 };
 use halflight_core::transport::shoot::{Keep, PATHS, ROOM, ShootSettings, Shooter};
-use halflight_core::transport::{Discs, PathTracer, PhotonLight};
+use halflight_core::transport::{Discs, PathTracer};
 use std::time::Instant;
 
 /// How photons are used.
@@ -281,12 +282,11 @@ impl<'a> Laboratory<'a> {
         FARTHEST * self.stage.bvh.bounds().diagonal()
     }
 
-    /// What paths see of the maps; caustics in discs of `pixels`.
-    pub(super) fn light<'m>(&self, built: &'m Built<'m>, pixels: f32) -> PhotonMaps<'m> {
+    /// What paths see of the maps; caustics in discs as they are after so many maps were `made`.
+    pub(super) fn light<'m>(&self, built: &'m Built<'m>, made: u32) -> PhotonMaps<'m> {
         let falloff = self.stage.settings.photons.falloff;
-        let discs = self.discs.of_pixels(pixels);
         let global = self.gathered(built);
-        let light = |map| PhotonLight::new(map, discs).with_falloff(falloff).of_caustics();
+        let light = |map| progressive(map, self.discs, made).with_falloff(falloff).of_caustics();
         PhotonMaps { caustic: built.caustic.as_ref().map(light), global }
     }
 

@@ -18,13 +18,16 @@ use crate::drive::run::path_settings;
 use halflight_core::bsdf::Features;
 use halflight_core::light::Emission;
 use halflight_core::memory::{Arena, Line};
-use halflight_core::photon::Photons;
+use halflight_core::photon::{PhotonMap, Photons};
 use halflight_core::transport::shoot::{Keep, PATHS, ROOM, ShootSettings, Shooter};
 use halflight_core::transport::{Discs, PathTracer, PhotonLight, path::WAVE};
 use std::time::Instant;
 
 /// Radius of the discs of the first sample, in pixels.
-pub(super) const FIRST_RADIUS: f64 = 3.0;
+const FIRST_RADIUS: f64 = 3.0;
+
+/// Photons that a disc of the first sample needs, if they lie evenly: where they crowd, it is smaller.
+const ENOUGH: f64 = 12.0;
 
 /// How fast radii shrink, a: with 2/3 the variance and the squared bias fall alike, as n^(-2/3).
 const ALPHA: f64 = 2.0 / 3.0;
@@ -114,8 +117,7 @@ impl<F: Features> Renderer for ProgressivePhotons<'_, F> {
                 used.seconds += start.elapsed().as_secs_f64();
             }
             let Some(map) = photons.map()? else { return Ok(()) };
-            let pixels = FIRST_RADIUS * shrunk(sample / 2).sqrt();
-            let light = PhotonLight::new(&map, discs.of_pixels(pixels as f32));
+            let light = progressive(&map, *discs, sample / 2);
             let tracer = tracer.with_photons(light.with_falloff(settings.photons.falloff));
             crew.tiles(sample + 1, scratch, &|task, samples, arena, pixels| {
                 tracer.run(task, samples, WAVE, arena, pixels)
@@ -132,6 +134,13 @@ impl<F: Features> Renderer for ProgressivePhotons<'_, F> {
     fn photons(&self) -> Option<PhotonUse> {
         Some(self.used)
     }
+}
+
+/// The light of `map` from discs of one pixel, made as large as they are after `samples`.
+pub(super) fn progressive<'a>(map: &'a PhotonMap<'a>, discs: Discs, samples: u32) -> PhotonLight<'a> {
+    let shrunk = shrunk(samples);
+    let pixels = FIRST_RADIUS * shrunk.sqrt();
+    PhotonLight::new(map, discs.of_pixels(pixels as f32)).with_enough((ENOUGH * shrunk) as f32)
 }
 
 /// What is left of the squared radius after `samples`.

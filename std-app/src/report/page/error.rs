@@ -1,7 +1,7 @@
 //! The error of a render in words, as a curve and round by round.
 
 use super::chart::{Chart, Series};
-use crate::drive::{ErrorEstimate, Round};
+use crate::drive::{ErrorEstimate, RenderResult, Round};
 use crate::report::Run;
 use crate::report::fit::{Fit, Point};
 use crate::report::words::{grouped, number, readable_seconds};
@@ -37,7 +37,11 @@ pub(super) fn lead(run: &Run) -> String {
                  Estimated from its own noise{} it would be {estimate}.",
                 number(relmse, 3),
                 typical(relmse),
-                if run.result.audit.is_some() { " and an audit of its bias" } else { "" },
+                match run.result {
+                    RenderResult { audit: Some(_), .. } => " and an audit of its bias",
+                    RenderResult { blurred: Some(_), .. } => " and what its photons blur",
+                    _ => "",
+                },
             )
         }
         (None, Some(error)) if error.upper > VAGUE * error.lower => format!(
@@ -47,11 +51,14 @@ pub(super) fn lead(run: &Run) -> String {
             number(error.relmse, 2)
         ),
         (None, Some(error)) => format!(
-            "This picture has a relMSE of about {}, as its own noise {}{}.{}",
+            "This picture has a relMSE of about {}, as its own noise {}{}.",
             interval(error),
-            if run.result.audit.is_some() { "and an audit of its bias tell" } else { "tells" },
+            match run.result {
+                RenderResult { audit: Some(_), .. } => "and an audit of its bias tell",
+                RenderResult { blurred: Some(_), .. } => "and what its photons blur tell",
+                _ => "tells",
+            },
             typical(error.relmse),
-            if run.result.caustics.used { " What photons of caustics blur is not in it." } else { "" },
         ),
         (None, None) => {
             "The error of this picture is not known: it takes four samples of each pixel, and some light."

@@ -1,0 +1,149 @@
+//! What the photons of a picture blur, as its samples tell: each gathers photons from a disc, and knows what it would be
+//! with a finer one (docs/decisions/0043).
+//!
+//! Of the halves of a pixel, a and b tell by how much they are too bright, each with noise of its own. So a b has the squared
+//! blur for its mean. Over R² + 0.01 m², with I − a for R, and with I − b for R: beside a focus a pixel is darker than it
+//! looks, by many times; and the other factor does not know what is in the denominator. R is half of I at least, for where
+//! finer discs are noisy one of them says that nothing is there.
+
+use super::audit::BiasEstimate;
+use super::metric::DARK;
+use crate::film::{PIXELS_PER_TILE, Pixel};
+
+/// Pixels of a block, in which photons are shared: 4 × 4 along the Z-curve.
+const BLOCK: usize = 16;
+
+/// What is not known of blur, as a share of it: finer discs blur as well, at an edge more than is reckoned.
+const UNSURE: f64 = 0.25;
+
+/// Sums over the pixels of one tile, of squared blur in units of relMSE.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct TileBlur {
+    pixels: u64,
+    squared: f64,
+    /// Squares and fourth powers of the sums over blocks of (a² − b²) / 2, which varies as a b does and has the mean 0.
+    squares: f64,
+    fourths: f64,
+}
+
+impl TileBlur {
+    /// Of the pixels of one tile of a picture of mean `mean` > 0.
+    pub fn of(pixels: &[Pixel], mean: f64) -> Self {
+        let mut sums = Self::default();
+        let mut blocks = [0.0; PIXELS_PER_TILE / BLOCK];
+        for (i, pixel) in pixels.iter().enumerate().take(PIXELS_PER_TILE) {
+            if pixel.even.count() == 0 || pixel.odd.count() == 0 {
+                continue;
+            }
+            sums.pixels += 1;
+            let [a, b] = [pixel.even.blur(), pixel.odd.blur()].map(|blur| f64::from(blur) / mean);
+            if a == 0.0 && b == 0.0 {
+                continue;
+            }
+            let light = f64::from(pixel.mean().element_sum()) / (3.0 * mean);
+            let over_square = |blur: f64| {
+                let r = (light - blur).max(0.5 * light);
+                1.0 / (r * r + DARK)
+            };
+            let weight = 0.5 * (over_square(a) + over_square(b));
+            sums.squared += a * b * weight;
+            blocks[i / BLOCK] += 0.5 * (a * a - b * b) * weight;
+        }
+        for block in blocks {
+            sums.squares += block * block;
+            sums.fourths += block * block * block * block;
+        }
+        sums
+    }
+}
+
+impl core::ops::AddAssign for TileBlur {
+    fn add_assign(&mut self, other: Self) {
+        self.pixels += other.pixels;
+        self.squared += other.squared;
+        self.squares += other.squares;
+        self.fourths += other.fourths;
+    }
+}
+
+impl BiasEstimate {
+    /// From all tiles of a picture; `None` where no photons blur.
+    pub fn of_blur(tiles: impl Iterator<Item = TileBlur>) -> Option<Self> {
+        let mut sum = TileBlur::default();
+        tiles.for_each(|tile| sum += tile);
+        let TileBlur { pixels, squared, squares, fourths } = sum;
+        if pixels == 0 || squares == 0.0 {
+            return None;
+        }
+        let count = pixels as f64;
+        let freedom = squares * squares / fourths;
+        Some(Self::known(squared / count, (squares / (count * count), freedom), UNSURE))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Rgb;
+    use crate::film::Dropped;
+    use crate::sampling::Random;
+    use std::vec::Vec;
+
+    /// Tiles of light 1 that is 0.2 too bright in a quarter of the pixels, as samples say with such noise.
+    fn picture(blur: f32, noise: f32, seed: u32) -> Vec<Vec<Pixel>> {
+        let pixel = |tile: u32, i: u32| {
+            let random = Random::new(seed, tile << 8 | i);
+            let mut pixel = Pixel::default();
+            for sample in 0..8 {
+                let blur = if i.is_multiple_of(4) { blur } else { 0.0 };
+                let off = blur + noise * (2.0 * random.single(sample) - 1.0);
+                pixel.add(sample, Rgb::splat(1.0 + blur), &mut Dropped::default());
+                pixel.add_blur(sample, Rgb::splat(off));
+            }
+            pixel
+        };
+        (0..4).map(|tile| (0..PIXELS_PER_TILE as u32).map(|i| pixel(tile, i)).collect()).collect()
+    }
+
+    fn estimate(blur: f32, noise: f32, seed: u32) -> Option<BiasEstimate> {
+        BiasEstimate::of_blur(picture(blur, noise, seed).iter().map(|tile| TileBlur::of(tile, 1.0)))
+    }
+
+    #[test]
+    fn blur_is_told_from_noise() {
+        let truth = 0.25 * 0.2 * 0.2 / 1.01;
+        let (mut held, mut found, runs) = (0, 0, 100);
+        for seed in 0..runs {
+            let with = estimate(0.2, 0.3, seed).unwrap();
+            held += u32::from((with.lower..=with.upper).contains(&truth));
+            assert!(with.is_found(), "{with:?}");
+            found += u32::from(estimate(0.0, 0.3, seed).unwrap().is_found());
+        }
+        // 95 % of 100, and more, as a quarter is not known; 2.5 % of 100.
+        assert!(held >= 90 && found <= 8, "{held} {found}");
+    }
+
+    #[test]
+    fn dark_pixels_beside_a_focus_count_for_what_they_are() {
+        // Light 0.5 that looks like 1: half of it is blur.
+        let mut pixel = Pixel::default();
+        for sample in 0..4 {
+            pixel.add(sample, Rgb::ONE, &mut Dropped::default());
+            pixel.add_blur(sample, Rgb::splat(0.5));
+        }
+        let sums = TileBlur::of(&[pixel; PIXELS_PER_TILE], 1.0);
+        let expected = 0.25 / (0.25 + 0.01) * PIXELS_PER_TILE as f64;
+        assert!((sums.squared / expected - 1.0).abs() < 1e-6, "{sums:?} {expected}");
+    }
+
+    #[test]
+    fn pictures_without_photons_have_none() {
+        assert_eq!(BiasEstimate::of_blur([TileBlur::of(&[Pixel::default(); 256], 1.0)].into_iter()), None);
+        let mut pixel = Pixel::default();
+        for sample in 0..4 {
+            pixel.add(sample, Rgb::ONE, &mut Dropped::default());
+            pixel.add_blur(sample, Rgb::splat(f32::NAN));
+        }
+        assert_eq!(BiasEstimate::of_blur([TileBlur::of(&[pixel; 256], 1.0)].into_iter()), None);
+    }
+}
