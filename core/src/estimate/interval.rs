@@ -14,7 +14,7 @@
 //!    with heavy tails); Student's t says what it is to know that from few pixels. How errors hang together between
 //!    pixels that share paths is seen in the differences of the halves. Upwards less is in doubt where single samples have
 //!    the noise: the error of a pixel that flashed is hardly more than its variance. Nor is the lower end above what the error
-//!    would be if all flashes belonged there.
+//!    may be if all flashes belonged there.
 //!
 //! The price: about as much time as a tenth of a sample for each pixel.
 
@@ -84,10 +84,14 @@ impl ErrorEstimate {
         }
         let delta = fmax(log(sum.crossed / sum.parts), 0.0);
         let relmse = sum.halves / sum.values as f64 * exp(delta / (1.0 + DOUBTED * delta));
-        let below = 4.0 / 3.0 * sum.squares;
+        // What a square of an estimate V tells of V² with normal noise.
+        const OF_SQUARE: f64 = 4.0 / 3.0;
+        let below = OF_SQUARE * sum.squares;
         let doubt = hypot(delta, fmax(log(sum.halves / sum.certain), 0.0));
         let end = |square: f64| exp(hypot(reach * sqrt(square) / sum.halves, doubt));
-        let lower = fmin(relmse / end(below), sum.least / sum.values as f64);
+        let least = sum.least / sum.values as f64;
+        let least = least / exp(reach * sqrt(OF_SQUARE * sum.least_squares) / sum.least);
+        let lower = fmin(relmse / end(below), least);
         Some(Self { relmse, lower, upper: relmse * end(fmin(above, below)) })
             .filter(|estimate| estimate.upper.is_finite())
     }

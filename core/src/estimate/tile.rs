@@ -49,6 +49,8 @@ pub struct TileError {
     pub(super) certain: f64,
     /// The same, as if pixels were what they look like: a flash hides itself.
     pub(super) least: f64,
+    /// Squares of that in pixels.
+    pub(super) least_squares: f64,
     /// Variance of the pictures of both pairs over the squares of both R.
     pub(super) parts: f64,
     /// The same, each over the square of the other R: numerator and denominator are independent. Too large where a pair
@@ -122,7 +124,9 @@ impl TileError {
             sums.fourths += squared * squared;
             let darker = total(noise * (by[0].max(by[1]) - by_both));
             let (seen, around) = (0.25 * (a1 + a2 + b1 + b2), seen.around[place]);
-            sums.least += total(noise / (seen * seen + DARK as f32));
+            let least = total(noise / (seen * seen + DARK as f32));
+            sums.least += least;
+            sums.least_squares += least * least;
             sums.above += above([variance, darker], likely, seen, around, by_both);
             sums.parts += total((first + second) * by_both * 0.5);
             sums.crossed += total(0.5 * (first * by[1] + second * by[0]));
@@ -148,6 +152,7 @@ impl core::ops::AddAssign for TileError {
         self.halves += other.halves;
         self.certain += other.certain;
         self.least += other.least;
+        self.least_squares += other.least_squares;
         self.parts += other.parts;
         self.crossed += other.crossed;
         self.squares += other.squares;
