@@ -129,7 +129,8 @@ impl ErrorEstimate {
         let squared = if bias.relmse > 0.0 { bias.relmse - 0.25 * reach * reach / bias.relmse } else { 0.0 };
         let squared = squared.max(0.0);
         let relmse = self.relmse + squared;
-        let below = hypot(self.relmse - self.lower, (squared - bias.relmse + reach).max(0.0));
+        let under = if bias.lower > 0.0 { bias.relmse - bias.lower } else { reach };
+        let below = hypot(self.relmse - self.lower, (squared - bias.relmse + under).max(0.0));
         let above = hypot(self.upper - self.relmse, bias.upper - squared);
         let least = self.lower + bias.lower;
         Self { relmse, lower: (relmse - below).max(least), upper: relmse + above }

@@ -8,6 +8,7 @@
 
 use super::audit::BiasEstimate;
 use super::metric::DARK;
+use crate::Rgb;
 use crate::film::{PIXELS_PER_TILE, Pixel};
 
 /// Pixels of a block, in which photons are shared: 4 × 4 along the Z-curve.
@@ -37,13 +38,17 @@ impl TileBlur {
             }
             sums.pixels += 1;
             let [a, b] = [pixel.even.blur(), pixel.odd.blur()].map(|blur| f64::from(blur) / mean);
-            if a == 0.0 && b == 0.0 {
+            if a == 0.0 && b == 0.0 || pixel.mean() == Rgb::ZERO {
                 continue;
             }
-            let light = f64::from(pixel.mean().element_sum()) / (3.0 * mean);
+            let colour = pixel.mean().to_array().map(f64::from);
+            let sum: f64 = colour.iter().sum();
+            let light = sum / (3.0 * mean);
+            // Channels are blurred as they shine.
             let over_square = |blur: f64| {
                 let r = (light - blur).max(0.5 * light);
-                1.0 / (r * r + DARK)
+                let channel = |shine: f64| shine * shine / (shine * shine * r * r + DARK) / 3.0;
+                colour.iter().map(|channel_of| channel(3.0 * channel_of / sum)).sum::<f64>()
             };
             let weight = 0.5 * (over_square(a) + over_square(b));
             sums.squared += a * b * weight;
@@ -84,7 +89,7 @@ impl BiasEstimate {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Rgb;
+    use crate::estimate::ErrorEstimate;
     use crate::film::Dropped;
     use crate::sampling::Random;
     use std::vec::Vec;
@@ -134,6 +139,26 @@ mod tests {
         let sums = TileBlur::of(&[pixel; PIXELS_PER_TILE], 1.0);
         let expected = 0.25 / (0.25 + 0.01) * PIXELS_PER_TILE as f64;
         assert!((sums.squared / expected - 1.0).abs() < 1e-6, "{sums:?} {expected}");
+    }
+
+    #[test]
+    fn coloured_light_is_blurred_in_its_channel() {
+        let mut pixel = Pixel::default();
+        for sample in 0..4 {
+            pixel.add(sample, Rgb::new(3.0, 0.0, 0.0), &mut Dropped::default());
+            pixel.add_blur(sample, Rgb::new(0.3, 0.0, 0.0));
+        }
+        let sums = TileBlur::of(&[pixel; PIXELS_PER_TILE], 1.0);
+        let expected = 0.3 * 0.3 / (2.7 * 2.7 + 0.01) / 3.0 * PIXELS_PER_TILE as f64;
+        assert!((sums.squared / expected - 1.0).abs() < 1e-5, "{sums:?} {expected}");
+    }
+
+    #[test]
+    fn what_is_not_known_of_blur_reaches_both_ways() {
+        let noise = ErrorEstimate { relmse: 1e-4, lower: 0.9e-4, upper: 1.1e-4 };
+        let blur = BiasEstimate::known(5e-3, (1e-10, 100.0), UNSURE);
+        let sum = noise.with_bias(blur);
+        assert!(sum.lower < 1e-4 + 0.8 * 5e-3 && sum.upper > 1e-4 + 1.2 * 5e-3, "{sum:?}");
     }
 
     #[test]

@@ -76,16 +76,18 @@ pub struct Pixel {
 
 impl Pixel {
     /// Adds the radiance that sample number `index` saw. What is not a non-negative number below 2^96, the
-    /// most that sums can hold, is counted in `dropped` and does not reach the picture.
+    /// most that sums can hold, is counted in `dropped` and does not reach the picture. Whether it did.
     #[inline]
-    pub fn add(&mut self, index: u32, radiance: Rgb, dropped: &mut Dropped) {
+    pub fn add(&mut self, index: u32, radiance: Rgb, dropped: &mut Dropped) -> bool {
         // False for NaN as well.
-        if radiance.cmpge(Rgb::ZERO).all() && radiance.cmplt(Rgb::splat(BRIGHTEST)).all() {
+        let is_light = radiance.cmpge(Rgb::ZERO).all() && radiance.cmplt(Rgb::splat(BRIGHTEST)).all();
+        if is_light {
             let half = if index & 1 == 0 { &mut self.even } else { &mut self.odd };
             half.add((index >> 1) as usize, radiance);
         } else {
             dropped.record(radiance);
         }
+        is_light
     }
 
     /// Tells by how much sample number `index`, which was added, is too bright because photons blur. What is no number is

@@ -96,19 +96,20 @@ pub struct Density {
 }
 
 impl Density {
-    /// The radiance by the finest disc that has `enough` photons, if they lie evenly; and that by a disc of half the radius,
-    /// where there is one.
+    /// The radiance by the finest disc that has `enough` photons, if they lie evenly; and that by a disc of half the radius;
+    /// for the last of them, what it would be if blur went on falling with the square of the radius.
     #[inline]
     pub fn of_enough(&self, enough: f32) -> [Rgb; 2] {
         let (mut chosen, mut photons) = (self.radiance, self.photons as f32);
+        let mut wider = chosen;
         for finer in self.finer {
             photons *= 0.25;
             if photons < enough {
                 return [chosen, finer];
             }
-            chosen = finer;
+            (wider, chosen) = (chosen, finer);
         }
-        [chosen; 2]
+        [chosen, chosen - (wider - chosen) * 0.25]
     }
 }
 

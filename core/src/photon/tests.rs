@@ -282,7 +282,7 @@ fn the_finest_disc_is_chosen_that_has_enough_photons() {
         (32, [half, quarter]),
         (127, [half, quarter]),
         (128, [quarter, eighth]),
-        (512, [eighth; 2]),
+        (512, [eighth, Rgb::splat(4.25)]),
     ] {
         let density = Density { radiance: whole, finer: [half, quarter, eighth], photons };
         assert_eq!(density.of_enough(8.0), expected, "{photons}");

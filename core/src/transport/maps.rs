@@ -296,6 +296,7 @@ impl PhotonMaps<'_> {
         }
         match &self.caustic {
             Some(caustic) => {
+                let travelled = if came.gathers() { 0.0 } else { travelled };
                 let gathered = caustic.reflected::<F>(tracer, point, bsdf, (wo, travelled), turns);
                 Said { gathered: gathered.unwrap_or_default(), next: Share::NO_CAUSTIC, ..all }
             }

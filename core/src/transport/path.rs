@@ -16,7 +16,7 @@
 //! 8. Where photons of caustics lie, paths and photons share the light that both find (`merge.rs`).
 //! 9. Where all else is quiet, pixels that see an edge have several paths for each sample (`edges.rs`).
 //!
-//! The price: about 300 bytes for each path of a wave. What a pixel sees depends on (seed, sample) and the pixels of
+//! The price: about 400 bytes for each path of a wave. What a pixel sees depends on (seed, sample) and the pixels of
 //! its group only, no wave cuts a group that shares, and samples are summed in their order: the picture has the same bits for
 //! any size of wave and any distribution of tasks.
 
@@ -670,8 +670,9 @@ impl Path {
     }
 
     #[inline]
-    fn gather(&mut self, throughput: Rgb, exchange: &Exchange, Gathered { light, blur }: Gathered) {
-        self.add(throughput * light);
+    fn gather(&mut self, throughput: Rgb, exchange: &mut Exchange, Gathered { light, blur }: Gathered) {
+        // It is for this path alone: others have asked photons where they are.
+        exchange.keep(self, throughput * light);
         self.blur = (Rgb::from(self.blur) + exchange.worth(throughput) * blur).to_array();
     }
 

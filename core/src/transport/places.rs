@@ -128,8 +128,9 @@ impl<F: Features> PathTracer<'_, F> {
                 let seen = exchange.seen(path) + lamps;
                 let Some(pixel) = out.get_mut(path.place as usize) else { continue };
                 if !places.edges.contains(path.place as usize) {
-                    pixel.add(path.sample, seen, &mut counters.dropped);
-                    pixel.add_blur(path.sample, Rgb::from(path.blur));
+                    if pixel.add(path.sample, seen, &mut counters.dropped) {
+                        pixel.add_blur(path.sample, Rgb::from(path.blur));
+                    }
                     continue;
                 }
                 // Those of a sample are together.
@@ -138,8 +139,10 @@ impl<F: Features> PathTracer<'_, F> {
                 let part = path.sample >> 1;
                 if part % PER_EDGE == PER_EDGE - 1 {
                     let sample = ((part / PER_EDGE) << 1) | (path.sample & 1);
-                    pixel.add(sample, core::mem::take(&mut light), &mut counters.dropped);
-                    pixel.add_blur(sample, core::mem::take(&mut blur));
+                    let blur = core::mem::take(&mut blur);
+                    if pixel.add(sample, core::mem::take(&mut light), &mut counters.dropped) {
+                        pixel.add_blur(sample, blur);
+                    }
                 }
             }
         }

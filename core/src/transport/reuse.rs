@@ -243,6 +243,16 @@ impl Exchange {
         Rgb::from(self.radiance) + worth * (Rgb::from(path.radiance) + Rgb::from(self.coated.base))
     }
 
+    /// Adds `light` that belongs to `path` alone, wherever it is met.
+    #[inline]
+    pub(super) fn keep(&mut self, path: &mut Path, light: Rgb) {
+        if self.stage >= OFFERING {
+            self.take(1.0, light);
+        } else {
+            path.add(light);
+        }
+    }
+
     #[inline]
     fn take(&mut self, share: f32, light: Rgb) {
         self.radiance = (Rgb::from(self.radiance) + share * (Rgb::from(self.throughput) * light)).to_array();

@@ -28,7 +28,7 @@ use halflight_core::transport::{Discs, GLIMPSES, Glimpse, Merging, PathTracer, p
 use std::time::Instant;
 
 /// Radius of the discs of the first sample, in pixels.
-const FIRST_RADIUS: f64 = 0.8;
+const FIRST_RADIUS: f64 = 1.0;
 
 /// Light paths of a map for each pixel of the picture and each sample that the map serves, but no fewer and no more
 /// than these.
@@ -39,7 +39,7 @@ const MOST_PATHS: usize = 4096 * PATHS;
 /// Samples that share their photons, even ones and odd ones apart, at most: less would not fill the waves of a tile.
 const MOST_SAMPLES: u32 = 8;
 
-/// Light paths of the first look, and of one by what that has learned.
+/// Light paths of each look.
 const LOOK: usize = 32 * PATHS;
 
 /// The share of the picture's light from which on photons may have all of it, where the method is left to us: paths find
@@ -98,13 +98,15 @@ pub(super) fn with<F: Features, T>(
             let found = Glimpse::find::<F>(seen, frame, settings.seed, &mut glimpses);
             let seen = (discs, &glimpses[..found]);
             let aimed = worth.guide(&plain, &mut arena)?;
-            let finds = look::<F>(stage, &mut paths, &aimed, (seen, 0))?;
-            finds.iter().for_each(|find| worth.learn(find.cell, find.worth));
+            for find in look::<F>(stage, &mut paths, &aimed, (seen, 0))? {
+                worth.learn(find.cell, find.worth);
+            }
             let learned = worth.guide(&plain, &mut arena)?;
             let finds = look::<F>(stage, &mut paths, &learned, (seen, 1))?;
             finds.iter().for_each(|find| worth.learn(find.cell, find.worth));
             let pixels = f64::from(settings.width) * f64::from(settings.height);
             let looked = Looked::new(&finds, FIRST_RADIUS, pixels, f64::from(paths.mean(stage)?));
+            drop(finds);
             paths.caustics.share = Some(looked.share);
             if is_open && looked.share >= MOST_SHARE {
                 let by_chance = useful(&look::<F>(stage, &mut paths, &plain, (seen, 2))?);

@@ -64,7 +64,7 @@ fn truth(race: &Race) -> &'static str {
         "Errors are measured against the reference."
     } else {
         "There is no reference: errors are estimated, each with the interval that holds it with 95 % confidence. \
-         An estimate knows the noise that was seen, not the bias of a biased method."
+         An estimate knows the noise that was seen and what photons blur, but no other bias of a biased method."
     }
 }
 
