@@ -11,7 +11,7 @@ use super::spots::{Glint, LOOK};
 use super::wave::{Path, Share, Wave};
 use crate::bsdf::Features;
 use crate::bvh::Coherence;
-use crate::cache::irradiance::{CellFlux, Hemisphere, Record, SECTORS, metric, reach};
+use crate::cache::irradiance::{CellFlux, Hemisphere, Record, metric, reach};
 use crate::geometry::{Frame, Hit, MISS, Ray};
 use crate::memory::{Arena, Footprint, OutOfMemory};
 use crate::sampling::Sampler;
@@ -22,12 +22,6 @@ use glam::Vec3;
 
 /// Gatherings have numbers of pixels that no picture has.
 pub(super) const NO_PIXEL: u32 = 1 << 30;
-
-/// Rays along the surface for each sector of a record's fence.
-const RAYS_PER_SECTOR: usize = 2;
-
-/// By how much they rise: low enough for low walls, high enough for the surface's own roundness.
-const FENCE_SLOPE: f32 = 0.05;
 
 /// A diffuse point where the irradiance is wanted. Both normals are on the side of the viewer.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
@@ -227,7 +221,7 @@ impl<F: Features> PathTracer<'_, F> {
         let luminance = derivatives.luminance();
         record.note_noise(if luminance > 0.0 { variance / (luminance * luminance) } else { 0.0 });
         record.shining = strata.shining as f32 / (n * n) as f32;
-        self.fence(&mut record, place, counters);
+        self.fence(&mut record, place, &frame, &strata, counters);
         Ok(Some(record))
     }
 
@@ -270,26 +264,6 @@ impl<F: Features> PathTracer<'_, F> {
         if let Some(slot) = strata.normals.get_mut(stratum) {
             let [a, b, c] = self.scene.mesh.corners(hit.triangle);
             *slot = frame.to_local((b - a).cross(c - a).normalize_or_zero()).to_array();
-        }
-    }
-
-    /// Looks for walls around a record.
-    fn fence(&self, record: &mut Record, place: &Place, counters: &mut Counters) {
-        const COUNT: usize = SECTORS * RAYS_PER_SECTOR;
-        let sector = |i: usize| (i as f32 + 0.5) / RAYS_PER_SECTOR as f32;
-        let origin = place.position() + place.error * Vec3::from(place.geometric_normal);
-        let rays: [Ray; COUNT] = core::array::from_fn(|i| {
-            let along = record.towards(sector(i)).1.normalize_or_zero();
-            Ray::segment(origin, along + FENCE_SLOPE * place.normal(), record.reach)
-        });
-        let mut hits = [Hit::NONE; COUNT];
-        counters.rays += rays.len() as u64;
-        self.bvh.nearest_batch(self.level, &rays, Coherence::Incoherent, &mut hits);
-        for (i, hit) in hits.iter().enumerate() {
-            if hit.is_some() && hit.triangle != place.triangle {
-                let (along, _) = record.towards(sector(i));
-                record.fence_off(along, hit.t);
-            }
         }
     }
 }

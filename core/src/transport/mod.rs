@@ -11,6 +11,7 @@ pub mod caustics;
 mod density;
 mod edges;
 mod estimator;
+mod fences;
 mod flight;
 pub mod gather;
 mod glimpse;

@@ -276,6 +276,17 @@ impl Record {
         }
     }
 
+    /// A direction of the world along the two axes.
+    pub fn along_axes(&self, direction: Vec3) -> Vec2 {
+        self.local(direction).truncate()
+    }
+
+    /// The sector in the direction of `place` along a record's axes, as [`Record::towards`] takes it: the fraction says
+    /// where in it.
+    pub fn sector(place: Vec2) -> f32 {
+        sector(One, place.to_array())
+    }
+
     /// The direction of the middle of a sector, in the world; not of unit length.
     pub fn towards(&self, sector: f32) -> (Vec2, Vec3) {
         // The inverse of `sector`: a walk around the diamond |x| + |y| = 1.
@@ -389,7 +400,7 @@ mod tests {
         let mut record = record();
         for i in 0..SECTORS {
             let (place, world) = record.towards(i as f32 + 0.5);
-            assert_eq!(sector(One, place.to_array()) as usize, i);
+            assert!((Record::sector(place) - (i as f32 + 0.5)).abs() < 1e-5);
             assert!(place.extend(0.0).distance(world) < 1e-6);
         }
         record.fence_off(Vec2::new(0.0, 1.0), 0.5);
