@@ -9,8 +9,12 @@
 use core::sync::atomic::AtomicBool;
 use halflight::drive::{ErrorEstimate, Method, RenderResult, Round, Settings, Stop, render};
 use halflight::load::{self, LoadOptions};
+use halflight::save::Image;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+
+/// Samples of a reference over those of the one that is blurred three times as much.
+const FEWER: u32 = 27;
 
 /// Seeds of renders count from 0.
 const REFERENCE_SEED: u32 = u32::MAX;
@@ -87,13 +91,20 @@ fn calibrate(file: &Path, wanted: &Wanted) {
     let error = Some(wanted.error).filter(|error| *error > 0.0);
     let stop = Stop { error, spp: Some(wanted.spp), seconds: None };
     let settings = |seed| settings(wanted, seed, stop);
-    let first = run(settings(REFERENCE_SEED - 1));
+    let first = run(settings(REFERENCE_SEED - 4));
     // By path tracing: what is judged may be biased.
-    let most = Stop { spp: Some(first.spp.max(16) * wanted.times), ..Stop::default() };
-    let reference = Settings { stop: most, seed: REFERENCE_SEED, method: Some(Method::Path), ..settings(0) };
-    let reference = run(Settings { adaptive: Some(false), ..reference });
-    let noise = reference.error.map_or(0.0, |error| error.relmse);
-    let image = Arc::new(reference.image);
+    let most = (first.spp.max(16) * wanted.times).div_ceil(2);
+    let [one, other] = [0, 2].map(|i| {
+        let part = |spp, seed| {
+            let stop = Stop { spp: Some(spp), ..Stop::default() };
+            let reference =
+                Settings { stop, method: Some(Method::Path), adaptive: Some(false), ..settings(seed) };
+            run(Settings { audit: None, ..reference })
+        };
+        sharpened(part(most, REFERENCE_SEED - i), || part(most.div_ceil(FEWER), REFERENCE_SEED - i - 1).image)
+    });
+    let (image, noise) = mean(one, &other);
+    let image = Arc::new(image);
 
     let results: Vec<RenderResult> = (0..wanted.renders)
         .map(|seed| run(Settings { reference: Some(image.clone()), ..settings(seed) }))
@@ -133,12 +144,39 @@ fn calibrate(file: &Path, wanted: &Wanted) {
         quantile(&mut ratios, 0.97),
         quantile(&mut samples, 0.5),
         quantile(&mut seconds, 0.5),
-        reference.spp,
+        2 * most,
         size = wanted.size,
         wanted = wanted.error,
         renders = wanted.renders,
         most = wanted.spp,
     );
+}
+
+/// What photons blur falls with the third root of the samples: a picture of fewer samples is blurred three times as much,
+/// and half of the difference to it is taken off.
+fn sharpened(many: RenderResult, few: impl FnOnce() -> Image) -> Image {
+    let mut image = many.image;
+    if many.blurred.is_some() {
+        let few = few();
+        for (value, blurred) in image.pixels.as_flattened_mut().iter_mut().zip(few.pixels.as_flattened()) {
+            *value = 1.5 * *value - 0.5 * blurred;
+        }
+    }
+    image
+}
+
+/// The mean of two pictures that know nothing of each other, and its relMSE by their difference.
+fn mean(mut image: Image, other: &Image) -> (Image, f64) {
+    let mut squares = Vec::with_capacity(3 * image.pixels.len());
+    for (value, other) in image.pixels.as_flattened_mut().iter_mut().zip(other.pixels.as_flattened()) {
+        squares.push(0.25 * f64::from(*value - other).powi(2));
+        *value = 0.5 * (*value + other);
+    }
+    let values = || image.pixels.as_flattened().iter().map(|value| f64::from(*value));
+    let (count, dark) = (squares.len() as f64, 0.01 * (values().sum::<f64>() / squares.len() as f64).powi(2));
+    let noise =
+        squares.iter().zip(values()).map(|(squared, value)| squared / (value * value + dark)).sum::<f64>();
+    (image, noise / count)
 }
 
 fn settings(wanted: &Wanted, seed: u32, stop: Stop) -> Settings {
