@@ -1,6 +1,6 @@
 //! Does the interval hold the error, and does a render that stops by its error have it? Renders scenes with many
 //! seeds until they say that they have the error asked for; each round is compared with a reference of many times the
-//! samples, whose own noise is taken off. Prints the tables of docs/validation.md:
+//! samples, whose own noise is taken off, and what photons blur in it. Prints the tables of docs/validation.md:
 //!
 //! `cargo run --release -p halflight-tests --example calibration -- [--renders 40] [--size 64] [--error 0.001]
 //! [--spp 4096] [--times 100] [--method path] [--adaptive] [SCENE…]`, of our own scenes by name or of any scene file.

@@ -13,7 +13,7 @@
 //!    exactly. For a pixel of variance V the product has the variance 4 V², and the estimate squared the mean 3 V² (more
 //!    with heavy tails); Student's t says what it is to know that from few pixels. How errors hang together between
 //!    pixels that share paths is seen in the differences of the halves. Upwards less is in doubt where single samples have
-//!    the noise: the error of a pixel that flashed is hardly more than its variance. Nor is the lower end above what the error
+//!    the noise: the error of a pixel that flashed is hardly more than its variance; but not of three or fewer. Nor is the lower end above what the error
 //!    may be if all flashes belonged there.
 //!
 //! The price: about as much time as a tenth of a sample for each pixel.
@@ -42,6 +42,10 @@ const Z: f64 = 1.959_963_984_540_054;
 /// tails, and their squares are too large already.
 const FEWEST: f64 = 8.0;
 
+/// Where fewer pixels than these have nearly all of the noise an interval reaches as far up as down: so few flashes do not tell
+/// how often there are any, nor are pixels like them known.
+const FLASHES: f64 = 4.0;
+
 /// How soon δ is doubted: all of it counts where it is small and both bounds are right to first order, at most a tenth
 /// of the estimate where light is rare.
 const DOUBTED: f64 = 10.0;
@@ -53,9 +57,9 @@ impl ErrorEstimate {
         let mut sum = TileError::default();
         tiles.for_each(|tile| sum += tile);
         let shared = shared(&sum);
-        let freedom = fmax(freedom(sum.squares, sum.fourths) / shared, FEWEST);
-        let reach = student_95(freedom) * sqrt(shared);
-        Self::with_reach(&sum, reach, sum.above)
+        let pixels = freedom(sum.squares, sum.fourths);
+        let reach = student_95(fmax(pixels / shared, FEWEST)) * sqrt(shared);
+        Self::with_reach(&sum, reach, if pixels < FLASHES { f64::INFINITY } else { sum.above })
     }
 
     /// From the sums over regions, where a method shares between pixels far apart: regions count as independent. They
@@ -231,6 +235,8 @@ mod tests {
         let truth = (1e4f64 / 17.0).powi(2) / 1.01 / 1024.0;
         assert!(after.relmse > 10.0 * before.relmse, "{before:?} {after:?}");
         assert!(after.lower < truth && truth < after.upper, "{truth} {after:?}");
+        // One flash does not tell how often there are any: as far up as down.
+        assert!(after.upper > 10.0 * after.relmse, "{after:?}");
     }
 
     #[test]
