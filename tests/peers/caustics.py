@@ -1,14 +1,15 @@
 """Caustics: 1 / (relMSE x seconds of rendering) of our methods and of Mitsuba's, on scenes lit through mirrors and glass.
 
-    python3 tests/peers/caustics.py [--seconds 4] [--seeds 5] [--reference-seconds 240] [scene ...]
+    python3 tests/peers/caustics.py [scene ...] [--seconds 3 10 30] [--seeds 5] [--reference-seconds 240]
 
 Ours: `path` without and with photons of caustics, the latter with adaptive sampling as well, and `sppm`; Mitsuba's:
 `path` and `ptracer`, `llvm_ad_rgb`, with our materials; where `LUXCORE` names the python of a virtual environment with
 `pyluxcore` and `numpy`, LuxCore's `BIDIRVMCPU` and `PATHCPU` with its caustic cache, on scenes that it has the words for.
 Two threads, no limit of depth. Seconds are those of the processors, so that a busy machine tells the same.
-Each renders for about `--seconds`: by the samples that a first, short picture says can be had in that time. All are measured against one reference, the mean of long pictures of our `path`
-with photons by other seeds, whose remaining noise is subtracted; the mean of each over that of the reference is printed as well. Medians of the
-seeds.
+Each renders for about `--seconds`, or for each of several: by the samples that a first, short picture says can be had in that time.
+Ratios hang on it, for what no path finds is missing from `path` without photons however long it takes. All are measured against one
+reference, the mean of long pictures of our `path` with photons by other seeds, whose remaining noise is subtracted; the mean of each over
+that of the reference is printed as well. Medians of the seeds.
 """
 
 import argparse
@@ -153,6 +154,14 @@ def budgeted(render, seconds):
         spp *= 4
 
 
+def measured(render, spp, seeds, converged, noise):
+    """Medians of relMSE, seconds and efficiency of pictures by the first `seeds`, and the mean of these over that of the reference."""
+    runs = [render(spp, seed) for seed in range(1, seeds + 1)]
+    values = [(max(relmse(picture, converged.mean) - noise, 1e-12), seconds) for picture, seconds in runs]
+    error, seconds, efficiency = np.median([(error, seconds, 1 / (error * seconds)) for error, seconds in values], axis=0)
+    return error, seconds, efficiency, np.mean([picture.mean() for picture, _ in runs]) / converged.mean.mean()
+
+
 def reference(name, render, seconds):
     """`Sums` of long pictures, kept in the output folder."""
     path = workbench.OUTPUT / "references" / f"{name}-caustics.npz"
@@ -189,34 +198,31 @@ def compare(name, size, arguments, program, folder):
         lux = lux_scene(description, Path(folder) / f"{name}.json")
         for kind in LUX_METHODS if lux else ():
             renderers[f"LuxCore {kind}"] = lambda seconds, seed, kind=kind: luxcore(lux, kind, seconds, seed)
-    best = None
-    for who, render in renderers.items():
-        if best is not None and arguments.only and arguments.only not in who:
-            continue
-        # LuxCore is told the seconds themselves.
-        spp = arguments.seconds if who.startswith("LuxCore") else budgeted(render, arguments.seconds)
-        runs = [render(spp, seed) for seed in range(1, arguments.seeds + 1)]
-        values = [(max(relmse(picture, converged.mean) - noise, 1e-12), seconds) for picture, seconds in runs]
-        mean = np.mean([picture.mean() for picture, _ in runs]) / converged.mean.mean()
-        error, seconds = np.median(np.array(values), axis=0)
-        efficiency = np.median([1 / (error * seconds) for error, seconds in values])
-        best = efficiency if best is None else best
-        row = f"| {name} | {who} | {spp} | {error:.3e} | {seconds:.2f} | {efficiency:.3g} | {efficiency / best:.3g} |"
-        print(f"{row} {mean:.4f} |", flush=True)
+    first = next(iter(renderers))
+    chosen = {who: render for who, render in renderers.items() if who == first or (arguments.only or "") in who}
+    for wanted in arguments.seconds:
+        off = None
+        for who, render in chosen.items():
+            # LuxCore is told the seconds themselves.
+            spp = wanted if who.startswith("LuxCore") else budgeted(render, wanted)
+            error, seconds, efficiency, mean = measured(render, spp, arguments.seeds, converged, noise)
+            off = efficiency if off is None else off
+            row = f"| {name} | {who} | {spp} | {error:.3e} | {seconds:.2f} | {efficiency:.3g} | {efficiency / off:.3g} |"
+            print(f"{row} {mean:.4f} |", flush=True)
     return f"{name}: noise of the reference {noise:.1e}"
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("scenes", nargs="*", default=list(SCENES))
-    parser.add_argument("--seconds", type=float, default=4.0)
+    parser.add_argument("--seconds", type=float, nargs="+", default=[4.0])
     parser.add_argument("--seeds", type=int, default=5)
     parser.add_argument("--reference-seconds", type=float, default=240.0)
     parser.add_argument("--ours-only", action="store_true", help="without peers")
     parser.add_argument("--only", help="beside our path only methods whose name has this in it")
     arguments = parser.parse_args()
     program = workbench.halflight_program()
-    print(f"{workbench.machine()}; about {arguments.seconds} s, medians of {arguments.seeds} seeds")
+    print(f"{workbench.machine()}; about {', '.join(map(str, arguments.seconds))} s, medians of {arguments.seeds} seeds")
     print("| scene | method | spp | relMSE | seconds | 1/(relMSE s) | to our path | mean to reference |")
     print("|---|---|---|---|---|---|---|---|")
     with tempfile.TemporaryDirectory() as folder:
