@@ -5,7 +5,7 @@
 
 use super::seen::raster;
 use crate::Rgb;
-use crate::film::{PIXELS_PER_TILE, Pixel, TILE};
+use crate::film::{PIXELS_PER_TILE, Pixel, TILE, Tile};
 use glam::Vec4;
 
 /// Neighbours on each side: windows of 5 x 5 pixels, cut at the border of the tile.
@@ -17,66 +17,61 @@ const NOISE: f32 = 2.0;
 
 const SIDE: usize = TILE as usize;
 
-/// One tile, row by row: colours with a 1 in the fourth place, or all zero where there is no pixel.
-type Raster = [Vec4; PIXELS_PER_TILE];
-
 /// What the pixels of a tile of a picture of mean `mean` probably are: filtered, in the order of the tile's pixels.
 pub fn filtered(pixels: &[Pixel], mean: f64) -> [Rgb; PIXELS_PER_TILE] {
     let scale = (1.0 / mean) as f32;
-    let [mut picture, mut noise, mut out] = [[Vec4::ZERO; PIXELS_PER_TILE]; 3];
-    for (i, pixel) in pixels.iter().enumerate().take(PIXELS_PER_TILE).filter(|(_, pixel)| pixel.count() > 0) {
-        picture[raster(i)] = (scale * pixel.mean()).extend(1.0);
-        noise[raster(i)] = pixel.scaled_variance(scale).extend(0.0);
+    let [mut picture, mut noise] = [[Vec4::ZERO; PIXELS_PER_TILE]; 2];
+    for (i, pixel) in pixels.iter().enumerate().take(PIXELS_PER_TILE) {
+        (picture[raster(i)], noise[raster(i)]) = seen(pixel, scale);
     }
-    lee(&picture, &noise, &mut out);
-    core::array::from_fn(|i| out[raster(i)].truncate() / scale)
+    core::array::from_fn(|i| lee(|place| (picture[place], noise[place]), raster(i)).truncate() / scale)
 }
 
-/// Filters `picture` of variance `variance` into `out`. A pixel's own value has its weight only there.
-fn lee(picture: &Raster, variance: &Raster, out: &mut Raster) {
-    let [mut sums, mut squares, mut variances] = [[Vec4::ZERO; PIXELS_PER_TILE]; 3];
-    for (place, ((sum, square), noise)) in
-        sums.iter_mut().zip(squares.iter_mut()).zip(variances.iter_mut()).enumerate()
-    {
-        let row = place / SIDE * SIDE;
-        for other in row + low(place % SIDE)..row + high(place % SIDE) {
-            *sum += picture[other];
-            *square += picture[other] * picture[other];
-            *noise += variance[other];
+/// The same of the pixel with number `i` alone.
+pub fn filtered_pixel(pixels: &[Pixel], mean: f64, i: usize) -> Rgb {
+    let scale = (1.0 / mean) as f32;
+    let at = |place: usize| {
+        let other = Tile::position(TILE, (place % SIDE) as u32, (place / SIDE) as u32);
+        pixels.get(other).map_or((Vec4::ZERO, Vec4::ZERO), |pixel| seen(pixel, scale))
+    };
+    lee(at, raster(i)).truncate() / scale
+}
+
+/// What a pixel shows and the variance of that: a colour with a 1 in the fourth place, or all zero where there is no pixel.
+fn seen(pixel: &Pixel, scale: f32) -> (Vec4, Vec4) {
+    if pixel.count() == 0 {
+        return (Vec4::ZERO, Vec4::ZERO);
+    }
+    ((scale * pixel.mean()).extend(1.0), pixel.scaled_variance(scale).extend(0.0))
+}
+
+/// Filters the pixel at `place`, where `at` tells what each place shows and the variance of that. A pixel's own value has its weight only
+/// there.
+fn lee(at: impl Fn(usize) -> (Vec4, Vec4), place: usize) -> Vec4 {
+    let (x, y) = (place % SIDE, place / SIDE);
+    let (own, own_noise) = at(place);
+    // The sum without the pixel itself: subtracting it would leave nothing but rounding beside a firefly.
+    let (mut others, mut square, mut noise) = (Vec4::ZERO, own * own, own_noise);
+    for other in (low(y)..high(y)).flat_map(|row| (low(x)..high(x)).map(move |column| row * SIDE + column)) {
+        if other != place {
+            let (colour, variance) = at(other);
+            others += colour;
+            square += colour * colour;
+            noise += variance;
         }
     }
-    for (place, out) in out.iter_mut().enumerate() {
-        let (x, y) = (place % SIDE, place / SIDE);
-        // The sum without the pixel itself: subtracting it would leave nothing but rounding beside a firefly.
-        let (mut others, mut square, mut noise) = (Vec4::ZERO, Vec4::ZERO, Vec4::ZERO);
-        for row in low(y)..high(y) {
-            let at = row * SIDE + x;
-            square += squares[at];
-            noise += variances[at];
-            if row != y {
-                others += sums[at];
-            }
-        }
-        for column in low(x)..high(x) {
-            if column != x {
-                others += picture[y * SIDE + column];
-            }
-        }
-        let own = picture[place];
-        let (count, neighbours) = (others.w + own.w, others.w);
-        if own.w == 0.0 || neighbours == 0.0 {
-            *out = own;
-            continue;
-        }
-        let mean = (others + own) / count;
-        let spread = (square / count - mean * mean).max(Vec4::ZERO);
-        let structure = (spread - NOISE * noise / count).max(Vec4::ZERO);
-        // Where nothing differs both are the same.
-        let weight = structure / spread.max(Vec4::splat(f32::MIN_POSITIVE));
-        let (others, own) = (root(others / neighbours), root(own));
-        let between = others + weight * (own - others);
-        *out = between * between;
+    let (count, neighbours) = (others.w + own.w, others.w);
+    if own.w == 0.0 || neighbours == 0.0 {
+        return own;
     }
+    let mean = (others + own) / count;
+    let spread = (square / count - mean * mean).max(Vec4::ZERO);
+    let structure = (spread - NOISE * noise / count).max(Vec4::ZERO);
+    // Where nothing differs both are the same.
+    let weight = structure / spread.max(Vec4::splat(f32::MIN_POSITIVE));
+    let (others, own) = (root(others / neighbours), root(own));
+    let between = others + weight * (own - others);
+    between * between
 }
 
 fn root(v: Vec4) -> Vec4 {
@@ -94,19 +89,17 @@ fn high(x: usize) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::film::Dropped;
 
-    fn filtered(value: impl Fn(usize, usize) -> f32, variance: f32) -> Raster {
-        let pixel = |place| value(place % SIDE, place / SIDE);
-        let picture = core::array::from_fn(|place| Vec4::new(pixel(place), 0.5, 0.0, 1.0));
-        let mut out = [Vec4::ZERO; PIXELS_PER_TILE];
-        lee(&picture, &[Vec4::splat(variance); PIXELS_PER_TILE], &mut out);
-        out
+    fn filter(value: impl Fn(usize, usize) -> f32, variance: f32) -> [Vec4; PIXELS_PER_TILE] {
+        let picture = |place| Vec4::new(value(place % SIDE, place / SIDE), 0.5, 0.0, 1.0);
+        core::array::from_fn(|place| lee(|place| (picture(place), Vec4::splat(variance)), place))
     }
 
     #[test]
     fn edges_stay_where_there_is_no_noise() {
         let edge = |x: usize, _| if x < 7 { 0.2 } else { 3.0 };
-        for (place, pixel) in filtered(edge, 0.0).iter().enumerate() {
+        for (place, pixel) in filter(edge, 0.0).iter().enumerate() {
             assert!((pixel.x - edge(place % SIDE, 0)).abs() < 1e-5 && (pixel.y - 0.5).abs() < 1e-6);
         }
     }
@@ -115,7 +108,7 @@ mod tests {
     fn noise_gives_way_to_the_neighbours() {
         // A chessboard of 0 and 2 has the variance 1 around a mean of 1.
         let board = |x: usize, y: usize| 2.0 * ((x + y) % 2) as f32;
-        for pixel in filtered(board, 1.0) {
+        for pixel in filter(board, 1.0) {
             assert!((pixel.x - 1.0).abs() < 0.26, "{pixel}");
         }
     }
@@ -123,7 +116,23 @@ mod tests {
     #[test]
     fn a_firefly_does_not_speak_for_itself() {
         let firefly = |x, y| if (x, y) == (8, 5) { 1e6 } else { 0.1 };
-        let out = filtered(firefly, 1e12 / 25.0);
+        let out = filter(firefly, 1e12 / 25.0);
         assert!((out[5 * SIDE + 8].x - 0.1).abs() < 1e-6, "{}", out[5 * SIDE + 8]);
+    }
+    #[test]
+    fn a_pixel_alone_is_what_it_is_among_all() {
+        // The last row lies outside of the picture.
+        let pixels: [Pixel; PIXELS_PER_TILE] = core::array::from_fn(|i| {
+            let (x, y) = Tile::place(i);
+            let mut pixel = Pixel::default();
+            for sample in 0..if y < 15 { 8 } else { 0 } {
+                let light = Rgb::new(x as f32, (y * sample) as f32, 1.0);
+                pixel.add(sample, light, &mut Dropped::default());
+            }
+            pixel
+        });
+        for (i, colour) in filtered(&pixels, 2.5).iter().enumerate() {
+            assert_eq!(filtered_pixel(&pixels, 2.5, i), *colour, "{i}");
+        }
     }
 }

@@ -12,7 +12,7 @@ mod tile;
 
 pub use audit::{BiasEstimate, Deviation, Finding};
 pub use blur::TileBlur;
-pub use filter::filtered;
+pub use filter::{filtered, filtered_pixel};
 pub use interval::ErrorEstimate;
 pub use metric::{Difference, mse, relmse, rmse};
 pub use noise::{BLOCKS, BlockNoise, Noise};

@@ -17,7 +17,8 @@ pub struct Round {
     pub spp: u32,
     /// Rays of every kind.
     pub rays: u64,
-    /// The error as estimated; of the last round, and of each that has an eighth more samples than the last with it.
+    /// The error as estimated; of the last round, and of those before it that have an eighth more samples than the last with it,
+    /// and sixteen or twice as many.
     pub error: Option<ErrorEstimate>,
     /// The error against the reference, where there is one.
     pub reference: Option<Against>,

@@ -27,6 +27,7 @@ mod run;
 mod sealed;
 mod study;
 mod survey;
+mod told;
 mod turns;
 mod windows;
 mod workers;

@@ -2,7 +2,6 @@
 
 use super::adapt::{self, Spread, Weights};
 use super::audit::Audit;
-use super::blurred::Blurred;
 use super::canvas::{Canvas, Shard};
 use super::crew::{self, Crew};
 use super::film_file::{self, Header, Identity, Reader};
@@ -11,9 +10,8 @@ use super::ledger::empty_pixels;
 use super::method::{Method, Renderer, Stage};
 use super::refinement::Refinements;
 use super::rounds::{Plan, Rounds};
-use super::{
-    AdaptiveUse, Ending, FileError, Progress, RenderError, RenderResult, Seconds, WindowUse, regions,
-};
+use super::told::Told;
+use super::{AdaptiveUse, Ending, FileError, Progress, RenderError, RenderResult, Seconds, WindowUse};
 use crate::save::Image;
 use core::sync::atomic::{AtomicBool, Ordering};
 use core::time::Duration;
@@ -66,7 +64,7 @@ impl Picture<'_> {
         let reference = clock.pause(|| settings.reference.as_deref().map(Reference::new));
         let mut latest = history.iter().rev().find_map(|round: &Round| round.error);
         let (mut estimating, mut estimate) = (0.0, 0.0);
-        let mut gain = None;
+        let (mut gain, mut told) = (None, None);
         let mut saved = Instant::now();
         let mut is_lost = false;
         let save = |canvas: &Canvas,
@@ -100,10 +98,8 @@ impl Picture<'_> {
                     audit.step(workers, &canvas.film, rays(&canvas), clock.seconds(), left)?;
                 }
                 let start = Instant::now();
-                let tiles = workers.errors(&canvas.film);
-                error = tiles.as_ref().and_then(|tiles| regions::estimate(tiles, width, canvas.shares));
+                let now = Told::of(workers, &canvas, audit.as_ref());
                 estimate += start.elapsed().as_secs_f64();
-                let audited = error.and_then(|noise| audit.as_ref()?.verdict(workers, &canvas.film, noise));
                 // Once only: noise that is told later would know who asked for it.
                 let is_even = canvas.weights.is_none();
                 if is_even && settings.may_adapt() && rounds.spp() >= adapt::FROM {
@@ -115,20 +111,22 @@ impl Picture<'_> {
                     let spp = rounds.spp();
                     canvas.weights = spread.filter(pays).map(|spread| Weights::new(spread.weights, spp));
                 }
-                let short = settings.stop.error.zip(error).and_then(|(wanted, noise)| {
-                    refinements.shortfall(wanted, rounds.spp(), noise, audited.as_ref())
+                let short = settings.stop.error.zip(now.noise).and_then(|(wanted, noise)| {
+                    refinements.shortfall(wanted, rounds.spp(), noise, now.audited.as_ref())
                 });
                 if let Some(refinement) = short.and_then(|short| renderer.refine(&short)) {
                     refinements.add(refinement, rounds.spp());
                 }
-                let unaudited = || Blurred::of(workers, &canvas.film, error).map(|blurred| blurred.total);
-                error = audited.as_ref().map(|audited| audited.total).or_else(unaudited).or(error);
                 is_lost = !method.converges()
                     && !refinements.are_young(rounds.spp())
-                    && audited.is_some_and(|audited| rounds.is_out_of_reach(&audited));
+                    && now.audited.as_ref().is_some_and(|audited| rounds.is_out_of_reach(audited));
+                error = now.error();
                 rounds.estimated(error);
                 estimating = start.elapsed().as_secs_f64();
                 latest = error;
+                told = Some(now);
+            } else {
+                told = None;
             }
             let seconds = clock.seconds();
             let against = reference.as_ref().map(|r| clock.pause(|| r.compare(&image(&canvas.film))));
@@ -164,13 +162,11 @@ impl Picture<'_> {
             }
         }
         let start = Instant::now();
-        let noise = workers.estimate(&canvas.film, canvas.shares);
+        // The last round may have asked already.
+        let told = told.unwrap_or_else(|| Told::of(workers, &canvas, audit.as_ref()));
         estimate += start.elapsed().as_secs_f64();
         let render = clock.seconds();
-        let audited = noise.and_then(|noise| audit.as_ref()?.verdict(workers, &canvas.film, noise));
-        let blurred = if audited.is_none() { Blurred::of(workers, &canvas.film, noise) } else { None };
-        let error = audited.as_ref().map(|audited| audited.total);
-        let error = error.or(blurred.map(|blurred| blurred.total)).or(noise);
+        let error = told.error();
         if let Some(last) = history.last_mut() {
             last.error = error;
         }
@@ -197,8 +193,8 @@ impl Picture<'_> {
             places: canvas.ledger.places(width, height),
             empty_pixels: empty_pixels(film, |task| canvas.shard.owns(task)),
             error,
-            blurred,
-            audit: audited,
+            blurred: told.blurred,
+            audit: told.audited,
             memory: Vec::new(),
             memory_peak: 0,
             ending: match (interrupted, is_lost) {

@@ -120,10 +120,10 @@ impl Rounds {
         self.spp >= self.next_estimate
     }
 
-    /// Takes note of an estimate, which takes as long as a tenth of a sample. The next is due after an eighth more
-    /// samples, eight at least; where the error is to stop the render, when it can be reached at the earliest (errors
-    /// fall with the square of the samples at best, and intervals become narrower), after a thirty-second at least and
-    /// twice as many at most.
+    /// Takes note of an estimate, which takes as long as a tenth of a sample, or a quarter where samples are cheap. The next is
+    /// due after an eighth more samples, but sixteen at least, or twice as many; where the error is to stop the render, when it can be
+    /// reached at the earliest (errors fall with the square of the samples at best, and intervals become narrower), after a
+    /// thirty-second at least and twice as many at most.
     pub(super) fn estimated(&mut self, error: Option<ErrorEstimate>) {
         let spp = self.spp;
         let next = match (self.stop.error, error) {
@@ -131,7 +131,7 @@ impl Rounds {
                 let growth = (error.upper / wanted).cbrt().clamp(1.0 + 1.0 / 32.0, 2.0);
                 (f64::from(spp) * growth) as u32
             }
-            _ => spp + (spp / 8).max(spp.min(8)),
+            _ => spp + (spp / 8).max(spp.min(16)),
         };
         self.next_estimate = next.max(spp + 1).next_multiple_of(4);
         self.decision = error.map(|error| (spp, error));

@@ -2,7 +2,7 @@
 
 use super::choice::Grid;
 use crate::drive::ErrorEstimate;
-use halflight_core::estimate::{BiasEstimate, Deviation, Finding, filtered};
+use halflight_core::estimate::{BiasEstimate, Deviation, Finding, filtered_pixel};
 use halflight_core::film::{Film, PIXELS_PER_TILE, Pixel, Tile};
 
 /// A region is told to be biased where chance alone would say so of any of them in one picture of so many.
@@ -69,23 +69,14 @@ pub(super) fn findings(
     places: &[[u32; 2]],
     truth: &[Pixel],
 ) -> Vec<(usize, Finding)> {
-    let position = |index: &usize| Tile::position(film.width(), places[*index][0], places[*index][1]);
-    // Each tile is filtered once.
-    let mut order: Vec<usize> = (0..places.len()).collect();
-    order.sort_unstable_by_key(position);
-    let mut findings = Vec::with_capacity(places.len());
-    for tile in order.chunk_by(|a, b| position(a) / PIXELS_PER_TILE == position(b) / PIXELS_PER_TILE) {
-        let first = position(&tile[0]) / PIXELS_PER_TILE * PIXELS_PER_TILE;
-        let Some(pixels) = film.pixels().get(first..first + PIXELS_PER_TILE) else { continue };
-        let colours = filtered(pixels, mean);
-        for index in tile {
-            let place = position(index) - first;
-            let finding = Finding::of(&pixels[place], &truth[*index], colours[place], mean);
-            findings.extend(finding.map(|finding| (*index, finding)));
-        }
-    }
-    findings.sort_unstable_by_key(|(index, _)| *index);
-    findings
+    let finding = |(index, (place, truth)): (usize, (&[u32; 2], &Pixel))| {
+        let position = Tile::position(film.width(), place[0], place[1]);
+        let first = position / PIXELS_PER_TILE * PIXELS_PER_TILE;
+        let tile = film.pixels().get(first..first + PIXELS_PER_TILE)?;
+        let colour = filtered_pixel(tile, mean, position - first);
+        Some((index, Finding::of(&tile[position - first], truth, colour, mean)?))
+    };
+    places.iter().zip(truth).enumerate().filter_map(finding).collect()
 }
 
 /// All but what the audit has cost. `None` for fewer findings than say anything.
