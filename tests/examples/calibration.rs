@@ -3,7 +3,7 @@
 //! samples, whose own noise is taken off, and what photons blur in it. Prints the tables of docs/validation.md:
 //!
 //! `cargo run --release -p halflight-tests --example calibration -- [--renders 40] [--size 64] [--error 0.001]
-//! [--spp 4096] [--times 100] [--method path] [--adaptive] [SCENE…]`, of our own scenes by name or of any scene file.
+//! [--spp 4096] [--times 100] [--method path] [--adaptive] [--audit 0.05] [SCENE…]`, of our own scenes by name or of any scene file.
 //! `--error 0` goes on to the last sample, also where a method's bias is found.
 
 use core::sync::atomic::AtomicBool;
@@ -101,7 +101,7 @@ fn calibrate(file: &Path, wanted: &Wanted) {
                 Settings { stop, method: Some(Method::Path), adaptive: Some(false), ..settings(seed) };
             run(Settings { audit: None, ..reference })
         };
-        sharpened(part(most, REFERENCE_SEED - i), || part(most.div_ceil(FEWER), REFERENCE_SEED - i - 1).image)
+        sharpened(part(most, REFERENCE_SEED - i), || part(most.div_ceil(FEWER), REFERENCE_SEED - i - 1))
     });
     let (image, noise) = mean(one, &other);
     let image = Arc::new(image);
@@ -153,12 +153,16 @@ fn calibrate(file: &Path, wanted: &Wanted) {
 }
 
 /// What photons blur falls with the third root of the samples: a picture of fewer samples is blurred three times as much,
-/// and half of the difference to it is taken off.
-fn sharpened(many: RenderResult, few: impl FnOnce() -> Image) -> Image {
+/// and half of the difference to it is taken off (docs/validation.md, the slope of progressive photon mapping). Its noise is nine
+/// times as large for that: 2.25 of its own, and a quarter of 27 times as much.
+fn sharpened(many: RenderResult, few: impl FnOnce() -> RenderResult) -> Image {
     let mut image = many.image;
     if many.blurred.is_some() {
         let few = few();
-        for (value, blurred) in image.pixels.as_flattened_mut().iter_mut().zip(few.pixels.as_flattened()) {
+        assert!(few.blurred.is_some(), "a reference of fewer samples has photons as well");
+        for (value, blurred) in
+            image.pixels.as_flattened_mut().iter_mut().zip(few.image.pixels.as_flattened())
+        {
             *value = 1.5 * *value - 0.5 * blurred;
         }
     }

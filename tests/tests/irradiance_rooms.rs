@@ -147,7 +147,7 @@ fn a_needle_stands_in_the_way() {
     agrees(&buffers.scene(), 0.02, 0.25);
 }
 
-/// Rays along the wall pass under the board, and so do records' eyes: light is fenced off where it begins to hang.
+/// Rays along the wall pass under the board; what hangs over the wall is met by the strata.
 #[test]
 fn a_slot_behind_a_board_is_dark_to_the_last_pixel() {
     let mut buffers = room(0.73);

@@ -119,6 +119,7 @@ mod tests {
         let out = filter(firefly, 1e12 / 25.0);
         assert!((out[5 * SIDE + 8].x - 0.1).abs() < 1e-6, "{}", out[5 * SIDE + 8]);
     }
+
     #[test]
     fn a_pixel_alone_is_what_it_is_among_all() {
         // The last row lies outside of the picture.

@@ -13,8 +13,8 @@
 //!    exactly. For a pixel of variance V the product has the variance 4 V², and the estimate squared the mean 3 V² (more
 //!    with heavy tails); Student's t says what it is to know that from few pixels. How errors hang together between
 //!    pixels that share paths is seen in the differences of the halves. Upwards less is in doubt where single samples have
-//!    the noise: the error of a pixel that flashed is hardly more than its variance; but not of three or fewer. Nor is the lower end above what the error
-//!    may be if all flashes belonged there.
+//!    the noise: the error of a pixel that flashed is hardly more than its variance, if enough of them tell. Nor is the lower
+//!    end above what the error may be if all flashes belonged there.
 //!
 //! The price: about as much time as a tenth of a sample for each pixel.
 

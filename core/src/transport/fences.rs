@@ -15,7 +15,7 @@ use glam::{Vec2, Vec3};
 const RAYS_PER_SECTOR: usize = 2;
 const RING: usize = SECTORS * RAYS_PER_SECTOR;
 
-/// By how much they rise: low enough for low walls, high enough for the surface's own roundness. Strata are
+/// By how much they rise: low enough for low walls, high enough for the surface's own roundness. Most strata are
 /// higher, and those of a second ring are between.
 const SLOPE: f32 = 0.05;
 const SECOND_SLOPE: f32 = 0.12;
@@ -64,8 +64,9 @@ impl<F: Features> PathTracer<'_, F> {
         for (&direction, &inverse) in strata.directions.iter().zip(&*strata.inverse_distance) {
             let direction = Vec3::from(direction);
             let along = direction.truncate().length();
-            // Nothing that is not finite is less.
-            if direction.z < LOW * along && along < record.reach * inverse {
+            // Lower ones would meet the surface's own roundness; the surface itself is met at no distance.
+            let hangs = (SLOPE * along..LOW * along).contains(&direction.z) && inverse.is_finite();
+            if hangs && along < record.reach * inverse {
                 let towards = record.along_axes(frame.to_world(direction));
                 hang(record, &walls, towards, along / inverse);
             }
@@ -78,7 +79,7 @@ fn azimuth(i: usize) -> f32 {
     ((i % RING) as f32 + 0.5) / RAYS_PER_SECTOR as f32
 }
 
-/// Fences off what is met at `distance` in the direction `towards`, where it is not of the walls that both rays of the
+/// Fences off what is met at `distance` in the direction `towards`, where it is nearer than the walls that the two rays of the
 /// first ring beside it have met.
 fn hang(record: &mut Record, walls: &[f32; RING], towards: Vec2, distance: f32) {
     let after = (Record::sector(towards) * RAYS_PER_SECTOR as f32 + 0.5) as usize;

@@ -98,7 +98,7 @@ impl Picture<'_> {
                     audit.step(workers, &canvas.film, rays(&canvas), clock.seconds(), left)?;
                 }
                 let start = Instant::now();
-                let now = Told::of(workers, &canvas, audit.as_ref());
+                let found = Told::of(workers, &canvas, audit.as_ref());
                 estimate += start.elapsed().as_secs_f64();
                 // Once only: noise that is told later would know who asked for it.
                 let is_even = canvas.weights.is_none();
@@ -111,20 +111,20 @@ impl Picture<'_> {
                     let spp = rounds.spp();
                     canvas.weights = spread.filter(pays).map(|spread| Weights::new(spread.weights, spp));
                 }
-                let short = settings.stop.error.zip(now.noise).and_then(|(wanted, noise)| {
-                    refinements.shortfall(wanted, rounds.spp(), noise, now.audited.as_ref())
+                let short = settings.stop.error.zip(found.noise).and_then(|(wanted, noise)| {
+                    refinements.shortfall(wanted, rounds.spp(), noise, found.audited.as_ref())
                 });
                 if let Some(refinement) = short.and_then(|short| renderer.refine(&short)) {
                     refinements.add(refinement, rounds.spp());
                 }
                 is_lost = !method.converges()
                     && !refinements.are_young(rounds.spp())
-                    && now.audited.as_ref().is_some_and(|audited| rounds.is_out_of_reach(audited));
-                error = now.error();
+                    && found.audited.as_ref().is_some_and(|audited| rounds.is_out_of_reach(audited));
+                error = found.error();
                 rounds.estimated(error);
                 estimating = start.elapsed().as_secs_f64();
                 latest = error;
-                told = Some(now);
+                told = Some(found);
             } else {
                 told = None;
             }
