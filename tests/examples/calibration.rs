@@ -10,6 +10,7 @@ use core::sync::atomic::AtomicBool;
 use halflight::drive::{ErrorEstimate, Method, RenderResult, Round, Settings, Stop, render};
 use halflight::load::{self, LoadOptions};
 use halflight::save::Image;
+use halflight_core::estimate::relmse;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -103,7 +104,7 @@ fn calibrate(file: &Path, wanted: &Wanted) {
         };
         sharpened(part(most, REFERENCE_SEED - i), || part(most.div_ceil(FEWER), REFERENCE_SEED - i - 1))
     });
-    let (image, noise) = mean(one, &other);
+    let (image, noise) = mean(&one, &other);
     let image = Arc::new(image);
 
     let results: Vec<RenderResult> = (0..wanted.renders)
@@ -169,18 +170,14 @@ fn sharpened(many: RenderResult, few: impl FnOnce() -> RenderResult) -> Image {
     image
 }
 
-/// The mean of two pictures that know nothing of each other, and its relMSE by their difference.
-fn mean(mut image: Image, other: &Image) -> (Image, f64) {
-    let mut squares = Vec::with_capacity(3 * image.pixels.len());
-    for (value, other) in image.pixels.as_flattened_mut().iter_mut().zip(other.pixels.as_flattened()) {
-        squares.push(0.25 * f64::from(*value - other).powi(2));
+/// The mean of two pictures that know nothing of each other, and its relMSE, which is that of either to it.
+fn mean(one: &Image, other: &Image) -> (Image, f64) {
+    let mut mean = one.clone();
+    for (value, other) in mean.pixels.as_flattened_mut().iter_mut().zip(other.pixels.as_flattened()) {
         *value = 0.5 * (*value + other);
     }
-    let values = || image.pixels.as_flattened().iter().map(|value| f64::from(*value));
-    let (count, dark) = (squares.len() as f64, 0.01 * (values().sum::<f64>() / squares.len() as f64).powi(2));
-    let noise =
-        squares.iter().zip(values()).map(|(squared, value)| squared / (value * value + dark)).sum::<f64>();
-    (image, noise / count)
+    let noise = relmse(one.colours(), mean.colours());
+    (mean, noise)
 }
 
 fn settings(wanted: &Wanted, seed: u32, stop: Stop) -> Settings {

@@ -9,10 +9,7 @@
 use super::audit::BiasEstimate;
 use super::metric::DARK;
 use crate::Rgb;
-use crate::film::{PIXELS_PER_TILE, Pixel};
-
-/// Pixels of a block, in which photons are shared: 4 × 4 along the Z-curve.
-const BLOCK: usize = 16;
+use crate::film::{GROUP, GROUPS, PIXELS_PER_TILE, Pixel};
 
 /// What is not known of blur, as a share of it: finer discs blur as well, at an edge more than is reckoned.
 const UNSURE: f64 = 0.25;
@@ -31,7 +28,8 @@ impl TileBlur {
     /// Of the pixels of one tile of a picture of mean `mean` > 0.
     pub fn of(pixels: &[Pixel], mean: f64) -> Self {
         let mut sums = Self::default();
-        let mut blocks = [0.0; PIXELS_PER_TILE / BLOCK];
+        // Of 4 × 4 neighbours along the Z-curve, which share photons.
+        let mut blocks = [0.0; GROUPS];
         for (i, pixel) in pixels.iter().enumerate().take(PIXELS_PER_TILE) {
             if pixel.even.count() == 0 || pixel.odd.count() == 0 {
                 continue;
@@ -52,7 +50,7 @@ impl TileBlur {
             };
             let weight = 0.5 * (over_square(a) + over_square(b));
             sums.squared += a * b * weight;
-            blocks[i / BLOCK] += 0.5 * (a * a - b * b) * weight;
+            blocks[i / GROUP] += 0.5 * (a * a - b * b) * weight;
         }
         for block in blocks {
             sums.squares += block * block;

@@ -9,6 +9,7 @@ use super::film_file::Reader;
 use super::ledger::{Place, empty_pixels};
 use super::method::Method;
 use super::picture::image;
+use super::told::Told;
 use super::workers::Workers;
 use crate::save::Image;
 use halflight_core::film::Film;
@@ -78,11 +79,10 @@ pub fn merge(files: &[PathBuf]) -> Result<Merged, RenderError> {
         film.read_into(&mut canvas)?;
     }
     let workers = Workers::new(None)?;
-    let noise = workers.estimate(&canvas.film, canvas.shares);
-    let audit = workers.mean(&canvas.film).zip(audits).and_then(|(mean, audits)| {
-        audit::State::merged(audits, &canvas.film, mean)?.verdict(&canvas.film, mean, noise?)
+    let told = Told::by(&workers, &canvas, |noise| {
+        let (mean, audits) = workers.mean(&canvas.film).zip(audits)?;
+        audit::State::merged(audits, &canvas.film, mean)?.verdict(&canvas.film, mean, noise)
     });
-    let blurred = if audit.is_none() { Blurred::of(&workers, &canvas.film, noise) } else { None };
     Ok(Merged {
         image: image(&canvas.film),
         spp,
@@ -90,9 +90,9 @@ pub fn merge(files: &[PathBuf]) -> Result<Merged, RenderError> {
         counters: canvas.counters,
         places: canvas.ledger.places(width, height),
         empty_pixels: empty_pixels(&canvas.film, |_| true),
-        error: audit.as_ref().map(|audit| audit.total).or(blurred.map(|blurred| blurred.total)).or(noise),
-        blurred,
-        audit,
+        error: told.error(),
+        blurred: told.blurred,
+        audit: told.audited,
         is_biased,
     })
 }

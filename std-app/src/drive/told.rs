@@ -17,8 +17,17 @@ pub(super) struct Told {
 
 impl Told {
     pub(super) fn of(workers: &Workers, canvas: &Canvas, audit: Option<&Audit>) -> Self {
+        Self::by(workers, canvas, |noise| audit?.verdict(workers, &canvas.film, noise))
+    }
+
+    /// With what an audit says to the noise.
+    pub(super) fn by(
+        workers: &Workers,
+        canvas: &Canvas,
+        audit: impl FnOnce(ErrorEstimate) -> Option<Audited>,
+    ) -> Self {
         let noise = workers.estimate(&canvas.film, canvas.shares);
-        let audited = noise.and_then(|noise| audit?.verdict(workers, &canvas.film, noise));
+        let audited = noise.and_then(audit);
         let blurred = if audited.is_none() { Blurred::of(workers, &canvas.film, noise) } else { None };
         Self { noise, audited, blurred }
     }

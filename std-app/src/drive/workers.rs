@@ -45,7 +45,7 @@ impl Workers {
     }
 
     /// What the tiles of `film` tell of its error; `None` for a black picture.
-    pub(super) fn errors(&self, film: &Film) -> Option<Vec<TileError>> {
+    fn errors(&self, film: &Film) -> Option<Vec<TileError>> {
         let mean = self.mean(film)?;
         let tiles = film.pixels().par_chunks(PIXELS_PER_TILE);
         let learn = |mut known: Lookalikes, (_, tile): (usize, &[Pixel])| {
