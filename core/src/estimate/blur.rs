@@ -19,9 +19,8 @@ const UNSURE: f64 = 0.25;
 pub struct TileBlur {
     pixels: u64,
     squared: f64,
-    /// Squares and fourth powers of the sums over blocks of (a² − b²) / 2, which varies as a b does and has the mean 0.
+    /// Squares of the sums over blocks of (a² − b²) / 2, which varies as a b does and has the mean 0.
     squares: f64,
-    fourths: f64,
 }
 
 impl TileBlur {
@@ -54,7 +53,6 @@ impl TileBlur {
         }
         for block in blocks {
             sums.squares += block * block;
-            sums.fourths += block * block * block * block;
         }
         sums
     }
@@ -65,7 +63,6 @@ impl core::ops::AddAssign for TileBlur {
         self.pixels += other.pixels;
         self.squared += other.squared;
         self.squares += other.squares;
-        self.fourths += other.fourths;
     }
 }
 
@@ -74,13 +71,12 @@ impl BiasEstimate {
     pub fn of_blur(tiles: impl Iterator<Item = TileBlur>) -> Option<Self> {
         let mut sum = TileBlur::default();
         tiles.for_each(|tile| sum += tile);
-        let TileBlur { pixels, squared, squares, fourths } = sum;
+        let TileBlur { pixels, squared, squares } = sum;
         if pixels == 0 || squares == 0.0 {
             return None;
         }
         let count = pixels as f64;
-        let freedom = squares * squares / fourths;
-        Some(Self::known(squared / count, (squares / (count * count), freedom), UNSURE))
+        Some(Self::known(squared / count, squares / (count * count), UNSURE))
     }
 }
 
@@ -154,7 +150,7 @@ mod tests {
     #[test]
     fn what_is_not_known_of_blur_reaches_both_ways() {
         let noise = ErrorEstimate { relmse: 1e-4, lower: 0.9e-4, upper: 1.1e-4 };
-        let blur = BiasEstimate::known(5e-3, (1e-10, 100.0), UNSURE);
+        let blur = BiasEstimate::known(5e-3, 1e-10, UNSURE);
         let sum = noise.with_bias(blur);
         assert!(sum.lower < 1e-4 + 0.8 * 5e-3 && sum.upper > 1e-4 + 1.2 * 5e-3, "{sum:?}");
     }

@@ -36,7 +36,7 @@ pub struct ErrorEstimate {
 }
 
 /// The normal distribution lies between this and its negative with 95 %.
-const Z: f64 = 1.959_963_984_540_054;
+pub(super) const Z: f64 = 1.959_963_984_540_054;
 
 /// Degrees of freedom at the least, of independent pixels: where fewer of them have nearly all of the noise it has heavy
 /// tails, and their squares are too large already.
@@ -58,8 +58,9 @@ impl ErrorEstimate {
         tiles.for_each(|tile| sum += tile);
         let shared = shared(&sum);
         let pixels = freedom(sum.squares, sum.fourths);
-        let reach = student_95(fmax(pixels / shared, FEWEST)) * sqrt(shared);
-        Self::with_reach(&sum, reach, if pixels < FLASHES { f64::INFINITY } else { sum.above })
+        let events = pixels / shared;
+        let reach = student_95(fmax(events, FEWEST)) * sqrt(shared);
+        Self::with_reach(&sum, reach, if events < FLASHES { f64::INFINITY } else { sum.above })
     }
 
     /// From the sums over regions, where a method shares between pixels far apart: regions count as independent. They
@@ -130,7 +131,7 @@ fn freedom(squares: f64, fourths: f64) -> f64 {
 
 /// Student's t of `freedom` degrees lies between this and its negative with 95 % (expansion of Cornish and Fisher;
 /// too small by a tenth for two degrees, and taken at one for fewer).
-pub(super) fn student_95(freedom: f64) -> f64 {
+fn student_95(freedom: f64) -> f64 {
     const FIRST: f64 = (Z * Z * Z + Z) / 4.0;
     const SECOND: f64 = (5.0 * Z * Z * Z * Z * Z + 16.0 * Z * Z * Z + 3.0 * Z) / 96.0;
     let freedom = fmax(freedom, 1.0);
