@@ -155,10 +155,10 @@ fn calibrate(file: &Path, wanted: &Wanted) {
 
 /// What photons blur falls with the third root of the samples: a picture of fewer samples is blurred three times as much,
 /// and half of the difference to it is taken off (docs/validation.md, the slope of progressive photon mapping). Its noise is nine
-/// times as large for that: 2.25 of its own, and a quarter of 27 times as much.
+/// times as large for that: 2.25 of its own, and a quarter of 27 times as much. Not where no blur is found, which is less than that.
 fn sharpened(many: RenderResult, few: impl FnOnce() -> RenderResult) -> Image {
     let mut image = many.image;
-    if many.blurred.is_some() {
+    if many.blurred.is_some_and(|blurred| blurred.blur.is_found()) {
         let few = few();
         assert!(few.blurred.is_some(), "a reference of fewer samples has photons as well");
         for (value, blurred) in
