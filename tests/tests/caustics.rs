@@ -1,5 +1,5 @@
 //! Path tracing joined with photons of caustics: right in the mean whatever the surfaces and lights, nothing counted
-//! twice, the same bits on any number of threads, and none of it where there is no caustic.
+//! twice, also beside an irradiance cache, the same bits on any number of threads, and none of it where there is no caustic.
 
 use glam::Vec3;
 use halflight::drive::{Checkpoint, Method, RenderResult, Settings};
@@ -14,7 +14,7 @@ use halflight_core::transport::caustics::{CausticShooter, Find, PATHS, ROOM};
 use halflight_core::transport::shoot::{Keep, ShootSettings};
 use halflight_core::transport::{Discs, Merging, PathSettings, PathTracer, UNLIMITED};
 use halflight_core::{Level, Rgb};
-use halflight_tests::render::render;
+use halflight_tests::render::{difference, render};
 use halflight_tests::scenes::{
     IN_THE_BRIGHT_ROOM, SceneBuffers, bright_and_dark, constant_environment, cornell_box, emitter,
     everything, lamp_before,
@@ -31,7 +31,7 @@ const BLOCK: u32 = 7;
 /// Independent pictures of each kind.
 const SEEDS: u32 = 16;
 
-/// Normal quantile for one error in ten thousand over all blocks and channels of all scenes (Šidák; 20 comparisons of 48
+/// Normal quantile for one error in ten thousand over all blocks and channels of all scenes (Šidák; 39 comparisons of 48
 /// values), with Student's wider tails of 2 × 15 degrees of freedom.
 const WIDEST: f64 = 6.8;
 
@@ -43,9 +43,12 @@ fn arena(lines: &mut [Line]) -> Arena<'_> {
     Arena::new(bytemuck::cast_slice_mut(lines))
 }
 
-/// Blocks of pictures of `scene` by 16 samples, joined with photons of `tasks` and discs of so many pixels if there
-/// are any.
-fn pictures(scene: &Scene, first: u32, tasks: usize, pixels: f32, max_depth: u32) -> Vec<Vec<f64>> {
+/// Photons of a picture: tasks, the radius of discs in pixels, and whether they are those beside records of an irradiance
+/// cache. There, too, nothing is lost or counted twice where no record is.
+type Shot = (usize, f32, bool);
+
+/// Blocks of pictures of `scene` by 16 samples, joined with photons if there are any.
+fn pictures(scene: &Scene, first: u32, (tasks, pixels, is_beside): Shot, max_depth: u32) -> Vec<Vec<f64>> {
     let level = Level::detect();
     let mut bvh_lines = lines(Bvh::footprint(scene.mesh.triangles.len()));
     let bvh = Bvh::build(&scene.mesh, &mut arena(&mut bvh_lines)).unwrap();
@@ -63,6 +66,7 @@ fn pictures(scene: &Scene, first: u32, tasks: usize, pixels: f32, max_depth: u32
         let shot = ShootSettings { keep: Keep::Caustic, seed, paths, max_depth };
         let shooter =
             CausticShooter::<All>::new((scene, &bvh, &lights), &emission, shot, (discs, [SIZE; 2]), level);
+        let shooter = if is_beside { shooter.beside_records() } else { shooter };
         let [even, odd] = &mut photon_lines;
         let mut map = 0;
         let mut shoot = |lines| {
@@ -77,8 +81,9 @@ fn pictures(scene: &Scene, first: u32, tasks: usize, pixels: f32, max_depth: u32
         let settings = PathSettings { width: SIZE, height: SIZE, seed, max_depth, reuse: false };
         let mut tracer = PathTracer::<All>::new(scene, &bvh, &lights, settings, level);
         if tasks > 0 {
-            assert!(tasks == 1 || !maps[0].is_empty());
-            tracer = tracer.with_caustics(Merging::new([&maps[0], &maps[1]], &emission, discs, paths));
+            assert!(tasks == 1 || is_beside || !maps[0].is_empty());
+            let merging = Merging::new([&maps[0], &maps[1]], &emission, discs, paths);
+            tracer = tracer.with_caustics(if is_beside { merging.beside_records() } else { merging });
         }
         let mut film = Film::new(SIZE, SIZE, &mut arena(&mut film_lines)).unwrap();
         film.pixels_mut().fill(Default::default());
@@ -117,11 +122,11 @@ fn in_a_room(mut buffers: SceneBuffers) -> SceneBuffers {
 
 fn is_right_in_the_mean(name: &str, buffers: &SceneBuffers, max_depth: u32) {
     let scene = buffers.scene();
-    let off = pictures(&scene, 0, 0, 0.3, max_depth);
+    let off = pictures(&scene, 0, (0, 0.3, false), max_depth);
     // Photons against paths from a hundredth to a hundred and more.
-    for (tasks, pixels, first) in [(1, 0.15, 100), (16, 0.3, 200)] {
-        let joined = pictures(&scene, first, tasks, pixels, max_depth);
-        agree(&joined, &off, WIDEST).unwrap_or_else(|why| panic!("{name}, {tasks} tasks, {why}"));
+    for (shot, first) in [((1, 0.15, false), 100), ((16, 0.3, false), 200), ((16, 0.3, true), 300)] {
+        let joined = pictures(&scene, first, shot, max_depth);
+        agree(&joined, &off, WIDEST).unwrap_or_else(|why| panic!("{name}, {shot:?}, {why}"));
     }
 }
 
@@ -182,7 +187,7 @@ fn what_a_focus_lights_has_no_spikes() {
 
 /// How far blocks of pictures with few photons scatter, over their means, at worst.
 fn scatter(buffers: &SceneBuffers) -> f64 {
-    let pictures = pictures(&buffers.scene(), 0, 4, 0.5, UNLIMITED);
+    let pictures = pictures(&buffers.scene(), 0, (4, 0.5, false), UNLIMITED);
     let of_block = |i: usize| {
         let mean = pictures.iter().map(|one| one[i]).sum::<f64>() / f64::from(SEEDS);
         let square = pictures.iter().map(|one| (one[i] - mean).powi(2)).sum::<f64>() / f64::from(SEEDS - 1);
@@ -243,8 +248,76 @@ fn path(scene: &Scene, spp: u32, change: impl FnOnce(&mut Settings)) -> RenderRe
     render(scene, Method::Path, 40, spp, change)
 }
 
+/// The same with an irradiance cache.
+fn cached(scene: &Scene, spp: u32, change: impl FnOnce(&mut Settings)) -> RenderResult {
+    render(scene, Method::IrradianceCache, 40, spp, |settings| {
+        settings.cache.strata = 16;
+        change(settings);
+    })
+}
+
 fn has_photons(result: &RenderResult) -> bool {
     result.memory.iter().any(|one| one.structure == "photons" && one.bytes > 0)
+}
+
+#[test]
+fn records_and_photons_have_no_light_in_common() {
+    let rooms = [
+        ("glass", in_a_room(lamp_over_ball(glass(0.0), 0.7)), None),
+        ("mirror", in_a_room(lamp_before(metal(0.0), 0.6)), None),
+        ("mirror, limited", in_a_room(lamp_before(metal(0.0), 0.6)), Some(4)),
+    ];
+    for (name, buffers, depth) in rooms {
+        let scene = buffers.scene();
+        let truth = path(&scene, 1024, |s| (s.caustics, s.max_depth) = (false, depth));
+        let joined = cached(&scene, 64, |s| s.max_depth = depth);
+        assert!(has_photons(&joined) && joined.cache.unwrap().records > 100, "{name}: {:?}", joined.caustics);
+        for (a, b) in joined.image.mean().into_iter().zip(truth.image.mean()) {
+            assert!((a / b - 1.0).abs() < 0.01, "{name}: {a} {b}");
+        }
+        let difference = difference(&joined.image, &truth.image);
+        assert!(difference < 0.03, "{name}: {difference}");
+    }
+}
+
+#[test]
+fn beside_records_bits_are_the_same_and_off_is_off() {
+    let buffers = in_a_room(lamp_over_ball(glass(0.0), 0.3));
+    let scene = buffers.scene();
+    let temporary = |name: &str| std::env::temp_dir().join(format!("{}-{name}", std::process::id()));
+    let [film, records] = ["cached-caustics.film", "cached-caustics.records"].map(temporary);
+    let one = cached(&scene, 11, |s| (s.threads, s.save_cache) = (Some(1), Some(records.clone())));
+    assert!(has_photons(&one), "{:?}", one.caustics);
+    assert_eq!(cached(&scene, 11, |s| s.threads = Some(2)).image, one.image);
+    assert_eq!(cached(&scene, 11, |s| s.load_cache = Some(records.clone())).image, one.image);
+    let keep = Some(Checkpoint { path: film.clone(), every: f64::INFINITY });
+    let _ = cached(&scene, 5, |s| s.checkpoint = keep.clone());
+    assert_eq!(cached(&scene, 11, |s| s.resume = Some(film.clone())).image, one.image);
+    let off = cached(&scene, 11, |s| s.caustics = false);
+    assert!(!has_photons(&off) && off.image != one.image);
+    // Records are of all light, with photons beside them or not.
+    assert_eq!(off.cache.unwrap().records, one.cache.unwrap().records);
+    [film, records].into_iter().for_each(|file| std::fs::remove_file(file).unwrap());
+}
+
+#[test]
+fn beside_records_little_memory_is_enough() {
+    let buffers = in_a_room(lamp_over_ball(glass(0.0), 0.3));
+    let scene = buffers.scene();
+    let limited = |memory, caustics| {
+        cached(&scene, 2, |s| (s.threads, s.memory, s.caustics) = (Some(1), memory, caustics))
+    };
+    let mut limit = limited(None, true).memory_peak;
+    let lacking = loop {
+        let joined = limited(Some(limit), true);
+        assert!(joined.memory_peak <= limit);
+        if joined.caustics.lacks_memory {
+            break joined;
+        }
+        assert!(has_photons(&joined) && joined.cache.unwrap().records > 0);
+        limit = limit * 3 / 4;
+    };
+    assert!(lacking.image == limited(Some(limit), false).image);
 }
 
 /// Everything, and caustics that are worth photons: of a lamp that has no size, by a wide mirror.
@@ -309,6 +382,9 @@ fn where_there_is_no_caustic_the_picture_is_that_without_photons() {
         let scene = buffers.scene();
         let joined = path(&scene, 9, |_| ());
         assert_eq!(joined.image, path(&scene, 9, |s| s.caustics = false).image);
+        assert!(!has_photons(&joined));
+        let joined = cached(&scene, 5, |_| ());
+        assert_eq!(joined.image, cached(&scene, 5, |s| s.caustics = false).image);
         assert!(!has_photons(&joined));
     }
 }

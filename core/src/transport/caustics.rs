@@ -3,6 +3,8 @@
 //!
 //! From there paths go on in whatever way, and leave a photon on each rough surface, so that paths from the eye need not
 //! find the caustic by chance. A path that meets a rough surface first goes on by what a smooth coat mirrors there alone.
+//! Beside the records of an irradiance cache a photon is left only by what comes straight from a mirror or smooth glass:
+//! records have all that something rough sent.
 //! How paths go is in `flight.rs`.
 
 use super::estimator::{Counters, UNLIMITED};
@@ -51,6 +53,7 @@ pub struct CausticShooter<'a, F> {
     /// Pixels across and down.
     frame: [u32; 2],
     glimpses: &'a [Glimpse],
+    beside_records: bool,
 }
 
 /// What became of a light path: what its photons are worth, and from which cell of the guide it came.
@@ -86,12 +89,17 @@ impl<'a, F: Features> CausticShooter<'a, F> {
         let ShootSettings { seed, paths, max_depth, .. } = settings;
         let features = PhantomData;
         let flight = Flight { scene, bvh, lights, emission, seed, paths, max_depth, level, features };
-        Self { flight, discs, frame, glimpses: &[] }
+        Self { flight, discs, frame, glimpses: &[], beside_records: false }
     }
 
     /// The same, which knows what is seen in mirrors when it looks.
     pub fn with_glimpses(self, glimpses: &'a [Glimpse]) -> Self {
         Self { glimpses, ..self }
+    }
+
+    /// The same, of photons for [`Merging::beside_records`](super::Merging::beside_records).
+    pub fn beside_records(self) -> Self {
+        Self { beside_records: true, ..self }
     }
 
     /// Number of tasks of a map.
@@ -304,7 +312,8 @@ impl<F: Features, L: FnMut(&State, Photon, Share, &mut Counters)> Visitor for We
     #[inline]
     fn meet(&mut self, state: &State, vertex: &Vertex, counters: &mut Counters) -> Option<Onward> {
         let ends = ends_chain(vertex.bsdf);
-        let leaves = ends && state.segments > 1;
+        let is_known = self.shooter.beside_records && state.mirrored == 0;
+        let leaves = ends && state.segments > 1 && !is_known;
         if leaves && self.is_merged(state, vertex) {
             let share = self.share(state, vertex);
             if let Some(kept) = share.kept(vertex) {
@@ -318,6 +327,7 @@ impl<F: Features, L: FnMut(&State, Photon, Share, &mut Counters)> Visitor for We
     /// tracer finds its light.
     #[inline]
     fn leave(&self, state: &mut State, vertex: &Vertex, from: Vec3, sample: &BsdfSample) {
+        state.mirrored = vertex.bsdf.is_delta().into();
         if ends_chain(vertex.bsdf) && !sample.delta {
             if state.others != SCATTERED {
                 // What goes on is what was left.

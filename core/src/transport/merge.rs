@@ -23,6 +23,11 @@
 //! of N light paths and discs of radius r. At a mirror ρ = 1; where light is refracted, the squared ratio of the
 //! indices; elsewhere densities of both ways. Both ends know all of it when they meet: nobody needs to be traced back.
 //!
+//! Beside an irradiance cache photons have less to do: a record knows all that something rough, be it metal, sent to a point,
+//! and photons only what came there straight from a mirror or smooth glass; so did the light of each rough surface before,
+//! which a record would know otherwise. A path from the eye that goes from one rough surface to another asks photons at both,
+//! unless it leaves the first for a mirror or smooth glass: then those at the first know the light of the second.
+//!
 //! Weights are those of the power heuristic. For them p(xⱼ → x₍ⱼ₋₁₎) is that of a diffuse surface, cos θⱼ / π, whatever
 //! else x reflects, and r is that of the place of the photon, or of the point. So R = π² r² N ..., the weight of a
 //! photon is known when it is left, its power is multiplied with it, and a map needs no more than power. Photons that
@@ -30,6 +35,7 @@
 
 use super::density::{Gathered, Light, reflected};
 use super::shoot::holds_photons;
+use super::wave::Merged;
 use crate::bsdf::{Bsdf, Features};
 use crate::bvh::Bvh;
 use crate::light::Emission;
@@ -133,6 +139,8 @@ pub struct Merging<'a> {
     discs: Discs,
     /// Light paths of each map.
     paths: f32,
+    /// Whether records have the light that something rough sent.
+    beside_records: bool,
 }
 
 /// A surface of a chain: where light goes from `far`, the side of the light, to `near`, the side of the eye.
@@ -167,7 +175,32 @@ impl ChainLink<'_> {
 impl<'a> Merging<'a> {
     /// `maps` for even and odd samples, of `paths` light paths each, which were left for the same `discs`.
     pub fn new(maps: [&'a PhotonMap<'a>; 2], emission: &'a Emission<'a>, discs: Discs, paths: u32) -> Self {
-        Self { maps, emission, discs, paths: paths as f32 }
+        Self { maps, emission, discs, paths: paths as f32, beside_records: false }
+    }
+
+    /// The same, where an irradiance cache may have the light that something rough sent to a point. Photons are then of what
+    /// comes straight from a mirror or smooth glass.
+    pub fn beside_records(self) -> Self {
+        Self { beside_records: true, ..self }
+    }
+
+    /// Whether photons at a rough surface may be of what paths from there find by their `chain`.
+    #[inline]
+    pub(super) fn may_know(&self, chain: f32) -> bool {
+        !self.beside_records || chain > 0.0
+    }
+
+    /// What becomes of the vertex to merge at, where photons at a rough surface before knew of it: beside records the next may
+    /// be another.
+    #[inline]
+    pub(super) fn known(&self) -> Merged {
+        if self.beside_records { Merged::LATER } else { Merged::DONE }
+    }
+
+    /// Whether photons may come by `bsdf` to where a path has its `chain` from.
+    #[inline]
+    pub(super) fn may_come_by(&self, bsdf: &Bsdf, chain: f32) -> bool {
+        !self.beside_records || chain >= 0.0 || bsdf.is_delta()
     }
 
     /// The radius of discs around `place`.

@@ -508,6 +508,7 @@ impl<'a, F: Features> PathTracer<'a, F> {
                     };
                     if let Some(merging) = &self.merging
                         && !ends_chain(&bsdf)
+                        && merging.may_come_by(&bsdf, path.chain)
                     {
                         let there = ChainLink { point, bsdf: &bsdf, near: wo, far: wi };
                         let to_light = there.reverse::<F>(scene) / sample.pdf;
@@ -543,8 +544,9 @@ impl<'a, F: Features> PathTracer<'a, F> {
         if let Some(merging) = self.merging.as_ref().filter(|_| merged == Merged::LATER) {
             // Where depth is limited the first point alone, for photons do not know how far they are from their light.
             let is_first = path.disc == 0.0;
-            if !is_first && (self.is_limited() || is_wide_enough(path.disc, merging.radius(point.position))) {
-                merged = Merged::DONE;
+            let is_done = || self.is_limited() || is_wide_enough(path.disc, merging.radius(point.position));
+            if !is_first && merging.may_know(path.chain) && is_done() {
+                merged = merging.known();
             } else if segments > 1 && self.is_limited() {
                 merged = Merged::NEVER;
             } else {
@@ -616,6 +618,7 @@ impl<'a, F: Features> PathTracer<'a, F> {
             path.chain = match path.chain {
                 _ if is_rough && merged != Merged::NEVER => -merging.begun(point.position),
                 _ if is_rough => 0.0,
+                chain if !merging.may_come_by(&bsdf, chain) => 0.0,
                 0.0 => 0.0,
                 chain if sample.delta => chain.abs() / (sample.eta * sample.eta),
                 chain => chain.abs() * there.reverse::<F>(scene) / sample.pdf,

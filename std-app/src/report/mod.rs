@@ -52,8 +52,9 @@ pub struct Run<'a> {
 impl Run<'_> {
     /// Why what an audit has found may not be a bias; `None` where path tracing can be trusted.
     pub fn doubt(&self) -> Option<&'static str> {
-        let caustics = self.result.method.finds_caustics() && Census::of(self.scene).specular > 0;
-        caustics.then_some("path tracing, the judge, may miss light through mirrors and glass")
+        let by_photons = self.result.method.finds_caustics() && Census::of(self.scene).specular > 0;
+        (by_photons || self.result.caustics.used)
+            .then_some("path tracing, the judge, may miss light through mirrors and glass")
     }
 
     /// What was left out and why.

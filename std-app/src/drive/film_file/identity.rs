@@ -48,7 +48,8 @@ impl Identity {
         if has_photons {
             cache += &format!(", {:?}", settings.photons);
         }
-        let joined = method == Method::Path.name() && settings.caustics;
+        let may_join = [Method::Path, Method::IrradianceCache].map(Method::name).contains(&method);
+        let joined = may_join && settings.caustics;
         let caustics = if joined { ", caustics" } else { "" };
         Self {
             version: env!("CARGO_PKG_VERSION").into(),

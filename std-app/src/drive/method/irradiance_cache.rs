@@ -1,12 +1,16 @@
 //! Irradiance caching: the indirect light of diffuse surfaces is gathered at few points and interpolated between them,
-//! all other light is path traced. Two caches that know nothing of each other serve the even and the odd samples, so
+//! all other light is path traced, or, where a first look says that it pays, caustics come from photons (`caster.rs`). Two caches that know nothing of each other serve the even and the odd samples, so
 //! that the halves of the film tell the errors of records too.
 //!
 //! The first round begins with the overture of both. Then caches are frozen; a point that no record reaches is path
 //! traced, as is every surface that is not diffuse. Caches can be kept in a file, and be the first records of another
 //! picture of the same scene.
 
+use super::caster::Caster;
+use super::caustics::{self, CausticUse};
 use super::overture::{Growing, Overture};
+use super::path::Paths;
+use super::photon_view::PhotonView;
 use super::photons::{Laboratory, PhotonUse, Shelf};
 use super::{Method, Renderer, Stage};
 use crate::drive::audit::Audit;
@@ -24,6 +28,7 @@ use core::ops::Range;
 use halflight_core::bsdf::Features;
 use halflight_core::cache::irradiance::{CellFlux, IrradianceCache, Metric, metric};
 use halflight_core::film::{Dropped, PIXELS_PER_TILE, Pixel, PixelSet, Tile};
+use halflight_core::light::Emission;
 use halflight_core::memory::{Arena, Footprint, Line};
 use halflight_core::transport::gather::Gathering;
 use halflight_core::transport::path::{LIGHTS, WAVE};
@@ -115,10 +120,44 @@ const TRIALS: Range<u32> = (1 << 28) - 2..1 << 28;
 /// By what factor one point of lights must leave more noise, for its rays, before several are asked.
 const WORTH: f64 = 1.25;
 
-/// Takes the memory, sets the method up, and hands it to `then`.
+/// Looks for caustics, then takes the memory, sets the method up, and hands it to `then`.
 pub(super) fn with<F: Features, T>(
     stage: &Stage,
     memory: &mut Memory,
+    then: impl FnOnce(&mut dyn Renderer, &mut Memory) -> Result<T, RenderError>,
+) -> Result<T, RenderError> {
+    if !caustics::are_possible(stage) {
+        return set_up::<F, T>(stage, memory, (None, CausticUse::default()), then);
+    }
+    let Stage { lights, workers, .. } = *stage;
+    let scratch = caustics::scratch::<F>();
+    let others = Audit::bytes::<F>(stage, Method::IrradianceCache.is_biased());
+    let needed = scratch.bytes().saturating_mul(workers.count()).saturating_add(others);
+    if !caustics::has_memory(memory, lights, needed) {
+        let caustics = CausticUse { lacks_memory: true, ..CausticUse::default() };
+        return set_up::<F, T>(stage, memory, (None, caustics), then);
+    }
+    let mut paths = Paths::<F>::alone(stage, memory.take_each("paths", scratch, workers.count())?);
+    let mut lines = memory.take("emission", caustics::footprint(lights))?;
+    let mut arena = Arena::new(bytemuck::cast_slice_mut(&mut lines));
+    let (emission, _) = caustics::look_first::<F>(stage, &mut paths, stage.discs(), true, &mut arena)?;
+    let caustics = paths.caustics;
+    drop(paths);
+    memory.give_back("paths");
+    if emission.is_none() {
+        // As if nobody had looked.
+        drop(lines);
+        memory.give_back("emission");
+        return set_up::<F, T>(stage, memory, (None, caustics), then);
+    }
+    set_up::<F, T>(stage, memory, (emission, caustics), then)
+}
+
+/// Takes the memory, sets the method up, and hands it to `then`; with photons that go by the emission, if there is one.
+fn set_up<F: Features, T>(
+    stage: &Stage,
+    memory: &mut Memory,
+    (emission, caustics): (Option<Emission>, CausticUse),
     then: impl FnOnce(&mut dyn Renderer, &mut Memory) -> Result<T, RenderError>,
 ) -> Result<T, RenderError> {
     let Stage { scene, bvh, lights, settings, workers } = *stage;
@@ -139,6 +178,7 @@ pub(super) fn with<F: Features, T>(
     let scratch = PathTracer::<F>::scratch(WAVE).or(PathTracer::<F>::gather_scratch(finest));
     let by_photons = gather == Gather::Photons && has_indirect_light(settings);
     let scratch = if by_photons { scratch.or(Laboratory::scratch::<F>()) } else { scratch };
+    let scratch = if emission.is_some() { scratch.or(caustics::scratch::<F>()) } else { scratch };
     let scratch = memory.take_each("paths", scratch, workers.count())?;
     let tiles = Tile::count(settings.width, settings.height);
     memory.set_aside("edges", Footprint::default().slice::<[u64; PIXELS_PER_TILE / 64]>(tiles))?;
@@ -157,6 +197,10 @@ pub(super) fn with<F: Features, T>(
     let fewest = loaded.iter().map(Vec::len).max().unwrap_or(0);
     let wanted = (pixels / PIXELS_PER_RECORD).max(FEWEST_RECORDS).saturating_add(fewest);
     let others = Audit::bytes::<F>(stage, Method::IrradianceCache.is_biased());
+    let caster = match emission {
+        Some(emission) => Some(Caster::new(stage, memory, (emission, stage.discs()), true, others)?),
+        None => None,
+    };
     let laboratory = if by_photons {
         // Half of the memory for photons at most: records need some as well.
         let half = memory.available().saturating_sub(others) / 2;
@@ -192,6 +236,8 @@ pub(super) fn with<F: Features, T>(
         size: [settings.width, settings.height],
         halves: [Growing::new(even, 0), Growing::new(odd, 1)],
         laboratory,
+        caster,
+        caustics,
         scratch,
         survey,
         view: View::of(scene, settings),
@@ -226,6 +272,9 @@ struct Cached<'a, F> {
     size: [u32; 2],
     halves: [Growing<'a>; 2],
     laboratory: Option<(Laboratory<'a>, [Shelf; 2])>,
+    /// Of photons of caustics, where they are worth it.
+    caster: Option<Caster<'a>>,
+    caustics: CausticUse,
     scratch: Vec<Vec<Line>>,
     /// Points, and memory for gathering there.
     survey: Option<(u32, Vec<Vec<Line>>)>,
@@ -400,7 +449,7 @@ impl<F: Features> Renderer for Cached<'_, F> {
         if resumed {
             crew.canvas.counters = counted;
         }
-        let Self { tracer, halves: [even, odd], scratch, edges, lights, laboratory, .. } = self;
+        let Self { tracer, halves: [even, odd], scratch, edges, lights, laboratory, caster, .. } = self;
         let edges = edges.as_deref().unwrap_or_default();
         let mut tracer =
             tracer.with_caches([&even.cache, &odd.cache]).with_edges(edges).with_lights(lights.unwrap_or(1));
@@ -410,6 +459,9 @@ impl<F: Features> Renderer for Cached<'_, F> {
             let Some(odd) = laboratory.build::<F>(odd, 1, crew, scratch)? else { return Ok(()) };
             built = [even, odd];
             tracer = tracer.with_bounced(built.each_ref().map(|built| laboratory.gathered(built)));
+        }
+        if let Some(caster) = caster {
+            return caster.round(&tracer, scratch, crew);
         }
         crew.tiles(u32::MAX, scratch, &|task, samples, arena, pixels| {
             tracer.run(task, samples, WAVE, arena, pixels)
@@ -462,7 +514,25 @@ impl<F: Features> Renderer for Cached<'_, F> {
         })
     }
 
+    fn caustics(&self) -> CausticUse {
+        self.caustics
+    }
+
+    fn photon_view(&mut self) -> Result<Option<PhotonView>, RenderError> {
+        self.caster.as_mut().map_or(Ok(None), |caster| caster.view::<F>())
+    }
+
     fn photons(&self) -> Option<PhotonUse> {
-        self.laboratory.as_ref().map(|(laboratory, _)| laboratory.used)
+        let reflected = self.laboratory.as_ref().map(|(laboratory, _)| laboratory.used);
+        let caustic = self.caster.as_ref().map(|caster| caster.used);
+        match (reflected, caustic) {
+            (Some(reflected), Some(caustic)) => Some(PhotonUse {
+                caustic: caustic.caustic,
+                maps: reflected.maps + caustic.maps,
+                seconds: reflected.seconds + caustic.seconds,
+                ..reflected
+            }),
+            (reflected, caustic) => reflected.or(caustic),
+        }
     }
 }

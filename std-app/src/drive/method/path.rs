@@ -46,6 +46,13 @@ impl<'a, F: Features> Paths<'a, F> {
         Ok(Self { tracer, scratch, reuse, mean, caustics })
     }
 
+    /// Paths that share nothing, for looks before a picture that another method makes.
+    pub(super) fn alone(stage: &Stage<'a>, scratch: Vec<Vec<Line>>) -> Self {
+        let Stage { scene, bvh, lights, settings, .. } = *stage;
+        let tracer = PathTracer::<F>::new(scene, bvh, lights, path_settings(settings), settings.level);
+        Self { tracer, scratch, reuse: Reuse::default(), mean: None, caustics: CausticUse::default() }
+    }
+
     /// About the mean radiance of the picture.
     pub(super) fn mean(&mut self, stage: &Stage) -> Result<f32, RenderError> {
         if self.mean.is_none() {
