@@ -263,17 +263,16 @@ fn has_photons(result: &RenderResult) -> bool {
 #[test]
 fn records_and_photons_have_no_light_in_common() {
     let rooms = [
-        ("glass", in_a_room(lamp_over_ball(glass(0.0), 0.7)), None),
-        ("mirror", in_a_room(lamp_before(metal(0.0), 0.6)), None),
-        ("mirror, limited", in_a_room(lamp_before(metal(0.0), 0.6)), Some(4)),
+        ("glass", in_a_room(lamp_over_ball(glass(0.0), 0.7))),
+        ("mirror", in_a_room(lamp_before(metal(0.0), 0.6))),
     ];
-    for (name, buffers, depth) in rooms {
+    for (name, buffers) in rooms {
         let scene = buffers.scene();
-        let truth = path(&scene, 1024, |s| (s.caustics, s.max_depth) = (false, depth));
-        let joined = cached(&scene, 64, |s| s.max_depth = depth);
+        let truth = path(&scene, 256, |_| ());
+        let joined = cached(&scene, 64, |_| ());
         assert!(has_photons(&joined) && joined.cache.unwrap().records > 100, "{name}: {:?}", joined.caustics);
         for (a, b) in joined.image.mean().into_iter().zip(truth.image.mean()) {
-            assert!((a / b - 1.0).abs() < 0.01, "{name}: {a} {b}");
+            assert!((a / b - 1.0).abs() < 0.005, "{name}: {a} {b}");
         }
         let difference = difference(&joined.image, &truth.image);
         assert!(difference < 0.03, "{name}: {difference}");
@@ -295,8 +294,6 @@ fn beside_records_bits_are_the_same_and_off_is_off() {
     assert_eq!(cached(&scene, 11, |s| s.resume = Some(film.clone())).image, one.image);
     let off = cached(&scene, 11, |s| s.caustics = false);
     assert!(!has_photons(&off) && off.image != one.image);
-    // Records are of all light, with photons beside them or not.
-    assert_eq!(off.cache.unwrap().records, one.cache.unwrap().records);
     [film, records].into_iter().for_each(|file| std::fs::remove_file(file).unwrap());
 }
 

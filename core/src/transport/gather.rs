@@ -95,6 +95,7 @@ impl Place {
             throughput: [1.0; 3],
             pdf: f32::INFINITY,
             pixel,
+            position: self.position,
             place: index as u32,
             sample,
             segments: 2,

@@ -39,7 +39,7 @@ pub(super) struct Shot {
 /// How a method does its work: what may differ between the methods of a race.
 #[derive(Args, Clone, Debug)]
 pub(super) struct Options {
-    /// Whether `path` is joined with photons of caustics where a first look finds any [default: auto]
+    /// Whether `path` and `irradiance-cache` are joined with photons of caustics where a first look finds any [default: auto]
     #[arg(long)]
     caustics: Option<Caustics>,
     /// Whether neighbouring pixels share what their paths find: less noise for the same time where much of the

@@ -31,6 +31,12 @@ const MOST_PATHS: usize = 4096 * PATHS;
 /// Samples that share their photons, even ones and odd ones apart, at most: less would not fill the waves of a tile.
 const MOST_SAMPLES: u32 = 8;
 
+/// Radius of the discs where records are lit, in pixels: they see the mean of what these blur. Their map has a number that no
+/// picture's has.
+const RECORD_RADIUS: f32 = 3.0;
+const RECORD_MAP: u32 = 1 << 30;
+const RECORD_PART: usize = 4;
+
 /// See the file.
 pub(super) struct Caster<'a> {
     stage: Stage<'a>,
@@ -54,6 +60,20 @@ struct Kept {
     /// Photons that there is room for in each.
     room: usize,
     shapes: [MapShape; 2],
+}
+
+/// A map of photons for rays that gather.
+pub(super) struct ForRecords<'m> {
+    map: PhotonMap<'m>,
+    emission: &'m Emission<'m>,
+    discs: Discs,
+    paths: u32,
+}
+
+impl ForRecords<'_> {
+    pub(super) fn merging(&self) -> Merging<'_> {
+        Merging::new([&self.map; 2], self.emission, self.discs, self.paths).beside_records()
+    }
 }
 
 /// Samples that share their photons.
@@ -160,6 +180,37 @@ impl<'a> Caster<'a> {
             })?;
         }
         Ok(())
+    }
+
+    /// Photons for rays that gather for cache number 0 or 1; `None` where the round is over.
+    pub(super) fn for_records<F: Features>(
+        &mut self,
+        half: u32,
+        scratch: &mut [Vec<Line>],
+        crew: &mut Crew,
+    ) -> Result<Option<ForRecords<'_>>, RenderError> {
+        let Self { stage, discs, emission, photons, used, kept, .. } = self;
+        *kept = None;
+        let start = Instant::now();
+        let paths = used.caustic.map_or(0, |map| map.given as usize).div_ceil(RECORD_PART);
+        let from = (discs.of_pixels(RECORD_RADIUS), 0);
+        let (shooter, discs) = shooter::<F>(stage, emission, paths, from, true);
+        let room = shooter.tasks() * ROOM;
+        let lines = &mut photons[half as usize & 1];
+        let mut map = Photons::new(room, &mut Arena::new(bytemuck::cast_slice_mut(lines)))?;
+        let number = RECORD_MAP + half;
+        let shoot = |task: usize, arena: &mut Arena, out: &mut [_]| shooter.run(task, number, arena, out);
+        if !crew.pass(map.as_mut_slice(), ROOM, scratch, &shoot)? {
+            return Ok(None);
+        }
+        let map = stage.workers.build_photons(map, room);
+        used.maps += 1;
+        if let Some(used) = &mut used.caustic {
+            used.shot += paths as u64;
+            used.stored += map.len() as u64;
+        }
+        used.seconds += start.elapsed().as_secs_f64();
+        Ok(Some(ForRecords { map, emission, discs, paths: paths as u32 }))
     }
 
     /// The last maps, as the camera sees them.

@@ -303,24 +303,32 @@ struct Cached<'a, F> {
 impl<F: Features> Cached<'_, F> {
     /// Fills both halves, or goes on with it, and keeps them; whether that is done: not where the round is over.
     fn fill(&mut self, crew: &mut Crew) -> Result<bool, RenderError> {
-        let Self { tracer, gathering, size, halves, laboratory, scratch, .. } = self;
+        let Self { tracer, gathering, size, halves, laboratory, caster, scratch, .. } = self;
         let start = Instant::now();
-        let overture = Overture { tracer, gathering, size: *size };
         let mut all = true;
         for (i, half) in halves.iter_mut().enumerate() {
-            all = all
-                && match laboratory {
-                    Some((laboratory, shelves)) => {
-                        match laboratory.build::<F>(&mut shelves[i], i as u32, crew, scratch)? {
-                            None => false,
-                            Some(built) => {
-                                let tracer = &tracer.with_bounced([laboratory.gathered(&built); 2]);
-                                Overture { tracer, ..overture }.fill(half, crew, scratch)?
-                            }
-                        }
-                    }
-                    None => overture.fill(half, crew, scratch)?,
+            let (photons, built);
+            let mut tracer = *tracer;
+            if let Some(caster) = caster.as_mut().filter(|_| !half.is_finished()) {
+                let Some(found) = caster.for_records::<F>(i as u32, scratch, crew)? else {
+                    all = false;
+                    break;
                 };
+                photons = found;
+                tracer = tracer.with_caustics(photons.merging());
+            }
+            if let Some((laboratory, shelves)) = laboratory {
+                let Some(found) = laboratory.build::<F>(&mut shelves[i], i as u32, crew, scratch)? else {
+                    all = false;
+                    break;
+                };
+                built = found;
+                tracer = tracer.with_bounced([laboratory.gathered(&built); 2]);
+            }
+            if !(Overture { tracer: &tracer, gathering, size: *size }).fill(half, crew, scratch)? {
+                all = false;
+                break;
+            }
         }
         if all {
             halves.iter_mut().for_each(|half| half.cache.settle());

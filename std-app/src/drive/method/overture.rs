@@ -145,6 +145,11 @@ impl<'a> Growing<'a> {
         self.sweeps = SWEEPS;
     }
 
+    /// Whether nothing will be added.
+    pub(in crate::drive) fn is_finished(&self) -> bool {
+        self.sweeps >= SWEEPS
+    }
+
     fn is_known(&self, glint: &Glint) -> bool {
         self.spots.iter().chain(&self.dismissed).any(|spot| spot.holds(glint.position.into()))
     }
