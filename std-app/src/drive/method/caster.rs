@@ -31,11 +31,12 @@ const MOST_PATHS: usize = 4096 * PATHS;
 /// Samples that share their photons, even ones and odd ones apart, at most: less would not fill the waves of a tile.
 const MOST_SAMPLES: u32 = 8;
 
-/// Radius of the discs where records are lit, in pixels: they see the mean of what these blur. Their map has a number that no
-/// picture's has.
+/// Radius of the discs where rays gather for records, in pixels: they see the mean of what these blur.
 const RECORD_RADIUS: f32 = 3.0;
-const RECORD_MAP: u32 = 1 << 30;
+
+/// Their maps have one in so many of the light paths of a picture's, and numbers that no picture's has.
 const RECORD_PART: usize = 4;
+const RECORD_MAP: u32 = 1 << 30;
 
 /// See the file.
 pub(super) struct Caster<'a> {
