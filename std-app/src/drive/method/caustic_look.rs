@@ -17,6 +17,11 @@ const LEAST_SHARE: f64 = 3.5e-2;
 const LEAST_NOISE: f64 = 0.5;
 const LEAST_USEFUL: f64 = 0.2;
 
+/// The parts of them from which on a glance leaves it open: it finds between a half and twice the share, and where it has not learned
+/// which of many lamps matters a tenth of what is useful.
+const DOUBT_SHARE: f64 = 0.25;
+const DOUBT_USEFUL: f64 = 0.0625;
+
 /// Samples of a picture, and how often paths must find light in all of it to be noise: what they find more rarely is
 /// missing.
 const SAMPLES: f64 = 64.0;
@@ -83,6 +88,11 @@ impl Looked {
         };
         let noise = blocks.iter().map(relative).sum::<f64>() / ALL as f64;
         Self { share, useful: useful(finds), noise, mean }
+    }
+
+    /// Whether a longer look may find that photons are worth it.
+    pub(super) fn may_pay(&self) -> bool {
+        self.share >= DOUBT_SHARE * LEAST_SHARE || self.useful >= DOUBT_USEFUL * LEAST_USEFUL
     }
 
     /// Whether photons are worth it.

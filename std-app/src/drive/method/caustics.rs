@@ -23,7 +23,8 @@ use halflight_core::photon::Photons;
 use halflight_core::transport::caustics::{CausticShooter, Find, PATHS, ROOM};
 use halflight_core::transport::{Discs, GLIMPSES, Glimpse, PathTracer, path::WAVE};
 
-/// Light paths of each look.
+/// Light paths of a glance, which tells where there is next to nothing to find, and of each look after it.
+const GLANCE: usize = 4 * PATHS;
 const LOOK: usize = 32 * PATHS;
 
 /// The share of the picture's light from which on photons may have all of it, where the method is left to us: paths find
@@ -78,26 +79,29 @@ pub(super) fn look_first<'l, F: Features>(
 ) -> Result<(Option<Emission<'l>>, bool), RenderError> {
     let Stage { scene, bvh, lights, settings, .. } = *stage;
     let plain = Emission::build(scene, lights, &bvh.bounds(), arena)?;
-    let Some(mut worth) = Worth::aimed(scene, lights, &plain, arena)? else { return Ok((None, false)) };
     let mut glimpses = vec![Glimpse::default(); GLIMPSES];
     let (seen, frame) = ((scene, bvh, settings.level), [settings.width, settings.height]);
     let found = Glimpse::find::<F>(seen, frame, settings.seed, &mut glimpses);
-    let seen = (discs, &glimpses[..found]);
+    let eye = Eye { discs, glimpses: &glimpses[..found], is_beside };
+    if !glance::<F>(stage, paths, (&plain, &eye), &mut arena.scratch())?
+        .is_some_and(|glance| glance.may_pay())
+    {
+        return Ok((None, false));
+    }
+    let Some(mut worth) = Worth::aimed(scene, lights, &plain, arena)? else { return Ok((None, false)) };
     let aimed = worth.guide(&plain, arena)?;
-    for find in look::<F>(stage, paths, &aimed, (seen, 0), is_beside)? {
+    for find in look::<F>(stage, paths, &aimed, &eye, (LOOK, 0))? {
         worth.learn(find.cell, find.worth);
     }
     let learned = worth.guide(&plain, arena)?;
-    let finds = look::<F>(stage, paths, &learned, (seen, 1), is_beside)?;
+    let finds = look::<F>(stage, paths, &learned, &eye, (LOOK, 1))?;
     finds.iter().for_each(|find| worth.learn(find.cell, find.worth));
-    let pixels = f64::from(settings.width) * f64::from(settings.height);
-    let looked = Looked::new(&finds, FIRST_RADIUS, pixels, f64::from(paths.mean(stage)?));
+    let looked = looked(stage, paths, &finds)?;
     drop(finds);
-    paths.caustics.share = Some(looked.share);
     let is_open = settings.method.is_none() && settings.resume.is_none();
     let mut is_all = false;
     if is_open && looked.share >= MOST_SHARE {
-        let by_chance = useful(&look::<F>(stage, paths, &plain, (seen, 2), is_beside)?);
+        let by_chance = useful(&look::<F>(stage, paths, &plain, &eye, (LOOK, 2))?);
         is_all = by_chance > 0.0 && by_chance >= LEAST_BY_CHANCE * looked.useful;
     }
     let emission = looked.pays(stage, paths)?.then(|| worth.guide(&plain, arena)).transpose()?;
@@ -136,21 +140,48 @@ pub(super) fn with<F: Features, T>(
     then(&mut Joined { paths, caster }, memory)
 }
 
-/// What photons of `emission`, those of map `map`, are worth.
+/// How photons are seen.
+struct Eye<'g> {
+    discs: Discs,
+    glimpses: &'g [Glimpse],
+    /// Beside a cache.
+    is_beside: bool,
+}
+
+/// What a few light paths tell that go to all that mirrors or refracts; `None` where nothing does.
+fn glance<'l, F: Features>(
+    stage: &Stage,
+    paths: &mut Paths<F>,
+    (plain, eye): (&Emission<'l>, &Eye),
+    arena: &mut Arena<'l>,
+) -> Result<Option<Looked>, RenderError> {
+    let Some(worth) = Worth::aimed(stage.scene, stage.lights, plain, arena)? else { return Ok(None) };
+    let finds = look::<F>(stage, paths, &worth.guide(plain, arena)?, eye, (GLANCE, 0))?;
+    looked(stage, paths, &finds).map(Some)
+}
+
+/// What `finds` tell together.
+fn looked<F: Features>(stage: &Stage, paths: &mut Paths<F>, finds: &[Find]) -> Result<Looked, RenderError> {
+    let pixels = f64::from(stage.settings.width) * f64::from(stage.settings.height);
+    let looked = Looked::new(finds, FIRST_RADIUS, pixels, f64::from(paths.mean(stage)?));
+    paths.caustics.share = Some(looked.share);
+    Ok(looked)
+}
+
+/// What `count` photons of `emission`, those of map `map`, are worth.
 fn look<F: Features>(
     stage: &Stage,
     paths: &mut Paths<F>,
     emission: &Emission,
-    ((discs, glimpses), map): ((Discs, &[Glimpse]), u32),
-    is_beside: bool,
+    &Eye { discs, glimpses, is_beside }: &Eye,
+    (count, map): (usize, u32),
 ) -> Result<Vec<Find>, RenderError> {
-    let workers = stage.workers;
     let scratch = &mut paths.scratch;
-    let (shooter, _) = shooter::<F>(stage, emission, LOOK, (discs, 0), is_beside);
-    let mut finds = vec![Find::default(); LOOK];
+    let (shooter, _) = shooter::<F>(stage, emission, count, (discs, 0), is_beside);
+    let mut finds = vec![Find::default(); count];
     let shooter = shooter.with_glimpses(glimpses);
     let look = |task: usize, arena: &mut Arena, out: &mut [Find]| shooter.look(task, map, arena, out);
-    workers.pass(&mut finds, PATHS, scratch, &|| false, &look)?;
+    stage.workers.pass(&mut finds, PATHS, scratch, &|| false, &look)?;
     Ok(finds)
 }
 
