@@ -130,6 +130,22 @@ fn is_right_in_the_mean(name: &str, buffers: &SceneBuffers, max_depth: u32) {
     }
 }
 
+/// A room of mirrors with a floor, a lamp on it that faces up, and a plate below the ceiling, right over the eye: light goes from
+/// the floor by a mirror to the plate, where discs are small, and from there by another to the floor again.
+fn between_mirrors() -> SceneBuffers {
+    let camera = Camera::look_at(Vec3::new(0.0, 2.7, 0.0), Vec3::new(0.1, 0.0, -0.1), Vec3::Z, 40.0);
+    let mut buffers = SceneBuffers::new(camera);
+    let reflectance = Rgb::splat(0.95).into();
+    let mirror = buffers.material(Material { surface: Surface::Mirror { reflectance }, ..Material::GREY });
+    let grey = buffers.material(Material::diffuse(Rgb::splat(0.8)));
+    let lamp = buffers.material(emitter(0.0, 8.0));
+    buffers.cuboid(Vec3::new(-1.0, -0.1, -1.0), Vec3::new(1.0, 3.5, 1.0), true, mirror);
+    buffers.square(Vec3::ZERO, Vec3::Y, 1.9, grey);
+    buffers.square(Vec3::new(0.0, 3.0, 0.0), Vec3::NEG_Y, 1.2, grey);
+    buffers.square(Vec3::new(0.6, 0.1, 0.0), Vec3::Y, 0.5, lamp);
+    buffers
+}
+
 fn metal(roughness: f32) -> Surface {
     Surface::Conductor { reflectance: Rgb::splat(0.9).into(), roughness: roughness.into() }
 }
@@ -143,6 +159,11 @@ fn what_a_mirror_throws_is_right_in_the_mean() {
     is_right_in_the_mean("mirror", &lamp_before(metal(0.0), 0.6), UNLIMITED);
     is_right_in_the_mean("mirror, limited", &lamp_before(metal(0.0), 0.6), 3);
     is_right_in_the_mean("rough metal", &lamp_before(metal(0.5), 0.3), UNLIMITED);
+}
+
+#[test]
+fn what_mirrors_throw_after_each_other_is_right_in_the_mean() {
+    is_right_in_the_mean("between mirrors", &between_mirrors(), UNLIMITED);
 }
 
 #[test]

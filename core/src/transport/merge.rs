@@ -23,19 +23,19 @@
 //! of N light paths and discs of radius r. At a mirror ρ = 1; where light is refracted, the squared ratio of the
 //! indices; elsewhere densities of both ways. Both ends know all of it when they meet: nobody needs to be traced back.
 //!
-//! Beside an irradiance cache photons have less to do: a record knows all that something rough, be it metal, sent to a point,
-//! and photons only what came there straight from a mirror or smooth glass; so did the light of each rough surface before,
-//! which a record would know otherwise. A path from the eye that goes from one rough surface to another asks photons at both,
-//! unless it leaves the first for a mirror or smooth glass: then those at the first know the light of the second.
-//!
 //! Weights are those of the power heuristic. For them p(xⱼ → x₍ⱼ₋₁₎) is that of a diffuse surface, cos θⱼ / π, whatever
 //! else x reflects, and r is that of the place of the photon, or of the point. So R = π² r² N ..., the weight of a
 //! photon is known when it is left, its power is multiplied with it, and a map needs no more than power. Photons that
 //! paths find more easily are hardly ever left. Ends of paths by roulette count for none of the densities.
+//!
+//! Beside an irradiance cache photons have less to do: a record knows all that something rough, be it metal, sent to a point,
+//! and photons only what came there straight from a mirror or smooth glass. A light path that meets two rough surfaces after
+//! each other ends, as its light is the record's. A path from the eye asks photons at each rough surface, but for those to
+//! which mirrors and glass lead from one whose photons know them.
 
 use super::density::{Gathered, Light, reflected};
 use super::shoot::holds_photons;
-use super::wave::Merged;
+use super::wave::{Merged, Path};
 use crate::bsdf::{Bsdf, Features};
 use crate::bvh::Bvh;
 use crate::light::Emission;
@@ -184,17 +184,20 @@ impl<'a> Merging<'a> {
         Self { beside_records: true, ..self }
     }
 
-    /// Whether photons at a rough surface may be of what paths from there find by their `chain`.
+    /// What becomes of the one vertex at which `path` can be merged, now that it meets the rough surface at `place` in its
+    /// segment number `segments`: `None` where photons are to be asked there. Beside records they may know what comes
+    /// straight from a mirror, and of that all that came to the surfaces before it.
+    ///
+    /// Where depth `is_limited` that is the first surface alone, for photons do not know how far they are from their light.
     #[inline]
-    pub(super) fn may_know(&self, chain: f32) -> bool {
-        !self.beside_records || chain > 0.0
-    }
-
-    /// What becomes of the vertex to merge at, where photons at a rough surface before knew of it: beside records the next may
-    /// be another.
-    #[inline]
-    pub(super) fn known(&self) -> Merged {
-        if self.beside_records { Merged::LATER } else { Merged::DONE }
+    pub(super) fn met(&self, path: &Path, place: Vec3, segments: u32, is_limited: bool) -> Option<Merged> {
+        let is_first = path.disc == 0.0;
+        let is_known =
+            || is_limited || path.merged == Merged::KNOWN || is_wide_enough(path.disc, self.radius(place));
+        if !is_first && (!self.beside_records || path.chain > 0.0) && is_known() {
+            return Some(if self.beside_records { Merged::KNOWN } else { Merged::DONE });
+        }
+        (segments > 1 && is_limited).then_some(Merged::NEVER)
     }
 
     /// Whether photons may come by `bsdf` to where a path has its `chain` from.

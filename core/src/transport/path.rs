@@ -28,7 +28,7 @@ use super::estimator::{
     survival,
 };
 use super::maps::{GatherLight, PhotonMaps, Said};
-use super::merge::{ChainLink, Merging, ends_chain, is_wide_enough};
+use super::merge::{ChainLink, Merging, ends_chain};
 use super::reuse::Exchange;
 use super::shadow::{FEW, pass_cutout, passing, shadow_ray};
 use super::spots::{Cones, Spot};
@@ -541,21 +541,18 @@ impl<'a, F: Features> PathTracer<'a, F> {
         }
 
         let mut merged = path.merged;
-        if let Some(merging) = self.merging.as_ref().filter(|_| merged == Merged::LATER) {
-            // Where depth is limited the first point alone, for photons do not know how far they are from their light.
-            let is_first = path.disc == 0.0;
-            let is_done = || self.is_limited() || is_wide_enough(path.disc, merging.radius(point.position));
-            if !is_first && merging.may_know(path.chain) && is_done() {
-                merged = merging.known();
-            } else if segments > 1 && self.is_limited() {
-                merged = Merged::NEVER;
-            } else {
-                let turns = || sampler.single(dimension::PROBES + segments);
-                let from = (wo, if is_first { travelled } else { 0.0 });
-                let tracer = (self.bvh, self.level);
-                let gathered = merging.reflected::<F>(tracer, path.sample, (point, &bsdf), from, turns);
-                path.gather(throughput, exchange, gathered);
-            }
+        if let Some(merging) = self.merging.as_ref().filter(|_| merged.may_come()) {
+            merged = match merging.met(path, point.position, segments, self.is_limited()) {
+                Some(merged) => merged,
+                None => {
+                    let turns = || sampler.single(dimension::PROBES + segments);
+                    let from = (wo, if path.disc == 0.0 { travelled } else { 0.0 });
+                    let tracer = (self.bvh, self.level);
+                    let gathered = merging.reflected::<F>(tracer, path.sample, (point, &bsdf), from, turns);
+                    path.gather(throughput, exchange, gathered);
+                    Merged::LATER
+                }
+            };
         }
 
         let [u, v] = dimension::scattering(&sampler, segments);

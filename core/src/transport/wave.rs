@@ -65,6 +65,14 @@ impl Merged {
     pub(super) const DONE: Merged = Merged(1);
     /// They were not, and will not be.
     pub(super) const NEVER: Merged = Merged(2);
+    /// Photons at a surface before know what comes straight from a mirror; of other light it may be still to come.
+    pub(super) const KNOWN: Merged = Merged(3);
+
+    /// Whether it may be still to come.
+    #[inline]
+    pub(super) fn may_come(self) -> bool {
+        self == Self::LATER || self == Self::KNOWN
+    }
 }
 
 /// Light that comes to a diffuse point is either direct, from emitters and from what mirrors or refracts them; or it
