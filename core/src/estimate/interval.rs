@@ -13,8 +13,8 @@
 //!    exactly. For a pixel of variance V the product has the variance 4 V², and the estimate squared the mean 3 V² (more
 //!    with heavy tails); Student's t says what it is to know that from few pixels. How errors hang together between
 //!    pixels that share paths is seen in the differences of the halves. Upwards less is in doubt where single samples have
-//!    the noise: the error of a pixel that flashed is hardly more than its variance, if enough of them tell. Nor is the lower
-//!    end above what the error may be if all flashes belonged there.
+//!    the noise: the error of a pixel that flashed is hardly more than its variance, if enough of them tell. If they are few,
+//!    the lower end is not above what the error may be if all flashes belonged there.
 //!
 //! The price: about as much time as a tenth of a sample for each pixel.
 
@@ -38,12 +38,13 @@ pub struct ErrorEstimate {
 /// The normal distribution lies between this and its negative with 95 %.
 pub(super) const Z: f64 = 1.959_963_984_540_054;
 
-/// Degrees of freedom at the least, of independent pixels: where fewer of them have nearly all of the noise it has heavy
-/// tails, and their squares are too large already.
+/// Where fewer independent pixels have nearly all of the noise, intervals are those of Student's t with as many degrees of
+/// freedom. Where more have it they are those of the normal distribution: squares of heavy tails are rather too large, and
+/// Student's t would be for squares that are as often too small.
 const FEWEST: f64 = 8.0;
 
-/// Where fewer pixels than these have nearly all of the noise an interval reaches as far up as down: so few flashes do not tell
-/// how often there are any, nor are pixels like them known.
+/// Where fewer independent pixels than these have nearly all of the noise an interval reaches as far up as down, and down to
+/// where all flashes belong there: so few do not tell how often there are any, nor are pixels like them known.
 const FLASHES: f64 = 4.0;
 
 /// How soon δ is doubted: all of it counts where it is small and both bounds are right to first order, at most a tenth
@@ -57,10 +58,9 @@ impl ErrorEstimate {
         let mut sum = TileError::default();
         tiles.for_each(|tile| sum += tile);
         let shared = shared(&sum);
-        let pixels = freedom(sum.squares, sum.fourths);
-        let events = pixels / shared;
-        let reach = student_95(fmax(events, FEWEST)) * sqrt(shared);
-        Self::with_reach(&sum, reach, if events < FLASHES { f64::INFINITY } else { sum.above })
+        let flashes = freedom(sum.squares, sum.fourths) / shared;
+        let quantile = if flashes < FEWEST { student_95(FEWEST) } else { Z };
+        Self::with_reach(&sum, quantile * sqrt(shared), sum.above, flashes)
     }
 
     /// From the sums over regions, where a method shares between pixels far apart: regions count as independent. They
@@ -73,13 +73,13 @@ impl ErrorEstimate {
             squares += squared;
             fourths += squared * squared;
         }
-        let freedom = freedom(squares, fourths);
-        Self::with_reach(&sum, student_95(freedom) * sqrt(together(squares, sum.pixels)), f64::INFINITY)
+        let reach = student_95(freedom(squares, fourths)) * sqrt(together(squares, sum.pixels));
+        Self::with_reach(&sum, reach, f64::INFINITY, freedom(sum.squares, sum.fourths))
     }
 
     /// `reach`: standard errors from the estimate to an end of its interval, as if pixels were independent; `above`: the
-    /// square of the one to the upper end, if that is less.
-    fn with_reach(sum: &TileError, reach: f64, above: f64) -> Option<Self> {
+    /// square of the one to the upper end, if that is less; `flashes`: how many have nearly all of the noise.
+    fn with_reach(sum: &TileError, reach: f64, above: f64, flashes: f64) -> Option<Self> {
         if sum.values == 0 {
             return None;
         }
@@ -96,9 +96,12 @@ impl ErrorEstimate {
         let end = |square: f64| exp(hypot(reach * sqrt(square) / sum.halves, doubt));
         let least = sum.least / sum.values as f64;
         let least = least / exp(reach * sqrt(OF_SQUARE * sum.least_squares) / sum.least);
-        let lower = fmin(relmse / end(below), least);
-        Some(Self { relmse, lower, upper: relmse * end(fmin(above, below)) })
-            .filter(|estimate| estimate.upper.is_finite())
+        let (lower, upper) = if flashes < FLASHES {
+            (fmin(relmse / end(below), least), relmse * end(below))
+        } else {
+            (relmse / end(below), relmse * end(fmin(above, below)))
+        };
+        Some(Self { relmse, lower, upper }).filter(|estimate| estimate.upper.is_finite())
     }
 }
 
