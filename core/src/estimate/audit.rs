@@ -106,7 +106,7 @@ impl BiasEstimate {
 
     /// A lower end that holds however often it is looked at: about four standard errors below.
     pub fn least(&self) -> f64 {
-        (self.relmse - 2.0 * (self.relmse - self.lower)).max(0.0)
+        (self.relmse - 2.0 * (self.upper - self.relmse)).max(0.0)
     }
 
     /// Whether there is a bias, at a level of 2.5 %.
@@ -122,7 +122,8 @@ impl BiasEstimate {
 fn ends(estimate: f64, error: f64) -> [f64; 2] {
     let x = estimate / error;
     let lower = (Z * (x - ONE_SIDED) / (2.0 * Z - ONE_SIDED)).max(x - Z).max(0.0);
-    let upper = if x > 0.0 { x + Z } else { x + hypot(x, Z) };
+    // x + hypot(x, Z), without its cancellation.
+    let upper = if x > 0.0 { x + Z } else { Z * Z / (hypot(x, Z) - x) };
     [lower * error, upper * error]
 }
 
@@ -213,6 +214,17 @@ mod tests {
 
     fn estimate(findings: &[Finding]) -> BiasEstimate {
         BiasEstimate::of(findings.iter().map(|finding| (*finding, 1.0))).unwrap()
+    }
+
+    #[test]
+    fn what_is_certain_of_a_bias_is_nothing_below_four_standard_errors() {
+        for relmse in [-1e9, -10.0, -2.0, -0.5, 0.0, 0.5, 2.0, 3.9] {
+            assert_eq!(BiasEstimate::known(relmse, 1.0, 0.0).least(), 0.0, "{relmse}");
+        }
+        for relmse in [4.0, 10.0, 1e9] {
+            let least = BiasEstimate::known(relmse, 1.0, 0.0).least();
+            assert!((least - (relmse - 2.0 * Z)).abs() < 1e-9 * relmse, "{relmse} {least}");
+        }
     }
 
     #[test]
