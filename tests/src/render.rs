@@ -2,7 +2,7 @@
 
 use crate::statistics;
 use core::sync::atomic::AtomicBool;
-use halflight::drive::{self, Method, RenderResult, Settings, Stop};
+use halflight::drive::{self, Method, RenderError, RenderResult, Settings, Stop};
 use halflight::save::Image;
 use halflight_core::scene::Scene;
 
@@ -17,11 +17,22 @@ pub fn render(
     spp: u32,
     change: impl FnOnce(&mut Settings),
 ) -> RenderResult {
+    try_render(scene, method, size, spp, change).expect("it can be rendered")
+}
+
+/// The same, where it may fail.
+pub fn try_render(
+    scene: &Scene,
+    method: Method,
+    size: u32,
+    spp: u32,
+    change: impl FnOnce(&mut Settings),
+) -> Result<RenderResult, RenderError> {
     let stop = Stop { spp: Some(spp), ..Stop::default() };
     let (method, audit) = (Some(method), Some(0.0));
     let mut settings = Settings { method, width: size, height: size, stop, audit, ..Settings::default() };
     change(&mut settings);
-    drive::render(scene, &settings, &mut |_| (), &AtomicBool::new(false)).expect("it can be rendered")
+    drive::render(scene, &settings, &mut |_| (), &AtomicBool::new(false))
 }
 
 /// Means of green over blocks of 4 × 4 pixels: what is left of noise is a quarter.

@@ -2,7 +2,7 @@
 //! twice, also beside an irradiance cache, the same bits on any number of threads, and none of it where there is no caustic.
 
 use glam::Vec3;
-use halflight::drive::{Checkpoint, Method, RenderResult, Settings};
+use halflight::drive::{CacheUse, Checkpoint, Gather, Method, RenderResult, Settings, Stop};
 use halflight_core::bsdf::All;
 use halflight_core::bvh::Bvh;
 use halflight_core::film::Film;
@@ -14,7 +14,7 @@ use halflight_core::transport::caustics::{CausticShooter, Find, PATHS, ROOM};
 use halflight_core::transport::shoot::{Keep, ShootSettings};
 use halflight_core::transport::{Discs, Merging, PathSettings, PathTracer, UNLIMITED};
 use halflight_core::{Level, Rgb};
-use halflight_tests::render::{difference, render};
+use halflight_tests::render::{difference, render, try_render};
 use halflight_tests::scenes::{
     IN_THE_BRIGHT_ROOM, SceneBuffers, bright_and_dark, constant_environment, cornell_box, emitter,
     everything, lamp_before,
@@ -66,7 +66,7 @@ fn pictures(scene: &Scene, first: u32, (tasks, pixels, is_beside): Shot, max_dep
         let shot = ShootSettings { keep: Keep::Caustic, seed, paths, max_depth };
         let shooter =
             CausticShooter::<All>::new((scene, &bvh, &lights), &emission, shot, (discs, [SIZE; 2]), level);
-        let shooter = if is_beside { shooter.beside_records() } else { shooter };
+        let shooter = shooter.beside_records(is_beside);
         let [even, odd] = &mut photon_lines;
         let mut map = 0;
         let mut shoot = |lines| {
@@ -83,7 +83,7 @@ fn pictures(scene: &Scene, first: u32, (tasks, pixels, is_beside): Shot, max_dep
         if tasks > 0 {
             assert!(tasks == 1 || is_beside || !maps[0].is_empty());
             let merging = Merging::new([&maps[0], &maps[1]], &emission, discs, paths);
-            tracer = tracer.with_caustics(if is_beside { merging.beside_records() } else { merging });
+            tracer = tracer.with_caustics(merging.beside_records(is_beside));
         }
         let mut film = Film::new(SIZE, SIZE, &mut arena(&mut film_lines)).unwrap();
         film.pixels_mut().fill(Default::default());
@@ -281,23 +281,41 @@ fn has_photons(result: &RenderResult) -> bool {
     result.memory.iter().any(|one| one.structure == "photons" && one.bytes > 0)
 }
 
+/// Whether a picture of `spp` samples with records and photons is that of paths, with the same `change` of settings.
+fn have_no_light_in_common(
+    name: &str,
+    buffers: &SceneBuffers,
+    spp: u32,
+    change: fn(&mut Settings),
+) -> CacheUse {
+    let scene = buffers.scene();
+    let truth = path(&scene, 256, |settings| {
+        change(settings);
+        settings.stop = Stop { spp: settings.stop.spp, ..Stop::default() };
+    });
+    let joined = cached(&scene, spp, change);
+    println!("{name}: {:?}", joined.cache);
+    assert!(has_photons(&joined) && joined.cache.unwrap().records > 100, "{name}: {:?}", joined.caustics);
+    for (a, b) in joined.image.mean().into_iter().zip(truth.image.mean()) {
+        assert!((a / b - 1.0).abs() < 0.005, "{name}: {a} {b}");
+    }
+    let difference = difference(&joined.image, &truth.image);
+    assert!(difference < 0.03, "{name}: {difference}");
+    joined.cache.unwrap()
+}
+
 #[test]
 fn records_and_photons_have_no_light_in_common() {
-    let rooms = [
-        ("glass", in_a_room(lamp_over_ball(glass(0.0), 0.7))),
-        ("mirror", in_a_room(lamp_before(metal(0.0), 0.6))),
-    ];
-    for (name, buffers) in rooms {
-        let scene = buffers.scene();
-        let truth = path(&scene, 256, |_| ());
-        let joined = cached(&scene, 64, |_| ());
-        assert!(has_photons(&joined) && joined.cache.unwrap().records > 100, "{name}: {:?}", joined.caustics);
-        for (a, b) in joined.image.mean().into_iter().zip(truth.image.mean()) {
-            assert!((a / b - 1.0).abs() < 0.005, "{name}: {a} {b}");
-        }
-        let difference = difference(&joined.image, &truth.image);
-        assert!(difference < 0.03, "{name}: {difference}");
-    }
+    let glass = in_a_room(lamp_over_ball(glass(0.0), 0.7));
+    have_no_light_in_common("glass", &glass, 64, |_| ());
+    have_no_light_in_common("mirror", &in_a_room(lamp_before(metal(0.0), 0.6)), 64, |_| ());
+    have_no_light_in_common("four segments", &glass, 64, |s| s.max_depth = Some(4));
+    have_no_light_in_common("reflected before", &glass, 64, |s| s.cache.gather = Gather::Photons);
+    // Few rays: noise that no number of samples takes away, unless records are refined.
+    let refined = have_no_light_in_common("refined", &glass, 1 << 9, |s| {
+        (s.cache.strata, s.stop.error) = (4, Some(1e-4));
+    });
+    assert!(refined.refined > 0, "{refined:?}");
 }
 
 #[test]
@@ -336,6 +354,35 @@ fn beside_records_little_memory_is_enough() {
         limit = limit * 3 / 4;
     };
     assert!(lacking.image == limited(Some(limit), false).image);
+}
+
+#[test]
+fn what_suffices_for_records_suffices_beside_photons_too() {
+    let buffers = in_a_room(lamp_over_ball(glass(0.0), 0.3));
+    let scene = buffers.scene();
+    let limited = |memory, caustics| {
+        try_render(&scene, Method::IrradianceCache, 24, 2, |s| {
+            (s.cache.strata, s.cache.error) = (64, Some(10.0));
+            (s.threads, s.memory, s.caustics) = (Some(1), memory, caustics);
+        })
+    };
+    let plain = limited(None, false).unwrap().memory_peak;
+    let [mut too_little, mut enough] = [0, plain];
+    while enough - too_little > 1000 {
+        let middle = too_little.midpoint(enough);
+        *(if limited(Some(middle), false).is_ok() { &mut enough } else { &mut too_little }) = middle;
+    }
+    let mut limit = enough;
+    loop {
+        let [off, joined] = [false, true].map(|caustics| limited(Some(limit), caustics).unwrap());
+        let [without, beside] = [&off, &joined].map(|result| result.cache.unwrap().capacity);
+        if !joined.caustics.lacks_memory {
+            assert!(has_photons(&joined) && 4 * beside > without);
+            break;
+        }
+        assert_eq!(joined.image, off.image);
+        limit += 50_000;
+    }
 }
 
 /// Everything, and caustics that are worth photons: of a lamp that has no size, by a wide mirror.

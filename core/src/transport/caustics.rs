@@ -97,9 +97,14 @@ impl<'a, F: Features> CausticShooter<'a, F> {
         Self { glimpses, ..self }
     }
 
-    /// The same, of photons for [`Merging::beside_records`](super::Merging::beside_records).
-    pub fn beside_records(self) -> Self {
-        Self { beside_records: true, ..self }
+    /// The same, of photons for [`Merging::beside_records`](super::Merging::beside_records), if so.
+    pub fn beside_records(self, beside_records: bool) -> Self {
+        Self { beside_records, ..self }
+    }
+
+    /// Light paths of a map.
+    pub fn paths(&self) -> u32 {
+        self.flight.paths
     }
 
     /// Number of tasks of a map.

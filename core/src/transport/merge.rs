@@ -180,8 +180,8 @@ impl<'a> Merging<'a> {
 
     /// The same, where an irradiance cache may have the light that something rough sent to a point. Photons are then of what
     /// comes straight from a mirror or smooth glass.
-    pub fn beside_records(self) -> Self {
-        Self { beside_records: true, ..self }
+    pub fn beside_records(self, beside_records: bool) -> Self {
+        Self { beside_records, ..self }
     }
 
     /// What becomes of the one vertex at which `path` can be merged, now that it meets the rough surface at `place` in its
@@ -221,7 +221,7 @@ impl<'a> Merging<'a> {
     /// The `weight` of what the path tracer found, where photons might have found it as well: R is `chain` times what
     /// the light has to do with it. No chain, no photons.
     #[inline]
-    pub(super) fn beside(&self, weight: f32, chain: f32, of_light: impl FnOnce() -> f32) -> f32 {
+    pub(super) fn beside_photons(&self, weight: f32, chain: f32, of_light: impl FnOnce() -> f32) -> f32 {
         if chain <= 0.0 || chain.is_nan() {
             return weight;
         }

@@ -183,7 +183,7 @@ impl<'a, F: Features> PathTracer<'a, F> {
     }
 
     /// Whether paths have a limit of depth.
-    pub(super) fn is_limited(&self) -> bool {
+    pub fn is_limited(&self) -> bool {
         self.settings.is_limited()
     }
 
@@ -383,7 +383,7 @@ impl<'a, F: Features> PathTracer<'a, F> {
                     weight = environment_heuristic(self.lights, path.pdf, pdf);
                 }
                 if let Some(merging) = &self.merging {
-                    weight = merging.beside(weight, path.chain, || {
+                    weight = merging.beside_photons(weight, path.chain, || {
                         merging.emission.density_of_sky(scene, self.lights, direction, position)
                     });
                 }
@@ -407,7 +407,7 @@ impl<'a, F: Features> PathTracer<'a, F> {
                     weight = power_heuristic(path.pdf, pdf);
                 }
                 if let Some(merging) = &self.merging {
-                    weight = merging.beside(weight, path.chain, || {
+                    weight = merging.beside_photons(weight, path.chain, || {
                         let from = (point.position, -direction);
                         merging.emission.density_of_surface(scene, self.lights, hit.triangle, from)
                     });
@@ -512,7 +512,7 @@ impl<'a, F: Features> PathTracer<'a, F> {
                     {
                         let there = ChainLink { point, bsdf: &bsdf, near: wo, far: wi };
                         let to_light = there.reverse::<F>(scene) / sample.pdf;
-                        weight = merging.beside(weight, path.chain.abs() * to_light, || {
+                        weight = merging.beside_photons(weight, path.chain.abs() * to_light, || {
                             merging.emission.density_of_sample(scene, self.lights, &sample, point.position)
                         });
                     }

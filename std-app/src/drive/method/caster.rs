@@ -44,7 +44,7 @@ pub(super) struct Caster<'a> {
     /// Of one pixel.
     discs: Discs,
     emission: Emission<'a>,
-    is_beside: bool,
+    beside_records: bool,
     /// Of even and of odd samples.
     photons: [Vec<Line>; 2],
     /// Light paths of a map for each sample that it serves, as far as there is memory.
@@ -73,7 +73,7 @@ pub(super) struct ForRecords<'m> {
 
 impl ForRecords<'_> {
     pub(super) fn merging(&self) -> Merging<'_> {
-        Merging::new([&self.map; 2], self.emission, self.discs, self.paths).beside_records()
+        Merging::new([&self.map; 2], self.emission, self.discs, self.paths).beside_records(true)
     }
 }
 
@@ -102,20 +102,19 @@ impl Block {
 }
 
 impl<'a> Caster<'a> {
-    /// Of photons that go by `emission`, which have half of the memory at most where they are beside records. `others` is what
-    /// is to be left of it.
+    /// Of photons that go by `emission`. `others` is what is to be left of the memory; beside records so is half of the rest.
     pub(super) fn new(
         stage: &Stage<'a>,
         memory: &mut Memory,
         (emission, discs): (Emission<'a>, Discs),
-        is_beside: bool,
+        beside_records: bool,
         others: usize,
     ) -> Result<Self, RenderError> {
         let Stage { settings, .. } = *stage;
         let pixels = f64::from(settings.width) * f64::from(settings.height);
         let each = ((PATHS_PER_SAMPLE * pixels) as usize).clamp(FEWEST_PATHS, MOST_PATHS);
         let wanted = (each * (MOST_SAMPLES / 2) as usize).min(MOST_PATHS).div_ceil(PATHS);
-        let maps = if is_beside { 4 } else { 2 };
+        let maps = if beside_records { 4 } else { 2 };
         let of_task = Photons::footprint(ROOM).bytes();
         let tasks = wanted.min(memory.available().saturating_sub(others) / maps / of_task).max(1);
         let footprint = Photons::footprint(tasks * ROOM);
@@ -123,7 +122,7 @@ impl<'a> Caster<'a> {
         let [wanted, given] = [wanted, tasks].map(|tasks| (tasks * PATHS) as u64);
         let map = MapUse { wanted, given, ..MapUse::default() };
         let used = PhotonUse { caustic: Some(map), ..PhotonUse::default() };
-        Ok(Self { stage: *stage, discs, emission, is_beside, photons, each, used, kept: None })
+        Ok(Self { stage: *stage, discs, emission, beside_records, photons, each, used, kept: None })
     }
 
     /// Brings the tiles of `crew` to their targets by `tracer`, joined with photons; less where the round is cut.
@@ -133,14 +132,13 @@ impl<'a> Caster<'a> {
         scratch: &mut [Vec<Line>],
         crew: &mut Crew,
     ) -> Result<(), RenderError> {
-        let Self { stage, discs, emission, is_beside, photons, each, used, kept } = self;
-        let workers = stage.workers;
+        let Self { stage, discs, emission, beside_records, photons, each, used, kept } = self;
         while let Some(sample) = crew.next_in_mean() {
             let block = Block::of(sample);
             let most = used.caustic.map_or(0, |map| map.given as usize);
             let light_paths = (*each * block.samples() as usize).min(most);
             let from = (*discs, block.first);
-            let (shooter, discs) = shooter::<F>(stage, emission, light_paths, from, *is_beside);
+            let (shooter, discs) = shooter::<F>(stage, emission, light_paths, from, *beside_records);
             let room = shooter.tasks() * ROOM;
             let [even, odd] = &mut *photons;
             let maps = match *kept {
@@ -152,30 +150,18 @@ impl<'a> Caster<'a> {
                 }
                 _ => {
                     *kept = None;
-                    let start = Instant::now();
-                    let open = |lines| Photons::new(room, &mut Arena::new(bytemuck::cast_slice_mut(lines)));
-                    let mut maps = [open(even)?, open(odd)?];
-                    for (map, half) in maps.iter_mut().zip(0..) {
-                        let shoot = |task: usize, arena: &mut Arena, out: &mut [_]| {
-                            shooter.run(task, block.first + half, arena, out)
-                        };
-                        if !crew.pass(map.as_mut_slice(), ROOM, scratch, &shoot)? {
-                            return Ok(());
-                        }
-                    }
-                    let maps = maps.map(|map| workers.build_photons(map, room));
-                    *kept = Some(Kept { block, room, shapes: [maps[0].shape(), maps[1].shape()] });
-                    used.maps += 2;
-                    if let Some(used) = &mut used.caustic {
-                        used.shot += 2 * light_paths as u64;
-                        used.stored += maps.iter().map(|map| map.len() as u64).sum::<u64>();
-                    }
-                    used.seconds += start.elapsed().as_secs_f64();
-                    maps
+                    let Some(even) = shoot(&shooter, block.first, even, scratch, crew, used)? else {
+                        return Ok(());
+                    };
+                    let Some(odd) = shoot(&shooter, block.first + 1, odd, scratch, crew, used)? else {
+                        return Ok(());
+                    };
+                    *kept = Some(Kept { block, room, shapes: [even.shape(), odd.shape()] });
+                    [even, odd]
                 }
             };
             let merging = Merging::new([&maps[0], &maps[1]], emission, discs, light_paths as u32);
-            let tracer = tracer.with_caustics(if *is_beside { merging.beside_records() } else { merging });
+            let tracer = tracer.with_caustics(merging.beside_records(*beside_records));
             crew.tiles_in_mean(block.end, scratch, &|task, samples, arena, pixels| {
                 tracer.run(task, samples, WAVE, arena, pixels)
             })?;
@@ -183,35 +169,24 @@ impl<'a> Caster<'a> {
         Ok(())
     }
 
-    /// Photons for rays that gather for cache number 0 or 1; `None` where the round is over.
+    /// Photons for rays that gather for cache number 0 or 1, which was `refined` so many times; `None` where the round is
+    /// over. Each time they are others, of smaller discs, as if they served the next samples.
     pub(super) fn for_records<F: Features>(
         &mut self,
-        half: u32,
+        (half, refined): (u32, u32),
         scratch: &mut [Vec<Line>],
         crew: &mut Crew,
     ) -> Result<Option<ForRecords<'_>>, RenderError> {
         let Self { stage, discs, emission, photons, used, kept, .. } = self;
         *kept = None;
-        let start = Instant::now();
         let paths = used.caustic.map_or(0, |map| map.given as usize).div_ceil(RECORD_PART);
-        let from = (discs.of_pixels(RECORD_RADIUS), 0);
+        let sample = 2 * refined + half;
+        let from = (discs.of_pixels(RECORD_RADIUS), sample);
         let (shooter, discs) = shooter::<F>(stage, emission, paths, from, true);
-        let room = shooter.tasks() * ROOM;
-        let lines = &mut photons[half as usize & 1];
-        let mut map = Photons::new(room, &mut Arena::new(bytemuck::cast_slice_mut(lines)))?;
-        let number = RECORD_MAP + half;
-        let shoot = |task: usize, arena: &mut Arena, out: &mut [_]| shooter.run(task, number, arena, out);
-        if !crew.pass(map.as_mut_slice(), ROOM, scratch, &shoot)? {
-            return Ok(None);
-        }
-        let map = stage.workers.build_photons(map, room);
-        used.maps += 1;
-        if let Some(used) = &mut used.caustic {
-            used.shot += paths as u64;
-            used.stored += map.len() as u64;
-        }
-        used.seconds += start.elapsed().as_secs_f64();
-        Ok(Some(ForRecords { map, emission, discs, paths: paths as u32 }))
+        let [even, odd] = photons;
+        let lines = if half == 0 { even } else { odd };
+        let map = shoot(&shooter, RECORD_MAP + sample, lines, scratch, crew, used)?;
+        Ok(map.map(|map| ForRecords { map, emission, discs, paths: paths as u32 }))
     }
 
     /// The last maps, as the camera sees them.
@@ -225,13 +200,39 @@ impl<'a> Caster<'a> {
     }
 }
 
+/// Shoots the photons of map `number` into `lines`; `None` where the round is over.
+fn shoot<'m, F: Features>(
+    shooter: &CausticShooter<F>,
+    number: u32,
+    lines: &'m mut [Line],
+    scratch: &mut [Vec<Line>],
+    crew: &mut Crew,
+    used: &mut PhotonUse,
+) -> Result<Option<PhotonMap<'m>>, RenderError> {
+    let start = Instant::now();
+    let room = shooter.tasks() * ROOM;
+    let mut photons = Photons::new(room, &mut Arena::new(bytemuck::cast_slice_mut(lines)))?;
+    let run = |task: usize, arena: &mut Arena, out: &mut [_]| shooter.run(task, number, arena, out);
+    if !crew.pass(photons.as_mut_slice(), ROOM, scratch, &run)? {
+        return Ok(None);
+    }
+    let map = crew.workers.build_photons(photons, room);
+    used.maps += 1;
+    if let Some(used) = &mut used.caustic {
+        used.shot += u64::from(shooter.paths());
+        used.stored += map.len() as u64;
+    }
+    used.seconds += start.elapsed().as_secs_f64();
+    Ok(Some(map))
+}
+
 /// A shooter of `paths` photons by `emission`, for what is left of `discs` at `sample`; of those beside records, if so.
 pub(super) fn shooter<'a, F: Features>(
     stage: &Stage<'a>,
     emission: &'a Emission<'a>,
     paths: usize,
     (discs, sample): (Discs, u32),
-    is_beside: bool,
+    beside_records: bool,
 ) -> (CausticShooter<'a, F>, Discs) {
     let Stage { scene, bvh, lights, settings, .. } = *stage;
     let pixels = FIRST_RADIUS * shrunk(sample / 2).sqrt();
@@ -240,7 +241,7 @@ pub(super) fn shooter<'a, F: Features>(
     let shot = ShootSettings { keep: Keep::Caustic, seed: settings.seed, paths: paths as u32, max_depth };
     let frame = (discs, [settings.width, settings.height]);
     let shooter = CausticShooter::new((scene, bvh, lights), emission, shot, frame, settings.level);
-    (if is_beside { shooter.beside_records() } else { shooter }, discs)
+    (shooter.beside_records(beside_records), discs)
 }
 
 #[cfg(test)]

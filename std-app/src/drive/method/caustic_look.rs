@@ -17,8 +17,8 @@ const LEAST_SHARE: f64 = 3.5e-2;
 const LEAST_NOISE: f64 = 0.5;
 const LEAST_USEFUL: f64 = 0.2;
 
-/// The parts of them from which on a glance leaves it open: it finds between a half and twice the share, and where it has not learned
-/// which of many lamps matters a tenth of what is useful.
+/// The parts of them from which on a glance leaves it open: it finds between a half and twice the share, and a tenth of what is
+/// useful where it has not learned which of many lamps matters; half of it once more, for it sees few.
 const DOUBT_SHARE: f64 = 0.25;
 const DOUBT_USEFUL: f64 = 0.0625;
 

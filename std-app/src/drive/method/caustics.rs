@@ -63,10 +63,14 @@ pub(super) fn footprint(lights: &Lights) -> Footprint {
     Emission::footprint(lights).and(guide).and(Worth::footprint(lights)).and(guide).and(guide)
 }
 
+/// Bytes of a few photons.
+pub(super) fn least_photons() -> usize {
+    2 * Photons::footprint(ROOM).bytes()
+}
+
 /// Whether there is memory for a look, and for a few photons after it.
 pub(super) fn has_memory(memory: &Memory, lights: &Lights, others: usize) -> bool {
-    let photons = 2 * Photons::footprint(ROOM).bytes();
-    memory.has((footprint(lights).bytes() + photons).saturating_add(others))
+    memory.has((footprint(lights).bytes() + least_photons()).saturating_add(others))
 }
 
 /// What a first look finds: by what emission photons are to go, if they are worth it; and whether they may have all light.
@@ -74,7 +78,7 @@ pub(super) fn look_first<'l, F: Features>(
     stage: &Stage,
     paths: &mut Paths<F>,
     discs: Discs,
-    is_beside: bool,
+    beside_records: bool,
     arena: &mut Arena<'l>,
 ) -> Result<(Option<Emission<'l>>, bool), RenderError> {
     let Stage { scene, bvh, lights, settings, .. } = *stage;
@@ -82,7 +86,7 @@ pub(super) fn look_first<'l, F: Features>(
     let mut glimpses = vec![Glimpse::default(); GLIMPSES];
     let (seen, frame) = ((scene, bvh, settings.level), [settings.width, settings.height]);
     let found = Glimpse::find::<F>(seen, frame, settings.seed, &mut glimpses);
-    let eye = Eye { discs, glimpses: &glimpses[..found], is_beside };
+    let eye = Eye { discs, glimpses: &glimpses[..found], beside_records };
     if !glance::<F>(stage, paths, (&plain, &eye), &mut arena.scratch())?
         .is_some_and(|glance| glance.may_pay())
     {
@@ -145,7 +149,7 @@ struct Eye<'g> {
     discs: Discs,
     glimpses: &'g [Glimpse],
     /// Beside a cache.
-    is_beside: bool,
+    beside_records: bool,
 }
 
 /// What a few light paths tell that go to all that mirrors or refracts; `None` where nothing does.
@@ -173,11 +177,11 @@ fn look<F: Features>(
     stage: &Stage,
     paths: &mut Paths<F>,
     emission: &Emission,
-    &Eye { discs, glimpses, is_beside }: &Eye,
+    &Eye { discs, glimpses, beside_records }: &Eye,
     (count, map): (usize, u32),
 ) -> Result<Vec<Find>, RenderError> {
     let scratch = &mut paths.scratch;
-    let (shooter, _) = shooter::<F>(stage, emission, count, (discs, 0), is_beside);
+    let (shooter, _) = shooter::<F>(stage, emission, count, (discs, 0), beside_records);
     let mut finds = vec![Find::default(); count];
     let shooter = shooter.with_glimpses(glimpses);
     let look = |task: usize, arena: &mut Arena, out: &mut [Find]| shooter.look(task, map, arena, out);

@@ -1,6 +1,7 @@
 //! Irradiance caching: the indirect light of diffuse surfaces is gathered at few points and interpolated between them,
-//! all other light is path traced, or, where a first look says that it pays, caustics come from photons (`caster.rs`). Two caches that know nothing of each other serve the even and the odd samples, so
-//! that the halves of the film tell the errors of records too.
+//! all other light is path traced, or, where a first look says that it pays, caustics come from photons (`caster.rs`).
+//! Two caches that know nothing of each other serve the even and the odd samples, so that the halves of the film tell the
+//! errors of records too.
 //!
 //! The first round begins with the overture of both. Then caches are frozen; a point that no record reaches is path
 //! traced, as is every surface that is not diffuse. Caches can be kept in a file, and be the first records of another
@@ -14,7 +15,7 @@ use super::photon_view::PhotonView;
 use super::photons::{Laboratory, PhotonUse, Shelf};
 use super::{Method, Renderer, Stage};
 use crate::drive::audit::Audit;
-use crate::drive::cache_file::{self, Half, Header, View};
+use crate::drive::cache_file::{self, Half, Header, Reader, View};
 use crate::drive::crew::Crew;
 use crate::drive::held_out::{EXACT, luminance};
 use crate::drive::memory::Memory;
@@ -26,7 +27,7 @@ use crate::drive::{RenderError, Settings};
 use core::f32::consts::FRAC_PI_2;
 use core::ops::Range;
 use halflight_core::bsdf::Features;
-use halflight_core::cache::irradiance::{CellFlux, IrradianceCache, Metric, metric};
+use halflight_core::cache::irradiance::{CellFlux, IrradianceCache, Metric, Record, metric};
 use halflight_core::film::{Dropped, PIXELS_PER_TILE, Pixel, PixelSet, Tile};
 use halflight_core::light::Emission;
 use halflight_core::memory::{Arena, Footprint, Line};
@@ -120,94 +121,163 @@ const TRIALS: Range<u32> = (1 << 28) - 2..1 << 28;
 /// By what factor one point of lights must leave more noise, for its rays, before several are asked.
 const WORTH: f64 = 1.25;
 
-/// Looks for caustics, then takes the memory, sets the method up, and hands it to `then`.
+/// Looks for caustics, takes the memory, sets the method up, and hands it to `then`.
 pub(super) fn with<F: Features, T>(
     stage: &Stage,
     memory: &mut Memory,
     then: impl FnOnce(&mut dyn Renderer, &mut Memory) -> Result<T, RenderError>,
 ) -> Result<T, RenderError> {
-    if !caustics::are_possible(stage) {
-        return set_up::<F, T>(stage, memory, (None, CausticUse::default()), then);
+    let Stage { scene, settings, .. } = *stage;
+    let file = cache_file::open(scene, settings)?;
+    let header = file.as_ref().map_or_else(|| Header::new(scene, settings), |file| file.header.clone());
+    let loaded = Loaded { header, records: file.map(Reader::records).transpose()?.unwrap_or_default() };
+    let mut lines = Vec::new();
+    let (emission, caustics) = find_caustics::<F>(stage, memory, loaded.fewest(), &mut lines)?;
+    if emission.is_some() {
+        return set_up::<F, T>(stage, memory, loaded, (emission, caustics), then);
     }
+    // As if nobody had looked.
+    drop(lines);
+    memory.give_back("emission");
+    set_up::<F, T>(stage, memory, loaded, (None, caustics), then)
+}
+
+/// By what emission photons of caustics are to go, kept in `lines`, if they are worth it and there is memory beside records,
+/// of which each half has room for `fewest` at least.
+fn find_caustics<'l, F: Features>(
+    stage: &Stage,
+    memory: &mut Memory,
+    fewest: usize,
+    lines: &'l mut Vec<Line>,
+) -> Result<(Option<Emission<'l>>, CausticUse), RenderError> {
     let Stage { lights, workers, .. } = *stage;
-    let scratch = caustics::scratch::<F>();
-    let others = Audit::bytes::<F>(stage, Method::IrradianceCache.is_biased());
-    let needed = scratch.bytes().saturating_mul(workers.count()).saturating_add(others);
-    if !caustics::has_memory(memory, lights, needed) {
-        let caustics = CausticUse { lacks_memory: true, ..CausticUse::default() };
-        return set_up::<F, T>(stage, memory, (None, caustics), then);
+    if !caustics::are_possible(stage) {
+        return Ok((None, CausticUse::default()));
     }
-    let mut paths = Paths::<F>::alone(stage, memory.take_each("paths", scratch, workers.count())?);
-    let mut lines = memory.take("emission", caustics::footprint(lights))?;
-    let mut arena = Arena::new(bytemuck::cast_slice_mut(&mut lines));
+    let needs = Needs::of::<F>(stage, memory, true);
+    // As much for records as for photons.
+    let others = needs.bytes(stage).saturating_add(needs.later::<F>(stage, fewest));
+    let others = others.saturating_add(caustics::least_photons());
+    if !caustics::has_memory(memory, lights, others) {
+        return Ok((None, CausticUse { lacks_memory: true, ..CausticUse::default() }));
+    }
+    let scratch = memory.take_each("paths", caustics::scratch::<F>(), workers.count())?;
+    let mut paths = Paths::<F>::alone(stage, scratch);
+    *lines = memory.take("emission", caustics::footprint(lights))?;
+    let mut arena = Arena::new(bytemuck::cast_slice_mut(lines));
     let (emission, _) = caustics::look_first::<F>(stage, &mut paths, stage.discs(), true, &mut arena)?;
     let caustics = paths.caustics;
     drop(paths);
     memory.give_back("paths");
-    if emission.is_none() {
-        // As if nobody had looked.
-        drop(lines);
-        memory.give_back("emission");
-        return set_up::<F, T>(stage, memory, (None, caustics), then);
+    Ok((emission, caustics))
+}
+
+/// What a file has of caches.
+struct Loaded {
+    header: Header,
+    records: [Vec<Record>; 2],
+}
+
+impl Loaded {
+    /// Records that there must be room for in each half.
+    fn fewest(&self) -> usize {
+        self.records.iter().map(Vec::len).max().unwrap_or(0)
     }
-    set_up::<F, T>(stage, memory, (emission, caustics), then)
+}
+
+/// What a picture takes of memory, whatever is left of it for records and photons.
+struct Needs {
+    /// Strata along a side that may be gathered, the fewest first.
+    sizes: Vec<usize>,
+    /// Of each thread.
+    scratch: Footprint,
+    edges: Footprint,
+    /// Whether gather rays end in photons.
+    by_photons: bool,
+    /// Whether caches may be refined.
+    is_refined: bool,
+}
+
+impl Needs {
+    /// With photons of caustics or without.
+    fn of<F: Features>(stage: &Stage, memory: &Memory, has_caustics: bool) -> Self {
+        let Stage { settings, workers, .. } = *stage;
+        let CacheSettings { strata, gather, .. } = settings.cache;
+        let strata = strata as usize;
+        // Records of a file have one error and one number of rays.
+        let in_files = settings.save_cache.is_some() || settings.load_cache.is_some();
+        let is_refined = settings.stop.error.is_some() && !in_files && has_indirect_light(settings);
+        // As fine as half of the memory allows.
+        let has_memory = |n: usize| {
+            let scratch = PathTracer::<F>::gather_scratch(n).bytes().saturating_mul(workers.count());
+            is_refined && n <= FINEST && memory.available() / 2 > scratch + 2 * CellFlux::footprint(n).bytes()
+        };
+        let sizes: Vec<usize> = core::iter::successors(Some(strata), |n| Some(2 * n))
+            .take_while(|n| *n == strata || has_memory(*n))
+            .collect();
+        let finest = sizes.last().copied().unwrap_or(strata);
+        let scratch = PathTracer::<F>::scratch(WAVE).or(PathTracer::<F>::gather_scratch(finest));
+        let by_photons = gather == Gather::Photons && has_indirect_light(settings);
+        let scratch = if by_photons { scratch.or(Laboratory::scratch::<F>()) } else { scratch };
+        let scratch = if has_caustics { scratch.or(caustics::scratch::<F>()) } else { scratch };
+        let tiles = Tile::count(settings.width, settings.height);
+        let edges = Footprint::default().slice::<[u64; PIXELS_PER_TILE / 64]>(tiles);
+        Self { sizes, scratch, edges, by_photons, is_refined }
+    }
+
+    /// All of it.
+    fn bytes(&self, stage: &Stage) -> usize {
+        let tables: usize = self.sizes.iter().map(|&n| CellFlux::footprint(n).bytes()).sum();
+        let scratch = self.scratch.bytes().saturating_mul(stage.workers.count());
+        scratch.saturating_add(self.edges.bytes()).saturating_add(tables)
+    }
+
+    /// What comes after photons of caustics: the audit, the fewest photons that gather rays end in, room for `fewest` records in each half.
+    fn later<F: Features>(&self, stage: &Stage, fewest: usize) -> usize {
+        let photons = if self.by_photons { Laboratory::least_bytes(stage.lights) } else { 0 };
+        let records = IrradianceCache::footprint(fewest).bytes().saturating_mul(2);
+        Audit::bytes::<F>(stage, Method::IrradianceCache.is_biased()) + photons + records
+    }
 }
 
 /// Takes the memory, sets the method up, and hands it to `then`; with photons that go by the emission, if there is one.
 fn set_up<F: Features, T>(
     stage: &Stage,
     memory: &mut Memory,
+    loaded: Loaded,
     (emission, caustics): (Option<Emission>, CausticUse),
     then: impl FnOnce(&mut dyn Renderer, &mut Memory) -> Result<T, RenderError>,
 ) -> Result<T, RenderError> {
     let Stage { scene, bvh, lights, settings, workers } = *stage;
-    let CacheSettings { strata, gather, .. } = settings.cache;
-    let strata = strata as usize;
-    // Records of a file have one error and one number of rays.
-    let in_files = settings.save_cache.is_some() || settings.load_cache.is_some();
-    let is_refined = settings.stop.error.is_some() && !in_files && has_indirect_light(settings);
-    // As fine as half of the memory allows.
-    let has_memory = |n: usize| {
-        let scratch = PathTracer::<F>::gather_scratch(n).bytes().saturating_mul(workers.count());
-        is_refined && n <= FINEST && memory.available() / 2 > scratch + 2 * CellFlux::footprint(n).bytes()
-    };
-    let sizes: Vec<usize> = core::iter::successors(Some(strata), |n| Some(2 * n))
-        .take_while(|n| *n == strata || has_memory(*n))
-        .collect();
-    let finest = sizes.last().copied().unwrap_or(strata);
-    let scratch = PathTracer::<F>::scratch(WAVE).or(PathTracer::<F>::gather_scratch(finest));
-    let by_photons = gather == Gather::Photons && has_indirect_light(settings);
-    let scratch = if by_photons { scratch.or(Laboratory::scratch::<F>()) } else { scratch };
-    let scratch = if emission.is_some() { scratch.or(caustics::scratch::<F>()) } else { scratch };
-    let scratch = memory.take_each("paths", scratch, workers.count())?;
-    let tiles = Tile::count(settings.width, settings.height);
-    memory.set_aside("edges", Footprint::default().slice::<[u64; PIXELS_PER_TILE / 64]>(tiles))?;
+    let needs = Needs::of::<F>(stage, memory, emission.is_some());
+    let scratch = memory.take_each("paths", needs.scratch, workers.count())?;
+    memory.set_aside("edges", needs.edges)?;
     let mut tables = Vec::new();
-    for &n in &sizes {
+    for &n in &needs.sizes {
         tables.push(memory.take("gathering", CellFlux::footprint(n))?);
     }
-    let tables = sizes.iter().zip(&mut tables);
+    let tables = needs.sizes.iter().zip(&mut tables);
     let tables = tables
         .map(|(&n, lines)| CellFlux::build(n, &mut Arena::new(bytemuck::cast_slice_mut(lines))))
         .collect::<Result<Vec<_>, _>>()?;
-    let pixels = settings.width as usize * settings.height as usize;
-    let file = cache_file::open(scene, settings)?;
-    let header = file.as_ref().map_or_else(|| Header::new(scene, settings), |file| file.header.clone());
-    let loaded = file.map(cache_file::Reader::records).transpose()?.unwrap_or_default();
-    let fewest = loaded.iter().map(Vec::len).max().unwrap_or(0);
-    let wanted = (pixels / PIXELS_PER_RECORD).max(FEWEST_RECORDS).saturating_add(fewest);
-    let others = Audit::bytes::<F>(stage, Method::IrradianceCache.is_biased());
+    let fewest = loaded.fewest();
     let caster = match emission {
-        Some(emission) => Some(Caster::new(stage, memory, (emission, stage.discs()), true, others)?),
+        Some(emission) => {
+            let later = needs.later::<F>(stage, fewest);
+            Some(Caster::new(stage, memory, (emission, stage.discs()), true, later)?)
+        }
         None => None,
     };
-    let laboratory = if by_photons {
+    let others = Audit::bytes::<F>(stage, Method::IrradianceCache.is_biased());
+    let laboratory = if needs.by_photons {
         // Half of the memory for photons at most: records need some as well.
         let half = memory.available().saturating_sub(others) / 2;
         Some(Laboratory::new(stage, memory, Keep::Scattered, others.saturating_add(half))?)
     } else {
         None
     };
+    let pixels = settings.width as usize * settings.height as usize;
+    let wanted = (pixels / PIXELS_PER_RECORD).max(FEWEST_RECORDS).saturating_add(fewest);
     let available = memory.available().saturating_sub(others);
     let capacity = wanted.min(IrradianceCache::capacity_of(available / 2)).max(fewest);
     let footprint = IrradianceCache::footprint(capacity);
@@ -230,7 +300,7 @@ fn set_up<F: Features, T>(
         tracer: PathTracer::<F>::new(scene, bvh, lights, path_settings(settings), settings.level),
         gathering: Gathering { flux: &tables[0], metric, least_pixels: LEAST_PIXELS },
         tables: &tables,
-        is_refined,
+        is_refined: needs.is_refined,
         refined: 0,
         pending: VecDeque::new(),
         size: [settings.width, settings.height],
@@ -241,8 +311,8 @@ fn set_up<F: Features, T>(
         scratch,
         survey,
         view: View::of(scene, settings),
-        loaded: header.halves,
-        header,
+        loaded: loaded.header.halves,
+        header: loaded.header,
         save: settings.save_cache.as_deref(),
         is_filled: false,
         edges: None,
@@ -250,13 +320,13 @@ fn set_up<F: Features, T>(
         seconds: 0.0,
     };
     let is_served = !has_indirect_light(settings) || method.header.serves(&method.view);
-    for ((growing, records), half) in method.halves.iter_mut().zip(&loaded).zip(method.loaded) {
+    for ((growing, records), half) in method.halves.iter_mut().zip(&loaded.records).zip(method.loaded) {
         growing.restore(records, half.gathered);
         if is_served {
             growing.finish();
         }
     }
-    drop(loaded);
+    drop(loaded.records);
     then(&mut method, memory)
 }
 
@@ -303,14 +373,16 @@ struct Cached<'a, F> {
 impl<F: Features> Cached<'_, F> {
     /// Fills both halves, or goes on with it, and keeps them; whether that is done: not where the round is over.
     fn fill(&mut self, crew: &mut Crew) -> Result<bool, RenderError> {
-        let Self { tracer, gathering, size, halves, laboratory, caster, scratch, .. } = self;
+        let Self { tracer, gathering, size, halves, laboratory, caster, refined, scratch, .. } = self;
         let start = Instant::now();
         let mut all = true;
         for (i, half) in halves.iter_mut().enumerate() {
             let (photons, built);
             let mut tracer = *tracer;
-            if let Some(caster) = caster.as_mut().filter(|_| !half.is_finished()) {
-                let Some(found) = caster.for_records::<F>(i as u32, scratch, crew)? else {
+            // Where depth is limited, rays that gather ask for none.
+            if let Some(caster) = caster.as_mut().filter(|_| !half.is_finished() && !tracer.is_limited()) {
+                let map = (i as u32, *refined as u32);
+                let Some(found) = caster.for_records::<F>(map, scratch, crew)? else {
                     all = false;
                     break;
                 };

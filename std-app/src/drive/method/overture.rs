@@ -147,7 +147,7 @@ impl<'a> Growing<'a> {
 
     /// Whether nothing will be added.
     pub(in crate::drive) fn is_finished(&self) -> bool {
-        self.sweeps >= SWEEPS
+        self.sweeps >= SWEEPS || self.cache.is_full()
     }
 
     fn is_known(&self, glint: &Glint) -> bool {
@@ -232,7 +232,7 @@ impl<F: Features> Overture<'_, '_, F> {
     ) -> Result<bool, RenderError> {
         let [width, height] = self.size;
         let order = Order::new(width, height, STRIDE);
-        'looks: while growing.sweeps < SWEEPS && !growing.cache.is_full() {
+        'looks: while !growing.is_finished() {
             if growing.next >= order.len() {
                 growing.next = 0;
                 growing.sweeps += 1;

@@ -9,7 +9,7 @@ use crate::drive::crew::{Crew, Task};
 use crate::drive::memory::Memory;
 use crate::drive::run::path_settings;
 use halflight_core::bsdf::Features;
-use halflight_core::light::Emission;
+use halflight_core::light::{Emission, Lights};
 use halflight_core::memory::{Arena, Footprint, Line};
 use halflight_core::photon::{Falloff, MapShape, Photon, PhotonMap, Photons};
 use halflight_core::transport::maps::{
@@ -188,6 +188,11 @@ impl<'a> Laboratory<'a> {
             ..PhotonUse::default()
         };
         Ok((Self { stage: *stage, discs: stage.discs(), keep, emission, global, caustic, used }, shelves))
+    }
+
+    /// Bytes of the smallest maps of what was reflected, of both halves.
+    pub(super) fn least_bytes(lights: &Lights) -> usize {
+        Emission::footprint(lights).bytes().saturating_add(2 * bytes(1, 0))
     }
 
     /// Working memory of each thread.

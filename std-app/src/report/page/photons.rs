@@ -57,7 +57,7 @@ fn first_look(run: &Run) -> &'static str {
              missing or noisy. "
         }
         (true, _) => {
-            "Paths find all other light, and share with photons what both find. Only photons that count are kept: each \
+            "Paths, or records, have all other light, and paths share with photons what both find. Only photons that count are kept: each \
              is left with the probability that is its weight beside paths, most where paths find next to nothing. "
         }
         (false, Some(_)) => {
