@@ -431,7 +431,7 @@ impl<'a, F: Features> PathTracer<'a, F> {
             return None;
         }
         let came = path.share;
-        path.share = Share::ALL;
+        path.share = came.behind(&bsdf);
         let is_diffuse = matches!(bsdf, Bsdf::Diffuse(_));
         if self.settings.reuse {
             exchange.arrive(point, bsdf.cover(), path);

@@ -7,7 +7,7 @@
 use super::estimator::Counters;
 use super::path::PathTracer;
 use super::places::Places;
-use super::wave::Wave;
+use super::wave::{Share, Wave};
 use crate::Rgb;
 use crate::bsdf::Features;
 use crate::film::Tile;
@@ -86,6 +86,26 @@ impl<F: Features> PathTracer<'_, F> {
     /// # Errors
     /// [`OutOfMemory`] where `scratch` has less than [`PathTracer::scratch`] bytes.
     pub fn pilot_mean(&self, task: usize, wave: usize, scratch: &mut Arena) -> Result<f32, OutOfMemory> {
+        self.mean_of(None, task, wave, scratch)
+    }
+
+    /// The same of light that is there beside the photons of [`PathTracer::with_caustics`]: paths that meet a lamp by chance
+    /// count by their weight, and lamps that the eye sees, itself or by mirrors and glass, do not.
+    ///
+    /// # Errors
+    /// As [`PathTracer::pilot_mean`].
+    pub fn pilot_rest(&self, task: usize, wave: usize, scratch: &mut Arena) -> Result<f32, OutOfMemory> {
+        self.mean_of(Some(Share::UNSEEN), task, wave, scratch)
+    }
+
+    /// The mean radiance of the `share` of the light.
+    fn mean_of(
+        &self,
+        share: Option<Share>,
+        task: usize,
+        wave: usize,
+        scratch: &mut Arena,
+    ) -> Result<f32, OutOfMemory> {
         let mut arena = scratch.scratch();
         let mut wave = Wave::new(wave, &mut arena)?;
         let tile = Tile::new(self.settings.width, self.settings.height, task);
@@ -95,6 +115,9 @@ impl<F: Features> PathTracer<'_, F> {
             let count = self.start(&mut places, &mut wave);
             if count == 0 {
                 return Ok(sum / all.max(1) as f32);
+            }
+            for path in &mut wave.paths[..count] {
+                path.share = share.unwrap_or(path.share);
             }
             self.advance(&mut wave, count, &mut Counters::default());
             let light = wave.paths[..count].iter().map(|path| Rgb::from(path.radiance).element_sum() / 3.0);

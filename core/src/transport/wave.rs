@@ -96,6 +96,8 @@ impl Share {
     pub(super) const GATHERED: Share = Share(6);
     /// All light but that of the lamp which a camera ray meets: its pixel has that from rays of their own.
     pub(super) const BESIDE_LAMP: Share = Share(7);
+    /// All light but that of emitters which the eye sees, itself or by mirrors and glass.
+    pub(super) const UNSEEN: Share = Share(8);
 
     /// Whether what `bsdf` reflects or transmits belongs to the other share.
     #[inline]
@@ -114,10 +116,16 @@ impl Share {
         self != Self::EMITTED && self != Self::DIRECT
     }
 
+    /// What belongs to the path behind `bsdf`, if nobody says otherwise.
+    #[inline]
+    pub(super) fn behind(self, bsdf: &Bsdf) -> Self {
+        if self == Self::UNSEEN && bsdf.is_delta() { self } else { Self::ALL }
+    }
+
     /// Whether light of emitters at the end of the ray belongs to it.
     #[inline]
     pub(super) fn sees_emitters(self) -> bool {
-        self != Self::REFLECTED && self != Self::BEHIND_MIRROR
+        self != Self::REFLECTED && self != Self::BEHIND_MIRROR && self != Self::UNSEEN
     }
 
     /// The same of surfaces that emit.

@@ -112,8 +112,25 @@ impl Workers {
         tracer: &PathTracer<F>,
         scratch: &mut [Vec<Line>],
     ) -> Result<f32, OutOfMemory> {
-        let tasks = tracer.pilot_tasks();
-        let means = self.each(tasks, scratch, |task, arena| tracer.pilot_mean(task, WAVE, arena))?;
+        self.mean_of(tracer.pilot_tasks(), scratch, |task, arena| tracer.pilot_mean(task, WAVE, arena))
+    }
+
+    /// The same of light that is there beside photons.
+    pub(super) fn pilot_rest<F: Features>(
+        &self,
+        tracer: &PathTracer<F>,
+        scratch: &mut [Vec<Line>],
+    ) -> Result<f32, OutOfMemory> {
+        self.mean_of(tracer.pilot_tasks(), scratch, |task, arena| tracer.pilot_rest(task, WAVE, arena))
+    }
+
+    fn mean_of(
+        &self,
+        tasks: impl Iterator<Item = usize> + Send,
+        scratch: &mut [Vec<Line>],
+        of_task: impl Fn(usize, &mut Arena) -> Result<f32, OutOfMemory> + Sync,
+    ) -> Result<f32, OutOfMemory> {
+        let means = self.each(tasks, scratch, of_task)?;
         Ok(means.iter().sum::<f32>() / means.len().max(1) as f32)
     }
 

@@ -18,10 +18,10 @@ use crate::drive::{RenderError, Reuse};
 use halflight_core::bsdf::Features;
 use halflight_core::census::Census;
 use halflight_core::light::{Emission, Lights, Worth};
-use halflight_core::memory::{Arena, Footprint};
+use halflight_core::memory::{Arena, Footprint, Line};
 use halflight_core::photon::Photons;
 use halflight_core::transport::caustics::{CausticShooter, Find, PATHS, ROOM};
-use halflight_core::transport::{Discs, GLIMPSES, Glimpse, PathTracer, path::WAVE};
+use halflight_core::transport::{Discs, GLIMPSES, Glimpse, Merging, PathTracer, path::WAVE};
 
 /// Light paths of a glance, which tells where there is next to nothing to find, and of each look after it.
 const GLANCE: usize = 4 * PATHS;
@@ -100,7 +100,8 @@ pub(super) fn look_first<'l, F: Features>(
     let learned = worth.guide(&plain, arena)?;
     let finds = look::<F>(stage, paths, &learned, &eye, (LOOK, 1))?;
     finds.iter().for_each(|find| worth.learn(find.cell, find.worth));
-    let looked = looked(stage, paths, &finds)?;
+    let beside = beside::<F>(stage, paths, &learned, &eye)?;
+    let looked = looked(stage, paths, &finds, beside);
     drop(finds);
     let is_open = settings.method.is_none() && settings.resume.is_none();
     let mut is_all = false;
@@ -161,15 +162,33 @@ fn glance<'l, F: Features>(
 ) -> Result<Option<Looked>, RenderError> {
     let Some(worth) = Worth::aimed(stage.scene, stage.lights, plain, arena)? else { return Ok(None) };
     let finds = look::<F>(stage, paths, &worth.guide(plain, arena)?, eye, (GLANCE, 0))?;
-    looked(stage, paths, &finds).map(Some)
+    let mean = paths.mean(stage)?;
+    Ok(Some(looked(stage, paths, &finds, mean)))
 }
 
-/// What `finds` tell together.
-fn looked<F: Features>(stage: &Stage, paths: &mut Paths<F>, finds: &[Find]) -> Result<Looked, RenderError> {
+/// The mean radiance of what is seen beside photons of a look. Not that of the picture, of which a lamp that is seen, or a path that
+/// meets one through glass, may be nearly all, or not be there by chance.
+fn beside<F: Features>(
+    stage: &Stage,
+    paths: &mut Paths<F>,
+    emission: &Emission,
+    eye: &Eye,
+) -> Result<f32, RenderError> {
+    let (_, discs) = shooter::<F>(stage, emission, LOOK, (eye.discs, 0), eye.beside_records);
+    // Weights alone: no photon adds to what paths find.
+    let mut line = [Line([0; _])];
+    let none = Photons::new(0, &mut Arena::new(bytemuck::cast_slice_mut(&mut line)))?.build(0);
+    let merging = Merging::new([&none; 2], emission, discs, LOOK as u32).beside_records(eye.beside_records);
+    let tracer = paths.tracer.with_reuse(false).with_caustics(merging);
+    Ok(stage.workers.pilot_rest(&tracer, &mut paths.scratch)?)
+}
+
+/// What `finds` tell together, where all other light has such a mean radiance.
+fn looked<F: Features>(stage: &Stage, paths: &mut Paths<F>, finds: &[Find], mean: f32) -> Looked {
     let pixels = f64::from(stage.settings.width) * f64::from(stage.settings.height);
-    let looked = Looked::new(finds, FIRST_RADIUS, pixels, f64::from(paths.mean(stage)?));
+    let looked = Looked::new(finds, FIRST_RADIUS, pixels, f64::from(mean));
     paths.caustics.share = Some(looked.share);
-    Ok(looked)
+    looked
 }
 
 /// What `count` photons of `emission`, those of map `map`, are worth.
