@@ -197,6 +197,39 @@ pub fn lamp_before(surface: Surface, size: f32) -> SceneBuffers {
     buffers
 }
 
+/// A ball between floor and a lamp of `size`.
+pub fn lamp_over_ball(surface: Surface, size: f32) -> SceneBuffers {
+    let camera = Camera::look_at(Vec3::new(0.0, 2.0, 3.5), Vec3::new(0.0, 0.3, 0.0), Vec3::Y, 40.0);
+    let mut buffers = SceneBuffers::new(camera);
+    let floor = buffers.material(Material::diffuse(Rgb::splat(0.7)));
+    let ball = buffers.material(Material { surface, ..Material::GREY });
+    let lamp = buffers.material(emitter(0.0, 8.0 / (size * size)));
+    buffers.square(Vec3::ZERO, Vec3::Y, 4.0, floor);
+    buffers.normals = vec![[0.0; 3]; buffers.positions.len()];
+    buffers.sphere(Vec3::new(0.0, 0.6, 0.0), 0.5, 24, ball);
+    buffers.square(Vec3::new(0.0, 3.0, 0.0), Vec3::NEG_Y, size, lamp);
+    buffers.normals.resize(buffers.positions.len(), [0.0; 3]);
+    buffers
+}
+
+/// The same in a room, so that the caustic lights walls.
+pub fn in_a_room(mut buffers: SceneBuffers) -> SceneBuffers {
+    let wall = buffers.material(Material::diffuse(Rgb::splat(0.6)));
+    buffers.cuboid(Vec3::new(-3.0, -0.5, -3.0), Vec3::new(3.0, 3.5, 4.5), true, wall);
+    buffers.normals.resize(buffers.positions.len(), [0.0; 3]);
+    buffers
+}
+
+/// Metal, which is a mirror where it is not rough.
+pub fn metal(roughness: f32) -> Surface {
+    Surface::Conductor { reflectance: Rgb::splat(0.9).into(), roughness: roughness.into() }
+}
+
+/// Glass.
+pub fn glass(roughness: f32) -> Surface {
+    Surface::Dielectric { ior: 1.5, tint: Rgb::ONE, roughness: roughness.into() }
+}
+
 /// A bright room and a dark one, with a wall between them that is as thin as a thousandth; seen from the dark one.
 pub fn bright_and_dark() -> SceneBuffers {
     let camera = Camera::look_at(Vec3::new(0.52, 0.5, 0.95), Vec3::new(0.52, 0.45, 0.0), Vec3::Y, 80.0);

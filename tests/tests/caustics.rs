@@ -1,8 +1,9 @@
 //! Path tracing joined with photons of caustics: right in the mean whatever the surfaces and lights, nothing counted
-//! twice, also beside an irradiance cache, the same bits on any number of threads, and none of it where there is no caustic.
+//! twice, also beside records (`caustics_cached.rs`), the same bits on any number of threads, and none of it where there is
+//! no caustic.
 
 use glam::Vec3;
-use halflight::drive::{CacheUse, Checkpoint, Gather, Method, RenderResult, Settings, Stop};
+use halflight::drive::{Checkpoint, Method, RenderResult, Settings};
 use halflight_core::bsdf::All;
 use halflight_core::bvh::Bvh;
 use halflight_core::film::Film;
@@ -14,10 +15,10 @@ use halflight_core::transport::caustics::{CausticShooter, Find, PATHS, ROOM};
 use halflight_core::transport::shoot::{Keep, ShootSettings};
 use halflight_core::transport::{Discs, Merging, PathSettings, PathTracer, UNLIMITED};
 use halflight_core::{Level, Rgb};
-use halflight_tests::render::{difference, render, try_render};
+use halflight_tests::render::render;
 use halflight_tests::scenes::{
     IN_THE_BRIGHT_ROOM, SceneBuffers, bright_and_dark, constant_environment, cornell_box, emitter,
-    everything, lamp_before,
+    everything, glass, in_a_room, lamp_before, lamp_over_ball, metal,
 };
 use halflight_tests::statistics::{agree, blocks};
 use std::time::Instant;
@@ -97,29 +98,6 @@ fn pictures(scene: &Scene, first: u32, (tasks, pixels, is_beside): Shot, max_dep
     (first..first + SEEDS).map(one).collect()
 }
 
-/// A ball between floor and a lamp of `size`.
-fn lamp_over_ball(surface: Surface, size: f32) -> SceneBuffers {
-    let camera = Camera::look_at(Vec3::new(0.0, 2.0, 3.5), Vec3::new(0.0, 0.3, 0.0), Vec3::Y, 40.0);
-    let mut buffers = SceneBuffers::new(camera);
-    let floor = buffers.material(Material::diffuse(Rgb::splat(0.7)));
-    let ball = buffers.material(Material { surface, ..Material::GREY });
-    let lamp = buffers.material(emitter(0.0, 8.0 / (size * size)));
-    buffers.square(Vec3::ZERO, Vec3::Y, 4.0, floor);
-    buffers.normals = vec![[0.0; 3]; buffers.positions.len()];
-    buffers.sphere(Vec3::new(0.0, 0.6, 0.0), 0.5, 24, ball);
-    buffers.square(Vec3::new(0.0, 3.0, 0.0), Vec3::NEG_Y, size, lamp);
-    buffers.normals.resize(buffers.positions.len(), [0.0; 3]);
-    buffers
-}
-
-/// The same in a room, so that the caustic lights walls.
-fn in_a_room(mut buffers: SceneBuffers) -> SceneBuffers {
-    let wall = buffers.material(Material::diffuse(Rgb::splat(0.6)));
-    buffers.cuboid(Vec3::new(-3.0, -0.5, -3.0), Vec3::new(3.0, 3.5, 4.5), true, wall);
-    buffers.normals.resize(buffers.positions.len(), [0.0; 3]);
-    buffers
-}
-
 fn is_right_in_the_mean(name: &str, buffers: &SceneBuffers, max_depth: u32) {
     let scene = buffers.scene();
     let off = pictures(&scene, 0, (0, 0.3, false), max_depth);
@@ -144,14 +122,6 @@ fn between_mirrors() -> SceneBuffers {
     buffers.square(Vec3::new(0.0, 3.0, 0.0), Vec3::NEG_Y, 1.2, grey);
     buffers.square(Vec3::new(0.6, 0.1, 0.0), Vec3::Y, 0.5, lamp);
     buffers
-}
-
-fn metal(roughness: f32) -> Surface {
-    Surface::Conductor { reflectance: Rgb::splat(0.9).into(), roughness: roughness.into() }
-}
-
-fn glass(roughness: f32) -> Surface {
-    Surface::Dielectric { ior: 1.5, tint: Rgb::ONE, roughness: roughness.into() }
 }
 
 #[test]
@@ -269,120 +239,8 @@ fn path(scene: &Scene, spp: u32, change: impl FnOnce(&mut Settings)) -> RenderRe
     render(scene, Method::Path, 40, spp, change)
 }
 
-/// The same with an irradiance cache.
-fn cached(scene: &Scene, spp: u32, change: impl FnOnce(&mut Settings)) -> RenderResult {
-    render(scene, Method::IrradianceCache, 40, spp, |settings| {
-        settings.cache.strata = 16;
-        change(settings);
-    })
-}
-
 fn has_photons(result: &RenderResult) -> bool {
     result.memory.iter().any(|one| one.structure == "photons" && one.bytes > 0)
-}
-
-/// Whether a picture of `spp` samples with records and photons is that of paths, with the same `change` of settings.
-fn have_no_light_in_common(
-    name: &str,
-    buffers: &SceneBuffers,
-    spp: u32,
-    change: fn(&mut Settings),
-) -> CacheUse {
-    let scene = buffers.scene();
-    let truth = path(&scene, 256, |settings| {
-        change(settings);
-        settings.stop = Stop { spp: settings.stop.spp, ..Stop::default() };
-    });
-    let joined = cached(&scene, spp, change);
-    println!("{name}: {:?}", joined.cache);
-    assert!(has_photons(&joined) && joined.cache.unwrap().records > 100, "{name}: {:?}", joined.caustics);
-    for (a, b) in joined.image.mean().into_iter().zip(truth.image.mean()) {
-        assert!((a / b - 1.0).abs() < 0.005, "{name}: {a} {b}");
-    }
-    let difference = difference(&joined.image, &truth.image);
-    assert!(difference < 0.03, "{name}: {difference}");
-    joined.cache.unwrap()
-}
-
-#[test]
-fn records_and_photons_have_no_light_in_common() {
-    let glass = in_a_room(lamp_over_ball(glass(0.0), 0.7));
-    have_no_light_in_common("glass", &glass, 64, |_| ());
-    have_no_light_in_common("mirror", &in_a_room(lamp_before(metal(0.0), 0.6)), 64, |_| ());
-    have_no_light_in_common("four segments", &glass, 64, |s| s.max_depth = Some(4));
-    have_no_light_in_common("reflected before", &glass, 64, |s| s.cache.gather = Gather::Photons);
-    // Few rays: noise that no number of samples takes away, unless records are refined.
-    let refined = have_no_light_in_common("refined", &glass, 1 << 9, |s| {
-        (s.cache.strata, s.stop.error) = (4, Some(1e-4));
-    });
-    assert!(refined.refined > 0, "{refined:?}");
-}
-
-#[test]
-fn beside_records_bits_are_the_same_and_off_is_off() {
-    let buffers = in_a_room(lamp_over_ball(glass(0.0), 0.3));
-    let scene = buffers.scene();
-    let temporary = |name: &str| std::env::temp_dir().join(format!("{}-{name}", std::process::id()));
-    let [film, records] = ["cached-caustics.film", "cached-caustics.records"].map(temporary);
-    let one = cached(&scene, 11, |s| (s.threads, s.save_cache) = (Some(1), Some(records.clone())));
-    assert!(has_photons(&one), "{:?}", one.caustics);
-    assert_eq!(cached(&scene, 11, |s| s.threads = Some(2)).image, one.image);
-    assert_eq!(cached(&scene, 11, |s| s.load_cache = Some(records.clone())).image, one.image);
-    let keep = Some(Checkpoint { path: film.clone(), every: f64::INFINITY });
-    let _ = cached(&scene, 5, |s| s.checkpoint = keep.clone());
-    assert_eq!(cached(&scene, 11, |s| s.resume = Some(film.clone())).image, one.image);
-    let off = cached(&scene, 11, |s| s.caustics = false);
-    assert!(!has_photons(&off) && off.image != one.image);
-    [film, records].into_iter().for_each(|file| std::fs::remove_file(file).unwrap());
-}
-
-#[test]
-fn beside_records_little_memory_is_enough() {
-    let buffers = in_a_room(lamp_over_ball(glass(0.0), 0.3));
-    let scene = buffers.scene();
-    let limited = |memory, caustics| {
-        cached(&scene, 2, |s| (s.threads, s.memory, s.caustics) = (Some(1), memory, caustics))
-    };
-    let mut limit = limited(None, true).memory_peak;
-    let lacking = loop {
-        let joined = limited(Some(limit), true);
-        assert!(joined.memory_peak <= limit);
-        if joined.caustics.lacks_memory {
-            break joined;
-        }
-        assert!(has_photons(&joined) && joined.cache.unwrap().records > 0);
-        limit = limit * 3 / 4;
-    };
-    assert!(lacking.image == limited(Some(limit), false).image);
-}
-
-#[test]
-fn what_suffices_for_records_suffices_beside_photons_too() {
-    let buffers = in_a_room(lamp_over_ball(glass(0.0), 0.3));
-    let scene = buffers.scene();
-    let limited = |memory, caustics| {
-        try_render(&scene, Method::IrradianceCache, 24, 2, |s| {
-            (s.cache.strata, s.cache.error) = (64, Some(10.0));
-            (s.threads, s.memory, s.caustics) = (Some(1), memory, caustics);
-        })
-    };
-    let plain = limited(None, false).unwrap().memory_peak;
-    let [mut too_little, mut enough] = [0, plain];
-    while enough - too_little > 1000 {
-        let middle = too_little.midpoint(enough);
-        *(if limited(Some(middle), false).is_ok() { &mut enough } else { &mut too_little }) = middle;
-    }
-    let mut limit = enough;
-    loop {
-        let [off, joined] = [false, true].map(|caustics| limited(Some(limit), caustics).unwrap());
-        let [without, beside] = [&off, &joined].map(|result| result.cache.unwrap().capacity);
-        if !joined.caustics.lacks_memory {
-            assert!(has_photons(&joined) && 4 * beside > without);
-            break;
-        }
-        assert_eq!(joined.image, off.image);
-        limit += 50_000;
-    }
 }
 
 /// Everything, and caustics that are worth photons: of a lamp that has no size, by a wide mirror.
@@ -448,8 +306,9 @@ fn where_there_is_no_caustic_the_picture_is_that_without_photons() {
         let joined = path(&scene, 9, |_| ());
         assert_eq!(joined.image, path(&scene, 9, |s| s.caustics = false).image);
         assert!(!has_photons(&joined));
-        let joined = cached(&scene, 5, |_| ());
-        assert_eq!(joined.image, cached(&scene, 5, |s| s.caustics = false).image);
+        let cached = |caustics| render(&scene, Method::IrradianceCache, 40, 5, |s| s.caustics = caustics);
+        let joined = cached(true);
+        assert_eq!(joined.image, cached(false).image);
         assert!(!has_photons(&joined));
     }
 }

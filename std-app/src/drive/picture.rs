@@ -95,7 +95,10 @@ impl Picture<'_> {
             if rounds.estimate_is_due() {
                 if let Some(audit) = &mut audit {
                     let left = settings.stop.seconds.map(|limit| limit - estimating - clock.seconds());
-                    audit.step(workers, &canvas.film, rays(&canvas), clock.seconds(), left)?;
+                    let work = (rays(&canvas), clock.seconds());
+                    renderer.lend_photons(&mut |photons| {
+                        audit.step(workers, &canvas.film, photons, work, left)
+                    })?;
                 }
                 let start = Instant::now();
                 let found = Told::of(workers, &canvas, audit.as_ref());
@@ -155,7 +158,8 @@ impl Picture<'_> {
         let is_known = history.last().is_some_and(|last| last.error.is_some());
         if let (Some(audit), false) = (&mut audit, interrupted || is_known) {
             let left = settings.stop.seconds.map(|limit| limit - estimating - clock.seconds());
-            audit.step(workers, &canvas.film, rays(&canvas), clock.seconds(), left)?;
+            let work = (rays(&canvas), clock.seconds());
+            renderer.lend_photons(&mut |photons| audit.step(workers, &canvas.film, photons, work, left))?;
             // A shard is merged with them.
             if settings.shard != Shard::WHOLE {
                 save(&canvas, &rounds, Some(audit), &refinements, clock.seconds(), &history)?;

@@ -27,8 +27,17 @@ impl Told {
         audit: impl FnOnce(ErrorEstimate) -> Option<Audited>,
     ) -> Self {
         let noise = workers.estimate(&canvas.film, canvas.shares);
-        let audited = noise.and_then(audit);
-        let blurred = if audited.is_none() { Blurred::of(workers, &canvas.film, noise) } else { None };
+        let mut audited = noise.and_then(audit);
+        let is_blurred = audited.as_ref().is_none_or(|audited| audited.has_photons);
+        let blurred = if is_blurred { Blurred::of(workers, &canvas.film, noise) } else { None };
+        let blurred = match &mut audited {
+            Some(audited) => {
+                let all = |blurred: Blurred| audited.total.with_bias(blurred.blur);
+                audited.total = blurred.map_or(audited.total, all);
+                None
+            }
+            None => blurred,
+        };
         Self { noise, audited, blurred }
     }
 

@@ -223,6 +223,7 @@ fn bias(audit: &Audited) -> Value {
             "samples": audit.samples,
             "rays": audit.rays,
             "seconds": audit.seconds,
+            "photons": audit.has_photons,
         },
     })
 }

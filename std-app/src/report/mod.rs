@@ -53,7 +53,8 @@ impl Run<'_> {
     /// Why what an audit has found may not be a bias; `None` where path tracing can be trusted.
     pub fn doubt(&self) -> Option<&'static str> {
         let by_photons = self.result.method.finds_caustics() && Census::of(self.scene).specular > 0;
-        (by_photons || self.result.caustics.used)
+        let alone = self.result.audit.as_ref().is_none_or(|audit| !audit.has_photons);
+        (by_photons || self.result.caustics.used && alone)
             .then_some("path tracing, the judge, may miss light through mirrors and glass")
     }
 

@@ -17,7 +17,7 @@ use core::ops::Range;
 use halflight_core::bsdf::Features;
 use halflight_core::film::{Film, Pixel};
 use halflight_core::memory::{Arena, Footprint, Line, OutOfMemory};
-use halflight_core::transport::{Counters, PathSettings, PathTracer, path::WAVE};
+use halflight_core::transport::{Counters, Merging, PathSettings, PathTracer, path::WAVE};
 use serde::{Deserialize, Serialize};
 use std::time::Instant;
 
@@ -33,9 +33,12 @@ const PIXELS_PER_TASK: usize = 8;
 /// Makes the random numbers of the audit others than those of the picture.
 const OTHER_SEED: u32 = 0x5eed_a0d1;
 
-/// Samples of single pixels by the path tracer.
+/// Samples of single pixels by the path tracer, joined with photons of caustics if there are any.
 type Truth<'a> =
-    dyn Fn(&[[u32; 2]], Range<u32>, &mut Arena, &mut [Pixel]) -> Result<Counters, OutOfMemory> + Sync + 'a;
+    dyn Fn(Samples, Option<Merging>, &mut Arena, &mut [Pixel]) -> Result<Counters, OutOfMemory> + Sync + 'a;
+
+/// Samples of the pixels in these columns and rows.
+type Samples<'s> = (&'s [[u32; 2]], Range<u32>);
 
 /// See the file.
 pub(super) struct Audit<'a> {
@@ -61,6 +64,9 @@ pub(super) struct State {
     taken: u32,
     rays: u64,
     seconds: f64,
+    /// Whether paths were joined with photons of the picture, whose blur they do not see.
+    #[serde(default)]
+    has_photons: bool,
 }
 
 impl State {
@@ -71,12 +77,19 @@ impl State {
 
     /// What is known of the bias of `film`, of mean `mean`, whose own noise tells `noise`.
     pub(super) fn verdict(&self, film: &Film, mean: f64, noise: ErrorEstimate) -> Option<Audited> {
-        let Self { share, places, shares, pixels, taken, rays, seconds } = self;
+        let Self { share, places, shares, pixels, taken, rays, seconds, has_photons } = self;
         let truth: &[Pixel] = bytemuck::cast_slice(pixels);
         let grid = Grid::new([film.width(), film.height()], places.len());
         let findings = verdict::findings(film, mean, places, truth);
         let audited = verdict::verdict(&findings, shares, places, grid, noise)?;
-        Some(Audited { share: *share, samples: *taken, rays: *rays, seconds: *seconds, ..audited })
+        Some(Audited {
+            share: *share,
+            samples: *taken,
+            rays: *rays,
+            seconds: *seconds,
+            has_photons: *has_photons,
+            ..audited
+        })
     }
 }
 
@@ -103,7 +116,8 @@ impl<'a> Audit<'a> {
         let other = PathSettings { seed: paths.seed ^ OTHER_SEED, ..paths };
         let tracer = PathTracer::<F>::new(scene, bvh, lights, other, settings.level);
         Ok(Some(Self {
-            truth: Box::new(move |places, samples, arena, out| {
+            truth: Box::new(move |(places, samples), photons, arena, out| {
+                let tracer = photons.map_or(tracer, |photons| tracer.with_caustics(photons));
                 tracer.probe(places, samples, WAVE, arena, out)
             }),
             shard: settings.shard,
@@ -136,13 +150,15 @@ impl<'a> Audit<'a> {
     }
 
     /// Takes the samples that are due after so many `rays` of the picture, or `seconds` of picture and audit; fewer where
-    /// there is no time for all of them. Pixels are chosen in the first step, by the film.
+    /// there is no time for all of them. Pixels are chosen in the first step, by the film. Where the picture has `photons` of
+    /// caustics, paths are joined with the same ones, those of each half with photons that the other half does not know; their
+    /// blur is in both, and not seen.
     pub(super) fn step(
         &mut self,
         workers: &Workers,
         film: &Film,
-        rays: u64,
-        seconds: f64,
+        photons: Option<Merging>,
+        (rays, seconds): (u64, f64),
         time_left: Option<f64>,
     ) -> Result<(), RenderError> {
         let start = Instant::now();
@@ -169,20 +185,26 @@ impl<'a> Audit<'a> {
             if samples == 0 || spare.is_some_and(|spare| spare < cost) {
                 return Ok(());
             }
-            self.run(workers, taken..taken + samples)?;
+            self.run(workers, taken..taken + samples, photons)?;
             self.state.seconds = before + start.elapsed().as_secs_f64();
         }
     }
 
-    fn run(&mut self, workers: &Workers, samples: Range<u32>) -> Result<(), OutOfMemory> {
+    fn run(
+        &mut self,
+        workers: &Workers,
+        samples: Range<u32>,
+        photons: Option<Merging>,
+    ) -> Result<(), OutOfMemory> {
         let Self { truth, scratch, state, .. } = self;
         let places = &state.places;
         let pixels: &mut [Pixel] = bytemuck::cast_slice_mut(&mut state.pixels);
         let (counters, _) =
             workers.pass(pixels, PIXELS_PER_TASK, scratch, &|| false, &|task, arena, out| {
                 let first = task * PIXELS_PER_TASK;
-                truth(&places[first..first + out.len()], samples.clone(), arena, out)
+                truth((&places[first..first + out.len()], samples.clone()), photons, arena, out)
             })?;
+        state.has_photons |= photons.is_some();
         state.taken = samples.end;
         state.rays += counters.rays + counters.shadow_rays;
         Ok(())

@@ -31,6 +31,7 @@ impl State {
             merged.taken = merged.taken.min(state.taken);
             merged.rays += state.rays;
             merged.seconds += state.seconds;
+            merged.has_photons |= state.has_photons;
         }
         for place in order {
             if let Some((share, pixel)) = strata.remove(&place) {

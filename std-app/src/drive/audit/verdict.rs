@@ -21,11 +21,13 @@ pub struct Audited {
     pub rays: u64,
     /// Seconds of the audit; those of rendering have them in.
     pub seconds: f64,
+    /// Whether its paths were joined with the photons of the picture: their blur is not in the bias.
+    pub has_photons: bool,
     /// The error that the picture's own noise tells of.
     pub noise: ErrorEstimate,
     /// The squared bias.
     pub bias: BiasEstimate,
-    /// The sum of both.
+    /// The sum of both, and of what photons blur that the audit does not see.
     pub total: ErrorEstimate,
     /// By how much the whole picture is too bright.
     pub whole: Deviation,
@@ -102,6 +104,7 @@ pub(super) fn verdict(
         samples: 0,
         rays: 0,
         seconds: 0.0,
+        has_photons: false,
         noise,
         bias,
         total: noise.with_bias(bias),

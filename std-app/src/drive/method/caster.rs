@@ -2,10 +2,10 @@
 //! every few samples, into two maps, of even and of odd ones, so that the halves of the film stay independent; and discs
 //! shrink from one to the next as those of progressive photon mapping do, so that the blur vanishes.
 
-use super::Stage;
 use super::photon_view::{self, PhotonView};
 use super::photons::{MapUse, PhotonUse};
 use super::sppm::shrunk;
+use super::{Borrower, Stage};
 use crate::drive::RenderError;
 use crate::drive::crew::Crew;
 use crate::drive::memory::Memory;
@@ -61,6 +61,9 @@ struct Kept {
     /// Photons that there is room for in each.
     room: usize,
     shapes: [MapShape; 2],
+    /// What they were shot for.
+    discs: Discs,
+    paths: u32,
 }
 
 /// A map of photons for rays that gather.
@@ -156,7 +159,8 @@ impl<'a> Caster<'a> {
                     let Some(odd) = shoot(&shooter, block.first + 1, odd, scratch, crew, used)? else {
                         return Ok(());
                     };
-                    *kept = Some(Kept { block, room, shapes: [even.shape(), odd.shape()] });
+                    let (shapes, paths) = ([even.shape(), odd.shape()], light_paths as u32);
+                    *kept = Some(Kept { block, room, shapes, discs, paths });
                     [even, odd]
                 }
             };
@@ -187,6 +191,18 @@ impl<'a> Caster<'a> {
         let lines = if half == 0 { even } else { odd };
         let map = shoot(&shooter, RECORD_MAP + sample, lines, scratch, crew, used)?;
         Ok(map.map(|map| ForRecords { map, emission, discs, paths: paths as u32 }))
+    }
+
+    /// Lends `then` the last maps, if there are any.
+    pub(super) fn lend(&mut self, then: &mut Borrower) -> Result<(), RenderError> {
+        let Some(Kept { room, shapes, discs, paths, .. }) = self.kept else { return then(None) };
+        let [even, odd] = &mut self.photons;
+        let again = |shape: &MapShape, lines| {
+            PhotonMap::again(shape, room, &mut Arena::new(bytemuck::cast_slice_mut(lines)))
+        };
+        let maps = [again(&shapes[0], even)?, again(&shapes[1], odd)?];
+        let merging = Merging::new([&maps[0], &maps[1]], &self.emission, discs, paths);
+        then(Some(merging.beside_records(self.beside_records)))
     }
 
     /// The last maps, as the camera sees them.

@@ -13,7 +13,7 @@ use super::overture::{Growing, Overture};
 use super::path::Paths;
 use super::photon_view::PhotonView;
 use super::photons::{Laboratory, PhotonUse, Shelf};
-use super::{Method, Renderer, Stage};
+use super::{Borrower, Method, Renderer, Stage};
 use crate::drive::audit::Audit;
 use crate::drive::cache_file::{self, Half, Header, Reader, View};
 use crate::drive::crew::Crew;
@@ -568,6 +568,13 @@ impl<F: Features> Renderer for Cached<'_, F> {
 
     fn resume(&mut self, refinements: &[Refinement]) {
         self.pending = refinements.iter().copied().collect();
+    }
+
+    fn lend_photons(&mut self, then: &mut Borrower) -> Result<(), RenderError> {
+        match &mut self.caster {
+            Some(caster) => caster.lend(then),
+            None => then(None),
+        }
     }
 
     fn survey(&mut self, workers: &Workers) -> Result<Option<Survey>, RenderError> {

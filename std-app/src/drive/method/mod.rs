@@ -34,7 +34,7 @@ use halflight_core::bsdf::Features;
 use halflight_core::bvh::Bvh;
 use halflight_core::light::Lights;
 use halflight_core::scene::Scene;
-use halflight_core::transport::Discs;
+use halflight_core::transport::{Discs, Merging};
 
 /// A way to make a picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -167,6 +167,9 @@ impl Stage<'_> {
     }
 }
 
+/// What paths do with photons of caustics.
+pub(super) type Borrower<'b> = dyn FnMut(Option<Merging>) -> Result<(), RenderError> + 'b;
+
 /// A method at work on one scene. Its structures are its own; the film is the crew's.
 pub(super) trait Renderer {
     /// Another method than was thought, where a first look has chosen it.
@@ -190,6 +193,14 @@ pub(super) trait Renderer {
     /// of them, and says how; `None` where that cannot be. Sample `n` then follows from what was refined before it, too.
     fn refine(&mut self, _short: &Shortfall) -> Option<Refinement> {
         None
+    }
+
+    /// Lends `then` the photons of caustics that the picture has now, for paths without records; none where it has none.
+    ///
+    /// # Errors
+    /// Those of `then`.
+    fn lend_photons(&mut self, then: &mut Borrower) -> Result<(), RenderError> {
+        then(None)
     }
 
     /// Refines as it did before a film was kept, one after the other.

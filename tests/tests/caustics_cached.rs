@@ -1,0 +1,147 @@
+//! An irradiance cache beside photons of caustics: nothing is counted twice, the same bits on any number of threads, records
+//! come first where memory is short, and the audit asks the same photons.
+
+use halflight::drive::{CacheUse, Checkpoint, Gather, Method, RenderResult, Settings, Stop};
+use halflight_core::scene::Scene;
+use halflight_tests::render::{difference, render, try_render};
+use halflight_tests::scenes::{SceneBuffers, glass, in_a_room, lamp_before, lamp_over_ball, metal};
+
+fn path(scene: &Scene, spp: u32, change: impl FnOnce(&mut Settings)) -> RenderResult {
+    render(scene, Method::Path, 40, spp, change)
+}
+
+/// The same with an irradiance cache.
+fn cached(scene: &Scene, spp: u32, change: impl FnOnce(&mut Settings)) -> RenderResult {
+    render(scene, Method::IrradianceCache, 40, spp, |settings| {
+        settings.cache.strata = 16;
+        change(settings);
+    })
+}
+
+fn has_photons(result: &RenderResult) -> bool {
+    result.memory.iter().any(|one| one.structure == "photons" && one.bytes > 0)
+}
+
+/// Whether a picture of `spp` samples with records and photons is that of paths, with the same `change` of settings.
+fn have_no_light_in_common(
+    name: &str,
+    buffers: &SceneBuffers,
+    spp: u32,
+    change: fn(&mut Settings),
+) -> CacheUse {
+    let scene = buffers.scene();
+    let truth = path(&scene, 256, |settings| {
+        change(settings);
+        settings.stop = Stop { spp: settings.stop.spp, ..Stop::default() };
+    });
+    let joined = cached(&scene, spp, change);
+    println!("{name}: {:?}", joined.cache);
+    assert!(has_photons(&joined) && joined.cache.unwrap().records > 100, "{name}: {:?}", joined.caustics);
+    for (a, b) in joined.image.mean().into_iter().zip(truth.image.mean()) {
+        assert!((a / b - 1.0).abs() < 0.005, "{name}: {a} {b}");
+    }
+    let difference = difference(&joined.image, &truth.image);
+    assert!(difference < 0.03, "{name}: {difference}");
+    joined.cache.unwrap()
+}
+
+#[test]
+fn records_and_photons_have_no_light_in_common() {
+    let glass = in_a_room(lamp_over_ball(glass(0.0), 0.7));
+    have_no_light_in_common("glass", &glass, 64, |_| ());
+    have_no_light_in_common("mirror", &in_a_room(lamp_before(metal(0.0), 0.6)), 64, |_| ());
+    have_no_light_in_common("four segments", &glass, 64, |s| s.max_depth = Some(4));
+    have_no_light_in_common("reflected before", &glass, 64, |s| s.cache.gather = Gather::Photons);
+    // Few rays: noise that no number of samples takes away, unless records are refined.
+    let refined = have_no_light_in_common("refined", &glass, 1 << 9, |s| {
+        (s.cache.strata, s.stop.error) = (4, Some(1e-4));
+    });
+    assert!(refined.refined > 0, "{refined:?}");
+}
+
+#[test]
+fn beside_records_bits_are_the_same_and_off_is_off() {
+    let buffers = in_a_room(lamp_over_ball(glass(0.0), 0.3));
+    let scene = buffers.scene();
+    let temporary = |name: &str| std::env::temp_dir().join(format!("{}-{name}", std::process::id()));
+    let [film, records] = ["cached-caustics.film", "cached-caustics.records"].map(temporary);
+    let one = cached(&scene, 11, |s| (s.threads, s.save_cache) = (Some(1), Some(records.clone())));
+    assert!(has_photons(&one), "{:?}", one.caustics);
+    assert_eq!(cached(&scene, 11, |s| s.threads = Some(2)).image, one.image);
+    assert_eq!(cached(&scene, 11, |s| s.load_cache = Some(records.clone())).image, one.image);
+    let keep = Some(Checkpoint { path: film.clone(), every: f64::INFINITY });
+    let _ = cached(&scene, 5, |s| s.checkpoint = keep.clone());
+    assert_eq!(cached(&scene, 11, |s| s.resume = Some(film.clone())).image, one.image);
+    let off = cached(&scene, 11, |s| s.caustics = false);
+    assert!(!has_photons(&off) && off.image != one.image);
+    [film, records].into_iter().for_each(|file| std::fs::remove_file(file).unwrap());
+}
+
+#[test]
+fn beside_records_little_memory_is_enough() {
+    let buffers = in_a_room(lamp_over_ball(glass(0.0), 0.3));
+    let scene = buffers.scene();
+    let limited = |memory, caustics| {
+        cached(&scene, 2, |s| (s.threads, s.memory, s.caustics) = (Some(1), memory, caustics))
+    };
+    let mut limit = limited(None, true).memory_peak;
+    let lacking = loop {
+        let joined = limited(Some(limit), true);
+        assert!(joined.memory_peak <= limit);
+        if joined.caustics.lacks_memory {
+            break joined;
+        }
+        assert!(has_photons(&joined) && joined.cache.unwrap().records > 0);
+        limit = limit * 3 / 4;
+    };
+    assert!(lacking.image == limited(Some(limit), false).image);
+}
+
+#[test]
+fn what_suffices_for_records_suffices_beside_photons_too() {
+    let buffers = in_a_room(lamp_over_ball(glass(0.0), 0.3));
+    let scene = buffers.scene();
+    let limited = |memory, caustics| {
+        try_render(&scene, Method::IrradianceCache, 24, 2, |s| {
+            (s.cache.strata, s.cache.error) = (64, Some(10.0));
+            (s.threads, s.memory, s.caustics) = (Some(1), memory, caustics);
+        })
+    };
+    let plain = limited(None, false).unwrap().memory_peak;
+    let [mut too_little, mut enough] = [0, plain];
+    while enough - too_little > 1000 {
+        let middle = too_little.midpoint(enough);
+        *(if limited(Some(middle), false).is_ok() { &mut enough } else { &mut too_little }) = middle;
+    }
+    let mut limit = enough;
+    loop {
+        let [off, joined] = [false, true].map(|caustics| limited(Some(limit), caustics).unwrap());
+        let [without, beside] = [&off, &joined].map(|result| result.cache.unwrap().capacity);
+        if !joined.caustics.lacks_memory {
+            assert!(has_photons(&joined) && 4 * beside > without);
+            break;
+        }
+        assert_eq!(joined.image, off.image);
+        limit += 50_000;
+    }
+}
+
+/// Rays of the audit in a room that is lit by a caustic hardly ever meet it by chance; joined with photons they do not have to.
+#[test]
+fn the_audit_asks_the_same_photons() {
+    let buffers = in_a_room(lamp_over_ball(glass(0.0), 0.3));
+    let scene = buffers.scene();
+    let audited = |allowed| {
+        cached(&scene, 64, |s| {
+            (s.audit, s.stop.error, s.cache.error) = (None, Some(1e-9), allowed);
+        })
+    };
+    let fine = audited(None);
+    let audit = fine.audit.as_ref().unwrap();
+    println!("{:?} {:?} {:?}", fine.error, audit.bias, audit.whole);
+    assert!(audit.has_photons && !audit.is_biased() && audit.bias.detectable < 0.02);
+    // Records that reach too far are biased.
+    let coarse = audited(Some(30.0));
+    println!("{:?} {:?}", coarse.error, coarse.audit.as_ref().map(|audit| (audit.bias, audit.whole)));
+    assert!(coarse.audit.unwrap().is_biased());
+}
