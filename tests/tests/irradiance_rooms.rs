@@ -7,7 +7,7 @@ use halflight::save::Image;
 use halflight_core::Rgb;
 use halflight_core::scene::{Camera, Material, Scene};
 use halflight_tests::render::{blocks_of, render};
-use halflight_tests::scenes::{SceneBuffers, cornell_box, emitter};
+use halflight_tests::scenes::{SceneBuffers, constant_environment, cornell_box, emitter};
 
 const SIZE: u32 = 64;
 
@@ -135,6 +135,26 @@ fn what_many_rays_meet_is_no_spot_and_the_first_records_are_gathered_again() {
     assert!(rays < 2.7, "{rays} rays for one that is gathered");
     let again = cache.gathered as f64 / cache.records as f64 - 1.0;
     assert!((0.05..0.5).contains(&again), "{again} of them");
+}
+
+/// Several points of lights are asked beside the ray that may meet the sky or the lamp: each kind by its weight.
+#[test]
+fn a_court_under_a_sky_has_its_light_once() {
+    let camera = Camera::look_at(Vec3::new(0.8, 1.2, 2.2), Vec3::new(0.0, 0.3, 0.0), Vec3::Y, 50.0);
+    let mut buffers = SceneBuffers::new(camera);
+    let grey = buffers.material(diffuse(0.5));
+    buffers.square(Vec3::ZERO, Vec3::Y, 4.0, grey);
+    buffers.square(Vec3::new(0.0, 1.0, -1.5), Vec3::Z, 4.0, grey);
+    buffers.cuboid(Vec3::new(-0.6, 0.001, -0.6), Vec3::new(0.0, 0.8, 0.0), false, grey);
+    buffers.square(Vec3::new(0.2, 1.1, 0.2), Vec3::NEG_Y, 0.9, grey);
+    lamp(&mut buffers, Vec3::new(0.9, 0.9, -0.4), Vec3::NEG_X, 0.5, 4.0);
+    buffers.environment = constant_environment(0.7);
+    let scene = buffers.scene();
+    let asked = |spp| render(&scene, Method::IrradianceCache, 2 * SIZE, spp, |_| ()).counters;
+    let [few, more] = [1, 3].map(asked);
+    let each = (more.shadow_rays - few.shadow_rays) as f64 / (more.paths - few.paths) as f64;
+    assert!(each > 2.0, "{each} shadow rays for each path");
+    agrees(&scene, 0.004, 0.05);
 }
 
 #[test]

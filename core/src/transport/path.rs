@@ -9,9 +9,8 @@
 //!    the path then.
 //! 4. Code for what the scene does not have is not compiled in ([`Features`]).
 //! 5. Where that pays, pixels of a group share what their paths find (`reuse.rs`).
-//! 6. Where an irradiance cache knows the indirect light of a diffuse point, the path need not find it
-//!    (`cached.rs`), or a map of photons does one bounce later, and may ask several points of lights; nor where photons tell
-//!    it (`density.rs`, `maps.rs`).
+//! 6. Where an irradiance cache knows the indirect light of a diffuse point, the path need not find it (`cached.rs`), or a
+//!    map of photons does one bounce later, and may ask several points of lights; nor where photons do (`density.rs`, `maps.rs`).
 //! 7. Pixels at the border of a lamp look at it with rays of their own (`outline.rs`).
 //! 8. Where photons of caustics lie, paths and photons share the light that both find (`merge.rs`).
 //! 9. Where all else is quiet, pixels that see an edge have several paths for each sample (`edges.rs`).
@@ -391,7 +390,7 @@ impl<'a, F: Features> PathTracer<'a, F> {
             }
             return None;
         }
-        let &Met { ref point, light: [u, v], aim, indirect, .. } = met?;
+        let &Met { ref point, light: [u, v], aim, window, indirect, .. } = met?;
 
         // A ray cannot meet the plane that it started on: rounding on a needle. Nor does a camera on a surface see its back.
         if hit.triangle == path.triangle || (segments == 1 && point.is_left_by(ray)) {
@@ -456,8 +455,8 @@ impl<'a, F: Features> PathTracer<'a, F> {
         }
 
         // Where lights are small all around, and nothing mirrors them, a shadow ray alone finds the direct light. Not
-        // that of an environment, which is not drawn from where it seemed to be hidden.
-        let mut ends = false;
+        // that of an environment, which is not drawn from where it seemed to be hidden. Both ask several points of lights.
+        let (mut ends, mut points) = (false, 1);
         if let (Some(indirect), Bsdf::Diffuse(diffuse)) = (indirect, &bsdf)
             && !said.is_all
         {
@@ -465,6 +464,7 @@ impl<'a, F: Features> PathTracer<'a, F> {
             path.share = Share::DIRECT;
             said.next = Share::DIRECT;
             ends = indirect.shining < SMALL && !self.has_mirrors && scene.environment.is_none();
+            points = if ends || scene.environment.is_some() { path.lights.max(1).into() } else { 1 };
         }
 
         let cones = match bsdf {
@@ -474,10 +474,11 @@ impl<'a, F: Features> PathTracer<'a, F> {
         if !self.lights.is_empty() && !bsdf.is_delta() && !said.is_lit {
             // What transmits is looked at from both sides, a window from one.
             let aim = aim.filter(|_| normal != Vec3::ZERO);
-            let wanted = if ends { u32::from(path.lights.max(1)) } else { 1 };
-            for part in 0..wanted {
-                let sampler = if wanted > 1 { path.part(self.settings.seed, part) } else { sampler };
-                let [u, v] = if wanted > 1 { sampler.pair(first + dimension::LIGHT) } else { [u, v] };
+            for part in 0..points {
+                let sampler = if points > 1 { path.part(self.settings.seed, part) } else { sampler };
+                let [u, v] = if points > 1 { sampler.pair(first + dimension::LIGHT) } else { [u, v] };
+                let again = || aim.and(window).map(|window| window.aim(u, window.row(v)));
+                let aim = if points > 1 { again() } else { aim };
                 let choice = if self.lights.have_choice() {
                     sampler.single(first + dimension::LIGHT_CHOICE)
                 } else {
@@ -501,10 +502,11 @@ impl<'a, F: Features> PathTracer<'a, F> {
                         exchange.light_is_of_base(bsdf.base_part(wo, wi, f));
                     }
                     let alone = sample.delta || ends;
+                    let each = 1.0 / points as f32;
                     let mut weight = match alone {
-                        true => 1.0 / wanted as f32,
-                        false if later => environment_heuristic(self.lights, sample.pdf, pdf),
-                        false => power_heuristic(sample.pdf, pdf),
+                        true => each,
+                        false if later => each * environment_heuristic(self.lights, sample.pdf, each * pdf),
+                        false => each * power_heuristic(sample.pdf, each * pdf),
                     };
                     if let Some(merging) = &self.merging
                         && !ends_chain(&bsdf)
@@ -622,7 +624,8 @@ impl<'a, F: Features> PathTracer<'a, F> {
             };
         }
         path.throughput = throughput.to_array();
-        path.pdf = if sample.delta { f32::INFINITY } else { sample.pdf };
+        // One ray beside as many points of lights.
+        path.pdf = if sample.delta { f32::INFINITY } else { sample.pdf / points as f32 };
         path.position = point.position.to_array();
         path.normal = normal.to_array();
         path.travelled = travelled;
