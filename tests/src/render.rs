@@ -35,6 +35,11 @@ pub fn try_render(
     drive::render(scene, &settings, &mut |_| (), &AtomicBool::new(false))
 }
 
+/// Whether it has memory of photons.
+pub fn has_photons(result: &RenderResult) -> bool {
+    result.memory.iter().any(|one| one.structure == "photons" && one.bytes > 0)
+}
+
 /// Means of green over blocks of 4 × 4 pixels: what is left of noise is a quarter.
 pub fn blocks(image: &Image) -> Vec<f64> {
     blocks_of(image, 4)

@@ -15,7 +15,7 @@ use halflight_core::transport::caustics::{CausticShooter, Find, PATHS, ROOM};
 use halflight_core::transport::shoot::{Keep, ShootSettings};
 use halflight_core::transport::{Discs, Merging, PathSettings, PathTracer, UNLIMITED};
 use halflight_core::{Level, Rgb};
-use halflight_tests::render::render;
+use halflight_tests::render::{has_photons, render};
 use halflight_tests::scenes::{
     IN_THE_BRIGHT_ROOM, SceneBuffers, bright_and_dark, constant_environment, cornell_box, emitter,
     everything, glass, in_a_room, lamp_before, lamp_over_ball, metal,
@@ -239,10 +239,6 @@ fn path(scene: &Scene, spp: u32, change: impl FnOnce(&mut Settings)) -> RenderRe
     render(scene, Method::Path, 40, spp, change)
 }
 
-fn has_photons(result: &RenderResult) -> bool {
-    result.memory.iter().any(|one| one.structure == "photons" && one.bytes > 0)
-}
-
 /// Everything, and caustics that are worth photons: of a lamp that has no size, by a wide mirror.
 fn lit_by_a_mirror() -> SceneBuffers {
     let mut buffers = everything();
@@ -306,7 +302,11 @@ fn where_there_is_no_caustic_the_picture_is_that_without_photons() {
         let joined = path(&scene, 9, |_| ());
         assert_eq!(joined.image, path(&scene, 9, |s| s.caustics = false).image);
         assert!(!has_photons(&joined));
-        let cached = |caustics| render(&scene, Method::IrradianceCache, 40, 5, |s| s.caustics = caustics);
+        let cached = |caustics| {
+            render(&scene, Method::IrradianceCache, 40, 5, |s| {
+                (s.cache.strata, s.caustics) = (16, caustics);
+            })
+        };
         let joined = cached(true);
         assert_eq!(joined.image, cached(false).image);
         assert!(!has_photons(&joined));

@@ -3,7 +3,7 @@
 
 use halflight::drive::{CacheUse, Checkpoint, Gather, Method, RenderResult, Settings, Stop};
 use halflight_core::scene::Scene;
-use halflight_tests::render::{difference, render, try_render};
+use halflight_tests::render::{difference, has_photons, render, try_render};
 use halflight_tests::scenes::{SceneBuffers, glass, in_a_room, lamp_before, lamp_over_ball, metal};
 
 fn path(scene: &Scene, spp: u32, change: impl FnOnce(&mut Settings)) -> RenderResult {
@@ -16,10 +16,6 @@ fn cached(scene: &Scene, spp: u32, change: impl FnOnce(&mut Settings)) -> Render
         settings.cache.strata = 16;
         change(settings);
     })
-}
-
-fn has_photons(result: &RenderResult) -> bool {
-    result.memory.iter().any(|one| one.structure == "photons" && one.bytes > 0)
 }
 
 /// Whether a picture of `spp` samples with records and photons is that of paths, with the same `change` of settings.

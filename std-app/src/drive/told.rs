@@ -28,16 +28,14 @@ impl Told {
     ) -> Self {
         let noise = workers.estimate(&canvas.film, canvas.shares);
         let mut audited = noise.and_then(audit);
-        let is_blurred = audited.as_ref().is_none_or(|audited| audited.has_photons);
-        let blurred = if is_blurred { Blurred::of(workers, &canvas.film, noise) } else { None };
-        let blurred = match &mut audited {
-            Some(audited) => {
-                let all = |blurred: Blurred| audited.total.with_bias(blurred.blur);
-                audited.total = blurred.map_or(audited.total, all);
-                None
-            }
-            None => blurred,
-        };
+        // An audit without photons sees what they blur.
+        let is_seen = audited.as_ref().is_some_and(|audited| !audited.has_photons);
+        let mut blurred = if is_seen { None } else { Blurred::of(workers, &canvas.film, noise) };
+        if let Some(audited) = &mut audited
+            && let Some(blurred) = blurred.take()
+        {
+            audited.total = audited.total.with_bias(blurred.blur);
+        }
         Self { noise, audited, blurred }
     }
 

@@ -12,7 +12,7 @@ use crate::drive::memory::Memory;
 use crate::drive::run::path_settings;
 use halflight_core::bsdf::Features;
 use halflight_core::light::Emission;
-use halflight_core::memory::{Arena, Line};
+use halflight_core::memory::{Arena, Line, OutOfMemory};
 use halflight_core::photon::{MapShape, PhotonMap, Photons};
 use halflight_core::transport::caustics::{CausticShooter, PATHS, ROOM};
 use halflight_core::transport::shoot::{Keep, ShootSettings};
@@ -55,7 +55,6 @@ pub(super) struct Caster<'a> {
 }
 
 /// Maps that were made.
-#[derive(Clone, Copy)]
 struct Kept {
     block: Block,
     /// Photons that there is room for in each.
@@ -64,6 +63,17 @@ struct Kept {
     /// What they were shot for.
     discs: Discs,
     paths: u32,
+}
+
+impl Kept {
+    /// They, from the memory that they are in.
+    fn maps<'m>(&self, photons: [&'m mut Vec<Line>; 2]) -> Result<[PhotonMap<'m>; 2], OutOfMemory> {
+        let [even, odd] = photons;
+        let again = |shape, lines: &'m mut Vec<Line>| {
+            PhotonMap::again(shape, self.room, &mut Arena::new(bytemuck::cast_slice_mut(lines)))
+        };
+        Ok([again(&self.shapes[0], even)?, again(&self.shapes[1], odd)?])
+    }
 }
 
 /// A map of photons for rays that gather.
@@ -144,13 +154,8 @@ impl<'a> Caster<'a> {
             let (shooter, discs) = shooter::<F>(stage, emission, light_paths, from, *beside_records);
             let room = shooter.tasks() * ROOM;
             let [even, odd] = &mut *photons;
-            let maps = match *kept {
-                Some(Kept { block: of, shapes, .. }) if of == block => {
-                    let again = |shape: &MapShape, lines| {
-                        PhotonMap::again(shape, room, &mut Arena::new(bytemuck::cast_slice_mut(lines)))
-                    };
-                    [again(&shapes[0], even)?, again(&shapes[1], odd)?]
-                }
+            let maps = match kept {
+                Some(kept) if kept.block == block => kept.maps([even, odd])?,
                 _ => {
                     *kept = None;
                     let Some(even) = shoot(&shooter, block.first, even, scratch, crew, used)? else {
@@ -195,24 +200,18 @@ impl<'a> Caster<'a> {
 
     /// Lends `then` the last maps, if there are any.
     pub(super) fn lend(&mut self, then: &mut Borrower) -> Result<(), RenderError> {
-        let Some(Kept { room, shapes, discs, paths, .. }) = self.kept else { return then(None) };
-        let [even, odd] = &mut self.photons;
-        let again = |shape: &MapShape, lines| {
-            PhotonMap::again(shape, room, &mut Arena::new(bytemuck::cast_slice_mut(lines)))
-        };
-        let maps = [again(&shapes[0], even)?, again(&shapes[1], odd)?];
-        let merging = Merging::new([&maps[0], &maps[1]], &self.emission, discs, paths);
+        let Some(kept) = &self.kept else { return then(None) };
+        let maps = kept.maps(self.photons.each_mut())?;
+        let merging = Merging::new([&maps[0], &maps[1]], &self.emission, kept.discs, kept.paths);
         then(Some(merging.beside_records(self.beside_records)))
     }
 
     /// The last maps, as the camera sees them.
     pub(super) fn view<F: Features>(&mut self) -> Result<Option<PhotonView>, RenderError> {
+        let Some(kept) = &self.kept else { return Ok(None) };
         // The odd ones are the last that were made.
-        let (Some(Kept { room, shapes, .. }), [_, odd]) = (self.kept, &mut self.photons) else {
-            return Ok(None);
-        };
-        let map = PhotonMap::again(&shapes[1], room, &mut Arena::new(bytemuck::cast_slice_mut(odd)))?;
-        Ok(Some(photon_view::look::<F>(&self.stage, None, Some(&map))?))
+        let [_, odd] = kept.maps(self.photons.each_mut())?;
+        Ok(Some(photon_view::look::<F>(&self.stage, None, Some(&odd))?))
     }
 }
 

@@ -232,7 +232,8 @@ impl Needs {
         scratch.saturating_add(self.edges.bytes()).saturating_add(tables)
     }
 
-    /// What comes after photons of caustics: the audit, the fewest photons that gather rays end in, room for `fewest` records in each half.
+    /// What comes after photons of caustics: the audit, the fewest photons that gather rays end in, room for `fewest`
+    /// records in each half.
     fn later<F: Features>(&self, stage: &Stage, fewest: usize) -> usize {
         let photons = if self.by_photons { Laboratory::least_bytes(stage.lights) } else { 0 };
         let records = IrradianceCache::footprint(fewest).bytes().saturating_mul(2);

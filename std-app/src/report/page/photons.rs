@@ -57,8 +57,8 @@ fn first_look(run: &Run) -> &'static str {
              missing or noisy. "
         }
         (true, _) => {
-            "Paths, or records, have all other light, and paths share with photons what both find. Only photons that count are kept: each \
-             is left with the probability that is its weight beside paths, most where paths find next to nothing. "
+            "Paths, or records, have all other light, and paths share with photons what both find. Only photons \
+             that count are kept: each is left with the probability that is its weight beside paths, most where paths find next to nothing. "
         }
         (false, Some(_)) => {
             "Photons of caustics were shot and thrown away: they bring too little light to pay for themselves, and paths \
