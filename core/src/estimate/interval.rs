@@ -12,7 +12,7 @@
 //! 3. The error that this picture has and its estimate differ by the mean of the product of both halves' errors,
 //!    exactly. For a pixel of variance V the product has the variance 4 V², and the estimate squared the mean 3 V² (more
 //!    with heavy tails); Student's t says what it is to know that from few pixels. How errors hang together between
-//!    pixels that share paths is seen in the differences of the halves. Upwards less is in doubt where single samples have
+//!    pixels that share paths, and between those of a region where all is shared, is seen in the differences of the halves. Upwards less is in doubt where single samples have
 //!    the noise: the error of a pixel that flashed is hardly more than its variance, if enough of them tell. If they are few,
 //!    the lower end is not above what the error may be if all flashes belonged there.
 //!
@@ -57,24 +57,27 @@ impl ErrorEstimate {
     pub fn of(tiles: impl Iterator<Item = TileError>) -> Option<Self> {
         let mut sum = TileError::default();
         tiles.for_each(|tile| sum += tile);
-        let shared = shared(&sum);
-        let flashes = freedom(sum.squares, sum.fourths) / shared;
-        let quantile = if flashes < FEWEST { student_95(FEWEST) } else { Z };
-        Self::with_reach(&sum, quantile * sqrt(shared), sum.above, flashes)
+        Self::with_shared(&sum, shared(&sum), sum.above)
     }
 
-    /// From the sums over regions, where a method shares between pixels far apart: regions count as independent. They
-    /// are few, so the interval is wider by Student's t.
+    /// From the sums over regions, where a method shares between pixels far apart, too.
     pub fn of_regions(regions: impl Iterator<Item = TileError>) -> Option<Self> {
-        let (mut sum, mut squares, mut fourths) = (TileError::default(), 0.0, 0.0);
-        for region in regions {
+        let (mut sum, mut parts, mut count) = (TileError::default(), Parts::default(), 0);
+        for region in regions.filter(|region| region.values > 0) {
+            parts += Parts::of([[region.difference, region.halves]]);
             sum += region;
-            let squared = region.product * region.product;
-            squares += squared;
-            fourths += squared * squared;
+            count += 1;
         }
-        let reach = student_95(freedom(squares, fourths)) * sqrt(together(squares, sum.pixels));
-        Self::with_reach(&sum, reach, f64::INFINITY, freedom(sum.squares, sum.fourths))
+        let pixels = (sum.values / 3) as f64 / f64::from(count.max(1));
+        Self::with_shared(&sum, shared(&sum) + by_parts(&sum, parts, pixels), f64::INFINITY)
+    }
+
+    /// `shared`: by how much what pixels share makes the estimate vary more; `above`: the square of the standard error to the upper
+    /// end, as if they shared nothing, if that is less than to the lower.
+    fn with_shared(sum: &TileError, shared: f64, above: f64) -> Option<Self> {
+        let flashes = freedom(sum.squares, sum.fourths) / shared;
+        let quantile = if flashes < FEWEST { student_95(FEWEST) } else { Z };
+        Self::with_reach(sum, quantile * sqrt(shared), above, flashes)
     }
 
     /// `reach`: standard errors from the estimate to an end of its interval, as if pixels were independent; `above`: the
@@ -106,25 +109,22 @@ impl ErrorEstimate {
 }
 
 /// By how much errors that the pixels of a group share, or those of a block, make the sum of products of both halves' errors
-/// vary more. With the correlation ρ of each two of them, from the squares of sums over parts and of pixels, it is
-/// 1 + ρ² Σ V_p V_q / Σ V_p², of all p ≠ q of a part. Estimates have 1 + 2 ρ² times the former and 3 times the latter.
+/// vary more.
 fn shared(sum: &TileError) -> f64 {
-    const OTHERS: f64 = GROUP as f64 - 1.0;
-    if !(sum.differences > 0.0 && sum.squares > 0.0) {
-        return 1.0;
-    }
-    let more = |parts: Parts| {
-        let rho = fmax(parts.differences / sum.differences - 1.0, 0.0) / OTHERS;
-        let pairs = 3.0 * fmax(parts.variances / sum.squares - 1.0, 0.0) / (1.0 + 2.0 * rho * rho);
-        rho * rho * fmin(pairs, OTHERS)
-    };
+    let more = |parts| by_parts(sum, parts, GROUP as f64);
     1.0 + more(sum.groups) + more(sum.blocks)
 }
 
-/// By how much errors that hang together make a sum over pixels vary more: from the squares of sums over parts of the
-/// picture and of pixels.
-fn together(parts: f64, pixels: f64) -> f64 {
-    if pixels > 0.0 { fmax(parts / pixels, 1.0) } else { 1.0 }
+/// What parts of so many pixels add to it. With the correlation ρ of each two of them, from the squares of sums over parts and of
+/// pixels, it is ρ² Σ V_p V_q / Σ V_p², of all p ≠ q of a part. Estimates have 1 + 2 ρ² times the former and 3 times the latter.
+fn by_parts(sum: &TileError, parts: Parts, pixels: f64) -> f64 {
+    let others = pixels - 1.0;
+    if !(sum.differences > 0.0 && sum.squares > 0.0 && others > 0.0) {
+        return 0.0;
+    }
+    let rho = fmax(parts.differences / sum.differences - 1.0, 0.0) / others;
+    let pairs = 3.0 * fmax(parts.variances / sum.squares - 1.0, 0.0) / (1.0 + 2.0 * rho * rho);
+    rho * rho * fmin(pairs, others)
 }
 
 /// Degrees of freedom of a sum, from the sums of the squares and fourth powers of what is added up.
@@ -152,15 +152,22 @@ mod tests {
 
     /// A picture of `tiles` tiles of radiance 1 with uniform noise: samples between 1 − `noise` and 1 + `noise`.
     fn picture(tiles: u32, samples: u32, noise: f32, seed: u32) -> Vec<Vec<Pixel>> {
-        shared_picture(tiles, samples, noise, 0.0, seed)
+        shared_picture(tiles, samples, noise, 0.0, Tile::group, seed)
     }
 
-    /// The same, where `common` of the variance is noise that the pixels of a group have in common.
-    fn shared_picture(tiles: u32, samples: u32, noise: f32, common: f32, seed: u32) -> Vec<Vec<Pixel>> {
+    /// The same, where `common` of the variance is noise that the pixels of each `part` of a tile have in common.
+    fn shared_picture(
+        tiles: u32,
+        samples: u32,
+        noise: f32,
+        common: f32,
+        part: fn(usize) -> usize,
+        seed: u32,
+    ) -> Vec<Vec<Pixel>> {
         let tile = |tile: u32| {
             (0..PIXELS_PER_TILE).map(move |i| {
                 let own = Random::new(seed, tile << 8 | i as u32);
-                let group = Random::new(!seed, tile << 8 | Tile::group(i) as u32);
+                let group = Random::new(!seed, tile << 8 | part(i) as u32);
                 let mut pixel = Pixel::default();
                 for sample in 0..samples {
                     let [own, group] = [own, group].map(|random| 2.0 * random.single(sample) - 1.0);
@@ -174,12 +181,22 @@ mod tests {
     }
 
     fn estimate(picture: &[Vec<Pixel>]) -> Option<ErrorEstimate> {
+        ErrorEstimate::of(errors(picture).into_iter())
+    }
+
+    fn errors(picture: &[Vec<Pixel>]) -> Vec<TileError> {
         let mut light = TileLight::default();
         picture.iter().for_each(|tile| light += TileLight::of(tile));
         let (mean, mut alike) = (light.mean(), Lookalikes::default());
         picture.iter().for_each(|tile| alike.add(tile, mean));
         let shrinkage = alike.shrinkage();
-        ErrorEstimate::of(picture.iter().map(|tile| TileError::of(tile, mean, &shrinkage)))
+        picture.iter().map(|tile| TileError::of(tile, mean, &shrinkage)).collect()
+    }
+
+    /// The error that a picture of radiance 1 has.
+    fn truth(picture: &[Vec<Pixel>]) -> f64 {
+        let errors = picture.iter().flatten().map(|pixel| f64::from(pixel.mean().x) - 1.0);
+        errors.map(|e| e * e / 1.01).sum::<f64>() / (picture.len() * PIXELS_PER_TILE) as f64
     }
 
     #[test]
@@ -188,18 +205,40 @@ mod tests {
         for (common, tolerance) in [(0.0, 0.12), (0.5, 0.24)] {
             let (mut held, pictures) = (0, 60);
             for seed in 0..pictures {
-                let picture = shared_picture(12, 16, 0.5, common, seed);
+                let picture = shared_picture(12, 16, 0.5, common, Tile::group, seed);
                 let found = estimate(&picture).unwrap();
                 // σ² = noise² / 3 for a sample; R² + 0.01 m² = 1.01.
                 let expected = 0.25 / 3.0 / 16.0 / 1.01;
                 assert!((found.relmse / expected - 1.0).abs() < tolerance, "{found:?} {expected}");
-                let errors = picture.iter().flatten().map(|pixel| f64::from(pixel.mean().x) - 1.0);
-                let truth = errors.map(|e| e * e / 1.01).sum::<f64>() / (12.0 * 256.0);
-                held += u32::from((found.lower..=found.upper).contains(&truth));
+                held += u32::from((found.lower..=found.upper).contains(&truth(&picture)));
             }
             // 95 % of 60 are 57; fewer than 51 have a chance of 1 %.
             assert!(held >= 51, "{common}: {held} of {pictures}");
         }
+    }
+
+    #[test]
+    fn what_regions_share_is_doubted_and_no_more() {
+        // Where regions share nothing the interval is hardly wider than that of pixels.
+        let still = errors(&picture(64, 16, 0.5, 1));
+        let [alone, together] =
+            [ErrorEstimate::of(still.iter().copied()), ErrorEstimate::of_regions(still.into_iter())]
+                .map(Option::unwrap);
+        assert!(
+            alone.relmse == together.relmse && together.upper / together.relmse < 1.1,
+            "{alone:?} {together:?}"
+        );
+        let (mut held, mut held_by_pixels, pictures) = (0, 0, 60);
+        for seed in 0..pictures {
+            let picture = shared_picture(64, 16, 0.5, 0.3, |_| 0, seed);
+            let (truth, tiles) = (truth(&picture), errors(&picture));
+            let found = ErrorEstimate::of_regions(tiles.iter().copied()).unwrap();
+            held += u32::from((found.lower..=found.upper).contains(&truth));
+            let pixels = ErrorEstimate::of(tiles.into_iter()).unwrap();
+            held_by_pixels += u32::from((pixels.lower..=pixels.upper).contains(&truth));
+        }
+        // 95 % of 60 are 57; fewer than 51 have a chance of 1 %.
+        assert!(held >= 51 && held_by_pixels < 51, "{held}, {held_by_pixels} of {pictures}");
     }
 
     #[test]

@@ -62,11 +62,9 @@ pub struct TileError {
     pub(super) fourths: f64,
     /// Squares of what the errors of pixels may be above their variances ([`above`]).
     pub(super) above: f64,
-    /// Sum of (A₁ − A₂)(B₁ − B₂) / 4, which has the mean 0 and hangs together between pixels as the errors do.
-    pub(super) product: f64,
-    /// Squares of that sum in pixels.
-    pub(super) pixels: f64,
-    /// Squares of (A − B) / R in pixels.
+    /// Sum of (A − B) / R, which hangs together between pixels as the errors do,
+    pub(super) difference: f64,
+    /// and of its squares in pixels.
     pub(super) differences: f64,
     /// Of groups, which may share their paths.
     pub(super) groups: Parts,
@@ -74,7 +72,7 @@ pub struct TileError {
     pub(super) blocks: Parts,
 }
 
-/// Sums over the parts of a tile, of sixteen pixels each, whose errors may hang together.
+/// Sums over parts of a picture whose errors may hang together.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Parts {
     /// Squares of the sums of (A − B) / R over their pixels.
@@ -85,7 +83,7 @@ pub(super) struct Parts {
 
 impl Parts {
     /// From both sums of each part.
-    fn of(parts: [[f64; 2]; GROUPS]) -> Self {
+    pub(super) fn of<const N: usize>(parts: [[f64; 2]; N]) -> Self {
         let [differences, variances] = [0, 1].map(|i| parts.iter().map(|part| part[i] * part[i]).sum());
         Self { differences, variances }
     }
@@ -130,10 +128,8 @@ impl TileError {
             sums.above += above([variance, darker], likely, seen, around, by_both);
             sums.parts += total((first + second) * by_both * 0.5);
             sums.crossed += total(0.5 * (first * by[1] + second * by[0]));
-            let product = total((a1 - a2) * (b1 - b2) * by_both) / 4.0;
-            sums.product += product;
-            sums.pixels += product * product;
             let difference = total(a1 + a2 - b1 - b2) * libm::sqrt(total(by_both));
+            sums.difference += difference;
             sums.differences += difference * difference;
             for part in [&mut groups[Tile::group(i)], &mut blocks[i / GROUP]] {
                 part[0] += difference;
@@ -158,8 +154,7 @@ impl core::ops::AddAssign for TileError {
         self.squares += other.squares;
         self.fourths += other.fourths;
         self.above += other.above;
-        self.product += other.product;
-        self.pixels += other.pixels;
+        self.difference += other.difference;
         self.differences += other.differences;
         self.groups += other.groups;
         self.blocks += other.blocks;

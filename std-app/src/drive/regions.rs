@@ -1,12 +1,11 @@
-//! Parts of a picture whose errors count as independent of each other: its tiles; larger regions where a method shares
-//! between pixels far apart. The error itself comes from independent halves whatever is shared between pixels; only how
-//! sure it is follows from the parts.
+//! Regions of a picture within which errors may hang together, where a method shares between pixels far apart. The error
+//! itself comes from independent halves whatever is shared between pixels; only how sure it is follows from the regions.
 
 use halflight_core::estimate::{ErrorEstimate, TileError};
 use halflight_core::film::TILE;
 
-/// Regions along each side of a picture, at most: enough to tell how far they differ, so large that what is shared is
-/// mostly shared within them.
+/// Regions along each side of a picture, at most: enough to tell how far their errors hang together, so large that what is
+/// shared is mostly shared within them.
 const SIDE: usize = 8;
 
 /// The error of a picture `width` pixels across from all of its tiles.
