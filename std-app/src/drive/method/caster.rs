@@ -19,10 +19,10 @@ use halflight_core::transport::shoot::{Keep, ShootSettings};
 use halflight_core::transport::{Discs, Merging, PathTracer, path::WAVE};
 use std::time::Instant;
 
-/// Radius of the discs of the first sample, in pixels.
+/// Radius of the discs of the first sample, in pixels, where photons are not what is noisy.
 pub(super) const FIRST_RADIUS: f64 = 1.0;
 
-/// Light paths of a map for each pixel of the picture and each sample that the map serves, but no fewer and no more
+/// Light paths of a map for each pixel of the picture and each sample that the map serves, there, but no fewer and no more
 /// than these.
 const PATHS_PER_SAMPLE: f64 = 0.5;
 const FEWEST_PATHS: usize = 16 * PATHS;
@@ -38,12 +38,19 @@ const RECORD_RADIUS: f32 = 3.0;
 const RECORD_PART: usize = 4;
 const RECORD_MAP: u32 = 1 << 30;
 
+/// How photons are to be shot.
+pub(super) struct Cast<'a> {
+    pub(super) emission: Emission<'a>,
+    /// Of one pixel.
+    pub(super) discs: Discs,
+    /// So many times the light paths, for discs so many times as wide.
+    pub(super) plenty: f64,
+}
+
 /// See the file.
 pub(super) struct Caster<'a> {
     stage: Stage<'a>,
-    /// Of one pixel.
-    discs: Discs,
-    emission: Emission<'a>,
+    cast: Cast<'a>,
     beside_records: bool,
     /// Of even and of odd samples.
     photons: [Vec<Line>; 2],
@@ -115,17 +122,17 @@ impl Block {
 }
 
 impl<'a> Caster<'a> {
-    /// Of photons that go by `emission`. `others` is what is to be left of the memory; beside records so is half of the rest.
+    /// Of photons as `cast` has them. `others` is what is to be left of the memory; beside records so is half of the rest.
     pub(super) fn new(
         stage: &Stage<'a>,
         memory: &mut Memory,
-        (emission, discs): (Emission<'a>, Discs),
+        cast: Cast<'a>,
         beside_records: bool,
         others: usize,
     ) -> Result<Self, RenderError> {
         let Stage { settings, .. } = *stage;
         let pixels = f64::from(settings.width) * f64::from(settings.height);
-        let each = ((PATHS_PER_SAMPLE * pixels) as usize).clamp(FEWEST_PATHS, MOST_PATHS);
+        let each = ((cast.plenty * PATHS_PER_SAMPLE * pixels) as usize).clamp(FEWEST_PATHS, MOST_PATHS);
         let wanted = (each * (MOST_SAMPLES / 2) as usize).min(MOST_PATHS).div_ceil(PATHS);
         let maps = if beside_records { 4 } else { 2 };
         let of_task = Photons::footprint(ROOM).bytes();
@@ -135,7 +142,7 @@ impl<'a> Caster<'a> {
         let [wanted, given] = [wanted, tasks].map(|tasks| (tasks * PATHS) as u64);
         let map = MapUse { wanted, given, ..MapUse::default() };
         let used = PhotonUse { caustic: Some(map), ..PhotonUse::default() };
-        Ok(Self { stage: *stage, discs, emission, beside_records, photons, each, used, kept: None })
+        Ok(Self { stage: *stage, cast, beside_records, photons, each, used, kept: None })
     }
 
     /// Brings the tiles of `crew` to their targets by `tracer`, joined with photons; less where the round is cut.
@@ -145,12 +152,14 @@ impl<'a> Caster<'a> {
         scratch: &mut [Vec<Line>],
         crew: &mut Crew,
     ) -> Result<(), RenderError> {
-        let Self { stage, discs, emission, beside_records, photons, each, used, kept } = self;
+        let Self { stage, cast: Cast { emission, discs, plenty }, beside_records, photons, each, used, kept } =
+            self;
+        let discs = discs.of_pixels(*plenty as f32);
         while let Some(sample) = crew.next_in_mean() {
             let block = Block::of(sample);
             let most = used.caustic.map_or(0, |map| map.given as usize);
             let light_paths = (*each * block.samples() as usize).min(most);
-            let from = (*discs, block.first);
+            let from = (discs, block.first);
             let (shooter, discs) = shooter::<F>(stage, emission, light_paths, from, *beside_records);
             let room = shooter.tasks() * ROOM;
             let [even, odd] = &mut *photons;
@@ -186,7 +195,7 @@ impl<'a> Caster<'a> {
         scratch: &mut [Vec<Line>],
         crew: &mut Crew,
     ) -> Result<Option<ForRecords<'_>>, RenderError> {
-        let Self { stage, discs, emission, photons, used, kept, .. } = self;
+        let Self { stage, cast: Cast { emission, discs, .. }, photons, used, kept, .. } = self;
         *kept = None;
         let paths = used.caustic.map_or(0, |map| map.given as usize).div_ceil(RECORD_PART);
         let sample = 2 * refined + half;
@@ -202,7 +211,7 @@ impl<'a> Caster<'a> {
     pub(super) fn lend(&mut self, then: &mut Borrower) -> Result<(), RenderError> {
         let Some(kept) = &self.kept else { return then(None) };
         let maps = kept.maps(self.photons.each_mut())?;
-        let merging = Merging::new([&maps[0], &maps[1]], &self.emission, kept.discs, kept.paths);
+        let merging = Merging::new([&maps[0], &maps[1]], &self.cast.emission, kept.discs, kept.paths);
         then(Some(merging.beside_records(self.beside_records)))
     }
 

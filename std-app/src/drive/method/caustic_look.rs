@@ -27,6 +27,11 @@ const DOUBT_USEFUL: f64 = 0.0625;
 const SAMPLES: f64 = 64.0;
 const LEAST_HITS: f64 = 4.0;
 
+/// By how much there are more and wider discs, at most, than where photons are not what is noisy; and the light that photons bring,
+/// over all other, from which on there are.
+const MOST_PLENTY: f64 = 4.0;
+const MUCH: f64 = 0.4;
+
 const ALL: usize = (BLOCKS * BLOCKS) as usize;
 
 /// A block of the picture: means over its pixels.
@@ -90,6 +95,12 @@ impl Looked {
         Self { share, useful: useful(finds), noise, mean }
     }
 
+    /// How much more is to be done for photons than usual. Over the light squared their variance is that of a disc's few photons, and
+    /// counts as the square of their share: the light paths that are best grow with the quotient of their light to the other.
+    pub(super) fn plenty(&self) -> f64 {
+        (self.share / (MUCH * (1.0 - self.share))).clamp(1.0, MOST_PLENTY)
+    }
+
     /// Whether a longer look may find that photons are worth it.
     pub(super) fn may_pay(&self) -> bool {
         self.share >= DOUBT_SHARE * LEAST_SHARE || self.useful >= DOUBT_USEFUL * LEAST_USEFUL
@@ -101,5 +112,19 @@ impl Looked {
             return Ok(self.share >= LEAST_SHARE);
         }
         Ok(self.noise >= LEAST_NOISE * paths.noise(stage, self.mean as f32)?)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_more_of_the_light_photons_bring_the_more_is_done_for_them() {
+        let plenty = |share| Looked { share, useful: 1.0, noise: 0.0, mean: 1.0 }.plenty();
+        // A caustic beside a lamp, as many as ever; a room behind glass; and a lamp in a bulb.
+        assert_eq!([0.0, 0.05, 0.28].map(plenty), [1.0; 3]);
+        assert!((2.0..4.0).contains(&plenty(0.5)), "{}", plenty(0.5));
+        assert_eq!([0.7, 0.96, 1.0].map(plenty), [4.0; 3]);
     }
 }

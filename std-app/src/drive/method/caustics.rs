@@ -4,7 +4,7 @@
 //! that is not worth it (`caustic_look.rs`), the picture is path traced alone, as if photons had never been asked for.
 //! Otherwise it is where most of them go from then on.
 
-use super::caster::{Caster, FIRST_RADIUS, shooter};
+use super::caster::{Cast, Caster, FIRST_RADIUS, shooter};
 use super::caustic_look::{Looked, useful};
 use super::path::Paths;
 use super::photon_view::PhotonView;
@@ -73,15 +73,15 @@ pub(super) fn has_memory(memory: &Memory, lights: &Lights, others: usize) -> boo
     memory.has((footprint(lights).bytes() + least_photons()).saturating_add(others))
 }
 
-/// What a first look finds: by what emission photons are to go, if they are worth it; and whether they may have all light.
+/// What a first look finds: how photons are to be shot, if they are worth it; and whether they may have all light.
 pub(super) fn look_first<'l, F: Features>(
     stage: &Stage,
     paths: &mut Paths<F>,
-    discs: Discs,
     beside_records: bool,
     arena: &mut Arena<'l>,
-) -> Result<(Option<Emission<'l>>, bool), RenderError> {
+) -> Result<(Option<Cast<'l>>, bool), RenderError> {
     let Stage { scene, bvh, lights, settings, .. } = *stage;
+    let discs = stage.discs();
     let plain = Emission::build(scene, lights, &bvh.bounds(), arena)?;
     let mut glimpses = vec![Glimpse::default(); GLIMPSES];
     let (seen, frame) = ((scene, bvh, settings.level), [settings.width, settings.height]);
@@ -111,7 +111,8 @@ pub(super) fn look_first<'l, F: Features>(
     }
     let emission = looked.pays(stage, paths)?.then(|| worth.guide(&plain, arena)).transpose()?;
     paths.caustics.used = emission.is_some() && !is_all;
-    Ok((emission, is_all))
+    let plenty = looked.plenty();
+    Ok((emission.map(|emission| Cast { emission, discs, plenty }), is_all))
 }
 
 /// Takes the memory, sets the method up, and hands it to `then`.
@@ -129,19 +130,18 @@ pub(super) fn with<F: Features, T>(
     }
     let mut lines = memory.take("emission", footprint(stage.lights))?;
     let mut arena = Arena::new(bytemuck::cast_slice_mut(&mut lines));
-    let discs = stage.discs();
-    let (emission, is_all) = look_first::<F>(stage, &mut paths, discs, false, &mut arena)?;
+    let (cast, is_all) = look_first::<F>(stage, &mut paths, false, &mut arena)?;
     if is_all {
         drop((lines, paths));
         ["emission", "paths"].into_iter().for_each(|structure| memory.give_back(structure));
         return then(&mut ProgressivePhotons::<F>::new(stage, memory)?, memory);
     }
-    let Some(emission) = emission else {
+    let Some(cast) = cast else {
         drop(lines);
         memory.give_back("emission");
         return then(&mut paths, memory);
     };
-    let caster = Caster::new(stage, memory, (emission, discs), false, others)?;
+    let caster = Caster::new(stage, memory, cast, false, others)?;
     then(&mut Joined { paths, caster }, memory)
 }
 

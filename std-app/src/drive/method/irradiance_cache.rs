@@ -7,7 +7,7 @@
 //! traced, as is every surface that is not diffuse. Caches can be kept in a file, and be the first records of another
 //! picture of the same scene.
 
-use super::caster::Caster;
+use super::caster::{Cast, Caster};
 use super::caustics::{self, CausticUse};
 use super::overture::{Growing, Overture};
 use super::path::Paths;
@@ -29,7 +29,6 @@ use core::ops::Range;
 use halflight_core::bsdf::Features;
 use halflight_core::cache::irradiance::{CellFlux, IrradianceCache, Metric, Record, metric};
 use halflight_core::film::{Dropped, PIXELS_PER_TILE, Pixel, PixelSet, Tile};
-use halflight_core::light::Emission;
 use halflight_core::memory::{Arena, Footprint, Line};
 use halflight_core::transport::gather::Gathering;
 use halflight_core::transport::path::{LIGHTS, WAVE};
@@ -132,9 +131,9 @@ pub(super) fn with<F: Features, T>(
     let header = file.as_ref().map_or_else(|| Header::new(scene, settings), |file| file.header.clone());
     let loaded = Loaded { header, records: file.map(Reader::records).transpose()?.unwrap_or_default() };
     let mut lines = Vec::new();
-    let (emission, caustics) = find_caustics::<F>(stage, memory, loaded.fewest(), &mut lines)?;
-    if emission.is_some() {
-        return set_up::<F, T>(stage, memory, loaded, (emission, caustics), then);
+    let (cast, caustics) = find_caustics::<F>(stage, memory, loaded.fewest(), &mut lines)?;
+    if cast.is_some() {
+        return set_up::<F, T>(stage, memory, loaded, (cast, caustics), then);
     }
     // As if nobody had looked.
     drop(lines);
@@ -142,14 +141,14 @@ pub(super) fn with<F: Features, T>(
     set_up::<F, T>(stage, memory, loaded, (None, caustics), then)
 }
 
-/// By what emission photons of caustics are to go, kept in `lines`, if they are worth it and there is memory beside records,
+/// How photons of caustics are to be shot, by what is kept in `lines`, if they are worth it and there is memory beside records,
 /// of which each half has room for `fewest` at least.
 fn find_caustics<'l, F: Features>(
     stage: &Stage,
     memory: &mut Memory,
     fewest: usize,
     lines: &'l mut Vec<Line>,
-) -> Result<(Option<Emission<'l>>, CausticUse), RenderError> {
+) -> Result<(Option<Cast<'l>>, CausticUse), RenderError> {
     let Stage { lights, workers, .. } = *stage;
     if !caustics::are_possible(stage) {
         return Ok((None, CausticUse::default()));
@@ -165,11 +164,11 @@ fn find_caustics<'l, F: Features>(
     let mut paths = Paths::<F>::alone(stage, scratch);
     *lines = memory.take("emission", caustics::footprint(lights))?;
     let mut arena = Arena::new(bytemuck::cast_slice_mut(lines));
-    let (emission, _) = caustics::look_first::<F>(stage, &mut paths, stage.discs(), true, &mut arena)?;
+    let (cast, _) = caustics::look_first::<F>(stage, &mut paths, true, &mut arena)?;
     let caustics = paths.caustics;
     drop(paths);
     memory.give_back("paths");
-    Ok((emission, caustics))
+    Ok((cast, caustics))
 }
 
 /// What a file has of caches.
@@ -241,16 +240,16 @@ impl Needs {
     }
 }
 
-/// Takes the memory, sets the method up, and hands it to `then`; with photons that go by the emission, if there is one.
+/// Takes the memory, sets the method up, and hands it to `then`; with photons, if there is a cast of them.
 fn set_up<F: Features, T>(
     stage: &Stage,
     memory: &mut Memory,
     loaded: Loaded,
-    (emission, caustics): (Option<Emission>, CausticUse),
+    (cast, caustics): (Option<Cast>, CausticUse),
     then: impl FnOnce(&mut dyn Renderer, &mut Memory) -> Result<T, RenderError>,
 ) -> Result<T, RenderError> {
     let Stage { scene, bvh, lights, settings, workers } = *stage;
-    let needs = Needs::of::<F>(stage, memory, emission.is_some());
+    let needs = Needs::of::<F>(stage, memory, cast.is_some());
     let scratch = memory.take_each("paths", needs.scratch, workers.count())?;
     memory.set_aside("edges", needs.edges)?;
     let mut tables = Vec::new();
@@ -262,10 +261,10 @@ fn set_up<F: Features, T>(
         .map(|(&n, lines)| CellFlux::build(n, &mut Arena::new(bytemuck::cast_slice_mut(lines))))
         .collect::<Result<Vec<_>, _>>()?;
     let fewest = loaded.fewest();
-    let caster = match emission {
-        Some(emission) => {
+    let caster = match cast {
+        Some(cast) => {
             let later = needs.later::<F>(stage, fewest);
-            Some(Caster::new(stage, memory, (emission, stage.discs()), true, later)?)
+            Some(Caster::new(stage, memory, cast, true, later)?)
         }
         None => None,
     };
