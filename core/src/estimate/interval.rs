@@ -6,9 +6,9 @@
 //!    missed the light the denominator is too small. So denominators are what pixels that look alike are in the mean
 //!    ([`super::Shrinkage`]), the mean of the quotients by what each pair of quarters says.
 //! 2. What is left of that is seen where nothing hides itself: the variance of one pair over the square of what the
-//!    *other* says is too large, for where light is rare both are. With δ the logarithm of its quotient to the variance
-//!    of the pairs over the common squares, its logarithm goes up by δ / (1 + 10 δ), and is as uncertain as δ, and as
-//!    what is added for pixels that may be other than they probably are.
+//!    *other* says is too large, for where light is rare both are. The error is between both: with δ the logarithm of their
+//!    quotient that of the estimate goes up by δ / (1 + 10 δ), and may go up by all of δ, or by nothing. It is as uncertain, both
+//!    ways, as what is added for pixels that may be other than they probably are.
 //! 3. The error that this picture has and its estimate differ by the mean of the product of both halves' errors,
 //!    exactly. For a pixel of variance V the product has the variance 4 V², and the estimate squared the mean 3 V² (more
 //!    with heavy tails); Student's t says what it is to know that from few pixels. How errors hang together between
@@ -90,20 +90,22 @@ impl ErrorEstimate {
             // Without noise; unless what there is of it cannot be counted.
             return (sum.halves == 0.0).then_some(Self { relmse: 0.0, lower: 0.0, upper: 0.0 });
         }
-        let delta = fmax(log(sum.crossed / sum.parts), 0.0);
-        let relmse = sum.halves / sum.values as f64 * exp(delta / (1.0 + DOUBTED * delta));
         // What a square of an estimate V tells of V² with normal noise.
         const OF_SQUARE: f64 = 4.0 / 3.0;
         let below = OF_SQUARE * sum.squares;
-        let doubt = hypot(delta, fmax(log(sum.halves / sum.certain), 0.0));
-        let end = |square: f64| exp(hypot(reach * sqrt(square) / sum.halves, doubt));
-        let least = sum.least / sum.values as f64;
-        let least = least / exp(reach * sqrt(OF_SQUARE * sum.least_squares) / sum.least);
-        let (lower, upper) = if flashes < FLASHES {
-            (fmin(relmse / end(below), least), relmse * end(below))
-        } else {
-            (relmse / end(below), relmse * end(fmin(above, below)))
-        };
+        let above = if flashes < FLASHES { below } else { fmin(above, below) };
+        let certain = fmax(log(sum.halves / sum.certain), 0.0);
+        let doubt = |square: f64| hypot(reach * sqrt(square) / sum.halves, certain);
+        let plain = sum.halves / sum.values as f64;
+        let delta = fmax(log(sum.crossed / sum.parts), 0.0);
+        let added = delta / (1.0 + DOUBTED * delta);
+        let relmse = plain * exp(added);
+        let upper = relmse * exp(hypot(doubt(above), delta - added));
+        let mut lower = plain / exp(doubt(below));
+        if flashes < FLASHES {
+            let least = sum.least / sum.values as f64;
+            lower = fmin(lower, least / exp(reach * sqrt(OF_SQUARE * sum.least_squares) / sum.least));
+        }
         Some(Self { relmse, lower, upper }).filter(|estimate| estimate.upper.is_finite())
     }
 }
