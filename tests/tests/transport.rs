@@ -12,7 +12,7 @@ use halflight_core::light::Lights;
 use halflight_core::memory::{Arena, Footprint, Line};
 use halflight_core::scene::Scene;
 use halflight_core::transport::gather::{Gathering, Place};
-use halflight_core::transport::overture::{Order, PIXELS};
+use halflight_core::transport::overture::{Order, PIXELS, Sight};
 use halflight_core::transport::{Counters, PathSettings, PathTracer, UNLIMITED, reference};
 use halflight_tests::scenes::{cornell_box, everything};
 
@@ -114,7 +114,7 @@ fn scratch_is_exactly_what_it_says() {
 fn a_gathering_does_not_know_what_its_memory_was() {
     in_the_box(|tracer| {
         let mut places = [Place::NONE; PIXELS];
-        tracer.places(&Order::new(16, 16, 1), 0, 0, &mut places, &mut Counters::default());
+        tracer.places(&Order::new(16, 16, 1), 0, (0, Sight::Clear), &mut places, &mut Counters::default());
         let place = places.iter().find(|place| place.is_some()).unwrap();
         for n in [8, 16, 64] {
             let mut tables = lines(CellFlux::footprint(n));

@@ -98,6 +98,17 @@ impl Surface {
             }
         }
     }
+
+    /// Whether it may scatter, somewhere, and yet not be diffuse alone.
+    pub fn may_be_rough(&self) -> bool {
+        match self {
+            Surface::Diffuse { .. } | Surface::Mirror { .. } => false,
+            Surface::Glossy { .. } => true,
+            Surface::Conductor { roughness, .. } | Surface::Dielectric { roughness, .. } => {
+                roughness.texture.is_some() || roughness.value * roughness.value >= SMOOTH_ALPHA
+            }
+        }
+    }
 }
 
 /// A map that bends the shading normal.

@@ -3,7 +3,8 @@
 //!
 //! It goes over the pixels in an order in which the first n of them are spread evenly, whatever n is, in steps. A step
 //! has two passes: tasks find the diffuse points that its pixels see, directly or through mirrors and glass; then tasks
-//! gather where no record reaches, some places at a time, and each time all records are committed in their order.
+//! gather where no record reaches, some places at a time, and each time all records are committed in their order. Then
+//! it goes over them again, for the diffuse points that are seen in rough surfaces ([`Sight`]).
 
 use super::estimator::{Counters, dimension};
 use super::gather::Place;
@@ -13,6 +14,7 @@ use crate::bvh::Coherence;
 use crate::geometry::{Hit, MISS, Ray};
 use crate::sampling::Sampler;
 use crate::scene::SurfacePoint;
+use core::f32::consts::PI;
 use glam::Vec3;
 
 /// Pixels that a task looks through.
@@ -24,6 +26,19 @@ const MOST_BOUNCES: usize = 16;
 /// Where the shading normal deviates by more than this from that of the surface (a cosine), it is of details that no
 /// record could serve.
 const SMOOTH: f32 = 0.9;
+
+/// A record that is seen in a rough surface is one of many that a pixel sees: in the lobe of a direction of density p, whose radius is
+/// about 1 / √(π p), there is room for so many pixels' widths side by side.
+const PER_LOBE: f32 = 16.0;
+
+/// How the points that are looked for are seen.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Sight {
+    /// Directly, or through mirrors and glass.
+    Clear,
+    /// By light that a rough surface scatters, once or more often.
+    Rough,
+}
 
 /// The pixels of a picture, evenly spread from the first on: every other of every `stride`th column and row last.
 #[derive(Clone, Copy, Debug)]
@@ -67,9 +82,16 @@ impl Order {
 }
 
 impl<F: Features> PathTracer<'_, F> {
-    /// What sample `sample` of the pixels of [`PIXELS`] steps from `first` on sees first that is diffuse; into `out`,
-    /// in their order. Places without triangle ([`Place::is_some`]) where there is no pixel or nothing diffuse.
-    pub fn places(&self, order: &Order, first: u64, sample: u32, out: &mut [Place], counters: &mut Counters) {
+    /// What sample `sample` of the pixels of [`PIXELS`] steps from `first` on sees first that is diffuse, in the way of `sight`; into
+    /// `out`, in their order. Places without triangle ([`Place::is_some`]) where there is no pixel or nothing diffuse.
+    pub fn places(
+        &self,
+        order: &Order,
+        first: u64,
+        (sample, sight): (u32, Sight),
+        out: &mut [Place],
+        counters: &mut Counters,
+    ) {
         let mut rays = [Ray::segment(Vec3::ZERO, Vec3::Z, -1.0); PIXELS];
         let mut hits = [Hit::NONE; PIXELS];
         let (width, height) = (self.settings.width, self.settings.height);
@@ -85,25 +107,33 @@ impl<F: Features> PathTracer<'_, F> {
             *place = Place::NONE;
             if let Some((x, y)) = order.pixel(first + i as u64) {
                 let sampler = Sampler::new(self.settings.seed, y * width + x, sample);
-                let found = self.first_diffuse(rays[i], hits[i], &sampler, counters);
-                *place = found.map_or(Place::NONE, |(point, distance)| Place::of(&point, pixel * distance));
+                let found = self.first_diffuse((rays[i], hits[i]), pixel, sight, &sampler, counters);
+                *place = found.map_or(Place::NONE, |(point, width)| Place::of(&point, width));
             }
         }
     }
 
-    /// The diffuse point that a camera ray comes to from `hit` on, and the length of its way.
+    /// Whether anything may be seen in a rough surface.
+    pub fn has_rough_surfaces(&self) -> bool {
+        self.scene.materials.iter().any(|material| material.surface.may_be_rough())
+    }
+
+    /// The diffuse point that a camera ray comes to from `hit` on, and the width of a pixel there, which is `spread` at a distance
+    /// of 1.
     fn first_diffuse(
         &self,
-        mut ray: Ray,
-        mut hit: Hit,
+        (mut ray, mut hit): (Ray, Hit),
+        mut spread: f32,
+        sight: Sight,
         sampler: &Sampler,
         counters: &mut Counters,
     ) -> Option<(SurfacePoint<'_>, f32)> {
-        let (mut segments, mut crossings, mut distance, mut left) = (1, 0, 0.0, MISS);
+        let (mut segments, mut crossings, mut width, mut left) = (1, 0, 0.0, MISS);
+        let mut seen = Sight::Clear;
         for _ in 0..MOST_BOUNCES {
             let point = SurfacePoint::at::<F>(self.scene, &ray, &hit)?;
             let direction = Vec3::from(ray.direction);
-            distance += hit.t;
+            width += spread * hit.t;
             let opacity = point.material.opacity.at::<F>(self.scene, point.uv);
             let through = F::CUTOUT
                 && point.material.has_cutout()
@@ -115,12 +145,19 @@ impl<F: Features> PathTracer<'_, F> {
                 let bsdf = Bsdf::at::<F>(self.scene, point.material, point.uv, point.front);
                 if let Bsdf::Diffuse(_) = bsdf {
                     let smooth = point.frame.normal.dot(point.geometric_normal) > SMOOTH;
-                    return smooth.then_some((point, distance));
+                    return (smooth && seen == sight).then_some((point, width));
                 }
                 let wo = point.frame.to_local(-direction);
                 let [u, v] = dimension::scattering(sampler, segments);
                 let lobe = sampler.single(dimension::vertex(segments) + dimension::LOBE);
-                let sample = bsdf.sample::<F>(wo, [u, v, lobe]).filter(|sample| sample.delta)?;
+                let sample = bsdf.sample::<F>(wo, [u, v, lobe])?;
+                if !sample.delta {
+                    if sight == Sight::Clear {
+                        return None;
+                    }
+                    seen = Sight::Rough;
+                    spread = spread.max(1.0 / (PER_LOBE * libm::sqrtf(PI * sample.pdf)));
+                }
                 let next = point.frame.to_world(sample.direction);
                 if !point.sides_agree(sample.direction, next) {
                     return None;

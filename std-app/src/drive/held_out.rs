@@ -7,7 +7,7 @@ use halflight_core::bsdf::Features;
 use halflight_core::cache::irradiance::{CellFlux, Metric, metric};
 use halflight_core::memory::{Arena, Line};
 use halflight_core::transport::gather::{Gathering, Place};
-use halflight_core::transport::overture::{Order, PIXELS};
+use halflight_core::transport::overture::{Order, PIXELS, Sight};
 use halflight_core::transport::{Counters, PathTracer};
 
 /// Rays along a side of a gathering at such a point.
@@ -50,7 +50,7 @@ pub(super) fn held_out<F: Features>(
     let mut places = vec![Place::NONE; order.len() as usize];
     let look = |task: usize, _: &mut Arena, out: &mut [Place]| {
         let mut counters = Counters::default();
-        tracer.places(&order, (task * PIXELS) as u64, SAMPLE, out, &mut counters);
+        tracer.places(&order, (task * PIXELS) as u64, (SAMPLE, Sight::Clear), out, &mut counters);
         Ok(counters)
     };
     workers.pass(&mut places, PIXELS, scratch, &|| false, &look)?;

@@ -8,7 +8,7 @@ use halflight_core::bsdf::Features;
 use halflight_core::cache::irradiance::{IrradianceCache, Record};
 use halflight_core::memory::{Arena, Line};
 use halflight_core::transport::gather::Place;
-use halflight_core::transport::overture::{Order, PIXELS};
+use halflight_core::transport::overture::{Order, PIXELS, Sight};
 use halflight_core::transport::{Counters, PathTracer};
 use std::time::Instant;
 
@@ -105,7 +105,7 @@ pub(super) fn survey<F: Features>(
     let mut found = vec![Look::default(); order.len() as usize];
     let task = |task: usize, _: &mut Arena, out: &mut [Look]| {
         let (mut counters, mut places) = (Counters::default(), [Place::NONE; PIXELS]);
-        tracer.places(&order, (task * PIXELS) as u64, 0, &mut places, &mut counters);
+        tracer.places(&order, (task * PIXELS) as u64, (0, Sight::Clear), &mut places, &mut counters);
         for (look, place) in out.iter_mut().zip(&places).filter(|(_, place)| place.is_some()) {
             *look = look_at(place, caches, step);
         }

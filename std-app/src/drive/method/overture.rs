@@ -1,5 +1,6 @@
 //! The overture of an irradiance cache on all threads: it looks over the picture from coarse to fine, gathers where no
-//! record reaches, and commits what was found in its order.
+//! record reaches, and commits what was found in its order. First where diffuse surfaces are seen, then where rough ones
+//! have their light from.
 
 use crate::drive::RenderError;
 use crate::drive::crew::Crew;
@@ -9,7 +10,7 @@ use halflight_core::bsdf::Features;
 use halflight_core::cache::irradiance::{IrradianceCache, Record};
 use halflight_core::memory::{Arena, Line};
 use halflight_core::transport::gather::{Gathering, Place};
-use halflight_core::transport::overture::{Order, PIXELS};
+use halflight_core::transport::overture::{Order, PIXELS, Sight};
 use halflight_core::transport::spots::{Glint, Spot};
 use halflight_core::transport::{Counters, PathTracer};
 
@@ -20,7 +21,7 @@ const STRIDE: u32 = 2;
 const LOOKED_AT: usize = 16 * PIXELS;
 
 /// Records shrink when later ones clamp them or know better, so the overture looks again: so many times, or until a sweep
-/// adds less than one record in so many.
+/// adds less than one record in so many. What rough surfaces scatter is looked at in other directions each time.
 const SWEEPS: u32 = 4;
 const FEW: usize = 50;
 
@@ -56,9 +57,11 @@ pub(in crate::drive) struct Growing<'a> {
     pub(in crate::drive) cache: IrradianceCache<'a>,
     /// Which of independent ones: it looks at another sample of each pixel, and gathers with other rays.
     index: u32,
-    /// How far the overture is in its order.
+    /// What the overture looks for; `None`: nothing any more.
+    sight: Option<Sight>,
+    /// How far it is in its order.
     next: u64,
-    /// Sweeps that are done, and how many records there were before this one.
+    /// Sweeps in this sight that are done, and how many records there were before this one.
     sweeps: u32,
     before: usize,
     /// Places at which it has gathered.
@@ -103,6 +106,7 @@ impl<'a> Growing<'a> {
         Self {
             cache,
             index,
+            sight: Some(Sight::Clear),
             next: 0,
             sweeps: 0,
             before: 0,
@@ -136,18 +140,47 @@ impl<'a> Growing<'a> {
             None => self.cache.restore(&[]),
         }
         self.loaded = self.cache.records().len();
+        self.begin();
+    }
+
+    /// Looks for all from the beginning, beside the records of before.
+    fn begin(&mut self) {
         self.efforts.clear();
-        (self.next, self.sweeps, self.before) = (0, 0, self.loaded);
+        (self.sight, self.next, self.sweeps, self.before) = (Some(Sight::Clear), 0, 0, self.loaded);
     }
 
     /// Leaves the cache as it is.
     pub(in crate::drive) fn finish(&mut self) {
-        self.sweeps = SWEEPS;
+        self.sight = None;
     }
 
     /// Whether nothing will be added.
     pub(in crate::drive) fn is_finished(&self) -> bool {
-        self.sweeps >= SWEEPS || self.cache.is_full()
+        self.sight.is_none() || self.cache.is_full()
+    }
+
+    /// Goes on after a sweep: with another one, or with what rough surfaces see, if there are any.
+    fn sweep(&mut self, has_rough: bool) {
+        (self.next, self.sweeps) = (0, self.sweeps + 1);
+        let is_first = self.sight == Some(Sight::Clear) && self.sweeps == 1;
+        if is_first {
+            self.forget_lonely();
+        }
+        let records = self.cache.records().len();
+        let adds_few = (records - self.before.min(records)) * FEW < records;
+        self.before = records;
+        if !is_first && adds_few || self.sweeps == SWEEPS {
+            let is_next = has_rough && self.sight == Some(Sight::Clear);
+            (self.sight, self.sweeps) = (is_next.then_some(Sight::Rough), 0);
+        }
+    }
+
+    /// What it looks for, and by which sample of each pixel.
+    fn look(&self) -> Option<(u32, Sight)> {
+        self.sight.map(|sight| match sight {
+            Sight::Clear => (self.index, sight),
+            Sight::Rough => (self.index + 2 * self.sweeps, sight),
+        })
     }
 
     fn is_known(&self, glint: &Glint) -> bool {
@@ -162,8 +195,8 @@ impl<'a> Growing<'a> {
         }
         let loaded = self.cache.records().get(..self.loaded).unwrap_or_default().to_vec();
         self.cache.restore(&loaded);
-        self.efforts.clear();
-        (self.next, self.sweeps, self.before, self.light) = (0, 0, self.loaded, (0.0, 0));
+        self.begin();
+        self.light = (0.0, 0);
         self.attempts += 1;
         true
     }
@@ -232,27 +265,19 @@ impl<F: Features> Overture<'_, '_, F> {
     ) -> Result<bool, RenderError> {
         let [width, height] = self.size;
         let order = Order::new(width, height, STRIDE);
-        'looks: while !growing.is_finished() {
+        let has_rough = self.tracer.has_rough_surfaces();
+        'looks: while let Some(sight) = growing.look()
+            && !growing.is_finished()
+        {
             if growing.next >= order.len() {
-                growing.next = 0;
-                growing.sweeps += 1;
-                if growing.sweeps == 1 {
-                    growing.forget_lonely();
-                    growing.before = growing.cache.records().len();
-                    continue;
-                }
-                let records = growing.cache.records().len();
-                if (records - growing.before) * FEW < records {
-                    growing.sweeps = SWEEPS;
-                }
-                growing.before = records;
+                growing.sweep(has_rough);
                 continue;
             }
             let mut places = vec![Place::NONE; LOOKED_AT];
             let look = |task: usize, _: &mut Arena, out: &mut [Place]| {
                 let mut counters = Counters::default();
                 let first = growing.next + (task * PIXELS) as u64;
-                self.tracer.places(&order, first, growing.index, out, &mut counters);
+                self.tracer.places(&order, first, sight, out, &mut counters);
                 out.iter_mut()
                     .filter(|place| growing.is_served(place))
                     .for_each(|place| *place = Place::NONE);
