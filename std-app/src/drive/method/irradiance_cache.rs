@@ -93,6 +93,9 @@ pub struct CacheUse {
     pub seconds: f64,
 }
 
+/// Strata along a side come in so many.
+const BLOCK: usize = 8;
+
 /// The most strata along a side, where caches are refined, and how often they are.
 const FINEST: usize = 128;
 const MOST_REFINEMENTS: usize = 8;
@@ -186,7 +189,7 @@ impl Loaded {
 
 /// What a picture takes of memory, whatever is left of it for records and photons.
 struct Needs {
-    /// Strata along a side that may be gathered, the fewest first.
+    /// Strata along a side that may be gathered, the fewest first: half of those that were asked for, those, and more of them.
     sizes: Vec<usize>,
     /// Of each thread.
     scratch: Footprint,
@@ -211,9 +214,9 @@ impl Needs {
             let scratch = PathTracer::<F>::gather_scratch(n).bytes().saturating_mul(workers.count());
             is_refined && n <= FINEST && memory.available() / 2 > scratch + 2 * CellFlux::footprint(n).bytes()
         };
-        let sizes: Vec<usize> = core::iter::successors(Some(strata), |n| Some(2 * n))
-            .take_while(|n| *n == strata || has_memory(*n))
-            .collect();
+        let finer = core::iter::successors(Some(2 * strata), |n| Some(2 * n)).take_while(|n| has_memory(*n));
+        let coarse = (strata / (2 * BLOCK)).max(1) * BLOCK;
+        let sizes: Vec<usize> = [coarse, strata].into_iter().chain(finer).collect();
         let finest = sizes.last().copied().unwrap_or(strata);
         let scratch = PathTracer::<F>::scratch(WAVE).or(PathTracer::<F>::gather_scratch(finest));
         let by_photons = gather == Gather::Photons && has_indirect_light(settings);
@@ -298,7 +301,7 @@ fn set_up<F: Features, T>(
     let metric = metric::Settings { error: settings.cache.allowed(), ..usual };
     let mut method = Cached {
         tracer: PathTracer::<F>::new(scene, bvh, lights, path_settings(settings), settings.level),
-        gathering: Gathering { flux: &tables[0], metric, least_pixels: LEAST_PIXELS },
+        gathering: Gathering { flux: &tables[1], metric, least_pixels: LEAST_PIXELS },
         tables: &tables,
         is_refined: needs.is_refined,
         refined: 0,
@@ -356,7 +359,7 @@ struct Cached<'a, F> {
     /// Where they are kept.
     save: Option<&'a Path>,
     is_filled: bool,
-    /// Of each number of strata that may be gathered, the fewest first.
+    /// Of each number of strata that may be gathered, the fewest first: see [`Needs::sizes`].
     tables: &'a [CellFlux<'a>],
     /// Whether caches may be refined, and how often they were.
     is_refined: bool,
@@ -373,9 +376,11 @@ struct Cached<'a, F> {
 impl<F: Features> Cached<'_, F> {
     /// Fills both halves, or goes on with it, and keeps them; whether that is done: not where the round is over.
     fn fill(&mut self, crew: &mut Crew) -> Result<bool, RenderError> {
-        let Self { tracer, gathering, size, halves, laboratory, caster, refined, scratch, .. } = self;
+        let Self { tracer, gathering, tables, size, halves, laboratory, caster, refined, scratch, .. } = self;
         let start = Instant::now();
         let mut all = true;
+        let coarse = tables.iter().rev().find(|table| table.n() < gathering.flux.n());
+        let coarse = coarse.unwrap_or(gathering.flux);
         for (i, half) in halves.iter_mut().enumerate() {
             let (photons, built);
             let mut tracer = *tracer;
@@ -397,7 +402,8 @@ impl<F: Features> Cached<'_, F> {
                 built = found;
                 tracer = tracer.with_bounced([laboratory.gathered(&built); 2]);
             }
-            if !(Overture { tracer: &tracer, gathering, size: *size }).fill(half, crew, scratch)? {
+            let overture = Overture { tracer: &tracer, gathering, coarse, size: *size };
+            if !overture.fill(half, crew, scratch)? {
                 all = false;
                 break;
             }

@@ -7,7 +7,7 @@ use crate::drive::crew::Crew;
 use crate::drive::held_out::luminance;
 use core::f64::consts::FRAC_1_PI;
 use halflight_core::bsdf::Features;
-use halflight_core::cache::irradiance::{IrradianceCache, Record};
+use halflight_core::cache::irradiance::{CellFlux, IrradianceCache, Record};
 use halflight_core::memory::{Arena, Line};
 use halflight_core::transport::gather::{Gathering, Place};
 use halflight_core::transport::overture::{Order, PIXELS, Sight};
@@ -252,6 +252,8 @@ impl<'a> Growing<'a> {
 pub(in crate::drive) struct Overture<'o, 'a, F> {
     pub(in crate::drive) tracer: &'o PathTracer<'a, F>,
     pub(in crate::drive) gathering: &'o Gathering<'o>,
+    /// Of fewer strata, for what rough surfaces see: a pixel has the mean of many records there.
+    pub(in crate::drive) coarse: &'o CellFlux<'o>,
     pub(in crate::drive) size: [u32; 2],
 }
 
@@ -312,6 +314,10 @@ impl<F: Features> Overture<'_, '_, F> {
         scratch: &mut [Vec<Line>],
     ) -> Result<Gathered, RenderError> {
         let first = growing.gathered;
+        let gathering = match growing.sight {
+            Some(Sight::Rough) => Gathering { flux: self.coarse, ..*self.gathering },
+            _ => *self.gathering,
+        };
         loop {
             // What a gather ray meets may be lit by the cache already.
             let tracer = self.tracer.with_growing_cache(&growing.cache).with_spots(&growing.spots);
@@ -322,7 +328,7 @@ impl<F: Features> Overture<'_, '_, F> {
                 if let (Some(Found { record, glints, effort }), Some(place)) =
                     (out.first_mut(), places.get(task))
                 {
-                    *record = tracer.gather(place, number, self.gathering, arena, &mut counters, glints)?;
+                    *record = tracer.gather(place, number, &gathering, arena, &mut counters, glints)?;
                     *effort = counters.rays as f32 / counters.paths.max(1) as f32;
                 }
                 Ok(counters)
@@ -330,7 +336,7 @@ impl<F: Features> Overture<'_, '_, F> {
             if !crew.pass(&mut all, 1, scratch, &task)? {
                 return Ok(Gathered::Cut);
             }
-            let strata = self.gathering.flux.n();
+            let strata = gathering.flux.n();
             let glints = growing.glints(&all, strata);
             let mut spots = vec![None; glints.len()];
             let look = |task: usize, arena: &mut Arena, out: &mut [Option<Spot>]| {
