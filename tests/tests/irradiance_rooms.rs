@@ -7,7 +7,7 @@ use halflight::save::Image;
 use halflight_core::Rgb;
 use halflight_core::scene::{Camera, Material, Scene};
 use halflight_tests::render::{blocks_of, render};
-use halflight_tests::scenes::{SceneBuffers, constant_environment, cornell_box, emitter};
+use halflight_tests::scenes::{SceneBuffers, constant_environment, cornell_box, emitter, metal};
 
 const SIZE: u32 = 64;
 
@@ -155,6 +155,28 @@ fn a_court_under_a_sky_has_its_light_once() {
     let each = (more.shadow_rays - few.shadow_rays) as f64 / (more.paths - few.paths) as f64;
     assert!(each > 2.0, "{each} shadow rays for each path");
     agrees(&scene, 0.004, 0.05);
+}
+
+/// A wall of brushed metal is all that is seen: its light comes from where no pixel looks.
+#[test]
+fn a_room_is_seen_in_brushed_metal() {
+    let camera = Camera::look_at(Vec3::new(0.5, 0.5, 0.5), Vec3::new(0.5, 0.5, 0.0), Vec3::Y, 60.0);
+    let mut buffers = SceneBuffers::new(camera);
+    let wall = buffers.material(diffuse(0.7));
+    buffers.cuboid(Vec3::ZERO, Vec3::ONE, true, wall);
+    let brushed = buffers.material(Material { surface: metal(0.6), ..Material::GREY });
+    buffers.square(Vec3::new(0.5, 0.5, 0.01), Vec3::Z, 0.98, brushed);
+    lamp(&mut buffers, Vec3::new(0.5, 0.9, 0.8), Vec3::Y, 0.2, 100.0);
+    let scene = buffers.scene();
+    let [path, cache] = [Method::Path, Method::IrradianceCache].map(|method| {
+        render(&scene, method, SIZE, 64, |settings| {
+            (settings.cache.strata, settings.reuse, settings.audit) = (16, Some(false), Some(0.0));
+        })
+    });
+    let [few, many] = [&cache, &path].map(|result| result.error.unwrap().relmse);
+    println!("{few:.2e} {many:.2e}, {:?}", cache.cache);
+    assert!(few < 0.5 * many && cache.cache.unwrap().records > 50, "{few} {many}");
+    agrees(&scene, 0.02, 0.25);
 }
 
 #[test]
