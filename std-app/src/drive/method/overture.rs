@@ -267,7 +267,8 @@ impl<F: Features> Overture<'_, '_, F> {
     ) -> Result<bool, RenderError> {
         let [width, height] = self.size;
         let order = Order::new(width, height, STRIDE);
-        let has_rough = self.tracer.has_rough_surfaces();
+        // Where depth is limited only what is seen asks for records.
+        let has_rough = self.tracer.has_rough_surfaces() && !self.tracer.is_limited();
         'looks: while let Some(sight) = growing.look()
             && !growing.is_finished()
         {
