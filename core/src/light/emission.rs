@@ -16,7 +16,7 @@ use crate::sampling::warp::{
     UNIFORM_SPHERE_PDF, concentric_disk, concentric_square, cosine_hemisphere, uniform_cone,
     uniform_cone_pdf, uniform_sphere, uniform_sphere_square, uniform_triangle,
 };
-use crate::sampling::{AliasTable, Sampler};
+use crate::sampling::{AliasTable, Numbers, Sampler};
 use crate::scene::Scene;
 use core::f32::consts::{PI, TAU};
 use glam::Vec3;
@@ -86,18 +86,18 @@ impl<'m> Emission<'m> {
         Ok(Self { table: AliasTable::build(lights.count(), relative, arena)?, center, radius, guide: None })
     }
 
-    /// The photon of `sampler`. `None` where it leaves no light, or none shines.
-    pub fn emit(&self, scene: &Scene, lights: &Lights, sampler: &Sampler) -> Option<Emitted> {
-        let choice = sampler.single(CHOICE);
-        let (mut place, mut direction) = (sampler.pair(PLACE), sampler.pair(DIRECTION));
+    /// The photon of `numbers`. `None` where it leaves no light, or none shines.
+    pub fn emit<N: Numbers>(&self, scene: &Scene, lights: &Lights, numbers: &N) -> Option<Emitted> {
+        let choice = numbers.single(CHOICE);
+        let (mut place, mut direction) = (numbers.pair(PLACE), numbers.pair(DIRECTION));
         let Pick { light, cell, square, target } = match &self.guide {
             None => Pick { light: self.table.sample(choice)?.0, ..Pick::default() },
             Some(guide) => guide.pick(choice)?,
         };
         // Light from infinitely far goes its way; what is aimed is where it comes through.
-        let numbers = if light < lights.near() { &mut direction } else { &mut place };
-        *numbers = square.map_or(*numbers, |square| square.at(*numbers));
-        let square = square.map(|_| *numbers);
+        let aiming = if light < lights.near() { &mut direction } else { &mut place };
+        *aiming = square.map_or(*aiming, |square| square.at(*aiming));
+        let square = square.map(|_| *aiming);
         let emitted = if let Some(emitter) = lights.emitters.get(light) {
             from_surface(scene, emitter, place, direction, target)
         } else if light < lights.near() + lights.distant.len() {

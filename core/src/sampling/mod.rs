@@ -4,6 +4,7 @@
 mod alias;
 mod distribution;
 mod hash;
+mod numbers;
 mod sobol;
 mod trigonometry;
 pub mod warp;
@@ -11,6 +12,7 @@ pub mod warp;
 pub use alias::{AliasEntry, AliasTable};
 pub use distribution::{Cell, Distribution2d};
 pub use hash::{Random, mix};
+pub use numbers::Numbers;
 pub use sobol::Sampler;
 pub use trigonometry::sin_cos_turns;
 

@@ -2,7 +2,7 @@
 //! [`Visitor`] to say: `shoot.rs` leaves photons of all light, `caustics.rs` those of caustics.
 //!
 //! All paths of a task advance together, so that the tracer sees batches of rays. Path `i` of map `n` follows from
-//! (seed, n, i) alone.
+//! (seed, n, i) alone, or from other numbers that are given for it (`chain.rs`).
 
 use super::estimator::{Counters, MAX_CROSSINGS, MAX_VERTICES};
 use crate::bsdf::{Bsdf, BsdfSample, Features};
@@ -11,7 +11,7 @@ use crate::geometry::{Hit, Ray};
 use crate::light::{EMISSION_DIMENSIONS, Emission, Lights};
 use crate::memory::{Arena, Footprint, OutOfMemory};
 use crate::photon::Photon;
-use crate::sampling::{Sampler, mix};
+use crate::sampling::{Numbers, Sampler, mix};
 use crate::scene::{Scene, SurfacePoint};
 use crate::{Level, Rgb};
 use bytemuck::{Pod, Zeroable};
@@ -64,7 +64,7 @@ pub(super) struct Vertex<'v> {
     pub bsdf: &'v Bsdf,
     /// Unit direction to where the light comes from.
     pub to_light: Vec3,
-    sampler: &'v Sampler,
+    numbers: &'v dyn Numbers,
     /// Its first dimension.
     first: u32,
 }
@@ -72,7 +72,7 @@ pub(super) struct Vertex<'v> {
 impl Vertex<'_> {
     /// The visitor's own random number.
     pub(super) fn own(&self) -> f32 {
-        self.sampler.single(self.first + OWN)
+        self.numbers.single(self.first + OWN)
     }
 
     /// The photon of light of such power that has come here.
@@ -103,6 +103,31 @@ pub(super) trait Visitor {
     /// It is about to leave it by `sample`, having come from `from`, local.
     #[inline]
     fn leave(&self, _state: &mut State, _vertex: &Vertex, _from: Vec3, _sample: &BsdfSample) {}
+}
+
+/// Where the numbers of paths come from.
+pub(super) trait Source {
+    /// Those of a path.
+    type Numbers: Numbers;
+
+    /// Those of path `number`.
+    fn of(&self, number: u32) -> Self::Numbers;
+}
+
+/// Those of a map of photons, a point of a sequence for each path.
+#[derive(Clone, Copy)]
+pub(super) struct Sequence {
+    seed: u32,
+    map: u32,
+}
+
+impl Source for Sequence {
+    type Numbers = Sampler;
+
+    #[inline]
+    fn of(&self, number: u32) -> Sampler {
+        Sampler::replicate(self.seed, self.map >> 1, self.map & 1, number)
+    }
 }
 
 /// What is shot: all but its visitor.
@@ -139,19 +164,33 @@ impl<F: Features> Flight<'_, F> {
         scratch: &mut Arena,
         visitor: &mut V,
     ) -> Result<Counters, OutOfMemory> {
+        let first = task * PATHS;
+        let paths = (self.paths as usize).saturating_sub(first).min(PATHS);
+        self.follow_all(&self.sequence::<V>(map), (first as u32, paths), scratch, visitor)
+    }
+
+    /// The numbers of the paths of map number `map`.
+    pub(super) fn sequence<V: Visitor>(&self, map: u32) -> Sequence {
+        Sequence { seed: mix(V::SEED ^ u64::from(self.seed)) as u32, map }
+    }
+
+    /// Follows so many `paths` from number `first` on, [`PATHS`] at most, by the numbers of `source`.
+    pub(super) fn follow_all<V: Visitor, S: Source>(
+        &self,
+        source: &S,
+        (first, paths): (u32, usize),
+        scratch: &mut Arena,
+        visitor: &mut V,
+    ) -> Result<Counters, OutOfMemory> {
         let mut arena = scratch.scratch();
         let states = arena.slice::<State>(PATHS)?;
         let rays = arena.slice::<Ray>(PATHS)?;
         let hits = arena.slice::<Hit>(PATHS)?;
         let mut counters = Counters::default();
-        let seed = mix(V::SEED ^ u64::from(self.seed)) as u32;
-        let sampler = |number: u32| Sampler::replicate(seed, map >> 1, map & 1, number);
-        let first = task * PATHS;
-        let paths = (self.paths as usize).saturating_sub(first).min(PATHS);
         let mut active = 0;
         for (i, state) in states.iter_mut().enumerate().take(paths) {
-            let number = (first + i) as u32;
-            if let Some(emitted) = self.emission.emit(self.scene, self.lights, &sampler(number)) {
+            let number = first + i as u32;
+            if let Some(emitted) = self.emission.emit(self.scene, self.lights, &source.of(number)) {
                 *state = State {
                     power: (emitted.power / self.paths as f32).to_array(),
                     number,
@@ -173,8 +212,8 @@ impl<F: Features> Flight<'_, F> {
             for i in 0..active {
                 let (ray, hit) = (rays[i], hits[i]);
                 let Some(state) = states.get_mut(ray.tag as usize) else { continue };
-                let sampler = sampler(state.number);
-                if let Some(next) = self.step(state, &sampler, &ray, &hit, visitor, &mut counters) {
+                let numbers = source.of(state.number);
+                if let Some(next) = self.step(state, &numbers, &ray, &hit, visitor, &mut counters) {
                     rays[going_on] = Ray { tag: ray.tag, ..next };
                     going_on += 1;
                 }
@@ -185,10 +224,10 @@ impl<F: Features> Flight<'_, F> {
     }
 
     /// One vertex: what the path of `ray` met. The ray by which it goes on.
-    fn step<V: Visitor>(
+    fn step<V: Visitor, N: Numbers>(
         &self,
         state: &mut State,
-        sampler: &Sampler,
+        numbers: &N,
         ray: &Ray,
         hit: &Hit,
         visitor: &mut V,
@@ -199,7 +238,7 @@ impl<F: Features> Flight<'_, F> {
         let direction = Vec3::from(ray.direction);
         let passes = F::CUTOUT && point.material.has_cutout() && {
             let opacity = point.material.opacity.at::<F>(scene, point.uv);
-            sampler.single(CROSSING + state.crossings) >= opacity
+            numbers.single(CROSSING + state.crossings) >= opacity
         };
         if passes || hit.triangle == state.triangle {
             if state.crossings >= MAX_CROSSINGS {
@@ -215,15 +254,15 @@ impl<F: Features> Flight<'_, F> {
         }
         let bsdf = Bsdf::at::<F>(scene, point.material, point.uv, point.front);
         let first = EMISSION_DIMENSIONS + V::DIMENSIONS * (state.segments - 1);
-        let vertex = Vertex { point: &point, bsdf: &bsdf, to_light: -direction, sampler, first };
+        let vertex = Vertex { point: &point, bsdf: &bsdf, to_light: -direction, numbers, first };
         let onward = visitor.meet(state, &vertex, counters)?;
         if state.segments + 1 >= self.max_depth {
             return None;
         }
 
         let from = point.frame.to_local(-direction);
-        let [u, v] = sampler.pair(first + SCATTERING);
-        let lobe = if F::GLOSSY || F::DIELECTRIC { sampler.single(first + LOBE) } else { 0.0 };
+        let [u, v] = numbers.pair(first + SCATTERING);
+        let lobe = if F::GLOSSY || F::DIELECTRIC { numbers.single(first + LOBE) } else { 0.0 };
         let sample =
             bsdf.sample::<F>(from, [u, v, lobe]).filter(|sample| sample.delta || !onward.mirrored)?;
         let towards = point.frame.to_world(sample.direction);
@@ -244,7 +283,7 @@ impl<F: Features> Flight<'_, F> {
         }
         // Power that goes on is the same where it can be: what is absorbed ends paths.
         let survival = (next.max_element() / power.max_element()).min(onward.most);
-        if !(survival > 0.0 && sampler.single(first + ROULETTE) < survival && next.is_finite()) {
+        if !(survival > 0.0 && numbers.single(first + ROULETTE) < survival && next.is_finite()) {
             return None;
         }
         if state.segments >= MAX_VERTICES {

@@ -8,6 +8,7 @@
 mod arrivals;
 mod cached;
 pub mod caustics;
+pub mod chain;
 mod density;
 mod edges;
 mod estimator;
@@ -28,6 +29,7 @@ pub mod reference;
 mod reuse;
 mod shadow;
 pub mod shoot;
+pub mod sight;
 pub mod spots;
 mod wave;
 

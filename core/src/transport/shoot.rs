@@ -10,6 +10,7 @@
 //!    the mean it would have to live through as many ends as no sequence of random numbers holds.
 //! 2. The price: where surfaces are lighter than that, photons differ in power.
 
+use super::chain::Share;
 use super::estimator::Counters;
 pub use super::flight::PATHS;
 use super::flight::{Flight, Onward, Pile, State, Vertex, Visitor};
@@ -27,7 +28,7 @@ use glam::Vec3;
 pub const ROOM: usize = 6 * PATHS;
 
 /// Probability with which a path goes on, at most, where it leaves a photon.
-const MOST: f32 = 0.8;
+pub(super) const MOST: f32 = 0.8;
 
 /// Whether photons are left on such a surface, and light is gathered from it: it has a diffuse part. What is only
 /// glossy reflects too little of a disc of photons to see much of them; paths from the eye find its light.
@@ -92,7 +93,7 @@ pub struct ShootSettings {
 /// Shoots the photons of one scene: a pass of tasks of [`PATHS`] paths.
 #[derive(Clone, Copy)]
 pub struct Shooter<'a, F> {
-    flight: Flight<'a, F>,
+    pub(super) flight: Flight<'a, F>,
     keep: Keep,
 }
 
@@ -141,17 +142,44 @@ impl<'a, F: Features> Shooter<'a, F> {
         scratch: &mut Arena,
         out: &mut [Photon],
     ) -> Result<Counters, OutOfMemory> {
-        let mut leaver = Leaver { keep: self.keep, pile: Pile::new(out) };
+        let mut leaver = Leaver { keep: self.keep, pile: Pile::new(out), beside: None };
+        let counters = self.flight.follow(task, map, scratch, &mut leaver)?;
+        leaver.pile.finish();
+        Ok(counters)
+    }
+
+    /// The same beside chains, with which seen photons `share` their light. `seen` is told of each of those, by the number
+    /// of its path.
+    ///
+    /// # Errors
+    /// Those of [`Shooter::run`].
+    pub fn run_beside(
+        &self,
+        (task, map): (usize, u32),
+        share: &Share,
+        scratch: &mut Arena,
+        out: &mut [Photon],
+        seen: &mut dyn FnMut(u32),
+    ) -> Result<Counters, OutOfMemory> {
+        let mut leaver = Leaver { keep: self.keep, pile: Pile::new(out), beside: Some((share, seen)) };
         let counters = self.flight.follow(task, map, scratch, &mut leaver)?;
         leaver.pile.finish();
         Ok(counters)
     }
 }
 
+/// Whether such a path leaves a photon of reflected light where it met a surface.
+#[inline]
+pub(super) fn leaves_reflected(state: &State, vertex: &Vertex) -> bool {
+    holds_photons(vertex.bsdf) && state.segments > 1
+}
+
 /// Leaves the photons that are wanted.
-struct Leaver<'p> {
+pub(super) struct Leaver<'p> {
     keep: Keep,
     pile: Pile<'p>,
+    /// What chains are for, and who wants to know of photons that are seen.
+    beside: Option<(&'p Share<'p>, &'p mut dyn FnMut(u32))>,
 }
 
 impl Visitor for Leaver<'_> {
@@ -167,7 +195,16 @@ impl Visitor for Leaver<'_> {
                 Keep::Reflected | Keep::Caustic => state.segments > 1,
             };
         if leaves {
-            self.pile.leave(vertex.photon(Rgb::from(state.power)), counters);
+            let mut power = Rgb::from(state.power);
+            if let Some((share, seen)) = &mut self.beside {
+                if share.sight.shows(vertex.point.position, vertex.point.geometric_normal) {
+                    power *= share.kept;
+                    seen(state.number);
+                }
+            }
+            if power.max_element() > 0.0 {
+                self.pile.leave(vertex.photon(power), counters);
+            }
         }
         let ends = self.keep == Keep::Caustic && (holds || !focuses(vertex.bsdf));
         (!ends).then_some(Onward { most: if leaves { MOST } else { 1.0 }, mirrored: false })

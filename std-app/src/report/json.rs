@@ -85,6 +85,8 @@ fn most(run: &Run) -> Value {
                 "global": photons.global.map(map),
                 "caustic": photons.caustic.map(map),
                 "irradiances": photons.irradiances,
+                "seen": photons.seen,
+                "chained": photons.chained,
                 "seconds": photons.seconds,
             })
         }),

@@ -7,6 +7,7 @@
 mod caster;
 mod caustic_look;
 mod caustics;
+mod chaining;
 mod irradiance_cache;
 mod overture;
 mod path;

@@ -8,6 +8,7 @@ use crate::drive::RenderError;
 use crate::drive::crew::{Crew, Task};
 use crate::drive::memory::Memory;
 use crate::drive::run::path_settings;
+use crate::drive::workers::Workers;
 use halflight_core::bsdf::Features;
 use halflight_core::light::{Emission, Lights};
 use halflight_core::memory::{Arena, Footprint, Line};
@@ -54,6 +55,10 @@ pub struct PhotonUse {
     pub caustic: Option<MapUse>,
     /// Irradiances worked out beforehand.
     pub irradiances: u64,
+    /// What share of light paths left photons that are seen, by a first look; `None` where nobody looked.
+    pub seen: Option<f64>,
+    /// Whether half of them are chains that stay where photons are seen.
+    pub chained: bool,
     /// Seconds of shooting and building.
     pub seconds: f64,
 }
@@ -116,12 +121,22 @@ impl Drawer {
         scratch: &mut [Vec<Line>],
         task: &Task<Photon>,
     ) -> Result<bool, RenderError> {
+        let workers = crew.workers;
+        self.fill_with(workers, |photons| Ok(crew.pass(photons, size, scratch, task)?))
+    }
+
+    /// Lets `shoot` write the photons, all of them, and builds the map, unless it says that it was not done.
+    pub(super) fn fill_with(
+        &mut self,
+        workers: &Workers,
+        shoot: impl FnOnce(&mut [Photon]) -> Result<bool, RenderError>,
+    ) -> Result<bool, RenderError> {
         let capacity = self.capacity;
         let mut photons = Photons::new(capacity, &mut Arena::new(bytemuck::cast_slice_mut(&mut self.lines)))?;
-        if !crew.pass(photons.as_mut_slice(), size, scratch, task)? {
+        if !shoot(photons.as_mut_slice())? {
             return Ok(false);
         }
-        self.shape = Some(crew.workers.build_photons(photons, capacity).shape());
+        self.shape = Some(workers.build_photons(photons, capacity).shape());
         Ok(true)
     }
 

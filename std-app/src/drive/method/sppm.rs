@@ -7,6 +7,7 @@
 //! No pixel keeps anything but its sum, and memory is the same for any number of samples. Even and odd samples count
 //! their radii apart, so that the halves of the film are two such pictures of their own.
 
+use super::chaining::{self, Chaining};
 use super::photon_view::{self, PhotonView};
 use super::photons::{Drawer, MapUse, PhotonUse};
 use super::{Method, Renderer, Stage};
@@ -44,6 +45,7 @@ pub(super) struct ProgressivePhotons<'a, F> {
     paths: usize,
     used: PhotonUse,
     photons: Drawer,
+    chaining: Option<Chaining>,
     /// The sample that they are of.
     sample: Option<u32>,
     emission: Vec<Line>,
@@ -53,9 +55,9 @@ pub(super) struct ProgressivePhotons<'a, F> {
 impl<'a, F: Features> ProgressivePhotons<'a, F> {
     pub(super) fn new(stage: &Stage<'a>, memory: &mut Memory) -> Result<Self, RenderError> {
         let Stage { scene, bvh, lights, settings, workers } = *stage;
-        let scratch = PathTracer::<F>::scratch(WAVE).or(Shooter::<F>::scratch());
-        let scratch = memory.take_each("paths", scratch, workers.count())?;
-        let emission = memory.take("emission", Emission::footprint(lights))?;
+        let scratch = PathTracer::<F>::scratch(WAVE).or(chaining::scratch::<F>());
+        let mut scratch = memory.take_each("paths", scratch, workers.count())?;
+        let mut emission = memory.take("emission", Emission::footprint(lights))?;
         let pixels = settings.width as usize * settings.height as usize;
         let usual = pixels.clamp(FEWEST_PATHS, MOST_PATHS);
         let wanted = settings.photons.global.map_or(usual, |paths| paths as usize).div_ceil(PATHS).max(1);
@@ -66,7 +68,11 @@ impl<'a, F: Features> ProgressivePhotons<'a, F> {
         let tracer = PathTracer::<F>::new(scene, bvh, lights, path_settings(settings), settings.level);
         let [wanted, given] = [wanted, tasks].map(|tasks| (tasks * PATHS) as u64);
         let global = Some(MapUse { wanted, given, ..MapUse::default() });
-        let used = PhotonUse { global, ..PhotonUse::default() };
+        let mut arena = Arena::new(bytemuck::cast_slice_mut(&mut emission));
+        let all = Emission::build(scene, lights, &bvh.bounds(), &mut arena)?;
+        let of = (tasks, FIRST_RADIUS as f32);
+        let (chaining, seen) = Chaining::look_first::<F>(stage, of, &all, &mut scratch, memory, others)?;
+        let used = PhotonUse { global, seen, chained: chaining.is_some(), ..PhotonUse::default() };
         Ok(Self {
             stage: *stage,
             tracer,
@@ -74,6 +80,7 @@ impl<'a, F: Features> ProgressivePhotons<'a, F> {
             paths: tasks * PATHS,
             used,
             photons,
+            chaining,
             sample: None,
             emission,
             scratch,
@@ -87,7 +94,7 @@ impl<F: Features> Renderer for ProgressivePhotons<'_, F> {
     }
 
     fn round(&mut self, crew: &mut Crew) -> Result<(), RenderError> {
-        let Self { stage, tracer, discs, paths, used, photons, sample: shot_for, emission, scratch } = self;
+        let Self { stage, tracer, discs, paths, used, photons, chaining, sample: shot_for, emission, scratch } = self;
         let Stage { scene, bvh, lights, settings, .. } = *stage;
         let mut arena = Arena::new(bytemuck::cast_slice_mut(emission));
         let emission = Emission::build(scene, lights, &bvh.bounds(), &mut arena)?;
@@ -105,7 +112,14 @@ impl<F: Features> Renderer for ProgressivePhotons<'_, F> {
                 *shot_for = None;
                 let shoot =
                     |task: usize, arena: &mut Arena, out: &mut [_]| shooter.run(task, sample, arena, out);
-                if !photons.fill(ROOM, crew, scratch, &shoot)? {
+                let done = match chaining {
+                    None => photons.fill(ROOM, crew, scratch, &shoot)?,
+                    Some(chaining) => {
+                        let of = (&mut *photons, *paths / PATHS, sample);
+                        chaining.fill::<F>(stage, (&emission, FIRST_RADIUS as f32), of, crew, scratch)?
+                    }
+                };
+                if !done {
                     return Ok(());
                 }
                 *shot_for = Some(sample);

@@ -1,0 +1,39 @@
+//! What a light path is made of: numbers in [0, 1) by the names of their dimensions. Those of a [`Sampler`] are points of a
+//! sequence; those of a Markov chain are what they were before, a little changed (`transport/chain.rs`).
+
+use super::Sampler;
+
+/// Numbers in [0, 1). A dimension gives the same ones whenever it is asked, by pairs or one alone, of which the one is the
+/// first of the pair.
+pub trait Numbers {
+    /// One number.
+    fn single(&self, dimension: u32) -> f32;
+
+    /// Two.
+    fn pair(&self, dimension: u32) -> [f32; 2];
+}
+
+impl Numbers for Sampler {
+    #[inline]
+    fn single(&self, dimension: u32) -> f32 {
+        Sampler::single(self, dimension)
+    }
+
+    #[inline]
+    fn pair(&self, dimension: u32) -> [f32; 2] {
+        Sampler::pair(self, dimension)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn one_number_is_the_first_of_two() {
+        for index in 0..100 {
+            let sampler = Sampler::replicate(3, 7, 1, index);
+            assert_eq!(Numbers::single(&sampler, index), Numbers::pair(&sampler, index)[0]);
+        }
+    }
+}

@@ -1,0 +1,123 @@
+//! What the camera sees that holds photons: places of a raster of camera rays, straight on, in mirrors and behind glass,
+//! in a map of their own. A photon counts as seen where one of them lies beside it. That need not be exact: what is not
+//! held for seen is found by other paths (`chain.rs`).
+
+use super::estimator::dimension;
+use super::merge::Discs;
+use super::shoot::holds_photons;
+use crate::bsdf::{Bsdf, Features};
+use crate::bvh::Bvh;
+use crate::memory::Footprint;
+use crate::photon::{Disc, Falloff, Photon, PhotonMap, Photons, Uniform};
+use crate::sampling::Sampler;
+use crate::scene::{Scene, SurfacePoint};
+use crate::{Level, Rgb};
+use glam::Vec3;
+
+/// Camera rays, at most.
+const MOST_RAYS: u32 = 1 << 14;
+
+/// Mirrors and surfaces of glass on the way, at most.
+const MOST_MIRRORS: u32 = 16;
+
+/// How far places stand for others, in distances between two.
+const REACH: f32 = 1.5;
+
+/// The camera rays that look for places.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Raster {
+    frame: [u32; 2],
+    /// Pixels from ray to ray.
+    step: u32,
+}
+
+impl Raster {
+    /// Rays of a task.
+    pub const TASK: usize = 256;
+
+    /// For a picture that is `frame` pixels wide and high.
+    pub fn new(frame: [u32; 2]) -> Self {
+        let across = |step: u32| frame.map(|pixels| u64::from(pixels.div_ceil(step)));
+        let mut step = 1;
+        while across(step)[0] * across(step)[1] > u64::from(MOST_RAYS) {
+            step += 1;
+        }
+        Self { frame, step }
+    }
+
+    /// How many rays there are.
+    pub fn rays(&self) -> usize {
+        self.frame.iter().map(|pixels| pixels.div_ceil(self.step) as usize).product()
+    }
+
+    /// Bytes of the map of the places.
+    pub fn footprint(&self) -> Footprint {
+        Photons::footprint(self.rays())
+    }
+
+    /// What the rays of task `task`, [`Raster::TASK`] of them, find: places, as photons without power; where there is
+    /// none, one that a map refuses.
+    pub fn run<F: Features>(
+        &self,
+        task: usize,
+        (scene, bvh, level): (&Scene, &Bvh, Level),
+        seed: u32,
+        out: &mut [Photon],
+    ) {
+        for (i, slot) in out.iter_mut().enumerate() {
+            let ray = (task * Self::TASK + i) as u32;
+            *slot = self.along::<F>((scene, bvh, level), seed, ray).unwrap_or(Photon::NONE);
+        }
+    }
+
+    fn along<F: Features>(
+        &self,
+        (scene, bvh, level): (&Scene, &Bvh, Level),
+        seed: u32,
+        number: u32,
+    ) -> Option<Photon> {
+        let [width, height] = self.frame;
+        let across = width.div_ceil(self.step);
+        let sampler = Sampler::new(seed, number, 0);
+        let [u, v] = sampler.pair(dimension::PIXEL);
+        let at = |i: u32, u: f32, pixels: u32| ((i as f32 + u) * self.step as f32).min(pixels as f32);
+        let (x, y) = (at(number % across, u, width), at(number / across, v, height));
+        let mut ray = scene.camera.ray(width, height, x, y, [0.5; 2]);
+        for segments in 1..=MOST_MIRRORS + 1 {
+            let hit = bvh.nearest(level, &ray);
+            let point = SurfacePoint::at::<F>(scene, &ray, &hit).filter(|_| hit.is_some())?;
+            let direction = Vec3::from(ray.direction).normalize_or_zero();
+            let bsdf = Bsdf::at::<F>(scene, point.material, point.uv, point.front);
+            if holds_photons(&bsdf) {
+                return Some(Photon::new(point.position, -direction, point.geometric_normal, Rgb::ZERO));
+            }
+            let [u, v] = dimension::scattering(&sampler, segments);
+            let lobe = sampler.single(dimension::vertex(segments) + dimension::LOBE);
+            let sample = bsdf.sample::<F>(point.frame.to_local(-direction), [u, v, lobe])?;
+            ray = point.spawn(point.frame.to_world(sample.direction));
+        }
+        None
+    }
+}
+
+/// The places, and how far each stands for others.
+#[derive(Clone, Copy)]
+pub struct Sight<'a> {
+    map: &'a PhotonMap<'a>,
+    discs: Discs,
+    level: Level,
+}
+
+impl<'a> Sight<'a> {
+    /// Of the places in `map`, which `raster` found. Light is gathered from discs of so many pixels, at most; `discs` are
+    /// those of one.
+    pub fn new(map: &'a PhotonMap<'a>, raster: &Raster, discs: Discs, pixels: f32, level: Level) -> Self {
+        Self { map, discs: discs.of_pixels(pixels.max(REACH * raster.step as f32)), level }
+    }
+
+    /// Whether a photon at `place`, on a surface of `normal`, is seen.
+    pub(super) fn shows(&self, place: Vec3, normal: Vec3) -> bool {
+        let disc = Disc { place, normal, radius: self.discs.radius(place), falloff: Falloff::Constant };
+        self.map.gather(self.level, &disc, &Uniform(Rgb::ONE)).photons > 0
+    }
+}
