@@ -11,20 +11,22 @@
 //! Of N paths by independent numbers, n are seen: b ≈ n / N, over *all* of them, those included that looked for a place to
 //! start at. Chains start at one of these n, each equally likely. It is a draw from what the chain converges to, so
 //! there is nothing to wait for: whatever n is, what a chain counts has the right mean, and b is multiplied by zero where
-//! n = 0 and there is no chain. So every map has the right light in the mean, by itself.
+//! n = 0 and there is no chain. So every map has the right light in the mean, whatever paths its chains start from: its
+//! own, and where too few of those are seen, those of some maps before.
 //!
 //! Photons that are not seen are left by the N paths alone. They leave seen ones, too: of light that both find, each has a share.
 //!
 //! Departures from the paper:
 //! 1. Chains do not go on from map to map, and exchange nothing with independent paths on their way: starting from them
-//!    is that exchange, once for each map. A map follows from its number, which rendering in parts asks for.
+//!    is that exchange, once for each map. A map follows from its number and those of a few before, which rendering in
+//!    parts asks for.
 //! 2. The size of a change does not adapt to how many are taken, but is drawn anew for each, over all scales: what adapts
 //!    depends on its past, and one size is not right for a large lamp and a small one.
 //! 3. Photons that are counted several times are left once, with their power as many times.
 
 use super::estimator::Counters;
 use super::flight::{Flight, Onward, PATHS, Pile, Sequence, Source, State, Vertex, Visitor};
-use super::shoot::{Leaver, MOST, ROOM, Shooter, leaves_reflected};
+use super::shoot::{Leaver, MOST, Shooter, leaves_reflected};
 use super::sight::Sight;
 use crate::Rgb;
 use crate::bsdf::Features;
@@ -34,9 +36,10 @@ use crate::photon::Photon;
 use crate::sampling::{Numbers, ONE_MINUS_EPSILON, Random, Sampler, mix};
 use bytemuck::{Pod, Zeroable};
 
-/// Chains of a task, which advance together, and how often each changes: so many paths as other tasks have.
-const CHAINS: usize = 128;
-const STEPS: usize = PATHS / CHAINS;
+/// Chains of a task, which advance together, at most and at least. They change as often as makes so many paths as other
+/// tasks have: fewer chains are longer.
+const MOST_CHAINS: usize = 128;
+const FEWEST_CHAINS: usize = 16;
 
 /// Vertices of which a chain keeps the numbers. Those further on are drawn anew with each change.
 const VERTICES: u32 = 10;
@@ -45,7 +48,7 @@ const DIMENSIONS: usize = (EMISSION_DIMENSIONS + VERTICES * Leaver::DIMENSIONS) 
 const SLOTS: usize = 2 * DIMENSIONS;
 
 /// Photons that all chains of a task have at a time, at most.
-const HELD: usize = 16 * CHAINS;
+const HELD: usize = 16 * MOST_CHAINS;
 
 /// The largest change; the smallest of a step is so many octaves less, and steps shrink by up to so many.
 const LARGEST: f32 = 0.125;
@@ -60,31 +63,57 @@ pub struct Share<'a> {
     pub kept: f32,
 }
 
-/// Chains that begin at paths of one map.
+/// A path of a map that left a photon that is seen.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Start {
+    /// Number of the map.
+    pub map: u32,
+    /// Number of the path.
+    pub path: u32,
+}
+
+/// Where chains may begin.
+#[derive(Clone, Copy)]
+pub struct Starts<'a> {
+    /// The paths that were seen.
+    pub seen: &'a [Start],
+    /// Of how many, all maps together.
+    pub of: u64,
+}
+
+/// Chains that begin at paths of some maps.
 #[derive(Clone, Copy)]
 pub struct Chains<'a, F> {
     flight: Flight<'a, F>,
     tasks: usize,
+    /// Of each task.
+    chains: usize,
     share: Share<'a>,
-    /// Numbers of the paths of the map that left seen photons.
-    starts: &'a [u32],
+    starts: &'a [Start],
     /// b, times what chains have of seen light.
     power: f32,
 }
 
 impl<'a, F: Features> Chains<'a, F> {
-    /// In so many `tasks`, beside `shooter`, whose paths of this map left seen photons where `starts` says so.
-    pub fn new(shooter: &Shooter<'a, F>, tasks: usize, share: Share<'a>, starts: &'a [u32]) -> Self {
+    /// In so many `tasks`, from paths of `shooter`.
+    pub fn new(shooter: &Shooter<'a, F>, tasks: usize, share: Share<'a>, starts: Starts<'a>) -> Self {
         let flight = shooter.flight;
-        let chained = (tasks * CHAINS * STEPS) as f32;
-        // A path of the flight carries its part of all paths; b is the number of starts in such parts.
-        let power = (1.0 - share.kept) * starts.len() as f32 / chained;
-        Self { flight, tasks, share, starts, power }
+        let Starts { seen, of } = starts;
+        // About two chains for each start: more would begin alike.
+        let mut chains = MOST_CHAINS;
+        while chains > FEWEST_CHAINS && chains * tasks > 2 * seen.len() {
+            chains /= 2;
+        }
+        // A path of the flight carries its part of as many as it has.
+        let visible = seen.len() as f64 / of.max(1) as f64;
+        let part = f64::from(flight.paths) / (tasks * PATHS) as f64;
+        let power = f64::from(1.0 - share.kept) * visible * part;
+        Self { flight, tasks, chains, share, starts: seen, power: power as f32 }
     }
 
     /// Working memory of one task.
     pub fn scratch() -> Footprint {
-        let numbers = Footprint::default().slice::<f32>(CHAINS * SLOTS).slice::<u32>(CHAINS);
+        let numbers = Footprint::default().slice::<f32>(MOST_CHAINS * SLOTS).slice::<u32>(MOST_CHAINS);
         numbers.slice::<Left>(HELD).slice::<Left>(HELD).and(Shooter::<F>::scratch())
     }
 
@@ -100,12 +129,12 @@ impl<'a, F: Features> Chains<'a, F> {
         scratch: &mut Arena,
         out: &mut [Photon],
     ) -> Result<Counters, OutOfMemory> {
-        const { assert!(CHAINS * STEPS == PATHS && ROOM >= 6 * PATHS) };
         let mut arena = scratch.scratch();
         let mut pile = Pile::new(out);
         let mut counters = Counters::default();
-        let numbers = arena.slice::<f32>(CHAINS * SLOTS)?;
-        let counted = arena.slice::<u32>(CHAINS)?;
+        let chains = self.chains;
+        let numbers = arena.slice::<f32>(chains * SLOTS)?;
+        let counted = arena.slice::<u32>(chains)?;
         let mut now = Held { left: arena.slice::<Left>(HELD)?, count: 0 };
         let mut next = Held { left: arena.slice::<Left>(HELD)?, count: 0 };
         if self.starts.is_empty() {
@@ -113,10 +142,11 @@ impl<'a, F: Features> Chains<'a, F> {
             return Ok(counters);
         }
         let key = mix(SEED ^ u64::from(self.flight.seed)) as u32 ^ map.rotate_left(16);
-        let step = 1.0 / (self.tasks * CHAINS) as f64;
+        let step = 1.0 / (self.tasks * chains) as f64;
         let turned = f64::from(Random::new(key, u32::MAX).single(0));
-        let first = ((task * CHAINS) as f64 + turned) * step;
-        let begin = Begin { sequence: self.flight.sequence::<Leaver>(map), starts: self.starts, first, step };
+        let first = ((task * chains) as f64 + turned) * step;
+        let begin =
+            Begin { sequence: |map| self.flight.sequence::<Leaver>(map), starts: self.starts, first, step };
         counters += self.follow(&begin, &mut arena, &mut now)?;
         counted.fill(0);
         for (chain, own) in numbers.chunks_exact_mut(SLOTS).enumerate() {
@@ -125,14 +155,14 @@ impl<'a, F: Features> Chains<'a, F> {
                 slots.copy_from_slice(&sampler.pair(dimension as u32));
             }
         }
-        for step in 0..STEPS {
-            let first = ((task * STEPS + step) * CHAINS) as u32;
+        for first in (0..PATHS).step_by(chains) {
+            let first = (task * PATHS + first) as u32;
             let change = Change { numbers, key, first };
             next.count = 0;
             counters += self.follow(&change, &mut arena, &mut next)?;
-            let mut seen = [false; CHAINS];
-            next.as_slice().iter().for_each(|left| seen[usize::from(left.chain) % CHAINS] = true);
-            now.leave(|chain| seen[chain], counted, self.power, &mut pile, &mut counters);
+            let mut seen = [false; MOST_CHAINS];
+            next.as_slice().iter().for_each(|left| seen[usize::from(left.chain) % MOST_CHAINS] = true);
+            now.leave(|chain| seen[chain % MOST_CHAINS], counted, self.power, &mut pile, &mut counters);
             for left in next.as_slice() {
                 now.hold(*left, &mut counters);
             }
@@ -158,7 +188,7 @@ impl<'a, F: Features> Chains<'a, F> {
         held: &mut Held,
     ) -> Result<Counters, OutOfMemory> {
         let mut watcher = Watcher { sight: self.share.sight, held };
-        self.flight.follow_all(source, (0, CHAINS), arena, &mut watcher)
+        self.flight.follow_all(source, (0, self.chains), arena, &mut watcher)
     }
 }
 
@@ -244,21 +274,23 @@ impl Visitor for Watcher<'_, '_> {
 }
 
 /// Where chains begin: over all of them each of `starts` is as likely as any other.
-struct Begin<'s> {
-    sequence: Sequence,
-    starts: &'s [u32],
+struct Begin<'s, S> {
+    /// The numbers of a map.
+    sequence: S,
+    starts: &'s [Start],
     /// Of the first chain, and from one to the next, in parts of all starts.
     first: f64,
     step: f64,
 }
 
-impl Source for Begin<'_> {
+impl<S: Fn(u32) -> Sequence> Source for Begin<'_, S> {
     type Numbers = Sampler;
 
     fn of(&self, number: u32) -> Sampler {
         let at = (self.first + f64::from(number) * self.step) * self.starts.len() as f64;
-        let at = (at as usize).min(self.starts.len() - 1);
-        self.sequence.of(self.starts.get(at).copied().unwrap_or(0))
+        let at = (at as usize).min(self.starts.len().saturating_sub(1));
+        let Start { map, path } = self.starts.get(at).copied().unwrap_or(Start { map: 0, path: 0 });
+        (self.sequence)(map).of(path)
     }
 }
 
@@ -274,8 +306,7 @@ impl<'c> Source for Change<'c> {
     type Numbers = Changed<'c>;
 
     fn of(&self, number: u32) -> Changed<'c> {
-        let chains = self.numbers.chunks_exact(SLOTS);
-        let own = chains.skip(number as usize).next().unwrap_or_default();
+        let own = self.numbers.chunks_exact(SLOTS).nth(number as usize).unwrap_or_default();
         Changed { own, by: Move::new(self.key, self.first + number) }
     }
 }

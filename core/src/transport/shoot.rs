@@ -14,6 +14,7 @@ use super::chain::Share;
 use super::estimator::Counters;
 pub use super::flight::PATHS;
 use super::flight::{Flight, Onward, Pile, State, Vertex, Visitor};
+use super::sight::Sight;
 use crate::bsdf::{Bsdf, BsdfSample, Features};
 use crate::bvh::Bvh;
 use crate::light::{Emission, Lights};
@@ -148,7 +149,24 @@ impl<'a, F: Features> Shooter<'a, F> {
         Ok(counters)
     }
 
-    /// The same beside chains, with which seen photons `share` their light. `seen` is told of each of those, by the number
+    /// Which of the paths of task `task` of map number `map` leave a photon of reflected light in `sight`: it is written to
+    /// `seen`, a flag for each.
+    ///
+    /// # Errors
+    /// Those of [`Shooter::run`].
+    pub fn look(
+        &self,
+        task: usize,
+        map: u32,
+        sight: Sight,
+        scratch: &mut Arena,
+        seen: &mut [bool],
+    ) -> Result<Counters, OutOfMemory> {
+        seen.fill(false);
+        self.flight.follow(task, map, scratch, &mut Looker { sight, first: (task * PATHS) as u32, seen })
+    }
+
+    /// The same as [`Shooter::run`] beside chains, with which seen photons `share` their light. `seen` is told of each of those, by the number
     /// of its path.
     ///
     /// # Errors
@@ -165,6 +183,30 @@ impl<'a, F: Features> Shooter<'a, F> {
         let counters = self.flight.follow(task, map, scratch, &mut leaver)?;
         leaver.pile.finish();
         Ok(counters)
+    }
+}
+
+/// Sees which paths leave photons that are seen.
+struct Looker<'s> {
+    sight: Sight<'s>,
+    /// Number of the first path.
+    first: u32,
+    seen: &'s mut [bool],
+}
+
+impl Visitor for Looker<'_> {
+    const SEED: u64 = Leaver::SEED;
+
+    #[inline]
+    fn meet(&mut self, state: &State, vertex: &Vertex, _: &mut Counters) -> Option<Onward> {
+        let leaves = leaves_reflected(state, vertex);
+        if leaves
+            && self.sight.shows(vertex.point.position, vertex.point.geometric_normal)
+            && let Some(seen) = self.seen.get_mut((state.number - self.first) as usize)
+        {
+            *seen = true;
+        }
+        Some(Onward { most: if leaves { MOST } else { 1.0 }, mirrored: false })
     }
 }
 
@@ -196,11 +238,11 @@ impl Visitor for Leaver<'_> {
             };
         if leaves {
             let mut power = Rgb::from(state.power);
-            if let Some((share, seen)) = &mut self.beside {
-                if share.sight.shows(vertex.point.position, vertex.point.geometric_normal) {
-                    power *= share.kept;
-                    seen(state.number);
-                }
+            if let Some((share, seen)) = &mut self.beside
+                && share.sight.shows(vertex.point.position, vertex.point.geometric_normal)
+            {
+                power *= share.kept;
+                seen(state.number);
             }
             if power.max_element() > 0.0 {
                 self.pile.leave(vertex.photon(power), counters);

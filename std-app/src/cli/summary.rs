@@ -77,6 +77,12 @@ pub(super) fn text(run: &Run, report: Option<&Path>) -> String {
             readable_seconds(photons.seconds),
             stored.join("; "),
         ));
+        if let (Some(seen), true) = (photons.seen, photons.chained) {
+            lines.push(format!(
+                "       half of them in chains that stay where photons are seen: {:.2} % of light paths leave some",
+                100.0 * seen
+            ));
+        }
         for (map, name) in [(photons.global, "global"), (photons.caustic, "caustic")] {
             if let Some(map) = map.filter(|map| map.given < map.wanted) {
                 lines.push(format!(

@@ -18,7 +18,7 @@ pub use maker::Maker;
 pub use race::{Race, Racer};
 
 use crate::compare::Comparison;
-use crate::drive::{Method, PhotonUse, RenderResult, Settings};
+use crate::drive::{MOST_SEEN, Method, PhotonUse, RenderResult, Settings};
 use crate::save::Image;
 use halflight_core::census::Census;
 use halflight_core::scene::Scene;
@@ -82,6 +82,11 @@ impl Run<'_> {
                 "windows to the environment",
                 "there was no memory for them: light of the sky may be noisier",
             ));
+        }
+        if let Some(PhotonUse { seen: Some(seen), chained: false, .. }) = self.result.photons {
+            let some = "enough light paths leave photons that are seen";
+            let none = "next to no light path leaves a photon that is seen: there is nothing to begin at";
+            left_out.push(("chains of light paths", if seen >= MOST_SEEN { some } else { none }));
         }
         if let (Method::PhotonMap, Some(PhotonUse { caustic: None, .. })) =
             (self.result.method, self.result.photons)

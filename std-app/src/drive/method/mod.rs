@@ -19,6 +19,7 @@ mod sppm;
 mod wrong;
 
 pub use caustics::CausticUse;
+pub use chaining::MOST_SEEN;
 pub(super) use irradiance_cache::LEAST_PIXELS;
 pub use irradiance_cache::{CacheSettings, CacheUse, Gather};
 pub(super) use overture::{Growing, Overture};

@@ -110,7 +110,16 @@ pub(super) struct Drawer {
 
 impl Drawer {
     pub(super) fn new(capacity: usize, memory: &mut Memory) -> Result<Self, RenderError> {
-        let lines = memory.take("photons", Photons::footprint(capacity))?;
+        Self::of("photons", capacity, memory)
+    }
+
+    /// In memory of that name.
+    pub(super) fn of(
+        structure: &'static str,
+        capacity: usize,
+        memory: &mut Memory,
+    ) -> Result<Self, RenderError> {
+        let lines = memory.take(structure, Photons::footprint(capacity))?;
         Ok(Self { lines, capacity, shape: None })
     }
 

@@ -94,7 +94,18 @@ impl<F: Features> Renderer for ProgressivePhotons<'_, F> {
     }
 
     fn round(&mut self, crew: &mut Crew) -> Result<(), RenderError> {
-        let Self { stage, tracer, discs, paths, used, photons, chaining, sample: shot_for, emission, scratch } = self;
+        let Self {
+            stage,
+            tracer,
+            discs,
+            paths,
+            used,
+            photons,
+            chaining,
+            sample: shot_for,
+            emission,
+            scratch,
+        } = self;
         let Stage { scene, bvh, lights, settings, .. } = *stage;
         let mut arena = Arena::new(bytemuck::cast_slice_mut(emission));
         let emission = Emission::build(scene, lights, &bvh.bounds(), &mut arena)?;
@@ -116,7 +127,7 @@ impl<F: Features> Renderer for ProgressivePhotons<'_, F> {
                     None => photons.fill(ROOM, crew, scratch, &shoot)?,
                     Some(chaining) => {
                         let of = (&mut *photons, *paths / PATHS, sample);
-                        chaining.fill::<F>(stage, (&emission, FIRST_RADIUS as f32), of, crew, scratch)?
+                        chaining.fill::<F>(stage, &emission, of, crew, scratch)?
                     }
                 };
                 if !done {

@@ -21,12 +21,19 @@ pub(super) fn section(run: &Run) -> String {
     if let Some(share) = caustics.share {
         facts.push(("Light that they bring, by a first look", parts::percent(share)));
     }
+    if let Some(share) = photons.seen {
+        facts.push(("Light paths whose photons are seen, by a first look", parts::percent(share)));
+    }
     let mut maps = String::new();
     let kinds = [
         (false, photons.global, view.and_then(|view| view.global.as_ref())),
         (true, photons.caustic, view.and_then(|view| view.caustic.as_ref())),
     ];
     let mut words = first_look(run).to_owned();
+    if photons.chained {
+        words += "Half of the light paths are chains, each a little different from the one before, that stay where they leave \
+                  photons which the camera sees. ";
+    }
     for (is_caustic, used, seen) in kinds {
         let Some(used) = used else { continue };
         facts.extend(numbers(is_caustic, &used, seen));
