@@ -4,7 +4,8 @@
 
 Ours: `path` without and with photons of caustics, the latter with adaptive sampling as well, and `sppm`; Mitsuba's:
 `path` and `ptracer`, `llvm_ad_rgb`, with our materials; where `LUXCORE` names the python of a virtual environment with
-`pyluxcore` and `numpy`, LuxCore's `BIDIRVMCPU` and `PATHCPU` with its caustic cache, on scenes that it has the words for.
+`pyluxcore` and `numpy`, LuxCore's `BIDIRVMCPU` and `PATHCPU` with its caustic cache, with several radii, on scenes that it has the
+words for.
 Two threads, no limit of depth. Seconds are those of the processors, so that a busy machine tells the same.
 Each renders for about `--seconds`, or for each of several: by the samples that a first, short picture says can be had in that time.
 Ratios hang on it, for what no path finds is missing from `path` without photons however long it takes. All are measured against one
@@ -41,8 +42,8 @@ FIRST_REFERENCE_SEED = 1000
 # Pictures that a reference is the mean of: their differences tell its noise.
 REFERENCE_PICTURES = 8
 LUX_METHODS = ("BiDirVM", "caustic cache")
-# Lookup radius of LuxCore's caustic cache, in diagonals of the scene.
-LUX_RADIUS = 0.003
+# Radii of LuxCore's merging, and of the lookups of its caustic cache, in diagonals of the scene: the best differs by scene.
+LUX_RADII = (0.0005, 0.0015, 0.005)
 OURS = {
     "path, off": ["--method", "path", "--caustics", "off"],
     "path, caustics": ["--method", "path", "--caustics", "auto"],
@@ -126,18 +127,18 @@ def lux_scene(description, path):
     if any(light["kind"] != "directional" for light in lights) or any(mesh["material"] is None for mesh in meshes):
         return None
     corners = np.vstack([mesh["positions"] for mesh in meshes])
-    radius = LUX_RADIUS * float(np.linalg.norm(corners.max(0) - corners.min(0)))
+    diagonal = float(np.linalg.norm(corners.max(0) - corners.min(0)))
     said = {"size": description["render"]["size"], "camera": description["camera"], "meshes": meshes, "lights": lights}
-    path.write_text(json.dumps(said | {"radius": radius}))
+    path.write_text(json.dumps(said | {"diagonal": diagonal}))
     return path
 
 
-def luxcore(scene, method, seconds, seed):
+def luxcore(scene, method, radius, seconds, seed):
     """LuxCore's picture after so many seconds; loading is not counted."""
     with tempfile.TemporaryDirectory() as folder:
         picture = Path(folder) / "picture.npy"
         program = Path(__file__).with_name("luxcore_peer.py")
-        command = [os.environ["LUXCORE"], program, scene, method, seconds, seed, picture]
+        command = [os.environ["LUXCORE"], program, scene, method, radius, seconds, seed, picture]
         done = subprocess.run([str(word) for word in command], capture_output=True, text=True)
         if done.returncode != 0:
             raise RuntimeError(done.stderr)
@@ -196,8 +197,9 @@ def compare(name, size, arguments, program, folder):
             renderers[f"Mitsuba {kind}"] = lambda spp, seed, i=integrator: theirs(scene, i, seed, spp)
     if "LUXCORE" in os.environ and not arguments.ours_only:
         lux = lux_scene(description, Path(folder) / f"{name}.json")
-        for kind in LUX_METHODS if lux else ():
-            renderers[f"LuxCore {kind}"] = lambda seconds, seed, kind=kind: luxcore(lux, kind, seconds, seed)
+        for kind, radius in ((kind, radius) for kind in LUX_METHODS for radius in LUX_RADII) if lux else ():
+            who = f"LuxCore {kind}, {radius}"
+            renderers[who] = lambda seconds, seed, kind=kind, radius=radius: luxcore(lux, kind, radius, seconds, seed)
     first = next(iter(renderers))
     chosen = {who: render for who, render in renderers.items() if who == first or (arguments.only or "") in who}
     for wanted in arguments.seconds:

@@ -1,9 +1,9 @@
 """One picture by LuxCore, in a virtual environment of its own (`pip install pyluxcore numpy`): its libraries and Mitsuba's
 do not share a process. `caustics.py` starts it where `LUXCORE` names the python of such an environment.
 
-    python luxcore_peer.py scene.json method seconds seed picture.npy
+    python luxcore_peer.py scene.json method radius seconds seed picture.npy
 
-The scene is what `lux_scene` of caustics.py wrote. Prints the seconds of the processors that rendering took; the picture is
+The scene is what `lux_scene` of caustics.py wrote, the radius that of photons or of merging, in diagonals of the scene. Prints the seconds of the processors that rendering took; the picture is
 (height, width, 3), linear.
 """
 
@@ -81,12 +81,14 @@ def lux_scene(said):
 
 
 def main():
-    file, method, seconds, seed, out = sys.argv[1:]
+    file, method, radius, seconds, seed, out = sys.argv[1:]
     with open(file) as text:
         said = json.load(text)
     width, height = said["size"]
     if METHODS[method].get("path.photongi.caustic.enabled"):
-        METHODS[method]["path.photongi.caustic.lookup.radius"] = said["radius"]
+        METHODS[method]["path.photongi.caustic.lookup.radius"] = float(radius) * said["diagonal"]
+    else:  # in radii of the sphere around the scene
+        METHODS[method]["bidirvm.startradius.scale"] = 2 * float(radius)
     config = {
         "film.width": width,
         "film.height": height,

@@ -1,10 +1,11 @@
 """Error after the same processor time: the ambient cache of Radiance's `rpict` beside `--method irradiance-cache`.
 
-    python3 tests/peers/radiance.py [--reference-spp 1024] [--target 1e-3] [cornell two-rooms]
+    python3 tests/peers/radiance.py [--reference-spp 1024] [--target 1e-3] [cornell two-rooms sponza-dabrovic]
 
-Scenes of this repository with diffuse materials alone, and lamps that reflect nothing, in the words of both: materials
+Scenes of this repository, and one of the published ones (`HALFLIGHT_SCENES`), with diffuse materials alone, and lamps that reflect nothing, in the words of both: materials
 `plastic` without specularity, lamps `light`, radiance for radiance (Radiance's 179 lumen per watt is for those who want
-candelas; its pixels are watts). Both run on one thread; seconds are those of the processor, for the whole process. Errors
+candelas; its pixels are watts). Textures are their mean colour, and normals those of the triangles, for both; a lamp that is a sphere of
+triangles is a sphere there. Both run on one thread; seconds are those of the processor, for the whole process. Errors
 are against our path tracer, whose own noise is subtracted; how far the means are apart is printed beside. `rpict` renders
 more pixels than are wanted, jittered, and squares of them are averaged: the time for that is not counted. Its settings
 are a sweep of `-aa`, `-ad`, `-as`, `-ar`, `-ab`, `-ds` and of the pixels; what counts is the fastest that is good enough, for the error
@@ -40,6 +41,18 @@ SCENES = {
         "camera": {"eye": (0.6, 1.5, 3.8), "look-at": (3, 0.9, 0.6), "up": (0, 1, 0), "fov": 55},
         "target": 2e-3,
     },
+    "sponza-dabrovic": {
+        "obj": os.path.join(os.environ.get("HALFLIGHT_SCENES", "."), "sponza-dabrovic/sponza-dabrovic.obj"),
+        "size": (192, 144),
+        "camera": {
+            "eye": (14.4499, 6.89415, -1.18547),
+            "look-at": (13.45630589820548, 6.78438065161636, -1.1586101594462552),
+            "up": (-0.10970821656511949, 0.9939567862130738, 0.003743575707618994),
+            "fov": 74.09584038370595,
+        },
+        "target": 2e-3,
+        "sphere": True,
+    },
 }
 # -aa, -ar, -ad; and -ab, -ds.
 COARSE = [(0.6, 16, 64), (0.5, 16, 128), (0.5, 8, 256), (0.5, 16, 256), (0.4, 8, 512), (0.4, 16, 256), (0.3, 8, 512), (0.4, 32, 256)]
@@ -70,12 +83,12 @@ def programs():
 
 
 def read_diffuse(path):
-    """Faces as (material, corners), and materials as {name: (Kd, Ke)}, of one of our own OBJ files."""
+    """Faces as (material, corners), and materials as {name: (Kd, Ke)}, of an OBJ file."""
     positions, faces, material, library = [], [], None, None
-    for line in path.read_text().splitlines():
+    for line in path.read_text(errors="replace").splitlines():
         key, _, rest = line.partition(" ")
         if key == "v":
-            positions.append([float(x) for x in rest.split()])
+            positions.append([float(x) for x in rest.split()[:3]])
         elif key == "usemtl":
             material = rest.strip()
         elif key == "mtllib":
@@ -90,13 +103,26 @@ def read_diffuse(path):
             materials[name] = {"Kd": [0.0] * 3, "Ke": [0.0] * 3}
         elif key in ("Kd", "Ke"):
             materials[name][key] = [float(x) for x in rest.split()]
+        elif key == "map_Kd":
+            texels = workbench.mi.Bitmap(str(library.parent / rest.strip()))
+            linear = np.array(texels.convert(workbench.mi.Bitmap.PixelFormat.RGB, workbench.mi.Struct.Type.Float32, False))
+            materials[name]["Kd"] = [float(x) for x in linear.mean(axis=(0, 1))]
     for values in materials.values():
         if any(values["Ke"]):
             values["Kd"] = [0.0] * 3
     return faces, materials
 
 
-def write_scene(name, path):
+def sphere(name, triangles):
+    """The sphere of `triangles`, of the same area."""
+    corners = np.array(triangles)
+    center = (corners.min(axis=(0, 1)) + corners.max(axis=(0, 1))) / 2
+    across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    radius = np.sqrt(np.linalg.norm(across, axis=1).sum() / 2 / (4 * np.pi))
+    return f"{name} sphere of_{name}\n0\n0\n4 {' '.join(f'{x:.9g}' for x in (*center, radius))}\n"
+
+
+def write_scene(name, path, with_sphere=False):
     """The same scene twice: `NAME.obj` for us, `NAME.rad` for Radiance."""
     faces, materials = read_diffuse(path)
     words = lambda values: " ".join(f"{x:.9g}" for x in values)
@@ -106,12 +132,17 @@ def write_scene(name, path):
             rad.append(f"void light {material}\n0\n0\n3 {words(values['Ke'])}\n")
         else:
             rad.append(f"void plastic {material}\n0\n0\n5 {words(values['Kd'])} 0 0\n")
+    lamps = {}
     for i, (material, corners) in enumerate(faces):
         obj += [f"usemtl {material}", *(f"v {words(corner)}" for corner in corners)]
         obj.append("f " + " ".join(str(count + k + 1) for k in range(len(corners))))
         count += len(corners)
+        if with_sphere and any(materials[material]["Ke"]):
+            lamps.setdefault(material, []).append(corners)
+            continue
         numbers = "\n".join(words(corner) for corner in corners)
         rad.append(f"{material} polygon face{i}\n0\n0\n{3 * len(corners)}\n{numbers}\n")
+    rad += [sphere(material, triangles) for material, triangles in lamps.items()]
     mtl = [f"newmtl {m}\nKd {words(v['Kd'])}\nKe {words(v['Ke'])}" for m, v in materials.items()]
     FOLDER.mkdir(parents=True, exist_ok=True)
     (FOLDER / f"{name}.mtl").write_text("\n".join(mtl) + "\n")
@@ -204,7 +235,7 @@ def reference(program, name, scene, spp):
 
 def compare(name, arguments, program, bin_folder):
     scene = SCENES[name] | ({"size": tuple(arguments.size)} if arguments.size else {})
-    write_scene(name, workbench.ROOT / scene["obj"])
+    write_scene(name, workbench.ROOT / scene["obj"], scene.get("sphere", False))
     with open(FOLDER / f"{name}.oct", "wb") as octree:
         subprocess.check_call([bin_folder / "oconv", "-w", FOLDER / f"{name}.rad"], stdout=octree)
     truth = reference(program, name, scene, arguments.reference_spp)
@@ -239,7 +270,7 @@ def compare(name, arguments, program, bin_folder):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("scenes", nargs="*", default=list(SCENES))
+    parser.add_argument("scenes", nargs="*", default=["cornell", "two-rooms"])
     parser.add_argument("--reference-spp", type=int, default=1024)
     parser.add_argument("--target", type=float, help="relMSE [default: of the scene]")
     parser.add_argument("--size", type=int, nargs=2, metavar=("W", "H"), help="pixels [default: of the scene]")
