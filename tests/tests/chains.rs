@@ -65,7 +65,7 @@ fn sum(photons: &[Photon], of: impl Fn(&Photon) -> bool) -> (f64, usize) {
 #[test]
 fn chains_carry_the_light_of_independent_paths_however_few_are_seen() {
     // A map has one task of independent paths and one of chains. A thousandth of a path is seen.
-    const MAPS: u32 = 6000;
+    const MAPS: u32 = 3000;
     in_the_hall(|_, shooter, sight| {
         let mut scratch = lines(Chains::<All>::scratch().or(Shooter::<All>::scratch()));
         let mut scratch = arena(&mut scratch);
