@@ -118,7 +118,7 @@ impl<'a, F: Features> Chains<'a, F> {
     }
 
     /// Lets the chains of task `task` of map number `map` run. All of `out` is written, as by [`Shooter::run`], and room
-    /// for [`ROOM`] photons is enough.
+    /// for [`ROOM`](super::shoot::ROOM) photons is enough.
     ///
     /// # Errors
     /// [`OutOfMemory`] where `scratch` has less than [`Chains::scratch`] bytes.
