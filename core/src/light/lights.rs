@@ -17,6 +17,7 @@ use crate::geometry::Bounds;
 use crate::memory::{Arena, Footprint, OutOfMemory};
 use crate::sampling::{AliasTable, ONE_MINUS_EPSILON, Sampler, warp::uniform_triangle};
 use crate::scene::{Material, Mesh, Scene};
+use core::cell::Cell;
 use glam::{Vec2, Vec3};
 
 /// The least share of each kind of light that is there.
@@ -345,6 +346,29 @@ impl<'m> Lights<'m> {
             let borders = emitter.border(mesh).filter(|edge| edges.is_border(*edge, side(emitter, front)));
             borders.for_each(&mut draw);
         });
+    }
+
+    /// Whether surfaces emit.
+    pub(crate) fn have_emitters(&self) -> bool {
+        !self.emitters.is_empty()
+    }
+
+    /// Whether a surface that emits towards `ray`, an origin and a direction, is not ruled out by `meets`, which is asked for
+    /// spheres around some of them, and then for points of each, by centre and radius.
+    pub(crate) fn may_be_met(
+        &self,
+        [origin, direction]: [Vec3; 2],
+        meets: impl Fn(Vec3, f32) -> bool,
+    ) -> bool {
+        let found = Cell::new(false);
+        let is_met = |emitter: &Emitter| {
+            emitter.faces(origin).is_some() && meets(emitter.near(origin, direction), 0.0)
+        };
+        let waits = |center, radius| !found.get() && meets(center, radius);
+        self.tree.visit(waits, |light| {
+            found.set(found.get() || self.emitters.get(light as usize).is_some_and(is_met));
+        });
+        found.get()
     }
 
     /// A triangle of emitter `light`.

@@ -13,7 +13,8 @@
 //!    map of photons does one bounce later, and may ask several points of lights; nor where photons do (`density.rs`, `maps.rs`).
 //! 7. Pixels at the border of a lamp look at it with rays of their own (`outline.rs`).
 //! 8. Where photons of caustics lie, paths and photons share the light that both find (`merge.rs`).
-//! 9. Where all else is quiet, pixels that see an edge have several paths for each sample (`edges.rs`).
+//! 9. What mirrors and glass show of a lamp has rays of its own, where it was found beforehand (`images.rs`).
+//! 10. Where all else is quiet, pixels that see an edge have several paths for each sample (`edges.rs`).
 //!
 //! The price: about 400 bytes for each path of a wave. What a pixel sees depends on (seed, sample) and the pixels of
 //! its group only, no wave cuts a group that shares, and samples are summed in their order: the picture has the same bits for
@@ -26,6 +27,7 @@ use super::estimator::{
     Counters, MAX_CROSSINGS, MAX_VERTICES, PathSettings, dimension, environment_heuristic, power_heuristic,
     survival,
 };
+use super::images::{Images, Way};
 use super::maps::{GatherLight, PhotonMaps, Said};
 use super::merge::{ChainLink, Merging, ends_chain};
 use super::reuse::Exchange;
@@ -72,7 +74,7 @@ pub struct PathTracer<'a, F> {
     /// Some surfaces let a part of the light through, so that a shadow ray may go on behind a hit.
     pub(super) has_cutouts: bool,
     /// Some surfaces may reflect or refract into one direction only.
-    has_mirrors: bool,
+    pub(super) has_mirrors: bool,
     pub(super) caches: Option<Caches<'a>>,
     photons: Option<PhotonLight<'a>>,
     /// Of even and of odd samples.
@@ -85,6 +87,7 @@ pub struct PathTracer<'a, F> {
     pub(super) asked: u32,
     /// Tile by tile, or none.
     pub(super) edges: &'a [PixelSet],
+    pub(super) images: Images<'a>,
     features: PhantomData<F>,
 }
 
@@ -116,6 +119,7 @@ impl<'a, F: Features> PathTracer<'a, F> {
             spots: &[],
             asked: 1,
             edges: &[],
+            images: Images::default(),
             features: PhantomData,
         }
     }
@@ -179,6 +183,11 @@ impl<'a, F: Features> PathTracer<'a, F> {
     /// The same, where pixels share what their paths find, or do not.
     pub fn with_reuse(&self, reuse: bool) -> Self {
         Self { settings: PathSettings { reuse, ..self.settings }, ..*self }
+    }
+
+    /// The same, where `images` of lamps have rays of their own.
+    pub fn with_images(&self, images: Images<'a>) -> Self {
+        Self { images, ..*self }
     }
 
     /// Whether paths have a limit of depth.
@@ -398,7 +407,7 @@ impl<'a, F: Features> PathTracer<'a, F> {
         }
         if point.material.emits() && path.share.sees_lamps() {
             let radiance = emitted(scene, hit.triangle, point.uv, point.front);
-            if radiance != Rgb::ZERO {
+            if radiance != Rgb::ZERO && !self.leaves_to_image(path) {
                 let mut weight = 1.0;
                 if path.pdf < f32::INFINITY {
                     let distance = position.distance(point.position);
@@ -623,6 +632,7 @@ impl<'a, F: Features> PathTracer<'a, F> {
                 chain => chain.abs() * there.reverse::<F>(scene) / sample.pdf,
             };
         }
+        path.way = if sample.delta { path.way.on(sample.transmitted) } else { Way::LOST };
         path.throughput = throughput.to_array();
         // One ray beside as many points of lights.
         path.pdf = if sample.delta { f32::INFINITY } else { sample.pdf / points as f32 };

@@ -1,5 +1,6 @@
 //! The working memory of a wavefront: the state of every path of the wave, and queues of rays.
 
+use super::images::Way;
 use super::reuse::{Exchange, Pair};
 use crate::bsdf::Bsdf;
 use crate::film::GROUP;
@@ -39,6 +40,8 @@ pub(super) struct Path {
     pub(super) eta_squared: f32,
     /// What of the light at the end of the ray belongs to the path.
     pub(super) share: Share,
+    /// By which mirrors and glass it has come from the eye, if by nothing else.
+    pub(super) way: Way,
     /// Of a path that came by mirrors and glass from a rough surface: how much denser photons come from a light to
     /// there than paths from there to the light, but for what the light has to do with it ([`super::merge`]). Negative
     /// on the way to the first mirror or glass; zero where photons could not find the path.
