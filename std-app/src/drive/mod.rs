@@ -15,6 +15,7 @@ mod film_file;
 mod fingerprint;
 mod held_out;
 mod history;
+mod images;
 mod ledger;
 mod memory;
 mod merge;
@@ -270,6 +271,8 @@ pub struct RenderResult {
     pub photon_view: Option<PhotonView>,
     /// Whether the sky was sampled through windows.
     pub windows: WindowUse,
+    /// Pixels that see lamps in mirrors or through glass, and look at them with rays of their own.
+    pub images: usize,
     /// Where samples were dropped, the worst first.
     pub places: Vec<Place>,
     /// Pixels that are black because all of their samples were dropped.

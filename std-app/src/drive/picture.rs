@@ -194,6 +194,7 @@ impl Picture<'_> {
             photons: renderer.photons(),
             photon_view: if settings.photon_view { renderer.photon_view()? } else { None },
             windows: WindowUse::default(),
+            images: 0,
             places: canvas.ledger.places(width, height),
             empty_pixels: empty_pixels(film, |task| canvas.shard.owns(task)),
             error,

@@ -7,7 +7,7 @@ use super::memory::Memory;
 use super::method::{Method, Stage};
 use super::picture::Picture;
 use super::workers::Workers;
-use super::{Progress, RenderError, RenderResult, Seconds, Settings, cache_file, windows};
+use super::{Progress, RenderError, RenderResult, Seconds, Settings, cache_file, images, windows};
 use crate::pages::Pages;
 use core::sync::atomic::AtomicBool;
 use halflight_core::Level;
@@ -71,7 +71,10 @@ impl WithFeatures for Render<'_> {
         let paths = PathTracer::<F>::new(scene, &bvh, &lights, path_settings(settings), settings.level);
         let (lights, windows) =
             windows::learn(&paths, &lights, settings.windows, &workers, &mut memory, &mut window_lines)?;
-        let stage = Stage { scene, bvh: &bvh, lights: &lights, settings, workers: &workers };
+        let mut image_lines = Vec::new();
+        let paths = PathTracer::<F>::new(scene, &bvh, &lights, path_settings(settings), settings.level);
+        let images = images::find(&paths, settings, &workers, &mut memory, &mut image_lines)?;
+        let stage = Stage { scene, bvh: &bvh, lights: &lights, images, settings, workers: &workers };
         method.with::<F, _>(&stage, &mut memory, |renderer, memory| {
             let method = renderer.chosen().unwrap_or(method);
             let identity = identity(method);
@@ -80,7 +83,15 @@ impl WithFeatures for Render<'_> {
                 Picture { method, stage, film, audit, identity, resumed, clock, progress, interrupt };
             let done = picture.render(renderer)?;
             let seconds = Seconds { build, ..done.seconds };
-            Ok(RenderResult { memory: memory.uses(), memory_peak: memory.peak(), seconds, windows, ..done })
+            let images = images.pixels();
+            Ok(RenderResult {
+                memory: memory.uses(),
+                memory_peak: memory.peak(),
+                seconds,
+                windows,
+                images,
+                ..done
+            })
         })
     }
 }

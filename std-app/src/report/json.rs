@@ -61,6 +61,7 @@ fn most(run: &Run) -> Value {
         "dropped": dropped_object(&result.counters.dropped, &result.places, result.empty_pixels),
         "memory": memory,
         "memory_peak": result.memory_peak,
+        "lamp_images": result.images,
         "windows": {
             "used": result.windows.used,
             "gain": result.windows.gain.map(|gain| gain.factor()),

@@ -9,7 +9,6 @@ pub use verdict::{Audited, Region};
 
 use super::memory::Memory;
 use super::method::Stage;
-use super::run::path_settings;
 use super::workers::Workers;
 use super::{ErrorEstimate, RenderError, Settings, Shard};
 use choice::Grid;
@@ -17,7 +16,7 @@ use core::ops::Range;
 use halflight_core::bsdf::Features;
 use halflight_core::film::{Film, Pixel};
 use halflight_core::memory::{Arena, Footprint, Line, OutOfMemory};
-use halflight_core::transport::{Counters, Merging, PathSettings, PathTracer, path::WAVE};
+use halflight_core::transport::{Counters, Merging, PathTracer, path::WAVE};
 use serde::{Deserialize, Serialize};
 use std::time::Instant;
 
@@ -106,15 +105,14 @@ impl<'a> Audit<'a> {
         memory: &mut Memory,
         is_biased: bool,
     ) -> Result<Option<Self>, RenderError> {
-        let Stage { scene, bvh, lights, settings, workers } = *stage;
+        let Stage { settings, workers, .. } = *stage;
         let Some(share) = share(settings, is_biased) else { return Ok(None) };
         let scratch = memory.take_each("audit", PathTracer::<F>::scratch(WAVE), workers.count())?;
         // The pixels themselves are counted and not taken: they are kept where a film file can find them.
         let pixels = choice::count(settings.width, settings.height);
         memory.set_aside("audit", Footprint::default().slice::<Pixel>(pixels))?;
-        let paths = path_settings(settings);
-        let other = PathSettings { seed: paths.seed ^ OTHER_SEED, ..paths };
-        let tracer = PathTracer::<F>::new(scene, bvh, lights, other, settings.level);
+        let seed = settings.seed ^ OTHER_SEED;
+        let tracer = stage.paths::<F>(seed);
         Ok(Some(Self {
             truth: Box::new(move |(places, samples), photons, arena, out| {
                 let tracer = photons.map_or(tracer, |photons| tracer.with_caustics(photons));
@@ -122,7 +120,7 @@ impl<'a> Audit<'a> {
             }),
             shard: settings.shard,
             by_clock: settings.stop.error.is_none(),
-            seed: other.seed,
+            seed,
             scratch,
             state: State { share, ..State::default() },
         }))

@@ -20,7 +20,6 @@ use crate::drive::crew::Crew;
 use crate::drive::held_out::{EXACT, luminance};
 use crate::drive::memory::Memory;
 use crate::drive::refinement::{Refinement, Shortfall};
-use crate::drive::run::path_settings;
 use crate::drive::survey::{self, Survey};
 use crate::drive::workers::Workers;
 use crate::drive::{RenderError, Settings};
@@ -251,7 +250,7 @@ fn set_up<F: Features, T>(
     (cast, caustics): (Option<Cast>, CausticUse),
     then: impl FnOnce(&mut dyn Renderer, &mut Memory) -> Result<T, RenderError>,
 ) -> Result<T, RenderError> {
-    let Stage { scene, bvh, lights, settings, workers } = *stage;
+    let Stage { scene, bvh, settings, workers, .. } = *stage;
     let needs = Needs::of::<F>(stage, memory, cast.is_some());
     let scratch = memory.take_each("paths", needs.scratch, workers.count())?;
     memory.set_aside("edges", needs.edges)?;
@@ -300,7 +299,7 @@ fn set_up<F: Features, T>(
     let usual = metric::Settings::new(settings.cache.metric, 0.5 * bvh.bounds().diagonal());
     let metric = metric::Settings { error: settings.cache.allowed(), ..usual };
     let mut method = Cached {
-        tracer: PathTracer::<F>::new(scene, bvh, lights, path_settings(settings), settings.level),
+        tracer: stage.paths::<F>(settings.seed),
         gathering: Gathering { flux: &tables[1], metric, least_pixels: LEAST_PIXELS },
         tables: &tables,
         is_refined: needs.is_refined,

@@ -29,6 +29,7 @@ pub use photons::{MapUse, PhotonSettings, PhotonUse};
 use super::crew::Crew;
 use super::memory::Memory;
 use super::refinement::{Refinement, Shortfall};
+use super::run::path_settings;
 use super::survey::Survey;
 use super::workers::Workers;
 use super::{RenderError, Reuse, Settings};
@@ -36,7 +37,7 @@ use halflight_core::bsdf::Features;
 use halflight_core::bvh::Bvh;
 use halflight_core::light::Lights;
 use halflight_core::scene::Scene;
-use halflight_core::transport::{Discs, Merging};
+use halflight_core::transport::{Discs, Images, Merging, PathSettings, PathTracer};
 
 /// A way to make a picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -157,11 +158,19 @@ pub(super) struct Stage<'a> {
     pub(super) scene: &'a Scene<'a>,
     pub(super) bvh: &'a Bvh<'a>,
     pub(super) lights: &'a Lights<'a>,
+    pub(super) images: Images<'a>,
     pub(super) settings: &'a Settings,
     pub(super) workers: &'a Workers,
 }
 
-impl Stage<'_> {
+impl<'a> Stage<'a> {
+    /// Paths of the picture, or of one by another `seed`.
+    pub(super) fn paths<F: Features>(&self, seed: u32) -> PathTracer<'a, F> {
+        let Self { scene, bvh, lights, images, settings, .. } = *self;
+        let paths = PathSettings { seed, ..path_settings(settings) };
+        PathTracer::new(scene, bvh, lights, paths, settings.level).with_images(images)
+    }
+
     /// Discs that photons are gathered from, of one pixel.
     fn discs(&self) -> Discs {
         let Self { scene, bvh, settings, .. } = self;

@@ -3,7 +3,6 @@
 use super::{CausticUse, Renderer, Stage};
 use crate::drive::crew::Crew;
 use crate::drive::memory::Memory;
-use crate::drive::run::path_settings;
 use crate::drive::{RenderError, Reuse};
 use halflight_core::bsdf::Features;
 use halflight_core::memory::{Footprint, Line};
@@ -31,9 +30,9 @@ impl<'a, F: Features> Paths<'a, F> {
         memory: &mut Memory,
         scratch: Footprint,
     ) -> Result<Self, RenderError> {
-        let Stage { scene, bvh, lights, settings, workers } = *stage;
+        let Stage { settings, workers, .. } = *stage;
         let mut scratch = memory.take_each("paths", scratch, workers.count())?;
-        let tracer = PathTracer::<F>::new(scene, bvh, lights, path_settings(settings), settings.level);
+        let tracer = stage.paths::<F>(settings.seed);
         let (reuse, mean) = match settings.reuse {
             Some(used) => (Reuse { used, pilot: None }, None),
             None => {
@@ -48,8 +47,8 @@ impl<'a, F: Features> Paths<'a, F> {
 
     /// Paths that share nothing, for looks before a picture that another method makes.
     pub(super) fn alone(stage: &Stage<'a>, scratch: Vec<Vec<Line>>) -> Self {
-        let Stage { scene, bvh, lights, settings, .. } = *stage;
-        let tracer = PathTracer::<F>::new(scene, bvh, lights, path_settings(settings), settings.level);
+        let Stage { settings, .. } = *stage;
+        let tracer = stage.paths::<F>(settings.seed);
         Self { tracer, scratch, reuse: Reuse::default(), mean: None, caustics: CausticUse::default() }
     }
 

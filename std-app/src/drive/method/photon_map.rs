@@ -13,7 +13,6 @@ use crate::drive::RenderError;
 use crate::drive::audit::Audit;
 use crate::drive::crew::Crew;
 use crate::drive::memory::Memory;
-use crate::drive::run::path_settings;
 use halflight_core::bsdf::Features;
 use halflight_core::memory::Line;
 use halflight_core::transport::shoot::Keep;
@@ -32,11 +31,11 @@ pub(super) struct TwoPasses<'a, F> {
 
 impl<'a, F: Features> TwoPasses<'a, F> {
     pub(super) fn new(stage: &Stage<'a>, memory: &mut Memory) -> Result<Self, RenderError> {
-        let Stage { scene, bvh, lights, settings, workers } = *stage;
+        let Stage { settings, workers, .. } = *stage;
         let scratch = memory.take_each("paths", scratch::<F>(WAVE), workers.count())?;
         let others = Audit::bytes::<F>(stage, Method::PhotonMap.is_biased());
         let (laboratory, shelves) = Laboratory::new(stage, memory, Keep::All, others)?;
-        let tracer = PathTracer::<F>::new(scene, bvh, lights, path_settings(settings), settings.level);
+        let tracer = stage.paths::<F>(settings.seed);
         Ok(Self { tracer, laboratory, shelves, scratch })
     }
 }

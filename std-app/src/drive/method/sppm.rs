@@ -54,7 +54,7 @@ pub(super) struct ProgressivePhotons<'a, F> {
 
 impl<'a, F: Features> ProgressivePhotons<'a, F> {
     pub(super) fn new(stage: &Stage<'a>, memory: &mut Memory) -> Result<Self, RenderError> {
-        let Stage { scene, bvh, lights, settings, workers } = *stage;
+        let Stage { scene, bvh, lights, settings, workers, .. } = *stage;
         let scratch = PathTracer::<F>::scratch(WAVE).or(chaining::scratch::<F>());
         let mut scratch = memory.take_each("paths", scratch, workers.count())?;
         let mut emission = memory.take("emission", Emission::footprint(lights))?;
@@ -65,7 +65,7 @@ impl<'a, F: Features> ProgressivePhotons<'a, F> {
         let others = Audit::bytes::<F>(stage, Method::ProgressivePhotons.is_biased());
         let tasks = wanted.min(memory.available().saturating_sub(others) / of_task).max(1);
         let photons = Drawer::new(tasks * ROOM, memory)?;
-        let tracer = PathTracer::<F>::new(scene, bvh, lights, path_settings(settings), settings.level);
+        let tracer = stage.paths::<F>(settings.seed);
         let [wanted, given] = [wanted, tasks].map(|tasks| (tasks * PATHS) as u64);
         let global = Some(MapUse { wanted, given, ..MapUse::default() });
         let mut arena = Arena::new(bytemuck::cast_slice_mut(&mut emission));

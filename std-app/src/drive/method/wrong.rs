@@ -5,7 +5,6 @@ use super::{Renderer, Stage};
 use crate::drive::RenderError;
 use crate::drive::crew::Crew;
 use crate::drive::memory::Memory;
-use crate::drive::run::path_settings;
 use halflight_core::bsdf::Features;
 use halflight_core::film::{Dropped, PIXELS_PER_TILE, Pixel, Tile};
 use halflight_core::memory::Line;
@@ -21,9 +20,9 @@ pub(super) struct Wrong<'a, F> {
 
 impl<'a, F: Features> Wrong<'a, F> {
     pub(super) fn new(stage: &Stage<'a>, memory: &mut Memory) -> Result<Self, RenderError> {
-        let Stage { scene, bvh, lights, settings, workers } = *stage;
+        let Stage { settings, workers, .. } = *stage;
         let scratch = memory.take_each("paths", PathTracer::<F>::scratch(WAVE), workers.count())?;
-        let tracer = PathTracer::<F>::new(scene, bvh, lights, path_settings(settings), settings.level);
+        let tracer = stage.paths::<F>(settings.seed);
         Ok(Self { tracer, scratch, size: [settings.width, settings.height] })
     }
 }
