@@ -46,13 +46,12 @@ const STRAIGHT: u16 = 3;
 /// What lies this much farther than where all corners of a beam end is hidden.
 const BEHIND: f32 = 1.1;
 
-/// A beam of two corners is as wide across as this many times along, and cut so many times at most.
-const GUESS: f32 = 2.0;
-const GUESSES: u16 = 2;
-
-/// Parts of a tile that are cut as often though one corner alone knows the way, at the outline of a ball; if paths take it so often.
-const MOST_GUESSES: u32 = 256;
+/// Where paths take a way this often, parts are cut so many times though fewer than three corners know it. A beam of two is taken to be
+/// as wide across as this many times along; one corner, at the outline of a ball, says nothing, and few parts of a tile are cut for it.
 const OFTEN: f32 = 0.01;
+const GUESSES: u16 = 2;
+const GUESS: f32 = 2.0;
+const MOST_GUESSES: u32 = 256;
 
 /// Surfaces that a ray may start on at once.
 const PASSED: u32 = 16;
@@ -144,11 +143,10 @@ struct Beam {
 }
 
 impl Beam {
-    /// Of the corners that there are of a part that was cut `level` times: three at least, or two at first.
-    fn of(corners: &[Option<Lead>; 4], level: u16) -> Option<Self> {
+    /// Of the corners that there are of a part that was cut `level` times: three at least, or two for a guess.
+    fn of(corners: &[Option<Lead>; 4], level: u16, may_guess: bool) -> Option<Self> {
         let known = || corners.iter().flatten();
-        let is_guess = known().count() == 2;
-        if known().count() < 2 || is_guess && level >= GUESSES {
+        if known().count() < if may_guess { 2 } else { 3 } {
             return None;
         }
         let parts = |of: &dyn Fn(&Lead) -> Vec3| -> ([Vec3; 3], f32) {
@@ -417,11 +415,13 @@ impl<'a, F: Features> PathTracer<'a, F> {
         if corners.iter().flatten().any(|lead| lead.sees) {
             return true;
         }
-        let Some(beam) = Beam::of(corners, level) else {
-            let is_often = corners.iter().flatten().any(|lead| lead.probability >= OFTEN);
-            let guesses_so = is_often && level < GUESSES && *guesses > 0;
-            *guesses -= u32::from(guesses_so);
-            return guesses_so;
+        // What paths take so seldom is not worth a guess.
+        let is_often = corners.iter().flatten().any(|lead| lead.probability >= OFTEN);
+        let may_guess = is_often && level < GUESSES;
+        let Some(beam) = Beam::of(corners, level, may_guess) else {
+            let is_guess = may_guess && *guesses > 0 && corners.iter().flatten().count() == 1;
+            *guesses -= u32::from(is_guess);
+            return is_guess;
         };
         let middle = [beam.origin[0], beam.direction[0]];
         self.lights.may_be_met(middle, |center, radius| beam.meets(center, radius))
