@@ -22,7 +22,15 @@ const BENT: f32 = 0.95;
 /// Corners along the side of a tile.
 const CORNERS: usize = TILE as usize + 1;
 
-impl<F: Features> PathTracer<'_, F> {
+impl<'a, F: Features> PathTracer<'a, F> {
+    /// The same, where the pixels of `edges`, tile by tile, have several paths for each sample. Not where pixels share
+    /// their paths.
+    pub fn with_edges(&self, edges: &'a [PixelSet]) -> Self {
+        let mut other = *self;
+        other.edges = edges;
+        other
+    }
+
     /// The pixels of tile `task` that see an edge. None through a lens, which blurs them.
     pub fn edges(&self, task: usize, counters: &mut Counters) -> PixelSet {
         let (width, height) = (self.settings.width, self.settings.height);

@@ -29,7 +29,8 @@ impl Way {
     /// The way on from one more surface.
     #[inline]
     pub(super) fn on(self, transmitted: bool) -> Way {
-        if self.0 >> 31 != 0 { Self::LOST } else { Way(self.0 << 1 | u32::from(transmitted)) }
+        let is_lost = self == Self::LOST || self.0 >> 31 != 0;
+        if is_lost { Self::LOST } else { Way(self.0 << 1 | u32::from(transmitted)) }
     }
 
     /// How many surfaces there are on it.
@@ -153,7 +154,14 @@ pub(super) fn number([x, y]: [u32; 2]) -> u16 {
     (y * TILE + x) as u16
 }
 
-impl<F: Features> PathTracer<'_, F> {
+impl<'a, F: Features> PathTracer<'a, F> {
+    /// The same, where `images` of lamps have rays of their own.
+    pub fn with_images(&self, images: Images<'a>) -> Self {
+        let mut other = *self;
+        other.images = images;
+        other
+    }
+
     /// Whether an image has what `path` sees of the lamp that it has met.
     #[inline]
     pub(super) fn leaves_to_image(&self, path: &Path) -> bool {
@@ -204,7 +212,9 @@ mod tests {
         let went: vec::Vec<bool> = (0..4).map(|n| way.goes_through(n)).collect();
         assert_eq!(went, [true, false, false, true]);
         let long = (0..31).fold(Way::EYE, |way, _| way.on(true));
-        assert_eq!((long.surfaces(), long.on(false), Way::LOST.on(true)), (31, Way::LOST, Way::LOST));
+        assert_eq!((long.surfaces(), long.on(false)), (31, Way::LOST));
+        // Glass behind something rough begins no way.
+        assert_eq!([true, false].map(|through| Way::LOST.on(through)), [Way::LOST; 2]);
     }
 
     #[test]

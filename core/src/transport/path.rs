@@ -155,12 +155,6 @@ impl<'a, F: Features> PathTracer<'a, F> {
         Self { asked: count.clamp(1, most) as u32, ..*self }
     }
 
-    /// The same, where the pixels of `edges`, tile by tile, have several paths for each sample. Not where pixels share
-    /// their paths.
-    pub fn with_edges(&self, edges: &'a [PixelSet]) -> Self {
-        Self { edges, ..*self }
-    }
-
     /// The same, where surfaces with a diffuse part have from photons what light is reflected onto them. Pixels must
     /// not share their paths as well. Where depth is limited only the first point of a path is served, for photons do
     /// not know how far they are from their light.
@@ -183,11 +177,6 @@ impl<'a, F: Features> PathTracer<'a, F> {
     /// The same, where pixels share what their paths find, or do not.
     pub fn with_reuse(&self, reuse: bool) -> Self {
         Self { settings: PathSettings { reuse, ..self.settings }, ..*self }
-    }
-
-    /// The same, where `images` of lamps have rays of their own.
-    pub fn with_images(&self, images: Images<'a>) -> Self {
-        Self { images, ..*self }
     }
 
     /// Whether paths have a limit of depth.
