@@ -137,7 +137,7 @@ fn the_audit_asks_the_same_photons() {
     println!("{:?} {:?} {:?}", fine.error, audit.bias, audit.whole);
     assert!(audit.has_photons && !audit.is_biased() && audit.bias.detectable < 0.02);
     // Records that reach too far are biased, by less than a twentieth of the work would tell from noise.
-    let coarse = audited(Some(0.5), Some(100.0));
+    let coarse = audited(Some(0.5), Some(30.0));
     println!("{:?} {:?}", coarse.error, coarse.audit.as_ref().map(|audit| (audit.bias, audit.whole)));
     assert!(coarse.audit.unwrap().is_biased());
 }

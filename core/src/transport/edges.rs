@@ -20,7 +20,7 @@ pub(super) const PER_EDGE: u32 = 4;
 const BENT: f32 = 0.95;
 
 /// Corners along the side of a tile.
-const CORNERS: usize = TILE as usize + 1;
+pub(super) const CORNERS: usize = TILE as usize + 1;
 
 impl<'a, F: Features> PathTracer<'a, F> {
     /// The same, where the pixels of `edges`, tile by tile, have several paths for each sample. Not where pixels share

@@ -5,6 +5,7 @@
 //! until corners see the lamp, or quarters are as small as they get: an image of a thousandth of a pixel costs as few
 //! rays as a large one. A beam is only about straight, and what is overlooked stays with the paths.
 
+use super::edges::CORNERS;
 use super::estimator::Counters;
 use super::images::{Image, Way, number};
 use super::path::PathTracer;
@@ -55,9 +56,6 @@ const MOST_GUESSES: u32 = 256;
 
 /// Surfaces that a ray may start on at once.
 const PASSED: u32 = 16;
-
-/// Corners along a tile.
-const CORNERS: usize = TILE as usize + 1;
 
 /// Where a way leads to from a point of the picture: its last ray, and what that meets.
 #[derive(Clone, Copy)]
@@ -378,6 +376,7 @@ impl<'a, F: Features> PathTracer<'a, F> {
         if !self.may_see(&corners, 0, &mut found.guesses) {
             return;
         }
+        let before = found.count;
         // Parts that are full of the image are done; others are cut.
         let (mut parts, mut count, mut level) = ([None; MOST_PARTS], 1, 0);
         parts[0] = Some(whole);
@@ -393,7 +392,7 @@ impl<'a, F: Features> PathTracer<'a, F> {
                     }
                 }
             }
-            if kept + found.of(pixel, way) > MOST_PARTS {
+            if kept + found.count - before > MOST_PARTS {
                 break;
             }
             level += 1;
@@ -479,12 +478,5 @@ impl Found<'_> {
             *slot = Image { way, column: part.column, row: part.row, level, pixel };
             self.count += 1;
         }
-    }
-
-    /// How many a pixel has by a way. They came last.
-    fn of(&self, [x, y]: [u32; 2], way: Way) -> usize {
-        let pixel = number([x % TILE, y % TILE]);
-        let last = self.out.get(..self.count).unwrap_or_default().iter().rev();
-        last.take_while(|image| image.pixel == pixel && image.way == way).count()
     }
 }

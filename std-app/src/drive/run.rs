@@ -72,7 +72,6 @@ impl WithFeatures for Render<'_> {
         let (lights, windows) =
             windows::learn(&paths, &lights, settings.windows, &workers, &mut memory, &mut window_lines)?;
         let mut image_lines = Vec::new();
-        let paths = PathTracer::<F>::new(scene, &bvh, &lights, path_settings(settings), settings.level);
         let images = images::find(&paths, settings, &workers, &mut memory, &mut image_lines)?;
         let stage = Stage { scene, bvh: &bvh, lights: &lights, images, settings, workers: &workers };
         method.with::<F, _>(&stage, &mut memory, |renderer, memory| {
