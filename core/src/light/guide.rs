@@ -3,6 +3,8 @@
 //! Grittmann et al. 2018). For what is smaller than a cell each light has balls around it as well, at which it aims from
 //! wherever on it a photon starts (`target.rs`): cells and balls overlap, and their densities sum up. What leads nowhere
 //! is still chosen now and then: nothing that shines has no photons.
+//!
+//! Where photons of all light are wanted there is nothing to aim at: cells are fewer, and what they are worth is learned alone.
 
 use super::emission::Emission;
 use super::lights::Lights;
@@ -20,6 +22,14 @@ const MOST_CELLS: usize = 1 << 16;
 /// Shares of emission: aimed nowhere; where mirrors and glass are; the rest where photons were seen to be useful.
 const DEFENSIVE: f32 = 0.1;
 const AIMED: f32 = 0.2;
+
+/// The same where photons of all light are wanted: by power, so that none has more than four times that of the others; evenly from
+/// lights by what they are worth.
+const DEFENSIVE_OF_ALL: f32 = 0.25;
+const EVENLY_OF_ALL: f32 = 0.25;
+
+/// Cells of all squares together there, where lights are few, so that each is learned from many photons.
+const CELLS_OF_ALL: usize = 1 << 10;
 
 /// What a cell gets of what each of its neighbours was worth.
 const BESIDE: f32 = 0.125;
@@ -104,15 +114,63 @@ impl<'m> Guide<'m> {
 
 /// What the cells of all lights are worth, while that is being learned.
 pub struct Worth<'m> {
-    /// Squares: 1 where mirrors and glass are. Balls: how often each is aimed at, 1 in all.
+    /// Squares: 1 where mirrors and glass are, or by what all of a light is worth, times its power. Balls: how often each is
+    /// aimed at, 1 in all.
     aimed: &'m mut [f32],
     /// What photons were worth.
     learned: &'m mut [f32],
     targets: &'m [Target],
     side: usize,
+    /// Shares of emission: aimed nowhere, and at `aimed`.
+    shares: [f32; 2],
 }
 
 impl<'m> Worth<'m> {
+    /// Cells that [`Worth::of_all`] has.
+    pub fn cells_of_all(lights: &Lights) -> usize {
+        let side = side(lights.count(), CELLS_OF_ALL);
+        lights.count() * side * side
+    }
+
+    /// Bytes that [`Worth::of_all`] takes together with [`Worth::guide`].
+    pub fn footprint_of_all(lights: &Lights) -> Footprint {
+        let cells = Self::cells_of_all(lights);
+        let worth = Footprint::default().slice::<f32>(cells).slice::<f32>(cells);
+        worth.and(AliasTable::footprint(cells))
+    }
+
+    /// For photons of all light, of which those of each of [`Worth::cells_of_all`] were worth so much, as they have `learned`.
+    /// A part of them comes evenly from each light by what it is worth altogether: few have looked.
+    ///
+    /// # Errors
+    /// [`OutOfMemory`] where the arena has less than [`Worth::footprint_of_all`].
+    pub fn of_all(
+        lights: &Lights,
+        emission: &Emission,
+        learned: &[f32],
+        arena: &mut Arena<'m>,
+    ) -> Result<Self, OutOfMemory> {
+        let side = side(lights.count(), CELLS_OF_ALL);
+        let cells = Self::cells_of_all(lights).min(learned.len());
+        let (evenly, own) = (arena.slice::<f32>(cells)?, arena.slice::<f32>(cells)?);
+        for (cell, worth) in own.iter_mut().zip(learned) {
+            *cell = *worth;
+        }
+        let of_light = (side * side).max(1);
+        for (light, (evenly, own)) in evenly.chunks_mut(of_light).zip(own.chunks(of_light)).enumerate() {
+            // By its power once more, as what is aimed at is.
+            let worth = own.iter().sum::<f32>() / emission.table.pdf(light);
+            evenly.fill(if worth.is_finite() { worth } else { 0.0 });
+        }
+        Ok(Self {
+            aimed: evenly,
+            learned: own,
+            targets: &[],
+            side,
+            shares: [DEFENSIVE_OF_ALL, EVENLY_OF_ALL],
+        })
+    }
+
     /// Bytes that [`Worth::aimed`] takes.
     pub fn footprint(lights: &Lights) -> Footprint {
         let cells = cells(lights);
@@ -130,7 +188,7 @@ impl<'m> Worth<'m> {
         emission: &Emission,
         arena: &mut Arena<'m>,
     ) -> Result<Option<Self>, OutOfMemory> {
-        let side = side(lights.count());
+        let side = side(lights.count(), MOST_CELLS);
         let (mut aimed, mut learned) =
             (arena.slice::<f32>(cells(lights))?, arena.slice::<f32>(cells(lights))?);
         let balls = arena.slice::<Target>(targets(lights.count()))?;
@@ -186,7 +244,7 @@ impl<'m> Worth<'m> {
                 *cell = (0.5 * f64::from(*cell) / power + 0.5 / lit) as f32;
             }
         }
-        Ok((any || lit > 0.0).then_some(Self { aimed, learned, targets, side }))
+        Ok((any || lit > 0.0).then_some(Self { aimed, learned, targets, side, shares: [DEFENSIVE, AIMED] }))
     }
 
     /// A photon from `cell` was worth so much.
@@ -224,10 +282,11 @@ impl<'m> Worth<'m> {
         };
         let learned = |i: usize| self.spread(i);
         let (per_aimed, per_learned) = (sum(&aimed), sum(&learned));
-        let seen = if per_learned > 0.0 { 1.0 - DEFENSIVE - AIMED } else { 0.0 };
-        let at = (1.0 - DEFENSIVE - seen) / if targets.is_empty() { 1.0 } else { 2.0 };
+        let [nowhere, aimed_at] = self.shares;
+        let seen = if per_learned > 0.0 { 1.0 - nowhere - aimed_at } else { 0.0 };
+        let at = (1.0 - nowhere - seen) / if targets.is_empty() { 1.0 } else { 2.0 };
         let weight = |i| {
-            DEFENSIVE * power(i) + at * (per_aimed * aimed(i) + at_ball(i)) + seen * per_learned * learned(i)
+            nowhere * power(i) + at * (per_aimed * aimed(i) + at_ball(i)) + seen * per_learned * learned(i)
         };
         let table = AliasTable::build(self.aimed.len(), weight, arena)?;
         Ok(Emission { guide: Some(Guide { table, side, targets }), ..*emission })
@@ -259,10 +318,10 @@ impl<'m> Worth<'m> {
     }
 }
 
-/// Cells along a side, for so many lights.
-fn side(lights: usize) -> usize {
+/// Cells along a side, for so many lights, of `most` cells in all.
+fn side(lights: usize, most: usize) -> usize {
     let mut side = MOST_SIDE;
-    while side > 1 && lights.saturating_mul(side * side) > MOST_CELLS {
+    while side > 1 && lights.saturating_mul(side * side) > most {
         side /= 2;
     }
     side
@@ -274,7 +333,7 @@ fn targets(lights: usize) -> usize {
 }
 
 fn cells(lights: &Lights) -> usize {
-    let side = side(lights.count());
+    let side = side(lights.count(), MOST_CELLS);
     lights.count() * (side * side + targets(lights.count()))
 }
 

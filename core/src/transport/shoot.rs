@@ -17,7 +17,7 @@ use super::flight::{Flight, Onward, Pile, State, Vertex, Visitor};
 use super::sight::Sight;
 use crate::bsdf::{Bsdf, BsdfSample, Features};
 use crate::bvh::Bvh;
-use crate::light::{Emission, Lights};
+use crate::light::{Emission, Lights, luminance};
 use crate::memory::{Arena, Footprint, OutOfMemory};
 use crate::photon::Photon;
 use crate::scene::{Material, Scene, Surface};
@@ -76,6 +76,26 @@ pub enum Keep {
     All,
     /// Those that came from a light by mirrors and glass alone, at least one of them. Their paths end there.
     Caustic,
+}
+
+impl Keep {
+    /// Whether a path leaves a photon where it met a surface.
+    #[inline]
+    fn leaves(self, state: &State, vertex: &Vertex) -> bool {
+        holds_photons(vertex.bsdf)
+            && match self {
+                Keep::All => true,
+                Keep::Scattered => state.segments > 1 && state.mirrored == 0,
+                Keep::Reflected | Keep::Caustic => state.segments > 1,
+            }
+    }
+
+    /// How it goes on from there.
+    #[inline]
+    fn onward(self, vertex: &Vertex, leaves: bool) -> Option<Onward> {
+        let ends = self == Keep::Caustic && (holds_photons(vertex.bsdf) || !focuses(vertex.bsdf));
+        (!ends).then_some(Onward { most: if leaves { MOST } else { 1.0 }, mirrored: false })
+    }
 }
 
 /// What is shot.
@@ -149,21 +169,18 @@ impl<'a, F: Features> Shooter<'a, F> {
         Ok(counters)
     }
 
-    /// Which of the paths of task `task` of map number `map` leave a photon of reflected light in `sight`: it is written to
-    /// `seen`, a flag for each.
+    /// Which photons of task `task` of map number `map` are left in `sight`: `seen` is told of each.
     ///
     /// # Errors
     /// Those of [`Shooter::run`].
     pub fn look(
         &self,
-        task: usize,
-        map: u32,
+        (task, map): (usize, u32),
         sight: Sight,
         scratch: &mut Arena,
-        seen: &mut [bool],
+        seen: &mut dyn FnMut(Seen),
     ) -> Result<Counters, OutOfMemory> {
-        seen.fill(false);
-        self.flight.follow(task, map, scratch, &mut Looker { sight, first: (task * PATHS) as u32, seen })
+        self.flight.follow(task, map, scratch, &mut Looker { keep: self.keep, sight, seen })
     }
 
     /// The same as [`Shooter::run`] beside chains, with which seen photons `share` their light. `seen` is told of each of those, by the number
@@ -186,12 +203,22 @@ impl<'a, F: Features> Shooter<'a, F> {
     }
 }
 
-/// Sees which paths leave photons that are seen.
+/// A photon that is seen.
+#[derive(Clone, Copy, Debug)]
+pub struct Seen {
+    /// The number of its path among those of its task.
+    pub path: usize,
+    /// From which cell of a guide it came.
+    pub cell: u32,
+    /// W: the luminance of its power.
+    pub power: f32,
+}
+
+/// Tells of photons that are seen.
 struct Looker<'s> {
+    keep: Keep,
     sight: Sight<'s>,
-    /// Number of the first path.
-    first: u32,
-    seen: &'s mut [bool],
+    seen: &'s mut dyn FnMut(Seen),
 }
 
 impl Visitor for Looker<'_> {
@@ -199,14 +226,17 @@ impl Visitor for Looker<'_> {
 
     #[inline]
     fn meet(&mut self, state: &State, vertex: &Vertex, _: &mut Counters) -> Option<Onward> {
-        let leaves = leaves_reflected(state, vertex);
-        if leaves
-            && self.sight.shows(vertex.point.position, vertex.point.geometric_normal)
-            && let Some(seen) = self.seen.get_mut((state.number - self.first) as usize)
-        {
-            *seen = true;
+        let leaves = self.keep.leaves(state, vertex);
+        if leaves && self.sight.shows(vertex.point.position, vertex.point.geometric_normal) {
+            let power = luminance(Rgb::from(state.power));
+            (self.seen)(Seen { path: state.number as usize % PATHS, cell: state.cell, power });
         }
-        Some(Onward { most: if leaves { MOST } else { 1.0 }, mirrored: false })
+        self.keep.onward(vertex, leaves)
+    }
+
+    #[inline]
+    fn leave(&self, state: &mut State, vertex: &Vertex, _from: Vec3, _sample: &BsdfSample) {
+        state.mirrored = vertex.bsdf.is_delta().into();
     }
 }
 
@@ -229,13 +259,7 @@ impl Visitor for Leaver<'_> {
 
     #[inline]
     fn meet(&mut self, state: &State, vertex: &Vertex, counters: &mut Counters) -> Option<Onward> {
-        let holds = holds_photons(vertex.bsdf);
-        let leaves = holds
-            && match self.keep {
-                Keep::All => true,
-                Keep::Scattered => state.segments > 1 && state.mirrored == 0,
-                Keep::Reflected | Keep::Caustic => state.segments > 1,
-            };
+        let leaves = self.keep.leaves(state, vertex);
         if leaves {
             let mut power = Rgb::from(state.power);
             if let Some((share, seen)) = &mut self.beside
@@ -248,8 +272,7 @@ impl Visitor for Leaver<'_> {
                 self.pile.leave(vertex.photon(power), counters);
             }
         }
-        let ends = self.keep == Keep::Caustic && (holds || !focuses(vertex.bsdf));
-        (!ends).then_some(Onward { most: if leaves { MOST } else { 1.0 }, mirrored: false })
+        self.keep.onward(vertex, leaves)
     }
 
     #[inline]

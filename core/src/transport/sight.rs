@@ -12,6 +12,7 @@ use crate::photon::{Disc, Falloff, Photon, PhotonMap, Photons, Uniform};
 use crate::sampling::Sampler;
 use crate::scene::{Scene, SurfacePoint};
 use crate::{Level, Rgb};
+use core::mem;
 use glam::Vec3;
 
 /// Camera rays, at most.
@@ -29,6 +30,8 @@ pub struct Raster {
     frame: [u32; 2],
     /// Pixels from ray to ray.
     step: u32,
+    /// Whether places are those that rays go to from what is seen, as they gather light for it.
+    gathers: bool,
 }
 
 impl Raster {
@@ -42,7 +45,12 @@ impl Raster {
         while across(step)[0] * across(step)[1] > u64::from(MOST_RAYS) {
             step += 1;
         }
-        Self { frame, step }
+        Self { frame, step, gathers: false }
+    }
+
+    /// The same one bounce further: from each place one ray goes on, to what lights it.
+    pub fn gathering(self) -> Self {
+        Self { gathers: true, ..self }
     }
 
     /// How many rays there are.
@@ -83,12 +91,13 @@ impl Raster {
         let at = |i: u32, u: f32, pixels: u32| ((i as f32 + u) * self.step as f32).min(pixels as f32);
         let (x, y) = (at(number % across, u, width), at(number / across, v, height));
         let mut ray = scene.camera.ray(width, height, x, y, [0.5; 2]);
+        let mut gathers = self.gathers;
         for segments in 1..=MOST_MIRRORS + 1 {
             let hit = bvh.nearest(level, &ray);
             let point = SurfacePoint::at::<F>(scene, &ray, &hit).filter(|_| hit.is_some())?;
             let direction = Vec3::from(ray.direction).normalize_or_zero();
             let bsdf = Bsdf::at::<F>(scene, point.material, point.uv, point.front);
-            if holds_photons(&bsdf) {
+            if holds_photons(&bsdf) && !mem::take(&mut gathers) {
                 return Some(Photon::new(point.position, -direction, point.geometric_normal, Rgb::ZERO));
             }
             let [u, v] = dimension::scattering(&sampler, segments);
@@ -104,20 +113,36 @@ impl Raster {
 #[derive(Clone, Copy)]
 pub struct Sight<'a> {
     map: &'a PhotonMap<'a>,
-    discs: Discs,
+    reach: Reach,
     level: Level,
+}
+
+/// How far a place stands for others.
+#[derive(Clone, Copy)]
+enum Reach {
+    Discs(Discs),
+    Everywhere(f32),
 }
 
 impl<'a> Sight<'a> {
     /// Of the places in `map`, which `raster` found. Light is gathered from discs of so many pixels, at most; `discs` are
     /// those of one.
     pub fn new(map: &'a PhotonMap<'a>, raster: &Raster, discs: Discs, pixels: f32, level: Level) -> Self {
-        Self { map, discs: discs.of_pixels(pixels.max(REACH * raster.step as f32)), level }
+        Self { map, reach: Reach::Discs(discs.of_pixels(pixels.max(REACH * raster.step as f32))), level }
+    }
+
+    /// Of the places in `map`, each of which stands for what is no further from it than `radius`.
+    pub fn within(map: &'a PhotonMap<'a>, radius: f32, level: Level) -> Self {
+        Self { map, reach: Reach::Everywhere(radius), level }
     }
 
     /// Whether a photon at `place`, on a surface of `normal`, is seen.
     pub(super) fn shows(&self, place: Vec3, normal: Vec3) -> bool {
-        let disc = Disc { place, normal, radius: self.discs.radius(place), falloff: Falloff::Constant };
+        let radius = match self.reach {
+            Reach::Discs(discs) => discs.radius(place),
+            Reach::Everywhere(radius) => radius,
+        };
+        let disc = Disc { place, normal, radius, falloff: Falloff::Constant };
         self.map.gather(self.level, &disc, &Uniform(Rgb::ONE)).photons > 0
     }
 }

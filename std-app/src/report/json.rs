@@ -87,6 +87,7 @@ fn most(run: &Run) -> Value {
                 "caustic": photons.caustic.map(map),
                 "irradiances": photons.irradiances,
                 "seen": photons.seen,
+                "seen_by_power": photons.by_power,
                 "chained": photons.chained,
                 "seconds": photons.seconds,
             })

@@ -83,7 +83,9 @@ impl Run<'_> {
                 "there was no memory for them: light of the sky may be noisier",
             ));
         }
-        if let Some(PhotonUse { seen: Some(seen), chained: false, .. }) = self.result.photons {
+        if let (Method::ProgressivePhotons, Some(PhotonUse { seen: Some(seen), chained: false, .. })) =
+            (self.result.method, self.result.photons)
+        {
             let some = "enough light paths leave photons that are seen";
             let none = "next to no light path leaves a photon that is seen: there is nothing to begin at";
             left_out.push(("chains of light paths", if seen >= MOST_SEEN { some } else { none }));

@@ -101,7 +101,7 @@ impl Chaining {
         let sight = Sight::new(&map, &raster, stage.discs(), pixels, settings.level);
         let shooter = shooter::<F>(stage, emission, LOOK);
         let look = |task: usize, arena: &mut Arena, out: &mut [bool]| {
-            shooter.look(task, LOOK_MAP, sight, arena, out)
+            shooter.look((task, LOOK_MAP), sight, arena, &mut |photon| out[photon.path] = true)
         };
         let mut seen = vec![false; LOOK];
         workers.pass(&mut seen, PATHS, scratch, &|| false, &look)?;
@@ -152,7 +152,7 @@ impl Chaining {
             }
             let mut all = vec![false; independent * PATHS];
             let look = |task: usize, arena: &mut Arena, out: &mut [bool]| {
-                shooter.look(task, before, share.sight, arena, out)
+                shooter.look((task, before), share.sight, arena, &mut |photon| out[photon.path] = true)
             };
             if !crew.pass(&mut all, PATHS, scratch, &look)? {
                 return Ok(false);

@@ -252,7 +252,7 @@ fn set_up<F: Features, T>(
 ) -> Result<T, RenderError> {
     let Stage { scene, bvh, settings, workers, .. } = *stage;
     let needs = Needs::of::<F>(stage, memory, cast.is_some());
-    let scratch = memory.take_each("paths", needs.scratch, workers.count())?;
+    let mut scratch = memory.take_each("paths", needs.scratch, workers.count())?;
     memory.set_aside("edges", needs.edges)?;
     let mut tables = Vec::new();
     for &n in &needs.sizes {
@@ -274,7 +274,8 @@ fn set_up<F: Features, T>(
     let laboratory = if needs.by_photons {
         // Half of the memory for photons at most: records need some as well.
         let half = memory.available().saturating_sub(others) / 2;
-        Some(Laboratory::new(stage, memory, Keep::Scattered, others.saturating_add(half))?)
+        let others = others.saturating_add(half);
+        Some(Laboratory::new::<F>(stage, &mut scratch, memory, Keep::Scattered, others)?)
     } else {
         None
     };

@@ -4,6 +4,7 @@
 //! [`Crew`] runs in parallel ("The unit of work" in docs/architecture.md). To add a method: a variant of [`Method`]
 //! with its words, a file with its [`Renderer`], a line in [`Method::with`].
 
+mod aiming;
 mod caster;
 mod caustic_look;
 mod caustics;

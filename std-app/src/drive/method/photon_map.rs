@@ -32,9 +32,9 @@ pub(super) struct TwoPasses<'a, F> {
 impl<'a, F: Features> TwoPasses<'a, F> {
     pub(super) fn new(stage: &Stage<'a>, memory: &mut Memory) -> Result<Self, RenderError> {
         let Stage { settings, workers, .. } = *stage;
-        let scratch = memory.take_each("paths", scratch::<F>(WAVE), workers.count())?;
+        let mut scratch = memory.take_each("paths", scratch::<F>(WAVE), workers.count())?;
         let others = Audit::bytes::<F>(stage, Method::PhotonMap.is_biased());
-        let (laboratory, shelves) = Laboratory::new(stage, memory, Keep::All, others)?;
+        let (laboratory, shelves) = Laboratory::new::<F>(stage, &mut scratch, memory, Keep::All, others)?;
         let tracer = stage.paths::<F>(settings.seed);
         Ok(Self { tracer, laboratory, shelves, scratch })
     }

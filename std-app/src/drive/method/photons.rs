@@ -2,13 +2,14 @@
 //! became of them.
 
 use super::Stage;
+use super::aiming::{Aiming, Wanted};
 use super::photon_view::{self, PhotonView};
 use super::sppm::progressive;
-use crate::drive::RenderError;
 use crate::drive::crew::{Crew, Task};
 use crate::drive::memory::Memory;
 use crate::drive::run::path_settings;
 use crate::drive::workers::Workers;
+use crate::drive::{RenderError, Settings};
 use halflight_core::bsdf::Features;
 use halflight_core::light::{Emission, Lights};
 use halflight_core::memory::{Arena, Footprint, Line};
@@ -55,8 +56,11 @@ pub struct PhotonUse {
     pub caustic: Option<MapUse>,
     /// Irradiances worked out beforehand.
     pub irradiances: u64,
-    /// What share of light paths left photons that are seen, by a first look; `None` where nobody looked.
+    /// What share of light paths leaves photons that count, where they are seen or gathered for what is, by a first look;
+    /// `None` where nobody looked.
     pub seen: Option<f64>,
+    /// The same by the power of lights, where they are chosen by what they bring instead.
+    pub by_power: Option<f64>,
     /// Whether half of them are chains that stay where photons are seen.
     pub chained: bool,
     /// Seconds of shooting and building.
@@ -84,7 +88,7 @@ pub(super) struct Laboratory<'a> {
     stage: Stage<'a>,
     discs: Discs,
     keep: Keep,
-    emission: Vec<Line>,
+    aiming: Aiming,
     global: usize,
     caustic: usize,
     pub(super) used: PhotonUse,
@@ -172,14 +176,18 @@ fn bytes(global: usize, caustic: usize) -> usize {
 impl<'a> Laboratory<'a> {
     /// For maps of the scene, of the photons to `keep`; where those are all, with one of caustics if there may be any; and
     /// the memory for both halves, of which so many `others` bytes are left free.
-    pub(super) fn new(
+    pub(super) fn new<F: Features>(
         stage: &Stage<'a>,
+        scratch: &mut [Vec<Line>],
         memory: &mut Memory,
         keep: Keep,
         others: usize,
     ) -> Result<(Self, [Shelf; 2]), RenderError> {
-        let Stage { scene, lights, settings, .. } = *stage;
-        let emission = memory.take("emission", Emission::footprint(lights))?;
+        let Stage { scene, bvh, settings, .. } = *stage;
+        let wanted = Wanted::Gathered(FARTHEST * bvh.bounds().diagonal());
+        let least = others.saturating_add(2 * bytes(1, 1));
+        let of = (keep, shortened(settings));
+        let aiming = Aiming::look_first::<F>(stage, of, wanted, scratch, memory, least)?;
         let pixels = settings.width as usize * settings.height as usize;
         let fewest = if keep == Keep::All { FEWEST } else { FEWEST_FOR_RECORDS };
         let usual = (pixels / PIXELS_PER_PATH).div_ceil(PATHS).clamp(fewest, MOST);
@@ -209,9 +217,11 @@ impl<'a> Laboratory<'a> {
         let used = PhotonUse {
             global: Some(used(wanted[0], global)),
             caustic: has_caustics.then(|| used(wanted[1], caustic)),
+            seen: aiming.seen,
+            by_power: aiming.by_power,
             ..PhotonUse::default()
         };
-        Ok((Self { stage: *stage, discs: stage.discs(), keep, emission, global, caustic, used }, shelves))
+        Ok((Self { stage: *stage, discs: stage.discs(), keep, aiming, global, caustic, used }, shelves))
     }
 
     /// Bytes of the smallest maps of what was reflected, of both halves.
@@ -256,11 +266,9 @@ impl<'a> Laboratory<'a> {
         let Stage { scene, bvh, lights, settings, .. } = self.stage;
         let start = Instant::now();
         let farthest = self.farthest();
-        let mut arena = Arena::new(bytemuck::cast_slice_mut(&mut self.emission));
-        let emission = Emission::build(scene, lights, &bvh.bounds(), &mut arena)?;
+        let emission = self.aiming.emission(&self.stage)?;
         let paths = path_settings(settings);
-        // One segment more is to come after the global map: that of the gather ray.
-        let short = if paths.is_limited() { paths.max_depth - 1 } else { paths.max_depth };
+        let short = shortened(settings);
         let shooter = |tasks: usize, keep: Keep, seed: u32, max_depth: u32| {
             let shot = ShootSettings { keep, seed, paths: (tasks * PATHS) as u32, max_depth };
             Shooter::<F>::new(scene, bvh, lights, &emission, shot, settings.level)
@@ -324,6 +332,12 @@ impl<'a> Laboratory<'a> {
         let falloff = self.stage.settings.photons.falloff;
         GatherLight::new(&built.global, &built.irradiances, self.farthest(), falloff)
     }
+}
+
+/// Segments of the paths of a global map: one more is to come, that of the gather ray.
+fn shortened(settings: &Settings) -> u32 {
+    let paths = path_settings(settings);
+    if paths.is_limited() { paths.max_depth - 1 } else { paths.max_depth }
 }
 
 /// Working memory of a thread that traces paths as well.

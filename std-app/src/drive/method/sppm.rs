@@ -7,6 +7,7 @@
 //! No pixel keeps anything but its sum, and memory is the same for any number of samples. Even and odd samples count
 //! their radii apart, so that the halves of the film are two such pictures of their own.
 
+use super::aiming::{Aiming, Wanted};
 use super::chaining::{self, Chaining};
 use super::photon_view::{self, PhotonView};
 use super::photons::{Drawer, MapUse, PhotonUse};
@@ -17,7 +18,6 @@ use crate::drive::crew::Crew;
 use crate::drive::memory::Memory;
 use crate::drive::run::path_settings;
 use halflight_core::bsdf::Features;
-use halflight_core::light::Emission;
 use halflight_core::memory::{Arena, Line};
 use halflight_core::photon::{PhotonMap, Photons};
 use halflight_core::transport::shoot::{Keep, PATHS, ROOM, ShootSettings, Shooter};
@@ -48,31 +48,35 @@ pub(super) struct ProgressivePhotons<'a, F> {
     chaining: Option<Chaining>,
     /// The sample that they are of.
     sample: Option<u32>,
-    emission: Vec<Line>,
+    aiming: Aiming,
     scratch: Vec<Vec<Line>>,
 }
 
 impl<'a, F: Features> ProgressivePhotons<'a, F> {
     pub(super) fn new(stage: &Stage<'a>, memory: &mut Memory) -> Result<Self, RenderError> {
-        let Stage { scene, bvh, lights, settings, workers, .. } = *stage;
+        let Stage { settings, workers, .. } = *stage;
         let scratch = PathTracer::<F>::scratch(WAVE).or(chaining::scratch::<F>());
         let mut scratch = memory.take_each("paths", scratch, workers.count())?;
-        let mut emission = memory.take("emission", Emission::footprint(lights))?;
         let pixels = settings.width as usize * settings.height as usize;
         let usual = pixels.clamp(FEWEST_PATHS, MOST_PATHS);
         let wanted = settings.photons.global.map_or(usual, |paths| paths as usize).div_ceil(PATHS).max(1);
         let of_task = Photons::footprint(ROOM).bytes();
         let others = Audit::bytes::<F>(stage, Method::ProgressivePhotons.is_biased());
+        let look = (Keep::Reflected, path_settings(settings).max_depth);
+        let seen = Wanted::Seen(FIRST_RADIUS as f32);
+        let least = others.saturating_add(FEWEST_PATHS / PATHS * of_task);
+        let mut aiming = Aiming::look_first::<F>(stage, look, seen, &mut scratch, memory, least)?;
         let tasks = wanted.min(memory.available().saturating_sub(others) / of_task).max(1);
         let photons = Drawer::new(tasks * ROOM, memory)?;
         let tracer = stage.paths::<F>(settings.seed);
         let [wanted, given] = [wanted, tasks].map(|tasks| (tasks * PATHS) as u64);
         let global = Some(MapUse { wanted, given, ..MapUse::default() });
-        let mut arena = Arena::new(bytemuck::cast_slice_mut(&mut emission));
-        let all = Emission::build(scene, lights, &bvh.bounds(), &mut arena)?;
+        let emission = aiming.emission(stage)?;
         let of = (tasks, FIRST_RADIUS as f32);
-        let (chaining, seen) = Chaining::look_first::<F>(stage, of, &all, &mut scratch, memory, others)?;
-        let used = PhotonUse { global, seen, chained: chaining.is_some(), ..PhotonUse::default() };
+        let (chaining, seen) = Chaining::look_first::<F>(stage, of, &emission, &mut scratch, memory, others)?;
+        let by_power = aiming.by_power;
+        let chained = chaining.is_some();
+        let used = PhotonUse { global, seen, by_power, chained, ..PhotonUse::default() };
         Ok(Self {
             stage: *stage,
             tracer,
@@ -82,7 +86,7 @@ impl<'a, F: Features> ProgressivePhotons<'a, F> {
             photons,
             chaining,
             sample: None,
-            emission,
+            aiming,
             scratch,
         })
     }
@@ -94,21 +98,10 @@ impl<F: Features> Renderer for ProgressivePhotons<'_, F> {
     }
 
     fn round(&mut self, crew: &mut Crew) -> Result<(), RenderError> {
-        let Self {
-            stage,
-            tracer,
-            discs,
-            paths,
-            used,
-            photons,
-            chaining,
-            sample: shot_for,
-            emission,
-            scratch,
-        } = self;
+        let Self { stage, tracer, discs, paths, used, photons, chaining, sample: shot_for, aiming, scratch } =
+            self;
         let Stage { scene, bvh, lights, settings, .. } = *stage;
-        let mut arena = Arena::new(bytemuck::cast_slice_mut(emission));
-        let emission = Emission::build(scene, lights, &bvh.bounds(), &mut arena)?;
+        let emission = aiming.emission(stage)?;
         let shot = ShootSettings {
             keep: Keep::Reflected,
             seed: settings.seed,

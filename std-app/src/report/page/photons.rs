@@ -22,7 +22,13 @@ pub(super) fn section(run: &Run) -> String {
         facts.push(("Light that they bring, by a first look", parts::percent(share)));
     }
     if let Some(share) = photons.seen {
-        facts.push(("Light paths whose photons are seen, by a first look", parts::percent(share)));
+        facts.push((
+            "Light paths whose photons count for the picture, by a first look",
+            parts::percent(share),
+        ));
+    }
+    if let Some(share) = photons.by_power {
+        facts.push(("The same if the power of lights decided", parts::percent(share)));
     }
     let mut maps = String::new();
     let kinds = [
@@ -30,6 +36,10 @@ pub(super) fn section(run: &Run) -> String {
         (true, photons.caustic, view.and_then(|view| view.caustic.as_ref())),
     ];
     let mut words = first_look(run).to_owned();
+    if photons.by_power.is_some() {
+        words += "Lights, and where they shine, are chosen by what photons of a first look brought to what is visible, a quarter by \
+                  power alone. ";
+    }
     if photons.chained {
         words += "Half of the light paths are chains, each a little different from the one before, that stay where they leave \
                   photons which the camera sees. ";
