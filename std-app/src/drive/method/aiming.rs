@@ -23,7 +23,7 @@ const LOOK_MAPS: [u32; 2] = [0x7fff_fffc, 0x7fff_fffd];
 
 /// The share of light paths that count from which on power is good enough; and the fewest that tell of lights.
 const MOST_SEEN: f64 = 0.5;
-const FEWEST_SEEN: usize = 64;
+const FEWEST_SEEN: usize = 512;
 
 /// What is left of the variance of light that counts, at most, where aiming pays.
 const LESS: f64 = 0.7;
