@@ -26,7 +26,7 @@
 
 use super::estimator::Counters;
 use super::flight::{Flight, Onward, PATHS, Pile, Sequence, Source, State, Vertex, Visitor};
-use super::shoot::{Leaver, MOST, Shooter, leaves_reflected};
+use super::shoot::{Keep, Leaver, Shooter};
 use super::sight::Sight;
 use crate::Rgb;
 use crate::bsdf::Features;
@@ -264,12 +264,12 @@ impl Visitor for Watcher<'_, '_> {
 
     #[inline]
     fn meet(&mut self, state: &State, vertex: &Vertex, counters: &mut Counters) -> Option<Onward> {
-        let leaves = leaves_reflected(state, vertex);
+        let leaves = Keep::Reflected.leaves(state, vertex);
         if leaves && self.sight.shows(vertex.point.position, vertex.point.geometric_normal) {
             let photon = vertex.photon(Rgb::from(state.power));
             self.held.hold(Left { photon, chain: state.number as u16 }, counters);
         }
-        Some(Onward { most: if leaves { MOST } else { 1.0 }, mirrored: false })
+        Keep::Reflected.onward(vertex, leaves)
     }
 }
 

@@ -45,7 +45,7 @@ impl<'a, F: Features> PathTracer<'a, F> {
         for (i, ray) in rays.iter_mut().enumerate() {
             let (x, y) = (left + (i % CORNERS) as u32, top + (i / CORNERS) as u32);
             if x <= width && y <= height {
-                *ray = camera.ray(width, height, x as f32, y as f32, [0.0; 2]);
+                *ray = self.raster_ray([x as f32, y as f32]);
                 counters.rays += 1;
             }
         }

@@ -246,7 +246,8 @@ impl<'a, F: Features> PathTracer<'a, F> {
         self.walk(way, raster, counters).map_or(Rgb::ZERO, |met| met.start.worth * self.shine(&met))
     }
 
-    fn raster_ray(&self, [x, y]: [f32; 2]) -> Ray {
+    /// From the eye through a point of the picture.
+    pub(super) fn raster_ray(&self, [x, y]: [f32; 2]) -> Ray {
         self.scene.camera.ray(self.settings.width, self.settings.height, x, y, [0.0; 2])
     }
 

@@ -81,7 +81,7 @@ pub enum Keep {
 impl Keep {
     /// Whether a path leaves a photon where it met a surface.
     #[inline]
-    fn leaves(self, state: &State, vertex: &Vertex) -> bool {
+    pub(super) fn leaves(self, state: &State, vertex: &Vertex) -> bool {
         holds_photons(vertex.bsdf)
             && match self {
                 Keep::All => true,
@@ -92,7 +92,7 @@ impl Keep {
 
     /// How it goes on from there.
     #[inline]
-    fn onward(self, vertex: &Vertex, leaves: bool) -> Option<Onward> {
+    pub(super) fn onward(self, vertex: &Vertex, leaves: bool) -> Option<Onward> {
         let ends = self == Keep::Caustic && (holds_photons(vertex.bsdf) || !focuses(vertex.bsdf));
         (!ends).then_some(Onward { most: if leaves { MOST } else { 1.0 }, mirrored: false })
     }
@@ -238,12 +238,6 @@ impl Visitor for Looker<'_> {
     fn leave(&self, state: &mut State, vertex: &Vertex, _from: Vec3, _sample: &BsdfSample) {
         state.mirrored = vertex.bsdf.is_delta().into();
     }
-}
-
-/// Whether such a path leaves a photon of reflected light where it met a surface.
-#[inline]
-pub(super) fn leaves_reflected(state: &State, vertex: &Vertex) -> bool {
-    holds_photons(vertex.bsdf) && state.segments > 1
 }
 
 /// Leaves the photons that are wanted.

@@ -6,14 +6,12 @@
 //! count as it is, the power of lights decides as if nobody had looked.
 
 use super::Stage;
-use super::photons::Drawer;
+use super::places::{self, PLACES};
 use crate::drive::RenderError;
 use crate::drive::memory::Memory;
 use halflight_core::bsdf::Features;
 use halflight_core::light::{Emission, Lights, Worth};
 use halflight_core::memory::{Arena, Footprint, Line};
-use halflight_core::photon::Photon;
-use halflight_core::transport::Counters;
 use halflight_core::transport::shoot::{Keep, PATHS, ShootSettings, Shooter};
 use halflight_core::transport::sight::{Raster, Sight};
 
@@ -30,7 +28,6 @@ const LESS: f64 = 0.7;
 
 /// What its memory is counted as.
 const STRUCTURE: &str = "emission";
-const PLACES: &str = "places of a look";
 
 /// Where photons count.
 #[derive(Clone, Copy)]
@@ -78,7 +75,7 @@ impl Aiming {
         memory: &mut Memory,
         others: usize,
     ) -> Result<Self, RenderError> {
-        let Stage { scene, bvh, lights, settings, workers, .. } = *stage;
+        let Stage { scene, bvh, lights, settings, .. } = *stage;
         let raster = Raster::new([settings.width, settings.height]);
         let raster = if matches!(wanted, Wanted::Gathered(_)) { raster.gathering() } else { raster };
         let cells = Footprint::default().slice::<f32>(Worth::cells_of_all(lights));
@@ -92,14 +89,7 @@ impl Aiming {
         let learned = Some(vec![0.0; Worth::cells_of_all(lights)]);
         let mut aiming = Self { lines, learned, seen: None, by_power: None };
         memory.set_aside(PLACES, found)?;
-        let mut places = Drawer::of(PLACES, raster.rays(), memory)?;
-        let look = |task: usize, _: &mut Arena, out: &mut [Photon]| {
-            raster.run::<F>(task, (scene, bvh, settings.level), settings.seed, out);
-            Ok(Counters::default())
-        };
-        places.fill_with(workers, |photons| {
-            Ok(workers.pass(photons, Raster::TASK, scratch, &|| false, &look)?.1)
-        })?;
+        let mut places = places::find::<F>(stage, &raster, scratch, memory)?;
         if let Some(map) = places.map()? {
             let sight = match wanted {
                 Wanted::Seen(pixels) => Sight::new(&map, &raster, stage.discs(), pixels, settings.level),
@@ -160,8 +150,8 @@ impl Look {
         let mut found = vec![(0u32, 0.0f32); LOOK];
         let task = |task: usize, arena: &mut Arena, out: &mut [(u32, f32)]| {
             shooter.look((task, map), sight, arena, &mut |photon| {
-                let (cell, power) = out[photon.path];
-                out[photon.path] = (photon.cell.max(cell), power + photon.power);
+                // All photons of a path come from one cell.
+                out[photon.path] = (photon.cell, out[photon.path].1 + photon.power);
             })
         };
         stage.workers.pass(&mut found, PATHS, scratch, &|| false, &task)?;

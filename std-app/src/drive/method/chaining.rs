@@ -5,6 +5,7 @@
 
 use super::Stage;
 use super::photons::Drawer;
+use super::places::{self, PLACES};
 use crate::drive::RenderError;
 use crate::drive::crew::Crew;
 use crate::drive::memory::Memory;
@@ -14,7 +15,6 @@ use halflight_core::bsdf::Features;
 use halflight_core::light::Emission;
 use halflight_core::memory::{Arena, Footprint, Line};
 use halflight_core::photon::{Photon, PhotonMap};
-use halflight_core::transport::Counters;
 use halflight_core::transport::chain::{Chains, Share, Start, Starts};
 use halflight_core::transport::shoot::{Keep, PATHS, ROOM, ShootSettings, Shooter};
 use halflight_core::transport::sight::{Raster, Sight};
@@ -35,9 +35,6 @@ const MOST_MAPS: usize = 32;
 
 /// Tasks of a map, at least: one of independent paths, one of chains.
 const FEWEST_TASKS: usize = 2;
-
-/// What its memory is counted as.
-const STRUCTURE: &str = "places";
 
 /// Chains, where they are of use.
 pub(super) struct Chaining {
@@ -79,7 +76,7 @@ impl Chaining {
         memory: &mut Memory,
         others: usize,
     ) -> Result<(Option<Self>, Option<f64>), RenderError> {
-        let Stage { scene, bvh, settings, workers, .. } = *stage;
+        let Stage { settings, workers, .. } = *stage;
         let raster = Raster::new([settings.width, settings.height]);
         let paths = tasks.div_ceil(2) * PATHS;
         // Of seen paths there are a tenth at most, or few.
@@ -89,16 +86,9 @@ impl Chaining {
         if tasks < FEWEST_TASKS || !memory.has(needed.bytes().saturating_add(others)) {
             return Ok((None, None));
         }
-        let mut places = Drawer::of(STRUCTURE, raster.rays(), memory)?;
-        let look = |task: usize, _: &mut Arena, out: &mut [Photon]| {
-            raster.run::<F>(task, (scene, bvh, settings.level), settings.seed, out);
-            Ok(Counters::default())
-        };
-        places.fill_with(workers, |photons| {
-            Ok(workers.pass(photons, Raster::TASK, scratch, &|| false, &look)?.1)
-        })?;
+        let mut places = places::find::<F>(stage, &raster, scratch, memory)?;
         let Some(map) = places.map()? else { return Ok((None, None)) };
-        let sight = Sight::new(&map, &raster, stage.discs(), pixels, settings.level);
+        let sight = sight(stage, &raster, &map, pixels);
         let shooter = shooter::<F>(stage, emission, LOOK);
         let look = |task: usize, arena: &mut Arena, out: &mut [bool]| {
             shooter.look((task, LOOK_MAP), sight, arena, &mut |photon| out[photon.path] = true)
@@ -108,10 +98,10 @@ impl Chaining {
         let share = seen.iter().filter(|seen| **seen).count() as f64 / LOOK as f64;
         let of_map = share * paths as f64;
         if share >= MOST_SEEN || of_map * (MOST_MAPS as f64) < FEWEST_STARTS {
-            memory.give_back(STRUCTURE);
+            memory.give_back(PLACES);
             return Ok((None, Some(share)));
         }
-        memory.set_aside(STRUCTURE, own)?;
+        memory.set_aside(PLACES, own)?;
         let chaining = Self {
             raster,
             places,

@@ -15,6 +15,7 @@ mod path;
 mod photon_map;
 mod photon_view;
 mod photons;
+mod places;
 mod sppm;
 #[cfg(test)]
 mod wrong;

@@ -1,0 +1,33 @@
+//! Places that the camera sees, or that rays gather from for what it sees, in a map of their own: photons count there.
+
+use super::Stage;
+use super::photons::Drawer;
+use crate::drive::RenderError;
+use crate::drive::memory::Memory;
+use halflight_core::bsdf::Features;
+use halflight_core::memory::{Arena, Line};
+use halflight_core::photon::Photon;
+use halflight_core::transport::Counters;
+use halflight_core::transport::sight::Raster;
+
+/// What their memory is counted as.
+pub(super) const PLACES: &str = "places";
+
+/// The map of the places that the rays of `raster` find.
+pub(super) fn find<F: Features>(
+    stage: &Stage,
+    raster: &Raster,
+    scratch: &mut [Vec<Line>],
+    memory: &mut Memory,
+) -> Result<Drawer, RenderError> {
+    let Stage { scene, bvh, settings, workers, .. } = *stage;
+    let mut places = Drawer::of(PLACES, raster.rays(), memory)?;
+    let look = |task: usize, _: &mut Arena, out: &mut [Photon]| {
+        raster.run::<F>(task, (scene, bvh, settings.level), settings.seed, out);
+        Ok(Counters::default())
+    };
+    places.fill_with(workers, |photons| {
+        Ok(workers.pass(photons, Raster::TASK, scratch, &|| false, &look)?.1)
+    })?;
+    Ok(places)
+}
