@@ -150,11 +150,11 @@ fn bits_do_not_depend_on_threads_or_level_and_the_light_is_that_of_paths() {
 fn where_all_is_seen_or_nothing_there_are_none() {
     let buffers = cornell_box();
     let all = sppm(&buffers.scene(), 1, |_| ()).photons.unwrap();
-    assert!(!all.chained && all.seen > Some(0.3), "{all:?}");
+    assert!(!all.chained && all.global.unwrap().seen > Some(0.3), "{all:?}");
     let hall = table_in_a_hall();
     let camera = Camera::look_at(hall.camera.eye, Vec3::new(24.6, 0.9, 24.5), Vec3::Y, 0.1);
     let none = sppm(&Scene { camera, ..hall.scene() }, 1, |_| ()).photons.unwrap();
-    assert!(!none.chained && none.seen < Some(1e-3), "{none:?}");
+    assert!(!none.chained && none.global.unwrap().seen < Some(1e-3), "{none:?}");
 }
 
 #[test]

@@ -247,6 +247,12 @@ impl<'m> Worth<'m> {
         Ok((any || lit > 0.0).then_some(Self { aimed, learned, targets, side, shares: [DEFENSIVE, AIMED] }))
     }
 
+    /// The same for photons that have all of their light, with no paths beside them: as many go by power as of all light, so that
+    /// none has more than four times that of the others.
+    pub fn alone(self) -> Self {
+        Self { shares: [DEFENSIVE_OF_ALL, AIMED], ..self }
+    }
+
     /// A photon from `cell` was worth so much.
     pub fn learn(&mut self, cell: u32, worth: f32) {
         if let Some(slot) = self.learned.get_mut(cell as usize).filter(|_| worth.is_finite()) {

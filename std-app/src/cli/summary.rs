@@ -77,14 +77,16 @@ pub(super) fn text(run: &Run, report: Option<&Path>) -> String {
             readable_seconds(photons.seconds),
             stored.join("; "),
         ));
-        if let (Some(seen), Some(by_power)) = (photons.seen, photons.by_power) {
-            lines.push(format!(
-                "       lights chosen by what they bring to what is visible: {:.2} % of light paths count, {:.2} % by power",
-                100.0 * seen,
-                100.0 * by_power
-            ));
+        for (map, name) in [(photons.global, ""), (photons.caustic, " of caustics")] {
+            if let Some(MapUse { seen: Some(seen), by_power: Some(by_power), .. }) = map {
+                lines.push(format!(
+                    "       lights chosen by what they bring to what is visible: {:.2} % of light paths{name} count, {:.2} % by power",
+                    100.0 * seen,
+                    100.0 * by_power
+                ));
+            }
         }
-        if let (Some(seen), true) = (photons.seen, photons.chained) {
+        if let (Some(seen), true) = (photons.global.and_then(|map| map.seen), photons.chained) {
             lines.push(format!(
                 "       half of them in chains that stay where photons are seen: {:.2} % of light paths leave some",
                 100.0 * seen

@@ -80,14 +80,14 @@ fn most(run: &Run) -> Value {
                 "paths_given": map.given,
                 "paths_shot": map.shot,
                 "stored": map.stored,
+                "seen": map.seen,
+                "seen_by_power": map.by_power,
             });
             json!({
                 "maps": photons.maps,
                 "global": photons.global.map(map),
                 "caustic": photons.caustic.map(map),
                 "irradiances": photons.irradiances,
-                "seen": photons.seen,
-                "seen_by_power": photons.by_power,
                 "chained": photons.chained,
                 "seconds": photons.seconds,
             })

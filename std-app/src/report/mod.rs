@@ -83,8 +83,9 @@ impl Run<'_> {
                 "there was no memory for them: light of the sky may be noisier",
             ));
         }
-        if let (Method::ProgressivePhotons, Some(PhotonUse { seen: Some(seen), chained: false, .. })) =
+        if let (Method::ProgressivePhotons, Some(PhotonUse { global: Some(map), chained: false, .. })) =
             (self.result.method, self.result.photons)
+            && let Some(seen) = map.seen
         {
             let some = "enough light paths leave photons that are seen";
             let none = "next to no light path leaves a photon that is seen: there is nothing to begin at";

@@ -134,7 +134,8 @@ pub(super) fn with<F: Features, T>(
     if is_all {
         drop((lines, paths));
         ["emission", "paths"].into_iter().for_each(|structure| memory.give_back(structure));
-        return then(&mut ProgressivePhotons::<F>::new(stage, memory)?, memory);
+        let mut lamps = Vec::new();
+        return then(&mut ProgressivePhotons::<F>::new(stage, memory, &mut lamps)?, memory);
     }
     let Some(cast) = cast else {
         drop(lines);

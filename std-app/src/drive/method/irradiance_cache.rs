@@ -271,11 +271,12 @@ fn set_up<F: Features, T>(
         None => None,
     };
     let others = Audit::bytes::<F>(stage, Method::IrradianceCache.is_biased());
+    let mut lamps = Default::default();
     let laboratory = if needs.by_photons {
         // Half of the memory for photons at most: records need some as well.
         let half = memory.available().saturating_sub(others) / 2;
         let others = others.saturating_add(half);
-        Some(Laboratory::new::<F>(stage, &mut scratch, memory, Keep::Scattered, others)?)
+        Some(Laboratory::new::<F>(stage, &mut scratch, (memory, &mut lamps), Keep::Scattered, others)?)
     } else {
         None
     };

@@ -144,9 +144,13 @@ impl Method {
             Method::Path if caustics::are_possible(stage) => caustics::with::<F, T>(stage, memory, then),
             Method::Path => then(&mut path::Paths::<F>::new(stage, memory)?, memory),
             Method::IrradianceCache => irradiance_cache::with::<F, T>(stage, memory, then),
-            Method::PhotonMap => then(&mut photon_map::TwoPasses::<F>::new(stage, memory)?, memory),
+            Method::PhotonMap => {
+                let mut lamps = Default::default();
+                then(&mut photon_map::TwoPasses::<F>::new(stage, memory, &mut lamps)?, memory)
+            }
             Method::ProgressivePhotons => {
-                then(&mut sppm::ProgressivePhotons::<F>::new(stage, memory)?, memory)
+                let mut lamps = Vec::new();
+                then(&mut sppm::ProgressivePhotons::<F>::new(stage, memory, &mut lamps)?, memory)
             }
             #[cfg(test)]
             Method::Wrong => then(&mut wrong::Wrong::<F>::new(stage, memory)?, memory),

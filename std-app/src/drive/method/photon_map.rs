@@ -7,7 +7,7 @@
 //! group to group as those of `sppm`; the blur of the global map stays, behind a bounce.
 
 use super::photon_view::PhotonView;
-use super::photons::{Laboratory, PhotonUse, Shelf, scratch};
+use super::photons::{Laboratory, Lamps, PhotonUse, Shelf, scratch};
 use super::{Method, Renderer, Stage};
 use crate::drive::RenderError;
 use crate::drive::audit::Audit;
@@ -30,11 +30,17 @@ pub(super) struct TwoPasses<'a, F> {
 }
 
 impl<'a, F: Features> TwoPasses<'a, F> {
-    pub(super) fn new(stage: &Stage<'a>, memory: &mut Memory) -> Result<Self, RenderError> {
+    /// What it knows of lights is kept in `lamps`.
+    pub(super) fn new(
+        stage: &Stage<'a>,
+        memory: &mut Memory,
+        lamps: &'a mut Lamps,
+    ) -> Result<Self, RenderError> {
         let Stage { settings, workers, .. } = *stage;
         let mut scratch = memory.take_each("paths", scratch::<F>(WAVE), workers.count())?;
         let others = Audit::bytes::<F>(stage, Method::PhotonMap.is_biased());
-        let (laboratory, shelves) = Laboratory::new::<F>(stage, &mut scratch, memory, Keep::All, others)?;
+        let (laboratory, shelves) =
+            Laboratory::new::<F>(stage, &mut scratch, (memory, lamps), Keep::All, others)?;
         let tracer = stage.paths::<F>(settings.seed);
         Ok(Self { tracer, laboratory, shelves, scratch })
     }

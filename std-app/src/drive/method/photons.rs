@@ -2,9 +2,9 @@
 //! became of them.
 
 use super::Stage;
-use super::aiming::{Aiming, Wanted};
+use super::aiming::{Aim, Wanted};
 use super::photon_view::{self, PhotonView};
-use super::sppm::progressive;
+use super::sppm::{FIRST_RADIUS, progressive};
 use crate::drive::crew::{Crew, Task};
 use crate::drive::memory::Memory;
 use crate::drive::run::path_settings;
@@ -43,6 +43,11 @@ pub struct MapUse {
     pub shot: u64,
     /// Photons that they left.
     pub stored: u64,
+    /// What share of light paths leaves photons that count, where they are seen or gathered for what is, by a first look;
+    /// `None` where nobody looked.
+    pub seen: Option<f64>,
+    /// The same by the power of lights, where they are chosen by what they bring instead.
+    pub by_power: Option<f64>,
 }
 
 /// What became of photons.
@@ -56,11 +61,6 @@ pub struct PhotonUse {
     pub caustic: Option<MapUse>,
     /// Irradiances worked out beforehand.
     pub irradiances: u64,
-    /// What share of light paths leaves photons that count, where they are seen or gathered for what is, by a first look;
-    /// `None` where nobody looked.
-    pub seen: Option<f64>,
-    /// The same by the power of lights, where they are chosen by what they bring instead.
-    pub by_power: Option<f64>,
     /// Whether half of them are chains that stay where photons are seen.
     pub chained: bool,
     /// Seconds of shooting and building.
@@ -83,12 +83,17 @@ const FARTHEST: f32 = 0.03;
 /// Other random numbers for maps of caustics.
 const CAUSTIC_SEED: u32 = 0x6361_7573;
 
+/// Memory of what a [`Laboratory`] knows of lights.
+pub(super) type Lamps = [Vec<Line>; 2];
+
 /// Shoots photons and builds maps.
 pub(super) struct Laboratory<'a> {
     stage: Stage<'a>,
     discs: Discs,
     keep: Keep,
-    aiming: Aiming,
+    aim: Aim<'a>,
+    /// For maps of caustics, where there are any.
+    caustics: Option<Aim<'a>>,
     global: usize,
     caustic: usize,
     pub(super) used: PhotonUse,
@@ -179,20 +184,28 @@ impl<'a> Laboratory<'a> {
     pub(super) fn new<F: Features>(
         stage: &Stage<'a>,
         scratch: &mut [Vec<Line>],
-        memory: &mut Memory,
+        (memory, lamps): (&mut Memory, &'a mut Lamps),
         keep: Keep,
         others: usize,
     ) -> Result<(Self, [Shelf; 2]), RenderError> {
         let Stage { scene, bvh, settings, .. } = *stage;
-        let wanted = Wanted::Gathered(FARTHEST * bvh.bounds().diagonal());
+        let has_caustics = keep == Keep::All && may_have_caustics(scene);
         let least = others.saturating_add(2 * bytes(1, 1));
+        let [all, caustics] = lamps;
+        let gathered = Wanted::Gathered(FARTHEST * bvh.bounds().diagonal());
         let of = (keep, shortened(settings));
-        let aiming = Aiming::look_first::<F>(stage, of, wanted, scratch, memory, least)?;
+        let aim = Aim::look_first::<F>(stage, of, gathered, scratch, (memory, all), least)?;
+        let caustics = if has_caustics {
+            let of = (Keep::Caustic, path_settings(settings).max_depth);
+            let seen = Wanted::Seen(FIRST_RADIUS as f32);
+            Some(Aim::look_first::<F>(stage, of, seen, scratch, (memory, caustics), least)?)
+        } else {
+            None
+        };
         let pixels = settings.width as usize * settings.height as usize;
         let fewest = if keep == Keep::All { FEWEST } else { FEWEST_FOR_RECORDS };
         let usual = (pixels / PIXELS_PER_PATH).div_ceil(PATHS).clamp(fewest, MOST);
         let tasks = |asked: Option<u32>| asked.map_or(usual, |paths| (paths as usize).div_ceil(PATHS).max(1));
-        let has_caustics = keep == Keep::All && may_have_caustics(scene);
         let wanted =
             [tasks(settings.photons.global), if has_caustics { tasks(settings.photons.caustic) } else { 0 }];
         // Where memory is short, both get the same share of what they want.
@@ -209,19 +222,22 @@ impl<'a> Laboratory<'a> {
             })
         };
         let shelves = [shelf(memory)?, shelf(memory)?];
-        let used = |wanted: usize, given: usize| MapUse {
+        let used = |aim: &Aim, wanted: usize, given: usize| MapUse {
             wanted: (wanted * PATHS) as u64,
             given: (given * PATHS) as u64,
+            seen: aim.seen,
+            by_power: aim.by_power,
             ..MapUse::default()
         };
         let used = PhotonUse {
-            global: Some(used(wanted[0], global)),
-            caustic: has_caustics.then(|| used(wanted[1], caustic)),
-            seen: aiming.seen,
-            by_power: aiming.by_power,
+            global: Some(used(&aim, wanted[0], global)),
+            caustic: caustics.as_ref().map(|aim| used(aim, wanted[1], caustic)),
             ..PhotonUse::default()
         };
-        Ok((Self { stage: *stage, discs: stage.discs(), keep, aiming, global, caustic, used }, shelves))
+        Ok((
+            Self { stage: *stage, discs: stage.discs(), keep, aim, caustics, global, caustic, used },
+            shelves,
+        ))
     }
 
     /// Bytes of the smallest maps of what was reflected, of both halves.
@@ -266,21 +282,22 @@ impl<'a> Laboratory<'a> {
         let Stage { scene, bvh, lights, settings, .. } = self.stage;
         let start = Instant::now();
         let farthest = self.farthest();
-        let emission = self.aiming.emission(&self.stage)?;
-        let paths = path_settings(settings);
-        let short = shortened(settings);
-        let shooter = |tasks: usize, keep: Keep, seed: u32, max_depth: u32| {
-            let shot = ShootSettings { keep, seed, paths: (tasks * PATHS) as u32, max_depth };
-            Shooter::<F>::new(scene, bvh, lights, &emission, shot, settings.level)
+        let shot = |keep: Keep, tasks: usize, seed: u32, max_depth: u32| ShootSettings {
+            keep,
+            seed,
+            paths: (tasks * PATHS) as u32,
+            max_depth,
         };
-        let shoot = [
-            (&mut shelf.global, shooter(self.global, self.keep, settings.seed, short)),
-            (
-                &mut shelf.caustic,
-                shooter(self.caustic, Keep::Caustic, settings.seed ^ CAUSTIC_SEED, paths.max_depth),
-            ),
+        let all = shot(self.keep, self.global, settings.seed, shortened(settings));
+        let (seed, max_depth) = (settings.seed ^ CAUSTIC_SEED, path_settings(settings).max_depth);
+        let caustic = shot(Keep::Caustic, self.caustic, seed, max_depth);
+        let shots = [
+            (&mut shelf.global, Some(&self.aim), all),
+            (&mut shelf.caustic, self.caustics.as_ref(), caustic),
         ];
-        for (drawer, shooter) in shoot.into_iter().filter(|(drawer, _)| drawer.capacity > 0) {
+        for (drawer, aim, shot) in shots {
+            let Some(aim) = aim else { continue };
+            let shooter = Shooter::<F>::new(scene, bvh, lights, &aim.emission, shot, settings.level);
             let task = |task: usize, arena: &mut Arena, out: &mut [_]| shooter.run(task, map, arena, out);
             if !drawer.fill(shooter.room(), crew, scratch, &task)? {
                 return Ok(false);

@@ -7,7 +7,7 @@
 //! No pixel keeps anything but its sum, and memory is the same for any number of samples. Even and odd samples count
 //! their radii apart, so that the halves of the film are two such pictures of their own.
 
-use super::aiming::{Aiming, Wanted};
+use super::aiming::{Aim, Wanted};
 use super::chaining::{self, Chaining};
 use super::photon_view::{self, PhotonView};
 use super::photons::{Drawer, MapUse, PhotonUse};
@@ -25,7 +25,7 @@ use halflight_core::transport::{Discs, PathTracer, PhotonLight, path::WAVE};
 use std::time::Instant;
 
 /// Radius of the discs of the first sample, in pixels.
-const FIRST_RADIUS: f64 = 3.0;
+pub(super) const FIRST_RADIUS: f64 = 3.0;
 
 /// Photons that a disc of the first sample needs, if they lie evenly: where they crowd, it is smaller.
 const ENOUGH: f64 = 12.0;
@@ -48,12 +48,17 @@ pub(super) struct ProgressivePhotons<'a, F> {
     chaining: Option<Chaining>,
     /// The sample that they are of.
     sample: Option<u32>,
-    aiming: Aiming,
+    aim: Aim<'a>,
     scratch: Vec<Vec<Line>>,
 }
 
 impl<'a, F: Features> ProgressivePhotons<'a, F> {
-    pub(super) fn new(stage: &Stage<'a>, memory: &mut Memory) -> Result<Self, RenderError> {
+    /// What it knows of lights is kept in `lamps`.
+    pub(super) fn new(
+        stage: &Stage<'a>,
+        memory: &mut Memory,
+        lamps: &'a mut Vec<Line>,
+    ) -> Result<Self, RenderError> {
         let Stage { settings, workers, .. } = *stage;
         let scratch = PathTracer::<F>::scratch(WAVE).or(chaining::scratch::<F>());
         let mut scratch = memory.take_each("paths", scratch, workers.count())?;
@@ -65,18 +70,16 @@ impl<'a, F: Features> ProgressivePhotons<'a, F> {
         let look = (Keep::Reflected, path_settings(settings).max_depth);
         let seen = Wanted::Seen(FIRST_RADIUS as f32);
         let least = others.saturating_add(FEWEST_PATHS / PATHS * of_task);
-        let mut aiming = Aiming::look_first::<F>(stage, look, seen, &mut scratch, memory, least)?;
+        let aim = Aim::look_first::<F>(stage, look, seen, &mut scratch, (memory, lamps), least)?;
         let tasks = wanted.min(memory.available().saturating_sub(others) / of_task).max(1);
         let photons = Drawer::new(tasks * ROOM, memory)?;
         let tracer = stage.paths::<F>(settings.seed);
         let [wanted, given] = [wanted, tasks].map(|tasks| (tasks * PATHS) as u64);
-        let global = Some(MapUse { wanted, given, ..MapUse::default() });
-        let emission = aiming.emission(stage)?;
         let of = (tasks, FIRST_RADIUS as f32);
-        let (chaining, seen) = Chaining::look_first::<F>(stage, of, &emission, &mut scratch, memory, others)?;
-        let by_power = aiming.by_power;
-        let chained = chaining.is_some();
-        let used = PhotonUse { global, seen, by_power, chained, ..PhotonUse::default() };
+        let (chaining, seen) =
+            Chaining::look_first::<F>(stage, of, &aim.emission, &mut scratch, memory, others)?;
+        let global = Some(MapUse { wanted, given, seen, by_power: aim.by_power, ..MapUse::default() });
+        let used = PhotonUse { global, chained: chaining.is_some(), ..PhotonUse::default() };
         Ok(Self {
             stage: *stage,
             tracer,
@@ -86,7 +89,7 @@ impl<'a, F: Features> ProgressivePhotons<'a, F> {
             photons,
             chaining,
             sample: None,
-            aiming,
+            aim,
             scratch,
         })
     }
@@ -98,17 +101,17 @@ impl<F: Features> Renderer for ProgressivePhotons<'_, F> {
     }
 
     fn round(&mut self, crew: &mut Crew) -> Result<(), RenderError> {
-        let Self { stage, tracer, discs, paths, used, photons, chaining, sample: shot_for, aiming, scratch } =
+        let Self { stage, tracer, discs, paths, used, photons, chaining, sample: shot_for, aim, scratch } =
             self;
         let Stage { scene, bvh, lights, settings, .. } = *stage;
-        let emission = aiming.emission(stage)?;
+        let emission = &aim.emission;
         let shot = ShootSettings {
             keep: Keep::Reflected,
             seed: settings.seed,
             paths: *paths as u32,
             max_depth: path_settings(settings).max_depth,
         };
-        let shooter = Shooter::<F>::new(scene, bvh, lights, &emission, shot, settings.level);
+        let shooter = Shooter::<F>::new(scene, bvh, lights, emission, shot, settings.level);
         while let Some(sample) = crew.next_sample() {
             // A round that was cut in the middle of a sample has left its photons.
             if *shot_for != Some(sample) {
@@ -120,7 +123,7 @@ impl<F: Features> Renderer for ProgressivePhotons<'_, F> {
                     None => photons.fill(ROOM, crew, scratch, &shoot)?,
                     Some(chaining) => {
                         let of = (&mut *photons, *paths / PATHS, sample);
-                        chaining.fill::<F>(stage, &emission, of, crew, scratch)?
+                        chaining.fill::<F>(stage, emission, of, crew, scratch)?
                     }
                 };
                 if !done {

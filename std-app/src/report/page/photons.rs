@@ -21,23 +21,14 @@ pub(super) fn section(run: &Run) -> String {
     if let Some(share) = caustics.share {
         facts.push(("Light that they bring, by a first look", parts::percent(share)));
     }
-    if let Some(share) = photons.seen {
-        facts.push((
-            "Light paths whose photons count for the picture, by a first look",
-            parts::percent(share),
-        ));
-    }
-    if let Some(share) = photons.by_power {
-        facts.push(("The same if the power of lights decided", parts::percent(share)));
-    }
     let mut maps = String::new();
     let kinds = [
         (false, photons.global, view.and_then(|view| view.global.as_ref())),
         (true, photons.caustic, view.and_then(|view| view.caustic.as_ref())),
     ];
     let mut words = first_look(run).to_owned();
-    if photons.by_power.is_some() {
-        words += "Lights, and where they shine, are chosen by what photons of a first look brought to what is visible, a quarter by \
+    if [photons.global, photons.caustic].into_iter().flatten().any(|map| map.by_power.is_some()) {
+        words += "Lights, and where they shine, are chosen by what photons of a first look brought to what is visible, a part by \
                   power alone. ";
     }
     if photons.chained {
@@ -86,15 +77,26 @@ fn first_look(run: &Run) -> &'static str {
 }
 
 fn numbers(is_caustic: bool, used: &MapUse, seen: Option<&MapView>) -> Vec<(&'static str, String)> {
-    let [shot, stored, useful] = if is_caustic {
-        ["Light paths for caustics", "Caustic photons left", "Caustic photons in direct sight"]
+    let [shot, stored, useful, counting, by_power] = if is_caustic {
+        [
+            "Light paths for caustics",
+            "Caustic photons left",
+            "Caustic photons in direct sight",
+            "Light paths for caustics that count for the picture, by a first look",
+            "The same for caustics if the power of lights decided",
+        ]
     } else {
-        ["Light paths", "Photons left", "Photons in direct sight"]
+        [
+            "Light paths",
+            "Photons left",
+            "Photons in direct sight",
+            "Light paths whose photons count for the picture, by a first look",
+            "The same if the power of lights decided",
+        ]
     };
     let mut facts = vec![(shot, grouped(used.shot)), (stored, grouped(used.stored))];
-    if let Some(seen) = seen {
-        facts.push((useful, parts::percent(seen.seen)));
-    }
+    let shares = [(useful, seen.map(|seen| seen.seen)), (counting, used.seen), (by_power, used.by_power)];
+    facts.extend(shares.into_iter().filter_map(|(name, share)| Some((name, parts::percent(share?)))));
     facts
 }
 
