@@ -93,14 +93,22 @@ fn weighted(coat: &impl Coat, wo: Vec3, wi: Vec3, transmittance_o: Rgb, p: f32) 
 /// f cos θ_i and the density, of base and rough coat together.
 #[inline]
 fn both_lobes(coat: &impl Coat, wo: Vec3, wi: Vec3, transmittance_o: Rgb, p: f32) -> (Rgb, f32) {
-    let cosine = wi.z * FRAC_1_PI;
-    let base = coat.base() * transmittance_o * coat.transmittance(wi.z) * cosine;
-    let base_pdf = (1.0 - p) * cosine;
+    let value = value(coat, wo, wi, transmittance_o);
+    let base_pdf = (1.0 - p) * (wi.z * FRAC_1_PI);
     if coat.alpha() == 0.0 {
-        return (base, base_pdf);
+        return (value, base_pdf);
+    }
+    (value, base_pdf + p * Ggx::new(coat.alpha()).reflection_density(wo, wo + wi))
+}
+
+/// f cos θ_i of base and rough coat together, for `wi` above the surface; T(θ_o) is known.
+#[inline]
+pub(super) fn value(coat: &impl Coat, wo: Vec3, wi: Vec3, transmittance_o: Rgb) -> Rgb {
+    let base = coat.base() * transmittance_o * coat.transmittance(wi.z) * (wi.z * FRAC_1_PI);
+    if coat.alpha() == 0.0 {
+        return base;
     }
     let ggx = Ggx::new(coat.alpha());
     let h = wo + wi;
-    let lobe = coat.reflectance(half_cosine(wo, h)) * (ggx.density(h) * ggx.visibility(wo, wi) * wi.z);
-    (base + lobe, base_pdf + p * ggx.reflection_density(wo, h))
+    base + coat.reflectance(half_cosine(wo, h)) * (ggx.density(h) * ggx.visibility(wo, wi) * wi.z)
 }

@@ -84,6 +84,29 @@ impl BsdfSample {
     }
 }
 
+/// A material as it is seen from somewhere: what is the same for all light is worked out.
+#[derive(Clone, Copy)]
+pub(crate) struct Seen<'b> {
+    bsdf: &'b Bsdf,
+    wo: Vec3,
+    /// T(θ_o) of a coat.
+    transmittance: Rgb,
+}
+
+impl Seen<'_> {
+    /// What [`Bsdf::evaluate`] has as f(wo, wi) |cos θ_i|, to the bit.
+    #[inline]
+    pub(crate) fn value<F: Features>(&self, wi: Vec3) -> Rgb {
+        let Self { bsdf, wo, transmittance } = *self;
+        match bsdf {
+            Bsdf::Glossy(_) | Bsdf::Plastic(_) if !(wi.z > 0.0) => Rgb::ZERO,
+            Bsdf::Glossy(b) if F::GLOSSY => coated::value(b, wo, wi, transmittance),
+            Bsdf::Plastic(b) if F::GLOSSY => coated::value(b, wo, wi, transmittance),
+            _ => bsdf.evaluate::<F>(wo, wi).0,
+        }
+    }
+}
+
 impl Bsdf {
     /// Chooses where the light that leaves to `wo` (`wo.z` > 0) came from; `u` in [0, 1), `u[2]` picks the
     /// lobe. `None`: absorbed.
@@ -115,6 +138,18 @@ impl Bsdf {
             Bsdf::RoughDielectric(b) if F::DIELECTRIC => b.evaluate(wo, wi),
             _ => (Rgb::ZERO, 0.0),
         }
+    }
+
+    /// As it is seen from `wo`, by light from many directions.
+    #[inline]
+    pub(crate) fn seen<F: Features>(&self, wo: Vec3) -> Seen<'_> {
+        let wo = above_horizon(wo);
+        let transmittance = match self {
+            Bsdf::Glossy(b) if F::GLOSSY => coated::Coat::transmittance(b, wo.z),
+            Bsdf::Plastic(b) if F::GLOSSY => coated::Coat::transmittance(b, wo.z),
+            _ => Rgb::ONE,
+        };
+        Seen { bsdf: self, wo, transmittance }
     }
 
     /// Whether every lobe is a delta lobe: to connect it to a light is in vain.
@@ -161,4 +196,31 @@ fn above_horizon(wo: Vec3) -> Vec3 {
 #[inline]
 fn sqrt(x: f32) -> f32 {
     libm::sqrtf(x)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sampling::Random;
+    use crate::sampling::warp::uniform_sphere;
+
+    #[test]
+    fn what_is_seen_is_what_is_evaluated() {
+        let (colour, coat) = (Rgb::new(0.8, 0.5, 0.1), Rgb::splat(0.04));
+        let random = Random::new(1, 2);
+        for i in 0..4000 {
+            let [a, b, c, d, alpha] = [0, 1, 2, 3, 4].map(|k| random.single(5 * i + k));
+            let (wo, wi) = (uniform_sphere([a, b]), uniform_sphere([c, d]));
+            let wo = wo.with_z(wo.z.abs());
+            let alpha = if i % 8 == 0 { 0.0 } else { alpha };
+            let kinds = [
+                Bsdf::Diffuse(Diffuse { reflectance: colour }),
+                Bsdf::Glossy(Glossy::new(colour, coat, alpha, a)),
+                Bsdf::Plastic(Plastic::new(colour, coat, alpha, b, 1.5)),
+            ];
+            for bsdf in kinds {
+                assert_eq!(bsdf.seen::<All>(wo).value::<All>(wi), bsdf.evaluate::<All>(wo, wi).0, "{bsdf:?}");
+            }
+        }
+    }
 }

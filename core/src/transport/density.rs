@@ -145,13 +145,14 @@ pub(super) fn reflected<F: Features>(
             _ => Gathered::of(map.gather_within(level, disc, &fence, &Uniform(response)), enough, Rgb::ONE),
         };
     }
+    let seen = bsdf.seen::<F>(wo);
     // A photon's power has met the triangle: the cosine is in it already, and that of the triangle's normal.
     let response = |from: Vec3| {
         let wi = point.frame.to_local(from);
         if !point.sides_agree(wi, from) {
             return Rgb::ZERO;
         }
-        bsdf.evaluate::<F>(wo, wi).0 / from.dot(point.geometric_normal).abs().max(GRAZING)
+        seen.value::<F>(wi) / from.dot(point.geometric_normal).abs().max(GRAZING)
     };
     Gathered::of(map.gather_within(level, disc, &fence, &response), enough, Rgb::ONE)
 }
