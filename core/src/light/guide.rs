@@ -127,7 +127,7 @@ pub struct Worth<'m> {
 
 impl<'m> Worth<'m> {
     /// Cells that [`Worth::of_all`] has.
-    pub fn cells_of_all(lights: &Lights) -> usize {
+    fn cells_of_all(lights: &Lights) -> usize {
         let side = side(lights.count(), CELLS_OF_ALL);
         lights.count() * side * side
     }
@@ -139,36 +139,29 @@ impl<'m> Worth<'m> {
         worth.and(AliasTable::footprint(cells))
     }
 
-    /// For photons of all light, of which those of each of [`Worth::cells_of_all`] were worth so much, as they have `learned`.
-    /// A part of them comes evenly from each light by what it is worth altogether: few have looked.
+    /// For photons of all light: by power, as long as nothing was learned.
     ///
     /// # Errors
     /// [`OutOfMemory`] where the arena has less than [`Worth::footprint_of_all`].
-    pub fn of_all(
-        lights: &Lights,
-        emission: &Emission,
-        learned: &[f32],
-        arena: &mut Arena<'m>,
-    ) -> Result<Self, OutOfMemory> {
+    pub fn of_all(lights: &Lights, arena: &mut Arena<'m>) -> Result<Self, OutOfMemory> {
+        let cells = Self::cells_of_all(lights);
+        let (aimed, learned) = (arena.slice::<f32>(cells)?, arena.slice::<f32>(cells)?);
+        aimed.fill(0.0);
+        learned.fill(0.0);
         let side = side(lights.count(), CELLS_OF_ALL);
-        let cells = Self::cells_of_all(lights).min(learned.len());
-        let (evenly, own) = (arena.slice::<f32>(cells)?, arena.slice::<f32>(cells)?);
-        for (cell, worth) in own.iter_mut().zip(learned) {
-            *cell = *worth;
-        }
-        let of_light = (side * side).max(1);
-        for (light, (evenly, own)) in evenly.chunks_mut(of_light).zip(own.chunks(of_light)).enumerate() {
+        Ok(Self { aimed, learned, targets: &[], side, shares: [DEFENSIVE_OF_ALL, EVENLY_OF_ALL] })
+    }
+
+    /// A part of the photons of all light comes evenly from each light by what it was worth altogether, as far as that was
+    /// learned: few have looked.
+    pub fn even_out(&mut self, emission: &Emission) {
+        let of_light = (self.side * self.side).max(1);
+        let lights = self.aimed.chunks_mut(of_light).zip(self.learned.chunks(of_light));
+        for (light, (aimed, learned)) in lights.enumerate() {
             // By its power once more, as what is aimed at is.
-            let worth = own.iter().sum::<f32>() / emission.table.pdf(light);
-            evenly.fill(if worth.is_finite() { worth } else { 0.0 });
+            let worth = learned.iter().sum::<f32>() / emission.table.pdf(light);
+            aimed.fill(if worth.is_finite() { worth } else { 0.0 });
         }
-        Ok(Self {
-            aimed: evenly,
-            learned: own,
-            targets: &[],
-            side,
-            shares: [DEFENSIVE_OF_ALL, EVENLY_OF_ALL],
-        })
     }
 
     /// Bytes that [`Worth::aimed`] takes.

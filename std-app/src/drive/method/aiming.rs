@@ -60,14 +60,6 @@ struct Look {
     spread: f64,
 }
 
-/// What cells are worth, as far as it is known.
-enum Learned<'l> {
-    /// For photons of all light.
-    All(Vec<f32>),
-    /// For those of what mirrors and refracts, which is aimed at from the beginning.
-    Caustics(Worth<'l>),
-}
-
 impl<'l> Aim<'l> {
     /// By power alone.
     pub(super) fn by_power(
@@ -97,8 +89,14 @@ impl<'l> Aim<'l> {
         let Stage { scene, bvh, lights, settings, .. } = *stage;
         let raster = Raster::new([settings.width, settings.height]);
         let raster = if matches!(wanted, Wanted::Gathered(_)) { raster.gathering() } else { raster };
-        let kept = Emission::footprint(lights).and(Learned::footprint(stage, keep));
-        let found = Footprint::default().slice::<(u32, f32)>(LOOK).and(Learned::beside(stage, keep));
+        let of_caustics = keep == Keep::Caustic;
+        let worth = if of_caustics {
+            Worth::footprint(lights).and(Worth::guide_footprint(lights))
+        } else {
+            Worth::footprint_of_all(lights)
+        };
+        let kept = Emission::footprint(lights).and(worth);
+        let found = Footprint::default().slice::<(u32, f32)>(LOOK);
         let needed = kept.bytes() + raster.footprint().bytes() + found.bytes();
         if !memory.has(needed.saturating_add(others)) {
             return Self::by_power(stage, (memory, lines));
@@ -106,7 +104,12 @@ impl<'l> Aim<'l> {
         *lines = memory.take(STRUCTURE, kept)?;
         let mut arena = Arena::new(bytemuck::cast_slice_mut(lines));
         let mut aim = Self::plain(stage, &mut arena)?;
-        let Some(mut learned) = Learned::new(stage, keep, &aim.emission, &mut arena)? else { return Ok(aim) };
+        let worth = if of_caustics {
+            Worth::aimed(scene, lights, &aim.emission, &mut arena)?.map(Worth::alone)
+        } else {
+            Some(Worth::of_all(lights, &mut arena)?)
+        };
+        let Some(mut worth) = worth else { return Ok(aim) };
         memory.set_aside(PLACES, found)?;
         let mut places = places::find::<F>(stage, &raster, scratch, memory)?;
         if let Some(map) = places.map()? {
@@ -116,7 +119,7 @@ impl<'l> Aim<'l> {
             };
             let shot = ShootSettings { keep, seed: settings.seed, paths: LOOK as u32, max_depth };
             let most = if matches!(wanted, Wanted::Seen(_)) { AS_CHAINS } else { f64::INFINITY };
-            aim.learn(stage, (&mut learned, most), &mut arena, |emission, number| {
+            aim.learn((&mut worth, of_caustics), most, &mut arena, |emission, number| {
                 let shooter = Shooter::<F>::new(scene, bvh, lights, emission, shot, settings.level);
                 Look::of(stage, &shooter, sight, FIRST_MAP + number, scratch)
             })?;
@@ -129,137 +132,45 @@ impl<'l> Aim<'l> {
     /// Looks, and again by what was learned where that may pay: where the spread is `most` at most.
     fn learn(
         &mut self,
-        stage: &Stage,
-        (learned, most): (&mut Learned<'l>, f64),
+        (worth, of_caustics): (&mut Worth<'l>, bool),
+        most: f64,
         arena: &mut Arena<'l>,
         mut look: impl FnMut(&Emission, u32) -> Result<Look, RenderError>,
     ) -> Result<(), RenderError> {
-        let first = look(&learned.by_power(stage, &self.emission, &mut arena.scratch())?, 0)?;
+        let plain = self.emission;
+        // By power; of all light by that of cells, which are known then, as those of mirrors and glass are not.
+        let first = if of_caustics { plain } else { worth.guide(&plain, &mut arena.scratch())? };
+        let first = look(&first, 0)?;
         self.seen = Some(first.share());
-        if first.share() >= MOST_SEEN || first.found.len() < learned.fewest_to_begin() {
+        // What mirrors and refracts can be aimed at before anything was seen of it.
+        let fewest = if of_caustics { 0 } else { FEWEST_TO_BEGIN };
+        if first.share() >= MOST_SEEN || first.found.len() < fewest {
             return Ok(());
         }
-        let mut seen = learned.learn_first(&first);
+        let learn = |worth: &mut Worth, look: &Look| {
+            look.found.iter().for_each(|&(cell, power)| worth.learn(cell, power));
+            if !of_caustics {
+                worth.even_out(&plain);
+            }
+            look.found.len()
+        };
+        let mut seen = if of_caustics { 0 } else { learn(worth, &first) };
+        // Where power alone found nothing, nothing is known of its spread, but that it is large.
+        let most = if first.found.is_empty() { most } else { most.min(LESS * first.spread) };
         for number in 1..=MOST_LOOKS {
             let knew = seen;
-            let again = look(&learned.guide(stage, &self.emission, &mut arena.scratch())?, number)?;
-            seen += learned.learn(&again);
+            let again = look(&worth.guide(&plain, &mut arena.scratch())?, number)?;
+            seen += learn(worth, &again);
             if knew == 0 || seen < FEWEST_SEEN {
                 continue;
             }
-            // Where power alone found nothing, nothing is known of its spread, but that it is large.
-            let most = if first.found.is_empty() { most } else { most.min(LESS * first.spread) };
             if again.spread <= most {
-                self.emission = learned.guide(stage, &self.emission, arena)?;
+                self.emission = worth.guide(&plain, arena)?;
                 (self.seen, self.by_power) = (Some(again.share()), self.seen);
             }
             break;
         }
         Ok(())
-    }
-}
-
-impl<'l> Learned<'l> {
-    /// Bytes that it takes in an arena, with the guide that is made of it.
-    fn footprint(stage: &Stage, keep: Keep) -> Footprint {
-        match keep {
-            Keep::Caustic => Worth::footprint(stage.lights).and(Worth::guide_footprint(stage.lights)),
-            _ => Worth::footprint_of_all(stage.lights),
-        }
-    }
-
-    /// Bytes that it takes besides.
-    fn beside(stage: &Stage, keep: Keep) -> Footprint {
-        match keep {
-            Keep::Caustic => Footprint::default(),
-            _ => Footprint::default().slice::<f32>(Worth::cells_of_all(stage.lights)),
-        }
-    }
-
-    /// Nothing yet. `None` where no photon is worth anything.
-    fn new(
-        stage: &Stage,
-        keep: Keep,
-        plain: &Emission<'l>,
-        arena: &mut Arena<'l>,
-    ) -> Result<Option<Self>, RenderError> {
-        Ok(match keep {
-            Keep::Caustic => Worth::aimed(stage.scene, stage.lights, plain, arena)?
-                .map(Worth::alone)
-                .map(Learned::Caustics),
-            _ => Some(Learned::All(vec![0.0; Worth::cells_of_all(stage.lights)])),
-        })
-    }
-
-    /// The fewest paths of the first look to learn from: what mirrors and refracts can be aimed at without.
-    fn fewest_to_begin(&self) -> usize {
-        match self {
-            Learned::All(_) => FEWEST_TO_BEGIN,
-            Learned::Caustics(_) => 0,
-        }
-    }
-
-    /// Lights by their power.
-    fn by_power<'m>(
-        &self,
-        stage: &Stage,
-        plain: &Emission<'m>,
-        arena: &mut Arena<'m>,
-    ) -> Result<Emission<'m>, RenderError>
-    where
-        'l: 'm,
-    {
-        match self {
-            // By the power of cells, so that these are known.
-            Learned::All(_) => self.guide(stage, plain, arena),
-            Learned::Caustics(_) => Ok(*plain),
-        }
-    }
-
-    /// Lights by what was learned.
-    fn guide<'m>(
-        &self,
-        stage: &Stage,
-        plain: &Emission<'m>,
-        arena: &mut Arena<'m>,
-    ) -> Result<Emission<'m>, RenderError>
-    where
-        'l: 'm,
-    {
-        match self {
-            Learned::All(learned) => {
-                let worth = Worth::of_all(stage.lights, plain, learned, arena)?;
-                Ok(worth.guide(plain, arena)?)
-            }
-            Learned::Caustics(worth) => {
-                let worth: &Worth<'m> = worth;
-                Ok(worth.guide(plain, arena)?)
-            }
-        }
-    }
-
-    /// From a look by power; from how many paths.
-    fn learn_first(&mut self, look: &Look) -> usize {
-        match self {
-            Learned::All(_) => self.learn(look),
-            // Where nothing is aimed there are no such cells.
-            Learned::Caustics(_) => 0,
-        }
-    }
-
-    /// From a look by what was learned before; from how many paths.
-    fn learn(&mut self, look: &Look) -> usize {
-        for (cell, power) in &look.found {
-            match self {
-                Learned::All(learned) => {
-                    if let Some(worth) = learned.get_mut(*cell as usize) {
-                        *worth += power;
-                    }
-                }
-                Learned::Caustics(worth) => worth.learn(*cell, *power),
-            }
-        }
-        look.found.len()
     }
 }
 
