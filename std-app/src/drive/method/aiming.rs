@@ -27,7 +27,7 @@ const FEWEST_TO_BEGIN: usize = 8;
 const FEWEST_SEEN: usize = 512;
 
 /// What is left of the variance of light that counts, at most, where aiming pays; and the mean square of what a path brings over
-/// the square of its mean, at most, where photons are seen: chains are as good as so much.
+/// the square of its mean, at most, where chains are the other way: they are as good as so much.
 const LESS: f64 = 0.5;
 const AS_CHAINS: f64 = 12.0;
 
@@ -118,7 +118,8 @@ impl<'l> Aim<'l> {
                 Wanted::Gathered(radius) => Sight::within(&map, radius, settings.level),
             };
             let shot = ShootSettings { keep, seed: settings.seed, paths: LOOK as u32, max_depth };
-            let most = if matches!(wanted, Wanted::Seen(_)) { AS_CHAINS } else { f64::INFINITY };
+            let has_chains = !of_caustics && matches!(wanted, Wanted::Seen(_));
+            let most = if has_chains { AS_CHAINS } else { f64::INFINITY };
             aim.learn((&mut worth, of_caustics), most, &mut arena, |emission, number| {
                 let shooter = Shooter::<F>::new(scene, bvh, lights, emission, shot, settings.level);
                 Look::of(stage, &shooter, sight, FIRST_MAP + number, scratch)
