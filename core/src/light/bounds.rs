@@ -1,33 +1,58 @@
 //! What is known of a group of lights: where they are, which way they shine, how strongly; and how much of
 //! that can reach a point (Conty Estevez and Kulla 2018, "Importance Sampling of Many Lights with Adaptive
-//! Tree Splitting", section 4).
+//! Tree Splitting", section 4). One group or eight, by the same code: the bits are the same.
 
 use crate::geometry::Bounds;
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
+use halflight_simd::{Lanes, Simd};
 
 /// Importances are kept below this, so that their sums stay finite at a point on a light.
 const LARGEST: f32 = 1e30;
 
+/// Groups that are weighed at once.
+pub(super) const GROUPS: usize = 8;
+
+/// What a group is, number by number.
+#[derive(Clone, Copy)]
+struct Known<L> {
+    center: [L; 3],
+    radius: L,
+    axis: [L; 3],
+    sin_cone: L,
+    cos_cone: L,
+    power: L,
+}
+
 /// A bounding sphere, a cone that holds the normals, and the power of some lights. Every light is taken to
 /// shine into the half-space around its normal.
-#[derive(Clone, Copy, Debug, Pod, Zeroable)]
-#[repr(C)]
+#[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Group {
     center: [f32; 3],
     radius: f32,
-    axis: [f32; 3],
-    /// Cosine of the half-angle of the cone; -1 shines everywhere.
-    cos_cone: f32,
+    cone: Cone,
     /// Luminance times area, or luminous intensity, in units of the strongest light.
-    pub(super) power: f32,
+    power: f32,
+}
+
+/// Eight groups. One without power is none.
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C)]
+pub(super) struct Groups {
+    center: [[f32; GROUPS]; 3],
+    radius: [f32; GROUPS],
+    axis: [[f32; GROUPS]; 3],
+    sin_cone: [f32; GROUPS],
+    cos_cone: [f32; GROUPS],
+    power: [f32; GROUPS],
 }
 
 /// The directions of a group: a cone.
-#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C)]
 pub(super) struct Cone {
     pub(super) axis: [f32; 3],
+    /// Cosine of the half-angle; -1 shines everywhere.
     pub(super) cos: f32,
 }
 
@@ -37,7 +62,11 @@ impl Cone {
     /// The cosine of the cone around unit `axis` that holds this one.
     pub(super) fn cos_around(&self, axis: Vec3) -> f32 {
         let (cos_a, cos_b) = (axis.dot(self.axis.into()).min(1.0), self.cos);
-        if cos_a + cos_b <= 0.0 { -1.0 } else { cos_a * cos_b - sine(cos_a) * sine(cos_b) }
+        if cos_a + cos_b <= 0.0 {
+            -1.0
+        } else {
+            cos_a * cos_b - sine(cos_a, 0.0, 1.0) * sine(cos_b, 0.0, 1.0)
+        }
     }
 }
 
@@ -47,59 +76,176 @@ impl Group {
             center: bounds.center().to_array(),
             // A little larger, against the rounding of the corners.
             radius: 0.5 * bounds.diagonal() * (1.0 + 1e-5),
-            axis: cone.axis,
-            cos_cone: cone.cos,
+            cone,
             power,
         }
-    }
-
-    /// The centre and the radius of the sphere.
-    pub(super) fn sphere(&self) -> (Vec3, f32) {
-        (self.center.into(), self.radius)
     }
 
     /// An estimate of the irradiance at `point` on a surface with `normal` (zero: facing everywhere). Zero
     /// only where no light of the group can reach the front of the surface.
     #[inline]
     pub(super) fn importance(&self, point: Vec3, normal: Vec3) -> f32 {
-        let to_light = Vec3::from(self.center) - point;
-        let radius2 = self.radius * self.radius;
-        let distance2 = to_light.length_squared();
-        // Within the sphere lights may lie in any direction.
-        if distance2 <= radius2 {
-            return (self.power / radius2.max(f32::MIN_POSITIVE)).min(LARGEST);
-        }
-        let direction = to_light * (1.0 / libm::sqrtf(distance2));
-        // θ_u: half-angle of the cone in which the sphere is seen.
-        let sin2_u = radius2 / distance2;
-        let uncertainty = (libm::sqrtf(sin2_u), libm::sqrtf(1.0 - sin2_u));
-        let mut strength = self.power / distance2;
-        if self.cos_cone > -1.0 {
-            // θ' = max(θ - θ_o - θ_u, 0), the least angle to a normal of the group.
-            let cos = -direction.dot(self.axis.into());
-            let cone = (sine(self.cos_cone), self.cos_cone);
-            let rest = minus_clamped(minus_clamped((sine(cos), cos), cone), uncertainty);
-            strength *= rest.1.max(0.0);
-        }
-        if normal != Vec3::ZERO {
-            let cos = direction.dot(normal);
-            strength *= minus_clamped((sine(cos), cos), uncertainty).1.max(0.0);
-        }
-        // Comparison with NaN is false: a point that is no number sees no light.
-        if strength > 0.0 { strength.min(LARGEST) } else { 0.0 }
+        let Self { center, radius, cone: Cone { axis, cos }, power } = *self;
+        let known = Known { center, radius, axis, sin_cone: sine(cos, 0.0, 1.0), cos_cone: cos, power };
+        importance(|value| value, &known, point, normal)
+    }
+
+    /// Whether `meets` does not rule it out, by the centre and the radius of a sphere around it.
+    pub(super) fn meets(&self, meets: impl Fn(Vec3, f32) -> bool) -> bool {
+        meets(self.center.into(), self.radius)
     }
 }
 
-#[inline]
-fn sine(cos: f32) -> f32 {
-    libm::sqrtf((1.0 - cos * cos).max(0.0))
+impl Groups {
+    /// Makes it group `i`, of [`GROUPS`].
+    pub(super) fn set(&mut self, i: usize, group: &Group) {
+        let i = i % GROUPS;
+        for k in 0..3 {
+            self.center[k][i] = group.center[k];
+            self.axis[k][i] = group.cone.axis[k];
+        }
+        self.radius[i] = group.radius;
+        self.sin_cone[i] = sine(group.cone.cos, 0.0, 1.0);
+        self.cos_cone[i] = group.cone.cos;
+        self.power[i] = group.power;
+    }
+
+    /// Group `i`, of [`GROUPS`]; `None` where there is none.
+    pub(super) fn get(&self, i: usize) -> Option<Group> {
+        let i = i % GROUPS;
+        let group = Group {
+            center: self.center.map(|all| all[i]),
+            radius: self.radius[i],
+            cone: Cone { axis: self.axis.map(|all| all[i]), cos: self.cos_cone[i] },
+            power: self.power[i],
+        };
+        (group.power > 0.0).then_some(group)
+    }
+
+    /// [`Group::importance`] of each.
+    #[inline(always)]
+    pub(super) fn importance<S: Simd>(&self, simd: S, point: Vec3, normal: Vec3) -> [f32; GROUPS] {
+        let load = |values: &[f32; GROUPS]| simd.load8(values);
+        let known = Known {
+            center: [load(&self.center[0]), load(&self.center[1]), load(&self.center[2])],
+            radius: load(&self.radius),
+            axis: [load(&self.axis[0]), load(&self.axis[1]), load(&self.axis[2])],
+            sin_cone: load(&self.sin_cone),
+            cos_cone: load(&self.cos_cone),
+            power: load(&self.power),
+        };
+        importance(|value| simd.splat8(value), &known, point, normal).to_array()
+    }
+}
+
+/// See [`Group::importance`]; `all` makes all lanes the same.
+#[inline(always)]
+fn importance<L: Lanes>(all: impl Fn(f32) -> L, group: &Known<L>, point: Vec3, normal: Vec3) -> L {
+    let (zero, one) = (all(0.0), all(1.0));
+    let [cx, cy, cz] = group.center;
+    let to_light = [cx - all(point.x), cy - all(point.y), cz - all(point.z)];
+    let (square, distance2) = (group.radius * group.radius, dot(to_light, to_light));
+    let inverse = one / distance2.sqrt();
+    let direction = to_light.map(|along| along * inverse);
+    // θ_u: half-angle of the cone in which the sphere is seen.
+    let sin_u = group.radius * inverse;
+    let uncertainty = (sin_u, sine(sin_u, zero, one));
+    // θ' = max(θ - θ_o - θ_u, 0), the least angle to a normal of the group.
+    let cos = -dot(direction, group.axis);
+    let angle = minus_clamped((sine(cos, zero, one), cos), (group.sin_cone, group.cos_cone), zero, one);
+    let narrow = minus_clamped(angle, uncertainty, zero, one).1.max(zero);
+    let shone = narrow.select(all(-1.0).lt(group.cos_cone), one);
+    let mut strength = group.power * inverse * inverse * shone;
+    if normal != Vec3::ZERO {
+        let cos = dot(direction, [all(normal.x), all(normal.y), all(normal.z)]);
+        strength = strength * minus_clamped((sine(cos, zero, one), cos), uncertainty, zero, one).1.max(zero);
+    }
+    // Within the sphere lights may lie in any direction.
+    let within = group.power / square.max(all(f32::MIN_POSITIVE));
+    let strength = within.select(distance2.le(square), strength);
+    // Comparison with NaN is false: a point that is no number sees no light.
+    strength.min(all(LARGEST)).select(zero.lt(strength), zero)
+}
+
+#[inline(always)]
+fn dot<L: Lanes>([a, b, c]: [L; 3], [x, y, z]: [L; 3]) -> L {
+    (a * x + b * y) + c * z
+}
+
+/// The sine to a cosine, or the cosine to a sine.
+#[inline(always)]
+fn sine<L: Lanes>(cos: L, zero: L, one: L) -> L {
+    (one - cos * cos).max(zero).sqrt()
 }
 
 /// (sin, cos) of max(a - b, 0) for angles of 0 … π.
-#[inline]
-fn minus_clamped((sin_a, cos_a): (f32, f32), (sin_b, cos_b): (f32, f32)) -> (f32, f32) {
-    if cos_a > cos_b {
-        return (0.0, 1.0);
+#[inline(always)]
+fn minus_clamped<L: Lanes>((sin_a, cos_a): (L, L), (sin_b, cos_b): (L, L), zero: L, one: L) -> (L, L) {
+    let is_less = cos_b.lt(cos_a);
+    let difference = (sin_a * cos_b - cos_a * sin_b, cos_a * cos_b + sin_a * sin_b);
+    (zero.select(is_less, difference.0), one.select(is_less, difference.1))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Level;
+    use crate::sampling::Random;
+    use halflight_simd::Kernel;
+    use std::vec::Vec;
+
+    struct Weigh<'a>(&'a Groups, Vec3, Vec3);
+
+    impl Kernel for Weigh<'_> {
+        type Out = [f32; GROUPS];
+
+        #[inline(always)]
+        fn run<S: Simd>(self, simd: S) -> Self::Out {
+            self.0.importance(simd, self.1, self.2)
+        }
     }
-    (sin_a * cos_b - cos_a * sin_b, cos_a * cos_b + sin_a * sin_b)
+
+    /// Groups as they come and groups that are points, hold the point, shine everywhere, or have powers that overflow.
+    fn group(random: &Random, i: u32) -> Group {
+        let [x, y, z, size, u, v, cos, power] = [0, 1, 2, 3, 4, 5, 6, 7].map(|k| random.single(8 * i + k));
+        let center = 4.0 * Vec3::new(x, y, z) - 2.0;
+        let half = match i % 4 {
+            0 => 0.0,
+            1 => 4.0 * size,
+            _ => 0.3 * size,
+        };
+        let axis = crate::sampling::warp::uniform_cone([u, v], 2.0);
+        let cos = if i % 5 == 0 { -1.0 } else { 2.0 * cos - 1.0 };
+        let power = if i % 7 == 0 { 3e38 } else { power };
+        let bounds = Bounds { min: center - half, max: center + half };
+        Group::new(&bounds, Cone { axis: axis.to_array(), cos }, power)
+    }
+
+    #[test]
+    fn eight_groups_are_weighed_as_each_of_them() {
+        let random = Random::new(1, 2);
+        for case in 0..2000u32 {
+            let all: Vec<Group> = (0..GROUPS as u32).map(|i| group(&random, 8 * case + i)).collect();
+            let mut groups = Groups::zeroed();
+            // The last is none in every other case.
+            let count = GROUPS - (case as usize & 1);
+            all.iter().take(count).enumerate().for_each(|(i, group)| groups.set(i, group));
+            let [x, y, z, u, v] = [0, 1, 2, 3, 4].map(|k| random.single(1_000_000 + 5 * case + k));
+            let (point, normal) = match case % 6 {
+                0 => (Vec3::NAN, Vec3::Z),
+                1 => (Vec3::from(all[0].center), Vec3::Z),
+                2 => (4.0 * Vec3::new(x, y, z) - 2.0, Vec3::ZERO),
+                _ => (4.0 * Vec3::new(x, y, z) - 2.0, crate::sampling::warp::uniform_cone([u, v], 2.0)),
+            };
+            let mut wanted = [0.0; GROUPS];
+            for (slot, group) in wanted.iter_mut().zip(&all).take(count) {
+                *slot = group.importance(point, normal);
+            }
+            assert!(wanted.iter().all(|value| (0.0..=LARGEST).contains(value)), "{wanted:?}");
+            for level in Level::detect().and_below() {
+                let found = level.dispatch(Weigh(&groups, point, normal));
+                assert_eq!(found.map(f32::to_bits), wanted.map(f32::to_bits), "{case} {}", level.name());
+            }
+        }
+    }
 }

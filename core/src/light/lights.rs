@@ -11,12 +11,12 @@ use super::environment::EnvironmentSampler;
 use super::tree::{Item, Tree};
 use super::window::{Aim, Window, Windows};
 use super::{PointLight, emitted, luminance};
-use crate::Rgb;
 use crate::bsdf::All;
 use crate::geometry::Bounds;
 use crate::memory::{Arena, Footprint, OutOfMemory};
 use crate::sampling::{AliasTable, ONE_MINUS_EPSILON, Sampler, warp::uniform_triangle};
 use crate::scene::{Material, Mesh, Scene};
+use crate::{Level, Rgb};
 use core::cell::Cell;
 use glam::{Vec2, Vec3};
 
@@ -185,6 +185,11 @@ impl<'m> Lights<'m> {
             environment_weight: if environment.is_some() { finite(sky) } else { 0.0 },
             distant_weight: if distant.is_empty() { 0.0 } else { finite(sun) },
         })
+    }
+
+    /// The same lights, chosen by the instructions of `level`: the same ones, and sooner.
+    pub fn with_level(&self, level: Level) -> Self {
+        Self { tree: self.tree.with_level(level), ..*self }
     }
 
     /// The same lights, the environment sampled through `windows`.

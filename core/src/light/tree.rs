@@ -1,12 +1,15 @@
-//! The light tree: groups of lights in a binary tree, so that one of very many is chosen by what it can do
-//! for a point, in as many steps as the tree is deep (Conty Estevez and Kulla 2018).
+//! The light tree: groups of lights in a tree, so that one of very many is chosen by what it can do for a point, in as
+//! many steps as the tree is deep (Conty Estevez and Kulla 2018). It is built as a binary tree, of which three levels
+//! make a node: eight groups are weighed at once, and chosen from.
 
-use super::bounds::{Cone, Group};
+use super::bounds::{Cone, GROUPS, Group, Groups};
+use crate::Level;
 use crate::geometry::Bounds;
 use crate::memory::{Arena, Footprint, OutOfMemory};
 use crate::sampling::ONE_MINUS_EPSILON;
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
+use halflight_simd::{Kernel, Simd};
 
 /// Bins of the split search, for each axis.
 const BINS: usize = 12;
@@ -14,16 +17,22 @@ const BINS: usize = 12;
 /// From this depth on nodes are halved by count, so that no path is longer than the bits of a trail.
 const DEPTH_OF_HALVING: u32 = 30;
 
-/// A leaf or the parent of two neighbours.
+/// Three levels of a binary tree: up to eight lights or nodes.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C)]
 pub(super) struct Node {
-    group: Group,
-    /// The first child, or [`LEAF`] and the light.
-    link: u32,
+    groups: Groups,
+    /// The node of each group, or [`LEAF`] and the light.
+    links: [u32; GROUPS],
 }
 
 const LEAF: u32 = 1 << 31;
+
+/// Levels of a binary tree in a node.
+const LEVELS: u32 = GROUPS.trailing_zeros();
+
+/// The most nodes that wait while all are visited: no path has more than 21 of them, as trails have bits.
+const WAITING: usize = 1 + (u64::BITS / LEVELS) as usize * (GROUPS - 1);
 
 /// A light that is to go into a tree: scratch memory of the build.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
@@ -46,137 +55,208 @@ impl Item {
     }
 }
 
-/// A binary tree over lights. Built from [`Item`]s; a light is its `light` number there.
+/// A tree over lights. Built from [`Item`]s; a light is its `light` number there.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Tree<'m> {
+    level: Level,
+    /// All lights.
+    whole: Group,
+    /// None where there is one light only.
     nodes: &'m [Node],
-    /// For each light the turns from the root to its leaf, the first one lowest.
+    /// For each light the groups from the first node to it, [`LEVELS`] bits for each, the first one lowest.
     trails: &'m [u64],
 }
 
 impl<'m> Tree<'m> {
     pub(super) fn footprint(lights: usize) -> Footprint {
-        Footprint::default().slice::<Node>((2 * lights).saturating_sub(1)).slice::<u64>(lights)
+        Footprint::default().slice::<Node>(most_nodes(lights)).slice::<u64>(lights)
     }
 
     /// Over `items`, whose order changes. Their `light`s are 0 … `items.len()` - 1, each once.
     pub(super) fn build(items: &mut [Item], nodes: &'m mut [Node], trails: &'m mut [u64]) -> Self {
-        let mut stack = [Work::default(); 64];
-        let mut waiting = 1;
-        let mut free = 1;
+        let whole = items.iter().fold(Sum::NONE, |sum, item| sum.and(Sum::of(item)));
+        let whole = if items.is_empty() { Group::default() } else { whole.group(items) };
+        let mut stack = [Work::default(); WAITING];
+        let mut waiting = usize::from(items.len() > 1);
+        let mut free = waiting;
         stack[0] = Work { end: items.len(), ..Work::default() };
-        while waiting > 0 && !items.is_empty() {
+        while waiting > 0 {
             waiting -= 1;
             let work = stack[waiting];
-            let part = &mut items[work.start..work.end];
-            let whole = part.iter().fold(Sum::NONE, |sum, item| sum.and(Sum::of(item)));
-            let group = Group::new(&whole.bounds, whole.cone(part), whole.power);
-            if let [item] = part {
-                nodes[work.node] = Node { group, link: LEAF | item.light };
-                trails[item.light as usize] = work.trail;
-                continue;
+            for (lane, (start, end)) in work.parts(items).into_iter().enumerate() {
+                let part = &items[start..end];
+                if part.is_empty() {
+                    continue;
+                }
+                let sum = part.iter().fold(Sum::NONE, |sum, item| sum.and(Sum::of(item)));
+                let node = &mut nodes[work.node];
+                node.groups.set(lane, &sum.group(part));
+                let trail = work.trail | (lane as u64) << work.depth;
+                if let [item] = part {
+                    node.links[lane] = LEAF | item.light;
+                    trails[item.light as usize] = trail;
+                } else {
+                    node.links[lane] = free as u32;
+                    stack[waiting] = Work { start, end, node: free, depth: work.depth + LEVELS, trail };
+                    waiting += 1;
+                    free += 1;
+                }
             }
-            let middle = work.start + split(part, &whole, work.depth);
-            nodes[work.node] = Node { group, link: free as u32 };
-            let child = |start, end, right: usize| Work {
-                start,
-                end,
-                node: free + right,
-                depth: work.depth + 1,
-                trail: work.trail | (right as u64) << work.depth,
-            };
-            stack[waiting] = child(middle, work.end, 1);
-            stack[waiting + 1] = child(work.start, middle, 0);
-            waiting += 2;
-            free += 2;
         }
-        Self { nodes, trails }
+        Self { level: Level::BASELINE, whole, nodes, trails }
     }
 
     /// The slices that [`Tree::build`] fills.
     pub(super) fn memory(lights: usize, arena: &mut Arena<'m>) -> Result<Memory<'m>, OutOfMemory> {
-        Ok((arena.slice((2 * lights).saturating_sub(1))?, arena.slice(lights)?))
+        Ok((arena.slice(most_nodes(lights))?, arena.slice(lights)?))
+    }
+
+    /// The same, with the instructions of `level`.
+    pub(super) fn with_level(self, level: Level) -> Self {
+        Self { level, ..self }
     }
 
     /// The estimate of what all lights together can do.
     #[inline]
     pub(super) fn importance(&self, point: Vec3, normal: Vec3) -> f32 {
-        self.nodes.first().map_or(0.0, |root| root.group.importance(point, normal))
+        if self.trails.is_empty() { 0.0 } else { self.whole.importance(point, normal) }
     }
 
     /// A light, its probability, and what is left of `u`, a number in [0, 1) again. `None` where no light
     /// can reach the point.
     #[inline]
-    pub(super) fn sample(&self, point: Vec3, normal: Vec3, mut u: f32) -> Option<(u32, f32, f32)> {
-        let mut node = self.nodes.first()?;
-        let mut probability = 1.0;
-        while node.link & LEAF == 0 {
-            let (left, right, share) = self.children(node, point, normal)?;
-            if u < share {
-                u /= share;
-                probability *= share;
-                node = left;
-            } else {
-                u = (u - share) / (1.0 - share);
-                probability *= 1.0 - share;
-                node = right;
-            }
-            u = u.min(ONE_MINUS_EPSILON);
+    pub(super) fn sample(&self, point: Vec3, normal: Vec3, u: f32) -> Option<(u32, f32, f32)> {
+        match self.trails.len() {
+            0 => None,
+            1 => Some((0, 1.0, u)),
+            _ => self.level.dispatch(Choose { nodes: self.nodes, point, normal, u }),
         }
-        Some((node.link & !LEAF, probability, u))
     }
 
     /// The probability with which [`Tree::sample`] finds `light`.
     #[inline]
     pub(super) fn pdf(&self, point: Vec3, normal: Vec3, light: u32) -> f32 {
-        let (Some(mut node), Some(&trail)) = (self.nodes.first(), self.trails.get(light as usize)) else {
-            return 0.0;
-        };
-        let mut trail = trail;
-        let mut probability = 1.0;
-        while node.link & LEAF == 0 {
-            let Some((left, right, share)) = self.children(node, point, normal) else { return 0.0 };
-            if trail & 1 == 0 {
-                probability *= share;
-                node = left;
-            } else {
-                probability *= 1.0 - share;
-                node = right;
-            }
-            trail >>= 1;
+        match self.trails.get(light as usize) {
+            None => 0.0,
+            Some(_) if self.nodes.is_empty() => 1.0,
+            Some(&trail) => self.level.dispatch(Follow { nodes: self.nodes, point, normal, trail }),
         }
-        probability
     }
 
     /// Every light of a group that `meets` does not rule out, by the centre and the radius of a sphere around it.
     pub(super) fn visit(&self, meets: impl Fn(Vec3, f32) -> bool, mut each: impl FnMut(u32)) {
-        // As deep as the tree, as both children of a node are taken at once.
-        let mut stack = [0; 65];
-        let mut waiting = usize::from(!self.nodes.is_empty());
-        while let Some(next) = waiting.checked_sub(1) {
+        if self.trails.is_empty() || !self.whole.meets(&meets) {
+            return;
+        }
+        if self.nodes.is_empty() {
+            return each(0);
+        }
+        let mut stack = [0u32; WAITING];
+        let mut waiting = 1;
+        while let Some(next) = usize::checked_sub(waiting, 1) {
             waiting = next;
-            let Some(node) = stack.get(next).and_then(|node| self.nodes.get(*node)) else { return };
-            let (center, radius) = node.group.sphere();
-            if !meets(center, radius) {
-                continue;
-            }
-            if node.link & LEAF != 0 {
-                each(node.link & !LEAF);
-            } else if let Some(free) = stack.get_mut(next..next + 2) {
-                free.copy_from_slice(&[node.link as usize, node.link as usize + 1]);
-                waiting += 2;
+            let Some(node) = stack.get(next).and_then(|node| self.nodes.get(*node as usize)) else { return };
+            for (i, &link) in node.links.iter().enumerate() {
+                if !node.groups.get(i).is_some_and(|group| group.meets(&meets)) {
+                    continue;
+                }
+                if link & LEAF != 0 {
+                    each(link & !LEAF);
+                } else if let Some(slot) = stack.get_mut(waiting) {
+                    *slot = link;
+                    waiting += 1;
+                }
             }
         }
     }
+}
 
-    /// Both children of an inner node, and the probability of the left one. `None` where neither can reach.
-    #[inline]
-    fn children(&self, node: &Node, point: Vec3, normal: Vec3) -> Option<(&'m Node, &'m Node, f32)> {
-        let first = node.link as usize;
-        let [left, right] = self.nodes.get(first..first + 2)? else { return None };
-        let (l, r) = (left.group.importance(point, normal), right.group.importance(point, normal));
-        if l + r > 0.0 { Some((left, right, l / (l + r))) } else { None }
+/// The most nodes of a tree. One with c nodes below it has b of the n - 1 branchings: at least 1 where c is 0, 3 where it is
+/// 2, 4, 6 and 7 where it is 4, 6 and 8, so that 4 b >= 4 + 3 c. The sum over all of w nodes, of which all but the first
+/// are below another: 4 (n - 1) >= 4 w + 3 (w - 1).
+fn most_nodes(lights: usize) -> usize {
+    lights.checked_sub(1).map_or(0, |branchings| (branchings.saturating_mul(4).saturating_add(3)) / 7)
+}
+
+/// See [`Tree::sample`].
+struct Choose<'t> {
+    nodes: &'t [Node],
+    point: Vec3,
+    normal: Vec3,
+    u: f32,
+}
+
+impl Kernel for Choose<'_> {
+    type Out = Option<(u32, f32, f32)>;
+
+    #[inline(always)]
+    fn run<S: Simd>(self, simd: S) -> Self::Out {
+        let Self { nodes, point, normal, mut u } = self;
+        let mut node = nodes.first()?;
+        let mut probability = 1.0;
+        loop {
+            let weights = node.groups.importance(simd, point, normal);
+            let ends = ends(&weights);
+            let sum = ends[GROUPS - 1];
+            let wanted = u * sum;
+            // Without a branch, which would be guessed wrong most of the time.
+            let mut i = ends.iter().map(|end| usize::from(*end <= wanted)).sum::<usize>();
+            if i == GROUPS {
+                // Nothing shines, or rounding went beyond the last that does.
+                i = weights.iter().rposition(|weight| *weight > 0.0)?;
+            }
+            let before = if i == 0 { 0.0 } else { ends[i - 1] };
+            u = ((wanted - before) / weights[i]).clamp(0.0, ONE_MINUS_EPSILON);
+            probability *= weights[i] / sum;
+            let link = node.links[i];
+            if link & LEAF != 0 {
+                return Some((link & !LEAF, probability, u));
+            }
+            node = nodes.get(link as usize)?;
+        }
     }
+}
+
+/// See [`Tree::pdf`].
+struct Follow<'t> {
+    nodes: &'t [Node],
+    point: Vec3,
+    normal: Vec3,
+    trail: u64,
+}
+
+impl Kernel for Follow<'_> {
+    type Out = f32;
+
+    #[inline(always)]
+    fn run<S: Simd>(self, simd: S) -> Self::Out {
+        let Self { nodes, point, normal, mut trail } = self;
+        let (mut node, mut probability) = (nodes.first(), 1.0);
+        while let Some(Node { groups, links }) = node {
+            let weights = groups.importance(simd, point, normal);
+            let i = trail as usize % GROUPS;
+            if weights[i] <= 0.0 {
+                return 0.0;
+            }
+            probability *= weights[i] / ends(&weights)[GROUPS - 1];
+            if links[i] & LEAF != 0 {
+                return probability;
+            }
+            node = nodes.get(links[i] as usize);
+            trail >>= LEVELS;
+        }
+        0.0
+    }
+}
+
+/// Sums of the first one, two … all of `weights`: each larger than the one before where its weight is not zero and rounding
+/// does not swallow it, and the same where it is.
+#[inline(always)]
+fn ends(&[a, b, c, d, e, f, g, h]: &[f32; GROUPS]) -> [f32; GROUPS] {
+    let two = a + b;
+    let four = two + (c + d);
+    let six = four + (e + f);
+    [a, two, two + c, four, four + e, six, six + g, six + g + h]
 }
 
 /// Nodes and trails of a tree that is about to be built.
@@ -188,8 +268,30 @@ struct Work {
     start: usize,
     end: usize,
     node: usize,
+    /// Bits of the trail, as many as the binary tree is deep.
     depth: u32,
     trail: u64,
+}
+
+impl Work {
+    /// The ranges of [`LEVELS`] branchings; which way each goes is a bit of its number, that of the first one lowest.
+    fn parts(&self, items: &mut [Item]) -> [(usize, usize); GROUPS] {
+        let mut parts = [(0, 0); GROUPS];
+        parts[0] = (self.start, self.end);
+        for level in 0..LEVELS {
+            let side = 1 << level;
+            for i in 0..side {
+                let (start, end) = parts[i];
+                if end - start > 1 {
+                    let part = &mut items[start..end];
+                    let whole = part.iter().fold(Sum::NONE, |sum, item| sum.and(Sum::of(item)));
+                    let middle = start + split(part, &whole, self.depth + level);
+                    (parts[i], parts[i + side]) = ((start, middle), (middle, end));
+                }
+            }
+        }
+        parts
+    }
 }
 
 /// Some items together.
@@ -217,6 +319,11 @@ impl Sum {
             power: self.power + other.power,
             count: self.count + other.count,
         }
+    }
+
+    /// The group of `items`, whose sum this is.
+    fn group(&self, items: &[Item]) -> Group {
+        Group::new(&self.bounds, self.cone(items), self.power)
     }
 
     /// A cone around the mean axis that holds those of all `items`.
@@ -307,4 +414,93 @@ fn partition(items: &mut [Item], first: impl Fn(&Item) -> bool) -> usize {
         }
     }
     middle
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::memory::Line;
+    use crate::sampling::Random;
+    use std::vec;
+    use std::vec::Vec;
+
+    /// Lights that lie as `place` says, and shine as they come.
+    fn items(count: u32, place: impl Fn(&Random, u32) -> Vec3) -> Vec<Item> {
+        let random = Random::new(3, count);
+        let item = |i: u32| {
+            let [u, v, cos, power] = [0, 1, 2, 3].map(|k| random.single(1_000_000 + 4 * i + k));
+            let axis = crate::sampling::warp::uniform_cone([u, v], 2.0).to_array();
+            let cone = if i.is_multiple_of(5) { Cone::ALL } else { Cone { axis, cos } };
+            let center = place(&random, i);
+            Item::new(&Bounds { min: center - 0.01, max: center + 0.01 }, cone, power + 0.01, i)
+        };
+        (0..count).map(item).collect()
+    }
+
+    fn with_tree(mut items: Vec<Item>, then: impl FnOnce(&Tree, usize)) {
+        let count = items.len();
+        let mut lines = vec![Line([0; 64]); Tree::footprint(count).bytes() / 64];
+        let (nodes, trails) =
+            Tree::memory(count, &mut Arena::new(bytemuck::cast_slice_mut(&mut lines))).unwrap();
+        then(&Tree::build(&mut items, nodes, trails), count);
+    }
+
+    #[test]
+    fn lights_are_found_as_often_as_is_said() {
+        let even = |random: &Random, i: u32| Vec3::from([0, 1, 2].map(|k| random.single(3 * i + k)));
+        let on_a_line = |_: &Random, i: u32| Vec3::X * libm::powf(0.7, i as f32);
+        let all_at_once = |_: &Random, _: u32| Vec3::ONE;
+        let mut cases = Vec::new();
+        for count in [0, 1, 2, 3, 7, 8, 9, 16, 17, 64, 100, 513] {
+            cases.extend([items(count, even), items(count, on_a_line), items(count, all_at_once)]);
+        }
+        let random = Random::new(4, 4);
+        for (case, items) in cases.into_iter().enumerate() {
+            with_tree(items, |tree, count| {
+                for i in 0..20 {
+                    let [x, y, z, u, v] =
+                        [0, 1, 2, 3, 4].map(|k| random.single(200 * case as u32 + 5 * i + k));
+                    let point = 4.0 * Vec3::new(x, y, z) - 1.5;
+                    let normal = if i % 4 == 0 {
+                        Vec3::ZERO
+                    } else {
+                        crate::sampling::warp::uniform_cone([u, v], 2.0)
+                    };
+                    let densities: Vec<f32> =
+                        (0..count as u32).map(|light| tree.pdf(point, normal, light)).collect();
+                    let sum: f32 = densities.iter().sum();
+                    let steps = 256;
+                    let mut found = 0;
+                    for step in 0..steps {
+                        let u = (step as f32 + 0.5) / steps as f32;
+                        let drawn = tree.sample(point, normal, u);
+                        found += u32::from(drawn.is_some());
+                        let Some((light, probability, left)) = drawn else { continue };
+                        assert_eq!(probability, densities[light as usize]);
+                        assert!(probability > 0.0 && (0.0..1.0).contains(&left));
+                        for level in Level::detect().and_below() {
+                            let same = tree.with_level(level);
+                            assert_eq!(same.sample(point, normal, u), drawn);
+                            assert_eq!(same.pdf(point, normal, light), probability);
+                        }
+                    }
+                    // A group may be better than all that is in it: what is lost is a sample of nothing.
+                    let share = found as f32 / steps as f32;
+                    assert!((sum - share).abs() < 0.02 && sum < 1.0 + 1e-4, "{case} {i}: {sum} {share}");
+                }
+            });
+        }
+    }
+
+    #[test]
+    fn all_lights_are_visited_once_but_those_of_groups_that_are_ruled_out() {
+        for count in [0, 1, 2, 9, 100] {
+            with_tree(items(count, |random, i| Vec3::X * random.single(i)), |tree, count| {
+                let mut seen = vec![0; count];
+                tree.visit(|_, _| true, |light| seen[light as usize] += 1);
+                assert!(seen.iter().all(|times| *times == 1));
+                tree.visit(|_, _| false, |_| panic!("ruled out"));
+            });
+        }
+    }
 }

@@ -63,6 +63,7 @@ impl WithFeatures for Render<'_> {
         memory.set_aside("picture", picture.slice::<u32>(pixels))?;
         let mut lights_lines = memory.take("lights", Lights::footprint(scene).and(Lights::scratch(scene)))?;
         let lights = Lights::build(scene, &mut Arena::new(bytemuck::cast_slice_mut(&mut lights_lines)))?;
+        let lights = lights.with_level(settings.level);
         let build = build_start.elapsed().as_secs_f64();
 
         let clock = Clock::start(resumed.as_ref().map_or(0.0, |film| film.header.seconds));

@@ -100,7 +100,7 @@ impl WithFeatures for Study<'_> {
         let mut bvh_lines = Pages::default();
         let bvh = build_bvh(scene, settings.level, &workers, &mut memory, &mut bvh_lines)?;
         let mut lights_lines = memory.take("lights", Lights::footprint(scene).and(Lights::scratch(scene)))?;
-        let lights = Lights::build(scene, &mut arena(&mut lights_lines))?;
+        let lights = Lights::build(scene, &mut arena(&mut lights_lines))?.with_level(settings.level);
         let tracer = PathTracer::<F>::new(scene, &bvh, &lights, path_settings(settings), settings.level);
         let strata = settings.cache.strata as usize;
         let scratch = PathTracer::<F>::gather_scratch(strata).or(PathTracer::<F>::gather_scratch(EXACT));
