@@ -11,6 +11,7 @@ pub mod derivatives;
 pub mod image_input;
 pub mod kernels;
 pub mod lanes;
+pub mod lights;
 #[cfg(feature = "app")]
 pub mod mtl;
 mod numbers;
@@ -41,6 +42,7 @@ pub const TARGETS: &[Target] = &[
     Target { name: "image_input", run: image_input::run },
     Target { name: "kernels", run: kernels::run },
     Target { name: "lanes", run: lanes::run },
+    Target { name: "lights", run: lights::run },
     #[cfg(feature = "app")]
     Target { name: "mtl", run: mtl::run },
     #[cfg(feature = "app")]

@@ -1,6 +1,8 @@
 //! What is known of a group of lights: where they are, which way they shine, how strongly; and how much of
 //! that can reach a point (Conty Estevez and Kulla 2018, "Importance Sampling of Many Lights with Adaptive
 //! Tree Splitting", section 4). One group or eight, by the same code: the bits are the same.
+//!
+//! Departure: cosines count by what they are in the mean over a group, not at most (docs/decisions/0059).
 
 use crate::geometry::Bounds;
 use bytemuck::{Pod, Zeroable};
@@ -9,6 +11,19 @@ use halflight_simd::{Lanes, Simd};
 
 /// Importances are kept below this, so that their sums stay finite at a point on a light.
 const LARGEST: f32 = 1e30;
+
+/// What is above zero of cosines of mean µ and variance σ² is taken for (µ + √(µ² + k σ²)) / 2, with this k: right for all
+/// directions at once, and for a half of them seen from its side.
+const CLAMPED: f32 = 0.75;
+
+/// k σ² of cosines to places in a ball that is seen under a half-angle of sine 1, across: a ball on the horizon is right.
+const SPREAD: f32 = 0.14;
+
+/// The mean of what is above zero of cosines to all directions: what shines everywhere sends so much to each side.
+const ALL_AROUND: f32 = 0.25;
+
+/// Nothing counts for less than this share of what it may be at most.
+const LEAST: f32 = 0.1;
 
 /// Groups that are weighed at once.
 pub(super) const GROUPS: usize = 8;
@@ -31,7 +46,8 @@ pub(super) struct Group {
     center: [f32; 3],
     radius: f32,
     cone: Cone,
-    /// Luminance times area, or luminous intensity, in units of the strongest light.
+    /// Luminance times area, of both sides if both shine, or luminous intensity, four times that of what shines everywhere
+    /// (a ball shows a quarter of its area); in units of the strongest light.
     power: f32,
 }
 
@@ -58,6 +74,11 @@ pub(super) struct Cone {
 
 impl Cone {
     pub(super) const ALL: Cone = Cone { axis: [0.0, 0.0, 1.0], cos: -1.0 };
+
+    /// Whether it is of all directions.
+    pub(super) fn is_all(&self) -> bool {
+        self.cos <= -1.0
+    }
 
     /// The cosine of the cone around unit `axis` that holds this one.
     pub(super) fn cos_around(&self, axis: Vec3) -> f32 {
@@ -150,21 +171,38 @@ fn importance<L: Lanes>(all: impl Fn(f32) -> L, group: &Known<L>, point: Vec3, n
     // θ_u: half-angle of the cone in which the sphere is seen.
     let sin_u = group.radius * inverse;
     let uncertainty = (sin_u, sine(sin_u, zero, one));
-    // θ' = max(θ - θ_o - θ_u, 0), the least angle to a normal of the group.
+    let spread = all(SPREAD) * sin_u * sin_u;
     let cos = -dot(direction, group.axis);
-    let angle = minus_clamped((sine(cos, zero, one), cos), (group.sin_cone, group.cos_cone), zero, one);
-    let narrow = minus_clamped(angle, uncertainty, zero, one).1.max(zero);
-    let shone = narrow.select(all(-1.0).lt(group.cos_cone), one);
+    let sin = sine(cos, zero, one);
+    // θ' = max(θ - θ_o - θ_u, 0), the least angle to a normal of the group.
+    let angle = minus_clamped((sin, cos), (group.sin_cone, group.cos_cone), zero, one);
+    let most = minus_clamped(angle, uncertainty, zero, one).1;
+    // Normals that fill a cone of half-angle θ_o evenly have a mean of m = (1 + cos θ_o) / 2 along its axis, and there a
+    // variance of (1 - m)² / 3; the rest of 1 is across.
+    let mean = all(0.5) * (one + group.cos_cone);
+    let along = (one - mean) * (one - mean) * all(1.0 / 3.0);
+    let across = all(0.5) * (one - mean * mean - along);
+    let variance = all(CLAMPED) * (along * cos * cos + across * sin * sin) + spread * sin * sin;
+    let shone = facing(mean * cos, variance, most, (zero, all(LEAST), all(0.5)));
+    let shone = shone.select(all(-1.0).lt(group.cos_cone), all(ALL_AROUND));
     let mut strength = group.power * inverse * inverse * shone;
     if normal != Vec3::ZERO {
         let cos = dot(direction, [all(normal.x), all(normal.y), all(normal.z)]);
-        strength = strength * minus_clamped((sine(cos, zero, one), cos), uncertainty, zero, one).1.max(zero);
+        let most = minus_clamped((sine(cos, zero, one), cos), uncertainty, zero, one).1;
+        strength = strength * facing(cos, spread, most, (zero, all(LEAST), all(0.5)));
     }
     // Within the sphere lights may lie in any direction.
-    let within = group.power / square.max(all(f32::MIN_POSITIVE));
+    let within = all(ALL_AROUND) * group.power / square.max(all(f32::MIN_POSITIVE));
     let strength = within.select(distance2.le(square), strength);
     // Comparison with NaN is false: a point that is no number sees no light.
     strength.min(all(LARGEST)).select(zero.lt(strength), zero)
+}
+
+/// The mean of what is above zero of cosines of this mean and variance, of which the largest is `most`.
+#[inline(always)]
+fn facing<L: Lanes>(mean: L, variance: L, most: L, (zero, least, half): (L, L, L)) -> L {
+    let about = half * (mean + (mean * mean + variance).sqrt());
+    about.max(least * most).select(zero.lt(most), zero)
 }
 
 #[inline(always)]

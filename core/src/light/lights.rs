@@ -154,8 +154,11 @@ impl<'m> Lights<'m> {
 
         let mut scratch = arena.scratch();
         let items: &mut [Item] = scratch.slice(counts.in_tree())?;
-        let area_powers = kept.iter().map(|e| mean_luminance(scene, e) * f64::from(e.area));
-        let point_powers = points.iter().map(|&light| strength_of(scene, light));
+        let sides = |e: &Emitter| if e.is_two_sided() { 2.0 } else { 1.0 };
+        let area_powers = kept.iter().map(|e| mean_luminance(scene, e) * f64::from(e.area) * sides(e));
+        // As a ball that shows a quarter of its area.
+        let all_around = |light| if place_of(scene, light).1.is_all() { 4.0 } else { 1.0 };
+        let point_powers = points.iter().map(|&light| strength_of(scene, light) * all_around(light));
         let unit = area_powers.clone().chain(point_powers.clone()).fold(0.0, f64::max);
         let unit = if unit > 0.0 { unit } else { 1.0 };
         let relative = |power: f64| (power / unit).max(LEAST_POWER) as f32;
