@@ -253,8 +253,8 @@ mod tests {
             _ => 0.3 * size,
         };
         let axis = crate::sampling::warp::uniform_cone([u, v], 2.0);
-        let cos = if i % 5 == 0 { -1.0 } else { 2.0 * cos - 1.0 };
-        let power = if i % 7 == 0 { 3e38 } else { power };
+        let cos = if i.is_multiple_of(5) { -1.0 } else { 2.0 * cos - 1.0 };
+        let power = if i.is_multiple_of(7) { 3e38 } else { power };
         let bounds = Bounds { min: center - half, max: center + half };
         Group::new(&bounds, Cone { axis: axis.to_array(), cos }, power)
     }
