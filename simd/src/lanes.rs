@@ -64,6 +64,12 @@ pub trait Lanes:
     fn to_array(self) -> Self::Array;
 }
 
+/// a · b, lane by lane.
+#[inline(always)]
+pub fn dot<L: Lanes>([a, b, c]: [L; 3], [x, y, z]: [L; 3]) -> L {
+    (a * x + b * y) + c * z
+}
+
 impl Mask for bool {
     #[inline(always)]
     fn bits(self) -> u32 {

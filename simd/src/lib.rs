@@ -21,7 +21,7 @@ mod x86;
 pub mod kernels;
 
 pub use baseline::{Baseline, F8, M8, Pair};
-pub use lanes::{Lanes, Mask, Simd};
+pub use lanes::{Lanes, Mask, Simd, dot};
 pub use level::{Kernel, Level, Tier};
 pub use prefetch::prefetch;
 pub use stack::{STACK, Stack, StackMemory};

@@ -7,7 +7,7 @@
 use crate::geometry::Bounds;
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
-use halflight_simd::{Lanes, Simd};
+use halflight_simd::{Lanes, Simd, dot};
 
 /// Importances are kept below this, so that their sums stay finite at a point on a light.
 const LARGEST: f32 = 1e30;
@@ -28,27 +28,18 @@ const LEAST: f32 = 0.1;
 /// Groups that are weighed at once.
 pub(super) const GROUPS: usize = 8;
 
-/// What a group is, number by number.
-#[derive(Clone, Copy)]
-struct Known<L> {
+/// A bounding sphere, a cone that holds the normals, and the power of some lights; or those of several groups, in lanes. Every
+/// light is taken to shine into the half-space around its normal.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Group<L = f32> {
     center: [L; 3],
     radius: L,
     axis: [L; 3],
     sin_cone: L,
     cos_cone: L,
-    power: L,
-}
-
-/// A bounding sphere, a cone that holds the normals, and the power of some lights. Every light is taken to
-/// shine into the half-space around its normal.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Group {
-    center: [f32; 3],
-    radius: f32,
-    cone: Cone,
     /// Luminance times area, of both sides if both shine, or luminous intensity, four times that of what shines everywhere
     /// (a ball shows a quarter of its area); in units of the strongest light.
-    power: f32,
+    power: L,
 }
 
 /// Eight groups. One without power is none.
@@ -97,23 +88,23 @@ impl Group {
             center: bounds.center().to_array(),
             // A little larger, against the rounding of the corners.
             radius: 0.5 * bounds.diagonal() * (1.0 + 1e-5),
-            cone,
+            axis: cone.axis,
+            sin_cone: sine(cone.cos, 0.0, 1.0),
+            cos_cone: cone.cos,
             power,
         }
+    }
+
+    /// The centre and the radius of the sphere.
+    pub(super) fn sphere(&self) -> (Vec3, f32) {
+        (self.center.into(), self.radius)
     }
 
     /// An estimate of the irradiance at `point` on a surface with `normal` (zero: facing everywhere). Zero
     /// only where no light of the group can reach the front of the surface.
     #[inline]
     pub(super) fn importance(&self, point: Vec3, normal: Vec3) -> f32 {
-        let Self { center, radius, cone: Cone { axis, cos }, power } = *self;
-        let known = Known { center, radius, axis, sin_cone: sine(cos, 0.0, 1.0), cos_cone: cos, power };
-        importance(|value| value, &known, point, normal)
-    }
-
-    /// Whether `meets` does not rule it out, by the centre and the radius of a sphere around it.
-    pub(super) fn meets(&self, meets: impl Fn(Vec3, f32) -> bool) -> bool {
-        meets(self.center.into(), self.radius)
+        importance(|value| value, self, point, normal)
     }
 }
 
@@ -123,31 +114,25 @@ impl Groups {
         let i = i % GROUPS;
         for k in 0..3 {
             self.center[k][i] = group.center[k];
-            self.axis[k][i] = group.cone.axis[k];
+            self.axis[k][i] = group.axis[k];
         }
         self.radius[i] = group.radius;
-        self.sin_cone[i] = sine(group.cone.cos, 0.0, 1.0);
-        self.cos_cone[i] = group.cone.cos;
+        self.sin_cone[i] = group.sin_cone;
+        self.cos_cone[i] = group.cos_cone;
         self.power[i] = group.power;
     }
 
-    /// Group `i`, of [`GROUPS`]; `None` where there is none.
-    pub(super) fn get(&self, i: usize) -> Option<Group> {
+    /// [`Group::sphere`] of group `i`, of [`GROUPS`]; `None` where there is none.
+    pub(super) fn sphere(&self, i: usize) -> Option<(Vec3, f32)> {
         let i = i % GROUPS;
-        let group = Group {
-            center: self.center.map(|all| all[i]),
-            radius: self.radius[i],
-            cone: Cone { axis: self.axis.map(|all| all[i]), cos: self.cos_cone[i] },
-            power: self.power[i],
-        };
-        (group.power > 0.0).then_some(group)
+        (self.power[i] > 0.0).then(|| (self.center.map(|all| all[i]).into(), self.radius[i]))
     }
 
     /// [`Group::importance`] of each.
     #[inline(always)]
     pub(super) fn importance<S: Simd>(&self, simd: S, point: Vec3, normal: Vec3) -> [f32; GROUPS] {
         let load = |values: &[f32; GROUPS]| simd.load8(values);
-        let known = Known {
+        let groups = Group {
             center: [load(&self.center[0]), load(&self.center[1]), load(&self.center[2])],
             radius: load(&self.radius),
             axis: [load(&self.axis[0]), load(&self.axis[1]), load(&self.axis[2])],
@@ -155,14 +140,19 @@ impl Groups {
             cos_cone: load(&self.cos_cone),
             power: load(&self.power),
         };
-        importance(|value| simd.splat8(value), &known, point, normal).to_array()
+        importance(|value| simd.splat8(value), &groups, point, normal).to_array()
     }
 }
 
 /// See [`Group::importance`]; `all` makes all lanes the same.
 #[inline(always)]
-fn importance<L: Lanes>(all: impl Fn(f32) -> L, group: &Known<L>, point: Vec3, normal: Vec3) -> L {
+fn importance<L: Lanes>(all: impl Fn(f32) -> L, group: &Group<L>, point: Vec3, normal: Vec3) -> L {
     let (zero, one) = (all(0.0), all(1.0));
+    // The mean of what is above zero of cosines of this mean and variance, of which the largest is `most`.
+    let facing = |mean: L, variance: L, most: L| {
+        let about = all(0.5) * (mean + (mean * mean + variance).sqrt());
+        about.max(all(LEAST) * most).select(zero.lt(most), zero)
+    };
     let [cx, cy, cz] = group.center;
     let to_light = [cx - all(point.x), cy - all(point.y), cz - all(point.z)];
     let (square, distance2) = (group.radius * group.radius, dot(to_light, to_light));
@@ -183,31 +173,19 @@ fn importance<L: Lanes>(all: impl Fn(f32) -> L, group: &Known<L>, point: Vec3, n
     let along = (one - mean) * (one - mean) * all(1.0 / 3.0);
     let across = all(0.5) * (one - mean * mean - along);
     let variance = all(CLAMPED) * (along * cos * cos + across * sin * sin) + spread * sin * sin;
-    let shone = facing(mean * cos, variance, most, (zero, all(LEAST), all(0.5)));
+    let shone = facing(mean * cos, variance, most);
     let shone = shone.select(all(-1.0).lt(group.cos_cone), all(ALL_AROUND));
     let mut strength = group.power * inverse * inverse * shone;
     if normal != Vec3::ZERO {
         let cos = dot(direction, [all(normal.x), all(normal.y), all(normal.z)]);
         let most = minus_clamped((sine(cos, zero, one), cos), uncertainty, zero, one).1;
-        strength = strength * facing(cos, spread, most, (zero, all(LEAST), all(0.5)));
+        strength = strength * facing(cos, spread, most);
     }
     // Within the sphere lights may lie in any direction.
     let within = all(ALL_AROUND) * group.power / square.max(all(f32::MIN_POSITIVE));
     let strength = within.select(distance2.le(square), strength);
     // Comparison with NaN is false: a point that is no number sees no light.
     strength.min(all(LARGEST)).select(zero.lt(strength), zero)
-}
-
-/// The mean of what is above zero of cosines of this mean and variance, of which the largest is `most`.
-#[inline(always)]
-fn facing<L: Lanes>(mean: L, variance: L, most: L, (zero, least, half): (L, L, L)) -> L {
-    let about = half * (mean + (mean * mean + variance).sqrt());
-    about.max(least * most).select(zero.lt(most), zero)
-}
-
-#[inline(always)]
-fn dot<L: Lanes>([a, b, c]: [L; 3], [x, y, z]: [L; 3]) -> L {
-    (a * x + b * y) + c * z
 }
 
 /// The sine to a cosine, or the cosine to a sine.

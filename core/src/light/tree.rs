@@ -119,7 +119,7 @@ impl<'m> Tree<'m> {
     /// The estimate of what all lights together can do.
     #[inline]
     pub(super) fn importance(&self, point: Vec3, normal: Vec3) -> f32 {
-        if self.trails.is_empty() { 0.0 } else { self.whole.importance(point, normal) }
+        self.whole.importance(point, normal)
     }
 
     /// A light, its probability, and what is left of `u`, a number in [0, 1) again. `None` where no light
@@ -145,7 +145,8 @@ impl<'m> Tree<'m> {
 
     /// Every light of a group that `meets` does not rule out, by the centre and the radius of a sphere around it.
     pub(super) fn visit(&self, meets: impl Fn(Vec3, f32) -> bool, mut each: impl FnMut(u32)) {
-        if self.trails.is_empty() || !self.whole.meets(&meets) {
+        let (center, radius) = self.whole.sphere();
+        if self.trails.is_empty() || !meets(center, radius) {
             return;
         }
         if self.nodes.is_empty() {
@@ -157,7 +158,7 @@ impl<'m> Tree<'m> {
             waiting = next;
             let Some(node) = stack.get(next).and_then(|node| self.nodes.get(*node as usize)) else { return };
             for (i, &link) in node.links.iter().enumerate() {
-                if !node.groups.get(i).is_some_and(|group| group.meets(&meets)) {
+                if !node.groups.sphere(i).is_some_and(|(center, radius)| meets(center, radius)) {
                     continue;
                 }
                 if link & LEAF != 0 {

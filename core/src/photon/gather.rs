@@ -21,7 +21,7 @@ use crate::Rgb;
 use core::f32::consts::PI;
 use glam::Vec3;
 use halflight_simd::kernels::points::{Place16, squared};
-use halflight_simd::{Kernel, Lanes, Mask, Simd};
+use halflight_simd::{Kernel, Lanes, Mask, Simd, dot};
 
 /// How far from the plane of a disc its photons may lie, in radii: what a surface bends in it, when its radius of
 /// curvature is two and a half times as large.
@@ -351,11 +351,6 @@ impl<S: Simd> Weighed<S> {
         let per_area = if seen > 0.0 { 1.0 / (PI * seen * radius) / radius } else { 0.0 };
         responded * per_area
     }
-}
-
-#[inline(always)]
-fn dot<L: Lanes>([a, b, c]: [L; 3], [x, y, z]: [L; 3]) -> L {
-    (a * x + b * y) + c * z
 }
 
 /// The directions of points of an octahedral grid, in whole numbers of its steps.

@@ -73,9 +73,3 @@ impl<S: Simd> Width for Sixteen<S> {
         self.0.pick16(self.0.bytes16(table), which)
     }
 }
-
-/// a · b
-#[inline(always)]
-pub(super) fn dot<L: Lanes>([a, b, c]: [L; 3], [x, y, z]: [L; 3]) -> L {
-    (a * x + b * y) + c * z
-}

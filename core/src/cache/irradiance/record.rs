@@ -4,14 +4,14 @@
 //! (Schwarzhaupt, Jensen and Jarosz 2012, §5). Its support may be wider, by the overlap that the metric allows. A fence
 //! cuts out of both what lies behind a wall.
 
-use super::lanes::{Asked, One, Voice, Width, dot};
+use super::lanes::{Asked, One, Voice, Width};
 use super::{Derivatives, Reach};
 use crate::Rgb;
 use crate::geometry::Frame;
 use crate::sampling::ONE_MINUS_EPSILON;
 use bytemuck::{Pod, Zeroable};
 use glam::{Vec2, Vec3};
-use halflight_simd::{Lanes, Mask};
+use halflight_simd::{Lanes, Mask, dot};
 
 /// Azimuths for each of which a record knows how far it is to the next wall.
 pub const SECTORS: usize = 16;
