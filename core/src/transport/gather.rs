@@ -23,6 +23,10 @@ use glam::Vec3;
 /// Gatherings have numbers of pixels that no picture has.
 pub(super) const NO_PIXEL: u32 = 1 << 30;
 
+/// From so many strata along a side on those of a block go much the same way: packets save time. Of fewer they cost it, a
+/// quarter of the time of a record in Sponza with 16, a tenth with 32.
+const NARROW: usize = 64;
+
 /// A diffuse point where the irradiance is wanted. Both normals are on the side of the viewer.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C)]
@@ -194,7 +198,8 @@ impl<F: Features> PathTracer<'_, F> {
                 wave.exchanges[i] = Exchange::new(0);
             }
             counters.paths += count as u64;
-            self.trace(&mut wave, count, Coherence::Coherent, counters);
+            let coherence = if n >= NARROW { Coherence::Coherent } else { Coherence::Incoherent };
+            self.trace(&mut wave, count, coherence, counters);
             for (path, hit) in wave.paths.iter().zip(&*wave.hits).take(count) {
                 self.note(path.place as usize, hit, &frame, &mut strata);
             }

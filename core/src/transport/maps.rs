@@ -8,6 +8,9 @@
 //!    blur of the map at its end is wide (Jensen's secondary gathering, by a measured distance), where there are few
 //!    photons, where none lies on a surface like that of the point, or where a wall is in between.
 //! 2. A photon knows whether there is a wall within the disc of its estimate. If not, it need not be asked for again.
+//! 3. Where no wall is near the ray takes the harmonic mean of the nearest irradiances. Photons lie where light is: of the
+//!    nearest to a place in the shade most are of the light beside it, more than their share of the area. As many lie on an
+//!    area as it is bright, so that weights of one over brightness give each area its share.
 
 use super::PhotonLight;
 use super::density::{Gathered, Light, fence, reflected};
@@ -23,6 +26,7 @@ use crate::photon::{ALIKE, Disc, FLATNESS, Falloff, Neighbours, Photon, PhotonMa
 use crate::sampling::mix;
 use crate::scene::{Scene, SurfacePoint};
 use crate::{Level, Rgb};
+use core::cmp::Ordering;
 use core::f32::consts::{FRAC_1_PI, SQRT_2};
 use glam::Vec3;
 
@@ -203,32 +207,41 @@ impl<'a> GatherLight<'a> {
         }
         let radius = BLUR * libm::sqrtf(squared);
         let normal = point.geometric_normal;
-        let mut nearest: Option<(Photon, (f32, u32))> = None;
-        let (mut count, mut moment) = (0.0, Vec3::ZERO);
-        for (index, squared) in neighbours.iter() {
-            let Some(photon) = self.irradiances.get(index) else { continue };
-            let offset = photon.position() - point.position;
-            if photon.normal().dot(normal) < ALIKE || offset.dot(normal).abs() > FLATNESS * radius {
-                continue;
-            }
-            count += 1.0;
-            moment += offset;
-            if nearest.is_none_or(|(_, least)| (squared, index) < least) {
-                nearest = Some((photon, (squared, index)));
-            }
-        }
-        // Beside a bright spot all irradiances are of the spot.
-        let is_even = moment.length_squared() <= EVEN_CHOICE * EVEN_CHOICE * count * count * squared;
-        let (photon, _) = nearest.filter(|_| is_even)?;
-        if photon.direction().dot(photon.normal()) < 0.0 {
-            let from = point.position + point.error * normal;
-            let above = ABOVE * radius + 16.0 * f32::EPSILON * from.abs().max_element();
+        let from = point.position + point.error * normal;
+        let above = ABOVE * radius + 16.0 * f32::EPSILON * from.abs().max_element();
+        let is_seen = |photon: &Photon| {
             let to = photon.position() + above * photon.normal();
-            if bvh.occluded(level, &Ray::segment(from + above * normal, to - from - above * normal, 1.0)) {
-                return None;
+            let way = Ray::segment(from + above * normal, to - from - above * normal, 1.0);
+            photon.direction().dot(photon.normal()) >= 0.0 || !bvh.occluded(level, &way)
+        };
+        let alike = || {
+            let photons = neighbours.iter().filter_map(|(index, squared)| {
+                let photon = self.irradiances.get(index)?;
+                Some((photon, photon.position() - point.position, (squared, index)))
+            });
+            photons.filter(|(photon, offset, _)| {
+                photon.normal().dot(normal) >= ALIKE && offset.dot(normal).abs() <= FLATNESS * radius
+            })
+        };
+        // Beside a bright spot all irradiances are of the spot.
+        let (count, moment) =
+            alike().fold((0.0, Vec3::ZERO), |(n, sum), (_, offset, _)| (n + 1.0, sum + offset));
+        if moment.length_squared() > EVEN_CHOICE * EVEN_CHOICE * count * count * squared {
+            return None;
+        }
+        let (nearest, ..) = alike().min_by(|(.., a), (.., b)| a.partial_cmp(b).unwrap_or(Ordering::Equal))?;
+        if !is_seen(&nearest) {
+            return None;
+        }
+        let (mut sum, mut weights) = (Rgb::ZERO, 0.0);
+        for (photon, ..) in alike().filter(|(photon, ..)| is_seen(photon)) {
+            let brightness = luminance(photon.power());
+            if brightness > 0.0 {
+                sum += photon.power() / brightness;
+                weights += 1.0 / brightness;
             }
         }
-        Some((photon.power(), radius))
+        Some((if weights > 0.0 { sum / weights } else { Rgb::ZERO }, radius))
     }
 }
 
