@@ -322,3 +322,97 @@ impl PhotonMaps<'_> {
 pub fn may_have_caustics(scene: &Scene) -> bool {
     scene.materials.iter().any(may_focus)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::Frame;
+    use crate::photon::Photons;
+    use crate::sampling::Random;
+    use crate::scene::{Material, Mesh, Triangle};
+    use glam::Vec2;
+    use std::vec;
+    use std::vec::Vec;
+
+    fn lines(footprint: Footprint) -> Vec<Line> {
+        vec![Line([0; 64]); footprint.bytes().div_ceil(64)]
+    }
+
+    /// The map of `photons` in `memory`.
+    fn map<'m>(photons: &[Photon], memory: &'m mut [Line]) -> PhotonMap<'m> {
+        let mut arena = Arena::new(bytemuck::cast_slice_mut(memory));
+        let mut places = Photons::new(photons.len(), &mut arena).unwrap();
+        places.as_mut_slice().copy_from_slice(photons);
+        places.build(photons.len())
+    }
+
+    #[test]
+    fn an_even_floor_is_even_and_the_dark_stays_behind_its_wall() {
+        // Upright in the middle of a floor of 1 × 1.
+        let positions = [
+            [0.5, -9.0, 0.0],
+            [0.5, 9.0, 0.0],
+            [0.5, 0.5, 9.0],
+            [0.0, 0.0, 0.0],
+            [1.0, 0.0, 0.0],
+            [1.0, 1.0, 0.0],
+            [0.0, 1.0, 0.0],
+        ];
+        let triangles = [[0, 1, 2], [3, 4, 5], [3, 5, 6]].map(|vertices| Triangle { vertices, material: 0 });
+        let mesh = Mesh { positions: &positions, normals: &[], texcoords: &[], triangles: &triangles };
+        let mut memory = lines(Bvh::footprint(triangles.len()));
+        let bvh = Bvh::build(&mesh, &mut Arena::new(bytemuck::cast_slice_mut(&mut memory))).unwrap();
+
+        // An irradiance of one on its left, of a tenth on its right.
+        const PER_AREA: u32 = 20_000;
+        let random = Random::new(1, 0);
+        let mut photons = Vec::new();
+        for i in 0..PER_AREA {
+            let [x, y, chance] = [0, 1, 2].map(|which| random.single(3 * i + which));
+            if x < 0.5 || chance < 0.1 {
+                let power = Rgb::splat(1.0 / PER_AREA as f32);
+                photons.push(Photon::new(Vec3::new(x, y, 0.0), Vec3::Z, Vec3::Z, power));
+            }
+        }
+        let mut memory = lines(Photons::footprint(photons.len()));
+        let global = map(&photons, &mut memory);
+        let (level, falloff) = (Level::BASELINE, Falloff::default());
+        let all = Irradiances::new(&bvh, &global, 1.0, falloff, level);
+        let mut found = vec![Photon::NONE; all.count().div_ceil(IRRADIANCES) * IRRADIANCES];
+        for (task, out) in found.chunks_mut(IRRADIANCES).enumerate() {
+            let mut scratch = lines(Irradiances::scratch());
+            all.run(task, &mut Arena::new(bytemuck::cast_slice_mut(&mut scratch)), out).unwrap();
+        }
+        let mut memory = lines(Photons::footprint(found.len()));
+        let irradiances = map(&found, &mut memory);
+        let light = GatherLight::new(&global, &irradiances, 1.0, falloff);
+
+        let material = Material::diffuse(Rgb::ONE);
+        let ask = |x: f32, y: f32| {
+            let point = SurfacePoint {
+                position: Vec3::new(x, y, 0.0),
+                error: 1e-7,
+                geometric_normal: Vec3::Z,
+                frame: Frame::from_normal(Vec3::Z),
+                uv: Vec2::ZERO,
+                front: true,
+                material: &material,
+                triangle: 1,
+            };
+            light.irradiance((&bvh, level), &point, 100.0).map(|(irradiance, _)| irradiance.x)
+        };
+        let in_light: Vec<_> = (0..4000)
+            .filter_map(|i| ask(0.1 + 0.3 * random.single(i), 0.1 + 0.8 * random.single(4000 + i)))
+            .collect();
+        let count = in_light.len() as f32;
+        let mean = in_light.iter().sum::<f32>() / count;
+        let scatter = (in_light.iter().map(|e| (e - mean).powi(2)).sum::<f32>() / count).sqrt();
+        // The nearest irradiance alone scatters by 0.146.
+        assert!(count > 3000.0 && (mean - 1.0).abs() < 0.025 && scatter < 0.13, "{count} {mean} {scatter}");
+        let in_shade: Vec<_> = (0..4000)
+            .filter_map(|i| ask(0.501 + 0.1 * random.single(i), 0.1 + 0.8 * random.single(4000 + i)))
+            .collect();
+        let most = in_shade.iter().fold(0.0, |most: f32, &e| most.max(e));
+        assert!(in_shade.len() > 1000 && most < 0.25, "{} {most}", in_shade.len());
+    }
+}
