@@ -113,7 +113,7 @@ const FEWEST_RECORDS: usize = 4096;
 pub(in crate::drive) const LEAST_PIXELS: f32 = 2.0;
 
 /// Pixels that see an edge have several paths for each sample, unless more than one in so many does.
-const FEW_EDGES: usize = 8;
+const FEW_EDGES: usize = 2;
 
 /// Samples by which it is judged whether more points of lights are worth their rays: far from those of any picture, and
 /// the last whose rays to lamps have numbers of their own.
