@@ -64,6 +64,7 @@ OVERSAMPLING = (3, 6)
 OURS = [("paths", rays, error, spp) for rays in (256, 1024) for error in (1e-4, 3e-4) for spp in (4, 16, 64)]
 OURS += [("paths", 1024, 1e-4, 256), ("paths", 4096, 1e-4, 64), ("paths", 4096, 1e-4, 256)]
 # Many records of few rays pay where those end in photons.
+OURS += [("photons", 64, error, spp) for error, spp in ((1e-2, 4), (3e-4, 8), (3e-6, 32))]
 OURS += [("photons", 256, error, spp) for error, spp in ((3e-4, 4), (3e-4, 16), (3e-5, 16), (3e-5, 32), (3e-6, 64), (1e-6, 128))]
 # Errors for which the fastest of both are told, besides the one asked for.
 ROUND_ERRORS = [m * 10.0**e for e in range(-1, -4, -1) for m in (5, 2, 1)]

@@ -74,7 +74,7 @@ pub(super) struct Options {
     /// distance that they take [default: 0.3]
     #[arg(long, value_name = "ERROR", value_parser = values::positive, help_heading = "Irradiance cache")]
     cache_error: Option<f64>,
-    /// Rays that are gathered for a record: 256, 1024 or 4096 [default: 1024]
+    /// Rays that are gathered for a record: 64, 256, 1024 or 4096 [default: 1024]
     #[arg(long, value_name = "N", value_parser = values::gather_rays, help_heading = "Irradiance cache")]
     cache_rays: Option<u32>,
     /// Where the rays of a record find light: on paths, or in a map of photons [default: paths]
