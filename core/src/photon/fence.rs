@@ -10,7 +10,7 @@ use super::gather::Falloff;
 use crate::geometry::Frame;
 use crate::sampling::sin_cos_turns;
 use glam::{Vec2, Vec3};
-use halflight_simd::{Lanes, Mask, Simd};
+use halflight_simd::{Lanes, Mask, Simd, dot};
 
 /// Probes, and parts of a disc between them.
 pub const PROBES: usize = 8;
@@ -104,14 +104,12 @@ impl Fence {
     pub(super) fn sees<S: Simd>(
         &self,
         simd: S,
-        [x, y, z]: [S::F16; 3],
+        offset: [S::F16; 3],
         distance: S::F16,
         squared_radius: f32,
     ) -> <S::F16 as Lanes>::Mask {
-        let [a, b] = self.axes;
         // Backwards, for offsets are.
-        let u = -((x * simd.splat16(a.x) + y * simd.splat16(a.y)) + z * simd.splat16(a.z));
-        let v = -((x * simd.splat16(b.x) + y * simd.splat16(b.y)) + z * simd.splat16(b.z));
+        let [u, v] = self.axes.map(|axis| -dot(offset, axis.to_array().map(|value| simd.splat16(value))));
         let zero = simd.splat16(0.0);
         let (left, below, steep) = (u.lt(zero), v.lt(zero), u.abs().lt(v.abs()));
         let mut hidden = simd.mask16(0);

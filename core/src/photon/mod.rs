@@ -237,4 +237,7 @@ impl PhotonMap<'_> {
 }
 
 #[cfg(test)]
+pub(crate) use tests::{lines, with_map_of};
+
+#[cfg(test)]
 mod tests;

@@ -24,19 +24,24 @@ impl Random {
     }
 }
 
-pub(super) fn lines(footprint: Footprint) -> Vec<Line> {
+pub(crate) fn lines(footprint: Footprint) -> Vec<Line> {
     vec![Line([0; 64]); footprint.bytes() / size_of::<Line>()]
 }
 
 /// Builds over photons at `places` and checks the map.
 pub(super) fn with_map(places: &[Vec3], check: impl FnOnce(&PhotonMap)) {
-    let mut memory = lines(Photons::footprint(places.len()));
+    let photons: Vec<_> =
+        places.iter().map(|&place| Photon::new(place, Vec3::Z, Vec3::Z, Rgb::ONE)).collect();
+    with_map_of(&photons, check);
+}
+
+/// Builds over `photons` and checks the map.
+pub(crate) fn with_map_of(photons: &[Photon], check: impl FnOnce(&PhotonMap)) {
+    let mut memory = lines(Photons::footprint(photons.len()));
     let mut arena = Arena::new(bytemuck::cast_slice_mut(&mut memory));
-    let mut photons = Photons::new(places.len(), &mut arena).unwrap();
-    for (photon, &place) in photons.as_mut_slice().iter_mut().zip(places) {
-        *photon = Photon::new(place, Vec3::Z, Vec3::Z, Rgb::ONE);
-    }
-    check(&photons.build(places.len()));
+    let mut room = Photons::new(photons.len(), &mut arena).unwrap();
+    room.as_mut_slice().copy_from_slice(photons);
+    check(&room.build(photons.len()));
 }
 
 /// What the nearest should be: bits of squared distances in units of the map, and indices, sorted.
