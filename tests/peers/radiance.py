@@ -9,7 +9,7 @@ triangles is a sphere there. Both run on one thread; seconds are those of the pr
 are against our path tracer, whose own noise is subtracted; how far the means are apart is printed beside. `rpict` renders
 more pixels than are wanted, jittered, and squares of them are averaged: the time for that is not counted. Its settings
 are a sweep of `-aa`, `-ad`, `-as`, `-ar`, `-ab`, `-ds` and of the pixels; what counts is the fastest that is good enough, for the error
-asked for and for others that both reach.
+asked for and for others that both reach. `path` stands beside, by one picture.
 
 `RADIANCE` names a folder with the programs; without it pyradiance from PyPI is installed into `tests/peers/venv-radiance`.
 """
@@ -245,7 +245,7 @@ def compare(name, arguments, program, bin_folder):
     noise = relmse_of_noise(truth.variance(), truth.mean)
     print(f"\n{name}: reference of {truth.count * CHUNK} samples, relMSE of its noise {noise:.1e}\n")
     print("| who | settings | relMSE | mean | processor s |\n|---|---|---|---|---|", flush=True)
-    rows = {"rpict": [], "halflight": []}
+    rows = {"rpict": [], "path": [], "halflight": []}
 
     def note(who, settings, picture, seconds):
         error, mean = relmse(picture, truth.mean) - noise, picture.mean() / truth.mean.mean()
@@ -253,22 +253,29 @@ def compare(name, arguments, program, bin_folder):
         print(f"| {who} | {settings} | {error:.2e} | {mean:.4f} | {seconds:.2f} |", flush=True)
         workbench.write_picture(FOLDER / f"{name}-{who}-{len(rows[who])}.exr", picture)
 
+    picture, seconds = halflight(program, name, scene, "path", CHUNK, 1, 1, ["--audit", "off"])
+    note("path", f"{CHUNK} spp", picture, seconds)
     for gather, rays, error, spp in OURS:
+        told = f"{gather}, {rays} rays, error {error:g}, {spp} spp"
+        if arguments.only not in told:
+            continue
         extra = ["--audit", "off", "--gather", gather, "--cache-rays", rays, "--cache-error", error]
         picture, seconds = halflight(program, name, scene, "irradiance-cache", spp, 1, 1, extra)
-        note("halflight", f"{gather}, {rays} rays, error {error:g}, {spp} spp", picture, seconds)
+        note("halflight", told, picture, seconds)
     for settings in SWEEP[arguments.sweep :]:
         for oversampling in OVERSAMPLING[: arguments.oversampling]:
             told = "-aa {:g} -ar {} -ad {} -ab {} -ds {:g}".format(*settings) + f", {oversampling}² pixels"
             note("rpict", told, *rpict(bin_folder, name, scene, settings, oversampling))
-    print("\nFastest that are good enough:\n\n| relMSE | halflight | s | rpict | s | ratio |\n|---|---|---|---|---|---|")
+    print("\nFastest that are good enough; `path` as if its error fell as one over its samples:\n")
+    print("| relMSE | halflight | s | rpict | s | ratio | path s | ratio |\n|---|---|---|---|---|---|---|---|")
     for target in sorted({arguments.target or scene["target"], *ROUND_ERRORS}, reverse=True):
         fastest = lambda of: min(((row[1], row[2]) for row in of if row[0] <= target), default=(None, "none"))
         (ours, how), (theirs, settings) = fastest(rows["halflight"]), fastest(rows["rpict"])
         if ours or theirs:
             told = lambda seconds: f"{seconds:.2f}" if seconds else ""
-            ratio = f"{theirs / ours:.1f}" if ours and theirs else ""
-            print(f"| {target:g} | {how} | {told(ours)} | {settings} | {told(theirs)} | {ratio} |")
+            ratio = lambda other: f"{other / ours:.1f}" if ours and other else ""
+            by_path = rows["path"][0][0] * rows["path"][0][1] / target
+            print(f"| {target:g} | {how} | {told(ours)} | {settings} | {told(theirs)} | {ratio(theirs)} | {told(by_path)} | {ratio(by_path)} |")
 
 
 def main():
@@ -278,6 +285,7 @@ def main():
     parser.add_argument("--target", type=float, help="relMSE [default: of the scene]")
     parser.add_argument("--size", type=int, nargs=2, metavar=("W", "H"), help="pixels [default: of the scene]")
     parser.add_argument("--sweep", type=int, default=0, help="rpict's settings from this one on [default: the first]")
+    parser.add_argument("--only", default="", help="of the settings of the cache those whose words hold this")
     parser.add_argument("--oversampling", type=int, default=len(OVERSAMPLING), help="only so many numbers of its pixels")
     arguments = parser.parse_args()
     program, bin_folder = workbench.halflight_program(), programs()
