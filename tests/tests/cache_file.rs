@@ -17,7 +17,7 @@ fn render(
     let stop = Stop { spp: Some(4), ..Stop::default() };
     let method = Some(Method::IrradianceCache);
     let mut settings = Settings { method, width: 64, height: 64, stop, ..Settings::default() };
-    settings.cache.strata = 16;
+    settings.cache.strata = Some(16);
     settings.load_cache = load.map(Path::to_owned);
     settings.save_cache = save.map(Path::to_owned);
     change(&mut settings);
@@ -84,7 +84,9 @@ fn a_cache_of_something_else_is_refused_and_told_why() {
     assert!(
         refused(&buffers, |s| s.max_depth = Some(4)).ends_with("a cache of max-depth no limit of, not 4")
     );
-    assert!(refused(&buffers, |s| s.cache.strata = 32).ends_with("a cache of cache-rays 256, not 1024"));
+    assert!(
+        refused(&buffers, |s| s.cache.strata = Some(32)).ends_with("a cache of cache-rays 256, not 1024")
+    );
     assert!(refused(&buffers, |s| s.cache.error = Some(1e-3)).ends_with("of cache-error 1e-4, not 1e-3"));
     buffers.positions[0][0] += 0.01;
     let why = refused(&buffers, |_| ());

@@ -304,7 +304,7 @@ fn where_there_is_no_caustic_the_picture_is_that_without_photons() {
         assert!(!has_photons(&joined));
         let cached = |caustics| {
             render(&scene, Method::IrradianceCache, 40, 5, |s| {
-                (s.cache.strata, s.caustics) = (16, caustics);
+                (s.cache.strata, s.caustics) = (Some(16), caustics);
             })
         };
         let joined = cached(true);

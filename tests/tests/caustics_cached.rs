@@ -13,7 +13,7 @@ fn path(scene: &Scene, spp: u32, change: impl FnOnce(&mut Settings)) -> RenderRe
 /// The same with an irradiance cache.
 fn cached(scene: &Scene, spp: u32, change: impl FnOnce(&mut Settings)) -> RenderResult {
     render(scene, Method::IrradianceCache, 40, spp, |settings| {
-        settings.cache.strata = 16;
+        settings.cache.strata = Some(16);
         change(settings);
     })
 }
@@ -50,7 +50,7 @@ fn records_and_photons_have_no_light_in_common() {
     have_no_light_in_common("reflected before", &glass, 64, |s| s.cache.gather = Gather::Photons);
     // Few rays: noise that no number of samples takes away, unless records are refined.
     let refined = have_no_light_in_common("refined", &glass, 1 << 9, |s| {
-        (s.cache.strata, s.stop.error) = (4, Some(1e-4));
+        (s.cache.strata, s.stop.error) = (Some(4), Some(1e-4));
     });
     assert!(refined.refined > 0, "{refined:?}");
 }
@@ -99,7 +99,7 @@ fn what_suffices_for_records_suffices_beside_photons_too() {
     let scene = buffers.scene();
     let limited = |memory, caustics| {
         try_render(&scene, Method::IrradianceCache, 24, 2, |s| {
-            (s.cache.strata, s.cache.error) = (64, Some(10.0));
+            (s.cache.strata, s.cache.error) = (Some(64), Some(10.0));
             (s.threads, s.memory, s.caustics) = (Some(1), memory, caustics);
         })
     };

@@ -1,6 +1,7 @@
 //! The irradiance cache as a method of the renderer: its light against that of the path tracer, its bits against
 //! threads, its records against the unit of the scene, and what it does without memory.
 
+use core::sync::atomic::AtomicBool;
 use glam::Vec3;
 use halflight::compare::compare;
 use halflight::drive::{CacheUse, Ending, Gather, Mark, Method, RenderResult, Settings};
@@ -15,7 +16,7 @@ const STRATA: u32 = 16;
 
 fn cached(scene: &Scene, size: u32, spp: u32, change: impl FnOnce(&mut Settings)) -> RenderResult {
     render(scene, Method::IrradianceCache, size, spp, |settings| {
-        settings.cache.strata = STRATA;
+        settings.cache.strata = Some(STRATA);
         change(settings);
     })
 }
@@ -63,6 +64,39 @@ fn photons_tell_what_records_and_paths_do_not_know() {
     let seen = |gather| cached(&scene, 32, 4, |s| (s.max_depth, s.cache.gather) = (Some(3), gather)).image;
     let [paths, photons] = [Gather::Paths, Gather::Photons].map(seen);
     assert!(paths == photons);
+}
+
+#[test]
+fn caches_are_left_when_their_time_is_over() {
+    let buffers = cornell_box();
+    let scene = buffers.scene();
+    let path = render(&scene, Method::Path, 64, 64, |_| ());
+    // No time at all: the one sample that every picture has is path traced, of records with the fewest rays that there may be.
+    let timed = |seconds: f64, strata: Option<u32>| {
+        cached(&scene, 64, 64, |s| (s.stop.seconds, s.cache.strata) = (Some(seconds), strata))
+    };
+    let none = timed(0.0, None);
+    assert_eq!(
+        (none.spp, cache(&none)),
+        (1, CacheUse { rays: 64, is_cut: true, ..CacheUse { records: 0, ..cache(&none) } })
+    );
+    assert!(difference(&none.image, &path.image) < 0.4);
+    // What was asked for stays.
+    assert_eq!(cache(&timed(0.0, Some(16))).rays, 256);
+    // With time enough they are as without a limit.
+    let (long, unlimited) = (timed(1e6, None), cached(&scene, 64, 64, |s| s.cache.strata = None));
+    assert!(long.image == unlimited.image && cache(&long) == cache(&unlimited));
+    assert_eq!((cache(&long).rays, cache(&long).is_cut), (1024, false));
+}
+
+#[test]
+fn an_impatient_user_does_not_wait_for_caches() {
+    let buffers = cornell_box();
+    let settings =
+        Settings { method: Some(Method::IrradianceCache), width: 64, height: 64, ..Settings::default() };
+    let result =
+        halflight::drive::render(&buffers.scene(), &settings, &mut |_| (), &AtomicBool::new(true)).unwrap();
+    assert_eq!((result.spp, result.ending, cache(&result).records), (1, Ending::Interrupted, 0));
 }
 
 #[test]
@@ -203,7 +237,7 @@ fn caches_are_refined_until_the_error_asked_for_holds() {
     let buffers = cornell_box();
     let scene = buffers.scene();
     let coarse = |settings: &mut Settings| {
-        settings.cache.strata = 4;
+        settings.cache.strata = Some(4);
         settings.cache.error = Some(10.0);
     };
     let reference = render(&scene, Method::Path, SIDE, 2048, |_| ()).image;

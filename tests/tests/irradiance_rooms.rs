@@ -12,7 +12,7 @@ use halflight_tests::scenes::{SceneBuffers, constant_environment, cornell_box, e
 const SIZE: u32 = 64;
 
 fn picture(scene: &Scene, method: Method, spp: u32) -> Image {
-    let result = render(scene, method, SIZE, spp, |settings| settings.cache.strata = 16);
+    let result = render(scene, method, SIZE, spp, |settings| settings.cache.strata = Some(16));
     assert_eq!(result.counters.dropped.total(), 0);
     result.image
 }
@@ -112,7 +112,8 @@ fn spots_smaller_than_the_share_of_a_ray_light_a_room() {
         lamp(&mut buffers, Vec3::new(2.0 * size, 0.6, 0.6), Vec3::NEG_X, size, 2.5 / (size * size));
         let scene = buffers.scene();
         let [few, many] = [16, 64].map(|strata| {
-            render(&scene, Method::IrradianceCache, SIZE, 64, |settings| settings.cache.strata = strata).image
+            render(&scene, Method::IrradianceCache, SIZE, 64, |settings| settings.cache.strata = Some(strata))
+                .image
         });
         let [ratio, worst] = compared(&few, &many, 4);
         assert!((ratio - 1.0).abs() < 0.04 && worst < 0.5, "mean {ratio}, worst block {worst}");
@@ -127,7 +128,7 @@ fn spots_smaller_than_the_share_of_a_ray_light_a_room() {
 #[test]
 fn what_many_rays_meet_is_no_spot_and_the_first_records_are_gathered_again() {
     let result = render(&cornell_box().scene(), Method::IrradianceCache, SIZE, 1, |settings| {
-        settings.cache.strata = 16;
+        settings.cache.strata = Some(16);
     });
     let cache = result.cache.expect("a cache");
     let rays = result.counters.rays as f64 / (256 * cache.gathered) as f64;
@@ -170,7 +171,7 @@ fn a_room_is_seen_in_brushed_metal() {
     let scene = buffers.scene();
     let [path, cache] = [Method::Path, Method::IrradianceCache].map(|method| {
         render(&scene, method, SIZE, 64, |settings| {
-            (settings.cache.strata, settings.reuse, settings.audit) = (16, Some(false), Some(0.0));
+            (settings.cache.strata, settings.reuse, settings.audit) = (Some(16), Some(false), Some(0.0));
         })
     });
     let [few, many] = [&cache, &path].map(|result| result.error.unwrap().relmse);

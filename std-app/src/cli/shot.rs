@@ -170,7 +170,7 @@ impl Options {
         CacheSettings {
             metric: self.cache_metric.unwrap_or(defaults.metric),
             error: self.cache_error.map(|error| error as f32),
-            strata: self.cache_rays.map_or(defaults.strata, u32::isqrt),
+            strata: self.cache_rays.map(u32::isqrt),
             gather: match self.gather {
                 None => defaults.gather,
                 Some(GatherBy::Paths) => Gather::Paths,

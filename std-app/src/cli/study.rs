@@ -85,7 +85,7 @@ impl Irradiance {
         })
         .map_err(|error| shot::explain(&self.scene, &error))?;
         if self.json {
-            let rays = settings.cache.strata * settings.cache.strata;
+            let rays = settings.cache.strata().pow(2);
             say(&json!({ "records": self.records, "rays_per_record": rays, "metrics": rows }).to_string());
         }
         Ok(ExitCode::SUCCESS)

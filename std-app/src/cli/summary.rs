@@ -60,9 +60,11 @@ pub(super) fn text(run: &Run, report: Option<&Path>) -> String {
             0 => String::new(),
             times => format!(", refined {}", plural(times.into(), "time")),
         };
+        let cut = if cache.is_cut { "; cut short: what they do not reach is path traced" } else { "" };
         lines.push(format!(
-            "cache  {}{loaded} in {} by {}{refined}{lost}",
+            "cache  {}{loaded} of {} rays in {} by {}{refined}{lost}{cut}",
             plural(cache.records, "record"),
+            cache.rays,
             readable_seconds(cache.seconds),
             settings.cache.metric.name(),
         ));

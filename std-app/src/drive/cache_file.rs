@@ -42,7 +42,7 @@ impl Identity {
                 Gather::Photons => format!("{} from photons", settings.cache.metric.name()),
             },
             error: format!("{:e}", settings.cache.allowed()),
-            rays: settings.cache.strata * settings.cache.strata,
+            rays: settings.cache.strata().pow(2),
         }
     }
 

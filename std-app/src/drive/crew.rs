@@ -21,6 +21,8 @@ pub(super) struct Round<'a> {
     pub(super) deadline: Option<Instant>,
     /// Cuts it when raised.
     pub(super) interrupt: Option<&'a AtomicBool>,
+    /// Cuts what is done in a [`Crew::hurry`] when raised.
+    pub(super) hurry: Option<&'a AtomicBool>,
 }
 
 impl Round<'_> {
@@ -68,6 +70,20 @@ impl Crew<'_, '_> {
         let own = tiles.filter(|(task, _)| shard.owns(*task));
         let groups = own.flat_map(|(_, (taken, target))| taken.iter().zip(target));
         groups.filter(|(taken, target)| taken < target).map(|(taken, _)| *taken)
+    }
+
+    /// Whether the round is over.
+    pub(super) fn is_over(&self) -> bool {
+        self.round.is_over()
+    }
+
+    /// Does work that the picture can be without: cut at `deadline`, and where the render is interrupted, which the first
+    /// round as a whole is not.
+    pub(super) fn hurry<T>(&mut self, deadline: Option<Instant>, work: impl FnOnce(&mut Crew) -> T) -> T {
+        let Round { hurry, deadline: end, .. } = *self.round;
+        let deadline = [deadline, end].into_iter().flatten().min();
+        let round = Round { targets: Vec::new(), step: 1, deadline, interrupt: hurry, hurry };
+        work(&mut Crew { workers: self.workers, round: &round, canvas: self.canvas })
     }
 
     /// A pass: task `i` writes to the `i`th piece of `size` values of `out`, and what they count is the round's. Returns
@@ -198,6 +214,7 @@ mod tests {
             step: 2,
             deadline: None,
             interrupt: Some(&interrupt),
+            hurry: None,
         };
         let mut scratch = vec![vec![Line([0; 64]); 1]; threads];
         work(&mut Crew { workers: &workers, round: &round, canvas: &mut canvas }, &mut scratch)
@@ -233,6 +250,18 @@ mod tests {
     fn a_pass_that_is_cut_says_so() {
         let task = |_: usize, _: &mut Arena, _: &mut [u8]| Ok(Counters::default());
         crew(2, 1, true, |crew, scratch| assert_eq!(crew.pass(&mut [0; 9], 2, scratch, &task), Ok(false)));
+    }
+
+    #[test]
+    fn what_is_done_in_a_hurry_is_cut_and_the_round_goes_on() {
+        let task = |_: usize, _: &mut Arena, _: &mut [u8]| Ok(Counters::default());
+        let (late, soon) = (Instant::now(), Instant::now() + core::time::Duration::from_secs(3600));
+        crew(2, 1, false, |crew, scratch| {
+            let mut pass = |crew: &mut Crew| crew.pass(&mut [0; 9], 2, scratch, &task);
+            assert_eq!(crew.hurry(Some(late), &mut pass), Ok(false));
+            assert_eq!(crew.hurry(Some(soon), &mut pass), Ok(true));
+            assert_eq!((pass(crew), crew.is_over()), (Ok(true), false));
+        });
     }
 
     #[test]

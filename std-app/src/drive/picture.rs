@@ -88,6 +88,7 @@ impl Picture<'_> {
                 step: step(&plan, canvas.tiles(), workers.count()),
                 deadline,
                 interrupt: (!plan.first).then_some(interrupt),
+                hurry: Some(interrupt),
             };
             renderer.round(&mut Crew { workers, round: &round, canvas: &mut canvas })?;
             rounds.completed(canvas.spp().min(plan.target), clock.seconds());

@@ -102,7 +102,7 @@ impl WithFeatures for Study<'_> {
         let mut lights_lines = memory.take("lights", Lights::footprint(scene).and(Lights::scratch(scene)))?;
         let lights = Lights::build(scene, &mut arena(&mut lights_lines))?.with_level(settings.level);
         let tracer = PathTracer::<F>::new(scene, &bvh, &lights, path_settings(settings), settings.level);
-        let strata = settings.cache.strata as usize;
+        let strata = settings.cache.strata() as usize;
         let scratch = PathTracer::<F>::gather_scratch(strata).or(PathTracer::<F>::gather_scratch(EXACT));
         let mut scratch = memory.take_each("paths", scratch, workers.count())?;
 
@@ -110,7 +110,8 @@ impl WithFeatures for Study<'_> {
         let mut film_lines = memory.take("film", Film::footprint(1, 1))?;
         let film = Film::new(1, 1, &mut arena(&mut film_lines))?;
         let mut canvas = Canvas::new(film, Shard::WHOLE);
-        let round = Round { targets: vec![[0; GROUPS]], step: 1, deadline: None, interrupt: None };
+        let round =
+            Round { targets: vec![[0; GROUPS]], step: 1, deadline: None, interrupt: None, hurry: None };
         let mut crew = Crew { workers: &workers, round: &round, canvas: &mut canvas };
 
         let size = [settings.width, settings.height];

@@ -105,13 +105,14 @@ fn cache(run: &Run) -> Value {
     let (result, settings) = (run.result, run.settings);
     json!(result.cache.map(|cache| json!({
         "metric": settings.cache.metric.name(),
-        "rays_per_record": settings.cache.strata * settings.cache.strata,
+        "rays_per_record": cache.rays,
         "records": cache.records,
         "capacity": cache.capacity,
         "refused": cache.refused,
         "loaded": cache.loaded,
         "gathered": cache.gathered,
         "refined": cache.refined,
+        "cut": cache.is_cut,
         "seconds": cache.seconds,
         "allowed": settings.cache.allowed(),
         "survey": result.survey.as_ref().map(|survey| json!({

@@ -3,12 +3,14 @@
 //! Two caches that know nothing of each other serve the even and the odd samples, so that the halves of the film tell the
 //! errors of records too.
 //!
-//! The first round begins with the overture of both. Then caches are frozen; a point that no record reaches is path
-//! traced, as is every surface that is not diffuse. Caches can be kept in a file, and be the first records of another
+//! The first round begins with the overture of both, for which it has half of the time if that is limited (`haste.rs`).
+//! Then caches are frozen; a point that no record reaches is path traced, as is every surface that is not diffuse. Caches can be kept in a file, and be the first records of another
 //! picture of the same scene.
 
+use super::cache_settings::{CacheUse, Gather};
 use super::caster::{Cast, Caster};
 use super::caustics::{self, CausticUse};
+use super::haste::{ENOUGH, Haste};
 use super::overture::{Growing, Overture};
 use super::path::Paths;
 use super::photon_view::PhotonView;
@@ -26,7 +28,7 @@ use crate::drive::{RenderError, Settings};
 use core::f32::consts::FRAC_PI_2;
 use core::ops::Range;
 use halflight_core::bsdf::Features;
-use halflight_core::cache::irradiance::{CellFlux, IrradianceCache, Metric, Record, metric};
+use halflight_core::cache::irradiance::{CellFlux, IrradianceCache, Record, metric};
 use halflight_core::film::{Dropped, PIXELS_PER_TILE, Pixel, PixelSet, Tile};
 use halflight_core::memory::{Arena, Footprint, Line};
 use halflight_core::transport::gather::Gathering;
@@ -36,61 +38,6 @@ use halflight_core::transport::{Counters, PathTracer};
 use std::collections::VecDeque;
 use std::path::Path;
 use std::time::Instant;
-
-/// How an irradiance cache is filled.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct CacheSettings {
-    /// The rule by which records know how far they reach.
-    pub metric: Metric,
-    /// Error allowed, in the unit of the metric; `None`: its usual one.
-    pub error: Option<f32>,
-    /// Strata along a side of the hemisphere that is gathered: its square is the number of rays of a record.
-    pub strata: u32,
-    /// How the rays of a record find light.
-    pub gather: Gather,
-}
-
-impl CacheSettings {
-    /// The error allowed.
-    pub fn allowed(&self) -> f32 {
-        self.error.unwrap_or(metric::Settings::new(self.metric, 1.0).error)
-    }
-}
-
-impl Default for CacheSettings {
-    fn default() -> Self {
-        Self { metric: Metric::Halflight, error: None, strata: 32, gather: Gather::Paths }
-    }
-}
-
-/// How rays that are gathered for a record find the light that is reflected at their ends.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Gather {
-    /// By paths that go on from there, as far as the cache does not know it.
-    #[default]
-    Paths,
-    /// From a map of photons, where that is sure.
-    Photons,
-}
-
-/// What became of the caches.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct CacheUse {
-    /// Records of both.
-    pub records: u64,
-    /// Most records that there was memory for.
-    pub capacity: u64,
-    /// Records that found no memory: their surroundings are path traced.
-    pub refused: u64,
-    /// Records of both that a file had.
-    pub loaded: u64,
-    /// Places at which light was gathered: as many times the rays of a record.
-    pub gathered: u64,
-    /// How often they were refined, because the error asked for was out of reach.
-    pub refined: u32,
-    /// Seconds of the overture.
-    pub seconds: f64,
-}
 
 /// Strata along a side come in so many.
 const BLOCK: usize = 8;
@@ -190,6 +137,8 @@ impl Loaded {
 struct Needs {
     /// Strata along a side that may be gathered, the fewest first: half of those that were asked for, those, and more of them.
     sizes: Vec<usize>,
+    /// Which of them were asked for.
+    asked: usize,
     /// Of each thread.
     scratch: Footprint,
     edges: Footprint,
@@ -203,11 +152,9 @@ impl Needs {
     /// With photons of caustics or without.
     fn of<F: Features>(stage: &Stage, memory: &Memory, has_caustics: bool) -> Self {
         let Stage { settings, workers, .. } = *stage;
-        let CacheSettings { strata, gather, .. } = settings.cache;
-        let strata = strata as usize;
-        // Records of a file have one error and one number of rays.
-        let in_files = settings.save_cache.is_some() || settings.load_cache.is_some();
-        let is_refined = settings.stop.error.is_some() && !in_files && has_indirect_light(settings);
+        let gather = settings.cache.gather;
+        let strata = settings.cache.strata() as usize;
+        let is_refined = settings.stop.error.is_some() && !in_files(settings) && has_indirect_light(settings);
         // As fine as half of the memory allows.
         let has_memory = |n: usize| {
             let scratch = PathTracer::<F>::gather_scratch(n).bytes().saturating_mul(workers.count());
@@ -215,7 +162,8 @@ impl Needs {
         };
         let finer = core::iter::successors(Some(2 * strata), |n| Some(2 * n)).take_while(|n| has_memory(*n));
         let coarse = (strata / (2 * BLOCK)).max(1) * BLOCK;
-        let sizes: Vec<usize> = [coarse, strata].into_iter().chain(finer).collect();
+        let coarsest = may_be_coarse(settings).then_some(BLOCK);
+        let sizes: Vec<usize> = coarsest.into_iter().chain([coarse, strata]).chain(finer).collect();
         let finest = sizes.last().copied().unwrap_or(strata);
         let scratch = PathTracer::<F>::scratch(WAVE).or(PathTracer::<F>::gather_scratch(finest));
         let by_photons = gather == Gather::Photons && has_indirect_light(settings);
@@ -223,7 +171,8 @@ impl Needs {
         let scratch = if has_caustics { scratch.or(caustics::scratch::<F>()) } else { scratch };
         let tiles = Tile::count(settings.width, settings.height);
         let edges = Footprint::default().slice::<[u64; PIXELS_PER_TILE / 64]>(tiles);
-        Self { sizes, scratch, edges, by_photons, is_refined }
+        let asked = sizes.iter().position(|n| *n == strata).unwrap_or(0);
+        Self { sizes, asked, scratch, edges, by_photons, is_refined }
     }
 
     /// All of it.
@@ -302,7 +251,7 @@ fn set_up<F: Features, T>(
     let metric = metric::Settings { error: settings.cache.allowed(), ..usual };
     let mut method = Cached {
         tracer: stage.paths::<F>(settings.seed),
-        gathering: Gathering { flux: &tables[1], metric, least_pixels: LEAST_PIXELS },
+        gathering: Gathering { flux: &tables[needs.asked], metric, least_pixels: LEAST_PIXELS },
         tables: &tables,
         is_refined: needs.is_refined,
         refined: 0,
@@ -319,6 +268,10 @@ fn set_up<F: Features, T>(
         header: loaded.header,
         save: settings.save_cache.as_deref(),
         is_filled: false,
+        may_be_coarse: may_be_coarse(settings),
+        seconds_asked: settings.stop.seconds,
+        haste: None,
+        is_cut: false,
         edges: None,
         lights: None,
         seconds: 0.0,
@@ -337,6 +290,21 @@ fn set_up<F: Features, T>(
 /// Whether paths are long enough for light to be reflected by one surface before the one that is seen.
 fn has_indirect_light(settings: &Settings) -> bool {
     settings.max_depth.is_none_or(|depth| depth > 2)
+}
+
+/// The next fewer strata, if there are any.
+fn coarser<'t>(tables: &'t [CellFlux<'t>], flux: &'t CellFlux<'t>) -> &'t CellFlux<'t> {
+    tables.iter().rev().find(|table| table.n() < flux.n()).unwrap_or(flux)
+}
+
+/// Whether records are of a file, or go to one: they have one error and one number of rays.
+fn in_files(settings: &Settings) -> bool {
+    settings.save_cache.is_some() || settings.load_cache.is_some()
+}
+
+/// Whether records may have fewer rays than usual, where there is no time for these.
+fn may_be_coarse(settings: &Settings) -> bool {
+    settings.stop.seconds.is_some() && settings.cache.strata.is_none() && !in_files(settings)
 }
 
 /// See the file.
@@ -367,6 +335,13 @@ struct Cached<'a, F> {
     refined: usize,
     /// Refinements that wait until the caches of before are filled.
     pending: VecDeque<Refinement>,
+    /// Whether records may have fewer rays than usual, where there is no time for these.
+    may_be_coarse: bool,
+    /// Seconds that the picture has.
+    seconds_asked: Option<f64>,
+    /// When caches must be filled, where there is a limit of time, from the first time on that they are.
+    haste: Option<Haste>,
+    is_cut: bool,
     /// Pixels that see an edge, when they are known.
     edges: Option<Vec<PixelSet>>,
     /// Points of lights that are asked, when that is known.
@@ -377,11 +352,14 @@ struct Cached<'a, F> {
 impl<F: Features> Cached<'_, F> {
     /// Fills both halves, or goes on with it, and keeps them; whether that is done: not where the round is over.
     fn fill(&mut self, crew: &mut Crew) -> Result<bool, RenderError> {
-        let Self { tracer, gathering, tables, size, halves, laboratory, caster, refined, scratch, .. } = self;
         let start = Instant::now();
+        if self.haste.is_none() {
+            self.haste = self.seconds_asked.map(Haste::new);
+        }
+        let haste = self.haste;
+        let Self { tracer, gathering, tables, size, halves, laboratory, caster, refined, scratch, .. } = self;
+        let (may_be_coarse, is_cut) = (&mut self.may_be_coarse, &mut self.is_cut);
         let mut all = true;
-        let coarse = tables.iter().rev().find(|table| table.n() < gathering.flux.n());
-        let coarse = coarse.unwrap_or(gathering.flux);
         for (i, half) in halves.iter_mut().enumerate() {
             let (photons, built);
             let mut tracer = *tracer;
@@ -403,15 +381,37 @@ impl<F: Features> Cached<'_, F> {
                 built = found;
                 tracer = tracer.with_bounced([laboratory.gathered(&built); 2]);
             }
+            for (glance, enough) in ENOUGH.iter().enumerate() {
+                let Some(haste) = haste.filter(|_| *may_be_coarse) else { break };
+                let coarse = coarser(tables, gathering.flux);
+                let overture = Overture { tracer: &tracer, gathering, coarse, size: *size };
+                let is_done =
+                    crew.hurry(haste.glance(i, glance), |crew| overture.fill(half, crew, scratch))?;
+                let served = if is_done { None } else { overture.served(half, crew, scratch)? };
+                if served.is_none_or(|served| served > *enough) {
+                    break;
+                }
+                gathering.flux = coarse;
+                half.refine(None);
+            }
+            *may_be_coarse = false;
+            let coarse = coarser(tables, gathering.flux);
             let overture = Overture { tracer: &tracer, gathering, coarse, size: *size };
-            if !overture.fill(half, crew, scratch)? {
-                all = false;
-                break;
+            let end = haste.and_then(|haste| haste.end(i));
+            if !crew.hurry(end, |crew| overture.fill(half, crew, scratch))? {
+                if crew.is_over() {
+                    all = false;
+                    break;
+                }
+                half.finish();
+                *is_cut = true;
             }
         }
         if all {
             halves.iter_mut().for_each(|half| half.cache.settle());
-            self.header.is_filled_for(self.view.clone());
+            if !self.is_cut {
+                self.header.is_filled_for(self.view.clone());
+            }
         }
         self.save()?;
         self.seconds += start.elapsed().as_secs_f64();
@@ -604,6 +604,8 @@ impl<F: Features> Renderer for Cached<'_, F> {
             loaded: gathered(self.loaded.map(|half| half.records)),
             gathered: gathered([0, 1].map(|i| self.halves[i].gathered() - self.loaded[i].gathered)),
             refined: self.refined as u32,
+            rays: self.gathering.flux.n().pow(2) as u32,
+            is_cut: self.is_cut,
             seconds: self.seconds,
         })
     }

@@ -5,10 +5,12 @@
 //! with its words, a file with its [`Renderer`], a line in [`Method::with`].
 
 mod aiming;
+mod cache_settings;
 mod caster;
 mod caustic_look;
 mod caustics;
 mod chaining;
+mod haste;
 mod irradiance_cache;
 mod overture;
 mod path;
@@ -20,10 +22,10 @@ mod sppm;
 #[cfg(test)]
 mod wrong;
 
+pub use cache_settings::{CacheSettings, CacheUse, Gather};
 pub use caustics::CausticUse;
 pub use chaining::MOST_SEEN;
 pub(super) use irradiance_cache::LEAST_PIXELS;
-pub use irradiance_cache::{CacheSettings, CacheUse, Gather};
 pub(super) use overture::{Growing, Overture};
 pub use photon_view::{MapView, PhotonView};
 pub use photons::{MapUse, PhotonSettings, PhotonUse};

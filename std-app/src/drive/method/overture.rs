@@ -306,6 +306,32 @@ impl<F: Features> Overture<'_, '_, F> {
         Ok(true)
     }
 
+    /// What share of the diffuse points that the camera sees records serve, by a look at pixels that are evenly spread and the
+    /// last of its order; `None` where the round is over, or it sees none.
+    pub(in crate::drive) fn served(
+        &self,
+        growing: &Growing,
+        crew: &mut Crew,
+        scratch: &mut [Vec<Line>],
+    ) -> Result<Option<f64>, RenderError> {
+        let [width, height] = self.size;
+        let order = Order::new(width, height, STRIDE);
+        let first = order.len().saturating_sub(LOOKED_AT as u64);
+        let mut places = vec![Place::NONE; LOOKED_AT];
+        let look = |task: usize, _: &mut Arena, out: &mut [Place]| {
+            let mut counters = Counters::default();
+            let sight = (growing.index, Sight::Clear);
+            self.tracer.places(&order, first + (task * PIXELS) as u64, sight, out, &mut counters);
+            Ok(counters)
+        };
+        if !crew.pass(&mut places, PIXELS, scratch, &look)? {
+            return Ok(None);
+        }
+        places.retain(Place::is_some);
+        let served = places.iter().filter(|place| growing.is_served(place)).count();
+        Ok((!places.is_empty()).then(|| served as f64 / places.len() as f64))
+    }
+
     /// Gathers at all of `places`, again where spots are found, then commits the records in their order.
     fn gather(
         &self,

@@ -18,16 +18,18 @@ const DARKER: f32 = 0.4;
 pub(super) fn section(run: &Run) -> String {
     let Some(cache) = &run.result.cache else { return String::new() };
     let settings = run.settings.cache;
-    let rays = u64::from(settings.strata) * u64::from(settings.strata);
     let mut facts = vec![
         ("Records", grouped(cache.records)),
         ("Places gathered at", grouped(cache.gathered)),
-        ("Rays of each", grouped(rays)),
+        ("Rays of each", grouped(cache.rays.into())),
         ("Time of filling", readable_seconds(cache.seconds)),
         ("Error asked for", format!("{} ({})", number(settings.allowed().into(), 2), settings.metric.name())),
     ];
     if cache.loaded > 0 {
         facts.insert(1, ("of them loaded", grouped(cache.loaded)));
+    }
+    if cache.is_cut {
+        facts.push(("Cut short", "for lack of time".into()));
     }
     if cache.refused > 0 {
         facts.push(("Records that had no memory", grouped(cache.refused)));

@@ -1,0 +1,71 @@
+//! What is asked of irradiance caches, and what became of them.
+
+use halflight_core::cache::irradiance::{Metric, metric};
+
+/// How an irradiance cache is filled.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CacheSettings {
+    /// The rule by which records know how far they reach.
+    pub metric: Metric,
+    /// Error allowed, in the unit of the metric; `None`: its usual one.
+    pub error: Option<f32>,
+    /// Strata along a side of the hemisphere that is gathered: its square is the number of rays of a record. `None`:
+    /// [`CacheSettings::STRATA`], or half as many where the time of the picture would not do for these.
+    pub strata: Option<u32>,
+    /// How the rays of a record find light.
+    pub gather: Gather,
+}
+
+impl CacheSettings {
+    /// Strata along a side where nothing else is asked for.
+    pub const STRATA: u32 = 32;
+
+    /// Strata along a side that are wanted.
+    pub fn strata(&self) -> u32 {
+        self.strata.unwrap_or(Self::STRATA)
+    }
+
+    /// The error allowed.
+    pub fn allowed(&self) -> f32 {
+        self.error.unwrap_or(metric::Settings::new(self.metric, 1.0).error)
+    }
+}
+
+impl Default for CacheSettings {
+    fn default() -> Self {
+        Self { metric: Metric::Halflight, error: None, strata: None, gather: Gather::Paths }
+    }
+}
+
+/// How rays that are gathered for a record find the light that is reflected at their ends.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Gather {
+    /// By paths that go on from there, as far as the cache does not know it.
+    #[default]
+    Paths,
+    /// From a map of photons, where that is sure.
+    Photons,
+}
+
+/// What became of the caches.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct CacheUse {
+    /// Records of both.
+    pub records: u64,
+    /// Most records that there was memory for.
+    pub capacity: u64,
+    /// Records that found no memory: their surroundings are path traced.
+    pub refused: u64,
+    /// Records of both that a file had.
+    pub loaded: u64,
+    /// Places at which light was gathered: as many times the rays of a record.
+    pub gathered: u64,
+    /// How often they were refined, because the error asked for was out of reach.
+    pub refined: u32,
+    /// Rays of a record, of the last of them.
+    pub rays: u32,
+    /// They were left as they were when their share of the time was over, or the render was interrupted.
+    pub is_cut: bool,
+    /// Seconds of the overture.
+    pub seconds: f64,
+}
