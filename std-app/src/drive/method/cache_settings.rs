@@ -10,7 +10,7 @@ pub struct CacheSettings {
     /// Error allowed, in the unit of the metric; `None`: its usual one.
     pub error: Option<f32>,
     /// Strata along a side of the hemisphere that is gathered: its square is the number of rays of a record. `None`:
-    /// [`CacheSettings::STRATA`], or half as many where the time of the picture would not do for these.
+    /// [`CacheSettings::STRATA`], or fewer where the time of the picture would not do for these.
     pub strata: Option<u32>,
     /// How the rays of a record find light.
     pub gather: Gather,
@@ -62,7 +62,7 @@ pub struct CacheUse {
     pub gathered: u64,
     /// How often they were refined, because the error asked for was out of reach.
     pub refined: u32,
-    /// Rays of a record, of the last of them.
+    /// Rays of each of the last of them.
     pub rays: u32,
     /// They were left as they were when their share of the time was over, or the render was interrupted.
     pub is_cut: bool,

@@ -4,8 +4,8 @@
 //! errors of records too.
 //!
 //! The first round begins with the overture of both, for which it has half of the time if that is limited (`haste.rs`).
-//! Then caches are frozen; a point that no record reaches is path traced, as is every surface that is not diffuse. Caches can be kept in a file, and be the first records of another
-//! picture of the same scene.
+//! Then caches are frozen; a point that no record reaches is path traced, as is every surface that is not diffuse. Caches
+//! can be kept in a file, and be the first records of another picture of the same scene.
 
 use super::cache_settings::{CacheUse, Gather};
 use super::caster::{Cast, Caster};
@@ -135,7 +135,7 @@ impl Loaded {
 
 /// What a picture takes of memory, whatever is left of it for records and photons.
 struct Needs {
-    /// Strata along a side that may be gathered, the fewest first: half of those that were asked for, those, and more of them.
+    /// Strata along a side that may be gathered, the fewest first: fewer than were asked for, those, and more of them.
     sizes: Vec<usize>,
     /// Which of them were asked for.
     asked: usize,
@@ -354,9 +354,12 @@ impl<F: Features> Cached<'_, F> {
     fn fill(&mut self, crew: &mut Crew) -> Result<bool, RenderError> {
         let start = Instant::now();
         if self.haste.is_none() {
-            self.haste = self.seconds_asked.map(Haste::new);
+            // A film that goes on has the time that is left.
+            let left = crew.round.deadline.map(|end| end.saturating_duration_since(start).as_secs_f64());
+            self.haste = self.seconds_asked.map(|seconds| Haste::new(left.unwrap_or(seconds)));
         }
-        let haste = self.haste;
+        // Those that are refined are not cut before the picture is.
+        let haste = self.haste.filter(|_| self.refined == 0);
         let Self { tracer, gathering, tables, size, halves, laboratory, caster, refined, scratch, .. } = self;
         let (may_be_coarse, is_cut) = (&mut self.may_be_coarse, &mut self.is_cut);
         let mut all = true;

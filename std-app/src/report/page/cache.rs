@@ -29,7 +29,7 @@ pub(super) fn section(run: &Run) -> String {
         facts.insert(1, ("of them loaded", grouped(cache.loaded)));
     }
     if cache.is_cut {
-        facts.push(("Cut short", "for lack of time".into()));
+        facts.push(("Filling cut short", "by the limit of time, or an interruption".into()));
     }
     if cache.refused > 0 {
         facts.push(("Records that had no memory", grouped(cache.refused)));
