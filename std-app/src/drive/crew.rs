@@ -19,15 +19,14 @@ pub(super) struct Round<'a> {
     pub(super) step: u32,
     /// When it is cut.
     pub(super) deadline: Option<Instant>,
-    /// Cuts it when raised.
+    /// Cuts it when raised; of the first only what is done in a [`Crew::hurry`].
     pub(super) interrupt: Option<&'a AtomicBool>,
-    /// Cuts what is done in a [`Crew::hurry`] when raised.
-    pub(super) hurry: Option<&'a AtomicBool>,
+    pub(super) is_first: bool,
 }
 
 impl Round<'_> {
     fn is_over(&self) -> bool {
-        self.interrupt.is_some_and(|flag| flag.load(Ordering::Relaxed))
+        !self.is_first && self.interrupt.is_some_and(|flag| flag.load(Ordering::Relaxed))
             || self.deadline.is_some_and(|deadline| Instant::now() >= deadline)
     }
 }
@@ -80,9 +79,9 @@ impl Crew<'_, '_> {
     /// Does work that the picture can be without: cut at `deadline`, and where the render is interrupted, which the first
     /// round as a whole is not.
     pub(super) fn hurry<T>(&mut self, deadline: Option<Instant>, work: impl FnOnce(&mut Crew) -> T) -> T {
-        let Round { hurry, deadline: end, .. } = *self.round;
+        let Round { interrupt, deadline: end, .. } = *self.round;
         let deadline = [deadline, end].into_iter().flatten().min();
-        let round = Round { targets: Vec::new(), step: 1, deadline, interrupt: hurry, hurry };
+        let round = Round { targets: Vec::new(), step: 1, deadline, interrupt, is_first: false };
         work(&mut Crew { workers: self.workers, round: &round, canvas: self.canvas })
     }
 
@@ -214,7 +213,7 @@ mod tests {
             step: 2,
             deadline: None,
             interrupt: Some(&interrupt),
-            hurry: None,
+            is_first: false,
         };
         let mut scratch = vec![vec![Line([0; 64]); 1]; threads];
         work(&mut Crew { workers: &workers, round: &round, canvas: &mut canvas }, &mut scratch)

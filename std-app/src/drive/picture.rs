@@ -87,8 +87,8 @@ impl Picture<'_> {
                 targets: canvas.targets(plan.target),
                 step: step(&plan, canvas.tiles(), workers.count()),
                 deadline,
-                interrupt: (!plan.first).then_some(interrupt),
-                hurry: Some(interrupt),
+                interrupt: Some(interrupt),
+                is_first: plan.first,
             };
             renderer.round(&mut Crew { workers, round: &round, canvas: &mut canvas })?;
             rounds.completed(canvas.spp().min(plan.target), clock.seconds());

@@ -111,7 +111,7 @@ impl WithFeatures for Study<'_> {
         let film = Film::new(1, 1, &mut arena(&mut film_lines))?;
         let mut canvas = Canvas::new(film, Shard::WHOLE);
         let round =
-            Round { targets: vec![[0; GROUPS]], step: 1, deadline: None, interrupt: None, hurry: None };
+            Round { targets: vec![[0; GROUPS]], step: 1, deadline: None, interrupt: None, is_first: false };
         let mut crew = Crew { workers: &workers, round: &round, canvas: &mut canvas };
 
         let size = [settings.width, settings.height];

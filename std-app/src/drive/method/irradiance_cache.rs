@@ -384,24 +384,26 @@ impl<F: Features> Cached<'_, F> {
                 built = found;
                 tracer = tracer.with_bounced([laboratory.gathered(&built); 2]);
             }
-            for (glance, enough) in ENOUGH.iter().enumerate() {
-                let Some(haste) = haste.filter(|_| *may_be_coarse) else { break };
+            let mut glances = ENOUGH.iter().enumerate();
+            let is_done = loop {
                 let coarse = coarser(tables, gathering.flux);
                 let overture = Overture { tracer: &tracer, gathering, coarse, size: *size };
-                let is_done =
-                    crew.hurry(haste.glance(i, glance), |crew| overture.fill(half, crew, scratch))?;
-                let served = if is_done { None } else { overture.served(half, crew, scratch)? };
-                if served.is_none_or(|served| served > *enough) {
-                    break;
+                let glance = haste.filter(|_| *may_be_coarse).zip(glances.next());
+                let until = match glance {
+                    Some((haste, (before, _))) => haste.glance(i, before),
+                    None => haste.and_then(|haste| haste.end(i)),
+                };
+                let is_done = crew.hurry(until, |crew| overture.fill(half, crew, scratch))?;
+                let Some((_, (_, enough))) = glance.filter(|_| !is_done) else { break is_done };
+                *may_be_coarse =
+                    overture.served(half, crew, scratch)?.is_some_and(|served| served <= *enough);
+                if *may_be_coarse {
+                    gathering.flux = coarse;
+                    half.refine(None);
                 }
-                gathering.flux = coarse;
-                half.refine(None);
-            }
+            };
             *may_be_coarse = false;
-            let coarse = coarser(tables, gathering.flux);
-            let overture = Overture { tracer: &tracer, gathering, coarse, size: *size };
-            let end = haste.and_then(|haste| haste.end(i));
-            if !crew.hurry(end, |crew| overture.fill(half, crew, scratch))? {
+            if !is_done {
                 if crew.is_over() {
                     all = false;
                     break;

@@ -276,20 +276,11 @@ impl<F: Features> Overture<'_, '_, F> {
                 growing.sweep(has_rough);
                 continue;
             }
-            let mut places = vec![Place::NONE; LOOKED_AT];
-            let look = |task: usize, _: &mut Arena, out: &mut [Place]| {
-                let mut counters = Counters::default();
-                let first = growing.next + (task * PIXELS) as u64;
-                self.tracer.places(&order, first, sight, out, &mut counters);
-                out.iter_mut()
-                    .filter(|place| growing.is_served(place))
-                    .for_each(|place| *place = Place::NONE);
-                Ok(counters)
-            };
-            if !crew.pass(&mut places, PIXELS, scratch, &look)? {
+            let is_missing = |place: &Place| !growing.is_served(place);
+            let Some(mut missing) = self.look(&order, growing.next, sight, &is_missing, crew, scratch)?
+            else {
                 return Ok(false);
-            }
-            let mut missing: Vec<Place> = places.into_iter().filter(Place::is_some).collect();
+            };
             while !missing.is_empty() {
                 missing.retain(|place| !growing.is_served(place));
                 let [fewest, most] = GATHERED;
@@ -317,19 +308,34 @@ impl<F: Features> Overture<'_, '_, F> {
         let [width, height] = self.size;
         let order = Order::new(width, height, STRIDE);
         let first = order.len().saturating_sub(LOOKED_AT as u64);
+        let sight = (growing.index, Sight::Clear);
+        let Some(places) = self.look(&order, first, sight, &|_| true, crew, scratch)? else {
+            return Ok(None);
+        };
+        let served = places.iter().filter(|place| growing.is_served(place)).count();
+        Ok((!places.is_empty()).then(|| served as f64 / places.len() as f64))
+    }
+
+    /// What pixels see from the `first` of the order on, as far as it is wanted; `None` where the round is over.
+    fn look(
+        &self,
+        order: &Order,
+        first: u64,
+        sight: (u32, Sight),
+        is_wanted: &(dyn Fn(&Place) -> bool + Sync),
+        crew: &mut Crew,
+        scratch: &mut [Vec<Line>],
+    ) -> Result<Option<Vec<Place>>, RenderError> {
         let mut places = vec![Place::NONE; LOOKED_AT];
         let look = |task: usize, _: &mut Arena, out: &mut [Place]| {
             let mut counters = Counters::default();
-            let sight = (growing.index, Sight::Clear);
-            self.tracer.places(&order, first + (task * PIXELS) as u64, sight, out, &mut counters);
+            self.tracer.places(order, first + (task * PIXELS) as u64, sight, out, &mut counters);
+            out.iter_mut().filter(|place| !is_wanted(place)).for_each(|place| *place = Place::NONE);
             Ok(counters)
         };
-        if !crew.pass(&mut places, PIXELS, scratch, &look)? {
-            return Ok(None);
-        }
+        let is_done = crew.pass(&mut places, PIXELS, scratch, &look)?;
         places.retain(Place::is_some);
-        let served = places.iter().filter(|place| growing.is_served(place)).count();
-        Ok((!places.is_empty()).then(|| served as f64 / places.len() as f64))
+        Ok(is_done.then_some(places))
     }
 
     /// Gathers at all of `places`, again where spots are found, then commits the records in their order.
