@@ -179,6 +179,21 @@ fn the_unit_of_the_scene_does_not_matter() {
 }
 
 #[test]
+fn a_wide_landscape_takes_no_records_from_a_room() {
+    let records = |size: f32| {
+        let mut buffers = cornell_box();
+        let black = buffers.material(Material::diffuse(Rgb::ZERO));
+        buffers.square(Vec3::new(0.0, -0.5 * size, 0.0), Vec3::Y, size, black);
+        cached(&buffers.scene(), 64, 1, |_| ()).cache.unwrap().records as f64
+    };
+    let alone = records(0.1);
+    for size in [30.0, 3000.0] {
+        let wide = records(size);
+        assert!(wide > 0.7 * alone, "{wide} records, not {alone}");
+    }
+}
+
+#[test]
 fn without_memory_for_records_the_rest_is_path_traced() {
     let buffers = cornell_box();
     let scene = buffers.scene();

@@ -116,7 +116,7 @@ impl Place {
 pub struct Gathering<'a> {
     /// Tables for as many strata as are gathered.
     pub flux: &'a CellFlux<'a>,
-    /// How far records are relied upon.
+    /// How far records are relied upon: within the side of the picture at their place.
     pub metric: metric::Settings,
     /// The least radius of a record, in pixels.
     pub least_pixels: f32,
@@ -221,8 +221,9 @@ impl<F: Features> PathTracer<'_, F> {
             counters.dropped.nan += 1;
             return Ok(None);
         };
-        let least = least_pixels * place.pixel;
-        let reach = reach(&metric::Settings { least, ..metric }, &derivatives);
+        let picture = place.pixel * libm::sqrtf(self.settings.width as f32 * self.settings.height as f32);
+        let settings = metric::Settings { least: least_pixels * place.pixel, ..metric.within(picture) };
+        let reach = reach(&settings, &derivatives);
         let mut record = Record::new(place.position(), &frame, &derivatives, &reach);
         let luminance = derivatives.luminance();
         record.note_noise(if luminance > 0.0 { variance / (luminance * luminance) } else { 0.0 });

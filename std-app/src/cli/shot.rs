@@ -70,8 +70,8 @@ pub(super) struct Options {
     #[arg(long, value_name = "METRIC", value_parser = values::metric, help_heading = "Irradiance cache")]
     cache_metric: Option<Metric>,
     /// Error allowed between records. Metrics with a Hessian: the error within the reach of a record over its
-    /// irradiance, times the area in squares of the scene's radius [default: 1e-4]; the others: the radius over the
-    /// distance that they take [default: 0.3]
+    /// irradiance, times the area in squares of the scene's radius, or of the picture's side there if that is
+    /// smaller [default: 1e-4]; the others: the radius over the distance that they take [default: 0.3]
     #[arg(long, value_name = "ERROR", value_parser = values::positive, help_heading = "Irradiance cache")]
     cache_error: Option<f64>,
     /// Rays that are gathered for a record: 64, 256, 1024 or 4096 [default: 1024]

@@ -103,7 +103,7 @@ pub struct Settings {
     /// Error allowed, above 0. With a Hessian: ε in units of `extent`², relative to the irradiance of the record
     /// (or to `against`). Otherwise: the radius in units of the distance that the rule takes.
     pub error: f32,
-    /// Size of the scene (radius of its bounding sphere), m.
+    /// Size of the scene (radius of its bounding sphere), m, or of the part of it that matters.
     pub extent: f32,
     /// The irradiance (luminance) that errors are relative to, where it is not each record's own: a constant is
     /// an absolute error.
@@ -118,6 +118,9 @@ pub struct Settings {
     pub floor: f32,
 }
 
+/// Largest radius of a record, in extents.
+const MOST: f32 = 0.2;
+
 impl Settings {
     /// `metric` with its usual settings in a scene of that extent: axes up to 2 : 1, radii from 0 to a fifth of
     /// the extent.
@@ -130,9 +133,16 @@ impl Settings {
             against: None,
             aspect: 2.0,
             least: 0.0,
-            most: 0.2 * extent,
+            most: MOST * extent,
             floor: 0.01,
         }
+    }
+
+    /// The same where no more than `size`, m, of the scene is seen: a room in a wide landscape is to have the records that it
+    /// has without.
+    pub fn within(self, size: f32) -> Self {
+        let extent = self.extent.min(size);
+        Self { extent, most: self.most.min(MOST * extent), ..self }
     }
 }
 
