@@ -1,6 +1,7 @@
 //! Pixels that see an edge: of a thing before another, between two walls, between two materials. Where indirect light
 //! is interpolated, what is left of noise is shadows' and theirs, and theirs lies in one pixel of twenty. So these have
-//! several paths for each sample.
+//! several paths for each of their first samples. An edge is noise of few samples: it falls faster than others with the points of a
+//! net, and later ones are better spent on all pixels alike.
 //!
 //! Which pixels these are follows from what rays through their corners meet, and from no sample, so that nothing is
 //! biased. An edge that lies within a pixel and passes none of its corners is missed, and costs noise.
@@ -11,10 +12,14 @@ use crate::bsdf::Features;
 use crate::bvh::Coherence;
 use crate::film::{PIXELS_PER_TILE, PixelSet, TILE, Tile};
 use crate::geometry::{Hit, Ray};
+use core::ops::Range;
 use glam::Vec3;
 
-/// Paths for each sample of a pixel with an edge, a power of two: their numbers stay a net.
+/// Paths for each of the first samples of a pixel with an edge, a power of two: their numbers stay a net.
 pub(super) const PER_EDGE: u32 = 4;
+
+/// So many of them in each half of the samples.
+const FIRST: u32 = 8;
 
 /// The cosine between normals from which on there is an edge.
 const BENT: f32 = 0.95;
@@ -22,9 +27,25 @@ const BENT: f32 = 0.95;
 /// Corners along the side of a tile.
 pub(super) const CORNERS: usize = TILE as usize + 1;
 
+/// The paths of sample `index` of a half of the samples of a pixel with an edge: points of its net.
+pub(super) fn points_of(index: u32) -> Range<u32> {
+    let first = index + (PER_EDGE - 1) * index.min(FIRST);
+    first..first + if index < FIRST { PER_EDGE } else { 1 }
+}
+
+/// The sample of the half that such a point belongs to.
+pub(super) fn sample_of(point: u32) -> u32 {
+    if is_of_several(point) { point / PER_EDGE } else { point - (PER_EDGE - 1) * FIRST }
+}
+
+/// Whether it belongs to a sample of several.
+pub(super) fn is_of_several(point: u32) -> bool {
+    point < PER_EDGE * FIRST
+}
+
 impl<'a, F: Features> PathTracer<'a, F> {
-    /// The same, where the pixels of `edges`, tile by tile, have several paths for each sample. Not where pixels share
-    /// their paths.
+    /// The same, where the pixels of `edges`, tile by tile, have several paths for each of their first samples. Not where pixels
+    /// share their paths.
     pub fn with_edges(&self, edges: &'a [PixelSet]) -> Self {
         let mut other = *self;
         other.edges = edges;
@@ -87,5 +108,21 @@ impl<'a, F: Features> PathTracer<'a, F> {
         let step = (end(other_ray, other) - end(ray, hit)).dot(here);
         let bent = here.dot(normal(other)).abs() < BENT;
         triangle.material != other_triangle.material || bent || step.abs() > pixel * hit.t
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn samples_have_all_points_one_after_the_other() {
+        let mut next = 0;
+        for index in 0..4 * FIRST {
+            let points = points_of(index);
+            assert_eq!((points.start, points.len()), (next, if index < FIRST { 4 } else { 1 }));
+            assert!(points.clone().all(|point| sample_of(point) == index));
+            next = points.end;
+        }
     }
 }

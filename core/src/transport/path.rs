@@ -14,7 +14,7 @@
 //! 7. Pixels at the border of a lamp look at it with rays of their own (`outline.rs`).
 //! 8. Where photons of caustics lie, paths and photons share the light that both find (`merge.rs`).
 //! 9. What mirrors and glass show of a lamp has rays of its own, where it was found beforehand (`images.rs`).
-//! 10. Where all else is quiet, pixels that see an edge have several paths for each sample (`edges.rs`).
+//! 10. Where all else is quiet, pixels that see an edge have several paths for each of the first samples (`edges.rs`).
 //!
 //! The price: about 400 bytes for each path of a wave. What a pixel sees depends on (seed, sample) and the pixels of
 //! its group only, no wave cuts a group that shares, and samples are summed in their order: the picture has the same bits for

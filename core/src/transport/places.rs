@@ -2,9 +2,9 @@
 //!
 //! Layer after layer, one sample of each pixel that is to have any more. Where pixels share their paths, those of a group
 //! stay together; else all go along the Z-curve, so that neighbours ask caches together. A pixel that sees an edge has
-//! [`PER_EDGE`] paths for each sample: it is sampled as if it had so many more, taken together.
+//! [`PER_EDGE`] paths for each of its first samples: it is sampled as if it had so many more, taken together.
 
-use super::edges::PER_EDGE;
+use super::edges::{PER_EDGE, is_of_several, points_of, sample_of};
 use super::estimator::{Counters, PathSettings};
 use super::images::Way;
 use super::outline::outlined;
@@ -17,6 +17,7 @@ use crate::film::{GROUP, GROUPS, PIXELS_PER_TILE, Pixel, PixelSet, Samples, Tile
 use crate::geometry::{MISS, Ray};
 use crate::memory::{Arena, OutOfMemory};
 use crate::sampling::Sampler;
+use core::ops::Range;
 
 /// All samples of a tile that are still to be taken.
 pub(super) struct Places {
@@ -27,7 +28,7 @@ pub(super) struct Places {
     layer: u32,
     /// Pixels whose paths leave the lamp that they see to others.
     outlined: PixelSet,
-    /// Pixels that have several paths for each sample.
+    /// Pixels that have several paths for each of the first samples.
     edges: PixelSet,
 }
 
@@ -75,9 +76,10 @@ impl Places {
         }
     }
 
-    /// How many paths a sample of a pixel has.
-    fn paths(&self, place: usize) -> u32 {
-        if self.edges.contains(place) { PER_EDGE } else { 1 }
+    /// The paths of a sample of a pixel, as points of the net of its half of the samples.
+    fn points(&self, place: usize, sample: u32) -> Range<u32> {
+        let index = sample >> 1;
+        if self.edges.contains(place) { points_of(index) } else { index..index + 1 }
     }
 }
 
@@ -143,11 +145,12 @@ impl<F: Features> PathTracer<'_, F> {
                     continue;
                 }
                 // Those of a sample are together.
-                light += seen / PER_EDGE as f32;
-                blur += Rgb::from(path.blur) / PER_EDGE as f32;
-                let part = path.sample >> 1;
-                if part % PER_EDGE == PER_EDGE - 1 {
-                    let sample = ((part / PER_EDGE) << 1) | (path.sample & 1);
+                let index = sample_of(path.sample >> 1);
+                let points = points_of(index);
+                light += seen / points.len() as f32;
+                blur += Rgb::from(path.blur) / points.len() as f32;
+                if (path.sample >> 1) + 1 == points.end {
+                    let sample = (index << 1) | (path.sample & 1);
                     let blur = core::mem::take(&mut blur);
                     if pixel.add(sample, core::mem::take(&mut light), &mut counters.dropped) {
                         pixel.add_blur(sample, blur);
@@ -175,10 +178,7 @@ impl<F: Features> PathTracer<'_, F> {
         while count + PER_EDGE as usize <= wave.paths.len()
             && let Some((place, sample)) = places.next_pixel()
         {
-            let paths = places.paths(place);
-            for part in 0..paths {
-                // The next points of the half of the samples that it belongs to.
-                let point = (sample >> 1).wrapping_mul(paths).wrapping_add(part);
+            for point in places.points(place, sample) {
                 self.begin(places, place, (point << 1) | (sample & 1), Exchange::new(0), wave, &mut count);
             }
         }
@@ -200,6 +200,7 @@ impl<F: Features> PathTracer<'_, F> {
         let Some((x, y)) = places.tile.pixel(place) else { return };
         let index = y * width + x;
         let ray = self.camera_ray([x, y], &Sampler::new(seed, index, sample));
+        let is_several = places.edges.contains(place) && is_of_several(sample >> 1);
         wave.rays[*count] = Ray { tag: *count as u32, ..ray };
         wave.paths[*count] = Path {
             throughput: [1.0; 3],
@@ -212,7 +213,7 @@ impl<F: Features> PathTracer<'_, F> {
             way: Way::EYE,
             triangle: MISS,
             eta_squared: 1.0,
-            lights: if places.edges.contains(place) { 1 } else { self.asked as u16 },
+            lights: if is_several { 1 } else { self.asked as u16 },
             ..Path::default()
         };
         wave.exchanges[*count] = exchange;

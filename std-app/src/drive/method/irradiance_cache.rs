@@ -59,7 +59,7 @@ const FEWEST_RECORDS: usize = 4096;
 /// Least radius of a record in pixels: neighbouring pixels of the overture reach each other.
 pub(in crate::drive) const LEAST_PIXELS: f32 = 2.0;
 
-/// Pixels that see an edge have several paths for each sample, unless more than one in so many does.
+/// Pixels that see an edge have several paths for each of the first samples, unless more than one in so many does.
 const FEW_EDGES: usize = 2;
 
 /// Samples by which it is judged whether more points of lights are worth their rays: far from those of any picture, and
