@@ -148,11 +148,7 @@ impl Groups {
 #[inline(always)]
 fn importance<L: Lanes>(all: impl Fn(f32) -> L, group: &Group<L>, point: Vec3, normal: Vec3) -> L {
     let (zero, one) = (all(0.0), all(1.0));
-    // The mean of what is above zero of cosines of this mean and variance, of which the largest is `most`.
-    let facing = |mean: L, variance: L, most: L| {
-        let about = all(0.5) * (mean + (mean * mean + variance).sqrt());
-        about.max(all(LEAST) * most).select(zero.lt(most), zero)
-    };
+    let parts = [zero, all(0.5), all(LEAST)];
     let [cx, cy, cz] = group.center;
     let to_light = [cx - all(point.x), cy - all(point.y), cz - all(point.z)];
     let (square, distance2) = (group.radius * group.radius, dot(to_light, to_light));
@@ -173,19 +169,27 @@ fn importance<L: Lanes>(all: impl Fn(f32) -> L, group: &Group<L>, point: Vec3, n
     let along = (one - mean) * (one - mean) * all(1.0 / 3.0);
     let across = all(0.5) * (one - mean * mean - along);
     let variance = all(CLAMPED) * (along * cos * cos + across * sin * sin) + spread * sin * sin;
-    let shone = facing(mean * cos, variance, most);
+    let shone = facing(mean * cos, variance, most, parts);
     let shone = shone.select(all(-1.0).lt(group.cos_cone), all(ALL_AROUND));
     let mut strength = group.power * inverse * inverse * shone;
     if normal != Vec3::ZERO {
         let cos = dot(direction, [all(normal.x), all(normal.y), all(normal.z)]);
         let most = minus_clamped((sine(cos, zero, one), cos), uncertainty, zero, one).1;
-        strength = strength * facing(cos, spread, most);
+        strength = strength * facing(cos, spread, most, parts);
     }
     // Within the sphere lights may lie in any direction.
     let within = all(ALL_AROUND) * group.power / square.max(all(f32::MIN_POSITIVE));
     let strength = within.select(distance2.le(square), strength);
     // Comparison with NaN is false: a point that is no number sees no light.
     strength.min(all(LARGEST)).select(zero.lt(strength), zero)
+}
+
+/// The mean of what is above zero of cosines of this mean and variance, of which the largest is `most`. No closure: what is not
+/// inlined has not the instructions of its kernel, and calls a function for each.
+#[inline(always)]
+fn facing<L: Lanes>(mean: L, variance: L, most: L, [zero, half, least]: [L; 3]) -> L {
+    let about = half * (mean + (mean * mean + variance).sqrt());
+    about.max(least * most).select(zero.lt(most), zero)
 }
 
 /// The sine to a cosine, or the cosine to a sine.

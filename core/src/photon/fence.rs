@@ -109,7 +109,8 @@ impl Fence {
         squared_radius: f32,
     ) -> <S::F16 as Lanes>::Mask {
         // Backwards, for offsets are.
-        let [u, v] = self.axes.map(|axis| -dot(offset, axis.to_array().map(|value| simd.splat16(value))));
+        let [right, up] = &self.axes;
+        let (u, v) = (-dot(offset, splat(simd, right)), -dot(offset, splat(simd, up)));
         let zero = simd.splat16(0.0);
         let (left, below, steep) = (u.lt(zero), v.lt(zero), u.abs().lt(v.abs()));
         let mut hidden = simd.mask16(0);
@@ -124,6 +125,12 @@ impl Fence {
         debug_assert!(hidden.bits() <= 0xffff);
         !hidden
     }
+}
+
+/// No closures: see `facing` of `light/bounds.rs`.
+#[inline(always)]
+fn splat<S: Simd>(simd: S, axis: &Vec3) -> [S::F16; 3] {
+    [simd.splat16(axis.x), simd.splat16(axis.y), simd.splat16(axis.z)]
 }
 
 #[cfg(test)]
