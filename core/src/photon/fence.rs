@@ -109,7 +109,7 @@ impl Fence {
         squared_radius: f32,
     ) -> <S::F16 as Lanes>::Mask {
         // Backwards, for offsets are.
-        let [right, up] = &self.axes;
+        let [right, up] = self.axes;
         let (u, v) = (-dot(offset, splat(simd, right)), -dot(offset, splat(simd, up)));
         let zero = simd.splat16(0.0);
         let (left, below, steep) = (u.lt(zero), v.lt(zero), u.abs().lt(v.abs()));
@@ -127,10 +127,10 @@ impl Fence {
     }
 }
 
-/// No closures: see `facing` of `light/bounds.rs`.
+/// The same vector in all lanes. No closures: see `facing` of `light/bounds.rs`.
 #[inline(always)]
-fn splat<S: Simd>(simd: S, axis: &Vec3) -> [S::F16; 3] {
-    [simd.splat16(axis.x), simd.splat16(axis.y), simd.splat16(axis.z)]
+pub(super) fn splat<S: Simd>(simd: S, vector: Vec3) -> [S::F16; 3] {
+    [simd.splat16(vector.x), simd.splat16(vector.y), simd.splat16(vector.z)]
 }
 
 #[cfg(test)]

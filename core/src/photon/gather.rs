@@ -13,7 +13,7 @@
 //! places where photons crowd, and to know what a disc blurs (`docs/decisions/0043-what-photons-blur.md`).
 
 use super::PhotonMap;
-use super::fence::Fence;
+use super::fence::{Fence, splat};
 use super::layout::{HALVES, Leaf};
 use super::range::{Visit, leaves_within};
 use super::record::{DIRECTION_BITS, DIRECTION_STEPS, NORMAL_STEPS, POWER_BITS};
@@ -144,10 +144,9 @@ pub(super) fn gather<S: Simd, R: Response>(
         return Density::default();
     }
     let place = Place16::new(simd, map.space.enter(disc.place.to_array()));
-    let [x, y, z] = disc.normal.to_array();
     let mut sum = Sum {
         place,
-        normal: [simd.splat16(x), simd.splat16(y), simd.splat16(z)],
+        normal: splat(simd, disc.normal),
         fence,
         squared_radius,
         thickness: simd.splat16(FLATNESS * libm::sqrtf(squared_radius)),

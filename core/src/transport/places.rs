@@ -145,11 +145,12 @@ impl<F: Features> PathTracer<'_, F> {
                     continue;
                 }
                 // Those of a sample are together.
-                let index = sample_of(path.sample >> 1);
+                let point = path.sample >> 1;
+                let index = sample_of(point);
                 let points = points_of(index);
                 light += seen / points.len() as f32;
                 blur += Rgb::from(path.blur) / points.len() as f32;
-                if (path.sample >> 1) + 1 == points.end {
+                if point + 1 == points.end {
                     let sample = (index << 1) | (path.sample & 1);
                     let blur = core::mem::take(&mut blur);
                     if pixel.add(sample, core::mem::take(&mut light), &mut counters.dropped) {
