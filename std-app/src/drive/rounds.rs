@@ -17,6 +17,11 @@ pub struct Stop {
 impl Stop {
     /// Samples per pixel where no rule is given.
     pub const DEFAULT_SPP: u32 = 256;
+
+    /// Samples per pixel at most, where there is a limit.
+    pub(super) fn most_samples(&self) -> Option<u32> {
+        if *self == Self::default() { Some(Self::DEFAULT_SPP) } else { self.spp }
+    }
 }
 
 /// Samples that a pixel can have at most: the sampler's points repeat after 2^32, and a half must count.
@@ -71,9 +76,7 @@ pub(super) struct Plan {
 
 impl Rounds {
     pub(super) fn new(stop: Stop) -> Self {
-        let nothing = stop == Stop::default();
-        let most = if nothing { Some(Stop::DEFAULT_SPP) } else { stop.spp };
-        let stop = Stop { spp: most, ..stop };
+        let stop = Stop { spp: stop.most_samples(), ..stop };
         Self {
             stop,
             spp: 0,

@@ -10,7 +10,7 @@ pub struct CacheSettings {
     /// Error allowed, in the unit of the metric; `None`: its usual one.
     pub error: Option<f32>,
     /// Strata along a side of the hemisphere that is gathered: its square is the number of rays of a record. `None`:
-    /// [`CacheSettings::STRATA`], or fewer where the time of the picture would not do for these.
+    /// as many as the picture is better for; [`CacheSettings::STRATA`] where records are kept in a file, and in a study.
     pub strata: Option<u32>,
     /// How the rays of a record find light.
     pub gather: Gather,

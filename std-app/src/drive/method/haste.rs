@@ -8,13 +8,13 @@ use std::time::Instant;
 /// The share of the time of a picture that is there for both of its caches.
 const SHARE: f64 = 0.5;
 
-/// The part of the time of a cache after which it is looked whether records will reach far enough, and after which once
-/// more if they have fewer rays by then: most of what they reach they reach early.
-const GLANCE: f64 = 0.125;
+/// The part of the time of the first cache after which it is looked whether records will reach far enough: most of what they
+/// reach they reach early.
+const GLANCE: f64 = 0.25;
 
-/// They will where they serve this share of what the camera sees: first and then. Records of few rays are noisier than
-/// a picture with gaps between better ones.
-pub(super) const ENOUGH: [f64; 2] = [0.65, 0.35];
+/// They will where they serve this share of what the camera sees. Records of fewer rays are noisier than a picture with gaps
+/// between better ones.
+pub(super) const ENOUGH: f64 = 0.25;
 
 /// When caches must be filled.
 #[derive(Clone, Copy, Debug)]
@@ -34,9 +34,14 @@ impl Haste {
         self.at(half as f64 + 1.0)
     }
 
-    /// When it is looked how far it is, for the first time or another.
-    pub(super) fn glance(&self, half: usize, before: usize) -> Option<Instant> {
-        self.at(half as f64 + GLANCE * (before as f64 + 1.0))
+    /// When it is looked how far the first is.
+    pub(super) fn glance(&self) -> Option<Instant> {
+        self.at(GLANCE)
+    }
+
+    /// Seconds that the picture has left.
+    pub(super) fn left(&self) -> f64 {
+        (self.seconds - self.start.elapsed().as_secs_f64()).max(0.0)
     }
 
     /// After so many times the time of one.
@@ -54,8 +59,8 @@ mod tests {
     fn caches_have_half_of_the_time() {
         let haste = Haste::new(8.0);
         let after = |at: Option<Instant>| at.unwrap().duration_since(haste.start).as_secs_f64();
-        let all = [haste.glance(0, 0), haste.glance(0, 1), haste.end(0), haste.end(1)].map(after);
-        assert_eq!(all, [0.25, 0.5, 2.0, 4.0]);
+        let all = [haste.glance(), haste.end(0), haste.end(1)].map(after);
+        assert_eq!(all, [0.5, 2.0, 4.0]);
         // However long or short.
         assert_eq!(Haste::new(1e300).end(0), None);
         let none = Haste::new(0.0);

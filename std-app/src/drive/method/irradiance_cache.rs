@@ -3,10 +3,12 @@
 //! Two caches that know nothing of each other serve the even and the odd samples, so that the halves of the film tell the
 //! errors of records too.
 //!
-//! The first round begins with the overture of both, for which it has half of the time if that is limited (`haste.rs`).
+//! The first round begins with the overture of both, for which it has half of the time if that is limited (`haste.rs`), and
+//! again with more rays for each record where these are worth it (`balance.rs`).
 //! Then caches are frozen; a point that no record reaches is path traced, as is every surface that is not diffuse. Caches
 //! can be kept in a file, and be the first records of another picture of the same scene.
 
+use super::balance::{Account, Trial};
 use super::cache_settings::{CacheUse, Gather};
 use super::caster::{Cast, Caster};
 use super::caustics::{self, CausticUse};
@@ -19,20 +21,19 @@ use super::{Borrower, Method, Renderer, Stage};
 use crate::drive::audit::Audit;
 use crate::drive::cache_file::{self, Half, Header, Reader, View};
 use crate::drive::crew::Crew;
-use crate::drive::held_out::{EXACT, luminance};
+use crate::drive::held_out::EXACT;
 use crate::drive::memory::Memory;
 use crate::drive::refinement::{Refinement, Shortfall};
 use crate::drive::survey::{self, Survey};
 use crate::drive::workers::Workers;
-use crate::drive::{RenderError, Settings};
+use crate::drive::{RenderError, Settings, Stop};
 use core::f32::consts::FRAC_PI_2;
-use core::ops::Range;
 use halflight_core::bsdf::Features;
 use halflight_core::cache::irradiance::{CellFlux, IrradianceCache, Record, metric};
-use halflight_core::film::{Dropped, PIXELS_PER_TILE, Pixel, PixelSet, Tile};
+use halflight_core::film::{PIXELS_PER_TILE, PixelSet, Tile};
 use halflight_core::memory::{Arena, Footprint, Line};
 use halflight_core::transport::gather::Gathering;
-use halflight_core::transport::path::{LIGHTS, WAVE};
+use halflight_core::transport::path::WAVE;
 use halflight_core::transport::shoot::Keep;
 use halflight_core::transport::{Counters, PathTracer};
 use std::collections::VecDeque;
@@ -41,6 +42,10 @@ use std::time::Instant;
 
 /// Strata along a side come in so many.
 const BLOCK: usize = 8;
+
+/// Strata along a side to begin with where it is to be found out how many records are worth, and the most that they may be.
+const FIRST: usize = 16;
+const MOST: usize = 64;
 
 /// The most strata along a side, where caches are refined, and how often they are.
 const FINEST: usize = 128;
@@ -61,13 +66,6 @@ pub(in crate::drive) const LEAST_PIXELS: f32 = 2.0;
 
 /// Pixels that see an edge have several paths for each of the first samples, unless more than one in so many does.
 const FEW_EDGES: usize = 2;
-
-/// Samples by which it is judged whether more points of lights are worth their rays: far from those of any picture, and
-/// the last whose rays to lamps have numbers of their own.
-const TRIALS: Range<u32> = (1 << 28) - 2..1 << 28;
-
-/// By what factor one point of lights must leave more noise, for its rays, before several are asked.
-const WORTH: f64 = 1.25;
 
 /// Looks for caustics, takes the memory, sets the method up, and hands it to `then`.
 pub(super) fn with<F: Features, T>(
@@ -135,10 +133,10 @@ impl Loaded {
 
 /// What a picture takes of memory, whatever is left of it for records and photons.
 struct Needs {
-    /// Strata along a side that may be gathered, the fewest first: fewer than were asked for, those, and more of them.
+    /// Strata along a side that may be gathered, the fewest first: fewer than those to begin with, these, and more of them.
     sizes: Vec<usize>,
-    /// Which of them were asked for.
-    asked: usize,
+    /// Which of them it begins with.
+    first: usize,
     /// Of each thread.
     scratch: Footprint,
     edges: Footprint,
@@ -153,17 +151,22 @@ impl Needs {
     fn of<F: Features>(stage: &Stage, memory: &Memory, has_caustics: bool) -> Self {
         let Stage { settings, workers, .. } = *stage;
         let gather = settings.cache.gather;
-        let strata = settings.cache.strata() as usize;
+        let is_open = is_open(settings);
+        let strata = if is_open { FIRST } else { settings.cache.strata() as usize };
         let is_refined = settings.stop.error.is_some() && !in_files(settings) && has_indirect_light(settings);
+        let most = match (is_refined, is_open) {
+            (true, _) => FINEST,
+            (_, true) => MOST,
+            _ => strata,
+        };
         // As fine as half of the memory allows.
         let has_memory = |n: usize| {
             let scratch = PathTracer::<F>::gather_scratch(n).bytes().saturating_mul(workers.count());
-            is_refined && n <= FINEST && memory.available() / 2 > scratch + 2 * CellFlux::footprint(n).bytes()
+            n <= most && memory.available() / 2 > scratch + 2 * CellFlux::footprint(n).bytes()
         };
         let finer = core::iter::successors(Some(2 * strata), |n| Some(2 * n)).take_while(|n| has_memory(*n));
         let coarse = (strata / (2 * BLOCK)).max(1) * BLOCK;
-        let coarsest = may_be_coarse(settings).then_some(BLOCK);
-        let sizes: Vec<usize> = coarsest.into_iter().chain([coarse, strata]).chain(finer).collect();
+        let sizes: Vec<usize> = [coarse, strata].into_iter().chain(finer).collect();
         let finest = sizes.last().copied().unwrap_or(strata);
         let scratch = PathTracer::<F>::scratch(WAVE).or(PathTracer::<F>::gather_scratch(finest));
         let by_photons = gather == Gather::Photons && has_indirect_light(settings);
@@ -171,8 +174,7 @@ impl Needs {
         let scratch = if has_caustics { scratch.or(caustics::scratch::<F>()) } else { scratch };
         let tiles = Tile::count(settings.width, settings.height);
         let edges = Footprint::default().slice::<[u64; PIXELS_PER_TILE / 64]>(tiles);
-        let asked = sizes.iter().position(|n| *n == strata).unwrap_or(0);
-        Self { sizes, asked, scratch, edges, by_photons, is_refined }
+        Self { sizes, first: 1, scratch, edges, by_photons, is_refined }
     }
 
     /// All of it.
@@ -251,7 +253,7 @@ fn set_up<F: Features, T>(
     let metric = metric::Settings { error: settings.cache.allowed(), ..usual };
     let mut method = Cached {
         tracer: stage.paths::<F>(settings.seed),
-        gathering: Gathering { flux: &tables[needs.asked], metric, least_pixels: LEAST_PIXELS },
+        gathering: Gathering { flux: &tables[needs.first], metric, least_pixels: LEAST_PIXELS },
         tables: &tables,
         is_refined: needs.is_refined,
         refined: 0,
@@ -268,10 +270,11 @@ fn set_up<F: Features, T>(
         header: loaded.header,
         save: settings.save_cache.as_deref(),
         is_filled: false,
-        may_be_coarse: may_be_coarse(settings),
-        seconds_asked: settings.stop.seconds,
+        is_open: is_open(settings),
+        stop: settings.stop,
         haste: None,
         is_cut: false,
+        spent: (0, 0.0),
         edges: None,
         lights: None,
         seconds: 0.0,
@@ -302,9 +305,9 @@ fn in_files(settings: &Settings) -> bool {
     settings.save_cache.is_some() || settings.load_cache.is_some()
 }
 
-/// Whether records may have fewer rays than usual, where there is no time for these.
-fn may_be_coarse(settings: &Settings) -> bool {
-    settings.stop.seconds.is_some() && settings.cache.strata.is_none() && !in_files(settings)
+/// Whether it is to be found out how many rays records have.
+fn is_open(settings: &Settings) -> bool {
+    settings.cache.strata.is_none() && !in_files(settings)
 }
 
 /// See the file.
@@ -335,13 +338,14 @@ struct Cached<'a, F> {
     refined: usize,
     /// Refinements that wait until the caches of before are filled.
     pending: VecDeque<Refinement>,
-    /// Whether records may have fewer rays than usual, where there is no time for these.
-    may_be_coarse: bool,
-    /// Seconds that the picture has.
-    seconds_asked: Option<f64>,
+    /// Whether it is to be found out how many rays records have.
+    is_open: bool,
+    stop: Stop,
     /// When caches must be filled, where there is a limit of time, from the first time on that they are.
     haste: Option<Haste>,
     is_cut: bool,
+    /// Rays and seconds of the caches that there are.
+    spent: (u64, f64),
     /// Pixels that see an edge, when they are known.
     edges: Option<Vec<PixelSet>>,
     /// Points of lights that are asked, when that is known.
@@ -352,16 +356,15 @@ struct Cached<'a, F> {
 impl<F: Features> Cached<'_, F> {
     /// Fills both halves, or goes on with it, and keeps them; whether that is done: not where the round is over.
     fn fill(&mut self, crew: &mut Crew) -> Result<bool, RenderError> {
-        let start = Instant::now();
+        let (start, counted) = (Instant::now(), crew.canvas.counters);
         if self.haste.is_none() {
             // A film that goes on has the time that is left.
             let left = crew.round.deadline.map(|end| end.saturating_duration_since(start).as_secs_f64());
-            self.haste = self.seconds_asked.map(|seconds| Haste::new(left.unwrap_or(seconds)));
+            self.haste = self.stop.seconds.map(|seconds| Haste::new(left.unwrap_or(seconds)));
         }
         // Those that are refined are not cut before the picture is.
         let haste = self.haste.filter(|_| self.refined == 0);
         let Self { tracer, gathering, tables, size, halves, laboratory, caster, refined, scratch, .. } = self;
-        let (may_be_coarse, is_cut) = (&mut self.may_be_coarse, &mut self.is_cut);
         let mut all = true;
         for (i, half) in halves.iter_mut().enumerate() {
             let (photons, built);
@@ -384,32 +387,30 @@ impl<F: Features> Cached<'_, F> {
                 built = found;
                 tracer = tracer.with_bounced([laboratory.gathered(&built); 2]);
             }
-            let mut glances = ENOUGH.iter().enumerate();
-            let is_done = loop {
-                let coarse = coarser(tables, gathering.flux);
-                let overture = Overture { tracer: &tracer, gathering, coarse, size: *size };
-                let glance = haste.filter(|_| *may_be_coarse).zip(glances.next());
-                let until = match glance {
-                    Some((haste, (before, _))) => haste.glance(i, before),
-                    None => haste.and_then(|haste| haste.end(i)),
-                };
-                let is_done = crew.hurry(until, |crew| overture.fill(half, crew, scratch))?;
-                let Some((_, (_, enough))) = glance.filter(|_| !is_done) else { break is_done };
-                *may_be_coarse =
-                    overture.served(half, crew, scratch)?.is_some_and(|served| served <= *enough);
-                if *may_be_coarse {
-                    gathering.flux = coarse;
+            // The first of all: whether there is time for records of so many rays.
+            let glance = haste.filter(|_| self.is_open && i == 0 && self.lights.is_none());
+            let until = glance.map_or(haste.and_then(|haste| haste.end(i)), |haste| haste.glance());
+            let overture = |flux| {
+                let coarse = coarser(tables, flux);
+                Overture { tracer: &tracer, gathering: Gathering { flux, ..*gathering }, coarse, size: *size }
+            };
+            let mut is_done = crew.hurry(until, |crew| overture(gathering.flux).fill(half, crew, scratch))?;
+            if let Some(haste) = glance.filter(|_| !is_done) {
+                let served = overture(gathering.flux).served(half, crew, scratch)?;
+                if served.is_some_and(|served| served <= ENOUGH) {
+                    gathering.flux = coarser(tables, gathering.flux);
                     half.refine(None);
                 }
-            };
-            *may_be_coarse = false;
+                is_done =
+                    crew.hurry(haste.end(i), |crew| overture(gathering.flux).fill(half, crew, scratch))?;
+            }
             if !is_done {
                 if crew.is_over() {
                     all = false;
                     break;
                 }
                 half.finish();
-                *is_cut = true;
+                self.is_cut = true;
             }
         }
         if all {
@@ -419,7 +420,11 @@ impl<F: Features> Cached<'_, F> {
             }
         }
         self.save()?;
-        self.seconds += start.elapsed().as_secs_f64();
+        let seconds = start.elapsed().as_secs_f64();
+        let Counters { rays, shadow_rays, .. } = crew.canvas.counters;
+        self.spent.0 += rays + shadow_rays - counted.rays - counted.shadow_rays;
+        self.spent.1 += seconds;
+        self.seconds += seconds;
         Ok(all)
     }
 
@@ -443,39 +448,31 @@ impl<F: Features> Cached<'_, F> {
         Ok(true)
     }
 
-    /// Looks at a few tiles whether several points of lights leave less noise for their rays than one; whether that is done.
-    fn choose_lights(&mut self, crew: &mut Crew) -> Result<bool, RenderError> {
+    /// Tries out the caches: begins finer ones where those are worth it; whether that is done.
+    fn try_out(&mut self, crew: &mut Crew) -> Result<bool, RenderError> {
         let Self { tracer, halves: [even, odd], scratch, .. } = self;
-        let tracer = tracer.with_caches([&even.cache, &odd.cache]);
-        let tiles: Vec<usize> = tracer.pilot_tasks().collect();
-        let mut noise = vec![[0.0; 2]; tiles.len()];
-        let look = |task: usize, arena: &mut Arena, out: &mut [[f64; 2]]| {
-            let (mut all, mut rays, mut pixels) =
-                (Counters::default(), [0; 2], [[Pixel::default(); PIXELS_PER_TILE]; 2]);
-            for ((rays, pixels), lights) in rays.iter_mut().zip(&mut pixels).zip([1, LIGHTS]) {
-                let counters = tracer.with_lights(lights).run(tiles[task], TRIALS, WAVE, arena, pixels)?;
-                *rays = counters.rays + counters.shadow_rays;
-                all += counters;
-            }
-            // Both by the light that the better one sees.
-            let [one, several] = pixels;
-            let light = several.map(|pixel| luminance(pixel.mean()));
-            let mean = light.iter().sum::<f64>() / light.len() as f64;
-            for (noise, (pixels, rays)) in out.iter_mut().flatten().zip([one, several].iter().zip(rays)) {
-                let relative = |(pixel, light): (&Pixel, f64)| {
-                    luminance(pixel.variance()) / (light * light + 0.01 * mean * mean)
-                };
-                let sum: f64 = pixels.iter().zip(light).map(relative).filter(|noise| noise.is_finite()).sum();
-                *noise = sum * rays as f64;
-            }
-            // What is dropped here is dropped from no picture.
-            Ok(Counters { dropped: Dropped::default(), ..all })
-        };
-        if !crew.pass(&mut noise, 1, scratch, &look)? {
+        let Some(trial) = Trial::of(tracer, [&even.cache, &odd.cache], crew, scratch)? else {
             return Ok(false);
+        };
+        self.lights = Some(trial.lights);
+        if !self.is_open || self.is_cut {
+            return Ok(true);
         }
-        let [one, several] = noise.iter().fold([0.0; 2], |[a, b], [c, d]| [a + c, b + d]);
-        self.lights = Some(if WORTH * several < one { LIGHTS } else { 1 });
+        let (rays, seconds) = (self.spent.0 as f64, self.spent.1);
+        let left = self.haste.map(|haste| haste.left() * rays / seconds.max(f64::MIN_POSITIVE));
+        let account = Account { records: rays, left };
+        let n = self.gathering.flux.n();
+        let times = |table: &CellFlux| (table.n() as f64 / n as f64).powi(2);
+        let finer: Vec<&CellFlux> = self.tables.iter().filter(|table| table.n() > n).collect();
+        let all: Vec<f64> = finer.iter().map(|table| times(table)).collect();
+        if let Some(best) = trial.finer(&all, &self.stop, &account)
+            && let Some(flux) = finer.iter().find(|table| times(table) == best)
+        {
+            self.gathering.flux = flux;
+            self.halves.iter_mut().for_each(|half| half.refine(None));
+            self.haste = self.haste.map(|haste| Haste::new(haste.left()));
+            (self.is_filled, self.spent) = (false, (0, 0.0));
+        }
         Ok(true)
     }
 
@@ -528,8 +525,11 @@ impl<F: Features> Renderer for Cached<'_, F> {
                 return Ok(());
             }
             // By the first caches, also where a film goes on with later ones.
-            if self.lights.is_none() && !self.choose_lights(crew)? {
-                return Ok(());
+            if self.lights.is_none() {
+                if !self.try_out(crew)? {
+                    return Ok(());
+                }
+                continue;
             }
             if let Some(next) = self.pending.pop_front() {
                 self.begin(next);

@@ -5,6 +5,7 @@
 //! with its words, a file with its [`Renderer`], a line in [`Method::with`].
 
 mod aiming;
+mod balance;
 mod cache_settings;
 mod caster;
 mod caustic_look;

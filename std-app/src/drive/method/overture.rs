@@ -251,7 +251,7 @@ impl<'a> Growing<'a> {
 /// See the file.
 pub(in crate::drive) struct Overture<'o, 'a, F> {
     pub(in crate::drive) tracer: &'o PathTracer<'a, F>,
-    pub(in crate::drive) gathering: &'o Gathering<'o>,
+    pub(in crate::drive) gathering: Gathering<'o>,
     /// Of fewer strata, for what rough surfaces see: a pixel has the mean of many records there.
     pub(in crate::drive) coarse: &'o CellFlux<'o>,
     pub(in crate::drive) size: [u32; 2],
@@ -348,8 +348,8 @@ impl<F: Features> Overture<'_, '_, F> {
     ) -> Result<Gathered, RenderError> {
         let first = growing.gathered;
         let gathering = match growing.sight {
-            Some(Sight::Rough) => Gathering { flux: self.coarse, ..*self.gathering },
-            _ => *self.gathering,
+            Some(Sight::Rough) => Gathering { flux: self.coarse, ..self.gathering },
+            _ => self.gathering,
         };
         loop {
             // What a gather ray meets may be lit by the cache already.
