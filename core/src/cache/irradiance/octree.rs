@@ -16,6 +16,9 @@ const DEPTH: u32 = 16;
 /// A box no larger than a cell touches this many at most.
 const CELLS: usize = 8;
 
+/// Links of a record: from these, and from the one that its center lies in.
+const LINKS: usize = CELLS + 1;
+
 /// Levels that a record may be linked deeper than that where there is memory: points find fewer records in vain.
 const FINER: u32 = 2;
 
@@ -32,13 +35,15 @@ const FIRST_NODES: usize = 1 + CELLS * DEPTH as usize;
 /// Columns, rows and layers from the lowest corner of the root.
 type Cell = [u32; 3];
 
-/// Children by octant, and the first link of the list of records; 0 where there is none.
+/// Children by octant, and the first links of the lists of records that touch the cell and of those whose centers lie in it;
+/// 0 where there is none.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C)]
 struct Node {
     children: [u32; 8],
     /// One more than the index of a link.
     first: u32,
+    home: u32,
 }
 
 /// A record in a cell, and the next in that cell.
@@ -70,13 +75,13 @@ pub(super) struct Octree<'m> {
 impl<'m> Octree<'m> {
     /// Bytes for `records` records.
     pub(super) fn footprint(records: usize) -> Footprint {
-        Footprint::default().slice::<Node>(nodes(records)).slice::<Link>(records.saturating_mul(CELLS))
+        Footprint::default().slice::<Node>(nodes(records)).slice::<Link>(records.saturating_mul(LINKS))
     }
 
     /// An empty tree around `bounds`.
     pub(super) fn new(bounds: &Bounds, records: usize, arena: &mut Arena<'m>) -> Result<Self, OutOfMemory> {
         let nodes = arena.slice(nodes(records))?;
-        let links = arena.slice(records.saturating_mul(CELLS))?;
+        let links = arena.slice(records.saturating_mul(LINKS))?;
         let size = bounds.extent().max_element();
         let min = bounds.center() - 0.5 * size;
         let mut tree = Self { min, size, nodes, used_nodes: 1, links, used_links: 0 };
@@ -102,7 +107,7 @@ impl<'m> Octree<'m> {
 
     /// Whether there is memory for the links of another record.
     pub(super) fn has_room(&self) -> bool {
-        self.links.len() - self.used_links >= CELLS
+        self.links.len() - self.used_links >= LINKS
     }
 
     /// Links `record`, whose support lies within `extent` of `center`, from all cells that it touches: such as are larger than
@@ -115,8 +120,8 @@ impl<'m> Octree<'m> {
         while level > 0 && (0..3).any(|i| touches(level, i) > 1) {
             level -= 1;
         }
-        let spare =
-            self.links.len().saturating_sub(self.used_links.saturating_add(others.saturating_mul(CELLS)));
+        let taken = self.used_links.saturating_add(others.saturating_mul(LINKS)).saturating_add(1);
+        let spare = self.links.len().saturating_sub(taken);
         for finer in (level + 1..=DEPTH.min(level + FINER)).rev() {
             let cells = (0..3).map(|i| touches(finer, i) as usize + 1).product::<usize>();
             // Of each level the way down has no more nodes than there are cells.
@@ -133,17 +138,19 @@ impl<'m> Octree<'m> {
                 level -= 1;
             }
         }
-        let first = [0, 1, 2].map(|i| low[i] >> (DEPTH - level));
+        let [first, home] = [low, self.cell(center)].map(|cell| cell.map(|i| i >> (DEPTH - level)));
+        self.insert_at(record, home, level, |node| &mut node.home);
         for z in 0..=touches(level, 2) {
             for y in 0..=touches(level, 1) {
                 for x in 0..=touches(level, 0) {
-                    self.insert_at(record, [first[0] + x, first[1] + y, first[2] + z], level);
+                    let cell = [first[0] + x, first[1] + y, first[2] + z];
+                    self.insert_at(record, cell, level, |node| &mut node.first);
                 }
             }
         }
     }
 
-    fn insert_at(&mut self, record: u32, cell: Cell, level: u32) {
+    fn insert_at(&mut self, record: u32, cell: Cell, level: u32, list: impl Fn(&mut Node) -> &mut u32) {
         let mut at = 0;
         for depth in (0..level).rev() {
             let Some(child) = self.nodes.get(at).and_then(|node| node.children.get(octant(cell, depth)))
@@ -166,9 +173,10 @@ impl<'m> Octree<'m> {
         }
         let Some(node) = self.nodes.get_mut(at) else { return };
         if let Some(link) = self.links.get_mut(self.used_links) {
-            *link = Link { record, next: node.first };
+            let first = list(node);
             self.used_links += 1;
-            node.first = self.used_links as u32;
+            *link = Link { record, next: *first };
+            *first = self.used_links as u32;
         }
     }
 
@@ -254,7 +262,7 @@ impl<'m> Octree<'m> {
         }
     }
 
-    /// Calls `visit` with all records whose boxes touch the box around `center`, some of them several times.
+    /// Calls `visit` with all records whose centers lie in the box around `center`, and with some more; each once.
     pub(super) fn around(&self, center: Vec3, extent: f32, mut visit: impl FnMut(u32)) {
         let (low, high) = (self.cell(center - extent), self.cell(center + extent));
         // Nodes to visit: index, level, cell. A level leaves seven open at most.
@@ -264,7 +272,7 @@ impl<'m> Octree<'m> {
             count -= 1;
             let Some(&(index, level, cell)) = open.get(count) else { return };
             let Some(node) = self.nodes.get(index as usize) else { continue };
-            let mut link = node.first;
+            let mut link = node.home;
             while let Some(entry) = (link as usize).checked_sub(1).and_then(|link| self.links.get(link)) {
                 visit(entry.record);
                 link = entry.next;
@@ -370,20 +378,22 @@ mod tests {
     }
 
     #[test]
-    fn a_region_finds_every_box_that_touches_it() {
+    fn a_region_finds_every_center_in_it_and_none_twice() {
         let boxes = boxes(400);
-        with_tree(&boxes, 400, usize::MAX, |tree| {
-            let random = Random::new(5, 6);
-            for i in 0..500 {
-                let (center, extent) = (random_point(&random, i), 0.2 * random.single(9_000_000 + i));
-                let mut found = vec![false; 400];
-                tree.around(center, extent, |record| found[record as usize] = true);
-                for (other, &(c, e)) in boxes.iter().enumerate() {
-                    let touches = (c - center).abs().cmple(e + extent).all();
-                    assert!(found[other] || !touches, "{other} at {center}");
+        for nodes in [usize::MAX, 300, 9, 1] {
+            with_tree(&boxes, 400, nodes, |tree| {
+                let random = Random::new(5, 6);
+                for i in 0..500 {
+                    let (center, extent) = (random_point(&random, i), 0.2 * random.single(9_000_000 + i));
+                    let mut found = vec![0; 400];
+                    tree.around(center, extent, |record| found[record as usize] += 1);
+                    for (other, &(c, _)) in boxes.iter().enumerate() {
+                        let lies = (c - center).abs().cmple(Vec3::splat(extent)).all();
+                        assert!(found[other] <= 1 && (found[other] == 1 || !lies), "{other} at {center}");
+                    }
                 }
-            }
-        });
+            });
+        }
     }
 
     #[test]

@@ -226,10 +226,7 @@ impl<'m> IrradianceCache<'m> {
         let (records, least_cos) = (&*self.records, self.least_cos);
         // What another says of its place, and what it says of that of another.
         let mut note = |index: u32, curvatures: [f32; 2]| {
-            // The tree may find one several times.
-            let is_new = !found.iter().take(count).any(|&known| known == (index, curvatures));
             if curvatures != [0.0; 2]
-                && is_new
                 && let Some(slot) = found.get_mut(count)
             {
                 *slot = (index, curvatures);

@@ -1,6 +1,6 @@
 //! How many rays the records of caches are worth. Caches of few rays are tried out on a few tiles: the same samples by one cache
-//! and by the other tell the noise of records, their variance that of samples, and what each has cost tells where more
-//! work leaves less error. Whether several points of lights are worth their rays is told by the same samples.
+//! and by the other tell the noise of records, the variance of some more that of samples, and what each has cost tells where
+//! more work leaves less error. Whether several points of lights are worth their rays is tried out as well.
 
 use crate::drive::RenderError;
 use crate::drive::Stop;
@@ -14,13 +14,21 @@ use halflight_core::memory::{Arena, Line};
 use halflight_core::transport::path::{LIGHTS, WAVE};
 use halflight_core::transport::{Counters, PathTracer};
 
-/// Samples that are tried out: far from those of any picture, and the last whose rays to lamps have numbers of their own.
-const TRIALS: Range<u32> = (1 << 28) - 2..1 << 28;
+/// Samples that are tried out: far from those of any picture, and the last whose rays to lamps have numbers of their own. Many
+/// tell what the noise of samples comes to, which falls faster while they are few; of pictures that have no more than these,
+/// coarse records are good enough.
+const FEW: Range<u32> = (1 << 28) - 2..1 << 28;
+const MANY: Range<u32> = (1 << 28) - 16..1 << 28;
+
+/// Many are taken of one tile in so many of a small picture, but of so many at least.
+const LARGE_PART: usize = 8;
+const FEWEST_TILES: usize = 4;
 
 /// By what factor one point of lights must leave more noise, for its rays, before several are asked.
 const WORTH: f64 = 1.25;
 
-/// The part of the pixels that is left out, those of most noise: flashes, of which so few samples have too many or none.
+/// The part of the pixels that is left out where caches differ most: what no record reaches flashes, of which so few samples
+/// have too many or none.
 const FLASHES: usize = 100;
 
 /// The share of the time that is left which finer caches may take.
@@ -49,9 +57,7 @@ impl Default for Tried {
 pub(super) struct Trial {
     /// Points of lights that are asked.
     pub(super) lights: usize,
-    /// relMSE of one sample of each pixel, but for the noise of records,
-    sample: f64,
-    /// and of records.
+    /// relMSE by the noise of records.
     records: f64,
     /// Rays of one sample of each pixel.
     rays: f64,
@@ -82,7 +88,7 @@ impl Trial {
             let mut pixels = [[Pixel::default(); PIXELS_PER_TILE]; 3];
             let tracers = [one.with_lights(1), one.with_lights(LIGHTS), other.with_lights(1)];
             for ((tracer, rays), pixels) in tracers.iter().zip(&mut rays).zip(&mut pixels) {
-                let counters = tracer.run(tiles[task], TRIALS, WAVE, arena, pixels)?;
+                let counters = tracer.run(tiles[task], FEW, WAVE, arena, pixels)?;
                 *rays = counters.rays + counters.shadow_rays;
                 all += counters;
             }
@@ -104,44 +110,79 @@ impl Trial {
     /// By tiles of so many.
     fn told(tried: &[Tried], tiles: usize) -> Self {
         let light: Vec<f64> = tried.iter().flat_map(|tile| tile.light).collect();
-        let mean = light.iter().sum::<f64>() / light.len().max(1) as f64;
+        let whole = mean(light.iter().copied());
         let relative = |squared: &dyn Fn(&Tried) -> [f64; PIXELS_PER_TILE]| {
-            let squared = tried.iter().flat_map(squared);
-            let weighed =
-                squared.zip(&light).map(|(squared, light)| squared / (light * light + 0.01 * mean * mean));
-            let mut all: Vec<f64> = weighed.filter(|squared| squared.is_finite()).collect();
+            let squared = tried.iter().flat_map(squared).zip(&light);
+            let mut all: Vec<f64> =
+                squared.map(|(squared, light)| relative(squared, *light, whole)).collect();
             all.sort_by(f64::total_cmp);
-            let kept = all.len() - all.len() / FLASHES;
-            all[..kept].iter().sum::<f64>() / kept.max(1) as f64
+            all
         };
-        let [one, several] = [0, 1].map(|i| relative(&|tile| tile.samples[i]));
+        let noise = |i: usize| mean(relative(&|tile| tile.samples[i]).into_iter());
         let rays = [0, 1].map(|i| tried.iter().map(|tile| tile.rays[i]).sum::<u64>() as f64);
-        let is_several = WORTH * several * rays[1] < one * rays[0];
-        let samples = TRIALS.len() as f64;
+        let is_several = WORTH * noise(1) * rays[1] < noise(0) * rays[0];
+        let caches = relative(&|tile| tile.caches);
+        let kept = caches.len() - caches.len() / FLASHES;
         let share = tried.len().max(1) as f64 / tiles.max(1) as f64;
-        let (sample, rays) = if is_several { (several, rays[1]) } else { (one, rays[0]) };
         Self {
             lights: if is_several { LIGHTS } else { 1 },
-            sample: sample * samples,
             // A picture has the mean of both.
-            records: 0.25 * relative(&|tile| tile.caches),
-            rays: rays / (samples * share),
+            records: 0.25 * mean(caches.into_iter().take(kept)),
+            rays: rays[usize::from(is_several)] / (FEW.len() as f64 * share),
         }
     }
 
-    /// By how many times as many rays records are to be made anew, of `finer`; `None`: they are good as they are. It is where
-    /// error times work is least.
-    pub(super) fn finer(&self, finer: &[f64], stop: &Stop, account: &Account) -> Option<f64> {
+    /// relMSE of one sample of each pixel, but for the noise of records, as far as many tell; `None` where the round is over.
+    pub(super) fn noise<F: Features>(
+        &self,
+        tracer: &PathTracer<F>,
+        cache: &IrradianceCache,
+        crew: &mut Crew,
+        scratch: &mut [Vec<Line>],
+    ) -> Result<Option<f64>, RenderError> {
+        let tracer = tracer.with_caches([cache; 2]).with_lights(self.lights);
+        let all = tracer.pilot_tasks().count();
+        let wanted = (tracer.tasks() / LARGE_PART).clamp(FEWEST_TILES.min(all), all);
+        let tiles: Vec<usize> = tracer.pilot_tasks().step_by(all.div_ceil(wanted.max(1)).max(1)).collect();
+        let mut tried = vec![[Pixel::default(); PIXELS_PER_TILE]; tiles.len()];
+        let look = |task: usize, arena: &mut Arena, out: &mut [[Pixel; PIXELS_PER_TILE]]| {
+            let Some(pixels) = out.first_mut() else { return Ok(Counters::default()) };
+            let counters = tracer.run(tiles[task], MANY, WAVE, arena, pixels)?;
+            Ok(Counters { dropped: Dropped::default(), ..counters })
+        };
+        if !crew.pass(&mut tried, 1, scratch, &look)? {
+            return Ok(None);
+        }
+        let pixels = || tried.iter().flatten();
+        let light = mean(pixels().map(|pixel| luminance(pixel.mean())));
+        let noise =
+            pixels().map(|pixel| relative(luminance(pixel.variance()), luminance(pixel.mean()), light));
+        Ok(Some(MANY.len() as f64 * mean(noise)))
+    }
+
+    /// Samples that the picture will have at most, where an error does not say.
+    fn most(&self, stop: &Stop, left: Option<f64>) -> f64 {
+        let by_time = left.map(|left| left / self.rays);
+        let by_count = stop.most_samples().map(f64::from);
+        [by_time, by_count].into_iter().flatten().fold(f64::INFINITY, f64::min)
+    }
+
+    /// Whether the picture will have so few samples that records may be coarse.
+    pub(super) fn is_short(&self, stop: &Stop, account: &Account) -> bool {
+        self.most(stop, account.left) <= MANY.len() as f64
+    }
+
+    /// By how many times as many rays records are to be made anew, of `finer`, where one sample has that noise; `None`: they are
+    /// good as they are. It is where error times work is least.
+    pub(super) fn finer(&self, finer: &[f64], sample: f64, stop: &Stop, account: &Account) -> Option<f64> {
         let worth = |times: f64| {
             // Before finer ones, coarse ones were made.
             let records = if times > 1.0 { times * account.records } else { 0.0 };
-            let (noise, left) = (self.records / times, account.left.map(|left| left - records));
-            let by_time = left.map(|left| left / self.rays);
-            let by_error = stop.error.map(|error| self.sample / (error - noise).max(0.0));
-            let by_count = stop.most_samples().map(f64::from);
-            let samples = [by_time, by_error, by_count].into_iter().flatten().fold(f64::INFINITY, f64::min);
-            let work = account.records + records + samples * self.rays;
-            (noise + self.sample / samples.max(1.0)) * work
+            let noise = self.records / times;
+            let most = self.most(stop, account.left.map(|left| left - records));
+            let by_error = stop.error.map(|error| sample / (error - noise).max(0.0));
+            let samples = most.min(by_error.unwrap_or(most)).max(1.0);
+            (noise + sample / samples) * (account.records + records + samples * self.rays)
         };
         let has_time =
             |times: f64| account.left.is_none_or(|left| times * account.records <= MOST_TIME * left);
@@ -152,20 +193,31 @@ impl Trial {
     }
 }
 
+/// A squared error of a pixel of that light, as relMSE counts it; none where it is not a number.
+fn relative(squared: f64, light: f64, mean: f64) -> f64 {
+    let relative = squared / (light * light + 0.01 * mean * mean);
+    if relative.is_finite() { relative } else { 0.0 }
+}
+
+fn mean(values: impl Iterator<Item = f64>) -> f64 {
+    let (sum, count) = values.fold((0.0, 0u32), |(sum, count), value| (sum + value, count + 1));
+    sum / f64::from(count.max(1))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
     const ACCOUNT: Account = Account { records: 10.0, left: None };
 
-    fn trial(sample: f64, records: f64) -> Trial {
-        Trial { lights: 1, sample, records, rays: 1.0 }
+    fn trial(records: f64) -> Trial {
+        Trial { lights: 1, records, rays: 1.0 }
     }
 
     #[test]
     fn finer_records_are_made_where_their_noise_is_most_of_it() {
         let spp = |spp| Stop { spp: Some(spp), ..Stop::default() };
-        let finer = |records, stop| trial(1.0, records).finer(&[4.0, 16.0], &stop, &ACCOUNT);
+        let finer = |records, stop| trial(records).finer(&[4.0, 16.0], 1.0, &stop, &ACCOUNT);
         assert_eq!(finer(1e-6, spp(100)), None);
         // (1 / 100 + 0.01) 110 = 2.2, (1 / 100 + 0.01 / 4) 150 = 1.9, (1 / 100 + 0.01 / 16) 270 = 2.9.
         assert_eq!(finer(0.01, spp(100)), Some(4.0));
@@ -175,32 +227,36 @@ mod tests {
         // An error below that of these records needs others, however few samples there are.
         let error = |error| Stop { error: Some(error), ..Stop::default() };
         assert_eq!([0.1, 0.009, 1e-3].map(|e| finer(0.01, error(e))), [None, Some(4.0), Some(16.0)]);
-        assert_eq!(trial(1.0, 1.0).finer(&[], &spp(100), &ACCOUNT), None);
+        assert_eq!(trial(1.0).finer(&[], 1.0, &spp(100), &ACCOUNT), None);
     }
 
     #[test]
     fn what_there_is_no_time_for_is_not_made() {
         let finer = |left| {
             let account = Account { left: Some(left), ..ACCOUNT };
-            trial(1.0, 1.0).finer(&[4.0, 16.0], &Stop { seconds: Some(1e3), ..Stop::default() }, &account)
+            trial(1.0).finer(&[4.0, 16.0], 1.0, &Stop { seconds: Some(1e3), ..Stop::default() }, &account)
         };
         assert_eq!([79.0, 81.0, 321.0].map(finer), [None, Some(4.0), Some(16.0)]);
     }
 
     #[test]
-    fn a_trial_tells_noise_and_rays_of_one_sample() {
+    fn a_trial_tells_the_noise_of_records_and_the_rays_of_a_sample() {
         let mut tile = Tried { light: [1.0; PIXELS_PER_TILE], rays: [100, 300], ..Tried::default() };
         tile.samples = [[1.01; PIXELS_PER_TILE], [0.505; PIXELS_PER_TILE]];
         tile.caches = [4.04; PIXELS_PER_TILE];
         // Flashes do not count, nor what is not a number.
-        (tile.samples[0][7], tile.caches[9]) = (1e9, f64::NAN);
+        (tile.caches[7], tile.samples[0][9]) = (1e9, f64::NAN);
         let told = Trial::told(&vec![tile.clone(); 16], 64);
         // Two samples, a quarter of the tiles; several points leave half of the noise for three times the rays.
-        let near = |a: f64, b: f64| (a - b).abs() < 1e-9;
         assert!(told.lights == 1 && told.rays == 3200.0, "{told:?}");
-        assert!(near(told.sample, 2.0) && near(told.records, 1.0), "{told:?}");
+        assert!((told.records - 1.0).abs() < 1e-9, "{told:?}");
         tile.rays[1] = 150;
         let told = Trial::told(&vec![tile; 16], 64);
-        assert!(told.lights == LIGHTS && near(told.sample, 1.0) && told.rays == 4800.0, "{told:?}");
+        assert!(told.lights == LIGHTS && told.rays == 4800.0, "{told:?}");
+        // How many there will be at most.
+        let of = |spp, seconds| Stop { spp, seconds, error: None };
+        let most = |stop, left| told.is_short(&stop, &Account { records: 1.0, left });
+        assert!(most(of(Some(16), None), None) && !most(of(Some(17), None), None));
+        assert!(most(of(None, Some(1.0)), Some(4800.0)) && !most(of(None, Some(1.0)), Some(1e6)));
     }
 }

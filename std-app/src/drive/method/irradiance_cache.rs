@@ -450,29 +450,28 @@ impl<F: Features> Cached<'_, F> {
 
     /// Tries out the caches: begins finer ones where those are worth it; whether that is done.
     fn try_out(&mut self, crew: &mut Crew) -> Result<bool, RenderError> {
-        let Self { tracer, halves: [even, odd], scratch, .. } = self;
+        let Self { tracer, halves: [even, odd], tables, stop, scratch, .. } = self;
         let Some(trial) = Trial::of(tracer, [&even.cache, &odd.cache], crew, scratch)? else {
             return Ok(false);
         };
-        self.lights = Some(trial.lights);
-        if !self.is_open || self.is_cut {
-            return Ok(true);
-        }
         let (rays, seconds) = (self.spent.0 as f64, self.spent.1);
         let left = self.haste.map(|haste| haste.left() * rays / seconds.max(f64::MIN_POSITIVE));
         let account = Account { records: rays, left };
-        let n = self.gathering.flux.n();
-        let times = |table: &CellFlux| (table.n() as f64 / n as f64).powi(2);
-        let finer: Vec<&CellFlux> = self.tables.iter().filter(|table| table.n() > n).collect();
-        let all: Vec<f64> = finer.iter().map(|table| times(table)).collect();
-        if let Some(best) = trial.finer(&all, &self.stop, &account)
-            && let Some(flux) = finer.iter().find(|table| times(table) == best)
-        {
-            self.gathering.flux = flux;
-            self.halves.iter_mut().for_each(|half| half.refine(None));
-            self.haste = self.haste.map(|haste| Haste::new(haste.left()));
-            (self.is_filled, self.spent) = (false, (0, 0.0));
+        if self.is_open && !self.is_cut && !trial.is_short(stop, &account) {
+            let Some(noise) = trial.noise(tracer, &even.cache, crew, scratch)? else { return Ok(false) };
+            let n = self.gathering.flux.n();
+            let times = |table: &CellFlux| (table.n() as f64 / n as f64).powi(2);
+            let finer: Vec<f64> = tables.iter().map(times).filter(|times| *times > 1.0).collect();
+            if let Some(best) = trial.finer(&finer, noise, stop, &account)
+                && let Some(flux) = tables.iter().find(|table| times(table) == best)
+            {
+                self.gathering.flux = flux;
+                self.halves.iter_mut().for_each(|half| half.refine(None));
+                self.haste = self.haste.map(|haste| Haste::new(haste.left()));
+                (self.is_filled, self.spent) = (false, (0, 0.0));
+            }
         }
+        self.lights = Some(trial.lights);
         Ok(true)
     }
 
