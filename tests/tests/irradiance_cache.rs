@@ -1,10 +1,12 @@
 //! The irradiance cache as a method of the renderer: its light against that of the path tracer, its bits against
 //! threads, its records against the unit of the scene, and what it does without memory.
 
-use core::sync::atomic::AtomicBool;
+use core::sync::atomic::{AtomicBool, Ordering};
 use glam::Vec3;
 use halflight::compare::compare;
-use halflight::drive::{CacheUse, Ending, Gather, Mark, Method, RenderResult, Settings};
+use halflight::drive::{
+    CacheUse, Checkpoint, Ending, Gather, Mark, Method, Progress, RenderResult, Settings, Stop,
+};
 use halflight::save::Image;
 use halflight_core::Rgb;
 use halflight_core::scene::{Material, Scene, Surface};
@@ -102,6 +104,31 @@ fn records_have_the_rays_that_they_are_worth() {
     let many = of(2048, None, 2);
     assert!(cache(&many).rays > 256, "{:?}", cache(&many));
     assert!(many.image == of(2048, None, 1).image);
+}
+
+#[test]
+fn films_go_on_with_the_records_that_they_would_have_had() {
+    let buffers = cornell_box();
+    let scene = buffers.scene();
+    let file = std::env::temp_dir().join(format!("halflight-finer-{}", std::process::id()));
+    let checkpoint = Checkpoint { path: file.clone(), every: 1e9 };
+    let stop = Stop { spp: Some(1024), ..Stop::default() };
+    let usual = Settings { width: 32, height: 32, stop, ..Settings::default() };
+    let usual = Settings { method: Some(Method::IrradianceCache), ..usual };
+    let whole = halflight::drive::render(&scene, &usual, &mut |_| (), &AtomicBool::new(false)).unwrap();
+    assert!(cache(&whole).rays > 256, "{:?}", cache(&whole));
+    // The first samples have coarse records: cut while these are used, and when they are no more.
+    for cut in [8, 512] {
+        let interrupt = AtomicBool::new(false);
+        let cut = |known: &Progress| interrupt.store(known.spp >= cut, Ordering::Relaxed);
+        let first = Settings { checkpoint: Some(checkpoint.clone()), ..usual.clone() };
+        let first = halflight::drive::render(&scene, &first, &mut { cut }, &interrupt).unwrap();
+        assert!(first.spp < 1024);
+        let then = Settings { resume: Some(file.clone()), ..usual.clone() };
+        let then = halflight::drive::render(&scene, &then, &mut |_| (), &AtomicBool::new(false)).unwrap();
+        assert!(then.image == whole.image && then.counters == whole.counters, "{}", first.spp);
+    }
+    std::fs::remove_file(file).unwrap();
 }
 
 #[test]

@@ -31,6 +31,9 @@ const WORTH: f64 = 1.25;
 /// have too many or none.
 const FLASHES: usize = 100;
 
+/// Caches change where so many samples are done: those that photons of caustics serve.
+const BLOCK: u32 = 8;
+
 /// The share of the time that is left which finer caches may take.
 const MOST_TIME: f64 = 0.5;
 
@@ -172,24 +175,38 @@ impl Trial {
         self.most(stop, account.left) <= MANY.len() as f64
     }
 
-    /// By how many times as many rays records are to be made anew, of `finer`, where one sample has that noise; `None`: they are
-    /// good as they are. It is where error times work is least.
-    pub(super) fn finer(&self, finer: &[f64], sample: f64, stop: &Stop, account: &Account) -> Option<f64> {
+    /// By how many times as many rays records are to be made anew, of `finer`, where one sample has that noise, and from which
+    /// sample on; `None`: they are good as they are. It is where error times work is least.
+    pub(super) fn finer(
+        &self,
+        finer: &[f64],
+        sample: f64,
+        stop: &Stop,
+        account: &Account,
+    ) -> Option<(f64, u32)> {
+        let samples = |times: f64| {
+            let most = self.most(stop, account.left.map(|left| left - times * account.records));
+            let by_error = stop.error.map(|error| sample / (error - self.noise_of(times)).max(0.0));
+            most.min(by_error.unwrap_or(most)).max(1.0)
+        };
         let worth = |times: f64| {
-            // Before finer ones, coarse ones were made.
-            let records = if times > 1.0 { times * account.records } else { 0.0 };
-            let noise = self.records / times;
-            let most = self.most(stop, account.left.map(|left| left - records));
-            let by_error = stop.error.map(|error| sample / (error - noise).max(0.0));
-            let samples = most.min(by_error.unwrap_or(most)).max(1.0);
-            (noise + sample / samples) * (account.records + records + samples * self.rays)
+            let samples = samples(times);
+            let work = (1.0 + times) * account.records + samples * self.rays;
+            (self.noise_of(times) + sample / samples) * work
         };
         let has_time =
             |times: f64| account.left.is_none_or(|left| times * account.records <= MOST_TIME * left);
-        let now = worth(1.0);
+        let now = worth(0.0);
         let finer = finer.iter().filter(|times| has_time(**times)).map(|times| (*times, worth(*times)));
-        let best = finer.min_by(|(_, a), (_, b)| a.total_cmp(b));
-        best.filter(|(_, best)| now.is_infinite() || *best < now).map(|(times, _)| times)
+        let (times, best) = finer.min_by(|(_, a), (_, b)| a.total_cmp(b))?;
+        let from = (samples(times) / (1.0 + times)) as u32 / BLOCK * BLOCK;
+        (now.is_infinite() || best < now).then_some((times, from))
+    }
+
+    /// relMSE by the noise of records where others follow these, which have so many `times` as many rays: either have their
+    /// part of the samples.
+    fn noise_of(&self, times: f64) -> f64 {
+        self.records / (1.0 + times)
     }
 }
 
@@ -219,14 +236,18 @@ mod tests {
         let spp = |spp| Stop { spp: Some(spp), ..Stop::default() };
         let finer = |records, stop| trial(records).finer(&[4.0, 16.0], 1.0, &stop, &ACCOUNT);
         assert_eq!(finer(1e-6, spp(100)), None);
-        // (1 / 100 + 0.01) 110 = 2.2, (1 / 100 + 0.01 / 4) 150 = 1.9, (1 / 100 + 0.01 / 16) 270 = 2.9.
-        assert_eq!(finer(0.01, spp(100)), Some(4.0));
-        assert_eq!(finer(1.0, spp(100)), Some(16.0));
+        // (1 / 100 + 0.01) 110 = 2.2, (1 / 100 + 0.01 / 5) 150 = 1.8, (1 / 100 + 0.01 / 17) 270 = 2.9. A fifth of the samples
+        // are left to coarse ones.
+        assert_eq!(finer(0.01, spp(100)), Some((4.0, 16)));
+        assert_eq!(finer(1.0, spp(100)), Some((16.0, 0)));
         // The more samples, the finer.
-        assert_eq!([10, 10_000].map(|n| finer(0.01, spp(n))), [None, Some(16.0)]);
+        assert_eq!([10, 10_000].map(|n| finer(0.01, spp(n))), [None, Some((16.0, 584))]);
         // An error below that of these records needs others, however few samples there are.
-        let error = |error| Stop { error: Some(error), ..Stop::default() };
-        assert_eq!([0.1, 0.009, 1e-3].map(|e| finer(0.01, error(e))), [None, Some(4.0), Some(16.0)]);
+        let error = |error| finer(0.01, Stop { error: Some(error), ..Stop::default() });
+        assert_eq!(
+            [0.1, 0.009, 1e-3].map(|e| error(e).map(|(times, _)| times)),
+            [None, Some(4.0), Some(16.0)]
+        );
         assert_eq!(trial(1.0).finer(&[], 1.0, &spp(100), &ACCOUNT), None);
     }
 
@@ -234,7 +255,8 @@ mod tests {
     fn what_there_is_no_time_for_is_not_made() {
         let finer = |left| {
             let account = Account { left: Some(left), ..ACCOUNT };
-            trial(1.0).finer(&[4.0, 16.0], 1.0, &Stop { seconds: Some(1e3), ..Stop::default() }, &account)
+            let stop = Stop { seconds: Some(1e3), ..Stop::default() };
+            trial(1.0).finer(&[4.0, 16.0], 1.0, &stop, &account).map(|(times, _)| times)
         };
         assert_eq!([79.0, 81.0, 321.0].map(finer), [None, Some(4.0), Some(16.0)]);
     }

@@ -145,17 +145,18 @@ impl<'a> Caster<'a> {
         Ok(Self { stage: *stage, cast, beside_records, photons, each, used, kept: None })
     }
 
-    /// Brings the tiles of `crew` to their targets by `tracer`, joined with photons; less where the round is cut.
+    /// Brings the tiles of `crew` to their targets, or to `end` samples, by `tracer`, joined with photons; less where the round is cut.
     pub(super) fn round<F: Features>(
         &mut self,
         tracer: &PathTracer<F>,
+        end: u32,
         scratch: &mut [Vec<Line>],
         crew: &mut Crew,
     ) -> Result<(), RenderError> {
         let Self { stage, cast: Cast { emission, discs, plenty }, beside_records, photons, each, used, kept } =
             self;
         let discs = discs.of_pixels(*plenty as f32);
-        while let Some(sample) = crew.next_in_mean() {
+        while let Some(sample) = crew.next_in_mean().filter(|sample| *sample < end) {
             let block = Block::of(sample);
             let most = used.caustic.map_or(0, |map| map.given as usize);
             let light_paths = (*each * block.samples() as usize).min(most);
@@ -187,18 +188,18 @@ impl<'a> Caster<'a> {
         Ok(())
     }
 
-    /// Photons for rays that gather for cache number 0 or 1, which was `refined` so many times; `None` where the round is
+    /// Photons for rays that gather for cache number 0 or 1, which has `begun` anew so many times; `None` where the round is
     /// over. Each time they are others, of smaller discs, as if they served the next samples.
     pub(super) fn for_records<F: Features>(
         &mut self,
-        (half, refined): (u32, u32),
+        (half, begun): (u32, u32),
         scratch: &mut [Vec<Line>],
         crew: &mut Crew,
     ) -> Result<Option<ForRecords<'_>>, RenderError> {
         let Self { stage, cast: Cast { emission, discs, .. }, photons, used, kept, .. } = self;
         *kept = None;
         let paths = used.caustic.map_or(0, |map| map.given as usize).div_ceil(RECORD_PART);
-        let sample = 2 * refined + half;
+        let sample = 2 * begun + half;
         let from = (discs.of_pixels(RECORD_RADIUS), sample);
         let (shooter, discs) = shooter::<F>(stage, emission, paths, from, true);
         let [even, odd] = photons;

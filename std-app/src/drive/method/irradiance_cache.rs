@@ -274,7 +274,10 @@ fn set_up<F: Features, T>(
         stop: settings.stop,
         haste: None,
         is_cut: false,
+        begun: 0,
         spent: (0, 0.0),
+        may_wait: settings.stop.error.is_none() && settings.adaptive == Some(false),
+        finer: None,
         edges: None,
         lights: None,
         seconds: 0.0,
@@ -344,8 +347,14 @@ struct Cached<'a, F> {
     /// When caches must be filled, where there is a limit of time, from the first time on that they are.
     haste: Option<Haste>,
     is_cut: bool,
-    /// Rays and seconds of the caches that there are.
+    /// How often caches began anew.
+    begun: u32,
+    /// Rays and seconds of caches.
     spent: (u64, f64),
+    /// Whether the first samples may have coarser caches than those that follow, and from which sample on records have more
+    /// rays, where they are worth it.
+    may_wait: bool,
+    finer: Option<(u32, &'a CellFlux<'a>)>,
     /// Pixels that see an edge, when they are known.
     edges: Option<Vec<PixelSet>>,
     /// Points of lights that are asked, when that is known.
@@ -364,14 +373,14 @@ impl<F: Features> Cached<'_, F> {
         }
         // Those that are refined are not cut before the picture is.
         let haste = self.haste.filter(|_| self.refined == 0);
-        let Self { tracer, gathering, tables, size, halves, laboratory, caster, refined, scratch, .. } = self;
+        let Self { tracer, gathering, tables, size, halves, laboratory, caster, begun, scratch, .. } = self;
         let mut all = true;
         for (i, half) in halves.iter_mut().enumerate() {
             let (photons, built);
             let mut tracer = *tracer;
             // Where depth is limited, rays that gather ask for none.
             if let Some(caster) = caster.as_mut().filter(|_| !half.is_finished() && !tracer.is_limited()) {
-                let map = (i as u32, *refined as u32);
+                let map = (i as u32, *begun);
                 let Some(found) = caster.for_records::<F>(map, scratch, crew)? else {
                     all = false;
                     break;
@@ -462,17 +471,29 @@ impl<F: Features> Cached<'_, F> {
             let n = self.gathering.flux.n();
             let times = |table: &CellFlux| (table.n() as f64 / n as f64).powi(2);
             let finer: Vec<f64> = tables.iter().map(times).filter(|times| *times > 1.0).collect();
-            if let Some(best) = trial.finer(&finer, noise, stop, &account)
-                && let Some(flux) = tables.iter().find(|table| times(table) == best)
-            {
-                self.gathering.flux = flux;
-                self.halves.iter_mut().for_each(|half| half.refine(None));
-                self.haste = self.haste.map(|haste| Haste::new(haste.left()));
-                (self.is_filled, self.spent) = (false, (0, 0.0));
+            if let Some((best, from)) = trial.finer(&finer, noise, stop, &account) {
+                let from = if self.may_wait { from } else { 0 };
+                self.finer = tables.iter().find(|table| times(table) == best).map(|flux| (from, flux));
             }
         }
         self.lights = Some(trial.lights);
         Ok(true)
+    }
+
+    /// Whether it is time for records of more rays.
+    fn is_time_for_finer(&self, crew: &Crew) -> bool {
+        let next = || crew.next_sample();
+        self.finer.is_some_and(|(from, _)| next().is_some_and(|sample| sample >= from))
+    }
+
+    /// Begins caches of records of more rays.
+    fn begin_finer(&mut self) {
+        let Some((_, flux)) = self.finer.take() else { return };
+        self.gathering.flux = flux;
+        self.halves.iter_mut().for_each(|half| half.refine(None));
+        self.haste = self.haste.map(|haste| Haste::new(haste.left()));
+        self.begun += 1;
+        self.is_filled = false;
     }
 
     /// Begins caches that are better.
@@ -489,7 +510,31 @@ impl<F: Features> Cached<'_, F> {
         let keeps = by_curvature && !is_finer;
         self.halves.iter_mut().for_each(|growing| growing.refine(keeps.then_some(share)));
         self.refined += 1;
+        self.begun += 1;
         self.is_filled = false;
+    }
+
+    /// Brings the tiles to their targets, as far as these caches are for them.
+    fn take_samples(&mut self, crew: &mut Crew) -> Result<(), RenderError> {
+        let end = self.finer.map_or(u32::MAX, |(from, _)| from);
+        let Self { tracer, halves: [even, odd], scratch, edges, lights, laboratory, caster, .. } = self;
+        let edges = edges.as_deref().unwrap_or_default();
+        let mut tracer =
+            tracer.with_caches([&even.cache, &odd.cache]).with_edges(edges).with_lights(lights.unwrap_or(1));
+        let built;
+        if let Some((laboratory, [even, odd])) = laboratory {
+            let Some(even) = laboratory.build::<F>(even, 0, crew, scratch)? else { return Ok(()) };
+            let Some(odd) = laboratory.build::<F>(odd, 1, crew, scratch)? else { return Ok(()) };
+            built = [even, odd];
+            tracer = tracer.with_bounced(built.each_ref().map(|built| laboratory.gathered(built)));
+        }
+        if let Some(caster) = caster {
+            return caster.round(&tracer, end, scratch, crew);
+        }
+        crew.tiles(end, scratch, &|task, samples, arena, pixels| {
+            tracer.run(task, samples, WAVE, arena, pixels)
+        })?;
+        Ok(())
     }
 
     /// Whether records expect more error of the noise of their rays than of extrapolation.
@@ -518,46 +563,34 @@ impl<F: Features> Renderer for Cached<'_, F> {
         // A film that goes on has the rays of all this already.
         let resumed = self.edges.is_none() && crew.canvas.spp() > 0;
         let counted = crew.canvas.counters;
-        while !self.is_filled || self.lights.is_none() || !self.pending.is_empty() {
-            self.is_filled = self.is_filled || self.fill(crew)?;
-            if !self.is_filled {
-                return Ok(());
-            }
-            // By the first caches, also where a film goes on with later ones.
-            if self.lights.is_none() {
-                if !self.try_out(crew)? {
+        loop {
+            while !self.is_filled || self.lights.is_none() || !self.pending.is_empty() {
+                self.is_filled = self.is_filled || self.fill(crew)?;
+                if !self.is_filled {
                     return Ok(());
                 }
-                continue;
+                // By the first caches, also where a film goes on with later ones.
+                if self.lights.is_none() && !self.try_out(crew)? {
+                    return Ok(());
+                }
+                if self.is_time_for_finer(crew) {
+                    self.begin_finer();
+                } else if let Some(next) = self.pending.pop_front() {
+                    self.begin(next);
+                }
             }
-            if let Some(next) = self.pending.pop_front() {
-                self.begin(next);
+            if self.edges.is_none() && !self.find_edges(crew)? {
+                return Ok(());
             }
+            if resumed {
+                crew.canvas.counters = counted;
+            }
+            self.take_samples(crew)?;
+            if !self.is_time_for_finer(crew) {
+                return Ok(());
+            }
+            self.begin_finer();
         }
-        if self.edges.is_none() && !self.find_edges(crew)? {
-            return Ok(());
-        }
-        if resumed {
-            crew.canvas.counters = counted;
-        }
-        let Self { tracer, halves: [even, odd], scratch, edges, lights, laboratory, caster, .. } = self;
-        let edges = edges.as_deref().unwrap_or_default();
-        let mut tracer =
-            tracer.with_caches([&even.cache, &odd.cache]).with_edges(edges).with_lights(lights.unwrap_or(1));
-        let built;
-        if let Some((laboratory, [even, odd])) = laboratory {
-            let Some(even) = laboratory.build::<F>(even, 0, crew, scratch)? else { return Ok(()) };
-            let Some(odd) = laboratory.build::<F>(odd, 1, crew, scratch)? else { return Ok(()) };
-            built = [even, odd];
-            tracer = tracer.with_bounced(built.each_ref().map(|built| laboratory.gathered(built)));
-        }
-        if let Some(caster) = caster {
-            return caster.round(&tracer, scratch, crew);
-        }
-        crew.tiles(u32::MAX, scratch, &|task, samples, arena, pixels| {
-            tracer.run(task, samples, WAVE, arena, pixels)
-        })?;
-        Ok(())
     }
 
     fn refine(&mut self, short: &Shortfall) -> Option<Refinement> {
