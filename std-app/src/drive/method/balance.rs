@@ -34,6 +34,9 @@ const FLASHES: usize = 100;
 /// Caches change where so many samples are done: those that photons of caustics serve.
 const BLOCK: u32 = 8;
 
+/// The share of the noise of records that is that of photons, where rays end in these, however many they are.
+const OF_PHOTONS: f64 = 0.5;
+
 /// The share of the time that is left which finer caches may take.
 const MOST_TIME: f64 = 0.5;
 
@@ -73,6 +76,8 @@ pub(super) struct Account {
     pub(super) records: f64,
     /// For which there is time, where it is limited.
     pub(super) left: Option<f64>,
+    /// Whether rays end in photons.
+    pub(super) by_photons: bool,
 }
 
 impl Trial {
@@ -184,15 +189,18 @@ impl Trial {
         stop: &Stop,
         account: &Account,
     ) -> Option<(f64, u32)> {
+        let stays = if account.by_photons { OF_PHOTONS } else { 0.0 };
+        // Both caches have their part of the samples.
+        let noise = |times: f64| self.records * (stays + (1.0 - stays) / (1.0 + times));
         let samples = |times: f64| {
             let most = self.most(stop, account.left.map(|left| left - times * account.records));
-            let by_error = stop.error.map(|error| sample / (error - self.noise_of(times)).max(0.0));
+            let by_error = stop.error.map(|error| sample / (error - noise(times)).max(0.0));
             most.min(by_error.unwrap_or(most)).max(1.0)
         };
         let worth = |times: f64| {
             let samples = samples(times);
             let work = (1.0 + times) * account.records + samples * self.rays;
-            (self.noise_of(times) + sample / samples) * work
+            (noise(times) + sample / samples) * work
         };
         let has_time =
             |times: f64| account.left.is_none_or(|left| times * account.records <= MOST_TIME * left);
@@ -201,12 +209,6 @@ impl Trial {
         let (times, best) = finer.min_by(|(_, a), (_, b)| a.total_cmp(b))?;
         let from = (samples(times) / (1.0 + times)) as u32 / BLOCK * BLOCK;
         (now.is_infinite() || best < now).then_some((times, from))
-    }
-
-    /// relMSE by the noise of records where others follow these, which have so many `times` as many rays: either have their
-    /// part of the samples.
-    fn noise_of(&self, times: f64) -> f64 {
-        self.records / (1.0 + times)
     }
 }
 
@@ -225,7 +227,7 @@ fn mean(values: impl Iterator<Item = f64>) -> f64 {
 mod tests {
     use super::*;
 
-    const ACCOUNT: Account = Account { records: 10.0, left: None };
+    const ACCOUNT: Account = Account { records: 10.0, left: None, by_photons: false };
 
     fn trial(records: f64) -> Trial {
         Trial { lights: 1, records, rays: 1.0 }
@@ -249,6 +251,9 @@ mod tests {
             [None, Some(4.0), Some(16.0)]
         );
         assert_eq!(trial(1.0).finer(&[], 1.0, &spp(100), &ACCOUNT), None);
+        // Of photons' own noise rays take nothing away.
+        let photons = Account { by_photons: true, ..ACCOUNT };
+        assert_eq!(trial(0.01).finer(&[4.0, 16.0], 1.0, &spp(100), &photons), None);
     }
 
     #[test]
@@ -277,7 +282,7 @@ mod tests {
         assert!(told.lights == LIGHTS && told.rays == 4800.0, "{told:?}");
         // How many there will be at most.
         let of = |spp, seconds| Stop { spp, seconds, error: None };
-        let most = |stop, left| told.is_short(&stop, &Account { records: 1.0, left });
+        let most = |stop, left| told.is_short(&stop, &Account { records: 1.0, left, ..ACCOUNT });
         assert!(most(of(Some(16), None), None) && !most(of(Some(17), None), None));
         assert!(most(of(None, Some(1.0)), Some(4800.0)) && !most(of(None, Some(1.0)), Some(1e6)));
     }

@@ -465,7 +465,7 @@ impl<F: Features> Cached<'_, F> {
         };
         let (rays, seconds) = (self.spent.0 as f64, self.spent.1);
         let left = self.haste.map(|haste| haste.left() * rays / seconds.max(f64::MIN_POSITIVE));
-        let account = Account { records: rays, left };
+        let account = Account { records: rays, left, by_photons: self.laboratory.is_some() };
         if self.is_open && !self.is_cut && !trial.is_short(stop, &account) {
             let Some(noise) = trial.noise(tracer, &even.cache, crew, scratch)? else { return Ok(false) };
             let n = self.gathering.flux.n();
