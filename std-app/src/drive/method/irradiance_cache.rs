@@ -43,7 +43,7 @@ use std::time::Instant;
 /// Strata along a side come in so many.
 const BLOCK: usize = 8;
 
-/// Strata along a side to begin with where it is to be found out how many records are worth, and the most that they may be.
+/// Strata along a side to begin with where it is to be found out how many rays records are worth, and the most there may be.
 const FIRST: usize = 16;
 const MOST: usize = 64;
 
@@ -457,7 +457,7 @@ impl<F: Features> Cached<'_, F> {
         Ok(true)
     }
 
-    /// Tries out the caches: begins finer ones where those are worth it; whether that is done.
+    /// Tries out the caches: whether finer ones should follow, and how many points of lights are asked. Whether that is done.
     fn try_out(&mut self, crew: &mut Crew) -> Result<bool, RenderError> {
         let Self { tracer, halves: [even, odd], tables, stop, scratch, .. } = self;
         let Some(trial) = Trial::of(tracer, [&even.cache, &odd.cache], crew, scratch)? else {
@@ -482,8 +482,7 @@ impl<F: Features> Cached<'_, F> {
 
     /// Whether it is time for records of more rays.
     fn is_time_for_finer(&self, crew: &Crew) -> bool {
-        let next = || crew.next_sample();
-        self.finer.is_some_and(|(from, _)| next().is_some_and(|sample| sample >= from))
+        self.finer.zip(crew.next_sample()).is_some_and(|((from, _), sample)| sample >= from)
     }
 
     /// Begins caches of records of more rays.
@@ -561,7 +560,7 @@ impl<F: Features> Cached<'_, F> {
 impl<F: Features> Renderer for Cached<'_, F> {
     fn round(&mut self, crew: &mut Crew) -> Result<(), RenderError> {
         // A film that goes on has the rays of all this already.
-        let resumed = self.edges.is_none() && crew.canvas.spp() > 0;
+        let mut resumed = self.edges.is_none() && crew.canvas.spp() > 0;
         let counted = crew.canvas.counters;
         loop {
             while !self.is_filled || self.lights.is_none() || !self.pending.is_empty() {
@@ -582,7 +581,7 @@ impl<F: Features> Renderer for Cached<'_, F> {
             if self.edges.is_none() && !self.find_edges(crew)? {
                 return Ok(());
             }
-            if resumed {
+            if core::mem::take(&mut resumed) {
                 crew.canvas.counters = counted;
             }
             self.take_samples(crew)?;
