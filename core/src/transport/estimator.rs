@@ -44,6 +44,13 @@ pub struct Counters {
     pub dropped: Dropped,
 }
 
+impl Counters {
+    /// Rays of every kind.
+    pub fn all_rays(&self) -> u64 {
+        self.rays + self.shadow_rays
+    }
+}
+
 impl core::ops::AddAssign for Counters {
     fn add_assign(&mut self, other: Self) {
         self.paths += other.paths;

@@ -48,7 +48,7 @@ impl Merge {
             "shards": self.films.len(),
             "spp": merged.spp,
             "seconds": { "render": merged.seconds },
-            "rays": counters.rays + counters.shadow_rays,
+            "rays": counters.all_rays(),
             "shadow_rays": counters.shadow_rays,
             "paths": counters.paths,
             "mean_radiance": merged.image.mean(),

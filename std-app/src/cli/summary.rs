@@ -36,7 +36,7 @@ pub(super) fn text(run: &Run, report: Option<&Path>) -> String {
     if let Some(comparison) = run.comparison {
         lines.extend(comparing::text(comparison).lines().map(|line| format!("       {line}")));
     }
-    let rays = result.counters.rays + result.counters.shadow_rays;
+    let rays = result.counters.all_rays();
     lines.push(format!(
         "time   {} rendering, {} building, {} loading; {:.1} million rays/s on {} ({}, {})",
         readable_seconds(result.seconds.render),

@@ -157,7 +157,7 @@ impl Crew<'_, '_> {
                     if more.dropped.total() > 0 {
                         dropped.push((index, more.dropped));
                     }
-                    *rays += more.rays + more.shadow_rays;
+                    *rays += more.all_rays();
                     left.from = samples.ends();
                     *taken = left.from;
                 }

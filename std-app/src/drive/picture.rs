@@ -96,7 +96,7 @@ impl Picture<'_> {
             if rounds.estimate_is_due() {
                 if let Some(audit) = &mut audit {
                     let left = settings.stop.seconds.map(|limit| limit - estimating - clock.seconds());
-                    let work = (rays(&canvas), clock.seconds());
+                    let work = (canvas.counters.all_rays(), clock.seconds());
                     renderer.lend_photons(&mut |photons| {
                         audit.step(workers, &canvas.film, photons, work, left)
                     })?;
@@ -135,7 +135,7 @@ impl Picture<'_> {
             let seconds = clock.seconds();
             let against = reference.as_ref().map(|r| clock.pause(|| r.compare(&image(&canvas.film))));
             let spp = rounds.spp();
-            history.push(Round { seconds, spp, rays: rays(&canvas), error, reference: against });
+            history.push(Round { seconds, spp, rays: canvas.counters.all_rays(), error, reference: against });
             let known = Progress {
                 seconds,
                 seconds_left: rounds.seconds_left(seconds, latest),
@@ -159,7 +159,7 @@ impl Picture<'_> {
         let is_known = history.last().is_some_and(|last| last.error.is_some());
         if let (Some(audit), false) = (&mut audit, interrupted || is_known) {
             let left = settings.stop.seconds.map(|limit| limit - estimating - clock.seconds());
-            let work = (rays(&canvas), clock.seconds());
+            let work = (canvas.counters.all_rays(), clock.seconds());
             renderer.lend_photons(&mut |photons| audit.step(workers, &canvas.film, photons, work, left))?;
             // A shard is merged with them.
             if settings.shard != Shard::WHOLE {
@@ -210,11 +210,6 @@ impl Picture<'_> {
             },
         })
     }
-}
-
-/// Rays of every kind.
-fn rays(canvas: &Canvas) -> u64 {
-    canvas.counters.rays + canvas.counters.shadow_rays
 }
 
 /// Samples of a tile between two looks at the clock.

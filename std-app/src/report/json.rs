@@ -52,7 +52,7 @@ fn most(run: &Run) -> Value {
             "estimate": result.seconds.estimate,
             "total": run.total_seconds,
         },
-        "rays": result.counters.rays + result.counters.shadow_rays,
+        "rays": result.counters.all_rays(),
         "shadow_rays": result.counters.shadow_rays,
         "paths": result.counters.paths,
         "mean_radiance": result.image.mean(),

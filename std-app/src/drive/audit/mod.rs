@@ -204,7 +204,7 @@ impl<'a> Audit<'a> {
             })?;
         state.has_photons |= photons.is_some();
         state.taken = samples.end;
-        state.rays += counters.rays + counters.shadow_rays;
+        state.rays += counters.all_rays();
         Ok(())
     }
 

@@ -99,11 +99,10 @@ fn any_number_of_threads_finds_the_same() {
 fn the_share_of_the_work_is_kept() {
     let result = picture(settings(Method::Wrong, 256, 3, 0.05));
     let audit = result.audit.unwrap();
-    let rays = (result.counters.rays + result.counters.shadow_rays) as f64;
+    let rays = result.counters.all_rays() as f64;
     let stop = Stop { error: Some(1e-9), spp: Some(128), ..Stop::default() };
     let by_rays = picture(Settings { stop, audit: Some(0.05), ..settings(Method::Path, 0, 3, 0.05) });
-    let exact =
-        by_rays.audit.unwrap().rays as f64 / (by_rays.counters.rays + by_rays.counters.shadow_rays) as f64;
+    let exact = by_rays.audit.unwrap().rays as f64 / by_rays.counters.all_rays() as f64;
     assert!((0.045..0.0535).contains(&exact), "{exact}");
     // By the clock, on a machine with other work: a factor.
     assert!((0.01..0.25).contains(&(audit.rays as f64 / rays)), "{audit:?}");

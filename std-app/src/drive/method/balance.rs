@@ -2,10 +2,10 @@
 //! and by the other tell the noise of records, the variance of some more that of samples, and what each has cost tells where
 //! more work leaves less error. Whether several points of lights are worth their rays is tried out as well.
 
-use crate::drive::RenderError;
-use crate::drive::Stop;
+use super::caster::MOST_SAMPLES;
 use crate::drive::crew::Crew;
 use crate::drive::held_out::luminance;
+use crate::drive::{RenderError, Stop};
 use core::ops::Range;
 use halflight_core::bsdf::Features;
 use halflight_core::cache::irradiance::IrradianceCache;
@@ -30,9 +30,6 @@ const WORTH: f64 = 1.25;
 /// The part of the pixels that is left out where caches differ most: what no record reaches flashes, of which so few samples
 /// have too many or none.
 const FLASHES: usize = 100;
-
-/// Caches change where so many samples are done: those that photons of caustics serve.
-const BLOCK: u32 = 8;
 
 /// The share of the noise of records that is that of photons, where rays end in these, however many they are.
 const OF_PHOTONS: f64 = 0.5;
@@ -63,7 +60,7 @@ impl Default for Tried {
 pub(super) struct Trial {
     /// Points of lights that are asked.
     pub(super) lights: usize,
-    /// relMSE by the noise of records.
+    /// relMSE by the noise of records, where it was asked for.
     records: f64,
     /// Rays of one sample of each pixel.
     rays: f64,
@@ -81,10 +78,10 @@ pub(super) struct Account {
 }
 
 impl Trial {
-    /// Tries out two caches; `None` where the round is over.
+    /// Tries out the first of two caches, and, if the noise of their records `is_asked`, the other; `None` where the round is over.
     pub(super) fn of<F: Features>(
         tracer: &PathTracer<F>,
-        [even, odd]: [&IrradianceCache; 2],
+        ([even, odd], is_asked): ([&IrradianceCache; 2], bool),
         crew: &mut Crew,
         scratch: &mut [Vec<Line>],
     ) -> Result<Option<Self>, RenderError> {
@@ -95,17 +92,20 @@ impl Trial {
             let (mut all, mut rays) = (Counters::default(), [0; 3]);
             let mut pixels = [[Pixel::default(); PIXELS_PER_TILE]; 3];
             let tracers = [one.with_lights(1), one.with_lights(LIGHTS), other.with_lights(1)];
-            for ((tracer, rays), pixels) in tracers.iter().zip(&mut rays).zip(&mut pixels) {
+            let tracers = tracers.iter().take(if is_asked { 3 } else { 2 });
+            for ((tracer, rays), pixels) in tracers.zip(&mut rays).zip(&mut pixels) {
                 let counters = tracer.run(tiles[task], FEW, WAVE, arena, pixels)?;
-                *rays = counters.rays + counters.shadow_rays;
+                *rays = counters.all_rays();
                 all += counters;
             }
             if let Some(out) = out.first_mut() {
                 let [one, several, other] = &pixels;
                 out.light = several.map(|pixel| luminance(pixel.mean()));
                 out.samples = [one, several].map(|pixels| pixels.map(|pixel| luminance(pixel.variance())));
-                let squared = |i: usize| luminance(one[i].mean() - other[i].mean()).powi(2);
-                out.caches = core::array::from_fn(squared);
+                if is_asked {
+                    let squared = |i: usize| luminance(one[i].mean() - other[i].mean()).powi(2);
+                    out.caches = core::array::from_fn(squared);
+                }
                 out.rays = [rays[0], rays[1]];
             }
             // What is dropped here is dropped from no picture.
@@ -119,17 +119,12 @@ impl Trial {
     fn told(tried: &[Tried], tiles: usize) -> Self {
         let light: Vec<f64> = tried.iter().flat_map(|tile| tile.light).collect();
         let whole = mean(light.iter().copied());
-        let relative = |squared: &dyn Fn(&Tried) -> [f64; PIXELS_PER_TILE]| {
-            let squared = tried.iter().flat_map(squared).zip(&light);
-            let mut all: Vec<f64> =
-                squared.map(|(squared, light)| relative(squared, *light, whole)).collect();
-            all.sort_by(f64::total_cmp);
-            all
-        };
-        let noise = |i: usize| mean(relative(&|tile| tile.samples[i]).into_iter());
+        let weigh = |(squared, light): (f64, &f64)| relative(squared, *light, whole);
+        let noise = |i: usize| mean(tried.iter().flat_map(|tile| tile.samples[i]).zip(&light).map(weigh));
         let rays = [0, 1].map(|i| tried.iter().map(|tile| tile.rays[i]).sum::<u64>() as f64);
         let is_several = WORTH * noise(1) * rays[1] < noise(0) * rays[0];
-        let caches = relative(&|tile| tile.caches);
+        let mut caches: Vec<f64> = tried.iter().flat_map(|tile| tile.caches).zip(&light).map(weigh).collect();
+        caches.sort_by(f64::total_cmp);
         let kept = caches.len() - caches.len() / FLASHES;
         let share = tried.len().max(1) as f64 / tiles.max(1) as f64;
         Self {
@@ -207,7 +202,8 @@ impl Trial {
         let now = worth(0.0);
         let finer = finer.iter().filter(|times| has_time(**times)).map(|times| (*times, worth(*times)));
         let (times, best) = finer.min_by(|(_, a), (_, b)| a.total_cmp(b))?;
-        let from = (samples(times) / (1.0 + times)) as u32 / BLOCK * BLOCK;
+        // Where photons of caustics change as well.
+        let from = (samples(times) / (1.0 + times)) as u32 / MOST_SAMPLES * MOST_SAMPLES;
         (now.is_infinite() || best < now).then_some((times, from))
     }
 }

@@ -29,7 +29,7 @@ const FEWEST_PATHS: usize = 16 * PATHS;
 const MOST_PATHS: usize = 4096 * PATHS;
 
 /// Samples that share their photons, even ones and odd ones apart, at most: less would not fill the waves of a tile.
-const MOST_SAMPLES: u32 = 8;
+pub(super) const MOST_SAMPLES: u32 = 8;
 
 /// Radius of the discs where rays gather for records, in pixels: they see the mean of what these blur.
 const RECORD_RADIUS: f32 = 3.0;

@@ -47,6 +47,9 @@ const BLOCK: usize = 8;
 const FIRST: usize = 16;
 const MOST: usize = 64;
 
+/// Which of [`Needs::sizes`] that is.
+const BEGIN: usize = 1;
+
 /// The most strata along a side, where caches are refined, and how often they are.
 const FINEST: usize = 128;
 const MOST_REFINEMENTS: usize = 8;
@@ -135,8 +138,6 @@ impl Loaded {
 struct Needs {
     /// Strata along a side that may be gathered, the fewest first: fewer than those to begin with, these, and more of them.
     sizes: Vec<usize>,
-    /// Which of them it begins with.
-    first: usize,
     /// Of each thread.
     scratch: Footprint,
     edges: Footprint,
@@ -174,7 +175,7 @@ impl Needs {
         let scratch = if has_caustics { scratch.or(caustics::scratch::<F>()) } else { scratch };
         let tiles = Tile::count(settings.width, settings.height);
         let edges = Footprint::default().slice::<[u64; PIXELS_PER_TILE / 64]>(tiles);
-        Self { sizes, first: 1, scratch, edges, by_photons, is_refined }
+        Self { sizes, scratch, edges, by_photons, is_refined }
     }
 
     /// All of it.
@@ -253,7 +254,7 @@ fn set_up<F: Features, T>(
     let metric = metric::Settings { error: settings.cache.allowed(), ..usual };
     let mut method = Cached {
         tracer: stage.paths::<F>(settings.seed),
-        gathering: Gathering { flux: &tables[needs.first], metric, least_pixels: LEAST_PIXELS },
+        gathering: Gathering { flux: &tables[BEGIN], metric, least_pixels: LEAST_PIXELS },
         tables: &tables,
         is_refined: needs.is_refined,
         refined: 0,
@@ -275,7 +276,7 @@ fn set_up<F: Features, T>(
         haste: None,
         is_cut: false,
         begun: 0,
-        spent: (0, 0.0),
+        spent: 0,
         may_wait: settings.stop.error.is_none() && settings.adaptive == Some(false),
         finer: None,
         edges: None,
@@ -349,8 +350,8 @@ struct Cached<'a, F> {
     is_cut: bool,
     /// How often caches began anew.
     begun: u32,
-    /// Rays and seconds of caches.
-    spent: (u64, f64),
+    /// Rays of caches.
+    spent: u64,
     /// Whether the first samples may have coarser caches than those that follow, and from which sample on records have more
     /// rays, where they are worth it.
     may_wait: bool,
@@ -365,7 +366,7 @@ struct Cached<'a, F> {
 impl<F: Features> Cached<'_, F> {
     /// Fills both halves, or goes on with it, and keeps them; whether that is done: not where the round is over.
     fn fill(&mut self, crew: &mut Crew) -> Result<bool, RenderError> {
-        let (start, counted) = (Instant::now(), crew.canvas.counters);
+        let (start, counted) = (Instant::now(), crew.canvas.counters.all_rays());
         if self.haste.is_none() {
             // A film that goes on has the time that is left.
             let left = crew.round.deadline.map(|end| end.saturating_duration_since(start).as_secs_f64());
@@ -429,11 +430,8 @@ impl<F: Features> Cached<'_, F> {
             }
         }
         self.save()?;
-        let seconds = start.elapsed().as_secs_f64();
-        let Counters { rays, shadow_rays, .. } = crew.canvas.counters;
-        self.spent.0 += rays + shadow_rays - counted.rays - counted.shadow_rays;
-        self.spent.1 += seconds;
-        self.seconds += seconds;
+        self.spent += crew.canvas.counters.all_rays() - counted;
+        self.seconds += start.elapsed().as_secs_f64();
         Ok(all)
     }
 
@@ -460,13 +458,13 @@ impl<F: Features> Cached<'_, F> {
     /// Tries out the caches: whether finer ones should follow, and how many points of lights are asked. Whether that is done.
     fn try_out(&mut self, crew: &mut Crew) -> Result<bool, RenderError> {
         let Self { tracer, halves: [even, odd], tables, stop, scratch, .. } = self;
-        let Some(trial) = Trial::of(tracer, [&even.cache, &odd.cache], crew, scratch)? else {
-            return Ok(false);
-        };
-        let (rays, seconds) = (self.spent.0 as f64, self.spent.1);
-        let left = self.haste.map(|haste| haste.left() * rays / seconds.max(f64::MIN_POSITIVE));
+        let is_asked = self.is_open && !self.is_cut;
+        let caches = ([&even.cache, &odd.cache], is_asked);
+        let Some(trial) = Trial::of(tracer, caches, crew, scratch)? else { return Ok(false) };
+        let rays = self.spent as f64;
+        let left = self.haste.map(|haste| haste.left() * rays / self.seconds.max(f64::MIN_POSITIVE));
         let account = Account { records: rays, left, by_photons: self.laboratory.is_some() };
-        if self.is_open && !self.is_cut && !trial.is_short(stop, &account) {
+        if is_asked && !trial.is_short(stop, &account) {
             let Some(noise) = trial.noise(tracer, &even.cache, crew, scratch)? else { return Ok(false) };
             let n = self.gathering.flux.n();
             let times = |table: &CellFlux| (table.n() as f64 / n as f64).powi(2);
@@ -489,8 +487,13 @@ impl<F: Features> Cached<'_, F> {
     fn begin_finer(&mut self) {
         let Some((_, flux)) = self.finer.take() else { return };
         self.gathering.flux = flux;
-        self.halves.iter_mut().for_each(|half| half.refine(None));
         self.haste = self.haste.map(|haste| Haste::new(haste.left()));
+        self.begin_anew(None);
+    }
+
+    /// Begins with the records that there are, their radii smaller by `share`, or with none.
+    fn begin_anew(&mut self, share: Option<f32>) {
+        self.halves.iter_mut().for_each(|growing| growing.refine(share));
         self.begun += 1;
         self.is_filled = false;
     }
@@ -507,10 +510,8 @@ impl<F: Features> Cached<'_, F> {
             *flux = finer;
         }
         let keeps = by_curvature && !is_finer;
-        self.halves.iter_mut().for_each(|growing| growing.refine(keeps.then_some(share)));
+        self.begin_anew(keeps.then_some(share));
         self.refined += 1;
-        self.begun += 1;
-        self.is_filled = false;
     }
 
     /// Brings the tiles to their targets, as far as these caches are for them.
@@ -563,7 +564,11 @@ impl<F: Features> Renderer for Cached<'_, F> {
         let mut resumed = self.edges.is_none() && crew.canvas.spp() > 0;
         let counted = crew.canvas.counters;
         loop {
-            while !self.is_filled || self.lights.is_none() || !self.pending.is_empty() {
+            while !self.is_filled
+                || self.lights.is_none()
+                || !self.pending.is_empty()
+                || self.is_time_for_finer(crew)
+            {
                 self.is_filled = self.is_filled || self.fill(crew)?;
                 if !self.is_filled {
                     return Ok(());
@@ -588,7 +593,6 @@ impl<F: Features> Renderer for Cached<'_, F> {
             if !self.is_time_for_finer(crew) {
                 return Ok(());
             }
-            self.begin_finer();
         }
     }
 

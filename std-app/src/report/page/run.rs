@@ -71,7 +71,7 @@ pub(super) fn smaller(factor: u32) -> String {
 
 fn facts(run: &Run) -> Vec<(&'static str, String)> {
     let result = run.result;
-    let rays = result.counters.rays + result.counters.shadow_rays;
+    let rays = result.counters.all_rays();
     let speed = rays as f64 / result.seconds.render.max(1e-9) * 1e-6;
     let dropped = match result.counters.dropped.total() {
         0 => "none".into(),
