@@ -32,6 +32,8 @@ pub struct Finding {
     pub bias: f64,
     /// By how much it is too bright, over the root of that.
     pub deviation: f64,
+    /// The variances of the pixel in the picture and in the audit, over that.
+    pub variances: [f64; 2],
 }
 
 impl Finding {
@@ -46,17 +48,27 @@ impl Finding {
         let [a, b, both, filtered] =
             [picture.even.mean(), picture.odd.mean(), picture.mean(), filtered].map(scaled);
         let [u1, u2, v1, v2] = [u1, u2, v1, v2].map(scaled);
-        let (mut bias, mut deviation) = (0.0, 0.0);
+        let (mut bias, mut deviation, mut variances) = (0.0, 0.0, [0.0; 2]);
         for c in 0..3 {
+            let weight = |truth: f64| {
+                let r = truth.max(filtered[c] / DOUBT);
+                1.0 / (r * r + DARK)
+            };
+            // Halves know nothing of each other; quarters of one half do, for what one has met the other does not meet again, and
+            // where samples are few a deviation over the other quarter would be below zero in the mean.
+            let halves = [0.5 * (u1[c] + u2[c]), 0.5 * (v1[c] + v2[c])];
+            for (half, other) in [(halves[0], halves[1]), (halves[1], halves[0])] {
+                deviation += 0.5 * (both[c] - half) * sqrt(weight(other));
+            }
             // Numerator from one part of the truth, denominator from the other, and the other way round.
             for (u, v, other) in [(u1[c], v1[c], u2[c] + v2[c]), (u2[c], v2[c], u1[c] + v1[c])] {
-                let r = (0.5 * other).max(filtered[c] / DOUBT);
-                let weight = 1.0 / (r * r + DARK);
+                let weight = weight(0.5 * other);
                 bias += 0.5 * ((a[c] - u) * (b[c] - v) + (a[c] - v) * (b[c] - u)) * weight;
-                deviation += (both[c] - 0.5 * (u + v)) * sqrt(weight);
+                let squares = [a[c] - b[c], u - v].map(|halves| 0.25 * halves * halves * weight / 6.0);
+                variances = [variances[0] + squares[0], variances[1] + 0.5 * squares[1]];
             }
         }
-        Some(Self { bias: bias / 6.0, deviation: deviation / 6.0 })
+        Some(Self { bias: bias / 6.0, deviation: deviation / 3.0, variances })
             .filter(|finding| finding.bias.is_finite() && finding.deviation.is_finite())
     }
 }
@@ -240,6 +252,35 @@ mod tests {
         // 2.5 % of 400 are 10, more than 20 have a chance of 0.2 %; 5 % are 20, more than 35 one of 0.1 %.
         assert!(found <= 20, "{found} of {runs}");
         assert!((8..=35).contains(&strange), "{strange} of {runs}");
+    }
+
+    #[test]
+    fn what_quarters_know_of_each_other_is_no_deviation() {
+        // Each quarter of a half has as much too much as the other has too little.
+        for signs in [[0.9, 0.9], [0.9, -0.9], [-0.9, 0.5]] {
+            let mut truth = Pixel::default();
+            for (sample, half) in [0, 1, 0, 1].into_iter().enumerate() {
+                let sign = if sample < 2 { signs[half] } else { -signs[half] };
+                truth.add(sample as u32, Rgb::splat(1.0 + sign), &mut Dropped::default());
+            }
+            let mut picture = Pixel::default();
+            for sample in 0..2 {
+                picture.add(sample, Rgb::ONE, &mut Dropped::default());
+            }
+            let finding = Finding::of(&picture, &truth, Rgb::ONE, 1.0).unwrap();
+            assert!(finding.deviation.abs() < 1e-6, "{finding:?}");
+        }
+    }
+
+    #[test]
+    fn both_variances_are_known() {
+        let findings = findings(1000, 0.0, 9);
+        let mean = |of: usize| findings.iter().map(|finding| finding.variances[of]).sum::<f64>() / 1000.0;
+        // A third for a sample, over 2² + 0.01 · 2²; means of squares of 1000 pixels of three channels.
+        for (found, samples) in [(mean(0), 8.0), (mean(1), 16.0)] {
+            let expected = 1.0 / 3.0 / samples / 4.04;
+            assert!((found / expected - 1.0).abs() < 0.12, "{found} {expected}");
+        }
     }
 
     #[test]

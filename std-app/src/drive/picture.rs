@@ -11,6 +11,7 @@ use super::method::{Method, Renderer, Stage};
 use super::refinement::Refinements;
 use super::rounds::{Plan, Rounds};
 use super::told::Told;
+use super::workers::Workers;
 use super::{AdaptiveUse, Ending, FileError, Progress, RenderError, RenderResult, Seconds, WindowUse};
 use crate::save::Image;
 use core::sync::atomic::{AtomicBool, Ordering};
@@ -102,8 +103,23 @@ impl Picture<'_> {
                     })?;
                 }
                 let start = Instant::now();
-                let found = Told::of(workers, &canvas, audit.as_ref());
+                let mut found = Told::of(workers, &canvas, audit.as_ref());
                 estimate += start.elapsed().as_secs_f64();
+                estimating = start.elapsed().as_secs_f64();
+                if let Some(audit) = &mut audit {
+                    if let Some(audited) = &found.audited {
+                        audit.focus(audited, (canvas.counters.all_rays(), rounds.spp()));
+                    }
+                    let left = settings.stop.seconds.map(|limit| limit - estimating);
+                    let may = |cost: f64| {
+                        let is_time = left.is_none_or(|left| clock.seconds() + cost < left);
+                        is_time && !interrupt.load(Ordering::Relaxed)
+                    };
+                    if settings.audit.is_none() {
+                        found = go_on_alone(audit, &rounds, found, renderer, (workers, &canvas), &may)?;
+                    }
+                }
+                let start = Instant::now();
                 // Once only: noise that is told later would know who asked for it.
                 let is_even = canvas.weights.is_none();
                 if is_even && settings.may_adapt() && rounds.spp() >= adapt::FROM {
@@ -126,7 +142,7 @@ impl Picture<'_> {
                     && found.audited.as_ref().is_some_and(|audited| rounds.is_out_of_reach(audited));
                 error = found.error();
                 rounds.estimated(error);
-                estimating = start.elapsed().as_secs_f64();
+                estimating += start.elapsed().as_secs_f64();
                 latest = error;
                 told = Some(found);
             } else {
@@ -210,6 +226,30 @@ impl Picture<'_> {
             },
         })
     }
+}
+
+/// What is known after `told`, where the audit alone keeps a picture from its end: it goes on as long as it `may` take so many
+/// seconds more.
+fn go_on_alone(
+    audit: &mut Audit,
+    rounds: &Rounds,
+    mut told: Told,
+    renderer: &mut dyn Renderer,
+    (workers, canvas): (&Workers, &Canvas),
+    may: &dyn Fn(f64) -> bool,
+) -> Result<Told, RenderError> {
+    while told.audited.as_ref().is_some_and(|audited| rounds.waits_for(audited)) {
+        let mut went = false;
+        renderer.lend_photons(&mut |photons| {
+            went = audit.go_on(workers, photons, may)?;
+            Ok(())
+        })?;
+        if !went {
+            break;
+        }
+        told = Told::beside(told.noise, workers, canvas, |noise| audit.verdict(workers, &canvas.film, noise));
+    }
+    Ok(told)
 }
 
 /// Samples of a tile between two looks at the clock.

@@ -39,6 +39,9 @@ pub(super) const FEWEST_FOR_ERROR: u32 = 16;
 /// Below this many samples of each audited pixel its light is too rarely seen to end a render for its bias.
 pub(super) const FEWEST_FOR_BIAS: u32 = 64;
 
+/// The part of the error asked for that the picture's own noise may be, where its audit goes on alone.
+const ENOUGH: f64 = 0.5;
+
 /// The rounds of a picture.
 pub(super) struct Rounds {
     stop: Stop,
@@ -184,6 +187,14 @@ impl Rounds {
             _ => None,
         };
         [by_samples, by_time, by_error].into_iter().flatten().reduce(f64::min).map(|left| left.max(0.0))
+    }
+
+    /// Whether samples of the picture are enough for the error that was asked for, and those of the audit are not: its pixels
+    /// are noisier than the picture's, and what they leave open is more than half of it.
+    pub(super) fn waits_for(&self, audited: &Audited) -> bool {
+        let Some(wanted) = self.stop.error.filter(|_| self.spp >= FEWEST_FOR_ERROR) else { return false };
+        let is_open = audited.bias.least() <= wanted && audited.total.upper > wanted;
+        is_open && audited.noise.upper <= ENOUGH * wanted && audited.imbalance > 1.0
     }
 
     /// Whether the error that was asked for is less than the bias, as far as enough samples tell.

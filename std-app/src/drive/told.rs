@@ -26,7 +26,16 @@ impl Told {
         canvas: &Canvas,
         audit: impl FnOnce(ErrorEstimate) -> Option<Audited>,
     ) -> Self {
-        let noise = workers.estimate(&canvas.film, canvas.shares);
+        Self::beside(workers.estimate(&canvas.film, canvas.shares), workers, canvas, audit)
+    }
+
+    /// The same of a picture whose noise is known.
+    pub(super) fn beside(
+        noise: Option<ErrorEstimate>,
+        workers: &Workers,
+        canvas: &Canvas,
+        audit: impl FnOnce(ErrorEstimate) -> Option<Audited>,
+    ) -> Self {
         let mut audited = noise.and_then(audit);
         // An audit without photons sees what they blur.
         let is_seen = audited.as_ref().is_some_and(|audited| !audited.has_photons);

@@ -22,6 +22,9 @@ const PER_REGION: usize = 12;
 /// Regions along each side at most.
 const SIDE: u32 = 8;
 
+/// So many pixels are enough for all regions.
+pub(super) const ENOUGH: usize = PER_REGION * (SIDE * SIDE) as usize;
+
 /// The regions of a picture: a grid of `side` x `side`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Grid {
@@ -74,6 +77,25 @@ pub(super) fn choose(film: &Film, shard: Shard, mean: f64, seed: u32) -> (Vec<[u
         (order[(first + pick).min(end - 1)], ((end - first) * strata) as f32 / order.len() as f32)
     };
     (0..strata).map(stratum).unzip()
+}
+
+/// Of strata with these `shares` of the picture, which are to become so `many` by joining neighbours: the one of each whose pixel
+/// stays, by its share, and the share of all of them.
+pub(super) fn join(shares: &[f32], many: usize, seed: u32) -> Vec<(usize, f32)> {
+    let random = Random::new(seed, STREAM ^ u32::MAX);
+    let border = |i: usize| i * shares.len() / many;
+    let joined = |i: usize| {
+        let all = &shares[border(i)..border(i + 1)];
+        let sum: f32 = all.iter().sum();
+        let mut left = random.single(i as u32) * sum;
+        let kept = all.iter().position(|share| {
+            left -= share;
+            left < 0.0
+        });
+        let share = sum * many as f32 / shares.len() as f32;
+        (border(i) + kept.unwrap_or(all.len() - 1), share)
+    };
+    (0..many).map(joined).collect()
 }
 
 /// The pixels of a shard, region by region, within each by brightness.
@@ -177,6 +199,26 @@ mod tests {
                 let stripe = pixels.iter().filter(|[x, _]| *x == 17).count();
                 assert!((1..=5).contains(&stripe), "{stripe}");
             },
+        );
+    }
+
+    #[test]
+    fn strata_that_are_joined_keep_the_chances_of_pixels() {
+        let shares: Vec<f32> = (0..1000).map(|i| if i % 3 == 0 { 0.8 } else { 1.1 }).collect();
+        let mut kept = [0; 2];
+        for seed in 0..20 {
+            let joined = join(&shares, 300, seed);
+            assert_eq!(joined.len(), 300);
+            assert!(joined.windows(2).all(|pair| pair[0].0 < pair[1].0));
+            let sum: f32 = joined.iter().map(|(_, share)| share).sum();
+            assert!((sum / 300.0 - 1.0).abs() < 1e-3, "{sum}");
+            joined.iter().for_each(|(i, _)| kept[usize::from(i % 3 == 0)] += 1);
+        }
+        // 0.8 of 3.0; 6000 times, so that the standard deviation is 34.
+        assert!((1600 - 150..1600 + 150).contains(&kept[1]), "{kept:?}");
+        assert_eq!(
+            join(&shares, 1000, 1).iter().map(|(i, _)| *i).collect::<Vec<_>>(),
+            (0..1000).collect::<Vec<_>>()
         );
     }
 

@@ -29,6 +29,9 @@ const STEP: u32 = 4;
 /// Audited pixels of one task.
 const PIXELS_PER_TASK: usize = 8;
 
+/// Seconds of samples after which the clock, and whoever waits, are asked again.
+const LONGEST: f64 = 0.25;
+
 /// Makes the random numbers of the audit others than those of the picture.
 const OTHER_SEED: u32 = 0x5eed_a0d1;
 
@@ -186,6 +189,47 @@ impl<'a> Audit<'a> {
             self.run(workers, taken..taken + samples, photons)?;
             self.state.seconds = before + start.elapsed().as_secs_f64();
         }
+    }
+
+    /// After its first samples, and as many as `spp` of each pixel of the picture in so many `rays`: where audited pixels are going
+    /// to be noisier than those of the picture, more samples of fewer of them tell more.
+    pub(super) fn focus(&mut self, audited: &Audited, (rays, spp): (u64, u32)) {
+        let State { share, places, shares, taken, rays: own, .. } = &self.state;
+        if *taken != STEP || *own == 0 {
+            return;
+        }
+        // Samples of an audited pixel for each of the picture's.
+        let rate = share / (1.0 - share) * rays as f64 / f64::from(spp) * f64::from(*taken) / *own as f64;
+        let wanted = places.len() as f64 * rate * f64::from(spp) / (f64::from(*taken) * audited.imbalance);
+        let many = (wanted as usize).max(choice::ENOUGH);
+        if many >= places.len() {
+            return;
+        }
+        let kept = choice::join(shares, many, self.seed);
+        self.state.places = kept.iter().map(|(i, _)| self.state.places[*i]).collect();
+        self.state.pixels = kept.iter().map(|(i, _)| self.state.pixels[*i]).collect();
+        self.state.shares = kept.into_iter().map(|(_, share)| share).collect();
+    }
+
+    /// Takes a quarter more samples than there are, whatever is due, some at a time, as long as it `may`; whether it did.
+    pub(super) fn go_on(
+        &mut self,
+        workers: &Workers,
+        photons: Option<Merging>,
+        may: &dyn Fn(f64) -> bool,
+    ) -> Result<bool, RenderError> {
+        let end = (self.state.taken + self.state.taken / 4).next_multiple_of(STEP);
+        while self.state.taken < end {
+            let each = self.state.seconds / f64::from(self.state.taken.max(1));
+            let samples = ((LONGEST / each) as u32 / STEP * STEP).clamp(STEP, end - self.state.taken);
+            if !may(each * f64::from(samples)) {
+                return Ok(false);
+            }
+            let start = Instant::now();
+            self.run(workers, self.state.taken..self.state.taken + samples, photons)?;
+            self.state.seconds += start.elapsed().as_secs_f64();
+        }
+        Ok(true)
     }
 
     fn run(

@@ -13,7 +13,7 @@ fn picture(settings: Settings) -> RenderResult {
     let loaded = load(scene.as_ref(), &LoadOptions::default()).unwrap();
     let views = loaded.views();
     let scene = views.scene(loaded.camera_or_default());
-    let settings = Settings { width: SIZE, height: SIZE, ..settings };
+
     render(&scene, &settings, &mut |_| {}, &AtomicBool::new(false)).unwrap()
 }
 
@@ -25,6 +25,8 @@ fn settings(method: Method, spp: u32, seed: u32, audit: f64) -> Settings {
         seed,
         audit: Some(audit),
         reuse: Some(false),
+        width: SIZE,
+        height: SIZE,
         ..Settings::default()
     }
 }
@@ -86,13 +88,41 @@ fn an_error_above_the_bias_is_the_sum_of_both() {
 }
 
 #[test]
+fn an_audit_that_alone_keeps_a_picture_from_its_end_goes_on() {
+    // The default share, and the same share where it was asked for.
+    let stop = Stop { spp: Some(4096), error: Some(0.02), ..Stop::default() };
+    let [free, asked] = [None, Some(SHARE)]
+        .map(|audit| picture(Settings { stop, audit, ..settings(Method::Wrong, 0, 5, 0.0) }));
+    for result in [&free, &asked] {
+        assert!(result.ending == Ending::Done && result.error.unwrap().upper <= 0.02, "{:?}", result.audit);
+    }
+    let rays = |result: &RenderResult| (result.counters.all_rays(), result.audit.as_ref().unwrap().rays);
+    let ([picture, audit], [before, share]) =
+        ([rays(&free).0, rays(&free).1], [rays(&asked).0, rays(&asked).1]);
+    assert!(5 * (picture + audit) < 4 * (before + share), "{picture} {audit}, {before} {share}");
+    assert!(audit > 2 * picture / 19 && share <= before / 18, "{picture} {audit}, {before} {share}");
+}
+
+#[test]
+fn a_large_picture_that_is_hardly_audited_has_few_pixels_audited() {
+    let large = |audit| picture(Settings { width: 512, height: 416, ..settings(Method::Wrong, 8, 3, audit) });
+    let [few, all] = [0.001, 0.3].map(|share| large(share).audit.unwrap());
+    // Twelve for each of 8 x 8 regions, and one for each tile.
+    assert_eq!([few.pixels, all.pixels], [768, 832]);
+    assert_eq!(few.regions.len(), 64);
+}
+
+#[test]
 fn any_number_of_threads_finds_the_same() {
     let stop = Stop { error: Some(0.03), ..Stop::default() };
-    let [one, three] = [1, 3].map(|threads| {
-        let result = picture(Settings { stop, threads: Some(threads), ..settings(Method::Wrong, 0, 2, 0.1) });
-        (result.image, result.audit.map(|audit| Audited { seconds: 0.0, ..audit }))
-    });
-    assert!(one == three);
+    for audit in [None, Some(0.1)] {
+        let [one, three] = [1, 3].map(|threads| {
+            let threads = Some(threads);
+            let result = picture(Settings { stop, threads, audit, ..settings(Method::Wrong, 0, 2, 0.0) });
+            (result.image, result.audit.map(|audit| Audited { seconds: 0.0, ..audit }))
+        });
+        assert!(one == three, "{audit:?}");
+    }
 }
 
 #[test]

@@ -27,6 +27,8 @@ pub struct Audited {
     pub noise: ErrorEstimate,
     /// The squared bias.
     pub bias: BiasEstimate,
+    /// How much noisier pixels are in the audit than in the picture: the quotient of their variances, in the root mean square.
+    pub imbalance: f64,
     /// The sum of both, and of what photons blur that the audit does not see.
     pub total: ErrorEstimate,
     /// By how much the whole picture is too bright.
@@ -91,6 +93,8 @@ pub(super) fn verdict(
 ) -> Option<Audited> {
     let bias = BiasEstimate::of(findings.iter().map(|(i, finding)| (*finding, f64::from(shares[*i]))))?;
     let count = (grid.side * grid.side) as usize;
+    // The noise of a product is the product of those of both halves, each of picture and audit.
+    let squares = |of: usize| findings.iter().map(|(_, finding)| finding.variances[of].powi(2)).sum::<f64>();
     let region = |index: usize| {
         let inside = findings.iter().filter(|(i, _)| grid.region(places[*i]) == index);
         let deviation = Deviation::of(inside.map(|(_, finding)| finding.deviation));
@@ -107,6 +111,7 @@ pub(super) fn verdict(
         has_photons: false,
         noise,
         bias,
+        imbalance: (squares(1) / squares(0)).sqrt(),
         total: noise.with_bias(bias),
         whole: Deviation::of(findings.iter().map(|(_, finding)| finding.deviation)),
         regions: (0..count).map(region).collect(),
@@ -136,7 +141,7 @@ mod tests {
     #[test]
     fn one_firefly_of_an_audit_is_doubted() {
         let noise = ErrorEstimate { relmse: 0.01, lower: 0.008, upper: 0.013 };
-        let finding = |bias: f64| (Finding { bias, deviation: 0.0 }, 1.0);
+        let finding = |bias: f64| (Finding { bias, deviation: 0.0, variances: [0.0; 2] }, 1.0);
         let others = (0..255).map(|i| finding(if i % 2 == 0 { 0.01 } else { -0.01 }));
         let bias = BiasEstimate::of(others.chain([finding(200.0)])).unwrap();
         assert!(bias.relmse > 0.7, "{bias:?}");
