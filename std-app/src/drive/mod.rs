@@ -173,7 +173,7 @@ impl Default for Settings {
     }
 }
 
-/// What is known while a picture is made, after each round.
+/// What is known while a picture is made, after each round, and while its audit goes on alone.
 #[derive(Clone, Copy, Debug)]
 pub struct Progress {
     /// Seconds of rendering so far.

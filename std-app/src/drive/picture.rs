@@ -111,12 +111,15 @@ impl Picture<'_> {
                         audit.focus(audited, (canvas.counters.all_rays(), rounds.spp()));
                     }
                     let left = settings.stop.seconds.map(|limit| limit - estimating);
-                    let may = |cost: f64| {
+                    let so_far = found.error();
+                    let mut may = |cost: f64| {
+                        let known = rounds.progress(clock.seconds(), so_far);
+                        clock.pause(|| progress(&known));
                         let is_time = left.is_none_or(|left| clock.seconds() + cost < left);
                         is_time && !interrupt.load(Ordering::Relaxed)
                     };
                     if settings.audit.is_none() {
-                        found = go_on_alone(audit, &rounds, found, renderer, (workers, &canvas), &may)?;
+                        found = go_on_alone(audit, &rounds, found, renderer, (workers, &canvas), &mut may)?;
                     }
                 }
                 let start = Instant::now();
@@ -152,13 +155,7 @@ impl Picture<'_> {
             let against = reference.as_ref().map(|r| clock.pause(|| r.compare(&image(&canvas.film))));
             let spp = rounds.spp();
             history.push(Round { seconds, spp, rays: canvas.counters.all_rays(), error, reference: against });
-            let known = Progress {
-                seconds,
-                seconds_left: rounds.seconds_left(seconds, latest),
-                spp,
-                rounds: rounds.count(),
-                error: latest,
-            };
+            let known = rounds.progress(seconds, latest);
             clock.pause(|| progress(&known));
             let due = |every: f64| saved.elapsed().as_secs_f64() >= every;
             if plan.first || settings.checkpoint.as_ref().is_some_and(|checkpoint| due(checkpoint.every)) {
@@ -236,7 +233,7 @@ fn go_on_alone(
     mut told: Told,
     renderer: &mut dyn Renderer,
     (workers, canvas): (&Workers, &Canvas),
-    may: &dyn Fn(f64) -> bool,
+    may: &mut dyn FnMut(f64) -> bool,
 ) -> Result<Told, RenderError> {
     while told.audited.as_ref().is_some_and(|audited| rounds.waits_for(audited)) {
         let mut went = false;

@@ -1,6 +1,6 @@
 //! How many samples the next round takes, and whether there is one: the stop rules.
 
-use super::{Audited, ErrorEstimate};
+use super::{Audited, ErrorEstimate, Progress};
 use serde::{Deserialize, Serialize};
 
 /// When to stop: the first rule that holds. Without any rule, [`Stop::DEFAULT_SPP`] samples.
@@ -177,8 +177,14 @@ impl Rounds {
         self.count += 1;
     }
 
+    /// What is told of the picture meanwhile, at `seconds`.
+    pub(super) fn progress(&self, seconds: f64, error: Option<ErrorEstimate>) -> Progress {
+        let seconds_left = self.seconds_left(seconds, error);
+        Progress { seconds, seconds_left, spp: self.spp, rounds: self.count, error }
+    }
+
     /// Seconds until the first rule holds, if all goes on as before: errors fall like one over the samples.
-    pub(super) fn seconds_left(&self, seconds: f64, error: Option<ErrorEstimate>) -> Option<f64> {
+    fn seconds_left(&self, seconds: f64, error: Option<ErrorEstimate>) -> Option<f64> {
         let by_samples =
             self.stop.spp.map(|spp| seconds * (f64::from(spp) / f64::from(self.spp.max(1)) - 1.0));
         let by_time = self.stop.seconds.map(|limit| limit - seconds);

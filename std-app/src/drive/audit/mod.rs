@@ -216,7 +216,7 @@ impl<'a> Audit<'a> {
         &mut self,
         workers: &Workers,
         photons: Option<Merging>,
-        may: &dyn Fn(f64) -> bool,
+        may: &mut dyn FnMut(f64) -> bool,
     ) -> Result<bool, RenderError> {
         let end = (self.state.taken + self.state.taken / 4).next_multiple_of(STEP);
         while self.state.taken < end {
