@@ -178,6 +178,13 @@ impl<'m> IrradianceCache<'m> {
         true
     }
 
+    /// See [`Record::correct`], of the record of that number.
+    pub fn correct(&mut self, number: usize, found: &Record) {
+        if let Some(record) = self.records.get_mut(..self.used).and_then(|all| all.get_mut(number)) {
+            record.correct(found);
+        }
+    }
+
     /// Makes all radii smaller by a factor, as for an error allowed that is smaller by its fourth power. What records
     /// then no longer cover is to be filled again.
     pub fn tighten(&mut self, share: f32) {

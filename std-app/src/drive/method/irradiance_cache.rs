@@ -32,7 +32,7 @@ use halflight_core::bsdf::Features;
 use halflight_core::cache::irradiance::{CellFlux, IrradianceCache, Record, metric};
 use halflight_core::film::{PIXELS_PER_TILE, PixelSet, Tile};
 use halflight_core::memory::{Arena, Footprint, Line};
-use halflight_core::transport::gather::Gathering;
+use halflight_core::transport::gather::{Gathering, Place};
 use halflight_core::transport::path::WAVE;
 use halflight_core::transport::shoot::Keep;
 use halflight_core::transport::{Counters, PathTracer};
@@ -235,7 +235,8 @@ fn set_up<F: Features, T>(
     let pixels = settings.width as usize * settings.height as usize;
     let wanted = (pixels / PIXELS_PER_RECORD).max(FEWEST_RECORDS).saturating_add(fewest);
     let available = memory.available().saturating_sub(others);
-    let capacity = wanted.min(IrradianceCache::capacity_of(available / 2)).max(fewest);
+    let capacity = wanted.min(capacity_of(available / 2)).max(fewest);
+    memory.set_aside("cache", Footprint::default().slice::<Place>(2 * capacity))?;
     let footprint = IrradianceCache::footprint(capacity);
     let mut lines = [memory.take("cache", footprint)?, memory.take("cache", footprint)?];
     let [even, odd] = &mut lines;
@@ -297,6 +298,17 @@ fn set_up<F: Features, T>(
 /// Whether paths are long enough for light to be reflected by one surface before the one that is seen.
 fn has_indirect_light(settings: &Settings) -> bool {
     settings.max_depth.is_none_or(|depth| depth > 2)
+}
+
+/// How many records fit into `bytes`, with the place of each.
+fn capacity_of(bytes: usize) -> usize {
+    let places = IrradianceCache::capacity_of(bytes).saturating_mul(size_of::<Place>());
+    IrradianceCache::capacity_of(bytes.saturating_sub(places))
+}
+
+/// Those of more strata than `flux`.
+fn finer_than<'t>(tables: &'t [CellFlux<'t>], flux: &CellFlux) -> &'t [CellFlux<'t>] {
+    tables.get(tables.partition_point(|table| table.n() <= flux.n())..).unwrap_or_default()
 }
 
 /// The next fewer strata, if there are any.
@@ -374,7 +386,9 @@ impl<F: Features> Cached<'_, F> {
         }
         // Those that are refined are not cut before the picture is.
         let haste = self.haste.filter(|_| self.refined == 0);
-        let Self { tracer, gathering, tables, size, halves, laboratory, caster, begun, scratch, .. } = self;
+        let Self {
+            tracer, gathering, tables, size, halves, laboratory, caster, begun, scratch, is_open, ..
+        } = self;
         let mut all = true;
         for (i, half) in halves.iter_mut().enumerate() {
             let (photons, built);
@@ -398,11 +412,18 @@ impl<F: Features> Cached<'_, F> {
                 tracer = tracer.with_bounced([laboratory.gathered(&built); 2]);
             }
             // The first of all: whether there is time for records of so many rays.
-            let glance = haste.filter(|_| self.is_open && i == 0 && self.lights.is_none());
+            let glance = haste.filter(|_| *is_open && i == 0 && self.lights.is_none());
             let until = glance.map_or(haste.and_then(|haste| haste.end(i)), |haste| haste.glance());
             let overture = |flux| {
                 let coarse = coarser(tables, flux);
-                Overture { tracer: &tracer, gathering: Gathering { flux, ..*gathering }, coarse, size: *size }
+                let finer = if *is_open { finer_than(tables, flux) } else { &[] };
+                Overture {
+                    tracer: &tracer,
+                    gathering: Gathering { flux, ..*gathering },
+                    coarse,
+                    finer,
+                    size: *size,
+                }
             };
             let mut is_done = crew.hurry(until, |crew| overture(gathering.flux).fill(half, crew, scratch))?;
             if let Some(haste) = glance.filter(|_| !is_done) {

@@ -19,6 +19,7 @@ mod photon_map;
 mod photon_view;
 mod photons;
 mod places;
+mod second_look;
 mod sppm;
 #[cfg(test)]
 mod wrong;

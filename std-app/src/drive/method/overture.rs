@@ -65,8 +65,8 @@ pub(in crate::drive) struct Growing<'a> {
     sweeps: u32,
     before: usize,
     /// Places at which it has gathered.
-    gathered: u32,
-    spots: Vec<Spot>,
+    pub(super) gathered: u32,
+    pub(super) spots: Vec<Spot>,
     /// Spots that are not worth rays of their own.
     dismissed: Vec<Spot>,
     /// Glints that were none.
@@ -77,6 +77,10 @@ pub(in crate::drive) struct Growing<'a> {
     loaded: usize,
     /// Rays for each path, of each of the records that came then.
     efforts: Vec<f32>,
+    /// Of each record; [`Place::NONE`] for those of a file.
+    pub(super) places: Vec<Place>,
+    /// Whether it was looked again at the records that are worth it.
+    is_seen_again: bool,
     /// Sum of the radiance that records see in the mean, and how many.
     light: (f64, u32),
 }
@@ -117,6 +121,8 @@ impl<'a> Growing<'a> {
             attempts: 0,
             loaded: 0,
             efforts: Vec::new(),
+            places: Vec::new(),
+            is_seen_again: false,
             light: (0.0, 0),
         }
     }
@@ -125,7 +131,13 @@ impl<'a> Growing<'a> {
     pub(in crate::drive) fn restore(&mut self, records: &[Record], gathered: u32) {
         self.cache.restore(records);
         self.loaded = self.cache.records().len();
+        self.places.resize(self.loaded, Place::NONE);
         self.gathered = gathered;
+    }
+
+    /// What names the gathering at the next place but `after`.
+    pub(super) fn number(&self, after: usize) -> u32 {
+        2 * (self.gathered + after as u32) + self.index
     }
 
     /// Places at which it has gathered.
@@ -146,6 +158,8 @@ impl<'a> Growing<'a> {
     /// Looks for all from the beginning, beside the records of before.
     fn begin(&mut self) {
         self.efforts.clear();
+        self.places.truncate(self.loaded);
+        self.is_seen_again = false;
         (self.sight, self.next, self.sweeps, self.before) = (Some(Sight::Clear), 0, 0, self.loaded);
     }
 
@@ -208,10 +222,12 @@ impl<'a> Growing<'a> {
         sorted.sort_by(f32::total_cmp);
         let most = ALONE * sorted.get(sorted.len() / 2).copied().unwrap_or(f32::INFINITY);
         let efforts = core::iter::repeat_n(0.0, self.loaded).chain(self.efforts.drain(..));
-        let records = self.cache.records().iter().zip(efforts);
-        let kept: Vec<Record> =
-            records.filter(|(_, effort)| *effort <= most).map(|(record, _)| *record).collect();
-        self.cache.restore(&kept);
+        let records = self.cache.records().iter().zip(&self.places).zip(efforts);
+        let kept =
+            records.filter(|(_, effort)| *effort <= most).map(|((record, place), _)| (*record, *place));
+        let (records, places): (Vec<Record>, _) = kept.unzip();
+        self.cache.restore(&records);
+        self.places = places;
     }
 
     /// The radiance that records see in the mean, those of `found` as well.
@@ -254,6 +270,8 @@ pub(in crate::drive) struct Overture<'o, 'a, F> {
     pub(in crate::drive) gathering: Gathering<'o>,
     /// Of fewer strata, for what rough surfaces see: a pixel has the mean of many records there.
     pub(in crate::drive) coarse: &'o CellFlux<'o>,
+    /// Of more strata, for second looks, the fewest first.
+    pub(in crate::drive) finer: &'o [CellFlux<'o>],
     pub(in crate::drive) size: [u32; 2],
 }
 
@@ -294,7 +312,9 @@ impl<F: Features> Overture<'_, '_, F> {
             }
             growing.next += LOOKED_AT as u64;
         }
-        Ok(true)
+        growing.is_seen_again =
+            growing.is_seen_again || self.look_again(self.finer, growing, crew, scratch)?;
+        Ok(growing.is_seen_again)
     }
 
     /// What share of the diffuse points that the camera sees records serve, by a look at pixels that are evenly spread and the
@@ -346,7 +366,6 @@ impl<F: Features> Overture<'_, '_, F> {
         crew: &mut Crew,
         scratch: &mut [Vec<Line>],
     ) -> Result<Gathered, RenderError> {
-        let first = growing.gathered;
         let gathering = match growing.sight {
             Some(Sight::Rough) => Gathering { flux: self.coarse, ..self.gathering },
             _ => self.gathering,
@@ -357,11 +376,17 @@ impl<F: Features> Overture<'_, '_, F> {
             let mut all = vec![Found::default(); places.len()];
             let task = |task: usize, arena: &mut Arena, out: &mut [Found]| {
                 let mut counters = Counters::default();
-                let number = 2 * (first + task as u32) + growing.index;
                 if let (Some(Found { record, glints, effort }), Some(place)) =
                     (out.first_mut(), places.get(task))
                 {
-                    *record = tracer.gather(place, number, &gathering, arena, &mut counters, glints)?;
+                    *record = tracer.gather(
+                        place,
+                        growing.number(task),
+                        &gathering,
+                        arena,
+                        &mut counters,
+                        glints,
+                    )?;
                     *effort = counters.rays as f32 / counters.paths.max(1) as f32;
                 }
                 Ok(counters)
@@ -405,11 +430,12 @@ impl<F: Features> Overture<'_, '_, F> {
                 continue;
             }
             growing.gathered += places.len() as u32;
-            for Found { record, effort, .. } in all {
+            for (Found { record, effort, .. }, place) in all.into_iter().zip(places) {
                 let Some(record) = record else { continue };
                 growing.light = (growing.light.0 + light(&record), growing.light.1 + 1);
                 if growing.cache.insert(record) {
                     growing.efforts.push(effort);
+                    growing.places.push(*place);
                 }
             }
             return Ok(Gathered::All);
