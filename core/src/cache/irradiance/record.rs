@@ -133,10 +133,10 @@ impl Record {
     /// far it reaches stays what neighbours have made of it.
     pub fn correct(&mut self, found: &Self) {
         for (c, new) in found.irradiance.into_iter().enumerate() {
-            let factor = if self.irradiance[c] > 0.0 { new / self.irradiance[c] } else { 1.0 };
-            self.irradiance[c] = new;
+            let old = core::mem::replace(&mut self.irradiance[c], new);
             for derivatives in [&mut self.gradient[c], &mut self.rotation[c]] {
-                *derivatives = derivatives.map(|derivative| derivative * factor);
+                *derivatives =
+                    derivatives.map(|derivative| if old > 0.0 { derivative / old * new } else { 0.0 });
             }
         }
         (self.noise, self.shining) = (found.noise, found.shining);

@@ -6,7 +6,7 @@ use crate::drive::RenderError;
 use crate::drive::crew::Crew;
 use core::f32::consts::PI;
 use halflight_core::bsdf::Features;
-use halflight_core::cache::irradiance::{CellFlux, Record};
+use halflight_core::cache::irradiance::{CellFlux, IrradianceCache, Record};
 use halflight_core::memory::{Arena, Line};
 use halflight_core::transport::Counters;
 use halflight_core::transport::gather::{Gathering, Place};
@@ -14,13 +14,30 @@ use halflight_core::transport::gather::{Gathering, Place};
 /// No record has more than this share of the picture, however large it is.
 const MOST_OF_PICTURE: f32 = 1.0 / 32.0;
 
-/// What the noise of `record` is in the picture: its variance times the pixels that it covers.
-fn worth(record: &Record, place: &Place, pixels: f32) -> f32 {
-    if !place.is_some() {
-        return 0.0;
-    }
-    let [r1, r2] = record.radii.map(|radius| radius / place.pixel());
-    record.noise * (PI * r1 * r2).min(MOST_OF_PICTURE * pixels)
+/// What the noise of each record is in a picture of so many `pixels`: its variance times those that it covers.
+fn worth(growing: &Growing, pixels: f32) -> Vec<f32> {
+    let records = growing.cache.records();
+    let mean = records.iter().map(|record| record.noise).sum::<f32>() / records.len().max(1) as f32;
+    let of = |(record, place): (&Record, &Place)| {
+        if !place.is_some() {
+            return 0.0;
+        }
+        let [r1, r2] = record.radii.map(|radius| radius / place.pixel());
+        noise_around(&growing.cache, record).unwrap_or(mean) * (PI * r1 * r2).min(MOST_OF_PICTURE * pixels)
+    };
+    records.iter().zip(&growing.places).map(of).collect()
+}
+
+/// The variance of the others that speak where `record` is; `None` where it is alone. Its own is larger where its rays have met too much
+/// by chance than where they have missed it: if it looked again for that, pictures would be too dark.
+fn noise_around(cache: &IrradianceCache, record: &Record) -> Option<f32> {
+    let (mut sum, mut weights) = (0.0, 0.0);
+    cache.visit(record.position.into(), record.normal.into(), |other, weight| {
+        if other.position != record.position {
+            (sum, weights) = (sum + weight * other.noise, weights + weight);
+        }
+    });
+    (weights > 0.0).then(|| sum / weights)
 }
 
 /// Which records are worth which of the numbers of rays that are so many `times` those of first looks, the fewest first: where each
@@ -45,8 +62,7 @@ impl<F: Features> Overture<'_, '_, F> {
         scratch: &mut [Vec<Line>],
     ) -> Result<bool, RenderError> {
         let pixels = self.size[0] as f32 * self.size[1] as f32;
-        let records = growing.cache.records().iter().zip(&growing.places);
-        let worth: Vec<f32> = records.map(|(record, place)| worth(record, place, pixels)).collect();
+        let worth = worth(growing, pixels);
         let strata = self.gathering.flux.n() as f32;
         let times: Vec<f32> = finer.iter().map(|flux| (flux.n() as f32 / strata).powi(2)).collect();
         let chosen = choose(&worth, &times);
