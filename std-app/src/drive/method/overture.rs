@@ -312,8 +312,7 @@ impl<F: Features> Overture<'_, '_, F> {
             }
             growing.next += LOOKED_AT as u64;
         }
-        growing.is_seen_again =
-            growing.is_seen_again || self.look_again(self.finer, growing, crew, scratch)?;
+        growing.is_seen_again = growing.is_seen_again || self.look_again(growing, crew, scratch)?;
         Ok(growing.is_seen_again)
     }
 

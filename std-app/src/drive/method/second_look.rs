@@ -6,7 +6,7 @@ use crate::drive::RenderError;
 use crate::drive::crew::Crew;
 use core::f32::consts::PI;
 use halflight_core::bsdf::Features;
-use halflight_core::cache::irradiance::{CellFlux, IrradianceCache, Record};
+use halflight_core::cache::irradiance::{IrradianceCache, Record};
 use halflight_core::memory::{Arena, Line};
 use halflight_core::transport::Counters;
 use halflight_core::transport::gather::{Gathering, Place};
@@ -53,25 +53,27 @@ fn choose(worth: &[f32], times: &[f32]) -> Vec<(usize, usize)> {
 }
 
 impl<F: Features> Overture<'_, '_, F> {
-    /// Gathers again with those of `finer` at the records that are worth it; whether that is done: not where the round is over.
+    /// Gathers again with those of its finer strata at the records that are worth it; whether that is done: not where the round is over.
     pub(in crate::drive) fn look_again(
         &self,
-        finer: &[CellFlux],
         growing: &mut Growing,
         crew: &mut Crew,
         scratch: &mut [Vec<Line>],
     ) -> Result<bool, RenderError> {
+        if self.finer.is_empty() {
+            return Ok(true);
+        }
         let pixels = self.size[0] as f32 * self.size[1] as f32;
         let worth = worth(growing, pixels);
         let strata = self.gathering.flux.n() as f32;
-        let times: Vec<f32> = finer.iter().map(|flux| (flux.n() as f32 / strata).powi(2)).collect();
+        let times: Vec<f32> = self.finer.iter().map(|flux| (flux.n() as f32 / strata).powi(2)).collect();
         let chosen = choose(&worth, &times);
         let tracer = self.tracer.with_growing_cache(&growing.cache).with_spots(&growing.spots);
         let mut found: Vec<Option<Record>> = vec![None; chosen.len()];
         let gather = |task: usize, arena: &mut Arena, out: &mut [Option<Record>]| {
             let mut counters = Counters::default();
             if let (Some(out), Some((index, flux))) = (out.first_mut(), chosen.get(task)) {
-                let gathering = Gathering { flux: &finer[*flux], ..self.gathering };
+                let gathering = Gathering { flux: &self.finer[*flux], ..self.gathering };
                 let number = growing.number(task);
                 *out = tracer.gather(
                     &growing.places[*index],
