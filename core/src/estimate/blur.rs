@@ -76,7 +76,7 @@ impl BiasEstimate {
             return None;
         }
         let count = pixels as f64;
-        Some(Self::known(squared / count, squares / (count * count), UNSURE))
+        Some(Self::known(squared / count, squares / (count * count), 0.0, UNSURE))
     }
 }
 
@@ -150,7 +150,7 @@ mod tests {
     #[test]
     fn what_is_not_known_of_blur_reaches_both_ways() {
         let noise = ErrorEstimate { relmse: 1e-4, lower: 0.9e-4, upper: 1.1e-4 };
-        let blur = BiasEstimate::known(5e-3, 1e-10, UNSURE);
+        let blur = BiasEstimate::known(5e-3, 1e-10, 0.0, UNSURE);
         let sum = noise.with_bias(blur);
         assert!(sum.lower < 1e-4 + 0.8 * 5e-3 && sum.upper > 1e-4 + 1.2 * 5e-3, "{sum:?}");
     }

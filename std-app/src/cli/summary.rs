@@ -125,7 +125,7 @@ pub(super) fn text(run: &Run, report: Option<&Path>) -> String {
 /// The lines of an audited estimate.
 pub(super) fn audited(audit: &Audited) -> [String; 3] {
     let ErrorEstimate { relmse, lower, upper } = audit.total;
-    let BiasEstimate { relmse: bias, lower: least, upper: most, detectable } = audit.bias;
+    let BiasEstimate { relmse: bias, lower: least, upper: most, detectable, .. } = audit.bias;
     let found = if audit.is_biased() { "bias found" } else { "no bias found" };
     [
         format!("error  relMSE {relmse:.3e} (95 %: {lower:.3e} to {upper:.3e}), noise and bias"),

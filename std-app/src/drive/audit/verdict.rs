@@ -125,14 +125,21 @@ mod tests {
     #[test]
     fn noise_and_bias_add_up() {
         let noise = ErrorEstimate { relmse: 0.01, lower: 0.008, upper: 0.013 };
-        let bias = BiasEstimate { relmse: 0.02, lower: 0.016, upper: 0.024, detectable: 0.004 };
+        let bias = BiasEstimate {
+            relmse: 0.02,
+            lower: 0.016,
+            upper: 0.024,
+            detectable: 0.004,
+            error: 0.004 / 1.959964,
+        };
         let sum = noise.with_bias(bias);
         // 0.03, less twice the square of the standard error over 0.02; the distance to the ends of both.
         let less = 2.0 * (0.004f64 / 1.96).powi(2) / 0.02;
         assert!((sum.relmse - (0.03 - less)).abs() < 1e-7, "{sum:?}");
         assert!((sum.relmse - sum.lower - 0.002f64.hypot(0.004 - less)).abs() < 1e-7, "{sum:?}");
         assert!((sum.upper - sum.relmse - 0.003f64.hypot(0.004 + less)).abs() < 1e-7, "{sum:?}");
-        let none = BiasEstimate { relmse: -0.001, lower: 0.0, upper: 0.002, detectable: 0.003 };
+        let none =
+            BiasEstimate { relmse: -0.001, lower: 0.0, upper: 0.002, detectable: 0.003, error: 0.0015 };
         let sum = noise.with_bias(none);
         assert_eq!((sum.relmse, sum.lower), (0.01, 0.008));
         assert!(sum.upper > 0.0135 && sum.upper < 0.014);
