@@ -33,6 +33,9 @@ const LONGEST_ROUND: f64 = 0.5;
 /// The error is estimated from this many samples on: one for each quarter of the film.
 const FIRST_ESTIMATE: u32 = 4;
 
+/// Where no error is to stop the render estimates are no closer than so many samples, and mostly at multiples of these.
+const SELDOM: u32 = 16;
+
 /// Below this many samples an error estimate is too vague to stop on.
 pub(super) const FEWEST_FOR_ERROR: u32 = 16;
 
@@ -127,7 +130,7 @@ impl Rounds {
     }
 
     /// Takes note of an estimate, which takes as long as a tenth of a sample, or a quarter where samples are cheap. The next is
-    /// due after an eighth more samples, but sixteen at least, or twice as many; where the error is to stop the render, when it can be
+    /// due after an eighth more samples, but sixteen at least; where the error is to stop the render, when it can be
     /// reached at the earliest (errors fall with the square of the samples at best, and intervals become narrower), after a
     /// thirty-second at least and twice as many at most.
     pub(super) fn estimated(&mut self, error: Option<ErrorEstimate>) {
@@ -137,7 +140,7 @@ impl Rounds {
                 let growth = (error.upper / wanted).cbrt().clamp(1.0 + 1.0 / 32.0, 2.0);
                 (f64::from(spp) * growth) as u32
             }
-            _ => spp + (spp / 8).max(spp.min(16)),
+            _ => (spp + (spp / 8).max(SELDOM)) / SELDOM * SELDOM,
         };
         self.next_estimate = next.max(spp + 1).next_multiple_of(4);
         self.decision = error.map(|error| (spp, error));
