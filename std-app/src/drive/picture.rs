@@ -25,6 +25,9 @@ const STEP_SECONDS: f64 = 0.01;
 /// Samples of a tile that fill a wave: steps are multiples of it where time allows.
 const FULL_STEP: u32 = 8;
 
+/// Seconds that are kept free for an estimate of the error, for each pixel and thread, before the first has been made.
+const ESTIMATING: f64 = 1e-7;
+
 /// A picture to be rendered.
 pub(super) struct Picture<'a> {
     pub(super) method: Method,
@@ -64,7 +67,8 @@ impl Picture<'_> {
         };
         let reference = clock.pause(|| settings.reference.as_deref().map(Reference::new));
         let mut latest = history.iter().rev().find_map(|round: &Round| round.error);
-        let (mut estimating, mut estimate) = (0.0, 0.0);
+        let pixels = f64::from(settings.width) * f64::from(settings.height);
+        let (mut estimating, mut estimate) = (ESTIMATING * pixels / workers.count() as f64, 0.0);
         let (mut gain, mut told) = (None, None);
         let mut saved = Instant::now();
         let mut is_lost = false;
