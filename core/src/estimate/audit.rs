@@ -160,6 +160,8 @@ fn ends(estimate: f64, error: f64) -> [f64; 2] {
 /// values lie above, so that it is less for skew ones: Hall 1992, On the removal of skewness by transformation. `skewness` is the sum
 /// of their third moments over the 3/2 power of that of their second, from −1 to 1.
 fn studentised(skewness: f64) -> f64 {
+    // Where all are the same it is what rounding makes of nothing.
+    let skewness = skewness.clamp(-1.0, 1.0);
     if fabs(skewness) >= 1e-4 {
         3.0 / skewness * (cbrt(1.0 + skewness * (Z - skewness / 6.0)) - 1.0)
     } else {
@@ -277,6 +279,23 @@ mod tests {
         // 0.8 and 5.6 % by the normal distribution; one standard error is 0.25 %.
         assert!((found(1.0) - 0.025).abs() < 0.008, "{}", found(1.0));
         assert!((found(-1.0) - 0.025).abs() < 0.015, "{}", found(-1.0));
+    }
+
+    #[test]
+    fn what_all_findings_agree_on_is_found() {
+        for bias in [0.1, 1e-3, 3.3e5] {
+            let finding = Finding { bias, deviation: 0.0, variances: [0.0; 2] };
+            let of = |sign: f64| {
+                let finding = Finding { bias: sign * bias, ..finding };
+                BiasEstimate::of((0..256).map(|_| (finding, 1.0))).unwrap()
+            };
+            assert!(
+                of(1.0).is_found() && of(1.0).detectable > 0.0 && of(1.0).lower > 0.99 * bias,
+                "{:?}",
+                of(1.0)
+            );
+            assert!(!of(-1.0).is_found() && of(-1.0).upper >= 0.0, "{:?}", of(-1.0));
+        }
     }
 
     #[test]
