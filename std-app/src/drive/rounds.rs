@@ -33,7 +33,7 @@ const LONGEST_ROUND: f64 = 0.5;
 /// The error is estimated from this many samples on: one for each quarter of the film.
 const FIRST_ESTIMATE: u32 = 4;
 
-/// Where no error is to stop the render estimates are no closer than so many samples, and mostly at multiples of these.
+/// Where no error is to stop the render estimates after the first are at multiples of so many samples.
 const SELDOM: u32 = 16;
 
 /// Below this many samples an error estimate is too vague to stop on.
@@ -130,7 +130,7 @@ impl Rounds {
     }
 
     /// Takes note of an estimate, which takes as long as a tenth of a sample, or a quarter where samples are cheap. The next is
-    /// due after an eighth more samples, but sixteen at least; where the error is to stop the render, when it can be
+    /// due after an eighth more samples, but at the next multiple of sixteen at least; where the error is to stop the render, when it can be
     /// reached at the earliest (errors fall with the square of the samples at best, and intervals become narrower), after a
     /// thirty-second at least and twice as many at most.
     pub(super) fn estimated(&mut self, error: Option<ErrorEstimate>) {
