@@ -165,7 +165,10 @@ impl Needs {
             let scratch = PathTracer::<F>::gather_scratch(n).bytes().saturating_mul(workers.count());
             n <= most && memory.available() / 2 > scratch + 2 * CellFlux::footprint(n).bytes()
         };
-        let finer = core::iter::successors(Some(2 * strata), |n| Some(2 * n)).take_while(|n| has_memory(*n));
+        // With one between, but where caches are refined, which begin anew each time.
+        let between = |n: usize| if n.is_multiple_of(3) { n / 3 * 4 } else { n / 2 * 3 };
+        let more = |n: &usize| Some(if is_refined { 2 * n } else { between(*n) });
+        let finer = core::iter::successors(more(&strata), more).take_while(|n| has_memory(*n));
         let coarse = (strata / (2 * BLOCK)).max(1) * BLOCK;
         let sizes: Vec<usize> = [coarse, strata].into_iter().chain(finer).collect();
         let finest = sizes.last().copied().unwrap_or(strata);
