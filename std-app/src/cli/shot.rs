@@ -74,7 +74,7 @@ pub(super) struct Options {
     /// smaller [default: 1e-4]; the others: the radius over the distance that they take [default: 0.3]
     #[arg(long, value_name = "ERROR", value_parser = values::positive, help_heading = "Irradiance cache")]
     cache_error: Option<f64>,
-    /// Rays that are gathered for a record: 64, 256, 1024 or 4096 [default: as many as the
+    /// Rays that are gathered for a record: 64, 256, 576, 1024, 2304 or 4096 [default: as many as the
     /// picture is better for; 1024 where caches are kept in a file]
     #[arg(long, value_name = "N", value_parser = values::gather_rays, help_heading = "Irradiance cache")]
     cache_rays: Option<u32>,

@@ -85,8 +85,8 @@ pub(super) fn metric(name: &str) -> Result<Metric, String> {
 
 /// Rays of a record: strata in blocks of 8 x 8.
 pub(super) fn gather_rays(text: &str) -> Result<u32, String> {
-    let known = text.parse().ok().filter(|rays| [64, 256, 1024, 4096].contains(rays));
-    known.ok_or("64, 256, 1024 or 4096 rays are expected".into())
+    let known = text.parse().ok().filter(|rays| [64, 256, 576, 1024, 2304, 4096].contains(rays));
+    known.ok_or("64, 256, 576, 1024, 2304 or 4096 rays are expected".into())
 }
 
 /// A part of a picture: `I/N`, counted from 1.

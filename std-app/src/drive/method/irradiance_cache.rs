@@ -169,7 +169,7 @@ impl Needs {
         let between = |n: usize| if n.is_multiple_of(3) { n / 3 * 4 } else { n / 2 * 3 };
         let more = |n: &usize| Some(if is_refined { 2 * n } else { between(*n) });
         let finer = core::iter::successors(more(&strata), more).take_while(|n| has_memory(*n));
-        let coarse = (strata / (2 * BLOCK)).max(1) * BLOCK;
+        let coarse = strata.div_ceil(2 * BLOCK) * BLOCK;
         let sizes: Vec<usize> = [coarse, strata].into_iter().chain(finer).collect();
         let finest = sizes.last().copied().unwrap_or(strata);
         let scratch = PathTracer::<F>::scratch(WAVE).or(PathTracer::<F>::gather_scratch(finest));
@@ -314,9 +314,9 @@ fn finer_than<'t>(tables: &'t [CellFlux<'t>], flux: &CellFlux) -> &'t [CellFlux<
     tables.get(tables.partition_point(|table| table.n() <= flux.n())..).unwrap_or_default()
 }
 
-/// The next fewer strata, if there are any.
+/// Strata of half the side, or the next more that there are.
 fn coarser<'t>(tables: &'t [CellFlux<'t>], flux: &'t CellFlux<'t>) -> &'t CellFlux<'t> {
-    tables.iter().rev().find(|table| table.n() < flux.n()).unwrap_or(flux)
+    tables.iter().find(|table| 2 * table.n() >= flux.n()).unwrap_or(flux)
 }
 
 /// Whether records are of a file, or go to one: they have one error and one number of rays.
