@@ -1,39 +1,13 @@
 //! Loading as a user meets it: small files on disk, each with one thing that has to be repaired, refused, or
 //! understood.
 
-use core::sync::atomic::{AtomicU32, Ordering};
+mod load_support;
+
 use glam::Vec3;
 use halflight::load::{LoadError, LoadOptions, LoadedScene, load};
 use halflight_core::Rgb;
 use halflight_core::scene::{ColorInput, Material, PointLight, Surface, Texels};
-use std::fs;
-use std::path::PathBuf;
-
-/// A directory of small files that goes away with the test.
-struct Files(PathBuf);
-
-impl Files {
-    fn new(files: &[(&str, &[u8])]) -> Self {
-        static NEXT: AtomicU32 = AtomicU32::new(0);
-        let name = format!("halflight-load-{}-{}", std::process::id(), NEXT.fetch_add(1, Ordering::Relaxed));
-        let directory = std::env::temp_dir().join(name);
-        fs::create_dir_all(&directory).unwrap();
-        for (name, bytes) in files {
-            fs::write(directory.join(name), bytes).unwrap();
-        }
-        Self(directory)
-    }
-
-    fn load(&self, name: &str) -> Result<LoadedScene, LoadError> {
-        load(&self.0.join(name), &LoadOptions::default())
-    }
-}
-
-impl Drop for Files {
-    fn drop(&mut self) {
-        let _ = fs::remove_dir_all(&self.0);
-    }
-}
+use load_support::{Files, bmp};
 
 fn obj(text: &str) -> Result<LoadedScene, LoadError> {
     Files::new(&[("a.obj", text.as_bytes())]).load("a.obj")
@@ -196,16 +170,6 @@ fn diffuse(scene: &LoadedScene, name: &str) -> ColorInput {
     }
 }
 
-/// A bitmap of 1 by 1 pixels.
-fn bmp(rgb: [u8; 3]) -> Vec<u8> {
-    let mut bytes = b"BM".to_vec();
-    for word in [58u32, 0, 54, 40, 1, 1, 1 | 24 << 16, 0, 4, 2835, 2835, 0, 0] {
-        bytes.extend(word.to_le_bytes());
-    }
-    bytes.extend([rgb[2], rgb[1], rgb[0], 0]);
-    bytes
-}
-
 #[test]
 fn materials_and_textures_are_found() {
     let mtl = b"newmtl a b\nmap_Kd .\\tex\\my wood.bmp\nmap_d -clamp on my wood.bmp\nnewmtl c\nKd 0.25\nmap_Kd gone.png\nnewmtl d\nmap_Kd broken.png";
@@ -226,10 +190,11 @@ fn materials_and_textures_are_found() {
     assert_eq!(diffuse(&scene, "d"), Rgb::splat(0.5).into());
     let said = scene.repairs.join("\n");
     assert!(
-        said.contains("texture gone.png is missing") && said.contains("broken.png cannot be read"),
+        said.contains("texture `gone.png` is missing") && said.contains("broken.png cannot be read"),
         "{said}"
     );
-    assert_eq!(scene.repairs.len(), 2, "{said}");
+    assert!(said.contains("`.\\tex\\my wood.bmp` is not there under this name"), "{said}");
+    assert_eq!(scene.repairs.len(), 3, "{said}");
 }
 
 #[test]

@@ -6,8 +6,12 @@
 //! they can be fed anything: [`obj::parse`], [`mtl::parse`], [`scene_file::parse`], [`texture::decode`].
 
 mod error;
+mod files;
 mod geometry;
+mod library;
+mod map;
 pub mod mtl;
+mod name;
 mod notes;
 pub mod obj;
 mod scene;
@@ -20,15 +24,20 @@ mod texture_set;
 mod transform;
 
 pub use error::LoadError;
+pub use map::{Map, MapOptions};
+pub use name::Name;
 pub use notes::Notes;
 pub use scene::{LoadedScene, SceneViews};
 pub use settings::RenderSettings;
 pub use texture_set::TextureSet;
 pub use transform::SceneTransform;
 
+use files::Lookup;
 use geometry::{Placed, Placement};
 use halflight_core::scene::{Environment, Material};
+use library::Library;
 use mtl::MtlMaterial;
+use name::readings;
 use scene_file::{EnvironmentChange, MaterialChange};
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::path::{Path, PathBuf};
@@ -80,10 +89,11 @@ struct SceneBuilder {
     objs: Vec<obj::Obj>,
     materials: Vec<MtlMaterial>,
     /// By file (none for materials of the scene file) and name.
-    by_name: HashMap<(Option<usize>, String), u32>,
+    by_name: HashMap<(Option<usize>, Name), u32>,
     /// Changes by the scene file, by name of the material.
     overrides: BTreeMap<String, MaterialChange>,
     used_overrides: BTreeSet<String>,
+    lookup: Lookup,
     notes: Notes,
 }
 
@@ -113,111 +123,64 @@ impl SceneBuilder {
             }
         };
         let names = self.objs[number].materials.clone();
-        let library = if material.is_none() { self.library(number, path) } else { HashMap::new() };
+        let mut library = Library::default();
+        if material.is_none() {
+            let statements = &self.objs[number].libraries;
+            library = Library::read(path, statements, &names, &mut self.lookup, &mut self.notes);
+        }
         let mut materials = Vec::with_capacity(names.len() + 1);
-        for name in names.iter().map(Some).chain([None]) {
+        for name in &names {
             materials.push(match material {
-                Some(material) => self.material(None, material, None),
-                None => self.file_material(number, name.map(String::as_str), &library, path),
+                Some(material) => self.material(None, material.into(), None),
+                None => self.file_material(number, name, &library, path),
             });
         }
+        materials.push(self.material(None, material.unwrap_or_default().into(), None));
         self.meshes.push(PlacedMesh { obj: number, placement, materials });
         Ok(())
     }
 
-    fn file_material(
-        &mut self,
-        file: usize,
-        name: Option<&str>,
-        library: &HashMap<String, MtlMaterial>,
-        path: &Path,
-    ) -> u32 {
-        let Some(name) = name else {
-            return self.material(None, "", None);
+    /// The number of the material that the operand of a `usemtl` means.
+    fn file_material(&mut self, file: usize, used: &Name, library: &Library, path: &Path) -> u32 {
+        let found = library.find(used);
+        let is_changed = |name: &Name| self.overrides.contains_key(&name.to_string());
+        let names: Vec<Name> = readings(used.bytes()).iter().map(|reading| reading.name.into()).collect();
+        let place = path.display();
+        let name = match &found {
+            Some(material) => {
+                let name = material.name.clone();
+                if !names.contains(&name) {
+                    let what =
+                        format!("material `{}` of {place} is not there, `{name}` is taken", used.trimmed());
+                    self.notes.add(1, what);
+                }
+                name
+            }
+            None => names.into_iter().find(is_changed).unwrap_or_else(|| used.trimmed()),
         };
-        let found = library.get(name);
-        if found.is_none() && !self.overrides.contains_key(name) {
-            let what =
-                format!("material `{name}` of {} is not in its material libraries: grey", path.display());
+        if found.is_none() && !is_changed(&name) {
+            let what = format!("material `{name}` of {place} is not in its material libraries: grey");
             self.notes.add(1, what);
         }
         self.material(Some(file), name, found)
     }
 
     /// The number of a material; a new one unless this name of this file has one.
-    fn material(&mut self, file: Option<usize>, name: &str, found: Option<&MtlMaterial>) -> u32 {
-        let key = (file, name.to_string());
+    fn material(&mut self, file: Option<usize>, name: Name, found: Option<MtlMaterial>) -> u32 {
+        let key = (file, name.clone());
         if let Some(&number) = self.by_name.get(&key) {
             return number;
         }
-        let blank = || MtlMaterial { name: name.into(), ..MtlMaterial::default() };
-        let mut material = found.cloned().unwrap_or_else(blank);
-        if let Some(change) = self.overrides.get(name) {
+        let shown = name.to_string();
+        let mut material = found.unwrap_or(MtlMaterial { name, ..MtlMaterial::default() });
+        if let Some(change) = self.overrides.get(&shown) {
             change.apply(&mut material);
-            self.used_overrides.insert(name.to_string());
+            self.used_overrides.insert(shown);
         }
         let number = self.materials.len() as u32;
         self.materials.push(material);
         self.by_name.insert(key, number);
         number
-    }
-
-    /// All materials of the libraries that an OBJ file names; the later of two with one name counts.
-    fn library(&mut self, obj: usize, path: &Path) -> HashMap<String, MtlMaterial> {
-        let directory = path.parent().unwrap_or(Path::new(""));
-        let statements = self.objs[obj].libraries.clone();
-        let mut files: Vec<PathBuf> = Vec::new();
-        for (line, operand) in &statements {
-            let mut found = find_libraries(directory, operand);
-            if found.is_empty() {
-                let place = format!("{}:{line}", path.display());
-                let beside = path.with_extension("mtl");
-                if beside.is_file() {
-                    let name = beside.display();
-                    self.notes.add(
-                        1,
-                        format!("material library `{operand}` is missing, {name} is read instead ({place})"),
-                    );
-                    found.push(beside);
-                } else {
-                    self.notes.add(1, format!("material library `{operand}` is missing ({place})"));
-                }
-            }
-            found.retain(|file| !files.contains(file));
-            files.append(&mut found);
-        }
-        let mut library = HashMap::new();
-        for file in files {
-            let bytes = match std::fs::read(&file) {
-                Ok(bytes) => bytes,
-                Err(error) => {
-                    self.notes.add(1, format!("material library {} cannot be read: {error}", file.display()));
-                    continue;
-                }
-            };
-            let mut mtl = mtl::parse(bytes, &file.display().to_string());
-            let directory = file.parent().unwrap_or(Path::new(""));
-            for mut material in mtl.materials {
-                Self::locate_maps(&mut material, directory, &mut mtl.notes);
-                let name = material.name.clone();
-                if library.insert(name, material).is_some() {
-                    mtl.notes
-                        .add(1, format!("material defined twice in {}: the later counts", file.display()));
-                }
-            }
-            self.notes.merge(mtl.notes);
-        }
-        library
-    }
-
-    /// Finds the files that the maps name.
-    fn locate_maps(material: &mut MtlMaterial, directory: &Path, notes: &mut Notes) {
-        for map in surface::maps_mut(material) {
-            map.found = texture_set::locate(directory, &map.file);
-            if map.found.is_none() {
-                notes.add(1, format!("texture {} is missing: constant value", map.file.display()));
-            }
-        }
     }
 
     /// Buffers for the core.
@@ -272,7 +235,7 @@ impl SceneBuilder {
             texcoords: geometry.texcoords,
             triangles: geometry.triangles,
             materials,
-            material_names: self.materials.into_iter().map(|mtl| mtl.name).collect(),
+            material_names: self.materials.into_iter().map(|mtl| mtl.name.to_string()).collect(),
             textures,
             lights: Vec::new(),
             environment,
@@ -282,12 +245,4 @@ impl SceneBuilder {
             repairs: self.notes.sentences(),
         })
     }
-}
-
-/// The files of an `mtllib` statement: one name with blanks, or several names.
-fn find_libraries(directory: &Path, operand: &str) -> Vec<PathBuf> {
-    if let Some(file) = texture_set::locate(directory, Path::new(operand)) {
-        return vec![file];
-    }
-    operand.split_whitespace().filter_map(|name| texture_set::locate(directory, Path::new(name))).collect()
 }

@@ -1,15 +1,16 @@
 //! MTL files, as their statements say them; [`super::surface`] decides what they mean. A statement that
 //! cannot be read is left out with a note: a picture with one wrong material is better than none.
 
+use super::map::Map;
+use super::name::Name;
 use super::notes::Notes;
 use super::text::{self, Lines, Words, words};
-use std::path::PathBuf;
 
 /// A material as written. `None` where the file says nothing.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct MtlMaterial {
-    /// `newmtl`.
-    pub name: String,
+    /// `newmtl`: all that follows the keyword.
+    pub name: Name,
     /// `Kd`: diffuse reflectance.
     pub diffuse: Option<[f64; 3]>,
     /// `Ks`: reflectance at normal incidence.
@@ -50,41 +51,6 @@ pub struct MtlMaterial {
     pub normal_map: Option<Map>,
 }
 
-/// A texture statement.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Map {
-    /// As written, relative to the file that names it.
-    pub file: PathBuf,
-    /// The file that this means, once it has been looked for and is there.
-    pub found: Option<PathBuf>,
-    /// `-s u v`.
-    pub scale: [f64; 2],
-    /// `-o u v`.
-    pub offset: [f64; 2],
-    /// `-clamp on`.
-    pub clamp: bool,
-    /// `-bm`.
-    pub bump_multiplier: f64,
-    /// `-imfchan r|g|b|m`: the channel of a scalar map.
-    pub channel: Option<u8>,
-}
-
-impl Map {
-    /// A map without options.
-    pub fn plain(file: impl Into<PathBuf>) -> Self {
-        let file = file.into();
-        Self {
-            file,
-            found: None,
-            scale: [1.0; 2],
-            offset: [0.0; 2],
-            clamp: false,
-            bump_multiplier: 1.0,
-            channel: None,
-        }
-    }
-}
-
 /// What an MTL file says.
 #[derive(Clone, Debug, Default)]
 pub struct Mtl {
@@ -116,7 +82,7 @@ impl Reader {
         let Some(keyword) = operands.next() else { return };
         let keyword = String::from_utf8_lossy(keyword).to_ascii_lowercase();
         if keyword == "newmtl" {
-            let name = operands.rest().into_owned();
+            let name = operands.rest().into();
             self.materials.push(MtlMaterial { name, ..MtlMaterial::default() });
             self.opacity_by_d = false;
             return;
@@ -223,69 +189,12 @@ fn unreadable<T>(keyword: &str, line: u32, notes: &mut Notes) -> Option<T> {
 }
 
 /// `[-option values]... file name with blanks`
-fn map(mut operands: Words, line: u32, notes: &mut Notes) -> Option<Map> {
-    let mut map = Map::plain("");
-    loop {
-        let mut ahead = operands.clone();
-        let word = ahead.next()?;
-        let option = match word {
-            [b'-', option @ ..] => String::from_utf8_lossy(option).to_ascii_lowercase(),
-            _ => break,
-        };
-        match option.as_str() {
-            "s" => map.scale = uv(&mut ahead, 1.0),
-            "o" => map.offset = uv(&mut ahead, 0.0),
-            "t" => {
-                uv(&mut ahead, 0.0);
-                unsupported(&option, line, notes);
-            }
-            "clamp" => map.clamp = ahead.next() == Some(b"on"),
-            "bm" => map.bump_multiplier = ahead.next().and_then(text::number).unwrap_or(1.0),
-            "imfchan" => {
-                map.channel = match ahead.next() {
-                    Some(b"r") => Some(0),
-                    Some(b"g") => Some(1),
-                    Some(b"b") => Some(2),
-                    Some(b"m") => Some(3),
-                    _ => None,
-                }
-            }
-            "blendu" | "blendv" | "cc" | "type" | "boost" | "texres" => {
-                ahead.next();
-                unsupported(&option, line, notes);
-            }
-            "mm" => {
-                ahead.nth(1);
-                unsupported(&option, line, notes);
-            }
-            _ => break, // a file name that begins with a hyphen
-        }
-        operands = ahead;
-    }
-    map.file = operands.rest().into_owned().into();
-    if map.file.as_os_str().is_empty() {
+fn map(operands: Words, line: u32, notes: &mut Notes) -> Option<Map> {
+    let map = Map::of_statement(operands.rest(), line);
+    if map.is_none() {
         notes.at(line, "map without a file name left out");
-        return None;
     }
-    Some(map)
-}
-
-fn unsupported(option: &str, line: u32, notes: &mut Notes) {
-    notes.at(line, format!("map option `-{option}` is not supported: left out"));
-}
-
-/// One to three numbers, of which the first two count.
-fn uv(operands: &mut Words, absent: f64) -> [f64; 2] {
-    let mut uv = [absent; 2];
-    for i in 0..3 {
-        let mut ahead = operands.clone();
-        let Some(number) = ahead.next().and_then(text::number) else { break };
-        if let Some(place) = uv.get_mut(i) {
-            *place = number;
-        }
-        *operands = ahead;
-    }
-    uv
+    map
 }
 
 #[cfg(test)]
@@ -301,7 +210,7 @@ mod tests {
     fn values_and_comments() {
         let (material, notes) =
             one("newmtl red wall \n\tKd 0.63 0.065 0.05 # Red\nKs 0.4\nNs 10.0\r\nillum 2\nKe 1e1 2 3\n");
-        assert_eq!(material.name, "red wall");
+        assert_eq!(material.name, "red wall ".into());
         assert_eq!(material.diffuse, Some([0.63, 0.065, 0.05]));
         assert_eq!(material.specular, Some([0.4; 3]));
         assert_eq!((material.shininess, material.illumination), (Some(10.0), Some(2)));
@@ -318,19 +227,13 @@ mod tests {
     }
 
     #[test]
-    fn maps_with_options_and_blanks() {
-        let (material, notes) = one(
-            "newmtl a\nmap_Kd -s 2 3 1 -o 0.5 -clamp on -mm 0 1 dark wood.png\nbump -bm 0.2 -imfchan g h.png\nnorm -n.png",
-        );
-        let expected =
-            Map { scale: [2.0, 3.0], offset: [0.5, 0.0], clamp: true, ..Map::plain("dark wood.png") };
-        assert_eq!(material.diffuse_map, Some(expected));
-        assert_eq!(
-            material.bump_map,
-            Some(Map { bump_multiplier: 0.2, channel: Some(1), ..Map::plain("h.png") })
-        );
-        assert_eq!(material.normal_map, Some(Map::plain("-n.png")));
-        assert_eq!(notes, ["map option `-mm` is not supported: left out (m.mtl:2)"]);
+    fn maps_and_names_keep_their_bytes() {
+        let mtl = parse(b"newmtl gr\xfcn #1\nmap_Kd -s 2 2 gr\xfcn #1.png\r\nbump".to_vec(), "m.mtl");
+        let material = &mtl.materials[0];
+        assert_eq!(material.name, b"gr\xfcn #1"[..].into());
+        let map = material.diffuse_map.as_ref().unwrap();
+        assert_eq!((map.operand.bytes(), map.line, &map.found), (&b"-s 2 2 gr\xfcn #1.png"[..], 2, &None));
+        assert_eq!(mtl.notes.sentences(), ["map without a file name left out (m.mtl:3)"]);
     }
 
     #[test]
@@ -346,6 +249,7 @@ mod tests {
                 "material statement `ns` whose numbers cannot be read left out (m.mtl:4)",
                 "material statement `pe` is not supported: left out, 2 times (first: m.mtl:5)",
                 "material statement `ks` whose numbers cannot be read left out (m.mtl:7)",
+                "map without a file name left out (m.mtl:8)",
             ]
         );
         assert_eq!(parse(vec![1, 0, 7, 0, 9, 0, 0, 0, 0], "m.mtl").materials, []);

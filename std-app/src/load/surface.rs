@@ -1,7 +1,8 @@
 //! What the statements of an MTL file mean: from [`MtlMaterial`] to the core's [`Material`]. The conventions
 //! are those of `docs/loading.md`; that of plastics is argued in `docs/decisions/0002-plastic-from-mtl.md`.
 
-use super::mtl::{Map, MtlMaterial};
+use super::map::Map;
+use super::mtl::MtlMaterial;
 use super::notes::Notes;
 use super::texture_set::TextureSet;
 use halflight_core::Rgb;
@@ -29,7 +30,7 @@ pub(super) fn resolve(mtl: &MtlMaterial, textures: &mut TextureSet, notes: &mut 
 /// Scale and offset that all the maps of a material share, applied to its texture coordinates by the loader.
 pub(super) fn texcoord_transform(mtl: &MtlMaterial, notes: &mut Notes) -> ([f64; 2], [f64; 2]) {
     const NONE: ([f64; 2], [f64; 2]) = ([1.0; 2], [0.0; 2]);
-    let mut transforms = maps(mtl).map(|map| (map.scale, map.offset));
+    let mut transforms = maps(mtl).map(|map| (map.options.scale, map.options.offset));
     let Some(first) = transforms.next() else { return NONE };
     if transforms.all(|other| other == first) {
         return first;
@@ -199,7 +200,12 @@ impl Resolver<'_> {
     fn normal_map(&mut self) -> Option<NormalMap> {
         let bump = self.mtl.bump_map.as_ref();
         let tangent = self.textures.data(self.mtl.normal_map.as_ref()).map(NormalMap::Tangent);
-        tangent.or_else(|| Some(NormalMap::Height(self.textures.data(bump)?, bump?.bump_multiplier as f32)))
+        tangent.or_else(|| {
+            Some(NormalMap::Height(
+                self.textures.data(bump)?,
+                bump?.options.bump_multiplier.unwrap_or(1.0) as f32,
+            ))
+        })
     }
 
     /// `Ni`, where it can be one.

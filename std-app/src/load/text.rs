@@ -1,8 +1,6 @@
 //! Bytes of a text file as OBJ and MTL readers want them: decoded, continued lines joined, line by line,
 //! word by word. Names stay bytes until somebody shows them; numbers are checked, not guessed.
 
-use std::borrow::Cow;
-
 /// Why bytes cannot be text.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Binary;
@@ -134,23 +132,26 @@ pub(super) fn words(line: &[u8]) -> Words<'_> {
 }
 
 impl<'a> Words<'a> {
-    /// All that follows the words taken so far, without blanks at its ends and without a comment: a name.
-    pub(super) fn rest(self) -> Cow<'a, str> {
-        let mut rest = self.0;
-        let comment = rest.windows(2).position(|pair| is_blank(pair[0]) && pair[1] == b'#');
-        rest = &rest[..comment.unwrap_or(rest.len())];
-        while let [first, tail @ ..] = rest
-            && is_blank(*first)
-        {
-            rest = tail;
-        }
-        while let [head @ .., last] = rest
-            && is_blank(*last)
-        {
-            rest = head;
-        }
-        String::from_utf8_lossy(rest)
+    /// All that follows the words taken so far and one blank, to the end of the line: an operand that holds a name.
+    pub(super) fn rest(self) -> &'a [u8] {
+        let rest = self.0.split_first().map_or(self.0, |(_, rest)| rest);
+        rest.strip_suffix(b"\r").unwrap_or(rest)
     }
+}
+
+/// Without blanks at its ends.
+pub(super) fn trimmed(mut text: &[u8]) -> &[u8] {
+    while let [first, tail @ ..] = text
+        && is_blank(*first)
+    {
+        text = tail;
+    }
+    while let [head @ .., last] = text
+        && is_blank(*last)
+    {
+        text = head;
+    }
+    text
 }
 
 impl<'a> Iterator for Words<'a> {
@@ -271,12 +272,11 @@ mod tests {
     }
 
     #[test]
-    fn names_keep_their_blanks_and_lose_comments() {
-        let mut line = words(b"usemtl  dark  wood #3 # old ");
+    fn operands_are_what_stands_there() {
+        let mut line = words(b"usemtl  dark  wood #3 # old \r");
         assert_eq!(line.next(), Some(&b"usemtl"[..]));
-        assert_eq!(line.rest(), "dark  wood");
-        let mut line = words(b"map_Kd a#b.png\r");
-        line.next();
-        assert_eq!(line.rest(), "a#b.png");
+        assert_eq!(line.clone().rest(), b" dark  wood #3 # old ");
+        assert_eq!(trimmed(line.rest()), b"dark  wood #3 # old");
+        assert_eq!(words(b"").rest(), b"");
     }
 }

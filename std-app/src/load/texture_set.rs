@@ -1,13 +1,13 @@
 //! The textures of a scene: every picture is found, decoded once, and used under as many views as the
 //! materials need (as colours, as plain numbers, wrapped or clamped).
 
-use super::mtl::Map;
+use super::map::Map;
 use super::notes::Notes;
 use super::texture::{self, Picture, Pixels};
 use halflight_core::scene::{Texture, TextureId, Wrap};
 use rayon::prelude::*;
 use std::collections::HashMap;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// Pictures and the views of them that materials refer to by [`TextureId`].
 #[derive(Clone, Debug, Default)]
@@ -66,7 +66,7 @@ impl TextureSet {
 
     /// The channel of a scalar map: the one it names, else red.
     pub fn scalar(&mut self, map: Option<&Map>) -> Option<(TextureId, u8)> {
-        Some((self.data(map)?, map?.channel.unwrap_or(0)))
+        Some((self.data(map)?, map?.options.channel.unwrap_or(0)))
     }
 
     /// The channel of an opacity map: the one it names, else alpha where there is one, else red.
@@ -74,7 +74,7 @@ impl TextureSet {
         let map = map?;
         let picture = *self.by_file.get(map.found.as_ref()?)?;
         let alpha = self.pictures[picture].has_alpha.then_some(3);
-        let channel = map.channel.or(alpha).unwrap_or(0);
+        let channel = map.options.channel.or(alpha).unwrap_or(0);
         // Alpha is the same number in both views: share the one that is likely there, the colour's.
         Some((if channel == 3 { self.colour(Some(map))? } else { self.data(Some(map))? }, channel))
     }
@@ -106,19 +106,11 @@ impl TextureSet {
     fn view(&mut self, map: &Map, srgb: bool) -> Option<TextureId> {
         let picture = *self.by_file.get(map.found.as_ref()?)?;
         let srgb = srgb && matches!(self.pictures[picture].pixels, Pixels::Bytes(_));
-        let view = View { picture, srgb, wrap: if map.clamp { Wrap::Clamp } else { Wrap::Repeat } };
+        let view = View { picture, srgb, wrap: if map.options.clamp { Wrap::Clamp } else { Wrap::Repeat } };
         let id = self.views.iter().position(|known| *known == view).unwrap_or_else(|| {
             self.views.push(view);
             self.views.len() - 1
         });
         Some(TextureId(id as u32))
     }
-}
-
-/// The file that `name` means in `directory`: as it stands, with slashes for backslashes, or by its last part
-/// alone (paths of the machine that wrote it).
-pub(super) fn locate(directory: &Path, name: &Path) -> Option<PathBuf> {
-    let slashes = PathBuf::from(name.to_string_lossy().replace('\\', "/"));
-    let last = slashes.file_name().map(PathBuf::from).unwrap_or_default();
-    [name.to_path_buf(), slashes, last].iter().map(|name| directory.join(name)).find(|file| file.is_file())
 }

@@ -6,6 +6,7 @@
 //! indices, hence two passes: [`survey`] counts, [`clean`] rewrites.
 
 use crate::load::error::LoadError;
+use crate::load::name::Name;
 use crate::load::notes::Notes;
 use crate::load::text::{Lines, Numeral, Words, is_zero, number, numeral, words};
 use std::path::Path;
@@ -35,9 +36,9 @@ pub(super) struct Cleaned {
     /// `f` lines.
     pub(super) faces: Vec<u8>,
     /// `usemtl` statements: where in `faces`, and the name.
-    pub(super) materials: Vec<(usize, String)>,
+    pub(super) materials: Vec<(usize, Name)>,
     /// `mtllib` statements: line and operand.
-    pub(super) libraries: Vec<(u32, String)>,
+    pub(super) libraries: Vec<(u32, Name)>,
     pub(super) notes: Notes,
 }
 
@@ -87,11 +88,11 @@ impl Cleaner<'_> {
             b"vn" => self.vertex(number, 2, operands),
             b"f" | b"fo" => self.face(number, operands),
             b"usemtl" => {
-                self.out.materials.push((self.out.faces.len(), operands.rest().into_owned()));
+                self.out.materials.push((self.out.faces.len(), operands.rest().into()));
                 Ok(())
             }
             b"mtllib" => {
-                self.out.libraries.push((number, operands.rest().into_owned()));
+                self.out.libraries.push((number, operands.rest().into()));
                 Ok(())
             }
             other => {

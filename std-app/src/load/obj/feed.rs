@@ -4,6 +4,7 @@
 use super::clean::Cleaned;
 use super::{Group, STAND_INS, polygon};
 use crate::load::error::LoadError;
+use crate::load::name::Name;
 use crate::load::notes::Notes;
 use rayon::prelude::*;
 use std::collections::HashMap;
@@ -20,7 +21,7 @@ pub(super) fn read(
     file: &Path,
     pieces: &[Cleaned],
     notes: &mut Notes,
-) -> Result<(Vec<Group>, Vec<String>), LoadError> {
+) -> Result<(Vec<Group>, Vec<Name>), LoadError> {
     let (runs, names) = runs(pieces);
     let table = material_table(names.len());
     let vertices: Vec<&[u8]> = pieces.iter().map(|piece| &piece.vertices[..]).chain([STAND_INS]).collect();
@@ -71,11 +72,11 @@ struct Run<'a> {
 }
 
 /// Cuts the faces at the `usemtl` statements. Materials are numbered in the order of their first use.
-fn runs(pieces: &[Cleaned]) -> (Vec<Run<'_>>, Vec<String>) {
-    let mut names: Vec<String> = Vec::new();
-    let mut numbers: HashMap<&str, usize> = HashMap::new();
+fn runs(pieces: &[Cleaned]) -> (Vec<Run<'_>>, Vec<Name>) {
+    let mut names: Vec<Name> = Vec::new();
+    let mut numbers: HashMap<&Name, usize> = HashMap::new();
     let mut runs = Vec::new();
-    let mut named: Option<&str> = None;
+    let mut named: Option<&Name> = None;
     for piece in pieces {
         let ends = piece.materials.iter().map(|&(at, _)| at).chain([piece.faces.len()]);
         let mut starts = 0;
@@ -83,7 +84,7 @@ fn runs(pieces: &[Cleaned]) -> (Vec<Run<'_>>, Vec<String>) {
             if starts < end {
                 let material = named.map(|name| {
                     *numbers.entry(name).or_insert_with(|| {
-                        names.push(name.to_string());
+                        names.push(name.clone());
                         names.len() - 1
                     })
                 });

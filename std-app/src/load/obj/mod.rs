@@ -6,6 +6,7 @@ mod feed;
 mod polygon;
 
 use super::error::LoadError;
+use super::name::Name;
 use super::notes::Notes;
 use super::text::{self, Binary};
 use clean::{Cleaned, Counts, Piece, Survey};
@@ -24,10 +25,10 @@ const STAND_INS: &[u8] = b"vt 0 0\nvn 0 0 0\n";
 pub struct Obj {
     /// Triangles, in the order of the file, in runs of one material.
     pub groups: Vec<Group>,
-    /// Names of the materials in use, in the order of their first use.
-    pub materials: Vec<String>,
+    /// Operands of the `usemtl` statements in use, in the order of their first use.
+    pub materials: Vec<Name>,
     /// `mtllib` statements: line and operand.
-    pub libraries: Vec<(u32, String)>,
+    pub libraries: Vec<(u32, Name)>,
     /// What was repaired.
     pub notes: Notes,
 }

@@ -2,13 +2,12 @@
 
 use super::values::{Colour, Degrees, Matrix, Number, Rotation};
 use super::{LoadError, Source};
-use crate::load::mtl::Map;
+use crate::load::map::Map;
 use crate::load::transform::SceneTransform;
 use glam::{DMat3, DVec3, Mat3, Vec3};
 use halflight_core::Rgb;
 use halflight_core::scene::PointLight;
 use serde::Deserialize;
-use std::path::PathBuf;
 use toml::Spanned;
 
 /// Kinds of `[[light]]`.
@@ -52,7 +51,7 @@ pub struct EnvironmentEntry {
     /// Radiance, or factor on the map; 1.
     pub radiance: Option<Colour>,
     /// A latitude-longitude picture.
-    pub map: Option<Spanned<PathBuf>>,
+    pub map: Option<Spanned<String>>,
     /// Turns the map in the world.
     pub rotate: Option<Spanned<Rotation>>,
     /// From directions of the map to those of the world, instead of `rotate`: rows of a matrix whose

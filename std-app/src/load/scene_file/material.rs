@@ -4,8 +4,8 @@
 use super::values::{Colour, Number};
 use super::{LoadError, Source};
 use crate::load::mtl::MtlMaterial;
+use crate::load::name::Name;
 use serde::Deserialize;
-use std::path::PathBuf;
 use toml::Spanned;
 
 /// What kind of material starts afresh.
@@ -33,21 +33,21 @@ pub struct MaterialEntry {
     /// Diffuse reflectance, or that of the metal (`Kd`).
     pub color: Option<Colour>,
     /// Texture of `color` (`map_Kd`).
-    pub color_map: Option<Spanned<PathBuf>>,
+    pub color_map: Option<Spanned<String>>,
     /// Reflectance of the coat at normal incidence (`Ks`).
     pub specular: Option<Colour>,
     /// Texture of `specular` (`map_Ks`).
-    pub specular_map: Option<Spanned<PathBuf>>,
+    pub specular_map: Option<Spanned<String>>,
     /// Phong exponent (`Ns`); `roughness` wins.
     pub shininess: Option<Number>,
     /// 0 smooth ... 1 rough; GGX alpha is its square (`Pr`).
     pub roughness: Option<Number>,
     /// Texture of `roughness` (`map_Pr`).
-    pub roughness_map: Option<Spanned<PathBuf>>,
+    pub roughness_map: Option<Spanned<String>>,
     /// 0 coat over base ... 1 metal (`Pm`).
     pub metallic: Option<Number>,
     /// Texture of `metallic` (`map_Pm`).
-    pub metallic_map: Option<Spanned<PathBuf>>,
+    pub metallic_map: Option<Spanned<String>>,
     /// Index of refraction (`Ni`).
     pub ior: Option<Number>,
     /// Factor on light that a glass lets through (`Tf`).
@@ -55,19 +55,19 @@ pub struct MaterialEntry {
     /// Probability that a ray meets the surface (`d`).
     pub opacity: Option<Number>,
     /// Texture of `opacity` (`map_d`).
-    pub opacity_map: Option<Spanned<PathBuf>>,
+    pub opacity_map: Option<Spanned<String>>,
     /// Emitted radiance (`Ke`).
     pub emission: Option<Colour>,
     /// Texture of `emission` (`map_Ke`).
-    pub emission_map: Option<Spanned<PathBuf>>,
+    pub emission_map: Option<Spanned<String>>,
     /// Whether the back emits as well.
     pub two_sided: Option<bool>,
     /// Heights (`bump`).
-    pub bump_map: Option<Spanned<PathBuf>>,
+    pub bump_map: Option<Spanned<String>>,
     /// Factor on the heights (`-bm`).
     pub bump_scale: Option<Number>,
     /// Tangent-space normals (`norm`).
-    pub normal_map: Option<Spanned<PathBuf>>,
+    pub normal_map: Option<Spanned<String>>,
 }
 
 /// A change to a material, its textures found.
@@ -81,11 +81,11 @@ pub(in crate::load) struct MaterialChange {
 
 impl MaterialEntry {
     pub(super) fn resolved(&self, source: &Source) -> Result<MaterialChange, LoadError> {
-        let map = |path: &Option<Spanned<PathBuf>>| path.as_ref().map(|path| source.map(path)).transpose();
+        let map = |path: &Option<Spanned<String>>| path.as_ref().map(|path| source.map(path)).transpose();
         let colour = |colour: Option<Colour>| colour.map(Colour::channels);
         let number = |number: Option<Number>| number.map(f64::from);
         let mut change = MtlMaterial {
-            name: String::new(),
+            name: Name::default(),
             diffuse: colour(self.color),
             specular: colour(self.specular),
             emission: colour(self.emission),
@@ -153,7 +153,7 @@ impl MaterialChange {
         replace!(bump_map, normal_map);
         material.two_sided = self.two_sided.unwrap_or(material.two_sided);
         if let (Some(map), Some(scale)) = (&mut material.bump_map, self.bump_scale) {
-            map.bump_multiplier = scale;
+            map.options.bump_multiplier = Some(scale);
         }
     }
 }

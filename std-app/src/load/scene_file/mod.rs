@@ -13,8 +13,10 @@ pub use material::{MaterialEntry, MaterialKind};
 pub use values::{Colour, Degrees, Factors, FieldOfView, Matrix, Number, Positive, Rotation};
 
 use super::error::LoadError;
+use super::files::{Found, Lookup};
 use super::geometry::Placement;
-use super::mtl::Map;
+use super::map::Map;
+use super::notes::Notes;
 use super::scene::LoadedScene;
 use super::settings::RenderSettings;
 use super::transform::SceneTransform;
@@ -22,6 +24,7 @@ use super::{LoadOptions, SceneBuilder, read};
 use glam::{DMat3, DVec3};
 use halflight_core::scene::Camera;
 use serde::Deserialize;
+use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use toml::Spanned;
@@ -53,7 +56,7 @@ pub struct SceneFile {
 #[serde(deny_unknown_fields)]
 pub struct MeshEntry {
     /// An OBJ file, relative to the scene file.
-    pub file: Spanned<PathBuf>,
+    pub file: Spanned<String>,
     /// One factor or three.
     #[serde(default)]
     pub scale: Factors,
@@ -96,7 +99,11 @@ pub fn parse(text: &str, file: &Path) -> Result<SceneFile, LoadError> {
             Some((problem, expected)) => (problem.to_string(), format!("expected {expected}")),
             None => (message, "docs/scene-file.md describes the scene file".into()),
         };
-        Source { text, file }.error(error.span().unwrap_or_default(), problem, help)
+        Source { text, file, looked: &Looked::default() }.error(
+            error.span().unwrap_or_default(),
+            problem,
+            help,
+        )
     })
 }
 
@@ -105,6 +112,14 @@ pub fn parse(text: &str, file: &Path) -> Result<SceneFile, LoadError> {
 struct Source<'a> {
     text: &'a str,
     file: &'a Path,
+    looked: &'a Looked,
+}
+
+/// Looks for files, and notes which were taken.
+#[derive(Default)]
+struct Looked {
+    lookup: RefCell<Lookup>,
+    notes: RefCell<Notes>,
 }
 
 impl Source<'_> {
@@ -121,18 +136,28 @@ impl Source<'_> {
     }
 
     /// The file that a path of the scene file means.
-    fn resolve(&self, path: &Spanned<PathBuf>) -> Result<PathBuf, LoadError> {
-        let file = self.file.parent().unwrap_or(Path::new("")).join(path.get_ref());
-        if file.is_file() {
-            return Ok(file);
+    fn resolve(&self, path: &Spanned<String>) -> Result<PathBuf, LoadError> {
+        let directory = self.file.parent().unwrap_or(Path::new(""));
+        let name = path.get_ref();
+        let found = self.looked.lookup.borrow_mut().find(&[name.as_bytes()], &[directory]);
+        if let Some(file) = found.file() {
+            let place = self.error(path.span(), "", "").line;
+            let note = found
+                .note("file", name.as_bytes())
+                .map(|note| format!("{note} ({}:{place})", self.file.display()));
+            note.into_iter().for_each(|note| self.looked.notes.borrow_mut().add(1, note));
+            return Ok(file.into());
         }
-        let problem = format!("there is no file {}", file.display());
+        let problem = match found {
+            Found::Missing => format!("there is no file {}", directory.join(name).display()),
+            _ => found.note("file", name.as_bytes()).unwrap_or_default(),
+        };
         Err(self.error(path.span(), problem, "paths are relative to the scene file"))
     }
 
     /// A texture that has to be there.
-    fn map(&self, path: &Spanned<PathBuf>) -> Result<Map, LoadError> {
-        Ok(Map { found: Some(self.resolve(path)?), ..Map::plain(path.get_ref()) })
+    fn map(&self, path: &Spanned<String>) -> Result<Map, LoadError> {
+        Ok(Map::of_file(path.get_ref(), self.resolve(path)?))
     }
 }
 
@@ -145,7 +170,8 @@ pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<LoadedScene, Lo
         LoadError::at(path, line as u32 + 1, "this is not UTF-8 text", "save the scene file as UTF-8")
     })?;
     let text = text.strip_prefix('\u{feff}').unwrap_or(&text);
-    let source = Source { text, file: path };
+    let looked = Looked::default();
+    let source = Source { text, file: path, looked: &looked };
     let scene = parse(text, path)?;
 
     let mut builder = SceneBuilder::default();
@@ -164,6 +190,7 @@ pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<LoadedScene, Lo
         builder.add_mesh(&file, mesh.placement(&source)?, material)?;
     }
     let environment = scene.environment.as_ref().map(|entry| entry.resolved(&source)).transpose()?;
+    builder.notes.merge(looked.notes.take());
     let mut loaded = builder.build(path, options, environment)?;
     let transform = loaded.transform;
     loaded.lights =

@@ -1,0 +1,338 @@
+//! Texture statements: `[-option values]... file name with blanks`. Options may stand behind the name as well, names
+//! may look like options or hold ` #`; which reading is meant is settled by the file that is there.
+
+use super::files::{Found, Lookup};
+use super::name::{Name, unquoted, without_comments};
+use super::notes::Notes;
+use super::text::{self, is_blank, trimmed};
+use std::path::{Path, PathBuf};
+
+/// A texture statement.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Map {
+    /// All that follows the keyword.
+    pub operand: Name,
+    /// Line of the statement; 0 where it has none.
+    pub line: u32,
+    /// The file that this means, once it has been looked for and is there.
+    pub found: Option<PathBuf>,
+    /// As the statement has them, in the reading that was found.
+    pub options: MapOptions,
+}
+
+/// The options of a texture statement.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MapOptions {
+    /// `-s u v`.
+    pub scale: [f64; 2],
+    /// `-o u v`.
+    pub offset: [f64; 2],
+    /// `-clamp on`.
+    pub clamp: bool,
+    /// `-bm`.
+    pub bump_multiplier: Option<f64>,
+    /// `-imfchan r|g|b|m`: the channel of a scalar map.
+    pub channel: Option<u8>,
+    /// Options without effect.
+    pub unsupported: Vec<Name>,
+}
+
+impl Default for MapOptions {
+    fn default() -> Self {
+        Self {
+            scale: [1.0; 2],
+            offset: [0.0; 2],
+            clamp: false,
+            bump_multiplier: None,
+            channel: None,
+            unsupported: Vec::new(),
+        }
+    }
+}
+
+impl Map {
+    /// A map that has been found.
+    pub(super) fn of_file(name: &str, found: PathBuf) -> Self {
+        Self { operand: name.into(), found: Some(found), ..Self::default() }
+    }
+
+    /// The statement with this operand; `None` where it names no file.
+    pub(super) fn of_statement(operand: &[u8], line: u32) -> Option<Self> {
+        (!plain_name(operand).is_empty()).then(|| Self { operand: operand.into(), line, ..Self::default() })
+    }
+
+    /// Finds the file in one of `directories`, the likeliest first, and with it the options.
+    pub(super) fn locate(&mut self, lookup: &mut Lookup, directories: &[&Path], notes: &mut Notes) {
+        let mut readings = readings(self.operand.bytes());
+        let names: Vec<&[u8]> = readings.iter().map(|reading| reading.name).collect();
+        let found = lookup.find(&names, directories);
+        let name = match found {
+            Found::Exact(_, number) | Found::Instead(_, number) => readings[number].name,
+            _ => plain_name(self.operand.bytes()),
+        };
+        if let Some(note) = found.note("texture", name) {
+            notes.at(self.line, if found.file().is_none() { note + ": constant value" } else { note });
+        }
+        if let Found::Exact(file, number) | Found::Instead(file, number) = found {
+            self.options = readings.swap_remove(number).options;
+            self.found = Some(file);
+            for option in &self.options.unsupported {
+                notes.at(self.line, format!("map option `{option}` is not supported: left out"));
+            }
+        }
+    }
+}
+
+/// More readings of one statement are not tried.
+const MOST_READINGS: usize = 64;
+/// More places where a name may begin, or end before options, are not tried.
+const MOST_PLACES: usize = 8;
+/// An operand of more words is a name without options.
+const MOST_WORDS: usize = 128;
+/// An option that is not known has at most this many values.
+const MOST_VALUES: usize = 3;
+
+/// What a texture statement may mean.
+#[derive(Clone, Debug, PartialEq)]
+struct Reading<'a> {
+    name: &'a [u8],
+    options: MapOptions,
+}
+
+/// A word and where it begins.
+type Token<'a> = (usize, &'a [u8]);
+
+/// The words of an operand; a `#` is part of one.
+fn tokens(operand: &[u8]) -> Vec<Token<'_>> {
+    let begins = |&i: &usize| !is_blank(operand[i]) && (i == 0 || is_blank(operand[i - 1]));
+    let word = |i: usize| {
+        let length = operand[i..].iter().position(|&byte| is_blank(byte));
+        (i, &operand[i..length.map_or(operand.len(), |length| i + length)])
+    };
+    let tokens: Vec<Token> = (0..operand.len()).filter(begins).map(word).take(MOST_WORDS + 1).collect();
+    if tokens.len() > MOST_WORDS { vec![(0, operand)] } else { tokens }
+}
+
+/// The readings of an operand, the likeliest first: all leading options taken, then fewer of them; of what
+/// follows the whole, then without options behind it, then without comments; unknown options come last.
+fn readings(operand: &[u8]) -> Vec<Reading<'_>> {
+    let tokens = tokens(operand);
+    let mut starts = leading(&tokens);
+    starts.reverse();
+    starts.truncate(MOST_PLACES);
+    let known = starts.len();
+    starts.extend(beyond_unknown(&tokens, starts.first()));
+    let mut readings: Vec<Reading> = Vec::new();
+    for (number, (at, options)) in starts.iter().enumerate() {
+        let Some(&(begin, _)) = tokens.get(*at) else { continue };
+        let text = if *at == 0 { operand } else { &operand[begin..] };
+        for head in [text].into_iter().chain(without_comments(text)) {
+            add(&mut readings, head, options);
+            behind(head, options, number < known, &mut readings);
+        }
+    }
+    readings.truncate(MOST_READINGS);
+    readings
+}
+
+fn add<'a>(readings: &mut Vec<Reading<'a>>, name: &'a [u8], options: &MapOptions) {
+    for name in [name, trimmed(name), unquoted(trimmed(name))] {
+        if !trimmed(name).is_empty() && readings.iter().all(|known| known.name != name) {
+            readings.push(Reading { name, options: options.clone() });
+        }
+    }
+}
+
+/// Where a name may begin before which all words are options: number of words, and what they say.
+fn leading(tokens: &[Token]) -> Vec<(usize, MapOptions)> {
+    let mut starts = vec![(0, MapOptions::default())];
+    while let Some((at, options)) = starts.last() {
+        let mut options = options.clone();
+        let Some(next) = option(tokens, *at, &mut options) else { break };
+        starts.push((next, options));
+    }
+    starts
+}
+
+/// The same behind one option that is not known and its values.
+fn beyond_unknown(tokens: &[Token], start: Option<&(usize, MapOptions)>) -> Vec<(usize, MapOptions)> {
+    let Some((at, options)) = start else { return Vec::new() };
+    let Some((_, word @ [b'-', _, ..])) = tokens.get(*at) else { return Vec::new() };
+    let skip = |values: usize| {
+        let mut options = options.clone();
+        options.unsupported.push((*word).into());
+        let mut at = at + 1 + values;
+        while let Some(next) = option(tokens, at, &mut options) {
+            at = next;
+        }
+        (at, options)
+    };
+    (0..=MOST_VALUES).map(skip).collect()
+}
+
+/// The readings of `head` with options behind the name, the longest name first; and with what looks like options but
+/// is not known.
+fn behind<'a>(head: &'a [u8], options: &MapOptions, unknown: bool, readings: &mut Vec<Reading<'a>>) {
+    let tokens = tokens(head);
+    let mut later = Vec::new();
+    let places = (1..tokens.len()).rev().filter(|&at| tokens[at].1.starts_with(b"-"));
+    for at in places.take(MOST_PLACES) {
+        let mut all = options.clone();
+        let mut next = at;
+        let mut known = true;
+        while next < tokens.len() {
+            next = option(&tokens, next, &mut all).unwrap_or_else(|| {
+                known = false;
+                if tokens[next].1.starts_with(b"-") {
+                    all.unsupported.push(tokens[next].1.into());
+                }
+                next + 1
+            });
+        }
+        let name = &head[..tokens[at].0];
+        if known {
+            add(readings, trimmed(name), &all);
+        } else if unknown {
+            later.push((name, all));
+        }
+    }
+    later.into_iter().for_each(|(name, all)| add(readings, trimmed(name), &all));
+}
+
+/// The name where no file settles it: without options before and behind it, and no comment.
+fn plain_name(operand: &[u8]) -> &[u8] {
+    let tokens = tokens(operand);
+    let first = leading(&tokens).last().map_or(0, |(at, _)| *at);
+    let Some(&(begin, _)) = tokens.get(first) else { return &[] };
+    let all_options = |at: &usize| {
+        let mut next = *at;
+        while let Some(after) = option(&tokens, next, &mut MapOptions::default()) {
+            next = after;
+        }
+        next == tokens.len()
+    };
+    let end = (first + 1..tokens.len()).find(all_options).map_or(operand.len(), |at| tokens[at].0);
+    unquoted(trimmed(&operand[begin..end]))
+}
+
+/// Reads the option that begins with word `at`; the number of the word behind it, `None` where it is none.
+fn option(tokens: &[Token], at: usize, options: &mut MapOptions) -> Option<usize> {
+    let (_, word) = tokens.get(at)?;
+    let name = word.strip_prefix(b"-")?.to_ascii_lowercase();
+    let value = tokens.get(at + 1).map_or(&b""[..], |(_, word)| word);
+    let numbers = |most: usize| -> Vec<f64> {
+        tokens[at + 1..].iter().take(most).map_while(|(_, word)| text::number(word)).collect()
+    };
+    let switch = usize::from(value.eq_ignore_ascii_case(b"on") || value.eq_ignore_ascii_case(b"off"));
+    let mut unsupported = || options.unsupported.push((*word).into());
+    let values = match &name[..] {
+        b"s" | b"o" => {
+            let numbers = numbers(3);
+            let uv = if name == b"s" { &mut options.scale } else { &mut options.offset };
+            uv.iter_mut().zip(&numbers).for_each(|(uv, number)| *uv = *number);
+            numbers.len()
+        }
+        b"bm" => {
+            let numbers = numbers(1);
+            options.bump_multiplier = numbers.first().copied().or(options.bump_multiplier);
+            numbers.len()
+        }
+        b"clamp" => {
+            options.clamp = value.eq_ignore_ascii_case(b"on");
+            switch
+        }
+        b"imfchan" => {
+            options.channel = match value {
+                b"r" => Some(0),
+                b"g" => Some(1),
+                b"b" => Some(2),
+                b"m" => Some(3),
+                _ => None,
+            };
+            usize::from(matches!(value, b"r" | b"g" | b"b" | b"m" | b"l" | b"z"))
+        }
+        b"blendu" | b"blendv" | b"cc" => {
+            unsupported();
+            switch
+        }
+        b"type" => {
+            unsupported();
+            usize::from(!value.is_empty())
+        }
+        b"t" | b"mm" | b"boost" | b"texres" => {
+            unsupported();
+            numbers(match name[0] {
+                b't' if name.len() == 1 => 3,
+                b'm' => 2,
+                _ => 1,
+            })
+            .len()
+        }
+        _ => return None,
+    };
+    Some(at + 1 + values)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::load::name::shown;
+
+    fn all(operand: &str) -> Vec<(String, MapOptions)> {
+        readings(operand.as_bytes()).into_iter().map(|r| (shown(r.name).into(), r.options)).collect()
+    }
+
+    fn options(operand: &str, name: &str) -> MapOptions {
+        let all = all(operand);
+        let found = all.iter().find(|(known, _)| known == name);
+        found.unwrap_or_else(|| panic!("{name} is no reading of {operand}: {all:?}")).1.clone()
+    }
+
+    fn names(operand: &str) -> Vec<String> {
+        all(operand).into_iter().map(|(name, _)| name).collect()
+    }
+
+    #[test]
+    fn options_stand_before_or_behind_the_name() {
+        let expected =
+            MapOptions { scale: [2.0, 3.0], offset: [0.5, 0.0], clamp: true, ..Default::default() };
+        for operand in [
+            "-s 2 3 1 -o 0.5 -clamp on dark wood.png",
+            "dark wood.png -s 2 3 1 -o 0.5 -clamp on",
+            "-s 2 3 1 dark wood.png -o 0.5 -clamp on",
+            "\"dark wood.png\" -s 2 3 -clamp on -o 0.5 # tiles",
+            "-S 2 3 -O .5 -Clamp ON 'dark wood.png'",
+        ] {
+            assert_eq!(options(operand, "dark wood.png"), expected, "{operand}");
+            let plain = operand.split(" # ").next().unwrap();
+            assert_eq!(plain_name(plain.as_bytes()), b"dark wood.png", "{operand}");
+        }
+        let height = options("-bm 0.2 -imfchan g h.png", "h.png");
+        assert_eq!((height.bump_multiplier, height.channel), (Some(0.2), Some(1)));
+    }
+
+    #[test]
+    fn options_take_only_values_that_can_be_theirs() {
+        for operand in
+            ["-mm 0 t.png", "-bm t.png", "-clamp t.png", "-imfchan t.png", "-boost t.png", "-s t.png"]
+        {
+            assert_eq!(names(operand)[0], "t.png", "{operand}");
+        }
+        assert_eq!(names("-mm 0 1 -blendu off -type sphere t.png")[0], "t.png");
+        assert_eq!(options("-mm 0 1 -boost 2 t.png", "t.png").unsupported, ["-mm".into(), "-boost".into()]);
+    }
+
+    #[test]
+    fn names_that_look_like_options_or_comments_are_readings() {
+        assert_eq!(names("-s.png"), ["-s.png"]);
+        assert_eq!(names("-s 2.png"), ["2.png", "-s 2.png"]);
+        assert_eq!(names("Map #5.png"), ["Map #5.png", "Map"]);
+        assert_eq!(names("t.png -s 2 2 1"), ["t.png -s 2 2 1", "t.png"]);
+        assert_eq!(options("Map #5.png -s 4 4", "Map #5.png").scale, [4.0; 2]);
+        assert!(names("-colorspace sRGB t.png").contains(&"t.png".to_string()));
+        let unknown = options("t.png -gamma 2.2 -s 2 2", "t.png");
+        assert_eq!((unknown.scale, unknown.unsupported), ([2.0; 2], vec!["-gamma".into()]));
+        assert!(readings(b"  ").is_empty() && Map::of_statement(b"-s 1 1", 1).is_none());
+        assert!(readings("-s #a ".repeat(700).as_bytes()).len() <= MOST_READINGS);
+    }
+}
