@@ -70,7 +70,7 @@ impl Rays {
         let level = Level::detect();
         let level = self.simd.map_or(level, |tier| level.capped(tier));
         let report = rays::run(&scene, level)?;
-        say(&if self.json { object(&report).to_string() } else { text(&report) });
+        say(&if self.json { object(&report).to_string() } else { text(&report) })?;
         Ok(ExitCode::SUCCESS)
     }
 }

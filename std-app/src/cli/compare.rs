@@ -1,7 +1,7 @@
 //! `halflight compare`: two picture files, their errors, and a picture of the difference.
 
 use super::failure::Failure;
-use super::say;
+use super::outputs::{Outputs, Role};
 use clap::{Args, ValueEnum};
 use halflight::compare::{Comparison, Shown, compare, false_colours};
 use halflight::report::comparison_object;
@@ -48,7 +48,10 @@ enum Difference {
 
 impl Compare {
     pub(super) fn run(&self) -> Result<ExitCode, Failure> {
-        let plan = self.output.iter().map(|file| self.plan(file)).collect::<Result<Vec<_>, _>>()?;
+        let mut outputs = Outputs::new(self.json);
+        let plan = self.output.iter().map(|file| self.plan(file, &mut outputs));
+        let plan = plan.collect::<Result<Vec<_>, _>>()?;
+        [&self.a, &self.b].into_iter().try_for_each(|picture| outputs.spare(picture))?;
         let (a, b) = (save::read(&self.a)?, save::read(&self.b)?);
         let comparison = compare(&a, &b).map_err(|mismatch| {
             Failure::new(format!("{}: {mismatch}", self.a.display()))
@@ -57,23 +60,24 @@ impl Compare {
         let mut saved = Vec::new();
         for (file, shown) in plan {
             let values = comparison.values(&a, &b, shown);
-            let scale = if Format::of(file)?.is_linear() {
-                save::write(file, &values)?;
-                None
+            let (picture, scale) = if Format::of(file)?.is_linear() {
+                (values, None)
             } else {
                 let (colours, end) = false_colours(&values, shown);
-                save::write(file, &colours)?;
-                Some([if shown.is_signed() { -end } else { 0.0 }, end])
+                (colours, Some([if shown.is_signed() { -end } else { 0.0 }, end]))
             };
-            saved.push(Saved { file, shown, scale });
+            if outputs.save(file, &picture) {
+                saved.push(Saved { file, shown, scale });
+            }
         }
-        say(&if self.json { told(&comparison, &saved).to_string() } else { page(&comparison, &saved) });
-        Ok(ExitCode::SUCCESS)
+        let results =
+            if self.json { told(&comparison, &saved).to_string() } else { page(&comparison, &saved) };
+        Ok(outputs.end(&results, ExitCode::SUCCESS))
     }
 
     /// What `file` is going to show, where that can be written.
-    fn plan<'a>(&self, file: &'a PathBuf) -> Result<(&'a PathBuf, Shown), Failure> {
-        save::check_writable(file)?;
+    fn plan<'a>(&self, file: &'a PathBuf, outputs: &mut Outputs) -> Result<(&'a PathBuf, Shown), Failure> {
+        outputs.plan(Role::Picture, file)?;
         let format = Format::of(file)?;
         let shown = match self.difference {
             Some(Difference::Signed) => Shown::Signed,

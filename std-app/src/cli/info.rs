@@ -52,7 +52,7 @@ impl Info {
             counts: counts(&census, &scene),
             loaded: &loaded,
         };
-        say(&if self.json { facts.object().to_string() } else { facts.text() });
+        say(&if self.json { facts.object().to_string() } else { facts.text() })?;
         Ok(ExitCode::SUCCESS)
     }
 }

@@ -17,3 +17,14 @@ pub(super) fn listen() -> Result<(), Failure> {
     };
     ctrlc::set_handler(heard).map_err(|error| Failure::new(format!("Ctrl-C cannot be listened for: {error}")))
 }
+
+/// Makes an error of a write beyond the size that files may have (`ulimit -f`), which is a signal that ends the program
+/// otherwise. To be called before there are other threads, which inherit it.
+pub(super) fn outlive_limits() {
+    #[cfg(unix)]
+    {
+        use nix::sys::signal::{SigSet, Signal};
+        // Without it such a write is what it was.
+        let _ = SigSet::from(Signal::SIGXFSZ).thread_block();
+    }
+}

@@ -1,11 +1,11 @@
 //! `halflight merge`: the films of shards, put together to a picture.
 
 use super::failure::Failure;
-use super::{ledger, say, summary};
+use super::outputs::{Outputs, Role};
+use super::{ledger, summary};
 use clap::Args;
 use halflight::drive::{self, Merged};
 use halflight::report::{dropped_object, error_object};
-use halflight::save;
 use serde_json::{Value, json};
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -29,18 +29,17 @@ pub(super) struct Merge {
 
 impl Merge {
     pub(super) fn run(&self) -> Result<ExitCode, Failure> {
-        for output in &self.output {
-            save::check_writable(output)?;
-        }
+        let mut outputs = Outputs::new(self.json);
+        self.output.iter().try_for_each(|output| outputs.plan(Role::Picture, output))?;
+        self.films.iter().try_for_each(|film| outputs.spare(film))?;
         let merged = drive::merge(&self.films)?;
-        for output in &self.output {
-            save::write(output, &merged.image)?;
-        }
-        say(&if self.json { self.object(&merged).to_string() } else { self.text(&merged) });
-        Ok(ExitCode::SUCCESS)
+        let saved: Vec<_> = self.output.iter().filter(|output| outputs.save(output, &merged.image)).collect();
+        let results =
+            if self.json { self.object(&merged, &saved).to_string() } else { self.text(&merged, &saved) };
+        Ok(outputs.end(&results, ExitCode::SUCCESS))
     }
 
-    fn object(&self, merged: &Merged) -> Value {
+    fn object(&self, merged: &Merged, saved: &[&PathBuf]) -> Value {
         let counters = &merged.counters;
         json!({
             "width": merged.image.width,
@@ -55,13 +54,12 @@ impl Merge {
             "error": error_object(merged.error, merged.blurred, merged.audit.as_ref()),
             "may_be_biased": merged.is_biased,
             "dropped": dropped_object(&counters.dropped, &merged.places, merged.empty_pixels),
-            "outputs": self.output,
+            "outputs": saved,
         })
     }
 
-    fn text(&self, merged: &Merged) -> String {
-        let saved = |output: &PathBuf| format!("saved  {}", output.display());
-        let mut lines: Vec<String> = self.output.iter().map(saved).collect();
+    fn text(&self, merged: &Merged, saved: &[&PathBuf]) -> String {
+        let mut lines: Vec<_> = saved.iter().map(|output| format!("saved  {}", output.display())).collect();
         let (width, height) = (merged.image.width, merged.image.height);
         lines.push(format!("image  {width}x{height}, {} samples per pixel", merged.spp));
         match &merged.audit {

@@ -8,12 +8,14 @@ mod interrupt;
 mod ledger;
 mod merge;
 mod method;
+mod outputs;
 mod progress;
 mod race;
 mod racer;
 mod render;
 mod shot;
 mod stability;
+mod stdio;
 mod study;
 mod summary;
 mod values;
@@ -23,6 +25,7 @@ use clap::{Parser, Subcommand};
 use std::io::{Write, stdout};
 use std::panic;
 use std::process::ExitCode;
+use stdio::{heard, say, tell, warn};
 
 /// Renders scenes, and says how wrong the pictures are.
 #[derive(Parser)]
@@ -47,9 +50,12 @@ enum Command {
 /// Runs the program. The exit codes are a contract: 0 done, 2 usage or bad input, 3 stopped early with a
 /// valid picture saved.
 pub(crate) fn main() -> ExitCode {
-    // Clap prints its own messages, and exits with 2 on wrong usage, 0 after help.
-    let command = Cli::parse().command;
-    panic::set_hook(Box::new(|panic| eprintln!("halflight met an error of its own: {panic}")));
+    interrupt::outlive_limits();
+    panic::set_hook(Box::new(|panic| tell(format_args!("halflight met an error of its own: {panic}"))));
+    let command = match Cli::try_parse() {
+        Ok(cli) => cli.command,
+        Err(message) => return end_with(&message),
+    };
     let outcome = panic::catch_unwind(panic::AssertUnwindSafe(|| match command {
         Command::Render(command) => command.run(),
         Command::Compare(command) => command.run(),
@@ -62,18 +68,19 @@ pub(crate) fn main() -> ExitCode {
     }));
     match outcome {
         Ok(Ok(code)) => return code,
-        Ok(Err(failure)) => eprintln!("{failure}"),
-        Err(_) => eprintln!("  help: please report it, with the command and the scene; no file was changed"),
+        Ok(Err(failure)) => tell(failure),
+        Err(_) => tell("  help: please report it, with the command and the scene"),
     }
     ExitCode::from(2)
 }
 
-/// Prints a result. Nobody is listening any more where that fails.
-fn say(text: &str) {
-    let _ = writeln!(stdout(), "{text}");
-}
-
-/// Prints what a person should know, on stderr.
-fn warn(text: &str) {
-    eprintln!("note: {text}");
+/// Prints clap's own message: help and version are results, wrong usage is none.
+fn end_with(message: &clap::Error) -> ExitCode {
+    let printed = message.print().and_then(|()| stdout().flush());
+    match heard(printed).err().filter(|_| !message.use_stderr()) {
+        Some(failure) => tell(failure),
+        None if !message.use_stderr() => return ExitCode::SUCCESS,
+        None => {}
+    }
+    ExitCode::from(2)
 }

@@ -1,5 +1,6 @@
 //! Progress on stderr: a bar with the time left on a terminal, a plain line every few seconds elsewhere.
 
+use super::stdio::{tell, warn};
 use halflight::drive::Progress;
 use halflight::report::words::readable_seconds;
 use indicatif::{ProgressBar, ProgressStyle};
@@ -35,13 +36,17 @@ impl Teller {
     }
 
     fn tell_words(&mut self, progress: &Progress, words: String) {
+        if let Some(why) = &progress.unsaved {
+            let note = || warn(format_args!("{why}; the render goes on, and tries again"));
+            self.bar.as_ref().map_or_else(note, |bar| bar.suspend(note));
+        }
         let share = progress.seconds_left.map(|left| progress.seconds / (progress.seconds + left).max(1e-9));
         if let Some(bar) = &self.bar {
             bar.set_position((share.unwrap_or(0.0) * STEPS as f64) as u64);
             bar.set_message(words);
         } else if progress.seconds >= self.told + EVERY {
             self.told = progress.seconds;
-            eprintln!("{:>3.0} %  {words}", 100.0 * share.unwrap_or(0.0));
+            tell(format_args!("{:>3.0} %  {words}", 100.0 * share.unwrap_or(0.0)));
         }
     }
 

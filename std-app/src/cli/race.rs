@@ -2,10 +2,11 @@
 
 use super::failure::Failure;
 use super::interrupt::{self, INTERRUPT};
+use super::outputs::Outputs;
 use super::progress::Teller;
 use super::racer::{self, Racer};
 use super::shot::{self, Options, Shot};
-use super::{say, values, warn};
+use super::{values, warn};
 use clap::Args;
 use core::sync::atomic::Ordering;
 use halflight::compare::{Comparison, compare};
@@ -14,7 +15,7 @@ use halflight::load::{self, LoadOptions};
 use halflight::report::{self, Maker, Run, words::readable_seconds};
 use halflight_core::scene::Scene;
 use std::panic::resume_unwind;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
@@ -58,14 +59,16 @@ struct Done {
 impl Race {
     pub(super) fn run(&self) -> Result<ExitCode, Failure> {
         self.check_names()?;
-        if let Some(folder) = &self.report {
-            report::check_folder(folder)?;
-        }
+        let mut outputs = Outputs::new(self.json);
+        self.report.iter().try_for_each(|folder| outputs.plan_report(folder))?;
+        outputs.spare(&self.scene)?;
+        self.shot.reference_file().map_or(Ok(()), |reference| outputs.spare(reference))?;
         let reference = self.shot.reference()?;
 
         let loading = Instant::now();
         let loaded = load::load(&self.scene, &LoadOptions::default())?;
         let load_seconds = loading.elapsed().as_secs_f64();
+        loaded.files.iter().try_for_each(|file| outputs.spare(file))?;
         for repair in &loaded.repairs {
             warn(repair);
         }
@@ -98,12 +101,10 @@ impl Race {
             report::Racer { name: racer.name.clone(), run }
         });
         let race = report::Race { racers: racers.collect(), seconds: self.time, maker: &maker };
-        if let Some(folder) = &self.report {
-            report::write_folder(folder, &race.files())?;
-        }
-        say(&if self.json { race.object().to_string() } else { self.text(&race) });
         let early = INTERRUPT.load(Ordering::Relaxed);
-        Ok(if early { ExitCode::from(3) } else { ExitCode::SUCCESS })
+        let reported = self.report.as_deref().filter(|folder| outputs.report(folder, &race.files()));
+        let results = if self.json { race.object().to_string() } else { self.text(&race, reported) };
+        Ok(outputs.end(&results, if early { ExitCode::from(3) } else { ExitCode::SUCCESS }))
     }
 
     /// The pictures of all methods, made in turns.
@@ -148,10 +149,10 @@ impl Race {
     }
 
     /// The lines for a person.
-    fn text(&self, race: &report::Race) -> String {
+    fn text(&self, race: &report::Race, reported: Option<&Path>) -> String {
         let width = race.racers.iter().map(|racer| racer.name.chars().count()).max().unwrap_or(0).max(6);
         let mut lines = Vec::new();
-        if let Some(folder) = &self.report {
+        if let Some(folder) = reported {
             lines.push(format!("report {}", folder.join("index.html").display()));
         }
         let truth = if race.has_reference() { "against the reference" } else { "as estimated" };

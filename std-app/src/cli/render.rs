@@ -3,15 +3,15 @@
 use super::failure::Failure;
 use super::interrupt::{self, INTERRUPT};
 use super::method::{self, Choice};
+use super::outputs::{Outputs, Role};
 use super::progress::Teller;
 use super::shot::{self, Options, Shot, When};
-use super::{say, summary, values, warn};
+use super::{summary, values, warn};
 use clap::{Args, ValueEnum};
 use halflight::compare::compare;
 use halflight::drive::{self, Checkpoint, Ending, Settings, Shard, Stop};
 use halflight::load::{self, LoadOptions, LoadedScene};
-use halflight::report::{self, Maker, Run};
-use halflight::save;
+use halflight::report::{Maker, Run};
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Instant;
@@ -88,24 +88,14 @@ const SURVEY: u32 = 1000;
 impl Render {
     pub(super) fn run(&self) -> Result<ExitCode, Failure> {
         let start = Instant::now();
-        let outputs = self.outputs();
-        for output in &outputs {
-            save::check_writable(output)?;
-        }
-        if let Some(film) = &self.checkpoint {
-            drive::check_writable(film)?;
-        }
-        if let Some(cache) = &self.save_cache {
-            drive::check_writable(cache)?;
-        }
-        if let Some(folder) = &self.report {
-            report::check_folder(folder)?;
-        }
+        let (role, pictures) = self.pictures();
+        let mut outputs = self.outputs(role, &pictures)?;
         let reference = self.shot.reference()?;
 
         let loading = Instant::now();
         let loaded = load::load(&self.scene, &LoadOptions::default())?;
         let load_seconds = loading.elapsed().as_secs_f64();
+        loaded.files.iter().try_for_each(|file| outputs.spare(file))?;
         for repair in &loaded.repairs {
             warn(repair);
         }
@@ -133,9 +123,9 @@ impl Render {
         teller.end();
         let result = result.map_err(|error| shot::explain(&self.scene, &error))?;
 
-        for output in &outputs {
-            save::write(output, &result.image)?;
-        }
+        result.unsaved.iter().for_each(|error| outputs.fail(error.clone()));
+        let saved: Vec<_> =
+            pictures.into_iter().filter(|picture| outputs.save(picture, &result.image)).collect();
         let comparison = match &settings.reference {
             Some(reference) => Some(compare(&result.image, reference)?),
             None => None,
@@ -148,32 +138,47 @@ impl Render {
             settings: &settings,
             result: &result,
             comparison: comparison.as_ref(),
-            outputs: &outputs,
+            outputs: &saved,
             load_seconds,
             total_seconds: start.elapsed().as_secs_f64(),
             maker: &maker,
         };
-        if let Some(folder) = &self.report {
-            report::write_folder(folder, &run.files())?;
-        }
-        say(&if self.json { run.object().to_string() } else { summary::text(&run, self.report.as_deref()) });
-        Ok(match result.ending {
+        let reported = self.report.as_deref().filter(|folder| outputs.report(folder, &run.files()));
+        let results = if self.json { run.object().to_string() } else { summary::text(&run, reported) };
+        let code = match result.ending {
             Ending::Done => ExitCode::SUCCESS,
             Ending::Interrupted | Ending::Biased => ExitCode::from(3),
-        })
+        };
+        Ok(outputs.end(&results, code))
     }
 
-    fn outputs(&self) -> Vec<PathBuf> {
+    /// All that is going to be written, where it can be and is nothing that is read; the files of the scene are not
+    /// known yet.
+    fn outputs(&self, role: Role, pictures: &[PathBuf]) -> Result<Outputs, Failure> {
+        let mut outputs = Outputs::new(self.json);
+        pictures.iter().try_for_each(|picture| outputs.plan(role, picture))?;
+        self.checkpoint.iter().try_for_each(|film| outputs.plan(Role::Checkpoint, film))?;
+        self.save_cache.iter().try_for_each(|cache| outputs.plan(Role::Cache, cache))?;
+        self.report.iter().try_for_each(|folder| outputs.plan_report(folder))?;
+        outputs.spare(&self.scene)?;
+        self.shot.reference_file().map_or(Ok(()), |reference| outputs.spare(reference))?;
+        self.resume.iter().try_for_each(|film| outputs.spare_but(film, Role::Checkpoint))?;
+        self.load_cache.iter().try_for_each(|cache| outputs.spare_but(cache, Role::Cache))?;
+        Ok(outputs)
+    }
+
+    /// Where the picture goes, and whether a flag says so.
+    fn pictures(&self) -> (Role, Vec<PathBuf>) {
         if self.output.is_empty() && self.shard.is_some() {
-            return Vec::new();
+            return (Role::Default, Vec::new());
         }
         if self.output.is_empty() {
             let name = self.scene.file_stem().unwrap_or("picture".as_ref());
             let mut name = PathBuf::from(name).into_os_string();
             name.push(".png");
-            return vec![name.into()];
+            return (Role::Default, vec![name.into()]);
         }
-        self.output.clone()
+        (Role::Picture, self.output.clone())
     }
 
     /// The method that the scene file asks for.

@@ -197,6 +197,11 @@ impl Options {
 }
 
 impl Shot {
+    /// The file of the reference picture.
+    pub(super) fn reference_file(&self) -> Option<&Path> {
+        self.reference.as_deref()
+    }
+
     /// The reference picture. To be read before the scene: a wrong name should not cost a minute.
     pub(super) fn reference(&self) -> Result<Option<Arc<Image>>, Failure> {
         Ok(self.reference.as_deref().map(save::read).transpose()?.map(Arc::new))

@@ -25,26 +25,26 @@ pub(super) struct Stability {
 impl Stability {
     pub(super) fn run(&self) -> Result<ExitCode, Failure> {
         let wanted = |name: &str| self.only.as_ref().is_none_or(|word| name.contains(word.as_str()));
-        let mut group = "";
+        let (mut group, mut said) = ("", Ok(()));
         let outcomes = stability::run(&wanted, &mut |outcome| {
-            if !self.json {
-                if outcome.group != group {
-                    say(outcome.group);
-                    group = outcome.group;
-                }
-                say(&line(outcome));
+            if !self.json && said.is_ok() {
+                let head =
+                    if outcome.group == group { String::new() } else { format!("{}\n", outcome.group) };
+                group = outcome.group;
+                said = say(&(head + &line(outcome)));
             }
         });
         let failed = outcomes.iter().filter(|outcome| !outcome.passed).count();
+        said?;
         if self.json {
             let object = json!({
                 "cases": outcomes.iter().map(object).collect::<Vec<_>>(),
                 "passed": outcomes.len() - failed,
                 "failed": failed,
             });
-            say(&object.to_string());
+            say(&object.to_string())?;
         } else {
-            say(&format!("{}, {failed} not as expected", plural(outcomes.len() as u64, "case")));
+            say(&format!("{}, {failed} not as expected", plural(outcomes.len() as u64, "case")))?;
         }
         Ok(if failed == 0 { ExitCode::SUCCESS } else { ExitCode::from(1) })
     }

@@ -64,33 +64,36 @@ impl Study {
 impl Irradiance {
     fn run(&self) -> Result<ExitCode, Failure> {
         let loaded = load::load(&self.scene, &LoadOptions::default())?;
-        loaded.repairs.iter().for_each(|repair| warn(repair));
+        loaded.repairs.iter().for_each(warn);
         let settings = self.shot.settings(&loaded, Choice(None), &self.options, Stop::default(), None)?;
         let views = loaded.views();
         let scene = views.scene(self.shot.view.camera(&loaded)?);
         let metrics = if self.metrics.is_empty() { Metric::ALL.to_vec() } else { self.metrics.clone() };
         let Self { records, points, progressive, .. } = *self;
         let study = IrradianceStudy { metrics, records, points, progressive };
-        if !self.json {
-            say(
-                "metric                    error   records       RMSE     noise  1 in 100  reached  predicted   achieved",
-            );
-        }
+        let mut said = if self.json { Ok(()) } else { say(HEAD) };
         let mut rows = Vec::new();
         study_irradiance(&scene, &settings, &study, &mut |row| {
-            if !self.json {
-                say(&text(row));
+            if !self.json && said.is_ok() {
+                said = say(&text(row));
             }
             rows.push(object(row));
         })
         .map_err(|error| shot::explain(&self.scene, &error))?;
         if self.json {
             let rays = settings.cache.strata().pow(2);
-            say(&json!({ "records": self.records, "rays_per_record": rays, "metrics": rows }).to_string());
+            said = say(
+                &json!({ "records": self.records, "rays_per_record": rays, "metrics": rows }).to_string()
+            );
         }
+        said?;
         Ok(ExitCode::SUCCESS)
     }
 }
+
+/// Above the rows.
+const HEAD: &str =
+    "metric                    error   records       RMSE     noise  1 in 100  reached  predicted   achieved";
 
 fn text(row: &MetricError) -> String {
     format!(

@@ -3,6 +3,7 @@
 use super::error::FileError;
 use super::sealed::{self, Kind};
 use super::{Gather, Settings, fingerprint};
+use crate::save::Patience;
 use halflight_core::cache::irradiance::{IrradianceCache, Record};
 use halflight_core::scene::Scene;
 use serde::{Deserialize, Serialize};
@@ -124,8 +125,13 @@ impl Header {
 }
 
 /// Writes both caches to `path`, whole or not at all.
-pub(super) fn write(path: &Path, header: &Header, caches: [&IrradianceCache; 2]) -> Result<(), FileError> {
-    sealed::write(path, &KIND, header, |file| {
+pub(super) fn write(
+    path: &Path,
+    header: &Header,
+    caches: [&IrradianceCache; 2],
+    patience: Patience,
+) -> Result<(), FileError> {
+    sealed::write(path, &KIND, header, patience, |file| {
         let mut sections = caches.iter().flat_map(|cache| cache.records().chunks(AT_ONCE));
         sections.try_for_each(|records| file.put(bytemuck::cast_slice(records)))
     })
@@ -262,7 +268,7 @@ mod tests {
         let halves = counts.map(|records| Half { records, gathered: records + 1 });
         let header = Header { identity: identity(), views: Vec::new(), halves };
         let (even, odd) = (caches.next().unwrap(), caches.next().unwrap());
-        write(&path, &header, [&even, &odd]).unwrap();
+        write(&path, &header, [&even, &odd], Patience::least()).unwrap();
         let bytes = std::fs::read(&path).unwrap();
         (path, bytes)
     }

@@ -16,6 +16,7 @@ mod fingerprint;
 mod held_out;
 mod history;
 mod images;
+mod kept;
 mod ledger;
 mod memory;
 mod merge;
@@ -174,7 +175,7 @@ impl Default for Settings {
 }
 
 /// What is known while a picture is made, after each round, and while its audit goes on alone.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct Progress {
     /// Seconds of rendering so far.
     pub seconds: f64,
@@ -186,6 +187,8 @@ pub struct Progress {
     pub rounds: u32,
     /// The error so far.
     pub error: Option<ErrorEstimate>,
+    /// A film or a cache that could not be written, once for each: the render goes on, and tries again.
+    pub unsaved: Option<FileError>,
 }
 
 /// Why rendering ended.
@@ -288,6 +291,8 @@ pub struct RenderResult {
     pub memory: Vec<MemoryUse>,
     /// The most bytes at any time: building the hierarchy takes more than keeping it.
     pub memory_peak: usize,
+    /// Films and caches that are not in their files as they are in the end. Those of before are whole.
+    pub unsaved: Vec<FileError>,
     /// Why rendering ended.
     pub ending: Ending,
 }

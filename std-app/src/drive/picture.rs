@@ -6,17 +6,19 @@ use super::canvas::{Canvas, Shard};
 use super::crew::{self, Crew};
 use super::film_file::{self, Header, Identity, Reader};
 use super::history::{Clock, Reference, Round};
+use super::kept::Kept;
 use super::ledger::empty_pixels;
 use super::method::{Method, Renderer, Stage};
 use super::refinement::Refinements;
 use super::rounds::{Plan, Rounds};
 use super::told::Told;
 use super::workers::Workers;
-use super::{AdaptiveUse, Ending, FileError, Progress, RenderError, RenderResult, Seconds, WindowUse};
-use crate::save::Image;
+use super::{AdaptiveUse, Ending, Progress, RenderError, RenderResult, Seconds, WindowUse};
+use crate::save::{Image, Patience};
 use core::sync::atomic::{AtomicBool, Ordering};
 use core::time::Duration;
 use halflight_core::film::{Film, Pixel};
+use std::path::Path;
 use std::time::Instant;
 
 /// A thread looks at the clock, and at the flag, after about so many seconds.
@@ -72,15 +74,16 @@ impl Picture<'_> {
         let (mut gain, mut told) = (None, None);
         let mut saved = Instant::now();
         let mut is_lost = false;
-        let save = |canvas: &Canvas,
-                    rounds: &Rounds,
-                    audit: Option<&Audit>,
-                    refinements: &Refinements,
-                    seconds: f64,
-                    history: &[Round]| {
-            let Some(checkpoint) = &settings.checkpoint else { return Ok::<(), FileError>(()) };
-            let header = Header::new(identity.clone(), canvas, rounds, audit, refinements, seconds, history);
-            film_file::write(&checkpoint.path, &header, canvas)
+        let mut kept =
+            Kept::in_file(settings.checkpoint.as_ref().map(|checkpoint| checkpoint.path.as_path()));
+        let began = Instant::now();
+        let header = |canvas: &Canvas,
+                      rounds: &Rounds,
+                      audit: Option<&Audit>,
+                      refinements: &Refinements,
+                      seconds: f64,
+                      history: &[Round]| {
+            Header::new(identity.clone(), canvas, rounds, audit, refinements, seconds, history)
         };
 
         while let Some(plan) = rounds.next(clock.seconds(), estimating) {
@@ -159,29 +162,56 @@ impl Picture<'_> {
             let against = reference.as_ref().map(|r| clock.pause(|| r.compare(&image(&canvas.film))));
             let spp = rounds.spp();
             history.push(Round { seconds, spp, rays: canvas.counters.all_rays(), error, reference: against });
-            let known = rounds.progress(seconds, latest);
-            clock.pause(|| progress(&known));
             let due = |every: f64| saved.elapsed().as_secs_f64() >= every;
             if plan.first || settings.checkpoint.as_ref().is_some_and(|checkpoint| due(checkpoint.every)) {
-                clock.pause(|| save(&canvas, &rounds, audit.as_ref(), &refinements, seconds, &history))?;
+                clock.pause(|| {
+                    kept.update(|path, patience| {
+                        let header =
+                            header(&canvas, &rounds, audit.as_ref(), &refinements, seconds, &history);
+                        film_file::write(path, &header, &canvas, patience)
+                    });
+                });
                 saved = Instant::now();
             }
+            let unsaved = kept.news().or_else(|| renderer.kept()?.news());
+            let known = Progress { unsaved, ..rounds.progress(seconds, latest) };
+            clock.pause(|| progress(&known));
             if is_lost || interrupt.load(Ordering::Relaxed) && !plan.first {
                 break;
             }
         }
         let interrupted = interrupt.load(Ordering::Relaxed);
-        // Before the last steps of the audit, which a render that goes on would not take here.
-        save(&canvas, &rounds, audit.as_ref(), &refinements, clock.seconds(), &history)?;
+        let patience = Patience { since: began, interrupt };
         let is_known = history.last().is_some_and(|last| last.error.is_some());
-        if let (Some(audit), false) = (&mut audit, interrupted || is_known) {
+        let goes_on = audit.is_some() && !(interrupted || is_known);
+        // A shard is merged with the last steps of its audit, a render that goes on would not take them here.
+        let is_last = !goes_on || settings.shard == Shard::WHOLE;
+        let seconds = clock.seconds();
+        clock.pause(|| {
+            let write = |path: &Path, patience: Patience| {
+                let header = header(&canvas, &rounds, audit.as_ref(), &refinements, seconds, &history);
+                film_file::write(path, &header, &canvas, patience)
+            };
+            if is_last {
+                kept.finish(patience, write)
+            } else {
+                kept.update(write)
+            }
+            renderer.finish(patience);
+        });
+        if let Some(audit) = audit.as_mut().filter(|_| goes_on) {
             let left = settings.stop.seconds.map(|limit| limit - estimating - clock.seconds());
             let work = (canvas.counters.all_rays(), clock.seconds());
             renderer.lend_photons(&mut |photons| audit.step(workers, &canvas.film, photons, work, left))?;
-            // A shard is merged with them.
-            if settings.shard != Shard::WHOLE {
-                save(&canvas, &rounds, Some(audit), &refinements, clock.seconds(), &history)?;
-            }
+        }
+        if !is_last {
+            let seconds = clock.seconds();
+            clock.pause(|| {
+                kept.finish(patience, |path, patience| {
+                    let header = header(&canvas, &rounds, audit.as_ref(), &refinements, seconds, &history);
+                    film_file::write(path, &header, &canvas, patience)
+                });
+            });
         }
         let start = Instant::now();
         // The last round may have asked already.
@@ -208,9 +238,10 @@ impl Picture<'_> {
             reuse: renderer.reuse(),
             caustics: renderer.caustics(),
             cache: renderer.cache(),
-            survey: if interrupted { None } else { renderer.survey(workers)? },
+            // The picture is there: what there is no memory to look at is left out.
+            survey: if interrupted { None } else { renderer.survey(workers).unwrap_or_default() },
             photons: renderer.photons(),
-            photon_view: if settings.photon_view { renderer.photon_view()? } else { None },
+            photon_view: if settings.photon_view { renderer.photon_view().unwrap_or_default() } else { None },
             windows: WindowUse::default(),
             images: 0,
             places: canvas.ledger.places(width, height),
@@ -220,6 +251,7 @@ impl Picture<'_> {
             audit: told.audited,
             memory: Vec::new(),
             memory_peak: 0,
+            unsaved: kept.failed().into_iter().chain(renderer.kept().and_then(Kept::failed)).collect(),
             ending: match (interrupted, is_lost) {
                 (true, _) => Ending::Interrupted,
                 (_, true) => Ending::Biased,

@@ -183,7 +183,7 @@ impl Rounds {
     /// What is told of the picture meanwhile, at `seconds`.
     pub(super) fn progress(&self, seconds: f64, error: Option<ErrorEstimate>) -> Progress {
         let seconds_left = self.seconds_left(seconds, error);
-        Progress { seconds, seconds_left, spp: self.spp, rounds: self.count, error }
+        Progress { seconds, seconds_left, spp: self.spp, rounds: self.count, error, unsaved: None }
     }
 
     /// Seconds until the first rule holds, if all goes on as before: errors fall like one over the samples.

@@ -3,7 +3,7 @@
 //! first, then the same without regard to case and encoding, where just one file fits.
 
 use super::name::{folded, path, shown};
-use std::collections::HashMap;
+use std::collections::{BTreeSet, HashMap};
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
@@ -56,11 +56,32 @@ impl Found {
 pub(super) struct Lookup {
     /// Entries of a directory by their folded names.
     listings: HashMap<PathBuf, HashMap<String, Vec<OsString>>>,
+    /// All that was found, whatever became of it.
+    files: BTreeSet<PathBuf>,
 }
 
 impl Lookup {
     /// The file that one of `names`, the likeliest first, means in one of `directories`, the likeliest first.
     pub(super) fn find(&mut self, names: &[&[u8]], directories: &[&Path]) -> Found {
+        let found = self.search(names, directories);
+        match &found {
+            Found::Ambiguous(files) => self.files.extend(files.iter().cloned()),
+            found => self.files.extend(found.file().map(Path::to_path_buf)),
+        }
+        found
+    }
+
+    /// All files that were found so far.
+    pub(super) fn into_files(self) -> BTreeSet<PathBuf> {
+        self.files
+    }
+
+    /// Counts what `other` has found as its own.
+    pub(super) fn adopt(&mut self, other: Lookup) {
+        self.files.extend(other.files);
+    }
+
+    fn search(&mut self, names: &[&[u8]], directories: &[&Path]) -> Found {
         let names = || names.iter().enumerate().filter(|(_, name)| name.len() <= LONGEST_NAME);
         for (number, name) in names() {
             for directory in directories {

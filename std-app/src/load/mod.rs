@@ -242,6 +242,7 @@ impl SceneBuilder {
             camera: None,
             settings: RenderSettings::default(),
             transform,
+            files: self.lookup.into_files().into_iter().chain([path.into()]).collect(),
             repairs: self.notes.sentences(),
         })
     }

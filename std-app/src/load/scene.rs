@@ -4,6 +4,7 @@ use super::settings::RenderSettings;
 use super::texture_set::TextureSet;
 use super::transform::SceneTransform;
 use halflight_core::scene::{Camera, Environment, Material, Mesh, PointLight, Scene, Texture, Triangle};
+use std::path::PathBuf;
 
 /// Everything of a scene, owned, in the coordinates of the core.
 #[derive(Clone, Debug)]
@@ -32,6 +33,9 @@ pub struct LoadedScene {
     pub settings: RenderSettings,
     /// From the coordinates of the file to those of the buffers.
     pub transform: SceneTransform,
+    /// Every file that was looked at: the scene, its meshes, their materials, all pictures that these name and that
+    /// are there, whether they could be read or not.
+    pub files: Vec<PathBuf>,
     /// What was repaired or left out, a sentence for each kind.
     pub repairs: Vec<String>,
 }

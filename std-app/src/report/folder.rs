@@ -1,31 +1,75 @@
 //! The folder of a report: found usable before a long render, filled after it.
 
 use super::Files;
-use crate::save::{PictureError, replace, words};
-use std::fs;
-use std::path::Path;
+use crate::save::{Patience, PictureError, Place, check_place, not_written, replace, words};
+use std::fs::{self, File};
+use std::io::{self, Read};
+use std::path::{Path, PathBuf};
 
-/// Finds out whether [`write_folder`] will find its way, and makes the folder where only that is missing.
+/// The files of a report, and what stands in those that this program has written.
+const FILES: [(&str, &[&str]); 3] = [
+    ("index.html", &["<p class=\"brand\">halflight</p>"]),
+    ("curve.csv", &["seconds,spp,rays,relmse,", "method,seconds,spp,rays,relmse,"]),
+    ("run.json", &["\"version\": \"halflight "]),
+];
+
+/// Bytes of a file that are looked at: no report is longer.
+const LONGEST: u64 = 1 << 28;
+
+/// The files that a report in `folder` has.
+pub fn report_files(folder: &Path) -> [PathBuf; 3] {
+    FILES.map(|(name, _)| folder.join(name))
+}
+
+/// Finds out whether [`write_folder`] will find its way, and that it takes nobody else's place: where a file of one
+/// of its names is there, this program has written it.
 ///
 /// # Errors
-/// Names the folder and what to do.
+/// Names the folder or the file and what to do.
 pub fn check_folder(folder: &Path) -> Result<(), PictureError> {
     let refuse = |reason: String| PictureError::new(reason).at(folder);
     if folder.exists() && !folder.is_dir() {
         return Err(refuse("cannot hold a report: it is a file, not a folder".into()));
     }
-    if !folder.is_dir() {
-        fs::create_dir(folder).map_err(|error| refuse(format!("cannot be made: {}", words(&error))))?;
+    if !folder.exists() {
+        // As if it were a file: what it is in is there and takes it.
+        return check_place(folder).map_err(refuse);
     }
-    let probe = folder.join(format!(".{}.part", std::process::id()));
-    let written = fs::write(&probe, []).and_then(|()| fs::remove_file(&probe));
-    written.map_err(|error| refuse(format!("takes no files: {}", words(&error))))
+    for (path, (_, marks)) in report_files(folder).iter().zip(FILES) {
+        check_place(path).map_err(|why| PictureError::new(why).at(path))?;
+        let is_ours = is_ours(path, marks);
+        if !is_ours.map_err(|error| PictureError::new(not_written(&error)).at(path))? {
+            let why = "would be overwritten by the report, and is not of one: give the report another folder";
+            return Err(PictureError::new(why).at(path));
+        }
+    }
+    Ok(())
 }
 
-/// Writes the files of a report; each appears whole or not at all.
+/// Whether nothing is lost where a report takes the place of `path`.
+fn is_ours(path: &Path, marks: &[&str]) -> io::Result<bool> {
+    if Place::of(path)?.is_stream() || !path.exists() {
+        return Ok(true);
+    }
+    let mut bytes = Vec::new();
+    File::open(path)?.take(LONGEST).read_to_end(&mut bytes)?;
+    let text = String::from_utf8_lossy(&bytes);
+    Ok(marks.iter().any(|mark| text.contains(mark)))
+}
+
+/// Writes the files of a report, and makes the folder where only it is missing; each file appears whole or not at
+/// all. One that cannot be written does not keep the others from it.
 ///
 /// # Errors
-/// Names the file and why it cannot be written.
-pub fn write_folder(folder: &Path, files: &Files) -> Result<(), PictureError> {
-    files.iter().try_for_each(|(name, bytes)| replace(&folder.join(name), bytes))
+/// For each file that is not there, its name and why.
+pub fn write_folder(folder: &Path, files: &Files, patience: Patience) -> Result<(), Vec<PictureError>> {
+    if !folder.is_dir()
+        && let Err(error) = Place::of(folder).and_then(|place| fs::create_dir(place.path()))
+    {
+        let why = format!("cannot be made: {}", words(&error));
+        return Err(vec![PictureError::new(why).at(folder)]);
+    }
+    let write = |(name, bytes): &(&str, Vec<u8>)| replace(&folder.join(name), bytes, patience).err();
+    let failed: Vec<_> = files.iter().filter_map(write).collect();
+    if failed.is_empty() { Ok(()) } else { Err(failed) }
 }

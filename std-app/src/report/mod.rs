@@ -12,7 +12,7 @@ mod race;
 pub mod words;
 
 pub use census::counts;
-pub use folder::{check_folder, write_folder};
+pub use folder::{check_folder, report_files, write_folder};
 pub use json::{comparison_object, dropped_object, error_object};
 pub use maker::Maker;
 pub use race::{Race, Racer};

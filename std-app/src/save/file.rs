@@ -1,13 +1,19 @@
-//! Reading and writing whole files. A file is written beside its place and then renamed into it, so that
-//! an interrupted write leaves the old one as it was.
+//! Reading and writing whole files: the one reader of pictures by name, and the one writer of everything. A file
+//! is written beside its place and then renamed into it, so that whenever the program ends the old file or the new
+//! one is there, whole.
 
+use super::place::{Place, folder};
+use super::stream::{self, Patience};
 use super::{Format, Image, PictureError, decode, encode};
 use std::fs::{self, File, OpenOptions};
-use std::io::{self, Write};
+use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
 /// Longest file that is read, in bytes.
 const MAX_FILE: u64 = 8 << 30;
+
+/// Bytes that are gathered before they are handed to the system.
+const BUFFER: usize = 1 << 20;
 
 /// The picture in a file; the extension says the format. See [`decode`].
 ///
@@ -24,31 +30,68 @@ pub fn read(path: &Path) -> Result<Image, PictureError> {
     decode(&bytes, format).map_err(|error| error.at(path))
 }
 
-/// Writes a picture; the extension says the format. The file appears whole or not at all.
+/// Writes a picture; the extension says the format. A file appears whole or not at all; a pipe or a device is
+/// written in place, and a reader of it is waited for two and a half seconds.
 ///
 /// # Errors
 /// Names the file and why it cannot be written.
 pub fn write(path: &Path, image: &Image) -> Result<(), PictureError> {
-    replace(path, &encode(image, Format::of(path)?).map_err(|error| error.at(path))?)
+    write_with(path, image, Patience::least())
 }
 
-/// Writes a file, which appears whole or not at all.
-pub(crate) fn replace(path: &Path, bytes: &[u8]) -> Result<(), PictureError> {
-    let about =
-        |error: io::Error| PictureError::new(format!("cannot be written: {}", words(&error))).at(path);
-    if is_special(path) {
-        return OpenOptions::new().write(true).open(path).and_then(|mut f| f.write_all(bytes)).map_err(about);
+/// The same, with more patience for the reader of a pipe.
+///
+/// # Errors
+/// Names the file and why it cannot be written.
+pub fn write_with(path: &Path, image: &Image, patience: Patience) -> Result<(), PictureError> {
+    let bytes = encode(image, Format::of(path)?).map_err(|error| error.at(path))?;
+    replace(path, &bytes, patience)
+}
+
+/// Writes `bytes` to a file, which appears whole or not at all.
+pub(crate) fn replace(path: &Path, bytes: &[u8], patience: Patience) -> Result<(), PictureError> {
+    replace_with(path, patience, |file| file.write_all(bytes))
+        .map_err(|error| PictureError::new(not_written(&error)).at(path))
+}
+
+/// Writes what `put` puts into a file, which appears whole or not at all.
+pub(crate) fn replace_with(
+    path: &Path,
+    patience: Patience,
+    put: impl FnOnce(&mut dyn Write) -> io::Result<()>,
+) -> io::Result<()> {
+    let place = Place::of(path)?;
+    if place.is_stream() {
+        let mut bytes = Vec::new();
+        put(&mut bytes)?;
+        return stream::write(&place, bytes, patience);
     }
-    let target = place(path);
-    let beside = temporary(&target);
-    let written = File::create_new(&beside)
-        .and_then(|mut file| file.write_all(bytes).and_then(|()| file.sync_all()))
-        .and_then(|()| fs::rename(&beside, &target));
-    if written.is_err() {
+    let part = part(place.path());
+    let written =
+        create(&part).and_then(|file| fill(file, put)).and_then(|()| fs::rename(&part, place.path()));
+    match &written {
+        // The new name is on the disk when the folder is. Where folders cannot be opened there is nothing to do.
+        Ok(()) => {
+            let _ = File::open(folder(place.path())).and_then(|folder| folder.sync_all());
+        }
         // Of no use to anybody; if even this fails the first error says why.
-        let _ = fs::remove_file(&beside);
+        Err(_) => {
+            let _ = fs::remove_file(&part);
+        }
     }
-    written.map_err(about)
+    written
+}
+
+fn fill(file: File, put: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> io::Result<()> {
+    let mut file = BufWriter::with_capacity(BUFFER, file);
+    put(&mut file)?;
+    file.into_inner().map_err(io::IntoInnerError::into_error)?.sync_all()
+}
+
+/// A file of its own: what a program of the same number has left there when it was killed is removed.
+fn create(part: &Path) -> io::Result<File> {
+    let _ = fs::remove_file(part);
+    File::create_new(part)
 }
 
 /// Finds out, before a long render, whether [`write()`] will find its way: the extension is known, the
@@ -58,48 +101,44 @@ pub(crate) fn replace(path: &Path, bytes: &[u8]) -> Result<(), PictureError> {
 /// Names the file and what to do.
 pub fn check_writable(path: &Path) -> Result<(), PictureError> {
     Format::of(path)?;
-    let refuse = |reason: String| Err(PictureError::new(reason).at(path));
-    let target = place(path);
-    if target.is_dir() {
-        return refuse("cannot be written: it is a folder".into());
+    check_place(path).map_err(|why| PictureError::new(why).at(path))
+}
+
+/// The same of a file that is no picture; why not.
+pub(crate) fn check_place(path: &Path) -> Result<(), String> {
+    let place = Place::of(path).map_err(|error| not_written(&error))?;
+    if place.is_folder() {
+        return Err("cannot be written: it is a folder".into());
     }
-    let folder = folder(&target);
-    if !folder.is_dir() {
-        return refuse(format!("cannot be written: there is no folder {}", folder.display()));
-    }
-    if target.exists()
-        && let Err(error) = OpenOptions::new().append(true).open(&target)
-    {
-        return refuse(format!("cannot be written: {}", words(&error)));
-    }
-    if is_special(path) {
+    if place.is_stream() {
         return Ok(());
     }
-    let beside = temporary(&target);
-    if let Err(error) = File::create_new(&beside) {
-        return refuse(format!("cannot be written in {}: {}", folder.display(), words(&error)));
+    let (target, folder) = (place.path(), folder(place.path()));
+    if target.file_name().is_none() || !folder.is_dir() {
+        return Err(format!("cannot be written: there is no folder {}", folder.display()));
     }
-    let _ = fs::remove_file(&beside);
-    Ok(())
+    if target.exists()
+        && let Err(error) = OpenOptions::new().append(true).open(target)
+    {
+        return Err(not_written(&error));
+    }
+    let part = part(target);
+    let created = create(&part).map(|_| ());
+    let _ = fs::remove_file(&part);
+    created.map_err(|error| format!("cannot be written in {}: {}", folder.display(), words(&error)))
 }
 
-/// Pipes and devices are written in place.
-fn is_special(path: &Path) -> bool {
-    fs::metadata(path).is_ok_and(|data| !data.is_file() && !data.is_dir())
+/// Where a file is while it is written.
+fn part(path: &Path) -> PathBuf {
+    let mut name = std::ffi::OsString::from(".");
+    name.push(path.file_name().unwrap_or_default());
+    name.push(format!(".{}.part", std::process::id()));
+    folder(path).join(name)
 }
 
-/// Where the file lies, links followed: the link stays a link.
-fn place(path: &Path) -> PathBuf {
-    path.canonicalize().unwrap_or_else(|_| path.to_owned())
-}
-
-fn folder(path: &Path) -> &Path {
-    path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
-}
-
-fn temporary(path: &Path) -> PathBuf {
-    let name = path.file_name().unwrap_or_default().to_string_lossy();
-    folder(path).join(format!(".{name}.{}.part", std::process::id()))
+/// Why a file is not there, or not the new one.
+pub(crate) fn not_written(error: &io::Error) -> String {
+    format!("cannot be written: {}", words(error))
 }
 
 /// The error without the number of the operating system.
@@ -108,6 +147,10 @@ pub(crate) fn words(error: &io::Error) -> String {
         io::ErrorKind::NotFound => "no such file".into(),
         io::ErrorKind::PermissionDenied => "permission denied".into(),
         io::ErrorKind::StorageFull => "the disk is full".into(),
+        io::ErrorKind::QuotaExceeded => "the quota is used up".into(),
+        io::ErrorKind::FileTooLarge => "it would be larger than files may be here".into(),
+        io::ErrorKind::ReadOnlyFilesystem => "the disk is read-only".into(),
+        io::ErrorKind::BrokenPipe => "its reader is gone".into(),
         _ => error.to_string(),
     }
 }

@@ -9,13 +9,17 @@ mod file;
 mod hdr;
 mod image;
 mod pfm;
+mod place;
 mod png;
+mod stream;
 
 pub use error::PictureError;
-pub use file::{check_writable, read, write};
-pub(crate) use file::{replace, words};
+pub(crate) use file::{check_place, not_written, replace, replace_with, words};
+pub use file::{check_writable, read, write, write_with};
 pub use image::Image;
+pub use place::{Identity, Place};
 pub use png::{from_srgb, to_srgb};
+pub use stream::Patience;
 
 use std::path::Path;
 

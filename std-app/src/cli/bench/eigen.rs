@@ -27,7 +27,7 @@ impl Eigen {
     pub(super) fn run(&self) -> Result<ExitCode, Failure> {
         let level = Level::detect();
         let report = eigen::run(self.simd.map_or(level, |tier| level.capped(tier)));
-        say(&if self.json { object(&report).to_string() } else { text(&report) });
+        say(&if self.json { object(&report).to_string() } else { text(&report) })?;
         Ok(ExitCode::SUCCESS)
     }
 }

@@ -40,7 +40,7 @@ impl Knn {
         let level = Level::detect();
         let level = self.simd.map_or(level, |tier| level.capped(tier));
         let report = knn::run(Amount { photons: self.photons.get(), queries: self.queries.get() }, level)?;
-        say(&if self.json { object(&report).to_string() } else { text(&report) });
+        say(&if self.json { object(&report).to_string() } else { text(&report) })?;
         Ok(ExitCode::SUCCESS)
     }
 }

@@ -10,14 +10,20 @@ use super::MOST_PIXELS;
 use super::canvas::{Canvas, Shard};
 use super::error::FileError;
 use super::sealed::{self, Kind};
+use crate::save::Patience;
 use halflight_core::film::{GROUPS, PIXELS_PER_TILE, Pixel, Tile};
 use std::path::Path;
 
 const KIND: Kind = Kind { magic: *b"HLFILM", version: 5, name: "film" };
 
 /// Writes `canvas` to `path`, whole or not at all.
-pub(super) fn write(path: &Path, header: &Header, canvas: &Canvas) -> Result<(), FileError> {
-    sealed::write(path, &KIND, header, |file| {
+pub(super) fn write(
+    path: &Path,
+    header: &Header,
+    canvas: &Canvas,
+    patience: Patience,
+) -> Result<(), FileError> {
+    sealed::write(path, &KIND, header, patience, |file| {
         file.put(bytemuck::cast_slice(&canvas.taken))?;
         let tiles = tiles(canvas.film.pixels(), &canvas.taken);
         tiles.into_iter().try_for_each(|pixels| file.put(bytemuck::cast_slice(pixels)))

@@ -1,5 +1,6 @@
 //! What is asked of irradiance caches, and what became of them.
 
+use crate::drive::Settings;
 use halflight_core::cache::irradiance::{Metric, metric};
 
 /// How an irradiance cache is filled.
@@ -68,4 +69,14 @@ pub struct CacheUse {
     pub is_cut: bool,
     /// Seconds of the overture.
     pub seconds: f64,
+}
+
+/// Whether records are of a file, or go to one: they have one error and one number of rays.
+pub(super) fn in_files(settings: &Settings) -> bool {
+    settings.save_cache.is_some() || settings.load_cache.is_some()
+}
+
+/// Whether it is to be found out how many rays records have.
+pub(super) fn is_open(settings: &Settings) -> bool {
+    settings.cache.strata.is_none() && !in_files(settings)
 }

@@ -9,7 +9,7 @@
 //! can be kept in a file, and be the first records of another picture of the same scene.
 
 use super::balance::{Account, Trial};
-use super::cache_settings::{CacheUse, Gather};
+use super::cache_settings::{CacheUse, Gather, in_files, is_open};
 use super::caster::{Cast, Caster};
 use super::caustics::{self, CausticUse};
 use super::haste::{ENOUGH, Haste};
@@ -22,11 +22,13 @@ use crate::drive::audit::Audit;
 use crate::drive::cache_file::{self, Half, Header, Reader, View};
 use crate::drive::crew::Crew;
 use crate::drive::held_out::EXACT;
+use crate::drive::kept::Kept;
 use crate::drive::memory::Memory;
 use crate::drive::refinement::{Refinement, Shortfall};
 use crate::drive::survey::{self, Survey};
 use crate::drive::workers::Workers;
 use crate::drive::{RenderError, Settings, Stop};
+use crate::save::Patience;
 use core::f32::consts::FRAC_PI_2;
 use halflight_core::bsdf::Features;
 use halflight_core::cache::irradiance::{CellFlux, IrradianceCache, Record, metric};
@@ -37,7 +39,6 @@ use halflight_core::transport::path::WAVE;
 use halflight_core::transport::shoot::Keep;
 use halflight_core::transport::{Counters, PathTracer};
 use std::collections::VecDeque;
-use std::path::Path;
 use std::time::Instant;
 
 /// Strata along a side come in so many.
@@ -273,7 +274,7 @@ fn set_up<F: Features, T>(
         view: View::of(scene, settings),
         loaded: loaded.header.halves,
         header: loaded.header,
-        save: settings.save_cache.as_deref(),
+        kept: Kept::in_file(settings.save_cache.as_deref()),
         is_filled: false,
         is_open: is_open(settings),
         stop: settings.stop,
@@ -319,16 +320,6 @@ fn coarser<'t>(tables: &'t [CellFlux<'t>], flux: &'t CellFlux<'t>) -> &'t CellFl
     tables.iter().find(|table| 2 * table.n() >= flux.n()).unwrap_or(flux)
 }
 
-/// Whether records are of a file, or go to one: they have one error and one number of rays.
-fn in_files(settings: &Settings) -> bool {
-    settings.save_cache.is_some() || settings.load_cache.is_some()
-}
-
-/// Whether it is to be found out how many rays records have.
-fn is_open(settings: &Settings) -> bool {
-    settings.cache.strata.is_none() && !in_files(settings)
-}
-
 /// See the file.
 struct Cached<'a, F> {
     tracer: PathTracer<'a, F>,
@@ -348,7 +339,7 @@ struct Cached<'a, F> {
     /// What came from a file.
     loaded: [Half; 2],
     /// Where they are kept.
-    save: Option<&'a Path>,
+    kept: Kept<'a>,
     is_filled: bool,
     /// Of each number of strata that may be gathered, the fewest first: see [`Needs::sizes`].
     tables: &'a [CellFlux<'a>],
@@ -453,7 +444,7 @@ impl<F: Features> Cached<'_, F> {
                 self.header.is_filled_for(self.view.clone());
             }
         }
-        self.save()?;
+        self.keep(None);
         self.spent += crew.canvas.counters.all_rays() - counted;
         self.seconds += start.elapsed().as_secs_f64();
         Ok(all)
@@ -572,13 +563,15 @@ impl<F: Features> Cached<'_, F> {
         noise > 0.5 * all
     }
 
-    fn save(&mut self) -> Result<(), RenderError> {
-        let Some(path) = self.save else { return Ok(()) };
+    /// Writes the file on the way, or what is owed for the last time.
+    fn keep(&mut self, last: Option<Patience>) {
         for (half, growing) in self.header.halves.iter_mut().zip(&self.halves) {
             *half = Half { records: growing.cache.records().len() as u32, gathered: growing.gathered() };
         }
-        let [even, odd] = &self.halves;
-        Ok(cache_file::write(path, &self.header, [&even.cache, &odd.cache])?)
+        let (header, [even, odd]) = (&self.header, &self.halves);
+        self.kept.keep(last, |path, patience| {
+            cache_file::write(path, header, [&even.cache, &odd.cache], patience)
+        });
     }
 }
 
@@ -672,6 +665,14 @@ impl<F: Features> Renderer for Cached<'_, F> {
             is_cut: self.is_cut,
             seconds: self.seconds,
         })
+    }
+
+    fn finish(&mut self, patience: Patience) {
+        self.keep(Some(patience));
+    }
+
+    fn kept(&self) -> Option<&Kept<'_>> {
+        Some(&self.kept)
     }
 
     fn caustics(&self) -> CausticUse {

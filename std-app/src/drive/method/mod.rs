@@ -33,12 +33,14 @@ pub use photon_view::{MapView, PhotonView};
 pub use photons::{MapUse, PhotonSettings, PhotonUse};
 
 use super::crew::Crew;
+use super::kept::Kept;
 use super::memory::Memory;
 use super::refinement::{Refinement, Shortfall};
 use super::run::path_settings;
 use super::survey::Survey;
 use super::workers::Workers;
 use super::{RenderError, Reuse, Settings};
+use crate::save::Patience;
 use halflight_core::bsdf::Features;
 use halflight_core::bvh::Bvh;
 use halflight_core::light::Lights;
@@ -247,6 +249,14 @@ pub(super) trait Renderer {
 
     /// What became of its irradiance cache.
     fn cache(&self) -> Option<CacheUse> {
+        None
+    }
+
+    /// Writes what it keeps in a file for the last time.
+    fn finish(&mut self, _patience: Patience) {}
+
+    /// That file.
+    fn kept(&self) -> Option<&Kept<'_>> {
         None
     }
 

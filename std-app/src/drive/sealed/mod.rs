@@ -1,18 +1,19 @@
 //! Sealed files, which films and caches are kept in: a name and a version, a header in JSON, sections of bytes, and a
 //! checksum over all of it (docs/film-file.md).
 //!
-//! A file is written beside its place and renamed into it when all of it is on the disk: whenever the program is
-//! killed, the old file or the new one is there, whole.
+//! They are written as all files are (`save::file`): whenever the program is killed, the old file or the new one is
+//! there, whole.
 
 mod hash;
 
 pub(super) use hash::Hash;
 
 use super::error::FileError;
+use crate::save::{Patience, check_place, not_written, replace_with};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
-use std::fs::{self, File};
-use std::io::{self, BufReader, BufWriter, Read, Write};
+use std::fs::File;
+use std::io::{self, BufReader, Read, Write};
 use std::path::{Path, PathBuf};
 
 /// What is in a file.
@@ -41,12 +42,12 @@ impl Kind {
 const LONGEST_HEADER: u32 = 1 << 28;
 
 /// A file that is being written.
-pub(super) struct Writer {
-    file: BufWriter<File>,
+pub(super) struct Writer<'w> {
+    file: &'w mut dyn Write,
     hash: Hash,
 }
 
-impl Writer {
+impl Writer<'_> {
     /// A section.
     pub(super) fn put(&mut self, bytes: &[u8]) -> io::Result<()> {
         self.hash.section(bytes);
@@ -59,47 +60,25 @@ pub(super) fn write(
     path: &Path,
     kind: &Kind,
     header: &impl Serialize,
+    patience: Patience,
     sections: impl FnOnce(&mut Writer) -> io::Result<()>,
 ) -> Result<(), FileError> {
-    let part = part(path);
-    let written = write_part(&part, kind, header, sections).and_then(|()| fs::rename(&part, path));
-    // The new name is on the disk when the folder is. Where folders cannot be opened there is nothing to do.
-    if let (Ok(()), Ok(folder)) = (&written, File::open(folder(path))) {
-        let _ = folder.sync_all();
-    }
-    written.map_err(|error| {
-        let _ = fs::remove_file(&part);
-        FileError::new(path, format!("cannot be written: {error}"))
-    })
-}
-
-fn write_part(
-    part: &Path,
-    kind: &Kind,
-    header: &impl Serialize,
-    sections: impl FnOnce(&mut Writer) -> io::Result<()>,
-) -> io::Result<()> {
-    let file = BufWriter::with_capacity(1 << 20, File::create(part)?);
-    let mut writer = Writer { file, hash: Hash::default() };
-    writer.put(&kind.opening())?;
-    let header = serde_json::to_vec(header)?;
-    writer.put(&(header.len() as u32).to_le_bytes())?;
-    writer.put(&header)?;
-    sections(&mut writer)?;
-    let Writer { mut file, hash } = writer;
-    file.write_all(&hash.value().to_le_bytes())?;
-    file.into_inner().map_err(io::IntoInnerError::into_error)?.sync_all()
+    let written = replace_with(path, patience, |file| {
+        let mut writer = Writer { file, hash: Hash::default() };
+        writer.put(&kind.opening())?;
+        let header = serde_json::to_vec(header)?;
+        writer.put(&(header.len() as u32).to_le_bytes())?;
+        writer.put(&header)?;
+        sections(&mut writer)?;
+        let Writer { file, hash } = writer;
+        file.write_all(&hash.value().to_le_bytes())
+    });
+    written.map_err(|error| FileError::new(path, not_written(&error)))
 }
 
 /// Whether a file will find its way to `path`: the folder is there and takes files.
 pub(super) fn check_writable(path: &Path) -> Result<(), FileError> {
-    if path.is_dir() {
-        return Err(FileError::new(path, "cannot be written: it is a folder"));
-    }
-    let part = part(path);
-    let created = File::create(&part).map(|_| ());
-    let _ = fs::remove_file(&part);
-    created.map_err(|error| FileError::new(path, format!("cannot be written: {error}")))
+    check_place(path).map_err(|why| FileError::new(path, why))
 }
 
 /// A file whose header has been read, and whose sections are to be.
@@ -182,14 +161,4 @@ impl<'r> Reader<'r> {
     pub(super) fn damage(&self, what: impl core::fmt::Display) -> FileError {
         self.refusal(format!("is damaged: {what}"))
     }
-}
-
-fn folder(path: &Path) -> &Path {
-    path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
-}
-
-/// Where a file is while it is written: always the same, so that what a killed program leaves is used again.
-fn part(path: &Path) -> PathBuf {
-    let name = path.file_name().unwrap_or_default().to_string_lossy();
-    folder(path).join(format!(".{name}.part"))
 }

@@ -191,6 +191,7 @@ pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<LoadedScene, Lo
     }
     let environment = scene.environment.as_ref().map(|entry| entry.resolved(&source)).transpose()?;
     builder.notes.merge(looked.notes.take());
+    builder.lookup.adopt(looked.lookup.take());
     let mut loaded = builder.build(path, options, environment)?;
     let transform = loaded.transform;
     loaded.lights =

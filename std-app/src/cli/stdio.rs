@@ -1,0 +1,36 @@
+//! Standard output and standard error. The library's own macros panic where a write fails; here it is an answer: of
+//! results a failure, unless their reader has had enough, and of notes nothing, for they are advice.
+
+use super::failure::Failure;
+use core::fmt::Display;
+use std::io::{self, Write, stderr, stdout};
+
+/// Prints a result.
+///
+/// # Errors
+/// Results that are lost. A reader that is gone has what it wanted.
+pub(super) fn say(text: &str) -> Result<(), Failure> {
+    heard(writeln!(stdout(), "{text}").and_then(|()| stdout().flush()))
+}
+
+/// What a write to standard output means.
+pub(super) fn heard(written: io::Result<()>) -> Result<(), Failure> {
+    match written {
+        Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
+            let why = format!("the results could not be written to standard output: {error}");
+            Err(Failure::new(why))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Prints a line for a person, on standard error.
+pub(super) fn tell(text: impl Display) {
+    // One write, so that lines of several threads stay whole; nobody is listening where it fails.
+    let _ = stderr().write_all(format!("{text}\n").as_bytes());
+}
+
+/// Prints what a person should know.
+pub(super) fn warn(text: impl Display) {
+    tell(format_args!("note: {text}"));
+}

@@ -1,0 +1,203 @@
+//! Where the name of an output leads, links followed: to a file, which is replaced whole, or to a pipe or a
+//! device, which is written in place. Nothing is opened here: a pipe that is opened and closed ends its reader.
+
+use std::ffi::OsString;
+use std::fs::{self, Metadata};
+use std::io;
+use std::path::{Path, PathBuf};
+
+/// Links that are followed one after the other, as Linux has it.
+const MOST_LINKS: usize = 40;
+
+/// Where a name leads.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Place {
+    path: PathBuf,
+    kind: Kind,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Kind {
+    /// A file, or nothing yet.
+    File,
+    /// A folder.
+    Folder,
+    /// A pipe or a device.
+    Stream,
+    /// What the program was started with under this number.
+    Descriptor(u32),
+}
+
+impl Place {
+    /// Where `path` leads: the last of its links may lead to a file that is not there yet.
+    ///
+    /// # Errors
+    /// Links in a circle, and whatever the system says of a name that it cannot look up.
+    pub fn of(path: &Path) -> io::Result<Self> {
+        let mut path = path.to_owned();
+        for _ in 0..MOST_LINKS {
+            let kind = match fs::symlink_metadata(&path) {
+                Ok(data) if data.is_symlink() => {
+                    if let Some(number) = descriptor(&path) {
+                        return Ok(Self { path, kind: Kind::Descriptor(number) });
+                    }
+                    path = folder(&path).join(fs::read_link(&path)?);
+                    continue;
+                }
+                Ok(data) if data.is_file() => Kind::File,
+                Ok(data) if data.is_dir() => Kind::Folder,
+                Ok(_) => Kind::Stream,
+                Err(error) if error.kind() == io::ErrorKind::NotFound => Kind::File,
+                Err(error) => return Err(error),
+            };
+            return Ok(Self { path, kind });
+        }
+        Err(io::Error::other("its links lead in a circle"))
+    }
+
+    /// The name, links followed.
+    pub(crate) fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Whether it is written in place.
+    pub fn is_stream(&self) -> bool {
+        matches!(self.kind, Kind::Stream | Kind::Descriptor(_))
+    }
+
+    /// Whether it is a folder.
+    pub(crate) fn is_folder(&self) -> bool {
+        self.kind == Kind::Folder
+    }
+
+    /// Whether it is the standard output of the program.
+    pub fn is_stdout(&self) -> bool {
+        self.kind == Kind::Descriptor(1)
+    }
+
+    /// Whether it is the standard error of the program.
+    pub(crate) fn is_stderr(&self) -> bool {
+        self.kind == Kind::Descriptor(2)
+    }
+}
+
+/// N of `/proc/self/fd/N`, under whatever name: the link there leads to no name that could be opened again.
+fn descriptor(path: &Path) -> Option<u32> {
+    let folder = folder(path).canonicalize().ok()?;
+    let is_open = folder.starts_with("/proc") && folder.ends_with("fd");
+    path.file_name()?.to_str()?.parse().ok().filter(|_| is_open)
+}
+
+/// The folder that a file is in.
+pub(crate) fn folder(path: &Path) -> &Path {
+    path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
+}
+
+/// What makes two names the same file: device and inode, or those of the folder and a name where there is no file
+/// yet. Other spellings, links and hard links are the same.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Identity {
+    key: Key,
+    name: Option<OsString>,
+}
+
+#[cfg(unix)]
+type Key = (u64, u64);
+#[cfg(not(unix))]
+type Key = PathBuf;
+
+impl Identity {
+    /// Of what `path` leads to. `None` for devices, which nothing can be lost in, and for names that lead nowhere.
+    pub fn of(path: &Path) -> Option<Self> {
+        if let Ok(data) = fs::metadata(path) {
+            return Some(Self { key: key(path, &data)?, name: None });
+        }
+        let path = Place::of(path).ok()?.path;
+        let folder = folder(&path);
+        let key = key(folder, &fs::metadata(folder).ok()?)?;
+        Some(Self { key, name: Some(path.file_name()?.to_owned()) })
+    }
+
+    /// Of an open file or pipe.
+    #[cfg(unix)]
+    pub fn of_open(file: impl std::os::fd::AsFd) -> Option<Self> {
+        let file = fs::File::from(file.as_fd().try_clone_to_owned().ok()?);
+        Some(Self { key: key(Path::new(""), &file.metadata().ok()?)?, name: None })
+    }
+
+    /// Not known.
+    #[cfg(not(unix))]
+    pub fn of_open<T>(_: T) -> Option<Self> {
+        None
+    }
+}
+
+#[cfg(unix)]
+fn key(_: &Path, data: &Metadata) -> Option<Key> {
+    use std::os::unix::fs::{FileTypeExt, MetadataExt};
+    (!data.file_type().is_char_device()).then(|| (data.dev(), data.ino()))
+}
+
+#[cfg(not(unix))]
+fn key(path: &Path, _: &Metadata) -> Option<Key> {
+    path.canonicalize().ok()
+}
+
+#[cfg(all(test, unix))]
+mod tests {
+    use super::*;
+    use std::os::unix::fs::symlink;
+
+    /// A folder that is empty, with what `fill` puts into it.
+    fn in_folder(name: &str, check: impl FnOnce(&Path)) {
+        let folder = std::env::temp_dir().join(format!("halflight-place-{name}-{}", std::process::id()));
+        fs::create_dir_all(folder.join("sub")).unwrap();
+        check(&folder);
+        fs::remove_dir_all(folder).unwrap();
+    }
+
+    #[test]
+    fn one_file_has_one_identity_under_all_its_names() {
+        in_folder("names", |folder| {
+            let file = folder.join("a");
+            fs::write(&file, "a").unwrap();
+            fs::write(folder.join("b"), "a").unwrap();
+            symlink("a", folder.join("link")).unwrap();
+            symlink("../link", folder.join("sub/chain")).unwrap();
+            fs::hard_link(&file, folder.join("hard")).unwrap();
+            let identity = Identity::of(&file);
+            assert!(identity.is_some());
+            for name in ["./a", "sub/../a", "link", "sub/chain", "hard"] {
+                assert_eq!(Identity::of(&folder.join(name)), identity, "{name}");
+            }
+            assert_ne!(Identity::of(&folder.join("b")), identity);
+        });
+    }
+
+    #[test]
+    fn files_that_are_not_there_yet_have_one_too() {
+        in_folder("missing", |folder| {
+            symlink("new", folder.join("link")).unwrap();
+            symlink("sub", folder.join("other")).unwrap();
+            assert_eq!(Identity::of(&folder.join("link")), Identity::of(&folder.join("sub/../new")));
+            assert_eq!(Identity::of(&folder.join("sub/x")), Identity::of(&folder.join("other/x")));
+            assert_ne!(Identity::of(&folder.join("sub/x")), Identity::of(&folder.join("x")));
+            assert_eq!(Identity::of(&folder.join("none/x")), None);
+            assert_eq!(Identity::of(Path::new("/dev/null")), None, "nothing can be lost there");
+        });
+    }
+
+    #[test]
+    fn links_lead_to_what_is_not_there_and_never_in_circles() {
+        in_folder("links", |folder| {
+            symlink("sub/new", folder.join("link")).unwrap();
+            symlink("y", folder.join("x")).unwrap();
+            symlink("x", folder.join("y")).unwrap();
+            let place = Place::of(&folder.join("link")).unwrap();
+            assert_eq!((place.path(), place.is_stream()), (&*folder.join("sub/new"), false));
+            assert!(Place::of(&folder.join("x")).unwrap_err().to_string().contains("circle"));
+            assert!(Place::of(Path::new("/dev/null")).unwrap().is_stream());
+            assert!(Place::of(Path::new("/dev/stdout")).unwrap().is_stdout());
+        });
+    }
+}
