@@ -2,6 +2,7 @@
 //! when a path ends.
 
 use crate::Rgb;
+use crate::bsdf::{Bsdf, BsdfSample};
 use crate::film::Dropped;
 use crate::light::Lights;
 
@@ -117,6 +118,22 @@ pub(super) const MAX_CROSSINGS: u32 = 1024;
 /// See [`MAX_CROSSINGS`].
 pub(super) const MAX_VERTICES: u32 = 1 << 13;
 
+/// Vertices after which total reflection ends a path as well. Light that glass has held for so long does not leave it
+/// in theory; in practice a ray in 10⁴ slips out by rounding where it meets an edge, and over thousands of reflections
+/// that is much of the light. A light guide has a hundred.
+const TRAPPED_FROM: u32 = 256;
+
+/// Whether a path is cut at the end of its `segments`th segment, where `bsdf` sends it on by `sample`: it is
+/// unfinished then.
+#[inline]
+pub(super) fn is_cut(segments: u32, bsdf: &Bsdf, sample: &BsdfSample) -> bool {
+    if segments < TRAPPED_FROM {
+        return false;
+    }
+    let is_total = bsdf.transmits() && sample.delta && !sample.transmitted && sample.pdf >= 1.0;
+    is_total || segments >= MAX_VERTICES
+}
+
 /// Weight of a sample that was drawn with density `own` where another technique has density `other`: the power
 /// heuristic (Veach and Guibas 1995, §4.1), for any two numbers but two zeros.
 #[inline]
@@ -140,7 +157,7 @@ const CERTAIN_FROM: f32 = 0.25;
 /// From this many segments on nothing survives for certain, so that paths end even between perfect mirrors: of those
 /// that lose nothing 1 / n come to n times this length, and carry n times the light. Any fixed probability would
 /// make the variance of light that loses less than half as much infinite.
-const CERTAIN_BELOW: u32 = 16;
+pub(super) const CERTAIN_BELOW: u32 = 16;
 
 /// From this many on they end soon.
 const ENDLESS: u32 = 2048;

@@ -4,7 +4,7 @@
 //! All paths of a task advance together, so that the tracer sees batches of rays. Path `i` of map `n` follows from
 //! (seed, n, i) alone, or from other numbers that are given for it (`chain.rs`).
 
-use super::estimator::{Counters, MAX_CROSSINGS, MAX_VERTICES};
+use super::estimator::{CERTAIN_BELOW, Counters, MAX_CROSSINGS, is_cut};
 use crate::bsdf::{Bsdf, BsdfSample, Features};
 use crate::bvh::{Bvh, Coherence};
 use crate::geometry::{Hit, Ray};
@@ -56,6 +56,8 @@ pub(super) struct State {
     pub others: f32,
     /// 1 where the last surface only mirrors or refracts.
     pub mirrored: u32,
+    /// Probability with which it has come so far.
+    survived: f32,
 }
 
 /// Where a path meets a surface.
@@ -199,6 +201,7 @@ impl<F: Features> Flight<'_, F> {
                     light: emitted.light,
                     cell: emitted.cell,
                     origin: emitted.ray.origin,
+                    survived: 1.0,
                     ..State::default()
                 };
                 rays[active] = Ray { tag: i as u32, ..emitted.ray };
@@ -283,18 +286,27 @@ impl<F: Features> Flight<'_, F> {
         }
         // Power that goes on is the same where it can be: what is absorbed ends paths.
         let survival = (next.max_element() / power.max_element()).min(onward.most);
+        let survival = survival.min(reaching(state.segments + 1) / state.survived);
         if !(survival > 0.0 && numbers.single(first + ROULETTE) < survival && next.is_finite()) {
             return None;
         }
-        if state.segments >= MAX_VERTICES {
+        if is_cut(state.segments, &bsdf, &sample) {
             counters.dropped.unfinished += 1;
             return None;
         }
         state.power = (next / survival).to_array();
         state.segments += 1;
         state.triangle = hit.triangle;
+        state.survived *= survival;
         Some(point.spawn(towards))
     }
+}
+
+/// The share of paths that come to so many segments at most. Between perfect mirrors, and by total reflection in a
+/// piece of glass, nothing else ends them; where a fortieth of the light is lost at each surface, fewer come so far.
+/// The paths carry more power instead, as those of the path tracer do (`survival` in `estimator.rs`): there is no bias.
+fn reaching(segments: u32) -> f32 {
+    CERTAIN_BELOW as f32 / segments.max(CERTAIN_BELOW) as f32
 }
 
 /// Where the photons of a task go.

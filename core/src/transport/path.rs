@@ -24,7 +24,7 @@ use super::arrivals::{Arrivals, TO_ENVIRONMENT};
 use super::cached::Caches;
 use super::density::{Gathered, PhotonLight};
 use super::estimator::{
-    Counters, MAX_CROSSINGS, MAX_VERTICES, PathSettings, dimension, environment_heuristic, power_heuristic,
+    Counters, MAX_CROSSINGS, PathSettings, dimension, environment_heuristic, is_cut, power_heuristic,
     survival,
 };
 use super::images::{Images, Way};
@@ -602,7 +602,7 @@ impl<'a, F: Features> PathTracer<'a, F> {
         if throughput == Rgb::ZERO {
             return None;
         }
-        if segments >= MAX_VERTICES {
+        if is_cut(segments, &bsdf, &sample) {
             counters.dropped.unfinished += 1;
             return None;
         }

@@ -2,7 +2,8 @@
 //! against, and it says in order what that does in pieces.
 
 use super::estimator::{
-    MAX_CROSSINGS, MAX_VERTICES, PathSettings, dimension, environment_heuristic, power_heuristic, survival,
+    MAX_CROSSINGS, MAX_VERTICES, PathSettings, dimension, environment_heuristic, is_cut, power_heuristic,
+    survival,
 };
 use super::outline::{self, is_outlined};
 use super::shadow::{passing, shadow_ray};
@@ -131,7 +132,7 @@ pub fn radiance(
             }
             throughput /= survival;
         }
-        if throughput == Rgb::ZERO {
+        if throughput == Rgb::ZERO || is_cut(segments, &bsdf, &scattered) {
             break;
         }
         pdf = if scattered.delta { f32::INFINITY } else { scattered.pdf };
