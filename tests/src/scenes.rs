@@ -277,6 +277,17 @@ pub fn everything() -> SceneBuffers {
     scene
 }
 
+/// A unit room with a lamp of `opacity` and radiance `radiance` under its ceiling, which is behind the camera.
+pub fn room_with_lamp(opacity: f32, radiance: f32) -> SceneBuffers {
+    let camera = Camera::look_at(Vec3::new(0.5, 0.6, 0.05), Vec3::new(0.5, 0.2, 1.0), Vec3::Y, 60.0);
+    let mut buffers = SceneBuffers::new(camera);
+    let wall = buffers.material(Material::diffuse(Rgb::splat(0.5)));
+    let lamp = buffers.material(Material { opacity: opacity.into(), ..emitter(0.0, radiance) });
+    buffers.cuboid(Vec3::ZERO, Vec3::ONE, true, wall);
+    buffers.square(Vec3::new(0.5, 0.97, 0.4), Vec3::NEG_Y, 0.15, lamp);
+    buffers
+}
+
 /// A table in a hall of fifty metres with 49 lamps, seen from so near that one light path of a thousand leaves a photon
 /// that is seen.
 pub fn table_in_a_hall() -> SceneBuffers {

@@ -14,7 +14,7 @@ use halflight_core::scene::Scene;
 use halflight_core::transport::gather::{Gathering, Place};
 use halflight_core::transport::overture::{Order, PIXELS, Sight};
 use halflight_core::transport::{Counters, PathSettings, PathTracer, UNLIMITED, reference};
-use halflight_tests::scenes::{cornell_box, everything};
+use halflight_tests::scenes::{cornell_box, everything, room_with_lamp};
 
 /// Mean radiance of the box, from 4 million paths that sampled the lamp uniformly by area.
 const CORNELL_MEAN: [f64; 3] = [0.2123, 0.1509, 0.0652];
@@ -56,7 +56,7 @@ fn bits_do_not_depend_on_threads_or_level() {
 
 #[test]
 fn the_wavefront_is_the_textbook_to_the_bit_for_any_wave() {
-    for buffers in [cornell_box(), everything()] {
+    for buffers in [cornell_box(), everything(), room_with_lamp(0.3, 5.0)] {
         let scene = buffers.scene();
         let settings = PathSettings { width: 24, height: 20, seed: 3, max_depth: UNLIMITED, reuse: false };
         let samples = 0..3;

@@ -394,6 +394,13 @@ impl<'a, F: Features> PathTracer<'a, F> {
         if hit.triangle == path.triangle || (segments == 1 && point.is_left_by(ray)) {
             return path.cross(point.spawn(direction), hit, counters);
         }
+        let sampler = Sampler::new(self.settings.seed, path.pixel, path.sample);
+        if F::CUTOUT && point.material.has_cutout() {
+            let opacity = point.material.opacity.at::<F>(scene, point.uv);
+            if sampler.single(dimension::CROSSING + u32::from(path.crossings)) >= opacity {
+                return path.cross(point.spawn(direction), hit, counters);
+            }
+        }
         if point.material.emits() && path.share.sees_lamps() {
             let radiance = emitted(scene, hit.triangle, point.uv, point.front);
             if radiance != Rgb::ZERO && !self.leaves_to_image(path) {
@@ -410,13 +417,6 @@ impl<'a, F: Features> PathTracer<'a, F> {
                     });
                 }
                 path.add(throughput * radiance * weight);
-            }
-        }
-        let sampler = Sampler::new(self.settings.seed, path.pixel, path.sample);
-        if F::CUTOUT && point.material.has_cutout() {
-            let opacity = point.material.opacity.at::<F>(scene, point.uv);
-            if sampler.single(dimension::CROSSING + u32::from(path.crossings)) >= opacity {
-                return path.cross(point.spawn(direction), hit, counters);
             }
         }
         if segments >= self.settings.max_depth {

@@ -61,15 +61,6 @@ pub fn radiance(
         // Rounding, or a hole in the surface: on in the same direction.
         let opacity = point.material.opacity.at::<All>(scene, point.uv);
         let met_again = hit.triangle == left || (segments == 1 && point.is_left_by(&ray));
-
-        // Light from the surface itself.
-        let seen = emitted(scene, hit.triangle, point.uv, point.front);
-        if seen != Rgb::ZERO && !met_again && !(is_outlined && segments == 1) {
-            let distance = from.distance(point.position);
-            let light_pdf = lights.pdf_hit(scene, from, from_normal, hit.triangle, distance, direction);
-            let weight = if pdf == f32::INFINITY { 1.0 } else { power_heuristic(pdf, light_pdf) };
-            radiance += throughput * seen * weight;
-        }
         let transparent =
             point.material.has_cutout() && sampler.single(dimension::CROSSING + crossings) >= opacity;
         if met_again || transparent {
@@ -77,6 +68,15 @@ pub fn radiance(
             left = hit.triangle;
             crossings += 1;
             continue;
+        }
+
+        // Light from the surface itself.
+        let seen = emitted(scene, hit.triangle, point.uv, point.front);
+        if seen != Rgb::ZERO && !(is_outlined && segments == 1) {
+            let distance = from.distance(point.position);
+            let light_pdf = lights.pdf_hit(scene, from, from_normal, hit.triangle, distance, direction);
+            let weight = if pdf == f32::INFINITY { 1.0 } else { power_heuristic(pdf, light_pdf) };
+            radiance += throughput * seen * weight;
         }
         if segments >= max_depth {
             break;
