@@ -69,6 +69,7 @@ fn wrong_usage_is_refused_before_anything_is_written() {
         ("info missing.toml", "missing.toml"),
         ("bench", "rays"),
         ("bench rays missing.obj", "missing.obj"),
+        ("bench rays scene.obj --size 0x9", "640x480"),
         ("bench rays scene.obj --simd mmx", "baseline, avx2, avx512"),
     ] {
         let said = folder.refused(arguments);
@@ -279,6 +280,13 @@ fn bench_rays_measures_the_cornell_box() {
     assert_eq!(object["rays"]["primary"], 1024 * 1024);
     assert_eq!(object["hits"]["primary"], object["rays"]["diffuse"], "one bounce from each hit");
     assert_eq!(files(&folder.0), 2, "nothing is written");
+
+    // Neither is a multiple of a tile.
+    let object = folder.object(&format!("bench rays {cornell} --size 37x21 --simd baseline --json"));
+    assert_eq!((&object["width"], &object["height"]), (&37.into(), &21.into()));
+    assert_eq!(object["rays"]["primary"], 37 * 21);
+    assert_eq!(object["hits"]["primary"], object["rays"]["diffuse"]);
+    assert_eq!(object["rays"]["shadow"], object["rays"]["diffuse"]);
 
     let away = "bench rays scene.obj --eye 0,0,9 --look-at 0,0,10 --json";
     let object = folder.object(away);

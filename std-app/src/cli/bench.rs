@@ -8,7 +8,7 @@ use super::view::View;
 use super::{say, values, warn};
 use clap::{Args, Subcommand};
 use halflight::bench::REPETITIONS;
-use halflight::bench::rays::{self, RaysReport, RivalReport, SIDE, geometric_mean};
+use halflight::bench::rays::{self, RaysReport, RivalReport, SIZE, geometric_mean};
 use halflight::load::{self, LoadOptions};
 use halflight_simd::{Level, Tier};
 use serde_json::{Map, Value, json};
@@ -32,13 +32,16 @@ enum Kernel {
 
 /// Rays per second on one thread
 ///
-/// Camera rays of a square picture in tiles, one cosine-distributed bounce from each point that they meet,
+/// Camera rays of a picture in tiles, one cosine-distributed bounce from each point that they meet,
 /// and shadow rays: the same, at most a quarter of the diagonal of the scene long. A program built with the
 /// feature `embree` measures Embree in turn.
 #[derive(Args)]
 struct Rays {
     /// The scene: a mesh (.obj) or a scene file (.toml)
     scene: PathBuf,
+    /// Size of the picture: one camera ray for each pixel [default: 1024x1024]
+    #[arg(long, value_name = "WxH", value_parser = values::size)]
+    size: Option<[u32; 2]>,
     #[command(flatten)]
     view: View,
     /// Highest instruction set to use: baseline, avx2 or avx512 [default: the processor's]
@@ -69,7 +72,7 @@ impl Rays {
         let scene = views.scene(self.view.camera(&loaded)?);
         let level = Level::detect();
         let level = self.simd.map_or(level, |tier| level.capped(tier));
-        let report = rays::run(&scene, level)?;
+        let report = rays::run(&scene, level, self.size.unwrap_or(SIZE))?;
         say(&if self.json { object(&report).to_string() } else { text(&report) })?;
         Ok(ExitCode::SUCCESS)
     }
@@ -83,6 +86,8 @@ fn object(report: &RaysReport) -> Value {
     };
     let mut object = json!({
         "level": report.level.name(),
+        "width": report.size[0],
+        "height": report.size[1],
         "build_seconds": report.build_seconds,
         "bytes_per_triangle": report.bytes_per_triangle(),
         "mrays_per_second": by_class(report.classes.iter().map(|c| c.mrays_per_second.into()).collect()),
@@ -109,9 +114,10 @@ fn object(report: &RaysReport) -> Value {
 
 /// The lines for a person.
 fn text(report: &RaysReport) -> String {
+    let [width, height] = report.size;
     let mut lines = vec![
         format!(
-            "{} triangles, one thread, {}; medians of {REPETITIONS}, Mray/s; {SIDE}x{SIDE} camera rays",
+            "{} triangles, one thread, {}; medians of {REPETITIONS}, Mray/s; {width}x{height} camera rays",
             report.triangles,
             report.level.name()
         ),

@@ -4,11 +4,12 @@ use halflight_core::Level;
 use halflight_core::bsdf::DiffuseOnly;
 use halflight_core::bvh::{Bvh, Coherence};
 use halflight_core::geometry::{Frame, Hit, Ray};
+use halflight_core::memory::OutOfMemory;
 use halflight_core::sampling::{Sampler, warp};
 use halflight_core::scene::{Scene, SurfacePoint};
 
-/// The picture has so many pixels a side.
-pub const SIDE: u32 = 1024;
+/// Pixels across and down where nothing else is asked for.
+pub const SIZE: [u32; 2] = [1024; 2];
 
 /// Pixels of a tile a side.
 const TILE: u32 = 8;
@@ -19,7 +20,7 @@ const SHADOW_LENGTH: f32 = 0.25;
 /// A kind of rays.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Class {
-    /// Through the middles of the pixels of a square picture, tile by tile; the nearest hit counts.
+    /// Through the middles of the pixels of a picture, tile by tile; the nearest hit counts.
     Primary,
     /// One from each point that the camera sees, cosine-distributed about the normal, in the order of the
     /// primary hits; the nearest hit counts.
@@ -50,17 +51,24 @@ pub(super) struct Rays {
 }
 
 impl Rays {
-    /// The rays of `scene` seen by its camera; `bvh` is the scene's.
-    pub(super) fn of(scene: &Scene, bvh: &Bvh, level: Level) -> Self {
-        let primary: Vec<Ray> = pixels().map(|[x, y]| primary(scene, x, y)).collect();
-        let mut hits = vec![Hit::NONE; primary.len()];
+    /// The rays of `scene` seen by its camera in a picture of `size`; `bvh` is the scene's.
+    ///
+    /// # Errors
+    /// Memory that the system does not give.
+    pub(super) fn of(scene: &Scene, bvh: &Bvh, level: Level, size: [u32; 2]) -> Result<Self, OutOfMemory> {
+        let count = size[0] as usize * size[1] as usize;
+        let mut primary: Vec<Ray> = reserved(count)?;
+        primary.extend(pixels(size).map(|pixel| self::primary(scene, size, pixel)));
+        let mut hits = reserved(count)?;
+        hits.resize(count, Hit::NONE);
         bvh.nearest_batch(level, &primary, Coherence::Coherent, &mut hits);
-        let seen = pixels().zip(primary.iter().zip(&hits)).filter(|(_, (_, hit))| hit.is_some());
-        let diffuse: Vec<Ray> =
-            seen.filter_map(|([x, y], (ray, hit))| bounce(scene, ray, hit, y * SIDE + x)).collect();
+        let seen = pixels(size).zip(primary.iter().zip(&hits)).filter(|(_, (_, hit))| hit.is_some());
+        let mut diffuse: Vec<Ray> = reserved(hits.iter().filter(|hit| hit.is_some()).count())?;
+        diffuse.extend(seen.filter_map(|([x, y], (ray, hit))| bounce(scene, ray, hit, y * size[0] + x)));
         let reach = SHADOW_LENGTH * bvh.bounds().diagonal();
-        let shadow = diffuse.iter().map(|ray| Ray { t_max: reach, ..*ray }).collect();
-        Self { primary, diffuse, shadow }
+        let mut shadow = reserved(diffuse.len())?;
+        shadow.extend(diffuse.iter().map(|ray| Ray { t_max: reach, ..*ray }));
+        Ok(Self { primary, diffuse, shadow })
     }
 
     pub(super) fn of_class(&self, class: Class) -> &[Ray] {
@@ -72,18 +80,27 @@ impl Rays {
     }
 }
 
-/// All pixels, tile by tile.
-pub(super) fn pixels() -> impl Iterator<Item = [u32; 2]> {
-    let tiles_across = SIDE / TILE;
-    (0..SIDE * SIDE).map(move |i| {
-        let (tile, place) = (i / (TILE * TILE), i % (TILE * TILE));
-        [tile % tiles_across * TILE + place % TILE, tile / tiles_across * TILE + place / TILE]
+/// Room for so many, where the system has it.
+fn reserved<T>(count: usize) -> Result<Vec<T>, OutOfMemory> {
+    let mut empty = Vec::new();
+    let needed = count.saturating_mul(size_of::<T>());
+    empty.try_reserve_exact(count).map_err(|_| OutOfMemory { needed, available: 0 })?;
+    Ok(empty)
+}
+
+/// All pixels of a picture, tile by tile; tiles at the right and at the bottom are cut.
+pub(super) fn pixels([width, height]: [u32; 2]) -> impl Iterator<Item = [u32; 2]> {
+    let steps = |side: u32| (0..side).step_by(TILE as usize);
+    let tiles = steps(height).flat_map(move |y| steps(width).map(move |x| [x, y]));
+    tiles.flat_map(move |[left, top]| {
+        let (right, bottom) = (width.min(left + TILE), height.min(top + TILE));
+        (top..bottom).flat_map(move |y| (left..right).map(move |x| [x, y]))
     })
 }
 
-fn primary(scene: &Scene, x: u32, y: u32) -> Ray {
+fn primary(scene: &Scene, [width, height]: [u32; 2], [x, y]: [u32; 2]) -> Ray {
     let middle_of_the_lens = [0.5; 2];
-    scene.camera.ray(SIDE, SIDE, x as f32 + 0.5, y as f32 + 0.5, middle_of_the_lens)
+    scene.camera.ray(width, height, x as f32 + 0.5, y as f32 + 0.5, middle_of_the_lens)
 }
 
 /// A ray that leaves the surface as paths do.

@@ -13,7 +13,7 @@ mod ours;
 mod packets;
 mod report;
 
-pub use classes::{Class, SIDE};
+pub use classes::{Class, SIZE};
 pub use report::{ClassReport, RaysReport, RivalClass, RivalReport, geometric_mean};
 
 use super::{BenchError, REPETITIONS, median};
@@ -58,11 +58,11 @@ fn rival() -> Result<Option<Box<dyn Rival>>, BenchError> {
     Ok(None)
 }
 
-/// Measures `scene` from its camera, with the kernels of `level`.
+/// Measures `scene` from its camera, in a picture of `size` (pixels across and down), with the kernels of `level`.
 ///
 /// # Errors
 /// [`BenchError`] where memory is missing or the rival refuses.
-pub fn run(scene: &Scene, level: Level) -> Result<RaysReport, BenchError> {
+pub fn run(scene: &Scene, level: Level, size: [u32; 2]) -> Result<RaysReport, BenchError> {
     let mesh = &scene.mesh;
     let mut rival = rival()?;
     let (mut build, mut rival_build) = (Vec::new(), Vec::new());
@@ -80,7 +80,7 @@ pub fn run(scene: &Scene, level: Level) -> Result<RaysReport, BenchError> {
 
     let mut memory = Pages::default();
     let bvh = ours::build(mesh, level, &mut memory)?;
-    let rays = Rays::of(scene, &bvh, level);
+    let rays = Rays::of(scene, &bvh, level, size)?;
     let mut classes = Vec::new();
     let mut rival_classes = Vec::new();
     for class in Class::ALL {
@@ -100,6 +100,7 @@ pub fn run(scene: &Scene, level: Level) -> Result<RaysReport, BenchError> {
     }
     Ok(RaysReport {
         level,
+        size,
         triangles: mesh.triangles.len(),
         build_seconds: median(build),
         bytes: bvh.used().bytes(),

@@ -8,6 +8,8 @@ use halflight_core::Level;
 pub struct RaysReport {
     /// The instruction set of our kernels.
     pub level: Level,
+    /// Pixels across and down: one camera ray for each.
+    pub size: [u32; 2],
     /// Triangles of the scene.
     pub triangles: usize,
     /// Seconds to build the hierarchy, the memory for it included.

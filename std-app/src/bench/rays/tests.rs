@@ -22,7 +22,7 @@ fn in_the_box(check: impl FnOnce(&Scene, &halflight_core::bvh::Bvh)) {
 fn bounces_leave_the_surface_cosine_distributed() {
     in_the_box(|scene, bvh| {
         let level = Level::detect();
-        let rays = Rays::of(scene, bvh, level);
+        let rays = Rays::of(scene, bvh, level, SIZE).unwrap();
         let [primary, diffuse, shadow] = Class::ALL.map(|class| rays.of_class(class));
         let mut bounces = diffuse.iter();
         let (mut cosines, mut count) = (0.0, 0);
@@ -52,12 +52,13 @@ fn bounces_leave_the_surface_cosine_distributed() {
 
 #[test]
 fn tiles_cover_the_picture() {
-    let mut seen = vec![false; (SIDE * SIDE) as usize];
-    for [x, y] in classes::pixels() {
-        seen[(y * SIDE + x) as usize] = true;
+    for size in [SIZE, [8, 8], [13, 9], [1, 20], [20, 1]] {
+        let mut seen = vec![0; (size[0] * size[1]) as usize];
+        classes::pixels(size).for_each(|[x, y]| seen[(y * size[0] + x) as usize] += 1);
+        assert!(seen.iter().all(|&times| times == 1), "{size:?}");
     }
-    assert!(seen.into_iter().all(|seen| seen));
-    assert_eq!(classes::pixels().nth(64 + 9), Some([9, 1]));
+    assert_eq!(classes::pixels(SIZE).nth(64 + 9), Some([9, 1]));
+    assert_eq!(classes::pixels([13, 9]).nth(64 + 5), Some([8, 1]), "the second tile has five columns");
 }
 
 /// Share of rays that may differ: Embree's test of a triangle is not watertight, and rounds otherwise.
@@ -69,7 +70,7 @@ const DIFFERENT: f64 = 1e-4;
 fn embree_meets_what_we_meet_by_every_entry_point() {
     in_the_box(|scene, bvh| {
         let level = Level::detect();
-        let rays = Rays::of(scene, bvh, level);
+        let rays = Rays::of(scene, bvh, level, SIZE).unwrap();
         let mut rival = embree::Embree::new().unwrap();
         rival.build(&scene.mesh).unwrap();
         for class in Class::ALL {
