@@ -11,6 +11,7 @@ pub(super) static INTERRUPT: AtomicBool = AtomicBool::new(false);
 pub(super) fn listen() -> Result<(), Failure> {
     let heard = || {
         if INTERRUPT.swap(true, Ordering::Relaxed) {
+            halflight::save::abandon();
             std::process::exit(130);
         }
         warn("stopping; once more to stop at once, without a picture");

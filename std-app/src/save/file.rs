@@ -2,12 +2,13 @@
 //! is written beside its place and then renamed into it, so that whenever the program ends the old file or the new
 //! one is there, whole.
 
+use super::part::Part;
 use super::place::{Place, folder};
 use super::stream::{self, Patience};
 use super::{Format, Image, PictureError, decode, encode};
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, BufWriter, Write};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// Longest file that is read, in bytes.
 const MAX_FILE: u64 = 8 << 30;
@@ -66,32 +67,15 @@ pub(crate) fn replace_with(
         put(&mut bytes)?;
         return stream::write(&place, bytes, patience);
     }
-    let part = part(place.path());
-    let written =
-        create(&part).and_then(|file| fill(file, put)).and_then(|()| fs::rename(&part, place.path()));
-    match &written {
-        // The new name is on the disk when the folder is. Where folders cannot be opened there is nothing to do.
-        Ok(()) => {
-            let _ = File::open(folder(place.path())).and_then(|folder| folder.sync_all());
-        }
-        // Of no use to anybody; if even this fails the first error says why.
-        Err(_) => {
-            let _ = fs::remove_file(&part);
-        }
-    }
-    written
+    let (part, file) = Part::create(place.path())?;
+    fill(file, put)?;
+    part.rename(place.path())
 }
 
 fn fill(file: File, put: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> io::Result<()> {
     let mut file = BufWriter::with_capacity(BUFFER, file);
     put(&mut file)?;
     file.into_inner().map_err(io::IntoInnerError::into_error)?.sync_all()
-}
-
-/// A file of its own: what a program of the same number has left there when it was killed is removed.
-fn create(part: &Path) -> io::Result<File> {
-    let _ = fs::remove_file(part);
-    File::create_new(part)
 }
 
 /// Finds out, before a long render, whether [`write()`] will find its way: the extension is known, the
@@ -122,18 +106,8 @@ pub(crate) fn check_place(path: &Path) -> Result<(), String> {
     {
         return Err(not_written(&error));
     }
-    let part = part(target);
-    let created = create(&part).map(|_| ());
-    let _ = fs::remove_file(&part);
-    created.map_err(|error| format!("cannot be written in {}: {}", folder.display(), words(&error)))
-}
-
-/// Where a file is while it is written.
-fn part(path: &Path) -> PathBuf {
-    let mut name = std::ffi::OsString::from(".");
-    name.push(path.file_name().unwrap_or_default());
-    name.push(format!(".{}.part", std::process::id()));
-    folder(path).join(name)
+    let created = Part::create(target);
+    created.map(drop).map_err(|error| format!("cannot be written in {}: {}", folder.display(), words(&error)))
 }
 
 /// Why a file is not there, or not the new one.
