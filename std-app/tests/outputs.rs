@@ -192,6 +192,14 @@ fn one_output_that_fails_leaves_all_others() {
     assert!(said.contains("error: a.pfm") && said.contains("error: c.film"), "{said}");
     assert!(read(&folder.path("c.png")).is_ok());
     assert!(!folder.path("a.pfm").exists() && !folder.path("c.film").exists());
+
+    // The same of caches: 1 kB, which the picture does not need.
+    let script = "ulimit -f 2; exec $H render scene.obj --spp 1 --method irradiance-cache \
+        -o tiny.png --size 8x8 --save-cache c.cache";
+    let output = shell(&folder, script);
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(2), "{said}");
+    assert!(said.contains("note: c.cache") && said.contains("error: c.cache"), "{said}");
     assert!(contents(&folder.0).iter().all(|(name, _)| !name.ends_with(".part")));
 }
 

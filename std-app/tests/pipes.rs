@@ -72,7 +72,13 @@ fn a_pipe_that_nobody_reads_costs_nothing_else() {
     let folder = Folder::new("nobody");
     pipe(&folder, "a.png");
     let start = Instant::now();
-    let output = folder.run("render scene.obj --size 8x8 --spp 1 -o a.png -o b.png");
+    let mut command = folder.command("render scene.obj --size 8x8 --spp 1 -o a.png -o b.png");
+    let mut child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    while !folder.path("b.png").exists() {
+        sleep(Duration::from_millis(10));
+        assert!(child.try_wait().unwrap().is_none(), "files are written before it waits");
+    }
+    let output = child.wait_with_output().unwrap();
     assert_eq!(output.status.code(), Some(2));
     assert!(
         words(&output).contains("a.png") && words(&output).contains("nobody reads"),

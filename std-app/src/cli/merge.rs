@@ -33,7 +33,7 @@ impl Merge {
         self.output.iter().try_for_each(|output| outputs.plan(Role::Picture, output))?;
         self.films.iter().try_for_each(|film| outputs.spare(film))?;
         let merged = drive::merge(&self.films)?;
-        let saved: Vec<_> = self.output.iter().filter(|output| outputs.save(output, &merged.image)).collect();
+        let saved = outputs.save_to(&self.output, &merged.image);
         let results =
             if self.json { self.object(&merged, &saved).to_string() } else { self.text(&merged, &saved) };
         Ok(outputs.end(&results, ExitCode::SUCCESS))

@@ -155,6 +155,16 @@ impl Outputs {
         saved.map_err(|error| self.fail(error)).is_ok()
     }
 
+    /// Writes a picture to all of `paths`, to files before it waits for readers of pipes; where it is.
+    pub(super) fn save_to<'p>(&mut self, paths: &'p [PathBuf], image: &Image) -> Vec<&'p PathBuf> {
+        let is_stream = |path: &PathBuf| Place::of(path).is_ok_and(|place| place.is_stream());
+        let mut order: Vec<usize> = (0..paths.len()).collect();
+        order.sort_by_key(|&i| is_stream(&paths[i]));
+        order.retain(|&i| self.save(&paths[i], image));
+        order.sort_unstable();
+        order.into_iter().map(|i| &paths[i]).collect()
+    }
+
     /// Writes a report; whether its page is there.
     pub(super) fn report(&mut self, folder: &Path, files: &Files) -> bool {
         let failed = report::write_folder(folder, files, self.patience());

@@ -124,8 +124,7 @@ impl Render {
         let result = result.map_err(|error| shot::explain(&self.scene, &error))?;
 
         result.unsaved.iter().for_each(|error| outputs.fail(error.clone()));
-        let saved: Vec<_> =
-            pictures.into_iter().filter(|picture| outputs.save(picture, &result.image)).collect();
+        let saved: Vec<_> = outputs.save_to(&pictures, &result.image).into_iter().cloned().collect();
         let comparison = match &settings.reference {
             Some(reference) => Some(compare(&result.image, reference)?),
             None => None,

@@ -3,6 +3,7 @@
 
 use super::failure::Failure;
 use core::fmt::Display;
+use halflight::save::Identity;
 use std::io::{self, Write, stderr, stdout};
 
 /// Prints a result.
@@ -16,12 +17,20 @@ pub(super) fn say(text: &str) -> Result<(), Failure> {
 /// What a write to standard output means.
 pub(super) fn heard(written: io::Result<()>) -> Result<(), Failure> {
     match written {
-        Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
+        Err(error) if !is_gone(&error) => {
             let why = format!("the results could not be written to standard output: {error}");
             Err(Failure::new(why))
         }
         _ => Ok(()),
     }
+}
+
+/// Whether nobody reads any more: the pipe or the terminal is closed.
+fn is_gone(error: &io::Error) -> bool {
+    /// Of a terminal that is closed, and of a file on a disk that is broken.
+    const INPUT_OUTPUT: i32 = 5;
+    let is_file = || Identity::of_open(stdout()).is_some();
+    error.kind() == io::ErrorKind::BrokenPipe || (error.raw_os_error() == Some(INPUT_OUTPUT) && !is_file())
 }
 
 /// Prints a line for a person, on standard error.
