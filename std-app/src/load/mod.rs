@@ -14,6 +14,7 @@ pub mod mtl;
 mod name;
 mod notes;
 pub mod obj;
+mod relief;
 mod scene;
 pub mod scene_file;
 mod settings;

@@ -4,6 +4,8 @@
 use super::map::Map;
 use super::mtl::MtlMaterial;
 use super::notes::Notes;
+use super::relief::Relief;
+use super::scene_file::BRIGHTEST;
 use super::texture_set::TextureSet;
 use halflight_core::Rgb;
 use halflight_core::scene::{ColorInput, Material, NormalMap, ScalarInput, Surface};
@@ -13,10 +15,18 @@ use halflight_core::scene::{ColorInput, Material, NormalMap, ScalarInput, Surfac
 const PLASTIC_TOLERANCE: f64 = 0.05;
 /// Index of refraction where a file has glass or a PBR coat without `Ni`.
 const DEFAULT_IOR: f64 = 1.5;
+/// A base whose brightest channel reflects less is black beside a mirror or a glass: some exporters do not write 0.
+const DARK_BASE: f64 = 0.02;
+/// How far `Ni` may be from 1 and still bend no ray.
+const INDEX_TOLERANCE: f64 = 1e-3;
+/// Heights of a bump map without `-bm`, in lengths of a texture-coordinate unit: a picture of a square metre of
+/// bricks has joints a centimetre deep.
+const DEFAULT_BUMP: f64 = 0.01;
 
 /// The core's material for what the file says, with views of the textures that it needs.
 pub(super) fn resolve(mtl: &MtlMaterial, textures: &mut TextureSet, notes: &mut Notes) -> Material {
     let mut resolver = Resolver { mtl, textures, notes };
+    resolver.note_what_illum_loses();
     let surface = resolver.surface();
     Material {
         surface,
@@ -25,6 +35,41 @@ pub(super) fn resolve(mtl: &MtlMaterial, textures: &mut TextureSet, notes: &mut 
         opacity: resolver.opacity(),
         normal_map: resolver.normal_map(),
     }
+}
+
+/// Whether `illum` makes a boundary between two media of the material, and nothing speaks against it: a metal is no
+/// glass; `Ni 1` bends no ray, and exporters write it for what is opaque; glass without ray tracing (`illum 9`) that
+/// has a `d` is what shows through by opacity; and without `Ni` and `Tf`, `illum 4` and `9` say less than a `Kd`.
+fn is_glass(mtl: &MtlMaterial) -> bool {
+    let Some(model @ (4 | 6 | 7 | 9)) = mtl.illumination else { return false };
+    let has_base = has_base(mtl);
+    let is_metal = mtl.metallic.is_some_and(|pm| pm > 0.0) || mtl.metallic_map.is_some();
+    let is_cut_out = mtl.opacity.is_some_and(|d| d < 1.0) || mtl.opacity_map.is_some();
+    let filters = mtl.tint.is_some_and(|tint| tint != [1.0; 3]);
+    match index(mtl) {
+        _ if is_metal => false,
+        Some(ni) if (ni - 1.0).abs() <= INDEX_TOLERANCE => filters && !has_base,
+        Some(_) => !(model == 9 && is_cut_out && has_base && mtl.tint.is_none()),
+        None => matches!(model, 6 | 7) || mtl.tint.is_some() || !has_base,
+    }
+}
+
+/// Whether there is a diffuse base that can be seen.
+fn has_base(mtl: &MtlMaterial) -> bool {
+    mtl.diffuse_map.is_some() || mtl.diffuse.is_some_and(|kd| kd.iter().any(|&x| x > DARK_BASE))
+}
+
+/// `Ni`, where it can be one: within the limits of the MTL specification, with room.
+fn index(mtl: &MtlMaterial) -> Option<f64> {
+    mtl.ior.filter(|ior| (0.001..=100.0).contains(ior))
+}
+
+/// Whether `Pr`, `Pm` or a map of them says what the surface is.
+fn is_pbr(mtl: &MtlMaterial) -> bool {
+    mtl.roughness.is_some()
+        || mtl.roughness_map.is_some()
+        || mtl.metallic.is_some_and(|pm| pm > 0.0)
+        || mtl.metallic_map.is_some()
 }
 
 /// Scale and offset that all the maps of a material share, applied to its texture coordinates by the loader.
@@ -64,28 +109,46 @@ struct Resolver<'a> {
 }
 
 impl Resolver<'_> {
+    /// `illum` decides what nothing more precise says: `Pr`, `Pm` and their maps win, and a diffuse base stays.
     fn surface(&mut self) -> Surface {
-        let mtl = self.mtl;
-        let is_glass = matches!(mtl.illumination, Some(4 | 6 | 7 | 9));
+        if is_glass(self.mtl) {
+            return self.glass();
+        }
+        let base = self.diffuse();
         let metallic = self.metallic();
-        let is_metal = metallic.texture.is_none() && metallic.value >= 1.0;
-        let is_polished = is_metal && mtl.roughness == Some(0.0) && mtl.roughness_map.is_none();
-        if is_glass {
-            self.glass()
-        } else if mtl.illumination == Some(3) || is_polished {
-            let reflectance = if self.has_specular() { self.specular() } else { self.diffuse() };
-            Surface::Mirror { reflectance }
-        } else if mtl.illumination == Some(5) {
-            // Mirror reflection with Fresnel's law: a metal without roughness.
-            let reflectance = if self.has_specular() { self.specular() } else { self.diffuse() };
-            Surface::Conductor { reflectance, roughness: 0.0.into() }
-        } else if is_metal {
-            let diffuse = self.diffuse();
-            let reflectance =
-                if is_black(&diffuse) && self.has_specular() { self.specular() } else { diffuse };
-            Surface::Conductor { reflectance, roughness: self.roughness() }
+        if metallic.texture.is_none() && metallic.value >= 1.0 {
+            self.metal(base)
+        } else if metallic == 0.0.into() && self.is_mirror(&base) {
+            self.mirror(base)
         } else {
-            self.coated(metallic)
+            self.coated(base, metallic)
+        }
+    }
+
+    fn note_what_illum_loses(&mut self) {
+        let mtl = self.mtl;
+        let Some(model) = mtl.illumination else { return };
+        let name = &mtl.name;
+        let mut note = |what: String| self.notes.add(1, what);
+        let shines = mtl.specular.is_some_and(|ks| ks != [0.0; 3]) || mtl.specular_map.is_some();
+        match model {
+            0 | 1 if shines && !is_pbr(mtl) => {
+                note(format!("`Ks` of material `{name}` left out: `illum {model}` has no highlight"));
+            }
+            4 | 6 | 7 | 9 if is_glass(mtl) && has_base(mtl) => {
+                note(format!("`Kd` of material `{name}` left out: `illum {model}` is glass"));
+            }
+            4 | 6 | 7 | 9 if !is_glass(mtl) => {
+                let tint = mtl.tint.filter(|&tint| tint != [1.0; 3]);
+                let lost = if tint.is_some() { ", `Tf` left out" } else { "" };
+                note(format!(
+                    "material `{name}` is no glass in spite of `illum {model}`{lost}: docs/loading.md"
+                ));
+            }
+            3 | 5 if mtl.metallic.is_some_and(|pm| pm > 0.0) && has_base(mtl) => {
+                note(format!("`illum {model}` of material `{name}` left out: `Pm` says what it is"));
+            }
+            _ => {}
         }
     }
 
@@ -98,13 +161,50 @@ impl Resolver<'_> {
         Surface::Dielectric { ior: self.ior().unwrap_or(DEFAULT_IOR) as f32, tint, roughness }
     }
 
+    /// A metal of colour `Kd`, or `Ks` where that is black or absent; a perfect mirror where `Pr` is 0.
+    fn metal(&mut self, base: ColorInput) -> Surface {
+        let is_absent = self.mtl.diffuse.is_none() && self.mtl.diffuse_map.is_none();
+        let by_specular = self.has_specular() && (is_black(&base) || is_absent);
+        let reflectance = if by_specular { self.specular() } else { base };
+        if self.mtl.roughness == Some(0.0) && self.mtl.roughness_map.is_none() {
+            return Surface::Mirror { reflectance };
+        }
+        Surface::Conductor { reflectance, roughness: self.roughness() }
+    }
+
+    /// Whether `illum 3` or `5` leaves nothing but a reflection: by `Ks`, with as good as no base, or by `Kd` alone,
+    /// which is its colour then.
+    fn is_mirror(&mut self, base: &ColorInput) -> bool {
+        let Some(model @ (3 | 5)) = self.mtl.illumination else { return false };
+        let is_dark = base.texture.is_none() && f64::from(base.value.max_element()) <= DARK_BASE;
+        let (what, is_mirror) = match (self.has_specular(), is_dark) {
+            (true, true) if is_black(base) => return true,
+            (true, true) => ("is a mirror: its dark `Kd` is left out", true),
+            (true, false) => ("is a reflection `Ks` over its `Kd`", false),
+            (false, _) if base.texture.is_some() => ("is diffuse: there is no `Ks` to reflect by", false),
+            (false, _) => ("is a mirror of colour `Kd`: there is no `Ks`", true),
+        };
+        let name = &self.mtl.name;
+        self.notes.add(1, format!("material `{name}` with `illum {model}` {what}"));
+        is_mirror
+    }
+
+    /// `illum 3` reflects alike at all angles, `illum 5` by Fresnel's law; `Pr` may make either rough.
+    fn mirror(&mut self, base: ColorInput) -> Surface {
+        let reflectance = if self.has_specular() { self.specular() } else { base };
+        let is_smooth = self.mtl.roughness.is_none_or(|pr| pr == 0.0) && self.mtl.roughness_map.is_none();
+        match (self.mtl.illumination, is_smooth) {
+            (Some(3), true) => Surface::Mirror { reflectance },
+            (_, true) => Surface::Conductor { reflectance, roughness: 0.0.into() },
+            (_, false) => Surface::Conductor { reflectance, roughness: self.roughness() },
+        }
+    }
+
     /// Diffuse, under a coat where there is one.
-    fn coated(&mut self, metallic: ScalarInput) -> Surface {
-        let base = self.diffuse();
-        let is_pbr = self.mtl.roughness.is_some() || self.mtl.roughness_map.is_some() || metallic.value > 0.0;
+    fn coated(&mut self, base: ColorInput, metallic: ScalarInput) -> Surface {
         let (specular, ior) = if self.has_specular() {
             (self.specular(), self.plastic_ior())
-        } else if is_pbr {
+        } else if is_pbr(self.mtl) {
             let ior = self.ior().unwrap_or(DEFAULT_IOR);
             (Rgb::splat(fresnel(ior) as f32).into(), Some(ior as f32))
         } else {
@@ -122,16 +222,20 @@ impl Resolver<'_> {
         let specular = self.mtl.specular.filter(|_| self.mtl.specular_map.is_none())?;
         let expected = fresnel(ior);
         let agrees = specular.iter().all(|ks| (ks - expected).abs() <= PLASTIC_TOLERANCE * expected);
-        (self.mtl.illumination == Some(2) && expected > 0.0 && agrees).then_some(ior as f32)
+        (matches!(self.mtl.illumination, Some(2 | 3 | 5)) && expected > 0.0 && agrees).then_some(ior as f32)
     }
 
+    /// Whether `Ks` counts: `illum 0` and `1` have no highlight unless `Pr` or `Pm` speaks of one.
     fn has_specular(&self) -> bool {
-        self.mtl.specular.is_some() || self.mtl.specular_map.is_some()
+        let mtl = self.mtl;
+        let is_matt = matches!(mtl.illumination, Some(0 | 1)) && !is_pbr(mtl);
+        !is_matt && (mtl.specular.is_some() || mtl.specular_map.is_some())
     }
 
     fn specular(&mut self) -> ColorInput {
-        let value = self.reflectance("Ks", self.mtl.specular.unwrap_or([1.0; 3]));
-        ColorInput { value, texture: self.textures.colour(self.mtl.specular_map.as_ref()) }
+        let texture = self.textures.colour(self.mtl.specular_map.as_ref());
+        let factor = self.factor("Ks", self.mtl.specular, [1.0; 3], texture.is_some());
+        ColorInput { value: self.reflectance("Ks", factor), texture }
     }
 
     /// `Kd`; where there is none, white under a map, black where something else is said, else grey.
@@ -144,7 +248,8 @@ impl Resolver<'_> {
             (None, true) if mtl.diffuse_map.is_none() => 0.0,
             (None, _) => 0.5,
         };
-        ColorInput { value: self.reflectance("Kd", mtl.diffuse.unwrap_or([absent; 3])), texture }
+        let factor = self.factor("Kd", mtl.diffuse, [absent; 3], texture.is_some());
+        ColorInput { value: self.reflectance("Kd", factor), texture }
     }
 
     /// sqrt(alpha): `Pr`, else from `Ns` by alpha = sqrt(2 / (Ns + 2)).
@@ -152,44 +257,63 @@ impl Resolver<'_> {
         let mtl = self.mtl;
         let texture = self.textures.scalar(mtl.roughness_map.as_ref());
         let from_shininess = |ns: f64| (2.0 / (ns.max(0.0) + 2.0)).powf(0.25);
-        let value = match (mtl.roughness, texture) {
-            (Some(roughness), _) => roughness,
-            (None, Some(_)) => 1.0,
-            (None, None) => mtl.shininess.map_or(1.0, from_shininess),
-        };
+        // The reflections of `illum 3` and `5` are sharp unless something says how rough they are.
+        let absent = if matches!(mtl.illumination, Some(3 | 5)) { 0.0 } else { 1.0 };
+        let absent = if texture.is_some() { 1.0 } else { mtl.shininess.map_or(absent, from_shininess) };
+        let [value] = self.factor("Pr", mtl.roughness.map(|pr| [pr]), [absent], texture.is_some());
         ScalarInput { value: self.unit("Pr", value), texture }
     }
 
     fn metallic(&mut self) -> ScalarInput {
         let texture = self.textures.scalar(self.mtl.metallic_map.as_ref());
         let absent = if texture.is_some() { 1.0 } else { 0.0 };
-        ScalarInput { value: self.unit("Pm", self.mtl.metallic.unwrap_or(absent)), texture }
+        let [value] = self.factor("Pm", self.mtl.metallic.map(|pm| [pm]), [absent], texture.is_some());
+        ScalarInput { value: self.unit("Pm", value), texture }
     }
 
     fn emission(&mut self) -> ColorInput {
         let texture = self.textures.colour(self.mtl.emission_map.as_ref());
         let absent = if texture.is_some() { 1.0 } else { 0.0 };
-        let value = self.mtl.emission.unwrap_or([absent; 3]);
-        if value.iter().any(|&x| x < 0.0 || x > f64::from(f32::MAX)) {
-            self.notes.add(1, format!("Ke of material `{}` is limited to what light can be", self.mtl.name));
+        let value = self.factor("Ke", self.mtl.emission, [absent; 3], texture.is_some());
+        if value.iter().any(|&x| !(0.0..=BRIGHTEST).contains(&x)) {
+            let name = &self.mtl.name;
+            self.notes.add(1, format!("Ke of material `{name}` is limited to 0 ... {BRIGHTEST:e}"));
         }
-        let value = value.map(|x| x.clamp(0.0, f64::from(f32::MAX)) as f32).into();
+        let value = value.map(|x| x.clamp(0.0, BRIGHTEST) as f32).into();
         ColorInput { value, texture }
+    }
+
+    /// What multiplies a map, or stands alone. A factor of 0 hides its own map, which nobody means: exporters write it
+    /// where the map is all that counts.
+    fn factor<const N: usize>(
+        &mut self,
+        what: &str,
+        given: Option<[f64; N]>,
+        absent: [f64; N],
+        has_map: bool,
+    ) -> [f64; N] {
+        let factor = given.unwrap_or(absent);
+        if !(has_map && factor == [0.0; N]) {
+            return factor;
+        }
+        let name = &self.mtl.name;
+        self.notes.add(
+            1,
+            format!("`{what}` of material `{name}` is 0 and would hide its map: the map counts alone"),
+        );
+        [1.0; N]
     }
 
     /// `d`; glass lets light through by refraction alone.
     fn opacity(&mut self) -> ScalarInput {
         let mtl = self.mtl;
         let texture = self.textures.opacity(mtl.opacity_map.as_ref());
-        let is_glass = matches!(mtl.illumination, Some(4 | 6 | 7 | 9));
-        let value = match mtl.opacity {
-            Some(d) if is_glass && d < 1.0 => {
-                self.notes
-                    .add(1, "`d` of a glass (illum 4, 6, 7, 9) left out: it refracts, it is not cut out");
-                1.0
-            }
-            Some(d) => self.unit("d", d),
-            None => 1.0,
+        let [value] = self.factor("d", mtl.opacity.map(|d| [d]), [1.0], texture.is_some());
+        let value = if is_glass(mtl) && value < 1.0 {
+            self.notes.add(1, "`d` of a glass (illum 4, 6, 7, 9) left out: it refracts, it is not cut out");
+            1.0
+        } else {
+            self.unit("d", value)
         };
         if value == 0.0 {
             self.notes.add(1, format!("material `{}` has opacity 0 and cannot be seen", mtl.name));
@@ -197,29 +321,47 @@ impl Resolver<'_> {
         ScalarInput { value, texture }
     }
 
+    /// `norm`, else `bump`. A picture that cannot be what its statement says is taken for what it is.
     fn normal_map(&mut self) -> Option<NormalMap> {
-        let bump = self.mtl.bump_map.as_ref();
-        let tangent = self.textures.data(self.mtl.normal_map.as_ref()).map(NormalMap::Tangent);
-        tangent.or_else(|| {
-            Some(NormalMap::Height(
-                self.textures.data(bump)?,
-                bump?.options.bump_multiplier.unwrap_or(1.0) as f32,
-            ))
-        })
+        let mtl = self.mtl;
+        let normals = mtl.normal_map.as_ref().filter(|map| self.textures.relief(map).is_some());
+        let (map, statement) = match normals {
+            Some(map) => (map, "norm"),
+            None => (mtl.bump_map.as_ref()?, "bump"),
+        };
+        let relief = self.textures.relief(map)?;
+        let name = map.found.as_ref().map(|file| file.display().to_string()).unwrap_or_default();
+        let is_normals = match (statement, relief) {
+            ("bump", Relief::Normals) => {
+                self.notes.add(1, format!("texture {name} of a `bump` is a map of normals and used as one"));
+                true
+            }
+            ("norm", Relief::Heights) => {
+                self.notes.add(1, format!("texture {name} of a `norm` is grey: it is used as heights"));
+                false
+            }
+            (statement, _) => statement == "norm",
+        };
+        let id = self.textures.data(Some(map))?;
+        let multiplier = map.options.bump_multiplier;
+        if is_normals {
+            return Some(NormalMap::Tangent(id));
+        }
+        if multiplier.is_none() {
+            self.notes
+                .add(1, format!("heights of {name} have no `-bm`: they are taken times {DEFAULT_BUMP}"));
+        }
+        Some(NormalMap::Height(id, multiplier.unwrap_or(DEFAULT_BUMP) as f32))
     }
 
     /// `Ni`, where it can be one.
     fn ior(&mut self) -> Option<f64> {
-        let ior = self.mtl.ior?;
-        // The limits of the MTL specification, with room.
-        let fine = (0.001..=100.0).contains(&ior);
-        if !fine {
-            self.notes.add(
-                1,
-                format!("Ni {ior} of material `{}` is no index of refraction: left out", self.mtl.name),
-            );
+        let (ior, index) = (self.mtl.ior?, index(self.mtl));
+        if index.is_none() {
+            let name = &self.mtl.name;
+            self.notes.add(1, format!("Ni {ior} of material `{name}` is no index of refraction: left out"));
         }
-        fine.then_some(ior)
+        index
     }
 
     /// A colour that reflects no more than it receives.
@@ -305,6 +447,8 @@ mod tests {
         assert_eq!(surface("Kd 1 0.5 0\nKs 0.9 0.8 0.7\nPr 0.5\nPm 1"), conductor(rgb(1.0, 0.5, 0.0)));
         let mirror = Surface::Mirror { reflectance: rgb(0.9, 0.8, 0.7) };
         assert_eq!(surface("Kd 0 0 0\nKs 0.9 0.8 0.7\nillum 3"), mirror);
+        assert_eq!(surface("Ks 0.9 0.8 0.7\nillum 3\nPr 0\nPm 1"), mirror);
+        assert_eq!(surface("Kd 0 0 0\nKs 0.9 0.8 0.7\nillum 3\nPr 0\nPm 1\nNs 1000"), mirror);
         assert_eq!(surface("Kd 0.9 0.8 0.7\nillum 3"), mirror);
         assert_eq!(surface("Kd 0.9 0.8 0.7\nPm 1\nPr 0"), mirror);
         let smooth = Surface::Conductor { reflectance: rgb(0.95, 0.95, 0.95), roughness: 0.0.into() };
@@ -313,6 +457,80 @@ mod tests {
             panic!("not glossy")
         };
         assert_eq!(metallic.value, 0.5);
+    }
+
+    #[test]
+    fn illum_decides_only_what_nothing_more_precise_says() {
+        // Blender's metals: the colour is `Kd`, `Ks` a grey specular.
+        let gold = "Kd 0.8 0.6 0.2\nKs 0.5 0.5 0.5\nNs 250\nNi 1.45\n";
+        for pbr in ["Pr 0.5\nPm 1", "Pr 0.5\nPm 0.5", "Pr 0.2\nPm 0.1", "Pr 0\nPm 1"] {
+            assert_eq!(surface(&format!("{gold}{pbr}\nillum 3")), surface(&format!("{gold}{pbr}\nillum 2")));
+        }
+        let reflection = |roughness: f32| Surface::Glossy {
+            base: rgb(0.375, 0.25, 0.125),
+            specular: rgb(0.125, 0.125, 0.125),
+            roughness: roughness.into(),
+            metallic: 0.0.into(),
+            ior: None,
+        };
+        let base = "Kd 0.375 0.25 0.125\nKs 0.125 0.125 0.125\n";
+        for model in [3, 5] {
+            let (found, notes) = material(&format!("{base}illum {model}"));
+            assert_eq!(found.surface, reflection(0.0));
+            assert!(
+                notes[0].contains(&format!("`illum {model}`")) && notes[0].contains("over its `Kd`"),
+                "{notes:?}"
+            );
+            assert_eq!(surface(&format!("{base}illum {model}\nPr 0.5")), reflection(0.5));
+            let diffuse = Surface::Diffuse { reflectance: rgb(0.375, 0.25, 0.125) };
+            assert_eq!(surface(&format!("Kd 0.375 0.25 0.125\nKs 0 0 0\nillum {model}")), diffuse);
+        }
+        let rough = Surface::Conductor { reflectance: rgb(0.75, 0.75, 0.75), roughness: 0.25.into() };
+        assert_eq!(surface("Kd 0 0 0\nKs 0.75 0.75 0.75\nPr 0.25\nillum 3"), rough);
+    }
+
+    #[test]
+    fn illum_0_and_1_have_no_highlight() {
+        let red = Surface::Diffuse { reflectance: rgb(0.5, 0.25, 0.125) };
+        for model in [0, 1] {
+            let (found, notes) = material(&format!("Kd 0.5 0.25 0.125\nKs 1 1 1\nNs 10\nillum {model}"));
+            assert_eq!(found.surface, red);
+            assert!(notes.len() == 1 && notes[0].contains("`Ks`"), "{notes:?}");
+            let (found, notes) = material(&format!("Kd 0.5 0.25 0.125\nKs 0 0 0\nillum {model}"));
+            assert_eq!((found.surface, notes.len()), (red, 0));
+            let without = surface(&format!("Ks 1 1 1\nillum {model}"));
+            assert_eq!(without, Surface::Diffuse { reflectance: rgb(0.5, 0.5, 0.5) });
+            let pbr = surface(&format!("Kd 1 1 1\nKs 0.25 0.25 0.25\nPr 0.5\nillum {model}"));
+            assert!(matches!(pbr, Surface::Glossy { specular, .. } if specular == rgb(0.25, 0.25, 0.25)));
+        }
+    }
+
+    #[test]
+    fn glass_that_bends_no_ray_is_opaque() {
+        let kd = Surface::Diffuse { reflectance: rgb(0.5, 0.25, 0.125) };
+        for (statements, opacity) in [
+            ("Ni 1\nTf 1 1 1\nillum 4", 1.0),
+            ("Ni 1.00\nillum 7", 1.0),
+            ("Ni 1\nTf 0.5 0.5 0.5\nillum 4", 1.0),
+            ("Ni 1\nd 0.25\nillum 6", 0.25),
+            ("illum 4", 1.0),
+            ("d 0.5\nillum 9", 0.5),
+            ("Ni 1.45\nd 0.5\nillum 9", 0.5),
+        ] {
+            let (found, notes) = material(&format!("Kd 0.5 0.25 0.125\n{statements}"));
+            assert_eq!((found.surface, found.opacity.value), (kd, opacity), "{statements}");
+            assert!(notes.len() == 1 && notes[0].contains("no glass in spite of `illum"), "{notes:?}");
+        }
+        let black = Surface::Diffuse { reflectance: rgb(0.0, 0.0, 0.0) };
+        assert_eq!(surface("Kd 0 0 0\nNi 1\nTf 1 1 1\nillum 4"), black);
+        assert!(matches!(surface("Ni 1\nTf 0.5 1 1\nillum 4"), Surface::Dielectric { .. }));
+        assert!(matches!(surface("Kd 1 1 1\nPm 1\nPr 0.5\nd 0.5\nillum 6"), Surface::Conductor { .. }));
+        for glass in ["Ni 1.5\nillum 4", "Ni 1.5\nillum 9", "illum 7", "illum 6", "Tf 0.5 0.5 0.5\nillum 4"] {
+            assert!(matches!(surface(&format!("Kd 0 0 0\n{glass}")), Surface::Dielectric { .. }), "{glass}");
+            let (found, notes) = material(&format!("Kd 0.5 0.5 0.5\n{glass}"));
+            assert!(matches!(found.surface, Surface::Dielectric { .. }), "{glass}");
+            assert!(notes.len() == 1 && notes[0].contains("`Kd`"), "{notes:?}");
+        }
     }
 
     #[test]
@@ -325,7 +543,7 @@ mod tests {
                 glass(1.33, 0.0)
             );
         }
-        assert_eq!(surface("Ni 1\nPr 0.2\nillum 7"), glass(1.0, 0.2));
+        assert_eq!(surface("Ni 1.25\nPr 0.2\nillum 7"), glass(1.25, 0.2));
         let (material, notes) = material("Ni 0\nTf 2 1 -1\nd 0.1\nillum 7");
         assert_eq!(material.opacity.value, 1.0);
         let Surface::Dielectric { ior, tint, .. } = material.surface else { panic!("not glass") };

@@ -3,6 +3,7 @@
 
 use super::map::Map;
 use super::notes::Notes;
+use super::relief::{self, Relief};
 use super::texture::{self, Picture, Pixels};
 use halflight_core::scene::{Texture, TextureId, Wrap};
 use rayon::prelude::*;
@@ -77,6 +78,12 @@ impl TextureSet {
         let channel = map.options.channel.or(alpha).unwrap_or(0);
         // Alpha is the same number in both views: share the one that is likely there, the colour's.
         Some((if channel == 3 { self.colour(Some(map))? } else { self.data(Some(map))? }, channel))
+    }
+
+    /// What kind of relief the picture of a map is; `None` where it could not be decoded.
+    pub(super) fn relief(&self, map: &Map) -> Option<Relief> {
+        let picture = *self.by_file.get(map.found.as_ref()?)?;
+        Some(relief::relief(&self.pictures[picture].view(false, Wrap::Repeat)))
     }
 
     /// The views, in the order of their ids.

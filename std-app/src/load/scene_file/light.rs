@@ -1,6 +1,6 @@
 //! `[[light]]` and `[environment]`: lights that have no surface.
 
-use super::values::{Colour, Degrees, Matrix, Number, Rotation};
+use super::values::{BRIGHTEST, Colour, Degrees, Matrix, Number, Rotation};
 use super::{LoadError, Source};
 use crate::load::map::Map;
 use crate::load::transform::SceneTransform;
@@ -94,7 +94,7 @@ impl EnvironmentEntry {
         };
         let map = self.map.as_ref().map(|path| source.map(path)).transpose()?;
         Ok(EnvironmentChange {
-            radiance: rgb(self.radiance.map_or([1.0; 3], Colour::channels), 1.0),
+            radiance: rgb(self.radiance.map_or([1.0; 3], Colour::channels)),
             map,
             to_map: to_world.transpose().as_mat3(),
         })
@@ -115,7 +115,13 @@ pub(super) fn light(
     let position = || light.position.map(|p| p.map(f64::from)).ok_or_else(|| needs("position"));
     let intensity = || {
         let intensity = light.intensity.ok_or_else(|| needs("intensity"))?;
-        Ok::<_, LoadError>(rgb(intensity.channels(), transform.intensity_factor()))
+        let channels = intensity.channels().map(|x| x * transform.intensity_factor());
+        if channels.iter().any(|&x| x > BRIGHTEST) {
+            let most = BRIGHTEST / transform.intensity_factor();
+            let problem = "the `intensity` of this light is too large for a scene of this size";
+            return Err(source.error(entry.span(), problem, format!("{most:.1e} W/sr are possible here")));
+        }
+        Ok(rgb(channels))
     };
     let direction = |from: Option<[f64; 3]>| {
         let direction = match (light.direction, light.look_at, from) {
@@ -145,15 +151,11 @@ pub(super) fn light(
         }
         LightKind::Directional => {
             let irradiance = light.irradiance.ok_or_else(|| needs("irradiance"))?;
-            PointLight::Directional {
-                direction: direction(None)?,
-                irradiance: rgb(irradiance.channels(), 1.0),
-            }
+            PointLight::Directional { direction: direction(None)?, irradiance: rgb(irradiance.channels()) }
         }
     })
 }
 
-/// Light is not negative, and finite.
-fn rgb(channels: [f64; 3], factor: f64) -> Rgb {
-    channels.map(|x| (x * factor).clamp(0.0, f64::from(f32::MAX)) as f32).into()
+fn rgb(channels: [f64; 3]) -> Rgb {
+    channels.map(|x| x as f32).into()
 }

@@ -24,6 +24,9 @@ pub enum MaterialKind {
     Glass,
 }
 
+/// Reflectance of a mirror without `color`.
+const DEFAULT_MIRROR: f64 = 0.5;
+
 /// A material in plain words; what is not given stays as it was.
 #[derive(Clone, Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -119,7 +122,16 @@ impl MaterialEntry {
                 change.metallic.get_or_insert(1.0);
                 change.roughness.get_or_insert(0.0);
             }
-            Some(MaterialKind::Mirror) => change.illumination = Some(3),
+            Some(MaterialKind::Mirror) => {
+                // A mirror reflects by `Ks` and has no base.
+                change.illumination = Some(3);
+                if change.specular.is_none() && change.specular_map.is_none() {
+                    let plain = change.diffuse_map.is_none().then_some([DEFAULT_MIRROR; 3]);
+                    change.specular = change.diffuse.take().or(plain);
+                    change.specular_map = change.diffuse_map.take();
+                }
+                (change.diffuse, change.diffuse_map) = (None, None);
+            }
             Some(MaterialKind::Glass) => change.illumination = Some(7),
         }
         let bump_scale = number(self.bump_scale);
@@ -134,6 +146,12 @@ impl MaterialChange {
             *material = MtlMaterial { name: core::mem::take(&mut material.name), ..MtlMaterial::default() };
         }
         let change = self.change.clone();
+        // A coat that the scene file gives is there, whatever `illum` says.
+        let is_coated =
+            change.specular.is_some() || change.specular_map.is_some() || change.shininess.is_some();
+        if is_coated && matches!(material.illumination, Some(0 | 1)) {
+            material.illumination = Some(2);
+        }
         macro_rules! replace {
             ($($field:ident),*) => { $( if change.$field.is_some() { material.$field = change.$field; } )* };
         }

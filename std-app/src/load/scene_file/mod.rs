@@ -10,7 +10,8 @@ pub(super) use light::EnvironmentChange;
 pub use light::{EnvironmentEntry, LightEntry, LightKind};
 pub(super) use material::MaterialChange;
 pub use material::{MaterialEntry, MaterialKind};
-pub use values::{Colour, Degrees, Factors, FieldOfView, Matrix, Number, Positive, Rotation};
+pub(super) use values::BRIGHTEST;
+pub use values::{Colour, Degrees, Factors, FieldOfView, Matrix, NotNegative, Number, Positive, Rotation};
 
 use super::error::LoadError;
 use super::files::{Found, Lookup};
@@ -85,7 +86,7 @@ pub struct CameraEntry {
     pub fov: Option<FieldOfView>,
     /// Radius of the lens; 0 is a pinhole.
     #[serde(default)]
-    pub lens_radius: Number,
+    pub lens_radius: NotNegative,
     /// Distance of what is sharp; that of `look_at`.
     pub focus_distance: Option<Positive>,
 }
@@ -235,7 +236,7 @@ fn camera_in(
     let fov = camera.fov.map_or(DEFAULT_FOV, f64::from);
     let focus = camera.focus_distance.map_or(distance, f64::from);
     Ok(Camera {
-        lens_radius: transform.length(f64::from(camera.lens_radius).max(0.0)) as f32,
+        lens_radius: transform.length(f64::from(camera.lens_radius)) as f32,
         focus_distance: transform.length(focus) as f32,
         ..transform.camera(eye, look_at, up, fov)
     })
@@ -265,6 +266,18 @@ mod tests {
         place("[camera]\neye = [0, 0, nan]\nlook_at = [0, 0, 1]", 2, "must be finite");
         place("[camera]\neye = [0, 0, 0]\nlook_at = [0, 0, 1]\nfov = 180", 4, "between 0 and 180");
         place("[[mesh]]\nfile = \"a.obj\"\nscale = \"big\"", 3, "a number or three numbers");
+        let light = "[[light]]\nkind = \"point\"\nposition = [0, 0, 0]\nintensity = ";
+        place(&format!("{light}-9"), 4, "-9.0 is negative");
+        place(&format!("{light}[1, 2, 1e38]"), 4, "1e38 is too large: light and colours are at most 1e15");
+        place(&format!("{light}[1, 2]"), 4, "three numbers");
+        place(&format!("{light}nan"), 4, "finite");
+        place("[environment]\nradiance = 1e30", 2, "at most 1e15");
+        place("[environment]\nradiance = [0, -1e-9, 0]", 2, "negative");
+        place("[material.a]\nemission = inf", 2, "too large");
+        place("[material.a]\ncolor = -0.5", 2, "negative");
+        place("[[mesh]]\nfile = \"a.obj\"\nscale = 1e31", 3, "at most 1e30");
+        place("[[mesh]]\nfile = \"a.obj\"\nscale = [1, 1, nan]", 3, "finite");
+        place("[camera]\neye = [0, 0, 0]\nlook_at = [0, 0, 1]\nlens_radius = -1", 4, "negative");
         place("[render]\nspp = -1", 2, "");
         place("[[light]]\nkind = \"laser\"", 2, "`point`, `spot`");
         place("[[mesh]]\nfile = \"a.obj\"\nmatrix = [[1, 0, 0, 0]]", 3, "three or four rows");

@@ -9,6 +9,11 @@ use serde::Deserialize;
 #[serde(try_from = "f64")]
 pub struct Number(f64);
 
+/// A finite number, zero or above.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize)]
+#[serde(try_from = "f64")]
+pub struct NotNegative(f64);
+
 /// A finite number above zero.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
 #[serde(try_from = "f64")]
@@ -42,57 +47,90 @@ macro_rules! checked {
     )*};
 }
 
-// Numbers are limited to those of f32, where they end up, with room for the change of scale.
+/// Beyond this, numbers of a scene have no room in f32 for the change of scale.
+const LARGEST: f64 = 1e30;
+
+/// The greatest radiance, irradiance or intensity that is read: its square is a number of f32, and so is what a
+/// picture adds up of it.
+pub(in crate::load) const BRIGHTEST: f64 = 1e15;
+
 checked! {
-    Number: x => x.abs() <= 1e30, "this number must be finite and of reasonable size";
-    Positive: x => x > 0.0 && x <= 1e30, "this number must be above zero and of reasonable size";
+    Number: x => x.abs() <= LARGEST, "this number must be finite and at most 1e30 in size";
+    NotNegative: x => (0.0..=LARGEST).contains(&x), "this number must not be negative, and at most 1e30";
+    Positive: x => x > 0.0 && x <= LARGEST, "this number must be above zero and at most 1e30";
     FieldOfView: x => x > 0.0 && x < 180.0, "this angle must lie between 0 and 180 degrees";
     Degrees: x => (0.0..=180.0).contains(&x), "this angle must lie between 0 and 180 degrees";
 }
 
-/// One number for all three channels, or three.
+/// A value for all of three, or three; checked by the type that it is meant for, so that the reason of a refusal is
+/// that type's.
+#[derive(Clone, Copy, Deserialize)]
+#[serde(untagged, expecting = "a number or three numbers are needed here, like 0.5 or [0.2, 0.5, 1]")]
+enum OneOrThree {
+    One(f64),
+    Three([f64; 3]),
+}
+
+impl OneOrThree {
+    fn three(self) -> [f64; 3] {
+        match self {
+            OneOrThree::One(one) => [one; 3],
+            OneOrThree::Three(three) => three,
+        }
+    }
+}
+
+/// Red, green, blue, linear, in 0 ... 1e15: one number for all three, or three.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
-#[serde(untagged, expecting = "a number or three numbers [r, g, b] are needed here")]
-pub enum Colour {
-    /// The same in all channels.
-    Grey(Number),
-    /// Red, green, blue; linear.
-    Rgb([Number; 3]),
+#[serde(try_from = "OneOrThree")]
+pub struct Colour([f64; 3]);
+
+impl TryFrom<OneOrThree> for Colour {
+    type Error = String;
+
+    fn try_from(value: OneOrThree) -> Result<Self, Self::Error> {
+        let channels = value.three();
+        match channels.iter().find(|channel| !(0.0..=BRIGHTEST).contains(*channel)) {
+            None => Ok(Self(channels)),
+            Some(x) if *x < 0.0 => Err(format!("{x:?} is negative: light and colours are not")),
+            Some(x) if x.is_nan() => Err("light and colours must be finite".into()),
+            Some(x) => Err(format!("{x:?} is too large: light and colours are at most {BRIGHTEST:e}")),
+        }
+    }
 }
 
 impl Colour {
     /// The channels.
     pub fn channels(self) -> [f64; 3] {
-        match self {
-            Colour::Grey(grey) => [grey.0; 3],
-            Colour::Rgb(rgb) => rgb.map(f64::from),
-        }
+        self.0
     }
 }
 
 /// One factor for all three axes, or three.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
-#[serde(untagged, expecting = "a number or three numbers [x, y, z] are needed here")]
-pub enum Factors {
-    /// The same along all axes.
-    Uniform(Number),
-    /// One for each axis.
-    Axes([Number; 3]),
+#[serde(try_from = "OneOrThree")]
+pub struct Factors([f64; 3]);
+
+impl TryFrom<OneOrThree> for Factors {
+    type Error = &'static str;
+
+    fn try_from(value: OneOrThree) -> Result<Self, Self::Error> {
+        let axes = value.three();
+        axes.into_iter().try_for_each(|axis| Number::try_from(axis).map(drop))?;
+        Ok(Self(axes))
+    }
 }
 
 impl Default for Factors {
     fn default() -> Self {
-        Factors::Uniform(Number(1.0))
+        Self([1.0; 3])
     }
 }
 
 impl Factors {
     /// The factors of the axes.
     pub fn axes(self) -> [f64; 3] {
-        match self {
-            Factors::Uniform(factor) => [factor.0; 3],
-            Factors::Axes(axes) => axes.map(f64::from),
-        }
+        self.0
     }
 }
 
