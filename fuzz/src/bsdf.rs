@@ -8,7 +8,8 @@ use halflight_core::Rgb;
 use halflight_core::bsdf::{All, Bsdf};
 use halflight_core::sampling::warp::uniform_sphere;
 use halflight_core::scene::{
-    Camera, ColorInput, Material, Mesh, ScalarInput, Scene, Surface, Texels, Texture, TextureId, Wrap,
+    Camera, ColorInput, Material, Mesh, ScalarInput, Scene, Surface, Texels, Texture, TextureId, TextureTransform,
+    Wrap,
 };
 
 /// Lengths of unit vectors may be off by so much.
@@ -26,7 +27,7 @@ fn attempt(input: &mut Unstructured) -> Result<()> {
     let wrap = if input.arbitrary()? { Wrap::Repeat } else { Wrap::Clamp };
     // Fewer texels than the size promises are the caller's mistake, and must not be the end of it.
     let textures = [Texels::Float(&floats), Texels::Srgb8(&bytes), Texels::Linear8(&bytes)]
-        .map(|texels| Texture { width, height, texels, wrap });
+        .map(|texels| Texture { width, height, texels, wrap, transform: TextureTransform::IDENTITY });
     let mesh = Mesh::default();
     let camera = Camera::look_at(Vec3::ZERO, Vec3::NEG_Z, Vec3::Y, 40.0);
     let scene = Scene { mesh, materials: &[], textures: &textures, lights: &[], environment: None, camera };

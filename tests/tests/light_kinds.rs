@@ -8,7 +8,7 @@ use halflight_core::Rgb;
 use halflight_core::light::{Environment, Lights, PointLight, emitted};
 use halflight_core::memory::{Arena, Line};
 use halflight_core::sampling::{Random, Sampler, warp};
-use halflight_core::scene::{Texels, Texture, TextureId, Wrap};
+use halflight_core::scene::{Texels, Texture, TextureId, TextureTransform, Wrap};
 use light_support::{Lamp, Stage, random_direction};
 
 /// Standard errors that an estimate may be off.
@@ -23,7 +23,13 @@ static SKY: [[f32; 3]; 16 * 8] = {
 };
 
 fn sky() -> Stage {
-    let map = Texture { width: 16, height: 8, texels: Texels::Float(&SKY), wrap: Wrap::Repeat };
+    let map = Texture {
+        width: 16,
+        height: 8,
+        texels: Texels::Float(&SKY),
+        wrap: Wrap::Repeat,
+        transform: TextureTransform::IDENTITY,
+    };
     let to_map = Mat3::from_cols(Vec3::new(0.0, 0.0, 1.0), Vec3::X, Vec3::Y);
     Stage {
         environment: Some(Environment { radiance: Rgb::splat(0.5), map: Some(TextureId(0)), to_map }),
@@ -223,8 +229,13 @@ fn lamps_shine_to_their_front_only_unless_two_sided() {
 fn a_textured_lamp_sends_what_its_texels_say() {
     static CHECKER: [[f32; 3]; 4] = [[1.0; 3], [0.0; 3], [0.0; 3], [1.0; 3]];
     let mut stage = Stage::of(&[Lamp::quad(Vec3::new(-1.0, -1.0, 1.0), Vec3::Y * 2.0, Vec3::X * 2.0)]);
-    stage.textures =
-        vec![Texture { width: 2, height: 2, texels: Texels::Float(&CHECKER), wrap: Wrap::Clamp }];
+    stage.textures = vec![Texture {
+        width: 2,
+        height: 2,
+        texels: Texels::Float(&CHECKER),
+        wrap: Wrap::Clamp,
+        transform: TextureTransform::IDENTITY,
+    }];
     stage.materials[0].emission.texture = Some(TextureId(0));
     stage.texcoords = vec![[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]];
     stage.with_lights(|scene, lights| {

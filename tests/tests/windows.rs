@@ -6,7 +6,7 @@ use glam::{Mat3, Vec3};
 use halflight::drive::{self, RenderResult, Settings, Stop};
 use halflight_core::camera::Camera;
 use halflight_core::light::Environment;
-use halflight_core::scene::{Material, Scene, Texels, Texture, TextureId, Wrap};
+use halflight_core::scene::{Material, Scene, Texels, Texture, TextureId, TextureTransform, Wrap};
 use halflight_core::{Level, Rgb};
 use halflight_tests::scenes::{SceneBuffers, constant_environment, everything};
 use halflight_tests::statistics::{agree, blocks};
@@ -58,8 +58,13 @@ const TEXELS: [[f32; 3]; 32] = {
     texels
 };
 
-const SKY: [Texture<'static>; 1] =
-    [Texture { width: 8, height: 4, texels: Texels::Float(&TEXELS), wrap: Wrap::Repeat }];
+const SKY: [Texture<'static>; 1] = [Texture {
+    width: 8,
+    height: 4,
+    texels: Texels::Float(&TEXELS),
+    wrap: Wrap::Repeat,
+    transform: TextureTransform::IDENTITY,
+}];
 
 fn with_sky(mut scene: SceneBuffers) -> SceneBuffers {
     let to_map = Mat3::from_rotation_y(0.7);

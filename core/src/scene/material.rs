@@ -114,8 +114,8 @@ impl Surface {
 /// A map that bends the shading normal.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum NormalMap {
-    /// Tangent-space normals, RGB in 0 … 1.
-    Tangent(TextureId),
+    /// Tangent-space normals, RGB in 0 … 1, with a factor on their slopes.
+    Tangent(TextureId, f32),
     /// Heights, with the factor that turns them into lengths of a texture-coordinate unit.
     Height(TextureId, f32),
 }

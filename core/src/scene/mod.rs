@@ -9,7 +9,7 @@ mod texture;
 pub use material::{ColorInput, Material, NormalMap, ScalarInput, Surface};
 pub use mesh::{Mesh, Triangle};
 pub use surface::SurfacePoint;
-pub use texture::{Texels, Texture, TextureId, Wrap};
+pub use texture::{Texels, Texture, TextureId, TextureTransform, Wrap};
 
 pub use crate::camera::Camera;
 pub use crate::light::{Environment, PointLight};

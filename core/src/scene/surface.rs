@@ -1,7 +1,7 @@
 //! The point where a ray met a triangle: position with a bound of its error, normals, texture coordinates;
 //! and rays that leave it without meeting it again.
 
-use super::{Material, NormalMap, Scene, TextureId};
+use super::{Material, NormalMap, Scene};
 use crate::bsdf::Features;
 use crate::geometry::{Frame, Hit, Ray};
 use glam::{Vec2, Vec3};
@@ -212,29 +212,26 @@ fn mapped_normal(
     edges: [Vec3; 2],
     sides: [Vec2; 2],
 ) -> Option<Vec3> {
-    let local = match map {
-        NormalMap::Tangent(id) => {
-            let [x, y, z, _] = scene.textures.get(id.0 as usize)?.lookup(uv);
-            2.0 * Vec3::new(x, y, z) - Vec3::ONE
+    let (texture, local) = match map {
+        NormalMap::Tangent(id, factor) => {
+            let texture = scene.textures.get(id.0 as usize)?;
+            let [x, y, z, _] = texture.lookup(uv);
+            let local = 2.0 * Vec3::new(x, y, z) - Vec3::ONE;
+            (texture, Vec3::new(factor * local.x, factor * local.y, local.z))
         }
         NormalMap::Height(id, factor) => {
-            let slope = height_gradient(scene, id, uv)? * factor;
-            Vec3::new(-slope.x, -slope.y, 1.0)
+            let texture = scene.textures.get(id.0 as usize)?;
+            let slope = texture.gradient(uv) * factor;
+            (texture, Vec3::new(-slope.x, -slope.y, 1.0))
         }
     };
+    // Where the texture is mirrored, so are its directions.
+    let mirrored = Vec2::ONE.copysign(texture.transform.scale);
+    let local = Vec3::new(mirrored.x * local.x, mirrored.y * local.y, local.z);
     // dp/du from the two edges, made orthogonal to the normal; mirrored charts turn the bitangent.
     let determinant = sides[0].perp_dot(sides[1]);
     let along_u = (edges[0] * sides[1].y - edges[1] * sides[0].y) * 1f32.copysign(determinant);
     let tangent = (along_u - normal.dot(along_u) * normal).try_normalize()?;
     let bitangent = normal.cross(tangent) * 1f32.copysign(determinant);
     (local.x * tangent + local.y * bitangent + local.z * normal).try_normalize()
-}
-
-/// (dh/du, dh/dv) by central differences over one texel.
-fn height_gradient(scene: &Scene, id: TextureId, uv: Vec2) -> Option<Vec2> {
-    let texture = scene.textures.get(id.0 as usize)?;
-    let height = |uv: Vec2| texture.lookup(uv)[0];
-    let (w, h) = (texture.width as f32, texture.height as f32);
-    let (du, dv) = (Vec2::new(0.5 / w, 0.0), Vec2::new(0.0, 0.5 / h));
-    Some(Vec2::new((height(uv + du) - height(uv - du)) * w, (height(uv + dv) - height(uv - dv)) * h))
 }

@@ -28,6 +28,25 @@ pub enum Wrap {
     Clamp,
 }
 
+/// Which place of a texture belongs to texture coordinates `uv`: `scale * uv + offset`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TextureTransform {
+    /// Factors on u and v; a negative one mirrors the texture.
+    pub scale: Vec2,
+    /// Added after that.
+    pub offset: Vec2,
+}
+
+impl TextureTransform {
+    /// The texture lies as the texture coordinates do.
+    pub const IDENTITY: Self = Self { scale: Vec2::ONE, offset: Vec2::ZERO };
+
+    #[inline]
+    fn at(&self, uv: Vec2) -> Vec2 {
+        self.scale * uv + self.offset
+    }
+}
+
 /// A texture: borrowed texels with their size.
 #[derive(Clone, Copy, Debug)]
 pub struct Texture<'a> {
@@ -39,6 +58,8 @@ pub struct Texture<'a> {
     pub texels: Texels<'a>,
     /// Beyond the edge.
     pub wrap: Wrap,
+    /// From the texture coordinates of a surface to those of the texture.
+    pub transform: TextureTransform,
 }
 
 impl Texture<'_> {
@@ -46,6 +67,12 @@ impl Texture<'_> {
     /// texels have none.
     #[inline]
     pub fn lookup(&self, uv: Vec2) -> [f32; 4] {
+        self.between(self.transform.at(uv))
+    }
+
+    /// The same at texture coordinates of its own.
+    #[inline]
+    fn between(&self, uv: Vec2) -> [f32; 4] {
         let (x0, x1, fx) = self.wrap.neighbours(uv.x, self.width);
         let (y0, y1, fy) = self.wrap.neighbours(1.0 - uv.y, self.height);
         let (top, bottom) = (y0 as usize * self.width as usize, y1 as usize * self.width as usize);
@@ -58,6 +85,7 @@ impl Texture<'_> {
     /// Asks for the texels that [`Texture::lookup`] is about to need.
     #[inline]
     pub(crate) fn prefetch(&self, uv: Vec2) {
+        let uv = self.transform.at(uv);
         let (x, ..) = self.wrap.neighbours(uv.x, self.width);
         let (y0, y1, _) = self.wrap.neighbours(1.0 - uv.y, self.height);
         for row in [y0, y1] {
@@ -69,12 +97,13 @@ impl Texture<'_> {
         }
     }
 
-    /// Slope (∂/∂u, ∂/∂v) of the luminance at `uv`, per unit of texture coordinates: central differences
+    /// Slope (∂/∂u, ∂/∂v) of the red channel at `uv`, per unit of the texture's own coordinates: central differences
     /// over one texel, hence continuous. For height maps.
     pub fn gradient(&self, uv: Vec2) -> Vec2 {
+        let uv = self.transform.at(uv);
         let size = Vec2::new(self.width as f32, self.height as f32);
         let half = 0.5 / size.max(Vec2::ONE);
-        let height = |du: f32, dv: f32| luminance(self.lookup(uv + Vec2::new(du, dv)));
+        let height = |du: f32, dv: f32| self.between(uv + Vec2::new(du, dv))[0];
         Vec2::new(height(half.x, 0.0) - height(-half.x, 0.0), height(0.0, half.y) - height(0.0, -half.y))
             * size
     }
@@ -139,12 +168,6 @@ fn floor(x: f32) -> f32 {
     if whole > x { whole - 1.0 } else { whole }
 }
 
-/// Rec. 709 luminance.
-#[inline]
-fn luminance([r, g, b, _]: [f32; 4]) -> f32 {
-    0.2126 * r + 0.7152 * g + 0.0722 * b
-}
-
 /// The sRGB curve (IEC 61966-2-1) of every byte.
 static SRGB_TO_LINEAR: [f32; 256] = {
     let mut table = [0.0; 256];
@@ -177,10 +200,11 @@ const fn power_12_5(x: f64) -> f64 {
 mod tests {
     use super::*;
 
+    const IDENTITY: TextureTransform = TextureTransform::IDENTITY;
     const RGBW: [[f32; 3]; 4] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 1.0, 1.0]];
 
     fn texture(wrap: Wrap) -> Texture<'static> {
-        Texture { width: 2, height: 2, texels: Texels::Float(&RGBW), wrap }
+        Texture { width: 2, height: 2, texels: Texels::Float(&RGBW), wrap, transform: IDENTITY }
     }
 
     #[test]
@@ -210,7 +234,7 @@ mod tests {
             assert_eq!(linear, expected as f32, "{byte}");
         }
         let texels = [[188, 0, 255, 51]];
-        let t = Texture { width: 1, height: 1, texels: Texels::Srgb8(&texels), wrap: Wrap::Repeat };
+        let t = Texture { width: 1, height: 1, texels: Texels::Srgb8(&texels), ..texture(Wrap::Repeat) };
         let [r, g, b, a] = t.lookup(Vec2::ZERO);
         assert!((r - 0.502_886).abs() < 1e-5 && g == 0.0 && b == 1.0 && a == 0.2);
         let t = Texture { texels: Texels::Linear8(&texels), ..t };
@@ -220,10 +244,21 @@ mod tests {
     #[test]
     fn a_ramp_has_a_constant_slope() {
         let ramp: [[f32; 3]; 32] = core::array::from_fn(|i| [(i % 8) as f32 * 0.5 - (i / 8) as f32; 3]);
-        let t = Texture { width: 8, height: 4, texels: Texels::Float(&ramp), wrap: Wrap::Clamp };
+        let t = Texture { width: 8, height: 4, texels: Texels::Float(&ramp), ..texture(Wrap::Clamp) };
         let slope = t.gradient(Vec2::new(0.5, 0.5));
         // Half a unit a texel, 8 texels a unit of u; minus one a row downwards, 4 rows a unit of v.
         assert!(slope.distance(Vec2::new(4.0, 4.0)) < 1e-4, "{slope}");
+    }
+
+    #[test]
+    fn a_texture_lies_where_its_transform_says() {
+        let plain = texture(Wrap::Repeat);
+        let (scale, offset) = (Vec2::new(-2.0, 4.0), Vec2::new(0.25, -0.5));
+        let moved = Texture { transform: TextureTransform { scale, offset }, ..plain };
+        for uv in [Vec2::ZERO, Vec2::new(0.125, 0.75), Vec2::new(-3.375, 0.0625)] {
+            assert_eq!(moved.lookup(uv), plain.lookup(scale * uv + offset));
+            assert_eq!(moved.gradient(uv), plain.gradient(scale * uv + offset));
+        }
     }
 
     #[test]
@@ -246,7 +281,7 @@ mod tests {
                 }
             }
         }
-        let none = Texture { width: 4, height: 4, texels: Texels::Float(&[]), wrap: Wrap::Repeat };
+        let none = Texture { width: 4, height: 4, texels: Texels::Float(&[]), ..texture(Wrap::Repeat) };
         assert_eq!(none.lookup(Vec2::splat(0.3)), [1.0; 4]);
     }
 }

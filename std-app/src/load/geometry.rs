@@ -3,6 +3,7 @@
 
 use super::notes::Notes;
 use super::obj::Group;
+use super::texcoords::{self, Texcoords};
 use super::transform::SceneTransform;
 use glam::{DMat3, DVec3};
 use halflight_core::scene::Triangle;
@@ -45,8 +46,7 @@ pub(super) struct Placed<'a> {
     pub(super) placement: Placement,
     /// Index into the materials of the scene.
     pub(super) material: u32,
-    /// Scale and offset of its texture coordinates.
-    pub(super) texcoords: ([f64; 2], [f64; 2]),
+    pub(super) texcoords: Texcoords,
 }
 
 /// The buffers of [`halflight_core::scene::Mesh`].
@@ -98,6 +98,7 @@ pub(super) fn assemble(parts: &[Placed], to_core: &SceneTransform, notes: &mut N
     notes.add(repairs.without_area, "triangle without area left out");
     notes.add(repairs.broken_normals, "normal that is not finite is shaded flat");
     notes.add(repairs.broken_texcoords, "texture coordinate that is not finite is 0 0 now");
+    notes.add(repairs.blurred_textures, texcoords::BLURRED);
     notes.add(repairs.against_winding, "triangle whose normals point against its winding (kept as it is)");
     all
 }
@@ -108,6 +109,7 @@ struct Repairs {
     without_area: u64,
     broken_normals: u64,
     broken_texcoords: u64,
+    blurred_textures: u64,
     against_winding: u64,
 }
 
@@ -117,6 +119,7 @@ impl Repairs {
         self.without_area += other.without_area;
         self.broken_normals += other.broken_normals;
         self.broken_texcoords += other.broken_texcoords;
+        self.blurred_textures += other.blurred_textures;
         self.against_winding += other.against_winding;
     }
 }
@@ -150,19 +153,11 @@ fn build(
         (true, false) => group.normals.iter().map(&mut normal).collect(),
     };
 
-    let (scale, offset) = part.texcoords;
-    let mut texcoord = |uv: &[f64; 2]| {
-        let uv = [0, 1].map(|i| (uv[i] * scale[i] + offset[i]) as f32);
-        if uv.iter().all(|x| x.is_finite()) {
-            return uv;
-        }
-        repairs.broken_texcoords += 1;
-        [0.0; 2]
-    };
+    let placed = part.texcoords.placed(&group.texcoords, &mut repairs.broken_texcoords);
     let texcoords: Vec<[f32; 2]> = match (with_texcoords, group.texcoords.is_empty()) {
         (false, _) => Vec::new(),
         (true, true) => vec![[0.0; 2]; vertices],
-        (true, false) => group.texcoords.iter().map(&mut texcoord).collect(),
+        (true, false) => placed.iter().map(|uv| uv.map(|x| x as f32)).collect(),
     };
 
     let mirrored = part.placement.linear.determinant() < 0.0;
@@ -184,7 +179,9 @@ fn build(
             triangles.push(Triangle { vertices: corners, material: part.material });
         }
     }
-    (Geometry { positions, normals, texcoords, triangles }, repairs)
+    let mut geometry = Geometry { positions, normals, texcoords, triangles };
+    repairs.blurred_textures = texcoords::take_whole_numbers_off(&part.texcoords, &placed, &mut geometry);
+    (geometry, repairs)
 }
 
 /// The unit normal, or zero (flat) where there is none.
@@ -209,7 +206,7 @@ mod tests {
     }
 
     fn placed(group: &Group, placement: Placement) -> Placed<'_> {
-        Placed { group, placement, material: 0, texcoords: ([1.0; 2], [0.0; 2]) }
+        Placed { group, placement, material: 0, texcoords: Texcoords::default() }
     }
 
     fn all(group: &Group, placement: Placement) -> (Geometry, Vec<String>) {

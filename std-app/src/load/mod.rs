@@ -8,6 +8,7 @@
 mod error;
 mod files;
 mod geometry;
+mod illum;
 mod library;
 mod map;
 pub mod mtl;
@@ -19,6 +20,7 @@ mod scene;
 pub mod scene_file;
 mod settings;
 mod surface;
+mod texcoords;
 mod text;
 pub mod texture;
 mod texture_set;
@@ -42,6 +44,7 @@ use name::readings;
 use scene_file::{EnvironmentChange, MaterialChange};
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::path::{Path, PathBuf};
+use texcoords::Texcoords;
 
 /// What to load of a scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -202,10 +205,14 @@ impl SceneBuilder {
         let files = maps.filter_map(|map| map.found.clone()).filter(|_| options.textures);
         let mut textures = TextureSet::decode(files, &mut self.notes);
         let notes = &mut self.notes;
+        let of_maps = |mtl: &mut MtlMaterial| {
+            Texcoords::of_maps(
+                &mut surface::maps_mut(mtl).filter(|map| map.found.is_some()).collect::<Vec<_>>(),
+            )
+        };
+        let texcoords: Vec<Texcoords> = self.materials.iter_mut().map(of_maps).collect();
         let materials: Vec<Material> =
             self.materials.iter().map(|mtl| surface::resolve(mtl, &mut textures, notes)).collect();
-        let texcoords: Vec<_> =
-            self.materials.iter().map(|mtl| surface::texcoord_transform(mtl, notes)).collect();
 
         let environment = environment.map(|entry| Environment {
             radiance: entry.radiance,
@@ -222,21 +229,19 @@ impl SceneBuilder {
                 parts.push(Placed { group, placement: mesh.placement, material, texcoords });
             }
         }
-        let vertices: usize = parts.iter().map(|part| part.group.positions.len()).sum();
-        if u32::try_from(vertices).is_err() {
-            let problem = format!("the scene has {vertices} vertices, more than 32 bits can count");
-            return Err(LoadError::of_file(path, problem, "leave out some of its meshes"));
-        }
+        count_vertices(path, parts.iter().map(|part| part.group.positions.len()).sum())?;
         let (min, max) = geometry::bounds(&parts);
         let transform = SceneTransform::fitting(min, max);
         let geometry = geometry::assemble(&parts, &transform, notes);
+        count_vertices(path, geometry.positions.len())?;
+        let names: Vec<String> = self.materials.iter().map(|mtl| mtl.name.to_string()).collect();
         Ok(LoadedScene {
             positions: geometry.positions,
             normals: geometry.normals,
             texcoords: geometry.texcoords,
             triangles: geometry.triangles,
             materials,
-            material_names: self.materials.into_iter().map(|mtl| mtl.name.to_string()).collect(),
+            material_names: names,
             textures,
             lights: Vec::new(),
             environment,
@@ -247,4 +252,13 @@ impl SceneBuilder {
             repairs: self.notes.sentences(),
         })
     }
+}
+
+/// Triangles refer to their vertices by 32 bits.
+fn count_vertices(path: &Path, vertices: usize) -> Result<(), LoadError> {
+    if u32::try_from(vertices).is_ok() {
+        return Ok(());
+    }
+    let problem = format!("the scene has {vertices} vertices, more than 32 bits can count");
+    Err(LoadError::of_file(path, problem, "leave out some of its meshes"))
 }

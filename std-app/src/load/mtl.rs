@@ -31,6 +31,8 @@ pub struct MtlMaterial {
     pub metallic: Option<f64>,
     /// `illum`.
     pub illumination: Option<u32>,
+    /// Not in MTL: whether somebody calls it glass, who knows what that is.
+    pub surely_glass: bool,
     /// Not in MTL: whether both sides emit.
     pub two_sided: bool,
     /// `map_Kd`.

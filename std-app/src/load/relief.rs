@@ -55,7 +55,7 @@ pub(super) fn relief(texture: &Texture) -> Relief {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use halflight_core::scene::{Texels, Wrap};
+    use halflight_core::scene::{Texels, TextureTransform, Wrap};
 
     fn of(texel: impl Fn(f32) -> [f32; 3]) -> Relief {
         let byte = |c: f32| (255.0 * c.clamp(0.0, 1.0)).round() as u8;
@@ -63,7 +63,12 @@ mod tests {
             .map(|i| texel((i as f32 * 0.7).sin()).map(byte))
             .map(|[r, g, b]| [r, g, b, 255])
             .collect();
-        relief(&Texture { width: 16, height: 16, texels: Texels::Linear8(&texels), wrap: Wrap::Repeat })
+        relief(&square(16, &texels))
+    }
+
+    fn square(size: u32, texels: &[[u8; 4]]) -> Texture<'_> {
+        let transform = TextureTransform::IDENTITY;
+        Texture { width: size, height: size, texels: Texels::Linear8(texels), wrap: Wrap::Repeat, transform }
     }
 
     /// A normal with slope `x` along u, in 0 ... 1.
@@ -80,7 +85,6 @@ mod tests {
         assert_eq!(of(|x| normal(1.5 * x)), Relief::Normals);
         assert_eq!(of(|x| [0.6 + 0.3 * x, 0.4 + 0.2 * x, 0.2]), Relief::Unclear);
         assert_eq!(of(|x| [0.3, 0.5, 0.8 + 0.1 * x]), Relief::Unclear);
-        let none = Texture { width: 0, height: 9, texels: Texels::Linear8(&[]), wrap: Wrap::Clamp };
-        assert_eq!(relief(&none), Relief::Unclear);
+        assert_eq!(relief(&square(0, &[])), Relief::Unclear);
     }
 }

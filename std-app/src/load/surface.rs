@@ -1,6 +1,7 @@
 //! What the statements of an MTL file mean: from [`MtlMaterial`] to the core's [`Material`]. The conventions
 //! are those of `docs/loading.md`; that of plastics is argued in `docs/decisions/0002-plastic-from-mtl.md`.
 
+use super::illum::{self, DARK_BASE, index, is_glass, is_pbr};
 use super::map::Map;
 use super::mtl::MtlMaterial;
 use super::notes::Notes;
@@ -15,18 +16,14 @@ use halflight_core::scene::{ColorInput, Material, NormalMap, ScalarInput, Surfac
 const PLASTIC_TOLERANCE: f64 = 0.05;
 /// Index of refraction where a file has glass or a PBR coat without `Ni`.
 const DEFAULT_IOR: f64 = 1.5;
-/// A base whose brightest channel reflects less is black beside a mirror or a glass: some exporters do not write 0.
-const DARK_BASE: f64 = 0.02;
-/// How far `Ni` may be from 1 and still bend no ray.
-const INDEX_TOLERANCE: f64 = 1e-3;
 /// Heights of a bump map without `-bm`, in lengths of a texture-coordinate unit: a picture of a square metre of
 /// bricks has joints a centimetre deep.
 const DEFAULT_BUMP: f64 = 0.01;
 
 /// The core's material for what the file says, with views of the textures that it needs.
 pub(super) fn resolve(mtl: &MtlMaterial, textures: &mut TextureSet, notes: &mut Notes) -> Material {
+    illum::note_what_is_lost(mtl, notes);
     let mut resolver = Resolver { mtl, textures, notes };
-    resolver.note_what_illum_loses();
     let surface = resolver.surface();
     Material {
         surface,
@@ -35,53 +32,6 @@ pub(super) fn resolve(mtl: &MtlMaterial, textures: &mut TextureSet, notes: &mut 
         opacity: resolver.opacity(),
         normal_map: resolver.normal_map(),
     }
-}
-
-/// Whether `illum` makes a boundary between two media of the material, and nothing speaks against it: a metal is no
-/// glass; `Ni 1` bends no ray, and exporters write it for what is opaque; glass without ray tracing (`illum 9`) that
-/// has a `d` is what shows through by opacity; and without `Ni` and `Tf`, `illum 4` and `9` say less than a `Kd`.
-fn is_glass(mtl: &MtlMaterial) -> bool {
-    let Some(model @ (4 | 6 | 7 | 9)) = mtl.illumination else { return false };
-    let has_base = has_base(mtl);
-    let is_metal = mtl.metallic.is_some_and(|pm| pm > 0.0) || mtl.metallic_map.is_some();
-    let is_cut_out = mtl.opacity.is_some_and(|d| d < 1.0) || mtl.opacity_map.is_some();
-    let filters = mtl.tint.is_some_and(|tint| tint != [1.0; 3]);
-    match index(mtl) {
-        _ if is_metal => false,
-        Some(ni) if (ni - 1.0).abs() <= INDEX_TOLERANCE => filters && !has_base,
-        Some(_) => !(model == 9 && is_cut_out && has_base && mtl.tint.is_none()),
-        None => matches!(model, 6 | 7) || mtl.tint.is_some() || !has_base,
-    }
-}
-
-/// Whether there is a diffuse base that can be seen.
-fn has_base(mtl: &MtlMaterial) -> bool {
-    mtl.diffuse_map.is_some() || mtl.diffuse.is_some_and(|kd| kd.iter().any(|&x| x > DARK_BASE))
-}
-
-/// `Ni`, where it can be one: within the limits of the MTL specification, with room.
-fn index(mtl: &MtlMaterial) -> Option<f64> {
-    mtl.ior.filter(|ior| (0.001..=100.0).contains(ior))
-}
-
-/// Whether `Pr`, `Pm` or a map of them says what the surface is.
-fn is_pbr(mtl: &MtlMaterial) -> bool {
-    mtl.roughness.is_some()
-        || mtl.roughness_map.is_some()
-        || mtl.metallic.is_some_and(|pm| pm > 0.0)
-        || mtl.metallic_map.is_some()
-}
-
-/// Scale and offset that all the maps of a material share, applied to its texture coordinates by the loader.
-pub(super) fn texcoord_transform(mtl: &MtlMaterial, notes: &mut Notes) -> ([f64; 2], [f64; 2]) {
-    const NONE: ([f64; 2], [f64; 2]) = ([1.0; 2], [0.0; 2]);
-    let mut transforms = maps(mtl).map(|map| (map.options.scale, map.options.offset));
-    let Some(first) = transforms.next() else { return NONE };
-    if transforms.all(|other| other == first) {
-        return first;
-    }
-    notes.add(1, format!("maps of material `{}` have different `-s` or `-o`: left out", mtl.name));
-    NONE
 }
 
 /// The maps of a material.
@@ -122,33 +72,6 @@ impl Resolver<'_> {
             self.mirror(base)
         } else {
             self.coated(base, metallic)
-        }
-    }
-
-    fn note_what_illum_loses(&mut self) {
-        let mtl = self.mtl;
-        let Some(model) = mtl.illumination else { return };
-        let name = &mtl.name;
-        let mut note = |what: String| self.notes.add(1, what);
-        let shines = mtl.specular.is_some_and(|ks| ks != [0.0; 3]) || mtl.specular_map.is_some();
-        match model {
-            0 | 1 if shines && !is_pbr(mtl) => {
-                note(format!("`Ks` of material `{name}` left out: `illum {model}` has no highlight"));
-            }
-            4 | 6 | 7 | 9 if is_glass(mtl) && has_base(mtl) => {
-                note(format!("`Kd` of material `{name}` left out: `illum {model}` is glass"));
-            }
-            4 | 6 | 7 | 9 if !is_glass(mtl) => {
-                let tint = mtl.tint.filter(|&tint| tint != [1.0; 3]);
-                let lost = if tint.is_some() { ", `Tf` left out" } else { "" };
-                note(format!(
-                    "material `{name}` is no glass in spite of `illum {model}`{lost}: docs/loading.md"
-                ));
-            }
-            3 | 5 if mtl.metallic.is_some_and(|pm| pm > 0.0) && has_base(mtl) => {
-                note(format!("`illum {model}` of material `{name}` left out: `Pm` says what it is"));
-            }
-            _ => {}
         }
     }
 
@@ -345,7 +268,7 @@ impl Resolver<'_> {
         let id = self.textures.data(Some(map))?;
         let multiplier = map.options.bump_multiplier;
         if is_normals {
-            return Some(NormalMap::Tangent(id));
+            return Some(NormalMap::Tangent(id, multiplier.unwrap_or(1.0) as f32));
         }
         if multiplier.is_none() {
             self.notes

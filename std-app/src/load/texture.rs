@@ -1,7 +1,7 @@
 //! Pictures that become textures: decoded once each, in parallel, and refused when they would not fit a sane
 //! amount of memory.
 
-use halflight_core::scene::{Texels, Texture, Wrap};
+use halflight_core::scene::{Texels, Texture, TextureTransform, Wrap};
 use image::{DynamicImage, ImageFormat, ImageReader, Limits};
 use std::io::Cursor;
 use std::path::Path;
@@ -43,7 +43,13 @@ impl Picture {
             Pixels::Bytes(bytes) if srgb => Texels::Srgb8(bytemuck::cast_slice(bytes)),
             Pixels::Bytes(bytes) => Texels::Linear8(bytemuck::cast_slice(bytes)),
         };
-        Texture { width: self.width, height: self.height, texels, wrap }
+        Texture {
+            width: self.width,
+            height: self.height,
+            texels,
+            wrap,
+            transform: TextureTransform::IDENTITY,
+        }
     }
 }
 

@@ -1,11 +1,11 @@
 //! The textures of a scene: every picture is found, decoded once, and used under as many views as the
 //! materials need (as colours, as plain numbers, wrapped or clamped).
 
-use super::map::Map;
+use super::map::{Map, MapOptions};
 use super::notes::Notes;
 use super::relief::{self, Relief};
 use super::texture::{self, Picture, Pixels};
-use halflight_core::scene::{Texture, TextureId, Wrap};
+use halflight_core::scene::{Texture, TextureId, TextureTransform, Wrap};
 use rayon::prelude::*;
 use std::collections::HashMap;
 use std::path::PathBuf;
@@ -23,6 +23,7 @@ struct View {
     picture: usize,
     srgb: bool,
     wrap: Wrap,
+    transform: TextureTransform,
 }
 
 impl TextureSet {
@@ -88,7 +89,11 @@ impl TextureSet {
 
     /// The views, in the order of their ids.
     pub fn views(&self) -> Vec<Texture<'_>> {
-        self.views.iter().map(|view| self.pictures[view.picture].view(view.srgb, view.wrap)).collect()
+        let view = |view: &View| {
+            let texture = self.pictures[view.picture].view(view.srgb, view.wrap);
+            Texture { transform: view.transform, ..texture }
+        };
+        self.views.iter().map(view).collect()
     }
 
     /// Number of views.
@@ -113,7 +118,10 @@ impl TextureSet {
     fn view(&mut self, map: &Map, srgb: bool) -> Option<TextureId> {
         let picture = *self.by_file.get(map.found.as_ref()?)?;
         let srgb = srgb && matches!(self.pictures[picture].pixels, Pixels::Bytes(_));
-        let view = View { picture, srgb, wrap: if map.options.clamp { Wrap::Clamp } else { Wrap::Repeat } };
+        let MapOptions { scale, offset, clamp, .. } = map.options;
+        let [scale, offset] = [scale, offset].map(|uv| uv.map(|x| x as f32).into());
+        let transform = TextureTransform { scale, offset };
+        let view = View { picture, srgb, wrap: if clamp { Wrap::Clamp } else { Wrap::Repeat }, transform };
         let id = self.views.iter().position(|known| *known == view).unwrap_or_else(|| {
             self.views.push(view);
             self.views.len() - 1

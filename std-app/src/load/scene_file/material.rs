@@ -99,6 +99,7 @@ impl MaterialEntry {
             roughness: number(self.roughness),
             metallic: number(self.metallic),
             illumination: None,
+            surely_glass: self.kind == Some(MaterialKind::Glass),
             two_sided: false,
             diffuse_map: map(&self.color_map)?,
             specular_map: map(&self.specular_map)?,
@@ -169,6 +170,7 @@ impl MaterialChange {
         );
         replace!(diffuse_map, specular_map, emission_map, roughness_map, metallic_map, opacity_map);
         replace!(bump_map, normal_map);
+        material.surely_glass |= change.surely_glass;
         material.two_sided = self.two_sided.unwrap_or(material.two_sided);
         if let (Some(map), Some(scale)) = (&mut material.bump_map, self.bump_scale) {
             map.options.bump_multiplier = Some(scale);

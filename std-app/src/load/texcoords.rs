@@ -1,0 +1,208 @@
+//! Texture coordinates on their way to f32. Far from 0 they would lose their fraction, which is all that a texture
+//! that repeats needs of them: the whole number is taken off in f64, for each triangle.
+
+use super::geometry::Geometry;
+use super::map::Map;
+use std::collections::HashMap;
+
+/// From here on a coordinate is far: f32 still has 1/65536 there, a sixteenth of a texel of 4096.
+const FAR: f64 = 256.0;
+/// Whole numbers are taken off in steps of this, so that neighbours share their vertices.
+const STEP: f64 = 64.0;
+/// The longest period of maps of different scales.
+const LONGEST_PERIOD: u32 = 1000;
+/// From here on a coordinate that is left keeps less than 1/128.
+const BLURS: f64 = 65536.0;
+
+/// Says of triangles what [`take_whole_numbers_off`] counts.
+pub(super) const BLURRED: &str =
+    "triangle with texture coordinates beyond 65536, which leave no detail of its textures";
+
+/// What becomes of the texture coordinates of a material.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Texcoords {
+    /// Factor on them.
+    scale: [f64; 2],
+    /// Added after that.
+    offset: [f64; 2],
+    /// All maps are the same this much further; `None` where some are not, or there are none.
+    period: Option<f64>,
+}
+
+impl Default for Texcoords {
+    fn default() -> Self {
+        Self { scale: [1.0; 2], offset: [0.0; 2], period: None }
+    }
+}
+
+impl Texcoords {
+    /// Of a material with `maps`. Scale and offset that all of them share become those of the coordinates.
+    pub(super) fn of_maps(maps: &mut [&mut Map]) -> Self {
+        let mut texcoords = Self::default();
+        let Some(first) = maps.first() else { return texcoords };
+        let shared = (first.options.scale, first.options.offset);
+        if maps.iter().all(|map| (map.options.scale, map.options.offset) == shared) {
+            (texcoords.scale, texcoords.offset) = shared;
+            for map in maps.iter_mut() {
+                (map.options.scale, map.options.offset) = ([1.0; 2], [0.0; 2]);
+            }
+        }
+        if maps.iter().all(|map| !map.options.clamp) {
+            let scales: Vec<f64> = maps.iter().flat_map(|map| map.options.scale).collect();
+            texcoords.period = period(&scales);
+        }
+        texcoords
+    }
+
+    /// The coordinates, not yet rounded; those that are not finite are 0 and counted.
+    pub(super) fn placed(&self, texcoords: &[[f64; 2]], broken: &mut u64) -> Vec<[f64; 2]> {
+        let place = |uv: &[f64; 2]| {
+            let uv = [0, 1].map(|i| uv[i] * self.scale[i] + self.offset[i]);
+            if uv.iter().all(|&x| (x as f32).is_finite()) {
+                return uv;
+            }
+            *broken += 1;
+            [0.0; 2]
+        };
+        texcoords.iter().map(place).collect()
+    }
+}
+
+/// The least whole number that all scales take to whole numbers.
+fn period(scales: &[f64]) -> Option<f64> {
+    let is_whole = |x: f64| (x - x.round()).abs() <= 1e-9 * x.abs().max(1.0);
+    (1..=LONGEST_PERIOD).map(f64::from).find(|period| scales.iter().all(|scale| is_whole(scale * period)))
+}
+
+/// Takes whole numbers off the texture coordinates of triangles that are far from 0; a vertex that triangles far from
+/// each other share becomes several. `placed` are the coordinates of the vertices in f64. Returns the number of
+/// triangles whose coordinates are still so large that no detail is left.
+pub(super) fn take_whole_numbers_off(
+    texcoords: &Texcoords,
+    placed: &[[f64; 2]],
+    geometry: &mut Geometry,
+) -> u64 {
+    let Some(period) = texcoords.period else { return 0 };
+    if placed.iter().flatten().all(|x| x.abs() < FAR) {
+        return 0;
+    }
+    let step = period * (STEP / period).ceil();
+    let mut blurred = 0;
+    // The vertex that stands for a vertex of the file less a multiple of the step.
+    let mut vertices: HashMap<(u32, [i64; 2]), u32> = HashMap::new();
+    let mut is_taken = vec![false; placed.len()];
+    for triangle in &mut geometry.triangles {
+        let corners = triangle.vertices.map(|v| placed[v as usize]);
+        let steps = [0, 1].map(|i| {
+            let least = corners.iter().map(|uv| uv[i]).fold(f64::INFINITY, f64::min);
+            let is_far = corners.iter().any(|uv| uv[i].abs() >= FAR);
+            if is_far { (least / step).floor() as i64 } else { 0 }
+        });
+        let near = corners.map(|uv| [0, 1].map(|i| uv[i] - steps[i] as f64 * step));
+        blurred += u64::from(near.iter().flatten().any(|x| x.abs() > BLURS));
+        for (vertex, uv) in triangle.vertices.iter_mut().zip(near) {
+            let old = *vertex as usize;
+            *vertex = *vertices.entry((*vertex, steps)).or_insert_with(|| {
+                let uv = uv.map(|x| x as f32);
+                if !core::mem::replace(&mut is_taken[old], true) {
+                    geometry.texcoords[old] = uv;
+                    return old as u32;
+                }
+                geometry.positions.push(geometry.positions[old]);
+                geometry.texcoords.push(uv);
+                if !geometry.normals.is_empty() {
+                    geometry.normals.push(geometry.normals[old]);
+                }
+                geometry.positions.len() as u32 - 1
+            });
+        }
+    }
+    blurred
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use halflight_core::scene::Triangle;
+
+    /// Two triangles that share an edge, the texture coordinates of whose corners are `u` along u.
+    fn strip(u: [f64; 4], texcoords: Texcoords) -> (Geometry, u64) {
+        let uv = u.map(|u| [u, 0.25]);
+        let triangles = [[0, 1, 2], [1, 3, 2]].map(|vertices| Triangle { vertices, material: 0 }).to_vec();
+        let mut geometry = Geometry {
+            positions: vec![[0.0; 3], [1.0; 3], [2.0; 3], [3.0; 3]],
+            texcoords: uv.map(|uv| uv.map(|x| x as f32)).to_vec(),
+            triangles,
+            ..Geometry::default()
+        };
+        let blurred = take_whole_numbers_off(&texcoords, &uv, &mut geometry);
+        (geometry, blurred)
+    }
+
+    fn repeating(scales: [f64; 2]) -> Texcoords {
+        let mut maps =
+            scales.map(|scale| Map::of_statement(format!("-s {scale} 1 a.png").as_bytes(), 1).unwrap());
+        maps.iter_mut().zip(scales).for_each(|(map, scale)| map.options.scale = [scale, 1.0]);
+        let [a, b] = &mut maps;
+        Texcoords::of_maps(&mut [a, b])
+    }
+
+    fn of_triangle(geometry: &Geometry, triangle: usize) -> [f32; 3] {
+        geometry.triangles[triangle].vertices.map(|v| geometry.texcoords[v as usize][0])
+    }
+
+    #[test]
+    fn the_fraction_stays_whatever_the_whole_number() {
+        for whole in [1e3, 1e5, 1e7, 1e12, -1e5, -1e12] {
+            let (geometry, blurred) = strip([0.25, 0.5, 0.75, 1.0].map(|u| whole + u), repeating([1.0; 2]));
+            let [a, b, c] = of_triangle(&geometry, 0);
+            assert_eq!([a.rem_euclid(1.0), b - a, c - a], [0.25, 0.25, 0.5], "{whole}");
+            assert!((0.0..64.0).contains(&a));
+            assert_eq!((geometry.positions.len(), blurred), (4, 0));
+        }
+    }
+
+    #[test]
+    fn coordinates_near_0_and_those_that_clamp_keep_their_bits() {
+        let near = [0.1, -200.0, 255.9, 0.3];
+        assert_eq!(strip(near, repeating([1.0; 2])).0.texcoords[1][0], -200.0);
+        let far = [1e6, 1e6 + 1.0, 1e6, 1e6];
+        assert_eq!(strip(far, Texcoords::default()).0.texcoords[1][0], 1_000_001.0);
+        let mut clamped = Map::default();
+        clamped.options.clamp = true;
+        assert_eq!(strip(far, Texcoords::of_maps(&mut [&mut clamped])).0.texcoords[1][0], 1_000_001.0);
+    }
+
+    #[test]
+    fn a_vertex_between_triangles_far_apart_becomes_two() {
+        let (geometry, _) = strip([0.0, 300.5, 301.0, 1000.25], repeating([1.0; 2]));
+        assert_eq!(of_triangle(&geometry, 0), [0.0, 300.5, 301.0]);
+        assert_eq!(of_triangle(&geometry, 1), [44.5, 744.25, 45.0]);
+        assert_eq!(geometry.positions.len(), 6);
+        assert_eq!(geometry.positions[5], geometry.positions[2]);
+        let (_, blurred) = strip([0.0, 1e9, 0.0, 1e9], repeating([1.0; 2]));
+        assert_eq!(blurred, 2);
+    }
+
+    #[test]
+    fn maps_of_different_scales_have_a_period_in_common() {
+        assert_eq!(period(&[1.0, 1.0]), Some(1.0));
+        assert_eq!(period(&[1.0, 0.5, 0.1]), Some(10.0));
+        assert_eq!(period(&[0.0, -2.0]), Some(1.0));
+        assert_eq!(period(&[1.0, core::f64::consts::PI]), None);
+        let (geometry, _) = strip([1e6 + 0.5, 1e6, 1e6, 1e6], repeating([1.0, 0.3]));
+        let left = 1e6 + 0.5 - f64::from(of_triangle(&geometry, 0)[0]);
+        assert_eq!(left % 10.0, 0.0);
+        assert!(left > 9e5);
+    }
+
+    #[test]
+    fn what_all_maps_share_is_applied_once() {
+        let mut maps = [1.0, 1.0].map(|_| Map::of_statement(b"a.png", 1).unwrap());
+        maps.iter_mut().for_each(|map| map.options.scale = [0.37, 2.0]);
+        let [a, b] = &mut maps;
+        let texcoords = Texcoords::of_maps(&mut [a, b]);
+        assert_eq!((texcoords.scale, texcoords.period), ([0.37, 2.0], Some(1.0)));
+        assert_eq!(maps[0].options.scale, [1.0; 2]);
+    }
+}

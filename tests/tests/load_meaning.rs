@@ -1,0 +1,224 @@
+//! Materials, texture coordinates and meshes that mean something else than the letter of the file: as exporters write
+//! them, and as they go wrong.
+
+mod load_support;
+
+use glam::Vec2;
+use halflight::load::{LoadError, LoadedScene};
+use halflight_core::Rgb;
+use halflight_core::scene::{ColorInput, NormalMap, Surface};
+use load_support::{Files, bmp};
+
+const SQUARE: &str = "v 0 0 0\nv 4 0 0\nv 4 4 0\nv 0 4 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n";
+const FACE: &str = "usemtl a\nf 1/1 2/2 3/3 4/4\n";
+
+/// A bitmap, `size` by `size`, of these colours from the bottom.
+fn picture(size: u32, texel: impl Fn(u32, u32) -> [u8; 3]) -> Vec<u8> {
+    let row = (3 * size).next_multiple_of(4);
+    let mut bytes = b"BM".to_vec();
+    for word in [54 + row * size, 0, 54, 40, size, size, 1 | 24 << 16, 0, row * size, 2835, 2835, 0, 0] {
+        bytes.extend(word.to_le_bytes());
+    }
+    for y in 0..size {
+        let start = bytes.len();
+        (0..size).for_each(|x| bytes.extend(texel(x, y).iter().rev()));
+        bytes.resize(start + row as usize, 0);
+    }
+    bytes
+}
+
+fn scene(obj: &str, mtl: &str) -> Result<LoadedScene, LoadError> {
+    let obj = format!("mtllib m.mtl\n{obj}");
+    let mtl = format!("newmtl a\n{mtl}");
+    let orange = bmp([255, 128, 0]);
+    let heights = picture(8, |x, y| [(x * 30 + y) as u8; 3]);
+    let normals = picture(8, |x, y| [100 + 8 * x as u8, 128 + y as u8, 250]);
+    let files = [
+        ("q.obj", obj.as_bytes()),
+        ("m.mtl", mtl.as_bytes()),
+        ("o.bmp", &orange),
+        ("h.bmp", &heights),
+        ("n.bmp", &normals),
+    ];
+    Files::new(&files).load("q.obj")
+}
+
+fn material(mtl: &str) -> LoadedScene {
+    scene(&format!("{SQUARE}{FACE}"), mtl).unwrap()
+}
+
+fn says(scene: &LoadedScene, words: &[&str]) {
+    let said = scene.repairs.iter().any(|note| words.iter().all(|word| note.contains(word)));
+    assert!(said, "no note has {words:?}: {:?}", scene.repairs);
+}
+
+#[test]
+fn a_factor_of_0_does_not_hide_its_own_map() {
+    let orange =
+        |input: ColorInput, factor: f32| input.value == Rgb::splat(factor) && input.texture.is_some();
+    let black = material("Kd 0 0 0\nmap_Kd o.bmp");
+    assert!(
+        matches!(black.materials[0].surface, Surface::Diffuse { reflectance } if orange(reflectance, 1.0))
+    );
+    says(&black, &["`Kd`", "`a`", "is 0"]);
+    let half = material("Kd 0.5 0.5 0.5\nmap_Kd o.bmp");
+    assert!(
+        matches!(half.materials[0].surface, Surface::Diffuse { reflectance } if orange(reflectance, 0.5))
+    );
+    assert!(half.repairs.is_empty());
+    let lamp = material("Kd 0 0 0\nKe 0 0 0\nmap_Ke o.bmp");
+    assert!(orange(lamp.materials[0].emission, 1.0));
+    let coat = material("Kd 0.5 0.5 0.5\nKs 0 0 0\nmap_Ks o.bmp");
+    assert!(matches!(coat.materials[0].surface, Surface::Glossy { specular, .. } if orange(specular, 1.0)));
+    let metal = material("Kd 1 1 1\nPm 0\nmap_Pm o.bmp\nPr 0\nmap_Pr o.bmp\nd 0\nmap_d o.bmp");
+    let Surface::Glossy { metallic, roughness, .. } = metal.materials[0].surface else {
+        panic!("not glossy")
+    };
+    assert_eq!((metallic.value, roughness.value, metal.materials[0].opacity.value), (1.0, 1.0, 1.0));
+    let maya = material("illum 4\nKd 0 0 0\nTf 1 1 1\nNi 1\nmap_Kd o.bmp");
+    assert!(
+        matches!(maya.materials[0].surface, Surface::Diffuse { reflectance } if orange(reflectance, 1.0))
+    );
+    assert_eq!(maya.repairs.len(), 2, "{:?}", maya.repairs);
+    // A map that is not there leaves the constant value.
+    let gone = material("Kd 0 0 0\nmap_Kd gone.bmp");
+    assert!(
+        matches!(gone.materials[0].surface, Surface::Diffuse { reflectance } if reflectance.value == Rgb::ZERO)
+    );
+}
+
+#[test]
+fn pictures_of_relief_are_what_they_look_like() {
+    let map = |mtl: &str| material(mtl).materials[0].normal_map;
+    for statement in ["bump", "map_Bump", "map_bump -s 1 1", "norm"] {
+        assert!(
+            matches!(map(&format!("{statement} n.bmp")), Some(NormalMap::Tangent(_, 1.0))),
+            "{statement}"
+        );
+        let height = map(&format!("{statement} -bm 0.5 h.bmp"));
+        assert!(matches!(height, Some(NormalMap::Height(_, 0.5))), "{statement}");
+    }
+    assert!(matches!(map("map_Bump -bm 0.25 n.bmp"), Some(NormalMap::Tangent(_, 0.25))));
+    assert!(matches!(map("bump -bm 1 o.bmp"), Some(NormalMap::Height(_, 1.0))));
+    assert!(matches!(map("norm o.bmp"), Some(NormalMap::Tangent(..))));
+    assert!(matches!(map("norm gone.bmp\nbump -bm 1 h.bmp"), Some(NormalMap::Height(_, 1.0))));
+    says(&material("bump n.bmp"), &["n.bmp", "normals"]);
+    says(&material("norm h.bmp"), &["h.bmp", "heights"]);
+    let plain = material("bump h.bmp");
+    assert!(matches!(plain.materials[0].normal_map, Some(NormalMap::Height(_, factor)) if factor < 0.1));
+    says(&plain, &["h.bmp", "`-bm`"]);
+}
+
+#[test]
+fn each_map_has_its_own_scale_and_offset() {
+    let scene = material("Kd 1 1 1\nmap_Kd -s 4 1 1 -o 0.5 0 0 o.bmp\nnorm n.bmp");
+    assert!(scene.repairs.is_empty(), "{:?}", scene.repairs);
+    assert_eq!(scene.texcoords[1], [1.0, 0.0]);
+    let views = scene.textures.views();
+    let Surface::Diffuse { reflectance } = scene.materials[0].surface else { panic!("not diffuse") };
+    let colour = views[reflectance.texture.unwrap().0 as usize].transform;
+    assert_eq!((colour.scale, colour.offset), (Vec2::new(4.0, 1.0), Vec2::new(0.5, 0.0)));
+    let Some(NormalMap::Tangent(id, _)) = scene.materials[0].normal_map else { panic!("no normals") };
+    assert_eq!(views[id.0 as usize].transform.scale, Vec2::ONE);
+    // What all share is in the texture coordinates, as ever.
+    let shared = material("Kd 1 1 1\nmap_Kd -s 4 1 1 o.bmp\nnorm -s 4 1 1 n.bmp");
+    assert_eq!(shared.texcoords[1], [4.0, 0.0]);
+    assert!(shared.textures.views().iter().all(|view| view.transform.scale == Vec2::ONE));
+}
+
+#[test]
+fn texture_coordinates_keep_their_fraction_far_from_0() {
+    let at = |u: f64, v: f64, mtl: &str| {
+        let vt = |du: f64, dv: f64| format!("vt {:?} {:?}\n", u + du, v + dv);
+        let corners = [vt(0.0, 0.0), vt(0.75, 0.0), vt(0.75, 0.75), vt(0.0, 0.75)].concat();
+        let vertices = "v 0 0 0\nv 4 0 0\nv 4 4 0\nv 0 4 0\n";
+        scene(&format!("{vertices}{corners}{FACE}"), mtl).unwrap()
+    };
+    let fraction = |scene: &LoadedScene| -> Vec<[f32; 2]> {
+        scene.texcoords.iter().map(|uv| uv.map(|x| x - x.floor())).collect()
+    };
+    let near = at(0.125, 0.25, "map_Kd o.bmp");
+    for (u, v) in [(1e5, 0.0), (-1e7, 3e5), (1e9, 1e12), (300.0, -1e3)] {
+        let far = at(u + 0.125, v + 0.25, "map_Kd o.bmp");
+        assert_eq!(fraction(&far), fraction(&near), "{u} {v}");
+        assert!(far.repairs.is_empty() && far.positions.len() == 4);
+    }
+    // Clamped textures end at 1; without a texture nothing depends on it; nor do ordinary coordinates change.
+    assert_eq!(at(1e5, 0.0, "map_Kd -clamp on o.bmp").texcoords[0], [1e5, 0.0]);
+    assert_eq!(at(1e5, 0.0, "Kd 1 1 1").texcoords[0], [1e5, 0.0]);
+    assert_eq!(at(200.0, 0.0, "map_Kd o.bmp").texcoords[1], [200.75, 0.0]);
+}
+
+#[test]
+fn a_lamp_that_is_there_twice_shines_once() {
+    let lamp = "Kd 0 0 0\nKe 5 5 5\nnewmtl b\nKe 1 1 1\nnewmtl w\nKd 1 1 1\n";
+    let of = |faces: &str| {
+        let obj = format!("{SQUARE}v 0 0 0\nv 4 0 0\nv 4 4 0\nv 0 4 0\nv 9 0 0\nv 9 9 1\n{faces}");
+        scene(&obj, lamp).unwrap()
+    };
+    let twice = of("usemtl a\nf 1 2 3\nf 5 6 7\nf 2 3 1\nf 1 3 4\nf 5 7 8\n");
+    assert_eq!(twice.triangles.len(), 2);
+    says(&twice, &["lamp `a`", "twice", "3 times"]);
+    // Back to back, beside each other, and what does not shine.
+    for faces in
+        ["usemtl a\nf 1 2 3 4\nf 4 3 2 1\n", "usemtl a\nf 1 2 3\nf 1 3 4\n", "usemtl w\nf 1 2 3\nf 1 2 3\n"]
+    {
+        let scene = of(faces);
+        assert!(scene.repairs.is_empty(), "{faces}: {:?}", scene.repairs);
+    }
+    for faces in ["usemtl a\nf 1 2 3 4\nf 2 3 4 1\n", "usemtl a\nf 1 2 3\nusemtl b\nf 1 2 3\n"] {
+        let scene = of(faces);
+        assert!(scene.triangles.len() > 1);
+        says(&scene, &["in the same place"]);
+    }
+}
+
+#[test]
+fn open_glass_is_said() {
+    let cube = "v -1 -1 -1\nv 1 -1 -1\nv 1 1 -1\nv -1 1 -1\nv -1 -1 1\nv 1 -1 1\nv 1 1 1\nv -1 1 1\nv 5 5 5\nv 6 5 5\nv 6 6 5\n";
+    let of = |faces: &str| {
+        scene(&format!("{cube}usemtl a\n{faces}"), "illum 7\nNi 1.5\nnewmtl w\nKd 1 1 1\n").unwrap()
+    };
+    let sides = "f 1 4 3 2\nf 5 6 7 8\nf 1 2 6 5\nf 4 8 7 3\nf 1 5 8 4\n";
+    let closed = of(&format!("{sides}f 2 3 7 6\n"));
+    assert!(closed.repairs.is_empty(), "{:?}", closed.repairs);
+    // Water in a basin: the basin closes it.
+    let basin = of(&format!("{sides}usemtl w\nf 2 3 7 6\n"));
+    assert!(basin.repairs.is_empty(), "{:?}", basin.repairs);
+    says(&of(sides), &["glass `a` is open", "4 edges", "1 of its pieces"]);
+    says(&of(&format!("{sides}f 2 3 7 6\nf 9 10 11\n")), &["3 edges", "1 of its pieces"]);
+    says(&of(&format!("{sides}f 9 10 11\n")), &["7 edges", "2 of its pieces"]);
+}
+
+#[test]
+fn a_scene_file_overrides_what_illum_says() {
+    let mtl = "newmtl a\nKd 0.5 0.5 0.5\nillum 1\n";
+    let obj = format!("mtllib m.mtl\n{SQUARE}{FACE}");
+    let load = |material: &str| {
+        let toml = format!("[[mesh]]\nfile = \"q.obj\"\n{material}");
+        let files = [("q.obj", obj.as_bytes()), ("m.mtl", mtl.as_bytes()), ("s.toml", toml.as_bytes())];
+        Files::new(&files).load("s.toml").unwrap()
+    };
+    let coated = load("[material.a]\nspecular = 0.04\n");
+    assert!(matches!(coated.materials[0].surface, Surface::Glossy { .. }));
+    let mirror =
+        |color: &str| match load(&format!("[material.a]\nkind = \"mirror\"\n{color}")).materials[0].surface {
+            Surface::Mirror { reflectance } => reflectance.value,
+            other => panic!("{other:?}"),
+        };
+    assert_eq!(mirror("color = [0.9, 0.5, 0.1]"), Rgb::new(0.9, 0.5, 0.1));
+    assert_eq!(mirror("color = 0.9\nspecular = 0.25"), Rgb::splat(0.25));
+    assert_eq!(mirror(""), Rgb::splat(0.5));
+    let glass = load("[material.a]\nkind = \"glass\"\nior = 1\n");
+    assert!(matches!(glass.materials[0].surface, Surface::Dielectric { ior: 1.0, .. }));
+}
+
+#[test]
+fn a_light_too_bright_for_its_scene_is_refused() {
+    let obj = "v 0 0 0\nv 1e-12 0 0\nv 0 1e-12 0\nf 1 2 3\n";
+    let toml =
+        "[[mesh]]\nfile = \"q.obj\"\n[[light]]\nkind = \"point\"\nposition = [0, 0, 1]\nintensity = 1\n";
+    let error =
+        Files::new(&[("q.obj", obj.as_bytes()), ("s.toml", toml.as_bytes())]).load("s.toml").unwrap_err();
+    assert!(error.line == 3 && error.to_string().contains("too large"), "{error}");
+}
