@@ -98,7 +98,14 @@ fn what_is_repaired_is_said_once() {
     repairs(&format!("{SQUARE}f 1 2 3\ncall a.obj\n"), "`call` and `csh` are not followed");
     repairs(&format!("{SQUARE}f 1 2 3\nfoo 1\nfoo 2\n"), "unknown statement `foo` left out, 2 times");
     repairs(&format!("v 0 0 0 1 0 0\n{SQUARE}f 2 3 4\n"), "vertex colours");
-    repairs(&format!("v 0 0 0 0\n{SQUARE}f 1 3 4\nf 2 3 4\n"), "w = 0");
+    let plain = repairs(&format!("{SQUARE}f 1 2 3\nl 1 2\n"), "no surface");
+    for weight in ["0", "2", "-1e-3", "nan"] {
+        let weighted: String = SQUARE.lines().map(|line| format!("{line} {weight}\n")).collect();
+        assert_eq!(
+            repairs(&format!("{weighted}f 1 2 3\n"), "weight of a `v` left out").positions,
+            plain.positions
+        );
+    }
     repairs(&format!("mtllib none.mtl\n{SQUARE}f 1 2 3\n"), "material library `none.mtl` is missing");
     let scene = repairs(&format!("{SQUARE}usemtl gone\nf 1 2 3\n"), "material `gone`");
     assert_eq!(scene.materials[scene.triangles[0].material as usize], Material::GREY);

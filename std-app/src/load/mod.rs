@@ -5,6 +5,7 @@
 //! with file, line and what to do. The table of both is `docs/loading.md`. The parsers take bytes, so that
 //! they can be fed anything: [`obj::parse`], [`mtl::parse`], [`scene_file::parse`], [`texture::decode`].
 
+mod doubled;
 mod error;
 mod files;
 mod geometry;
@@ -15,6 +16,7 @@ pub mod mtl;
 mod name;
 mod notes;
 pub mod obj;
+mod open_glass;
 mod relief;
 mod scene;
 pub mod scene_file;
@@ -232,9 +234,11 @@ impl SceneBuilder {
         count_vertices(path, parts.iter().map(|part| part.group.positions.len()).sum())?;
         let (min, max) = geometry::bounds(&parts);
         let transform = SceneTransform::fitting(min, max);
-        let geometry = geometry::assemble(&parts, &transform, notes);
+        let mut geometry = geometry::assemble(&parts, &transform, notes);
         count_vertices(path, geometry.positions.len())?;
         let names: Vec<String> = self.materials.iter().map(|mtl| mtl.name.to_string()).collect();
+        doubled::leave_out(&mut geometry, &materials, &names, notes);
+        open_glass::note(&geometry, &materials, &names, notes);
         Ok(LoadedScene {
             positions: geometry.positions,
             normals: geometry.normals,

@@ -122,14 +122,15 @@ impl Cleaner<'_> {
         self.out.notes.at(number, what);
     }
 
-    /// `kind` 0: `v x y z [w]` or `v x y z r g b`; 1: `vt u [v [w]]`; 2: `vn x y z`.
+    /// `kind` 0: `v x y z [w]` or `v x y z r g b`; 1: `vt u [v [w]]`; 2: `vn x y z`. Polygons have no use for w.
     #[inline]
     fn vertex(&mut self, line: u32, kind: usize, operands: Words) -> Result<(), LoadError> {
         const KEYWORDS: [&str; 3] = ["v", "vt", "vn"];
         const NEEDED: [usize; 3] = [3, 1, 3];
-        const KEPT: [usize; 3] = [4, 2, 3];
+        const KEPT: [usize; 3] = [3, 2, 3];
+        let mut weight = None;
         self.seen[kind] += 1;
-        let mut numbers: [&[u8]; 4] = [b"0"; 4];
+        let mut numbers: [&[u8]; 3] = [b"0"; 3];
         let mut found = 0;
         for word in operands {
             match numeral(word) {
@@ -151,6 +152,8 @@ impl Cleaner<'_> {
             }
             if found < KEPT[kind] {
                 numbers[found] = word;
+            } else if found == 3 {
+                weight = number(word);
             }
             found += 1;
         }
@@ -158,25 +161,21 @@ impl Cleaner<'_> {
             let problem = format!("`{}` needs {} numbers and has {found}", KEYWORDS[kind], NEEDED[kind]);
             return Err(LoadError::at(self.file, line, problem, "the file may have been cut off here"));
         }
-        let kept = match (kind, found) {
-            (0, 4) => 4, // x y z w
-            (0, 5..) => {
-                self.out.notes.at(line, "vertex colours are not supported: left out");
-                3
+        match (kind, found) {
+            (0, 4) if weight != Some(1.0) => {
+                self.out
+                    .notes
+                    .at(line, "weight of a `v` left out: only curves and free-form surfaces have weights");
             }
-            (1, _) => 2,
-            _ => 3,
-        };
+            (0, 5..) => self.out.notes.at(line, "vertex colours are not supported: left out"),
+            _ => {}
+        }
         let out = &mut self.out.vertices;
         out.extend_from_slice(KEYWORDS[kind].as_bytes());
-        if kept == 4 && number(numbers[3]).is_none_or(|w| w == 0.0) {
-            numbers = [b"nan", b"nan", b"nan", b"1"]; // a point at infinity
-            self.out.notes.at(line, "vertex with w = 0, its faces are left out");
-        }
         if kind == 2 && numbers[..3].iter().all(|number| is_zero(number)) {
             self.out.notes.at(line, "zero normal, its faces are shaded flat there");
         }
-        for number in &numbers[..kept] {
+        for number in &numbers[..KEPT[kind]] {
             out.push(b' ');
             out.extend_from_slice(number);
         }
