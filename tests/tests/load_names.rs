@@ -70,6 +70,9 @@ fn comments_quotes_and_blanks_count_only_where_names_differ_in_nothing_else() {
         let (rgb, notes) = one(name);
         assert_eq!((greys(rgb), notes.len()), ([grey, 0.4], 0), "{name:?} {notes:?}");
     }
+    // Comments on both sides are likely, and said.
+    let (rgb, notes) = one(b"a # other");
+    assert_eq!((greys(rgb), notes.len()), ([0.1, 0.4], 1), "{notes:?}");
     // Neither of the materials whose names begin alike.
     let mtl = b"newmtl M #1\nKd .1 0 0\nnewmtl M #2\nKd .2 0 0\n";
     let (rgb, notes) = two(b"mtllib m.mtl", [b"M #3", b"M #2"], &[("m.mtl", mtl)]);

@@ -77,19 +77,21 @@ impl Library {
         library
     }
 
-    /// The material that the operand of a `usemtl` means, under the name that both sides have.
-    pub(super) fn find(&self, used: &Name) -> Option<MtlMaterial> {
-        self.exact(used).or_else(|| self.alike(used))
+    /// The material that the operand of a `usemtl` means, under the name that both sides have, and whether that is
+    /// beyond doubt.
+    pub(super) fn find(&self, used: &Name) -> Option<(MtlMaterial, bool)> {
+        self.shared(used).or_else(|| Some((self.alike(used)?, false)))
     }
 
-    /// The material that shares the longest reading. Where both sides would have to lose a comment, it has to be
-    /// the only one: `Material #3` is neither `Material #1` nor `Material #2`.
-    fn exact(&self, used: &Name) -> Option<MtlMaterial> {
+    /// The material that shares the longest reading. Where both sides have to lose what may be a comment, it has to
+    /// be the only one: `Material #3` is neither `Material #1` nor `Material #2`.
+    fn shared(&self, used: &Name) -> Option<(MtlMaterial, bool)> {
         readings(used.bytes()).into_iter().find_map(|reading| {
             let name = Name::from(reading.name);
             let known = self.by_reading.get(&name)?;
-            let doubtful = reading.kind == Kind::Cut && known.kind == Kind::Cut && known.others;
-            (!doubtful).then(|| MtlMaterial { name, ..self.materials[known.number].clone() })
+            let is_doubtful = reading.kind == Kind::Cut && known.kind == Kind::Cut;
+            let material = MtlMaterial { name, ..self.materials[known.number].clone() };
+            (!(is_doubtful && known.others)).then_some((material, !is_doubtful))
         })
     }
 

@@ -150,24 +150,28 @@ impl SceneBuilder {
     fn file_material(&mut self, file: usize, used: &Name, library: &Library, path: &Path) -> u32 {
         let found = library.find(used);
         let is_changed = |name: &Name| self.overrides.contains_key(&name.to_string());
-        let names: Vec<Name> = readings(used.bytes()).iter().map(|reading| reading.name.into()).collect();
         let place = path.display();
         let name = match &found {
-            Some(material) => {
-                let name = material.name.clone();
-                if !names.contains(&name) {
-                    let what =
-                        format!("material `{}` of {place} is not there, `{name}` is taken", used.trimmed());
-                    self.notes.add(1, what);
-                }
-                name
+            Some((material, _)) => material.name.clone(),
+            None => {
+                let names = readings(used.bytes());
+                let mut names = names.iter().map(|reading| Name::from(reading.name));
+                names.find(is_changed).unwrap_or_else(|| used.trimmed())
             }
-            None => names.into_iter().find(is_changed).unwrap_or_else(|| used.trimmed()),
         };
-        if found.is_none() && !is_changed(&name) {
-            let what = format!("material `{name}` of {place} is not in its material libraries: grey");
-            self.notes.add(1, what);
+        match &found {
+            Some((_, false)) => {
+                let what =
+                    format!("material `{}` of {place} is not there, `{name}` is taken", used.trimmed());
+                self.notes.add(1, what);
+            }
+            None if !is_changed(&name) => {
+                let what = format!("material `{name}` of {place} is not in its material libraries: grey");
+                self.notes.add(1, what);
+            }
+            _ => {}
         }
+        let found = found.map(|(material, _)| material);
         self.material(Some(file), name, found)
     }
 

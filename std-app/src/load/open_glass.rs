@@ -49,7 +49,7 @@ pub(super) fn note(geometry: &Geometry, materials: &[Material], names: &[String]
         let (name, pieces) = (&names[material as usize], roots.len());
         let what = format!(
             "glass `{name}` is open ({count} edges of one face, in {pieces} of its pieces): all that lies behind it \
-             counts as its inside; give it a thickness"
+             counts as its inside; a pane needs two faces"
         );
         notes.add(1, what);
     }
