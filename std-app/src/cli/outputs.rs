@@ -13,7 +13,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Instant;
 
-/// What a file is for: the flag that names it.
+/// The purpose of an output, with the flag that names it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Role {
     /// A picture.
@@ -26,7 +26,7 @@ pub(super) enum Role {
     Cache,
     /// A file of a report.
     Report,
-    /// What the program was started with.
+    /// Standard output or standard error.
     Standard,
 }
 

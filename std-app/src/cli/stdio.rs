@@ -14,7 +14,7 @@ pub(super) fn say(text: &str) -> Result<(), Failure> {
     heard(writeln!(stdout(), "{text}").and_then(|()| stdout().flush()))
 }
 
-/// What a write to standard output means.
+/// The outcome of a write to standard output.
 pub(super) fn heard(written: io::Result<()>) -> Result<(), Failure> {
     match written {
         Err(error) if !is_gone(&error) => {
@@ -27,7 +27,7 @@ pub(super) fn heard(written: io::Result<()>) -> Result<(), Failure> {
 
 /// Whether nobody reads any more: the pipe or the terminal is closed.
 fn is_gone(error: &io::Error) -> bool {
-    /// Of a terminal that is closed, and of a file on a disk that is broken.
+    /// EIO: a closed terminal, or a file on a broken disk.
     const INPUT_OUTPUT: i32 = 5;
     let is_file = || Identity::of_open(stdout()).is_some();
     error.kind() == io::ErrorKind::BrokenPipe || (error.raw_os_error() == Some(INPUT_OUTPUT) && !is_file())

@@ -187,7 +187,7 @@ pub struct Progress {
     pub rounds: u32,
     /// The error so far.
     pub error: Option<ErrorEstimate>,
-    /// A film or a cache that could not be written, once for each: the render goes on, and tries again.
+    /// A failed write of a film or a cache, once for each file: the render goes on, and tries again.
     pub unsaved: Option<FileError>,
 }
 
@@ -291,7 +291,7 @@ pub struct RenderResult {
     pub memory: Vec<MemoryUse>,
     /// The most bytes at any time: building the hierarchy takes more than keeping it.
     pub memory_peak: usize,
-    /// Films and caches that are not in their files as they are in the end. Those of before are whole.
+    /// Films and caches whose last write failed. The files hold the last whole version.
     pub unsaved: Vec<FileError>,
     /// Why rendering ended.
     pub ending: Ending,

@@ -6,7 +6,7 @@ use std::fs::{self, File};
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
-/// The files of a report, and what stands in those that this program has written.
+/// The files of a report, and marks of those that this program has written.
 const FILES: [(&str, &[&str]); 3] = [
     ("index.html", &["<p class=\"brand\">halflight</p>"]),
     ("curve.csv", &["seconds,spp,rays,relmse,", "method,seconds,spp,rays,relmse,"]),
@@ -21,8 +21,7 @@ pub fn report_files(folder: &Path) -> [PathBuf; 3] {
     FILES.map(|(name, _)| folder.join(name))
 }
 
-/// Finds out whether [`write_folder`] will find its way, and that it takes nobody else's place: where a file of one
-/// of its names is there, this program has written it.
+/// Checks that [`write_folder`] can write its files, and that files of these names are those of an earlier report.
 ///
 /// # Errors
 /// Names the folder or the file and what to do.
@@ -32,7 +31,7 @@ pub fn check_folder(folder: &Path) -> Result<(), PictureError> {
         return Err(refuse("cannot hold a report: it is a file, not a folder".into()));
     }
     if !folder.exists() {
-        // As if it were a file: what it is in is there and takes it.
+        // As of a file: the folder above is there and writable.
         return check_place(folder).map_err(refuse);
     }
     for (path, (_, marks)) in report_files(folder).iter().zip(FILES) {
@@ -46,7 +45,7 @@ pub fn check_folder(folder: &Path) -> Result<(), PictureError> {
     Ok(())
 }
 
-/// Whether nothing is lost where a report takes the place of `path`.
+/// Whether `path` may be replaced by a file of a report.
 fn is_ours(path: &Path, marks: &[&str]) -> io::Result<bool> {
     if Place::of(path)?.is_stream() || !path.exists() {
         return Ok(true);

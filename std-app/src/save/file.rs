@@ -112,7 +112,10 @@ pub(crate) fn check_place(path: &Path) -> Result<(), String> {
 
 /// Why a file is not there, or not the new one.
 pub(crate) fn not_written(error: &io::Error) -> String {
-    format!("cannot be written: {}", words(error))
+    match error.kind() {
+        io::ErrorKind::NotFound => "cannot be written: its folder is not there any more".into(),
+        _ => format!("cannot be written: {}", words(error)),
+    }
 }
 
 /// The error without the number of the operating system.

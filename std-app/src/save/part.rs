@@ -1,5 +1,5 @@
-//! A file on its way: written beside its place under a name of its own, and renamed into it when all of it is on the
-//! disk. What does not get there is removed, also where the program is told to end at once.
+//! A file that is being written: beside its place under a name of its own, and renamed into it when all of it is on
+//! the disk. A part that is not finished is removed, even if the program is to end at once.
 
 use super::place::folder;
 use std::ffi::OsString;
@@ -34,7 +34,7 @@ impl Part {
     /// Moves it to `target`.
     pub(super) fn rename(self, target: &Path) -> io::Result<()> {
         fs::rename(&self.0, target)?;
-        // The new name is on the disk when the folder is. Where folders cannot be opened there is nothing to do.
+        // The new name is on the disk when the folder is. Some systems cannot open folders, and need not.
         let _ = File::open(folder(target)).and_then(|folder| folder.sync_all());
         Ok(())
     }

@@ -1,5 +1,5 @@
-//! Where the name of an output leads, links followed: to a file, which is replaced whole, or to a pipe or a
-//! device, which is written in place. Nothing is opened here: a pipe that is opened and closed ends its reader.
+//! The place of an output, links followed: a file, which is replaced whole, or a pipe or a device, which is written
+//! in place. Nothing is opened here: a pipe that is opened and closed ends its reader.
 
 use std::ffi::OsString;
 use std::fs::{self, Metadata};
@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 /// Links that are followed one after the other, as Linux has it.
 const MOST_LINKS: usize = 40;
 
-/// Where a name leads.
+/// The end of all links of a name.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Place {
     path: PathBuf,
@@ -24,12 +24,12 @@ enum Kind {
     Folder,
     /// A pipe or a device.
     Stream,
-    /// What the program was started with under this number.
+    /// A file descriptor that the program was started with.
     Descriptor(u32),
 }
 
 impl Place {
-    /// Where `path` leads: the last of its links may lead to a file that is not there yet.
+    /// Follows the links of `path`; the last may lead to a file that is not there yet.
     ///
     /// # Errors
     /// Links in a circle, and whatever the system says of a name that it cannot look up.
@@ -93,8 +93,8 @@ pub(crate) fn folder(path: &Path) -> &Path {
     path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
-/// What makes two names the same file: device and inode, or those of the folder and a name where there is no file
-/// yet. Other spellings, links and hard links are the same.
+/// Two names with the same identity are one file: device and inode, or those of the folder and a name if there is no
+/// file yet. Other spellings, links and hard links are the same.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Identity {
     key: Key,
@@ -107,7 +107,7 @@ type Key = (u64, u64);
 type Key = PathBuf;
 
 impl Identity {
-    /// Of what `path` leads to. `None` for devices, which nothing can be lost in, and for names that lead nowhere.
+    /// Identity of the file at `path`. `None` for devices, which keep nothing, and for folders that are not there.
     pub fn of(path: &Path) -> Option<Self> {
         if let Ok(data) = fs::metadata(path) {
             return Some(Self { key: key(path, &data)?, name: None });
@@ -118,7 +118,7 @@ impl Identity {
         Some(Self { key, name: Some(path.file_name()?.to_owned()) })
     }
 
-    /// Of an open file or pipe.
+    /// Identity of an open file or pipe.
     #[cfg(unix)]
     pub fn of_open(file: impl std::os::fd::AsFd) -> Option<Self> {
         let file = fs::File::from(file.as_fd().try_clone_to_owned().ok()?);

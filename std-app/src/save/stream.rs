@@ -17,10 +17,10 @@ const CHUNK: usize = 1 << 16;
 /// Time between two looks at the flag.
 const TICK: Duration = Duration::from_millis(20);
 
-/// How long the reader of a pipe is waited for.
+/// The longest wait for the reader of a pipe.
 #[derive(Clone, Copy, Debug)]
 pub struct Patience<'a> {
-    /// Since when the program works on what it writes: a reader may take as long again to come.
+    /// The start of the work: a reader may come as late again.
     pub since: Instant,
     /// Raised when it should end.
     pub interrupt: &'a AtomicBool,
@@ -45,7 +45,7 @@ pub(super) fn write(place: &Place, bytes: Vec<u8>, patience: Patience) -> io::Re
     let (sender, ended) = mpsc::channel();
     let (place, progress) = (place.clone(), steps.clone());
     thread::Builder::new().spawn(move || {
-        // Nobody listens any more where patience has ended.
+        // Nobody receives it after the end of patience.
         let _ = sender.send(open(&place).and_then(|stream| put(stream, &bytes, &progress)));
     })?;
     let (mut seen, mut since) = (0, Instant::now());
