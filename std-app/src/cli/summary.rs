@@ -119,6 +119,12 @@ pub(super) fn text(run: &Run, report: Option<&Path>) -> String {
         readable_bytes(result.memory_peak),
     ));
     lines.extend(ledger::text(&result.counters, &result.places, result.empty_pixels));
+    if result.filled_pixels > 0 {
+        lines.push(format!(
+            "       {} had no sample yet, and show what is around them: the render was ended before its first",
+            plural(result.filled_pixels, "pixel")
+        ));
+    }
     lines.join("\n")
 }
 

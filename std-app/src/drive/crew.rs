@@ -3,8 +3,8 @@
 //! threads.
 
 use super::canvas::Canvas;
+use super::watch::Watch;
 use super::workers::Workers;
-use core::sync::atomic::{AtomicBool, Ordering};
 use halflight_core::film::{GROUPS, PIXELS_PER_TILE, Pixel, Samples};
 use halflight_core::memory::{Arena, Line, OutOfMemory};
 use halflight_core::transport::Counters;
@@ -19,15 +19,16 @@ pub(super) struct Round<'a> {
     pub(super) step: u32,
     /// When it is cut.
     pub(super) deadline: Option<Instant>,
-    /// Cuts it when raised; of the first only what is done in a [`Crew::hurry`].
-    pub(super) interrupt: Option<&'a AtomicBool>,
+    /// Cuts it when the render is interrupted; the first when the watch is late, but for what is done in a
+    /// [`Crew::hurry`].
+    pub(super) watch: &'a Watch<'a>,
     pub(super) is_first: bool,
 }
 
 impl Round<'_> {
     fn is_over(&self) -> bool {
-        !self.is_first && self.interrupt.is_some_and(|flag| flag.load(Ordering::Relaxed))
-            || self.deadline.is_some_and(|deadline| Instant::now() >= deadline)
+        let is_ended = if self.is_first { self.watch.is_late() } else { self.watch.is_interrupted() };
+        is_ended || self.deadline.is_some_and(|deadline| Instant::now() >= deadline)
     }
 }
 
@@ -41,7 +42,7 @@ pub(super) type TileTask<'t> =
 
 /// The threads, and the round that they are in.
 pub(super) struct Crew<'r, 'm> {
-    pub(super) workers: &'r Workers,
+    pub(super) workers: &'r Workers<'r>,
     pub(super) round: &'r Round<'r>,
     pub(super) canvas: &'r mut Canvas<'m>,
 }
@@ -79,9 +80,9 @@ impl Crew<'_, '_> {
     /// Does work that the picture can be without: cut at `deadline`, and where the render is interrupted, which the first
     /// round as a whole is not.
     pub(super) fn hurry<T>(&mut self, deadline: Option<Instant>, work: impl FnOnce(&mut Crew) -> T) -> T {
-        let Round { interrupt, deadline: end, .. } = *self.round;
+        let Round { watch, deadline: end, .. } = *self.round;
         let deadline = [deadline, end].into_iter().flatten().min();
-        let round = Round { targets: Vec::new(), step: 1, deadline, interrupt, is_first: false };
+        let round = Round { targets: Vec::new(), step: 1, deadline, watch, is_first: false };
         work(&mut Crew { workers: self.workers, round: &round, canvas: self.canvas })
     }
 
@@ -193,6 +194,7 @@ fn greatest_common_divisor(a: usize, b: usize) -> usize {
 mod tests {
     use super::*;
     use crate::drive::canvas::Shard;
+    use core::sync::atomic::AtomicBool;
     use halflight_core::Rgb;
     use halflight_core::film::{Dropped, Film};
 
@@ -212,7 +214,7 @@ mod tests {
             targets: vec![[target; GROUPS]; 9],
             step: 2,
             deadline: None,
-            interrupt: Some(&interrupt),
+            watch: &Watch::until(&interrupt),
             is_first: false,
         };
         let mut scratch = vec![vec![Line([0; 64]); 1]; threads];

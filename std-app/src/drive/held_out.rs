@@ -38,13 +38,14 @@ pub(super) fn stride([width, height]: [u32; 2], points: u32) -> u32 {
 }
 
 /// About `points` points, spread evenly over the picture; at each is gathered `repeats` times, at least twice.
+/// `None` where `is_over` says so before.
 pub(super) fn held_out<F: Features>(
     tracer: &PathTracer<F>,
     size: [u32; 2],
     [points, repeats]: [u32; 2],
-    workers: &Workers,
+    (workers, is_over): (&Workers, &(dyn Fn() -> bool + Sync)),
     scratch: &mut [Vec<Line>],
-) -> Result<Vec<Point>, RenderError> {
+) -> Result<Option<Vec<Point>>, RenderError> {
     let [width, height] = size;
     let order = Order::new(width, height, stride(size, points));
     let mut places = vec![Place::NONE; order.len() as usize];
@@ -53,7 +54,9 @@ pub(super) fn held_out<F: Features>(
         tracer.places(&order, (task * PIXELS) as u64, (SAMPLE, Sight::Clear), out, &mut counters);
         Ok(counters)
     };
-    workers.pass(&mut places, PIXELS, scratch, &|| false, &look)?;
+    if !workers.pass(&mut places, PIXELS, scratch, is_over, &look)?.1 {
+        return Ok(None);
+    }
     let pixel = |i: usize| order.pixel(i as u64).map_or([0; 2], |(x, y)| [x, y]);
     let places = places.into_iter().enumerate().filter(|(_, place)| place.is_some());
     let places: Vec<_> = places.map(|(i, place)| (place, pixel(i))).collect();
@@ -84,9 +87,11 @@ pub(super) fn held_out<F: Features>(
         *out = Some([mean, squares / (count * (count - 1.0))]);
         Ok(counters)
     };
-    workers.pass(&mut known, 1, scratch, &|| false, &gather)?;
+    if !workers.pass(&mut known, 1, scratch, is_over, &gather)?.1 {
+        return Ok(None);
+    }
     let point = |((place, pixel), known): ((Place, [u32; 2]), Option<[f64; 2]>)| {
         known.map(|[exact, variance]| Point { place, pixel, exact, variance })
     };
-    Ok(places.into_iter().zip(known).filter_map(point).collect())
+    Ok(Some(places.into_iter().zip(known).filter_map(point).collect()))
 }

@@ -13,6 +13,7 @@ mod crew;
 mod error;
 mod film_file;
 mod fingerprint;
+mod gaps;
 mod held_out;
 mod history;
 mod images;
@@ -31,6 +32,7 @@ mod study;
 mod survey;
 mod told;
 mod turns;
+mod watch;
 mod windows;
 mod workers;
 
@@ -280,6 +282,8 @@ pub struct RenderResult {
     pub places: Vec<Place>,
     /// Pixels that are black because all of their samples were dropped.
     pub empty_pixels: u64,
+    /// Pixels that had no sample yet when the render was ended, and show what is around them.
+    pub filled_pixels: u64,
     /// The error, estimated from the two half-films, and from the audit where there is one or from what photons blur; `None` for
     /// fewer than four samples, and for a black picture.
     pub error: Option<ErrorEstimate>,

@@ -5,6 +5,7 @@ use super::audit::Audit;
 use super::canvas::{Canvas, Shard};
 use super::crew::{self, Crew};
 use super::film_file::{self, Header, Identity, Reader};
+use super::gaps::{self, Sketch};
 use super::history::{Clock, Reference, Round};
 use super::kept::Kept;
 use super::ledger::empty_pixels;
@@ -41,13 +42,25 @@ pub(super) struct Picture<'a> {
     pub(super) clock: Clock,
     pub(super) progress: &'a mut dyn FnMut(&Progress),
     pub(super) interrupt: &'a AtomicBool,
+    /// For a picture without samples.
+    pub(super) sketch: &'a Sketch<'a>,
 }
 
 impl Picture<'_> {
     /// Renders until a stop rule holds. What was built, and the memory of it, is for the caller to tell.
     pub(super) fn render(self, renderer: &mut dyn Renderer) -> Result<RenderResult, RenderError> {
-        let Picture { method, stage, film, mut audit, identity, resumed, mut clock, progress, interrupt } =
-            self;
+        let Picture {
+            method,
+            stage,
+            film,
+            mut audit,
+            identity,
+            resumed,
+            mut clock,
+            progress,
+            interrupt,
+            sketch,
+        } = self;
         let Stage { settings, workers, .. } = stage;
         let (width, height) = (settings.width, settings.height);
         let mut canvas = Canvas::new(film, settings.shard);
@@ -95,7 +108,7 @@ impl Picture<'_> {
                 targets: canvas.targets(plan.target),
                 step: step(&plan, canvas.tiles(), workers.count()),
                 deadline,
-                interrupt: Some(interrupt),
+                watch: &workers.watch,
                 is_first: plan.first,
             };
             renderer.round(&mut Crew { workers, round: &round, canvas: &mut canvas })?;
@@ -176,7 +189,8 @@ impl Picture<'_> {
             let unsaved = kept.news().or_else(|| renderer.kept()?.news());
             let known = Progress { unsaved, ..rounds.progress(seconds, latest) };
             clock.pause(|| progress(&known));
-            if is_lost || interrupt.load(Ordering::Relaxed) && !plan.first {
+            // Where the first round was cut, others would be as well.
+            if is_lost || rounds.spp() == 0 || interrupt.load(Ordering::Relaxed) && !plan.first {
                 break;
             }
         }
@@ -223,9 +237,10 @@ impl Picture<'_> {
             last.error = error;
         }
         let film = &canvas.film;
+        let (image, filled_pixels) = without_gaps(&canvas, sketch, workers);
         Ok(RenderResult {
             method,
-            image: image(film),
+            image,
             spp: rounds.spp(),
             rounds: rounds.count(),
             history,
@@ -241,11 +256,18 @@ impl Picture<'_> {
             // The picture is there: what there is no memory to look at is left out.
             survey: if interrupted { None } else { renderer.survey(workers).unwrap_or_default() },
             photons: renderer.photons(),
-            photon_view: if settings.photon_view { renderer.photon_view().unwrap_or_default() } else { None },
+            photon_view: if settings.photon_view && !interrupted {
+                renderer.photon_view().unwrap_or_default()
+            } else {
+                None
+            },
             windows: WindowUse::default(),
             images: 0,
             places: canvas.ledger.places(width, height),
-            empty_pixels: empty_pixels(film, |task| canvas.shard.owns(task)),
+            empty_pixels: empty_pixels(film, |task| {
+                canvas.shard.owns(task) && !canvas.taken[task].contains(&0)
+            }),
+            filled_pixels,
             error,
             blurred: told.blurred,
             audit: told.audited,
@@ -291,6 +313,25 @@ fn step(plan: &Plan, tiles: usize, threads: usize) -> u32 {
     let tile = each * threads as f64 / tiles.max(1) as f64;
     let step = (STEP_SECONDS / tile) as u32;
     if step >= FULL_STEP { step / FULL_STEP * FULL_STEP } else { step.max(1) }
+}
+
+/// The picture of `canvas`, its gaps filled, and how many pixels were gaps: those of its groups that were not reached.
+fn without_gaps(canvas: &Canvas, sketch: &Sketch, workers: &Workers) -> (Image, u64) {
+    let mut image = image(&canvas.film);
+    // A shard has gaps that others fill.
+    if canvas.shard != Shard::WHOLE || !canvas.taken.as_flattened().contains(&0) {
+        return (image, 0);
+    }
+    let mut known: Vec<bool> = by_rows(&canvas.film).map(|pixel| pixel.count() > 0).collect();
+    let gaps = known.iter().filter(|known| !**known).count() as u64;
+    if known.iter().all(|known| !known) {
+        for ([x, y], light) in sketch(workers) {
+            let index = y as usize * image.width as usize + x as usize;
+            (image.pixels[index], known[index]) = (light, true);
+        }
+    }
+    gaps::fill(&mut image, &known);
+    (image, gaps)
 }
 
 pub(super) fn image(film: &Film) -> Image {

@@ -6,8 +6,9 @@ use super::history::Clock;
 use super::memory::Memory;
 use super::method::{Method, Stage};
 use super::picture::Picture;
+use super::watch::Watch;
 use super::workers::Workers;
-use super::{Progress, RenderError, RenderResult, Seconds, Settings, cache_file, images, windows};
+use super::{Progress, RenderError, RenderResult, Seconds, Settings, cache_file, gaps, images, windows};
 use crate::pages::Pages;
 use core::sync::atomic::AtomicBool;
 use halflight_core::Level;
@@ -67,6 +68,8 @@ impl WithFeatures for Render<'_> {
         let build = build_start.elapsed().as_secs_f64();
 
         let clock = Clock::start(resumed.as_ref().map_or(0.0, |film| film.header.seconds));
+        let left = settings.stop.seconds.map(|limit| limit - clock.seconds());
+        let workers = workers.watched(Watch::until(interrupt).within(left));
         let film = Film::new(width, height, &mut Arena::new(bytemuck::cast_slice_mut(&mut film_lines)))?;
         let mut window_lines = Vec::new();
         let paths = PathTracer::<F>::new(scene, &bvh, &lights, path_settings(settings), settings.level);
@@ -75,12 +78,24 @@ impl WithFeatures for Render<'_> {
         let mut image_lines = Vec::new();
         let images = images::find(&paths, settings, &workers, &mut memory, &mut image_lines)?;
         let stage = Stage { scene, bvh: &bvh, lights: &lights, images, settings, workers: &workers };
+        let plain = stage.paths::<F>(settings.seed);
+        let sketch = |workers: &Workers| gaps::sketch(&plain, [width, height], workers);
         method.with::<F, _>(&stage, &mut memory, |renderer, memory| {
             let method = renderer.chosen().unwrap_or(method);
             let identity = identity(method);
             let audit = Audit::new::<F>(&stage, memory, method.is_biased())?;
-            let picture =
-                Picture { method, stage, film, audit, identity, resumed, clock, progress, interrupt };
+            let picture = Picture {
+                method,
+                stage,
+                film,
+                audit,
+                identity,
+                resumed,
+                clock,
+                sketch: &sketch,
+                progress,
+                interrupt,
+            };
             let done = picture.render(renderer)?;
             let seconds = Seconds { build, ..done.seconds };
             let images = images.pixels();

@@ -110,13 +110,20 @@ impl WithFeatures for Study<'_> {
         let mut film_lines = memory.take("film", Film::footprint(1, 1))?;
         let film = Film::new(1, 1, &mut arena(&mut film_lines))?;
         let mut canvas = Canvas::new(film, Shard::WHOLE);
-        let round =
-            Round { targets: vec![[0; GROUPS]], step: 1, deadline: None, interrupt: None, is_first: false };
+        let round = Round {
+            targets: vec![[0; GROUPS]],
+            step: 1,
+            deadline: None,
+            watch: &workers.watch,
+            is_first: false,
+        };
         let mut crew = Crew { workers: &workers, round: &round, canvas: &mut canvas };
 
         let size = [settings.width, settings.height];
         let extent = 0.5 * bvh.bounds().diagonal();
-        let points = held_out(&tracer, size, [study.points, REPEATS], &workers, &mut scratch)?;
+        let never = || false;
+        let points = held_out(&tracer, size, [study.points, REPEATS], (&workers, &never), &mut scratch)?;
+        let points = points.unwrap_or_default();
         let mut tables = memory.take("gathering", CellFlux::footprint(strata))?;
         let flux = CellFlux::build(strata, &mut arena(&mut tables))?;
         let capacity = (study.records as usize).saturating_mul(4);

@@ -15,6 +15,9 @@ use std::time::Instant;
 /// Maps have no more pixels than this.
 const MOST_PIXELS: u64 = 1 << 21;
 
+/// Seconds that a survey may always take.
+const SHORT: f64 = 10.0;
+
 /// Gatherings at a point of comparison.
 const REPEATS: u32 = 2;
 
@@ -86,16 +89,19 @@ pub struct Survey {
     pub seconds: f64,
 }
 
-/// Looks at all pixels, and gathers at about `points` of them.
+/// Looks at all pixels, and gathers at about `points` of them; `None` where the render is interrupted, or
+/// has had so many `seconds` and this takes longer.
 pub(super) fn survey<F: Features>(
     tracer: &PathTracer<F>,
     caches: [&IrradianceCache; 2],
     size: [u32; 2],
     points: u32,
-    workers: &Workers,
+    (workers, seconds): (&Workers, Option<f64>),
     scratch: &mut [Vec<Line>],
-) -> Result<Survey, RenderError> {
+) -> Result<Option<Survey>, RenderError> {
     let start = Instant::now();
+    let limit = seconds.map_or(f64::INFINITY, |seconds| seconds.max(SHORT));
+    let is_over = || workers.watch.is_interrupted() || start.elapsed().as_secs_f64() > limit;
     let [width, height] = size;
     let mut step = 1;
     while u64::from(width.div_ceil(step)) * u64::from(height.div_ceil(step)) > MOST_PIXELS {
@@ -111,7 +117,9 @@ pub(super) fn survey<F: Features>(
         }
         Ok(counters)
     };
-    workers.pass(&mut found, PIXELS, scratch, &|| false, &task)?;
+    if !workers.pass(&mut found, PIXELS, scratch, &is_over, &task)?.1 {
+        return Ok(None);
+    }
     let (columns, rows) = (width.div_ceil(step), height.div_ceil(step));
     let mut looks = vec![Look::default(); columns as usize * rows as usize];
     for (i, look) in found.into_iter().enumerate() {
@@ -121,14 +129,16 @@ pub(super) fn survey<F: Features>(
     }
 
     let points_asked = [points, REPEATS];
-    let points = held_out(tracer, size, points_asked, workers, scratch)?;
+    let Some(points) = held_out(tracer, size, points_asked, (workers, &is_over), scratch)? else {
+        return Ok(None);
+    };
     let mean = points.iter().map(|point| point.exact).sum::<f64>() / points.len().max(1) as f64;
     let checked: Vec<_> = points.iter().filter_map(|point| check(point, mean, caches)).collect();
     let count = checked.len().max(1) as f64;
     let average = |of: &dyn Fn(&(Check, f64)) -> f64| checked.iter().map(of).sum::<f64>() / count;
     let square = |(check, _): &(Check, f64)| f64::from(check.error).powi(2);
     let noise = average(&|(_, noise)| *noise);
-    Ok(Survey {
+    Ok(Some(Survey {
         step,
         width: columns,
         looks,
@@ -140,7 +150,7 @@ pub(super) fn survey<F: Features>(
         noise: noise.sqrt(),
         checks: checked.into_iter().map(|(check, _)| check).collect(),
         seconds: start.elapsed().as_secs_f64(),
-    })
+    }))
 }
 
 fn look_at(place: &Place, caches: [&IrradianceCache; 2], step: u32) -> Look {

@@ -49,6 +49,14 @@ pub(super) fn learn<'m, F: Features>(
         tracer.look(task, part);
         Ok(())
     })?;
+    // Of what was not looked at nobody knows whether it is hidden.
+    let unknown = |memory: &mut Memory| {
+        ["look at the sky", "windows"].into_iter().for_each(|structure| memory.give_back(structure));
+        Ok((*lights, WindowUse::default()))
+    };
+    if workers.watch.is_over() {
+        return unknown(memory);
+    }
     tracer.aim_at_sky(&mut outlook);
     let mut gain = WindowGain::default();
     let settled = outlook.settle(slots);
@@ -58,6 +66,9 @@ pub(super) fn learn<'m, F: Features>(
             tracer.learn(&outlook, number, count, arena, window)
         })?;
         gains.into_iter().for_each(|other| gain += other);
+    }
+    if workers.watch.is_over() {
+        return unknown(memory);
     }
     memory.give_back("look at the sky");
     let used = wanted.unwrap_or(gain.pays());

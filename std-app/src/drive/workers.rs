@@ -1,6 +1,7 @@
 //! The threads: each takes the next task when it is done with one, and has working memory of its own.
 
 use super::crew::Task;
+use super::watch::Watch;
 use super::{RenderError, regions};
 use halflight_core::Level;
 use halflight_core::bsdf::Features;
@@ -18,15 +19,23 @@ use rayon::{ThreadPool, ThreadPoolBuilder};
 use std::sync::Mutex;
 
 /// A pool of threads.
-pub(super) struct Workers {
+pub(super) struct Workers<'w> {
     pool: ThreadPool,
+    /// When what they do must end.
+    pub(super) watch: Watch<'w>,
 }
 
-impl Workers {
+impl<'w> Workers<'w> {
     /// `threads` threads; as many as the machine runs at once where `None`.
     pub(super) fn new(threads: Option<usize>) -> Result<Self, RenderError> {
         let pool = ThreadPoolBuilder::new().num_threads(threads.unwrap_or(0)).build();
-        pool.map(|pool| Self { pool }).map_err(|error| RenderError::Threads(error.to_string()))
+        pool.map(|pool| Self { pool, watch: Watch::default() })
+            .map_err(|error| RenderError::Threads(error.to_string()))
+    }
+
+    /// The same, which are watched.
+    pub(super) fn watched(self, watch: Watch<'w>) -> Self {
+        Self { watch, ..self }
     }
 
     /// How many there are.
@@ -181,7 +190,19 @@ impl Workers {
         Ok((counters, done == tasks))
     }
 
-    /// What `look` says of each of `tasks`, in their order.
+    /// A pass before the picture, or after it, which ends where the render is over. Whether all tasks ran: if not, what
+    /// was to be found is not known.
+    pub(super) fn look<T: Send>(
+        &self,
+        out: &mut [T],
+        size: usize,
+        scratch: &mut [Vec<Line>],
+        task: &Task<T>,
+    ) -> Result<bool, OutOfMemory> {
+        Ok(self.pass(out, size, scratch, &|| self.watch.is_over(), task)?.1)
+    }
+
+    /// What `look` says of each of `tasks`, in their order; of fewer where the render is over.
     pub(super) fn each<P: Send, T: Send>(
         &self,
         tasks: impl Iterator<Item = P> + Send,
@@ -192,7 +213,7 @@ impl Workers {
         let next = || queue.lock().unwrap_or_else(|poisoned| poisoned.into_inner()).next();
         let seen = self.on_all(scratch, |arena| {
             let mut seen = Vec::new();
-            while let Some((index, task)) = next() {
+            while let Some((index, task)) = next().filter(|_| !self.watch.is_over()) {
                 seen.push((index, look(task, arena)?));
             }
             Ok(seen)

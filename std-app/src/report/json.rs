@@ -59,6 +59,7 @@ fn most(run: &Run) -> Value {
         "error": error(run),
         "history": result.history.iter().map(round).collect::<Vec<_>>(),
         "dropped": dropped_object(&result.counters.dropped, &result.places, result.empty_pixels),
+        "filled_pixels": result.filled_pixels,
         "memory": memory,
         "memory_peak": result.memory_peak,
         "lamp_images": result.images,

@@ -186,7 +186,9 @@ impl<'a> Audit<'a> {
             if samples == 0 || spare.is_some_and(|spare| spare < cost) {
                 return Ok(());
             }
-            self.run(workers, taken..taken + samples, photons)?;
+            if !self.run(workers, taken..taken + samples, photons)? {
+                return Ok(());
+            }
             self.state.seconds = before + start.elapsed().as_secs_f64();
         }
     }
@@ -226,30 +228,40 @@ impl<'a> Audit<'a> {
                 return Ok(false);
             }
             let start = Instant::now();
-            self.run(workers, self.state.taken..self.state.taken + samples, photons)?;
+            if !self.run(workers, self.state.taken..self.state.taken + samples, photons)? {
+                return Ok(false);
+            }
             self.state.seconds += start.elapsed().as_secs_f64();
         }
         Ok(true)
     }
 
+    /// Whether they were taken: not where the render is interrupted.
     fn run(
         &mut self,
         workers: &Workers,
         samples: Range<u32>,
         photons: Option<Merging>,
-    ) -> Result<(), OutOfMemory> {
+    ) -> Result<bool, OutOfMemory> {
         let Self { truth, scratch, state, .. } = self;
         let places = &state.places;
         let pixels: &mut [Pixel] = bytemuck::cast_slice_mut(&mut state.pixels);
-        let (counters, _) =
-            workers.pass(pixels, PIXELS_PER_TASK, scratch, &|| false, &|task, arena, out| {
+        let before = pixels.to_vec();
+        let is_over = || workers.watch.is_interrupted();
+        let (counters, all) =
+            workers.pass(pixels, PIXELS_PER_TASK, scratch, &is_over, &|task, arena, out| {
                 let first = task * PIXELS_PER_TASK;
                 truth((&places[first..first + out.len()], samples.clone()), photons, arena, out)
             })?;
+        state.rays += counters.all_rays();
+        if !all {
+            // All have the same samples, or none of them.
+            pixels.copy_from_slice(&before);
+            return Ok(false);
+        }
         state.has_photons |= photons.is_some();
         state.taken = samples.end;
-        state.rays += counters.all_rays();
-        Ok(())
+        Ok(true)
     }
 
     /// What is known of the bias of `film`, whose own noise tells `noise`.

@@ -136,12 +136,12 @@ impl<'l> Aim<'l> {
         (worth, of_caustics): (&mut Worth<'l>, bool),
         most: f64,
         arena: &mut Arena<'l>,
-        mut look: impl FnMut(&Emission, u32) -> Result<Look, RenderError>,
+        mut look: impl FnMut(&Emission, u32) -> Result<Option<Look>, RenderError>,
     ) -> Result<(), RenderError> {
         let plain = self.emission;
         // By power; of all light by that of cells, which are known then, as those of mirrors and glass are not.
         let first = if of_caustics { plain } else { worth.guide(&plain, &mut arena.scratch())? };
-        let first = look(&first, 0)?;
+        let Some(first) = look(&first, 0)? else { return Ok(()) };
         self.seen = Some(first.share());
         // What mirrors and refracts can be aimed at before anything was seen of it.
         let fewest = if of_caustics { 0 } else { FEWEST_TO_BEGIN };
@@ -160,7 +160,7 @@ impl<'l> Aim<'l> {
         let most = if first.found.is_empty() { most } else { most.min(LESS * first.spread) };
         for number in 1..=MOST_LOOKS {
             let knew = seen;
-            let again = look(&worth.guide(&plain, &mut arena.scratch())?, number)?;
+            let Some(again) = look(&worth.guide(&plain, &mut arena.scratch())?, number)? else { break };
             seen += learn(worth, &again);
             if knew == 0 || seen < FEWEST_SEEN {
                 continue;
@@ -176,14 +176,14 @@ impl<'l> Aim<'l> {
 }
 
 impl Look {
-    /// Of the paths of map number `map`.
+    /// Of the paths of map number `map`; `None` where the render is over.
     fn of<F: Features>(
         stage: &Stage,
         shooter: &Shooter<F>,
         sight: Sight,
         map: u32,
         scratch: &mut [Vec<Line>],
-    ) -> Result<Self, RenderError> {
+    ) -> Result<Option<Self>, RenderError> {
         let mut found = vec![(0u32, 0.0f32); LOOK];
         let task = |task: usize, arena: &mut Arena, out: &mut [(u32, f32)]| {
             shooter.look((task, map), sight, arena, &mut |photon| {
@@ -191,11 +191,13 @@ impl Look {
                 out[photon.path] = (photon.cell, out[photon.path].1 + photon.power);
             })
         };
-        stage.workers.pass(&mut found, PATHS, scratch, &|| false, &task)?;
+        if !stage.workers.look(&mut found, PATHS, scratch, &task)? {
+            return Ok(None);
+        }
         found.retain(|(_, power)| *power > 0.0 && power.is_finite());
         let powers = || found.iter().map(|(_, power)| f64::from(*power));
         let (sum, squares) = (powers().sum::<f64>(), powers().map(|power| power * power).sum::<f64>());
-        Ok(Self { spread: LOOK as f64 * squares / (sum * sum), found })
+        Ok(Some(Self { spread: LOOK as f64 * squares / (sum * sum), found }))
     }
 
     /// The share of light paths that count.

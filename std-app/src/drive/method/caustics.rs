@@ -205,7 +205,8 @@ fn look<F: Features>(
     let mut finds = vec![Find::default(); count];
     let shooter = shooter.with_glimpses(glimpses);
     let look = |task: usize, arena: &mut Arena, out: &mut [Find]| shooter.look(task, map, arena, out);
-    stage.workers.pass(&mut finds, PATHS, scratch, &|| false, &look)?;
+    // Where the render is over a part of them has to do.
+    stage.workers.look(&mut finds, PATHS, scratch, &look)?;
     Ok(finds)
 }
 

@@ -94,7 +94,10 @@ impl Chaining {
             shooter.look((task, LOOK_MAP), sight, arena, &mut |photon| out[photon.path] = true)
         };
         let mut seen = vec![false; LOOK];
-        workers.pass(&mut seen, PATHS, scratch, &|| false, &look)?;
+        if !workers.look(&mut seen, PATHS, scratch, &look)? {
+            memory.give_back(PLACES);
+            return Ok((None, None));
+        }
         let share = seen.iter().filter(|seen| **seen).count() as f64 / LOOK as f64;
         let of_map = share * paths as f64;
         if share >= MOST_SEEN || of_map * (MOST_MAPS as f64) < FEWEST_STARTS {

@@ -642,13 +642,13 @@ impl<F: Features> Renderer for Cached<'_, F> {
     }
 
     fn survey(&mut self, workers: &Workers) -> Result<Option<Survey>, RenderError> {
-        let Self { tracer, size, halves: [even, odd], survey, .. } = self;
+        let Self { tracer, size, halves: [even, odd], survey, stop, .. } = self;
         let Some((points, scratch)) = survey else { return Ok(None) };
         let caches = [&even.cache, &odd.cache];
         if caches.iter().all(|cache| cache.records().is_empty()) {
             return Ok(None);
         }
-        survey::survey(tracer, caches, *size, *points, workers, scratch).map(Some)
+        survey::survey(tracer, caches, *size, *points, (workers, stop.seconds), scratch)
     }
 
     fn cache(&self) -> Option<CacheUse> {

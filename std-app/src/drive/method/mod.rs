@@ -172,7 +172,7 @@ pub(super) struct Stage<'a> {
     pub(super) lights: &'a Lights<'a>,
     pub(super) images: Images<'a>,
     pub(super) settings: &'a Settings,
-    pub(super) workers: &'a Workers,
+    pub(super) workers: &'a Workers<'a>,
 }
 
 impl<'a> Stage<'a> {

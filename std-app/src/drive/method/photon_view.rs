@@ -102,6 +102,10 @@ fn look_at<F: Features>(
     let farthest = bvh.bounds().diagonal();
     for pixel in 0..pixels as u32 {
         let (x, y) = (pixel % width, pixel / width);
+        // Black from here on: nobody waits for it any more.
+        if x == 0 && stage.workers.watch.is_interrupted() {
+            break;
+        }
         let ray = camera.ray(width, height, x as f32 + 0.5, y as f32 + 0.5, [0.5; 2]);
         let point = SurfacePoint::at::<F>(scene, &ray, &bvh.nearest(level, &ray));
         let (mut density, mut radius) = (0.0, 0.0);
@@ -117,5 +121,7 @@ fn look_at<F: Features>(
         view.density.push(density);
         view.radius.push(radius);
     }
+    view.density.resize(pixels, 0.0);
+    view.radius.resize(pixels, 0.0);
     Ok(view)
 }

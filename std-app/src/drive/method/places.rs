@@ -26,8 +26,6 @@ pub(super) fn find<F: Features>(
         raster.run::<F>(task, (scene, bvh, settings.level), settings.seed, out);
         Ok(Counters::default())
     };
-    places.fill_with(workers, |photons| {
-        Ok(workers.pass(photons, Raster::TASK, scratch, &|| false, &look)?.1)
-    })?;
+    places.fill_with(workers, |photons| Ok(workers.look(photons, Raster::TASK, scratch, &look)?))?;
     Ok(places)
 }
