@@ -59,14 +59,8 @@ fn comments_quotes_and_blanks_count_only_where_names_differ_in_nothing_else() {
     let mtl = b"newmtl a # first\nKd .1 0 0\nnewmtl Mat #2 # second\nKd .2 0 0\nnewmtl \"q r\"\nKd .3 0 0\n\
         newmtl tail  \nKd .4 0 0\n";
     let one = |name: &[u8]| two(b"mtllib m.mtl", [name, b"tail"], &[("m.mtl", mtl)]);
-    for (name, grey) in [
-        (&b"a"[..], 0.1),
-        (b"a # other", 0.1),
-        (b"  a\t", 0.1),
-        (b"Mat #2", 0.2),
-        (b"q r", 0.3),
-        (b"'q r'", 0.3),
-    ] {
+    for (name, grey) in [(&b"a"[..], 0.1), (b"  a\t", 0.1), (b"Mat #2", 0.2), (b"q r", 0.3), (b"'q r'", 0.3)]
+    {
         let (rgb, notes) = one(name);
         assert_eq!((greys(rgb), notes.len()), ([grey, 0.4], 0), "{name:?} {notes:?}");
     }

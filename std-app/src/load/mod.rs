@@ -1,5 +1,6 @@
 //! Scenes from files: OBJ with MTL ([`obj`], [`mtl`], [`surface`]), pictures ([`texture`]), and the scene
-//! file that places meshes and adds camera, lights and settings ([`scene_file`]).
+//! file that places meshes and adds camera, lights and settings ([`scene_file`]). Names are bytes ([`name`]), and
+//! one lookup finds the files that they mean ([`files`]).
 //!
 //! A load repairs what it can and says each kind of repair once; what it cannot repair is a [`LoadError`]
 //! with file, line and what to do. The table of both is `docs/loading.md`. The parsers take bytes, so that

@@ -104,6 +104,9 @@ impl Resolver<'_> {
             (true, true) if is_black(base) => return true,
             (true, true) => ("is a mirror: its dark `Kd` is left out", true),
             (true, false) => ("is a reflection `Ks` over its `Kd`", false),
+            (false, _) if is_pbr(self.mtl) || self.mtl.metallic.is_some() => {
+                ("is what `Pr` and `Pm` say", false)
+            }
             (false, _) if base.texture.is_some() => ("is diffuse: there is no `Ks` to reflect by", false),
             (false, _) => ("is a mirror of colour `Kd`: there is no `Ks`", true),
         };
@@ -407,6 +410,14 @@ mod tests {
             assert_eq!(surface(&format!("{base}illum {model}\nPr 0.5")), reflection(0.5));
             let diffuse = Surface::Diffuse { reflectance: rgb(0.375, 0.25, 0.125) };
             assert_eq!(surface(&format!("Kd 0.375 0.25 0.125\nKs 0 0 0\nillum {model}")), diffuse);
+        }
+        for pbr in ["Pr 0.5", "Pr 0.5\nPm 0", "Pm 0"] {
+            let without_ks = format!("Kd 0.375 0.25 0.125\n{pbr}\n");
+            assert_eq!(
+                surface(&format!("{without_ks}illum 3")),
+                surface(&format!("{without_ks}illum 2")),
+                "{pbr}"
+            );
         }
         let rough = Surface::Conductor { reflectance: rgb(0.75, 0.75, 0.75), roughness: 0.25.into() };
         assert_eq!(surface("Kd 0 0 0\nKs 0.75 0.75 0.75\nPr 0.25\nillum 3"), rough);
