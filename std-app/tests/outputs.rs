@@ -193,8 +193,8 @@ fn one_output_that_fails_leaves_all_others() {
     assert!(read(&folder.path("c.png")).is_ok());
     assert!(!folder.path("a.pfm").exists() && !folder.path("c.film").exists());
 
-    // The same of caches: 1 kB, which the picture does not need.
-    let script = "ulimit -f 2; exec $H render scene.obj --spp 1 --method irradiance-cache \
+    // The same of caches: 512 bytes, which the picture does not need.
+    let script = "ulimit -f 1; exec $H render scene.obj --spp 1 --method irradiance-cache \
         -o tiny.png --size 8x8 --save-cache c.cache";
     let output = shell(&folder, script);
     let said = String::from_utf8_lossy(&output.stderr);
