@@ -4,7 +4,8 @@
 mod support;
 
 use core::time::Duration;
-use halflight::save::{Format, decode, read};
+use halflight::picture::decode;
+use halflight::save::{Image, read};
 use std::fs::{self, File};
 use std::io::Read;
 use std::path::PathBuf;
@@ -51,7 +52,7 @@ fn pipes_get_what_they_are_named_for() {
         "render scene.obj --method irradiance-cache --size 16x16 --spp 16 -o a.png -o b.png --checkpoint film \
          --checkpoint-every 1ms --save-cache cache --json",
     );
-    let picture = decode(&picture.join().unwrap(), Format::Png).unwrap();
+    let picture = Image::from(decode(&picture.join().unwrap(), "f.png".as_ref(), 1 << 24).unwrap());
     assert_eq!(picture, read(&folder.path("b.png")).unwrap());
     fs::write(folder.path("kept.film"), film.join().unwrap()).unwrap();
     fs::write(folder.path("kept.cache"), cache.join().unwrap()).unwrap();

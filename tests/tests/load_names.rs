@@ -126,7 +126,7 @@ fn texture(statement: &[u8], files: &[(&str, &[u8])]) -> (Option<u8>, Vec<String
     let scene = Files::new(&all).load("q.obj").unwrap();
     let red = scene.textures.views().first().map(|view| match view.texels {
         Texels::Srgb8(texels) | Texels::Linear8(texels) => texels[0][0],
-        Texels::Float(_) => 0,
+        Texels::Float(_) | Texels::Number(_) => 0,
     });
     (red, scene.repairs)
 }

@@ -1,7 +1,8 @@
 //! Pictures written and read back, and files that lie.
 
-use halflight::save::{Format, Image, check_writable, decode, encode, read, to_srgb, write};
-use std::path::PathBuf;
+use halflight::picture::{self, PictureError};
+use halflight::save::{Format, Image, check_writable, encode, read, read_within, to_srgb, write};
+use std::path::{Path, PathBuf};
 
 /// RGBE keeps 8 bits of the largest channel; truncation loses up to one step of them.
 const RGBE_TOLERANCE: f32 = 1.0 / 128.0;
@@ -16,8 +17,15 @@ fn picture() -> Image {
     Image { width: 37, height: 23, pixels }
 }
 
+/// Bytes that reading may take.
+const MOST: usize = 1 << 24;
+
+fn decode(bytes: &[u8]) -> Result<Image, PictureError> {
+    picture::decode(bytes, Path::new("a"), MOST).map(Image::from)
+}
+
 fn there_and_back(image: &Image, format: Format) -> Image {
-    decode(&encode(image, format).unwrap(), format).unwrap()
+    decode(&encode(image, format).unwrap()).unwrap()
 }
 
 #[test]
@@ -65,16 +73,16 @@ fn damaged_files_are_an_error_or_a_picture_and_never_a_panic() {
     for format in Format::ALL {
         let whole = encode(&picture(), format).unwrap();
         for length in (0..whole.len()).step_by(13) {
-            let _ = decode(&whole[..length], format);
+            let _ = decode(&whole[..length]);
         }
         for at in 0..whole.len().min(600) {
             for flip in [0x01, 0x80, 0xff] {
                 let mut bytes = whole.clone();
                 bytes[at] ^= flip;
-                let _ = decode(&bytes, format);
+                let _ = decode(&bytes);
             }
         }
-        assert!(decode(b"", format).is_err() && decode(b"hello, picture", format).is_err());
+        assert!(decode(b"").is_err() && decode(b"hello, picture").is_err());
     }
 }
 
@@ -86,6 +94,9 @@ fn files_are_replaced_whole_and_errors_name_them() {
     write(&path, &Image::black(2, 2)).unwrap();
     write(&path, &picture()).unwrap();
     assert_eq!(read(&path).unwrap(), picture());
+    assert_eq!(read_within(&path, MOST).unwrap(), (picture(), vec![]));
+    let short = read_within(&path, 20_000).unwrap_err().to_string();
+    assert!(short.contains("picture.exr") && short.contains("37x23 pixels"), "{short}");
     assert_eq!(std::fs::read_dir(&folder).unwrap().count(), 1, "nothing is left beside the picture");
 
     let refusal = |name: &str| check_writable(&folder.join(name)).unwrap_err().to_string();

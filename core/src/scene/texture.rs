@@ -17,6 +17,8 @@ pub enum Texels<'a> {
     Linear8(&'a [[u8; 4]]),
     /// Linear floats, not limited to 1.
     Float(&'a [[f32; 3]]),
+    /// One number, the same in all four channels.
+    Number(&'a [f32]),
 }
 
 /// What lies beyond the edge.
@@ -93,6 +95,7 @@ impl Texture<'_> {
             match self.texels {
                 Texels::Srgb8(texels) | Texels::Linear8(texels) => prefetch(texels, index),
                 Texels::Float(texels) => prefetch(texels, index),
+                Texels::Number(texels) => prefetch(texels, index),
             }
         }
     }
@@ -131,6 +134,7 @@ impl Texture<'_> {
                 None => Vec4::ONE,
             },
             Texels::Float(texels) => texels.get(index).map_or(Vec4::ONE, |&rgb| Vec3::from(rgb).extend(1.0)),
+            Texels::Number(texels) => texels.get(index).map_or(Vec4::ONE, |&number| Vec4::splat(number)),
         }
     }
 }

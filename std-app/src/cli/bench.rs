@@ -64,7 +64,7 @@ impl Bench {
 
 impl Rays {
     fn run(&self) -> Result<ExitCode, Failure> {
-        let loaded = load::load(&self.scene, &LoadOptions { textures: false })?;
+        let loaded = load::load(&self.scene, &LoadOptions { textures: false, ..LoadOptions::default() })?;
         for repair in &loaded.repairs {
             warn(repair);
         }

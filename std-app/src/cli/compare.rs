@@ -2,10 +2,12 @@
 
 use super::failure::Failure;
 use super::outputs::{Outputs, Role};
+use super::read_picture;
 use clap::{Args, ValueEnum};
-use halflight::compare::{Comparison, Shown, compare, false_colours};
+use halflight::compare::{Comparison, Shown, compare, false_colours, working_bytes};
+use halflight::memory::Budget;
 use halflight::report::comparison_object;
-use halflight::save::{self, Format};
+use halflight::save::Format;
 use serde_json::{Value, json};
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -18,9 +20,9 @@ use std::process::ExitCode;
 /// a number are left out of the linear errors, and counted.
 #[derive(Args)]
 pub(super) struct Compare {
-    /// The picture (.exr, .hdr, .pfm or .png)
+    /// The picture, of any format that is read: EXR, HDR, PFM, PNG, JPEG, TIFF, WebP, BMP, TGA
     a: PathBuf,
-    /// The reference (.exr, .hdr, .pfm or .png)
+    /// The reference, likewise
     b: PathBuf,
     /// Also write a picture of the difference: its values, or, as .png, in false colours; may be given
     /// several times
@@ -52,7 +54,11 @@ impl Compare {
         let plan = self.output.iter().map(|file| self.plan(file, &mut outputs));
         let plan = plan.collect::<Result<Vec<_>, _>>()?;
         [&self.a, &self.b].into_iter().try_for_each(|picture| outputs.spare(picture))?;
-        let (a, b) = (save::read(&self.a)?, save::read(&self.b)?);
+        let mut budget = Budget::new(None);
+        let (a, b) = (read_picture(&self.a, &mut budget)?, read_picture(&self.b, &mut budget)?);
+        budget.has(working_bytes(&b)).map_err(|why| {
+            Failure::new(format!("{} and {} cannot be compared: {why}", self.a.display(), self.b.display()))
+        })?;
         let comparison = compare(&a, &b).map_err(|mismatch| {
             Failure::new(format!("{}: {mismatch}", self.a.display()))
                 .advice("render both with the same --size; nothing is resampled")

@@ -22,8 +22,12 @@ mod values;
 mod view;
 
 use clap::{Parser, Subcommand};
+use failure::Failure;
+use halflight::memory::Budget;
+use halflight::save::{self, Image};
 use std::io::{Write, stdout};
 use std::panic;
+use std::path::Path;
 use std::process::ExitCode;
 use stdio::{heard, say, tell, warn};
 
@@ -72,6 +76,14 @@ pub(crate) fn main() -> ExitCode {
         Err(_) => tell("  help: please report it, with the command and the scene"),
     }
     ExitCode::from(2)
+}
+
+/// The picture in a file, whose pixels `budget` has taken; says what had to be repaired.
+fn read_picture(path: &Path, budget: &mut Budget) -> Result<Image, Failure> {
+    let (image, notes) = save::read_within(path, budget.left())?;
+    notes.iter().for_each(warn);
+    budget.take(size_of_val(&image.pixels[..]))?;
+    Ok(image)
 }
 
 /// Prints clap's own message: help and version are results, wrong usage is none.

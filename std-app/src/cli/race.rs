@@ -11,7 +11,7 @@ use clap::Args;
 use core::sync::atomic::Ordering;
 use halflight::compare::{Comparison, compare};
 use halflight::drive::{self, Progress, RenderResult, Settings, Stop, Turns};
-use halflight::load::{self, LoadOptions};
+use halflight::load;
 use halflight::report::{self, Maker, Run, words::readable_seconds};
 use halflight_core::scene::Scene;
 use std::panic::resume_unwind;
@@ -66,7 +66,7 @@ impl Race {
         let reference = self.shot.reference()?;
 
         let loading = Instant::now();
-        let loaded = load::load(&self.scene, &LoadOptions::default())?;
+        let loaded = load::load(&self.scene, &self.shot.load_options(reference.as_deref()))?;
         let load_seconds = loading.elapsed().as_secs_f64();
         loaded.files.iter().try_for_each(|file| outputs.spare(file))?;
         for repair in &loaded.repairs {

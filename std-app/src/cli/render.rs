@@ -10,7 +10,7 @@ use super::{summary, values, warn};
 use clap::{Args, ValueEnum};
 use halflight::compare::compare;
 use halflight::drive::{self, Checkpoint, Ending, Settings, Shard, Stop};
-use halflight::load::{self, LoadOptions, LoadedScene};
+use halflight::load::{self, LoadedScene};
 use halflight::report::{Maker, Run};
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -93,7 +93,7 @@ impl Render {
         let reference = self.shot.reference()?;
 
         let loading = Instant::now();
-        let loaded = load::load(&self.scene, &LoadOptions::default())?;
+        let loaded = load::load(&self.scene, &self.shot.load_options(reference.as_deref()))?;
         let load_seconds = loading.elapsed().as_secs_f64();
         loaded.files.iter().try_for_each(|file| outputs.spare(file))?;
         for repair in &loaded.repairs {

@@ -2,13 +2,15 @@
 
 use super::failure::Failure;
 use super::method::{self, Choice};
+use super::read_picture;
 use super::values;
 use super::view::View;
 use clap::{Args, ValueEnum};
 use halflight::drive::{CacheSettings, Gather, PhotonSettings, RenderError, Settings, Stop};
-use halflight::load::LoadedScene;
+use halflight::load::{LoadOptions, LoadedScene};
+use halflight::memory::Budget;
 use halflight::report::words::readable_bytes;
-use halflight::save::{self, Image};
+use halflight::save::Image;
 use halflight_core::cache::irradiance::Metric;
 use halflight_core::photon::Falloff;
 use halflight_simd::{Level, Tier};
@@ -31,7 +33,8 @@ pub(super) struct Shot {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=4096),
         help_heading = "How to run")]
     threads: Option<u32>,
-    /// Most memory for the scene and all structures, as in 512M or 2G [default: no limit]
+    /// Most memory for all that is read, the scene and all structures, as in 512M or 2G [default: four fifths of the
+    /// machine's]
     #[arg(long, value_name = "BYTES", value_parser = values::bytes, help_heading = "How to run")]
     memory: Option<usize>,
 }
@@ -204,7 +207,16 @@ impl Shot {
 
     /// The reference picture. To be read before the scene: a wrong name should not cost a minute.
     pub(super) fn reference(&self) -> Result<Option<Arc<Image>>, Failure> {
-        Ok(self.reference.as_deref().map(save::read).transpose()?.map(Arc::new))
+        let mut budget = Budget::new(self.memory);
+        let read = |path: &PathBuf| read_picture(path, &mut budget);
+        Ok(self.reference.as_ref().map(read).transpose()?.map(Arc::new))
+    }
+
+    /// How to load a scene beside `reference`.
+    pub(super) fn load_options(&self, reference: Option<&Image>) -> LoadOptions {
+        let taken = reference.map_or(0, |image| size_of_val(&image.pixels[..]));
+        let memory = Budget::new(self.memory).limit().saturating_sub(taken);
+        LoadOptions { memory: Some(memory), ..LoadOptions::default() }
     }
 
     /// The settings of `method` with `options`, completed by those of the scene file.

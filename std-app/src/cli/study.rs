@@ -6,7 +6,7 @@ use super::shot::{self, Options, Shot};
 use super::{say, values, warn};
 use clap::{Args, Subcommand};
 use halflight::drive::{IrradianceStudy, MetricError, Stop, study_irradiance};
-use halflight::load::{self, LoadOptions};
+use halflight::load;
 use halflight_core::cache::irradiance::Metric;
 use serde_json::{Value, json};
 use std::path::PathBuf;
@@ -63,7 +63,7 @@ impl Study {
 
 impl Irradiance {
     fn run(&self) -> Result<ExitCode, Failure> {
-        let loaded = load::load(&self.scene, &LoadOptions::default())?;
+        let loaded = load::load(&self.scene, &self.shot.load_options(None))?;
         loaded.repairs.iter().for_each(warn);
         let settings = self.shot.settings(&loaded, Choice(None), &self.options, Stop::default(), None)?;
         let views = loaded.views();

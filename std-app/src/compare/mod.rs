@@ -44,6 +44,12 @@ impl fmt::Display for SizeMismatch {
 
 impl core::error::Error for SizeMismatch {}
 
+/// Bytes that [`compare`] takes beside two pictures of the size of `image`: planes of colours, blurred and not, of both.
+pub fn working_bytes(image: &Image) -> usize {
+    const OF_PIXEL: usize = 84;
+    image.pixels.len().saturating_mul(OF_PIXEL)
+}
+
 /// Compares `image` with `reference`.
 ///
 /// # Errors

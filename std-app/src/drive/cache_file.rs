@@ -11,10 +11,7 @@ use std::path::Path;
 
 const KIND: Kind = Kind { magic: *b"HLCACH", version: 2, name: "cache" };
 
-/// A file that says it has more is damaged.
-const MOST_RECORDS: u32 = 1 << 28;
-
-/// Records of a section: memory is only taken for what is there.
+/// Records of a section.
 const AT_ONCE: usize = 1 << 12;
 
 /// What records follow from, but where they are: that is for the views.
@@ -106,6 +103,11 @@ impl Header {
         Self { identity: Identity::of(scene, settings), views: Vec::new(), halves: [Half::default(); 2] }
     }
 
+    /// Of both halves.
+    pub(super) fn records(&self) -> usize {
+        self.halves.iter().map(|half| half.records as usize).sum()
+    }
+
     /// Whether nothing is to be gathered for `view`.
     pub(super) fn serves(&self, view: &View) -> bool {
         self.views.iter().any(|known| known.serves(view))
@@ -137,9 +139,13 @@ pub(super) fn write(
     })
 }
 
-/// The cache that `settings` want to be loaded; refused where it is of something else.
-pub(super) fn open(scene: &Scene, settings: &Settings) -> Result<Option<Reader<'static>>, FileError> {
-    let open = |path| Reader::open(path, &Identity::of(scene, settings));
+/// The cache that `settings` want to be loaded, in no more than `most` bytes; refused where it is of something else.
+pub(super) fn open(
+    scene: &Scene,
+    settings: &Settings,
+    most: usize,
+) -> Result<Option<Reader<'static>>, FileError> {
+    let open = |path| Reader::open(path, &Identity::of(scene, settings), most);
     settings.load_cache.as_deref().map(open).transpose()
 }
 
@@ -151,17 +157,16 @@ pub(super) struct Reader<'r> {
 
 impl<'r> Reader<'r> {
     /// Opens `path`, reads its header, and refuses a cache that is of something else.
-    fn open(path: &Path, identity: &Identity) -> Result<Self, FileError> {
-        let reader = Self::new(sealed::Reader::open(path, &KIND)?)?;
+    fn open(path: &Path, identity: &Identity, most: usize) -> Result<Self, FileError> {
+        let reader = Self::new(sealed::Reader::open(path, &KIND, most)?)?;
         let difference = reader.header.identity.difference(identity);
         difference.map_or(Ok(()), |why| Err(reader.file.refusal(format!("is a cache {why}"))))?;
         Ok(reader)
     }
 
     fn new((file, header): (sealed::Reader<'r>, Header)) -> Result<Self, FileError> {
-        if header.halves.iter().any(|half| half.records > MOST_RECORDS) {
-            return Err(file.damage("it has no sensible number of records"));
-        }
+        let records: u64 = header.halves.iter().map(|half| u64::from(half.records)).sum();
+        file.expect(records * size_of::<Record>() as u64, 1)?;
         Ok(Self { file, header })
     }
 
@@ -178,6 +183,10 @@ impl<'r> Reader<'r> {
     fn half(&mut self, half: usize) -> Result<Vec<Record>, FileError> {
         let mut left = self.header.halves[half].records as usize;
         let (mut records, mut section) = (Vec::new(), vec![Record::default(); AT_ONCE]);
+        let needed = left * size_of::<Record>();
+        if records.try_reserve_exact(left).is_err() {
+            return Err(self.file.refusal(format!("cannot be read: there are no {needed} bytes of memory")));
+        }
         while left > 0 {
             let some = &mut section[..left.min(AT_ONCE)];
             self.file.get(bytemuck::cast_slice_mut(some))?;
@@ -208,7 +217,8 @@ fn is_sound(record: &Record) -> bool {
 /// # Errors
 /// Why it is none.
 pub fn inspect(bytes: &[u8]) -> Result<[usize; 2], FileError> {
-    let reader = Reader::new(sealed::Reader::read(Path::new("cache"), &KIND, Box::new(bytes))?)?;
+    let file = (Box::new(bytes) as Box<dyn std::io::Read>, bytes.len() as u64);
+    let reader = Reader::new(sealed::Reader::read(Path::new("cache"), &KIND, file, 1 << 30)?)?;
     Ok(reader.records()?.map(|records| records.len()))
 }
 
@@ -218,6 +228,9 @@ mod tests {
     use halflight_core::cache::irradiance::SECTORS;
     use halflight_core::geometry::Bounds;
     use halflight_core::memory::{Arena, Line};
+
+    /// Bytes that reading may take.
+    const MOST: usize = 1 << 24;
 
     fn parts([geometry, materials, textures, lights]: [&str; 4]) -> fingerprint::Parts {
         let parts = serde_json::json!({
@@ -277,7 +290,7 @@ mod tests {
     fn records_come_back_as_they_were() {
         let (path, bytes) = file("whole", [5000, 3]);
         assert_eq!(inspect(&bytes), Ok([5000, 3]));
-        let reader = Reader::open(&path, &identity()).unwrap();
+        let reader = Reader::open(&path, &identity(), MOST).unwrap();
         assert_eq!(reader.header.halves.map(|half| half.gathered), [5001, 4]);
         let [even, odd] = reader.records().unwrap();
         assert_eq!((even.len(), odd), (5000, [0, 1, 2].map(|i| record(i as f32 / 3.0)).to_vec()));
@@ -297,7 +310,7 @@ mod tests {
         }
         assert!(inspect(&[&bytes[..], b"x"].concat()).is_err());
         std::fs::write(&path, &bytes[..bytes.len() - 9]).unwrap();
-        let why = Reader::open(&path, &identity()).and_then(Reader::records).err().unwrap().to_string();
+        let why = Reader::open(&path, &identity(), MOST).and_then(Reader::records).err().unwrap().to_string();
         assert!(why.contains("damaged.cache: is damaged: it is too short"), "{why}");
         std::fs::remove_file(path).unwrap();
     }
@@ -308,7 +321,7 @@ mod tests {
         let refused = |change: fn(&mut Identity)| {
             let mut identity = identity();
             change(&mut identity);
-            Reader::open(&path, &identity).err().map(|why| why.to_string()).unwrap_or_default()
+            Reader::open(&path, &identity, MOST).err().map(|why| why.to_string()).unwrap_or_default()
         };
         assert_eq!(refused(|_| ()), "");
         let moved: fn(&mut Identity) = |identity| identity.scene = parts(["9", "2", "3", "5"]);

@@ -82,6 +82,10 @@ fn textures(scene: &Scene, hash: &mut Hash) {
                 hash.section(b"float");
                 hash.section(bytemuck::cast_slice(texels));
             }
+            Texels::Number(texels) => {
+                hash.section(b"number");
+                hash.section(bytemuck::cast_slice(texels));
+            }
         }
     }
 }

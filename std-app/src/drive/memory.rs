@@ -1,6 +1,8 @@
 //! The bytes behind the arenas: counted, held against the limit, asked of the system without aborting.
 
-use super::RenderError;
+use super::{RenderError, Settings};
+use crate::compare::working_bytes;
+use crate::memory::Budget;
 use crate::pages::Pages;
 use halflight_core::memory::{ALIGNMENT, Footprint, Line};
 use halflight_core::scene::{Scene, Texels};
@@ -16,16 +18,32 @@ pub struct MemoryUse {
 
 /// What is taken now, and the most that ever was.
 pub(super) struct Memory {
+    /// What was asked for: structures that can be smaller are, where it is short.
     limit: Option<usize>,
+    /// What nothing goes beyond. Without a limit it depends on the machine, and nothing else may.
+    wall: usize,
     uses: Vec<MemoryUse>,
     peak: usize,
 }
 
 impl Memory {
-    /// Counts the buffers of `scene` as taken.
-    pub(super) fn new(scene: &Scene, limit: Option<usize>) -> Self {
-        let bytes = scene_bytes(scene);
-        Self { limit, uses: vec![MemoryUse { structure: "scene", bytes }], peak: bytes }
+    /// Counts the buffers of `scene`, and the reference with what comparing takes, as taken.
+    pub(super) fn new(scene: &Scene, settings: &Settings) -> Self {
+        let limit = settings.memory;
+        let wall = Budget::new(limit).limit();
+        let mut uses = vec![MemoryUse { structure: "scene", bytes: scene_bytes(scene) }];
+        if let Some(reference) = &settings.reference {
+            let bytes = size_of_val(&reference.pixels[..]) + working_bytes(reference);
+            uses.push(MemoryUse { structure: "reference", bytes });
+        }
+        let mut memory = Self { limit, wall, uses, peak: 0 };
+        memory.peak = memory.total();
+        memory
+    }
+
+    /// Bytes that a file may take while it is read.
+    pub(super) fn for_file(&self) -> usize {
+        self.wall.saturating_sub(self.total())
     }
 
     /// Lines of `footprint` bytes for `structure`.
@@ -71,9 +89,9 @@ impl Memory {
     /// All that is taken once `footprint` is as well.
     fn needed(&self, footprint: Footprint) -> Result<usize, RenderError> {
         let needed = self.total().saturating_add(footprint.bytes());
-        match self.limit {
-            Some(limit) if needed > limit => Err(RenderError::Memory { needed, available: limit }),
-            _ => Ok(needed),
+        match needed > self.wall {
+            true => Err(RenderError::Memory { needed, available: self.wall }),
+            false => Ok(needed),
         }
     }
 
@@ -96,12 +114,12 @@ impl Memory {
         (0..count).map(|_| self.take(structure, footprint)).collect()
     }
 
-    /// Bytes that are left of the limit.
+    /// Bytes that are left of the limit, where there is one.
     pub(super) fn available(&self) -> usize {
         self.limit.map_or(usize::MAX, |limit| limit.saturating_sub(self.total()))
     }
 
-    /// Whether `bytes` more are within the limit.
+    /// Whether `bytes` more are within the limit, where there is one.
     pub(super) fn has(&self, bytes: usize) -> bool {
         self.limit.is_none_or(|limit| self.total().saturating_add(bytes) <= limit)
     }
@@ -131,6 +149,7 @@ fn scene_bytes(scene: &Scene) -> usize {
     let textures = scene.textures.iter().map(|texture| match texture.texels {
         Texels::Srgb8(texels) | Texels::Linear8(texels) => size_of_val(texels),
         Texels::Float(texels) => size_of_val(texels),
+        Texels::Number(texels) => size_of_val(texels),
     });
     size_of_val(mesh.positions)
         + size_of_val(mesh.normals)

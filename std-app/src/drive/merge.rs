@@ -11,6 +11,7 @@ use super::method::Method;
 use super::picture::image;
 use super::told::Told;
 use super::workers::Workers;
+use crate::memory::Budget;
 use crate::save::Image;
 use halflight_core::film::Film;
 use halflight_core::memory::{ALIGNMENT, Arena, Line};
@@ -47,7 +48,8 @@ pub struct Merged {
 /// # Errors
 /// Names the file that does not belong to the first one and why, or the shards that are missing or there twice.
 pub fn merge(files: &[PathBuf]) -> Result<Merged, RenderError> {
-    let films = files.iter().map(|file| Reader::open(file)).collect::<Result<Vec<_>, _>>()?;
+    let most = Budget::new(None).limit();
+    let films = files.iter().map(|file| Reader::open(file, most)).collect::<Result<Vec<_>, _>>()?;
     let (Some(first), Some(name)) = (films.first(), files.first()) else { return Err(RenderError::Shard) };
     films.iter().try_for_each(|film| film.check_sibling(first))?;
     let count = first.header.shard().count;
@@ -65,6 +67,11 @@ pub fn merge(files: &[PathBuf]) -> Result<Merged, RenderError> {
     let is_biased = first.header.method().is_some_and(Method::is_biased);
     let mut lines = Vec::new();
     let needed = Film::footprint(width, height).bytes();
+    // The picture, and what tells its error.
+    let beside = 64 * width as usize * height as usize;
+    if needed.saturating_add(beside) > most {
+        return Err(RenderError::Memory { needed: needed.saturating_add(beside), available: most });
+    }
     let count = needed.div_ceil(ALIGNMENT);
     lines.try_reserve_exact(count).map_err(|_| RenderError::Memory { needed, available: 0 })?;
     lines.resize(count, Line([0; ALIGNMENT]));

@@ -38,8 +38,10 @@ impl WithFeatures for Render<'_> {
         let Render { scene, settings, method, progress, interrupt } = self;
         let (width, height) = (settings.width, settings.height);
         // What is of something else should not cost the time of building.
-        let cache = cache_file::open(scene, settings)?.map(|file| file.header.fingerprint());
-        let resumed = settings.resume.as_deref().map(Reader::open).transpose()?;
+        let mut memory = Memory::new(scene, settings);
+        let most = memory.for_file();
+        let cache = cache_file::open(scene, settings, most)?.map(|file| file.header.fingerprint());
+        let resumed = settings.resume.as_deref().map(|file| Reader::open(file, most)).transpose()?;
         // What a first look has chosen is in the film.
         let chosen = |method: &Method| *method == Method::ProgressivePhotons;
         let of_film = resumed.as_ref().and_then(|film| film.header.method()).filter(chosen);
@@ -52,7 +54,6 @@ impl WithFeatures for Render<'_> {
         }
 
         let workers = Workers::new(settings.threads)?;
-        let mut memory = Memory::new(scene, settings.memory);
         let build_start = Instant::now();
         // First, for the working memory of its build is free again for the others.
         let mut bvh_lines = Pages::default();

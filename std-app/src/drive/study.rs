@@ -96,7 +96,7 @@ impl WithFeatures for Study<'_> {
     fn run<F: Features>(self) -> Self::Out {
         let Study { scene, settings, study, tell } = self;
         let workers = Workers::new(settings.threads)?;
-        let mut memory = Memory::new(scene, settings.memory);
+        let mut memory = Memory::new(scene, settings);
         let mut bvh_lines = Pages::default();
         let bvh = build_bvh(scene, settings.level, &workers, &mut memory, &mut bvh_lines)?;
         let mut lights_lines = memory.take("lights", Lights::footprint(scene).and(Lights::scratch(scene)))?;

@@ -7,6 +7,8 @@ use super::name::{Kind, Name, folded, readings};
 use super::notes::Notes;
 use super::surface;
 use super::text::{is_blank, trimmed};
+use super::{read, weight};
+use crate::memory::Budget;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
@@ -52,7 +54,7 @@ impl Library {
         obj: &Path,
         statements: &[(u32, Name)],
         used: &[Name],
-        lookup: &mut Lookup,
+        (lookup, budget): (&mut Lookup, &Budget),
         notes: &mut Notes,
     ) -> Self {
         let directory = obj.parent().unwrap_or(Path::new(""));
@@ -60,7 +62,7 @@ impl Library {
         for (line, operand) in statements {
             let place = format!("({}:{line})", obj.display());
             for file in named_files(operand, directory, lookup, &place, notes) {
-                library.add(&file, directory, lookup, notes);
+                library.add(&file, directory, (lookup, budget), notes);
             }
         }
         if used.iter().any(|name| library.find(name).is_none()) {
@@ -71,7 +73,7 @@ impl Library {
                 && !library.files.iter().any(|file| file == own)
             {
                 notes.add(1, format!("{} is read for materials that no library has", own.display()));
-                library.add(own, directory, lookup, notes);
+                library.add(own, directory, (lookup, budget), notes);
             }
         }
         library
@@ -102,16 +104,22 @@ impl Library {
         Some(MtlMaterial { name: material.name.trimmed(), ..material })
     }
 
-    fn add(&mut self, file: &Path, beside: &Path, lookup: &mut Lookup, notes: &mut Notes) {
+    fn add(
+        &mut self,
+        file: &Path,
+        beside: &Path,
+        (lookup, budget): (&mut Lookup, &Budget),
+        notes: &mut Notes,
+    ) {
         if self.files.iter().any(|known| known == file) {
             return;
         }
         self.files.push(file.into());
         let shown = file.display();
-        let bytes = match std::fs::read(file) {
+        let bytes = match read(file, budget, weight::of_mtl) {
             Ok(bytes) => bytes,
             Err(error) => {
-                return notes.add(1, format!("material library {shown} cannot be read: {error}"));
+                return notes.add(1, format!("material library {shown} is left out: {}", error.problem));
             }
         };
         let mut mtl = mtl::parse(bytes, &shown.to_string());

@@ -1,10 +1,10 @@
-//! Scenes from files: OBJ with MTL ([`obj`], [`mtl`], [`surface`]), pictures ([`texture`]), and the scene
+//! Scenes from files: OBJ with MTL ([`obj`], [`mtl`], [`surface`]), pictures ([`crate::picture`]), and the scene
 //! file that places meshes and adds camera, lights and settings ([`scene_file`]). Names are bytes ([`name`]), and
 //! one lookup finds the files that they mean ([`files`]).
 //!
 //! A load repairs what it can and says each kind of repair once; what it cannot repair is a [`LoadError`]
 //! with file, line and what to do. The table of both is `docs/loading.md`. The parsers take bytes, so that
-//! they can be fed anything: [`obj::parse`], [`mtl::parse`], [`scene_file::parse`], [`texture::decode`].
+//! they can be fed anything: [`obj::parse`], [`mtl::parse`], [`scene_file::parse`].
 
 mod doubled;
 mod error;
@@ -25,9 +25,10 @@ mod settings;
 mod surface;
 mod texcoords;
 mod text;
-pub mod texture;
+mod texture;
 mod texture_set;
 mod transform;
+mod weight;
 
 pub use error::LoadError;
 pub use map::{Map, MapOptions};
@@ -38,6 +39,7 @@ pub use settings::RenderSettings;
 pub use texture_set::TextureSet;
 pub use transform::SceneTransform;
 
+use crate::memory::{self, Budget, Shortage};
 use files::Lookup;
 use geometry::{Placed, Placement};
 use halflight_core::scene::{Environment, Material};
@@ -46,6 +48,7 @@ use mtl::MtlMaterial;
 use name::readings;
 use scene_file::{EnvironmentChange, MaterialChange};
 use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::io;
 use std::path::{Path, PathBuf};
 use texcoords::Texcoords;
 
@@ -54,11 +57,13 @@ use texcoords::Texcoords;
 pub struct LoadOptions {
     /// Whether to decode textures; without them, materials have their constant values.
     pub textures: bool,
+    /// Most bytes to take, for what stays and for what is taken on the way; `None`: a share of what the machine has.
+    pub memory: Option<usize>,
 }
 
 impl Default for LoadOptions {
     fn default() -> Self {
-        Self { textures: true }
+        Self { textures: true, memory: None }
     }
 }
 
@@ -68,7 +73,7 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<LoadedScene, LoadError
     match extension.as_deref() {
         Some("toml") => scene_file::load(path, options),
         Some("obj") => {
-            let mut builder = SceneBuilder::default();
+            let mut builder = SceneBuilder::new(options);
             builder.add_mesh(path, Placement::IDENTITY, None)?;
             builder.build(path, options, None)
         }
@@ -76,20 +81,28 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<LoadedScene, LoadError
     }
 }
 
-/// Reads a whole file, with an error that names it.
-fn read(path: &Path) -> Result<Vec<u8>, LoadError> {
-    std::fs::read(path).map_err(|error| {
-        LoadError::of_file(
-            path,
-            format!("cannot be read: {error}"),
-            "is the path right, relative to where you are?",
-        )
-    })
+/// Reads a whole text file, which `weight` must find room for in `budget`; with an error that names it.
+fn read(path: &Path, budget: &Budget, weight: fn(&[u8]) -> usize) -> Result<Vec<u8>, LoadError> {
+    let bytes = memory::read_file(path, budget.left()).map_err(|error| {
+        let help = match error.kind() {
+            io::ErrorKind::FileTooLarge => MORE_MEMORY,
+            _ => "is the path right, relative to where you are?",
+        };
+        LoadError::of_file(path, format!("cannot be read: {error}"), help)
+    })?;
+    budget.has(weight(&bytes)).map_err(|why| too_large(path, &why))?;
+    Ok(bytes)
+}
+
+const MORE_MEMORY: &str = "raise --memory, or leave out a part of the scene";
+
+fn too_large(path: &Path, why: &Shortage) -> LoadError {
+    LoadError::of_file(path, why.to_string(), MORE_MEMORY)
 }
 
 /// Meshes and materials on their way to a scene.
-#[derive(Default)]
 struct SceneBuilder {
+    budget: Budget,
     meshes: Vec<PlacedMesh>,
     /// Each OBJ file once, however often it is placed.
     files: HashMap<PathBuf, usize>,
@@ -112,6 +125,21 @@ struct PlacedMesh {
 }
 
 impl SceneBuilder {
+    fn new(options: &LoadOptions) -> Self {
+        Self {
+            budget: Budget::new(options.memory),
+            meshes: Vec::new(),
+            files: HashMap::new(),
+            objs: Vec::new(),
+            materials: Vec::new(),
+            by_name: HashMap::new(),
+            overrides: BTreeMap::new(),
+            used_overrides: BTreeSet::new(),
+            lookup: Lookup::default(),
+            notes: Notes::default(),
+        }
+    }
+
     /// Places an OBJ file. `material` replaces those of the file;
     fn add_mesh(
         &mut self,
@@ -122,7 +150,9 @@ impl SceneBuilder {
         let number = match self.files.get(path) {
             Some(&number) => number,
             None => {
-                let mut obj = obj::parse(read(path)?, path)?;
+                let text = read(path, &self.budget, weight::of_obj)?;
+                let mut obj = obj::parse(text, path)?;
+                self.budget.take(weight::of_mesh(&obj)).map_err(|why| too_large(path, &why))?;
                 self.notes.merge(core::mem::take(&mut obj.notes));
                 self.objs.push(obj);
                 self.files.insert(path.into(), self.objs.len() - 1);
@@ -133,7 +163,8 @@ impl SceneBuilder {
         let mut library = Library::default();
         if material.is_none() {
             let statements = &self.objs[number].libraries;
-            library = Library::read(path, statements, &names, &mut self.lookup, &mut self.notes);
+            let sources = (&mut self.lookup, &self.budget);
+            library = Library::read(path, statements, &names, sources, &mut self.notes);
         }
         let mut materials = Vec::with_capacity(names.len() + 1);
         for name in &names {
@@ -210,7 +241,10 @@ impl SceneBuilder {
         let maps =
             self.materials.iter().flat_map(surface::maps).chain(environment.iter().flat_map(|e| &e.map));
         let files = maps.filter_map(|map| map.found.clone()).filter(|_| options.textures);
-        let mut textures = TextureSet::decode(files, &mut self.notes);
+        let by_scene_file = self.overrides.values().flat_map(|change| surface::maps(change.material()));
+        let by_scene_file = by_scene_file.chain(environment.iter().flat_map(|e| &e.map));
+        let required = by_scene_file.filter_map(|map| map.found.clone()).collect();
+        let mut textures = TextureSet::decode(files, &required, &mut self.budget, &mut self.notes)?;
         let notes = &mut self.notes;
         let of_maps = |mtl: &mut MtlMaterial| {
             Texcoords::of_maps(
@@ -237,6 +271,7 @@ impl SceneBuilder {
             }
         }
         count_vertices(path, parts.iter().map(|part| part.group.positions.len()).sum())?;
+        self.budget.take(weight::of_scene(&parts, &materials)).map_err(|why| too_large(path, &why))?;
         let (min, max) = geometry::bounds(&parts);
         let transform = SceneTransform::fitting(min, max);
         let mut geometry = geometry::assemble(&parts, &transform, notes);

@@ -2,6 +2,7 @@
 
 use core::fmt::Write;
 use std::borrow::Cow;
+use std::collections::HashMap;
 
 /// Where a thing was first met: a file and a line of it, 0 where there is none.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -22,12 +23,14 @@ struct Note {
 pub struct Notes {
     file: String,
     notes: Vec<Note>,
+    /// Where in `notes` each kind is.
+    places: HashMap<Cow<'static, str>, usize>,
 }
 
 impl Notes {
     /// An empty list; lines given to [`Notes::at`] are those of `file`.
     pub fn of(file: impl Into<String>) -> Self {
-        Self { file: file.into(), notes: Vec::new() }
+        Self { file: file.into(), ..Self::default() }
     }
 
     /// One more of `what`, at `line` of the file.
@@ -54,12 +57,15 @@ impl Notes {
     }
 
     fn push(&mut self, note: Note) {
-        match self.notes.iter_mut().find(|known| known.what == note.what) {
+        match self.places.get(&note.what).and_then(|place| self.notes.get_mut(*place)) {
             Some(known) => {
                 known.count += note.count;
                 known.first = known.first.take().or(note.first);
             }
-            None => self.notes.push(note),
+            None => {
+                self.places.insert(note.what.clone(), self.notes.len());
+                self.notes.push(note);
+            }
         }
     }
 }

@@ -1,124 +1,126 @@
-//! Pictures that become textures: decoded once each, in parallel, and refused when they would not fit a sane
-//! amount of memory.
+//! Pictures that become textures and skies: their numbers made finite and not negative, and the views of them
+//! that the core sees.
 
+use crate::picture::{Picture, Samples};
 use halflight_core::scene::{Texels, Texture, TextureTransform, Wrap};
-use image::{DynamicImage, ImageFormat, ImageReader, Limits};
-use std::io::Cursor;
-use std::path::Path;
 
-/// Longest side in pixels.
-const LONGEST_SIDE: u32 = 1 << 15;
-/// Bytes that a decoded picture may take.
-const MOST_BYTES: u64 = 1 << 30;
+/// What an infinite texel becomes where nothing in the picture is brighter: the largest half float.
+const LARGEST_HALF: f32 = 65504.0;
 
-/// Decoded texels, row by row from the top.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Pixels {
-    /// RGBA, as the file has them.
-    Bytes(Vec<u8>),
-    /// RGB, linear; finite and not negative.
-    Floats(Vec<f32>),
+/// No texel is larger: products of a few of them, and the squares that the film sums, stay finite.
+const LARGEST: f32 = 1e15;
+
+/// Which numbers of a picture a view shows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Shown {
+    /// Colours.
+    Colour,
+    /// Plain numbers.
+    Data,
+    /// Opacity, in all channels.
+    Alpha,
 }
 
-/// A decoded picture.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Picture {
-    /// Pixels across.
-    pub width: u32,
-    /// Pixels down.
-    pub height: u32,
-    /// The texels.
-    pub pixels: Pixels,
-    /// Whether the file has an alpha channel.
-    pub has_alpha: bool,
-    /// Texels that were not finite or negative and are 0 now.
-    pub repaired: u64,
-}
-
-impl Picture {
-    /// The picture as the core sees it: bytes are colours in the sRGB curve where `srgb`, else plain numbers.
-    pub fn view(&self, srgb: bool, wrap: Wrap) -> Texture<'_> {
-        let texels = match &self.pixels {
-            Pixels::Floats(floats) => Texels::Float(bytemuck::cast_slice(floats)),
-            Pixels::Bytes(bytes) if srgb => Texels::Srgb8(bytemuck::cast_slice(bytes)),
-            Pixels::Bytes(bytes) => Texels::Linear8(bytemuck::cast_slice(bytes)),
-        };
-        Texture {
-            width: self.width,
-            height: self.height,
-            texels,
-            wrap,
-            transform: TextureTransform::IDENTITY,
+/// The picture as textures have it: 8 bits or floats, no number that light cannot be.
+pub(super) fn prepared(mut picture: Picture) -> Picture {
+    match &mut picture.samples {
+        Samples::Bytes(_) => {}
+        Samples::Words(words) => {
+            // As `image` rounds them.
+            let byte = |&word: &u16| ((u32::from(word) + 128) / 257) as u8;
+            picture.samples = Samples::Bytes(words.iter().map(byte).collect());
         }
-    }
-}
-
-/// Decodes the bytes of a picture. `name` gives the format where the bytes do not (TGA).
-pub fn decode(bytes: &[u8], name: &Path) -> Result<Picture, String> {
-    let format = image::guess_format(bytes).or_else(|_| ImageFormat::from_path(name));
-    let format =
-        format.map_err(|_| "it is in no format that is known (png, jpg, bmp, tga, hdr, exr)".to_string())?;
-    let mut reader = ImageReader::with_format(Cursor::new(bytes), format);
-    let mut limits = Limits::default();
-    limits.max_image_width = Some(LONGEST_SIDE);
-    limits.max_image_height = Some(LONGEST_SIDE);
-    limits.max_alloc = Some(MOST_BYTES);
-    reader.limits(limits);
-    let decoded = reader.decode().map_err(|error| error.to_string())?;
-    let (width, height) = (decoded.width(), decoded.height());
-    if width == 0 || height == 0 {
-        return Err("it has no pixels".into());
-    }
-    let has_alpha = decoded.color().has_alpha();
-    let mut repaired = 0;
-    let pixels = match decoded {
-        DynamicImage::ImageRgb32F(_) | DynamicImage::ImageRgba32F(_) => {
-            let mut floats = decoded.into_rgb32f().into_raw();
-            for value in floats.iter_mut().filter(|value| !(value.is_finite() && **value >= 0.0)) {
-                *value = 0.0;
-                repaired += 1;
+        Samples::Floats { rgb, alpha } => {
+            let finite = rgb.as_flattened().iter().copied().filter(|value| value.is_finite());
+            let sun = finite.fold(LARGEST_HALF, f32::max).min(LARGEST);
+            let [mut broken, mut infinite, mut large] = [0u64; 3];
+            for value in rgb.as_flattened_mut() {
+                let (usable, count) = match *value {
+                    value if value == f32::INFINITY => (sun, &mut infinite),
+                    value if value > LARGEST => (LARGEST, &mut large),
+                    value if value >= 0.0 => continue,
+                    _ => (0.0, &mut broken),
+                };
+                *value = usable;
+                *count += 1;
             }
-            Pixels::Floats(floats)
+            for value in alpha.iter_mut() {
+                broken += u64::from(!(value.is_finite() && *value >= 0.0));
+                *value = value.clamp(0.0, 1.0).max(0.0);
+            }
+            let notes = [
+                (broken, "numbers that are not finite or negative are 0 now".to_string()),
+                (infinite, format!("infinite numbers are {sun} now")),
+                (large, format!("numbers above {LARGEST:e} are {LARGEST:e} now")),
+            ];
+            for (count, what) in notes.into_iter().filter(|(count, _)| *count > 0) {
+                picture.notes.push(if count == 1 { what } else { format!("{what}, {count} times") });
+            }
         }
-        _ => Pixels::Bytes(decoded.into_rgba8().into_raw()),
+    }
+    picture
+}
+
+/// The picture as the core sees it. Bytes are colours in the sRGB curve, or plain numbers; floats are both.
+pub(super) fn view(picture: &Picture, shown: Shown, wrap: Wrap) -> Texture<'_> {
+    let texels = match (&picture.samples, shown) {
+        (Samples::Floats { alpha, .. }, Shown::Alpha) => Texels::Number(alpha),
+        (Samples::Floats { rgb, .. }, _) => Texels::Float(rgb),
+        (Samples::Bytes(bytes), Shown::Colour) => Texels::Srgb8(bytemuck::cast_slice(bytes)),
+        (Samples::Bytes(bytes), _) => Texels::Linear8(bytemuck::cast_slice(bytes)),
+        // There are none once they are prepared.
+        (Samples::Words(_), _) => Texels::Float(&[]),
     };
-    Ok(Picture { width, height, pixels, has_alpha, repaired })
+    let transform = TextureTransform::IDENTITY;
+    Texture { width: picture.width, height: picture.height, texels, wrap, transform }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    #[test]
-    fn bytes_that_are_no_picture_are_refused() {
-        for bytes in [
-            &b""[..],
-            b"GIF89a",
-            b"\x89PNG\r\n\x1a\n",
-            b"BM\xff\xff\xff\xff",
-            b"#?RADIANCE\n\n-Y 99999 +X 99999\n",
-        ] {
-            assert!(decode(bytes, Path::new("a.png")).is_err());
-        }
+    fn floats(rgb: Vec<[f32; 3]>, alpha: Vec<f32>) -> Picture {
+        let (width, has_alpha) = (rgb.len() as u32, !alpha.is_empty());
+        prepared(Picture {
+            width,
+            height: 1,
+            samples: Samples::Floats { rgb, alpha },
+            has_alpha,
+            notes: Vec::new(),
+        })
     }
 
     #[test]
-    fn a_png_keeps_its_bytes() {
-        let mut bytes = Cursor::new(Vec::new());
-        let picture = image::RgbaImage::from_raw(2, 1, vec![1, 2, 3, 4, 250, 251, 252, 253]).unwrap();
-        picture.write_to(&mut bytes, ImageFormat::Png).unwrap();
-        let decoded = decode(bytes.get_ref(), Path::new("a.png")).unwrap();
-        assert_eq!((decoded.width, decoded.height, decoded.has_alpha), (2, 1, true));
-        assert_eq!(decoded.pixels, Pixels::Bytes(vec![1, 2, 3, 4, 250, 251, 252, 253]));
+    fn numbers_are_what_light_can_be() {
+        let odd =
+            floats(vec![[1.0, f32::NAN, -2.0], [f32::INFINITY, 3.0, f32::NEG_INFINITY]], vec![2.0, f32::NAN]);
+        let rgb = vec![[1.0, 0.0, 0.0], [65504.0, 3.0, 0.0]];
+        assert_eq!(odd.samples, Samples::Floats { rgb, alpha: vec![1.0, 0.0] });
+        let expected =
+            ["numbers that are not finite or negative are 0 now, 4 times", "infinite numbers are 65504 now"];
+        assert_eq!(odd.notes, expected);
+        assert_eq!(floats(vec![[0.0, -0.0, 1e15]], vec![1.0]).notes, [""; 0]);
     }
 
     #[test]
-    fn a_bomb_is_refused_before_it_is_decoded() {
-        let mut bytes = Cursor::new(Vec::new());
-        image::GrayImage::new(1, 1).write_to(&mut bytes, ImageFormat::Bmp).unwrap();
-        let mut bytes = bytes.into_inner();
-        bytes[18..22].copy_from_slice(&30_000i32.to_le_bytes());
-        bytes[22..26].copy_from_slice(&30_000i32.to_le_bytes());
-        assert!(decode(&bytes, Path::new("a.bmp")).is_err());
+    fn the_sun_is_no_darker_than_anything_else() {
+        let of = |brightest: f32| match floats(vec![[f32::INFINITY, brightest, 0.0]], vec![]).samples {
+            Samples::Floats { rgb, .. } => rgb[0],
+            other => panic!("{other:?}"),
+        };
+        assert_eq!(of(3e6), [3e6, 3e6, 0.0]);
+        assert_eq!(of(f32::MAX), [LARGEST, LARGEST, 0.0]);
+    }
+
+    #[test]
+    fn words_become_bytes() {
+        let words = Picture {
+            width: 1,
+            height: 1,
+            samples: Samples::Words(vec![0, 65535, 257 * 7, 257 * 7 + 129]),
+            has_alpha: true,
+            notes: Vec::new(),
+        };
+        assert_eq!(prepared(words).samples, Samples::Bytes(vec![0, 255, 7, 8]));
     }
 }

@@ -5,30 +5,42 @@
 use super::part::Part;
 use super::place::{Place, folder};
 use super::stream::{self, Patience};
-use super::{Format, Image, PictureError, decode, encode};
-use std::fs::{self, File, OpenOptions};
+use super::{Format, Image, PictureError, encode};
+use crate::memory::{self, Budget};
+use crate::picture::{self, Kind};
+use std::fs::{File, OpenOptions};
 use std::io::{self, BufWriter, Write};
 use std::path::Path;
-
-/// Longest file that is read, in bytes.
-const MAX_FILE: u64 = 8 << 30;
 
 /// Bytes that are gathered before they are handed to the system.
 const BUFFER: usize = 1 << 20;
 
-/// The picture in a file; the extension says the format. See [`decode`].
+/// The picture in a file, whose bytes say the format, in no more than `most` bytes of memory; and what had to be
+/// repaired, a sentence for each that names the file. See [`Image::from`].
+///
+/// # Errors
+/// Names the file and what is wrong with it.
+pub fn read_within(path: &Path, most: usize) -> Result<(Image, Vec<String>), PictureError> {
+    let bytes = memory::read_file(path, most).map_err(|error| PictureError::new(words(&error)).at(path))?;
+    let about = |error: PictureError| error.at(path);
+    let survey = picture::survey(&bytes, path).map_err(about)?;
+    // Whole numbers become floats, in memory of their own.
+    let image = match survey.kind {
+        Kind::Exr | Kind::Hdr | Kind::Pfm => 0,
+        _ => survey.width as usize * survey.height as usize * size_of::<[f32; 3]>(),
+    };
+    let most = most.saturating_sub(bytes.len()).saturating_sub(image);
+    let mut picture = picture::decode(&bytes, path, most).map_err(about)?;
+    let notes = picture.notes.drain(..).map(|note| format!("{}: {note}", path.display())).collect();
+    Ok((Image::from(picture), notes))
+}
+
+/// As [`read_within`], in the memory that is the default ([`Budget::new`]), and without a word of repairs.
 ///
 /// # Errors
 /// Names the file and what is wrong with it.
 pub fn read(path: &Path) -> Result<Image, PictureError> {
-    let format = Format::of(path)?;
-    let about = |error: io::Error| PictureError::new(words(&error)).at(path);
-    let length = fs::metadata(path).map_err(about)?.len();
-    if length > MAX_FILE {
-        return Err(PictureError::new(format!("{length} bytes are too many for a picture")).at(path));
-    }
-    let bytes = fs::read(path).map_err(about)?;
-    decode(&bytes, format).map_err(|error| error.at(path))
+    read_within(path, Budget::new(None).limit()).map(|(image, _)| image)
 }
 
 /// Writes a picture; the extension says the format. A file appears whole or not at all; a pipe or a device is

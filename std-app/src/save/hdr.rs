@@ -1,9 +1,8 @@
 //! Radiance RGBE: three mantissas of 8 bits and a common exponent.
 
-use super::{Image, PictureError, plausible};
-use image::codecs::hdr::{HdrDecoder, HdrEncoder};
-use image::{DynamicImage, ImageDecoder, Rgb};
-use std::io::Cursor;
+use super::{Image, PictureError};
+use image::Rgb;
+use image::codecs::hdr::HdrEncoder;
 
 /// Largest value that RGBE holds.
 const LARGEST: f32 = 255.0 / 256.0 * 1.701_411_8e38;
@@ -17,12 +16,4 @@ pub(super) fn encode(picture: &Image) -> Result<Vec<u8>, PictureError> {
         .encode(&pixels, picture.width as usize, picture.height as usize)
         .map_err(PictureError::new)?;
     Ok(bytes)
-}
-
-pub(super) fn decode(bytes: &[u8]) -> Result<Image, PictureError> {
-    let decoder = HdrDecoder::new_nonstrict(Cursor::new(bytes)).map_err(PictureError::new)?;
-    let (width, height) = decoder.dimensions();
-    plausible(width as usize, height as usize, bytes.len())?;
-    let linear = DynamicImage::from_decoder(decoder).map_err(PictureError::new)?.into_rgb32f();
-    Ok(Image { width, height, pixels: linear.pixels().map(|pixel| pixel.0).collect() })
 }

@@ -1,5 +1,7 @@
 //! A picture in memory: linear RGB, rows from the top.
 
+use super::from_srgb;
+use crate::picture::{Picture, Samples};
 use halflight_core::Rgb;
 
 /// Linear radiance, `width * height` pixels, row by row from the top left.
@@ -35,5 +37,24 @@ impl Image {
             }
         }
         sum.map(|sum| sum / count.max(1) as f64)
+    }
+}
+
+/// The colours in linear light: whole numbers go back through the sRGB curve. Alpha is left out.
+impl From<Picture> for Image {
+    fn from(picture: Picture) -> Self {
+        let pixels = match picture.samples {
+            Samples::Floats { rgb, .. } => rgb,
+            Samples::Bytes(samples) => {
+                let table: [f32; 256] = core::array::from_fn(|byte| from_srgb(byte as f32 / 255.0));
+                let pixel = |rgba: &[u8]| [0, 1, 2].map(|c: usize| table[usize::from(rgba[c])]);
+                samples.chunks_exact(4).map(pixel).collect()
+            }
+            Samples::Words(samples) => {
+                let pixel = |rgba: &[u16]| [0, 1, 2].map(|c: usize| from_srgb(f32::from(rgba[c]) / 65535.0));
+                samples.chunks_exact(4).map(pixel).collect()
+            }
+        };
+        Self { width: picture.width, height: picture.height, pixels }
     }
 }

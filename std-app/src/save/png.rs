@@ -1,8 +1,7 @@
 //! PNG: pictures for the eye. Tone mapping is a clamp to [0, 1] and the sRGB curve, nothing else.
 
-use super::{Image, MAX_PIXELS, PictureError, plausible};
-use image::{ExtendedColorType, ImageDecoder, ImageEncoder};
-use std::io::Cursor;
+use super::{Image, PictureError};
+use image::{ExtendedColorType, ImageEncoder};
 
 /// Linear value to display value in [0, 1] (IEC 61966-2-1). Not a number becomes 0.
 pub fn to_srgb(linear: f32) -> f32 {
@@ -24,17 +23,6 @@ pub(super) fn encode(picture: &Image) -> Result<Vec<u8>, PictureError> {
         .write_image(&samples, picture.width, picture.height, ExtendedColorType::Rgb8)
         .map_err(PictureError::new)?;
     Ok(bytes)
-}
-
-pub(super) fn decode(bytes: &[u8]) -> Result<Image, PictureError> {
-    let mut limits = image::Limits::default();
-    limits.max_alloc = Some(MAX_PIXELS as u64 * 16);
-    let decoder =
-        image::codecs::png::PngDecoder::with_limits(Cursor::new(bytes), limits).map_err(PictureError::new)?;
-    let (width, height) = decoder.dimensions();
-    plausible(width as usize, height as usize, bytes.len())?;
-    let display = image::DynamicImage::from_decoder(decoder).map_err(PictureError::new)?.into_rgb32f();
-    Ok(Image { width, height, pixels: display.pixels().map(|pixel| pixel.0.map(from_srgb)).collect() })
 }
 
 #[cfg(test)]

@@ -47,14 +47,15 @@ pub(super) struct Reader {
 }
 
 impl Reader {
-    /// Opens `path` and reads its header.
-    pub(super) fn open(path: &Path) -> Result<Self, FileError> {
-        let (file, header): (_, Header) = sealed::Reader::open(path, &KIND)?;
+    /// Opens `path` and reads its header, in no more than `most` bytes.
+    pub(super) fn open(path: &Path, most: usize) -> Result<Self, FileError> {
+        let (file, header): (_, Header) = sealed::Reader::open(path, &KIND, most)?;
         let Shard { index, count } = header.shard();
         let [width, height] = header.size();
         if index >= count || !(1..=MOST_PIXELS).contains(&(u64::from(width) * u64::from(height))) {
             return Err(file.damage("there is no such picture"));
         }
+        file.expect((Tile::count(width, height) * size_of::<[u32; GROUPS]>()) as u64, 1)?;
         Ok(Self { file, header })
     }
 

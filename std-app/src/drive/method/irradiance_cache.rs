@@ -78,8 +78,10 @@ pub(super) fn with<F: Features, T>(
     then: impl FnOnce(&mut dyn Renderer, &mut Memory) -> Result<T, RenderError>,
 ) -> Result<T, RenderError> {
     let Stage { scene, settings, .. } = *stage;
-    let file = cache_file::open(scene, settings)?;
+    let file = cache_file::open(scene, settings, memory.for_file())?;
     let header = file.as_ref().map_or_else(|| Header::new(scene, settings), |file| file.header.clone());
+    let bytes = Footprint::default().slice::<Record>(header.records());
+    memory.set_aside(LOADED, bytes)?;
     let loaded = Loaded { header, records: file.map(Reader::records).transpose()?.unwrap_or_default() };
     let mut lines = Vec::new();
     let (cast, caustics) = find_caustics::<F>(stage, memory, loaded.fewest(), &mut lines)?;
@@ -121,6 +123,9 @@ fn find_caustics<'l, F: Features>(
     memory.give_back("paths");
     Ok((cast, caustics))
 }
+
+/// What the memory of records of a file is counted as, until caches have them.
+const LOADED: &str = "loaded records";
 
 /// What a file has of caches.
 struct Loaded {
@@ -296,6 +301,7 @@ fn set_up<F: Features, T>(
         }
     }
     drop(loaded.records);
+    memory.give_back(LOADED);
     then(&mut method, memory)
 }
 

@@ -9,6 +9,7 @@ mod hash;
 pub(super) use hash::Hash;
 
 use super::error::FileError;
+use crate::memory::Shortage;
 use crate::save::{Patience, check_place, not_written, replace_with};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -38,8 +39,8 @@ impl Kind {
     }
 }
 
-/// A header is no longer than this, in bytes.
-const LONGEST_HEADER: u32 = 1 << 28;
+/// Bytes that a header takes once it is read, for each of its own: numbers of one digit take most.
+const HEADER: usize = 24;
 
 /// A file that is being written.
 pub(super) struct Writer<'w> {
@@ -85,23 +86,33 @@ pub(super) fn check_writable(path: &Path) -> Result<(), FileError> {
 pub(super) struct Reader<'r> {
     path: PathBuf,
     file: Box<dyn Read + 'r>,
+    /// Bytes of the whole file.
+    length: u64,
+    /// Bytes of memory that may be taken.
+    most: usize,
     hash: Hash,
 }
 
 impl<'r> Reader<'r> {
-    /// Opens the file of `kind` at `path` and reads its header.
-    pub(super) fn open<H: DeserializeOwned>(path: &Path, kind: &Kind) -> Result<(Self, H), FileError> {
+    /// Opens the file of `kind` at `path` and reads its header, in no more than `most` bytes.
+    pub(super) fn open<H: DeserializeOwned>(
+        path: &Path,
+        kind: &Kind,
+        most: usize,
+    ) -> Result<(Self, H), FileError> {
         let file = File::open(path).map_err(|error| FileError::io(path, &error))?;
-        Self::read(path, kind, Box::new(BufReader::with_capacity(1 << 20, file)))
+        let length = file.metadata().map_err(|error| FileError::io(path, &error))?.len();
+        Self::read(path, kind, (Box::new(BufReader::with_capacity(1 << 16, file)), length), most)
     }
 
-    /// The same of bytes from anywhere; `path` is what errors name.
+    /// The same of `length` bytes from anywhere; `path` is what errors name.
     pub(super) fn read<H: DeserializeOwned>(
         path: &Path,
         kind: &Kind,
-        file: Box<dyn Read + 'r>,
+        (file, length): (Box<dyn Read + 'r>, u64),
+        most: usize,
     ) -> Result<(Self, H), FileError> {
-        let mut reader = Self { path: path.to_owned(), file, hash: Hash::default() };
+        let mut reader = Self { path: path.to_owned(), file, length, most, hash: Hash::default() };
         let mut opening = [0; 12];
         reader.get(&mut opening)?;
         if opening[..6] != kind.magic {
@@ -114,9 +125,7 @@ impl<'r> Reader<'r> {
         let mut length = [0; 4];
         reader.get(&mut length)?;
         let length = u32::from_le_bytes(length);
-        if length > LONGEST_HEADER {
-            return Err(reader.damage("its header has no sensible length"));
-        }
+        reader.expect(u64::from(length), HEADER)?;
         let mut text = Vec::new();
         let limited = reader.file.by_ref().take(u64::from(length)).read_to_end(&mut text);
         limited.map_err(|error| FileError::io(path, &error))?;
@@ -127,6 +136,20 @@ impl<'r> Reader<'r> {
         let header = serde_json::from_slice(&text);
         let header = header.map_err(|error| reader.damage(format!("its header: {error}")))?;
         Ok((reader, header))
+    }
+
+    /// Refuses a file that says that it has `count` things more, of at least a byte each, and is shorter than that, or
+    /// has no memory for them, `size` bytes each.
+    pub(super) fn expect(&self, count: u64, size: usize) -> Result<(), FileError> {
+        if count > self.length {
+            return Err(self.damage("it is too short"));
+        }
+        let needed = usize::try_from(count).unwrap_or(usize::MAX).saturating_mul(size);
+        if needed > self.most {
+            let shortage = Shortage { needed, left: self.most };
+            return Err(self.refusal(format!("cannot be read: {shortage}: raise --memory")));
+        }
+        Ok(())
     }
 
     /// The next section, of as many bytes.

@@ -141,6 +141,11 @@ impl MaterialEntry {
 }
 
 impl MaterialChange {
+    /// What is said, as statements of an MTL.
+    pub(in crate::load) fn material(&self) -> &MtlMaterial {
+        &self.change
+    }
+
     /// Applies what is given.
     pub(in crate::load) fn apply(&self, material: &mut MtlMaterial) {
         if self.afresh {

@@ -21,7 +21,7 @@ use super::notes::Notes;
 use super::scene::LoadedScene;
 use super::settings::RenderSettings;
 use super::transform::SceneTransform;
-use super::{LoadOptions, SceneBuilder, read};
+use super::{LoadOptions, SceneBuilder, read, too_large, weight};
 use core::cell::RefCell;
 use glam::{DMat3, DVec3};
 use halflight_core::scene::Camera;
@@ -164,7 +164,9 @@ impl Source<'_> {
 
 /// Loads a scene file with all that it names.
 pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<LoadedScene, LoadError> {
-    let bytes = read(path)?;
+    let mut builder = SceneBuilder::new(options);
+    let bytes = read(path, &builder.budget, weight::of_scene_file)?;
+    builder.budget.take(weight::of_scene_file(&bytes)).map_err(|why| too_large(path, &why))?;
     let text = String::from_utf8(bytes).map_err(|error| {
         let line =
             error.as_bytes()[..error.utf8_error().valid_up_to()].iter().filter(|&&b| b == b'\n').count();
@@ -175,7 +177,6 @@ pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<LoadedScene, Lo
     let source = Source { text, file: path, looked: &looked };
     let scene = parse(text, path)?;
 
-    let mut builder = SceneBuilder::default();
     for (name, entry) in &scene.material {
         let material = entry.get_ref().resolved(&source)?;
         builder.overrides.insert(name.clone(), material);

@@ -11,9 +11,9 @@ pub struct PictureError {
 }
 
 impl PictureError {
-    /// An error of bytes that have no name yet.
+    /// An error of bytes that have no name yet. What a decoder says in several lines becomes one.
     pub(crate) fn new(reason: impl fmt::Display) -> Self {
-        Self { file: None, reason: reason.to_string() }
+        Self { file: None, reason: reason.to_string().trim().replace('\n', ", ") }
     }
 
     /// The same error, of this file.

@@ -1,0 +1,192 @@
+//! How much memory a text takes on its way into a scene, told before it is read in earnest: for each
+//! statement what the worst of its kind takes, as measured.
+
+use super::geometry::Placed;
+use super::obj::{Group, Obj};
+use super::text::{Words, words};
+use core::sync::atomic::{AtomicU64, Ordering};
+use halflight_core::sampling::mix;
+use halflight_core::scene::{Material, Surface};
+use rayon::prelude::*;
+
+/// Bytes for each byte of text: itself, cleaned, and room to grow.
+const TEXT: usize = 4;
+/// For each `v`, `vt` and `vn`, in each of the readers.
+const VERTEX: usize = 80;
+/// Readers that work side by side, each on its megabyte of faces.
+const READERS: usize = 4;
+/// For each corner of a face.
+const CORNER: usize = 50;
+/// For each corner that is a vertex of its own.
+const UNIQUE: usize = 130;
+/// For each run of faces of a material.
+const RUN: usize = 700;
+/// For each line that may end in a note of its own.
+const NOTE: usize = 300;
+/// For each material: as read, as used, as the core has it.
+const MATERIAL: usize = 4096;
+/// For each byte of a scene file: values of two characters take most.
+const SCENE_FILE: usize = 220;
+
+/// What an OBJ file has, counted.
+#[derive(Clone, Copy, Debug, Default)]
+struct Counts {
+    vertices: usize,
+    /// `vt` and `vn`.
+    others: usize,
+    corners: usize,
+    /// Of those, corners counted from the end: the same word may mean any vertex.
+    relative: usize,
+    runs: usize,
+    notes: usize,
+}
+
+impl Counts {
+    fn and(self, other: Self) -> Self {
+        Self {
+            vertices: self.vertices + other.vertices,
+            others: self.others + other.others,
+            corners: self.corners + other.corners,
+            relative: self.relative + other.relative,
+            runs: self.runs + other.runs,
+            notes: self.notes + other.notes,
+        }
+    }
+}
+
+/// Bytes that [`super::obj::parse`] takes at most.
+pub(super) fn of_obj(text: &[u8]) -> usize {
+    let words_seen = Distinct::new(text.len() / 2);
+    let corners = |words: Words, counts: &mut Counts| {
+        for word in words {
+            counts.corners += 1;
+            counts.relative += usize::from(word.contains(&b'-'));
+            words_seen.add(word);
+        }
+    };
+    let count = |mut counts: Counts, line: &[u8]| {
+        let mut operands = words(line);
+        match operands.next() {
+            Some(b"v") => counts.vertices += 1,
+            Some(b"vt" | b"vn") => counts.others += 1,
+            Some(b"f" | b"fo") => corners(operands, &mut counts),
+            Some(b"usemtl") => counts.runs += 1,
+            // A line that goes on.
+            Some(first) if first[0].is_ascii_digit() || first[0] == b'-' => corners(words(line), &mut counts),
+            Some(_) => counts.notes += 1,
+            None => {}
+        }
+        counts
+    };
+    let lines = text.par_split(|&b| matches!(b, b'\n' | b'\r'));
+    let Counts { vertices, others, corners, relative, runs, notes } =
+        lines.fold(Counts::default, count).reduce(Counts::default, Counts::and);
+    let readers = (1 + (text.len() >> 20)).min(READERS);
+    let unique = corners.min(relative + words_seen.at_most());
+    (text.len() * TEXT)
+        .saturating_add(readers * VERTEX * (vertices + others))
+        .saturating_add(CORNER * corners + UNIQUE * unique)
+        .saturating_add(RUN * runs + NOTE * notes)
+}
+
+/// About how many different words there are, by how many bits their hashes set (Whang et al., "A linear-time
+/// probabilistic counting algorithm", 1990).
+struct Distinct(Vec<AtomicU64>);
+
+impl Distinct {
+    /// For up to about `most` words.
+    fn new(most: usize) -> Self {
+        Self((0..=most / 64).map(|_| AtomicU64::new(0)).collect())
+    }
+
+    fn add(&self, word: &[u8]) {
+        let hash = word.iter().fold(0xcbf2_9ce4_8422_2325u64, |hash, &byte| {
+            (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3)
+        });
+        let hash = mix(hash);
+        let place = (hash >> 6) as usize % self.0.len();
+        self.0[place].fetch_or(1 << (hash & 63), Ordering::Relaxed);
+    }
+
+    /// The estimate and five of its standard deviations.
+    fn at_most(&self) -> usize {
+        let bits = (self.0.len() * 64) as f64;
+        let set: u32 = self.0.iter().map(|word| word.load(Ordering::Relaxed).count_ones()).sum();
+        let estimate = -bits * (1.0 - f64::from(set) / bits).max(1.0 / bits).ln();
+        (estimate + 5.0 * estimate.sqrt() + 64.0) as usize
+    }
+}
+
+/// Bytes that [`super::mtl::parse`] takes at most.
+pub(super) fn of_mtl(text: &[u8]) -> usize {
+    let [mut materials, mut others] = [0usize; 2];
+    for line in text.split(|&b| matches!(b, b'\n' | b'\r')) {
+        match words(line).next() {
+            Some(word) if word.eq_ignore_ascii_case(b"newmtl") => materials += 1,
+            Some(_) => others += 1,
+            None => {}
+        }
+    }
+    (text.len() * TEXT).saturating_add(MATERIAL * materials + NOTE * others)
+}
+
+/// Bytes that a scene file takes, with all that it says.
+pub(super) fn of_scene_file(text: &[u8]) -> usize {
+    text.len().saturating_mul(SCENE_FILE)
+}
+
+/// Bytes of what was read.
+pub(super) fn of_mesh(obj: &Obj) -> usize {
+    let of_group = |group: &Group| {
+        size_of_val(&group.positions[..])
+            + size_of_val(&group.normals[..])
+            + size_of_val(&group.texcoords[..])
+            + size_of_val(&group.triangles[..])
+            + size_of::<Group>()
+    };
+    obj.groups.iter().map(of_group).sum::<usize>() + MATERIAL * obj.materials.len()
+}
+
+/// Bytes that [`super::geometry::assemble`] takes: of each vertex its exact place, its place, normal and
+/// texture coordinates, of each triangle itself, and all of that twice where parts are put together. Lamps are
+/// searched for doubles and glass for holes, which takes as much again.
+pub(super) fn of_scene(parts: &[Placed], materials: &[Material]) -> usize {
+    let is_searched =
+        |material: &Material| material.emits() || matches!(material.surface, Surface::Dielectric { .. });
+    let of_part = |part: &Placed| {
+        let searched = materials.get(part.material as usize).is_some_and(is_searched);
+        let of_triangle = if searched { 232 } else { 32 };
+        96 * part.group.positions.len() + of_triangle * part.group.triangles.len()
+    };
+    parts.iter().fold(0, |sum, part| sum.saturating_add(of_part(part)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_takes_more_weighs_more() {
+        let face = of_obj(b"f 1 2 3\n");
+        assert!(of_obj(b"f 1 2 3 4\n") > face && of_obj(b"f 1 2 \\\n3 4\n") > face);
+        let same = of_obj(&b"f 1 2 3\n".repeat(1000));
+        let different: String = (0..1000).map(|i| format!("f {i} {} {}\n", i + 1000, i + 2000)).collect();
+        assert!(of_obj(different.as_bytes()) > same + 2500 * UNIQUE);
+        assert!(of_obj(&b"f -1 -2 -3\n".repeat(1000)) > same + 2500 * UNIQUE);
+        assert!(of_obj(b"usemtl a\nf 1 2 3\n") > face + RUN);
+        assert!(of_obj(&b"f 1 2 3\r".repeat(900)) > of_obj(&b"f 1 2 3\r".repeat(800)));
+        assert!(of_mtl(b"newmtl a\n\tNEWMTL b\nKd 1\n") > 2 * MATERIAL);
+    }
+
+    #[test]
+    fn different_words_are_counted() {
+        for count in [0usize, 1, 100, 10_000, 100_000] {
+            let distinct = Distinct::new(100_000);
+            for i in 0..2 * count {
+                distinct.add((i % count).to_string().as_bytes());
+            }
+            let most = distinct.at_most();
+            assert!(most >= count && most <= count + count / 20 + 700, "{count}: {most}");
+        }
+    }
+}

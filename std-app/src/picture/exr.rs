@@ -1,0 +1,289 @@
+//! OpenEXR: half, float or integer channels, any lossless or lossy compression that the `exr` crate knows,
+//! scanlines or tiles, several parts, any data window. Only the blocks of the part that is wanted are
+//! decompressed.
+
+use super::layers::{self, Choice};
+use super::{Kind, Picture, PictureError, Samples, Survey, filled, pixels};
+use exr::block::UncompressedBlock;
+use exr::block::reader::{ChunksReader, Reader};
+use exr::math::Vec2;
+use exr::meta::attribute::SampleType;
+use exr::meta::header::Header;
+use exr::prelude::f16;
+use std::io::Cursor;
+
+/// Channels that one part may have.
+const MOST_CHANNELS: usize = 1024;
+
+/// Pictures up to this many samples are read by one thread: starting more costs longer.
+const SINGLE_THREAD: usize = 1 << 20;
+
+/// Bytes that a block takes while it is decompressed, over its own: compressed, unpacked, put into order, and
+/// handed on.
+const COPIES: usize = 5;
+
+/// A file whose header has been read, and what is wanted of it.
+struct File<'a> {
+    reader: Reader<Cursor<&'a [u8]>>,
+    choice: Choice,
+    /// Of the display window.
+    width: usize,
+    height: usize,
+    notes: Vec<String>,
+}
+
+pub(super) fn survey(bytes: &[u8]) -> Result<Survey, PictureError> {
+    let file = open(bytes)?;
+    let header = file.header();
+    let of_pixel = size_of::<[f32; 3]>() + if file.choice.alpha.is_some() { size_of::<f32>() } else { 0 };
+    let kept = file.width * file.height * of_pixel;
+    // Tiles may say that they are larger than the picture.
+    let (Vec2(columns, rows), Vec2(width, height)) = (header.max_block_pixel_size(), header.layer_size);
+    let block = columns.min(width).saturating_mul(rows.min(height));
+    let block = block.saturating_mul(header.channels.bytes_per_pixel);
+    // The offsets of blocks are no longer than the file.
+    let scratch = block.saturating_mul(COPIES * file.blocks_at_once()).saturating_add(2 * bytes.len());
+    let (width, height) = (file.width as u32, file.height as u32);
+    Ok(Survey { kind: Kind::Exr, width, height, kept, peak: kept.saturating_add(scratch) })
+}
+
+pub(super) fn decode(bytes: &[u8]) -> Result<Picture, PictureError> {
+    let file = open(bytes)?;
+    let (width, height, has_alpha) = (file.width, file.height, file.choice.alpha.is_some());
+    // Outside of the data window a picture is black, and nothing is there.
+    let mut rgb = filled(width * height, [0.0; 3])?;
+    let mut alpha = filled(if has_alpha { width * height } else { 0 }, 0.0)?;
+    let wanted = file.columns();
+    let origin = file.origin();
+    let in_parallel = file.blocks_at_once() > 1;
+    let File { reader, choice, notes, .. } = file;
+
+    let insert = |header: &Header, block: UncompressedBlock| {
+        let Vec2(columns, rows) = block.index.pixel_size;
+        let line = header.channels.bytes_per_pixel * columns;
+        for (row, line) in block.data.chunks_exact(line.max(1)).enumerate().take(rows) {
+            let y = origin[1] + (block.index.pixel_position.y() + row) as i64;
+            let Some(y) = usize::try_from(y).ok().filter(|y| *y < height) else { continue };
+            for column in 0..columns {
+                let x = origin[0] + (block.index.pixel_position.x() + column) as i64;
+                let Some(x) = usize::try_from(x).ok().filter(|x| *x < width) else { continue };
+                let value = |channel: Column| channel.value(line, columns, column);
+                rgb[y * width + x] = wanted.colour.map(value);
+                if let Some(channel) = wanted.alpha {
+                    alpha[y * width + x] = value(channel);
+                }
+            }
+        }
+    };
+    read_blocks(reader, choice.part, in_parallel, insert)?;
+    let samples = Samples::Floats { rgb, alpha };
+    Ok(Picture { width: width as u32, height: height as u32, samples, has_alpha, notes })
+}
+
+/// Hands the blocks of a part to `insert`, in any order.
+fn read_blocks(
+    reader: Reader<Cursor<&[u8]>>,
+    part: usize,
+    in_parallel: bool,
+    mut insert: impl FnMut(&Header, UncompressedBlock),
+) -> Result<(), PictureError> {
+    let is_wanted = |layer: usize, level: Vec2<usize>| layer == part && level == Vec2(0, 0);
+    let chunks = reader
+        .filter_chunks(false, |_, tile, block| is_wanted(block.layer, tile.level_index))
+        .map_err(PictureError::new)?;
+    let insert = |meta: &exr::meta::MetaData, block: UncompressedBlock| {
+        // A file may say one thing in its table and another in its blocks.
+        if is_wanted(block.index.layer, block.index.level) {
+            insert(&meta.headers[block.index.layer], block);
+        }
+        Ok(())
+    };
+    let read = match in_parallel {
+        true => chunks.decompress_parallel(false, insert),
+        false => chunks.decompress_sequential(false, insert),
+    };
+    read.map_err(PictureError::new)
+}
+
+fn open(bytes: &[u8]) -> Result<File<'_>, PictureError> {
+    let reader = exr::block::read(Cursor::new(bytes), false).map_err(PictureError::new)?;
+    let headers = reader.headers();
+    let names = |header: &Header| header.channels.list.iter().map(|c| c.name.to_string()).collect();
+    let parts: Vec<Vec<String>> = headers.iter().map(names).collect();
+    let Some((choice, layer)) = layers::choose(&parts) else {
+        let all: Vec<&str> = parts.iter().flatten().take(12).map(String::as_str).collect();
+        return Err(PictureError::new(format!("no R, G, B and no Y among its channels: {}", all.join(", "))));
+    };
+    check(&headers[choice.part])?;
+    let display = headers[choice.part].shared_attributes.display_window.size;
+    let (width, height) = (display.x(), display.y());
+    pixels(width, height)?;
+    let notes = layer.map(|layer| format!("of its layers `{layer}` is read")).into_iter().collect();
+    Ok(File { reader, choice, width, height, notes })
+}
+
+fn check(header: &Header) -> Result<(), PictureError> {
+    pixels(header.layer_size.x(), header.layer_size.y())?;
+    let channels = &header.channels.list;
+    if header.deep {
+        return Err(PictureError::new("deep pictures are not supported"));
+    }
+    if channels.len() > MOST_CHANNELS {
+        return Err(PictureError::new(format!("more than {MOST_CHANNELS} channels are not supported")));
+    }
+    if channels
+        .iter()
+        .any(|c| c.sampling != Vec2(1, 1) || ["RY", "BY"].contains(&c.name.to_string().as_str()))
+    {
+        return Err(PictureError::new("luminance with chroma (RY, BY) is not supported"));
+    }
+    Ok(())
+}
+
+fn area(header: &Header) -> usize {
+    header.layer_size.x().saturating_mul(header.layer_size.y())
+}
+
+impl File<'_> {
+    /// Of the part that is read.
+    fn header(&self) -> &Header {
+        &self.reader.headers()[self.choice.part]
+    }
+
+    /// From the data window to the display window.
+    fn origin(&self) -> [i64; 2] {
+        let header = self.header();
+        let (data, display) =
+            (header.own_attributes.layer_position, header.shared_attributes.display_window.position);
+        [i64::from(data.x()) - i64::from(display.x()), i64::from(data.y()) - i64::from(display.y())]
+    }
+
+    /// Blocks that are decompressed at the same time.
+    fn blocks_at_once(&self) -> usize {
+        match area(self.header()) < SINGLE_THREAD {
+            true => 1,
+            false => rayon::current_num_threads() + 4,
+        }
+    }
+
+    /// Where the wanted channels are in a line of a block.
+    fn columns(&self) -> Columns {
+        let column = |channel: usize| {
+            let channels = &self.header().channels.list;
+            let before = channels[..channel].iter().map(|c| c.sample_type.bytes_per_sample()).sum();
+            Column { before, kind: channels[channel].sample_type }
+        };
+        Columns { colour: self.choice.colour.map(column), alpha: self.choice.alpha.map(column) }
+    }
+}
+
+struct Columns {
+    colour: [Column; 3],
+    alpha: Option<Column>,
+}
+
+/// A channel within the lines of blocks, which hold the values of one channel after those of another.
+#[derive(Clone, Copy)]
+struct Column {
+    /// Bytes of a pixel in the channels before it.
+    before: usize,
+    kind: SampleType,
+}
+
+impl Column {
+    /// The value at `column` in a line of `columns` pixels.
+    fn value(&self, line: &[u8], columns: usize, column: usize) -> f32 {
+        let at = self.before * columns + column * self.kind.bytes_per_sample();
+        let bytes = &line[at..];
+        match self.kind {
+            SampleType::F16 => f16::from_ne_bytes([bytes[0], bytes[1]]).to_f32(),
+            SampleType::F32 => f32::from_ne_bytes([bytes[0], bytes[1], bytes[2], bytes[3]]),
+            SampleType::U32 => u32::from_ne_bytes([bytes[0], bytes[1], bytes[2], bytes[3]]) as f32,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use exr::image::{AnyChannel, AnyChannels, Encoding, FlatSamples, Image, Layer};
+    use exr::prelude::{IntegerBounds, LayerAttributes, WritableImage};
+    use std::path::Path;
+
+    fn layer(name: &str, channels: Vec<(&str, FlatSamples)>) -> Layer<AnyChannels<FlatSamples>> {
+        let channels = channels.into_iter().map(|(name, samples)| AnyChannel::new(name, samples)).collect();
+        Layer::new((2, 1), LayerAttributes::named(name), Encoding::FAST_LOSSLESS, AnyChannels::sort(channels))
+    }
+
+    fn floats(values: [f32; 2]) -> FlatSamples {
+        FlatSamples::F32(values.to_vec())
+    }
+
+    fn file(layers: Vec<Layer<AnyChannels<FlatSamples>>>) -> Vec<u8> {
+        let attributes = Image::from_layer(layers[0].clone()).attributes;
+        let mut bytes = Cursor::new(Vec::new());
+        Image::from_layers(attributes, layers).write().to_buffered(&mut bytes).unwrap();
+        bytes.into_inner()
+    }
+
+    fn read(bytes: &[u8]) -> (Vec<[f32; 3]>, Vec<f32>, Vec<String>) {
+        let picture = super::super::decode(bytes, Path::new("a"), 1 << 24).unwrap();
+        match picture.samples {
+            Samples::Floats { rgb, alpha } => (rgb, alpha, picture.notes),
+            other => panic!("{other:?}"),
+        }
+    }
+
+    #[test]
+    fn channels_of_every_type_and_layers_of_every_name() {
+        let half = FlatSamples::F16(vec![f16::from_f32(0.25), f16::INFINITY]);
+        let whole = FlatSamples::U32(vec![7, 9]);
+        let mixed = file(vec![layer(
+            "",
+            vec![("R", half), ("G", whole), ("B", floats([0.5, -1.0])), ("A", floats([1.0, 0.5]))],
+        )]);
+        let expected = (vec![[0.25, 7.0, 0.5], [f32::INFINITY, 9.0, -1.0]], vec![1.0, 0.5], vec![]);
+        assert_eq!(read(&mixed), expected);
+
+        let grey = file(vec![layer("", vec![("Y", floats([0.5, 2.0]))])]);
+        assert_eq!(read(&grey), (vec![[0.5; 3], [2.0; 3]], vec![], vec![]));
+
+        let rgb = |prefix: &str, value: f32| {
+            ["R", "G", "B"].map(|channel| (format!("{prefix}{channel}"), floats([value; 2])))
+        };
+        let layered: Vec<(String, FlatSamples)> =
+            rgb("albedo.", 1.0).into_iter().chain(rgb("beauty.", 3.0)).collect();
+        let layered = layered.iter().map(|(name, samples)| (name.as_str(), samples.clone())).collect();
+        let (colours, _, notes) = read(&file(vec![layer("", layered)]));
+        assert_eq!(colours, [[3.0; 3]; 2]);
+        assert_eq!(notes, ["of its layers `beauty` is read"]);
+    }
+
+    #[test]
+    fn the_picture_is_found_in_a_later_part() {
+        let depth = layer("depth", vec![("Z", floats([9.0; 2]))]);
+        let colour =
+            layer("colour", vec![("R", floats([1.0; 2])), ("G", floats([2.0; 2])), ("B", floats([3.0; 2]))]);
+        assert_eq!(read(&file(vec![depth, colour])).0, [[1.0, 2.0, 3.0]; 2]);
+    }
+
+    #[test]
+    fn outside_of_the_data_window_it_is_black() {
+        let mut image =
+            Image::from_layer(layer("", vec![("Y", floats([5.0, 6.0])), ("A", floats([1.0; 2]))]));
+        image.attributes.display_window = IntegerBounds::new((-1, 0), (2, 2));
+        let mut bytes = Cursor::new(Vec::new());
+        image.write().to_buffered(&mut bytes).unwrap();
+        let (colours, alpha, _) = read(bytes.get_ref());
+        assert_eq!(colours, [[0.0; 3], [5.0; 3], [0.0; 3], [0.0; 3]]);
+        assert_eq!(alpha, [0.0, 1.0, 0.0, 0.0]);
+    }
+
+    #[test]
+    fn what_is_cut_short_is_refused() {
+        let bytes = file(vec![layer("", vec![("Y", floats([5.0, 6.0]))])]);
+        for length in 0..bytes.len() {
+            assert!(super::super::decode(&bytes[..length], Path::new("a"), 1 << 24).is_err(), "{length}");
+        }
+    }
+}

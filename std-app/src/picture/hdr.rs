@@ -1,0 +1,301 @@
+//! Radiance pictures, by the documentation of the format (Ward, "Radiance File Formats"): any program's name
+//! after `#?`, all eight orders of rows and columns, RGBE and XYZE, and the header lines that change values.
+
+use super::rgbe::read_scanline;
+use super::{Kind, Picture, PictureError, Samples, Survey, filled, pixels};
+
+/// Chromaticities of red, green, blue and white that count as those of sRGB: its own, and those of Radiance.
+const PRIMARIES: [[f64; 8]; 2] = [
+    [0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290],
+    [0.64, 0.33, 0.29, 0.60, 0.15, 0.06, 0.3333, 0.3333],
+];
+/// How far chromaticities may be from them: files are written with two to four digits.
+const PRIMARIES_TOLERANCE: f64 = 0.006;
+
+/// CIE XYZ to linear sRGB (IEC 61966-2-1).
+const TO_SRGB: [[f32; 3]; 3] = [
+    [3.240_97, -1.537_383, -0.498_611],
+    [-0.969_244, 1.875_968, 0.041_555],
+    [0.055_63, -0.203_977, 1.056_972],
+];
+
+/// Header lines, at most: what has more is no picture.
+const MOST_LINES: usize = 1 << 16;
+
+/// What a header says.
+struct Header<'a> {
+    order: Order,
+    is_xyz: bool,
+    /// What the values of each channel have been multiplied by.
+    applied: [f64; 3],
+    notes: Vec<String>,
+    /// The pixels.
+    rest: &'a [u8],
+}
+
+/// How the pixels of the file lie in the picture.
+#[derive(Clone, Copy)]
+struct Order {
+    width: usize,
+    height: usize,
+    /// Scanlines are columns.
+    columns: bool,
+    /// From the right to the left.
+    leftwards: bool,
+    /// From the bottom to the top.
+    upwards: bool,
+}
+
+impl Order {
+    /// Number of scanlines and their length.
+    fn scanlines(&self) -> (usize, usize) {
+        if self.columns { (self.width, self.height) } else { (self.height, self.width) }
+    }
+
+    /// Place in the picture, row by row from the top left, of a pixel of a scanline.
+    fn place(&self, scanline: usize, pixel: usize) -> usize {
+        let (x, y) = if self.columns { (scanline, pixel) } else { (pixel, scanline) };
+        let x = if self.leftwards { self.width - 1 - x } else { x };
+        let y = if self.upwards { self.height - 1 - y } else { y };
+        y * self.width + x
+    }
+}
+
+pub(super) fn survey(bytes: &[u8]) -> Result<Survey, PictureError> {
+    let Header { order, .. } = read_header(bytes)?;
+    let Order { width, height, .. } = order;
+    let kept = width * height * size_of::<[f32; 3]>();
+    let peak = kept + order.scanlines().1 * size_of::<[u8; 4]>();
+    Ok(Survey { kind: Kind::Hdr, width: width as u32, height: height as u32, kept, peak })
+}
+
+pub(super) fn decode(bytes: &[u8]) -> Result<Picture, PictureError> {
+    let Header { order, is_xyz, applied, notes, mut rest } = read_header(bytes)?;
+    let (scanlines, length) = order.scanlines();
+    let mut rgb = filled(order.width * order.height, [0.0; 3])?;
+    let mut line = filled(length, [0u8; 4])?;
+    for scanline in 0..scanlines {
+        read_scanline(&mut rest, &mut line)?;
+        for (pixel, &rgbe) in line.iter().enumerate() {
+            rgb[order.place(scanline, pixel)] = colour(rgbe, applied, is_xyz);
+        }
+    }
+    let samples = Samples::Floats { rgb, alpha: Vec::new() };
+    let (width, height) = (order.width as u32, order.height as u32);
+    Ok(Picture { width, height, samples, has_alpha: false, notes })
+}
+
+/// Mantissas count as they are, not half a step more, as in most programs that write and read the format.
+fn colour([r, g, b, exponent]: [u8; 4], applied: [f64; 3], is_xyz: bool) -> [f32; 3] {
+    if exponent == 0 {
+        return [0.0; 3];
+    }
+    let scale = 2f64.powi(i32::from(exponent) - 136);
+    let mantissas = [r, g, b];
+    let value: [f32; 3] = core::array::from_fn(|c| (f64::from(mantissas[c]) * scale / applied[c]) as f32);
+    if is_xyz { TO_SRGB.map(|row| row[0] * value[0] + row[1] * value[1] + row[2] * value[2]) } else { value }
+}
+
+fn read_header(bytes: &[u8]) -> Result<Header<'_>, PictureError> {
+    let mut rest = bytes;
+    let mut header = Header {
+        order: Order { width: 0, height: 0, columns: false, leftwards: false, upwards: false },
+        is_xyz: false,
+        applied: [1.0; 3],
+        notes: Vec::new(),
+        rest,
+    };
+    for _ in 0..MOST_LINES {
+        let line = line(&mut rest)?;
+        if line.is_empty() {
+            header.order = resolution(self::line(&mut rest)?)?;
+            // Each scanline takes at least one pixel.
+            if rest.len() / 4 < header.order.scanlines().0 {
+                return Err(PictureError::new("truncated: there are fewer pixels than scanlines"));
+            }
+            header.rest = rest;
+            return Ok(header);
+        }
+        if let Some((key, value)) = line.split_once('=').filter(|_| !line.starts_with('#')) {
+            header.variable(&key.trim().to_ascii_uppercase(), value.trim())?;
+        }
+    }
+    Err(PictureError::new("its header has no end"))
+}
+
+impl Header<'_> {
+    /// A line of the header that may change what the pixels mean.
+    fn variable(&mut self, key: &str, value: &str) -> Result<(), PictureError> {
+        let numbers = || value.split_whitespace().map(|word| word.parse().ok()).collect::<Option<Vec<f64>>>();
+        match key {
+            "FORMAT" => match value.to_ascii_lowercase().as_str() {
+                "32-bit_rle_rgbe" => self.is_xyz = false,
+                "32-bit_rle_xyze" => self.is_xyz = true,
+                _ => return Err(PictureError::new(format!("its format `{value}` is not supported"))),
+            },
+            "NCOMP" if value != "3" => {
+                return Err(PictureError::new(format!("{value} components of colour are not supported")));
+            }
+            "EXPOSURE" => self.apply(key, value, numbers().filter(|n| n.len() == 1)),
+            "COLORCORR" => self.apply(key, value, numbers().filter(|n| n.len() == 3)),
+            "PRIMARIES" => {
+                let is_near = |known: &[f64; 8], given: &[f64]| {
+                    given.len() == 8
+                        && known.iter().zip(given).all(|(a, b)| (a - b).abs() <= PRIMARIES_TOLERANCE)
+                };
+                let given = numbers().unwrap_or_default();
+                if !PRIMARIES.iter().any(|known| is_near(known, &given)) {
+                    self.notes
+                        .push(format!("its colours are taken as those of sRGB, not of PRIMARIES={value}"));
+                }
+            }
+            _ => {}
+        }
+        Ok(())
+    }
+
+    /// A factor that pixels have been multiplied by; several count together.
+    fn apply(&mut self, key: &str, value: &str, factors: Option<Vec<f64>>) {
+        let usable = factors.filter(|factors| factors.iter().all(|f| *f > 0.0 && f.is_finite()));
+        let Some(factors) = usable else {
+            self.notes.push(format!("{key}={value} is left out: it is no factor"));
+            return;
+        };
+        let factor = |c: usize| if factors.len() == 3 { factors[c] } else { factors[0] };
+        self.applied = core::array::from_fn(|c| self.applied[c] * factor(c));
+    }
+}
+
+/// The next line of the header.
+fn line<'a>(rest: &mut &'a [u8]) -> Result<&'a str, PictureError> {
+    let bytes = *rest;
+    let end =
+        bytes.iter().position(|&b| b == b'\n').ok_or_else(|| PictureError::new("its header has no end"))?;
+    *rest = &bytes[end + 1..];
+    let line = &bytes[..end];
+    // A comment in another encoding is none of our business.
+    Ok(core::str::from_utf8(line).unwrap_or("#").trim_end_matches('\r'))
+}
+
+/// `-Y 512 +X 1024`: the axis from scanline to scanline, then that within them; y is up.
+fn resolution(line: &str) -> Result<Order, PictureError> {
+    let unknown = || PictureError::new(format!("`{line}` is no order of rows and columns"));
+    let words: Vec<&str> = line.split_whitespace().collect();
+    let [first, lines, second, length] = words[..] else { return Err(unknown()) };
+    let count = |word: &str| word.parse::<u32>().map(|count| count as usize).map_err(|_| unknown());
+    let (lines, length) = (count(lines)?, count(length)?);
+    let (columns, (x, width), (y, height)) = match (first.get(1..), second.get(1..)) {
+        (Some("Y"), Some("X")) => (false, (second, length), (first, lines)),
+        (Some("X"), Some("Y")) => (true, (first, lines), (second, length)),
+        _ => return Err(unknown()),
+    };
+    if ![x, y].iter().all(|axis| axis.starts_with(['+', '-'])) {
+        return Err(unknown());
+    }
+    pixels(width, height)?;
+    Ok(Order { width, height, columns, leftwards: x.starts_with('-'), upwards: y.starts_with('+') })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read(text: &str, pixels: &[[u8; 4]]) -> Result<Picture, PictureError> {
+        decode(&[text.as_bytes(), pixels.as_flattened()].concat())
+    }
+
+    fn colours(picture: &Picture) -> &[[f32; 3]] {
+        match &picture.samples {
+            Samples::Floats { rgb, .. } => rgb,
+            other => panic!("{other:?}"),
+        }
+    }
+
+    #[test]
+    fn all_eight_orders_show_the_same_picture() {
+        // 3 by 2, seen from the top left: 1 2 3 / 4 5 6.
+        let orders = [
+            ("-Y 2 +X 3", [1, 2, 3, 4, 5, 6]),
+            ("-Y 2 -X 3", [3, 2, 1, 6, 5, 4]),
+            ("+Y 2 +X 3", [4, 5, 6, 1, 2, 3]),
+            ("+Y 2 -X 3", [6, 5, 4, 3, 2, 1]),
+            ("+X 3 -Y 2", [1, 4, 2, 5, 3, 6]),
+            ("+X 3 +Y 2", [4, 1, 5, 2, 6, 3]),
+            ("-X 3 -Y 2", [3, 6, 2, 5, 1, 4]),
+            ("-X 3 +Y 2", [6, 3, 5, 2, 4, 1]),
+        ];
+        for (order, pixels) in orders {
+            let pixels = pixels.map(|n| [n, 0, 0, 136]);
+            let picture = read(&format!("#?any program\n\n{order}\n"), &pixels).unwrap();
+            assert_eq!((picture.width, picture.height), (3, 2));
+            let reds: Vec<f32> = colours(&picture).iter().map(|c| c[0]).collect();
+            assert_eq!(reds, [1.0, 2.0, 3.0, 4.0, 5.0, 6.0], "{order}");
+        }
+    }
+
+    #[test]
+    fn factors_that_were_applied_are_divided_out() {
+        let of = |lines: &str| {
+            let picture = read(&format!("#?x\n{lines}\n-Y 1 +X 1\n"), &[[64, 32, 16, 129]]).unwrap();
+            (colours(&picture)[0], picture.notes)
+        };
+        assert_eq!(of(""), ([0.5, 0.25, 0.125], vec![]));
+        assert_eq!(of("EXPOSURE=2\nSOFTWARE=x=y\nexposure = 0.25\n").0, [1.0, 0.5, 0.25]);
+        assert_eq!(of("COLORCORR=2 4 1\nCOLORCORR= 0.5 1 1\nEXPOSURE=0.5\n").0, [1.0, 0.125, 0.25]);
+        for odd in
+            ["EXPOSURE=0", "EXPOSURE=nan", "EXPOSURE=", "EXPOSURE=-1", "COLORCORR=1 0 1", "COLORCORR=2"]
+        {
+            let (colour, notes) = of(&format!("{odd}\n"));
+            assert!(colour == [0.5, 0.25, 0.125] && notes[0].starts_with(odd), "{odd}: {colour:?} {notes:?}");
+        }
+    }
+
+    #[test]
+    fn xyz_becomes_rgb() {
+        // D65 white has Y = 1, and the primaries add up to it.
+        let bytes = |xyz: [f64; 3]| [0, 1, 2].map(|c: usize| (xyz[c] * 128.0).round() as u8);
+        for (rgb, xyz) in [
+            ([1.0, 1.0, 1.0], [0.9505, 1.0, 1.0888]),
+            ([1.0, 0.0, 0.0], [0.4124, 0.2126, 0.0193]),
+            ([0.5, 0.25, 0.125], [0.3182, 0.2941, 0.1581]),
+        ] {
+            let [x, y, z] = bytes(xyz);
+            let picture =
+                read("#?RADIANCE\nFORMAT=32-bit_rle_xyze\n\n-Y 1 +X 1\n", &[[x, y, z, 129]]).unwrap();
+            let found = colours(&picture)[0];
+            // Half a step of the mantissas, through the matrix.
+            assert!((0..3).all(|c| (found[c] - rgb[c]).abs() < 0.02), "{rgb:?}: {found:?}");
+        }
+    }
+
+    #[test]
+    fn other_primaries_are_noted_and_other_formats_refused() {
+        let header = |line: &str| read(&format!("#?x\n{line}\n\n-Y 1 +X 1\n"), &[[64, 32, 16, 129]]);
+        for same in
+            ["0.64 0.33 0.3 0.6 0.15 0.06 0.3127 0.329", ".6400 .3300 .2900 .6000 .1500 .0600 .3333 .3333"]
+        {
+            assert_eq!(header(&format!("PRIMARIES={same}")).unwrap().notes, [""; 0]);
+        }
+        let wide = header("PRIMARIES= 0.708 0.292 0.17 0.797 0.131 0.046 0.3127 0.329").unwrap();
+        assert!(wide.notes[0].contains("taken as those of sRGB"), "{:?}", wide.notes);
+        for line in ["FORMAT=32-bit_rle_spectral", "FORMAT=ascii", "NCOMP=8"] {
+            assert!(header(line).unwrap_err().to_string().contains("not supported"), "{line}");
+        }
+    }
+
+    #[test]
+    fn lies_about_the_size_are_refused() {
+        for line in [
+            "-Y 1 +Y 1",
+            "-Y 1",
+            "Y 1 X 1",
+            "-Y 0 +X 1",
+            "-Y -1 +X 1",
+            "-Y 4000000000 +X 4000000000",
+            "-Y 3 +X 1",
+        ] {
+            assert!(read(&format!("#?x\n\n{line}\n"), &[[1, 2, 3, 128]; 2]).is_err(), "{line}");
+        }
+        assert!(read("#?x\n-Y 1 +X 1\n", &[]).is_err());
+    }
+}

@@ -1,0 +1,68 @@
+//! Formats, told by the bytes of a file, and by its name only where they do not say.
+
+use super::PictureError;
+use std::path::Path;
+
+/// The format of a picture file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// Portable network graphics, 8 or 16 bits.
+    Png,
+    /// JPEG, baseline or progressive.
+    Jpeg,
+    /// Windows bitmap.
+    Bmp,
+    /// Truevision TGA, which nothing at its beginning tells.
+    Tga,
+    /// WebP, the first picture of an animation.
+    WebP,
+    /// TIFF, integers or floats, the first picture of several.
+    Tiff,
+    /// Radiance.
+    Hdr,
+    /// OpenEXR.
+    Exr,
+    /// Portable float map.
+    Pfm,
+}
+
+/// All of them, for a message.
+const NAMES: &str = "png, jpg, bmp, tga, webp, tiff, hdr, exr, pfm";
+
+impl Kind {
+    /// The format of a file.
+    ///
+    /// # Errors
+    /// Neither its bytes nor its name say one.
+    pub fn of(bytes: &[u8], name: &Path) -> Result<Self, PictureError> {
+        let extension = name.extension().map(|extension| extension.to_string_lossy().to_ascii_lowercase());
+        let by_name = matches!(extension.as_deref(), Some("tga" | "targa" | "icb" | "vda" | "vst"));
+        Ok(match bytes {
+            [0x89, b'P', b'N', b'G', ..] => Self::Png,
+            [0xff, 0xd8, 0xff, ..] => Self::Jpeg,
+            [0x76, 0x2f, 0x31, 0x01, ..] => Self::Exr,
+            [b'#', b'?', ..] => Self::Hdr,
+            [b'P', b'F' | b'f', next, ..] if next.is_ascii_whitespace() || *next == b'4' => Self::Pfm,
+            [b'R', b'I', b'F', b'F', _, _, _, _, b'W', b'E', b'B', b'P', ..] => Self::WebP,
+            [b'I', b'I', b'*' | b'+', 0, ..] | [b'M', b'M', 0, b'*' | b'+', ..] => Self::Tiff,
+            [b'B', b'M', ..] => Self::Bmp,
+            _ if by_name || bytes.ends_with(b"TRUEVISION-XFILE.\0") => Self::Tga,
+            _ => return Err(PictureError::new(format!("it is in no format that is known ({NAMES})"))),
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bytes_win_over_names() {
+        assert_eq!(Kind::of(b"\x89PNG\r\n\x1a\n", Path::new("a.jpg")), Ok(Kind::Png));
+        assert_eq!(Kind::of(b"#?\n", Path::new("sky.exr")), Ok(Kind::Hdr));
+        assert_eq!(Kind::of(b"PF\n1 1\n-1\n", Path::new("a")), Ok(Kind::Pfm));
+        assert_eq!(Kind::of(&[0; 18], Path::new("WOOD.TGA")), Ok(Kind::Tga));
+        let why = Kind::of(&[0; 18], Path::new("wood.png")).unwrap_err().to_string();
+        assert!(why.contains("no format that is known") && why.contains("webp"), "{why}");
+    }
+}

@@ -1,0 +1,141 @@
+//! Portable float map: a text header of three words, then f32 rows from the bottom up.
+
+use super::{Kind, Picture, PictureError, Samples, Survey, filled, pixels};
+
+/// What a header says.
+struct Header<'a> {
+    width: usize,
+    height: usize,
+    /// Values of a pixel: 1 grey, 3 RGB, 4 RGBA.
+    channels: usize,
+    little_endian: bool,
+    /// Factor on all values.
+    scale: f32,
+    notes: Vec<String>,
+    /// The pixels.
+    rest: &'a [u8],
+}
+
+pub(super) fn survey(bytes: &[u8]) -> Result<Survey, PictureError> {
+    let header = read_header(bytes)?;
+    let of_pixel = if header.channels == 4 { 16 } else { 12 };
+    let kept = header.width * header.height * of_pixel;
+    Ok(Survey { kind: Kind::Pfm, width: header.width as u32, height: header.height as u32, kept, peak: kept })
+}
+
+/// Colour (`PF`), grey (`Pf`) and colour with alpha (`PF4`), of either byte order.
+pub(super) fn decode(bytes: &[u8]) -> Result<Picture, PictureError> {
+    let Header { width, height, channels, little_endian, scale, notes, rest } = read_header(bytes)?;
+    let value = |bytes: &[u8]| {
+        let bytes = [bytes[0], bytes[1], bytes[2], bytes[3]];
+        if little_endian { f32::from_le_bytes(bytes) } else { f32::from_be_bytes(bytes) }
+    };
+    let has_alpha = channels == 4;
+    let mut rgb = filled(width * height, [0.0; 3])?;
+    let mut alpha = filled(if has_alpha { width * height } else { 0 }, 0.0)?;
+    let rows = rest.chunks_exact(width * channels * 4);
+    for (y, bytes) in (0..height).rev().zip(rows) {
+        for (x, bytes) in bytes.chunks_exact(channels * 4).enumerate() {
+            let at = |c: usize| value(&bytes[c * 4..]);
+            let last = channels.min(3) - 1;
+            rgb[y * width + x] = [0, 1, 2].map(|c: usize| scale * at(c.min(last)));
+            if has_alpha {
+                alpha[y * width + x] = at(3);
+            }
+        }
+    }
+    let samples = Samples::Floats { rgb, alpha };
+    Ok(Picture { width: width as u32, height: height as u32, samples, has_alpha, notes })
+}
+
+fn read_header(bytes: &[u8]) -> Result<Header<'_>, PictureError> {
+    let mut rest = bytes;
+    let channels = match word(&mut rest) {
+        Some("PF") => 3,
+        Some("Pf") => 1,
+        Some("PF4") => 4,
+        _ => return Err(PictureError::new("not a PFM: it does not begin with PF or Pf")),
+    };
+    let mut number = |what| {
+        let text = word(&mut rest).unwrap_or("");
+        text.parse::<f64>().map_err(|_| PictureError::new(format!("not a PFM: `{text}` is no {what}")))
+    };
+    let (width, height, scale) = (number("width")?, number("height")?, number("scale")?);
+    let side = |value: f64| {
+        (value >= 1.0 && value <= f64::from(u32::MAX) && value.fract() == 0.0).then_some(value as usize)
+    };
+    let (Some(width), Some(height)) = (side(width), side(height)) else {
+        return Err(PictureError::new(format!("a size of {width} by {height} is impossible")));
+    };
+    let expected = pixels(width, height)? * channels * 4;
+    if rest.len() < expected {
+        let found = rest.len();
+        return Err(PictureError::new(format!(
+            "truncated: {expected} bytes of pixels expected, {found} found"
+        )));
+    }
+    let factor = scale.abs() as f32;
+    let is_usable = factor > 0.0 && factor.is_finite();
+    let notes = if is_usable { Vec::new() } else { vec![format!("its scale of {scale} is left out")] };
+    let scale_used = if is_usable { factor } else { 1.0 };
+    Ok(Header { width, height, channels, little_endian: scale < 0.0, scale: scale_used, notes, rest })
+}
+
+/// The next word of the header, with the one blank behind it: pixels may follow at once.
+fn word<'a>(rest: &mut &'a [u8]) -> Option<&'a str> {
+    let bytes = rest.trim_ascii_start();
+    let length = bytes.iter().take(32).position(u8::is_ascii_whitespace)?;
+    let (word, after) = bytes.split_at(length);
+    *rest = &after[1..];
+    core::str::from_utf8(word).ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn colours(bytes: &[u8]) -> Vec<[f32; 3]> {
+        match decode(bytes).unwrap().samples {
+            Samples::Floats { rgb, .. } => rgb,
+            other => panic!("{other:?}"),
+        }
+    }
+
+    #[test]
+    fn grey_big_endian_from_the_bottom() {
+        let mut bytes = b"Pf\n1 2\n1.0\n".to_vec();
+        bytes.extend([1.0f32, 2.0].iter().flat_map(|v| v.to_be_bytes()));
+        assert_eq!(colours(&bytes), [[2.0; 3], [1.0; 3]]);
+    }
+
+    #[test]
+    fn the_magnitude_of_the_scale_is_a_factor() {
+        let pixel: Vec<u8> = [1.0f32, 2.0, 3.0].iter().flat_map(|v| v.to_le_bytes()).collect();
+        assert_eq!(colours(&[b"PF 1 1 -2.5\n", &pixel[..]].concat()), [[2.5, 5.0, 7.5]]);
+        let zero = decode(&[b"PF 1 1 -0.0\n", &pixel[..]].concat()).unwrap();
+        assert!(zero.notes[0].contains("scale of -0"), "{:?}", zero.notes);
+    }
+
+    #[test]
+    fn four_values_are_a_colour_and_its_alpha() {
+        let pixel: Vec<u8> = [1.0f32, 2.0, 3.0, 0.25].iter().flat_map(|v| v.to_le_bytes()).collect();
+        let picture = decode(&[b"PF4\n1 1\n-1\n", &pixel[..]].concat()).unwrap();
+        assert!(picture.has_alpha);
+        assert_eq!(picture.samples, Samples::Floats { rgb: vec![[1.0, 2.0, 3.0]], alpha: vec![0.25] });
+    }
+
+    #[test]
+    fn a_first_pixel_that_looks_like_a_blank_is_kept() {
+        let bytes = [b"Pf 1 1 -1\n".as_slice(), &[0x20, 0x20, 0x20, 0x20]].concat();
+        assert_eq!(colours(&bytes), [[f32::from_le_bytes([0x20; 4]); 3]]);
+    }
+
+    #[test]
+    fn lies_about_the_size_are_refused() {
+        for header in
+            ["PF\n4000000000 4000000000\n-1\n", "PF\n9 9\n-1\n", "PF\n-1 1\n-1\n", "PF\n1 nan\n1\n", "P6\n"]
+        {
+            assert!(decode(header.as_bytes()).is_err(), "{header}");
+        }
+    }
+}

@@ -1,0 +1,108 @@
+//! TIFF: grey floats, which the `image` crate does not take, here; all else through it.
+
+use super::raster::{self, TABLES};
+use super::{Kind, Picture, PictureError, Samples, Survey, filled, plausible};
+use image::ImageDecoder;
+use std::io::Cursor;
+use tiff::ColorType;
+use tiff::decoder::{Decoder, DecodingResult, Limits};
+
+/// Pixels that one byte can stand for: 1032 bytes of deflate, of 8 pixels each.
+const PIXELS_PER_BYTE: usize = 8 * 1032;
+
+pub(super) fn survey(bytes: &[u8]) -> Result<Survey, PictureError> {
+    let (width, height, raw, kept) = match grey_floats(bytes)? {
+        Some((width, height, channels)) => {
+            let area = width as usize * height as usize;
+            (width, height, area * 4 * channels, area * if channels == 2 { 16 } else { 12 })
+        }
+        None => {
+            let decoder = raster::open(bytes, Kind::Tiff)?;
+            let (width, height) = decoder.dimensions();
+            let pixels = plausible(width as usize, height as usize, bytes.len(), PIXELS_PER_BYTE)?;
+            let raw = usize::try_from(decoder.total_bytes()).unwrap_or(usize::MAX);
+            (width, height, raw, raster::kept(decoder.color_type(), pixels))
+        }
+    };
+    // The decoder's pixels, a copy, one strip or tile unpacked, and four channels of ink instead of three of
+    // light.
+    let peak = kept.saturating_add(raw.saturating_mul(4)).saturating_add(2 * bytes.len() + TABLES);
+    Ok(Survey { kind: Kind::Tiff, width, height, kept, peak })
+}
+
+pub(super) fn decode(bytes: &[u8], survey: &Survey) -> Result<Picture, PictureError> {
+    let Some((width, height, channels)) = grey_floats(bytes)? else {
+        let mut decoder = raster::open(bytes, Kind::Tiff)?;
+        let mut limits = image::Limits::no_limits();
+        limits.max_alloc = Some(survey.peak as u64);
+        decoder.set_limits(limits).map_err(PictureError::new)?;
+        return raster::read(decoder);
+    };
+    let mut limits = Limits::default();
+    (limits.decoding_buffer_size, limits.intermediate_buffer_size) = (survey.peak, survey.peak);
+    let mut decoder = Decoder::new(Cursor::new(bytes)).map_err(PictureError::new)?.with_limits(limits);
+    let DecodingResult::F32(values) = decoder.read_image().map_err(PictureError::new)? else {
+        return Err(PictureError::new("its kind of numbers is not supported"));
+    };
+    let pixels = width as usize * height as usize;
+    if values.len() < pixels * channels {
+        return Err(PictureError::new("truncated: pixels are missing"));
+    }
+    let has_alpha = channels == 2;
+    let mut rgb = filled(pixels, [0.0; 3])?;
+    let mut alpha = filled(if has_alpha { pixels } else { 0 }, 0.0)?;
+    for (i, pixel) in values.chunks_exact(channels).take(pixels).enumerate() {
+        rgb[i] = [pixel[0]; 3];
+        if let Some(alpha) = alpha.get_mut(i) {
+            *alpha = pixel[1];
+        }
+    }
+    Ok(Picture { width, height, samples: Samples::Floats { rgb, alpha }, has_alpha, notes: Vec::new() })
+}
+
+/// Size and channels of a picture of grey floats; `None` for another.
+fn grey_floats(bytes: &[u8]) -> Result<Option<(u32, u32, usize)>, PictureError> {
+    let mut decoder = Decoder::new(Cursor::new(bytes)).map_err(PictureError::new)?;
+    let channels = match decoder.colortype().map_err(PictureError::new)? {
+        ColorType::Gray(32) => 1,
+        ColorType::GrayA(32) => 2,
+        _ => return Ok(None),
+    };
+    let (width, height) = decoder.dimensions().map_err(PictureError::new)?;
+    plausible(width as usize, height as usize, bytes.len(), PIXELS_PER_BYTE)?;
+    Ok(Some((width, height, channels)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::path::Path;
+    use tiff::encoder::{TiffEncoder, colortype};
+
+    #[test]
+    fn floats_are_linear_and_grey_ones_too() {
+        let mut bytes = Cursor::new(Vec::new());
+        let mut encoder = TiffEncoder::new(&mut bytes).unwrap();
+        encoder.write_image::<colortype::Gray32Float>(2, 1, &[0.25, -7.5]).unwrap();
+        let picture = super::super::decode(bytes.get_ref(), Path::new("a"), 1 << 22).unwrap();
+        let expected = Samples::Floats { rgb: vec![[0.25; 3], [-7.5; 3]], alpha: vec![] };
+        assert_eq!((picture.width, picture.height, picture.samples), (2, 1, expected));
+
+        let mut bytes = Cursor::new(Vec::new());
+        let mut encoder = TiffEncoder::new(&mut bytes).unwrap();
+        encoder.write_image::<colortype::RGB32Float>(1, 1, &[0.25, 9.0, 3.0]).unwrap();
+        let picture = super::super::decode(bytes.get_ref(), Path::new("a"), 1 << 22).unwrap();
+        assert_eq!(picture.samples, Samples::Floats { rgb: vec![[0.25, 9.0, 3.0]], alpha: vec![] });
+    }
+
+    #[test]
+    fn what_is_cut_short_is_refused() {
+        let mut bytes = Cursor::new(Vec::new());
+        let mut encoder = TiffEncoder::new(&mut bytes).unwrap();
+        encoder.write_image::<colortype::Gray32Float>(8, 8, &[0.5; 64]).unwrap();
+        let bytes = bytes.into_inner();
+        for length in (0..bytes.len()).step_by(7) {
+            assert!(super::super::decode(&bytes[..length], Path::new("a"), 1 << 22).is_err(), "{length}");
+        }
+    }
+}
