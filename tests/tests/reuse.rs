@@ -12,7 +12,7 @@ use halflight_core::memory::{Arena, Footprint, Line};
 use halflight_core::scene::{Material, Scene, Surface};
 use halflight_core::transport::{PathSettings, PathTracer, UNLIMITED};
 use halflight_core::{Level, Rgb};
-use halflight_tests::scenes::{SceneBuffers, cornell_box, everything};
+use halflight_tests::scenes::{SceneBuffers, cornell_box, emitter, everything};
 use halflight_tests::statistics::{agree, blocks};
 
 /// Pixels across and down: four tiles, the outer ones cut by the border.
@@ -143,8 +143,8 @@ fn bits_hang_on_neither_threads_nor_waves_nor_rounds() {
             }
             film.pixels().to_vec()
         };
-        let all = picture(2048, &[0, 6]);
-        for (wave, cuts) in [(1, [0, 6].as_slice()), (100, &[0, 1, 6]), (5000, &[0, 3, 4, 6])] {
+        let all = picture(2048, &[0, 40]);
+        for (wave, cuts) in [(1, [0, 40].as_slice()), (100, &[0, 1, 40]), (5000, &[0, 3, 33, 40])] {
             assert!(picture(wave, cuts) == all, "waves of {wave}, rounds {cuts:?}");
         }
     }
@@ -166,4 +166,99 @@ fn a_look_at_a_few_tiles_tells_whether_it_pays() {
     // What is asked for is done, and nobody looks.
     let asked = render(&scene, 4, |s| s.reuse = Some(false)).reuse;
     assert!(!asked.used && asked.pilot.is_none());
+}
+
+/// Pictures of `seeds` seeds as brightnesses, and their mean.
+fn seen(scene: &Scene, size: u32, spp: u32, seeds: u32) -> (Vec<Vec<f64>>, Vec<f64>) {
+    let one = |seed| {
+        let result = render(scene, spp, |s| {
+            (s.width, s.height, s.seed, s.reuse) = (size, size, seed, Some(true));
+            (s.caustics, s.adaptive) = (false, Some(false));
+        });
+        let pixels = result.image.pixels.iter();
+        pixels.map(|pixel| pixel.iter().map(|v| f64::from(*v)).sum::<f64>() / 3.0).collect()
+    };
+    let pictures: Vec<Vec<f64>> = (0..seeds).map(one).collect();
+    let mean = |i: usize| pictures.iter().map(|picture| picture[i]).sum::<f64>() / f64::from(seeds);
+    let mean = (0..pictures[0].len()).map(mean).collect();
+    (pictures, mean)
+}
+
+/// The pixels of each block of 8 × 8.
+fn blocks_of(size: u32) -> impl Iterator<Item = [usize; 64]> {
+    let (across, width) = (size as usize / 8, size as usize);
+    (0..across * across).map(move |block| {
+        let corner = block / across * 8 * width + block % across * 8;
+        core::array::from_fn(|i| corner + i / 8 * width + i % 8)
+    })
+}
+
+#[test]
+fn no_lattice_shows() {
+    let buffers = cornell_box();
+    let (size, seeds) = (64, 8);
+    // The first circles alone, and two rounds of them.
+    for spp in [8, 64] {
+        let (pictures, mean) = seen(&buffers.scene(), size, spp, seeds);
+        for side in [2, 4] {
+            // The variance between the means of the sublattices of a block over that of independent pixels.
+            let (mut ratios, mut count, parts) = (0.0, 0, side * side);
+            for block in blocks_of(size) {
+                let level = block.iter().map(|i| mean[*i]).sum::<f64>() / 64.0;
+                let spread = block.iter().map(|i| (mean[*i] - level).powi(2)).sum::<f64>() / 64.0;
+                if spread.sqrt() > 0.3 * level {
+                    continue;
+                }
+                let (mut between, mut alone) = (0.0, 0.0);
+                for picture in &pictures {
+                    let mut sums = vec![0.0; parts];
+                    for (k, i) in block.iter().enumerate() {
+                        let error = picture[*i] - mean[*i];
+                        sums[k / 8 % side * side + k % side] += error;
+                        alone += error * error / 64.0;
+                    }
+                    let all = sums.iter().sum::<f64>() / parts as f64;
+                    let scatter = sums.iter().map(|sum| (sum - all).powi(2)).sum::<f64>();
+                    // Of sums of 64 / parts pixels.
+                    between += scatter / (parts - 1) as f64 / (64 / parts) as f64;
+                }
+                ratios += between / alone;
+                count += 1;
+            }
+            let ratio = ratios / f64::from(count);
+            // Every other pixel of a block: 12 for 2 x 2, 2.7 for 4 x 4. 400 and more degrees of freedom: ± 0.07.
+            assert!(count >= 16 && ratio < 1.3, "{spp} samples, {side} x {side}: {ratio}, {count} blocks");
+        }
+    }
+}
+
+#[test]
+fn flashes_stay_with_their_pixels() {
+    // A mirror shows a small bright lamp to few paths.
+    let mut buffers = cornell_box();
+    let surface = Surface::Mirror { reflectance: Rgb::splat(0.9).into() };
+    let mirror = buffers.material(Material { surface, ..Material::GREY });
+    buffers.cuboid(Vec3::new(0.35, 0.32, 0.35), Vec3::new(0.65, 0.35, 0.65), false, mirror);
+    let lamp = buffers.material(emitter(0.0, 500.0));
+    buffers.square(Vec3::new(0.5, 0.9, 0.5), Vec3::NEG_Y, 0.02, lamp);
+    let (size, spp) = (64, 16);
+    let (pictures, mean) = seen(&buffers.scene(), size, spp, 8);
+    let level = mean.iter().sum::<f64>() / mean.len() as f64;
+    let (mut ratios, mut flashes) = (Vec::new(), 0);
+    for picture in &pictures {
+        for block in blocks_of(size) {
+            let excess = block.map(|i| picture[i] - mean[i]);
+            let most = excess.iter().copied().fold(0.0, f64::max);
+            // Light of a sample that is far more than what is shared of it.
+            if most > 16.0 * level {
+                let all: f64 = excess.iter().filter(|e| **e > 0.02 * most).sum();
+                ratios.push(all / most);
+                flashes += 1;
+            }
+        }
+    }
+    ratios.sort_by(f64::total_cmp);
+    assert!(flashes >= 4, "{flashes}");
+    // In a circle of sixteen: 16.
+    assert!(ratios[flashes / 2] < 3.0, "{ratios:?}");
 }

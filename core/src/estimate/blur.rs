@@ -8,8 +8,9 @@
 
 use super::audit::BiasEstimate;
 use super::metric::DARK;
+use super::tile::{BLOCK, BLOCKS};
 use crate::Rgb;
-use crate::film::{GROUP, GROUPS, PIXELS_PER_TILE, Pixel};
+use crate::film::{PIXELS_PER_TILE, Pixel};
 
 /// What is not known of blur, as a share of it: finer discs blur as well, at an edge more than is reckoned.
 const UNSURE: f64 = 0.25;
@@ -28,7 +29,7 @@ impl TileBlur {
     pub fn of(pixels: &[Pixel], mean: f64) -> Self {
         let mut sums = Self::default();
         // Of 4 × 4 neighbours along the Z-curve, which share photons.
-        let mut blocks = [0.0; GROUPS];
+        let mut blocks = [0.0; BLOCKS];
         for (i, pixel) in pixels.iter().enumerate().take(PIXELS_PER_TILE) {
             if pixel.even.count() == 0 || pixel.odd.count() == 0 {
                 continue;
@@ -49,7 +50,7 @@ impl TileBlur {
             };
             let weight = 0.5 * (over_square(a) + over_square(b));
             sums.squared += a * b * weight;
-            blocks[i / GROUP] += 0.5 * (a * a - b * b) * weight;
+            blocks[i / BLOCK] += 0.5 * (a * a - b * b) * weight;
         }
         for block in blocks {
             sums.squares += block * block;

@@ -19,8 +19,8 @@
 //! The price: about as much time as a tenth of a sample for each pixel.
 
 use super::TileError;
-use super::tile::Parts;
-use crate::film::GROUP;
+use super::tile::{BLOCK, Parts};
+use crate::film::{CIRCLE, GROUP};
 use libm::{exp, fmax, fmin, hypot, log, sqrt};
 
 /// An estimate of the relMSE with the interval that holds it with 95 % confidence, as far as one picture can
@@ -113,8 +113,9 @@ impl ErrorEstimate {
 /// By how much errors that the pixels of a group share, or those of a block, make the sum of products of both halves' errors
 /// vary more.
 fn shared(sum: &TileError) -> f64 {
-    let more = |parts| by_parts(sum, parts, GROUP as f64);
-    1.0 + more(sum.groups) + more(sum.blocks)
+    // A pixel shares each sample with half of its group: ρ² of the pairs that share is four times that of the mean ρ.
+    const CIRCLES: f64 = (GROUP - 1) as f64 / (CIRCLE - 1) as f64;
+    1.0 + CIRCLES * by_parts(sum, sum.groups, GROUP as f64) + by_parts(sum, sum.blocks, BLOCK as f64)
 }
 
 /// What parts of so many pixels add to it. With the correlation ρ of each two of them, from the squares of sums over parts and of

@@ -3,8 +3,14 @@
 use super::metric::DARK;
 use super::seen::{Seen, brightness, raster};
 use super::shrinkage::{Around, Likely, Pair, Shrinkage};
-use crate::film::{GROUP, GROUPS, PIXELS_PER_TILE, Pixel, Tile};
+use crate::film::{GROUPS, PIXELS_PER_TILE, Pixel, Tile};
 use glam::Vec4;
+
+/// Pixels of a block, 4 × 4 neighbours along the Z-curve, which may share photons.
+pub(super) const BLOCK: usize = 16;
+
+/// Blocks of a tile.
+pub(super) const BLOCKS: usize = PIXELS_PER_TILE / BLOCK;
 
 /// The light of a tile: over all tiles it gives the m of relMSE.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -103,7 +109,7 @@ impl TileError {
         let scale = (1.0 / mean) as f32;
         let seen = Seen::new(pixels, scale);
         let mut sums = Self::default();
-        let [mut groups, mut blocks] = [[[0.0; 2]; GROUPS]; 2];
+        let (mut groups, mut blocks) = ([[0.0; 2]; GROUPS], [[0.0; 2]; BLOCKS]);
         for (i, pixel) in pixels.iter().enumerate().take(PIXELS_PER_TILE) {
             let place = raster(i);
             let Some(quarters @ [a1, a2, b1, b2]) = seen.quarters[place] else { continue };
@@ -131,7 +137,7 @@ impl TileError {
             let difference = total(a1 + a2 - b1 - b2) * libm::sqrt(total(by_both));
             sums.difference += difference;
             sums.differences += difference * difference;
-            for part in [&mut groups[Tile::group(i)], &mut blocks[i / GROUP]] {
+            for part in [&mut groups[Tile::group(i)], &mut blocks[i / BLOCK]] {
                 part[0] += difference;
                 part[1] += variance;
             }

@@ -1,26 +1,70 @@
-//! Which samples of a tile are taken: of its groups, the smallest parts of a picture that can have numbers of their own.
+//! Which samples of a tile are taken: of its groups, the smallest parts of a picture that can have numbers of their own; and
+//! which pixels of a group share what their paths find.
 
 use super::tile::{PIXELS_PER_TILE, Tile};
+use crate::sampling::mix;
 use core::ops::Range;
 
-/// Pixels of a group, whose paths may share what they find: every other pixel, across and down, of a block of 8 × 8.
-/// Neighbours belong to different groups, so that the errors that a group has in common do not show as squares.
-pub const GROUP: usize = 16;
+/// Pixels of a group: two of each 2 × 2 of a block of 8 × 8, drawn by lot.
+pub const GROUP: usize = 32;
 
 /// Groups of a tile.
 pub const GROUPS: usize = PIXELS_PER_TILE / GROUP;
+
+/// Pixels of a circle, whose paths share what they find: half of a group, one of each 2 × 2. Which ones is drawn by lot for
+/// each circle, and again whenever the number of samples has doubled, so that no pattern shows.
+pub const CIRCLE: usize = GROUP / 2;
+
+/// Circles of a tile.
+pub const CIRCLES: usize = PIXELS_PER_TILE / CIRCLE;
+
+/// Pixels of a block, of groups of its own.
+const BLOCK: usize = 64;
+
+/// Groups of a block.
+const IN_BLOCK: usize = BLOCK / GROUP;
+
+/// Samples of each half that the first circles last: fewer would break up the nets of their pixels.
+const FIRST: u32 = 16;
+
+/// The pixels of each group in their order along the Z-curve, and the group of each pixel.
+const LOTS: ([[u8; GROUP]; GROUPS], [u8; PIXELS_PER_TILE]) = {
+    let (mut members, mut groups) = ([[0; GROUP]; GROUPS], [0; PIXELS_PER_TILE]);
+    let mut quad = 0;
+    while quad < PIXELS_PER_TILE / 4 {
+        // The pixel that goes with the first, and which group these two belong to.
+        let lot = mix(quad as u64 + 1) >> 8;
+        let (partner, first) = (1 + (lot >> 1) % 3, lot & 1);
+        let (mut i, mut counts) = (0, [0, 0]);
+        while i < 4 {
+            let half = if i == 0 || i == partner { first } else { 1 - first } as usize;
+            let (pixel, group) = (4 * quad + i as usize, quad / (BLOCK / 4) * IN_BLOCK + half);
+            groups[pixel] = group as u8;
+            members[group][quad % (BLOCK / 4) * 2 + counts[half]] = pixel as u8;
+            counts[half] += 1;
+            i += 1;
+        }
+        quad += 1;
+    }
+    (members, groups)
+};
 
 impl Tile {
     /// The group of the `i`th pixel.
     #[inline]
     pub const fn group(i: usize) -> usize {
-        i / 64 * 4 + i % 4
+        LOTS.1[i % PIXELS_PER_TILE] as usize
     }
 
-    /// Which pixel of the tile is the one with number `member` of a group.
+    /// The pixels of a circle that take `sample` together, in their order along the Z-curve; `seed` is that of the picture.
     #[inline]
-    pub const fn member(group: usize, member: usize) -> usize {
-        group / 4 * 64 + member * 4 + group % 4
+    pub fn circle(&self, circle: usize, seed: u32, sample: u32) -> [usize; CIRCLE] {
+        let (group, half) = (circle / 2 % GROUPS, circle % 2);
+        let round = u32::BITS - (sample >> 1).checked_div(FIRST).unwrap_or_default().leading_zeros();
+        let [x, y] = self.corner();
+        let place = u64::from(seed) << 32 | u64::from(x ^ y.rotate_left(16));
+        let lots = mix(mix(place) ^ (u64::from(round) << 8 | group as u64));
+        core::array::from_fn(|i| LOTS.0[group][2 * i + (lots >> i & 1) as usize ^ half] as usize)
     }
 }
 
@@ -68,11 +112,34 @@ mod tests {
     use super::*;
 
     #[test]
-    fn groups_cover_a_tile() {
-        for i in 0..PIXELS_PER_TILE {
-            let group = Tile::group(i);
-            assert_eq!((0..GROUP).filter(|member| Tile::member(group, *member) == i).count(), 1);
+    fn circles_cover_a_tile_and_stay_in_their_group() {
+        let tile = Tile::new(64, 64, 5);
+        for sample in [0, 31, 32, 1000, u32::MAX] {
+            let mut seen = [0; PIXELS_PER_TILE];
+            for circle in 0..CIRCLES {
+                let members = tile.circle(circle, 7, sample);
+                assert!(members.is_sorted());
+                // One of each 2 × 2 of a block.
+                assert!(members.iter().enumerate().all(|(i, member)| member / 4 % 16 == i));
+                for member in members {
+                    seen[member] += 1;
+                    assert_eq!(Tile::group(member), circle / 2);
+                }
+            }
+            assert_eq!(seen, [1; PIXELS_PER_TILE]);
         }
+    }
+
+    #[test]
+    fn circles_change_when_samples_have_doubled_and_from_tile_to_tile() {
+        let circles = |task, sample| -> [_; CIRCLES] {
+            core::array::from_fn(|i| Tile::new(64, 64, task).circle(i, 0, sample))
+        };
+        let first = circles(0, 0);
+        assert_eq!(circles(0, 2 * FIRST - 1), first);
+        let later = [2, 4, 8, 16].map(|n| circles(0, n * FIRST));
+        assert!(later.iter().all(|later| *later != first) && later[0] != later[1]);
+        assert_ne!(circles(1, 0), first);
     }
 
     #[test]
@@ -80,7 +147,7 @@ mod tests {
         let mut samples = Samples::from(4..20);
         samples.to[3] = 7;
         samples.from[5] = 30;
-        assert_eq!(samples.count(), 14 * 16 + 3);
+        assert_eq!(samples.count(), 6 * 16 + 3);
         let (mut parts, mut sum) = (4, 0);
         while samples.count() > 0 {
             let first = samples.first(parts);
@@ -88,6 +155,6 @@ mod tests {
             samples.from = first.ends();
             parts -= 1;
         }
-        assert_eq!((parts, sum), (0, 14 * 16 + 3));
+        assert_eq!((parts, sum), (0, 6 * 16 + 3));
     }
 }

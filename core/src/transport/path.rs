@@ -8,7 +8,7 @@
 //! 3. Shadow rays are traced after all vertices of the wave are shaded, or as many as there is room for; light is added to
 //!    the path then.
 //! 4. Code for what the scene does not have is not compiled in ([`Features`]).
-//! 5. Where that pays, pixels of a group share what their paths find (`reuse.rs`).
+//! 5. Where that pays, pixels of a circle share what their paths find (`reuse.rs`).
 //! 6. Where an irradiance cache knows the indirect light of a diffuse point, the path need not find it (`cached.rs`), or a
 //!    map of photons does one bounce later, and may ask several points of lights; nor where photons do (`density.rs`, `maps.rs`).
 //! 7. Pixels at the border of a lamp look at it with rays of their own (`outline.rs`).
@@ -17,7 +17,7 @@
 //! 10. Where all else is quiet, pixels that see an edge have several paths for each of the first samples (`edges.rs`).
 //!
 //! The price: about 400 bytes for each path of a wave. What a pixel sees depends on (seed, sample) and the pixels of
-//! its group only, no wave cuts a group that shares, and samples are summed in their order: the picture has the same bits for
+//! its circle only, no wave cuts a circle, and samples are summed in their order: the picture has the same bits for
 //! any size of wave and any distribution of tasks.
 
 use super::arrivals::{Arrivals, TO_ENVIRONMENT};
@@ -88,6 +88,8 @@ pub struct PathTracer<'a, F> {
     /// Tile by tile, or none.
     pub(super) edges: &'a [PixelSet],
     pub(super) images: Images<'a>,
+    /// Light that is not all shared, for each sample; see `reuse.rs`.
+    pub(super) flash: f32,
     features: PhantomData<F>,
 }
 
@@ -120,6 +122,7 @@ impl<'a, F: Features> PathTracer<'a, F> {
             asked: 1,
             edges: &[],
             images: Images::default(),
+            flash: f32::INFINITY,
             features: PhantomData,
         }
     }

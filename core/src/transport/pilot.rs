@@ -137,7 +137,7 @@ impl<F: Features> PathTracer<'_, F> {
         wave: usize,
         scratch: &mut Arena,
     ) -> Result<Pilot, OutOfMemory> {
-        let sharing = self.with_reuse(true);
+        let sharing = self.with_reuse(true).with_flashes(mean);
         let connection = if self.has_cutouts { CONNECTION_THROUGH_CUTOUTS } else { CONNECTION };
         let mut arena = scratch.scratch();
         let mut wave = Wave::new(wave, &mut arena)?;

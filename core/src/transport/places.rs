@@ -1,6 +1,6 @@
 //! The samples of a tile: in which order they are taken, how their paths begin, and what becomes of their light.
 //!
-//! Layer after layer, one sample of each pixel that is to have any more. Where pixels share their paths, those of a group
+//! Layer after layer, one sample of each pixel that is to have any more. Where pixels share their paths, those of a circle
 //! stay together; else all go along the Z-curve, so that neighbours ask caches together. A pixel that sees an edge has
 //! [`PER_EDGE`] paths for each of its first samples: it is sampled as if it had so many more, taken together.
 
@@ -13,7 +13,7 @@ use super::reuse::Exchange;
 use super::wave::{Path, Share, Wave};
 use crate::Rgb;
 use crate::bsdf::Features;
-use crate::film::{GROUP, GROUPS, PIXELS_PER_TILE, Pixel, PixelSet, Samples, Tile};
+use crate::film::{CIRCLE, CIRCLES, GROUP, PIXELS_PER_TILE, Pixel, PixelSet, Samples, Tile};
 use crate::geometry::{MISS, Ray};
 use crate::memory::{Arena, OutOfMemory};
 use crate::sampling::Sampler;
@@ -23,7 +23,7 @@ use core::ops::Range;
 pub(super) struct Places {
     tile: Tile,
     left: Samples,
-    /// The next group of a layer; where nothing is shared, the next pixel, and how many layers are done.
+    /// The next circle of a layer; where nothing is shared, the next pixel, and how many layers are done.
     next: usize,
     layer: u32,
     /// Pixels whose paths leave the lamp that they see to others.
@@ -38,16 +38,18 @@ impl Places {
         Self { tile, left: samples, next: 0, layer: 0, outlined: none, edges: none }
     }
 
-    /// The next group, and which sample of its pixels.
-    fn next_group(&mut self) -> Option<(usize, u32)> {
-        for _ in 0..GROUPS {
-            let index = self.next;
-            self.next = (index + 1) % GROUPS;
-            let (next, end) = (self.left.from.get_mut(index)?, *self.left.to.get(index)?);
+    /// The next circle, and which sample of its pixels.
+    fn next_circle(&mut self) -> Option<(usize, u32)> {
+        for _ in 0..CIRCLES {
+            let circle = self.next;
+            self.next = (circle + 1) % CIRCLES;
+            let group = circle / (CIRCLES / self.left.from.len());
+            let (next, end) = (self.left.from.get_mut(group)?, *self.left.to.get(group)?);
             if *next < end {
                 let sample = *next;
-                *next += 1;
-                return Some((index, sample));
+                // Those of a group take their samples one after the other.
+                *next += (circle % (GROUP / CIRCLE) == GROUP / CIRCLE - 1) as u32;
+                return Some((circle, sample));
             }
         }
         None
@@ -161,17 +163,17 @@ impl<F: Features> PathTracer<'_, F> {
         }
     }
 
-    /// Fills the wave with camera rays; returns how many. Groups that share stay together, and so do the paths of a sample.
+    /// Fills the wave with camera rays; returns how many. Circles stay together, and so do the paths of a sample.
     pub(super) fn start(&self, places: &mut Places, wave: &mut Wave) -> usize {
         let mut count = 0;
         if self.settings.reuse {
-            while count + GROUP <= wave.paths.len()
-                && let Some((group, sample)) = places.next_group()
+            while count + CIRCLE <= wave.paths.len()
+                && let Some((circle, sample)) = places.next_circle()
             {
-                // Another number for each group that a wave can hold.
-                let exchange = Exchange::new(sample.wrapping_mul(GROUPS as u32) + group as u32);
-                for member in 0..GROUP {
-                    self.begin(places, Tile::member(group, member), sample, exchange, wave, &mut count);
+                // Another number for each circle that a wave can hold.
+                let exchange = Exchange::new(sample.wrapping_mul(CIRCLES as u32) + circle as u32);
+                for place in places.tile.circle(circle, self.settings.seed, sample) {
+                    self.begin(places, place, sample, exchange, wave, &mut count);
                 }
             }
             return count;

@@ -2,7 +2,7 @@
 //! re-using paths", 2002).
 //!
 //! Path j starts from a diffuse point x_j in its pixel and meets a diffuse point y_j, which reflects L_j. From
-//! every x_i of the group y_j could have been met as well. The balance heuristic over all of them gives pixel i
+//! every x_i of the circle y_j could have been met as well. The balance heuristic over all of them gives pixel i
 //! a share w_ij of what path j found:
 //!
 //!   w_ij = V_ij g_ij / Σ_k V_kj g_kj,    g_kj = cos θ_k cos θ_y / |x_k - y_j|²
@@ -10,6 +10,9 @@
 //! with V the visibility between the two. The shares of one y_j add up to one: nothing is lost and nothing is
 //! counted twice, whatever V and g are, so the picture stays right in the mean. The price is one shadow ray for
 //! each pair, and errors that neighbours have in common.
+//!
+//! Light that would show in the picture wherever it is shared, a flash, is shared up to a limit, which grows with the number
+//! of the sample; the rest stays with the path that found it. The limit is of the light of y, the same for all paths.
 //!
 //! Where y has a coat, what its diffuse part sends back is shared, times T(to x_i) / T(to x_j), the shares that pass the
 //! coat; what the coat mirrors belongs to path j alone.
@@ -21,7 +24,7 @@ use super::wave::{Path, Wave};
 use crate::Rgb;
 use crate::bsdf::{Cover, Features};
 use crate::bvh::Coherence;
-use crate::film::GROUP;
+use crate::film::CIRCLE;
 use crate::geometry::Ray;
 use crate::scene::SurfacePoint;
 use bytemuck::{Pod, Zeroable};
@@ -30,6 +33,13 @@ use glam::Vec3;
 /// Below this cosine of the viewer the shading normal may have been turned to him: no two viewers then see the
 /// same surface.
 const HORIZON: f32 = 2e-3;
+
+/// A flash of the `n`th sample is what brings more light than this times the mean of the picture, times n and
+/// [`BEFORE_FLASHES`]: a sixteenth of it, in the mean of n samples, is a quarter of the mean.
+const FLASH: f32 = 4.0;
+
+/// With few samples all is noise, and flashes hardly show.
+const BEFORE_FLASHES: u32 = 16;
 
 /// One end of a connection. Both normals are on the side of the other end.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
@@ -98,7 +108,7 @@ struct Coated {
     base: [f32; 3],
 }
 
-/// What a path offers to its group, and what it gets.
+/// What a path offers to its circle, and what it gets.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C)]
 pub(super) struct Exchange {
@@ -108,8 +118,8 @@ pub(super) struct Exchange {
     throughput: [f32; 3],
     /// What the path gathered before y, and its shares of all L_j.
     radiance: [f32; 3],
-    /// Which group the path belongs to.
-    group: u32,
+    /// Which circle the path belongs to.
+    circle: u32,
     /// Segments up to x: under a limit of depth only equals can share.
     segments: u16,
     /// [`ALONE`] and so on.
@@ -131,8 +141,8 @@ const LIT: u16 = 4;
 const BEHIND: u16 = 5;
 
 impl Exchange {
-    pub(super) fn new(group: u32) -> Self {
-        Self { group, ..Self::default() }
+    pub(super) fn new(circle: u32) -> Self {
+        Self { circle, ..Self::default() }
     }
 
     /// The path scatters at a diffuse `point`, its x if it has none. Whether it has become that: it must go on for
@@ -150,7 +160,7 @@ impl Exchange {
     }
 
     /// The path is about to scatter at the next surface after x. Where that is fit to be met from elsewhere, it
-    /// becomes y: the path then gathers for all its group, with throughput 1.
+    /// becomes y: the path then gathers for all its circle, with throughput 1.
     #[inline]
     pub(super) fn arrive(&mut self, point: &SurfacePoint, cover: Option<Cover>, path: &mut Path) {
         if self.stage != LEAVING {
@@ -270,25 +280,32 @@ pub(super) struct Pair {
 }
 
 impl<F: Features> PathTracer<'_, F> {
+    /// The same, where samples that are bright next to the `mean` radiance of the picture are shared in part only.
+    pub fn with_flashes(&self, mean: f32) -> Self {
+        let mut other = *self;
+        other.flash = if mean > 0.0 { FLASH * mean } else { f32::INFINITY };
+        other
+    }
+
     /// Deals out what the first `count` paths of the wave have gathered behind their y.
     pub(super) fn share(&self, wave: &mut Wave, count: usize, counters: &mut Counters) {
         for (exchange, path) in wave.exchanges.iter_mut().zip(wave.paths.iter_mut()).take(count) {
             exchange.finish(path);
         }
-        let (mut pairs, mut rays, mut group) = (0, 0, 0..0);
+        let (mut pairs, mut rays, mut circle) = (0, 0, 0..0);
         for j in 0..count {
-            if j >= group.end {
-                group = j..end_of_group(&wave.exchanges[..count], j);
+            if j >= circle.end {
+                circle = j..end_of_circle(&wave.exchanges[..count], j);
             }
             let offer = wave.exchanges[j];
             if offer.stage != OFFERING {
                 continue;
             }
-            if pairs + GROUP > wave.pairs.len() {
+            if pairs + CIRCLE > wave.pairs.len() {
                 self.deal(wave, pairs, rays, counters);
                 (pairs, rays) = (0, 0);
             }
-            for k in group.clone() {
+            for k in circle.clone() {
                 let taker = &wave.exchanges[k];
                 if taker.stage == ALONE || (self.is_limited() && taker.segments != offer.segments) {
                     continue;
@@ -328,11 +345,16 @@ impl<F: Features> PathTracer<'_, F> {
             let offer = wave.exchanges[first.offering as usize];
             let coated = offer.coated.cover != Cover::NONE;
             let here = if coated { offer.transmittance(&offer.x) } else { Rgb::ONE };
+            let base = Rgb::select(here.cmpgt(Rgb::ZERO), light / here, Rgb::ZERO);
+            let most = self.flash * (BEFORE_FLASHES + wave.paths[first.offering as usize].sample) as f32;
+            let shared = (most / base.max_element()).min(1.0);
+            if shared < 1.0 {
+                wave.exchanges[first.offering as usize].take(1.0 - shared, light);
+            }
             for pair in takers.iter().filter(|pair| pair.density > 0.0) {
                 let taker = &mut wave.exchanges[pair.taking as usize];
                 let there = if coated { offer.transmittance(&taker.x) } else { Rgb::ONE };
-                let light = Rgb::select(here.cmpgt(Rgb::ZERO), light * there / here, Rgb::ZERO);
-                taker.take(pair.density / total, light);
+                taker.take(shared * pair.density / total, base * there);
             }
         }
     }
@@ -383,8 +405,8 @@ impl<F: Features> PathTracer<'_, F> {
     }
 }
 
-/// Where the group of path `first` ends.
-fn end_of_group(exchanges: &[Exchange], first: usize) -> usize {
-    let members = |other: &&Exchange| other.group == exchanges[first].group;
+/// Where the circle of path `first` ends.
+fn end_of_circle(exchanges: &[Exchange], first: usize) -> usize {
+    let members = |other: &&Exchange| other.circle == exchanges[first].circle;
     first + exchanges[first..].iter().take_while(members).count()
 }

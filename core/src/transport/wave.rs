@@ -3,7 +3,7 @@
 use super::images::Way;
 use super::reuse::{Exchange, Pair};
 use crate::bsdf::Bsdf;
-use crate::film::GROUP;
+use crate::film::CIRCLE;
 use crate::geometry::{Hit, Ray};
 use crate::memory::{Arena, Footprint, OutOfMemory};
 use bytemuck::{Pod, Zeroable};
@@ -161,7 +161,7 @@ pub(super) struct Wave<'m> {
 impl<'m> Wave<'m> {
     /// `capacity` paths, or the fewest that can share.
     pub(super) fn footprint(capacity: usize) -> Footprint {
-        let capacity = capacity.max(GROUP);
+        let capacity = capacity.max(CIRCLE);
         Footprint::default()
             .slice::<Path>(capacity)
             .slice::<Exchange>(capacity)
@@ -174,7 +174,7 @@ impl<'m> Wave<'m> {
     }
 
     pub(super) fn new(capacity: usize, arena: &mut Arena<'m>) -> Result<Self, OutOfMemory> {
-        let capacity = capacity.max(GROUP);
+        let capacity = capacity.max(CIRCLE);
         Ok(Self {
             paths: arena.slice(capacity)?,
             exchanges: arena.slice(capacity)?,

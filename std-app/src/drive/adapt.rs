@@ -215,7 +215,7 @@ mod tests {
     /// A block in which each pixel has so much noise.
     fn block(noise: f64) -> BlockNoise {
         let of = |pixels: u32| Noise { sum: noise * f64::from(pixels), pixels };
-        BlockNoise { own: [of(16); ASKING], others: [of(48); ASKING] }
+        BlockNoise { own: [of(32); ASKING], others: [of(32); ASKING] }
     }
 
     fn even(costs: &[f64]) -> Costs {
@@ -234,10 +234,10 @@ mod tests {
         // The lower right block of the upper left tile.
         tiles[0][3] = block(100.0);
         let Spread { weights, gain } = Spread::of(&tiles, &even(&[1.0; 4]), 32);
-        let far = weights[3][12];
-        assert!(weights[0][12..].iter().all(|weight| *weight > 3.0 * far), "{weights:?}");
-        assert!([weights[3][0], weights[1][8], weights[1][0]].iter().all(|near| *near > 1.3 * far));
-        assert_eq!(weights[1][4], far);
+        let far = weights[3][6];
+        assert!(weights[0][6..].iter().all(|weight| *weight > 3.0 * far), "{weights:?}");
+        assert!([weights[3][0], weights[1][4], weights[1][0]].iter().all(|near| *near > 1.3 * far));
+        assert_eq!(weights[1][2], far);
         assert!(gain > 1.5, "{gain}");
     }
 

@@ -14,7 +14,7 @@ use crate::save::Patience;
 use halflight_core::film::{GROUPS, PIXELS_PER_TILE, Pixel, Tile};
 use std::path::Path;
 
-const KIND: Kind = Kind { magic: *b"HLFILM", version: 5, name: "film" };
+const KIND: Kind = Kind { magic: *b"HLFILM", version: 6, name: "film" };
 
 /// Writes `canvas` to `path`, whole or not at all.
 pub(super) fn write(

@@ -34,14 +34,18 @@ impl<'a, F: Features> Paths<'a, F> {
         let mut scratch = memory.take_each("paths", scratch, workers.count())?;
         let tracer = stage.paths::<F>(settings.seed);
         let (reuse, mean) = match settings.reuse {
-            Some(used) => (Reuse { used, pilot: None }, None),
+            Some(used) => {
+                let mean = if used { Some(workers.pilot_mean(&tracer, &mut scratch)?) } else { None };
+                (Reuse { used, pilot: None }, mean)
+            }
             None => {
                 let mean = workers.pilot_mean(&tracer, &mut scratch)?;
                 let pilot = workers.pilot(&tracer, mean, &mut scratch)?;
                 (Reuse { used: pilot.pays(), pilot: Some(pilot) }, Some(mean))
             }
         };
-        let (tracer, caustics) = (tracer.with_reuse(reuse.used), CausticUse::default());
+        let tracer = tracer.with_reuse(reuse.used).with_flashes(mean.unwrap_or_default());
+        let caustics = CausticUse::default();
         Ok(Self { tracer, scratch, reuse, mean, caustics })
     }
 
