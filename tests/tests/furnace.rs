@@ -16,6 +16,7 @@ const INSIDE: Camera = Camera {
     tan_half_fov: 0.7,
     lens_radius: 0.0,
     focus_distance: 1.0,
+    start: None,
 };
 
 #[test]

@@ -24,6 +24,17 @@ pub struct Camera {
     pub lens_radius: f32,
     /// Distance along `forward` of what is sharp; of no effect for a pinhole.
     pub focus_distance: f32,
+    /// Where rays start that begin very far from all surfaces; `None` at the eye.
+    pub start: Option<Start>,
+}
+
+/// A plane before everything that a far camera sees: next to it, coordinates are more precise than at the eye.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Start {
+    /// Where the middle of the picture lies on it.
+    pub anchor: Vec3,
+    /// How deep it is.
+    pub depth: f32,
 }
 
 /// Where the camera sees a point, for light that is traced towards it.
@@ -44,11 +55,16 @@ impl Camera {
     /// A pinhole at `eye` that looks at `target`, with `up` to the top. Directions that do not span a
     /// frame are replaced by the nearest ones that do.
     pub fn look_at(eye: Vec3, target: Vec3, up: Vec3, vertical_fov_degrees: f32) -> Self {
-        let forward = direction(target - eye).unwrap_or(Vec3::NEG_Z);
+        Self::towards(eye, target - eye, up, vertical_fov_degrees)
+    }
+
+    /// The same, with the direction from `eye` to the target, of whatever length.
+    pub fn towards(eye: Vec3, along: Vec3, up: Vec3, vertical_fov_degrees: f32) -> Self {
+        let forward = direction(along).unwrap_or(Vec3::NEG_Z);
         let right = direction(up)
             .and_then(|up| direction_unless_tiny(forward.cross(up)))
             .unwrap_or_else(|| forward.any_orthonormal_vector());
-        let half = (0.5 * vertical_fov_degrees).clamp(1e-3, 89.0).to_radians();
+        let half = (0.5 * vertical_fov_degrees).clamp(1e-10, 89.0).to_radians();
         Self {
             eye,
             right,
@@ -57,6 +73,7 @@ impl Camera {
             tan_half_fov: libm::tanf(half),
             lens_radius: 0.0,
             focus_distance: 1.0,
+            start: None,
         }
     }
 
@@ -67,13 +84,20 @@ impl Camera {
         let pixel = 2.0 * self.tan_half_fov / height as f32;
         let film = Vec2::new(x - 0.5 * width as f32, 0.5 * height as f32 - y) * pixel;
         let through = self.forward + film.x * self.right + film.y * self.up;
+        let start = |offset: Vec2| match self.start {
+            None => self.eye + (offset.x * self.right + offset.y * self.up),
+            Some(Start { anchor, depth }) => {
+                let place = depth * film + (1.0 - depth / self.focus_distance) * offset;
+                anchor + place.x * self.right + place.y * self.up
+            }
+        };
         if self.lens_radius > 0.0 {
             let p = self.lens_radius * concentric_disk(lens);
             let offset = p.x * self.right + p.y * self.up;
             let focus = self.focus_distance * through - offset;
-            return Ray::new(self.eye + offset, focus.normalize());
+            return Ray::new(start(p), focus.normalize());
         }
-        Ray::new(self.eye, through.normalize())
+        Ray::new(if self.start.is_some() { start(Vec2::ZERO) } else { self.eye }, through.normalize())
     }
 
     /// The inverse of [`Camera::ray`]: where `point` is seen through the point `lens` of the lens. `None`
@@ -84,7 +108,9 @@ impl Camera {
         if self.lens_radius > 0.0 {
             offset = self.lens_radius * concentric_disk(lens);
         }
-        let to_point = point - self.eye - offset.x * self.right - offset.y * self.up;
+        let (from, start) = self.start.map_or((self.eye, 0.0), |start| (start.anchor, start.depth));
+        let beside = point - from - offset.x * self.right - offset.y * self.up;
+        let to_point = if start > 0.0 { beside + start * self.forward } else { beside };
         let distance = to_point.length();
         let depth = to_point.dot(self.forward);
         if !(depth > 0.0 && distance < f32::INFINITY) {
@@ -92,7 +118,7 @@ impl Camera {
         }
         // On the plane at depth 1: what is sharp lies where the ray meets the plane of focus.
         let focus = if self.lens_radius > 0.0 { self.focus_distance } else { 1.0 };
-        let at_focus = Vec2::new(to_point.dot(self.right), to_point.dot(self.up)) / depth * focus + offset;
+        let at_focus = Vec2::new(beside.dot(self.right), beside.dot(self.up)) / depth * focus + offset;
         let film = at_focus / focus;
         let pixel = 2.0 * self.tan_half_fov / height as f32;
         let raster = Vec2::new(0.5 * width as f32 + film.x / pixel, 0.5 * height as f32 - film.y / pixel);
@@ -147,5 +173,24 @@ mod tests {
             assert!(seen.is_some_and(|s| s.raster.distance(Vec2::new(12.5, 40.25)) < 1e-3));
         }
         assert_eq!(camera.project(100, 50, Vec3::new(2.0, 4.0, 6.0), [0.5; 2]), None);
+    }
+
+    #[test]
+    fn rays_of_a_far_camera_start_on_their_way() {
+        let mut near = Camera::look_at(Vec3::new(1.0, 2.0, 3.0), Vec3::ZERO, Vec3::Z, 50.0);
+        near.focus_distance = 4.0;
+        for radius in [0.0, 0.3] {
+            near.lens_radius = radius;
+            let start = Start { anchor: near.eye + 2.5 * near.forward, depth: 2.5 };
+            let far = Camera { start: Some(start), ..near };
+            let lens = [0.8, 0.3];
+            let [a, b] = [near, far].map(|camera| camera.ray(100, 50, 12.5, 40.25, lens));
+            assert_eq!(a.direction, b.direction);
+            let between = Vec3::from(b.origin) - Vec3::from(a.origin);
+            assert!(between.normalize().distance(Vec3::from(a.direction)) < 1e-6);
+            assert!((between.dot(near.forward) - 2.5).abs() < 1e-6);
+            let seen = far.project(100, 50, a.at(7.0), lens);
+            assert!(seen.is_some_and(|s| s.raster.distance(Vec2::new(12.5, 40.25)) < 1e-3));
+        }
     }
 }

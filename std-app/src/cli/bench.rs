@@ -4,7 +4,7 @@ mod eigen;
 mod knn;
 
 use super::failure::Failure;
-use super::view::View;
+use super::view::ViewFlags;
 use super::{say, values, warn};
 use clap::{Args, Subcommand};
 use halflight::bench::REPETITIONS;
@@ -43,7 +43,7 @@ struct Rays {
     #[arg(long, value_name = "WxH", value_parser = values::size)]
     size: Option<[u32; 2]>,
     #[command(flatten)]
-    view: View,
+    view: ViewFlags,
     /// Highest instruction set to use: baseline, avx2 or avx512 [default: the processor's]
     #[arg(long, value_name = "LEVEL", value_parser = values::tier, help_heading = "How to run")]
     simd: Option<Tier>,

@@ -4,7 +4,7 @@
 use super::failure::Failure;
 use super::say;
 use super::values;
-use super::view::View;
+use super::view::ViewFlags;
 use clap::Args;
 use halflight::load::{self, LoadOptions, LoadedScene};
 use halflight::report::counts;
@@ -27,7 +27,7 @@ pub(super) struct Info {
     #[arg(long, value_name = "WxH", value_parser = values::size)]
     size: Option<[u32; 2]>,
     #[command(flatten)]
-    view: View,
+    view: ViewFlags,
     /// Print one JSON object instead of text
     #[arg(long)]
     json: bool,

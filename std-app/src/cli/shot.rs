@@ -4,7 +4,7 @@ use super::failure::Failure;
 use super::method::{self, Choice};
 use super::read_picture;
 use super::values;
-use super::view::View;
+use super::view::ViewFlags;
 use clap::{Args, ValueEnum};
 use halflight::drive::{CacheSettings, Gather, PhotonSettings, RenderError, Settings, Stop};
 use halflight::load::{LoadOptions, LoadedScene};
@@ -28,7 +28,7 @@ pub(super) struct Shot {
     #[arg(long, value_name = "FILE", help_heading = "Results")]
     reference: Option<PathBuf>,
     #[command(flatten)]
-    pub(super) view: View,
+    pub(super) view: ViewFlags,
     /// Threads [default: all that the machine runs at once]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=4096),
         help_heading = "How to run")]

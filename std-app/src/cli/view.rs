@@ -4,15 +4,13 @@
 use super::failure::Failure;
 use super::values::{self, Lens};
 use clap::Args;
-use glam::Vec3;
-use halflight::load::LoadedScene;
-use halflight_core::geometry::Bounds;
+use halflight::load::{LoadedScene, View, direction};
 use halflight_core::scene::Camera;
 
 /// Where to look from, in the units of the scene.
 #[derive(Args)]
 #[command(next_help_heading = "Camera (of the scene file, else one that frames everything)")]
-pub(super) struct View {
+pub(super) struct ViewFlags {
     /// Where the camera stands
     #[arg(long, value_name = "X,Y,Z", value_parser = values::vector, allow_hyphen_values = true)]
     eye: Option<[f64; 3]>,
@@ -30,7 +28,7 @@ pub(super) struct View {
     lens: Option<Lens>,
 }
 
-impl View {
+impl ViewFlags {
     /// The camera that looks at `scene`, in the coordinates of the core.
     pub(super) fn camera(&self, scene: &LoadedScene) -> Result<Camera, Failure> {
         let mut camera = scene.camera_or_default();
@@ -50,27 +48,32 @@ impl View {
     }
 
     fn turned(&self, old: &Camera, scene: &LoadedScene) -> Result<Camera, Failure> {
-        let eye = self.eye.map_or(old.eye, |eye| scene.transform.point(eye));
-        let target = match (self.look_at, self.eye) {
-            (Some(target), _) => scene.transform.point(target),
-            (None, Some(_)) => Bounds::around(scene.positions.iter().map(|&p| p.into())).center(),
-            (None, None) => eye + old.forward * old.focus_distance,
+        let to_user = |point| scene.transform.to_user(point);
+        let file = scene.view;
+        let eye = self.eye.unwrap_or_else(|| file.map_or_else(|| to_user(old.eye), |file| file.eye));
+        let look_at = match (self.look_at, self.eye) {
+            (Some(target), _) => target,
+            (None, Some(_)) => to_user(scene.middle()),
+            (None, None) => {
+                file.map_or_else(|| to_user(old.eye + old.forward * old.focus_distance), |file| file.look_at)
+            }
         };
-        let up = Vec3::from(self.up.unwrap_or([0.0, 1.0, 0.0]).map(|x| x as f32));
-        let along = target - eye;
-        if !along.is_finite() || along == Vec3::ZERO {
+        let up = self.up.unwrap_or([0.0, 1.0, 0.0]);
+        let Some(turned) = scene.camera_at(View { eye, look_at, up }, 1.0) else {
             return Err(Failure::new("the camera stands at the point it looks at")
                 .advice("give --eye and --look-at two different points"));
-        }
-        if along.normalize().cross(up.normalize_or_zero()).length() < PARALLEL {
+        };
+        let up = direction([0.0; 3], up).unwrap_or_default();
+        if turned.forward.as_dvec3().cross(up).length() < PARALLEL {
             return Err(Failure::new("the camera looks along its up vector")
                 .advice("give another one, as in --up 0,0,1"));
         }
-        let turned = Camera::look_at(eye, target, up, 1.0);
         let Camera { tan_half_fov, lens_radius, .. } = *old;
-        Ok(Camera { tan_half_fov, lens_radius, focus_distance: along.length(), ..turned })
+        let moved = self.eye.is_some() || self.look_at.is_some();
+        let focus_distance = if moved { turned.focus_distance } else { old.focus_distance };
+        Ok(Camera { tan_half_fov, lens_radius, focus_distance, ..turned })
     }
 }
 
 /// Sine of the angle between view and up below which the picture would turn with rounding errors.
-const PARALLEL: f32 = 1e-4;
+const PARALLEL: f64 = 1e-4;

@@ -1,11 +1,12 @@
 //! All triangles of a scene in one mesh, in the coordinates of the core: placed, centred, scaled, checked.
 //! Everything is f64 until the last step.
 
+use super::fit::Fit;
 use super::notes::Notes;
 use super::obj::Group;
+use super::split;
 use super::texcoords::{self, Texcoords};
-use super::transform::SceneTransform;
-use glam::{DMat3, DVec3};
+use glam::{DMat3, DVec2, DVec3};
 use halflight_core::scene::Triangle;
 use rayon::prelude::*;
 
@@ -25,7 +26,7 @@ impl Placement {
     /// Where the file puts it.
     pub(super) const IDENTITY: Self = Self { linear: DMat3::IDENTITY, offset: DVec3::ZERO };
 
-    fn point(&self, p: [f64; 3]) -> [f64; 3] {
+    pub(super) fn point(&self, p: [f64; 3]) -> [f64; 3] {
         if *self == Self::IDENTITY {
             return p;
         }
@@ -73,11 +74,18 @@ pub(super) fn bounds(parts: &[Placed]) -> ([f64; 3], [f64; 3]) {
 }
 
 /// Puts everything into one mesh. The order of triangles is that of `parts`.
-pub(super) fn assemble(parts: &[Placed], to_core: &SceneTransform, notes: &mut Notes) -> Geometry {
+pub(super) fn assemble(parts: &[Placed], fit: &Fit, notes: &mut Notes) -> Geometry {
     let with_normals = parts.iter().any(|part| !part.group.normals.is_empty());
     let with_texcoords = parts.iter().any(|part| !part.group.texcoords.is_empty());
-    let built: Vec<(Geometry, Repairs)> =
-        parts.par_iter().map(|part| build(part, to_core, with_normals, with_texcoords)).collect();
+    let cut = fit.is_far && {
+        let pieces = parts.par_iter().map(|part| pieces(part, fit)).sum();
+        if !split::is_affordable(pieces) {
+            notes.add(1, "very many triangles are very large: none is cut, and their shading is coarse");
+        }
+        split::is_affordable(pieces)
+    };
+    let build = |part| build(part, fit, cut, with_normals, with_texcoords);
+    let built: Vec<(Geometry, Repairs)> = parts.par_iter().map(build).collect();
     let mut all = Geometry::default();
     let vertices = built.iter().map(|(part, _)| part.positions.len()).sum();
     all.positions.reserve_exact(vertices);
@@ -99,6 +107,10 @@ pub(super) fn assemble(parts: &[Placed], to_core: &SceneTransform, notes: &mut N
     notes.add(repairs.broken_normals, "normal that is not finite is shaded flat");
     notes.add(repairs.broken_texcoords, "texture coordinate that is not finite is 0 0 now");
     notes.add(repairs.blurred_textures, texcoords::BLURRED);
+    notes.add(
+        repairs.too_far,
+        "triangle that is smaller than 1e-5 of its distance from the detail of the scene: rounding bends it",
+    );
     notes.add(repairs.against_winding, "triangle whose normals point against its winding (kept as it is)");
     all
 }
@@ -111,6 +123,7 @@ struct Repairs {
     broken_texcoords: u64,
     blurred_textures: u64,
     against_winding: u64,
+    too_far: u64,
 }
 
 impl Repairs {
@@ -121,6 +134,7 @@ impl Repairs {
         self.broken_texcoords += other.broken_texcoords;
         self.blurred_textures += other.blurred_textures;
         self.against_winding += other.against_winding;
+        self.too_far += other.too_far;
     }
 }
 
@@ -128,33 +142,49 @@ fn is_usable(p: &[f64; 3]) -> bool {
     p.iter().all(|x| x.abs() <= LARGEST)
 }
 
+/// The corners of the triangles of a part, in the coordinates of the core; not numbers where they are of no use.
+fn exact(part: &Placed, fit: &Fit) -> Vec<DVec3> {
+    let place = |&p: &[f64; 3]| {
+        let placed = part.placement.point(p);
+        DVec3::from(if is_usable(&placed) { fit.transform.point_f64(placed) } else { [f64::NAN; 3] })
+    };
+    part.group.positions.iter().map(place).collect()
+}
+
+/// How many pieces those triangles of a part become that are cut.
+fn pieces(part: &Placed, fit: &Fit) -> f64 {
+    let exact = exact(part, fit);
+    let counts = part.group.triangles.iter().map(|t| split::count(t.map(|v| exact[v as usize])));
+    counts.filter(|count| *count > 1.0).sum()
+}
+
+/// A triangle smaller than this share of its coordinates is bent by rounding.
+const BENT: f64 = 1e-5;
+
 fn build(
     part: &Placed,
-    to_core: &SceneTransform,
+    fit: &Fit,
+    cut: bool,
     with_normals: bool,
     with_texcoords: bool,
 ) -> (Geometry, Repairs) {
     let group = part.group;
     let mut repairs = Repairs::default();
-    let place = |&p: &[f64; 3]| {
-        let placed = part.placement.point(p);
-        if is_usable(&placed) { to_core.point_f64(placed) } else { [f64::NAN; 3] }
-    };
-    let exact: Vec<[f64; 3]> = group.positions.iter().map(place).collect();
-    let positions: Vec<[f32; 3]> =
-        exact.iter().map(|p| if p[0].is_nan() { [0.0; 3] } else { p.map(|x| x as f32) }).collect();
+    let exact = exact(part, fit);
+    let rounded = |p: &DVec3| if p.is_nan() { [0.0; 3] } else { p.as_vec3().to_array() };
+    let mut positions: Vec<[f32; 3]> = exact.iter().map(rounded).collect();
     let vertices = positions.len();
 
     let normal_matrix = part.placement.normal_matrix();
     let mut normal = |n: &[f64; 3]| unit_normal(normal_matrix * DVec3::from(*n), &mut repairs);
-    let normals: Vec<[f32; 3]> = match (with_normals, group.normals.is_empty()) {
+    let mut normals: Vec<[f32; 3]> = match (with_normals, group.normals.is_empty()) {
         (false, _) => Vec::new(),
         (true, true) => vec![[0.0; 3]; vertices],
         (true, false) => group.normals.iter().map(&mut normal).collect(),
     };
 
-    let placed = part.texcoords.placed(&group.texcoords, &mut repairs.broken_texcoords);
-    let texcoords: Vec<[f32; 2]> = match (with_texcoords, group.texcoords.is_empty()) {
+    let mut placed = part.texcoords.placed(&group.texcoords, &mut repairs.broken_texcoords);
+    let mut texcoords: Vec<[f32; 2]> = match (with_texcoords, group.texcoords.is_empty()) {
         (false, _) => Vec::new(),
         (true, true) => vec![[0.0; 2]; vertices],
         (true, false) => placed.iter().map(|uv| uv.map(|x| x as f32)).collect(),
@@ -165,7 +195,7 @@ fn build(
     for &[a, b, c] in &group.triangles {
         // A reflection turns the winding around; turned back, the front stays the front.
         let corners = if mirrored { [a, c, b] } else { [a, b, c] };
-        let [p, q, r] = corners.map(|v| DVec3::from(exact[v as usize]));
+        let [p, q, r] = corners.map(|v| exact[v as usize]);
         let area = (q - p).cross(r - p);
         if !area.is_finite() {
             repairs.not_finite += 1;
@@ -176,12 +206,50 @@ fn build(
                 normals.get(v as usize).is_some_and(|&n| area.dot(DVec3::from(n.map(f64::from))) < 0.0)
             };
             repairs.against_winding += u64::from(corners.iter().all(|&v| against(v)));
-            triangles.push(Triangle { vertices: corners, material: part.material });
+            if fit.is_far {
+                let (low, high) = (p.min(q).min(r), p.max(q).max(r));
+                let farthest = low.abs().max(high.abs()).max_element();
+                repairs.too_far += u64::from((high - low).max_element() < BENT * farthest);
+            }
+            let material = part.material;
+            if !(cut && split::count([p, q, r]) > 1.0) {
+                triangles.push(Triangle { vertices: corners, material });
+                continue;
+            }
+            for piece in split::pieces([p, q, r]) {
+                let first = positions.len() as u32;
+                for corner in &piece {
+                    positions.push(rounded(&corner.position));
+                    if with_normals {
+                        normals.push(normal_between(corners.map(|v| normals[v as usize]), corner.weights));
+                    }
+                    if with_texcoords {
+                        let ends = corners.map(|v| placed.get(v as usize).copied().unwrap_or_default());
+                        let between: DVec2 = (0..3).map(|i| corner.weights[i] * DVec2::from(ends[i])).sum();
+                        texcoords.push(between.as_vec2().to_array());
+                        if !placed.is_empty() {
+                            placed.push(between.into());
+                        }
+                    }
+                }
+                let fan = (1..piece.len() as u32 - 1).map(|i| [first, first + i, first + i + 1]);
+                triangles.extend(fan.map(|vertices| Triangle { vertices, material }));
+            }
         }
     }
     let mut geometry = Geometry { positions, normals, texcoords, triangles };
     repairs.blurred_textures = texcoords::take_whole_numbers_off(&part.texcoords, &placed, &mut geometry);
     (geometry, repairs)
+}
+
+/// The unit normal between three, or zero where one of them is.
+fn normal_between(normals: [[f32; 3]; 3], weights: DVec3) -> [f32; 3] {
+    let ends = normals.map(|n| DVec3::from(n.map(f64::from)));
+    if ends.contains(&DVec3::ZERO) {
+        return [0.0; 3];
+    }
+    let between: DVec3 = (0..3).map(|i| weights[i] * ends[i]).sum();
+    between.normalize_or_zero().as_vec3().into()
 }
 
 /// The unit normal, or zero (flat) where there is none.
@@ -211,9 +279,8 @@ mod tests {
 
     fn all(group: &Group, placement: Placement) -> (Geometry, Vec<String>) {
         let parts = [placed(group, placement)];
-        let (min, max) = bounds(&parts);
         let mut notes = Notes::default();
-        (assemble(&parts, &SceneTransform::fitting(min, max), &mut notes), notes.sentences())
+        (assemble(&parts, &Fit::of(&parts), &mut notes), notes.sentences())
     }
 
     #[test]

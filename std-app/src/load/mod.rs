@@ -9,6 +9,7 @@
 mod doubled;
 mod error;
 mod files;
+mod fit;
 mod geometry;
 mod illum;
 mod library;
@@ -22,6 +23,7 @@ mod relief;
 mod scene;
 pub mod scene_file;
 mod settings;
+mod split;
 mod surface;
 mod texcoords;
 mod text;
@@ -34,10 +36,10 @@ pub use error::LoadError;
 pub use map::{Map, MapOptions};
 pub use name::Name;
 pub use notes::Notes;
-pub use scene::{LoadedScene, SceneViews};
+pub use scene::{LoadedScene, SceneViews, View};
 pub use settings::RenderSettings;
 pub use texture_set::TextureSet;
-pub use transform::SceneTransform;
+pub use transform::{SceneTransform, direction};
 
 use crate::memory::{self, Budget, Shortage};
 use files::Lookup;
@@ -272,9 +274,8 @@ impl SceneBuilder {
         }
         count_vertices(path, parts.iter().map(|part| part.group.positions.len()).sum())?;
         self.budget.take(weight::of_scene(&parts, &materials)).map_err(|why| too_large(path, &why))?;
-        let (min, max) = geometry::bounds(&parts);
-        let transform = SceneTransform::fitting(min, max);
-        let mut geometry = geometry::assemble(&parts, &transform, notes);
+        let fit = fit::Fit::of(&parts);
+        let mut geometry = geometry::assemble(&parts, &fit, notes);
         count_vertices(path, geometry.positions.len())?;
         let names: Vec<String> = self.materials.iter().map(|mtl| mtl.name.to_string()).collect();
         doubled::leave_out(&mut geometry, &materials, &names, notes);
@@ -290,8 +291,9 @@ impl SceneBuilder {
             lights: Vec::new(),
             environment,
             camera: None,
+            view: None,
             settings: RenderSettings::default(),
-            transform,
+            transform: fit.transform,
             files: self.lookup.into_files().into_iter().chain([path.into()]).collect(),
             repairs: self.notes.sentences(),
         })

@@ -2,7 +2,9 @@
 
 use super::settings::RenderSettings;
 use super::texture_set::TextureSet;
-use super::transform::SceneTransform;
+use super::transform::{SceneTransform, direction};
+use glam::{DVec3, Vec3};
+use halflight_core::geometry::Bounds;
 use halflight_core::scene::{Camera, Environment, Material, Mesh, PointLight, Scene, Texture, Triangle};
 use std::path::PathBuf;
 
@@ -29,6 +31,8 @@ pub struct LoadedScene {
     pub environment: Option<Environment>,
     /// The camera of the scene file.
     pub camera: Option<Camera>,
+    /// Where that stands and looks.
+    pub view: Option<View>,
     /// Settings of the scene file.
     pub settings: RenderSettings,
     /// From the coordinates of the file to those of the buffers.
@@ -38,6 +42,17 @@ pub struct LoadedScene {
     pub files: Vec<PathBuf>,
     /// What was repaired or left out, a sentence for each kind.
     pub repairs: Vec<String>,
+}
+
+/// Where a camera stands and looks, in the coordinates of the files.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct View {
+    /// Where from.
+    pub eye: [f64; 3],
+    /// Where to.
+    pub look_at: [f64; 3],
+    /// Up in the picture.
+    pub up: [f64; 3],
 }
 
 /// The scene with the texture views that [`Scene`] borrows.
@@ -63,11 +78,35 @@ impl LoadedScene {
         }
     }
 
+    /// The middle of the scene in the coordinates of the core: of its bounding box, or of what is fine in it.
+    pub fn middle(&self) -> Vec3 {
+        let bounds = self.bounds();
+        if bounds.extent().max_element() > CENTRED { Vec3::ZERO } else { bounds.center() }
+    }
+
+    fn bounds(&self) -> Bounds {
+        Bounds::around(self.positions.iter().map(|&p| p.into()))
+    }
+
+    /// A pinhole that stands and looks as said in the coordinates of the files; `None` where both points are the same.
+    pub fn camera_at(&self, view: View, fov_degrees: f64) -> Option<Camera> {
+        let along = direction(view.eye, view.look_at)?;
+        let bounds = self.bounds();
+        let corners = [bounds.min, bounds.max].map(|corner| corner.as_dvec3());
+        let start = if bounds.is_empty() { None } else { self.transform.start(view.eye, along, corners) };
+        let distance = DVec3::from(view.eye).distance(view.look_at.into());
+        let camera = self.transform.camera(view.eye, view.look_at, view.up, fov_degrees);
+        Some(Camera { start, focus_distance: self.transform.length(distance) as f32, ..camera })
+    }
+
     /// The camera of the scene file, else one that frames everything.
     pub fn camera_or_default(&self) -> Camera {
         self.camera.unwrap_or_else(|| Camera::framing(&self.mesh()))
     }
 }
+
+/// A scene whose bounding box is at the origin is not longer than this.
+const CENTRED: f32 = 4.0;
 
 impl SceneViews<'_> {
     /// The scene as the core sees it, looked at by `camera`.

@@ -3,8 +3,8 @@
 use super::values::{BRIGHTEST, Colour, Degrees, Matrix, Number, Rotation};
 use super::{LoadError, Source};
 use crate::load::map::Map;
-use crate::load::transform::SceneTransform;
-use glam::{DMat3, DVec3, Mat3, Vec3};
+use crate::load::transform::{SceneTransform, direction as direction_between};
+use glam::{DMat3, Mat3};
 use halflight_core::Rgb;
 use halflight_core::scene::PointLight;
 use serde::Deserialize;
@@ -124,13 +124,12 @@ pub(super) fn light(
         Ok(rgb(channels))
     };
     let direction = |from: Option<[f64; 3]>| {
-        let direction = match (light.direction, light.look_at, from) {
-            (Some(direction), None, _) => DVec3::from(direction.map(f64::from)),
-            (None, Some(look_at), Some(from)) => DVec3::from(look_at.map(f64::from)) - DVec3::from(from),
+        let (from, to) = match (light.direction, light.look_at, from) {
+            (Some(direction), None, _) => ([0.0; 3], direction),
+            (None, Some(look_at), Some(from)) => (from, look_at),
             _ => return Err(needs(if from.is_some() { "direction` or `look_at" } else { "direction" })),
         };
-        let unit = direction.try_normalize().map(|unit| Vec3::from(unit.to_array().map(|x| x as f32)));
-        unit.ok_or_else(|| {
+        direction_between(from, to.map(f64::from)).map(|unit| unit.as_vec3()).ok_or_else(|| {
             source.error(entry.span(), "the direction of this light is zero", "give it a length")
         })
     };

@@ -18,9 +18,8 @@ use super::files::{Found, Lookup};
 use super::geometry::Placement;
 use super::map::Map;
 use super::notes::Notes;
-use super::scene::LoadedScene;
+use super::scene::{LoadedScene, View};
 use super::settings::RenderSettings;
-use super::transform::SceneTransform;
 use super::{LoadOptions, SceneBuilder, read, too_large, weight};
 use core::cell::RefCell;
 use glam::{DMat3, DVec3};
@@ -198,7 +197,9 @@ pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<LoadedScene, Lo
     let transform = loaded.transform;
     loaded.lights =
         scene.light.iter().map(|light| light::light(light, &transform, &source)).collect::<Result<_, _>>()?;
-    loaded.camera = scene.camera.as_ref().map(|camera| camera_in(camera, &transform, &source)).transpose()?;
+    if let Some(camera) = &scene.camera {
+        place_camera(camera, &mut loaded, &source)?;
+    }
     loaded.settings = scene.render;
     Ok(loaded)
 }
@@ -221,26 +222,25 @@ impl MeshEntry {
     }
 }
 
-fn camera_in(
+fn place_camera(
     entry: &Spanned<CameraEntry>,
-    transform: &SceneTransform,
+    loaded: &mut LoadedScene,
     source: &Source,
-) -> Result<Camera, LoadError> {
+) -> Result<(), LoadError> {
     const DEFAULT_FOV: f64 = 40.0;
     let camera = entry.get_ref();
-    let (eye, look_at) = (camera.eye.map(f64::from), camera.look_at.map(f64::from));
-    let distance = DVec3::from(look_at).distance(eye.into());
-    if distance == 0.0 {
-        return Err(source.error(entry.span(), "`eye` and `look_at` are the same point", "move one of them"));
-    }
     let up = camera.up.map_or([0.0, 1.0, 0.0], |up| up.map(f64::from));
+    let view = View { eye: camera.eye.map(f64::from), look_at: camera.look_at.map(f64::from), up };
     let fov = camera.fov.map_or(DEFAULT_FOV, f64::from);
-    let focus = camera.focus_distance.map_or(distance, f64::from);
-    Ok(Camera {
-        lens_radius: transform.length(f64::from(camera.lens_radius)) as f32,
-        focus_distance: transform.length(focus) as f32,
-        ..transform.camera(eye, look_at, up, fov)
-    })
+    let pinhole = loaded.camera_at(view, fov).ok_or_else(|| {
+        source.error(entry.span(), "`eye` and `look_at` are the same point", "move one of them")
+    })?;
+    let length = |user: f64| loaded.transform.length(user) as f32;
+    let focus = camera.focus_distance.map_or(pinhole.focus_distance, |focus| length(focus.into()));
+    let lens_radius = length(f64::from(camera.lens_radius));
+    loaded.camera = Some(Camera { lens_radius, focus_distance: focus, ..pinhole });
+    loaded.view = Some(view);
+    Ok(())
 }
 
 #[cfg(test)]

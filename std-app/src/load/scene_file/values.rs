@@ -1,6 +1,7 @@
 //! Values of a scene file that are checked as they are read, so that errors point at them.
 
 use crate::load::geometry::Placement;
+use crate::load::transform::direction;
 use glam::{DMat3, DVec3};
 use serde::Deserialize;
 
@@ -153,7 +154,7 @@ impl TryFrom<RotationEntry> for Rotation {
     type Error = &'static str;
 
     fn try_from(entry: RotationEntry) -> Result<Self, Self::Error> {
-        let axis = DVec3::from(entry.axis.map(f64::from)).try_normalize();
+        let axis = direction([0.0; 3], entry.axis.map(f64::from));
         Ok(Self { axis: axis.ok_or("the axis must not be zero")?, degrees: entry.degrees.0 })
     }
 }
