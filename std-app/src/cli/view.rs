@@ -31,9 +31,10 @@ pub(super) struct ViewFlags {
 impl ViewFlags {
     /// The camera that looks at `scene`, in the coordinates of the core.
     pub(super) fn camera(&self, scene: &LoadedScene) -> Result<Camera, Failure> {
-        let mut camera = scene.camera_or_default();
+        let (mut camera, mut view) = (scene.camera_or_default(), scene.view);
         if self.eye.is_some() || self.look_at.is_some() || self.up.is_some() {
-            camera = self.turned(&camera, scene)?;
+            let (turned, there) = self.turned(&camera, scene)?;
+            (camera, view) = (turned, Some(there));
         }
         if let Some(degrees) = self.fov {
             camera.tan_half_fov = (0.5 * degrees).to_radians().tan() as f32;
@@ -44,10 +45,10 @@ impl ViewFlags {
                 camera.focus_distance = scene.transform.length(distance) as f32;
             }
         }
-        Ok(camera)
+        Ok(view.map_or(camera, |view| scene.with_start(camera, view)))
     }
 
-    fn turned(&self, old: &Camera, scene: &LoadedScene) -> Result<Camera, Failure> {
+    fn turned(&self, old: &Camera, scene: &LoadedScene) -> Result<(Camera, View), Failure> {
         let to_user = |point| scene.transform.to_user(point);
         let file = scene.view;
         let eye = self.eye.unwrap_or_else(|| file.map_or_else(|| to_user(old.eye), |file| file.eye));
@@ -59,7 +60,8 @@ impl ViewFlags {
             }
         };
         let up = self.up.unwrap_or([0.0, 1.0, 0.0]);
-        let Some(turned) = scene.camera_at(View { eye, look_at, up }, 1.0) else {
+        let view = View { eye, look_at, up };
+        let Some(turned) = scene.camera_at(view, 1.0) else {
             return Err(Failure::new("the camera stands at the point it looks at")
                 .advice("give --eye and --look-at two different points"));
         };
@@ -71,7 +73,7 @@ impl ViewFlags {
         let Camera { tan_half_fov, lens_radius, .. } = *old;
         let moved = self.eye.is_some() || self.look_at.is_some();
         let focus_distance = if moved { turned.focus_distance } else { old.focus_distance };
-        Ok(Camera { tan_half_fov, lens_radius, focus_distance, ..turned })
+        Ok((Camera { tan_half_fov, lens_radius, focus_distance, ..turned }, view))
     }
 }
 

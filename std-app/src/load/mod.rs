@@ -8,6 +8,7 @@
 
 mod doubled;
 mod error;
+mod far_camera;
 mod files;
 mod fit;
 mod geometry;

@@ -1,5 +1,6 @@
 //! A loaded scene: the buffers that the core borrows, and what is known of where they came from.
 
+use super::far_camera::start;
 use super::settings::RenderSettings;
 use super::texture_set::TextureSet;
 use super::transform::{SceneTransform, direction};
@@ -78,6 +79,11 @@ impl LoadedScene {
         }
     }
 
+    /// `camera`, whose rays start before all that it sees, if it stands at `view` very far from there.
+    pub fn with_start(&self, camera: Camera, view: View) -> Camera {
+        Camera { start: start(self, &camera, view), ..camera }
+    }
+
     /// The middle of the scene in the coordinates of the core: of its bounding box, or of what is fine in it.
     pub fn middle(&self) -> Vec3 {
         let bounds = self.bounds();
@@ -90,13 +96,10 @@ impl LoadedScene {
 
     /// A pinhole that stands and looks as said in the coordinates of the files; `None` where both points are the same.
     pub fn camera_at(&self, view: View, fov_degrees: f64) -> Option<Camera> {
-        let along = direction(view.eye, view.look_at)?;
-        let bounds = self.bounds();
-        let corners = [bounds.min, bounds.max].map(|corner| corner.as_dvec3());
-        let start = if bounds.is_empty() { None } else { self.transform.start(view.eye, along, corners) };
+        direction(view.eye, view.look_at)?;
         let distance = DVec3::from(view.eye).distance(view.look_at.into());
         let camera = self.transform.camera(view.eye, view.look_at, view.up, fov_degrees);
-        Some(Camera { start, focus_distance: self.transform.length(distance) as f32, ..camera })
+        Some(Camera { focus_distance: self.transform.length(distance) as f32, ..camera })
     }
 
     /// The camera of the scene file, else one that frames everything.

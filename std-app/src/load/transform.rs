@@ -3,7 +3,6 @@
 //! a scene scaled by a power of two gives the same bits.
 
 use glam::{DVec3, Vec3};
-use halflight_core::camera::Start;
 use halflight_core::scene::Camera;
 
 /// `core = (user - offset) / 2^exponent`, in f64 until the last step.
@@ -48,21 +47,6 @@ impl SceneTransform {
         Camera::towards(self.point(eye), along.as_vec3(), up.as_vec3(), fov_degrees as f32)
     }
 
-    /// Where the rays of a camera start that stands far from everything between two corners, in the coordinates of the core,
-    /// and looks along a unit vector. `None` where that is the eye.
-    pub fn start(&self, eye: [f64; 3], along: DVec3, [low, high]: [DVec3; 2]) -> Option<Start> {
-        let eye = DVec3::from(self.point_f64(eye));
-        let size = (high - low).length();
-        if !(eye.distance(eye.clamp(low, high)) > FAR * size) {
-            return None;
-        }
-        let half = 0.5 * (high - low);
-        // Half of the size before the corner that is met first.
-        let depth = (low + half - eye).dot(along) - half.dot(along.abs()) - 0.5 * size;
-        let anchor = (eye + depth * along).as_vec3();
-        (depth > 0.0).then_some(Start { anchor, depth: depth as f32 })
-    }
-
     /// A length.
     pub fn length(&self, user: f64) -> f64 {
         user * self.factor()
@@ -90,9 +74,6 @@ pub fn direction(from: [f64; 3], to: [f64; 3]) -> Option<DVec3> {
     let along = DVec3::from(to) - DVec3::from(from);
     (along / along.abs().max_element()).try_normalize()
 }
-
-/// A camera is far where it is so many times farther from a scene than that is large.
-const FAR: f64 = 64.0;
 
 /// The exponent of two in `x`: x = m 2^e with 1 <= m < 2; 0 for zero, subnormal and infinite numbers.
 fn exponent(x: f64) -> i32 {

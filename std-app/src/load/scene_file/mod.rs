@@ -238,7 +238,8 @@ fn place_camera(
     let length = |user: f64| loaded.transform.length(user) as f32;
     let focus = camera.focus_distance.map_or(pinhole.focus_distance, |focus| length(focus.into()));
     let lens_radius = length(f64::from(camera.lens_radius));
-    loaded.camera = Some(Camera { lens_radius, focus_distance: focus, ..pinhole });
+    let camera = Camera { lens_radius, focus_distance: focus, ..pinhole };
+    loaded.camera = Some(loaded.with_start(camera, view));
     loaded.view = Some(view);
     Ok(())
 }
