@@ -225,6 +225,27 @@ pub fn metal(roughness: f32) -> Surface {
     Surface::Conductor { reflectance: Rgb::splat(0.9).into(), roughness: roughness.into() }
 }
 
+/// A diffuse surface under a coat of such roughness.
+pub fn varnish(roughness: f32) -> Surface {
+    Surface::Glossy {
+        base: Rgb::new(0.5, 0.35, 0.2).into(),
+        specular: Rgb::splat(0.04).into(),
+        roughness: roughness.into(),
+        metallic: 0.0.into(),
+        ior: Some(1.5),
+    }
+}
+
+/// The same scene with such a varnish on all that was diffuse.
+pub fn varnished(mut buffers: SceneBuffers, roughness: f32) -> SceneBuffers {
+    for material in &mut buffers.materials {
+        if matches!(material.surface, Surface::Diffuse { .. }) && !material.emits() {
+            material.surface = varnish(roughness);
+        }
+    }
+    buffers
+}
+
 /// Glass.
 pub fn glass(roughness: f32) -> Surface {
     Surface::Dielectric { ior: 1.5, tint: Rgb::ONE, roughness: roughness.into() }

@@ -8,7 +8,9 @@ use halflight_core::Rgb;
 use halflight_core::photon::Falloff;
 use halflight_core::scene::{Camera, Scene, Surface};
 use halflight_tests::render::render;
-use halflight_tests::scenes::{IN_THE_BRIGHT_ROOM, bright_and_dark, cornell_box, everything, lamp_before};
+use halflight_tests::scenes::{
+    IN_THE_BRIGHT_ROOM, bright_and_dark, cornell_box, everything, lamp_before, varnished,
+};
 use std::path::Path;
 
 fn mapped(scene: &Scene, size: u32, spp: u32, change: impl FnOnce(&mut Settings)) -> RenderResult {
@@ -73,6 +75,18 @@ fn every_kind_of_surface_and_light_has_the_light_that_the_path_tracer_finds() {
     let found = mapped(&scene, 64, 256, |_| ()).image;
     let deviation = deviation(&found, &path);
     assert!(deviation.abs() < 2.0 * BIAS, "{deviation}");
+}
+
+#[test]
+fn narrow_coats_have_the_light_that_the_path_tracer_finds() {
+    for roughness in [0.1, 0.3] {
+        let buffers = varnished(cornell_box(), roughness);
+        let scene = buffers.scene();
+        let path = render(&scene, Method::Path, 64, 512, |_| ()).image;
+        let found = mapped(&scene, 64, 256, |_| ()).image;
+        let deviation = deviation(&found, &path);
+        assert!(deviation.abs() < 2.0 * BIAS, "{roughness}: {deviation}");
+    }
 }
 
 #[test]

@@ -43,6 +43,41 @@ pub(super) trait Coat {
     }
 }
 
+/// Whether the peak of the coat outshines a diffuse surface: of GGX at normal incidence that is F / (4 π α²), here to a
+/// quarter of a white one's 1 / π.
+#[inline]
+pub(super) fn is_narrow(coat: &impl Coat) -> bool {
+    coat.alpha() * coat.alpha() < coat.reflectance(1.0).max_element()
+}
+
+/// As [`sample`], by base or coat alone: weight and density are of that one, with the probability of its choice. Whether it
+/// was the coat.
+#[inline]
+pub(super) fn sample_apart(coat: &impl Coat, wo: Vec3, u: [f32; 3]) -> Option<(BsdfSample, bool)> {
+    let transmittance_o = coat.transmittance(wo.z);
+    let is_coat = u[2] < coat.coat_probability(wo.z, transmittance_o);
+    let wi = match is_coat {
+        true => Ggx::new(coat.alpha()).sample_reflection(wo, [u[0], u[1]]),
+        false => cosine_hemisphere([u[0], u[1]]),
+    };
+    let [of_base, of_coat] = evaluate_apart(coat, wo, wi);
+    let (value, pdf) = if is_coat { of_coat } else { of_base };
+    (pdf > 0.0).then(|| (BsdfSample::reflection(wi, value / pdf, pdf), is_coat))
+}
+
+/// As [`evaluate`], of the base and of the coat, which is rough.
+#[inline]
+pub(super) fn evaluate_apart(coat: &impl Coat, wo: Vec3, wi: Vec3) -> [(Rgb, f32); 2] {
+    if !(wi.z > 0.0) {
+        return [(Rgb::ZERO, 0.0); 2];
+    }
+    let transmittance_o = coat.transmittance(wo.z);
+    let p = coat.coat_probability(wo.z, transmittance_o);
+    let of_base = (base_value(coat, wi, transmittance_o), (1.0 - p) * (wi.z * FRAC_1_PI));
+    let density = p * Ggx::new(coat.alpha()).reflection_density(wo, wo + wi);
+    [of_base, (coat_value(coat, wo, wi), density)]
+}
+
 /// See [`super::Bsdf::sample`].
 #[inline]
 pub(super) fn sample(coat: &impl Coat, wo: Vec3, u: [f32; 3]) -> Option<BsdfSample> {
@@ -104,11 +139,20 @@ fn both_lobes(coat: &impl Coat, wo: Vec3, wi: Vec3, transmittance_o: Rgb, p: f32
 /// f cos θ_i of base and rough coat together, for `wi` above the surface; T(θ_o) is known.
 #[inline]
 pub(super) fn value(coat: &impl Coat, wo: Vec3, wi: Vec3, transmittance_o: Rgb) -> Rgb {
-    let base = coat.base() * transmittance_o * coat.transmittance(wi.z) * (wi.z * FRAC_1_PI);
-    if coat.alpha() == 0.0 {
-        return base;
-    }
+    let base = base_value(coat, wi, transmittance_o);
+    if coat.alpha() == 0.0 { base } else { base + coat_value(coat, wo, wi) }
+}
+
+/// f cos θ_i of the base alone.
+#[inline]
+pub(super) fn base_value(coat: &impl Coat, wi: Vec3, transmittance_o: Rgb) -> Rgb {
+    coat.base() * transmittance_o * coat.transmittance(wi.z) * (wi.z * FRAC_1_PI)
+}
+
+/// f cos θ_i of a rough coat alone.
+#[inline]
+fn coat_value(coat: &impl Coat, wo: Vec3, wi: Vec3) -> Rgb {
     let ggx = Ggx::new(coat.alpha());
     let h = wo + wi;
-    base + coat.reflectance(half_cosine(wo, h)) * (ggx.density(h) * ggx.visibility(wo, wi) * wi.z)
+    coat.reflectance(half_cosine(wo, h)) * (ggx.density(h) * ggx.visibility(wo, wi) * wi.z)
 }

@@ -91,15 +91,19 @@ pub(crate) struct Seen<'b> {
     wo: Vec3,
     /// T(θ_o) of a coat.
     transmittance: Rgb,
+    /// By its base alone.
+    base_alone: bool,
 }
 
 impl Seen<'_> {
     /// What [`Bsdf::evaluate`] has as f(wo, wi) |cos θ_i|, to the bit.
     #[inline]
     pub(crate) fn value<F: Features>(&self, wi: Vec3) -> Rgb {
-        let Self { bsdf, wo, transmittance } = *self;
+        let Self { bsdf, wo, transmittance, base_alone } = *self;
         match bsdf {
             Bsdf::Glossy(_) | Bsdf::Plastic(_) if !(wi.z > 0.0) => Rgb::ZERO,
+            Bsdf::Glossy(b) if F::GLOSSY && base_alone => coated::base_value(b, wi, transmittance),
+            Bsdf::Plastic(b) if F::GLOSSY && base_alone => coated::base_value(b, wi, transmittance),
             Bsdf::Glossy(b) if F::GLOSSY => coated::value(b, wo, wi, transmittance),
             Bsdf::Plastic(b) if F::GLOSSY => coated::value(b, wo, wi, transmittance),
             _ => bsdf.evaluate::<F>(wo, wi).0,
@@ -149,7 +153,56 @@ impl Bsdf {
             Bsdf::Plastic(b) if F::GLOSSY => coated::Coat::transmittance(b, wo.z),
             _ => Rgb::ONE,
         };
-        Seen { bsdf: self, wo, transmittance }
+        Seen { bsdf: self, wo, transmittance, base_alone: false }
+    }
+
+    /// The same without the coat, if `base_alone`.
+    #[inline]
+    pub(crate) fn seen_apart<F: Features>(&self, wo: Vec3, base_alone: bool) -> Seen<'_> {
+        Seen { base_alone, ..self.seen::<F>(wo) }
+    }
+
+    /// As [`Bsdf::sample`] of a surface with a rough coat, by its base or its coat alone: weight and density are of that one,
+    /// with the probability of its choice. Whether it was the coat.
+    #[inline]
+    pub(crate) fn sample_apart<F: Features>(&self, wo: Vec3, u: [f32; 3]) -> Option<(BsdfSample, bool)> {
+        let wo = above_horizon(wo);
+        match self {
+            Bsdf::Glossy(b) if F::GLOSSY => coated::sample_apart(b, wo, u),
+            Bsdf::Plastic(b) if F::GLOSSY => coated::sample_apart(b, wo, u),
+            _ => None,
+        }
+    }
+
+    /// As [`Bsdf::evaluate`] of a surface with a rough coat: of its base, and of its coat.
+    #[inline]
+    pub(crate) fn evaluate_apart<F: Features>(&self, wo: Vec3, wi: Vec3) -> [(Rgb, f32); 2] {
+        let wo = above_horizon(wo);
+        match self {
+            Bsdf::Glossy(b) if F::GLOSSY => coated::evaluate_apart(b, wo, wi),
+            Bsdf::Plastic(b) if F::GLOSSY => coated::evaluate_apart(b, wo, wi),
+            _ => [(Rgb::ZERO, 0.0); 2],
+        }
+    }
+
+    /// Whether it has a coat, rough or smooth, whose peak outshines a diffuse surface.
+    #[inline]
+    pub(crate) fn has_narrow_coat(&self) -> bool {
+        match self {
+            Bsdf::Glossy(b) => coated::is_narrow(b),
+            Bsdf::Plastic(b) => coated::is_narrow(b),
+            _ => false,
+        }
+    }
+
+    /// Whether it has a coat that is not smooth.
+    #[inline]
+    pub(crate) fn has_rough_coat(&self) -> bool {
+        match self {
+            Bsdf::Glossy(b) => b.alpha() > 0.0,
+            Bsdf::Plastic(b) => b.alpha() > 0.0,
+            _ => false,
+        }
     }
 
     /// Whether every lobe is a delta lobe: to connect it to a light is in vain.

@@ -356,6 +356,11 @@ impl<'m> Lights<'m> {
         });
     }
 
+    /// Whether some are points or directional: no path meets these by chance.
+    pub(crate) fn have_deltas(&self) -> bool {
+        !self.points.is_empty() || !self.distant.is_empty()
+    }
+
     /// Whether surfaces emit.
     pub(crate) fn have_emitters(&self) -> bool {
         !self.emitters.is_empty()

@@ -12,7 +12,7 @@ pub use super::flight::PATHS;
 use super::flight::{Flight, Onward, Pile, State, Vertex, Visitor};
 use super::glimpse::Glimpse;
 use super::merge::{ChainLink, Discs, ends_chain, is_wide_enough};
-use super::shoot::ShootSettings;
+use super::shoot::{ShootSettings, is_varnished};
 use crate::bsdf::{BsdfSample, Features};
 use crate::bvh::Bvh;
 use crate::geometry::Ray;
@@ -328,12 +328,24 @@ impl<F: Features, L: FnMut(&State, Photon, Share, &mut Counters)> Visitor for We
         Some(Onward { most: if leaves { MOST } else { 1.0 }, mirrored: ends && !(leaves && self.goes_on) })
     }
 
+    /// Straight from a light no photon goes on by a rough coat: paths find that light.
+    #[inline]
+    fn is_apart(&self, state: &State, vertex: &Vertex) -> bool {
+        state.segments > 1 && is_varnished(vertex.bsdf, !self.shooter.flight.lights.have_deltas())
+    }
+
     /// Takes note of what a surface does with the densities of both ways, at the first of a path also of how the path
     /// tracer finds its light.
     #[inline]
-    fn leave(&self, state: &mut State, vertex: &Vertex, from: Vec3, sample: &BsdfSample) {
+    fn leave(
+        &self,
+        state: &mut State,
+        vertex: &Vertex,
+        from: Vec3,
+        (sample, is_narrow): (&BsdfSample, bool),
+    ) {
         state.mirrored = vertex.bsdf.is_delta().into();
-        if ends_chain(vertex.bsdf) && !sample.delta {
+        if ends_chain(vertex.bsdf) && !is_narrow {
             if state.others != SCATTERED {
                 // What goes on is what was left.
                 let kept = self.share(state, vertex).kept(vertex).unwrap_or(0.0);
@@ -345,7 +357,9 @@ impl<F: Features, L: FnMut(&State, Photon, Share, &mut Counters)> Visitor for We
             return;
         }
         // The way back, as the path tracer goes it.
-        let there = ChainLink { point: vertex.point, bsdf: vertex.bsdf, near: from, far: sample.direction };
+        let Vertex { point, bsdf, .. } = *vertex;
+        let coat_alone = is_narrow && !sample.delta;
+        let there = ChainLink { point, bsdf, near: from, far: sample.direction, coat_alone };
         let back = if sample.delta { 1.0 } else { there.density::<F>(self.shooter.flight.scene) };
         if state.segments == 1 {
             let back = (!sample.delta).then_some(back);

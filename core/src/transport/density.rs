@@ -1,7 +1,7 @@
 //! Paths that end where photons lie: reflected light by the density of photons, direct light by shadow rays.
 
 use super::merge::Discs;
-use super::shoot::holds_photons;
+use super::shoot::{gathers_photons, is_varnished};
 use crate::bsdf::{Bsdf, Features};
 use crate::bvh::Bvh;
 use crate::bvh::survey::{Site, Survey};
@@ -75,12 +75,11 @@ impl<'a> PhotonLight<'a> {
     pub(super) fn reflected<F: Features>(
         &self,
         (bvh, level): (&Bvh, Level),
-        point: &SurfacePoint,
-        bsdf: &Bsdf,
+        (point, bsdf, apart): (&SurfacePoint, &Bsdf, bool),
         (wo, travelled): (Vec3, f32),
         turns: f32,
     ) -> Option<Gathered> {
-        if !holds_photons(bsdf) {
+        if !gathers_photons(bsdf, apart) {
             return None;
         }
         let disc = Disc {
@@ -94,7 +93,7 @@ impl<'a> PhotonLight<'a> {
             return Some(Gathered::default());
         }
         let light = Light { map: self.map, is_caustic: self.is_sparse, enough: self.enough };
-        Some(reflected::<F>(light, (bvh, level), (&disc, density), (point, bsdf), wo, turns))
+        Some(reflected::<F>(light, (bvh, level), (&disc, density), (point, bsdf, apart), wo, turns))
     }
 }
 
@@ -125,13 +124,13 @@ pub(super) struct Light<'a> {
 }
 
 /// What `point` reflects to `wo` of the light of the photons on `disc`, as far as it is seen from there; `all` is the
-/// density of all of them, where it is known.
+/// density of all of them, where it is known. By its base alone where it `is_varnished`.
 #[inline]
 pub(super) fn reflected<F: Features>(
     Light { map, is_caustic, enough }: Light,
     (bvh, level): (&Bvh, Level),
     (disc, all): (&Disc, Option<Density>),
-    (point, bsdf): (&SurfacePoint, &Bsdf),
+    (point, bsdf, apart): (&SurfacePoint, &Bsdf, bool),
     wo: Vec3,
     turns: f32,
 ) -> Gathered {
@@ -145,7 +144,7 @@ pub(super) fn reflected<F: Features>(
             _ => Gathered::of(map.gather_within(level, disc, &fence, &Uniform(response)), enough, Rgb::ONE),
         };
     }
-    let seen = bsdf.seen::<F>(wo);
+    let seen = bsdf.seen_apart::<F>(wo, is_varnished(bsdf, apart));
     // A photon's power has met the triangle: the cosine is in it already, and that of the triangle's normal.
     let response = |from: Vec3| {
         let wi = point.frame.to_local(from);

@@ -102,9 +102,16 @@ pub(super) trait Visitor {
     /// A path has met a surface. `None` ends it.
     fn meet(&mut self, state: &State, vertex: &Vertex, counters: &mut Counters) -> Option<Onward>;
 
-    /// It is about to leave it by `sample`, having come from `from`, local.
+    /// Whether it goes on by the base or the coat of `vertex` alone.
     #[inline]
-    fn leave(&self, _state: &mut State, _vertex: &Vertex, _from: Vec3, _sample: &BsdfSample) {}
+    fn is_apart(&self, _state: &State, _vertex: &Vertex) -> bool {
+        false
+    }
+
+    /// It is about to leave it by `sample`, having come from `from`, local. That `is_narrow` where it is mirrored, or by a coat
+    /// alone.
+    #[inline]
+    fn leave(&self, _state: &mut State, _vertex: &Vertex, _from: Vec3, _sample: (&BsdfSample, bool)) {}
 }
 
 /// Where the numbers of paths come from.
@@ -266,13 +273,16 @@ impl<F: Features> Flight<'_, F> {
         let from = point.frame.to_local(-direction);
         let [u, v] = numbers.pair(first + SCATTERING);
         let lobe = if F::GLOSSY || F::DIELECTRIC { numbers.single(first + LOBE) } else { 0.0 };
-        let sample =
-            bsdf.sample::<F>(from, [u, v, lobe]).filter(|sample| sample.delta || !onward.mirrored)?;
+        let sample = match F::GLOSSY && visitor.is_apart(state, &vertex) {
+            true => bsdf.sample_apart::<F>(from, [u, v, lobe]),
+            false => bsdf.sample::<F>(from, [u, v, lobe]).map(|sample| (sample, sample.delta)),
+        };
+        let (sample, is_narrow) = sample.filter(|(_, is_narrow)| *is_narrow || !onward.mirrored)?;
         let towards = point.frame.to_world(sample.direction);
         if !point.sides_agree(sample.direction, towards) {
             return None;
         }
-        visitor.leave(state, &vertex, from, &sample);
+        visitor.leave(state, &vertex, from, (&sample, is_narrow));
         // Power is not squeezed by refraction, as radiance is; and where the shading normal is not that of the
         // triangle, it is the other cosine that counts (Veach 1997, sections 5.2 and 5.3).
         let power = Rgb::from(state.power);

@@ -15,7 +15,7 @@
 use super::PhotonLight;
 use super::density::{Gathered, Light, fence, reflected};
 use super::estimator::Counters;
-use super::shoot::{focuses, holds_photons, may_focus};
+use super::shoot::{focuses, gathers_photons, may_focus};
 use super::wave::Share;
 use crate::bsdf::{Bsdf, Features};
 use crate::bvh::Bvh;
@@ -165,13 +165,12 @@ impl<'a> GatherLight<'a> {
         Self { global, irradiances, farthest, falloff }
     }
 
-    /// The light that `point`, at the end of a gather ray of length `distance`, reflects to `wo`, but for what a smooth
-    /// coat mirrors. `None` where the map should not tell. `turns`, from 0 to 1, turns probes for walls.
+    /// The light that `point`, at the end of a gather ray of length `distance`, reflects to `wo`, except what a narrow
+    /// coat does. `None` where the map should not tell. `turns`, from 0 to 1, turns probes for walls.
     pub(super) fn reflected<F: Features>(
         &self,
         (bvh, level): (&Bvh, Level),
-        point: &SurfacePoint,
-        bsdf: &Bsdf,
+        (point, bsdf, apart): (&SurfacePoint, &Bsdf, bool),
         wo: Vec3,
         distance: f32,
         turns: f32,
@@ -183,7 +182,7 @@ impl<'a> GatherLight<'a> {
         let (place, normal) = (point.position, point.geometric_normal);
         let disc = Disc { place, normal, radius: radius.min(self.farthest), falloff: self.falloff };
         let light = Light { map: self.global, is_caustic: false, enough: f32::INFINITY };
-        Some(reflected::<F>(light, (bvh, level), (&disc, None), (point, bsdf), wo, turns).light)
+        Some(reflected::<F>(light, (bvh, level), (&disc, None), (point, bsdf, apart), wo, turns).light)
     }
 
     /// The irradiance of the photons at `point`, at the end of a gather ray of length `distance`, and the radius of their
@@ -263,13 +262,13 @@ pub struct PhotonMaps<'a> {
 pub(super) struct Said {
     /// Reflected light.
     pub(super) gathered: Gathered,
-    /// Whether that is all light but what a smooth coat mirrors.
+    /// Whether that is all light but what a narrow coat reflects.
     pub(super) is_all: bool,
     /// Whether no light need be asked for by a shadow ray.
     pub(super) is_lit: bool,
     /// What a path finds that goes on from here,
     pub(super) next: Share,
-    /// and what it finds by a smooth coat.
+    /// and what it finds by a narrow coat.
     pub(super) mirrored: Share,
 }
 
@@ -282,15 +281,14 @@ impl PhotonMaps<'_> {
         &self,
         tracer: (&Bvh, Level),
         (came, limited, distance): (Share, u32, f32),
-        point: &SurfacePoint,
-        bsdf: &Bsdf,
+        (point, bsdf, apart): (&SurfacePoint, &Bsdf, bool),
         (wo, travelled): (Vec3, f32),
         turns: f32,
     ) -> Said {
         // What was scattered by something with a diffuse part stays so.
         let rest = if came.gathers() { Share::GATHERED } else { Share::ALL };
         let all = Said { next: rest, mirrored: rest, ..Said::default() };
-        if !holds_photons(bsdf) {
+        if !gathers_photons(bsdf, apart) {
             return match came {
                 Share::NO_CAUSTIC | Share::BEHIND_MIRROR if focuses(bsdf) => Said {
                     is_lit: true,
@@ -303,7 +301,7 @@ impl PhotonMaps<'_> {
         }
         if came.gathers()
             && (limited == 0 || limited == 2)
-            && let Some(light) = self.global.reflected::<F>(tracer, point, bsdf, wo, distance, turns)
+            && let Some(light) = self.global.reflected::<F>(tracer, (point, bsdf, apart), wo, distance, turns)
         {
             let gathered = Gathered { light, ..Gathered::default() };
             return Said { gathered, is_all: true, is_lit: true, ..all };
@@ -314,7 +312,7 @@ impl PhotonMaps<'_> {
         match &self.caustic {
             Some(caustic) => {
                 let travelled = if came.gathers() { 0.0 } else { travelled };
-                let gathered = caustic.reflected::<F>(tracer, point, bsdf, (wo, travelled), turns);
+                let gathered = caustic.reflected::<F>(tracer, (point, bsdf, apart), (wo, travelled), turns);
                 Said { gathered: gathered.unwrap_or_default(), next: Share::NO_CAUSTIC, ..all }
             }
             None => Said { next: Share::GATHERED, ..all },

@@ -28,13 +28,16 @@
 //! photon is known when it is left, its power is multiplied with it, and a map needs no more than power. Photons that
 //! paths find more easily are hardly ever left. Ends of paths by roulette count for none of the densities.
 //!
+//! A diffuse surface under a narrow coat is two: its base is rough, its coat a link of the chain like rough metal. Paths and light
+//! paths choose one of them at each such surface (`docs/decisions/0069-photons-under-varnish.md`).
+//!
 //! Beside an irradiance cache photons have less to do: a record knows all that something rough, be it metal, sent to a point,
 //! and photons only what came there straight from a mirror or smooth glass. A light path that meets two rough surfaces after
 //! each other ends, as its light is the record's. A path from the eye asks photons at each rough surface, but for those to
 //! which mirrors and glass lead from one whose photons know them.
 
 use super::density::{Gathered, Light, reflected};
-use super::shoot::holds_photons;
+use super::shoot::{has_base, holds_photons};
 use super::wave::{Merged, Path};
 use crate::bsdf::{Bsdf, Features};
 use crate::bvh::Bvh;
@@ -56,14 +59,10 @@ const STANDS_ON: f32 = 1e-6;
 /// Rays across and down that look for the nearest.
 const GLANCES: u32 = 32;
 
-/// Of a coated surface, the colour of the base from which on it is a rough one. Below, it mirrors and little else, and
-/// would make spikes of photons.
-const BASE: f32 = 0.02;
-
 /// Whether light that `bsdf` does not mirror is found by photons: it is a rough surface.
 #[inline]
 pub(super) fn ends_chain(bsdf: &Bsdf) -> bool {
-    matches!(bsdf, Bsdf::Diffuse(_)) || holds_photons(bsdf) && bsdf.base().max_element() >= BASE
+    matches!(bsdf, Bsdf::Diffuse(_)) || holds_photons(bsdf) && has_base(bsdf)
 }
 
 /// The least that the radius of a disc may be, times that of the disc from where something rough throws the light.
@@ -151,6 +150,8 @@ pub(super) struct ChainLink<'p> {
     /// The one from which it is seen; local, as `far`.
     pub(super) near: Vec3,
     pub(super) far: Vec3,
+    /// By its coat alone.
+    pub(super) coat_alone: bool,
 }
 
 impl ChainLink<'_> {
@@ -162,7 +163,10 @@ impl ChainLink<'_> {
 
     /// The density alone.
     pub(super) fn density<F: Features>(&self, scene: &Scene) -> f32 {
-        let Self { point, bsdf, near, far } = *self;
+        let Self { point, bsdf, near, far, coat_alone } = *self;
+        if F::GLOSSY && coat_alone {
+            return bsdf.evaluate_apart::<F>(far, near)[1].1;
+        }
         if far.z > 0.0 {
             return bsdf.evaluate::<F>(far, near).1;
         }
@@ -236,7 +240,7 @@ impl<'a> Merging<'a> {
         &self,
         (bvh, level): (&Bvh, Level),
         sample: u32,
-        (point, bsdf): (&SurfacePoint, &Bsdf),
+        (point, bsdf, apart): (&SurfacePoint, &Bsdf, bool),
         (wo, travelled): (Vec3, f32),
         turns: impl FnOnce() -> f32,
     ) -> Gathered {
@@ -256,6 +260,6 @@ impl<'a> Merging<'a> {
             return Gathered::default();
         }
         let light = Light { map, is_caustic: true, enough: f32::INFINITY };
-        reflected::<F>(light, (bvh, level), (&disc, Some(density)), (point, bsdf), wo, turns())
+        reflected::<F>(light, (bvh, level), (&disc, Some(density)), (point, bsdf, apart), wo, turns())
     }
 }

@@ -22,7 +22,7 @@
 
 use super::arrivals::{Arrivals, TO_ENVIRONMENT};
 use super::cached::Caches;
-use super::density::{Gathered, PhotonLight};
+use super::density::PhotonLight;
 use super::estimator::{
     Counters, MAX_CROSSINGS, PathSettings, dimension, environment_heuristic, is_cut, power_heuristic,
     survival,
@@ -32,6 +32,7 @@ use super::maps::{GatherLight, PhotonMaps, Said};
 use super::merge::{ChainLink, Merging, ends_chain};
 use super::reuse::Exchange;
 use super::shadow::{FEW, pass_cutout, passing, shadow_ray};
+use super::shoot::is_varnished;
 use super::spots::{Cones, Spot};
 use super::wave::{Merged, Path, Share, Wave};
 use crate::bsdf::{Bsdf, Features};
@@ -73,6 +74,8 @@ pub struct PathTracer<'a, F> {
     pub(super) level: Level,
     /// Some surfaces let a part of the light through, so that a shadow ray may go on behind a hit.
     pub(super) has_cutouts: bool,
+    /// Photons are known by the bases of narrow coats alone (`shoot::is_varnished`).
+    apart: bool,
     /// Some surfaces may reflect or refract into one direction only.
     pub(super) has_mirrors: bool,
     pub(super) caches: Option<Caches<'a>>,
@@ -112,6 +115,7 @@ impl<'a, F: Features> PathTracer<'a, F> {
             settings,
             level,
             has_cutouts,
+            apart: !lights.have_deltas(),
             has_mirrors,
             caches: None,
             photons: None,
@@ -383,7 +387,7 @@ impl<'a, F: Features> PathTracer<'a, F> {
                     weight = environment_heuristic(self.lights, path.pdf, pdf);
                 }
                 if let Some(merging) = &self.merging {
-                    weight = merging.beside_photons(weight, path.chain, || {
+                    weight = merging.beside_photons(weight, path.chain_to_light(), || {
                         merging.emission.density_of_sky(scene, self.lights, direction, position)
                     });
                 }
@@ -414,7 +418,7 @@ impl<'a, F: Features> PathTracer<'a, F> {
                     weight = power_heuristic(path.pdf, pdf);
                 }
                 if let Some(merging) = &self.merging {
-                    weight = merging.beside_photons(weight, path.chain, || {
+                    weight = merging.beside_photons(weight, path.chain_to_light(), || {
                         let from = (point.position, -direction);
                         merging.emission.density_of_surface(scene, self.lights, hit.triangle, from)
                     });
@@ -445,13 +449,18 @@ impl<'a, F: Features> PathTracer<'a, F> {
         // Lights behind an opaque surface need not be asked.
         let normal = if F::DIELECTRIC && bsdf.transmits() { Vec3::ZERO } else { point.frame.normal };
 
+        // Photons are of its base; its coat goes on alone.
+        let has_photons = self.merging.is_some() || self.photons.is_some() || self.maps.is_some();
+        let apart = F::GLOSSY && has_photons && is_varnished(&bsdf, self.apart);
+
         let mut said = Said::default();
         if let Some(maps) = self.maps {
             let turns = sampler.single(dimension::PROBES + segments);
             let limit = if self.is_limited() { segments } else { 0 };
             let maps = &maps[path.sample as usize & 1];
             let tracer = (self.bvh, self.level);
-            said = maps.ask::<F>(tracer, (came, limit, distance), point, &bsdf, (wo, travelled), turns);
+            let surface = (point, &bsdf, self.apart);
+            said = maps.ask::<F>(tracer, (came, limit, distance), surface, (wo, travelled), turns);
             path.gather(throughput, exchange, said.gathered);
         }
 
@@ -472,7 +481,7 @@ impl<'a, F: Features> PathTracer<'a, F> {
             Bsdf::Diffuse(_) if indirect.is_none() => Cones::around(self.spots, point.position, normal),
             _ => None,
         };
-        if !self.lights.is_empty() && !bsdf.is_delta() && !said.is_lit {
+        if !self.lights.is_empty() && !bsdf.is_delta() && (!said.is_lit || apart) {
             // What transmits is looked at from both sides, a window from one.
             let aim = aim.filter(|_| normal != Vec3::ZERO);
             for part in 0..points {
@@ -491,35 +500,55 @@ impl<'a, F: Features> PathTracer<'a, F> {
                     if !point.sides_agree(wi, sample.direction) {
                         return None;
                     }
-                    let (f, mut pdf) = bsdf.evaluate::<F>(wo, wi);
-                    if f == Rgb::ZERO {
+                    let ([(mut f, mut pdf), coat], is_rough) = match apart {
+                        true => (bsdf.evaluate_apart::<F>(wo, wi), true),
+                        false => ([bsdf.evaluate::<F>(wo, wi), (Rgb::ZERO, 0.0)], ends_chain(&bsdf)),
+                    };
+                    if apart && said.is_lit {
+                        f = Rgb::ZERO;
+                    }
+                    if f == Rgb::ZERO && coat.0 == Rgb::ZERO {
                         return None;
                     }
                     let shadow = shadow_ray(point, &sample)?;
                     if let Some(cones) = &cones {
                         pdf = cones.density(sample.direction, pdf);
                     }
-                    if self.settings.reuse && exchange.is_lit() {
-                        exchange.light_is_of_base(bsdf.base_part(wo, wi, f));
-                    }
                     let alone = sample.delta || ends;
                     let each = 1.0 / points as f32;
-                    let mut weight = match alone {
+                    let weigh = |pdf: f32| match alone {
                         true => each,
                         false if later => each * environment_heuristic(self.lights, sample.pdf, each * pdf),
                         false => each * power_heuristic(sample.pdf, each * pdf),
                     };
+                    let mut weight = weigh(pdf);
                     if let Some(merging) = &self.merging
-                        && !ends_chain(&bsdf)
+                        && !is_rough
                         && merging.may_come_by(&bsdf, path.chain)
                     {
-                        let there = ChainLink { point, bsdf: &bsdf, near: wo, far: wi };
+                        let there = ChainLink { point, bsdf: &bsdf, near: wo, far: wi, coat_alone: false };
                         let to_light = there.reverse::<F>(scene) / sample.pdf;
                         weight = merging.beside_photons(weight, path.chain.abs() * to_light, || {
                             merging.emission.density_of_sample(scene, self.lights, &sample, point.position)
                         });
                     }
-                    let contribution = throughput * f * sample.radiance * (weight / sample.pdf);
+                    let of_base = f * weight;
+                    let contribution = if apart {
+                        let both = of_base + coat.0 * weigh(coat.1);
+                        if self.settings.reuse && exchange.is_lit() {
+                            exchange.light_is_of_base(Rgb::select(
+                                both.cmpgt(of_base),
+                                of_base / both,
+                                Rgb::ONE,
+                            ));
+                        }
+                        throughput * both * sample.radiance / sample.pdf
+                    } else {
+                        if self.settings.reuse && exchange.is_lit() {
+                            exchange.light_is_of_base(bsdf.base_part(wo, wi, f));
+                        }
+                        throughput * f * sample.radiance * (weight / sample.pdf)
+                    };
                     let tag = ray.tag | if later { TO_ENVIRONMENT } else { 0 };
                     Some((Ray { tag, ..shadow }, contribution))
                 });
@@ -539,7 +568,7 @@ impl<'a, F: Features> PathTracer<'a, F> {
         {
             let turns = sampler.single(dimension::PROBES + segments);
             let tracer = (self.bvh, self.level);
-            reflected = photons.reflected::<F>(tracer, point, &bsdf, (wo, travelled), turns);
+            reflected = photons.reflected::<F>(tracer, (point, &bsdf, self.apart), (wo, travelled), turns);
             path.gather(throughput, exchange, reflected.unwrap_or_default());
         }
 
@@ -551,7 +580,8 @@ impl<'a, F: Features> PathTracer<'a, F> {
                     let turns = || sampler.single(dimension::PROBES + segments);
                     let from = (wo, if path.disc == 0.0 { travelled } else { 0.0 });
                     let tracer = (self.bvh, self.level);
-                    let gathered = merging.reflected::<F>(tracer, path.sample, (point, &bsdf), from, turns);
+                    let surface = (point, &bsdf, self.apart);
+                    let gathered = merging.reflected::<F>(tracer, path.sample, surface, from, turns);
                     path.gather(throughput, exchange, gathered);
                     Merged::LATER
                 }
@@ -560,30 +590,31 @@ impl<'a, F: Features> PathTracer<'a, F> {
 
         let [u, v] = dimension::scattering(&sampler, segments);
         let lobe = if F::GLOSSY || F::DIELECTRIC { sampler.single(first + dimension::LOBE) } else { 0.0 };
-        let sample = match &cones {
+        let (sample, is_narrow) = match &cones {
+            _ if apart => bsdf.sample_apart::<F>(wo, [u, v, lobe])?,
             Some(cones) => {
-                cones.sample::<F>(&bsdf, &point.frame, [u, v], sampler.single(first + dimension::LOBE))
+                let lobe = sampler.single(first + dimension::LOBE);
+                (cones.sample::<F>(&bsdf, &point.frame, [u, v], lobe)?, false)
             }
-            None => bsdf.sample::<F>(wo, [u, v, lobe]),
+            None => bsdf.sample::<F>(wo, [u, v, lobe]).map(|sample| (sample, sample.delta))?,
         };
-        let sample = sample?;
-        // What a smooth coat mirrors was not gathered.
-        if reflected.is_some() && !sample.delta {
+        // What a narrow coat reflects was not gathered.
+        if reflected.is_some() && !is_narrow {
             path.share = Share::EMITTED;
         }
         if self.settings.reuse && exchange.is_lit() {
             let f = sample.weight * sample.pdf;
-            exchange.path_is_of_base(if sample.delta {
-                Rgb::ZERO
-            } else {
-                bsdf.base_part(wo, sample.direction, f)
+            exchange.path_is_of_base(match is_narrow {
+                true => Rgb::ZERO,
+                false if apart => Rgb::ONE,
+                false => bsdf.base_part(wo, sample.direction, f),
             });
         }
         if self.maps.is_some() {
-            if said.is_all && !sample.delta {
+            if said.is_all && !is_narrow {
                 return None;
             }
-            path.share = if sample.delta { said.mirrored } else { said.next };
+            path.share = if is_narrow { said.mirrored } else { said.next };
         }
         let mut throughput = throughput * sample.weight;
         let certain = self.settings.reuse && is_diffuse && exchange.leave(point, throughput, segments);
@@ -610,8 +641,9 @@ impl<'a, F: Features> PathTracer<'a, F> {
             return None;
         }
         if let Some(merging) = &self.merging {
-            let there = ChainLink { point, bsdf: &bsdf, near: wo, far: sample.direction };
-            let is_rough = ends_chain(&bsdf) && !sample.delta;
+            let coat_alone = apart && is_narrow;
+            let there = ChainLink { point, bsdf: &bsdf, near: wo, far: sample.direction, coat_alone };
+            let is_rough = ends_chain(&bsdf) && !is_narrow;
             if is_rough {
                 (path.merged, path.disc) = (merged, merging.radius(point.position));
             }
@@ -624,6 +656,7 @@ impl<'a, F: Features> PathTracer<'a, F> {
                 chain => chain.abs() * there.reverse::<F>(scene) / sample.pdf,
             };
         }
+        path.left_coat = u32::from(apart && is_narrow);
         path.way = if sample.delta { path.way.on(sample.transmitted) } else { Way::LOST };
         path.throughput = throughput.to_array();
         // One ray beside as many points of lights.
@@ -665,38 +698,5 @@ impl Shadows<'_> {
             (*slot, *arrives) = (ray, light.to_array());
             self.count += 1;
         }
-    }
-}
-
-impl Path {
-    #[inline]
-    pub(super) fn add(&mut self, radiance: Rgb) {
-        self.radiance = (Rgb::from(self.radiance) + radiance).to_array();
-    }
-
-    #[inline]
-    fn gather(&mut self, throughput: Rgb, exchange: &mut Exchange, Gathered { light, blur }: Gathered) {
-        // It is for this path alone: others have asked photons where they are.
-        exchange.keep(self, throughput * light);
-        self.blur = (Rgb::from(self.blur) + exchange.worth(throughput) * blur).to_array();
-    }
-
-    /// Random numbers for one of the points of lights that it asks where it ends: those of all its pixel's are a net.
-    #[inline]
-    fn part(&self, seed: u32, part: u32) -> Sampler {
-        let index = (self.sample >> 1).wrapping_mul(self.lights.into()).wrapping_add(part);
-        Sampler::replicate(seed, self.pixel, self.sample & 1, index)
-    }
-
-    /// Goes on behind the triangle of `hit` as if it were not there.
-    #[cold]
-    fn cross(&mut self, next: Ray, hit: &Hit, counters: &mut Counters) -> Option<Ray> {
-        if u32::from(self.crossings) >= MAX_CROSSINGS {
-            counters.dropped.unfinished += 1;
-            return None;
-        }
-        self.crossings += 1;
-        self.triangle = hit.triangle;
-        Some(next)
     }
 }

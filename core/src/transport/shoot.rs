@@ -38,6 +38,29 @@ pub(super) fn holds_photons(bsdf: &Bsdf) -> bool {
     matches!(bsdf, Bsdf::Diffuse(_) | Bsdf::Glossy(_) | Bsdf::Plastic(_)) && !bsdf.is_delta()
 }
 
+/// Of a coated surface, the colour of the base from which on it is a rough one. Below, it mirrors and little else, and
+/// would make spikes of photons.
+const BASE: f32 = 0.02;
+
+/// Whether its base is that of a rough surface.
+#[inline]
+pub(super) fn has_base(bsdf: &Bsdf) -> bool {
+    matches!(bsdf, Bsdf::Diffuse(_)) || bsdf.base().max_element() >= BASE
+}
+
+/// Whether photons are known by the base of `bsdf` alone, and paths go on through its coat as by a rough metal: there a
+/// photon would be a spike. `apart` says whether that is possible, as it is where paths may meet each light by chance.
+#[inline]
+pub(super) fn is_varnished(bsdf: &Bsdf, apart: bool) -> bool {
+    apart && bsdf.has_rough_coat() && bsdf.has_narrow_coat() && has_base(bsdf)
+}
+
+/// Whether light is gathered from photons on such a surface: it has a base, or nothing narrow.
+#[inline]
+pub(super) fn gathers_photons(bsdf: &Bsdf, apart: bool) -> bool {
+    holds_photons(bsdf) && (!apart || has_base(bsdf) || !bsdf.has_narrow_coat())
+}
+
 /// Smooth enough to throw light onto something else in a pattern that gathering would not find: largest GGX alpha.
 const FOCUSING: f32 = 0.1;
 
@@ -235,7 +258,7 @@ impl Visitor for Looker<'_> {
     }
 
     #[inline]
-    fn leave(&self, state: &mut State, vertex: &Vertex, _from: Vec3, _sample: &BsdfSample) {
+    fn leave(&self, state: &mut State, vertex: &Vertex, _from: Vec3, _sample: (&BsdfSample, bool)) {
         state.mirrored = vertex.bsdf.is_delta().into();
     }
 }
@@ -270,7 +293,7 @@ impl Visitor for Leaver<'_> {
     }
 
     #[inline]
-    fn leave(&self, state: &mut State, vertex: &Vertex, _from: Vec3, _sample: &BsdfSample) {
+    fn leave(&self, state: &mut State, vertex: &Vertex, _from: Vec3, _sample: (&BsdfSample, bool)) {
         state.mirrored = vertex.bsdf.is_delta().into();
     }
 }

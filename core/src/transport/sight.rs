@@ -4,7 +4,7 @@
 
 use super::estimator::dimension;
 use super::merge::Discs;
-use super::shoot::holds_photons;
+use super::shoot::gathers_photons;
 use crate::bsdf::{Bsdf, Features};
 use crate::bvh::Bvh;
 use crate::memory::Footprint;
@@ -97,7 +97,7 @@ impl Raster {
             let point = SurfacePoint::at::<F>(scene, &ray, &hit).filter(|_| hit.is_some())?;
             let direction = Vec3::from(ray.direction).normalize_or_zero();
             let bsdf = Bsdf::at::<F>(scene, point.material, point.uv, point.front);
-            if holds_photons(&bsdf) && !mem::take(&mut gathers) {
+            if gathers_photons(&bsdf, true) && !mem::take(&mut gathers) {
                 return Some(Photon::new(point.position, -direction, point.geometric_normal, Rgb::ZERO));
             }
             let [u, v] = dimension::scattering(&sampler, segments);

@@ -1,11 +1,15 @@
 //! The working memory of a wavefront: the state of every path of the wave, and queues of rays.
 
+use super::density::Gathered;
+use super::estimator::{Counters, MAX_CROSSINGS};
 use super::images::Way;
 use super::reuse::{Exchange, Pair};
+use crate::Rgb;
 use crate::bsdf::Bsdf;
 use crate::film::CIRCLE;
 use crate::geometry::{Hit, Ray};
 use crate::memory::{Arena, Footprint, OutOfMemory};
+use crate::sampling::Sampler;
 use bytemuck::{Pod, Zeroable};
 
 /// A path between two of its vertices.
@@ -54,6 +58,52 @@ pub(super) struct Path {
     pub(super) disc: f32,
     /// How long it is from the eye to its last vertex.
     pub(super) travelled: f32,
+    /// 1 where that was a rough coat alone, by which photons do not come straight from a light.
+    pub(super) left_coat: u32,
+}
+
+impl Path {
+    /// Its chain, as light at the end of the ray knows it.
+    #[inline]
+    pub(super) fn chain_to_light(&self) -> f32 {
+        if self.left_coat == 0 { self.chain } else { 0.0 }
+    }
+
+    #[inline]
+    pub(super) fn add(&mut self, radiance: Rgb) {
+        self.radiance = (Rgb::from(self.radiance) + radiance).to_array();
+    }
+
+    #[inline]
+    pub(super) fn gather(
+        &mut self,
+        throughput: Rgb,
+        exchange: &mut Exchange,
+        Gathered { light, blur }: Gathered,
+    ) {
+        // It is for this path alone: others have asked photons where they are.
+        exchange.keep(self, throughput * light);
+        self.blur = (Rgb::from(self.blur) + exchange.worth(throughput) * blur).to_array();
+    }
+
+    /// Random numbers for one of the points of lights that it asks where it ends: those of all its pixel's are a net.
+    #[inline]
+    pub(super) fn part(&self, seed: u32, part: u32) -> Sampler {
+        let index = (self.sample >> 1).wrapping_mul(self.lights.into()).wrapping_add(part);
+        Sampler::replicate(seed, self.pixel, self.sample & 1, index)
+    }
+
+    /// Goes on behind the triangle of `hit` as if it were not there.
+    #[cold]
+    pub(super) fn cross(&mut self, next: Ray, hit: &Hit, counters: &mut Counters) -> Option<Ray> {
+        if u32::from(self.crossings) >= MAX_CROSSINGS {
+            counters.dropped.unfinished += 1;
+            return None;
+        }
+        self.crossings += 1;
+        self.triangle = hit.triangle;
+        Some(next)
+    }
 }
 
 /// What became of the one vertex of a path at which a photon of caustics can be merged with it ([`super::merge`]).
