@@ -56,9 +56,24 @@ impl Bvh<'_> {
     /// What lies around `site`.
     pub fn survey(&self, site: &Site) -> Survey {
         let (lo, hi) = (site.place - Vec3::splat(site.reach), site.place + Vec3::splat(site.reach));
+        let mut survey = Survey { rises: false, hangs: false, surface: 0 };
+        let is_whole = self.overlapping(lo, hi, |corners| {
+            site.meet(corners, &mut survey);
+            !survey.hangs
+        });
+        if !is_whole {
+            (survey.rises, survey.hangs) = (true, true);
+        }
+        survey
+    }
+
+    /// Calls `visit` with the triangles whose leaves overlap a box, as long as it says yes. `false` where the place is
+    /// too crowded for all of them to be found.
+    #[inline(always)]
+    pub(crate) fn overlapping(&self, lo: Vec3, hi: Vec3, mut visit: impl FnMut([Vec3; 3]) -> bool) -> bool {
         let mut waiting = [0u32; WAITING];
         let mut count = 1usize;
-        let mut survey = Survey { rises: false, hangs: false, surface: 0 };
+        let (mut goes_on, mut is_whole) = (true, true);
         while let Some(&index) = count.checked_sub(1).and_then(|last| waiting.get(last)) {
             count -= 1;
             let Some(node) = self.nodes.get(index as usize) else { break };
@@ -70,20 +85,20 @@ impl Bvh<'_> {
                     let (first, of) = child.triangles();
                     let runs = self.coordinates.get(9 * first..9 * (first + of)).unwrap_or(&[]);
                     for i in 0..of {
-                        site.meet(corners_of(runs, of, i).map(Vec3::from), &mut survey);
+                        goes_on &= visit(corners_of(runs, of, i).map(Vec3::from));
                     }
                 } else if let Some(slot) = waiting.get_mut(count) {
                     *slot = child.0;
                     count += 1;
                 } else {
-                    (survey.rises, survey.hangs) = (true, true);
+                    is_whole = false;
                 }
             }
-            if survey.hangs {
+            if !(goes_on && is_whole) {
                 break;
             }
         }
-        survey
+        is_whole
     }
 }
 

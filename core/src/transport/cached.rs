@@ -1,10 +1,12 @@
 //! Irradiance caches as paths ask them: what a block of vertices has of reflected light is asked for at once, before
 //! they are shaded. Where caches do not know it, photons may.
 
+use super::estimator::Counters;
 use super::path::{BLOCK, Met, PathTracer};
 use super::wave::{Path, Share, Wave};
+use crate::Level;
 use crate::bsdf::Features;
-use crate::cache::irradiance::{Indirect, IrradianceCache, Points};
+use crate::cache::irradiance::{Asker, Indirect, IrradianceCache, Points};
 use crate::geometry::Ray;
 use crate::scene::SurfacePoint;
 use core::f32::consts::FRAC_1_PI;
@@ -24,6 +26,37 @@ pub(super) enum Caches<'a> {
     Growing(&'a IrradianceCache<'a>),
 }
 
+impl Caches<'_> {
+    /// What is `known` of those of `askers` that there are, each with its sample, and how far each is `exposed`
+    /// ([`IrradianceCache::at_all`]).
+    fn ask(
+        &self,
+        level: Level,
+        askers: &[Option<(Asker, u32)>; BLOCK],
+        known: &mut [Option<Indirect>; BLOCK],
+        exposed: &mut [f32; BLOCK],
+    ) {
+        let askers = askers.iter().enumerate().filter_map(|(i, asker)| Some((i, asker.as_ref()?)));
+        match self {
+            Caches::Halves(caches) => {
+                let mut points = [Points::NONE; 2];
+                askers.for_each(|(i, (asker, sample))| points[*sample as usize & 1].set(i, asker));
+                for (cache, points) in caches.iter().zip(&points) {
+                    let found = cache.at_all(level, points, known);
+                    exposed.iter_mut().zip(found).for_each(|(exposed, found)| *exposed = exposed.max(found));
+                }
+            }
+            Caches::Growing(cache) => {
+                for (i, (asker, _)) in askers {
+                    let found = cache.roughly(asker);
+                    known[i] = found.map(|(indirect, _)| indirect);
+                    exposed[i] = found.map_or(0.0, |(_, exposed)| exposed);
+                }
+            }
+        }
+    }
+}
+
 impl<'a, F: Features> PathTracer<'a, F> {
     /// Asks `caches` for the light that is reflected onto those of `block`, at the ends of rays of `range`, that may be
     /// diffuse.
@@ -33,23 +66,26 @@ impl<'a, F: Features> PathTracer<'a, F> {
         wave: &Wave,
         range: Range<usize>,
         block: &mut [Option<Met<'a>>; BLOCK],
+        counters: &mut Counters,
     ) {
-        let (mut points, mut known) = ([Points::NONE; 2], [None; BLOCK]);
-        for (i, (ray, met)) in wave.rays[range.clone()].iter().zip(block.iter()).enumerate() {
-            if let Some((Met { point, .. }, path)) = self.asks(wave, ray, met)
-                && (path.segments == 1 || !self.is_limited())
-            {
-                let (position, normal) = (point.position, point.frame.normal);
-                match caches {
-                    Caches::Halves(_) => points[path.sample as usize & 1].set(i, position, normal),
-                    Caches::Growing(cache) => known[i] = cache.roughly(position, normal),
-                }
-            }
-        }
-        if let Caches::Halves(caches) = caches {
-            for (cache, points) in caches.into_iter().zip(&points) {
-                cache.at_all(self.level, points, &mut known);
-            }
+        let (mut known, mut exposed) = ([None; BLOCK], [0.0; BLOCK]);
+        let rays = &wave.rays[range.clone()];
+        let askers: [Option<(&SurfacePoint, u32)>; BLOCK] = core::array::from_fn(|i| {
+            let (Met { point, .. }, path) = self.asks(wave, rays.get(i)?, block.get(i)?)?;
+            (path.segments == 1 || !self.is_limited()).then_some((point, path.sample))
+        });
+        let open =
+            |(point, sample): (&SurfacePoint, u32)| (Asker::open(point.position, point.frame.normal), sample);
+        caches.ask(self.level, &askers.map(|asker| asker.map(open)), &mut known, &mut exposed);
+        if exposed != [0.0; BLOCK] {
+            // Those that something hangs close over ask once more.
+            let points = askers.map(|asker| asker.map(|(point, _)| point));
+            let within = self.within(&points, &exposed, counters);
+            let again = core::array::from_fn(|i| {
+                let (asker, sample) = askers[i].map(open).filter(|_| within[i] < exposed[i])?;
+                Some((Asker { within: within[i], ..asker }, sample))
+            });
+            caches.ask(self.level, &again, &mut known, &mut exposed);
         }
         for ((ray, met), known) in wave.rays[range].iter().zip(block.iter_mut()).zip(&mut known) {
             if known.is_none()

@@ -38,6 +38,30 @@ impl<F: Features> PathTracer<'_, F> {
         strata: &Strata,
         counters: &mut Counters,
     ) {
+        let walls = self.fence_along(record, place, counters);
+        for (&direction, &inverse) in strata.directions.iter().zip(&*strata.inverse_distance) {
+            let direction = Vec3::from(direction);
+            let along = direction.truncate().length();
+            // Lower ones would meet the surface's own roundness; the surface itself is met at no distance.
+            let hangs = (SLOPE * along..LOW * along).contains(&direction.z) && inverse.is_finite();
+            if hangs && along < record.reach * inverse {
+                let towards = record.along_axes(frame.to_world(direction));
+                hang(record, &walls, towards, along / inverse);
+            }
+        }
+    }
+
+    /// The record of `place`, so many times as wide: it looks farther for walls and for what hangs over it, and light changes
+    /// over its support by as much as before.
+    pub fn widened(&self, record: &Record, place: &Place, factor: f32, counters: &mut Counters) -> Record {
+        let mut wide = record.widened(factor);
+        self.fence_along(&mut wide, place, counters);
+        self.note_overhangs(&mut wide, place);
+        wide
+    }
+
+    /// Looks for walls by rays along the surface, and returns how far they are from ray to ray.
+    fn fence_along(&self, record: &mut Record, place: &Place, counters: &mut Counters) -> [f32; RING] {
         let origin = place.position() + place.error * Vec3::from(place.geometric_normal);
         let rays: [Ray; 2 * RING] = core::array::from_fn(|i| {
             let along = record.towards(azimuth(i)).1.normalize_or_zero();
@@ -61,16 +85,7 @@ impl<F: Features> PathTracer<'_, F> {
                 None => hang(record, &walls, towards, hit.t),
             }
         }
-        for (&direction, &inverse) in strata.directions.iter().zip(&*strata.inverse_distance) {
-            let direction = Vec3::from(direction);
-            let along = direction.truncate().length();
-            // Lower ones would meet the surface's own roundness; the surface itself is met at no distance.
-            let hangs = (SLOPE * along..LOW * along).contains(&direction.z) && inverse.is_finite();
-            if hangs && along < record.reach * inverse {
-                let towards = record.along_axes(frame.to_world(direction));
-                hang(record, &walls, towards, along / inverse);
-            }
-        }
+        walls
     }
 }
 

@@ -11,7 +11,7 @@ use super::spots::{Glint, LOOK};
 use super::wave::{Path, Share, Wave};
 use crate::bsdf::Features;
 use crate::bvh::Coherence;
-use crate::cache::irradiance::{CellFlux, Hemisphere, Record, metric, reach};
+use crate::cache::irradiance::{Asker, CellFlux, FINE, Hemisphere, Record, metric, reach};
 use crate::geometry::{Frame, Hit, MISS, Ray};
 use crate::memory::{Arena, Footprint, OutOfMemory};
 use crate::sampling::Sampler;
@@ -40,6 +40,8 @@ pub struct Place {
     pub(super) triangle: u32,
     /// How wide a pixel is here.
     pub(super) pixel: f32,
+    /// Records that are farther than this are not for it, nor its own for what is: [`Asker::within`].
+    pub(super) within: f32,
 }
 
 impl Place {
@@ -51,6 +53,7 @@ impl Place {
         geometric_normal: [0.0; 3],
         triangle: MISS,
         pixel: 0.0,
+        within: f32::INFINITY,
     };
 
     /// Whether it is a place.
@@ -67,12 +70,23 @@ impl Place {
             geometric_normal: point.geometric_normal.to_array(),
             triangle: point.triangle,
             pixel,
+            within: f32::INFINITY,
         }
     }
 
     /// Where it is.
     pub fn position(&self) -> Vec3 {
         self.position.into()
+    }
+
+    /// How it asks a cache.
+    pub fn asker(&self) -> Asker {
+        Asker { position: self.position(), normal: self.normal(), within: self.within }
+    }
+
+    /// Whether something hangs so close over it that records of so many pixels are too coarse.
+    pub fn is_confined(&self, pixels: f32) -> bool {
+        self.within < FINE * pixels * self.pixel
     }
 
     /// The shading normal.
@@ -229,6 +243,7 @@ impl<F: Features> PathTracer<'_, F> {
         record.note_noise(if luminance > 0.0 { variance / (luminance * luminance) } else { 0.0 });
         record.shining = strata.shining as f32 / (n * n) as f32;
         self.fence(&mut record, place, &frame, &strata, counters);
+        self.note_overhangs(&mut record, place);
         Ok(Some(record))
     }
 

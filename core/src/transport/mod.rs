@@ -22,6 +22,7 @@ pub mod maps;
 mod merge;
 mod outline;
 mod outlook;
+mod overhang;
 pub mod overture;
 pub mod path;
 mod pilot;

@@ -236,7 +236,7 @@ impl<'a, F: Features> PathTracer<'a, F> {
         let mut block = [None; BLOCK];
         for i in 0..active {
             if i % BLOCK == 0 {
-                self.look_at(wave, i..active.min(i + BLOCK), &mut block);
+                self.look_at(wave, i..active.min(i + BLOCK), &mut block, counters);
             }
             let (ray, hit) = (wave.rays[i], wave.hits[i]);
             // Several lights at a vertex have no place where all vertices are lit. Not through cut-outs, which have one each.
@@ -269,7 +269,13 @@ impl<'a, F: Features> PathTracer<'a, F> {
     /// What the rays of `range` have met. All that is read next, of these and of those after them, is asked for first:
     /// the memory that vertices need is scattered over the scene, and waiting for it would be half of the time.
     #[inline]
-    fn look_at(&self, wave: &Wave, range: Range<usize>, block: &mut [Option<Met<'a>>; BLOCK]) {
+    fn look_at(
+        &self,
+        wave: &Wave,
+        range: Range<usize>,
+        block: &mut [Option<Met<'a>>; BLOCK],
+        counters: &mut Counters,
+    ) {
         let mesh = &self.scene.mesh;
         for hit in wave.hits.iter().skip(range.end + BLOCK).take(BLOCK) {
             mesh.prefetch_triangle(hit.triangle);
@@ -300,7 +306,7 @@ impl<'a, F: Features> PathTracer<'a, F> {
             met.aim = met.window.zip(met.row).map(|(window, row)| window.aim(met.light[0], row));
         }
         if let Some(caches) = self.caches {
-            self.ask(caches, wave, range, block);
+            self.ask(caches, wave, range, block, counters);
         }
     }
 

@@ -52,6 +52,7 @@ pub(super) fn held_out<F: Features>(
     let look = |task: usize, _: &mut Arena, out: &mut [Place]| {
         let mut counters = Counters::default();
         tracer.places(&order, (task * PIXELS) as u64, (SAMPLE, Sight::Clear), out, &mut counters);
+        tracer.look_up(out, &mut counters);
         Ok(counters)
     };
     if !workers.pass(&mut places, PIXELS, scratch, is_over, &look)?.1 {

@@ -18,6 +18,9 @@ const MOST_PIXELS: u64 = 1 << 21;
 /// Seconds that a survey may always take.
 const SHORT: f64 = 10.0;
 
+/// Pixels of which the risk is known, at most: those of larger pictures have that of a neighbour.
+const MOST_RISKS: u64 = 1 << 16;
+
 /// Gatherings at a point of comparison.
 const REPEATS: u32 = 2;
 
@@ -112,6 +115,7 @@ pub(super) fn survey<F: Features>(
     let task = |task: usize, _: &mut Arena, out: &mut [Look]| {
         let (mut counters, mut places) = (Counters::default(), [Place::NONE; PIXELS]);
         tracer.places(&order, (task * PIXELS) as u64, (0, Sight::Clear), &mut places, &mut counters);
+        tracer.look_up(&mut places, &mut counters);
         for (look, place) in out.iter_mut().zip(&places).filter(|(_, place)| place.is_some()) {
             *look = look_at(place, caches, step);
         }
@@ -153,11 +157,69 @@ pub(super) fn survey<F: Features>(
     }))
 }
 
+/// Of each pixel, row by row, the variance of what records say at the place that it shows, over the square of that: where they say
+/// different things, one of them is wrong. 0 where none speaks. Of large pictures some pixels stand for their neighbours.
+pub(super) fn risks<F: Features>(
+    tracer: &PathTracer<F>,
+    caches: [&IrradianceCache; 2],
+    size: [u32; 2],
+    workers: &Workers,
+    scratch: &mut [Vec<Line>],
+) -> Result<Vec<f32>, RenderError> {
+    let [width, height] = size;
+    let mut step = 1;
+    while u64::from(width.div_ceil(step)) * u64::from(height.div_ceil(step)) > MOST_RISKS {
+        step *= 2;
+    }
+    let order = Order::new(width, height, step);
+    let mut found = vec![[0.0; 2]; order.len() as usize];
+    let task = |task: usize, _: &mut Arena, out: &mut [[f32; 2]]| {
+        let (mut counters, mut places) = (Counters::default(), [Place::NONE; PIXELS]);
+        tracer.places(&order, (task * PIXELS) as u64, (0, Sight::Clear), &mut places, &mut counters);
+        for (out, place) in out.iter_mut().zip(&places).filter(|(_, place)| place.is_some()) {
+            *out = said_at(place, caches);
+        }
+        Ok(counters)
+    };
+    workers.pass(&mut found, PIXELS, scratch, &|| false, &task)?;
+    let known = || found.iter().filter(|[said, _]| *said > 0.0);
+    let mean = known().map(|[said, _]| f64::from(*said)).sum::<f64>() / known().count().max(1) as f64;
+    let dark = ((DARK * mean).powi(2)) as f32;
+    let mut risks = vec![0.0; width as usize * height as usize];
+    for (i, [said, variance]) in found.into_iter().enumerate() {
+        let Some((x, y)) = order.pixel(i as u64).filter(|_| said > 0.0) else { continue };
+        for row in y..(y + step).min(height) {
+            let first = row as usize * width as usize;
+            let end = (x + step).min(width) as usize;
+            risks[first + x as usize..first + end].fill(variance / (said * said + dark));
+        }
+    }
+    Ok(risks)
+}
+
+/// What records of both caches say at a place in the mean, and the variance of that.
+fn said_at(place: &Place, caches: [&IrradianceCache; 2]) -> [f32; 2] {
+    let (mut sum, mut squares, mut weights) = (0.0, 0.0, 0.0);
+    for cache in caches {
+        cache.hear(&place.asker(), |said, weight| {
+            let said = luminance(said) as f32;
+            sum += weight * said;
+            squares += weight * said * said;
+            weights += weight;
+        });
+    }
+    if weights <= 0.0 {
+        return [0.0; 2];
+    }
+    let mean = sum / weights;
+    [mean, (squares / weights - mean * mean).max(0.0)]
+}
+
 fn look_at(place: &Place, caches: [&IrradianceCache; 2], step: u32) -> Look {
     let (position, pixel) = (place.position(), place.pixel() * step as f32);
     let mut mark = Mark::None;
     let [even, _] = caches;
-    even.visit(position, place.normal(), |record, _| {
+    even.visit(&place.asker(), |record, _| {
         let [r1, r2] = record.radii;
         let distance = position.distance(record.position.into());
         if distance < MIDDLE * pixel {
@@ -182,7 +244,7 @@ pub(super) fn means(
 ) -> [f32; 2] {
     let (mut sums, mut weights) = ([0.0; 2], 0.0);
     for cache in caches {
-        cache.visit(place.position(), place.normal(), |record, weight| {
+        cache.visit(&place.asker(), |record, weight| {
             let values = of(record);
             sums.iter_mut().zip(values).for_each(|(sum, value)| *sum += weight * value);
             weights += weight;
@@ -195,7 +257,7 @@ pub(super) fn means(
 /// record reaches.
 fn check(point: &Point, mean: f64, caches: [&IrradianceCache; 2]) -> Option<(Check, f64)> {
     let Point { place, pixel, exact, variance } = point;
-    let said = caches.map(|cache| cache.at(place.position(), place.normal()));
+    let said = caches.map(|cache| cache.at(&place.asker()));
     let said: Vec<f64> = said.into_iter().flatten().map(|said| luminance(said.irradiance)).collect();
     if said.is_empty() {
         return None;

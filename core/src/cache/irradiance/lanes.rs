@@ -9,12 +9,34 @@ use halflight_simd::{Lanes, Simd};
 pub(super) struct Asked<L> {
     pub(super) position: [L; 3],
     pub(super) normal: [L; 3],
+    /// Records that are farther along the surface are not heard.
+    pub(super) within: L,
+}
+
+/// A point that asks.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Asker {
+    /// Where it is.
+    pub position: Vec3,
+    /// Unit normal of its surface.
+    pub normal: Vec3,
+    /// Records that are farther than this along the surface are not heard, for something hangs close over it: [`super::CLOSE`] times
+    /// as far as that is high. Infinite where nobody has looked up from there.
+    pub within: f32,
+}
+
+impl Asker {
+    /// Of which nobody knows what hangs over it.
+    pub fn open(position: Vec3, normal: Vec3) -> Self {
+        Self { position, normal, within: f32::INFINITY }
+    }
 }
 
 impl Asked<f32> {
     #[inline(always)]
-    pub(super) fn of(position: Vec3, normal: Vec3) -> Self {
-        Self { position: position.to_array(), normal: normal.to_array() }
+    pub(super) fn of(point: &Asker) -> Self {
+        let Asker { position, normal, within } = *point;
+        Self { position: position.to_array(), normal: normal.to_array(), within }
     }
 }
 

@@ -201,21 +201,26 @@ pub fn reach(settings: &Settings, derivatives: &Derivatives) -> Reach {
         }
     };
     let Bent { axis, curvature, signed } = bent;
+    let wanted = radii;
     let radii = clamped(settings, radii);
+    // Where radii are larger than wanted, for they are the least, light changes over them by what it would over those: a
+    // pixel does not show more, and what a border has so near says nothing of the other side.
+    let shares =
+        [0, 1].map(|k: usize| if wanted[k] < radii[k] { (wanted[k] / radii[k]).max(0.0) } else { 1.0 });
     // An extrapolation reaches |∇E · dx|, largest at the rim of the ellipse.
     let gradient = derivatives.luminance_gradient();
     let rise = Vec2::new(radii[0] * gradient.dot(axis), radii[1] * gradient.dot(axis.perp())).length();
     let gradient_scale = match lit {
         false => 0.0,
-        true if rise > irradiance => irradiance / rise,
-        true => 1.0,
+        true if rise > irradiance => shares[0].min(irradiance / rise),
+        true => shares[0],
     };
     let second = lit && settings.metric == Metric::Halflight;
     let overlap = if settings.metric == Metric::Halflight { OVERLAP } else { 1.0 };
     let bend = [0, 1].map(|k| {
         // Where radii are larger than the curvature allows, the second order is to change it by no more than all.
         let most = 2.0 / (overlap * radii[k] * overlap * radii[k]);
-        let bend = signed[k] / irradiance;
+        let bend = shares[k] * shares[k] * signed[k] / irradiance;
         if second && bend.is_finite() { bend.max(-most).min(most) } else { 0.0 }
     });
     let allowed = if second { settings.error * settings.extent * settings.extent } else { 0.0 };

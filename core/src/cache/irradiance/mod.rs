@@ -14,9 +14,10 @@ mod store;
 pub use derivatives::{CellFlux, Derivatives, Hessian};
 pub(crate) use hemisphere::second_differences;
 pub use hemisphere::{Hemisphere, SIDE_MAX};
+pub use lanes::Asker;
 pub use metric::{Metric, Reach, reach};
 pub use packet::{POINTS, Points};
-pub use record::{Record, SECTORS};
+pub use record::{CLOSE, FINE, Record, SECTORS};
 pub use store::{GREATEST_DEVIATION, Indirect, IrradianceCache};
 
 #[cfg(test)]

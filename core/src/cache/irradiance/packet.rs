@@ -5,12 +5,11 @@
 //! done in lanes as it is done for one: the bits are the same. The price: points that are alone in their cells pay for
 //! sixteen lanes.
 
-use super::lanes::{Asked, Sixteen};
+use super::lanes::{Asked, Asker, Sixteen};
 use super::octree::Visit;
 use super::record::Record;
 use super::store::{Indirect, IrradianceCache};
 use crate::{Level, Rgb};
-use glam::Vec3;
 use halflight_simd::{Kernel, Lanes, Mask, Simd};
 
 /// Points that ask at once.
@@ -21,33 +20,47 @@ pub const POINTS: usize = 16;
 pub struct Points {
     position: [[f32; POINTS]; 3],
     normal: [[f32; POINTS]; 3],
+    within: [f32; POINTS],
     /// Bit `i`: there is a point `i`.
     wanted: u32,
 }
 
 impl Points {
     /// No point.
-    pub const NONE: Points = Points { position: [[0.0; POINTS]; 3], normal: [[0.0; POINTS]; 3], wanted: 0 };
+    pub const NONE: Points = Points {
+        position: [[0.0; POINTS]; 3],
+        normal: [[0.0; POINTS]; 3],
+        within: [f32::INFINITY; POINTS],
+        wanted: 0,
+    };
 
     /// Makes it point `i`, of [`POINTS`].
     #[inline]
-    pub fn set(&mut self, i: usize, position: Vec3, normal: Vec3) {
+    pub fn set(&mut self, i: usize, point: &Asker) {
         let i = i % POINTS;
         for axis in 0..3 {
-            self.position[axis][i] = position[axis];
-            self.normal[axis][i] = normal[axis];
+            self.position[axis][i] = point.position[axis];
+            self.normal[axis][i] = point.normal[axis];
         }
+        self.within[i] = point.within;
         self.wanted |= 1 << i;
     }
 }
 
 impl IrradianceCache<'_> {
-    /// What is known at each of `points`: [`IrradianceCache::at`], to the bit. `known` keeps its other entries.
-    pub fn at_all(&self, level: Level, points: &Points, known: &mut [Option<Indirect>; POINTS]) {
+    /// What is known at each of `points`: [`IrradianceCache::at`], to the bit. `known` keeps its other entries. And of each
+    /// how far the farthest is of the records that speak for it where something may hang too close over it for that; 0 where
+    /// nothing does.
+    pub fn at_all(
+        &self,
+        level: Level,
+        points: &Points,
+        known: &mut [Option<Indirect>; POINTS],
+    ) -> [f32; POINTS] {
         if points.wanted == 0 {
-            return;
+            return [0.0; POINTS];
         }
-        let [red, green, blue, shining, weights] = level.dispatch(Ask { cache: self, points });
+        let [red, green, blue, shining, weights, exposed] = level.dispatch(Ask { cache: self, points });
         let mut left = points.wanted;
         while left != 0 {
             let i = left.trailing_zeros() as usize % POINTS;
@@ -58,31 +71,42 @@ impl IrradianceCache<'_> {
                 shining: shining[i] / weight,
             });
         }
+        exposed.map(libm::sqrtf)
     }
 }
 
-/// The sums over all records: of the irradiance of each channel, of what shines, of weights.
+/// The sums over all records: of the irradiance of each channel, of what shines, of weights; and the greatest square of
+/// the distance to those of points over which something may hang.
 struct Ask<'a> {
     cache: &'a IrradianceCache<'a>,
     points: &'a Points,
 }
 
 impl Kernel for Ask<'_> {
-    type Out = [[f32; POINTS]; 5];
+    type Out = [[f32; POINTS]; 6];
 
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) -> Self::Out {
-        let Self { cache, points: Points { position, normal, wanted } } = self;
+        let Self { cache, points: Points { position, normal, within, wanted } } = self;
         let ([x, y, z], [u, v, w]) = (position, normal);
         let asked = Asked {
             position: [simd.load16(x), simd.load16(y), simd.load16(z)],
             normal: [simd.load16(u), simd.load16(v), simd.load16(w)],
+            within: simd.load16(within),
         };
         let (tree, records, least_cos) = cache.parts();
-        let mut sums = Sums { simd, records, least_cos, asked, sums: [simd.splat16(0.0); 5] };
+        let mut sums = Sums {
+            simd,
+            records,
+            least_cos,
+            asked,
+            sums: [simd.splat16(0.0); 5],
+            exposed: simd.splat16(0.0),
+        };
         tree.at_all(position, *wanted, &mut sums);
         let [a, b, c, d, e] = sums.sums;
-        [a.to_array(), b.to_array(), c.to_array(), d.to_array(), e.to_array()]
+        let exposed = sums.exposed.to_array();
+        [a.to_array(), b.to_array(), c.to_array(), d.to_array(), e.to_array(), exposed]
     }
 }
 
@@ -93,6 +117,7 @@ struct Sums<'a, S: Simd> {
     least_cos: f32,
     asked: Asked<S::F16>,
     sums: [S::F16; 5],
+    exposed: S::F16,
 }
 
 impl<S: Simd> Visit for Sums<'_, S> {
@@ -110,6 +135,11 @@ impl<S: Simd> Visit for Sums<'_, S> {
         for (sum, term) in self.sums.iter_mut().zip(terms) {
             *sum = (*sum + voice.weight * term).select(speaks, *sum);
         }
+        if record.is_free() {
+            return;
+        }
+        let exposed = record.square_exposed(width, voice.place);
+        self.exposed = self.exposed.max(exposed).select(speaks, self.exposed);
     }
 }
 
@@ -120,6 +150,7 @@ mod tests {
     use crate::geometry::Bounds;
     use crate::memory::{Arena, Line};
     use crate::sampling::Random;
+    use glam::Vec3;
     use std::vec;
 
     const RECORDS: u32 = 500;
@@ -158,21 +189,28 @@ mod tests {
             error: number(14),
             shining: number(15),
             fence: core::array::from_fn(|k| if number(16) < 0.3 { 255 } else { (200 + 4 * k) as u8 }),
+            free: core::array::from_fn(|k| if number(17) < 0.3 { 255 } else { (100 + 4 * k) as u8 }),
+            least: 0.01 * number(18),
             ..Record::default()
         }
     }
 
     /// What is known of `points` at all levels: of each as of it alone. How many are known.
     #[track_caller]
-    fn check(cache: &IrradianceCache, points: &[(Vec3, Vec3)]) -> usize {
+    fn check(cache: &IrradianceCache, points: &[Asker]) -> usize {
         let mut asked = Points::NONE;
-        points.iter().enumerate().for_each(|(i, &(position, normal))| asked.set(i, position, normal));
-        let alone = |i: usize| points.get(i).and_then(|&(position, normal)| cache.at(position, normal));
+        points.iter().enumerate().for_each(|(i, point)| asked.set(i, point));
+        let alone = |i: usize| points.get(i).and_then(|point| cache.at(point));
         let wanted: [Option<Indirect>; POINTS] = core::array::from_fn(alone);
         for level in Level::detect().and_below() {
             let mut known = [None; POINTS];
-            cache.at_all(level, &asked, &mut known);
+            let exposed = cache.at_all(level, &asked, &mut known);
             assert_eq!(known, wanted, "{}", level.name());
+            for (point, exposed) in points.iter().zip(exposed) {
+                let mut farthest = 0.0f32;
+                cache.visit(point, |record, _| farthest = farthest.max(record.exposed(point)));
+                assert_eq!(exposed, farthest);
+            }
         }
         wanted.iter().flatten().count()
     }
@@ -184,7 +222,7 @@ mod tests {
         let mut lines = vec![Line([0; 64]); IrradianceCache::footprint(RECORDS as usize).bytes() / 64];
         let mut arena = Arena::new(bytemuck::cast_slice_mut(&mut lines));
         let mut cache = IrradianceCache::new(&bounds, RECORDS as usize, &mut arena).unwrap();
-        assert_eq!(check(&cache, &[(Vec3::splat(0.5), Vec3::Z)]), 0);
+        assert_eq!(check(&cache, &[Asker::open(Vec3::splat(0.5), Vec3::Z)]), 0);
         (0..RECORDS).for_each(|i| _ = cache.insert(record(i)));
         let random = Random::new(5, 5);
         let mut known = 0;
@@ -196,13 +234,15 @@ mod tests {
                 .map(|k| {
                     let beside = place(&random, 10_000 + 16 * i + k);
                     let position = middle + size * Vec3::new(beside.x - middle.x, beside.y - middle.y, 0.0);
-                    (position, normal(&random, 90_000 + 16 * i + k))
+                    // Beneath something here and there.
+                    let within = if k % 3 == 0 { 0.1 * random.single(50_000 + i) } else { f32::INFINITY };
+                    Asker { position, normal: normal(&random, 90_000 + 16 * i + k), within }
                 })
                 .collect();
             known += check(&cache, &points);
         }
         assert!(known > 3000, "{known}");
-        let nowhere = [(Vec3::splat(2.0), Vec3::Z), (Vec3::NAN, Vec3::Z), (Vec3::NEG_INFINITY, Vec3::Z)];
+        let nowhere = [Vec3::splat(2.0), Vec3::NAN, Vec3::NEG_INFINITY].map(|p| Asker::open(p, Vec3::Z));
         assert_eq!(check(&cache, &nowhere), 0);
     }
 }

@@ -2,7 +2,7 @@
 //! random order wherever none reaches yet, and what is interpolated of them is held against the truth.
 
 use super::rooms::{Gather, LIGHT, OPEN, Random, Room, SHADOW, WALLS, with_tables};
-use super::{Derivatives, IrradianceCache, Metric, Record, metric};
+use super::{Asker, Derivatives, IrradianceCache, Metric, Record, metric};
 use crate::Level;
 use crate::geometry::{Bounds, Frame};
 use crate::light::luminance;
@@ -68,7 +68,7 @@ impl Floor {
         // Local axes are the world's.
         let frame = Frame { tangent: Vec3::X, bitangent: Vec3::Y, normal: Vec3::Z };
         for &i in &self.order {
-            if !cache.covers(self.points[i], Vec3::Z) {
+            if !cache.covers(&Asker::open(self.points[i], Vec3::Z)) {
                 let reach = metric::reach(&settings, &derivatives[i]);
                 let mut record = Record::new(self.points[i], &frame, &derivatives[i], &reach);
                 record.note_noise(self.noise[i]);
@@ -77,7 +77,7 @@ impl Floor {
         }
         let (mut squares, mut sum) = (0.0, 0.0);
         for (point, truth) in self.points.iter().zip(&self.truth) {
-            if let Some(found) = cache.at(*point, Vec3::Z) {
+            if let Some(found) = cache.at(&Asker::open(*point, Vec3::Z)) {
                 squares += (f64::from(found.irradiance.y) - truth).powi(2);
             }
             sum += truth;

@@ -4,7 +4,7 @@
 //! (Schwarzhaupt, Jensen and Jarosz 2012, §5). Its support may be wider, by the overlap that the metric allows. A fence
 //! cuts out of both what lies behind a wall.
 
-use super::lanes::{Asked, One, Voice, Width};
+use super::lanes::{Asked, Asker, One, Voice, Width};
 use super::{Derivatives, Reach};
 use crate::Rgb;
 use crate::geometry::Frame;
@@ -34,12 +34,19 @@ const MOST_OVERLAP: f32 = 2.0;
 const MISSED: f32 = 0.5;
 const MOST_MISSED: f32 = 0.3;
 
+/// A point beneath something hears no record that is farther than this many times the height of what hangs over it: light
+/// changes there over as little as that.
+pub const CLOSE: f32 = 2.0;
+
+/// It hears none whose least radius is more than one part in this many of that: such a record is too coarse.
+pub const FINE: f32 = 4.0;
+
 /// The least variance that a record is taken to have, relative: one that knows itself without noise is not alone.
 const LEAST_NOISE: f32 = 1e-6;
 
 /// See the file.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
-#[repr(C, align(32))]
+#[repr(C, align(16))]
 pub struct Record {
     // What decides whether it speaks for a point comes first, in one line of memory.
     /// x_i.
@@ -77,6 +84,8 @@ pub struct Record {
     pub nearness: f32,
     /// The least that R1 may be, m, whatever neighbours say.
     pub least: f32,
+    /// How far nothing hangs so close over points in each sector that they must not hear it, as the fence counts.
+    pub free: [u8; SECTORS],
 }
 
 impl Record {
@@ -113,6 +122,7 @@ impl Record {
             allowed: reach.allowed,
             least: reach.least,
             fence: [u8::MAX; SECTORS],
+            free: [u8::MAX; SECTORS],
         }
     }
 
@@ -140,6 +150,21 @@ impl Record {
             }
         }
         (self.noise, self.shining) = (found.noise, found.shining);
+    }
+
+    /// The same of radii so many times as large, over which light changes by as much. What hangs over it is to be looked for.
+    pub fn widened(&self, factor: f32) -> Self {
+        let narrow = |free: u8| if free == u8::MAX { free } else { (f32::from(free) / factor) as u8 };
+        Self {
+            radii: self.radii.map(|radius| factor * radius),
+            reach: factor * self.reach,
+            fence: self.fence.map(narrow),
+            free: [u8::MAX; SECTORS],
+            gradient: self.gradient.map(|channel| channel.map(|slope| slope / factor)),
+            bend: self.bend.map(|bend| bend / (factor * factor)),
+            error: factor * factor * self.error,
+            ..*self
+        }
     }
 
     /// The magnitude of the relative error that is expected on average where this record speaks: by its noise, of which
@@ -173,18 +198,37 @@ impl Record {
         Vec3::new(libm::sqrtf(square.x), libm::sqrtf(square.y), libm::sqrtf(square.z))
     }
 
-    /// What this record says of E at `position` with `normal`, and its weight w_i > 0 (equations 12 to 14 of the
-    /// paper). `least_cos` is the cosine of the greatest deviation of the normal. `None` outside of the support.
+    /// What this record says of E at `point`, and its weight w_i > 0 (equations 12 to 14 of the paper). `least_cos` is the
+    /// cosine of the greatest deviation of the normal. `None` outside of the support.
     #[inline]
-    pub fn at(&self, position: Vec3, normal: Vec3, least_cos: f32) -> Option<(Rgb, f32)> {
-        let (speaks, voice) = self.listen(One, &Asked::of(position, normal), least_cos, self.overlap);
+    pub fn at(&self, point: &Asker, least_cos: f32) -> Option<(Rgb, f32)> {
+        let (speaks, voice) = self.listen(One, &Asked::of(point), least_cos, self.overlap);
         speaks.then(|| (Rgb::from(self.said(One, &voice)), voice.weight))
     }
 
     /// Whether it covers the point.
     #[inline]
-    pub fn covers(&self, position: Vec3, normal: Vec3, least_cos: f32) -> bool {
-        self.listen(One, &Asked::of(position, normal), least_cos, 1.0).0
+    pub fn covers(&self, point: &Asker, least_cos: f32) -> bool {
+        self.listen(One, &Asked::of(point), least_cos, 1.0).0
+    }
+
+    /// How far away the records must be allowed to be that the point hears for this one to be heard, where something may
+    /// hang too close over it for that; 0 where nothing does.
+    #[inline]
+    pub(super) fn exposed(&self, point: &Asker) -> f32 {
+        let place = self.along_axes(point.position - Vec3::from(self.position));
+        libm::sqrtf(self.square_exposed(One, place.to_array()))
+    }
+
+    /// The square of that, of points at `place` along its axes.
+    #[inline(always)]
+    pub(super) fn square_exposed<W: Width>(&self, width: W, place: [W::L; 2]) -> W::L {
+        let free = width.pick(&self.free, sector(width, place));
+        let distance = free * width.all(self.reach / f32::from(u8::MAX));
+        let [x, y] = place;
+        let (square, least) = (x * x + y * y, FINE * self.least);
+        let is_exposed = free.lt(width.all(f32::from(u8::MAX))) & (distance * distance).lt(square);
+        square.max(width.all(least * least)).select(is_exposed, width.all(0.0))
     }
 
     /// Which of the points lie in a support of so many radii, and with what weight.
@@ -222,6 +266,8 @@ impl Record {
         let height = all(0.5) * (dot(offset, asked.normal) + z);
         let speaks = near & square.lt(one) & !height.lt(all(-IN_FRONT * r1));
         voice.place = [x, y];
+        let least = (x * x + y * y).sqrt().max(all(FINE * self.least));
+        let speaks = speaks & !asked.within.lt(least);
         let speaks = if self.is_fenced() { speaks & !self.is_fenced_off(width, voice.place) } else { speaks };
         // n_i × n along both axes.
         voice.turned = [-dot(asked.normal, across), dot(asked.normal, axis)];
@@ -281,6 +327,37 @@ impl Record {
         free.lt(width.all(f32::from(u8::MAX))) & (distance * distance).lt(x * x + y * y)
     }
 
+    /// Notes that something hangs over the sectors from `first` to `last`, which count on around the circle, so close that points at
+    /// more than `distance` may not hear this record.
+    pub fn note_overhang(&mut self, [first, last]: [i32; 2], distance: f32) {
+        let share = (distance / self.reach).clamp(0.0, 1.0);
+        for sector in first..=last.min(first + SECTORS as i32 - 1) {
+            if let Some(free) = self.free.get_mut(sector.rem_euclid(SECTORS as i32) as usize) {
+                *free = (*free).min((share * 255.0) as u8);
+            }
+        }
+    }
+
+    /// Whether nothing hangs close over any point in its support.
+    #[inline(always)]
+    pub(super) fn is_free(&self) -> bool {
+        self.free == [u8::MAX; SECTORS]
+    }
+
+    /// The farthest point that it speaks for, by its fence.
+    pub fn farthest(&self) -> f32 {
+        match self.fence.iter().max() {
+            Some(&most) if most < u8::MAX => f32::from(most) * (self.reach / f32::from(u8::MAX)),
+            _ => f32::INFINITY,
+        }
+    }
+
+    /// It speaks for nothing that is farther than `distance`, in whatever direction.
+    pub fn confine(&mut self, distance: f32) {
+        let share = (distance / self.reach).clamp(0.0, 1.0);
+        self.fence = self.fence.map(|free| free.min((share * 255.0) as u8));
+    }
+
     /// Notes a wall at `distance` from the record, in the direction of `place` along its axes.
     pub fn fence_off(&mut self, place: Vec2, distance: f32) {
         let share = (distance / self.reach).clamp(0.0, 1.0);
@@ -334,6 +411,7 @@ mod tests {
             overlap: 1.0,
             reach: 2.0,
             fence: [u8::MAX; SECTORS],
+            free: [u8::MAX; SECTORS],
             ..Record::default()
         }
     }
@@ -363,13 +441,13 @@ mod tests {
 
     #[test]
     fn it_extrapolates_along_its_axes_and_weighs_by_the_tent() {
-        let (e, w) = record().at(Vec3::new(0.5, 0.0, 0.0), Vec3::Z, LEAST_COS).unwrap();
+        let (e, w) = record().at(&Asker::open(Vec3::new(0.5, 0.0, 0.0), Vec3::Z), LEAST_COS).unwrap();
         assert!((e.x - 2.25).abs() < 1e-6 && (w - 0.5).abs() < 1e-6, "{e} {w}");
-        let (e, w) = record().at(Vec3::new(0.0, 1.0, 0.0), Vec3::Z, LEAST_COS).unwrap();
+        let (e, w) = record().at(&Asker::open(Vec3::new(0.0, 1.0, 0.0), Vec3::Z), LEAST_COS).unwrap();
         assert!((e.x - 1.0).abs() < 1e-6 && (w - 0.5).abs() < 1e-6, "{e} {w}");
         // Turned about x by 0.1: n_i × n = (sin, 0, 0) reversed; about y: along the second axis.
         let normal = Vec3::new(0.1f32.sin(), 0.0, 0.1f32.cos());
-        let (e, w) = record().at(Vec3::ZERO, normal, LEAST_COS).unwrap();
+        let (e, w) = record().at(&Asker::open(Vec3::ZERO, normal), LEAST_COS).unwrap();
         assert!((e.x - (2.0 + 3.0 * 0.1f32.sin())).abs() < 1e-6, "{e}");
         assert!((w - (0.1f32.cos() - LEAST_COS) / (1.0 - LEAST_COS)).abs() < 1e-4, "{w}");
     }
@@ -377,10 +455,10 @@ mod tests {
     #[test]
     fn it_overlaps_others_and_bends() {
         let record = Record { overlap: 2.0, bend: [0.0, 0.25], reach: 4.0, ..record() };
-        let (e, w) = record.at(Vec3::new(0.0, 3.0, 0.0), Vec3::Z, LEAST_COS).unwrap();
+        let (e, w) = record.at(&Asker::open(Vec3::new(0.0, 3.0, 0.0), Vec3::Z), LEAST_COS).unwrap();
         assert!((e.x - (2.0 - 3.0 + 2.0 * 0.25 * 9.0)).abs() < 1e-5 && (w - 0.25).abs() < 1e-6, "{e} {w}");
-        assert!(record.at(Vec3::new(0.0, 4.0, 0.0), Vec3::Z, LEAST_COS).is_none());
-        let covers = |y| record.covers(Vec3::new(0.0, y, 0.0), Vec3::Z, LEAST_COS);
+        assert!(record.at(&Asker::open(Vec3::new(0.0, 4.0, 0.0), Vec3::Z), LEAST_COS).is_none());
+        let covers = |y| record.covers(&Asker::open(Vec3::new(0.0, y, 0.0), Vec3::Z), LEAST_COS);
         assert_eq!((record.radii_to(Vec3::new(0.0, 3.0, 0.0)), record.radii_to(Vec3::X)), (1.5, 1.0));
         assert!(covers(1.9) && !covers(2.1));
         assert_eq!(record.extent(), Vec3::new(2.0, 4.0, 1.0));
@@ -392,17 +470,19 @@ mod tests {
         for (x, y, z) in
             [(1.0, 0.0, 0.0), (0.0, 2.0, 0.0), (0.0, 0.0, 1.0), (0.8, 1.3, 0.0), (0.0, 0.0, -0.2)]
         {
-            assert!(record.at(Vec3::new(x, y, z), Vec3::Z, LEAST_COS).is_none(), "{x} {y} {z}");
+            assert!(record.at(&Asker::open(Vec3::new(x, y, z), Vec3::Z), LEAST_COS).is_none(), "{x} {y} {z}");
         }
-        assert!(record.at(Vec3::ZERO, Vec3::new(0.3, 0.0, 0.954), LEAST_COS).is_none());
-        assert!(record.at(Vec3::ZERO, Vec3::NEG_Z, LEAST_COS).is_none());
-        assert!(Record { radii: [0.0; 2], ..record }.at(Vec3::ZERO, Vec3::Z, LEAST_COS).is_none());
+        assert!(record.at(&Asker::open(Vec3::ZERO, Vec3::new(0.3, 0.0, 0.954)), LEAST_COS).is_none());
+        assert!(record.at(&Asker::open(Vec3::ZERO, Vec3::NEG_Z), LEAST_COS).is_none());
+        assert!(
+            Record { radii: [0.0; 2], ..record }.at(&Asker::open(Vec3::ZERO, Vec3::Z), LEAST_COS).is_none()
+        );
     }
 
     #[test]
     fn what_it_says_stays_between_limits() {
         let steep = Record { gradient: [[100.0, 0.0]; 3], ..record() };
-        let at = |x| steep.at(Vec3::new(x, 0.0, 0.0), Vec3::Z, LEAST_COS).unwrap().0.x;
+        let at = |x| steep.at(&Asker::open(Vec3::new(x, 0.0, 0.0), Vec3::Z), LEAST_COS).unwrap().0.x;
         assert_eq!((at(0.9), at(-0.9)), (40.0, 0.1));
     }
 
@@ -438,9 +518,41 @@ mod tests {
             assert!(place.extend(0.0).distance(world) < 1e-6);
         }
         record.fence_off(Vec2::new(0.0, 1.0), 0.5);
-        let at = |x, y| record.at(Vec3::new(x, y, 0.0), Vec3::Z, LEAST_COS).is_some();
+        let at = |x, y| record.at(&Asker::open(Vec3::new(x, y, 0.0), Vec3::Z), LEAST_COS).is_some();
         assert!(at(0.01, 0.49) && !at(0.01, 0.51) && at(-0.01, 0.51) && at(0.01, -0.51) && at(0.51, 0.0));
         let bounds = record.extent();
         assert_eq!(bounds, Vec3::new(1.0, 2.0, 1.0));
+    }
+
+    #[test]
+    fn what_hangs_close_over_a_point_silences_what_is_far_or_coarse() {
+        let at = |record: &Record, x: f32, within: f32| {
+            let point = Asker { within, ..Asker::open(Vec3::new(x, 0.0, 0.0), Vec3::Z) };
+            record.at(&point, LEAST_COS).is_some()
+        };
+        let fine = record();
+        assert!(at(&fine, 0.5, f32::INFINITY) && at(&fine, 0.5, 0.51) && !at(&fine, 0.5, 0.49));
+        let coarse = Record { least: 0.1, ..fine };
+        assert!(at(&coarse, 0.1, FINE * 0.101) && !at(&coarse, 0.1, FINE * 0.099));
+        assert!(at(&coarse, 0.5, f32::INFINITY));
+    }
+
+    #[test]
+    fn points_are_exposed_beyond_what_was_noted_in_their_sector() {
+        let mut record = record();
+        let exposed =
+            |record: &Record, x: f32, y: f32| record.exposed(&Asker::open(Vec3::new(x, y, 0.0), Vec3::Z));
+        assert!(record.is_free() && exposed(&record, 0.9, 0.0) == 0.0);
+        let sector = Record::sector(Vec2::new(0.9, 0.1)) as i32;
+        record.note_overhang([sector, sector], 0.5);
+        assert!(!record.is_free() && exposed(&record, 0.4, 0.05) == 0.0);
+        assert!((exposed(&record, 0.8, 0.08) - 0.8f32.hypot(0.08)).abs() < 1e-6);
+        assert_eq!((exposed(&record, 0.0, 0.9), exposed(&record, -0.9, 0.1)), (0.0, 0.0));
+        // Around the circle, and no farther.
+        record.note_overhang([-1, 40], 0.0);
+        assert_eq!(record.free, [0; SECTORS]);
+        assert_eq!(record.farthest(), f32::INFINITY);
+        record.confine(0.5);
+        assert!((record.farthest() - 0.5).abs() < record.reach / 255.0 && record.farthest() <= 0.5);
     }
 }

@@ -1,5 +1,6 @@
 //! The cache: records, the octree that finds them, and what they say together of the irradiance at a point.
 
+use super::lanes::Asker;
 use super::metric::radius;
 use super::octree::Octree;
 use super::record::Record;
@@ -91,16 +92,16 @@ impl<'m> IrradianceCache<'m> {
         self.refused
     }
 
-    /// What is known at `position` on a surface of unit `normal`; `None` where no record reaches.
+    /// What is known at `point`; `None` where no record reaches.
     ///
     /// E = Σ w_i (E_i + ∇E_i · Δx_i + ∇_n E_i · (n_i × n)) / Σ w_i (Schwarzhaupt et al. 2012, equation 12), with the
     /// second order where a metric has it.
     #[inline]
-    pub fn at(&self, position: Vec3, normal: Vec3) -> Option<Indirect> {
+    pub fn at(&self, point: &Asker) -> Option<Indirect> {
         let (mut sum, mut shining, mut weights) = (Rgb::ZERO, 0.0, 0.0);
-        self.tree.at(position, |index| {
+        self.tree.at(point.position, |index| {
             if let Some(record) = self.records.get(index as usize)
-                && let Some((irradiance, weight)) = record.at(position, normal, self.least_cos)
+                && let Some((irradiance, weight)) = record.at(point, self.least_cos)
             {
                 sum += weight * irradiance;
                 shining += weight * record.shining;
@@ -111,15 +112,17 @@ impl<'m> IrradianceCache<'m> {
         (weights > 0.0).then(|| Indirect { irradiance: sum / weights, shining: shining / weights })
     }
 
-    /// What one of the records says that [`IrradianceCache::at`] asks: enough where many points are averaged.
+    /// What one of the records says that [`IrradianceCache::at`] asks: enough where many points are averaged. And as
+    /// [`IrradianceCache::at_all`] has it, how far that record is.
     #[inline]
-    pub fn roughly(&self, position: Vec3, normal: Vec3) -> Option<Indirect> {
+    pub fn roughly(&self, point: &Asker) -> Option<(Indirect, f32)> {
         let mut found = None;
-        self.tree.at(position, |index| {
+        self.tree.at(point.position, |index| {
             if let Some(record) = self.records.get(index as usize)
-                && let Some((irradiance, _)) = record.at(position, normal, self.least_cos)
+                && let Some((irradiance, _)) = record.at(point, self.least_cos)
             {
-                found = Some(Indirect { irradiance, shining: record.shining });
+                let exposed = record.exposed(point);
+                found = Some((Indirect { irradiance, shining: record.shining }, exposed));
             }
             found.is_none()
         });
@@ -133,10 +136,10 @@ impl<'m> IrradianceCache<'m> {
     }
 
     /// Calls `visit` with the records that speak for a point, and their weights.
-    pub fn visit(&self, position: Vec3, normal: Vec3, mut visit: impl FnMut(&Record, f32)) {
-        self.tree.at(position, |index| {
+    pub fn visit(&self, point: &Asker, mut visit: impl FnMut(&Record, f32)) {
+        self.tree.at(point.position, |index| {
             if let Some(record) = self.records.get(index as usize)
-                && let Some((_, weight)) = record.at(position, normal, self.least_cos)
+                && let Some((_, weight)) = record.at(point, self.least_cos)
             {
                 visit(record, weight);
             }
@@ -144,13 +147,26 @@ impl<'m> IrradianceCache<'m> {
         });
     }
 
-    /// Whether some record covers the point.
+    /// Calls `hear` with what each of the records says that speak for a point, and with its weight.
+    pub fn hear(&self, point: &Asker, mut hear: impl FnMut(Rgb, f32)) {
+        self.tree.at(point.position, |index| {
+            if let Some(record) = self.records.get(index as usize)
+                && let Some((irradiance, weight)) = record.at(point, self.least_cos)
+            {
+                hear(irradiance, weight);
+            }
+            true
+        });
+    }
+
+    /// Whether some record covers the point: one that must be heard, whatever hangs over it, where nobody has looked up from there.
     #[inline]
-    pub fn covers(&self, position: Vec3, normal: Vec3) -> bool {
+    pub fn covers(&self, point: &Asker) -> bool {
         let mut covered = false;
-        self.tree.at(position, |index| {
+        self.tree.at(point.position, |index| {
             let record = self.records.get(index as usize);
-            covered = record.is_some_and(|record| record.covers(position, normal, self.least_cos));
+            let is_heard = |record: &Record| point.within < f32::INFINITY || record.exposed(point) == 0.0;
+            covered = record.is_some_and(|record| record.covers(point, self.least_cos) && is_heard(record));
             !covered
         });
         covered
@@ -182,6 +198,14 @@ impl<'m> IrradianceCache<'m> {
     pub fn correct(&mut self, number: usize, found: &Record) {
         if let Some(record) = self.records.get_mut(..self.used).and_then(|all| all.get_mut(number)) {
             record.correct(found);
+        }
+    }
+
+    /// Takes `record` in place of that of that number, which stands at the same place. The cache is to be settled when all are
+    /// replaced: what is wider is not found before.
+    pub fn replace(&mut self, number: usize, record: Record) {
+        if let Some(slot) = self.records.get_mut(..self.used).and_then(|all| all.get_mut(number)) {
+            *slot = record;
         }
     }
 
@@ -306,7 +330,9 @@ impl Record {
     /// none, or one that noise explains or that the radii of both are made for.
     fn misses(&self, other: &Record, least_cos: f32) -> f32 {
         let (place, normal) = (Vec3::from(other.position), Vec3::from(other.normal));
-        let Some((said, _)) = self.at(place, normal, least_cos) else { return 0.0 };
+        // What hangs close over the other has confined it.
+        let point = Asker { position: place, normal, within: other.farthest() };
+        let Some((said, _)) = self.at(&point, least_cos) else { return 0.0 };
         let (here, there) = (luminance(self.irradiance.into()), luminance(other.irradiance.into()));
         let square = place.distance_squared(self.position.into());
         // The gradient has noise too.
@@ -376,6 +402,7 @@ mod tests {
             overlap: 1.0,
             reach: 1.5 * radius,
             fence: [u8::MAX; SECTORS],
+            free: [u8::MAX; SECTORS],
             ..Record::default()
         }
     }
@@ -410,11 +437,11 @@ mod tests {
             }
             for i in 0..1000 {
                 let (x, y) = (random.single(10_000 + 2 * i), random.single(10_001 + 2 * i));
-                let e = cache.at(Vec3::new(x, y, 0.5), Vec3::Z).unwrap().irradiance;
+                let e = cache.at(&Asker::open(Vec3::new(x, y, 0.5), Vec3::Z)).unwrap().irradiance;
                 assert!(e.distance(Vec3::new(1.0 + x, 2.0, 2.0)) < 1e-5, "{x} {y}: {e}");
-                assert!(cache.covers(Vec3::new(x, y, 0.5), Vec3::Z));
-                assert_eq!(cache.at(Vec3::new(x, y, 0.5), Vec3::NEG_Z), None);
-                assert_eq!(cache.at(Vec3::new(x, y, 0.9), Vec3::Z), None);
+                assert!(cache.covers(&Asker::open(Vec3::new(x, y, 0.5), Vec3::Z)));
+                assert_eq!(cache.at(&Asker::open(Vec3::new(x, y, 0.5), Vec3::NEG_Z)), None);
+                assert_eq!(cache.at(&Asker::open(Vec3::new(x, y, 0.9), Vec3::Z)), None);
             }
         });
     }
@@ -429,7 +456,8 @@ mod tests {
                 let bent = Record { bend: [radius; 2], ..record(random.single(3 * i + 1), 0.5, radius) };
                 cache.insert(Record { position: point(9_000 + i).to_array(), ..bent });
             }
-            let covered = |cache: &IrradianceCache, i| cache.covers(point(i), Vec3::Z);
+            let said = |cache: &IrradianceCache, i| cache.at(&Asker::open(point(i), Vec3::Z));
+            let covered = |cache: &IrradianceCache, i| cache.covers(&Asker::open(point(i), Vec3::Z));
             let before: vec::Vec<_> = (0..500).map(|i| covered(cache, i)).collect();
             cache.settle();
             assert!((0..500).all(|i| covered(cache, i) == before[i as usize]));
@@ -437,7 +465,7 @@ mod tests {
                 other.insert(record(0.5, 0.5, 0.5));
                 other.restore(cache.records());
                 assert_eq!((other.records(), other.refused()), (cache.records(), 0));
-                assert!((0..500).all(|i| other.at(point(i), Vec3::Z) == cache.at(point(i), Vec3::Z)));
+                assert!((0..500).all(|i| said(other, i) == said(cache, i)));
             });
             with_cache(200, |other| {
                 other.restore(cache.records());

@@ -34,6 +34,12 @@ const ALONE: f32 = 1.3;
 const GATHERED: [usize; 2] = [8, 32];
 const GATHERED_PART: usize = 4;
 
+/// Records that had no time for others beside them become wider, step by step, until they serve this share of what the camera sees, and
+/// by so much at most.
+const WIDER: f32 = 1.3;
+const WIDEST: f32 = 6.0;
+const NEARLY_ALL: f64 = 0.98;
+
 /// Glints that are kept of each record, and looked at closely of each batch; how many of these may be no spots.
 const GLINTS: usize = 4;
 const LOOKS: usize = 8;
@@ -258,9 +264,9 @@ impl<'a> Growing<'a> {
         glints
     }
 
-    /// Whether nothing is to be gathered at `place`.
-    fn is_served(&self, place: &Place) -> bool {
-        self.cache.is_full() || self.cache.covers(place.position(), place.normal())
+    /// Whether nothing is to be gathered at `place`: a record of fewer than so many pixels serves no other.
+    fn is_served(&self, place: &Place, least_pixels: f32) -> bool {
+        self.cache.is_full() || place.is_confined(least_pixels) || self.cache.covers(&place.asker())
     }
 }
 
@@ -294,13 +300,13 @@ impl<F: Features> Overture<'_, '_, F> {
                 growing.sweep(has_rough);
                 continue;
             }
-            let is_missing = |place: &Place| !growing.is_served(place);
+            let is_missing = |place: &Place| !growing.is_served(place, self.gathering.least_pixels);
             let Some(mut missing) = self.look(&order, growing.next, sight, &is_missing, crew, scratch)?
             else {
                 return Ok(false);
             };
             while !missing.is_empty() {
-                missing.retain(|place| !growing.is_served(place));
+                missing.retain(|place| !growing.is_served(place, self.gathering.least_pixels));
                 let [fewest, most] = GATHERED;
                 let most = (growing.cache.records().len() / GATHERED_PART).clamp(fewest, most);
                 let batch: Vec<Place> = missing.drain(..missing.len().min(most)).collect();
@@ -331,8 +337,45 @@ impl<F: Features> Overture<'_, '_, F> {
         let Some(places) = self.look(&order, first, sight, &|_| true, crew, scratch)? else {
             return Ok(None);
         };
-        let served = places.iter().filter(|place| growing.is_served(place)).count();
+        let served =
+            places.iter().filter(|place| growing.is_served(place, self.gathering.least_pixels)).count();
         Ok((!places.is_empty()).then(|| served as f64 / places.len() as f64))
+    }
+
+    /// Makes records wider, all by the same factor, until they serve nearly all that the camera sees or are [`WIDEST`] times as wide:
+    /// where there was no time to fill the cache, it is coarser everywhere rather than good in places. Its first records are
+    /// spread evenly over the picture.
+    pub(in crate::drive) fn widen(
+        &self,
+        growing: &mut Growing,
+        crew: &mut Crew,
+        scratch: &mut [Vec<Line>],
+    ) -> Result<(), RenderError> {
+        let mut factor = 1.0;
+        while factor < WIDEST
+            && !growing.cache.records().is_empty()
+            && self.served(growing, crew, scratch)?.is_some_and(|served| served < NEARLY_ALL)
+        {
+            factor *= WIDER;
+            let mut wide = vec![Record::default(); growing.cache.records().len()];
+            let widen = |index: usize, _: &mut Arena, out: &mut [Record]| {
+                let mut counters = Counters::default();
+                let found = growing.cache.records().get(index).zip(growing.places.get(index));
+                if let (Some(out), Some((record, place))) = (out.first_mut(), found) {
+                    *out = match place.is_some() {
+                        true => self.tracer.widened(record, place, WIDER, &mut counters),
+                        false => *record,
+                    };
+                }
+                Ok(counters)
+            };
+            if !crew.pass(&mut wide, 1, scratch, &widen)? {
+                return Ok(());
+            }
+            wide.into_iter().enumerate().for_each(|(i, record)| growing.cache.replace(i, record));
+            growing.cache.settle();
+        }
+        Ok(())
     }
 
     /// What pixels see from the `first` of the order on, as far as it is wanted; `None` where the round is over.
@@ -349,7 +392,11 @@ impl<F: Features> Overture<'_, '_, F> {
         let look = |task: usize, _: &mut Arena, out: &mut [Place]| {
             let mut counters = Counters::default();
             self.tracer.places(order, first + (task * PIXELS) as u64, sight, out, &mut counters);
-            out.iter_mut().filter(|place| !is_wanted(place)).for_each(|place| *place = Place::NONE);
+            let leave_out =
+                |out: &mut [Place]| out.iter_mut().filter(|p| !is_wanted(p)).for_each(|p| *p = Place::NONE);
+            leave_out(out);
+            self.tracer.look_up(out, &mut counters);
+            leave_out(out);
             Ok(counters)
         };
         let is_done = crew.pass(&mut places, PIXELS, scratch, &look)?;

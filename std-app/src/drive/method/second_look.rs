@@ -6,7 +6,7 @@ use crate::drive::RenderError;
 use crate::drive::crew::Crew;
 use core::f32::consts::PI;
 use halflight_core::bsdf::Features;
-use halflight_core::cache::irradiance::{IrradianceCache, Record};
+use halflight_core::cache::irradiance::{Asker, IrradianceCache, Record};
 use halflight_core::memory::{Arena, Line};
 use halflight_core::transport::Counters;
 use halflight_core::transport::gather::{Gathering, Place};
@@ -32,7 +32,7 @@ fn worth(growing: &Growing, pixels: f32) -> Vec<f32> {
 /// by chance than where they have missed it: if it looked again for that, pictures would be too dark.
 fn noise_around(cache: &IrradianceCache, record: &Record) -> Option<f32> {
     let (mut sum, mut weights) = (0.0, 0.0);
-    cache.visit(record.position.into(), record.normal.into(), |other, weight| {
+    cache.visit(&Asker::open(record.position.into(), record.normal.into()), |other, weight| {
         if other.position != record.position {
             (sum, weights) = (sum + weight * other.noise, weights + weight);
         }

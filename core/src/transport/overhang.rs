@@ -1,0 +1,194 @@
+//! What hangs over places of surfaces: shelves, panels, lamps under ceilings, boards behind furniture. Where it hangs close, light
+//! changes over as little as it is high, and it is seen edge-on from farther away, where hardly a ray of a hemisphere meets it. So
+//! a record knows how low anything hangs over its support, by a walk through the hierarchy that misses none; and a point
+//! that asks it from farther away than that would allow looks upwards once.
+
+use super::estimator::Counters;
+use super::gather::Place;
+use super::path::{BLOCK, PathTracer};
+use crate::bsdf::Features;
+use crate::bvh::Coherence;
+use crate::cache::irradiance::{CLOSE, FINE, Record, SECTORS};
+use crate::geometry::{Frame, Hit, Ray};
+use crate::scene::{Surface, SurfacePoint};
+use glam::{Vec2, Vec3};
+
+/// No record reaches farther, in diagonals of the scene.
+const MOST: f32 = 0.25;
+
+/// Ways to look upwards: along the normal, and at half a right angle to all sides.
+const WAYS: usize = 5;
+const TILTS: [[f32; 2]; WAYS] = [[0.0, 0.0], [1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]];
+
+/// What is met on one side hangs where it is at most sixty degrees steep; otherwise it is a wall.
+const STEEPEST: f32 = 0.5;
+
+/// Of what may hang over a record the planes are less steep than this (the cosine to its normal): the normals of a record and of
+/// the points that ask it differ.
+const STEEP: f32 = 0.25;
+
+/// A surface that bends upwards, whose heights go with the square of the distance, has risen twice as much where it is met
+/// as it is high there. What hangs has risen less.
+const BENDS: f32 = 1.8;
+
+/// What is no higher over the plane than its points are uncertain, or than so small a part of the reach, is the same surface.
+const FLAT: f32 = 4.0;
+const FLATTEST: f32 = 2.5e-5;
+
+/// Where to look from.
+#[derive(Clone, Copy)]
+struct Probe {
+    origin: Vec3,
+    normal: Vec3,
+    length: f32,
+}
+
+impl<F: Features> PathTracer<'_, F> {
+    /// How far away the records may be ([`crate::cache::irradiance::Asker::within`]) that these points hear, each of which wants to
+    /// hear such as are so far `exposed`.
+    pub(super) fn within(
+        &self,
+        points: &[Option<&SurfacePoint>; BLOCK],
+        exposed: &[f32; BLOCK],
+        counters: &mut Counters,
+    ) -> [f32; BLOCK] {
+        let mut within = [f32::INFINITY; BLOCK];
+        for ((within, point), exposed) in within.iter_mut().zip(points).zip(exposed) {
+            if let Some(point) = point.filter(|_| *exposed > 0.0) {
+                counters.rays += WAYS as u64;
+                let normal = point.geometric_normal;
+                let origin = point.position + point.error * normal;
+                *within = CLOSE * self.headroom(&Probe { origin, normal, length: exposed / CLOSE });
+            }
+        }
+        within
+    }
+
+    /// Looks how high what hangs over each of `places` is, as far as records reach.
+    pub fn look_up(&self, places: &mut [Place], counters: &mut Counters) {
+        let length = MOST * self.bvh.bounds().diagonal();
+        for place in places.iter_mut().filter(|place| place.is_some()) {
+            counters.rays += WAYS as u64;
+            let normal = Vec3::from(place.geometric_normal);
+            let origin = place.position() + place.error * normal;
+            place.within = (CLOSE * self.headroom(&Probe { origin, normal, length })).min(f32::MAX);
+        }
+    }
+
+    /// How far it is to what hangs over a point and hides light; infinite where it is farther than the probe is long.
+    fn headroom(&self, probe: &Probe) -> f32 {
+        let frame = Frame::from_normal(probe.normal);
+        let rays = TILTS.map(|[x, y]| {
+            let direction = frame.to_world(Vec3::new(x, y, 1.0)).normalize_or_zero();
+            Ray::segment(probe.origin, direction, probe.length)
+        });
+        let mut hits = [Hit::NONE; WAYS];
+        self.bvh.nearest_batch(self.level, &rays, Coherence::Incoherent, &mut hits);
+        let hanging = hits.iter().filter(|hit| self.hangs(hit, probe.normal));
+        hanging.map(|hit| hit.t).fold(f32::INFINITY, f32::min)
+    }
+
+    /// Whether what was met hangs over a surface of that normal and hides light. Glass and what is cut out do not.
+    fn hangs(&self, hit: &Hit, normal: Vec3) -> bool {
+        let mesh = &self.scene.mesh;
+        let Some(triangle) = mesh.triangles.get(hit.triangle as usize) else { return false };
+        let [a, b, c] = mesh.corners(hit.triangle);
+        let cos = (b - a).cross(c - a).normalize_or_zero().dot(normal);
+        let material = self.scene.materials.get(triangle.material as usize);
+        cos.abs() > STEEPEST
+            && material.is_some_and(|material| {
+                !matches!(material.surface, Surface::Dielectric { .. }) && !material.has_cutout()
+            })
+    }
+
+    /// Notes what hangs over the support of a record at `place`, and over the place.
+    pub(super) fn note_overhangs(&self, record: &mut Record, place: &Place) {
+        record.confine(place.within);
+        let least = FINE * record.least;
+        // Higher than this nothing matters, and what is met at a tilt is as far outside.
+        let height = record.reach.max(least) / CLOSE;
+        let reach = record.reach + height;
+        let (middle, normal) = (place.position(), Vec3::from(place.geometric_normal));
+        let along = (Vec3::ONE - normal * normal).max(Vec3::ZERO).to_array().map(libm::sqrtf);
+        let half = reach * Vec3::from(along) + 0.5 * height * normal.abs();
+        let center = middle + 0.5 * height * normal;
+        let local = |corner: Vec3| {
+            let offset = corner - middle;
+            record.along_axes(offset).extend(offset.dot(normal))
+        };
+        let flat = FLAT * place.error.max(FLATTEST * reach);
+        let mut noted = *record;
+        let is_whole = self.bvh.overlapping(center - half, center + half, |corners| {
+            if let Some(overhang) = Overhang::of(corners.map(local), reach, flat) {
+                let Overhang { sectors, from, height } = overhang;
+                let close = if CLOSE * height < least { 0.0 } else { CLOSE * height };
+                noted.note_overhang(sectors, close.max(from - height));
+            }
+            true
+        });
+        if !is_whole {
+            noted.free = [0; SECTORS];
+        }
+        *record = noted;
+    }
+}
+
+/// A triangle that hangs over a disc.
+struct Overhang {
+    /// The sectors that it may take, which count on around the circle.
+    sectors: [i32; 2],
+    /// How far from the middle it may begin, and how low it may come.
+    from: f32,
+    height: f32,
+}
+
+impl Overhang {
+    /// The triangle of these corners, over a disc of that radius around the origin in the plane z = 0; what is no higher than `flat` is
+    /// the plane.
+    fn of(corners: [Vec3; 3], reach: f32, flat: f32) -> Option<Self> {
+        let [a, b, c] = corners;
+        let (highest, lowest) = (a.max(b).max(c), a.min(b).min(c));
+        let normal = (b - a).cross(c - a);
+        let is_steep = normal.z.abs() <= STEEP * normal.length();
+        let [x, y] = [highest.x.min(-lowest.x), highest.y.min(-lowest.y)];
+        if is_steep || x.min(y) < -reach || highest.z <= flat {
+            return None;
+        }
+        // The height of its plane over the middle, and its slope.
+        let (middle, slope) = (normal.dot(a) / normal.z, normal.truncate().length() / normal.z.abs());
+        let height = lowest.z.max(middle - reach * slope).max(0.0);
+        let bends = middle <= 0.0 && height - middle >= BENDS * height;
+        if bends {
+            return None;
+        }
+        let flat = corners.map(Vec3::truncate);
+        let from = distance(flat);
+        if from <= 2.0 * height {
+            return Some(Self { sectors: [0, SECTORS as i32 - 1], from, height });
+        }
+        // The origin is outside: no corner is half a circle away from another.
+        let [first, second, third] = flat.map(Record::sector);
+        let half = SECTORS as f32 / 2.0;
+        let turn = |to: f32| (to - first + 3.0 * half) % (2.0 * half) - half;
+        let (low, high) = (turn(second).min(turn(third)).min(0.0), turn(second).max(turn(third)).max(0.0));
+        // What is met at a tilt is at most in the next sector.
+        let sectors = [libm::floorf(first + low) as i32 - 1, libm::floorf(first + high) as i32 + 1];
+        Some(Self { sectors, from, height })
+    }
+}
+
+/// How far the origin is from a triangle; 0 inside.
+fn distance(corners: [Vec2; 3]) -> f32 {
+    let [a, b, c] = corners;
+    let sides = [(a, b), (b, c), (c, a)];
+    let areas = sides.map(|(p, q)| p.perp_dot(q));
+    if areas.iter().all(|area| *area >= 0.0) || areas.iter().all(|area| *area <= 0.0) {
+        return 0.0;
+    }
+    let to = |(p, q): (Vec2, Vec2)| {
+        let along = q - p;
+        let share = (-p.dot(along) / along.length_squared()).clamp(0.0, 1.0);
+        (p + share * along).length()
+    };
+    sides.map(to).into_iter().fold(f32::INFINITY, f32::min)
+}

@@ -1,0 +1,123 @@
+//! Records of the irradiance cache do not leak into gaps: behind a picture, beneath a bench, over a board under the
+//! ceiling there is the light that paths find, however narrow the gap is beside the room.
+
+use glam::Vec3;
+use halflight::drive::{Method, RenderResult};
+use halflight_core::Rgb;
+use halflight_core::camera::Camera;
+use halflight_core::scene::{Material, Scene};
+use halflight_tests::render::render;
+use halflight_tests::scenes::{SceneBuffers, emitter};
+
+const SIZE: u32 = 48;
+
+/// A room of 4 x 3 x 4 with a lamp, and a board that lies a gap away from one of its walls.
+struct Slot {
+    /// Of the wall: its axis, where it is along that, and which way is inside.
+    axis: usize,
+    wall: f32,
+    inside: f32,
+    gap: f32,
+    /// The board, along the other two axes.
+    low: Vec3,
+    high: Vec3,
+    eye: Vec3,
+    target: Vec3,
+}
+
+impl Slot {
+    fn buffers(&self) -> SceneBuffers {
+        let camera = Camera::look_at(self.eye, self.target, Vec3::Y, 20.0);
+        let mut buffers = SceneBuffers::new(camera);
+        let white = buffers.material(Material::diffuse(Rgb::new(0.73, 0.7, 0.65)));
+        let board = buffers.material(Material::diffuse(Rgb::new(0.5, 0.3, 0.2)));
+        let lamp = buffers.material(emitter(0.0, 10.0));
+        buffers.cuboid(Vec3::new(-2.0, 0.0, -2.0), Vec3::new(2.0, 3.0, 2.0), true, white);
+        // In the middle, away from all walls.
+        buffers.square(Vec3::new(0.0, 1.7, 0.8), Vec3::NEG_Y, 0.6, lamp);
+        buffers.square(Vec3::new(0.0, 1.701, 0.8), Vec3::Y, 0.6, lamp);
+        let (mut low, mut high) = (self.low, self.high);
+        let [near, far] = [self.gap, self.gap + 0.02].map(|height| self.wall + self.inside * height);
+        (low[self.axis], high[self.axis]) = (near.min(far), near.max(far));
+        buffers.cuboid(low, high, false, board);
+        buffers
+    }
+
+    /// Whether the middle of a pixel shows the wall behind the board.
+    fn is_behind(&self, scene: &Scene, [x, y]: [u32; 2]) -> bool {
+        let camera = &scene.camera;
+        let at = |i: u32| (2.0 * (i as f32 + 0.5) / SIZE as f32 - 1.0) * camera.tan_half_fov;
+        let direction = camera.forward + at(x) * camera.right - at(y) * camera.up;
+        let covers = |height: f32| {
+            let along = (self.wall + self.inside * height - self.eye[self.axis]) / direction[self.axis];
+            let place = self.eye + along * direction;
+            let holds = |k: usize| k == self.axis || (self.low[k]..self.high[k]).contains(&place[k]);
+            along > 0.0 && (0..3).all(holds)
+        };
+        covers(0.0) && !covers(self.gap) && !covers(self.gap + 0.02)
+    }
+
+    /// How much too bright the gap is in the mean of its pixels, relative to them.
+    fn leak(&self, scene: &Scene, path: &RenderResult, cached: &RenderResult) -> f64 {
+        let (mut sums, mut count) = ([0.0; 2], 0);
+        for (i, (a, b)) in path.image.pixels.iter().zip(&cached.image.pixels).enumerate() {
+            if self.is_behind(scene, [i as u32 % SIZE, i as u32 / SIZE]) {
+                sums[0] += f64::from(a[1]);
+                sums[1] += f64::from(b[1]);
+                count += 1;
+            }
+        }
+        assert!(count > 20, "{count} pixels of a gap of {}", self.gap);
+        sums[1] / sums[0] - 1.0
+    }
+}
+
+/// A picture on the wall, from the side; a bench on the floor; a board under the ceiling.
+fn slots(gap: f32) -> [Slot; 3] {
+    let picture = Slot {
+        axis: 2,
+        wall: -2.0,
+        inside: 1.0,
+        gap,
+        low: Vec3::new(-0.5, 1.0, 0.0),
+        high: Vec3::new(0.5, 2.0, 0.0),
+        eye: Vec3::new(-1.5, 1.5, -2.0 + 0.3 + gap),
+        target: Vec3::new(-0.5, 1.5, -2.0),
+    };
+    let bench = Slot {
+        axis: 1,
+        wall: 0.0,
+        inside: 1.0,
+        gap,
+        low: Vec3::new(-0.8, 0.0, -1.0),
+        high: Vec3::new(0.8, 0.0, 0.0),
+        eye: Vec3::new(0.0, 0.3 + gap, 1.2),
+        target: Vec3::ZERO,
+    };
+    let board = Slot {
+        axis: 1,
+        wall: 3.0,
+        inside: -1.0,
+        gap,
+        low: Vec3::new(-0.6, 0.0, -1.2),
+        high: Vec3::new(0.6, 0.0, -0.2),
+        eye: Vec3::new(0.3, 2.6 - gap, 1.0),
+        target: Vec3::new(0.0, 3.0, -0.2),
+    };
+    [picture, bench, board]
+}
+
+#[test]
+fn gaps_have_the_light_of_paths() {
+    for gap in [0.03, 0.12] {
+        for slot in slots(gap) {
+            let buffers = slot.buffers();
+            let scene = buffers.scene();
+            let path = render(&scene, Method::Path, SIZE, 512, |_| ());
+            let cached = render(&scene, Method::IrradianceCache, SIZE, 128, |_| ());
+            let leak = slot.leak(&scene, &path, &cached);
+            println!("gap {gap} at axis {} wall {}: {leak:+.4}", slot.axis, slot.wall);
+            assert!(leak.abs() < 0.05, "gap {gap}, axis {}, wall {}: {leak}", slot.axis, slot.wall);
+        }
+    }
+}
