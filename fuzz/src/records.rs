@@ -5,7 +5,7 @@ use crate::numbers::{fraction, point};
 use arbitrary::{Result, Unstructured};
 use glam::Vec3;
 use halflight_core::Level;
-use halflight_core::cache::irradiance::{IrradianceCache, POINTS, Points, Record, SECTORS};
+use halflight_core::cache::irradiance::{Asker, IrradianceCache, POINTS, Points, Record, SECTORS};
 use halflight_core::geometry::Bounds;
 use halflight_core::memory::{Arena, Line};
 
@@ -44,8 +44,11 @@ fn attempt(input: &mut Unstructured) -> Result<()> {
             _ => Vec3::from(point(input)?),
         };
         let normal = normal(input)?;
-        points.set(i, position, normal);
-        *wanted = cache.at(position, normal);
+        let beneath = input.arbitrary::<u8>()? < 64;
+        let within = if beneath { 0.3 * fraction(input)? } else { f32::INFINITY };
+        let asker = Asker { position, normal, within };
+        points.set(i, &asker);
+        *wanted = cache.at(&asker);
     }
     for level in Level::detect().and_below() {
         let mut known = [None; POINTS];
@@ -77,7 +80,9 @@ fn record(input: &mut Unstructured) -> Result<Record> {
     let (gradient, rotation) = ([pair()?, pair()?, pair()?], [pair()?, pair()?, pair()?]);
     let (bend, [noise, error], [allowed, shining]) = (pair()?, pair()?, pair()?);
     let irradiance = within(input)?;
-    let fence: [u8; SECTORS] = if input.arbitrary()? { input.arbitrary()? } else { [u8::MAX; SECTORS] };
+    let mut sectors =
+        || if input.arbitrary()? { input.arbitrary() } else { Ok([u8::MAX; SECTORS]) };
+    let (fence, free): ([u8; SECTORS], [u8; SECTORS]) = (sectors()?, sectors()?);
     let radii = [r1, r1 * (1.0 + longer)];
     Ok(Record {
         position: within(input)?.to_array(),
@@ -95,6 +100,7 @@ fn record(input: &mut Unstructured) -> Result<Record> {
         allowed: 1e-3 * allowed.max(0.0),
         shining: shining.abs(),
         fence,
+        free,
         ..Record::default()
     })
 }

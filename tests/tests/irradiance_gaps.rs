@@ -1,5 +1,5 @@
-//! Records of the irradiance cache do not leak into gaps: behind a picture, beneath a bench, over a board under the
-//! ceiling there is the light that paths find, however narrow the gap is beside the room.
+//! Records of the irradiance cache do not leak into gaps: behind a picture, beneath a bench, over a board
+//! under the ceiling there is the light that paths find, however narrow the gap is beside the room.
 
 use glam::Vec3;
 use halflight::drive::{Method, RenderResult};

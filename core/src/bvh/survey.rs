@@ -67,8 +67,8 @@ impl Bvh<'_> {
         survey
     }
 
-    /// Calls `visit` with the triangles whose leaves overlap a box, as long as it says yes. `false` where the place is
-    /// too crowded for all of them to be found.
+    /// Calls `visit` with the triangles whose leaves overlap a box, as long as it says yes. `false` where the
+    /// place is too crowded for all of them to be found.
     #[inline(always)]
     pub(crate) fn overlapping(&self, lo: Vec3, hi: Vec3, mut visit: impl FnMut([Vec3; 3]) -> bool) -> bool {
         let mut waiting = [0u32; WAITING];

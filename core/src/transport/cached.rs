@@ -27,8 +27,8 @@ pub(super) enum Caches<'a> {
 }
 
 impl Caches<'_> {
-    /// What is `known` of those of `askers` that there are, each with its sample, and how far each is `exposed`
-    /// ([`IrradianceCache::at_all`]).
+    /// What is `known` of those of `askers` that there are, each with its sample, and how far each is
+    /// `exposed` ([`IrradianceCache::at_all`]).
     fn ask(
         &self,
         level: Level,

@@ -51,8 +51,8 @@ impl<F: Features> PathTracer<'_, F> {
         }
     }
 
-    /// The record of `place`, so many times as wide: it looks farther for walls and for what hangs over it, and light changes
-    /// over its support by as much as before.
+    /// The record of `place`, so many times as wide: it looks farther for walls and for what hangs over it,
+    /// and light changes over its support by as much as before.
     pub fn widened(&self, record: &Record, place: &Place, factor: f32, counters: &mut Counters) -> Record {
         let mut wide = record.widened(factor);
         self.fence_along(&mut wide, place, counters);

@@ -1,7 +1,8 @@
-//! What hangs over places of surfaces: shelves, panels, lamps under ceilings, boards behind furniture. Where it hangs close, light
-//! changes over as little as it is high, and it is seen edge-on from farther away, where hardly a ray of a hemisphere meets it. So
-//! a record knows how low anything hangs over its support, by a walk through the hierarchy that misses none; and a point
-//! that asks it from farther away than that would allow looks upwards once.
+//! What hangs over places of surfaces: shelves, panels, lamps under ceilings, boards behind furniture. Where
+//! it hangs close, light changes over as little as it is high, and it is seen edge-on from farther away,
+//! where hardly a ray of a hemisphere meets it. So a record knows how low anything hangs over its support, by
+//! a walk through the hierarchy that misses none; and a point that asks it from farther away than that would
+//! allow looks upwards once.
 
 use super::estimator::Counters;
 use super::gather::Place;
@@ -23,15 +24,16 @@ const TILTS: [[f32; 2]; WAYS] = [[0.0, 0.0], [1.0, 0.0], [-1.0, 0.0], [0.0, 1.0]
 /// What is met on one side hangs where it is at most sixty degrees steep; otherwise it is a wall.
 const STEEPEST: f32 = 0.5;
 
-/// Of what may hang over a record the planes are less steep than this (the cosine to its normal): the normals of a record and of
-/// the points that ask it differ.
+/// Of what may hang over a record the planes are less steep than this (the cosine to its normal): the normals
+/// of a record and of the points that ask it differ.
 const STEEP: f32 = 0.25;
 
-/// A surface that bends upwards, whose heights go with the square of the distance, has risen twice as much where it is met
-/// as it is high there. What hangs has risen less.
+/// A surface that bends upwards, whose heights go with the square of the distance, has risen twice as much
+/// where it is met as it is high there. What hangs has risen less.
 const BENDS: f32 = 1.8;
 
-/// What is no higher over the plane than its points are uncertain, or than so small a part of the reach, is the same surface.
+/// What is no higher over the plane than its points are uncertain, or than so small a part of the reach, is
+/// the same surface.
 const FLAT: f32 = 4.0;
 const FLATTEST: f32 = 2.5e-5;
 
@@ -44,8 +46,8 @@ struct Probe {
 }
 
 impl<F: Features> PathTracer<'_, F> {
-    /// How far away the records may be ([`crate::cache::irradiance::Asker::within`]) that these points hear, each of which wants to
-    /// hear such as are so far `exposed`.
+    /// How far away the records may be ([`crate::cache::irradiance::Asker::within`]) that these points hear,
+    /// each of which wants to hear such as are so far `exposed`.
     pub(super) fn within(
         &self,
         points: &[Option<&SurfacePoint>; BLOCK],
@@ -75,7 +77,8 @@ impl<F: Features> PathTracer<'_, F> {
         }
     }
 
-    /// How far it is to what hangs over a point and hides light; infinite where it is farther than the probe is long.
+    /// How far it is to what hangs over a point and hides light; infinite where it is farther than the probe
+    /// is long.
     fn headroom(&self, probe: &Probe) -> f32 {
         let frame = Frame::from_normal(probe.normal);
         let rays = TILTS.map(|[x, y]| {
@@ -88,7 +91,8 @@ impl<F: Features> PathTracer<'_, F> {
         hanging.map(|hit| hit.t).fold(f32::INFINITY, f32::min)
     }
 
-    /// Whether what was met hangs over a surface of that normal and hides light. Glass and what is cut out do not.
+    /// Whether what was met hangs over a surface of that normal and hides light. Glass and what is cut out do
+    /// not.
     fn hangs(&self, hit: &Hit, normal: Vec3) -> bool {
         let mesh = &self.scene.mesh;
         let Some(triangle) = mesh.triangles.get(hit.triangle as usize) else { return false };
@@ -143,8 +147,8 @@ struct Overhang {
 }
 
 impl Overhang {
-    /// The triangle of these corners, over a disc of that radius around the origin in the plane z = 0; what is no higher than `flat` is
-    /// the plane.
+    /// The triangle of these corners, over a disc of that radius around the origin in the plane z = 0; what
+    /// is no higher than `flat` is the plane.
     fn of(corners: [Vec3; 3], reach: f32, flat: f32) -> Option<Self> {
         let [a, b, c] = corners;
         let (highest, lowest) = (a.max(b).max(c), a.min(b).min(c));

@@ -118,6 +118,9 @@ impl Picture<'_> {
                 if let Some(audit) = &mut audit {
                     let left = settings.stop.seconds.map(|limit| limit - estimating - clock.seconds());
                     let work = (canvas.counters.all_rays(), clock.seconds());
+                    if audit.is_open() {
+                        audit.weigh(renderer.risks(workers)?);
+                    }
                     renderer.lend_photons(&mut |photons| {
                         audit.step(workers, &canvas.film, photons, work, left)
                     })?;
@@ -216,6 +219,9 @@ impl Picture<'_> {
         if let Some(audit) = audit.as_mut().filter(|_| goes_on) {
             let left = settings.stop.seconds.map(|limit| limit - estimating - clock.seconds());
             let work = (canvas.counters.all_rays(), clock.seconds());
+            if audit.is_open() {
+                audit.weigh(renderer.risks(workers)?);
+            }
             renderer.lend_photons(&mut |photons| audit.step(workers, &canvas.film, photons, work, left))?;
         }
         if !is_last {

@@ -157,8 +157,9 @@ pub(super) fn survey<F: Features>(
     }))
 }
 
-/// Of each pixel, row by row, the variance of what records say at the place that it shows, over the square of that: where they say
-/// different things, one of them is wrong. 0 where none speaks. Of large pictures some pixels stand for their neighbours.
+/// Of each pixel, row by row, the variance of what records say at the place that it shows, over the square of
+/// that: where they say different things, one of them is wrong. 0 where none speaks; nothing where it was
+/// interrupted. Of large pictures some pixels stand for their neighbours.
 pub(super) fn risks<F: Features>(
     tracer: &PathTracer<F>,
     caches: [&IrradianceCache; 2],
@@ -181,7 +182,9 @@ pub(super) fn risks<F: Features>(
         }
         Ok(counters)
     };
-    workers.pass(&mut found, PIXELS, scratch, &|| false, &task)?;
+    if !workers.pass(&mut found, PIXELS, scratch, &|| workers.watch.is_interrupted(), &task)?.1 {
+        return Ok(Vec::new());
+    }
     let known = || found.iter().filter(|[said, _]| *said > 0.0);
     let mean = known().map(|[said, _]| f64::from(*said)).sum::<f64>() / known().count().max(1) as f64;
     let dark = ((DARK * mean).powi(2)) as f32;

@@ -20,8 +20,8 @@ pub struct Asker {
     pub position: Vec3,
     /// Unit normal of its surface.
     pub normal: Vec3,
-    /// Records that are farther than this along the surface are not heard, for something hangs close over it: [`super::CLOSE`] times
-    /// as far as that is high. Infinite where nobody has looked up from there.
+    /// Records that are farther than this along the surface are not heard, for something hangs close over it:
+    /// [`super::CLOSE`] times as far as that is high. Infinite where nobody has looked up from there.
     pub within: f32,
 }
 

@@ -203,8 +203,8 @@ pub fn reach(settings: &Settings, derivatives: &Derivatives) -> Reach {
     let Bent { axis, curvature, signed } = bent;
     let wanted = radii;
     let radii = clamped(settings, radii);
-    // Where radii are larger than wanted, for they are the least, light changes over them by what it would over those: a
-    // pixel does not show more, and what a border has so near says nothing of the other side.
+    // Where radii are larger than wanted, for they are the least, light changes over them by what it would
+    // over those: a pixel does not show more, and what a border has so near says nothing of the other side.
     let shares =
         [0, 1].map(|k: usize| if wanted[k] < radii[k] { (wanted[k] / radii[k]).max(0.0) } else { 1.0 });
     // An extrapolation reaches |∇E · dx|, largest at the rim of the ellipse.

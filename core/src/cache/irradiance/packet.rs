@@ -48,9 +48,9 @@ impl Points {
 }
 
 impl IrradianceCache<'_> {
-    /// What is known at each of `points`: [`IrradianceCache::at`], to the bit. `known` keeps its other entries. And of each
-    /// how far the farthest is of the records that speak for it where something may hang too close over it for that; 0 where
-    /// nothing does.
+    /// What is known at each of `points`: [`IrradianceCache::at`], to the bit. `known` keeps its other
+    /// entries. And of each how far the farthest is of the records that speak for it where something may hang
+    /// too close over it for that; 0 where nothing does.
     pub fn at_all(
         &self,
         level: Level,
@@ -75,8 +75,8 @@ impl IrradianceCache<'_> {
     }
 }
 
-/// The sums over all records: of the irradiance of each channel, of what shines, of weights; and the greatest square of
-/// the distance to those of points over which something may hang.
+/// The sums over all records: of the irradiance of each channel, of what shines, of weights; and the greatest
+/// square of the distance to those of points over which something may hang.
 struct Ask<'a> {
     cache: &'a IrradianceCache<'a>,
     points: &'a Points,

@@ -34,8 +34,8 @@ const MOST_OVERLAP: f32 = 2.0;
 const MISSED: f32 = 0.5;
 const MOST_MISSED: f32 = 0.3;
 
-/// A point beneath something hears no record that is farther than this many times the height of what hangs over it: light
-/// changes there over as little as that.
+/// A point beneath something hears no record that is farther than this many times the height of what hangs
+/// over it: light changes there over as little as that.
 pub const CLOSE: f32 = 2.0;
 
 /// It hears none whose least radius is more than one part in this many of that: such a record is too coarse.
@@ -84,7 +84,8 @@ pub struct Record {
     pub nearness: f32,
     /// The least that R1 may be, m, whatever neighbours say.
     pub least: f32,
-    /// How far nothing hangs so close over points in each sector that they must not hear it, as the fence counts.
+    /// How far nothing hangs so close over points in each sector that they must not hear it, as the fence
+    /// counts.
     pub free: [u8; SECTORS],
 }
 
@@ -152,7 +153,8 @@ impl Record {
         (self.noise, self.shining) = (found.noise, found.shining);
     }
 
-    /// The same of radii so many times as large, over which light changes by as much. What hangs over it is to be looked for.
+    /// The same of radii so many times as large, over which light changes by as much. What hangs over it is
+    /// to be looked for.
     pub fn widened(&self, factor: f32) -> Self {
         let narrow = |free: u8| if free == u8::MAX { free } else { (f32::from(free) / factor) as u8 };
         Self {
@@ -198,8 +200,8 @@ impl Record {
         Vec3::new(libm::sqrtf(square.x), libm::sqrtf(square.y), libm::sqrtf(square.z))
     }
 
-    /// What this record says of E at `point`, and its weight w_i > 0 (equations 12 to 14 of the paper). `least_cos` is the
-    /// cosine of the greatest deviation of the normal. `None` outside of the support.
+    /// What this record says of E at `point`, and its weight w_i > 0 (equations 12 to 14 of the paper).
+    /// `least_cos` is the cosine of the greatest deviation of the normal. `None` outside of the support.
     #[inline]
     pub fn at(&self, point: &Asker, least_cos: f32) -> Option<(Rgb, f32)> {
         let (speaks, voice) = self.listen(One, &Asked::of(point), least_cos, self.overlap);
@@ -212,8 +214,8 @@ impl Record {
         self.listen(One, &Asked::of(point), least_cos, 1.0).0
     }
 
-    /// How far away the records must be allowed to be that the point hears for this one to be heard, where something may
-    /// hang too close over it for that; 0 where nothing does.
+    /// How far away the records must be allowed to be that the point hears for this one to be heard, where
+    /// something may hang too close over it for that; 0 where nothing does.
     #[inline]
     pub(super) fn exposed(&self, point: &Asker) -> f32 {
         let place = self.along_axes(point.position - Vec3::from(self.position));
@@ -327,8 +329,8 @@ impl Record {
         free.lt(width.all(f32::from(u8::MAX))) & (distance * distance).lt(x * x + y * y)
     }
 
-    /// Notes that something hangs over the sectors from `first` to `last`, which count on around the circle, so close that points at
-    /// more than `distance` may not hear this record.
+    /// Notes that something hangs over the sectors from `first` to `last`, which count on around the circle,
+    /// so close that points at more than `distance` may not hear this record.
     pub fn note_overhang(&mut self, [first, last]: [i32; 2], distance: f32) {
         let share = (distance / self.reach).clamp(0.0, 1.0);
         for sector in first..=last.min(first + SECTORS as i32 - 1) {

@@ -112,8 +112,8 @@ impl<'m> IrradianceCache<'m> {
         (weights > 0.0).then(|| Indirect { irradiance: sum / weights, shining: shining / weights })
     }
 
-    /// What one of the records says that [`IrradianceCache::at`] asks: enough where many points are averaged. And as
-    /// [`IrradianceCache::at_all`] has it, how far that record is.
+    /// What one of the records says that [`IrradianceCache::at`] asks: enough where many points are averaged.
+    /// And as [`IrradianceCache::at_all`] has it, how far that record is.
     #[inline]
     pub fn roughly(&self, point: &Asker) -> Option<(Indirect, f32)> {
         let mut found = None;
@@ -159,7 +159,8 @@ impl<'m> IrradianceCache<'m> {
         });
     }
 
-    /// Whether some record covers the point: one that must be heard, whatever hangs over it, where nobody has looked up from there.
+    /// Whether some record covers the point: one that must be heard, whatever hangs over it, where nobody has
+    /// looked up from there.
     #[inline]
     pub fn covers(&self, point: &Asker) -> bool {
         let mut covered = false;
@@ -201,8 +202,8 @@ impl<'m> IrradianceCache<'m> {
         }
     }
 
-    /// Takes `record` in place of that of that number, which stands at the same place. The cache is to be settled when all are
-    /// replaced: what is wider is not found before.
+    /// Takes `record` in place of that of that number, which stands at the same place. The cache is to be
+    /// settled when all are replaced: what is wider is not found before.
     pub fn replace(&mut self, number: usize, record: Record) {
         if let Some(slot) = self.records.get_mut(..self.used).and_then(|all| all.get_mut(number)) {
             *slot = record;

@@ -51,6 +51,8 @@ pub(super) struct Audit<'a> {
     by_clock: bool,
     seed: u32,
     scratch: Vec<Vec<Line>>,
+    /// Of each pixel, where the method knows them, until pixels are chosen.
+    risks: Vec<f32>,
     state: State,
 }
 
@@ -125,6 +127,7 @@ impl<'a> Audit<'a> {
             by_clock: settings.stop.error.is_none(),
             seed,
             scratch,
+            risks: Vec::new(),
             state: State { share, ..State::default() },
         }))
     }
@@ -138,6 +141,16 @@ impl<'a> Audit<'a> {
         let pixels = Footprint::default().slice::<Pixel>(choice::count(settings.width, settings.height));
         let threads = PathTracer::<F>::scratch(WAVE).bytes().saturating_mul(workers.count());
         threads.saturating_add(pixels.bytes())
+    }
+
+    /// Whether its pixels are still to be chosen.
+    pub(super) fn is_open(&self) -> bool {
+        self.state.places.is_empty()
+    }
+
+    /// Chooses its pixels by these risks ([`choice::choose`]).
+    pub(super) fn weigh(&mut self, risks: Vec<f32>) {
+        self.risks = risks;
     }
 
     /// What a film file keeps.
@@ -165,7 +178,9 @@ impl<'a> Audit<'a> {
         let start = Instant::now();
         if self.state.places.is_empty() {
             let Some(mean) = workers.mean(film) else { return Ok(()) };
-            (self.state.places, self.state.shares) = choice::choose(film, self.shard, mean, self.seed);
+            (self.state.places, self.state.shares) =
+                choice::choose(film, self.shard, mean, self.seed, &self.risks);
+            self.risks = Vec::new();
             self.state.pixels = vec![bytemuck::cast(Pixel::default()); self.state.places.len()];
         }
         let before = self.state.seconds;

@@ -96,8 +96,10 @@ pub(super) fn verdict(
     // The noise of a product is the product of those of both halves, each of picture and audit.
     let squares = |of: usize| findings.iter().map(|(_, finding)| finding.variances[of].powi(2)).sum::<f64>();
     let region = |index: usize| {
-        let inside = findings.iter().filter(|(i, _)| grid.region(places[*i]) == index);
-        let deviation = Deviation::of(inside.map(|(_, finding)| finding.deviation));
+        let inside = || findings.iter().filter(|(i, _)| grid.region(places[*i]) == index);
+        let mean = inside().map(|(i, _)| f64::from(shares[*i])).sum::<f64>() / inside().count().max(1) as f64;
+        let deviation =
+            Deviation::of(inside().map(|(i, finding)| finding.deviation * f64::from(shares[*i]) / mean));
         let [[x, right], [y, bottom]] = grid.bounds(index);
         let is_biased = deviation.chance() < LEVEL / (count + 1) as f64;
         Region { x, y, width: right - x, height: bottom - y, deviation, is_biased }
@@ -113,7 +115,7 @@ pub(super) fn verdict(
         bias,
         imbalance: (squares(1) / squares(0)).sqrt(),
         total: noise.with_bias(bias),
-        whole: Deviation::of(findings.iter().map(|(_, finding)| finding.deviation)),
+        whole: Deviation::of(findings.iter().map(|(i, finding)| finding.deviation * f64::from(shares[*i]))),
         regions: (0..count).map(region).collect(),
     })
 }

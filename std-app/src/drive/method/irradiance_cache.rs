@@ -440,6 +440,10 @@ impl<F: Features> Cached<'_, F> {
                     all = false;
                     break;
                 }
+                // What goes into a file is good where it is.
+                if !self.kept.is_some() {
+                    overture(gathering.flux).widen(half, crew, scratch)?;
+                }
                 half.finish();
                 self.is_cut = true;
             }
@@ -645,6 +649,11 @@ impl<F: Features> Renderer for Cached<'_, F> {
             Some(caster) => caster.lend(then),
             None => then(None),
         }
+    }
+
+    fn risks(&mut self, workers: &Workers) -> Result<Vec<f32>, RenderError> {
+        let Self { tracer, size, halves: [even, odd], scratch, .. } = self;
+        survey::risks(tracer, [&even.cache, &odd.cache], *size, workers, scratch)
     }
 
     fn survey(&mut self, workers: &Workers) -> Result<Option<Survey>, RenderError> {

@@ -234,6 +234,15 @@ pub(super) trait Renderer {
         Reuse::default()
     }
 
+    /// Of each pixel, row by row, how large the square of its bias may be, relative to that of others;
+    /// nothing where it does not know.
+    ///
+    /// # Errors
+    /// Memory that does not suffice.
+    fn risks(&mut self, _workers: &Workers) -> Result<Vec<f32>, RenderError> {
+        Ok(Vec::new())
+    }
+
     /// What its irradiance cache looks like and how wrong it is, where the settings ask for that.
     ///
     /// # Errors

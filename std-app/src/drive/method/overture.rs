@@ -34,8 +34,8 @@ const ALONE: f32 = 1.3;
 const GATHERED: [usize; 2] = [8, 32];
 const GATHERED_PART: usize = 4;
 
-/// Records that had no time for others beside them become wider, step by step, until they serve this share of what the camera sees, and
-/// by so much at most.
+/// Records that had no time for others beside them become wider, step by step, until they serve this share of
+/// what the camera sees, and by so much at most.
 const WIDER: f32 = 1.3;
 const WIDEST: f32 = 6.0;
 const NEARLY_ALL: f64 = 0.98;
@@ -342,9 +342,9 @@ impl<F: Features> Overture<'_, '_, F> {
         Ok((!places.is_empty()).then(|| served as f64 / places.len() as f64))
     }
 
-    /// Makes records wider, all by the same factor, until they serve nearly all that the camera sees or are [`WIDEST`] times as wide:
-    /// where there was no time to fill the cache, it is coarser everywhere rather than good in places. Its first records are
-    /// spread evenly over the picture.
+    /// Makes records wider, all by the same factor, until they serve nearly all that the camera sees or are
+    /// [`WIDEST`] times as wide: where there was no time to fill the cache, it is coarser everywhere rather
+    /// than good in places. Its first records are spread evenly over the picture.
     pub(in crate::drive) fn widen(
         &self,
         growing: &mut Growing,
