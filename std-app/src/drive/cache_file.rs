@@ -9,7 +9,7 @@ use halflight_core::scene::Scene;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
-const KIND: Kind = Kind { magic: *b"HLCACH", version: 2, name: "cache" };
+const KIND: Kind = Kind { magic: *b"HLCACH", version: 3, name: "cache" };
 
 /// Records of a section.
 const AT_ONCE: usize = 1 << 12;
