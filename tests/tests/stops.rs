@@ -146,3 +146,16 @@ fn a_picture_that_ends_before_its_first_sample_is_whole() {
         assert!(dark < result.image.pixels.len() / 100, "{dark}");
     }
 }
+
+#[test]
+fn a_judge_that_cannot_find_the_light_has_no_opinion() {
+    for method in [Method::ProgressivePhotons, Method::PhotonMap] {
+        let stop = Stop { spp: Some(512), error: Some(0.02), ..Stop::default() };
+        let settings = Settings { method: Some(method), width: 32, height: 32, stop, ..Settings::default() };
+        let flag = AtomicBool::new(false);
+        let result = drive::render(&glass_cube(false).scene(), &settings, &mut |_| (), &flag).unwrap();
+        let (audit, error) = (result.audit.unwrap(), result.error.unwrap());
+        assert!(audit.is_blind && audit.unseen > 0.9 && !audit.is_biased(), "{audit:?}");
+        assert!(result.ending == Ending::Done && result.spp < 512 && error.upper <= 0.02, "{error:?}");
+    }
+}

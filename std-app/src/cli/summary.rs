@@ -129,11 +129,22 @@ pub(super) fn text(run: &Run, report: Option<&Path>) -> String {
 }
 
 /// The lines of an audited estimate.
-pub(super) fn audited(audit: &Audited) -> [String; 3] {
+pub(super) fn audited(audit: &Audited) -> Vec<String> {
     let ErrorEstimate { relmse, lower, upper } = audit.total;
+    if audit.is_blind {
+        return vec![
+            format!(
+                "error  relMSE {relmse:.3e} (95 %: {lower:.3e} to {upper:.3e}), of noise; the bias is not known:"
+            ),
+            format!(
+                "audit  its paths cannot find about {:.0} % of the light, which comes by mirrors and glass",
+                100.0 * audit.unseen
+            ),
+        ];
+    }
     let BiasEstimate { relmse: bias, lower: least, upper: most, detectable, .. } = audit.bias;
     let found = if audit.is_biased() { "bias found" } else { "no bias found" };
-    [
+    vec![
         format!("error  relMSE {relmse:.3e} (95 %: {lower:.3e} to {upper:.3e}), noise and bias"),
         format!(
             "       {:.3e} of it is noise; bias {:.3e} (95 %: {least:.3e} to {most:.3e})",

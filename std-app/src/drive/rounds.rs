@@ -209,7 +209,7 @@ impl Rounds {
     /// Whether the error that was asked for is less than the bias, as far as enough samples tell.
     pub(super) fn is_out_of_reach(&self, audited: &Audited) -> bool {
         let enough = self.spp >= FEWEST_FOR_ERROR && audited.samples >= FEWEST_FOR_BIAS;
-        enough && self.stop.error.is_some_and(|wanted| audited.bias.least() > wanted)
+        enough && !audited.is_blind && self.stop.error.is_some_and(|wanted| audited.bias.least() > wanted)
     }
 
     fn error_reached(&self) -> bool {

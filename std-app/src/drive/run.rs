@@ -84,7 +84,7 @@ impl WithFeatures for Render<'_> {
         method.with::<F, _>(&stage, &mut memory, |renderer, memory| {
             let method = renderer.chosen().unwrap_or(method);
             let identity = identity(method);
-            let audit = Audit::new::<F>(&stage, memory, method.is_biased())?;
+            let audit = Audit::new::<F>(&stage, memory, method)?;
             let picture = Picture {
                 method,
                 stage,

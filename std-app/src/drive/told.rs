@@ -37,8 +37,8 @@ impl Told {
         audit: impl FnOnce(ErrorEstimate) -> Option<Audited>,
     ) -> Self {
         let mut audited = noise.and_then(audit);
-        // An audit without photons sees what they blur.
-        let is_seen = audited.as_ref().is_some_and(|audited| !audited.has_photons);
+        // An audit without photons sees what they blur, if it sees.
+        let is_seen = audited.as_ref().is_some_and(|audited| !audited.has_photons && !audited.is_blind);
         let mut blurred = if is_seen { None } else { Blurred::of(workers, &canvas.film, noise) };
         if let Some(audited) = &mut audited
             && let Some(blurred) = blurred.take()

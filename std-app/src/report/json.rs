@@ -230,6 +230,8 @@ fn bias(audit: &Audited) -> Value {
             "rays": audit.rays,
             "seconds": audit.seconds,
             "photons": audit.has_photons,
+            "unseen": audit.unseen,
+            "blind": audit.is_blind,
         },
     })
 }

@@ -52,6 +52,9 @@ pub struct Run<'a> {
 impl Run<'_> {
     /// Why what an audit has found may not be a bias; `None` where path tracing can be trusted.
     pub fn doubt(&self) -> Option<&'static str> {
+        if self.result.audit.as_ref().is_some_and(|audit| audit.is_blind) {
+            return Some("the bias is not known: path tracing, the judge, cannot find much of the light");
+        }
         let by_photons = self.result.method.finds_caustics() && Census::of(self.scene).specular > 0;
         let alone = self.result.audit.as_ref().is_none_or(|audit| !audit.has_photons);
         (by_photons || self.result.caustics.used && alone)

@@ -8,7 +8,7 @@ mod verdict;
 pub use verdict::{Audited, Region};
 
 use super::memory::Memory;
-use super::method::Stage;
+use super::method::{Method, Stage, unseen};
 use super::workers::Workers;
 use super::{ErrorEstimate, RenderError, Settings, Shard};
 use choice::Grid;
@@ -28,6 +28,9 @@ const STEP: u32 = 4;
 
 /// Audited pixels of one task.
 const PIXELS_PER_TASK: usize = 8;
+
+/// Samples of each audited pixel by which it must have seen all light of the picture.
+const SEEN: f64 = 256.0;
 
 /// Seconds of samples after which the clock, and whoever waits, are asked again.
 const LONGEST: f64 = 0.25;
@@ -71,6 +74,9 @@ pub(super) struct State {
     /// Whether paths were joined with photons of the picture, whose blur they do not see.
     #[serde(default)]
     has_photons: bool,
+    /// The share of the picture's light that its paths as good as never find, by a first look with photons.
+    #[serde(default)]
+    unseen: f64,
 }
 
 impl State {
@@ -81,11 +87,11 @@ impl State {
 
     /// What is known of the bias of `film`, of mean `mean`, whose own noise tells `noise`.
     pub(super) fn verdict(&self, film: &Film, mean: f64, noise: ErrorEstimate) -> Option<Audited> {
-        let Self { share, places, shares, pixels, taken, rays, seconds, has_photons } = self;
+        let Self { share, places, shares, pixels, taken, rays, seconds, has_photons, unseen } = self;
         let truth: &[Pixel] = bytemuck::cast_slice(pixels);
         let grid = Grid::new([film.width(), film.height()], places.len());
         let findings = verdict::findings(film, mean, places, truth);
-        let audited = verdict::verdict(&findings, shares, places, grid, noise)?;
+        let audited = verdict::verdict(&findings, shares, places, grid, noise)?.by_a_judge_without(*unseen);
         Some(Audited {
             share: *share,
             samples: *taken,
@@ -108,16 +114,22 @@ impl<'a> Audit<'a> {
     pub(super) fn new<F: Features>(
         stage: &Stage<'a>,
         memory: &mut Memory,
-        is_biased: bool,
+        method: Method,
     ) -> Result<Option<Self>, RenderError> {
         let Stage { settings, workers, .. } = *stage;
-        let Some(share) = share(settings, is_biased) else { return Ok(None) };
-        let scratch = memory.take_each("audit", PathTracer::<F>::scratch(WAVE), workers.count())?;
+        let Some(share) = share(settings, method.is_biased()) else { return Ok(None) };
+        let mut scratch = memory.take_each("audit", PathTracer::<F>::scratch(WAVE), workers.count())?;
         // The pixels themselves are counted and not taken: they are kept where a film file can find them.
         let pixels = choice::count(settings.width, settings.height);
         memory.set_aside("audit", Footprint::default().slice::<Pixel>(pixels))?;
         let seed = settings.seed ^ OTHER_SEED;
         let tracer = stage.paths::<F>(seed);
+        // Others lend the audit the photons that they have, or find no more than its paths.
+        let samples = SEEN * pixels as f64 / (f64::from(settings.width) * f64::from(settings.height));
+        let unseen = match method.finds_caustics() {
+            true => unseen::<F>(stage, samples, &mut scratch, memory)?.unwrap_or(0.0),
+            false => 0.0,
+        };
         Ok(Some(Self {
             truth: Box::new(move |(places, samples), photons, arena, out| {
                 let tracer = photons.map_or(tracer, |photons| tracer.with_caustics(photons));
@@ -128,7 +140,7 @@ impl<'a> Audit<'a> {
             seed,
             scratch,
             risks: Vec::new(),
-            state: State { share, ..State::default() },
+            state: State { share, unseen, ..State::default() },
         }))
     }
 

@@ -32,6 +32,7 @@ impl State {
             merged.rays += state.rays;
             merged.seconds += state.seconds;
             merged.has_photons |= state.has_photons;
+            merged.unseen = merged.unseen.max(state.unseen);
         }
         for place in order {
             if let Some((share, pixel)) = strata.remove(&place) {

@@ -8,6 +8,9 @@ use halflight_core::film::{Film, PIXELS_PER_TILE, Pixel, Tile};
 /// A region is told to be biased where chance alone would say so of any of them in one picture of so many.
 const LEVEL: f64 = 0.025;
 
+/// The share of a picture's light that its judge may be without.
+const MOST_UNSEEN: f64 = 0.01;
+
 /// What an audit has found.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Audited {
@@ -35,6 +38,10 @@ pub struct Audited {
     pub whole: Deviation,
     /// By how much its parts are, row by row.
     pub regions: Vec<Region>,
+    /// The share of the picture's light that its paths cannot find, by a first look with photons.
+    pub unseen: f64,
+    /// Whether it can tell a bias from light that its paths do not find: if not, `total` is without bias.
+    pub is_blind: bool,
 }
 
 /// A part of the picture.
@@ -57,7 +64,19 @@ pub struct Region {
 impl Audited {
     /// Whether there is a bias. Where there is none, this says so in 5 % of all pictures at most.
     pub fn is_biased(&self) -> bool {
-        self.bias.is_found() || self.whole_is_biased() || self.regions.iter().any(|region| region.is_biased)
+        let is_found = self.bias.is_found()
+            || self.whole_is_biased()
+            || self.regions.iter().any(|region| region.is_biased);
+        is_found && !self.is_blind
+    }
+
+    /// The same by a judge whose paths do not find a share `unseen` of the picture's light. Where that is more than next to
+    /// nothing, a picture that is brighter than the judge's may be right; one that is darker is wrong all the same.
+    pub(super) fn by_a_judge_without(self, unseen: f64) -> Self {
+        let Deviation { mean, error, .. } = self.whole;
+        let is_blind = unseen >= MOST_UNSEEN && mean > -2.0 * error;
+        let total = if is_blind { self.noise } else { self.total };
+        Self { unseen, is_blind, total, ..self }
     }
 
     /// Whether the whole picture is too bright or too dark.
@@ -117,6 +136,8 @@ pub(super) fn verdict(
         total: noise.with_bias(bias),
         whole: Deviation::of(findings.iter().map(|(i, finding)| finding.deviation * f64::from(shares[*i]))),
         regions: (0..count).map(region).collect(),
+        unseen: 0.0,
+        is_blind: false,
     })
 }
 

@@ -62,6 +62,25 @@ pub(super) fn useful(finds: &[Find]) -> f64 {
     finds.iter().filter(|find| find.light > 0.0).count() as f64 / finds.len().max(1) as f64
 }
 
+/// The mean radiance that `finds` bring to a picture of so many `pixels`, in discs of `radius` pixels, where paths that take
+/// so many `samples` of each pixel as good as never find it: less often than `least` times in all.
+pub(super) fn missing(finds: &[Find], radius: f64, pixels: f64, (samples, least): (f64, f64)) -> f64 {
+    let disc = PI * radius * radius;
+    // What flashes brightest first.
+    let mut shown: Vec<_> = finds.iter().filter(|find| find.light > 0.0).collect();
+    shown.sort_by(|a, b| b.flash.total_cmp(&a.flash));
+    let mut hits = 0.0;
+    let mut missing = 0.0;
+    for find in shown {
+        hits += samples * disc * f64::from(find.hits);
+        if hits >= least {
+            break;
+        }
+        missing += disc * f64::from(find.light) / pixels;
+    }
+    missing
+}
+
 impl Looked {
     /// `finds` of discs of `radius` pixels in a picture of so many `pixels`, which is of `mean` radiance without them.
     pub(super) fn new(finds: &[Find], radius: f64, pixels: f64, mean: f64) -> Self {

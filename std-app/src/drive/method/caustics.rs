@@ -5,7 +5,7 @@
 //! Otherwise it is where most of them go from then on.
 
 use super::caster::{Cast, Caster, FIRST_RADIUS, shooter};
-use super::caustic_look::{Looked, useful};
+use super::caustic_look::{Looked, missing, useful};
 use super::path::Paths;
 use super::photon_view::PhotonView;
 use super::photons::PhotonUse;
@@ -32,6 +32,11 @@ const LOOK: usize = 32 * PATHS;
 const MOST_SHARE: f64 = 0.75;
 const LEAST_BY_CHANCE: f64 = 0.25;
 
+/// What the look of a judge takes, the map of its photons, and how often its paths must find light to know of it.
+const JUDGE: &str = "look of the audit";
+const JUDGE_MAP: u32 = 0x7fff_ff00;
+const FEWEST_HITS: f64 = 64.0;
+
 /// Whether paths were joined with photons of caustics.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct CausticUse {
@@ -46,10 +51,14 @@ pub struct CausticUse {
 
 /// Whether anything could throw a caustic.
 pub(super) fn are_possible(stage: &Stage) -> bool {
+    stage.settings.caustics && may_be(stage)
+}
+
+fn may_be(stage: &Stage) -> bool {
     let census = Census::of(stage.scene);
     let kinds = &census.surfaces;
     let mirrors = kinds.mirror + kinds.conductor + kinds.glossy + kinds.dielectric + kinds.rough_dielectric;
-    stage.settings.caustics && mirrors > 0 && kinds.diffuse + kinds.glossy > 0 && census.has_light()
+    mirrors > 0 && kinds.diffuse + kinds.glossy > 0 && census.has_light()
 }
 
 /// Working memory of paths and of light paths.
@@ -200,7 +209,22 @@ fn look<F: Features>(
     &Eye { discs, glimpses, beside_records }: &Eye,
     (count, map): (usize, u32),
 ) -> Result<Vec<Find>, RenderError> {
-    let scratch = &mut paths.scratch;
+    look_with::<F>(
+        stage,
+        &mut paths.scratch,
+        emission,
+        &Eye { discs, glimpses, beside_records },
+        (count, map),
+    )
+}
+
+fn look_with<F: Features>(
+    stage: &Stage,
+    scratch: &mut [Vec<Line>],
+    emission: &Emission,
+    &Eye { discs, glimpses, beside_records }: &Eye,
+    (count, map): (usize, u32),
+) -> Result<Vec<Find>, RenderError> {
     let (shooter, _) = shooter::<F>(stage, emission, count, (discs, 0), beside_records);
     let mut finds = vec![Find::default(); count];
     let shooter = shooter.with_glimpses(glimpses);
@@ -208,6 +232,35 @@ fn look<F: Features>(
     // Where the render is over a part of them has to do.
     stage.workers.look(&mut finds, PATHS, scratch, &look)?;
     Ok(finds)
+}
+
+/// About the share of the picture's light that photons find and paths as good as never, which take so many `samples` of each
+/// pixel: that of lamps without size, and of small ones, by mirrors and glass. `None` where there is no memory to look.
+pub(in crate::drive) fn unseen<F: Features>(
+    stage: &Stage,
+    samples: f64,
+    scratch: &mut [Vec<Line>],
+    memory: &mut Memory,
+) -> Result<Option<f64>, RenderError> {
+    let Stage { scene, bvh, lights, settings, .. } = *stage;
+    let emission = Emission::footprint(lights);
+    if !may_be(stage) || !memory.has(emission.bytes()) {
+        return Ok(None);
+    }
+    let mut lines = memory.take(JUDGE, emission)?;
+    let mut arena = Arena::new(bytemuck::cast_slice_mut(&mut lines));
+    let plain = Emission::build(scene, lights, &bvh.bounds(), &mut arena)?;
+    let mut glimpses = vec![Glimpse::default(); GLIMPSES];
+    let (sight, frame) = ((scene, bvh, settings.level), [settings.width, settings.height]);
+    let found = Glimpse::find::<F>(sight, frame, settings.seed, &mut glimpses);
+    let eye = Eye { discs: stage.discs(), glimpses: &glimpses[..found], beside_records: false };
+    let finds = look_with::<F>(stage, scratch, &plain, &eye, (LOOK, JUDGE_MAP))?;
+    let pixels = f64::from(settings.width) * f64::from(settings.height);
+    let missing = missing(&finds, FIRST_RADIUS, pixels, (samples, FEWEST_HITS));
+    let mean = f64::from(stage.workers.pilot_mean(&stage.paths::<F>(settings.seed), scratch)?);
+    drop((finds, lines));
+    memory.give_back(JUDGE);
+    Ok((missing > 0.0).then(|| missing / (missing + mean)))
 }
 
 /// See the file.

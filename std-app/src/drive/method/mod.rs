@@ -26,6 +26,7 @@ mod wrong;
 
 pub use cache_settings::{CacheSettings, CacheUse, Gather};
 pub use caustics::CausticUse;
+pub(super) use caustics::unseen;
 pub use chaining::MOST_SEEN;
 pub(super) use irradiance_cache::LEAST_PIXELS;
 pub(super) use overture::{Growing, Overture};

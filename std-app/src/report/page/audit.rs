@@ -28,6 +28,9 @@ pub(super) fn section(run: &Run) -> String {
 
 /// The verdict.
 fn words(audit: &Audited, doubt: Option<&str>) -> String {
+    if let Some(doubt) = doubt.filter(|_| audit.is_blind) {
+        return format!("No verdict: {doubt}. The error is that of noise.");
+    }
     if !audit.is_biased() {
         let least = number(audit.bias.detectable, 1);
         return format!("No bias was found. One of less than {least} in relMSE might not have been.");
