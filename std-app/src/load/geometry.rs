@@ -74,16 +74,14 @@ pub(super) fn bounds(parts: &[Placed]) -> ([f64; 3], [f64; 3]) {
 }
 
 /// Puts everything into one mesh. The order of triangles is that of `parts`.
-pub(super) fn assemble(parts: &[Placed], fit: &Fit, notes: &mut Notes) -> Geometry {
+/// `pieces` is what [`pieces`] counts.
+pub(super) fn assemble(parts: &[Placed], fit: &Fit, pieces: f64, notes: &mut Notes) -> Geometry {
     let with_normals = parts.iter().any(|part| !part.group.normals.is_empty());
     let with_texcoords = parts.iter().any(|part| !part.group.texcoords.is_empty());
-    let cut = fit.is_far && {
-        let pieces = parts.par_iter().map(|part| pieces(part, fit)).sum();
-        if !split::is_affordable(pieces) {
-            notes.add(1, "very many triangles are very large: none is cut, and their shading is coarse");
-        }
-        split::is_affordable(pieces)
-    };
+    let cut = pieces > 0.0 && split::is_affordable(pieces);
+    if pieces > 0.0 && !cut {
+        notes.add(1, "very many triangles are very large: none is cut, and their shading is coarse");
+    }
     let build = |part| build(part, fit, cut, with_normals, with_texcoords);
     let built: Vec<(Geometry, Repairs)> = parts.par_iter().map(build).collect();
     let mut all = Geometry::default();
@@ -151,11 +149,14 @@ fn exact(part: &Placed, fit: &Fit) -> Vec<DVec3> {
     part.group.positions.iter().map(place).collect()
 }
 
-/// How many pieces those triangles of a part become that are cut.
-fn pieces(part: &Placed, fit: &Fit) -> f64 {
-    let exact = exact(part, fit);
-    let counts = part.group.triangles.iter().map(|t| split::count(t.map(|v| exact[v as usize])));
-    counts.filter(|count| *count > 1.0).sum()
+/// How many pieces, at most, those triangles become that are to be cut.
+pub(super) fn pieces(parts: &[Placed], fit: &Fit) -> f64 {
+    let of_part = |part: &Placed| {
+        let exact = exact(part, fit);
+        let counts = part.group.triangles.iter().map(|t| split::count(t.map(|v| exact[v as usize])));
+        counts.filter(|count| *count > 1.0).sum::<f64>()
+    };
+    if fit.is_far { parts.iter().map(of_part).sum() } else { 0.0 }
 }
 
 /// A triangle smaller than this share of its coordinates is bent by rounding.
@@ -280,7 +281,8 @@ mod tests {
     fn all(group: &Group, placement: Placement) -> (Geometry, Vec<String>) {
         let parts = [placed(group, placement)];
         let mut notes = Notes::default();
-        (assemble(&parts, &Fit::of(&parts), &mut notes), notes.sentences())
+        let fit = Fit::of(&parts);
+        (assemble(&parts, &fit, pieces(&parts, &fit), &mut notes), notes.sentences())
     }
 
     #[test]

@@ -274,9 +274,11 @@ impl SceneBuilder {
             }
         }
         count_vertices(path, parts.iter().map(|part| part.group.positions.len()).sum())?;
-        self.budget.take(weight::of_scene(&parts, &materials)).map_err(|why| too_large(path, &why))?;
         let fit = fit::Fit::of(&parts);
-        let mut geometry = geometry::assemble(&parts, &fit, notes);
+        let pieces = geometry::pieces(&parts, &fit);
+        let weight = weight::of_scene(&parts, &materials).saturating_add(weight::of_pieces(pieces));
+        self.budget.take(weight).map_err(|why| too_large(path, &why))?;
+        let mut geometry = geometry::assemble(&parts, &fit, pieces, notes);
         count_vertices(path, geometry.positions.len())?;
         let names: Vec<String> = self.materials.iter().map(|mtl| mtl.name.to_string()).collect();
         doubled::leave_out(&mut geometry, &materials, &names, notes);

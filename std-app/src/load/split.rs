@@ -16,7 +16,7 @@ const STEP: f64 = 4.0;
 const PLANES: i32 = 16;
 
 /// Pieces beyond which nothing is cut: a file of very many large triangles is no ground.
-const MOST: f64 = 4e6;
+const MOST: f64 = 1e6;
 
 /// A corner of a piece.
 #[derive(Clone, Copy, Debug, PartialEq)]

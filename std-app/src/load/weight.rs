@@ -28,6 +28,9 @@ const MATERIAL: usize = 4096;
 /// For each byte of a scene file: values of two characters take most.
 const SCENE_FILE: usize = 220;
 
+/// For each piece of a triangle that is cut: four corners and two triangles that may be lamps.
+const PIECE: usize = 860;
+
 /// What an OBJ file has, counted.
 #[derive(Clone, Copy, Debug, Default)]
 struct Counts {
@@ -159,6 +162,11 @@ pub(super) fn of_scene(parts: &[Placed], materials: &[Material]) -> usize {
         96 * part.group.positions.len() + of_triangle * part.group.triangles.len()
     };
     parts.iter().fold(0, |sum, part| sum.saturating_add(of_part(part)))
+}
+
+/// Bytes of so many pieces of triangles that are cut; of none where they are too many.
+pub(super) fn of_pieces(pieces: f64) -> usize {
+    if super::split::is_affordable(pieces) { pieces as usize * PIECE } else { 0 }
 }
 
 #[cfg(test)]
