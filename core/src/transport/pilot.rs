@@ -10,7 +10,7 @@ use super::places::Places;
 use super::wave::{Share, Wave};
 use crate::Rgb;
 use crate::bsdf::Features;
-use crate::film::Tile;
+use crate::film::{PIXELS_PER_TILE, Tile};
 use crate::memory::{Arena, OutOfMemory};
 
 /// Samples of each pixel of the pilot. The first alone tells how bright the picture is.
@@ -39,6 +39,22 @@ pub struct Pilot {
     connections: f64,
     /// Pairs of samples that were compared.
     pairs: f64,
+    /// Variances alone and with sharing, relative to the light of a block, added up over so many blocks.
+    scatter: [f64; 2],
+    blocks: f64,
+    samples: f64,
+}
+
+/// Pixels of a block of a tile, 8 × 8.
+const BLOCK: usize = 64;
+
+/// What pairs of samples of a block have in common.
+#[derive(Clone, Copy, Default)]
+struct Block {
+    light: f32,
+    /// Squared differences alone, and with sharing.
+    squares: [f32; 2],
+    pairs: f32,
 }
 
 impl Pilot {
@@ -58,6 +74,16 @@ impl Pilot {
         (if shared { self.shared } else { self.alone }) / (6.0 * self.pairs.max(1.0))
     }
 
+    /// The same relative to the light of blocks of 8 × 8 pixels, so that a sample counts as much as it scatters.
+    pub fn scatter(&self, shared: bool) -> f64 {
+        self.scatter[usize::from(shared)] / (6.0 * self.blocks.max(1.0))
+    }
+
+    /// The work of a sample of a pixel, in rays.
+    pub fn work(&self, shared: bool) -> f64 {
+        (self.rays + if shared { self.connections } else { 0.0 }) / self.samples.max(1.0)
+    }
+
     /// Whether pixels should share.
     pub fn pays(&self) -> bool {
         self.gain() > self.cost()
@@ -71,6 +97,10 @@ impl core::ops::AddAssign for Pilot {
         self.rays += other.rays;
         self.connections += other.connections;
         self.pairs += other.pairs;
+        self.scatter[0] += other.scatter[0];
+        self.scatter[1] += other.scatter[1];
+        self.blocks += other.blocks;
+        self.samples += other.samples;
     }
 }
 
@@ -161,6 +191,7 @@ impl<F: Features> PathTracer<'_, F> {
             let before = counters.shadow_rays;
             sharing.share(&mut wave, count, &mut counters);
             pilot.connections += f64::from(connection) * (counters.shadow_rays - before) as f64;
+            pilot.samples += count as f64;
             pilot.compare(&wave, count, mean);
         }
     }
@@ -171,17 +202,32 @@ impl Pilot {
     fn compare(&mut self, wave: &Wave, count: usize, mean: f32) {
         let shared = |i: usize| wave.exchanges[i].seen(&wave.paths[i]);
         let layer = wave.paths[..count].iter().take_while(|path| path.sample == wave.paths[0].sample).count();
+        let mut blocks = [Block::default(); PIXELS_PER_TILE / BLOCK];
         for i in layer..count {
             let (a, b) = (shared(i), shared(i - layer));
             let light = (a + b).element_sum() / 6.0;
             let weight = 1.0 / (light * light + 0.01 * mean * mean);
             let alone = Rgb::from(wave.shadow_light[i]) - Rgb::from(wave.shadow_light[i - layer]);
-            let (alone, shared) = (alone.length_squared() * weight, (a - b).length_squared() * weight);
+            let squares = [alone.length_squared(), (a - b).length_squared()];
             // No light, or one that cannot be compared.
+            let [alone, shared] = squares.map(|square| square * weight);
             if alone.is_finite() && shared.is_finite() {
                 self.alone += f64::from(alone);
                 self.shared += f64::from(shared);
                 self.pairs += 1.0;
+                if let Some(block) = blocks.get_mut(wave.paths[i].place as usize / BLOCK) {
+                    block.light += light;
+                    block.squares = [0, 1].map(|k| block.squares[k] + squares[k]);
+                    block.pairs += 1.0;
+                }
+            }
+        }
+        for Block { light, squares, pairs } in blocks.into_iter().filter(|block| block.pairs > 0.0) {
+            let light = light / pairs;
+            let weight = 1.0 / (pairs * (light * light + 0.01 * mean * mean));
+            if squares.iter().all(|square| (square * weight).is_finite()) {
+                self.scatter = [0, 1].map(|k| self.scatter[k] + f64::from(squares[k] * weight));
+                self.blocks += 1.0;
             }
         }
     }

@@ -2,18 +2,20 @@
 //! every few samples, into two maps, of even and of odd ones, so that the halves of the film stay independent; and discs
 //! shrink from one to the next as those of progressive photon mapping do, so that the blur vanishes.
 
+use super::caustic_look::Alone;
 use super::photon_view::{self, PhotonView};
 use super::photons::{MapUse, PhotonUse};
 use super::sppm::shrunk;
 use super::{Borrower, Stage};
 use crate::drive::RenderError;
-use crate::drive::crew::Crew;
+use crate::drive::crew::{Crew, Task};
 use crate::drive::memory::Memory;
 use crate::drive::run::path_settings;
+use crate::drive::workers::Workers;
 use halflight_core::bsdf::Features;
 use halflight_core::light::Emission;
 use halflight_core::memory::{Arena, Line, OutOfMemory};
-use halflight_core::photon::{MapShape, PhotonMap, Photons};
+use halflight_core::photon::{MapShape, Photon, PhotonMap, Photons};
 use halflight_core::transport::caustics::{CausticShooter, PATHS, ROOM};
 use halflight_core::transport::shoot::{Keep, ShootSettings};
 use halflight_core::transport::{Discs, Merging, PathTracer, path::WAVE};
@@ -45,6 +47,8 @@ pub(super) struct Cast<'a> {
     pub(super) discs: Discs,
     /// So many times the light paths, for discs so many times as wide.
     pub(super) plenty: f64,
+    /// What paths leave without photons.
+    pub(super) alone: Alone,
 }
 
 /// See the file.
@@ -145,6 +149,40 @@ impl<'a> Caster<'a> {
         Ok(Self { stage: *stage, cast, beside_records, photons, each, used, kept: None })
     }
 
+    /// Whether `tracer` leaves less variance for its work with the photons of the first samples than paths do `alone`.
+    pub(super) fn pays<F: Features>(
+        &mut self,
+        (tracer, shared): (&PathTracer<F>, bool),
+        scratch: &mut [Vec<Line>],
+    ) -> Result<bool, RenderError> {
+        let Self { stage, cast, beside_records, photons, each, used, kept } = self;
+        let Cast { emission, discs, plenty, alone } = cast;
+        let most = used.caustic.map_or(0, |map| map.given as usize);
+        let (block, light_paths) = (Block::of(0), (*each).min(most));
+        let from = (discs.of_pixels(*plenty as f32), block.first);
+        let (shooter, discs) = shooter::<F>(stage, emission, light_paths, from, *beside_records);
+        let [even, odd] = &mut *photons;
+        let mut rays = 0;
+        let pass: Pass = &mut |photons, scratch, run| {
+            let (counters, done) = stage.workers.pass(photons, ROOM, scratch, &|| false, run)?;
+            rays += counters.rays;
+            Ok(done)
+        };
+        let workers = stage.workers;
+        let Some(even) = shoot(&shooter, block.first, even, scratch, (pass, workers), used)? else {
+            return Ok(false);
+        };
+        let Some(odd) = shoot(&shooter, block.first + 1, odd, scratch, (pass, workers), used)? else {
+            return Ok(false);
+        };
+        let (shapes, paths) = ([even.shape(), odd.shape()], light_paths as u32);
+        let merging = Merging::new([&even, &odd], emission, discs, paths).beside_records(*beside_records);
+        let pilot = workers.pilot(&tracer.with_caustics(merging), alone.mean, scratch)?;
+        let pixels = f64::from(stage.settings.width) * f64::from(stage.settings.height);
+        *kept = Some(Kept { block, room: shooter.tasks() * ROOM, shapes, discs, paths });
+        Ok(alone.is_worse_than(&pilot, shared, rays as f64 / (2.0 * pixels)))
+    }
+
     /// Brings the tiles of `crew` to their targets, or to `end` samples, by `tracer`, joined with photons; less where the round is cut.
     pub(super) fn round<F: Features>(
         &mut self,
@@ -153,8 +191,8 @@ impl<'a> Caster<'a> {
         scratch: &mut [Vec<Line>],
         crew: &mut Crew,
     ) -> Result<(), RenderError> {
-        let Self { stage, cast: Cast { emission, discs, plenty }, beside_records, photons, each, used, kept } =
-            self;
+        let Self { stage, cast, beside_records, photons, each, used, kept } = self;
+        let Cast { emission, discs, plenty, .. } = cast;
         let discs = discs.of_pixels(*plenty as f32);
         while let Some(sample) = crew.next_in_mean().filter(|sample| *sample < end) {
             let block = Block::of(sample);
@@ -168,10 +206,14 @@ impl<'a> Caster<'a> {
                 Some(kept) if kept.block == block => kept.maps([even, odd])?,
                 _ => {
                     *kept = None;
-                    let Some(even) = shoot(&shooter, block.first, even, scratch, crew, used)? else {
+                    let workers = crew.workers;
+                    let pass: Pass = &mut |photons, scratch, run| Ok(crew.pass(photons, ROOM, scratch, run)?);
+                    let Some(even) = shoot(&shooter, block.first, even, scratch, (pass, workers), used)?
+                    else {
                         return Ok(());
                     };
-                    let Some(odd) = shoot(&shooter, block.first + 1, odd, scratch, crew, used)? else {
+                    let Some(odd) = shoot(&shooter, block.first + 1, odd, scratch, (pass, workers), used)?
+                    else {
                         return Ok(());
                     };
                     let (shapes, paths) = ([even.shape(), odd.shape()], light_paths as u32);
@@ -204,7 +246,9 @@ impl<'a> Caster<'a> {
         let (shooter, discs) = shooter::<F>(stage, emission, paths, from, true);
         let [even, odd] = photons;
         let lines = if half == 0 { even } else { odd };
-        let map = shoot(&shooter, RECORD_MAP + sample, lines, scratch, crew, used)?;
+        let workers = crew.workers;
+        let pass: Pass = &mut |photons, scratch, run| Ok(crew.pass(photons, ROOM, scratch, run)?);
+        let map = shoot(&shooter, RECORD_MAP + sample, lines, scratch, (pass, workers), used)?;
         Ok(map.map(|map| ForRecords { map, emission, discs, paths: paths as u32 }))
     }
 
@@ -225,23 +269,27 @@ impl<'a> Caster<'a> {
     }
 }
 
+/// Runs a task for each [`ROOM`] photons, or less where the round is over; whether all are done.
+type Pass<'p> =
+    &'p mut dyn FnMut(&mut [Photon], &mut [Vec<Line>], &Task<Photon>) -> Result<bool, RenderError>;
+
 /// Shoots the photons of map `number` into `lines`; `None` where the round is over.
 fn shoot<'m, F: Features>(
     shooter: &CausticShooter<F>,
     number: u32,
     lines: &'m mut [Line],
     scratch: &mut [Vec<Line>],
-    crew: &mut Crew,
+    (pass, workers): (Pass, &Workers),
     used: &mut PhotonUse,
 ) -> Result<Option<PhotonMap<'m>>, RenderError> {
     let start = Instant::now();
     let room = shooter.tasks() * ROOM;
     let mut photons = Photons::new(room, &mut Arena::new(bytemuck::cast_slice_mut(lines)))?;
     let run = |task: usize, arena: &mut Arena, out: &mut [_]| shooter.run(task, number, arena, out);
-    if !crew.pass(photons.as_mut_slice(), ROOM, scratch, &run)? {
+    if !pass(photons.as_mut_slice(), scratch, &run)? {
         return Ok(None);
     }
-    let map = crew.workers.build_photons(photons, room);
+    let map = workers.build_photons(photons, room);
     used.maps += 1;
     if let Some(used) = &mut used.caustic {
         used.shot += u64::from(shooter.paths());

@@ -7,6 +7,7 @@ use super::path::Paths;
 use crate::drive::RenderError;
 use core::f64::consts::PI;
 use halflight_core::bsdf::Features;
+use halflight_core::transport::Pilot;
 use halflight_core::transport::caustics::{BLOCKS, Find};
 
 /// The share of the picture's light that photons must bring, of what paths find badly,
@@ -27,6 +28,12 @@ const DOUBT_USEFUL: f64 = 0.0625;
 const SAMPLES: f64 = 64.0;
 const LEAST_HITS: f64 = 4.0;
 
+/// Samples that a pilot takes: what it meets less often than that, it does not know.
+const PILOT: f64 = 4.0 * 16.0 * 1024.0;
+
+/// The work of a path that asks photons, relative to one that does not, for the same rays.
+const ASKING: f64 = 1.3;
+
 /// By how much there are more and wider discs, at most, than where photons are not what is noisy; and the light that photons bring,
 /// over all other, from which on there are.
 const MOST_PLENTY: f64 = 4.0;
@@ -41,8 +48,10 @@ struct Block {
     light: f64,
     /// that part which paths alone never find,
     missing: f64,
-    /// and the square of the other in a sample by paths alone.
+    /// and the square of the other in a sample by paths alone;
     square: f64,
+    /// that part of it which a pilot is too short for.
+    rare: f64,
 }
 
 /// What a look has found.
@@ -53,8 +62,12 @@ pub(super) struct Looked {
     pub(super) useful: f64,
     /// The relative variance of one sample that their light has by paths alone.
     noise: f64,
+    /// The same of what a pilot of these paths does not know.
+    rare: f64,
+    /// The share of the light that paths never find.
+    missing: f64,
     /// The mean radiance without them.
-    mean: f64,
+    pub(super) mean: f64,
 }
 
 /// The share of light paths that show in the picture.
@@ -101,17 +114,25 @@ impl Looked {
             let light = of_block * f64::from(find.light);
             hits += SAMPLES * disc * f64::from(find.hits);
             block.light += light;
-            match hits < LEAST_HITS {
-                true => block.missing += light,
-                false => block.square += of_block * f64::from(find.hits) * f64::from(find.flash).powi(2),
+            if hits < LEAST_HITS {
+                block.missing += light;
+                continue;
+            }
+            let square = of_block * f64::from(find.hits) * f64::from(find.flash).powi(2);
+            block.square += square;
+            if hits * PILOT < LEAST_HITS * SAMPLES * pixels {
+                block.rare += square;
             }
         }
-        let relative = |block: &Block| {
-            let square = block.square + SAMPLES * block.missing.powi(2);
+        let relative = |square: f64, block: &Block| {
+            let square = square + SAMPLES * block.missing.powi(2);
             if square > 0.0 { square / (mean + block.light).powi(2) } else { 0.0 }
         };
-        let noise = blocks.iter().map(relative).sum::<f64>() / ALL as f64;
-        Self { share, useful: useful(finds), noise, mean }
+        let noise = blocks.iter().map(|block| relative(block.square, block)).sum::<f64>() / ALL as f64;
+        let rare = blocks.iter().map(|block| relative(block.rare, block)).sum::<f64>() / ALL as f64;
+        let missing = blocks.iter().map(|block| block.missing).sum::<f64>() / ALL as f64;
+        let missing = if missing > 0.0 { missing / (mean + found) } else { 0.0 };
+        Self { share, useful: useful(finds), noise, rare, missing, mean }
     }
 
     /// How much more is to be done for photons than usual. Over the light squared their variance is that of a disc's few photons, and
@@ -125,12 +146,39 @@ impl Looked {
         self.share >= DOUBT_SHARE * LEAST_SHARE || self.useful >= DOUBT_USEFUL * LEAST_USEFUL
     }
 
-    /// Whether photons are worth it.
+    /// What paths alone leave, by their `pilot`, for photons to be compared with.
+    pub(super) fn alone(&self, pilot: &Pilot, shared: bool) -> Alone {
+        // Light that paths never find is not noise: without photons the picture would lack it.
+        let rare = if self.missing >= LEAST_SHARE { f64::INFINITY } else { self.rare };
+        Alone { scatter: pilot.scatter(shared) + rare, work: pilot.work(shared), mean: self.mean as f32 }
+    }
+
+    /// Whether photons may be worth it.
     pub(super) fn pays<F: Features>(&self, stage: &Stage, paths: &mut Paths<F>) -> Result<bool, RenderError> {
         if self.share >= LEAST_SHARE || self.useful < LEAST_USEFUL {
             return Ok(self.share >= LEAST_SHARE);
         }
         Ok(self.noise >= LEAST_NOISE * paths.noise(stage, self.mean as f32)?)
+    }
+}
+
+/// What paths alone leave and cost, for each sample of a pixel.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Alone {
+    /// Variance, relative to the light of a block.
+    scatter: f64,
+    /// Rays.
+    work: f64,
+    /// The mean radiance of the picture.
+    pub(super) mean: f32,
+}
+
+impl Alone {
+    /// Whether paths with photons, by their `pilot`, leave less variance for their work, which is so many rays of `light` paths
+    /// more.
+    pub(super) fn is_worse_than(&self, pilot: &Pilot, shared: bool, light: f64) -> bool {
+        let work = ASKING * pilot.work(shared) + light;
+        pilot.scatter(shared) * work < self.scatter * self.work
     }
 }
 
@@ -140,7 +188,8 @@ mod tests {
 
     #[test]
     fn the_more_of_the_light_photons_bring_the_more_is_done_for_them() {
-        let plenty = |share| Looked { share, useful: 1.0, noise: 0.0, mean: 1.0 }.plenty();
+        let plenty =
+            |share| Looked { share, useful: 1.0, noise: 0.0, rare: 0.0, missing: 0.0, mean: 1.0 }.plenty();
         // A caustic beside a lamp, as many as ever; a room behind glass; and a lamp in a bulb.
         assert_eq!([0.0, 0.05, 0.28].map(plenty), [1.0; 3]);
         assert!((2.0..4.0).contains(&plenty(0.5)), "{}", plenty(0.5));

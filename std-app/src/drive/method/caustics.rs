@@ -120,8 +120,10 @@ pub(super) fn look_first<'l, F: Features>(
     }
     let emission = looked.pays(stage, paths)?.then(|| worth.guide(&plain, arena)).transpose()?;
     paths.caustics.used = emission.is_some() && !is_all;
-    let plenty = looked.plenty();
-    Ok((emission.map(|emission| Cast { emission, discs, plenty }), is_all))
+    let Some(emission) = emission else { return Ok((None, false)) };
+    let (pilot, shared) = paths.pilot(stage, looked.mean as f32)?;
+    let (plenty, alone) = (looked.plenty(), looked.alone(&pilot, shared));
+    Ok((Some(Cast { emission, discs, plenty, alone }), is_all))
 }
 
 /// Takes the memory, sets the method up, and hands it to `then`.
@@ -151,8 +153,16 @@ pub(super) fn with<F: Features, T>(
         memory.give_back("emission");
         return then(&mut paths, memory);
     };
-    let caster = Caster::new(stage, memory, cast, false, others)?;
-    then(&mut Joined { paths, caster }, memory)
+    let mut caster = Caster::new(stage, memory, cast, false, others)?;
+    let pair = (&paths.tracer, paths.reuse().used);
+    if caster.pays(pair, &mut paths.scratch)? {
+        return then(&mut Joined { paths, caster }, memory);
+    }
+    drop(caster);
+    drop(lines);
+    ["photons", "emission"].into_iter().for_each(|structure| memory.give_back(structure));
+    paths.caustics.used = false;
+    then(&mut paths, memory)
 }
 
 /// How photons are seen.

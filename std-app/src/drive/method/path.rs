@@ -6,7 +6,7 @@ use crate::drive::memory::Memory;
 use crate::drive::{RenderError, Reuse};
 use halflight_core::bsdf::Features;
 use halflight_core::memory::{Footprint, Line};
-use halflight_core::transport::{PathTracer, path::WAVE};
+use halflight_core::transport::{PathTracer, Pilot, path::WAVE};
 
 /// See the file.
 pub(super) struct Paths<'a, F> {
@@ -66,13 +66,19 @@ impl<'a, F: Features> Paths<'a, F> {
         Ok(self.mean.unwrap_or_default())
     }
 
-    /// About the relative variance of a sample of the picture, which is of `mean` radiance.
-    pub(super) fn noise(&mut self, stage: &Stage, mean: f32) -> Result<f64, RenderError> {
+    /// A pilot of the picture, which is of `mean` radiance; and whether its pixels share.
+    pub(super) fn pilot(&mut self, stage: &Stage, mean: f32) -> Result<(Pilot, bool), RenderError> {
         let pilot = match self.reuse.pilot {
             Some(pilot) => pilot,
             None => stage.workers.pilot(&self.tracer, mean, &mut self.scratch)?,
         };
-        Ok(pilot.noise(self.reuse.used))
+        Ok((pilot, self.reuse.used))
+    }
+
+    /// About the relative variance of a sample of the picture, which is of `mean` radiance.
+    pub(super) fn noise(&mut self, stage: &Stage, mean: f32) -> Result<f64, RenderError> {
+        let (pilot, shared) = self.pilot(stage, mean)?;
+        Ok(pilot.noise(shared))
     }
 }
 
