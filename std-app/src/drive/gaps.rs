@@ -35,7 +35,7 @@ pub(super) fn sketch<F: Features>(
     let mut step = size[0].max(size[1]).next_power_of_two();
     while step > 0 && Instant::now() < end {
         // Those that coarser steps have not had.
-        let is_new = |x: u32, y: u32| all.is_empty() || (x / step | y / step) & 1 == 1;
+        let is_new = |x: u32, y: u32| all.is_empty() || ((x / step) | (y / step)) & 1 == 1;
         let middle = |at: u32, size: u32| (at + step / 2).min(size - 1);
         let rows = (0..size[1]).step_by(step as usize);
         let places = rows.flat_map(|y| (0..size[0]).step_by(step as usize).map(move |x| [x, y]));
