@@ -51,7 +51,7 @@ fn wrong_usage_is_refused_before_anything_is_written() {
         ("render scene.obj -o no/such/folder.png", "no folder"),
         ("render scene.obj --reference missing.exr", "missing.exr"),
         ("compare missing.exr missing.exr", "missing.exr"),
-        ("compare scene.obj scene.obj", ".exr"),
+        ("compare scene.obj scene.obj", "exr, pfm"),
         ("compare missing.exr missing.exr --difference signed", "--output"),
         ("compare missing.exr missing.exr -o d.hdr --difference relative", "no values below zero"),
         ("compare missing.exr missing.exr -o d.png --difference loud", "signed, absolute, relative, flip"),

@@ -338,6 +338,9 @@ fn no_caustic_leaks_through_a_thin_wall() {
     let mut buffers = bright_and_dark();
     let mirror = buffers.material(Material { surface: metal(0.0), ..Material::GREY });
     buffers.square(Vec3::new(0.1, 0.3, 0.5), Vec3::new(1.0, 1.0, 0.0).normalize(), 0.3, mirror);
+    // Paths never meet its light by the mirror.
+    let position = Vec3::new(0.3, 0.6, 0.5);
+    buffers.lights.push(PointLight::Point { position, intensity: Rgb::splat(0.3) });
     let image = path(&buffers.scene(), 8, |_| ()).image;
     assert_eq!(image.mean(), [0.0; 3], "the camera is in the dark room");
     let camera = Camera { eye: IN_THE_BRIGHT_ROOM, ..buffers.camera };

@@ -64,7 +64,7 @@ impl Tile {
         let [x, y] = self.corner();
         let place = u64::from(seed) << 32 | u64::from(x ^ y.rotate_left(16));
         let lots = mix(mix(place) ^ (u64::from(round) << 8 | group as u64));
-        core::array::from_fn(|i| LOTS.0[group][2 * i + (lots >> i & 1) as usize ^ half] as usize)
+        core::array::from_fn(|i| LOTS.0[group][(2 * i + (lots >> i & 1) as usize) ^ half] as usize)
     }
 }
 

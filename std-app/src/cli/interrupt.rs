@@ -3,18 +3,27 @@
 use super::failure::Failure;
 use super::warn;
 use core::sync::atomic::{AtomicBool, Ordering};
+use core::time::Duration;
+use std::time::Instant;
 
 /// Raised by the first.
 pub(super) static INTERRUPT: AtomicBool = AtomicBool::new(false);
 
+/// Signals closer together are one: `timeout` and shells send theirs to a process and to its group.
+const SAME_SIGNAL: Duration = Duration::from_millis(300);
+
 /// Listens from now on.
 pub(super) fn listen() -> Result<(), Failure> {
-    let heard = || {
-        if INTERRUPT.swap(true, Ordering::Relaxed) {
+    let mut first = None;
+    let heard = move || {
+        let now = Instant::now();
+        if now.duration_since(*first.get_or_insert(now)) > SAME_SIGNAL {
             halflight::save::abandon();
             std::process::exit(130);
         }
-        warn("stopping; once more to stop at once, without a picture");
+        if !INTERRUPT.swap(true, Ordering::Relaxed) {
+            warn("stopping; once more to stop at once, without a picture");
+        }
     };
     ctrlc::set_handler(heard).map_err(|error| Failure::new(format!("Ctrl-C cannot be listened for: {error}")))
 }

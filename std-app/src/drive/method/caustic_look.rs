@@ -28,6 +28,9 @@ const DOUBT_USEFUL: f64 = 0.0625;
 const SAMPLES: f64 = 64.0;
 const LEAST_HITS: f64 = 4.0;
 
+/// The share of the picture's light from which on photons stay because paths never find it: no pilot knows of it.
+const MOST_MISSING: f64 = 5e-3;
+
 /// Samples that a pilot takes: what it meets less often than that, it does not know.
 const PILOT: f64 = 4.0 * 16.0 * 1024.0;
 
@@ -149,7 +152,7 @@ impl Looked {
     /// What paths alone leave, by their `pilot`, for photons to be compared with.
     pub(super) fn alone(&self, pilot: &Pilot, shared: bool) -> Alone {
         // Light that paths never find is not noise: without photons the picture would lack it.
-        let rare = if self.missing >= LEAST_SHARE { f64::INFINITY } else { self.rare };
+        let rare = if self.missing >= MOST_MISSING { f64::INFINITY } else { self.rare };
         Alone { scatter: pilot.scatter(shared) + rare, work: pilot.work(shared), mean: self.mean as f32 }
     }
 
