@@ -289,16 +289,17 @@ fn what_is_dropped_is_told_with_its_place() {
     mtl += "\nnewmtl glass\nillum 7\nNi 2.4\nTf 1 1 1\n";
     fs::write(folder.path("scene.mtl"), mtl).unwrap();
     let object = folder
-        .object("render scene.obj --size 64x64 --spp 4 --eye 0.1,1.2,4.1 --look-at 0,1,0 -o a.pfm --json");
+        .object("render scene.obj --size 128x128 --spp 1 --eye 0.1,1.2,4.1 --look-at 0,1,0 -o a.pfm --json");
     let dropped = &object["dropped"];
     let total = dropped["unfinished"].as_u64().unwrap();
-    assert!(total > 100, "{dropped}");
+    assert!(total > 8, "{dropped}");
     let places = dropped["places"].as_array().unwrap();
     assert_eq!(dropped["tiles"].as_u64().unwrap(), places.len() as u64);
     assert_eq!(places.iter().map(|place| place["unfinished"].as_u64().unwrap()).sum::<u64>(), total);
     assert!(places[0]["unfinished"].as_u64() >= places[1]["unfinished"].as_u64());
     assert_eq!((&places[0]["width"], &places[0]["height"]), (&16.into(), &16.into()));
-    assert!(dropped["empty_pixels"].as_u64().unwrap() > 0);
+    // Samples of such paths count with the light that was found before.
+    assert_eq!(dropped["empty_pixels"].as_u64(), Some(0));
     let picture = read(&folder.path("a.pfm")).unwrap();
     assert!(picture.pixels.iter().flatten().all(|value| value.is_finite()));
 }

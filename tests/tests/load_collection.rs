@@ -49,10 +49,13 @@ fn report(path: &Path) -> Result<LoadedScene, LoadError> {
     result
 }
 
+/// The largest coordinate: the detail of a scene lies within 1, and large triangles around it reach far.
+const FARTHEST: f32 = (1u32 << 31) as f32;
+
 /// What the core relies on.
 fn assert_sound(scene: &LoadedScene) {
     assert_eq!(scene.mesh().validate(scene.materials.len()), Ok(()));
-    assert!(scene.positions.iter().flatten().all(|x| x.is_finite() && x.abs() <= 1.0));
+    assert!(scene.positions.iter().flatten().all(|x| x.is_finite() && x.abs() <= FARTHEST));
     assert!(scene.texcoords.iter().flatten().all(|x| x.is_finite()));
     let is_unit_or_zero = |n: &[f32; 3]| {
         let squared = n.iter().map(|x| x * x).sum::<f32>();
