@@ -8,8 +8,8 @@ use halflight_core::Rgb;
 use halflight_core::bsdf::{All, Bsdf};
 use halflight_core::sampling::warp::uniform_sphere;
 use halflight_core::scene::{
-    Camera, ColorInput, Material, Mesh, ScalarInput, Scene, Surface, Texels, Texture, TextureId, TextureTransform,
-    Wrap,
+    Camera, ColorInput, Material, Mesh, ScalarInput, Scene, Surface, Texels, Texture, TextureId,
+    TextureTransform, Wrap,
 };
 
 /// Lengths of unit vectors may be off by so much.

@@ -80,8 +80,7 @@ fn record(input: &mut Unstructured) -> Result<Record> {
     let (gradient, rotation) = ([pair()?, pair()?, pair()?], [pair()?, pair()?, pair()?]);
     let (bend, [noise, error], [allowed, shining]) = (pair()?, pair()?, pair()?);
     let irradiance = within(input)?;
-    let mut sectors =
-        || if input.arbitrary()? { input.arbitrary() } else { Ok([u8::MAX; SECTORS]) };
+    let mut sectors = || if input.arbitrary()? { input.arbitrary() } else { Ok([u8::MAX; SECTORS]) };
     let (fence, free): ([u8; SECTORS], [u8; SECTORS]) = (sectors()?, sectors()?);
     let radii = [r1, r1 * (1.0 + longer)];
     Ok(Record {

@@ -31,7 +31,7 @@ use super::images::{Images, Way};
 use super::maps::{GatherLight, PhotonMaps, Said};
 use super::merge::{ChainLink, Merging, ends_chain};
 use super::reuse::Exchange;
-use super::shadow::{FEW, pass_cutout, passing, shadow_ray};
+use super::shadow::{FEW, Shadows, pass_cutout, passing, shadow_ray};
 use super::shoot::is_varnished;
 use super::spots::{Cones, Spot};
 use super::wave::{Merged, Path, Share, Wave};
@@ -688,21 +688,4 @@ pub(super) struct Met<'a> {
     aim: Option<Aim>,
     /// What a cache says of it.
     pub(super) indirect: Option<Indirect>,
-}
-
-/// Shadow rays, and what arrives at the camera from each if nothing is in its way.
-struct Shadows<'w> {
-    rays: &'w mut [Ray],
-    light: &'w mut [[f32; 3]],
-    count: usize,
-}
-
-impl Shadows<'_> {
-    #[inline]
-    fn push(&mut self, ray: Ray, light: Rgb) {
-        if let (Some(slot), Some(arrives)) = (self.rays.get_mut(self.count), self.light.get_mut(self.count)) {
-            (*slot, *arrives) = (ray, light.to_array());
-            self.count += 1;
-        }
-    }
 }

@@ -73,3 +73,20 @@ pub(super) fn pass_cutout<F: Features>(scene: &Scene, ray: &Ray, hit: &Hit) -> O
         (Ray { tag: ray.tag, ..rest }, transmittance)
     })
 }
+
+/// Shadow rays, and what arrives at the camera from each if nothing is in its way.
+pub(super) struct Shadows<'w> {
+    pub(super) rays: &'w mut [Ray],
+    pub(super) light: &'w mut [[f32; 3]],
+    pub(super) count: usize,
+}
+
+impl Shadows<'_> {
+    #[inline]
+    pub(super) fn push(&mut self, ray: Ray, light: Rgb) {
+        if let (Some(slot), Some(arrives)) = (self.rays.get_mut(self.count), self.light.get_mut(self.count)) {
+            (*slot, *arrives) = (ray, light.to_array());
+            self.count += 1;
+        }
+    }
+}

@@ -9,7 +9,8 @@
 //! can be kept in a file, and be the first records of another picture of the same scene.
 
 use super::balance::{Account, Trial};
-use super::cache_settings::{CacheUse, Gather, in_files, is_open};
+use super::cache_memory::{Needs, has_indirect_light};
+use super::cache_settings::{CacheUse, is_open};
 use super::caster::{Cast, Caster};
 use super::caustics::{self, CausticUse};
 use super::haste::{ENOUGH, Haste};
@@ -27,12 +28,12 @@ use crate::drive::memory::Memory;
 use crate::drive::refinement::{Refinement, Shortfall};
 use crate::drive::survey::{self, Survey};
 use crate::drive::workers::Workers;
-use crate::drive::{RenderError, Settings, Stop};
+use crate::drive::{RenderError, Stop};
 use crate::save::Patience;
 use core::f32::consts::FRAC_PI_2;
 use halflight_core::bsdf::Features;
 use halflight_core::cache::irradiance::{CellFlux, IrradianceCache, Record, metric};
-use halflight_core::film::{PIXELS_PER_TILE, PixelSet, Tile};
+use halflight_core::film::PixelSet;
 use halflight_core::memory::{Arena, Footprint, Line};
 use halflight_core::transport::gather::{Gathering, Place};
 use halflight_core::transport::path::WAVE;
@@ -41,18 +42,10 @@ use halflight_core::transport::{Counters, PathTracer};
 use std::collections::VecDeque;
 use std::time::Instant;
 
-/// Strata along a side come in so many.
-const BLOCK: usize = 8;
-
-/// Strata along a side to begin with where it is to be found out how many rays records are worth, and the most there may be.
-const FIRST: usize = 16;
-const MOST: usize = 64;
-
 /// Which of [`Needs::sizes`] that is.
 const BEGIN: usize = 1;
 
-/// The most strata along a side, where caches are refined, and how often they are.
-const FINEST: usize = 128;
+/// How often caches are refined.
 const MOST_REFINEMENTS: usize = 8;
 
 /// Radii become smaller by a factor between these: squared errors of extrapolation fall with its fourth power.
@@ -137,69 +130,6 @@ impl Loaded {
     /// Records that there must be room for in each half.
     fn fewest(&self) -> usize {
         self.records.iter().map(Vec::len).max().unwrap_or(0)
-    }
-}
-
-/// What a picture takes of memory, whatever is left of it for records and photons.
-struct Needs {
-    /// Strata along a side that may be gathered, the fewest first: fewer than those to begin with, these, and more of them.
-    sizes: Vec<usize>,
-    /// Of each thread.
-    scratch: Footprint,
-    edges: Footprint,
-    /// Whether gather rays end in photons.
-    by_photons: bool,
-    /// Whether caches may be refined.
-    is_refined: bool,
-}
-
-impl Needs {
-    /// With photons of caustics or without.
-    fn of<F: Features>(stage: &Stage, memory: &Memory, has_caustics: bool) -> Self {
-        let Stage { settings, workers, .. } = *stage;
-        let gather = settings.cache.gather;
-        let is_open = is_open(settings);
-        let strata = if is_open { FIRST } else { settings.cache.strata() as usize };
-        let is_refined = settings.stop.error.is_some() && !in_files(settings) && has_indirect_light(settings);
-        let most = match (is_refined, is_open) {
-            (true, _) => FINEST,
-            (_, true) => MOST,
-            _ => strata,
-        };
-        // As fine as half of the memory allows.
-        let has_memory = |n: usize| {
-            let scratch = PathTracer::<F>::gather_scratch(n).bytes().saturating_mul(workers.count());
-            n <= most && memory.available() / 2 > scratch + 2 * CellFlux::footprint(n).bytes()
-        };
-        // With one between, but where caches are refined, which begin anew each time.
-        let between = |n: usize| if n.is_multiple_of(3) { n / 3 * 4 } else { n / 2 * 3 };
-        let more = |n: &usize| Some(if is_refined { 2 * n } else { between(*n) });
-        let finer = core::iter::successors(more(&strata), more).take_while(|n| has_memory(*n));
-        let coarse = strata.div_ceil(2 * BLOCK) * BLOCK;
-        let sizes: Vec<usize> = [coarse, strata].into_iter().chain(finer).collect();
-        let finest = sizes.last().copied().unwrap_or(strata);
-        let scratch = PathTracer::<F>::scratch(WAVE).or(PathTracer::<F>::gather_scratch(finest));
-        let by_photons = gather == Gather::Photons && has_indirect_light(settings);
-        let scratch = if by_photons { scratch.or(Laboratory::scratch::<F>()) } else { scratch };
-        let scratch = if has_caustics { scratch.or(caustics::scratch::<F>()) } else { scratch };
-        let tiles = Tile::count(settings.width, settings.height);
-        let edges = Footprint::default().slice::<[u64; PIXELS_PER_TILE / 64]>(tiles);
-        Self { sizes, scratch, edges, by_photons, is_refined }
-    }
-
-    /// All of it.
-    fn bytes(&self, stage: &Stage) -> usize {
-        let tables: usize = self.sizes.iter().map(|&n| CellFlux::footprint(n).bytes()).sum();
-        let scratch = self.scratch.bytes().saturating_mul(stage.workers.count());
-        scratch.saturating_add(self.edges.bytes()).saturating_add(tables)
-    }
-
-    /// What comes after photons of caustics: the audit, the fewest photons that gather rays end in, room for `fewest`
-    /// records in each half.
-    fn later<F: Features>(&self, stage: &Stage, fewest: usize) -> usize {
-        let photons = if self.by_photons { Laboratory::least_bytes(stage.lights) } else { 0 };
-        let records = IrradianceCache::footprint(fewest).bytes().saturating_mul(2);
-        Audit::bytes::<F>(stage, Method::IrradianceCache.is_biased()) + photons + records
     }
 }
 
@@ -303,11 +233,6 @@ fn set_up<F: Features, T>(
     drop(loaded.records);
     memory.give_back(LOADED);
     then(&mut method, memory)
-}
-
-/// Whether paths are long enough for light to be reflected by one surface before the one that is seen.
-fn has_indirect_light(settings: &Settings) -> bool {
-    settings.max_depth.is_none_or(|depth| depth > 2)
 }
 
 /// How many records fit into `bytes`, with the place of each.

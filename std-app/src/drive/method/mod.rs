@@ -6,6 +6,7 @@
 
 mod aiming;
 mod balance;
+mod cache_memory;
 mod cache_settings;
 mod caster;
 mod caustic_look;

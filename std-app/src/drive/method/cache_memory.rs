@@ -1,0 +1,94 @@
+//! Memory of cached pictures beside their records and photons: tables of the strata that may be gathered, working memory
+//! of threads.
+
+use super::cache_settings::{Gather, in_files, is_open};
+use super::caustics;
+use super::photons::Laboratory;
+use super::{Method, Stage};
+use crate::drive::Settings;
+use crate::drive::audit::Audit;
+use crate::drive::memory::Memory;
+use halflight_core::bsdf::Features;
+use halflight_core::cache::irradiance::{CellFlux, IrradianceCache};
+use halflight_core::film::{PIXELS_PER_TILE, Tile};
+use halflight_core::memory::Footprint;
+use halflight_core::transport::PathTracer;
+use halflight_core::transport::path::WAVE;
+
+/// Strata along a side are multiples of this.
+const BLOCK: usize = 8;
+
+/// Strata along a side of the first records where a trial chooses the number of rays, and the most that it may choose.
+const FIRST: usize = 16;
+const MOST: usize = 64;
+
+/// The most strata along a side where caches are refined.
+const FINEST: usize = 128;
+
+/// What a picture takes of memory, whatever is left of it for records and photons.
+pub(super) struct Needs {
+    /// Strata along a side that may be gathered, the fewest first: fewer than those to begin with, these, and more of them.
+    pub(super) sizes: Vec<usize>,
+    /// Of each thread.
+    pub(super) scratch: Footprint,
+    pub(super) edges: Footprint,
+    /// Whether gather rays end in photons.
+    pub(super) by_photons: bool,
+    /// Whether caches may be refined.
+    pub(super) is_refined: bool,
+}
+
+impl Needs {
+    /// With photons of caustics or without.
+    pub(super) fn of<F: Features>(stage: &Stage, memory: &Memory, has_caustics: bool) -> Self {
+        let Stage { settings, workers, .. } = *stage;
+        let gather = settings.cache.gather;
+        let is_open = is_open(settings);
+        let strata = if is_open { FIRST } else { settings.cache.strata() as usize };
+        let is_refined = settings.stop.error.is_some() && !in_files(settings) && has_indirect_light(settings);
+        let most = match (is_refined, is_open) {
+            (true, _) => FINEST,
+            (_, true) => MOST,
+            _ => strata,
+        };
+        // As fine as half of the memory allows.
+        let has_memory = |n: usize| {
+            let scratch = PathTracer::<F>::gather_scratch(n).bytes().saturating_mul(workers.count());
+            n <= most && memory.available() / 2 > scratch + 2 * CellFlux::footprint(n).bytes()
+        };
+        // With one between, but where caches are refined, which begin anew each time.
+        let between = |n: usize| if n.is_multiple_of(3) { n / 3 * 4 } else { n / 2 * 3 };
+        let more = |n: &usize| Some(if is_refined { 2 * n } else { between(*n) });
+        let finer = core::iter::successors(more(&strata), more).take_while(|n| has_memory(*n));
+        let coarse = strata.div_ceil(2 * BLOCK) * BLOCK;
+        let sizes: Vec<usize> = [coarse, strata].into_iter().chain(finer).collect();
+        let finest = sizes.last().copied().unwrap_or(strata);
+        let scratch = PathTracer::<F>::scratch(WAVE).or(PathTracer::<F>::gather_scratch(finest));
+        let by_photons = gather == Gather::Photons && has_indirect_light(settings);
+        let scratch = if by_photons { scratch.or(Laboratory::scratch::<F>()) } else { scratch };
+        let scratch = if has_caustics { scratch.or(caustics::scratch::<F>()) } else { scratch };
+        let tiles = Tile::count(settings.width, settings.height);
+        let edges = Footprint::default().slice::<[u64; PIXELS_PER_TILE / 64]>(tiles);
+        Self { sizes, scratch, edges, by_photons, is_refined }
+    }
+
+    /// All of it.
+    pub(super) fn bytes(&self, stage: &Stage) -> usize {
+        let tables: usize = self.sizes.iter().map(|&n| CellFlux::footprint(n).bytes()).sum();
+        let scratch = self.scratch.bytes().saturating_mul(stage.workers.count());
+        scratch.saturating_add(self.edges.bytes()).saturating_add(tables)
+    }
+
+    /// What comes after photons of caustics: the audit, the fewest photons that gather rays end in, room for `fewest`
+    /// records in each half.
+    pub(super) fn later<F: Features>(&self, stage: &Stage, fewest: usize) -> usize {
+        let photons = if self.by_photons { Laboratory::least_bytes(stage.lights) } else { 0 };
+        let records = IrradianceCache::footprint(fewest).bytes().saturating_mul(2);
+        Audit::bytes::<F>(stage, Method::IrradianceCache.is_biased()) + photons + records
+    }
+}
+
+/// Whether paths are long enough for light to be reflected by one surface before the one that is seen.
+pub(super) fn has_indirect_light(settings: &Settings) -> bool {
+    settings.max_depth.is_none_or(|depth| depth > 2)
+}
