@@ -10,7 +10,7 @@
 //! Unit vectors are not normalised for that: a photon's grid holds whole numbers, which are compared squared.
 //!
 //! The same walk weighs the photons of finer discs once more, of half the radius and less, as if there were no others: for
-//! places where photons crowd, and to know what a disc blurs (`docs/decisions/0043-what-photons-blur.md`).
+//! places where photons crowd, and to know what a disc blurs (`docs/decisions/0043-density-bias.md`).
 
 use super::PhotonMap;
 use super::fence::{Fence, splat};

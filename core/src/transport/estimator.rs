@@ -151,7 +151,7 @@ pub(super) fn environment_heuristic(lights: &Lights, own: f32, other: f32) -> f3
 
 /// A path that carries at least this much goes on for certain; one that carries half of it, every other time. The fewest
 /// segments do not matter: to let the dark ones go at once is what pays
-/// (docs/decisions/0023-roulette-from-the-first-bounce.md).
+/// (docs/decisions/0023-russian-roulette.md).
 const CERTAIN_FROM: f32 = 0.25;
 
 /// From this many segments on nothing survives for certain, so that paths end even between perfect mirrors: of those

@@ -12,7 +12,7 @@
 //! eye sees x, it has three densities, which have all that lies behind x in common. Else the third is reckoned as if photons
 //! were gathered at x: with discs of one size it is the same, as a diffuse surface leaves the ratio of both as it is, and
 //! weights are right as long as all agree on them. But gathered they are not at x, which paths from the eye may meet so rarely
-//! that each that does would be a spike (`docs/decisions/0042-focus-lights-by-photons.md`). Nor is light gathered on a disc much
+//! that each that does would be a spike (`docs/decisions/0042-photons-past-the-first-receiver.md`). Nor is light gathered on a disc much
 //! smaller than that where it comes from, as right before the eye: there each photon would be one. Both ends know these two
 //! discs, and so where the one vertex is (`docs/decisions/0045-discs-before-the-eye.md`). With étendue in place of areas
 //! (`light/etendue.rs`) distances cancel, and the third over the first is
@@ -29,7 +29,7 @@
 //! paths find more easily are hardly ever left. Ends of paths by roulette count for none of the densities.
 //!
 //! A diffuse surface under a narrow coat is two: its base is rough, its coat a link of the chain like rough metal. Paths and light
-//! paths choose one of them at each such surface (`docs/decisions/0069-photons-under-varnish.md`).
+//! paths choose one of them at each such surface (`docs/decisions/0069-coats-as-layers.md`).
 //!
 //! Beside an irradiance cache photons have less to do: a record knows all that something rough, be it metal, sent to a point,
 //! and photons only what came there straight from a mirror or smooth glass. A light path that meets two rough surfaces after
