@@ -3,11 +3,14 @@
 //! The core allocates nothing, spawns no thread and holds no lock. Every structure states its
 //! [`memory::Footprint`] before it is built and lives in an [`memory::Arena`] over the caller's bytes.
 //!
-//! Data meets the rooms in this order: [`scene`] borrowed views of what to render; [`census`] what the
-//! scene holds and hence what can be left out; [`bvh`] and [`light`] structures built over it; [`cache`]
-//! irradiance kept with its derivatives; [`photon`] light that was left on surfaces; [`transport`] the methods,
-//! written against [`bsdf`], [`camera`] and [`sampling`]; [`film`] what they fill; [`estimate`] what is known of
-//! the error.
+//! The modules are layers: each imports only those above it in this list, which `cargo verify source` enforces.
+//!
+//! - [`memory`], [`geometry`], [`sampling`]: arenas, vectors and rays, random numbers and their warps.
+//! - [`scene`]: borrowed views of the meshes, materials, textures, lights and the camera to render.
+//! - [`bsdf`]: scattering at a point. [`bvh`]: ray tracing. [`light`]: sampling of all lights together.
+//! - [`film`]: pixels and tiles. [`photon`]: photon maps. [`cache`]: irradiance with its derivatives.
+//! - [`estimate`]: the error of a picture. [`census`]: the kinds of things in a scene, and the code they need.
+//! - [`transport`]: the methods.
 #![no_std]
 #![forbid(unsafe_code)]
 
@@ -17,9 +20,9 @@ extern crate std;
 pub mod bsdf;
 pub mod bvh;
 pub mod cache;
-pub mod camera;
 pub mod census;
 pub mod estimate;
+mod features;
 pub mod film;
 pub mod geometry;
 pub mod light;

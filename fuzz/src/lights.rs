@@ -4,9 +4,10 @@
 use crate::numbers::{fraction, traceable_point as point};
 use arbitrary::{Result, Unstructured};
 use glam::Vec3;
-use halflight_core::light::{Lights, PointLight};
+use halflight_core::light::Lights;
 use halflight_core::memory::{Arena, Line};
 use halflight_core::sampling::warp::uniform_sphere;
+use halflight_core::scene::PointLight;
 use halflight_core::scene::{Camera, Material, Mesh, Scene, Triangle};
 use halflight_core::{Level, Rgb};
 

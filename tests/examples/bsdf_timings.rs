@@ -7,8 +7,8 @@ use core::hint::black_box;
 use glam::{Vec2, Vec3};
 use halflight_core::Rgb;
 use halflight_core::bsdf::{All, Bsdf, DiffuseOnly, Features};
-use halflight_core::camera::Camera;
 use halflight_core::sampling::Random;
+use halflight_core::scene::Camera;
 use halflight_core::scene::{Material, Mesh, Scene, Surface};
 use std::time::Instant;
 

@@ -4,7 +4,7 @@
 use glam::Vec3;
 use halflight::drive::{Method, RenderResult};
 use halflight_core::Rgb;
-use halflight_core::camera::Camera;
+use halflight_core::scene::Camera;
 use halflight_core::scene::{Material, Scene};
 use halflight_tests::render::render;
 use halflight_tests::scenes::{SceneBuffers, emitter};

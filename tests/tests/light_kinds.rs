@@ -5,9 +5,10 @@ mod light_support;
 
 use glam::{Mat3, Vec2, Vec3};
 use halflight_core::Rgb;
-use halflight_core::light::{Environment, Lights, PointLight, emitted};
+use halflight_core::light::{Lights, emitted};
 use halflight_core::memory::{Arena, Line};
 use halflight_core::sampling::{Random, Sampler, warp};
+use halflight_core::scene::{Environment, PointLight};
 use halflight_core::scene::{Texels, Texture, TextureId, TextureTransform, Wrap};
 use light_support::{Lamp, Stage, random_direction};
 

@@ -6,7 +6,7 @@ use core::time::Duration;
 use glam::Vec3;
 use halflight::drive::{self, Ending, Method, RenderResult, Settings, Stop};
 use halflight_core::Rgb;
-use halflight_core::light::PointLight;
+use halflight_core::scene::PointLight;
 use halflight_core::scene::{Camera, Material, Surface};
 use halflight_tests::scenes::{SceneBuffers, emitter, glass};
 use std::sync::mpsc;

@@ -5,7 +5,7 @@ mod picture;
 use core::f64::consts::PI;
 use glam::{DVec3, Vec3};
 use halflight_core::Rgb;
-use halflight_core::light::PointLight;
+use halflight_core::scene::PointLight;
 use halflight_core::scene::{Camera, Material};
 use halflight_tests::scenes::{SceneBuffers, emitter};
 use picture::{SIZE, assert_picture};

@@ -4,8 +4,8 @@
 use core::sync::atomic::AtomicBool;
 use glam::{Mat3, Vec3};
 use halflight::drive::{self, RenderResult, Settings, Stop};
-use halflight_core::camera::Camera;
-use halflight_core::light::Environment;
+use halflight_core::scene::Camera;
+use halflight_core::scene::Environment;
 use halflight_core::scene::{Material, Scene, Texels, Texture, TextureId, TextureTransform, Wrap};
 use halflight_core::{Level, Rgb};
 use halflight_tests::scenes::{SceneBuffers, constant_environment, everything};

@@ -9,10 +9,6 @@ use crate::sampling::sin_cos_turns;
 use core::f32::consts::FRAC_1_PI;
 use glam::Vec3;
 
-/// Surfaces below this alpha are smooth. A half-vector of two f32 directions has an error of about 1e-7:
-/// here still a thousandth of the lobe's width.
-pub const SMOOTH_ALPHA: f32 = 1e-4;
-
 /// The distribution of microfacet normals of roughness `alpha`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ggx {
@@ -20,7 +16,7 @@ pub struct Ggx {
 }
 
 impl Ggx {
-    /// `alpha` in [`SMOOTH_ALPHA`] … 1.
+    /// `alpha` in 1e-4 … 1; smoother surfaces are perfectly smooth.
     #[inline]
     pub fn new(alpha: f32) -> Self {
         Self { alpha2: alpha * alpha }

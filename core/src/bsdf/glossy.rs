@@ -8,7 +8,7 @@
 use super::Cover;
 use super::albedo::SchlickAlbedo;
 use super::coated::Coat;
-use super::{fresnel, resolve::unit};
+use super::{fresnel, range::unit};
 use crate::Rgb;
 
 /// A coat over a base, mixed with metal. See the module.

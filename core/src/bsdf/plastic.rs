@@ -11,7 +11,7 @@ use super::Cover;
 use super::albedo::{self, SchlickAlbedo};
 use super::coated::Coat;
 use super::fresnel;
-use super::resolve::{GREATEST_INDEX, unit};
+use super::range::{GREATEST_INDEX, unit};
 use crate::Rgb;
 
 /// A dielectric coat over a diffuse base, mixed with metal. See the module.

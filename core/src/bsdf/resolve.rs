@@ -1,35 +1,10 @@
-//! From what the file says to what a hit needs: textures are looked up, numbers brought into range.
+//! From a material of the scene to the BSDF of a hit: textures are looked up, numbers brought into range.
 
-use super::ggx::SMOOTH_ALPHA;
+use super::range::{GREATEST_INDEX, unit, unit_rgb};
 use super::{Bsdf, Conductor, Dielectric, Diffuse, Features, Glossy, Mirror, Plastic, RoughDielectric};
 use crate::Rgb;
-use crate::scene::{ColorInput, Material, ScalarInput, Scene, Surface, TextureId};
-use glam::{Vec2, Vec3, Vec4};
-
-impl ColorInput {
-    /// The colour at texture coordinates `uv`.
-    #[inline]
-    pub fn at<F: Features>(&self, scene: &Scene, uv: Vec2) -> Rgb {
-        match self.texture {
-            Some(id) if F::TEXTURES => self.value * texel(scene, id, uv).truncate(),
-            _ => self.value,
-        }
-    }
-}
-
-impl ScalarInput {
-    /// The number at texture coordinates `uv`.
-    #[inline]
-    pub fn at<F: Features>(&self, scene: &Scene, uv: Vec2) -> f32 {
-        match self.texture {
-            Some((id, channel)) if F::TEXTURES => {
-                let texel = texel(scene, id, uv).to_array();
-                self.value * texel.get(channel as usize).copied().unwrap_or(1.0)
-            }
-            _ => self.value,
-        }
-    }
-}
+use crate::scene::{ColorInput, Material, SMOOTH_ALPHA, ScalarInput, Scene, Surface};
+use glam::Vec2;
 
 impl Bsdf {
     /// What `material` does with light at texture coordinates `uv`, seen from its front or its back.
@@ -85,27 +60,6 @@ fn dielectric(ior: f32, front: bool, tint: Rgb, alpha: f32) -> Bsdf {
     }
 }
 
-/// Nothing transparent comes near; beyond, refraction from inside multiplies the rounding of a direction.
-pub(super) const GREATEST_INDEX: f32 = 20.0;
-
 /// The narrowest lobe of transmitted light that still counts as rough: its half-vector is a difference
 /// whose error, 1e-7, must be small against it.
 const MIN_SCATTER: f32 = 1e-5;
-
-/// Linear RGBA of a texture; white where the scene has no such texture.
-#[inline]
-fn texel(scene: &Scene, id: TextureId, uv: Vec2) -> Vec4 {
-    scene.textures.get(id.0 as usize).map_or(Vec4::ONE, |texture| texture.lookup(uv).into())
-}
-
-/// `x` within 0 … 1; 0 where it is not a number.
-#[inline]
-pub(super) fn unit(x: f32) -> f32 {
-    if x > 0.0 { x.min(1.0) } else { 0.0 }
-}
-
-/// Every channel within 0 … 1.
-#[inline]
-pub(super) fn unit_rgb(c: Rgb) -> Rgb {
-    Vec3::new(unit(c.x), unit(c.y), unit(c.z))
-}

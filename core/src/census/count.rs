@@ -2,8 +2,7 @@
 
 use super::Plan;
 use crate::geometry::Bounds;
-use crate::light::PointLight;
-use crate::scene::{ColorInput, Material, ScalarInput, Scene, Surface};
+use crate::scene::{ColorInput, Material, PointLight, ScalarInput, Scene, Surface};
 use glam::Vec3;
 
 /// How many of each kind of surface.

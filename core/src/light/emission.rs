@@ -4,7 +4,6 @@
 //!
 //! Light from infinitely far is sent through the disc that the scene's bounding sphere shows to it.
 
-use super::PointLight;
 use super::emitter::Emitter;
 use super::guide::{Guide, Pick};
 use super::lights::{Lights, emitted_at, mean_luminance, spot_falloff, strength};
@@ -17,7 +16,7 @@ use crate::sampling::warp::{
     uniform_cone_pdf, uniform_sphere, uniform_sphere_square, uniform_triangle,
 };
 use crate::sampling::{AliasTable, Numbers, Sampler};
-use crate::scene::Scene;
+use crate::scene::{PointLight, Scene};
 use core::f32::consts::{PI, TAU};
 use glam::Vec3;
 
@@ -362,9 +361,8 @@ fn power(scene: &Scene, lights: &Lights, radius: f32, i: usize) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::light::Environment;
     use crate::memory::Line;
-    use crate::scene::{Camera, Material, Mesh, Triangle};
+    use crate::scene::{Camera, Environment, Material, Mesh, Triangle};
     use std::vec;
 
     /// A unit square light that faces +z, with `material`.

@@ -1,6 +1,5 @@
 //! Light from infinitely far: what a ray sees that leaves the scene, and how to find its bright parts.
 
-use super::Environment;
 use super::window::{Aim, Window};
 use crate::Rgb;
 use crate::geometry::Frame;
@@ -9,7 +8,7 @@ use crate::sampling::warp::{
     UNIFORM_SPHERE_PDF, cosine_hemisphere, cosine_hemisphere_pdf, uniform_sphere, uniform_sphere_square,
 };
 use crate::sampling::{Distribution2d, sin_cos_turns};
-use crate::scene::{Scene, Texture};
+use crate::scene::{Environment, Scene, Texture};
 use core::f32::consts::{PI, TAU};
 use glam::{Vec2, Vec3};
 

@@ -4,11 +4,10 @@
 //! p(x₀) p(ω) / cos θ. The étendue is kept on the way, so the same number, over the density of the direction in which
 //! a path from the eye meets x₀, tells how much likelier one is than the other (`transport/merge.rs`).
 
-use super::PointLight;
 use super::emission::Emission;
 use super::lights::{LightSample, Lights};
 use crate::sampling::warp::{UNIFORM_SPHERE_PDF, uniform_cone_pdf};
-use crate::scene::Scene;
+use crate::scene::{PointLight, Scene};
 use core::f32::consts::{FRAC_1_PI, PI};
 use glam::Vec3;
 

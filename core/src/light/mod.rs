@@ -1,4 +1,4 @@
-//! Lights: what a scene file can name, and how transport samples all of them together.
+//! Sampling of all lights of a scene together, from surfaces and for light paths that start on them.
 
 mod border;
 mod bounds;
@@ -9,7 +9,6 @@ mod etendue;
 mod guide;
 mod lights;
 mod rectangle;
-mod source;
 mod target;
 mod tree;
 mod triangle;
@@ -20,12 +19,11 @@ pub(crate) use etendue::Found;
 pub use guide::Worth;
 pub(crate) use guide::throws;
 pub use lights::{LightPoint, LightSample, Lights};
-pub use source::{Environment, PointLight};
 pub(crate) use window::Row;
 pub use window::{Aim, Bins, Grid, Window, Windows};
 
 use crate::Rgb;
-use crate::bsdf::All;
+use crate::features::All;
 use crate::scene::Scene;
 use glam::Vec2;
 

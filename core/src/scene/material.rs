@@ -1,40 +1,13 @@
 //! What a surface does with light, as the scene file says it: inputs that may be textured.
 //! [`crate::bsdf`] turns a material at a hit point into a BSDF.
 
-use super::{Scene, TextureId};
+use super::{ColorInput, ScalarInput, Scene, TextureId};
 use crate::Rgb;
-use crate::bsdf::ggx::SMOOTH_ALPHA;
 use glam::Vec2;
 
-/// A colour, multiplied by a texture where there is one.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ColorInput {
-    /// The constant factor.
-    pub value: Rgb,
-    /// The texture's RGB, linear.
-    pub texture: Option<TextureId>,
-}
-
-/// A number, multiplied by a texture where there is one.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ScalarInput {
-    /// The constant factor.
-    pub value: f32,
-    /// The texture, and which of its channels (0 = R … 3 = A).
-    pub texture: Option<(TextureId, u8)>,
-}
-
-impl From<Rgb> for ColorInput {
-    fn from(value: Rgb) -> Self {
-        Self { value, texture: None }
-    }
-}
-
-impl From<f32> for ScalarInput {
-    fn from(value: f32) -> Self {
-        Self { value, texture: None }
-    }
-}
+/// Surfaces below this alpha are smooth. A half-vector of two f32 directions has an error of about 1e-7:
+/// here still a thousandth of the lobe's width.
+pub(crate) const SMOOTH_ALPHA: f32 = 1e-4;
 
 /// How the surface scatters. `roughness` is GGX alpha in 0 … 1; a textured roughness holds sqrt(alpha),
 /// so its texel is squared after the product.

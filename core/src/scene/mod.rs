@@ -1,18 +1,23 @@
 //! What to render: borrowed views of meshes, materials, textures, lights and the camera.
 //! A scene owns nothing; the app's buffers or a microcontroller's flash do.
 
+mod camera;
+mod framing;
+mod input;
+mod light;
 mod material;
 mod mesh;
 mod surface;
 mod texture;
 
-pub use material::{ColorInput, Material, NormalMap, ScalarInput, Surface};
+pub use camera::{Camera, Projection, StartPlane};
+pub use input::{ColorInput, ScalarInput};
+pub use light::{Environment, PointLight};
+pub(crate) use material::SMOOTH_ALPHA;
+pub use material::{Material, NormalMap, Surface};
 pub use mesh::{Mesh, Triangle};
 pub use surface::SurfacePoint;
 pub use texture::{Texels, Texture, TextureId, TextureTransform, Wrap};
-
-pub use crate::camera::Camera;
-pub use crate::light::{Environment, PointLight};
 
 /// All that a picture is made of.
 #[derive(Clone, Copy, Debug)]

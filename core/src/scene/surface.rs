@@ -2,7 +2,7 @@
 //! and rays that leave it without meeting it again.
 
 use super::{Material, NormalMap, Scene};
-use crate::bsdf::Features;
+use crate::features::Features;
 use crate::geometry::{Frame, Hit, Ray};
 use glam::{Vec2, Vec3};
 

@@ -1,7 +1,7 @@
 //! Fingerprints: 64 bits, in hexadecimal, by which files know what they are of.
 
 use super::sealed::Hash;
-use halflight_core::camera::Camera;
+use halflight_core::scene::Camera;
 use halflight_core::scene::{Scene, Texels};
 use serde::{Deserialize, Serialize};
 

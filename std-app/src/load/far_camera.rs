@@ -5,8 +5,8 @@ use super::scene::{LoadedScene, View};
 use super::transform::direction;
 use core::f64::consts::FRAC_PI_4;
 use glam::{DVec3, Vec3};
-use halflight_core::camera::Start;
 use halflight_core::scene::Camera;
+use halflight_core::scene::StartPlane;
 
 /// Tangent of half of the field of view below which a lens is long.
 const LONG: f32 = 1e-3;
@@ -21,7 +21,7 @@ const NEARER: f64 = 64.0;
 const MARGIN: f64 = 1e-5;
 
 /// Where the rays of `camera`, which stands at `view`, start; `None` at the eye.
-pub(super) fn start(scene: &LoadedScene, camera: &Camera, view: View) -> Option<Start> {
+pub(super) fn start(scene: &LoadedScene, camera: &Camera, view: View) -> Option<StartPlane> {
     if camera.tan_half_fov > LONG {
         return None;
     }
@@ -48,5 +48,5 @@ pub(super) fn start(scene: &LoadedScene, camera: &Camera, view: View) -> Option<
     let depth = first - MARGIN * first - 1.0;
     let anchor = eye + depth * along;
     let is_worth_it = depth > 0.0 && depth < f64::INFINITY && NEARER * anchor.length() < eye.length();
-    is_worth_it.then(|| Start { anchor: anchor.as_vec3(), depth: depth as f32 })
+    is_worth_it.then(|| StartPlane { anchor: anchor.as_vec3(), depth: depth as f32 })
 }

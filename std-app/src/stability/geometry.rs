@@ -6,7 +6,7 @@ use super::world::{World, faces, glowing};
 use core::f64::consts::PI;
 use glam::{DVec3, Vec3};
 use halflight_core::Rgb;
-use halflight_core::light::PointLight;
+use halflight_core::scene::PointLight;
 use halflight_core::scene::{Material, Triangle};
 
 const REFLECTANCE: f32 = 0.5;

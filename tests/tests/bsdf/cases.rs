@@ -3,8 +3,8 @@
 use glam::{Vec2, Vec3};
 use halflight_core::Rgb;
 use halflight_core::bsdf::{All, Bsdf, BsdfSample};
-use halflight_core::camera::Camera;
 use halflight_core::sampling::Random;
+use halflight_core::scene::Camera;
 use halflight_core::scene::{ColorInput, Material, Mesh, ScalarInput, Scene, Surface};
 
 /// A scene with nothing in it, for materials without textures.

@@ -5,10 +5,11 @@ use glam::{DVec3, Vec3};
 use halflight_core::Rgb;
 use halflight_core::bvh::brute::intersect;
 use halflight_core::geometry::Ray;
-use halflight_core::light::{Environment, Lights, PointLight};
+use halflight_core::light::Lights;
 use halflight_core::memory::{Arena, Line};
 use halflight_core::sampling::{Random, warp};
 use halflight_core::scene::{Camera, Material, Mesh, Scene, Texture, Triangle};
+use halflight_core::scene::{Environment, PointLight};
 
 /// A flat light.
 #[derive(Clone)]

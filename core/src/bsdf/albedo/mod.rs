@@ -8,7 +8,7 @@ mod data;
 #[cfg(test)]
 mod derive;
 
-use super::resolve::unit;
+use super::range::unit;
 use super::{fresnel, sqrt};
 
 /// The unit of the tables.

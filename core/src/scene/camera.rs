@@ -1,8 +1,6 @@
 //! The camera: pinhole or thin lens. Raster coordinates are continuous, x to the right and y down; the
 //! middle of the first pixel is (0.5, 0.5).
 
-mod framing;
-
 use crate::geometry::Ray;
 use crate::sampling::warp::concentric_disk;
 use glam::{Vec2, Vec3};
@@ -25,12 +23,12 @@ pub struct Camera {
     /// Distance along `forward` of what is sharp; of no effect for a pinhole.
     pub focus_distance: f32,
     /// Where rays start that begin very far from all surfaces; `None` at the eye.
-    pub start: Option<Start>,
+    pub start: Option<StartPlane>,
 }
 
 /// A plane before everything that a far camera sees: next to it, coordinates are more precise than at the eye.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Start {
+pub struct StartPlane {
     /// Where the middle of the picture lies on it.
     pub anchor: Vec3,
     /// How deep it is.
@@ -86,7 +84,7 @@ impl Camera {
         let through = self.forward + film.x * self.right + film.y * self.up;
         let start = |offset: Vec2| match self.start {
             None => self.eye + (offset.x * self.right + offset.y * self.up),
-            Some(Start { anchor, depth }) => {
+            Some(StartPlane { anchor, depth }) => {
                 let place = depth * film + (1.0 - depth / self.focus_distance) * offset;
                 anchor + place.x * self.right + place.y * self.up
             }
@@ -181,7 +179,7 @@ mod tests {
         near.focus_distance = 4.0;
         for radius in [0.0, 0.3] {
             near.lens_radius = radius;
-            let start = Start { anchor: near.eye + 2.5 * near.forward, depth: 2.5 };
+            let start = StartPlane { anchor: near.eye + 2.5 * near.forward, depth: 2.5 };
             let far = Camera { start: Some(start), ..near };
             let lens = [0.8, 0.3];
             let [a, b] = [near, far].map(|camera| camera.ray(100, 50, 12.5, 40.25, lens));

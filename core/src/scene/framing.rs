@@ -1,8 +1,7 @@
 //! The camera for a scene that names none: in front of the side of the bounding box that sees the most.
 
-use super::Camera;
+use super::{Camera, Mesh};
 use crate::geometry::Bounds;
-use crate::scene::Mesh;
 use glam::{Vec2, Vec3};
 
 /// Vertical field of view in degrees: that of the camera of the measured Cornell box (a lens of 35 mm

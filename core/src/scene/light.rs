@@ -1,6 +1,7 @@
 //! Lights as the scene file says them: those without surface, and the environment.
 
-use crate::{Rgb, scene::TextureId};
+use super::TextureId;
+use crate::Rgb;
 use glam::{Mat3, Vec3};
 
 /// A light without surface: a ray cannot hit it, it has to be sampled.
