@@ -4,9 +4,10 @@
 //!
 //! Light from infinitely far is sent through the disc that the scene's bounding sphere shows to it.
 
-use super::emitter::Emitter;
+use super::area::Emitter;
+use super::emitted::{emitted_at, mean_luminance, spot_falloff, strength};
 use super::guide::{Guide, Pick};
-use super::lights::{Lights, emitted_at, mean_luminance, spot_falloff, strength};
+use super::sampler::Lights;
 use super::target::Target;
 use crate::Rgb;
 use crate::geometry::{Bounds, Frame, MISS, Ray};

@@ -1,6 +1,6 @@
 //! Light from infinitely far: what a ray sees that leaves the scene, and how to find its bright parts.
 
-use super::window::{Aim, Window};
+use super::environment_visibility::{Aim, Window};
 use crate::Rgb;
 use crate::geometry::Frame;
 use crate::memory::{Arena, Footprint, OutOfMemory};

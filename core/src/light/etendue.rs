@@ -5,7 +5,7 @@
 //! a path from the eye meets x₀, tells how much likelier one is than the other (`transport/merge.rs`).
 
 use super::emission::Emission;
-use super::lights::{LightSample, Lights};
+use super::sampler::{LightSample, Lights};
 use crate::sampling::warp::{UNIFORM_SPHERE_PDF, uniform_cone_pdf};
 use crate::scene::{PointLight, Scene};
 use core::f32::consts::{FRAC_1_PI, PI};

@@ -7,7 +7,7 @@
 //! Where photons of all light are wanted there is nothing to aim at: cells are fewer, and what they are worth is learned alone.
 
 use super::emission::Emission;
-use super::lights::Lights;
+use super::sampler::Lights;
 use super::target::{self, Target};
 use crate::Rgb;
 use crate::memory::{Arena, Footprint, OutOfMemory};

@@ -127,7 +127,7 @@ impl Fence {
     }
 }
 
-/// The same vector in all lanes. No closures: see `facing` of `light/bounds.rs`.
+/// The same vector in all lanes. No closures: see `facing` of `light/tree/importance.rs`.
 #[inline(always)]
 pub(super) fn splat<S: Simd>(simd: S, vector: Vec3) -> [S::F16; 3] {
     [simd.splat16(vector.x), simd.splat16(vector.y), simd.splat16(vector.z)]

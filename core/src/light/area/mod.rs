@@ -2,13 +2,16 @@
 //! lights are sampled by solid angle, far ones by area; the choice depends on the shaded point only, so that
 //! [`Emitter::pdf`] gives the density of [`Emitter::sample`] whoever found the point.
 
-use super::bounds::Cone;
-use super::rectangle::SphericalRectangle;
-use super::triangle::SphericalTriangle;
+mod rectangle;
+mod triangle;
+
+use crate::geometry::Cone;
 use crate::sampling::warp::uniform_triangle;
 use crate::scene::Mesh;
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
+use rectangle::SphericalRectangle;
+use triangle::SphericalTriangle;
 
 /// A light whose radius is less than this fraction of its distance is sampled by area. On the Cornell box the
 /// squared error of a sample grows by 5 %, and its time shrinks by a quarter.
@@ -189,6 +192,17 @@ impl Emitter {
         (point - (o + share * (u + v))).length_squared() < self.near
     }
 
+    #[inline]
+    fn seen_rectangle(&self, from: Vec3) -> Option<SphericalRectangle> {
+        let edges = self.edges.map(Vec3::from);
+        SphericalRectangle::new(Vec3::from(self.origin), edges, self.normal.into(), from)
+    }
+
+    #[inline]
+    fn seen_triangle(&self, from: Vec3) -> Option<SphericalTriangle> {
+        SphericalTriangle::new(Vec3::from(self.origin), self.edges.map(Vec3::from), from)
+    }
+
     /// A point of the light as seen from `from`, and its density if that is one of solid angle; density
     /// of area otherwise. `None` where the light turns its back.
     #[inline]
@@ -199,8 +213,8 @@ impl Emitter {
         }
         if self.is_near(from) {
             let sampled = match self.shape() {
-                Shape::Rectangle => SphericalRectangle::new(self, from).map(|r| (r.sample(u), r.solid_angle)),
-                Shape::Triangle => SphericalTriangle::new(self, from).map(|t| (t.sample(u), t.solid_angle)),
+                Shape::Rectangle => self.seen_rectangle(from).map(|r| (r.sample(u), r.solid_angle)),
+                Shape::Triangle => self.seen_triangle(from).map(|t| (t.sample(u), t.solid_angle)),
                 Shape::Parallelogram => None,
             };
             if let Some((at, solid_angle)) = sampled.filter(|s| s.1 > SLIVER) {
@@ -221,8 +235,8 @@ impl Emitter {
         }
         if self.is_near(from) {
             let solid_angle = match self.shape() {
-                Shape::Rectangle => SphericalRectangle::new(self, from).map(|r| r.solid_angle),
-                Shape::Triangle => SphericalTriangle::new(self, from).map(|t| t.solid_angle),
+                Shape::Rectangle => self.seen_rectangle(from).map(|r| r.solid_angle),
+                Shape::Triangle => self.seen_triangle(from).map(|t| t.solid_angle),
                 Shape::Parallelogram => None,
             };
             if let Some(solid_angle) = solid_angle.filter(|&s| s > SLIVER) {

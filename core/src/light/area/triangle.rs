@@ -1,7 +1,6 @@
 //! Triangles seen from a point, sampled uniformly in solid angle (Arvo 1995, in the form without inverse
 //! cosines of Peters 2021, "BRDF Importance Sampling for Polygonal Lights", section 4).
 
-use super::emitter::Emitter;
 use crate::sampling::sin_cos_turns;
 use core::f32::consts::TAU;
 use glam::Vec3;
@@ -24,11 +23,11 @@ pub(super) struct SphericalTriangle {
 }
 
 impl SphericalTriangle {
-    /// `None` where the point lies in the plane of the light or too near to tell.
+    /// The triangle `origin`, `origin + edges[0]`, `origin + edges[1]`, seen from `from`. `None` if that point
+    /// lies in its plane or too near to tell.
     #[inline]
-    pub(super) fn new(light: &Emitter, from: Vec3) -> Option<Self> {
-        let edges = light.edges.map(Vec3::from);
-        let p = Vec3::from(light.origin) - from;
+    pub(super) fn new(origin: Vec3, edges: [Vec3; 2], from: Vec3) -> Option<Self> {
+        let p = origin - from;
         // In units of the distance: products of three lengths would leave the range of floats.
         let scale = 1.0 / p.abs().max(edges[0].abs()).max(edges[1].abs()).max_element();
         let (p, edges) = (p * scale, edges.map(|e| e * scale));

@@ -4,7 +4,7 @@
 //!
 //! Departure: cosines count by what they are in the mean over a group, not at most (docs/decisions/0059).
 
-use crate::geometry::Bounds;
+use crate::geometry::{Bounds, Cone};
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 use halflight_simd::{Lanes, Simd, dot};
@@ -52,34 +52,6 @@ pub(super) struct Groups {
     sin_cone: [f32; GROUPS],
     cos_cone: [f32; GROUPS],
     power: [f32; GROUPS],
-}
-
-/// The directions of a group: a cone.
-#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
-#[repr(C)]
-pub(super) struct Cone {
-    pub(super) axis: [f32; 3],
-    /// Cosine of the half-angle; -1 shines everywhere.
-    pub(super) cos: f32,
-}
-
-impl Cone {
-    pub(super) const ALL: Cone = Cone { axis: [0.0, 0.0, 1.0], cos: -1.0 };
-
-    /// Whether it is of all directions.
-    pub(super) fn is_all(&self) -> bool {
-        self.cos <= -1.0
-    }
-
-    /// The cosine of the cone around unit `axis` that holds this one.
-    pub(super) fn cos_around(&self, axis: Vec3) -> f32 {
-        let (cos_a, cos_b) = (axis.dot(self.axis.into()).min(1.0), self.cos);
-        if cos_a + cos_b <= 0.0 {
-            -1.0
-        } else {
-            cos_a * cos_b - sine(cos_a, 0.0, 1.0) * sine(cos_b, 0.0, 1.0)
-        }
-    }
 }
 
 impl Group {

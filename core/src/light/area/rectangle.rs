@@ -5,7 +5,6 @@
 //! cosine, which are products of complex numbers; the one arc tangent is that of the solid angle, in a form
 //! (van Oosterom and Strackee 1983, for both triangles) that stays precise for small ones.
 
-use super::emitter::Emitter;
 use crate::sampling::sin_cos_turns;
 use core::f32::consts::TAU;
 use glam::{Vec2, Vec3};
@@ -23,15 +22,15 @@ pub(super) struct SphericalRectangle {
 }
 
 impl SphericalRectangle {
-    /// `None` where the point lies in the plane of the light or too near to tell.
+    /// The rectangle with a corner at `origin`, its two edges from there and its unit normal, seen from `from`.
+    /// `None` if that point lies in its plane or too near to tell.
     #[inline]
-    pub(super) fn new(light: &Emitter, from: Vec3) -> Option<Self> {
-        let [ex, ey] = light.edges.map(Vec3::from);
+    pub(super) fn new(origin: Vec3, [ex, ey]: [Vec3; 2], normal: Vec3, from: Vec3) -> Option<Self> {
         let (width, depth) = (ex.length(), ey.length());
-        let p = Vec3::from(light.origin) - from;
+        let p = origin - from;
         let (x0, y0) = (p.dot(ex) / width, p.dot(ey) / depth);
         let (x1, y1) = (x0 + width, y0 + depth);
-        let z = p.dot(light.normal.into()).abs();
+        let z = p.dot(normal).abs();
         let scale = 1.0 / x0.abs().max(x1.abs()).max(y0.abs()).max(y1.abs()).max(z);
         let (x, y, z) = ([x0 * scale, x1 * scale], [y0 * scale, y1 * scale], z * scale);
         let corners =

@@ -4,30 +4,20 @@
 //! chooses among; the environment; directional lights. Which kind is decided by estimates of the irradiance
 //! they bring, with a floor for each, since nobody knows yet what is hidden.
 
+use super::area::Emitter;
 use super::border::Edges;
-use super::bounds::Cone;
-use super::emitter::{Emitter, Place};
+use super::emitted::{emitted_at, spot_falloff};
 use super::environment::EnvironmentSampler;
-use super::tree::{Item, Tree};
-use super::window::{Aim, Window, Windows};
-use super::{emitted, luminance};
-use crate::features::All;
-use crate::geometry::Bounds;
-use crate::memory::{Arena, Footprint, OutOfMemory};
-use crate::sampling::{AliasTable, ONE_MINUS_EPSILON, Sampler, warp::uniform_triangle};
-use crate::scene::{Material, Mesh, PointLight, Scene};
+use super::environment_visibility::{Aim, Window, Windows};
+use super::tree::Tree;
+use crate::sampling::{AliasTable, ONE_MINUS_EPSILON};
+use crate::scene::{Mesh, PointLight, Scene};
 use crate::{Level, Rgb};
 use core::cell::Cell;
-use glam::{Vec2, Vec3};
+use glam::Vec3;
 
 /// The least share of each kind of light that is there.
 const FLOOR: f32 = 0.1;
-
-/// Least weight of a light, relative to the strongest: none that shines is ever left out.
-const LEAST_POWER: f64 = 1e-30;
-
-/// Points at which the mean of a textured emission is taken.
-const TEXTURE_SAMPLES: u32 = 16;
 
 /// One direction from which light may come.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -75,37 +65,16 @@ pub struct Lights<'m> {
     pub(super) emitters: &'m [Emitter],
     /// Indices into the scene's lights: points and spots.
     pub(super) points: &'m [u32],
-    tree: Tree<'m>,
+    pub(super) tree: Tree<'m>,
     pub(super) environment: Option<EnvironmentSampler<'m>>,
     /// What of the environment each place sees, where that has been learned.
-    windows: Option<Windows<'m>>,
+    pub(super) windows: Option<Windows<'m>>,
     /// Indices into the scene's lights: directional.
     pub(super) distant: &'m [u32],
-    distant_table: AliasTable<'m>,
+    pub(super) distant_table: AliasTable<'m>,
     /// Irradiance by environment and directional lights, in the unit of the tree's powers.
-    environment_weight: f32,
-    distant_weight: f32,
-}
-
-/// What [`Lights::build`] is about to hold.
-#[derive(Clone, Copy, Default)]
-struct Counts {
-    emitters: usize,
-    points: usize,
-    distant: usize,
-}
-
-impl Counts {
-    fn of(scene: &Scene) -> Self {
-        let shines = |light: &&PointLight| strength(light) > 0.0;
-        let all = scene.lights.iter().filter(shines);
-        let distant = all.clone().filter(|l| matches!(l, PointLight::Directional { .. })).count();
-        Self { emitters: emitters(scene).count(), points: all.count() - distant, distant }
-    }
-
-    fn in_tree(&self) -> usize {
-        self.emitters + self.points
-    }
+    pub(super) environment_weight: f32,
+    pub(super) distant_weight: f32,
 }
 
 /// Kinds of lights, and the probability of each.
@@ -116,80 +85,6 @@ struct Shares {
 }
 
 impl<'m> Lights<'m> {
-    /// Bytes that [`Lights::build`] takes and keeps.
-    pub fn footprint(scene: &Scene) -> Footprint {
-        let counts = Counts::of(scene);
-        Footprint::default()
-            .slice::<Emitter>(counts.emitters)
-            .slice::<u32>(counts.points)
-            .slice::<u32>(counts.distant)
-            .and(Tree::footprint(counts.in_tree()))
-            .and(AliasTable::footprint(counts.distant))
-            .and(EnvironmentSampler::footprint(scene))
-    }
-
-    /// Bytes beyond the footprint that must be free in the arena during [`Lights::build`].
-    pub fn scratch(scene: &Scene) -> Footprint {
-        Footprint::default().slice::<Item>(Counts::of(scene).in_tree())
-    }
-
-    /// Finds and orders the lights of `scene`.
-    ///
-    /// # Errors
-    /// [`OutOfMemory`] where the arena has less than [`Lights::footprint`] and [`Lights::scratch`] ask for.
-    pub fn build(scene: &Scene, arena: &mut Arena<'m>) -> Result<Self, OutOfMemory> {
-        let counts = Counts::of(scene);
-        let kept: &mut [Emitter] = arena.slice(counts.emitters)?;
-        for (slot, emitter) in kept.iter_mut().zip(emitters(scene)) {
-            *slot = emitter;
-        }
-        let points: &mut [u32] = arena.slice(counts.points)?;
-        let distant: &mut [u32] = arena.slice(counts.distant)?;
-        fill(points, scene, |light| !matches!(light, PointLight::Directional { .. }));
-        fill(distant, scene, |light| matches!(light, PointLight::Directional { .. }));
-        let (nodes, trails) = Tree::memory(counts.in_tree(), arena)?;
-        let distant_strength = |i: usize| distant.get(i).map_or(0.0, |&light| strength_of(scene, light));
-        let distant_table = AliasTable::build(distant.len(), |i| distant_strength(i) as f32, arena)?;
-        let environment = EnvironmentSampler::build(scene, arena)?;
-
-        let mut scratch = arena.scratch();
-        let items: &mut [Item] = scratch.slice(counts.in_tree())?;
-        let sides = |e: &Emitter| if e.is_two_sided() { 2.0 } else { 1.0 };
-        let area_powers = kept.iter().map(|e| mean_luminance(scene, e) * f64::from(e.area) * sides(e));
-        // As a ball that shows a quarter of its area.
-        let all_around = |light| if place_of(scene, light).1.is_all() { 4.0 } else { 1.0 };
-        let point_powers = points.iter().map(|&light| strength_of(scene, light) * all_around(light));
-        let unit = area_powers.clone().chain(point_powers.clone()).fold(0.0, f64::max);
-        let unit = if unit > 0.0 { unit } else { 1.0 };
-        let relative = |power: f64| (power / unit).max(LEAST_POWER) as f32;
-        let emitters = kept.iter().map(|e| (Bounds::around(e.corners()), e.cone()));
-        let without_surface = points.iter().map(|&light| place_of(scene, light));
-        for (i, ((slot, (bounds, cone)), power)) in items
-            .iter_mut()
-            .zip(emitters.chain(without_surface))
-            .zip(area_powers.chain(point_powers))
-            .enumerate()
-        {
-            *slot = Item::new(&bounds, cone, relative(power), i as u32);
-        }
-        let tree = Tree::build(items, nodes, trails);
-
-        let sky = environment.map_or(0.0, |e| f64::from(e.mean) * core::f64::consts::PI);
-        let sun = (0..distant.len()).map(distant_strength).sum::<f64>();
-        let finite = |weight: f64| relative(weight).min(f32::MAX);
-        Ok(Self {
-            emitters: kept,
-            points,
-            tree,
-            environment,
-            windows: None,
-            distant,
-            distant_table,
-            environment_weight: if environment.is_some() { finite(sky) } else { 0.0 },
-            distant_weight: if distant.is_empty() { 0.0 } else { finite(sun) },
-        })
-    }
-
     /// The same lights, chosen by the instructions of `level`: the same ones, and sooner.
     pub fn with_level(&self, level: Level) -> Self {
         Self { tree: self.tree.with_level(level), ..*self }
@@ -519,104 +414,4 @@ fn sample_emitter(
 #[inline]
 fn faces(normal: Vec3, direction: Vec3) -> bool {
     normal == Vec3::ZERO || normal.dot(direction) > 0.0
-}
-
-/// What the light emits at a place; of a cut-out surface, what is left of it.
-#[inline]
-pub(super) fn emitted_at(scene: &Scene, emitter: &Emitter, place: &Place, front: bool) -> Rgb {
-    if !emitter.is_textured() {
-        return emitted(scene, place.triangle, Vec2::ZERO, front);
-    }
-    let [a, b, c] = scene.mesh.corner_texcoords(place.triangle);
-    let [u, v] = place.barycentric;
-    let uv = (1.0 - u - v) * a + u * b + v * c;
-    let opacity = material_of(scene, place.triangle).map_or(1.0, |m| m.opacity.at::<All>(scene, uv));
-    emitted(scene, place.triangle, uv, front) * opacity.clamp(0.0, 1.0)
-}
-
-/// The mean luminance of a light, positive where its material emits at all.
-pub(super) fn mean_luminance(scene: &Scene, emitter: &Emitter) -> f64 {
-    let Some(material) = material_of(scene, emitter.triangle) else { return 0.0 };
-    let constant = f64::from(luminance(material.emission.value));
-    if !emitter.is_textured() {
-        return constant;
-    }
-    let samples = (0..TEXTURE_SAMPLES).map(|i| {
-        let u = Sampler::new(0, 0, i).pair(0);
-        let place = emitter.place(if emitter.is_pair() { u } else { uniform_triangle(u).into() });
-        f64::from(luminance(emitted_at(scene, emitter, &place, true)))
-    });
-    let mean = samples.filter(|l| l.is_finite()).sum::<f64>() / f64::from(TEXTURE_SAMPLES);
-    // What sixteen points have missed may still be there.
-    mean.max(1e-3 * constant)
-}
-
-fn material_of<'s>(scene: &'s Scene, triangle: u32) -> Option<&'s Material> {
-    scene.materials.get(scene.mesh.triangles.get(triangle as usize)?.material as usize)
-}
-
-/// The emissive triangles of `scene`, two that make a parallelogram as one.
-fn emitters(scene: &Scene) -> impl Iterator<Item = Emitter> {
-    let mut next = 0u32;
-    core::iter::from_fn(move || {
-        while let Some(triangle) = scene.mesh.triangles.get(next as usize) {
-            let index = next;
-            next += 1;
-            let Some(material) = scene.materials.get(triangle.material as usize).filter(|m| m.emits()) else {
-                continue;
-            };
-            let same =
-                scene.mesh.triangles.get(next as usize).is_some_and(|t| t.material == triangle.material);
-            let textured = material.emission.texture.is_some() || material.has_cutout();
-            if let Some(emitter) = Emitter::new(&scene.mesh, index, same, material.two_sided, textured) {
-                next += u32::from(emitter.is_pair());
-                return Some(emitter);
-            }
-        }
-        None
-    })
-}
-
-fn fill(indices: &mut [u32], scene: &Scene, which: impl Fn(&PointLight) -> bool) {
-    let chosen = scene.lights.iter().enumerate().filter(|(_, light)| strength(light) > 0.0 && which(light));
-    for (slot, (index, _)) in indices.iter_mut().zip(chosen) {
-        *slot = index as u32;
-    }
-}
-
-fn strength_of(scene: &Scene, light: u32) -> f64 {
-    scene.lights.get(light as usize).map_or(0.0, strength)
-}
-
-/// Luminance of the intensity or irradiance; zero where it is no number.
-pub(super) fn strength(light: &PointLight) -> f64 {
-    let color = match light {
-        PointLight::Point { intensity, .. } | PointLight::Spot { intensity, .. } => intensity,
-        PointLight::Directional { irradiance, .. } => irradiance,
-    };
-    let strength = f64::from(luminance(*color));
-    if strength.is_finite() { strength.max(0.0) } else { 0.0 }
-}
-
-fn place_of(scene: &Scene, light: u32) -> (Bounds, Cone) {
-    match scene.lights.get(light as usize) {
-        Some(PointLight::Point { position, .. }) => (Bounds::around([*position]), Cone::ALL),
-        Some(PointLight::Spot { position, direction, cos_outer, .. }) => (
-            Bounds::around([*position]),
-            Cone { axis: direction.to_array(), cos: cos_outer.clamp(-1.0, 1.0) },
-        ),
-        _ => (Bounds::EMPTY, Cone::ALL),
-    }
-}
-
-/// 1 inside the inner cone, 0 outside the outer one, and linear in the angle in between.
-pub(super) fn spot_falloff(cos: f32, cos_inner: f32, cos_outer: f32) -> f32 {
-    if cos >= cos_inner {
-        return 1.0;
-    }
-    if cos <= cos_outer {
-        return 0.0;
-    }
-    let [inside, angle, outside] = [cos_inner, cos, cos_outer].map(libm::acosf);
-    (outside - angle) / (outside - inside)
 }

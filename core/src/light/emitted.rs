@@ -1,0 +1,81 @@
+//! The radiance and the power that one light emits.
+
+use super::area::{Emitter, Place};
+use super::luminance;
+use crate::Rgb;
+use crate::features::All;
+use crate::sampling::{Sampler, warp::uniform_triangle};
+use crate::scene::{Material, PointLight, Scene};
+use glam::Vec2;
+
+/// Points at which the mean of a textured emission is taken.
+const TEXTURE_SAMPLES: u32 = 16;
+
+/// The radiance that `triangle` emits at texture coordinates `uv`, to its front or its back.
+#[inline]
+pub fn emitted(scene: &Scene, triangle: u32, uv: Vec2, front: bool) -> Rgb {
+    let material = scene.mesh.triangles.get(triangle as usize).map(|t| t.material as usize);
+    match material.and_then(|m| scene.materials.get(m)) {
+        Some(material) if front || material.two_sided => {
+            // Maps may hold anything; light is never negative.
+            material.emission.at::<All>(scene, uv).max(Rgb::ZERO)
+        }
+        _ => Rgb::ZERO,
+    }
+}
+
+/// What the light emits at a place; of a cut-out surface, what is left of it.
+#[inline]
+pub(super) fn emitted_at(scene: &Scene, emitter: &Emitter, place: &Place, front: bool) -> Rgb {
+    if !emitter.is_textured() {
+        return emitted(scene, place.triangle, Vec2::ZERO, front);
+    }
+    let [a, b, c] = scene.mesh.corner_texcoords(place.triangle);
+    let [u, v] = place.barycentric;
+    let uv = (1.0 - u - v) * a + u * b + v * c;
+    let opacity = material_of(scene, place.triangle).map_or(1.0, |m| m.opacity.at::<All>(scene, uv));
+    emitted(scene, place.triangle, uv, front) * opacity.clamp(0.0, 1.0)
+}
+
+/// The mean luminance of a light, positive where its material emits at all.
+pub(super) fn mean_luminance(scene: &Scene, emitter: &Emitter) -> f64 {
+    let Some(material) = material_of(scene, emitter.triangle) else { return 0.0 };
+    let constant = f64::from(luminance(material.emission.value));
+    if !emitter.is_textured() {
+        return constant;
+    }
+    let samples = (0..TEXTURE_SAMPLES).map(|i| {
+        let u = Sampler::new(0, 0, i).pair(0);
+        let place = emitter.place(if emitter.is_pair() { u } else { uniform_triangle(u).into() });
+        f64::from(luminance(emitted_at(scene, emitter, &place, true)))
+    });
+    let mean = samples.filter(|l| l.is_finite()).sum::<f64>() / f64::from(TEXTURE_SAMPLES);
+    // What sixteen points have missed may still be there.
+    mean.max(1e-3 * constant)
+}
+
+fn material_of<'s>(scene: &'s Scene, triangle: u32) -> Option<&'s Material> {
+    scene.materials.get(scene.mesh.triangles.get(triangle as usize)?.material as usize)
+}
+
+/// Luminance of the intensity or irradiance; zero where it is no number.
+pub(super) fn strength(light: &PointLight) -> f64 {
+    let color = match light {
+        PointLight::Point { intensity, .. } | PointLight::Spot { intensity, .. } => intensity,
+        PointLight::Directional { irradiance, .. } => irradiance,
+    };
+    let strength = f64::from(luminance(*color));
+    if strength.is_finite() { strength.max(0.0) } else { 0.0 }
+}
+
+/// 1 inside the inner cone, 0 outside the outer one, and linear in the angle in between.
+pub(super) fn spot_falloff(cos: f32, cos_inner: f32, cos_outer: f32) -> f32 {
+    if cos >= cos_inner {
+        return 1.0;
+    }
+    if cos <= cos_outer {
+        return 0.0;
+    }
+    let [inside, angle, outside] = [cos_inner, cos, cos_outer].map(libm::acosf);
+    (outside - angle) / (outside - inside)
+}

@@ -1,0 +1,225 @@
+//! Building of a light tree: splits by the surface area orientation heuristic, three levels to a node.
+
+use super::importance::{GROUPS, Group};
+use super::{LEAF, LEVELS, Node, Tree, WAITING};
+use crate::Level;
+use crate::geometry::{Bounds, Cone};
+use bytemuck::{Pod, Zeroable};
+use glam::Vec3;
+
+/// Bins of the split search, for each axis.
+const BINS: usize = 12;
+
+/// From this depth on nodes are halved by count, so that no path is longer than the bits of a trail.
+const DEPTH_OF_HALVING: u32 = 30;
+
+/// A light that is to go into a tree: scratch memory of the build.
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C)]
+pub(in crate::light) struct Item {
+    min: [f32; 3],
+    max: [f32; 3],
+    cone: Cone,
+    power: f32,
+    light: u32,
+}
+
+impl Item {
+    pub(in crate::light) fn new(bounds: &Bounds, cone: Cone, power: f32, light: u32) -> Self {
+        Self { min: bounds.min.to_array(), max: bounds.max.to_array(), cone, power, light }
+    }
+
+    fn bounds(&self) -> Bounds {
+        Bounds { min: self.min.into(), max: self.max.into() }
+    }
+}
+
+impl<'m> Tree<'m> {
+    /// Over `items`, whose order changes. Their `light`s are 0 … `items.len()` - 1, each once.
+    pub(in crate::light) fn build(items: &mut [Item], nodes: &'m mut [Node], trails: &'m mut [u64]) -> Self {
+        let whole = items.iter().fold(Sum::NONE, |sum, item| sum.and(Sum::of(item)));
+        let whole = if items.is_empty() { Group::default() } else { whole.group(items) };
+        let mut stack = [Work::default(); WAITING];
+        let mut waiting = usize::from(items.len() > 1);
+        let mut free = waiting;
+        stack[0] = Work { end: items.len(), ..Work::default() };
+        while waiting > 0 {
+            waiting -= 1;
+            let work = stack[waiting];
+            for (lane, (start, end)) in work.parts(items).into_iter().enumerate() {
+                let part = &items[start..end];
+                if part.is_empty() {
+                    continue;
+                }
+                let sum = part.iter().fold(Sum::NONE, |sum, item| sum.and(Sum::of(item)));
+                let node = &mut nodes[work.node];
+                node.groups.set(lane, &sum.group(part));
+                let trail = work.trail | (lane as u64) << work.depth;
+                if let [item] = part {
+                    node.links[lane] = LEAF | item.light;
+                    trails[item.light as usize] = trail;
+                } else {
+                    node.links[lane] = free as u32;
+                    stack[waiting] = Work { start, end, node: free, depth: work.depth + LEVELS, trail };
+                    waiting += 1;
+                    free += 1;
+                }
+            }
+        }
+        Self { level: Level::BASELINE, whole, nodes, trails }
+    }
+}
+
+/// A range of items that waits for its node.
+#[derive(Clone, Copy, Default)]
+struct Work {
+    start: usize,
+    end: usize,
+    node: usize,
+    /// Bits of the trail, as many as the binary tree is deep.
+    depth: u32,
+    trail: u64,
+}
+
+impl Work {
+    /// The ranges of [`LEVELS`] branchings; which way each goes is a bit of its number, that of the first one lowest.
+    fn parts(&self, items: &mut [Item]) -> [(usize, usize); GROUPS] {
+        let mut parts = [(0, 0); GROUPS];
+        parts[0] = (self.start, self.end);
+        for level in 0..LEVELS {
+            let side = 1 << level;
+            for i in 0..side {
+                let (start, end) = parts[i];
+                if end - start > 1 {
+                    let part = &mut items[start..end];
+                    let whole = part.iter().fold(Sum::NONE, |sum, item| sum.and(Sum::of(item)));
+                    let middle = start + split(part, &whole, self.depth + level);
+                    (parts[i], parts[i + side]) = ((start, middle), (middle, end));
+                }
+            }
+        }
+        parts
+    }
+}
+
+/// Some items together.
+#[derive(Clone, Copy)]
+struct Sum {
+    bounds: Bounds,
+    /// Axes times powers; a light that shines everywhere adds nothing.
+    axis: Vec3,
+    power: f32,
+    count: usize,
+}
+
+impl Sum {
+    const NONE: Sum = Sum { bounds: Bounds::EMPTY, axis: Vec3::ZERO, power: 0.0, count: 0 };
+
+    fn of(item: &Item) -> Self {
+        let axis = if item.cone.cos > -1.0 { Vec3::from(item.cone.axis) * item.power } else { Vec3::ZERO };
+        Self { bounds: item.bounds(), axis, power: item.power, count: 1 }
+    }
+
+    fn and(self, other: Sum) -> Self {
+        Self {
+            bounds: self.bounds.union(other.bounds),
+            axis: self.axis + other.axis,
+            power: self.power + other.power,
+            count: self.count + other.count,
+        }
+    }
+
+    /// The group of `items`, whose sum this is.
+    fn group(&self, items: &[Item]) -> Group {
+        Group::new(&self.bounds, self.cone(items), self.power)
+    }
+
+    /// A cone around the mean axis that holds those of all `items`.
+    fn cone(&self, items: &[Item]) -> Cone {
+        if let [item] = items {
+            return item.cone;
+        }
+        let Some(axis) = (self.axis / self.power).try_normalize() else { return Cone::ALL };
+        let cos = items.iter().fold(1f32, |cos, item| cos.min(item.cone.cos_around(axis)));
+        // A little wider, against the rounding of axes.
+        Cone { axis: axis.to_array(), cos: (cos - 1e-5).max(-1.0) }
+    }
+
+    /// Power times the measures of directions and space (M_Ω and M_A of eq. 1).
+    fn cost(&self, unit: f32) -> f32 {
+        // The mean of unit axes has the length (1 + cos θ) / 2 where they fill a cone of half-angle θ.
+        let cos = 2.0 * (self.axis.length() / self.power) - 1.0;
+        // M_Ω for lights that shine into half-spaces: a quadratic through π, 2π + π²/2 and 4π at cosines
+        // of 1, 0 and -1.
+        let directions = 11.218 - (4.712 + 3.365 * cos) * cos;
+        let e = self.bounds.extent() / unit;
+        // Lines and points of lights have no area and still a size.
+        let area = e.x * (e.y + e.z) + e.y * e.z + 1e-3 * e.length_squared();
+        self.power * directions * area
+    }
+}
+
+/// Orders `items` into two parts and returns the size of the first: the best of [`BINS`] planes for each
+/// axis by the surface area orientation heuristic (SAOH, eq. 2 of the paper), or halves where none divides.
+fn split(items: &mut [Item], whole: &Sum, depth: u32) -> usize {
+    let half = items.len() / 2;
+    let extent = whole.bounds.extent();
+    let longest = extent.max_element();
+    if depth < DEPTH_OF_HALVING && longest > 0.0 {
+        let mut best = (f32::INFINITY, 0, 0);
+        for axis in 0..3 {
+            if extent[axis] <= 0.0 {
+                continue;
+            }
+            let mut bins = [Sum::NONE; BINS];
+            for item in items.iter() {
+                let bin = &mut bins[bin_of(item, &whole.bounds, axis)];
+                *bin = bin.and(Sum::of(item));
+            }
+            let mut above = [Sum::NONE; BINS];
+            for i in (0..BINS - 1).rev() {
+                above[i] = above[i + 1].and(bins[i + 1]);
+            }
+            let mut below = Sum::NONE;
+            for i in 0..BINS - 1 {
+                below = below.and(bins[i]);
+                if below.count > 0 && above[i].count > 0 {
+                    let cost = (below.cost(longest) + above[i].cost(longest)) * (longest / extent[axis]);
+                    if cost < best.0 {
+                        best = (cost, axis, i);
+                    }
+                }
+            }
+        }
+        if best.0 < f32::INFINITY {
+            let middle = partition(items, |item| bin_of(item, &whole.bounds, best.1) <= best.2);
+            if middle > 0 && middle < items.len() {
+                return middle;
+            }
+        }
+    }
+    let axis = (0..3).fold(0, |best, axis| if extent[axis] > extent[best] { axis } else { best });
+    items.select_nth_unstable_by(half, |a, b| {
+        let center = |item: &Item| item.min[axis] + item.max[axis];
+        center(a).total_cmp(&center(b)).then(a.light.cmp(&b.light))
+    });
+    half
+}
+
+fn bin_of(item: &Item, bounds: &Bounds, axis: usize) -> usize {
+    let center = 0.5 * (item.min[axis] + item.max[axis]);
+    let place = (center - bounds.min[axis]) / (bounds.max[axis] - bounds.min[axis]);
+    ((place * BINS as f32) as usize).min(BINS - 1)
+}
+
+/// Those of which `first` holds to the front; how many they are.
+fn partition(items: &mut [Item], first: impl Fn(&Item) -> bool) -> usize {
+    let mut middle = 0;
+    for i in 0..items.len() {
+        if first(&items[i]) {
+            items.swap(i, middle);
+            middle += 1;
+        }
+    }
+    middle
+}
