@@ -10,6 +10,7 @@ mod join;
 mod layout;
 mod leaf;
 mod packet;
+mod query;
 mod ready;
 mod references;
 mod split;
@@ -23,9 +24,10 @@ use crate::Level;
 use crate::geometry::{Bounds, Hit, Ray};
 use crate::memory::{Arena, Footprint, OutOfMemory};
 use crate::scene::Mesh;
-use batch::{Hidden, Nearest, Stream, Tiles};
+use batch::{Stream, Tiles};
 use halflight_simd::{Kernel, Simd};
 use layout::Node;
+use query::{Hidden, Nearest};
 
 /// How alike the rays of a batch are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

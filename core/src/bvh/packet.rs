@@ -12,9 +12,9 @@
 //! The price: a packet whose rays diverge visits nodes that few rays of it meet.
 
 use super::Bvh;
-use super::batch::{Nearest, Sink};
 use super::layout::Child;
 use super::leaf::corners_of;
+use super::query::{Nearest, Sink};
 use crate::geometry::{Hit, MISS, Ray};
 use halflight_simd::kernels::RECIPROCAL_MAX;
 use halflight_simd::kernels::boxes::{ROBUST, SlabInterval, SlabInterval8, SlabRays16};

@@ -10,9 +10,9 @@
 //!    boxes first was slower.
 
 use super::Bvh;
-use super::batch::Sink;
 use super::layout::Child;
 use super::leaf::{meets_doubtful, take};
+use super::query::Sink;
 use super::ready::{Ready, traceable};
 use crate::geometry::{Hit, Ray};
 use core::hint::select_unpredictable;

@@ -1,6 +1,5 @@
 //! The count: one walk over the triangles, nothing allocated.
 
-use super::Plan;
 use crate::geometry::Bounds;
 use crate::scene::{ColorInput, Material, PointLight, ScalarInput, Scene, Surface};
 use glam::Vec3;
@@ -146,11 +145,6 @@ impl Census {
     pub fn has_light(&self) -> bool {
         self.emissive + self.point_lights + self.spot_lights + self.directional_lights > 0
             || self.environment != EnvironmentKind::None
-    }
-
-    /// What to render with, and what that can do without.
-    pub fn plan(&self) -> Plan {
-        Plan::new(self)
     }
 }
 

@@ -99,8 +99,15 @@ pub struct Plan {
     left_out: [Option<(&'static str, &'static str)>; 8],
 }
 
+impl Census {
+    /// What to render with, and what that can do without.
+    pub fn plan(&self) -> Plan {
+        Plan::new(self)
+    }
+}
+
 impl Plan {
-    pub(super) fn new(census: &Census) -> Plan {
+    fn new(census: &Census) -> Plan {
         let kinds = &census.surfaces;
         let needed = Able {
             textures: census.textured > 0,

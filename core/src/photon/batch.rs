@@ -1,8 +1,8 @@
 //! Searches for many places, in an order of our own.
 
 use super::PhotonMap;
-use super::curve::{self, Turn};
 use super::gather::{Density, Disc, Response, gather};
+use super::morton::{self, Turn};
 use super::nearest::{Neighbours, search};
 use glam::Vec3;
 use halflight_simd::{Kernel, Simd};
@@ -31,7 +31,7 @@ impl<F: FnMut(usize, &Neighbours)> Kernel for Searches<'_, '_, '_, F> {
         let map = self.map;
         // Where the search before was, and how far its k-th photon.
         let mut last: Option<([f32; 3], f32)> = None;
-        for turn in curve::along(map, self.places.iter().copied(), self.turns) {
+        for turn in morton::along(map, self.places.iter().copied(), self.turns) {
             let index = turn.index as usize;
             let Some(place) = self.places.get(index) else { continue };
             let place = map.space.enter(place.to_array());
@@ -64,7 +64,7 @@ impl<R: Response> Kernel for Gathers<'_, '_, R> {
 
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) {
-        for turn in curve::along(self.map, self.discs.iter().map(|disc| disc.place), self.turns) {
+        for turn in morton::along(self.map, self.discs.iter().map(|disc| disc.place), self.turns) {
             let index = turn.index as usize;
             if let (Some(disc), Some(density)) = (self.discs.get(index), self.densities.get_mut(index)) {
                 *density = gather(simd, self.map, disc, None, self.response);

@@ -9,18 +9,18 @@
 mod batch;
 pub mod brute;
 mod build;
-mod curve;
 mod fence;
 mod gather;
 mod layout;
+mod morton;
 mod nearest;
 mod range;
 mod record;
 mod space;
 
-pub use curve::Turn;
 pub use fence::{Fence, PROBES};
 pub use gather::{ALIKE, Density, Disc, FINER, FLATNESS, Falloff, Response, Uniform};
+pub use morton::Turn;
 pub use nearest::Neighbours;
 pub use record::Photon;
 
