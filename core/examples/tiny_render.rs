@@ -5,7 +5,7 @@ use glam::Vec3;
 use halflight_core::bsdf::DiffuseOnly;
 use halflight_core::bvh::Bvh;
 use halflight_core::film::{Film, PIXELS_PER_TILE};
-use halflight_core::light::Lights;
+use halflight_core::light::LightSampler;
 use halflight_core::memory::{Arena, Line, OutOfMemory};
 use halflight_core::scene::{Camera, Material, Mesh, Scene, Triangle};
 use halflight_core::transport::{PathSettings, PathTracer};
@@ -50,7 +50,7 @@ pub fn render(memory: &mut [Line; LINES], pixels: &mut [Rgb; SIZE * SIZE]) -> Re
     };
     let mut arena = Arena::new(bytemuck::cast_slice_mut(memory));
     let bvh = Bvh::build(&scene.mesh, &mut arena)?;
-    let lights = Lights::build(&scene, &mut arena)?;
+    let lights = LightSampler::build(&scene, &mut arena)?;
     let mut film = Film::new(SIZE as u32, SIZE as u32, &mut arena)?;
     let settings =
         PathSettings { width: SIZE as u32, height: SIZE as u32, seed: 1, max_depth: 8, reuse: true };

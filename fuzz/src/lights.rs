@@ -4,7 +4,7 @@
 use crate::numbers::{fraction, traceable_point as point};
 use arbitrary::{Result, Unstructured};
 use glam::Vec3;
-use halflight_core::light::Lights;
+use halflight_core::light::LightSampler;
 use halflight_core::memory::{Arena, Line};
 use halflight_core::sampling::warp::uniform_sphere;
 use halflight_core::scene::PointLight;
@@ -42,9 +42,9 @@ fn attempt(input: &mut Unstructured) -> Result<()> {
     let scene =
         Scene { mesh, materials: &materials, textures: &[], lights: &lights, environment: None, camera };
 
-    let bytes = Lights::footprint(&scene).and(Lights::scratch(&scene)).bytes();
+    let bytes = LightSampler::footprint(&scene).and(LightSampler::scratch(&scene)).bytes();
     let mut lines = vec![Line([0; 64]); bytes / 64];
-    let built = Lights::build(&scene, &mut Arena::new(bytemuck::cast_slice_mut(&mut lines)));
+    let built = LightSampler::build(&scene, &mut Arena::new(bytemuck::cast_slice_mut(&mut lines)));
     let lights = built.expect("the footprint is what the build takes");
     for _ in 0..MAX_POINTS {
         if input.is_empty() {

@@ -6,7 +6,7 @@ use arbitrary::{Result, Unstructured};
 use glam::Vec3;
 use halflight_core::memory::{Arena, Footprint, Line};
 use halflight_core::photon::{
-    Density, Disc, Falloff, Neighbours, Photon, PhotonMap, Photons, Response, Turn, Uniform, brute,
+    Density, Disc, Falloff, Neighbours, Photon, PhotonMap, Photons, QueryOrder, Response, Uniform, brute,
 };
 use halflight_core::{Level, Rgb};
 
@@ -106,7 +106,7 @@ fn search(map: &PhotonMap, level: Level, asked: &[Vec3], orders: &[Vec<u32>], ra
         assert_eq!(map.within(level, place, radius, &mut found), expected.len());
         assert_eq!(found, expected, "{level:?} at {place} within {radius}");
     }
-    let mut turns = vec![Turn::default(); asked.len()];
+    let mut turns = vec![QueryOrder::default(); asked.len()];
     let mut seen = 0;
     map.nearest_batch(level, asked, radius, &mut turns, &mut neighbours, |index, neighbours| {
         seen += 1;

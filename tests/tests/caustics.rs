@@ -7,7 +7,7 @@ use halflight::drive::{Checkpoint, Method, RenderResult, Settings};
 use halflight_core::bsdf::All;
 use halflight_core::bvh::Bvh;
 use halflight_core::film::Film;
-use halflight_core::light::{Emission, Lights, Worth};
+use halflight_core::light::{Emission, LightSampler, Worth};
 use halflight_core::memory::{Arena, Footprint, Line};
 use halflight_core::photon::{Photon, Photons};
 use halflight_core::scene::PointLight;
@@ -54,8 +54,8 @@ fn pictures(scene: &Scene, first: u32, (tasks, pixels, is_beside): Shot, max_dep
     let level = Level::detect();
     let mut bvh_lines = lines(Bvh::footprint(scene.mesh.triangles.len()));
     let bvh = Bvh::build(&scene.mesh, &mut arena(&mut bvh_lines)).unwrap();
-    let mut light_lines = lines(Lights::footprint(scene).and(Lights::scratch(scene)));
-    let lights = Lights::build(scene, &mut arena(&mut light_lines)).unwrap();
+    let mut light_lines = lines(LightSampler::footprint(scene).and(LightSampler::scratch(scene)));
+    let lights = LightSampler::build(scene, &mut arena(&mut light_lines)).unwrap();
     let mut emission_lines = lines(Emission::footprint(&lights));
     let emission = Emission::build(scene, &lights, &bvh.bounds(), &mut arena(&mut emission_lines)).unwrap();
     let mut scratch = lines(PathTracer::<All>::scratch(2048).or(CausticShooter::<All>::scratch()));
@@ -469,8 +469,8 @@ fn photons_go_to_a_mirror_of(side: f32) {
     let level = Level::detect();
     let mut bvh_lines = lines(Bvh::footprint(scene.mesh.triangles.len()));
     let bvh = Bvh::build(&scene.mesh, &mut arena(&mut bvh_lines)).unwrap();
-    let mut light_lines = lines(Lights::footprint(&scene).and(Lights::scratch(&scene)));
-    let lights = Lights::build(&scene, &mut arena(&mut light_lines)).unwrap();
+    let mut light_lines = lines(LightSampler::footprint(&scene).and(LightSampler::scratch(&scene)));
+    let lights = LightSampler::build(&scene, &mut arena(&mut light_lines)).unwrap();
     let guided = Worth::guide_footprint(&lights);
     let mut all = lines(
         Emission::footprint(&lights).and(Worth::footprint(&lights)).and(guided).and(guided).and(guided),

@@ -4,7 +4,7 @@ use glam::{Vec2, Vec3};
 use halflight_core::bsdf::All;
 use halflight_core::bvh::Bvh;
 use halflight_core::film::{Film, PIXELS_PER_TILE, Pixel, PixelSet, Tile};
-use halflight_core::light::Lights;
+use halflight_core::light::LightSampler;
 use halflight_core::memory::{Arena, Footprint, Line};
 use halflight_core::scene::{Camera, Material, Scene};
 use halflight_core::transport::{Counters, PathSettings, PathTracer};
@@ -23,8 +23,9 @@ fn with_edges<T>(scene: &Scene, then: impl FnOnce(PathTracer<All>, &[PixelSet]) 
     let settings = PathSettings { width: SIZE, height: SIZE, seed: 3, max_depth: 2, reuse: false };
     let mut bvh_lines = lines(Bvh::footprint(scene.mesh.triangles.len()));
     let bvh = Bvh::build(&scene.mesh, &mut Arena::new(bytemuck::cast_slice_mut(&mut bvh_lines))).unwrap();
-    let mut light_lines = lines(Lights::footprint(scene).and(Lights::scratch(scene)));
-    let lights = Lights::build(scene, &mut Arena::new(bytemuck::cast_slice_mut(&mut light_lines))).unwrap();
+    let mut light_lines = lines(LightSampler::footprint(scene).and(LightSampler::scratch(scene)));
+    let lights =
+        LightSampler::build(scene, &mut Arena::new(bytemuck::cast_slice_mut(&mut light_lines))).unwrap();
     let tracer = PathTracer::<All>::new(scene, &bvh, &lights, settings, Level::detect());
     let edges: Vec<_> =
         (0..tracer.tasks()).map(|task| tracer.edges(task, &mut Counters::default())).collect();

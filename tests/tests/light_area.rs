@@ -27,7 +27,7 @@ fn lambert(point: DVec3, normal: DVec3, corners: &[DVec3]) -> f64 {
     0.5 * sum.dot(normal).abs()
 }
 
-/// Mean and standard error of the irradiance, by `Lights::sample` alone.
+/// Mean and standard error of the irradiance, by `LightSampler::sample` alone.
 fn irradiance(stage: &Stage, point: Vec3, normal: Vec3, samples: u32) -> (f64, f64) {
     stage.with_lights(|scene, lights| {
         let random = Random::new(1, 2);

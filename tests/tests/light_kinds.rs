@@ -5,7 +5,7 @@ mod light_support;
 
 use glam::{Mat3, Vec2, Vec3};
 use halflight_core::Rgb;
-use halflight_core::light::{Lights, emitted};
+use halflight_core::light::{LightSampler, emitted};
 use halflight_core::memory::{Arena, Line};
 use halflight_core::sampling::{Random, Sampler, warp};
 use halflight_core::scene::{Environment, PointLight};
@@ -263,14 +263,17 @@ fn one_byte_less_is_an_error_and_nothing_needs_nothing() {
         PointLight::Directional { direction: Vec3::X, irradiance: Rgb::ONE },
     ];
     let scene = stage.scene();
-    let bytes = Lights::footprint(&scene).and(Lights::scratch(&scene)).bytes();
+    let bytes = LightSampler::footprint(&scene).and(LightSampler::scratch(&scene)).bytes();
     let mut lines = vec![Line([0; 64]); bytes / 64];
     let memory: &mut [u8] = bytemuck::cast_slice_mut(&mut lines);
-    assert!(Lights::build(&scene, &mut Arena::new(&mut memory[..bytes - 1])).is_err());
-    assert!(Lights::build(&scene, &mut Arena::new(memory)).is_ok());
+    assert!(LightSampler::build(&scene, &mut Arena::new(&mut memory[..bytes - 1])).is_err());
+    assert!(LightSampler::build(&scene, &mut Arena::new(memory)).is_ok());
 
     let nothing = Stage::default();
-    assert_eq!(Lights::footprint(&nothing.scene()).and(Lights::scratch(&nothing.scene())).bytes(), 0);
+    assert_eq!(
+        LightSampler::footprint(&nothing.scene()).and(LightSampler::scratch(&nothing.scene())).bytes(),
+        0
+    );
     nothing.with_lights(|scene, lights| {
         assert!(lights.is_empty() && lights.sample(scene, Vec3::ZERO, Vec3::Z, [0.5; 3]).is_none());
         assert_eq!(lights.pdf_hit(scene, Vec3::ZERO, Vec3::Z, 0, 1.0, Vec3::Z), 0.0);

@@ -7,7 +7,7 @@ use halflight::drive::{self, RenderResult, Settings, Stop};
 use halflight_core::bsdf::All;
 use halflight_core::bvh::Bvh;
 use halflight_core::film::Film;
-use halflight_core::light::Lights;
+use halflight_core::light::LightSampler;
 use halflight_core::memory::{Arena, Footprint, Line};
 use halflight_core::scene::{Material, Scene, Surface};
 use halflight_core::transport::{PathSettings, PathTracer, UNLIMITED};
@@ -126,9 +126,9 @@ fn bits_hang_on_neither_threads_nor_waves_nor_rounds() {
         let settings = PathSettings { width: SIZE, height: SIZE, seed: 3, max_depth: UNLIMITED, reuse: true };
         let mut bvh_lines = lines(Bvh::footprint(scene.mesh.triangles.len()));
         let bvh = Bvh::build(&scene.mesh, &mut Arena::new(bytemuck::cast_slice_mut(&mut bvh_lines))).unwrap();
-        let mut light_lines = lines(Lights::footprint(&scene).and(Lights::scratch(&scene)));
+        let mut light_lines = lines(LightSampler::footprint(&scene).and(LightSampler::scratch(&scene)));
         let lights =
-            Lights::build(&scene, &mut Arena::new(bytemuck::cast_slice_mut(&mut light_lines))).unwrap();
+            LightSampler::build(&scene, &mut Arena::new(bytemuck::cast_slice_mut(&mut light_lines))).unwrap();
         let tracer = PathTracer::<All>::new(&scene, &bvh, &lights, settings, Level::detect());
         let picture = |wave: usize, cuts: &[u32]| {
             let mut scratch = lines(PathTracer::<All>::scratch(wave));

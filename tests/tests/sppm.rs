@@ -7,7 +7,7 @@ use halflight::load::{self, LoadOptions};
 use halflight::save::Image;
 use halflight_core::bsdf::All;
 use halflight_core::bvh::Bvh;
-use halflight_core::light::{Emission, Lights};
+use halflight_core::light::{Emission, LightSampler};
 use halflight_core::memory::{Arena, Footprint, Line};
 use halflight_core::photon::{Photon, Photons};
 use halflight_core::scene::{Camera, Material, Scene, Surface};
@@ -33,8 +33,9 @@ fn lines(footprint: Footprint) -> Vec<Line> {
 fn photons(scene: &Scene, tasks: usize) -> Vec<Photon> {
     let mut bvh_lines = lines(Bvh::footprint(scene.mesh.triangles.len()));
     let bvh = Bvh::build(&scene.mesh, &mut Arena::new(bytemuck::cast_slice_mut(&mut bvh_lines))).unwrap();
-    let mut light_lines = lines(Lights::footprint(scene).and(Lights::scratch(scene)));
-    let lights = Lights::build(scene, &mut Arena::new(bytemuck::cast_slice_mut(&mut light_lines))).unwrap();
+    let mut light_lines = lines(LightSampler::footprint(scene).and(LightSampler::scratch(scene)));
+    let lights =
+        LightSampler::build(scene, &mut Arena::new(bytemuck::cast_slice_mut(&mut light_lines))).unwrap();
     let mut emission_lines = lines(Emission::footprint(&lights));
     let mut arena = Arena::new(bytemuck::cast_slice_mut(&mut emission_lines));
     let emission = Emission::build(scene, &lights, &bvh.bounds(), &mut arena).unwrap();

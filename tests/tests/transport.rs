@@ -8,7 +8,7 @@ use halflight_core::bsdf::All;
 use halflight_core::bvh::Bvh;
 use halflight_core::cache::irradiance::{CellFlux, Metric, metric};
 use halflight_core::film::Film;
-use halflight_core::light::Lights;
+use halflight_core::light::LightSampler;
 use halflight_core::memory::{Arena, Footprint, Line};
 use halflight_core::scene::Scene;
 use halflight_core::transport::gather::{Gathering, Place};
@@ -62,9 +62,9 @@ fn the_wavefront_is_the_textbook_to_the_bit_for_any_wave() {
         let samples = 0..3;
         let mut bvh_lines = lines(Bvh::footprint(scene.mesh.triangles.len()));
         let bvh = Bvh::build(&scene.mesh, &mut Arena::new(bytemuck::cast_slice_mut(&mut bvh_lines))).unwrap();
-        let mut light_lines = lines(Lights::footprint(&scene).and(Lights::scratch(&scene)));
+        let mut light_lines = lines(LightSampler::footprint(&scene).and(LightSampler::scratch(&scene)));
         let lights =
-            Lights::build(&scene, &mut Arena::new(bytemuck::cast_slice_mut(&mut light_lines))).unwrap();
+            LightSampler::build(&scene, &mut Arena::new(bytemuck::cast_slice_mut(&mut light_lines))).unwrap();
         let tracer = PathTracer::<All>::new(&scene, &bvh, &lights, settings, Level::detect());
         for wave in [1, 100, 5000] {
             let mut scratch = lines(PathTracer::<All>::scratch(wave));
@@ -92,8 +92,9 @@ fn in_the_box(work: impl FnOnce(&PathTracer<All>)) {
     let settings = PathSettings { width: 16, height: 16, seed: 0, max_depth: UNLIMITED, reuse: false };
     let mut bvh_lines = lines(Bvh::footprint(scene.mesh.triangles.len()));
     let bvh = Bvh::build(&scene.mesh, &mut Arena::new(bytemuck::cast_slice_mut(&mut bvh_lines))).unwrap();
-    let mut light_lines = lines(Lights::footprint(&scene).and(Lights::scratch(&scene)));
-    let lights = Lights::build(&scene, &mut Arena::new(bytemuck::cast_slice_mut(&mut light_lines))).unwrap();
+    let mut light_lines = lines(LightSampler::footprint(&scene).and(LightSampler::scratch(&scene)));
+    let lights =
+        LightSampler::build(&scene, &mut Arena::new(bytemuck::cast_slice_mut(&mut light_lines))).unwrap();
     work(&PathTracer::new(&scene, &bvh, &lights, settings, Level::detect()));
 }
 

@@ -3,8 +3,8 @@
 use super::Bvh;
 use super::packet::{CLASSES, Columns, Packet, RAYS_MAX, class};
 use super::query::{Nearest, Sink};
-use super::ready::traceable;
 use super::stream;
+use super::traversal_ray::traceable;
 use crate::geometry::Ray;
 use halflight_simd::{Kernel, Simd, Stack};
 

@@ -4,7 +4,7 @@
 //! right subtree. So every subtree knows its slice of the nodes before it is built, and two of them can be
 //! built at the same time.
 
-use super::join::Join;
+use super::fork_join::ForkJoin;
 use super::layout::DEPTH_MAX;
 use super::references::Reference;
 use super::split::{Box4, Extent, divide, halve};
@@ -64,7 +64,12 @@ const PARALLEL_MIN: usize = 4096;
 const HALVE_FROM: usize = DEPTH_MAX - 32;
 
 /// Sorts `references` and fills `nodes`, which holds [`nodes_of`] them.
-pub(super) fn build<J: Join>(level: Level, references: &mut [Reference], nodes: &mut [BinaryNode], join: &J) {
+pub(super) fn build<J: ForkJoin>(
+    level: Level,
+    references: &mut [Reference],
+    nodes: &mut [BinaryNode],
+    join: &J,
+) {
     let extent = Extent::of(references);
     Division { level, join }.subtree(references, nodes, &extent, 0);
 }
@@ -75,7 +80,7 @@ struct Division<'j, J> {
     join: &'j J,
 }
 
-impl<J: Join> Division<'_, J> {
+impl<J: ForkJoin> Division<'_, J> {
     fn subtree(&self, references: &mut [Reference], nodes: &mut [BinaryNode], extent: &Extent, depth: usize) {
         let n = references.len();
         let Some((node, below)) = nodes.split_first_mut() else { return };

@@ -1,7 +1,7 @@
 //! The scalar truth: one ray against every triangle of a mesh. All tracing is tested against it.
 
-use super::ready::traceable;
 use super::references::hittable;
+use super::traversal_ray::traceable;
 use crate::geometry::{Hit, MISS, Ray};
 use crate::scene::Mesh;
 use halflight_simd::kernels::triangles::{self, Shear};

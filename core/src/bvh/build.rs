@@ -3,7 +3,7 @@
 use super::Bvh;
 use super::binary::{self, BinaryNode, nodes_of};
 use super::collapse::{Costs, Emitter, Output, evaluate};
-use super::join::Join;
+use super::fork_join::ForkJoin;
 use super::layout::{LEAF_MAX, Node};
 use super::references::{self, Reference, capacity};
 use crate::Level;
@@ -34,7 +34,7 @@ pub(super) fn working_footprint(triangles: usize) -> Footprint {
     Footprint::default().slice::<Reference>(r).slice::<BinaryNode>(nodes_of(r)).slice::<Costs>(nodes_of(r))
 }
 
-pub(super) fn build<'m, J: Join>(
+pub(super) fn build<'m, J: ForkJoin>(
     mesh: &Mesh,
     arena: &mut Arena<'m>,
     level: Level,

@@ -2,7 +2,7 @@
 
 use super::Bvh;
 use super::layout::Child;
-use super::ready::Ready;
+use super::traversal_ray::TraversalRay;
 use crate::geometry::{Hit, MISS};
 use halflight_simd::Simd;
 use halflight_simd::kernels::triangles::{Areas, intersect};
@@ -24,7 +24,14 @@ pub(super) fn corners_of(runs: &[f32], count: usize, i: usize) -> [[f32; 3]; 3] 
 /// Takes over the best hit of a leaf into `best`: the nearest, and of equals that of the lowest index. `best` is
 /// no hit, or no nearer than where `ray` ends.
 #[inline(always)]
-pub(super) fn take<S: Simd>(simd: S, bvh: &Bvh, ray: &Ready, leaf: Child, areas: &Areas, best: &mut Hit) {
+pub(super) fn take<S: Simd>(
+    simd: S,
+    bvh: &Bvh,
+    ray: &TraversalRay,
+    leaf: Child,
+    areas: &Areas,
+    best: &mut Hit,
+) {
     let (first, count) = leaf.triangles();
     let Some(ids) = bvh.triangles.get(first..first + count) else { return };
     let mut lanes = areas.nearest(simd);
@@ -42,7 +49,7 @@ pub(super) fn take<S: Simd>(simd: S, bvh: &Bvh, ray: &Ready, leaf: Child, areas:
 }
 
 /// Whether one of the triangles on whose edge the ray is in f32 is met.
-pub(super) fn meets_doubtful(bvh: &Bvh, ray: &Ready, leaf: Child, doubtful: u32) -> bool {
+pub(super) fn meets_doubtful(bvh: &Bvh, ray: &TraversalRay, leaf: Child, doubtful: u32) -> bool {
     let (first, count) = leaf.triangles();
     let mut best = Hit::NONE;
     take_doubtful(
@@ -58,7 +65,14 @@ pub(super) fn meets_doubtful(bvh: &Bvh, ray: &Ready, leaf: Child, doubtful: u32)
 
 /// By the scalar reference.
 #[cold]
-fn take_doubtful(bvh: &Bvh, ray: &Ready, first: usize, ids: &[u32], mut doubtful: u32, best: &mut Hit) {
+fn take_doubtful(
+    bvh: &Bvh,
+    ray: &TraversalRay,
+    first: usize,
+    ids: &[u32],
+    mut doubtful: u32,
+    best: &mut Hit,
+) {
     let count = ids.len();
     let runs = bvh.coordinates.get(9 * first..9 * (first + count)).unwrap_or(&[]);
     while doubtful != 0 {

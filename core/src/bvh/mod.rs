@@ -5,20 +5,20 @@ mod batch;
 mod binary;
 pub mod brute;
 mod build;
+pub mod clearance;
 mod collapse;
-mod join;
+mod fork_join;
 mod layout;
 mod leaf;
 mod packet;
 mod query;
-mod ready;
 mod references;
 mod split;
 mod stream;
-pub mod survey;
+mod traversal_ray;
 mod walk;
 
-pub use join::{Join, Serial};
+pub use fork_join::{ForkJoin, Serial};
 
 use crate::Level;
 use crate::geometry::{Bounds, Hit, Ray};
@@ -27,7 +27,7 @@ use crate::scene::Mesh;
 use batch::{Stream, Tiles};
 use halflight_simd::{Kernel, Simd};
 use layout::Node;
-use query::{Hidden, Nearest};
+use query::{Nearest, Occluded};
 
 /// How alike the rays of a batch are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -75,7 +75,7 @@ impl<'m> Bvh<'m> {
     ///
     /// # Errors
     /// [`OutOfMemory`] when the arena is smaller than [`Bvh::footprint`].
-    pub fn build_with<J: Join>(
+    pub fn build_with<J: ForkJoin>(
         mesh: &Mesh,
         arena: &mut Arena<'m>,
         level: Level,
@@ -133,7 +133,7 @@ impl<'m> Bvh<'m> {
 
     /// For each ray 1 where something is in the way and 0 where not.
     pub fn occluded_batch(&self, level: Level, rays: &[Ray], hidden: &mut [u8]) {
-        level.dispatch(Stream::<_, true> { bvh: self, rays, sink: Hidden(hidden) });
+        level.dispatch(Stream::<_, true> { bvh: self, rays, sink: Occluded(hidden) });
     }
 }
 

@@ -102,7 +102,7 @@ impl<S: Simd> Columns<S> {
         Self([simd.columns16(a), simd.columns16(b), simd.columns16(c), simd.columns16(d)])
     }
 
-    /// Whether all rays are traceable (as [`super::ready::traceable`] has it) and of one [`class`].
+    /// Whether all rays are traceable (as [`super::traversal_ray::traceable`] has it) and of one [`class`].
     #[inline(always)]
     fn agree(&self, simd: S) -> bool {
         const ALL: u32 = 0xffff;

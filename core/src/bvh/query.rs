@@ -14,7 +14,7 @@ pub(super) trait Sink {
 pub(super) struct Nearest<'a>(pub &'a mut [Hit]);
 
 /// Keeps whether there was one.
-pub(super) struct Hidden<'a>(pub &'a mut [u8]);
+pub(super) struct Occluded<'a>(pub &'a mut [u8]);
 
 impl Sink for Nearest<'_> {
     #[inline(always)]
@@ -41,7 +41,7 @@ impl Nearest<'_> {
     }
 }
 
-impl Sink for Hidden<'_> {
+impl Sink for Occluded<'_> {
     #[inline(always)]
     fn clear(&mut self, base: u32, count: usize) {
         self.0.iter_mut().skip(base as usize).take(count).for_each(|hidden| *hidden = 0);

@@ -13,7 +13,7 @@ use super::Bvh;
 use super::layout::Child;
 use super::leaf::{meets_doubtful, take};
 use super::query::Sink;
-use super::ready::{Ready, traceable};
+use super::traversal_ray::{TraversalRay, traceable};
 use crate::geometry::{Hit, Ray};
 use core::hint::select_unpredictable;
 use halflight_simd::kernels::boxes::ROBUST;
@@ -30,12 +30,12 @@ const AHEAD: usize = 64;
 #[derive(Clone, Copy)]
 #[repr(C, align(64))]
 struct Slot {
-    ray: Ready,
+    ray: TraversalRay,
     hit: Hit,
 }
 
 impl Slot {
-    const EMPTY: Slot = Slot { ray: Ready::NONE, hit: Hit::NONE };
+    const EMPTY: Slot = Slot { ray: TraversalRay::NONE, hit: Hit::NONE };
 }
 
 /// At the bottom of every stack.
@@ -45,14 +45,14 @@ const DONE: Child = Child::NONE;
 struct Queue<'a, I> {
     rays: &'a [Ray],
     indices: I,
-    ahead: [Ready; AHEAD],
+    ahead: [TraversalRay; AHEAD],
     count: usize,
     taken: usize,
 }
 
 impl<I: Iterator<Item = u32>> Queue<'_, I> {
     #[inline(always)]
-    fn next(&mut self) -> Option<&Ready> {
+    fn next(&mut self) -> Option<&TraversalRay> {
         if self.taken == self.count {
             self.fill();
         }
@@ -70,7 +70,7 @@ impl<I: Iterator<Item = u32>> Queue<'_, I> {
         while self.count < AHEAD {
             let Some(index) = self.indices.next() else { return };
             let Some(ray) = self.rays.get(index as usize) else { continue };
-            self.ahead[self.count & (AHEAD - 1)] = Ready::new(ray, index);
+            self.ahead[self.count & (AHEAD - 1)] = TraversalRay::new(ray, index);
             self.count += traceable(ray) as usize;
         }
     }
@@ -88,7 +88,7 @@ pub(super) fn trace<S: Simd, T: Sink, const ANY: bool>(
     if bvh.nodes.is_empty() {
         return;
     }
-    let mut queue = Queue { rays, indices, ahead: [Ready::NONE; AHEAD], count: 0, taken: 0 };
+    let mut queue = Queue { rays, indices, ahead: [TraversalRay::NONE; AHEAD], count: 0, taken: 0 };
     let mut slots = [Slot::EMPTY; SLOTS];
     let mut memory = StackMemory::<SLOTS>::new();
     let stacks = memory.stacks();
@@ -109,7 +109,7 @@ pub(super) fn trace<S: Simd, T: Sink, const ANY: bool>(
             let (Slot { ray, hit }, stack) = (&mut slots[i], &mut stacks[i]);
             sink.put(ray.index, *hit);
             match queue.next() {
-                Some(ready) => *ray = *ready,
+                Some(traversal_ray) => *ray = *traversal_ray,
                 None => {
                     empty |= 1 << i;
                     continue;

@@ -1,6 +1,6 @@
 //! Every way of tracing against brute force, on scenes that are hard on a hierarchy.
 
-use super::survey::{POINTS, Site, Survey};
+use super::clearance::{Clearance, ClearanceQuery, POINTS};
 use super::*;
 use crate::geometry::Frame;
 use crate::memory::Line;
@@ -300,17 +300,17 @@ fn what_a_survey_is_sure_of_rays_find() {
             let (radius, above) = (0.01 + random.unit(), 1e-4);
             let place = a + u * (b - a) + v * (c - a) + above * frame.normal;
             let points = POINTS_ASIDE.map(|axis| axis.map(|at| at * radius));
-            let site = Site { place, frame, reach: radius, points, depth: 0.3 * radius };
-            let survey = bvh.survey(&site);
+            let query = ClearanceQuery { place, frame, reach: radius, points, depth: 0.3 * radius };
+            let clearance = bvh.clearance(&query);
             let level = Level::detect();
-            low += u32::from(!survey.rises);
-            for _ in 0..if survey.rises { 0 } else { 16 } {
+            low += u32::from(!clearance.rises);
+            for _ in 0..if clearance.rises { 0 } else { 16 } {
                 let local = random.point(2.0).with_z(random.unit());
                 let way = radius / 3f32.sqrt() * frame.to_world(local.normalize());
-                assert!(!bvh.occluded(level, &Ray::segment(place, way, 1.0)), "{site:?} {way}");
+                assert!(!bvh.occluded(level, &Ray::segment(place, way, 1.0)), "{query:?} {way}");
             }
-            unhung += u32::from(survey.rises && !survey.hangs);
-            for _ in 0..if survey.hangs { 0 } else { 16 } {
+            unhung += u32::from(clearance.rises && !clearance.hangs);
+            for _ in 0..if clearance.hangs { 0 } else { 16 } {
                 let local = random.point(2.0).with_z(1.0).normalize();
                 let way = radius / 3f32.sqrt() * frame.to_world(local);
                 let hit = bvh.nearest(level, &Ray::segment(place, way, 1.0));
@@ -319,14 +319,14 @@ fn what_a_survey_is_sure_of_rays_find() {
                     let normal = (b - a).cross(c - a).normalize();
                     let slope = normal.dot(frame.normal);
                     let height = normal.dot(a - place) / slope;
-                    assert!(slope.abs() < 0.501 || height < 0.011 * radius, "{site:?} {way}");
+                    assert!(slope.abs() < 0.501 || height < 0.011 * radius, "{query:?} {way}");
                 }
             }
-            for i in (0..POINTS).filter(|i| survey.surface >> i & 1 != 0) {
+            for i in (0..POINTS).filter(|i| clearance.surface >> i & 1 != 0) {
                 let [x, y] = points.map(|axis| axis[i]);
-                let from = place + frame.to_world(Vec3::new(x, y, 1.001 * site.depth));
-                let down = Ray::segment(from, -frame.normal, 2.002 * site.depth);
-                assert!(bvh.occluded(level, &down), "{site:?} {i}");
+                let from = place + frame.to_world(Vec3::new(x, y, 1.001 * query.depth));
+                let down = Ray::segment(from, -frame.normal, 2.002 * query.depth);
+                assert!(bvh.occluded(level, &down), "{query:?} {i}");
                 there += 1;
             }
         }
@@ -349,9 +349,9 @@ fn on_a_floor_of_many_triangles_a_survey_sees_it_all_but_at_the_edge_and_under_a
     let points = [[0.9, -0.9, 0.9, -0.9, 0.9, -0.9, 0.9, -0.9], [0.8; POINTS]];
     let look = |x: f32| {
         let place = Vec3::new(x, 1e-3, 4.3);
-        bvh.survey(&Site { place, frame, reach: 1.0, points, depth: 0.1 })
+        bvh.clearance(&ClearanceQuery { place, frame, reach: 1.0, points, depth: 0.1 })
     };
-    assert_eq!(look(5.3), Survey::OPEN);
-    assert_eq!(look(7.3), Survey { rises: false, hangs: false, surface: 0xaa });
-    assert!([2.7, 1.3].map(look).iter().all(|survey| survey.rises && !survey.hangs));
+    assert_eq!(look(5.3), Clearance::OPEN);
+    assert_eq!(look(7.3), Clearance { rises: false, hangs: false, surface: 0xaa });
+    assert!([2.7, 1.3].map(look).iter().all(|clearance| clearance.rises && !clearance.hangs));
 }

@@ -11,7 +11,7 @@
 use super::Bvh;
 use super::layout::Child;
 use super::leaf::take;
-use super::ready::{Ready, traceable};
+use super::traversal_ray::{TraversalRay, traceable};
 use crate::geometry::{Hit, Ray};
 use halflight_simd::kernels::boxes::ROBUST;
 use halflight_simd::{Simd, Stack};
@@ -23,7 +23,7 @@ pub(super) fn trace<S: Simd, const ANY: bool>(simd: S, bvh: &Bvh, ray: &Ray) -> 
     if !traceable(ray) {
         return best;
     }
-    let mut ray = Ready::new(ray, 0);
+    let mut ray = TraversalRay::new(ray, 0);
     let (slab, shear) = (ray.slab8(simd), ray.shear8(simd));
     let mut stack = Stack::new();
     stack.restart(Child::node(0).0);

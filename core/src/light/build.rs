@@ -3,7 +3,7 @@
 use super::area::Emitter;
 use super::emitted::{mean_luminance, strength};
 use super::environment::EnvironmentSampler;
-use super::sampler::Lights;
+use super::sampler::LightSampler;
 use super::tree::{Item, Tree};
 use crate::geometry::{Bounds, Cone};
 use crate::memory::{Arena, Footprint, OutOfMemory};
@@ -13,7 +13,7 @@ use crate::scene::{PointLight, Scene};
 /// Least weight of a light, relative to the strongest: none that shines is ever left out.
 const LEAST_POWER: f64 = 1e-30;
 
-/// What [`Lights::build`] is about to hold.
+/// What [`LightSampler::build`] is about to hold.
 #[derive(Clone, Copy, Default)]
 struct Counts {
     emitters: usize,
@@ -34,8 +34,8 @@ impl Counts {
     }
 }
 
-impl<'m> Lights<'m> {
-    /// Bytes that [`Lights::build`] takes and keeps.
+impl<'m> LightSampler<'m> {
+    /// Bytes that [`LightSampler::build`] takes and keeps.
     pub fn footprint(scene: &Scene) -> Footprint {
         let counts = Counts::of(scene);
         Footprint::default()
@@ -47,7 +47,7 @@ impl<'m> Lights<'m> {
             .and(EnvironmentSampler::footprint(scene))
     }
 
-    /// Bytes beyond the footprint that must be free in the arena during [`Lights::build`].
+    /// Bytes beyond the footprint that must be free in the arena during [`LightSampler::build`].
     pub fn scratch(scene: &Scene) -> Footprint {
         Footprint::default().slice::<Item>(Counts::of(scene).in_tree())
     }
@@ -55,7 +55,7 @@ impl<'m> Lights<'m> {
     /// Finds and orders the lights of `scene`.
     ///
     /// # Errors
-    /// [`OutOfMemory`] where the arena has less than [`Lights::footprint`] and [`Lights::scratch`] ask for.
+    /// [`OutOfMemory`] where the arena has less than [`LightSampler::footprint`] and [`LightSampler::scratch`] ask for.
     pub fn build(scene: &Scene, arena: &mut Arena<'m>) -> Result<Self, OutOfMemory> {
         let counts = Counts::of(scene);
         let kept: &mut [Emitter] = arena.slice(counts.emitters)?;
@@ -101,7 +101,7 @@ impl<'m> Lights<'m> {
             points,
             tree,
             environment,
-            windows: None,
+            visibility: None,
             distant,
             distant_table,
             environment_weight: if environment.is_some() { finite(sky) } else { 0.0 },

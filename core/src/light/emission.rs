@@ -7,7 +7,7 @@
 use super::area::Emitter;
 use super::emitted::{emitted_at, mean_luminance, spot_falloff, strength};
 use super::guide::{Guide, Pick};
-use super::sampler::Lights;
+use super::sampler::LightSampler;
 use super::target::Target;
 use crate::Rgb;
 use crate::geometry::{Bounds, Frame, MISS, Ray};
@@ -62,7 +62,7 @@ pub struct Emission<'m> {
 
 impl<'m> Emission<'m> {
     /// Bytes that [`Emission::build`] takes.
-    pub fn footprint(lights: &Lights) -> Footprint {
+    pub fn footprint(lights: &LightSampler) -> Footprint {
         AliasTable::footprint(lights.count())
     }
 
@@ -72,7 +72,7 @@ impl<'m> Emission<'m> {
     /// [`OutOfMemory`] where the arena has less than [`Emission::footprint`].
     pub fn build(
         scene: &Scene,
-        lights: &Lights,
+        lights: &LightSampler,
         bounds: &Bounds,
         arena: &mut Arena<'m>,
     ) -> Result<Self, OutOfMemory> {
@@ -87,7 +87,7 @@ impl<'m> Emission<'m> {
     }
 
     /// The photon of `numbers`. `None` where it leaves no light, or none shines.
-    pub fn emit<N: Numbers>(&self, scene: &Scene, lights: &Lights, numbers: &N) -> Option<Emitted> {
+    pub fn emit<N: Numbers>(&self, scene: &Scene, lights: &LightSampler, numbers: &N) -> Option<Emitted> {
         let choice = numbers.single(CHOICE);
         let (mut place, mut direction) = (numbers.pair(PLACE), numbers.pair(DIRECTION));
         let Pick { light, cell, square, target } = match &self.guide {
@@ -125,7 +125,14 @@ impl<'m> Emission<'m> {
     /// The density of light `light`, in the order of the table, times that of the numbers that aim its photon; 1 / area
     /// and the like are not in it. The photon goes along unit `way` from the place `on` of the light, or comes through
     /// `on` from infinitely far.
-    pub(super) fn density(&self, scene: &Scene, lights: &Lights, light: usize, way: Vec3, on: Vec3) -> f32 {
+    pub(super) fn density(
+        &self,
+        scene: &Scene,
+        lights: &LightSampler,
+        light: usize,
+        way: Vec3,
+        on: Vec3,
+    ) -> f32 {
         self.density_with(scene, lights, light, (way, on), None)
     }
 
@@ -133,7 +140,7 @@ impl<'m> Emission<'m> {
     fn density_with(
         &self,
         scene: &Scene,
-        lights: &Lights,
+        lights: &LightSampler,
         light: usize,
         line: (Vec3, Vec3),
         known: Option<[f32; 2]>,
@@ -148,7 +155,7 @@ impl<'m> Emission<'m> {
     fn dense(
         &self,
         scene: &Scene,
-        lights: &Lights,
+        lights: &LightSampler,
         light: usize,
         (way, on): (Vec3, Vec3),
     ) -> impl Fn(&Target) -> f32 + use<> {
@@ -171,7 +178,7 @@ impl<'m> Emission<'m> {
     }
 
     /// About the share of the photons of light `light` that leave it towards `target`; zero where it cannot shine there.
-    pub(super) fn filled(&self, scene: &Scene, lights: &Lights, light: usize, target: &Target) -> f32 {
+    pub(super) fn filled(&self, scene: &Scene, lights: &LightSampler, light: usize, target: &Target) -> f32 {
         let mut on = target.center();
         if let Some(emitter) = lights.emitters.get(light) {
             on = emitter.place([1.0 / 3.0; 2]).position;
@@ -196,7 +203,14 @@ impl<'m> Emission<'m> {
     }
 
     /// The numbers that aim a photon of light `light` along unit `way` through `to`.
-    fn square(&self, scene: &Scene, lights: &Lights, light: usize, way: Vec3, to: Vec3) -> Option<[f32; 2]> {
+    fn square(
+        &self,
+        scene: &Scene,
+        lights: &LightSampler,
+        light: usize,
+        way: Vec3,
+        to: Vec3,
+    ) -> Option<[f32; 2]> {
         if let Some(emitter) = lights.emitters.get(light) {
             let plane = Vec3::from(emitter.normal);
             let normal = if way.dot(plane) > 0.0 || !emitter.is_two_sided() { plane } else { -plane };
@@ -226,7 +240,7 @@ impl<'m> Emission<'m> {
     pub(super) fn aim(
         &self,
         scene: &Scene,
-        lights: &Lights,
+        lights: &LightSampler,
         light: usize,
         target: Vec3,
         sampler: &Sampler,
@@ -342,7 +356,7 @@ fn from_surface(
 }
 
 /// The luminance of the power of light `i`, or about that.
-fn power(scene: &Scene, lights: &Lights, radius: f32, i: usize) -> f64 {
+fn power(scene: &Scene, lights: &LightSampler, radius: f32, i: usize) -> f64 {
     const PI: f64 = core::f64::consts::PI;
     let disc = PI * f64::from(radius) * f64::from(radius);
     if let Some(emitter) = lights.emitters.get(i) {
@@ -386,9 +400,10 @@ mod tests {
     fn mean_power(scene: &Scene, mut look: impl FnMut(&Emitted)) -> Rgb {
         const PHOTONS: u32 = 1 << 16;
         let bounds = Bounds { min: Vec3::splat(-1.0), max: Vec3::splat(1.0) };
-        let bytes = Lights::footprint(scene).and(Lights::scratch(scene));
+        let bytes = LightSampler::footprint(scene).and(LightSampler::scratch(scene));
         let mut memory = vec![Line([0; 64]); bytes.bytes() / 64];
-        let lights = Lights::build(scene, &mut Arena::new(bytemuck::cast_slice_mut(&mut memory))).unwrap();
+        let lights =
+            LightSampler::build(scene, &mut Arena::new(bytemuck::cast_slice_mut(&mut memory))).unwrap();
         let mut memory = vec![Line([0; 64]); Emission::footprint(&lights).bytes() / 64];
         let mut arena = Arena::new(bytemuck::cast_slice_mut(&mut memory));
         let emission = Emission::build(scene, &lights, &bounds, &mut arena).unwrap();

@@ -1,6 +1,6 @@
 //! Light from infinitely far: what a ray sees that leaves the scene, and how to find its bright parts.
 
-use super::environment_visibility::{Aim, Window};
+use super::environment_visibility::{VisibilityTable, WarpedSample};
 use crate::Rgb;
 use crate::geometry::Frame;
 use crate::memory::{Arena, Footprint, OutOfMemory};
@@ -167,20 +167,25 @@ impl<'m> EnvironmentSampler<'m> {
 
     /// A direction and its density in solid angle, where a window has chosen.
     #[inline]
-    pub(super) fn sample_at(&self, environment: &Environment, aim: Aim) -> Option<(Vec3, f32)> {
-        let (direction, pdf) = self.sample(environment, Vec3::ZERO, aim.place)?;
-        Some((direction, pdf * aim.density))
+    pub(super) fn sample_at(&self, environment: &Environment, warped: WarpedSample) -> Option<(Vec3, f32)> {
+        let (direction, pdf) = self.sample(environment, Vec3::ZERO, warped.place)?;
+        Some((direction, pdf * warped.density))
     }
 
-    /// The density of [`EnvironmentSampler::sample_at`] for unit `direction`, where `window` chose.
+    /// The density of [`EnvironmentSampler::sample_at`] for unit `direction`, where `table` chose.
     #[inline]
-    pub(super) fn pdf_through(&self, environment: &Environment, window: &Window, direction: Vec3) -> f32 {
+    pub(super) fn pdf_through(
+        &self,
+        environment: &Environment,
+        table: &VisibilityTable,
+        direction: Vec3,
+    ) -> f32 {
         let Some(map) = &self.map else {
-            return UNIFORM_SPHERE_PDF * window.density(uniform_sphere_square(direction));
+            return UNIFORM_SPHERE_PDF * table.density(uniform_sphere_square(direction));
         };
         let d = environment.to_map * direction;
         match map.invert(square(d).to_array()) {
-            Some((u, pdf)) => solid_angle_pdf(pdf, libm::sqrtf(d.x * d.x + d.z * d.z)) * window.density(u),
+            Some((u, pdf)) => solid_angle_pdf(pdf, libm::sqrtf(d.x * d.x + d.z * d.z)) * table.density(u),
             None => 0.0,
         }
     }

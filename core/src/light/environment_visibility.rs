@@ -25,7 +25,7 @@ const DEFENCE: f32 = 0.1;
 /// The density over the unit square that suits one place.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
 #[repr(C)]
-pub struct Window {
+pub struct VisibilityTable {
     /// The last 65536th of each row.
     rows: [u16; ROWS],
     /// The last 65536th of each cell in its row.
@@ -34,7 +34,7 @@ pub struct Window {
 
 /// A point of the environment's square that a window chose.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Aim {
+pub struct WarpedSample {
     /// The point, in the unit square.
     pub place: [f32; 2],
     /// How much denser samples are there than without the window.
@@ -43,26 +43,26 @@ pub struct Aim {
 
 /// A row of a window, chosen.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Row {
+pub(crate) struct MarginalSample {
     y: usize,
     /// Where in it.
     v: f32,
     share: f32,
 }
 
-impl Window {
+impl VisibilityTable {
     /// From how much each bin matters, on average over bins whole or in part: for the least variance, the root of
     /// the mean square of what arrives from it. What is no number counts as zero.
     pub fn new(bins: &Bins) -> Self {
         let probabilities = Self::probabilities(bins);
-        let mut window = Self { rows: [0; ROWS], cells: [[0; COLUMNS]; ROWS] };
+        let mut table = Self { rows: [0; ROWS], cells: [[0; COLUMNS]; ROWS] };
         let mut rows = [0.0; ROWS];
         for (y, row) in probabilities.chunks_exact(COLUMNS).enumerate() {
             rows[y] = row.iter().sum();
-            window.cells[y] = ends(row);
+            table.cells[y] = ends(row);
         }
-        window.rows = ends(&rows);
-        window
+        table.rows = ends(&rows);
+        table
     }
 
     /// What a bin's share of samples is about to be; the sum is one.
@@ -77,33 +77,37 @@ impl Window {
 
     /// Where in the square of the environment a point of the unit square leads, and how dense samples are there.
     #[inline]
-    pub fn warp(&self, [u, v]: [f32; 2]) -> Aim {
-        self.aim(u, self.row(v))
+    pub fn warp(&self, [u, v]: [f32; 2]) -> WarpedSample {
+        self.sample_in_row(u, self.sample_row(v))
     }
 
-    /// Asks for what [`Window::row`] reads.
+    /// Asks for what [`VisibilityTable::sample_row`] reads.
     #[inline]
     pub(crate) fn prefetch(&self) {
         prefetch(&self.rows, 0);
     }
 
-    /// The first half of [`Window::warp`]. Asks for what the second reads.
+    /// The first half of [`VisibilityTable::warp`]. Asks for what the second reads.
     #[inline]
-    pub(crate) fn row(&self, v: f32) -> Row {
+    pub(crate) fn sample_row(&self, v: f32) -> MarginalSample {
         let (y, v, share) = pick(&self.rows, v);
         // Two cache lines.
         prefetch(self.cells.as_flattened(), y * COLUMNS);
         prefetch(self.cells.as_flattened(), y * COLUMNS + COLUMNS / 2);
-        Row { y, v, share }
+        MarginalSample { y, v, share }
     }
 
-    /// The second half of [`Window::warp`].
+    /// The second half of [`VisibilityTable::warp`].
     #[inline]
-    pub(crate) fn aim(&self, u: f32, Row { y, v, share }: Row) -> Aim {
+    pub(crate) fn sample_in_row(
+        &self,
+        u: f32,
+        MarginalSample { y, v, share }: MarginalSample,
+    ) -> WarpedSample {
         let (x, u, cell) = pick(self.cells.get(y).unwrap_or(&self.cells[0]), u);
         let place = [(x as f32 + u) / COLUMNS as f32, (y as f32 + v) / ROWS as f32];
         let density = share * cell * (COLUMNS * ROWS) as f32;
-        Aim { place: place.map(|u| u.min(crate::sampling::ONE_MINUS_EPSILON)), density }
+        WarpedSample { place: place.map(|u| u.min(crate::sampling::ONE_MINUS_EPSILON)), density }
     }
 
     /// How much denser samples are at a point of the environment's square than without the window.
@@ -184,7 +188,7 @@ fn pick<const N: usize>(ends: &[u16; N], u: f32) -> (usize, f32, f32) {
 
 /// Cells of equal size over the places that matter.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Grid {
+pub struct VisibilityGrid {
     origin: Vec3,
     /// Cells for each unit of length.
     per_length: f32,
@@ -197,7 +201,7 @@ const CELLS: usize = 4096;
 /// A surface faces along ±x, ±y or ±z.
 const SIDES: usize = 6;
 
-impl Grid {
+impl VisibilityGrid {
     /// A grid over `bounds`; `None` where they hold nothing or are no numbers.
     pub fn over(bounds: &Bounds) -> Option<Self> {
         let (origin, size) = (bounds.min, bounds.max - bounds.min);
@@ -236,45 +240,45 @@ impl Grid {
 
 /// The windows of all places.
 #[derive(Clone, Copy, Debug)]
-pub struct Windows<'m> {
-    grid: Grid,
+pub struct EnvironmentVisibility<'m> {
+    grid: VisibilityGrid,
     /// For each place of the grid the number of its window, from 1; 0 where it has none.
     slots: &'m [u16],
-    windows: &'m [Window],
+    visibility: &'m [VisibilityTable],
 }
 
-impl<'m> Windows<'m> {
+impl<'m> EnvironmentVisibility<'m> {
     /// Windows that there can be.
     pub const MOST: usize = 2048;
 
     /// Bytes of all that is kept.
     pub fn footprint() -> Footprint {
-        Footprint::default().slice::<u16>(CELLS * SIDES).slice::<Window>(Self::MOST)
+        Footprint::default().slice::<u16>(CELLS * SIDES).slice::<VisibilityTable>(Self::MOST)
     }
 
-    /// The memory that [`Windows::new`] takes, to be filled: numbers of windows by place, all zero, and windows.
+    /// The memory that [`EnvironmentVisibility::new`] takes, to be filled: numbers of windows by place, all zero, and windows.
     ///
     /// # Errors
-    /// [`OutOfMemory`] where the arena has less than [`Windows::footprint`].
-    pub fn memory(arena: &mut Arena<'m>) -> Result<(&'m mut [u16], &'m mut [Window]), OutOfMemory> {
+    /// [`OutOfMemory`] where the arena has less than [`EnvironmentVisibility::footprint`].
+    pub fn memory(arena: &mut Arena<'m>) -> Result<(&'m mut [u16], &'m mut [VisibilityTable]), OutOfMemory> {
         let slots: &mut [u16] = arena.slice(CELLS * SIDES)?;
         slots.fill(0);
         Ok((slots, arena.slice(Self::MOST)?))
     }
 
-    /// Of what [`Windows::memory`] gave.
-    pub fn new(grid: Grid, slots: &'m [u16], windows: &'m [Window]) -> Self {
-        Self { grid, slots, windows }
+    /// Of what [`EnvironmentVisibility::memory`] gave.
+    pub fn new(grid: VisibilityGrid, slots: &'m [u16], visibility: &'m [VisibilityTable]) -> Self {
+        Self { grid, slots, visibility }
     }
 
     /// The window of a surface with unit `normal`; `None` where nothing is known.
     #[inline]
-    pub fn at(&self, position: Vec3, normal: Vec3) -> Option<&'m Window> {
+    pub fn at(&self, position: Vec3, normal: Vec3) -> Option<&'m VisibilityTable> {
         if normal == Vec3::ZERO {
             return None;
         }
         let slot = *self.slots.get(self.grid.place(position, normal)?)?;
-        self.windows.get(usize::from(slot).wrapping_sub(1))
+        self.visibility.get(usize::from(slot).wrapping_sub(1))
     }
 }
 
@@ -284,25 +288,26 @@ mod tests {
     use crate::sampling::Sampler;
 
     /// A window with a bright corner, a bin of nothing, one of no number.
-    fn window() -> Window {
+    fn table() -> VisibilityTable {
         let mut bins: Bins =
             core::array::from_fn(|i| if i % COLUMNS < 5 && i < 128 { i as f32 } else { 0.1 });
         (bins[7], bins[300]) = (f32::NAN, 0.0);
-        Window::new(&bins)
+        VisibilityTable::new(&bins)
     }
 
     #[test]
     fn samples_have_the_density_that_is_said() {
-        let window = window();
+        let table = table();
         let (mut counts, count) = ([0.0f32; COLUMNS * ROWS], 1 << 18);
         for i in 0..count {
-            let Aim { place: at, density } = window.warp(Sampler::new(7, 0, i).pair(0));
+            let WarpedSample { place: at, density } = table.warp(Sampler::new(7, 0, i).pair(0));
             assert!(at.iter().all(|x| (0.0..1.0).contains(x)), "{at:?}");
-            assert!((density / window.density(at) - 1.0).abs() < 1e-6, "{at:?}");
+            assert!((density / table.density(at) - 1.0).abs() < 1e-6, "{at:?}");
             counts[(at[1] * ROWS as f32) as usize * COLUMNS + (at[0] * COLUMNS as f32) as usize] += 1.0;
         }
         for (bin, found) in counts.into_iter().enumerate() {
-            let expected = window.density(Window::place(bin, [0.5; 2])) * count as f32 / counts.len() as f32;
+            let expected =
+                table.density(VisibilityTable::place(bin, [0.5; 2])) * count as f32 / counts.len() as f32;
             // Of a sequence that fills bins evenly: a few more or less at the borders.
             assert!((found - expected).abs() < 4.0 + 0.05 * expected, "bin {bin}: {found}, {expected}");
         }
@@ -310,17 +315,17 @@ mod tests {
 
     #[test]
     fn the_density_is_one_in_the_mean_and_nowhere_zero() {
-        let window = window();
-        let all = (0..COLUMNS * ROWS).map(|bin| window.density(Window::place(bin, [0.5; 2])));
+        let table = table();
+        let all = (0..COLUMNS * ROWS).map(|bin| table.density(VisibilityTable::place(bin, [0.5; 2])));
         assert!((all.clone().sum::<f32>() / (COLUMNS * ROWS) as f32 - 1.0).abs() < 1e-5);
         assert!(all.fold(f32::INFINITY, f32::min) > 0.5 * DEFENCE);
     }
 
     #[test]
     fn nothing_known_is_the_square_as_it_is() {
-        let plain = Window::new(&[0.0; COLUMNS * ROWS]);
+        let plain = VisibilityTable::new(&[0.0; COLUMNS * ROWS]);
         for u in [[0.0; 2], [0.3, 0.8], [crate::sampling::ONE_MINUS_EPSILON; 2]] {
-            let Aim { place: at, density } = plain.warp(u);
+            let WarpedSample { place: at, density } = plain.warp(u);
             assert!((density - 1.0).abs() < 1e-2, "{density}");
             assert!((at[0] - u[0]).abs() < 1e-3 && (at[1] - u[1]).abs() < 1e-3, "{at:?}");
         }
@@ -328,22 +333,22 @@ mod tests {
 
     #[test]
     fn exact_bytes_suffice_and_one_less_is_an_error() {
-        let bytes = Windows::footprint().bytes();
+        let bytes = EnvironmentVisibility::footprint().bytes();
         let mut lines = std::vec![crate::memory::Line([0; 64]); bytes / 64];
         let memory: &mut [u8] = bytemuck::cast_slice_mut(&mut lines);
-        assert!(Windows::memory(&mut Arena::new(&mut memory[..bytes - 1])).is_err());
-        assert!(Windows::memory(&mut Arena::new(memory)).is_ok());
+        assert!(EnvironmentVisibility::memory(&mut Arena::new(&mut memory[..bytes - 1])).is_err());
+        assert!(EnvironmentVisibility::memory(&mut Arena::new(memory)).is_ok());
     }
 
     #[test]
     fn places_tell_sides_apart_and_what_is_outside() {
-        let grid =
-            Grid::over(&Bounds::around([Vec3::ZERO, Vec3::new(4.0, 1.0, 2.0)])).expect("it has a size");
+        let grid = VisibilityGrid::over(&Bounds::around([Vec3::ZERO, Vec3::new(4.0, 1.0, 2.0)]))
+            .expect("it has a size");
         let at = |p: Vec3, n: Vec3| grid.place(p, n);
         assert_ne!(at(Vec3::ONE, Vec3::Y), at(Vec3::ONE, Vec3::NEG_Y));
         assert_ne!(at(Vec3::ONE, Vec3::X), at(Vec3::new(3.0, 1.0, 1.0), Vec3::X));
         assert!(at(Vec3::splat(-0.1), Vec3::X).is_none() && at(Vec3::NAN, Vec3::X).is_none());
-        assert!(Grid::over(&Bounds::around([Vec3::ONE])).is_none());
-        assert!(Grid::over(&Bounds::EMPTY).is_none());
+        assert!(VisibilityGrid::over(&Bounds::around([Vec3::ONE])).is_none());
+        assert!(VisibilityGrid::over(&Bounds::EMPTY).is_none());
     }
 }

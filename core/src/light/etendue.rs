@@ -5,7 +5,7 @@
 //! a path from the eye meets x₀, tells how much likelier one is than the other (`transport/merge.rs`).
 
 use super::emission::Emission;
-use super::sampler::{LightSample, Lights};
+use super::sampler::{LightSample, LightSampler};
 use crate::sampling::warp::{UNIFORM_SPHERE_PDF, uniform_cone_pdf};
 use crate::scene::{PointLight, Scene};
 use core::f32::consts::{FRAC_1_PI, PI};
@@ -27,7 +27,7 @@ impl Emission<'_> {
     pub(crate) fn density_of_surface(
         &self,
         scene: &Scene,
-        lights: &Lights,
+        lights: &LightSampler,
         triangle: u32,
         (place, way): (Vec3, Vec3),
     ) -> f32 {
@@ -40,7 +40,7 @@ impl Emission<'_> {
     pub(crate) fn density_of_emitter(
         &self,
         scene: &Scene,
-        lights: &Lights,
+        lights: &LightSampler,
         index: usize,
         (place, way): (Vec3, Vec3),
     ) -> f32 {
@@ -53,7 +53,7 @@ impl Emission<'_> {
     pub(crate) fn density_of_sky(
         &self,
         scene: &Scene,
-        lights: &Lights,
+        lights: &LightSampler,
         direction: Vec3,
         position: Vec3,
     ) -> f32 {
@@ -71,7 +71,7 @@ impl Emission<'_> {
     pub(crate) fn density_of_choice(
         &self,
         scene: &Scene,
-        lights: &Lights,
+        lights: &LightSampler,
         light: u32,
         position: Vec3,
     ) -> f32 {
@@ -94,7 +94,7 @@ impl Emission<'_> {
     pub(crate) fn density_of_sample(
         &self,
         scene: &Scene,
-        lights: &Lights,
+        lights: &LightSampler,
         sample: &LightSample,
         position: Vec3,
     ) -> f32 {
@@ -110,7 +110,7 @@ impl Emission<'_> {
     }
 
     /// How light `light`, in the order of the table, is found.
-    pub(crate) fn found(&self, lights: &Lights, light: u32) -> Found {
+    pub(crate) fn found(&self, lights: &LightSampler, light: u32) -> Found {
         let index = light as usize;
         if index < lights.emitters.len() {
             Found::OnSurface

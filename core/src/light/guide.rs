@@ -7,7 +7,7 @@
 //! Where photons of all light are wanted there is nothing to aim at: cells are fewer, and what they are worth is learned alone.
 
 use super::emission::Emission;
-use super::sampler::Lights;
+use super::sampler::LightSampler;
 use super::target::{self, Target};
 use crate::Rgb;
 use crate::memory::{Arena, Footprint, OutOfMemory};
@@ -127,13 +127,13 @@ pub struct Worth<'m> {
 
 impl<'m> Worth<'m> {
     /// Cells that [`Worth::of_all`] has.
-    fn cells_of_all(lights: &Lights) -> usize {
+    fn cells_of_all(lights: &LightSampler) -> usize {
         let side = side(lights.count(), CELLS_OF_ALL);
         lights.count() * side * side
     }
 
     /// Bytes that [`Worth::of_all`] takes together with [`Worth::guide`].
-    pub fn footprint_of_all(lights: &Lights) -> Footprint {
+    pub fn footprint_of_all(lights: &LightSampler) -> Footprint {
         let cells = Self::cells_of_all(lights);
         let worth = Footprint::default().slice::<f32>(cells).slice::<f32>(cells);
         worth.and(AliasTable::footprint(cells))
@@ -143,7 +143,7 @@ impl<'m> Worth<'m> {
     ///
     /// # Errors
     /// [`OutOfMemory`] where the arena has less than [`Worth::footprint_of_all`].
-    pub fn of_all(lights: &Lights, arena: &mut Arena<'m>) -> Result<Self, OutOfMemory> {
+    pub fn of_all(lights: &LightSampler, arena: &mut Arena<'m>) -> Result<Self, OutOfMemory> {
         let cells = Self::cells_of_all(lights);
         let (aimed, learned) = (arena.slice::<f32>(cells)?, arena.slice::<f32>(cells)?);
         aimed.fill(0.0);
@@ -165,7 +165,7 @@ impl<'m> Worth<'m> {
     }
 
     /// Bytes that [`Worth::aimed`] takes.
-    pub fn footprint(lights: &Lights) -> Footprint {
+    pub fn footprint(lights: &LightSampler) -> Footprint {
         let cells = cells(lights);
         let targets = targets(lights.count());
         Footprint::default().slice::<f32>(cells).slice::<f32>(cells).slice::<Target>(targets)
@@ -177,7 +177,7 @@ impl<'m> Worth<'m> {
     /// [`OutOfMemory`] where the arena has less than [`Worth::footprint`].
     pub fn aimed(
         scene: &Scene,
-        lights: &Lights,
+        lights: &LightSampler,
         emission: &Emission,
         arena: &mut Arena<'m>,
     ) -> Result<Option<Self>, OutOfMemory> {
@@ -312,7 +312,7 @@ impl<'m> Worth<'m> {
     }
 
     /// Bytes that [`Worth::guide`] takes.
-    pub fn guide_footprint(lights: &Lights) -> Footprint {
+    pub fn guide_footprint(lights: &LightSampler) -> Footprint {
         AliasTable::footprint(cells(lights))
     }
 }
@@ -331,7 +331,7 @@ fn targets(lights: usize) -> usize {
     (MOST_CELLS / lights.max(1)).clamp(1, target::MOST)
 }
 
-fn cells(lights: &Lights) -> usize {
+fn cells(lights: &LightSampler) -> usize {
     let side = side(lights.count(), MOST_CELLS);
     lights.count() * (side * side + targets(lights.count()))
 }

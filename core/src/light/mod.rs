@@ -15,12 +15,14 @@ mod tree;
 
 pub use emission::{DIMENSIONS as EMISSION_DIMENSIONS, Emission, Emitted};
 pub use emitted::emitted;
-pub(crate) use environment_visibility::Row;
-pub use environment_visibility::{Aim, Bins, Grid, Window, Windows};
+pub(crate) use environment_visibility::MarginalSample;
+pub use environment_visibility::{
+    Bins, EnvironmentVisibility, VisibilityGrid, VisibilityTable, WarpedSample,
+};
 pub(crate) use etendue::Found;
 pub use guide::Worth;
 pub(crate) use guide::throws;
-pub use sampler::{LightPoint, LightSample, Lights};
+pub use sampler::{LightPoint, LightSample, LightSampler};
 
 use crate::Rgb;
 

@@ -8,7 +8,7 @@ use super::area::Emitter;
 use super::border::Edges;
 use super::emitted::{emitted_at, spot_falloff};
 use super::environment::EnvironmentSampler;
-use super::environment_visibility::{Aim, Window, Windows};
+use super::environment_visibility::{EnvironmentVisibility, VisibilityTable, WarpedSample};
 use super::tree::Tree;
 use crate::sampling::{AliasTable, ONE_MINUS_EPSILON};
 use crate::scene::{Mesh, PointLight, Scene};
@@ -59,7 +59,7 @@ pub struct LightPoint {
 
 /// The lights of a scene, ready to be sampled.
 #[derive(Clone, Copy, Debug)]
-pub struct Lights<'m> {
+pub struct LightSampler<'m> {
     /// Emissive triangles and parallelograms, in the order of the mesh. Light `i` of the tree is emitter
     /// `i`; then come the points and spots.
     pub(super) emitters: &'m [Emitter],
@@ -68,7 +68,7 @@ pub struct Lights<'m> {
     pub(super) tree: Tree<'m>,
     pub(super) environment: Option<EnvironmentSampler<'m>>,
     /// What of the environment each place sees, where that has been learned.
-    pub(super) windows: Option<Windows<'m>>,
+    pub(super) visibility: Option<EnvironmentVisibility<'m>>,
     /// Indices into the scene's lights: directional.
     pub(super) distant: &'m [u32],
     pub(super) distant_table: AliasTable<'m>,
@@ -84,15 +84,15 @@ struct Shares {
     distant: f32,
 }
 
-impl<'m> Lights<'m> {
+impl<'m> LightSampler<'m> {
     /// The same lights, chosen by the instructions of `level`: the same ones, and sooner.
     pub fn with_level(&self, level: Level) -> Self {
         Self { tree: self.tree.with_level(level), ..*self }
     }
 
-    /// The same lights, the environment sampled through `windows`.
-    pub fn with_windows(&self, windows: Option<Windows<'m>>) -> Self {
-        Self { windows, ..*self }
+    /// The same lights, the environment sampled through `visibility`.
+    pub fn with_visibility(&self, visibility: Option<EnvironmentVisibility<'m>>) -> Self {
+        Self { visibility, ..*self }
     }
 
     /// Whether there is an environment that shines, and whether its radiance is constant.
@@ -107,20 +107,20 @@ impl<'m> Lights<'m> {
     }
 
     /// Whether the environment is sampled through windows.
-    pub(crate) fn have_windows(&self) -> bool {
-        self.windows.is_some()
+    pub(crate) fn has_visibility(&self) -> bool {
+        self.visibility.is_some()
     }
 
     /// What a surface sees the environment through, where that is known.
     #[inline]
-    pub(crate) fn window(&self, position: Vec3, normal: Vec3) -> Option<&'m Window> {
-        self.windows.as_ref()?.at(position, normal)
+    pub(crate) fn visibility(&self, position: Vec3, normal: Vec3) -> Option<&'m VisibilityTable> {
+        self.visibility.as_ref()?.at(position, normal)
     }
 
     /// Where the window of a surface leads, if it has one.
     #[inline]
-    pub(crate) fn aim(&self, position: Vec3, normal: Vec3, [u, v, _]: [f32; 3]) -> Option<Aim> {
-        Some(self.window(position, normal)?.warp([u, v]))
+    pub(crate) fn warp(&self, position: Vec3, normal: Vec3, [u, v, _]: [f32; 3]) -> Option<WarpedSample> {
+        Some(self.visibility(position, normal)?.warp([u, v]))
     }
 
     /// Whether there is nothing that shines.
@@ -133,22 +133,23 @@ impl<'m> Lights<'m> {
     /// of nothing.
     #[inline]
     pub fn sample(&self, scene: &Scene, position: Vec3, normal: Vec3, u: [f32; 3]) -> Option<LightSample> {
-        let (sample, later) = self.draw(scene, position, normal, u, self.aim(position, normal, u))?;
+        let (sample, later) =
+            self.sample_deferred(scene, position, normal, u, self.warp(position, normal, u))?;
         let environment = scene.environment.as_ref().filter(|_| later);
         let radiance = environment.map_or(Rgb::ONE, |e| e.radiance(scene, sample.direction));
         Some(LightSample { radiance: sample.radiance * radiance, ..sample })
     }
 
-    /// The same, but `aim` is what [`Lights::aim`] says, and whether the radiance is still to be multiplied with that of
+    /// The same, but `warped` is the result of [`LightSampler::warp`], and whether the radiance is still to be multiplied with that of
     /// the environment in this direction: looking it up is only worth it where nothing is in the way.
     #[inline]
-    pub fn draw(
+    pub fn sample_deferred(
         &self,
         scene: &Scene,
         position: Vec3,
         normal: Vec3,
         u: [f32; 3],
-        aim: Option<Aim>,
+        warped: Option<WarpedSample>,
     ) -> Option<(LightSample, bool)> {
         let shares = self.shares(position, normal);
         let [u0, u1, choice] = u;
@@ -165,8 +166,8 @@ impl<'m> Lights<'m> {
         let choice = choice - shares.tree;
         if choice < shares.environment {
             let (sampler, environment) = (self.environment?, scene.environment.as_ref()?);
-            let (direction, pdf) = match aim {
-                Some(aim) => sampler.sample_at(environment, aim)?,
+            let (direction, pdf) = match warped {
+                Some(warped) => sampler.sample_at(environment, warped)?,
                 None => sampler.sample(environment, normal, [u0, u1])?,
             };
             let pdf = pdf * shares.environment;
@@ -185,7 +186,7 @@ impl<'m> Lights<'m> {
         }
     }
 
-    /// The density of [`Lights::sample`] for a point of emissive `triangle` that is seen from `position` in
+    /// The density of [`LightSampler::sample`] for a point of emissive `triangle` that is seen from `position` in
     /// unit `direction` at `hit_distance`. Zero for a triangle that does not shine this way.
     #[inline]
     pub fn pdf_hit(
@@ -292,7 +293,7 @@ impl<'m> Lights<'m> {
         scene.lights.get(*index as usize)
     }
 
-    /// The probability of [`Lights::sample`] for light `light`, one without surface, in the order of emission.
+    /// The probability of [`LightSampler::sample`] for light `light`, one without surface, in the order of emission.
     pub(crate) fn probability(&self, light: u32, position: Vec3, normal: Vec3) -> f32 {
         let index = light as usize;
         let shares = self.shares(position, normal);
@@ -302,13 +303,13 @@ impl<'m> Lights<'m> {
         }
     }
 
-    /// The density of [`Lights::sample`] for the environment in unit `direction`.
+    /// The density of [`LightSampler::sample`] for the environment in unit `direction`.
     #[inline]
     pub fn pdf_escape(&self, scene: &Scene, position: Vec3, normal: Vec3, direction: Vec3) -> f32 {
         match (&self.environment, &scene.environment) {
             (Some(sampler), Some(environment)) => {
-                let pdf = match self.window(position, normal) {
-                    Some(window) => sampler.pdf_through(environment, window, direction),
+                let pdf = match self.visibility(position, normal) {
+                    Some(table) => sampler.pdf_through(environment, table, direction),
                     None => sampler.pdf(environment, normal, direction),
                 };
                 self.shares(position, normal).environment * pdf
@@ -317,7 +318,7 @@ impl<'m> Lights<'m> {
         }
     }
 
-    /// Whether there is more than one light to choose from; otherwise `u[2]` of [`Lights::sample`] does
+    /// Whether there is more than one light to choose from; otherwise `u[2]` of [`LightSampler::sample`] does
     /// not matter.
     #[inline]
     pub fn have_choice(&self) -> bool {

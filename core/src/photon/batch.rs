@@ -2,7 +2,7 @@
 
 use super::PhotonMap;
 use super::gather::{Density, Disc, Response, gather};
-use super::morton::{self, Turn};
+use super::morton::{self, QueryOrder};
 use super::nearest::{Neighbours, search};
 use glam::Vec3;
 use halflight_simd::{Kernel, Simd};
@@ -18,7 +18,7 @@ pub(super) struct Searches<'a, 'm, 'n, F> {
     pub map: &'a PhotonMap<'m>,
     pub places: &'a [Vec3],
     pub squared_radius: f32,
-    pub turns: &'a mut [Turn],
+    pub order: &'a mut [QueryOrder],
     pub neighbours: &'a mut Neighbours<'n>,
     pub each: F,
 }
@@ -31,8 +31,8 @@ impl<F: FnMut(usize, &Neighbours)> Kernel for Searches<'_, '_, '_, F> {
         let map = self.map;
         // Where the search before was, and how far its k-th photon.
         let mut last: Option<([f32; 3], f32)> = None;
-        for turn in morton::along(map, self.places.iter().copied(), self.turns) {
-            let index = turn.index as usize;
+        for next in morton::along(map, self.places.iter().copied(), self.order) {
+            let index = next.index as usize;
             let Some(place) = self.places.get(index) else { continue };
             let place = map.space.enter(place.to_array());
             // The k photons of the last search are no farther from here than this, by the triangle's inequality.
@@ -55,7 +55,7 @@ pub(super) struct Gathers<'a, 'm, R> {
     pub map: &'a PhotonMap<'m>,
     pub discs: &'a [Disc],
     pub response: &'a R,
-    pub turns: &'a mut [Turn],
+    pub order: &'a mut [QueryOrder],
     pub densities: &'a mut [Density],
 }
 
@@ -64,8 +64,8 @@ impl<R: Response> Kernel for Gathers<'_, '_, R> {
 
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) {
-        for turn in morton::along(self.map, self.discs.iter().map(|disc| disc.place), self.turns) {
-            let index = turn.index as usize;
+        for next in morton::along(self.map, self.discs.iter().map(|disc| disc.place), self.order) {
+            let index = next.index as usize;
             if let (Some(disc), Some(density)) = (self.discs.get(index), self.densities.get_mut(index)) {
                 *density = gather(simd, self.map, disc, None, self.response);
             }

@@ -6,14 +6,14 @@ use super::PhotonMap;
 use super::layout::{LEAF, Leaf, Levels, Node, WIDTH};
 use super::record::Photon;
 use super::space::Space;
-use crate::bvh::Join;
+use crate::bvh::ForkJoin;
 use core::cmp::Ordering;
 
 /// Ranges shorter than this are not worth another core.
 const PARALLEL_MIN: usize = 8192;
 
 /// Builds over the first `count` photons of `leaves`; `nodes` holds what [`Levels`] says.
-pub(super) fn build<'m, J: Join>(
+pub(super) fn build<'m, J: ForkJoin>(
     leaves: &'m mut [Leaf],
     count: usize,
     nodes: &'m mut [Node],
@@ -30,7 +30,7 @@ pub(super) fn build<'m, J: Join>(
 
     let leaves = &mut leaves[..kept.div_ceil(LEAF)];
     let nodes = &mut nodes[..levels.nodes];
-    turn(leaves, kept, &mut nodes[..levels.at(1, 0).min(levels.nodes)], join);
+    next(leaves, kept, &mut nodes[..levels.at(1, 0).min(levels.nodes)], join);
     bound(nodes, &levels);
     PhotonMap { leaves, nodes, levels, count: kept, refused: offered - kept, space }
 }
@@ -55,7 +55,7 @@ fn admit(photons: &mut [Photon]) -> (usize, Space) {
 }
 
 /// Orders what is under a node of `level`.
-fn order<J: Join>(photons: &mut [Photon], level: usize, join: &J) {
+fn order<J: ForkJoin>(photons: &mut [Photon], level: usize, join: &J) {
     let child = LEAF * WIDTH.pow(level as u32);
     if photons.len() > child {
         // All children but the last are full, and the left half of them goes left.
@@ -109,15 +109,15 @@ fn widest_axis(photons: &[Photon]) -> usize {
 }
 
 /// Turns the leaves of `count` photons from rows to columns, and puts boxes around them: into `nodes`, those above.
-fn turn<J: Join>(leaves: &mut [Leaf], count: usize, nodes: &mut [Node], join: &J) {
+fn next<J: ForkJoin>(leaves: &mut [Leaf], count: usize, nodes: &mut [Node], join: &J) {
     if count > PARALLEL_MIN && nodes.len() > 1 {
         let half = nodes.len() / 2;
         let middle = half * WIDTH;
         let (left, right) = leaves.split_at_mut(middle);
         let (above_left, above_right) = nodes.split_at_mut(half);
         join.join(
-            || turn(left, middle * LEAF, above_left, join),
-            || turn(right, count - middle * LEAF, above_right, join),
+            || next(left, middle * LEAF, above_left, join),
+            || next(right, count - middle * LEAF, above_right, join),
         );
         return;
     }

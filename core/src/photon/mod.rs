@@ -20,12 +20,12 @@ mod space;
 
 pub use fence::{Fence, PROBES};
 pub use gather::{ALIKE, Density, Disc, FINER, FLATNESS, Falloff, Response, Uniform};
-pub use morton::Turn;
+pub use morton::QueryOrder;
 pub use nearest::Neighbours;
 pub use record::Photon;
 
 use crate::Level;
-use crate::bvh::{Join, Serial};
+use crate::bvh::{ForkJoin, Serial};
 use crate::memory::{Arena, Footprint, OutOfMemory};
 use glam::Vec3;
 use layout::{LEAF, Leaf, Levels, Node};
@@ -70,7 +70,7 @@ impl<'m> Photons<'m> {
     }
 
     /// Builds it on the cores that `join` brings. The same map, to the bit.
-    pub fn build_with<J: Join>(self, count: usize, join: &J) -> PhotonMap<'m> {
+    pub fn build_with<J: ForkJoin>(self, count: usize, join: &J) -> PhotonMap<'m> {
         build::build(self.leaves, count.min(self.capacity), self.nodes, join)
     }
 }
@@ -200,31 +200,31 @@ impl PhotonMap<'_> {
     }
 
     /// [`PhotonMap::nearest`] for many places, of which `each` gets the index and what was found; in an order in
-    /// which neighbours follow each other. `turns` is working memory, one for each place: those beyond are left out.
+    /// which neighbours follow each other. `order` is working memory, one for each place: those beyond are left out.
     pub fn nearest_batch(
         &self,
         level: Level,
         places: &[Vec3],
         radius: f32,
-        turns: &mut [Turn],
+        order: &mut [QueryOrder],
         neighbours: &mut Neighbours,
         each: impl FnMut(usize, &Neighbours),
     ) {
         let squared_radius = self.space.squared(radius).unwrap_or(-1.0);
-        level.dispatch(batch::Searches { map: self, places, squared_radius, turns, neighbours, each });
+        level.dispatch(batch::Searches { map: self, places, squared_radius, order, neighbours, each });
     }
 
-    /// [`PhotonMap::gather`] for many discs, in such an order. `turns` is working memory, one for each disc: those
+    /// [`PhotonMap::gather`] for many discs, in such an order. `order` is working memory, one for each disc: those
     /// beyond are left out, as are those for which there is no density.
     pub fn gather_batch<R: Response>(
         &self,
         level: Level,
         discs: &[Disc],
         response: &R,
-        turns: &mut [Turn],
+        order: &mut [QueryOrder],
         densities: &mut [Density],
     ) {
-        level.dispatch(batch::Gathers { map: self, discs, response, turns, densities });
+        level.dispatch(batch::Gathers { map: self, discs, response, order, densities });
     }
 
     /// Lowest and highest corner of the box around the photons, in units of the map; empty where there are none.

@@ -11,33 +11,33 @@ const BITS: u32 = 10;
 /// When it is the turn of a place.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Pod, Zeroable)]
 #[repr(C)]
-pub struct Turn {
+pub struct QueryOrder {
     code: u32,
     /// Which place it is.
     pub index: u32,
 }
 
-/// Fills `turns` with the first so many of `places`, along the curve. Gives those that it filled.
+/// Fills `order` with the first so many of `places`, along the curve. Gives those that it filled.
 pub(super) fn along<'t>(
     map: &PhotonMap,
     places: impl ExactSizeIterator<Item = Vec3>,
-    turns: &'t mut [Turn],
-) -> &'t mut [Turn] {
+    order: &'t mut [QueryOrder],
+) -> &'t mut [QueryOrder] {
     let [lo, hi] = map.bounds();
     let cells = (1u32 << BITS) as f32;
-    let count = places.len().min(turns.len());
-    let turns = &mut turns[..count];
-    for (index, (turn, place)) in turns.iter_mut().zip(places).enumerate() {
+    let count = places.len().min(order.len());
+    let order = &mut order[..count];
+    for (index, (next, place)) in order.iter_mut().zip(places).enumerate() {
         let place = map.space.enter(place.to_array());
         let cell = [0, 1, 2].map(|axis| {
             // From anywhere, NaN included, to one of the cells: floats saturate when they become whole numbers.
             ((place[axis] - lo[axis]) / (hi[axis] - lo[axis]) * cells) as u32
         });
         let [x, y, z] = cell.map(|cell| spread(cell.min((1 << BITS) - 1)));
-        *turn = Turn { code: x | y << 1 | z << 2, index: index as u32 };
+        *next = QueryOrder { code: x | y << 1 | z << 2, index: index as u32 };
     }
-    turns.sort_unstable();
-    turns
+    order.sort_unstable();
+    order
 }
 
 /// Ten bits, with two zeros after each.

@@ -366,8 +366,8 @@ fn batches_find_what_single_searches_find() {
                     Neighbours::new(k, &mut Arena::new(bytemuck::cast_slice_mut(memory))).unwrap()
                 });
                 let mut seen = vec![false; asked.len()];
-                let mut turns = vec![Turn::default(); asked.len()];
-                map.nearest_batch(level, &asked, radius, &mut turns, &mut many, |i, found| {
+                let mut order = vec![QueryOrder::default(); asked.len()];
+                map.nearest_batch(level, &asked, radius, &mut order, &mut many, |i, found| {
                     seen[i] = true;
                     map.nearest(level, asked[i], radius, &mut one);
                     let sorted = |neighbours: &Neighbours| {
@@ -382,9 +382,9 @@ fn batches_find_what_single_searches_find() {
             let disc =
                 |&place: &Vec3| Disc { place, normal: Vec3::Z, radius: 0.1 * extent, falloff: Falloff::Cone };
             let discs: Vec<_> = asked.iter().map(disc).collect();
-            let mut turns = vec![Turn::default(); discs.len()];
+            let mut order = vec![QueryOrder::default(); discs.len()];
             let mut densities = vec![Density::default(); discs.len()];
-            map.gather_batch(level, &discs, &Uniform(Rgb::ONE), &mut turns, &mut densities);
+            map.gather_batch(level, &discs, &Uniform(Rgb::ONE), &mut order, &mut densities);
             for (disc, density) in discs.iter().zip(&densities) {
                 let bits =
                     |density: Density| (density.radiance.to_array().map(f32::to_bits), density.photons);
@@ -397,7 +397,7 @@ fn batches_find_what_single_searches_find() {
 /// Both at once, on two threads.
 struct Threads;
 
-impl Join for Threads {
+impl ForkJoin for Threads {
     fn join(&self, a: impl FnOnce() + Send, b: impl FnOnce() + Send) {
         std::thread::scope(|scope| {
             scope.spawn(a);

@@ -16,7 +16,7 @@ use super::shoot::{ShootSettings, is_varnished};
 use crate::bsdf::{BsdfSample, Features};
 use crate::bvh::Bvh;
 use crate::geometry::Ray;
-use crate::light::{Emission, Found, Lights, luminance, throws};
+use crate::light::{Emission, Found, LightSampler, luminance, throws};
 use crate::memory::{Arena, Footprint, OutOfMemory};
 use crate::photon::Photon;
 use crate::scene::{Scene, SurfacePoint};
@@ -80,7 +80,7 @@ impl<'a, F: Features> CausticShooter<'a, F> {
     /// A shooter over frozen structures, for photons that will be gathered from `discs` in a picture of so many pixels
     /// across and down. `F` has at least the features of the scene. All photons are kept, whatever `settings` say.
     pub fn new(
-        (scene, bvh, lights): (&'a Scene<'a>, &'a Bvh<'a>, &'a Lights<'a>),
+        (scene, bvh, lights): (&'a Scene<'a>, &'a Bvh<'a>, &'a LightSampler<'a>),
         emission: &'a Emission<'a>,
         settings: ShootSettings,
         (discs, frame): (Discs, [u32; 2]),

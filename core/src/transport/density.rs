@@ -4,7 +4,7 @@ use super::merge::Discs;
 use super::shoot::{gathers_photons, is_varnished};
 use crate::bsdf::{Bsdf, Features};
 use crate::bvh::Bvh;
-use crate::bvh::survey::{Site, Survey};
+use crate::bvh::clearance::{Clearance, ClearanceQuery};
 use crate::geometry::Ray;
 use crate::photon::{Density, Disc, FLATNESS, Falloff, Fence, PROBES, PhotonMap, Uniform};
 use crate::scene::SurfacePoint;
@@ -171,7 +171,7 @@ pub(super) fn fence(
     let depth = FLATNESS * radius;
     let reach = Fence::FARTHEST * radius;
     // Most discs lie in the open, which one look around tells.
-    let site = Site {
+    let query = ClearanceQuery {
         place: origin,
         frame,
         reach: (1.0 + LIFT) * reach,
@@ -181,21 +181,21 @@ pub(super) fn fence(
         ],
         depth,
     };
-    let survey = bvh.survey(&site);
-    if survey == Survey::OPEN {
+    let clearance = bvh.clearance(&query);
+    if clearance == Clearance::OPEN {
         return Fence::open(&frame);
     }
     let mut shares = [f32::INFINITY; PROBES];
     for (i, share) in shares.iter_mut().enumerate() {
         let way = frame.to_world(Fence::WAYS[i].extend(0.0));
-        if survey.rises {
+        if clearance.rises {
             // One by one: the setup of a batch costs more than it gains for eight.
             let hit = bvh.nearest(level, &Ray::segment(origin, way + LIFT * disc.normal, reach));
             if hit.is_some() {
                 *share = hit.t / radius;
             }
         }
-        if share.is_infinite() && survey.surface >> i & 1 != 0 {
+        if share.is_infinite() && clearance.surface >> i & 1 != 0 {
             continue;
         }
         let is_there = |share: f32| {
@@ -217,7 +217,7 @@ pub(super) fn fence(
         }
         *share = 0.5 * (low + high);
     }
-    if survey.hangs && !is_caustic {
+    if clearance.hangs && !is_caustic {
         // Under something that hangs lower than the disc is wide, the light changes over as little.
         for way in UPWARDS {
             let hit = bvh.nearest(level, &Ray::segment(origin, frame.to_world(way), radius / way.z));

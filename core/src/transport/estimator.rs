@@ -4,7 +4,7 @@
 use crate::Rgb;
 use crate::bsdf::{Bsdf, BsdfSample};
 use crate::film::Dropped;
-use crate::light::Lights;
+use crate::light::LightSampler;
 
 /// No limit on the length of paths.
 pub const UNLIMITED: u32 = u32::MAX;
@@ -145,8 +145,8 @@ pub(super) fn power_heuristic(own: f32, other: f32) -> f32 {
 /// The same for light of the environment. What a window shows is true of its place, not of each point: the densities say
 /// less than they seem to, and the square would trust them too much.
 #[inline]
-pub(super) fn environment_heuristic(lights: &Lights, own: f32, other: f32) -> f32 {
-    if lights.have_windows() { 1.0 / (1.0 + other / own) } else { power_heuristic(own, other) }
+pub(super) fn environment_heuristic(lights: &LightSampler, own: f32, other: f32) -> f32 {
+    if lights.has_visibility() { 1.0 / (1.0 + other / own) } else { power_heuristic(own, other) }
 }
 
 /// A path that carries at least this much goes on for certain; one that carries half of it, every other time. The fewest

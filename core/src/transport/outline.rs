@@ -12,7 +12,7 @@ use crate::bsdf::Features;
 use crate::bvh::{Bvh, Coherence};
 use crate::film::{PixelSet, TILE, Tile};
 use crate::geometry::{Hit, MISS, Ray};
-use crate::light::{Lights, emitted};
+use crate::light::{LightSampler, emitted};
 use crate::sampling::Sampler;
 use crate::scene::{Camera, Material, Scene, SurfacePoint};
 use crate::{Level, Rgb};
@@ -91,7 +91,12 @@ impl View {
 
 /// The pixels of a tile that see the border of a lamp, as far as nothing is in the way. None where a sharp border is not
 /// seen: through a lens, or where surfaces have cut-outs.
-pub(super) fn outlined(scene: &Scene, lights: &Lights, settings: &PathSettings, tile: Tile) -> PixelSet {
+pub(super) fn outlined(
+    scene: &Scene,
+    lights: &LightSampler,
+    settings: &PathSettings,
+    tile: Tile,
+) -> PixelSet {
     let camera = &scene.camera;
     if camera.lens_radius > 0.0 {
         return PixelSet::default();
@@ -120,7 +125,12 @@ pub(super) fn outlined(scene: &Scene, lights: &Lights, settings: &PathSettings, 
 }
 
 /// Whether the pixel in column `x` and row `y` is one of [`outlined`].
-pub(super) fn is_outlined(scene: &Scene, lights: &Lights, settings: &PathSettings, [x, y]: [u32; 2]) -> bool {
+pub(super) fn is_outlined(
+    scene: &Scene,
+    lights: &LightSampler,
+    settings: &PathSettings,
+    [x, y]: [u32; 2],
+) -> bool {
     let index = y / TILE * settings.width.div_ceil(TILE) + x / TILE;
     let tile = Tile::new(settings.width, settings.height, index as usize);
     outlined(scene, lights, settings, tile).contains(Tile::position(TILE, x % TILE, y % TILE))

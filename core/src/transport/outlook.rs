@@ -1,5 +1,5 @@
 //! A first look from the surfaces of the scene to the sky: which of its light reaches which place. What is learned
-//! are the [`Windows`] through which the environment is then sampled.
+//! are the [`EnvironmentVisibility`] through which the environment is then sampled.
 //!
 //! 1. Paths from the camera, few and in all of the picture, leave a vertex wherever they meet a surface that scatters.
 //! 2. Vertices are sorted by their place, a cell of a grid and the side that the surface faces.
@@ -15,7 +15,7 @@ use crate::Rgb;
 use crate::bsdf::{Bsdf, Features};
 use crate::bvh::Coherence;
 use crate::geometry::{Bounds, Hit, MISS, Ray};
-use crate::light::{Bins, Grid, Window, Windows};
+use crate::light::{Bins, EnvironmentVisibility, VisibilityGrid, VisibilityTable};
 use crate::memory::{Arena, Footprint, OutOfMemory};
 use crate::sampling::Sampler;
 use crate::scene::SurfacePoint;
@@ -104,7 +104,7 @@ impl<'m> Outlook<'m> {
     pub fn footprint() -> Footprint {
         Footprint::default()
             .slice::<Vertex>(TASKS * PATHS.end * VERTICES)
-            .slice::<[u32; 2]>(Windows::MOST)
+            .slice::<[u32; 2]>(EnvironmentVisibility::MOST)
             .slice::<[f32; 3]>(PASSES * BINS)
     }
 
@@ -114,7 +114,7 @@ impl<'m> Outlook<'m> {
     /// [`OutOfMemory`] where the arena has less than [`Outlook::footprint`].
     pub fn new(arena: &mut Arena<'m>) -> Result<Self, OutOfMemory> {
         let vertices = arena.slice(TASKS * PATHS.end * VERTICES)?;
-        let ranges = arena.slice(Windows::MOST)?;
+        let ranges = arena.slice(EnvironmentVisibility::MOST)?;
         Ok(Self { vertices, ranges, directions: arena.slice(PASSES * BINS)? })
     }
 
@@ -125,9 +125,9 @@ impl<'m> Outlook<'m> {
 
     /// Sorts the vertices by their places and numbers the windows that there will be in `slots`. Returns the
     /// grid of places and how many windows there are.
-    pub fn settle(&mut self, slots: &mut [u16]) -> Option<(Grid, usize)> {
+    pub fn settle(&mut self, slots: &mut [u16]) -> Option<(VisibilityGrid, usize)> {
         let seen = || self.vertices.iter().filter(|vertex| vertex.place != NOWHERE);
-        let grid = Grid::over(&Bounds::around(seen().map(|vertex| vertex.position.into())))?;
+        let grid = VisibilityGrid::over(&Bounds::around(seen().map(|vertex| vertex.position.into())))?;
         for (index, vertex) in self.vertices.iter_mut().enumerate() {
             vertex.index = index as u32;
             if vertex.place != NOWHERE {
@@ -271,7 +271,7 @@ impl<F: Features> PathTracer<'_, F> {
         for (i, direction) in outlook.directions.iter_mut().enumerate() {
             let (bin, pass) = (i % BINS, i / BINS);
             let offset = Sampler::new(self.settings.seed ^ STREAM, 1 + bin as u32, pass as u32).pair(0);
-            let at = self.lights.sample_environment(self.scene, Window::place(bin, offset));
+            let at = self.lights.sample_environment(self.scene, VisibilityTable::place(bin, offset));
             *direction = at.unwrap_or(Vec3::ZERO).to_array();
         }
     }
@@ -291,7 +291,7 @@ impl<F: Features> PathTracer<'_, F> {
         number: usize,
         count: usize,
         scratch: &mut Arena,
-        window: &mut Window,
+        window: &mut VisibilityTable,
     ) -> Result<WindowGain, OutOfMemory> {
         let mut arena = scratch.scratch();
         let mut glances = Glances::new(&mut arena)?;
@@ -299,9 +299,9 @@ impl<F: Features> PathTracer<'_, F> {
 
         // Every other bin has a ray, which speaks for its neighbours. Where light may come from has more.
         let mut squares: Bins = [0.0; _];
-        glances.ask((0..squares.len()).filter(|&bin| Window::is_black(bin)), 0, outlook, vertices);
+        glances.ask((0..squares.len()).filter(|&bin| VisibilityTable::is_black(bin)), 0, outlook, vertices);
         self.send(&mut glances, |bin, light| squares[bin] = light);
-        let near = Window::smoothed(&Window::smoothed(&squares));
+        let near = VisibilityTable::smoothed(&VisibilityTable::smoothed(&squares));
         let open = || (0..near.len()).filter(|&bin| near[bin] > 0.0);
 
         let pixels = self.settings.width as usize * self.settings.height as usize;
@@ -316,9 +316,9 @@ impl<F: Features> PathTracer<'_, F> {
                 squares[bin] += light * light / passes as f32;
             });
         }
-        let smooth = Window::smoothed(&squares);
+        let smooth = VisibilityTable::smoothed(&squares);
         let shares = smooth.map(libm::sqrtf);
-        *window = Window::new(&shares);
+        *window = VisibilityTable::new(&shares);
 
         let bins = sums.len() as f64;
         let mean = |values: &Bins| values.iter().map(|&x| f64::from(x)).sum::<f64>() / bins;
@@ -329,7 +329,7 @@ impl<F: Features> PathTracer<'_, F> {
         // Second moments, of the light in units of the environment's mean over its square.
         let cosine_sampled = self.lights.environment_is_constant() == Some(true);
         let before = if cosine_sampled { seen / 4.0 } else { mean(&smooth) };
-        let shares = Window::probabilities(&shares);
+        let shares = VisibilityTable::probabilities(&shares);
         let moment = |(&square, &share): (&f32, &f32)| f64::from(square) / f64::from(share);
         let after = smooth.iter().zip(&shares).map(moment).sum::<f64>() / bins / bins;
         let relative = |moment: f64| vertices.len() as f64 * (moment / seen / seen - 1.0).max(0.0);

@@ -40,7 +40,7 @@ use crate::bvh::{Bvh, Coherence};
 use crate::cache::irradiance::{Indirect, IrradianceCache, POINTS};
 use crate::film::{PixelSet, Tile};
 use crate::geometry::{Hit, Ray};
-use crate::light::{Aim, Lights, Row, Window, emitted};
+use crate::light::{LightSampler, MarginalSample, VisibilityTable, WarpedSample, emitted};
 use crate::memory::Footprint;
 use crate::sampling::Sampler;
 use crate::scene::{Material, Scene, SurfacePoint};
@@ -69,7 +69,7 @@ pub const LIGHTS: usize = 4;
 pub struct PathTracer<'a, F> {
     pub(super) scene: &'a Scene<'a>,
     pub(super) bvh: &'a Bvh<'a>,
-    pub(super) lights: &'a Lights<'a>,
+    pub(super) lights: &'a LightSampler<'a>,
     pub(super) settings: PathSettings,
     pub(super) level: Level,
     /// Some surfaces let a part of the light through, so that a shadow ray may go on behind a hit.
@@ -102,7 +102,7 @@ impl<'a, F: Features> PathTracer<'a, F> {
     pub fn new(
         scene: &'a Scene<'a>,
         bvh: &'a Bvh<'a>,
-        lights: &'a Lights<'a>,
+        lights: &'a LightSampler<'a>,
         settings: PathSettings,
         level: Level,
     ) -> Self {
@@ -290,7 +290,7 @@ impl<'a, F: Features> PathTracer<'a, F> {
                 if F::TEXTURES {
                     point.material.prefetch(self.scene, point.uv);
                 }
-                let window = self.lights.window(point.position, point.frame.normal);
+                let window = self.lights.visibility(point.position, point.frame.normal);
                 if let Some(window) = window {
                     window.prefetch();
                 }
@@ -300,10 +300,10 @@ impl<'a, F: Features> PathTracer<'a, F> {
             });
         }
         for met in block.iter_mut().flatten() {
-            met.row = met.window.map(|window| window.row(met.light[1]));
+            met.row = met.window.map(|window| window.sample_row(met.light[1]));
         }
         for met in block.iter_mut().flatten() {
-            met.aim = met.window.zip(met.row).map(|(window, row)| window.aim(met.light[0], row));
+            met.aim = met.window.zip(met.row).map(|(window, row)| window.sample_in_row(met.light[0], row));
         }
         if let Some(caches) = self.caches {
             self.ask(caches, wave, range, block, counters);
@@ -493,14 +493,14 @@ impl<'a, F: Features> PathTracer<'a, F> {
             for part in 0..points {
                 let sampler = if points > 1 { path.part(self.settings.seed, part) } else { sampler };
                 let [u, v] = if points > 1 { sampler.pair(first + dimension::LIGHT) } else { [u, v] };
-                let again = || aim.and(window).map(|window| window.aim(u, window.row(v)));
+                let again = || aim.and(window).map(|window| window.sample_in_row(u, window.sample_row(v)));
                 let aim = if points > 1 { again() } else { aim };
                 let choice = if self.lights.have_choice() {
                     sampler.single(first + dimension::LIGHT_CHOICE)
                 } else {
                     0.0
                 };
-                let drawn = self.lights.draw(scene, point.position, normal, [u, v, choice], aim);
+                let drawn = self.lights.sample_deferred(scene, point.position, normal, [u, v, choice], aim);
                 let light = drawn.and_then(|(sample, later)| {
                     let wi = point.frame.to_local(sample.direction);
                     if !point.sides_agree(wi, sample.direction) {
@@ -683,9 +683,9 @@ pub(super) struct Met<'a> {
     /// Where light is looked for.
     light: [f32; 2],
     /// The same through the window, found step by step, so that nobody waits for memory.
-    window: Option<&'a Window>,
-    row: Option<Row>,
-    aim: Option<Aim>,
+    window: Option<&'a VisibilityTable>,
+    row: Option<MarginalSample>,
+    aim: Option<WarpedSample>,
     /// What a cache says of it.
     pub(super) indirect: Option<Indirect>,
 }

@@ -10,7 +10,7 @@ use super::shadow::{passing, shadow_ray};
 use crate::bsdf::{All, Bsdf};
 use crate::bvh::Bvh;
 use crate::geometry::MISS;
-use crate::light::{Lights, emitted};
+use crate::light::{LightSampler, emitted};
 use crate::sampling::Sampler;
 use crate::scene::{Scene, SurfacePoint};
 use crate::{Level, Rgb};
@@ -20,7 +20,7 @@ use glam::Vec3;
 pub fn radiance(
     scene: &Scene,
     bvh: &Bvh,
-    lights: &Lights,
+    lights: &LightSampler,
     settings: &PathSettings,
     [x, y]: [u32; 2],
     sample: u32,
@@ -92,8 +92,8 @@ pub fn radiance(
             let [u, v] = sampler.pair(first + dimension::LIGHT);
             let choice = sampler.single(first + dimension::LIGHT_CHOICE);
             let u = [u, v, choice];
-            let aim = lights.aim(point.position, normal, u);
-            if let Some((light, later)) = lights.draw(scene, point.position, normal, u, aim) {
+            let aim = lights.warp(point.position, normal, u);
+            if let Some((light, later)) = lights.sample_deferred(scene, point.position, normal, u, aim) {
                 let wi = point.frame.to_local(light.direction);
                 let (f, pdf) = bsdf.evaluate::<All>(wo, wi);
                 let same_side = point.sides_agree(wi, light.direction);

@@ -17,7 +17,7 @@ use super::flight::{Flight, Onward, Pile, State, Vertex, Visitor};
 use super::sight::Sight;
 use crate::bsdf::{Bsdf, BsdfSample, Features};
 use crate::bvh::Bvh;
-use crate::light::{Emission, Lights, luminance};
+use crate::light::{Emission, LightSampler, luminance};
 use crate::memory::{Arena, Footprint, OutOfMemory};
 use crate::photon::Photon;
 use crate::scene::{Material, Scene, Surface};
@@ -146,7 +146,7 @@ impl<'a, F: Features> Shooter<'a, F> {
     pub fn new(
         scene: &'a Scene<'a>,
         bvh: &'a Bvh<'a>,
-        lights: &'a Lights<'a>,
+        lights: &'a LightSampler<'a>,
         emission: &'a Emission<'a>,
         settings: ShootSettings,
         level: Level,

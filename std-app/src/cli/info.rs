@@ -12,7 +12,7 @@ use halflight::report::words::readable_bytes;
 use halflight_core::bvh::Bvh;
 use halflight_core::census::{Census, Plan};
 use halflight_core::film::Film;
-use halflight_core::light::Lights;
+use halflight_core::light::LightSampler;
 use halflight_core::scene::Camera;
 use serde_json::{Map, Value, json};
 use std::path::PathBuf;
@@ -44,7 +44,7 @@ impl Info {
             footprints: [
                 ("bvh", Bvh::kept_footprint(scene.mesh.triangles.len()).bytes()),
                 ("bvh_build", Bvh::footprint(scene.mesh.triangles.len()).bytes()),
-                ("lights", Lights::footprint(&scene).bytes()),
+                ("lights", LightSampler::footprint(&scene).bytes()),
                 ("film", Film::footprint(width, height).bytes()),
             ],
             plan: census.plan(),

@@ -16,7 +16,7 @@ use halflight_core::bsdf::Features;
 use halflight_core::bvh::Bvh;
 use halflight_core::census::WithFeatures;
 use halflight_core::film::Film;
-use halflight_core::light::Lights;
+use halflight_core::light::LightSampler;
 use halflight_core::memory::{Arena, Footprint};
 use halflight_core::scene::Scene;
 use halflight_core::transport::{PathSettings, PathTracer, UNLIMITED};
@@ -63,8 +63,10 @@ impl WithFeatures for Render<'_> {
         let pixels = width as usize * height as usize;
         let picture = Footprint::default().slice::<[f32; 3]>(pixels).slice::<[f32; 3]>(pixels);
         memory.set_aside("picture", picture.slice::<u32>(pixels))?;
-        let mut lights_lines = memory.take("lights", Lights::footprint(scene).and(Lights::scratch(scene)))?;
-        let lights = Lights::build(scene, &mut Arena::new(bytemuck::cast_slice_mut(&mut lights_lines)))?;
+        let mut lights_lines =
+            memory.take("lights", LightSampler::footprint(scene).and(LightSampler::scratch(scene)))?;
+        let lights =
+            LightSampler::build(scene, &mut Arena::new(bytemuck::cast_slice_mut(&mut lights_lines)))?;
         let lights = lights.with_level(settings.level);
         let build = build_start.elapsed().as_secs_f64();
 

@@ -15,7 +15,7 @@ use halflight_core::bsdf::Features;
 use halflight_core::cache::irradiance::{CellFlux, IrradianceCache, Metric, metric};
 use halflight_core::census::{Census, WithFeatures};
 use halflight_core::film::{Film, GROUPS};
-use halflight_core::light::Lights;
+use halflight_core::light::LightSampler;
 use halflight_core::memory::{Arena, Line};
 use halflight_core::scene::Scene;
 use halflight_core::transport::PathTracer;
@@ -99,8 +99,9 @@ impl WithFeatures for Study<'_> {
         let mut memory = Memory::new(scene, settings);
         let mut bvh_lines = Pages::default();
         let bvh = build_bvh(scene, settings.level, &workers, &mut memory, &mut bvh_lines)?;
-        let mut lights_lines = memory.take("lights", Lights::footprint(scene).and(Lights::scratch(scene)))?;
-        let lights = Lights::build(scene, &mut arena(&mut lights_lines))?.with_level(settings.level);
+        let mut lights_lines =
+            memory.take("lights", LightSampler::footprint(scene).and(LightSampler::scratch(scene)))?;
+        let lights = LightSampler::build(scene, &mut arena(&mut lights_lines))?.with_level(settings.level);
         let tracer = PathTracer::<F>::new(scene, &bvh, &lights, path_settings(settings), settings.level);
         let strata = settings.cache.strata() as usize;
         let scratch = PathTracer::<F>::gather_scratch(strata).or(PathTracer::<F>::gather_scratch(EXACT));

@@ -5,7 +5,7 @@ use super::RenderError;
 use super::memory::Memory;
 use super::workers::Workers;
 use halflight_core::bsdf::Features;
-use halflight_core::light::{Lights, Windows};
+use halflight_core::light::{EnvironmentVisibility, LightSampler};
 use halflight_core::memory::{Arena, Line};
 use halflight_core::transport::{Outlook, PathTracer, WindowGain, path::WAVE};
 
@@ -23,25 +23,25 @@ pub struct WindowUse {
 /// Learns the windows of `tracer`'s scene in `lines`, where it has a sky and they pay, or are `wanted`.
 pub(super) fn learn<'m, F: Features>(
     tracer: &PathTracer<F>,
-    lights: &Lights<'m>,
+    lights: &LightSampler<'m>,
     wanted: Option<bool>,
     workers: &Workers,
     memory: &mut Memory,
     lines: &'m mut Vec<Line>,
-) -> Result<(Lights<'m>, WindowUse), RenderError> {
+) -> Result<(LightSampler<'m>, WindowUse), RenderError> {
     if wanted == Some(false) || lights.environment_is_constant().is_none() {
         return Ok((*lights, WindowUse::default()));
     }
     // They are for speed alone: where there is no memory for them, the picture is made without.
     let each = PathTracer::<F>::learn_scratch().and(PathTracer::<F>::scratch(WAVE)).bytes();
-    let all = Outlook::footprint().and(Windows::footprint()).bytes();
+    let all = Outlook::footprint().and(EnvironmentVisibility::footprint()).bytes();
     if wanted.is_none() && !memory.has(all.saturating_add(each.saturating_mul(workers.count()))) {
         return Ok((*lights, WindowUse { lacks_memory: true, ..WindowUse::default() }));
     }
     let mut look_lines = memory.take("look at the sky", Outlook::footprint())?;
     let mut outlook = Outlook::new(&mut Arena::new(bytemuck::cast_slice_mut(&mut look_lines)))?;
-    *lines = memory.take("windows", Windows::footprint())?;
-    let (slots, windows) = Windows::memory(&mut Arena::new(bytemuck::cast_slice_mut(lines)))?;
+    *lines = memory.take("windows", EnvironmentVisibility::footprint())?;
+    let (slots, windows) = EnvironmentVisibility::memory(&mut Arena::new(bytemuck::cast_slice_mut(lines)))?;
 
     let mut scratch =
         memory.take_each("look at the sky", PathTracer::<F>::learn_scratch(), workers.count())?;
@@ -72,12 +72,14 @@ pub(super) fn learn<'m, F: Features>(
     }
     memory.give_back("look at the sky");
     let used = wanted.unwrap_or(gain.pays());
-    let found = settled.filter(|_| used).map(|(grid, count)| Windows::new(grid, slots, &windows[..count]));
+    let found = settled
+        .filter(|_| used)
+        .map(|(grid, count)| EnvironmentVisibility::new(grid, slots, &windows[..count]));
     if found.is_none() {
         memory.give_back("windows");
     }
     Ok((
-        lights.with_windows(found),
+        lights.with_visibility(found),
         WindowUse { used: found.is_some(), gain: Some(gain), lacks_memory: false },
     ))
 }

@@ -5,7 +5,7 @@ use super::watch::Watch;
 use super::{RenderError, regions};
 use halflight_core::Level;
 use halflight_core::bsdf::Features;
-use halflight_core::bvh::{Bvh, Join};
+use halflight_core::bvh::{Bvh, ForkJoin};
 use halflight_core::estimate::{
     BLOCKS, BiasEstimate, BlockNoise, ErrorEstimate, Lookalikes, TileBlur, TileError, TileLight,
 };
@@ -232,7 +232,7 @@ impl<'w> Workers<'w> {
 /// Forks on the pool that runs it.
 struct Fork;
 
-impl Join for Fork {
+impl ForkJoin for Fork {
     fn join(&self, a: impl FnOnce() + Send, b: impl FnOnce() + Send) {
         rayon::join(a, b);
     }

@@ -5,7 +5,7 @@ use glam::{DVec3, Vec3};
 use halflight_core::Rgb;
 use halflight_core::bvh::brute::intersect;
 use halflight_core::geometry::Ray;
-use halflight_core::light::Lights;
+use halflight_core::light::LightSampler;
 use halflight_core::memory::{Arena, Line};
 use halflight_core::sampling::{Random, warp};
 use halflight_core::scene::{Camera, Material, Mesh, Scene, Texture, Triangle};
@@ -112,13 +112,13 @@ impl Stage {
     }
 
     /// Calls `use_them` with the lights, built in an arena of exactly the stated bytes.
-    pub(crate) fn with_lights<T>(&self, use_them: impl FnOnce(&Scene, &Lights) -> T) -> T {
+    pub(crate) fn with_lights<T>(&self, use_them: impl FnOnce(&Scene, &LightSampler) -> T) -> T {
         let scene = self.scene();
-        let bytes = Lights::footprint(&scene).and(Lights::scratch(&scene)).bytes();
+        let bytes = LightSampler::footprint(&scene).and(LightSampler::scratch(&scene)).bytes();
         let mut lines = vec![Line([0; 64]); bytes / 64];
         let mut arena = Arena::new(bytemuck::cast_slice_mut(&mut lines));
-        let lights = Lights::build(&scene, &mut arena).expect("the footprint is what the build takes");
-        assert_eq!(arena.available(), Lights::scratch(&scene).bytes(), "what is kept is the footprint");
+        let lights = LightSampler::build(&scene, &mut arena).expect("the footprint is what the build takes");
+        assert_eq!(arena.available(), LightSampler::scratch(&scene).bytes(), "what is kept is the footprint");
         use_them(&scene, &lights)
     }
 

@@ -22,7 +22,7 @@ pub use report::{KnnReport, KnnRival, Speed};
 use super::{BenchError, REPETITIONS, median};
 use core::hint::black_box;
 use halflight_core::Level;
-use halflight_core::bvh::{Join, Serial};
+use halflight_core::bvh::{ForkJoin, Serial};
 use halflight_core::photon::Photons;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use std::time::Instant;
@@ -186,7 +186,7 @@ impl Two {
     }
 }
 
-impl Join for Two {
+impl ForkJoin for Two {
     fn join(&self, a: impl FnOnce() + Send, b: impl FnOnce() + Send) {
         rayon::join(a, b);
     }

@@ -3,9 +3,11 @@
 use super::{Data, Searcher, Surfel, Task};
 use crate::bench::BenchError;
 use glam::Vec3;
-use halflight_core::bvh::Join;
+use halflight_core::bvh::ForkJoin;
 use halflight_core::memory::{Arena, Footprint, Line, OutOfMemory};
-use halflight_core::photon::{Density, Disc, Falloff, Neighbours, Photon, PhotonMap, Photons, Turn, Uniform};
+use halflight_core::photon::{
+    Density, Disc, Falloff, Neighbours, Photon, PhotonMap, Photons, QueryOrder, Uniform,
+};
 use halflight_core::{Level, Rgb};
 
 /// Photons as a renderer has them when it builds: as records, in the order in which they were shot.
@@ -18,7 +20,7 @@ pub(super) fn records(photons: &[Surfel]) -> Vec<Photon> {
 pub(super) fn build<'m>(
     records: &[Photon],
     memory: &'m mut Vec<Line>,
-    join: &impl Join,
+    join: &impl ForkJoin,
 ) -> Result<PhotonMap<'m>, BenchError> {
     *memory = lines(Photons::footprint(records.len()))?;
     let mut photons = Photons::new(records.len(), &mut Arena::new(bytemuck::cast_slice_mut(memory)))?;
@@ -82,7 +84,7 @@ impl Searcher for Singly<'_> {
 impl Searcher for Together<'_> {
     fn run(&mut self, task: Task, data: &Data) -> Result<u64, BenchError> {
         let queries = task.queries(data);
-        let mut turns = vec![Turn::default(); queries.len()];
+        let mut turns = vec![QueryOrder::default(); queries.len()];
         let mut found = 0;
         match task {
             Task::Nearest { k, radius } => {

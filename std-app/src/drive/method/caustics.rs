@@ -17,7 +17,7 @@ use crate::drive::memory::Memory;
 use crate::drive::{RenderError, Reuse};
 use halflight_core::bsdf::Features;
 use halflight_core::census::Census;
-use halflight_core::light::{Emission, Lights, Worth};
+use halflight_core::light::{Emission, LightSampler, Worth};
 use halflight_core::memory::{Arena, Footprint, Line};
 use halflight_core::photon::Photons;
 use halflight_core::transport::caustics::{CausticShooter, Find, PATHS, ROOM};
@@ -67,7 +67,7 @@ pub(super) fn scratch<F: Features>() -> Footprint {
 }
 
 /// Memory of a look.
-pub(super) fn footprint(lights: &Lights) -> Footprint {
+pub(super) fn footprint(lights: &LightSampler) -> Footprint {
     let guide = Worth::guide_footprint(lights);
     Emission::footprint(lights).and(guide).and(Worth::footprint(lights)).and(guide).and(guide)
 }
@@ -78,7 +78,7 @@ pub(super) fn least_photons() -> usize {
 }
 
 /// Whether there is memory for a look, and for a few photons after it.
-pub(super) fn has_memory(memory: &Memory, lights: &Lights, others: usize) -> bool {
+pub(super) fn has_memory(memory: &Memory, lights: &LightSampler, others: usize) -> bool {
     memory.has((footprint(lights).bytes() + least_photons()).saturating_add(others))
 }
 

@@ -45,7 +45,7 @@ use super::{RenderError, Reuse, Settings};
 use crate::save::Patience;
 use halflight_core::bsdf::Features;
 use halflight_core::bvh::Bvh;
-use halflight_core::light::Lights;
+use halflight_core::light::LightSampler;
 use halflight_core::scene::Scene;
 use halflight_core::transport::{Discs, Images, Merging, PathSettings, PathTracer};
 
@@ -171,7 +171,7 @@ impl Method {
 pub(super) struct Stage<'a> {
     pub(super) scene: &'a Scene<'a>,
     pub(super) bvh: &'a Bvh<'a>,
-    pub(super) lights: &'a Lights<'a>,
+    pub(super) lights: &'a LightSampler<'a>,
     pub(super) images: Images<'a>,
     pub(super) settings: &'a Settings,
     pub(super) workers: &'a Workers<'a>,

@@ -11,7 +11,7 @@ use crate::drive::run::path_settings;
 use crate::drive::workers::Workers;
 use crate::drive::{RenderError, Settings};
 use halflight_core::bsdf::Features;
-use halflight_core::light::{Emission, Lights};
+use halflight_core::light::{Emission, LightSampler};
 use halflight_core::memory::{Arena, Footprint, Line};
 use halflight_core::photon::{Falloff, MapShape, Photon, PhotonMap, Photons};
 use halflight_core::transport::maps::{
@@ -241,7 +241,7 @@ impl<'a> Laboratory<'a> {
     }
 
     /// Bytes of the smallest maps of what was reflected, of both halves.
-    pub(super) fn least_bytes(lights: &Lights) -> usize {
+    pub(super) fn least_bytes(lights: &LightSampler) -> usize {
         Emission::footprint(lights).bytes().saturating_add(2 * bytes(1, 0))
     }
 

@@ -23,7 +23,7 @@ const STEEPEST: f32 = 0.5;
 
 /// Where to look.
 #[derive(Clone, Copy, Debug)]
-pub struct Site {
+pub struct ClearanceQuery {
     /// The middle.
     pub place: Vec3,
     /// Whose z axis is the normal.
@@ -38,7 +38,7 @@ pub struct Site {
 
 /// What is there.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Survey {
+pub struct Clearance {
     /// Something may be above the plane.
     pub rises: bool,
     /// Something may be above the place, across the plane: then nothing else was looked at.
@@ -47,24 +47,24 @@ pub struct Survey {
     pub surface: u32,
 }
 
-impl Survey {
+impl Clearance {
     /// Nothing rises, and the surface is all there.
-    pub const OPEN: Survey = Survey { rises: false, hangs: false, surface: (1 << POINTS) - 1 };
+    pub const OPEN: Clearance = Clearance { rises: false, hangs: false, surface: (1 << POINTS) - 1 };
 }
 
 impl Bvh<'_> {
-    /// What lies around `site`.
-    pub fn survey(&self, site: &Site) -> Survey {
-        let (lo, hi) = (site.place - Vec3::splat(site.reach), site.place + Vec3::splat(site.reach));
-        let mut survey = Survey { rises: false, hangs: false, surface: 0 };
+    /// What lies around `query`.
+    pub fn clearance(&self, query: &ClearanceQuery) -> Clearance {
+        let (lo, hi) = (query.place - Vec3::splat(query.reach), query.place + Vec3::splat(query.reach));
+        let mut clearance = Clearance { rises: false, hangs: false, surface: 0 };
         let is_whole = self.overlapping(lo, hi, |corners| {
-            site.meet(corners, &mut survey);
-            !survey.hangs
+            query.meet(corners, &mut clearance);
+            !clearance.hangs
         });
         if !is_whole {
-            (survey.rises, survey.hangs) = (true, true);
+            (clearance.rises, clearance.hangs) = (true, true);
         }
-        survey
+        clearance
     }
 
     /// Calls `visit` with the triangles whose leaves overlap a box, as long as it says yes. `false` where the
@@ -120,10 +120,10 @@ fn bits(lanes: [u32; 8]) -> u32 {
     lanes.iter().rev().fold(0, |bits, lane| bits << 1 | lane)
 }
 
-impl Site {
+impl ClearanceQuery {
     /// Takes note of one triangle.
     #[inline]
-    fn meet(&self, corners: [Vec3; 3], survey: &mut Survey) {
+    fn meet(&self, corners: [Vec3; 3], clearance: &mut Clearance) {
         let [a, b, c] = corners;
         let from = a.min(b).min(c) - self.place;
         let to = a.max(b).max(c) - self.place;
@@ -134,11 +134,11 @@ impl Site {
         // What is not a number rises.
         let is_low = |corner: Vec3| corner.z <= 0.0;
         if !(is_low(a) && is_low(b) && is_low(c)) {
-            survey.rises = true;
+            clearance.rises = true;
             let normal = (b - a).cross(c - a);
             let is_steep = normal.z.abs() < STEEPEST * normal.length();
             let passes_below = normal.dot(a) / normal.z <= STEP * self.reach;
-            survey.hangs |= !(is_steep || passes_below);
+            clearance.hangs |= !(is_steep || passes_below);
             return;
         }
         // Twice the areas that a point makes with the sides, which are linear in it; and what these are in weights of
@@ -152,6 +152,6 @@ impl Site {
             let height = (u * a.z + v * b.z + w * c.z).abs();
             *surface = u32::from(inside & (height <= self.depth * (u + v + w).abs()));
         }
-        survey.surface |= bits(surface);
+        clearance.surface |= bits(surface);
     }
 }

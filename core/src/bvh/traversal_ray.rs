@@ -10,7 +10,7 @@ use halflight_simd::kernels::triangles::{Shear, ShearRay8};
 /// All that a step wants to know of a ray, in one cache line.
 #[derive(Clone, Copy)]
 #[repr(C, align(64))]
-pub(super) struct Ready {
+pub(super) struct TraversalRay {
     pub origin: [f32; 3],
     /// The farthest that it still looks.
     pub t_max: f32,
@@ -26,9 +26,9 @@ pub(super) struct Ready {
     pub index: u32,
 }
 
-impl Ready {
+impl TraversalRay {
     /// No ray.
-    pub(super) const NONE: Ready = Ready {
+    pub(super) const NONE: TraversalRay = TraversalRay {
         origin: [0.0; 3],
         t_max: -1.0,
         reciprocal: [0.0; 3],
@@ -135,7 +135,11 @@ mod tests {
                     let direction = [x, y, z];
                     let ray = Ray { origin: [1.0, 2.0, 3.0], t_max: 1.0, direction, tag: u32::MAX };
                     if traceable(&ray) {
-                        assert_eq!(Ready::new(&ray, 0).shear(), Shear::new(direction), "{direction:?}");
+                        assert_eq!(
+                            TraversalRay::new(&ray, 0).shear(),
+                            Shear::new(direction),
+                            "{direction:?}"
+                        );
                     }
                 }
             }
