@@ -1,5 +1,5 @@
 //! Rooms that are hard for an irradiance cache: its pictures against those of the path tracer where a wall is thin, where
-//! nothing reflects, where all light comes from one spot, and where a needle stands in the way.
+//! nothing reflects, where all light comes from one small place, and where a needle stands in the way.
 
 use glam::Vec3;
 use halflight::drive::Method;
@@ -94,46 +94,22 @@ fn a_black_room_is_black_but_for_what_is_not() {
     agrees(&buffers.scene(), 0.02, 0.25);
 }
 
-/// The spot fills a hundredth of a hemisphere, so few of the 256 rays of a record.
+/// It fills a hundredth of a hemisphere, so few of the 256 rays of a record.
 #[test]
-fn one_bright_spot_lights_a_room() {
+fn one_bright_place_lights_a_room() {
     let mut buffers = room(0.5);
     lamp(&mut buffers, Vec3::new(0.1, 0.6, 0.6), Vec3::NEG_X, 0.05, 1e3);
     agrees(&buffers.scene(), 0.02, 0.25);
 }
 
-/// A lamp so near a wall that what it lights is the share of a ray, or a fifth of it: records that meet it by chance are
-/// too bright by as much, all others too dark (worst blocks of 2.5 and 4.3 before). Path tracing hardly finds it
-/// either, so that small blocks are compared with those of records of 4096 rays, and large ones with its picture.
+/// The first records have nothing but paths, whose light is luck where it comes by many bounces: they are gathered again when
+/// there are others.
 #[test]
-fn spots_smaller_than_the_share_of_a_ray_light_a_room() {
-    for size in [0.01, 0.005] {
-        let mut buffers = room(0.5);
-        lamp(&mut buffers, Vec3::new(2.0 * size, 0.6, 0.6), Vec3::NEG_X, size, 2.5 / (size * size));
-        let scene = buffers.scene();
-        let [few, many] = [16, 64].map(|strata| {
-            render(&scene, Method::IrradianceCache, SIZE, 64, |settings| settings.cache.strata = Some(strata))
-                .image
-        });
-        let [ratio, worst] = compared(&few, &many, 4);
-        assert!((ratio - 1.0).abs() < 0.04 && worst < 0.5, "mean {ratio}, worst block {worst}");
-        let [ratio, worst] = compared(&few, &picture(&scene, Method::Path, 1024), 16);
-        assert!((ratio - 1.0).abs() < 0.05 && worst < 0.3, "mean {ratio}, worst block {worst}");
-    }
-}
-
-/// The top of a box under the lamp is bright, and many rays of a record meet it: aiming at it, which takes as many
-/// rays again, is not worth it. And the first records have nothing but paths, whose light is luck where it comes by many bounces:
-/// they are gathered again when there are others.
-#[test]
-fn what_many_rays_meet_is_no_spot_and_the_first_records_are_gathered_again() {
+fn the_first_records_are_gathered_again() {
     let result = render(&cornell_box().scene(), Method::IrradianceCache, SIZE, 1, |settings| {
         settings.cache.strata = Some(16);
     });
     let cache = result.cache.expect("a cache");
-    let rays = result.counters.rays as f64 / (256 * cache.gathered) as f64;
-    // 2.1 was measured, and 3.6 where it is aimed at.
-    assert!(rays < 2.7, "{rays} rays for one that is gathered");
     let again = cache.gathered as f64 / cache.records as f64 - 1.0;
     assert!((0.05..0.5).contains(&again), "{again} of them");
 }

@@ -248,6 +248,17 @@ fn warps_have_their_densities() {
     assert_eq!(sin_cos_turns(0.25), (1.0, 0.0));
 }
 
+#[test]
+fn points_of_the_disk_find_where_they_came_from() {
+    let random = Random::new(7, 8);
+    for i in 0..1000 {
+        let u = [random.single(2 * i), random.single(2 * i + 1)];
+        let found = warp::concentric_square(warp::concentric_disk(u));
+        assert!((0..2).all(|k| (found[k] - u[k]).abs() < 1e-5), "{u:?} {found:?}");
+    }
+    assert_eq!(warp::concentric_square(glam::Vec2::ZERO), [0.5; 2]);
+}
+
 fn memory(bytes: usize) -> Vec<Line> {
     vec![Line([0; 64]); bytes / 64]
 }

@@ -126,8 +126,7 @@ fn a_gathering_does_not_know_what_its_memory_was() {
                 let mut scratch = lines(PathTracer::<All>::gather_scratch(n));
                 scratch.fill(Line([left_over; 64]));
                 let mut arena = Arena::new(bytemuck::cast_slice_mut(&mut scratch));
-                let record =
-                    tracer.gather(place, 0, &gathering, &mut arena, &mut Counters::default(), &mut []);
+                let record = tracer.gather(place, 0, &gathering, &mut arena, &mut Counters::default());
                 record.unwrap().unwrap()
             };
             assert_eq!(gather(0), gather(1), "{n}");

@@ -7,7 +7,6 @@
 use super::estimator::{Counters, dimension};
 use super::path::{PathTracer, WAVE};
 use super::reuse::Exchange;
-use super::spots::{Glint, LOOK};
 use super::wave::{Path, Share, Wave};
 use crate::bsdf::Features;
 use crate::bvh::Coherence;
@@ -142,8 +141,6 @@ pub(super) struct Strata<'m> {
     pub(super) radiance: &'m mut [[f32; 3]],
     pub(super) inverse_distance: &'m mut [f32],
     pub(super) directions: &'m mut [[f32; 3]],
-    /// What is seen in the cone of a spot.
-    pub(super) aimed: &'m mut [[f32; 3]],
     /// Of what is seen, local; empty where the metric does not ask for them.
     normals: &'m mut [[f32; 3]],
     /// How many of them see light directly.
@@ -154,7 +151,7 @@ impl<'m> Strata<'m> {
     fn footprint(n: usize) -> Footprint {
         let strata = n.saturating_mul(n);
         let triples = Footprint::default().slice::<[f32; 3]>(strata);
-        triples.and(triples).and(triples).and(triples).slice::<f32>(strata)
+        triples.and(triples).and(triples).slice::<f32>(strata)
     }
 
     fn new(n: usize, normals: bool, arena: &mut Arena<'m>) -> Result<Self, OutOfMemory> {
@@ -164,7 +161,6 @@ impl<'m> Strata<'m> {
             radiance: arena.slice(strata)?,
             inverse_distance: arena.slice(strata)?,
             directions: arena.slice(strata)?,
-            aimed: arena.slice(strata)?,
             normals: arena.slice(if normals { strata } else { 0 })?,
             shining: 0,
         })
@@ -179,11 +175,11 @@ impl<'m> Strata<'m> {
 impl<F: Features> PathTracer<'_, F> {
     /// Working memory of [`PathTracer::gather`] with n × n strata.
     pub fn gather_scratch(n: usize) -> Footprint {
-        Wave::footprint(n.saturating_mul(n).clamp(LOOK * LOOK, WAVE)).and(Strata::footprint(n))
+        Wave::footprint(n.saturating_mul(n).min(WAVE)).and(Strata::footprint(n))
     }
 
-    /// Gathers at `place`. `number` names the gathering: another one, other rays. Of what its rays meet the brightest is
-    /// left in `glints`. `None` where what was found is not a number; it is counted as dropped.
+    /// Gathers at `place`. `number` names the gathering: another one, other rays. `None` where what was
+    /// found is not a number; it is counted as dropped.
     ///
     /// # Errors
     /// [`OutOfMemory`] where `scratch` has less than [`PathTracer::gather_scratch`].
@@ -194,7 +190,6 @@ impl<F: Features> PathTracer<'_, F> {
         gathering: &Gathering,
         scratch: &mut Arena,
         counters: &mut Counters,
-        glints: &mut [Glint],
     ) -> Result<Option<Record>, OutOfMemory> {
         let Gathering { flux, metric, least_pixels } = *gathering;
         let n = flux.n();
@@ -225,11 +220,7 @@ impl<F: Features> PathTracer<'_, F> {
             }
             first += count;
         }
-        strata.glints(place, &frame, number, glints);
-        self.leave_out_spots(place, &frame, &mut strata);
-        let mut variance = strata.hemisphere().map_or(0.0, |hemisphere| hemisphere.variance());
-        variance += self.look_at_spots(place, &frame, number, &mut wave, &mut strata, counters);
-
+        let variance = strata.hemisphere().map_or(0.0, |hemisphere| hemisphere.variance());
         let derivatives = strata.hemisphere().and_then(|h| metric.metric.derivatives(self.level, flux, &h));
         let Some(derivatives) = derivatives.filter(|found| found.irradiance.is_finite()) else {
             counters.dropped.nan += 1;

@@ -33,7 +33,6 @@ mod reuse;
 mod shadow;
 pub mod shoot;
 pub mod sight;
-pub mod spots;
 mod wave;
 
 pub use density::PhotonLight;

@@ -33,7 +33,6 @@ use super::merge::{ChainLink, Merging, ends_chain};
 use super::reuse::Exchange;
 use super::shadow::{FEW, Shadows, pass_cutout, passing, shadow_ray};
 use super::shoot::is_varnished;
-use super::spots::{Cones, Spot};
 use super::wave::{Merged, Path, Share, Wave};
 use crate::bsdf::{Bsdf, Features};
 use crate::bvh::{Bvh, Coherence};
@@ -85,7 +84,6 @@ pub struct PathTracer<'a, F> {
     merging: Option<Merging<'a>>,
     /// Light that was reflected before, where caches do not know it: of even and of odd samples.
     pub(super) bounced: Option<[GatherLight<'a>; 2]>,
-    pub(super) spots: &'a [Spot],
     /// Points of lights that paths of the picture ask where a shadow ray alone finds direct light.
     pub(super) asked: u32,
     /// Tile by tile, or none.
@@ -122,7 +120,6 @@ impl<'a, F: Features> PathTracer<'a, F> {
             maps: None,
             merging: None,
             bounced: None,
-            spots: &[],
             asked: 1,
             edges: &[],
             images: Images::default(),
@@ -147,12 +144,6 @@ impl<'a, F: Features> PathTracer<'a, F> {
     /// light from photons that were reflected before: even samples from the first, odd ones from the second.
     pub fn with_bounced(&self, photons: [GatherLight<'a>; 2]) -> Self {
         Self { bounced: Some(photons), ..*self }
-    }
-
-    /// The same, where rays that gather for a cache aim at `spots`, and so do paths that go on from what they meet. Paths of
-    /// the picture would, too.
-    pub fn with_spots(&self, spots: &'a [Spot]) -> Self {
-        Self { spots, ..*self }
     }
 
     /// The same, where a path of the picture asks so many points of lights, [`LIGHTS`] at most, at a vertex whose other light a
@@ -483,10 +474,6 @@ impl<'a, F: Features> PathTracer<'a, F> {
             points = if ends || scene.environment.is_some() { path.lights.max(1).into() } else { 1 };
         }
 
-        let cones = match bsdf {
-            Bsdf::Diffuse(_) if indirect.is_none() => Cones::around(self.spots, point.position, normal),
-            _ => None,
-        };
         if !self.lights.is_empty() && !bsdf.is_delta() && (!said.is_lit || apart) {
             // What transmits is looked at from both sides, a window from one.
             let aim = aim.filter(|_| normal != Vec3::ZERO);
@@ -506,7 +493,7 @@ impl<'a, F: Features> PathTracer<'a, F> {
                     if !point.sides_agree(wi, sample.direction) {
                         return None;
                     }
-                    let ([(mut f, mut pdf), coat], is_rough) = match apart {
+                    let ([(mut f, pdf), coat], is_rough) = match apart {
                         true => (bsdf.evaluate_apart::<F>(wo, wi), true),
                         false => ([bsdf.evaluate::<F>(wo, wi), (Rgb::ZERO, 0.0)], ends_chain(&bsdf)),
                     };
@@ -517,9 +504,6 @@ impl<'a, F: Features> PathTracer<'a, F> {
                         return None;
                     }
                     let shadow = shadow_ray(point, &sample)?;
-                    if let Some(cones) = &cones {
-                        pdf = cones.density(sample.direction, pdf);
-                    }
                     let alone = sample.delta || ends;
                     let each = 1.0 / points as f32;
                     let weigh = |pdf: f32| match alone {
@@ -596,13 +580,9 @@ impl<'a, F: Features> PathTracer<'a, F> {
 
         let [u, v] = dimension::scattering(&sampler, segments);
         let lobe = if F::GLOSSY || F::DIELECTRIC { sampler.single(first + dimension::LOBE) } else { 0.0 };
-        let (sample, is_narrow) = match &cones {
-            _ if apart => bsdf.sample_apart::<F>(wo, [u, v, lobe])?,
-            Some(cones) => {
-                let lobe = sampler.single(first + dimension::LOBE);
-                (cones.sample::<F>(&bsdf, &point.frame, [u, v], lobe)?, false)
-            }
-            None => bsdf.sample::<F>(wo, [u, v, lobe]).map(|sample| (sample, sample.delta))?,
+        let (sample, is_narrow) = match apart {
+            true => bsdf.sample_apart::<F>(wo, [u, v, lobe])?,
+            false => bsdf.sample::<F>(wo, [u, v, lobe]).map(|sample| (sample, sample.delta))?,
         };
         // What a narrow coat reflects was not gathered.
         if reflected.is_some() && !is_narrow {
@@ -630,9 +610,7 @@ impl<'a, F: Features> PathTracer<'a, F> {
         }
         path.eta_squared *= sample.eta * sample.eta;
         let worth = exchange.worth(throughput) * path.eta_squared;
-        // What leads to a spot brings much light, little as it carries.
-        let is_aimed = cones.is_some_and(|cones| cones.hold(direction));
-        let survival = if certain || is_aimed { 1.0 } else { survival(segments, worth) };
+        let survival = if certain { 1.0 } else { survival(segments, worth) };
         if survival < 1.0 {
             if sampler.single(first + dimension::ROULETTE) >= survival {
                 return None;

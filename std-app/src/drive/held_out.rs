@@ -76,8 +76,7 @@ pub(super) fn held_out<F: Features>(
         for repeat in 0..repeats {
             // Numbers that no record has.
             let number = 1 << 29 | (repeats * task as u32 + repeat);
-            let Some(record) = tracer.gather(place, number, &gathering, arena, &mut counters, &mut [])?
-            else {
+            let Some(record) = tracer.gather(place, number, &gathering, arena, &mut counters)? else {
                 return Ok(counters);
             };
             found.push(luminance(record.irradiance.into()));

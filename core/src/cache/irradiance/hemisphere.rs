@@ -98,7 +98,7 @@ impl<'a> Hemisphere<'a> {
 
 /// The squares of second differences of luminance along rows of `side` values, summed; and how many there are. Where values
 /// are independent their mean is six times the variance of each.
-pub(crate) fn second_differences(values: &[[f32; 3]], side: usize) -> [f32; 2] {
+fn second_differences(values: &[[f32; 3]], side: usize) -> [f32; 2] {
     let (mut squares, mut count) = (0.0, 0usize);
     for row in values.chunks_exact(side.max(1)) {
         let mut sum = 0.0;

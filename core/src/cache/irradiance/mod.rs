@@ -12,7 +12,6 @@ mod record;
 mod store;
 
 pub use derivatives::{CellFlux, Derivatives, Hessian};
-pub(crate) use hemisphere::second_differences;
 pub use hemisphere::{Hemisphere, SIDE_MAX};
 pub use lanes::Asker;
 pub use metric::{Metric, Reach, reach};

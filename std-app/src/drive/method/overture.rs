@@ -4,14 +4,11 @@
 
 use crate::drive::RenderError;
 use crate::drive::crew::Crew;
-use crate::drive::held_out::luminance;
-use core::f64::consts::FRAC_1_PI;
 use halflight_core::bsdf::Features;
 use halflight_core::cache::irradiance::{CellFlux, IrradianceCache, Record};
 use halflight_core::memory::{Arena, Line};
 use halflight_core::transport::gather::{Gathering, Place};
 use halflight_core::transport::overture::{Order, PIXELS, Sight};
-use halflight_core::transport::spots::{Glint, Spot};
 use halflight_core::transport::{Counters, PathTracer};
 
 /// It looks at every other pixel of every other row: what lies between is reached from there, or path traced.
@@ -40,24 +37,6 @@ const WIDER: f32 = 1.3;
 const WIDEST: f32 = 6.0;
 const NEARLY_ALL: f64 = 0.98;
 
-/// Glints that are kept of each record, and looked at closely of each batch; how many of these may be no spots.
-const GLINTS: usize = 4;
-const LOOKS: usize = 8;
-const MOST_IN_VAIN: usize = 32;
-
-/// A glint is a ray that brings this share of all that records have in the mean.
-const GLINT: f64 = 0.05;
-
-/// All spots together take as many rays as strata. One that makes less than so many times the variance of a diffuse
-/// scene, which is about 1 / strata², would be looked at for nothing.
-const WORTH: f64 = 4.0;
-
-/// Spots that are aimed at, at most.
-const MOST_SPOTS: usize = 8;
-
-/// How often an overture begins anew because of a spot.
-const MOST_ATTEMPTS: u32 = 4;
-
 /// A cache that is being filled.
 pub(in crate::drive) struct Growing<'a> {
     pub(in crate::drive) cache: IrradianceCache<'a>,
@@ -72,13 +51,6 @@ pub(in crate::drive) struct Growing<'a> {
     before: usize,
     /// Places at which it has gathered.
     pub(super) gathered: u32,
-    pub(super) spots: Vec<Spot>,
-    /// Spots that are not worth rays of their own.
-    dismissed: Vec<Spot>,
-    /// Glints that were none.
-    in_vain: usize,
-    /// How often it began anew.
-    attempts: u32,
     /// Records of a file, or of before a refinement.
     loaded: usize,
     /// Rays for each path, of each of the records that came then.
@@ -87,27 +59,14 @@ pub(in crate::drive) struct Growing<'a> {
     pub(super) places: Vec<Place>,
     /// Whether it was looked again at the records that are worth it.
     is_seen_again: bool,
-    /// Sum of the radiance that records see in the mean, and how many.
-    light: (f64, u32),
 }
 
 /// What came of gathering at a place.
 #[derive(Clone, Default)]
 struct Found {
     record: Option<Record>,
-    glints: [Glint; GLINTS],
     /// Rays for each path.
     effort: f32,
-}
-
-/// How gathering at some places ended.
-enum Gathered {
-    /// There are records of them.
-    All,
-    /// The round is over.
-    Cut,
-    /// All begins anew.
-    Nothing,
 }
 
 impl<'a> Growing<'a> {
@@ -121,15 +80,10 @@ impl<'a> Growing<'a> {
             sweeps: 0,
             before: 0,
             gathered: 0,
-            spots: Vec::new(),
-            dismissed: Vec::new(),
-            in_vain: 0,
-            attempts: 0,
             loaded: 0,
             efforts: Vec::new(),
             places: Vec::new(),
             is_seen_again: false,
-            light: (0.0, 0),
         }
     }
 
@@ -203,24 +157,6 @@ impl<'a> Growing<'a> {
         })
     }
 
-    fn is_known(&self, glint: &Glint) -> bool {
-        self.spots.iter().chain(&self.dismissed).any(|spot| spot.holds(glint.position.into()))
-    }
-
-    /// Forgets the records that did not know of all spots, but for those of a file or of before a refinement; whether
-    /// there were any. Not again and again.
-    fn begins_anew(&mut self) -> bool {
-        if self.cache.records().len() == self.loaded || self.attempts == MOST_ATTEMPTS {
-            return false;
-        }
-        let loaded = self.cache.records().get(..self.loaded).unwrap_or_default().to_vec();
-        self.cache.restore(&loaded);
-        self.begin();
-        self.light = (0.0, 0);
-        self.attempts += 1;
-        true
-    }
-
     /// Forgets the records that were gathered before there were others. By their rays, and not by what they found, so that
     /// no light is preferred.
     fn forget_lonely(&mut self) {
@@ -234,34 +170,6 @@ impl<'a> Growing<'a> {
         let (records, places): (Vec<Record>, _) = kept.unzip();
         self.cache.restore(&records);
         self.places = places;
-    }
-
-    /// The radiance that records see in the mean, those of `found` as well.
-    fn mean_light(&self, found: &[Found]) -> f64 {
-        let lights = found.iter().flat_map(|found| &found.record).map(light);
-        let (sum, count) = lights.fold(self.light, |(sum, count), light| (sum + light, count + 1));
-        sum / f64::from(count.max(1))
-    }
-
-    /// Whether what the rays of `found` meet of a spot by chance makes much of the noise of their records.
-    fn is_worth_its_rays(&self, spot: &Spot, found: &[Found], strata: usize) -> bool {
-        let glints = found.iter().flat_map(|found| &found.glints);
-        let met = glints.filter(|glint| spot.holds(glint.position.into()));
-        let squares: f64 = met.map(|glint| f64::from(glint.light).powi(2)).sum();
-        let noise = strata as f64 * self.mean_light(found);
-        squares > WORTH * noise * noise * found.len() as f64
-    }
-
-    /// Glints of no known spot that are worth a closer look, each with the number of its place; the brightest first.
-    fn glints(&self, found: &[Found], strata: usize) -> Vec<(usize, Glint)> {
-        let least = GLINT * (strata * strata) as f64 * self.mean_light(found);
-        let all = found.iter().enumerate().flat_map(|(i, found)| found.glints.map(|glint| (i, glint)));
-        let mut glints: Vec<_> =
-            all.filter(|(_, glint)| f64::from(glint.light) > least && !self.is_known(glint)).collect();
-        glints.sort_by(|(_, a), (_, b)| b.light.total_cmp(&a.light));
-        let left = if self.spots.len() < MOST_SPOTS { MOST_IN_VAIN.saturating_sub(self.in_vain) } else { 0 };
-        glints.truncate(LOOKS.min(left));
-        glints
     }
 
     /// Whether nothing is to be gathered at `place`: a record of fewer than so many pixels serves no other.
@@ -293,7 +201,7 @@ impl<F: Features> Overture<'_, '_, F> {
         let order = Order::new(width, height, STRIDE);
         // Where depth is limited only what is seen asks for records.
         let has_rough = self.tracer.has_rough_surfaces() && !self.tracer.is_limited();
-        'looks: while let Some(sight) = growing.look()
+        while let Some(sight) = growing.look()
             && !growing.is_finished()
         {
             if growing.next >= order.len() {
@@ -310,10 +218,8 @@ impl<F: Features> Overture<'_, '_, F> {
                 let [fewest, most] = GATHERED;
                 let most = (growing.cache.records().len() / GATHERED_PART).clamp(fewest, most);
                 let batch: Vec<Place> = missing.drain(..missing.len().min(most)).collect();
-                match self.gather(&batch, growing, crew, scratch)? {
-                    Gathered::All => (),
-                    Gathered::Cut => return Ok(false),
-                    Gathered::Nothing => continue 'looks,
+                if !self.gather(&batch, growing, crew, scratch)? {
+                    return Ok(false);
                 }
             }
             growing.next += LOOKED_AT as u64;
@@ -404,92 +310,43 @@ impl<F: Features> Overture<'_, '_, F> {
         Ok(is_done.then_some(places))
     }
 
-    /// Gathers at all of `places`, again where spots are found, then commits the records in their order.
+    /// Gathers at all of `places`, then commits the records in their order; whether that is done: not where the round is
+    /// over.
     fn gather(
         &self,
         places: &[Place],
         growing: &mut Growing,
         crew: &mut Crew,
         scratch: &mut [Vec<Line>],
-    ) -> Result<Gathered, RenderError> {
+    ) -> Result<bool, RenderError> {
         let gathering = match growing.sight {
             Some(Sight::Rough) => Gathering { flux: self.coarse, ..self.gathering },
             _ => self.gathering,
         };
-        loop {
-            // What a gather ray meets may be lit by the cache already.
-            let tracer = self.tracer.with_growing_cache(&growing.cache).with_spots(&growing.spots);
-            let mut all = vec![Found::default(); places.len()];
-            let task = |task: usize, arena: &mut Arena, out: &mut [Found]| {
-                let mut counters = Counters::default();
-                if let (Some(Found { record, glints, effort }), Some(place)) =
-                    (out.first_mut(), places.get(task))
-                {
-                    *record = tracer.gather(
-                        place,
-                        growing.number(task),
-                        &gathering,
-                        arena,
-                        &mut counters,
-                        glints,
-                    )?;
-                    *effort = counters.rays as f32 / counters.paths.max(1) as f32;
-                }
-                Ok(counters)
-            };
-            if !crew.pass(&mut all, 1, scratch, &task)? {
-                return Ok(Gathered::Cut);
+        // What a gather ray meets may be lit by the cache already.
+        let tracer = self.tracer.with_growing_cache(&growing.cache);
+        let mut all = vec![Found::default(); places.len()];
+        let gather = |task: usize, arena: &mut Arena, out: &mut [Found]| {
+            let mut counters = Counters::default();
+            if let (Some(found), Some(place)) = (out.first_mut(), places.get(task)) {
+                let number = growing.number(task);
+                found.record = tracer.gather(place, number, &gathering, arena, &mut counters)?;
+                found.effort = counters.rays as f32 / counters.paths.max(1) as f32;
             }
-            let strata = gathering.flux.n();
-            let glints = growing.glints(&all, strata);
-            let mut spots = vec![None; glints.len()];
-            let look = |task: usize, arena: &mut Arena, out: &mut [Option<Spot>]| {
-                let mut counters = Counters::default();
-                if let (Some(out), Some((place, glint))) = (out.first_mut(), glints.get(task)) {
-                    *out = tracer.spot_of(glint, &places[*place], strata, arena, &mut counters)?;
-                }
-                Ok(counters)
-            };
-            if !crew.pass(&mut spots, 1, scratch, &look)? {
-                return Ok(Gathered::Cut);
-            }
-            let known = growing.spots.len();
-            for ((_, glint), spot) in glints.iter().zip(spots) {
-                let Some(spot) = spot else {
-                    growing.in_vain += 1;
-                    continue;
-                };
-                // Not twice by two of its glints.
-                if growing.is_known(glint) {
-                    continue;
-                }
-                if !growing.is_worth_its_rays(&spot, &all, strata) {
-                    growing.dismissed.push(spot);
-                } else if growing.spots.len() < MOST_SPOTS {
-                    growing.spots.push(spot);
-                }
-            }
-            if growing.spots.len() > known {
-                if growing.begins_anew() {
-                    return Ok(Gathered::Nothing);
-                }
-                continue;
-            }
-            growing.gathered += places.len() as u32;
-            for (Found { record, effort, .. }, place) in all.into_iter().zip(places) {
-                let Some(record) = record else { continue };
-                growing.light = (growing.light.0 + light(&record), growing.light.1 + 1);
-                if growing.cache.insert(record) {
-                    growing.efforts.push(effort);
-                    growing.places.push(*place);
-                }
-            }
-            return Ok(Gathered::All);
+            Ok(counters)
+        };
+        if !crew.pass(&mut all, 1, scratch, &gather)? {
+            return Ok(false);
         }
+        growing.gathered += places.len() as u32;
+        for (Found { record, effort }, place) in all.into_iter().zip(places) {
+            if let Some(record) = record
+                && growing.cache.insert(record)
+            {
+                growing.efforts.push(effort);
+                growing.places.push(*place);
+            }
+        }
+        Ok(true)
     }
-}
-
-/// The radiance that a record sees in the mean.
-fn light(record: &Record) -> f64 {
-    FRAC_1_PI * luminance(record.irradiance.into())
 }

@@ -68,21 +68,14 @@ impl<F: Features> Overture<'_, '_, F> {
         let strata = self.gathering.flux.n() as f32;
         let times: Vec<f32> = self.finer.iter().map(|flux| (flux.n() as f32 / strata).powi(2)).collect();
         let chosen = choose(&worth, &times);
-        let tracer = self.tracer.with_growing_cache(&growing.cache).with_spots(&growing.spots);
+        let tracer = self.tracer.with_growing_cache(&growing.cache);
         let mut found: Vec<Option<Record>> = vec![None; chosen.len()];
         let gather = |task: usize, arena: &mut Arena, out: &mut [Option<Record>]| {
             let mut counters = Counters::default();
             if let (Some(out), Some((index, flux))) = (out.first_mut(), chosen.get(task)) {
                 let gathering = Gathering { flux: &self.finer[*flux], ..self.gathering };
                 let number = growing.number(task);
-                *out = tracer.gather(
-                    &growing.places[*index],
-                    number,
-                    &gathering,
-                    arena,
-                    &mut counters,
-                    &mut [],
-                )?;
+                *out = tracer.gather(&growing.places[*index], number, &gathering, arena, &mut counters)?;
             }
             Ok(counters)
         };
