@@ -142,8 +142,7 @@ impl WithFeatures for Study<'_> {
                     let settings = metric::Settings { error: looser * search.error, ..usual };
                     let least_pixels = wider * LEAST_PIXELS;
                     let gathering = Gathering { flux: &flux, metric: settings, least_pixels };
-                    let overture =
-                        Overture { tracer: &tracer, gathering, coarse: gathering.flux, finer: &[], size };
+                    let overture = Overture { tracer: &tracer, gathering, coarse: gathering.flux, size };
                     overture.fill(&mut growing, &mut crew, &mut scratch)?;
                     if pass > 0 {
                         growing.refine(Some(0.5));

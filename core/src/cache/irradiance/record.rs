@@ -140,19 +140,6 @@ impl Record {
         }
     }
 
-    /// Takes the irradiance, and its noise, from one that was `found` at the same place with more rays. Derivatives go with it; how
-    /// far it reaches stays what neighbours have made of it.
-    pub fn correct(&mut self, found: &Self) {
-        for (c, new) in found.irradiance.into_iter().enumerate() {
-            let old = core::mem::replace(&mut self.irradiance[c], new);
-            for derivatives in [&mut self.gradient[c], &mut self.rotation[c]] {
-                *derivatives =
-                    derivatives.map(|derivative| if old > 0.0 { derivative / old * new } else { 0.0 });
-            }
-        }
-        (self.noise, self.shining) = (found.noise, found.shining);
-    }
-
     /// The same of radii so many times as large, over which light changes by as much. What hangs over it is
     /// to be looked for.
     pub fn widened(&self, factor: f32) -> Self {
@@ -419,27 +406,6 @@ mod tests {
     }
 
     const LEAST_COS: f32 = 0.98;
-
-    #[test]
-    fn what_is_corrected_keeps_its_shape() {
-        let old = Record {
-            irradiance: [2.0, 0.0, 4.0],
-            gradient: [[1.0, 2.0], [0.0; 2], [4.0, -4.0]],
-            rotation: [[0.5; 2], [0.0; 2], [1.0; 2]],
-            radii: [0.3, 0.4],
-            noise: 0.1,
-            ..Record::default()
-        };
-        let found = Record { irradiance: [3.0, 1.0, 2.0], noise: 0.02, shining: 0.5, radii: [9.0; 2], ..old };
-        let mut new = old;
-        new.correct(&found);
-        assert_eq!(
-            (new.irradiance, new.noise, new.shining, new.radii),
-            ([3.0, 1.0, 2.0], 0.02, 0.5, [0.3, 0.4])
-        );
-        assert_eq!(new.gradient, [[1.5, 3.0], [0.0; 2], [2.0, -2.0]]);
-        assert_eq!(new.rotation, [[0.75; 2], [0.0; 2], [0.5; 2]]);
-    }
 
     #[test]
     fn it_extrapolates_along_its_axes_and_weighs_by_the_tent() {

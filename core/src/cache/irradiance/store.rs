@@ -195,13 +195,6 @@ impl<'m> IrradianceCache<'m> {
         true
     }
 
-    /// See [`Record::correct`], of the record of that number.
-    pub fn correct(&mut self, number: usize, found: &Record) {
-        if let Some(record) = self.records.get_mut(..self.used).and_then(|all| all.get_mut(number)) {
-            record.correct(found);
-        }
-    }
-
     /// Takes `record` in place of that of that number, which stands at the same place. The cache is to be
     /// settled when all are replaced: what is wider is not found before.
     pub fn replace(&mut self, number: usize, record: Record) {

@@ -241,11 +241,6 @@ fn capacity_of(bytes: usize) -> usize {
     IrradianceCache::capacity_of(bytes.saturating_sub(places))
 }
 
-/// Those of more strata than `flux`.
-fn finer_than<'t>(tables: &'t [CellFlux<'t>], flux: &CellFlux) -> &'t [CellFlux<'t>] {
-    tables.get(tables.partition_point(|table| table.n() <= flux.n())..).unwrap_or_default()
-}
-
 /// Strata of half the side, or the next more that there are.
 fn coarser<'t>(tables: &'t [CellFlux<'t>], flux: &'t CellFlux<'t>) -> &'t CellFlux<'t> {
     tables.iter().find(|table| 2 * table.n() >= flux.n()).unwrap_or(flux)
@@ -341,14 +336,7 @@ impl<F: Features> Cached<'_, F> {
             let until = glance.map_or(haste.and_then(|haste| haste.end(i)), |haste| haste.glance());
             let overture = |flux| {
                 let coarse = coarser(tables, flux);
-                let finer = if *is_open { finer_than(tables, flux) } else { &[] };
-                Overture {
-                    tracer: &tracer,
-                    gathering: Gathering { flux, ..*gathering },
-                    coarse,
-                    finer,
-                    size: *size,
-                }
+                Overture { tracer: &tracer, gathering: Gathering { flux, ..*gathering }, coarse, size: *size }
             };
             let mut is_done = crew.hurry(until, |crew| overture(gathering.flux).fill(half, crew, scratch))?;
             if let Some(haste) = glance.filter(|_| !is_done) {

@@ -20,7 +20,6 @@ mod photon_map;
 mod photon_view;
 mod photons;
 mod places;
-mod second_look;
 mod sppm;
 #[cfg(test)]
 mod wrong;

@@ -50,15 +50,13 @@ pub(in crate::drive) struct Growing<'a> {
     sweeps: u32,
     before: usize,
     /// Places at which it has gathered.
-    pub(super) gathered: u32,
+    gathered: u32,
     /// Records of a file, or of before a refinement.
     loaded: usize,
     /// Rays for each path, of each of the records that came then.
     efforts: Vec<f32>,
     /// Of each record; [`Place::NONE`] for those of a file.
-    pub(super) places: Vec<Place>,
-    /// Whether it was looked again at the records that are worth it.
-    is_seen_again: bool,
+    places: Vec<Place>,
 }
 
 /// What came of gathering at a place.
@@ -83,7 +81,6 @@ impl<'a> Growing<'a> {
             loaded: 0,
             efforts: Vec::new(),
             places: Vec::new(),
-            is_seen_again: false,
         }
     }
 
@@ -96,7 +93,7 @@ impl<'a> Growing<'a> {
     }
 
     /// What names the gathering at the next place but `after`.
-    pub(super) fn number(&self, after: usize) -> u32 {
+    fn number(&self, after: usize) -> u32 {
         2 * (self.gathered + after as u32) + self.index
     }
 
@@ -119,7 +116,6 @@ impl<'a> Growing<'a> {
     fn begin(&mut self) {
         self.efforts.clear();
         self.places.truncate(self.loaded);
-        self.is_seen_again = false;
         (self.sight, self.next, self.sweeps, self.before) = (Some(Sight::Clear), 0, 0, self.loaded);
     }
 
@@ -184,8 +180,6 @@ pub(in crate::drive) struct Overture<'o, 'a, F> {
     pub(in crate::drive) gathering: Gathering<'o>,
     /// Of fewer strata, for what rough surfaces see: a pixel has the mean of many records there.
     pub(in crate::drive) coarse: &'o CellFlux<'o>,
-    /// Of more strata, for second looks, the fewest first.
-    pub(in crate::drive) finer: &'o [CellFlux<'o>],
     pub(in crate::drive) size: [u32; 2],
 }
 
@@ -224,8 +218,7 @@ impl<F: Features> Overture<'_, '_, F> {
             }
             growing.next += LOOKED_AT as u64;
         }
-        growing.is_seen_again = growing.is_seen_again || self.look_again(growing, crew, scratch)?;
-        Ok(growing.is_seen_again)
+        Ok(true)
     }
 
     /// What share of the diffuse points that the camera sees records serve, by a look at pixels that are evenly spread and the
