@@ -13,7 +13,7 @@ use super::cache_memory::{Needs, has_indirect_light};
 use super::cache_settings::{CacheUse, is_open};
 use super::caster::{Cast, Caster};
 use super::caustics::{self, CausticUse};
-use super::haste::{ENOUGH, Haste};
+use super::haste::Haste;
 use super::overture::{Growing, Overture};
 use super::path::Paths;
 use super::photon_view::PhotonView;
@@ -306,9 +306,7 @@ impl<F: Features> Cached<'_, F> {
         }
         // Those that are refined are not cut before the picture is.
         let haste = self.haste.filter(|_| self.refined == 0);
-        let Self {
-            tracer, gathering, tables, size, halves, laboratory, caster, begun, scratch, is_open, ..
-        } = self;
+        let Self { tracer, gathering, tables, size, halves, laboratory, caster, begun, scratch, .. } = self;
         let mut all = true;
         for (i, half) in halves.iter_mut().enumerate() {
             let (photons, built);
@@ -331,31 +329,17 @@ impl<F: Features> Cached<'_, F> {
                 built = found;
                 tracer = tracer.with_bounced([laboratory.gathered(&built); 2]);
             }
-            // The first of all: whether there is time for records of so many rays.
-            let glance = haste.filter(|_| *is_open && i == 0 && self.lights.is_none());
-            let until = glance.map_or(haste.and_then(|haste| haste.end(i)), |haste| haste.glance());
-            let overture = |flux| {
-                let coarse = coarser(tables, flux);
-                Overture { tracer: &tracer, gathering: Gathering { flux, ..*gathering }, coarse, size: *size }
-            };
-            let mut is_done = crew.hurry(until, |crew| overture(gathering.flux).fill(half, crew, scratch))?;
-            if let Some(haste) = glance.filter(|_| !is_done) {
-                let served = overture(gathering.flux).served(half, crew, scratch)?;
-                if served.is_some_and(|served| served <= ENOUGH) {
-                    gathering.flux = coarser(tables, gathering.flux);
-                    half.refine(None);
-                }
-                is_done =
-                    crew.hurry(haste.end(i), |crew| overture(gathering.flux).fill(half, crew, scratch))?;
-            }
-            if !is_done {
+            let until = haste.and_then(|haste| haste.end(i));
+            let coarse = coarser(tables, gathering.flux);
+            let overture = Overture { tracer: &tracer, gathering: *gathering, coarse, size: *size };
+            if !crew.hurry(until, |crew| overture.fill(half, crew, scratch))? {
                 if crew.is_over() {
                     all = false;
                     break;
                 }
                 // What goes into a file is good where it is.
                 if !self.kept.is_some() {
-                    overture(gathering.flux).widen(half, crew, scratch)?;
+                    overture.widen(half, crew, scratch)?;
                 }
                 half.finish();
                 self.is_cut = true;

@@ -223,7 +223,7 @@ impl<F: Features> Overture<'_, '_, F> {
 
     /// What share of the diffuse points that the camera sees records serve, by a look at pixels that are evenly spread and the
     /// last of its order; `None` where the round is over, or it sees none.
-    pub(in crate::drive) fn served(
+    fn served(
         &self,
         growing: &Growing,
         crew: &mut Crew,
