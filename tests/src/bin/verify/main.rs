@@ -4,6 +4,7 @@
 
 mod command;
 mod fuzz;
+mod layers;
 mod quality;
 mod source;
 mod targets;

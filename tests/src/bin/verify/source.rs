@@ -1,5 +1,6 @@
 //! The house rules that no compiler checks, by reading the source line by line.
 
+use crate::layers::{self, Source};
 use crate::{Failure, Outcome, Project};
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -59,6 +60,12 @@ const RULES: &[Rule] = &[
 /// No file is longer: one idea per file.
 const MAX_LINES: usize = 700;
 
+/// Most columns of a line, comments included: rustfmt does not wrap those.
+const COLUMNS: usize = 110;
+
+/// Where no line is longer.
+const NARROW: &[&str] = &["tests/src/bin/verify/layers.rs"];
+
 pub(crate) fn check(project: &Project) -> Outcome {
     let mut files = Vec::new();
     for folder in ["simd", "core", "std-app", "tests", "fuzz"] {
@@ -73,9 +80,17 @@ pub(crate) fn check(project: &Project) -> Outcome {
     let test_modules: Vec<PathBuf> =
         files.iter().zip(&texts).flat_map(|(path, text)| test_modules(path, text)).collect();
 
+    let in_test = |path: &Path| {
+        test_modules.iter().any(|module| path.starts_with(module) || *path == module.with_extension("rs"))
+    };
+    let name_of = |path: &PathBuf| {
+        path.strip_prefix(&project.root).unwrap_or(path).to_string_lossy().replace('\\', "/")
+    };
+    let names: Vec<String> = files.iter().map(name_of).collect();
+
     let mut complaints = Vec::new();
-    for (path, text) in files.iter().zip(&texts) {
-        let name = path.strip_prefix(&project.root).unwrap_or(path).to_string_lossy().replace('\\', "/");
+    let mut core = Vec::new();
+    for ((path, name), text) in files.iter().zip(&names).zip(&texts) {
         let lines = text.lines().count();
         if lines > MAX_LINES {
             complaints.push(format!("{name}: {lines} lines, {MAX_LINES} at most"));
@@ -83,11 +98,17 @@ pub(crate) fn check(project: &Project) -> Outcome {
         if !text.starts_with("//!") {
             complaints.push(format!("{name}:1: the file does not open with `//!` and what lives in it"));
         }
-        if !test_modules.iter().any(|module| path.starts_with(module) || *path == module.with_extension("rs"))
-        {
-            complaints.extend(broken_rules(&name, text));
+        if NARROW.iter().any(|folder| name.starts_with(folder)) {
+            complaints
+                .extend(wide_lines(text).map(|line| format!("{name}:{line}: more than {COLUMNS} columns")));
+        }
+        if !in_test(path) {
+            complaints.extend(broken_rules(name, text));
+            let below = name.strip_prefix("core/src/");
+            core.extend(below.map(|name| Source { name, code: code(text) }));
         }
     }
+    complaints.extend(layers::check(&core));
     complaints.iter().for_each(|complaint| println!("{complaint}"));
     match complaints.len() {
         0 => Ok(format!("{} files", files.len())),
@@ -108,6 +129,12 @@ fn broken_rules(name: &str, text: &str) -> Vec<String> {
         }
     }
     complaints
+}
+
+/// The numbers of the lines that are longer than [`COLUMNS`].
+fn wide_lines(text: &str) -> impl Iterator<Item = usize> {
+    let wide = |(_, line): &(usize, &str)| line.chars().count() > COLUMNS;
+    text.lines().enumerate().filter(wide).map(|(index, _)| index + 1)
 }
 
 /// Modules in files of their own that only tests have: their paths without `.rs`.
@@ -170,6 +197,12 @@ mod tests {
         let text =
             "let a = 1; // panic!\n#[cfg(test)]\nmod tests {\n    panic!()\n}\n#[cfg(test)]\nuse x;\nlet b;";
         assert_eq!(code(text), [(1, "let a = 1;"), (8, "let b;")]);
+    }
+
+    #[test]
+    fn lines_are_measured_in_characters() {
+        let text = format!("{}\n{}\n", "ä".repeat(COLUMNS), "a".repeat(COLUMNS + 1));
+        assert_eq!(wide_lines(&text).collect::<Vec<_>>(), [2]);
     }
 
     #[test]

@@ -1,0 +1,300 @@
+//! The layers of the core: a folder imports only from folders below it, and the files of a folder import each
+//! other without circles. The `mod.rs` of a folder names the items that its files offer, and its files may
+//! import it.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+/// Folders and files of core/src, lowest first. A new one has to find its place here.
+const LAYERS: &[&str] = &[
+    "memory",
+    "geometry",
+    "features",
+    "sampling",
+    "scene",
+    "bsdf",
+    "bvh",
+    "light",
+    "film",
+    "photon",
+    "cache",
+    "estimate",
+    "census",
+    "transport",
+];
+
+/// Folders of core/src whose files form no circle.
+const WITHOUT_CIRCLES: &[&str] =
+    &["memory", "geometry", "sampling", "scene", "bsdf", "bvh", "film", "estimate", "census"];
+
+/// A file of core/src: its path below that folder, and its numbered lines of code.
+pub(crate) struct Source<'t> {
+    pub name: &'t str,
+    pub code: Vec<(usize, &'t str)>,
+}
+
+/// A path of modules from the root of the crate, perhaps with the name of an item at its end.
+type Path = Vec<String>;
+
+/// A complaint for each import from a higher layer and for each circle.
+pub(crate) fn check(sources: &[Source]) -> Vec<String> {
+    let tree = Tree::new(sources);
+    let mut complaints = Vec::new();
+    let mut edges: BTreeMap<Path, BTreeMap<String, BTreeSet<String>>> = BTreeMap::new();
+    for (source, imports) in sources.iter().zip(&tree.imports) {
+        let from = module_of(source.name);
+        let Some(first) = from.first() else { continue };
+        let Some(layer) = layer(first) else {
+            complaints.push(format!("core/src/{}: `{first}` is not among the layers", source.name));
+            continue;
+        };
+        for import in imports {
+            let Some(to) = tree.target(&from, &import.path) else { continue };
+            let shared = from.iter().zip(&to).take_while(|(a, b)| a == b).count();
+            match (from.get(shared), to.get(shared)) {
+                (Some(_), Some(higher)) if shared == 0 => {
+                    if self::layer(higher).is_some_and(|other| other > layer) {
+                        let (name, line) = (source.name, import.line);
+                        complaints
+                            .push(format!("core/src/{name}:{line}: `{higher}` is a layer above `{first}`"));
+                    }
+                }
+                (Some(a), Some(b)) if WITHOUT_CIRCLES.contains(&first.as_str()) => {
+                    let folder = edges.entry(from[..shared].to_vec()).or_default();
+                    folder.entry(a.clone()).or_default().insert(b.clone());
+                }
+                _ => {}
+            }
+        }
+    }
+    complaints.extend(edges.into_iter().filter_map(|(folder, edges)| {
+        let names = circle(edges);
+        (!names.is_empty())
+            .then(|| format!("core/src/{}: {} import in a circle", folder.join("/"), names.join(", ")))
+    }));
+    complaints
+}
+
+fn layer(name: &str) -> Option<usize> {
+    LAYERS.iter().position(|layer| *layer == name)
+}
+
+/// `a/b.rs` and `a/b/mod.rs` are module a::b.
+fn module_of(name: &str) -> Path {
+    let path = name.strip_suffix(".rs").unwrap_or(name);
+    let mut path: Path = path.split('/').map(str::to_owned).collect();
+    path.pop_if(|last| last == "mod" || last == "lib");
+    path
+}
+
+/// The names that are left when those that import none of the others, and those that none imports, are gone.
+fn circle(mut edges: BTreeMap<String, BTreeSet<String>>) -> Vec<String> {
+    loop {
+        let count = edges.values().map(BTreeSet::len).sum::<usize>();
+        let importing: BTreeSet<String> = edges.keys().cloned().collect();
+        let imported: BTreeSet<String> = edges.values().flatten().cloned().collect();
+        edges.values_mut().for_each(|targets| targets.retain(|target| importing.contains(target)));
+        edges.retain(|name, targets| imported.contains(name) && !targets.is_empty());
+        if edges.values().map(BTreeSet::len).sum::<usize>() == count {
+            return edges.into_keys().collect();
+        }
+    }
+}
+
+/// An import, or a path within code.
+#[derive(Debug, PartialEq)]
+struct Import {
+    line: usize,
+    path: Path,
+    /// By which others find it here, if it is exported.
+    exported: Option<String>,
+}
+
+/// All modules, and what they import.
+struct Tree {
+    modules: BTreeSet<Path>,
+    imports: Vec<Vec<Import>>,
+    /// For a module and a name that it exports: where that comes from.
+    exports: BTreeMap<(Path, String), Path>,
+}
+
+impl Tree {
+    fn new(sources: &[Source]) -> Self {
+        let modules = sources.iter().map(|source| module_of(source.name)).collect();
+        let imports = sources.iter().map(|source| imports(&source.code)).collect();
+        let mut tree = Tree { modules, imports, exports: BTreeMap::new() };
+        for (source, imports) in sources.iter().zip(&tree.imports) {
+            let module = module_of(source.name);
+            for import in imports {
+                if let (Some(name), Some(path)) = (&import.exported, tree.absolute(&module, &import.path)) {
+                    tree.exports.insert((module.clone(), name.clone()), path);
+                }
+            }
+        }
+        tree
+    }
+
+    /// From a path as `module` writes it to one from the root; `None` where it leads to another crate.
+    fn absolute(&self, module: &Path, path: &[String]) -> Option<Path> {
+        let ups = path.iter().take_while(|name| *name == "super").count();
+        let base = module.len().checked_sub(ups)?;
+        match path.first()?.as_str() {
+            "crate" => Some(path[1..].to_vec()),
+            "self" => Some([module, &path[1..]].concat()),
+            "super" => Some([&module[..base], &path[ups..]].concat()),
+            child => {
+                let inner = [module.as_slice(), &[child.to_owned()]].concat();
+                self.modules.contains(&inner).then(|| [module.as_slice(), path].concat())
+            }
+        }
+    }
+
+    /// The module in which an import finds its item, through what others export.
+    fn target(&self, module: &Path, path: &[String]) -> Option<Path> {
+        let mut path = self.absolute(module, path)?;
+        for _ in 0..LAYERS.len() {
+            let depth = (0..=path.len()).rev().find(|depth| self.modules.contains(&path[..*depth]))?;
+            let exported = path.get(depth).and_then(|name| {
+                self.exports
+                    .get(&(path[..depth].to_vec(), name.clone()))
+                    .map(|to| [to, &path[depth + 1..]].concat())
+            });
+            match exported {
+                Some(next) => path = next,
+                None => return Some(path[..depth].to_vec()),
+            }
+        }
+        None
+    }
+}
+
+/// The imports of a file, and the paths that begin with `crate` or `super` in its other code.
+fn imports(code: &[(usize, &str)]) -> Vec<Import> {
+    let mut found = Vec::new();
+    let mut lines = code.iter();
+    while let Some(&(line, text)) = lines.next() {
+        let text = text.trim();
+        let Some((before, tree)) = text.split_once("use ").filter(|(before, _)| is_visibility(before)) else {
+            found.extend(paths(text).map(|path| Import { line, path, exported: None }));
+            continue;
+        };
+        let mut tree = tree.to_owned();
+        while !tree.contains(';') {
+            let Some((_, more)) = lines.next() else { break };
+            tree += more.trim();
+        }
+        let mut all = Vec::new();
+        expand(tree.trim_end_matches(';'), &[], &mut all);
+        found.extend(all.into_iter().map(|(path, name)| Import {
+            line,
+            path,
+            exported: Some(name).filter(|_| before.starts_with("pub")),
+        }));
+    }
+    found
+}
+
+fn is_visibility(before: &str) -> bool {
+    let before = before.trim();
+    before.is_empty() || before == "pub" || before.starts_with("pub(") && before.ends_with(')')
+}
+
+/// `a::{b, c as d}` is a::b, and a::c by the name of d.
+fn expand(tree: &str, outer: &[String], all: &mut Vec<(Path, String)>) {
+    let segments = |text: &str| -> Path {
+        text.split("::").map(str::trim).filter(|name| !name.is_empty()).map(str::to_owned).collect()
+    };
+    if let Some((head, rest)) = tree.split_once('{') {
+        let outer = [outer, &segments(head)].concat();
+        let body = rest.rsplit_once('}').map_or(rest, |(body, _)| body);
+        let mut depth = 0;
+        let parts = body.split(|c| {
+            depth += i32::from(c == '{') - i32::from(c == '}');
+            c == ',' && depth == 0
+        });
+        return parts.filter(|part| !part.trim().is_empty()).for_each(|part| expand(part, &outer, all));
+    }
+    let (path, renamed) = tree.split_once(" as ").map_or((tree, None), |(path, name)| (path, Some(name)));
+    let mut path = [outer, &segments(path)].concat();
+    path.pop_if(|last| last == "self" && !outer.is_empty());
+    let name = renamed.map(str::trim).or(path.last().map(String::as_str)).unwrap_or_default().to_owned();
+    all.push((path, name));
+}
+
+/// Paths such as `crate::a::b` in a line of code.
+fn paths(line: &str) -> impl Iterator<Item = Path> {
+    let words = line.split(|c: char| !(c.is_alphanumeric() || c == '_' || c == ':'));
+    let from_here = |word: &&str| word.starts_with("crate::") || word.starts_with("super::");
+    words
+        .filter(from_here)
+        .map(|word| word.split("::").filter(|name| !name.is_empty()).map(str::to_owned).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn complaints(files: &[(&str, &str)]) -> Vec<String> {
+        let source = |(name, text): &(&'static str, &'static str)| Source {
+            name,
+            code: text.lines().enumerate().map(|(i, line)| (i + 1, line)).collect(),
+        };
+        let files: Vec<(&'static str, &'static str)> =
+            files.iter().map(|&(a, b)| (leak(a), leak(b))).collect();
+        check(&files.iter().map(source).collect::<Vec<_>>())
+    }
+
+    fn leak(text: &str) -> &'static str {
+        Box::leak(text.to_owned().into_boxed_str())
+    }
+
+    #[test]
+    fn a_layer_imports_those_below_it_and_none_above() {
+        let lower = ("scene/mesh.rs", "use crate::geometry::Ray;\nuse crate::{Rgb, memory::Arena};\n");
+        assert_eq!(complaints(&[("geometry/ray.rs", ""), ("memory/mod.rs", ""), lower]), [""; 0]);
+        let upper =
+            ("scene/mesh.rs", "use crate::Rgb;\nuse crate::{\n    geometry::Ray,\n    light::Tree,\n};\n");
+        let found = complaints(&[("light/mod.rs", ""), ("geometry/ray.rs", ""), upper]);
+        assert_eq!(found, ["core/src/scene/mesh.rs:2: `light` is a layer above `scene`"]);
+        let within = ("scene/mesh.rs", "fn a() {\n    crate::light::tree::b();\n}\n");
+        let found = complaints(&[("light/tree.rs", ""), within]);
+        assert_eq!(found, ["core/src/scene/mesh.rs:2: `light` is a layer above `scene`"]);
+        let face = ("scene/mod.rs", "pub use super::light::Tree;\n");
+        assert_eq!(complaints(&[("light/mod.rs", ""), face]).len(), 1);
+    }
+
+    #[test]
+    fn a_folder_that_is_no_layer_is_refused() {
+        assert_eq!(
+            complaints(&[("extra/mod.rs", "")]),
+            ["core/src/extra/mod.rs: `extra` is not among the layers"]
+        );
+        assert_eq!(complaints(&[("lib.rs", "pub mod transport;\nuse crate::transport::X;\n")]), [""; 0]);
+    }
+
+    #[test]
+    fn files_of_a_folder_form_no_circle() {
+        let face = ("bvh/mod.rs", "mod a;\nmod b;\nuse a::A;\n");
+        let (a, b) =
+            (("bvh/a.rs", "use super::b::B;\nuse super::Bvh;\n"), ("bvh/b.rs", "use crate::bvh::a;\n"));
+        assert_eq!(complaints(&[face, a, ("bvh/b.rs", "use super::Bvh;\n")]), [""; 0]);
+        assert_eq!(complaints(&[face, a, b]), ["core/src/bvh: a, b import in a circle"]);
+        // One that only imports from the circle is not part of it.
+        let c = ("bvh/c.rs", "use super::a::A;\n");
+        assert_eq!(complaints(&[face, a, b, c]), ["core/src/bvh: a, b import in a circle"]);
+    }
+
+    #[test]
+    fn circles_are_found_through_what_a_folder_exports() {
+        let face = ("bvh/mod.rs", "pub use a::{A, Other as Name};\npub(crate) use b::B;\n");
+        let (a, b) = (("bvh/a.rs", "use super::B;\n"), ("bvh/b.rs", "use super::Name;\n"));
+        assert_eq!(complaints(&[face, a, b]), ["core/src/bvh: a, b import in a circle"]);
+    }
+
+    #[test]
+    fn folders_within_a_folder_are_as_one_file() {
+        let a = ("bvh/a/x.rs", "use super::y::Y;\nuse crate::bvh::b::B;\n");
+        let (y, b) = (("bvh/a/y.rs", ""), ("bvh/b.rs", "use super::a::y::Y;\n"));
+        assert_eq!(complaints(&[a, y, b]), ["core/src/bvh: a, b import in a circle"]);
+        assert_eq!(complaints(&[a, y, ("bvh/b.rs", "")]), [""; 0]);
+    }
+}
