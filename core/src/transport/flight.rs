@@ -4,6 +4,7 @@
 //! All paths of a task advance together, so that the tracer sees batches of rays. Path `i` of map `n` follows from
 //! (seed, n, i) alone, or from other numbers that are given for it (`chain.rs`).
 
+use super::context::SceneContext;
 use super::estimator::{CERTAIN_BELOW, Counters, MAX_CROSSINGS, is_cut};
 use crate::bsdf::{Bsdf, BsdfSample, Features};
 use crate::bvh::{Bvh, Coherence};
@@ -246,11 +247,9 @@ impl<F: Features> Flight<'_, F> {
         let scene = self.scene;
         let point = SurfacePoint::at::<F>(scene, ray, hit).filter(|_| hit.is_some())?;
         let direction = Vec3::from(ray.direction);
-        let passes = F::CUTOUT && point.material.has_cutout() && {
-            let opacity = point.material.opacity.at::<F>(scene, point.uv);
-            numbers.single(CROSSING + state.crossings) >= opacity
-        };
-        if passes || hit.triangle == state.triangle {
+        let context = SceneContext::<F>::new(scene, self.bvh, self.level);
+        let opacity = || numbers.single(CROSSING + state.crossings);
+        if context.is_passed(&point, hit, state.triangle, opacity) {
             if state.crossings >= MAX_CROSSINGS {
                 counters.dropped.unfinished += 1;
                 return None;

@@ -9,6 +9,7 @@ mod arrivals;
 mod cached;
 pub mod caustics;
 pub mod chain;
+mod context;
 mod density;
 mod edges;
 mod estimator;
@@ -35,6 +36,7 @@ pub mod shoot;
 pub mod sight;
 mod wave;
 
+pub use context::SceneContext;
 pub use density::PhotonLight;
 pub use estimator::{Counters, PathSettings, UNLIMITED};
 pub use glimpse::{GLIMPSES, Glimpse};

@@ -9,16 +9,17 @@
 //! Windows pay where most of the sky is hidden, as in a room, and cost a little where it is not: the same rays tell
 //! which it is.
 
+use super::context::Segment;
+use super::estimator::{Counters, dimension};
 use super::path::PathTracer;
 use super::shadow::{pass_cutout, passing};
 use crate::Rgb;
 use crate::bsdf::{Bsdf, Features};
 use crate::bvh::Coherence;
-use crate::geometry::{Bounds, Hit, MISS, Ray};
+use crate::geometry::{Bounds, Hit, Ray};
 use crate::light::{Bins, EnvironmentVisibility, VisibilityGrid, VisibilityTable};
 use crate::memory::{Arena, Footprint, OutOfMemory};
 use crate::sampling::Sampler;
-use crate::scene::SurfacePoint;
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
@@ -227,21 +228,13 @@ impl<F: Features> PathTracer<'_, F> {
     }
 
     /// Follows one path until all `vertices` are filled, or it ends.
-    fn follow(&self, mut ray: Ray, sampler: &Sampler, vertices: &mut [Vertex]) {
+    fn follow(&self, ray: Ray, sampler: &Sampler, vertices: &mut [Vertex]) {
+        let (context, counters) = (self.context(), &mut Counters::default());
+        let mut segment = Segment::first(ray);
         let mut free = vertices.iter_mut();
-        let mut from = MISS;
         for surface in 0..SURFACES as u32 {
-            let hit = self.bvh.nearest(self.level, &ray);
-            let Some(point) = SurfacePoint::at::<F>(self.scene, &ray, &hit) else { return };
-            let direction = Vec3::from(ray.direction);
-            let first = 2 + 3 * surface;
-            let passes = F::CUTOUT && point.material.has_cutout() && {
-                sampler.single(first) >= point.material.opacity.at::<F>(self.scene, point.uv)
-            };
-            if passes || hit.triangle == from {
-                (ray, from) = (point.spawn(direction), hit.triangle);
-                continue;
-            }
+            let opacity = |n| sampler.single(dimension::CROSSING + n);
+            let Some((hit, point)) = context.next_surface(&mut segment, opacity, counters) else { return };
             let bsdf = Bsdf::at::<F>(self.scene, point.material, point.uv, point.front);
             if !bsdf.is_delta() {
                 let Some(vertex) = free.next() else { return };
@@ -254,15 +247,15 @@ impl<F: Features> PathTracer<'_, F> {
                     index: 0,
                 };
             }
+            let first = 2 + 3 * surface;
             let ([u, v], lobe) = (sampler.pair(first + 1), sampler.single(first + 2));
-            let Some(sample) = bsdf.sample::<F>(point.frame.to_local(-direction), [u, v, lobe]) else {
-                return;
-            };
+            let wo = point.frame.to_local(-Vec3::from(segment.ray.direction));
+            let Some(sample) = bsdf.sample::<F>(wo, [u, v, lobe]) else { return };
             let direction = point.frame.to_world(sample.direction);
             if !point.sides_agree(sample.direction, direction) {
                 return;
             }
-            (ray, from) = (point.spawn(direction), hit.triangle);
+            segment = segment.onward(&point, &hit, direction);
         }
     }
 

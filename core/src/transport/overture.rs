@@ -6,12 +6,13 @@
 //! gather where no record reaches, some places at a time, and each time all records are committed in their order. Then
 //! it goes over them again, for the diffuse points that are seen in rough surfaces ([`Sight`]).
 
+use super::context::Segment;
 use super::estimator::{Counters, dimension};
 use super::gather::Place;
 use super::path::PathTracer;
 use crate::bsdf::{Bsdf, Features};
 use crate::bvh::Coherence;
-use crate::geometry::{Hit, MISS, Ray};
+use crate::geometry::{Hit, Ray};
 use crate::sampling::Sampler;
 use crate::scene::SurfacePoint;
 use core::f32::consts::PI;
@@ -20,8 +21,8 @@ use glam::Vec3;
 /// Pixels that a task looks through.
 pub const PIXELS: usize = 64;
 
-/// Mirrors, panes and cut-outs behind each other that it looks through.
-const MOST_BOUNCES: usize = 16;
+/// Mirrors and panes behind each other that it looks through.
+const MOST_BOUNCES: u32 = 16;
 
 /// Where the shading normal deviates by more than this from that of the surface (a cosine), it is of details that no
 /// record could serve.
@@ -118,56 +119,46 @@ impl<F: Features> PathTracer<'_, F> {
         self.scene.materials.iter().any(|material| material.surface.may_be_rough())
     }
 
-    /// The diffuse point that a camera ray comes to from `hit` on, and the width of a pixel there, which is `spread` at a distance
-    /// of 1.
+    /// The diffuse point that a camera ray comes to from `hit` on, and the width of a pixel there, which is `spread`
+    /// at a distance of 1.
     fn first_diffuse(
         &self,
-        (mut ray, mut hit): (Ray, Hit),
+        (ray, mut hit): (Ray, Hit),
         mut spread: f32,
         sight: Sight,
         sampler: &Sampler,
         counters: &mut Counters,
     ) -> Option<(SurfacePoint<'_>, f32)> {
-        let (mut segments, mut crossings, mut width, mut left) = (1, 0, 0.0, MISS);
-        let mut seen = Sight::Clear;
-        for _ in 0..MOST_BOUNCES {
-            let point = SurfacePoint::at::<F>(self.scene, &ray, &hit)?;
-            let direction = Vec3::from(ray.direction);
-            width += spread * hit.t;
-            let opacity = point.material.opacity.at::<F>(self.scene, point.uv);
-            let through = F::CUTOUT
-                && point.material.has_cutout()
-                && sampler.single(dimension::CROSSING + crossings) >= opacity;
-            if hit.triangle == left || through {
-                crossings += 1;
-                ray = point.spawn(direction);
-            } else {
-                let bsdf = Bsdf::at::<F>(self.scene, point.material, point.uv, point.front);
-                if let Bsdf::Diffuse(_) = bsdf {
-                    let smooth = point.frame.normal.dot(point.geometric_normal) > SMOOTH;
-                    return (smooth && seen == sight).then_some((point, width));
-                }
-                let wo = point.frame.to_local(-direction);
-                let [u, v] = dimension::scattering(sampler, segments);
-                let lobe = sampler.single(dimension::vertex(segments) + dimension::LOBE);
-                let sample = bsdf.sample::<F>(wo, [u, v, lobe])?;
-                if !sample.delta {
-                    if sight == Sight::Clear {
-                        return None;
-                    }
-                    seen = Sight::Rough;
-                    spread = spread.max(1.0 / (PER_LOBE * libm::sqrtf(PI * sample.pdf)));
-                }
-                let next = point.frame.to_world(sample.direction);
-                if !point.sides_agree(sample.direction, next) {
+        let context = self.context();
+        let mut segment = Segment::first(ray);
+        let (mut width, mut seen) = (0.0, Sight::Clear);
+        for segments in 1..=MOST_BOUNCES {
+            let opacity = |n| sampler.single(dimension::CROSSING + n);
+            let (met, point) = context.surface_from(hit, &mut segment, opacity, counters)?;
+            width += spread * segment.length;
+            let bsdf = Bsdf::at::<F>(self.scene, point.material, point.uv, point.front);
+            if let Bsdf::Diffuse(_) = bsdf {
+                let smooth = point.frame.normal.dot(point.geometric_normal) > SMOOTH;
+                return (smooth && seen == sight).then_some((point, width));
+            }
+            let wo = point.frame.to_local(-Vec3::from(segment.ray.direction));
+            let [u, v] = dimension::scattering(sampler, segments);
+            let lobe = sampler.single(dimension::vertex(segments) + dimension::LOBE);
+            let sample = bsdf.sample::<F>(wo, [u, v, lobe])?;
+            if !sample.delta {
+                if sight == Sight::Clear {
                     return None;
                 }
-                segments += 1;
-                ray = point.spawn(next);
+                seen = Sight::Rough;
+                spread = spread.max(1.0 / (PER_LOBE * libm::sqrtf(PI * sample.pdf)));
             }
-            left = hit.triangle;
+            let next = point.frame.to_world(sample.direction);
+            if !point.sides_agree(sample.direction, next) {
+                return None;
+            }
+            segment = segment.onward(&point, &met, next);
             counters.rays += 1;
-            hit = self.bvh.nearest(self.level, &ray);
+            hit = self.bvh.nearest(self.level, &segment.ray);
         }
         None
     }

@@ -22,6 +22,7 @@
 
 use super::arrivals::{Arrivals, TO_ENVIRONMENT};
 use super::cached::Caches;
+use super::context::SceneContext;
 use super::density::PhotonLight;
 use super::estimator::{
     Counters, MAX_CROSSINGS, PathSettings, dimension, environment_heuristic, is_cut, power_heuristic,
@@ -180,6 +181,11 @@ impl<'a, F: Features> PathTracer<'a, F> {
     /// Whether paths have a limit of depth.
     pub fn is_limited(&self) -> bool {
         self.settings.is_limited()
+    }
+
+    /// Scene, hierarchy and level.
+    pub(super) fn context(&self) -> SceneContext<'a, F> {
+        SceneContext::new(self.scene, self.bvh, self.level)
     }
 
     /// Number of tasks: tiles of the film.

@@ -2,15 +2,14 @@
 //! in a map of their own. A photon counts as seen where one of them lies beside it. That need not be exact: what is not
 //! held for seen is found by other paths (`chain.rs`).
 
-use super::estimator::dimension;
+use super::context::{SceneContext, Segment};
+use super::estimator::{Counters, dimension};
 use super::merge::Discs;
 use super::shoot::gathers_photons;
 use crate::bsdf::{Bsdf, Features};
-use crate::bvh::Bvh;
 use crate::memory::Footprint;
 use crate::photon::{Disc, Falloff, Photon, PhotonMap, Photons, Uniform};
 use crate::sampling::Sampler;
-use crate::scene::{Scene, SurfacePoint};
 use crate::{Level, Rgb};
 use core::mem;
 use glam::Vec3;
@@ -68,21 +67,23 @@ impl Raster {
     pub fn run<F: Features>(
         &self,
         task: usize,
-        (scene, bvh, level): (&Scene, &Bvh, Level),
+        context: &SceneContext<F>,
         seed: u32,
         out: &mut [Photon],
-    ) {
+    ) -> Counters {
+        let mut counters = Counters::default();
         for (i, slot) in out.iter_mut().enumerate() {
             let ray = (task * Self::TASK + i) as u32;
-            *slot = self.along::<F>((scene, bvh, level), seed, ray).unwrap_or(Photon::NONE);
+            *slot = self.along(context, (seed, ray), &mut counters).unwrap_or(Photon::NONE);
         }
+        counters
     }
 
     fn along<F: Features>(
         &self,
-        (scene, bvh, level): (&Scene, &Bvh, Level),
-        seed: u32,
-        number: u32,
+        context: &SceneContext<F>,
+        (seed, number): (u32, u32),
+        counters: &mut Counters,
     ) -> Option<Photon> {
         let [width, height] = self.frame;
         let across = width.div_ceil(self.step);
@@ -90,20 +91,24 @@ impl Raster {
         let [u, v] = sampler.pair(dimension::PIXEL);
         let at = |i: u32, u: f32, pixels: u32| ((i as f32 + u) * self.step as f32).min(pixels as f32);
         let (x, y) = (at(number % across, u, width), at(number / across, v, height));
-        let mut ray = scene.camera.ray(width, height, x, y, [0.5; 2]);
+        let mut segment = Segment::first(context.scene.camera.ray(width, height, x, y, [0.5; 2]));
         let mut gathers = self.gathers;
         for segments in 1..=MOST_MIRRORS + 1 {
-            let hit = bvh.nearest(level, &ray);
-            let point = SurfacePoint::at::<F>(scene, &ray, &hit).filter(|_| hit.is_some())?;
-            let direction = Vec3::from(ray.direction).normalize_or_zero();
-            let bsdf = Bsdf::at::<F>(scene, point.material, point.uv, point.front);
+            let opacity = |n| sampler.single(dimension::CROSSING + n);
+            let (hit, point) = context.next_surface(&mut segment, opacity, counters)?;
+            let direction = Vec3::from(segment.ray.direction).normalize_or_zero();
+            let bsdf = Bsdf::at::<F>(context.scene, point.material, point.uv, point.front);
             if gathers_photons(&bsdf, true) && !mem::take(&mut gathers) {
                 return Some(Photon::new(point.position, -direction, point.geometric_normal, Rgb::ZERO));
             }
             let [u, v] = dimension::scattering(&sampler, segments);
             let lobe = sampler.single(dimension::vertex(segments) + dimension::LOBE);
             let sample = bsdf.sample::<F>(point.frame.to_local(-direction), [u, v, lobe])?;
-            ray = point.spawn(point.frame.to_world(sample.direction));
+            let onward = point.frame.to_world(sample.direction);
+            if !point.sides_agree(sample.direction, onward) {
+                return None;
+            }
+            segment = segment.onward(&point, &hit, onward);
         }
         None
     }

@@ -7,7 +7,7 @@ use crate::drive::memory::Memory;
 use halflight_core::bsdf::Features;
 use halflight_core::memory::{Arena, Line};
 use halflight_core::photon::Photon;
-use halflight_core::transport::Counters;
+use halflight_core::transport::SceneContext;
 use halflight_core::transport::sight::Raster;
 
 /// What their memory is counted as.
@@ -23,8 +23,7 @@ pub(super) fn find<F: Features>(
     let Stage { scene, bvh, settings, workers, .. } = *stage;
     let mut places = Drawer::of(PLACES, raster.rays(), memory)?;
     let look = |task: usize, _: &mut Arena, out: &mut [Photon]| {
-        raster.run::<F>(task, (scene, bvh, settings.level), settings.seed, out);
-        Ok(Counters::default())
+        Ok(raster.run(task, &SceneContext::<F>::new(scene, bvh, settings.level), settings.seed, out))
     };
     places.fill_with(workers, |photons| Ok(workers.look(photons, Raster::TASK, scratch, &look)?))?;
     Ok(places)
