@@ -13,7 +13,6 @@ use super::tree::Tree;
 use crate::sampling::{AliasTable, ONE_MINUS_EPSILON};
 use crate::scene::{Mesh, PointLight, Scene};
 use crate::{Level, Rgb};
-use core::cell::Cell;
 use glam::Vec3;
 
 /// The least share of each kind of light that is there.
@@ -255,29 +254,6 @@ impl<'m> LightSampler<'m> {
     /// Whether some are points or directional: no path meets these by chance.
     pub(crate) fn have_deltas(&self) -> bool {
         !self.points.is_empty() || !self.distant.is_empty()
-    }
-
-    /// Whether surfaces emit.
-    pub(crate) fn have_emitters(&self) -> bool {
-        !self.emitters.is_empty()
-    }
-
-    /// Whether a surface that emits towards `ray`, an origin and a direction, is not ruled out by `meets`, which is asked for
-    /// spheres around some of them, and then for points of each, by centre and radius.
-    pub(crate) fn may_be_met(
-        &self,
-        [origin, direction]: [Vec3; 2],
-        meets: impl Fn(Vec3, f32) -> bool,
-    ) -> bool {
-        let found = Cell::new(false);
-        let is_met = |emitter: &Emitter| {
-            emitter.faces(origin).is_some() && meets(emitter.near(origin, direction), 0.0)
-        };
-        let waits = |center, radius| !found.get() && meets(center, radius);
-        self.tree.visit(waits, |light| {
-            found.set(found.get() || self.emitters.get(light as usize).is_some_and(is_met));
-        });
-        found.get()
     }
 
     /// A triangle of emitter `light`.

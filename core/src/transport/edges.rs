@@ -25,7 +25,7 @@ const FIRST: u32 = 8;
 const BENT: f32 = 0.95;
 
 /// Corners along the side of a tile.
-pub(super) const CORNERS: usize = TILE as usize + 1;
+const CORNERS: usize = TILE as usize + 1;
 
 /// The paths of sample `index` of a half of the samples of a pixel with an edge: points of its net.
 pub(super) fn points_of(index: u32) -> Range<u32> {
@@ -66,7 +66,7 @@ impl<'a, F: Features> PathTracer<'a, F> {
         for (i, ray) in rays.iter_mut().enumerate() {
             let (x, y) = (left + (i % CORNERS) as u32, top + (i / CORNERS) as u32);
             if x <= width && y <= height {
-                *ray = self.raster_ray([x as f32, y as f32]);
+                *ray = self.scene.camera.ray(width, height, x as f32, y as f32, [0.0; 2]);
                 counters.rays += 1;
             }
         }

@@ -78,9 +78,6 @@ pub(super) mod dimension {
     /// Where in the pixel the rays are that look at lamps alone.
     pub(in crate::transport) const OUTLINE: u32 = 1 << 29;
 
-    /// Where in the images of lamps that a pixel has.
-    pub(in crate::transport) const IMAGE: u32 = 1 << 28;
-
     // At every vertex, from `vertex(n)` on:
     /// Where on the light.
     pub(in crate::transport) const LIGHT: u32 = 0;

@@ -13,8 +13,7 @@
 //!    map of photons does one bounce later, and may ask several points of lights; nor where photons do (`density.rs`, `maps.rs`).
 //! 7. Pixels at the border of a lamp look at it with rays of their own (`outline.rs`).
 //! 8. Where photons of caustics lie, paths and photons share the light that both find (`merge.rs`).
-//! 9. What mirrors and glass show of a lamp has rays of its own, where it was found beforehand (`images.rs`).
-//! 10. Where all else is quiet, pixels that see an edge have several paths for each of the first samples (`edges.rs`).
+//! 9. Where all else is quiet, pixels that see an edge have several paths for each of the first samples (`edges.rs`).
 //!
 //! The price: about 400 bytes for each path of a wave. What a pixel sees depends on (seed, sample) and the pixels of
 //! its circle only, no wave cuts a circle, and samples are summed in their order: the picture has the same bits for
@@ -28,7 +27,6 @@ use super::estimator::{
     Counters, MAX_CROSSINGS, PathSettings, dimension, environment_heuristic, is_cut, power_heuristic,
     survival,
 };
-use super::images::{Images, Way};
 use super::maps::{GatherLight, PhotonMaps, Said};
 use super::merge::{ChainLink, Merging, ends_chain};
 use super::reuse::Exchange;
@@ -89,7 +87,6 @@ pub struct PathTracer<'a, F> {
     pub(super) asked: u32,
     /// Tile by tile, or none.
     pub(super) edges: &'a [PixelSet],
-    pub(super) images: Images<'a>,
     /// Light that is not all shared, for each sample; see `reuse.rs`.
     pub(super) flash: f32,
     features: PhantomData<F>,
@@ -123,7 +120,6 @@ impl<'a, F: Features> PathTracer<'a, F> {
             bounced: None,
             asked: 1,
             edges: &[],
-            images: Images::default(),
             flash: f32::INFINITY,
             features: PhantomData,
         }
@@ -413,7 +409,7 @@ impl<'a, F: Features> PathTracer<'a, F> {
         }
         if point.material.emits() && path.share.sees_lamps() {
             let radiance = emitted(scene, hit.triangle, point.uv, point.front);
-            if radiance != Rgb::ZERO && !self.leaves_to_image(path) {
+            if radiance != Rgb::ZERO {
                 let mut weight = 1.0;
                 if path.pdf < f32::INFINITY {
                     let distance = position.distance(point.position);
@@ -647,7 +643,6 @@ impl<'a, F: Features> PathTracer<'a, F> {
             };
         }
         path.left_coat = u32::from(apart && is_narrow);
-        path.way = if sample.delta { path.way.on(sample.transmitted) } else { Way::LOST };
         path.throughput = throughput.to_array();
         // One ray beside as many points of lights.
         path.pdf = if sample.delta { f32::INFINITY } else { sample.pdf / points as f32 };

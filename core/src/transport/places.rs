@@ -6,7 +6,6 @@
 
 use super::edges::{PER_EDGE, is_of_several, points_of, sample_of};
 use super::estimator::{Counters, PathSettings};
-use super::images::Way;
 use super::outline::outlined;
 use super::path::PathTracer;
 use super::reuse::Exchange;
@@ -113,7 +112,6 @@ impl<F: Features> PathTracer<'_, F> {
         let most = usize::try_from(paths).unwrap_or(usize::MAX);
         let mut wave = Wave::new(wave.min(most), &mut arena)?;
         let has_outlines = !places.outlined.is_empty();
-        let has_images = !self.images.of_tile(task).is_empty();
         loop {
             let count = self.start(&mut places, &mut wave);
             if count == 0 {
@@ -128,16 +126,9 @@ impl<F: Features> PathTracer<'_, F> {
                 let outlined = |place| places.outlined.contains(place as usize);
                 self.look_at_lamps(outlined, &mut wave, count, &mut counters);
             }
-            if has_images {
-                if !has_outlines {
-                    wave.shadow_light.fill([0.0; 3]);
-                }
-                self.look_at_images(&mut wave, count, &mut counters);
-            }
             let (mut light, mut blur) = (Rgb::ZERO, Rgb::ZERO);
             for (i, (path, exchange)) in wave.paths.iter().zip(&*wave.exchanges).take(count).enumerate() {
-                let lamps =
-                    if has_outlines || has_images { Rgb::from(wave.shadow_light[i]) } else { Rgb::ZERO };
+                let lamps = if has_outlines { Rgb::from(wave.shadow_light[i]) } else { Rgb::ZERO };
                 let seen = exchange.seen(path) + lamps;
                 let Some(pixel) = out.get_mut(path.place as usize) else { continue };
                 if !places.edges.contains(path.place as usize) {
@@ -213,7 +204,6 @@ impl<F: Features> PathTracer<'_, F> {
             sample,
             segments: 1,
             share: if places.outlined.contains(place) { Share::BESIDE_LAMP } else { Share::ALL },
-            way: Way::EYE,
             triangle: MISS,
             eta_squared: 1.0,
             lights: if is_several { 1 } else { self.asked as u16 },

@@ -1,7 +1,6 @@
 //! Path tracing of single pixels, far apart: what an audit asks ([`crate::estimate`]).
 
 use super::estimator::Counters;
-use super::images::Way;
 use super::outline::is_outlined;
 use super::path::PathTracer;
 use super::reuse::Exchange;
@@ -57,7 +56,6 @@ impl<F: Features> PathTracer<'_, F> {
                     sample,
                     segments: 1,
                     share: if outlined(place) { Share::BESIDE_LAMP } else { Share::ALL },
-                    way: Way::EYE,
                     triangle: MISS,
                     eta_squared: 1.0,
                     ..Path::default()
@@ -68,7 +66,6 @@ impl<F: Features> PathTracer<'_, F> {
             counters.paths += count as u64;
             alone.advance(&mut wave, count, &mut counters);
             self.look_at_lamps(outlined, &mut wave, count, &mut counters);
-            self.look_at_images(&mut wave, count, &mut counters);
             let ends = wave.paths.iter().zip(&*wave.exchanges).zip(&*wave.shadow_light);
             for ((path, exchange), lamps) in ends.take(count) {
                 if let Some(pixel) = out.get_mut(path.place as usize) {

@@ -2,7 +2,6 @@
 
 use super::density::Gathered;
 use super::estimator::{Counters, MAX_CROSSINGS};
-use super::images::Way;
 use super::reuse::{Exchange, Pair};
 use crate::Rgb;
 use crate::bsdf::Bsdf;
@@ -44,8 +43,6 @@ pub(super) struct Path {
     pub(super) eta_squared: f32,
     /// What of the light at the end of the ray belongs to the path.
     pub(super) share: Share,
-    /// By which mirrors and glass it has come from the eye, if by nothing else.
-    pub(super) way: Way,
     /// Of a path that came by mirrors and glass from a rough surface: how much denser photons come from a light to
     /// there than paths from there to the light, but for what the light has to do with it ([`super::merge`]). Negative
     /// on the way to the first mirror or glass; zero where photons could not find the path.

@@ -103,10 +103,6 @@ pub(super) fn text(run: &Run, report: Option<&Path>) -> String {
             }
         }
     }
-    if result.images > 0 {
-        let pixels = plural(result.images as u64, "pixel");
-        lines.push(format!("light  lamps in mirrors or through glass have rays of their own in {pixels}"));
-    }
     if result.windows.lacks_memory {
         lines.push("light  no memory for windows to the environment: light of the sky may be noisier".into());
     }

@@ -16,7 +16,6 @@ mod fingerprint;
 mod gaps;
 mod held_out;
 mod history;
-mod images;
 mod kept;
 mod ledger;
 mod memory;
@@ -276,8 +275,6 @@ pub struct RenderResult {
     pub photon_view: Option<PhotonView>,
     /// Whether the sky was sampled through windows.
     pub windows: WindowUse,
-    /// Pixels that see lamps in mirrors or through glass, and look at them with rays of their own.
-    pub images: usize,
     /// Where samples were dropped, the worst first.
     pub places: Vec<Place>,
     /// Pixels that are black because all of their samples were dropped.

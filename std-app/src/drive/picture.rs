@@ -268,7 +268,6 @@ impl Picture<'_> {
                 None
             },
             windows: WindowUse::default(),
-            images: 0,
             places: canvas.ledger.places(width, height),
             empty_pixels: empty_pixels(film, |task| {
                 canvas.shard.owns(task) && !canvas.taken[task].contains(&0)

@@ -8,7 +8,7 @@ use super::method::{Method, Stage};
 use super::picture::Picture;
 use super::watch::Watch;
 use super::workers::Workers;
-use super::{Progress, RenderError, RenderResult, Seconds, Settings, cache_file, gaps, images, windows};
+use super::{Progress, RenderError, RenderResult, Seconds, Settings, cache_file, gaps, windows};
 use crate::pages::Pages;
 use core::sync::atomic::AtomicBool;
 use halflight_core::Level;
@@ -78,9 +78,7 @@ impl WithFeatures for Render<'_> {
         let paths = PathTracer::<F>::new(scene, &bvh, &lights, path_settings(settings), settings.level);
         let (lights, windows) =
             windows::learn(&paths, &lights, settings.windows, &workers, &mut memory, &mut window_lines)?;
-        let mut image_lines = Vec::new();
-        let images = images::find(&paths, settings, &workers, &mut memory, &mut image_lines)?;
-        let stage = Stage { scene, bvh: &bvh, lights: &lights, images, settings, workers: &workers };
+        let stage = Stage { scene, bvh: &bvh, lights: &lights, settings, workers: &workers };
         let plain = stage.paths::<F>(settings.seed);
         let sketch = |workers: &Workers| gaps::sketch(&plain, [width, height], workers);
         method.with::<F, _>(&stage, &mut memory, |renderer, memory| {
@@ -101,15 +99,7 @@ impl WithFeatures for Render<'_> {
             };
             let done = picture.render(renderer)?;
             let seconds = Seconds { build, ..done.seconds };
-            let images = images.pixels();
-            Ok(RenderResult {
-                memory: memory.uses(),
-                memory_peak: memory.peak(),
-                seconds,
-                windows,
-                images,
-                ..done
-            })
+            Ok(RenderResult { memory: memory.uses(), memory_peak: memory.peak(), seconds, windows, ..done })
         })
     }
 }

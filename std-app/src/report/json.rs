@@ -62,7 +62,6 @@ fn most(run: &Run) -> Value {
         "filled_pixels": result.filled_pixels,
         "memory": memory,
         "memory_peak": result.memory_peak,
-        "lamp_images": result.images,
         "windows": {
             "used": result.windows.used,
             "gain": result.windows.gain.map(|gain| gain.factor()),

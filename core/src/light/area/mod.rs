@@ -139,21 +139,6 @@ impl Emitter {
         (front || self.is_two_sided()).then_some(front)
     }
 
-    /// A point of it that is about as near to a ray as any.
-    pub(super) fn near(&self, origin: Vec3, direction: Vec3) -> Vec3 {
-        let [o, u, v] = [self.origin, self.edges[0], self.edges[1]].map(Vec3::from);
-        let t = -self.height(origin) / direction.dot(self.normal.into());
-        // A ray that does not come to its plane is taken to its foot there.
-        let p = origin + if t > 0.0 && t < f32::INFINITY { t } else { 0.0 } * direction - o;
-        let (uu, uv, vv) = (u.dot(u), u.dot(v), v.dot(v));
-        let [pu, pv] = [p.dot(u), p.dot(v)];
-        let inverse = 1.0 / (uu * vv - uv * uv);
-        let [a, b] =
-            [(vv * pu - uv * pv) * inverse, (uu * pv - uv * pu) * inverse].map(|x| x.clamp(0.0, 1.0));
-        let beyond = if self.shape() == Shape::Triangle { 0.5 * (a + b - 1.0).max(0.0) } else { 0.0 };
-        o + (a - beyond).max(0.0) * u + (b - beyond).max(0.0) * v
-    }
-
     pub(super) fn cone(&self) -> Cone {
         if self.is_two_sided() { Cone::ALL } else { Cone { axis: self.normal, cos: 1.0 } }
     }

@@ -46,7 +46,7 @@ use halflight_core::bsdf::Features;
 use halflight_core::bvh::Bvh;
 use halflight_core::light::LightSampler;
 use halflight_core::scene::Scene;
-use halflight_core::transport::{Discs, Images, Merging, PathSettings, PathTracer};
+use halflight_core::transport::{Discs, Merging, PathSettings, PathTracer};
 
 /// A way to make a picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -171,7 +171,6 @@ pub(super) struct Stage<'a> {
     pub(super) scene: &'a Scene<'a>,
     pub(super) bvh: &'a Bvh<'a>,
     pub(super) lights: &'a LightSampler<'a>,
-    pub(super) images: Images<'a>,
     pub(super) settings: &'a Settings,
     pub(super) workers: &'a Workers<'a>,
 }
@@ -179,9 +178,9 @@ pub(super) struct Stage<'a> {
 impl<'a> Stage<'a> {
     /// Paths of the picture, or of one by another `seed`.
     pub(super) fn paths<F: Features>(&self, seed: u32) -> PathTracer<'a, F> {
-        let Self { scene, bvh, lights, images, settings, .. } = *self;
+        let Self { scene, bvh, lights, settings, .. } = *self;
         let paths = PathSettings { seed, ..path_settings(settings) };
-        PathTracer::new(scene, bvh, lights, paths, settings.level).with_images(images)
+        PathTracer::new(scene, bvh, lights, paths, settings.level)
     }
 
     /// Discs that photons are gathered from, of one pixel.

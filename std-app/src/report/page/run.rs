@@ -77,18 +77,14 @@ fn facts(run: &Run) -> Vec<(&'static str, String)> {
         0 => "none".into(),
         count => grouped(count),
     };
-    let mut facts = vec![
+    vec![
         ("Samples per pixel", grouped(result.spp.into())),
         ("Rendering", readable_seconds(result.seconds.render)),
         ("Estimating its error", readable_seconds(result.seconds.estimate)),
         ("Rays per second", format!("{} million", number(speed, 2))),
         ("Memory at the peak", readable_bytes(result.memory_peak)),
         ("Dropped samples", dropped),
-    ];
-    if result.images > 0 {
-        facts.push(("Pixels with images of lamps", grouped(result.images as u64)));
-    }
-    facts
+    ]
 }
 
 /// The maps of what is known of each pixel.
