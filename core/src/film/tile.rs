@@ -89,11 +89,6 @@ impl PixelSet {
         }
     }
 
-    /// Those that are not in `other` as well.
-    pub fn without(&self, other: &Self) -> Self {
-        Self(core::array::from_fn(|i| self.0[i] & !other.0[i]))
-    }
-
     /// How many there are.
     pub fn len(&self) -> u32 {
         self.0.iter().map(|word| word.count_ones()).sum()

@@ -11,7 +11,6 @@ pub mod caustics;
 pub mod chain;
 mod context;
 mod density;
-mod edges;
 mod estimator;
 mod fences;
 mod flight;

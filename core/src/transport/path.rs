@@ -13,7 +13,6 @@
 //!    map of photons does one bounce later, and may ask several points of lights; nor where photons do (`density.rs`, `maps.rs`).
 //! 7. Pixels at the border of a lamp look at it with rays of their own (`outline.rs`).
 //! 8. Where photons of caustics lie, paths and photons share the light that both find (`merge.rs`).
-//! 9. Where all else is quiet, pixels that see an edge have several paths for each of the first samples (`edges.rs`).
 //!
 //! The price: about 400 bytes for each path of a wave. What a pixel sees depends on (seed, sample) and the pixels of
 //! its circle only, no wave cuts a circle, and samples are summed in their order: the picture has the same bits for
@@ -36,7 +35,7 @@ use super::wave::{Merged, Path, Share, Wave};
 use crate::bsdf::{Bsdf, Features};
 use crate::bvh::{Bvh, Coherence};
 use crate::cache::irradiance::{Indirect, IrradianceCache, POINTS};
-use crate::film::{PixelSet, Tile};
+use crate::film::Tile;
 use crate::geometry::{Hit, Ray};
 use crate::light::{LightSampler, MarginalSample, VisibilityTable, WarpedSample, emitted};
 use crate::memory::Footprint;
@@ -85,8 +84,6 @@ pub struct PathTracer<'a, F> {
     pub(super) bounced: Option<[GatherLight<'a>; 2]>,
     /// Points of lights that paths of the picture ask where a shadow ray alone finds direct light.
     pub(super) asked: u32,
-    /// Tile by tile, or none.
-    pub(super) edges: &'a [PixelSet],
     /// Light that is not all shared, for each sample; see `reuse.rs`.
     pub(super) flash: f32,
     features: PhantomData<F>,
@@ -119,7 +116,6 @@ impl<'a, F: Features> PathTracer<'a, F> {
             merging: None,
             bounced: None,
             asked: 1,
-            edges: &[],
             flash: f32::INFINITY,
             features: PhantomData,
         }

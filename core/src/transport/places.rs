@@ -1,10 +1,8 @@
 //! The samples of a tile: in which order they are taken, how their paths begin, and what becomes of their light.
 //!
 //! Layer after layer, one sample of each pixel that is to have any more. Where pixels share their paths, those of a circle
-//! stay together; else all go along the Z-curve, so that neighbours ask caches together. A pixel that sees an edge has
-//! [`PER_EDGE`] paths for each of its first samples: it is sampled as if it had so many more, taken together.
+//! stay together; else all go along the Z-curve, so that neighbours ask caches together.
 
-use super::edges::{PER_EDGE, is_of_several, points_of, sample_of};
 use super::estimator::{Counters, PathSettings};
 use super::outline::outlined;
 use super::path::PathTracer;
@@ -16,7 +14,6 @@ use crate::film::{CIRCLE, CIRCLES, GROUP, PIXELS_PER_TILE, Pixel, PixelSet, Samp
 use crate::geometry::{MISS, Ray};
 use crate::memory::{Arena, OutOfMemory};
 use crate::sampling::Sampler;
-use core::ops::Range;
 
 /// All samples of a tile that are still to be taken.
 pub(super) struct Places {
@@ -27,14 +24,11 @@ pub(super) struct Places {
     layer: u32,
     /// Pixels whose paths leave the lamp that they see to others.
     outlined: PixelSet,
-    /// Pixels that have several paths for each of the first samples.
-    edges: PixelSet,
 }
 
 impl Places {
     pub(super) fn new(tile: Tile, samples: Samples) -> Self {
-        let none = PixelSet::default();
-        Self { tile, left: samples, next: 0, layer: 0, outlined: none, edges: none }
+        Self { tile, left: samples, next: 0, layer: 0, outlined: PixelSet::default() }
     }
 
     /// The next circle, and which sample of its pixels.
@@ -76,12 +70,6 @@ impl Places {
             }
         }
     }
-
-    /// The paths of a sample of a pixel, as points of the net of its half of the samples.
-    fn points(&self, place: usize, sample: u32) -> Range<u32> {
-        let index = sample >> 1;
-        if self.edges.contains(place) { points_of(index) } else { index..index + 1 }
-    }
 }
 
 impl<F: Features> PathTracer<'_, F> {
@@ -103,13 +91,8 @@ impl<F: Features> PathTracer<'_, F> {
         let mut counters = Counters::default();
         let mut places = Places::new(tile, samples);
         places.outlined = outlined(self.scene, self.lights, &self.settings, tile);
-        if !self.settings.reuse {
-            places.edges = self.edges.get(task).copied().unwrap_or_default().without(&places.outlined);
-        }
         // No larger than there are paths: the memory of a wave is cleared.
-        let most = if places.edges.is_empty() { 1 } else { u64::from(PER_EDGE) };
-        let paths = samples.count().saturating_mul(GROUP as u64).saturating_mul(most);
-        let most = usize::try_from(paths).unwrap_or(usize::MAX);
+        let most = usize::try_from(samples.count().saturating_mul(GROUP as u64)).unwrap_or(usize::MAX);
         let mut wave = Wave::new(wave.min(most), &mut arena)?;
         let has_outlines = !places.outlined.is_empty();
         loop {
@@ -126,35 +109,18 @@ impl<F: Features> PathTracer<'_, F> {
                 let outlined = |place| places.outlined.contains(place as usize);
                 self.look_at_lamps(outlined, &mut wave, count, &mut counters);
             }
-            let (mut light, mut blur) = (Rgb::ZERO, Rgb::ZERO);
             for (i, (path, exchange)) in wave.paths.iter().zip(&*wave.exchanges).take(count).enumerate() {
                 let lamps = if has_outlines { Rgb::from(wave.shadow_light[i]) } else { Rgb::ZERO };
                 let seen = exchange.seen(path) + lamps;
                 let Some(pixel) = out.get_mut(path.place as usize) else { continue };
-                if !places.edges.contains(path.place as usize) {
-                    if pixel.add(path.sample, seen, &mut counters.dropped) {
-                        pixel.add_blur(path.sample, Rgb::from(path.blur));
-                    }
-                    continue;
-                }
-                // Those of a sample are together.
-                let point = path.sample >> 1;
-                let index = sample_of(point);
-                let points = points_of(index);
-                light += seen / points.len() as f32;
-                blur += Rgb::from(path.blur) / points.len() as f32;
-                if point + 1 == points.end {
-                    let sample = (index << 1) | (path.sample & 1);
-                    let blur = core::mem::take(&mut blur);
-                    if pixel.add(sample, core::mem::take(&mut light), &mut counters.dropped) {
-                        pixel.add_blur(sample, blur);
-                    }
+                if pixel.add(path.sample, seen, &mut counters.dropped) {
+                    pixel.add_blur(path.sample, Rgb::from(path.blur));
                 }
             }
         }
     }
 
-    /// Fills the wave with camera rays; returns how many. Circles stay together, and so do the paths of a sample.
+    /// Fills the wave with camera rays; returns how many. Circles stay together.
     pub(super) fn start(&self, places: &mut Places, wave: &mut Wave) -> usize {
         let mut count = 0;
         if self.settings.reuse {
@@ -169,12 +135,10 @@ impl<F: Features> PathTracer<'_, F> {
             }
             return count;
         }
-        while count + PER_EDGE as usize <= wave.paths.len()
+        while count < wave.paths.len()
             && let Some((place, sample)) = places.next_pixel()
         {
-            for point in places.points(place, sample) {
-                self.begin(places, place, (point << 1) | (sample & 1), Exchange::new(0), wave, &mut count);
-            }
+            self.begin(places, place, sample, Exchange::new(0), wave, &mut count);
         }
         count
     }
@@ -194,7 +158,6 @@ impl<F: Features> PathTracer<'_, F> {
         let Some((x, y)) = places.tile.pixel(place) else { return };
         let index = y * width + x;
         let ray = self.camera_ray([x, y], &Sampler::new(seed, index, sample));
-        let is_several = places.edges.contains(place) && is_of_several(sample >> 1);
         wave.rays[*count] = Ray { tag: *count as u32, ..ray };
         wave.paths[*count] = Path {
             throughput: [1.0; 3],
@@ -206,7 +169,7 @@ impl<F: Features> PathTracer<'_, F> {
             share: if places.outlined.contains(place) { Share::BESIDE_LAMP } else { Share::ALL },
             triangle: MISS,
             eta_squared: 1.0,
-            lights: if is_several { 1 } else { self.asked as u16 },
+            lights: self.asked as u16,
             ..Path::default()
         };
         wave.exchanges[*count] = exchange;

@@ -10,7 +10,6 @@ use crate::drive::audit::Audit;
 use crate::drive::memory::Memory;
 use halflight_core::bsdf::Features;
 use halflight_core::cache::irradiance::{CellFlux, IrradianceCache};
-use halflight_core::film::{PIXELS_PER_TILE, Tile};
 use halflight_core::memory::Footprint;
 use halflight_core::transport::PathTracer;
 use halflight_core::transport::path::WAVE;
@@ -31,7 +30,6 @@ pub(super) struct Needs {
     pub(super) sizes: Vec<usize>,
     /// Of each thread.
     pub(super) scratch: Footprint,
-    pub(super) edges: Footprint,
     /// Whether gather rays end in photons.
     pub(super) by_photons: bool,
     /// Whether caches may be refined.
@@ -67,16 +65,14 @@ impl Needs {
         let by_photons = gather == Gather::Photons && has_indirect_light(settings);
         let scratch = if by_photons { scratch.or(Laboratory::scratch::<F>()) } else { scratch };
         let scratch = if has_caustics { scratch.or(caustics::scratch::<F>()) } else { scratch };
-        let tiles = Tile::count(settings.width, settings.height);
-        let edges = Footprint::default().slice::<[u64; PIXELS_PER_TILE / 64]>(tiles);
-        Self { sizes, scratch, edges, by_photons, is_refined }
+        Self { sizes, scratch, by_photons, is_refined }
     }
 
     /// All of it.
     pub(super) fn bytes(&self, stage: &Stage) -> usize {
         let tables: usize = self.sizes.iter().map(|&n| CellFlux::footprint(n).bytes()).sum();
         let scratch = self.scratch.bytes().saturating_mul(stage.workers.count());
-        scratch.saturating_add(self.edges.bytes()).saturating_add(tables)
+        scratch.saturating_add(tables)
     }
 
     /// What comes after photons of caustics: the audit, the fewest photons that gather rays end in, room for `fewest`

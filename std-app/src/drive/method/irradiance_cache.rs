@@ -33,12 +33,11 @@ use crate::save::Patience;
 use core::f32::consts::FRAC_PI_2;
 use halflight_core::bsdf::Features;
 use halflight_core::cache::irradiance::{CellFlux, IrradianceCache, Record, metric};
-use halflight_core::film::PixelSet;
 use halflight_core::memory::{Arena, Footprint, Line};
+use halflight_core::transport::PathTracer;
 use halflight_core::transport::gather::{Gathering, Place};
 use halflight_core::transport::path::WAVE;
 use halflight_core::transport::shoot::Keep;
-use halflight_core::transport::{Counters, PathTracer};
 use std::collections::VecDeque;
 use std::time::Instant;
 
@@ -60,9 +59,6 @@ const FEWEST_RECORDS: usize = 4096;
 
 /// Least radius of a record in pixels: neighbouring pixels of the overture reach each other.
 pub(in crate::drive) const LEAST_PIXELS: f32 = 2.0;
-
-/// Pixels that see an edge have several paths for each of the first samples, unless more than one in so many does.
-const FEW_EDGES: usize = 2;
 
 /// Looks for caustics, takes the memory, sets the method up, and hands it to `then`.
 pub(super) fn with<F: Features, T>(
@@ -144,7 +140,6 @@ fn set_up<F: Features, T>(
     let Stage { scene, bvh, settings, workers, .. } = *stage;
     let needs = Needs::of::<F>(stage, memory, cast.is_some());
     let mut scratch = memory.take_each("paths", needs.scratch, workers.count())?;
-    memory.set_aside("edges", needs.edges)?;
     let mut tables = Vec::new();
     for &n in &needs.sizes {
         tables.push(memory.take("gathering", CellFlux::footprint(n))?);
@@ -219,7 +214,7 @@ fn set_up<F: Features, T>(
         spent: 0,
         may_wait: settings.stop.error.is_none() && settings.adaptive == Some(false),
         finer: None,
-        edges: None,
+        has_samples: false,
         lights: None,
         seconds: 0.0,
     };
@@ -288,8 +283,8 @@ struct Cached<'a, F> {
     /// rays, where they are worth it.
     may_wait: bool,
     finer: Option<(u32, &'a CellFlux<'a>)>,
-    /// Pixels that see an edge, when they are known.
-    edges: Option<Vec<PixelSet>>,
+    /// Whether samples were taken since the render or its resumption began.
+    has_samples: bool,
     /// Points of lights that are asked, when that is known.
     lights: Option<usize>,
     seconds: f64,
@@ -357,26 +352,6 @@ impl<F: Features> Cached<'_, F> {
         Ok(all)
     }
 
-    /// Looks for pixels that see an edge; whether that is done.
-    fn find_edges(&mut self, crew: &mut Crew) -> Result<bool, RenderError> {
-        let Self { tracer, size: [width, height], scratch, .. } = self;
-        let mut edges = vec![PixelSet::default(); tracer.tasks()];
-        let look = |task: usize, _: &mut Arena, out: &mut [PixelSet]| {
-            let mut counters = Counters::default();
-            out.iter_mut().for_each(|edges| *edges = tracer.edges(task, &mut counters));
-            Ok(counters)
-        };
-        if !crew.pass(&mut edges, 1, scratch, &look)? {
-            return Ok(false);
-        }
-        let found: usize = edges.iter().map(|edges| edges.len() as usize).sum();
-        if found * FEW_EDGES > *width as usize * *height as usize {
-            edges.clear();
-        }
-        self.edges = Some(edges);
-        Ok(true)
-    }
-
     /// Tries out the caches: whether finer ones should follow, and how many points of lights are asked. Whether that is done.
     fn try_out(&mut self, crew: &mut Crew) -> Result<bool, RenderError> {
         let Self { tracer, halves: [even, odd], tables, stop, scratch, .. } = self;
@@ -439,10 +414,8 @@ impl<F: Features> Cached<'_, F> {
     /// Brings the tiles to their targets, as far as these caches are for them.
     fn take_samples(&mut self, crew: &mut Crew) -> Result<(), RenderError> {
         let end = self.finer.map_or(u32::MAX, |(from, _)| from);
-        let Self { tracer, halves: [even, odd], scratch, edges, lights, laboratory, caster, .. } = self;
-        let edges = edges.as_deref().unwrap_or_default();
-        let mut tracer =
-            tracer.with_caches([&even.cache, &odd.cache]).with_edges(edges).with_lights(lights.unwrap_or(1));
+        let Self { tracer, halves: [even, odd], scratch, lights, laboratory, caster, .. } = self;
+        let mut tracer = tracer.with_caches([&even.cache, &odd.cache]).with_lights(lights.unwrap_or(1));
         let built;
         if let Some((laboratory, [even, odd])) = laboratory {
             let Some(even) = laboratory.build::<F>(even, 0, crew, scratch)? else { return Ok(()) };
@@ -485,7 +458,7 @@ impl<F: Features> Cached<'_, F> {
 impl<F: Features> Renderer for Cached<'_, F> {
     fn round(&mut self, crew: &mut Crew) -> Result<(), RenderError> {
         // A film that goes on has the rays of all this already.
-        let mut resumed = self.edges.is_none() && crew.canvas.spp() > 0;
+        let mut resumed = !self.has_samples && crew.canvas.spp() > 0;
         let counted = crew.canvas.counters;
         loop {
             while !self.is_filled
@@ -507,9 +480,7 @@ impl<F: Features> Renderer for Cached<'_, F> {
                     self.begin(next);
                 }
             }
-            if self.edges.is_none() && !self.find_edges(crew)? {
-                return Ok(());
-            }
+            self.has_samples = true;
             if core::mem::take(&mut resumed) {
                 crew.canvas.counters = counted;
             }
