@@ -2,7 +2,7 @@
 //! they are shaded. Where caches do not know it, photons may.
 
 use super::estimator::Counters;
-use super::path::{BLOCK, Met, PathTracer};
+use super::path::{BLOCK, PathTracer, SurfaceInteraction};
 use super::wave::{Path, Share, Wave};
 use crate::Level;
 use crate::bsdf::Features;
@@ -65,13 +65,13 @@ impl<'a, F: Features> PathTracer<'a, F> {
         caches: Caches,
         wave: &Wave,
         range: Range<usize>,
-        block: &mut [Option<Met<'a>>; BLOCK],
+        block: &mut [Option<SurfaceInteraction<'a>>; BLOCK],
         counters: &mut Counters,
     ) {
         let (mut known, mut exposed) = ([None; BLOCK], [0.0; BLOCK]);
         let rays = &wave.rays[range.clone()];
         let askers: [Option<(&SurfacePoint, u32)>; BLOCK] = core::array::from_fn(|i| {
-            let (Met { point, .. }, path) = self.asks(wave, rays.get(i)?, block.get(i)?)?;
+            let (SurfaceInteraction { point, .. }, path) = self.asks(wave, rays.get(i)?, block.get(i)?)?;
             (path.segments == 1 || !self.is_limited()).then_some((point, path.sample))
         });
         let open =
@@ -89,7 +89,7 @@ impl<'a, F: Features> PathTracer<'a, F> {
         }
         for ((ray, met), known) in wave.rays[range].iter().zip(block.iter_mut()).zip(&mut known) {
             if known.is_none()
-                && let Some((Met { point, .. }, path)) = self.asks(wave, ray, met)
+                && let Some((SurfaceInteraction { point, .. }, path)) = self.asks(wave, ray, met)
             {
                 *known = self.bounced(ray, point, path);
             }
@@ -104,8 +104,8 @@ impl<'a, F: Features> PathTracer<'a, F> {
         &self,
         wave: &'b Wave,
         ray: &Ray,
-        met: &'b Option<Met<'a>>,
-    ) -> Option<(&'b Met<'a>, &'b Path)> {
+        met: &'b Option<SurfaceInteraction<'a>>,
+    ) -> Option<(&'b SurfaceInteraction<'a>, &'b Path)> {
         met.as_ref().zip(wave.paths.get(ray.tag as usize)).filter(|(met, path)| {
             met.point.material.surface.may_be_diffuse()
                 && path.share.goes_on_from_rough()

@@ -212,7 +212,7 @@ impl<F: Features> PathTracer<'_, F> {
             for (path, hit) in wave.paths.iter().zip(&*wave.hits).take(count) {
                 self.note(path.place as usize, hit, &frame, &mut strata);
             }
-            self.finish(&mut wave, count, counters);
+            self.trace_to_end(&mut wave, count, counters);
             for path in wave.paths.iter().take(count) {
                 if let Some(slot) = strata.radiance.get_mut(path.place as usize) {
                     *slot = path.radiance;
@@ -236,15 +236,6 @@ impl<F: Features> PathTracer<'_, F> {
         self.fence(&mut record, place, &frame, &strata, counters);
         self.note_overhangs(&mut record, place);
         Ok(Some(record))
-    }
-
-    /// All that follows from the first `active` rays of the wave, which were traced.
-    pub(super) fn finish(&self, wave: &mut Wave, active: usize, counters: &mut Counters) {
-        let mut active = self.go_on(wave, active, counters);
-        while active > 0 {
-            self.trace(wave, active, Coherence::Incoherent, counters);
-            active = self.go_on(wave, active, counters);
-        }
     }
 
     /// The `i`th ray of a gathering, and its path.

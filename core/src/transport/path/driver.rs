@@ -1,0 +1,128 @@
+//! The wavefront: all paths of a wave advance together, one segment at a time, so that the tracer sees batches of rays
+//! (pbrt-v4, chapter 15). Queues are compacted in place: the ray of a path that goes on overwrites one that was already
+//! shaded.
+
+use super::{BLOCK, LIGHTS, PathTracer, SurfaceInteraction};
+use crate::bsdf::Features;
+use crate::bvh::Coherence;
+use crate::sampling::Sampler;
+use crate::scene::SurfacePoint;
+use crate::transport::estimator::{Counters, dimension};
+use crate::transport::shadow::Shadows;
+use crate::transport::wave::Wave;
+use core::ops::Range;
+
+impl<'a, F: Features> PathTracer<'a, F> {
+    /// Traces the first `count` rays of the wave and all that follows from them.
+    pub(in crate::transport) fn advance(&self, wave: &mut Wave, count: usize, counters: &mut Counters) {
+        self.trace(wave, count, Coherence::Coherent, counters);
+        self.trace_to_end(wave, count, counters);
+    }
+
+    /// Finds what the first `active` rays of the wave meet.
+    pub(in crate::transport) fn trace(
+        &self,
+        wave: &mut Wave,
+        active: usize,
+        coherence: Coherence,
+        counters: &mut Counters,
+    ) {
+        counters.rays += active as u64;
+        let rays = &wave.rays[..active];
+        self.bvh.nearest_batch(self.level, rays, coherence, &mut wave.hits[..active]);
+    }
+
+    /// Shades the first `active` rays of the wave, which were traced, and traces what follows until no path is left.
+    pub(in crate::transport) fn trace_to_end(&self, wave: &mut Wave, active: usize, counters: &mut Counters) {
+        let mut active = self.shade_hits(wave, active, counters);
+        while active > 0 {
+            self.trace(wave, active, Coherence::Incoherent, counters);
+            active = self.shade_hits(wave, active, counters);
+        }
+    }
+
+    /// Shades what they met; returns how many rays there are now.
+    pub(in crate::transport) fn shade_hits(
+        &self,
+        wave: &mut Wave,
+        active: usize,
+        counters: &mut Counters,
+    ) -> usize {
+        let (mut going_on, mut shadows) = (0, 0);
+        let mut block = [None; BLOCK];
+        for i in 0..active {
+            if i % BLOCK == 0 {
+                self.prepare_block(wave, i..active.min(i + BLOCK), &mut block, counters);
+            }
+            let (ray, hit) = (wave.rays[i], wave.hits[i]);
+            // Several lights at a vertex have no place where all vertices are lit. Not through cut-outs, which have one each.
+            if shadows + LIGHTS > wave.shadow_rays.len() && !self.has_cutouts {
+                counters.shadow_rays += shadows as u64;
+                self.trace_shadow_rays(wave, core::mem::take(&mut shadows));
+            }
+            let Wave { paths, exchanges, shadow_rays, shadow_light, .. } = wave;
+            let Some(path) = paths.get_mut(ray.tag as usize) else { continue };
+            let Some(exchange) = exchanges.get_mut(ray.tag as usize) else { continue };
+            let mut queue = Shadows { rays: shadow_rays, light: shadow_light, count: shadows };
+            let next =
+                self.shade(path, exchange, (&ray, &hit), block[i % BLOCK].as_ref(), &mut queue, counters);
+            shadows = queue.count;
+            if let Some(mut next) = next {
+                next.tag = ray.tag;
+                wave.rays[going_on] = next;
+                going_on += 1;
+            }
+        }
+        if F::CUTOUT && self.has_cutouts {
+            self.trace_shadow_rays_through_cutouts(wave, shadows, counters);
+        } else {
+            counters.shadow_rays += shadows as u64;
+            self.trace_shadow_rays(wave, shadows);
+        }
+        going_on
+    }
+
+    /// What the rays of `range` have met. All that is read next, of these and of those after them, is asked for first:
+    /// the memory that vertices need is scattered over the scene, and waiting for it would be half of the time.
+    #[inline]
+    fn prepare_block(
+        &self,
+        wave: &Wave,
+        range: Range<usize>,
+        block: &mut [Option<SurfaceInteraction<'a>>; BLOCK],
+        counters: &mut Counters,
+    ) {
+        let mesh = &self.scene.mesh;
+        for hit in wave.hits.iter().skip(range.end + BLOCK).take(BLOCK) {
+            mesh.prefetch_triangle(hit.triangle);
+        }
+        for hit in wave.hits.iter().skip(range.end).take(BLOCK) {
+            mesh.prefetch_corners(hit.triangle);
+        }
+        let met = wave.rays[range.clone()].iter().zip(&wave.hits[range.clone()]);
+        for ((ray, hit), met) in met.zip(block.iter_mut()) {
+            let point = SurfacePoint::at::<F>(self.scene, ray, hit);
+            *met = point.zip(wave.paths.get(ray.tag as usize)).map(|(point, path)| {
+                if F::TEXTURES {
+                    point.material.prefetch(self.scene, point.uv);
+                }
+                let window = self.lights.visibility(point.position, point.frame.normal);
+                if let Some(window) = window {
+                    window.prefetch();
+                }
+                let sampler = Sampler::new(self.settings.seed, path.pixel, path.sample);
+                let light = sampler.pair(dimension::vertex(path.segments.into()) + dimension::LIGHT);
+                SurfaceInteraction { point, light, window, row: None, aim: None, indirect: None }
+            });
+        }
+        for met in block.iter_mut().flatten() {
+            met.row = met.window.map(|window| window.sample_row(met.light[1]));
+        }
+        for met in block.iter_mut().flatten() {
+            met.aim = met.window.zip(met.row).map(|(window, row)| window.sample_in_row(met.light[0], row));
+        }
+        if let Some(caches) = self.caches {
+            self.ask(caches, wave, range, block, counters);
+        }
+    }
+}

@@ -1,0 +1,208 @@
+//! The path tracer that renders: unidirectional, with next-event estimation and multiple importance sampling
+//! (Kajiya 1986; Veach 1997, chapter 9).
+//!
+//! The plain algorithm is [`super::reference`]. Departures from it:
+//! 1. All paths of a wave advance together, one segment at a time, so that the tracer sees batches of rays:
+//!    first alike (camera rays along the Z-curve of a tile), then in no order (bounces).
+//! 2. Queues are compacted in place: the ray of a path that goes on overwrites one that was already shaded.
+//! 3. Shadow rays are traced after all vertices of the wave are shaded, or as many as there is room for; light is added to
+//!    the path then.
+//! 4. Code for what the scene does not have is not compiled in ([`Features`]).
+//! 5. Where that pays, pixels of a circle share what their paths find (`reuse.rs`).
+//! 6. Where an irradiance cache knows the indirect light of a diffuse point, the path need not find it (`cached.rs`), or a
+//!    map of photons does one bounce later, and may ask several points of lights; nor where photons do (`density.rs`, `maps.rs`).
+//! 7. Pixels at the border of a lamp look at it with rays of their own (`outline.rs`).
+//! 8. Where photons of caustics lie, paths and photons share the light that both find (`merge.rs`).
+//!
+//! The price: about 400 bytes for each path of a wave. What a pixel sees depends on (seed, sample) and the pixels of
+//! its circle only, no wave cuts a circle, and samples are summed in their order: the picture has the same bits for
+//! any size of wave and any distribution of tasks.
+
+mod direct;
+mod driver;
+mod scatter;
+mod shade;
+mod shadow_rays;
+
+use super::cached::Caches;
+use super::context::SceneContext;
+use super::density::PhotonLight;
+use super::estimator::{PathSettings, dimension};
+use super::maps::{GatherLight, PhotonMaps};
+use super::merge::Merging;
+use super::wave::Wave;
+use crate::Level;
+use crate::bsdf::Features;
+use crate::bvh::Bvh;
+use crate::cache::irradiance::{Indirect, IrradianceCache, POINTS};
+use crate::film::Tile;
+use crate::geometry::Ray;
+use crate::light::{LightSampler, MarginalSample, VisibilityTable, WarpedSample};
+use crate::memory::Footprint;
+use crate::sampling::Sampler;
+use crate::scene::{Material, Scene, SurfacePoint};
+use core::marker::PhantomData;
+
+/// Paths that advance together where memory allows: enough to fill the tracer's batches, few enough to
+/// stay in the second cache.
+pub const WAVE: usize = 2048;
+
+/// Vertices that are looked at together before they are shaded.
+pub(super) const BLOCK: usize = POINTS;
+
+/// The most points of lights that a vertex asks.
+pub const LIGHTS: usize = 4;
+
+/// Path tracing of one scene: a pass whose tasks are the tiles of the picture.
+#[derive(Clone, Copy)]
+pub struct PathTracer<'a, F> {
+    pub(super) scene: &'a Scene<'a>,
+    pub(super) bvh: &'a Bvh<'a>,
+    pub(super) lights: &'a LightSampler<'a>,
+    pub(super) settings: PathSettings,
+    pub(super) level: Level,
+    /// Some surfaces let a part of the light through, so that a shadow ray may go on behind a hit.
+    pub(super) has_cutouts: bool,
+    /// Photons are known by the bases of narrow coats alone (`shoot::is_varnished`).
+    apart: bool,
+    /// Some surfaces may reflect or refract into one direction only.
+    pub(super) has_mirrors: bool,
+    pub(super) caches: Option<Caches<'a>>,
+    photons: Option<PhotonLight<'a>>,
+    /// Of even and of odd samples.
+    maps: Option<&'a [PhotonMaps<'a>; 2]>,
+    merging: Option<Merging<'a>>,
+    /// Light that was reflected before, where caches do not know it: of even and of odd samples.
+    pub(super) bounced: Option<[GatherLight<'a>; 2]>,
+    /// Points of lights that paths of the picture ask where a shadow ray alone finds direct light.
+    pub(super) asked: u32,
+    /// Light that is not all shared, for each sample; see `reuse.rs`.
+    pub(super) flash: f32,
+    features: PhantomData<F>,
+}
+
+impl<'a, F: Features> PathTracer<'a, F> {
+    /// A path tracer over frozen structures. `F` has at least the features of the scene
+    /// ([`crate::census`] tells which).
+    pub fn new(
+        scene: &'a Scene<'a>,
+        bvh: &'a Bvh<'a>,
+        lights: &'a LightSampler<'a>,
+        settings: PathSettings,
+        level: Level,
+    ) -> Self {
+        let has_cutouts = scene.materials.iter().any(Material::has_cutout);
+        let has_mirrors = scene.materials.iter().any(|material| material.surface.may_be_smooth());
+        Self {
+            scene,
+            bvh,
+            lights,
+            settings,
+            level,
+            has_cutouts,
+            apart: !lights.have_deltas(),
+            has_mirrors,
+            caches: None,
+            photons: None,
+            maps: None,
+            merging: None,
+            bounced: None,
+            asked: 1,
+            flash: f32::INFINITY,
+            features: PhantomData,
+        }
+    }
+
+    /// The same, where diffuse points have their indirect light from a cache as far as it reaches: even samples from the
+    /// first, odd ones from the second. Pixels must not share their paths as well. Where depth is limited only the
+    /// first point of a path is served, for records do not know how far they are from the camera.
+    pub fn with_caches(&self, caches: [&'a IrradianceCache<'a>; 2]) -> Self {
+        Self { caches: Some(Caches::Halves(caches)), ..*self }
+    }
+
+    /// The same, for rays that gather for the cache itself, as it is now.
+    pub fn with_growing_cache(&self, cache: &'a IrradianceCache<'a>) -> Self {
+        Self { caches: Some(Caches::Growing(cache)), ..*self }
+    }
+
+    /// The same, where paths with caches that come by a diffuse bounce to a point that these do not know have its indirect
+    /// light from photons that were reflected before: even samples from the first, odd ones from the second.
+    pub fn with_bounced(&self, photons: [GatherLight<'a>; 2]) -> Self {
+        Self { bounced: Some(photons), ..*self }
+    }
+
+    /// The same, where a path of the picture asks so many points of lights, [`LIGHTS`] at most, at a vertex whose other light a
+    /// cache knows. Not where surfaces have cut-outs.
+    pub fn with_lights(&self, count: usize) -> Self {
+        let most = if self.has_cutouts { 1 } else { LIGHTS };
+        Self { asked: count.clamp(1, most) as u32, ..*self }
+    }
+
+    /// The same, where surfaces with a diffuse part have from photons what light is reflected onto them. Pixels must
+    /// not share their paths as well. Where depth is limited only the first point of a path is served, for photons do
+    /// not know how far they are from their light.
+    pub fn with_photons(&self, photons: PhotonLight<'a>) -> Self {
+        Self { photons: Some(photons), ..*self }
+    }
+
+    /// The same, where surfaces with a diffuse part have caustics from photons, and rays that gather from there end in a
+    /// map of photons: even samples in the first, odd ones in the second. Pixels must not share their paths as well.
+    /// Where depth is limited only the first point of a path is served.
+    pub fn with_maps(&self, maps: &'a [PhotonMaps<'a>; 2]) -> Self {
+        Self { maps: Some(maps), ..*self }
+    }
+
+    /// The same, joined with photons of caustics.
+    pub fn with_caustics(&self, merging: Merging<'a>) -> Self {
+        Self { merging: Some(merging), ..*self }
+    }
+
+    /// The same, where pixels share what their paths find, or do not.
+    pub fn with_reuse(&self, reuse: bool) -> Self {
+        Self { settings: PathSettings { reuse, ..self.settings }, ..*self }
+    }
+
+    /// Whether paths have a limit of depth.
+    pub fn is_limited(&self) -> bool {
+        self.settings.is_limited()
+    }
+
+    /// Scene, hierarchy and level.
+    pub(super) fn context(&self) -> SceneContext<'a, F> {
+        SceneContext::new(self.scene, self.bvh, self.level)
+    }
+
+    /// Number of tasks: tiles of the film.
+    pub fn tasks(&self) -> usize {
+        Tile::count(self.settings.width, self.settings.height)
+    }
+
+    /// Working memory of one task that advances `wave` paths together.
+    pub fn scratch(wave: usize) -> Footprint {
+        Wave::footprint(wave)
+    }
+
+    /// The camera ray of a sample of the pixel in column `x` and row `y`.
+    #[inline]
+    pub(super) fn camera_ray(&self, [x, y]: [u32; 2], sampler: &Sampler) -> Ray {
+        let PathSettings { width, height, .. } = self.settings;
+        let [dx, dy] = sampler.pair(dimension::PIXEL);
+        let has_lens = self.scene.camera.lens_radius > 0.0;
+        let lens = if has_lens { sampler.pair(dimension::LENS) } else { [0.0; 2] };
+        self.scene.camera.ray(width, height, x as f32 + dx, y as f32 + dy, lens)
+    }
+}
+
+/// A vertex that is about to be shaded.
+#[derive(Clone, Copy)]
+pub(super) struct SurfaceInteraction<'a> {
+    pub(super) point: SurfacePoint<'a>,
+    /// Where light is looked for.
+    light: [f32; 2],
+    /// The same through the window, found step by step, so that nobody waits for memory.
+    window: Option<&'a VisibilityTable>,
+    row: Option<MarginalSample>,
+    aim: Option<WarpedSample>,
+    /// What a cache says of it.
+    pub(super) indirect: Option<Indirect>,
+}
