@@ -1,3 +1,4 @@
-//! Light that is computed at few places and reused at many.
+//! Light that is computed at a few points and reused at many.
 
 pub mod irradiance;
+mod octree;

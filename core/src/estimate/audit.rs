@@ -8,10 +8,10 @@
 //! of its pixels instead of a few.
 
 use super::interval::{ErrorEstimate, Z};
-use super::metric::DARK;
+use super::metric::{DARK, ROUNDING};
 use crate::Rgb;
 use crate::film::Pixel;
-use libm::{cbrt, erfc, fabs, hypot, log, sqrt};
+use libm::{cbrt, fabs, hypot, sqrt};
 
 /// The unknown reference in a denominator comes from the part of the audit that is not in the numerator: what made a
 /// pixel of the picture bright by chance must not make its error small. Where light is rare the part may lack it, so
@@ -21,9 +21,6 @@ const DOUBT: f64 = 4.0;
 
 /// The normal distribution lies below this with 95 %.
 const ONE_SIDED: f64 = 1.644_853_626_951_472_7;
-
-/// Relative differences of pictures that add up the same light in another order.
-const ROUNDING: f64 = 1e-6;
 
 /// What an audited pixel says.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -187,52 +184,13 @@ impl ErrorEstimate {
     }
 }
 
-/// By how much a part of a picture is too bright, relative to the truth, in the mean.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Deviation {
-    /// Its estimate; negative: too dark.
-    pub mean: f64,
-    /// Its standard error.
-    pub error: f64,
-    /// From how many pixels.
-    pub pixels: u32,
-}
-
-impl Deviation {
-    /// From the deviations of some pixels.
-    pub fn of(values: impl Iterator<Item = f64>) -> Self {
-        // Welford 1962.
-        let (mut pixels, mut mean, mut squares) = (0, 0.0, 0.0);
-        for value in values {
-            pixels += 1;
-            let before = value - mean;
-            mean += before / f64::from(pixels);
-            squares += before * (value - mean);
-        }
-        let n = f64::from(pixels);
-        let error =
-            if pixels > 1 { sqrt(squares / (n * (n - 1.0)) + ROUNDING * ROUNDING) } else { f64::INFINITY };
-        Self { mean, error, pixels }
-    }
-
-    /// The probability to see as much or more where there is nothing: the two tails of Student's t, after Wallace
-    /// (1959), right to a few hundredths of itself from three degrees of freedom on.
-    pub fn chance(&self) -> f64 {
-        if self.pixels < 4 || !self.error.is_finite() {
-            return 1.0;
-        }
-        let freedom = f64::from(self.pixels - 1);
-        let t = fabs(self.mean) / self.error;
-        let z = (8.0 * freedom + 1.0) / (8.0 * freedom + 3.0) * sqrt(freedom * log(1.0 + t * t / freedom));
-        erfc(z * core::f64::consts::FRAC_1_SQRT_2)
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::estimate::Deviation;
     use crate::film::Dropped;
     use crate::sampling::Random;
+    use libm::log;
     use std::vec::Vec;
 
     /// A pixel of `light` and uniform noise of ± 1 a sample.
@@ -428,17 +386,5 @@ mod tests {
         assert!(BiasEstimate::of([].into_iter()).is_none());
         let truth = pixel(2.0, 3, Random::new(0, 1));
         assert!(Finding::of(&pixel(2.0, 8, Random::new(0, 0)), &truth, Rgb::ONE, 1.0).is_none());
-        assert_eq!(Deviation::of([1.0].into_iter()).chance(), 1.0);
-        // Two pictures of the same lamp, added up in another order.
-        let same = [1e-7, -1e-7, 1e-7, 1e-7].into_iter();
-        assert!(Deviation::of(same).chance() > 0.5);
-    }
-
-    #[test]
-    fn chances_are_those_of_the_tables() {
-        for (freedom, t, chance) in [(4, 2.776, 0.05), (15, 4.073, 0.001), (60, 2.0, 0.05)] {
-            let found = Deviation { mean: t, error: 1.0, pixels: freedom + 1 }.chance();
-            assert!((found / chance - 1.0).abs() < 0.06, "{found} {chance}");
-        }
     }
 }

@@ -7,6 +7,9 @@ use crate::Rgb;
 /// Share of the squared mean that keeps relMSE finite where the reference is dark.
 pub(super) const DARK: f64 = 0.01;
 
+/// Relative differences of pictures that add up the same light in another order.
+pub(super) const ROUNDING: f64 = 1e-6;
+
 /// How a picture differs from a reference of the same size, over pixels and channels.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Difference {

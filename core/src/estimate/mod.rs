@@ -2,6 +2,7 @@
 
 mod audit;
 mod blur;
+mod deviation;
 mod filter;
 mod interval;
 mod metric;
@@ -10,8 +11,9 @@ mod seen;
 mod shrinkage;
 mod tile;
 
-pub use audit::{BiasEstimate, Deviation, Finding};
+pub use audit::{BiasEstimate, Finding};
 pub use blur::TileBlur;
+pub use deviation::Deviation;
 pub use filter::{filtered, filtered_pixel};
 pub use interval::ErrorEstimate;
 pub use metric::{Difference, mse, relmse, rmse};

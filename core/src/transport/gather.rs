@@ -10,7 +10,7 @@ use super::reuse::Exchange;
 use super::wave::{Path, Share, Wave};
 use crate::bsdf::Features;
 use crate::bvh::Coherence;
-use crate::cache::irradiance::{Asker, CellFlux, FINE, Hemisphere, Record, metric, reach};
+use crate::cache::irradiance::{Asker, CellFlux, FINE, Hemisphere, Record, metric, validity};
 use crate::geometry::{Frame, Hit, MISS, Ray};
 use crate::memory::{Arena, Footprint, OutOfMemory};
 use crate::sampling::Sampler;
@@ -228,7 +228,7 @@ impl<F: Features> PathTracer<'_, F> {
         };
         let picture = place.pixel * libm::sqrtf(self.settings.width as f32 * self.settings.height as f32);
         let settings = metric::Settings { least: least_pixels * place.pixel, ..metric.within(picture) };
-        let reach = reach(&settings, &derivatives);
+        let reach = validity(&settings, &derivatives);
         let mut record = Record::new(place.position(), &frame, &derivatives, &reach);
         let luminance = derivatives.luminance();
         record.note_noise(if luminance > 0.0 { variance / (luminance * luminance) } else { 0.0 });

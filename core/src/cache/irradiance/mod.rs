@@ -3,21 +3,25 @@
 //! the [`IrradianceCache`] all records.
 
 pub mod derivatives;
+mod evaluate;
 mod hemisphere;
 mod lanes;
 pub mod metric;
-mod octree;
+mod neighbours;
 mod packet;
 mod record;
 mod store;
+mod validity;
 
+pub use super::octree::POINTS;
 pub use derivatives::{CellFlux, Derivatives, Hessian};
 pub use hemisphere::{Hemisphere, SIDE_MAX};
 pub use lanes::Asker;
-pub use metric::{Metric, Reach, reach};
-pub use packet::{POINTS, Points};
+pub use metric::Metric;
+pub use packet::Points;
 pub use record::{CLOSE, FINE, Record, SECTORS};
 pub use store::{GREATEST_DEVIATION, Indirect, IrradianceCache};
+pub use validity::{Validity, validity};
 
 #[cfg(test)]
 mod placement;

@@ -6,14 +6,11 @@
 //! sixteen lanes.
 
 use super::lanes::{Asked, Asker, Sixteen};
-use super::octree::Visit;
 use super::record::Record;
 use super::store::{Indirect, IrradianceCache};
+use crate::cache::octree::{POINTS, Visit};
 use crate::{Level, Rgb};
 use halflight_simd::{Kernel, Lanes, Mask, Simd};
-
-/// Points that ask at once.
-pub const POINTS: usize = 16;
 
 /// Points, and the unit normals of their surfaces.
 #[derive(Clone, Copy, Debug)]

@@ -2,7 +2,7 @@
 //! random order wherever none reaches yet, and what is interpolated of them is held against the truth.
 
 use super::rooms::{Gather, LIGHT, OPEN, Random, Room, SHADOW, WALLS, with_tables};
-use super::{Asker, Derivatives, IrradianceCache, Metric, Record, metric};
+use super::{Asker, Derivatives, IrradianceCache, Metric, Record, metric, validity};
 use crate::Level;
 use crate::geometry::{Bounds, Frame};
 use crate::light::luminance;
@@ -69,7 +69,7 @@ impl Floor {
         let frame = Frame { tangent: Vec3::X, bitangent: Vec3::Y, normal: Vec3::Z };
         for &i in &self.order {
             if !cache.covers(&Asker::open(self.points[i], Vec3::Z)) {
-                let reach = metric::reach(&settings, &derivatives[i]);
+                let reach = validity(&settings, &derivatives[i]);
                 let mut record = Record::new(self.points[i], &frame, &derivatives[i], &reach);
                 record.note_noise(self.noise[i]);
                 cache.insert(record);

@@ -2,8 +2,9 @@
 
 use super::*;
 use crate::Level;
-use crate::cache::irradiance::metric::{Metric, Settings, reach};
+use crate::cache::irradiance::metric::{Metric, Settings};
 use crate::cache::irradiance::rooms::{Gather, LIGHT, OPEN, Random, Room, SHADOW, WALLS, with_tables};
+use crate::cache::irradiance::validity;
 use core::hint::black_box;
 use std::println;
 use std::time::Instant;
@@ -173,7 +174,7 @@ fn print_times() {
                 };
                 let borders = time(&|| {
                     let found = black_box(tables).derivatives(level, black_box(&hemisphere)).unwrap();
-                    black_box(reach(&settings, &found));
+                    black_box(validity(&settings, &found));
                 });
                 let mesh = time(&|| {
                     black_box(closed_mesh(level, black_box(&hemisphere)));

@@ -4,11 +4,13 @@
 //!
 //! Supports may shrink later, never grow: what the tree finds is then more than what reaches.
 
-use super::packet::POINTS;
 use crate::geometry::Bounds;
 use crate::memory::{Arena, Footprint, OutOfMemory};
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
+
+/// Points that may go down the tree together.
+pub const POINTS: usize = 16;
 
 /// The deepest level: cells are counted in `1 << DEPTH` along a side.
 const DEPTH: u32 = 16;
