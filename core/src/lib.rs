@@ -3,13 +3,15 @@
 //! The core allocates nothing, spawns no thread and holds no lock. Every structure states its
 //! [`memory::Footprint`] before it is built and lives in an [`memory::Arena`] over the caller's bytes.
 //!
-//! The modules are layers: each imports only those above it in this list, which `cargo verify source` enforces.
+//! The modules are layers: each imports only those above it in this list, which `cargo verify source`
+//! enforces.
 //!
 //! - [`memory`], [`geometry`], [`sampling`]: arenas, vectors and rays, random numbers and their warps.
 //! - [`scene`]: borrowed views of the meshes, materials, textures, lights and the camera to render.
 //! - [`bsdf`]: scattering at a point. [`bvh`]: ray tracing. [`light`]: sampling of all lights together.
 //! - [`film`]: pixels and tiles. [`photon`]: photon maps. [`cache`]: irradiance with its derivatives.
-//! - [`estimate`]: the error of a picture. [`census`]: the kinds of things in a scene, and the code they need.
+//! - [`estimate`]: the error of a picture. [`census`]: the kinds of things in a scene, and the code they
+//!   need.
 //! - [`transport`]: the methods.
 #![no_std]
 #![forbid(unsafe_code)]

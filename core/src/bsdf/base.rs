@@ -1,5 +1,5 @@
-//! The diffuse part of a surface, and how the light that it sends back depends on where it goes: by the share that
-//! passes the coat, which is known for any direction.
+//! The diffuse part of a surface, and how the light that it sends back depends on where it goes: by the share
+//! that passes the coat, which is known for any direction.
 
 use super::albedo::{self, SchlickAlbedo};
 use super::{Bsdf, coated};

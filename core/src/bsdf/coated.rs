@@ -14,9 +14,9 @@ use crate::sampling::warp::cosine_hemisphere;
 use core::f32::consts::FRAC_1_PI;
 use glam::Vec3;
 
-/// How much more a direction from the coat is worth than one from the base. Shadow rays find the lamps that the base
-/// reflects; those that show in the coat it has to find alone. In a room whose floor mirrors its windows 2 takes a
-/// seventh off the variance of the floor and 3.5 a fifth.
+/// How much more a direction from the coat is worth than one from the base. Shadow rays find the lamps that
+/// the base reflects; those that show in the coat it has to find alone. In a room whose floor mirrors its
+/// windows 2 takes a seventh off the variance of the floor and 3.5 a fifth.
 const ALONE: f32 = 2.0;
 
 /// A kind of coat.
@@ -43,15 +43,15 @@ pub(super) trait Coat {
     }
 }
 
-/// Whether the peak of the coat outshines a diffuse surface: of GGX at normal incidence that is F / (4 π α²), here to a
-/// quarter of a white one's 1 / π.
+/// Whether the peak of the coat outshines a diffuse surface: of GGX at normal incidence that is F / (4 π α²),
+/// here to a quarter of a white one's 1 / π.
 #[inline]
 pub(super) fn is_narrow(coat: &impl Coat) -> bool {
     coat.alpha() * coat.alpha() < coat.reflectance(1.0).max_element()
 }
 
-/// As [`sample`], by base or coat alone: weight and density are of that one, with the probability of its choice. Whether it
-/// was the coat.
+/// As [`sample`], by base or coat alone: weight and density are of that one, with the probability of its
+/// choice. Whether it was the coat.
 #[inline]
 pub(super) fn sample_apart(coat: &impl Coat, wo: Vec3, u: [f32; 3]) -> Option<(BsdfSample, bool)> {
     let transmittance_o = coat.transmittance(wo.z);

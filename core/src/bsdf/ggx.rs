@@ -44,9 +44,9 @@ impl Ggx {
         2.0 * c / (c + self.stretch(v))
     }
 
-    /// G / (4 cos θ_o cos θ_i) of a reflection, masking and shadowing independent (Walter 2007, eq. 23), as in
-    /// the renderers that published scenes were made for. Correlating them by height (Heitz 2014, eq. 99) would
-    /// return a little more at grazing angles.
+    /// G / (4 cos θ_o cos θ_i) of a reflection, masking and shadowing independent (Walter 2007, eq. 23), as
+    /// in the renderers that published scenes were made for. Correlating them by height (Heitz 2014, eq. 99)
+    /// would return a little more at grazing angles.
     #[inline]
     pub fn visibility(&self, wo: Vec3, wi: Vec3) -> f32 {
         1.0 / ((wo.z + self.stretch(wo)) * (wi.z + self.stretch(wi)))

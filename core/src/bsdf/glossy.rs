@@ -24,7 +24,8 @@ pub struct Glossy {
     alpha: f32,
 }
 
-/// Less than this passes the coat at grazing angles only: what the base would add there is noise, and is lost.
+/// Less than this passes the coat at grazing angles only: what the base would add there is noise, and is
+/// lost.
 const LEAST_MEAN: f32 = 0.02;
 
 impl Glossy {

@@ -162,8 +162,8 @@ impl Bsdf {
         Seen { base_alone, ..self.seen::<F>(wo) }
     }
 
-    /// As [`Bsdf::sample`] of a surface with a rough coat, by its base or its coat alone: weight and density are of that one,
-    /// with the probability of its choice. Whether it was the coat.
+    /// As [`Bsdf::sample`] of a surface with a rough coat, by its base or its coat alone: weight and density
+    /// are of that one, with the probability of its choice. Whether it was the coat.
     #[inline]
     pub(crate) fn sample_apart<F: Features>(&self, wo: Vec3, u: [f32; 3]) -> Option<(BsdfSample, bool)> {
         let wo = above_horizon(wo);

@@ -68,8 +68,8 @@ impl RoughDielectric {
             let lobe = ggx.density(h) * ggx.visibility(wo, wi) * wi.z;
             return (Rgb::splat(reflectance * lobe), p * ggx.visible_density(wo, h, c) / (4.0 * c));
         }
-        // The normal that refracts wo to wi (Walter 2007, eq. 16) points to where the index is lower; turned to the
-        // viewer. One in the surface may seem to be below it.
+        // The normal that refracts wo to wi (Walter 2007, eq. 16) points to where the index is lower; turned
+        // to the viewer. One in the surface may seem to be below it.
         let h = (wo + self.eta * wi) * 1f32.copysign(1.0 - self.eta);
         if h.z < -ROUNDING {
             return (Rgb::ZERO, 0.0);

@@ -35,8 +35,8 @@ const PACKET_MIN: usize = 12;
 /// Most rays that wait to be traced in step.
 const ALONE: usize = 512;
 
-/// Rays that come tile by tile. Those of a tile that go the same way make a packet, the others are left for the
-/// stream.
+/// Rays that come tile by tile. Those of a tile that go the same way make a packet, the others are left for
+/// the stream.
 pub(super) struct Tiles<'a, 'm> {
     pub bvh: &'a Bvh<'m>,
     pub rays: &'a [Ray],

@@ -1,8 +1,9 @@
-//! What lies around a place on a surface, in one walk: whether anything rises above its plane, or hangs over it, and
-//! where the surface goes on. Rays tell the same (`transport/density.rs`), and cost ten times as much.
+//! The surroundings of a point on a surface, in one traversal: whether anything rises above the tangent plane
+//! or overhangs the point, and where the surface continues. Rays answer the same questions
+//! (`transport/density.rs`) at ten times the cost.
 //!
-//! It is sure where it says that nothing rises or hangs, and that the surface goes on. Where it says otherwise, rays may
-//! find that it is not so.
+//! The answer is conservative: "nothing rises", "nothing overhangs" and "the surface continues" are certain;
+//! the opposite answers are not, and rays may refute them.
 
 use super::Bvh;
 use super::layout::{Node, WIDTH};
@@ -10,14 +11,14 @@ use super::leaf::corners_of;
 use crate::geometry::Frame;
 use glam::Vec3;
 
-/// Points at which it is asked for the surface.
+/// Points at which the surface is looked for.
 pub const POINTS: usize = 8;
 
-/// Children that may wait. A place around which more do is too crowded to be sure of anything.
+/// Size of the traversal stack. If it overflows, the surroundings count as closed.
 const WAITING: usize = 64;
 
-/// What hangs over a place has a plane that is at least so high above it, in reaches, and at most sixty degrees steep.
-/// The planes of a surface that bends upwards pass below.
+/// An overhang has a plane at least this high above the point, in units of the reach, and at most sixty
+/// degrees steep. The planes of a surface that bends upwards pass below.
 const STEP: f32 = 0.01;
 const STEEPEST: f32 = 0.5;
 
@@ -28,11 +29,11 @@ pub struct ClearanceQuery {
     pub place: Vec3,
     /// Whose z axis is the normal.
     pub frame: Frame,
-    /// Half the edge of the cube around it, along the axes of the world, of which all is looked at.
+    /// Half the edge of the axis-aligned cube that is searched.
     pub reach: f32,
-    /// Points on the plane, from the middle: their places along the other two axes of the frame.
+    /// Points on the plane relative to the middle, along the two tangents of the frame.
     pub points: [[f32; POINTS]; 2],
-    /// How far from the plane the surface may be there, as far as it is within the cube.
+    /// Largest distance of the surface from the plane there, within the cube.
     pub depth: f32,
 }
 
@@ -141,8 +142,8 @@ impl ClearanceQuery {
             clearance.hangs |= !(is_steep || passes_below);
             return;
         }
-        // Twice the areas that a point makes with the sides, which are linear in it; and what these are in weights of
-        // the corners' heights.
+        // Twice the areas that a point makes with the sides, which are linear in it; and what these are in
+        // weights of the corners' heights.
         let side = |from: Vec3, to: Vec3| [from.x * to.y - from.y * to.x, from.y - to.y, to.x - from.x];
         let sides = [side(b, c), side(c, a), side(a, b)];
         let mut surface = [0; POINTS];

@@ -21,8 +21,8 @@ pub(super) fn corners_of(runs: &[f32], count: usize, i: usize) -> [[f32; 3]; 3] 
     corners
 }
 
-/// Takes over the best hit of a leaf into `best`: the nearest, and of equals that of the lowest index. `best` is
-/// no hit, or no nearer than where `ray` ends.
+/// Takes over the best hit of a leaf into `best`: the nearest, and of equals that of the lowest index. `best`
+/// is no hit, or no nearer than where `ray` ends.
 #[inline(always)]
 pub(super) fn take<S: Simd>(
     simd: S,

@@ -52,8 +52,8 @@ pub struct Bvh<'m> {
 }
 
 impl<'m> Bvh<'m> {
-    /// Bytes that [`Bvh::build`] wants of the arena. What it keeps of them is [`Bvh::kept_footprint`]; the rest
-    /// is working memory, free again when it returns.
+    /// Bytes that [`Bvh::build`] wants of the arena. What it keeps of them is [`Bvh::kept_footprint`]; the
+    /// rest is working memory, free again when it returns.
     pub fn footprint(triangles: usize) -> Footprint {
         build::kept_footprint(triangles).and(build::working_footprint(triangles))
     }
@@ -71,7 +71,8 @@ impl<'m> Bvh<'m> {
         build::build(mesh, arena, Level::BASELINE, &Serial)
     }
 
-    /// Builds over `mesh` with the instructions of `level` on the cores that `join` brings. The same tree, to the bit.
+    /// Builds over `mesh` with the instructions of `level` on the cores that `join` brings. The same tree, to
+    /// the bit.
     ///
     /// # Errors
     /// [`OutOfMemory`] when the arena is smaller than [`Bvh::footprint`].

@@ -3,10 +3,10 @@
 //! Plainly: all rays of the packet walk the tree together, so a node is fetched and tested once for all.
 //! 1. A node's eight boxes are tested at once against the interval of all rays, and visited in the order that
 //!    the build has prepared for the octant of the directions.
-//! 2. At a leaf the rays are tested against its box, sixteen at a time. The interval of all rays leaves out the
-//!    triangles that none can meet, and the rest is tested against sixteen rays at a time.
-//! 3. The rays of a packet agree in the signs of their directions and in their dominant axis: the caller sorts
-//!    them so ([`class`]).
+//! 2. At a leaf the rays are tested against its box, sixteen at a time. The interval of all rays leaves out
+//!    the triangles that none can meet, and the rest is tested against sixteen rays at a time.
+//! 3. The rays of a packet agree in the signs of their directions and in their dominant axis: the caller
+//!    sorts them so ([`class`]).
 //! 4. Where all start at the same point, as those of a pinhole do, that is subtracted once for all.
 //!
 //! The price: a packet whose rays diverge visits nodes that few rays of it meet.

@@ -37,8 +37,8 @@ pub(super) fn capacity(triangles: usize) -> usize {
     triangles.saturating_add(triangles / SPLIT_SHARE).min(Child::REFERENCES_MAX)
 }
 
-/// Corners of a triangle that a ray can hit: finite, and not all on one line. Areas of a triangle without area
-/// are rounding alone, so that a ray might meet it anywhere.
+/// Corners of a triangle that a ray can hit: finite, and not all on one line. Areas of a triangle without
+/// area are rounding alone, so that a ray might meet it anywhere.
 pub(super) fn hittable(mesh: &Mesh, triangle: u32) -> Option<[Vec3; 3]> {
     let [a, b, c] = mesh.corners(triangle);
     let finite = a.is_finite() && b.is_finite() && c.is_finite();
@@ -166,7 +166,8 @@ pub(super) fn divide(corners: [Vec3; 3], bounds: Bounds, axis: usize, plane: f32
             let (p, q, a, b) = if a < b { (p, q, a, b) } else { (q, p, b, a) };
             let mut x = p.lerp(q, ((plane - a) / (b - a)).clamp(0.0, 1.0));
             x[axis] = plane;
-            // The interpolated point is off the edge by the rounding of the weight and of the sum: widen by both.
+            // The interpolated point is off the edge by the rounding of the weight and of the sum: widen by
+            // both.
             let slack = (p.abs().max(q.abs())) * (4.0 * f32::EPSILON);
             left = left.union(Bounds { min: x - slack, max: x + slack });
             right = right.union(Bounds { min: x - slack, max: x + slack });

@@ -1,13 +1,14 @@
-//! Rays in no order, each on its own way but in step: of [`SLOTS`] rays in flight, first all those at a node take
-//! a step, then all those at a leaf, then those that found something, and those that are done make room.
+//! Rays in no order, each on its own way but in step: of [`SLOTS`] rays in flight, first all those at a node
+//! take a step, then all those at a leaf, then those that found something, and those that are done make room.
 //!
-//! A walk alone is a chain of dependent steps with branches that cannot be guessed. In step, the same is done for
-//! one independent walk after the other:
-//! 1. Which walks do the same next is a set of bits. What is guessed wrong is the end of a set, not every step.
+//! A walk alone is a chain of dependent steps with branches that cannot be guessed. In step, the same is done
+//! for one independent walk after the other:
+//! 1. Which walks do the same next is a set of bits. What is guessed wrong is the end of a set, not every
+//!    step.
 //! 2. Nothing on a stack needs a test when it is taken: a new best hit has taken off all that is farther.
 //! 3. Rays are set up in a loop of their own, [`AHEAD`] at a time.
-//! 4. Any-hit walks visit what is cheap for its size first ([`super::collapse`] lays the children out so): near
-//!    boxes first was slower.
+//! 4. Any-hit walks visit what is cheap for its size first ([`super::collapse`] lays the children out so):
+//!    near boxes first was slower.
 
 use super::Bvh;
 use super::layout::Child;
@@ -187,8 +188,8 @@ fn pop(slots: &mut u32) -> Option<usize> {
     Some(lowest)
 }
 
-/// Takes a child from the stack, and asks the memory for what is in it; for any-hit rays, which take fewer steps,
-/// that costs more than it brings.
+/// Takes a child from the stack, and asks the memory for what is in it; for any-hit rays, which take fewer
+/// steps, that costs more than it brings.
 #[inline(always)]
 fn take_next<S: Simd, const ANY: bool>(simd: S, bvh: &Bvh, stack: &mut Stack) -> u32 {
     let child = Child(stack.pop().unwrap_or(DONE.0));

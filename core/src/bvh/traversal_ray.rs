@@ -92,8 +92,8 @@ fn unpack(axes: u32) -> [usize; 3] {
     [axes as usize & 3, (axes >> 8) as usize & 3, (axes >> 16) as usize & 3]
 }
 
-/// [`Shear::axes`], a byte each, by the signs of the direction (low three bits) and by which of its components
-/// are the larger ones: x of x and y, x of x and z, y of y and z.
+/// [`Shear::axes`], a byte each, by the signs of the direction (low three bits) and by which of its
+/// components are the larger ones: x of x and y, x of x and z, y of y and z.
 static AXES: [u32; 64] = {
     let mut table = [0; 64];
     let mut i = 0;

@@ -1,8 +1,10 @@
-//! An octree over the supports of records: each is linked from the cells that its box touches, at the depth where cells
-//! are just larger than it, or somewhat smaller where there is memory for more links, so that a point finds all records
-//! that reach it on one way down (Ward, Rubinstein and Clear 1988, §3, with boxes in place of spheres).
+//! An octree over the supports of records. Each record is linked from the cells that its box touches, at the
+//! depth where cells are just larger than the box, or deeper where memory allows more links. A point thus
+//! finds all records that reach it on one way down (Ward, Rubinstein and Clear 1988, section 3, with boxes in
+//! place of spheres).
 //!
-//! Supports may shrink later, never grow: what the tree finds is then more than what reaches.
+//! Supports may shrink later but never grow: the tree then finds more records than reach a point, never
+//! fewer.
 
 use crate::geometry::Bounds;
 use crate::memory::{Arena, Footprint, OutOfMemory};
@@ -21,14 +23,14 @@ const CELLS: usize = 8;
 /// Links of a record: from these, and from the one that its center lies in.
 const LINKS: usize = CELLS + 1;
 
-/// Levels that a record may be linked deeper than that where there is memory: points find fewer records in vain.
+/// A record may be linked this many levels deeper if there is memory: points then find fewer records in vain.
 const FINER: u32 = 2;
 
 /// The most cells that it is linked from then.
 const MOST_CELLS: usize = 128;
 
-/// Nodes that there is memory for, for each record. Where they run out, records stay higher up: found more often than
-/// they would have to be, never less.
+/// Nodes for each record. When they run out, records are linked higher up: they are found more often than
+/// necessary, never less.
 const NODES_PER_RECORD: usize = 3;
 
 /// Nodes for the first few records: a record makes a whole way down.
@@ -37,8 +39,8 @@ const FIRST_NODES: usize = 1 + CELLS * DEPTH as usize;
 /// Columns, rows and layers from the lowest corner of the root.
 type Cell = [u32; 3];
 
-/// Children by octant, and the first links of the lists of records that touch the cell and of those whose centers lie in it;
-/// 0 where there is none.
+/// Children by octant, and the first links of the lists of records that touch the cell and of those whose
+/// centers lie in it; 0 where there is none.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C)]
 struct Node {
@@ -112,8 +114,8 @@ impl<'m> Octree<'m> {
         self.links.len() - self.used_links >= LINKS
     }
 
-    /// Links `record`, whose support lies within `extent` of `center`, from all cells that it touches: such as are larger than
-    /// the box, or a quarter of that where links are left for `others` records more.
+    /// Links `record`, whose support lies within `extent` of `center`, from all cells that it touches: such
+    /// as are larger than the box, or a quarter of that where links are left for `others` records more.
     pub(super) fn insert(&mut self, record: u32, center: Vec3, extent: Vec3, others: usize) {
         let (low, high) = (self.cell(center - extent), self.cell(center + extent));
         // The deepest level at which the box touches no more than two cells along each side.
@@ -205,8 +207,8 @@ impl<'m> Octree<'m> {
         }
     }
 
-    /// Of sixteen points, coordinate by coordinate, the `wanted` ones (bit by bit) find what each finds by [`Octree::at`],
-    /// in the same order; those that are in the same cells together.
+    /// Of sixteen points, coordinate by coordinate, the `wanted` ones (bit by bit) find what each finds by
+    /// [`Octree::at`], in the same order; those that are in the same cells together.
     #[inline(always)]
     pub(super) fn at_all<V: Visit>(&self, points: &[[f32; POINTS]; 3], wanted: u32, visitor: &mut V) {
         let [x, y, z] = points;
@@ -264,7 +266,8 @@ impl<'m> Octree<'m> {
         }
     }
 
-    /// Calls `visit` with all records whose centers lie in the box around `center`, and with some more; each once.
+    /// Calls `visit` with all records whose centers lie in the box around `center`, and with some more; each
+    /// once.
     pub(super) fn around(&self, center: Vec3, extent: f32, mut visit: impl FnMut(u32)) {
         let (low, high) = (self.cell(center - extent), self.cell(center + extent));
         // Nodes to visit: index, level, cell. A level leaves seven open at most.

@@ -1,11 +1,11 @@
-//! The audit: what a biased picture is off by, from a few of its pixels that an unbiased estimator renders as well
-//! (docs/decisions/0011).
+//! The audit: what a biased picture is off by, from a few of its pixels that an unbiased estimator renders as
+//! well (docs/decisions/0011).
 //!
-//! A and B are a pixel's halves in the picture, U and V those of the audit, all independent of each other. (A − U) and
-//! (B − V) both have the pixel's bias for their mean and share no noise, so their product has the square of the bias
-//! for its mean, whatever the noise of either is. With the mean of both halves in place of A and B it would be the
-//! squared error of the pixel: the difference, ((A − B) / 2)², is the variance that the picture tells of itself, in all
-//! of its pixels instead of a few.
+//! A and B are a pixel's halves in the picture, U and V those of the audit, all independent of each other. (A
+//! − U) and (B − V) both have the pixel's bias for their mean and share no noise, so their product has the
+//! square of the bias for its mean, whatever the noise of either is. With the mean of both halves in place of
+//! A and B it would be the squared error of the pixel: the difference, ((A − B) / 2)², is the variance that
+//! the picture tells of itself, in all of its pixels instead of a few.
 
 use super::interval::{ErrorEstimate, Z};
 use super::metric::{DARK, ROUNDING};
@@ -13,10 +13,10 @@ use crate::Rgb;
 use crate::film::Pixel;
 use libm::{cbrt, fabs, hypot, sqrt};
 
-/// The unknown reference in a denominator comes from the part of the audit that is not in the numerator: what made a
-/// pixel of the picture bright by chance must not make its error small. Where light is rare the part may lack it, so
-/// that the reference is taken for no darker than the filtered picture over this; a pixel that shines where it should
-/// not is off by as much at most.
+/// The unknown reference in a denominator comes from the part of the audit that is not in the numerator: what
+/// made a pixel of the picture bright by chance must not make its error small. Where light is rare the part
+/// may lack it, so that the reference is taken for no darker than the filtered picture over this; a pixel
+/// that shines where it should not is off by as much at most.
 const DOUBT: f64 = 4.0;
 
 /// The normal distribution lies below this with 95 %.
@@ -34,8 +34,8 @@ pub struct Finding {
 }
 
 impl Finding {
-    /// Of a pixel of the `picture`, its `truth`, and what it is after filtering, in a picture of mean `mean`. `None`
-    /// where the picture has no two samples, or the truth no four.
+    /// Of a pixel of the `picture`, its `truth`, and what it is after filtering, in a picture of mean `mean`.
+    /// `None` where the picture has no two samples, or the truth no four.
     pub fn of(picture: &Pixel, truth: &Pixel, filtered: Rgb, mean: f64) -> Option<Self> {
         if picture.even.count() == 0 || picture.odd.count() == 0 {
             return None;
@@ -51,8 +51,9 @@ impl Finding {
                 let r = truth.max(filtered[c] / DOUBT);
                 1.0 / (r * r + DARK)
             };
-            // Halves know nothing of each other; quarters of one half do, for what one has met the other does not meet again, and
-            // where samples are few a deviation over the other quarter would be below zero in the mean.
+            // Halves know nothing of each other; quarters of one half do, for what one has met the other does
+            // not meet again, and where samples are few a deviation over the other quarter would be below
+            // zero in the mean.
             let halves = [0.5 * (u1[c] + u2[c]), 0.5 * (v1[c] + v2[c])];
             for (half, other) in [(halves[0], halves[1]), (halves[1], halves[0])] {
                 deviation += 0.5 * (both[c] - half) * sqrt(weight(other));
@@ -86,11 +87,11 @@ pub struct BiasEstimate {
 }
 
 impl BiasEstimate {
-    /// From the findings of all strata, one of each, in an order in which neighbours are alike; with the share of the
-    /// picture that each stands for, over the mean share. `None` for fewer than eight.
+    /// From the findings of all strata, one of each, in an order in which neighbours are alike; with the
+    /// share of the picture that each stands for, over the mean share. `None` for fewer than eight.
     ///
-    /// What neighbours differ by is taken for chance: too much where strata differ, so that the interval is rather too
-    /// wide than too narrow.
+    /// What neighbours differ by is taken for chance: too much where strata differ, so that the interval is
+    /// rather too wide than too narrow.
     pub fn of(findings: impl Iterator<Item = (Finding, f64)>) -> Option<Self> {
         let (mut count, mut differences) = (0.0, 0.0);
         let (mut sum, mut squares, mut cubes) = (0.0, 0.0, 0.0);
@@ -118,11 +119,13 @@ impl BiasEstimate {
         Some(Self::known(mean, variance, third / (second * sqrt(second)), 0.0))
     }
 
-    /// From an estimate, its variance and how skew its noise is; `unsure` is what else is not known of it, as a share of it.
+    /// From an estimate, its variance and how skew its noise is; `unsure` is what else is not known of it, as
+    /// a share of it.
     ///
-    /// Its noise is a sum of products that are as often negative as positive. Over the root of their squares such a sum has
-    /// lighter tails than the normal distribution, however heavy those of the products are (Efron 1969): Student's t would be
-    /// for squares that are not known as well. Where few products have most of it, they are rather positive.
+    /// Its noise is a sum of products that are as often negative as positive. Over the root of their squares
+    /// such a sum has lighter tails than the normal distribution, however heavy those of the products are
+    /// (Efron 1969): Student's t would be for squares that are not known as well. Where few products have
+    /// most of it, they are rather positive.
     pub(super) fn known(relmse: f64, variance: f64, skewness: f64, unsure: f64) -> Self {
         let error = sqrt(variance).max(ROUNDING * ROUNDING / Z);
         let detectable = error * studentised(skewness);
@@ -141,10 +144,11 @@ impl BiasEstimate {
     }
 }
 
-/// The ends of the interval of 95 % for what is 0 or more, of a normal estimate with this standard error, in the order of
-/// likelihood ratios (Feldman & Cousins 1998): an estimate below 0 does not make it empty, and where there is nothing it
-/// errs in 5 % as everywhere. Their lower end between the one-sided and twice the two-sided quantile, and their upper end
-/// below 0, are within 0.1 standard errors of these; so is what they hold of 95 %, within 1 %.
+/// The ends of the interval of 95 % for what is 0 or more, of a normal estimate with this standard error, in
+/// the order of likelihood ratios (Feldman & Cousins 1998): an estimate below 0 does not make it empty, and
+/// where there is nothing it errs in 5 % as everywhere. Their lower end between the one-sided and twice the
+/// two-sided quantile, and their upper end below 0, are within 0.1 standard errors of these; so is what they
+/// hold of 95 %, within 1 %.
 fn ends(estimate: f64, error: f64) -> [f64; 2] {
     let x = estimate / error;
     let lower = (Z * (x - ONE_SIDED) / (2.0 * Z - ONE_SIDED)).max(x - Z).max(0.0);
@@ -153,9 +157,10 @@ fn ends(estimate: f64, error: f64) -> [f64; 2] {
     [lower * error, upper * error]
 }
 
-/// An estimated mean is above the true one by less than so many standard errors with 97.5 %. Both are the larger the further single
-/// values lie above, so that it is less for skew ones: Hall 1992, On the removal of skewness by transformation. `skewness` is the sum
-/// of their third moments over the 3/2 power of that of their second, from −1 to 1.
+/// An estimated mean is above the true one by less than so many standard errors with 97.5 %. Both are the
+/// larger the further single values lie above, so that it is less for skew ones: Hall 1992, On the removal of
+/// skewness by transformation. `skewness` is the sum of their third moments over the 3/2 power of that of
+/// their second, from −1 to 1.
 fn studentised(skewness: f64) -> f64 {
     // Where all are the same it is what rounding makes of nothing.
     let skewness = skewness.clamp(-1.0, 1.0);
@@ -167,10 +172,11 @@ fn studentised(skewness: f64) -> f64 {
 }
 
 impl ErrorEstimate {
-    /// Of noise and bias together: both add up, and so do the squares of how unsure they are. A squared bias b counts as
-    /// b − 2 σ² / b, with the standard error σ, and not at all below the root of that: one audited pixel with a firefly is enough
-    /// for a b of many times the error, and for a σ nearly as large. Its lower end errs in 2.5 %: that
-    /// of likelihood ratios, which errs in 5 % where there is no bias, would be beside what noise errs by.
+    /// Of noise and bias together: both add up, and so do the squares of how unsure they are. A squared bias
+    /// b counts as b − 2 σ² / b, with the standard error σ, and not at all below the root of that: one
+    /// audited pixel with a firefly is enough for a b of many times the error, and for a σ nearly as large.
+    /// Its lower end errs in 2.5 %: that of likelihood ratios, which errs in 5 % where there is no bias,
+    /// would be beside what noise errs by.
     pub fn with_bias(self, bias: BiasEstimate) -> Self {
         let error = bias.error;
         let squared = if bias.relmse > 0.0 { bias.relmse - 2.0 * error * error / bias.relmse } else { 0.0 };
@@ -337,7 +343,8 @@ mod tests {
             let sum = noise.with_bias(BiasEstimate::known(radius * cosine, 1.0, 0.0, 0.0));
             missed += u32::from(!(sum.lower..=sum.upper).contains(&1.0));
         }
-        // 6.1 %; it would be 7.1 % with the lower end that likelihood ratios give the bias. One standard error is 0.08 %.
+        // 6.1 %; it would be 7.1 % with the lower end that likelihood ratios give the bias. One standard
+        // error is 0.08 %.
         assert!(missed * 1000 < runs * 65, "{missed} of {runs}");
     }
 
@@ -351,7 +358,8 @@ mod tests {
             held += u32::from((bias.lower..=bias.upper).contains(&truth));
             sum += bias.relmse;
         }
-        // The noise of a denominator makes its inverse larger by three times its square, 3 %; what is left is chance.
+        // The noise of a denominator makes its inverse larger by three times its square, 3 %; what is left is
+        // chance.
         let mean = sum / f64::from(runs);
         assert!((0.93..1.13).contains(&(mean / truth)), "{mean} {truth}");
         // 95 % of 200 are 190; fewer than 180 have a chance of 0.2 %.

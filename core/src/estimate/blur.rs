@@ -1,10 +1,11 @@
-//! What the photons of a picture blur, as its samples tell: each gathers photons from a disc, and knows what it would be
-//! with a finer one (docs/decisions/0043).
+//! What the photons of a picture blur, as its samples tell: each gathers photons from a disc, and knows what
+//! it would be with a finer one (docs/decisions/0043).
 //!
-//! Of the halves of a pixel, a and b tell by how much they are too bright, each with noise of its own. So a b has the squared
-//! blur for its mean. Over R² + 0.01 m², with I − a for R, and with I − b for R: beside a focus a pixel is darker than it
-//! looks, by many times; and the other factor does not know what is in the denominator. R is half of I at least, for where
-//! finer discs are noisy one of them says that nothing is there.
+//! Of the halves of a pixel, a and b tell by how much they are too bright, each with noise of its own. So a b
+//! has the squared blur for its mean. Over R² + 0.01 m², with I − a for R, and with I − b for R: beside a
+//! focus a pixel is darker than it looks, by many times; and the other factor does not know what is in the
+//! denominator. R is half of I at least, for where finer discs are noisy one of them says that nothing is
+//! there.
 
 use super::audit::BiasEstimate;
 use super::metric::DARK;

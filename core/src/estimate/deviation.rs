@@ -31,8 +31,8 @@ impl Deviation {
         Self { mean, error, pixels }
     }
 
-    /// The probability to see as much or more where there is nothing: the two tails of Student's t, after Wallace
-    /// (1959), right to a few hundredths of itself from three degrees of freedom on.
+    /// The probability to see as much or more where there is nothing: the two tails of Student's t, after
+    /// Wallace (1959), right to a few hundredths of itself from three degrees of freedom on.
     pub fn chance(&self) -> f64 {
         if self.pixels < 4 || !self.error.is_finite() {
             return 1.0;

@@ -1,7 +1,8 @@
-//! What a pixel probably is, from itself and its neighbours: the filter of Lee (1980, "Digital image enhancement and
-//! noise filtering by use of local statistics"), over one tile. Where the noise explains all that differs around a
-//! pixel its neighbours speak for it; where more differs than noise explains it speaks for itself. Between both the
-//! filter goes by roots, so that what is a hundred times as bright next door does not drown a dark pixel.
+//! What a pixel probably is, from itself and its neighbours: the filter of Lee (1980, "Digital image
+//! enhancement and noise filtering by use of local statistics"), over one tile. Where the noise explains all
+//! that differs around a pixel its neighbours speak for it; where more differs than noise explains it speaks
+//! for itself. Between both the filter goes by roots, so that what is a hundred times as bright next door
+//! does not drown a dark pixel.
 
 use super::seen::raster;
 use crate::Rgb;
@@ -11,13 +12,14 @@ use glam::Vec4;
 /// Neighbours on each side: windows of 5 x 5 pixels, cut at the border of the tile.
 const REACH: usize = 2;
 
-/// What differs around a pixel is taken for noise up to this many times the estimated variance, which is as uncertain
-/// itself: with 1.5 it leaves too much noise.
+/// What differs around a pixel is taken for noise up to this many times the estimated variance, which is as
+/// uncertain itself: with 1.5 it leaves too much noise.
 const NOISE: f32 = 2.0;
 
 const SIDE: usize = TILE as usize;
 
-/// What the pixels of a tile of a picture of mean `mean` probably are: filtered, in the order of the tile's pixels.
+/// What the pixels of a tile of a picture of mean `mean` probably are: filtered, in the order of the tile's
+/// pixels.
 pub fn filtered(pixels: &[Pixel], mean: f64) -> [Rgb; PIXELS_PER_TILE] {
     let scale = (1.0 / mean) as f32;
     let [mut picture, mut noise] = [[Vec4::ZERO; PIXELS_PER_TILE]; 2];
@@ -37,7 +39,8 @@ pub fn filtered_pixel(pixels: &[Pixel], mean: f64, i: usize) -> Rgb {
     lee(at, raster(i)).truncate() / scale
 }
 
-/// What a pixel shows and the variance of that: a colour with a 1 in the fourth place, or all zero where there is no pixel.
+/// What a pixel shows and the variance of that: a colour with a 1 in the fourth place, or all zero where
+/// there is no pixel.
 fn seen(pixel: &Pixel, scale: f32) -> (Vec4, Vec4) {
     if pixel.count() == 0 {
         return (Vec4::ZERO, Vec4::ZERO);
@@ -45,8 +48,8 @@ fn seen(pixel: &Pixel, scale: f32) -> (Vec4, Vec4) {
     ((scale * pixel.mean()).extend(1.0), pixel.scaled_variance(scale).extend(0.0))
 }
 
-/// Filters the pixel at `place`, where `at` tells what each place shows and the variance of that. A pixel's own value has its weight only
-/// there.
+/// Filters the pixel at `place`, where `at` tells what each place shows and the variance of that. A pixel's
+/// own value has its weight only there.
 fn lee(at: impl Fn(usize) -> (Vec4, Vec4), place: usize) -> Vec4 {
     let (x, y) = (place % SIDE, place / SIDE);
     let (own, own_noise) = at(place);

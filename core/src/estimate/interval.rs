@@ -1,20 +1,22 @@
 //! The error of a picture, from itself: relMSE and the interval that holds it (docs/decisions/0009, 0035).
 //!
-//! The plain algorithm: half-pictures A and B are independent and unbiased, so ((A − B) / 2)² has the variance of
-//! their mean I for its mean; over I² + 0.01 m² its mean over pixels is the relMSE. Departures:
-//! 1. I is not R. Where a sample is far too bright it makes its own denominator large and hides itself; where samples
-//!    missed the light the denominator is too small. So denominators are what pixels that look alike are in the mean
-//!    ([`super::Shrinkage`]), the mean of the quotients by what each pair of quarters says.
-//! 2. What is left of that is seen where nothing hides itself: the variance of one pair over the square of what the
-//!    *other* says is too large, for where light is rare both are. The error is between both: with δ the logarithm of their
-//!    quotient that of the estimate goes up by δ / (1 + 10 δ), and may go up by all of δ, or by nothing. It is as uncertain, both
-//!    ways, as what is added for pixels that may be other than they probably are.
-//! 3. The error that this picture has and its estimate differ by the mean of the product of both halves' errors,
-//!    exactly. For a pixel of variance V the product has the variance 4 V², and the estimate squared the mean 3 V² (more
-//!    with heavy tails); Student's t says what it is to know that from few pixels. How errors hang together between
-//!    pixels that share paths, and between those of a region where all is shared, is seen in the differences of the halves. Upwards less is in doubt where single samples have
-//!    the noise: the error of a pixel that flashed is hardly more than its variance, if enough of them tell. If they are few,
-//!    the lower end is not above what the error may be if all flashes belonged there.
+//! The plain algorithm: half-pictures A and B are independent and unbiased, so ((A − B) / 2)² has the
+//! variance of their mean I for its mean; over I² + 0.01 m² its mean over pixels is the relMSE. Departures:
+//! 1. I is not R. Where a sample is far too bright it makes its own denominator large and hides itself; where
+//!    samples missed the light the denominator is too small. So denominators are what pixels that look alike
+//!    are in the mean ([`super::Shrinkage`]), the mean of the quotients by what each pair of quarters says.
+//! 2. What is left of that is seen where nothing hides itself: the variance of one pair over the square of
+//!    what the *other* says is too large, for where light is rare both are. The error is between both: with δ
+//!    the logarithm of their quotient that of the estimate goes up by δ / (1 + 10 δ), and may go up by all of
+//!    δ, or by nothing. It is as uncertain, both ways, as what is added for pixels that may be other than
+//!    they probably are.
+//! 3. The error that this picture has and its estimate differ by the mean of the product of both halves'
+//!    errors, exactly. For a pixel of variance V the product has the variance 4 V², and the estimate squared
+//!    the mean 3 V² (more with heavy tails); Student's t says what it is to know that from few pixels. How
+//!    errors hang together between pixels that share paths, and between those of a region where all is
+//!    shared, is seen in the differences of the halves. Upwards less is in doubt where single samples have
+//!    the noise: the error of a pixel that flashed is hardly more than its variance, if enough of them tell.
+//!    If they are few, the lower end is not above what the error may be if all flashes belonged there.
 //!
 //! The price: about as much time as a tenth of a sample for each pixel.
 
@@ -38,22 +40,23 @@ pub struct ErrorEstimate {
 /// The normal distribution lies between this and its negative with 95 %.
 pub(super) const Z: f64 = 1.959_963_984_540_054;
 
-/// Where fewer independent pixels have nearly all of the noise, intervals are those of Student's t with as many degrees of
-/// freedom. Where more have it they are those of the normal distribution: squares of heavy tails are rather too large, and
-/// Student's t would be for squares that are as often too small.
+/// Where fewer independent pixels have nearly all of the noise, intervals are those of Student's t with as
+/// many degrees of freedom. Where more have it they are those of the normal distribution: squares of heavy
+/// tails are rather too large, and Student's t would be for squares that are as often too small.
 const FEWEST: f64 = 8.0;
 
-/// Where fewer independent pixels than these have nearly all of the noise an interval reaches as far up as down, and down to
-/// where all flashes belong there: so few do not tell how often there are any, nor are pixels like them known.
+/// Where fewer independent pixels than these have nearly all of the noise an interval reaches as far up as
+/// down, and down to where all flashes belong there: so few do not tell how often there are any, nor are
+/// pixels like them known.
 const FLASHES: f64 = 4.0;
 
-/// How soon δ is doubted: all of it counts where it is small and both bounds are right to first order, at most a tenth
-/// of the estimate where light is rare.
+/// How soon δ is doubted: all of it counts where it is small and both bounds are right to first order, at
+/// most a tenth of the estimate where light is rare.
 const DOUBTED: f64 = 10.0;
 
 impl ErrorEstimate {
-    /// From all tiles of a picture whose pixels share nothing, or paths within groups and photons with their neighbours; `None` where no pixel has
-    /// four samples.
+    /// From all tiles of a picture whose pixels share nothing, or paths within groups and photons with their
+    /// neighbours; `None` where no pixel has four samples.
     pub fn of(tiles: impl Iterator<Item = TileError>) -> Option<Self> {
         let mut sum = TileError::default();
         tiles.for_each(|tile| sum += tile);
@@ -72,16 +75,17 @@ impl ErrorEstimate {
         Self::with_shared(&sum, shared(&sum) + by_parts(&sum, parts, pixels), f64::INFINITY)
     }
 
-    /// `shared`: by how much what pixels share makes the estimate vary more; `above`: the square of the standard error to the upper
-    /// end, as if they shared nothing, if that is less than to the lower.
+    /// `shared`: by how much what pixels share makes the estimate vary more; `above`: the square of the
+    /// standard error to the upper end, as if they shared nothing, if that is less than to the lower.
     fn with_shared(sum: &TileError, shared: f64, above: f64) -> Option<Self> {
         let flashes = freedom(sum.squares, sum.fourths) / shared;
         let quantile = if flashes < FEWEST { student_95(FEWEST) } else { Z };
         Self::with_reach(sum, quantile * sqrt(shared), above, flashes)
     }
 
-    /// `reach`: standard errors from the estimate to an end of its interval, as if pixels were independent; `above`: the
-    /// square of the one to the upper end, if that is less; `flashes`: how many have nearly all of the noise.
+    /// `reach`: standard errors from the estimate to an end of its interval, as if pixels were independent;
+    /// `above`: the square of the one to the upper end, if that is less; `flashes`: how many have nearly all
+    /// of the noise.
     fn with_reach(sum: &TileError, reach: f64, above: f64, flashes: f64) -> Option<Self> {
         if sum.values == 0 {
             return None;
@@ -110,16 +114,18 @@ impl ErrorEstimate {
     }
 }
 
-/// By how much errors that the pixels of a group share, or those of a block, make the sum of products of both halves' errors
-/// vary more.
+/// By how much errors that the pixels of a group share, or those of a block, make the sum of products of both
+/// halves' errors vary more.
 fn shared(sum: &TileError) -> f64 {
-    // A pixel shares each sample with half of its group: ρ² of the pairs that share is four times that of the mean ρ.
+    // A pixel shares each sample with half of its group: ρ² of the pairs that share is four times that of the
+    // mean ρ.
     const CIRCLES: f64 = (GROUP - 1) as f64 / (CIRCLE - 1) as f64;
     1.0 + CIRCLES * by_parts(sum, sum.groups, GROUP as f64) + by_parts(sum, sum.blocks, BLOCK as f64)
 }
 
-/// What parts of so many pixels add to it. With the correlation ρ of each two of them, from the squares of sums over parts and of
-/// pixels, it is ρ² Σ V_p V_q / Σ V_p², of all p ≠ q of a part. Estimates have 1 + 2 ρ² times the former and 3 times the latter.
+/// What parts of so many pixels add to it. With the correlation ρ of each two of them, from the squares of
+/// sums over parts and of pixels, it is ρ² Σ V_p V_q / Σ V_p², of all p ≠ q of a part. Estimates have 1 + 2
+/// ρ² times the former and 3 times the latter.
 fn by_parts(sum: &TileError, parts: Parts, pixels: f64) -> f64 {
     let others = pixels - 1.0;
     if !(sum.differences > 0.0 && sum.squares > 0.0 && others > 0.0) {
@@ -135,8 +141,8 @@ fn freedom(squares: f64, fourths: f64) -> f64 {
     if fourths > 0.0 { squares * squares / fourths } else { 1.0 }
 }
 
-/// Student's t of `freedom` degrees lies between this and its negative with 95 % (expansion of Cornish and Fisher;
-/// too small by a tenth for two degrees, and taken at one for fewer).
+/// Student's t of `freedom` degrees lies between this and its negative with 95 % (expansion of Cornish and
+/// Fisher; too small by a tenth for two degrees, and taken at one for fewer).
 fn student_95(freedom: f64) -> f64 {
     const FIRST: f64 = (Z * Z * Z + Z) / 4.0;
     const SECOND: f64 = (5.0 * Z * Z * Z * Z * Z + 16.0 * Z * Z * Z + 3.0 * Z) / 96.0;
@@ -153,12 +159,14 @@ mod tests {
     use crate::sampling::Random;
     use std::vec::Vec;
 
-    /// A picture of `tiles` tiles of radiance 1 with uniform noise: samples between 1 − `noise` and 1 + `noise`.
+    /// A picture of `tiles` tiles of radiance 1 with uniform noise: samples between 1 − `noise` and 1 +
+    /// `noise`.
     fn picture(tiles: u32, samples: u32, noise: f32, seed: u32) -> Vec<Vec<Pixel>> {
         shared_picture(tiles, samples, noise, 0.0, Tile::group, seed)
     }
 
-    /// The same, where `common` of the variance is noise that the pixels of each `part` of a tile have in common.
+    /// The same, where `common` of the variance is noise that the pixels of each `part` of a tile have in
+    /// common.
     fn shared_picture(
         tiles: u32,
         samples: u32,
@@ -319,8 +327,8 @@ mod tests {
 
     #[test]
     fn light_that_few_samples_meet() {
-        // A row of pixels of 0.1 touches a lamp of 20 with a hundredth of its area, beside rows that are all lamp: in most
-        // pixels one of both pairs has not met it. The row has most of the error.
+        // A row of pixels of 0.1 touches a lamp of 20 with a hundredth of its area, beside rows that are all
+        // lamp: in most pixels one of both pairs has not met it. The row has most of the error.
         const LAMP: f32 = 20.0;
         let (share, samples, pictures) = (0.01, 128, 60);
         let (mut ratios, mut held) = (Vec::new(), 0);

@@ -1,10 +1,11 @@
 //! Where the noise of a picture is, told to each group of pixels by others: what adaptive sampling goes by.
 //!
-//! A group that its own samples tell how many more it gets has a biased mean (Kirk and Arvo 1991, "Unbiased sampling
-//! techniques for image synthesis"). So what a group is told comes from the other group of its block of 8 × 8
-//! pixels, which lies between its pixels and shares no path with them. Nor is it in their denominators: light at a place
-//! is what a pixel itself has seen, or what the pixels around it have that are not of the group that asks, whichever is
-//! less. The former is too large for a pixel that was hit by a firefly, the latter beside a lamp.
+//! A group that its own samples tell how many more it gets has a biased mean (Kirk and Arvo 1991, "Unbiased
+//! sampling techniques for image synthesis"). So what a group is told comes from the other group of its block
+//! of 8 × 8 pixels, which lies between its pixels and shares no path with them. Nor is it in their
+//! denominators: light at a place is what a pixel itself has seen, or what the pixels around it have that are
+//! not of the group that asks, whichever is less. The former is too large for a pixel that was hit by a
+//! firefly, the latter beside a lamp.
 
 use super::metric::DARK;
 use crate::Rgb;

@@ -4,19 +4,20 @@
 use crate::film::{PIXELS_PER_TILE, Pixel, TILE, Tile};
 use glam::Vec4;
 
-/// Light that is added to that of the neighbours before anything is divided by it, in units of the picture's mean.
+/// Light that is added to that of the neighbours before anything is divided by it, in units of the picture's
+/// mean.
 pub(super) const FAINT: f32 = 0.01;
 
-/// A neighbour all of whose quarters are this many times as bright as the brightest of a pixel lies beyond an edge, and says
-/// nothing of what the pixel is.
+/// A neighbour all of whose quarters are this many times as bright as the brightest of a pixel lies beyond an
+/// edge, and says nothing of what the pixel is.
 const SURELY: f32 = 2.0;
 
 /// A tile, row by row, of a picture times some scale.
 pub(super) struct Seen {
     /// A₁, A₂, B₁, B₂ of each pixel, the parts of its halves; `None` where one is empty.
     pub(super) quarters: [Option<[Vec4; 4]>; PIXELS_PER_TILE],
-    /// The mean light of the eight neighbours of each pixel, as far as they lie in the tile and are not surely brighter; its own
-    /// where there are none.
+    /// The mean light of the eight neighbours of each pixel, as far as they lie in the tile and are not
+    /// surely brighter; its own where there are none.
     pub(super) around: [Vec4; PIXELS_PER_TILE],
 }
 

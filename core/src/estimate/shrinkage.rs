@@ -1,14 +1,16 @@
-//! What a pixel probably is, learnt from the picture itself (Robbins 1956, "An empirical Bayes approach to statistics").
-//! Pixels of one class are so much brighter or darker than their neighbours, and their quarters in such disagreement, to one
-//! pair of quarters; how much of that the *other* pair finds is the share of it that is believed. A firefly that no
-//! other sample meets shrinks to its neighbours, a texture stays. What for: docs/decisions/0035.
+//! What a pixel probably is, learnt from the picture itself (Robbins 1956, "An empirical Bayes approach to
+//! statistics"). Pixels of one class are so much brighter or darker than their neighbours, and their quarters
+//! in such disagreement, to one pair of quarters; how much of that the *other* pair finds is the share of it
+//! that is believed. A firefly that no other sample meets shrinks to its neighbours, a texture stays. What
+//! for: docs/decisions/0035.
 
 use super::metric::DARK;
 use super::seen::{FAINT, Seen, brightness};
 use crate::film::Pixel;
 use glam::Vec4;
 
-/// Octaves of what a pixel has more than its neighbours, over theirs; less than the first is as good as nothing.
+/// Octaves of what a pixel has more than its neighbours, over theirs; less than the first is as good as
+/// nothing.
 const FIRST_OCTAVE: i32 = -5;
 const LAST_OCTAVE: i32 = 18;
 const BRIGHTER: usize = (LAST_OCTAVE - FIRST_OCTAVE + 1) as usize;
@@ -23,15 +25,16 @@ const ALIKE: usize = DISAGREEMENT.len() + 1;
 
 const CLASSES: usize = (BRIGHTER + DARKER) * ALIKE;
 
-/// Before anything is learnt a class is known as well as by this many pixels: what is brighter is believed in half of
-/// its octaves, what is darker in full.
+/// Before anything is learnt a class is known as well as by this many pixels: what is brighter is believed in
+/// half of its octaves, what is darker in full.
 const PRIOR: f64 = 4.0;
 
-/// A pixel that is darker than its neighbours to one pair may be brighter to the other, where light is rare; by so many times
-/// that at most.
+/// A pixel that is darker than its neighbours to one pair may be brighter to the other, where light is rare;
+/// by so many times that at most.
 const CONTRARY: f64 = 2.0;
 
-/// Variance of what a pixel is, over the square, at most: where light is so rare that it is more, noise is where light is.
+/// Variance of what a pixel is, over the square, at most: where light is so rare that it is more, noise is
+/// where light is.
 const MOST_SPREAD: f64 = 0.1;
 
 /// So many tiles know enough, with twice 16,384 pixels in two hundred classes.
@@ -43,8 +46,8 @@ const UNIT: f64 = 1.0 / (1 << 20) as f64;
 /// What is added up, in units of the middle of a class, is no more than this.
 const MOST: f64 = 4096.0;
 
-/// Sums over the pixels of one class. x is what a pixel has more than its neighbours, over theirs, in units of the middle of
-/// its class and with the sign that it has to the pair that is asked.
+/// Sums over the pixels of one class. x is what a pixel has more than its neighbours, over theirs, in units
+/// of the middle of its class and with the sign that it has to the pair that is asked.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 struct Class {
     pixels: u64,
@@ -83,14 +86,15 @@ impl core::ops::AddAssign<&Self> for Lookalikes {
 }
 
 impl Lookalikes {
-    /// Whether tile number `tile` of `count` is to be asked: all of small pictures, of others as many as know enough, spread
-    /// evenly whatever their width (by multiples of the golden ratio).
+    /// Whether tile number `tile` of `count` is to be asked: all of small pictures, of others as many as know
+    /// enough, spread evenly whatever their width (by multiples of the golden ratio).
     pub fn asks(tile: usize, count: usize) -> bool {
         let turns = (tile as u32).wrapping_mul(0x9e37_79b9);
         (u64::from(turns) * count as u64) >> 32 < ENOUGH
     }
 
-    /// Learns from one tile of a picture of mean `mean` > 0. Pixels whose halves have no two samples each are left out.
+    /// Learns from one tile of a picture of mean `mean` > 0. Pixels whose halves have no two samples each are
+    /// left out.
     pub fn add(&mut self, pixels: &[Pixel], mean: f64) {
         let seen = Seen::new(pixels, (1.0 / mean) as f32);
         let whole = |value: f64| (value.clamp(-MOST, MOST) / UNIT) as i64;
@@ -130,7 +134,8 @@ impl Lookalikes {
                 ((libm::sqrt(1.0 + middle) - 1.0) / middle, 0.0, 1.0)
             };
             let believed = ((other + PRIOR * before) / (own + PRIOR)).clamp(least, 1.0);
-            // V is nearly in proportion to R where light is rare, so that the mean of V / R² is that of V times ⟨R²⟩ / ⟨R⟩⁴.
+            // V is nearly in proportion to R where light is rare, so that the mean of V / R² is that of V
+            // times ⟨R²⟩ / ⟨R⟩⁴.
             let there = 1.0 + sign * middle * believed * own / pixels.max(1.0);
             let spread = middle * middle * (other_squared - believed * believed * own_squared)
                 / ((pixels + PRIOR) * there * there);

@@ -42,9 +42,9 @@ impl core::ops::AddAssign for TileLight {
     }
 }
 
-/// Sums over the pixels and channels of one tile, of squared differences over R² + 0.01 m². A and B are the means of
-/// the halves, A₁, A₂, B₁, B₂ of their parts; the R of each pair, of A₁ and B₁ and of A₂ and B₂, is what
-/// the pair says that the pixel is ([`Shrinkage`]).
+/// Sums over the pixels and channels of one tile, of squared differences over R² + 0.01 m². A and B are the
+/// means of the halves, A₁, A₂, B₁, B₂ of their parts; the R of each pair, of A₁ and B₁ and of A₂ and B₂, is
+/// what the pair says that the pixel is ([`Shrinkage`]).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct TileError {
     /// Values: three for each pixel.
@@ -59,8 +59,8 @@ pub struct TileError {
     pub(super) least_squares: f64,
     /// Variance of the pictures of both pairs over the squares of both R.
     pub(super) parts: f64,
-    /// The same, each over the square of the other R: numerator and denominator are independent. Too large where a pair
-    /// saw nothing of a light that the other met.
+    /// The same, each over the square of the other R: numerator and denominator are independent. Too large
+    /// where a pair saw nothing of a light that the other met.
     pub(super) crossed: f64,
     /// Squares of the variances of pixels in `halves`.
     pub(super) squares: f64,
@@ -103,8 +103,8 @@ impl core::ops::AddAssign for Parts {
 }
 
 impl TileError {
-    /// Of the pixels of one tile of a picture of mean `mean` > 0, with what its tiles tell of it. Pixels whose
-    /// halves have no two samples each are left out.
+    /// Of the pixels of one tile of a picture of mean `mean` > 0, with what its tiles tell of it. Pixels
+    /// whose halves have no two samples each are left out.
     pub fn of(pixels: &[Pixel], mean: f64, shrinkage: &Shrinkage) -> Self {
         let scale = (1.0 / mean) as f32;
         let seen = Seen::new(pixels, scale);
@@ -167,13 +167,14 @@ impl core::ops::AddAssign for TileError {
     }
 }
 
-/// The square of what the error of a pixel may be above its variance V: 4 V² in the mean, and little where a single sample has
-/// nearly all of V. Such a flash is one too many, and the error is V; or one of the few that there should be, and it is
-/// less. `seen` is the pixel, `around` its neighbours; V and how much more it would be with the R of the `darker` pair are weighed
-/// by `weights`.
+/// The square of what the error of a pixel may be above its variance V: 4 V² in the mean, and little where a
+/// single sample has nearly all of V. Such a flash is one too many, and the error is V; or one of the few
+/// that there should be, and it is less. `seen` is the pixel, `around` its neighbours; V and how much more it
+/// would be with the R of the `darker` pair are weighed by `weights`.
 ///
-/// With T = (A − R)(B − R) = (I − R)² − V for the difference, and v for what is not known of R: T² + 4 (I − R)² v, and 4/3 V²
-/// for as much as the pixel itself is believed. Where pixels like it are not known, R may be that of the darker pair.
+/// With T = (A − R)(B − R) = (I − R)² − V for the difference, and v for what is not known of R: T² + 4 (I −
+/// R)² v, and 4/3 V² for as much as the pixel itself is believed. Where pixels like it are not known, R may
+/// be that of the darker pair.
 fn above([variance, darker]: [f64; 2], likely: [Likely; 2], seen: Vec4, around: Vec4, weights: Vec4) -> f64 {
     /// (I − R)² over V at most: more comes from an edge that R does not follow.
     const MOST: f64 = 3.0;

@@ -102,8 +102,8 @@ impl<'m> Distribution2d<'m> {
         self.pdf(cell(u, self.width), cell(v, self.height))
     }
 
-    /// The `u` that [`Distribution2d::sample`] takes to a point of [0, 1]², and the density there. `None` where
-    /// it takes none there.
+    /// The `u` that [`Distribution2d::sample`] takes to a point of [0, 1]², and the density there. `None`
+    /// where it takes none there.
     #[inline]
     pub fn invert(&self, [x, y]: [f32; 2]) -> Option<([f32; 2], f32)> {
         let (y, v, row_probability) = unpick(self.rows, y * self.height as f32)?;
@@ -124,7 +124,8 @@ impl<'m> Distribution2d<'m> {
     }
 }
 
-/// Turns weights (as bits of floats) into cumulative sums in units of 2^-32 of their total. Returns the total.
+/// Turns weights (as bits of floats) into cumulative sums in units of 2^-32 of their total. Returns the
+/// total.
 fn accumulate(weights: &mut [u32]) -> f64 {
     let total: f64 = weights.iter().map(|&w| f64::from(f32::from_bits(w))).sum();
     let scale = if total > 0.0 { 4_294_967_296.0 / total } else { 4_294_967_296.0 / weights.len() as f64 };
@@ -150,7 +151,8 @@ const fn entries(bins: usize) -> usize {
     bins.div_ceil(BINS_PER_ENTRY)
 }
 
-/// Fills `places`: entry e is the first bin whose end lies beyond e/n of the whole, n being the number of entries.
+/// Fills `places`: entry e is the first bin whose end lies beyond e/n of the whole, n being the number of
+/// entries.
 fn index(ends: &[u32], places: &mut [u32]) {
     let mut bin = 0;
     let count = places.len() as u64;
@@ -177,7 +179,8 @@ fn probability(ends: &[u32], i: usize) -> f32 {
     interval(ends, i).map_or(0.0, |(start, end)| (end - start) as f32 / 4_294_967_296.0)
 }
 
-/// The bin that holds place `x` in bins, the `u` at which [`pick`] finds that place, and the bin's probability.
+/// The bin that holds place `x` in bins, the `u` at which [`pick`] finds that place, and the bin's
+/// probability.
 #[inline]
 fn unpick(ends: &[u32], x: f32) -> Option<(usize, f32, f32)> {
     let i = (x as usize).min(ends.len().saturating_sub(1));

@@ -1,10 +1,11 @@
-//! What a light path is made of: numbers in [0, 1) by the names of their dimensions. Those of a [`Sampler`] are points of a
-//! sequence; those of a Markov chain are what they were before, a little changed (`transport/chain.rs`).
+//! What a light path is made of: numbers in [0, 1) by the names of their dimensions. Those of a [`Sampler`]
+//! are points of a sequence; those of a Markov chain are what they were before, a little changed
+//! (`transport/chain.rs`).
 
 use super::Sampler;
 
-/// Numbers in [0, 1). A dimension gives the same ones whenever it is asked, by pairs or one alone, of which the one is the
-/// first of the pair.
+/// Numbers in [0, 1). A dimension gives the same ones whenever it is asked, by pairs or one alone, of which
+/// the one is the first of the pair.
 pub trait Numbers {
     /// One number.
     fn single(&self, dimension: u32) -> f32;

@@ -5,8 +5,8 @@
 //! every power-of-two prefix stays a net), then both coordinates are Owen-scrambled. Pairs are thereby
 //! independent of each other (padding), and there are as many as anybody asks for.
 //!
-//! Even and odd samples of a pixel come from two such sequences with keys of their own: independent replicates,
-//! without which the error of their mean could not be estimated (docs/decisions/0009).
+//! Even and odd samples of a pixel come from two such sequences with keys of their own: independent
+//! replicates, without which the error of their mean could not be estimated (docs/decisions/0009).
 //!
 //! Departures from the paper:
 //! 1. The Laine-Karras hash has Vegdahl's constants (2021, "Building a Better LK Hash"), which come closer
@@ -39,14 +39,15 @@ pub struct Sampler {
 }
 
 impl Sampler {
-    /// Sample number `sample` of `pixel` in the picture of `seed`: even ones are the points of replicate 0, odd
-    /// ones those of replicate 1.
+    /// Sample number `sample` of `pixel` in the picture of `seed`: even ones are the points of replicate 0,
+    /// odd ones those of replicate 1.
     #[inline]
     pub const fn new(seed: u32, pixel: u32, sample: u32) -> Self {
         Self::replicate(seed, pixel, sample & 1, sample >> 1)
     }
 
-    /// Point number `index` of a sequence, 0 or 1, of `pixel` in the picture of `seed`. The two are independent.
+    /// Point number `index` of a sequence, 0 or 1, of `pixel` in the picture of `seed`. The two are
+    /// independent.
     #[inline]
     pub const fn replicate(seed: u32, pixel: u32, replicate: u32, index: u32) -> Self {
         let place = (seed as u64) << 32 | (pixel ^ replicate << 31) as u64;

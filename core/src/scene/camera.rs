@@ -26,7 +26,8 @@ pub struct Camera {
     pub start: Option<StartPlane>,
 }
 
-/// A plane before everything that a far camera sees: next to it, coordinates are more precise than at the eye.
+/// A plane before everything that a far camera sees: next to it, coordinates are more precise than at the
+/// eye.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StartPlane {
     /// Where the middle of the picture lies on it.

@@ -53,8 +53,8 @@ impl Camera {
     }
 }
 
-/// Area of what `camera`, which stands outside `bounds`, sees first, in squares of their longest edge: a small
-/// depth buffer.
+/// Area of what `camera`, which stands outside `bounds`, sees first, in squares of their longest edge: a
+/// small depth buffer.
 fn visible_area(camera: &Camera, mesh: &Mesh, bounds: &Bounds) -> f32 {
     let size = bounds.extent().max_element().max(f32::MIN_POSITIVE);
     let half = 0.5 * GRID as f32;
@@ -134,7 +134,8 @@ mod tests {
             let camera = Camera::framing(&mesh);
             assert!(camera.forward.distance(Vec3::Z * -open) < 1e-6, "{camera:?}");
             let corner = camera.project(100, 100, Vec3::new(2.5, 3.5, 3.0 + 0.5 * open), [0.5; 2]);
-            assert!(corner.is_some_and(|c| c.raster.cmpgt(glam::Vec2::ZERO).all() && c.raster.max_element() < 100.0));
+            let inside = |raster: Vec2| raster.cmpgt(Vec2::ZERO).all() && raster.max_element() < 100.0;
+            assert!(corner.is_some_and(|corner| inside(corner.raster)));
         }
     }
 

@@ -101,8 +101,8 @@ impl<'a> SurfacePoint<'a> {
         Some(Self { position, error, geometric_normal, frame, uv, front, material, triangle: hit.triangle })
     }
 
-    /// Whether a direction, given in the shading frame and in the world, is on the same side of the triangle as
-    /// of its shading normal: no light passes where the two disagree.
+    /// Whether a direction, given in the shading frame and in the world, is on the same side of the triangle
+    /// as of its shading normal: no light passes where the two disagree.
     #[inline]
     pub fn sides_agree(&self, local: Vec3, world: Vec3) -> bool {
         local.z * world.dot(self.geometric_normal) > 0.0
@@ -114,8 +114,8 @@ impl<'a> SurfacePoint<'a> {
         Ray::new(self.origin(direction), direction)
     }
 
-    /// Whether `ray`, which met this point, started on the surface as far as rounding can tell, and leaves its front. A
-    /// camera on a wall stands before it.
+    /// Whether `ray`, which met this point, started on the surface as far as rounding can tell, and leaves
+    /// its front. A camera on a wall stands before it.
     #[inline]
     pub fn is_left_by(&self, ray: &Ray) -> bool {
         !self.front && Vec3::from(ray.origin).distance(self.position) <= STARTS_HERE * self.error
@@ -137,8 +137,8 @@ impl<'a> SurfacePoint<'a> {
     }
 }
 
-/// Bounds of the error of a point, within which a ray starts at it: its own, that of the origin, and as much for a
-/// corner, where the ray has left another surface just before.
+/// Bounds of the error of a point, within which a ray starts at it: its own, that of the origin, and as much
+/// for a corner, where the ray has left another surface just before.
 const STARTS_HERE: f32 = 4.0;
 
 #[inline]

@@ -100,8 +100,8 @@ impl Texture<'_> {
         }
     }
 
-    /// Slope (∂/∂u, ∂/∂v) of the red channel at `uv`, per unit of the texture's own coordinates: central differences
-    /// over one texel, hence continuous. For height maps.
+    /// Slope (∂/∂u, ∂/∂v) of the red channel at `uv`, per unit of the texture's own coordinates: central
+    /// differences over one texel, hence continuous. For height maps.
     pub fn gradient(&self, uv: Vec2) -> Vec2 {
         let uv = self.transform.at(uv);
         let size = Vec2::new(self.width as f32, self.height as f32);

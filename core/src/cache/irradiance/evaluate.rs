@@ -6,20 +6,21 @@ use crate::Rgb;
 use glam::Vec3;
 use halflight_simd::{Lanes, Mask, dot};
 
-/// A point lies in front of a record, and is not to use it, where it is so much below the mean of both tangent planes,
-/// in radii: light that the record sees from above may be hidden from it.
+/// A point lies in front of a record, and does not use it, if it is this far below the mean of both tangent
+/// planes, in radii: light that the record sees from above may be hidden from it.
 const IN_FRONT: f32 = 0.05;
 
 /// Extrapolation stays within these factors of what was gathered.
 const LEAST_FACTOR: f32 = 0.05;
 const GREATEST_FACTOR: f32 = 20.0;
 
-/// The least variance that a record is taken to have, relative: one that knows itself without noise is not alone.
+/// The least relative variance of a record. A record without noise would otherwise silence all others.
 const LEAST_NOISE: f32 = 1e-6;
 
 impl Record {
-    /// What this record says of E at `point`, and its weight w_i > 0 (equations 12 to 14 of the paper).
-    /// `least_cos` is the cosine of the greatest deviation of the normal. `None` outside of the support.
+    /// The irradiance that this record extrapolates to `point`, and its weight w_i > 0 (equations 12 to 14 of
+    /// the paper). `least_cos` is the cosine of the greatest deviation of the normal. `None` outside the
+    /// support.
     #[inline]
     pub fn at(&self, point: &Asker, least_cos: f32) -> Option<(Rgb, f32)> {
         let (speaks, voice) = self.listen(One, &Asked::of(point), least_cos, self.overlap);
@@ -96,8 +97,9 @@ impl Record {
         (speaks, voice)
     }
 
-    /// Its variance at the place where it is over that at the square of so many radii, which extrapolation adds to: weights
-    /// that go with it make the best of records that differ. 1 where the metric does not ask neighbours.
+    /// Variance of E_i over its variance at the given squared distance in radii, to which the error of
+    /// extrapolation adds. Weights ∝ inverse variance combine records that differ. 1 if the metric does not
+    /// compare neighbours.
     #[inline(always)]
     fn trust<W: Width>(&self, width: W, square: W::L) -> W::L {
         if self.allowed <= 0.0 {

@@ -1,4 +1,5 @@
-//! What one place sees: radiance and distance for each stratum of its hemisphere, in the frame of its normal (+z).
+//! The gather rays of one point: radiance and distance for each stratum of the hemisphere, in the frame of
+//! the normal (+z).
 
 use crate::Rgb;
 use crate::light::luminance;
@@ -19,9 +20,10 @@ pub struct Hemisphere<'a> {
 }
 
 impl<'a> Hemisphere<'a> {
-    /// From n² strata: incident radiance, 1/distance of what is seen (0 where nothing is) and the direction that
-    /// was traced (unit, local: z is the cosine). `None` where n is not in 1 ..= [`SIDE_MAX`] or a slice does not
-    /// hold n² values. What they hold is not checked: a value that is not finite spoils the derivatives, no more.
+    /// From n² strata: incident radiance, 1/distance of what is seen (0 where nothing is) and the direction
+    /// that was traced (unit, local: z is the cosine). `None` where n is not in 1 ..= [`SIDE_MAX`] or a slice
+    /// does not hold n² values. What they hold is not checked: a value that is not finite spoils the
+    /// derivatives, no more.
     pub fn new(
         n: usize,
         radiance: &'a [[f32; 3]],
@@ -71,8 +73,9 @@ impl<'a> Hemisphere<'a> {
         sum * (PI / (self.n * self.n) as f32)
     }
 
-    /// Variance of the luminance of [`Hemisphere::irradiance`], estimated from second differences along the rows: what
-    /// changes evenly from one stratum to the next is no noise. A pattern finer than the strata is.
+    /// Variance of the luminance of [`Hemisphere::irradiance`], estimated from second differences along the
+    /// rows: what changes evenly from one stratum to the next is no noise. A pattern finer than the strata
+    /// is.
     pub fn variance(&self) -> f32 {
         let [squares, count] = second_differences(self.radiance, self.n);
         let strata = (self.n * self.n) as f32;
@@ -96,8 +99,8 @@ impl<'a> Hemisphere<'a> {
     }
 }
 
-/// The squares of second differences of luminance along rows of `side` values, summed; and how many there are. Where values
-/// are independent their mean is six times the variance of each.
+/// The squares of second differences of luminance along rows of `side` values, summed; and how many there
+/// are. Where values are independent their mean is six times the variance of each.
 fn second_differences(values: &[[f32; 3]], side: usize) -> [f32; 2] {
     let (mut squares, mut count) = (0.0, 0usize);
     for row in values.chunks_exact(side.max(1)) {
@@ -126,8 +129,8 @@ mod tests {
     use crate::sampling::Random;
     use std::vec;
 
-    /// Radiances that are even on [0, 1] have a variance of 1/12; what rises evenly along the rows has none. The
-    /// estimate of 4096 strata is good to 10 %, four of its standard deviations.
+    /// Radiances that are even on [0, 1] have a variance of 1/12; what rises evenly along the rows has none.
+    /// The estimate of 4096 strata is good to 10 %, four of its standard deviations.
     #[test]
     fn the_variance_is_that_of_the_noise() {
         const N: usize = 64;

@@ -1,5 +1,5 @@
-//! Points that ask for irradiance, one or sixteen at a time: what a record does with them is written once for both, so
-//! that one is the reference of sixteen, and the bits are the same.
+//! Query points, one or sixteen at a time. The evaluation of a record is written once for both, so the scalar
+//! form is the reference of the lanes, and the bits are equal.
 
 use glam::Vec3;
 use halflight_simd::{Lanes, Simd};

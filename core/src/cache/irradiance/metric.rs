@@ -1,10 +1,10 @@
-//! How far a record of irradiance may be used: from its derivatives to the two radii of an ellipse in its tangent
-//! plane, by any of the rules of the literature and by ours.
+//! How far a record of irradiance may be used: from its derivatives to the two radii of an ellipse in its
+//! tangent plane, by any of the rules of the literature and by ours.
 //!
-//! First-order extrapolation over an ellipse A misses half of ∫ |dxᵀ H dx| over A; of values l₁, l₂ of H that is at
-//! most (π/8)(|l₁| R₁³ R₂ + |l₂| R₁ R₂³), and R = (4 ε/π|l|)^¼ along each axis makes it ε where both are equal
-//! (Schwarzhaupt, Jensen, Jarosz 2012). ε is an integral over an area: we measure it in the square of the scene's
-//! extent, so that a scene in millimetres is cached as the same in kilometres.
+//! First-order extrapolation over an ellipse A misses half of ∫ |dxᵀ H dx| over A; of values l₁, l₂ of H that
+//! is at most (π/8)(|l₁| R₁³ R₂ + |l₂| R₁ R₂³), and R = (4 ε/π|l|)^¼ along each axis makes it ε where both
+//! are equal (Schwarzhaupt, Jensen, Jarosz 2012). ε is an integral over an area: we measure it in the square
+//! of the scene's extent, so that a scene in millimetres is cached as the same in kilometres.
 
 use super::derivatives::{CellFlux, Derivatives, triangulated, unoccluded};
 use super::hemisphere::Hemisphere;
@@ -26,7 +26,8 @@ pub enum Metric {
     /// The Hessian of the triangulated environment with the two rules of the paper for black surroundings
     /// (Schwarzhaupt, Jensen, Jarosz 2012).
     OcclusionHessian,
-    /// The Hessian with a floor by the distances, a bound by the gradient, and a way out of black surroundings.
+    /// The Hessian with a floor by the distances, a bound by the gradient, and a way out of black
+    /// surroundings.
     Halflight,
 }
 
@@ -70,9 +71,9 @@ impl Metric {
         matches!(self, Metric::RadiometricHessian | Metric::GeometricHessian)
     }
 
-    /// The derivatives that it is made for: those of the borders of strata (so that all metrics extrapolate by the
-    /// same gradients) with its own Hessian; of [`Metric::OcclusionHessian`] all as in the paper. `None` where the
-    /// tables are of another number of strata, or normals are missing.
+    /// The derivatives that it is made for: those of the borders of strata (so that all metrics extrapolate
+    /// by the same gradients) with its own Hessian; of [`Metric::OcclusionHessian`] all as in the paper.
+    /// `None` where the tables are of another number of strata, or normals are missing.
     pub fn derivatives(
         self,
         level: Level,
@@ -97,13 +98,13 @@ impl Metric {
 pub struct Settings {
     /// The rule.
     pub metric: Metric,
-    /// Error allowed, above 0. With a Hessian: ε in units of `extent`², relative to the irradiance of the record
-    /// (or to `against`). Otherwise: the radius in units of the distance that the rule takes.
+    /// Error allowed, above 0. With a Hessian: ε in units of `extent`², relative to the irradiance of the
+    /// record (or to `against`). Otherwise: the radius in units of the distance that the rule takes.
     pub error: f32,
     /// Size of the scene (radius of its bounding sphere), m, or of the part of it that matters.
     pub extent: f32,
-    /// The irradiance (luminance) that errors are relative to, where it is not each record's own: a constant is
-    /// an absolute error.
+    /// The irradiance (luminance) that errors are relative to, where it is not each record's own: a constant
+    /// is an absolute error.
     pub against: Option<f32>,
     /// Most that the longer radius may be of the shorter, at least 1; 1 makes circles.
     pub aspect: f32,
@@ -119,8 +120,8 @@ pub struct Settings {
 const MOST: f32 = 0.2;
 
 impl Settings {
-    /// `metric` with its usual settings in a scene of that extent: axes up to 2 : 1, radii from 0 to a fifth of
-    /// the extent.
+    /// `metric` with its usual settings in a scene of that extent: axes up to 2 : 1, radii from 0 to a fifth
+    /// of the extent.
     pub fn new(metric: Metric, extent: f32) -> Self {
         let error = if metric.takes_distances() { 0.3 } else { 1e-4 };
         Self {
@@ -135,8 +136,8 @@ impl Settings {
         }
     }
 
-    /// The same where no more than `size`, m, of the scene is seen: a room in a wide landscape is to have the records that it
-    /// has without.
+    /// The same where no more than `size`, m, of the scene is seen: a room in a wide landscape is to have the
+    /// records that it has without.
     pub fn within(self, size: f32) -> Self {
         let extent = self.extent.min(size);
         Self { extent, most: self.most.min(MOST * extent), ..self }

@@ -1,6 +1,6 @@
-//! Irradiance caching: a [`Hemisphere`] is what one place sees, [`derivatives`] what its irradiance does when the
-//! place moves or turns, and a [`Metric`] how far around it that may be relied upon. A [`Record`] keeps all this, and
-//! the [`IrradianceCache`] all records.
+//! Irradiance caching. A [`Hemisphere`] holds the gather rays of one point, [`derivatives`] the change of its
+//! irradiance with position and normal, a [`Metric`] and [`validity`] the region in which it may be reused. A
+//! [`Record`] keeps all this; the [`IrradianceCache`] holds the records.
 
 pub mod derivatives;
 mod evaluate;

@@ -1,5 +1,5 @@
-//! What a new record and its neighbours learn from each other: where one contradicts the other beyond noise, both
-//! become smaller, and no radius is much larger than that of a neighbour.
+//! Neighbouring records correct each other. If one contradicts the other beyond their noise, the radii of
+//! both shrink, and no radius is much larger than that of a neighbour.
 
 use super::lanes::Asker;
 use super::record::Record;
@@ -29,9 +29,10 @@ pub(super) struct Neighbours<'a, 'm> {
 }
 
 impl Neighbours<'_, '_> {
-    /// What no hemisphere tells, as that a surface comes into sight a step farther, neighbours do: where one says of the
-    /// place of the new record what this did not find, or the new one of its place, and noise is no excuse, the error is
-    /// that of a curvature: the radii of both become those of that curvature, and the one that was wrong counts for less.
+    /// Compares the extrapolations of a new record and its neighbours. A hemisphere does not show, for
+    /// example, a surface that comes into sight a step farther; a neighbour does. If one record contradicts
+    /// the other beyond their noise, the difference is taken for a curvature: both radii become those of this
+    /// curvature, and the record that was wrong gets less weight.
     pub(super) fn compare(&mut self, new: &mut Record) {
         if new.allowed <= 0.0 {
             return;
@@ -72,9 +73,9 @@ impl Neighbours<'_, '_> {
         }
     }
 
-    /// Neighbour clamping (Krivanek, Bouatouch, Pattanaik and Zara 2006, §4): what limits the radius of one record
-    /// is by the distance farther from the other, so no radius is larger than that of a neighbour and the distance
-    /// to it. Complete: all records that the new one could shrink it by, and all that it could shrink, are asked.
+    /// Neighbour clamping (Křivánek et al. 2006, section 4): whatever limits the radius of one record is
+    /// farther from the other by their distance, so no radius exceeds that of a neighbour plus the distance
+    /// to it. All records that may clamp the new one or be clamped by it are visited.
     pub(super) fn clamp(&mut self, new: &mut Record) {
         let (position, normal) = (Vec3::from(new.position), Vec3::from(new.normal));
         let records = &*self.records;
@@ -111,8 +112,8 @@ impl Record {
         alike.then(|| position.distance(Vec3::from(self.position)))
     }
 
-    /// The curvature, relative to the irradiance, whose error this record makes at the place of `other`; zero where it makes
-    /// none, or one that noise explains or that the radii of both are made for.
+    /// The curvature, relative to the irradiance, that explains the error of this record at the position of
+    /// `other`. Zero if there is no error, or if noise or the radii of both explain it.
     fn misses(&self, other: &Record, least_cos: f32) -> f32 {
         let (place, normal) = (Vec3::from(other.position), Vec3::from(other.normal));
         // What hangs close over the other has confined it.

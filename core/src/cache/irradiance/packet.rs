@@ -1,8 +1,9 @@
-//! Sixteen points ask the cache at once. Neighbours in a picture are reached by the same records, so that all go down
-//! the octree together, as far as they are in the same cells, and each record is read once and weighed for all.
+//! Look-ups of sixteen points at once. Neighbours in a picture are reached by the same records, so they
+//! descend the octree together while they are in the same cells, and each record is read once for all of
+//! them.
 //!
-//! Plainly: [`IrradianceCache::at`] for each of them. Here a point meets the same records in the same order, and all is
-//! done in lanes as it is done for one: the bits are the same. The price: points that are alone in their cells pay for
+//! Plainly: [`IrradianceCache::at`] for each point. A point meets the same records in the same order, and the
+//! lanes do the same arithmetic: the bits are equal. The price: a point that is alone in its cells pays for
 //! sixteen lanes.
 
 use super::lanes::{Asked, Asker, Sixteen};
@@ -224,7 +225,8 @@ mod tests {
         let random = Random::new(5, 5);
         let mut known = 0;
         for i in 0..500u32 {
-            // Neighbours, and points that have nothing to do with each other; also fewer than sixteen, and none.
+            // Neighbours, and points that have nothing to do with each other; also fewer than sixteen, and
+            // none.
             let size = if i % 2 == 0 { 0.02 } else { 1.0 };
             let middle = place(&random, i);
             let points: vec::Vec<_> = (0..(i as usize * 7 % 17) as u32)

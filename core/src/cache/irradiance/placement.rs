@@ -1,5 +1,6 @@
-//! All metrics with as many records, on the floor of rooms where its irradiance is known: records are gathered in
-//! random order wherever none reaches yet, and what is interpolated of them is held against the truth.
+//! All metrics with as many records, on the floor of rooms where its irradiance is known: records are
+//! gathered in random order wherever none reaches yet, and what is interpolated of them is held against the
+//! truth.
 
 use super::rooms::{Gather, LIGHT, OPEN, Random, Room, SHADOW, WALLS, with_tables};
 use super::{Asker, Derivatives, IrradianceCache, Metric, Record, metric, validity};
@@ -57,7 +58,8 @@ impl Floor {
         }
     }
 
-    /// Records and root mean square error of all points, relative to the mean, where records are gathered for `error`.
+    /// Records and root mean square error of all points, relative to the mean, where records are gathered for
+    /// `error`.
     fn cached(&self, metric: Metric, derivatives: &[Derivatives], error: f32) -> (usize, f64) {
         let bounds = Bounds { min: Vec3::ZERO, max: Vec3::ONE };
         let mut lines = vec![Line([0; 64]); IrradianceCache::footprint(CAPACITY).bytes() / 64];

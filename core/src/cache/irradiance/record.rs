@@ -1,8 +1,8 @@
 //! One place where the indirect irradiance is known: how it changes around, and how far that may be trusted.
 //!
-//! A record covers an ellipsoid: the two radii R1 ≤ R2 that an error metric gives along the surface, and R1 across it
-//! (Schwarzhaupt, Jensen and Jarosz 2012, §5). Its support may be wider, by the overlap that the metric allows. A fence
-//! cuts out of both what lies behind a wall.
+//! A record covers an ellipsoid: the two radii R1 ≤ R2 that an error metric gives along the surface, and R1
+//! across it (Schwarzhaupt, Jensen and Jarosz 2012, §5). Its support may be wider, by the overlap that the
+//! metric allows. A fence cuts out of both what lies behind a wall.
 
 use super::lanes::{One, Width};
 use super::{Derivatives, Validity};
@@ -15,13 +15,13 @@ use halflight_simd::Lanes;
 /// Azimuths for each of which a record knows how far it is to the next wall.
 pub const SECTORS: usize = 16;
 
-/// Overlap over the cube root of the relative noise, and the most of it: least errors in the Cornell box with 4096 rays and
-/// with 500 to 5000 records.
+/// Overlap over the cube root of the relative noise, and the largest overlap. These give the least error in
+/// the Cornell box with 4096 rays and 500 to 5000 records.
 const NOISE_TO_OVERLAP: f32 = 8.0;
 const MOST_OVERLAP: f32 = 2.0;
 
-/// Of what the Hessian says that extrapolation misses, the part that is missed where several records speak; and the most
-/// of it, for extrapolation is kept within limits.
+/// The part of the error predicted by the Hessian that remains where several records overlap, and its upper
+/// limit: extrapolation is clamped.
 const MISSED: f32 = 0.5;
 const MOST_MISSED: f32 = 0.3;
 
@@ -43,8 +43,8 @@ pub struct Record {
     pub overlap: f32,
     /// n_i, unit: the shading normal.
     pub normal: [f32; 3],
-    /// Error allowed over its support, relative to E_i: an integral over an area, m². Zero where it does not learn from
-    /// its neighbours.
+    /// Error allowed over its support, relative to E_i: an integral over an area, m². Zero where it does not
+    /// learn from its neighbours.
     pub allowed: f32,
     /// Unit tangent along which the radius is R1; along the normal times it it is R2.
     pub axis: [f32; 3],
@@ -78,8 +78,8 @@ pub struct Record {
 }
 
 impl Record {
-    /// What `derivatives` say at `position`, whose tangent frame is `frame`, as far as `reach`. Gradients are kept so small
-    /// that no channel falls below zero within the support.
+    /// The record of `derivatives` at `position` with tangent frame `frame`, valid within `reach`. Gradients
+    /// are limited so that no channel falls below zero within the support.
     pub fn new(position: Vec3, frame: &Frame, derivatives: &Derivatives, reach: &Validity) -> Self {
         let axis = reach.axis;
         let along = |v: Vec2| Vec2::new(v.dot(axis), axis.perp_dot(v));
@@ -115,10 +115,9 @@ impl Record {
         }
     }
 
-    /// Takes note of the variance of E_i by noise, over its square. Where supports may overlap, they do so by what that
-    /// asks for: averaging over s radii leaves a noise of σ/s, and extrapolation over them an error that grows with s²,
-    /// so that their sum is least at an s that goes with the cube root of σ. Whose radii are already larger than its
-    /// metric wants, for they are the least that there are, does not overlap.
+    /// Sets the relative variance of E_i. If supports may overlap, the overlap s follows from it: averaging
+    /// over s radii leaves a noise of σ/s and an extrapolation error ∝ s², so the optimal s is ∝ σ^⅓. Records
+    /// clamped to the minimum radius do not overlap.
     pub fn note_noise(&mut self, noise: f32) {
         self.noise = noise;
         if self.allowed > 0.0 {
@@ -144,9 +143,9 @@ impl Record {
         }
     }
 
-    /// The magnitude of the relative error that is expected on average where this record speaks: by its noise, of which
-    /// that of its neighbours takes away as much as supports overlap, and by extrapolation. A normal deviate of variance
-    /// 1 has the magnitude √(2/π).
+    /// The magnitude of the relative error that is expected on average where this record speaks: by its
+    /// noise, of which that of its neighbours takes away as much as supports overlap, and by extrapolation. A
+    /// normal deviate of variance 1 has the magnitude √(2/π).
     pub fn predicted(&self) -> f32 {
         let missed = MISSED * self.error.min(MOST_MISSED);
         let variance = self.noise / (self.overlap * self.overlap) + missed * missed;
@@ -213,8 +212,8 @@ impl Record {
         self.local(direction).truncate()
     }
 
-    /// The sector in the direction of `place` along a record's axes, as [`Record::towards`] takes it: the fraction says
-    /// where in it.
+    /// The sector in the direction of `place` along a record's axes, as [`Record::towards`] takes it: the
+    /// fraction says where in it.
     pub fn sector(place: Vec2) -> f32 {
         sector(One, place.to_array())
     }

@@ -1,7 +1,7 @@
-//! Rooms of which the irradiance of the floor is exact, for the tests of what is estimated: a unit room of six walls,
-//! lit by any of them or by a patch of its ceiling, with or without a square in the air. Irradiance is Lambert's
-//! formula over the walls, of which the square takes away its shadow by exact clipping; its derivatives are central
-//! differences of that in f64.
+//! Rooms of which the irradiance of the floor is exact, for the tests of what is estimated: a unit room of
+//! six walls, lit by any of them or by a patch of its ceiling, with or without a square in the air.
+//! Irradiance is Lambert's formula over the walls, of which the square takes away its shadow by exact
+//! clipping; its derivatives are central differences of that in f64.
 
 use super::derivatives::CellFlux;
 use super::hemisphere::Hemisphere;
@@ -75,8 +75,8 @@ pub(super) struct Room {
     pub(super) walls: [f64; 5],
     /// A square of the ceiling: lowest corner, side, radiance.
     pub(super) patch: Option<([f64; 2], f64, f64)>,
-    /// A square in the air, parallel to the floor and askew: middle, side, radiance. (Were it in line with the walls,
-    /// its edges would pass before theirs all at once, and the irradiance would have kinks.)
+    /// A square in the air, parallel to the floor and askew: middle, side, radiance. (Were it in line with
+    /// the walls, its edges would pass before theirs all at once, and the irradiance would have kinks.)
     pub(super) square: Option<(Point, f64, f64)>,
 }
 

@@ -9,8 +9,8 @@ use crate::geometry::Bounds;
 use crate::memory::{Arena, Footprint, OutOfMemory};
 use glam::Vec3;
 
-/// Normals that deviate by more than this many radians are not served: what rises over the turned horizon was not
-/// sampled (Schwarzhaupt et al. 2012, §4.3).
+/// Normals that deviate by more than this many radians are not served: what rises over the turned horizon was
+/// not sampled (Schwarzhaupt et al. 2012, §4.3).
 pub const GREATEST_DEVIATION: f32 = 0.2;
 
 /// What a cache knows of a point.
@@ -81,8 +81,8 @@ impl<'m> IrradianceCache<'m> {
 
     /// What is known at `point`; `None` where no record reaches.
     ///
-    /// E = Σ w_i (E_i + ∇E_i · Δx_i + ∇_n E_i · (n_i × n)) / Σ w_i (Schwarzhaupt et al. 2012, equation 12), with the
-    /// second order where a metric has it.
+    /// E = Σ w_i (E_i + ∇E_i · Δx_i + ∇_n E_i · (n_i × n)) / Σ w_i (Schwarzhaupt et al. 2012, equation 12),
+    /// with the second order where a metric has it.
     #[inline]
     pub fn at(&self, point: &Asker) -> Option<Indirect> {
         let (mut sum, mut shining, mut weights) = (Rgb::ZERO, 0.0, 0.0);
@@ -160,8 +160,8 @@ impl<'m> IrradianceCache<'m> {
         covered
     }
 
-    /// Adds a record, after it and its neighbours have learnt from each other and clamped each other. Whether there was
-    /// memory for it.
+    /// Adds a record, after it and its neighbours have learnt from each other and clamped each other. Whether
+    /// there was memory for it.
     pub fn insert(&mut self, mut record: Record) -> bool {
         if self.is_full() {
             self.refused += 1;
@@ -192,15 +192,16 @@ impl<'m> IrradianceCache<'m> {
         }
     }
 
-    /// Makes all radii smaller by a factor, as for an error allowed that is smaller by its fourth power. What records
-    /// then no longer cover is to be filled again.
+    /// Makes all radii smaller by a factor, as for an error allowed that is smaller by its fourth power. What
+    /// records then no longer cover is to be filled again.
     pub fn tighten(&mut self, share: f32) {
         self.records.iter_mut().take(self.used).for_each(|record| record.tighten(share));
         self.settle();
     }
 
-    /// Links all records anew, by their supports as they are now: what was clamped is found less often. The order in
-    /// which a place finds its records, and so the last bit of what they say, then follows from the records alone.
+    /// Links all records anew, by their supports as they are now: what was clamped is found less often. The
+    /// order in which a place finds its records, and so the last bit of what they say, then follows from the
+    /// records alone.
     pub fn settle(&mut self) {
         self.link(self.used);
     }
@@ -216,8 +217,8 @@ impl<'m> IrradianceCache<'m> {
         }
     }
 
-    /// Takes over `records`, those of another cache of the same scene, as they are; what was here is gone. As many as
-    /// there is memory for; the others are refused.
+    /// Takes over `records`, those of another cache of the same scene, as they are; what was here is gone. As
+    /// many as there is memory for; the others are refused.
     pub fn restore(&mut self, records: &[Record]) {
         self.used = records.len().min(self.records.len());
         self.refused = (records.len() - self.used) as u64;
@@ -329,8 +330,8 @@ mod tests {
         });
     }
 
-    /// E = 1 and 1.5 at a distance of 0.1: a curvature of 2 · 0.5 / 0.1² over 1.5. Excused if the noise is a quarter of
-    /// each, for their difference is then no more than three deviations.
+    /// E = 1 and 1.5 at a distance of 0.1: a curvature of 2 · 0.5 / 0.1² over 1.5. Excused if the noise is a
+    /// quarter of each, for their difference is then no more than three deviations.
     #[test]
     fn records_that_disagree_shrink_unless_noise_is_an_excuse() {
         let pair = |noise| {

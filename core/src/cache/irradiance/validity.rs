@@ -13,20 +13,22 @@ pub struct Validity {
     pub axis: Vec2,
     /// The shorter and the longer radius, m.
     pub radii: [f32; 2],
-    /// How much farther than the radii the record still has weight where others reach: 1, or more to average over
-    /// more of them.
+    /// How much farther than the radii the record still has weight where others reach: 1, or more to average
+    /// over more of them.
     pub overlap: f32,
-    /// Second derivatives along the axes to extrapolate by, of the irradiance relative to itself, so that at (x, y)
-    /// along them it is (x² bend₀ + y² bend₁)/2 of it more. Zero where the rule extrapolates to first order.
+    /// Second derivatives along the axes to extrapolate by, of the irradiance relative to itself, so that at
+    /// (x, y) along them it is (x² bend₀ + y² bend₁)/2 of it more. Zero where the rule extrapolates to first
+    /// order.
     pub bend: [f32; 2],
-    /// By what the gradients are to be multiplied, so that extrapolation within the reach takes the irradiance
-    /// (luminance) neither below zero nor above its double. 1 where the metric's own radii hold.
+    /// By what the gradients are to be multiplied, so that extrapolation within the reach takes the
+    /// irradiance (luminance) neither below zero nor above its double. 1 where the metric's own radii hold.
     pub gradient_scale: f32,
-    /// Curvatures along the axes that the radii were made for: at (x, y) along them the error of extrapolation is
-    /// expected to be (x² curvature₀ + y² curvature₁)/2 of the irradiance. Zero where the rule knows none.
+    /// Curvatures along the axes that the radii were made for: at (x, y) along them the error of
+    /// extrapolation is expected to be (x² curvature₀ + y² curvature₁)/2 of the irradiance. Zero where the
+    /// rule knows none.
     pub curvature: [f32; 2],
-    /// Error allowed over the reach, an integral over its area, m²: where neighbours show that it is more, the reach is
-    /// to shrink. Zero where the metric does not ask them.
+    /// Error allowed over the reach, an integral over its area, m²: where neighbours show that it is more,
+    /// the reach is to shrink. Zero where the metric does not ask them.
     pub allowed: f32,
     /// The least that it may shrink to, m.
     pub least: f32,
@@ -37,9 +39,10 @@ const OVERLAP: f32 = 1.5;
 
 /// The reach of a record of these derivatives, which should be those of [`Metric::derivatives`].
 ///
-/// Of [`Metric::Halflight`] a place gets a record where it is in the radii of none, and is interpolated of all within
-/// [`OVERLAP`] times their radii: twice as many, whose independent errors average out. That is not to be had to first order,
-/// for the error of extrapolation grows with the square of the distance; but the Hessian is known, and is added to it.
+/// Of [`Metric::Halflight`] a place gets a record where it is in the radii of none, and is interpolated of
+/// all within [`OVERLAP`] times their radii: twice as many, whose independent errors average out. That is not
+/// to be had to first order, for the error of extrapolation grows with the square of the distance; but the
+/// Hessian is known, and is added to it.
 pub fn validity(settings: &Settings, derivatives: &Derivatives) -> Validity {
     let irradiance = derivatives.luminance();
     let slope = derivatives.luminance_gradient().length();
@@ -78,7 +81,8 @@ pub fn validity(settings: &Settings, derivatives: &Derivatives) -> Validity {
     let second = lit && settings.metric == Metric::Halflight;
     let overlap = if settings.metric == Metric::Halflight { OVERLAP } else { 1.0 };
     let bend = [0, 1].map(|k| {
-        // Where radii are larger than the curvature allows, the second order is to change it by no more than all.
+        // Where radii are larger than the curvature allows, the second order is to change it by no more than
+        // all.
         let most = 2.0 / (overlap * radii[k] * overlap * radii[k]);
         let bend = shares[k] * shares[k] * signed[k] / irradiance;
         if second && bend.is_finite() { bend.max(-most).min(most) } else { 0.0 }
@@ -87,7 +91,8 @@ pub fn validity(settings: &Settings, derivatives: &Derivatives) -> Validity {
     Validity { axis, radii, overlap, bend, gradient_scale, curvature, allowed, least: settings.least }
 }
 
-/// R = (4 ε/π|l|)^¼: how far a record of curvature `l`, relative to its irradiance, makes the error `allowed`.
+/// R = (4 ε/π|l|)^¼: how far a record of curvature `l`, relative to its irradiance, makes the error
+/// `allowed`.
 pub(super) fn radius(allowed: f32, l: f32) -> f32 {
     libm::sqrtf(libm::sqrtf(4.0 / PI * allowed / l))
 }
@@ -108,7 +113,8 @@ impl Default for Bent {
     }
 }
 
-/// Relative curvatures of the irradiance along the axes, the larger first, by the Hessian and the metric's rules.
+/// Relative curvatures of the irradiance along the axes, the larger first, by the Hessian and the metric's
+/// rules.
 fn curvatures(settings: &Settings, derivatives: &Derivatives, lit: bool) -> Bent {
     let irradiance = derivatives.luminance();
     let against = settings.against.unwrap_or(irradiance);
@@ -144,8 +150,8 @@ fn relative(hessian: Hessian, irradiance: f32) -> Bent {
     Bent { axis: if axis.is_finite() { axis } else { Vec2::X }, curvature, signed: values }
 }
 
-/// Radii within the limits: the longer at most `aspect` times the shorter, then both from `least` to `most`; what
-/// is no number is `least`.
+/// Radii within the limits: the longer at most `aspect` times the shorter, then both from `least` to `most`;
+/// what is no number is `least`.
 fn clamped(settings: &Settings, [short, long]: [f32; 2]) -> [f32; 2] {
     let short = if short.is_nan() { 0.0 } else { short };
     let long = long.max(short).min(settings.aspect.max(1.0) * short);

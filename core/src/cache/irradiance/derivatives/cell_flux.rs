@@ -1,14 +1,15 @@
 //! Derivatives from the borders between strata: the default.
 //!
-//! The strata of the concentric map never move; what they see does. Between two of radiance L₁ and L₂ runs the
-//! boundary of a surface, which belongs to the nearer of both and moves with its inverse distance u. By the
-//! boundary integrals of [`halflight_simd::kernels::edge`], with u the same at both ends of a border,
+//! The strata of the concentric map never move; what they see does. Between two of radiance L₁ and L₂ runs
+//! the boundary of a surface, which belongs to the nearer of both and moves with its inverse distance u. By
+//! the boundary integrals of [`halflight_simd::kernels::edge`], with u the same at both ends of a border,
 //!
 //!   grad E = Σ (L₁ - L₂) u g,   Hess E = Σ (L₁ - L₂) u² h,   grad_n E = Σ (L₁ - L₂) r,
 //!
-//! where g, h, r depend on the border alone: tables. No triangulation, so no diagonal and no rule for the radiance
-//! of a triangle; no open rim, for the rim of the hemisphere lies in the horizon, where nothing flows; and all of
-//! it is of the same strata as the unbiased E. With polar strata the first sum is Ward and Heckbert's (1992).
+//! where g, h, r depend on the border alone: tables. No triangulation, so no diagonal and no rule for the
+//! radiance of a triangle; no open rim, for the rim of the hemisphere lies in the horizon, where nothing
+//! flows; and all of it is of the same strata as the unbiased E. With polar strata the first sum is Ward and
+//! Heckbert's (1992).
 
 use super::Derivatives;
 use crate::Level;
@@ -144,8 +145,8 @@ mod tests {
         assert_eq!(found.min_distance, 0.2);
     }
 
-    /// The sky of radiance 1 + s · w: its rotational gradient is n × ∫ s · w w dω = n × 2π/3 s, and its irradiance
-    /// 2π/3 s_z + π; a sky does not move.
+    /// The sky of radiance 1 + s · w: its rotational gradient is n × ∫ s · w w dω = n × 2π/3 s, and its
+    /// irradiance 2π/3 s_z + π; a sky does not move.
     #[test]
     fn a_sky_with_a_slope_turns_and_does_not_move() {
         let n = 64;

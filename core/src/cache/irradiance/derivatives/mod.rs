@@ -23,7 +23,8 @@ use core::ops::{Add, Mul};
 use glam::Vec2;
 use halflight_simd::kernels::jumps::Sums;
 
-/// Irradiance and its derivatives at a place, in the tangent frame of its normal. A derivative by a length in m.
+/// Irradiance and its derivatives at a place, in the tangent frame of its normal. A derivative by a length in
+/// m.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Derivatives {
     /// E, of which a hemisphere of radiance 1 makes π.
@@ -34,8 +35,8 @@ pub struct Derivatives {
     pub rotation: [Vec2; 3],
     /// Second derivatives of the luminance of E.
     pub hessian: Hessian,
-    /// The same of the estimator's environment with radiance 1 everywhere: zero where that is closed, as every
-    /// environment is but the triangulated one of the paper.
+    /// The same of the estimator's environment with radiance 1 everywhere: zero where that is closed, as
+    /// every environment is but the triangulated one of the paper.
     pub open_hessian: Hessian,
     /// Mean of 1/t² over the strata, 1/m².
     pub mean_square_inverse_distance: f32,
@@ -98,8 +99,8 @@ impl Derivatives {
     }
 }
 
-/// The rotational gradient by the samples themselves (Ward, Heckbert 1992): π/N² Σ L (n × w)/cos, with the cosine
-/// kept above 0.05, for near the horizon it has no bound.
+/// The rotational gradient by the samples themselves (Ward, Heckbert 1992): π/N² Σ L (n × w)/cos, with the
+/// cosine kept above 0.05, for near the horizon it has no bound.
 fn rotation_by_samples(hemisphere: &Hemisphere) -> [Vec2; 3] {
     const LOW: f32 = 0.05;
     let share = PI / (hemisphere.n() * hemisphere.n()) as f32;

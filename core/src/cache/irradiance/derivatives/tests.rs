@@ -16,8 +16,8 @@ fn five(found: &Derivatives) -> [f64; 5] {
 
 const RECEIVERS: usize = 40;
 
-/// Root mean square of the errors of gradient and Hessian over receivers on the floor, relative to that of the truth,
-/// for each estimator.
+/// Root mean square of the errors of gradient and Hessian over receivers on the floor, relative to that of
+/// the truth, for each estimator.
 fn errors<const M: usize>(
     room: &Room,
     n: usize,
@@ -56,8 +56,8 @@ fn all(tables: &CellFlux, hemisphere: &Hemisphere) -> [[f64; 5]; 5] {
     ]
 }
 
-/// Room, strata along a side, and the most that gradient and Hessian of closed mesh and of borders of strata may be
-/// off: a third above what was measured.
+/// Room, strata along a side, and the most that gradient and Hessian of closed mesh and of borders of strata
+/// may be off: a third above what was measured.
 type Expected = (&'static str, Room, usize, [[f64; 2]; 2]);
 
 const EXPECTED: [Expected; 8] = [
@@ -107,7 +107,8 @@ fn one_radiance_is_flat_but_to_the_open_mesh() {
     for (found, rim) in [open.hessian.xx, open.hessian.xy, open.hessian.yy].iter().zip([xx, xy, yy]) {
         assert!((found - rim).abs() < 1e-5 * xx.abs().max(yy.abs()), "{open:?}");
     }
-    // Nor is it to what does not know of occlusion, but for its noise; the sum of magnitudes is something else.
+    // Nor is it to what does not know of occlusion, but for its noise; the sum of magnitudes is something
+    // else.
     let Unoccluded { radiometric, geometric, .. } = unoccluded(&hemisphere).unwrap();
     assert!(geometric.xx + geometric.yy > 4.0 * (radiometric.xx + radiometric.yy).abs(), "{geometric:?}");
     assert!(geometric.xx * geometric.yy > geometric.xy * geometric.xy, "{geometric:?} is not positive");

@@ -1,9 +1,10 @@
-//! Derivatives from the triangulated environment of Schwarzhaupt, Jensen and Jarosz (2012), as printed: each quad of
-//! neighbouring samples is two triangles of their farthest vertex's radiance, and the mesh ends at the outermost
-//! samples. For comparison, and as an oracle of the others.
+//! Derivatives from the triangulated environment of Schwarzhaupt, Jensen and Jarosz (2012), as printed: each
+//! quad of neighbouring samples is two triangles of their farthest vertex's radiance, and the mesh ends at
+//! the outermost samples. For comparison, and as an oracle of the others.
 //!
-//! That open rim is the boundary of a false light before a black sky: a room of radiance 1 does not come out flat.
-//! [`Derivatives::open_hessian`] says by how much, which is what the paper's rules for black surroundings rest on.
+//! That open rim is the boundary of a false light before a black sky: a room of radiance 1 does not come out
+//! flat. [`Derivatives::open_hessian`] says by how much, which is what the paper's rules for black
+//! surroundings rest on.
 
 use super::{Derivatives, Hessian, rotation_by_samples};
 use crate::Level;
@@ -12,8 +13,8 @@ use core::ops::Add;
 use halflight_simd::kernels::edge::{Flux, flux_of};
 use halflight_simd::kernels::mesh::{Mesh, Rule};
 
-/// Irradiance and all its derivatives; the rotational gradient by samples, for the mesh lacks what is near the
-/// horizon.
+/// Irradiance and all its derivatives; the rotational gradient by samples, for the mesh lacks what is near
+/// the horizon.
 pub fn triangulated(level: Level, hemisphere: &Hemisphere) -> Derivatives {
     let mesh = Mesh {
         n: hemisphere.n(),
@@ -28,7 +29,8 @@ pub fn triangulated(level: Level, hemisphere: &Hemisphere) -> Derivatives {
     found
 }
 
-/// The Hessian of the mesh with radiance 1 everywhere: all that does not cancel is its rim, counter-clockwise.
+/// The Hessian of the mesh with radiance 1 everywhere: all that does not cancel is its rim,
+/// counter-clockwise.
 fn rim(hemisphere: &Hemisphere) -> Hessian {
     let n = hemisphere.n();
     let last = n - 1;

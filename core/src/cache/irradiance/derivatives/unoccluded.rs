@@ -1,14 +1,16 @@
-//! Derivatives that do not know of occlusion (Jarosz et al. 2012): each sample as a small patch of a surface that
-//! stays in sight. For comparison; they need the normals of what is seen.
+//! Derivatives that do not know of occlusion (Jarosz et al. 2012): each sample as a small patch of a surface
+//! that stays in sight. For comparison; they need the normals of what is seen.
 //!
-//! Irradiance is ∫ L K dA with K = -(n·d)(m·d)/|d|⁴, d from the receiver to a patch of normal m. With w = d/r,
+//! Irradiance is ∫ L K dA with K = -(n·d)(m·d)/|d|⁴, d from the receiver to a patch of normal m. With w =
+//! d/r,
 //!
 //!   grad K = K (4 w - m/(m·w))/r,   Hess K = K (24 w wᵀ - 4 I - 4 (w mᵀ + m wᵀ)/(m·w))/r²   (x and y only),
 //!
-//! so with strata of equal irradiance each derivative is π/N² Σ L times a bracket. At a grazing hit 1/(m·w) has no
-//! bound: it is kept to [`GRAZING`]. With L = 1 the second sum is zero in every closed room, whatever it looks
-//! like; so the geometric Hessian is the sum of the magnitudes, |H| with the absolute eigenvalues of each patch: the
-//! bound of what radiances between 0 and 1 may do. (The paper was not at hand; this is our reading.)
+//! so with strata of equal irradiance each derivative is π/N² Σ L times a bracket. At a grazing hit 1/(m·w)
+//! has no bound: it is kept to [`GRAZING`]. With L = 1 the second sum is zero in every closed room, whatever
+//! it looks like; so the geometric Hessian is the sum of the magnitudes, |H| with the absolute eigenvalues of
+//! each patch: the bound of what radiances between 0 and 1 may do. (The paper was not at hand; this is our
+//! reading.)
 
 use super::Hessian;
 use crate::cache::irradiance::hemisphere::Hemisphere;

@@ -1,6 +1,6 @@
-//! Gradients as of Ward and Heckbert (1992), carried over from polar strata to those of the concentric map: a border
-//! between strata moves with the nearer of both, and is as long and as high as at its middle. No second order. For
-//! comparison.
+//! Gradients as of Ward and Heckbert (1992), carried over from polar strata to those of the concentric map: a
+//! border between strata moves with the nearer of both, and is as long and as high as at its middle. No
+//! second order. For comparison.
 
 use super::{Derivatives, rotation_by_samples};
 use crate::Rgb;
