@@ -5,7 +5,7 @@ use crate::numbers::{fraction, point};
 use arbitrary::{Result, Unstructured};
 use glam::Vec3;
 use halflight_core::Level;
-use halflight_core::cache::irradiance::{Asker, IrradianceCache, POINTS, Points, Record, SECTORS};
+use halflight_core::cache::irradiance::{QueryPoint, IrradianceCache, POINTS, Points, Record, SECTORS};
 use halflight_core::geometry::Bounds;
 use halflight_core::memory::{Arena, Line};
 
@@ -29,7 +29,7 @@ fn attempt(input: &mut Unstructured) -> Result<()> {
         cache.insert(record(input)?);
     }
     if input.arbitrary()? {
-        cache.settle();
+        cache.rebuild();
     }
     let (mut points, mut wanted) = (Points::NONE, [None; POINTS]);
     let from = within(input)?;
@@ -46,7 +46,7 @@ fn attempt(input: &mut Unstructured) -> Result<()> {
         let normal = normal(input)?;
         let beneath = input.arbitrary::<u8>()? < 64;
         let within = if beneath { 0.3 * fraction(input)? } else { f32::INFINITY };
-        let asker = Asker { position, normal, within };
+        let asker = QueryPoint { position, normal, within };
         points.set(i, &asker);
         *wanted = cache.at(&asker);
     }

@@ -4,7 +4,7 @@
 //! for itself. Between both the filter goes by roots, so that what is a hundred times as bright next door
 //! does not drown a dark pixel.
 
-use super::seen::raster;
+use super::tile_statistics::raster;
 use crate::Rgb;
 use crate::film::{PIXELS_PER_TILE, Pixel, TILE, Tile};
 use glam::Vec4;

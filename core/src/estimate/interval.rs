@@ -154,7 +154,7 @@ fn student_95(freedom: f64) -> f64 {
 mod tests {
     use super::*;
     use crate::Rgb;
-    use crate::estimate::{Lookalikes, TileLight};
+    use crate::estimate::{BrightnessClasses, TileLight};
     use crate::film::{Dropped, PIXELS_PER_TILE, Pixel, Tile};
     use crate::sampling::Random;
     use std::vec::Vec;
@@ -198,7 +198,7 @@ mod tests {
     fn errors(picture: &[Vec<Pixel>]) -> Vec<TileError> {
         let mut light = TileLight::default();
         picture.iter().for_each(|tile| light += TileLight::of(tile));
-        let (mean, mut alike) = (light.mean(), Lookalikes::default());
+        let (mean, mut alike) = (light.mean(), BrightnessClasses::default());
         picture.iter().for_each(|tile| alike.add(tile, mean));
         let shrinkage = alike.shrinkage();
         picture.iter().map(|tile| TileError::of(tile, mean, &shrinkage)).collect()

@@ -1,8 +1,8 @@
 //! What the halves of one tile disagree by: sums from which [`super::ErrorEstimate`] is made.
 
+use super::empirical_bayes::{Neighbourhood, Pair, Posterior, Shrinkage};
 use super::metric::DARK;
-use super::seen::{Seen, brightness, raster};
-use super::shrinkage::{Around, Likely, Pair, Shrinkage};
+use super::tile_statistics::{TileStatistics, brightness, raster};
 use crate::film::{GROUPS, PIXELS_PER_TILE, Pixel, Tile};
 use glam::Vec4;
 
@@ -107,20 +107,20 @@ impl TileError {
     /// whose halves have no two samples each are left out.
     pub fn of(pixels: &[Pixel], mean: f64, shrinkage: &Shrinkage) -> Self {
         let scale = (1.0 / mean) as f32;
-        let seen = Seen::new(pixels, scale);
+        let seen = TileStatistics::new(pixels, scale);
         let mut sums = Self::default();
         let (mut groups, mut blocks) = ([[0.0; 2]; GROUPS], [[0.0; 2]; BLOCKS]);
         for (i, pixel) in pixels.iter().enumerate().take(PIXELS_PER_TILE) {
             let place = raster(i);
             let Some(quarters @ [a1, a2, b1, b2]) = seen.quarters[place] else { continue };
-            let (pairs, around) = (Pair::both(quarters), Around::new(seen.around[place]));
-            let likely = pairs.map(|pair| shrinkage.likely(pair, &around));
-            let by = likely.map(|likely| likely.spread * likely.over_square);
+            let (pairs, around) = (Pair::both(quarters), Neighbourhood::new(seen.around[place]));
+            let posterior = pairs.map(|pair| shrinkage.posterior(pair, &around));
+            let by = posterior.map(|posterior| posterior.spread * posterior.over_square);
             let [first, second] = pairs.map(|pair| pair.noise());
             let by_both = 0.5 * (by[0] + by[1]);
             sums.values += 3;
             let noise = pixel.scaled_variance(scale).extend(0.0);
-            sums.certain += total(noise * (likely[0].over_square + likely[1].over_square) * 0.5);
+            sums.certain += total(noise * (posterior[0].over_square + posterior[1].over_square) * 0.5);
             let variance = total(noise * by_both);
             let squared = variance * variance;
             sums.halves += variance;
@@ -131,7 +131,7 @@ impl TileError {
             let least = total(noise / (seen * seen + DARK as f32));
             sums.least += least;
             sums.least_squares += least * least;
-            sums.above += above([variance, darker], likely, seen, around, by_both);
+            sums.above += above([variance, darker], posterior, seen, around, by_both);
             sums.parts += total((first + second) * by_both * 0.5);
             sums.crossed += total(0.5 * (first * by[1] + second * by[0]));
             let difference = total(a1 + a2 - b1 - b2) * libm::sqrt(total(by_both));
@@ -175,7 +175,13 @@ impl core::ops::AddAssign for TileError {
 /// With T = (A − R)(B − R) = (I − R)² − V for the difference, and v for what is not known of R: T² + 4 (I −
 /// R)² v, and 4/3 V² for as much as the pixel itself is believed. Where pixels like it are not known, R may
 /// be that of the darker pair.
-fn above([variance, darker]: [f64; 2], likely: [Likely; 2], seen: Vec4, around: Vec4, weights: Vec4) -> f64 {
+fn above(
+    [variance, darker]: [f64; 2],
+    posterior: [Posterior; 2],
+    seen: Vec4,
+    around: Vec4,
+    weights: Vec4,
+) -> f64 {
     /// (I − R)² over V at most: more comes from an edge that R does not follow.
     const MOST: f64 = 3.0;
     /// The mean of T² over 4 V², for normal noise, where that is the most.
@@ -183,12 +189,12 @@ fn above([variance, darker]: [f64; 2], likely: [Likely; 2], seen: Vec4, around: 
     /// What is believed with 95 % is two standard errors.
     const BELIEVED: f64 = 0.25;
     let square = |light: Vec4| total(light * light * weights);
-    let light = 0.5 * (likely[0].light + likely[1].light);
-    let share = f64::from(0.5 * (likely[0].share + likely[1].share)).clamp(0.0, 1.0);
+    let light = 0.5 * (posterior[0].light + posterior[1].light);
+    let share = f64::from(0.5 * (posterior[0].share + posterior[1].share)).clamp(0.0, 1.0);
     let distance = square(seen - light).min(MOST * variance);
     let unknown = square(light - around).min(share * variance);
     let difference = distance - variance;
-    let darker = f64::from(likely[0].doubt.max(likely[1].doubt)) * darker;
+    let darker = f64::from(posterior[0].doubt.max(posterior[1].doubt)) * darker;
     (1.0 - share) / CUT * difference * difference
         + 4.0 / 3.0 * share * share * variance * variance
         + 4.0 * distance * unknown

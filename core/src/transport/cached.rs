@@ -6,7 +6,7 @@ use super::path::{BLOCK, PathTracer, SurfaceInteraction};
 use super::wave::{Path, Share, Wave};
 use crate::Level;
 use crate::bsdf::Features;
-use crate::cache::irradiance::{Asker, Indirect, IrradianceCache, Points};
+use crate::cache::irradiance::{CachedIrradiance, IrradianceCache, Points, QueryPoint};
 use crate::geometry::Ray;
 use crate::scene::SurfacePoint;
 use core::f32::consts::FRAC_1_PI;
@@ -32,8 +32,8 @@ impl Caches<'_> {
     fn ask(
         &self,
         level: Level,
-        askers: &[Option<(Asker, u32)>; BLOCK],
-        known: &mut [Option<Indirect>; BLOCK],
+        askers: &[Option<(QueryPoint, u32)>; BLOCK],
+        known: &mut [Option<CachedIrradiance>; BLOCK],
         exposed: &mut [f32; BLOCK],
     ) {
         let askers = askers.iter().enumerate().filter_map(|(i, asker)| Some((i, asker.as_ref()?)));
@@ -48,7 +48,7 @@ impl Caches<'_> {
             }
             Caches::Growing(cache) => {
                 for (i, (asker, _)) in askers {
-                    let found = cache.roughly(asker);
+                    let found = cache.first_valid(asker);
                     known[i] = found.map(|(indirect, _)| indirect);
                     exposed[i] = found.map_or(0.0, |(_, exposed)| exposed);
                 }
@@ -74,8 +74,9 @@ impl<'a, F: Features> PathTracer<'a, F> {
             let (SurfaceInteraction { point, .. }, path) = self.asks(wave, rays.get(i)?, block.get(i)?)?;
             (path.segments == 1 || !self.is_limited()).then_some((point, path.sample))
         });
-        let open =
-            |(point, sample): (&SurfacePoint, u32)| (Asker::open(point.position, point.frame.normal), sample);
+        let open = |(point, sample): (&SurfacePoint, u32)| {
+            (QueryPoint::open(point.position, point.frame.normal), sample)
+        };
         caches.ask(self.level, &askers.map(|asker| asker.map(open)), &mut known, &mut exposed);
         if exposed != [0.0; BLOCK] {
             // Those that something hangs close over ask once more.
@@ -83,7 +84,7 @@ impl<'a, F: Features> PathTracer<'a, F> {
             let within = self.within(&points, &exposed, counters);
             let again = core::array::from_fn(|i| {
                 let (asker, sample) = askers[i].map(open).filter(|_| within[i] < exposed[i])?;
-                Some((Asker { within: within[i], ..asker }, sample))
+                Some((QueryPoint { within: within[i], ..asker }, sample))
             });
             caches.ask(self.level, &again, &mut known, &mut exposed);
         }
@@ -114,7 +115,7 @@ impl<'a, F: Features> PathTracer<'a, F> {
     }
 
     /// What photons say of light that was reflected before, where a ray comes from a diffuse surface.
-    fn bounced(&self, ray: &Ray, point: &SurfacePoint, path: &Path) -> Option<Indirect> {
+    fn bounced(&self, ray: &Ray, point: &SurfacePoint, path: &Path) -> Option<CachedIrradiance> {
         let photons = self.bounced?;
         let gathers = path.share == Share::REFLECTED;
         if !(gathers || path.pdf <= DIFFUSE) || self.is_limited() && path.segments != 2 {
@@ -124,6 +125,6 @@ impl<'a, F: Features> PathTracer<'a, F> {
         let which = &photons[if gathers { 0 } else { path.sample as usize & 1 }];
         let (irradiance, _) = which.irradiance((self.bvh, self.level), point, distance)?;
         // One of many rays: shadow rays will do.
-        Some(Indirect { irradiance, shining: 0.0 })
+        Some(CachedIrradiance { irradiance, shining: 0.0 })
     }
 }

@@ -10,7 +10,7 @@ use super::reuse::Exchange;
 use super::wave::{Path, Share, Wave};
 use crate::bsdf::Features;
 use crate::bvh::Coherence;
-use crate::cache::irradiance::{Asker, CellFlux, FINE, Hemisphere, Record, metric, validity};
+use crate::cache::irradiance::{CellFlux, FINE, Hemisphere, QueryPoint, Record, metric, validity};
 use crate::geometry::{Frame, Hit, MISS, Ray};
 use crate::memory::{Arena, Footprint, OutOfMemory};
 use crate::sampling::Sampler;
@@ -39,7 +39,7 @@ pub struct Place {
     pub(super) triangle: u32,
     /// How wide a pixel is here.
     pub(super) pixel: f32,
-    /// Records that are farther than this are not for it, nor its own for what is: [`Asker::within`].
+    /// Records that are farther than this are not for it, nor its own for what is: [`QueryPoint::within`].
     pub(super) within: f32,
 }
 
@@ -79,8 +79,8 @@ impl Place {
     }
 
     /// How it asks a cache.
-    pub fn asker(&self) -> Asker {
-        Asker { position: self.position(), normal: self.normal(), within: self.within }
+    pub fn asker(&self) -> QueryPoint {
+        QueryPoint { position: self.position(), normal: self.normal(), within: self.within }
     }
 
     /// Whether something hangs so close over it that records of so many pixels are too coarse.

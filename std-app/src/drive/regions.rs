@@ -34,7 +34,7 @@ fn merged(tiles: &[TileError], width: u32) -> Vec<TileError> {
 mod tests {
     use super::*;
     use halflight_core::Rgb;
-    use halflight_core::estimate::Lookalikes;
+    use halflight_core::estimate::BrightnessClasses;
     use halflight_core::film::{Dropped, PIXELS_PER_TILE, Pixel};
 
     #[test]
@@ -46,7 +46,7 @@ mod tests {
                 pixel.add(sample, Rgb::splat(light), &mut Dropped::default());
             }
             let pixels = [pixel; PIXELS_PER_TILE];
-            let mut alike = Lookalikes::default();
+            let mut alike = BrightnessClasses::default();
             alike.add(&pixels, 3.0);
             TileError::of(&pixels, 3.0, &alike.shrinkage())
         };

@@ -204,7 +204,7 @@ pub(super) fn risks<F: Features>(
 fn said_at(place: &Place, caches: [&IrradianceCache; 2]) -> [f32; 2] {
     let (mut sum, mut squares, mut weights) = (0.0, 0.0, 0.0);
     for cache in caches {
-        cache.hear(&place.asker(), |said, weight| {
+        cache.visit_values(&place.asker(), |said, weight| {
             let said = luminance(said) as f32;
             sum += weight * said;
             squares += weight * said * said;

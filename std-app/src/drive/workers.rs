@@ -7,7 +7,7 @@ use halflight_core::Level;
 use halflight_core::bsdf::Features;
 use halflight_core::bvh::{Bvh, ForkJoin};
 use halflight_core::estimate::{
-    BLOCKS, BiasEstimate, BlockNoise, ErrorEstimate, Lookalikes, TileBlur, TileError, TileLight,
+    BLOCKS, BiasEstimate, BlockNoise, BrightnessClasses, ErrorEstimate, TileBlur, TileError, TileLight,
 };
 use halflight_core::film::{Film, PIXELS_PER_TILE, Pixel};
 use halflight_core::memory::{Arena, Line, OutOfMemory};
@@ -57,18 +57,19 @@ impl<'w> Workers<'w> {
     fn errors(&self, film: &Film) -> Option<Vec<TileError>> {
         let mean = self.mean(film)?;
         let tiles = film.pixels().par_chunks(PIXELS_PER_TILE);
-        let learn = |mut known: Lookalikes, (_, tile): (usize, &[Pixel])| {
+        let learn = |mut known: BrightnessClasses, (_, tile): (usize, &[Pixel])| {
             known.add(tile, mean);
             known
         };
-        let both = |mut one: Lookalikes, other: Lookalikes| {
+        let both = |mut one: BrightnessClasses, other: BrightnessClasses| {
             one += &other;
             one
         };
         let count = tiles.len();
         Some(self.pool.install(|| {
-            let asked = tiles.clone().enumerate().filter(|(tile, _)| Lookalikes::asks(*tile, count));
-            let alike = asked.fold(Lookalikes::default, learn).reduce(Lookalikes::default, both);
+            let asked = tiles.clone().enumerate().filter(|(tile, _)| BrightnessClasses::asks(*tile, count));
+            let alike =
+                asked.fold(BrightnessClasses::default, learn).reduce(BrightnessClasses::default, both);
             let shrinkage = alike.shrinkage();
             tiles.map(|tile| TileError::of(tile, mean, &shrinkage)).collect()
         }))

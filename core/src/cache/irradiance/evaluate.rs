@@ -1,6 +1,6 @@
 //! The irradiance that a record says of points, one or sixteen at a time, and its weight there.
 
-use super::lanes::{Asked, Asker, One, Voice, Width};
+use super::lanes::{One, Query, QueryPoint, RecordWeight, Width};
 use super::record::{FINE, Record, SECTORS, sector};
 use crate::Rgb;
 use glam::Vec3;
@@ -22,21 +22,21 @@ impl Record {
     /// the paper). `least_cos` is the cosine of the greatest deviation of the normal. `None` outside the
     /// support.
     #[inline]
-    pub fn at(&self, point: &Asker, least_cos: f32) -> Option<(Rgb, f32)> {
-        let (speaks, voice) = self.listen(One, &Asked::of(point), least_cos, self.overlap);
-        speaks.then(|| (Rgb::from(self.said(One, &voice)), voice.weight))
+    pub fn at(&self, point: &QueryPoint, least_cos: f32) -> Option<(Rgb, f32)> {
+        let (is_valid, weight) = self.weigh(One, &Query::of(point), least_cos, self.overlap);
+        is_valid.then(|| (Rgb::from(self.extrapolate(One, &weight)), weight.weight))
     }
 
     /// Whether it covers the point.
     #[inline]
-    pub fn covers(&self, point: &Asker, least_cos: f32) -> bool {
-        self.listen(One, &Asked::of(point), least_cos, 1.0).0
+    pub fn covers(&self, point: &QueryPoint, least_cos: f32) -> bool {
+        self.weigh(One, &Query::of(point), least_cos, 1.0).0
     }
 
     /// How far away the records must be allowed to be that the point hears for this one to be heard, where
     /// something may hang too close over it for that; 0 where nothing does.
     #[inline]
-    pub(super) fn exposed(&self, point: &Asker) -> f32 {
+    pub(super) fn exposed(&self, point: &QueryPoint) -> f32 {
         let place = self.along_axes(point.position - Vec3::from(self.position));
         libm::sqrtf(self.square_exposed(One, place.to_array()))
     }
@@ -54,27 +54,27 @@ impl Record {
 
     /// Which of the points lie in a support of so many radii, and with what weight.
     #[inline(always)]
-    pub(super) fn listen<W: Width>(
+    pub(super) fn weigh<W: Width>(
         &self,
         width: W,
-        asked: &Asked<W::L>,
+        query: &Query<W::L>,
         least_cos: f32,
         overlap: f32,
-    ) -> (<W::L as Lanes>::Mask, Voice<W::L>) {
+    ) -> (<W::L as Lanes>::Mask, RecordWeight<W::L>) {
         let all = |value: f32| width.all(value);
         let (zero, one) = (all(0.0), all(1.0));
         let [r1, r2] = self.radii;
         let farthest = r2 * overlap;
         let [px, py, pz] = self.position;
-        let [x, y, z] = asked.position;
+        let [x, y, z] = query.position;
         let offset = [x - all(px), y - all(py), z - all(pz)];
         let [nx, ny, nz] = self.normal;
         let normal = [all(nx), all(ny), all(nz)];
-        let cos = dot(asked.normal, normal);
+        let cos = dot(query.normal, normal);
         let near = dot(offset, offset).lt(all(farthest * farthest)) & all(least_cos).lt(cos);
-        let mut voice = Voice { place: [zero; 2], turned: [zero; 2], weight: zero };
+        let mut weight = RecordWeight { place: [zero; 2], turned: [zero; 2], weight: zero };
         if !near.any() {
-            return (near, voice);
+            return (near, weight);
         }
         let (axis, across) = (self.axis, self.across());
         let axis = [all(axis[0]), all(axis[1]), all(axis[2])];
@@ -84,24 +84,25 @@ impl Record {
         // A support without extent holds nothing: the square is no number there.
         let square = dot([u, v, w], [u, v, w]);
         // Half of the sum of both normals, along the offset.
-        let height = all(0.5) * (dot(offset, asked.normal) + z);
-        let speaks = near & square.lt(one) & !height.lt(all(-IN_FRONT * r1));
-        voice.place = [x, y];
+        let height = all(0.5) * (dot(offset, query.normal) + z);
+        let is_valid = near & square.lt(one) & !height.lt(all(-IN_FRONT * r1));
+        weight.place = [x, y];
         let least = (x * x + y * y).sqrt().max(all(FINE * self.least));
-        let speaks = speaks & !asked.within.lt(least);
-        let speaks = if self.is_fenced() { speaks & !self.is_fenced_off(width, voice.place) } else { speaks };
+        let is_valid = is_valid & !query.within.lt(least);
+        let is_valid =
+            if self.is_fenced() { is_valid & !self.is_fenced_off(width, weight.place) } else { is_valid };
         // n_i × n along both axes.
-        voice.turned = [-dot(asked.normal, across), dot(asked.normal, axis)];
+        weight.turned = [-dot(query.normal, across), dot(query.normal, axis)];
         let tent = (one - square.sqrt()) * ((cos - all(least_cos)) * all(1.0 / (1.0 - least_cos)));
-        voice.weight = tent * self.trust(width, square * all(overlap * overlap));
-        (speaks, voice)
+        weight.weight = tent * self.inverse_variance(width, square * all(overlap * overlap));
+        (is_valid, weight)
     }
 
     /// Variance of E_i over its variance at the given squared distance in radii, to which the error of
     /// extrapolation adds. Weights ∝ inverse variance combine records that differ. 1 if the metric does not
     /// compare neighbours.
     #[inline(always)]
-    fn trust<W: Width>(&self, width: W, square: W::L) -> W::L {
+    fn inverse_variance<W: Width>(&self, width: W, square: W::L) -> W::L {
         if self.allowed <= 0.0 {
             return width.all(1.0);
         }
@@ -112,18 +113,18 @@ impl Record {
 
     /// E_i + ∇E_i · Δx + Δxᵀ H Δx / 2 + ∇_n E_i · (n_i × n), within limits; of each channel.
     #[inline(always)]
-    pub(super) fn said<W: Width>(&self, width: W, voice: &Voice<W::L>) -> [W::L; 3] {
-        let [x, y] = voice.place;
-        let [u, v] = voice.turned;
+    pub(super) fn extrapolate<W: Width>(&self, width: W, weight: &RecordWeight<W::L>) -> [W::L; 3] {
+        let [x, y] = weight.place;
+        let [u, v] = weight.turned;
         let bend = x * x * width.all(self.bend[0]) + y * y * width.all(self.bend[1]);
         let mut channels = [width.all(0.0); 3];
-        for (channel, said) in channels.iter_mut().enumerate() {
+        for (channel, value) in channels.iter_mut().enumerate() {
             let ([gx, gy], [ru, rv]) = (self.gradient[channel], self.rotation[channel]);
             let change = (x * width.all(gx) + y * width.all(gy)) + (u * width.all(ru) + v * width.all(rv));
             let here = self.irradiance[channel];
             let (least, greatest) = (width.all(LEAST_FACTOR * here), width.all(GREATEST_FACTOR * here));
             let here = width.all(here);
-            *said = (here + bend * here + change).max(least).min(greatest);
+            *value = (here + bend * here + change).max(least).min(greatest);
         }
         channels
     }
@@ -181,13 +182,13 @@ mod tests {
 
     #[test]
     fn it_extrapolates_along_its_axes_and_weighs_by_the_tent() {
-        let (e, w) = record().at(&Asker::open(Vec3::new(0.5, 0.0, 0.0), Vec3::Z), LEAST_COS).unwrap();
+        let (e, w) = record().at(&QueryPoint::open(Vec3::new(0.5, 0.0, 0.0), Vec3::Z), LEAST_COS).unwrap();
         assert!((e.x - 2.25).abs() < 1e-6 && (w - 0.5).abs() < 1e-6, "{e} {w}");
-        let (e, w) = record().at(&Asker::open(Vec3::new(0.0, 1.0, 0.0), Vec3::Z), LEAST_COS).unwrap();
+        let (e, w) = record().at(&QueryPoint::open(Vec3::new(0.0, 1.0, 0.0), Vec3::Z), LEAST_COS).unwrap();
         assert!((e.x - 1.0).abs() < 1e-6 && (w - 0.5).abs() < 1e-6, "{e} {w}");
         // Turned about x by 0.1: n_i × n = (sin, 0, 0) reversed; about y: along the second axis.
         let normal = Vec3::new(0.1f32.sin(), 0.0, 0.1f32.cos());
-        let (e, w) = record().at(&Asker::open(Vec3::ZERO, normal), LEAST_COS).unwrap();
+        let (e, w) = record().at(&QueryPoint::open(Vec3::ZERO, normal), LEAST_COS).unwrap();
         assert!((e.x - (2.0 + 3.0 * 0.1f32.sin())).abs() < 1e-6, "{e}");
         assert!((w - (0.1f32.cos() - LEAST_COS) / (1.0 - LEAST_COS)).abs() < 1e-4, "{w}");
     }
@@ -195,10 +196,10 @@ mod tests {
     #[test]
     fn it_overlaps_others_and_bends() {
         let record = Record { overlap: 2.0, bend: [0.0, 0.25], reach: 4.0, ..record() };
-        let (e, w) = record.at(&Asker::open(Vec3::new(0.0, 3.0, 0.0), Vec3::Z), LEAST_COS).unwrap();
+        let (e, w) = record.at(&QueryPoint::open(Vec3::new(0.0, 3.0, 0.0), Vec3::Z), LEAST_COS).unwrap();
         assert!((e.x - (2.0 - 3.0 + 2.0 * 0.25 * 9.0)).abs() < 1e-5 && (w - 0.25).abs() < 1e-6, "{e} {w}");
-        assert!(record.at(&Asker::open(Vec3::new(0.0, 4.0, 0.0), Vec3::Z), LEAST_COS).is_none());
-        let covers = |y| record.covers(&Asker::open(Vec3::new(0.0, y, 0.0), Vec3::Z), LEAST_COS);
+        assert!(record.at(&QueryPoint::open(Vec3::new(0.0, 4.0, 0.0), Vec3::Z), LEAST_COS).is_none());
+        let covers = |y| record.covers(&QueryPoint::open(Vec3::new(0.0, y, 0.0), Vec3::Z), LEAST_COS);
         assert_eq!((record.radii_to(Vec3::new(0.0, 3.0, 0.0)), record.radii_to(Vec3::X)), (1.5, 1.0));
         assert!(covers(1.9) && !covers(2.1));
         assert_eq!(record.extent(), Vec3::new(2.0, 4.0, 1.0));
@@ -210,19 +211,24 @@ mod tests {
         for (x, y, z) in
             [(1.0, 0.0, 0.0), (0.0, 2.0, 0.0), (0.0, 0.0, 1.0), (0.8, 1.3, 0.0), (0.0, 0.0, -0.2)]
         {
-            assert!(record.at(&Asker::open(Vec3::new(x, y, z), Vec3::Z), LEAST_COS).is_none(), "{x} {y} {z}");
+            assert!(
+                record.at(&QueryPoint::open(Vec3::new(x, y, z), Vec3::Z), LEAST_COS).is_none(),
+                "{x} {y} {z}"
+            );
         }
-        assert!(record.at(&Asker::open(Vec3::ZERO, Vec3::new(0.3, 0.0, 0.954)), LEAST_COS).is_none());
-        assert!(record.at(&Asker::open(Vec3::ZERO, Vec3::NEG_Z), LEAST_COS).is_none());
+        assert!(record.at(&QueryPoint::open(Vec3::ZERO, Vec3::new(0.3, 0.0, 0.954)), LEAST_COS).is_none());
+        assert!(record.at(&QueryPoint::open(Vec3::ZERO, Vec3::NEG_Z), LEAST_COS).is_none());
         assert!(
-            Record { radii: [0.0; 2], ..record }.at(&Asker::open(Vec3::ZERO, Vec3::Z), LEAST_COS).is_none()
+            Record { radii: [0.0; 2], ..record }
+                .at(&QueryPoint::open(Vec3::ZERO, Vec3::Z), LEAST_COS)
+                .is_none()
         );
     }
 
     #[test]
     fn what_it_says_stays_between_limits() {
         let steep = Record { gradient: [[100.0, 0.0]; 3], ..record() };
-        let at = |x| steep.at(&Asker::open(Vec3::new(x, 0.0, 0.0), Vec3::Z), LEAST_COS).unwrap().0.x;
+        let at = |x| steep.at(&QueryPoint::open(Vec3::new(x, 0.0, 0.0), Vec3::Z), LEAST_COS).unwrap().0.x;
         assert_eq!((at(0.9), at(-0.9)), (40.0, 0.1));
     }
 
@@ -235,7 +241,7 @@ mod tests {
             assert!(place.extend(0.0).distance(world) < 1e-6);
         }
         record.fence_off(Vec2::new(0.0, 1.0), 0.5);
-        let at = |x, y| record.at(&Asker::open(Vec3::new(x, y, 0.0), Vec3::Z), LEAST_COS).is_some();
+        let at = |x, y| record.at(&QueryPoint::open(Vec3::new(x, y, 0.0), Vec3::Z), LEAST_COS).is_some();
         assert!(at(0.01, 0.49) && !at(0.01, 0.51) && at(-0.01, 0.51) && at(0.01, -0.51) && at(0.51, 0.0));
         let bounds = record.extent();
         assert_eq!(bounds, Vec3::new(1.0, 2.0, 1.0));
@@ -244,7 +250,7 @@ mod tests {
     #[test]
     fn what_hangs_close_over_a_point_silences_what_is_far_or_coarse() {
         let at = |record: &Record, x: f32, within: f32| {
-            let point = Asker { within, ..Asker::open(Vec3::new(x, 0.0, 0.0), Vec3::Z) };
+            let point = QueryPoint { within, ..QueryPoint::open(Vec3::new(x, 0.0, 0.0), Vec3::Z) };
             record.at(&point, LEAST_COS).is_some()
         };
         let fine = record();
@@ -257,8 +263,9 @@ mod tests {
     #[test]
     fn points_are_exposed_beyond_what_was_noted_in_their_sector() {
         let mut record = record();
-        let exposed =
-            |record: &Record, x: f32, y: f32| record.exposed(&Asker::open(Vec3::new(x, y, 0.0), Vec3::Z));
+        let exposed = |record: &Record, x: f32, y: f32| {
+            record.exposed(&QueryPoint::open(Vec3::new(x, y, 0.0), Vec3::Z))
+        };
         assert!(record.is_free() && exposed(&record, 0.9, 0.0) == 0.0);
         let sector = Record::sector(Vec2::new(0.9, 0.1)) as i32;
         record.note_overhang([sector, sector], 0.5);

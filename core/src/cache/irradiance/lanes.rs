@@ -6,7 +6,7 @@ use halflight_simd::{Lanes, Simd};
 
 /// Points, and the unit normals of their surfaces, coordinate by coordinate.
 #[derive(Clone, Copy)]
-pub(super) struct Asked<L> {
+pub(super) struct Query<L> {
     pub(super) position: [L; 3],
     pub(super) normal: [L; 3],
     /// Records that are farther along the surface are not heard.
@@ -15,7 +15,7 @@ pub(super) struct Asked<L> {
 
 /// A point that asks.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Asker {
+pub struct QueryPoint {
     /// Where it is.
     pub position: Vec3,
     /// Unit normal of its surface.
@@ -25,24 +25,24 @@ pub struct Asker {
     pub within: f32,
 }
 
-impl Asker {
+impl QueryPoint {
     /// Of which nobody knows what hangs over it.
     pub fn open(position: Vec3, normal: Vec3) -> Self {
         Self { position, normal, within: f32::INFINITY }
     }
 }
 
-impl Asked<f32> {
+impl Query<f32> {
     #[inline(always)]
-    pub(super) fn of(point: &Asker) -> Self {
-        let Asker { position, normal, within } = *point;
+    pub(super) fn of(point: &QueryPoint) -> Self {
+        let QueryPoint { position, normal, within } = *point;
         Self { position: position.to_array(), normal: normal.to_array(), within }
     }
 }
 
 /// What a record needs to know of points that are in its support.
 #[derive(Clone, Copy)]
-pub(super) struct Voice<L> {
+pub(super) struct RecordWeight<L> {
     /// Where they lie along its axes.
     pub(super) place: [L; 2],
     /// Its normal times theirs, along its axes.

@@ -16,11 +16,11 @@ mod validity;
 pub use super::octree::POINTS;
 pub use derivatives::{CellFlux, Derivatives, Hessian};
 pub use hemisphere::{Hemisphere, SIDE_MAX};
-pub use lanes::Asker;
+pub use lanes::QueryPoint;
 pub use metric::Metric;
 pub use packet::Points;
 pub use record::{CLOSE, FINE, Record, SECTORS};
-pub use store::{GREATEST_DEVIATION, Indirect, IrradianceCache};
+pub use store::{CachedIrradiance, GREATEST_DEVIATION, IrradianceCache};
 pub use validity::{Validity, validity};
 
 #[cfg(test)]

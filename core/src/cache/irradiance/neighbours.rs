@@ -1,7 +1,7 @@
 //! Neighbouring records correct each other. If one contradicts the other beyond their noise, the radii of
 //! both shrink, and no radius is much larger than that of a neighbour.
 
-use super::lanes::Asker;
+use super::lanes::QueryPoint;
 use super::record::Record;
 use super::validity::radius;
 use crate::cache::octree::Octree;
@@ -117,7 +117,7 @@ impl Record {
     fn misses(&self, other: &Record, least_cos: f32) -> f32 {
         let (place, normal) = (Vec3::from(other.position), Vec3::from(other.normal));
         // What hangs close over the other has confined it.
-        let point = Asker { position: place, normal, within: other.farthest() };
+        let point = QueryPoint { position: place, normal, within: other.farthest() };
         let Some((said, _)) = self.at(&point, least_cos) else { return 0.0 };
         let (here, there) = (luminance(self.irradiance.into()), luminance(other.irradiance.into()));
         let square = place.distance_squared(self.position.into());
@@ -137,7 +137,7 @@ impl Record {
     }
 
     /// Scales the radii, and the error allowed by the fourth power of that.
-    pub(super) fn tighten(&mut self, share: f32) {
+    pub(super) fn scale_radii(&mut self, share: f32) {
         let square = share * share;
         self.allowed *= square * square;
         self.least *= share;

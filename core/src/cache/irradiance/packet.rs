@@ -6,9 +6,9 @@
 //! lanes do the same arithmetic: the bits are equal. The price: a point that is alone in its cells pays for
 //! sixteen lanes.
 
-use super::lanes::{Asked, Asker, Sixteen};
+use super::lanes::{Query, QueryPoint, Sixteen};
 use super::record::Record;
-use super::store::{Indirect, IrradianceCache};
+use super::store::{CachedIrradiance, IrradianceCache};
 use crate::cache::octree::{POINTS, Visit};
 use crate::{Level, Rgb};
 use halflight_simd::{Kernel, Lanes, Mask, Simd};
@@ -34,7 +34,7 @@ impl Points {
 
     /// Makes it point `i`, of [`POINTS`].
     #[inline]
-    pub fn set(&mut self, i: usize, point: &Asker) {
+    pub fn set(&mut self, i: usize, point: &QueryPoint) {
         let i = i % POINTS;
         for axis in 0..3 {
             self.position[axis][i] = point.position[axis];
@@ -53,7 +53,7 @@ impl IrradianceCache<'_> {
         &self,
         level: Level,
         points: &Points,
-        known: &mut [Option<Indirect>; POINTS],
+        known: &mut [Option<CachedIrradiance>; POINTS],
     ) -> [f32; POINTS] {
         if points.wanted == 0 {
             return [0.0; POINTS];
@@ -64,7 +64,7 @@ impl IrradianceCache<'_> {
             let i = left.trailing_zeros() as usize % POINTS;
             left &= left - 1;
             let weight = weights[i];
-            known[i] = (weight > 0.0).then(|| Indirect {
+            known[i] = (weight > 0.0).then(|| CachedIrradiance {
                 irradiance: Rgb::new(red[i], green[i], blue[i]) / weight,
                 shining: shining[i] / weight,
             });
@@ -87,7 +87,7 @@ impl Kernel for Ask<'_> {
     fn run<S: Simd>(self, simd: S) -> Self::Out {
         let Self { cache, points: Points { position, normal, within, wanted } } = self;
         let ([x, y, z], [u, v, w]) = (position, normal);
-        let asked = Asked {
+        let query = Query {
             position: [simd.load16(x), simd.load16(y), simd.load16(z)],
             normal: [simd.load16(u), simd.load16(v), simd.load16(w)],
             within: simd.load16(within),
@@ -97,7 +97,7 @@ impl Kernel for Ask<'_> {
             simd,
             records,
             least_cos,
-            asked,
+            query,
             sums: [simd.splat16(0.0); 5],
             exposed: simd.splat16(0.0),
         };
@@ -113,7 +113,7 @@ struct Sums<'a, S: Simd> {
     simd: S,
     records: &'a [Record],
     least_cos: f32,
-    asked: Asked<S::F16>,
+    query: Query<S::F16>,
     sums: [S::F16; 5],
     exposed: S::F16,
 }
@@ -123,21 +123,21 @@ impl<S: Simd> Visit for Sums<'_, S> {
     fn visit(&mut self, record: u32, points: u32) {
         let Some(record) = self.records.get(record as usize) else { return };
         let width = Sixteen(self.simd);
-        let (speaks, voice) = record.listen(width, &self.asked, self.least_cos, record.overlap);
-        let speaks = speaks & self.simd.mask16(points);
-        if !speaks.any() {
+        let (is_valid, weight) = record.weigh(width, &self.query, self.least_cos, record.overlap);
+        let is_valid = is_valid & self.simd.mask16(points);
+        if !is_valid.any() {
             return;
         }
-        let [red, green, blue] = record.said(width, &voice);
+        let [red, green, blue] = record.extrapolate(width, &weight);
         let terms = [red, green, blue, self.simd.splat16(record.shining), self.simd.splat16(1.0)];
         for (sum, term) in self.sums.iter_mut().zip(terms) {
-            *sum = (*sum + voice.weight * term).select(speaks, *sum);
+            *sum = (*sum + weight.weight * term).select(is_valid, *sum);
         }
         if record.is_free() {
             return;
         }
-        let exposed = record.square_exposed(width, voice.place);
-        self.exposed = self.exposed.max(exposed).select(speaks, self.exposed);
+        let exposed = record.square_exposed(width, weight.place);
+        self.exposed = self.exposed.max(exposed).select(is_valid, self.exposed);
     }
 }
 
@@ -195,14 +195,14 @@ mod tests {
 
     /// What is known of `points` at all levels: of each as of it alone. How many are known.
     #[track_caller]
-    fn check(cache: &IrradianceCache, points: &[Asker]) -> usize {
-        let mut asked = Points::NONE;
-        points.iter().enumerate().for_each(|(i, point)| asked.set(i, point));
+    fn check(cache: &IrradianceCache, points: &[QueryPoint]) -> usize {
+        let mut query = Points::NONE;
+        points.iter().enumerate().for_each(|(i, point)| query.set(i, point));
         let alone = |i: usize| points.get(i).and_then(|point| cache.at(point));
-        let wanted: [Option<Indirect>; POINTS] = core::array::from_fn(alone);
+        let wanted: [Option<CachedIrradiance>; POINTS] = core::array::from_fn(alone);
         for level in Level::detect().and_below() {
             let mut known = [None; POINTS];
-            let exposed = cache.at_all(level, &asked, &mut known);
+            let exposed = cache.at_all(level, &query, &mut known);
             assert_eq!(known, wanted, "{}", level.name());
             for (point, exposed) in points.iter().zip(exposed) {
                 let mut farthest = 0.0f32;
@@ -220,7 +220,7 @@ mod tests {
         let mut lines = vec![Line([0; 64]); IrradianceCache::footprint(RECORDS as usize).bytes() / 64];
         let mut arena = Arena::new(bytemuck::cast_slice_mut(&mut lines));
         let mut cache = IrradianceCache::new(&bounds, RECORDS as usize, &mut arena).unwrap();
-        assert_eq!(check(&cache, &[Asker::open(Vec3::splat(0.5), Vec3::Z)]), 0);
+        assert_eq!(check(&cache, &[QueryPoint::open(Vec3::splat(0.5), Vec3::Z)]), 0);
         (0..RECORDS).for_each(|i| _ = cache.insert(record(i)));
         let random = Random::new(5, 5);
         let mut known = 0;
@@ -235,13 +235,13 @@ mod tests {
                     let position = middle + size * Vec3::new(beside.x - middle.x, beside.y - middle.y, 0.0);
                     // Beneath something here and there.
                     let within = if k % 3 == 0 { 0.1 * random.single(50_000 + i) } else { f32::INFINITY };
-                    Asker { position, normal: normal(&random, 90_000 + 16 * i + k), within }
+                    QueryPoint { position, normal: normal(&random, 90_000 + 16 * i + k), within }
                 })
                 .collect();
             known += check(&cache, &points);
         }
         assert!(known > 3000, "{known}");
-        let nowhere = [Vec3::splat(2.0), Vec3::NAN, Vec3::NEG_INFINITY].map(|p| Asker::open(p, Vec3::Z));
+        let nowhere = [Vec3::splat(2.0), Vec3::NAN, Vec3::NEG_INFINITY].map(|p| QueryPoint::open(p, Vec3::Z));
         assert_eq!(check(&cache, &nowhere), 0);
     }
 }

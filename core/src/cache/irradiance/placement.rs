@@ -3,7 +3,7 @@
 //! truth.
 
 use super::rooms::{Gather, LIGHT, OPEN, Random, Room, SHADOW, WALLS, with_tables};
-use super::{Asker, Derivatives, IrradianceCache, Metric, Record, metric, validity};
+use super::{Derivatives, IrradianceCache, Metric, QueryPoint, Record, metric, validity};
 use crate::Level;
 use crate::geometry::{Bounds, Frame};
 use crate::light::luminance;
@@ -70,7 +70,7 @@ impl Floor {
         // Local axes are the world's.
         let frame = Frame { tangent: Vec3::X, bitangent: Vec3::Y, normal: Vec3::Z };
         for &i in &self.order {
-            if !cache.covers(&Asker::open(self.points[i], Vec3::Z)) {
+            if !cache.covers(&QueryPoint::open(self.points[i], Vec3::Z)) {
                 let reach = validity(&settings, &derivatives[i]);
                 let mut record = Record::new(self.points[i], &frame, &derivatives[i], &reach);
                 record.note_noise(self.noise[i]);
@@ -79,7 +79,7 @@ impl Floor {
         }
         let (mut squares, mut sum) = (0.0, 0.0);
         for (point, truth) in self.points.iter().zip(&self.truth) {
-            if let Some(found) = cache.at(&Asker::open(*point, Vec3::Z)) {
+            if let Some(found) = cache.at(&QueryPoint::open(*point, Vec3::Z)) {
                 squares += (f64::from(found.irradiance.y) - truth).powi(2);
             }
             sum += truth;

@@ -1,6 +1,6 @@
 //! The cache: records, the octree that finds them, and what they say together of the irradiance at a point.
 
-use super::lanes::Asker;
+use super::lanes::QueryPoint;
 use super::neighbours::Neighbours;
 use super::record::Record;
 use crate::Rgb;
@@ -15,7 +15,7 @@ pub const GREATEST_DEVIATION: f32 = 0.2;
 
 /// What a cache knows of a point.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Indirect {
+pub struct CachedIrradiance {
     /// Irradiance without what emitters send directly, in W/m².
     pub irradiance: Rgb,
     /// Share of the hemisphere, weighted by cosines, in which light shines directly.
@@ -84,7 +84,7 @@ impl<'m> IrradianceCache<'m> {
     /// E = Σ w_i (E_i + ∇E_i · Δx_i + ∇_n E_i · (n_i × n)) / Σ w_i (Schwarzhaupt et al. 2012, equation 12),
     /// with the second order where a metric has it.
     #[inline]
-    pub fn at(&self, point: &Asker) -> Option<Indirect> {
+    pub fn at(&self, point: &QueryPoint) -> Option<CachedIrradiance> {
         let (mut sum, mut shining, mut weights) = (Rgb::ZERO, 0.0, 0.0);
         self.tree.at(point.position, |index| {
             if let Some(record) = self.records.get(index as usize)
@@ -96,20 +96,20 @@ impl<'m> IrradianceCache<'m> {
             }
             true
         });
-        (weights > 0.0).then(|| Indirect { irradiance: sum / weights, shining: shining / weights })
+        (weights > 0.0).then(|| CachedIrradiance { irradiance: sum / weights, shining: shining / weights })
     }
 
     /// What one of the records says that [`IrradianceCache::at`] asks: enough where many points are averaged.
     /// And as [`IrradianceCache::at_all`] has it, how far that record is.
     #[inline]
-    pub fn roughly(&self, point: &Asker) -> Option<(Indirect, f32)> {
+    pub fn first_valid(&self, point: &QueryPoint) -> Option<(CachedIrradiance, f32)> {
         let mut found = None;
         self.tree.at(point.position, |index| {
             if let Some(record) = self.records.get(index as usize)
                 && let Some((irradiance, _)) = record.at(point, self.least_cos)
             {
                 let exposed = record.exposed(point);
-                found = Some((Indirect { irradiance, shining: record.shining }, exposed));
+                found = Some((CachedIrradiance { irradiance, shining: record.shining }, exposed));
             }
             found.is_none()
         });
@@ -123,7 +123,7 @@ impl<'m> IrradianceCache<'m> {
     }
 
     /// Calls `visit` with the records that speak for a point, and their weights.
-    pub fn visit(&self, point: &Asker, mut visit: impl FnMut(&Record, f32)) {
+    pub fn visit(&self, point: &QueryPoint, mut visit: impl FnMut(&Record, f32)) {
         self.tree.at(point.position, |index| {
             if let Some(record) = self.records.get(index as usize)
                 && let Some((_, weight)) = record.at(point, self.least_cos)
@@ -134,13 +134,13 @@ impl<'m> IrradianceCache<'m> {
         });
     }
 
-    /// Calls `hear` with what each of the records says that speak for a point, and with its weight.
-    pub fn hear(&self, point: &Asker, mut hear: impl FnMut(Rgb, f32)) {
+    /// Calls `visit` with the irradiance that each valid record extrapolates to a point, and with its weight.
+    pub fn visit_values(&self, point: &QueryPoint, mut visit: impl FnMut(Rgb, f32)) {
         self.tree.at(point.position, |index| {
             if let Some(record) = self.records.get(index as usize)
                 && let Some((irradiance, weight)) = record.at(point, self.least_cos)
             {
-                hear(irradiance, weight);
+                visit(irradiance, weight);
             }
             true
         });
@@ -149,7 +149,7 @@ impl<'m> IrradianceCache<'m> {
     /// Whether some record covers the point: one that must be heard, whatever hangs over it, where nobody has
     /// looked up from there.
     #[inline]
-    pub fn covers(&self, point: &Asker) -> bool {
+    pub fn covers(&self, point: &QueryPoint) -> bool {
         let mut covered = false;
         self.tree.at(point.position, |index| {
             let record = self.records.get(index as usize);
@@ -194,15 +194,15 @@ impl<'m> IrradianceCache<'m> {
 
     /// Makes all radii smaller by a factor, as for an error allowed that is smaller by its fourth power. What
     /// records then no longer cover is to be filled again.
-    pub fn tighten(&mut self, share: f32) {
-        self.records.iter_mut().take(self.used).for_each(|record| record.tighten(share));
-        self.settle();
+    pub fn scale_radii(&mut self, share: f32) {
+        self.records.iter_mut().take(self.used).for_each(|record| record.scale_radii(share));
+        self.rebuild();
     }
 
     /// Links all records anew, by their supports as they are now: what was clamped is found less often. The
     /// order in which a place finds its records, and so the last bit of what they say, then follows from the
     /// records alone.
-    pub fn settle(&mut self) {
+    pub fn rebuild(&mut self) {
         self.link(self.used);
     }
 
@@ -225,7 +225,7 @@ impl<'m> IrradianceCache<'m> {
         for (slot, record) in self.records.iter_mut().zip(records) {
             *slot = *record;
         }
-        self.settle();
+        self.rebuild();
     }
 }
 
@@ -293,11 +293,11 @@ mod tests {
             }
             for i in 0..1000 {
                 let (x, y) = (random.single(10_000 + 2 * i), random.single(10_001 + 2 * i));
-                let e = cache.at(&Asker::open(Vec3::new(x, y, 0.5), Vec3::Z)).unwrap().irradiance;
+                let e = cache.at(&QueryPoint::open(Vec3::new(x, y, 0.5), Vec3::Z)).unwrap().irradiance;
                 assert!(e.distance(Vec3::new(1.0 + x, 2.0, 2.0)) < 1e-5, "{x} {y}: {e}");
-                assert!(cache.covers(&Asker::open(Vec3::new(x, y, 0.5), Vec3::Z)));
-                assert_eq!(cache.at(&Asker::open(Vec3::new(x, y, 0.5), Vec3::NEG_Z)), None);
-                assert_eq!(cache.at(&Asker::open(Vec3::new(x, y, 0.9), Vec3::Z)), None);
+                assert!(cache.covers(&QueryPoint::open(Vec3::new(x, y, 0.5), Vec3::Z)));
+                assert_eq!(cache.at(&QueryPoint::open(Vec3::new(x, y, 0.5), Vec3::NEG_Z)), None);
+                assert_eq!(cache.at(&QueryPoint::open(Vec3::new(x, y, 0.9), Vec3::Z)), None);
             }
         });
     }
@@ -312,10 +312,10 @@ mod tests {
                 let bent = Record { bend: [radius; 2], ..record(random.single(3 * i + 1), 0.5, radius) };
                 cache.insert(Record { position: point(9_000 + i).to_array(), ..bent });
             }
-            let said = |cache: &IrradianceCache, i| cache.at(&Asker::open(point(i), Vec3::Z));
-            let covered = |cache: &IrradianceCache, i| cache.covers(&Asker::open(point(i), Vec3::Z));
+            let said = |cache: &IrradianceCache, i| cache.at(&QueryPoint::open(point(i), Vec3::Z));
+            let covered = |cache: &IrradianceCache, i| cache.covers(&QueryPoint::open(point(i), Vec3::Z));
             let before: vec::Vec<_> = (0..500).map(|i| covered(cache, i)).collect();
-            cache.settle();
+            cache.rebuild();
             assert!((0..500).all(|i| covered(cache, i) == before[i as usize]));
             with_cache(300, |other| {
                 other.insert(record(0.5, 0.5, 0.5));

@@ -34,7 +34,7 @@ use super::wave::Wave;
 use crate::Level;
 use crate::bsdf::Features;
 use crate::bvh::Bvh;
-use crate::cache::irradiance::{Indirect, IrradianceCache, POINTS};
+use crate::cache::irradiance::{CachedIrradiance, IrradianceCache, POINTS};
 use crate::film::Tile;
 use crate::geometry::Ray;
 use crate::light::{LightSampler, MarginalSample, VisibilityTable, WarpedSample};
@@ -204,5 +204,5 @@ pub(super) struct SurfaceInteraction<'a> {
     row: Option<MarginalSample>,
     aim: Option<WarpedSample>,
     /// What a cache says of it.
-    pub(super) indirect: Option<Indirect>,
+    pub(super) indirect: Option<CachedIrradiance>,
 }

@@ -341,7 +341,7 @@ impl<F: Features> Cached<'_, F> {
             }
         }
         if all {
-            halves.iter_mut().for_each(|half| half.cache.settle());
+            halves.iter_mut().for_each(|half| half.cache.rebuild());
             if !self.is_cut {
                 self.header.is_filled_for(self.view.clone());
             }

@@ -105,7 +105,7 @@ impl<'a> Growing<'a> {
     /// Begins again, with the records that there are, their radii smaller by `share`, or with none.
     pub(in crate::drive) fn refine(&mut self, share: Option<f32>) {
         match share {
-            Some(share) => self.cache.tighten(share),
+            Some(share) => self.cache.scale_radii(share),
             None => self.cache.restore(&[]),
         }
         self.loaded = self.cache.records().len();
@@ -272,7 +272,7 @@ impl<F: Features> Overture<'_, '_, F> {
                 return Ok(());
             }
             wide.into_iter().enumerate().for_each(|(i, record)| growing.cache.replace(i, record));
-            growing.cache.settle();
+            growing.cache.rebuild();
         }
         Ok(())
     }

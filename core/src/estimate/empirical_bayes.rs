@@ -5,7 +5,7 @@
 //! for: docs/decisions/0035.
 
 use super::metric::DARK;
-use super::seen::{FAINT, Seen, brightness};
+use super::tile_statistics::{FAINT, TileStatistics, brightness};
 use crate::film::Pixel;
 use glam::Vec4;
 
@@ -63,17 +63,17 @@ struct Class {
 
 /// What the pixels of a picture that look alike tell of each other.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Lookalikes {
+pub struct BrightnessClasses {
     classes: [Class; CLASSES],
 }
 
-impl Default for Lookalikes {
+impl Default for BrightnessClasses {
     fn default() -> Self {
         Self { classes: [Class::default(); CLASSES] }
     }
 }
 
-impl core::ops::AddAssign<&Self> for Lookalikes {
+impl core::ops::AddAssign<&Self> for BrightnessClasses {
     fn add_assign(&mut self, other: &Self) {
         for (class, other) in self.classes.iter_mut().zip(&other.classes) {
             class.pixels += other.pixels;
@@ -85,7 +85,7 @@ impl core::ops::AddAssign<&Self> for Lookalikes {
     }
 }
 
-impl Lookalikes {
+impl BrightnessClasses {
     /// Whether tile number `tile` of `count` is to be asked: all of small pictures, of others as many as know
     /// enough, spread evenly whatever their width (by multiples of the golden ratio).
     pub fn asks(tile: usize, count: usize) -> bool {
@@ -96,11 +96,11 @@ impl Lookalikes {
     /// Learns from one tile of a picture of mean `mean` > 0. Pixels whose halves have no two samples each are
     /// left out.
     pub fn add(&mut self, pixels: &[Pixel], mean: f64) {
-        let seen = Seen::new(pixels, (1.0 / mean) as f32);
+        let seen = TileStatistics::new(pixels, (1.0 / mean) as f32);
         let whole = |value: f64| (value.clamp(-MOST, MOST) / UNIT) as i64;
         for (quarters, around) in seen.quarters.iter().zip(&seen.around) {
             let Some(quarters) = quarters else { continue };
-            let ([first, second], around) = (Pair::both(*quarters), Around::new(*around));
+            let ([first, second], around) = (Pair::both(*quarters), Neighbourhood::new(*around));
             for (asked, other) in [(first, second), (second, first)] {
                 let more = around.more(asked.light);
                 let class = asked.class(more);
@@ -165,17 +165,17 @@ pub struct Shrinkage {
 
 impl Shrinkage {
     /// What a pixel probably is that `pair` saw, with such neighbours (m = 1).
-    pub(super) fn likely(&self, pair: Pair, around: &Around) -> Likely {
+    pub(super) fn posterior(&self, pair: Pair, around: &Neighbourhood) -> Posterior {
         let Believed { share, spread, doubt } = self.classes[pair.class(around.more(pair.light))];
         // Where it is darker in sum and brighter in a channel, a share below zero would lead through black.
         let light = (around.light + share * (pair.light - around.light)).max(around.light.min(pair.light));
-        Likely { light, over_square: (light * light + DARK as f32).recip(), spread, share, doubt }
+        Posterior { light, over_square: (light * light + DARK as f32).recip(), spread, share, doubt }
     }
 }
 
 /// What a pixel probably is.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Likely {
+pub(super) struct Posterior {
     /// R.
     pub(super) light: Vec4,
     /// 1 / (R² + 0.01).
@@ -189,13 +189,13 @@ pub(super) struct Likely {
 }
 
 /// The light of the neighbours of a pixel.
-pub(super) struct Around {
+pub(super) struct Neighbourhood {
     light: Vec4,
     brightness: f32,
     reciprocal: f32,
 }
 
-impl Around {
+impl Neighbourhood {
     pub(super) fn new(light: Vec4) -> Self {
         let brightness = brightness(light);
         Self { light, brightness, reciprocal: (brightness + 3.0 * FAINT).recip() }
@@ -271,14 +271,14 @@ mod tests {
 
     /// What both pairs of each pixel take R² + 0.01 for, row by row.
     fn squares(pixels: &[Pixel; PIXELS_PER_TILE]) -> [[f32; 2]; PIXELS_PER_TILE] {
-        let mut alike = Lookalikes::default();
+        let mut alike = BrightnessClasses::default();
         alike.add(pixels, 1.0);
-        let (shrinkage, seen) = (alike.shrinkage(), Seen::new(pixels, 1.0));
+        let (shrinkage, seen) = (alike.shrinkage(), TileStatistics::new(pixels, 1.0));
         core::array::from_fn(|place| {
             let pairs = seen.quarters[place].map(Pair::both).unwrap();
             pairs.map(|pair| {
-                let likely = shrinkage.likely(pair, &Around::new(seen.around[place]));
-                (likely.spread * likely.over_square.x).recip()
+                let posterior = shrinkage.posterior(pair, &Neighbourhood::new(seen.around[place]));
+                (posterior.spread * posterior.over_square.x).recip()
             })
         })
     }
@@ -322,7 +322,7 @@ mod tests {
 
     #[test]
     fn coloured_rare_light_does_not_lead_through_black() {
-        let mut alike = Lookalikes::default();
+        let mut alike = BrightnessClasses::default();
         // Dark to one pair, bright to the other: a share below zero is learnt.
         alike.add(&tile(|x, y, sample| if (x + y) % 4 == 0 && sample % 4 < 2 { 4.0 } else { 0.1 }), 1.0);
         let shrinkage = alike.shrinkage();
@@ -333,7 +333,7 @@ mod tests {
             let shrinkage =
                 Shrinkage { classes: [Believed { share: believed, spread: 1.0, doubt: 0.0 }; CLASSES] };
             let pair = Pair { a: light, b: light, light };
-            let weight = shrinkage.likely(pair, &Around::new(around)).over_square;
+            let weight = shrinkage.posterior(pair, &Neighbourhood::new(around)).over_square;
             assert!(weight.truncate().max_element() <= 1.0 / (0.1f32.powi(2) + 0.01) * 1.0001, "{weight}");
         }
     }
@@ -342,7 +342,7 @@ mod tests {
     fn tiles_are_asked_all_over_the_picture() {
         for (across, down) in [(8, 16), (16, 16), (45, 21), (63, 63), (64, 48), (240, 135)] {
             let asked: Vec<_> =
-                (0..across * down).filter(|tile| Lookalikes::asks(*tile, across * down)).collect();
+                (0..across * down).filter(|tile| BrightnessClasses::asks(*tile, across * down)).collect();
             assert!((64..=67).contains(&asked.len()), "{across} x {down}: {}", asked.len());
             let distinct = |place: &dyn Fn(usize) -> usize| {
                 let mut places: Vec<_> = asked.iter().map(|tile| place(*tile)).collect();
@@ -356,7 +356,7 @@ mod tests {
                 "{across} x {down}: {columns}, {rows}"
             );
         }
-        assert!((0..64).all(|tile| Lookalikes::asks(tile, 64)));
+        assert!((0..64).all(|tile| BrightnessClasses::asks(tile, 64)));
     }
 
     #[test]
@@ -364,9 +364,9 @@ mod tests {
         let tiles =
             [1, 2, 3].map(|seed| tile(|x, y, sample| (1.0 + noise(x + seed * 16, y, sample)).powi(8)));
         let learnt = |order: [usize; 3]| {
-            let mut all = Lookalikes::default();
+            let mut all = BrightnessClasses::default();
             for i in order {
-                let mut one = Lookalikes::default();
+                let mut one = BrightnessClasses::default();
                 one.add(&tiles[i], 30.0);
                 all += &one;
             }

@@ -1,5 +1,5 @@
 //! What the quarters of the pixels of a tile saw, and what is seen around each pixel: what
-//! [`Lookalikes`](super::Lookalikes) are told by.
+//! [`BrightnessClasses`](super::Lookalikes) are told by.
 
 use crate::film::{PIXELS_PER_TILE, Pixel, TILE, Tile};
 use glam::Vec4;
@@ -13,7 +13,7 @@ pub(super) const FAINT: f32 = 0.01;
 const SURELY: f32 = 2.0;
 
 /// A tile, row by row, of a picture times some scale.
-pub(super) struct Seen {
+pub(super) struct TileStatistics {
     /// A₁, A₂, B₁, B₂ of each pixel, the parts of its halves; `None` where one is empty.
     pub(super) quarters: [Option<[Vec4; 4]>; PIXELS_PER_TILE],
     /// The mean light of the eight neighbours of each pixel, as far as they lie in the tile and are not
@@ -21,7 +21,7 @@ pub(super) struct Seen {
     pub(super) around: [Vec4; PIXELS_PER_TILE],
 }
 
-impl Seen {
+impl TileStatistics {
     /// Of the pixels of one tile, times `scale`.
     pub(super) fn new(pixels: &[Pixel], scale: f32) -> Self {
         const SIDE: usize = TILE as usize;
