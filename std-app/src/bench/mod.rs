@@ -1,4 +1,4 @@
-//! How fast the kernels are on this machine, on one thread, beside a rival where the build has one.
+//! Speed of the kernels on this machine, on one thread. Rivals that the caller brings are measured in the same run.
 
 pub mod eigen;
 pub mod knn;
@@ -37,7 +37,7 @@ impl From<OutOfMemory> for BenchError {
 }
 
 /// The middle one of `values`, or the mean of the two in the middle; NaN where there are none.
-fn median(mut values: Vec<f64>) -> f64 {
+pub fn median(mut values: Vec<f64>) -> f64 {
     values.sort_by(f64::total_cmp);
     let middle = |i: usize| values.get(i).copied().unwrap_or(f64::NAN);
     let half = values.len() / 2;

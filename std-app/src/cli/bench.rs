@@ -1,4 +1,4 @@
-//! `halflight bench`: how fast the kernels are on this machine, beside the rival that the build has.
+//! `halflight bench`: speed of the kernels on this machine.
 
 mod eigen;
 mod knn;
@@ -8,7 +8,7 @@ use super::view::ViewFlags;
 use super::{say, values, warn};
 use clap::{Args, Subcommand};
 use halflight::bench::REPETITIONS;
-use halflight::bench::rays::{self, RaysReport, RivalReport, SIZE, geometric_mean};
+use halflight::bench::rays::{self, RaysReport, SIZE};
 use halflight::load::{self, LoadOptions};
 use halflight_simd::{Level, Tier};
 use serde_json::{Map, Value, json};
@@ -33,8 +33,7 @@ enum Kernel {
 /// Rays per second on one thread
 ///
 /// Camera rays of a picture in tiles, one cosine-distributed bounce from each point that they meet,
-/// and shadow rays: the same, at most a quarter of the diagonal of the scene long. A program built with the
-/// feature `embree` measures Embree in turn.
+/// and shadow rays: the same, at most a quarter of the diagonal of the scene long.
 #[derive(Args)]
 struct Rays {
     /// The scene: a mesh (.obj) or a scene file (.toml)
@@ -84,7 +83,7 @@ fn object(report: &RaysReport) -> Value {
         let names = report.classes.iter().map(|class| class.class.name().to_string());
         names.zip(values).collect::<Map<_, _>>().into()
     };
-    let mut object = json!({
+    json!({
         "level": report.level.name(),
         "width": report.size[0],
         "height": report.size[1],
@@ -95,21 +94,7 @@ fn object(report: &RaysReport) -> Value {
         "repetitions": REPETITIONS,
         "rays": by_class(report.classes.iter().map(|c| c.rays.into()).collect()),
         "hits": by_class(report.classes.iter().map(|c| c.hits.into()).collect()),
-    });
-    if let Some(rival) = &report.rival {
-        let ratios = report.ratios(rival);
-        object["rival"] = json!({
-            "name": rival.name,
-            "build_seconds": rival.build_seconds,
-            "mrays_per_second": by_class(rival.classes.iter().map(|c| c.mrays_per_second.into()).collect()),
-            "entry_points": by_class(rival.classes.iter().map(|c| c.entry.into()).collect()),
-            "hits": by_class(rival.classes.iter().map(|c| c.hits.into()).collect()),
-        });
-        object["ratios"] = by_class(ratios.iter().map(|&ratio| ratio.into()).collect());
-        object["ratios"]["build"] = (rival.build_seconds / report.build_seconds).into();
-        object["geometric_mean"] = geometric_mean(&ratios).into();
-    }
-    object
+    })
 }
 
 /// The lines for a person.
@@ -125,29 +110,9 @@ fn text(report: &RaysReport) -> String {
         row("halflight", report.classes.iter().map(|class| format!("{:.2}", class.mrays_per_second)))
             + &format!("{:>9.3} s{:>8.1} bytes/triangle", report.build_seconds, report.bytes_per_triangle()),
     ];
-    if let Some(rival) = &report.rival {
-        lines.extend(beside(report, rival));
-    }
     let share = |hits: usize, rays: usize| format!("{:.1} %", 100.0 * hits as f64 / rays.max(1) as f64);
     lines.push(row("met something", report.classes.iter().map(|class| share(class.hits, class.rays))));
     lines.join("\n")
-}
-
-fn beside(report: &RaysReport, rival: &RivalReport) -> Vec<String> {
-    let ratios = report.ratios(rival);
-    let mut lines = vec![
-        row(&rival.name, rival.classes.iter().map(|class| format!("{:.2}", class.mrays_per_second)))
-            + &format!("{:>9.3} s", rival.build_seconds),
-        row("ratio", ratios.iter().map(|ratio| format!("{ratio:.2}")))
-            + &format!(
-                "{:>9.2}    geometric mean of rays {:.2}",
-                rival.build_seconds / report.build_seconds,
-                geometric_mean(&ratios)
-            ),
-    ];
-    let best: Vec<&str> = rival.classes.iter().map(|class| class.entry).collect();
-    lines.push(format!("{} was fastest by {}", rival.name, best.join(", ")));
-    lines
 }
 
 fn row(name: &str, cells: impl Iterator<Item = String>) -> String {

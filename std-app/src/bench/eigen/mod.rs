@@ -5,9 +5,6 @@
 //! again, for [`SECONDS`] at a time; that [`REPETITIONS`] times, ours and the rival's in turn, and the median counts.
 //! Values and vectors of all are computed and stored, of ours sorted by magnitude.
 
-#[cfg(feature = "nalgebra")]
-mod nalgebra;
-
 use super::{REPETITIONS, median};
 use core::hint::black_box;
 use halflight_core::Level;
@@ -38,14 +35,10 @@ pub struct EigenReport {
     pub level: Level,
     /// Ours.
     pub ours: Speeds,
-    /// Name and speeds of the rival that this program was built with.
-    pub rival: Option<(&'static str, Speeds)>,
 }
 
 /// One way of decomposing batches.
-trait Entry {
-    /// What its library is called.
-    fn name(&self) -> &'static str;
+pub trait Entry {
     /// Decomposes 2×2 matrices.
     fn sym2(&mut self, matrices: &[Matrices2]);
     /// Decomposes 3×3 matrices.
@@ -54,13 +47,18 @@ trait Entry {
 
 /// Measures the kernels of `level`.
 pub fn run(level: Level) -> EigenReport {
+    run_beside(level, None).0
+}
+
+/// [`run`] with a rival whose repetitions alternate with ours, and its speeds.
+pub fn run_beside(level: Level, rival: Option<&mut dyn Entry>) -> (EigenReport, Option<Speeds>) {
     let numbers: Vec<f32> = numbers().take(6 * BATCH).collect();
     let (rows, _) = numbers.as_chunks::<16>();
     let (small, large): (&[Matrices2], &[Matrices3]) =
         (rows[..3 * BATCH / 16].as_chunks().0, rows.as_chunks().0);
-    let mut entries: Vec<Box<dyn Entry>> = vec![Box::new(Ours::new(level))];
-    #[cfg(feature = "nalgebra")]
-    entries.push(Box::new(nalgebra::Nalgebra::default()));
+    let mut ours = Ours::new(level);
+    let mut entries: Vec<&mut dyn Entry> = vec![&mut ours];
+    entries.extend(rival.map(|rival| rival as &mut dyn Entry));
     let mut speeds = vec![(Vec::new(), Vec::new()); entries.len()];
     for _ in 0..REPETITIONS {
         for (entry, speeds) in entries.iter_mut().zip(&mut speeds) {
@@ -68,13 +66,10 @@ pub fn run(level: Level) -> EigenReport {
             speeds.1.push(per_second(|| entry.sym3(black_box(large))));
         }
     }
-    let mut measured = entries
-        .iter()
-        .zip(speeds)
-        .map(|(entry, (sym2, sym3))| (entry.name(), Speeds { sym2: median(sym2), sym3: median(sym3) }));
-    let nothing = Speeds { sym2: f64::NAN, sym3: f64::NAN };
-    let (_, ours) = measured.next().unwrap_or(("", nothing));
-    EigenReport { level, ours, rival: measured.next() }
+    let mut measured =
+        speeds.into_iter().map(|(sym2, sym3)| Speeds { sym2: median(sym2), sym3: median(sym3) });
+    let ours = measured.next().unwrap_or(Speeds { sym2: f64::NAN, sym3: f64::NAN });
+    (EigenReport { level, ours }, measured.next())
 }
 
 /// Numbers from -1 to 1.
@@ -111,10 +106,6 @@ impl Ours {
 }
 
 impl Entry for Ours {
-    fn name(&self) -> &'static str {
-        "halflight"
-    }
-
     fn sym2(&mut self, matrices: &[Matrices2]) {
         decompose2(self.level, matrices, &mut self.small);
         black_box(&self.small);
@@ -136,7 +127,6 @@ mod tests {
             let report = run(level);
             assert_eq!(report.level, level);
             assert!(report.ours.sym2 > 0.0 && report.ours.sym3 > 0.0, "{report:?}");
-            assert_eq!(report.rival.is_some(), cfg!(feature = "nalgebra"));
         }
     }
 }

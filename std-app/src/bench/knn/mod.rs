@@ -3,21 +3,17 @@
 //!
 //! The build is timed on two threads as well.
 //!
-//! Everything is timed [`REPETITIONS`] times by the wall clock, and the median counts; ours and the rival's
-//! repetitions alternate, so that whatever else the machine does meets both.
+//! Everything is timed [`REPETITIONS`] times by the wall clock, and the median counts; ours and the rivals'
+//! repetitions alternate, so that other load of the machine slows all.
 
 mod data;
-#[cfg(feature = "kiddo")]
-mod kiddo;
-#[cfg(feature = "nanoflann")]
-mod nanoflann;
 mod ours;
 mod report;
 #[cfg(test)]
 mod tests;
 
 pub use data::{Data, Surfel};
-pub use report::{KnnReport, KnnRival, Speed};
+pub use report::{KnnReport, RivalReport, Speed};
 
 use super::{BenchError, REPETITIONS, median};
 use core::hint::black_box;
@@ -100,24 +96,46 @@ impl Task {
 }
 
 /// One way of searching.
-trait Searcher {
-    /// Does it for every query, and says how many photons were found in all.
+pub trait Searcher {
+    /// Runs every query of `task`; returns the number of photons found in all.
+    ///
+    /// # Errors
+    /// [`BenchError`] where memory is missing.
     fn run(&mut self, task: Task, data: &Data) -> Result<u64, BenchError>;
+}
+
+/// Another library's tree over the same points.
+pub trait Rival {
+    /// Its name and version.
+    fn name(&self) -> String;
+    /// A tree, built anew.
+    ///
+    /// # Errors
+    /// [`BenchError::Rival`] if it does not take the points.
+    fn build(&self) -> Result<Box<dyn Searcher + '_>, BenchError>;
 }
 
 /// Measures with the kernels of `level`.
 ///
 /// # Errors
-/// [`BenchError`] where memory is missing or the rival refuses.
+/// [`BenchError`] where memory is missing.
 pub fn run(amount: Amount, level: Level) -> Result<KnnReport, BenchError> {
-    let data = Data::new(amount.photons, amount.queries);
+    Ok(run_beside(&Data::new(amount.photons, amount.queries), level, &[])?.0)
+}
+
+/// [`run`] on `data` with rivals whose repetitions alternate with ours.
+///
+/// # Errors
+/// [`BenchError`] where memory is missing or a rival refuses.
+pub fn run_beside(
+    data: &Data,
+    level: Level,
+    rivals: &[&dyn Rival],
+) -> Result<(KnnReport, Vec<RivalReport>), BenchError> {
     let records = ours::records(&data.photons);
     let two = Two::new()?;
-    #[cfg(any(feature = "kiddo", feature = "nanoflann"))]
-    let points: Vec<[f32; 3]> = data.photons.iter().map(|surfel| surfel.place.to_array()).collect();
     let (mut build, mut build_on_two) = (Vec::new(), Vec::new());
-    #[allow(unused_mut, reason = "without rivals")]
-    let (mut kiddo_build, mut nanoflann_build) = (Vec::<f64>::new(), Vec::<f64>::new());
+    let mut rival_builds = vec![Vec::new(); rivals.len()];
     for _ in 0..REPETITIONS {
         let mut memory = Vec::new();
         build.push(seconds(|| ours::build(&records, &mut memory, &Serial).map(|map| map.len()))?.0);
@@ -125,55 +143,44 @@ pub fn run(amount: Amount, level: Level) -> Result<KnnReport, BenchError> {
         let time =
             two.0.install(|| seconds(|| ours::build(&records, &mut memory, &two).map(|map| map.len())));
         build_on_two.push(time?.0);
-        #[cfg(feature = "kiddo")]
-        kiddo_build.push(seconds(|| kiddo::build(&points))?.0);
-        #[cfg(feature = "nanoflann")]
-        nanoflann_build.push(seconds(|| nanoflann::build(&points))?.0);
+        for (rival, builds) in rivals.iter().zip(&mut rival_builds) {
+            builds.push(seconds(|| rival.build())?.0);
+        }
     }
 
     let mut memory = Vec::new();
     let map = ours::build(&records, &mut memory, &Serial)?;
     let bytes = Photons::footprint(records.len()).bytes();
     let (mut singly, mut together) = (ours::Singly { map: &map, level }, ours::Together { map: &map, level });
+    let mut trees = rivals.iter().map(|rival| rival.build()).collect::<Result<Vec<_>, _>>()?;
     let mut searchers: Vec<&mut dyn Searcher> = vec![&mut singly, &mut together];
-    #[cfg(feature = "kiddo")]
-    let mut kiddo = kiddo::Kiddo(kiddo::build(&points)?);
-    #[cfg(feature = "kiddo")]
-    searchers.push(&mut kiddo);
-    #[cfg(feature = "nanoflann")]
-    let mut nanoflann = nanoflann::Nanoflann(nanoflann::build(&points)?);
-    #[cfg(feature = "nanoflann")]
-    searchers.push(&mut nanoflann);
+    for tree in &mut trees {
+        searchers.push(tree.as_mut());
+    }
 
     let mut speeds: Vec<Vec<Speed>> = searchers.iter().map(|_| Vec::new()).collect();
     for task in Task::ALL {
-        for (speeds, speed) in speeds.iter_mut().zip(measure(&mut searchers, task, &data)?) {
+        for (speeds, speed) in speeds.iter_mut().zip(measure(&mut searchers, task, data)?) {
             speeds.push(speed);
         }
     }
     let mut speeds = speeds.into_iter();
     let (singly, together) = (speeds.next().unwrap_or_default(), speeds.next().unwrap_or_default());
-    let rivals = [
-        (cfg!(feature = "kiddo"), "kiddo", "kiddo 6 ImmutableKdTree", kiddo_build),
-        (cfg!(feature = "nanoflann"), "nanoflann", "nanoflann KDTreeSingleIndexAdaptor", nanoflann_build),
-    ];
-    let rivals = rivals.into_iter().filter(|(is_here, ..)| *is_here);
-    let rivals = rivals.map(|(_, key, name, builds)| KnnRival {
-        key,
-        name: name.into(),
-        build_seconds: median(builds),
-        speeds: speeds.next().unwrap_or_default(),
-    });
-    Ok(KnnReport {
+    let report = KnnReport {
         level,
-        amount,
+        amount: Amount { photons: data.photons.len(), queries: data.queries.len() },
         build_seconds: median(build),
         build_seconds_on_two: median(build_on_two),
         bytes,
         singly,
         together,
-        rivals: rivals.collect(),
-    })
+    };
+    let theirs = rivals.iter().zip(rival_builds).zip(speeds).map(|((rival, builds), speeds)| RivalReport {
+        name: rival.name(),
+        build_seconds: median(builds),
+        speeds,
+    });
+    Ok((report, theirs.collect()))
 }
 
 /// Two threads.

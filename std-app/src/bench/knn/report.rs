@@ -1,9 +1,9 @@
-//! What was measured, and how it compares.
+//! Results of the measurement.
 
 use super::{Amount, Task};
 use halflight_core::Level;
 
-/// Our numbers, and the rivals'.
+/// Our numbers.
 #[derive(Clone, Debug)]
 pub struct KnnReport {
     /// The instruction set of our kernels.
@@ -20,15 +20,11 @@ pub struct KnnReport {
     pub singly: Vec<Speed>,
     /// All searches in one call.
     pub together: Vec<Speed>,
-    /// Those that the program was built with.
-    pub rivals: Vec<KnnRival>,
 }
 
 /// The numbers of a rival.
 #[derive(Clone, Debug)]
-pub struct KnnRival {
-    /// Its name in one word.
-    pub key: &'static str,
+pub struct RivalReport {
     /// Its name and version.
     pub name: String,
     /// Seconds to build its tree.
@@ -52,13 +48,5 @@ impl KnnReport {
     /// Bytes of the map for each photon.
     pub fn bytes_per_photon(&self) -> f64 {
         self.bytes as f64 / self.amount.photons as f64
-    }
-}
-
-impl KnnRival {
-    /// The speeds of `ours` over the rival's, task by task.
-    pub fn ratios(&self, ours: &[Speed]) -> Vec<f64> {
-        let pairs = ours.iter().zip(&self.speeds);
-        pairs.map(|(ours, theirs)| ours.queries_per_second / theirs.queries_per_second).collect()
     }
 }

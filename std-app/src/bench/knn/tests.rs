@@ -15,11 +15,6 @@ fn three_tenths_of_the_photons_are_in_the_focus() {
     assert!((share - 0.301).abs() < 0.0075, "{share}");
 }
 
-#[cfg(any(feature = "kiddo", feature = "nanoflann"))]
-fn places(data: &Data) -> Vec<[f32; 3]> {
-    data.photons.iter().map(|surfel| surfel.place.to_array()).collect()
-}
-
 #[test]
 fn all_ways_find_the_same_number_of_photons() {
     let data = Data::new(FEW.photons, FEW.queries);
@@ -35,17 +30,6 @@ fn all_ways_find_the_same_number_of_photons() {
         {
             assert_eq!(found, (k * FEW.queries) as u64);
         }
-        #[cfg(feature = "kiddo")]
-        if let Task::Nearest { .. } = task {
-            let mut rival = kiddo::Kiddo(kiddo::build(&places(&data)).unwrap());
-            assert_eq!(rival.run(task, &data).unwrap(), found, "{task:?}");
-        }
-        #[cfg(feature = "nanoflann")]
-        if let Task::Nearest { .. } = task {
-            let places = places(&data);
-            let mut rival = nanoflann::Nanoflann(nanoflann::build(&places).unwrap());
-            assert_eq!(rival.run(task, &data).unwrap(), found, "{task:?}");
-        }
     }
 }
 
@@ -57,7 +41,5 @@ fn the_report_has_every_task() {
         assert!(speeds.iter().all(|speed| speed.queries_per_second > 0.0 && speed.found > 0.0));
     }
     assert!(report.build_seconds > 0.0 && report.bytes_per_photon() < 24.0);
-    let rivals = usize::from(cfg!(feature = "kiddo")) + usize::from(cfg!(feature = "nanoflann"));
-    assert_eq!(report.rivals.len(), rivals);
     assert!(report.build_seconds_on_two > 0.0);
 }

@@ -2,19 +2,15 @@
 //! shadow rays.
 //!
 //! Everything is timed [`REPETITIONS`] times by the wall clock, and the median counts; ours and the rival's
-//! repetitions alternate, so that whatever else the machine does meets both. Rays come in batches; what it
-//! takes to bring a batch into the form that a tracer reads is not timed, for nobody.
+//! repetitions alternate, so that other load of the machine slows both. Rays come in batches; bringing a batch into
+//! the form that a tracer reads is not timed.
 
 mod classes;
-#[cfg(feature = "embree")]
-mod embree;
 mod ours;
-#[cfg(feature = "embree")]
-mod packets;
 mod report;
 
 pub use classes::{Class, SIZE};
-pub use report::{ClassReport, RaysReport, RivalClass, RivalReport, geometric_mean};
+pub use report::{ClassReport, RaysReport, RivalClass, RivalReport};
 
 use super::{BenchError, REPETITIONS, median};
 use crate::pages::Pages;
@@ -29,42 +25,49 @@ use std::time::Instant;
 pub const BATCH: usize = 65536;
 
 /// One way of tracing rays.
-trait Entry {
-    /// What its library calls it.
+pub trait Entry {
+    /// The function of its library.
     fn name(&self) -> &'static str;
     /// Takes over the rays to be traced next. Not timed.
     fn load(&mut self, rays: &[Ray]);
     /// Traces them.
     fn trace(&mut self);
-    /// How many of them met something.
+    /// Rays that met something.
     fn hits(&self) -> usize;
 }
 
-/// Somebody else's tracer.
-trait Rival {
+/// Another library's tracer.
+pub trait Rival {
     /// Its name and version.
     fn name(&self) -> String;
     /// Builds its hierarchy anew.
+    ///
+    /// # Errors
+    /// [`BenchError::Rival`] if it does not take the mesh.
     fn build(&mut self, mesh: &Mesh) -> Result<(), BenchError>;
     /// All its ways of tracing rays of `class`.
     fn entries(&self, class: Class) -> Vec<Box<dyn Entry + '_>>;
 }
 
-/// The rival that this program was built with.
-fn rival() -> Result<Option<Box<dyn Rival>>, BenchError> {
-    #[cfg(feature = "embree")]
-    return Ok(Some(Box::new(embree::Embree::new()?)));
-    #[cfg(not(feature = "embree"))]
-    Ok(None)
-}
-
 /// Measures `scene` from its camera, in a picture of `size` (pixels across and down), with the kernels of `level`.
 ///
 /// # Errors
-/// [`BenchError`] where memory is missing or the rival refuses.
+/// [`BenchError`] where memory is missing.
 pub fn run(scene: &Scene, level: Level, size: [u32; 2]) -> Result<RaysReport, BenchError> {
+    Ok(run_beside(scene, level, size, None)?.0)
+}
+
+/// [`run`] with a rival whose repetitions alternate with ours.
+///
+/// # Errors
+/// [`BenchError`] where memory is missing or the rival refuses.
+pub fn run_beside(
+    scene: &Scene,
+    level: Level,
+    size: [u32; 2],
+    mut rival: Option<&mut dyn Rival>,
+) -> Result<(RaysReport, Option<RivalReport>), BenchError> {
     let mesh = &scene.mesh;
-    let mut rival = rival()?;
     let (mut build, mut rival_build) = (Vec::new(), Vec::new());
     for _ in 0..REPETITIONS {
         let mut memory = Pages::default();
@@ -94,23 +97,23 @@ pub fn run(scene: &Scene, level: Level, size: [u32; 2]) -> Result<RaysReport, Be
                 hits: ours.hits,
                 mrays_per_second: ours.mrays_per_second,
             });
-            let best = theirs.iter().max_by(|a, b| a.mrays_per_second.total_cmp(&b.mrays_per_second));
-            rival_classes.extend(best.cloned());
+            rival_classes.push(theirs.to_vec());
         }
     }
-    Ok(RaysReport {
+    let report = RaysReport {
         level,
         size,
         triangles: mesh.triangles.len(),
         build_seconds: median(build),
         bytes: bvh.used().bytes(),
         classes,
-        rival: rival.map(|rival| RivalReport {
-            name: rival.name(),
-            build_seconds: median(rival_build),
-            classes: rival_classes,
-        }),
-    })
+    };
+    let theirs = rival.map(|rival| RivalReport {
+        name: rival.name(),
+        build_seconds: median(rival_build),
+        classes: rival_classes,
+    });
+    Ok((report, theirs))
 }
 
 /// Traces `rays` by each entry in turn, again and again.

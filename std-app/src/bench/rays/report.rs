@@ -1,9 +1,9 @@
-//! What was measured, and how it compares.
+//! Results of the measurement.
 
 use super::Class;
 use halflight_core::Level;
 
-/// Our numbers, and the rival's.
+/// Our numbers.
 #[derive(Clone, Debug)]
 pub struct RaysReport {
     /// The instruction set of our kernels.
@@ -18,8 +18,6 @@ pub struct RaysReport {
     pub bytes: usize,
     /// One for each of [`Class::ALL`].
     pub classes: Vec<ClassReport>,
-    /// Where the program was built with one.
-    pub rival: Option<RivalReport>,
 }
 
 /// Rays of one class, traced by us.
@@ -42,14 +40,14 @@ pub struct RivalReport {
     pub name: String,
     /// Seconds to build its best hierarchy.
     pub build_seconds: f64,
-    /// One for each of [`Class::ALL`]: the fastest of its ways.
-    pub classes: Vec<RivalClass>,
+    /// All its ways, for each of [`Class::ALL`].
+    pub classes: Vec<Vec<RivalClass>>,
 }
 
 /// Rays of one class, traced in one way.
 #[derive(Clone, Debug)]
 pub struct RivalClass {
-    /// The function of the library, and what it was told of the rays.
+    /// The function of the library.
     pub entry: &'static str,
     /// How many rays met something.
     pub hits: usize,
@@ -62,15 +60,4 @@ impl RaysReport {
     pub fn bytes_per_triangle(&self) -> f64 {
         self.bytes as f64 / self.triangles as f64
     }
-
-    /// Our speed over that of `rival`, class by class.
-    pub fn ratios(&self, rival: &RivalReport) -> Vec<f64> {
-        let pairs = self.classes.iter().zip(&rival.classes);
-        pairs.map(|(ours, theirs)| ours.mrays_per_second / theirs.mrays_per_second).collect()
-    }
-}
-
-/// The geometric mean; NaN of nothing.
-pub fn geometric_mean(values: &[f64]) -> f64 {
-    (values.iter().map(|value| value.ln()).sum::<f64>() / values.len() as f64).exp()
 }

@@ -1,4 +1,4 @@
-//! The rays are what they say, and the rival meets what we meet.
+//! The rays are those of their class.
 
 use super::*;
 use crate::load::{LoadOptions, load};
@@ -59,32 +59,4 @@ fn tiles_cover_the_picture() {
     }
     assert_eq!(classes::pixels(SIZE).nth(64 + 9), Some([9, 1]));
     assert_eq!(classes::pixels([13, 9]).nth(64 + 5), Some([8, 1]), "the second tile has five columns");
-}
-
-/// Share of rays that may differ: Embree's test of a triangle is not watertight, and rounds otherwise.
-#[cfg(feature = "embree")]
-const DIFFERENT: f64 = 1e-4;
-
-#[cfg(feature = "embree")]
-#[test]
-fn embree_meets_what_we_meet_by_every_entry_point() {
-    in_the_box(|scene, bvh| {
-        let level = Level::detect();
-        let rays = Rays::of(scene, bvh, level, SIZE).unwrap();
-        let mut rival = embree::Embree::new().unwrap();
-        rival.build(&scene.mesh).unwrap();
-        for class in Class::ALL {
-            // Not a multiple of any packet.
-            let rays = &rays.of_class(class)[..9999];
-            let mut ours = ours::entry(bvh, level, class);
-            ours.load(rays);
-            ours.trace();
-            for mut entry in rival.entries(class) {
-                entry.load(rays);
-                entry.trace();
-                let difference = entry.hits().abs_diff(ours.hits()) as f64;
-                assert!(difference <= DIFFERENT * rays.len() as f64, "{}: {difference}", entry.name());
-            }
-        }
-    });
 }

@@ -12,7 +12,7 @@ use std::process::ExitCode;
 /// Eigen decompositions of small symmetric matrices per second on one thread
 ///
 /// 2×2, as the radii of irradiance records want them, and 3×3: values and vectors of random matrices in batches that
-/// stay in the first-level cache. A program built with the feature `nalgebra` measures nalgebra in turn.
+/// stay in the first-level cache.
 #[derive(Args)]
 pub(super) struct Eigen {
     /// Highest instruction set to use: baseline, avx2 or avx512 [default: the processor's]
@@ -35,21 +35,12 @@ impl Eigen {
 /// The object of `--json`.
 fn object(report: &EigenReport) -> Value {
     let speeds = |speeds: &Speeds| json!({"sym2": speeds.sym2, "sym3": speeds.sym3});
-    let mut object = json!({
+    json!({
         "level": report.level.name(),
         "matrices_per_second": speeds(&report.ours),
         "batch": BATCH,
         "repetitions": REPETITIONS,
-    });
-    if let Some((name, theirs)) = &report.rival {
-        object["rival"] = json!({"name": name, "matrices_per_second": speeds(theirs)});
-        object["ratios"] = speeds(&ratios(report, theirs));
-    }
-    object
-}
-
-fn ratios(report: &EigenReport, theirs: &Speeds) -> Speeds {
-    Speeds { sym2: report.ours.sym2 / theirs.sym2, sym3: report.ours.sym3 / theirs.sym3 }
+    })
 }
 
 /// The lines for a person.
@@ -57,7 +48,7 @@ fn text(report: &EigenReport) -> String {
     let row = |name: &str, speeds: &Speeds| {
         format!("{name:<14}{:>10.1}{:>10.1}", 1e-6 * speeds.sym2, 1e-6 * speeds.sym3)
     };
-    let mut lines = vec![
+    let lines = [
         format!(
             "symmetric matrices in batches of {BATCH}, one thread, {}; medians of {REPETITIONS}, M/s",
             report.level.name()
@@ -65,10 +56,5 @@ fn text(report: &EigenReport) -> String {
         format!("{:<14}{:>10}{:>10}", "", "2x2", "3x3"),
         row("halflight", &report.ours),
     ];
-    if let Some((name, theirs)) = &report.rival {
-        let Speeds { sym2, sym3 } = ratios(report, theirs);
-        lines.push(row(name, theirs));
-        lines.push(format!("{:<14}{sym2:>10.1}{sym3:>10.1}", "ratio"));
-    }
     lines.join("\n")
 }

@@ -17,8 +17,7 @@ const QUERIES: NonZero<usize> = NonZero::new(Amount::FULL.queries).unwrap();
 /// Searches of the photon map per second, on one thread
 ///
 /// A million photons on the surfaces of a room, three tenths of them in the focus of a caustic; the 8, 50, 100 and
-/// 200 nearest of places on the surfaces, with and without a radius, and the density estimate. A program built with
-/// the feature `kiddo` measures kiddo's immutable tree in turn, one with `nanoflann` nanoflann's.
+/// 200 nearest of places on the surfaces, with and without a radius, and the density estimate.
 #[derive(Args)]
 pub(super) struct Knn {
     /// Photons in the map
@@ -52,7 +51,7 @@ fn object(report: &KnnReport) -> Value {
     };
     let speed = |speed: &Speed| speed.queries_per_second;
     let found = |speed: &Speed| speed.found;
-    let mut object = json!({
+    json!({
         "level": report.level.name(),
         "build_seconds": report.build_seconds,
         "build_seconds_on_two_threads": report.build_seconds_on_two,
@@ -63,24 +62,7 @@ fn object(report: &KnnReport) -> Value {
         "photons": report.amount.photons,
         "queries": report.amount.queries,
         "repetitions": REPETITIONS,
-    });
-    for rival in &report.rivals {
-        let ratios = |ours: &[Speed]| -> Map<String, Value> {
-            let names = ours.iter().map(|speed| speed.task.name());
-            names.zip(rival.ratios(ours).into_iter().map(Value::from)).collect()
-        };
-        let mut singly = ratios(&report.singly);
-        singly.insert("build".into(), (rival.build_seconds / report.build_seconds).into());
-        object["rivals"][rival.key] = json!({
-            "name": rival.name,
-            "build_seconds": rival.build_seconds,
-            "queries_per_second": by_task(&rival.speeds, speed),
-            "found": by_task(&rival.speeds, found),
-            "ratios": singly,
-            "ratios_in_batches": ratios(&report.together),
-        });
-    }
-    object
+    })
 }
 
 /// The lines for a person.
@@ -99,22 +81,10 @@ fn text(report: &KnnReport) -> String {
             report.bytes_per_photon()
         ),
     ];
-    let mut beside = String::new();
-    for rival in &report.rivals {
-        let ratio = rival.build_seconds / report.build_seconds;
-        lines.push(format!("{}: build {:.3} s, ratio {ratio:.2}", rival.name, rival.build_seconds));
-        beside += &format!(" {:>9}{:>9}{:>9}", rival.key, "ratio", "batches");
-    }
-    lines.push(format!("{:<14}{:>9}{:>9}{:>9}{beside}", "", "found", "singly", "batches"));
-    for (i, (one, all)) in report.singly.iter().zip(&report.together).enumerate() {
+    lines.push(format!("{:<14}{:>9}{:>9}{:>9}", "", "found", "singly", "batches"));
+    for (one, all) in report.singly.iter().zip(&report.together) {
         let thousands = |speed: &Speed| format!("{:>9.1}", 1e-3 * speed.queries_per_second);
-        let mut line =
-            format!("{:<14}{:>9.1}{}{}", one.task.name(), one.found, thousands(one), thousands(all));
-        for theirs in report.rivals.iter().filter_map(|rival| rival.speeds.get(i)) {
-            let ratio = |ours: &Speed| ours.queries_per_second / theirs.queries_per_second;
-            line += &format!(" {}{:>9.2}{:>9.2}", thousands(theirs), ratio(one), ratio(all));
-        }
-        lines.push(line);
+        lines.push(format!("{:<14}{:>9.1}{}{}", one.task.name(), one.found, thousands(one), thousands(all)));
     }
     lines.join("\n")
 }

@@ -1,20 +1,22 @@
-//! Embree as the rival: its high-quality hierarchy on one thread, and every entry point for single rays and
-//! packets of 8 and 16, told that rays are coherent or not.
+//! Embree 3: its high-quality hierarchy on one thread, and every entry point for single rays and packets of 8 and 16,
+//! with the coherent and the incoherent flag.
 
-use super::{BenchError, Class, Entry, Rival, packets};
+use crate::packets;
 use embree3::{
     BufferUsage, BuildQuality, Config, Device, DeviceProperty, Format, GeometryKind, Ray as SingleRay, Ray8,
     Ray16, RayHit, RayHit8, RayHit16, Scene,
 };
+use halflight::bench::BenchError;
+use halflight::bench::rays::{Class, Entry, Rival};
 use halflight_core::scene::Mesh;
 
-pub(super) struct Embree {
+pub(crate) struct Embree {
     device: Device,
     scene: Scene<'static>,
 }
 
 impl Embree {
-    pub(super) fn new() -> Result<Self, BenchError> {
+    pub(crate) fn new() -> Result<Self, BenchError> {
         let device = Device::with_config(Config { threads: 1, ..Config::default() }).map_err(refused)?;
         let scene = device.create_scene().map_err(refused)?;
         Ok(Self { device, scene })

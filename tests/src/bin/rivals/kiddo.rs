@@ -1,19 +1,29 @@
-//! kiddo as the rival: its immutable tree, and the query that suits the task best. Where we gather, it only finds.
+//! kiddo's immutable tree, and the query that suits the task best. It only finds what the density estimate weighs.
 
-use super::{Data, Searcher, Task};
-use crate::bench::BenchError;
 use core::num::NonZero;
+use halflight::bench::BenchError;
+use halflight::bench::knn::{Data, Rival, Searcher, Task};
 use kiddo::{ImmutableKdTree, SquaredEuclidean};
 
-pub(super) type Tree = ImmutableKdTree<f32, 3>;
+/// The points of the tree.
+pub(crate) struct Kiddo<'p>(pub(crate) &'p [[f32; 3]]);
 
-pub(super) fn build(points: &[[f32; 3]]) -> Result<Tree, BenchError> {
-    Tree::new_from_slice(points).map_err(|error| BenchError::Rival(format!("kiddo refuses: {error:?}")))
+struct Tree(ImmutableKdTree<f32, 3>);
+
+impl Rival for Kiddo<'_> {
+    fn name(&self) -> String {
+        "kiddo".into()
+    }
+
+    fn build(&self) -> Result<Box<dyn Searcher + '_>, BenchError> {
+        match ImmutableKdTree::new_from_slice(self.0) {
+            Ok(tree) => Ok(Box::new(Tree(tree))),
+            Err(error) => Err(BenchError::Rival(format!("kiddo: {error:?}"))),
+        }
+    }
 }
 
-pub(super) struct Kiddo(pub Tree);
-
-impl Searcher for Kiddo {
+impl Searcher for Tree {
     fn run(&mut self, task: Task, data: &Data) -> Result<u64, BenchError> {
         let mut found = 0;
         for query in task.queries(data) {

@@ -1,15 +1,15 @@
 //! Rays in the forms that Embree reads: alone, by 8 and by 16, with room for a hit or without.
 
-use super::Entry;
 use core::array::from_fn;
 use embree3::{
     Hit8, Hit16, INVALID_ID, IntersectContext, Ray as SingleRay, Ray8, Ray16, RayHit, RayHit8, RayHit16,
     Scene, ValidMaskN,
 };
+use halflight::bench::rays::Entry;
 use halflight_core::geometry::Ray;
 
 /// What one call takes: a ray or a packet of them, and in it what comes back.
-pub(super) trait Packet: Sized {
+pub(crate) trait Packet: Sized {
     /// Rays of a packet.
     const WIDTH: usize;
     /// Its function, for coherent rays and for incoherent ones.
@@ -22,7 +22,7 @@ pub(super) trait Packet: Sized {
 }
 
 /// The function of `P` told that rays are coherent, and told that they are not.
-pub(super) fn both<'a, P: Packet + 'a>(scene: &'a Scene<'static>) -> [Box<dyn Entry + 'a>; 2] {
+pub(crate) fn both<'a, P: Packet + 'a>(scene: &'a Scene<'static>) -> [Box<dyn Entry + 'a>; 2] {
     let [coherent, incoherent] = P::NAMES;
     let entry = |name, context| -> Box<dyn Entry + 'a> {
         Box::new(Packets::<P> { name, scene, context, packets: Vec::new() })

@@ -1,0 +1,31 @@
+//! nanoflann's tree with leaves of ten points, unsorted results. It only finds what the density estimate weighs.
+
+use halflight::bench::BenchError;
+use halflight::bench::knn::{Data, Rival, Searcher, Surfel, Task};
+use halflight_nanoflann::Tree;
+
+/// The points of the tree.
+pub(crate) struct Nanoflann<'p>(pub(crate) &'p [[f32; 3]]);
+
+struct Built<'p>(Tree<'p>);
+
+impl Rival for Nanoflann<'_> {
+    fn name(&self) -> String {
+        "nanoflann".into()
+    }
+
+    fn build(&self) -> Result<Box<dyn Searcher + '_>, BenchError> {
+        let tree = Tree::new(self.0).ok_or_else(|| BenchError::Rival("nanoflann: no points".into()))?;
+        Ok(Box::new(Built(tree)))
+    }
+}
+
+impl Searcher for Built<'_> {
+    fn run(&mut self, task: Task, data: &Data) -> Result<u64, BenchError> {
+        let search = |query: &Surfel| match task {
+            Task::Nearest { k, radius } => self.0.nearest(query.place.to_array(), k, radius * radius),
+            Task::Gather { radius } => self.0.within(query.place.to_array(), radius * radius),
+        };
+        Ok(task.queries(data).iter().map(search).sum::<usize>() as u64)
+    }
+}
