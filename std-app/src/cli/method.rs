@@ -34,9 +34,7 @@ impl ValueEnum for Choice {
     }
 
     fn to_possible_value(&self) -> Option<PossibleValue> {
-        let about = self
-            .0
-            .map_or("What fits the scene: path; sppm where nearly all light is caustics", Method::about);
+        let about = self.0.map_or("path, or sppm if caustics are nearly all of the light", Method::about);
         Some(PossibleValue::new(self.name()).help(about))
     }
 }

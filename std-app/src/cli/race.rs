@@ -20,30 +20,30 @@ use std::process::ExitCode;
 use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
 
-/// Let methods race on a scene: the error of each against run time
+/// Compare methods on a scene: the error of each against run time
 ///
-/// The methods render on all threads for the same time, in turns, round by round, so that none has a quieter
-/// machine than the others. Errors are measured against --reference, or estimated. Ctrl-C ends the
-/// race with what there is and exits with 3.
+/// All methods render for the same time, on all threads, in turns, round by round, so that other load of the
+/// machine slows all of them. Errors are measured against --reference, or estimated. Ctrl-C ends the race early;
+/// it then exits with 3.
 #[derive(Args)]
 pub(super) struct Race {
     /// The scene: a mesh (.obj) or a scene file (.toml)
     scene: PathBuf,
-    /// The methods, as in path,path:max-depth=2: a method of `render`, then options, which are its flags
-    /// without dashes and win over those of the race
+    /// Methods, as in path,path:max-depth=2: a method of `render`, then options, which are its flags without dashes
+    /// and win over those of the race
     #[arg(long, value_name = "METHOD[:OPTION=VALUE]...,...", value_parser = racer::racer, value_delimiter = ',',
-        required = true)]
+        required = true, display_order = 1)]
     methods: Vec<Racer>,
-    /// Time of rendering of each, as in 30s, 2m, 1h
-    #[arg(long, value_name = "TIME", value_parser = values::duration)]
+    /// Time of rendering for each method, as in 30s, 2m, 1h
+    #[arg(long, value_name = "TIME", value_parser = values::duration, display_order = 5)]
     time: f64,
     #[command(flatten)]
     options: Options,
     #[command(flatten)]
     shot: Shot,
 
-    /// Write a report into this folder: index.html, which needs nothing else, curve.csv and run.json
-    #[arg(long, value_name = "DIR", help_heading = "Results")]
+    /// Write a report into this folder: index.html, a page that needs no other file, curve.csv and run.json
+    #[arg(long, value_name = "DIR", display_order = 10)]
     report: Option<PathBuf>,
     /// Print one JSON object instead of text
     #[arg(long, help_heading = "Results")]

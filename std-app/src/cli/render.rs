@@ -18,64 +18,63 @@ use std::time::Instant;
 
 /// Render a scene to pictures
 ///
-/// Stops at the first of --spp, --time and --error that holds; flags win over the scene file, and any of
-/// these three replaces all three of it. Ctrl-C stops early, saves what there is and exits with 3.
+/// The render stops when the first of --spp, --time and --error is reached. Flags win over the scene file; any of
+/// these three replaces all three of it. Ctrl-C stops early, saves the picture and exits with 3.
 #[derive(Args)]
 pub(super) struct Render {
     /// The scene: a mesh (.obj) or a scene file (.toml)
     scene: PathBuf,
-    /// Where the picture goes (.png, .exr, .hdr or .pfm); may be given several times [default: the name of
-    /// the scene with .png, in the current folder]
-    #[arg(short, long, value_name = "FILE")]
+    /// File of the picture: .png, .exr, .hdr or .pfm; may be given several times [default: the name of the
+    /// scene with .png, in the current folder]
+    #[arg(short, long, value_name = "FILE", display_order = 1)]
     output: Vec<PathBuf>,
-    /// How light is transported
-    #[arg(long, default_value = "auto")]
+    /// Method of light transport
+    #[arg(long, default_value = "auto", display_order = 2)]
     method: Choice,
     #[command(flatten)]
     options: Options,
     #[command(flatten)]
     shot: Shot,
 
-    /// Samples per pixel [default: 256, where no other rule is given]
+    /// Samples per pixel [default: 256 without --time and --error]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1 << 30),
-        help_heading = "When to stop")]
+        display_order = 4)]
     spp: Option<u32>,
     /// Time of rendering, as in 30s, 2m, 1h
-    #[arg(long, value_name = "TIME", value_parser = values::duration, help_heading = "When to stop")]
+    #[arg(long, value_name = "TIME", value_parser = values::duration, display_order = 5)]
     time: Option<f64>,
-    /// relMSE: stop when the upper end of its interval is not above
-    #[arg(long, value_name = "RELMSE", value_parser = values::positive, help_heading = "When to stop")]
+    /// Stop when the 95 % upper bound of relMSE falls to this value
+    #[arg(long, value_name = "RELMSE", value_parser = values::positive, display_order = 6)]
     error: Option<f64>,
 
-    /// Whether pixels get their samples by the noise around them, or all the same number; auto: where the noise says that it
-    /// pays
-    #[arg(long, default_value = "off", help_heading = "When to stop")]
+    /// Give pixels with noisy surroundings more samples; auto: if the noise promises a gain
+    #[arg(long, default_value = "off", help_heading = "Light transport")]
     adaptive: When,
-    /// Keep the film in a file while it grows, for --resume and `halflight merge`
+    /// Keep the film in a file during the render, for --resume and `halflight merge`
     #[arg(long, value_name = "FILE", help_heading = "In parts")]
     checkpoint: Option<PathBuf>,
-    /// Time between two checkpoints; there is one at the end as well [default: 60s]
+    /// Time between two checkpoints; the last one is written at the end [default: 60s]
     #[arg(long, value_name = "TIME", value_parser = values::duration, requires = "checkpoint",
         help_heading = "In parts")]
     checkpoint_every: Option<f64>,
-    /// Go on with the film of a checkpoint; all other flags as they were, but for those of when to stop
+    /// Continue the film of a checkpoint; all flags must be the same, except --spp, --time and --error
     #[arg(long, value_name = "FILE", help_heading = "In parts")]
     resume: Option<PathBuf>,
-    /// Render only part I of N, counted from 1, into the film of --checkpoint, for `halflight merge`; without -o
-    /// no picture is written
+    /// Render part I of N, counted from 1, into the film of --checkpoint, for `halflight merge`; without -o no
+    /// picture is written
     #[arg(long, value_name = "I/N", value_parser = values::shard, requires = "checkpoint",
         conflicts_with_all = ["time", "error", "adaptive"], help_heading = "In parts")]
     shard: Option<Shard>,
 
-    /// Begin with the irradiance caches of a file: of the same scene and settings, of any view
+    /// Start with the irradiance caches of a file: same scene and settings, any view
     #[arg(long, value_name = "FILE", help_heading = "Irradiance cache")]
     load_cache: Option<PathBuf>,
-    /// Keep the irradiance caches in a file when they are filled, for --load-cache
+    /// Write the irradiance caches to a file when they are filled, for --load-cache
     #[arg(long, value_name = "FILE", help_heading = "Irradiance cache")]
     save_cache: Option<PathBuf>,
 
-    /// Write a report into this folder: index.html, which needs nothing else, curve.csv and run.json
-    #[arg(long, value_name = "DIR", help_heading = "Results")]
+    /// Write a report into this folder: index.html, a page that needs no other file, curve.csv and run.json
+    #[arg(long, value_name = "DIR", display_order = 10)]
     report: Option<PathBuf>,
     /// Print one JSON object instead of text
     #[arg(long, help_heading = "Results")]

@@ -21,106 +21,103 @@ use std::sync::Arc;
 #[derive(Args)]
 pub(super) struct Shot {
     /// Width and height in pixels [default: 512x512]
-    #[arg(long, value_name = "WxH", value_parser = values::size)]
+    #[arg(long, value_name = "WxH", value_parser = values::size, display_order = 3)]
     size: Option<[u32; 2]>,
-    /// A reference picture of the same size; the error against it is reported, that of each round with
-    /// --json. Comparing does not count as time of rendering
+    /// Reference picture of the same size: errors are measured against it, with --json those of each round. The
+    /// comparison does not count as time of rendering
     #[arg(long, value_name = "FILE", help_heading = "Results")]
     reference: Option<PathBuf>,
     #[command(flatten)]
     pub(super) view: ViewFlags,
-    /// Threads [default: all that the machine runs at once]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=4096),
-        help_heading = "How to run")]
+    /// Threads [default: one for each processor]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=4096), display_order = 8)]
     threads: Option<u32>,
-    /// Most memory for all that is read, the scene and all structures, as in 512M or 2G [default: four fifths of the
-    /// machine's]
-    #[arg(long, value_name = "BYTES", value_parser = values::bytes, help_heading = "How to run")]
+    /// Memory limit for files, scene and all structures, as in 512M or 2G [default: four fifths of the machine's]
+    #[arg(long, value_name = "BYTES", value_parser = values::bytes, display_order = 9)]
     memory: Option<usize>,
 }
 
 /// How a method does its work: what may differ between the methods of a race.
 #[derive(Args, Clone, Debug)]
 pub(super) struct Options {
-    /// Whether `path` and `irradiance-cache` are joined with photons of caustics where a first look finds any [default: auto]
-    #[arg(long)]
+    /// Photons for caustics with path and irradiance-cache; auto: if a pilot pass finds caustics [default: auto]
+    #[arg(long, help_heading = "Light transport")]
     caustics: Option<Caustics>,
-    /// Whether neighbouring pixels share what their paths find: less noise for the same time where much of the
-    /// light is indirect; the noise that is left is alike in pixels near each other [default: auto]
-    #[arg(long, value_name = "WHEN")]
+    /// Path reuse among neighbouring pixels: less noise in indirect light, but the noise that remains is correlated
+    /// [default: auto]
+    #[arg(long, value_name = "WHEN", help_heading = "Light transport")]
     reuse: Option<When>,
-    /// Whether a first look finds which part of the environment each place sees, and light is then asked for there:
-    /// less noise in rooms lit through windows [default: auto]
-    #[arg(long, value_name = "WHEN")]
+    /// Sample the part of the environment that is visible from each region: less noise in rooms with windows; auto:
+    /// if a pilot pass finds most of it occluded [default: auto]
+    #[arg(long, value_name = "WHEN", help_heading = "Light transport")]
     windows: Option<When>,
-    /// Longest path in segments: 1 is light seen directly, 2 adds direct light [default: no limit]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    /// Longest path in segments: 1 is emission seen directly, 2 adds direct light [default: no limit]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..),
+        help_heading = "Light transport")]
     max_depth: Option<u32>,
-    /// Share of the work for an audit of the bias: a few pixels are path traced as well [default: 5% where the method
-    /// is biased, otherwise off]
-    #[arg(long, value_name = "SHARE|off", value_parser = values::audit)]
+    /// Share of the work for an audit of the bias, which path traces some pixels as well [default: 5% if the method
+    /// is biased, else off]
+    #[arg(long, value_name = "SHARE|off", value_parser = values::audit, help_heading = "Light transport")]
     audit: Option<f64>,
-    /// Another seed, another noise [default: 0]
-    #[arg(long, value_name = "N", help_heading = "How to run")]
+    /// Seed of the random numbers [default: 0]
+    #[arg(long, value_name = "N", display_order = 7)]
     seed: Option<u32>,
     /// Highest instruction set to use: baseline, avx2 or avx512 [default: the processor's]
-    #[arg(long, value_name = "LEVEL", value_parser = values::tier, help_heading = "How to run")]
+    #[arg(long, value_name = "LEVEL", value_parser = values::tier, help_heading = "Instruction set")]
     simd: Option<Tier>,
-    /// The same bits on every processor: the instruction set that all have
-    #[arg(long, help_heading = "How to run")]
+    /// The same bits on every processor, by the instruction set that all have
+    #[arg(long, help_heading = "Instruction set")]
     precise: bool,
-    /// By which rule the records of an irradiance cache know how far they reach [default: halflight]
+    /// Error metric that sets the radii of records [default: halflight]
     #[arg(long, value_name = "METRIC", value_parser = values::metric, help_heading = "Irradiance cache")]
     cache_metric: Option<Metric>,
-    /// Error allowed between records. Metrics with a Hessian: the error within the reach of a record over its
-    /// irradiance, times the area in squares of the scene's radius, or of the picture's side there if that is
-    /// smaller [default: 1e-4]; the others: the radius over the distance that they take [default: 0.3]
+    /// Interpolation error; smaller means more records [default: 1e-4; min-distance and split spheres: 0.3]
     #[arg(long, value_name = "ERROR", value_parser = values::positive, help_heading = "Irradiance cache")]
     cache_error: Option<f64>,
-    /// Rays that are gathered for a record: 64, 256, 576, 1024, 2304 or 4096 [default: as many as the
-    /// picture is better for; 1024 where caches are kept in a file]
+    /// Gather rays per record: 64, 256, 576, 1024, 2304 or 4096 [default: by the number of samples; 1024 with
+    /// --load-cache and --save-cache]
     #[arg(long, value_name = "N", value_parser = values::gather_rays, help_heading = "Irradiance cache")]
     cache_rays: Option<u32>,
-    /// Where the rays of a record find light: on paths, or in a map of photons [default: paths]
+    /// Light at the hits of gather rays: path traced, or from a photon map [default: paths]
     #[arg(long, help_heading = "Irradiance cache")]
     gather: Option<GatherBy>,
-    /// How the weight of a photon falls with its distance from where light is asked for [default: epanechnikov]
+    /// Weight of a photon by its distance [default: epanechnikov]
     #[arg(long, value_name = "KERNEL", help_heading = "Photons")]
     photon_kernel: Option<Kernel>,
-    /// Light paths of a global map of photons; those of a sample where the method is sppm [default: half as many as
-    /// pixels, 262144 at least for records; as many]
+    /// Light paths per global map, or per sample with sppm [default: pixels / 2, at least 262144 for records; sppm:
+    /// pixels]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1 << 28),
         help_heading = "Photons")]
     global_photons: Option<u32>,
-    /// Light paths of a map of caustics [default: half as many as pixels]
+    /// Light paths per caustic map [default: pixels / 2]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1 << 28),
         help_heading = "Photons")]
     caustic_photons: Option<u32>,
 }
 
-/// Where the rays of a record find light.
+/// Source of light at the hits of gather rays.
 #[derive(Clone, Copy, Debug, ValueEnum)]
 pub(super) enum GatherBy {
-    /// On paths that go on from their ends
+    /// Path traced
     Paths,
-    /// In a map of photons
+    /// From a photon map
     Photons,
 }
 
-/// How the weight of a photon falls.
+/// Weight of a photon by its distance.
 #[derive(Clone, Copy, Debug, ValueEnum)]
 pub(super) enum Kernel {
-    /// The same everywhere
+    /// Constant
     Constant,
-    /// Linearly
+    /// Linear
     Cone,
-    /// With the square of the distance
+    /// Quadratic
     Epanechnikov,
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
 pub(super) enum Caustics {
-    /// Where they are found
+    /// If a pilot pass finds caustics
     Auto,
     /// Never
     Off,
@@ -128,7 +125,7 @@ pub(super) enum Caustics {
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
 pub(super) enum When {
-    /// Where it pays
+    /// If it pays
     Auto,
     /// Always
     On,

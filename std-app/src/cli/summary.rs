@@ -1,4 +1,4 @@
-//! What is said when a render is done: the lines for a person. The object of `--json` is that of the report.
+//! Summary of a render: lines for a person. The object of `--json` is that of the report.
 
 use super::compare as comparing;
 use super::ledger;
@@ -7,7 +7,7 @@ use halflight::report::Run;
 use halflight::report::words::{plural, readable_bytes, readable_seconds};
 use std::path::Path;
 
-/// What is said of `run`, and of its `report`.
+/// The lines of `run`; `report` is the folder of its report.
 pub(super) fn text(run: &Run, report: Option<&Path>) -> String {
     let (result, settings) = (run.result, run.settings);
     let mut lines = Vec::new();
@@ -50,7 +50,7 @@ pub(super) fn text(run: &Run, report: Option<&Path>) -> String {
     if let Some(cache) = result.cache {
         let lost = match cache.refused {
             0 => String::new(),
-            refused => format!("; {refused} more had no memory"),
+            refused => format!("; {refused} more did not fit into memory"),
         };
         let loaded = match cache.loaded {
             0 => String::new(),
@@ -60,7 +60,7 @@ pub(super) fn text(run: &Run, report: Option<&Path>) -> String {
             0 => String::new(),
             times => format!(", refined {}", plural(times.into(), "time")),
         };
-        let cut = if cache.is_cut { "; cut short: what they do not reach is path traced" } else { "" };
+        let cut = if cache.is_cut { "; cut short: points without a record are path traced" } else { "" };
         lines.push(format!(
             "cache  {}{loaded} of {} rays in {} by {}{refined}{lost}{cut}",
             plural(cache.records, "record"),
@@ -82,7 +82,7 @@ pub(super) fn text(run: &Run, report: Option<&Path>) -> String {
         for (map, name) in [(photons.global, ""), (photons.caustic, " of caustics")] {
             if let Some(MapUse { seen: Some(seen), by_power: Some(by_power), .. }) = map {
                 lines.push(format!(
-                    "       lights chosen by what they bring to what is visible: {:.2} % of light paths{name} count, {:.2} % by power",
+                    "       emission guiding: {:.2} % of light paths{name} reach visible surfaces ({:.2} % without)",
                     100.0 * seen,
                     100.0 * by_power
                 ));
@@ -97,17 +97,19 @@ pub(super) fn text(run: &Run, report: Option<&Path>) -> String {
         for (map, name) in [(photons.global, "global"), (photons.caustic, "caustic")] {
             if let Some(map) = map.filter(|map| map.given < map.wanted) {
                 lines.push(format!(
-                    "       for want of memory {} light paths of {} for a {name} map: the picture has more noise",
+                    "       not enough memory: {} of {} light paths for the {name} map, the picture is noisier",
                     map.given, map.wanted
                 ));
             }
         }
     }
     if result.windows.lacks_memory {
-        lines.push("light  no memory for windows to the environment: light of the sky may be noisier".into());
+        lines.push(
+            "light  not enough memory for environment visibility sampling: sky light may be noisier".into(),
+        );
     }
     if result.caustics.lacks_memory {
-        lines.push("light  no memory for photons of caustics: their light may be missing or noisy".into());
+        lines.push("light  not enough memory for caustic photons: caustics may be missing or noisy".into());
     }
     lines.push(format!(
         "memory {}, {} at its peak",
@@ -117,7 +119,7 @@ pub(super) fn text(run: &Run, report: Option<&Path>) -> String {
     lines.extend(ledger::text(&result.counters, &result.places, result.empty_pixels));
     if result.filled_pixels > 0 {
         lines.push(format!(
-            "       {} had no sample yet, and show what is around them: the render was ended before its first",
+            "       {} had no sample when the render ended, and show the mean of the pixels around them",
             plural(result.filled_pixels, "pixel")
         ));
     }
@@ -130,10 +132,10 @@ pub(super) fn audited(audit: &Audited) -> Vec<String> {
     if audit.is_blind {
         return vec![
             format!(
-                "error  relMSE {relmse:.3e} (95 %: {lower:.3e} to {upper:.3e}), of noise; the bias is not known:"
+                "error  relMSE {relmse:.3e} (95 %: {lower:.3e} to {upper:.3e}), of noise; the bias is unknown:"
             ),
             format!(
-                "audit  its paths cannot find about {:.0} % of the light, which comes by mirrors and glass",
+                "audit  its paths cannot find about {:.0} % of the light, which arrives through mirrors and glass",
                 100.0 * audit.unseen
             ),
         ];
@@ -148,7 +150,7 @@ pub(super) fn audited(audit: &Audited) -> Vec<String> {
             bias.max(0.0)
         ),
         format!(
-            "audit  {found}: {} with {} each, off by {:+.2} % ± {:.2} % as a whole; {detectable:.1e} would show",
+            "audit  {found}: {} with {} each, off by {:+.2} % ± {:.2} % as a whole; a bias of {detectable:.1e} would be found",
             plural(audit.pixels.into(), "pixel"),
             plural(audit.samples.into(), "sample"),
             100.0 * audit.whole.mean,
@@ -164,7 +166,7 @@ pub(super) fn estimate(
     is_biased: bool,
 ) -> Vec<String> {
     let Some(ErrorEstimate { relmse, lower, upper }) = error else {
-        return vec!["error  unknown: it takes four samples per pixel and some light".into()];
+        return vec!["error  unknown: the estimate needs four samples per pixel and some light".into()];
     };
     let bias = match (is_biased, blurred) {
         (true, Some(_)) => "; other bias is not in it",

@@ -7,23 +7,23 @@ use clap::Args;
 use halflight::load::{LoadedScene, View, direction};
 use halflight_core::scene::Camera;
 
-/// Where to look from, in the units of the scene.
+/// The view, in the units of the scene.
 #[derive(Args)]
-#[command(next_help_heading = "Camera (of the scene file, else one that frames everything)")]
+#[command(next_help_heading = "Camera [default: of the scene file, else one that frames everything]")]
 pub(super) struct ViewFlags {
-    /// Where the camera stands
+    /// Position of the camera
     #[arg(long, value_name = "X,Y,Z", value_parser = values::vector, allow_hyphen_values = true)]
     eye: Option<[f64; 3]>,
-    /// The point it looks at; with --eye alone, the middle of the scene
+    /// Point in the middle of the picture; with --eye alone, the middle of the scene
     #[arg(long, value_name = "X,Y,Z", value_parser = values::vector, allow_hyphen_values = true)]
     look_at: Option<[f64; 3]>,
-    /// What is up in the picture; 0,1,0 where the view is changed
+    /// Direction that points up in the picture; 0,1,0 if --eye or --look-at is given
     #[arg(long, value_name = "X,Y,Z", value_parser = values::vector, allow_hyphen_values = true)]
     up: Option<[f64; 3]>,
     /// Vertical field of view in degrees
     #[arg(long, value_name = "DEG", value_parser = values::degrees)]
     fov: Option<f64>,
-    /// Radius of the lens, 0 for a pinhole, and the distance of what is sharp (else that of --look-at)
+    /// Radius of the lens, 0 for a pinhole, and distance in focus [default: that of --look-at]
     #[arg(long, value_name = "RADIUS[,DISTANCE]", value_parser = values::lens)]
     lens: Option<Lens>,
 }
@@ -62,8 +62,9 @@ impl ViewFlags {
         let up = self.up.unwrap_or([0.0, 1.0, 0.0]);
         let view = View { eye, look_at, up };
         let Some(turned) = scene.camera_at(view, 1.0) else {
-            return Err(Failure::new("the camera stands at the point it looks at")
-                .advice("give --eye and --look-at two different points"));
+            return Err(
+                Failure::new("--eye and --look-at are the same point").advice("give two different points")
+            );
         };
         let up = direction([0.0; 3], up).unwrap_or_default();
         if turned.forward.as_dvec3().cross(up).length() < PARALLEL {

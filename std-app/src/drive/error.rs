@@ -1,4 +1,4 @@
-//! Why there is no picture.
+//! Errors of a render.
 
 use halflight_core::memory::OutOfMemory;
 use std::io;
@@ -32,13 +32,16 @@ impl core::fmt::Display for RenderError {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         match self {
             Self::Size => write!(f, "the picture must have between 1 and 2^28 pixels"),
-            Self::Reference => write!(f, "the reference has not the size of the picture"),
+            Self::Reference => write!(f, "reference and picture differ in size"),
             Self::Memory { needed, available } => {
                 write!(f, "not enough memory: at least {needed} bytes needed, {available} available")
             }
             Self::Threads(why) => write!(f, "the threads could not be started: {why}"),
-            Self::Shard => write!(f, "the picture cannot be cut into such shards"),
-            Self::NoCache => write!(f, "only method irradiance-cache has a cache to load or save"),
+            Self::Shard => write!(
+                f,
+                "shard I/N is invalid: N must not exceed the number of tiles, and sampling must not be adaptive"
+            ),
+            Self::NoCache => write!(f, "only the method irradiance-cache has a cache to load or save"),
             Self::File(error) => error.fmt(f),
         }
     }
