@@ -42,7 +42,7 @@ fn wrong_usage_is_refused_before_anything_is_written() {
         ("render scene.obj --spp 0", "0 is not in"),
         ("render scene.obj --simd mmx", "baseline, avx2, avx512"),
         ("render scene.obj --sparkle", "unexpected argument"),
-        ("render scene.obj --eye 1,1,1 --look-at 1,1,1", "stands at the point"),
+        ("render scene.obj --eye 1,1,1 --look-at 1,1,1", "--eye and --look-at are the same point"),
         ("render scene.obj --eye 0,9,0 --look-at 0,0,0", "--up 0,0,1"),
         ("render scene.obj --memory 1K --size 64x64", "raise --memory"),
         ("render missing.obj", "missing.obj"),
