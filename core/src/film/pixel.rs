@@ -1,7 +1,7 @@
 //! One pixel: precise sums of its even and odd samples, and what is done with samples that are no light.
 //!
-//! Each half keeps its own even and odd samples apart. The halves tell the error of their mean; what the quarters
-//! add is said in [`crate::estimate`].
+//! Each half keeps its own even and odd samples apart. The halves tell the error of their mean; what the
+//! quarters add is said in [`crate::estimate`].
 
 use crate::Rgb;
 use bytemuck::{Pod, Zeroable};
@@ -49,7 +49,8 @@ impl Half {
         if self.count() == 0 { Rgb::ZERO } else { self.sum() / self.count() as f32 }
     }
 
-    /// By how much that is too bright in the mean of its channels, as far as samples told; negative: too dark.
+    /// By how much that is too bright in the mean of its channels, as far as samples told; negative: too
+    /// dark.
     pub fn blur(&self) -> f32 {
         if self.count() == 0 { 0.0 } else { self.blur / self.count() as f32 }
     }
@@ -90,8 +91,8 @@ impl Pixel {
         is_light
     }
 
-    /// Tells by how much sample number `index`, which was added, is too bright because photons blur. What is no number is
-    /// not counted.
+    /// Tells by how much sample number `index`, which was added, is too bright because photons blur. What is
+    /// no number is not counted.
     #[inline]
     pub fn add_blur(&mut self, index: u32, blur: Rgb) {
         let blur = blur.element_sum() / 3.0;
@@ -112,8 +113,8 @@ impl Pixel {
         if count == 0 { Rgb::ZERO } else { (self.even.sum() + self.odd.sum()) / count as f32 }
     }
 
-    /// Estimated variance of [`Pixel::mean`]: what the halves disagree by, with one degree of freedom. 0 where
-    /// a half is empty.
+    /// Estimated variance of [`Pixel::mean`]: what the halves disagree by, with one degree of freedom. 0
+    /// where a half is empty.
     ///
     /// With independent halves A and B of n_A and n_B samples and variance σ² of one sample, (A − B)² has the
     /// expectation σ² (1/n_A + 1/n_B), and their common mean the variance σ² / (n_A + n_B).
@@ -121,7 +122,8 @@ impl Pixel {
         self.scaled_variance(1.0)
     }
 
-    /// The same of a picture that is `scale` times as bright, also where it would not be a finite number itself.
+    /// The same of a picture that is `scale` times as bright, also where it would not be a finite number
+    /// itself.
     pub(crate) fn scaled_variance(&self, scale: f32) -> Rgb {
         let (even, odd) = (self.even.count() as f32, self.odd.count() as f32);
         if even == 0.0 || odd == 0.0 {

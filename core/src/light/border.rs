@@ -1,5 +1,6 @@
-//! The edges of lamps that are made of many triangles: those that two triangles of one material share which are both seen
-//! from the front, or both from behind, lie within what is seen of the lamp and are no border of it.
+//! The edges of lamps that are made of many triangles: those that two triangles of one material share which
+//! are both seen from the front, or both from behind, lie within what is seen of the lamp and are no border
+//! of it.
 
 use crate::sampling::mix;
 use glam::Vec3;
@@ -13,8 +14,8 @@ const TRIES: u64 = 64;
 /// Bits of a place that count, modulo their number: up for an edge, down for one that goes back.
 const COUNTER: u32 = 7;
 
-/// How often edges came, less how often they came the other way round. What an edge is known by is a hash of its ends: two
-/// that are taken for the same may cost a border, and so noise, now and then.
+/// How often edges came, less how often they came the other way round. What an edge is known by is a hash of
+/// its ends: two that are taken for the same may cost a border, and so noise, now and then.
 pub(super) struct Edges([u32; PLACES]);
 
 impl Edges {

@@ -55,7 +55,8 @@ impl<'m> LightSampler<'m> {
     /// Finds and orders the lights of `scene`.
     ///
     /// # Errors
-    /// [`OutOfMemory`] where the arena has less than [`LightSampler::footprint`] and [`LightSampler::scratch`] ask for.
+    /// [`OutOfMemory`] where the arena has less than [`LightSampler::footprint`] and
+    /// [`LightSampler::scratch`] ask for.
     pub fn build(scene: &Scene, arena: &mut Arena<'m>) -> Result<Self, OutOfMemory> {
         let counts = Counts::of(scene);
         let kept: &mut [Emitter] = arena.slice(counts.emitters)?;

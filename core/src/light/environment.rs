@@ -165,7 +165,7 @@ impl<'m> EnvironmentSampler<'m> {
         Ok((mean > 0.0).then_some(Self { map: Some(map), mean }))
     }
 
-    /// A direction and its density in solid angle, where a window has chosen.
+    /// A direction and its density in solid angle, where a visibility table has chosen.
     #[inline]
     pub(super) fn sample_at(&self, environment: &Environment, warped: WarpedSample) -> Option<(Vec3, f32)> {
         let (direction, pdf) = self.sample(environment, Vec3::ZERO, warped.place)?;

@@ -1,10 +1,10 @@
-//! What each place of the scene sees of the environment, so that light is looked for in the window and not behind
-//! the wall.
+//! The visibility of the environment from each place of the scene, learned before the picture, to importance
+//! sample the part that is not occluded.
 //!
-//! The unit square from which the environment is sampled is cut into bins of equal power. For each place, a cell of
-//! a grid and the axis that the surface there faces most, a table says which bins matter. It warps the square, monotone
-//! in both coordinates, so that what was well distributed stays so. How the tables are learned is in
-//! [`crate::transport::Outlook`]; whatever they hold, what is sampled with them is right in the mean.
+//! The unit square from which the environment is sampled is cut into bins of equal power. Each place, a cell
+//! of a grid and the axis that its surface faces most, has a table of the shares of the bins. The table warps
+//! the square monotonically in both coordinates, which preserves stratification.
+//! [`crate::transport::Outlook`] learns the tables; any table gives unbiased estimates.
 
 use crate::geometry::Bounds;
 use crate::memory::{Arena, Footprint, OutOfMemory};
@@ -19,10 +19,10 @@ const ROWS: usize = 32;
 /// A number for each bin, row by row.
 pub type Bins = [f32; COLUMNS * ROWS];
 
-/// What a first look may miss: the share of samples that all bins have alike.
+/// The share of samples that all bins have alike: the prepass may have missed light.
 const DEFENCE: f32 = 0.1;
 
-/// The density over the unit square that suits one place.
+/// The density over the unit square for one place.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
 #[repr(C)]
 pub struct VisibilityTable {
@@ -32,16 +32,16 @@ pub struct VisibilityTable {
     cells: [[u16; COLUMNS]; ROWS],
 }
 
-/// A point of the environment's square that a window chose.
+/// A point of the environment's square that a table chose.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct WarpedSample {
     /// The point, in the unit square.
     pub place: [f32; 2],
-    /// How much denser samples are there than without the window.
+    /// Density of samples there, relative to sampling without the table.
     pub density: f32,
 }
 
-/// A row of a window, chosen.
+/// A row that a table chose.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct MarginalSample {
     y: usize,
@@ -51,8 +51,8 @@ pub(crate) struct MarginalSample {
 }
 
 impl VisibilityTable {
-    /// From how much each bin matters, on average over bins whole or in part: for the least variance, the root of
-    /// the mean square of what arrives from it. What is no number counts as zero.
+    /// From how much each bin matters, on average over bins whole or in part: for the least variance, the
+    /// root of the mean square of what arrives from it. What is no number counts as zero.
     pub fn new(bins: &Bins) -> Self {
         let probabilities = Self::probabilities(bins);
         let mut table = Self { rows: [0; ROWS], cells: [[0; COLUMNS]; ROWS] };
@@ -75,7 +75,8 @@ impl VisibilityTable {
         bins.map(|x| rest + share * finite(x))
     }
 
-    /// Where in the square of the environment a point of the unit square leads, and how dense samples are there.
+    /// Where in the square of the environment a point of the unit square leads, and how dense samples are
+    /// there.
     #[inline]
     pub fn warp(&self, [u, v]: [f32; 2]) -> WarpedSample {
         self.sample_in_row(u, self.sample_row(v))
@@ -110,7 +111,7 @@ impl VisibilityTable {
         WarpedSample { place: place.map(|u| u.min(crate::sampling::ONE_MINUS_EPSILON)), density }
     }
 
-    /// How much denser samples are at a point of the environment's square than without the window.
+    /// How much denser samples are at a point of the environment's square than without the table.
     #[inline]
     pub fn density(&self, [u, v]: [f32; 2]) -> f32 {
         let y = ((v * ROWS as f32) as usize).min(ROWS - 1);
@@ -238,11 +239,11 @@ impl VisibilityGrid {
     }
 }
 
-/// The windows of all places.
+/// The visibility tables of all places.
 #[derive(Clone, Copy, Debug)]
 pub struct EnvironmentVisibility<'m> {
     grid: VisibilityGrid,
-    /// For each place of the grid the number of its window, from 1; 0 where it has none.
+    /// For each place of the grid the number of its table, from 1; 0 where it has none.
     slots: &'m [u16],
     visibility: &'m [VisibilityTable],
 }
@@ -256,7 +257,8 @@ impl<'m> EnvironmentVisibility<'m> {
         Footprint::default().slice::<u16>(CELLS * SIDES).slice::<VisibilityTable>(Self::MOST)
     }
 
-    /// The memory that [`EnvironmentVisibility::new`] takes, to be filled: numbers of windows by place, all zero, and windows.
+    /// The memory that [`EnvironmentVisibility::new`] takes, to be filled: numbers of tables by place, all
+    /// zero, and tables.
     ///
     /// # Errors
     /// [`OutOfMemory`] where the arena has less than [`EnvironmentVisibility::footprint`].
@@ -271,7 +273,7 @@ impl<'m> EnvironmentVisibility<'m> {
         Self { grid, slots, visibility }
     }
 
-    /// The window of a surface with unit `normal`; `None` where nothing is known.
+    /// The table of a surface with unit `normal`; `None` where nothing is known.
     #[inline]
     pub fn at(&self, position: Vec3, normal: Vec3) -> Option<&'m VisibilityTable> {
         if normal == Vec3::ZERO {
@@ -287,7 +289,7 @@ mod tests {
     use super::*;
     use crate::sampling::Sampler;
 
-    /// A window with a bright corner, a bin of nothing, one of no number.
+    /// A table with a bright corner, a bin of nothing, one of no number.
     fn table() -> VisibilityTable {
         let mut bins: Bins =
             core::array::from_fn(|i| if i % COLUMNS < 5 && i < 128 { i as f32 } else { 0.1 });

@@ -1,8 +1,10 @@
-//! How densely emission covers what paths from the eye find: what multiple importance sampling between the two needs.
+//! How densely emission covers what paths from the eye find: what multiple importance sampling between the
+//! two needs.
 //!
 //! A light path leaves its light at x₀ into ω with density p(x₀) p(ω), of which the étendue dA cos θ dω takes
-//! p(x₀) p(ω) / cos θ. The étendue is kept on the way, so the same number, over the density of the direction in which
-//! a path from the eye meets x₀, tells how much likelier one is than the other (`transport/merge.rs`).
+//! p(x₀) p(ω) / cos θ. The étendue is kept on the way, so the same number, over the density of the direction
+//! in which a path from the eye meets x₀, tells how much likelier one is than the other
+//! (`transport/merge.rs`).
 
 use super::emission::Emission;
 use super::sampler::{LightSample, LightSampler};

@@ -66,7 +66,7 @@ pub struct LightSampler<'m> {
     pub(super) points: &'m [u32],
     pub(super) tree: Tree<'m>,
     pub(super) environment: Option<EnvironmentSampler<'m>>,
-    /// What of the environment each place sees, where that has been learned.
+    /// The part of the environment that each place sees, where that has been learned.
     pub(super) visibility: Option<EnvironmentVisibility<'m>>,
     /// Indices into the scene's lights: directional.
     pub(super) distant: &'m [u32],
@@ -84,12 +84,12 @@ struct Shares {
 }
 
 impl<'m> LightSampler<'m> {
-    /// The same lights, chosen by the instructions of `level`: the same ones, and sooner.
+    /// The same lights, chosen with the instructions of `level`.
     pub fn with_level(&self, level: Level) -> Self {
         Self { tree: self.tree.with_level(level), ..*self }
     }
 
-    /// The same lights, the environment sampled through `visibility`.
+    /// The same lights, with the environment sampled by its `visibility`.
     pub fn with_visibility(&self, visibility: Option<EnvironmentVisibility<'m>>) -> Self {
         Self { visibility, ..*self }
     }
@@ -105,18 +105,18 @@ impl<'m> LightSampler<'m> {
         Some(sample.0)
     }
 
-    /// Whether the environment is sampled through windows.
+    /// Whether the environment is sampled by its visibility.
     pub(crate) fn has_visibility(&self) -> bool {
         self.visibility.is_some()
     }
 
-    /// What a surface sees the environment through, where that is known.
+    /// The visibility of the environment from a surface, where it is known.
     #[inline]
     pub(crate) fn visibility(&self, position: Vec3, normal: Vec3) -> Option<&'m VisibilityTable> {
         self.visibility.as_ref()?.at(position, normal)
     }
 
-    /// Where the window of a surface leads, if it has one.
+    /// The point of the environment that the visibility table of a surface maps `u` to.
     #[inline]
     pub(crate) fn warp(&self, position: Vec3, normal: Vec3, [u, v, _]: [f32; 3]) -> Option<WarpedSample> {
         Some(self.visibility(position, normal)?.warp([u, v]))
@@ -139,8 +139,9 @@ impl<'m> LightSampler<'m> {
         Some(LightSample { radiance: sample.radiance * radiance, ..sample })
     }
 
-    /// The same, but `warped` is the result of [`LightSampler::warp`], and whether the radiance is still to be multiplied with that of
-    /// the environment in this direction: looking it up is only worth it where nothing is in the way.
+    /// As [`LightSampler::sample`], with `warped` from [`LightSampler::warp`]. The flag says that the
+    /// radiance is still to be multiplied by that of the environment: its look-up is deferred until the
+    /// shadow ray is known to be free.
     #[inline]
     pub fn sample_deferred(
         &self,
@@ -185,8 +186,8 @@ impl<'m> LightSampler<'m> {
         }
     }
 
-    /// The density of [`LightSampler::sample`] for a point of emissive `triangle` that is seen from `position` in
-    /// unit `direction` at `hit_distance`. Zero for a triangle that does not shine this way.
+    /// The density of [`LightSampler::sample`] for a point of emissive `triangle` that is seen from
+    /// `position` in unit `direction` at `hit_distance`. Zero for a triangle that does not shine this way.
     #[inline]
     pub fn pdf_hit(
         &self,
@@ -214,8 +215,9 @@ impl<'m> LightSampler<'m> {
         (triangle - emitter.triangle <= u32::from(emitter.is_pair())).then_some((index, emitter))
     }
 
-    /// Draws the borders of lamps that shine towards `eye`, of those that `meets` does not rule out by the centre and the
-    /// radius of spheres around them; nothing where they are more than `most` triangles and parallelograms.
+    /// Draws the borders of lamps that shine towards `eye`, of those that `meets` does not rule out by the
+    /// centre and the radius of spheres around them; nothing where they are more than `most` triangles and
+    /// parallelograms.
     pub(crate) fn borders(
         &self,
         mesh: &Mesh,
@@ -269,7 +271,8 @@ impl<'m> LightSampler<'m> {
         scene.lights.get(*index as usize)
     }
 
-    /// The probability of [`LightSampler::sample`] for light `light`, one without surface, in the order of emission.
+    /// The probability of [`LightSampler::sample`] for light `light`, one without surface, in the order of
+    /// emission.
     pub(crate) fn probability(&self, light: u32, position: Vec3, normal: Vec3) -> f32 {
         let index = light as usize;
         let shares = self.shares(position, normal);

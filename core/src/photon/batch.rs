@@ -35,7 +35,8 @@ impl<F: FnMut(usize, &Neighbours)> Kernel for Searches<'_, '_, '_, F> {
             let index = next.index as usize;
             let Some(place) = self.places.get(index) else { continue };
             let place = map.space.enter(place.to_array());
-            // The k photons of the last search are no farther from here than this, by the triangle's inequality.
+            // The k photons of the last search are no farther from here than this, by the triangle's
+            // inequality.
             let near = last.map_or(f32::MAX, |(last, distance)| {
                 let way = Vec3::from_array(last).distance(Vec3::from_array(place));
                 let most = (way + distance) * ROUNDING;

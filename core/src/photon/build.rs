@@ -1,6 +1,7 @@
-//! The build, in the bytes of the photons themselves: they are brought into the order of the leaves by selection,
-//! level by level (Bentley 1975, with leaves; the halves are chosen so that all leaves but the last are full),
-//! then each leaf is turned from rows to columns in its place, and boxes are put around them from below.
+//! The build, in the bytes of the photons themselves: they are brought into the order of the leaves by
+//! selection, level by level (Bentley 1975, with leaves; the halves are chosen so that all leaves but the
+//! last are full), then each leaf is turned from rows to columns in its place, and boxes are put around them
+//! from below.
 
 use super::PhotonMap;
 use super::layout::{LEAF, Leaf, Levels, Node, WIDTH};
@@ -79,8 +80,8 @@ fn order<J: ForkJoin>(photons: &mut [Photon], level: usize, join: &J) {
     }
 }
 
-/// Brings those that come first along an axis to the front. Places are finite: they need no total order of floats, which
-/// takes longer.
+/// Brings those that come first along an axis to the front. Places are finite: they need no total order of
+/// floats, which takes longer.
 fn halve<const AXIS: usize>(photons: &mut [Photon], middle: usize) {
     photons.select_nth_unstable_by(middle, |a, b| {
         let (a, b) = (a.position[AXIS], b.position[AXIS]);
@@ -108,7 +109,8 @@ fn widest_axis(photons: &[Photon]) -> usize {
     }
 }
 
-/// Turns the leaves of `count` photons from rows to columns, and puts boxes around them: into `nodes`, those above.
+/// Turns the leaves of `count` photons from rows to columns, and puts boxes around them: into `nodes`, those
+/// above.
 fn next<J: ForkJoin>(leaves: &mut [Leaf], count: usize, nodes: &mut [Node], join: &J) {
     if count > PARALLEL_MIN && nodes.len() > 1 {
         let half = nodes.len() / 2;

@@ -1,6 +1,6 @@
-//! The map as it lies in memory: leaves of thirty-two photons, column by column, and above them levels of nodes of
-//! sixteen boxes. Every leaf and node is full but the last of its level, so that no child needs a name: node `i`
-//! of a level has the sixteen from `16 i` on of the level below.
+//! The map as it lies in memory: leaves of thirty-two photons, column by column, and above them levels of
+//! nodes of sixteen boxes. Every leaf and node is full but the last of its level, so that no child needs a
+//! name: node `i` of a level has the sixteen from `16 i` on of the level below.
 
 use super::record::Photon;
 use bytemuck::{Pod, Zeroable};
@@ -107,8 +107,8 @@ impl Levels {
         levels
     }
 
-    /// Where in the slice of nodes node `i` of a level is; level 0 is the one above the leaves. Node 0 of the level
-    /// behind the last is where the nodes end.
+    /// Where in the slice of nodes node `i` of a level is; level 0 is the one above the leaves. Node 0 of the
+    /// level behind the last is where the nodes end.
     #[inline(always)]
     pub(super) fn at(&self, level: usize, i: usize) -> usize {
         self.starts.get(level).map_or(usize::MAX, |&start| start as usize + i)

@@ -1,5 +1,5 @@
-//! Places in an order in which neighbours follow each other: along the Z curve (Morton 1966). A search then finds in
-//! the cache what the one before it has read, and how far the k-th photon can be at most.
+//! Places in an order in which neighbours follow each other: along the Z curve (Morton 1966). A search then
+//! finds in the cache what the one before it has read, and how far the k-th photon can be at most.
 
 use super::PhotonMap;
 use bytemuck::{Pod, Zeroable};
@@ -30,7 +30,8 @@ pub(super) fn along<'t>(
     for (index, (next, place)) in order.iter_mut().zip(places).enumerate() {
         let place = map.space.enter(place.to_array());
         let cell = [0, 1, 2].map(|axis| {
-            // From anywhere, NaN included, to one of the cells: floats saturate when they become whole numbers.
+            // From anywhere, NaN included, to one of the cells: floats saturate when they become whole
+            // numbers.
             ((place[axis] - lo[axis]) / (hi[axis] - lo[axis]) * cells) as u32
         });
         let [x, y, z] = cell.map(|cell| spread(cell.min((1 << BITS) - 1)));

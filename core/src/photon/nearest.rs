@@ -1,8 +1,10 @@
-//! The k nearest photons: depth first, the nearest child that is left first, until none can hold a nearer photon.
+//! The k nearest photons: depth first, the nearest child that is left first, until none can hold a nearer
+//! photon.
 //!
-//! Distances of a node's children are computed once, sixteen at a time, and stay where they are until it is done:
-//! a stack of at most [`LEVELS`] rows. Photons of a leaf that are near enough are appended to the candidates, which
-//! are cut back now and then ([`halflight_simd::kernels::select`]); their limit prunes the walk.
+//! Distances of a node's children are computed once, sixteen at a time, and stay where they are until it is
+//! done: a stack of at most [`LEVELS`] rows. Photons of a leaf that are near enough are appended to the
+//! candidates, which are cut back now and then ([`halflight_simd::kernels::select`]); their limit prunes the
+//! walk.
 
 use super::PhotonMap;
 use super::layout::{HALVES, LEAF, LEVELS, WIDTH};
@@ -129,7 +131,8 @@ impl<S: Simd> Walk<'_, '_, S> {
     #[inline(always)]
     fn run(&mut self, simd: S) {
         let Some(top) = self.map.levels.count.checked_sub(1) else { return };
-        // Of each node on the way down: its index on its level, and the distances of its children that are left.
+        // Of each node on the way down: its index on its level, and the distances of its children that are
+        // left.
         let mut indices = [0; LEVELS];
         let mut rows = [[f32::INFINITY; 16]; LEVELS];
         let mut level = top;

@@ -1,12 +1,13 @@
-//! All leaves within a radius, one after the other in the order of the map: what range queries and gathering have
-//! in common.
+//! All leaves within a radius, one after the other in the order of the map: what range queries and gathering
+//! have in common.
 
 use super::PhotonMap;
 use super::layout::{HALVES, LEAF, LEVELS, Leaf, WIDTH};
 use halflight_simd::kernels::points::Place16;
 use halflight_simd::{Kernel, Lanes, Mask, Simd};
 
-/// What is done with leaves. A trait, for a closure might be compiled apart, without the instructions of the level.
+/// What is done with leaves. A trait, for a closure might be compiled apart, without the instructions of the
+/// level.
 pub(super) trait Visit<S: Simd> {
     /// One leaf, and its index. To be inlined always.
     fn leaf(&mut self, simd: S, index: usize, leaf: &Leaf);
@@ -103,8 +104,8 @@ fn prefetch<S: Simd>(simd: S, map: &PhotonMap, leaf: usize) {
     }
 }
 
-/// All photons within a squared radius of a place in units of the map: their indices, in rising order, to `found`
-/// as far as there is room, and how many there are.
+/// All photons within a squared radius of a place in units of the map: their indices, in rising order, to
+/// `found` as far as there is room, and how many there are.
 pub(super) struct Range<'a, 'm> {
     pub map: &'a PhotonMap<'m>,
     pub place: [f32; 3],

@@ -1,12 +1,12 @@
 //! The units of a map: coordinates are scaled by a power of two, which is exact, so that the largest is about
-//! 2^40. Squares of distances then neither overflow nor vanish, whatever the units of the scene: from its extent
-//! down to 1e-30 of it.
+//! 2^40. Squares of distances then neither overflow nor vanish, whatever the units of the scene: from its
+//! extent down to 1e-30 of it.
 
 /// Binary exponent of the largest coordinate of a map.
 const LARGEST: i32 = 40;
 
-/// Where places asked for are held: four million times the extent of the map, beyond which all photons are equally
-/// far in f32 anyway.
+/// Where places asked for are held: four million times the extent of the map, beyond which all photons are
+/// equally far in f32 anyway.
 const EDGE: f32 = (1u64 << 62) as f32;
 
 /// From the units of the scene to those of the map.

@@ -22,8 +22,8 @@ pub(super) struct SphericalRectangle {
 }
 
 impl SphericalRectangle {
-    /// The rectangle with a corner at `origin`, its two edges from there and its unit normal, seen from `from`.
-    /// `None` if that point lies in its plane or too near to tell.
+    /// The rectangle with a corner at `origin`, its two edges from there and its unit normal, seen from
+    /// `from`. `None` if that point lies in its plane or too near to tell.
     #[inline]
     pub(super) fn new(origin: Vec3, [ex, ey]: [Vec3; 2], normal: Vec3, from: Vec3) -> Option<Self> {
         let (width, depth) = (ex.length(), ey.length());

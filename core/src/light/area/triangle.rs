@@ -23,8 +23,8 @@ pub(super) struct SphericalTriangle {
 }
 
 impl SphericalTriangle {
-    /// The triangle `origin`, `origin + edges[0]`, `origin + edges[1]`, seen from `from`. `None` if that point
-    /// lies in its plane or too near to tell.
+    /// The triangle `origin`, `origin + edges[0]`, `origin + edges[1]`, seen from `from`. `None` if that
+    /// point lies in its plane or too near to tell.
     #[inline]
     pub(super) fn new(origin: Vec3, edges: [Vec3; 2], from: Vec3) -> Option<Self> {
         let p = origin - from;

@@ -1,6 +1,6 @@
 //! Building of a light tree: splits by the surface area orientation heuristic, three levels to a node.
 
-use super::importance::{GROUPS, Group};
+use super::importance::{GROUPS, LightBounds};
 use super::{LEAF, LEVELS, Node, Tree, WAITING};
 use crate::Level;
 use crate::geometry::{Bounds, Cone};
@@ -38,7 +38,7 @@ impl<'m> Tree<'m> {
     /// Over `items`, whose order changes. Their `light`s are 0 … `items.len()` - 1, each once.
     pub(in crate::light) fn build(items: &mut [Item], nodes: &'m mut [Node], trails: &'m mut [u64]) -> Self {
         let whole = items.iter().fold(Sum::NONE, |sum, item| sum.and(Sum::of(item)));
-        let whole = if items.is_empty() { Group::default() } else { whole.group(items) };
+        let whole = if items.is_empty() { LightBounds::default() } else { whole.group(items) };
         let mut stack = [Work::default(); WAITING];
         let mut waiting = usize::from(items.len() > 1);
         let mut free = waiting;
@@ -82,7 +82,8 @@ struct Work {
 }
 
 impl Work {
-    /// The ranges of [`LEVELS`] branchings; which way each goes is a bit of its number, that of the first one lowest.
+    /// The ranges of [`LEVELS`] branchings; which way each goes is a bit of its number, that of the first one
+    /// lowest.
     fn parts(&self, items: &mut [Item]) -> [(usize, usize); GROUPS] {
         let mut parts = [(0, 0); GROUPS];
         parts[0] = (self.start, self.end);
@@ -130,8 +131,8 @@ impl Sum {
     }
 
     /// The group of `items`, whose sum this is.
-    fn group(&self, items: &[Item]) -> Group {
-        Group::new(&self.bounds, self.cone(items), self.power)
+    fn group(&self, items: &[Item]) -> LightBounds {
+        LightBounds::new(&self.bounds, self.cone(items), self.power)
     }
 
     /// A cone around the mean axis that holds those of all `items`.

@@ -1,8 +1,8 @@
-//! What is known of a group of lights: where they are, which way they shine, how strongly; and how much of
-//! that can reach a point (Conty Estevez and Kulla 2018, "Importance Sampling of Many Lights with Adaptive
-//! Tree Splitting", section 4). One group or eight, by the same code: the bits are the same.
+//! Bounds of a group of lights (position, directions, power) and the importance of the group for a point
+//! (Conty Estevez and Kulla 2018, "Importance Sampling of Many Lights with Adaptive Tree Splitting", section
+//! 4). The same code weighs one group or eight, with equal bits.
 //!
-//! Departure: cosines count by what they are in the mean over a group, not at most (docs/decisions/0059).
+//! Departure: cosines are averaged over a group; the paper takes their maximum (docs/decisions/0059).
 
 use crate::geometry::{Bounds, Cone};
 use bytemuck::{Pod, Zeroable};
@@ -12,40 +12,41 @@ use halflight_simd::{Lanes, Simd, dot};
 /// Importances are kept below this, so that their sums stay finite at a point on a light.
 const LARGEST: f32 = 1e30;
 
-/// What is above zero of cosines of mean µ and variance σ² is taken for (µ + √(µ² + k σ²)) / 2, with this k: right for all
-/// directions at once, and for a half of them seen from its side.
+/// The mean of max(cos, 0) for cosines of mean µ and variance σ² is approximated by (µ + √(µ² + k σ²)) / 2
+/// with this k: right for all directions at once, and for a hemisphere seen from its side.
 const CLAMPED: f32 = 0.75;
 
-/// k σ² of cosines to places in a ball that is seen under a half-angle of sine 1, across: a ball on the horizon is right.
+/// k σ² of the cosines to points of a ball that is seen under a half-angle of sine 1: right for a ball on the
+/// horizon.
 const SPREAD: f32 = 0.14;
 
-/// The mean of what is above zero of cosines to all directions: what shines everywhere sends so much to each side.
+/// The mean of max(cos, 0) over all directions, for lights that shine everywhere.
 const ALL_AROUND: f32 = 0.25;
 
-/// Nothing counts for less than this share of what it may be at most.
+/// Lower limit of a cosine, as a share of its largest possible value.
 const LEAST: f32 = 0.1;
 
 /// Groups that are weighed at once.
 pub(super) const GROUPS: usize = 8;
 
-/// A bounding sphere, a cone that holds the normals, and the power of some lights; or those of several groups, in lanes. Every
-/// light is taken to shine into the half-space around its normal.
+/// A bounding sphere, a cone that holds the normals, and the power of some lights; or those of several
+/// groups, in lanes. Every light is taken to shine into the half-space around its normal.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Group<L = f32> {
+pub(super) struct LightBounds<L = f32> {
     center: [L; 3],
     radius: L,
     axis: [L; 3],
     sin_cone: L,
     cos_cone: L,
-    /// Luminance times area, of both sides if both shine, or luminous intensity, four times that of what shines everywhere
-    /// (a ball shows a quarter of its area); in units of the strongest light.
+    /// Luminance times area, of both sides if both shine, or luminous intensity, four times that of what
+    /// shines everywhere (a ball shows a quarter of its area); in units of the strongest light.
     power: L,
 }
 
 /// Eight groups. One without power is none.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C)]
-pub(super) struct Groups {
+pub(super) struct LightBounds8 {
     center: [[f32; GROUPS]; 3],
     radius: [f32; GROUPS],
     axis: [[f32; GROUPS]; 3],
@@ -54,7 +55,7 @@ pub(super) struct Groups {
     power: [f32; GROUPS],
 }
 
-impl Group {
+impl LightBounds {
     pub(super) fn new(bounds: &Bounds, cone: Cone, power: f32) -> Self {
         Self {
             center: bounds.center().to_array(),
@@ -80,9 +81,9 @@ impl Group {
     }
 }
 
-impl Groups {
+impl LightBounds8 {
     /// Makes it group `i`, of [`GROUPS`].
-    pub(super) fn set(&mut self, i: usize, group: &Group) {
+    pub(super) fn set(&mut self, i: usize, group: &LightBounds) {
         let i = i % GROUPS;
         for k in 0..3 {
             self.center[k][i] = group.center[k];
@@ -94,17 +95,17 @@ impl Groups {
         self.power[i] = group.power;
     }
 
-    /// [`Group::sphere`] of group `i`, of [`GROUPS`]; `None` where there is none.
+    /// [`LightBounds::sphere`] of group `i`, of [`GROUPS`]; `None` where there is none.
     pub(super) fn sphere(&self, i: usize) -> Option<(Vec3, f32)> {
         let i = i % GROUPS;
         (self.power[i] > 0.0).then(|| (self.center.map(|all| all[i]).into(), self.radius[i]))
     }
 
-    /// [`Group::importance`] of each.
+    /// [`LightBounds::importance`] of each.
     #[inline(always)]
     pub(super) fn importance<S: Simd>(&self, simd: S, point: Vec3, normal: Vec3) -> [f32; GROUPS] {
         let load = |values: &[f32; GROUPS]| simd.load8(values);
-        let groups = Group {
+        let groups = LightBounds {
             center: [load(&self.center[0]), load(&self.center[1]), load(&self.center[2])],
             radius: load(&self.radius),
             axis: [load(&self.axis[0]), load(&self.axis[1]), load(&self.axis[2])],
@@ -116,9 +117,9 @@ impl Groups {
     }
 }
 
-/// See [`Group::importance`]; `all` makes all lanes the same.
+/// See [`LightBounds::importance`]; `all` makes all lanes the same.
 #[inline(always)]
-fn importance<L: Lanes>(all: impl Fn(f32) -> L, group: &Group<L>, point: Vec3, normal: Vec3) -> L {
+fn importance<L: Lanes>(all: impl Fn(f32) -> L, group: &LightBounds<L>, point: Vec3, normal: Vec3) -> L {
     let (zero, one) = (all(0.0), all(1.0));
     let parts = [zero, all(0.5), all(LEAST)];
     let [cx, cy, cz] = group.center;
@@ -135,8 +136,8 @@ fn importance<L: Lanes>(all: impl Fn(f32) -> L, group: &Group<L>, point: Vec3, n
     // θ' = max(θ - θ_o - θ_u, 0), the least angle to a normal of the group.
     let angle = minus_clamped((sin, cos), (group.sin_cone, group.cos_cone), zero, one);
     let most = minus_clamped(angle, uncertainty, zero, one).1;
-    // Normals that fill a cone of half-angle θ_o evenly have a mean of m = (1 + cos θ_o) / 2 along its axis, and there a
-    // variance of (1 - m)² / 3; the rest of 1 is across.
+    // Normals that fill a cone of half-angle θ_o evenly have a mean of m = (1 + cos θ_o) / 2 along its axis,
+    // and there a variance of (1 - m)² / 3; the rest of 1 is across.
     let mean = all(0.5) * (one + group.cos_cone);
     let along = (one - mean) * (one - mean) * all(1.0 / 3.0);
     let across = all(0.5) * (one - mean * mean - along);
@@ -156,8 +157,8 @@ fn importance<L: Lanes>(all: impl Fn(f32) -> L, group: &Group<L>, point: Vec3, n
     strength.min(all(LARGEST)).select(zero.lt(strength), zero)
 }
 
-/// The mean of what is above zero of cosines of this mean and variance, of which the largest is `most`. No closure: what is not
-/// inlined has not the instructions of its kernel, and calls a function for each.
+/// The mean of what is above zero of cosines of this mean and variance, of which the largest is `most`. No
+/// closure: what is not inlined has not the instructions of its kernel, and calls a function for each.
 #[inline(always)]
 fn facing<L: Lanes>(mean: L, variance: L, most: L, [zero, half, least]: [L; 3]) -> L {
     let about = half * (mean + (mean * mean + variance).sqrt());
@@ -186,7 +187,7 @@ mod tests {
     use halflight_simd::Kernel;
     use std::vec::Vec;
 
-    struct Weigh<'a>(&'a Groups, Vec3, Vec3);
+    struct Weigh<'a>(&'a LightBounds8, Vec3, Vec3);
 
     impl Kernel for Weigh<'_> {
         type Out = [f32; GROUPS];
@@ -197,8 +198,9 @@ mod tests {
         }
     }
 
-    /// Groups as they come and groups that are points, hold the point, shine everywhere, or have powers that overflow.
-    fn group(random: &Random, i: u32) -> Group {
+    /// Groups as they come and groups that are points, hold the point, shine everywhere, or have powers that
+    /// overflow.
+    fn group(random: &Random, i: u32) -> LightBounds {
         let [x, y, z, size, u, v, cos, power] = [0, 1, 2, 3, 4, 5, 6, 7].map(|k| random.single(8 * i + k));
         let center = 4.0 * Vec3::new(x, y, z) - 2.0;
         let half = match i % 4 {
@@ -210,15 +212,15 @@ mod tests {
         let cos = if i.is_multiple_of(5) { -1.0 } else { 2.0 * cos - 1.0 };
         let power = if i.is_multiple_of(7) { 3e38 } else { power };
         let bounds = Bounds { min: center - half, max: center + half };
-        Group::new(&bounds, Cone { axis: axis.to_array(), cos }, power)
+        LightBounds::new(&bounds, Cone { axis: axis.to_array(), cos }, power)
     }
 
     #[test]
     fn eight_groups_are_weighed_as_each_of_them() {
         let random = Random::new(1, 2);
         for case in 0..2000u32 {
-            let all: Vec<Group> = (0..GROUPS as u32).map(|i| group(&random, 8 * case + i)).collect();
-            let mut groups = Groups::zeroed();
+            let all: Vec<LightBounds> = (0..GROUPS as u32).map(|i| group(&random, 8 * case + i)).collect();
+            let mut groups = LightBounds8::zeroed();
             // The last is none in every other case.
             let count = GROUPS - (case as usize & 1);
             all.iter().take(count).enumerate().for_each(|(i, group)| groups.set(i, group));

@@ -1,6 +1,6 @@
-//! The light tree: groups of lights in a tree, so that one of very many is chosen by what it can do for a point, in as
-//! many steps as the tree is deep (Conty Estevez and Kulla 2018). It is built as a binary tree, of which three levels
-//! make a node: eight groups are weighed at once, and chosen from.
+//! The light tree (Conty Estevez and Kulla 2018) chooses one of many lights by its importance for a point, in
+//! as many steps as the tree is deep. It is built as a binary tree, and three of its levels make a node:
+//! eight groups are weighed at once.
 
 mod build;
 mod importance;
@@ -13,13 +13,13 @@ use crate::sampling::ONE_MINUS_EPSILON;
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 use halflight_simd::{Kernel, Simd};
-use importance::{GROUPS, Group, Groups};
+use importance::{GROUPS, LightBounds, LightBounds8};
 
 /// Three levels of a binary tree: up to eight lights or nodes.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C)]
 pub(super) struct Node {
-    groups: Groups,
+    groups: LightBounds8,
     /// The node of each group, or [`LEAF`] and the light.
     links: [u32; GROUPS],
 }
@@ -37,7 +37,7 @@ const WAITING: usize = 1 + (u64::BITS / LEVELS) as usize * (GROUPS - 1);
 pub(super) struct Tree<'m> {
     level: Level,
     /// All lights.
-    whole: Group,
+    whole: LightBounds,
     /// None where there is one light only.
     nodes: &'m [Node],
     /// For each light the groups from the first node to it, [`LEVELS`] bits for each, the first one lowest.
@@ -86,7 +86,8 @@ impl<'m> Tree<'m> {
         }
     }
 
-    /// Every light of a group that `meets` does not rule out, by the centre and the radius of a sphere around it.
+    /// Every light of a group that `meets` does not rule out, by the centre and the radius of a sphere around
+    /// it.
     pub(super) fn visit(&self, meets: impl Fn(Vec3, f32) -> bool, mut each: impl FnMut(u32)) {
         let (center, radius) = self.whole.sphere();
         if self.trails.is_empty() || !meets(center, radius) {
@@ -115,9 +116,9 @@ impl<'m> Tree<'m> {
     }
 }
 
-/// The most nodes of a tree. One with c nodes below it has b of the n - 1 branchings: at least 1 where c is 0, 3 where it is
-/// 2, 4, 6 and 7 where it is 4, 6 and 8, so that 4 b >= 4 + 3 c. The sum over all of w nodes, of which all but the first
-/// are below another: 4 (n - 1) >= 4 w + 3 (w - 1).
+/// The most nodes of a tree. One with c nodes below it has b of the n - 1 branchings: at least 1 where c is
+/// 0, 3 where it is 2, 4, 6 and 7 where it is 4, 6 and 8, so that 4 b >= 4 + 3 c. The sum over all of w
+/// nodes, of which all but the first are below another: 4 (n - 1) >= 4 w + 3 (w - 1).
 fn most_nodes(lights: usize) -> usize {
     lights.checked_sub(1).map_or(0, |branchings| (branchings.saturating_mul(4).saturating_add(3)) / 7)
 }
@@ -193,8 +194,8 @@ impl Kernel for Follow<'_> {
     }
 }
 
-/// Sums of the first one, two … all of `weights`: each larger than the one before where its weight is not zero and rounding
-/// does not swallow it, and the same where it is.
+/// Sums of the first one, two … all of `weights`: each larger than the one before where its weight is not
+/// zero and rounding does not swallow it, and the same where it is.
 #[inline(always)]
 fn ends(&[a, b, c, d, e, f, g, h]: &[f32; GROUPS]) -> [f32; GROUPS] {
     let two = a + b;
