@@ -74,24 +74,6 @@ fn a_finished_film_goes_on_to_more_samples() {
 }
 
 #[test]
-fn chains_of_light_paths_are_the_same_in_parts() {
-    let folder = Folder::new("chains");
-    // A room of which so little is seen that chains begin at paths of several maps.
-    let room = "mtllib scene.mtl\n\
-        v 0 0 0\nv 9 0 0\nv 9 0 9\nv 0 0 9\nv 0 9 0\nv 9 9 0\nv 9 9 9\nv 0 9 9\n\
-        v 4 8 4\nv 5 8 4\nv 5 8 5\nv 4 8 5\nusemtl floor\n\
-        f 4 3 2 1\nf 5 6 7 8\nf 1 2 6 5\nf 3 4 8 7\nf 4 1 5 8\nf 2 3 7 6\nusemtl lamp\nf 9 10 11 12\n";
-    fs::write(folder.path("room.obj"), room).unwrap();
-    let render = "render room.obj --size 32x24 --method sppm --eye 4,4,7 --look-at 4,0,3 --fov 6 --json";
-    let whole = folder.object(&format!("{render} --spp 24 --threads 1 -o whole.pfm"));
-    let photons = &whole["photons"];
-    assert!(photons["chained"] == true && photons["global"]["seen"].as_f64().unwrap() < 0.02, "{photons}");
-    folder.object(&format!("{render} --spp 11 -o a.pfm --checkpoint film"));
-    folder.object(&format!("{render} --spp 24 -o b.pfm --resume film"));
-    assert!(fs::read(folder.path("whole.pfm")).unwrap() == fs::read(folder.path("b.pfm")).unwrap());
-}
-
-#[test]
 fn adaptive_samples_are_the_same_in_parts() {
     let folder = Folder::new("adaptive");
     let render = "render scene.obj --size 100x70 --adaptive on --json";

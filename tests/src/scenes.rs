@@ -308,21 +308,3 @@ pub fn room_with_lamp(opacity: f32, radiance: f32) -> SceneBuffers {
     buffers.square(Vec3::new(0.5, 0.97, 0.4), Vec3::NEG_Y, 0.15, lamp);
     buffers
 }
-
-/// A table in a hall of fifty metres with 49 lamps, seen from so near that one light path of a thousand leaves a photon
-/// that is seen.
-pub fn table_in_a_hall() -> SceneBuffers {
-    let camera = Camera::look_at(Vec3::new(24.6, 2.6, 26.0), Vec3::new(24.6, 0.9, 24.5), Vec3::Y, 25.0);
-    let mut buffers = SceneBuffers::new(camera);
-    let wall = buffers.material(Material::diffuse(Rgb::splat(0.7)));
-    let wood = buffers.material(Material::diffuse(Rgb::new(0.5, 0.3, 0.2)));
-    let lamp = buffers.material(emitter(0.0, 20.0));
-    buffers.cuboid(Vec3::ZERO, Vec3::new(50.0, 10.0, 50.0), true, wall);
-    buffers.cuboid(Vec3::new(24.0, 0.0, 24.0), Vec3::new(25.2, 0.8, 25.0), false, wood);
-    buffers.cuboid(Vec3::new(24.5, 0.8, 24.4), Vec3::new(24.7, 1.0, 24.6), false, wall);
-    for i in 0..49 {
-        let place = Vec3::new(4.25 + (i % 7) as f32 * 7.0, 9.5, 4.25 + (i / 7) as f32 * 7.0);
-        buffers.square(place, Vec3::NEG_Y, 0.5, lamp);
-    }
-    buffers
-}

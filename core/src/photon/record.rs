@@ -52,12 +52,6 @@ impl Photon {
         }
     }
 
-    /// The same with so many times its power.
-    pub fn times(self, factor: f32) -> Self {
-        let (exponent, mantissas) = shared_exponent(self.power() * factor);
-        Self { light: self.light & !(0xff << 24) | exponent << 24, power: mantissas, ..self }
-    }
-
     /// Where it lies.
     pub fn position(&self) -> Vec3 {
         Vec3::from_array(self.position)

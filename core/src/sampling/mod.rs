@@ -1,10 +1,11 @@
 //! Where random numbers come from and what they are bent into: Owen-scrambled Sobol' streams, a hash for
-//! decisions outside them, warps of the unit square, and discrete distributions in arena memory.
+//! decisions outside them, mutations of primary sample space, warps of the unit square, and discrete distributions in arena memory.
 
 mod alias;
 mod distribution;
 mod hash;
 mod numbers;
+mod primary_sample;
 mod sobol;
 mod trigonometry;
 pub mod warp;
@@ -13,6 +14,7 @@ pub use alias::{AliasEntry, AliasTable};
 pub use distribution::{Cell, Distribution2d};
 pub use hash::{Random, mix};
 pub use numbers::Numbers;
+pub use primary_sample::{MutatedSample, Mutation};
 pub use sobol::Sampler;
 pub use trigonometry::sin_cos_turns;
 

@@ -1,6 +1,6 @@
-//! What a light path is made of: numbers in [0, 1) by the names of their dimensions. Those of a [`Sampler`]
-//! are points of a sequence; those of a Markov chain are what they were before, a little changed
-//! (`transport/chain.rs`).
+//! Random numbers of a light path: numbers in [0, 1) by the names of their dimensions. Those of a [`Sampler`]
+//! are points of a sequence; those of a [`MutatedSample`](super::MutatedSample) are a step of a Markov chain
+//! away from a point.
 
 use super::Sampler;
 

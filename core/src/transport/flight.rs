@@ -2,7 +2,7 @@
 //! [`Visitor`] to say: `shoot.rs` leaves photons of all light, `caustics.rs` those of caustics.
 //!
 //! All paths of a task advance together, so that the tracer sees batches of rays. Path `i` of map `n` follows from
-//! (seed, n, i) alone, or from other numbers that are given for it (`chain.rs`).
+//! (seed, n, i) alone.
 
 use super::context::SceneContext;
 use super::estimator::{CERTAIN_BELOW, Counters, MAX_CROSSINGS, is_cut};

@@ -2,13 +2,12 @@
 //!
 //! [`path`] is the path tracer that renders, a wavefront over a tile; [`mod@reference`] is the same estimator as a
 //! textbook has it, one path at a time, kept to test the other against. For the irradiance cache [`overture`] finds the
-//! places where it lacks a record, and [`gather`] makes one; [`shoot`] leaves the photons that [`PhotonLight`] gathers, [`chain`] more
-//! of those that are seen, and [`maps`] makes of them what gather rays end in.
+//! places where it lacks a record, and [`gather`] makes one; [`shoot`] leaves the photons that [`PhotonLight`] gathers, and
+//! [`maps`] makes of them what gather rays end in.
 
 mod arrivals;
 mod cached;
 pub mod caustics;
-pub mod chain;
 mod context;
 mod density;
 mod estimator;

@@ -10,7 +10,6 @@
 //!    the mean it would have to live through as many ends as no sequence of random numbers holds.
 //! 2. The price: where surfaces are lighter than that, photons differ in power.
 
-use super::chain::Share;
 use super::estimator::Counters;
 pub use super::flight::PATHS;
 use super::flight::{Flight, Onward, Pile, State, Vertex, Visitor};
@@ -186,7 +185,7 @@ impl<'a, F: Features> Shooter<'a, F> {
         scratch: &mut Arena,
         out: &mut [Photon],
     ) -> Result<Counters, OutOfMemory> {
-        let mut leaver = Leaver { keep: self.keep, pile: Pile::new(out), beside: None };
+        let mut leaver = Leaver { keep: self.keep, pile: Pile::new(out) };
         let counters = self.flight.follow(task, map, scratch, &mut leaver)?;
         leaver.pile.finish();
         Ok(counters)
@@ -204,25 +203,6 @@ impl<'a, F: Features> Shooter<'a, F> {
         seen: &mut dyn FnMut(Seen),
     ) -> Result<Counters, OutOfMemory> {
         self.flight.follow(task, map, scratch, &mut Looker { keep: self.keep, sight, seen })
-    }
-
-    /// The same as [`Shooter::run`] beside chains, with which seen photons `share` their light. `seen` is told of each of those, by the number
-    /// of its path.
-    ///
-    /// # Errors
-    /// Those of [`Shooter::run`].
-    pub fn run_beside(
-        &self,
-        (task, map): (usize, u32),
-        share: &Share,
-        scratch: &mut Arena,
-        out: &mut [Photon],
-        seen: &mut dyn FnMut(u32),
-    ) -> Result<Counters, OutOfMemory> {
-        let mut leaver = Leaver { keep: self.keep, pile: Pile::new(out), beside: Some((share, seen)) };
-        let counters = self.flight.follow(task, map, scratch, &mut leaver)?;
-        leaver.pile.finish();
-        Ok(counters)
     }
 }
 
@@ -267,8 +247,6 @@ impl Visitor for Looker<'_> {
 pub(super) struct Leaver<'p> {
     keep: Keep,
     pile: Pile<'p>,
-    /// What chains are for, and who wants to know of photons that are seen.
-    beside: Option<(&'p Share<'p>, &'p mut dyn FnMut(u32))>,
 }
 
 impl Visitor for Leaver<'_> {
@@ -278,13 +256,7 @@ impl Visitor for Leaver<'_> {
     fn meet(&mut self, state: &State, vertex: &Vertex, counters: &mut Counters) -> Option<Onward> {
         let leaves = self.keep.leaves(state, vertex);
         if leaves {
-            let mut power = Rgb::from(state.power);
-            if let Some((share, seen)) = &mut self.beside
-                && share.sight.shows(vertex.point.position, vertex.point.geometric_normal)
-            {
-                power *= share.kept;
-                seen(state.number);
-            }
+            let power = Rgb::from(state.power);
             if power.max_element() > 0.0 {
                 self.pile.leave(vertex.photon(power), counters);
             }

@@ -1,6 +1,6 @@
 //! What the camera sees that holds photons: places of a raster of camera rays, straight on, in mirrors and behind glass,
-//! in a map of their own. A photon counts as seen where one of them lies beside it. That need not be exact: what is not
-//! held for seen is found by other paths (`chain.rs`).
+//! in a map of their own. A photon counts as seen where one of them lies near it. That need not be exact: emission guided
+//! by it sends some light everywhere.
 
 use super::context::{SceneContext, Segment};
 use super::estimator::{Counters, dimension};

@@ -88,12 +88,6 @@ pub(super) fn text(run: &Run, report: Option<&Path>) -> String {
                 ));
             }
         }
-        if let (Some(seen), true) = (photons.global.and_then(|map| map.seen), photons.chained) {
-            lines.push(format!(
-                "       half of them in chains that stay where photons are seen: {:.2} % of light paths leave some",
-                100.0 * seen
-            ));
-        }
         for (map, name) in [(photons.global, "global"), (photons.caustic, "caustic")] {
             if let Some(map) = map.filter(|map| map.given < map.wanted) {
                 lines.push(format!(

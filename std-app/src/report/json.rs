@@ -88,7 +88,6 @@ fn most(run: &Run) -> Value {
                 "global": photons.global.map(map),
                 "caustic": photons.caustic.map(map),
                 "irradiances": photons.irradiances,
-                "chained": photons.chained,
                 "seconds": photons.seconds,
             })
         }),

@@ -18,7 +18,7 @@ pub use maker::Maker;
 pub use race::{Race, Racer};
 
 use crate::compare::Comparison;
-use crate::drive::{MOST_SEEN, Method, PhotonUse, RenderResult, Settings};
+use crate::drive::{Method, PhotonUse, RenderResult, Settings};
 use crate::save::Image;
 use halflight_core::census::Census;
 use halflight_core::scene::Scene;
@@ -85,14 +85,6 @@ impl Run<'_> {
                 "windows to the environment",
                 "there was no memory for them: light of the sky may be noisier",
             ));
-        }
-        if let (Method::ProgressivePhotons, Some(PhotonUse { global: Some(map), chained: false, .. })) =
-            (self.result.method, self.result.photons)
-            && let Some(seen) = map.seen
-        {
-            let some = "enough light paths leave photons that are seen";
-            let none = "next to no light path leaves a photon that is seen: there is nothing to begin at";
-            left_out.push(("chains of light paths", if seen >= MOST_SEEN { some } else { none }));
         }
         if let (Method::PhotonMap, Some(PhotonUse { caustic: None, .. })) =
             (self.result.method, self.result.photons)

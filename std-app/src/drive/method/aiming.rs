@@ -26,10 +26,8 @@ const MOST_SEEN: f64 = 0.5;
 const FEWEST_TO_BEGIN: usize = 8;
 const FEWEST_SEEN: usize = 512;
 
-/// What is left of the variance of light that counts, at most, where aiming pays; and the mean square of what a path brings over
-/// the square of its mean, at most, where chains are the other way: they are as good as so much.
+/// Variance of light that counts, at most, over that without guiding, where guiding pays.
 const LESS: f64 = 0.5;
-const AS_CHAINS: f64 = 12.0;
 
 /// What its memory is counted as.
 const STRUCTURE: &str = "emission";
@@ -118,9 +116,7 @@ impl<'l> Aim<'l> {
                 Wanted::Gathered(radius) => Sight::within(&map, radius, settings.level),
             };
             let shot = ShootSettings { keep, seed: settings.seed, paths: LOOK as u32, max_depth };
-            let has_chains = !of_caustics && matches!(wanted, Wanted::Seen(_));
-            let most = if has_chains { AS_CHAINS } else { f64::INFINITY };
-            aim.learn((&mut worth, of_caustics), most, &mut arena, |emission, number| {
+            aim.learn((&mut worth, of_caustics), &mut arena, |emission, number| {
                 let shooter = Shooter::<F>::new(scene, bvh, lights, emission, shot, settings.level);
                 Look::of(stage, &shooter, sight, FIRST_MAP + number, scratch)
             })?;
@@ -130,11 +126,10 @@ impl<'l> Aim<'l> {
         Ok(aim)
     }
 
-    /// Looks, and again by what was learned where that may pay: where the spread is `most` at most.
+    /// Looks, and again by what was learned where that may pay.
     fn learn(
         &mut self,
         (worth, of_caustics): (&mut Worth<'l>, bool),
-        most: f64,
         arena: &mut Arena<'l>,
         mut look: impl FnMut(&Emission, u32) -> Result<Option<Look>, RenderError>,
     ) -> Result<(), RenderError> {
@@ -157,7 +152,7 @@ impl<'l> Aim<'l> {
         };
         let mut seen = if of_caustics { 0 } else { learn(worth, &first) };
         // Where power alone found nothing, nothing is known of its spread, but that it is large.
-        let most = if first.found.is_empty() { most } else { most.min(LESS * first.spread) };
+        let most = if first.found.is_empty() { f64::INFINITY } else { LESS * first.spread };
         for number in 1..=MOST_LOOKS {
             let knew = seen;
             let Some(again) = look(&worth.guide(&plain, &mut arena.scratch())?, number)? else { break };

@@ -61,8 +61,6 @@ pub struct PhotonUse {
     pub caustic: Option<MapUse>,
     /// Irradiances worked out beforehand.
     pub irradiances: u64,
-    /// Whether half of them are chains that stay where photons are seen.
-    pub chained: bool,
     /// Seconds of shooting and building.
     pub seconds: f64,
 }

@@ -8,7 +8,6 @@
 //! their radii apart, so that the halves of the film are two such pictures of their own.
 
 use super::aiming::{Aim, Wanted};
-use super::chaining::{self, Chaining};
 use super::photon_view::{self, PhotonView};
 use super::photons::{Drawer, MapUse, PhotonUse};
 use super::{Method, Renderer, Stage};
@@ -45,7 +44,6 @@ pub(super) struct ProgressivePhotons<'a, F> {
     paths: usize,
     used: PhotonUse,
     photons: Drawer,
-    chaining: Option<Chaining>,
     /// The sample that they are of.
     sample: Option<u32>,
     aim: Aim<'a>,
@@ -60,7 +58,7 @@ impl<'a, F: Features> ProgressivePhotons<'a, F> {
         lamps: &'a mut Vec<Line>,
     ) -> Result<Self, RenderError> {
         let Stage { settings, workers, .. } = *stage;
-        let scratch = PathTracer::<F>::scratch(WAVE).or(chaining::scratch::<F>());
+        let scratch = PathTracer::<F>::scratch(WAVE).or(Shooter::<F>::scratch());
         let mut scratch = memory.take_each("paths", scratch, workers.count())?;
         let pixels = settings.width as usize * settings.height as usize;
         let usual = pixels.clamp(FEWEST_PATHS, MOST_PATHS);
@@ -75,11 +73,9 @@ impl<'a, F: Features> ProgressivePhotons<'a, F> {
         let photons = Drawer::new(tasks * ROOM, memory)?;
         let tracer = stage.paths::<F>(settings.seed);
         let [wanted, given] = [wanted, tasks].map(|tasks| (tasks * PATHS) as u64);
-        let of = (tasks, FIRST_RADIUS as f32);
-        let (chaining, seen) =
-            Chaining::look_first::<F>(stage, of, &aim.emission, &mut scratch, memory, others)?;
-        let global = Some(MapUse { wanted, given, seen, by_power: aim.by_power, ..MapUse::default() });
-        let used = PhotonUse { global, chained: chaining.is_some(), ..PhotonUse::default() };
+        let (seen, by_power) = (aim.seen, aim.by_power);
+        let global = Some(MapUse { wanted, given, seen, by_power, ..MapUse::default() });
+        let used = PhotonUse { global, ..PhotonUse::default() };
         Ok(Self {
             stage: *stage,
             tracer,
@@ -87,7 +83,6 @@ impl<'a, F: Features> ProgressivePhotons<'a, F> {
             paths: tasks * PATHS,
             used,
             photons,
-            chaining,
             sample: None,
             aim,
             scratch,
@@ -101,8 +96,7 @@ impl<F: Features> Renderer for ProgressivePhotons<'_, F> {
     }
 
     fn round(&mut self, crew: &mut Crew) -> Result<(), RenderError> {
-        let Self { stage, tracer, discs, paths, used, photons, chaining, sample: shot_for, aim, scratch } =
-            self;
+        let Self { stage, tracer, discs, paths, used, photons, sample: shot_for, aim, scratch } = self;
         let Stage { scene, bvh, lights, settings, .. } = *stage;
         let emission = &aim.emission;
         let shot = ShootSettings {
@@ -119,14 +113,7 @@ impl<F: Features> Renderer for ProgressivePhotons<'_, F> {
                 *shot_for = None;
                 let shoot =
                     |task: usize, arena: &mut Arena, out: &mut [_]| shooter.run(task, sample, arena, out);
-                let done = match chaining {
-                    None => photons.fill(ROOM, crew, scratch, &shoot)?,
-                    Some(chaining) => {
-                        let of = (&mut *photons, *paths / PATHS, sample);
-                        chaining.fill::<F>(stage, emission, of, crew, scratch)?
-                    }
-                };
-                if !done {
+                if !photons.fill(ROOM, crew, scratch, &shoot)? {
                     return Ok(());
                 }
                 *shot_for = Some(sample);

@@ -31,10 +31,6 @@ pub(super) fn section(run: &Run) -> String {
         words += "Lights, and where they shine, are chosen by what photons of a first look brought to what is visible, a part by \
                   power alone. ";
     }
-    if photons.chained {
-        words += "Half of the light paths are chains, each a little different from the one before, that stay where they leave \
-                  photons which the camera sees. ";
-    }
     for (is_caustic, used, seen) in kinds {
         let Some(used) = used else { continue };
         facts.extend(numbers(is_caustic, &used, seen));
