@@ -455,15 +455,7 @@ const MIRRORED: f32 = 0.9;
 
 #[test]
 fn in_a_stadium_photons_go_to_the_glass_and_their_power_is_right() {
-    photons_go_to_a_mirror_of(1.0);
-}
-
-#[test]
-fn so_they_do_where_it_takes_a_ten_millionth_of_all_directions() {
-    photons_go_to_a_mirror_of(0.005);
-}
-
-fn photons_go_to_a_mirror_of(side: f32) {
+    let side = 1.0;
     let buffers = stadium(side);
     let scene = buffers.scene();
     let level = Level::detect();

@@ -8,7 +8,6 @@ use super::area::Emitter;
 use super::emitted::{emitted_at, mean_luminance, spot_falloff, strength};
 use super::guide::{Guide, Pick};
 use super::sampler::LightSampler;
-use super::target::Target;
 use crate::Rgb;
 use crate::geometry::{Bounds, Frame, MISS, Ray};
 use crate::memory::{Arena, Footprint, OutOfMemory};
@@ -29,9 +28,6 @@ const DIRECTION: u32 = 2;
 
 /// By how much the bounding sphere is larger than the scene, so that rounding puts nothing outside of it.
 const AROUND: f32 = 1.0 + 1e-5;
-
-/// Cosine below which that of a light counts as this: what is aimed along a surface has no power.
-const LEAST_COS: f32 = 1e-12;
 
 /// A photon on its way from a light.
 #[derive(Clone, Copy, Debug)]
@@ -90,7 +86,7 @@ impl<'m> Emission<'m> {
     pub fn emit<N: Numbers>(&self, scene: &Scene, lights: &LightSampler, numbers: &N) -> Option<Emitted> {
         let choice = numbers.single(CHOICE);
         let (mut place, mut direction) = (numbers.pair(PLACE), numbers.pair(DIRECTION));
-        let Pick { light, cell, square, target } = match &self.guide {
+        let Pick { light, cell, square } = match &self.guide {
             None => Pick { light: self.table.sample(choice)?.0, ..Pick::default() },
             Some(guide) => guide.pick(choice)?,
         };
@@ -99,20 +95,16 @@ impl<'m> Emission<'m> {
         *aiming = square.map_or(*aiming, |square| square.at(*aiming));
         let square = square.map(|_| *aiming);
         let emitted = if let Some(emitter) = lights.emitters.get(light) {
-            from_surface(scene, emitter, place, direction, target)
+            from_surface(scene, emitter, place, direction)
         } else if light < lights.near() + lights.distant.len() {
-            self.without_surface(lights.without_surface(scene, light)?, place, direction, target)
+            self.without_surface(lights.without_surface(scene, light)?, place, direction)
         } else {
             let (environment, sky) = (scene.environment.as_ref()?, lights.environment.as_ref()?);
             let (towards, pdf) = sky.sample(environment, Vec3::ZERO, direction)?;
             let radiance = environment.radiance(scene, towards).max(Rgb::ZERO);
-            self.parallel(-towards, radiance / pdf, place, target)
+            self.parallel(-towards, radiance / pdf, place)
         }?;
         let (way, on) = (Vec3::from(emitted.ray.direction), Vec3::from(emitted.ray.origin));
-        // What rounding has put beside its ball would be said not to come from there, and be a spike.
-        if target.is_some_and(|target| self.dense(scene, lights, light, (way, on))(target) <= 0.0) {
-            return None;
-        }
         let power = emitted.power / self.density_with(scene, lights, light, (way, on), square);
         (power.is_finite() && power.max_element() > 0.0).then_some(Emitted {
             power,
@@ -147,59 +139,7 @@ impl<'m> Emission<'m> {
     ) -> f32 {
         let Some(guide) = &self.guide else { return self.table.pdf(light) };
         let square = known.or_else(|| self.square(scene, lights, light, line.0, line.1));
-        let dense = self.dense(scene, lights, light, line);
-        square.map_or(0.0, |square| guide.density(light, square, dense))
-    }
-
-    /// How dense photons of light `light` are that are aimed at a ball, over those that it sends evenly.
-    fn dense(
-        &self,
-        scene: &Scene,
-        lights: &LightSampler,
-        light: usize,
-        (way, on): (Vec3, Vec3),
-    ) -> impl Fn(&Target) -> f32 + use<> {
-        // Of a line from infinitely far the size of the scene is told instead of a place to start at.
-        let size = if light < lights.near() { None } else { Some(self.radius) };
-        let evenly = match (lights.emitters.get(light), lights.without_surface(scene, light)) {
-            (Some(emitter), _) => {
-                let sides = if emitter.is_two_sided() { 2.0 } else { 1.0 };
-                way.dot(Vec3::from(emitter.normal)).abs().max(LEAST_COS) / (PI * sides)
-            }
-            (_, Some(PointLight::Point { .. })) => UNIFORM_SPHERE_PDF,
-            (_, Some(PointLight::Spot { cos_outer, .. })) => uniform_cone_pdf(1.0 - cos_outer),
-            _ => 1.0 / (PI * self.radius * self.radius),
-        };
-        move |target| {
-            let density =
-                size.map_or_else(|| target.per_angle(on, way), |size| target.per_area(on, way, size));
-            density / evenly
-        }
-    }
-
-    /// About the share of the photons of light `light` that leave it towards `target`; zero where it cannot shine there.
-    pub(super) fn filled(&self, scene: &Scene, lights: &LightSampler, light: usize, target: &Target) -> f32 {
-        let mut on = target.center();
-        if let Some(emitter) = lights.emitters.get(light) {
-            on = emitter.place([1.0 / 3.0; 2]).position;
-            if !emitter.is_two_sided() && !target.is_before(on, emitter.normal.into()) {
-                return 0.0;
-            }
-        }
-        match lights.without_surface(scene, light) {
-            Some(PointLight::Point { position, .. }) => on = *position,
-            Some(PointLight::Spot { position, direction, cos_outer, .. }) => {
-                on = *position;
-                let off = (target.center() - on).normalize_or(*direction).dot(*direction);
-                let angle = |cos: f32| libm::acosf(cos.clamp(-1.0, 1.0));
-                if angle(off) > angle(*cos_outer) + angle(1.0 - target.one_minus_cos(on)) {
-                    return 0.0;
-                }
-            }
-            _ => {}
-        }
-        let way = (target.center() - on).normalize_or(Vec3::Z);
-        1.0 / self.dense(scene, lights, light, (way, on))(target).max(1.0)
+        square.map_or(0.0, |square| guide.density(light, square))
     }
 
     /// The numbers that aim a photon of light `light` along unit `way` through `to`.
@@ -263,13 +203,7 @@ impl<'m> Emission<'m> {
         self.square(scene, lights, light, way, target)
     }
 
-    fn without_surface(
-        &self,
-        light: &PointLight,
-        place: [f32; 2],
-        direction: [f32; 2],
-        target: Option<&Target>,
-    ) -> Option<Emitted> {
+    fn without_surface(&self, light: &PointLight, place: [f32; 2], direction: [f32; 2]) -> Option<Emitted> {
         let from = |position, way, power| Emitted {
             ray: Ray::new(position, way),
             power,
@@ -279,41 +213,22 @@ impl<'m> Emission<'m> {
         };
         match *light {
             PointLight::Point { position, intensity } => {
-                let way = match target {
-                    Some(target) => target.towards(position, direction),
-                    None => uniform_sphere(direction),
-                };
-                Some(from(position, way, intensity / UNIFORM_SPHERE_PDF))
+                Some(from(position, uniform_sphere(direction), intensity / UNIFORM_SPHERE_PDF))
             }
             PointLight::Spot { position, direction: axis, intensity, cos_inner, cos_outer } => {
-                let way = match target {
-                    Some(target) => target.towards(position, direction),
-                    None => Frame::from_normal(axis).to_world(uniform_cone(direction, 1.0 - cos_outer)),
-                };
+                let way = Frame::from_normal(axis).to_world(uniform_cone(direction, 1.0 - cos_outer));
                 let falloff = spot_falloff(way.dot(axis), cos_inner, cos_outer);
                 let power = intensity * falloff / uniform_cone_pdf(1.0 - cos_outer);
                 Some(from(position, way, power))
             }
-            PointLight::Directional { direction, irradiance } => {
-                self.parallel(direction, irradiance, place, target)
-            }
+            PointLight::Directional { direction, irradiance } => self.parallel(direction, irradiance, place),
         }
     }
 
-    /// Parallel light of `irradiance`, through a point of the disc that the scene, or `target`, shows to it.
-    fn parallel(
-        &self,
-        direction: Vec3,
-        irradiance: Rgb,
-        place: [f32; 2],
-        target: Option<&Target>,
-    ) -> Option<Emitted> {
+    /// Parallel light of `irradiance`, through a point of the disc that the scene shows to it.
+    fn parallel(&self, direction: Vec3, irradiance: Rgb, place: [f32; 2]) -> Option<Emitted> {
         let frame = Frame::from_normal(direction);
-        let through = match target {
-            Some(target) => frame.to_local(target.across(direction, self.radius, place) - self.center),
-            None => (concentric_disk(place) * self.radius).extend(0.0),
-        };
-        let across = frame.to_world(through.truncate().extend(-self.radius));
+        let across = frame.to_world((concentric_disk(place) * self.radius).extend(-self.radius));
         let power = irradiance * (PI * self.radius * self.radius);
         Some(Emitted {
             ray: Ray::new(self.center + across, direction),
@@ -325,26 +240,18 @@ impl<'m> Emission<'m> {
     }
 }
 
-fn from_surface(
-    scene: &Scene,
-    emitter: &Emitter,
-    [a, b]: [f32; 2],
-    direction: [f32; 2],
-    target: Option<&Target>,
-) -> Option<Emitted> {
-    // Of a two-sided light the first half of the numbers is for its front, unless its target says which side.
+fn from_surface(scene: &Scene, emitter: &Emitter, [a, b]: [f32; 2], direction: [f32; 2]) -> Option<Emitted> {
+    // Of a two-sided light the first half of the numbers is for its front.
     let sides = if emitter.is_two_sided() { 2.0 } else { 1.0 };
-    let mut front = sides * a < 1.0 || sides == 1.0;
+    let front = sides * a < 1.0 || sides == 1.0;
     let a = if sides == 1.0 { a } else { 2.0 * a - if front { 0.0 } else { 1.0 } };
     let at = if emitter.is_pair() { [a, b] } else { uniform_triangle([a, b]).into() };
     let place = emitter.place(at);
     let plane = Vec3::from(emitter.normal);
-    let aimed = target.map(|target| target.towards(place.position, direction));
-    front = aimed.map_or(front, |way| way.dot(plane) > 0.0);
     let radiance = emitted_at(scene, emitter, &place, front);
     let normal = if front { plane } else { -plane };
     let error = emitter.error(place.position);
-    let way = aimed.unwrap_or_else(|| Frame::from_normal(normal).to_world(cosine_hemisphere(direction)));
+    let way = Frame::from_normal(normal).to_world(cosine_hemisphere(direction));
     let ray = Ray::new(place.position + error * normal, way);
     Some(Emitted {
         ray,

@@ -1,14 +1,11 @@
 //! Emission aimed at what throws caustics: the square of random numbers that decides where a photon goes is cut into
 //! cells for each light, and cells are chosen by what they are worth (guided emission in primary sample space, as in
-//! Grittmann et al. 2018). For what is smaller than a cell each light has balls around it as well, at which it aims from
-//! wherever on it a photon starts (`target.rs`): cells and balls overlap, and their densities sum up. What leads nowhere
-//! is still chosen now and then: nothing that shines has no photons.
+//! Grittmann et al. 2018). What leads nowhere is still chosen now and then: nothing that shines has no photons.
 //!
 //! Where photons of all light are wanted there is nothing to aim at: cells are fewer, and what they are worth is learned alone.
 
 use super::emission::Emission;
 use super::sampler::LightSampler;
-use super::target::{self, Target};
 use crate::Rgb;
 use crate::memory::{Arena, Footprint, OutOfMemory};
 use crate::sampling::{AliasTable, ONE_MINUS_EPSILON, Sampler};
@@ -40,29 +37,23 @@ const AIMS: usize = 1 << 17;
 const MOST_AIMS: usize = 1 << 14;
 const FEWEST_AIMS: usize = 2;
 
-/// Balls are of use where one is so many times smaller than a cell.
-const MUCH_SMALLER: f32 = 8.0;
-
 /// Cells around a point that count as aimed at with it.
 const AROUND: isize = 1;
 
-/// Cells by what they are worth. Those of a light follow each other: the squares, then the balls.
+/// Cells by what they are worth. Those of a light follow each other.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Guide<'m> {
     table: AliasTable<'m>,
     side: usize,
-    targets: &'m [Target],
 }
 
 /// Where a photon is to come from and to go.
 #[derive(Default)]
-pub(super) struct Pick<'m> {
+pub(super) struct Pick {
     pub(super) light: usize,
     pub(super) cell: usize,
-    /// Numbers from here,
+    /// Numbers from here.
     pub(super) square: Option<Square>,
-    /// or any that lead there.
-    pub(super) target: Option<&'m Target>,
 }
 
 /// A cell of the square of random numbers.
@@ -80,46 +71,33 @@ impl Square {
     }
 }
 
-impl<'m> Guide<'m> {
+impl Guide<'_> {
     /// A light and one of its cells, by what they are worth.
-    pub(super) fn pick(&self, choice: f32) -> Option<Pick<'m>> {
+    pub(super) fn pick(&self, choice: f32) -> Option<Pick> {
         let (cell, _, _) = self.table.sample(choice)?;
         let (light, own) = (cell / self.cells(), cell % self.cells());
         let side = self.side;
-        Some(match own.checked_sub(side * side) {
-            Some(ball) => Pick { light, cell, square: None, target: Some(self.targets.get(ball)?) },
-            None => {
-                let corner = [(own % side) as f32, (own / side) as f32];
-                Pick { light, cell, square: Some(Square { corner, side: side as f32 }), target: None }
-            }
-        })
+        let corner = [(own % side) as f32, (own / side) as f32];
+        Some(Pick { light, cell, square: Some(Square { corner, side: side as f32 }) })
     }
 
-    /// The density of `light` times that of the numbers that aim its photon: of those of `place`, and of all that aim as
-    /// balls do, where numbers are as dense as `dense` says.
-    pub(super) fn density(&self, light: usize, place: [f32; 2], dense: impl Fn(&Target) -> f32) -> f32 {
-        let (first, squares) = (light * self.cells(), self.side * self.side);
-        let square = self.table.pdf(first + cell(self.side, place)) * squares as f32;
-        let at = |(index, target)| match dense(target) {
-            0.0 => 0.0,
-            dense => self.table.pdf(index) * dense,
-        };
-        square + (first + squares..).zip(self.targets).map(at).sum::<f32>()
+    /// The density of `light` times that of the numbers of `place`, which aim its photon.
+    pub(super) fn density(&self, light: usize, place: [f32; 2]) -> f32 {
+        let cells = self.cells();
+        self.table.pdf(light * cells + cell(self.side, place)) * cells as f32
     }
 
     fn cells(&self) -> usize {
-        self.side * self.side + self.targets.len()
+        self.side * self.side
     }
 }
 
 /// What the cells of all lights are worth, while that is being learned.
 pub struct Worth<'m> {
-    /// Squares: 1 where mirrors and glass are, or by what all of a light is worth, times its power. Balls: how often each is
-    /// aimed at, 1 in all.
+    /// 1 where mirrors and glass are, or by what all of a light is worth, times its power.
     aimed: &'m mut [f32],
     /// What photons were worth.
     learned: &'m mut [f32],
-    targets: &'m [Target],
     side: usize,
     /// Shares of emission: aimed nowhere, and at `aimed`.
     shares: [f32; 2],
@@ -149,7 +127,7 @@ impl<'m> Worth<'m> {
         aimed.fill(0.0);
         learned.fill(0.0);
         let side = side(lights.count(), CELLS_OF_ALL);
-        Ok(Self { aimed, learned, targets: &[], side, shares: [DEFENSIVE_OF_ALL, EVENLY_OF_ALL] })
+        Ok(Self { aimed, learned, side, shares: [DEFENSIVE_OF_ALL, EVENLY_OF_ALL] })
     }
 
     /// A part of the photons of all light comes evenly from each light by what it was worth altogether, as far as that was
@@ -167,8 +145,7 @@ impl<'m> Worth<'m> {
     /// Bytes that [`Worth::aimed`] takes.
     pub fn footprint(lights: &LightSampler) -> Footprint {
         let cells = cells(lights);
-        let targets = targets(lights.count());
-        Footprint::default().slice::<f32>(cells).slice::<f32>(cells).slice::<Target>(targets)
+        Footprint::default().slice::<f32>(cells).slice::<f32>(cells)
     }
 
     /// Aims at everything that mirrors or refracts. `None` where there is nothing such, or no light.
@@ -182,26 +159,10 @@ impl<'m> Worth<'m> {
         arena: &mut Arena<'m>,
     ) -> Result<Option<Self>, OutOfMemory> {
         let side = side(lights.count(), MOST_CELLS);
-        let (mut aimed, mut learned) =
-            (arena.slice::<f32>(cells(lights))?, arena.slice::<f32>(cells(lights))?);
-        let balls = arena.slice::<Target>(targets(lights.count()))?;
+        let cells = cells(lights);
+        let (aimed, learned) = (arena.slice::<f32>(cells)?, arena.slice::<f32>(cells)?);
         aimed.fill(0.0);
         learned.fill(0.0);
-        target::fit(scene, balls);
-        let mut targets: &'m [Target] = balls;
-        let filling = |light: usize, target: &Target| match target.is_any() {
-            true => emission.filled(scene, lights, light, target),
-            false => 0.0,
-        };
-        // Where cells are as small as they are, they do without.
-        let small = |&share: &f32| share > 0.0 && share * (MUCH_SMALLER * (side * side) as f32) < 1.0;
-        let mut all = (0..lights.count()).flat_map(|light| targets.iter().map(move |target| (light, target)));
-        if !all.any(|(light, target)| small(&filling(light, target))) {
-            targets = &[];
-        }
-        let of_light = side * side + targets.len();
-        aimed = aimed.get_mut(..lights.count() * of_light).unwrap_or_default();
-        learned = learned.get_mut(..lights.count() * of_light).unwrap_or_default();
         let lots = lights.count().max(1);
         let points = (AIMS / lots).clamp(FEWEST_AIMS * side * side, MOST_AIMS);
         let mut any = false;
@@ -214,7 +175,7 @@ impl<'m> Worth<'m> {
                 for y in middle[1] - AROUND..=middle[1] + AROUND {
                     for x in middle[0] - AROUND..=middle[0] + AROUND {
                         let inside = (0..side as isize).contains(&x) && (0..side as isize).contains(&y);
-                        let index = light * of_light + (y * side as isize + x).unsigned_abs();
+                        let index = light * side * side + (y * side as isize + x).unsigned_abs();
                         if let Some(cell) = aimed.get_mut(index).filter(|_| inside) {
                             *cell = 1.0;
                         }
@@ -222,22 +183,7 @@ impl<'m> Worth<'m> {
                 }
             }
         });
-        // Of balls, half by the light that they get if nothing is in the way, and half evenly over all that get any: what
-        // matters may be a faint lamp.
-        let (mut power, mut lit) = (0.0, 0.0);
-        for (light, cells) in aimed.chunks_mut(of_light).enumerate() {
-            for (cell, target) in cells.iter_mut().skip(side * side).zip(targets) {
-                *cell = emission.table.pdf(light) * filling(light, target);
-                power += f64::from(*cell);
-                lit += f64::from(u8::from(*cell > 0.0));
-            }
-        }
-        for cells in aimed.chunks_mut(of_light) {
-            for cell in cells.iter_mut().skip(side * side).filter(|cell| **cell > 0.0) {
-                *cell = (0.5 * f64::from(*cell) / power + 0.5 / lit) as f32;
-            }
-        }
-        Ok((any || lit > 0.0).then_some(Self { aimed, learned, targets, side, shares: [DEFENSIVE, AIMED] }))
+        Ok(any.then_some(Self { aimed, learned, side, shares: [DEFENSIVE, AIMED] }))
     }
 
     /// The same for photons that have all of their light, with no paths beside them: as many go by power as of all light, so that
@@ -263,43 +209,30 @@ impl<'m> Worth<'m> {
     /// # Errors
     /// [`OutOfMemory`] where it has less.
     pub fn guide(&self, emission: &Emission<'m>, arena: &mut Arena<'m>) -> Result<Emission<'m>, OutOfMemory> {
-        let Self { side, targets, .. } = *self;
-        let squares = side * side;
-        let of_light = squares + targets.len();
-        let power = |i: usize| match i % of_light < squares {
-            true => emission.table.pdf(i / of_light) / squares as f32,
-            false => 0.0,
-        };
+        let side = self.side;
+        let of_light = side * side;
+        let power = |i: usize| emission.table.pdf(i / of_light) / of_light as f32;
         let sum = |of: &dyn Fn(usize) -> f32| {
             let total = (0..self.aimed.len()).map(|i| f64::from(of(i))).sum::<f64>();
             if total > 0.0 { (1.0 / total) as f32 } else { 0.0 }
         };
         let aimed = |i: usize| self.aimed.get(i).map_or(0.0, |aimed| aimed * power(i));
-        let at_ball = |i: usize| match i % of_light < squares {
-            true => 0.0,
-            false => self.aimed.get(i).copied().unwrap_or(0.0),
-        };
         let learned = |i: usize| self.spread(i);
         let (per_aimed, per_learned) = (sum(&aimed), sum(&learned));
         let [nowhere, aimed_at] = self.shares;
         let seen = if per_learned > 0.0 { 1.0 - nowhere - aimed_at } else { 0.0 };
-        let at = (1.0 - nowhere - seen) / if targets.is_empty() { 1.0 } else { 2.0 };
-        let weight = |i| {
-            nowhere * power(i) + at * (per_aimed * aimed(i) + at_ball(i)) + seen * per_learned * learned(i)
-        };
+        let at = 1.0 - nowhere - seen;
+        let weight = |i| nowhere * power(i) + at * (per_aimed * aimed(i)) + seen * per_learned * learned(i);
         let table = AliasTable::build(self.aimed.len(), weight, arena)?;
-        Ok(Emission { guide: Some(Guide { table, side, targets }), ..*emission })
+        Ok(Emission { guide: Some(Guide { table, side }), ..*emission })
     }
 
     /// What was learned around cell `i`: what few photons have seen may go on beside it.
     fn spread(&self, i: usize) -> f32 {
         let side = self.side;
-        let of_light = side * side + self.targets.len();
+        let of_light = side * side;
         let (first, own) = (i / of_light * of_light, i % of_light);
         let learned = |i: usize| self.learned.get(i).copied().unwrap_or(0.0);
-        if own >= side * side {
-            return learned(i);
-        }
         let (x, y) = (own % side, own / side);
         let mut sum = 0.0;
         for v in y.saturating_sub(1)..(y + 2).min(side) {
@@ -326,14 +259,9 @@ fn side(lights: usize, most: usize) -> usize {
     side
 }
 
-/// Balls, for so many lights.
-fn targets(lights: usize) -> usize {
-    (MOST_CELLS / lights.max(1)).clamp(1, target::MOST)
-}
-
 fn cells(lights: &LightSampler) -> usize {
     let side = side(lights.count(), MOST_CELLS);
-    lights.count() * (side * side + targets(lights.count()))
+    lights.count() * side * side
 }
 
 fn cell(side: usize, place: [f32; 2]) -> usize {

@@ -10,7 +10,6 @@ mod environment_visibility;
 mod etendue;
 mod guide;
 mod sampler;
-mod target;
 mod tree;
 
 pub use emission::{DIMENSIONS as EMISSION_DIMENSIONS, Emission, Emitted};
