@@ -325,16 +325,6 @@ fn where_there_is_no_caustic_the_picture_is_that_without_photons() {
 }
 
 #[test]
-fn a_caustic_that_is_seen_in_a_mirror_alone_has_photons() {
-    let mut buffers = in_a_room(lamp_over_ball(glass(0.0), 0.1));
-    hang_a_mirror(&mut buffers);
-    // The ball is behind the camera.
-    buffers.camera = Camera::look_at(Vec3::new(0.0, 2.0, -1.5), Vec3::new(0.0, 1.5, -2.9), Vec3::Y, 60.0);
-    let seen = path(&buffers.scene(), 4, |_| ());
-    assert!(has_photons(&seen), "{:?}", seen.caustics);
-}
-
-#[test]
 fn no_caustic_leaks_through_a_thin_wall() {
     let mut buffers = bright_and_dark();
     let mirror = buffers.material(Material { surface: metal(0.0), ..Material::GREY });

@@ -10,7 +10,6 @@
 use super::estimator::{Counters, UNLIMITED};
 pub use super::flight::PATHS;
 use super::flight::{Flight, Onward, Pile, State, Vertex, Visitor};
-use super::glimpse::Glimpse;
 use super::merge::{ChainLink, Discs, ends_chain, is_wide_enough};
 use super::shoot::{ShootSettings, is_varnished};
 use crate::bsdf::{BsdfSample, Features};
@@ -52,7 +51,6 @@ pub struct CausticShooter<'a, F> {
     discs: Discs,
     /// Pixels across and down.
     frame: [u32; 2],
-    glimpses: &'a [Glimpse],
     beside_records: bool,
 }
 
@@ -89,12 +87,7 @@ impl<'a, F: Features> CausticShooter<'a, F> {
         let ShootSettings { seed, paths, max_depth, .. } = settings;
         let features = PhantomData;
         let flight = Flight { scene, bvh, lights, emission, seed, paths, max_depth, level, features };
-        Self { flight, discs, frame, glimpses: &[], beside_records: false }
-    }
-
-    /// The same, which knows what is seen in mirrors when it looks.
-    pub fn with_glimpses(self, glimpses: &'a [Glimpse]) -> Self {
-        Self { glimpses, ..self }
+        Self { flight, discs, frame, beside_records: false }
     }
 
     /// The same, of photons for [`Merging::beside_records`](super::Merging::beside_records), if so.
@@ -155,11 +148,10 @@ impl<'a, F: Features> CausticShooter<'a, F> {
             if let Some(find) = out.get_mut((state.number - first) as usize) {
                 let place = photon.position();
                 let power = luminance(photon.power());
-                let (block, travelled) = self.shown(place, photon.normal());
-                let radius = self.discs.radius_after(travelled, place);
+                let radius = self.discs.radius(place);
                 let pixels = 1.0 / (radius * radius);
                 find.cell = state.cell;
-                let Some(block) = block else {
+                let Some(block) = self.block(place) else {
                     find.worth += power * pixels * INDIRECT;
                     return;
                 };
@@ -174,18 +166,8 @@ impl<'a, F: Features> CausticShooter<'a, F> {
         self.flight.follow(task, map, scratch, &mut Weigher { shooter: self, leave, goes_on: false })
     }
 
-    /// In which block of the picture light at `place` shows, if it does, and how far from the eye, where that is by
-    /// mirrors.
-    fn shown(&self, place: Vec3, normal: Vec3) -> (Option<u32>, f32) {
-        let glimpse = || self.glimpses.iter().find(|glimpse| glimpse.shows(place, normal));
-        match self.block(place) {
-            None => glimpse().map_or((None, 0.0), |glimpse| (Some(glimpse.block), glimpse.travelled)),
-            block => (block, 0.0),
-        }
-    }
-
-    /// In which block of the picture light at `place` shows by itself; `None` where it is outside, or hidden from the eye: some
-    /// of it comes back.
+    /// In which block of the picture light at `place` shows, straight or through glass; `None` where it is outside, or
+    /// hidden from the eye: some of it comes back.
     fn block(&self, place: Vec3) -> Option<u32> {
         let Flight { scene, bvh, level, .. } = self.flight;
         let camera = &scene.camera;

@@ -21,7 +21,7 @@ use halflight_core::light::{Emission, LightSampler, Worth};
 use halflight_core::memory::{Arena, Footprint, Line};
 use halflight_core::photon::Photons;
 use halflight_core::transport::caustics::{CausticShooter, Find, PATHS, ROOM};
-use halflight_core::transport::{Discs, GLIMPSES, Glimpse, Merging, PathTracer, path::WAVE};
+use halflight_core::transport::{Discs, Merging, PathTracer, path::WAVE};
 
 /// Light paths of a glance, which tells where there is next to nothing to find, and of each look after it.
 const GLANCE: usize = 4 * PATHS;
@@ -92,10 +92,7 @@ pub(super) fn look_first<'l, F: Features>(
     let Stage { scene, bvh, lights, settings, .. } = *stage;
     let discs = stage.discs();
     let plain = Emission::build(scene, lights, &bvh.bounds(), arena)?;
-    let mut glimpses = vec![Glimpse::default(); GLIMPSES];
-    let (seen, frame) = ((scene, bvh, settings.level), [settings.width, settings.height]);
-    let found = Glimpse::find::<F>(seen, frame, settings.seed, &mut glimpses);
-    let eye = Eye { discs, glimpses: &glimpses[..found], beside_records };
+    let eye = Eye { discs, beside_records };
     if !glance::<F>(stage, paths, (&plain, &eye), &mut arena.scratch())?
         .is_some_and(|glance| glance.may_pay())
     {
@@ -166,9 +163,8 @@ pub(super) fn with<F: Features, T>(
 }
 
 /// How photons are seen.
-struct Eye<'g> {
+struct Eye {
     discs: Discs,
-    glimpses: &'g [Glimpse],
     /// Beside a cache.
     beside_records: bool,
 }
@@ -216,28 +212,21 @@ fn look<F: Features>(
     stage: &Stage,
     paths: &mut Paths<F>,
     emission: &Emission,
-    &Eye { discs, glimpses, beside_records }: &Eye,
+    eye: &Eye,
     (count, map): (usize, u32),
 ) -> Result<Vec<Find>, RenderError> {
-    look_with::<F>(
-        stage,
-        &mut paths.scratch,
-        emission,
-        &Eye { discs, glimpses, beside_records },
-        (count, map),
-    )
+    look_with::<F>(stage, &mut paths.scratch, emission, eye, (count, map))
 }
 
 fn look_with<F: Features>(
     stage: &Stage,
     scratch: &mut [Vec<Line>],
     emission: &Emission,
-    &Eye { discs, glimpses, beside_records }: &Eye,
+    &Eye { discs, beside_records }: &Eye,
     (count, map): (usize, u32),
 ) -> Result<Vec<Find>, RenderError> {
     let (shooter, _) = shooter::<F>(stage, emission, count, (discs, 0), beside_records);
     let mut finds = vec![Find::default(); count];
-    let shooter = shooter.with_glimpses(glimpses);
     let look = |task: usize, arena: &mut Arena, out: &mut [Find]| shooter.look(task, map, arena, out);
     // Where the render is over a part of them has to do.
     stage.workers.look(&mut finds, PATHS, scratch, &look)?;
@@ -260,10 +249,7 @@ pub(in crate::drive) fn unseen<F: Features>(
     let mut lines = memory.take(JUDGE, emission)?;
     let mut arena = Arena::new(bytemuck::cast_slice_mut(&mut lines));
     let plain = Emission::build(scene, lights, &bvh.bounds(), &mut arena)?;
-    let mut glimpses = vec![Glimpse::default(); GLIMPSES];
-    let (sight, frame) = ((scene, bvh, settings.level), [settings.width, settings.height]);
-    let found = Glimpse::find::<F>(sight, frame, settings.seed, &mut glimpses);
-    let eye = Eye { discs: stage.discs(), glimpses: &glimpses[..found], beside_records: false };
+    let eye = Eye { discs: stage.discs(), beside_records: false };
     let finds = look_with::<F>(stage, scratch, &plain, &eye, (LOOK, JUDGE_MAP))?;
     let pixels = f64::from(settings.width) * f64::from(settings.height);
     let missing = missing(&finds, FIRST_RADIUS, pixels, (samples, FEWEST_HITS));
