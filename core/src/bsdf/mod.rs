@@ -9,6 +9,7 @@
 
 mod albedo;
 mod base;
+mod class;
 mod coated;
 mod conductor;
 mod dielectric;

@@ -6,10 +6,9 @@
 
 use super::emission::Emission;
 use super::sampler::LightSampler;
-use crate::Rgb;
 use crate::memory::{Arena, Footprint, OutOfMemory};
 use crate::sampling::{AliasTable, ONE_MINUS_EPSILON, Sampler};
-use crate::scene::{Material, Scene, Surface};
+use crate::scene::{Material, Scene};
 use glam::Vec3;
 
 /// Cells along a side of the square of a light, at most, and of all squares together where there are many lights.
@@ -269,23 +268,6 @@ fn cell(side: usize, place: [f32; 2]) -> usize {
     y * side + x
 }
 
-/// Whether light may leave `material` for few directions only, as photons of caustics do.
-pub(crate) fn throws(material: &Material) -> bool {
-    match &material.surface {
-        Surface::Diffuse { .. } => false,
-        Surface::Mirror { .. } | Surface::Dielectric { .. } | Surface::Conductor { .. } => true,
-        Surface::Glossy { base, metallic, .. } => {
-            // What has no base to speak of mirrors, as far as it can be told without its textures.
-            let base =
-                if metallic.texture.is_some() { Rgb::ZERO } else { base.value * (1.0 - metallic.value) };
-            material.surface.may_be_smooth() || base.max_element() < LEAST_BASE
-        }
-    }
-}
-
-/// Below this a base may be black to the paths (`transport/merge.rs`), with a margin for what its textures say.
-const LEAST_BASE: f32 = 0.05;
-
 /// Shows about `count` points, evenly spread over all surfaces that throw caustics.
 fn throwing_points(scene: &Scene, count: usize, mut show: impl FnMut(u32, Vec3)) {
     let area = |index: u32| {
@@ -295,7 +277,9 @@ fn throwing_points(scene: &Scene, count: usize, mut show: impl FnMut(u32, Vec3))
     };
     let throwing = |index: &u32| {
         let triangle = scene.mesh.triangles.get(*index as usize);
-        triangle.and_then(|t| scene.materials.get(t.material as usize)).is_some_and(throws)
+        triangle
+            .and_then(|t| scene.materials.get(t.material as usize))
+            .is_some_and(Material::may_pass_caustics)
     };
     let triangles = || (0..scene.mesh.triangles.len() as u32).filter(throwing);
     let step = triangles().map(area).sum::<f64>() / count as f64;

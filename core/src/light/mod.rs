@@ -20,7 +20,6 @@ pub use environment_visibility::{
 };
 pub(crate) use etendue::Found;
 pub use guide::Worth;
-pub(crate) use guide::throws;
 pub use sampler::{LightPoint, LightSample, LightSampler};
 
 use crate::Rgb;

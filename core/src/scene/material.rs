@@ -5,10 +5,6 @@ use super::{ColorInput, ScalarInput, Scene, TextureId};
 use crate::Rgb;
 use glam::Vec2;
 
-/// Surfaces below this alpha are smooth. A half-vector of two f32 directions has an error of about 1e-7:
-/// here still a thousandth of the lobe's width.
-pub(crate) const SMOOTH_ALPHA: f32 = 1e-4;
-
 /// How the surface scatters. `roughness` is GGX alpha in 0 … 1; a textured roughness holds sqrt(alpha),
 /// so its texel is squared after the product.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -53,35 +49,6 @@ pub enum Surface {
         /// sqrt(alpha).
         roughness: ScalarInput,
     },
-}
-
-impl Surface {
-    /// Whether it may be diffuse alone, somewhere.
-    pub fn may_be_diffuse(&self) -> bool {
-        matches!(self, Surface::Diffuse { .. } | Surface::Glossy { ior: None, .. })
-    }
-
-    /// Whether it may reflect or refract into one direction only, somewhere.
-    pub fn may_be_smooth(&self) -> bool {
-        match self {
-            Surface::Diffuse { .. } => false,
-            Surface::Mirror { .. } | Surface::Dielectric { .. } => true,
-            Surface::Conductor { roughness, .. } | Surface::Glossy { roughness, .. } => {
-                roughness.texture.is_some() || roughness.value * roughness.value < SMOOTH_ALPHA
-            }
-        }
-    }
-
-    /// Whether it may scatter, somewhere, and yet not be diffuse alone.
-    pub fn may_be_rough(&self) -> bool {
-        match self {
-            Surface::Diffuse { .. } | Surface::Mirror { .. } => false,
-            Surface::Glossy { .. } => true,
-            Surface::Conductor { roughness, .. } | Surface::Dielectric { roughness, .. } => {
-                roughness.texture.is_some() || roughness.value * roughness.value >= SMOOTH_ALPHA
-            }
-        }
-    }
 }
 
 /// A map that bends the shading normal.

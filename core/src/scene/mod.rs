@@ -2,6 +2,7 @@
 //! A scene owns nothing; the app's buffers or a microcontroller's flash do.
 
 mod camera;
+mod class;
 mod framing;
 mod input;
 mod light;
@@ -11,9 +12,9 @@ mod surface;
 mod texture;
 
 pub use camera::{Camera, Projection, StartPlane};
+pub(crate) use class::{CAUSTIC_ALPHA, SMOOTH_ALPHA};
 pub use input::{ColorInput, ScalarInput};
 pub use light::{Environment, PointLight};
-pub(crate) use material::SMOOTH_ALPHA;
 pub use material::{Material, NormalMap, Surface};
 pub use mesh::{Mesh, Triangle};
 pub use surface::SurfacePoint;

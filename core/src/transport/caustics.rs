@@ -10,12 +10,12 @@
 use super::estimator::{Counters, UNLIMITED};
 pub use super::flight::PATHS;
 use super::flight::{Flight, Onward, Pile, State, Vertex, Visitor};
-use super::merge::{ChainLink, Discs, ends_chain, is_wide_enough};
-use super::shoot::{ShootSettings, is_varnished};
+use super::merge::{ChainLink, Discs, is_wide_enough};
+use super::shoot::ShootSettings;
 use crate::bsdf::{BsdfSample, Features};
 use crate::bvh::Bvh;
 use crate::geometry::Ray;
-use crate::light::{Emission, Found, LightSampler, luminance, throws};
+use crate::light::{Emission, Found, LightSampler, luminance};
 use crate::memory::{Arena, Footprint, OutOfMemory};
 use crate::photon::Photon;
 use crate::scene::{Scene, SurfacePoint};
@@ -188,7 +188,7 @@ impl<'a, F: Features> CausticShooter<'a, F> {
                 return Some((y as u32).min(BLOCKS - 1) * BLOCKS + (x as u32).min(BLOCKS - 1));
             };
             crossed += 1;
-            if crossed > MOST_GLASS || !throws(point.material) {
+            if crossed > MOST_GLASS || !point.material.may_pass_caustics() {
                 return None;
             }
             ray = point.spawn_to(camera.eye);
@@ -298,7 +298,7 @@ impl<F: Features, L: FnMut(&State, Photon, Share, &mut Counters)> Visitor for We
 
     #[inline]
     fn meet(&mut self, state: &State, vertex: &Vertex, counters: &mut Counters) -> Option<Onward> {
-        let ends = ends_chain(vertex.bsdf);
+        let ends = vertex.bsdf.is_receiver();
         let is_known = self.shooter.beside_records && state.mirrored == 0;
         let leaves = ends && state.segments > 1 && !is_known;
         if leaves && self.is_merged(state, vertex) {
@@ -313,7 +313,7 @@ impl<F: Features, L: FnMut(&State, Photon, Share, &mut Counters)> Visitor for We
     /// Straight from a light no photon goes on by a rough coat: paths find that light.
     #[inline]
     fn is_apart(&self, state: &State, vertex: &Vertex) -> bool {
-        state.segments > 1 && is_varnished(vertex.bsdf, !self.shooter.flight.lights.have_deltas())
+        state.segments > 1 && vertex.bsdf.is_varnished(!self.shooter.flight.lights.have_deltas())
     }
 
     /// Takes note of what a surface does with the densities of both ways, at the first of a path also of how the path
@@ -327,7 +327,7 @@ impl<F: Features, L: FnMut(&State, Photon, Share, &mut Counters)> Visitor for We
         (sample, is_narrow): (&BsdfSample, bool),
     ) {
         state.mirrored = vertex.bsdf.is_delta().into();
-        if ends_chain(vertex.bsdf) && !is_narrow {
+        if vertex.bsdf.is_receiver() && !is_narrow {
             if state.others != SCATTERED {
                 // What goes on is what was left.
                 let kept = self.share(state, vertex).kept(vertex).unwrap_or(0.0);

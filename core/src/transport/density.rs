@@ -1,7 +1,6 @@
 //! Paths that end where photons lie: reflected light by the density of photons, direct light by shadow rays.
 
 use super::merge::Discs;
-use super::shoot::{gathers_photons, is_varnished};
 use crate::bsdf::{Bsdf, Features};
 use crate::bvh::Bvh;
 use crate::bvh::clearance::{Clearance, ClearanceQuery};
@@ -79,7 +78,7 @@ impl<'a> PhotonLight<'a> {
         (wo, travelled): (Vec3, f32),
         turns: f32,
     ) -> Option<Gathered> {
-        if !gathers_photons(bsdf, apart) {
+        if !bsdf.gathers_photons(apart) {
             return None;
         }
         let disc = Disc {
@@ -144,7 +143,7 @@ pub(super) fn reflected<F: Features>(
             _ => Gathered::of(map.gather_within(level, disc, &fence, &Uniform(response)), enough, Rgb::ONE),
         };
     }
-    let seen = bsdf.seen_apart::<F>(wo, is_varnished(bsdf, apart));
+    let seen = bsdf.seen_apart::<F>(wo, bsdf.is_varnished(apart));
     // A photon's power has met the triangle: the cosine is in it already, and that of the triangle's normal.
     let response = |from: Vec3| {
         let wi = point.frame.to_local(from);

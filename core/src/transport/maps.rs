@@ -15,7 +15,6 @@
 use super::PhotonLight;
 use super::density::{Gathered, Light, fence, reflected};
 use super::estimator::Counters;
-use super::shoot::{focuses, gathers_photons, may_focus};
 use super::wave::Share;
 use crate::bsdf::{Bsdf, Features};
 use crate::bvh::Bvh;
@@ -24,7 +23,7 @@ use crate::light::luminance;
 use crate::memory::{Arena, Footprint, Line, OutOfMemory};
 use crate::photon::{ALIKE, Disc, FLATNESS, Falloff, Neighbours, Photon, PhotonMap, Uniform};
 use crate::sampling::mix;
-use crate::scene::{Scene, SurfacePoint};
+use crate::scene::{Material, Scene, SurfacePoint};
 use crate::{Level, Rgb};
 use core::f32::consts::{FRAC_1_PI, SQRT_2};
 use glam::Vec3;
@@ -288,9 +287,9 @@ impl PhotonMaps<'_> {
         // What was scattered by something with a diffuse part stays so.
         let rest = if came.gathers() { Share::GATHERED } else { Share::ALL };
         let all = Said { next: rest, mirrored: rest, ..Said::default() };
-        if !gathers_photons(bsdf, apart) {
+        if !bsdf.gathers_photons(apart) {
             return match came {
-                Share::NO_CAUSTIC | Share::BEHIND_MIRROR if focuses(bsdf) => Said {
+                Share::NO_CAUSTIC | Share::BEHIND_MIRROR if bsdf.is_caustic_caster() => Said {
                     is_lit: true,
                     next: Share::BEHIND_MIRROR,
                     mirrored: Share::BEHIND_MIRROR,
@@ -322,7 +321,7 @@ impl PhotonMaps<'_> {
 
 /// Whether something in `scene` may make caustics.
 pub fn may_have_caustics(scene: &Scene) -> bool {
-    scene.materials.iter().any(may_focus)
+    scene.materials.iter().any(Material::may_be_caustic_caster)
 }
 
 #[cfg(test)]

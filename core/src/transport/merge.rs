@@ -37,7 +37,6 @@
 //! which mirrors and glass lead from one whose photons know them.
 
 use super::density::{Gathered, Light, reflected};
-use super::shoot::{has_base, holds_photons};
 use super::wave::{Merged, Path};
 use crate::bsdf::{Bsdf, Features};
 use crate::bvh::Bvh;
@@ -58,12 +57,6 @@ const STANDS_ON: f32 = 1e-6;
 
 /// Rays across and down that look for the nearest.
 const GLANCES: u32 = 32;
-
-/// Whether light that `bsdf` does not mirror is found by photons: it is a rough surface.
-#[inline]
-pub(super) fn ends_chain(bsdf: &Bsdf) -> bool {
-    matches!(bsdf, Bsdf::Diffuse(_)) || holds_photons(bsdf) && has_base(bsdf)
-}
 
 /// The least that the radius of a disc may be, times that of the disc from where something rough throws the light.
 const SMALLEST: f32 = 0.5;
@@ -245,7 +238,7 @@ impl<'a> Merging<'a> {
         turns: impl FnOnce() -> f32,
     ) -> Gathered {
         let map = self.maps[sample as usize & 1];
-        if map.is_empty() || !ends_chain(bsdf) {
+        if map.is_empty() || !bsdf.is_receiver() {
             return Gathered::default();
         }
         let disc = Disc {

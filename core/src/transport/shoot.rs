@@ -14,12 +14,12 @@ use super::estimator::Counters;
 pub use super::flight::PATHS;
 use super::flight::{Flight, Onward, Pile, State, Vertex, Visitor};
 use super::sight::Sight;
-use crate::bsdf::{Bsdf, BsdfSample, Features};
+use crate::bsdf::{BsdfSample, Features};
 use crate::bvh::Bvh;
 use crate::light::{Emission, LightSampler, luminance};
 use crate::memory::{Arena, Footprint, OutOfMemory};
 use crate::photon::Photon;
-use crate::scene::{Material, Scene, Surface};
+use crate::scene::Scene;
 use crate::{Level, Rgb};
 use core::marker::PhantomData;
 use glam::Vec3;
@@ -29,62 +29,6 @@ pub const ROOM: usize = 6 * PATHS;
 
 /// Probability with which a path goes on, at most, where it leaves a photon.
 pub(super) const MOST: f32 = 0.8;
-
-/// Whether photons are left on such a surface, and light is gathered from it: it has a diffuse part. What is only
-/// glossy reflects too little of a disc of photons to see much of them; paths from the eye find its light.
-#[inline]
-pub(super) fn holds_photons(bsdf: &Bsdf) -> bool {
-    matches!(bsdf, Bsdf::Diffuse(_) | Bsdf::Glossy(_) | Bsdf::Plastic(_)) && !bsdf.is_delta()
-}
-
-/// Of a coated surface, the colour of the base from which on it is a rough one. Below, it mirrors and little else, and
-/// would make spikes of photons.
-const BASE: f32 = 0.02;
-
-/// Whether its base is that of a rough surface.
-#[inline]
-pub(super) fn has_base(bsdf: &Bsdf) -> bool {
-    matches!(bsdf, Bsdf::Diffuse(_)) || bsdf.base().max_element() >= BASE
-}
-
-/// Whether photons are known by the base of `bsdf` alone, and paths go on through its coat as by a rough metal: there a
-/// photon would be a spike. `apart` says whether that is possible, as it is where paths may meet each light by chance.
-#[inline]
-pub(super) fn is_varnished(bsdf: &Bsdf, apart: bool) -> bool {
-    apart && bsdf.has_rough_coat() && bsdf.has_narrow_coat() && has_base(bsdf)
-}
-
-/// Whether light is gathered from photons on such a surface: it has a base, or nothing narrow.
-#[inline]
-pub(super) fn gathers_photons(bsdf: &Bsdf, apart: bool) -> bool {
-    holds_photons(bsdf) && (!apart || has_base(bsdf) || !bsdf.has_narrow_coat())
-}
-
-/// Smooth enough to throw light onto something else in a pattern that gathering would not find: largest GGX alpha.
-const FOCUSING: f32 = 0.1;
-
-/// Whether such a surface makes caustics: it mirrors or refracts, and has no diffuse part.
-#[inline]
-pub(super) fn focuses(bsdf: &Bsdf) -> bool {
-    match bsdf {
-        Bsdf::Mirror(_) | Bsdf::Dielectric(_) => true,
-        Bsdf::Conductor(conductor) => conductor.alpha < FOCUSING,
-        Bsdf::RoughDielectric(glass) => glass.alpha < FOCUSING,
-        Bsdf::Diffuse(_) | Bsdf::Glossy(_) | Bsdf::Plastic(_) => bsdf.is_delta(),
-    }
-}
-
-/// Whether `material` may be such a surface somewhere.
-pub(super) fn may_focus(material: &Material) -> bool {
-    match &material.surface {
-        Surface::Diffuse { .. } => false,
-        Surface::Mirror { .. } => true,
-        Surface::Dielectric { roughness, .. } | Surface::Conductor { roughness, .. } => {
-            roughness.texture.is_some() || roughness.value * roughness.value < FOCUSING
-        }
-        Surface::Glossy { .. } => material.surface.may_be_smooth(),
-    }
-}
 
 /// Which photons are left.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -104,7 +48,7 @@ impl Keep {
     /// Whether a path leaves a photon where it met a surface.
     #[inline]
     pub(super) fn leaves(self, state: &State, vertex: &Vertex) -> bool {
-        holds_photons(vertex.bsdf)
+        vertex.bsdf.stores_photons()
             && match self {
                 Keep::All => true,
                 Keep::Scattered => state.segments > 1 && state.mirrored == 0,
@@ -115,7 +59,8 @@ impl Keep {
     /// How it goes on from there.
     #[inline]
     pub(super) fn onward(self, vertex: &Vertex, leaves: bool) -> Option<Onward> {
-        let ends = self == Keep::Caustic && (holds_photons(vertex.bsdf) || !focuses(vertex.bsdf));
+        let ends =
+            self == Keep::Caustic && (vertex.bsdf.stores_photons() || !vertex.bsdf.is_caustic_caster());
         (!ends).then_some(Onward { most: if leaves { MOST } else { 1.0 }, mirrored: false })
     }
 }

@@ -5,7 +5,6 @@
 use super::context::{SceneContext, Segment};
 use super::estimator::{Counters, dimension};
 use super::merge::Discs;
-use super::shoot::gathers_photons;
 use crate::bsdf::{Bsdf, Features};
 use crate::memory::Footprint;
 use crate::photon::{Disc, Falloff, Photon, PhotonMap, Photons, Uniform};
@@ -98,7 +97,7 @@ impl Raster {
             let (hit, point) = context.next_surface(&mut segment, opacity, counters)?;
             let direction = Vec3::from(segment.ray.direction).normalize_or_zero();
             let bsdf = Bsdf::at::<F>(context.scene, point.material, point.uv, point.front);
-            if gathers_photons(&bsdf, true) && !mem::take(&mut gathers) {
+            if bsdf.gathers_photons(true) && !mem::take(&mut gathers) {
                 return Some(Photon::new(point.position, -direction, point.geometric_normal, Rgb::ZERO));
             }
             let [u, v] = dimension::scattering(&sampler, segments);

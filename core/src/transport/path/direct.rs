@@ -9,7 +9,7 @@ use crate::geometry::Ray;
 use crate::light::LightSample;
 use crate::transport::arrivals::TO_ENVIRONMENT;
 use crate::transport::estimator::{dimension, environment_heuristic, power_heuristic};
-use crate::transport::merge::{ChainLink, ends_chain};
+use crate::transport::merge::ChainLink;
 use crate::transport::reuse::Exchange;
 use crate::transport::shadow::{Shadows, shadow_ray};
 use crate::transport::wave::Path;
@@ -72,7 +72,7 @@ impl<F: Features> PathTracer<'_, F> {
         }
         let ([(mut f, pdf), coat], is_rough) = match apart {
             true => (bsdf.evaluate_apart::<F>(wo, wi), true),
-            false => ([bsdf.evaluate::<F>(wo, wi), (Rgb::ZERO, 0.0)], ends_chain(bsdf)),
+            false => ([bsdf.evaluate::<F>(wo, wi), (Rgb::ZERO, 0.0)], bsdf.is_receiver()),
         };
         if apart && known.said.is_lit {
             f = Rgb::ZERO;

@@ -63,7 +63,7 @@ pub struct PathTracer<'a, F> {
     pub(super) level: Level,
     /// Some surfaces let a part of the light through, so that a shadow ray may go on behind a hit.
     pub(super) has_cutouts: bool,
-    /// Photons are known by the bases of narrow coats alone (`shoot::is_varnished`).
+    /// Photons are known by the bases of narrow coats alone (`Bsdf::is_varnished`).
     apart: bool,
     /// Some surfaces may reflect or refract into one direction only.
     pub(super) has_mirrors: bool,

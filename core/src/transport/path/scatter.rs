@@ -7,7 +7,7 @@ use crate::Rgb;
 use crate::bsdf::{Bsdf, BsdfSample, Features};
 use crate::geometry::Ray;
 use crate::transport::estimator::{Counters, dimension, is_cut, survival};
-use crate::transport::merge::{ChainLink, ends_chain};
+use crate::transport::merge::ChainLink;
 use crate::transport::reuse::Exchange;
 use crate::transport::wave::{Merged, Path, Share};
 
@@ -97,7 +97,7 @@ impl<F: Features> PathTracer<'_, F> {
         let Vertex { point, ref bsdf, wo, apart, .. } = *vertex;
         let coat_alone = apart && is_narrow;
         let there = ChainLink { point, bsdf, near: wo, far: sample.direction, coat_alone };
-        let is_rough = ends_chain(bsdf) && !is_narrow;
+        let is_rough = bsdf.is_receiver() && !is_narrow;
         if is_rough {
             (path.merged, path.disc) = (merged, merging.radius(point.position));
         }

@@ -12,7 +12,6 @@ use crate::transport::estimator::{Counters, dimension, environment_heuristic, po
 use crate::transport::maps::Said;
 use crate::transport::reuse::Exchange;
 use crate::transport::shadow::Shadows;
-use crate::transport::shoot::is_varnished;
 use crate::transport::wave::{Merged, Path, Share};
 use core::f32::consts::FRAC_1_PI;
 use glam::Vec3;
@@ -119,7 +118,7 @@ impl<'a, F: Features> PathTracer<'a, F> {
             distance,
             travelled: path.travelled + distance,
             throughput: path.throughput.into(),
-            apart: F::GLOSSY && has_photons && is_varnished(&bsdf, self.apart),
+            apart: F::GLOSSY && has_photons && bsdf.is_varnished(self.apart),
             bsdf,
         };
         let known = self.known(path, exchange, &vertex, came);
