@@ -1,6 +1,6 @@
-//! Light as it leaves: all lights together as the source of photons. One is chosen by its power, a place on it and a
-//! direction by what it emits there; what a photon carries is the power over the density of all that, so that the
-//! powers of photons sum up to that of the lights.
+//! Light as it leaves: all lights together as the source of photons. One is chosen by its power, a place on
+//! it and a direction by what it emits there; what a photon carries is the power over the density of all
+//! that, so that the powers of photons sum up to that of the lights.
 //!
 //! Light from infinitely far is sent through the disc that the scene's bounding sphere shows to it.
 
@@ -114,9 +114,9 @@ impl<'m> Emission<'m> {
         })
     }
 
-    /// The density of light `light`, in the order of the table, times that of the numbers that aim its photon; 1 / area
-    /// and the like are not in it. The photon goes along unit `way` from the place `on` of the light, or comes through
-    /// `on` from infinitely far.
+    /// The density of light `light`, in the order of the table, times that of the numbers that aim its
+    /// photon; 1 / area and the like are not in it. The photon goes along unit `way` from the place `on` of
+    /// the light, or comes through `on` from infinitely far.
     pub(super) fn density(
         &self,
         scene: &Scene,
@@ -175,8 +175,8 @@ impl<'m> Emission<'m> {
         }
     }
 
-    /// The numbers that aim a photon of light `light` at `target`, from anywhere on it; `None` where it does not shine
-    /// there.
+    /// The numbers that aim a photon of light `light` at `target`, from anywhere on it; `None` where it does
+    /// not shine there.
     pub(super) fn aim(
         &self,
         scene: &Scene,

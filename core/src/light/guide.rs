@@ -1,8 +1,10 @@
-//! Emission aimed at what throws caustics: the square of random numbers that decides where a photon goes is cut into
-//! cells for each light, and cells are chosen by what they are worth (guided emission in primary sample space, as in
-//! Grittmann et al. 2018). What leads nowhere is still chosen now and then: nothing that shines has no photons.
+//! Emission aimed at what throws caustics: the square of random numbers that decides where a photon goes is
+//! cut into cells for each light, and cells are chosen by what they are worth (guided emission in primary
+//! sample space, as in Grittmann et al. 2018). What leads nowhere is still chosen now and then: nothing that
+//! shines has no photons.
 //!
-//! Where photons of all light are wanted there is nothing to aim at: cells are fewer, and what they are worth is learned alone.
+//! Where photons of all light are wanted there is nothing to aim at: cells are fewer, and what they are worth
+//! is learned alone.
 
 use super::emission::Emission;
 use super::sampler::LightSampler;
@@ -11,16 +13,18 @@ use crate::sampling::{AliasTable, ONE_MINUS_EPSILON, Sampler};
 use crate::scene::{Material, Scene};
 use glam::Vec3;
 
-/// Cells along a side of the square of a light, at most, and of all squares together where there are many lights.
+/// Cells along a side of the square of a light, at most, and of all squares together where there are many
+/// lights.
 const MOST_SIDE: usize = 64;
 const MOST_CELLS: usize = 1 << 16;
 
-/// Shares of emission: aimed nowhere; where mirrors and glass are; the rest where photons were seen to be useful.
+/// Shares of emission: aimed nowhere; where mirrors and glass are; the rest where photons were seen to be
+/// useful.
 const DEFENSIVE: f32 = 0.1;
 const AIMED: f32 = 0.2;
 
-/// The same where photons of all light are wanted: by power, so that none has more than four times that of the others; evenly from
-/// lights by what they are worth.
+/// The same where photons of all light are wanted: by power, so that none has more than four times that of
+/// the others; evenly from lights by what they are worth.
 const DEFENSIVE_OF_ALL: f32 = 0.25;
 const EVENLY_OF_ALL: f32 = 0.25;
 
@@ -30,8 +34,8 @@ const CELLS_OF_ALL: usize = 1 << 10;
 /// What a cell gets of what each of its neighbours was worth.
 const BESIDE: f32 = 0.125;
 
-/// Points on mirrors and glass that are aimed at, over all lights together, at most for each light, and at least for each
-/// of its cells: of thousands of lights each has a few cells only.
+/// Points on mirrors and glass that are aimed at, over all lights together, at most for each light, and at
+/// least for each of its cells: of thousands of lights each has a few cells only.
 const AIMS: usize = 1 << 17;
 const MOST_AIMS: usize = 1 << 14;
 const FEWEST_AIMS: usize = 2;
@@ -129,8 +133,8 @@ impl<'m> Worth<'m> {
         Ok(Self { aimed, learned, side, shares: [DEFENSIVE_OF_ALL, EVENLY_OF_ALL] })
     }
 
-    /// A part of the photons of all light comes evenly from each light by what it was worth altogether, as far as that was
-    /// learned: few have looked.
+    /// A part of the photons of all light comes evenly from each light by what it was worth altogether, as
+    /// far as that was learned: few have looked.
     pub fn even_out(&mut self, emission: &Emission) {
         let of_light = (self.side * self.side).max(1);
         let lights = self.aimed.chunks_mut(of_light).zip(self.learned.chunks(of_light));
@@ -185,8 +189,8 @@ impl<'m> Worth<'m> {
         Ok(any.then_some(Self { aimed, learned, side, shares: [DEFENSIVE, AIMED] }))
     }
 
-    /// The same for photons that have all of their light, with no paths beside them: as many go by power as of all light, so that
-    /// none has more than four times that of the others.
+    /// The same for photons that have all of their light, with no paths beside them: as many go by power as
+    /// of all light, so that none has more than four times that of the others.
     pub fn alone(self) -> Self {
         Self { shares: [DEFENSIVE_OF_ALL, AIMED], ..self }
     }

@@ -1,5 +1,6 @@
 //! Where random numbers come from and what they are bent into: Owen-scrambled Sobol' streams, a hash for
-//! decisions outside them, mutations of primary sample space, warps of the unit square, and discrete distributions in arena memory.
+//! decisions outside them, mutations of primary sample space, warps of the unit square, and discrete
+//! distributions in arena memory.
 
 mod alias;
 mod distribution;

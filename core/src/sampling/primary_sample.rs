@@ -1,12 +1,12 @@
-//! Mutations of primary sample space (Kelemen et al. 2002): a light path is a point of the unit cube, the random numbers
-//! that make it, and a Markov chain moves that point.
+//! Mutations of primary sample space (Kelemen et al. 2002): a light path is a point of the unit cube, the
+//! random numbers that make it, and a Markov chain moves that point.
 //!
-//! A large step draws all numbers anew. A small step changes each by a distance between s and s / 64, distributed evenly
-//! over its logarithm, up or down alike and around the ends of the unit interval. Both are as likely as their reverse, so
-//! that a proposal is accepted with min(1, f(v) / f(u)).
+//! A large step draws all numbers anew. A small step changes each by a distance between s and s / 64,
+//! distributed evenly over its logarithm, up or down alike and around the ends of the unit interval. Both are
+//! as likely as their reverse, so that a proposal is accepted with min(1, f(v) / f(u)).
 //!
-//! A departure from the paper: s is not fixed, but drawn for each small step from 1/512 to 1/8, evenly over its logarithm.
-//! No single size suits a large lamp and a small one.
+//! A departure from the paper: s is not fixed, but drawn for each small step from 1/512 to 1/8, evenly over
+//! its logarithm. No single size suits a large lamp and a small one.
 //!
 //! A mutation follows from its key and number alone, and nothing is stored until it is accepted.
 
@@ -39,7 +39,7 @@ impl Mutation {
         Self { random: Random::new(key, number), size: None }
     }
 
-    /// The number of the proposal where that of the point is `u`, for the number with index `slot`; in [0, 1).
+    /// The proposed number in [0, 1) for number `slot` of the point, which is `u`.
     #[inline]
     pub fn mutate(&self, u: f32, slot: u32) -> f32 {
         let Some(size) = self.size else { return self.draw(slot) };
@@ -55,13 +55,14 @@ impl Mutation {
         self.random.single(slot)
     }
 
-    /// Makes the proposal the new point. Slot `2 d` of `point` is the first number of dimension `d`, `2 d + 1` the second.
+    /// Makes the proposal the new point. Slots 2 d and 2 d + 1 of `point` are the numbers of dimension d.
     pub fn accept(&self, point: &mut [f32]) {
         point.iter_mut().zip(0..).for_each(|(u, slot)| *u = self.mutate(*u, slot));
     }
 }
 
-/// The random numbers of a proposal: those of `point`, mutated. Dimensions beyond the end of `point` are drawn anew.
+/// The random numbers of a proposal: those of `point`, mutated. Dimensions beyond the end of `point` are
+/// drawn anew.
 #[derive(Clone, Copy, Debug)]
 pub struct MutatedSample<'p> {
     /// Two numbers for each dimension, as [`Mutation::accept`] has them.

@@ -1,5 +1,5 @@
-//! Classes of materials, before anything is hit: the classes that a surface may have somewhere. A texture may hold
-//! any value. Answers at a hit are in `bsdf/class.rs`, which names the classes.
+//! Classes of materials, before anything is hit: the classes that a surface may have somewhere. A texture may
+//! hold any value. Answers at a hit are in `bsdf/class.rs`, which names the classes.
 
 use super::{Material, Surface};
 use crate::Rgb;
@@ -56,8 +56,8 @@ impl Material {
         }
     }
 
-    /// Whether caustic photons may go on from it, so that they are aimed at it: it is no receiver somewhere, however
-    /// wide its lobe is.
+    /// Whether caustic photons may go on from it, so that they are aimed at it: it is no receiver somewhere,
+    /// however wide its lobe is.
     pub(crate) fn may_pass_caustics(&self) -> bool {
         match &self.surface {
             Surface::Diffuse { .. } => false,
