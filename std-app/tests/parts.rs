@@ -74,19 +74,6 @@ fn a_finished_film_goes_on_to_more_samples() {
 }
 
 #[test]
-fn adaptive_samples_are_the_same_in_parts() {
-    let folder = Folder::new("adaptive");
-    let render = "render scene.obj --size 100x70 --adaptive on --json";
-    let whole = folder.object(&format!("{render} --spp 40 --threads 1 -o whole.pfm"));
-    folder.object(&format!("{render} --spp 22 --threads 3 -o a.pfm --checkpoint film"));
-    folder.object(&format!("{render} --spp 40 --threads 2 -o b.pfm --resume film"));
-    assert!(fs::read(folder.path("whole.pfm")).unwrap() == fs::read(folder.path("b.pfm")).unwrap());
-    assert_eq!(whole["spp"], 40);
-    let said = folder.refused("render scene.obj --size 100x70 --spp 50 -o c.pfm --resume film");
-    assert!(said.contains("adaptive"), "{said}");
-}
-
-#[test]
 fn shards_merge_to_the_bits_of_one_render() {
     let folder = Folder::new("shards");
     let render = "render scene.obj --size 70x50 --spp 12 --json";

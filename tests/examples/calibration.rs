@@ -3,7 +3,7 @@
 //! samples, whose own noise is taken off, and what photons blur in it. Prints the tables of docs/validation.md:
 //!
 //! `cargo run --release -p halflight-tests --example calibration -- [--renders 40] [--size 64] [--error 0.001]
-//! [--spp 4096] [--times 100] [--method path] [--adaptive] [--audit 0.05] [SCENE…]`, of our own scenes by name or of any scene file.
+//! [--spp 4096] [--times 100] [--method path] [--audit 0.05] [SCENE…]`, of our own scenes by name or of any scene file.
 //! `--error 0` goes on to the last sample, also where a method's bias is found.
 
 use core::sync::atomic::AtomicBool;
@@ -31,21 +31,12 @@ struct Wanted {
     /// Samples of the reference over those of a render.
     times: u32,
     method: Option<Method>,
-    adaptive: Option<bool>,
     audit: Option<f64>,
 }
 
 fn main() {
-    let mut wanted = Wanted {
-        renders: 40,
-        size: 64,
-        error: 0.001,
-        spp: 4096,
-        times: 100,
-        method: None,
-        adaptive: Some(false),
-        audit: None,
-    };
+    let mut wanted =
+        Wanted { renders: 40, size: 64, error: 0.001, spp: 4096, times: 100, method: None, audit: None };
     let mut scenes = Vec::new();
     let mut arguments = std::env::args().skip(1);
     while let Some(argument) = arguments.next() {
@@ -57,7 +48,6 @@ fn main() {
             "--spp" => wanted.spp = value().parse().expect("a number of samples"),
             "--times" => wanted.times = value().parse().expect("a number of times"),
             "--method" => wanted.method = Some(Method::named(&value()).expect("a method")),
-            "--adaptive" => wanted.adaptive = Some(true),
             "--audit" => wanted.audit = Some(value().parse().expect("a share")),
             scene => scenes.push(scene.to_owned()),
         }
@@ -98,8 +88,7 @@ fn calibrate(file: &Path, wanted: &Wanted) {
     let [one, other] = [0, 2].map(|i| {
         let part = |spp, seed| {
             let stop = Stop { spp: Some(spp), ..Stop::default() };
-            let reference =
-                Settings { stop, method: Some(Method::Path), adaptive: Some(false), ..settings(seed) };
+            let reference = Settings { stop, method: Some(Method::Path), ..settings(seed) };
             run(Settings { audit: None, ..reference })
         };
         sharpened(part(most, REFERENCE_SEED - i), || part(most.div_ceil(FEWER), REFERENCE_SEED - i - 1))
@@ -181,8 +170,8 @@ fn mean(one: &Image, other: &Image) -> (Image, f64) {
 }
 
 fn settings(wanted: &Wanted, seed: u32, stop: Stop) -> Settings {
-    let Wanted { size, method, adaptive, audit, .. } = *wanted;
-    Settings { width: size, height: size, seed, stop, method, adaptive, audit, ..Settings::default() }
+    let Wanted { size, method, audit, .. } = *wanted;
+    Settings { width: size, height: size, seed, stop, method, audit, ..Settings::default() }
 }
 
 /// One line of the table: true errors and their estimates.

@@ -5,7 +5,7 @@
 //! - within blocks of 8 × 8 smooth pixels, the variance of the means of the four sublattices of pixels with the same
 //!   (x mod 2, y mod 2), and of the sixteen with the same (x mod 4, y mod 4), over that of independent pixels: 1 for those.
 //!
-//! `cargo run --release -p halflight-tests --example lattice -- [--renders 8] [--size 128] [--spp 16,64] [--adaptive]
+//! `cargo run --release -p halflight-tests --example lattice -- [--renders 8] [--size 128] [--spp 16,64]
 //! SCENE…`, scene files. Processor seconds are read from /proc, with one thread for each render.
 
 use core::sync::atomic::AtomicBool;
@@ -25,7 +25,7 @@ struct Kind {
 }
 
 fn main() {
-    let (mut renders, mut size, mut spp, mut adaptive) = (8, 128, vec![16, 64], false);
+    let (mut renders, mut size, mut spp) = (8, 128, vec![16, 64]);
     let mut scenes = Vec::new();
     let mut arguments = std::env::args().skip(1);
     while let Some(argument) = arguments.next() {
@@ -34,7 +34,6 @@ fn main() {
             "--renders" => renders = value().parse().expect("a number"),
             "--size" => size = value().parse().expect("a number"),
             "--spp" => spp = value().split(',').map(|n| n.parse().expect("numbers")).collect(),
-            "--adaptive" => adaptive = true,
             _ => scenes.push(argument),
         }
     }
@@ -54,7 +53,6 @@ fn main() {
                         height: size,
                         seed,
                         stop: Stop { spp: Some(*spp), ..Stop::default() },
-                        adaptive: Some(adaptive),
                         threads: Some(1),
                         reuse: Some(reuse),
                         caustics: false,

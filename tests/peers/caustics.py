@@ -2,7 +2,7 @@
 
     python3 tests/peers/caustics.py [scene ...] [--seconds 3 10 30] [--seeds 5] [--reference-seconds 240]
 
-Ours: `path` without and with photons of caustics, the latter with adaptive sampling as well, and `sppm`; Mitsuba's:
+Ours: `path` without and with photons of caustics, and `sppm`; Mitsuba's:
 `path` and `ptracer`, `llvm_ad_rgb`, with our materials; where `LUXCORE` names the python of a virtual environment with
 `pyluxcore` and `numpy`, LuxCore's `BIDIRVMCPU` and `PATHCPU` with its caustic cache, with several radii, on scenes that it has the
 words for.
@@ -47,7 +47,6 @@ LUX_RADII = (0.0005, 0.0015, 0.005)
 OURS = {
     "path, off": ["--method", "path", "--caustics", "off"],
     "path, caustics": ["--method", "path", "--caustics", "auto"],
-    "path, adaptive": ["--method", "path", "--caustics", "auto", "--adaptive", "auto"],
     "sppm": ["--method", "sppm", "--audit", "off"],
 }
 

@@ -340,22 +340,6 @@ fn no_caustic_leaks_through_a_thin_wall() {
 }
 
 #[test]
-fn where_pixels_have_different_numbers_of_samples_photons_are_shot_as_often_as_elsewhere() {
-    let buffers = lamp_before(Surface::Mirror { reflectance: Rgb::splat(0.9).into() }, 0.02);
-    let of = |adaptive, threads| {
-        render(&buffers.scene(), Method::Path, 64, 64, |s| {
-            (s.adaptive, s.threads) = (Some(adaptive), Some(threads));
-        })
-    };
-    let (uniform, adaptive) = (of(false, 1), of(true, 1));
-    assert!(has_photons(&uniform) && adaptive.adaptive.used);
-    let shot = |result: &RenderResult| result.photons.unwrap().caustic.unwrap().shot;
-    assert_eq!(shot(&uniform), shot(&adaptive));
-    assert!(adaptive.samples.iter().min() < adaptive.samples.iter().max());
-    assert_eq!(of(true, 3).image, adaptive.image);
-}
-
-#[test]
 fn where_all_light_is_caustics_photons_may_have_all_of_it_unless_paths_are_asked_for() {
     let glass = Surface::Dielectric { ior: 1.5, tint: Rgb::ONE, roughness: 0.0.into() };
     let auto = |buffers: &SceneBuffers, spp, change: fn(&mut Settings)| {

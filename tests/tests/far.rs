@@ -70,7 +70,6 @@ fn picture(faces: &Faces, placed: &str, camera: &str, light: &str) -> Vec<f64> {
         width: 32,
         height: 32,
         stop: Stop { spp: Some(256), ..Stop::default() },
-        adaptive: Some(false),
         ..Settings::default()
     };
     let views = loaded.views();

@@ -173,7 +173,7 @@ fn seen(scene: &Scene, size: u32, spp: u32, seeds: u32) -> (Vec<Vec<f64>>, Vec<f
     let one = |seed| {
         let result = render(scene, spp, |s| {
             (s.width, s.height, s.seed, s.reuse) = (size, size, seed, Some(true));
-            (s.caustics, s.adaptive) = (false, Some(false));
+            s.caustics = false;
         });
         let pixels = result.image.pixels.iter();
         pixels.map(|pixel| pixel.iter().map(|v| f64::from(*v)).sum::<f64>() / 3.0).collect()

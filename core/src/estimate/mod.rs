@@ -7,7 +7,6 @@ mod empirical_bayes;
 mod filter;
 mod interval;
 mod metric;
-mod noise;
 mod tile;
 mod tile_statistics;
 
@@ -18,5 +17,4 @@ pub use empirical_bayes::{BrightnessClasses, Shrinkage};
 pub use filter::{filtered, filtered_pixel};
 pub use interval::ErrorEstimate;
 pub use metric::{Difference, mse, relmse, rmse};
-pub use noise::{BLOCKS, BlockNoise, Noise};
 pub use tile::{TileError, TileLight};

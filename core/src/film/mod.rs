@@ -5,7 +5,7 @@ mod samples;
 mod tile;
 
 pub use pixel::{Dropped, Half, Pixel};
-pub use samples::{CIRCLE, CIRCLES, GROUP, GROUPS, Samples};
+pub use samples::{CIRCLE, CIRCLES, GROUP, GROUPS};
 pub use tile::{PIXELS_PER_TILE, PixelSet, TILE, Tile};
 
 use crate::Rgb;

@@ -1,9 +1,7 @@
-//! Which samples of a tile are taken: of its groups, the smallest parts of a picture that can have numbers of their own; and
-//! which pixels of a group share what their paths find.
+//! Groups of the pixels of a tile, and the circles in them: which pixels share what their paths find.
 
 use super::tile::{PIXELS_PER_TILE, Tile};
 use crate::sampling::mix;
-use core::ops::Range;
 
 /// Pixels of a group: two of each 2 × 2 of a block of 8 × 8, drawn by lot.
 pub const GROUP: usize = 32;
@@ -68,45 +66,6 @@ impl Tile {
     }
 }
 
-/// Samples of a tile: of each pixel of a group, from one number to before another.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Samples {
-    /// The first of each group.
-    pub from: [u32; GROUPS],
-    /// Where each group ends.
-    pub to: [u32; GROUPS],
-}
-
-impl Samples {
-    /// How many there are, over all groups.
-    pub fn count(&self) -> u64 {
-        let groups = self.to.iter().zip(&self.from);
-        groups.map(|(to, from)| u64::from(to.saturating_sub(*from))).sum()
-    }
-
-    /// The first of so many `parts` of about the same size, one at least: all groups are through together.
-    pub fn first(&self, parts: u64) -> Self {
-        let mut first = *self;
-        for (to, from) in first.to.iter_mut().zip(&self.from) {
-            let count = u64::from(to.saturating_sub(*from)).div_ceil(parts.max(1));
-            *to = from.saturating_add(count as u32);
-        }
-        first
-    }
-
-    /// How many samples the pixels of each group have with these.
-    pub fn ends(&self) -> [u32; GROUPS] {
-        core::array::from_fn(|group| self.to[group].max(self.from[group]))
-    }
-}
-
-/// The same of all pixels.
-impl From<Range<u32>> for Samples {
-    fn from(range: Range<u32>) -> Self {
-        Self { from: [range.start; GROUPS], to: [range.end; GROUPS] }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -140,21 +99,5 @@ mod tests {
         let later = [2, 4, 8, 16].map(|n| circles(0, n * FIRST));
         assert!(later.iter().all(|later| *later != first) && later[0] != later[1]);
         assert_ne!(circles(1, 0), first);
-    }
-
-    #[test]
-    fn parts_end_together() {
-        let mut samples = Samples::from(4..20);
-        samples.to[3] = 7;
-        samples.from[5] = 30;
-        assert_eq!(samples.count(), 6 * 16 + 3);
-        let (mut parts, mut sum) = (4, 0);
-        while samples.count() > 0 {
-            let first = samples.first(parts);
-            sum += first.count();
-            samples.from = first.ends();
-            parts -= 1;
-        }
-        assert_eq!((parts, sum), (0, 6 * 16 + 3));
     }
 }

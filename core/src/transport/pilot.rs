@@ -140,7 +140,7 @@ impl<F: Features> PathTracer<'_, F> {
         let mut wave = Wave::new(wave, &mut arena)?;
         let tile = Tile::new(self.settings.width, self.settings.height, task);
         let (mut sum, mut all) = (0.0, 0);
-        let mut places = Places::new(tile, (0..1).into());
+        let mut places = Places::new(tile, 0..1);
         loop {
             let count = self.start(&mut places, &mut wave);
             if count == 0 {
@@ -174,7 +174,7 @@ impl<F: Features> PathTracer<'_, F> {
         let tile = Tile::new(self.settings.width, self.settings.height, task);
         let mut pilot = Pilot::default();
         // A layer of all pixels after the other, as many at a time as there is memory for.
-        let mut places = Places::new(tile, (0..SAMPLES).into());
+        let mut places = Places::new(tile, 0..SAMPLES);
         loop {
             let count = sharing.start(&mut places, &mut wave);
             if count == 0 {

@@ -1,7 +1,7 @@
 //! The samples of a tile: in which order they are taken, how their paths begin, and what becomes of their light.
 //!
-//! Layer after layer, one sample of each pixel that is to have any more. Where pixels share their paths, those of a circle
-//! stay together; else all go along the Z-curve, so that neighbours ask caches together.
+//! Layer after layer, one sample of each pixel. Where pixels share their paths, those of a
+//! circle stay together; else all go along the Z-curve, so that neighbours ask caches together.
 
 use super::estimator::{Counters, PathSettings};
 use super::outline::outlined;
@@ -10,65 +10,37 @@ use super::reuse::Exchange;
 use super::wave::{Path, Share, Wave};
 use crate::Rgb;
 use crate::bsdf::Features;
-use crate::film::{CIRCLE, CIRCLES, GROUP, PIXELS_PER_TILE, Pixel, PixelSet, Samples, Tile};
+use crate::film::{CIRCLE, CIRCLES, PIXELS_PER_TILE, Pixel, PixelSet, Tile};
 use crate::geometry::{MISS, Ray};
 use crate::memory::{Arena, OutOfMemory};
 use crate::sampling::Sampler;
+use core::ops::Range;
 
 /// All samples of a tile that are still to be taken.
 pub(super) struct Places {
     tile: Tile,
-    left: Samples,
-    /// The next circle of a layer; where nothing is shared, the next pixel, and how many layers are done.
+    left: Range<u32>,
+    /// The next circle of the layer; where nothing is shared, the next pixel.
     next: usize,
-    layer: u32,
     /// Pixels whose paths leave the lamp that they see to others.
     outlined: PixelSet,
 }
 
 impl Places {
-    pub(super) fn new(tile: Tile, samples: Samples) -> Self {
-        Self { tile, left: samples, next: 0, layer: 0, outlined: PixelSet::default() }
+    pub(super) fn new(tile: Tile, samples: Range<u32>) -> Self {
+        Self { tile, left: samples, next: 0, outlined: PixelSet::default() }
     }
 
-    /// The next circle, and which sample of its pixels.
-    fn next_circle(&mut self) -> Option<(usize, u32)> {
-        for _ in 0..CIRCLES {
-            let circle = self.next;
-            self.next = (circle + 1) % CIRCLES;
-            let group = circle / (CIRCLES / self.left.from.len());
-            let (next, end) = (self.left.from.get_mut(group)?, *self.left.to.get(group)?);
-            if *next < end {
-                let sample = *next;
-                // Those of a group take their samples one after the other.
-                *next += (circle % (GROUP / CIRCLE) == GROUP / CIRCLE - 1) as u32;
-                return Some((circle, sample));
-            }
+    /// The next of the `count` parts of a layer, and which of their samples.
+    fn next_of(&mut self, count: usize) -> Option<(usize, u32)> {
+        if self.next == count {
+            (self.next, self.left.start) = (0, self.left.start.saturating_add(1));
         }
-        None
-    }
-
-    /// The next pixel along the Z-curve, and which of its samples.
-    fn next_pixel(&mut self) -> Option<(usize, u32)> {
-        loop {
-            if self.next == PIXELS_PER_TILE {
-                (self.next, self.layer) = (0, self.layer + 1);
-            }
-            if self.next == 0 {
-                let layer = self.layer;
-                let mut groups = self.left.from.iter().zip(&self.left.to);
-                groups.find(|(from, to)| from.checked_add(layer).is_some_and(|sample| sample < **to))?;
-            }
-            let place = self.next;
-            self.next += 1;
-            let group = Tile::group(place);
-            let sample = self.left.from.get(group)?.checked_add(self.layer);
-            if let Some(sample) =
-                sample.filter(|sample| self.left.to.get(group).is_some_and(|to| sample < to))
-            {
-                return Some((place, sample));
-            }
+        if self.left.is_empty() {
+            return None;
         }
+        self.next += 1;
+        Some((self.next - 1, self.left.start))
     }
 }
 
@@ -80,19 +52,18 @@ impl<F: Features> PathTracer<'_, F> {
     pub fn run(
         &self,
         task: usize,
-        samples: impl Into<Samples>,
+        samples: Range<u32>,
         wave: usize,
         scratch: &mut Arena,
         out: &mut [Pixel],
     ) -> Result<Counters, OutOfMemory> {
         let mut arena = scratch.scratch();
-        let samples = samples.into();
         let tile = Tile::new(self.settings.width, self.settings.height, task);
         let mut counters = Counters::default();
+        // No larger than there are paths: the memory of a wave is cleared.
+        let most = samples.len().saturating_mul(PIXELS_PER_TILE);
         let mut places = Places::new(tile, samples);
         places.outlined = outlined(self.scene, self.lights, &self.settings, tile);
-        // No larger than there are paths: the memory of a wave is cleared.
-        let most = usize::try_from(samples.count().saturating_mul(GROUP as u64)).unwrap_or(usize::MAX);
         let mut wave = Wave::new(wave.min(most), &mut arena)?;
         let has_outlines = !places.outlined.is_empty();
         loop {
@@ -125,7 +96,7 @@ impl<F: Features> PathTracer<'_, F> {
         let mut count = 0;
         if self.settings.reuse {
             while count + CIRCLE <= wave.paths.len()
-                && let Some((circle, sample)) = places.next_circle()
+                && let Some((circle, sample)) = places.next_of(CIRCLES)
             {
                 // Another number for each circle that a wave can hold.
                 let exchange = Exchange::new(sample.wrapping_mul(CIRCLES as u32) + circle as u32);
@@ -136,7 +107,7 @@ impl<F: Features> PathTracer<'_, F> {
             return count;
         }
         while count < wave.paths.len()
-            && let Some((place, sample)) = places.next_pixel()
+            && let Some((place, sample)) = places.next_of(PIXELS_PER_TILE)
         {
             self.begin(places, place, sample, Exchange::new(0), wave, &mut count);
         }

@@ -5,7 +5,7 @@ use super::interrupt::{self, INTERRUPT};
 use super::method::{self, Choice};
 use super::outputs::{Outputs, Role};
 use super::progress::Teller;
-use super::shot::{self, Options, Shot, When};
+use super::shot::{self, Options, Shot};
 use super::{summary, values, warn};
 use clap::{Args, ValueEnum};
 use halflight::compare::compare;
@@ -47,9 +47,6 @@ pub(super) struct Render {
     #[arg(long, value_name = "RELMSE", value_parser = values::positive, display_order = 6)]
     error: Option<f64>,
 
-    /// Give pixels with noisy surroundings more samples; auto: if the noise promises a gain
-    #[arg(long, default_value = "off", help_heading = "Light transport")]
-    adaptive: When,
     /// Keep the film in a file during the render, for --resume and `halflight merge`
     #[arg(long, value_name = "FILE", help_heading = "In parts")]
     checkpoint: Option<PathBuf>,
@@ -63,7 +60,7 @@ pub(super) struct Render {
     /// Render part I of N, counted from 1, into the film of --checkpoint, for `halflight merge`; without -o no
     /// picture is written
     #[arg(long, value_name = "I/N", value_parser = values::shard, requires = "checkpoint",
-        conflicts_with_all = ["time", "error", "adaptive"], help_heading = "In parts")]
+        conflicts_with_all = ["time", "error"], help_heading = "In parts")]
     shard: Option<Shard>,
 
     /// Start with the irradiance caches of a file: same scene and settings, any view
@@ -103,7 +100,6 @@ impl Render {
             self.shot.settings(&loaded, self.method, &self.options, self.stop(&loaded)?, reference)?;
         let every = self.checkpoint_every.unwrap_or(Checkpoint::EVERY);
         let settings = Settings {
-            adaptive: When::choice(Some(self.adaptive)),
             shard: self.shard.unwrap_or(Shard::WHOLE),
             checkpoint: self.checkpoint.clone().map(|path| Checkpoint { path, every }),
             resume: self.resume.clone(),

@@ -1,8 +1,7 @@
 //! What a render has done so far: the film, how far each tile is, what was counted. All that a film file keeps.
 
-use super::adapt::Weights;
 use super::ledger::Ledger;
-use halflight_core::film::{Film, GROUPS, PIXELS_PER_TILE};
+use halflight_core::film::{Film, PIXELS_PER_TILE};
 use halflight_core::transport::Counters;
 
 /// A part of a picture: every `count`th tile from tile `index` on. Shards of one picture are rendered apart and
@@ -28,15 +27,11 @@ impl Shard {
 /// See the file.
 pub(super) struct Canvas<'m> {
     pub(super) film: Film<'m>,
-    /// Samples that each pixel of the groups of a tile has had; 0 for tiles of other shards.
-    pub(super) taken: Vec<[u32; GROUPS]>,
-    /// Rays of every kind that each tile took.
-    pub(super) rays: Vec<u64>,
+    /// Samples that each pixel of a tile has had; 0 for tiles of other shards.
+    pub(super) taken: Vec<u32>,
     pub(super) shard: Shard,
     /// Whether pixels far apart share what their samples find.
     pub(super) shares: bool,
-    /// How many samples groups get; `None` where all get the same.
-    pub(super) weights: Option<Weights>,
     pub(super) counters: Counters,
     pub(super) ledger: Ledger,
 }
@@ -45,16 +40,7 @@ impl<'m> Canvas<'m> {
     pub(super) fn new(film: Film<'m>, shard: Shard) -> Self {
         let tiles = film.pixels().len() / PIXELS_PER_TILE;
         let (counters, ledger) = (Counters::default(), Ledger::default());
-        Self {
-            film,
-            taken: vec![[0; GROUPS]; tiles],
-            rays: vec![0; tiles],
-            shard,
-            shares: false,
-            weights: None,
-            counters,
-            ledger,
-        }
+        Self { film, taken: vec![0; tiles], shard, shares: false, counters, ledger }
     }
 
     /// Tiles of this shard.
@@ -62,22 +48,9 @@ impl<'m> Canvas<'m> {
         (0..self.taken.len()).filter(|&task| self.shard.owns(task)).count()
     }
 
-    /// Samples that groups should have when each pixel has `target` of them in the mean.
-    pub(super) fn targets(&self, target: u32) -> Vec<[u32; GROUPS]> {
-        match &self.weights {
-            Some(weights) => weights.targets(target),
-            None => vec![[target; GROUPS]; self.taken.len()],
-        }
-    }
-
-    /// Samples of each pixel: of the least sampled one, or in the mean where groups should have different numbers.
+    /// Samples of each pixel of its tiles, of the least sampled one.
     pub(super) fn spp(&self) -> u32 {
-        match &self.weights {
-            Some(weights) => weights.next(&self.taken),
-            None => {
-                let own = self.taken.iter().enumerate().filter(|(task, _)| self.shard.owns(*task));
-                own.flat_map(|(_, taken)| *taken).min().unwrap_or(0)
-            }
-        }
+        let own = self.taken.iter().enumerate().filter(|(task, _)| self.shard.owns(*task));
+        own.map(|(_, taken)| *taken).min().unwrap_or(0)
     }
 }

@@ -5,7 +5,8 @@
 use super::canvas::Canvas;
 use super::watch::Watch;
 use super::workers::Workers;
-use halflight_core::film::{GROUPS, PIXELS_PER_TILE, Pixel, Samples};
+use core::ops::Range;
+use halflight_core::film::{PIXELS_PER_TILE, Pixel};
 use halflight_core::memory::{Arena, Line, OutOfMemory};
 use halflight_core::transport::Counters;
 use std::sync::Mutex;
@@ -13,8 +14,8 @@ use std::time::Instant;
 
 /// What one round does.
 pub(super) struct Round<'a> {
-    /// Samples that each pixel of the groups of a tile has in the end.
-    pub(super) targets: Vec<[u32; GROUPS]>,
+    /// Samples that each pixel has in the end.
+    pub(super) target: u32,
     /// Samples after which a thread looks at the clock, and at the flag.
     pub(super) step: u32,
     /// When it is cut.
@@ -38,7 +39,7 @@ pub(super) type Task<'t, T> =
 
 /// A task on a tile: its number, samples, working memory, pixels.
 pub(super) type TileTask<'t> =
-    dyn Fn(usize, Samples, &mut Arena, &mut [Pixel]) -> Result<Counters, OutOfMemory> + Sync + 't;
+    dyn Fn(usize, Range<u32>, &mut Arena, &mut [Pixel]) -> Result<Counters, OutOfMemory> + Sync + 't;
 
 /// The threads, and the round that they are in.
 pub(super) struct Crew<'r, 'm> {
@@ -51,25 +52,8 @@ impl Crew<'_, '_> {
     /// The first sample that a pixel lacks; `None` where all have theirs, or the round is over. For methods that need
     /// something new for every sample, before its tiles.
     pub(super) fn next_sample(&self) -> Option<u32> {
-        self.open().min().filter(|_| !self.round.is_over())
-    }
-
-    /// The same in the mean over all pixels, where they are to have different numbers: for methods that need something new
-    /// from time to time, whatever the numbers of the samples that are taken then.
-    pub(super) fn next_in_mean(&self) -> Option<u32> {
-        if self.canvas.weights.is_none() {
-            return self.next_sample();
-        }
-        self.open().next().filter(|_| !self.round.is_over()).map(|_| self.canvas.spp())
-    }
-
-    /// How many samples those groups have that lack some.
-    fn open(&self) -> impl Iterator<Item = u32> {
-        let Canvas { shard, taken, .. } = &*self.canvas;
-        let tiles = taken.iter().zip(&self.round.targets).enumerate();
-        let own = tiles.filter(|(task, _)| shard.owns(*task));
-        let groups = own.flat_map(|(_, (taken, target))| taken.iter().zip(target));
-        groups.filter(|(taken, target)| taken < target).map(|(taken, _)| *taken)
+        let spp = self.canvas.spp();
+        (spp < self.round.target && !self.round.is_over()).then_some(spp)
     }
 
     /// Whether the round is over.
@@ -82,7 +66,7 @@ impl Crew<'_, '_> {
     pub(super) fn hurry<T>(&mut self, deadline: Option<Instant>, work: impl FnOnce(&mut Crew) -> T) -> T {
         let Round { watch, deadline: end, .. } = *self.round;
         let deadline = [deadline, end].into_iter().flatten().min();
-        let round = Round { targets: Vec::new(), step: 1, deadline, watch, is_first: false };
+        let round = Round { target: 0, step: 1, deadline, watch, is_first: false };
         work(&mut Crew { workers: self.workers, round: &round, canvas: self.canvas })
     }
 
@@ -101,66 +85,37 @@ impl Crew<'_, '_> {
         Ok(all)
     }
 
-    /// Brings every group to its target, or to `end` samples where that is less, unless the round is cut.
+    /// Brings every tile to its target, or to `end` samples where that is less, unless the round is cut.
     pub(super) fn tiles(
         &mut self,
         end: u32,
         scratch: &mut [Vec<Line>],
         task: &TileTask,
     ) -> Result<(), OutOfMemory> {
-        let ends = vec![[end; GROUPS]; self.canvas.taken.len()];
-        self.bring(&ends, scratch, task)
-    }
-
-    /// The same to where groups are when pixels have `end` samples in the mean.
-    pub(super) fn tiles_in_mean(
-        &mut self,
-        end: u32,
-        scratch: &mut [Vec<Line>],
-        task: &TileTask,
-    ) -> Result<(), OutOfMemory> {
-        let ends = self.canvas.targets(end);
-        self.bring(&ends, scratch, task)
-    }
-
-    /// Brings every group to its target, or to its end where that is less, unless the round is cut.
-    fn bring(
-        &mut self,
-        ends: &[[u32; GROUPS]],
-        scratch: &mut [Vec<Line>],
-        task: &TileTask,
-    ) -> Result<(), OutOfMemory> {
         let Self { workers, round, canvas } = self;
-        let shard = canvas.shard;
-        let tiles = canvas.film.pixels_mut().chunks_mut(PIXELS_PER_TILE);
-        let tiles = tiles.zip(&mut canvas.taken).zip(&mut canvas.rays).enumerate();
-        let tiles = tiles.zip(round.targets.iter().zip(ends));
-        let own = tiles.filter(|((task, _), _)| shard.owns(*task));
-        let open = own.filter_map(|((task, ((pixels, taken), rays)), (target, end))| {
-            let to = core::array::from_fn(|group| target[group].min(end[group]));
-            let left = Samples { from: *taken, to };
-            (left.count() > 0).then_some((task, pixels, taken, rays, left))
-        });
+        let (shard, end) = (canvas.shard, end.min(round.target));
+        let tiles = canvas.film.pixels_mut().chunks_mut(PIXELS_PER_TILE).zip(&mut canvas.taken).enumerate();
+        let own = tiles.filter(|(task, _)| shard.owns(*task));
+        let open = own.filter_map(|(task, (pixels, taken))| (*taken < end).then_some((task, pixels, taken)));
         let queue = Mutex::new(scattered(open.collect()));
         let next = || queue.lock().unwrap_or_else(|poisoned| poisoned.into_inner()).pop();
         let counted = workers.on_all(scratch, |arena| {
             let mut counters = Counters::default();
             let mut dropped = Vec::new();
-            let step = u64::from(round.step) * GROUPS as u64;
-            while let Some((index, pixels, taken, rays, mut left)) = next() {
-                while left.count() > 0 {
+            while let Some((index, pixels, taken)) = next() {
+                while *taken < end {
                     if round.is_over() {
                         return Ok((counters, dropped));
                     }
-                    let samples = left.first(left.count().div_ceil(step.max(1)));
-                    let more = task(index, samples, arena, pixels)?;
+                    // Parts of about the same size.
+                    let left = end - *taken;
+                    let samples = *taken..*taken + left.div_ceil(left.div_ceil(round.step.max(1)));
+                    let more = task(index, samples.clone(), arena, pixels)?;
                     counters += more;
                     if more.dropped.total() > 0 {
                         dropped.push((index, more.dropped));
                     }
-                    *rays += more.all_rays();
-                    left.from = samples.ends();
-                    *taken = left.from;
+                    *taken = samples.end;
                 }
             }
             Ok((counters, dropped))
@@ -210,13 +165,8 @@ mod tests {
         let film = Film::new(40, 40, &mut Arena::new(bytemuck::cast_slice_mut(&mut lines))).unwrap();
         let mut canvas = Canvas::new(film, Shard::WHOLE);
         let interrupt = AtomicBool::new(cut);
-        let round = Round {
-            targets: vec![[target; GROUPS]; 9],
-            step: 2,
-            deadline: None,
-            watch: &Watch::until(&interrupt),
-            is_first: false,
-        };
+        let round =
+            Round { target, step: 2, deadline: None, watch: &Watch::until(&interrupt), is_first: false };
         let mut scratch = vec![vec![Line([0; 64]); 1]; threads];
         work(&mut Crew { workers: &workers, round: &round, canvas: &mut canvas }, &mut scratch)
     }
@@ -267,14 +217,14 @@ mod tests {
 
     #[test]
     fn sample_after_sample_or_all_at_once_the_film_is_the_same() {
-        let tile = |task: usize, samples: Samples, _: &mut Arena, pixels: &mut [Pixel]| {
+        let tile = |task: usize, samples: Range<u32>, _: &mut Arena, pixels: &mut [Pixel]| {
             for (i, pixel) in pixels.iter_mut().enumerate() {
-                for sample in samples.from[0]..samples.to[0] {
+                for sample in samples.clone() {
                     let light = (task * 7 + i) as f32 / (1.0 + sample as f32);
                     pixel.add(sample, Rgb::splat(light), &mut Dropped::default());
                 }
             }
-            Ok(Counters { paths: samples.count() / GROUPS as u64, ..Counters::default() })
+            Ok(Counters { paths: samples.len() as u64, ..Counters::default() })
         };
         let at_once = crew(3, 7, false, |crew, scratch| {
             crew.tiles(u32::MAX, scratch, &tile).unwrap();
@@ -296,7 +246,7 @@ mod tests {
     #[test]
     fn a_task_without_memory_ends_the_round() {
         let short = OutOfMemory { needed: 2, available: 1 };
-        let tile = |task: usize, _: Samples, _: &mut Arena, _: &mut [Pixel]| {
+        let tile = |task: usize, _: Range<u32>, _: &mut Arena, _: &mut [Pixel]| {
             if task == 4 { Err(short) } else { Ok(Counters::default()) }
         };
         crew(2, 7, false, |crew, scratch| assert_eq!(crew.tiles(1, scratch, &tile), Err(short)));

@@ -20,7 +20,7 @@ pub enum RenderError {
     },
     /// The threads could not be started.
     Threads(String),
-    /// There are not as many tiles as shards, or no such shard; or sampling is adaptive, which needs all tiles.
+    /// There are not as many tiles as shards, or no such shard.
     Shard,
     /// A cache is to be loaded or saved, and the method has none.
     NoCache,
@@ -37,10 +37,7 @@ impl core::fmt::Display for RenderError {
                 write!(f, "not enough memory: at least {needed} bytes needed, {available} available")
             }
             Self::Threads(why) => write!(f, "the threads could not be started: {why}"),
-            Self::Shard => write!(
-                f,
-                "shard I/N is invalid: N must not exceed the number of tiles, and sampling must not be adaptive"
-            ),
+            Self::Shard => write!(f, "shard I/N is invalid: N must not exceed the number of tiles"),
             Self::NoCache => write!(f, "only the method irradiance-cache has a cache to load or save"),
             Self::File(error) => error.fmt(f),
         }

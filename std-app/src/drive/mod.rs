@@ -4,7 +4,6 @@
 //! cut into rounds, and how many threads there are, leaves the bits of the picture as they are; so does an end in the
 //! middle, where the film is kept in a file and the render resumed from it.
 
-mod adapt;
 mod audit;
 mod blurred;
 mod cache_file;
@@ -102,9 +101,6 @@ pub struct Settings {
     /// What the picture should be, of the same size: each round is compared with it, and the time that this
     /// takes does not count.
     pub reference: Option<Arc<Image>>,
-    /// Whether pixels get their samples by the noise around them; all the same otherwise. `None`: where the noise
-    /// tells that it pays. Not with shards.
-    pub adaptive: Option<bool>,
     /// The share of the work that goes into an audit of the picture, between 0, no audit, and 1. `None`: a twentieth
     /// where the method is biased. Not with shards.
     pub audit: Option<f64>,
@@ -137,13 +133,6 @@ impl Checkpoint {
     pub const EVERY: f64 = 60.0;
 }
 
-impl Settings {
-    /// Whether the picture may be sampled adaptively.
-    fn may_adapt(&self) -> bool {
-        self.shard == Shard::WHOLE && self.adaptive != Some(false)
-    }
-}
-
 impl Default for Settings {
     fn default() -> Self {
         Self {
@@ -163,7 +152,6 @@ impl Default for Settings {
             level: Level::detect(),
             stop: Stop::default(),
             reference: None,
-            adaptive: Some(false),
             audit: None,
             shard: Shard::WHOLE,
             checkpoint: None,
@@ -215,16 +203,6 @@ pub struct Seconds {
     pub estimate: f64,
 }
 
-/// Whether pixels got their samples by the noise around them.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct AdaptiveUse {
-    /// They did.
-    pub used: bool,
-    /// By which factor that makes the error after the same work smaller, as the noise last told; `None` where nobody
-    /// looked.
-    pub gain: Option<f64>,
-}
-
 /// Whether neighbouring pixels shared what their paths found.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Reuse {
@@ -241,8 +219,7 @@ pub struct RenderResult {
     pub method: Method,
     /// The picture.
     pub image: Image,
-    /// Samples of each pixel; of the least sampled one where the last round was cut, in the mean where sampling is
-    /// adaptive.
+    /// Samples of each pixel; of the least sampled one where the last round was cut.
     pub spp: u32,
     /// Rounds begun, those before a resumption included.
     pub rounds: u32,
@@ -258,8 +235,6 @@ pub struct RenderResult {
     pub seconds: Seconds,
     /// Paths, rays and dropped samples.
     pub counters: Counters,
-    /// Whether sampling was adaptive, and why.
-    pub adaptive: AdaptiveUse,
     /// Whether pixels shared what their paths found, and why.
     pub reuse: Reuse,
     /// Whether paths were joined with photons of caustics, and why.
@@ -327,7 +302,7 @@ pub fn render(
     }
     let Shard { index, count } = settings.shard;
     let many = count as usize > Tile::count(settings.width, settings.height);
-    if index >= count || many || (settings.adaptive == Some(true) && count > 1) {
+    if index >= count || many {
         return Err(RenderError::Shard);
     }
     let plan = Census::of(scene).plan();

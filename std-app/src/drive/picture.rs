@@ -1,6 +1,5 @@
 //! The rounds of a picture, from the first sample to the last estimate.
 
-use super::adapt::{self, Spread, Weights};
 use super::audit::Audit;
 use super::canvas::{Canvas, Shard};
 use super::crew::{self, Crew};
@@ -14,7 +13,7 @@ use super::refinement::Refinements;
 use super::rounds::{Plan, Rounds};
 use super::told::Told;
 use super::workers::Workers;
-use super::{AdaptiveUse, Ending, Progress, RenderError, RenderResult, Seconds, WindowUse};
+use super::{Ending, Progress, RenderError, RenderResult, Seconds, WindowUse};
 use crate::save::{Image, Patience};
 use core::sync::atomic::{AtomicBool, Ordering};
 use core::time::Duration;
@@ -70,7 +69,6 @@ impl Picture<'_> {
             Some(film) => {
                 let header = film.header.clone();
                 clock.pause(|| film.read_into(&mut canvas))?;
-                canvas.weights = header.weights(canvas.taken.len());
                 let Header { spp, rounds, seconds, estimates, ref refinements, .. } = header;
                 renderer.resume(&refinements.made);
                 if let (Some(audit), Some(state)) = (&mut audit, header.audit()) {
@@ -84,7 +82,7 @@ impl Picture<'_> {
         let mut latest = history.iter().rev().find_map(|round: &Round| round.error);
         let pixels = f64::from(settings.width) * f64::from(settings.height);
         let (mut estimating, mut estimate) = (ESTIMATING * pixels / workers.count() as f64, 0.0);
-        let (mut gain, mut told) = (None, None);
+        let mut told = None;
         let mut saved = Instant::now();
         let mut is_lost = false;
         let mut kept =
@@ -105,7 +103,7 @@ impl Picture<'_> {
             let later = |at: f64| Duration::try_from_secs_f64((at - now).max(0.0)).ok();
             let deadline = plan.deadline.and_then(later).and_then(|later| Instant::now().checked_add(later));
             let round = crew::Round {
-                targets: canvas.targets(plan.target),
+                target: plan.target,
                 step: step(&plan, canvas.tiles(), workers.count()),
                 deadline,
                 watch: &workers.watch,
@@ -146,17 +144,6 @@ impl Picture<'_> {
                     }
                 }
                 let start = Instant::now();
-                // Once only: noise that is told later would know who asked for it.
-                let is_even = canvas.weights.is_none();
-                if is_even && settings.may_adapt() && rounds.spp() >= adapt::FROM {
-                    let noise = workers.noise(&canvas.film);
-                    let spread = noise.map(|noise| Spread::of(&noise, &adapt::costs(&canvas, width), width));
-                    gain = spread.as_ref().map(|spread| spread.gain);
-                    let is_asked = settings.adaptive == Some(true);
-                    let pays = |spread: &Spread| is_asked || spread.gain >= adapt::PAYS;
-                    let spp = rounds.spp();
-                    canvas.weights = spread.filter(pays).map(|spread| Weights::new(spread.weights, spp));
-                }
                 let short = settings.stop.error.zip(found.noise).and_then(|(wanted, noise)| {
                     refinements.shortfall(wanted, rounds.spp(), noise, found.audited.as_ref())
                 });
@@ -255,7 +242,6 @@ impl Picture<'_> {
             threads: workers.count(),
             seconds: Seconds { build: 0.0, render, estimate },
             counters: canvas.counters,
-            adaptive: AdaptiveUse { used: canvas.weights.is_some(), gain },
             reuse: renderer.reuse(),
             caustics: renderer.caustics(),
             cache: renderer.cache(),
@@ -269,9 +255,7 @@ impl Picture<'_> {
             },
             windows: WindowUse::default(),
             places: canvas.ledger.places(width, height),
-            empty_pixels: empty_pixels(film, |task| {
-                canvas.shard.owns(task) && !canvas.taken[task].contains(&0)
-            }),
+            empty_pixels: empty_pixels(film, |task| canvas.shard.owns(task) && canvas.taken[task] > 0),
             filled_pixels,
             error,
             blurred: told.blurred,
@@ -320,11 +304,11 @@ fn step(plan: &Plan, tiles: usize, threads: usize) -> u32 {
     if step >= FULL_STEP { step / FULL_STEP * FULL_STEP } else { step.max(1) }
 }
 
-/// The picture of `canvas`, its gaps filled, and how many pixels were gaps: those of its groups that were not reached.
+/// The picture of `canvas`, its gaps filled, and how many pixels were gaps: those of tiles that were not reached.
 fn without_gaps(canvas: &Canvas, sketch: &Sketch, workers: &Workers) -> (Image, u64) {
     let mut image = image(&canvas.film);
     // A shard has gaps that others fill.
-    if canvas.shard != Shard::WHOLE || !canvas.taken.as_flattened().contains(&0) {
+    if canvas.shard != Shard::WHOLE || !canvas.taken.contains(&0) {
         return (image, 0);
     }
     let mut known: Vec<bool> = by_rows(&canvas.film).map(|pixel| pixel.count() > 0).collect();

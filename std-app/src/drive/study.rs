@@ -14,7 +14,7 @@ use crate::pages::Pages;
 use halflight_core::bsdf::Features;
 use halflight_core::cache::irradiance::{CellFlux, IrradianceCache, Metric, metric};
 use halflight_core::census::{Census, WithFeatures};
-use halflight_core::film::{Film, GROUPS};
+use halflight_core::film::Film;
 use halflight_core::light::LightSampler;
 use halflight_core::memory::{Arena, Line};
 use halflight_core::scene::Scene;
@@ -111,13 +111,7 @@ impl WithFeatures for Study<'_> {
         let mut film_lines = memory.take("film", Film::footprint(1, 1))?;
         let film = Film::new(1, 1, &mut arena(&mut film_lines))?;
         let mut canvas = Canvas::new(film, Shard::WHOLE);
-        let round = Round {
-            targets: vec![[0; GROUPS]],
-            step: 1,
-            deadline: None,
-            watch: &workers.watch,
-            is_first: false,
-        };
+        let round = Round { target: 0, step: 1, deadline: None, watch: &workers.watch, is_first: false };
         let mut crew = Crew { workers: &workers, round: &round, canvas: &mut canvas };
 
         let size = [settings.width, settings.height];

@@ -7,7 +7,7 @@ use halflight_core::Level;
 use halflight_core::bsdf::Features;
 use halflight_core::bvh::{Bvh, ForkJoin};
 use halflight_core::estimate::{
-    BLOCKS, BiasEstimate, BlockNoise, BrightnessClasses, ErrorEstimate, TileBlur, TileError, TileLight,
+    BiasEstimate, BrightnessClasses, ErrorEstimate, TileBlur, TileError, TileLight,
 };
 use halflight_core::film::{Film, PIXELS_PER_TILE, Pixel};
 use halflight_core::memory::{Arena, Line, OutOfMemory};
@@ -81,13 +81,6 @@ impl<'w> Workers<'w> {
         let tiles = film.pixels().par_chunks(PIXELS_PER_TILE);
         let tiles: Vec<_> = self.pool.install(|| tiles.map(|tile| TileBlur::of(tile, mean)).collect());
         BiasEstimate::of_blur(tiles.into_iter())
-    }
-
-    /// Where the noise of `film` is; `None` for a black picture.
-    pub(super) fn noise(&self, film: &Film) -> Option<Vec<[BlockNoise; BLOCKS]>> {
-        let mean = self.mean(film)?;
-        let tiles = film.pixels().par_chunks(PIXELS_PER_TILE);
-        Some(self.pool.install(|| tiles.map(|tile| BlockNoise::of(tile, mean)).collect()))
     }
 
     /// The mean radiance of `film`; `None` where it is black.

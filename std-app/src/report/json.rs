@@ -67,7 +67,6 @@ fn most(run: &Run) -> Value {
             "gain": result.windows.gain.map(|gain| gain.factor()),
             "lacks_memory": result.windows.lacks_memory,
         },
-        "adaptive": { "used": result.adaptive.used, "gain": result.adaptive.gain },
         "reuse": {
             "used": result.reuse.used,
             "gain": result.reuse.pilot.map(|pilot| pilot.gain()),

@@ -1,7 +1,6 @@
 //! The header of a film file: one JSON object, which a person can read with `head -c`.
 
 use super::identity::Identity;
-use crate::drive::adapt::Weights;
 use crate::drive::audit::{self, Audit};
 use crate::drive::canvas::{Canvas, Shard};
 use crate::drive::ledger::Ledger;
@@ -30,10 +29,6 @@ pub(in crate::drive) struct Header {
     /// Tiles and what they dropped.
     ledger: Vec<(u32, Causes)>,
     history: Vec<Entry>,
-    /// Rays of each tile.
-    tiles: Vec<u64>,
-    /// Of adaptive sampling.
-    weights: Option<Weights>,
     audit: Option<audit::State>,
     #[serde(default)]
     pub(in crate::drive) refinements: Refinements,
@@ -71,8 +66,6 @@ impl Header {
             dropped: causes(counters.dropped),
             ledger: ledger.tiles().map(|(task, dropped)| (task, causes(dropped))).collect(),
             history: history.iter().map(|r| (r.seconds, r.spp, r.rays, r.error.map(error))).collect(),
-            tiles: canvas.rays.clone(),
-            weights: canvas.weights.clone(),
             audit: audit.map(|audit| audit.state().clone()),
             refinements: refinements.clone(),
         }
@@ -101,16 +94,6 @@ impl Header {
         let mut ledger = Ledger::default();
         self.ledger.iter().for_each(|(task, causes)| ledger.add(*task as usize, dropped(*causes)));
         ledger
-    }
-
-    /// Rays of each tile.
-    pub(in crate::drive) fn tiles(&self) -> &[u64] {
-        &self.tiles
-    }
-
-    /// Of `tiles` tiles.
-    pub(in crate::drive) fn weights(&self, tiles: usize) -> Option<Weights> {
-        self.weights.clone().filter(|weights| weights.tiles() == tiles)
     }
 
     /// How far the audit is, where there is one.

@@ -18,7 +18,6 @@ pub(in crate::drive) struct Identity {
     /// What was asked for; what comes of it follows from the scene.
     reuse: Option<bool>,
     windows: Option<bool>,
-    adaptive: Option<bool>,
     /// Everything that the method is told.
     settings: String,
     /// Fingerprint of all that is in the scene.
@@ -60,7 +59,6 @@ impl Identity {
             max_depth: settings.max_depth,
             reuse: settings.reuse,
             windows: settings.windows,
-            adaptive: settings.adaptive,
             settings: format!("{paths:?}{cache}{caustics}"),
             scene: fingerprint::scene(scene),
             camera: fingerprint::camera(&scene.camera),
@@ -85,7 +83,6 @@ impl Identity {
             .or(said("max-depth ", depth(self.max_depth), depth(other.max_depth)))
             .or(said("reuse ", choice(self.reuse), choice(other.reuse)))
             .or(said("windows ", choice(self.windows), choice(other.windows)))
-            .or(said("adaptive ", choice(self.adaptive), choice(other.adaptive)))
             .or((self.scene != other.scene)
                 .then(|| "of another scene, or the scene has changed since".into()))
             .or((self.camera != other.camera).then(|| "seen by another camera".into()))

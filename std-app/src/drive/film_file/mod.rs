@@ -11,10 +11,10 @@ use super::canvas::{Canvas, Shard};
 use super::error::FileError;
 use super::sealed::{self, Kind};
 use crate::save::Patience;
-use halflight_core::film::{GROUPS, PIXELS_PER_TILE, Pixel, Tile};
+use halflight_core::film::{PIXELS_PER_TILE, Pixel, Tile};
 use std::path::Path;
 
-const KIND: Kind = Kind { magic: *b"HLFILM", version: 6, name: "film" };
+const KIND: Kind = Kind { magic: *b"HLFILM", version: 7, name: "film" };
 
 /// Writes `canvas` to `path`, whole or not at all.
 pub(super) fn write(
@@ -31,13 +31,9 @@ pub(super) fn write(
 }
 
 /// Tiles that have samples: the others are not stored.
-fn tiles<'a>(pixels: &'a [Pixel], taken: &'a [[u32; GROUPS]]) -> impl Iterator<Item = &'a [Pixel]> {
+fn tiles<'a>(pixels: &'a [Pixel], taken: &'a [u32]) -> impl Iterator<Item = &'a [Pixel]> {
     let tiles = pixels.chunks(PIXELS_PER_TILE).zip(taken);
-    tiles.filter(|(_, taken)| has_samples(taken)).map(|(pixels, _)| pixels)
-}
-
-fn has_samples(taken: &[u32; GROUPS]) -> bool {
-    taken.iter().any(|taken| *taken > 0)
+    tiles.filter(|(_, taken)| **taken > 0).map(|(pixels, _)| pixels)
 }
 
 /// A film file whose header has been read.
@@ -55,7 +51,7 @@ impl Reader {
         if index >= count || !(1..=MOST_PIXELS).contains(&(u64::from(width) * u64::from(height))) {
             return Err(file.damage("there is no such picture"));
         }
-        file.expect((Tile::count(width, height) * size_of::<[u32; GROUPS]>()) as u64, 1)?;
+        file.expect((Tile::count(width, height) * size_of::<u32>()) as u64, 1)?;
         Ok(Self { file, header })
     }
 
@@ -91,14 +87,14 @@ impl Reader {
     /// Reads the pixels of its tiles into those of `canvas`, a film of the same size.
     pub(super) fn read_into(mut self, canvas: &mut Canvas) -> Result<(), FileError> {
         let [width, height] = self.header.size();
-        let mut taken = vec![[0u32; GROUPS]; Tile::count(width, height)];
+        let mut taken = vec![0u32; Tile::count(width, height)];
         if taken.len() != canvas.taken.len() {
             return Err(self.file.damage("it has another size than it says"));
         }
         self.file.get(bytemuck::cast_slice_mut(&mut taken))?;
         let shard = self.header.shard();
         for (task, pixels) in canvas.film.pixels_mut().chunks_mut(PIXELS_PER_TILE).enumerate() {
-            if !has_samples(&taken[task]) {
+            if taken[task] == 0 {
                 continue;
             }
             if !shard.owns(task) {
@@ -108,7 +104,6 @@ impl Reader {
             canvas.taken[task] = taken[task];
         }
         self.file.finish()?;
-        canvas.rays.iter_mut().zip(self.header.tiles()).for_each(|(rays, more)| *rays += more);
         canvas.counters += self.header.counters();
         canvas.ledger.merge(&self.header.ledger());
         Ok(())

@@ -194,7 +194,7 @@ impl<'a> Caster<'a> {
         let Self { stage, cast, beside_records, photons, each, used, kept } = self;
         let Cast { emission, discs, plenty, .. } = cast;
         let discs = discs.of_pixels(*plenty as f32);
-        while let Some(sample) = crew.next_in_mean().filter(|sample| *sample < end) {
+        while let Some(sample) = crew.next_sample().filter(|sample| *sample < end) {
             let block = Block::of(sample);
             let most = used.caustic.map_or(0, |map| map.given as usize);
             let light_paths = (*each * block.samples() as usize).min(most);
@@ -223,7 +223,7 @@ impl<'a> Caster<'a> {
             };
             let merging = Merging::new([&maps[0], &maps[1]], emission, discs, light_paths as u32);
             let tracer = tracer.with_caustics(merging.beside_records(*beside_records));
-            crew.tiles_in_mean(block.end, scratch, &|task, samples, arena, pixels| {
+            crew.tiles(block.end, scratch, &|task, samples, arena, pixels| {
                 tracer.run(task, samples, WAVE, arena, pixels)
             })?;
         }

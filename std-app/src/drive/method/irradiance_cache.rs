@@ -212,7 +212,7 @@ fn set_up<F: Features, T>(
         is_cut: false,
         begun: 0,
         spent: 0,
-        may_wait: settings.stop.error.is_none() && settings.adaptive == Some(false),
+        may_wait: settings.stop.error.is_none(),
         finer: None,
         has_samples: false,
         lights: None,

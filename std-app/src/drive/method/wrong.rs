@@ -33,8 +33,7 @@ impl<F: Features> Renderer for Wrong<'_, F> {
         crew.tiles(u32::MAX, scratch, &|task, samples, arena, pixels| {
             let tile = Tile::new(*width, *height, task);
             let mut counters = Counters::default();
-            // All groups have the same: it is not adaptive.
-            for sample in samples.from[0]..samples.to[0] {
+            for sample in samples {
                 let mut one = [Pixel::default(); PIXELS_PER_TILE];
                 counters += tracer.run(task, sample..sample + 1, WAVE, arena, &mut one)?;
                 for (i, pixel) in pixels.iter_mut().enumerate() {
