@@ -14,7 +14,7 @@
 //! weights are right as long as all agree on them. But gathered they are not at x, which paths from the eye may meet so rarely
 //! that each that does would be a spike (`docs/decisions/0042-photons-past-the-first-receiver.md`). Nor is light gathered on a disc much
 //! smaller than that where it comes from, as right before the eye: there each photon would be one. Both ends know these two
-//! discs, and so where the one vertex is (`docs/decisions/0045-discs-before-the-eye.md`). With étendue in place of areas
+//! discs, and so where the one vertex is (`docs/decisions/0045-kernel-radii.md`). With étendue in place of areas
 //! (`light/etendue.rs`) distances cancel, and the third over the first is
 //!
 //!   R = N π r² cos θⱼ / p(xⱼ → x₍ⱼ₋₁₎) · Π ρᵢ · p(x₀) p(ω₀) / cos θ₀
