@@ -141,7 +141,7 @@ impl Render {
         let results = if self.json { run.object().to_string() } else { summary::text(&run, reported) };
         let code = match result.ending {
             Ending::Done => ExitCode::SUCCESS,
-            Ending::Interrupted | Ending::Biased => ExitCode::from(3),
+            Ending::Interrupted | Ending::Biased | Ending::NoiseFloor => ExitCode::from(3),
         };
         Ok(outputs.end(&results, code))
     }

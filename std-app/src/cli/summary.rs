@@ -28,10 +28,16 @@ pub(super) fn text(run: &Run, report: Option<&Path>) -> String {
             lines.extend(doubt.map(|doubt| format!("       but {doubt}")));
         }
     }
-    if result.ending == Ending::Biased {
-        lines.push(
+    match result.ending {
+        Ending::Biased => lines.push(
             "       the bias alone is larger than the error asked for: more samples would not help".into(),
-        );
+        ),
+        Ending::NoiseFloor => lines.push(
+            "       noise that all samples share stays above the error asked for: more samples would not help; for an \
+             irradiance cache more rays per record (--cache-rays) would"
+                .into(),
+        ),
+        Ending::Done | Ending::Interrupted => (),
     }
     if let Some(comparison) = run.comparison {
         lines.extend(comparing::text(comparison).lines().map(|line| format!("       {line}")));
@@ -56,13 +62,9 @@ pub(super) fn text(run: &Run, report: Option<&Path>) -> String {
             0 => String::new(),
             loaded => format!(", {loaded} of them loaded,"),
         };
-        let refined = match cache.refined {
-            0 => String::new(),
-            times => format!(", refined {}", plural(times.into(), "time")),
-        };
         let cut = if cache.is_cut { "; cut short: points without a record are path traced" } else { "" };
         lines.push(format!(
-            "cache  {}{loaded} of {} rays in {} by {}{refined}{lost}{cut}",
+            "cache  {}{loaded} of {} rays in {} by {}{lost}{cut}",
             plural(cache.records, "record"),
             cache.rays,
             readable_seconds(cache.seconds),

@@ -21,7 +21,6 @@ mod memory;
 mod merge;
 mod method;
 mod picture;
-mod refinement;
 mod regions;
 mod rounds;
 mod run;
@@ -189,6 +188,8 @@ pub enum Ending {
     Interrupted,
     /// The error that was asked for is out of reach: the bias alone is larger, and more samples leave it as it is.
     Biased,
+    /// The error that was asked for is out of reach: noise that all samples share, as that of records, stays above it.
+    NoiseFloor,
 }
 
 /// Seconds of wall-clock time.

@@ -9,7 +9,6 @@ use super::history::{Clock, Reference, Round};
 use super::kept::Kept;
 use super::ledger::empty_pixels;
 use super::method::{Method, Renderer, Stage};
-use super::refinement::Refinements;
 use super::rounds::{Plan, Rounds};
 use super::told::Told;
 use super::workers::Workers;
@@ -64,18 +63,17 @@ impl Picture<'_> {
         let (width, height) = (settings.width, settings.height);
         let mut canvas = Canvas::new(film, settings.shard);
         canvas.shares = method.shares();
-        let (mut rounds, mut history, mut refinements) = match resumed {
-            None => (Rounds::new(settings.stop), Vec::new(), Refinements::default()),
+        let (mut rounds, mut history) = match resumed {
+            None => (Rounds::new(settings.stop), Vec::new()),
             Some(film) => {
                 let header = film.header.clone();
                 clock.pause(|| film.read_into(&mut canvas))?;
-                let Header { spp, rounds, seconds, estimates, ref refinements, .. } = header;
-                renderer.resume(&refinements.made);
+                let Header { spp, rounds, seconds, estimates, .. } = header;
                 if let (Some(audit), Some(state)) = (&mut audit, header.audit()) {
                     audit.resume(state);
                 }
                 let rounds = Rounds::new(settings.stop).resumed(spp, rounds, seconds, estimates);
-                (rounds, header.history(), header.refinements)
+                (rounds, header.history())
             }
         };
         let reference = clock.pause(|| settings.reference.as_deref().map(Reference::new));
@@ -84,18 +82,14 @@ impl Picture<'_> {
         let (mut estimating, mut estimate) = (ESTIMATING * pixels / workers.count() as f64, 0.0);
         let mut told = None;
         let mut saved = Instant::now();
-        let mut is_lost = false;
+        let mut lost = None;
         let mut kept =
             Kept::in_file(settings.checkpoint.as_ref().map(|checkpoint| checkpoint.path.as_path()));
         let began = Instant::now();
-        let header = |canvas: &Canvas,
-                      rounds: &Rounds,
-                      audit: Option<&Audit>,
-                      refinements: &Refinements,
-                      seconds: f64,
-                      history: &[Round]| {
-            Header::new(identity.clone(), canvas, rounds, audit, refinements, seconds, history)
-        };
+        let header =
+            |canvas: &Canvas, rounds: &Rounds, audit: Option<&Audit>, seconds: f64, history: &[Round]| {
+                Header::new(identity.clone(), canvas, rounds, audit, seconds, history)
+            };
 
         while let Some(plan) = rounds.next(clock.seconds(), estimating) {
             let now = clock.seconds();
@@ -144,15 +138,13 @@ impl Picture<'_> {
                     }
                 }
                 let start = Instant::now();
-                let short = settings.stop.error.zip(found.noise).and_then(|(wanted, noise)| {
-                    refinements.shortfall(wanted, rounds.spp(), noise, found.audited.as_ref())
-                });
-                if let Some(refinement) = short.and_then(|short| renderer.refine(&short)) {
-                    refinements.add(refinement, rounds.spp());
-                }
-                is_lost = !method.converges()
-                    && !refinements.are_young(rounds.spp())
-                    && found.audited.as_ref().is_some_and(|audited| rounds.is_out_of_reach(audited));
+                let has_floor = found.noise.is_some_and(|noise| rounds.has_floor(noise));
+                let is_biased = found.audited.as_ref().is_some_and(|audited| rounds.is_out_of_reach(audited));
+                lost = match () {
+                    () if method.converges() => None,
+                    () if is_biased => Some(Ending::Biased),
+                    () => has_floor.then_some(Ending::NoiseFloor),
+                };
                 error = found.error();
                 rounds.estimated(error);
                 estimating += start.elapsed().as_secs_f64();
@@ -169,8 +161,7 @@ impl Picture<'_> {
             if plan.first || settings.checkpoint.as_ref().is_some_and(|checkpoint| due(checkpoint.every)) {
                 clock.pause(|| {
                     kept.update(|path, patience| {
-                        let header =
-                            header(&canvas, &rounds, audit.as_ref(), &refinements, seconds, &history);
+                        let header = header(&canvas, &rounds, audit.as_ref(), seconds, &history);
                         film_file::write(path, &header, &canvas, patience)
                     });
                 });
@@ -180,7 +171,7 @@ impl Picture<'_> {
             let known = Progress { unsaved, ..rounds.progress(seconds, latest) };
             clock.pause(|| progress(&known));
             // Where the first round was cut, others would be as well.
-            if is_lost || rounds.spp() == 0 || interrupt.load(Ordering::Relaxed) && !plan.first {
+            if lost.is_some() || rounds.spp() == 0 || interrupt.load(Ordering::Relaxed) && !plan.first {
                 break;
             }
         }
@@ -193,7 +184,7 @@ impl Picture<'_> {
         let seconds = clock.seconds();
         clock.pause(|| {
             let write = |path: &Path, patience: Patience| {
-                let header = header(&canvas, &rounds, audit.as_ref(), &refinements, seconds, &history);
+                let header = header(&canvas, &rounds, audit.as_ref(), seconds, &history);
                 film_file::write(path, &header, &canvas, patience)
             };
             if is_last {
@@ -215,7 +206,7 @@ impl Picture<'_> {
             let seconds = clock.seconds();
             clock.pause(|| {
                 kept.finish(patience, |path, patience| {
-                    let header = header(&canvas, &rounds, audit.as_ref(), &refinements, seconds, &history);
+                    let header = header(&canvas, &rounds, audit.as_ref(), seconds, &history);
                     film_file::write(path, &header, &canvas, patience)
                 });
             });
@@ -263,11 +254,7 @@ impl Picture<'_> {
             memory: Vec::new(),
             memory_peak: 0,
             unsaved: kept.failed().into_iter().chain(renderer.kept().and_then(Kept::failed)).collect(),
-            ending: match (interrupted, is_lost) {
-                (true, _) => Ending::Interrupted,
-                (_, true) => Ending::Biased,
-                _ => Ending::Done,
-            },
+            ending: if interrupted { Ending::Interrupted } else { lost.unwrap_or(Ending::Done) },
         })
     }
 }

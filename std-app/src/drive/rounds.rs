@@ -39,6 +39,9 @@ const SELDOM: u32 = 16;
 /// Below this many samples an error estimate is too vague to stop on.
 pub(super) const FEWEST_FOR_ERROR: u32 = 16;
 
+/// Noise is shared by all samples where it has become so many times what one over their number leaves of earlier noise.
+const SHARED: f64 = 2.0;
+
 /// Below this many samples of each audited pixel its light is too rarely seen to end a render for its bias.
 pub(super) const FEWEST_FOR_BIAS: u32 = 64;
 
@@ -55,6 +58,8 @@ pub(super) struct Rounds {
     next_estimate: u32,
     /// The last of these estimates, and at how many samples.
     decision: Option<(u32, ErrorEstimate)>,
+    /// The first noise that is clear enough to compare later noise with, and at how many samples.
+    first_noise: Option<(u32, f64)>,
     /// Where this run began: samples and seconds.
     began: (u32, f64),
     seconds: f64,
@@ -65,6 +70,7 @@ pub(super) struct Rounds {
 pub(super) struct Estimates {
     next: u32,
     last: Option<(u32, [f64; 3])>,
+    first_noise: Option<(u32, f64)>,
 }
 
 /// What a round is to do.
@@ -89,6 +95,7 @@ impl Rounds {
             count: 0,
             next_estimate: FIRST_ESTIMATE,
             decision: None,
+            first_noise: None,
             began: (0, 0.0),
             seconds: 0.0,
         }
@@ -96,12 +103,13 @@ impl Rounds {
 
     /// Goes on after `count` rounds that gave each pixel `spp` samples in `seconds`.
     pub(super) fn resumed(self, spp: u32, count: u32, seconds: f64, estimates: Estimates) -> Self {
-        let Estimates { next, last } = estimates;
+        let Estimates { next, last, first_noise } = estimates;
         Self {
             spp,
             count,
             seconds,
             began: (spp, seconds),
+            first_noise,
             next_estimate: next.max(FIRST_ESTIMATE),
             decision: last.map(|(spp, [relmse, lower, upper])| (spp, ErrorEstimate { relmse, lower, upper })),
             ..self
@@ -121,7 +129,7 @@ impl Rounds {
     /// What a render that goes on later must know.
     pub(super) fn estimates(&self) -> Estimates {
         let last = self.decision.map(|(spp, error)| (spp, [error.relmse, error.lower, error.upper]));
-        Estimates { next: self.next_estimate, last }
+        Estimates { next: self.next_estimate, last, first_noise: self.first_noise }
     }
 
     /// Whether it is time to estimate the error.
@@ -212,6 +220,15 @@ impl Rounds {
         enough && !audited.is_blind && self.stop.error.is_some_and(|wanted| audited.bias.least() > wanted)
     }
 
+    /// Whether `noise` that all samples share stays above the error that was asked for. Noise falls as a + b/n with n samples;
+    /// a shows when even its lower end is far above what b/n would have left, and samples reach no less.
+    pub(super) fn has_floor(&mut self, noise: ErrorEstimate) -> bool {
+        let Some(wanted) = self.stop.error.filter(|_| self.spp >= FEWEST_FOR_ERROR) else { return false };
+        let (before, was) = *self.first_noise.get_or_insert((self.spp, noise.upper));
+        let [n, m] = [before, self.spp].map(f64::from);
+        noise.lower * m > SHARED * was * n && noise.upper * m - was * n > wanted * (m - n)
+    }
+
     fn error_reached(&self) -> bool {
         let (Some(wanted), Some((spp, error))) = (self.stop.error, self.decision) else { return false };
         self.spp == spp && spp >= FEWEST_FOR_ERROR && error.upper <= wanted
@@ -256,6 +273,19 @@ mod tests {
         assert!((1100..=1170).contains(&spp), "{spp}");
         for each in [1e-6, 0.1, 3.0] {
             assert_eq!(run(stop, each).0, spp);
+        }
+    }
+
+    #[test]
+    fn noise_that_samples_share_is_found_and_a_slope_is_none() {
+        for (shared, expected) in [(0.0, None), (8e-4, None), (1.1e-3, Some(256)), (0.01, Some(64))] {
+            let mut rounds = Rounds::new(Stop { error: Some(1e-3), ..Stop::default() });
+            let found = (4..20).map(|k| 1 << k).find(|&spp| {
+                rounds.completed(spp, 0.0);
+                let relmse = shared + 0.1 / f64::from(spp);
+                rounds.has_floor(ErrorEstimate { relmse, lower: 0.9 * relmse, upper: 1.1 * relmse })
+            });
+            assert_eq!(found, expected, "{shared}");
         }
     }
 

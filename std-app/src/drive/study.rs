@@ -139,7 +139,7 @@ impl WithFeatures for Study<'_> {
                     let overture = Overture { tracer: &tracer, gathering, coarse: gathering.flux, size };
                     overture.fill(&mut growing, &mut crew, &mut scratch)?;
                     if pass > 0 {
-                        growing.refine(Some(0.5));
+                        growing.tighten(0.5);
                     }
                 }
                 let error = search.error;

@@ -44,6 +44,7 @@ fn most(run: &Run) -> Value {
             Ending::Done => "done",
             Ending::Interrupted => "interrupted",
             Ending::Biased => "biased",
+            Ending::NoiseFloor => "noise-floor",
         },
         "seconds": {
             "load": run.load_seconds,
@@ -109,7 +110,6 @@ fn cache(run: &Run) -> Value {
         "refused": cache.refused,
         "loaded": cache.loaded,
         "gathered": cache.gathered,
-        "refined": cache.refined,
         "cut": cache.is_cut,
         "seconds": cache.seconds,
         "allowed": settings.cache.allowed(),

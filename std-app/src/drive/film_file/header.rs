@@ -4,7 +4,6 @@ use super::identity::Identity;
 use crate::drive::audit::{self, Audit};
 use crate::drive::canvas::{Canvas, Shard};
 use crate::drive::ledger::Ledger;
-use crate::drive::refinement::Refinements;
 use crate::drive::rounds::{Estimates, Rounds};
 use crate::drive::{ErrorEstimate, Method, Round};
 use halflight_core::film::Dropped;
@@ -30,8 +29,6 @@ pub(in crate::drive) struct Header {
     ledger: Vec<(u32, Causes)>,
     history: Vec<Entry>,
     audit: Option<audit::State>,
-    #[serde(default)]
-    pub(in crate::drive) refinements: Refinements,
 }
 
 /// Not a number, infinite, negative, unfinished.
@@ -46,7 +43,6 @@ impl Header {
         canvas: &Canvas,
         rounds: &Rounds,
         audit: Option<&Audit>,
-        refinements: &Refinements,
         seconds: f64,
         history: &[Round],
     ) -> Self {
@@ -67,7 +63,6 @@ impl Header {
             ledger: ledger.tiles().map(|(task, dropped)| (task, causes(dropped))).collect(),
             history: history.iter().map(|r| (r.seconds, r.spp, r.rays, r.error.map(error))).collect(),
             audit: audit.map(|audit| audit.state().clone()),
-            refinements: refinements.clone(),
         }
     }
 

@@ -1,7 +1,7 @@
 //! Memory of cached pictures beside their records and photons: tables of the strata that may be gathered, working memory
 //! of threads.
 
-use super::cache_settings::{Gather, in_files, is_open};
+use super::cache_settings::{Gather, is_open};
 use super::caustics;
 use super::photons::Laboratory;
 use super::{Method, Stage};
@@ -21,9 +21,6 @@ const BLOCK: usize = 8;
 const FIRST: usize = 16;
 const MOST: usize = 64;
 
-/// The most strata along a side where caches are refined.
-const FINEST: usize = 128;
-
 /// What a picture takes of memory, whatever is left of it for records and photons.
 pub(super) struct Needs {
     /// Strata along a side that may be gathered, the fewest first: fewer than those to begin with, these, and more of them.
@@ -32,8 +29,6 @@ pub(super) struct Needs {
     pub(super) scratch: Footprint,
     /// Whether gather rays end in photons.
     pub(super) by_photons: bool,
-    /// Whether caches may be refined.
-    pub(super) is_refined: bool,
 }
 
 impl Needs {
@@ -43,20 +38,13 @@ impl Needs {
         let gather = settings.cache.gather;
         let is_open = is_open(settings);
         let strata = if is_open { FIRST } else { settings.cache.strata() as usize };
-        let is_refined = settings.stop.error.is_some() && !in_files(settings) && has_indirect_light(settings);
-        let most = match (is_refined, is_open) {
-            (true, _) => FINEST,
-            (_, true) => MOST,
-            _ => strata,
-        };
+        let most = if is_open { MOST } else { strata };
         // As fine as half of the memory allows.
         let has_memory = |n: usize| {
             let scratch = PathTracer::<F>::gather_scratch(n).bytes().saturating_mul(workers.count());
             n <= most && memory.available() / 2 > scratch + 2 * CellFlux::footprint(n).bytes()
         };
-        // With one between, but where caches are refined, which begin anew each time.
-        let between = |n: usize| if n.is_multiple_of(3) { n / 3 * 4 } else { n / 2 * 3 };
-        let more = |n: &usize| Some(if is_refined { 2 * n } else { between(*n) });
+        let more = |n: &usize| Some(if n.is_multiple_of(3) { n / 3 * 4 } else { n / 2 * 3 });
         let finer = core::iter::successors(more(&strata), more).take_while(|n| has_memory(*n));
         let coarse = strata.div_ceil(2 * BLOCK) * BLOCK;
         let sizes: Vec<usize> = [coarse, strata].into_iter().chain(finer).collect();
@@ -65,7 +53,7 @@ impl Needs {
         let by_photons = gather == Gather::Photons && has_indirect_light(settings);
         let scratch = if by_photons { scratch.or(Laboratory::scratch::<F>()) } else { scratch };
         let scratch = if has_caustics { scratch.or(caustics::scratch::<F>()) } else { scratch };
-        Self { sizes, scratch, by_photons, is_refined }
+        Self { sizes, scratch, by_photons }
     }
 
     /// All of it.

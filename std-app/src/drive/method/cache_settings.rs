@@ -61,8 +61,6 @@ pub struct CacheUse {
     pub loaded: u64,
     /// Places at which light was gathered: as many times the rays of a record.
     pub gathered: u64,
-    /// How often they were refined, because the error asked for was out of reach.
-    pub refined: u32,
     /// Rays of each of the last of them.
     pub rays: u32,
     /// They were left as they were when their share of the time was over, or the render was interrupted.

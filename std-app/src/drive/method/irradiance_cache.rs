@@ -25,12 +25,10 @@ use crate::drive::crew::Crew;
 use crate::drive::held_out::EXACT;
 use crate::drive::kept::Kept;
 use crate::drive::memory::Memory;
-use crate::drive::refinement::{Refinement, Shortfall};
 use crate::drive::survey::{self, Survey};
 use crate::drive::workers::Workers;
 use crate::drive::{RenderError, Stop};
 use crate::save::Patience;
-use core::f32::consts::FRAC_PI_2;
 use halflight_core::bsdf::Features;
 use halflight_core::cache::irradiance::{CellFlux, IrradianceCache, Record, metric};
 use halflight_core::memory::{Arena, Footprint, Line};
@@ -38,18 +36,10 @@ use halflight_core::transport::PathTracer;
 use halflight_core::transport::gather::{Gathering, Place};
 use halflight_core::transport::path::WAVE;
 use halflight_core::transport::shoot::Keep;
-use std::collections::VecDeque;
 use std::time::Instant;
 
 /// Which of [`Needs::sizes`] that is.
 const BEGIN: usize = 1;
-
-/// How often caches are refined.
-const MOST_REFINEMENTS: usize = 8;
-
-/// Radii become smaller by a factor between these: squared errors of extrapolation fall with its fourth power.
-const LEAST_SHARE: f32 = 0.35;
-const MOST_SHARE: f32 = 0.8;
 
 /// Pixels for each record that a cache has memory for, where that is not limited.
 const PIXELS_PER_RECORD: usize = 8;
@@ -191,9 +181,6 @@ fn set_up<F: Features, T>(
         tracer: stage.paths::<F>(settings.seed),
         gathering: Gathering { flux: &tables[BEGIN], metric, least_pixels: LEAST_PIXELS },
         tables: &tables,
-        is_refined: needs.is_refined,
-        refined: 0,
-        pending: VecDeque::new(),
         size: [settings.width, settings.height],
         halves: [Growing::new(even, 0), Growing::new(odd, 1)],
         laboratory,
@@ -264,11 +251,6 @@ struct Cached<'a, F> {
     is_filled: bool,
     /// Of each number of strata that may be gathered, the fewest first: see [`Needs::sizes`].
     tables: &'a [CellFlux<'a>],
-    /// Whether caches may be refined, and how often they were.
-    is_refined: bool,
-    refined: usize,
-    /// Refinements that wait until the caches of before are filled.
-    pending: VecDeque<Refinement>,
     /// Whether it is to be found out how many rays records have.
     is_open: bool,
     stop: Stop,
@@ -299,8 +281,7 @@ impl<F: Features> Cached<'_, F> {
             let left = crew.round.deadline.map(|end| end.saturating_duration_since(start).as_secs_f64());
             self.haste = self.stop.seconds.map(|seconds| Haste::new(left.unwrap_or(seconds)));
         }
-        // Those that are refined are not cut before the picture is.
-        let haste = self.haste.filter(|_| self.refined == 0);
+        let haste = self.haste;
         let Self { tracer, gathering, tables, size, halves, laboratory, caster, begun, scratch, .. } = self;
         let mut all = true;
         for (i, half) in halves.iter_mut().enumerate() {
@@ -385,30 +366,9 @@ impl<F: Features> Cached<'_, F> {
         let Some((_, flux)) = self.finer.take() else { return };
         self.gathering.flux = flux;
         self.haste = self.haste.map(|haste| Haste::new(haste.left()));
-        self.begin_anew(None);
-    }
-
-    /// Begins with the records that there are, their radii smaller by `share`, or with none.
-    fn begin_anew(&mut self, share: Option<f32>) {
-        self.halves.iter_mut().for_each(|growing| growing.refine(share));
+        self.halves.iter_mut().for_each(Growing::begin_anew);
         self.begun += 1;
         self.is_filled = false;
-    }
-
-    /// Begins caches that are better.
-    fn begin(&mut self, refinement: Refinement) {
-        let Refinement { share, is_finer } = refinement;
-        let n = self.gathering.flux.n();
-        let Gathering { flux, metric, least_pixels } = &mut self.gathering;
-        let by_curvature = !metric.metric.takes_distances();
-        metric.error *= if by_curvature { share.powi(4) } else { share };
-        *least_pixels *= share;
-        if let Some(finer) = self.tables.iter().find(|table| is_finer && table.n() > n) {
-            *flux = finer;
-        }
-        let keeps = by_curvature && !is_finer;
-        self.begin_anew(keeps.then_some(share));
-        self.refined += 1;
     }
 
     /// Brings the tiles to their targets, as far as these caches are for them.
@@ -432,17 +392,6 @@ impl<F: Features> Cached<'_, F> {
         Ok(())
     }
 
-    /// Whether records expect more error of the noise of their rays than of extrapolation.
-    fn is_noisy(&self) -> bool {
-        let records = self.halves.iter().flat_map(|half| half.cache.records());
-        let parts = records.map(|record| {
-            let noise = record.noise / (record.overlap * record.overlap);
-            [noise, FRAC_PI_2 * record.predicted() * record.predicted()].map(f64::from)
-        });
-        let [noise, all] = parts.fold([0.0; 2], |[a, b], [c, d]| [a + c, b + d]);
-        noise > 0.5 * all
-    }
-
     /// Writes the file on the way, or what is owed for the last time.
     fn keep(&mut self, last: Option<Patience>) {
         for (half, growing) in self.header.halves.iter_mut().zip(&self.halves) {
@@ -461,11 +410,7 @@ impl<F: Features> Renderer for Cached<'_, F> {
         let mut resumed = !self.has_samples && crew.canvas.spp() > 0;
         let counted = crew.canvas.counters;
         loop {
-            while !self.is_filled
-                || self.lights.is_none()
-                || !self.pending.is_empty()
-                || self.is_time_for_finer(crew)
-            {
+            while !self.is_filled || self.lights.is_none() || self.is_time_for_finer(crew) {
                 self.is_filled = self.is_filled || self.fill(crew)?;
                 if !self.is_filled {
                     return Ok(());
@@ -476,8 +421,6 @@ impl<F: Features> Renderer for Cached<'_, F> {
                 }
                 if self.is_time_for_finer(crew) {
                     self.begin_finer();
-                } else if let Some(next) = self.pending.pop_front() {
-                    self.begin(next);
                 }
             }
             self.has_samples = true;
@@ -489,27 +432,6 @@ impl<F: Features> Renderer for Cached<'_, F> {
                 return Ok(());
             }
         }
-    }
-
-    fn refine(&mut self, short: &Shortfall) -> Option<Refinement> {
-        if !self.is_refined || self.refined + self.pending.len() >= MOST_REFINEMENTS {
-            return None;
-        }
-        let has_finer = self.tables.last().is_some_and(|table| table.n() > self.gathering.flux.n());
-        let is_finer = short.noise && has_finer && self.is_noisy();
-        let share = match short.bias {
-            Some(bias) => (bias.powf(-0.25) as f32).clamp(LEAST_SHARE, MOST_SHARE),
-            None if is_finer => 1.0,
-            None => MOST_SHARE,
-        };
-        let refinement = Refinement { share, is_finer };
-        // Where no round follows, the caches stay as the picture knows them.
-        self.pending.push_back(refinement);
-        Some(refinement)
-    }
-
-    fn resume(&mut self, refinements: &[Refinement]) {
-        self.pending = refinements.iter().copied().collect();
     }
 
     fn lend_photons(&mut self, then: &mut Borrower) -> Result<(), RenderError> {
@@ -543,7 +465,6 @@ impl<F: Features> Renderer for Cached<'_, F> {
             refused: sum(|cache| cache.refused()),
             loaded: gathered(self.loaded.map(|half| half.records)),
             gathered: gathered([0, 1].map(|i| self.halves[i].gathered() - self.loaded[i].gathered)),
-            refined: self.refined as u32,
             rays: self.gathering.flux.n().pow(2) as u32,
             is_cut: self.is_cut,
             seconds: self.seconds,

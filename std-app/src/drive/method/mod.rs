@@ -34,7 +34,6 @@ pub use photons::{MapUse, PhotonSettings, PhotonUse};
 use super::crew::Crew;
 use super::kept::Kept;
 use super::memory::Memory;
-use super::refinement::{Refinement, Shortfall};
 use super::run::path_settings;
 use super::survey::Survey;
 use super::workers::Workers;
@@ -200,8 +199,8 @@ pub(super) trait Renderer {
 
     /// One round: brings the tiles of `crew` to their targets, or less where the round is cut.
     ///
-    /// What sample `n` of a pixel sees follows from the scene, the settings, and `n`, and from the weights and refinements
-    /// that a film keeps: neither from how samples are cut
+    /// What sample `n` of a pixel sees follows from the scene, the settings, and `n`, and from the weights that
+    /// a film keeps: neither from how samples are cut
     /// into rounds, nor from threads, nor from what was rendered before a film was resumed. What samples of several
     /// pixels share is drawn anew, or kept twice, for even and odd `n`: the halves of the film stay independent, and
     /// their difference tells of all that is random.
@@ -210,12 +209,6 @@ pub(super) trait Renderer {
     /// Memory that does not suffice.
     fn round(&mut self, crew: &mut Crew) -> Result<(), RenderError>;
 
-    /// Asked where samples alone do not bring the error that was asked for: refines what its samples share, before the next
-    /// of them, and says how; `None` where that cannot be. Sample `n` then follows from what was refined before it, too.
-    fn refine(&mut self, _short: &Shortfall) -> Option<Refinement> {
-        None
-    }
-
     /// Lends `then` the photons of caustics that the picture has now, for paths without records; none where it has none.
     ///
     /// # Errors
@@ -223,9 +216,6 @@ pub(super) trait Renderer {
     fn lend_photons(&mut self, then: &mut Borrower) -> Result<(), RenderError> {
         then(None)
     }
-
-    /// Refines as it did before a film was kept, one after the other.
-    fn resume(&mut self, _refinements: &[Refinement]) {}
 
     /// Whether neighbouring pixels share what their paths find.
     fn reuse(&self) -> Reuse {

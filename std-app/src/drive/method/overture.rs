@@ -51,7 +51,7 @@ pub(in crate::drive) struct Growing<'a> {
     before: usize,
     /// Places at which it has gathered.
     gathered: u32,
-    /// Records of a file, or of before a refinement.
+    /// Records of a file, or of wider ones of a study.
     loaded: usize,
     /// Rays for each path, of each of the records that came then.
     efforts: Vec<f32>,
@@ -102,18 +102,21 @@ impl<'a> Growing<'a> {
         self.gathered
     }
 
-    /// Begins again, with the records that there are, their radii smaller by `share`, or with none.
-    pub(in crate::drive) fn refine(&mut self, share: Option<f32>) {
-        match share {
-            Some(share) => self.cache.scale_radii(share),
-            None => self.cache.restore(&[]),
-        }
-        self.loaded = self.cache.records().len();
+    /// Begins again with no records.
+    pub(in crate::drive) fn begin_anew(&mut self) {
+        self.cache.restore(&[]);
+        self.begin();
+    }
+
+    /// Begins again beside the records that there are, their radii smaller by `share`.
+    pub(in crate::drive) fn tighten(&mut self, share: f32) {
+        self.cache.scale_radii(share);
         self.begin();
     }
 
     /// Looks for all from the beginning, beside the records of before.
     fn begin(&mut self) {
+        self.loaded = self.cache.records().len();
         self.efforts.clear();
         self.places.truncate(self.loaded);
         (self.sight, self.next, self.sweeps, self.before) = (Some(Sight::Clear), 0, 0, self.loaded);

@@ -56,6 +56,10 @@ fn early(run: &Run) -> &'static str {
             " It was stopped because its bias alone is larger than the error that was asked for: more samples would \
              not help, another method would."
         }
+        Ending::NoiseFloor => {
+            " It was stopped because noise that all samples share stays above the error that was asked for: more \
+             samples would not help."
+        }
     }
 }
 
