@@ -1,7 +1,7 @@
 //! An irradiance cache beside photons of caustics: nothing is counted twice, the same bits on any number of threads, records
 //! come first where memory is short, and the audit asks the same photons.
 
-use halflight::drive::{Checkpoint, Gather, Method, RenderResult, Settings, Stop};
+use halflight::drive::{Checkpoint, Gather, Method, RenderResult, Settings};
 use halflight_core::scene::Scene;
 use halflight_tests::render::{difference, has_photons, render, try_render};
 use halflight_tests::scenes::{SceneBuffers, glass, in_a_room, lamp_before, lamp_over_ball, metal};

@@ -5,7 +5,7 @@
 
 use super::estimator::{Counters, PathSettings};
 use super::outline::outlined;
-use super::path::PathTracer;
+use super::path::{LIGHT_SAMPLES, PathTracer};
 use super::reuse::Exchange;
 use super::wave::{Path, Share, Wave};
 use crate::Rgb;
@@ -140,7 +140,7 @@ impl<F: Features> PathTracer<'_, F> {
             share: if places.outlined.contains(place) { Share::BESIDE_LAMP } else { Share::ALL },
             triangle: MISS,
             eta_squared: 1.0,
-            lights: self.asked as u16,
+            lights: if self.has_cutouts { 1 } else { LIGHT_SAMPLES as u16 },
             ..Path::default()
         };
         wave.exchanges[*count] = exchange;

@@ -74,8 +74,7 @@ pub(super) struct Options {
     /// Interpolation error; smaller means more records [default: 1e-4; min-distance and split spheres: 0.3]
     #[arg(long, value_name = "ERROR", value_parser = values::positive, help_heading = "Irradiance cache")]
     cache_error: Option<f64>,
-    /// Gather rays per record: 64, 256, 576, 1024, 2304 or 4096 [default: by the number of samples; 1024 with
-    /// --load-cache and --save-cache]
+    /// Gather rays per record: 64, 256, 576, 1024, 2304 or 4096 [default: 256]
     #[arg(long, value_name = "N", value_parser = values::gather_rays, help_heading = "Irradiance cache")]
     cache_rays: Option<u32>,
     /// Light at the hits of gather rays: path traced, or from a photon map [default: paths]

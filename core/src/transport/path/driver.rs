@@ -2,7 +2,7 @@
 //! (pbrt-v4, chapter 15). Queues are compacted in place: the ray of a path that goes on overwrites one that was already
 //! shaded.
 
-use super::{BLOCK, LIGHTS, PathTracer, SurfaceInteraction};
+use super::{BLOCK, LIGHT_SAMPLES, PathTracer, SurfaceInteraction};
 use crate::bsdf::Features;
 use crate::bvh::Coherence;
 use crate::sampling::Sampler;
@@ -56,7 +56,7 @@ impl<'a, F: Features> PathTracer<'a, F> {
             }
             let (ray, hit) = (wave.rays[i], wave.hits[i]);
             // Several lights at a vertex have no place where all vertices are lit. Not through cut-outs, which have one each.
-            if shadows + LIGHTS > wave.shadow_rays.len() && !self.has_cutouts {
+            if shadows + LIGHT_SAMPLES > wave.shadow_rays.len() && !self.has_cutouts {
                 counters.shadow_rays += shadows as u64;
                 self.trace_shadow_rays(wave, core::mem::take(&mut shadows));
             }

@@ -50,8 +50,8 @@ pub const WAVE: usize = 2048;
 /// Vertices that are looked at together before they are shaded.
 pub(super) const BLOCK: usize = POINTS;
 
-/// The most points of lights that a vertex asks.
-pub const LIGHTS: usize = 4;
+/// Light samples of a path of the picture at a vertex whose other light a cache knows.
+pub(super) const LIGHT_SAMPLES: usize = 4;
 
 /// Path tracing of one scene: a pass whose tasks are the tiles of the picture.
 #[derive(Clone, Copy)]
@@ -74,8 +74,6 @@ pub struct PathTracer<'a, F> {
     merging: Option<Merging<'a>>,
     /// Light that was reflected before, where caches do not know it: of even and of odd samples.
     pub(super) bounced: Option<[GatherLight<'a>; 2]>,
-    /// Points of lights that paths of the picture ask where a shadow ray alone finds direct light.
-    pub(super) asked: u32,
     /// Light that is not all shared, for each sample; see `reuse.rs`.
     pub(super) flash: f32,
     features: PhantomData<F>,
@@ -107,7 +105,6 @@ impl<'a, F: Features> PathTracer<'a, F> {
             maps: None,
             merging: None,
             bounced: None,
-            asked: 1,
             flash: f32::INFINITY,
             features: PhantomData,
         }
@@ -129,13 +126,6 @@ impl<'a, F: Features> PathTracer<'a, F> {
     /// light from photons that were reflected before: even samples from the first, odd ones from the second.
     pub fn with_bounced(&self, photons: [GatherLight<'a>; 2]) -> Self {
         Self { bounced: Some(photons), ..*self }
-    }
-
-    /// The same, where a path of the picture asks so many points of lights, [`LIGHTS`] at most, at a vertex whose other light a
-    /// cache knows. Not where surfaces have cut-outs.
-    pub fn with_lights(&self, count: usize) -> Self {
-        let most = if self.has_cutouts { 1 } else { LIGHTS };
-        Self { asked: count.clamp(1, most) as u32, ..*self }
     }
 
     /// The same, where surfaces with a diffuse part have from photons what light is reflected onto them. Pixels must

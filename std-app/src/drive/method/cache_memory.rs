@@ -1,13 +1,12 @@
 //! Memory of cached pictures beside their records and photons: tables of the strata that may be gathered, working memory
 //! of threads.
 
-use super::cache_settings::{Gather, is_open};
+use super::cache_settings::Gather;
 use super::caustics;
 use super::photons::Laboratory;
 use super::{Method, Stage};
 use crate::drive::Settings;
 use crate::drive::audit::Audit;
-use crate::drive::memory::Memory;
 use halflight_core::bsdf::Features;
 use halflight_core::cache::irradiance::{CellFlux, IrradianceCache};
 use halflight_core::memory::Footprint;
@@ -17,14 +16,10 @@ use halflight_core::transport::path::WAVE;
 /// Strata along a side are multiples of this.
 const BLOCK: usize = 8;
 
-/// Strata along a side of the first records where a trial chooses the number of rays, and the most that it may choose.
-const FIRST: usize = 16;
-const MOST: usize = 64;
-
 /// What a picture takes of memory, whatever is left of it for records and photons.
 pub(super) struct Needs {
-    /// Strata along a side that may be gathered, the fewest first: fewer than those to begin with, these, and more of them.
-    pub(super) sizes: Vec<usize>,
+    /// Strata along a side that are gathered: for what rough surfaces see, and else.
+    pub(super) strata: [usize; 2],
     /// Of each thread.
     pub(super) scratch: Footprint,
     /// Whether gather rays end in photons.
@@ -33,32 +28,21 @@ pub(super) struct Needs {
 
 impl Needs {
     /// With photons of caustics or without.
-    pub(super) fn of<F: Features>(stage: &Stage, memory: &Memory, has_caustics: bool) -> Self {
-        let Stage { settings, workers, .. } = *stage;
+    pub(super) fn of<F: Features>(stage: &Stage, has_caustics: bool) -> Self {
+        let Stage { settings, .. } = *stage;
         let gather = settings.cache.gather;
-        let is_open = is_open(settings);
-        let strata = if is_open { FIRST } else { settings.cache.strata() as usize };
-        let most = if is_open { MOST } else { strata };
-        // As fine as half of the memory allows.
-        let has_memory = |n: usize| {
-            let scratch = PathTracer::<F>::gather_scratch(n).bytes().saturating_mul(workers.count());
-            n <= most && memory.available() / 2 > scratch + 2 * CellFlux::footprint(n).bytes()
-        };
-        let more = |n: &usize| Some(if n.is_multiple_of(3) { n / 3 * 4 } else { n / 2 * 3 });
-        let finer = core::iter::successors(more(&strata), more).take_while(|n| has_memory(*n));
+        let strata = settings.cache.strata() as usize;
         let coarse = strata.div_ceil(2 * BLOCK) * BLOCK;
-        let sizes: Vec<usize> = [coarse, strata].into_iter().chain(finer).collect();
-        let finest = sizes.last().copied().unwrap_or(strata);
-        let scratch = PathTracer::<F>::scratch(WAVE).or(PathTracer::<F>::gather_scratch(finest));
+        let scratch = PathTracer::<F>::scratch(WAVE).or(PathTracer::<F>::gather_scratch(strata));
         let by_photons = gather == Gather::Photons && has_indirect_light(settings);
         let scratch = if by_photons { scratch.or(Laboratory::scratch::<F>()) } else { scratch };
         let scratch = if has_caustics { scratch.or(caustics::scratch::<F>()) } else { scratch };
-        Self { sizes, scratch, by_photons }
+        Self { strata: [coarse, strata], scratch, by_photons }
     }
 
     /// All of it.
     pub(super) fn bytes(&self, stage: &Stage) -> usize {
-        let tables: usize = self.sizes.iter().map(|&n| CellFlux::footprint(n).bytes()).sum();
+        let tables: usize = self.strata.iter().map(|&n| CellFlux::footprint(n).bytes()).sum();
         let scratch = self.scratch.bytes().saturating_mul(stage.workers.count());
         scratch.saturating_add(tables)
     }

@@ -1,6 +1,5 @@
 //! What is asked of irradiance caches, and what became of them.
 
-use crate::drive::Settings;
 use halflight_core::cache::irradiance::{Metric, metric};
 
 /// How an irradiance cache is filled.
@@ -11,7 +10,7 @@ pub struct CacheSettings {
     /// Error allowed, in the unit of the metric; `None`: its usual one.
     pub error: Option<f32>,
     /// Strata along a side of the hemisphere that is gathered: its square is the number of rays of a record. `None`:
-    /// as many as the picture is better for; [`CacheSettings::STRATA`] where records are kept in a file, and in a study.
+    /// [`CacheSettings::STRATA`].
     pub strata: Option<u32>,
     /// How the rays of a record find light.
     pub gather: Gather,
@@ -19,7 +18,7 @@ pub struct CacheSettings {
 
 impl CacheSettings {
     /// Strata along a side where nothing else is asked for.
-    pub const STRATA: u32 = 32;
+    pub const STRATA: u32 = 16;
 
     /// Strata along a side that are wanted.
     pub fn strata(&self) -> u32 {
@@ -61,20 +60,10 @@ pub struct CacheUse {
     pub loaded: u64,
     /// Places at which light was gathered: as many times the rays of a record.
     pub gathered: u64,
-    /// Rays of each of the last of them.
+    /// Rays of each of them.
     pub rays: u32,
     /// They were left as they were when their share of the time was over, or the render was interrupted.
     pub is_cut: bool,
     /// Seconds of the overture.
     pub seconds: f64,
-}
-
-/// Whether records are of a file, or go to one: they have one error and one number of rays.
-pub(super) fn in_files(settings: &Settings) -> bool {
-    settings.save_cache.is_some() || settings.load_cache.is_some()
-}
-
-/// Whether it is to be found out how many rays records have.
-pub(super) fn is_open(settings: &Settings) -> bool {
-    settings.cache.strata.is_none() && !in_files(settings)
 }

@@ -183,18 +183,17 @@ impl<'a> Caster<'a> {
         Ok(alone.is_worse_than(&pilot, shared, rays as f64 / (2.0 * pixels)))
     }
 
-    /// Brings the tiles of `crew` to their targets, or to `end` samples, by `tracer`, joined with photons; less where the round is cut.
+    /// Brings the tiles of `crew` to their targets by `tracer`, joined with photons; less where the round is cut.
     pub(super) fn round<F: Features>(
         &mut self,
         tracer: &PathTracer<F>,
-        end: u32,
         scratch: &mut [Vec<Line>],
         crew: &mut Crew,
     ) -> Result<(), RenderError> {
         let Self { stage, cast, beside_records, photons, each, used, kept } = self;
         let Cast { emission, discs, plenty, .. } = cast;
         let discs = discs.of_pixels(*plenty as f32);
-        while let Some(sample) = crew.next_sample().filter(|sample| *sample < end) {
+        while let Some(sample) = crew.next_sample() {
             let block = Block::of(sample);
             let most = used.caustic.map_or(0, |map| map.given as usize);
             let light_paths = (*each * block.samples() as usize).min(most);
@@ -230,25 +229,23 @@ impl<'a> Caster<'a> {
         Ok(())
     }
 
-    /// Photons for rays that gather for cache number 0 or 1, which has `begun` anew so many times; `None` where the round is
-    /// over. Each time they are others, of smaller discs, as if they served the next samples.
+    /// Photons for rays that gather for cache number 0 or 1; `None` where the round is over.
     pub(super) fn for_records<F: Features>(
         &mut self,
-        (half, begun): (u32, u32),
+        half: u32,
         scratch: &mut [Vec<Line>],
         crew: &mut Crew,
     ) -> Result<Option<ForRecords<'_>>, RenderError> {
         let Self { stage, cast: Cast { emission, discs, .. }, photons, used, kept, .. } = self;
         *kept = None;
         let paths = used.caustic.map_or(0, |map| map.given as usize).div_ceil(RECORD_PART);
-        let sample = 2 * begun + half;
-        let from = (discs.of_pixels(RECORD_RADIUS), sample);
+        let from = (discs.of_pixels(RECORD_RADIUS), half);
         let (shooter, discs) = shooter::<F>(stage, emission, paths, from, true);
         let [even, odd] = photons;
         let lines = if half == 0 { even } else { odd };
         let workers = crew.workers;
         let pass: Pass = &mut |photons, scratch, run| Ok(crew.pass(photons, ROOM, scratch, run)?);
-        let map = shoot(&shooter, RECORD_MAP + sample, lines, scratch, (pass, workers), used)?;
+        let map = shoot(&shooter, RECORD_MAP + half, lines, scratch, (pass, workers), used)?;
         Ok(map.map(|map| ForRecords { map, emission, discs, paths: paths as u32 }))
     }
 

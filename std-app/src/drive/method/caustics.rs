@@ -268,7 +268,7 @@ struct Joined<'a, F> {
 impl<F: Features> Renderer for Joined<'_, F> {
     fn round(&mut self, crew: &mut Crew) -> Result<(), RenderError> {
         let Paths { tracer, scratch, .. } = &mut self.paths;
-        self.caster.round(tracer, u32::MAX, scratch, crew)
+        self.caster.round(tracer, scratch, crew)
     }
 
     fn reuse(&self) -> Reuse {

@@ -25,11 +25,6 @@ impl Haste {
         let seconds = 0.5 * SHARE * self.seconds * (half as f64 + 1.0);
         self.start.checked_add(Duration::try_from_secs_f64(seconds.max(0.0)).ok()?)
     }
-
-    /// Seconds that the picture has left.
-    pub(super) fn left(&self) -> f64 {
-        (self.seconds - self.start.elapsed().as_secs_f64()).max(0.0)
-    }
 }
 
 #[cfg(test)]

@@ -3,14 +3,12 @@
 //! Two caches that know nothing of each other serve the even and the odd samples, so that the halves of the film tell the
 //! errors of records too.
 //!
-//! The first round begins with the overture of both, for which it has half of the time if that is limited (`haste.rs`), and
-//! again with more rays for each record where these are worth it (`balance.rs`).
+//! The first round begins with the overture of both, for which it has half of the time if that is limited (`haste.rs`).
 //! Then caches are frozen; a point that no record reaches is path traced, as is every surface that is not diffuse. Caches
 //! can be kept in a file, and be the first records of another picture of the same scene.
 
-use super::balance::{Account, Trial};
 use super::cache_memory::{Needs, has_indirect_light};
-use super::cache_settings::{CacheUse, is_open};
+use super::cache_settings::CacheUse;
 use super::caster::{Cast, Caster};
 use super::caustics::{self, CausticUse};
 use super::haste::Haste;
@@ -37,9 +35,6 @@ use halflight_core::transport::gather::{Gathering, Place};
 use halflight_core::transport::path::WAVE;
 use halflight_core::transport::shoot::Keep;
 use std::time::Instant;
-
-/// Which of [`Needs::sizes`] that is.
-const BEGIN: usize = 1;
 
 /// Pixels for each record that a cache has memory for, where that is not limited.
 const PIXELS_PER_RECORD: usize = 8;
@@ -85,7 +80,7 @@ fn find_caustics<'l, F: Features>(
     if !caustics::are_possible(stage) {
         return Ok((None, CausticUse::default()));
     }
-    let needs = Needs::of::<F>(stage, memory, true);
+    let needs = Needs::of::<F>(stage, true);
     // As much for records as for photons.
     let others = needs.bytes(stage).saturating_add(needs.later::<F>(stage, fewest));
     let others = others.saturating_add(caustics::least_photons());
@@ -128,16 +123,16 @@ fn set_up<F: Features, T>(
     then: impl FnOnce(&mut dyn Renderer, &mut Memory) -> Result<T, RenderError>,
 ) -> Result<T, RenderError> {
     let Stage { scene, bvh, settings, workers, .. } = *stage;
-    let needs = Needs::of::<F>(stage, memory, cast.is_some());
+    let needs = Needs::of::<F>(stage, cast.is_some());
     let mut scratch = memory.take_each("paths", needs.scratch, workers.count())?;
-    let mut tables = Vec::new();
-    for &n in &needs.sizes {
-        tables.push(memory.take("gathering", CellFlux::footprint(n))?);
-    }
-    let tables = needs.sizes.iter().zip(&mut tables);
-    let tables = tables
-        .map(|(&n, lines)| CellFlux::build(n, &mut Arena::new(bytemuck::cast_slice_mut(lines))))
-        .collect::<Result<Vec<_>, _>>()?;
+    let [coarse, strata] = needs.strata;
+    let mut tables = [
+        memory.take("gathering", CellFlux::footprint(coarse))?,
+        memory.take("gathering", CellFlux::footprint(strata))?,
+    ];
+    let [a, b] = &mut tables;
+    let coarse = CellFlux::build(coarse, &mut Arena::new(bytemuck::cast_slice_mut(a)))?;
+    let flux = CellFlux::build(strata, &mut Arena::new(bytemuck::cast_slice_mut(b)))?;
     let fewest = loaded.fewest();
     let caster = match cast {
         Some(cast) => {
@@ -179,8 +174,8 @@ fn set_up<F: Features, T>(
     let metric = metric::Settings { error: settings.cache.allowed(), ..usual };
     let mut method = Cached {
         tracer: stage.paths::<F>(settings.seed),
-        gathering: Gathering { flux: &tables[BEGIN], metric, least_pixels: LEAST_PIXELS },
-        tables: &tables,
+        gathering: Gathering { flux: &flux, metric, least_pixels: LEAST_PIXELS },
+        coarse: &coarse,
         size: [settings.width, settings.height],
         halves: [Growing::new(even, 0), Growing::new(odd, 1)],
         laboratory,
@@ -193,16 +188,9 @@ fn set_up<F: Features, T>(
         header: loaded.header,
         kept: Kept::in_file(settings.save_cache.as_deref()),
         is_filled: false,
-        is_open: is_open(settings),
         stop: settings.stop,
         haste: None,
         is_cut: false,
-        begun: 0,
-        spent: 0,
-        may_wait: settings.stop.error.is_none(),
-        finer: None,
-        has_samples: false,
-        lights: None,
         seconds: 0.0,
     };
     let is_served = !has_indirect_light(settings) || method.header.serves(&method.view);
@@ -221,11 +209,6 @@ fn set_up<F: Features, T>(
 fn capacity_of(bytes: usize) -> usize {
     let places = IrradianceCache::capacity_of(bytes).saturating_mul(size_of::<Place>());
     IrradianceCache::capacity_of(bytes.saturating_sub(places))
-}
-
-/// Strata of half the side, or the next more that there are.
-fn coarser<'t>(tables: &'t [CellFlux<'t>], flux: &'t CellFlux<'t>) -> &'t CellFlux<'t> {
-    tables.iter().find(|table| 2 * table.n() >= flux.n()).unwrap_or(flux)
 }
 
 /// See the file.
@@ -249,48 +232,32 @@ struct Cached<'a, F> {
     /// Where they are kept.
     kept: Kept<'a>,
     is_filled: bool,
-    /// Of each number of strata that may be gathered, the fewest first: see [`Needs::sizes`].
-    tables: &'a [CellFlux<'a>],
-    /// Whether it is to be found out how many rays records have.
-    is_open: bool,
+    /// Tables of fewer strata, for what rough surfaces see.
+    coarse: &'a CellFlux<'a>,
     stop: Stop,
     /// When caches must be filled, where there is a limit of time, from the first time on that they are.
     haste: Option<Haste>,
     is_cut: bool,
-    /// How often caches began anew.
-    begun: u32,
-    /// Rays of caches.
-    spent: u64,
-    /// Whether the first samples may have coarser caches than those that follow, and from which sample on records have more
-    /// rays, where they are worth it.
-    may_wait: bool,
-    finer: Option<(u32, &'a CellFlux<'a>)>,
-    /// Whether samples were taken since the render or its resumption began.
-    has_samples: bool,
-    /// Points of lights that are asked, when that is known.
-    lights: Option<usize>,
     seconds: f64,
 }
 
 impl<F: Features> Cached<'_, F> {
     /// Fills both halves, or goes on with it, and keeps them; whether that is done: not where the round is over.
     fn fill(&mut self, crew: &mut Crew) -> Result<bool, RenderError> {
-        let (start, counted) = (Instant::now(), crew.canvas.counters.all_rays());
+        let start = Instant::now();
         if self.haste.is_none() {
             // A film that goes on has the time that is left.
             let left = crew.round.deadline.map(|end| end.saturating_duration_since(start).as_secs_f64());
             self.haste = self.stop.seconds.map(|seconds| Haste::new(left.unwrap_or(seconds)));
         }
-        let haste = self.haste;
-        let Self { tracer, gathering, tables, size, halves, laboratory, caster, begun, scratch, .. } = self;
+        let Self { tracer, gathering, coarse, haste, size, halves, laboratory, caster, scratch, .. } = self;
         let mut all = true;
         for (i, half) in halves.iter_mut().enumerate() {
             let (photons, built);
             let mut tracer = *tracer;
             // Where depth is limited, rays that gather ask for none.
             if let Some(caster) = caster.as_mut().filter(|_| !half.is_finished() && !tracer.is_limited()) {
-                let map = (i as u32, *begun);
-                let Some(found) = caster.for_records::<F>(map, scratch, crew)? else {
+                let Some(found) = caster.for_records::<F>(i as u32, scratch, crew)? else {
                     all = false;
                     break;
                 };
@@ -306,8 +273,7 @@ impl<F: Features> Cached<'_, F> {
                 tracer = tracer.with_bounced([laboratory.gathered(&built); 2]);
             }
             let until = haste.and_then(|haste| haste.end(i));
-            let coarse = coarser(tables, gathering.flux);
-            let overture = Overture { tracer: &tracer, gathering: *gathering, coarse, size: *size };
+            let overture = Overture { tracer: &tracer, gathering: *gathering, coarse: *coarse, size: *size };
             if !crew.hurry(until, |crew| overture.fill(half, crew, scratch))? {
                 if crew.is_over() {
                     all = false;
@@ -328,54 +294,14 @@ impl<F: Features> Cached<'_, F> {
             }
         }
         self.keep(None);
-        self.spent += crew.canvas.counters.all_rays() - counted;
         self.seconds += start.elapsed().as_secs_f64();
         Ok(all)
     }
 
-    /// Tries out the caches: whether finer ones should follow, and how many points of lights are asked. Whether that is done.
-    fn try_out(&mut self, crew: &mut Crew) -> Result<bool, RenderError> {
-        let Self { tracer, halves: [even, odd], tables, stop, scratch, .. } = self;
-        let is_asked = self.is_open && !self.is_cut;
-        let caches = ([&even.cache, &odd.cache], is_asked);
-        let Some(trial) = Trial::of(tracer, caches, crew, scratch)? else { return Ok(false) };
-        let rays = self.spent as f64;
-        let left = self.haste.map(|haste| haste.left() * rays / self.seconds.max(f64::MIN_POSITIVE));
-        let account = Account { records: rays, left, by_photons: self.laboratory.is_some() };
-        if is_asked && !trial.is_short(stop, &account) {
-            let Some(noise) = trial.noise(tracer, &even.cache, crew, scratch)? else { return Ok(false) };
-            let n = self.gathering.flux.n();
-            let times = |table: &CellFlux| (table.n() as f64 / n as f64).powi(2);
-            let finer: Vec<f64> = tables.iter().map(times).filter(|times| *times > 1.0).collect();
-            if let Some((best, from)) = trial.finer(&finer, noise, stop, &account) {
-                let from = if self.may_wait { from } else { 0 };
-                self.finer = tables.iter().find(|table| times(table) == best).map(|flux| (from, flux));
-            }
-        }
-        self.lights = Some(trial.lights);
-        Ok(true)
-    }
-
-    /// Whether it is time for records of more rays.
-    fn is_time_for_finer(&self, crew: &Crew) -> bool {
-        self.finer.zip(crew.next_sample()).is_some_and(|((from, _), sample)| sample >= from)
-    }
-
-    /// Begins caches of records of more rays.
-    fn begin_finer(&mut self) {
-        let Some((_, flux)) = self.finer.take() else { return };
-        self.gathering.flux = flux;
-        self.haste = self.haste.map(|haste| Haste::new(haste.left()));
-        self.halves.iter_mut().for_each(Growing::begin_anew);
-        self.begun += 1;
-        self.is_filled = false;
-    }
-
-    /// Brings the tiles to their targets, as far as these caches are for them.
+    /// Brings the tiles to their targets.
     fn take_samples(&mut self, crew: &mut Crew) -> Result<(), RenderError> {
-        let end = self.finer.map_or(u32::MAX, |(from, _)| from);
-        let Self { tracer, halves: [even, odd], scratch, lights, laboratory, caster, .. } = self;
-        let mut tracer = tracer.with_caches([&even.cache, &odd.cache]).with_lights(lights.unwrap_or(1));
+        let Self { tracer, halves: [even, odd], scratch, laboratory, caster, .. } = self;
+        let mut tracer = tracer.with_caches([&even.cache, &odd.cache]);
         let built;
         if let Some((laboratory, [even, odd])) = laboratory {
             let Some(even) = laboratory.build::<F>(even, 0, crew, scratch)? else { return Ok(()) };
@@ -384,9 +310,9 @@ impl<F: Features> Cached<'_, F> {
             tracer = tracer.with_bounced(built.each_ref().map(|built| laboratory.gathered(built)));
         }
         if let Some(caster) = caster {
-            return caster.round(&tracer, end, scratch, crew);
+            return caster.round(&tracer, scratch, crew);
         }
-        crew.tiles(end, scratch, &|task, samples, arena, pixels| {
+        crew.tiles(u32::MAX, scratch, &|task, samples, arena, pixels| {
             tracer.run(task, samples, WAVE, arena, pixels)
         })?;
         Ok(())
@@ -407,31 +333,16 @@ impl<F: Features> Cached<'_, F> {
 impl<F: Features> Renderer for Cached<'_, F> {
     fn round(&mut self, crew: &mut Crew) -> Result<(), RenderError> {
         // A film that goes on has the rays of all this already.
-        let mut resumed = !self.has_samples && crew.canvas.spp() > 0;
+        let is_resumed = !self.is_filled && crew.canvas.spp() > 0;
         let counted = crew.canvas.counters;
-        loop {
-            while !self.is_filled || self.lights.is_none() || self.is_time_for_finer(crew) {
-                self.is_filled = self.is_filled || self.fill(crew)?;
-                if !self.is_filled {
-                    return Ok(());
-                }
-                // By the first caches, also where a film goes on with later ones.
-                if self.lights.is_none() && !self.try_out(crew)? {
-                    return Ok(());
-                }
-                if self.is_time_for_finer(crew) {
-                    self.begin_finer();
-                }
-            }
-            self.has_samples = true;
-            if core::mem::take(&mut resumed) {
-                crew.canvas.counters = counted;
-            }
-            self.take_samples(crew)?;
-            if !self.is_time_for_finer(crew) {
-                return Ok(());
-            }
+        self.is_filled = self.is_filled || self.fill(crew)?;
+        if !self.is_filled {
+            return Ok(());
         }
+        if is_resumed {
+            crew.canvas.counters = counted;
+        }
+        self.take_samples(crew)
     }
 
     fn lend_photons(&mut self, then: &mut Borrower) -> Result<(), RenderError> {

@@ -5,7 +5,6 @@
 //! with its words, a file with its [`Renderer`], a line in [`Method::with`].
 
 mod aiming;
-mod balance;
 mod cache_memory;
 mod cache_settings;
 mod caster;

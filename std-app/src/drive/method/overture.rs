@@ -102,20 +102,9 @@ impl<'a> Growing<'a> {
         self.gathered
     }
 
-    /// Begins again with no records.
-    pub(in crate::drive) fn begin_anew(&mut self) {
-        self.cache.restore(&[]);
-        self.begin();
-    }
-
     /// Begins again beside the records that there are, their radii smaller by `share`.
     pub(in crate::drive) fn tighten(&mut self, share: f32) {
         self.cache.scale_radii(share);
-        self.begin();
-    }
-
-    /// Looks for all from the beginning, beside the records of before.
-    fn begin(&mut self) {
         self.loaded = self.cache.records().len();
         self.efforts.clear();
         self.places.truncate(self.loaded);
