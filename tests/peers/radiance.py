@@ -61,11 +61,8 @@ FINE = [(0.5, 16, 256, 8, 0.05), (0.4, 16, 512, 8, 0.05), (0.5, 16, 256, 8, 0.2)
 SWEEP = [(*settings, 5, 0.2) for settings in COARSE] + FINE
 # Nine for a pixel leave noise at edges, which no other setting takes away.
 OVERSAMPLING = (3, 6)
-OURS = [("paths", rays, error, spp) for rays in (256, 1024) for error in (1e-4, 3e-4) for spp in (4, 16, 64)]
-OURS += [("paths", 1024, 1e-4, 256), ("paths", 4096, 1e-4, 64), ("paths", 4096, 1e-4, 256)]
-# Many records of few rays pay where those end in photons.
-OURS += [("photons", 64, error, spp) for error, spp in ((1e-2, 4), (3e-4, 8), (3e-6, 32))]
-OURS += [("photons", 256, error, spp) for error, spp in ((3e-4, 4), (3e-4, 16), (3e-5, 16), (3e-5, 32), (3e-6, 64), (1e-6, 128))]
+OURS = [(rays, error, spp) for rays in (256, 1024) for error in (1e-4, 3e-4) for spp in (4, 16, 64)]
+OURS += [(1024, 1e-4, 256), (4096, 1e-4, 64), (4096, 1e-4, 256)]
 # Errors for which the fastest of both are told, besides the one asked for.
 ROUND_ERRORS = [m * 10.0**e for e in range(-1, -4, -1) for m in (5, 2, 1)]
 FIRST_REFERENCE_SEED = 1000
@@ -255,11 +252,11 @@ def compare(name, arguments, program, bin_folder):
 
     picture, seconds = halflight(program, name, scene, "path", CHUNK, 1, 1, ["--audit", "off"])
     note("path", f"{CHUNK} spp", picture, seconds)
-    for gather, rays, error, spp in OURS:
-        told = f"{gather}, {rays} rays, error {error:g}, {spp} spp"
+    for rays, error, spp in OURS:
+        told = f"{rays} rays, error {error:g}, {spp} spp"
         if arguments.only not in told:
             continue
-        extra = ["--audit", "off", "--gather", gather, "--cache-rays", rays, "--cache-error", error]
+        extra = ["--audit", "off", "--cache-rays", rays, "--cache-error", error]
         picture, seconds = halflight(program, name, scene, "irradiance-cache", spp, 1, 1, extra)
         note("halflight", told, picture, seconds)
     for settings in SWEEP[arguments.sweep :]:

@@ -1,7 +1,7 @@
 //! An irradiance cache beside photons of caustics: nothing is counted twice, the same bits on any number of threads, records
 //! come first where memory is short, and the audit asks the same photons.
 
-use halflight::drive::{Checkpoint, Gather, Method, RenderResult, Settings};
+use halflight::drive::{Checkpoint, Method, RenderResult, Settings};
 use halflight_core::scene::Scene;
 use halflight_tests::render::{difference, has_photons, render, try_render};
 use halflight_tests::scenes::{SceneBuffers, glass, in_a_room, lamp_before, lamp_over_ball, metal};
@@ -38,7 +38,6 @@ fn records_and_photons_have_no_light_in_common() {
     have_no_light_in_common("glass", &glass, 64, |_| ());
     have_no_light_in_common("mirror", &in_a_room(lamp_before(metal(0.0), 0.6)), 64, |_| ());
     have_no_light_in_common("four segments", &glass, 64, |s| s.max_depth = Some(4));
-    have_no_light_in_common("reflected before", &glass, 64, |s| s.cache.gather = Gather::Photons);
 }
 
 #[test]

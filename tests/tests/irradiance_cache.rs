@@ -3,7 +3,7 @@
 
 use core::sync::atomic::{AtomicBool, Ordering};
 use glam::Vec3;
-use halflight::drive::{CacheUse, Checkpoint, Ending, Gather, Mark, Method, RenderResult, Settings};
+use halflight::drive::{CacheUse, Checkpoint, Ending, Mark, Method, RenderResult, Settings};
 use halflight_core::Rgb;
 use halflight_core::scene::{Material, Scene, Surface};
 use halflight_tests::render::{blocks, difference, render};
@@ -44,28 +44,6 @@ fn the_cornell_box_is_that_of_the_path_tracer_at_any_depth() {
 }
 
 #[test]
-fn photons_tell_what_records_and_paths_do_not_know() {
-    let buffers = cornell_box();
-    let scene = buffers.scene();
-    for depth in [Some(4), None] {
-        let path = render(&scene, Method::Path, 64, 512, |s| s.max_depth = depth);
-        let [one, two] = [1, 2].map(|threads| {
-            cached(&scene, 64, 128, |s| {
-                (s.max_depth, s.cache.gather, s.threads) = (depth, Gather::Photons, Some(threads));
-            })
-        });
-        assert!(one.image == two.image && one.photons.is_some_and(|photons| photons.maps == 2));
-        for (a, b) in one.image.mean().into_iter().zip(path.image.mean()) {
-            assert!((a / b - 1.0).abs() < 0.01, "{depth:?}: {a} {b}");
-        }
-    }
-    // Direct light is for shadow rays.
-    let seen = |gather| cached(&scene, 32, 4, |s| (s.max_depth, s.cache.gather) = (Some(3), gather)).image;
-    let [paths, photons] = [Gather::Paths, Gather::Photons].map(seen);
-    assert!(paths == photons);
-}
-
-#[test]
 fn caches_are_left_when_their_time_is_over() {
     let buffers = cornell_box();
     let scene = buffers.scene();
@@ -98,22 +76,6 @@ fn an_impatient_user_does_not_wait_for_caches() {
     let result =
         halflight::drive::render(&buffers.scene(), &settings, &mut |_| (), &AtomicBool::new(true)).unwrap();
     assert_eq!((result.spp, result.ending, cache(&result).records), (1, Ending::Interrupted, 0));
-}
-
-#[test]
-fn what_a_mirror_throws_counts_once() {
-    // A cache knows what something rough reflected last; what a mirror throws is found by paths, and not by photons again.
-    let mut buffers = cornell_box();
-    let surface = Surface::Mirror { reflectance: Rgb::splat(0.9).into() };
-    let mirror = buffers.material(Material { surface, ..Material::GREY });
-    buffers.square(Vec3::new(0.5, 0.4, 0.4), Vec3::new(0.7, 1.0, 0.0).normalize(), 0.6, mirror);
-    let scene = buffers.scene();
-    let of = |gather| cached(&scene, 64, 128, |s| s.cache.gather = gather).image;
-    let [paths, photons] = [Gather::Paths, Gather::Photons].map(of);
-    for (a, b) in photons.mean().into_iter().zip(paths.mean()) {
-        // Counted twice it was 1.5 % too much.
-        assert!((a / b - 1.0).abs() < 0.006, "{a} {b}");
-    }
 }
 
 #[test]

@@ -1,21 +1,15 @@
 //! Irradiance caches as paths ask them: what a block of vertices has of reflected light is asked for at once, before
-//! they are shaded. Where caches do not know it, photons may.
+//! they are shaded.
 
 use super::estimator::Counters;
 use super::path::{BLOCK, PathTracer, SurfaceInteraction};
-use super::wave::{Path, Share, Wave};
+use super::wave::{Path, Wave};
 use crate::Level;
 use crate::bsdf::Features;
 use crate::cache::irradiance::{CachedIrradiance, IrradianceCache, Points, QueryPoint};
 use crate::geometry::Ray;
 use crate::scene::SurfacePoint;
-use core::f32::consts::FRAC_1_PI;
 use core::ops::Range;
-use glam::Vec3;
-
-/// The greatest density, per steradian, by which a direction is drawn where its ray may end in photons: what looks into
-/// all directions sees the mean of what they blur.
-const DIFFUSE: f32 = 1.001 * FRAC_1_PI;
 
 /// Irradiance caches, frozen.
 #[derive(Clone, Copy)]
@@ -88,14 +82,9 @@ impl<'a, F: Features> PathTracer<'a, F> {
             });
             caches.ask(self.level, &again, &mut known, &mut exposed);
         }
-        for ((ray, met), known) in wave.rays[range].iter().zip(block.iter_mut()).zip(&mut known) {
-            if known.is_none()
-                && let Some((SurfaceInteraction { point, .. }, path)) = self.asks(wave, ray, met)
-            {
-                *known = self.bounced(ray, point, path);
-            }
+        for (met, known) in block.iter_mut().zip(known).take(range.len()) {
             if let Some(met) = met {
-                met.indirect = *known;
+                met.indirect = known;
             }
         }
     }
@@ -112,19 +101,5 @@ impl<'a, F: Features> PathTracer<'a, F> {
                 && path.share.goes_on_from_rough()
                 && u32::from(path.segments) < self.settings.max_depth
         })
-    }
-
-    /// What photons say of light that was reflected before, where a ray comes from a diffuse surface.
-    fn bounced(&self, ray: &Ray, point: &SurfacePoint, path: &Path) -> Option<CachedIrradiance> {
-        let photons = self.bounced?;
-        let gathers = path.share == Share::REFLECTED;
-        if !(gathers || path.pdf <= DIFFUSE) || self.is_limited() && path.segments != 2 {
-            return None;
-        }
-        let distance = Vec3::from(ray.origin).distance(point.position);
-        let which = &photons[if gathers { 0 } else { path.sample as usize & 1 }];
-        let (irradiance, _) = which.irradiance((self.bvh, self.level), point, distance)?;
-        // One of many rays: shadow rays will do.
-        Some(CachedIrradiance { irradiance, shining: 0.0 })
     }
 }

@@ -36,8 +36,6 @@ pub enum Keep {
     /// All but those that come straight from a light.
     #[default]
     Reflected,
-    /// Those that something rough has reflected last: what an irradiance cache knows.
-    Scattered,
     /// All.
     All,
     /// Those that came from a light by mirrors and glass alone, at least one of them. Their paths end there.
@@ -51,7 +49,6 @@ impl Keep {
         vertex.bsdf.stores_photons()
             && match self {
                 Keep::All => true,
-                Keep::Scattered => state.segments > 1 && state.mirrored == 0,
                 Keep::Reflected | Keep::Caustic => state.segments > 1,
             }
     }

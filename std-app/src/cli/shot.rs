@@ -6,7 +6,7 @@ use super::read_picture;
 use super::values;
 use super::view::ViewFlags;
 use clap::{Args, ValueEnum};
-use halflight::drive::{CacheSettings, Gather, PhotonSettings, RenderError, Settings, Stop};
+use halflight::drive::{CacheSettings, PhotonSettings, RenderError, Settings, Stop};
 use halflight::load::{LoadOptions, LoadedScene};
 use halflight::memory::Budget;
 use halflight::report::words::readable_bytes;
@@ -77,14 +77,10 @@ pub(super) struct Options {
     /// Gather rays per record: 64, 256, 576, 1024, 2304 or 4096 [default: 256]
     #[arg(long, value_name = "N", value_parser = values::gather_rays, help_heading = "Irradiance cache")]
     cache_rays: Option<u32>,
-    /// Light at the hits of gather rays: path traced, or from a photon map [default: paths]
-    #[arg(long, help_heading = "Irradiance cache")]
-    gather: Option<GatherBy>,
     /// Weight of a photon by its distance [default: epanechnikov]
     #[arg(long, value_name = "KERNEL", help_heading = "Photons")]
     photon_kernel: Option<Kernel>,
-    /// Light paths per global map, or per sample with sppm [default: pixels / 2, at least 262144 for records; sppm:
-    /// pixels]
+    /// Light paths per global map, or per sample with sppm [default: pixels / 2; sppm: pixels]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1 << 28),
         help_heading = "Photons")]
     global_photons: Option<u32>,
@@ -92,15 +88,6 @@ pub(super) struct Options {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1 << 28),
         help_heading = "Photons")]
     caustic_photons: Option<u32>,
-}
-
-/// Source of light at the hits of gather rays.
-#[derive(Clone, Copy, Debug, ValueEnum)]
-pub(super) enum GatherBy {
-    /// Path traced
-    Paths,
-    /// From a photon map
-    Photons,
 }
 
 /// Weight of a photon by its distance.
@@ -152,7 +139,6 @@ impl Options {
             cache_metric: self.cache_metric.or(base.cache_metric),
             cache_error: self.cache_error.or(base.cache_error),
             cache_rays: self.cache_rays.or(base.cache_rays),
-            gather: self.gather.or(base.gather),
             photon_kernel: self.photon_kernel.or(base.photon_kernel),
             global_photons: self.global_photons.or(base.global_photons),
             caustic_photons: self.caustic_photons.or(base.caustic_photons),
@@ -171,11 +157,6 @@ impl Options {
             metric: self.cache_metric.unwrap_or(defaults.metric),
             error: self.cache_error.map(|error| error as f32),
             strata: self.cache_rays.map(u32::isqrt),
-            gather: match self.gather {
-                None => defaults.gather,
-                Some(GatherBy::Paths) => Gather::Paths,
-                Some(GatherBy::Photons) => Gather::Photons,
-            },
         }
     }
 

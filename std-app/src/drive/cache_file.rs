@@ -2,7 +2,7 @@
 
 use super::error::FileError;
 use super::sealed::{self, Kind};
-use super::{Gather, Settings, fingerprint};
+use super::{Settings, fingerprint};
 use crate::save::Patience;
 use halflight_core::cache::irradiance::{IrradianceCache, Record};
 use halflight_core::scene::Scene;
@@ -34,11 +34,7 @@ impl Identity {
             version: env!("CARGO_PKG_VERSION").into(),
             scene: fingerprint::Parts::of(scene),
             max_depth: settings.max_depth,
-            // Records that were gathered from photons are others.
-            metric: match settings.cache.gather {
-                Gather::Paths => settings.cache.metric.name().into(),
-                Gather::Photons => format!("{} from photons", settings.cache.metric.name()),
-            },
+            metric: settings.cache.metric.name().into(),
             error: format!("{:e}", settings.cache.allowed()),
             rays: settings.cache.strata().pow(2),
         }

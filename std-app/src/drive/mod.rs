@@ -44,7 +44,7 @@ pub use ledger::Place;
 pub use memory::MemoryUse;
 pub use merge::{Merged, merge};
 pub use method::{
-    CacheSettings, CacheUse, CausticUse, Gather, MapUse, MapView, Method, PhotonSettings, PhotonUse,
+    CacheSettings, CacheUse, CausticUse, MapUse, MapView, Method, PhotonSettings, PhotonUse,
     PhotonView,
 };
 pub use rounds::Stop;

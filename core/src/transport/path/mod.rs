@@ -28,7 +28,7 @@ use super::cached::Caches;
 use super::context::SceneContext;
 use super::density::PhotonLight;
 use super::estimator::{PathSettings, dimension};
-use super::maps::{GatherLight, PhotonMaps};
+use super::maps::PhotonMaps;
 use super::merge::Merging;
 use super::wave::Wave;
 use crate::Level;
@@ -72,8 +72,6 @@ pub struct PathTracer<'a, F> {
     /// Of even and of odd samples.
     maps: Option<&'a [PhotonMaps<'a>; 2]>,
     merging: Option<Merging<'a>>,
-    /// Light that was reflected before, where caches do not know it: of even and of odd samples.
-    pub(super) bounced: Option<[GatherLight<'a>; 2]>,
     /// Light that is not all shared, for each sample; see `reuse.rs`.
     pub(super) flash: f32,
     features: PhantomData<F>,
@@ -104,7 +102,6 @@ impl<'a, F: Features> PathTracer<'a, F> {
             photons: None,
             maps: None,
             merging: None,
-            bounced: None,
             flash: f32::INFINITY,
             features: PhantomData,
         }
@@ -120,12 +117,6 @@ impl<'a, F: Features> PathTracer<'a, F> {
     /// The same, for rays that gather for the cache itself, as it is now.
     pub fn with_growing_cache(&self, cache: &'a IrradianceCache<'a>) -> Self {
         Self { caches: Some(Caches::Growing(cache)), ..*self }
-    }
-
-    /// The same, where paths with caches that come by a diffuse bounce to a point that these do not know have its indirect
-    /// light from photons that were reflected before: even samples from the first, odd ones from the second.
-    pub fn with_bounced(&self, photons: [GatherLight<'a>; 2]) -> Self {
-        Self { bounced: Some(photons), ..*self }
     }
 
     /// The same, where surfaces with a diffuse part have from photons what light is reflected onto them. Pixels must

@@ -1,6 +1,6 @@
 //! Which picture a film is of: films can be continued and merged only where all of this is the same.
 
-use crate::drive::{Gather, Method, Settings, fingerprint};
+use crate::drive::{Method, Settings, fingerprint};
 use halflight_core::scene::Scene;
 use halflight_core::transport::PathSettings;
 use serde::{Deserialize, Serialize};
@@ -39,12 +39,7 @@ impl Identity {
         if let Some(loaded) = loaded {
             cache += &format!(", loaded {loaded}");
         }
-        let has_photons = match Method::named(method) {
-            Some(Method::PhotonMap | Method::ProgressivePhotons) => true,
-            Some(Method::IrradianceCache) => settings.cache.gather == Gather::Photons,
-            _ => false,
-        };
-        if has_photons {
+        if let Some(Method::PhotonMap | Method::ProgressivePhotons) = Method::named(method) {
             cache += &format!(", {:?}", settings.photons);
         }
         let may_join = [Method::Path, Method::IrradianceCache].map(Method::name).contains(&method);

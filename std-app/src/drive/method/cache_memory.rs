@@ -1,9 +1,7 @@
 //! Memory of cached pictures beside their records and photons: tables of the strata that may be gathered, working memory
 //! of threads.
 
-use super::cache_settings::Gather;
 use super::caustics;
-use super::photons::Laboratory;
 use super::{Method, Stage};
 use crate::drive::Settings;
 use crate::drive::audit::Audit;
@@ -22,22 +20,17 @@ pub(super) struct Needs {
     pub(super) strata: [usize; 2],
     /// Of each thread.
     pub(super) scratch: Footprint,
-    /// Whether gather rays end in photons.
-    pub(super) by_photons: bool,
 }
 
 impl Needs {
     /// With photons of caustics or without.
     pub(super) fn of<F: Features>(stage: &Stage, has_caustics: bool) -> Self {
         let Stage { settings, .. } = *stage;
-        let gather = settings.cache.gather;
         let strata = settings.cache.strata() as usize;
         let coarse = strata.div_ceil(2 * BLOCK) * BLOCK;
         let scratch = PathTracer::<F>::scratch(WAVE).or(PathTracer::<F>::gather_scratch(strata));
-        let by_photons = gather == Gather::Photons && has_indirect_light(settings);
-        let scratch = if by_photons { scratch.or(Laboratory::scratch::<F>()) } else { scratch };
         let scratch = if has_caustics { scratch.or(caustics::scratch::<F>()) } else { scratch };
-        Self { strata: [coarse, strata], scratch, by_photons }
+        Self { strata: [coarse, strata], scratch }
     }
 
     /// All of it.
@@ -47,12 +40,10 @@ impl Needs {
         scratch.saturating_add(tables)
     }
 
-    /// What comes after photons of caustics: the audit, the fewest photons that gather rays end in, room for `fewest`
-    /// records in each half.
-    pub(super) fn later<F: Features>(&self, stage: &Stage, fewest: usize) -> usize {
-        let photons = if self.by_photons { Laboratory::least_bytes(stage.lights) } else { 0 };
+    /// What comes after photons of caustics: the audit, and room for `fewest` records in each half.
+    pub(super) fn later<F: Features>(stage: &Stage, fewest: usize) -> usize {
         let records = IrradianceCache::footprint(fewest).bytes().saturating_mul(2);
-        Audit::bytes::<F>(stage, Method::IrradianceCache.is_biased()) + photons + records
+        Audit::bytes::<F>(stage, Method::IrradianceCache.is_biased()) + records
     }
 }
 

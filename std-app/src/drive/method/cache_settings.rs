@@ -12,8 +12,6 @@ pub struct CacheSettings {
     /// Strata along a side of the hemisphere that is gathered: its square is the number of rays of a record. `None`:
     /// [`CacheSettings::STRATA`].
     pub strata: Option<u32>,
-    /// How the rays of a record find light.
-    pub gather: Gather,
 }
 
 impl CacheSettings {
@@ -33,18 +31,8 @@ impl CacheSettings {
 
 impl Default for CacheSettings {
     fn default() -> Self {
-        Self { metric: Metric::Halflight, error: None, strata: None, gather: Gather::Paths }
+        Self { metric: Metric::Halflight, error: None, strata: None }
     }
-}
-
-/// How rays that are gathered for a record find the light that is reflected at their ends.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Gather {
-    /// By paths that go on from there, as far as the cache does not know it.
-    #[default]
-    Paths,
-    /// From a map of photons, where that is sure.
-    Photons,
 }
 
 /// What became of the caches.

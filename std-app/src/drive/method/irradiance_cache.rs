@@ -15,7 +15,7 @@ use super::haste::Haste;
 use super::overture::{Growing, Overture};
 use super::path::Paths;
 use super::photon_view::PhotonView;
-use super::photons::{Laboratory, PhotonUse, Shelf};
+use super::photons::PhotonUse;
 use super::{Borrower, Method, Renderer, Stage};
 use crate::drive::audit::Audit;
 use crate::drive::cache_file::{self, Half, Header, Reader, View};
@@ -33,7 +33,6 @@ use halflight_core::memory::{Arena, Footprint, Line};
 use halflight_core::transport::PathTracer;
 use halflight_core::transport::gather::{Gathering, Place};
 use halflight_core::transport::path::WAVE;
-use halflight_core::transport::shoot::Keep;
 use std::time::Instant;
 
 /// Pixels for each record that a cache has memory for, where that is not limited.
@@ -82,7 +81,7 @@ fn find_caustics<'l, F: Features>(
     }
     let needs = Needs::of::<F>(stage, true);
     // As much for records as for photons.
-    let others = needs.bytes(stage).saturating_add(needs.later::<F>(stage, fewest));
+    let others = needs.bytes(stage).saturating_add(Needs::later::<F>(stage, fewest));
     let others = others.saturating_add(caustics::least_photons());
     if !caustics::has_memory(memory, lights, others) {
         return Ok((None, CausticUse { lacks_memory: true, ..CausticUse::default() }));
@@ -124,7 +123,7 @@ fn set_up<F: Features, T>(
 ) -> Result<T, RenderError> {
     let Stage { scene, bvh, settings, workers, .. } = *stage;
     let needs = Needs::of::<F>(stage, cast.is_some());
-    let mut scratch = memory.take_each("paths", needs.scratch, workers.count())?;
+    let scratch = memory.take_each("paths", needs.scratch, workers.count())?;
     let [coarse, strata] = needs.strata;
     let mut tables = [
         memory.take("gathering", CellFlux::footprint(coarse))?,
@@ -136,21 +135,12 @@ fn set_up<F: Features, T>(
     let fewest = loaded.fewest();
     let caster = match cast {
         Some(cast) => {
-            let later = needs.later::<F>(stage, fewest);
+            let later = Needs::later::<F>(stage, fewest);
             Some(Caster::new(stage, memory, cast, true, later)?)
         }
         None => None,
     };
     let others = Audit::bytes::<F>(stage, Method::IrradianceCache.is_biased());
-    let mut lamps = Default::default();
-    let laboratory = if needs.by_photons {
-        // Half of the memory for photons at most: records need some as well.
-        let half = memory.available().saturating_sub(others) / 2;
-        let others = others.saturating_add(half);
-        Some(Laboratory::new::<F>(stage, &mut scratch, (memory, &mut lamps), Keep::Scattered, others)?)
-    } else {
-        None
-    };
     let pixels = settings.width as usize * settings.height as usize;
     let wanted = (pixels / PIXELS_PER_RECORD).max(FEWEST_RECORDS).saturating_add(fewest);
     let available = memory.available().saturating_sub(others);
@@ -178,7 +168,6 @@ fn set_up<F: Features, T>(
         coarse: &coarse,
         size: [settings.width, settings.height],
         halves: [Growing::new(even, 0), Growing::new(odd, 1)],
-        laboratory,
         caster,
         caustics,
         scratch,
@@ -217,7 +206,6 @@ struct Cached<'a, F> {
     gathering: Gathering<'a>,
     size: [u32; 2],
     halves: [Growing<'a>; 2],
-    laboratory: Option<(Laboratory<'a>, [Shelf; 2])>,
     /// Of photons of caustics, where they are worth it.
     caster: Option<Caster<'a>>,
     caustics: CausticUse,
@@ -250,10 +238,10 @@ impl<F: Features> Cached<'_, F> {
             let left = crew.round.deadline.map(|end| end.saturating_duration_since(start).as_secs_f64());
             self.haste = self.stop.seconds.map(|seconds| Haste::new(left.unwrap_or(seconds)));
         }
-        let Self { tracer, gathering, coarse, haste, size, halves, laboratory, caster, scratch, .. } = self;
+        let Self { tracer, gathering, coarse, haste, size, halves, caster, scratch, .. } = self;
         let mut all = true;
         for (i, half) in halves.iter_mut().enumerate() {
-            let (photons, built);
+            let photons;
             let mut tracer = *tracer;
             // Where depth is limited, rays that gather ask for none.
             if let Some(caster) = caster.as_mut().filter(|_| !half.is_finished() && !tracer.is_limited()) {
@@ -263,14 +251,6 @@ impl<F: Features> Cached<'_, F> {
                 };
                 photons = found;
                 tracer = tracer.with_caustics(photons.merging());
-            }
-            if let Some((laboratory, shelves)) = laboratory {
-                let Some(found) = laboratory.build::<F>(&mut shelves[i], i as u32, crew, scratch)? else {
-                    all = false;
-                    break;
-                };
-                built = found;
-                tracer = tracer.with_bounced([laboratory.gathered(&built); 2]);
             }
             let until = haste.and_then(|haste| haste.end(i));
             let overture = Overture { tracer: &tracer, gathering: *gathering, coarse: *coarse, size: *size };
@@ -300,15 +280,8 @@ impl<F: Features> Cached<'_, F> {
 
     /// Brings the tiles to their targets.
     fn take_samples(&mut self, crew: &mut Crew) -> Result<(), RenderError> {
-        let Self { tracer, halves: [even, odd], scratch, laboratory, caster, .. } = self;
-        let mut tracer = tracer.with_caches([&even.cache, &odd.cache]);
-        let built;
-        if let Some((laboratory, [even, odd])) = laboratory {
-            let Some(even) = laboratory.build::<F>(even, 0, crew, scratch)? else { return Ok(()) };
-            let Some(odd) = laboratory.build::<F>(odd, 1, crew, scratch)? else { return Ok(()) };
-            built = [even, odd];
-            tracer = tracer.with_bounced(built.each_ref().map(|built| laboratory.gathered(built)));
-        }
+        let Self { tracer, halves: [even, odd], scratch, caster, .. } = self;
+        let tracer = tracer.with_caches([&even.cache, &odd.cache]);
         if let Some(caster) = caster {
             return caster.round(&tracer, scratch, crew);
         }
@@ -399,16 +372,6 @@ impl<F: Features> Renderer for Cached<'_, F> {
     }
 
     fn photons(&self) -> Option<PhotonUse> {
-        let reflected = self.laboratory.as_ref().map(|(laboratory, _)| laboratory.used);
-        let caustic = self.caster.as_ref().map(|caster| caster.used);
-        match (reflected, caustic) {
-            (Some(reflected), Some(caustic)) => Some(PhotonUse {
-                caustic: caustic.caustic,
-                maps: reflected.maps + caustic.maps,
-                seconds: reflected.seconds + caustic.seconds,
-                ..reflected
-            }),
-            (reflected, caustic) => reflected.or(caustic),
-        }
+        self.caster.as_ref().map(|caster| caster.used)
     }
 }

@@ -22,7 +22,7 @@ mod sppm;
 #[cfg(test)]
 mod wrong;
 
-pub use cache_settings::{CacheSettings, CacheUse, Gather};
+pub use cache_settings::{CacheSettings, CacheUse};
 pub use caustics::CausticUse;
 pub(super) use caustics::unseen;
 pub(super) use irradiance_cache::LEAST_PIXELS;

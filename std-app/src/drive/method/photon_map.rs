@@ -15,7 +15,6 @@ use crate::drive::crew::Crew;
 use crate::drive::memory::Memory;
 use halflight_core::bsdf::Features;
 use halflight_core::memory::Line;
-use halflight_core::transport::shoot::Keep;
 use halflight_core::transport::{PathTracer, path::WAVE};
 
 /// Samples that share two sets of maps: enough that maps are the smaller part of the work.
@@ -39,8 +38,7 @@ impl<'a, F: Features> TwoPasses<'a, F> {
         let Stage { settings, workers, .. } = *stage;
         let mut scratch = memory.take_each("paths", scratch::<F>(WAVE), workers.count())?;
         let others = Audit::bytes::<F>(stage, Method::PhotonMap.is_biased());
-        let (laboratory, shelves) =
-            Laboratory::new::<F>(stage, &mut scratch, (memory, lamps), Keep::All, others)?;
+        let (laboratory, shelves) = Laboratory::new::<F>(stage, &mut scratch, (memory, lamps), others)?;
         let tracer = stage.paths::<F>(settings.seed);
         Ok(Self { tracer, laboratory, shelves, scratch })
     }

@@ -11,7 +11,6 @@ use crate::drive::run::path_settings;
 use crate::drive::workers::Workers;
 use crate::drive::{RenderError, Settings};
 use halflight_core::bsdf::Features;
-use halflight_core::light::{Emission, LightSampler};
 use halflight_core::memory::{Arena, Footprint, Line};
 use halflight_core::photon::{Falloff, MapShape, Photon, PhotonMap, Photons};
 use halflight_core::transport::maps::{
@@ -72,9 +71,6 @@ const PIXELS_PER_PATH: usize = 2;
 const FEWEST: usize = 16;
 const MOST: usize = 1024;
 
-/// The fewest where all records of a picture see the same map: its noise is in all of them.
-const FEWEST_FOR_RECORDS: usize = 256;
-
 /// Largest radius of a disc of the global map, in diagonals of the scene.
 const FARTHEST: f32 = 0.03;
 
@@ -88,7 +84,6 @@ pub(super) type Lamps = [Vec<Line>; 2];
 pub(super) struct Laboratory<'a> {
     stage: Stage<'a>,
     discs: Discs,
-    keep: Keep,
     aim: Aim<'a>,
     /// For maps of caustics, where there are any.
     caustics: Option<Aim<'a>>,
@@ -177,21 +172,20 @@ fn bytes(global: usize, caustic: usize) -> usize {
 }
 
 impl<'a> Laboratory<'a> {
-    /// For maps of the scene, of the photons to `keep`; where those are all, with one of caustics if there may be any; and
-    /// the memory for both halves, of which so many `others` bytes are left free.
+    /// For maps of all photons of the scene, and of caustics if there may be any; and the memory for both halves, of which
+    /// so many `others` bytes are left free.
     pub(super) fn new<F: Features>(
         stage: &Stage<'a>,
         scratch: &mut [Vec<Line>],
         (memory, lamps): (&mut Memory, &'a mut Lamps),
-        keep: Keep,
         others: usize,
     ) -> Result<(Self, [Shelf; 2]), RenderError> {
         let Stage { scene, bvh, settings, .. } = *stage;
-        let has_caustics = keep == Keep::All && may_have_caustics(scene);
+        let has_caustics = may_have_caustics(scene);
         let least = others.saturating_add(2 * bytes(1, 1));
         let [all, caustics] = lamps;
         let gathered = Wanted::Gathered(FARTHEST * bvh.bounds().diagonal());
-        let of = (keep, shortened(settings));
+        let of = (Keep::All, shortened(settings));
         let aim = Aim::look_first::<F>(stage, of, gathered, scratch, (memory, all), least)?;
         let caustics = if has_caustics {
             let of = (Keep::Caustic, path_settings(settings).max_depth);
@@ -201,8 +195,7 @@ impl<'a> Laboratory<'a> {
             None
         };
         let pixels = settings.width as usize * settings.height as usize;
-        let fewest = if keep == Keep::All { FEWEST } else { FEWEST_FOR_RECORDS };
-        let usual = (pixels / PIXELS_PER_PATH).div_ceil(PATHS).clamp(fewest, MOST);
+        let usual = (pixels / PIXELS_PER_PATH).div_ceil(PATHS).clamp(FEWEST, MOST);
         let tasks = |asked: Option<u32>| asked.map_or(usual, |paths| (paths as usize).div_ceil(PATHS).max(1));
         let wanted =
             [tasks(settings.photons.global), if has_caustics { tasks(settings.photons.caustic) } else { 0 }];
@@ -232,15 +225,7 @@ impl<'a> Laboratory<'a> {
             caustic: caustics.as_ref().map(|aim| used(aim, wanted[1], caustic)),
             ..PhotonUse::default()
         };
-        Ok((
-            Self { stage: *stage, discs: stage.discs(), keep, aim, caustics, global, caustic, used },
-            shelves,
-        ))
-    }
-
-    /// Bytes of the smallest maps of what was reflected, of both halves.
-    pub(super) fn least_bytes(lights: &LightSampler) -> usize {
-        Emission::footprint(lights).bytes().saturating_add(2 * bytes(1, 0))
+        Ok((Self { stage: *stage, discs: stage.discs(), aim, caustics, global, caustic, used }, shelves))
     }
 
     /// Working memory of each thread.
@@ -286,7 +271,7 @@ impl<'a> Laboratory<'a> {
             paths: (tasks * PATHS) as u32,
             max_depth,
         };
-        let all = shot(self.keep, self.global, settings.seed, shortened(settings));
+        let all = shot(Keep::All, self.global, settings.seed, shortened(settings));
         let (seed, max_depth) = (settings.seed ^ CAUSTIC_SEED, path_settings(settings).max_depth);
         let caustic = shot(Keep::Caustic, self.caustic, seed, max_depth);
         let shots = [
@@ -337,15 +322,9 @@ impl<'a> Laboratory<'a> {
     /// What paths see of the maps; caustics in discs as they are after so many maps were `made`.
     pub(super) fn light<'m>(&self, built: &'m Built<'m>, made: u32) -> PhotonMaps<'m> {
         let falloff = self.stage.settings.photons.falloff;
-        let global = self.gathered(built);
+        let global = GatherLight::new(&built.global, &built.irradiances, self.farthest(), falloff);
         let light = |map| progressive(map, self.discs, made).with_falloff(falloff).of_caustics();
         PhotonMaps { caustic: built.caustic.as_ref().map(light), global }
-    }
-
-    /// What gather rays find in the map.
-    pub(super) fn gathered<'m>(&self, built: &'m Built<'m>) -> GatherLight<'m> {
-        let falloff = self.stage.settings.photons.falloff;
-        GatherLight::new(&built.global, &built.irradiances, self.farthest(), falloff)
     }
 }
 
