@@ -44,8 +44,7 @@ pub use ledger::Place;
 pub use memory::MemoryUse;
 pub use merge::{Merged, merge};
 pub use method::{
-    CacheSettings, CacheUse, CausticUse, MapUse, MapView, Method, PhotonSettings, PhotonUse,
-    PhotonView,
+    CacheSettings, CacheUse, CausticUse, MapUse, MapView, Method, PhotonSettings, PhotonUse, PhotonView,
 };
 pub use rounds::Stop;
 pub use study::{IrradianceStudy, MetricError, study_irradiance};
