@@ -1,11 +1,11 @@
 //! The irradiance cache as a method of the renderer: its light against that of the path tracer, its bits against
 //! threads, its records against the unit of the scene, and what it does without memory.
 
-use core::sync::atomic::{AtomicBool, Ordering};
+use core::sync::atomic::AtomicBool;
 use glam::Vec3;
 use halflight::drive::{CacheUse, Checkpoint, Ending, Mark, Method, RenderResult, Settings};
 use halflight_core::Rgb;
-use halflight_core::scene::{Material, Scene, Surface};
+use halflight_core::scene::{Material, Scene};
 use halflight_tests::render::{blocks, difference, render};
 use halflight_tests::scenes::{SceneBuffers, cornell_box, emitter, everything};
 use std::path::Path;
