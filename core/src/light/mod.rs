@@ -23,9 +23,10 @@ pub use guide::Worth;
 pub use sampler::{LightPoint, LightSample, LightSampler};
 
 use crate::Rgb;
+use halflight_simd::kernels::jumps::LUMINANCE;
 
 /// Relative luminance of linear sRGB (BT.709).
 #[inline]
-pub(crate) fn luminance(color: Rgb) -> f32 {
-    color.dot(Rgb::new(0.2126, 0.7152, 0.0722))
+pub fn luminance(color: Rgb) -> f32 {
+    color.dot(Rgb::from_array(LUMINANCE))
 }

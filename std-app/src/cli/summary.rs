@@ -2,9 +2,10 @@
 
 use super::compare as comparing;
 use super::ledger;
-use halflight::drive::{Audited, BiasEstimate, Blurred, Ending, ErrorEstimate, MapUse};
+use halflight::drive::{Audited, BiasEstimate, Blurred, CacheUse, Ending, ErrorEstimate, MapUse, PhotonUse};
 use halflight::report::Run;
 use halflight::report::words::{plural, readable_bytes, readable_seconds};
+use halflight_core::cache::irradiance::Metric;
 use std::path::Path;
 
 /// The lines of `run`; `report` is the folder of its report.
@@ -53,52 +54,8 @@ pub(super) fn text(run: &Run, report: Option<&Path>) -> String {
         result.method.name(),
         settings.level.name(),
     ));
-    if let Some(cache) = result.cache {
-        let lost = match cache.refused {
-            0 => String::new(),
-            refused => format!("; {refused} more did not fit into memory"),
-        };
-        let loaded = match cache.loaded {
-            0 => String::new(),
-            loaded => format!(", {loaded} of them loaded,"),
-        };
-        let cut = if cache.is_cut { "; cut short: points without a record are path traced" } else { "" };
-        lines.push(format!(
-            "cache  {}{loaded} of {} rays in {} by {}{lost}{cut}",
-            plural(cache.records, "record"),
-            cache.rays,
-            readable_seconds(cache.seconds),
-            settings.cache.metric.name(),
-        ));
-    }
-    if let Some(photons) = result.photons {
-        let kinds = [(photons.global, "photon"), (photons.caustic, "caustic photon")];
-        let stored: Vec<_> =
-            kinds.iter().filter_map(|(map, name)| Some(map_text(map.as_ref()?, name))).collect();
-        lines.push(format!(
-            "light  {} in {}: {}",
-            plural(photons.maps, "map"),
-            readable_seconds(photons.seconds),
-            stored.join("; "),
-        ));
-        for (map, name) in [(photons.global, ""), (photons.caustic, " of caustics")] {
-            if let Some(MapUse { seen: Some(seen), by_power: Some(by_power), .. }) = map {
-                lines.push(format!(
-                    "       emission guiding: {:.2} % of light paths{name} reach visible surfaces ({:.2} % without)",
-                    100.0 * seen,
-                    100.0 * by_power
-                ));
-            }
-        }
-        for (map, name) in [(photons.global, "global"), (photons.caustic, "caustic")] {
-            if let Some(map) = map.filter(|map| map.given < map.wanted) {
-                lines.push(format!(
-                    "       not enough memory: {} of {} light paths for the {name} map, the picture is noisier",
-                    map.given, map.wanted
-                ));
-            }
-        }
-    }
+    lines.extend(result.cache.as_ref().map(|cache| cached(cache, settings.cache.metric)));
+    lines.extend(result.photons.iter().flat_map(photon_maps));
     if result.windows.lacks_memory {
         lines.push(
             "light  not enough memory for environment visibility sampling: sky light may be noisier".into(),
@@ -120,6 +77,56 @@ pub(super) fn text(run: &Run, report: Option<&Path>) -> String {
         ));
     }
     lines.join("\n")
+}
+
+/// The line of an irradiance cache.
+fn cached(cache: &CacheUse, metric: Metric) -> String {
+    let lost = match cache.refused {
+        0 => String::new(),
+        refused => format!("; {refused} more did not fit into memory"),
+    };
+    let loaded = match cache.loaded {
+        0 => String::new(),
+        loaded => format!(", {loaded} of them loaded,"),
+    };
+    let cut = if cache.is_cut { "; cut short: points without a record are path traced" } else { "" };
+    format!(
+        "cache  {}{loaded} of {} rays in {} by {}{lost}{cut}",
+        plural(cache.records, "record"),
+        cache.rays,
+        readable_seconds(cache.seconds),
+        metric.name(),
+    )
+}
+
+/// The lines of photon maps.
+fn photon_maps(photons: &PhotonUse) -> Vec<String> {
+    let kinds = [(photons.global, "photon"), (photons.caustic, "caustic photon")];
+    let stored: Vec<_> = kinds.iter().filter_map(|(map, name)| Some(map_text(map.as_ref()?, name))).collect();
+    let mut lines = vec![format!(
+        "light  {} in {}: {}",
+        plural(photons.maps, "map"),
+        readable_seconds(photons.seconds),
+        stored.join("; "),
+    )];
+    for (map, name) in [(photons.global, ""), (photons.caustic, " of caustics")] {
+        if let Some(MapUse { seen: Some(seen), by_power: Some(by_power), .. }) = map {
+            lines.push(format!(
+                "       emission guiding: {:.2} % of light paths{name} reach visible surfaces ({:.2} % without)",
+                100.0 * seen,
+                100.0 * by_power
+            ));
+        }
+    }
+    for (map, name) in [(photons.global, "global"), (photons.caustic, "caustic")] {
+        if let Some(map) = map.filter(|map| map.given < map.wanted) {
+            lines.push(format!(
+                "       not enough memory: {} of {} light paths for the {name} map, the picture is noisier",
+                map.given, map.wanted
+            ));
+        }
+    }
+    lines
 }
 
 /// The lines of an audited estimate.

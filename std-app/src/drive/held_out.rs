@@ -28,7 +28,7 @@ pub(super) struct Point {
 }
 
 pub(super) fn luminance(light: Rgb) -> f64 {
-    f64::from(light.dot(Rgb::new(0.2126, 0.7152, 0.0722)))
+    f64::from(halflight_core::light::luminance(light))
 }
 
 /// The picture in so many squares: pixels along the side of one, a power of two.

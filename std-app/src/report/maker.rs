@@ -1,7 +1,8 @@
 //! Who made a picture: the command, the program, the machine and the date.
 
+use core::fmt::Write;
 use std::env::consts::{ARCH, OS};
-use std::time::{SystemTime, UNIX_EPOCH};
+use std::time::SystemTime;
 
 /// What made a picture.
 #[derive(Clone, Debug)]
@@ -21,13 +22,12 @@ pub struct Maker {
 impl Maker {
     /// This program, on this machine, now.
     pub fn here() -> Self {
-        let now = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |since| since.as_secs());
         Self {
             command: std::env::args_os().map(|word| word.to_string_lossy().into_owned()).collect(),
             version: concat!("halflight ", env!("CARGO_PKG_VERSION")),
             machine: format!("{}, {ARCH} {OS}", processor().unwrap_or_else(|| "unnamed processor".into())),
             processors: std::thread::available_parallelism().map_or(1, usize::from),
-            date: date(now),
+            date: date(SystemTime::now()),
         }
     }
 
@@ -52,24 +52,19 @@ fn quoted(word: &str) -> String {
     }
 }
 
-/// `seconds` after 1970 as people write it, in UTC.
-fn date(seconds: u64) -> String {
-    let (days, second) = (seconds / 86_400, seconds % 86_400);
-    // Howard Hinnant's civil_from_days, for dates after 1970; years begin in March.
-    let shifted = days + 719_468;
-    let (era, day_of_era) = (shifted / 146_097, shifted % 146_097);
-    let year_of_era = (day_of_era - day_of_era / 1460 + day_of_era / 36_524 - day_of_era / 146_096) / 365;
-    let day_of_year = day_of_era - (365 * year_of_era + year_of_era / 4 - year_of_era / 100);
-    let month = (5 * day_of_year + 2) / 153;
-    let day = day_of_year - (153 * month + 2) / 5 + 1;
-    let month = if month < 10 { month + 3 } else { month - 9 };
-    let year = era * 400 + year_of_era + u64::from(month <= 2);
-    format!("{year}-{month:02}-{day:02} {:02}:{:02} UTC", second / 3600, second / 60 % 60)
+/// A time as people write it, in UTC and to the minute; clocks before 1970 show 1970.
+fn date(time: SystemTime) -> String {
+    let mut text = String::new();
+    // Fails after the year 9999.
+    let _ = write!(text, "{}", humantime::format_rfc3339_seconds(time.max(SystemTime::UNIX_EPOCH)));
+    let (day, time) = text.split_once('T').unwrap_or((&text, ""));
+    format!("{day} {} UTC", time.get(..5).unwrap_or_default())
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use core::time::Duration;
 
     #[test]
     fn dates_as_the_calendar_has_them() {
@@ -79,7 +74,7 @@ mod tests {
             (951_782_400, "2000-02-29 00:00 UTC"),
             (4_107_542_400, "2100-03-01 00:00 UTC"),
         ] {
-            assert_eq!(date(seconds), expected);
+            assert_eq!(date(SystemTime::UNIX_EPOCH + Duration::from_secs(seconds)), expected);
         }
     }
 
