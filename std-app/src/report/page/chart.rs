@@ -7,6 +7,13 @@ use crate::report::race::Lead;
 use crate::report::words::{number, power_of_ten, readable_seconds};
 use core::fmt::Write;
 
+/// Writes to a string, which does not fail.
+macro_rules! put {
+    ($text:ident, $($arguments:tt)+) => {
+        let _ = write!($text, $($arguments)+);
+    };
+}
+
 /// A curve.
 pub(super) struct Series {
     /// Its name.
@@ -191,46 +198,27 @@ impl Plot {
         for (seconds, labelled) in self.x.ticks() {
             let x = self.x(seconds);
             let class = if labelled { "" } else { " class=\"minor\"" };
-            put(svg, format_args!("<path{class} d=\"M{x:.1} {top}V{bottom}\"/>"));
+            put!(svg, "<path{class} d=\"M{x:.1} {top}V{bottom}\"/>");
             if labelled {
                 let y = bottom + 18.0;
-                put(
-                    svg,
-                    format_args!(
-                        "<text class=\"below\" x=\"{x:.1}\" y=\"{y}\">{}</text>",
-                        label(seconds, true)
-                    ),
-                );
+                put!(svg, "<text class=\"below\" x=\"{x:.1}\" y=\"{y}\">{}</text>", label(seconds, true));
             }
         }
         for (error, labelled) in self.y.ticks() {
             let y = self.y(error);
             let class = if labelled { "" } else { " class=\"minor\"" };
-            put(svg, format_args!("<path{class} d=\"M{left} {y:.1}H{right}\"/>"));
+            put!(svg, "<path{class} d=\"M{left} {y:.1}H{right}\"/>");
             if labelled {
                 let (x, y) = (left - 8.0, y + 4.5);
-                put(
-                    svg,
-                    format_args!(
-                        "<text class=\"beside\" x=\"{x}\" y=\"{y:.1}\">{}</text>",
-                        label(error, false)
-                    ),
-                );
+                put!(svg, "<text class=\"beside\" x=\"{x}\" y=\"{y:.1}\">{}</text>", label(error, false));
             }
         }
         let (middle, foot) = (0.5 * (left + right), self.height - 6.0);
-        put(
-            svg,
-            format_args!(
-                "<text class=\"axis below\" x=\"{middle}\" y=\"{foot}\">seconds of rendering</text>"
-            ),
-        );
+        put!(svg, "<text class=\"axis below\" x=\"{middle}\" y=\"{foot}\">seconds of rendering</text>");
         let middle = 0.5 * (top + bottom);
-        put(
+        put!(
             svg,
-            format_args!(
-                "<text class=\"axis below\" transform=\"translate(14 {middle}) rotate(-90)\">relMSE</text>"
-            ),
+            "<text class=\"axis below\" transform=\"translate(14 {middle}) rotate(-90)\">relMSE</text>"
         );
     }
 
@@ -240,28 +228,23 @@ impl Plot {
         if band.len() > 1 {
             let upper = band.iter().map(|[t, _, upper]| (*t, *upper));
             let lower = band.iter().rev().map(|[t, lower, _]| (*t, *lower));
-            put(
-                svg,
-                format_args!("<path class=\"band s{style}\" d=\"{}Z\"/>", self.path(upper.chain(lower))),
-            );
+            put!(svg, "<path class=\"band s{style}\" d=\"{}Z\"/>", self.path(upper.chain(lower)));
         }
         let points = thinned(&series.points, |point| point[0]);
         if let (Some(fit), Some(first), Some(last)) = (&series.fit, points.first(), points.last()) {
             let ends = [first[0].max(fit.from), last[0]].map(|seconds| (seconds, fit.at(seconds)));
-            put(svg, format_args!("<path class=\"fit\" d=\"{}\"/>", self.path(ends.into_iter())));
+            put!(svg, "<path class=\"fit\" d=\"{}\"/>", self.path(ends.into_iter()));
         }
         let path = self.path(points.iter().map(|point| (point[0], point[1])));
-        put(svg, format_args!("<path class=\"curve s{style}\" d=\"{path}\"/>"));
+        put!(svg, "<path class=\"curve s{style}\" d=\"{path}\"/>");
         for [seconds, error] in points.iter().filter(|_| points.len() <= MARKED) {
             let (x, y) = (self.x(*seconds), self.y(*error));
             let words =
                 format!("{}: {} after {}", series.name, number(*error, 3), readable_seconds(*seconds));
-            put(
+            put!(
                 svg,
-                format_args!(
-                    "<circle class=\"s{style}\" cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"3\"><title>{}</title></circle>",
-                    escape(&words)
-                ),
+                "<circle class=\"s{style}\" cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"3\"><title>{}</title></circle>",
+                escape(&words)
             );
         }
     }
@@ -273,12 +256,10 @@ impl Plot {
             let series = lead.who.and_then(|who| chart.series.get(who));
             let class = series.map_or("open".into(), |series| format!("s{}", series.style % STYLES));
             let name = series.map_or("too close to tell", |series| &series.name);
-            put(
+            put!(
                 svg,
-                format_args!(
-                    "<rect class=\"lead {class}\" x=\"{x:.1}\" y=\"{y}\" width=\"{width:.1}\" height=\"7\"><title>{}</title></rect>",
-                    escape(name)
-                ),
+                "<rect class=\"lead {class}\" x=\"{x:.1}\" y=\"{y}\" width=\"{width:.1}\" height=\"7\"><title>{}</title></rect>",
+                escape(name)
             );
         }
     }
@@ -287,15 +268,10 @@ impl Plot {
         let mut path = String::new();
         for (seconds, error) in points.filter(|(seconds, error)| *seconds > 0.0 && error.is_finite()) {
             let sign = if path.is_empty() { 'M' } else { 'L' };
-            put(&mut path, format_args!("{sign}{:.1} {:.1}", self.x(seconds), self.y(error)));
+            put!(path, "{sign}{:.1} {:.1}", self.x(seconds), self.y(error));
         }
         path
     }
-}
-
-/// Writing to a string does not fail.
-fn put(text: &mut String, arguments: core::fmt::Arguments) {
-    let _ = text.write_fmt(arguments);
 }
 
 /// Points that can be told apart, the last always among them.
