@@ -26,6 +26,11 @@ fn help_and_version_are_no_errors() {
     {
         assert!(help.contains(flag), "{flag}");
     }
+    let first = help.split("Options:").nth(1).and_then(|rest| rest.split("Light transport:").next()).unwrap();
+    let flags: Vec<&str> = first.split_whitespace().filter(|word| word.starts_with("--")).collect();
+    for flag in ["output", "method", "size", "spp", "time", "error", "seed", "threads", "memory", "report"] {
+        assert!(flags.contains(&&*format!("--{flag}")), "{flag} is not among the first: {first}");
+    }
 }
 
 #[test]

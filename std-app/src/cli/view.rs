@@ -7,24 +7,29 @@ use clap::Args;
 use halflight::load::{LoadedScene, View, direction};
 use halflight_core::scene::Camera;
 
+/// Heading of the flags. `next_help_heading` would cover the flags of other structs as well.
+const CAMERA: &str = "Camera [default: of the scene file, else one that frames everything]";
+
 /// The view, in the units of the scene.
 #[derive(Args)]
-#[command(next_help_heading = "Camera [default: of the scene file, else one that frames everything]")]
 pub(super) struct ViewFlags {
     /// Position of the camera
-    #[arg(long, value_name = "X,Y,Z", value_parser = values::vector, allow_hyphen_values = true)]
+    #[arg(long, value_name = "X,Y,Z", value_parser = values::vector, allow_hyphen_values = true,
+        help_heading = CAMERA)]
     eye: Option<[f64; 3]>,
     /// Point in the middle of the picture; with --eye alone, the middle of the scene
-    #[arg(long, value_name = "X,Y,Z", value_parser = values::vector, allow_hyphen_values = true)]
+    #[arg(long, value_name = "X,Y,Z", value_parser = values::vector, allow_hyphen_values = true,
+        help_heading = CAMERA)]
     look_at: Option<[f64; 3]>,
     /// Direction that points up in the picture; 0,1,0 if --eye or --look-at is given
-    #[arg(long, value_name = "X,Y,Z", value_parser = values::vector, allow_hyphen_values = true)]
+    #[arg(long, value_name = "X,Y,Z", value_parser = values::vector, allow_hyphen_values = true,
+        help_heading = CAMERA)]
     up: Option<[f64; 3]>,
     /// Vertical field of view in degrees
-    #[arg(long, value_name = "DEG", value_parser = values::degrees)]
+    #[arg(long, value_name = "DEG", value_parser = values::degrees, help_heading = CAMERA)]
     fov: Option<f64>,
     /// Radius of the lens, 0 for a pinhole, and distance in focus [default: that of --look-at]
-    #[arg(long, value_name = "RADIUS[,DISTANCE]", value_parser = values::lens)]
+    #[arg(long, value_name = "RADIUS[,DISTANCE]", value_parser = values::lens, help_heading = CAMERA)]
     lens: Option<Lens>,
 }
 
