@@ -5,7 +5,7 @@ use crate::numbers::{fraction, point};
 use arbitrary::{Result, Unstructured};
 use glam::Vec3;
 use halflight_core::Level;
-use halflight_core::cache::irradiance::{QueryPoint, IrradianceCache, POINTS, Points, Record, SECTORS};
+use halflight_core::cache::irradiance::{IrradianceCache, POINTS, Points, QueryPoint, Record, SECTORS};
 use halflight_core::geometry::Bounds;
 use halflight_core::memory::{Arena, Line};
 

@@ -7,7 +7,7 @@ use halflight::drive::{Checkpoint, Method, RenderResult, Settings};
 use halflight_core::bsdf::All;
 use halflight_core::bvh::Bvh;
 use halflight_core::film::Film;
-use halflight_core::light::{Emission, LightSampler, Worth};
+use halflight_core::light::{EmissionSampler, GuideStats, LightSampler};
 use halflight_core::memory::{Arena, Footprint, Line};
 use halflight_core::photon::{Photon, Photons};
 use halflight_core::scene::PointLight;
@@ -56,8 +56,9 @@ fn pictures(scene: &Scene, first: u32, (tasks, pixels, is_beside): Shot, max_dep
     let bvh = Bvh::build(&scene.mesh, &mut arena(&mut bvh_lines)).unwrap();
     let mut light_lines = lines(LightSampler::footprint(scene).and(LightSampler::scratch(scene)));
     let lights = LightSampler::build(scene, &mut arena(&mut light_lines)).unwrap();
-    let mut emission_lines = lines(Emission::footprint(&lights));
-    let emission = Emission::build(scene, &lights, &bvh.bounds(), &mut arena(&mut emission_lines)).unwrap();
+    let mut emission_lines = lines(EmissionSampler::footprint(&lights));
+    let emission =
+        EmissionSampler::build(scene, &lights, &bvh.bounds(), &mut arena(&mut emission_lines)).unwrap();
     let mut scratch = lines(PathTracer::<All>::scratch(2048).or(CausticShooter::<All>::scratch()));
     let mut scratch = arena(&mut scratch);
     let mut film_lines = lines(Film::footprint(SIZE, SIZE));
@@ -437,13 +438,17 @@ fn in_a_stadium_photons_go_to_the_glass_and_their_power_is_right() {
     let bvh = Bvh::build(&scene.mesh, &mut arena(&mut bvh_lines)).unwrap();
     let mut light_lines = lines(LightSampler::footprint(&scene).and(LightSampler::scratch(&scene)));
     let lights = LightSampler::build(&scene, &mut arena(&mut light_lines)).unwrap();
-    let guided = Worth::guide_footprint(&lights);
+    let guided = GuideStats::guide_footprint(&lights);
     let mut all = lines(
-        Emission::footprint(&lights).and(Worth::footprint(&lights)).and(guided).and(guided).and(guided),
+        EmissionSampler::footprint(&lights)
+            .and(GuideStats::footprint(&lights))
+            .and(guided)
+            .and(guided)
+            .and(guided),
     );
     let mut memory = arena(&mut all);
-    let plain = Emission::build(&scene, &lights, &bvh.bounds(), &mut memory).unwrap();
-    let mut worth = Worth::aimed(&scene, &lights, &plain, &mut memory).unwrap().unwrap();
+    let plain = EmissionSampler::build(&scene, &lights, &bvh.bounds(), &mut memory).unwrap();
+    let mut worth = GuideStats::aimed(&scene, &lights, &plain, &mut memory).unwrap().unwrap();
     let aimed = worth.guide(&plain, &mut memory).unwrap();
     let mut scratch = lines(CausticShooter::<All>::scratch());
     let mut scratch = arena(&mut scratch);
@@ -456,7 +461,7 @@ fn in_a_stadium_photons_go_to_the_glass_and_their_power_is_right() {
         let frame = (discs, [SIZE; 2]);
         CausticShooter::<All>::new((&scene, &bvh, &lights), emission, shot, frame, level)
     };
-    let look = |emission, map, worth: &mut Worth, scratch: &mut Arena| {
+    let look = |emission, map, worth: &mut GuideStats, scratch: &mut Arena| {
         let shooter = shooter(emission);
         for task in 0..TASKS / 2 {
             let mut finds = [Find::default(); PATHS];
@@ -469,7 +474,7 @@ fn in_a_stadium_photons_go_to_the_glass_and_their_power_is_right() {
     look(&once, 1, &mut worth, &mut scratch);
     let learned = worth.guide(&plain, &mut memory).unwrap();
     assert_eq!(memory.available(), 0, "footprints are exact");
-    assert!(Worth::aimed(&scene, &lights, &plain, &mut memory).is_err());
+    assert!(GuideStats::aimed(&scene, &lights, &plain, &mut memory).is_err());
 
     // Photons that were left, their power, the rays and the seconds that it took.
     let mut shoot = |emission| {

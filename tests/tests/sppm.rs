@@ -7,7 +7,7 @@ use halflight::load::{self, LoadOptions};
 use halflight::save::Image;
 use halflight_core::bsdf::All;
 use halflight_core::bvh::Bvh;
-use halflight_core::light::{Emission, LightSampler};
+use halflight_core::light::{EmissionSampler, LightSampler};
 use halflight_core::memory::{Arena, Footprint, Line};
 use halflight_core::photon::{Photon, Photons};
 use halflight_core::scene::{Camera, Material, Scene, Surface};
@@ -36,9 +36,9 @@ fn photons(scene: &Scene, tasks: usize) -> Vec<Photon> {
     let mut light_lines = lines(LightSampler::footprint(scene).and(LightSampler::scratch(scene)));
     let lights =
         LightSampler::build(scene, &mut Arena::new(bytemuck::cast_slice_mut(&mut light_lines))).unwrap();
-    let mut emission_lines = lines(Emission::footprint(&lights));
+    let mut emission_lines = lines(EmissionSampler::footprint(&lights));
     let mut arena = Arena::new(bytemuck::cast_slice_mut(&mut emission_lines));
-    let emission = Emission::build(scene, &lights, &bvh.bounds(), &mut arena).unwrap();
+    let emission = EmissionSampler::build(scene, &lights, &bvh.bounds(), &mut arena).unwrap();
     let settings =
         ShootSettings { keep: Keep::Reflected, seed: 1, paths: (tasks * PATHS) as u32, max_depth: UNLIMITED };
     let shooter = Shooter::<All>::new(scene, &bvh, &lights, &emission, settings, Level::detect());

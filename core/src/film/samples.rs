@@ -9,8 +9,9 @@ pub const GROUP: usize = 32;
 /// Groups of a tile.
 pub const GROUPS: usize = PIXELS_PER_TILE / GROUP;
 
-/// Pixels of a circle, whose paths share what they find: half of a group, one of each 2 × 2. Which ones is drawn by lot for
-/// each circle, and again whenever the number of samples has doubled, so that no pattern shows.
+/// Pixels of a circle, whose paths share what they find: half of a group, one of each 2 × 2. Which ones is
+/// drawn by lot for each circle, and again whenever the number of samples has doubled, so that no pattern
+/// shows.
 pub const CIRCLE: usize = GROUP / 2;
 
 /// Circles of a tile.
@@ -54,7 +55,8 @@ impl Tile {
         LOTS.1[i % PIXELS_PER_TILE] as usize
     }
 
-    /// The pixels of a circle that take `sample` together, in their order along the Z-curve; `seed` is that of the picture.
+    /// The pixels of a circle that take `sample` together, in their order along the Z-curve; `seed` is that
+    /// of the picture.
     #[inline]
     pub fn circle(&self, circle: usize, seed: u32, sample: u32) -> [usize; CIRCLE] {
         let (group, half) = (circle / 2 % GROUPS, circle % 2);

@@ -67,8 +67,8 @@ const MANY_CELLS: usize = 1 << 16;
 /// By how much larger cells may raise the second moment of the light.
 const LOSS: f64 = 0.02;
 
-/// Texels along a side of a cell of the density: as many as lose next to nothing, for a density that stays in the
-/// cache is several times as fast. A sky may have large cells, one with a sun may not.
+/// Texels along a side of a cell of the density: as many as lose next to nothing, for a density that stays in
+/// the cache is several times as fast. A sky may have large cells, one with a sun may not.
 fn block(texture: &Texture) -> usize {
     let (width, height) = (texture.width as usize, texture.height as usize);
     let mut block = 1;
@@ -82,7 +82,8 @@ fn block(texture: &Texture) -> usize {
     block
 }
 
-/// By which part the second moment of the light grows where cells of `block`² texels are sampled by their means.
+/// By which part the second moment of the light grows where cells of `block`² texels are sampled by their
+/// means.
 fn loss(texture: &Texture, block: usize) -> f64 {
     let (width, height) = (texture.width as usize, texture.height as usize);
     let (mut by_texels, mut by_cells) = (0.0, 0.0);

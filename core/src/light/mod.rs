@@ -7,19 +7,16 @@ mod emission;
 mod emitted;
 mod environment;
 mod environment_visibility;
-mod etendue;
-mod guide;
 mod sampler;
 mod tree;
 
-pub use emission::{DIMENSIONS as EMISSION_DIMENSIONS, Emission, Emitted};
+pub(crate) use emission::LightType;
+pub use emission::{DIMENSIONS as EMISSION_DIMENSIONS, EmissionSample, EmissionSampler, GuideStats};
 pub use emitted::emitted;
 pub(crate) use environment_visibility::MarginalSample;
 pub use environment_visibility::{
     Bins, EnvironmentVisibility, VisibilityGrid, VisibilityTable, WarpedSample,
 };
-pub(crate) use etendue::Found;
-pub use guide::Worth;
 pub use sampler::{LightPoint, LightSample, LightSampler};
 
 use crate::Rgb;

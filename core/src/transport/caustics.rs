@@ -15,7 +15,7 @@ use super::shoot::ShootSettings;
 use crate::bsdf::{BsdfSample, Features};
 use crate::bvh::Bvh;
 use crate::geometry::Ray;
-use crate::light::{Emission, Found, LightSampler, luminance};
+use crate::light::{EmissionSampler, LightSampler, LightType, luminance};
 use crate::memory::{Arena, Footprint, OutOfMemory};
 use crate::photon::Photon;
 use crate::scene::{Scene, SurfacePoint};
@@ -79,7 +79,7 @@ impl<'a, F: Features> CausticShooter<'a, F> {
     /// across and down. `F` has at least the features of the scene. All photons are kept, whatever `settings` say.
     pub fn new(
         (scene, bvh, lights): (&'a Scene<'a>, &'a Bvh<'a>, &'a LightSampler<'a>),
-        emission: &'a Emission<'a>,
+        emission: &'a EmissionSampler<'a>,
         settings: ShootSettings,
         (discs, frame): (Discs, [u32; 2]),
         level: Level,
@@ -214,7 +214,7 @@ impl<'a, F: Features> CausticShooter<'a, F> {
         let with = |chosen: f32| back.map_or(0.0, |back| chosen / back);
         let by_chance = |chosen: f32| libm::sqrtf(1.0 + with(chosen) * with(chosen));
         match emission.found(lights, state.light) {
-            Found::OnSurface => {
+            LightType::Area => {
                 let from = (state.origin.into(), -to_light);
                 let density = emission.density_of_emitter(scene, lights, state.light as usize, from);
                 let chosen = match (back, lights.triangle_of(state.light)) {
@@ -226,7 +226,7 @@ impl<'a, F: Features> CausticShooter<'a, F> {
                 };
                 (density, by_chance(chosen))
             }
-            Found::InSky => {
+            LightType::Infinite => {
                 let density = emission.density_of_sky(scene, lights, to_light, position);
                 let chosen = match back {
                     Some(_) => lights.pdf_escape(scene, position, normal, to_light),
@@ -234,7 +234,7 @@ impl<'a, F: Features> CausticShooter<'a, F> {
                 };
                 (density, by_chance(chosen))
             }
-            Found::ByChoice => {
+            LightType::Delta => {
                 let density = emission.density_of_choice(scene, lights, state.light, position);
                 (density, with(lights.probability(state.light, position, normal)))
             }

@@ -9,7 +9,7 @@ use super::estimator::{CERTAIN_BELOW, Counters, MAX_CROSSINGS, is_cut};
 use crate::bsdf::{Bsdf, BsdfSample, Features};
 use crate::bvh::{Bvh, Coherence};
 use crate::geometry::{Hit, Ray};
-use crate::light::{EMISSION_DIMENSIONS, Emission, LightSampler};
+use crate::light::{EMISSION_DIMENSIONS, EmissionSampler, LightSampler};
 use crate::memory::{Arena, Footprint, OutOfMemory};
 use crate::photon::Photon;
 use crate::sampling::{Numbers, Sampler, mix};
@@ -146,7 +146,7 @@ pub(super) struct Flight<'a, F> {
     pub scene: &'a Scene<'a>,
     pub bvh: &'a Bvh<'a>,
     pub lights: &'a LightSampler<'a>,
-    pub emission: &'a Emission<'a>,
+    pub emission: &'a EmissionSampler<'a>,
     pub seed: u32,
     /// Light paths of a map.
     pub paths: u32,

@@ -15,7 +15,7 @@
 //! that each that does would be a spike (`docs/decisions/0042-photons-past-the-first-receiver.md`). Nor is light gathered on a disc much
 //! smaller than that where it comes from, as right before the eye: there each photon would be one. Both ends know these two
 //! discs, and so where the one vertex is (`docs/decisions/0045-kernel-radii.md`). With étendue in place of areas
-//! (`light/etendue.rs`) distances cancel, and the third over the first is
+//! (`light/emission/pdf.rs`) distances cancel, and the third over the first is
 //!
 //!   R = N π r² cos θⱼ / p(xⱼ → x₍ⱼ₋₁₎) · Π ρᵢ · p(x₀) p(ω₀) / cos θ₀
 //!   ρᵢ = p(x₍ᵢ₋₁₎ → xᵢ → x₍ᵢ₊₁₎) cos θ(x₍ᵢ₋₁₎) / (p(x₍ᵢ₊₁₎ → xᵢ → x₍ᵢ₋₁₎) cos θ(x₍ᵢ₊₁₎))
@@ -40,7 +40,7 @@ use super::density::{Gathered, Light, reflected};
 use super::wave::{Merged, Path};
 use crate::bsdf::{Bsdf, Features};
 use crate::bvh::Bvh;
-use crate::light::Emission;
+use crate::light::EmissionSampler;
 use crate::photon::{Disc, Falloff, PhotonMap, Uniform};
 use crate::scene::{Scene, SurfacePoint};
 use crate::{Level, Rgb};
@@ -127,7 +127,7 @@ impl Discs {
 pub struct Merging<'a> {
     /// Of even and of odd samples.
     maps: [&'a PhotonMap<'a>; 2],
-    pub(super) emission: &'a Emission<'a>,
+    pub(super) emission: &'a EmissionSampler<'a>,
     discs: Discs,
     /// Light paths of each map.
     paths: f32,
@@ -171,7 +171,12 @@ impl ChainLink<'_> {
 
 impl<'a> Merging<'a> {
     /// `maps` for even and odd samples, of `paths` light paths each, which were left for the same `discs`.
-    pub fn new(maps: [&'a PhotonMap<'a>; 2], emission: &'a Emission<'a>, discs: Discs, paths: u32) -> Self {
+    pub fn new(
+        maps: [&'a PhotonMap<'a>; 2],
+        emission: &'a EmissionSampler<'a>,
+        discs: Discs,
+        paths: u32,
+    ) -> Self {
         Self { maps, emission, discs, paths: paths as f32, beside_records: false }
     }
 

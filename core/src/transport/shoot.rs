@@ -16,7 +16,7 @@ use super::flight::{Flight, Onward, Pile, State, Vertex, Visitor};
 use super::sight::Sight;
 use crate::bsdf::{BsdfSample, Features};
 use crate::bvh::Bvh;
-use crate::light::{Emission, LightSampler, luminance};
+use crate::light::{EmissionSampler, LightSampler, luminance};
 use crate::memory::{Arena, Footprint, OutOfMemory};
 use crate::photon::Photon;
 use crate::scene::Scene;
@@ -88,7 +88,7 @@ impl<'a, F: Features> Shooter<'a, F> {
         scene: &'a Scene<'a>,
         bvh: &'a Bvh<'a>,
         lights: &'a LightSampler<'a>,
-        emission: &'a Emission<'a>,
+        emission: &'a EmissionSampler<'a>,
         settings: ShootSettings,
         level: Level,
     ) -> Self {

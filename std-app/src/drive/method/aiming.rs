@@ -2,7 +2,7 @@
 //!
 //! A first look follows some light paths from all lights by their power, and asks which leave photons that count: where the
 //! camera sees them, or where rays go that gather for what it sees. Where few do, lights and directions are chosen by what
-//! they have brought (`halflight_core::light::Worth`), look by look, until enough have brought something. The last look says
+//! they have brought (`halflight_core::light::GuideStats`), look by look, until enough have brought something. The last look says
 //! whether that pays; if not, or if most paths count as it is, the power of lights decides as if nobody had looked.
 
 use super::Stage;
@@ -10,7 +10,7 @@ use super::places::{self, PLACES};
 use crate::drive::RenderError;
 use crate::drive::memory::Memory;
 use halflight_core::bsdf::Features;
-use halflight_core::light::{Emission, Worth};
+use halflight_core::light::{EmissionSampler, GuideStats};
 use halflight_core::memory::{Arena, Footprint, Line};
 use halflight_core::transport::shoot::{Keep, PATHS, ShootSettings, Shooter};
 use halflight_core::transport::sight::{Raster, Sight};
@@ -43,7 +43,7 @@ pub(super) enum Wanted {
 
 /// The lights as they are to shine for a map.
 pub(super) struct Aim<'l> {
-    pub(super) emission: Emission<'l>,
+    pub(super) emission: EmissionSampler<'l>,
     /// The share of light paths that count, where anybody looked,
     pub(super) seen: Option<f64>,
     /// and what it is by the power of lights, where they are aimed.
@@ -64,13 +64,13 @@ impl<'l> Aim<'l> {
         stage: &Stage,
         (memory, lines): (&mut Memory, &'l mut Vec<Line>),
     ) -> Result<Self, RenderError> {
-        *lines = memory.take(STRUCTURE, Emission::footprint(stage.lights))?;
+        *lines = memory.take(STRUCTURE, EmissionSampler::footprint(stage.lights))?;
         Self::plain(stage, &mut Arena::new(bytemuck::cast_slice_mut(lines)))
     }
 
     fn plain(stage: &Stage, arena: &mut Arena<'l>) -> Result<Self, RenderError> {
         let Stage { scene, bvh, lights, .. } = *stage;
-        let emission = Emission::build(scene, lights, &bvh.bounds(), arena)?;
+        let emission = EmissionSampler::build(scene, lights, &bvh.bounds(), arena)?;
         Ok(Self { emission, seen: None, by_power: None })
     }
 
@@ -89,11 +89,11 @@ impl<'l> Aim<'l> {
         let raster = if matches!(wanted, Wanted::Gathered(_)) { raster.gathering() } else { raster };
         let of_caustics = keep == Keep::Caustic;
         let worth = if of_caustics {
-            Worth::footprint(lights).and(Worth::guide_footprint(lights))
+            GuideStats::footprint(lights).and(GuideStats::guide_footprint(lights))
         } else {
-            Worth::footprint_of_all(lights)
+            GuideStats::footprint_of_all(lights)
         };
-        let kept = Emission::footprint(lights).and(worth);
+        let kept = EmissionSampler::footprint(lights).and(worth);
         let found = Footprint::default().slice::<(u32, f32)>(LOOK);
         let needed = kept.bytes() + raster.footprint().bytes() + found.bytes();
         if !memory.has(needed.saturating_add(others)) {
@@ -103,9 +103,9 @@ impl<'l> Aim<'l> {
         let mut arena = Arena::new(bytemuck::cast_slice_mut(lines));
         let mut aim = Self::plain(stage, &mut arena)?;
         let worth = if of_caustics {
-            Worth::aimed(scene, lights, &aim.emission, &mut arena)?.map(Worth::alone)
+            GuideStats::aimed(scene, lights, &aim.emission, &mut arena)?.map(GuideStats::alone)
         } else {
-            Some(Worth::of_all(lights, &mut arena)?)
+            Some(GuideStats::of_all(lights, &mut arena)?)
         };
         let Some(mut worth) = worth else { return Ok(aim) };
         memory.set_aside(PLACES, found)?;
@@ -129,9 +129,9 @@ impl<'l> Aim<'l> {
     /// Looks, and again by what was learned where that may pay.
     fn learn(
         &mut self,
-        (worth, of_caustics): (&mut Worth<'l>, bool),
+        (worth, of_caustics): (&mut GuideStats<'l>, bool),
         arena: &mut Arena<'l>,
-        mut look: impl FnMut(&Emission, u32) -> Result<Option<Look>, RenderError>,
+        mut look: impl FnMut(&EmissionSampler, u32) -> Result<Option<Look>, RenderError>,
     ) -> Result<(), RenderError> {
         let plain = self.emission;
         // By power; of all light by that of cells, which are known then, as those of mirrors and glass are not.
@@ -143,7 +143,7 @@ impl<'l> Aim<'l> {
         if first.share() >= MOST_SEEN || first.found.len() < fewest {
             return Ok(());
         }
-        let learn = |worth: &mut Worth, look: &Look| {
+        let learn = |worth: &mut GuideStats, look: &Look| {
             look.found.iter().for_each(|&(cell, power)| worth.learn(cell, power));
             if !of_caustics {
                 worth.even_out(&plain);

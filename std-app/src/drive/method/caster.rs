@@ -13,7 +13,7 @@ use crate::drive::memory::Memory;
 use crate::drive::run::path_settings;
 use crate::drive::workers::Workers;
 use halflight_core::bsdf::Features;
-use halflight_core::light::Emission;
+use halflight_core::light::EmissionSampler;
 use halflight_core::memory::{Arena, Line, OutOfMemory};
 use halflight_core::photon::{MapShape, Photon, PhotonMap, Photons};
 use halflight_core::transport::caustics::{CausticShooter, PATHS, ROOM};
@@ -42,7 +42,7 @@ const RECORD_MAP: u32 = 1 << 30;
 
 /// How photons are to be shot.
 pub(super) struct Cast<'a> {
-    pub(super) emission: Emission<'a>,
+    pub(super) emission: EmissionSampler<'a>,
     /// Of one pixel.
     pub(super) discs: Discs,
     /// So many times the light paths, for discs so many times as wide.
@@ -90,7 +90,7 @@ impl Kept {
 /// A map of photons for rays that gather.
 pub(super) struct ForRecords<'m> {
     map: PhotonMap<'m>,
-    emission: &'m Emission<'m>,
+    emission: &'m EmissionSampler<'m>,
     discs: Discs,
     paths: u32,
 }
@@ -299,7 +299,7 @@ fn shoot<'m, F: Features>(
 /// A shooter of `paths` photons by `emission`, for what is left of `discs` at `sample`; of those beside records, if so.
 pub(super) fn shooter<'a, F: Features>(
     stage: &Stage<'a>,
-    emission: &'a Emission<'a>,
+    emission: &'a EmissionSampler<'a>,
     paths: usize,
     (discs, sample): (Discs, u32),
     beside_records: bool,

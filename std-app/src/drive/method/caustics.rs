@@ -17,7 +17,7 @@ use crate::drive::memory::Memory;
 use crate::drive::{RenderError, Reuse};
 use halflight_core::bsdf::Features;
 use halflight_core::census::Census;
-use halflight_core::light::{Emission, LightSampler, Worth};
+use halflight_core::light::{EmissionSampler, GuideStats, LightSampler};
 use halflight_core::memory::{Arena, Footprint, Line};
 use halflight_core::photon::Photons;
 use halflight_core::transport::caustics::{CausticShooter, Find, PATHS, ROOM};
@@ -68,8 +68,8 @@ pub(super) fn scratch<F: Features>() -> Footprint {
 
 /// Memory of a look.
 pub(super) fn footprint(lights: &LightSampler) -> Footprint {
-    let guide = Worth::guide_footprint(lights);
-    Emission::footprint(lights).and(guide).and(Worth::footprint(lights)).and(guide).and(guide)
+    let guide = GuideStats::guide_footprint(lights);
+    EmissionSampler::footprint(lights).and(guide).and(GuideStats::footprint(lights)).and(guide).and(guide)
 }
 
 /// Bytes of a few photons.
@@ -91,14 +91,14 @@ pub(super) fn look_first<'l, F: Features>(
 ) -> Result<(Option<Cast<'l>>, bool), RenderError> {
     let Stage { scene, bvh, lights, settings, .. } = *stage;
     let discs = stage.discs();
-    let plain = Emission::build(scene, lights, &bvh.bounds(), arena)?;
+    let plain = EmissionSampler::build(scene, lights, &bvh.bounds(), arena)?;
     let eye = Eye { discs, beside_records };
     if !glance::<F>(stage, paths, (&plain, &eye), &mut arena.scratch())?
         .is_some_and(|glance| glance.may_pay())
     {
         return Ok((None, false));
     }
-    let Some(mut worth) = Worth::aimed(scene, lights, &plain, arena)? else { return Ok((None, false)) };
+    let Some(mut worth) = GuideStats::aimed(scene, lights, &plain, arena)? else { return Ok((None, false)) };
     let aimed = worth.guide(&plain, arena)?;
     for find in look::<F>(stage, paths, &aimed, &eye, (LOOK, 0))? {
         worth.learn(find.cell, find.worth);
@@ -173,10 +173,10 @@ struct Eye {
 fn glance<'l, F: Features>(
     stage: &Stage,
     paths: &mut Paths<F>,
-    (plain, eye): (&Emission<'l>, &Eye),
+    (plain, eye): (&EmissionSampler<'l>, &Eye),
     arena: &mut Arena<'l>,
 ) -> Result<Option<Looked>, RenderError> {
-    let Some(worth) = Worth::aimed(stage.scene, stage.lights, plain, arena)? else { return Ok(None) };
+    let Some(worth) = GuideStats::aimed(stage.scene, stage.lights, plain, arena)? else { return Ok(None) };
     let finds = look::<F>(stage, paths, &worth.guide(plain, arena)?, eye, (GLANCE, 0))?;
     let mean = paths.mean(stage)?;
     Ok(Some(looked(stage, paths, &finds, mean)))
@@ -187,7 +187,7 @@ fn glance<'l, F: Features>(
 fn beside<F: Features>(
     stage: &Stage,
     paths: &mut Paths<F>,
-    emission: &Emission,
+    emission: &EmissionSampler,
     eye: &Eye,
 ) -> Result<f32, RenderError> {
     let (_, discs) = shooter::<F>(stage, emission, LOOK, (eye.discs, 0), eye.beside_records);
@@ -211,7 +211,7 @@ fn looked<F: Features>(stage: &Stage, paths: &mut Paths<F>, finds: &[Find], mean
 fn look<F: Features>(
     stage: &Stage,
     paths: &mut Paths<F>,
-    emission: &Emission,
+    emission: &EmissionSampler,
     eye: &Eye,
     (count, map): (usize, u32),
 ) -> Result<Vec<Find>, RenderError> {
@@ -221,7 +221,7 @@ fn look<F: Features>(
 fn look_with<F: Features>(
     stage: &Stage,
     scratch: &mut [Vec<Line>],
-    emission: &Emission,
+    emission: &EmissionSampler,
     &Eye { discs, beside_records }: &Eye,
     (count, map): (usize, u32),
 ) -> Result<Vec<Find>, RenderError> {
@@ -242,13 +242,13 @@ pub(in crate::drive) fn unseen<F: Features>(
     memory: &mut Memory,
 ) -> Result<Option<f64>, RenderError> {
     let Stage { scene, bvh, lights, settings, .. } = *stage;
-    let emission = Emission::footprint(lights);
+    let emission = EmissionSampler::footprint(lights);
     if !may_be(stage) || !memory.has(emission.bytes()) {
         return Ok(None);
     }
     let mut lines = memory.take(JUDGE, emission)?;
     let mut arena = Arena::new(bytemuck::cast_slice_mut(&mut lines));
-    let plain = Emission::build(scene, lights, &bvh.bounds(), &mut arena)?;
+    let plain = EmissionSampler::build(scene, lights, &bvh.bounds(), &mut arena)?;
     let eye = Eye { discs: stage.discs(), beside_records: false };
     let finds = look_with::<F>(stage, scratch, &plain, &eye, (LOOK, JUDGE_MAP))?;
     let pixels = f64::from(settings.width) * f64::from(settings.height);

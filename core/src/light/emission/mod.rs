@@ -4,9 +4,15 @@
 //!
 //! Light from infinitely far is sent through the disc that the scene's bounding sphere shows to it.
 
+mod guide;
+mod learning;
+mod pdf;
+
+pub use learning::GuideStats;
+pub(crate) use pdf::LightType;
+
 use super::area::Emitter;
 use super::emitted::{emitted_at, mean_luminance, spot_falloff, strength};
-use super::guide::{Guide, Pick};
 use super::sampler::LightSampler;
 use crate::Rgb;
 use crate::geometry::{Bounds, Frame, MISS, Ray};
@@ -19,6 +25,7 @@ use crate::sampling::{AliasTable, Numbers, Sampler};
 use crate::scene::{PointLight, Scene};
 use core::f32::consts::{PI, TAU};
 use glam::Vec3;
+use guide::{EmissionGuide, GuideSample};
 
 /// Dimensions of the sampler of a photon that its emission takes: from 0 on so many.
 pub const DIMENSIONS: u32 = 3;
@@ -31,7 +38,7 @@ const AROUND: f32 = 1.0 + 1e-5;
 
 /// A photon on its way from a light.
 #[derive(Clone, Copy, Debug)]
-pub struct Emitted {
+pub struct EmissionSample {
     /// From the light.
     pub ray: Ray,
     /// W: what it carries if it is the only one.
@@ -46,18 +53,18 @@ pub struct Emitted {
 
 /// The lights of a scene as a source of photons.
 #[derive(Clone, Copy, Debug)]
-pub struct Emission<'m> {
+pub struct EmissionSampler<'m> {
     /// Emitters, points and spots, directional lights, the environment, by their power.
     pub(super) table: AliasTable<'m>,
     pub(super) center: Vec3,
     /// Of the bounding sphere.
     pub(super) radius: f32,
     /// Where photons are wanted.
-    pub(super) guide: Option<Guide<'m>>,
+    guide: Option<EmissionGuide<'m>>,
 }
 
-impl<'m> Emission<'m> {
-    /// Bytes that [`Emission::build`] takes.
+impl<'m> EmissionSampler<'m> {
+    /// Bytes that [`EmissionSampler::build`] takes.
     pub fn footprint(lights: &LightSampler) -> Footprint {
         AliasTable::footprint(lights.count())
     }
@@ -65,7 +72,7 @@ impl<'m> Emission<'m> {
     /// For the lights of a scene within `bounds`.
     ///
     /// # Errors
-    /// [`OutOfMemory`] where the arena has less than [`Emission::footprint`].
+    /// [`OutOfMemory`] where the arena has less than [`EmissionSampler::footprint`].
     pub fn build(
         scene: &Scene,
         lights: &LightSampler,
@@ -83,11 +90,16 @@ impl<'m> Emission<'m> {
     }
 
     /// The photon of `numbers`. `None` where it leaves no light, or none shines.
-    pub fn emit<N: Numbers>(&self, scene: &Scene, lights: &LightSampler, numbers: &N) -> Option<Emitted> {
+    pub fn emit<N: Numbers>(
+        &self,
+        scene: &Scene,
+        lights: &LightSampler,
+        numbers: &N,
+    ) -> Option<EmissionSample> {
         let choice = numbers.single(CHOICE);
         let (mut place, mut direction) = (numbers.pair(PLACE), numbers.pair(DIRECTION));
-        let Pick { light, cell, square } = match &self.guide {
-            None => Pick { light: self.table.sample(choice)?.0, ..Pick::default() },
+        let GuideSample { light, cell, square } = match &self.guide {
+            None => GuideSample { light: self.table.sample(choice)?.0, ..GuideSample::default() },
             Some(guide) => guide.pick(choice)?,
         };
         // Light from infinitely far goes its way; what is aimed is where it comes through.
@@ -106,7 +118,7 @@ impl<'m> Emission<'m> {
         }?;
         let (way, on) = (Vec3::from(emitted.ray.direction), Vec3::from(emitted.ray.origin));
         let power = emitted.power / self.density_with(scene, lights, light, (way, on), square);
-        (power.is_finite() && power.max_element() > 0.0).then_some(Emitted {
+        (power.is_finite() && power.max_element() > 0.0).then_some(EmissionSample {
             power,
             light: light as u32,
             cell: cell as u32,
@@ -203,8 +215,13 @@ impl<'m> Emission<'m> {
         self.square(scene, lights, light, way, target)
     }
 
-    fn without_surface(&self, light: &PointLight, place: [f32; 2], direction: [f32; 2]) -> Option<Emitted> {
-        let from = |position, way, power| Emitted {
+    fn without_surface(
+        &self,
+        light: &PointLight,
+        place: [f32; 2],
+        direction: [f32; 2],
+    ) -> Option<EmissionSample> {
+        let from = |position, way, power| EmissionSample {
             ray: Ray::new(position, way),
             power,
             triangle: MISS,
@@ -226,11 +243,11 @@ impl<'m> Emission<'m> {
     }
 
     /// Parallel light of `irradiance`, through a point of the disc that the scene shows to it.
-    fn parallel(&self, direction: Vec3, irradiance: Rgb, place: [f32; 2]) -> Option<Emitted> {
+    fn parallel(&self, direction: Vec3, irradiance: Rgb, place: [f32; 2]) -> Option<EmissionSample> {
         let frame = Frame::from_normal(direction);
         let across = frame.to_world((concentric_disk(place) * self.radius).extend(-self.radius));
         let power = irradiance * (PI * self.radius * self.radius);
-        Some(Emitted {
+        Some(EmissionSample {
             ray: Ray::new(self.center + across, direction),
             power,
             triangle: MISS,
@@ -240,7 +257,12 @@ impl<'m> Emission<'m> {
     }
 }
 
-fn from_surface(scene: &Scene, emitter: &Emitter, [a, b]: [f32; 2], direction: [f32; 2]) -> Option<Emitted> {
+fn from_surface(
+    scene: &Scene,
+    emitter: &Emitter,
+    [a, b]: [f32; 2],
+    direction: [f32; 2],
+) -> Option<EmissionSample> {
     // Of a two-sided light the first half of the numbers is for its front.
     let sides = if emitter.is_two_sided() { 2.0 } else { 1.0 };
     let front = sides * a < 1.0 || sides == 1.0;
@@ -253,7 +275,7 @@ fn from_surface(scene: &Scene, emitter: &Emitter, [a, b]: [f32; 2], direction: [
     let error = emitter.error(place.position);
     let way = Frame::from_normal(normal).to_world(cosine_hemisphere(direction));
     let ray = Ray::new(place.position + error * normal, way);
-    Some(Emitted {
+    Some(EmissionSample {
         ray,
         power: radiance * (PI * emitter.area * sides),
         triangle: place.triangle,
@@ -304,16 +326,16 @@ mod tests {
     }
 
     /// The mean power of photons, each of which is shown to `look`.
-    fn mean_power(scene: &Scene, mut look: impl FnMut(&Emitted)) -> Rgb {
+    fn mean_power(scene: &Scene, mut look: impl FnMut(&EmissionSample)) -> Rgb {
         const PHOTONS: u32 = 1 << 16;
         let bounds = Bounds { min: Vec3::splat(-1.0), max: Vec3::splat(1.0) };
         let bytes = LightSampler::footprint(scene).and(LightSampler::scratch(scene));
         let mut memory = vec![Line([0; 64]); bytes.bytes() / 64];
         let lights =
             LightSampler::build(scene, &mut Arena::new(bytemuck::cast_slice_mut(&mut memory))).unwrap();
-        let mut memory = vec![Line([0; 64]); Emission::footprint(&lights).bytes() / 64];
+        let mut memory = vec![Line([0; 64]); EmissionSampler::footprint(&lights).bytes() / 64];
         let mut arena = Arena::new(bytemuck::cast_slice_mut(&mut memory));
-        let emission = Emission::build(scene, &lights, &bounds, &mut arena).unwrap();
+        let emission = EmissionSampler::build(scene, &lights, &bounds, &mut arena).unwrap();
         assert_eq!(arena.available(), 0);
         let mut sum = [0.0f64; 3];
         for photon in 0..PHOTONS {

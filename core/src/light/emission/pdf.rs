@@ -6,8 +6,8 @@
 //! in which a path from the eye meets x₀, tells how much likelier one is than the other
 //! (`transport/merge.rs`).
 
-use super::emission::Emission;
-use super::sampler::{LightSample, LightSampler};
+use super::EmissionSampler;
+use crate::light::sampler::{LightSample, LightSampler};
 use crate::sampling::warp::{UNIFORM_SPHERE_PDF, uniform_cone_pdf};
 use crate::scene::{PointLight, Scene};
 use core::f32::consts::{FRAC_1_PI, PI};
@@ -15,16 +15,16 @@ use glam::Vec3;
 
 /// How paths from the eye can find a light.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Found {
+pub(crate) enum LightType {
     /// By chance, or by next-event estimation: it has a surface.
-    OnSurface,
+    Area,
     /// The same, in the sky.
-    InSky,
+    Infinite,
     /// By next-event estimation alone: it has no extent.
-    ByChoice,
+    Delta,
 }
 
-impl Emission<'_> {
+impl EmissionSampler<'_> {
     /// Of an emissive `triangle` at `place` in unit direction `way`: per m² sr of étendue.
     pub(crate) fn density_of_surface(
         &self,
@@ -102,24 +102,24 @@ impl Emission<'_> {
     ) -> f32 {
         let (light, direction) = (sample.light, sample.direction);
         match self.found(lights, light) {
-            Found::OnSurface => {
+            LightType::Area => {
                 let place = position + sample.distance * direction;
                 self.density_of_emitter(scene, lights, light as usize, (place, -direction))
             }
-            Found::InSky => self.density_of_sky(scene, lights, direction, position),
-            Found::ByChoice => self.density_of_choice(scene, lights, light, position),
+            LightType::Infinite => self.density_of_sky(scene, lights, direction, position),
+            LightType::Delta => self.density_of_choice(scene, lights, light, position),
         }
     }
 
     /// How light `light`, in the order of the table, is found.
-    pub(crate) fn found(&self, lights: &LightSampler, light: u32) -> Found {
+    pub(crate) fn found(&self, lights: &LightSampler, light: u32) -> LightType {
         let index = light as usize;
         if index < lights.emitters.len() {
-            Found::OnSurface
+            LightType::Area
         } else if index < lights.near() + lights.distant.len() {
-            Found::ByChoice
+            LightType::Delta
         } else {
-            Found::InSky
+            LightType::Infinite
         }
     }
 

@@ -1,15 +1,16 @@
-//! Emission aimed at what throws caustics: the square of random numbers that decides where a photon goes is
-//! cut into cells for each light, and cells are chosen by what they are worth (guided emission in primary
-//! sample space, as in Grittmann et al. 2018). What leads nowhere is still chosen now and then: nothing that
-//! shines has no photons.
+//! Learning of the emission guide. The square of random numbers that decides the direction of a photon is cut
+//! into cells for each light. Cells are chosen by the benefit of earlier photons from them (guided emission
+//! in primary sample space, as in Grittmann et al. 2018). Every cell keeps some probability, so that each
+//! light that shines has photons.
 //!
-//! Where photons of all light are wanted there is nothing to aim at: cells are fewer, and what they are worth
-//! is learned alone.
+//! For photons of caustics, cells that lead to mirrors and glass are preferred from the start. For photons of
+//! all light there is nothing to aim at: cells are fewer, and their benefit is learned alone.
 
-use super::emission::Emission;
-use super::sampler::LightSampler;
+use super::EmissionSampler;
+use super::guide::EmissionGuide;
+use crate::light::sampler::LightSampler;
 use crate::memory::{Arena, Footprint, OutOfMemory};
-use crate::sampling::{AliasTable, ONE_MINUS_EPSILON, Sampler};
+use crate::sampling::{AliasTable, Sampler};
 use crate::scene::{Material, Scene};
 use glam::Vec3;
 
@@ -43,60 +44,8 @@ const FEWEST_AIMS: usize = 2;
 /// Cells around a point that count as aimed at with it.
 const AROUND: isize = 1;
 
-/// Cells by what they are worth. Those of a light follow each other.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Guide<'m> {
-    table: AliasTable<'m>,
-    side: usize,
-}
-
-/// Where a photon is to come from and to go.
-#[derive(Default)]
-pub(super) struct Pick {
-    pub(super) light: usize,
-    pub(super) cell: usize,
-    /// Numbers from here.
-    pub(super) square: Option<Square>,
-}
-
-/// A cell of the square of random numbers.
-#[derive(Clone, Copy)]
-pub(super) struct Square {
-    corner: [f32; 2],
-    side: f32,
-}
-
-impl Square {
-    /// The numbers at a place within.
-    pub(super) fn at(&self, within: [f32; 2]) -> [f32; 2] {
-        let Self { corner: [x, y], side } = *self;
-        [x + within[0], y + within[1]].map(|u| (u / side).min(ONE_MINUS_EPSILON))
-    }
-}
-
-impl Guide<'_> {
-    /// A light and one of its cells, by what they are worth.
-    pub(super) fn pick(&self, choice: f32) -> Option<Pick> {
-        let (cell, _, _) = self.table.sample(choice)?;
-        let (light, own) = (cell / self.cells(), cell % self.cells());
-        let side = self.side;
-        let corner = [(own % side) as f32, (own / side) as f32];
-        Some(Pick { light, cell, square: Some(Square { corner, side: side as f32 }) })
-    }
-
-    /// The density of `light` times that of the numbers of `place`, which aim its photon.
-    pub(super) fn density(&self, light: usize, place: [f32; 2]) -> f32 {
-        let cells = self.cells();
-        self.table.pdf(light * cells + cell(self.side, place)) * cells as f32
-    }
-
-    fn cells(&self) -> usize {
-        self.side * self.side
-    }
-}
-
 /// What the cells of all lights are worth, while that is being learned.
-pub struct Worth<'m> {
+pub struct GuideStats<'m> {
     /// 1 where mirrors and glass are, or by what all of a light is worth, times its power.
     aimed: &'m mut [f32],
     /// What photons were worth.
@@ -106,14 +55,14 @@ pub struct Worth<'m> {
     shares: [f32; 2],
 }
 
-impl<'m> Worth<'m> {
-    /// Cells that [`Worth::of_all`] has.
+impl<'m> GuideStats<'m> {
+    /// Cells that [`GuideStats::of_all`] has.
     fn cells_of_all(lights: &LightSampler) -> usize {
         let side = side(lights.count(), CELLS_OF_ALL);
         lights.count() * side * side
     }
 
-    /// Bytes that [`Worth::of_all`] takes together with [`Worth::guide`].
+    /// Bytes that [`GuideStats::of_all`] takes together with [`GuideStats::guide`].
     pub fn footprint_of_all(lights: &LightSampler) -> Footprint {
         let cells = Self::cells_of_all(lights);
         let worth = Footprint::default().slice::<f32>(cells).slice::<f32>(cells);
@@ -123,7 +72,7 @@ impl<'m> Worth<'m> {
     /// For photons of all light: by power, as long as nothing was learned.
     ///
     /// # Errors
-    /// [`OutOfMemory`] where the arena has less than [`Worth::footprint_of_all`].
+    /// [`OutOfMemory`] where the arena has less than [`GuideStats::footprint_of_all`].
     pub fn of_all(lights: &LightSampler, arena: &mut Arena<'m>) -> Result<Self, OutOfMemory> {
         let cells = Self::cells_of_all(lights);
         let (aimed, learned) = (arena.slice::<f32>(cells)?, arena.slice::<f32>(cells)?);
@@ -135,7 +84,7 @@ impl<'m> Worth<'m> {
 
     /// A part of the photons of all light comes evenly from each light by what it was worth altogether, as
     /// far as that was learned: few have looked.
-    pub fn even_out(&mut self, emission: &Emission) {
+    pub fn even_out(&mut self, emission: &EmissionSampler) {
         let of_light = (self.side * self.side).max(1);
         let lights = self.aimed.chunks_mut(of_light).zip(self.learned.chunks(of_light));
         for (light, (aimed, learned)) in lights.enumerate() {
@@ -145,7 +94,7 @@ impl<'m> Worth<'m> {
         }
     }
 
-    /// Bytes that [`Worth::aimed`] takes.
+    /// Bytes that [`GuideStats::aimed`] takes.
     pub fn footprint(lights: &LightSampler) -> Footprint {
         let cells = cells(lights);
         Footprint::default().slice::<f32>(cells).slice::<f32>(cells)
@@ -154,11 +103,11 @@ impl<'m> Worth<'m> {
     /// Aims at everything that mirrors or refracts. `None` where there is nothing such, or no light.
     ///
     /// # Errors
-    /// [`OutOfMemory`] where the arena has less than [`Worth::footprint`].
+    /// [`OutOfMemory`] where the arena has less than [`GuideStats::footprint`].
     pub fn aimed(
         scene: &Scene,
         lights: &LightSampler,
-        emission: &Emission,
+        emission: &EmissionSampler,
         arena: &mut Arena<'m>,
     ) -> Result<Option<Self>, OutOfMemory> {
         let side = side(lights.count(), MOST_CELLS);
@@ -207,11 +156,15 @@ impl<'m> Worth<'m> {
         self.learned.iter().any(|&worth| worth > 0.0)
     }
 
-    /// `emission` by what is known so far. `arena` needs [`Worth::guide_footprint`].
+    /// `emission` by what is known so far. `arena` needs [`GuideStats::guide_footprint`].
     ///
     /// # Errors
     /// [`OutOfMemory`] where it has less.
-    pub fn guide(&self, emission: &Emission<'m>, arena: &mut Arena<'m>) -> Result<Emission<'m>, OutOfMemory> {
+    pub fn guide(
+        &self,
+        emission: &EmissionSampler<'m>,
+        arena: &mut Arena<'m>,
+    ) -> Result<EmissionSampler<'m>, OutOfMemory> {
         let side = self.side;
         let of_light = side * side;
         let power = |i: usize| emission.table.pdf(i / of_light) / of_light as f32;
@@ -227,7 +180,7 @@ impl<'m> Worth<'m> {
         let at = 1.0 - nowhere - seen;
         let weight = |i| nowhere * power(i) + at * (per_aimed * aimed(i)) + seen * per_learned * learned(i);
         let table = AliasTable::build(self.aimed.len(), weight, arena)?;
-        Ok(Emission { guide: Some(Guide { table, side }), ..*emission })
+        Ok(EmissionSampler { guide: Some(EmissionGuide::new(table, side)), ..*emission })
     }
 
     /// What was learned around cell `i`: what few photons have seen may go on beside it.
@@ -247,7 +200,7 @@ impl<'m> Worth<'m> {
         sum
     }
 
-    /// Bytes that [`Worth::guide`] takes.
+    /// Bytes that [`GuideStats::guide`] takes.
     pub fn guide_footprint(lights: &LightSampler) -> Footprint {
         AliasTable::footprint(cells(lights))
     }
@@ -265,11 +218,6 @@ fn side(lights: usize, most: usize) -> usize {
 fn cells(lights: &LightSampler) -> usize {
     let side = side(lights.count(), MOST_CELLS);
     lights.count() * side * side
-}
-
-fn cell(side: usize, place: [f32; 2]) -> usize {
-    let [x, y] = place.map(|u| ((u * side as f32) as usize).min(side - 1));
-    y * side + x
 }
 
 /// Shows about `count` points, evenly spread over all surfaces that throw caustics.
