@@ -6,7 +6,7 @@ use arbitrary::{Result, Unstructured};
 use glam::Vec3;
 use halflight_core::memory::{Arena, Footprint, Line};
 use halflight_core::photon::{
-    Density, Disc, Falloff, Neighbours, Photon, PhotonMap, Photons, QueryOrder, Response, Uniform, brute,
+    Density, QueryDisc, Kernel, Neighbours, Photon, PhotonMap, Photons, QueryOrder, Response, Uniform, brute,
 };
 use halflight_core::{Level, Rgb};
 
@@ -48,14 +48,14 @@ fn attempt(input: &mut Unstructured) -> Result<()> {
     let radius = if input.arbitrary::<u8>()? < 100 { f32::INFINITY } else { coordinate(input)? };
     let k = usize::from(input.arbitrary::<u8>()?);
     let normal = Vec3::from(point(input)?).normalize_or(Vec3::Z);
-    let falloff =
-        [Falloff::Constant, Falloff::Cone, Falloff::Epanechnikov][usize::from(input.arbitrary::<u8>()? % 3)];
+    let kernel =
+        [Kernel::Constant, Kernel::Cone, Kernel::Epanechnikov][usize::from(input.arbitrary::<u8>()? % 3)];
     // What brute force finds is the same for all levels.
     let orders: Vec<Vec<u32>> = asked.iter().map(|&place| expected(&map, place, radius)).collect();
     for level in Level::detect().and_below() {
         search(&map, level, &asked, &orders, radius, k);
         for &place in &asked {
-            gather(&map, level, &Disc { place, normal, radius, falloff });
+            gather(&map, level, &QueryDisc { place, normal, radius, kernel });
         }
     }
     Ok(())
@@ -115,13 +115,13 @@ fn search(map: &PhotonMap, level: Level, asked: &[Vec3], orders: &[Vec<u32>], ra
     assert_eq!(seen, asked.len());
 }
 
-fn gather(map: &PhotonMap, level: Level, disc: &Disc) {
+fn gather(map: &PhotonMap, level: Level, disc: &QueryDisc) {
     let glossy = |direction: Vec3| Rgb::new(1.0 + direction.x, direction.y * direction.y, 0.5);
     same(map, level, disc, &Uniform(Rgb::new(1.0, 0.5, 0.25)));
     same(map, level, disc, &glossy);
 }
 
-fn same<R: Response>(map: &PhotonMap, level: Level, disc: &Disc, response: &R) {
+fn same<R: Response>(map: &PhotonMap, level: Level, disc: &QueryDisc, response: &R) {
     let (found, expected) = (map.gather(level, disc, response), brute::gather(map, disc, response));
     assert_eq!(found.photons, expected.photons, "{level:?} {disc:?}");
     let baseline = map.gather(Level::BASELINE, disc, response);

@@ -14,7 +14,7 @@ use halflight_core::scene::PointLight;
 use halflight_core::scene::{Camera, Material, Scene, Surface};
 use halflight_core::transport::caustics::{CausticShooter, Find, PATHS, ROOM};
 use halflight_core::transport::shoot::{Keep, ShootSettings};
-use halflight_core::transport::{Discs, Merging, PathSettings, PathTracer, UNLIMITED};
+use halflight_core::transport::{Merging, PathSettings, PathTracer, RadiusSchedule, UNLIMITED};
 use halflight_core::{Level, Rgb};
 use halflight_tests::render::{has_photons, render};
 use halflight_tests::scenes::{
@@ -65,7 +65,7 @@ fn pictures(scene: &Scene, first: u32, (tasks, pixels, is_beside): Shot, max_dep
     let mut photon_lines = [0, 1].map(|_| lines(Photons::footprint(tasks * ROOM)));
     let one = |seed: u32| {
         let paths = (tasks * PATHS) as u32;
-        let discs = Discs::new((scene, &bvh), [SIZE; 2], level).of_pixels(pixels);
+        let discs = RadiusSchedule::new((scene, &bvh), [SIZE; 2], level).of_pixels(pixels);
         let shot = ShootSettings { keep: Keep::Caustic, seed, paths, max_depth };
         let shooter =
             CausticShooter::<All>::new((scene, &bvh, &lights), &emission, shot, (discs, [SIZE; 2]), level);
@@ -456,7 +456,7 @@ fn in_a_stadium_photons_go_to_the_glass_and_their_power_is_right() {
     const MAPS: u32 = 16;
     // No further than to the caustic: what that lights is not of its power.
     let shot = ShootSettings { keep: Keep::Caustic, seed: 3, paths: (TASKS * PATHS) as u32, max_depth: 3 };
-    let discs = Discs::new((&scene, &bvh), [SIZE; 2], level);
+    let discs = RadiusSchedule::new((&scene, &bvh), [SIZE; 2], level);
     let shooter = |emission| {
         let frame = (discs, [SIZE; 2]);
         CausticShooter::<All>::new((&scene, &bvh, &lights), emission, shot, frame, level)

@@ -5,7 +5,7 @@ use halflight::drive::{Method, PhotonUse, RenderResult, Settings};
 use halflight::load::{self, LoadOptions};
 use halflight::save::Image;
 use halflight_core::Rgb;
-use halflight_core::photon::Falloff;
+use halflight_core::photon::Kernel;
 use halflight_core::scene::{Camera, Scene, Surface};
 use halflight_tests::render::render;
 use halflight_tests::scenes::{
@@ -47,11 +47,11 @@ fn the_cornell_box_has_the_light_of_the_path_tracer_at_any_depth() {
 fn every_kernel_estimates_the_same_light() {
     let buffers = cornell_box();
     let scene = buffers.scene();
-    let kernel = |falloff| mapped(&scene, 64, 64, |s| s.photons.falloff = falloff).image;
-    let usual = kernel(Falloff::Epanechnikov);
-    for falloff in [Falloff::Constant, Falloff::Cone] {
-        let deviation = deviation(&kernel(falloff), &usual);
-        assert!(deviation.abs() < BIAS, "{falloff:?}: {deviation}");
+    let with = |kernel| mapped(&scene, 64, 64, |s| s.photons.kernel = kernel).image;
+    let usual = with(Kernel::Epanechnikov);
+    for kernel in [Kernel::Constant, Kernel::Cone] {
+        let deviation = deviation(&with(kernel), &usual);
+        assert!(deviation.abs() < BIAS, "{kernel:?}: {deviation}");
     }
 }
 

@@ -136,7 +136,7 @@ fn narrow_coats_have_the_light_that_the_path_tracer_finds_at_any_angle() {
         let path = render(&scene, Method::Path, 64, 1024, |_| ()).image;
         let found = sppm(&scene, 64, 256, |_| ()).image;
         assert_means(&found, &path, 0.01);
-        // Discs reach over edges, and mirrored lamps are noise. Photons in the coats would make 0.13 to 0.46.
+        // RadiusSchedule reach over edges, and mirrored lamps are noise. Photons in the coats would make 0.13 to 0.46.
         assert!(difference(&found, &path) < 0.1, "{roughness}: {}", difference(&found, &path));
     }
 }

@@ -1,7 +1,8 @@
 //! Searches for many places, in an order of our own.
 
 use super::PhotonMap;
-use super::gather::{Density, Disc, Response, gather};
+use super::gather::{Density, Response, gather};
+use super::kernel::QueryDisc;
 use super::morton::{self, QueryOrder};
 use super::nearest::{Neighbours, search};
 use glam::Vec3;
@@ -54,7 +55,7 @@ impl<F: FnMut(usize, &Neighbours)> Kernel for Searches<'_, '_, '_, F> {
 /// The density at each disc, with one response for all.
 pub(super) struct Gathers<'a, 'm, R> {
     pub map: &'a PhotonMap<'m>,
-    pub discs: &'a [Disc],
+    pub discs: &'a [QueryDisc],
     pub response: &'a R,
     pub order: &'a mut [QueryOrder],
     pub densities: &'a mut [Density],

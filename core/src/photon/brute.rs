@@ -1,6 +1,6 @@
 //! The reference: every photon of a map is looked at. For tests, and for those who doubt.
 
-use super::{ALIKE, Density, Disc, FLATNESS, Falloff, PhotonMap, Response, layout::LEAF};
+use super::{ALIKE, Density, FLATNESS, Kernel, PhotonMap, QueryDisc, Response, layout::LEAF};
 use core::f32::consts::PI;
 use glam::Vec3;
 use halflight_simd::kernels::points::squared_distance;
@@ -18,7 +18,7 @@ pub fn within(map: &PhotonMap, place: Vec3, radius: f32) -> impl Iterator<Item =
 }
 
 /// What [`PhotonMap::gather`] estimates, photon by photon: the same photons, their sum in another order.
-pub fn gather<R: Response>(map: &PhotonMap, disc: &Disc, response: &R) -> Density {
+pub fn gather<R: Response>(map: &PhotonMap, disc: &QueryDisc, response: &R) -> Density {
     let mut density = Density::default();
     let squared_radius = map.space.squared(disc.radius).unwrap_or(0.0);
     if !(squared_radius > 0.0 && squared_radius < f32::MAX) {
@@ -36,10 +36,10 @@ pub fn gather<R: Response>(map: &PhotonMap, disc: &Disc, response: &R) -> Densit
             let arrives = photon.power() * response.of(photon.direction());
             let weight = |squared_radius: f32| {
                 let squared = (distance * (1.0 / squared_radius).min(f32::MAX)).min(1.0);
-                match disc.falloff {
-                    Falloff::Constant => 1.0,
-                    Falloff::Cone => 3.0 * (1.0 - libm::sqrtf(squared)),
-                    Falloff::Epanechnikov => 2.0 * (1.0 - squared),
+                match disc.kernel {
+                    Kernel::Constant => 1.0,
+                    Kernel::Cone => 3.0 * (1.0 - libm::sqrtf(squared)),
+                    Kernel::Epanechnikov => 2.0 * (1.0 - squared),
                 }
             };
             density.radiance += arrives * weight(squared_radius);

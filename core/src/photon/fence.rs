@@ -6,7 +6,7 @@
 //! the nearer, less what a straight wall comes nearer in between. Photons beyond are left out, and the weights of the
 //! rest divided by what they integrate to over what is seen.
 
-use super::gather::Falloff;
+use super::kernel::Kernel;
 use crate::geometry::Frame;
 use crate::sampling::sin_cos_turns;
 use glam::{Vec2, Vec3};
@@ -89,11 +89,11 @@ impl Fence {
     }
 
     /// What the weights of a disc with that `part` of the radius integrate to over what is seen of it, of 1.
-    pub fn share(&self, falloff: Falloff, part: f32) -> f32 {
-        let parts = self.reach.iter().map(|&r| (r / part).min(1.0)).map(|r| match falloff {
-            Falloff::Constant => r * r,
-            Falloff::Cone => r * r * (3.0 - 2.0 * r),
-            Falloff::Epanechnikov => r * r * (2.0 - r * r),
+    pub fn share(&self, kernel: Kernel, part: f32) -> f32 {
+        let parts = self.reach.iter().map(|&r| (r / part).min(1.0)).map(|r| match kernel {
+            Kernel::Constant => r * r,
+            Kernel::Cone => r * r * (3.0 - 2.0 * r),
+            Kernel::Epanechnikov => r * r * (2.0 - r * r),
         });
         parts.sum::<f32>() / PROBES as f32
     }
@@ -156,11 +156,11 @@ mod tests {
         let open = Fence::open(&Fence::frame(Vec3::Y, 0.3));
         let half = Fence { reach: [0.5; PROBES], ..open };
         assert!(open.is_open() && !half.is_open());
-        for (falloff, expected) in
-            [(Falloff::Constant, 0.25), (Falloff::Cone, 0.5), (Falloff::Epanechnikov, 0.4375)]
+        for (kernel, expected) in
+            [(Kernel::Constant, 0.25), (Kernel::Cone, 0.5), (Kernel::Epanechnikov, 0.4375)]
         {
-            assert_eq!((open.share(falloff, 1.0), half.share(falloff, 1.0)), (1.0, expected));
-            assert_eq!((half.share(falloff, 0.5), half.share(falloff, 0.25)), (1.0, 1.0));
+            assert_eq!((open.share(kernel, 1.0), half.share(kernel, 1.0)), (1.0, expected));
+            assert_eq!((half.share(kernel, 0.5), half.share(kernel, 0.25)), (1.0, 1.0));
         }
     }
 }

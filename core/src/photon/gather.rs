@@ -14,6 +14,7 @@
 
 use super::PhotonMap;
 use super::fence::{Fence, splat};
+use super::kernel::{Kernel, QueryDisc};
 use super::layout::{HALVES, Leaf};
 use super::range::{Visit, leaves_within};
 use super::record::{DIRECTION_BITS, DIRECTION_STEPS, NORMAL_STEPS, POWER_BITS};
@@ -21,7 +22,7 @@ use crate::Rgb;
 use core::f32::consts::PI;
 use glam::Vec3;
 use halflight_simd::kernels::points::{Place16, squared};
-use halflight_simd::{Kernel, Lanes, Mask, Simd, dot};
+use halflight_simd::{Kernel as SimdKernel, Lanes, Mask, Simd, dot};
 
 /// How far from the plane of a disc its photons may lie, in radii: what a surface bends in it, when its radius of
 /// curvature is two and a half times as large.
@@ -32,32 +33,6 @@ pub const ALIKE: f32 = 0.7;
 
 /// Finer discs in a disc, each of half the radius of the one before.
 pub const FINER: usize = 3;
-
-/// How the weight of a photon falls with its distance from the middle of the disc. All of them integrate to one
-/// over it.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Falloff {
-    /// The same everywhere.
-    Constant,
-    /// 3 (1 - d / r).
-    Cone,
-    /// 2 (1 - d² / r²): the least variance for its width (Epanechnikov 1969).
-    #[default]
-    Epanechnikov,
-}
-
-/// Where the density of photons is asked for.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Disc {
-    /// Its middle.
-    pub place: Vec3,
-    /// Its normal, of unit length, on the side from which light is looked for.
-    pub normal: Vec3,
-    /// Its radius; finite and above zero, or nothing is found.
-    pub radius: f32,
-    /// How its photons are weighed.
-    pub falloff: Falloff,
-}
 
 /// What a surface makes of the light from a direction: its BSDF towards the eye, without a cosine.
 pub trait Response {
@@ -116,12 +91,12 @@ impl Density {
 /// One gathering.
 pub(super) struct Gather<'a, 'm, R> {
     pub map: &'a PhotonMap<'m>,
-    pub disc: &'a Disc,
+    pub disc: &'a QueryDisc,
     pub fence: Option<&'a Fence>,
     pub response: &'a R,
 }
 
-impl<R: Response> Kernel for Gather<'_, '_, R> {
+impl<R: Response> SimdKernel for Gather<'_, '_, R> {
     type Out = Density;
 
     #[inline(always)]
@@ -135,7 +110,7 @@ impl<R: Response> Kernel for Gather<'_, '_, R> {
 pub(super) fn gather<S: Simd, R: Response>(
     simd: S,
     map: &PhotonMap,
-    disc: &Disc,
+    disc: &QueryDisc,
     fence: Option<&Fence>,
     response: &R,
 ) -> Density {
@@ -150,11 +125,11 @@ pub(super) fn gather<S: Simd, R: Response>(
         fence,
         squared_radius,
         thickness: simd.splat16(FLATNESS * libm::sqrtf(squared_radius)),
-        disc: Weighed::new(simd, squared_radius, disc.falloff),
+        disc: Weighed::new(simd, squared_radius, disc.kernel),
         finer: [
-            Weighed::new(simd, squared_radius / 4.0, disc.falloff),
-            Weighed::new(simd, squared_radius / 16.0, disc.falloff),
-            Weighed::new(simd, squared_radius / 64.0, disc.falloff),
+            Weighed::new(simd, squared_radius / 4.0, disc.kernel),
+            Weighed::new(simd, squared_radius / 16.0, disc.kernel),
+            Weighed::new(simd, squared_radius / 64.0, disc.kernel),
         ],
         response,
     };
@@ -193,7 +168,7 @@ struct Weighed<S: Simd> {
     limit: S::F16,
     /// one over that.
     reciprocal: S::F16,
-    falloff: Falloff,
+    kernel: Kernel,
     /// Weighed power: where the response is uniform,
     lanes: [S::F16; 3],
     /// and where it is not, with the response.
@@ -281,11 +256,11 @@ struct Photons16<S: Simd> {
 impl<S: Simd> Weighed<S> {
     /// Nothing yet, of a disc of this squared radius.
     #[inline(always)]
-    fn new(simd: S, squared_radius: f32, falloff: Falloff) -> Self {
+    fn new(simd: S, squared_radius: f32, kernel: Kernel) -> Self {
         Self {
             limit: simd.splat16(squared_radius),
             reciprocal: simd.splat16((1.0 / squared_radius).min(f32::MAX)),
-            falloff,
+            kernel,
             lanes: [simd.splat16(0.0); 3],
             singles: Rgb::ZERO,
             photons: 0,
@@ -329,23 +304,28 @@ impl<S: Simd> Weighed<S> {
         let one = simd.splat16(1.0);
         // Rounding must not make a weight negative.
         let squared = (distance * self.reciprocal).min(one);
-        match self.falloff {
-            Falloff::Constant => one,
-            Falloff::Cone => simd.splat16(3.0) * (one - squared.sqrt()),
-            Falloff::Epanechnikov => simd.splat16(2.0) * (one - squared),
+        match self.kernel {
+            Kernel::Constant => one,
+            Kernel::Cone => simd.splat16(3.0) * (one - squared.sqrt()),
+            Kernel::Epanechnikov => simd.splat16(2.0) * (one - squared),
         }
     }
 
     /// Of so large a `part` of the radius of `disc`.
     #[inline(always)]
-    fn density<R: Response>(&self, (disc, part): (&Disc, f32), fence: Option<&Fence>, response: &R) -> Rgb {
+    fn density<R: Response>(
+        &self,
+        (disc, part): (&QueryDisc, f32),
+        fence: Option<&Fence>,
+        response: &R,
+    ) -> Rgb {
         if self.photons == 0 {
             return Rgb::ZERO;
         }
         let [r, g, b] = self.lanes;
         let total = Rgb::new(added(r.to_array()), added(g.to_array()), added(b.to_array()));
         let responded = if R::UNIFORM { total * response.of(disc.normal) } else { self.singles };
-        let seen = fence.map_or(1.0, |fence| fence.share(disc.falloff, part));
+        let seen = fence.map_or(1.0, |fence| fence.share(disc.kernel, part));
         let radius = part * disc.radius;
         let per_area = if seen > 0.0 { 1.0 / (PI * seen * radius) / radius } else { 0.0 };
         responded * per_area

@@ -11,6 +11,7 @@ pub mod brute;
 mod build;
 mod fence;
 mod gather;
+mod kernel;
 mod layout;
 mod morton;
 mod nearest;
@@ -19,7 +20,8 @@ mod record;
 mod space;
 
 pub use fence::{Fence, PROBES};
-pub use gather::{ALIKE, Density, Disc, FINER, FLATNESS, Falloff, Response, Uniform};
+pub use gather::{ALIKE, Density, FINER, FLATNESS, Response, Uniform};
+pub use kernel::{Kernel, QueryDisc};
 pub use morton::QueryOrder;
 pub use nearest::Neighbours;
 pub use record::Photon;
@@ -161,17 +163,17 @@ impl PhotonMap<'_> {
         level: Level,
         (place, normal): (Vec3, Vec3),
         farthest: f32,
-        falloff: Falloff,
+        kernel: Kernel,
         neighbours: &mut Neighbours,
-    ) -> (Disc, f32) {
+    ) -> (QueryDisc, f32) {
         self.nearest(level, place, farthest, neighbours);
         let squared = neighbours.squared_radius();
         let k = neighbours.len() as f32;
         let is_full = squared < f32::INFINITY && k > 1.0;
-        let factor = if is_full && falloff == Falloff::Constant { (k - 1.0) / k } else { 1.0 };
+        let factor = if is_full && kernel == Kernel::Constant { (k - 1.0) / k } else { 1.0 };
         // Rounding must not decide about the last one.
         let radius = if is_full { libm::sqrtf(squared) * (1.0 + 2.0 * f32::EPSILON) } else { farthest };
-        (Disc { place, normal, radius: radius.max(f32::MIN_POSITIVE), falloff }, factor)
+        (QueryDisc { place, normal, radius: radius.max(f32::MIN_POSITIVE), kernel }, factor)
     }
 
     /// Finds all photons within `radius` of `place`: how many they are, and in `found` their indices in rising
@@ -183,7 +185,7 @@ impl PhotonMap<'_> {
     }
 
     /// Estimates the density of photons on a disc, each with the response of the surface.
-    pub fn gather<R: Response>(&self, level: Level, disc: &Disc, response: &R) -> Density {
+    pub fn gather<R: Response>(&self, level: Level, disc: &QueryDisc, response: &R) -> Density {
         level.dispatch(gather::Gather { map: self, disc, fence: None, response })
     }
 
@@ -191,7 +193,7 @@ impl PhotonMap<'_> {
     pub fn gather_within<R: Response>(
         &self,
         level: Level,
-        disc: &Disc,
+        disc: &QueryDisc,
         fence: &Fence,
         response: &R,
     ) -> Density {
@@ -219,7 +221,7 @@ impl PhotonMap<'_> {
     pub fn gather_batch<R: Response>(
         &self,
         level: Level,
-        discs: &[Disc],
+        discs: &[QueryDisc],
         response: &R,
         order: &mut [QueryOrder],
         densities: &mut [Density],

@@ -235,11 +235,11 @@ fn what_is_gathered_is_what_brute_force_gathers() {
     with_light(&places, |map| {
         let mut most = 0;
         for i in 0..40 {
-            let disc = Disc {
+            let disc = QueryDisc {
                 place: places[i * 100] + random.point() * 0.01,
                 normal: (Vec3::Z + 0.5 * random.point()).normalize(),
                 radius: 0.3 * random.unit(),
-                falloff: [Falloff::Constant, Falloff::Cone, Falloff::Epanechnikov][i % 3],
+                kernel: [Kernel::Constant, Kernel::Cone, Kernel::Epanechnikov][i % 3],
             };
             let expected = brute::gather(map, &disc, &Uniform(Rgb::new(0.5, 1.0, 2.0)));
             let expected_glossy = brute::gather(map, &disc, &glossy);
@@ -263,12 +263,12 @@ fn what_is_gathered_is_what_brute_force_gathers() {
             }
         }
         assert!(most > 500, "the discs hold something: at most {most}");
-        let disc = Disc { place: Vec3::ONE, normal: Vec3::Z, radius: 1.0, falloff: Falloff::Cone };
+        let disc = QueryDisc { place: Vec3::ONE, normal: Vec3::Z, radius: 1.0, kernel: Kernel::Cone };
         for radius in [0.0, -1.0, f32::NAN, f32::INFINITY] {
-            let found = map.gather(Level::detect(), &Disc { radius, ..disc }, &Uniform(Rgb::ONE));
+            let found = map.gather(Level::detect(), &QueryDisc { radius, ..disc }, &Uniform(Rgb::ONE));
             assert_eq!(found, Density::default());
         }
-        let odd = Disc { normal: Vec3::NAN, ..disc };
+        let odd = QueryDisc { normal: Vec3::NAN, ..disc };
         assert_eq!(map.gather(Level::detect(), &odd, &Uniform(Rgb::ONE)), Density::default());
     });
 }
@@ -301,15 +301,15 @@ fn an_even_floor_has_the_irradiance_that_was_put_there_by_every_falloff() {
     let count = 400_000;
     let places: Vec<_> = (0..count).map(|_| random.point().with_z(0.0)).collect();
     with_map(&places, |map| {
-        for falloff in [Falloff::Constant, Falloff::Cone, Falloff::Epanechnikov] {
-            let disc = Disc { place: Vec3::new(0.5, 0.5, 0.0), normal: Vec3::Z, radius: 0.2, falloff };
+        for kernel in [Kernel::Constant, Kernel::Cone, Kernel::Epanechnikov] {
+            let disc = QueryDisc { place: Vec3::new(0.5, 0.5, 0.0), normal: Vec3::Z, radius: 0.2, kernel };
             let found = map.gather(Level::detect(), &disc, &Uniform(Rgb::ONE));
             // One watt each on one square metre; about 50 000 photons, four standard deviations of the least even
             // weights (E[k²] = 3/2): 2 %; and a quarter as many in each finer disc.
             let mut most = 0.022;
             for radiance in radiances(found) {
                 let off = (radiance / count as f32 - 1.0).abs().max_element();
-                assert!(off < most, "{falloff:?} {found:?}");
+                assert!(off < most, "{kernel:?} {found:?}");
                 most *= 2.0;
             }
         }
@@ -331,7 +331,7 @@ fn nothing_leaks_through_a_thin_wall_or_around_an_edge() {
     }
     let map = photons.build(40_000);
     let at = |place: Vec3, normal: Vec3| {
-        let disc = Disc { place, normal, radius: 0.1, falloff: Falloff::Epanechnikov };
+        let disc = QueryDisc { place, normal, radius: 0.1, kernel: Kernel::Epanechnikov };
         map.gather(Level::detect(), &disc, &Uniform(Rgb::ONE)).photons
     };
     assert!(at(Vec3::new(0.0, 0.0, 0.5), Vec3::X) > 500, "the lit side");
@@ -379,8 +379,12 @@ fn batches_find_what_single_searches_find() {
                 });
                 assert!(seen.into_iter().all(|seen| seen));
             }
-            let disc =
-                |&place: &Vec3| Disc { place, normal: Vec3::Z, radius: 0.1 * extent, falloff: Falloff::Cone };
+            let disc = |&place: &Vec3| QueryDisc {
+                place,
+                normal: Vec3::Z,
+                radius: 0.1 * extent,
+                kernel: Kernel::Cone,
+            };
             let discs: Vec<_> = asked.iter().map(disc).collect();
             let mut order = vec![QueryOrder::default(); discs.len()];
             let mut densities = vec![Density::default(); discs.len()];
@@ -430,8 +434,8 @@ fn a_fence_leaves_out_what_is_behind_it_and_makes_up_for_it() {
     let count = 400_000;
     let places: Vec<_> = (0..count).map(|_| random.point().with_z(0.0)).collect();
     with_map(&places, |map| {
-        for falloff in [Falloff::Constant, Falloff::Cone, Falloff::Epanechnikov] {
-            let disc = Disc { place: Vec3::new(0.5, 0.5, 0.0), normal: Vec3::Z, radius: 0.2, falloff };
+        for kernel in [Kernel::Constant, Kernel::Cone, Kernel::Epanechnikov] {
+            let disc = QueryDisc { place: Vec3::new(0.5, 0.5, 0.0), normal: Vec3::Z, radius: 0.2, kernel };
             let level = Level::detect();
             let open = map.gather(level, &disc, &Uniform(Rgb::ONE));
             // A wall along x = 0.55: probes get as far as it is on their way.

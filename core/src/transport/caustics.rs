@@ -10,7 +10,8 @@
 use super::estimator::{Counters, UNLIMITED};
 pub use super::flight::PATHS;
 use super::flight::{Flight, Onward, Pile, State, Vertex, Visitor};
-use super::merge::{ChainLink, Discs, is_wide_enough};
+use super::merge::{ChainLink, is_wide_enough};
+use super::radius::RadiusSchedule;
 use super::shoot::ShootSettings;
 use crate::bsdf::{BsdfSample, Features};
 use crate::bvh::Bvh;
@@ -48,7 +49,7 @@ const NEAR: f32 = 1e-4;
 #[derive(Clone, Copy)]
 pub struct CausticShooter<'a, F> {
     flight: Flight<'a, F>,
-    discs: Discs,
+    discs: RadiusSchedule,
     /// Pixels across and down.
     frame: [u32; 2],
     beside_records: bool,
@@ -81,7 +82,7 @@ impl<'a, F: Features> CausticShooter<'a, F> {
         (scene, bvh, lights): (&'a Scene<'a>, &'a Bvh<'a>, &'a LightSampler<'a>),
         emission: &'a EmissionSampler<'a>,
         settings: ShootSettings,
-        (discs, frame): (Discs, [u32; 2]),
+        (discs, frame): (RadiusSchedule, [u32; 2]),
         level: Level,
     ) -> Self {
         let ShootSettings { seed, paths, max_depth, .. } = settings;

@@ -1,11 +1,11 @@
 //! Paths that end where photons lie: reflected light by the density of photons, direct light by shadow rays.
 
-use super::merge::Discs;
+use super::radius::RadiusSchedule;
 use crate::bsdf::{Bsdf, Features};
 use crate::bvh::Bvh;
 use crate::bvh::clearance::{Clearance, ClearanceQuery};
 use crate::geometry::Ray;
-use crate::photon::{Density, Disc, FLATNESS, Falloff, Fence, PROBES, PhotonMap, Uniform};
+use crate::photon::{Density, FLATNESS, Fence, Kernel, PROBES, PhotonMap, QueryDisc, Uniform};
 use crate::scene::SurfacePoint;
 use crate::{Level, Rgb};
 use core::f32::consts::FRAC_1_PI;
@@ -38,8 +38,8 @@ const HALVINGS: u32 = 4;
 #[derive(Clone, Copy)]
 pub struct PhotonLight<'a> {
     map: &'a PhotonMap<'a>,
-    discs: Discs,
-    falloff: Falloff,
+    discs: RadiusSchedule,
+    kernel: Kernel,
     /// Most discs have no photon, so that to look for one first is worth it.
     is_sparse: bool,
     /// Photons that a disc needs.
@@ -48,13 +48,13 @@ pub struct PhotonLight<'a> {
 
 impl<'a> PhotonLight<'a> {
     /// The photons of `map`, gathered from `discs`.
-    pub fn new(map: &'a PhotonMap<'a>, discs: Discs) -> Self {
-        Self { map, discs, falloff: Falloff::default(), is_sparse: false, enough: f32::INFINITY }
+    pub fn new(map: &'a PhotonMap<'a>, discs: RadiusSchedule) -> Self {
+        Self { map, discs, kernel: Kernel::default(), is_sparse: false, enough: f32::INFINITY }
     }
 
-    /// The same, with photons weighed by `falloff`.
-    pub fn with_falloff(self, falloff: Falloff) -> Self {
-        Self { falloff, ..self }
+    /// The same, with photons weighed by `kernel`.
+    pub fn with_kernel(self, kernel: Kernel) -> Self {
+        Self { kernel, ..self }
     }
 
     /// The same, where discs are no wider than it takes for `enough` photons, if those lie evenly: where they crowd, an eighth of
@@ -81,11 +81,11 @@ impl<'a> PhotonLight<'a> {
         if !bsdf.gathers_photons(apart) {
             return None;
         }
-        let disc = Disc {
+        let disc = QueryDisc {
             place: point.position,
             normal: point.geometric_normal,
             radius: self.discs.radius_after(travelled, point.position),
-            falloff: self.falloff,
+            kernel: self.kernel,
         };
         let density = self.is_sparse.then(|| self.map.gather(level, &disc, &Uniform(Rgb::ONE)));
         if density.is_some_and(|density| density.photons == 0) {
@@ -118,7 +118,7 @@ impl Gathered {
 pub(super) struct Light<'a> {
     pub(super) map: &'a PhotonMap<'a>,
     pub(super) is_caustic: bool,
-    /// Discs are no wider than it takes for so many photons.
+    /// RadiusSchedule are no wider than it takes for so many photons.
     pub(super) enough: f32,
 }
 
@@ -128,7 +128,7 @@ pub(super) struct Light<'a> {
 pub(super) fn reflected<F: Features>(
     Light { map, is_caustic, enough }: Light,
     (bvh, level): (&Bvh, Level),
-    (disc, all): (&Disc, Option<Density>),
+    (disc, all): (&QueryDisc, Option<Density>),
     (point, bsdf, apart): (&SurfacePoint, &Bsdf, bool),
     wo: Vec3,
     turns: f32,
@@ -161,7 +161,7 @@ pub(super) fn fence(
     bvh: &Bvh,
     level: Level,
     (origin, is_caustic): (Vec3, bool),
-    disc: &Disc,
+    disc: &QueryDisc,
     turns: f32,
 ) -> Fence {
     let frame = Fence::frame(disc.normal, turns);

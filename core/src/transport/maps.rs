@@ -21,7 +21,7 @@ use crate::bvh::Bvh;
 use crate::geometry::Ray;
 use crate::light::luminance;
 use crate::memory::{Arena, Footprint, Line, OutOfMemory};
-use crate::photon::{ALIKE, Disc, FLATNESS, Falloff, Neighbours, Photon, PhotonMap, Uniform};
+use crate::photon::{ALIKE, FLATNESS, Kernel, Neighbours, Photon, PhotonMap, QueryDisc, Uniform};
 use crate::sampling::mix;
 use crate::scene::{Material, Scene, SurfacePoint};
 use crate::{Level, Rgb};
@@ -69,7 +69,7 @@ pub struct Irradiances<'a> {
     global: &'a PhotonMap<'a>,
     /// Largest radius of a disc.
     farthest: f32,
-    falloff: Falloff,
+    kernel: Kernel,
     level: Level,
 }
 
@@ -79,10 +79,10 @@ impl<'a> Irradiances<'a> {
         bvh: &'a Bvh<'a>,
         global: &'a PhotonMap<'a>,
         farthest: f32,
-        falloff: Falloff,
+        kernel: Kernel,
         level: Level,
     ) -> Self {
-        Self { bvh, global, farthest, falloff, level }
+        Self { bvh, global, farthest, kernel, level }
     }
 
     /// How many there are.
@@ -114,11 +114,11 @@ impl<'a> Irradiances<'a> {
     fn at(&self, photon: &Photon, index: usize, neighbours: &mut Neighbours) -> Photon {
         let (place, normal) = (photon.position(), photon.normal());
         let (disc, factor) =
-            self.global.disc_of_nearest(self.level, (place, normal), self.farthest, self.falloff, neighbours);
+            self.global.disc_of_nearest(self.level, (place, normal), self.farthest, self.kernel, neighbours);
         let above = ABOVE * disc.radius + 16.0 * f32::EPSILON * place.abs().max_element();
         let turns = (mix(index as u64) >> 40) as f32 / (1u64 << 24) as f32;
         let fence = fence(self.bvh, self.level, (place + above * normal, false), &disc, turns);
-        if fence.share(self.falloff, 1.0) < LEAST_SEEN {
+        if fence.share(self.kernel, 1.0) < LEAST_SEEN {
             return Photon::NONE;
         }
         if fence.is_open() && !self.is_even(&disc, neighbours) {
@@ -131,7 +131,7 @@ impl<'a> Irradiances<'a> {
     }
 
     /// Whether light comes to `disc`, of those nearest photons, on all sides of its middle alike.
-    fn is_even(&self, disc: &Disc, neighbours: &Neighbours) -> bool {
+    fn is_even(&self, disc: &QueryDisc, neighbours: &Neighbours) -> bool {
         let (mut sum, mut moment) = (0.0, Vec3::ZERO);
         for photon in neighbours.iter().filter_map(|(index, _)| self.global.get(index)) {
             if photon.normal().dot(disc.normal) >= ALIKE {
@@ -150,7 +150,7 @@ pub struct GatherLight<'a> {
     global: &'a PhotonMap<'a>,
     irradiances: &'a PhotonMap<'a>,
     farthest: f32,
-    falloff: Falloff,
+    kernel: Kernel,
 }
 
 impl<'a> GatherLight<'a> {
@@ -159,9 +159,9 @@ impl<'a> GatherLight<'a> {
         global: &'a PhotonMap<'a>,
         irradiances: &'a PhotonMap<'a>,
         farthest: f32,
-        falloff: Falloff,
+        kernel: Kernel,
     ) -> Self {
-        Self { global, irradiances, farthest, falloff }
+        Self { global, irradiances, farthest, kernel }
     }
 
     /// The light that `point`, at the end of a gather ray of length `distance`, reflects to `wo`, except what a narrow
@@ -179,7 +179,7 @@ impl<'a> GatherLight<'a> {
             return Some(irradiance * diffuse.reflectance * FRAC_1_PI);
         }
         let (place, normal) = (point.position, point.geometric_normal);
-        let disc = Disc { place, normal, radius: radius.min(self.farthest), falloff: self.falloff };
+        let disc = QueryDisc { place, normal, radius: radius.min(self.farthest), kernel: self.kernel };
         let light = Light { map: self.global, is_caustic: false, enough: f32::INFINITY };
         Some(reflected::<F>(light, (bvh, level), (&disc, None), (point, bsdf, apart), wo, turns).light)
     }
@@ -363,16 +363,16 @@ mod tests {
                 photons.push(Photon::new(Vec3::new(x, y, 0.0), Vec3::Z, Vec3::Z, power));
             }
         }
-        let (level, falloff) = (Level::BASELINE, Falloff::default());
+        let (level, kernel) = (Level::BASELINE, Kernel::default());
         with_map_of(&photons, |global| {
-            let all = Irradiances::new(&bvh, global, 1.0, falloff, level);
+            let all = Irradiances::new(&bvh, global, 1.0, kernel, level);
             let mut found = vec![Photon::NONE; all.count().div_ceil(IRRADIANCES) * IRRADIANCES];
             for (task, out) in found.chunks_mut(IRRADIANCES).enumerate() {
                 let mut scratch = lines(Irradiances::scratch());
                 all.run(task, &mut Arena::new(bytemuck::cast_slice_mut(&mut scratch)), out).unwrap();
             }
             with_map_of(&found, |irradiances| {
-                check(&GatherLight::new(global, irradiances, 1.0, falloff), (&bvh, level), random);
+                check(&GatherLight::new(global, irradiances, 1.0, kernel), (&bvh, level), random);
             });
         });
     }

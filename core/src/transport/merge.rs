@@ -37,26 +37,15 @@
 //! which mirrors and glass lead from one whose photons know them.
 
 use super::density::{Gathered, Light, reflected};
+use super::radius::RadiusSchedule;
 use super::wave::{Merged, Path};
 use crate::bsdf::{Bsdf, Features};
 use crate::bvh::Bvh;
 use crate::light::EmissionSampler;
-use crate::photon::{Disc, Falloff, PhotonMap, Uniform};
+use crate::photon::{Kernel, PhotonMap, QueryDisc, Uniform};
 use crate::scene::{Scene, SurfacePoint};
 use crate::{Level, Rgb};
-use core::f32::consts::PI;
 use glam::Vec3;
-
-/// The least distance from the eye by which radii are reckoned, as what is seen through a mirror may lie near the eye: in
-/// diagonals of the scene, or in distances of the nearest that is seen, where that is less.
-const NEAREST: f32 = 0.05;
-const NEAREST_SEEN: f32 = 0.5;
-
-/// What is nearer than this share of the scene is what the camera stands on.
-const STANDS_ON: f32 = 1e-6;
-
-/// Rays across and down that look for the nearest.
-const GLANCES: u32 = 32;
 
 /// The least that the radius of a disc may be, times that of the disc from where something rough throws the light.
 const SMALLEST: f32 = 0.5;
@@ -68,67 +57,13 @@ pub(super) fn is_wide_enough(radius: f32, from: f32) -> bool {
     radius >= SMALLEST * from
 }
 
-/// The radii of discs: as far on a surface as so many pixels at that distance from the eye.
-#[derive(Clone, Copy, Debug)]
-pub struct Discs {
-    eye: Vec3,
-    /// At distance one.
-    radius: f32,
-    nearest: f32,
-}
-
-impl Discs {
-    /// Of one pixel in radius, for a picture of `scene` that is `frame` pixels wide and high.
-    pub fn new((scene, bvh): (&Scene, &Bvh), frame: [u32; 2], level: Level) -> Self {
-        let camera = &scene.camera;
-        let mut seen = f32::INFINITY;
-        for i in 0..GLANCES * GLANCES {
-            let at = |i: u32, pixels: u32| (i as f32 + 0.5) * pixels as f32 / GLANCES as f32;
-            let (x, y) = (at(i % GLANCES, frame[0]), at(i / GLANCES, frame[1]));
-            let ray = camera.ray(frame[0], frame[1], x, y, [0.5; 2]);
-            let hit = bvh.nearest(level, &ray);
-            let distance = hit.t * Vec3::from(ray.direction).length();
-            let stands_on = distance < STANDS_ON * bvh.bounds().diagonal();
-            seen = if hit.is_some() && !stands_on { seen.min(distance) } else { seen };
-        }
-        let nearest = (NEAREST * bvh.bounds().diagonal()).min(NEAREST_SEEN * seen);
-        let radius = 2.0 * camera.tan_half_fov / frame[1].max(1) as f32;
-        Self { eye: camera.eye, radius, nearest }
-    }
-
-    /// The same, of so many pixels in radius.
-    pub fn of_pixels(self, pixels: f32) -> Self {
-        Self { radius: pixels * self.radius, ..self }
-    }
-
-    /// The radius around `place`.
-    #[inline]
-    pub fn radius(&self, place: Vec3) -> f32 {
-        self.radius * place.distance(self.eye).max(self.nearest)
-    }
-
-    /// The same for a path that has come so far from the eye: what mirrors show of the place is as small in the picture
-    /// as the way to it is long. Weights know the place alone.
-    #[inline]
-    pub(super) fn radius_after(&self, travelled: f32, place: Vec3) -> f32 {
-        self.radius(place).max(self.radius * travelled)
-    }
-
-    /// π² r² N: R where nothing lies between, and light is emitted with a density of one.
-    #[inline]
-    pub(super) fn reach(&self, place: Vec3, paths: f32) -> f32 {
-        let radius = PI * self.radius(place);
-        radius * radius * paths
-    }
-}
-
 /// Photons of caustics as paths from the eye use them.
 #[derive(Clone, Copy)]
 pub struct Merging<'a> {
     /// Of even and of odd samples.
     maps: [&'a PhotonMap<'a>; 2],
     pub(super) emission: &'a EmissionSampler<'a>,
-    discs: Discs,
+    discs: RadiusSchedule,
     /// Light paths of each map.
     paths: f32,
     /// Whether records have the light that something rough sent.
@@ -174,7 +109,7 @@ impl<'a> Merging<'a> {
     pub fn new(
         maps: [&'a PhotonMap<'a>; 2],
         emission: &'a EmissionSampler<'a>,
-        discs: Discs,
+        discs: RadiusSchedule,
         paths: u32,
     ) -> Self {
         Self { maps, emission, discs, paths: paths as f32, beside_records: false }
@@ -246,11 +181,11 @@ impl<'a> Merging<'a> {
         if map.is_empty() || !bsdf.is_receiver() {
             return Gathered::default();
         }
-        let disc = Disc {
+        let disc = QueryDisc {
             place: point.position,
             normal: point.geometric_normal,
             radius: self.discs.radius_after(travelled, point.position),
-            falloff: Falloff::Epanechnikov,
+            kernel: Kernel::Epanechnikov,
         };
         // Most places have no photon near them, and need not look for walls.
         let density = map.gather(level, &disc, &Uniform(Rgb::ONE));

@@ -4,10 +4,10 @@
 
 use super::context::{SceneContext, Segment};
 use super::estimator::{Counters, dimension};
-use super::merge::Discs;
+use super::radius::RadiusSchedule;
 use crate::bsdf::{Bsdf, Features};
 use crate::memory::Footprint;
-use crate::photon::{Disc, Falloff, Photon, PhotonMap, Photons, Uniform};
+use crate::photon::{Kernel, Photon, PhotonMap, Photons, QueryDisc, Uniform};
 use crate::sampling::Sampler;
 use crate::{Level, Rgb};
 use core::mem;
@@ -124,15 +124,25 @@ pub struct Sight<'a> {
 /// How far a place stands for others.
 #[derive(Clone, Copy)]
 enum Reach {
-    Discs(Discs),
+    RadiusSchedule(RadiusSchedule),
     Everywhere(f32),
 }
 
 impl<'a> Sight<'a> {
     /// Of the places in `map`, which `raster` found. Light is gathered from discs of so many pixels, at most; `discs` are
     /// those of one.
-    pub fn new(map: &'a PhotonMap<'a>, raster: &Raster, discs: Discs, pixels: f32, level: Level) -> Self {
-        Self { map, reach: Reach::Discs(discs.of_pixels(pixels.max(REACH * raster.step as f32))), level }
+    pub fn new(
+        map: &'a PhotonMap<'a>,
+        raster: &Raster,
+        discs: RadiusSchedule,
+        pixels: f32,
+        level: Level,
+    ) -> Self {
+        Self {
+            map,
+            reach: Reach::RadiusSchedule(discs.of_pixels(pixels.max(REACH * raster.step as f32))),
+            level,
+        }
     }
 
     /// Of the places in `map`, each of which stands for what is no further from it than `radius`.
@@ -143,10 +153,10 @@ impl<'a> Sight<'a> {
     /// Whether a photon at `place`, on a surface of `normal`, is seen.
     pub(super) fn shows(&self, place: Vec3, normal: Vec3) -> bool {
         let radius = match self.reach {
-            Reach::Discs(discs) => discs.radius(place),
+            Reach::RadiusSchedule(discs) => discs.radius(place),
             Reach::Everywhere(radius) => radius,
         };
-        let disc = Disc { place, normal, radius, falloff: Falloff::Constant };
+        let disc = QueryDisc { place, normal, radius, kernel: Kernel::Constant };
         self.map.gather(self.level, &disc, &Uniform(Rgb::ONE)).photons > 0
     }
 }

@@ -12,7 +12,7 @@ use halflight::memory::Budget;
 use halflight::report::words::readable_bytes;
 use halflight::save::Image;
 use halflight_core::cache::irradiance::Metric;
-use halflight_core::photon::Falloff;
+use halflight_core::photon;
 use halflight_simd::{Level, Tier};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -161,13 +161,13 @@ impl Options {
     }
 
     fn photons(&self) -> PhotonSettings {
-        let falloff = match self.photon_kernel {
-            None => Falloff::default(),
-            Some(Kernel::Constant) => Falloff::Constant,
-            Some(Kernel::Cone) => Falloff::Cone,
-            Some(Kernel::Epanechnikov) => Falloff::Epanechnikov,
+        let kernel = match self.photon_kernel {
+            None => photon::Kernel::default(),
+            Some(Kernel::Constant) => photon::Kernel::Constant,
+            Some(Kernel::Cone) => photon::Kernel::Cone,
+            Some(Kernel::Epanechnikov) => photon::Kernel::Epanechnikov,
         };
-        PhotonSettings { falloff, global: self.global_photons, caustic: self.caustic_photons }
+        PhotonSettings { kernel, global: self.global_photons, caustic: self.caustic_photons }
     }
 
     fn level(&self) -> Level {

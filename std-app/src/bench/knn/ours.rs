@@ -6,7 +6,7 @@ use glam::Vec3;
 use halflight_core::bvh::ForkJoin;
 use halflight_core::memory::{Arena, Footprint, Line, OutOfMemory};
 use halflight_core::photon::{
-    Density, Disc, Falloff, Neighbours, Photon, PhotonMap, Photons, QueryOrder, Uniform,
+    Density, Kernel, Neighbours, Photon, PhotonMap, Photons, QueryDisc, QueryOrder, Uniform,
 };
 use halflight_core::{Level, Rgb};
 
@@ -49,8 +49,8 @@ pub(super) struct Together<'a> {
     pub level: Level,
 }
 
-fn disc(query: &Surfel, radius: f32) -> Disc {
-    Disc { place: query.place, normal: query.normal, radius, falloff: Falloff::Epanechnikov }
+fn disc(query: &Surfel, radius: f32) -> QueryDisc {
+    QueryDisc { place: query.place, normal: query.normal, radius, kernel: Kernel::Epanechnikov }
 }
 
 /// Runs `search` with working memory for `k` neighbours.
@@ -96,7 +96,7 @@ impl Searcher for Together<'_> {
                 })?;
             }
             Task::Gather { radius } => {
-                let discs: Vec<Disc> = queries.iter().map(|query| disc(query, radius)).collect();
+                let discs: Vec<QueryDisc> = queries.iter().map(|query| disc(query, radius)).collect();
                 let mut densities = vec![Density::default(); discs.len()];
                 self.map.gather_batch(self.level, &discs, &Uniform(Rgb::ONE), &mut turns, &mut densities);
                 found = densities.iter().map(|density| u64::from(density.photons)).sum();

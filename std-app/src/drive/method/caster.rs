@@ -18,7 +18,7 @@ use halflight_core::memory::{Arena, Line, OutOfMemory};
 use halflight_core::photon::{MapShape, Photon, PhotonMap, Photons};
 use halflight_core::transport::caustics::{CausticShooter, PATHS, ROOM};
 use halflight_core::transport::shoot::{Keep, ShootSettings};
-use halflight_core::transport::{Discs, Merging, PathTracer, path::WAVE};
+use halflight_core::transport::{Merging, PathTracer, RadiusSchedule, path::WAVE};
 use std::time::Instant;
 
 /// Radius of the discs of the first sample, in pixels, where photons are not what is noisy.
@@ -44,7 +44,7 @@ const RECORD_MAP: u32 = 1 << 30;
 pub(super) struct Cast<'a> {
     pub(super) emission: EmissionSampler<'a>,
     /// Of one pixel.
-    pub(super) discs: Discs,
+    pub(super) discs: RadiusSchedule,
     /// So many times the light paths, for discs so many times as wide.
     pub(super) plenty: f64,
     /// What paths leave without photons.
@@ -72,7 +72,7 @@ struct Kept {
     room: usize,
     shapes: [MapShape; 2],
     /// What they were shot for.
-    discs: Discs,
+    discs: RadiusSchedule,
     paths: u32,
 }
 
@@ -91,7 +91,7 @@ impl Kept {
 pub(super) struct ForRecords<'m> {
     map: PhotonMap<'m>,
     emission: &'m EmissionSampler<'m>,
-    discs: Discs,
+    discs: RadiusSchedule,
     paths: u32,
 }
 
@@ -301,9 +301,9 @@ pub(super) fn shooter<'a, F: Features>(
     stage: &Stage<'a>,
     emission: &'a EmissionSampler<'a>,
     paths: usize,
-    (discs, sample): (Discs, u32),
+    (discs, sample): (RadiusSchedule, u32),
     beside_records: bool,
-) -> (CausticShooter<'a, F>, Discs) {
+) -> (CausticShooter<'a, F>, RadiusSchedule) {
     let Stage { scene, bvh, lights, settings, .. } = *stage;
     let pixels = FIRST_RADIUS * shrunk(sample / 2).sqrt();
     let discs = discs.of_pixels(pixels as f32);

@@ -21,7 +21,7 @@ use halflight_core::light::{EmissionSampler, GuideStats, LightSampler};
 use halflight_core::memory::{Arena, Footprint, Line};
 use halflight_core::photon::Photons;
 use halflight_core::transport::caustics::{CausticShooter, Find, PATHS, ROOM};
-use halflight_core::transport::{Discs, Merging, PathTracer, path::WAVE};
+use halflight_core::transport::{Merging, PathTracer, RadiusSchedule, path::WAVE};
 
 /// Light paths of a glance, which tells where there is next to nothing to find, and of each look after it.
 const GLANCE: usize = 4 * PATHS;
@@ -164,7 +164,7 @@ pub(super) fn with<F: Features, T>(
 
 /// How photons are seen.
 struct Eye {
-    discs: Discs,
+    discs: RadiusSchedule,
     /// Beside a cache.
     beside_records: bool,
 }

@@ -42,7 +42,7 @@ use halflight_core::bsdf::Features;
 use halflight_core::bvh::Bvh;
 use halflight_core::light::LightSampler;
 use halflight_core::scene::Scene;
-use halflight_core::transport::{Discs, Merging, PathSettings, PathTracer};
+use halflight_core::transport::{Merging, PathSettings, PathTracer, RadiusSchedule};
 
 /// A way to make a picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -179,10 +179,10 @@ impl<'a> Stage<'a> {
         PathTracer::new(scene, bvh, lights, paths, settings.level)
     }
 
-    /// Discs that photons are gathered from, of one pixel.
-    fn discs(&self) -> Discs {
+    /// RadiusSchedule that photons are gathered from, of one pixel.
+    fn discs(&self) -> RadiusSchedule {
         let Self { scene, bvh, settings, .. } = self;
-        Discs::new((scene, bvh), [settings.width, settings.height], settings.level)
+        RadiusSchedule::new((scene, bvh), [settings.width, settings.height], settings.level)
     }
 }
 

@@ -3,7 +3,7 @@
 //! indirect by gather rays that end in the global map, with irradiances worked out beforehand (`transport/maps.rs`).
 //!
 //! Photons are new for every [`GROUP`] of samples, and two sets of maps, for the even and for the odd of them, know
-//! nothing of each other: the halves of the film tell of all that is random in photons. Discs of caustics shrink from
+//! nothing of each other: the halves of the film tell of all that is random in photons. RadiusSchedule of caustics shrink from
 //! group to group as those of `sppm`; the blur of the global map stays, behind a bounce.
 
 use super::photon_view::PhotonView;

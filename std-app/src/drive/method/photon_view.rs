@@ -5,7 +5,7 @@ use super::Stage;
 use halflight_core::bsdf::Features;
 use halflight_core::geometry::Ray;
 use halflight_core::memory::{Arena, Line, OutOfMemory};
-use halflight_core::photon::{Falloff, Neighbours, PhotonMap};
+use halflight_core::photon::{Kernel, Neighbours, PhotonMap};
 use halflight_core::scene::SurfacePoint;
 
 /// The last maps, as the camera sees them.
@@ -111,8 +111,8 @@ fn look_at<F: Features>(
         let (mut density, mut radius) = (0.0, 0.0);
         if let Some(point) = point {
             let place = (point.position, point.geometric_normal);
-            let falloff = Falloff::Constant;
-            let (disc, factor) = map.disc_of_nearest(level, place, farthest, falloff, &mut neighbours);
+            let kernel = Kernel::Constant;
+            let (disc, factor) = map.disc_of_nearest(level, place, farthest, kernel, &mut neighbours);
             if neighbours.len() == NEAREST {
                 radius = disc.radius;
                 density = factor * NEAREST as f32 / (core::f32::consts::PI * radius * radius);

@@ -12,19 +12,19 @@ use crate::drive::workers::Workers;
 use crate::drive::{RenderError, Settings};
 use halflight_core::bsdf::Features;
 use halflight_core::memory::{Arena, Footprint, Line};
-use halflight_core::photon::{Falloff, MapShape, Photon, PhotonMap, Photons};
+use halflight_core::photon::{Kernel, MapShape, Photon, PhotonMap, Photons};
 use halflight_core::transport::maps::{
     GatherLight, IRRADIANCES, Irradiances, PhotonMaps, STRIDE, may_have_caustics,
 };
 use halflight_core::transport::shoot::{Keep, PATHS, ROOM, ShootSettings, Shooter};
-use halflight_core::transport::{Discs, PathTracer};
+use halflight_core::transport::{PathTracer, RadiusSchedule};
 use std::time::Instant;
 
 /// How photons are used.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct PhotonSettings {
     /// How the weight of a photon falls with its distance.
-    pub falloff: Falloff,
+    pub kernel: Kernel,
     /// Light paths of a map of all photons; `None`: by the number of pixels.
     pub global: Option<u32>,
     /// Light paths of a map of caustics; `None`: by the number of pixels.
@@ -83,7 +83,7 @@ pub(super) type Lamps = [Vec<Line>; 2];
 /// Shoots photons and builds maps.
 pub(super) struct Laboratory<'a> {
     stage: Stage<'a>,
-    discs: Discs,
+    discs: RadiusSchedule,
     aim: Aim<'a>,
     /// For maps of caustics, where there are any.
     caustics: Option<Aim<'a>>,
@@ -287,7 +287,7 @@ impl<'a> Laboratory<'a> {
             }
         }
         let Some(global) = shelf.global.map()? else { return Ok(false) };
-        let all = Irradiances::new(bvh, &global, farthest, settings.photons.falloff, settings.level);
+        let all = Irradiances::new(bvh, &global, farthest, settings.photons.kernel, settings.level);
         let task = |task: usize, arena: &mut Arena, out: &mut [_]| all.run(task, arena, out);
         if !shelf.irradiances.fill(IRRADIANCES, crew, scratch, &task)? {
             return Ok(false);
@@ -321,9 +321,9 @@ impl<'a> Laboratory<'a> {
 
     /// What paths see of the maps; caustics in discs as they are after so many maps were `made`.
     pub(super) fn light<'m>(&self, built: &'m Built<'m>, made: u32) -> PhotonMaps<'m> {
-        let falloff = self.stage.settings.photons.falloff;
-        let global = GatherLight::new(&built.global, &built.irradiances, self.farthest(), falloff);
-        let light = |map| progressive(map, self.discs, made).with_falloff(falloff).of_caustics();
+        let kernel = self.stage.settings.photons.kernel;
+        let global = GatherLight::new(&built.global, &built.irradiances, self.farthest(), kernel);
+        let light = |map| progressive(map, self.discs, made).with_kernel(kernel).of_caustics();
         PhotonMaps { caustic: built.caustic.as_ref().map(light), global }
     }
 }

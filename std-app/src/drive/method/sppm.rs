@@ -20,7 +20,7 @@ use halflight_core::bsdf::Features;
 use halflight_core::memory::{Arena, Line};
 use halflight_core::photon::{PhotonMap, Photons};
 use halflight_core::transport::shoot::{Keep, PATHS, ROOM, ShootSettings, Shooter};
-use halflight_core::transport::{Discs, PathTracer, PhotonLight, path::WAVE};
+use halflight_core::transport::{PathTracer, PhotonLight, RadiusSchedule, path::WAVE};
 use std::time::Instant;
 
 /// Radius of the discs of the first sample, in pixels.
@@ -40,7 +40,7 @@ const MOST_PATHS: usize = 1024 * PATHS;
 pub(super) struct ProgressivePhotons<'a, F> {
     stage: Stage<'a>,
     tracer: PathTracer<'a, F>,
-    discs: Discs,
+    discs: RadiusSchedule,
     paths: usize,
     used: PhotonUse,
     photons: Drawer,
@@ -126,7 +126,7 @@ impl<F: Features> Renderer for ProgressivePhotons<'_, F> {
             }
             let Some(map) = photons.map()? else { return Ok(()) };
             let light = progressive(&map, *discs, sample / 2);
-            let tracer = tracer.with_photons(light.with_falloff(settings.photons.falloff));
+            let tracer = tracer.with_photons(light.with_kernel(settings.photons.kernel));
             crew.tiles(sample + 1, scratch, &|task, samples, arena, pixels| {
                 tracer.run(task, samples, WAVE, arena, pixels)
             })?;
@@ -145,7 +145,11 @@ impl<F: Features> Renderer for ProgressivePhotons<'_, F> {
 }
 
 /// The light of `map` from discs of one pixel, made as large as they are after `samples`.
-pub(super) fn progressive<'a>(map: &'a PhotonMap<'a>, discs: Discs, samples: u32) -> PhotonLight<'a> {
+pub(super) fn progressive<'a>(
+    map: &'a PhotonMap<'a>,
+    discs: RadiusSchedule,
+    samples: u32,
+) -> PhotonLight<'a> {
     let shrunk = shrunk(samples);
     let pixels = FIRST_RADIUS * shrunk.sqrt();
     PhotonLight::new(map, discs.of_pixels(pixels as f32)).with_enough((ENOUGH * shrunk) as f32)
