@@ -12,7 +12,7 @@ use halflight_core::memory::{Arena, Footprint, Line};
 use halflight_core::photon::{Photon, Photons};
 use halflight_core::scene::{Camera, Material, Scene, Surface};
 use halflight_core::transport::UNLIMITED;
-use halflight_core::transport::shoot::{Keep, PATHS, ROOM, ShootSettings, Shooter};
+use halflight_core::transport::photon_mapping::deposit::{Keep, PATHS, ROOM, ShootSettings, Shooter};
 use halflight_core::{Level, Rgb};
 use halflight_tests::render::{difference, render};
 use halflight_tests::scenes::{

@@ -11,9 +11,10 @@ use halflight_core::film::Film;
 use halflight_core::light::LightSampler;
 use halflight_core::memory::{Arena, Footprint, Line};
 use halflight_core::scene::Scene;
-use halflight_core::transport::gather::{Gathering, Place};
-use halflight_core::transport::overture::{Order, PIXELS, Sight};
-use halflight_core::transport::{Counters, PathSettings, PathTracer, UNLIMITED, reference};
+use halflight_core::transport::cached::gather::{Gathering, Place};
+use halflight_core::transport::cached::placement::{Order, PIXELS, Sight};
+use halflight_core::transport::path::reference;
+use halflight_core::transport::{Counters, PathSettings, PathTracer, UNLIMITED};
 use halflight_tests::scenes::{cornell_box, everything, room_with_lamp};
 
 /// Mean radiance of the box, from 4 million paths that sampled the lamp uniformly by area.

@@ -1,42 +1,23 @@
-//! Light transport: one file per method, each readable beside its paper.
+//! Light transport, in folders by idea; each file is readable beside its paper.
 //!
-//! [`path`] is the path tracer that renders, a wavefront over a tile; [`mod@reference`] is the same estimator as a
-//! textbook has it, one path at a time, kept to test the other against. For the irradiance cache [`overture`] finds the
-//! places where it lacks a record, and [`gather`] makes one; [`shoot`] leaves the photons that [`PhotonLight`] gathers, and
-//! [`maps`] makes of them what gather rays end in.
+//! `walk` leads subpaths from surface to surface. [`path`] is the path tracer that renders, a wavefront over a tile;
+//! [`path::reference`] is the same estimator as a textbook has it, one path at a time, kept to test the other against.
+//! [`cached`] places, gathers and looks up records of the irradiance cache; [`photon_mapping`] traces photons and
+//! estimates their density; [`caustics`] merges them with paths; `prepass` learns what the first sample needs.
 
-mod arrivals;
-mod cached;
+pub mod cached;
 pub mod caustics;
-mod context;
-mod density;
 mod estimator;
-mod fences;
-mod flight;
-pub mod gather;
-pub mod maps;
-mod merge;
-mod outline;
-mod outlook;
-mod overhang;
-pub mod overture;
 pub mod path;
-mod pilot;
-mod places;
-mod probe;
-mod radius;
-pub mod reference;
-mod reuse;
-mod shadow;
-pub mod shoot;
-pub mod sight;
-mod wave;
+pub mod photon_mapping;
+mod prepass;
+mod walk;
 
-pub use context::SceneContext;
-pub use density::PhotonLight;
+pub use caustics::merge::Merging;
 pub use estimator::{Counters, PathSettings, UNLIMITED};
-pub use merge::Merging;
-pub use outlook::{Outlook, Vertex, WindowGain};
 pub use path::PathTracer;
-pub use pilot::Pilot;
-pub use radius::RadiusSchedule;
+pub use path::reuse_pilot::Pilot;
+pub use photon_mapping::density::PhotonLight;
+pub use photon_mapping::radius::RadiusSchedule;
+pub use prepass::environment_visibility::{Outlook, Vertex, WindowGain};
+pub use walk::context::SceneContext;

@@ -6,8 +6,8 @@ use halflight_core::Rgb;
 use halflight_core::bsdf::Features;
 use halflight_core::cache::irradiance::{CellFlux, Metric, metric};
 use halflight_core::memory::{Arena, Line};
-use halflight_core::transport::gather::{Gathering, Place};
-use halflight_core::transport::overture::{Order, PIXELS, Sight};
+use halflight_core::transport::cached::gather::{Gathering, Place};
+use halflight_core::transport::cached::placement::{Order, PIXELS, Sight};
 use halflight_core::transport::{Counters, PathTracer};
 
 /// Rays along a side of a gathering at such a point.

@@ -19,7 +19,7 @@ use halflight_core::light::LightSampler;
 use halflight_core::memory::{Arena, Line};
 use halflight_core::scene::Scene;
 use halflight_core::transport::PathTracer;
-use halflight_core::transport::gather::Gathering;
+use halflight_core::transport::cached::gather::Gathering;
 
 /// What to study.
 #[derive(Clone, Debug)]

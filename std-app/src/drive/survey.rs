@@ -7,8 +7,8 @@ use super::workers::Workers;
 use halflight_core::bsdf::Features;
 use halflight_core::cache::irradiance::{IrradianceCache, Record};
 use halflight_core::memory::{Arena, Line};
-use halflight_core::transport::gather::Place;
-use halflight_core::transport::overture::{Order, PIXELS, Sight};
+use halflight_core::transport::cached::gather::Place;
+use halflight_core::transport::cached::placement::{Order, PIXELS, Sight};
 use halflight_core::transport::{Counters, PathTracer};
 use std::time::Instant;
 

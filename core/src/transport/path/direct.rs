@@ -7,12 +7,12 @@ use crate::Rgb;
 use crate::bsdf::Features;
 use crate::geometry::Ray;
 use crate::light::LightSample;
-use crate::transport::arrivals::TO_ENVIRONMENT;
+use crate::transport::caustics::merge::ChainLink;
 use crate::transport::estimator::{dimension, environment_heuristic, power_heuristic};
-use crate::transport::merge::ChainLink;
-use crate::transport::reuse::Exchange;
-use crate::transport::shadow::{Shadows, shadow_ray};
-use crate::transport::wave::Path;
+use crate::transport::path::deferred_escapes::TO_ENVIRONMENT;
+use crate::transport::path::reuse::Exchange;
+use crate::transport::path::state::Path;
+use crate::transport::walk::visibility::{Shadows, shadow_ray};
 use glam::Vec3;
 
 impl<F: Features> PathTracer<'_, F> {

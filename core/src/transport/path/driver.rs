@@ -8,8 +8,8 @@ use crate::bvh::Coherence;
 use crate::sampling::Sampler;
 use crate::scene::SurfacePoint;
 use crate::transport::estimator::{Counters, dimension};
-use crate::transport::shadow::Shadows;
-use crate::transport::wave::Wave;
+use crate::transport::path::state::Wave;
+use crate::transport::walk::visibility::Shadows;
 use core::ops::Range;
 
 impl<'a, F: Features> PathTracer<'a, F> {

@@ -1,7 +1,7 @@
 //! The path tracer that renders: unidirectional, with next-event estimation and multiple importance sampling
 //! (Kajiya 1986; Veach 1997, chapter 9).
 //!
-//! The plain algorithm is [`super::reference`]. Departures from it:
+//! The plain algorithm is [`crate::transport::path::reference`]. Departures from it:
 //! 1. All paths of a wave advance together, one segment at a time, so that the tracer sees batches of rays:
 //!    first alike (camera rays along the Z-curve of a tile), then in no order (bounces).
 //! 2. Queues are compacted in place: the ray of a path that goes on overwrites one that was already shaded.
@@ -9,28 +9,29 @@
 //!    the path then.
 //! 4. Code for what the scene does not have is not compiled in ([`Features`]).
 //! 5. Where that pays, pixels of a circle share what their paths find (`reuse.rs`).
-//! 6. Where an irradiance cache knows the indirect light of a diffuse point, the path need not find it (`cached.rs`), or a
-//!    map of photons does one bounce later, and may ask several points of lights; nor where photons do (`density.rs`, `maps.rs`).
-//! 7. Pixels at the border of a lamp look at it with rays of their own (`outline.rs`).
+//! 6. Where an irradiance cache knows the indirect light of a diffuse point, the path need not find it (`lookup.rs`), or a
+//!    map of photons does one bounce later, and may ask several points of lights; nor where photons do (`density.rs`, `final_gather.rs`).
+//! 7. Pixels at the border of a lamp look at it with rays of their own (`silhouette.rs`).
 //! 8. Where photons of caustics lie, paths and photons share the light that both find (`merge.rs`).
 //!
 //! The price: about 400 bytes for each path of a wave. What a pixel sees depends on (seed, sample) and the pixels of
 //! its circle only, no wave cuts a circle, and samples are summed in their order: the picture has the same bits for
 //! any size of wave and any distribution of tasks.
 
+pub(in crate::transport) mod deferred_escapes;
 mod direct;
 mod driver;
+pub(in crate::transport) mod pixels;
+pub mod reference;
+pub(in crate::transport) mod reuse;
+pub(in crate::transport) mod reuse_pilot;
 mod scatter;
 mod shade;
 mod shadow_rays;
+pub(in crate::transport) mod silhouette;
+pub(in crate::transport) mod state;
+pub(in crate::transport) mod tile;
 
-use super::cached::Caches;
-use super::context::SceneContext;
-use super::density::PhotonLight;
-use super::estimator::{PathSettings, dimension};
-use super::maps::PhotonMaps;
-use super::merge::Merging;
-use super::wave::Wave;
 use crate::Level;
 use crate::bsdf::Features;
 use crate::bvh::Bvh;
@@ -41,6 +42,13 @@ use crate::light::{LightSampler, MarginalSample, VisibilityTable, WarpedSample};
 use crate::memory::Footprint;
 use crate::sampling::Sampler;
 use crate::scene::{Material, Scene, SurfacePoint};
+use crate::transport::cached::lookup::Caches;
+use crate::transport::caustics::merge::Merging;
+use crate::transport::estimator::{PathSettings, dimension};
+use crate::transport::path::state::Wave;
+use crate::transport::photon_mapping::density::PhotonLight;
+use crate::transport::photon_mapping::final_gather::PhotonMaps;
+use crate::transport::walk::context::SceneContext;
 use core::marker::PhantomData;
 
 /// Paths that advance together where memory allows: enough to fill the tracer's batches, few enough to

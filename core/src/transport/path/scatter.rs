@@ -6,10 +6,10 @@ use super::shade::{Known, Vertex};
 use crate::Rgb;
 use crate::bsdf::{Bsdf, BsdfSample, Features};
 use crate::geometry::Ray;
+use crate::transport::caustics::merge::ChainLink;
 use crate::transport::estimator::{Counters, dimension, is_cut, survival};
-use crate::transport::merge::ChainLink;
-use crate::transport::reuse::Exchange;
-use crate::transport::wave::{Merged, Path, Share};
+use crate::transport::path::reuse::Exchange;
+use crate::transport::path::state::{Merged, Path, Share};
 
 impl<F: Features> PathTracer<'_, F> {
     /// The ray by which the path goes on from `vertex`, if it does. `gathered`: photons have the light that the wide

@@ -9,10 +9,10 @@ use crate::light::emitted;
 use crate::sampling::Sampler;
 use crate::scene::SurfacePoint;
 use crate::transport::estimator::{Counters, dimension, environment_heuristic, power_heuristic};
-use crate::transport::maps::Said;
-use crate::transport::reuse::Exchange;
-use crate::transport::shadow::Shadows;
-use crate::transport::wave::{Merged, Path, Share};
+use crate::transport::path::reuse::Exchange;
+use crate::transport::path::state::{Merged, Path, Share};
+use crate::transport::photon_mapping::final_gather::Said;
+use crate::transport::walk::visibility::Shadows;
 use core::f32::consts::FRAC_1_PI;
 use glam::Vec3;
 

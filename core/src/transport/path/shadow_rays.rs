@@ -4,10 +4,10 @@ use super::PathTracer;
 use crate::Rgb;
 use crate::bsdf::Features;
 use crate::bvh::Coherence;
-use crate::transport::arrivals::Arrivals;
 use crate::transport::estimator::{Counters, MAX_CROSSINGS};
-use crate::transport::shadow::{FEW, pass_cutout, passing};
-use crate::transport::wave::Wave;
+use crate::transport::path::deferred_escapes::Arrivals;
+use crate::transport::path::state::Wave;
+use crate::transport::walk::visibility::{FEW, pass_cutout, passing};
 
 impl<F: Features> PathTracer<'_, F> {
     /// Adds the light at the end of the first `shadows` shadow rays to the paths of those that arrive.

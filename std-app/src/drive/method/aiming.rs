@@ -12,8 +12,8 @@ use crate::drive::memory::Memory;
 use halflight_core::bsdf::Features;
 use halflight_core::light::{EmissionSampler, GuideStats};
 use halflight_core::memory::{Arena, Footprint, Line};
-use halflight_core::transport::shoot::{Keep, PATHS, ShootSettings, Shooter};
-use halflight_core::transport::sight::{Raster, Sight};
+use halflight_core::transport::photon_mapping::deposit::{Keep, PATHS, ShootSettings, Shooter};
+use halflight_core::transport::photon_mapping::visible_points::{Raster, Sight};
 
 /// Light paths of each look; the map that those of the first are of, which no sample has; and looks after it, at most.
 const LOOK: usize = 16 * PATHS;

@@ -16,8 +16,8 @@ use halflight_core::bsdf::Features;
 use halflight_core::light::EmissionSampler;
 use halflight_core::memory::{Arena, Line, OutOfMemory};
 use halflight_core::photon::{MapShape, Photon, PhotonMap, Photons};
-use halflight_core::transport::caustics::{CausticShooter, PATHS, ROOM};
-use halflight_core::transport::shoot::{Keep, ShootSettings};
+use halflight_core::transport::caustics::tracer::{CausticShooter, PATHS, ROOM};
+use halflight_core::transport::photon_mapping::deposit::{Keep, ShootSettings};
 use halflight_core::transport::{Merging, PathTracer, RadiusSchedule, path::WAVE};
 use std::time::Instant;
 

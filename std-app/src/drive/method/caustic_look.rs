@@ -8,7 +8,7 @@ use crate::drive::RenderError;
 use core::f64::consts::PI;
 use halflight_core::bsdf::Features;
 use halflight_core::transport::Pilot;
-use halflight_core::transport::caustics::{BLOCKS, Find};
+use halflight_core::transport::caustics::tracer::{BLOCKS, Find};
 
 /// The share of the picture's light that photons must bring, of what paths find badly,
 const LEAST_SHARE: f64 = 3.5e-2;

@@ -20,7 +20,7 @@ use halflight_core::census::Census;
 use halflight_core::light::{EmissionSampler, GuideStats, LightSampler};
 use halflight_core::memory::{Arena, Footprint, Line};
 use halflight_core::photon::Photons;
-use halflight_core::transport::caustics::{CausticShooter, Find, PATHS, ROOM};
+use halflight_core::transport::caustics::tracer::{CausticShooter, Find, PATHS, ROOM};
 use halflight_core::transport::{Merging, PathTracer, RadiusSchedule, path::WAVE};
 
 /// Light paths of a glance, which tells where there is next to nothing to find, and of each look after it.

@@ -31,7 +31,7 @@ use halflight_core::bsdf::Features;
 use halflight_core::cache::irradiance::{CellFlux, IrradianceCache, Record, metric};
 use halflight_core::memory::{Arena, Footprint, Line};
 use halflight_core::transport::PathTracer;
-use halflight_core::transport::gather::{Gathering, Place};
+use halflight_core::transport::cached::gather::{Gathering, Place};
 use halflight_core::transport::path::WAVE;
 use std::time::Instant;
 

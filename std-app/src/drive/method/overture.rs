@@ -7,8 +7,8 @@ use crate::drive::crew::Crew;
 use halflight_core::bsdf::Features;
 use halflight_core::cache::irradiance::{CellFlux, IrradianceCache, Record};
 use halflight_core::memory::{Arena, Line};
-use halflight_core::transport::gather::{Gathering, Place};
-use halflight_core::transport::overture::{Order, PIXELS, Sight};
+use halflight_core::transport::cached::gather::{Gathering, Place};
+use halflight_core::transport::cached::placement::{Order, PIXELS, Sight};
 use halflight_core::transport::{Counters, PathTracer};
 
 /// It looks at every other pixel of every other row: what lies between is reached from there, or path traced.

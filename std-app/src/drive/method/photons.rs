@@ -13,10 +13,10 @@ use crate::drive::{RenderError, Settings};
 use halflight_core::bsdf::Features;
 use halflight_core::memory::{Arena, Footprint, Line};
 use halflight_core::photon::{Kernel, MapShape, Photon, PhotonMap, Photons};
-use halflight_core::transport::maps::{
+use halflight_core::transport::photon_mapping::deposit::{Keep, PATHS, ROOM, ShootSettings, Shooter};
+use halflight_core::transport::photon_mapping::final_gather::{
     GatherLight, IRRADIANCES, Irradiances, PhotonMaps, STRIDE, may_have_caustics,
 };
-use halflight_core::transport::shoot::{Keep, PATHS, ROOM, ShootSettings, Shooter};
 use halflight_core::transport::{PathTracer, RadiusSchedule};
 use std::time::Instant;
 

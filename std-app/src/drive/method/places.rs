@@ -8,7 +8,7 @@ use halflight_core::bsdf::Features;
 use halflight_core::memory::{Arena, Line};
 use halflight_core::photon::Photon;
 use halflight_core::transport::SceneContext;
-use halflight_core::transport::sight::Raster;
+use halflight_core::transport::photon_mapping::visible_points::Raster;
 
 /// What their memory is counted as.
 pub(super) const PLACES: &str = "places";

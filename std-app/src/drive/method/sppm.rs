@@ -19,7 +19,7 @@ use crate::drive::run::path_settings;
 use halflight_core::bsdf::Features;
 use halflight_core::memory::{Arena, Line};
 use halflight_core::photon::{PhotonMap, Photons};
-use halflight_core::transport::shoot::{Keep, PATHS, ROOM, ShootSettings, Shooter};
+use halflight_core::transport::photon_mapping::deposit::{Keep, PATHS, ROOM, ShootSettings, Shooter};
 use halflight_core::transport::{PathTracer, PhotonLight, RadiusSchedule, path::WAVE};
 use std::time::Instant;
 

@@ -12,10 +12,6 @@
 //!    nearest to a place in the shade most are of the light beside it, more than their share of the area. As many lie on an
 //!    area as it is bright, so that weights of one over brightness give each area its share.
 
-use super::PhotonLight;
-use super::density::{Gathered, Light, fence, reflected};
-use super::estimator::Counters;
-use super::wave::Share;
 use crate::bsdf::{Bsdf, Features};
 use crate::bvh::Bvh;
 use crate::geometry::Ray;
@@ -24,6 +20,10 @@ use crate::memory::{Arena, Footprint, Line, OutOfMemory};
 use crate::photon::{ALIKE, FLATNESS, Kernel, Neighbours, Photon, PhotonMap, QueryDisc, Uniform};
 use crate::sampling::mix;
 use crate::scene::{Material, Scene, SurfacePoint};
+use crate::transport::PhotonLight;
+use crate::transport::estimator::Counters;
+use crate::transport::path::state::Share;
+use crate::transport::photon_mapping::density::{Gathered, Light, fence, reflected};
 use crate::{Level, Rgb};
 use core::f32::consts::{FRAC_1_PI, SQRT_2};
 use glam::Vec3;
@@ -166,7 +166,7 @@ impl<'a> GatherLight<'a> {
 
     /// The light that `point`, at the end of a gather ray of length `distance`, reflects to `wo`, except what a narrow
     /// coat does. `None` where the map should not tell. `turns`, from 0 to 1, turns probes for walls.
-    pub(super) fn reflected<F: Features>(
+    pub(in crate::transport) fn reflected<F: Features>(
         &self,
         (bvh, level): (&Bvh, Level),
         (point, bsdf, apart): (&SurfacePoint, &Bsdf, bool),
@@ -186,7 +186,7 @@ impl<'a> GatherLight<'a> {
 
     /// The irradiance of the photons at `point`, at the end of a gather ray of length `distance`, and the radius of their
     /// discs. `None` where the map should not tell.
-    pub(super) fn irradiance(
+    pub(in crate::transport) fn irradiance(
         &self,
         (bvh, level): (&Bvh, Level),
         point: &SurfacePoint,
@@ -258,17 +258,17 @@ pub struct PhotonMaps<'a> {
 
 /// What maps say of a vertex of a path.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Said {
+pub(in crate::transport) struct Said {
     /// Reflected light.
-    pub(super) gathered: Gathered,
+    pub(in crate::transport) gathered: Gathered,
     /// Whether that is all light but what a narrow coat reflects.
-    pub(super) is_all: bool,
+    pub(in crate::transport) is_all: bool,
     /// Whether no light need be asked for by a shadow ray.
-    pub(super) is_lit: bool,
+    pub(in crate::transport) is_lit: bool,
     /// What a path finds that goes on from here,
-    pub(super) next: Share,
+    pub(in crate::transport) next: Share,
     /// and what it finds by a narrow coat.
-    pub(super) mirrored: Share,
+    pub(in crate::transport) mirrored: Share,
 }
 
 impl PhotonMaps<'_> {
@@ -276,7 +276,7 @@ impl PhotonMaps<'_> {
     /// `travelled` as far as that from the eye.
     /// `limited` is the number of its segments where depth is limited, otherwise zero.
     #[inline]
-    pub(super) fn ask<F: Features>(
+    pub(in crate::transport) fn ask<F: Features>(
         &self,
         tracer: (&Bvh, Level),
         (came, limited, distance): (Share, u32, f32),

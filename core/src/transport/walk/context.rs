@@ -1,12 +1,12 @@
 //! The scene as transport sees it: geometry, its hierarchy and the instruction set, and the walk from surface to
 //! surface that all subpaths share.
 
-use super::estimator::{Counters, MAX_CROSSINGS};
 use crate::Level;
 use crate::bsdf::Features;
 use crate::bvh::Bvh;
 use crate::geometry::{Hit, MISS, Ray};
 use crate::scene::{Scene, SurfacePoint};
+use crate::transport::estimator::{Counters, MAX_CROSSINGS};
 use core::marker::PhantomData;
 use glam::Vec3;
 
@@ -24,24 +24,24 @@ pub struct SceneContext<'a, F> {
 
 /// A ray between two surfaces of a subpath.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Segment {
-    pub(super) ray: Ray,
+pub(in crate::transport) struct Segment {
+    pub(in crate::transport) ray: Ray,
     /// The triangle that the ray starts on, which it cannot meet again; [`MISS`] at the camera.
-    pub(super) triangle: u32,
+    pub(in crate::transport) triangle: u32,
     /// Surfaces of the subpath passed by cut-out or coincidence.
-    pub(super) crossings: u32,
+    pub(in crate::transport) crossings: u32,
     /// Distance from the last surface that scattered, over that of the ray's direction.
-    pub(super) length: f32,
+    pub(in crate::transport) length: f32,
 }
 
 impl Segment {
     /// The first of a subpath, from the camera or a light.
-    pub(super) fn first(ray: Ray) -> Self {
+    pub(in crate::transport) fn first(ray: Ray) -> Self {
         Self { ray, triangle: MISS, crossings: 0, length: 0.0 }
     }
 
     /// The next, from `point` of the triangle that `hit` tells in a `direction` of the world.
-    pub(super) fn onward(&self, point: &SurfacePoint, hit: &Hit, direction: Vec3) -> Self {
+    pub(in crate::transport) fn onward(&self, point: &SurfacePoint, hit: &Hit, direction: Vec3) -> Self {
         Self { ray: point.spawn(direction), triangle: hit.triangle, crossings: self.crossings, length: 0.0 }
     }
 }
@@ -55,7 +55,7 @@ impl<'a, F: Features> SceneContext<'a, F> {
     /// Whether a ray that started on triangle `left` passes `point` as if it were not there: by a cut-out, whose
     /// opacity does not exceed `random` (called for surfaces that have one), or by rounding on its own triangle.
     #[inline]
-    pub(super) fn is_passed(
+    pub(in crate::transport) fn is_passed(
         &self,
         point: &SurfacePoint,
         hit: &Hit,
@@ -70,7 +70,7 @@ impl<'a, F: Features> SceneContext<'a, F> {
 
     /// Follows `segment` to the surface that scatters it; the n-th surface with a cut-out takes `random(n)`.
     /// `None` where it leaves the scene.
-    pub(super) fn next_surface(
+    pub(in crate::transport) fn next_surface(
         &self,
         segment: &mut Segment,
         random: impl Fn(u32) -> f32,
@@ -82,7 +82,7 @@ impl<'a, F: Features> SceneContext<'a, F> {
     }
 
     /// The same, where the ray of `segment` was traced and met `hit`.
-    pub(super) fn surface_from(
+    pub(in crate::transport) fn surface_from(
         &self,
         mut hit: Hit,
         segment: &mut Segment,

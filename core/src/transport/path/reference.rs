@@ -1,18 +1,18 @@
-//! The path tracer of the textbook: one path at a time, one ray at a time. It is what [`super::path`] is tested
+//! The path tracer of the textbook: one path at a time, one ray at a time. It is what [`crate::transport::path`] is tested
 //! against, and it says in order what that does in pieces.
 
-use super::estimator::{
-    MAX_CROSSINGS, MAX_VERTICES, PathSettings, dimension, environment_heuristic, is_cut, power_heuristic,
-    survival,
-};
-use super::outline::{self, is_outlined};
-use super::shadow::{passing, shadow_ray};
 use crate::bsdf::{All, Bsdf};
 use crate::bvh::Bvh;
 use crate::geometry::MISS;
 use crate::light::{LightSampler, emitted};
 use crate::sampling::Sampler;
 use crate::scene::{Scene, SurfacePoint};
+use crate::transport::estimator::{
+    MAX_CROSSINGS, MAX_VERTICES, PathSettings, dimension, environment_heuristic, is_cut, power_heuristic,
+    survival,
+};
+use crate::transport::path::silhouette::{self, is_outlined};
+use crate::transport::walk::visibility::{passing, shadow_ray};
 use crate::{Level, Rgb};
 use glam::Vec3;
 
@@ -142,9 +142,9 @@ pub fn radiance(
     }
     let mut lamps = Rgb::ZERO;
     if is_outlined {
-        for ray in outline::rays(scene, settings, [x, y], sample) {
+        for ray in silhouette::rays(scene, settings, [x, y], sample) {
             let hit = bvh.nearest(Level::BASELINE, &ray);
-            lamps += outline::emission::<All>(scene, bvh, Level::BASELINE, ray, hit);
+            lamps += silhouette::emission::<All>(scene, bvh, Level::BASELINE, ray, hit);
         }
     }
     radiance + lamps

@@ -60,13 +60,13 @@ impl RadiusSchedule {
     /// The same for a path that has come so far from the eye: what mirrors show of the place is as small in
     /// the picture as the way to it is long. Weights know the place alone.
     #[inline]
-    pub(super) fn radius_after(&self, travelled: f32, place: Vec3) -> f32 {
+    pub(in crate::transport) fn radius_after(&self, travelled: f32, place: Vec3) -> f32 {
         self.radius(place).max(self.radius * travelled)
     }
 
     /// π² r² N: R where nothing lies between, and light is emitted with a density of one.
     #[inline]
-    pub(super) fn reach(&self, place: Vec3, paths: f32) -> f32 {
+    pub(in crate::transport) fn reach(&self, place: Vec3, paths: f32) -> f32 {
         let radius = PI * self.radius(place);
         radius * radius * paths
     }

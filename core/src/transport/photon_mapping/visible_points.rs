@@ -2,13 +2,13 @@
 //! in a map of their own. A photon counts as seen where one of them lies near it. That need not be exact: emission guided
 //! by it sends some light everywhere.
 
-use super::context::{SceneContext, Segment};
-use super::estimator::{Counters, dimension};
-use super::radius::RadiusSchedule;
 use crate::bsdf::{Bsdf, Features};
 use crate::memory::Footprint;
 use crate::photon::{Kernel, Photon, PhotonMap, Photons, QueryDisc, Uniform};
 use crate::sampling::Sampler;
+use crate::transport::estimator::{Counters, dimension};
+use crate::transport::photon_mapping::radius::RadiusSchedule;
+use crate::transport::walk::context::{SceneContext, Segment};
 use crate::{Level, Rgb};
 use core::mem;
 use glam::Vec3;
@@ -151,7 +151,7 @@ impl<'a> Sight<'a> {
     }
 
     /// Whether a photon at `place`, on a surface of `normal`, is seen.
-    pub(super) fn shows(&self, place: Vec3, normal: Vec3) -> bool {
+    pub(in crate::transport) fn shows(&self, place: Vec3, normal: Vec3) -> bool {
         let radius = match self.reach {
             Reach::RadiusSchedule(discs) => discs.radius(place),
             Reach::Everywhere(radius) => radius,

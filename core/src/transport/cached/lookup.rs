@@ -1,19 +1,19 @@
 //! Irradiance caches as paths ask them: what a block of vertices has of reflected light is asked for at once, before
 //! they are shaded.
 
-use super::estimator::Counters;
-use super::path::{BLOCK, PathTracer, SurfaceInteraction};
-use super::wave::{Path, Wave};
 use crate::Level;
 use crate::bsdf::Features;
 use crate::cache::irradiance::{CachedIrradiance, IrradianceCache, Points, QueryPoint};
 use crate::geometry::Ray;
 use crate::scene::SurfacePoint;
+use crate::transport::estimator::Counters;
+use crate::transport::path::state::{Path, Wave};
+use crate::transport::path::{BLOCK, PathTracer, SurfaceInteraction};
 use core::ops::Range;
 
 /// Irradiance caches, frozen.
 #[derive(Clone, Copy)]
-pub(super) enum Caches<'a> {
+pub(in crate::transport) enum Caches<'a> {
     /// Of even and of odd samples.
     Halves([&'a IrradianceCache<'a>; 2]),
     /// What there is of one so far: one record is enough for rays that are averaged.
@@ -54,7 +54,7 @@ impl Caches<'_> {
 impl<'a, F: Features> PathTracer<'a, F> {
     /// Asks `caches` for the light that is reflected onto those of `block`, at the ends of rays of `range`, that may be
     /// diffuse.
-    pub(super) fn ask(
+    pub(in crate::transport) fn ask(
         &self,
         caches: Caches,
         wave: &Wave,

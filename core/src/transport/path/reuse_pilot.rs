@@ -4,14 +4,14 @@
 //! Sharing pays where the variance falls by a larger factor than the work grows. It does not where most of the
 //! error is in the direct light, or behind mirrors and glass.
 
-use super::estimator::Counters;
-use super::path::PathTracer;
-use super::places::Places;
-use super::wave::{Share, Wave};
 use crate::Rgb;
 use crate::bsdf::Features;
 use crate::film::{PIXELS_PER_TILE, Tile};
 use crate::memory::{Arena, OutOfMemory};
+use crate::transport::estimator::Counters;
+use crate::transport::path::PathTracer;
+use crate::transport::path::state::{Share, Wave};
+use crate::transport::path::tile::Places;
 
 /// Samples of each pixel of the pilot. The first alone tells how bright the picture is.
 const SAMPLES: u32 = 4;

@@ -1,11 +1,9 @@
 //! Light paths under way: from the lights, over surfaces, until they end. What is done where they meet one is for a
-//! [`Visitor`] to say: `shoot.rs` leaves photons of all light, `caustics.rs` those of caustics.
+//! [`Visitor`] to say: `deposit.rs` leaves photons of all light, `caustics.rs` those of caustics.
 //!
 //! All paths of a task advance together, so that the tracer sees batches of rays. Path `i` of map `n` follows from
 //! (seed, n, i) alone.
 
-use super::context::SceneContext;
-use super::estimator::{CERTAIN_BELOW, Counters, MAX_CROSSINGS, is_cut};
 use crate::bsdf::{Bsdf, BsdfSample, Features};
 use crate::bvh::{Bvh, Coherence};
 use crate::geometry::{Hit, Ray};
@@ -14,6 +12,8 @@ use crate::memory::{Arena, Footprint, OutOfMemory};
 use crate::photon::Photon;
 use crate::sampling::{Numbers, Sampler, mix};
 use crate::scene::{Scene, SurfacePoint};
+use crate::transport::estimator::{CERTAIN_BELOW, Counters, MAX_CROSSINGS, is_cut};
+use crate::transport::walk::context::SceneContext;
 use crate::{Level, Rgb};
 use bytemuck::{Pod, Zeroable};
 use core::marker::PhantomData;
@@ -35,7 +35,7 @@ const CROSSING: u32 = 1 << 31;
 /// A path between two of its vertices.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C)]
-pub(super) struct State {
+pub(in crate::transport) struct State {
     pub power: [f32; 3],
     /// Which path of the map.
     pub number: u32,
@@ -62,7 +62,7 @@ pub(super) struct State {
 }
 
 /// Where a path meets a surface.
-pub(super) struct Vertex<'v> {
+pub(in crate::transport) struct Vertex<'v> {
     pub point: &'v SurfacePoint<'v>,
     pub bsdf: &'v Bsdf,
     /// Unit direction to where the light comes from.
@@ -74,19 +74,19 @@ pub(super) struct Vertex<'v> {
 
 impl Vertex<'_> {
     /// The visitor's own random number.
-    pub(super) fn own(&self) -> f32 {
+    pub(in crate::transport) fn own(&self) -> f32 {
         self.numbers.single(self.first + OWN)
     }
 
     /// The photon of light of such power that has come here.
-    pub(super) fn photon(&self, power: Rgb) -> Photon {
+    pub(in crate::transport) fn photon(&self, power: Rgb) -> Photon {
         Photon::new(self.point.position, self.to_light, self.point.geometric_normal, power)
     }
 }
 
 /// How a path goes on.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Onward {
+pub(in crate::transport) struct Onward {
     /// With this probability at most.
     pub most: f32,
     /// Only where it is mirrored.
@@ -94,7 +94,7 @@ pub(super) struct Onward {
 }
 
 /// What is done with light paths.
-pub(super) trait Visitor {
+pub(in crate::transport) trait Visitor {
     /// Dimensions of the sampler at a vertex.
     const DIMENSIONS: u32 = 3;
     /// Distinguishes its random numbers from those of others, and of pixels.
@@ -116,7 +116,7 @@ pub(super) trait Visitor {
 }
 
 /// Where the numbers of paths come from.
-pub(super) trait Source {
+pub(in crate::transport) trait Source {
     /// Those of a path.
     type Numbers: Numbers;
 
@@ -126,7 +126,7 @@ pub(super) trait Source {
 
 /// Those of a map of photons, a point of a sequence for each path.
 #[derive(Clone, Copy)]
-pub(super) struct Sequence {
+pub(in crate::transport) struct Sequence {
     seed: u32,
     map: u32,
 }
@@ -142,7 +142,7 @@ impl Source for Sequence {
 
 /// What is shot: all but its visitor.
 #[derive(Clone, Copy)]
-pub(super) struct Flight<'a, F> {
+pub(in crate::transport) struct Flight<'a, F> {
     pub scene: &'a Scene<'a>,
     pub bvh: &'a Bvh<'a>,
     pub lights: &'a LightSampler<'a>,
@@ -157,17 +157,17 @@ pub(super) struct Flight<'a, F> {
 
 impl<F: Features> Flight<'_, F> {
     /// Number of tasks of a map.
-    pub(super) fn tasks(&self) -> usize {
+    pub(in crate::transport) fn tasks(&self) -> usize {
         (self.paths as usize).div_ceil(PATHS)
     }
 
     /// Working memory of one task.
-    pub(super) fn scratch() -> Footprint {
+    pub(in crate::transport) fn scratch() -> Footprint {
         Footprint::default().slice::<State>(PATHS).slice::<Ray>(PATHS).slice::<Hit>(PATHS)
     }
 
     /// Follows the paths of task `task` of map number `map`.
-    pub(super) fn follow<V: Visitor>(
+    pub(in crate::transport) fn follow<V: Visitor>(
         &self,
         task: usize,
         map: u32,
@@ -180,12 +180,12 @@ impl<F: Features> Flight<'_, F> {
     }
 
     /// The numbers of the paths of map number `map`.
-    pub(super) fn sequence<V: Visitor>(&self, map: u32) -> Sequence {
+    pub(in crate::transport) fn sequence<V: Visitor>(&self, map: u32) -> Sequence {
         Sequence { seed: mix(V::SEED ^ u64::from(self.seed)) as u32, map }
     }
 
     /// Follows so many `paths` from number `first` on, [`PATHS`] at most, by the numbers of `source`.
-    pub(super) fn follow_all<V: Visitor, S: Source>(
+    pub(in crate::transport) fn follow_all<V: Visitor, S: Source>(
         &self,
         source: &S,
         (first, paths): (u32, usize),
@@ -319,17 +319,17 @@ fn reaching(segments: u32) -> f32 {
 }
 
 /// Where the photons of a task go.
-pub(super) struct Pile<'p> {
+pub(in crate::transport) struct Pile<'p> {
     photons: &'p mut [Photon],
     count: usize,
 }
 
 impl<'p> Pile<'p> {
-    pub(super) fn new(photons: &'p mut [Photon]) -> Self {
+    pub(in crate::transport) fn new(photons: &'p mut [Photon]) -> Self {
         Self { photons, count: 0 }
     }
 
-    pub(super) fn leave(&mut self, photon: Photon, counters: &mut Counters) {
+    pub(in crate::transport) fn leave(&mut self, photon: Photon, counters: &mut Counters) {
         match self.photons.get_mut(self.count) {
             Some(slot) => {
                 *slot = photon;
@@ -340,7 +340,7 @@ impl<'p> Pile<'p> {
     }
 
     /// What is left of it has photons of no place, which a map refuses.
-    pub(super) fn finish(self) {
+    pub(in crate::transport) fn finish(self) {
         let Self { photons, count } = self;
         if let Some(rest) = photons.get_mut(count..) {
             rest.fill(Photon::NONE);

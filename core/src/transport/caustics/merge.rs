@@ -36,14 +36,14 @@
 //! each other ends, as its light is the record's. A path from the eye asks photons at each rough surface, but for those to
 //! which mirrors and glass lead from one whose photons know them.
 
-use super::density::{Gathered, Light, reflected};
-use super::radius::RadiusSchedule;
-use super::wave::{Merged, Path};
 use crate::bsdf::{Bsdf, Features};
 use crate::bvh::Bvh;
 use crate::light::EmissionSampler;
 use crate::photon::{Kernel, PhotonMap, QueryDisc, Uniform};
 use crate::scene::{Scene, SurfacePoint};
+use crate::transport::path::state::{Merged, Path};
+use crate::transport::photon_mapping::density::{Gathered, Light, reflected};
+use crate::transport::photon_mapping::radius::RadiusSchedule;
 use crate::{Level, Rgb};
 use glam::Vec3;
 
@@ -53,7 +53,7 @@ const SMALLEST: f32 = 0.5;
 /// Whether light is merged on a disc of `radius` that comes from a rough surface with discs of radius `from`, or, where that is
 /// zero, by mirrors and glass alone. If not, it is merged there, or still before.
 #[inline]
-pub(super) fn is_wide_enough(radius: f32, from: f32) -> bool {
+pub(in crate::transport) fn is_wide_enough(radius: f32, from: f32) -> bool {
     radius >= SMALLEST * from
 }
 
@@ -62,7 +62,7 @@ pub(super) fn is_wide_enough(radius: f32, from: f32) -> bool {
 pub struct Merging<'a> {
     /// Of even and of odd samples.
     maps: [&'a PhotonMap<'a>; 2],
-    pub(super) emission: &'a EmissionSampler<'a>,
+    pub(in crate::transport) emission: &'a EmissionSampler<'a>,
     discs: RadiusSchedule,
     /// Light paths of each map.
     paths: f32,
@@ -71,26 +71,26 @@ pub struct Merging<'a> {
 }
 
 /// A surface of a chain: where light goes from `far`, the side of the light, to `near`, the side of the eye.
-pub(super) struct ChainLink<'p> {
-    pub(super) point: &'p SurfacePoint<'p>,
+pub(in crate::transport) struct ChainLink<'p> {
+    pub(in crate::transport) point: &'p SurfacePoint<'p>,
     /// As seen from one of the two.
-    pub(super) bsdf: &'p Bsdf,
+    pub(in crate::transport) bsdf: &'p Bsdf,
     /// The one from which it is seen; local, as `far`.
-    pub(super) near: Vec3,
-    pub(super) far: Vec3,
+    pub(in crate::transport) near: Vec3,
+    pub(in crate::transport) far: Vec3,
     /// By its coat alone.
-    pub(super) coat_alone: bool,
+    pub(in crate::transport) coat_alone: bool,
 }
 
 impl ChainLink<'_> {
     /// The density with which who comes from `far` goes on to `near`, times the ratio of the cosines of `far` and of
     /// `near`. Over the density of the other way it is ρ.
-    pub(super) fn reverse<F: Features>(&self, scene: &Scene) -> f32 {
+    pub(in crate::transport) fn reverse<F: Features>(&self, scene: &Scene) -> f32 {
         self.density::<F>(scene) * (self.far.z / self.near.z).abs()
     }
 
     /// The density alone.
-    pub(super) fn density<F: Features>(&self, scene: &Scene) -> f32 {
+    pub(in crate::transport) fn density<F: Features>(&self, scene: &Scene) -> f32 {
         let Self { point, bsdf, near, far, coat_alone } = *self;
         if F::GLOSSY && coat_alone {
             return bsdf.evaluate_apart::<F>(far, near)[1].1;
@@ -127,7 +127,13 @@ impl<'a> Merging<'a> {
     ///
     /// Where depth `is_limited` that is the first surface alone, for photons do not know how far they are from their light.
     #[inline]
-    pub(super) fn met(&self, path: &Path, place: Vec3, segments: u32, is_limited: bool) -> Option<Merged> {
+    pub(in crate::transport) fn met(
+        &self,
+        path: &Path,
+        place: Vec3,
+        segments: u32,
+        is_limited: bool,
+    ) -> Option<Merged> {
         let is_first = path.disc == 0.0;
         let is_known =
             || is_limited || path.merged == Merged::KNOWN || is_wide_enough(path.disc, self.radius(place));
@@ -139,26 +145,31 @@ impl<'a> Merging<'a> {
 
     /// Whether photons may come by `bsdf` to where a path has its `chain` from.
     #[inline]
-    pub(super) fn may_come_by(&self, bsdf: &Bsdf, chain: f32) -> bool {
+    pub(in crate::transport) fn may_come_by(&self, bsdf: &Bsdf, chain: f32) -> bool {
         !self.beside_records || chain >= 0.0 || bsdf.is_delta()
     }
 
     /// The radius of discs around `place`.
     #[inline]
-    pub(super) fn radius(&self, place: Vec3) -> f32 {
+    pub(in crate::transport) fn radius(&self, place: Vec3) -> f32 {
         self.discs.radius(place)
     }
 
     /// R as far as a path knows it that begins its chain at `place`.
     #[inline]
-    pub(super) fn begun(&self, place: Vec3) -> f32 {
+    pub(in crate::transport) fn begun(&self, place: Vec3) -> f32 {
         self.discs.reach(place, self.paths)
     }
 
     /// The `weight` of what the path tracer found, where photons might have found it as well: R is `chain` times what
     /// the light has to do with it. No chain, no photons.
     #[inline]
-    pub(super) fn beside_photons(&self, weight: f32, chain: f32, of_light: impl FnOnce() -> f32) -> f32 {
+    pub(in crate::transport) fn beside_photons(
+        &self,
+        weight: f32,
+        chain: f32,
+        of_light: impl FnOnce() -> f32,
+    ) -> f32 {
         if chain <= 0.0 || chain.is_nan() {
             return weight;
         }
@@ -169,7 +180,7 @@ impl<'a> Merging<'a> {
     /// What `point` sends to `wo` of the light of photons around it, at the end of a path that has come so far from the eye, or
     /// zero where something rough has thrown it on. `turns` turns the probes for walls.
     #[inline]
-    pub(super) fn reflected<F: Features>(
+    pub(in crate::transport) fn reflected<F: Features>(
         &self,
         (bvh, level): (&Bvh, Level),
         sample: u32,

@@ -4,10 +4,6 @@
 //! mirrors is direct light, which each path of the picture finds for itself ([`Share`]). All N² rays of a point make
 //! one wave, or several; blocks of 8 × 8 strata go together, so that neighbours reach the hierarchy together.
 
-use super::estimator::{Counters, dimension};
-use super::path::{PathTracer, WAVE};
-use super::reuse::Exchange;
-use super::wave::{Path, Share, Wave};
 use crate::bsdf::Features;
 use crate::bvh::Coherence;
 use crate::cache::irradiance::{CellFlux, FINE, Hemisphere, QueryPoint, Record, metric, validity};
@@ -16,11 +12,15 @@ use crate::memory::{Arena, Footprint, OutOfMemory};
 use crate::sampling::Sampler;
 use crate::sampling::warp::cosine_hemisphere;
 use crate::scene::SurfacePoint;
+use crate::transport::estimator::{Counters, dimension};
+use crate::transport::path::reuse::Exchange;
+use crate::transport::path::state::{Path, Share, Wave};
+use crate::transport::path::{PathTracer, WAVE};
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
 /// Gatherings have numbers of pixels that no picture has.
-pub(super) const NO_PIXEL: u32 = 1 << 30;
+pub(in crate::transport) const NO_PIXEL: u32 = 1 << 30;
 
 /// From so many strata along a side on those of a block go much the same way: packets save time. Of fewer they cost it, a
 /// quarter of the time of a record in Sponza with 16, a tenth with 32.
@@ -30,17 +30,17 @@ const NARROW: usize = 64;
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C)]
 pub struct Place {
-    pub(super) position: [f32; 3],
+    pub(in crate::transport) position: [f32; 3],
     /// Bound of the error of `position`.
-    pub(super) error: f32,
+    pub(in crate::transport) error: f32,
     /// The shading normal, of which the hemisphere is gathered.
-    pub(super) normal: [f32; 3],
-    pub(super) geometric_normal: [f32; 3],
-    pub(super) triangle: u32,
+    pub(in crate::transport) normal: [f32; 3],
+    pub(in crate::transport) geometric_normal: [f32; 3],
+    pub(in crate::transport) triangle: u32,
     /// How wide a pixel is here.
-    pub(super) pixel: f32,
+    pub(in crate::transport) pixel: f32,
     /// Records that are farther than this are not for it, nor its own for what is: [`QueryPoint::within`].
-    pub(super) within: f32,
+    pub(in crate::transport) within: f32,
 }
 
 impl Place {
@@ -61,7 +61,7 @@ impl Place {
     }
 
     /// The place of `point`, on which a pixel is as wide as `pixel`.
-    pub(super) fn of(point: &SurfacePoint, pixel: f32) -> Self {
+    pub(in crate::transport) fn of(point: &SurfacePoint, pixel: f32) -> Self {
         Self {
             position: point.position.to_array(),
             error: point.error,
@@ -99,7 +99,7 @@ impl Place {
     }
 
     /// A ray into unit `direction` of the world.
-    pub(super) fn ray(&self, direction: Vec3) -> Ray {
+    pub(in crate::transport) fn ray(&self, direction: Vec3) -> Ray {
         let geometric = Vec3::from(self.geometric_normal);
         let ray = Ray::new(self.position() + self.error * geometric, direction);
         // No light comes from under the surface.
@@ -107,7 +107,7 @@ impl Place {
     }
 
     /// The path of a gather ray; `index` says where its light belongs.
-    pub(super) fn path(&self, pixel: u32, sample: u32, index: usize) -> Path {
+    pub(in crate::transport) fn path(&self, pixel: u32, sample: u32, index: usize) -> Path {
         Path {
             throughput: [1.0; 3],
             pdf: f32::INFINITY,
@@ -136,11 +136,11 @@ pub struct Gathering<'a> {
 }
 
 /// What the strata of a hemisphere see.
-pub(super) struct Strata<'m> {
-    pub(super) n: usize,
-    pub(super) radiance: &'m mut [[f32; 3]],
-    pub(super) inverse_distance: &'m mut [f32],
-    pub(super) directions: &'m mut [[f32; 3]],
+pub(in crate::transport) struct Strata<'m> {
+    pub(in crate::transport) n: usize,
+    pub(in crate::transport) radiance: &'m mut [[f32; 3]],
+    pub(in crate::transport) inverse_distance: &'m mut [f32],
+    pub(in crate::transport) directions: &'m mut [[f32; 3]],
     /// Of what is seen, local; empty where the metric does not ask for them.
     normals: &'m mut [[f32; 3]],
     /// How many of them see light directly.

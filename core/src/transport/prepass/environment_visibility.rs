@@ -9,10 +9,6 @@
 //! Windows pay where most of the sky is hidden, as in a room, and cost a little where it is not: the same rays tell
 //! which it is.
 
-use super::context::Segment;
-use super::estimator::{Counters, dimension};
-use super::path::PathTracer;
-use super::shadow::{pass_cutout, passing};
 use crate::Rgb;
 use crate::bsdf::{Bsdf, Features};
 use crate::bvh::Coherence;
@@ -20,6 +16,10 @@ use crate::geometry::{Bounds, Hit, Ray};
 use crate::light::{Bins, EnvironmentVisibility, VisibilityGrid, VisibilityTable};
 use crate::memory::{Arena, Footprint, OutOfMemory};
 use crate::sampling::Sampler;
+use crate::transport::estimator::{Counters, dimension};
+use crate::transport::path::PathTracer;
+use crate::transport::walk::context::Segment;
+use crate::transport::walk::visibility::{pass_cutout, passing};
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
@@ -215,7 +215,7 @@ impl<F: Features> PathTracer<'_, F> {
     /// Leaves the vertices of task `task` of a look in its part of the [`Outlook`].
     pub fn look(&self, task: usize, part: &mut [Vertex]) {
         part.fill(Vertex { place: NOWHERE, ..Vertex::default() });
-        let super::PathSettings { width, height, seed, .. } = self.settings;
+        let crate::transport::PathSettings { width, height, seed, .. } = self.settings;
         let pixels = width as usize * height as usize;
         let paths = (pixels / 4 / TASKS).clamp(PATHS.start, PATHS.end);
         for (path, vertices) in part.chunks_mut(VERTICES).take(paths).enumerate() {

@@ -5,9 +5,6 @@
 //!
 //! Which pixels these are follows from the camera and the corners of the lamps alone, so that nothing is biased.
 
-use super::estimator::{Counters, MAX_CROSSINGS, PathSettings, dimension};
-use super::path::PathTracer;
-use super::wave::Wave;
 use crate::bsdf::Features;
 use crate::bvh::{Bvh, Coherence};
 use crate::film::{PixelSet, TILE, Tile};
@@ -15,6 +12,9 @@ use crate::geometry::{Hit, MISS, Ray};
 use crate::light::{LightSampler, emitted};
 use crate::sampling::Sampler;
 use crate::scene::{Camera, Material, Scene, SurfacePoint};
+use crate::transport::estimator::{Counters, MAX_CROSSINGS, PathSettings, dimension};
+use crate::transport::path::PathTracer;
+use crate::transport::path::state::Wave;
 use crate::{Level, Rgb};
 use glam::{Vec2, Vec3};
 
@@ -91,7 +91,7 @@ impl View {
 
 /// The pixels of a tile that see the border of a lamp, as far as nothing is in the way. None where a sharp border is not
 /// seen: through a lens, or where surfaces have cut-outs.
-pub(super) fn outlined(
+pub(in crate::transport) fn outlined(
     scene: &Scene,
     lights: &LightSampler,
     settings: &PathSettings,
@@ -125,7 +125,7 @@ pub(super) fn outlined(
 }
 
 /// Whether the pixel in column `x` and row `y` is one of [`outlined`].
-pub(super) fn is_outlined(
+pub(in crate::transport) fn is_outlined(
     scene: &Scene,
     lights: &LightSampler,
     settings: &PathSettings,
@@ -137,7 +137,7 @@ pub(super) fn is_outlined(
 }
 
 /// The rays that look at lamps for one sample of the pixel in column `x` and row `y`.
-pub(super) fn rays(
+pub(in crate::transport) fn rays(
     scene: &Scene,
     settings: &PathSettings,
     [x, y]: [u32; 2],
@@ -155,7 +155,7 @@ pub(super) fn rays(
 
 /// The share of one of [`rays`], which met `hit`, in what its pixel sees of lamps. As a path does it passes a surface
 /// that the camera stands on.
-pub(super) fn emission<F: Features>(
+pub(in crate::transport) fn emission<F: Features>(
     scene: &Scene,
     bvh: &Bvh,
     level: Level,
@@ -180,7 +180,7 @@ pub(super) fn emission<F: Features>(
 impl<F: Features> PathTracer<'_, F> {
     /// What the first `count` paths of the wave see of lamps, in `wave.shadow_light`: those whose pixel is `outlined`, by
     /// its place; nothing for the others.
-    pub(super) fn look_at_lamps(
+    pub(in crate::transport) fn look_at_lamps(
         &self,
         mut outlined: impl FnMut(u32) -> bool,
         wave: &mut Wave,

@@ -1,16 +1,16 @@
 //! Path tracing of single pixels, far apart: what an audit asks ([`crate::estimate`]).
 
-use super::estimator::Counters;
-use super::outline::is_outlined;
-use super::path::PathTracer;
-use super::reuse::Exchange;
-use super::wave::{Path, Share, Wave};
 use crate::Rgb;
 use crate::bsdf::Features;
 use crate::film::Pixel;
 use crate::geometry::{MISS, Ray};
 use crate::memory::{Arena, OutOfMemory};
 use crate::sampling::Sampler;
+use crate::transport::estimator::Counters;
+use crate::transport::path::PathTracer;
+use crate::transport::path::reuse::Exchange;
+use crate::transport::path::silhouette::is_outlined;
+use crate::transport::path::state::{Path, Share, Wave};
 use core::ops::Range;
 
 impl<F: Features> PathTracer<'_, F> {

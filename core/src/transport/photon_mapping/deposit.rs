@@ -2,7 +2,7 @@
 //!
 //! What they leave is, by [`Keep`], the light that surfaces reflect onto each other, and that mirrors and glass throw onto
 //! surfaces, where light straight from a light is for shadow rays to find; all light; or caustics alone. How they get there
-//! is in `flight.rs`.
+//! is in `walk/light.rs`.
 //!
 //! Departures from the plain algorithm:
 //! 1. After a photon was left, its path goes on with a probability of at most [`MOST`]. A path then leaves five photons
@@ -10,16 +10,16 @@
 //!    the mean it would have to live through as many ends as no sequence of random numbers holds.
 //! 2. The price: where surfaces are lighter than that, photons differ in power.
 
-use super::estimator::Counters;
-pub use super::flight::PATHS;
-use super::flight::{Flight, Onward, Pile, State, Vertex, Visitor};
-use super::sight::Sight;
 use crate::bsdf::{BsdfSample, Features};
 use crate::bvh::Bvh;
 use crate::light::{EmissionSampler, LightSampler, luminance};
 use crate::memory::{Arena, Footprint, OutOfMemory};
 use crate::photon::Photon;
 use crate::scene::Scene;
+use crate::transport::estimator::Counters;
+use crate::transport::photon_mapping::visible_points::Sight;
+pub use crate::transport::walk::light::PATHS;
+use crate::transport::walk::light::{Flight, Onward, Pile, State, Vertex, Visitor};
 use crate::{Level, Rgb};
 use core::marker::PhantomData;
 use glam::Vec3;
@@ -28,7 +28,7 @@ use glam::Vec3;
 pub const ROOM: usize = 6 * PATHS;
 
 /// Probability with which a path goes on, at most, where it leaves a photon.
-pub(super) const MOST: f32 = 0.8;
+pub(in crate::transport) const MOST: f32 = 0.8;
 
 /// Which photons are left.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -45,7 +45,7 @@ pub enum Keep {
 impl Keep {
     /// Whether a path leaves a photon where it met a surface.
     #[inline]
-    pub(super) fn leaves(self, state: &State, vertex: &Vertex) -> bool {
+    pub(in crate::transport) fn leaves(self, state: &State, vertex: &Vertex) -> bool {
         vertex.bsdf.stores_photons()
             && match self {
                 Keep::All => true,
@@ -55,7 +55,7 @@ impl Keep {
 
     /// How it goes on from there.
     #[inline]
-    pub(super) fn onward(self, vertex: &Vertex, leaves: bool) -> Option<Onward> {
+    pub(in crate::transport) fn onward(self, vertex: &Vertex, leaves: bool) -> Option<Onward> {
         let ends =
             self == Keep::Caustic && (vertex.bsdf.stores_photons() || !vertex.bsdf.is_caustic_caster());
         (!ends).then_some(Onward { most: if leaves { MOST } else { 1.0 }, mirrored: false })
@@ -78,7 +78,7 @@ pub struct ShootSettings {
 /// Shoots the photons of one scene: a pass of tasks of [`PATHS`] paths.
 #[derive(Clone, Copy)]
 pub struct Shooter<'a, F> {
-    pub(super) flight: Flight<'a, F>,
+    pub(in crate::transport) flight: Flight<'a, F>,
     keep: Keep,
 }
 
@@ -186,7 +186,7 @@ impl Visitor for Looker<'_> {
 }
 
 /// Leaves the photons that are wanted.
-pub(super) struct Leaver<'p> {
+pub(in crate::transport) struct Leaver<'p> {
     keep: Keep,
     pile: Pile<'p>,
 }

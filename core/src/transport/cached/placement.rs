@@ -6,15 +6,15 @@
 //! gather where no record reaches, some places at a time, and each time all records are committed in their order. Then
 //! it goes over them again, for the diffuse points that are seen in rough surfaces ([`Sight`]).
 
-use super::context::Segment;
-use super::estimator::{Counters, dimension};
-use super::gather::Place;
-use super::path::PathTracer;
 use crate::bsdf::{Bsdf, Features};
 use crate::bvh::Coherence;
 use crate::geometry::{Hit, Ray};
 use crate::sampling::Sampler;
 use crate::scene::SurfacePoint;
+use crate::transport::cached::gather::Place;
+use crate::transport::estimator::{Counters, dimension};
+use crate::transport::path::PathTracer;
+use crate::transport::walk::context::Segment;
 use core::f32::consts::PI;
 use glam::Vec3;
 

@@ -5,14 +5,8 @@
 //! find the caustic by chance. A path that meets a rough surface first goes on by what a smooth coat mirrors there alone.
 //! Beside the records of an irradiance cache a photon is left only by what comes straight from a mirror or smooth glass:
 //! records have all that something rough sent.
-//! How paths go is in `flight.rs`.
+//! How paths go is in `walk/light.rs`.
 
-use super::estimator::{Counters, UNLIMITED};
-pub use super::flight::PATHS;
-use super::flight::{Flight, Onward, Pile, State, Vertex, Visitor};
-use super::merge::{ChainLink, is_wide_enough};
-use super::radius::RadiusSchedule;
-use super::shoot::ShootSettings;
 use crate::bsdf::{BsdfSample, Features};
 use crate::bvh::Bvh;
 use crate::geometry::Ray;
@@ -20,6 +14,12 @@ use crate::light::{EmissionSampler, LightSampler, LightType, luminance};
 use crate::memory::{Arena, Footprint, OutOfMemory};
 use crate::photon::Photon;
 use crate::scene::{Scene, SurfacePoint};
+use crate::transport::caustics::merge::{ChainLink, is_wide_enough};
+use crate::transport::estimator::{Counters, UNLIMITED};
+use crate::transport::photon_mapping::deposit::ShootSettings;
+use crate::transport::photon_mapping::radius::RadiusSchedule;
+pub use crate::transport::walk::light::PATHS;
+use crate::transport::walk::light::{Flight, Onward, Pile, State, Vertex, Visitor};
 use crate::{Level, Rgb};
 use core::f32::consts::PI;
 use core::marker::PhantomData;

@@ -3,21 +3,21 @@
 //! Layer after layer, one sample of each pixel. Where pixels share their paths, those of a
 //! circle stay together; else all go along the Z-curve, so that neighbours ask caches together.
 
-use super::estimator::{Counters, PathSettings};
-use super::outline::outlined;
-use super::path::{LIGHT_SAMPLES, PathTracer};
-use super::reuse::Exchange;
-use super::wave::{Path, Share, Wave};
 use crate::Rgb;
 use crate::bsdf::Features;
 use crate::film::{CIRCLE, CIRCLES, PIXELS_PER_TILE, Pixel, PixelSet, Tile};
 use crate::geometry::{MISS, Ray};
 use crate::memory::{Arena, OutOfMemory};
 use crate::sampling::Sampler;
+use crate::transport::estimator::{Counters, PathSettings};
+use crate::transport::path::reuse::Exchange;
+use crate::transport::path::silhouette::outlined;
+use crate::transport::path::state::{Path, Share, Wave};
+use crate::transport::path::{LIGHT_SAMPLES, PathTracer};
 use core::ops::Range;
 
 /// All samples of a tile that are still to be taken.
-pub(super) struct Places {
+pub(in crate::transport) struct Places {
     tile: Tile,
     left: Range<u32>,
     /// The next circle of the layer; where nothing is shared, the next pixel.
@@ -27,7 +27,7 @@ pub(super) struct Places {
 }
 
 impl Places {
-    pub(super) fn new(tile: Tile, samples: Range<u32>) -> Self {
+    pub(in crate::transport) fn new(tile: Tile, samples: Range<u32>) -> Self {
         Self { tile, left: samples, next: 0, outlined: PixelSet::default() }
     }
 
@@ -92,7 +92,7 @@ impl<F: Features> PathTracer<'_, F> {
     }
 
     /// Fills the wave with camera rays; returns how many. Circles stay together.
-    pub(super) fn start(&self, places: &mut Places, wave: &mut Wave) -> usize {
+    pub(in crate::transport) fn start(&self, places: &mut Places, wave: &mut Wave) -> usize {
         let mut count = 0;
         if self.settings.reuse {
             while count + CIRCLE <= wave.paths.len()

@@ -2,13 +2,13 @@
 //! what the surface sees. Behind a wall that is seen by rays along the surface; beneath what hangs low over it, which
 //! such rays pass under, and that the strata of the hemisphere have met.
 
-use super::estimator::Counters;
-use super::gather::{Place, Strata};
-use super::path::PathTracer;
 use crate::bsdf::Features;
 use crate::bvh::Coherence;
 use crate::cache::irradiance::{Record, SECTORS};
 use crate::geometry::{Frame, Hit, Ray};
+use crate::transport::cached::gather::{Place, Strata};
+use crate::transport::estimator::Counters;
+use crate::transport::path::PathTracer;
 use glam::{Vec2, Vec3};
 
 /// Rays along the surface in a ring, for each sector of a record's fence.
@@ -30,7 +30,7 @@ const NEARER: f32 = 0.95;
 impl<F: Features> PathTracer<'_, F> {
     /// Looks for walls around a record at `place`, and for what hangs over its surroundings in what its `strata`, which
     /// are local to `frame`, have met.
-    pub(super) fn fence(
+    pub(in crate::transport) fn fence(
         &self,
         record: &mut Record,
         place: &Place,

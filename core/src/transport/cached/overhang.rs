@@ -4,14 +4,14 @@
 //! a walk through the hierarchy that misses none; and a point that asks it from farther away than that would
 //! allow looks upwards once.
 
-use super::estimator::Counters;
-use super::gather::Place;
-use super::path::{BLOCK, PathTracer};
 use crate::bsdf::Features;
 use crate::bvh::Coherence;
 use crate::cache::irradiance::{CLOSE, FINE, Record, SECTORS};
 use crate::geometry::{Frame, Hit, Ray};
 use crate::scene::{Surface, SurfacePoint};
+use crate::transport::cached::gather::Place;
+use crate::transport::estimator::Counters;
+use crate::transport::path::{BLOCK, PathTracer};
 use glam::{Vec2, Vec3};
 
 /// No record reaches farther, in diagonals of the scene.
@@ -48,7 +48,7 @@ struct Probe {
 impl<F: Features> PathTracer<'_, F> {
     /// How far away the records may be ([`crate::cache::irradiance::Asker::within`]) that these points hear,
     /// each of which wants to hear such as are so far `exposed`.
-    pub(super) fn within(
+    pub(in crate::transport) fn within(
         &self,
         points: &[Option<&SurfacePoint>; BLOCK],
         exposed: &[f32; BLOCK],
@@ -106,7 +106,7 @@ impl<F: Features> PathTracer<'_, F> {
     }
 
     /// Notes what hangs over the support of a record at `place`, and over the place.
-    pub(super) fn note_overhangs(&self, record: &mut Record, place: &Place) {
+    pub(in crate::transport) fn note_overhangs(&self, record: &mut Record, place: &Place) {
         record.confine(place.within);
         let least = FINE * record.least;
         // Higher than this nothing matters, and what is met at a tilt is as far outside.

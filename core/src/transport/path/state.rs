@@ -1,78 +1,78 @@
 //! The working memory of a wavefront: the state of every path of the wave, and queues of rays.
 
-use super::density::Gathered;
-use super::estimator::{Counters, MAX_CROSSINGS};
-use super::reuse::{Exchange, Pair};
 use crate::Rgb;
 use crate::bsdf::Bsdf;
 use crate::film::CIRCLE;
 use crate::geometry::{Hit, Ray};
 use crate::memory::{Arena, Footprint, OutOfMemory};
 use crate::sampling::Sampler;
+use crate::transport::estimator::{Counters, MAX_CROSSINGS};
+use crate::transport::path::reuse::{Exchange, Pair};
+use crate::transport::photon_mapping::density::Gathered;
 use bytemuck::{Pod, Zeroable};
 
 /// A path between two of its vertices.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C)]
-pub(super) struct Path {
+pub(in crate::transport) struct Path {
     /// β: what radiance at the end of the ray is worth in the pixel.
-    pub(super) throughput: [f32; 3],
+    pub(in crate::transport) throughput: [f32; 3],
     /// Density in solid angle with which the ray was chosen; infinite where no other technique could.
-    pub(super) pdf: f32,
+    pub(in crate::transport) pdf: f32,
     /// L: what the path has gathered.
-    pub(super) radiance: [f32; 3],
+    pub(in crate::transport) radiance: [f32; 3],
     /// What photons blur of it.
-    pub(super) blur: [f32; 3],
+    pub(in crate::transport) blur: [f32; 3],
     /// Which pixel of the picture.
-    pub(super) pixel: u32,
+    pub(in crate::transport) pixel: u32,
     /// The last vertex at which the path was scattered.
-    pub(super) position: [f32; 3],
+    pub(in crate::transport) position: [f32; 3],
     /// Which pixel of the tile.
-    pub(super) place: u32,
+    pub(in crate::transport) place: u32,
     /// Which sample of the pixel.
-    pub(super) sample: u32,
+    pub(in crate::transport) sample: u32,
     /// The normal there, as the light sampling knows it.
-    pub(super) normal: [f32; 3],
+    pub(in crate::transport) normal: [f32; 3],
     /// Segments traced, the one under way included.
-    pub(super) segments: u16,
+    pub(in crate::transport) segments: u16,
     /// Surfaces passed through by cut-out.
-    pub(super) crossings: u16,
+    pub(in crate::transport) crossings: u16,
     /// The triangle that the ray starts on, which it cannot meet again.
-    pub(super) triangle: u32,
+    pub(in crate::transport) triangle: u32,
     /// Product of the squared relative indices of refraction passed so far.
-    pub(super) eta_squared: f32,
+    pub(in crate::transport) eta_squared: f32,
     /// What of the light at the end of the ray belongs to the path.
-    pub(super) share: Share,
+    pub(in crate::transport) share: Share,
     /// Of a path that came by mirrors and glass from a rough surface: how much denser photons come from a light to
-    /// there than paths from there to the light, but for what the light has to do with it ([`super::merge`]). Negative
+    /// there than paths from there to the light, but for what the light has to do with it ([`crate::transport::caustics::merge`]). Negative
     /// on the way to the first mirror or glass; zero where photons could not find the path.
-    pub(super) chain: f32,
+    pub(in crate::transport) chain: f32,
     /// Points of lights that it asks for direct light where a shadow ray alone finds that; 0 stands for one.
-    pub(super) lights: u16,
+    pub(in crate::transport) lights: u16,
     /// Whether photons are still to be asked, behind the rough surfaces that it has left.
-    pub(super) merged: Merged,
+    pub(in crate::transport) merged: Merged,
     /// The radius of discs at the last of them; zero before the first.
-    pub(super) disc: f32,
+    pub(in crate::transport) disc: f32,
     /// How long it is from the eye to its last vertex.
-    pub(super) travelled: f32,
+    pub(in crate::transport) travelled: f32,
     /// 1 where that was a rough coat alone, by which photons do not come straight from a light.
-    pub(super) left_coat: u32,
+    pub(in crate::transport) left_coat: u32,
 }
 
 impl Path {
     /// Its chain, as light at the end of the ray knows it.
     #[inline]
-    pub(super) fn chain_to_light(&self) -> f32 {
+    pub(in crate::transport) fn chain_to_light(&self) -> f32 {
         if self.left_coat == 0 { self.chain } else { 0.0 }
     }
 
     #[inline]
-    pub(super) fn add(&mut self, radiance: Rgb) {
+    pub(in crate::transport) fn add(&mut self, radiance: Rgb) {
         self.radiance = (Rgb::from(self.radiance) + radiance).to_array();
     }
 
     #[inline]
-    pub(super) fn gather(
+    pub(in crate::transport) fn gather(
         &mut self,
         throughput: Rgb,
         exchange: &mut Exchange,
@@ -85,14 +85,19 @@ impl Path {
 
     /// Random numbers for one of the points of lights that it asks where it ends: those of all its pixel's are a net.
     #[inline]
-    pub(super) fn part(&self, seed: u32, part: u32) -> Sampler {
+    pub(in crate::transport) fn part(&self, seed: u32, part: u32) -> Sampler {
         let index = (self.sample >> 1).wrapping_mul(self.lights.into()).wrapping_add(part);
         Sampler::replicate(seed, self.pixel, self.sample & 1, index)
     }
 
     /// Goes on behind the triangle of `hit` as if it were not there.
     #[cold]
-    pub(super) fn cross(&mut self, next: Ray, hit: &Hit, counters: &mut Counters) -> Option<Ray> {
+    pub(in crate::transport) fn cross(
+        &mut self,
+        next: Ray,
+        hit: &Hit,
+        counters: &mut Counters,
+    ) -> Option<Ray> {
         if u32::from(self.crossings) >= MAX_CROSSINGS {
             counters.dropped.unfinished += 1;
             return None;
@@ -103,24 +108,24 @@ impl Path {
     }
 }
 
-/// What became of the one vertex of a path at which a photon of caustics can be merged with it ([`super::merge`]).
+/// What became of the one vertex of a path at which a photon of caustics can be merged with it ([`crate::transport::caustics::merge`]).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
 #[repr(transparent)]
-pub(super) struct Merged(u16);
+pub(in crate::transport) struct Merged(u16);
 
 impl Merged {
     /// It may be still to come.
-    pub(super) const LATER: Merged = Merged(0);
+    pub(in crate::transport) const LATER: Merged = Merged(0);
     /// Photons were asked.
-    pub(super) const DONE: Merged = Merged(1);
+    pub(in crate::transport) const DONE: Merged = Merged(1);
     /// They were not, and will not be.
-    pub(super) const NEVER: Merged = Merged(2);
+    pub(in crate::transport) const NEVER: Merged = Merged(2);
     /// Photons at a surface before know what comes straight from a mirror; of other light it may be still to come.
-    pub(super) const KNOWN: Merged = Merged(3);
+    pub(in crate::transport) const KNOWN: Merged = Merged(3);
 
     /// Whether it may be still to come.
     #[inline]
-    pub(super) fn may_come(self) -> bool {
+    pub(in crate::transport) fn may_come(self) -> bool {
         self == Self::LATER || self == Self::KNOWN
     }
 }
@@ -130,28 +135,28 @@ impl Merged {
 /// rays that gather for the cache the other way round.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
 #[repr(transparent)]
-pub(super) struct Share(u32);
+pub(in crate::transport) struct Share(u32);
 
 impl Share {
-    pub(super) const ALL: Share = Share(0);
-    pub(super) const DIRECT: Share = Share(1);
-    pub(super) const REFLECTED: Share = Share(2);
+    pub(in crate::transport) const ALL: Share = Share(0);
+    pub(in crate::transport) const DIRECT: Share = Share(1);
+    pub(in crate::transport) const REFLECTED: Share = Share(2);
     /// Light straight from emitters: photons have the rest.
-    pub(super) const EMITTED: Share = Share(3);
+    pub(in crate::transport) const EMITTED: Share = Share(3);
     /// With photon maps: all but caustics. From a surface with a diffuse part; what is next that has one may end the path.
-    pub(super) const NO_CAUSTIC: Share = Share(4);
+    pub(in crate::transport) const NO_CAUSTIC: Share = Share(4);
     /// The same behind a mirror or glass, where emitters are caustics.
-    pub(super) const BEHIND_MIRROR: Share = Share(5);
+    pub(in crate::transport) const BEHIND_MIRROR: Share = Share(5);
     /// With photon maps: all light, but the next surface with a diffuse part may end the path.
-    pub(super) const GATHERED: Share = Share(6);
+    pub(in crate::transport) const GATHERED: Share = Share(6);
     /// All light but that of the lamp which a camera ray meets: its pixel has that from rays of their own.
-    pub(super) const BESIDE_LAMP: Share = Share(7);
+    pub(in crate::transport) const BESIDE_LAMP: Share = Share(7);
     /// All light but that of emitters which the eye sees, itself or by mirrors and glass.
-    pub(super) const UNSEEN: Share = Share(8);
+    pub(in crate::transport) const UNSEEN: Share = Share(8);
 
     /// Whether what `bsdf` reflects or transmits belongs to the other share.
     #[inline]
-    pub(super) fn ends_at(self, bsdf: &Bsdf) -> bool {
+    pub(in crate::transport) fn ends_at(self, bsdf: &Bsdf) -> bool {
         match self {
             Self::EMITTED => true,
             Self::DIRECT => !bsdf.is_delta(),
@@ -162,52 +167,52 @@ impl Share {
 
     /// Whether what a rough surface reflects belongs to it.
     #[inline]
-    pub(super) fn goes_on_from_rough(self) -> bool {
+    pub(in crate::transport) fn goes_on_from_rough(self) -> bool {
         self != Self::EMITTED && self != Self::DIRECT
     }
 
     /// What belongs to the path behind `bsdf`, if nobody says otherwise.
     #[inline]
-    pub(super) fn behind(self, bsdf: &Bsdf) -> Self {
+    pub(in crate::transport) fn behind(self, bsdf: &Bsdf) -> Self {
         if self == Self::UNSEEN && bsdf.is_delta() { self } else { Self::ALL }
     }
 
     /// Whether light of emitters at the end of the ray belongs to it.
     #[inline]
-    pub(super) fn sees_emitters(self) -> bool {
+    pub(in crate::transport) fn sees_emitters(self) -> bool {
         self != Self::REFLECTED && self != Self::BEHIND_MIRROR && self != Self::UNSEEN
     }
 
     /// The same of surfaces that emit.
     #[inline]
-    pub(super) fn sees_lamps(self) -> bool {
+    pub(in crate::transport) fn sees_lamps(self) -> bool {
         self.sees_emitters() && self != Self::BESIDE_LAMP
     }
 
     /// Whether the path may end in a map of photons.
     #[inline]
-    pub(super) fn gathers(self) -> bool {
+    pub(in crate::transport) fn gathers(self) -> bool {
         matches!(self, Self::REFLECTED | Self::NO_CAUSTIC | Self::BEHIND_MIRROR | Self::GATHERED)
     }
 }
 
 /// Slices for up to `capacity` paths. Rays know their path by their tag.
-pub(super) struct Wave<'m> {
-    pub(super) paths: &'m mut [Path],
+pub(in crate::transport) struct Wave<'m> {
+    pub(in crate::transport) paths: &'m mut [Path],
     /// What the paths share with their neighbours.
-    pub(super) exchanges: &'m mut [Exchange],
-    pub(super) pairs: &'m mut [Pair],
-    pub(super) rays: &'m mut [Ray],
-    pub(super) hits: &'m mut [Hit],
-    pub(super) shadow_rays: &'m mut [Ray],
+    pub(in crate::transport) exchanges: &'m mut [Exchange],
+    pub(in crate::transport) pairs: &'m mut [Pair],
+    pub(in crate::transport) rays: &'m mut [Ray],
+    pub(in crate::transport) hits: &'m mut [Hit],
+    pub(in crate::transport) shadow_rays: &'m mut [Ray],
     /// What arrives at the camera from the light at the end of the shadow ray.
-    pub(super) shadow_light: &'m mut [[f32; 3]],
-    pub(super) hidden: &'m mut [u8],
+    pub(in crate::transport) shadow_light: &'m mut [[f32; 3]],
+    pub(in crate::transport) hidden: &'m mut [u8],
 }
 
 impl<'m> Wave<'m> {
     /// `capacity` paths, or the fewest that can share.
-    pub(super) fn footprint(capacity: usize) -> Footprint {
+    pub(in crate::transport) fn footprint(capacity: usize) -> Footprint {
         let capacity = capacity.max(CIRCLE);
         Footprint::default()
             .slice::<Path>(capacity)
@@ -220,7 +225,7 @@ impl<'m> Wave<'m> {
             .slice::<u8>(capacity)
     }
 
-    pub(super) fn new(capacity: usize, arena: &mut Arena<'m>) -> Result<Self, OutOfMemory> {
+    pub(in crate::transport) fn new(capacity: usize, arena: &mut Arena<'m>) -> Result<Self, OutOfMemory> {
         let capacity = capacity.max(CIRCLE);
         Ok(Self {
             paths: arena.slice(capacity)?,

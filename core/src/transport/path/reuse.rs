@@ -17,16 +17,16 @@
 //! Where y has a coat, what its diffuse part sends back is shared, times T(to x_i) / T(to x_j), the shares that pass the
 //! coat; what the coat mirrors belongs to path j alone.
 
-use super::estimator::{Counters, MAX_CROSSINGS};
-use super::path::PathTracer;
-use super::shadow::{FEW, pass_cutout, passing};
-use super::wave::{Path, Wave};
 use crate::Rgb;
 use crate::bsdf::{Cover, Features};
 use crate::bvh::Coherence;
 use crate::film::CIRCLE;
 use crate::geometry::Ray;
 use crate::scene::SurfacePoint;
+use crate::transport::estimator::{Counters, MAX_CROSSINGS};
+use crate::transport::path::PathTracer;
+use crate::transport::path::state::{Path, Wave};
+use crate::transport::walk::visibility::{FEW, pass_cutout, passing};
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
@@ -44,7 +44,7 @@ const BEFORE_FLASHES: u32 = 16;
 /// One end of a connection. Both normals are on the side of the other end.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C)]
-pub(super) struct End {
+pub(in crate::transport) struct End {
     position: [f32; 3],
     /// Bound of the error of `position`.
     error: f32,
@@ -54,7 +54,7 @@ pub(super) struct End {
 }
 
 impl End {
-    pub(super) fn of(point: &SurfacePoint) -> Self {
+    pub(in crate::transport) fn of(point: &SurfacePoint) -> Self {
         Self {
             position: point.position.to_array(),
             error: point.error,
@@ -111,7 +111,7 @@ struct Coated {
 /// What a path offers to its circle, and what it gets.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C)]
-pub(super) struct Exchange {
+pub(in crate::transport) struct Exchange {
     x: End,
     y: End,
     /// β behind x: what radiance from y is worth in the pixel.
@@ -141,14 +141,19 @@ const LIT: u16 = 4;
 const BEHIND: u16 = 5;
 
 impl Exchange {
-    pub(super) fn new(circle: u32) -> Self {
+    pub(in crate::transport) fn new(circle: u32) -> Self {
         Self { circle, ..Self::default() }
     }
 
     /// The path scatters at a diffuse `point`, its x if it has none. Whether it has become that: it must go on for
     /// certain then, if it carries any `throughput` from there.
     #[inline]
-    pub(super) fn leave(&mut self, point: &SurfacePoint, throughput: Rgb, segments: u32) -> bool {
+    pub(in crate::transport) fn leave(
+        &mut self,
+        point: &SurfacePoint,
+        throughput: Rgb,
+        segments: u32,
+    ) -> bool {
         if self.stage != ALONE || throughput == Rgb::ZERO {
             return false;
         }
@@ -162,7 +167,12 @@ impl Exchange {
     /// The path is about to scatter at the next surface after x. Where that is fit to be met from elsewhere, it
     /// becomes y: the path then gathers for all its circle, with throughput 1.
     #[inline]
-    pub(super) fn arrive(&mut self, point: &SurfacePoint, cover: Option<Cover>, path: &mut Path) {
+    pub(in crate::transport) fn arrive(
+        &mut self,
+        point: &SurfacePoint,
+        cover: Option<Cover>,
+        path: &mut Path,
+    ) {
         if self.stage != LEAVING {
             return;
         }
@@ -181,25 +191,25 @@ impl Exchange {
 
     /// Whether the path is at a coated y.
     #[inline]
-    pub(super) fn is_lit(&self) -> bool {
+    pub(in crate::transport) fn is_lit(&self) -> bool {
         self.stage == LIT
     }
 
     /// At a coated y: which part of the light that a shadow ray brings is the base's.
     #[inline]
-    pub(super) fn light_is_of_base(&mut self, part: Rgb) {
+    pub(in crate::transport) fn light_is_of_base(&mut self, part: Rgb) {
         self.coated.of_light = part.to_array();
     }
 
     /// At a coated y: which part of what is found behind it is the base's.
     #[inline]
-    pub(super) fn path_is_of_base(&mut self, part: Rgb) {
+    pub(in crate::transport) fn path_is_of_base(&mut self, part: Rgb) {
         self.coated.of_path = part.to_array();
     }
 
     /// The path has left y: what it has gathered so far came from a light.
     #[inline]
-    pub(super) fn go_behind(&mut self, path: &mut Path) {
+    pub(in crate::transport) fn go_behind(&mut self, path: &mut Path) {
         if self.stage == LIT {
             self.divide(self.coated.of_light, path);
             self.stage = BEHIND;
@@ -236,26 +246,26 @@ impl Exchange {
 
     /// What a throughput is worth in the pixel.
     #[inline]
-    pub(super) fn worth(&self, throughput: Rgb) -> Rgb {
+    pub(in crate::transport) fn worth(&self, throughput: Rgb) -> Rgb {
         if self.stage >= OFFERING { throughput * Rgb::from(self.throughput) } else { throughput }
     }
 
     /// What the pixel sees in the end, `path` being what the path gathered.
     #[inline]
-    pub(super) fn seen(&self, path: &Path) -> Rgb {
+    pub(in crate::transport) fn seen(&self, path: &Path) -> Rgb {
         let own = if self.stage >= OFFERING { Rgb::ZERO } else { Rgb::from(path.radiance) };
         own + Rgb::from(self.radiance)
     }
 
     /// What the pixel would see if nothing were shared, before it is.
-    pub(super) fn alone(&self, path: &Path) -> Rgb {
+    pub(in crate::transport) fn alone(&self, path: &Path) -> Rgb {
         let worth = if self.stage >= OFFERING { Rgb::from(self.throughput) } else { Rgb::ONE };
         Rgb::from(self.radiance) + worth * (Rgb::from(path.radiance) + Rgb::from(self.coated.base))
     }
 
     /// Adds `light` that belongs to `path` alone, wherever it is met.
     #[inline]
-    pub(super) fn keep(&mut self, path: &mut Path, light: Rgb) {
+    pub(in crate::transport) fn keep(&mut self, path: &mut Path, light: Rgb) {
         if self.stage >= OFFERING {
             self.take(1.0, light);
         } else {
@@ -272,7 +282,7 @@ impl Exchange {
 /// That path `taking` might have met what path `offering` did.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C)]
-pub(super) struct Pair {
+pub(in crate::transport) struct Pair {
     offering: u32,
     taking: u32,
     /// V g.
@@ -288,7 +298,7 @@ impl<F: Features> PathTracer<'_, F> {
     }
 
     /// Deals out what the first `count` paths of the wave have gathered behind their y.
-    pub(super) fn share(&self, wave: &mut Wave, count: usize, counters: &mut Counters) {
+    pub(in crate::transport) fn share(&self, wave: &mut Wave, count: usize, counters: &mut Counters) {
         for (exchange, path) in wave.exchanges.iter_mut().zip(wave.paths.iter_mut()).take(count) {
             exchange.finish(path);
         }

@@ -1,12 +1,12 @@
 //! Paths that end where photons lie: reflected light by the density of photons, direct light by shadow rays.
 
-use super::radius::RadiusSchedule;
 use crate::bsdf::{Bsdf, Features};
 use crate::bvh::Bvh;
 use crate::bvh::clearance::{Clearance, ClearanceQuery};
 use crate::geometry::Ray;
 use crate::photon::{Density, FLATNESS, Fence, Kernel, PROBES, PhotonMap, QueryDisc, Uniform};
 use crate::scene::SurfacePoint;
+use crate::transport::photon_mapping::radius::RadiusSchedule;
 use crate::{Level, Rgb};
 use core::f32::consts::FRAC_1_PI;
 use glam::Vec3;
@@ -71,7 +71,7 @@ impl<'a> PhotonLight<'a> {
     /// The reflected light that `point` sends to `wo`, itself reflected, at the end of a path that has come so far from the
     /// eye; `None` where no photons are left on such a surface. `turns`, from 0 to 1, turns the probes for walls. Those are not counted as rays.
     #[inline]
-    pub(super) fn reflected<F: Features>(
+    pub(in crate::transport) fn reflected<F: Features>(
         &self,
         (bvh, level): (&Bvh, Level),
         (point, bsdf, apart): (&SurfacePoint, &Bsdf, bool),
@@ -98,11 +98,11 @@ impl<'a> PhotonLight<'a> {
 
 /// What a disc of photons sends to the eye.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Gathered {
-    pub(super) light: Rgb,
+pub(in crate::transport) struct Gathered {
+    pub(in crate::transport) light: Rgb,
     /// By how much that is too bright for its width, in the mean: what it differs by from a disc of half the radius, and
     /// what that blurs itself, a quarter of it all where light is smooth.
-    pub(super) blur: Rgb,
+    pub(in crate::transport) blur: Rgb,
 }
 
 impl Gathered {
@@ -115,17 +115,17 @@ impl Gathered {
 
 /// Photons, and whether they are those of caustics: what hangs over a disc may be what throws them there.
 #[derive(Clone, Copy)]
-pub(super) struct Light<'a> {
-    pub(super) map: &'a PhotonMap<'a>,
-    pub(super) is_caustic: bool,
+pub(in crate::transport) struct Light<'a> {
+    pub(in crate::transport) map: &'a PhotonMap<'a>,
+    pub(in crate::transport) is_caustic: bool,
     /// RadiusSchedule are no wider than it takes for so many photons.
-    pub(super) enough: f32,
+    pub(in crate::transport) enough: f32,
 }
 
 /// What `point` reflects to `wo` of the light of the photons on `disc`, as far as it is seen from there; `all` is the
 /// density of all of them, where it is known. By its base alone where it `is_varnished`.
 #[inline]
-pub(super) fn reflected<F: Features>(
+pub(in crate::transport) fn reflected<F: Features>(
     Light { map, is_caustic, enough }: Light,
     (bvh, level): (&Bvh, Level),
     (disc, all): (&QueryDisc, Option<Density>),
@@ -157,7 +157,7 @@ pub(super) fn reflected<F: Features>(
 
 /// Looks for walls on `disc`, and for its edges, by probes from `origin`, just above its middle; and for what hangs over
 /// it, but for caustics.
-pub(super) fn fence(
+pub(in crate::transport) fn fence(
     bvh: &Bvh,
     level: Level,
     (origin, is_caustic): (Vec3, bool),

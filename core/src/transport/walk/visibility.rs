@@ -1,18 +1,18 @@
 //! Rays from a surface point to a light, and what cut-outs on their way let through.
 
-use super::estimator::MAX_CROSSINGS;
 use crate::bsdf::Features;
 use crate::bvh::Bvh;
 use crate::geometry::{Hit, Ray};
 use crate::light::LightSample;
 use crate::scene::{Scene, SurfacePoint};
+use crate::transport::estimator::MAX_CROSSINGS;
 use crate::{Level, Rgb};
 use glam::Vec3;
 
 /// The ray that meets what hides the light of `sample` from `point`, and neither end. `None` where the light, moved off
 /// its surface, is no longer on the side on which it was seen: rounding may put a point of a light's own back before it.
 #[inline]
-pub(super) fn shadow_ray(point: &SurfacePoint, sample: &LightSample) -> Option<Ray> {
+pub(in crate::transport) fn shadow_ray(point: &SurfacePoint, sample: &LightSample) -> Option<Ray> {
     if let Some(target) = sample.target {
         // Off the light's surface, to the side from which it is seen.
         let end = target.position + target.error * target.normal;
@@ -26,11 +26,11 @@ pub(super) fn shadow_ray(point: &SurfacePoint, sample: &LightSample) -> Option<R
 }
 
 /// Fewer rays than this are followed one by one: a batch takes some time to set up.
-pub(super) const FEW: usize = 32;
+pub(in crate::transport) const FEW: usize = 32;
 
 /// What of `light` passes along `ray`, cut-outs included. `None` where there are too many of them. Counts the rays
 /// that this takes.
-pub(super) fn passing<F: Features>(
+pub(in crate::transport) fn passing<F: Features>(
     scene: &Scene,
     bvh: &Bvh,
     level: Level,
@@ -53,7 +53,11 @@ pub(super) fn passing<F: Features>(
 
 /// Behind the surface that a shadow ray met: the rest of the ray, and the factor on its light. `None` where
 /// nothing passes.
-pub(super) fn pass_cutout<F: Features>(scene: &Scene, ray: &Ray, hit: &Hit) -> Option<(Ray, f32)> {
+pub(in crate::transport) fn pass_cutout<F: Features>(
+    scene: &Scene,
+    ray: &Ray,
+    hit: &Hit,
+) -> Option<(Ray, f32)> {
     // Most are opaque, which is known before anything is computed.
     let triangle = scene.mesh.triangles.get(hit.triangle as usize)?;
     if !scene.materials.get(triangle.material as usize)?.has_cutout() {
@@ -75,15 +79,15 @@ pub(super) fn pass_cutout<F: Features>(scene: &Scene, ray: &Ray, hit: &Hit) -> O
 }
 
 /// Shadow rays, and what arrives at the camera from each if nothing is in its way.
-pub(super) struct Shadows<'w> {
-    pub(super) rays: &'w mut [Ray],
-    pub(super) light: &'w mut [[f32; 3]],
-    pub(super) count: usize,
+pub(in crate::transport) struct Shadows<'w> {
+    pub(in crate::transport) rays: &'w mut [Ray],
+    pub(in crate::transport) light: &'w mut [[f32; 3]],
+    pub(in crate::transport) count: usize,
 }
 
 impl Shadows<'_> {
     #[inline]
-    pub(super) fn push(&mut self, ray: Ray, light: Rgb) {
+    pub(in crate::transport) fn push(&mut self, ray: Ray, light: Rgb) {
         if let (Some(slot), Some(arrives)) = (self.rays.get_mut(self.count), self.light.get_mut(self.count)) {
             (*slot, *arrives) = (ray, light.to_array());
             self.count += 1;
