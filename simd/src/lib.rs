@@ -13,7 +13,6 @@ extern crate std;
 mod baseline;
 mod lanes;
 mod level;
-mod prefetch;
 mod stack;
 #[cfg(target_arch = "x86_64")]
 mod x86;
@@ -23,5 +22,4 @@ pub mod kernels;
 pub use baseline::{Baseline, F8, M8, Pair};
 pub use lanes::{Lanes, Mask, Simd, dot};
 pub use level::{Kernel, Level, Tier};
-pub use prefetch::prefetch;
 pub use stack::{STACK, Stack, StackMemory};

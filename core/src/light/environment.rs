@@ -16,23 +16,8 @@ impl Environment {
     /// The radiance from unit `direction`, which points away from the scene.
     #[inline]
     pub fn radiance(&self, scene: &Scene, direction: Vec3) -> Rgb {
-        self.radiance_at(scene, self.place(scene, direction))
-    }
-
-    /// Where on the map the radiance from unit `direction` is; asks for it.
-    #[inline]
-    pub(crate) fn place(&self, scene: &Scene, direction: Vec3) -> Vec2 {
-        let Some(texture) = self.texture(scene) else { return Vec2::ZERO };
-        let at = square(self.to_map * direction);
-        texture.prefetch(Vec2::new(at.x, 1.0 - at.y));
-        at
-    }
-
-    /// The radiance at a place of the map.
-    #[inline]
-    pub(crate) fn radiance_at(&self, scene: &Scene, place: Vec2) -> Rgb {
         match self.texture(scene) {
-            Some(texture) => self.looked_up(texture, place),
+            Some(texture) => self.looked_up(texture, square(self.to_map * direction)),
             None => self.radiance,
         }
     }

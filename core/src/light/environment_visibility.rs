@@ -10,7 +10,6 @@ use crate::geometry::Bounds;
 use crate::memory::{Arena, Footprint, OutOfMemory};
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
-use halflight_simd::prefetch;
 
 /// Bins across: most of the light of a sky comes from a few rows, and windows are upright.
 const COLUMNS: usize = 64;
@@ -39,15 +38,6 @@ pub struct WarpedSample {
     pub place: [f32; 2],
     /// Density of samples there, relative to sampling without the table.
     pub density: f32,
-}
-
-/// A row that a table chose.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct MarginalSample {
-    y: usize,
-    /// Where in it.
-    v: f32,
-    share: f32,
 }
 
 impl VisibilityTable {
@@ -79,32 +69,7 @@ impl VisibilityTable {
     /// there.
     #[inline]
     pub fn warp(&self, [u, v]: [f32; 2]) -> WarpedSample {
-        self.sample_in_row(u, self.sample_row(v))
-    }
-
-    /// Asks for what [`VisibilityTable::sample_row`] reads.
-    #[inline]
-    pub(crate) fn prefetch(&self) {
-        prefetch(&self.rows, 0);
-    }
-
-    /// The first half of [`VisibilityTable::warp`]. Asks for what the second reads.
-    #[inline]
-    pub(crate) fn sample_row(&self, v: f32) -> MarginalSample {
         let (y, v, share) = pick(&self.rows, v);
-        // Two cache lines.
-        prefetch(self.cells.as_flattened(), y * COLUMNS);
-        prefetch(self.cells.as_flattened(), y * COLUMNS + COLUMNS / 2);
-        MarginalSample { y, v, share }
-    }
-
-    /// The second half of [`VisibilityTable::warp`].
-    #[inline]
-    pub(crate) fn sample_in_row(
-        &self,
-        u: f32,
-        MarginalSample { y, v, share }: MarginalSample,
-    ) -> WarpedSample {
         let (x, u, cell) = pick(self.cells.get(y).unwrap_or(&self.cells[0]), u);
         let place = [(x as f32 + u) / COLUMNS as f32, (y as f32 + v) / ROWS as f32];
         let density = share * cell * (COLUMNS * ROWS) as f32;

@@ -13,7 +13,6 @@ mod tree;
 pub(crate) use emission::LightType;
 pub use emission::{DIMENSIONS as EMISSION_DIMENSIONS, EmissionSample, EmissionSampler, GuideStats};
 pub use emitted::emitted;
-pub(crate) use environment_visibility::MarginalSample;
 pub use environment_visibility::{
     Bins, EnvironmentVisibility, VisibilityGrid, VisibilityTable, WarpedSample,
 };

@@ -1,9 +1,8 @@
 //! What a surface does with light, as the scene file says it: inputs that may be textured.
 //! [`crate::bsdf`] turns a material at a hit point into a BSDF.
 
-use super::{ColorInput, ScalarInput, Scene, TextureId};
+use super::{ColorInput, ScalarInput, TextureId};
 use crate::Rgb;
-use glam::Vec2;
 
 /// How the surface scatters. `roughness` is GGX alpha in 0 … 1; a textured roughness holds sqrt(alpha),
 /// so its texel is squared after the product.
@@ -88,28 +87,6 @@ impl Material {
             two_sided: false,
             opacity: ScalarInput { value: 1.0, texture: None },
             normal_map: None,
-        }
-    }
-
-    /// Asks for the texels with which the material at texture coordinates `uv` is about to be looked up.
-    #[inline]
-    pub(crate) fn prefetch(&self, scene: &Scene, uv: Vec2) {
-        let (colors, numbers) = match &self.surface {
-            Surface::Diffuse { reflectance } | Surface::Mirror { reflectance } => {
-                ([reflectance.texture, None], [None; 2])
-            }
-            Surface::Conductor { reflectance, roughness } => {
-                ([reflectance.texture, None], [roughness.texture, None])
-            }
-            Surface::Glossy { base, specular, roughness, metallic, .. } => {
-                ([base.texture, specular.texture], [roughness.texture, metallic.texture])
-            }
-            Surface::Dielectric { roughness, .. } => ([None; 2], [roughness.texture, None]),
-        };
-        let numbers = [numbers[0], numbers[1], self.opacity.texture];
-        let all = colors.into_iter().flatten().chain(numbers.into_iter().flatten().map(|(id, _)| id));
-        for texture in all.filter_map(|id| scene.textures.get(id.0 as usize)) {
-            texture.prefetch(uv);
         }
     }
 

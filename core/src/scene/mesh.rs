@@ -2,7 +2,6 @@
 
 use bytemuck::{Pod, Zeroable};
 use glam::{Vec2, Vec3};
-use halflight_simd::prefetch;
 
 /// Three vertices, counter-clockwise seen from the front, and what they are made of.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
@@ -40,23 +39,6 @@ impl<'a> Mesh<'a> {
             t.vertices.iter().any(|&v| v as usize >= vertices) || t.material as usize >= materials
         };
         self.triangles.iter().position(broken).map_or(Ok(()), Err)
-    }
-
-    /// Asks for the record of a triangle that is about to be needed.
-    #[inline]
-    pub(crate) fn prefetch_triangle(&self, index: u32) {
-        prefetch(self.triangles, index as usize);
-    }
-
-    /// Asks for the corners of a triangle that is about to be needed, whose record has arrived.
-    #[inline]
-    pub(crate) fn prefetch_corners(&self, index: u32) {
-        let Some(triangle) = self.triangles.get(index as usize) else { return };
-        for vertex in triangle.vertices {
-            prefetch(self.positions, vertex as usize);
-            prefetch(self.normals, vertex as usize);
-            prefetch(self.texcoords, vertex as usize);
-        }
     }
 
     /// Corner positions of triangle `index`; zeros where the mesh has no such triangle or vertex.

@@ -2,7 +2,6 @@
 //! wild, panics: coordinates that are not finite count as 0, a texture without texels is white.
 
 use glam::{Vec2, Vec3, Vec4};
-use halflight_simd::prefetch;
 
 /// Index into the textures of the scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -82,22 +81,6 @@ impl Texture<'_> {
         let upper = self.texel(top + x0).lerp(self.texel(top + x1), fx);
         let lower = self.texel(bottom + x0).lerp(self.texel(bottom + x1), fx);
         upper.lerp(lower, fy).to_array()
-    }
-
-    /// Asks for the texels that [`Texture::lookup`] is about to need.
-    #[inline]
-    pub(crate) fn prefetch(&self, uv: Vec2) {
-        let uv = self.transform.at(uv);
-        let (x, ..) = self.wrap.neighbours(uv.x, self.width);
-        let (y0, y1, _) = self.wrap.neighbours(1.0 - uv.y, self.height);
-        for row in [y0, y1] {
-            let index = row as usize * self.width as usize + x as usize;
-            match self.texels {
-                Texels::Srgb8(texels) | Texels::Linear8(texels) => prefetch(texels, index),
-                Texels::Float(texels) => prefetch(texels, index),
-                Texels::Number(texels) => prefetch(texels, index),
-            }
-        }
     }
 
     /// Slope (∂/∂u, ∂/∂v) of the red channel at `uv`, per unit of the texture's own coordinates: central

@@ -3,16 +3,16 @@
 
 use super::PathTracer;
 use super::shade::{Known, Vertex};
+use super::shadow_rays::{Shadows, TO_ENVIRONMENT};
 use crate::Rgb;
 use crate::bsdf::Features;
 use crate::geometry::Ray;
 use crate::light::LightSample;
 use crate::transport::caustics::merge::ChainLink;
 use crate::transport::estimator::{dimension, environment_heuristic, power_heuristic};
-use crate::transport::path::deferred_escapes::TO_ENVIRONMENT;
 use crate::transport::path::reuse::Exchange;
 use crate::transport::path::state::Path;
-use crate::transport::walk::visibility::{Shadows, shadow_ray};
+use crate::transport::walk::visibility::shadow_ray;
 use glam::Vec3;
 
 impl<F: Features> PathTracer<'_, F> {
@@ -30,15 +30,18 @@ impl<F: Features> PathTracer<'_, F> {
         if self.lights.is_empty() || vertex.bsdf.is_delta() || !is_left {
             return;
         }
-        let (met, point, normal) = (vertex.met, vertex.point, vertex.normal);
+        let (point, normal) = (vertex.point, vertex.normal);
         // A visibility table is of one side.
-        let aim = met.aim.filter(|_| normal != Vec3::ZERO);
+        let table = if normal == Vec3::ZERO {
+            None
+        } else {
+            self.lights.visibility(point.position, point.frame.normal)
+        };
         for part in 0..known.points {
             let is_several = known.points > 1;
             let sampler = if is_several { path.part(self.settings.seed, part) } else { vertex.sampler };
-            let [u, v] = if is_several { sampler.pair(vertex.first + dimension::LIGHT) } else { met.light };
-            let again = || aim.and(met.window).map(|window| window.sample_in_row(u, window.sample_row(v)));
-            let aim = if is_several { again() } else { aim };
+            let [u, v] = sampler.pair(vertex.first + dimension::LIGHT);
+            let aim = table.map(|table| table.warp([u, v]));
             let choice = if self.lights.have_choice() {
                 sampler.single(vertex.first + dimension::LIGHT_CHOICE)
             } else {

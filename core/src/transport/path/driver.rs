@@ -2,14 +2,13 @@
 //! (pbrt-v4, chapter 15). Queues are compacted in place: the ray of a path that goes on overwrites one that was already
 //! shaded.
 
+use super::shadow_rays::Shadows;
 use super::{BLOCK, LIGHT_SAMPLES, PathTracer, SurfaceInteraction};
 use crate::bsdf::Features;
 use crate::bvh::Coherence;
-use crate::sampling::Sampler;
 use crate::scene::SurfacePoint;
-use crate::transport::estimator::{Counters, dimension};
+use crate::transport::estimator::Counters;
 use crate::transport::path::state::Wave;
-use crate::transport::walk::visibility::Shadows;
 use core::ops::Range;
 
 impl<'a, F: Features> PathTracer<'a, F> {
@@ -82,8 +81,7 @@ impl<'a, F: Features> PathTracer<'a, F> {
         going_on
     }
 
-    /// What the rays of `range` have met. All that is read next, of these and of those after them, is asked for first:
-    /// the memory that vertices need is scattered over the scene, and waiting for it would be half of the time.
+    /// The surface points that the rays of `range` have met, with what caches know of them.
     #[inline]
     fn prepare_block(
         &self,
@@ -92,34 +90,10 @@ impl<'a, F: Features> PathTracer<'a, F> {
         block: &mut [Option<SurfaceInteraction<'a>>; BLOCK],
         counters: &mut Counters,
     ) {
-        let mesh = &self.scene.mesh;
-        for hit in wave.hits.iter().skip(range.end + BLOCK).take(BLOCK) {
-            mesh.prefetch_triangle(hit.triangle);
-        }
-        for hit in wave.hits.iter().skip(range.end).take(BLOCK) {
-            mesh.prefetch_corners(hit.triangle);
-        }
         let met = wave.rays[range.clone()].iter().zip(&wave.hits[range.clone()]);
         for ((ray, hit), met) in met.zip(block.iter_mut()) {
             let point = SurfacePoint::at::<F>(self.scene, ray, hit);
-            *met = point.zip(wave.paths.get(ray.tag as usize)).map(|(point, path)| {
-                if F::TEXTURES {
-                    point.material.prefetch(self.scene, point.uv);
-                }
-                let window = self.lights.visibility(point.position, point.frame.normal);
-                if let Some(window) = window {
-                    window.prefetch();
-                }
-                let sampler = Sampler::new(self.settings.seed, path.pixel, path.sample);
-                let light = sampler.pair(dimension::vertex(path.segments.into()) + dimension::LIGHT);
-                SurfaceInteraction { point, light, window, row: None, aim: None, indirect: None }
-            });
-        }
-        for met in block.iter_mut().flatten() {
-            met.row = met.window.map(|window| window.sample_row(met.light[1]));
-        }
-        for met in block.iter_mut().flatten() {
-            met.aim = met.window.zip(met.row).map(|(window, row)| window.sample_in_row(met.light[0], row));
+            *met = point.map(|point| SurfaceInteraction { point, indirect: None });
         }
         if let Some(caches) = self.caches {
             self.ask(caches, wave, range, block, counters);

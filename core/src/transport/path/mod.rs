@@ -18,7 +18,6 @@
 //! its circle only, no wave cuts a circle, and samples are summed in their order: the picture has the same bits for
 //! any size of wave and any distribution of tasks.
 
-pub(in crate::transport) mod deferred_escapes;
 mod direct;
 mod driver;
 pub(in crate::transport) mod pixels;
@@ -38,7 +37,7 @@ use crate::bvh::Bvh;
 use crate::cache::irradiance::{CachedIrradiance, IrradianceCache, POINTS};
 use crate::film::Tile;
 use crate::geometry::Ray;
-use crate::light::{LightSampler, MarginalSample, VisibilityTable, WarpedSample};
+use crate::light::LightSampler;
 use crate::memory::Footprint;
 use crate::sampling::Sampler;
 use crate::scene::{Material, Scene, SurfacePoint};
@@ -186,12 +185,6 @@ impl<'a, F: Features> PathTracer<'a, F> {
 #[derive(Clone, Copy)]
 pub(super) struct SurfaceInteraction<'a> {
     pub(super) point: SurfacePoint<'a>,
-    /// Where light is looked for.
-    light: [f32; 2],
-    /// The same through the window, found step by step, so that nobody waits for memory.
-    window: Option<&'a VisibilityTable>,
-    row: Option<MarginalSample>,
-    aim: Option<WarpedSample>,
     /// What a cache says of it.
     pub(super) indirect: Option<CachedIrradiance>,
 }

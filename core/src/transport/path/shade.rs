@@ -1,6 +1,7 @@
 //! One vertex of a path, in the order of the textbook: light that escapes to the environment, emission of the surface,
 //! light that a structure knows, next-event estimation (`direct.rs`), the next direction (`scatter.rs`).
 
+use super::shadow_rays::Shadows;
 use super::{PathTracer, SurfaceInteraction};
 use crate::Rgb;
 use crate::bsdf::{Bsdf, Features};
@@ -12,7 +13,6 @@ use crate::transport::estimator::{Counters, dimension, environment_heuristic, po
 use crate::transport::path::reuse::Exchange;
 use crate::transport::path::state::{Merged, Path, Share};
 use crate::transport::photon_mapping::final_gather::Said;
-use crate::transport::walk::visibility::Shadows;
 use core::f32::consts::FRAC_1_PI;
 use glam::Vec3;
 

@@ -4,10 +4,42 @@ use super::PathTracer;
 use crate::Rgb;
 use crate::bsdf::Features;
 use crate::bvh::Coherence;
+use crate::geometry::Ray;
+use crate::scene::Scene;
 use crate::transport::estimator::{Counters, MAX_CROSSINGS};
-use crate::transport::path::deferred_escapes::Arrivals;
-use crate::transport::path::state::Wave;
+use crate::transport::path::state::{Path, Wave};
 use crate::transport::walk::visibility::{FEW, pass_cutout, passing};
+
+/// In the tag of a shadow ray: it goes to the environment, whose radiance is looked up when it has arrived. Most are
+/// hidden, and a map is large.
+pub(super) const TO_ENVIRONMENT: u32 = 1 << 31;
+
+/// Adds the light at the end of shadow ray `ray`, which met nothing, to its path.
+#[inline]
+fn arrive(scene: &Scene, paths: &mut [Path], ray: &Ray, light: Rgb) {
+    let environment = scene.environment.as_ref().filter(|_| ray.tag & TO_ENVIRONMENT != 0);
+    let radiance = environment.map_or(Rgb::ONE, |e| e.radiance(scene, ray.direction.into()));
+    if let Some(path) = paths.get_mut((ray.tag & !TO_ENVIRONMENT) as usize) {
+        path.add(light * radiance);
+    }
+}
+
+/// Shadow rays, and what arrives at the camera from each if nothing is in its way.
+pub(super) struct Shadows<'w> {
+    pub(super) rays: &'w mut [Ray],
+    pub(super) light: &'w mut [[f32; 3]],
+    pub(super) count: usize,
+}
+
+impl Shadows<'_> {
+    #[inline]
+    pub(super) fn push(&mut self, ray: Ray, light: Rgb) {
+        if let (Some(slot), Some(arrives)) = (self.rays.get_mut(self.count), self.light.get_mut(self.count)) {
+            (*slot, *arrives) = (ray, light.to_array());
+            self.count += 1;
+        }
+    }
+}
 
 impl<F: Features> PathTracer<'_, F> {
     /// Adds the light at the end of the first `shadows` shadow rays to the paths of those that arrive.
@@ -15,13 +47,11 @@ impl<F: Features> PathTracer<'_, F> {
         let rays = &wave.shadow_rays[..shadows];
         let hidden = &mut wave.hidden[..shadows];
         self.bvh.occluded_batch(self.level, rays, hidden);
-        let mut arrivals = Arrivals::default();
         for ((ray, light), hidden) in rays.iter().zip(&*wave.shadow_light).zip(&*hidden) {
             if *hidden == 0 {
-                arrivals.push(self.scene, wave.paths, ray, Rgb::from(*light));
+                arrive(self.scene, wave.paths, ray, Rgb::from(*light));
             }
         }
-        arrivals.receive(self.scene, wave.paths);
     }
 
     /// The same where some surfaces let a part of the light through: round after round, each ray to
@@ -32,7 +62,6 @@ impl<F: Features> PathTracer<'_, F> {
         mut shadows: usize,
         counters: &mut Counters,
     ) {
-        let mut arrivals = Arrivals::default();
         for _ in 0..=MAX_CROSSINGS {
             if shadows <= FEW {
                 break;
@@ -46,7 +75,7 @@ impl<F: Features> PathTracer<'_, F> {
                 let (ray, light) = (wave.shadow_rays[i], Rgb::from(wave.shadow_light[i]));
                 let hit = wave.hits[i];
                 if !hit.is_some() {
-                    arrivals.push(self.scene, wave.paths, &ray, light);
+                    arrive(self.scene, wave.paths, &ray, light);
                 } else if let Some((through, transmittance)) = pass_cutout::<F>(self.scene, &ray, &hit) {
                     wave.shadow_rays[left] = through;
                     wave.shadow_light[left] = (light * transmittance).to_array();
@@ -60,9 +89,8 @@ impl<F: Features> PathTracer<'_, F> {
             let light = passing::<F>(self.scene, self.bvh, self.level, *ray, Rgb::from(*light), rays);
             counters.dropped.unfinished += u64::from(light.is_none());
             if let Some(light) = light.filter(|light| *light != Rgb::ZERO) {
-                arrivals.push(self.scene, wave.paths, ray, light);
+                arrive(self.scene, wave.paths, ray, light);
             }
         }
-        arrivals.receive(self.scene, wave.paths);
     }
 }

@@ -77,20 +77,3 @@ pub(in crate::transport) fn pass_cutout<F: Features>(
         (Ray { tag: ray.tag, ..rest }, transmittance)
     })
 }
-
-/// Shadow rays, and what arrives at the camera from each if nothing is in its way.
-pub(in crate::transport) struct Shadows<'w> {
-    pub(in crate::transport) rays: &'w mut [Ray],
-    pub(in crate::transport) light: &'w mut [[f32; 3]],
-    pub(in crate::transport) count: usize,
-}
-
-impl Shadows<'_> {
-    #[inline]
-    pub(in crate::transport) fn push(&mut self, ray: Ray, light: Rgb) {
-        if let (Some(slot), Some(arrives)) = (self.rays.get_mut(self.count), self.light.get_mut(self.count)) {
-            (*slot, *arrives) = (ray, light.to_array());
-            self.count += 1;
-        }
-    }
-}
