@@ -253,7 +253,7 @@ impl<F: Features> Cached<'_, F> {
                 tracer = tracer.with_caustics(photons.merging());
             }
             let until = haste.and_then(|haste| haste.end(i));
-            let overture = Overture { tracer: &tracer, gathering: *gathering, coarse: *coarse, size: *size };
+            let overture = Overture { tracer: &tracer, gathering: *gathering, coarse, size: *size };
             if !crew.hurry(until, |crew| overture.fill(half, crew, scratch))? {
                 if crew.is_over() {
                     all = false;
