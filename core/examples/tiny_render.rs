@@ -8,7 +8,7 @@ use halflight_core::film::{Film, PIXELS_PER_TILE};
 use halflight_core::light::LightSampler;
 use halflight_core::memory::{Arena, Line, OutOfMemory};
 use halflight_core::scene::{Camera, Material, Mesh, Scene, Triangle};
-use halflight_core::transport::{PathSettings, PathTracer};
+use halflight_core::transport::{PathIntegrator, PathSettings};
 use halflight_core::{Level, Rgb};
 
 /// Pixels across and down.
@@ -54,7 +54,7 @@ pub fn render(memory: &mut [Line; LINES], pixels: &mut [Rgb; SIZE * SIZE]) -> Re
     let mut film = Film::new(SIZE as u32, SIZE as u32, &mut arena)?;
     let settings =
         PathSettings { width: SIZE as u32, height: SIZE as u32, seed: 1, max_depth: 8, reuse: true };
-    let tracer = PathTracer::<DiffuseOnly>::new(&scene, &bvh, &lights, settings, Level::BASELINE);
+    let tracer = PathIntegrator::<DiffuseOnly>::new(&scene, &bvh, &lights, settings, Level::BASELINE);
     for (task, tile) in film.pixels_mut().chunks_mut(PIXELS_PER_TILE).enumerate() {
         tracer.run(task, 0..PATHS, 64, &mut arena, tile)?;
     }

@@ -12,9 +12,9 @@ use halflight_core::memory::{Arena, Footprint, Line};
 use halflight_core::photon::{Photon, Photons};
 use halflight_core::scene::PointLight;
 use halflight_core::scene::{Camera, Material, Scene, Surface};
-use halflight_core::transport::caustics::tracer::{CausticShooter, Find, PATHS, ROOM};
-use halflight_core::transport::photon_mapping::deposit::{Keep, ShootSettings};
-use halflight_core::transport::{Merging, PathSettings, PathTracer, RadiusSchedule, UNLIMITED};
+use halflight_core::transport::caustics::tracer::{CausticPhotonTracer, GuideSample, PATHS, ROOM};
+use halflight_core::transport::photon_mapping::deposit::{PhotonFilter, PhotonTracerSettings};
+use halflight_core::transport::{CausticMerging, PathIntegrator, PathSettings, RadiusSchedule, UNLIMITED};
 use halflight_core::{Level, Rgb};
 use halflight_tests::render::{has_photons, render};
 use halflight_tests::scenes::{
@@ -59,16 +59,21 @@ fn pictures(scene: &Scene, first: u32, (tasks, pixels, is_beside): Shot, max_dep
     let mut emission_lines = lines(EmissionSampler::footprint(&lights));
     let emission =
         EmissionSampler::build(scene, &lights, &bvh.bounds(), &mut arena(&mut emission_lines)).unwrap();
-    let mut scratch = lines(PathTracer::<All>::scratch(2048).or(CausticShooter::<All>::scratch()));
+    let mut scratch = lines(PathIntegrator::<All>::scratch(2048).or(CausticPhotonTracer::<All>::scratch()));
     let mut scratch = arena(&mut scratch);
     let mut film_lines = lines(Film::footprint(SIZE, SIZE));
     let mut photon_lines = [0, 1].map(|_| lines(Photons::footprint(tasks * ROOM)));
     let one = |seed: u32| {
         let paths = (tasks * PATHS) as u32;
         let discs = RadiusSchedule::new((scene, &bvh), [SIZE; 2], level).of_pixels(pixels);
-        let shot = ShootSettings { keep: Keep::Caustic, seed, paths, max_depth };
-        let shooter =
-            CausticShooter::<All>::new((scene, &bvh, &lights), &emission, shot, (discs, [SIZE; 2]), level);
+        let shot = PhotonTracerSettings { keep: PhotonFilter::Caustic, seed, paths, max_depth };
+        let shooter = CausticPhotonTracer::<All>::new(
+            (scene, &bvh, &lights),
+            &emission,
+            shot,
+            (discs, [SIZE; 2]),
+            level,
+        );
         let shooter = shooter.beside_records(is_beside);
         let [even, odd] = &mut photon_lines;
         let mut map = 0;
@@ -82,10 +87,10 @@ fn pictures(scene: &Scene, first: u32, (tasks, pixels, is_beside): Shot, max_dep
         };
         let maps = [shoot(even), shoot(odd)];
         let settings = PathSettings { width: SIZE, height: SIZE, seed, max_depth, reuse: false };
-        let mut tracer = PathTracer::<All>::new(scene, &bvh, &lights, settings, level);
+        let mut tracer = PathIntegrator::<All>::new(scene, &bvh, &lights, settings, level);
         if tasks > 0 {
             assert!(tasks == 1 || is_beside || !maps[0].is_empty());
-            let merging = Merging::new([&maps[0], &maps[1]], &emission, discs, paths);
+            let merging = CausticMerging::new([&maps[0], &maps[1]], &emission, discs, paths);
             tracer = tracer.with_caustics(merging.beside_records(is_beside));
         }
         let mut film = Film::new(SIZE, SIZE, &mut arena(&mut film_lines)).unwrap();
@@ -450,21 +455,26 @@ fn in_a_stadium_photons_go_to_the_glass_and_their_power_is_right() {
     let plain = EmissionSampler::build(&scene, &lights, &bvh.bounds(), &mut memory).unwrap();
     let mut worth = GuideStats::aimed(&scene, &lights, &plain, &mut memory).unwrap().unwrap();
     let aimed = worth.guide(&plain, &mut memory).unwrap();
-    let mut scratch = lines(CausticShooter::<All>::scratch());
+    let mut scratch = lines(CausticPhotonTracer::<All>::scratch());
     let mut scratch = arena(&mut scratch);
     const TASKS: usize = 64;
     const MAPS: u32 = 16;
     // No further than to the caustic: what that lights is not of its power.
-    let shot = ShootSettings { keep: Keep::Caustic, seed: 3, paths: (TASKS * PATHS) as u32, max_depth: 3 };
+    let shot = PhotonTracerSettings {
+        keep: PhotonFilter::Caustic,
+        seed: 3,
+        paths: (TASKS * PATHS) as u32,
+        max_depth: 3,
+    };
     let discs = RadiusSchedule::new((&scene, &bvh), [SIZE; 2], level);
     let shooter = |emission| {
         let frame = (discs, [SIZE; 2]);
-        CausticShooter::<All>::new((&scene, &bvh, &lights), emission, shot, frame, level)
+        CausticPhotonTracer::<All>::new((&scene, &bvh, &lights), emission, shot, frame, level)
     };
     let look = |emission, map, worth: &mut GuideStats, scratch: &mut Arena| {
         let shooter = shooter(emission);
         for task in 0..TASKS / 2 {
-            let mut finds = [Find::default(); PATHS];
+            let mut finds = [GuideSample::default(); PATHS];
             shooter.look(task, map, scratch, &mut finds).unwrap();
             finds.iter().for_each(|find| worth.learn(find.cell, find.worth));
         }

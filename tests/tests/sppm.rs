@@ -12,7 +12,9 @@ use halflight_core::memory::{Arena, Footprint, Line};
 use halflight_core::photon::{Photon, Photons};
 use halflight_core::scene::{Camera, Material, Scene, Surface};
 use halflight_core::transport::UNLIMITED;
-use halflight_core::transport::photon_mapping::deposit::{Keep, PATHS, ROOM, ShootSettings, Shooter};
+use halflight_core::transport::photon_mapping::deposit::{
+    PATHS, PhotonFilter, PhotonTracer, PhotonTracerSettings, ROOM,
+};
 use halflight_core::{Level, Rgb};
 use halflight_tests::render::{difference, render};
 use halflight_tests::scenes::{
@@ -39,10 +41,14 @@ fn photons(scene: &Scene, tasks: usize) -> Vec<Photon> {
     let mut emission_lines = lines(EmissionSampler::footprint(&lights));
     let mut arena = Arena::new(bytemuck::cast_slice_mut(&mut emission_lines));
     let emission = EmissionSampler::build(scene, &lights, &bvh.bounds(), &mut arena).unwrap();
-    let settings =
-        ShootSettings { keep: Keep::Reflected, seed: 1, paths: (tasks * PATHS) as u32, max_depth: UNLIMITED };
-    let shooter = Shooter::<All>::new(scene, &bvh, &lights, &emission, settings, Level::detect());
-    let mut scratch = lines(Shooter::<All>::scratch());
+    let settings = PhotonTracerSettings {
+        keep: PhotonFilter::Reflected,
+        seed: 1,
+        paths: (tasks * PATHS) as u32,
+        max_depth: UNLIMITED,
+    };
+    let shooter = PhotonTracer::<All>::new(scene, &bvh, &lights, &emission, settings, Level::detect());
+    let mut scratch = lines(PhotonTracer::<All>::scratch());
     let mut scratch = Arena::new(bytemuck::cast_slice_mut(&mut scratch));
     let mut all = vec![Photon::NONE; tasks * ROOM];
     for (task, out) in all.chunks_mut(ROOM).enumerate() {

@@ -11,10 +11,10 @@ use halflight_core::film::Film;
 use halflight_core::light::LightSampler;
 use halflight_core::memory::{Arena, Footprint, Line};
 use halflight_core::scene::Scene;
-use halflight_core::transport::cached::gather::{Gathering, Place};
-use halflight_core::transport::cached::placement::{Order, PIXELS, Sight};
+use halflight_core::transport::cached::gather::{GatherPoint, Gathering};
+use halflight_core::transport::cached::placement::{PIXELS, ProgressiveOrder, Via};
 use halflight_core::transport::path::reference;
-use halflight_core::transport::{Counters, PathSettings, PathTracer, UNLIMITED};
+use halflight_core::transport::{Counters, PathIntegrator, PathSettings, UNLIMITED};
 use halflight_tests::scenes::{cornell_box, everything, room_with_lamp};
 
 /// Mean radiance of the box, from 4 million paths that sampled the lamp uniformly by area.
@@ -66,9 +66,9 @@ fn the_wavefront_is_the_textbook_to_the_bit_for_any_wave() {
         let mut light_lines = lines(LightSampler::footprint(&scene).and(LightSampler::scratch(&scene)));
         let lights =
             LightSampler::build(&scene, &mut Arena::new(bytemuck::cast_slice_mut(&mut light_lines))).unwrap();
-        let tracer = PathTracer::<All>::new(&scene, &bvh, &lights, settings, Level::detect());
+        let tracer = PathIntegrator::<All>::new(&scene, &bvh, &lights, settings, Level::detect());
         for wave in [1, 100, 5000] {
-            let mut scratch = lines(PathTracer::<All>::scratch(wave));
+            let mut scratch = lines(PathIntegrator::<All>::scratch(wave));
             let mut scratch = Arena::new(bytemuck::cast_slice_mut(&mut scratch));
             let mut film_lines = lines(Film::footprint(24, 20));
             let mut film =
@@ -87,7 +87,7 @@ fn the_wavefront_is_the_textbook_to_the_bit_for_any_wave() {
 }
 
 /// A path tracer of the box, of 16 x 16 pixels.
-fn in_the_box(work: impl FnOnce(&PathTracer<All>)) {
+fn in_the_box(work: impl FnOnce(&PathIntegrator<All>)) {
     let buffers = cornell_box();
     let scene = buffers.scene();
     let settings = PathSettings { width: 16, height: 16, seed: 0, max_depth: UNLIMITED, reuse: false };
@@ -96,13 +96,13 @@ fn in_the_box(work: impl FnOnce(&PathTracer<All>)) {
     let mut light_lines = lines(LightSampler::footprint(&scene).and(LightSampler::scratch(&scene)));
     let lights =
         LightSampler::build(&scene, &mut Arena::new(bytemuck::cast_slice_mut(&mut light_lines))).unwrap();
-    work(&PathTracer::new(&scene, &bvh, &lights, settings, Level::detect()));
+    work(&PathIntegrator::new(&scene, &bvh, &lights, settings, Level::detect()));
 }
 
 #[test]
 fn scratch_is_exactly_what_it_says() {
     in_the_box(|tracer| {
-        let mut scratch = lines(PathTracer::<All>::scratch(100));
+        let mut scratch = lines(PathIntegrator::<All>::scratch(100));
         let mut pixels = vec![Default::default(); 256];
         let bytes: &mut [u8] = bytemuck::cast_slice_mut(&mut scratch);
         assert!(tracer.run(0, 0..1, 100, &mut Arena::new(bytes), &mut pixels).is_ok());
@@ -115,8 +115,14 @@ fn scratch_is_exactly_what_it_says() {
 #[test]
 fn a_gathering_does_not_know_what_its_memory_was() {
     in_the_box(|tracer| {
-        let mut places = [Place::NONE; PIXELS];
-        tracer.places(&Order::new(16, 16, 1), 0, (0, Sight::Clear), &mut places, &mut Counters::default());
+        let mut places = [GatherPoint::NONE; PIXELS];
+        tracer.places(
+            &ProgressiveOrder::new(16, 16, 1),
+            0,
+            (0, Via::Specular),
+            &mut places,
+            &mut Counters::default(),
+        );
         let place = places.iter().find(|place| place.is_some()).unwrap();
         for n in [8, 16, 64] {
             let mut tables = lines(CellFlux::footprint(n));
@@ -124,7 +130,7 @@ fn a_gathering_does_not_know_what_its_memory_was() {
             let metric = metric::Settings::new(Metric::Halflight, 1.0);
             let gathering = Gathering { flux: &flux, metric, least_pixels: 1.0 };
             let gather = |left_over: u8| {
-                let mut scratch = lines(PathTracer::<All>::gather_scratch(n));
+                let mut scratch = lines(PathIntegrator::<All>::gather_scratch(n));
                 scratch.fill(Line([left_over; 64]));
                 let mut arena = Arena::new(bytemuck::cast_slice_mut(&mut scratch));
                 let record = tracer.gather(place, 0, &gathering, &mut arena, &mut Counters::default());

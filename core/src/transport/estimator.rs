@@ -162,7 +162,7 @@ const ENDLESS: u32 = 2048;
 /// The probability with which a path of `segments` segments goes on, which carries `throughput` (without the
 /// factor of refraction, which comes back where the light leaves the glass).
 #[inline]
-pub(super) fn survival(segments: u32, throughput: Rgb) -> f32 {
+pub(super) fn continuation_probability(segments: u32, throughput: Rgb) -> f32 {
     let most = match segments {
         0..CERTAIN_BELOW => 1.0,
         CERTAIN_BELOW..ENDLESS => 1.0 - 1.0 / segments as f32,

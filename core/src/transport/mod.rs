@@ -13,9 +13,9 @@ pub mod photon_mapping;
 mod prepass;
 mod walk;
 
-pub use caustics::merge::Merging;
+pub use caustics::merge::CausticMerging;
 pub use estimator::{Counters, PathSettings, UNLIMITED};
-pub use path::PathTracer;
+pub use path::PathIntegrator;
 pub use path::reuse_pilot::Pilot;
 pub use photon_mapping::density::PhotonLight;
 pub use photon_mapping::radius::RadiusSchedule;

@@ -7,7 +7,7 @@ use core::time::Duration;
 use halflight_core::bsdf::Features;
 use halflight_core::film::Pixel;
 use halflight_core::memory::{Arena, Line};
-use halflight_core::transport::PathTracer;
+use halflight_core::transport::PathIntegrator;
 use std::time::Instant;
 
 /// How long pixels are path traced where there is no sample.
@@ -24,12 +24,12 @@ pub(super) type Sketch<'a> = dyn Fn(&Workers) -> Vec<Sketched> + 'a;
 
 /// The sketch of what `tracer` sees: pixels that are spread evenly, ever more of them as long as there is time.
 pub(super) fn sketch<F: Features>(
-    tracer: &PathTracer<F>,
+    tracer: &PathIntegrator<F>,
     size: [u32; 2],
     workers: &Workers,
 ) -> Vec<([u32; 2], [f32; 3])> {
     let end = Instant::now() + SKETCHING;
-    let count = PathTracer::<F>::scratch(WAVE).bytes().div_ceil(size_of::<Line>());
+    let count = PathIntegrator::<F>::scratch(WAVE).bytes().div_ceil(size_of::<Line>());
     let mut scratch = vec![vec![Line([0; 64]); count]; workers.count()];
     let mut all = Vec::new();
     let mut step = size[0].max(size[1]).next_power_of_two();

@@ -6,9 +6,9 @@ use halflight_core::Rgb;
 use halflight_core::bsdf::Features;
 use halflight_core::cache::irradiance::{CellFlux, Metric, metric};
 use halflight_core::memory::{Arena, Line};
-use halflight_core::transport::cached::gather::{Gathering, Place};
-use halflight_core::transport::cached::placement::{Order, PIXELS, Sight};
-use halflight_core::transport::{Counters, PathTracer};
+use halflight_core::transport::cached::gather::{GatherPoint, Gathering};
+use halflight_core::transport::cached::placement::{PIXELS, ProgressiveOrder, Via};
+use halflight_core::transport::{Counters, PathIntegrator};
 
 /// Rays along a side of a gathering at such a point.
 pub(super) const EXACT: usize = 64;
@@ -18,7 +18,7 @@ const SAMPLE: u32 = 1000;
 
 /// See the file.
 pub(super) struct Point {
-    pub(super) place: Place,
+    pub(super) place: GatherPoint,
     /// Column and row.
     pub(super) pixel: [u32; 2],
     /// Luminance of the irradiance.
@@ -40,18 +40,18 @@ pub(super) fn stride([width, height]: [u32; 2], points: u32) -> u32 {
 /// About `points` points, spread evenly over the picture; at each is gathered `repeats` times, at least twice.
 /// `None` where `is_over` says so before.
 pub(super) fn held_out<F: Features>(
-    tracer: &PathTracer<F>,
+    tracer: &PathIntegrator<F>,
     size: [u32; 2],
     [points, repeats]: [u32; 2],
     (workers, is_over): (&Workers, &(dyn Fn() -> bool + Sync)),
     scratch: &mut [Vec<Line>],
 ) -> Result<Option<Vec<Point>>, RenderError> {
     let [width, height] = size;
-    let order = Order::new(width, height, stride(size, points));
-    let mut places = vec![Place::NONE; order.len() as usize];
-    let look = |task: usize, _: &mut Arena, out: &mut [Place]| {
+    let order = ProgressiveOrder::new(width, height, stride(size, points));
+    let mut places = vec![GatherPoint::NONE; order.len() as usize];
+    let look = |task: usize, _: &mut Arena, out: &mut [GatherPoint]| {
         let mut counters = Counters::default();
-        tracer.places(&order, (task * PIXELS) as u64, (SAMPLE, Sight::Clear), out, &mut counters);
+        tracer.places(&order, (task * PIXELS) as u64, (SAMPLE, Via::Specular), out, &mut counters);
         tracer.look_up(out, &mut counters);
         Ok(counters)
     };
@@ -90,7 +90,7 @@ pub(super) fn held_out<F: Features>(
     if !workers.pass(&mut known, 1, scratch, is_over, &gather)?.1 {
         return Ok(None);
     }
-    let point = |((place, pixel), known): ((Place, [u32; 2]), Option<[f64; 2]>)| {
+    let point = |((place, pixel), known): ((GatherPoint, [u32; 2]), Option<[f64; 2]>)| {
         known.map(|[exact, variance]| Point { place, pixel, exact, variance })
     };
     Ok(Some(places.into_iter().zip(known).filter_map(point).collect()))

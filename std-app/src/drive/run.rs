@@ -19,7 +19,7 @@ use halflight_core::film::Film;
 use halflight_core::light::LightSampler;
 use halflight_core::memory::{Arena, Footprint};
 use halflight_core::scene::Scene;
-use halflight_core::transport::{PathSettings, PathTracer, UNLIMITED};
+use halflight_core::transport::{PathIntegrator, PathSettings, UNLIMITED};
 use std::time::Instant;
 
 /// A render to be compiled for the features of its scene.
@@ -75,7 +75,7 @@ impl WithFeatures for Render<'_> {
         let workers = workers.watched(Watch::until(interrupt).within(left));
         let film = Film::new(width, height, &mut Arena::new(bytemuck::cast_slice_mut(&mut film_lines)))?;
         let mut window_lines = Vec::new();
-        let paths = PathTracer::<F>::new(scene, &bvh, &lights, path_settings(settings), settings.level);
+        let paths = PathIntegrator::<F>::new(scene, &bvh, &lights, path_settings(settings), settings.level);
         let (lights, windows) =
             windows::learn(&paths, &lights, settings.windows, &workers, &mut memory, &mut window_lines)?;
         let stage = Stage { scene, bvh: &bvh, lights: &lights, settings, workers: &workers };

@@ -18,7 +18,7 @@ use halflight_core::film::Film;
 use halflight_core::light::LightSampler;
 use halflight_core::memory::{Arena, Line};
 use halflight_core::scene::Scene;
-use halflight_core::transport::PathTracer;
+use halflight_core::transport::PathIntegrator;
 use halflight_core::transport::cached::gather::Gathering;
 
 /// What to study.
@@ -102,9 +102,10 @@ impl WithFeatures for Study<'_> {
         let mut lights_lines =
             memory.take("lights", LightSampler::footprint(scene).and(LightSampler::scratch(scene)))?;
         let lights = LightSampler::build(scene, &mut arena(&mut lights_lines))?.with_level(settings.level);
-        let tracer = PathTracer::<F>::new(scene, &bvh, &lights, path_settings(settings), settings.level);
+        let tracer = PathIntegrator::<F>::new(scene, &bvh, &lights, path_settings(settings), settings.level);
         let strata = settings.cache.strata() as usize;
-        let scratch = PathTracer::<F>::gather_scratch(strata).or(PathTracer::<F>::gather_scratch(EXACT));
+        let scratch =
+            PathIntegrator::<F>::gather_scratch(strata).or(PathIntegrator::<F>::gather_scratch(EXACT));
         let mut scratch = memory.take_each("paths", scratch, workers.count())?;
 
         // Passes count what they do on a canvas, of which there is no picture.

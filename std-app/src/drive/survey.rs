@@ -7,9 +7,9 @@ use super::workers::Workers;
 use halflight_core::bsdf::Features;
 use halflight_core::cache::irradiance::{IrradianceCache, Record};
 use halflight_core::memory::{Arena, Line};
-use halflight_core::transport::cached::gather::Place;
-use halflight_core::transport::cached::placement::{Order, PIXELS, Sight};
-use halflight_core::transport::{Counters, PathTracer};
+use halflight_core::transport::cached::gather::GatherPoint;
+use halflight_core::transport::cached::placement::{PIXELS, ProgressiveOrder, Via};
+use halflight_core::transport::{Counters, PathIntegrator};
 use std::time::Instant;
 
 /// Maps have no more pixels than this.
@@ -95,7 +95,7 @@ pub struct Survey {
 /// Looks at all pixels, and gathers at about `points` of them; `None` where the render is interrupted, or
 /// has had so many `seconds` and this takes longer.
 pub(super) fn survey<F: Features>(
-    tracer: &PathTracer<F>,
+    tracer: &PathIntegrator<F>,
     caches: [&IrradianceCache; 2],
     size: [u32; 2],
     points: u32,
@@ -110,11 +110,11 @@ pub(super) fn survey<F: Features>(
     while u64::from(width.div_ceil(step)) * u64::from(height.div_ceil(step)) > MOST_PIXELS {
         step *= 2;
     }
-    let order = Order::new(width, height, step);
+    let order = ProgressiveOrder::new(width, height, step);
     let mut found = vec![Look::default(); order.len() as usize];
     let task = |task: usize, _: &mut Arena, out: &mut [Look]| {
-        let (mut counters, mut places) = (Counters::default(), [Place::NONE; PIXELS]);
-        tracer.places(&order, (task * PIXELS) as u64, (0, Sight::Clear), &mut places, &mut counters);
+        let (mut counters, mut places) = (Counters::default(), [GatherPoint::NONE; PIXELS]);
+        tracer.places(&order, (task * PIXELS) as u64, (0, Via::Specular), &mut places, &mut counters);
         tracer.look_up(&mut places, &mut counters);
         for (look, place) in out.iter_mut().zip(&places).filter(|(_, place)| place.is_some()) {
             *look = look_at(place, caches, step);
@@ -161,7 +161,7 @@ pub(super) fn survey<F: Features>(
 /// that: where they say different things, one of them is wrong. 0 where none speaks; nothing where it was
 /// interrupted. Of large pictures some pixels stand for their neighbours.
 pub(super) fn risks<F: Features>(
-    tracer: &PathTracer<F>,
+    tracer: &PathIntegrator<F>,
     caches: [&IrradianceCache; 2],
     size: [u32; 2],
     workers: &Workers,
@@ -172,11 +172,11 @@ pub(super) fn risks<F: Features>(
     while u64::from(width.div_ceil(step)) * u64::from(height.div_ceil(step)) > MOST_RISKS {
         step *= 2;
     }
-    let order = Order::new(width, height, step);
+    let order = ProgressiveOrder::new(width, height, step);
     let mut found = vec![[0.0; 2]; order.len() as usize];
     let task = |task: usize, _: &mut Arena, out: &mut [[f32; 2]]| {
-        let (mut counters, mut places) = (Counters::default(), [Place::NONE; PIXELS]);
-        tracer.places(&order, (task * PIXELS) as u64, (0, Sight::Clear), &mut places, &mut counters);
+        let (mut counters, mut places) = (Counters::default(), [GatherPoint::NONE; PIXELS]);
+        tracer.places(&order, (task * PIXELS) as u64, (0, Via::Specular), &mut places, &mut counters);
         for (out, place) in out.iter_mut().zip(&places).filter(|(_, place)| place.is_some()) {
             *out = said_at(place, caches);
         }
@@ -201,7 +201,7 @@ pub(super) fn risks<F: Features>(
 }
 
 /// What records of both caches say at a place in the mean, and the variance of that.
-fn said_at(place: &Place, caches: [&IrradianceCache; 2]) -> [f32; 2] {
+fn said_at(place: &GatherPoint, caches: [&IrradianceCache; 2]) -> [f32; 2] {
     let (mut sum, mut squares, mut weights) = (0.0, 0.0, 0.0);
     for cache in caches {
         cache.visit_values(&place.asker(), |said, weight| {
@@ -218,7 +218,7 @@ fn said_at(place: &Place, caches: [&IrradianceCache; 2]) -> [f32; 2] {
     [mean, (squares / weights - mean * mean).max(0.0)]
 }
 
-fn look_at(place: &Place, caches: [&IrradianceCache; 2], step: u32) -> Look {
+fn look_at(place: &GatherPoint, caches: [&IrradianceCache; 2], step: u32) -> Look {
     let (position, pixel) = (place.position(), place.pixel() * step as f32);
     let mut mark = Mark::None;
     let [even, _] = caches;
@@ -241,7 +241,7 @@ fn look_at(place: &Place, caches: [&IrradianceCache; 2], step: u32) -> Look {
 
 /// Means over the records that speak for a place, by their weights; not a number where there are none.
 pub(super) fn means(
-    place: &Place,
+    place: &GatherPoint,
     caches: [&IrradianceCache; 2],
     of: impl Fn(&Record) -> [f32; 2],
 ) -> [f32; 2] {

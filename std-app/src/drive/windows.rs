@@ -7,7 +7,7 @@ use super::workers::Workers;
 use halflight_core::bsdf::Features;
 use halflight_core::light::{EnvironmentVisibility, LightSampler};
 use halflight_core::memory::{Arena, Line};
-use halflight_core::transport::{Outlook, PathTracer, WindowGain, path::WAVE};
+use halflight_core::transport::{Outlook, PathIntegrator, WindowGain, path::WAVE};
 
 /// Whether the sky is sampled through windows.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -22,7 +22,7 @@ pub struct WindowUse {
 
 /// Learns the windows of `tracer`'s scene in `lines`, where it has a sky and they pay, or are `wanted`.
 pub(super) fn learn<'m, F: Features>(
-    tracer: &PathTracer<F>,
+    tracer: &PathIntegrator<F>,
     lights: &LightSampler<'m>,
     wanted: Option<bool>,
     workers: &Workers,
@@ -33,7 +33,7 @@ pub(super) fn learn<'m, F: Features>(
         return Ok((*lights, WindowUse::default()));
     }
     // They are for speed alone: where there is no memory for them, the picture is made without.
-    let each = PathTracer::<F>::learn_scratch().and(PathTracer::<F>::scratch(WAVE)).bytes();
+    let each = PathIntegrator::<F>::learn_scratch().and(PathIntegrator::<F>::scratch(WAVE)).bytes();
     let all = Outlook::footprint().and(EnvironmentVisibility::footprint()).bytes();
     if wanted.is_none() && !memory.has(all.saturating_add(each.saturating_mul(workers.count()))) {
         return Ok((*lights, WindowUse { lacks_memory: true, ..WindowUse::default() }));
@@ -44,7 +44,7 @@ pub(super) fn learn<'m, F: Features>(
     let (slots, windows) = EnvironmentVisibility::memory(&mut Arena::new(bytemuck::cast_slice_mut(lines)))?;
 
     let mut scratch =
-        memory.take_each("look at the sky", PathTracer::<F>::learn_scratch(), workers.count())?;
+        memory.take_each("look at the sky", PathIntegrator::<F>::learn_scratch(), workers.count())?;
     workers.each(outlook.parts(), &mut scratch, |(task, part), _| {
         tracer.look(task, part);
         Ok(())

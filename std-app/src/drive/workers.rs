@@ -13,7 +13,7 @@ use halflight_core::film::{Film, PIXELS_PER_TILE, Pixel};
 use halflight_core::memory::{Arena, Line, OutOfMemory};
 use halflight_core::photon::{PhotonMap, Photons};
 use halflight_core::scene::Mesh;
-use halflight_core::transport::{Counters, PathTracer, Pilot, path::WAVE};
+use halflight_core::transport::{Counters, PathIntegrator, Pilot, path::WAVE};
 use rayon::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use std::sync::Mutex;
@@ -97,7 +97,7 @@ impl<'w> Workers<'w> {
     /// A look at a few tiles before the picture, whose mean radiance is about that.
     pub(super) fn pilot<F: Features>(
         &self,
-        tracer: &PathTracer<F>,
+        tracer: &PathIntegrator<F>,
         mean: f32,
         scratch: &mut [Vec<Line>],
     ) -> Result<Pilot, OutOfMemory> {
@@ -112,7 +112,7 @@ impl<'w> Workers<'w> {
     /// The mean radiance of the picture, by a look at the same tiles.
     pub(super) fn pilot_mean<F: Features>(
         &self,
-        tracer: &PathTracer<F>,
+        tracer: &PathIntegrator<F>,
         scratch: &mut [Vec<Line>],
     ) -> Result<f32, OutOfMemory> {
         self.mean_of(tracer.pilot_tasks(), scratch, |task, arena| tracer.pilot_mean(task, WAVE, arena))
@@ -121,7 +121,7 @@ impl<'w> Workers<'w> {
     /// The same of light that is there beside photons.
     pub(super) fn pilot_rest<F: Features>(
         &self,
-        tracer: &PathTracer<F>,
+        tracer: &PathIntegrator<F>,
         scratch: &mut [Vec<Line>],
     ) -> Result<f32, OutOfMemory> {
         self.mean_of(tracer.pilot_tasks(), scratch, |task, arena| tracer.pilot_rest(task, WAVE, arena))

@@ -6,9 +6,9 @@ use crate::bsdf::Features;
 use crate::bvh::Coherence;
 use crate::cache::irradiance::{Record, SECTORS};
 use crate::geometry::{Frame, Hit, Ray};
-use crate::transport::cached::gather::{Place, Strata};
+use crate::transport::cached::gather::{GatherPoint, HemisphereSamples};
 use crate::transport::estimator::Counters;
-use crate::transport::path::PathTracer;
+use crate::transport::path::PathIntegrator;
 use glam::{Vec2, Vec3};
 
 /// Rays along the surface in a ring, for each sector of a record's fence.
@@ -27,15 +27,15 @@ const LOW: f32 = 0.5;
 /// A wall is not nearer between two rays along the surface than by so much; what is hangs.
 const NEARER: f32 = 0.95;
 
-impl<F: Features> PathTracer<'_, F> {
+impl<F: Features> PathIntegrator<'_, F> {
     /// Looks for walls around a record at `place`, and for what hangs over its surroundings in what its `strata`, which
     /// are local to `frame`, have met.
     pub(in crate::transport) fn fence(
         &self,
         record: &mut Record,
-        place: &Place,
+        place: &GatherPoint,
         frame: &Frame,
-        strata: &Strata,
+        strata: &HemisphereSamples,
         counters: &mut Counters,
     ) {
         let walls = self.fence_along(record, place, counters);
@@ -53,7 +53,13 @@ impl<F: Features> PathTracer<'_, F> {
 
     /// The record of `place`, so many times as wide: it looks farther for walls and for what hangs over it,
     /// and light changes over its support by as much as before.
-    pub fn widened(&self, record: &Record, place: &Place, factor: f32, counters: &mut Counters) -> Record {
+    pub fn widened(
+        &self,
+        record: &Record,
+        place: &GatherPoint,
+        factor: f32,
+        counters: &mut Counters,
+    ) -> Record {
         let mut wide = record.widened(factor);
         self.fence_along(&mut wide, place, counters);
         self.note_overhangs(&mut wide, place);
@@ -61,7 +67,7 @@ impl<F: Features> PathTracer<'_, F> {
     }
 
     /// Looks for walls by rays along the surface, and returns how far they are from ray to ray.
-    fn fence_along(&self, record: &mut Record, place: &Place, counters: &mut Counters) -> [f32; RING] {
+    fn fence_along(&self, record: &mut Record, place: &GatherPoint, counters: &mut Counters) -> [f32; RING] {
         let origin = place.position() + place.error * Vec3::from(place.geometric_normal);
         let rays: [Ray; 2 * RING] = core::array::from_fn(|i| {
             let along = record.towards(azimuth(i)).1.normalize_or_zero();

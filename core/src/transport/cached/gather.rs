@@ -1,7 +1,7 @@
 //! Final gathering for the irradiance cache: what a diffuse point sees, stratum by stratum, and the record made of it.
 //!
 //! A gather ray finds the light that what it meets reflects, by path tracing on from there; what it meets emits or
-//! mirrors is direct light, which each path of the picture finds for itself ([`Share`]). All N² rays of a point make
+//! mirrors is direct light, which each path of the picture finds for itself ([`Components`]). All N² rays of a point make
 //! one wave, or several; blocks of 8 × 8 strata go together, so that neighbours reach the hierarchy together.
 
 use crate::bsdf::Features;
@@ -13,9 +13,9 @@ use crate::sampling::Sampler;
 use crate::sampling::warp::cosine_hemisphere;
 use crate::scene::SurfacePoint;
 use crate::transport::estimator::{Counters, dimension};
-use crate::transport::path::reuse::Exchange;
-use crate::transport::path::state::{Path, Share, Wave};
-use crate::transport::path::{PathTracer, WAVE};
+use crate::transport::path::reuse::ReuseState;
+use crate::transport::path::state::{Components, PathState, Wavefront};
+use crate::transport::path::{PathIntegrator, WAVE};
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
@@ -29,7 +29,7 @@ const NARROW: usize = 64;
 /// A diffuse point where the irradiance is wanted. Both normals are on the side of the viewer.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C)]
-pub struct Place {
+pub struct GatherPoint {
     pub(in crate::transport) position: [f32; 3],
     /// Bound of the error of `position`.
     pub(in crate::transport) error: f32,
@@ -43,9 +43,9 @@ pub struct Place {
     pub(in crate::transport) within: f32,
 }
 
-impl Place {
+impl GatherPoint {
     /// No place.
-    pub const NONE: Place = Place {
+    pub const NONE: GatherPoint = GatherPoint {
         position: [0.0; 3],
         error: 0.0,
         normal: [0.0; 3],
@@ -107,8 +107,8 @@ impl Place {
     }
 
     /// The path of a gather ray; `index` says where its light belongs.
-    pub(in crate::transport) fn path(&self, pixel: u32, sample: u32, index: usize) -> Path {
-        Path {
+    pub(in crate::transport) fn path(&self, pixel: u32, sample: u32, index: usize) -> PathState {
+        PathState {
             throughput: [1.0; 3],
             pdf: f32::INFINITY,
             pixel,
@@ -118,8 +118,8 @@ impl Place {
             segments: 2,
             triangle: self.triangle,
             eta_squared: 1.0,
-            share: Share::REFLECTED,
-            ..Path::default()
+            share: Components::REFLECTED,
+            ..PathState::default()
         }
     }
 }
@@ -136,7 +136,7 @@ pub struct Gathering<'a> {
 }
 
 /// What the strata of a hemisphere see.
-pub(in crate::transport) struct Strata<'m> {
+pub(in crate::transport) struct HemisphereSamples<'m> {
     pub(in crate::transport) n: usize,
     pub(in crate::transport) radiance: &'m mut [[f32; 3]],
     pub(in crate::transport) inverse_distance: &'m mut [f32],
@@ -147,7 +147,7 @@ pub(in crate::transport) struct Strata<'m> {
     shining: u32,
 }
 
-impl<'m> Strata<'m> {
+impl<'m> HemisphereSamples<'m> {
     fn footprint(n: usize) -> Footprint {
         let strata = n.saturating_mul(n);
         let triples = Footprint::default().slice::<[f32; 3]>(strata);
@@ -172,20 +172,20 @@ impl<'m> Strata<'m> {
     }
 }
 
-impl<F: Features> PathTracer<'_, F> {
-    /// Working memory of [`PathTracer::gather`] with n × n strata.
+impl<F: Features> PathIntegrator<'_, F> {
+    /// Working memory of [`PathIntegrator::gather`] with n × n strata.
     pub fn gather_scratch(n: usize) -> Footprint {
-        Wave::footprint(n.saturating_mul(n).min(WAVE)).and(Strata::footprint(n))
+        Wavefront::footprint(n.saturating_mul(n).min(WAVE)).and(HemisphereSamples::footprint(n))
     }
 
     /// Gathers at `place`. `number` names the gathering: another one, other rays. `None` where what was
     /// found is not a number; it is counted as dropped.
     ///
     /// # Errors
-    /// [`OutOfMemory`] where `scratch` has less than [`PathTracer::gather_scratch`].
+    /// [`OutOfMemory`] where `scratch` has less than [`PathIntegrator::gather_scratch`].
     pub fn gather(
         &self,
-        place: &Place,
+        place: &GatherPoint,
         number: u32,
         gathering: &Gathering,
         scratch: &mut Arena,
@@ -194,8 +194,8 @@ impl<F: Features> PathTracer<'_, F> {
         let Gathering { flux, metric, least_pixels } = *gathering;
         let n = flux.n();
         let mut arena = scratch.scratch();
-        let mut wave = Wave::new((n * n).min(WAVE), &mut arena)?;
-        let mut strata = Strata::new(n, metric.metric.takes_normals(), &mut arena)?;
+        let mut wave = Wavefront::new((n * n).min(WAVE), &mut arena)?;
+        let mut strata = HemisphereSamples::new(n, metric.metric.takes_normals(), &mut arena)?;
         let frame = Frame::from_normal(place.normal());
         let mut first = 0;
         while first < n * n {
@@ -204,7 +204,7 @@ impl<F: Features> PathTracer<'_, F> {
                 let (ray, path) = self.aim(place, &frame, number, first + i, &mut strata);
                 wave.rays[i] = Ray { tag: i as u32, ..ray };
                 wave.paths[i] = path;
-                wave.exchanges[i] = Exchange::new(0);
+                wave.exchanges[i] = ReuseState::new(0);
             }
             counters.paths += count as u64;
             let coherence = if n >= NARROW { Coherence::Coherent } else { Coherence::Incoherent };
@@ -239,7 +239,14 @@ impl<F: Features> PathTracer<'_, F> {
     }
 
     /// The `i`th ray of a gathering, and its path.
-    fn aim(&self, place: &Place, frame: &Frame, number: u32, i: usize, strata: &mut Strata) -> (Ray, Path) {
+    fn aim(
+        &self,
+        place: &GatherPoint,
+        frame: &Frame,
+        number: u32,
+        i: usize,
+        strata: &mut HemisphereSamples,
+    ) -> (Ray, PathState) {
         let n = strata.n;
         let stratum = stratum(n, i);
         let (pixel, sample) = (NO_PIXEL | number, i as u32);
@@ -254,7 +261,7 @@ impl<F: Features> PathTracer<'_, F> {
     }
 
     /// Notes what the ray of a stratum met.
-    fn note(&self, stratum: usize, hit: &Hit, frame: &Frame, strata: &mut Strata) {
+    fn note(&self, stratum: usize, hit: &Hit, frame: &Frame, strata: &mut HemisphereSamples) {
         if let Some(slot) = strata.inverse_distance.get_mut(stratum) {
             *slot = 1.0 / hit.t;
         }

@@ -7,20 +7,20 @@ use crate::cache::irradiance::{CachedIrradiance, IrradianceCache, Points, QueryP
 use crate::geometry::Ray;
 use crate::scene::SurfacePoint;
 use crate::transport::estimator::Counters;
-use crate::transport::path::state::{Path, Wave};
-use crate::transport::path::{BLOCK, PathTracer, SurfaceInteraction};
+use crate::transport::path::state::{PathState, Wavefront};
+use crate::transport::path::{BLOCK, PathIntegrator, SurfaceInteraction};
 use core::ops::Range;
 
 /// Irradiance caches, frozen.
 #[derive(Clone, Copy)]
-pub(in crate::transport) enum Caches<'a> {
+pub(in crate::transport) enum CacheView<'a> {
     /// Of even and of odd samples.
-    Halves([&'a IrradianceCache<'a>; 2]),
+    Pair([&'a IrradianceCache<'a>; 2]),
     /// What there is of one so far: one record is enough for rays that are averaged.
-    Growing(&'a IrradianceCache<'a>),
+    UnderConstruction(&'a IrradianceCache<'a>),
 }
 
-impl Caches<'_> {
+impl CacheView<'_> {
     /// What is `known` of those of `askers` that there are, each with its sample, and how far each is
     /// `exposed` ([`IrradianceCache::at_all`]).
     fn ask(
@@ -32,7 +32,7 @@ impl Caches<'_> {
     ) {
         let askers = askers.iter().enumerate().filter_map(|(i, asker)| Some((i, asker.as_ref()?)));
         match self {
-            Caches::Halves(caches) => {
+            CacheView::Pair(caches) => {
                 let mut points = [Points::NONE; 2];
                 askers.for_each(|(i, (asker, sample))| points[*sample as usize & 1].set(i, asker));
                 for (cache, points) in caches.iter().zip(&points) {
@@ -40,7 +40,7 @@ impl Caches<'_> {
                     exposed.iter_mut().zip(found).for_each(|(exposed, found)| *exposed = exposed.max(found));
                 }
             }
-            Caches::Growing(cache) => {
+            CacheView::UnderConstruction(cache) => {
                 for (i, (asker, _)) in askers {
                     let found = cache.first_valid(asker);
                     known[i] = found.map(|(indirect, _)| indirect);
@@ -51,13 +51,13 @@ impl Caches<'_> {
     }
 }
 
-impl<'a, F: Features> PathTracer<'a, F> {
+impl<'a, F: Features> PathIntegrator<'a, F> {
     /// Asks `caches` for the light that is reflected onto those of `block`, at the ends of rays of `range`, that may be
     /// diffuse.
     pub(in crate::transport) fn ask(
         &self,
-        caches: Caches,
-        wave: &Wave,
+        caches: CacheView,
+        wave: &Wavefront,
         range: Range<usize>,
         block: &mut [Option<SurfaceInteraction<'a>>; BLOCK],
         counters: &mut Counters,
@@ -92,10 +92,10 @@ impl<'a, F: Features> PathTracer<'a, F> {
     /// The vertex that a ray has met and its path, where they may ask.
     fn asks<'b>(
         &self,
-        wave: &'b Wave,
+        wave: &'b Wavefront,
         ray: &Ray,
         met: &'b Option<SurfaceInteraction<'a>>,
-    ) -> Option<(&'b SurfaceInteraction<'a>, &'b Path)> {
+    ) -> Option<(&'b SurfaceInteraction<'a>, &'b PathState)> {
         met.as_ref().zip(wave.paths.get(ray.tag as usize)).filter(|(met, path)| {
             met.point.material.surface.may_be_diffuse()
                 && path.share.goes_on_from_rough()

@@ -9,9 +9,9 @@ use crate::bvh::Coherence;
 use crate::cache::irradiance::{CLOSE, FINE, Record, SECTORS};
 use crate::geometry::{Frame, Hit, Ray};
 use crate::scene::{Surface, SurfacePoint};
-use crate::transport::cached::gather::Place;
+use crate::transport::cached::gather::GatherPoint;
 use crate::transport::estimator::Counters;
-use crate::transport::path::{BLOCK, PathTracer};
+use crate::transport::path::{BLOCK, PathIntegrator};
 use glam::{Vec2, Vec3};
 
 /// No record reaches farther, in diagonals of the scene.
@@ -45,7 +45,7 @@ struct Probe {
     length: f32,
 }
 
-impl<F: Features> PathTracer<'_, F> {
+impl<F: Features> PathIntegrator<'_, F> {
     /// How far away the records may be ([`crate::cache::irradiance::Asker::within`]) that these points hear,
     /// each of which wants to hear such as are so far `exposed`.
     pub(in crate::transport) fn within(
@@ -67,7 +67,7 @@ impl<F: Features> PathTracer<'_, F> {
     }
 
     /// Looks how high what hangs over each of `places` is, as far as records reach.
-    pub fn look_up(&self, places: &mut [Place], counters: &mut Counters) {
+    pub fn look_up(&self, places: &mut [GatherPoint], counters: &mut Counters) {
         let length = MOST * self.bvh.bounds().diagonal();
         for place in places.iter_mut().filter(|place| place.is_some()) {
             counters.rays += WAYS as u64;
@@ -106,7 +106,7 @@ impl<F: Features> PathTracer<'_, F> {
     }
 
     /// Notes what hangs over the support of a record at `place`, and over the place.
-    pub(in crate::transport) fn note_overhangs(&self, record: &mut Record, place: &Place) {
+    pub(in crate::transport) fn note_overhangs(&self, record: &mut Record, place: &GatherPoint) {
         record.confine(place.within);
         let least = FINE * record.least;
         // Higher than this nothing matters, and what is met at a tilt is as far outside.

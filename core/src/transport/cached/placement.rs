@@ -4,16 +4,16 @@
 //! It goes over the pixels in an order in which the first n of them are spread evenly, whatever n is, in steps. A step
 //! has two passes: tasks find the diffuse points that its pixels see, directly or through mirrors and glass; then tasks
 //! gather where no record reaches, some places at a time, and each time all records are committed in their order. Then
-//! it goes over them again, for the diffuse points that are seen in rough surfaces ([`Sight`]).
+//! it goes over them again, for the diffuse points that are seen in rough surfaces ([`Via`]).
 
 use crate::bsdf::{Bsdf, Features};
 use crate::bvh::Coherence;
 use crate::geometry::{Hit, Ray};
 use crate::sampling::Sampler;
 use crate::scene::SurfacePoint;
-use crate::transport::cached::gather::Place;
+use crate::transport::cached::gather::GatherPoint;
 use crate::transport::estimator::{Counters, dimension};
-use crate::transport::path::PathTracer;
+use crate::transport::path::PathIntegrator;
 use crate::transport::walk::context::Segment;
 use core::f32::consts::PI;
 use glam::Vec3;
@@ -34,16 +34,16 @@ const PER_LOBE: f32 = 16.0;
 
 /// How the points that are looked for are seen.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Sight {
+pub enum Via {
     /// Directly, or through mirrors and glass.
-    Clear,
+    Specular,
     /// By light that a rough surface scatters, once or more often.
-    Rough,
+    Glossy,
 }
 
 /// The pixels of a picture, evenly spread from the first on: every other of every `stride`th column and row last.
 #[derive(Clone, Copy, Debug)]
-pub struct Order {
+pub struct ProgressiveOrder {
     width: u32,
     height: u32,
     stride: u32,
@@ -51,7 +51,7 @@ pub struct Order {
     bits: u32,
 }
 
-impl Order {
+impl ProgressiveOrder {
     /// Every `stride`th pixel across and down of `width` by `height`; the stride is brought up to a power of two.
     pub fn new(width: u32, height: u32, stride: u32) -> Self {
         let stride = stride.clamp(1, 1 << 15).next_power_of_two();
@@ -82,15 +82,15 @@ impl Order {
     }
 }
 
-impl<F: Features> PathTracer<'_, F> {
+impl<F: Features> PathIntegrator<'_, F> {
     /// What sample `sample` of the pixels of [`PIXELS`] steps from `first` on sees first that is diffuse, in the way of `sight`; into
-    /// `out`, in their order. Places without triangle ([`Place::is_some`]) where there is no pixel or nothing diffuse.
+    /// `out`, in their order. Places without triangle ([`GatherPoint::is_some`]) where there is no pixel or nothing diffuse.
     pub fn places(
         &self,
-        order: &Order,
+        order: &ProgressiveOrder,
         first: u64,
-        (sample, sight): (u32, Sight),
-        out: &mut [Place],
+        (sample, sight): (u32, Via),
+        out: &mut [GatherPoint],
         counters: &mut Counters,
     ) {
         let mut rays = [Ray::segment(Vec3::ZERO, Vec3::Z, -1.0); PIXELS];
@@ -105,11 +105,11 @@ impl<F: Features> PathTracer<'_, F> {
         self.bvh.nearest_batch(self.level, &rays, Coherence::Incoherent, &mut hits);
         let pixel = 2.0 * self.scene.camera.tan_half_fov / height as f32;
         for (i, place) in out.iter_mut().enumerate().take(PIXELS) {
-            *place = Place::NONE;
+            *place = GatherPoint::NONE;
             if let Some((x, y)) = order.pixel(first + i as u64) {
                 let sampler = Sampler::new(self.settings.seed, y * width + x, sample);
                 let found = self.first_diffuse((rays[i], hits[i]), pixel, sight, &sampler, counters);
-                *place = found.map_or(Place::NONE, |(point, width)| Place::of(&point, width));
+                *place = found.map_or(GatherPoint::NONE, |(point, width)| GatherPoint::of(&point, width));
             }
         }
     }
@@ -125,13 +125,13 @@ impl<F: Features> PathTracer<'_, F> {
         &self,
         (ray, mut hit): (Ray, Hit),
         mut spread: f32,
-        sight: Sight,
+        sight: Via,
         sampler: &Sampler,
         counters: &mut Counters,
     ) -> Option<(SurfacePoint<'_>, f32)> {
         let context = self.context();
         let mut segment = Segment::first(ray);
-        let (mut width, mut seen) = (0.0, Sight::Clear);
+        let (mut width, mut seen) = (0.0, Via::Specular);
         for segments in 1..=MOST_BOUNCES {
             let opacity = |n| sampler.single(dimension::CROSSING + n);
             let (met, point) = context.surface_from(hit, &mut segment, opacity, counters)?;
@@ -146,10 +146,10 @@ impl<F: Features> PathTracer<'_, F> {
             let lobe = sampler.single(dimension::vertex(segments) + dimension::LOBE);
             let sample = bsdf.sample::<F>(wo, [u, v, lobe])?;
             if !sample.delta {
-                if sight == Sight::Clear {
+                if sight == Via::Specular {
                     return None;
                 }
-                seen = Sight::Rough;
+                seen = Via::Glossy;
                 spread = spread.max(1.0 / (PER_LOBE * libm::sqrtf(PI * sample.pdf)));
             }
             let next = point.frame.to_world(sample.direction);
@@ -173,13 +173,13 @@ mod tests {
     #[test]
     fn the_order_has_every_pixel_once_and_spreads_them() {
         for (width, height, stride) in [(1, 1, 1), (37, 20, 1), (64, 64, 4), (5, 300, 2), (33, 9, 64)] {
-            let order = Order::new(width, height, stride);
+            let order = ProgressiveOrder::new(width, height, stride);
             let pixels: Vec<_> = (0..order.len()).filter_map(|i| order.pixel(i)).collect();
             let wanted = width.div_ceil(stride) * height.div_ceil(stride);
             assert_eq!(pixels.len(), wanted as usize, "{width} {height} {stride}");
             assert_eq!(pixels.iter().collect::<BTreeSet<_>>().len(), pixels.len());
         }
-        let order = Order::new(64, 64, 1);
+        let order = ProgressiveOrder::new(64, 64, 1);
         let coarse: BTreeSet<_> = (0..16).filter_map(|i| order.pixel(i)).collect();
         assert!(coarse.iter().all(|(x, y)| x % 16 == 0 && y % 16 == 0) && coarse.len() == 16);
         assert_eq!(order.pixel(order.len()), None);

@@ -41,7 +41,7 @@ use crate::bvh::Bvh;
 use crate::light::EmissionSampler;
 use crate::photon::{Kernel, PhotonMap, QueryDisc, Uniform};
 use crate::scene::{Scene, SurfacePoint};
-use crate::transport::path::state::{Merged, Path};
+use crate::transport::path::state::{MergeState, PathState};
 use crate::transport::photon_mapping::density::{Gathered, Light, reflected};
 use crate::transport::photon_mapping::radius::RadiusSchedule;
 use crate::{Level, Rgb};
@@ -59,7 +59,7 @@ pub(in crate::transport) fn is_wide_enough(radius: f32, from: f32) -> bool {
 
 /// Photons of caustics as paths from the eye use them.
 #[derive(Clone, Copy)]
-pub struct Merging<'a> {
+pub struct CausticMerging<'a> {
     /// Of even and of odd samples.
     maps: [&'a PhotonMap<'a>; 2],
     pub(in crate::transport) emission: &'a EmissionSampler<'a>,
@@ -104,7 +104,7 @@ impl ChainLink<'_> {
     }
 }
 
-impl<'a> Merging<'a> {
+impl<'a> CausticMerging<'a> {
     /// `maps` for even and odd samples, of `paths` light paths each, which were left for the same `discs`.
     pub fn new(
         maps: [&'a PhotonMap<'a>; 2],
@@ -129,18 +129,19 @@ impl<'a> Merging<'a> {
     #[inline]
     pub(in crate::transport) fn met(
         &self,
-        path: &Path,
+        path: &PathState,
         place: Vec3,
         segments: u32,
         is_limited: bool,
-    ) -> Option<Merged> {
+    ) -> Option<MergeState> {
         let is_first = path.disc == 0.0;
-        let is_known =
-            || is_limited || path.merged == Merged::KNOWN || is_wide_enough(path.disc, self.radius(place));
+        let is_known = || {
+            is_limited || path.merged == MergeState::KNOWN || is_wide_enough(path.disc, self.radius(place))
+        };
         if !is_first && (!self.beside_records || path.chain > 0.0) && is_known() {
-            return Some(if self.beside_records { Merged::KNOWN } else { Merged::DONE });
+            return Some(if self.beside_records { MergeState::KNOWN } else { MergeState::DONE });
         }
-        (segments > 1 && is_limited).then_some(Merged::NEVER)
+        (segments > 1 && is_limited).then_some(MergeState::NEVER)
     }
 
     /// Whether photons may come by `bsdf` to where a path has its `chain` from.

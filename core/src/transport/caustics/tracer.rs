@@ -16,10 +16,10 @@ use crate::photon::Photon;
 use crate::scene::{Scene, SurfacePoint};
 use crate::transport::caustics::merge::{ChainLink, is_wide_enough};
 use crate::transport::estimator::{Counters, UNLIMITED};
-use crate::transport::photon_mapping::deposit::ShootSettings;
+use crate::transport::photon_mapping::deposit::PhotonTracerSettings;
 use crate::transport::photon_mapping::radius::RadiusSchedule;
 pub use crate::transport::walk::light::PATHS;
-use crate::transport::walk::light::{Flight, Onward, Pile, State, Vertex, Visitor};
+use crate::transport::walk::light::{Continuation, LightPathState, LightWalk, PhotonBuffer, Vertex, Visitor};
 use crate::{Level, Rgb};
 use core::f32::consts::PI;
 use core::marker::PhantomData;
@@ -47,8 +47,8 @@ const NEAR: f32 = 1e-4;
 
 /// Shoots photons of caustics: a pass of tasks of [`PATHS`] paths.
 #[derive(Clone, Copy)]
-pub struct CausticShooter<'a, F> {
-    flight: Flight<'a, F>,
+pub struct CausticPhotonTracer<'a, F> {
+    flight: LightWalk<'a, F>,
     discs: RadiusSchedule,
     /// Pixels across and down.
     frame: [u32; 2],
@@ -57,7 +57,7 @@ pub struct CausticShooter<'a, F> {
 
 /// What became of a light path: what its photons are worth, and from which cell of the guide it came.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Find {
+pub struct GuideSample {
     /// Its cell.
     pub cell: u32,
     /// Zero where nothing was left.
@@ -75,23 +75,23 @@ pub struct Find {
 /// Blocks of the picture, across and down, that tell where caustics are.
 pub const BLOCKS: u32 = 16;
 
-impl<'a, F: Features> CausticShooter<'a, F> {
+impl<'a, F: Features> CausticPhotonTracer<'a, F> {
     /// A shooter over frozen structures, for photons that will be gathered from `discs` in a picture of so many pixels
     /// across and down. `F` has at least the features of the scene. All photons are kept, whatever `settings` say.
     pub fn new(
         (scene, bvh, lights): (&'a Scene<'a>, &'a Bvh<'a>, &'a LightSampler<'a>),
         emission: &'a EmissionSampler<'a>,
-        settings: ShootSettings,
+        settings: PhotonTracerSettings,
         (discs, frame): (RadiusSchedule, [u32; 2]),
         level: Level,
     ) -> Self {
-        let ShootSettings { seed, paths, max_depth, .. } = settings;
+        let PhotonTracerSettings { seed, paths, max_depth, .. } = settings;
         let features = PhantomData;
-        let flight = Flight { scene, bvh, lights, emission, seed, paths, max_depth, level, features };
+        let flight = LightWalk { scene, bvh, lights, emission, seed, paths, max_depth, level, features };
         Self { flight, discs, frame, beside_records: false }
     }
 
-    /// The same, of photons for [`Merging::beside_records`](super::Merging::beside_records), if so.
+    /// The same, of photons for [`CausticMerging::beside_records`](super::Merging::beside_records), if so.
     pub fn beside_records(self, beside_records: bool) -> Self {
         Self { beside_records, ..self }
     }
@@ -108,14 +108,14 @@ impl<'a, F: Features> CausticShooter<'a, F> {
 
     /// Working memory of one task.
     pub fn scratch() -> Footprint {
-        Flight::<F>::scratch()
+        LightWalk::<F>::scratch()
     }
 
     /// Shoots the photons of task `task` of map number `map` (below 2^31). All of `out` is written; what is not needed,
     /// with photons of no place, which a map refuses. Room for [`ROOM`] is enough.
     ///
     /// # Errors
-    /// [`OutOfMemory`] where `scratch` has less than [`CausticShooter::scratch`] bytes.
+    /// [`OutOfMemory`] where `scratch` has less than [`CausticPhotonTracer::scratch`] bytes.
     pub fn run(
         &self,
         task: usize,
@@ -123,10 +123,14 @@ impl<'a, F: Features> CausticShooter<'a, F> {
         scratch: &mut Arena,
         out: &mut [Photon],
     ) -> Result<Counters, OutOfMemory> {
-        let mut pile = Pile::new(out);
-        let leave = |_: &State, photon, _, counters: &mut Counters| pile.leave(photon, counters);
-        let counters =
-            self.flight.follow(task, map, scratch, &mut Weigher { shooter: self, leave, goes_on: true })?;
+        let mut pile = PhotonBuffer::new(out);
+        let leave = |_: &LightPathState, photon, _, counters: &mut Counters| pile.leave(photon, counters);
+        let counters = self.flight.follow(
+            task,
+            map,
+            scratch,
+            &mut MisDepositor { shooter: self, leave, goes_on: true },
+        )?;
         pile.finish();
         Ok(counters)
     }
@@ -135,17 +139,17 @@ impl<'a, F: Features> CausticShooter<'a, F> {
     /// to [`PATHS`].
     ///
     /// # Errors
-    /// As [`CausticShooter::run`].
+    /// As [`CausticPhotonTracer::run`].
     pub fn look(
         &self,
         task: usize,
         map: u32,
         scratch: &mut Arena,
-        out: &mut [Find],
+        out: &mut [GuideSample],
     ) -> Result<Counters, OutOfMemory> {
         let first = (task * PATHS) as u32;
-        out.fill(Find::default());
-        let leave = |state: &State, photon: Photon, share: Share, _: &mut Counters| {
+        out.fill(GuideSample::default());
+        let leave = |state: &LightPathState, photon: Photon, share: CausticShare, _: &mut Counters| {
             if let Some(find) = out.get_mut((state.number - first) as usize) {
                 let place = photon.position();
                 let power = luminance(photon.power());
@@ -164,13 +168,13 @@ impl<'a, F: Features> CausticShooter<'a, F> {
                 (find.hits, find.flash) = (share.ratio / share.chance, whole / share.ratio);
             }
         };
-        self.flight.follow(task, map, scratch, &mut Weigher { shooter: self, leave, goes_on: false })
+        self.flight.follow(task, map, scratch, &mut MisDepositor { shooter: self, leave, goes_on: false })
     }
 
     /// In which block of the picture light at `place` shows, straight or through glass; `None` where it is outside, or
     /// hidden from the eye: some of it comes back.
     fn block(&self, place: Vec3) -> Option<u32> {
-        let Flight { scene, bvh, level, .. } = self.flight;
+        let LightWalk { scene, bvh, level, .. } = self.flight;
         let camera = &scene.camera;
         let [width, height] = self.frame;
         let at = camera.project(width, height, place, [0.5; 2])?.raster;
@@ -197,18 +201,18 @@ impl<'a, F: Features> CausticShooter<'a, F> {
     }
 
     /// The share that photons have in the light of this path at `place`.
-    fn share(&self, state: &State, place: Vec3) -> Share {
+    fn share(&self, state: &LightPathState, place: Vec3) -> CausticShare {
         let ratio = state.others / (self.discs.reach(place, self.flight.paths as f32) * state.chain);
         let weight = 1.0 / (1.0 + ratio * ratio);
         // Zero over zero: without any other technique photons have it all.
         let weight = if state.others == 0.0 { 1.0 } else { weight };
-        Share { weight, chance: (weight / LEAST_WEIGHT).min(1.0), ratio }
+        CausticShare { weight, chance: (weight / LEAST_WEIGHT).min(1.0), ratio }
     }
 
     /// `chain` and `others` before the first surface: `back` is the density of the direction to the light, where it is
     /// not the only one.
-    fn first(&self, state: &State, vertex: &Vertex, back: Option<f32>) -> (f32, f32) {
-        let Flight { scene, lights, emission, .. } = self.flight;
+    fn first(&self, state: &LightPathState, vertex: &Vertex, back: Option<f32>) -> (f32, f32) {
+        let LightWalk { scene, lights, emission, .. } = self.flight;
         let &Vertex { point, bsdf, to_light, .. } = vertex;
         let normal = if F::DIELECTRIC && bsdf.transmits() { Vec3::ZERO } else { point.frame.normal };
         let position = point.position;
@@ -245,7 +249,7 @@ impl<'a, F: Features> CausticShooter<'a, F> {
 
 /// What is known of a photon beside its power.
 #[derive(Clone, Copy)]
-struct Share {
+struct CausticShare {
     /// In the light of its path.
     weight: f32,
     /// With which it is left at all.
@@ -254,9 +258,9 @@ struct Share {
     ratio: f32,
 }
 
-impl Share {
+impl CausticShare {
     /// Of a photon that has its weight already.
-    const ALL: Share = Share { weight: 1.0, chance: 1.0, ratio: 0.0 };
+    const ALL: CausticShare = CausticShare { weight: 1.0, chance: 1.0, ratio: 0.0 };
 
     /// What is left of the power of a path with a photon at `vertex`; `None` where that is not left.
     fn kept(&self, vertex: &Vertex) -> Option<f32> {
@@ -264,41 +268,48 @@ impl Share {
     }
 }
 
-/// `State::others` of a path that a rough surface has scattered: its power has its weight, and `State::chain` is the radius
+/// `LightPathState::others` of a path that a rough surface has scattered: its power has its weight, and `LightPathState::chain` is the radius
 /// of discs at the last.
 const SCATTERED: f32 = -1.0;
 
 /// Leaves photons with their weights.
-struct Weigher<'s, 'a, F, L> {
-    shooter: &'s CausticShooter<'a, F>,
+struct MisDepositor<'s, 'a, F, L> {
+    shooter: &'s CausticPhotonTracer<'a, F>,
     leave: L,
     /// Whether paths go on from the first rough surface.
     goes_on: bool,
 }
 
-impl<F: Features, L> Weigher<'_, '_, F, L> {
+impl<F: Features, L> MisDepositor<'_, '_, F, L> {
     /// Whether light is gathered at `vertex`, which is rough, and not where it was scattered last.
-    fn is_merged(&self, state: &State, vertex: &Vertex) -> bool {
-        let Flight { max_depth, .. } = self.shooter.flight;
+    fn is_merged(&self, state: &LightPathState, vertex: &Vertex) -> bool {
+        let LightWalk { max_depth, .. } = self.shooter.flight;
         let from = if state.others == SCATTERED && max_depth == UNLIMITED { state.chain } else { 0.0 };
         is_wide_enough(self.shooter.discs.radius(vertex.point.position), from)
     }
 
     /// What is known of a photon at `vertex`, which is rough.
-    fn share(&self, state: &State, vertex: &Vertex) -> Share {
+    fn share(&self, state: &LightPathState, vertex: &Vertex) -> CausticShare {
         match state.others {
-            SCATTERED => Share::ALL,
+            SCATTERED => CausticShare::ALL,
             _ => self.shooter.share(state, vertex.point.position),
         }
     }
 }
 
-impl<F: Features, L: FnMut(&State, Photon, Share, &mut Counters)> Visitor for Weigher<'_, '_, F, L> {
+impl<F: Features, L: FnMut(&LightPathState, Photon, CausticShare, &mut Counters)> Visitor
+    for MisDepositor<'_, '_, F, L>
+{
     const DIMENSIONS: u32 = 4;
     const SEED: u64 = 0x6361_7573_7469_6373;
 
     #[inline]
-    fn meet(&mut self, state: &State, vertex: &Vertex, counters: &mut Counters) -> Option<Onward> {
+    fn meet(
+        &mut self,
+        state: &LightPathState,
+        vertex: &Vertex,
+        counters: &mut Counters,
+    ) -> Option<Continuation> {
         let ends = vertex.bsdf.is_receiver();
         let is_known = self.shooter.beside_records && state.mirrored == 0;
         let leaves = ends && state.segments > 1 && !is_known;
@@ -308,12 +319,15 @@ impl<F: Features, L: FnMut(&State, Photon, Share, &mut Counters)> Visitor for We
                 (self.leave)(state, vertex.photon(Rgb::from(state.power) * kept), share, counters);
             }
         }
-        Some(Onward { most: if leaves { MOST } else { 1.0 }, mirrored: ends && !(leaves && self.goes_on) })
+        Some(Continuation {
+            most: if leaves { MOST } else { 1.0 },
+            mirrored: ends && !(leaves && self.goes_on),
+        })
     }
 
     /// Straight from a light no photon goes on by a rough coat: paths find that light.
     #[inline]
-    fn is_apart(&self, state: &State, vertex: &Vertex) -> bool {
+    fn is_apart(&self, state: &LightPathState, vertex: &Vertex) -> bool {
         state.segments > 1 && vertex.bsdf.is_varnished(!self.shooter.flight.lights.have_deltas())
     }
 
@@ -322,7 +336,7 @@ impl<F: Features, L: FnMut(&State, Photon, Share, &mut Counters)> Visitor for We
     #[inline]
     fn leave(
         &self,
-        state: &mut State,
+        state: &mut LightPathState,
         vertex: &Vertex,
         from: Vec3,
         (sample, is_narrow): (&BsdfSample, bool),

@@ -1,7 +1,7 @@
 //! Next-event estimation: light samples of a vertex, weighted against BSDF sampling by the power heuristic
 //! (Veach 1997, chapter 9).
 
-use super::PathTracer;
+use super::PathIntegrator;
 use super::shade::{Known, Vertex};
 use super::shadow_rays::{Shadows, TO_ENVIRONMENT};
 use crate::Rgb;
@@ -10,18 +10,18 @@ use crate::geometry::Ray;
 use crate::light::LightSample;
 use crate::transport::caustics::merge::ChainLink;
 use crate::transport::estimator::{dimension, environment_heuristic, power_heuristic};
-use crate::transport::path::reuse::Exchange;
-use crate::transport::path::state::Path;
+use crate::transport::path::reuse::ReuseState;
+use crate::transport::path::state::PathState;
 use crate::transport::walk::visibility::shadow_ray;
 use glam::Vec3;
 
-impl<F: Features> PathTracer<'_, F> {
+impl<F: Features> PathIntegrator<'_, F> {
     /// Takes light samples at `vertex`, and puts their shadow rays into the queue.
     #[inline]
     pub(super) fn direct(
         &self,
-        path: &Path,
-        exchange: &mut Exchange,
+        path: &PathState,
+        exchange: &mut ReuseState,
         vertex: &Vertex,
         known: &Known,
         shadows: &mut Shadows,
@@ -62,8 +62,8 @@ impl<F: Features> PathTracer<'_, F> {
     #[inline]
     fn light_contribution(
         &self,
-        path: &Path,
-        exchange: &mut Exchange,
+        path: &PathState,
+        exchange: &mut ReuseState,
         vertex: &Vertex,
         known: &Known,
         (sample, later): (&LightSample, bool),

@@ -3,17 +3,17 @@
 //! shaded.
 
 use super::shadow_rays::Shadows;
-use super::{BLOCK, LIGHT_SAMPLES, PathTracer, SurfaceInteraction};
+use super::{BLOCK, LIGHT_SAMPLES, PathIntegrator, SurfaceInteraction};
 use crate::bsdf::Features;
 use crate::bvh::Coherence;
 use crate::scene::SurfacePoint;
 use crate::transport::estimator::Counters;
-use crate::transport::path::state::Wave;
+use crate::transport::path::state::Wavefront;
 use core::ops::Range;
 
-impl<'a, F: Features> PathTracer<'a, F> {
+impl<'a, F: Features> PathIntegrator<'a, F> {
     /// Traces the first `count` rays of the wave and all that follows from them.
-    pub(in crate::transport) fn advance(&self, wave: &mut Wave, count: usize, counters: &mut Counters) {
+    pub(in crate::transport) fn advance(&self, wave: &mut Wavefront, count: usize, counters: &mut Counters) {
         self.trace(wave, count, Coherence::Coherent, counters);
         self.trace_to_end(wave, count, counters);
     }
@@ -21,7 +21,7 @@ impl<'a, F: Features> PathTracer<'a, F> {
     /// Finds what the first `active` rays of the wave meet.
     pub(in crate::transport) fn trace(
         &self,
-        wave: &mut Wave,
+        wave: &mut Wavefront,
         active: usize,
         coherence: Coherence,
         counters: &mut Counters,
@@ -32,7 +32,12 @@ impl<'a, F: Features> PathTracer<'a, F> {
     }
 
     /// Shades the first `active` rays of the wave, which were traced, and traces what follows until no path is left.
-    pub(in crate::transport) fn trace_to_end(&self, wave: &mut Wave, active: usize, counters: &mut Counters) {
+    pub(in crate::transport) fn trace_to_end(
+        &self,
+        wave: &mut Wavefront,
+        active: usize,
+        counters: &mut Counters,
+    ) {
         let mut active = self.shade_hits(wave, active, counters);
         while active > 0 {
             self.trace(wave, active, Coherence::Incoherent, counters);
@@ -43,7 +48,7 @@ impl<'a, F: Features> PathTracer<'a, F> {
     /// Shades what they met; returns how many rays there are now.
     pub(in crate::transport) fn shade_hits(
         &self,
-        wave: &mut Wave,
+        wave: &mut Wavefront,
         active: usize,
         counters: &mut Counters,
     ) -> usize {
@@ -59,7 +64,7 @@ impl<'a, F: Features> PathTracer<'a, F> {
                 counters.shadow_rays += shadows as u64;
                 self.trace_shadow_rays(wave, core::mem::take(&mut shadows));
             }
-            let Wave { paths, exchanges, shadow_rays, shadow_light, .. } = wave;
+            let Wavefront { paths, exchanges, shadow_rays, shadow_light, .. } = wave;
             let Some(path) = paths.get_mut(ray.tag as usize) else { continue };
             let Some(exchange) = exchanges.get_mut(ray.tag as usize) else { continue };
             let mut queue = Shadows { rays: shadow_rays, light: shadow_light, count: shadows };
@@ -85,7 +90,7 @@ impl<'a, F: Features> PathTracer<'a, F> {
     #[inline]
     fn prepare_block(
         &self,
-        wave: &Wave,
+        wave: &Wavefront,
         range: Range<usize>,
         block: &mut [Option<SurfaceInteraction<'a>>; BLOCK],
         counters: &mut Counters,

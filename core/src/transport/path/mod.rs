@@ -41,10 +41,10 @@ use crate::light::LightSampler;
 use crate::memory::Footprint;
 use crate::sampling::Sampler;
 use crate::scene::{Material, Scene, SurfacePoint};
-use crate::transport::cached::lookup::Caches;
-use crate::transport::caustics::merge::Merging;
+use crate::transport::cached::lookup::CacheView;
+use crate::transport::caustics::merge::CausticMerging;
 use crate::transport::estimator::{PathSettings, dimension};
-use crate::transport::path::state::Wave;
+use crate::transport::path::state::Wavefront;
 use crate::transport::photon_mapping::density::PhotonLight;
 use crate::transport::photon_mapping::final_gather::PhotonMaps;
 use crate::transport::walk::context::SceneContext;
@@ -62,7 +62,7 @@ pub(super) const LIGHT_SAMPLES: usize = 4;
 
 /// Path tracing of one scene: a pass whose tasks are the tiles of the picture.
 #[derive(Clone, Copy)]
-pub struct PathTracer<'a, F> {
+pub struct PathIntegrator<'a, F> {
     pub(super) scene: &'a Scene<'a>,
     pub(super) bvh: &'a Bvh<'a>,
     pub(super) lights: &'a LightSampler<'a>,
@@ -74,17 +74,17 @@ pub struct PathTracer<'a, F> {
     apart: bool,
     /// Some surfaces may reflect or refract into one direction only.
     pub(super) has_mirrors: bool,
-    pub(super) caches: Option<Caches<'a>>,
+    pub(super) caches: Option<CacheView<'a>>,
     photons: Option<PhotonLight<'a>>,
     /// Of even and of odd samples.
     maps: Option<&'a [PhotonMaps<'a>; 2]>,
-    merging: Option<Merging<'a>>,
+    merging: Option<CausticMerging<'a>>,
     /// Light that is not all shared, for each sample; see `reuse.rs`.
     pub(super) flash: f32,
     features: PhantomData<F>,
 }
 
-impl<'a, F: Features> PathTracer<'a, F> {
+impl<'a, F: Features> PathIntegrator<'a, F> {
     /// A path tracer over frozen structures. `F` has at least the features of the scene
     /// ([`crate::census`] tells which).
     pub fn new(
@@ -118,12 +118,12 @@ impl<'a, F: Features> PathTracer<'a, F> {
     /// first, odd ones from the second. Pixels must not share their paths as well. Where depth is limited only the
     /// first point of a path is served, for records do not know how far they are from the camera.
     pub fn with_caches(&self, caches: [&'a IrradianceCache<'a>; 2]) -> Self {
-        Self { caches: Some(Caches::Halves(caches)), ..*self }
+        Self { caches: Some(CacheView::Pair(caches)), ..*self }
     }
 
     /// The same, for rays that gather for the cache itself, as it is now.
     pub fn with_growing_cache(&self, cache: &'a IrradianceCache<'a>) -> Self {
-        Self { caches: Some(Caches::Growing(cache)), ..*self }
+        Self { caches: Some(CacheView::UnderConstruction(cache)), ..*self }
     }
 
     /// The same, where surfaces with a diffuse part have from photons what light is reflected onto them. Pixels must
@@ -141,7 +141,7 @@ impl<'a, F: Features> PathTracer<'a, F> {
     }
 
     /// The same, joined with photons of caustics.
-    pub fn with_caustics(&self, merging: Merging<'a>) -> Self {
+    pub fn with_caustics(&self, merging: CausticMerging<'a>) -> Self {
         Self { merging: Some(merging), ..*self }
     }
 
@@ -167,7 +167,7 @@ impl<'a, F: Features> PathTracer<'a, F> {
 
     /// Working memory of one task that advances `wave` paths together.
     pub fn scratch(wave: usize) -> Footprint {
-        Wave::footprint(wave)
+        Wavefront::footprint(wave)
     }
 
     /// The camera ray of a sample of the pixel in column `x` and row `y`.

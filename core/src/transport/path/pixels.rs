@@ -7,18 +7,18 @@ use crate::geometry::{MISS, Ray};
 use crate::memory::{Arena, OutOfMemory};
 use crate::sampling::Sampler;
 use crate::transport::estimator::Counters;
-use crate::transport::path::PathTracer;
-use crate::transport::path::reuse::Exchange;
+use crate::transport::path::PathIntegrator;
+use crate::transport::path::reuse::ReuseState;
 use crate::transport::path::silhouette::is_outlined;
-use crate::transport::path::state::{Path, Share, Wave};
+use crate::transport::path::state::{Components, PathState, Wavefront};
 use core::ops::Range;
 
-impl<F: Features> PathTracer<'_, F> {
+impl<F: Features> PathIntegrator<'_, F> {
     /// Traces `samples` of the pixels in these columns and rows, and adds them to `out`, one for one. Pixels share
     /// nothing, whatever the settings say.
     ///
     /// # Errors
-    /// [`OutOfMemory`] where `scratch` has less than [`PathTracer::scratch`] bytes.
+    /// [`OutOfMemory`] where `scratch` has less than [`PathIntegrator::scratch`] bytes.
     pub fn probe(
         &self,
         pixels: &[[u32; 2]],
@@ -29,7 +29,7 @@ impl<F: Features> PathTracer<'_, F> {
     ) -> Result<Counters, OutOfMemory> {
         let alone = self.with_reuse(false);
         let mut arena = scratch.scratch();
-        let mut wave = Wave::new(wave, &mut arena)?;
+        let mut wave = Wavefront::new(wave, &mut arena)?;
         let mut counters = Counters::default();
         let all = pixels
             .iter()
@@ -48,19 +48,19 @@ impl<F: Features> PathTracer<'_, F> {
                 let pixel = y * self.settings.width + x;
                 let sampler = Sampler::new(self.settings.seed, pixel, sample);
                 *ray = Ray { tag: count as u32, ..self.camera_ray([x, y], &sampler) };
-                *path = Path {
+                *path = PathState {
                     throughput: [1.0; 3],
                     pdf: f32::INFINITY,
                     pixel,
                     place,
                     sample,
                     segments: 1,
-                    share: if outlined(place) { Share::BESIDE_LAMP } else { Share::ALL },
+                    share: if outlined(place) { Components::BESIDE_LAMP } else { Components::ALL },
                     triangle: MISS,
                     eta_squared: 1.0,
-                    ..Path::default()
+                    ..PathState::default()
                 };
-                *exchange = Exchange::new(0);
+                *exchange = ReuseState::new(0);
                 count += 1;
             }
             counters.paths += count as u64;

@@ -8,8 +8,8 @@ use crate::light::{LightSampler, emitted};
 use crate::sampling::Sampler;
 use crate::scene::{Scene, SurfacePoint};
 use crate::transport::estimator::{
-    MAX_CROSSINGS, MAX_VERTICES, PathSettings, dimension, environment_heuristic, is_cut, power_heuristic,
-    survival,
+    MAX_CROSSINGS, MAX_VERTICES, PathSettings, continuation_probability, dimension, environment_heuristic,
+    is_cut, power_heuristic,
 };
 use crate::transport::path::silhouette::{self, is_outlined};
 use crate::transport::walk::visibility::{passing, shadow_ray};
@@ -125,12 +125,12 @@ pub fn radiance(
         eta_squared *= scattered.eta * scattered.eta;
 
         // Roulette.
-        let survival = survival(segments, throughput * eta_squared);
-        if survival < 1.0 {
-            if sampler.single(first + dimension::ROULETTE) >= survival {
+        let continuation_probability = continuation_probability(segments, throughput * eta_squared);
+        if continuation_probability < 1.0 {
+            if sampler.single(first + dimension::ROULETTE) >= continuation_probability {
                 break;
             }
-            throughput /= survival;
+            throughput /= continuation_probability;
         }
         if throughput == Rgb::ZERO || is_cut(segments, &bsdf, &scattered) {
             break;

@@ -24,8 +24,8 @@ use crate::film::CIRCLE;
 use crate::geometry::Ray;
 use crate::scene::SurfacePoint;
 use crate::transport::estimator::{Counters, MAX_CROSSINGS};
-use crate::transport::path::PathTracer;
-use crate::transport::path::state::{Path, Wave};
+use crate::transport::path::PathIntegrator;
+use crate::transport::path::state::{PathState, Wavefront};
 use crate::transport::walk::visibility::{FEW, pass_cutout, passing};
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
@@ -44,7 +44,7 @@ const BEFORE_FLASHES: u32 = 16;
 /// One end of a connection. Both normals are on the side of the other end.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C)]
-pub(in crate::transport) struct End {
+pub(in crate::transport) struct ConnectionVertex {
     position: [f32; 3],
     /// Bound of the error of `position`.
     error: f32,
@@ -53,7 +53,7 @@ pub(in crate::transport) struct End {
     geometric_normal: [f32; 3],
 }
 
-impl End {
+impl ConnectionVertex {
     pub(in crate::transport) fn of(point: &SurfacePoint) -> Self {
         Self {
             position: point.position.to_array(),
@@ -71,7 +71,7 @@ impl End {
 
     /// The ray from here to `other` that meets neither surface.
     #[inline]
-    fn ray_to(&self, other: &End) -> Ray {
+    fn ray_to(&self, other: &ConnectionVertex) -> Ray {
         let origin = self.outside();
         Ray::segment(origin, other.outside() - origin, 1.0 - f32::EPSILON)
     }
@@ -80,7 +80,7 @@ impl End {
 /// g = cos θ_x cos θ_y / |x - y|²: density per area, up to π, with which a path from the diffuse point `x` meets
 /// `y`. Zero where the two are not on the same side of each other.
 #[inline]
-fn density(x: &End, y: &End) -> f32 {
+fn density(x: &ConnectionVertex, y: &ConnectionVertex) -> f32 {
     let between = Vec3::from(y.position) - Vec3::from(x.position);
     let square = between.length_squared();
     let leaving = between.dot(x.normal.into());
@@ -111,9 +111,9 @@ struct Coated {
 /// What a path offers to its circle, and what it gets.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C)]
-pub(in crate::transport) struct Exchange {
-    x: End,
-    y: End,
+pub(in crate::transport) struct ReuseState {
+    x: ConnectionVertex,
+    y: ConnectionVertex,
     /// β behind x: what radiance from y is worth in the pixel.
     throughput: [f32; 3],
     /// What the path gathered before y, and its shares of all L_j.
@@ -140,7 +140,7 @@ const LIT: u16 = 4;
 /// The same, but it came from behind y.
 const BEHIND: u16 = 5;
 
-impl Exchange {
+impl ReuseState {
     pub(in crate::transport) fn new(circle: u32) -> Self {
         Self { circle, ..Self::default() }
     }
@@ -157,7 +157,7 @@ impl Exchange {
         if self.stage != ALONE || throughput == Rgb::ZERO {
             return false;
         }
-        self.x = End::of(point);
+        self.x = ConnectionVertex::of(point);
         self.throughput = throughput.to_array();
         self.segments = segments as u16;
         self.stage = LEAVING;
@@ -171,12 +171,12 @@ impl Exchange {
         &mut self,
         point: &SurfacePoint,
         cover: Option<Cover>,
-        path: &mut Path,
+        path: &mut PathState,
     ) {
         if self.stage != LEAVING {
             return;
         }
-        self.y = End::of(point);
+        self.y = ConnectionVertex::of(point);
         let density = density(&self.x, &self.y);
         match cover {
             Some(cover) if density > 0.0 && density < f32::INFINITY => {
@@ -209,7 +209,7 @@ impl Exchange {
 
     /// The path has left y: what it has gathered so far came from a light.
     #[inline]
-    pub(in crate::transport) fn go_behind(&mut self, path: &mut Path) {
+    pub(in crate::transport) fn go_behind(&mut self, path: &mut PathState) {
         if self.stage == LIT {
             self.divide(self.coated.of_light, path);
             self.stage = BEHIND;
@@ -218,7 +218,7 @@ impl Exchange {
 
     /// The path has ended: what it offers is what it has gathered, less what is its own.
     #[inline]
-    fn finish(&mut self, path: &mut Path) {
+    fn finish(&mut self, path: &mut PathState) {
         match self.stage {
             LIT => self.divide(self.coated.of_light, path),
             BEHIND => self.divide(self.coated.of_path, path),
@@ -229,7 +229,7 @@ impl Exchange {
     }
 
     /// Divides what the path has gathered between base and coat.
-    fn divide(&mut self, part: [f32; 3], path: &mut Path) {
+    fn divide(&mut self, part: [f32; 3], path: &mut PathState) {
         let light = Rgb::from(core::mem::take(&mut path.radiance));
         let base = light * Rgb::from(part);
         self.coated.base = (Rgb::from(self.coated.base) + base).to_array();
@@ -238,7 +238,7 @@ impl Exchange {
 
     /// What T of y at `x` is.
     #[inline]
-    fn transmittance(&self, x: &End) -> Rgb {
+    fn transmittance(&self, x: &ConnectionVertex) -> Rgb {
         let to_x = Vec3::from(x.position) - Vec3::from(self.y.position);
         let cosine = to_x.dot(self.y.normal.into()) / to_x.length();
         self.coated.cover.transmittance(cosine.clamp(0.0, 1.0))
@@ -252,20 +252,20 @@ impl Exchange {
 
     /// What the pixel sees in the end, `path` being what the path gathered.
     #[inline]
-    pub(in crate::transport) fn seen(&self, path: &Path) -> Rgb {
+    pub(in crate::transport) fn seen(&self, path: &PathState) -> Rgb {
         let own = if self.stage >= OFFERING { Rgb::ZERO } else { Rgb::from(path.radiance) };
         own + Rgb::from(self.radiance)
     }
 
     /// What the pixel would see if nothing were shared, before it is.
-    pub(in crate::transport) fn alone(&self, path: &Path) -> Rgb {
+    pub(in crate::transport) fn alone(&self, path: &PathState) -> Rgb {
         let worth = if self.stage >= OFFERING { Rgb::from(self.throughput) } else { Rgb::ONE };
         Rgb::from(self.radiance) + worth * (Rgb::from(path.radiance) + Rgb::from(self.coated.base))
     }
 
     /// Adds `light` that belongs to `path` alone, wherever it is met.
     #[inline]
-    pub(in crate::transport) fn keep(&mut self, path: &mut Path, light: Rgb) {
+    pub(in crate::transport) fn keep(&mut self, path: &mut PathState, light: Rgb) {
         if self.stage >= OFFERING {
             self.take(1.0, light);
         } else {
@@ -282,14 +282,14 @@ impl Exchange {
 /// That path `taking` might have met what path `offering` did.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C)]
-pub(in crate::transport) struct Pair {
+pub(in crate::transport) struct Connection {
     offering: u32,
     taking: u32,
     /// V g.
     density: f32,
 }
 
-impl<F: Features> PathTracer<'_, F> {
+impl<F: Features> PathIntegrator<'_, F> {
     /// The same, where samples that are bright next to the `mean` radiance of the picture are shared in part only.
     pub fn with_flashes(&self, mean: f32) -> Self {
         let mut other = *self;
@@ -298,7 +298,7 @@ impl<F: Features> PathTracer<'_, F> {
     }
 
     /// Deals out what the first `count` paths of the wave have gathered behind their y.
-    pub(in crate::transport) fn share(&self, wave: &mut Wave, count: usize, counters: &mut Counters) {
+    pub(in crate::transport) fn share(&self, wave: &mut Wavefront, count: usize, counters: &mut Counters) {
         for (exchange, path) in wave.exchanges.iter_mut().zip(wave.paths.iter_mut()).take(count) {
             exchange.finish(path);
         }
@@ -322,7 +322,7 @@ impl<F: Features> PathTracer<'_, F> {
                 }
                 let density = density(&taker.x, &offer.y);
                 if density > 0.0 && density < f32::INFINITY {
-                    wave.pairs[pairs] = Pair { offering: j as u32, taking: k as u32, density };
+                    wave.pairs[pairs] = Connection { offering: j as u32, taking: k as u32, density };
                     if k != j {
                         wave.shadow_rays[rays] = Ray { tag: pairs as u32, ..offer.y.ray_to(&taker.x) };
                         rays += 1;
@@ -335,7 +335,7 @@ impl<F: Features> PathTracer<'_, F> {
     }
 
     /// Traces the first `rays` connections of the first `pairs` pairs and gives each path its shares.
-    fn deal(&self, wave: &mut Wave, pairs: usize, rays: usize, counters: &mut Counters) {
+    fn deal(&self, wave: &mut Wavefront, pairs: usize, rays: usize, counters: &mut Counters) {
         self.see(wave, rays, counters);
         let mut rest = &wave.pairs[..pairs];
         while let Some(first) = rest.first() {
@@ -370,7 +370,7 @@ impl<F: Features> PathTracer<'_, F> {
     }
 
     /// Multiplies the densities of the pairs with what the rays between them let pass: V.
-    fn see(&self, wave: &mut Wave, mut rays: usize, counters: &mut Counters) {
+    fn see(&self, wave: &mut Wavefront, mut rays: usize, counters: &mut Counters) {
         if !(F::CUTOUT && self.has_cutouts) {
             counters.shadow_rays += rays as u64;
             let (shadow_rays, hidden) = (&wave.shadow_rays[..rays], &mut wave.hidden[..rays]);
@@ -416,7 +416,7 @@ impl<F: Features> PathTracer<'_, F> {
 }
 
 /// Where the circle of path `first` ends.
-fn end_of_circle(exchanges: &[Exchange], first: usize) -> usize {
-    let members = |other: &&Exchange| other.circle == exchanges[first].circle;
+fn end_of_circle(exchanges: &[ReuseState], first: usize) -> usize {
+    let members = |other: &&ReuseState| other.circle == exchanges[first].circle;
     first + exchanges[first..].iter().take_while(members).count()
 }

@@ -9,9 +9,9 @@ use crate::bsdf::Features;
 use crate::film::{PIXELS_PER_TILE, Tile};
 use crate::memory::{Arena, OutOfMemory};
 use crate::transport::estimator::Counters;
-use crate::transport::path::PathTracer;
-use crate::transport::path::state::{Share, Wave};
-use crate::transport::path::tile::Places;
+use crate::transport::path::PathIntegrator;
+use crate::transport::path::state::{Components, Wavefront};
+use crate::transport::path::tile::TileSampler;
 
 /// Samples of each pixel of the pilot. The first alone tells how bright the picture is.
 const SAMPLES: u32 = 4;
@@ -104,7 +104,7 @@ impl core::ops::AddAssign for Pilot {
     }
 }
 
-impl<F: Features> PathTracer<'_, F> {
+impl<F: Features> PathIntegrator<'_, F> {
     /// The tiles at which a pilot looks, spread over the picture.
     pub fn pilot_tasks(&self) -> impl Iterator<Item = usize> + use<F> {
         let (tasks, pilots) = (self.tasks(), self.tasks().min(PILOT_TILES));
@@ -114,33 +114,33 @@ impl<F: Features> PathTracer<'_, F> {
     /// The mean radiance of one tile by a first look.
     ///
     /// # Errors
-    /// [`OutOfMemory`] where `scratch` has less than [`PathTracer::scratch`] bytes.
+    /// [`OutOfMemory`] where `scratch` has less than [`PathIntegrator::scratch`] bytes.
     pub fn pilot_mean(&self, task: usize, wave: usize, scratch: &mut Arena) -> Result<f32, OutOfMemory> {
         self.mean_of(None, task, wave, scratch)
     }
 
-    /// The same of light that is there beside the photons of [`PathTracer::with_caustics`]: paths that meet a lamp by chance
+    /// The same of light that is there beside the photons of [`PathIntegrator::with_caustics`]: paths that meet a lamp by chance
     /// count by their weight, and lamps that the eye sees, itself or by mirrors and glass, do not.
     ///
     /// # Errors
-    /// As [`PathTracer::pilot_mean`].
+    /// As [`PathIntegrator::pilot_mean`].
     pub fn pilot_rest(&self, task: usize, wave: usize, scratch: &mut Arena) -> Result<f32, OutOfMemory> {
-        self.mean_of(Some(Share::UNSEEN), task, wave, scratch)
+        self.mean_of(Some(Components::UNSEEN), task, wave, scratch)
     }
 
     /// The mean radiance of the `share` of the light.
     fn mean_of(
         &self,
-        share: Option<Share>,
+        share: Option<Components>,
         task: usize,
         wave: usize,
         scratch: &mut Arena,
     ) -> Result<f32, OutOfMemory> {
         let mut arena = scratch.scratch();
-        let mut wave = Wave::new(wave, &mut arena)?;
+        let mut wave = Wavefront::new(wave, &mut arena)?;
         let tile = Tile::new(self.settings.width, self.settings.height, task);
         let (mut sum, mut all) = (0.0, 0);
-        let mut places = Places::new(tile, 0..1);
+        let mut places = TileSampler::new(tile, 0..1);
         loop {
             let count = self.start(&mut places, &mut wave);
             if count == 0 {
@@ -159,7 +159,7 @@ impl<F: Features> PathTracer<'_, F> {
     /// Looks at one tile of a picture whose `mean` radiance is about that; nothing of it reaches the film.
     ///
     /// # Errors
-    /// [`OutOfMemory`] where `scratch` has less than [`PathTracer::scratch`] bytes.
+    /// [`OutOfMemory`] where `scratch` has less than [`PathIntegrator::scratch`] bytes.
     pub fn pilot(
         &self,
         task: usize,
@@ -170,11 +170,11 @@ impl<F: Features> PathTracer<'_, F> {
         let sharing = self.with_reuse(true).with_flashes(mean);
         let connection = if self.has_cutouts { CONNECTION_THROUGH_CUTOUTS } else { CONNECTION };
         let mut arena = scratch.scratch();
-        let mut wave = Wave::new(wave, &mut arena)?;
+        let mut wave = Wavefront::new(wave, &mut arena)?;
         let tile = Tile::new(self.settings.width, self.settings.height, task);
         let mut pilot = Pilot::default();
         // A layer of all pixels after the other, as many at a time as there is memory for.
-        let mut places = Places::new(tile, 0..SAMPLES);
+        let mut places = TileSampler::new(tile, 0..SAMPLES);
         loop {
             let count = sharing.start(&mut places, &mut wave);
             if count == 0 {
@@ -199,7 +199,7 @@ impl<F: Features> PathTracer<'_, F> {
 
 impl Pilot {
     /// Adds the squared differences between samples of the same pixel.
-    fn compare(&mut self, wave: &Wave, count: usize, mean: f32) {
+    fn compare(&mut self, wave: &Wavefront, count: usize, mean: f32) {
         let shared = |i: usize| wave.exchanges[i].seen(&wave.paths[i]);
         let layer = wave.paths[..count].iter().take_while(|path| path.sample == wave.paths[0].sample).count();
         let mut blocks = [Block::default(); PIXELS_PER_TILE / BLOCK];

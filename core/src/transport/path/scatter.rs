@@ -1,26 +1,26 @@
 //! The next direction of a path: BSDF sampling, Russian roulette, and the quantities that the next vertex needs for
 //! its weights.
 
-use super::PathTracer;
+use super::PathIntegrator;
 use super::shade::{Known, Vertex};
 use crate::Rgb;
 use crate::bsdf::{Bsdf, BsdfSample, Features};
 use crate::geometry::Ray;
 use crate::transport::caustics::merge::ChainLink;
-use crate::transport::estimator::{Counters, dimension, is_cut, survival};
-use crate::transport::path::reuse::Exchange;
-use crate::transport::path::state::{Merged, Path, Share};
+use crate::transport::estimator::{Counters, continuation_probability, dimension, is_cut};
+use crate::transport::path::reuse::ReuseState;
+use crate::transport::path::state::{Components, MergeState, PathState};
 
-impl<F: Features> PathTracer<'_, F> {
+impl<F: Features> PathIntegrator<'_, F> {
     /// The ray by which the path goes on from `vertex`, if it does. `gathered`: photons have the light that the wide
     /// part of the surface reflects.
     #[inline]
     pub(super) fn scatter(
         &self,
-        path: &mut Path,
-        exchange: &mut Exchange,
+        path: &mut PathState,
+        exchange: &mut ReuseState,
         vertex: &Vertex,
-        (known, gathered, merged): (&Known, bool, Merged),
+        (known, gathered, merged): (&Known, bool, MergeState),
         counters: &mut Counters,
     ) -> Option<Ray> {
         let Vertex { point, ref bsdf, ref sampler, wo, first, segments, apart, .. } = *vertex;
@@ -32,7 +32,7 @@ impl<F: Features> PathTracer<'_, F> {
         };
         // A narrow coat's reflection was not gathered.
         if gathered && !is_narrow {
-            path.share = Share::EMITTED;
+            path.share = Components::EMITTED;
         }
         if self.settings.reuse && exchange.is_lit() {
             let f = sample.weight * sample.pdf;
@@ -57,12 +57,12 @@ impl<F: Features> PathTracer<'_, F> {
         }
         path.eta_squared *= sample.eta * sample.eta;
         let worth = exchange.worth(throughput) * path.eta_squared;
-        let survival = if certain { 1.0 } else { survival(segments, worth) };
-        if survival < 1.0 {
-            if sampler.single(first + dimension::ROULETTE) >= survival {
+        let continuation_probability = if certain { 1.0 } else { continuation_probability(segments, worth) };
+        if continuation_probability < 1.0 {
+            if sampler.single(first + dimension::ROULETTE) >= continuation_probability {
                 return None;
             }
-            throughput /= survival;
+            throughput /= continuation_probability;
         }
         if throughput == Rgb::ZERO {
             return None;
@@ -88,9 +88,9 @@ impl<F: Features> PathTracer<'_, F> {
     #[inline]
     fn update_merging(
         &self,
-        path: &mut Path,
+        path: &mut PathState,
         vertex: &Vertex,
-        merged: Merged,
+        merged: MergeState,
         (sample, is_narrow): (&BsdfSample, bool),
     ) {
         let Some(merging) = &self.merging else { return };
@@ -102,7 +102,7 @@ impl<F: Features> PathTracer<'_, F> {
             (path.merged, path.disc) = (merged, merging.radius(point.position));
         }
         path.chain = match path.chain {
-            _ if is_rough && merged != Merged::NEVER => -merging.begun(point.position),
+            _ if is_rough && merged != MergeState::NEVER => -merging.begun(point.position),
             _ if is_rough => 0.0,
             chain if !merging.may_come_by(bsdf, chain) => 0.0,
             0.0 => 0.0,

@@ -2,7 +2,7 @@
 //! light that a structure knows, next-event estimation (`direct.rs`), the next direction (`scatter.rs`).
 
 use super::shadow_rays::Shadows;
-use super::{PathTracer, SurfaceInteraction};
+use super::{PathIntegrator, SurfaceInteraction};
 use crate::Rgb;
 use crate::bsdf::{Bsdf, Features};
 use crate::geometry::{Hit, Ray};
@@ -10,9 +10,9 @@ use crate::light::emitted;
 use crate::sampling::Sampler;
 use crate::scene::SurfacePoint;
 use crate::transport::estimator::{Counters, dimension, environment_heuristic, power_heuristic};
-use crate::transport::path::reuse::Exchange;
-use crate::transport::path::state::{Merged, Path, Share};
-use crate::transport::photon_mapping::final_gather::Said;
+use crate::transport::path::reuse::ReuseState;
+use crate::transport::path::state::{Components, MergeState, PathState};
+use crate::transport::photon_mapping::final_gather::MapLookup;
 use core::f32::consts::FRAC_1_PI;
 use glam::Vec3;
 
@@ -49,20 +49,20 @@ pub(super) struct Vertex<'v, 'a> {
 /// Light that structures know at a vertex, and the light that is left for the path to find.
 pub(super) struct Known {
     /// A photon map's answer.
-    pub(super) said: Said,
+    pub(super) said: MapLookup,
     /// Light samples of next-event estimation.
     pub(super) points: u32,
     /// Next-event estimation is all that is left: the path ends here.
     pub(super) ends: bool,
 }
 
-impl<'a, F: Features> PathTracer<'a, F> {
+impl<'a, F: Features> PathIntegrator<'a, F> {
     /// Shades the `hit` of `ray`, the last segment of `path`. The ray by which the path goes on.
     #[inline]
     pub(super) fn shade(
         &self,
-        path: &mut Path,
-        exchange: &mut Exchange,
+        path: &mut PathState,
+        exchange: &mut ReuseState,
         (ray, hit): (&Ray, &Hit),
         met: Option<&SurfaceInteraction<'a>>,
         shadows: &mut Shadows,
@@ -132,7 +132,7 @@ impl<'a, F: Features> PathTracer<'a, F> {
     }
 
     /// Adds light of the environment, which the ray reaches.
-    fn escape(&self, path: &mut Path, ray: &Ray) {
+    fn escape(&self, path: &mut PathState, ray: &Ray) {
         let Some(environment) = self.scene.environment.as_ref().filter(|_| path.share.sees_emitters()) else {
             return;
         };
@@ -153,7 +153,7 @@ impl<'a, F: Features> PathTracer<'a, F> {
 
     /// Adds light that the surface at `point` emits.
     #[inline]
-    fn emission(&self, path: &mut Path, point: &SurfacePoint, (ray, hit): (&Ray, &Hit)) {
+    fn emission(&self, path: &mut PathState, point: &SurfacePoint, (ray, hit): (&Ray, &Hit)) {
         if !(point.material.emits() && path.share.sees_lamps()) {
             return;
         }
@@ -181,9 +181,15 @@ impl<'a, F: Features> PathTracer<'a, F> {
     /// Adds light that a photon map or an irradiance cache knows, and says which light is left. `came` is the light
     /// that the path was to find when it came here.
     #[inline]
-    fn known(&self, path: &mut Path, exchange: &mut Exchange, vertex: &Vertex, came: Share) -> Known {
+    fn known(
+        &self,
+        path: &mut PathState,
+        exchange: &mut ReuseState,
+        vertex: &Vertex,
+        came: Components,
+    ) -> Known {
         let Vertex { point, ref bsdf, throughput, segments, .. } = *vertex;
-        let mut said = Said::default();
+        let mut said = MapLookup::default();
         if let Some(maps) = self.maps {
             let turns = vertex.sampler.single(dimension::PROBES + segments);
             let limit = if self.is_limited() { segments } else { 0 };
@@ -201,8 +207,8 @@ impl<'a, F: Features> PathTracer<'a, F> {
             && !known.said.is_all
         {
             path.add(throughput * diffuse.reflectance * indirect.irradiance * FRAC_1_PI);
-            path.share = Share::DIRECT;
-            known.said.next = Share::DIRECT;
+            path.share = Components::DIRECT;
+            known.said.next = Components::DIRECT;
             let has_environment = self.scene.environment.is_some();
             known.ends = indirect.shining < SMALL && !self.has_mirrors && !has_environment;
             known.points = if known.ends || has_environment { path.lights.max(1).into() } else { 1 };
@@ -212,7 +218,7 @@ impl<'a, F: Features> PathTracer<'a, F> {
 
     /// Adds light reflected from photons (`density.rs`); whether the surface stores any.
     #[inline]
-    fn photons_at(&self, path: &mut Path, exchange: &mut Exchange, vertex: &Vertex) -> bool {
+    fn photons_at(&self, path: &mut PathState, exchange: &mut ReuseState, vertex: &Vertex) -> bool {
         let Some(photons) = self.photons.as_ref().filter(|_| vertex.segments == 1 || !self.is_limited())
         else {
             return false;
@@ -227,7 +233,7 @@ impl<'a, F: Features> PathTracer<'a, F> {
 
     /// Adds caustics from photons, where the path merges with them at this vertex (`merge.rs`).
     #[inline]
-    fn merge_at(&self, path: &mut Path, exchange: &mut Exchange, vertex: &Vertex) -> Merged {
+    fn merge_at(&self, path: &mut PathState, exchange: &mut ReuseState, vertex: &Vertex) -> MergeState {
         let merged = path.merged;
         let Some(merging) = self.merging.as_ref().filter(|_| merged.may_come()) else { return merged };
         let met = merging.met(path, vertex.point.position, vertex.segments, self.is_limited());
@@ -238,7 +244,7 @@ impl<'a, F: Features> PathTracer<'a, F> {
             let tracer = (self.bvh, self.level);
             let gathered = merging.reflected::<F>(tracer, path.sample, surface, from, turns);
             path.gather(vertex.throughput, exchange, gathered);
-            Merged::LATER
+            MergeState::LATER
         })
     }
 }

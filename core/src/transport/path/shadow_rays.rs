@@ -1,13 +1,13 @@
 //! Shadow rays of a wave, traced after its vertices are shaded: light is added to the path then.
 
-use super::PathTracer;
+use super::PathIntegrator;
 use crate::Rgb;
 use crate::bsdf::Features;
 use crate::bvh::Coherence;
 use crate::geometry::Ray;
 use crate::scene::Scene;
 use crate::transport::estimator::{Counters, MAX_CROSSINGS};
-use crate::transport::path::state::{Path, Wave};
+use crate::transport::path::state::{PathState, Wavefront};
 use crate::transport::walk::visibility::{FEW, pass_cutout, passing};
 
 /// In the tag of a shadow ray: it goes to the environment, whose radiance is looked up when it has arrived. Most are
@@ -16,7 +16,7 @@ pub(super) const TO_ENVIRONMENT: u32 = 1 << 31;
 
 /// Adds the light at the end of shadow ray `ray`, which met nothing, to its path.
 #[inline]
-fn arrive(scene: &Scene, paths: &mut [Path], ray: &Ray, light: Rgb) {
+fn arrive(scene: &Scene, paths: &mut [PathState], ray: &Ray, light: Rgb) {
     let environment = scene.environment.as_ref().filter(|_| ray.tag & TO_ENVIRONMENT != 0);
     let radiance = environment.map_or(Rgb::ONE, |e| e.radiance(scene, ray.direction.into()));
     if let Some(path) = paths.get_mut((ray.tag & !TO_ENVIRONMENT) as usize) {
@@ -41,9 +41,9 @@ impl Shadows<'_> {
     }
 }
 
-impl<F: Features> PathTracer<'_, F> {
+impl<F: Features> PathIntegrator<'_, F> {
     /// Adds the light at the end of the first `shadows` shadow rays to the paths of those that arrive.
-    pub(super) fn trace_shadow_rays(&self, wave: &mut Wave, shadows: usize) {
+    pub(super) fn trace_shadow_rays(&self, wave: &mut Wavefront, shadows: usize) {
         let rays = &wave.shadow_rays[..shadows];
         let hidden = &mut wave.hidden[..shadows];
         self.bvh.occluded_batch(self.level, rays, hidden);
@@ -58,7 +58,7 @@ impl<F: Features> PathTracer<'_, F> {
     /// its next surface.
     pub(super) fn trace_shadow_rays_through_cutouts(
         &self,
-        wave: &mut Wave,
+        wave: &mut Wavefront,
         mut shadows: usize,
         counters: &mut Counters,
     ) {

@@ -13,8 +13,8 @@ use crate::light::{LightSampler, emitted};
 use crate::sampling::Sampler;
 use crate::scene::{Camera, Material, Scene, SurfacePoint};
 use crate::transport::estimator::{Counters, MAX_CROSSINGS, PathSettings, dimension};
-use crate::transport::path::PathTracer;
-use crate::transport::path::state::Wave;
+use crate::transport::path::PathIntegrator;
+use crate::transport::path::state::Wavefront;
 use crate::{Level, Rgb};
 use glam::{Vec2, Vec3};
 
@@ -177,13 +177,13 @@ pub(in crate::transport) fn emission<F: Features>(
     Rgb::ZERO
 }
 
-impl<F: Features> PathTracer<'_, F> {
+impl<F: Features> PathIntegrator<'_, F> {
     /// What the first `count` paths of the wave see of lamps, in `wave.shadow_light`: those whose pixel is `outlined`, by
     /// its place; nothing for the others.
     pub(in crate::transport) fn look_at_lamps(
         &self,
         mut outlined: impl FnMut(u32) -> bool,
-        wave: &mut Wave,
+        wave: &mut Wavefront,
         count: usize,
         counters: &mut Counters,
     ) {
@@ -207,7 +207,7 @@ impl<F: Features> PathTracer<'_, F> {
     }
 
     /// Adds what the first `count` rays of the wave see.
-    fn gather_emission(&self, wave: &mut Wave, count: usize, counters: &mut Counters) {
+    fn gather_emission(&self, wave: &mut Wavefront, count: usize, counters: &mut Counters) {
         self.trace(wave, count, Coherence::Coherent, counters);
         for (ray, hit) in wave.rays.iter().zip(&*wave.hits).take(count) {
             let light = emission::<F>(self.scene, self.bvh, self.level, *ray, *hit);

@@ -7,14 +7,14 @@ use crate::geometry::{Hit, Ray};
 use crate::memory::{Arena, Footprint, OutOfMemory};
 use crate::sampling::Sampler;
 use crate::transport::estimator::{Counters, MAX_CROSSINGS};
-use crate::transport::path::reuse::{Exchange, Pair};
+use crate::transport::path::reuse::{Connection, ReuseState};
 use crate::transport::photon_mapping::density::Gathered;
 use bytemuck::{Pod, Zeroable};
 
 /// A path between two of its vertices.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C)]
-pub(in crate::transport) struct Path {
+pub(in crate::transport) struct PathState {
     /// β: what radiance at the end of the ray is worth in the pixel.
     pub(in crate::transport) throughput: [f32; 3],
     /// Density in solid angle with which the ray was chosen; infinite where no other technique could.
@@ -42,7 +42,7 @@ pub(in crate::transport) struct Path {
     /// Product of the squared relative indices of refraction passed so far.
     pub(in crate::transport) eta_squared: f32,
     /// What of the light at the end of the ray belongs to the path.
-    pub(in crate::transport) share: Share,
+    pub(in crate::transport) share: Components,
     /// Of a path that came by mirrors and glass from a rough surface: how much denser photons come from a light to
     /// there than paths from there to the light, but for what the light has to do with it ([`crate::transport::caustics::merge`]). Negative
     /// on the way to the first mirror or glass; zero where photons could not find the path.
@@ -50,7 +50,7 @@ pub(in crate::transport) struct Path {
     /// Points of lights that it asks for direct light where a shadow ray alone finds that; 0 stands for one.
     pub(in crate::transport) lights: u16,
     /// Whether photons are still to be asked, behind the rough surfaces that it has left.
-    pub(in crate::transport) merged: Merged,
+    pub(in crate::transport) merged: MergeState,
     /// The radius of discs at the last of them; zero before the first.
     pub(in crate::transport) disc: f32,
     /// How long it is from the eye to its last vertex.
@@ -59,7 +59,7 @@ pub(in crate::transport) struct Path {
     pub(in crate::transport) left_coat: u32,
 }
 
-impl Path {
+impl PathState {
     /// Its chain, as light at the end of the ray knows it.
     #[inline]
     pub(in crate::transport) fn chain_to_light(&self) -> f32 {
@@ -75,7 +75,7 @@ impl Path {
     pub(in crate::transport) fn gather(
         &mut self,
         throughput: Rgb,
-        exchange: &mut Exchange,
+        exchange: &mut ReuseState,
         Gathered { light, blur }: Gathered,
     ) {
         // It is for this path alone: others have asked photons where they are.
@@ -111,17 +111,17 @@ impl Path {
 /// What became of the one vertex of a path at which a photon of caustics can be merged with it ([`crate::transport::caustics::merge`]).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
 #[repr(transparent)]
-pub(in crate::transport) struct Merged(u16);
+pub(in crate::transport) struct MergeState(u16);
 
-impl Merged {
+impl MergeState {
     /// It may be still to come.
-    pub(in crate::transport) const LATER: Merged = Merged(0);
+    pub(in crate::transport) const LATER: MergeState = MergeState(0);
     /// Photons were asked.
-    pub(in crate::transport) const DONE: Merged = Merged(1);
+    pub(in crate::transport) const DONE: MergeState = MergeState(1);
     /// They were not, and will not be.
-    pub(in crate::transport) const NEVER: Merged = Merged(2);
+    pub(in crate::transport) const NEVER: MergeState = MergeState(2);
     /// Photons at a surface before know what comes straight from a mirror; of other light it may be still to come.
-    pub(in crate::transport) const KNOWN: Merged = Merged(3);
+    pub(in crate::transport) const KNOWN: MergeState = MergeState(3);
 
     /// Whether it may be still to come.
     #[inline]
@@ -135,24 +135,24 @@ impl Merged {
 /// rays that gather for the cache the other way round.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
 #[repr(transparent)]
-pub(in crate::transport) struct Share(u32);
+pub(in crate::transport) struct Components(u32);
 
-impl Share {
-    pub(in crate::transport) const ALL: Share = Share(0);
-    pub(in crate::transport) const DIRECT: Share = Share(1);
-    pub(in crate::transport) const REFLECTED: Share = Share(2);
+impl Components {
+    pub(in crate::transport) const ALL: Components = Components(0);
+    pub(in crate::transport) const DIRECT: Components = Components(1);
+    pub(in crate::transport) const REFLECTED: Components = Components(2);
     /// Light straight from emitters: photons have the rest.
-    pub(in crate::transport) const EMITTED: Share = Share(3);
+    pub(in crate::transport) const EMITTED: Components = Components(3);
     /// With photon maps: all but caustics. From a surface with a diffuse part; what is next that has one may end the path.
-    pub(in crate::transport) const NO_CAUSTIC: Share = Share(4);
+    pub(in crate::transport) const NO_CAUSTIC: Components = Components(4);
     /// The same behind a mirror or glass, where emitters are caustics.
-    pub(in crate::transport) const BEHIND_MIRROR: Share = Share(5);
+    pub(in crate::transport) const BEHIND_MIRROR: Components = Components(5);
     /// With photon maps: all light, but the next surface with a diffuse part may end the path.
-    pub(in crate::transport) const GATHERED: Share = Share(6);
+    pub(in crate::transport) const GATHERED: Components = Components(6);
     /// All light but that of the lamp which a camera ray meets: its pixel has that from rays of their own.
-    pub(in crate::transport) const BESIDE_LAMP: Share = Share(7);
+    pub(in crate::transport) const BESIDE_LAMP: Components = Components(7);
     /// All light but that of emitters which the eye sees, itself or by mirrors and glass.
-    pub(in crate::transport) const UNSEEN: Share = Share(8);
+    pub(in crate::transport) const UNSEEN: Components = Components(8);
 
     /// Whether what `bsdf` reflects or transmits belongs to the other share.
     #[inline]
@@ -197,11 +197,11 @@ impl Share {
 }
 
 /// Slices for up to `capacity` paths. Rays know their path by their tag.
-pub(in crate::transport) struct Wave<'m> {
-    pub(in crate::transport) paths: &'m mut [Path],
+pub(in crate::transport) struct Wavefront<'m> {
+    pub(in crate::transport) paths: &'m mut [PathState],
     /// What the paths share with their neighbours.
-    pub(in crate::transport) exchanges: &'m mut [Exchange],
-    pub(in crate::transport) pairs: &'m mut [Pair],
+    pub(in crate::transport) exchanges: &'m mut [ReuseState],
+    pub(in crate::transport) pairs: &'m mut [Connection],
     pub(in crate::transport) rays: &'m mut [Ray],
     pub(in crate::transport) hits: &'m mut [Hit],
     pub(in crate::transport) shadow_rays: &'m mut [Ray],
@@ -210,14 +210,14 @@ pub(in crate::transport) struct Wave<'m> {
     pub(in crate::transport) hidden: &'m mut [u8],
 }
 
-impl<'m> Wave<'m> {
+impl<'m> Wavefront<'m> {
     /// `capacity` paths, or the fewest that can share.
     pub(in crate::transport) fn footprint(capacity: usize) -> Footprint {
         let capacity = capacity.max(CIRCLE);
         Footprint::default()
-            .slice::<Path>(capacity)
-            .slice::<Exchange>(capacity)
-            .slice::<Pair>(capacity)
+            .slice::<PathState>(capacity)
+            .slice::<ReuseState>(capacity)
+            .slice::<Connection>(capacity)
             .slice::<Ray>(capacity)
             .slice::<Hit>(capacity)
             .slice::<Ray>(capacity)

@@ -10,14 +10,14 @@ use crate::geometry::{MISS, Ray};
 use crate::memory::{Arena, OutOfMemory};
 use crate::sampling::Sampler;
 use crate::transport::estimator::{Counters, PathSettings};
-use crate::transport::path::reuse::Exchange;
+use crate::transport::path::reuse::ReuseState;
 use crate::transport::path::silhouette::outlined;
-use crate::transport::path::state::{Path, Share, Wave};
-use crate::transport::path::{LIGHT_SAMPLES, PathTracer};
+use crate::transport::path::state::{Components, PathState, Wavefront};
+use crate::transport::path::{LIGHT_SAMPLES, PathIntegrator};
 use core::ops::Range;
 
 /// All samples of a tile that are still to be taken.
-pub(in crate::transport) struct Places {
+pub(in crate::transport) struct TileSampler {
     tile: Tile,
     left: Range<u32>,
     /// The next circle of the layer; where nothing is shared, the next pixel.
@@ -26,7 +26,7 @@ pub(in crate::transport) struct Places {
     outlined: PixelSet,
 }
 
-impl Places {
+impl TileSampler {
     pub(in crate::transport) fn new(tile: Tile, samples: Range<u32>) -> Self {
         Self { tile, left: samples, next: 0, outlined: PixelSet::default() }
     }
@@ -44,11 +44,11 @@ impl Places {
     }
 }
 
-impl<F: Features> PathTracer<'_, F> {
+impl<F: Features> PathIntegrator<'_, F> {
     /// Traces `samples` of tile `task` and adds them to `out`, the tile's pixels of the film.
     ///
     /// # Errors
-    /// [`OutOfMemory`] where `scratch` has less than [`PathTracer::scratch`] bytes.
+    /// [`OutOfMemory`] where `scratch` has less than [`PathIntegrator::scratch`] bytes.
     pub fn run(
         &self,
         task: usize,
@@ -62,9 +62,9 @@ impl<F: Features> PathTracer<'_, F> {
         let mut counters = Counters::default();
         // No larger than there are paths: the memory of a wave is cleared.
         let most = samples.len().saturating_mul(PIXELS_PER_TILE);
-        let mut places = Places::new(tile, samples);
+        let mut places = TileSampler::new(tile, samples);
         places.outlined = outlined(self.scene, self.lights, &self.settings, tile);
-        let mut wave = Wave::new(wave.min(most), &mut arena)?;
+        let mut wave = Wavefront::new(wave.min(most), &mut arena)?;
         let has_outlines = !places.outlined.is_empty();
         loop {
             let count = self.start(&mut places, &mut wave);
@@ -92,14 +92,14 @@ impl<F: Features> PathTracer<'_, F> {
     }
 
     /// Fills the wave with camera rays; returns how many. Circles stay together.
-    pub(in crate::transport) fn start(&self, places: &mut Places, wave: &mut Wave) -> usize {
+    pub(in crate::transport) fn start(&self, places: &mut TileSampler, wave: &mut Wavefront) -> usize {
         let mut count = 0;
         if self.settings.reuse {
             while count + CIRCLE <= wave.paths.len()
                 && let Some((circle, sample)) = places.next_of(CIRCLES)
             {
                 // Another number for each circle that a wave can hold.
-                let exchange = Exchange::new(sample.wrapping_mul(CIRCLES as u32) + circle as u32);
+                let exchange = ReuseState::new(sample.wrapping_mul(CIRCLES as u32) + circle as u32);
                 for place in places.tile.circle(circle, self.settings.seed, sample) {
                     self.begin(places, place, sample, exchange, wave, &mut count);
                 }
@@ -109,7 +109,7 @@ impl<F: Features> PathTracer<'_, F> {
         while count < wave.paths.len()
             && let Some((place, sample)) = places.next_of(PIXELS_PER_TILE)
         {
-            self.begin(places, place, sample, Exchange::new(0), wave, &mut count);
+            self.begin(places, place, sample, ReuseState::new(0), wave, &mut count);
         }
         count
     }
@@ -118,11 +118,11 @@ impl<F: Features> PathTracer<'_, F> {
     #[inline]
     fn begin(
         &self,
-        places: &Places,
+        places: &TileSampler,
         place: usize,
         sample: u32,
-        exchange: Exchange,
-        wave: &mut Wave,
+        exchange: ReuseState,
+        wave: &mut Wavefront,
         count: &mut usize,
     ) {
         let PathSettings { width, seed, .. } = self.settings;
@@ -130,18 +130,18 @@ impl<F: Features> PathTracer<'_, F> {
         let index = y * width + x;
         let ray = self.camera_ray([x, y], &Sampler::new(seed, index, sample));
         wave.rays[*count] = Ray { tag: *count as u32, ..ray };
-        wave.paths[*count] = Path {
+        wave.paths[*count] = PathState {
             throughput: [1.0; 3],
             pdf: f32::INFINITY,
             pixel: index,
             place: place as u32,
             sample,
             segments: 1,
-            share: if places.outlined.contains(place) { Share::BESIDE_LAMP } else { Share::ALL },
+            share: if places.outlined.contains(place) { Components::BESIDE_LAMP } else { Components::ALL },
             triangle: MISS,
             eta_squared: 1.0,
             lights: if self.has_cutouts { 1 } else { LIGHT_SAMPLES as u16 },
-            ..Path::default()
+            ..PathState::default()
         };
         wave.exchanges[*count] = exchange;
         *count += 1;

@@ -1,6 +1,6 @@
 //! Light paths: photons from the lights, left on every rough surface that they meet after the first (Jensen 1996).
 //!
-//! What they leave is, by [`Keep`], the light that surfaces reflect onto each other, and that mirrors and glass throw onto
+//! What they leave is, by [`PhotonFilter`], the light that surfaces reflect onto each other, and that mirrors and glass throw onto
 //! surfaces, where light straight from a light is for shadow rays to find; all light; or caustics alone. How they get there
 //! is in `walk/light.rs`.
 //!
@@ -17,9 +17,9 @@ use crate::memory::{Arena, Footprint, OutOfMemory};
 use crate::photon::Photon;
 use crate::scene::Scene;
 use crate::transport::estimator::Counters;
-use crate::transport::photon_mapping::visible_points::Sight;
+use crate::transport::photon_mapping::visible_points::VisiblePoints;
 pub use crate::transport::walk::light::PATHS;
-use crate::transport::walk::light::{Flight, Onward, Pile, State, Vertex, Visitor};
+use crate::transport::walk::light::{Continuation, LightPathState, LightWalk, PhotonBuffer, Vertex, Visitor};
 use crate::{Level, Rgb};
 use core::marker::PhantomData;
 use glam::Vec3;
@@ -32,7 +32,7 @@ pub(in crate::transport) const MOST: f32 = 0.8;
 
 /// Which photons are left.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Keep {
+pub enum PhotonFilter {
     /// All but those that come straight from a light.
     #[default]
     Reflected,
@@ -42,31 +42,31 @@ pub enum Keep {
     Caustic,
 }
 
-impl Keep {
+impl PhotonFilter {
     /// Whether a path leaves a photon where it met a surface.
     #[inline]
-    pub(in crate::transport) fn leaves(self, state: &State, vertex: &Vertex) -> bool {
+    pub(in crate::transport) fn leaves(self, state: &LightPathState, vertex: &Vertex) -> bool {
         vertex.bsdf.stores_photons()
             && match self {
-                Keep::All => true,
-                Keep::Reflected | Keep::Caustic => state.segments > 1,
+                PhotonFilter::All => true,
+                PhotonFilter::Reflected | PhotonFilter::Caustic => state.segments > 1,
             }
     }
 
     /// How it goes on from there.
     #[inline]
-    pub(in crate::transport) fn onward(self, vertex: &Vertex, leaves: bool) -> Option<Onward> {
-        let ends =
-            self == Keep::Caustic && (vertex.bsdf.stores_photons() || !vertex.bsdf.is_caustic_caster());
-        (!ends).then_some(Onward { most: if leaves { MOST } else { 1.0 }, mirrored: false })
+    pub(in crate::transport) fn onward(self, vertex: &Vertex, leaves: bool) -> Option<Continuation> {
+        let ends = self == PhotonFilter::Caustic
+            && (vertex.bsdf.stores_photons() || !vertex.bsdf.is_caustic_caster());
+        (!ends).then_some(Continuation { most: if leaves { MOST } else { 1.0 }, mirrored: false })
     }
 }
 
 /// What is shot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct ShootSettings {
+pub struct PhotonTracerSettings {
     /// Which photons are left.
-    pub keep: Keep,
+    pub keep: PhotonFilter,
     /// Another seed, other photons.
     pub seed: u32,
     /// Light paths for each map.
@@ -77,25 +77,25 @@ pub struct ShootSettings {
 
 /// Shoots the photons of one scene: a pass of tasks of [`PATHS`] paths.
 #[derive(Clone, Copy)]
-pub struct Shooter<'a, F> {
-    pub(in crate::transport) flight: Flight<'a, F>,
-    keep: Keep,
+pub struct PhotonTracer<'a, F> {
+    pub(in crate::transport) flight: LightWalk<'a, F>,
+    keep: PhotonFilter,
 }
 
-impl<'a, F: Features> Shooter<'a, F> {
+impl<'a, F: Features> PhotonTracer<'a, F> {
     /// A shooter over frozen structures. `F` has at least the features of the scene.
     pub fn new(
         scene: &'a Scene<'a>,
         bvh: &'a Bvh<'a>,
         lights: &'a LightSampler<'a>,
         emission: &'a EmissionSampler<'a>,
-        settings: ShootSettings,
+        settings: PhotonTracerSettings,
         level: Level,
     ) -> Self {
-        let ShootSettings { keep, seed, paths, max_depth } = settings;
+        let PhotonTracerSettings { keep, seed, paths, max_depth } = settings;
         let features = PhantomData;
         Self {
-            flight: Flight { scene, bvh, lights, emission, seed, paths, max_depth, level, features },
+            flight: LightWalk { scene, bvh, lights, emission, seed, paths, max_depth, level, features },
             keep,
         }
     }
@@ -107,19 +107,19 @@ impl<'a, F: Features> Shooter<'a, F> {
 
     /// Working memory of one task.
     pub fn scratch() -> Footprint {
-        Flight::<F>::scratch()
+        LightWalk::<F>::scratch()
     }
 
     /// Photons that a task needs room for.
     pub fn room(&self) -> usize {
-        if self.keep == Keep::Caustic { PATHS } else { ROOM }
+        if self.keep == PhotonFilter::Caustic { PATHS } else { ROOM }
     }
 
     /// Shoots the photons of task `task` of map number `map` (below 2^31). All of `out` is written; what is not needed,
-    /// with photons of no place, which a map refuses. Room for [`Shooter::room`] is enough.
+    /// with photons of no place, which a map refuses. Room for [`PhotonTracer::room`] is enough.
     ///
     /// # Errors
-    /// [`OutOfMemory`] where `scratch` has less than [`Shooter::scratch`] bytes.
+    /// [`OutOfMemory`] where `scratch` has less than [`PhotonTracer::scratch`] bytes.
     pub fn run(
         &self,
         task: usize,
@@ -127,7 +127,7 @@ impl<'a, F: Features> Shooter<'a, F> {
         scratch: &mut Arena,
         out: &mut [Photon],
     ) -> Result<Counters, OutOfMemory> {
-        let mut leaver = Leaver { keep: self.keep, pile: Pile::new(out) };
+        let mut leaver = Depositor { keep: self.keep, pile: PhotonBuffer::new(out) };
         let counters = self.flight.follow(task, map, scratch, &mut leaver)?;
         leaver.pile.finish();
         Ok(counters)
@@ -136,15 +136,15 @@ impl<'a, F: Features> Shooter<'a, F> {
     /// Which photons of task `task` of map number `map` are left in `sight`: `seen` is told of each.
     ///
     /// # Errors
-    /// Those of [`Shooter::run`].
+    /// Those of [`PhotonTracer::run`].
     pub fn look(
         &self,
         (task, map): (usize, u32),
-        sight: Sight,
+        sight: VisiblePoints,
         scratch: &mut Arena,
         seen: &mut dyn FnMut(Seen),
     ) -> Result<Counters, OutOfMemory> {
-        self.flight.follow(task, map, scratch, &mut Looker { keep: self.keep, sight, seen })
+        self.flight.follow(task, map, scratch, &mut VisibilityCounter { keep: self.keep, sight, seen })
     }
 }
 
@@ -160,17 +160,17 @@ pub struct Seen {
 }
 
 /// Tells of photons that are seen.
-struct Looker<'s> {
-    keep: Keep,
-    sight: Sight<'s>,
+struct VisibilityCounter<'s> {
+    keep: PhotonFilter,
+    sight: VisiblePoints<'s>,
     seen: &'s mut dyn FnMut(Seen),
 }
 
-impl Visitor for Looker<'_> {
-    const SEED: u64 = Leaver::SEED;
+impl Visitor for VisibilityCounter<'_> {
+    const SEED: u64 = Depositor::SEED;
 
     #[inline]
-    fn meet(&mut self, state: &State, vertex: &Vertex, _: &mut Counters) -> Option<Onward> {
+    fn meet(&mut self, state: &LightPathState, vertex: &Vertex, _: &mut Counters) -> Option<Continuation> {
         let leaves = self.keep.leaves(state, vertex);
         if leaves && self.sight.shows(vertex.point.position, vertex.point.geometric_normal) {
             let power = luminance(Rgb::from(state.power));
@@ -180,22 +180,27 @@ impl Visitor for Looker<'_> {
     }
 
     #[inline]
-    fn leave(&self, state: &mut State, vertex: &Vertex, _from: Vec3, _sample: (&BsdfSample, bool)) {
+    fn leave(&self, state: &mut LightPathState, vertex: &Vertex, _from: Vec3, _sample: (&BsdfSample, bool)) {
         state.mirrored = vertex.bsdf.is_delta().into();
     }
 }
 
 /// Leaves the photons that are wanted.
-pub(in crate::transport) struct Leaver<'p> {
-    keep: Keep,
-    pile: Pile<'p>,
+pub(in crate::transport) struct Depositor<'p> {
+    keep: PhotonFilter,
+    pile: PhotonBuffer<'p>,
 }
 
-impl Visitor for Leaver<'_> {
+impl Visitor for Depositor<'_> {
     const SEED: u64 = 0x7068_6f74_6f6e_7321;
 
     #[inline]
-    fn meet(&mut self, state: &State, vertex: &Vertex, counters: &mut Counters) -> Option<Onward> {
+    fn meet(
+        &mut self,
+        state: &LightPathState,
+        vertex: &Vertex,
+        counters: &mut Counters,
+    ) -> Option<Continuation> {
         let leaves = self.keep.leaves(state, vertex);
         if leaves {
             let power = Rgb::from(state.power);
@@ -207,7 +212,7 @@ impl Visitor for Leaver<'_> {
     }
 
     #[inline]
-    fn leave(&self, state: &mut State, vertex: &Vertex, _from: Vec3, _sample: (&BsdfSample, bool)) {
+    fn leave(&self, state: &mut LightPathState, vertex: &Vertex, _from: Vec3, _sample: (&BsdfSample, bool)) {
         state.mirrored = vertex.bsdf.is_delta().into();
     }
 }

@@ -22,7 +22,7 @@ use crate::sampling::mix;
 use crate::scene::{Material, Scene, SurfacePoint};
 use crate::transport::PhotonLight;
 use crate::transport::estimator::Counters;
-use crate::transport::path::state::Share;
+use crate::transport::path::state::Components;
 use crate::transport::photon_mapping::density::{Gathered, Light, fence, reflected};
 use crate::{Level, Rgb};
 use core::f32::consts::{FRAC_1_PI, SQRT_2};
@@ -64,7 +64,7 @@ const ABOVE: f32 = 1e-3;
 
 /// Works out the irradiance of photons: a pass over tasks of [`IRRADIANCES`].
 #[derive(Clone, Copy)]
-pub struct Irradiances<'a> {
+pub struct PrecomputedIrradiance<'a> {
     bvh: &'a Bvh<'a>,
     global: &'a PhotonMap<'a>,
     /// Largest radius of a disc.
@@ -73,7 +73,7 @@ pub struct Irradiances<'a> {
     level: Level,
 }
 
-impl<'a> Irradiances<'a> {
+impl<'a> PrecomputedIrradiance<'a> {
     /// For a map of all photons; discs of at most `farthest`.
     pub fn new(
         bvh: &'a Bvh<'a>,
@@ -99,7 +99,7 @@ impl<'a> Irradiances<'a> {
     /// wall is near, otherwise from the other side. What is not needed of `out` is filled with photons of no place.
     ///
     /// # Errors
-    /// [`OutOfMemory`] where `scratch` has less than [`Irradiances::scratch`] bytes.
+    /// [`OutOfMemory`] where `scratch` has less than [`PrecomputedIrradiance::scratch`] bytes.
     pub fn run(&self, task: usize, scratch: &mut Arena, out: &mut [Photon]) -> Result<Counters, OutOfMemory> {
         let mut arena = scratch.scratch();
         let mut neighbours = Neighbours::new(NEAREST, &mut arena)?;
@@ -146,15 +146,15 @@ impl<'a> Irradiances<'a> {
 
 /// Photons as gather rays use them.
 #[derive(Clone, Copy)]
-pub struct GatherLight<'a> {
+pub struct GlobalMapLookup<'a> {
     global: &'a PhotonMap<'a>,
     irradiances: &'a PhotonMap<'a>,
     farthest: f32,
     kernel: Kernel,
 }
 
-impl<'a> GatherLight<'a> {
-    /// With the map of the [`Irradiances`] of `global`, and what those were made with.
+impl<'a> GlobalMapLookup<'a> {
+    /// With the map of the [`PrecomputedIrradiance`] of `global`, and what those were made with.
     pub fn new(
         global: &'a PhotonMap<'a>,
         irradiances: &'a PhotonMap<'a>,
@@ -253,12 +253,12 @@ pub struct PhotonMaps<'a> {
     /// Light that mirrors and glass throw onto surfaces; `None` where paths find it for themselves, or there is none.
     pub caustic: Option<PhotonLight<'a>>,
     /// All light.
-    pub global: GatherLight<'a>,
+    pub global: GlobalMapLookup<'a>,
 }
 
 /// What maps say of a vertex of a path.
 #[derive(Clone, Copy, Debug, Default)]
-pub(in crate::transport) struct Said {
+pub(in crate::transport) struct MapLookup {
     /// Reflected light.
     pub(in crate::transport) gathered: Gathered,
     /// Whether that is all light but what a narrow coat reflects.
@@ -266,9 +266,9 @@ pub(in crate::transport) struct Said {
     /// Whether no light need be asked for by a shadow ray.
     pub(in crate::transport) is_lit: bool,
     /// What a path finds that goes on from here,
-    pub(in crate::transport) next: Share,
+    pub(in crate::transport) next: Components,
     /// and what it finds by a narrow coat.
-    pub(in crate::transport) mirrored: Share,
+    pub(in crate::transport) mirrored: Components,
 }
 
 impl PhotonMaps<'_> {
@@ -279,21 +279,21 @@ impl PhotonMaps<'_> {
     pub(in crate::transport) fn ask<F: Features>(
         &self,
         tracer: (&Bvh, Level),
-        (came, limited, distance): (Share, u32, f32),
+        (came, limited, distance): (Components, u32, f32),
         (point, bsdf, apart): (&SurfacePoint, &Bsdf, bool),
         (wo, travelled): (Vec3, f32),
         turns: f32,
-    ) -> Said {
+    ) -> MapLookup {
         // What was scattered by something with a diffuse part stays so.
-        let rest = if came.gathers() { Share::GATHERED } else { Share::ALL };
-        let all = Said { next: rest, mirrored: rest, ..Said::default() };
+        let rest = if came.gathers() { Components::GATHERED } else { Components::ALL };
+        let all = MapLookup { next: rest, mirrored: rest, ..MapLookup::default() };
         if !bsdf.gathers_photons(apart) {
             return match came {
-                Share::NO_CAUSTIC | Share::BEHIND_MIRROR if bsdf.is_caustic_caster() => Said {
+                Components::NO_CAUSTIC | Components::BEHIND_MIRROR if bsdf.is_caustic_caster() => MapLookup {
                     is_lit: true,
-                    next: Share::BEHIND_MIRROR,
-                    mirrored: Share::BEHIND_MIRROR,
-                    ..Said::default()
+                    next: Components::BEHIND_MIRROR,
+                    mirrored: Components::BEHIND_MIRROR,
+                    ..MapLookup::default()
                 },
                 _ => all,
             };
@@ -303,18 +303,18 @@ impl PhotonMaps<'_> {
             && let Some(light) = self.global.reflected::<F>(tracer, (point, bsdf, apart), wo, distance, turns)
         {
             let gathered = Gathered { light, ..Gathered::default() };
-            return Said { gathered, is_all: true, is_lit: true, ..all };
+            return MapLookup { gathered, is_all: true, is_lit: true, ..all };
         }
         if limited > 1 {
-            return Said::default();
+            return MapLookup::default();
         }
         match &self.caustic {
             Some(caustic) => {
                 let travelled = if came.gathers() { 0.0 } else { travelled };
                 let gathered = caustic.reflected::<F>(tracer, (point, bsdf, apart), (wo, travelled), turns);
-                Said { gathered: gathered.unwrap_or_default(), next: Share::NO_CAUSTIC, ..all }
+                MapLookup { gathered: gathered.unwrap_or_default(), next: Components::NO_CAUSTIC, ..all }
             }
-            None => Said { next: Share::GATHERED, ..all },
+            None => MapLookup { next: Components::GATHERED, ..all },
         }
     }
 }
@@ -365,20 +365,20 @@ mod tests {
         }
         let (level, kernel) = (Level::BASELINE, Kernel::default());
         with_map_of(&photons, |global| {
-            let all = Irradiances::new(&bvh, global, 1.0, kernel, level);
+            let all = PrecomputedIrradiance::new(&bvh, global, 1.0, kernel, level);
             let mut found = vec![Photon::NONE; all.count().div_ceil(IRRADIANCES) * IRRADIANCES];
             for (task, out) in found.chunks_mut(IRRADIANCES).enumerate() {
-                let mut scratch = lines(Irradiances::scratch());
+                let mut scratch = lines(PrecomputedIrradiance::scratch());
                 all.run(task, &mut Arena::new(bytemuck::cast_slice_mut(&mut scratch)), out).unwrap();
             }
             with_map_of(&found, |irradiances| {
-                check(&GatherLight::new(global, irradiances, 1.0, kernel), (&bvh, level), random);
+                check(&GlobalMapLookup::new(global, irradiances, 1.0, kernel), (&bvh, level), random);
             });
         });
     }
 
     /// Asks `light` on both sides of the wall.
-    fn check(light: &GatherLight, tracer: (&Bvh, Level), random: Random) {
+    fn check(light: &GlobalMapLookup, tracer: (&Bvh, Level), random: Random) {
         let material = Material::diffuse(Rgb::ONE);
         let ask = |x: f32, y: f32| {
             let point = SurfacePoint {

@@ -24,7 +24,7 @@ const REACH: f32 = 1.5;
 
 /// The camera rays that look for places.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Raster {
+pub struct VisiblePointSampler {
     frame: [u32; 2],
     /// Pixels from ray to ray.
     step: u32,
@@ -32,7 +32,7 @@ pub struct Raster {
     gathers: bool,
 }
 
-impl Raster {
+impl VisiblePointSampler {
     /// Rays of a task.
     pub const TASK: usize = 256;
 
@@ -61,7 +61,7 @@ impl Raster {
         Photons::footprint(self.rays())
     }
 
-    /// What the rays of task `task`, [`Raster::TASK`] of them, find: places, as photons without power; where there is
+    /// What the rays of task `task`, [`VisiblePointSampler::TASK`] of them, find: places, as photons without power; where there is
     /// none, one that a map refuses.
     pub fn run<F: Features>(
         &self,
@@ -115,7 +115,7 @@ impl Raster {
 
 /// The places, and how far each stands for others.
 #[derive(Clone, Copy)]
-pub struct Sight<'a> {
+pub struct VisiblePoints<'a> {
     map: &'a PhotonMap<'a>,
     reach: Reach,
     level: Level,
@@ -128,12 +128,12 @@ enum Reach {
     Everywhere(f32),
 }
 
-impl<'a> Sight<'a> {
+impl<'a> VisiblePoints<'a> {
     /// Of the places in `map`, which `raster` found. Light is gathered from discs of so many pixels, at most; `discs` are
     /// those of one.
     pub fn new(
         map: &'a PhotonMap<'a>,
-        raster: &Raster,
+        raster: &VisiblePointSampler,
         discs: RadiusSchedule,
         pixels: f32,
         level: Level,

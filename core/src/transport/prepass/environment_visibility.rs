@@ -17,7 +17,7 @@ use crate::light::{Bins, EnvironmentVisibility, VisibilityGrid, VisibilityTable}
 use crate::memory::{Arena, Footprint, OutOfMemory};
 use crate::sampling::Sampler;
 use crate::transport::estimator::{Counters, dimension};
-use crate::transport::path::PathTracer;
+use crate::transport::path::PathIntegrator;
 use crate::transport::walk::context::Segment;
 use crate::transport::walk::visibility::{pass_cutout, passing};
 use bytemuck::{Pod, Zeroable};
@@ -119,7 +119,7 @@ impl<'m> Outlook<'m> {
         Ok(Self { vertices, ranges, directions: arena.slice(PASSES * BINS)? })
     }
 
-    /// What each task of the look fills, by [`PathTracer::look`].
+    /// What each task of the look fills, by [`PathIntegrator::look`].
     pub fn parts(&mut self) -> impl Iterator<Item = (usize, &mut [Vertex])> {
         self.vertices.chunks_mut(PATHS.end * VERTICES).enumerate()
     }
@@ -211,7 +211,7 @@ impl<'m> Glances<'m> {
     }
 }
 
-impl<F: Features> PathTracer<'_, F> {
+impl<F: Features> PathIntegrator<'_, F> {
     /// Leaves the vertices of task `task` of a look in its part of the [`Outlook`].
     pub fn look(&self, task: usize, part: &mut [Vertex]) {
         part.fill(Vertex { place: NOWHERE, ..Vertex::default() });
@@ -269,7 +269,7 @@ impl<F: Features> PathTracer<'_, F> {
         }
     }
 
-    /// Bytes of working memory of [`PathTracer::learn`].
+    /// Bytes of working memory of [`PathIntegrator::learn`].
     pub fn learn_scratch() -> Footprint {
         Footprint::default().slice::<Ray>(BINS).slice::<f32>(BINS).slice::<Hit>(BINS)
     }
@@ -277,7 +277,7 @@ impl<F: Features> PathTracer<'_, F> {
     /// Makes window number `number` of `count`. Returns what it does to the variance, by how much it matters.
     ///
     /// # Errors
-    /// [`OutOfMemory`] where `scratch` has less than [`PathTracer::learn_scratch`] bytes.
+    /// [`OutOfMemory`] where `scratch` has less than [`PathIntegrator::learn_scratch`] bytes.
     pub fn learn(
         &self,
         outlook: &Outlook,

@@ -35,7 +35,7 @@ const CROSSING: u32 = 1 << 31;
 /// A path between two of its vertices.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C)]
-pub(in crate::transport) struct State {
+pub(in crate::transport) struct LightPathState {
     pub power: [f32; 3],
     /// Which path of the map.
     pub number: u32,
@@ -86,7 +86,7 @@ impl Vertex<'_> {
 
 /// How a path goes on.
 #[derive(Clone, Copy, Debug)]
-pub(in crate::transport) struct Onward {
+pub(in crate::transport) struct Continuation {
     /// With this probability at most.
     pub most: f32,
     /// Only where it is mirrored.
@@ -101,18 +101,30 @@ pub(in crate::transport) trait Visitor {
     const SEED: u64;
 
     /// A path has met a surface. `None` ends it.
-    fn meet(&mut self, state: &State, vertex: &Vertex, counters: &mut Counters) -> Option<Onward>;
+    fn meet(
+        &mut self,
+        state: &LightPathState,
+        vertex: &Vertex,
+        counters: &mut Counters,
+    ) -> Option<Continuation>;
 
     /// Whether it goes on by the base or the coat of `vertex` alone.
     #[inline]
-    fn is_apart(&self, _state: &State, _vertex: &Vertex) -> bool {
+    fn is_apart(&self, _state: &LightPathState, _vertex: &Vertex) -> bool {
         false
     }
 
     /// It is about to leave it by `sample`, having come from `from`, local. That `is_narrow` where it is mirrored, or by a coat
     /// alone.
     #[inline]
-    fn leave(&self, _state: &mut State, _vertex: &Vertex, _from: Vec3, _sample: (&BsdfSample, bool)) {}
+    fn leave(
+        &self,
+        _state: &mut LightPathState,
+        _vertex: &Vertex,
+        _from: Vec3,
+        _sample: (&BsdfSample, bool),
+    ) {
+    }
 }
 
 /// Where the numbers of paths come from.
@@ -142,7 +154,7 @@ impl Source for Sequence {
 
 /// What is shot: all but its visitor.
 #[derive(Clone, Copy)]
-pub(in crate::transport) struct Flight<'a, F> {
+pub(in crate::transport) struct LightWalk<'a, F> {
     pub scene: &'a Scene<'a>,
     pub bvh: &'a Bvh<'a>,
     pub lights: &'a LightSampler<'a>,
@@ -155,7 +167,7 @@ pub(in crate::transport) struct Flight<'a, F> {
     pub features: PhantomData<F>,
 }
 
-impl<F: Features> Flight<'_, F> {
+impl<F: Features> LightWalk<'_, F> {
     /// Number of tasks of a map.
     pub(in crate::transport) fn tasks(&self) -> usize {
         (self.paths as usize).div_ceil(PATHS)
@@ -163,7 +175,7 @@ impl<F: Features> Flight<'_, F> {
 
     /// Working memory of one task.
     pub(in crate::transport) fn scratch() -> Footprint {
-        Footprint::default().slice::<State>(PATHS).slice::<Ray>(PATHS).slice::<Hit>(PATHS)
+        Footprint::default().slice::<LightPathState>(PATHS).slice::<Ray>(PATHS).slice::<Hit>(PATHS)
     }
 
     /// Follows the paths of task `task` of map number `map`.
@@ -193,7 +205,7 @@ impl<F: Features> Flight<'_, F> {
         visitor: &mut V,
     ) -> Result<Counters, OutOfMemory> {
         let mut arena = scratch.scratch();
-        let states = arena.slice::<State>(PATHS)?;
+        let states = arena.slice::<LightPathState>(PATHS)?;
         let rays = arena.slice::<Ray>(PATHS)?;
         let hits = arena.slice::<Hit>(PATHS)?;
         let mut counters = Counters::default();
@@ -201,7 +213,7 @@ impl<F: Features> Flight<'_, F> {
         for (i, state) in states.iter_mut().enumerate().take(paths) {
             let number = first + i as u32;
             if let Some(emitted) = self.emission.emit(self.scene, self.lights, &source.of(number)) {
-                *state = State {
+                *state = LightPathState {
                     power: (emitted.power / self.paths as f32).to_array(),
                     number,
                     segments: 1,
@@ -210,7 +222,7 @@ impl<F: Features> Flight<'_, F> {
                     cell: emitted.cell,
                     origin: emitted.ray.origin,
                     survived: 1.0,
-                    ..State::default()
+                    ..LightPathState::default()
                 };
                 rays[active] = Ray { tag: i as u32, ..emitted.ray };
                 active += 1;
@@ -237,7 +249,7 @@ impl<F: Features> Flight<'_, F> {
     /// One vertex: what the path of `ray` met. The ray by which it goes on.
     fn step<V: Visitor, N: Numbers>(
         &self,
-        state: &mut State,
+        state: &mut LightPathState,
         numbers: &N,
         ray: &Ray,
         hit: &Hit,
@@ -294,37 +306,41 @@ impl<F: Features> Flight<'_, F> {
             next *= from.z * flat(towards) / (flat(direction) * sample.direction.z.abs());
         }
         // Power that goes on is the same where it can be: what is absorbed ends paths.
-        let survival = (next.max_element() / power.max_element()).min(onward.most);
-        let survival = survival.min(reaching(state.segments + 1) / state.survived);
-        if !(survival > 0.0 && numbers.single(first + ROULETTE) < survival && next.is_finite()) {
+        let continuation_probability = (next.max_element() / power.max_element()).min(onward.most);
+        let continuation_probability =
+            continuation_probability.min(reaching(state.segments + 1) / state.survived);
+        if !(continuation_probability > 0.0
+            && numbers.single(first + ROULETTE) < continuation_probability
+            && next.is_finite())
+        {
             return None;
         }
         if is_cut(state.segments, &bsdf, &sample) {
             counters.dropped.unfinished += 1;
             return None;
         }
-        state.power = (next / survival).to_array();
+        state.power = (next / continuation_probability).to_array();
         state.segments += 1;
         state.triangle = hit.triangle;
-        state.survived *= survival;
+        state.survived *= continuation_probability;
         Some(point.spawn(towards))
     }
 }
 
 /// The share of paths that come to so many segments at most. Between perfect mirrors, and by total reflection in a
 /// piece of glass, nothing else ends them; where a fortieth of the light is lost at each surface, fewer come so far.
-/// The paths carry more power instead, as those of the path tracer do (`survival` in `estimator.rs`): there is no bias.
+/// The paths carry more power instead, as those of the path tracer do (`continuation_probability` in `estimator.rs`): there is no bias.
 fn reaching(segments: u32) -> f32 {
     CERTAIN_BELOW as f32 / segments.max(CERTAIN_BELOW) as f32
 }
 
 /// Where the photons of a task go.
-pub(in crate::transport) struct Pile<'p> {
+pub(in crate::transport) struct PhotonBuffer<'p> {
     photons: &'p mut [Photon],
     count: usize,
 }
 
-impl<'p> Pile<'p> {
+impl<'p> PhotonBuffer<'p> {
     pub(in crate::transport) fn new(photons: &'p mut [Photon]) -> Self {
         Self { photons, count: 0 }
     }

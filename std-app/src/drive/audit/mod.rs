@@ -16,7 +16,7 @@ use core::ops::Range;
 use halflight_core::bsdf::Features;
 use halflight_core::film::{Film, Pixel};
 use halflight_core::memory::{Arena, Footprint, Line, OutOfMemory};
-use halflight_core::transport::{Counters, Merging, PathTracer, path::WAVE};
+use halflight_core::transport::{CausticMerging, Counters, PathIntegrator, path::WAVE};
 use serde::{Deserialize, Serialize};
 use std::time::Instant;
 
@@ -39,8 +39,9 @@ const LONGEST: f64 = 0.25;
 const OTHER_SEED: u32 = 0x5eed_a0d1;
 
 /// Samples of single pixels by the path tracer, joined with photons of caustics if there are any.
-type Truth<'a> =
-    dyn Fn(Samples, Option<Merging>, &mut Arena, &mut [Pixel]) -> Result<Counters, OutOfMemory> + Sync + 'a;
+type Truth<'a> = dyn Fn(Samples, Option<CausticMerging>, &mut Arena, &mut [Pixel]) -> Result<Counters, OutOfMemory>
+    + Sync
+    + 'a;
 
 /// Samples of the pixels in these columns and rows.
 type Samples<'s> = (&'s [[u32; 2]], Range<u32>);
@@ -118,7 +119,7 @@ impl<'a> Audit<'a> {
     ) -> Result<Option<Self>, RenderError> {
         let Stage { settings, workers, .. } = *stage;
         let Some(share) = share(settings, method.is_biased()) else { return Ok(None) };
-        let mut scratch = memory.take_each("audit", PathTracer::<F>::scratch(WAVE), workers.count())?;
+        let mut scratch = memory.take_each("audit", PathIntegrator::<F>::scratch(WAVE), workers.count())?;
         // The pixels themselves are counted and not taken: they are kept where a film file can find them.
         let pixels = choice::count(settings.width, settings.height);
         memory.set_aside("audit", Footprint::default().slice::<Pixel>(pixels))?;
@@ -151,7 +152,7 @@ impl<'a> Audit<'a> {
             return 0;
         }
         let pixels = Footprint::default().slice::<Pixel>(choice::count(settings.width, settings.height));
-        let threads = PathTracer::<F>::scratch(WAVE).bytes().saturating_mul(workers.count());
+        let threads = PathIntegrator::<F>::scratch(WAVE).bytes().saturating_mul(workers.count());
         threads.saturating_add(pixels.bytes())
     }
 
@@ -183,7 +184,7 @@ impl<'a> Audit<'a> {
         &mut self,
         workers: &Workers,
         film: &Film,
-        photons: Option<Merging>,
+        photons: Option<CausticMerging>,
         (rays, seconds): (u64, f64),
         time_left: Option<f64>,
     ) -> Result<(), RenderError> {
@@ -244,7 +245,7 @@ impl<'a> Audit<'a> {
     pub(super) fn go_on(
         &mut self,
         workers: &Workers,
-        photons: Option<Merging>,
+        photons: Option<CausticMerging>,
         may: &mut dyn FnMut(f64) -> bool,
     ) -> Result<bool, RenderError> {
         let end = (self.state.taken + self.state.taken / 4).next_multiple_of(STEP);
@@ -268,7 +269,7 @@ impl<'a> Audit<'a> {
         &mut self,
         workers: &Workers,
         samples: Range<u32>,
-        photons: Option<Merging>,
+        photons: Option<CausticMerging>,
     ) -> Result<bool, OutOfMemory> {
         let Self { truth, scratch, state, .. } = self;
         let places = &state.places;

@@ -12,8 +12,10 @@ use crate::drive::memory::Memory;
 use halflight_core::bsdf::Features;
 use halflight_core::light::{EmissionSampler, GuideStats};
 use halflight_core::memory::{Arena, Footprint, Line};
-use halflight_core::transport::photon_mapping::deposit::{Keep, PATHS, ShootSettings, Shooter};
-use halflight_core::transport::photon_mapping::visible_points::{Raster, Sight};
+use halflight_core::transport::photon_mapping::deposit::{
+    PATHS, PhotonFilter, PhotonTracer, PhotonTracerSettings,
+};
+use halflight_core::transport::photon_mapping::visible_points::{VisiblePointSampler, VisiblePoints};
 
 /// Light paths of each look; the map that those of the first are of, which no sample has; and looks after it, at most.
 const LOOK: usize = 16 * PATHS;
@@ -78,16 +80,16 @@ impl<'l> Aim<'l> {
     /// would not be left.
     pub(super) fn look_first<F: Features>(
         stage: &Stage,
-        (keep, max_depth): (Keep, u32),
+        (keep, max_depth): (PhotonFilter, u32),
         wanted: Wanted,
         scratch: &mut [Vec<Line>],
         (memory, lines): (&mut Memory, &'l mut Vec<Line>),
         others: usize,
     ) -> Result<Self, RenderError> {
         let Stage { scene, bvh, lights, settings, .. } = *stage;
-        let raster = Raster::new([settings.width, settings.height]);
+        let raster = VisiblePointSampler::new([settings.width, settings.height]);
         let raster = if matches!(wanted, Wanted::Gathered(_)) { raster.gathering() } else { raster };
-        let of_caustics = keep == Keep::Caustic;
+        let of_caustics = keep == PhotonFilter::Caustic;
         let worth = if of_caustics {
             GuideStats::footprint(lights).and(GuideStats::guide_footprint(lights))
         } else {
@@ -112,12 +114,14 @@ impl<'l> Aim<'l> {
         let mut places = places::find::<F>(stage, &raster, scratch, memory)?;
         if let Some(map) = places.map()? {
             let sight = match wanted {
-                Wanted::Seen(pixels) => Sight::new(&map, &raster, stage.discs(), pixels, settings.level),
-                Wanted::Gathered(radius) => Sight::within(&map, radius, settings.level),
+                Wanted::Seen(pixels) => {
+                    VisiblePoints::new(&map, &raster, stage.discs(), pixels, settings.level)
+                }
+                Wanted::Gathered(radius) => VisiblePoints::within(&map, radius, settings.level),
             };
-            let shot = ShootSettings { keep, seed: settings.seed, paths: LOOK as u32, max_depth };
+            let shot = PhotonTracerSettings { keep, seed: settings.seed, paths: LOOK as u32, max_depth };
             aim.learn((&mut worth, of_caustics), &mut arena, |emission, number| {
-                let shooter = Shooter::<F>::new(scene, bvh, lights, emission, shot, settings.level);
+                let shooter = PhotonTracer::<F>::new(scene, bvh, lights, emission, shot, settings.level);
                 Look::of(stage, &shooter, sight, FIRST_MAP + number, scratch)
             })?;
         }
@@ -174,8 +178,8 @@ impl Look {
     /// Of the paths of map number `map`; `None` where the render is over.
     fn of<F: Features>(
         stage: &Stage,
-        shooter: &Shooter<F>,
-        sight: Sight,
+        shooter: &PhotonTracer<F>,
+        sight: VisiblePoints,
         map: u32,
         scratch: &mut [Vec<Line>],
     ) -> Result<Option<Self>, RenderError> {

@@ -8,7 +8,7 @@ use crate::drive::audit::Audit;
 use halflight_core::bsdf::Features;
 use halflight_core::cache::irradiance::{CellFlux, IrradianceCache};
 use halflight_core::memory::Footprint;
-use halflight_core::transport::PathTracer;
+use halflight_core::transport::PathIntegrator;
 use halflight_core::transport::path::WAVE;
 
 /// Strata along a side are multiples of this.
@@ -28,7 +28,7 @@ impl Needs {
         let Stage { settings, .. } = *stage;
         let strata = settings.cache.strata() as usize;
         let coarse = strata.div_ceil(2 * BLOCK) * BLOCK;
-        let scratch = PathTracer::<F>::scratch(WAVE).or(PathTracer::<F>::gather_scratch(strata));
+        let scratch = PathIntegrator::<F>::scratch(WAVE).or(PathIntegrator::<F>::gather_scratch(strata));
         let scratch = if has_caustics { scratch.or(caustics::scratch::<F>()) } else { scratch };
         Self { strata: [coarse, strata], scratch }
     }

@@ -16,9 +16,9 @@ use halflight_core::bsdf::Features;
 use halflight_core::light::EmissionSampler;
 use halflight_core::memory::{Arena, Line, OutOfMemory};
 use halflight_core::photon::{MapShape, Photon, PhotonMap, Photons};
-use halflight_core::transport::caustics::tracer::{CausticShooter, PATHS, ROOM};
-use halflight_core::transport::photon_mapping::deposit::{Keep, ShootSettings};
-use halflight_core::transport::{Merging, PathTracer, RadiusSchedule, path::WAVE};
+use halflight_core::transport::caustics::tracer::{CausticPhotonTracer, PATHS, ROOM};
+use halflight_core::transport::photon_mapping::deposit::{PhotonFilter, PhotonTracerSettings};
+use halflight_core::transport::{CausticMerging, PathIntegrator, RadiusSchedule, path::WAVE};
 use std::time::Instant;
 
 /// Radius of the discs of the first sample, in pixels, where photons are not what is noisy.
@@ -96,8 +96,8 @@ pub(super) struct ForRecords<'m> {
 }
 
 impl ForRecords<'_> {
-    pub(super) fn merging(&self) -> Merging<'_> {
-        Merging::new([&self.map; 2], self.emission, self.discs, self.paths).beside_records(true)
+    pub(super) fn merging(&self) -> CausticMerging<'_> {
+        CausticMerging::new([&self.map; 2], self.emission, self.discs, self.paths).beside_records(true)
     }
 }
 
@@ -152,7 +152,7 @@ impl<'a> Caster<'a> {
     /// Whether `tracer` leaves less variance for its work with the photons of the first samples than paths do `alone`.
     pub(super) fn pays<F: Features>(
         &mut self,
-        (tracer, shared): (&PathTracer<F>, bool),
+        (tracer, shared): (&PathIntegrator<F>, bool),
         scratch: &mut [Vec<Line>],
     ) -> Result<bool, RenderError> {
         let Self { stage, cast, beside_records, photons, each, used, kept } = self;
@@ -176,7 +176,8 @@ impl<'a> Caster<'a> {
             return Ok(false);
         };
         let (shapes, paths) = ([even.shape(), odd.shape()], light_paths as u32);
-        let merging = Merging::new([&even, &odd], emission, discs, paths).beside_records(*beside_records);
+        let merging =
+            CausticMerging::new([&even, &odd], emission, discs, paths).beside_records(*beside_records);
         let pilot = workers.pilot(&tracer.with_caustics(merging), alone.mean, scratch)?;
         let pixels = f64::from(stage.settings.width) * f64::from(stage.settings.height);
         *kept = Some(Kept { block, room: shooter.tasks() * ROOM, shapes, discs, paths });
@@ -186,7 +187,7 @@ impl<'a> Caster<'a> {
     /// Brings the tiles of `crew` to their targets by `tracer`, joined with photons; less where the round is cut.
     pub(super) fn round<F: Features>(
         &mut self,
-        tracer: &PathTracer<F>,
+        tracer: &PathIntegrator<F>,
         scratch: &mut [Vec<Line>],
         crew: &mut Crew,
     ) -> Result<(), RenderError> {
@@ -220,7 +221,7 @@ impl<'a> Caster<'a> {
                     [even, odd]
                 }
             };
-            let merging = Merging::new([&maps[0], &maps[1]], emission, discs, light_paths as u32);
+            let merging = CausticMerging::new([&maps[0], &maps[1]], emission, discs, light_paths as u32);
             let tracer = tracer.with_caustics(merging.beside_records(*beside_records));
             crew.tiles(block.end, scratch, &|task, samples, arena, pixels| {
                 tracer.run(task, samples, WAVE, arena, pixels)
@@ -253,7 +254,7 @@ impl<'a> Caster<'a> {
     pub(super) fn lend(&mut self, then: &mut Borrower) -> Result<(), RenderError> {
         let Some(kept) = &self.kept else { return then(None) };
         let maps = kept.maps(self.photons.each_mut())?;
-        let merging = Merging::new([&maps[0], &maps[1]], &self.cast.emission, kept.discs, kept.paths);
+        let merging = CausticMerging::new([&maps[0], &maps[1]], &self.cast.emission, kept.discs, kept.paths);
         then(Some(merging.beside_records(self.beside_records)))
     }
 
@@ -272,7 +273,7 @@ type Pass<'p> =
 
 /// Shoots the photons of map `number` into `lines`; `None` where the round is over.
 fn shoot<'m, F: Features>(
-    shooter: &CausticShooter<F>,
+    shooter: &CausticPhotonTracer<F>,
     number: u32,
     lines: &'m mut [Line],
     scratch: &mut [Vec<Line>],
@@ -303,14 +304,19 @@ pub(super) fn shooter<'a, F: Features>(
     paths: usize,
     (discs, sample): (RadiusSchedule, u32),
     beside_records: bool,
-) -> (CausticShooter<'a, F>, RadiusSchedule) {
+) -> (CausticPhotonTracer<'a, F>, RadiusSchedule) {
     let Stage { scene, bvh, lights, settings, .. } = *stage;
     let pixels = FIRST_RADIUS * shrunk(sample / 2).sqrt();
     let discs = discs.of_pixels(pixels as f32);
     let max_depth = path_settings(settings).max_depth;
-    let shot = ShootSettings { keep: Keep::Caustic, seed: settings.seed, paths: paths as u32, max_depth };
+    let shot = PhotonTracerSettings {
+        keep: PhotonFilter::Caustic,
+        seed: settings.seed,
+        paths: paths as u32,
+        max_depth,
+    };
     let frame = (discs, [settings.width, settings.height]);
-    let shooter = CausticShooter::new((scene, bvh, lights), emission, shot, frame, settings.level);
+    let shooter = CausticPhotonTracer::new((scene, bvh, lights), emission, shot, frame, settings.level);
     (shooter.beside_records(beside_records), discs)
 }
 

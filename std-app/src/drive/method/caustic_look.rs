@@ -8,7 +8,7 @@ use crate::drive::RenderError;
 use core::f64::consts::PI;
 use halflight_core::bsdf::Features;
 use halflight_core::transport::Pilot;
-use halflight_core::transport::caustics::tracer::{BLOCKS, Find};
+use halflight_core::transport::caustics::tracer::{BLOCKS, GuideSample};
 
 /// The share of the picture's light that photons must bring, of what paths find badly,
 const LEAST_SHARE: f64 = 3.5e-2;
@@ -74,13 +74,13 @@ pub(super) struct Looked {
 }
 
 /// The share of light paths that show in the picture.
-pub(super) fn useful(finds: &[Find]) -> f64 {
+pub(super) fn useful(finds: &[GuideSample]) -> f64 {
     finds.iter().filter(|find| find.light > 0.0).count() as f64 / finds.len().max(1) as f64
 }
 
 /// The mean radiance that `finds` bring to a picture of so many `pixels`, in discs of `radius` pixels, where paths that take
 /// so many `samples` of each pixel as good as never find it: less often than `least` times in all.
-pub(super) fn missing(finds: &[Find], radius: f64, pixels: f64, (samples, least): (f64, f64)) -> f64 {
+pub(super) fn missing(finds: &[GuideSample], radius: f64, pixels: f64, (samples, least): (f64, f64)) -> f64 {
     let disc = PI * radius * radius;
     // What flashes brightest first.
     let mut shown: Vec<_> = finds.iter().filter(|find| find.light > 0.0).collect();
@@ -99,7 +99,7 @@ pub(super) fn missing(finds: &[Find], radius: f64, pixels: f64, (samples, least)
 
 impl Looked {
     /// `finds` of discs of `radius` pixels in a picture of so many `pixels`, which is of `mean` radiance without them.
-    pub(super) fn new(finds: &[Find], radius: f64, pixels: f64, mean: f64) -> Self {
+    pub(super) fn new(finds: &[GuideSample], radius: f64, pixels: f64, mean: f64) -> Self {
         // Power over the area of a disc, from a surface that reflects half of it evenly.
         let worth = finds.iter().map(|find| f64::from(find.worth)).sum::<f64>();
         let found = 0.5 / PI * worth * radius * radius / pixels;

@@ -20,8 +20,8 @@ use halflight_core::census::Census;
 use halflight_core::light::{EmissionSampler, GuideStats, LightSampler};
 use halflight_core::memory::{Arena, Footprint, Line};
 use halflight_core::photon::Photons;
-use halflight_core::transport::caustics::tracer::{CausticShooter, Find, PATHS, ROOM};
-use halflight_core::transport::{Merging, PathTracer, RadiusSchedule, path::WAVE};
+use halflight_core::transport::caustics::tracer::{CausticPhotonTracer, GuideSample, PATHS, ROOM};
+use halflight_core::transport::{CausticMerging, PathIntegrator, RadiusSchedule, path::WAVE};
 
 /// Light paths of a glance, which tells where there is next to nothing to find, and of each look after it.
 const GLANCE: usize = 4 * PATHS;
@@ -63,7 +63,7 @@ fn may_be(stage: &Stage) -> bool {
 
 /// Working memory of paths and of light paths.
 pub(super) fn scratch<F: Features>() -> Footprint {
-    PathTracer::<F>::scratch(WAVE).or(CausticShooter::<F>::scratch())
+    PathIntegrator::<F>::scratch(WAVE).or(CausticPhotonTracer::<F>::scratch())
 }
 
 /// Memory of a look.
@@ -194,13 +194,14 @@ fn beside<F: Features>(
     // Weights alone: no photon adds to what paths find.
     let mut line = [Line([0; _])];
     let none = Photons::new(0, &mut Arena::new(bytemuck::cast_slice_mut(&mut line)))?.build(0);
-    let merging = Merging::new([&none; 2], emission, discs, LOOK as u32).beside_records(eye.beside_records);
+    let merging =
+        CausticMerging::new([&none; 2], emission, discs, LOOK as u32).beside_records(eye.beside_records);
     let tracer = paths.tracer.with_reuse(false).with_caustics(merging);
     Ok(stage.workers.pilot_rest(&tracer, &mut paths.scratch)?)
 }
 
 /// What `finds` tell together, where all other light has such a mean radiance.
-fn looked<F: Features>(stage: &Stage, paths: &mut Paths<F>, finds: &[Find], mean: f32) -> Looked {
+fn looked<F: Features>(stage: &Stage, paths: &mut Paths<F>, finds: &[GuideSample], mean: f32) -> Looked {
     let pixels = f64::from(stage.settings.width) * f64::from(stage.settings.height);
     let looked = Looked::new(finds, FIRST_RADIUS, pixels, f64::from(mean));
     paths.caustics.share = Some(looked.share);
@@ -214,7 +215,7 @@ fn look<F: Features>(
     emission: &EmissionSampler,
     eye: &Eye,
     (count, map): (usize, u32),
-) -> Result<Vec<Find>, RenderError> {
+) -> Result<Vec<GuideSample>, RenderError> {
     look_with::<F>(stage, &mut paths.scratch, emission, eye, (count, map))
 }
 
@@ -224,10 +225,10 @@ fn look_with<F: Features>(
     emission: &EmissionSampler,
     &Eye { discs, beside_records }: &Eye,
     (count, map): (usize, u32),
-) -> Result<Vec<Find>, RenderError> {
+) -> Result<Vec<GuideSample>, RenderError> {
     let (shooter, _) = shooter::<F>(stage, emission, count, (discs, 0), beside_records);
-    let mut finds = vec![Find::default(); count];
-    let look = |task: usize, arena: &mut Arena, out: &mut [Find]| shooter.look(task, map, arena, out);
+    let mut finds = vec![GuideSample::default(); count];
+    let look = |task: usize, arena: &mut Arena, out: &mut [GuideSample]| shooter.look(task, map, arena, out);
     // Where the render is over a part of them has to do.
     stage.workers.look(&mut finds, PATHS, scratch, &look)?;
     Ok(finds)

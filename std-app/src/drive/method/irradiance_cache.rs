@@ -30,8 +30,8 @@ use crate::save::Patience;
 use halflight_core::bsdf::Features;
 use halflight_core::cache::irradiance::{CellFlux, IrradianceCache, Record, metric};
 use halflight_core::memory::{Arena, Footprint, Line};
-use halflight_core::transport::PathTracer;
-use halflight_core::transport::cached::gather::{Gathering, Place};
+use halflight_core::transport::PathIntegrator;
+use halflight_core::transport::cached::gather::{GatherPoint, Gathering};
 use halflight_core::transport::path::WAVE;
 use std::time::Instant;
 
@@ -145,7 +145,7 @@ fn set_up<F: Features, T>(
     let wanted = (pixels / PIXELS_PER_RECORD).max(FEWEST_RECORDS).saturating_add(fewest);
     let available = memory.available().saturating_sub(others);
     let capacity = wanted.min(capacity_of(available / 2)).max(fewest);
-    memory.set_aside("cache", Footprint::default().slice::<Place>(2 * capacity))?;
+    memory.set_aside("cache", Footprint::default().slice::<GatherPoint>(2 * capacity))?;
     let footprint = IrradianceCache::footprint(capacity);
     let mut lines = [memory.take("cache", footprint)?, memory.take("cache", footprint)?];
     let [even, odd] = &mut lines;
@@ -154,7 +154,7 @@ fn set_up<F: Features, T>(
     };
     let (even, odd) = (cache(even)?, cache(odd)?);
 
-    let exact = PathTracer::<F>::gather_scratch(EXACT);
+    let exact = PathIntegrator::<F>::gather_scratch(EXACT);
     let surveying = settings.survey.filter(|_| memory.has(exact.bytes() * workers.count() + others));
     let survey = match surveying {
         Some(points) => Some((points, memory.take_each("survey", exact, workers.count())?)),
@@ -196,13 +196,13 @@ fn set_up<F: Features, T>(
 
 /// How many records fit into `bytes`, with the place of each.
 fn capacity_of(bytes: usize) -> usize {
-    let places = IrradianceCache::capacity_of(bytes).saturating_mul(size_of::<Place>());
+    let places = IrradianceCache::capacity_of(bytes).saturating_mul(size_of::<GatherPoint>());
     IrradianceCache::capacity_of(bytes.saturating_sub(places))
 }
 
 /// See the file.
 struct Cached<'a, F> {
-    tracer: PathTracer<'a, F>,
+    tracer: PathIntegrator<'a, F>,
     gathering: Gathering<'a>,
     size: [u32; 2],
     halves: [Growing<'a>; 2],

@@ -42,7 +42,7 @@ use halflight_core::bsdf::Features;
 use halflight_core::bvh::Bvh;
 use halflight_core::light::LightSampler;
 use halflight_core::scene::Scene;
-use halflight_core::transport::{Merging, PathSettings, PathTracer, RadiusSchedule};
+use halflight_core::transport::{CausticMerging, PathIntegrator, PathSettings, RadiusSchedule};
 
 /// A way to make a picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -173,10 +173,10 @@ pub(super) struct Stage<'a> {
 
 impl<'a> Stage<'a> {
     /// Paths of the picture, or of one by another `seed`.
-    pub(super) fn paths<F: Features>(&self, seed: u32) -> PathTracer<'a, F> {
+    pub(super) fn paths<F: Features>(&self, seed: u32) -> PathIntegrator<'a, F> {
         let Self { scene, bvh, lights, settings, .. } = *self;
         let paths = PathSettings { seed, ..path_settings(settings) };
-        PathTracer::new(scene, bvh, lights, paths, settings.level)
+        PathIntegrator::new(scene, bvh, lights, paths, settings.level)
     }
 
     /// RadiusSchedule that photons are gathered from, of one pixel.
@@ -187,7 +187,7 @@ impl<'a> Stage<'a> {
 }
 
 /// What paths do with photons of caustics.
-pub(super) type Borrower<'b> = dyn FnMut(Option<Merging>) -> Result<(), RenderError> + 'b;
+pub(super) type Borrower<'b> = dyn FnMut(Option<CausticMerging>) -> Result<(), RenderError> + 'b;
 
 /// A method at work on one scene. Its structures are its own; the film is the crew's.
 pub(super) trait Renderer {

@@ -7,9 +7,9 @@ use crate::drive::crew::Crew;
 use halflight_core::bsdf::Features;
 use halflight_core::cache::irradiance::{CellFlux, IrradianceCache, Record};
 use halflight_core::memory::{Arena, Line};
-use halflight_core::transport::cached::gather::{Gathering, Place};
-use halflight_core::transport::cached::placement::{Order, PIXELS, Sight};
-use halflight_core::transport::{Counters, PathTracer};
+use halflight_core::transport::cached::gather::{GatherPoint, Gathering};
+use halflight_core::transport::cached::placement::{PIXELS, ProgressiveOrder, Via};
+use halflight_core::transport::{Counters, PathIntegrator};
 
 /// It looks at every other pixel of every other row: what lies between is reached from there, or path traced.
 const STRIDE: u32 = 2;
@@ -43,7 +43,7 @@ pub(in crate::drive) struct Growing<'a> {
     /// Which of independent ones: it looks at another sample of each pixel, and gathers with other rays.
     index: u32,
     /// What the overture looks for; `None`: nothing any more.
-    sight: Option<Sight>,
+    sight: Option<Via>,
     /// How far it is in its order.
     next: u64,
     /// Sweeps in this sight that are done, and how many records there were before this one.
@@ -55,8 +55,8 @@ pub(in crate::drive) struct Growing<'a> {
     loaded: usize,
     /// Rays for each path, of each of the records that came then.
     efforts: Vec<f32>,
-    /// Of each record; [`Place::NONE`] for those of a file.
-    places: Vec<Place>,
+    /// Of each record; [`GatherPoint::NONE`] for those of a file.
+    places: Vec<GatherPoint>,
 }
 
 /// What came of gathering at a place.
@@ -73,7 +73,7 @@ impl<'a> Growing<'a> {
         Self {
             cache,
             index,
-            sight: Some(Sight::Clear),
+            sight: Some(Via::Specular),
             next: 0,
             sweeps: 0,
             before: 0,
@@ -88,7 +88,7 @@ impl<'a> Growing<'a> {
     pub(in crate::drive) fn restore(&mut self, records: &[Record], gathered: u32) {
         self.cache.restore(records);
         self.loaded = self.cache.records().len();
-        self.places.resize(self.loaded, Place::NONE);
+        self.places.resize(self.loaded, GatherPoint::NONE);
         self.gathered = gathered;
     }
 
@@ -108,7 +108,7 @@ impl<'a> Growing<'a> {
         self.loaded = self.cache.records().len();
         self.efforts.clear();
         self.places.truncate(self.loaded);
-        (self.sight, self.next, self.sweeps, self.before) = (Some(Sight::Clear), 0, 0, self.loaded);
+        (self.sight, self.next, self.sweeps, self.before) = (Some(Via::Specular), 0, 0, self.loaded);
     }
 
     /// Leaves the cache as it is.
@@ -124,7 +124,7 @@ impl<'a> Growing<'a> {
     /// Goes on after a sweep: with another one, or with what rough surfaces see, if there are any.
     fn sweep(&mut self, has_rough: bool) {
         (self.next, self.sweeps) = (0, self.sweeps + 1);
-        let is_first = self.sight == Some(Sight::Clear) && self.sweeps == 1;
+        let is_first = self.sight == Some(Via::Specular) && self.sweeps == 1;
         if is_first {
             self.forget_lonely();
         }
@@ -132,16 +132,16 @@ impl<'a> Growing<'a> {
         let adds_few = (records - self.before.min(records)) * FEW < records;
         self.before = records;
         if !is_first && adds_few || self.sweeps == SWEEPS {
-            let is_next = has_rough && self.sight == Some(Sight::Clear);
-            (self.sight, self.sweeps) = (is_next.then_some(Sight::Rough), 0);
+            let is_next = has_rough && self.sight == Some(Via::Specular);
+            (self.sight, self.sweeps) = (is_next.then_some(Via::Glossy), 0);
         }
     }
 
     /// What it looks for, and by which sample of each pixel.
-    fn look(&self) -> Option<(u32, Sight)> {
+    fn look(&self) -> Option<(u32, Via)> {
         self.sight.map(|sight| match sight {
-            Sight::Clear => (self.index, sight),
-            Sight::Rough => (self.index + 2 * self.sweeps, sight),
+            Via::Specular => (self.index, sight),
+            Via::Glossy => (self.index + 2 * self.sweeps, sight),
         })
     }
 
@@ -161,14 +161,14 @@ impl<'a> Growing<'a> {
     }
 
     /// Whether nothing is to be gathered at `place`: a record of fewer than so many pixels serves no other.
-    fn is_served(&self, place: &Place, least_pixels: f32) -> bool {
+    fn is_served(&self, place: &GatherPoint, least_pixels: f32) -> bool {
         self.cache.is_full() || place.is_confined(least_pixels) || self.cache.covers(&place.asker())
     }
 }
 
 /// See the file.
 pub(in crate::drive) struct Overture<'o, 'a, F> {
-    pub(in crate::drive) tracer: &'o PathTracer<'a, F>,
+    pub(in crate::drive) tracer: &'o PathIntegrator<'a, F>,
     pub(in crate::drive) gathering: Gathering<'o>,
     /// Of fewer strata, for what rough surfaces see: a pixel has the mean of many records there.
     pub(in crate::drive) coarse: &'o CellFlux<'o>,
@@ -184,7 +184,7 @@ impl<F: Features> Overture<'_, '_, F> {
         scratch: &mut [Vec<Line>],
     ) -> Result<bool, RenderError> {
         let [width, height] = self.size;
-        let order = Order::new(width, height, STRIDE);
+        let order = ProgressiveOrder::new(width, height, STRIDE);
         // Where depth is limited only what is seen asks for records.
         let has_rough = self.tracer.has_rough_surfaces() && !self.tracer.is_limited();
         while let Some(sight) = growing.look()
@@ -194,7 +194,7 @@ impl<F: Features> Overture<'_, '_, F> {
                 growing.sweep(has_rough);
                 continue;
             }
-            let is_missing = |place: &Place| !growing.is_served(place, self.gathering.least_pixels);
+            let is_missing = |place: &GatherPoint| !growing.is_served(place, self.gathering.least_pixels);
             let Some(mut missing) = self.look(&order, growing.next, sight, &is_missing, crew, scratch)?
             else {
                 return Ok(false);
@@ -203,7 +203,7 @@ impl<F: Features> Overture<'_, '_, F> {
                 missing.retain(|place| !growing.is_served(place, self.gathering.least_pixels));
                 let [fewest, most] = GATHERED;
                 let most = (growing.cache.records().len() / GATHERED_PART).clamp(fewest, most);
-                let batch: Vec<Place> = missing.drain(..missing.len().min(most)).collect();
+                let batch: Vec<GatherPoint> = missing.drain(..missing.len().min(most)).collect();
                 if !self.gather(&batch, growing, crew, scratch)? {
                     return Ok(false);
                 }
@@ -222,9 +222,9 @@ impl<F: Features> Overture<'_, '_, F> {
         scratch: &mut [Vec<Line>],
     ) -> Result<Option<f64>, RenderError> {
         let [width, height] = self.size;
-        let order = Order::new(width, height, STRIDE);
+        let order = ProgressiveOrder::new(width, height, STRIDE);
         let first = order.len().saturating_sub(LOOKED_AT as u64);
-        let sight = (growing.index, Sight::Clear);
+        let sight = (growing.index, Via::Specular);
         let Some(places) = self.look(&order, first, sight, &|_| true, crew, scratch)? else {
             return Ok(None);
         };
@@ -272,26 +272,27 @@ impl<F: Features> Overture<'_, '_, F> {
     /// What pixels see from the `first` of the order on, as far as it is wanted; `None` where the round is over.
     fn look(
         &self,
-        order: &Order,
+        order: &ProgressiveOrder,
         first: u64,
-        sight: (u32, Sight),
-        is_wanted: &(dyn Fn(&Place) -> bool + Sync),
+        sight: (u32, Via),
+        is_wanted: &(dyn Fn(&GatherPoint) -> bool + Sync),
         crew: &mut Crew,
         scratch: &mut [Vec<Line>],
-    ) -> Result<Option<Vec<Place>>, RenderError> {
-        let mut places = vec![Place::NONE; LOOKED_AT];
-        let look = |task: usize, _: &mut Arena, out: &mut [Place]| {
+    ) -> Result<Option<Vec<GatherPoint>>, RenderError> {
+        let mut places = vec![GatherPoint::NONE; LOOKED_AT];
+        let look = |task: usize, _: &mut Arena, out: &mut [GatherPoint]| {
             let mut counters = Counters::default();
             self.tracer.places(order, first + (task * PIXELS) as u64, sight, out, &mut counters);
-            let leave_out =
-                |out: &mut [Place]| out.iter_mut().filter(|p| !is_wanted(p)).for_each(|p| *p = Place::NONE);
+            let leave_out = |out: &mut [GatherPoint]| {
+                out.iter_mut().filter(|p| !is_wanted(p)).for_each(|p| *p = GatherPoint::NONE)
+            };
             leave_out(out);
             self.tracer.look_up(out, &mut counters);
             leave_out(out);
             Ok(counters)
         };
         let is_done = crew.pass(&mut places, PIXELS, scratch, &look)?;
-        places.retain(Place::is_some);
+        places.retain(GatherPoint::is_some);
         Ok(is_done.then_some(places))
     }
 
@@ -299,13 +300,13 @@ impl<F: Features> Overture<'_, '_, F> {
     /// over.
     fn gather(
         &self,
-        places: &[Place],
+        places: &[GatherPoint],
         growing: &mut Growing,
         crew: &mut Crew,
         scratch: &mut [Vec<Line>],
     ) -> Result<bool, RenderError> {
         let gathering = match growing.sight {
-            Some(Sight::Rough) => Gathering { flux: self.coarse, ..self.gathering },
+            Some(Via::Glossy) => Gathering { flux: self.coarse, ..self.gathering },
             _ => self.gathering,
         };
         // What a gather ray meets may be lit by the cache already.

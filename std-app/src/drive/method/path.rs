@@ -6,11 +6,11 @@ use crate::drive::memory::Memory;
 use crate::drive::{RenderError, Reuse};
 use halflight_core::bsdf::Features;
 use halflight_core::memory::{Footprint, Line};
-use halflight_core::transport::{PathTracer, Pilot, path::WAVE};
+use halflight_core::transport::{PathIntegrator, Pilot, path::WAVE};
 
 /// See the file.
 pub(super) struct Paths<'a, F> {
-    pub(super) tracer: PathTracer<'a, F>,
+    pub(super) tracer: PathIntegrator<'a, F>,
     pub(super) scratch: Vec<Vec<Line>>,
     reuse: Reuse,
     /// The mean radiance of the picture by a first look, where there was one.
@@ -21,7 +21,7 @@ pub(super) struct Paths<'a, F> {
 
 impl<'a, F: Features> Paths<'a, F> {
     pub(super) fn new(stage: &Stage<'a>, memory: &mut Memory) -> Result<Self, RenderError> {
-        Self::with_scratch(stage, memory, PathTracer::<F>::scratch(WAVE))
+        Self::with_scratch(stage, memory, PathIntegrator::<F>::scratch(WAVE))
     }
 
     /// With working memory for more than paths.

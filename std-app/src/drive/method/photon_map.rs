@@ -15,14 +15,14 @@ use crate::drive::crew::Crew;
 use crate::drive::memory::Memory;
 use halflight_core::bsdf::Features;
 use halflight_core::memory::Line;
-use halflight_core::transport::{PathTracer, path::WAVE};
+use halflight_core::transport::{PathIntegrator, path::WAVE};
 
 /// Samples that share two sets of maps: enough that maps are the smaller part of the work.
 const GROUP: u32 = 8;
 
 /// See the file.
 pub(super) struct TwoPasses<'a, F> {
-    tracer: PathTracer<'a, F>,
+    tracer: PathIntegrator<'a, F>,
     laboratory: Laboratory<'a>,
     shelves: [Shelf; 2],
     scratch: Vec<Vec<Line>>,

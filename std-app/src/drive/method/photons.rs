@@ -13,11 +13,13 @@ use crate::drive::{RenderError, Settings};
 use halflight_core::bsdf::Features;
 use halflight_core::memory::{Arena, Footprint, Line};
 use halflight_core::photon::{Kernel, MapShape, Photon, PhotonMap, Photons};
-use halflight_core::transport::photon_mapping::deposit::{Keep, PATHS, ROOM, ShootSettings, Shooter};
-use halflight_core::transport::photon_mapping::final_gather::{
-    GatherLight, IRRADIANCES, Irradiances, PhotonMaps, STRIDE, may_have_caustics,
+use halflight_core::transport::photon_mapping::deposit::{
+    PATHS, PhotonFilter, PhotonTracer, PhotonTracerSettings, ROOM,
 };
-use halflight_core::transport::{PathTracer, RadiusSchedule};
+use halflight_core::transport::photon_mapping::final_gather::{
+    GlobalMapLookup, IRRADIANCES, PhotonMaps, PrecomputedIrradiance, STRIDE, may_have_caustics,
+};
+use halflight_core::transport::{PathIntegrator, RadiusSchedule};
 use std::time::Instant;
 
 /// How photons are used.
@@ -185,10 +187,10 @@ impl<'a> Laboratory<'a> {
         let least = others.saturating_add(2 * bytes(1, 1));
         let [all, caustics] = lamps;
         let gathered = Wanted::Gathered(FARTHEST * bvh.bounds().diagonal());
-        let of = (Keep::All, shortened(settings));
+        let of = (PhotonFilter::All, shortened(settings));
         let aim = Aim::look_first::<F>(stage, of, gathered, scratch, (memory, all), least)?;
         let caustics = if has_caustics {
-            let of = (Keep::Caustic, path_settings(settings).max_depth);
+            let of = (PhotonFilter::Caustic, path_settings(settings).max_depth);
             let seen = Wanted::Seen(FIRST_RADIUS as f32);
             Some(Aim::look_first::<F>(stage, of, seen, scratch, (memory, caustics), least)?)
         } else {
@@ -230,7 +232,7 @@ impl<'a> Laboratory<'a> {
 
     /// Working memory of each thread.
     pub(super) fn scratch<F: Features>() -> Footprint {
-        Shooter::<F>::scratch().or(Irradiances::scratch())
+        PhotonTracer::<F>::scratch().or(PrecomputedIrradiance::scratch())
     }
 
     /// The maps of number `map`, made where they are not yet on the shelf. `None` where the round is over before they are
@@ -265,29 +267,29 @@ impl<'a> Laboratory<'a> {
         let Stage { scene, bvh, lights, settings, .. } = self.stage;
         let start = Instant::now();
         let farthest = self.farthest();
-        let shot = |keep: Keep, tasks: usize, seed: u32, max_depth: u32| ShootSettings {
+        let shot = |keep: PhotonFilter, tasks: usize, seed: u32, max_depth: u32| PhotonTracerSettings {
             keep,
             seed,
             paths: (tasks * PATHS) as u32,
             max_depth,
         };
-        let all = shot(Keep::All, self.global, settings.seed, shortened(settings));
+        let all = shot(PhotonFilter::All, self.global, settings.seed, shortened(settings));
         let (seed, max_depth) = (settings.seed ^ CAUSTIC_SEED, path_settings(settings).max_depth);
-        let caustic = shot(Keep::Caustic, self.caustic, seed, max_depth);
+        let caustic = shot(PhotonFilter::Caustic, self.caustic, seed, max_depth);
         let shots = [
             (&mut shelf.global, Some(&self.aim), all),
             (&mut shelf.caustic, self.caustics.as_ref(), caustic),
         ];
         for (drawer, aim, shot) in shots {
             let Some(aim) = aim else { continue };
-            let shooter = Shooter::<F>::new(scene, bvh, lights, &aim.emission, shot, settings.level);
+            let shooter = PhotonTracer::<F>::new(scene, bvh, lights, &aim.emission, shot, settings.level);
             let task = |task: usize, arena: &mut Arena, out: &mut [_]| shooter.run(task, map, arena, out);
             if !drawer.fill(shooter.room(), crew, scratch, &task)? {
                 return Ok(false);
             }
         }
         let Some(global) = shelf.global.map()? else { return Ok(false) };
-        let all = Irradiances::new(bvh, &global, farthest, settings.photons.kernel, settings.level);
+        let all = PrecomputedIrradiance::new(bvh, &global, farthest, settings.photons.kernel, settings.level);
         let task = |task: usize, arena: &mut Arena, out: &mut [_]| all.run(task, arena, out);
         if !shelf.irradiances.fill(IRRADIANCES, crew, scratch, &task)? {
             return Ok(false);
@@ -322,7 +324,7 @@ impl<'a> Laboratory<'a> {
     /// What paths see of the maps; caustics in discs as they are after so many maps were `made`.
     pub(super) fn light<'m>(&self, built: &'m Built<'m>, made: u32) -> PhotonMaps<'m> {
         let kernel = self.stage.settings.photons.kernel;
-        let global = GatherLight::new(&built.global, &built.irradiances, self.farthest(), kernel);
+        let global = GlobalMapLookup::new(&built.global, &built.irradiances, self.farthest(), kernel);
         let light = |map| progressive(map, self.discs, made).with_kernel(kernel).of_caustics();
         PhotonMaps { caustic: built.caustic.as_ref().map(light), global }
     }
@@ -336,5 +338,5 @@ fn shortened(settings: &Settings) -> u32 {
 
 /// Working memory of a thread that traces paths as well.
 pub(super) fn scratch<F: Features>(wave: usize) -> Footprint {
-    PathTracer::<F>::scratch(wave).or(Laboratory::scratch::<F>())
+    PathIntegrator::<F>::scratch(wave).or(Laboratory::scratch::<F>())
 }

@@ -8,7 +8,7 @@ use halflight_core::bsdf::Features;
 use halflight_core::memory::{Arena, Line};
 use halflight_core::photon::Photon;
 use halflight_core::transport::SceneContext;
-use halflight_core::transport::photon_mapping::visible_points::Raster;
+use halflight_core::transport::photon_mapping::visible_points::VisiblePointSampler;
 
 /// What their memory is counted as.
 pub(super) const PLACES: &str = "places";
@@ -16,7 +16,7 @@ pub(super) const PLACES: &str = "places";
 /// The map of the places that the rays of `raster` find.
 pub(super) fn find<F: Features>(
     stage: &Stage,
-    raster: &Raster,
+    raster: &VisiblePointSampler,
     scratch: &mut [Vec<Line>],
     memory: &mut Memory,
 ) -> Result<Drawer, RenderError> {
@@ -25,6 +25,8 @@ pub(super) fn find<F: Features>(
     let look = |task: usize, _: &mut Arena, out: &mut [Photon]| {
         Ok(raster.run(task, &SceneContext::<F>::new(scene, bvh, settings.level), settings.seed, out))
     };
-    places.fill_with(workers, |photons| Ok(workers.look(photons, Raster::TASK, scratch, &look)?))?;
+    places.fill_with(workers, |photons| {
+        Ok(workers.look(photons, VisiblePointSampler::TASK, scratch, &look)?)
+    })?;
     Ok(places)
 }

@@ -19,8 +19,10 @@ use crate::drive::run::path_settings;
 use halflight_core::bsdf::Features;
 use halflight_core::memory::{Arena, Line};
 use halflight_core::photon::{PhotonMap, Photons};
-use halflight_core::transport::photon_mapping::deposit::{Keep, PATHS, ROOM, ShootSettings, Shooter};
-use halflight_core::transport::{PathTracer, PhotonLight, RadiusSchedule, path::WAVE};
+use halflight_core::transport::photon_mapping::deposit::{
+    PATHS, PhotonFilter, PhotonTracer, PhotonTracerSettings, ROOM,
+};
+use halflight_core::transport::{PathIntegrator, PhotonLight, RadiusSchedule, path::WAVE};
 use std::time::Instant;
 
 /// Radius of the discs of the first sample, in pixels.
@@ -39,7 +41,7 @@ const MOST_PATHS: usize = 1024 * PATHS;
 /// See the file.
 pub(super) struct ProgressivePhotons<'a, F> {
     stage: Stage<'a>,
-    tracer: PathTracer<'a, F>,
+    tracer: PathIntegrator<'a, F>,
     discs: RadiusSchedule,
     paths: usize,
     used: PhotonUse,
@@ -58,14 +60,14 @@ impl<'a, F: Features> ProgressivePhotons<'a, F> {
         lamps: &'a mut Vec<Line>,
     ) -> Result<Self, RenderError> {
         let Stage { settings, workers, .. } = *stage;
-        let scratch = PathTracer::<F>::scratch(WAVE).or(Shooter::<F>::scratch());
+        let scratch = PathIntegrator::<F>::scratch(WAVE).or(PhotonTracer::<F>::scratch());
         let mut scratch = memory.take_each("paths", scratch, workers.count())?;
         let pixels = settings.width as usize * settings.height as usize;
         let usual = pixels.clamp(FEWEST_PATHS, MOST_PATHS);
         let wanted = settings.photons.global.map_or(usual, |paths| paths as usize).div_ceil(PATHS).max(1);
         let of_task = Photons::footprint(ROOM).bytes();
         let others = Audit::bytes::<F>(stage, Method::ProgressivePhotons.is_biased());
-        let look = (Keep::Reflected, path_settings(settings).max_depth);
+        let look = (PhotonFilter::Reflected, path_settings(settings).max_depth);
         let seen = Wanted::Seen(FIRST_RADIUS as f32);
         let least = others.saturating_add(FEWEST_PATHS / PATHS * of_task);
         let aim = Aim::look_first::<F>(stage, look, seen, &mut scratch, (memory, lamps), least)?;
@@ -99,13 +101,13 @@ impl<F: Features> Renderer for ProgressivePhotons<'_, F> {
         let Self { stage, tracer, discs, paths, used, photons, sample: shot_for, aim, scratch } = self;
         let Stage { scene, bvh, lights, settings, .. } = *stage;
         let emission = &aim.emission;
-        let shot = ShootSettings {
-            keep: Keep::Reflected,
+        let shot = PhotonTracerSettings {
+            keep: PhotonFilter::Reflected,
             seed: settings.seed,
             paths: *paths as u32,
             max_depth: path_settings(settings).max_depth,
         };
-        let shooter = Shooter::<F>::new(scene, bvh, lights, emission, shot, settings.level);
+        let shooter = PhotonTracer::<F>::new(scene, bvh, lights, emission, shot, settings.level);
         while let Some(sample) = crew.next_sample() {
             // A round that was cut in the middle of a sample has left its photons.
             if *shot_for != Some(sample) {

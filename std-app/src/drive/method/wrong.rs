@@ -8,12 +8,12 @@ use crate::drive::memory::Memory;
 use halflight_core::bsdf::Features;
 use halflight_core::film::{Dropped, PIXELS_PER_TILE, Pixel, Tile};
 use halflight_core::memory::Line;
-use halflight_core::transport::{Counters, PathTracer, path::WAVE};
+use halflight_core::transport::{Counters, PathIntegrator, path::WAVE};
 
 pub(in crate::drive) const FACTOR: f32 = 1.1;
 
 pub(super) struct Wrong<'a, F> {
-    tracer: PathTracer<'a, F>,
+    tracer: PathIntegrator<'a, F>,
     scratch: Vec<Vec<Line>>,
     size: [u32; 2],
 }
@@ -21,7 +21,7 @@ pub(super) struct Wrong<'a, F> {
 impl<'a, F: Features> Wrong<'a, F> {
     pub(super) fn new(stage: &Stage<'a>, memory: &mut Memory) -> Result<Self, RenderError> {
         let Stage { settings, workers, .. } = *stage;
-        let scratch = memory.take_each("paths", PathTracer::<F>::scratch(WAVE), workers.count())?;
+        let scratch = memory.take_each("paths", PathIntegrator::<F>::scratch(WAVE), workers.count())?;
         let tracer = stage.paths::<F>(settings.seed);
         Ok(Self { tracer, scratch, size: [settings.width, settings.height] })
     }
