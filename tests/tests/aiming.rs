@@ -70,7 +70,7 @@ fn photons_of_caustics_go_where_mirrors_throw_them_to_what_is_seen() {
     let found = render(&scene, Method::PhotonMap, 48, 256, |_| ());
     let MapUse { seen, by_power, .. } = photons(&found).caustic.unwrap();
     let (seen, by_power) = (seen.unwrap(), by_power.unwrap());
-    assert!(by_power < 0.01 && seen > 0.2, "{by_power} {seen}");
+    assert!(by_power < 0.01 && seen > 100.0 * by_power, "{by_power} {seen}");
     let off = deviation(&found.image, &path);
     assert!(off.abs() < 0.01, "{off}");
 }

@@ -516,24 +516,3 @@ fn in_a_stadium_photons_go_to_the_glass_and_their_power_is_right() {
     );
     println!("{power} W of {expected} W");
 }
-
-#[test]
-fn a_small_glass_in_a_large_lit_room_is_worth_photons() {
-    let camera = Camera::look_at(Vec3::new(45.4, 0.4, 25.4), Vec3::new(45.0, 0.05, 25.0), Vec3::Y, 40.0);
-    let mut buffers = SceneBuffers::new(camera);
-    let wall = buffers.material(Material::diffuse(Rgb::splat(0.5)));
-    let lamp = buffers.material(emitter(0.0, 40.0));
-    let ball = buffers.material(Material { surface: glass(0.0), ..Material::GREY });
-    buffers.cuboid(Vec3::ZERO, Vec3::new(50.0, 10.0, 50.0), true, wall);
-    for i in 0..50 {
-        let elsewhere = Vec3::new(2.0 + (i % 7) as f32 * 5.2, 9.0, 3.0 + (i / 7) as f32 * 6.0);
-        let at = if i == 23 { Vec3::new(45.0, 4.0, 25.0) } else { elsewhere };
-        buffers.square(at, Vec3::NEG_Y, 0.1, lamp);
-    }
-    buffers.normals = vec![[0.0; 3]; buffers.positions.len()];
-    buffers.sphere(Vec3::new(45.0, 0.08, 25.0), 0.05, 24, ball);
-    let joined = path(&buffers.scene(), 4, |_| ());
-    assert!(has_photons(&joined) && joined.caustics.share < Some(0.035), "{:?}", joined.caustics);
-    let map = joined.photons.unwrap().caustic.unwrap();
-    assert!(4 * map.stored > map.shot, "most of them lie where the ball throws them: {map:?}");
-}
