@@ -1,5 +1,5 @@
 //! What the quarters of the pixels of a tile saw, and what is seen around each pixel: what
-//! [`BrightnessClasses`](super::Lookalikes) are told by.
+//! [`BrightnessClasses`](super::BrightnessClasses) are told by.
 
 use crate::film::{PIXELS_PER_TILE, Pixel, TILE, Tile};
 use glam::Vec4;

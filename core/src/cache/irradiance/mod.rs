@@ -1,5 +1,5 @@
 //! Irradiance caching. A [`Hemisphere`] holds the gather rays of one point, [`derivatives`] the change of its
-//! irradiance with position and normal, a [`Metric`] and [`validity`] the region in which it may be reused. A
+//! irradiance with position and normal, a [`Metric`] and [`validity`](mod@validity) the region in which it may be reused. A
 //! [`Record`] keeps all this; the [`IrradianceCache`] holds the records.
 
 pub mod derivatives;

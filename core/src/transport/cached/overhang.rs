@@ -46,7 +46,7 @@ struct Probe {
 }
 
 impl<F: Features> PathIntegrator<'_, F> {
-    /// How far away the records may be ([`crate::cache::irradiance::Asker::within`]) that these points hear,
+    /// How far away the records may be ([`crate::cache::irradiance::QueryPoint::within`]) that these points hear,
     /// each of which wants to hear such as are so far `exposed`.
     pub(in crate::transport) fn within(
         &self,

@@ -91,7 +91,7 @@ impl<'a, F: Features> CausticPhotonTracer<'a, F> {
         Self { flight, discs, frame, beside_records: false }
     }
 
-    /// The same, of photons for [`CausticMerging::beside_records`](super::Merging::beside_records), if so.
+    /// The same, of photons for [`CausticMerging::beside_records`](crate::transport::CausticMerging::beside_records), if so.
     pub fn beside_records(self, beside_records: bool) -> Self {
         Self { beside_records, ..self }
     }
