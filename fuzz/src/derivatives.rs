@@ -5,7 +5,8 @@
 use crate::numbers::{coordinate, fraction};
 use arbitrary::{Result, Unstructured};
 use halflight_core::cache::irradiance::derivatives::{CellFlux, closed_mesh, triangulated, ward_heckbert};
-use halflight_core::cache::irradiance::metric::{Metric, Settings, reach};
+use halflight_core::cache::irradiance::metric::{Metric, Settings};
+use halflight_core::cache::irradiance::validity;
 use halflight_core::cache::irradiance::{Derivatives, Hemisphere};
 use halflight_core::memory::{Arena, Line};
 use halflight_core::sampling::warp::cosine_hemisphere;
@@ -190,7 +191,7 @@ fn radii(of: &[Derivatives]) {
     for derivatives in of {
         for metric in Metric::ALL {
             let settings = Settings { least: 0.01, ..Settings::new(metric, 10.0) };
-            let found = reach(&settings, derivatives);
+            let found = validity(&settings, derivatives);
             let [short, long] = found.radii;
             let within = 0.01 <= short && short <= long && long <= settings.most;
             assert!(within, "{metric:?}: {found:?} of {derivatives:?}");
