@@ -6,7 +6,7 @@ use arbitrary::{Result, Unstructured};
 use glam::Vec3;
 use halflight_core::memory::{Arena, Footprint, Line};
 use halflight_core::photon::{
-    Density, QueryDisc, Kernel, Neighbours, Photon, PhotonMap, Photons, QueryOrder, Response, Uniform, brute,
+    Density, Kernel, Neighbours, Photon, PhotonMap, Photons, QueryDisc, QueryOrder, Response, Uniform, brute,
 };
 use halflight_core::{Level, Rgb};
 
