@@ -54,7 +54,7 @@ impl Clearance {
 }
 
 impl Bvh<'_> {
-    /// What lies around `query`.
+    /// Clearance around `query`.
     pub fn clearance(&self, query: &ClearanceQuery) -> Clearance {
         let (lo, hi) = (query.place - Vec3::splat(query.reach), query.place + Vec3::splat(query.reach));
         let mut clearance = Clearance { rises: false, hangs: false, surface: 0 };

@@ -2,7 +2,7 @@
 
 use crate::geometry::Hit;
 
-/// What a batch does with the hits of its rays. All start as [`Hit::NONE`].
+/// Use of the hits of a batch of rays. All start as [`Hit::NONE`].
 pub(super) trait Sink {
     /// No hit for any of `count` rays from `base` on.
     fn clear(&mut self, base: u32, count: usize);

@@ -159,24 +159,9 @@ impl Record {
 
 #[cfg(test)]
 mod tests {
+    use super::super::record::tests::record;
     use super::*;
     use glam::Vec2;
-
-    fn record() -> Record {
-        Record {
-            normal: [0.0, 0.0, 1.0],
-            axis: [1.0, 0.0, 0.0],
-            irradiance: [2.0; 3],
-            gradient: [[0.5, -1.0]; 3],
-            rotation: [[0.0, 3.0]; 3],
-            radii: [1.0, 2.0],
-            overlap: 1.0,
-            reach: 2.0,
-            fence: [u8::MAX; SECTORS],
-            free: [u8::MAX; SECTORS],
-            ..Record::default()
-        }
-    }
 
     const LEAST_COS: f32 = 0.98;
 

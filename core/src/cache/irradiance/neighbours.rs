@@ -116,7 +116,7 @@ impl Record {
     /// `other`. Zero if there is no error, or if noise or the radii of both explain it.
     fn misses(&self, other: &Record, least_cos: f32) -> f32 {
         let (place, normal) = (Vec3::from(other.position), Vec3::from(other.normal));
-        // What hangs close over the other has confined it.
+        // An overhang close to the other has confined it.
         let point = QueryPoint { position: place, normal, within: other.farthest() };
         let Some((said, _)) = self.at(&point, least_cos) else { return 0.0 };
         let (here, there) = (luminance(self.irradiance.into()), luminance(other.irradiance.into()));

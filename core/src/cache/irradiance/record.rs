@@ -238,10 +238,11 @@ pub(super) fn sector<W: Width>(width: W, [x, y]: [W::L; 2]) -> W::L {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
 
-    fn record() -> Record {
+    /// A record of unequal derivatives and radii, which nothing confines.
+    pub(in crate::cache::irradiance) fn record() -> Record {
         Record {
             normal: [0.0, 0.0, 1.0],
             axis: [1.0, 0.0, 0.0],

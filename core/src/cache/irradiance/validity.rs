@@ -6,7 +6,7 @@ use core::f32::consts::PI;
 use glam::Vec2;
 use halflight_simd::kernels::eigen::{Eigen2, symmetric2};
 
-/// Where a record may be used.
+/// The region in which a record may be used.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Validity {
     /// Unit direction of the shorter radius, in the tangent frame; the longer stands at right angles.

@@ -10,7 +10,7 @@
 //!    the mean it would have to live through as many ends as no sequence of random numbers holds.
 //! 2. The price: where surfaces are lighter than that, photons differ in power.
 
-use crate::bsdf::{BsdfSample, Features};
+use crate::bsdf::Features;
 use crate::bvh::Bvh;
 use crate::light::{EmissionSampler, LightSampler, luminance};
 use crate::memory::{Arena, Footprint, OutOfMemory};
@@ -22,7 +22,6 @@ pub use crate::transport::walk::light::PATHS;
 use crate::transport::walk::light::{Continuation, LightPathState, LightWalk, PhotonBuffer, Vertex, Visitor};
 use crate::{Level, Rgb};
 use core::marker::PhantomData;
-use glam::Vec3;
 
 /// Photons that a task has room for.
 pub const ROOM: usize = 6 * PATHS;
@@ -178,11 +177,6 @@ impl Visitor for VisibilityCounter<'_> {
         }
         self.keep.onward(vertex, leaves)
     }
-
-    #[inline]
-    fn leave(&self, state: &mut LightPathState, vertex: &Vertex, _from: Vec3, _sample: (&BsdfSample, bool)) {
-        state.mirrored = vertex.bsdf.is_delta().into();
-    }
 }
 
 /// Leaves the photons that are wanted.
@@ -209,10 +203,5 @@ impl Visitor for Depositor<'_> {
             }
         }
         self.keep.onward(vertex, leaves)
-    }
-
-    #[inline]
-    fn leave(&self, state: &mut LightPathState, vertex: &Vertex, _from: Vec3, _sample: (&BsdfSample, bool)) {
-        state.mirrored = vertex.bsdf.is_delta().into();
     }
 }

@@ -127,31 +127,6 @@ pub(in crate::transport) trait Visitor {
     }
 }
 
-/// Where the numbers of paths come from.
-pub(in crate::transport) trait Source {
-    /// Those of a path.
-    type Numbers: Numbers;
-
-    /// Those of path `number`.
-    fn of(&self, number: u32) -> Self::Numbers;
-}
-
-/// Those of a map of photons, a point of a sequence for each path.
-#[derive(Clone, Copy)]
-pub(in crate::transport) struct Sequence {
-    seed: u32,
-    map: u32,
-}
-
-impl Source for Sequence {
-    type Numbers = Sampler;
-
-    #[inline]
-    fn of(&self, number: u32) -> Sampler {
-        Sampler::replicate(self.seed, self.map >> 1, self.map & 1, number)
-    }
-}
-
 /// What is shot: all but its visitor.
 #[derive(Clone, Copy)]
 pub(in crate::transport) struct LightWalk<'a, F> {
@@ -188,22 +163,9 @@ impl<F: Features> LightWalk<'_, F> {
     ) -> Result<Counters, OutOfMemory> {
         let first = task * PATHS;
         let paths = (self.paths as usize).saturating_sub(first).min(PATHS);
-        self.follow_all(&self.sequence::<V>(map), (first as u32, paths), scratch, visitor)
-    }
-
-    /// The numbers of the paths of map number `map`.
-    pub(in crate::transport) fn sequence<V: Visitor>(&self, map: u32) -> Sequence {
-        Sequence { seed: mix(V::SEED ^ u64::from(self.seed)) as u32, map }
-    }
-
-    /// Follows so many `paths` from number `first` on, [`PATHS`] at most, by the numbers of `source`.
-    pub(in crate::transport) fn follow_all<V: Visitor, S: Source>(
-        &self,
-        source: &S,
-        (first, paths): (u32, usize),
-        scratch: &mut Arena,
-        visitor: &mut V,
-    ) -> Result<Counters, OutOfMemory> {
+        // A point of a sequence for each path: even and odd maps are independent.
+        let seed = mix(V::SEED ^ u64::from(self.seed)) as u32;
+        let numbers_of = |number| Sampler::replicate(seed, map >> 1, map & 1, number);
         let mut arena = scratch.scratch();
         let states = arena.slice::<LightPathState>(PATHS)?;
         let rays = arena.slice::<Ray>(PATHS)?;
@@ -211,8 +173,8 @@ impl<F: Features> LightWalk<'_, F> {
         let mut counters = Counters::default();
         let mut active = 0;
         for (i, state) in states.iter_mut().enumerate().take(paths) {
-            let number = first + i as u32;
-            if let Some(emitted) = self.emission.emit(self.scene, self.lights, &source.of(number)) {
+            let number = (first + i) as u32;
+            if let Some(emitted) = self.emission.emit(self.scene, self.lights, &numbers_of(number)) {
                 *state = LightPathState {
                     power: (emitted.power / self.paths as f32).to_array(),
                     number,
@@ -235,7 +197,7 @@ impl<F: Features> LightWalk<'_, F> {
             for i in 0..active {
                 let (ray, hit) = (rays[i], hits[i]);
                 let Some(state) = states.get_mut(ray.tag as usize) else { continue };
-                let numbers = source.of(state.number);
+                let numbers = numbers_of(state.number);
                 if let Some(next) = self.step(state, &numbers, &ray, &hit, visitor, &mut counters) {
                     rays[going_on] = Ray { tag: ray.tag, ..next };
                     going_on += 1;
