@@ -12,7 +12,7 @@
 //! - [`film`]: pixels and tiles. [`photon`]: photon maps. [`cache`]: irradiance with its derivatives.
 //! - [`estimate`]: the error of a picture. [`census`]: the kinds of things in a scene, and the code they
 //!   need.
-//! - [`transport`]: the methods.
+//! - [`transport`]: subpaths, path tracing, photon tracing, gathering. [`method`]: the methods of rendering.
 #![no_std]
 #![forbid(unsafe_code)]
 
@@ -29,6 +29,7 @@ pub mod film;
 pub mod geometry;
 pub mod light;
 pub mod memory;
+pub mod method;
 pub mod photon;
 pub mod sampling;
 pub mod scene;

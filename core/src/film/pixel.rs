@@ -136,7 +136,8 @@ impl Pixel {
 }
 
 /// Samples that did not reach the picture, by cause.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
+#[repr(C)]
 pub struct Dropped {
     /// A channel was not a number.
     pub nan: u64,

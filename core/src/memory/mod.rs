@@ -2,6 +2,8 @@
 
 mod arena;
 mod footprint;
+mod source;
 
 pub use arena::{ALIGNMENT, Arena, Line, OutOfMemory};
 pub use footprint::Footprint;
+pub use source::{Buffer, MemorySource};

@@ -2,12 +2,12 @@
 //! writes to a slice of its own, and what they have found is committed in their order: the same bits on any number of
 //! threads.
 
-use super::canvas::Canvas;
 use super::watch::Watch;
 use super::workers::Workers;
 use core::ops::Range;
 use halflight_core::film::{PIXELS_PER_TILE, Pixel};
 use halflight_core::memory::{Arena, Line, OutOfMemory};
+use halflight_core::method::RenderState;
 use halflight_core::transport::Counters;
 use std::sync::Mutex;
 use std::time::Instant;
@@ -45,7 +45,7 @@ pub(super) type TileTask<'t> =
 pub(super) struct Crew<'r, 'm> {
     pub(super) workers: &'r Workers<'r>,
     pub(super) round: &'r Round<'r>,
-    pub(super) canvas: &'r mut Canvas<'m>,
+    pub(super) canvas: &'r mut RenderState<'m>,
 }
 
 impl Crew<'_, '_> {
@@ -94,7 +94,8 @@ impl Crew<'_, '_> {
     ) -> Result<(), OutOfMemory> {
         let Self { workers, round, canvas } = self;
         let (shard, end) = (canvas.shard, end.min(round.target));
-        let tiles = canvas.film.pixels_mut().chunks_mut(PIXELS_PER_TILE).zip(&mut canvas.taken).enumerate();
+        let tiles =
+            canvas.film.pixels_mut().chunks_mut(PIXELS_PER_TILE).zip(canvas.samples.iter_mut()).enumerate();
         let own = tiles.filter(|(task, _)| shard.owns(*task));
         let open = own.filter_map(|(task, (pixels, taken))| (*taken < end).then_some((task, pixels, taken)));
         let queue = Mutex::new(scattered(open.collect()));
@@ -122,7 +123,7 @@ impl Crew<'_, '_> {
         })?;
         for (counters, dropped) in counted {
             canvas.counters += counters;
-            dropped.into_iter().for_each(|(task, dropped)| canvas.ledger.add(task, dropped));
+            dropped.into_iter().for_each(|(task, dropped)| canvas.dropped[task] += dropped);
         }
         Ok(())
     }

@@ -1,11 +1,6 @@
-//! Where samples were dropped: by tile, and by cause in each.
+//! Rejected samples by tile and cause.
 
 use halflight_core::film::{Dropped, Film, TILE, Tile};
-use std::collections::BTreeMap;
-
-/// Samples that did not reach the picture, of all tiles that have such. At most 40 bytes for a tile.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub(super) struct Ledger(BTreeMap<u32, Dropped>);
 
 /// A part of the picture in which samples were dropped.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -22,36 +17,16 @@ pub struct Place {
     pub dropped: Dropped,
 }
 
-impl Ledger {
-    /// Adds what tile `task` has dropped.
-    pub(super) fn add(&mut self, task: usize, dropped: Dropped) {
-        if dropped.total() > 0 {
-            *self.0.entry(task as u32).or_default() += dropped;
-        }
-    }
-
-    /// Adds all of another.
-    pub(super) fn merge(&mut self, other: &Ledger) {
-        other.0.iter().for_each(|(task, dropped)| self.add(*task as usize, *dropped));
-    }
-
-    /// Tiles and what they dropped, in their order.
-    pub(super) fn tiles(&self) -> impl Iterator<Item = (u32, Dropped)> {
-        self.0.iter().map(|(task, dropped)| (*task, *dropped))
-    }
-
-    /// The places in a picture, those with the most first.
-    pub(super) fn places(&self, width: u32, height: u32) -> Vec<Place> {
-        let mut places: Vec<Place> = self
-            .tiles()
-            .filter_map(|(task, dropped)| {
-                let (x, y) = Tile::new(width, height, task as usize).pixel(0)?;
-                Some(Place { x, y, width: TILE.min(width - x), height: TILE.min(height - y), dropped })
-            })
-            .collect();
-        places.sort_by_key(|place| core::cmp::Reverse(place.dropped.total()));
-        places
-    }
+/// The tiles of a picture that have rejected samples, those with the most first.
+pub(super) fn places(dropped: &[Dropped], width: u32, height: u32) -> Vec<Place> {
+    let of_tile = |(task, &dropped): (usize, &Dropped)| {
+        let (x, y) = Tile::new(width, height, task).pixel(0)?;
+        Some(Place { x, y, width: TILE.min(width - x), height: TILE.min(height - y), dropped })
+    };
+    let some = dropped.iter().enumerate().filter(|(_, dropped)| dropped.total() > 0);
+    let mut places: Vec<Place> = some.filter_map(of_tile).collect();
+    places.sort_by_key(|place| core::cmp::Reverse(place.dropped.total()));
+    places
 }
 
 /// Pixels of the tiles in `tasks` without a single sample: all of theirs were dropped.
@@ -70,13 +45,10 @@ mod tests {
 
     #[test]
     fn places_are_tiles_and_the_worst_come_first() {
-        let mut ledger = Ledger::default();
         let nan = |count| Dropped { nan: count, ..Dropped::default() };
-        for (task, count) in [(1, 2), (5, 3), (1, 4), (0, 0)] {
-            ledger.add(task, nan(count));
-        }
+        let dropped = [0, 6, 0, 0, 0, 3].map(nan);
         // 40 x 20 pixels are 3 x 2 tiles.
-        let places = ledger.places(40, 20);
+        let places = places(&dropped, 40, 20);
         assert_eq!(places.len(), 2);
         assert_eq!(places[0], Place { x: 16, y: 0, width: 16, height: 16, dropped: nan(6) });
         assert_eq!(places[1], Place { x: 32, y: 16, width: 8, height: 4, dropped: nan(3) });

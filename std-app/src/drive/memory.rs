@@ -4,7 +4,7 @@ use super::{RenderError, Settings};
 use crate::compare::working_bytes;
 use crate::memory::Budget;
 use crate::pages::Pages;
-use halflight_core::memory::{ALIGNMENT, Footprint, Line};
+use halflight_core::memory::{ALIGNMENT, Arena, Footprint, Line, MemorySource, OutOfMemory};
 use halflight_core::scene::{Scene, Texels};
 
 /// Bytes of one structure.
@@ -16,8 +16,12 @@ pub struct MemoryUse {
     pub bytes: usize,
 }
 
+/// The owner of memory that lives as long as the picture.
+pub(super) type Bank = typed_arena::Arena<Vec<Line>>;
+
 /// What is taken now, and the most that ever was.
-pub(super) struct Memory {
+pub(super) struct Memory<'m> {
+    bank: &'m Bank,
     /// What was asked for: structures that can be smaller are, where it is short.
     limit: Option<usize>,
     /// What nothing goes beyond. Without a limit it depends on the machine, and nothing else may.
@@ -26,9 +30,9 @@ pub(super) struct Memory {
     peak: usize,
 }
 
-impl Memory {
+impl<'m> Memory<'m> {
     /// Counts the buffers of `scene`, and the reference with what comparing takes, as taken.
-    pub(super) fn new(scene: &Scene, settings: &Settings) -> Self {
+    pub(super) fn new(scene: &Scene, settings: &Settings, bank: &'m Bank) -> Self {
         let limit = settings.memory;
         let wall = Budget::new(limit).limit();
         let mut uses = vec![MemoryUse { structure: "scene", bytes: scene_bytes(scene) }];
@@ -36,7 +40,7 @@ impl Memory {
             let bytes = size_of_val(&reference.pixels[..]) + working_bytes(reference);
             uses.push(MemoryUse { structure: "reference", bytes });
         }
-        let mut memory = Self { limit, wall, uses, peak: 0 };
+        let mut memory = Self { bank, limit, wall, uses, peak: 0 };
         memory.peak = memory.total();
         memory
     }
@@ -52,10 +56,14 @@ impl Memory {
         structure: &'static str,
         footprint: Footprint,
     ) -> Result<Vec<Line>, RenderError> {
+        Ok(self.lines(structure, footprint)?)
+    }
+
+    fn lines(&mut self, structure: &'static str, footprint: Footprint) -> Result<Vec<Line>, OutOfMemory> {
         let needed = self.needed(footprint)?;
         let count = footprint.bytes().div_ceil(ALIGNMENT);
         let mut lines = Vec::new();
-        let failed = |_| RenderError::Memory { needed, available: self.total() };
+        let failed = |_| OutOfMemory { needed, available: self.total() };
         lines.try_reserve_exact(count).map_err(failed)?;
         lines.resize(count, Line([0; ALIGNMENT]));
         self.count(structure, footprint);
@@ -87,10 +95,10 @@ impl Memory {
     }
 
     /// All that is taken once `footprint` is as well.
-    fn needed(&self, footprint: Footprint) -> Result<usize, RenderError> {
+    fn needed(&self, footprint: Footprint) -> Result<usize, OutOfMemory> {
         let needed = self.total().saturating_add(footprint.bytes());
         match needed > self.wall {
-            true => Err(RenderError::Memory { needed, available: self.wall }),
+            true => Err(OutOfMemory { needed, available: self.wall }),
             false => Ok(needed),
         }
     }
@@ -141,6 +149,32 @@ impl Memory {
 
     fn total(&self) -> usize {
         self.uses.iter().fold(0, |sum, other| sum.saturating_add(other.bytes))
+    }
+}
+
+impl<'m> MemorySource<'m> for Memory<'m> {
+    fn available(&self) -> usize {
+        Memory::available(self)
+    }
+
+    fn take(&mut self, structure: &'static str, footprint: Footprint) -> Result<Arena<'m>, OutOfMemory> {
+        let lines = self.bank.alloc(self.lines(structure, footprint)?);
+        Ok(Arena::new(bytemuck::cast_slice_mut(lines)))
+    }
+
+    fn lend<T>(
+        &mut self,
+        structure: &'static str,
+        footprint: Footprint,
+        work: impl FnOnce(&mut Self, &mut Arena) -> Result<T, OutOfMemory>,
+    ) -> Result<T, OutOfMemory> {
+        let mut lines = self.lines(structure, footprint)?;
+        let done = work(self, &mut Arena::new(bytemuck::cast_slice_mut(&mut lines)));
+        if let Some(other) = self.uses.iter_mut().find(|other| other.structure == structure) {
+            other.bytes = other.bytes.saturating_sub(footprint.bytes());
+        }
+        self.uses.retain(|other| other.bytes > 0);
+        done
     }
 }
 

@@ -3,18 +3,17 @@
 use super::ErrorEstimate;
 use super::audit::{self, Audited};
 use super::blurred::Blurred;
-use super::canvas::{Canvas, Shard};
 use super::error::{FileError, RenderError};
 use super::film_file::Reader;
-use super::ledger::{Place, empty_pixels};
+use super::ledger::{self, Place, empty_pixels};
 use super::method::Method;
 use super::picture::image;
 use super::told::Told;
 use super::workers::Workers;
 use crate::memory::Budget;
 use crate::save::Image;
-use halflight_core::film::Film;
 use halflight_core::memory::{ALIGNMENT, Arena, Line};
+use halflight_core::method::{RenderState, Shard};
 use halflight_core::transport::Counters;
 use std::path::PathBuf;
 
@@ -66,7 +65,7 @@ pub fn merge(files: &[PathBuf]) -> Result<Merged, RenderError> {
     let spp = first.header.spp;
     let is_biased = first.header.method().is_some_and(Method::is_biased);
     let mut lines = Vec::new();
-    let needed = Film::footprint(width, height).bytes();
+    let needed = RenderState::footprint(width, height).bytes();
     // The picture, and what tells its error.
     let beside = 64 * width as usize * height as usize;
     if needed.saturating_add(beside) > most {
@@ -75,28 +74,28 @@ pub fn merge(files: &[PathBuf]) -> Result<Merged, RenderError> {
     let count = needed.div_ceil(ALIGNMENT);
     lines.try_reserve_exact(count).map_err(|_| RenderError::Memory { needed, available: 0 })?;
     lines.resize(count, Line([0; ALIGNMENT]));
-    let film = Film::new(width, height, &mut Arena::new(bytemuck::cast_slice_mut(&mut lines)))?;
-    let mut canvas = Canvas::new(film, Shard::WHOLE);
-    canvas.shares = first.header.shares;
+    let mut arena = Arena::new(bytemuck::cast_slice_mut(&mut lines));
+    let mut state = RenderState::new(width, height, Shard::WHOLE, &mut arena)?;
+    state.is_correlated = first.header.shares;
     let mut seconds = 0.0;
     let audits = films.iter().map(|film| Some((film.header.shard(), film.header.audit()?)));
     let audits: Option<Vec<_>> = audits.collect();
     for film in films {
         seconds += film.header.seconds;
-        film.read_into(&mut canvas)?;
+        film.read_into(&mut state)?;
     }
     let workers = Workers::new(None)?;
-    let told = Told::by(&workers, &canvas, |noise| {
-        let (mean, audits) = workers.mean(&canvas.film).zip(audits)?;
-        audit::State::merged(audits, &canvas.film, mean)?.verdict(&canvas.film, mean, noise)
+    let told = Told::by(&workers, &state, |noise| {
+        let (mean, audits) = workers.mean(&state.film).zip(audits)?;
+        audit::State::merged(audits, &state.film, mean)?.verdict(&state.film, mean, noise)
     });
     Ok(Merged {
-        image: image(&canvas.film),
+        image: image(&state.film),
         spp,
         seconds,
-        counters: canvas.counters,
-        places: canvas.ledger.places(width, height),
-        empty_pixels: empty_pixels(&canvas.film, |_| true),
+        counters: state.counters,
+        places: ledger::places(state.dropped, width, height),
+        empty_pixels: empty_pixels(&state.film, |_| true),
         error: told.error(),
         blurred: told.blurred,
         audit: told.audited,

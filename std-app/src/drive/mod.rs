@@ -7,7 +7,6 @@
 mod audit;
 mod blurred;
 mod cache_file;
-mod canvas;
 mod crew;
 mod error;
 mod film_file;
@@ -27,6 +26,7 @@ mod run;
 mod sealed;
 mod study;
 mod survey;
+mod threads;
 mod told;
 mod turns;
 mod watch;
@@ -36,9 +36,9 @@ mod workers;
 pub use audit::{Audited, Region};
 pub use blurred::Blurred;
 pub use cache_file::inspect as inspect_cache;
-pub use canvas::Shard;
 pub use error::{FileError, RenderError};
 pub use halflight_core::estimate::{BiasEstimate, Deviation, ErrorEstimate};
+pub use halflight_core::method::{Shard, path::Reuse};
 pub use history::{Against, Round};
 pub use ledger::Place;
 pub use memory::MemoryUse;
@@ -58,7 +58,7 @@ use halflight_core::Level;
 use halflight_core::census::Census;
 use halflight_core::film::Tile;
 use halflight_core::scene::Scene;
-use halflight_core::transport::{Counters, Pilot};
+use halflight_core::transport::Counters;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -201,15 +201,6 @@ pub struct Seconds {
     pub render: f64,
     /// Estimating the noise, a part of that; not before a resumption.
     pub estimate: f64,
-}
-
-/// Whether neighbouring pixels shared what their paths found.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Reuse {
-    /// They did.
-    pub used: bool,
-    /// What a look at a few tiles said, where it was asked.
-    pub pilot: Option<Pilot>,
 }
 
 /// A picture and all that is known of it.

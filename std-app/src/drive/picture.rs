@@ -1,13 +1,12 @@
 //! The rounds of a picture, from the first sample to the last estimate.
 
 use super::audit::Audit;
-use super::canvas::{Canvas, Shard};
 use super::crew::{self, Crew};
 use super::film_file::{self, Header, Identity, Reader};
 use super::gaps::{self, Sketch};
 use super::history::{Clock, Reference, Round};
 use super::kept::Kept;
-use super::ledger::empty_pixels;
+use super::ledger::{self, empty_pixels};
 use super::method::{Method, Renderer, Stage};
 use super::rounds::{Plan, Rounds};
 use super::told::Told;
@@ -17,6 +16,7 @@ use crate::save::{Image, Patience};
 use core::sync::atomic::{AtomicBool, Ordering};
 use core::time::Duration;
 use halflight_core::film::{Film, Pixel};
+use halflight_core::method::{RenderState, Shard};
 use std::path::Path;
 use std::time::Instant;
 
@@ -33,7 +33,7 @@ const ESTIMATING: f64 = 1e-7;
 pub(super) struct Picture<'a> {
     pub(super) method: Method,
     pub(super) stage: Stage<'a>,
-    pub(super) film: Film<'a>,
+    pub(super) state: RenderState<'a>,
     pub(super) audit: Option<Audit<'a>>,
     pub(super) identity: Identity,
     pub(super) resumed: Option<Reader>,
@@ -50,7 +50,7 @@ impl Picture<'_> {
         let Picture {
             method,
             stage,
-            film,
+            mut state,
             mut audit,
             identity,
             resumed,
@@ -61,16 +61,15 @@ impl Picture<'_> {
         } = self;
         let Stage { settings, workers, .. } = stage;
         let (width, height) = (settings.width, settings.height);
-        let mut canvas = Canvas::new(film, settings.shard);
-        canvas.shares = method.shares();
+        state.is_correlated = method.shares();
         let (mut rounds, mut history) = match resumed {
             None => (Rounds::new(settings.stop), Vec::new()),
             Some(film) => {
                 let header = film.header.clone();
-                clock.pause(|| film.read_into(&mut canvas))?;
+                clock.pause(|| film.read_into(&mut state))?;
                 let Header { spp, rounds, seconds, estimates, .. } = header;
-                if let (Some(audit), Some(state)) = (&mut audit, header.audit()) {
-                    audit.resume(state);
+                if let (Some(audit), Some(earlier)) = (&mut audit, header.audit()) {
+                    audit.resume(earlier);
                 }
                 let rounds = Rounds::new(settings.stop).resumed(spp, rounds, seconds, estimates);
                 (rounds, header.history())
@@ -87,8 +86,8 @@ impl Picture<'_> {
             Kept::in_file(settings.checkpoint.as_ref().map(|checkpoint| checkpoint.path.as_path()));
         let began = Instant::now();
         let header =
-            |canvas: &Canvas, rounds: &Rounds, audit: Option<&Audit>, seconds: f64, history: &[Round]| {
-                Header::new(identity.clone(), canvas, rounds, audit, seconds, history)
+            |state: &RenderState, rounds: &Rounds, audit: Option<&Audit>, seconds: f64, history: &[Round]| {
+                Header::new(identity.clone(), state, rounds, audit, seconds, history)
             };
 
         while let Some(plan) = rounds.next(clock.seconds(), estimating) {
@@ -98,32 +97,31 @@ impl Picture<'_> {
             let deadline = plan.deadline.and_then(later).and_then(|later| Instant::now().checked_add(later));
             let round = crew::Round {
                 target: plan.target,
-                step: step(&plan, canvas.tiles(), workers.count()),
+                step: step(&plan, state.tiles(), workers.count()),
                 deadline,
                 watch: &workers.watch,
                 is_first: plan.first,
             };
-            renderer.round(&mut Crew { workers, round: &round, canvas: &mut canvas })?;
-            rounds.completed(canvas.spp().min(plan.target), clock.seconds());
+            renderer.round(&mut Crew { workers, round: &round, canvas: &mut state })?;
+            rounds.completed(state.spp().min(plan.target), clock.seconds());
             let mut error = None;
             if rounds.estimate_is_due() {
                 if let Some(audit) = &mut audit {
                     let left = settings.stop.seconds.map(|limit| limit - estimating - clock.seconds());
-                    let work = (canvas.counters.all_rays(), clock.seconds());
+                    let work = (state.counters.all_rays(), clock.seconds());
                     if audit.is_open() {
                         audit.weigh(renderer.risks(workers)?);
                     }
-                    renderer.lend_photons(&mut |photons| {
-                        audit.step(workers, &canvas.film, photons, work, left)
-                    })?;
+                    renderer
+                        .lend_photons(&mut |photons| audit.step(workers, &state.film, photons, work, left))?;
                 }
                 let start = Instant::now();
-                let mut found = Told::of(workers, &canvas, audit.as_ref());
+                let mut found = Told::of(workers, &state, audit.as_ref());
                 estimate += start.elapsed().as_secs_f64();
                 estimating = start.elapsed().as_secs_f64();
                 if let Some(audit) = &mut audit {
                     if let Some(audited) = &found.audited {
-                        audit.focus(audited, (canvas.counters.all_rays(), rounds.spp()));
+                        audit.focus(audited, (state.counters.all_rays(), rounds.spp()));
                     }
                     let left = settings.stop.seconds.map(|limit| limit - estimating);
                     let so_far = found.error();
@@ -134,7 +132,7 @@ impl Picture<'_> {
                         is_time && !interrupt.load(Ordering::Relaxed)
                     };
                     if settings.audit.is_none() {
-                        found = go_on_alone(audit, &rounds, found, renderer, (workers, &canvas), &mut may)?;
+                        found = go_on_alone(audit, &rounds, found, renderer, (workers, &state), &mut may)?;
                     }
                 }
                 let start = Instant::now();
@@ -154,15 +152,15 @@ impl Picture<'_> {
                 told = None;
             }
             let seconds = clock.seconds();
-            let against = reference.as_ref().map(|r| clock.pause(|| r.compare(&image(&canvas.film))));
+            let against = reference.as_ref().map(|r| clock.pause(|| r.compare(&image(&state.film))));
             let spp = rounds.spp();
-            history.push(Round { seconds, spp, rays: canvas.counters.all_rays(), error, reference: against });
+            history.push(Round { seconds, spp, rays: state.counters.all_rays(), error, reference: against });
             let due = |every: f64| saved.elapsed().as_secs_f64() >= every;
             if plan.first || settings.checkpoint.as_ref().is_some_and(|checkpoint| due(checkpoint.every)) {
                 clock.pause(|| {
                     kept.update(|path, patience| {
-                        let header = header(&canvas, &rounds, audit.as_ref(), seconds, &history);
-                        film_file::write(path, &header, &canvas, patience)
+                        let header = header(&state, &rounds, audit.as_ref(), seconds, &history);
+                        film_file::write(path, &header, &state, patience)
                     });
                 });
                 saved = Instant::now();
@@ -184,8 +182,8 @@ impl Picture<'_> {
         let seconds = clock.seconds();
         clock.pause(|| {
             let write = |path: &Path, patience: Patience| {
-                let header = header(&canvas, &rounds, audit.as_ref(), seconds, &history);
-                film_file::write(path, &header, &canvas, patience)
+                let header = header(&state, &rounds, audit.as_ref(), seconds, &history);
+                film_file::write(path, &header, &state, patience)
             };
             if is_last {
                 kept.finish(patience, write)
@@ -196,32 +194,32 @@ impl Picture<'_> {
         });
         if let Some(audit) = audit.as_mut().filter(|_| goes_on) {
             let left = settings.stop.seconds.map(|limit| limit - estimating - clock.seconds());
-            let work = (canvas.counters.all_rays(), clock.seconds());
+            let work = (state.counters.all_rays(), clock.seconds());
             if audit.is_open() {
                 audit.weigh(renderer.risks(workers)?);
             }
-            renderer.lend_photons(&mut |photons| audit.step(workers, &canvas.film, photons, work, left))?;
+            renderer.lend_photons(&mut |photons| audit.step(workers, &state.film, photons, work, left))?;
         }
         if !is_last {
             let seconds = clock.seconds();
             clock.pause(|| {
                 kept.finish(patience, |path, patience| {
-                    let header = header(&canvas, &rounds, audit.as_ref(), seconds, &history);
-                    film_file::write(path, &header, &canvas, patience)
+                    let header = header(&state, &rounds, audit.as_ref(), seconds, &history);
+                    film_file::write(path, &header, &state, patience)
                 });
             });
         }
         let start = Instant::now();
         // The last round may have asked already.
-        let told = told.unwrap_or_else(|| Told::of(workers, &canvas, audit.as_ref()));
+        let told = told.unwrap_or_else(|| Told::of(workers, &state, audit.as_ref()));
         estimate += start.elapsed().as_secs_f64();
         let render = clock.seconds();
         let error = told.error();
         if let Some(last) = history.last_mut() {
             last.error = error;
         }
-        let film = &canvas.film;
-        let (image, filled_pixels) = without_gaps(&canvas, sketch, workers);
+        let film = &state.film;
+        let (image, filled_pixels) = without_gaps(&state, sketch, workers);
         Ok(RenderResult {
             method,
             image,
@@ -232,7 +230,7 @@ impl Picture<'_> {
             samples: by_rows(film).map(|pixel| pixel.count()).collect(),
             threads: workers.count(),
             seconds: Seconds { build: 0.0, render, estimate },
-            counters: canvas.counters,
+            counters: state.counters,
             reuse: renderer.reuse(),
             caustics: renderer.caustics(),
             cache: renderer.cache(),
@@ -245,8 +243,8 @@ impl Picture<'_> {
                 None
             },
             windows: WindowUse::default(),
-            places: canvas.ledger.places(width, height),
-            empty_pixels: empty_pixels(film, |task| canvas.shard.owns(task) && canvas.taken[task] > 0),
+            places: ledger::places(state.dropped, width, height),
+            empty_pixels: empty_pixels(film, |task| state.shard.owns(task) && state.samples[task] > 0),
             filled_pixels,
             error,
             blurred: told.blurred,
@@ -266,7 +264,7 @@ fn go_on_alone(
     rounds: &Rounds,
     mut told: Told,
     renderer: &mut dyn Renderer,
-    (workers, canvas): (&Workers, &Canvas),
+    (workers, state): (&Workers, &RenderState),
     may: &mut dyn FnMut(f64) -> bool,
 ) -> Result<Told, RenderError> {
     while told.audited.as_ref().is_some_and(|audited| rounds.waits_for(audited)) {
@@ -278,7 +276,7 @@ fn go_on_alone(
         if !went {
             break;
         }
-        told = Told::beside(told.noise, workers, canvas, |noise| audit.verdict(workers, &canvas.film, noise));
+        told = Told::beside(told.noise, workers, state, |noise| audit.verdict(workers, &state.film, noise));
     }
     Ok(told)
 }
@@ -291,14 +289,14 @@ fn step(plan: &Plan, tiles: usize, threads: usize) -> u32 {
     if step >= FULL_STEP { step / FULL_STEP * FULL_STEP } else { step.max(1) }
 }
 
-/// The picture of `canvas`, its gaps filled, and how many pixels were gaps: those of tiles that were not reached.
-fn without_gaps(canvas: &Canvas, sketch: &Sketch, workers: &Workers) -> (Image, u64) {
-    let mut image = image(&canvas.film);
+/// The picture of `state`, its gaps filled, and how many pixels were gaps: those of tiles that were not reached.
+fn without_gaps(state: &RenderState, sketch: &Sketch, workers: &Workers) -> (Image, u64) {
+    let mut image = image(&state.film);
     // A shard has gaps that others fill.
-    if canvas.shard != Shard::WHOLE || !canvas.taken.contains(&0) {
+    if state.shard != Shard::WHOLE || !state.samples.contains(&0) {
         return (image, 0);
     }
-    let mut known: Vec<bool> = by_rows(&canvas.film).map(|pixel| pixel.count() > 0).collect();
+    let mut known: Vec<bool> = by_rows(&state.film).map(|pixel| pixel.count() > 0).collect();
     let gaps = known.iter().filter(|known| !**known).count() as u64;
     if known.iter().all(|known| !known) {
         for ([x, y], light) in sketch(workers) {

@@ -3,7 +3,7 @@
 use super::audit::Audit;
 use super::film_file::{Identity, Reader};
 use super::history::Clock;
-use super::memory::Memory;
+use super::memory::{Bank, Memory};
 use super::method::{Method, Stage};
 use super::picture::Picture;
 use super::watch::Watch;
@@ -15,9 +15,9 @@ use halflight_core::Level;
 use halflight_core::bsdf::Features;
 use halflight_core::bvh::Bvh;
 use halflight_core::census::WithFeatures;
-use halflight_core::film::Film;
 use halflight_core::light::LightSampler;
 use halflight_core::memory::{Arena, Footprint};
+use halflight_core::method::RenderState;
 use halflight_core::scene::Scene;
 use halflight_core::transport::{PathIntegrator, PathSettings, UNLIMITED};
 use std::time::Instant;
@@ -38,7 +38,8 @@ impl WithFeatures for Render<'_> {
         let Render { scene, settings, method, progress, interrupt } = self;
         let (width, height) = (settings.width, settings.height);
         // What is of something else should not cost the time of building.
-        let mut memory = Memory::new(scene, settings);
+        let bank = Bank::new();
+        let mut memory = Memory::new(scene, settings, &bank);
         let most = memory.for_file();
         let cache = cache_file::open(scene, settings, most)?.map(|file| file.header.fingerprint());
         let resumed = settings.resume.as_deref().map(|file| Reader::open(file, most)).transpose()?;
@@ -58,7 +59,7 @@ impl WithFeatures for Render<'_> {
         // First, for the working memory of its build is free again for the others.
         let mut bvh_lines = Pages::default();
         let bvh = build_bvh(scene, settings.level, &workers, &mut memory, &mut bvh_lines)?;
-        let mut film_lines = memory.take("film", Film::footprint(width, height))?;
+        let mut film_lines = memory.take("film", RenderState::footprint(width, height))?;
         // What comes out is counted from the beginning, and taken in the end.
         let pixels = width as usize * height as usize;
         let picture = Footprint::default().slice::<[f32; 3]>(pixels).slice::<[f32; 3]>(pixels);
@@ -73,7 +74,8 @@ impl WithFeatures for Render<'_> {
         let clock = Clock::start(resumed.as_ref().map_or(0.0, |film| film.header.seconds));
         let left = settings.stop.seconds.map(|limit| limit - clock.seconds());
         let workers = workers.watched(Watch::until(interrupt).within(left));
-        let film = Film::new(width, height, &mut Arena::new(bytemuck::cast_slice_mut(&mut film_lines)))?;
+        let mut film_arena = Arena::new(bytemuck::cast_slice_mut(&mut film_lines));
+        let state = RenderState::new(width, height, settings.shard, &mut film_arena)?;
         let mut window_lines = Vec::new();
         let paths = PathIntegrator::<F>::new(scene, &bvh, &lights, path_settings(settings), settings.level);
         let (lights, windows) =
@@ -88,7 +90,7 @@ impl WithFeatures for Render<'_> {
             let picture = Picture {
                 method,
                 stage,
-                film,
+                state,
                 audit,
                 identity,
                 resumed,

@@ -1,10 +1,9 @@
 //! Studies of the irradiance cache: what each error metric makes of the same number of records, against irradiance that
 //! is gathered at points of the picture that no cache has seen.
 
-use super::canvas::{Canvas, Shard};
 use super::crew::{Crew, Round};
 use super::held_out::{EXACT, Point, held_out, luminance};
-use super::memory::Memory;
+use super::memory::{Bank, Memory};
 use super::method::{Growing, LEAST_PIXELS, Overture};
 use super::run::{build_bvh, path_settings};
 use super::survey::means;
@@ -14,9 +13,9 @@ use crate::pages::Pages;
 use halflight_core::bsdf::Features;
 use halflight_core::cache::irradiance::{CellFlux, IrradianceCache, Metric, metric};
 use halflight_core::census::{Census, WithFeatures};
-use halflight_core::film::Film;
 use halflight_core::light::LightSampler;
 use halflight_core::memory::{Arena, Line};
+use halflight_core::method::{RenderState, Shard};
 use halflight_core::scene::Scene;
 use halflight_core::transport::PathIntegrator;
 use halflight_core::transport::cached::gather::Gathering;
@@ -96,7 +95,8 @@ impl WithFeatures for Study<'_> {
     fn run<F: Features>(self) -> Self::Out {
         let Study { scene, settings, study, tell } = self;
         let workers = Workers::new(settings.threads)?;
-        let mut memory = Memory::new(scene, settings);
+        let bank = Bank::new();
+        let mut memory = Memory::new(scene, settings, &bank);
         let mut bvh_lines = Pages::default();
         let bvh = build_bvh(scene, settings.level, &workers, &mut memory, &mut bvh_lines)?;
         let mut lights_lines =
@@ -109,9 +109,8 @@ impl WithFeatures for Study<'_> {
         let mut scratch = memory.take_each("paths", scratch, workers.count())?;
 
         // Passes count what they do on a canvas, of which there is no picture.
-        let mut film_lines = memory.take("film", Film::footprint(1, 1))?;
-        let film = Film::new(1, 1, &mut arena(&mut film_lines))?;
-        let mut canvas = Canvas::new(film, Shard::WHOLE);
+        let mut film_lines = memory.take("film", RenderState::footprint(1, 1))?;
+        let mut canvas = RenderState::new(1, 1, Shard::WHOLE, &mut arena(&mut film_lines))?;
         let round = Round { target: 0, step: 1, deadline: None, watch: &workers.watch, is_first: false };
         let mut crew = Crew { workers: &workers, round: &round, canvas: &mut canvas };
 

@@ -1,9 +1,9 @@
 //! What a picture tells of its error at some time: its noise, and its bias by an audit or by what photons blur.
 
 use super::audit::{Audit, Audited};
-use super::canvas::Canvas;
 use super::workers::Workers;
 use super::{Blurred, ErrorEstimate};
+use halflight_core::method::RenderState;
 
 /// What is known of the error of a picture.
 pub(super) struct Told {
@@ -16,30 +16,30 @@ pub(super) struct Told {
 }
 
 impl Told {
-    pub(super) fn of(workers: &Workers, canvas: &Canvas, audit: Option<&Audit>) -> Self {
-        Self::by(workers, canvas, |noise| audit?.verdict(workers, &canvas.film, noise))
+    pub(super) fn of(workers: &Workers, state: &RenderState, audit: Option<&Audit>) -> Self {
+        Self::by(workers, state, |noise| audit?.verdict(workers, &state.film, noise))
     }
 
     /// With what an audit says to the noise.
     pub(super) fn by(
         workers: &Workers,
-        canvas: &Canvas,
+        state: &RenderState,
         audit: impl FnOnce(ErrorEstimate) -> Option<Audited>,
     ) -> Self {
-        Self::beside(workers.estimate(&canvas.film, canvas.shares), workers, canvas, audit)
+        Self::beside(workers.estimate(&state.film, state.is_correlated), workers, state, audit)
     }
 
     /// The same of a picture whose noise is known.
     pub(super) fn beside(
         noise: Option<ErrorEstimate>,
         workers: &Workers,
-        canvas: &Canvas,
+        state: &RenderState,
         audit: impl FnOnce(ErrorEstimate) -> Option<Audited>,
     ) -> Self {
         let mut audited = noise.and_then(audit);
         // An audit without photons sees what they blur, if it sees.
         let is_seen = audited.as_ref().is_some_and(|audited| !audited.has_photons && !audited.is_blind);
-        let mut blurred = if is_seen { None } else { Blurred::of(workers, &canvas.film, noise) };
+        let mut blurred = if is_seen { None } else { Blurred::of(workers, &state.film, noise) };
         if let Some(audited) = &mut audited
             && let Some(blurred) = blurred.take()
         {

@@ -17,6 +17,8 @@ const GRACE: Duration = Duration::from_secs(5);
 pub(super) struct Watch<'w> {
     interrupt: Option<&'w AtomicBool>,
     deadline: Option<Instant>,
+    /// Start of the render, and its seconds where they are limited.
+    limit: Option<(Instant, f64)>,
     /// When the interruption was noticed.
     noticed: OnceLock<Instant>,
 }
@@ -31,7 +33,14 @@ impl<'w> Watch<'w> {
     pub(super) fn within(self, seconds: Option<f64>) -> Self {
         let later = |seconds: f64| Duration::try_from_secs_f64(seconds.max(0.0)).ok();
         let deadline = seconds.and_then(later).and_then(|later| Instant::now().checked_add(later));
-        Self { deadline, ..self }
+        let limit = seconds.map(|seconds| (Instant::now(), seconds.max(0.0)));
+        Self { deadline, limit, ..self }
+    }
+
+    /// The end of a `fraction` of the seconds of the render; `None` where they are not limited.
+    pub(super) fn after(&self, fraction: f32) -> Option<Instant> {
+        let (start, seconds) = self.limit?;
+        start.checked_add(Duration::try_from_secs_f64(f64::from(fraction) * seconds).ok()?)
     }
 
     /// Whether somebody said so.

@@ -23,19 +23,39 @@ pub(super) struct Workers<'w> {
     pool: ThreadPool,
     /// When what they do must end.
     pub(super) watch: Watch<'w>,
+    /// Forks on their threads.
+    pub(super) fork: Fork,
+    /// Seconds of each phase of the render.
+    phases: Mutex<Vec<(&'static str, f64)>>,
 }
 
 impl<'w> Workers<'w> {
     /// `threads` threads; as many as the machine runs at once where `None`.
     pub(super) fn new(threads: Option<usize>) -> Result<Self, RenderError> {
         let pool = ThreadPoolBuilder::new().num_threads(threads.unwrap_or(0)).build();
-        pool.map(|pool| Self { pool, watch: Watch::default() })
+        let phases = Mutex::default();
+        pool.map(|pool| Self { fork: Fork, pool, watch: Watch::default(), phases })
             .map_err(|error| RenderError::Threads(error.to_string()))
     }
 
     /// The same, which are watched.
     pub(super) fn watched(self, watch: Watch<'w>) -> Self {
         Self { watch, ..self }
+    }
+
+    /// Adds to the `seconds` of a phase.
+    pub(super) fn spent(&self, phase: &'static str, seconds: f64) {
+        let mut phases = self.phases.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
+        match phases.iter_mut().find(|(other, _)| *other == phase) {
+            Some((_, sum)) => *sum += seconds,
+            None => phases.push((phase, seconds)),
+        }
+    }
+
+    /// Seconds of a phase so far.
+    pub(super) fn seconds_of(&self, phase: &str) -> f64 {
+        let phases = self.phases.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
+        phases.iter().find(|(other, _)| *other == phase).map_or(0.0, |(_, seconds)| *seconds)
     }
 
     /// How many there are.
@@ -224,7 +244,7 @@ impl<'w> Workers<'w> {
 }
 
 /// Forks on the pool that runs it.
-struct Fork;
+pub(super) struct Fork;
 
 impl ForkJoin for Fork {
     fn join(&self, a: impl FnOnce() + Send, b: impl FnOnce() + Send) {

@@ -23,7 +23,7 @@ mod driver;
 pub(in crate::transport) mod pixels;
 pub mod reference;
 pub(in crate::transport) mod reuse;
-pub(in crate::transport) mod reuse_pilot;
+pub mod reuse_pilot;
 mod scatter;
 mod shade;
 mod shadow_rays;

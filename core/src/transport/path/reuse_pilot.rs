@@ -17,7 +17,7 @@ use crate::transport::path::tile::TileSampler;
 const SAMPLES: u32 = 4;
 
 /// Tiles that a pilot needs: in all about as much work as two samples of every pixel of a thumbnail.
-const PILOT_TILES: usize = 16;
+pub const PILOT_TILES: usize = 16;
 
 /// What a connection between two paths costs, in rays of the other kinds with all that is shaded at their ends
 /// (measured: 0.2 in a box, 0.3 in a room of 400,000 triangles).

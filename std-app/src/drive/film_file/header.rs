@@ -2,11 +2,10 @@
 
 use super::identity::Identity;
 use crate::drive::audit::{self, Audit};
-use crate::drive::canvas::{Canvas, Shard};
-use crate::drive::ledger::Ledger;
 use crate::drive::rounds::{Estimates, Rounds};
 use crate::drive::{ErrorEstimate, Method, Round};
 use halflight_core::film::Dropped;
+use halflight_core::method::{RenderState, Shard};
 use halflight_core::transport::Counters;
 use serde::{Deserialize, Serialize};
 
@@ -40,19 +39,19 @@ type Entry = (f64, u32, u64, Option<[f64; 3]>);
 impl Header {
     pub(in crate::drive) fn new(
         identity: Identity,
-        canvas: &Canvas,
+        state: &RenderState,
         rounds: &Rounds,
         audit: Option<&Audit>,
         seconds: f64,
         history: &[Round],
     ) -> Self {
-        let Canvas { shard, counters, ledger, .. } = canvas;
+        let RenderState { shard, counters, dropped, .. } = state;
         let error = |e: ErrorEstimate| [e.relmse, e.lower, e.upper];
         Self {
             identity,
             shard: [shard.index + 1, shard.count],
-            shares: canvas.shares,
-            spp: canvas.spp(),
+            shares: state.is_correlated,
+            spp: state.spp(),
             rounds: rounds.count(),
             estimates: rounds.estimates(),
             seconds,
@@ -60,7 +59,11 @@ impl Header {
             rays: counters.rays,
             shadow_rays: counters.shadow_rays,
             dropped: causes(counters.dropped),
-            ledger: ledger.tiles().map(|(task, dropped)| (task, causes(dropped))).collect(),
+            ledger: (0..)
+                .zip(dropped.iter())
+                .filter(|(_, dropped)| dropped.total() > 0)
+                .map(|(tile, dropped)| (tile, causes(*dropped)))
+                .collect(),
             history: history.iter().map(|r| (r.seconds, r.spp, r.rays, r.error.map(error))).collect(),
             audit: audit.map(|audit| audit.state().clone()),
         }
@@ -85,10 +88,9 @@ impl Header {
         Counters { paths: self.paths, rays: self.rays, shadow_rays: self.shadow_rays, dropped }
     }
 
-    pub(in crate::drive) fn ledger(&self) -> Ledger {
-        let mut ledger = Ledger::default();
-        self.ledger.iter().for_each(|(task, causes)| ledger.add(*task as usize, dropped(*causes)));
-        ledger
+    /// Tiles with rejected samples.
+    pub(in crate::drive) fn dropped(&self) -> impl Iterator<Item = (usize, Dropped)> {
+        self.ledger.iter().map(|(tile, causes)| (*tile as usize, dropped(*causes)))
     }
 
     /// How far the audit is, where there is one.

@@ -7,25 +7,25 @@ pub(super) use header::Header;
 pub(super) use identity::Identity;
 
 use super::MOST_PIXELS;
-use super::canvas::{Canvas, Shard};
 use super::error::FileError;
 use super::sealed::{self, Kind};
 use crate::save::Patience;
 use halflight_core::film::{PIXELS_PER_TILE, Pixel, Tile};
+use halflight_core::method::{RenderState, Shard};
 use std::path::Path;
 
 const KIND: Kind = Kind { magic: *b"HLFILM", version: 7, name: "film" };
 
-/// Writes `canvas` to `path`, whole or not at all.
+/// Writes the film of `state` to `path`, whole or not at all.
 pub(super) fn write(
     path: &Path,
     header: &Header,
-    canvas: &Canvas,
+    state: &RenderState,
     patience: Patience,
 ) -> Result<(), FileError> {
     sealed::write(path, &KIND, header, patience, |file| {
-        file.put(bytemuck::cast_slice(&canvas.taken))?;
-        let tiles = tiles(canvas.film.pixels(), &canvas.taken);
+        file.put(bytemuck::cast_slice(state.samples))?;
+        let tiles = tiles(state.film.pixels(), state.samples);
         tiles.into_iter().try_for_each(|pixels| file.put(bytemuck::cast_slice(pixels)))
     })
 }
@@ -84,16 +84,16 @@ impl Reader {
         Ok(())
     }
 
-    /// Reads the pixels of its tiles into those of `canvas`, a film of the same size.
-    pub(super) fn read_into(mut self, canvas: &mut Canvas) -> Result<(), FileError> {
+    /// Reads the pixels of its tiles into those of `state`, a film of the same size.
+    pub(super) fn read_into(mut self, state: &mut RenderState) -> Result<(), FileError> {
         let [width, height] = self.header.size();
         let mut taken = vec![0u32; Tile::count(width, height)];
-        if taken.len() != canvas.taken.len() {
+        if taken.len() != state.samples.len() {
             return Err(self.file.damage("it has another size than it says"));
         }
         self.file.get(bytemuck::cast_slice_mut(&mut taken))?;
         let shard = self.header.shard();
-        for (task, pixels) in canvas.film.pixels_mut().chunks_mut(PIXELS_PER_TILE).enumerate() {
+        for (task, pixels) in state.film.pixels_mut().chunks_mut(PIXELS_PER_TILE).enumerate() {
             if taken[task] == 0 {
                 continue;
             }
@@ -101,11 +101,15 @@ impl Reader {
                 return Err(self.file.damage("it has tiles of other shards"));
             }
             self.file.get(bytemuck::cast_slice_mut(pixels))?;
-            canvas.taken[task] = taken[task];
+            state.samples[task] = taken[task];
         }
         self.file.finish()?;
-        canvas.counters += self.header.counters();
-        canvas.ledger.merge(&self.header.ledger());
+        state.counters += self.header.counters();
+        for (tile, dropped) in self.header.dropped() {
+            if let Some(sum) = state.dropped.get_mut(tile) {
+                *sum += dropped;
+            }
+        }
         Ok(())
     }
 }

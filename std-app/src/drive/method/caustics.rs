@@ -151,7 +151,7 @@ pub(super) fn with<F: Features, T>(
         return then(&mut paths, memory);
     };
     let mut caster = Caster::new(stage, memory, cast, false, others)?;
-    let pair = (&paths.tracer, paths.reuse().used);
+    let pair = (&paths.tracer().clone(), paths.reuse().used);
     if caster.pays(pair, &mut paths.scratch)? {
         return then(&mut Joined { paths, caster }, memory);
     }
@@ -196,7 +196,7 @@ fn beside<F: Features>(
     let none = Photons::new(0, &mut Arena::new(bytemuck::cast_slice_mut(&mut line)))?.build(0);
     let merging =
         CausticMerging::new([&none; 2], emission, discs, LOOK as u32).beside_records(eye.beside_records);
-    let tracer = paths.tracer.with_reuse(false).with_caustics(merging);
+    let tracer = paths.tracer().with_reuse(false).with_caustics(merging);
     Ok(stage.workers.pilot_rest(&tracer, &mut paths.scratch)?)
 }
 
@@ -268,8 +268,8 @@ struct Joined<'a, F> {
 
 impl<F: Features> Renderer for Joined<'_, F> {
     fn round(&mut self, crew: &mut Crew) -> Result<(), RenderError> {
-        let Paths { tracer, scratch, .. } = &mut self.paths;
-        self.caster.round(tracer, scratch, crew)
+        let Paths { method, scratch, .. } = &mut self.paths;
+        self.caster.round(method.integrator(), scratch, crew)
     }
 
     fn reuse(&self) -> Reuse {

@@ -41,6 +41,7 @@ use crate::save::Patience;
 use halflight_core::bsdf::Features;
 use halflight_core::bvh::Bvh;
 use halflight_core::light::LightSampler;
+use halflight_core::method::RenderContext;
 use halflight_core::scene::Scene;
 use halflight_core::transport::{CausticMerging, PathIntegrator, PathSettings, RadiusSchedule};
 
@@ -177,6 +178,12 @@ impl<'a> Stage<'a> {
         let Self { scene, bvh, lights, settings, .. } = *self;
         let paths = PathSettings { seed, ..path_settings(settings) };
         PathIntegrator::new(scene, bvh, lights, paths, settings.level)
+    }
+
+    /// The same for methods of the core.
+    fn context(&self) -> RenderContext<'a> {
+        let Self { scene, bvh, lights, settings, .. } = *self;
+        RenderContext { scene, bvh, lights, settings: path_settings(settings), level: settings.level }
     }
 
     /// RadiusSchedule that photons are gathered from, of one pixel.

@@ -1,27 +1,27 @@
-//! Path tracing: no structure beyond the hierarchy, so a round is its tiles.
+//! Path tracing for the program.
 
 use super::{CausticUse, Renderer, Stage};
 use crate::drive::crew::Crew;
 use crate::drive::memory::Memory;
+use crate::drive::threads::Threads;
 use crate::drive::{RenderError, Reuse};
 use halflight_core::bsdf::Features;
 use halflight_core::memory::{Footprint, Line};
-use halflight_core::transport::{PathIntegrator, Pilot, path::WAVE};
+use halflight_core::method::Method as _;
+use halflight_core::method::path::PathTracing;
+use halflight_core::transport::{PathIntegrator, Pilot};
 
 /// See the file.
 pub(super) struct Paths<'a, F> {
-    pub(super) tracer: PathIntegrator<'a, F>,
+    pub(super) method: PathTracing<'a, F>,
     pub(super) scratch: Vec<Vec<Line>>,
-    reuse: Reuse,
-    /// The mean radiance of the picture by a first look, where there was one.
-    mean: Option<f32>,
     /// Where photons of caustics were looked for in vain.
     pub(super) caustics: CausticUse,
 }
 
 impl<'a, F: Features> Paths<'a, F> {
     pub(super) fn new(stage: &Stage<'a>, memory: &mut Memory) -> Result<Self, RenderError> {
-        Self::with_scratch(stage, memory, PathIntegrator::<F>::scratch(WAVE))
+        Self::with_scratch(stage, memory, PathTracing::<F>::scratch())
     }
 
     /// With working memory for more than paths.
@@ -32,47 +32,29 @@ impl<'a, F: Features> Paths<'a, F> {
     ) -> Result<Self, RenderError> {
         let Stage { settings, workers, .. } = *stage;
         let mut scratch = memory.take_each("paths", scratch, workers.count())?;
-        let tracer = stage.paths::<F>(settings.seed);
-        let (reuse, mean) = match settings.reuse {
-            Some(used) => {
-                let mean = if used { Some(workers.pilot_mean(&tracer, &mut scratch)?) } else { None };
-                (Reuse { used, pilot: None }, mean)
-            }
-            None => {
-                let mean = workers.pilot_mean(&tracer, &mut scratch)?;
-                let pilot = workers.pilot(&tracer, mean, &mut scratch)?;
-                (Reuse { used: pilot.pays(), pilot: Some(pilot) }, Some(mean))
-            }
-        };
-        let tracer = tracer.with_reuse(reuse.used).with_flashes(mean.unwrap_or_default());
-        let caustics = CausticUse::default();
-        Ok(Self { tracer, scratch, reuse, mean, caustics })
+        let mut executor = Threads::new(workers, &mut scratch);
+        let method = PathTracing::new(&stage.context(), settings.reuse, &mut executor)?;
+        Ok(Self { method, scratch, caustics: CausticUse::default() })
     }
 
     /// Paths that share nothing, for looks before a picture that another method makes.
     pub(super) fn alone(stage: &Stage<'a>, scratch: Vec<Vec<Line>>) -> Self {
-        let Stage { settings, .. } = *stage;
-        let tracer = stage.paths::<F>(settings.seed);
-        Self { tracer, scratch, reuse: Reuse::default(), mean: None, caustics: CausticUse::default() }
+        Self { method: PathTracing::plain(&stage.context()), scratch, caustics: CausticUse::default() }
+    }
+
+    pub(super) fn tracer(&self) -> &PathIntegrator<'a, F> {
+        self.method.integrator()
     }
 
     /// About the mean radiance of the picture.
     pub(super) fn mean(&mut self, stage: &Stage) -> Result<f32, RenderError> {
-        if self.mean.is_none() {
-            // What neighbours share is not in their paths.
-            let tracer = self.tracer.with_reuse(false);
-            self.mean = Some(stage.workers.pilot_mean(&tracer, &mut self.scratch)?);
-        }
-        Ok(self.mean.unwrap_or_default())
+        Ok(self.method.mean_radiance(&mut Threads::new(stage.workers, &mut self.scratch))?)
     }
 
     /// A pilot of the picture, which is of `mean` radiance; and whether its pixels share.
     pub(super) fn pilot(&mut self, stage: &Stage, mean: f32) -> Result<(Pilot, bool), RenderError> {
-        let pilot = match self.reuse.pilot {
-            Some(pilot) => pilot,
-            None => stage.workers.pilot(&self.tracer, mean, &mut self.scratch)?,
-        };
-        Ok((pilot, self.reuse.used))
+        let pilot = self.method.variance(mean, &mut Threads::new(stage.workers, &mut self.scratch))?;
+        Ok((pilot, self.method.reuse().used))
     }
 
     /// About the relative variance of a sample of the picture, which is of `mean` radiance.
@@ -84,15 +66,11 @@ impl<'a, F: Features> Paths<'a, F> {
 
 impl<F: Features> Renderer for Paths<'_, F> {
     fn round(&mut self, crew: &mut Crew) -> Result<(), RenderError> {
-        let Self { tracer, scratch, .. } = self;
-        crew.tiles(u32::MAX, scratch, &|task, samples, arena, pixels| {
-            tracer.run(task, samples, WAVE, arena, pixels)
-        })?;
-        Ok(())
+        Ok(crew.round(&mut self.scratch, |round| self.method.round(round))?)
     }
 
     fn reuse(&self) -> Reuse {
-        self.reuse
+        self.method.reuse()
     }
 
     fn caustics(&self) -> CausticUse {

@@ -20,6 +20,7 @@ const LAYERS: &[&str] = &[
     "estimate",
     "census",
     "transport",
+    "method",
 ];
 
 /// Folders of core/src whose files form no circle.

@@ -1,0 +1,72 @@
+//! Methods of rendering: one file each, in the order of its paper.
+//!
+//! A method takes its memory from a [`MemorySource`](crate::memory::MemorySource), learns in its constructor what the
+//! scene needs, and adds samples to a film in [`Round`]s. An [`Executor`] of the caller runs the tasks of its passes:
+//! no method knows of threads, clocks or files.
+
+pub mod executor;
+pub mod path;
+pub mod pilot;
+pub mod round;
+
+pub use executor::{Executor, Loop, Passed, Worker};
+pub use round::{RenderState, Round, Shard};
+
+use crate::Level;
+use crate::bsdf::Features;
+use crate::bvh::Bvh;
+use crate::light::LightSampler;
+use crate::memory::OutOfMemory;
+use crate::scene::Scene;
+use crate::transport::{PathIntegrator, PathSettings, RadiusSchedule, SceneContext};
+
+/// A scene with the structures that all methods share, and the settings of its paths.
+#[derive(Clone, Copy)]
+pub struct RenderContext<'a> {
+    /// Geometry, materials, camera.
+    pub scene: &'a Scene<'a>,
+    /// The hierarchy over its triangles.
+    pub bvh: &'a Bvh<'a>,
+    /// The distribution over its lights.
+    pub lights: &'a LightSampler<'a>,
+    /// Size of the picture, seed, length of paths.
+    pub settings: PathSettings,
+    /// Highest instruction set to use.
+    pub level: Level,
+}
+
+impl<'a> RenderContext<'a> {
+    /// The path tracer of the picture.
+    pub fn integrator<F: Features>(&self) -> PathIntegrator<'a, F> {
+        PathIntegrator::new(self.scene, self.bvh, self.lights, self.settings, self.level)
+    }
+
+    /// The scene for rays.
+    pub fn scene_context<F: Features>(&self) -> SceneContext<'a, F> {
+        SceneContext::new(self.scene, self.bvh, self.level)
+    }
+
+    /// Kernel radii of one pixel.
+    pub fn radii(&self) -> RadiusSchedule {
+        let size = [self.settings.width, self.settings.height];
+        RadiusSchedule::new((self.scene, self.bvh), size, self.level)
+    }
+
+    /// Pixels of the picture.
+    pub fn pixels(&self) -> usize {
+        self.settings.width as usize * self.settings.height as usize
+    }
+}
+
+/// A method at work on one scene.
+///
+/// Sample `n` of a pixel follows from the scene, the settings and `n`: neither from the division of samples into
+/// rounds nor from threads. A structure that several pixels use is drawn anew, or kept twice, for even and odd `n`:
+/// the halves of the film stay independent, and their difference shows all that is random.
+pub trait Method {
+    /// One round: brings the tiles of the film to their target, or less if the executor ends it early.
+    ///
+    /// # Errors
+    /// [`OutOfMemory`] where the scratch of the executor is too small.
+    fn round<E: Executor>(&mut self, round: &mut Round<E>) -> Result<(), OutOfMemory>;
+}

@@ -1,0 +1,105 @@
+//! Path tracing with next-event estimation and multiple importance sampling (Kajiya 1986; Veach 1997, chapter 9), and
+//! path reuse among neighbouring pixels (Bekaert et al. 2002) where a pilot finds that it pays.
+
+use super::executor::Executor;
+use super::{Method, RenderContext, Round, pilot};
+use crate::bsdf::Features;
+use crate::memory::{Footprint, OutOfMemory};
+use crate::transport::{PathIntegrator, Pilot, path::WAVE};
+
+/// Whether neighbouring pixels reuse paths.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Reuse {
+    /// They do.
+    pub used: bool,
+    /// Samples of a few tiles with reuse and without; `None` where the caller has decided.
+    pub pilot: Option<Pilot>,
+}
+
+/// Path tracing of one picture.
+#[derive(Clone, Copy)]
+pub struct PathTracing<'a, F> {
+    integrator: PathIntegrator<'a, F>,
+    reuse: Reuse,
+    /// Mean radiance of the picture, once it was measured.
+    mean: Option<f32>,
+}
+
+impl<'a, F: Features> PathTracing<'a, F> {
+    /// Working memory of a worker.
+    pub fn scratch() -> Footprint {
+        PathIntegrator::<F>::scratch(WAVE)
+    }
+
+    /// Path tracing of `context`, with path `reuse` or without; `None` where a pilot decides.
+    ///
+    /// # Errors
+    /// [`OutOfMemory`] where the executor's scratch is too small.
+    pub fn new(
+        context: &RenderContext<'a>,
+        reuse: Option<bool>,
+        executor: &mut impl Executor,
+    ) -> Result<Self, OutOfMemory> {
+        let integrator = context.integrator::<F>();
+        let (reuse, mean) = match reuse {
+            Some(false) => (Reuse::default(), None),
+            Some(true) => {
+                let mean = pilot::mean_radiance(&integrator, executor)?;
+                (Reuse { used: true, pilot: None }, Some(mean))
+            }
+            None => {
+                let mean = pilot::mean_radiance(&integrator, executor)?;
+                let pilot = pilot::variance(&integrator, mean, executor)?;
+                (Reuse { used: pilot.pays(), pilot: Some(pilot) }, Some(mean))
+            }
+        };
+        let integrator = integrator.with_reuse(reuse.used).with_flashes(mean.unwrap_or_default());
+        Ok(Self { integrator, reuse, mean })
+    }
+
+    /// The same without reuse and without a pilot, for measurements before another method's picture.
+    pub fn plain(context: &RenderContext<'a>) -> Self {
+        Self { integrator: context.integrator(), reuse: Reuse::default(), mean: None }
+    }
+
+    /// Its path tracer.
+    pub fn integrator(&self) -> &PathIntegrator<'a, F> {
+        &self.integrator
+    }
+
+    /// Whether pixels reuse paths, and why.
+    pub fn reuse(&self) -> Reuse {
+        self.reuse
+    }
+
+    /// The mean radiance of the picture by its pilot, which runs if it has not.
+    ///
+    /// # Errors
+    /// [`OutOfMemory`] where the executor's scratch is too small.
+    pub fn mean_radiance(&mut self, executor: &mut impl Executor) -> Result<f32, OutOfMemory> {
+        let mean = match self.mean {
+            Some(mean) => mean,
+            // Light that neighbours contribute is not on a pixel's own paths.
+            None => pilot::mean_radiance(&self.integrator.with_reuse(false), executor)?,
+        };
+        self.mean = Some(mean);
+        Ok(mean)
+    }
+
+    /// Variance and work of the samples of a picture of about `mean` radiance.
+    ///
+    /// # Errors
+    /// [`OutOfMemory`] where the executor's scratch is too small.
+    pub fn variance(&self, mean: f32, executor: &mut impl Executor) -> Result<Pilot, OutOfMemory> {
+        self.reuse.pilot.map_or_else(|| pilot::variance(&self.integrator, mean, executor), Ok)
+    }
+}
+
+impl<F: Features> Method for PathTracing<'_, F> {
+    fn round<E: Executor>(&mut self, round: &mut Round<E>) -> Result<(), OutOfMemory> {
+        let integrator = &self.integrator;
+        round.tiles(u32::MAX, |tile, samples, scratch, pixels| {
+            integrator.run(tile, samples, WAVE, scratch, pixels)
+        })
+    }
+}

@@ -1,0 +1,209 @@
+//! The executor of the program: threads, which the clock and interrupts end.
+
+use super::crew::Crew;
+use super::watch::Watch;
+use super::workers::{Fork, Workers};
+use halflight_core::memory::{Line, OutOfMemory};
+use halflight_core::method::{Executor, Passed, Round, Worker};
+use halflight_core::transport::Counters;
+use std::sync::Mutex;
+use std::time::Instant;
+
+/// When passes end.
+#[derive(Clone, Copy)]
+pub(super) enum End {
+    /// Passes before the picture: some seconds after the end of the render.
+    Prepass,
+    /// The first round: some seconds later still, so that every pixel has a sample.
+    FirstRound(Option<Instant>),
+    /// Every other round: at its deadline and when the user interrupts.
+    Round(Option<Instant>),
+}
+
+impl End {
+    fn is_over(self, watch: &Watch) -> bool {
+        let is_past = |deadline: Option<Instant>| deadline.is_some_and(|deadline| Instant::now() >= deadline);
+        match self {
+            End::Prepass => watch.is_over(),
+            End::FirstRound(deadline) => watch.is_late() || is_past(deadline),
+            End::Round(deadline) => watch.is_interrupted() || is_past(deadline),
+        }
+    }
+
+    fn deadline(self) -> Option<Instant> {
+        match self {
+            End::Prepass => None,
+            End::FirstRound(deadline) | End::Round(deadline) => deadline,
+        }
+    }
+}
+
+/// Runs passes on all threads, each with scratch memory of its own.
+pub(super) struct Threads<'t> {
+    workers: &'t Workers<'t>,
+    scratch: &'t mut [Vec<Line>],
+    end: End,
+}
+
+impl<'t> Threads<'t> {
+    /// For passes before or beside the picture.
+    pub(super) fn new(workers: &'t Workers<'t>, scratch: &'t mut [Vec<Line>]) -> Self {
+        Self { workers, scratch, end: End::Prepass }
+    }
+
+    /// The same for passes that end at `end`.
+    pub(super) fn until(self, end: End) -> Self {
+        Self { end, ..self }
+    }
+
+    /// Takes tasks from `queue` on all threads until it is empty or the end has come.
+    fn run<P: Send>(
+        &mut self,
+        queue: impl Iterator<Item = (usize, P)> + Send,
+        task: impl Fn(usize, P, &mut Worker) -> Result<Counters, OutOfMemory> + Sync,
+    ) -> Result<Passed, OutOfMemory> {
+        let Self { workers, scratch, end } = self;
+        let (watch, end) = (&workers.watch, *end);
+        let queue = Mutex::new(queue);
+        let next = || queue.lock().unwrap_or_else(|poisoned| poisoned.into_inner()).next();
+        let passed = workers.on_all(scratch, |arena| {
+            let is_over = || end.is_over(watch);
+            let mut worker = Worker::new(arena.scratch(), &is_over);
+            let mut counters = Counters::default();
+            while let Some((number, piece)) = next() {
+                if worker.is_over() {
+                    return Ok(Passed { counters, is_complete: false });
+                }
+                counters += task(number, piece, &mut worker)?;
+            }
+            Ok(Passed { counters, is_complete: true })
+        })?;
+        let mut all = Passed { counters: Counters::default(), is_complete: true };
+        for Passed { counters, is_complete } in passed {
+            all.counters += counters;
+            all.is_complete &= is_complete;
+        }
+        Ok(all)
+    }
+}
+
+impl Executor for Threads<'_> {
+    type Fork = Fork;
+
+    fn pass<P, T>(&mut self, pieces: P, task: T) -> Result<Passed, OutOfMemory>
+    where
+        P: Iterator<Item: Send> + Send,
+        T: Fn(usize, P::Item, &mut Worker) -> Result<Counters, OutOfMemory> + Sync,
+    {
+        self.run(pieces.enumerate(), task)
+    }
+
+    fn pass_scattered<P, T>(&mut self, pieces: P, task: T) -> Result<Passed, OutOfMemory>
+    where
+        P: Iterator<Item: Send> + Send,
+        T: Fn(usize, P::Item, &mut Worker) -> Result<Counters, OutOfMemory> + Sync,
+    {
+        self.run(scattered(pieces.enumerate().collect()).into_iter(), task)
+    }
+
+    fn is_over(&self) -> bool {
+        self.end.is_over(&self.workers.watch)
+    }
+
+    fn fork(&self) -> &Fork {
+        &self.workers.fork
+    }
+
+    fn within<T>(&mut self, fraction: f32, work: impl FnOnce(&mut Self) -> T) -> T {
+        let before = self.end;
+        let deadlines = [self.workers.watch.after(fraction), before.deadline()];
+        self.end = End::Round(deadlines.into_iter().flatten().min());
+        let done = work(self);
+        self.end = before;
+        done
+    }
+
+    fn timed<T>(&mut self, phase: &'static str, work: impl FnOnce(&mut Self) -> T) -> T {
+        let start = Instant::now();
+        let done = work(self);
+        self.workers.spent(phase, start.elapsed().as_secs_f64());
+        done
+    }
+}
+
+impl Crew<'_, '_> {
+    /// Runs `work` on this round with `scratch` memory for each thread.
+    pub(super) fn round<T>(
+        &mut self,
+        scratch: &mut [Vec<Line>],
+        work: impl FnOnce(&mut Round<Threads>) -> Result<T, OutOfMemory>,
+    ) -> Result<T, OutOfMemory> {
+        let Crew { workers, round, canvas } = self;
+        let end = if round.is_first { End::FirstRound(round.deadline) } else { End::Round(round.deadline) };
+        let mut executor = Threads::new(workers, scratch).until(end);
+        work(&mut Round { executor: &mut executor, state: canvas, target: round.target, step: round.step })
+    }
+}
+
+/// The items in an order that jumps about by the golden ratio.
+fn scattered<T>(items: Vec<T>) -> Vec<T> {
+    let count = items.len();
+    let mut step = (count as f64 * 0.618_034) as usize;
+    while step > 1 && greatest_common_divisor(step, count) > 1 {
+        step -= 1;
+    }
+    let step = step.max(1);
+    let mut items: Vec<Option<T>> = items.into_iter().map(Some).collect();
+    (0..count).filter_map(|i| items[(i as u64 * step as u64 % count as u64) as usize].take()).collect()
+}
+
+fn greatest_common_divisor(a: usize, b: usize) -> usize {
+    if b == 0 { a } else { greatest_common_divisor(b, a % b) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use core::sync::atomic::AtomicBool;
+
+    #[test]
+    fn scattering_keeps_every_item() {
+        for count in [0, 1, 2, 3, 12, 1000] {
+            let mut items = scattered((0..count).collect::<Vec<u32>>());
+            items.sort_unstable();
+            assert_eq!(items, (0..count).collect::<Vec<u32>>());
+        }
+    }
+
+    #[test]
+    fn a_pass_writes_every_piece_once_and_counts() {
+        for threads in [1, 3] {
+            let workers = Workers::new(Some(threads)).unwrap();
+            let mut scratch = vec![vec![]; threads];
+            let mut executor = Threads::new(&workers, &mut scratch);
+            let mut out = vec![0; 23];
+            let passed = executor.pass(out.chunks_mut(5), |number, out, _| {
+                out.iter_mut().for_each(|value| *value += 100 * number + 1);
+                Ok(Counters { rays: out.len() as u64, ..Counters::default() })
+            });
+            let Passed { counters, is_complete } = passed.unwrap();
+            assert!(is_complete && counters.rays == 23);
+            assert!(out.iter().enumerate().all(|(i, value)| *value == 100 * (i / 5) + 1));
+        }
+    }
+
+    #[test]
+    fn an_interrupt_ends_a_pass_and_a_fraction_of_no_time_ends_its_work_alone() {
+        let flag = AtomicBool::new(false);
+        let workers = Workers::new(Some(2)).unwrap().watched(Watch::until(&flag).within(Some(3600.0)));
+        let mut scratch = vec![vec![]; 2];
+        let mut executor = Threads::new(&workers, &mut scratch).until(End::Round(None));
+        let mut is_complete = |executor: &mut Threads| {
+            executor.pass(0..9, |_, _, _| Ok(Counters::default())).unwrap().is_complete
+        };
+        assert!(!executor.within(0.0, &mut is_complete) && executor.within(0.5, &mut is_complete));
+        assert!(is_complete(&mut executor));
+        flag.store(true, core::sync::atomic::Ordering::Relaxed);
+        assert!(!is_complete(&mut executor) && executor.is_over());
+    }
+}
