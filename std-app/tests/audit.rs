@@ -1,8 +1,6 @@
 //! `render --audit`: what it says, and that it changes neither the picture nor what comes after an interruption.
 
-mod support;
-
-use support::Folder;
+use crate::support::Folder;
 
 #[test]
 fn an_audit_says_what_it_knows() {

@@ -1,8 +1,6 @@
 //! Whether photons are taken where they are worth it, whatever a look happens to see.
 
-mod support;
-
-use support::Folder;
+use crate::support::Folder;
 
 /// A room, of which all light but a glance at the lamp itself comes through the glass around that.
 const ROOM: &str = "mtllib room.mtl\n\

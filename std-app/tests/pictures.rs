@@ -1,14 +1,12 @@
 //! One reader of pictures: what one command reads the others read as well, and nothing that is repaired or
 //! left out goes without a word.
 
-mod support;
-
+use crate::support::Folder;
 use halflight::picture;
 use halflight::save::{self, Format, Image};
 use image::{DynamicImage, ImageBuffer, ImageFormat};
 use std::io::Cursor;
 use std::path::Path;
-use support::Folder;
 
 /// The colour of pictures of floats, and that of pictures of bytes: sRGB 188 137 99 is 0.503 0.251 0.125.
 const COLOUR: [f32; 3] = [0.5, 0.25, 0.125];

@@ -1,8 +1,6 @@
 //! Outputs that are no files, and files that stop being writable while a picture grows.
-#![cfg(unix)]
 
-mod support;
-
+use crate::support::Folder;
 use core::time::Duration;
 use halflight::picture::decode;
 use halflight::save::{Image, read};
@@ -12,7 +10,6 @@ use std::path::PathBuf;
 use std::process::{Child, Command, Output, Stdio};
 use std::thread::{JoinHandle, sleep, spawn};
 use std::time::Instant;
-use support::Folder;
 
 /// A pipe with a name.
 fn pipe(folder: &Folder, name: &str) -> PathBuf {

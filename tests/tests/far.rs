@@ -1,13 +1,10 @@
 //! Far away and large: grounds, suns and planets of 1e7 beside a cube of side 2, and cameras a million sizes away, show what smaller
 //! and nearer ones do.
 
-#[allow(dead_code)]
-mod load_support;
-
+use crate::load_support::Files;
 use core::fmt::Write;
 use core::sync::atomic::AtomicBool;
 use halflight::drive::{Settings, Stop, render};
-use load_support::Files;
 
 const MTL: &[u8] = b"newmtl a\nKd 0.5 0.5 0.5\nnewmtl lamp\nKd 0 0 0\nKe 3 3 3\n";
 

@@ -1,12 +1,10 @@
 //! Furnaces: places where light is the same everywhere, so that every error of a factor shows.
 
-mod picture;
-
+use crate::picture::{self, assert_picture};
 use glam::Vec3;
 use halflight_core::Rgb;
 use halflight_core::scene::{Camera, Material, Surface};
 use halflight_tests::scenes::{SceneBuffers, constant_environment, emitter};
-use picture::assert_picture;
 
 const INSIDE: Camera = Camera {
     eye: Vec3::new(0.1, -0.2, 0.3),

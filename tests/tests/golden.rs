@@ -3,7 +3,7 @@
 //! The renderer is deterministic, so that a change of structure leaves each row as it is. Rows change in commits
 //! that mend a fault or delete a mechanism, and those say so:
 //!
-//!     GOLDEN=write cargo test --release -p halflight-tests --test golden
+//!     GOLDEN=write cargo test --profile quick -p halflight-tests --test main golden::
 //!
 //! rewrites `golden.txt`, for the instruction sets of this machine; the others keep their rows.
 

@@ -1,11 +1,9 @@
 //! Area lights against Lambert's formula for the irradiance of a polygon, and densities against samples.
 
-mod light_support;
-
+use crate::light_support::{Lamp, Stage, random_direction};
 use glam::{DVec3, Vec3};
 use halflight_core::geometry::Frame;
 use halflight_core::sampling::{Random, Sampler, warp};
-use light_support::{Lamp, Stage, random_direction};
 
 /// Standard errors that an estimate may be off: exceeded once in 15,000 by chance, if errors are normal.
 const SIGMAS: f64 = 4.0;

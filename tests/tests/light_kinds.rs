@@ -1,8 +1,7 @@
 //! Lights of every kind together: environments by chi-squared, lights without surface, shares of kinds,
 //! emission with textures, and memory to the byte.
 
-mod light_support;
-
+use crate::light_support::{Lamp, Stage, random_direction};
 use glam::{Mat3, Vec2, Vec3};
 use halflight_core::Rgb;
 use halflight_core::light::{LightSampler, emitted};
@@ -10,7 +9,6 @@ use halflight_core::memory::{Arena, Line};
 use halflight_core::sampling::{Random, Sampler, warp};
 use halflight_core::scene::{Environment, PointLight};
 use halflight_core::scene::{Texels, Texture, TextureId, TextureTransform, Wrap};
-use light_support::{Lamp, Stage, random_direction};
 
 /// Standard errors that an estimate may be off.
 const SIGMAS: f64 = 4.0;

@@ -1,10 +1,8 @@
 //! Very many lights: built from exact memory, chosen by what they can do, cheaply.
 
-mod light_support;
-
+use crate::light_support::{Lamp, Stage, random_direction};
 use glam::Vec3;
 use halflight_core::sampling::Random;
-use light_support::{Lamp, Stage, random_direction};
 use std::time::Instant;
 
 /// Emissive triangles in the shell of a sphere.

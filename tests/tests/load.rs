@@ -1,13 +1,11 @@
 //! Loading as a user meets it: small files on disk, each with one thing that has to be repaired, refused, or
 //! understood.
 
-mod load_support;
-
+use crate::load_support::{Files, bmp};
 use glam::Vec3;
 use halflight::load::{LoadError, LoadOptions, LoadedScene, load};
 use halflight_core::Rgb;
 use halflight_core::scene::{ColorInput, Material, PointLight, Surface, Texels};
-use load_support::{Files, bmp};
 
 fn obj(text: &str) -> Result<LoadedScene, LoadError> {
     Files::new(&[("a.obj", text.as_bytes())]).load("a.obj")

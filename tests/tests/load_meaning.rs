@@ -1,13 +1,11 @@
 //! Materials, texture coordinates and meshes that mean something else than the letter of the file: as exporters write
 //! them, and as they go wrong.
 
-mod load_support;
-
+use crate::load_support::{Files, bmp};
 use glam::Vec2;
 use halflight::load::{LoadError, LoadedScene};
 use halflight_core::Rgb;
 use halflight_core::scene::{ColorInput, NormalMap, Surface};
-use load_support::{Files, bmp};
 
 const SQUARE: &str = "v 0 0 0\nv 4 0 0\nv 4 4 0\nv 0 4 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n";
 const FACE: &str = "usemtl a\nf 1/1 2/2 3/3 4/4\n";

@@ -1,12 +1,10 @@
 //! Names of materials and files as programs write them: with `#`, quotes, blanks and options, in Latin-1, in another
 //! case, with the folders of another machine.
 
-mod load_support;
-
+use crate::load_support::{Files, bmp};
 use halflight::load::LoadedScene;
 use halflight_core::Rgb;
 use halflight_core::scene::{Surface, Texels};
-use load_support::{Files, bmp};
 
 const SQUARE: &[u8] = b"v 0 0 0\nv 4 0 0\nv 4 4 0\nv 0 4 0\nvt 0 0\n";
 const GREY: f32 = 0.5;

@@ -1,14 +1,12 @@
 //! Direct light whose irradiance has a formula, and what cut-outs let through of it.
 
-mod picture;
-
+use crate::picture::{SIZE, assert_picture};
 use core::f64::consts::PI;
 use glam::{DVec3, Vec3};
 use halflight_core::Rgb;
 use halflight_core::scene::PointLight;
 use halflight_core::scene::{Camera, Material};
 use halflight_tests::scenes::{SceneBuffers, emitter};
-use picture::{SIZE, assert_picture};
 
 const REFLECTANCE: f32 = 0.6;
 

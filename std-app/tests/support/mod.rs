@@ -1,5 +1,4 @@
 //! What tests of the program share: a folder with a scene, and ways to run the program in it.
-#![allow(dead_code, unreachable_pub, missing_docs)]
 
 use serde_json::Value;
 use std::path::PathBuf;
@@ -12,10 +11,10 @@ const SCENE: &str = "mtllib scene.mtl\n\
 const MATERIALS: &str = "newmtl floor\nKd 0.5 0.5 0.5\nnewmtl lamp\nKd 0 0 0\nKe 1 1 1\n";
 
 /// A folder of its own for each test, with the scene in it; gone when the test ends well.
-pub struct Folder(pub PathBuf);
+pub(crate) struct Folder(pub(crate) PathBuf);
 
 impl Folder {
-    pub fn new(name: &str) -> Self {
+    pub(crate) fn new(name: &str) -> Self {
         let folder = std::env::temp_dir().join(format!("halflight-cli-{name}-{}", std::process::id()));
         std::fs::create_dir_all(&folder).unwrap();
         std::fs::write(folder.join("scene.obj"), SCENE).unwrap();
@@ -23,22 +22,22 @@ impl Folder {
         Self(folder)
     }
 
-    pub fn path(&self, name: &str) -> PathBuf {
+    pub(crate) fn path(&self, name: &str) -> PathBuf {
         self.0.join(name)
     }
 
-    pub fn command(&self, arguments: &str) -> Command {
+    pub(crate) fn command(&self, arguments: &str) -> Command {
         let mut command = Command::new(env!("CARGO_BIN_EXE_halflight"));
         command.current_dir(&self.0).args(arguments.split_whitespace());
         command
     }
 
-    pub fn run(&self, arguments: &str) -> Output {
+    pub(crate) fn run(&self, arguments: &str) -> Output {
         self.command(arguments).output().unwrap()
     }
 
     /// Runs what must succeed, and returns the object that it prints.
-    pub fn object(&self, arguments: &str) -> Value {
+    pub(crate) fn object(&self, arguments: &str) -> Value {
         let output = self.run(arguments);
         let said = String::from_utf8_lossy(&output.stderr);
         assert_eq!(output.status.code(), Some(0), "{arguments}: {said}");
@@ -46,7 +45,7 @@ impl Folder {
     }
 
     /// Runs what must be refused with exit code 2, and returns what is said.
-    pub fn refused(&self, arguments: &str) -> String {
+    pub(crate) fn refused(&self, arguments: &str) -> String {
         let output = self.run(arguments);
         let said = String::from_utf8(output.stderr).unwrap();
         assert_eq!(output.status.code(), Some(2), "{arguments}: {said}");

@@ -3,7 +3,7 @@
 //! fills as many of them as one of alpha 1. Delta samples and absorbed ones share one bin: its expectation is
 //! what the density leaves of 1.
 
-use crate::cases::{VIEWS, draw, scattering, view};
+use super::cases::{VIEWS, draw, scattering, view};
 use core::f64::consts::{SQRT_2, TAU};
 use glam::{DVec3, Vec3};
 use halflight_core::bsdf::{All, Bsdf};

@@ -1,6 +1,6 @@
 //! Energy and reciprocity.
 
-use crate::cases::{VIEWS, coated, dielectric, draw, plastic, scattering, view};
+use super::cases::{VIEWS, coated, dielectric, draw, plastic, scattering, view};
 use glam::{DVec3, Vec3};
 use halflight_core::Rgb;
 use halflight_core::bsdf::{All, Bsdf};

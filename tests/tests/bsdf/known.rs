@@ -1,6 +1,6 @@
 //! Numbers that are known from elsewhere.
 
-use crate::cases::{coated, conductor, dielectric, plastic, resolve, view};
+use super::cases::{coated, conductor, dielectric, plastic, resolve, view};
 use glam::Vec3;
 use halflight_core::Rgb;
 use halflight_core::bsdf::{All, Bsdf, DiffuseOnly};

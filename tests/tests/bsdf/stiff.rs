@@ -1,7 +1,7 @@
 //! The table of stiff inputs: every roughness, index and angle that a file can ask for, at the corners of the
 //! random numbers.
 
-use crate::cases::{coated, conductor, dielectric, resolve};
+use super::cases::{coated, conductor, dielectric, empty_scene, resolve};
 use glam::{Vec2, Vec3};
 use halflight_core::Rgb;
 use halflight_core::bsdf::{All, Bsdf};
@@ -113,7 +113,6 @@ fn no_input_makes_a_number_that_is_none() {
 
 #[test]
 fn textures_out_of_place_do_no_harm() {
-    use crate::cases::empty_scene;
     use halflight_core::scene::{ColorInput, TextureId};
     let scene = empty_scene();
     let missing = ColorInput { value: Rgb::splat(0.25), texture: Some(TextureId(77)) };

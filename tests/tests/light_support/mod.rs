@@ -1,5 +1,4 @@
 //! Scenes of lamps and nothing else, for the tests of lights.
-#![allow(dead_code)]
 
 use glam::{DVec3, Vec3};
 use halflight_core::Rgb;

@@ -1,5 +1,4 @@
 //! Small grey pictures, rendered several times with different seeds and held against what they should be.
-#![allow(dead_code)]
 
 use core::sync::atomic::AtomicBool;
 use halflight::drive::{self, Settings, Stop};

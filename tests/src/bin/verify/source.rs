@@ -81,6 +81,10 @@ const NARROW: &[&str] = &[
     "tests/src/bin/verify/layers.rs",
 ];
 
+/// Folders of tests, and the program of which each file in them is a module.
+const TEST_PROGRAMS: [(&str, &str); 2] =
+    [("tests/tests/", "tests/tests/main.rs"), ("std-app/tests/", "std-app/tests/main.rs")];
+
 pub(crate) fn check(project: &Project) -> Outcome {
     let mut files = Vec::new();
     for folder in ["simd", "core", "std-app", "tests", "fuzz"] {
@@ -123,6 +127,13 @@ pub(crate) fn check(project: &Project) -> Outcome {
             core.extend(below.map(|name| Source { name, code: code(text) }));
         }
     }
+    for (root, program) in TEST_PROGRAMS {
+        let text = names.iter().zip(&texts).find(|(name, _)| *name == program).map_or("", |(_, text)| text);
+        let files = names.iter().filter_map(|name| name.strip_prefix(root));
+        complaints.extend(
+            modules_left_out(text, files).map(|name| format!("{root}{name}: {program} does not name it")),
+        );
+    }
     complaints.extend(layers::check(&core));
     complaints.iter().for_each(|complaint| println!("{complaint}"));
     match complaints.len() {
@@ -144,6 +155,18 @@ fn broken_rules(name: &str, text: &str) -> Vec<String> {
         }
     }
     complaints
+}
+
+/// Files in the folder of a program that are no modules of it: their tests would never run.
+fn modules_left_out<'t>(
+    program: &'t str,
+    files: impl Iterator<Item = &'t str>,
+) -> impl Iterator<Item = &'t str> {
+    files.filter(move |file| {
+        let name = file.strip_suffix("/mod.rs").or(file.strip_suffix(".rs")).unwrap_or(file);
+        let module = format!("mod {name};");
+        name != "main" && !name.contains('/') && !program.lines().any(|line| line == module)
+    })
 }
 
 /// The numbers of the lines that are longer than [`COLUMNS`].
@@ -218,6 +241,13 @@ mod tests {
     fn lines_are_measured_in_characters() {
         let text = format!("{}\n{}\n", "ä".repeat(COLUMNS), "a".repeat(COLUMNS + 1));
         assert_eq!(wide_lines(&text).collect::<Vec<_>>(), [2]);
+    }
+
+    #[test]
+    fn a_file_of_tests_without_a_module_is_named() {
+        let files = ["main.rs", "a.rs", "b/mod.rs", "b/c.rs", "d.rs"];
+        let left_out: Vec<_> = modules_left_out("mod a;\nmod b;\n", files.into_iter()).collect();
+        assert_eq!(left_out, ["d.rs"]);
     }
 
     #[test]

@@ -1,0 +1,38 @@
+//! Tests that cross crates, in one program: pictures against known answers and against each other, lights, surfaces,
+//! loading and saving.
+//!
+//! `cargo test --profile quick -p halflight-tests --test main golden::` runs one module of it.
+
+mod aiming;
+mod bsdf;
+mod cache_file;
+mod caustics;
+mod caustics_cached;
+mod far;
+mod furnace;
+mod golden;
+mod irradiance_cache;
+mod irradiance_gaps;
+mod irradiance_rooms;
+mod lamp_borders;
+mod lamp_cutouts;
+mod light_area;
+mod light_kinds;
+mod light_many;
+mod light_support;
+mod load;
+mod load_collection;
+mod load_meaning;
+mod load_names;
+mod load_support;
+mod photon_map;
+mod picture;
+mod report;
+mod reuse;
+mod sampling;
+mod save;
+mod sppm;
+mod stops;
+mod transport;
+mod transport_analytic;
+mod windows;
