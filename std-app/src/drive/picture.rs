@@ -11,7 +11,7 @@ use super::method::{Method, Renderer, Stage};
 use super::rounds::{Plan, Rounds};
 use super::told::Told;
 use super::workers::Workers;
-use super::{Ending, Progress, RenderError, RenderResult, Seconds, WindowUse};
+use super::{Ending, ErrorEstimate, Progress, RenderError, RenderResult, Seconds, WindowUse};
 use crate::save::{Image, Patience};
 use core::sync::atomic::{AtomicBool, Ordering};
 use core::time::Duration;
@@ -45,30 +45,52 @@ pub(super) struct Picture<'a> {
 }
 
 impl Picture<'_> {
-    /// Renders until a stop rule holds. What was built, and the memory of it, is for the caller to tell.
+    /// Renders until a stop rule holds. The caller adds the seconds and the memory of what it has built.
     pub(super) fn render(self, renderer: &mut dyn Renderer) -> Result<RenderResult, RenderError> {
-        let Picture {
-            method,
-            stage,
-            mut state,
-            mut audit,
-            identity,
-            resumed,
-            mut clock,
-            progress,
-            interrupt,
-            sketch,
-        } = self;
-        let Stage { settings, workers, .. } = stage;
-        let (width, height) = (settings.width, settings.height);
+        let mut render = Progressive::new(self)?;
+        while let Some(plan) = render.plan() {
+            render.round(&plan, renderer)?;
+            if render.is_ended(&plan) {
+                break;
+            }
+        }
+        render.finish(renderer)
+    }
+}
+
+/// A picture in progress.
+struct Progressive<'a> {
+    picture: Picture<'a>,
+    rounds: Rounds,
+    history: Vec<Round>,
+    reference: Option<Reference<'a>>,
+    /// The last estimate of the error.
+    latest: Option<ErrorEstimate>,
+    /// The last estimate with its parts, if the last round had one.
+    report: Option<Told>,
+    /// Seconds of the last estimate, and of all.
+    estimating: f64,
+    estimated: f64,
+    /// The film file, and when it was written last.
+    kept: Kept<'a>,
+    saved: Instant,
+    began: Instant,
+    /// Why the error that was asked for is out of reach.
+    lost: Option<Ending>,
+}
+
+impl<'a> Progressive<'a> {
+    fn new(mut picture: Picture<'a>) -> Result<Self, RenderError> {
+        let Picture { method, stage, state, audit, resumed, clock, .. } = &mut picture;
+        let settings = stage.settings;
         state.is_correlated = method.shares();
-        let (mut rounds, mut history) = match resumed {
+        let (rounds, history) = match resumed.take() {
             None => (Rounds::new(settings.stop), Vec::new()),
             Some(film) => {
                 let header = film.header.clone();
-                clock.pause(|| film.read_into(&mut state))?;
+                clock.pause(|| film.read_into(state))?;
                 let Header { spp, rounds, seconds, estimates, .. } = header;
-                if let (Some(audit), Some(earlier)) = (&mut audit, header.audit()) {
+                if let (Some(audit), Some(earlier)) = (audit, header.audit()) {
                     audit.resume(earlier);
                 }
                 let rounds = Rounds::new(settings.stop).resumed(spp, rounds, seconds, estimates);
@@ -76,209 +98,242 @@ impl Picture<'_> {
             }
         };
         let reference = clock.pause(|| settings.reference.as_deref().map(Reference::new));
-        let mut latest = history.iter().rev().find_map(|round: &Round| round.error);
         let pixels = f64::from(settings.width) * f64::from(settings.height);
-        let (mut estimating, mut estimate) = (ESTIMATING * pixels / workers.count() as f64, 0.0);
-        let mut told = None;
-        let mut saved = Instant::now();
-        let mut lost = None;
-        let mut kept =
-            Kept::in_file(settings.checkpoint.as_ref().map(|checkpoint| checkpoint.path.as_path()));
-        let began = Instant::now();
-        let header =
-            |state: &RenderState, rounds: &Rounds, audit: Option<&Audit>, seconds: f64, history: &[Round]| {
-                Header::new(identity.clone(), state, rounds, audit, seconds, history)
-            };
+        let latest = history.iter().rev().find_map(|round| round.error);
+        let file = settings.checkpoint.as_ref().map(|checkpoint| checkpoint.path.as_path());
+        let estimating = ESTIMATING * pixels / stage.workers.count() as f64;
+        Ok(Self {
+            picture,
+            rounds,
+            history,
+            reference,
+            latest,
+            report: None,
+            estimating,
+            estimated: 0.0,
+            kept: Kept::in_file(file),
+            saved: Instant::now(),
+            began: Instant::now(),
+            lost: None,
+        })
+    }
 
-        while let Some(plan) = rounds.next(clock.seconds(), estimating) {
-            let now = clock.seconds();
-            // Later than any clock can tell is never.
-            let later = |at: f64| Duration::try_from_secs_f64((at - now).max(0.0)).ok();
-            let deadline = plan.deadline.and_then(later).and_then(|later| Instant::now().checked_add(later));
-            let round = crew::Round {
-                target: plan.target,
-                step: step(&plan, state.tiles(), workers.count()),
-                deadline,
-                watch: &workers.watch,
-                is_first: plan.first,
-            };
-            renderer.round(&mut Crew { workers, round: &round, canvas: &mut state })?;
-            rounds.completed(state.spp().min(plan.target), clock.seconds());
-            let mut error = None;
-            if rounds.estimate_is_due() {
-                if let Some(audit) = &mut audit {
-                    let left = settings.stop.seconds.map(|limit| limit - estimating - clock.seconds());
-                    let work = (state.counters.all_rays(), clock.seconds());
-                    if audit.is_open() {
-                        audit.weigh(renderer.risks(workers)?);
-                    }
-                    renderer
-                        .lend_photons(&mut |photons| audit.step(workers, &state.film, photons, work, left))?;
-                }
-                let start = Instant::now();
-                let mut found = Told::of(workers, &state, audit.as_ref());
-                estimate += start.elapsed().as_secs_f64();
-                estimating = start.elapsed().as_secs_f64();
-                if let Some(audit) = &mut audit {
-                    if let Some(audited) = &found.audited {
-                        audit.focus(audited, (state.counters.all_rays(), rounds.spp()));
-                    }
-                    let left = settings.stop.seconds.map(|limit| limit - estimating);
-                    let so_far = found.error();
-                    let mut may = |cost: f64| {
-                        let known = rounds.progress(clock.seconds(), so_far);
-                        clock.pause(|| progress(&known));
-                        let is_time = left.is_none_or(|left| clock.seconds() + cost < left);
-                        is_time && !interrupt.load(Ordering::Relaxed)
-                    };
-                    if settings.audit.is_none() {
-                        found = go_on_alone(audit, &rounds, found, renderer, (workers, &state), &mut may)?;
-                    }
-                }
-                let start = Instant::now();
-                let has_floor = found.noise.is_some_and(|noise| rounds.has_floor(noise));
-                let is_biased = found.audited.as_ref().is_some_and(|audited| rounds.is_out_of_reach(audited));
-                lost = match () {
-                    () if method.converges() => None,
-                    () if is_biased => Some(Ending::Biased),
-                    () => has_floor.then_some(Ending::NoiseFloor),
-                };
-                error = found.error();
-                rounds.estimated(error);
-                estimating += start.elapsed().as_secs_f64();
-                latest = error;
-                told = Some(found);
-            } else {
-                told = None;
-            }
-            let seconds = clock.seconds();
-            let against = reference.as_ref().map(|r| clock.pause(|| r.compare(&image(&state.film))));
-            let spp = rounds.spp();
-            history.push(Round { seconds, spp, rays: state.counters.all_rays(), error, reference: against });
-            let due = |every: f64| saved.elapsed().as_secs_f64() >= every;
-            if plan.first || settings.checkpoint.as_ref().is_some_and(|checkpoint| due(checkpoint.every)) {
-                clock.pause(|| {
-                    kept.update(|path, patience| {
-                        let header = header(&state, &rounds, audit.as_ref(), seconds, &history);
-                        film_file::write(path, &header, &state, patience)
-                    });
-                });
-                saved = Instant::now();
-            }
-            let unsaved = kept.news().or_else(|| renderer.kept()?.news());
-            let known = Progress { unsaved, ..rounds.progress(seconds, latest) };
+    /// The next round; `None` where a stop rule holds.
+    fn plan(&self) -> Option<Plan> {
+        self.rounds.next(self.picture.clock.seconds(), self.estimating)
+    }
+
+    /// Adds samples, estimates the error where that is due, writes the film file, and reports progress.
+    fn round(&mut self, plan: &Plan, renderer: &mut dyn Renderer) -> Result<(), RenderError> {
+        self.add_samples(plan, renderer)?;
+        self.report = None;
+        let error = match self.rounds.estimate_is_due() {
+            true => self.estimate(renderer)?,
+            false => None,
+        };
+        let Picture { stage, state, clock, .. } = &mut self.picture;
+        let (seconds, spp) = (clock.seconds(), self.rounds.spp());
+        let reference = self.reference.as_ref().map(|r| clock.pause(|| r.compare(&image(&state.film))));
+        self.history.push(Round { seconds, spp, rays: state.counters.all_rays(), error, reference });
+        let is_due = |every: f64| self.saved.elapsed().as_secs_f64() >= every;
+        let checkpoint = stage.settings.checkpoint.as_ref();
+        if plan.first || checkpoint.is_some_and(|checkpoint| is_due(checkpoint.every)) {
+            self.write_film(seconds, None);
+            self.saved = Instant::now();
+        }
+        let unsaved = self.kept.news().or_else(|| renderer.kept()?.news());
+        let known = Progress { unsaved, ..self.rounds.progress(seconds, self.latest) };
+        let Picture { clock, progress, .. } = &mut self.picture;
+        clock.pause(|| progress(&known));
+        Ok(())
+    }
+
+    fn add_samples(&mut self, plan: &Plan, renderer: &mut dyn Renderer) -> Result<(), RenderError> {
+        let Picture { stage: Stage { workers, .. }, state, clock, .. } = &mut self.picture;
+        let now = clock.seconds();
+        // A time beyond the range of the clock is no deadline.
+        let later = |at: f64| Duration::try_from_secs_f64((at - now).max(0.0)).ok();
+        let deadline = plan.deadline.and_then(later).and_then(|later| Instant::now().checked_add(later));
+        let round = crew::Round {
+            target: plan.target,
+            step: step(plan, state.tiles(), workers.count()),
+            deadline,
+            watch: &workers.watch,
+            is_first: plan.first,
+        };
+        renderer.round(&mut Crew { workers, round: &round, canvas: state })?;
+        self.rounds.completed(state.spp().min(plan.target), clock.seconds());
+        Ok(())
+    }
+
+    /// Estimates the error: noise from the two half-films, bias by the audit or from the photons' kernels.
+    fn estimate(&mut self, renderer: &mut dyn Renderer) -> Result<Option<ErrorEstimate>, RenderError> {
+        self.step_audit(renderer)?;
+        let start = Instant::now();
+        let Picture { stage, state, audit, .. } = &mut self.picture;
+        let mut report = Told::of(stage.workers, state, audit.as_ref());
+        self.estimating = start.elapsed().as_secs_f64();
+        self.estimated += self.estimating;
+        report = self.extend_audit(report, renderer)?;
+        let start = Instant::now();
+        let has_floor = report.noise.is_some_and(|noise| self.rounds.has_floor(noise));
+        let is_biased = report.audited.as_ref().is_some_and(|audited| self.rounds.is_out_of_reach(audited));
+        self.lost = match () {
+            () if self.picture.method.converges() => None,
+            () if is_biased => Some(Ending::Biased),
+            () => has_floor.then_some(Ending::NoiseFloor),
+        };
+        self.latest = report.error();
+        self.rounds.estimated(self.latest);
+        self.estimating += start.elapsed().as_secs_f64();
+        self.report = Some(report);
+        Ok(self.latest)
+    }
+
+    /// Takes the audit's samples that are due.
+    fn step_audit(&mut self, renderer: &mut dyn Renderer) -> Result<(), RenderError> {
+        let Picture { stage: Stage { settings, workers, .. }, state, audit, clock, .. } = &mut self.picture;
+        let Some(audit) = audit else { return Ok(()) };
+        let left = settings.stop.seconds.map(|limit| limit - self.estimating - clock.seconds());
+        let work = (state.counters.all_rays(), clock.seconds());
+        if audit.is_open() {
+            audit.weigh(renderer.risks(workers)?);
+        }
+        renderer.lend_photons(&mut |photons| audit.step(workers, &state.film, photons, work, left))
+    }
+
+    /// Focuses the audit after its first samples, and goes on with it alone where it alone keeps the picture from its
+    /// end.
+    fn extend_audit(&mut self, report: Told, renderer: &mut dyn Renderer) -> Result<Told, RenderError> {
+        let Picture { stage, state, audit, clock, progress, interrupt, .. } = &mut self.picture;
+        let (Stage { settings, workers, .. }, rounds) = (*stage, &self.rounds);
+        let Some(audit) = audit else { return Ok(report) };
+        if let Some(audited) = &report.audited {
+            audit.focus(audited, (state.counters.all_rays(), rounds.spp()));
+        }
+        if settings.audit.is_some() {
+            return Ok(report);
+        }
+        let left = settings.stop.seconds.map(|limit| limit - self.estimating);
+        let error = report.error();
+        let mut may = |cost: f64| {
+            let known = rounds.progress(clock.seconds(), error);
             clock.pause(|| progress(&known));
-            // Where the first round was cut, others would be as well.
-            if lost.is_some() || rounds.spp() == 0 || interrupt.load(Ordering::Relaxed) && !plan.first {
+            let is_time = left.is_none_or(|left| clock.seconds() + cost < left);
+            is_time && !interrupt.load(Ordering::Relaxed)
+        };
+        let mut report = report;
+        while report.audited.as_ref().is_some_and(|audited| rounds.waits_for(audited)) {
+            let mut went = false;
+            renderer.lend_photons(&mut |photons| {
+                went = audit.go_on(workers, photons, &mut may)?;
+                Ok(())
+            })?;
+            if !went {
                 break;
             }
+            let verdict = |noise| audit.verdict(workers, &state.film, noise);
+            report = Told::beside(report.noise, workers, state, verdict);
         }
-        let interrupted = interrupt.load(Ordering::Relaxed);
-        let patience = Patience { since: began, interrupt };
-        let is_known = history.last().is_some_and(|last| last.error.is_some());
-        let goes_on = audit.is_some() && !(interrupted || is_known);
-        // A shard is merged with the last steps of its audit, a render that goes on would not take them here.
-        let is_last = !goes_on || settings.shard == Shard::WHOLE;
-        let seconds = clock.seconds();
+        Ok(report)
+    }
+
+    /// Writes the film file: on the way, or with the `last` patience at the end.
+    fn write_film(&mut self, seconds: f64, last: Option<Patience>) {
+        let Picture { state, audit, identity, clock, .. } = &mut self.picture;
+        let (kept, rounds, history) = (&mut self.kept, &self.rounds, &self.history);
         clock.pause(|| {
             let write = |path: &Path, patience: Patience| {
-                let header = header(&state, &rounds, audit.as_ref(), seconds, &history);
-                film_file::write(path, &header, &state, patience)
+                let header = Header::new(identity.clone(), state, rounds, audit.as_ref(), seconds, history);
+                film_file::write(path, &header, state, patience)
             };
-            if is_last {
-                kept.finish(patience, write)
-            } else {
-                kept.update(write)
+            match last {
+                Some(patience) => kept.finish(patience, write),
+                None => kept.update(write),
             }
-            renderer.finish(patience);
         });
-        if let Some(audit) = audit.as_mut().filter(|_| goes_on) {
-            let left = settings.stop.seconds.map(|limit| limit - estimating - clock.seconds());
-            let work = (state.counters.all_rays(), clock.seconds());
-            if audit.is_open() {
-                audit.weigh(renderer.risks(workers)?);
-            }
-            renderer.lend_photons(&mut |photons| audit.step(workers, &state.film, photons, work, left))?;
+    }
+
+    /// Whether the rounds end although no stop rule holds. A first round that was cut would be cut again.
+    fn is_ended(&self, plan: &Plan) -> bool {
+        self.lost.is_some() || self.rounds.spp() == 0 || self.is_interrupted() && !plan.first
+    }
+
+    fn is_interrupted(&self) -> bool {
+        self.picture.interrupt.load(Ordering::Relaxed)
+    }
+
+    /// Writes the files for the last time, takes the last samples of the audit, and makes the result.
+    fn finish(mut self, renderer: &mut dyn Renderer) -> Result<RenderResult, RenderError> {
+        let interrupted = self.is_interrupted();
+        let patience = Patience { since: self.began, interrupt: self.picture.interrupt };
+        let is_known = self.history.last().is_some_and(|last| last.error.is_some());
+        let is_open = self.picture.audit.is_some() && !(interrupted || is_known);
+        // A shard is merged with the last samples of its audit. A render that is resumed would not take them here.
+        let is_last = !is_open || self.picture.stage.settings.shard == Shard::WHOLE;
+        let seconds = self.picture.clock.seconds();
+        self.write_film(seconds, is_last.then_some(patience));
+        self.picture.clock.pause(|| renderer.finish(patience));
+        if is_open {
+            self.step_audit(renderer)?;
         }
         if !is_last {
-            let seconds = clock.seconds();
-            clock.pause(|| {
-                kept.finish(patience, |path, patience| {
-                    let header = header(&state, &rounds, audit.as_ref(), seconds, &history);
-                    film_file::write(path, &header, &state, patience)
-                });
-            });
+            self.write_film(self.picture.clock.seconds(), Some(patience));
         }
         let start = Instant::now();
-        // The last round may have asked already.
-        let told = told.unwrap_or_else(|| Told::of(workers, &state, audit.as_ref()));
-        estimate += start.elapsed().as_secs_f64();
+        let Picture { stage, state, audit, .. } = &self.picture;
+        let report = self.report.take().unwrap_or_else(|| Told::of(stage.workers, state, audit.as_ref()));
+        self.estimated += start.elapsed().as_secs_f64();
+        self.result(report, renderer, interrupted)
+    }
+
+    fn result(
+        mut self,
+        report: Told,
+        renderer: &mut dyn Renderer,
+        interrupted: bool,
+    ) -> Result<RenderResult, RenderError> {
+        let Picture { method, stage, state, clock, sketch, .. } = &self.picture;
+        let Stage { settings, workers, .. } = *stage;
         let render = clock.seconds();
-        let error = told.error();
-        if let Some(last) = history.last_mut() {
+        let error = report.error();
+        if let Some(last) = self.history.last_mut() {
             last.error = error;
         }
         let film = &state.film;
-        let (image, filled_pixels) = without_gaps(&state, sketch, workers);
+        let (image, filled_pixels) = without_gaps(state, sketch, workers);
+        let is_viewed = settings.photon_view && !interrupted;
         Ok(RenderResult {
-            method,
+            method: *method,
             image,
-            spp: rounds.spp(),
-            rounds: rounds.count(),
-            history,
+            spp: self.rounds.spp(),
+            rounds: self.rounds.count(),
+            history: self.history,
             variance: map(film, |pixel| pixel.variance().to_array()),
             samples: by_rows(film).map(|pixel| pixel.count()).collect(),
             threads: workers.count(),
-            seconds: Seconds { build: 0.0, render, estimate },
+            seconds: Seconds { build: 0.0, render, estimate: self.estimated },
             counters: state.counters,
             reuse: renderer.reuse(),
             caustics: renderer.caustics(),
             cache: renderer.cache(),
-            // The picture is there: what there is no memory to look at is left out.
+            // The picture is there: a report for which there is no memory is left out.
             survey: if interrupted { None } else { renderer.survey(workers).unwrap_or_default() },
             photons: renderer.photons(),
-            photon_view: if settings.photon_view && !interrupted {
-                renderer.photon_view().unwrap_or_default()
-            } else {
-                None
-            },
+            photon_view: if is_viewed { renderer.photon_view().unwrap_or_default() } else { None },
             windows: WindowUse::default(),
-            places: ledger::places(state.dropped, width, height),
+            places: ledger::places(state.dropped, settings.width, settings.height),
             empty_pixels: empty_pixels(film, |task| state.shard.owns(task) && state.samples[task] > 0),
             filled_pixels,
             error,
-            blurred: told.blurred,
-            audit: told.audited,
+            blurred: report.blurred,
+            audit: report.audited,
             memory: Vec::new(),
             memory_peak: 0,
-            unsaved: kept.failed().into_iter().chain(renderer.kept().and_then(Kept::failed)).collect(),
-            ending: if interrupted { Ending::Interrupted } else { lost.unwrap_or(Ending::Done) },
+            unsaved: self.kept.failed().into_iter().chain(renderer.kept().and_then(Kept::failed)).collect(),
+            ending: if interrupted { Ending::Interrupted } else { self.lost.unwrap_or(Ending::Done) },
         })
     }
-}
-
-/// What is known after `told`, where the audit alone keeps a picture from its end: it goes on as long as it `may` take so many
-/// seconds more.
-fn go_on_alone(
-    audit: &mut Audit,
-    rounds: &Rounds,
-    mut told: Told,
-    renderer: &mut dyn Renderer,
-    (workers, state): (&Workers, &RenderState),
-    may: &mut dyn FnMut(f64) -> bool,
-) -> Result<Told, RenderError> {
-    while told.audited.as_ref().is_some_and(|audited| rounds.waits_for(audited)) {
-        let mut went = false;
-        renderer.lend_photons(&mut |photons| {
-            went = audit.go_on(workers, photons, may)?;
-            Ok(())
-        })?;
-        if !went {
-            break;
-        }
-        told = Told::beside(told.noise, workers, state, |noise| audit.verdict(workers, &state.film, noise));
-    }
-    Ok(told)
 }
 
 /// Samples of a tile between two looks at the clock.
