@@ -149,10 +149,10 @@ fn greatest_common_divisor(a: usize, b: usize) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::drive::canvas::Shard;
     use core::sync::atomic::AtomicBool;
     use halflight_core::Rgb;
-    use halflight_core::film::{Dropped, Film};
+    use halflight_core::film::Dropped;
+    use halflight_core::method::Shard;
 
     /// Runs `work` with a crew of `threads` on a film of 40 x 40 pixels, 9 tiles, that gets `target` samples.
     fn crew<T>(
@@ -162,9 +162,9 @@ mod tests {
         work: impl FnOnce(&mut Crew, &mut [Vec<Line>]) -> T,
     ) -> T {
         let workers = Workers::new(Some(threads)).unwrap();
-        let mut lines = vec![Line([0; 64]); Film::footprint(40, 40).bytes() / 64];
-        let film = Film::new(40, 40, &mut Arena::new(bytemuck::cast_slice_mut(&mut lines))).unwrap();
-        let mut canvas = Canvas::new(film, Shard::WHOLE);
+        let mut lines = vec![Line([0; 64]); RenderState::footprint(40, 40).bytes() / 64];
+        let mut arena = Arena::new(bytemuck::cast_slice_mut(&mut lines));
+        let mut canvas = RenderState::new(40, 40, Shard::WHOLE, &mut arena).unwrap();
         let interrupt = AtomicBool::new(cut);
         let round =
             Round { target, step: 2, deadline: None, watch: &Watch::until(&interrupt), is_first: false };
