@@ -31,7 +31,7 @@ fn deviation(a: &Image, b: &Image) -> f64 {
 }
 
 fn photons(result: &RenderResult) -> PhotonUse {
-    PhotonUse { seconds: 0.0, ..result.photons.unwrap() }
+    result.photons.unwrap()
 }
 
 fn all(result: &RenderResult) -> MapUse {

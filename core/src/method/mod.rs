@@ -6,10 +6,14 @@
 
 pub mod executor;
 pub mod path;
+pub mod photon_map_store;
+pub mod photon_use;
 pub mod pilot;
 pub mod round;
 
 pub use executor::{Executor, Loop, Passed, Worker};
+pub use photon_map_store::{PhotonMapPair, PhotonMapStore};
+pub use photon_use::{MapUse, PhotonUse};
 pub use round::{RenderState, Round, Shard};
 
 use crate::Level;

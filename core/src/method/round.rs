@@ -103,9 +103,14 @@ impl<E: Executor> Round<'_, '_, E> {
         P: Iterator<Item: Send> + Send,
         T: Fn(usize, P::Item, &mut Worker) -> Result<Counters, OutOfMemory> + Sync,
     {
-        let Passed { counters, is_complete } = self.executor.pass(pieces, task)?;
-        self.state.counters += counters;
-        Ok(is_complete)
+        let passed = self.executor.pass(pieces, task)?;
+        Ok(self.count(passed))
+    }
+
+    /// Counts the work of a pass as the picture's. Returns whether the pass is complete.
+    pub fn count(&mut self, passed: Passed) -> bool {
+        self.state.counters += passed.counters;
+        passed.is_complete
     }
 
     /// Brings every tile of the shard to `end` samples per pixel, or to the round's target if that is less. `sample`

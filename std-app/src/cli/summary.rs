@@ -55,7 +55,7 @@ pub(super) fn text(run: &Run, report: Option<&Path>) -> String {
         settings.level.name(),
     ));
     lines.extend(result.cache.as_ref().map(|cache| cached(cache, settings.cache.metric)));
-    lines.extend(result.photons.iter().flat_map(photon_maps));
+    lines.extend(result.photons.iter().flat_map(|photons| photon_maps(photons, result.seconds.photons)));
     if result.windows.lacks_memory {
         lines.push(
             "light  not enough memory for environment visibility sampling: sky light may be noisier".into(),
@@ -100,13 +100,13 @@ fn cached(cache: &CacheUse, metric: Metric) -> String {
 }
 
 /// The lines of photon maps.
-fn photon_maps(photons: &PhotonUse) -> Vec<String> {
+fn photon_maps(photons: &PhotonUse, seconds: f64) -> Vec<String> {
     let kinds = [(photons.global, "photon"), (photons.caustic, "caustic photon")];
     let stored: Vec<_> = kinds.iter().filter_map(|(map, name)| Some(map_text(map.as_ref()?, name))).collect();
     let mut lines = vec![format!(
         "light  {} in {}: {}",
         plural(photons.maps, "map"),
-        readable_seconds(photons.seconds),
+        readable_seconds(seconds),
         stored.join("; "),
     )];
     for (map, name) in [(photons.global, ""), (photons.caustic, " of caustics")] {

@@ -199,6 +199,8 @@ pub struct Seconds {
     /// Tracing paths, before a resumption too; without comparisons with a reference, checkpoints and calls of
     /// `progress`.
     pub render: f64,
+    /// Tracing photons and building their maps, a part of that; not before a resumption.
+    pub photons: f64,
     /// Estimating the noise, a part of that; not before a resumption.
     pub estimate: f64,
 }

@@ -295,7 +295,7 @@ impl<'a> Progressive<'a> {
     ) -> Result<RenderResult, RenderError> {
         let Picture { method, stage, state, clock, sketch, .. } = &self.picture;
         let Stage { settings, workers, .. } = *stage;
-        let render = clock.seconds();
+        let (render, photons) = (clock.seconds(), workers.seconds_of("photons"));
         let error = report.error();
         if let Some(last) = self.history.last_mut() {
             last.error = error;
@@ -312,7 +312,7 @@ impl<'a> Progressive<'a> {
             variance: map(film, |pixel| pixel.variance().to_array()),
             samples: by_rows(film).map(|pixel| pixel.count()).collect(),
             threads: workers.count(),
-            seconds: Seconds { build: 0.0, render, estimate: self.estimated },
+            seconds: Seconds { build: 0.0, render, photons, estimate: self.estimated },
             counters: state.counters,
             reuse: renderer.reuse(),
             caustics: renderer.caustics(),

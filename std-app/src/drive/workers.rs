@@ -20,10 +20,9 @@ use std::sync::Mutex;
 
 /// A pool of threads.
 pub(super) struct Workers<'w> {
-    pool: ThreadPool,
     /// When what they do must end.
     pub(super) watch: Watch<'w>,
-    /// Forks on their threads.
+    /// The pool, and forks on it.
     pub(super) fork: Fork,
     /// Seconds of each phase of the render.
     phases: Mutex<Vec<(&'static str, f64)>>,
@@ -34,7 +33,7 @@ impl<'w> Workers<'w> {
     pub(super) fn new(threads: Option<usize>) -> Result<Self, RenderError> {
         let pool = ThreadPoolBuilder::new().num_threads(threads.unwrap_or(0)).build();
         let phases = Mutex::default();
-        pool.map(|pool| Self { fork: Fork, pool, watch: Watch::default(), phases })
+        pool.map(|pool| Self { fork: Fork(pool), watch: Watch::default(), phases })
             .map_err(|error| RenderError::Threads(error.to_string()))
     }
 
@@ -60,7 +59,7 @@ impl<'w> Workers<'w> {
 
     /// How many there are.
     pub(super) fn count(&self) -> usize {
-        self.pool.current_num_threads()
+        self.fork.0.current_num_threads()
     }
 
     /// Builds the hierarchy over `mesh` on all threads.
@@ -70,7 +69,7 @@ impl<'w> Workers<'w> {
         level: Level,
         arena: &mut Arena<'m>,
     ) -> Result<Bvh<'m>, OutOfMemory> {
-        self.pool.install(|| Bvh::build_with(mesh, arena, level, &Fork))
+        self.fork.0.install(|| Bvh::build_with(mesh, arena, level, &self.fork))
     }
 
     /// What the tiles of `film` tell of its error; `None` for a black picture.
@@ -86,7 +85,7 @@ impl<'w> Workers<'w> {
             one
         };
         let count = tiles.len();
-        Some(self.pool.install(|| {
+        Some(self.fork.0.install(|| {
             let asked = tiles.clone().enumerate().filter(|(tile, _)| BrightnessClasses::asks(*tile, count));
             let alike =
                 asked.fold(BrightnessClasses::default, learn).reduce(BrightnessClasses::default, both);
@@ -99,7 +98,7 @@ impl<'w> Workers<'w> {
     pub(super) fn blur(&self, film: &Film) -> Option<BiasEstimate> {
         let mean = self.mean(film)?;
         let tiles = film.pixels().par_chunks(PIXELS_PER_TILE);
-        let tiles: Vec<_> = self.pool.install(|| tiles.map(|tile| TileBlur::of(tile, mean)).collect());
+        let tiles: Vec<_> = self.fork.0.install(|| tiles.map(|tile| TileBlur::of(tile, mean)).collect());
         BiasEstimate::of_blur(tiles.into_iter())
     }
 
@@ -107,7 +106,8 @@ impl<'w> Workers<'w> {
     pub(super) fn mean(&self, film: &Film) -> Option<f64> {
         let tiles = film.pixels().par_chunks(PIXELS_PER_TILE);
         let mut light = TileLight::default();
-        self.pool
+        self.fork
+            .0
             .install(|| tiles.map(TileLight::of).collect::<Vec<_>>())
             .into_iter()
             .for_each(|tile| light += tile);
@@ -159,7 +159,7 @@ impl<'w> Workers<'w> {
 
     /// Builds the map over the first `count` of `photons` on all cores.
     pub(super) fn build_photons<'m>(&self, photons: Photons<'m>, count: usize) -> PhotonMap<'m> {
-        self.pool.install(|| photons.build_with(count, &Fork))
+        self.fork.0.install(|| photons.build_with(count, &self.fork))
     }
 
     /// Runs `work` once on every thread, each with working memory of its own.
@@ -169,7 +169,7 @@ impl<'w> Workers<'w> {
         work: impl Fn(&mut Arena) -> Result<T, OutOfMemory> + Sync,
     ) -> Result<Vec<T>, OutOfMemory> {
         let one = |lines: &mut Vec<Line>| work(&mut Arena::new(bytemuck::cast_slice_mut(lines)));
-        self.pool.install(|| scratch.par_iter_mut().with_max_len(1).map(one).collect())
+        self.fork.0.install(|| scratch.par_iter_mut().with_max_len(1).map(one).collect())
     }
 
     /// A pass: task `i` writes to the `i`th piece of `size` values of `out`. Returns what they counted, and whether all
@@ -243,12 +243,12 @@ impl<'w> Workers<'w> {
     }
 }
 
-/// Forks on the pool that runs it.
-pub(super) struct Fork;
+/// Forks on the threads of a pool.
+pub(super) struct Fork(ThreadPool);
 
 impl ForkJoin for Fork {
     fn join(&self, a: impl FnOnce() + Send, b: impl FnOnce() + Send) {
-        rayon::join(a, b);
+        self.0.join(a, b);
     }
 }
 

@@ -88,7 +88,7 @@ fn most(run: &Run) -> Value {
                 "global": photons.global.map(map),
                 "caustic": photons.caustic.map(map),
                 "irradiances": photons.irradiances,
-                "seconds": photons.seconds,
+                "seconds": result.seconds.photons,
             })
         }),
         "left_out": left_out,

@@ -18,6 +18,9 @@ const STANDS_ON: f32 = 1e-6;
 /// Rays across and down that look for the nearest.
 const GLANCES: u32 = 32;
 
+/// How fast radii shrink, a: with 2/3 the variance and the squared bias both fall as n^(-2/3).
+const ALPHA: f64 = 2.0 / 3.0;
+
 /// The radii of discs: as far on a surface as so many pixels at that distance from the eye.
 #[derive(Clone, Copy, Debug)]
 pub struct RadiusSchedule {
@@ -51,6 +54,18 @@ impl RadiusSchedule {
         Self { radius: pixels * self.radius, ..self }
     }
 
+    /// The same, of so many `pixels` in radius for the first sample, for the sample after `samples` more of a
+    /// progressive method.
+    pub fn after(self, pixels: f64, samples: u32) -> Self {
+        self.of_pixels((pixels * libm::sqrt(Self::shrinkage(samples))) as f32)
+    }
+
+    /// Fraction of the first squared radius that is left after `samples` (Knaus and Zwicker 2011):
+    /// r² (i + 1) = r² (i) (i + a) / (i + 1).
+    pub fn shrinkage(samples: u32) -> f64 {
+        (1..=samples).map(f64::from).fold(1.0, |squared, i| squared * (i + ALPHA) / (i + 1.0))
+    }
+
     /// The radius around `place`.
     #[inline]
     pub fn radius(&self, place: Vec3) -> f32 {
@@ -69,5 +84,20 @@ impl RadiusSchedule {
     pub(in crate::transport) fn reach(&self, place: Vec3, paths: f32) -> f32 {
         let radius = PI * self.radius(place);
         radius * radius * paths
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn radii_shrink_as_a_power_of_the_samples() {
+        let shrinkage = RadiusSchedule::shrinkage;
+        assert_eq!(shrinkage(0), 1.0);
+        assert!((shrinkage(1) - (1.0 + ALPHA) / 2.0).abs() < 1e-12);
+        // Γ(n + a) / (Γ(1 + a) Γ(n + 1)), which goes like n^(a - 1) / Γ(5/3).
+        let expected = 64f64.powf(ALPHA - 1.0) / 0.902_745_293;
+        assert!((shrinkage(63) / expected - 1.0).abs() < 0.005, "{}", shrinkage(63));
     }
 }

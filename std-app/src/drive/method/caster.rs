@@ -4,8 +4,6 @@
 
 use super::caustic_look::Alone;
 use super::photon_view::{self, PhotonView};
-use super::photons::{MapUse, PhotonUse};
-use super::sppm::shrunk;
 use super::{Borrower, Stage};
 use crate::drive::RenderError;
 use crate::drive::crew::{Crew, Task};
@@ -15,6 +13,7 @@ use crate::drive::workers::Workers;
 use halflight_core::bsdf::Features;
 use halflight_core::light::EmissionSampler;
 use halflight_core::memory::{Arena, Line, OutOfMemory};
+use halflight_core::method::{MapUse, PhotonUse};
 use halflight_core::photon::{MapShape, Photon, PhotonMap, Photons};
 use halflight_core::transport::caustics::tracer::{CausticPhotonTracer, PATHS, ROOM};
 use halflight_core::transport::photon_mapping::deposit::{PhotonFilter, PhotonTracerSettings};
@@ -143,9 +142,7 @@ impl<'a> Caster<'a> {
         let tasks = wanted.min(memory.available().saturating_sub(others) / maps / of_task).max(1);
         let footprint = Photons::footprint(tasks * ROOM);
         let photons = [memory.take("photons", footprint)?, memory.take("photons", footprint)?];
-        let [wanted, given] = [wanted, tasks].map(|tasks| (tasks * PATHS) as u64);
-        let map = MapUse { wanted, given, ..MapUse::default() };
-        let used = PhotonUse { caustic: Some(map), ..PhotonUse::default() };
+        let used = PhotonUse { caustic: Some(MapUse::of_tasks(wanted, tasks)), ..PhotonUse::default() };
         Ok(Self { stage: *stage, cast, beside_records, photons, each, used, kept: None })
     }
 
@@ -293,7 +290,7 @@ fn shoot<'m, F: Features>(
         used.shot += u64::from(shooter.paths());
         used.stored += map.len() as u64;
     }
-    used.seconds += start.elapsed().as_secs_f64();
+    workers.spent("photons", start.elapsed().as_secs_f64());
     Ok(Some(map))
 }
 
@@ -306,8 +303,7 @@ pub(super) fn shooter<'a, F: Features>(
     beside_records: bool,
 ) -> (CausticPhotonTracer<'a, F>, RadiusSchedule) {
     let Stage { scene, bvh, lights, settings, .. } = *stage;
-    let pixels = FIRST_RADIUS * shrunk(sample / 2).sqrt();
-    let discs = discs.of_pixels(pixels as f32);
+    let discs = discs.after(FIRST_RADIUS, sample / 2);
     let max_depth = path_settings(settings).max_depth;
     let shot = PhotonTracerSettings {
         keep: PhotonFilter::Caustic,

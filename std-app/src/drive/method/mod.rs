@@ -25,10 +25,11 @@ mod wrong;
 pub use cache_settings::{CacheSettings, CacheUse};
 pub use caustics::CausticUse;
 pub(super) use caustics::unseen;
+pub use halflight_core::method::{MapUse, PhotonUse};
 pub(super) use irradiance_cache::LEAST_PIXELS;
 pub(super) use overture::{Growing, Overture};
 pub use photon_view::{MapView, PhotonView};
-pub use photons::{MapUse, PhotonSettings, PhotonUse};
+pub use photons::PhotonSettings;
 
 use super::crew::Crew;
 use super::kept::Kept;

@@ -7,7 +7,7 @@
 //! group to group as those of `sppm`; the blur of the global map stays, behind a bounce.
 
 use super::photon_view::PhotonView;
-use super::photons::{Laboratory, Lamps, PhotonUse, Shelf, scratch};
+use super::photons::{Laboratory, Lamps, Shelf, scratch};
 use super::{Method, Renderer, Stage};
 use crate::drive::RenderError;
 use crate::drive::audit::Audit;
@@ -15,6 +15,7 @@ use crate::drive::crew::Crew;
 use crate::drive::memory::Memory;
 use halflight_core::bsdf::Features;
 use halflight_core::memory::Line;
+use halflight_core::method::PhotonUse;
 use halflight_core::transport::{PathIntegrator, path::WAVE};
 
 /// Samples that share two sets of maps: enough that maps are the smaller part of the work.

@@ -12,6 +12,7 @@ use crate::drive::workers::Workers;
 use crate::drive::{RenderError, Settings};
 use halflight_core::bsdf::Features;
 use halflight_core::memory::{Arena, Footprint, Line};
+use halflight_core::method::{MapUse, PhotonUse};
 use halflight_core::photon::{Kernel, MapShape, Photon, PhotonMap, Photons};
 use halflight_core::transport::photon_mapping::deposit::{
     PATHS, PhotonFilter, PhotonTracer, PhotonTracerSettings, ROOM,
@@ -31,39 +32,6 @@ pub struct PhotonSettings {
     pub global: Option<u32>,
     /// Light paths of a map of caustics; `None`: by the number of pixels.
     pub caustic: Option<u32>,
-}
-
-/// What became of the maps of one kind.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct MapUse {
-    /// Light paths wanted for each map.
-    pub wanted: u64,
-    /// Light paths that there was memory for.
-    pub given: u64,
-    /// Light paths shot, for all maps.
-    pub shot: u64,
-    /// Photons that they left.
-    pub stored: u64,
-    /// What share of light paths leaves photons that count, where they are seen or gathered for what is, by a first look;
-    /// `None` where nobody looked.
-    pub seen: Option<f64>,
-    /// The same by the power of lights, where they are chosen by what they bring instead.
-    pub by_power: Option<f64>,
-}
-
-/// What became of photons.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct PhotonUse {
-    /// Maps made.
-    pub maps: u64,
-    /// Of reflected light, or of all light; `None` where paths find that.
-    pub global: Option<MapUse>,
-    /// Of caustics alone; `None` where nothing in the scene makes any.
-    pub caustic: Option<MapUse>,
-    /// Irradiances worked out beforehand.
-    pub irradiances: u64,
-    /// Seconds of shooting and building.
-    pub seconds: f64,
 }
 
 /// Pixels of the picture for each light path of a map.
@@ -216,11 +184,9 @@ impl<'a> Laboratory<'a> {
         };
         let shelves = [shelf(memory)?, shelf(memory)?];
         let used = |aim: &Aim, wanted: usize, given: usize| MapUse {
-            wanted: (wanted * PATHS) as u64,
-            given: (given * PATHS) as u64,
             seen: aim.seen,
             by_power: aim.by_power,
-            ..MapUse::default()
+            ..MapUse::of_tasks(wanted, given)
         };
         let used = PhotonUse {
             global: Some(used(&aim, wanted[0], global)),
@@ -306,7 +272,7 @@ impl<'a> Laboratory<'a> {
             used.shot += (self.caustic * PATHS) as u64;
             used.stored += map.len() as u64;
         }
-        used.seconds += start.elapsed().as_secs_f64();
+        self.stage.workers.spent("photons", start.elapsed().as_secs_f64());
         Ok(true)
     }
 

@@ -9,7 +9,7 @@
 
 use super::aiming::{Aim, Wanted};
 use super::photon_view::{self, PhotonView};
-use super::photons::{Drawer, MapUse, PhotonUse};
+use super::photons::Drawer;
 use super::{Method, Renderer, Stage};
 use crate::drive::RenderError;
 use crate::drive::audit::Audit;
@@ -18,6 +18,7 @@ use crate::drive::memory::Memory;
 use crate::drive::run::path_settings;
 use halflight_core::bsdf::Features;
 use halflight_core::memory::{Arena, Line};
+use halflight_core::method::{MapUse, PhotonUse};
 use halflight_core::photon::{PhotonMap, Photons};
 use halflight_core::transport::photon_mapping::deposit::{
     PATHS, PhotonFilter, PhotonTracer, PhotonTracerSettings, ROOM,
@@ -30,9 +31,6 @@ pub(super) const FIRST_RADIUS: f64 = 3.0;
 
 /// Photons that a disc of the first sample needs, if they lie evenly: where they crowd, it is smaller.
 const ENOUGH: f64 = 12.0;
-
-/// How fast radii shrink, a: with 2/3 the variance and the squared bias fall alike, as n^(-2/3).
-const ALPHA: f64 = 2.0 / 3.0;
 
 /// Light paths for a sample: one for each pixel of the picture, but no fewer and no more than these.
 const FEWEST_PATHS: usize = 16 * PATHS;
@@ -74,9 +72,8 @@ impl<'a, F: Features> ProgressivePhotons<'a, F> {
         let tasks = wanted.min(memory.available().saturating_sub(others) / of_task).max(1);
         let photons = Drawer::new(tasks * ROOM, memory)?;
         let tracer = stage.paths::<F>(settings.seed);
-        let [wanted, given] = [wanted, tasks].map(|tasks| (tasks * PATHS) as u64);
         let (seen, by_power) = (aim.seen, aim.by_power);
-        let global = Some(MapUse { wanted, given, seen, by_power, ..MapUse::default() });
+        let global = Some(MapUse { seen, by_power, ..MapUse::of_tasks(wanted, tasks) });
         let used = PhotonUse { global, ..PhotonUse::default() };
         Ok(Self {
             stage: *stage,
@@ -124,7 +121,7 @@ impl<F: Features> Renderer for ProgressivePhotons<'_, F> {
                     used.shot += *paths as u64;
                     used.stored += photons.map()?.map_or(0, |map| map.len()) as u64;
                 }
-                used.seconds += start.elapsed().as_secs_f64();
+                stage.workers.spent("photons", start.elapsed().as_secs_f64());
             }
             let Some(map) = photons.map()? else { return Ok(()) };
             let light = progressive(&map, *discs, sample / 2);
@@ -152,26 +149,6 @@ pub(super) fn progressive<'a>(
     discs: RadiusSchedule,
     samples: u32,
 ) -> PhotonLight<'a> {
-    let shrunk = shrunk(samples);
-    let pixels = FIRST_RADIUS * shrunk.sqrt();
-    PhotonLight::new(map, discs.of_pixels(pixels as f32)).with_enough((ENOUGH * shrunk) as f32)
-}
-
-/// What is left of the squared radius after `samples`.
-pub(super) fn shrunk(samples: u32) -> f64 {
-    (1..=samples).map(f64::from).fold(1.0, |squared, i| squared * (i + ALPHA) / (i + 1.0))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn radii_shrink_as_a_power_of_the_samples() {
-        assert_eq!(shrunk(0), 1.0);
-        assert!((shrunk(1) - (1.0 + ALPHA) / 2.0).abs() < 1e-12);
-        // Γ(n + a) / (Γ(1 + a) Γ(n + 1)), which goes like n^(a - 1) / Γ(5/3).
-        let expected = 64f64.powf(ALPHA - 1.0) / 0.902_745_293;
-        assert!((shrunk(63) / expected - 1.0).abs() < 0.005, "{}", shrunk(63));
-    }
+    let enough = ENOUGH * RadiusSchedule::shrinkage(samples);
+    PhotonLight::new(map, discs.after(FIRST_RADIUS, samples)).with_enough(enough as f32)
 }

@@ -16,7 +16,7 @@ pub(super) fn section(run: &Run) -> String {
     let view = run.result.photon_view.as_ref();
     let mut facts = vec![("Maps", grouped(photons.maps))];
     if photons.maps > 0 {
-        facts.push(("Shooting and building", readable_seconds(photons.seconds)));
+        facts.push(("Shooting and building", readable_seconds(run.result.seconds.photons)));
     }
     if let Some(share) = caustics.share {
         facts.push(("Light that they bring, by a first look", parts::percent(share)));

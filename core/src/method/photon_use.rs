@@ -1,0 +1,48 @@
+//! Statistics of photon maps, for reports.
+
+use crate::transport::photon_mapping::deposit::PATHS;
+
+/// Maps of one kind.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct MapUse {
+    /// Light paths wanted for each map.
+    pub wanted: u64,
+    /// Light paths that there was memory for.
+    pub given: u64,
+    /// Light paths traced, for all maps.
+    pub shot: u64,
+    /// Photons that they left.
+    pub stored: u64,
+    /// Fraction of light paths whose photons reach visible surfaces, or those that light them, by a pilot; `None`
+    /// without a pilot.
+    pub seen: Option<f64>,
+    /// The same with lights chosen by power; `None` where they are.
+    pub by_power: Option<f64>,
+}
+
+impl MapUse {
+    /// Maps of `given` tasks of light paths each, of `wanted` ones.
+    pub fn of_tasks(wanted: usize, given: usize) -> Self {
+        let [wanted, given] = [wanted, given].map(|tasks| (tasks * PATHS) as u64);
+        Self { wanted, given, ..Self::default() }
+    }
+
+    /// Counts a map of `paths` light paths that left `stored` photons.
+    pub fn add(&mut self, paths: u64, stored: usize) {
+        self.shot += paths;
+        self.stored += stored as u64;
+    }
+}
+
+/// All photon maps of a picture.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct PhotonUse {
+    /// Maps made; a global map and its caustic map count as one.
+    pub maps: u64,
+    /// Maps of reflected light, or of all light; `None` where paths find that.
+    pub global: Option<MapUse>,
+    /// Maps of caustics alone; `None` where the scene makes none.
+    pub caustic: Option<MapUse>,
+    /// Precomputed irradiances.
+    pub irradiances: u64,
+}
