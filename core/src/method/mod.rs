@@ -47,7 +47,7 @@ impl<'a> RenderContext<'a> {
 
     /// The scene for rays.
     pub fn scene_context<F: Features>(&self) -> SceneContext<'a, F> {
-        SceneContext::new(self.scene, self.bvh, self.level)
+        SceneContext::new(self.scene, self.bvh, self.lights, self.level)
     }
 
     /// Kernel radii of one pixel.

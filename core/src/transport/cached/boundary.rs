@@ -76,7 +76,7 @@ impl<F: Features> PathIntegrator<'_, F> {
         });
         let mut hits = [Hit::NONE; 2 * RING];
         counters.rays += rays.len() as u64;
-        self.bvh.nearest_batch(self.level, &rays, Coherence::Incoherent, &mut hits);
+        self.context.nearest_batch(&rays, Coherence::Incoherent, &mut hits);
         for hit in hits.iter_mut().filter(|hit| hit.triangle == place.triangle) {
             *hit = Hit::NONE;
         }

@@ -221,7 +221,8 @@ impl<F: Features> PathIntegrator<'_, F> {
             first += count;
         }
         let variance = strata.hemisphere().map_or(0.0, |hemisphere| hemisphere.variance());
-        let derivatives = strata.hemisphere().and_then(|h| metric.metric.derivatives(self.level, flux, &h));
+        let derivatives =
+            strata.hemisphere().and_then(|h| metric.metric.derivatives(self.context.level, flux, &h));
         let Some(derivatives) = derivatives.filter(|found| found.irradiance.is_finite()) else {
             counters.dropped.nan += 1;
             return Ok(None);
@@ -265,15 +266,16 @@ impl<F: Features> PathIntegrator<'_, F> {
         if let Some(slot) = strata.inverse_distance.get_mut(stratum) {
             *slot = 1.0 / hit.t;
         }
-        let triangle = self.scene.mesh.triangles.get(hit.triangle as usize);
-        let shines = match triangle.and_then(|triangle| self.scene.materials.get(triangle.material as usize))
+        let triangle = self.context.scene.mesh.triangles.get(hit.triangle as usize);
+        let shines = match triangle
+            .and_then(|triangle| self.context.scene.materials.get(triangle.material as usize))
         {
             Some(material) => material.emits(),
-            None => self.scene.environment.is_some(),
+            None => self.context.scene.environment.is_some(),
         };
         strata.shining += u32::from(shines);
         if let Some(slot) = strata.normals.get_mut(stratum) {
-            let [a, b, c] = self.scene.mesh.corners(hit.triangle);
+            let [a, b, c] = self.context.scene.mesh.corners(hit.triangle);
             *slot = frame.to_local((b - a).cross(c - a).normalize_or_zero()).to_array();
         }
     }

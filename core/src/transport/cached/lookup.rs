@@ -71,7 +71,7 @@ impl<'a, F: Features> PathIntegrator<'a, F> {
         let open = |(point, sample): (&SurfacePoint, u32)| {
             (QueryPoint::open(point.position, point.frame.normal), sample)
         };
-        caches.ask(self.level, &askers.map(|asker| asker.map(open)), &mut known, &mut exposed);
+        caches.ask(self.context.level, &askers.map(|asker| asker.map(open)), &mut known, &mut exposed);
         if exposed != [0.0; BLOCK] {
             // Those that something hangs close over ask once more.
             let points = askers.map(|asker| asker.map(|(point, _)| point));
@@ -80,7 +80,7 @@ impl<'a, F: Features> PathIntegrator<'a, F> {
                 let (asker, sample) = askers[i].map(open).filter(|_| within[i] < exposed[i])?;
                 Some((QueryPoint { within: within[i], ..asker }, sample))
             });
-            caches.ask(self.level, &again, &mut known, &mut exposed);
+            caches.ask(self.context.level, &again, &mut known, &mut exposed);
         }
         for (met, known) in block.iter_mut().zip(known).take(range.len()) {
             if let Some(met) = met {

@@ -68,7 +68,7 @@ impl<F: Features> PathIntegrator<'_, F> {
 
     /// Looks how high what hangs over each of `places` is, as far as records reach.
     pub fn look_up(&self, places: &mut [GatherPoint], counters: &mut Counters) {
-        let length = MOST * self.bvh.bounds().diagonal();
+        let length = MOST * self.context.bvh.bounds().diagonal();
         for place in places.iter_mut().filter(|place| place.is_some()) {
             counters.rays += WAYS as u64;
             let normal = Vec3::from(place.geometric_normal);
@@ -86,7 +86,7 @@ impl<F: Features> PathIntegrator<'_, F> {
             Ray::segment(probe.origin, direction, probe.length)
         });
         let mut hits = [Hit::NONE; WAYS];
-        self.bvh.nearest_batch(self.level, &rays, Coherence::Incoherent, &mut hits);
+        self.context.nearest_batch(&rays, Coherence::Incoherent, &mut hits);
         let hanging = hits.iter().filter(|hit| self.hangs(hit, probe.normal));
         hanging.map(|hit| hit.t).fold(f32::INFINITY, f32::min)
     }
@@ -94,11 +94,11 @@ impl<F: Features> PathIntegrator<'_, F> {
     /// Whether what was met hangs over a surface of that normal and hides light. Glass and what is cut out do
     /// not.
     fn hangs(&self, hit: &Hit, normal: Vec3) -> bool {
-        let mesh = &self.scene.mesh;
+        let mesh = &self.context.scene.mesh;
         let Some(triangle) = mesh.triangles.get(hit.triangle as usize) else { return false };
         let [a, b, c] = mesh.corners(hit.triangle);
         let cos = (b - a).cross(c - a).normalize_or_zero().dot(normal);
-        let material = self.scene.materials.get(triangle.material as usize);
+        let material = self.context.scene.materials.get(triangle.material as usize);
         cos.abs() > STEEPEST
             && material.is_some_and(|material| {
                 !matches!(material.surface, Surface::Dielectric { .. }) && !material.has_cutout()
@@ -122,7 +122,7 @@ impl<F: Features> PathIntegrator<'_, F> {
         };
         let flat = FLAT * place.error.max(FLATTEST * reach);
         let mut noted = *record;
-        let is_whole = self.bvh.overlapping(center - half, center + half, |corners| {
+        let is_whole = self.context.bvh.overlapping(center - half, center + half, |corners| {
             if let Some(overhang) = Overhang::of(corners.map(local), reach, flat) {
                 let Overhang { sectors, from, height } = overhang;
                 let close = if CLOSE * height < least { 0.0 } else { CLOSE * height };

@@ -102,8 +102,8 @@ impl<F: Features> PathIntegrator<'_, F> {
                 counters.rays += 1;
             }
         }
-        self.bvh.nearest_batch(self.level, &rays, Coherence::Incoherent, &mut hits);
-        let pixel = 2.0 * self.scene.camera.tan_half_fov / height as f32;
+        self.context.nearest_batch(&rays, Coherence::Incoherent, &mut hits);
+        let pixel = 2.0 * self.context.scene.camera.tan_half_fov / height as f32;
         for (i, place) in out.iter_mut().enumerate().take(PIXELS) {
             *place = GatherPoint::NONE;
             if let Some((x, y)) = order.pixel(first + i as u64) {
@@ -116,7 +116,7 @@ impl<F: Features> PathIntegrator<'_, F> {
 
     /// Whether anything may be seen in a rough surface.
     pub fn has_rough_surfaces(&self) -> bool {
-        self.scene.materials.iter().any(|material| material.surface.may_be_rough())
+        self.context.scene.materials.iter().any(|material| material.surface.may_be_rough())
     }
 
     /// The diffuse point that a camera ray comes to from `hit` on, and the width of a pixel there, which is `spread`
@@ -129,14 +129,14 @@ impl<F: Features> PathIntegrator<'_, F> {
         sampler: &Sampler,
         counters: &mut Counters,
     ) -> Option<(SurfacePoint<'_>, f32)> {
-        let context = self.context();
+        let context = self.context;
         let mut segment = Segment::first(ray);
         let (mut width, mut seen) = (0.0, Via::Specular);
         for segments in 1..=MOST_BOUNCES {
             let opacity = |n| sampler.single(dimension::CROSSING + n);
             let (met, point) = context.surface_from(hit, &mut segment, opacity, counters)?;
             width += spread * segment.length;
-            let bsdf = Bsdf::at::<F>(self.scene, point.material, point.uv, point.front);
+            let bsdf = self.context.bsdf_at(&point);
             if let Bsdf::Diffuse(_) = bsdf {
                 let smooth = point.frame.normal.dot(point.geometric_normal) > SMOOTH;
                 return (smooth && seen == sight).then_some((point, width));
@@ -158,7 +158,7 @@ impl<F: Features> PathIntegrator<'_, F> {
             }
             segment = segment.onward(&point, &met, next);
             counters.rays += 1;
-            hit = self.bvh.nearest(self.level, &segment.ray);
+            hit = self.context.nearest(&segment.ray);
         }
         None
     }

@@ -36,15 +36,15 @@
 //! each other ends, as its light is the record's. A path from the eye asks photons at each rough surface, but for those to
 //! which mirrors and glass lead from one whose photons know them.
 
+use crate::Rgb;
 use crate::bsdf::{Bsdf, Features};
-use crate::bvh::Bvh;
 use crate::light::EmissionSampler;
 use crate::photon::{Kernel, PhotonMap, QueryDisc, Uniform};
-use crate::scene::{Scene, SurfacePoint};
+use crate::scene::SurfacePoint;
 use crate::transport::path::state::{MergeState, PathState};
 use crate::transport::photon_mapping::density::{Gathered, Light, reflected};
 use crate::transport::photon_mapping::radius::RadiusSchedule;
-use crate::{Level, Rgb};
+use crate::transport::walk::context::SceneContext;
 use glam::Vec3;
 
 /// The least that the radius of a disc may be, times that of the disc from where something rough throws the light.
@@ -85,12 +85,12 @@ pub(in crate::transport) struct ChainLink<'p> {
 impl ChainLink<'_> {
     /// The density with which who comes from `far` goes on to `near`, times the ratio of the cosines of `far` and of
     /// `near`. Over the density of the other way it is ρ.
-    pub(in crate::transport) fn reverse<F: Features>(&self, scene: &Scene) -> f32 {
-        self.density::<F>(scene) * (self.far.z / self.near.z).abs()
+    pub(in crate::transport) fn reverse<F: Features>(&self, context: &SceneContext<F>) -> f32 {
+        self.density(context) * (self.far.z / self.near.z).abs()
     }
 
     /// The density alone.
-    pub(in crate::transport) fn density<F: Features>(&self, scene: &Scene) -> f32 {
+    pub(in crate::transport) fn density<F: Features>(&self, context: &SceneContext<F>) -> f32 {
         let Self { point, bsdf, near, far, coat_alone } = *self;
         if F::GLOSSY && coat_alone {
             return bsdf.evaluate_apart::<F>(far, near)[1].1;
@@ -99,7 +99,7 @@ impl ChainLink<'_> {
             return bsdf.evaluate::<F>(far, near).1;
         }
         let turned = |way: Vec3| Vec3::new(way.x, way.y, -way.z);
-        let behind = Bsdf::at::<F>(scene, point.material, point.uv, !point.front);
+        let behind = Bsdf::at::<F>(context.scene, point.material, point.uv, !point.front);
         behind.evaluate::<F>(turned(far), turned(near)).1
     }
 }
@@ -183,9 +183,9 @@ impl<'a> CausticMerging<'a> {
     #[inline]
     pub(in crate::transport) fn reflected<F: Features>(
         &self,
-        (bvh, level): (&Bvh, Level),
+        context: &SceneContext<F>,
         sample: u32,
-        (point, bsdf, apart): (&SurfacePoint, &Bsdf, bool),
+        (point, bsdf): (&SurfacePoint, &Bsdf),
         (wo, travelled): (Vec3, f32),
         turns: impl FnOnce() -> f32,
     ) -> Gathered {
@@ -200,11 +200,11 @@ impl<'a> CausticMerging<'a> {
             kernel: Kernel::Epanechnikov,
         };
         // Most places have no photon near them, and need not look for walls.
-        let density = map.gather(level, &disc, &Uniform(Rgb::ONE));
+        let density = map.gather(context.level, &disc, &Uniform(Rgb::ONE));
         if density.photons == 0 {
             return Gathered::default();
         }
         let light = Light { map, is_caustic: true, enough: f32::INFINITY };
-        reflected::<F>(light, (bvh, level), (&disc, Some(density)), (point, bsdf, apart), wo, turns())
+        reflected(light, context, (&disc, Some(density)), (point, bsdf), wo, turns())
     }
 }

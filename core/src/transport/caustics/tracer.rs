@@ -13,16 +13,16 @@ use crate::geometry::Ray;
 use crate::light::{EmissionSampler, LightSampler, LightType, luminance};
 use crate::memory::{Arena, Footprint, OutOfMemory};
 use crate::photon::Photon;
-use crate::scene::{Scene, SurfacePoint};
+use crate::scene::Scene;
 use crate::transport::caustics::merge::{ChainLink, is_wide_enough};
 use crate::transport::estimator::{Counters, UNLIMITED};
 use crate::transport::photon_mapping::deposit::PhotonTracerSettings;
 use crate::transport::photon_mapping::radius::RadiusSchedule;
+use crate::transport::walk::context::SceneContext;
 pub use crate::transport::walk::light::PATHS;
 use crate::transport::walk::light::{Continuation, LightPathState, LightWalk, PhotonBuffer, Vertex, Visitor};
 use crate::{Level, Rgb};
 use core::f32::consts::PI;
-use core::marker::PhantomData;
 use glam::{Vec2, Vec3};
 
 /// Photons that a task has room for: a path leaves two on average at most.
@@ -86,8 +86,8 @@ impl<'a, F: Features> CausticPhotonTracer<'a, F> {
         level: Level,
     ) -> Self {
         let PhotonTracerSettings { seed, paths, max_depth, .. } = settings;
-        let features = PhantomData;
-        let flight = LightWalk { scene, bvh, lights, emission, seed, paths, max_depth, level, features };
+        let context = SceneContext::new(scene, bvh, lights, level);
+        let flight = LightWalk { context, emission, seed, paths, max_depth };
         Self { flight, discs, frame, beside_records: false }
     }
 
@@ -174,8 +174,8 @@ impl<'a, F: Features> CausticPhotonTracer<'a, F> {
     /// In which block of the picture light at `place` shows, straight or through glass; `None` where it is outside, or
     /// hidden from the eye: some of it comes back.
     fn block(&self, place: Vec3) -> Option<u32> {
-        let LightWalk { scene, bvh, level, .. } = self.flight;
-        let camera = &scene.camera;
+        let context = &self.flight.context;
+        let camera = &context.scene.camera;
         let [width, height] = self.frame;
         let at = camera.project(width, height, place, [0.5; 2])?.raster;
         let frame = Vec2::new(width as f32, height as f32);
@@ -187,8 +187,8 @@ impl<'a, F: Features> CausticPhotonTracer<'a, F> {
         let mut ray = Ray::segment(place + NEAR * to_eye, (1.0 - NEAR) * to_eye, 1.0);
         let mut crossed = 0;
         loop {
-            let hit = bvh.nearest(level, &ray);
-            let Some(point) = SurfacePoint::at::<F>(scene, &ray, &hit).filter(|_| hit.is_some()) else {
+            let hit = context.nearest(&ray);
+            let Some(point) = context.surface_at(&ray, &hit) else {
                 let [x, y] = (at / frame * BLOCKS as f32).to_array();
                 return Some((y as u32).min(BLOCKS - 1) * BLOCKS + (x as u32).min(BLOCKS - 1));
             };
@@ -212,7 +212,7 @@ impl<'a, F: Features> CausticPhotonTracer<'a, F> {
     /// `chain` and `others` before the first surface: `back` is the density of the direction to the light, where it is
     /// not the only one.
     fn first(&self, state: &LightPathState, vertex: &Vertex, back: Option<f32>) -> (f32, f32) {
-        let LightWalk { scene, lights, emission, .. } = self.flight;
+        let LightWalk { context: SceneContext { scene, lights, .. }, emission, .. } = self.flight;
         let &Vertex { point, bsdf, to_light, .. } = vertex;
         let normal = if F::DIELECTRIC && bsdf.transmits() { Vec3::ZERO } else { point.frame.normal };
         let position = point.position;
@@ -328,7 +328,7 @@ impl<F: Features, L: FnMut(&LightPathState, Photon, CausticShare, &mut Counters)
     /// Straight from a light no photon goes on by a rough coat: paths find that light.
     #[inline]
     fn is_apart(&self, state: &LightPathState, vertex: &Vertex) -> bool {
-        state.segments > 1 && vertex.bsdf.is_varnished(!self.shooter.flight.lights.have_deltas())
+        state.segments > 1 && vertex.bsdf.is_varnished(self.shooter.flight.context.separates_coats())
     }
 
     /// Takes note of what a surface does with the densities of both ways, at the first of a path also of how the path
@@ -357,7 +357,7 @@ impl<F: Features, L: FnMut(&LightPathState, Photon, CausticShare, &mut Counters)
         let Vertex { point, bsdf, .. } = *vertex;
         let coat_alone = is_narrow && !sample.delta;
         let there = ChainLink { point, bsdf, near: from, far: sample.direction, coat_alone };
-        let back = if sample.delta { 1.0 } else { there.density::<F>(self.shooter.flight.scene) };
+        let back = if sample.delta { 1.0 } else { there.density(&self.shooter.flight.context) };
         if state.segments == 1 {
             let back = (!sample.delta).then_some(back);
             (state.chain, state.others) = self.shooter.first(state, vertex, back);

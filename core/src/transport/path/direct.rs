@@ -27,7 +27,7 @@ impl<F: Features> PathIntegrator<'_, F> {
         shadows: &mut Shadows,
     ) {
         let is_left = !known.said.is_lit || vertex.apart;
-        if self.lights.is_empty() || vertex.bsdf.is_delta() || !is_left {
+        if self.context.lights.is_empty() || vertex.bsdf.is_delta() || !is_left {
             return;
         }
         let (point, normal) = (vertex.point, vertex.normal);
@@ -35,19 +35,25 @@ impl<F: Features> PathIntegrator<'_, F> {
         let table = if normal == Vec3::ZERO {
             None
         } else {
-            self.lights.visibility(point.position, point.frame.normal)
+            self.context.lights.visibility(point.position, point.frame.normal)
         };
         for part in 0..known.points {
             let is_several = known.points > 1;
             let sampler = if is_several { path.part(self.settings.seed, part) } else { vertex.sampler };
             let [u, v] = sampler.pair(vertex.first + dimension::LIGHT);
             let aim = table.map(|table| table.warp([u, v]));
-            let choice = if self.lights.have_choice() {
+            let choice = if self.context.lights.have_choice() {
                 sampler.single(vertex.first + dimension::LIGHT_CHOICE)
             } else {
                 0.0
             };
-            let sample = self.lights.sample_deferred(self.scene, point.position, normal, [u, v, choice], aim);
+            let sample = self.context.lights.sample_deferred(
+                self.context.scene,
+                point.position,
+                normal,
+                [u, v, choice],
+                aim,
+            );
             if let Some((sample, later)) = sample
                 && let Some((shadow, light)) =
                     self.light_contribution(path, exchange, vertex, known, (&sample, later))
@@ -88,7 +94,7 @@ impl<F: Features> PathIntegrator<'_, F> {
         let each = 1.0 / known.points as f32;
         let weigh = |pdf: f32| match alone {
             true => each,
-            false if later => each * environment_heuristic(self.lights, sample.pdf, each * pdf),
+            false if later => each * environment_heuristic(self.context.lights, sample.pdf, each * pdf),
             false => each * power_heuristic(sample.pdf, each * pdf),
         };
         let mut weight = weigh(pdf);
@@ -97,9 +103,14 @@ impl<F: Features> PathIntegrator<'_, F> {
             && merging.may_come_by(bsdf, path.chain)
         {
             let there = ChainLink { point, bsdf, near: wo, far: wi, coat_alone: false };
-            let to_light = there.reverse::<F>(self.scene) / sample.pdf;
+            let to_light = there.reverse(&self.context) / sample.pdf;
             weight = merging.beside_photons(weight, path.chain.abs() * to_light, || {
-                merging.emission.density_of_sample(self.scene, self.lights, sample, point.position)
+                merging.emission.density_of_sample(
+                    self.context.scene,
+                    self.context.lights,
+                    sample,
+                    point.position,
+                )
             });
         }
         let of_base = f * weight;

@@ -6,7 +6,6 @@ use super::shadow_rays::Shadows;
 use super::{BLOCK, LIGHT_SAMPLES, PathIntegrator, SurfaceInteraction};
 use crate::bsdf::Features;
 use crate::bvh::Coherence;
-use crate::scene::SurfacePoint;
 use crate::transport::estimator::Counters;
 use crate::transport::path::state::Wavefront;
 use core::ops::Range;
@@ -28,7 +27,7 @@ impl<'a, F: Features> PathIntegrator<'a, F> {
     ) {
         counters.rays += active as u64;
         let rays = &wave.rays[..active];
-        self.bvh.nearest_batch(self.level, rays, coherence, &mut wave.hits[..active]);
+        self.context.nearest_batch(rays, coherence, &mut wave.hits[..active]);
     }
 
     /// Shades the first `active` rays of the wave, which were traced, and traces what follows until no path is left.
@@ -60,9 +59,8 @@ impl<'a, F: Features> PathIntegrator<'a, F> {
             }
             let (ray, hit) = (wave.rays[i], wave.hits[i]);
             // Several lights at a vertex have no place where all vertices are lit. Not through cut-outs, which have one each.
-            if shadows + LIGHT_SAMPLES > wave.shadow_rays.len() && !self.has_cutouts {
-                counters.shadow_rays += shadows as u64;
-                self.trace_shadow_rays(wave, core::mem::take(&mut shadows));
+            if shadows + LIGHT_SAMPLES > wave.shadow_rays.len() && !self.context.has_cutouts {
+                self.trace_shadow_rays(wave, core::mem::take(&mut shadows), counters);
             }
             let Wavefront { paths, exchanges, shadow_rays, shadow_light, .. } = wave;
             let Some(path) = paths.get_mut(ray.tag as usize) else { continue };
@@ -77,12 +75,7 @@ impl<'a, F: Features> PathIntegrator<'a, F> {
                 going_on += 1;
             }
         }
-        if F::CUTOUT && self.has_cutouts {
-            self.trace_shadow_rays_through_cutouts(wave, shadows, counters);
-        } else {
-            counters.shadow_rays += shadows as u64;
-            self.trace_shadow_rays(wave, shadows);
-        }
+        self.trace_shadow_rays(wave, shadows, counters);
         going_on
     }
 
@@ -97,7 +90,7 @@ impl<'a, F: Features> PathIntegrator<'a, F> {
     ) {
         let met = wave.rays[range.clone()].iter().zip(&wave.hits[range.clone()]);
         for ((ray, hit), met) in met.zip(block.iter_mut()) {
-            let point = SurfacePoint::at::<F>(self.scene, ray, hit);
+            let point = self.context.surface_at(ray, hit);
             *met = point.map(|point| SurfaceInteraction { point, indirect: None });
         }
         if let Some(caches) = self.caches {

@@ -40,7 +40,7 @@ use crate::geometry::Ray;
 use crate::light::LightSampler;
 use crate::memory::Footprint;
 use crate::sampling::Sampler;
-use crate::scene::{Material, Scene, SurfacePoint};
+use crate::scene::{Scene, SurfacePoint};
 use crate::transport::cached::lookup::CacheView;
 use crate::transport::caustics::merge::CausticMerging;
 use crate::transport::estimator::{PathSettings, dimension};
@@ -48,7 +48,6 @@ use crate::transport::path::state::Wavefront;
 use crate::transport::photon_mapping::density::PhotonLight;
 use crate::transport::photon_mapping::final_gather::PhotonMaps;
 use crate::transport::walk::context::SceneContext;
-use core::marker::PhantomData;
 
 /// Paths that advance together where memory allows: enough to fill the tracer's batches, few enough to
 /// stay in the second cache.
@@ -63,17 +62,8 @@ pub(super) const LIGHT_SAMPLES: usize = 4;
 /// Path tracing of one scene: a pass whose tasks are the tiles of the picture.
 #[derive(Clone, Copy)]
 pub struct PathIntegrator<'a, F> {
-    pub(super) scene: &'a Scene<'a>,
-    pub(super) bvh: &'a Bvh<'a>,
-    pub(super) lights: &'a LightSampler<'a>,
+    pub(super) context: SceneContext<'a, F>,
     pub(super) settings: PathSettings,
-    pub(super) level: Level,
-    /// Some surfaces let a part of the light through, so that a shadow ray may go on behind a hit.
-    pub(super) has_cutouts: bool,
-    /// Photons are known by the bases of narrow coats alone (`Bsdf::is_varnished`).
-    apart: bool,
-    /// Some surfaces may reflect or refract into one direction only.
-    pub(super) has_mirrors: bool,
     pub(super) caches: Option<CacheView<'a>>,
     photons: Option<PhotonLight<'a>>,
     /// Of even and of odd samples.
@@ -81,7 +71,6 @@ pub struct PathIntegrator<'a, F> {
     merging: Option<CausticMerging<'a>>,
     /// Light that is not all shared, for each sample; see `reuse.rs`.
     pub(super) flash: f32,
-    features: PhantomData<F>,
 }
 
 impl<'a, F: Features> PathIntegrator<'a, F> {
@@ -94,23 +83,14 @@ impl<'a, F: Features> PathIntegrator<'a, F> {
         settings: PathSettings,
         level: Level,
     ) -> Self {
-        let has_cutouts = scene.materials.iter().any(Material::has_cutout);
-        let has_mirrors = scene.materials.iter().any(|material| material.surface.may_be_smooth());
         Self {
-            scene,
-            bvh,
-            lights,
+            context: SceneContext::new(scene, bvh, lights, level),
             settings,
-            level,
-            has_cutouts,
-            apart: !lights.have_deltas(),
-            has_mirrors,
             caches: None,
             photons: None,
             maps: None,
             merging: None,
             flash: f32::INFINITY,
-            features: PhantomData,
         }
     }
 
@@ -155,11 +135,6 @@ impl<'a, F: Features> PathIntegrator<'a, F> {
         self.settings.is_limited()
     }
 
-    /// Scene, hierarchy and level.
-    pub(super) fn context(&self) -> SceneContext<'a, F> {
-        SceneContext::new(self.scene, self.bvh, self.level)
-    }
-
     /// Number of tasks: tiles of the film.
     pub fn tasks(&self) -> usize {
         Tile::count(self.settings.width, self.settings.height)
@@ -175,9 +150,9 @@ impl<'a, F: Features> PathIntegrator<'a, F> {
     pub(super) fn camera_ray(&self, [x, y]: [u32; 2], sampler: &Sampler) -> Ray {
         let PathSettings { width, height, .. } = self.settings;
         let [dx, dy] = sampler.pair(dimension::PIXEL);
-        let has_lens = self.scene.camera.lens_radius > 0.0;
+        let has_lens = self.context.scene.camera.lens_radius > 0.0;
         let lens = if has_lens { sampler.pair(dimension::LENS) } else { [0.0; 2] };
-        self.scene.camera.ray(width, height, x as f32 + dx, y as f32 + dy, lens)
+        self.context.scene.camera.ray(width, height, x as f32 + dx, y as f32 + dy, lens)
     }
 }
 

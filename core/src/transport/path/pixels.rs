@@ -38,7 +38,8 @@ impl<F: Features> PathIntegrator<'_, F> {
         let mut all = all.peekable();
         // A bit for each of the first pixels; others are path traced alone.
         let outlined = pixels.iter().take(u64::BITS as usize).enumerate().fold(0, |bits, (place, pixel)| {
-            bits | u64::from(is_outlined(self.scene, self.lights, &self.settings, *pixel)) << place
+            bits | u64::from(is_outlined(self.context.scene, self.context.lights, &self.settings, *pixel))
+                << place
         });
         let outlined = |place: u32| u64::checked_shr(outlined, place).unwrap_or(0) & 1 == 1;
         while all.peek().is_some() {

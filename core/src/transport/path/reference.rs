@@ -1,18 +1,19 @@
 //! The path tracer of the textbook: one path at a time, one ray at a time. It is what [`crate::transport::path`] is tested
 //! against, and it says in order what that does in pieces.
 
-use crate::bsdf::{All, Bsdf};
+use crate::bsdf::All;
 use crate::bvh::Bvh;
 use crate::geometry::MISS;
 use crate::light::{LightSampler, emitted};
 use crate::sampling::Sampler;
-use crate::scene::{Scene, SurfacePoint};
+use crate::scene::Scene;
 use crate::transport::estimator::{
     MAX_CROSSINGS, MAX_VERTICES, PathSettings, continuation_probability, dimension, environment_heuristic,
     is_cut, power_heuristic,
 };
 use crate::transport::path::silhouette::{self, is_outlined};
-use crate::transport::walk::visibility::{passing, shadow_ray};
+use crate::transport::walk::context::SceneContext;
+use crate::transport::walk::visibility::shadow_ray;
 use crate::{Level, Rgb};
 use glam::Vec3;
 
@@ -26,6 +27,7 @@ pub fn radiance(
     sample: u32,
 ) -> Rgb {
     let PathSettings { width, height, seed, max_depth, .. } = *settings;
+    let context = SceneContext::<All>::new(scene, bvh, lights, Level::BASELINE);
     let sampler = Sampler::new(seed, y * width + x, sample);
     let [dx, dy] = sampler.pair(dimension::PIXEL);
     let lens = sampler.pair(dimension::LENS);
@@ -43,7 +45,7 @@ pub fn radiance(
 
     while segments <= MAX_VERTICES && crossings <= MAX_CROSSINGS {
         let direction = Vec3::from(ray.direction);
-        let hit = bvh.nearest(Level::BASELINE, &ray);
+        let hit = context.nearest(&ray);
 
         // Light from infinitely far.
         if !hit.is_some() {
@@ -56,7 +58,7 @@ pub fn radiance(
             }
             break;
         }
-        let Some(point) = SurfacePoint::at::<All>(scene, &ray, &hit) else { break };
+        let Some(point) = context.surface_at(&ray, &hit) else { break };
 
         // Rounding, or a hole in the surface: on in the same direction.
         let opacity = point.material.opacity.at::<All>(scene, point.uv);
@@ -82,7 +84,7 @@ pub fn radiance(
             break;
         }
 
-        let bsdf = Bsdf::at::<All>(scene, point.material, point.uv, point.front);
+        let bsdf = context.bsdf_at(&point);
         let wo = point.frame.to_local(-direction);
         let normal = if bsdf.transmits() { Vec3::ZERO } else { point.frame.normal };
         let first = dimension::vertex(segments);
@@ -104,8 +106,8 @@ pub fn radiance(
                         false => power_heuristic(light.pdf, pdf),
                     };
                     let sent = throughput * f * light.radiance * (weight / light.pdf);
-                    let arriving = shadow_ray(&point, &light)
-                        .and_then(|ray| passing::<All>(scene, bvh, Level::BASELINE, ray, sent, &mut 0));
+                    let arriving =
+                        shadow_ray(&point, &light).and_then(|ray| context.transmit(ray, sent, &mut 0));
                     let environment = scene.environment.as_ref().filter(|_| later);
                     let seen = environment.map_or(Rgb::ONE, |e| e.radiance(scene, light.direction));
                     radiance += arriving.unwrap_or_default() * seen;
@@ -143,8 +145,8 @@ pub fn radiance(
     let mut lamps = Rgb::ZERO;
     if is_outlined {
         for ray in silhouette::rays(scene, settings, [x, y], sample) {
-            let hit = bvh.nearest(Level::BASELINE, &ray);
-            lamps += silhouette::emission::<All>(scene, bvh, Level::BASELINE, ray, hit);
+            let hit = context.nearest(&ray);
+            lamps += silhouette::emission(&context, ray, hit);
         }
     }
     radiance + lamps

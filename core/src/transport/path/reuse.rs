@@ -26,7 +26,7 @@ use crate::scene::SurfacePoint;
 use crate::transport::estimator::{Counters, MAX_CROSSINGS};
 use crate::transport::path::PathIntegrator;
 use crate::transport::path::state::{PathState, Wavefront};
-use crate::transport::walk::visibility::{FEW, pass_cutout, passing};
+use crate::transport::walk::visibility::FEW;
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
@@ -371,10 +371,10 @@ impl<F: Features> PathIntegrator<'_, F> {
 
     /// Multiplies the densities of the pairs with what the rays between them let pass: V.
     fn see(&self, wave: &mut Wavefront, mut rays: usize, counters: &mut Counters) {
-        if !(F::CUTOUT && self.has_cutouts) {
+        if !self.context.has_cutouts {
             counters.shadow_rays += rays as u64;
             let (shadow_rays, hidden) = (&wave.shadow_rays[..rays], &mut wave.hidden[..rays]);
-            self.bvh.occluded_batch(self.level, shadow_rays, hidden);
+            self.context.bvh.occluded_batch(self.context.level, shadow_rays, hidden);
             for (ray, _) in shadow_rays.iter().zip(&*hidden).filter(|(_, hidden)| **hidden != 0) {
                 wave.pairs[ray.tag as usize].density = 0.0;
             }
@@ -386,7 +386,7 @@ impl<F: Features> PathIntegrator<'_, F> {
             }
             counters.shadow_rays += rays as u64;
             let (shadow_rays, hits) = (&wave.shadow_rays[..rays], &mut wave.hits[..rays]);
-            self.bvh.nearest_batch(self.level, shadow_rays, Coherence::Incoherent, hits);
+            self.context.nearest_batch(shadow_rays, Coherence::Incoherent, hits);
             let mut left = 0;
             for i in 0..rays {
                 let (ray, hit) = (wave.shadow_rays[i], wave.hits[i]);
@@ -394,7 +394,7 @@ impl<F: Features> PathIntegrator<'_, F> {
                     continue;
                 }
                 let pair = &mut wave.pairs[ray.tag as usize];
-                match pass_cutout::<F>(self.scene, &ray, &hit) {
+                match self.context.pass_cutout(&ray, &hit) {
                     Some((through, transmittance)) => {
                         pair.density *= transmittance;
                         wave.shadow_rays[left] = through;
@@ -409,7 +409,7 @@ impl<F: Features> PathIntegrator<'_, F> {
             let density = &mut wave.pairs[ray.tag as usize].density;
             let light = Rgb::splat(*density);
             let rays = &mut counters.shadow_rays;
-            let passed = passing::<F>(self.scene, self.bvh, self.level, *ray, light, rays);
+            let passed = self.context.transmit(*ray, light, rays);
             *density = passed.unwrap_or_default().x;
         }
     }

@@ -168,7 +168,7 @@ impl<F: Features> PathIntegrator<'_, F> {
         scratch: &mut Arena,
     ) -> Result<Pilot, OutOfMemory> {
         let sharing = self.with_reuse(true).with_flashes(mean);
-        let connection = if self.has_cutouts { CONNECTION_THROUGH_CUTOUTS } else { CONNECTION };
+        let connection = if self.context.has_cutouts { CONNECTION_THROUGH_CUTOUTS } else { CONNECTION };
         let mut arena = scratch.scratch();
         let mut wave = Wavefront::new(wave, &mut arena)?;
         let tile = Tile::new(self.settings.width, self.settings.height, task);

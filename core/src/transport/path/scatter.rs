@@ -107,7 +107,7 @@ impl<F: Features> PathIntegrator<'_, F> {
             chain if !merging.may_come_by(bsdf, chain) => 0.0,
             0.0 => 0.0,
             chain if sample.delta => chain.abs() / (sample.eta * sample.eta),
-            chain => chain.abs() * there.reverse::<F>(self.scene) / sample.pdf,
+            chain => chain.abs() * there.reverse(&self.context) / sample.pdf,
         };
     }
 }

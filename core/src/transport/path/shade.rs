@@ -84,7 +84,7 @@ impl<'a, F: Features> PathIntegrator<'a, F> {
         // A camera on a surface does not see its back.
         let opacity = || sampler.single(dimension::CROSSING + u32::from(path.crossings));
         if segments == 1 && point.is_left_by(ray)
-            || self.context().is_passed(point, hit, path.triangle, opacity)
+            || self.context.is_passed(point, hit, path.triangle, opacity)
         {
             return path.cross(point.spawn(direction), hit, counters);
         }
@@ -92,7 +92,7 @@ impl<'a, F: Features> PathIntegrator<'a, F> {
         if segments >= self.settings.max_depth {
             return None;
         }
-        let bsdf = Bsdf::at::<F>(self.scene, point.material, point.uv, point.front);
+        let bsdf = self.context.bsdf_at(point);
         if path.share.ends_at(&bsdf) {
             return None;
         }
@@ -102,7 +102,7 @@ impl<'a, F: Features> PathIntegrator<'a, F> {
             exchange.arrive(point, bsdf.cover(), path);
         }
 
-        let near = if segments == 1 { self.scene.camera.eye } else { path.position.into() };
+        let near = if segments == 1 { self.context.scene.camera.eye } else { path.position.into() };
         let distance = near.distance(point.position);
         let has_photons = self.merging.is_some() || self.photons.is_some() || self.maps.is_some();
         let vertex = Vertex {
@@ -118,7 +118,7 @@ impl<'a, F: Features> PathIntegrator<'a, F> {
             distance,
             travelled: path.travelled + distance,
             throughput: path.throughput.into(),
-            apart: F::GLOSSY && has_photons && bsdf.is_varnished(self.apart),
+            apart: F::GLOSSY && has_photons && bsdf.is_varnished(self.context.separates_coats()),
             bsdf,
         };
         let known = self.known(path, exchange, &vertex, came);
@@ -133,19 +133,22 @@ impl<'a, F: Features> PathIntegrator<'a, F> {
 
     /// Adds light of the environment, which the ray reaches.
     fn escape(&self, path: &mut PathState, ray: &Ray) {
-        let Some(environment) = self.scene.environment.as_ref().filter(|_| path.share.sees_emitters()) else {
+        let Some(environment) =
+            self.context.scene.environment.as_ref().filter(|_| path.share.sees_emitters())
+        else {
             return;
         };
         let (position, direction) = (Vec3::from(path.position), Vec3::from(ray.direction));
-        let radiance = environment.radiance(self.scene, direction);
+        let radiance = environment.radiance(self.context.scene, direction);
         let mut weight = 1.0;
         if path.pdf < f32::INFINITY && radiance != Rgb::ZERO {
-            let pdf = self.lights.pdf_escape(self.scene, position, path.normal.into(), direction);
-            weight = environment_heuristic(self.lights, path.pdf, pdf);
+            let pdf =
+                self.context.lights.pdf_escape(self.context.scene, position, path.normal.into(), direction);
+            weight = environment_heuristic(self.context.lights, path.pdf, pdf);
         }
         if let Some(merging) = &self.merging {
             weight = merging.beside_photons(weight, path.chain_to_light(), || {
-                merging.emission.density_of_sky(self.scene, self.lights, direction, position)
+                merging.emission.density_of_sky(self.context.scene, self.context.lights, direction, position)
             });
         }
         path.add(Rgb::from(path.throughput) * radiance * weight);
@@ -157,7 +160,7 @@ impl<'a, F: Features> PathIntegrator<'a, F> {
         if !(point.material.emits() && path.share.sees_lamps()) {
             return;
         }
-        let radiance = emitted(self.scene, hit.triangle, point.uv, point.front);
+        let radiance = emitted(self.context.scene, hit.triangle, point.uv, point.front);
         if radiance == Rgb::ZERO {
             return;
         }
@@ -166,13 +169,25 @@ impl<'a, F: Features> PathIntegrator<'a, F> {
         if path.pdf < f32::INFINITY {
             let distance = position.distance(point.position);
             let normal = path.normal.into();
-            let pdf = self.lights.pdf_hit(self.scene, position, normal, hit.triangle, distance, direction);
+            let pdf = self.context.lights.pdf_hit(
+                self.context.scene,
+                position,
+                normal,
+                hit.triangle,
+                distance,
+                direction,
+            );
             weight = power_heuristic(path.pdf, pdf);
         }
         if let Some(merging) = &self.merging {
             weight = merging.beside_photons(weight, path.chain_to_light(), || {
                 let from = (point.position, -direction);
-                merging.emission.density_of_surface(self.scene, self.lights, hit.triangle, from)
+                merging.emission.density_of_surface(
+                    self.context.scene,
+                    self.context.lights,
+                    hit.triangle,
+                    from,
+                )
             });
         }
         path.add(Rgb::from(path.throughput) * radiance * weight);
@@ -194,10 +209,9 @@ impl<'a, F: Features> PathIntegrator<'a, F> {
             let turns = vertex.sampler.single(dimension::PROBES + segments);
             let limit = if self.is_limited() { segments } else { 0 };
             let maps = &maps[path.sample as usize & 1];
-            let tracer = (self.bvh, self.level);
-            let surface = (point, bsdf, self.apart);
+            let surface = (point, bsdf);
             let from = (vertex.wo, vertex.travelled);
-            said = maps.ask::<F>(tracer, (came, limit, vertex.distance), surface, from, turns);
+            said = maps.ask(&self.context, (came, limit, vertex.distance), surface, from, turns);
             path.gather(throughput, exchange, said.gathered);
         }
         let mut known = Known { said, points: 1, ends: false };
@@ -209,8 +223,8 @@ impl<'a, F: Features> PathIntegrator<'a, F> {
             path.add(throughput * diffuse.reflectance * indirect.irradiance * FRAC_1_PI);
             path.share = Components::DIRECT;
             known.said.next = Components::DIRECT;
-            let has_environment = self.scene.environment.is_some();
-            known.ends = indirect.shining < SMALL && !self.has_mirrors && !has_environment;
+            let has_environment = self.context.scene.environment.is_some();
+            known.ends = indirect.shining < SMALL && !self.context.has_mirrors && !has_environment;
             known.points = if known.ends || has_environment { path.lights.max(1).into() } else { 1 };
         }
         known
@@ -224,9 +238,9 @@ impl<'a, F: Features> PathIntegrator<'a, F> {
             return false;
         };
         let turns = vertex.sampler.single(dimension::PROBES + vertex.segments);
-        let surface = (vertex.point, &vertex.bsdf, self.apart);
+        let surface = (vertex.point, &vertex.bsdf);
         let from = (vertex.wo, vertex.travelled);
-        let reflected = photons.reflected::<F>((self.bvh, self.level), surface, from, turns);
+        let reflected = photons.reflected(&self.context, surface, from, turns);
         path.gather(vertex.throughput, exchange, reflected.unwrap_or_default());
         reflected.is_some()
     }
@@ -240,9 +254,8 @@ impl<'a, F: Features> PathIntegrator<'a, F> {
         met.unwrap_or_else(|| {
             let turns = || vertex.sampler.single(dimension::PROBES + vertex.segments);
             let from = (vertex.wo, if path.disc == 0.0 { vertex.travelled } else { 0.0 });
-            let surface = (vertex.point, &vertex.bsdf, self.apart);
-            let tracer = (self.bvh, self.level);
-            let gathered = merging.reflected::<F>(tracer, path.sample, surface, from, turns);
+            let surface = (vertex.point, &vertex.bsdf);
+            let gathered = merging.reflected(&self.context, path.sample, surface, from, turns);
             path.gather(vertex.throughput, exchange, gathered);
             MergeState::LATER
         })

@@ -3,12 +3,11 @@
 use super::PathIntegrator;
 use crate::Rgb;
 use crate::bsdf::Features;
-use crate::bvh::Coherence;
 use crate::geometry::Ray;
 use crate::scene::Scene;
-use crate::transport::estimator::{Counters, MAX_CROSSINGS};
+use crate::transport::estimator::Counters;
 use crate::transport::path::state::{PathState, Wavefront};
-use crate::transport::walk::visibility::{FEW, pass_cutout, passing};
+use crate::transport::walk::visibility::ShadowRays;
 
 /// In the tag of a shadow ray: it goes to the environment, whose radiance is looked up when it has arrived. Most are
 /// hidden, and a map is large.
@@ -43,54 +42,11 @@ impl Shadows<'_> {
 
 impl<F: Features> PathIntegrator<'_, F> {
     /// Adds the light at the end of the first `shadows` shadow rays to the paths of those that arrive.
-    pub(super) fn trace_shadow_rays(&self, wave: &mut Wavefront, shadows: usize) {
-        let rays = &wave.shadow_rays[..shadows];
-        let hidden = &mut wave.hidden[..shadows];
-        self.bvh.occluded_batch(self.level, rays, hidden);
-        for ((ray, light), hidden) in rays.iter().zip(&*wave.shadow_light).zip(&*hidden) {
-            if *hidden == 0 {
-                arrive(self.scene, wave.paths, ray, Rgb::from(*light));
-            }
-        }
-    }
-
-    /// The same where some surfaces let a part of the light through: round after round, each ray to
-    /// its next surface.
-    pub(super) fn trace_shadow_rays_through_cutouts(
-        &self,
-        wave: &mut Wavefront,
-        mut shadows: usize,
-        counters: &mut Counters,
-    ) {
-        for _ in 0..=MAX_CROSSINGS {
-            if shadows <= FEW {
-                break;
-            }
-            counters.shadow_rays += shadows as u64;
-            let rays = &wave.shadow_rays[..shadows];
-            let hits = &mut wave.hits[..shadows];
-            self.bvh.nearest_batch(self.level, rays, Coherence::Incoherent, hits);
-            let mut left = 0;
-            for i in 0..shadows {
-                let (ray, light) = (wave.shadow_rays[i], Rgb::from(wave.shadow_light[i]));
-                let hit = wave.hits[i];
-                if !hit.is_some() {
-                    arrive(self.scene, wave.paths, &ray, light);
-                } else if let Some((through, transmittance)) = pass_cutout::<F>(self.scene, &ray, &hit) {
-                    wave.shadow_rays[left] = through;
-                    wave.shadow_light[left] = (light * transmittance).to_array();
-                    left += 1;
-                }
-            }
-            shadows = left;
-        }
-        for (ray, light) in wave.shadow_rays[..shadows].iter().zip(&*wave.shadow_light) {
-            let rays = &mut counters.shadow_rays;
-            let light = passing::<F>(self.scene, self.bvh, self.level, *ray, Rgb::from(*light), rays);
-            counters.dropped.unfinished += u64::from(light.is_none());
-            if let Some(light) = light.filter(|light| *light != Rgb::ZERO) {
-                arrive(self.scene, wave.paths, ray, light);
-            }
-        }
+    pub(super) fn trace_shadow_rays(&self, wave: &mut Wavefront, shadows: usize, counters: &mut Counters) {
+        let Wavefront { paths, shadow_rays: rays, shadow_light: light, hits, hidden, .. } = wave;
+        let mut queue = ShadowRays { rays, light, hits, hidden };
+        let arrive = |ray: &Ray, light| arrive(self.context.scene, paths, ray, light);
+        counters.dropped.unfinished +=
+            self.context.trace_shadow_rays(&mut queue, shadows, &mut counters.shadow_rays, arrive);
     }
 }

@@ -5,17 +5,18 @@
 //!
 //! Which pixels these are follows from the camera and the corners of the lamps alone, so that nothing is biased.
 
+use crate::Rgb;
 use crate::bsdf::Features;
-use crate::bvh::{Bvh, Coherence};
+use crate::bvh::Coherence;
 use crate::film::{PixelSet, TILE, Tile};
 use crate::geometry::{Hit, MISS, Ray};
 use crate::light::{LightSampler, emitted};
 use crate::sampling::Sampler;
-use crate::scene::{Camera, Material, Scene, SurfacePoint};
+use crate::scene::{Camera, Material, Scene};
 use crate::transport::estimator::{Counters, MAX_CROSSINGS, PathSettings, dimension};
 use crate::transport::path::PathIntegrator;
 use crate::transport::path::state::Wavefront;
-use crate::{Level, Rgb};
+use crate::transport::walk::context::SceneContext;
 use glam::{Vec2, Vec3};
 
 /// Camera rays for each sample, a power of two: their places in the pixel stay a net. They take about as long as two
@@ -156,23 +157,22 @@ pub(in crate::transport) fn rays(
 /// The share of one of [`rays`], which met `hit`, in what its pixel sees of lamps. As a path does it passes a surface
 /// that the camera stands on.
 pub(in crate::transport) fn emission<F: Features>(
-    scene: &Scene,
-    bvh: &Bvh,
-    level: Level,
+    context: &SceneContext<F>,
     mut ray: Ray,
     mut hit: Hit,
 ) -> Rgb {
     let mut left = MISS;
     for _ in 0..=MAX_CROSSINGS {
-        let Some(point) = SurfacePoint::at::<F>(scene, &ray, &hit) else { break };
+        let Some(point) = context.surface_at(&ray, &hit) else { break };
         if hit.triangle != left && !point.is_left_by(&ray) {
             let emits = point.material.emits();
-            let light = if emits { emitted(scene, hit.triangle, point.uv, point.front) } else { Rgb::ZERO };
+            let light =
+                if emits { emitted(context.scene, hit.triangle, point.uv, point.front) } else { Rgb::ZERO };
             return light / RAYS as f32;
         }
         left = hit.triangle;
         ray = point.spawn(ray.direction.into());
-        hit = bvh.nearest(level, &ray);
+        hit = context.nearest(&ray);
     }
     Rgb::ZERO
 }
@@ -195,7 +195,7 @@ impl<F: Features> PathIntegrator<'_, F> {
                 continue;
             }
             let place = [path.pixel % self.settings.width, path.pixel / self.settings.width];
-            for ray in rays(self.scene, &self.settings, place, path.sample) {
+            for ray in rays(self.context.scene, &self.settings, place, path.sample) {
                 wave.rays[filled] = Ray { tag: i as u32, ..ray };
                 filled += 1;
                 if filled == capacity {
@@ -210,7 +210,7 @@ impl<F: Features> PathIntegrator<'_, F> {
     fn gather_emission(&self, wave: &mut Wavefront, count: usize, counters: &mut Counters) {
         self.trace(wave, count, Coherence::Coherent, counters);
         for (ray, hit) in wave.rays.iter().zip(&*wave.hits).take(count) {
-            let light = emission::<F>(self.scene, self.bvh, self.level, *ray, *hit);
+            let light = emission(&self.context, *ray, *hit);
             if let Some(sum) = wave.shadow_light.get_mut(ray.tag as usize) {
                 *sum = (Rgb::from(*sum) + light).to_array();
             }

@@ -63,7 +63,7 @@ impl<F: Features> PathIntegrator<'_, F> {
         // No larger than there are paths: the memory of a wave is cleared.
         let most = samples.len().saturating_mul(PIXELS_PER_TILE);
         let mut places = TileSampler::new(tile, samples);
-        places.outlined = outlined(self.scene, self.lights, &self.settings, tile);
+        places.outlined = outlined(self.context.scene, self.context.lights, &self.settings, tile);
         let mut wave = Wavefront::new(wave.min(most), &mut arena)?;
         let has_outlines = !places.outlined.is_empty();
         loop {
@@ -140,7 +140,7 @@ impl<F: Features> PathIntegrator<'_, F> {
             share: if places.outlined.contains(place) { Components::BESIDE_LAMP } else { Components::ALL },
             triangle: MISS,
             eta_squared: 1.0,
-            lights: if self.has_cutouts { 1 } else { LIGHT_SAMPLES as u16 },
+            lights: if self.context.has_cutouts { 1 } else { LIGHT_SAMPLES as u16 },
             ..PathState::default()
         };
         wave.exchanges[*count] = exchange;

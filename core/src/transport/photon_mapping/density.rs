@@ -7,6 +7,7 @@ use crate::geometry::Ray;
 use crate::photon::{Density, FLATNESS, Fence, Kernel, PROBES, PhotonMap, QueryDisc, Uniform};
 use crate::scene::SurfacePoint;
 use crate::transport::photon_mapping::radius::RadiusSchedule;
+use crate::transport::walk::context::SceneContext;
 use crate::{Level, Rgb};
 use core::f32::consts::FRAC_1_PI;
 use glam::Vec3;
@@ -73,12 +74,12 @@ impl<'a> PhotonLight<'a> {
     #[inline]
     pub(in crate::transport) fn reflected<F: Features>(
         &self,
-        (bvh, level): (&Bvh, Level),
-        (point, bsdf, apart): (&SurfacePoint, &Bsdf, bool),
+        context: &SceneContext<F>,
+        (point, bsdf): (&SurfacePoint, &Bsdf),
         (wo, travelled): (Vec3, f32),
         turns: f32,
     ) -> Option<Gathered> {
-        if !bsdf.gathers_photons(apart) {
+        if !bsdf.gathers_photons(context.separates_coats()) {
             return None;
         }
         let disc = QueryDisc {
@@ -87,12 +88,12 @@ impl<'a> PhotonLight<'a> {
             radius: self.discs.radius_after(travelled, point.position),
             kernel: self.kernel,
         };
-        let density = self.is_sparse.then(|| self.map.gather(level, &disc, &Uniform(Rgb::ONE)));
+        let density = self.is_sparse.then(|| self.map.gather(context.level, &disc, &Uniform(Rgb::ONE)));
         if density.is_some_and(|density| density.photons == 0) {
             return Some(Gathered::default());
         }
         let light = Light { map: self.map, is_caustic: self.is_sparse, enough: self.enough };
-        Some(reflected::<F>(light, (bvh, level), (&disc, density), (point, bsdf, apart), wo, turns))
+        Some(reflected(light, context, (&disc, density), (point, bsdf), wo, turns))
     }
 }
 
@@ -127,23 +128,27 @@ pub(in crate::transport) struct Light<'a> {
 #[inline]
 pub(in crate::transport) fn reflected<F: Features>(
     Light { map, is_caustic, enough }: Light,
-    (bvh, level): (&Bvh, Level),
+    context: &SceneContext<F>,
     (disc, all): (&QueryDisc, Option<Density>),
-    (point, bsdf, apart): (&SurfacePoint, &Bsdf, bool),
+    (point, bsdf): (&SurfacePoint, &Bsdf),
     wo: Vec3,
     turns: f32,
 ) -> Gathered {
     let origin = point.position + point.error * point.geometric_normal;
-    let fence = fence(bvh, level, (origin, is_caustic), disc, turns);
+    let fence = fence(context.bvh, context.level, (origin, is_caustic), disc, turns);
     let is_flat = point.frame.normal == point.geometric_normal;
     if let (Bsdf::Diffuse(diffuse), true) = (bsdf, is_flat) {
         let response = diffuse.reflectance * FRAC_1_PI;
         return match all {
             Some(all) if fence.is_open() => Gathered::of(all, enough, response),
-            _ => Gathered::of(map.gather_within(level, disc, &fence, &Uniform(response)), enough, Rgb::ONE),
+            _ => Gathered::of(
+                map.gather_within(context.level, disc, &fence, &Uniform(response)),
+                enough,
+                Rgb::ONE,
+            ),
         };
     }
-    let seen = bsdf.seen_apart::<F>(wo, bsdf.is_varnished(apart));
+    let seen = bsdf.seen_apart::<F>(wo, bsdf.is_varnished(context.separates_coats()));
     // A photon's power has met the triangle: the cosine is in it already, and that of the triangle's normal.
     let response = |from: Vec3| {
         let wi = point.frame.to_local(from);
@@ -152,7 +157,7 @@ pub(in crate::transport) fn reflected<F: Features>(
         }
         seen.value::<F>(wi) / from.dot(point.geometric_normal).abs().max(GRAZING)
     };
-    Gathered::of(map.gather_within(level, disc, &fence, &response), enough, Rgb::ONE)
+    Gathered::of(map.gather_within(context.level, disc, &fence, &response), enough, Rgb::ONE)
 }
 
 /// Looks for walls on `disc`, and for its edges, by probes from `origin`, just above its middle; and for what hangs over

@@ -18,10 +18,10 @@ use crate::photon::Photon;
 use crate::scene::Scene;
 use crate::transport::estimator::Counters;
 use crate::transport::photon_mapping::visible_points::VisiblePoints;
+use crate::transport::walk::context::SceneContext;
 pub use crate::transport::walk::light::PATHS;
 use crate::transport::walk::light::{Continuation, LightPathState, LightWalk, PhotonBuffer, Vertex, Visitor};
 use crate::{Level, Rgb};
-use core::marker::PhantomData;
 
 /// Photons that a task has room for.
 pub const ROOM: usize = 6 * PATHS;
@@ -92,9 +92,14 @@ impl<'a, F: Features> PhotonTracer<'a, F> {
         level: Level,
     ) -> Self {
         let PhotonTracerSettings { keep, seed, paths, max_depth } = settings;
-        let features = PhantomData;
         Self {
-            flight: LightWalk { scene, bvh, lights, emission, seed, paths, max_depth, level, features },
+            flight: LightWalk {
+                context: SceneContext::new(scene, bvh, lights, level),
+                emission,
+                seed,
+                paths,
+                max_depth,
+            },
             keep,
         }
     }

@@ -24,6 +24,7 @@ use crate::transport::PhotonLight;
 use crate::transport::estimator::Counters;
 use crate::transport::path::state::Components;
 use crate::transport::photon_mapping::density::{Gathered, Light, fence, reflected};
+use crate::transport::walk::context::SceneContext;
 use crate::{Level, Rgb};
 use core::f32::consts::{FRAC_1_PI, SQRT_2};
 use glam::Vec3;
@@ -168,20 +169,20 @@ impl<'a> GlobalMapLookup<'a> {
     /// coat does. `None` where the map should not tell. `turns`, from 0 to 1, turns probes for walls.
     pub(in crate::transport) fn reflected<F: Features>(
         &self,
-        (bvh, level): (&Bvh, Level),
-        (point, bsdf, apart): (&SurfacePoint, &Bsdf, bool),
+        context: &SceneContext<F>,
+        (point, bsdf): (&SurfacePoint, &Bsdf),
         wo: Vec3,
         distance: f32,
         turns: f32,
     ) -> Option<Rgb> {
-        let (irradiance, radius) = self.irradiance((bvh, level), point, distance)?;
+        let (irradiance, radius) = self.irradiance((context.bvh, context.level), point, distance)?;
         if let Bsdf::Diffuse(diffuse) = bsdf {
             return Some(irradiance * diffuse.reflectance * FRAC_1_PI);
         }
         let (place, normal) = (point.position, point.geometric_normal);
         let disc = QueryDisc { place, normal, radius: radius.min(self.farthest), kernel: self.kernel };
         let light = Light { map: self.global, is_caustic: false, enough: f32::INFINITY };
-        Some(reflected::<F>(light, (bvh, level), (&disc, None), (point, bsdf, apart), wo, turns).light)
+        Some(reflected(light, context, (&disc, None), (point, bsdf), wo, turns).light)
     }
 
     /// The irradiance of the photons at `point`, at the end of a gather ray of length `distance`, and the radius of their
@@ -278,16 +279,16 @@ impl PhotonMaps<'_> {
     #[inline]
     pub(in crate::transport) fn ask<F: Features>(
         &self,
-        tracer: (&Bvh, Level),
+        context: &SceneContext<F>,
         (came, limited, distance): (Components, u32, f32),
-        (point, bsdf, apart): (&SurfacePoint, &Bsdf, bool),
+        (point, bsdf): (&SurfacePoint, &Bsdf),
         (wo, travelled): (Vec3, f32),
         turns: f32,
     ) -> MapLookup {
         // What was scattered by something with a diffuse part stays so.
         let rest = if came.gathers() { Components::GATHERED } else { Components::ALL };
         let all = MapLookup { next: rest, mirrored: rest, ..MapLookup::default() };
-        if !bsdf.gathers_photons(apart) {
+        if !bsdf.gathers_photons(context.separates_coats()) {
             return match came {
                 Components::NO_CAUSTIC | Components::BEHIND_MIRROR if bsdf.is_caustic_caster() => MapLookup {
                     is_lit: true,
@@ -300,7 +301,7 @@ impl PhotonMaps<'_> {
         }
         if came.gathers()
             && (limited == 0 || limited == 2)
-            && let Some(light) = self.global.reflected::<F>(tracer, (point, bsdf, apart), wo, distance, turns)
+            && let Some(light) = self.global.reflected(context, (point, bsdf), wo, distance, turns)
         {
             let gathered = Gathered { light, ..Gathered::default() };
             return MapLookup { gathered, is_all: true, is_lit: true, ..all };
@@ -311,7 +312,7 @@ impl PhotonMaps<'_> {
         match &self.caustic {
             Some(caustic) => {
                 let travelled = if came.gathers() { 0.0 } else { travelled };
-                let gathered = caustic.reflected::<F>(tracer, (point, bsdf, apart), (wo, travelled), turns);
+                let gathered = caustic.reflected(context, (point, bsdf), (wo, travelled), turns);
                 MapLookup { gathered: gathered.unwrap_or_default(), next: Components::NO_CAUSTIC, ..all }
             }
             None => MapLookup { next: Components::GATHERED, ..all },

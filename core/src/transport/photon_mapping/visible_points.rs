@@ -2,7 +2,7 @@
 //! in a map of their own. A photon counts as seen where one of them lies near it. That need not be exact: emission guided
 //! by it sends some light everywhere.
 
-use crate::bsdf::{Bsdf, Features};
+use crate::bsdf::Features;
 use crate::memory::Footprint;
 use crate::photon::{Kernel, Photon, PhotonMap, Photons, QueryDisc, Uniform};
 use crate::sampling::Sampler;
@@ -96,7 +96,7 @@ impl VisiblePointSampler {
             let opacity = |n| sampler.single(dimension::CROSSING + n);
             let (hit, point) = context.next_surface(&mut segment, opacity, counters)?;
             let direction = Vec3::from(segment.ray.direction).normalize_or_zero();
-            let bsdf = Bsdf::at::<F>(context.scene, point.material, point.uv, point.front);
+            let bsdf = context.bsdf_at(&point);
             if bsdf.gathers_photons(true) && !mem::take(&mut gathers) {
                 return Some(Photon::new(point.position, -direction, point.geometric_normal, Rgb::ZERO));
             }

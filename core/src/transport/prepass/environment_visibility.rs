@@ -10,7 +10,7 @@
 //! which it is.
 
 use crate::Rgb;
-use crate::bsdf::{Bsdf, Features};
+use crate::bsdf::Features;
 use crate::bvh::Coherence;
 use crate::geometry::{Bounds, Hit, Ray};
 use crate::light::{Bins, EnvironmentVisibility, VisibilityGrid, VisibilityTable};
@@ -19,7 +19,6 @@ use crate::sampling::Sampler;
 use crate::transport::estimator::{Counters, dimension};
 use crate::transport::path::PathIntegrator;
 use crate::transport::walk::context::Segment;
-use crate::transport::walk::visibility::{pass_cutout, passing};
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
@@ -222,20 +221,20 @@ impl<F: Features> PathIntegrator<'_, F> {
             let sampler = Sampler::new(seed ^ STREAM, 0, (task * paths + path) as u32);
             let [x, y] = sampler.pair(0);
             let lens = sampler.pair(1);
-            let ray = self.scene.camera.ray(width, height, x * width as f32, y * height as f32, lens);
+            let ray = self.context.scene.camera.ray(width, height, x * width as f32, y * height as f32, lens);
             self.follow(ray, &sampler, vertices);
         }
     }
 
     /// Follows one path until all `vertices` are filled, or it ends.
     fn follow(&self, ray: Ray, sampler: &Sampler, vertices: &mut [Vertex]) {
-        let (context, counters) = (self.context(), &mut Counters::default());
+        let (context, counters) = (self.context, &mut Counters::default());
         let mut segment = Segment::first(ray);
         let mut free = vertices.iter_mut();
         for surface in 0..SURFACES as u32 {
             let opacity = |n| sampler.single(dimension::CROSSING + n);
             let Some((hit, point)) = context.next_surface(&mut segment, opacity, counters) else { return };
-            let bsdf = Bsdf::at::<F>(self.scene, point.material, point.uv, point.front);
+            let bsdf = self.context.bsdf_at(&point);
             if !bsdf.is_delta() {
                 let Some(vertex) = free.next() else { return };
                 *vertex = Vertex {
@@ -264,7 +263,10 @@ impl<F: Features> PathIntegrator<'_, F> {
         for (i, direction) in outlook.directions.iter_mut().enumerate() {
             let (bin, pass) = (i % BINS, i / BINS);
             let offset = Sampler::new(self.settings.seed ^ STREAM, 1 + bin as u32, pass as u32).pair(0);
-            let at = self.lights.sample_environment(self.scene, VisibilityTable::place(bin, offset));
+            let at = self
+                .context
+                .lights
+                .sample_environment(self.context.scene, VisibilityTable::place(bin, offset));
             *direction = at.unwrap_or(Vec3::ZERO).to_array();
         }
     }
@@ -320,7 +322,7 @@ impl<F: Features> PathIntegrator<'_, F> {
             return Ok(WindowGain::default());
         }
         // Second moments, of the light in units of the environment's mean over its square.
-        let cosine_sampled = self.lights.environment_is_constant() == Some(true);
+        let cosine_sampled = self.context.lights.environment_is_constant() == Some(true);
         let before = if cosine_sampled { seen / 4.0 } else { mean(&smooth) };
         let shares = VisibilityTable::probabilities(&shares);
         let moment = |(&square, &share): (&f32, &f32)| f64::from(square) / f64::from(share);
@@ -332,7 +334,7 @@ impl<F: Features> PathIntegrator<'_, F> {
     /// Follows all rays of `glances`; tells the light, times the cosine, of each bin.
     fn send(&self, glances: &mut Glances, mut tell: impl FnMut(usize, f32)) {
         let (rays, hits) = (&glances.rays[..glances.count], &mut glances.hits[..glances.count]);
-        self.bvh.nearest_batch(self.level, rays, Coherence::Incoherent, hits);
+        self.context.nearest_batch(rays, Coherence::Incoherent, hits);
         for ((ray, cosine), hit) in rays.iter().zip(&*glances.cosines).zip(&*hits) {
             tell(ray.tag as usize, cosine * self.arriving(ray, hit));
         }
@@ -343,11 +345,11 @@ impl<F: Features> PathIntegrator<'_, F> {
         if !hit.is_some() {
             return 1.0;
         }
-        if !(F::CUTOUT && self.has_cutouts) {
+        if !self.context.has_cutouts {
             return 0.0;
         }
-        let Some((rest, transmittance)) = pass_cutout::<F>(self.scene, ray, hit) else { return 0.0 };
+        let Some((rest, transmittance)) = self.context.pass_cutout(ray, hit) else { return 0.0 };
         let light = Rgb::splat(transmittance);
-        passing::<F>(self.scene, self.bvh, self.level, rest, light, &mut 0).unwrap_or_default().x
+        self.context.transmit(rest, light, &mut 0).unwrap_or_default().x
     }
 }

@@ -1,11 +1,12 @@
-//! The scene as transport sees it: geometry, its hierarchy and the instruction set, and the walk from surface to
+//! The scene as transport sees it: geometry, hierarchy, lights and instruction set, and the walk from surface to
 //! surface that all subpaths share.
 
 use crate::Level;
-use crate::bsdf::Features;
-use crate::bvh::Bvh;
+use crate::bsdf::{Bsdf, Features};
+use crate::bvh::{Bvh, Coherence};
 use crate::geometry::{Hit, MISS, Ray};
-use crate::scene::{Scene, SurfacePoint};
+use crate::light::LightSampler;
+use crate::scene::{Material, Scene, SurfacePoint};
 use crate::transport::estimator::{Counters, MAX_CROSSINGS};
 use core::marker::PhantomData;
 use glam::Vec3;
@@ -17,8 +18,14 @@ pub struct SceneContext<'a, F> {
     pub scene: &'a Scene<'a>,
     /// The hierarchy over its triangles.
     pub bvh: &'a Bvh<'a>,
+    /// Its lights.
+    pub lights: &'a LightSampler<'a>,
     /// Highest instruction set to use.
     pub level: Level,
+    /// Whether a shadow ray may go on behind a hit, as some surfaces let a part of the light through.
+    pub(in crate::transport) has_cutouts: bool,
+    /// Whether some surfaces may reflect or refract into one direction only.
+    pub(in crate::transport) has_mirrors: bool,
     features: PhantomData<F>,
 }
 
@@ -47,9 +54,42 @@ impl Segment {
 }
 
 impl<'a, F: Features> SceneContext<'a, F> {
-    /// Scene and hierarchy, for rays by instructions up to `level`.
-    pub fn new(scene: &'a Scene<'a>, bvh: &'a Bvh<'a>, level: Level) -> Self {
-        Self { scene, bvh, level, features: PhantomData }
+    /// Scene, hierarchy and lights, for rays by instructions up to `level`.
+    pub fn new(scene: &'a Scene<'a>, bvh: &'a Bvh<'a>, lights: &'a LightSampler<'a>, level: Level) -> Self {
+        let has_cutouts = F::CUTOUT && scene.materials.iter().any(Material::has_cutout);
+        let has_mirrors = scene.materials.iter().any(|material| material.surface.may_be_smooth());
+        Self { scene, bvh, lights, level, has_cutouts, has_mirrors, features: PhantomData }
+    }
+
+    /// The nearest hit of `ray`.
+    #[inline]
+    pub(in crate::transport) fn nearest(&self, ray: &Ray) -> Hit {
+        self.bvh.nearest(self.level, ray)
+    }
+
+    /// The nearest hits of `rays`.
+    #[inline]
+    pub(in crate::transport) fn nearest_batch(&self, rays: &[Ray], coherence: Coherence, hits: &mut [Hit]) {
+        self.bvh.nearest_batch(self.level, rays, coherence, hits);
+    }
+
+    /// The surface point that `ray` met by `hit`.
+    #[inline]
+    pub(in crate::transport) fn surface_at(&self, ray: &Ray, hit: &Hit) -> Option<SurfacePoint<'a>> {
+        SurfacePoint::at::<F>(self.scene, ray, hit).filter(|_| hit.is_some())
+    }
+
+    /// The BSDF at `point`.
+    #[inline]
+    pub(in crate::transport) fn bsdf_at(&self, point: &SurfacePoint) -> Bsdf {
+        Bsdf::at::<F>(self.scene, point.material, point.uv, point.front)
+    }
+
+    /// Whether photons are stored on the bases of narrow coats alone ([`Bsdf::is_varnished`]), whose coats are then
+    /// sampled apart: where every light can be met by chance.
+    #[inline]
+    pub(in crate::transport) fn separates_coats(&self) -> bool {
+        !self.lights.have_deltas()
     }
 
     /// Whether a ray that started on triangle `left` passes `point` as if it were not there: by a cut-out, whose
@@ -77,7 +117,7 @@ impl<'a, F: Features> SceneContext<'a, F> {
         counters: &mut Counters,
     ) -> Option<(Hit, SurfacePoint<'a>)> {
         counters.rays += 1;
-        let hit = self.bvh.nearest(self.level, &segment.ray);
+        let hit = self.nearest(&segment.ray);
         self.surface_from(hit, segment, random, counters)
     }
 
@@ -90,7 +130,7 @@ impl<'a, F: Features> SceneContext<'a, F> {
         counters: &mut Counters,
     ) -> Option<(Hit, SurfacePoint<'a>)> {
         loop {
-            let point = SurfacePoint::at::<F>(self.scene, &segment.ray, &hit).filter(|_| hit.is_some())?;
+            let point = self.surface_at(&segment.ray, &hit)?;
             let (crossings, length) = (segment.crossings, segment.length + hit.t);
             if !self.is_passed(&point, &hit, segment.triangle, || random(crossings)) {
                 segment.length = length;
@@ -103,7 +143,7 @@ impl<'a, F: Features> SceneContext<'a, F> {
             let onward = segment.onward(&point, &hit, segment.ray.direction.into());
             *segment = Segment { crossings: crossings + 1, length, ..onward };
             counters.rays += 1;
-            hit = self.bvh.nearest(self.level, &segment.ray);
+            hit = self.nearest(&segment.ray);
         }
     }
 }

@@ -4,19 +4,18 @@
 //! All paths of a task advance together, so that the tracer sees batches of rays. Path `i` of map `n` follows from
 //! (seed, n, i) alone.
 
+use crate::Rgb;
 use crate::bsdf::{Bsdf, BsdfSample, Features};
-use crate::bvh::{Bvh, Coherence};
+use crate::bvh::Coherence;
 use crate::geometry::{Hit, Ray};
-use crate::light::{EMISSION_DIMENSIONS, EmissionSampler, LightSampler};
+use crate::light::{EMISSION_DIMENSIONS, EmissionSampler};
 use crate::memory::{Arena, Footprint, OutOfMemory};
 use crate::photon::Photon;
 use crate::sampling::{Numbers, Sampler, mix};
-use crate::scene::{Scene, SurfacePoint};
+use crate::scene::SurfacePoint;
 use crate::transport::estimator::{CERTAIN_BELOW, Counters, MAX_CROSSINGS, is_cut};
 use crate::transport::walk::context::SceneContext;
-use crate::{Level, Rgb};
 use bytemuck::{Pod, Zeroable};
-use core::marker::PhantomData;
 use glam::Vec3;
 
 /// Light paths of a task.
@@ -130,16 +129,12 @@ pub(in crate::transport) trait Visitor {
 /// What is shot: all but its visitor.
 #[derive(Clone, Copy)]
 pub(in crate::transport) struct LightWalk<'a, F> {
-    pub scene: &'a Scene<'a>,
-    pub bvh: &'a Bvh<'a>,
-    pub lights: &'a LightSampler<'a>,
+    pub context: SceneContext<'a, F>,
     pub emission: &'a EmissionSampler<'a>,
     pub seed: u32,
     /// Light paths of a map.
     pub paths: u32,
     pub max_depth: u32,
-    pub level: Level,
-    pub features: PhantomData<F>,
 }
 
 impl<F: Features> LightWalk<'_, F> {
@@ -174,7 +169,9 @@ impl<F: Features> LightWalk<'_, F> {
         let mut active = 0;
         for (i, state) in states.iter_mut().enumerate().take(paths) {
             let number = (first + i) as u32;
-            if let Some(emitted) = self.emission.emit(self.scene, self.lights, &numbers_of(number)) {
+            if let Some(emitted) =
+                self.emission.emit(self.context.scene, self.context.lights, &numbers_of(number))
+            {
                 *state = LightPathState {
                     power: (emitted.power / self.paths as f32).to_array(),
                     number,
@@ -192,7 +189,7 @@ impl<F: Features> LightWalk<'_, F> {
         }
         while active > 0 {
             counters.rays += active as u64;
-            self.bvh.nearest_batch(self.level, &rays[..active], Coherence::Incoherent, &mut hits[..active]);
+            self.context.nearest_batch(&rays[..active], Coherence::Incoherent, &mut hits[..active]);
             let mut going_on = 0;
             for i in 0..active {
                 let (ray, hit) = (rays[i], hits[i]);
@@ -218,12 +215,10 @@ impl<F: Features> LightWalk<'_, F> {
         visitor: &mut V,
         counters: &mut Counters,
     ) -> Option<Ray> {
-        let scene = self.scene;
-        let point = SurfacePoint::at::<F>(scene, ray, hit).filter(|_| hit.is_some())?;
+        let point = self.context.surface_at(ray, hit)?;
         let direction = Vec3::from(ray.direction);
-        let context = SceneContext::<F>::new(scene, self.bvh, self.level);
         let opacity = || numbers.single(CROSSING + state.crossings);
-        if context.is_passed(&point, hit, state.triangle, opacity) {
+        if self.context.is_passed(&point, hit, state.triangle, opacity) {
             if state.crossings >= MAX_CROSSINGS {
                 counters.dropped.unfinished += 1;
                 return None;
@@ -235,7 +230,7 @@ impl<F: Features> LightWalk<'_, F> {
         if state.segments >= self.max_depth {
             return None;
         }
-        let bsdf = Bsdf::at::<F>(scene, point.material, point.uv, point.front);
+        let bsdf = self.context.bsdf_at(&point);
         let first = EMISSION_DIMENSIONS + V::DIMENSIONS * (state.segments - 1);
         let vertex = Vertex { point: &point, bsdf: &bsdf, to_light: -direction, numbers, first };
         let onward = visitor.meet(state, &vertex, counters)?;

@@ -1,16 +1,17 @@
-//! Rays from a surface point to a light, and what cut-outs on their way let through.
+//! Shadow rays from a surface point to a light, and the fraction of the light that cut-outs on their way transmit.
 
+use crate::Rgb;
 use crate::bsdf::Features;
-use crate::bvh::Bvh;
+use crate::bvh::Coherence;
 use crate::geometry::{Hit, Ray};
 use crate::light::LightSample;
-use crate::scene::{Scene, SurfacePoint};
+use crate::scene::SurfacePoint;
 use crate::transport::estimator::MAX_CROSSINGS;
-use crate::{Level, Rgb};
+use crate::transport::walk::context::SceneContext;
 use glam::Vec3;
 
-/// The ray that meets what hides the light of `sample` from `point`, and neither end. `None` where the light, moved off
-/// its surface, is no longer on the side on which it was seen: rounding may put a point of a light's own back before it.
+/// The shadow ray from `point` to the light of `sample`, which meets neither end. `None` where the light, moved off its
+/// surface, is no longer on the side on which it was seen: rounding may put `point` behind the light that it lies on.
 #[inline]
 pub(in crate::transport) fn shadow_ray(point: &SurfacePoint, sample: &LightSample) -> Option<Ray> {
     if let Some(target) = sample.target {
@@ -28,52 +29,114 @@ pub(in crate::transport) fn shadow_ray(point: &SurfacePoint, sample: &LightSampl
 /// Fewer rays than this are followed one by one: a batch takes some time to set up.
 pub(in crate::transport) const FEW: usize = 32;
 
-/// What of `light` passes along `ray`, cut-outs included. `None` where there are too many of them. Counts the rays
-/// that this takes.
-pub(in crate::transport) fn passing<F: Features>(
-    scene: &Scene,
-    bvh: &Bvh,
-    level: Level,
-    mut ray: Ray,
-    mut light: Rgb,
-    rays: &mut u64,
-) -> Option<Rgb> {
-    for _ in 0..=MAX_CROSSINGS {
-        *rays += 1;
-        let hit = bvh.nearest(level, &ray);
-        if !hit.is_some() {
-            return Some(light);
-        }
-        let Some((rest, transmittance)) = pass_cutout::<F>(scene, &ray, &hit) else { return Some(Rgb::ZERO) };
-        light *= transmittance;
-        ray = rest;
-    }
-    None
+/// Shadow rays that are traced together, with working memory for as many.
+pub(in crate::transport) struct ShadowRays<'w> {
+    pub(in crate::transport) rays: &'w mut [Ray],
+    /// Contribution of each ray if nothing is in its way.
+    pub(in crate::transport) light: &'w mut [[f32; 3]],
+    pub(in crate::transport) hits: &'w mut [Hit],
+    pub(in crate::transport) hidden: &'w mut [u8],
 }
 
-/// Behind the surface that a shadow ray met: the rest of the ray, and the factor on its light. `None` where
-/// nothing passes.
-pub(in crate::transport) fn pass_cutout<F: Features>(
-    scene: &Scene,
-    ray: &Ray,
-    hit: &Hit,
-) -> Option<(Ray, f32)> {
-    // Most are opaque, which is known before anything is computed.
-    let triangle = scene.mesh.triangles.get(hit.triangle as usize)?;
-    if !scene.materials.get(triangle.material as usize)?.has_cutout() {
-        return None;
+impl<F: Features> SceneContext<'_, F> {
+    /// Traces the first `count` of `shadows`, and calls `arrive` with each ray that reaches its light and with the light
+    /// that cut-outs transmit. Returns the number of rays that met too many cut-outs. Adds to the number of `rays`.
+    pub(in crate::transport) fn trace_shadow_rays(
+        &self,
+        shadows: &mut ShadowRays,
+        count: usize,
+        rays: &mut u64,
+        mut arrive: impl FnMut(&Ray, Rgb),
+    ) -> u64 {
+        if self.has_cutouts {
+            return self.trace_through_cutouts(shadows, count, rays, arrive);
+        }
+        *rays += count as u64;
+        let ShadowRays { rays, light, hidden, .. } = shadows;
+        let (rays, hidden) = (&rays[..count], &mut hidden[..count]);
+        self.bvh.occluded_batch(self.level, rays, hidden);
+        for ((ray, light), hidden) in rays.iter().zip(&**light).zip(&*hidden) {
+            if *hidden == 0 {
+                arrive(ray, Rgb::from(*light));
+            }
+        }
+        0
     }
-    let point = SurfacePoint::at::<F>(scene, ray, hit)?;
-    let opacity = point.material.opacity.at::<F>(scene, point.uv);
-    let transmittance = 1.0 - opacity.clamp(0.0, 1.0);
-    // What is no number lets nothing pass.
-    (transmittance > 0.0).then(|| {
-        let direction = Vec3::from(ray.direction);
-        let rest = if ray.t_max == f32::INFINITY {
-            point.spawn(direction)
-        } else {
-            point.spawn_to(Vec3::from(ray.origin) + direction)
-        };
-        (Ray { tag: ray.tag, ..rest }, transmittance)
-    })
+
+    /// The same where some surfaces have cut-outs: round after round, each ray to its next surface.
+    fn trace_through_cutouts(
+        &self,
+        shadows: &mut ShadowRays,
+        mut count: usize,
+        traced: &mut u64,
+        mut arrive: impl FnMut(&Ray, Rgb),
+    ) -> u64 {
+        let ShadowRays { rays, light, hits, .. } = shadows;
+        for _ in 0..=MAX_CROSSINGS {
+            if count <= FEW {
+                break;
+            }
+            *traced += count as u64;
+            self.nearest_batch(&rays[..count], Coherence::Incoherent, &mut hits[..count]);
+            let mut left = 0;
+            for i in 0..count {
+                let (ray, contribution, hit) = (rays[i], Rgb::from(light[i]), hits[i]);
+                if !hit.is_some() {
+                    arrive(&ray, contribution);
+                } else if let Some((rest, transmittance)) = self.pass_cutout(&ray, &hit) {
+                    rays[left] = rest;
+                    light[left] = (contribution * transmittance).to_array();
+                    left += 1;
+                }
+            }
+            count = left;
+        }
+        let mut unfinished = 0;
+        for (ray, light) in rays[..count].iter().zip(&**light) {
+            match self.transmit(*ray, Rgb::from(*light), traced) {
+                Some(light) if light != Rgb::ZERO => arrive(ray, light),
+                Some(_) => {}
+                None => unfinished += 1,
+            }
+        }
+        unfinished
+    }
+
+    /// The part of `light` that arrives along `ray`, through cut-outs as well. `None` where the ray met too many of them.
+    /// Adds to the number of `rays`.
+    pub(in crate::transport) fn transmit(&self, mut ray: Ray, mut light: Rgb, rays: &mut u64) -> Option<Rgb> {
+        for _ in 0..=MAX_CROSSINGS {
+            *rays += 1;
+            let hit = self.nearest(&ray);
+            if !hit.is_some() {
+                return Some(light);
+            }
+            let Some((rest, transmittance)) = self.pass_cutout(&ray, &hit) else { return Some(Rgb::ZERO) };
+            light *= transmittance;
+            ray = rest;
+        }
+        None
+    }
+
+    /// The rest of a shadow ray behind its `hit`, and the factor on its light. `None` where nothing passes.
+    pub(in crate::transport) fn pass_cutout(&self, ray: &Ray, hit: &Hit) -> Option<(Ray, f32)> {
+        // Most are opaque, which is known before anything is computed.
+        let triangle = self.scene.mesh.triangles.get(hit.triangle as usize)?;
+        if !self.scene.materials.get(triangle.material as usize)?.has_cutout() {
+            return None;
+        }
+        let point = self.surface_at(ray, hit)?;
+        let opacity = point.material.opacity.at::<F>(self.scene, point.uv);
+        let transmittance = 1.0 - opacity.clamp(0.0, 1.0);
+        // A NaN transmits nothing.
+        (transmittance > 0.0).then(|| {
+            let direction = Vec3::from(ray.direction);
+            let rest = if ray.t_max == f32::INFINITY {
+                point.spawn(direction)
+            } else {
+                point.spawn_to(Vec3::from(ray.origin) + direction)
+            };
+            (Ray { tag: ray.tag, ..rest }, transmittance)
+        })
+    }
 }

@@ -20,10 +20,10 @@ pub(super) fn find<F: Features>(
     scratch: &mut [Vec<Line>],
     memory: &mut Memory,
 ) -> Result<Drawer, RenderError> {
-    let Stage { scene, bvh, settings, workers, .. } = *stage;
+    let Stage { scene, bvh, lights, settings, workers } = *stage;
     let mut places = Drawer::of(PLACES, raster.rays(), memory)?;
     let look = |task: usize, _: &mut Arena, out: &mut [Photon]| {
-        Ok(raster.run(task, &SceneContext::<F>::new(scene, bvh, settings.level), settings.seed, out))
+        Ok(raster.run(task, &SceneContext::<F>::new(scene, bvh, lights, settings.level), settings.seed, out))
     };
     places.fill_with(workers, |photons| {
         Ok(workers.look(photons, VisiblePointSampler::TASK, scratch, &look)?)
