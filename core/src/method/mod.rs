@@ -4,16 +4,19 @@
 //! scene needs, and adds samples to a film in [`Round`]s. An [`Executor`] of the caller runs the tasks of its passes:
 //! no method knows of threads, clocks or files.
 
+pub mod emission_guide;
 pub mod executor;
 pub mod path;
+pub mod photon_map;
 pub mod photon_map_store;
-pub mod photon_use;
+pub mod photons;
 pub mod pilot;
 pub mod round;
+pub mod sppm;
 
 pub use executor::{Executor, Loop, Passed, Worker};
 pub use photon_map_store::{PhotonMapPair, PhotonMapStore};
-pub use photon_use::{MapUse, PhotonUse};
+pub use photons::{MapUse, PhotonSettings, PhotonUse};
 pub use round::{RenderState, Round, Shard};
 
 use crate::Level;

@@ -124,9 +124,9 @@ pub(super) fn look_first<'l, F: Features>(
 }
 
 /// Takes the memory, sets the method up, and hands it to `then`.
-pub(super) fn with<F: Features, T>(
-    stage: &Stage,
-    memory: &mut Memory,
+pub(super) fn with<'a, F: Features, T>(
+    stage: &Stage<'a>,
+    memory: &mut Memory<'a>,
     then: impl FnOnce(&mut dyn Renderer, &mut Memory) -> Result<T, RenderError>,
 ) -> Result<T, RenderError> {
     let mut paths = Paths::<F>::with_scratch(stage, memory, scratch::<F>())?;
@@ -142,8 +142,7 @@ pub(super) fn with<F: Features, T>(
     if is_all {
         drop((lines, paths));
         ["emission", "paths"].into_iter().for_each(|structure| memory.give_back(structure));
-        let mut lamps = Vec::new();
-        return then(&mut ProgressivePhotons::<F>::new(stage, memory, &mut lamps)?, memory);
+        return then(&mut ProgressivePhotons::<F>::new(stage, memory)?, memory);
     }
     let Some(cast) = cast else {
         drop(lines);

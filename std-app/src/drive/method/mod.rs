@@ -4,7 +4,6 @@
 //! [`Crew`] runs in parallel ("The unit of work" in docs/architecture.md). To add a method: a variant of [`Method`]
 //! with its words, a file with its [`Renderer`], a line in [`Method::with`].
 
-mod aiming;
 mod cache_memory;
 mod cache_settings;
 mod caster;
@@ -16,8 +15,6 @@ mod overture;
 mod path;
 mod photon_map;
 mod photon_view;
-mod photons;
-mod places;
 mod sppm;
 #[cfg(test)]
 mod wrong;
@@ -25,11 +22,10 @@ mod wrong;
 pub use cache_settings::{CacheSettings, CacheUse};
 pub use caustics::CausticUse;
 pub(super) use caustics::unseen;
-pub use halflight_core::method::{MapUse, PhotonUse};
+pub use halflight_core::method::{MapUse, PhotonSettings, PhotonUse};
 pub(super) use irradiance_cache::LEAST_PIXELS;
 pub(super) use overture::{Growing, Overture};
 pub use photon_view::{MapView, PhotonView};
-pub use photons::PhotonSettings;
 
 use super::crew::Crew;
 use super::kept::Kept;
@@ -139,23 +135,19 @@ impl Method {
     }
 
     /// Takes the memory that it needs, sets it up on `stage`, and hands it to `then`.
-    pub(super) fn with<F: Features, T>(
+    pub(super) fn with<'a, F: Features, T>(
         self,
-        stage: &Stage,
-        memory: &mut Memory,
+        stage: &Stage<'a>,
+        memory: &mut Memory<'a>,
         then: impl FnOnce(&mut dyn Renderer, &mut Memory) -> Result<T, RenderError>,
     ) -> Result<T, RenderError> {
         match self {
             Method::Path if caustics::are_possible(stage) => caustics::with::<F, T>(stage, memory, then),
             Method::Path => then(&mut path::Paths::<F>::new(stage, memory)?, memory),
             Method::IrradianceCache => irradiance_cache::with::<F, T>(stage, memory, then),
-            Method::PhotonMap => {
-                let mut lamps = Default::default();
-                then(&mut photon_map::TwoPasses::<F>::new(stage, memory, &mut lamps)?, memory)
-            }
+            Method::PhotonMap => then(&mut photon_map::TwoPasses::<F>::new(stage, memory)?, memory),
             Method::ProgressivePhotons => {
-                let mut lamps = Vec::new();
-                then(&mut sppm::ProgressivePhotons::<F>::new(stage, memory, &mut lamps)?, memory)
+                then(&mut sppm::ProgressivePhotons::<F>::new(stage, memory)?, memory)
             }
             #[cfg(test)]
             Method::Wrong => then(&mut wrong::Wrong::<F>::new(stage, memory)?, memory),

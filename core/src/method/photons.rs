@@ -1,6 +1,18 @@
-//! Statistics of photon maps, for reports.
+//! Settings and statistics of methods with photon maps.
 
+use crate::photon::Kernel;
 use crate::transport::photon_mapping::deposit::PATHS;
+
+/// Photon maps of a picture.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct PhotonSettings {
+    /// Weight of a photon by its distance.
+    pub kernel: Kernel,
+    /// Light paths of a global map; `None`: by the number of pixels.
+    pub global: Option<u32>,
+    /// Light paths of a caustic map; `None`: by the number of pixels.
+    pub caustic: Option<u32>,
+}
 
 /// Maps of one kind.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -28,8 +40,8 @@ impl MapUse {
     }
 
     /// Counts a map of `paths` light paths that left `stored` photons.
-    pub fn add(&mut self, paths: u64, stored: usize) {
-        self.shot += paths;
+    pub fn add(&mut self, paths: usize, stored: usize) {
+        self.shot += paths as u64;
         self.stored += stored as u64;
     }
 }
