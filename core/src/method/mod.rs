@@ -77,3 +77,6 @@ pub trait Method {
     /// [`OutOfMemory`] where the scratch of the executor is too small.
     fn round<E: Executor>(&mut self, round: &mut Round<E>) -> Result<(), OutOfMemory>;
 }
+
+#[cfg(test)]
+mod tests;

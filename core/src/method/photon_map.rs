@@ -245,10 +245,12 @@ impl<F: Features> Method for PhotonMapping<'_, F> {
             }
             let [even, odd] = &mut self.halves;
             let (Some(even), Some(odd)) = (even.built()?, odd.built()?) else { break };
-            let lookup = |map: &_| progressive(map, self.radii, group).with_kernel(self.kernel);
-            let maps = [&even, &odd].map(|built| PhotonMaps {
-                global: GlobalMapLookup::new(&built.global, &built.irradiances, self.farthest, self.kernel),
-                caustic: built.caustic.as_ref().map(|map| lookup(map).of_caustics()),
+            let Self { farthest, radii, kernel, .. } = *self;
+            let maps = [&even, &odd].map(|Built { global, irradiances, caustic }| PhotonMaps {
+                global: GlobalMapLookup::new(global, irradiances, farthest, kernel),
+                caustic: caustic
+                    .as_ref()
+                    .map(|map| progressive(map, radii, group).with_kernel(kernel).of_caustics()),
             });
             let integrator = self.integrator.with_maps(&maps);
             round.tiles((group + 1) * GROUP, |tile, samples, scratch, pixels| {
