@@ -52,9 +52,9 @@ pub fn render(memory: &mut [Line; LINES], pixels: &mut [Rgb; SIZE * SIZE]) -> Re
     let bvh = Bvh::build(&scene.mesh, &mut arena)?;
     let lights = LightSampler::build(&scene, &mut arena)?;
     let mut film = Film::new(SIZE as u32, SIZE as u32, &mut arena)?;
-    let settings =
-        PathSettings { width: SIZE as u32, height: SIZE as u32, seed: 1, max_depth: 8, reuse: true };
-    let tracer = PathIntegrator::<DiffuseOnly>::new(&scene, &bvh, &lights, settings, Level::BASELINE);
+    let settings = PathSettings { width: SIZE as u32, height: SIZE as u32, seed: 1, max_depth: 8 };
+    let tracer =
+        PathIntegrator::<DiffuseOnly>::new(&scene, &bvh, &lights, settings, Level::BASELINE).with_reuse();
     for (task, tile) in film.pixels_mut().chunks_mut(PIXELS_PER_TILE).enumerate() {
         tracer.run(task, 0..PATHS, 64, &mut arena, tile)?;
     }

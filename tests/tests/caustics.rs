@@ -59,7 +59,8 @@ fn pictures(scene: &Scene, first: u32, (tasks, pixels, is_beside): Shot, max_dep
     let mut emission_lines = lines(EmissionSampler::footprint(&lights));
     let emission =
         EmissionSampler::build(scene, &lights, &bvh.bounds(), &mut arena(&mut emission_lines)).unwrap();
-    let mut scratch = lines(PathIntegrator::<All>::scratch(2048).or(CausticPhotonTracer::<All>::scratch()));
+    let paths = PathIntegrator::<All>::scratch_with::<((), CausticMerging), ()>(2048);
+    let mut scratch = lines(paths.or(CausticPhotonTracer::<All>::scratch()));
     let mut scratch = arena(&mut scratch);
     let mut film_lines = lines(Film::footprint(SIZE, SIZE));
     let mut photon_lines = [0, 1].map(|_| lines(Photons::footprint(tasks * ROOM)));
@@ -86,17 +87,18 @@ fn pictures(scene: &Scene, first: u32, (tasks, pixels, is_beside): Shot, max_dep
             photons.build(tasks * ROOM)
         };
         let maps = [shoot(even), shoot(odd)];
-        let settings = PathSettings { width: SIZE, height: SIZE, seed, max_depth, reuse: false };
-        let mut tracer = PathIntegrator::<All>::new(scene, &bvh, &lights, settings, level);
-        if tasks > 0 {
-            assert!(tasks == 1 || is_beside || !maps[0].is_empty());
-            let merging = CausticMerging::new([&maps[0], &maps[1]], &emission, discs, paths);
-            tracer = tracer.with_caustics(merging.beside_records(is_beside));
-        }
+        let settings = PathSettings { width: SIZE, height: SIZE, seed, max_depth };
+        let tracer = PathIntegrator::<All>::new(scene, &bvh, &lights, settings, level);
+        let merging = CausticMerging::new([&maps[0], &maps[1]], &emission, discs, paths);
+        let merging = tracer.with_caustics(merging.beside_records(is_beside));
+        assert!(tasks <= 1 || is_beside || !maps[0].is_empty());
         let mut film = Film::new(SIZE, SIZE, &mut arena(&mut film_lines)).unwrap();
         film.pixels_mut().fill(Default::default());
         for (task, out) in film.pixels_mut().chunks_mut(halflight_core::film::PIXELS_PER_TILE).enumerate() {
-            let counters = tracer.run(task, 0..16, 2048, &mut scratch, out).unwrap();
+            let counters = match tasks {
+                0 => tracer.run(task, 0..16, 2048, &mut scratch, out).unwrap(),
+                _ => merging.run(task, 0..16, 2048, &mut scratch, out).unwrap(),
+            };
             assert_eq!(counters.dropped.total(), 0);
         }
         let all = (0..SIZE * SIZE).map(|i| film.pixel(i % SIZE, i / SIZE).mean().to_array());

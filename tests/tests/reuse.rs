@@ -10,7 +10,7 @@ use halflight_core::film::Film;
 use halflight_core::light::LightSampler;
 use halflight_core::memory::{Arena, Footprint, Line};
 use halflight_core::scene::{Material, Scene, Surface};
-use halflight_core::transport::{PathIntegrator, PathSettings, UNLIMITED};
+use halflight_core::transport::{PathIntegrator, PathReuse, PathSettings, UNLIMITED};
 use halflight_core::{Level, Rgb};
 use halflight_tests::scenes::{SceneBuffers, cornell_box, emitter, everything};
 use halflight_tests::statistics::{agree, blocks};
@@ -123,15 +123,16 @@ fn bits_hang_on_neither_threads_nor_waves_nor_rounds() {
             assert_eq!(other, image, "{level:?}");
         }
 
-        let settings = PathSettings { width: SIZE, height: SIZE, seed: 3, max_depth: UNLIMITED, reuse: true };
+        let settings = PathSettings { width: SIZE, height: SIZE, seed: 3, max_depth: UNLIMITED };
         let mut bvh_lines = lines(Bvh::footprint(scene.mesh.triangles.len()));
         let bvh = Bvh::build(&scene.mesh, &mut Arena::new(bytemuck::cast_slice_mut(&mut bvh_lines))).unwrap();
         let mut light_lines = lines(LightSampler::footprint(&scene).and(LightSampler::scratch(&scene)));
         let lights =
             LightSampler::build(&scene, &mut Arena::new(bytemuck::cast_slice_mut(&mut light_lines))).unwrap();
-        let tracer = PathIntegrator::<All>::new(&scene, &bvh, &lights, settings, Level::detect());
+        let tracer =
+            PathIntegrator::<All>::new(&scene, &bvh, &lights, settings, Level::detect()).with_reuse();
         let picture = |wave: usize, cuts: &[u32]| {
-            let mut scratch = lines(PathIntegrator::<All>::scratch(wave));
+            let mut scratch = lines(PathIntegrator::<All>::scratch_with::<(), PathReuse>(wave));
             let mut scratch = Arena::new(bytemuck::cast_slice_mut(&mut scratch));
             let mut film_lines = lines(Film::footprint(SIZE, SIZE));
             let mut film =

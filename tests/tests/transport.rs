@@ -59,7 +59,7 @@ fn bits_do_not_depend_on_threads_or_level() {
 fn the_wavefront_is_the_textbook_to_the_bit_for_any_wave() {
     for buffers in [cornell_box(), everything(), room_with_lamp(0.3, 5.0)] {
         let scene = buffers.scene();
-        let settings = PathSettings { width: 24, height: 20, seed: 3, max_depth: UNLIMITED, reuse: false };
+        let settings = PathSettings { width: 24, height: 20, seed: 3, max_depth: UNLIMITED };
         let samples = 0..3;
         let mut bvh_lines = lines(Bvh::footprint(scene.mesh.triangles.len()));
         let bvh = Bvh::build(&scene.mesh, &mut Arena::new(bytemuck::cast_slice_mut(&mut bvh_lines))).unwrap();
@@ -90,7 +90,7 @@ fn the_wavefront_is_the_textbook_to_the_bit_for_any_wave() {
 fn in_the_box(work: impl FnOnce(&PathIntegrator<All>)) {
     let buffers = cornell_box();
     let scene = buffers.scene();
-    let settings = PathSettings { width: 16, height: 16, seed: 0, max_depth: UNLIMITED, reuse: false };
+    let settings = PathSettings { width: 16, height: 16, seed: 0, max_depth: UNLIMITED };
     let mut bvh_lines = lines(Bvh::footprint(scene.mesh.triangles.len()));
     let bvh = Bvh::build(&scene.mesh, &mut Arena::new(bytemuck::cast_slice_mut(&mut bvh_lines))).unwrap();
     let mut light_lines = lines(LightSampler::footprint(&scene).and(LightSampler::scratch(&scene)));

@@ -1,11 +1,11 @@
-//! Path tracing with next-event estimation and multiple importance sampling (Kajiya 1986; Veach 1997, chapter 9), and
-//! path reuse among neighbouring pixels (Bekaert et al. 2002) where a pilot finds that it pays.
+//! Path tracing with next-event estimation and multiple importance sampling (Kajiya 1986; Veach 1997, chapter
+//! 9), and path reuse among neighbouring pixels (Bekaert et al. 2002) where a pilot finds that it pays.
 
 use super::executor::Executor;
 use super::{Method, RenderContext, Round, pilot};
 use crate::bsdf::Features;
 use crate::memory::{Footprint, OutOfMemory};
-use crate::transport::{PathIntegrator, Pilot, path::WAVE};
+use crate::transport::{PathIntegrator, PathReuse, Pilot, path::WAVE};
 
 /// Whether neighbouring pixels reuse paths.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -28,7 +28,7 @@ pub struct PathTracing<'a, F> {
 impl<'a, F: Features> PathTracing<'a, F> {
     /// Working memory of a worker.
     pub fn scratch() -> Footprint {
-        PathIntegrator::<F>::scratch(WAVE)
+        PathIntegrator::<F>::scratch_with::<(), PathReuse>(WAVE)
     }
 
     /// Path tracing of `context`, with path `reuse` or without; `None` where a pilot decides.
@@ -53,7 +53,6 @@ impl<'a, F: Features> PathTracing<'a, F> {
                 (Reuse { used: pilot.pays(), pilot: Some(pilot) }, Some(mean))
             }
         };
-        let integrator = integrator.with_reuse(reuse.used).with_flashes(mean.unwrap_or_default());
         Ok(Self { integrator, reuse, mean })
     }
 
@@ -62,9 +61,15 @@ impl<'a, F: Features> PathTracing<'a, F> {
         Self { integrator: context.integrator(), reuse: Reuse::default(), mean: None }
     }
 
-    /// Its path tracer.
+    /// Its path tracer, without reuse.
     pub fn integrator(&self) -> &PathIntegrator<'a, F> {
         &self.integrator
+    }
+
+    /// Its path tracer with reuse, where pixels reuse paths.
+    pub fn reusing(&self) -> Option<PathIntegrator<'a, F, (), PathReuse>> {
+        let mean = self.mean.unwrap_or_default();
+        self.reuse.used.then(|| self.integrator.with_reuse().with_flashes(mean))
     }
 
     /// Whether pixels reuse paths, and why.
@@ -79,8 +84,7 @@ impl<'a, F: Features> PathTracing<'a, F> {
     pub fn mean_radiance(&mut self, executor: &mut impl Executor) -> Result<f32, OutOfMemory> {
         let mean = match self.mean {
             Some(mean) => mean,
-            // Light that neighbours contribute is not on a pixel's own paths.
-            None => pilot::mean_radiance(&self.integrator.with_reuse(false), executor)?,
+            None => pilot::mean_radiance(&self.integrator, executor)?,
         };
         self.mean = Some(mean);
         Ok(mean)
@@ -97,6 +101,11 @@ impl<'a, F: Features> PathTracing<'a, F> {
 
 impl<F: Features> Method for PathTracing<'_, F> {
     fn round<E: Executor>(&mut self, round: &mut Round<E>) -> Result<(), OutOfMemory> {
+        if let Some(integrator) = self.reusing() {
+            return round.tiles(u32::MAX, |tile, samples, scratch, pixels| {
+                integrator.run(tile, samples, WAVE, scratch, pixels)
+            });
+        }
         let integrator = &self.integrator;
         round.tiles(u32::MAX, |tile, samples, scratch, pixels| {
             integrator.run(tile, samples, WAVE, scratch, pixels)

@@ -3,14 +3,16 @@
 use super::executor::Executor;
 use crate::bsdf::Features;
 use crate::memory::{Arena, OutOfMemory};
-use crate::transport::{Counters, PathIntegrator, Pilot, path::WAVE, path::reuse_pilot::PILOT_TILES};
+use crate::transport::{
+    Counters, Estimator, PathIntegrator, Pilot, path::WAVE, path::reuse_pilot::PILOT_TILES,
+};
 
 /// The mean radiance of the picture.
 ///
 /// # Errors
-/// [`OutOfMemory`] where scratch has less than [`PathIntegrator::scratch`] bytes.
-pub fn mean_radiance<F: Features>(
-    integrator: &PathIntegrator<F>,
+/// [`OutOfMemory`] where scratch has less than [`PathIntegrator::scratch_with`] bytes.
+pub fn mean_radiance<F: Features, E: Estimator<F>>(
+    integrator: &PathIntegrator<F, E>,
     executor: &mut impl Executor,
 ) -> Result<f32, OutOfMemory> {
     mean(integrator, executor, |tile, arena| integrator.pilot_mean(tile, WAVE, arena))
@@ -20,15 +22,15 @@ pub fn mean_radiance<F: Features>(
 ///
 /// # Errors
 /// Those of [`mean_radiance`].
-pub fn mean_radiance_without_photons<F: Features>(
-    integrator: &PathIntegrator<F>,
+pub fn mean_radiance_without_photons<F: Features, E: Estimator<F>>(
+    integrator: &PathIntegrator<F, E>,
     executor: &mut impl Executor,
 ) -> Result<f32, OutOfMemory> {
     mean(integrator, executor, |tile, arena| integrator.pilot_rest(tile, WAVE, arena))
 }
 
-fn mean<F: Features>(
-    integrator: &PathIntegrator<F>,
+fn mean<F: Features, E: Estimator<F>>(
+    integrator: &PathIntegrator<F, E>,
     executor: &mut impl Executor,
     of_tile: impl Fn(usize, &mut Arena) -> Result<f32, OutOfMemory> + Sync,
 ) -> Result<f32, OutOfMemory> {
@@ -42,8 +44,8 @@ fn mean<F: Features>(
 ///
 /// # Errors
 /// Those of [`mean_radiance`].
-pub fn variance<F: Features>(
-    integrator: &PathIntegrator<F>,
+pub fn variance<F: Features, E: Estimator<F>>(
+    integrator: &PathIntegrator<F, E>,
     mean: f32,
     executor: &mut impl Executor,
 ) -> Result<Pilot, OutOfMemory> {
@@ -57,8 +59,8 @@ pub fn variance<F: Features>(
 }
 
 /// Fills `out` with the values of the pilot's tiles; those that the executor did not come to stay `None`.
-fn for_each_tile<F: Features, T: Send>(
-    integrator: &PathIntegrator<F>,
+fn for_each_tile<F: Features, E: Estimator<F>, T: Send>(
+    integrator: &PathIntegrator<F, E>,
     executor: &mut impl Executor,
     out: &mut [Option<T>; PILOT_TILES],
     of_tile: impl Fn(usize, &mut Arena) -> Result<T, OutOfMemory> + Sync,

@@ -109,7 +109,7 @@ impl WithFeatures for Render<'_> {
 /// What paths are told, whatever the method.
 pub(super) fn path_settings(settings: &Settings) -> PathSettings {
     let Settings { width, height, seed, max_depth, .. } = *settings;
-    PathSettings { width, height, seed, max_depth: max_depth.unwrap_or(UNLIMITED), reuse: false }
+    PathSettings { width, height, seed, max_depth: max_depth.unwrap_or(UNLIMITED) }
 }
 
 /// The hierarchy, built on all cores, then moved out of the working memory of its build into `lines`.

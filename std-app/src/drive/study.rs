@@ -136,7 +136,8 @@ impl WithFeatures for Study<'_> {
                     let settings = metric::Settings { error: looser * search.error, ..usual };
                     let least_pixels = wider * LEAST_PIXELS;
                     let gathering = Gathering { flux: &flux, metric: settings, least_pixels };
-                    let overture = Overture { tracer: &tracer, gathering, coarse: gathering.flux, size };
+                    let overture =
+                        Overture { tracer: &tracer, photons: None, gathering, coarse: gathering.flux, size };
                     overture.fill(&mut growing, &mut crew, &mut scratch)?;
                     if pass > 0 {
                         growing.tighten(0.5);

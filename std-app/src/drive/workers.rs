@@ -13,7 +13,7 @@ use halflight_core::film::{Film, PIXELS_PER_TILE, Pixel};
 use halflight_core::memory::{Arena, Line, OutOfMemory};
 use halflight_core::photon::{PhotonMap, Photons};
 use halflight_core::scene::Mesh;
-use halflight_core::transport::{Counters, PathIntegrator, Pilot, path::WAVE};
+use halflight_core::transport::{Counters, Estimator, PathIntegrator, Pilot, path::WAVE};
 use rayon::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use std::sync::Mutex;
@@ -115,9 +115,9 @@ impl<'w> Workers<'w> {
     }
 
     /// A look at a few tiles before the picture, whose mean radiance is about that.
-    pub(super) fn pilot<F: Features>(
+    pub(super) fn pilot<F: Features, E: Estimator<F>>(
         &self,
-        tracer: &PathIntegrator<F>,
+        tracer: &PathIntegrator<F, E>,
         mean: f32,
         scratch: &mut [Vec<Line>],
     ) -> Result<Pilot, OutOfMemory> {
@@ -130,18 +130,18 @@ impl<'w> Workers<'w> {
     }
 
     /// The mean radiance of the picture, by a look at the same tiles.
-    pub(super) fn pilot_mean<F: Features>(
+    pub(super) fn pilot_mean<F: Features, E: Estimator<F>>(
         &self,
-        tracer: &PathIntegrator<F>,
+        tracer: &PathIntegrator<F, E>,
         scratch: &mut [Vec<Line>],
     ) -> Result<f32, OutOfMemory> {
         self.mean_of(tracer.pilot_tasks(), scratch, |task, arena| tracer.pilot_mean(task, WAVE, arena))
     }
 
     /// The same of light that is there beside photons.
-    pub(super) fn pilot_rest<F: Features>(
+    pub(super) fn pilot_rest<F: Features, E: Estimator<F>>(
         &self,
-        tracer: &PathIntegrator<F>,
+        tracer: &PathIntegrator<F, E>,
         scratch: &mut [Vec<Line>],
     ) -> Result<f32, OutOfMemory> {
         self.mean_of(tracer.pilot_tasks(), scratch, |task, arena| tracer.pilot_rest(task, WAVE, arena))

@@ -1,35 +1,35 @@
-//! Fences around the records of the irradiance cache: where, in each direction along the surface, a record ceases to know
-//! what the surface sees. Behind a wall that is seen by rays along the surface; beneath what hangs low over it, which
-//! such rays pass under, and that the strata of the hemisphere have met.
+//! Fences around the records of the irradiance cache: where, in each direction along the surface, a record
+//! ceases to know what the surface sees. Behind a wall that is seen by rays along the surface; beneath what
+//! hangs low over it, which such rays pass under, and that the strata of the hemisphere have met.
 
 use crate::bsdf::Features;
 use crate::bvh::Coherence;
 use crate::cache::irradiance::{Record, SECTORS};
 use crate::geometry::{Frame, Hit, Ray};
 use crate::transport::cached::gather::{GatherPoint, HemisphereSamples};
-use crate::transport::estimator::Counters;
-use crate::transport::path::PathIntegrator;
+use crate::transport::path::{Estimator, PathIntegrator};
+use crate::transport::settings::Counters;
 use glam::{Vec2, Vec3};
 
 /// Rays along the surface in a ring, for each sector of a record's fence.
 const RAYS_PER_SECTOR: usize = 2;
 const RING: usize = SECTORS * RAYS_PER_SECTOR;
 
-/// By how much they rise: low enough for low walls, high enough for the surface's own roundness. Most strata are
-/// higher, and those of a second ring are between.
+/// By how much they rise: low enough for low walls, high enough for the surface's own roundness. Most strata
+/// are higher, and those of a second ring are between.
 const SLOPE: f32 = 0.05;
 const SECOND_SLOPE: f32 = 0.12;
 
-/// What is met lower than so much of its distance along the surface takes so small a part of the hemisphere that neither
-/// gradient nor Hessian tell of what is beneath it.
+/// What is met lower than so much of its distance along the surface takes so small a part of the hemisphere
+/// that neither gradient nor Hessian tell of what is beneath it.
 const LOW: f32 = 0.5;
 
 /// A wall is not nearer between two rays along the surface than by so much; what is hangs.
 const NEARER: f32 = 0.95;
 
-impl<F: Features> PathIntegrator<'_, F> {
-    /// Looks for walls around a record at `place`, and for what hangs over its surroundings in what its `strata`, which
-    /// are local to `frame`, have met.
+impl<F: Features, E: Estimator<F>> PathIntegrator<'_, F, E> {
+    /// Looks for walls around a record at `place`, and for what hangs over its surroundings in what its
+    /// `strata`, which are local to `frame`, have met.
     pub(in crate::transport) fn fence(
         &self,
         record: &mut Record,
@@ -100,8 +100,8 @@ fn azimuth(i: usize) -> f32 {
     ((i % RING) as f32 + 0.5) / RAYS_PER_SECTOR as f32
 }
 
-/// Fences off what is met at `distance` in the direction `towards`, where it is nearer than the walls that the two rays of the
-/// first ring beside it have met.
+/// Fences off what is met at `distance` in the direction `towards`, where it is nearer than the walls that
+/// the two rays of the first ring beside it have met.
 fn hang(record: &mut Record, walls: &[f32; RING], towards: Vec2, distance: f32) {
     let after = (Record::sector(towards) * RAYS_PER_SECTOR as f32 + 0.5) as usize;
     let wall = walls[(after + RING - 1) % RING].min(walls[after % RING]);

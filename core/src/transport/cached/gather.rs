@@ -1,8 +1,10 @@
-//! Final gathering for the irradiance cache: what a diffuse point sees, stratum by stratum, and the record made of it.
+//! Final gathering for the irradiance cache: what a diffuse point sees, stratum by stratum, and the record
+//! made of it.
 //!
-//! A gather ray finds the light that what it meets reflects, by path tracing on from there; what it meets emits or
-//! mirrors is direct light, which each path of the picture finds for itself ([`Components`]). All N² rays of a point make
-//! one wave, or several; blocks of 8 × 8 strata go together, so that neighbours reach the hierarchy together.
+//! A gather ray finds the light that what it meets reflects, by path tracing on from there; what it meets
+//! emits or mirrors is direct light, which each path of the picture finds for itself ([`Components`]). All N²
+//! rays of a point make one wave, or several; blocks of 8 × 8 strata go together, so that neighbours reach
+//! the hierarchy together.
 
 use crate::bsdf::Features;
 use crate::bvh::Coherence;
@@ -12,18 +14,20 @@ use crate::memory::{Arena, Footprint, OutOfMemory};
 use crate::sampling::Sampler;
 use crate::sampling::warp::cosine_hemisphere;
 use crate::scene::SurfacePoint;
-use crate::transport::estimator::{Counters, dimension};
-use crate::transport::path::reuse::ReuseState;
-use crate::transport::path::state::{Components, PathState, Wavefront};
-use crate::transport::path::{PathIntegrator, WAVE};
+use crate::transport::path::wave::PathWave;
+use crate::transport::path::{Estimator, PathIntegrator};
+use crate::transport::settings::Counters;
+use crate::transport::walk::component::Components;
+use crate::transport::walk::dimension;
+use crate::transport::wavefront::{PathState, WAVE};
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
 /// Gatherings have numbers of pixels that no picture has.
 pub(in crate::transport) const NO_PIXEL: u32 = 1 << 30;
 
-/// From so many strata along a side on those of a block go much the same way: packets save time. Of fewer they cost it, a
-/// quarter of the time of a record in Sponza with 16, a tenth with 32.
+/// From so many strata along a side on those of a block go much the same way: packets save time. Of fewer
+/// they cost it, a quarter of the time of a record in Sponza with 16, a tenth with 32.
 const NARROW: usize = 64;
 
 /// A diffuse point where the irradiance is wanted. Both normals are on the side of the viewer.
@@ -109,17 +113,10 @@ impl GatherPoint {
     /// The path of a gather ray; `index` says where its light belongs.
     pub(in crate::transport) fn path(&self, pixel: u32, sample: u32, index: usize) -> PathState {
         PathState {
-            throughput: [1.0; 3],
-            pdf: f32::INFINITY,
-            pixel,
             position: self.position,
-            place: index as u32,
-            sample,
             segments: 2,
             triangle: self.triangle,
-            eta_squared: 1.0,
-            share: Components::REFLECTED,
-            ..PathState::default()
+            ..PathState::new(pixel, index as u32, sample, Components::REFLECTED)
         }
     }
 }
@@ -175,14 +172,22 @@ impl<'m> HemisphereSamples<'m> {
 impl<F: Features> PathIntegrator<'_, F> {
     /// Working memory of [`PathIntegrator::gather`] with n × n strata.
     pub fn gather_scratch(n: usize) -> Footprint {
-        Wavefront::footprint(n.saturating_mul(n).min(WAVE)).and(HemisphereSamples::footprint(n))
+        Self::gather_scratch_with::<()>(n)
     }
 
+    /// The same with an estimator.
+    pub fn gather_scratch_with<E: Estimator<F>>(n: usize) -> Footprint {
+        let wave = PathWave::<E::State, ()>::footprint(n.saturating_mul(n).min(WAVE));
+        wave.and(HemisphereSamples::footprint(n))
+    }
+}
+
+impl<F: Features, E: Estimator<F>> PathIntegrator<'_, F, E> {
     /// Gathers at `place`. `number` names the gathering: another one, other rays. `None` where what was
     /// found is not a number; it is counted as dropped.
     ///
     /// # Errors
-    /// [`OutOfMemory`] where `scratch` has less than [`PathIntegrator::gather_scratch`].
+    /// [`OutOfMemory`] where `scratch` has less than [`PathIntegrator::gather_scratch_with`].
     pub fn gather(
         &self,
         place: &GatherPoint,
@@ -194,26 +199,26 @@ impl<F: Features> PathIntegrator<'_, F> {
         let Gathering { flux, metric, least_pixels } = *gathering;
         let n = flux.n();
         let mut arena = scratch.scratch();
-        let mut wave = Wavefront::new((n * n).min(WAVE), &mut arena)?;
+        let mut wave = PathWave::<E::State, ()>::new((n * n).min(WAVE), &mut arena)?;
         let mut strata = HemisphereSamples::new(n, metric.metric.takes_normals(), &mut arena)?;
         let frame = Frame::from_normal(place.normal());
         let mut first = 0;
         while first < n * n {
-            let count = (n * n - first).min(wave.paths.len());
+            let count = (n * n - first).min(wave.wave.paths.len());
             for i in 0..count {
                 let (ray, path) = self.aim(place, &frame, number, first + i, &mut strata);
-                wave.rays[i] = Ray { tag: i as u32, ..ray };
-                wave.paths[i] = path;
-                wave.exchanges[i] = ReuseState::new(0);
+                wave.wave.rays[i] = Ray { tag: i as u32, ..ray };
+                wave.wave.paths[i] = path;
+                wave.begin(i, 0);
             }
             counters.paths += count as u64;
             let coherence = if n >= NARROW { Coherence::Coherent } else { Coherence::Incoherent };
-            self.trace(&mut wave, count, coherence, counters);
-            for (path, hit) in wave.paths.iter().zip(&*wave.hits).take(count) {
+            wave.wave.trace(&self.context, count, coherence, counters);
+            for (path, hit) in wave.wave.paths.iter().zip(&*wave.wave.hits).take(count) {
                 self.note(path.place as usize, hit, &frame, &mut strata);
             }
             self.trace_to_end(&mut wave, count, counters);
-            for path in wave.paths.iter().take(count) {
+            for path in wave.wave.paths.iter().take(count) {
                 if let Some(slot) = strata.radiance.get_mut(path.place as usize) {
                     *slot = path.radiance;
                 }

@@ -1,105 +1,158 @@
-//! Irradiance caches as paths ask them: what a block of vertices has of reflected light is asked for at once, before
-//! they are shaded.
+//! Irradiance caches as an estimator of the path tracer: reflected light at diffuse points, looked up for a
+//! block of vertices at once.
 
-use crate::Level;
-use crate::bsdf::Features;
-use crate::cache::irradiance::{CachedIrradiance, IrradianceCache, Points, QueryPoint};
-use crate::geometry::Ray;
+use crate::bsdf::{Bsdf, Features};
+use crate::cache::irradiance::{CachedIrradiance, IrradianceCache, POINTS, Points, QueryPoint};
 use crate::scene::SurfacePoint;
-use crate::transport::estimator::Counters;
-use crate::transport::path::state::{PathState, Wavefront};
-use crate::transport::path::{BLOCK, PathIntegrator, SurfaceInteraction};
+use crate::transport::cached::overhang;
+use crate::transport::path::PathIntegrator;
+use crate::transport::path::estimator::{Estimator, KnownLight, Rest};
+use crate::transport::path::vertex::PathVertex;
+use crate::transport::settings::{Counters, PathSettings};
+use crate::transport::walk::component::Components;
+use crate::transport::walk::context::SceneContext;
+use crate::transport::wavefront::{BLOCK, Wavefront};
+use crate::{Level, Rgb};
+use core::f32::consts::FRAC_1_PI;
 use core::ops::Range;
 
-/// Irradiance caches, frozen.
+const _: () = assert!(BLOCK == POINTS, "a block of vertices is looked up at once");
+
+/// Light samples of a path of the picture at a vertex where a cache knows all but direct light.
+const LIGHT_SAMPLES: u32 = 4;
+
+/// Lights that fill a smaller fraction of a hemisphere, weighted by cosines, are found by shadow rays alone
+/// as well as with the help of BSDF sampling.
+const SMALL: f32 = 0.1;
+
+/// Irradiance caches that paths look up.
 #[derive(Clone, Copy)]
-pub(in crate::transport) enum CacheView<'a> {
-    /// Of even and of odd samples.
+pub enum CacheView<'a> {
+    /// Frozen caches of even and of odd samples.
     Pair([&'a IrradianceCache<'a>; 2]),
-    /// What there is of one so far: one record is enough for rays that are averaged.
+    /// The present records of one cache. One record is enough for rays that are averaged.
     UnderConstruction(&'a IrradianceCache<'a>),
 }
 
 impl CacheView<'_> {
-    /// What is `known` of those of `askers` that there are, each with its sample, and how far each is
-    /// `exposed` ([`IrradianceCache::at_all`]).
-    fn ask(
+    /// Looks up those of `queries` that there are, each with its sample. Writes the distance as far as each
+    /// is `exposed` ([`IrradianceCache::at_all`]).
+    fn find(
         &self,
         level: Level,
-        askers: &[Option<(QueryPoint, u32)>; BLOCK],
-        known: &mut [Option<CachedIrradiance>; BLOCK],
+        queries: &[Option<(QueryPoint, u32)>; BLOCK],
+        found: &mut [Option<CachedIrradiance>; BLOCK],
         exposed: &mut [f32; BLOCK],
     ) {
-        let askers = askers.iter().enumerate().filter_map(|(i, asker)| Some((i, asker.as_ref()?)));
+        let queries = queries.iter().enumerate().filter_map(|(i, query)| Some((i, query.as_ref()?)));
         match self {
             CacheView::Pair(caches) => {
                 let mut points = [Points::NONE; 2];
-                askers.for_each(|(i, (asker, sample))| points[*sample as usize & 1].set(i, asker));
+                queries.for_each(|(i, (query, sample))| points[*sample as usize & 1].set(i, query));
                 for (cache, points) in caches.iter().zip(&points) {
-                    let found = cache.at_all(level, points, known);
-                    exposed.iter_mut().zip(found).for_each(|(exposed, found)| *exposed = exposed.max(found));
+                    let reach = cache.at_all(level, points, found);
+                    exposed.iter_mut().zip(reach).for_each(|(exposed, reach)| *exposed = exposed.max(reach));
                 }
             }
             CacheView::UnderConstruction(cache) => {
-                for (i, (asker, _)) in askers {
-                    let found = cache.first_valid(asker);
-                    known[i] = found.map(|(indirect, _)| indirect);
-                    exposed[i] = found.map_or(0.0, |(_, exposed)| exposed);
+                for (i, (query, _)) in queries {
+                    let first = cache.first_valid(query);
+                    found[i] = first.map(|(indirect, _)| indirect);
+                    exposed[i] = first.map_or(0.0, |(_, exposed)| exposed);
                 }
             }
         }
     }
 }
 
-impl<'a, F: Features> PathIntegrator<'a, F> {
-    /// Asks `caches` for the light that is reflected onto those of `block`, at the ends of rays of `range`, that may be
-    /// diffuse.
-    pub(in crate::transport) fn ask(
+/// Whether the path of a ray looks a cache up at `point`, the ray's end; if so, the number of its sample.
+fn sample_of(wave: &Wavefront, ray: usize, point: &SurfacePoint, settings: &PathSettings) -> Option<u32> {
+    let path = wave.paths.get(wave.rays.get(ray)?.tag as usize)?;
+    let asks = point.material.surface.may_be_diffuse()
+        && path.components.goes_on_from_rough()
+        && u32::from(path.segments) < settings.max_depth
+        // Records do not know their distance from the camera.
+        && (path.segments == 1 || !settings.is_limited());
+    asks.then_some(path.sample)
+}
+
+impl<F: Features> Estimator<F> for CacheView<'_> {
+    type State = ();
+    type Found = Option<CachedIrradiance>;
+
+    #[inline]
+    fn light_samples(&self, context: &SceneContext<F>) -> u32 {
+        match self {
+            // Through cut-outs each path has a place for one shadow ray.
+            CacheView::Pair(_) if !context.has_cutouts => LIGHT_SAMPLES,
+            _ => 1,
+        }
+    }
+
+    fn look_up(
         &self,
-        caches: CacheView,
-        wave: &Wavefront,
-        range: Range<usize>,
-        block: &mut [Option<SurfaceInteraction<'a>>; BLOCK],
+        (context, settings): (&SceneContext<F>, &PathSettings),
+        (wave, range): (&Wavefront, Range<usize>),
+        points: &[Option<SurfacePoint>; BLOCK],
+        found: &mut [Option<CachedIrradiance>; BLOCK],
         counters: &mut Counters,
     ) {
-        let (mut known, mut exposed) = ([None; BLOCK], [0.0; BLOCK]);
-        let rays = &wave.rays[range.clone()];
-        let askers: [Option<(&SurfacePoint, u32)>; BLOCK] = core::array::from_fn(|i| {
-            let (SurfaceInteraction { point, .. }, path) = self.asks(wave, rays.get(i)?, block.get(i)?)?;
-            (path.segments == 1 || !self.is_limited()).then_some((point, path.sample))
+        let mut exposed = [0.0; BLOCK];
+        let asking: [Option<(&SurfacePoint, u32)>; BLOCK] = core::array::from_fn(|i| {
+            let point = points[i].as_ref()?;
+            Some((point, sample_of(wave, range.start + i, point, settings)?))
         });
         let open = |(point, sample): (&SurfacePoint, u32)| {
             (QueryPoint::open(point.position, point.frame.normal), sample)
         };
-        caches.ask(self.context.level, &askers.map(|asker| asker.map(open)), &mut known, &mut exposed);
-        if exposed != [0.0; BLOCK] {
-            // Those that something hangs close over ask once more.
-            let points = askers.map(|asker| asker.map(|(point, _)| point));
-            let within = self.within(&points, &exposed, counters);
-            let again = core::array::from_fn(|i| {
-                let (asker, sample) = askers[i].map(open).filter(|_| within[i] < exposed[i])?;
-                Some((QueryPoint { within: within[i], ..asker }, sample))
-            });
-            caches.ask(self.context.level, &again, &mut known, &mut exposed);
+        self.find(context.level, &asking.map(|asking| asking.map(open)), found, &mut exposed);
+        if exposed == [0.0; BLOCK] {
+            return;
         }
-        for (met, known) in block.iter_mut().zip(known).take(range.len()) {
-            if let Some(met) = met {
-                met.indirect = known;
-            }
-        }
+        // Points with something close over them are looked up once more.
+        let points = asking.map(|asking| asking.map(|(point, _)| point));
+        let within = overhang::within(context, &points, &exposed, counters);
+        let again = core::array::from_fn(|i| {
+            let (query, sample) = asking[i].map(open).filter(|_| within[i] < exposed[i])?;
+            Some((QueryPoint { within: within[i], ..query }, sample))
+        });
+        self.find(context.level, &again, found, &mut exposed);
     }
 
-    /// The vertex that a ray has met and its path, where they may ask.
-    fn asks<'b>(
+    #[inline]
+    fn at_vertex(
         &self,
-        wave: &'b Wavefront,
-        ray: &Ray,
-        met: &'b Option<SurfaceInteraction<'a>>,
-    ) -> Option<(&'b SurfaceInteraction<'a>, &'b PathState)> {
-        met.as_ref().zip(wave.paths.get(ray.tag as usize)).filter(|(met, path)| {
-            met.point.material.surface.may_be_diffuse()
-                && path.share.goes_on_from_rough()
-                && u32::from(path.segments) < self.settings.max_depth
-        })
+        (context, _): (&SceneContext<F>, &PathSettings),
+        vertex: &PathVertex,
+        _: &mut (),
+        found: Option<CachedIrradiance>,
+        add: &mut impl FnMut(KnownLight),
+    ) -> Rest {
+        let (Some(indirect), Bsdf::Diffuse(diffuse)) = (found, &vertex.bsdf) else {
+            return Rest::all(vertex);
+        };
+        let contribution = vertex.throughput * diffuse.reflectance * indirect.irradiance * FRAC_1_PI;
+        add(KnownLight { contribution, blur: Rgb::ZERO });
+        // Where lights are small all around, and nothing mirrors them, a shadow ray alone finds the direct
+        // light. Not that of an environment, which is not sampled where it seemed to be hidden. Both take
+        // several light samples.
+        let has_environment = context.scene.environment.is_some();
+        let ends = indirect.shining < SMALL && !context.has_mirrors && !has_environment;
+        let light_samples = if ends || has_environment { self.light_samples(context) } else { 1 };
+        Rest { light_samples, ends, ..Rest::of(Components::DIRECT) }
+    }
+}
+
+impl<'a, F: Features> PathIntegrator<'a, F> {
+    /// The same, where diffuse points have indirect light from a cache as far as it reaches: even samples
+    /// from the first, odd ones from the second. Where depth is limited only the first point of a path has,
+    /// as records do not know their distance from the camera.
+    pub fn with_caches(&self, caches: [&'a IrradianceCache<'a>; 2]) -> PathIntegrator<'a, F, CacheView<'a>> {
+        self.with_estimator(CacheView::Pair(caches))
+    }
+
+    /// The same, for rays that gather for the cache itself, in its present state.
+    pub fn with_growing_cache(&self, cache: &'a IrradianceCache<'a>) -> PathIntegrator<'a, F, CacheView<'a>> {
+        self.with_estimator(CacheView::UnderConstruction(cache))
     }
 }

@@ -10,8 +10,10 @@ use crate::cache::irradiance::{CLOSE, FINE, Record, SECTORS};
 use crate::geometry::{Frame, Hit, Ray};
 use crate::scene::{Surface, SurfacePoint};
 use crate::transport::cached::gather::GatherPoint;
-use crate::transport::estimator::Counters;
-use crate::transport::path::{BLOCK, PathIntegrator};
+use crate::transport::path::{Estimator, PathIntegrator};
+use crate::transport::settings::Counters;
+use crate::transport::walk::context::SceneContext;
+use crate::transport::wavefront::BLOCK;
 use glam::{Vec2, Vec3};
 
 /// No record reaches farther, in diagonals of the scene.
@@ -45,64 +47,65 @@ struct Probe {
     length: f32,
 }
 
-impl<F: Features> PathIntegrator<'_, F> {
-    /// How far away the records may be ([`crate::cache::irradiance::QueryPoint::within`]) that these points hear,
-    /// each of which wants to hear such as are so far `exposed`.
-    pub(in crate::transport) fn within(
-        &self,
-        points: &[Option<&SurfacePoint>; BLOCK],
-        exposed: &[f32; BLOCK],
-        counters: &mut Counters,
-    ) -> [f32; BLOCK] {
-        let mut within = [f32::INFINITY; BLOCK];
-        for ((within, point), exposed) in within.iter_mut().zip(points).zip(exposed) {
-            if let Some(point) = point.filter(|_| *exposed > 0.0) {
-                counters.rays += WAYS as u64;
-                let normal = point.geometric_normal;
-                let origin = point.position + point.error * normal;
-                *within = CLOSE * self.headroom(&Probe { origin, normal, length: exposed / CLOSE });
-            }
+/// The distance as far as records may be used ([`crate::cache::irradiance::QueryPoint::within`]) at each of
+/// `points`, for records that are as far as it is `exposed`.
+pub(super) fn within<F: Features>(
+    context: &SceneContext<F>,
+    points: &[Option<&SurfacePoint>; BLOCK],
+    exposed: &[f32; BLOCK],
+    counters: &mut Counters,
+) -> [f32; BLOCK] {
+    let mut within = [f32::INFINITY; BLOCK];
+    for ((within, point), exposed) in within.iter_mut().zip(points).zip(exposed) {
+        if let Some(point) = point.filter(|_| *exposed > 0.0) {
+            counters.rays += WAYS as u64;
+            let normal = point.geometric_normal;
+            let origin = point.position + point.error * normal;
+            *within = CLOSE * headroom(context, &Probe { origin, normal, length: exposed / CLOSE });
         }
-        within
     }
+    within
+}
 
-    /// Looks how high what hangs over each of `places` is, as far as records reach.
+/// The distance to a surface that hangs over a point and hides light; infinite where it is farther than the
+/// probe is long.
+fn headroom<F: Features>(context: &SceneContext<F>, probe: &Probe) -> f32 {
+    let frame = Frame::from_normal(probe.normal);
+    let rays = TILTS.map(|[x, y]| {
+        let direction = frame.to_world(Vec3::new(x, y, 1.0)).normalize_or_zero();
+        Ray::segment(probe.origin, direction, probe.length)
+    });
+    let mut hits = [Hit::NONE; WAYS];
+    context.nearest_batch(&rays, Coherence::Incoherent, &mut hits);
+    let hanging = hits.iter().filter(|hit| hangs(context, hit, probe.normal));
+    hanging.map(|hit| hit.t).fold(f32::INFINITY, f32::min)
+}
+
+/// Whether the surface of `hit` hangs over a surface of that normal and hides light. Glass and cut-outs do
+/// not.
+fn hangs<F>(context: &SceneContext<F>, hit: &Hit, normal: Vec3) -> bool {
+    let mesh = &context.scene.mesh;
+    let Some(triangle) = mesh.triangles.get(hit.triangle as usize) else { return false };
+    let [a, b, c] = mesh.corners(hit.triangle);
+    let cos = (b - a).cross(c - a).normalize_or_zero().dot(normal);
+    let material = context.scene.materials.get(triangle.material as usize);
+    cos.abs() > STEEPEST
+        && material.is_some_and(|material| {
+            !matches!(material.surface, Surface::Dielectric { .. }) && !material.has_cutout()
+        })
+}
+
+impl<F: Features, E: Estimator<F>> PathIntegrator<'_, F, E> {
+    /// Measures the height of surfaces that hang over each of `places`, as far as records reach.
     pub fn look_up(&self, places: &mut [GatherPoint], counters: &mut Counters) {
         let length = MOST * self.context.bvh.bounds().diagonal();
         for place in places.iter_mut().filter(|place| place.is_some()) {
             counters.rays += WAYS as u64;
             let normal = Vec3::from(place.geometric_normal);
             let origin = place.position() + place.error * normal;
-            place.within = (CLOSE * self.headroom(&Probe { origin, normal, length })).min(f32::MAX);
+            let headroom = headroom(&self.context, &Probe { origin, normal, length });
+            place.within = (CLOSE * headroom).min(f32::MAX);
         }
-    }
-
-    /// How far it is to what hangs over a point and hides light; infinite where it is farther than the probe
-    /// is long.
-    fn headroom(&self, probe: &Probe) -> f32 {
-        let frame = Frame::from_normal(probe.normal);
-        let rays = TILTS.map(|[x, y]| {
-            let direction = frame.to_world(Vec3::new(x, y, 1.0)).normalize_or_zero();
-            Ray::segment(probe.origin, direction, probe.length)
-        });
-        let mut hits = [Hit::NONE; WAYS];
-        self.context.nearest_batch(&rays, Coherence::Incoherent, &mut hits);
-        let hanging = hits.iter().filter(|hit| self.hangs(hit, probe.normal));
-        hanging.map(|hit| hit.t).fold(f32::INFINITY, f32::min)
-    }
-
-    /// Whether what was met hangs over a surface of that normal and hides light. Glass and what is cut out do
-    /// not.
-    fn hangs(&self, hit: &Hit, normal: Vec3) -> bool {
-        let mesh = &self.context.scene.mesh;
-        let Some(triangle) = mesh.triangles.get(hit.triangle as usize) else { return false };
-        let [a, b, c] = mesh.corners(hit.triangle);
-        let cos = (b - a).cross(c - a).normalize_or_zero().dot(normal);
-        let material = self.context.scene.materials.get(triangle.material as usize);
-        cos.abs() > STEEPEST
-            && material.is_some_and(|material| {
-                !matches!(material.surface, Surface::Dielectric { .. }) && !material.has_cutout()
-            })
     }
 
     /// Notes what hangs over the support of a record at `place`, and over the place.

@@ -1,10 +1,11 @@
-//! The overture of the irradiance cache: a look over the picture, from coarse to fine, for places that no record reaches
-//! yet (Krivanek, Bouatouch, Pattanaik and Zara 2006, §5).
+//! The overture of the irradiance cache: a look over the picture, from coarse to fine, for places that no
+//! record reaches yet (Krivanek, Bouatouch, Pattanaik and Zara 2006, §5).
 //!
-//! It goes over the pixels in an order in which the first n of them are spread evenly, whatever n is, in steps. A step
-//! has two passes: tasks find the diffuse points that its pixels see, directly or through mirrors and glass; then tasks
-//! gather where no record reaches, some places at a time, and each time all records are committed in their order. Then
-//! it goes over them again, for the diffuse points that are seen in rough surfaces ([`Via`]).
+//! It goes over the pixels in an order in which the first n of them are spread evenly, whatever n is, in
+//! steps. A step has two passes: tasks find the diffuse points that its pixels see, directly or through
+//! mirrors and glass; then tasks gather where no record reaches, some places at a time, and each time all
+//! records are committed in their order. Then it goes over them again, for the diffuse points that are seen
+//! in rough surfaces ([`Via`]).
 
 use crate::bsdf::{Bsdf, Features};
 use crate::bvh::Coherence;
@@ -12,9 +13,10 @@ use crate::geometry::{Hit, Ray};
 use crate::sampling::Sampler;
 use crate::scene::SurfacePoint;
 use crate::transport::cached::gather::GatherPoint;
-use crate::transport::estimator::{Counters, dimension};
-use crate::transport::path::PathIntegrator;
+use crate::transport::path::{Estimator, PathIntegrator};
+use crate::transport::settings::Counters;
 use crate::transport::walk::context::Segment;
+use crate::transport::walk::dimension;
 use core::f32::consts::PI;
 use glam::Vec3;
 
@@ -24,12 +26,12 @@ pub const PIXELS: usize = 64;
 /// Mirrors and panes behind each other that it looks through.
 const MOST_BOUNCES: u32 = 16;
 
-/// Where the shading normal deviates by more than this from that of the surface (a cosine), it is of details that no
-/// record could serve.
+/// Where the shading normal deviates by more than this from that of the surface (a cosine), it is of details
+/// that no record could serve.
 const SMOOTH: f32 = 0.9;
 
-/// A record that is seen in a rough surface is one of many that a pixel sees: in the lobe of a direction of density p, whose radius is
-/// about 1 / √(π p), there is room for so many pixels' widths side by side.
+/// A record that is seen in a rough surface is one of many that a pixel sees: in the lobe of a direction of
+/// density p, whose radius is about 1 / √(π p), there is room for so many pixels' widths side by side.
 const PER_LOBE: f32 = 16.0;
 
 /// How the points that are looked for are seen.
@@ -41,7 +43,8 @@ pub enum Via {
     Glossy,
 }
 
-/// The pixels of a picture, evenly spread from the first on: every other of every `stride`th column and row last.
+/// The pixels of a picture, evenly spread from the first on: every other of every `stride`th column and row
+/// last.
 #[derive(Clone, Copy, Debug)]
 pub struct ProgressiveOrder {
     width: u32,
@@ -52,7 +55,8 @@ pub struct ProgressiveOrder {
 }
 
 impl ProgressiveOrder {
-    /// Every `stride`th pixel across and down of `width` by `height`; the stride is brought up to a power of two.
+    /// Every `stride`th pixel across and down of `width` by `height`; the stride is brought up to a power of
+    /// two.
     pub fn new(width: u32, height: u32, stride: u32) -> Self {
         let stride = stride.clamp(1, 1 << 15).next_power_of_two();
         let longest = width.max(height).div_ceil(stride).max(1);
@@ -69,8 +73,8 @@ impl ProgressiveOrder {
         false
     }
 
-    /// Column and row of step `i`, where there is such a pixel: the bits of i, dealt out from the highest of the column
-    /// and the row down.
+    /// Column and row of step `i`, where there is such a pixel: the bits of i, dealt out from the highest of
+    /// the column and the row down.
     pub fn pixel(&self, i: u64) -> Option<(u32, u32)> {
         let (mut x, mut y) = (0, 0);
         for bit in 0..self.bits {
@@ -82,9 +86,10 @@ impl ProgressiveOrder {
     }
 }
 
-impl<F: Features> PathIntegrator<'_, F> {
-    /// What sample `sample` of the pixels of [`PIXELS`] steps from `first` on sees first that is diffuse, in the way of `sight`; into
-    /// `out`, in their order. Places without triangle ([`GatherPoint::is_some`]) where there is no pixel or nothing diffuse.
+impl<F: Features, E: Estimator<F>> PathIntegrator<'_, F, E> {
+    /// What sample `sample` of the pixels of [`PIXELS`] steps from `first` on sees first that is diffuse, in
+    /// the way of `sight`; into `out`, in their order. Places without triangle ([`GatherPoint::is_some`])
+    /// where there is no pixel or nothing diffuse.
     pub fn places(
         &self,
         order: &ProgressiveOrder,
@@ -119,8 +124,8 @@ impl<F: Features> PathIntegrator<'_, F> {
         self.context.scene.materials.iter().any(|material| material.surface.may_be_rough())
     }
 
-    /// The diffuse point that a camera ray comes to from `hit` on, and the width of a pixel there, which is `spread`
-    /// at a distance of 1.
+    /// The diffuse point that a camera ray comes to from `hit` on, and the width of a pixel there, which is
+    /// `spread` at a distance of 1.
     fn first_diffuse(
         &self,
         (ray, mut hit): (Ray, Hit),
@@ -129,7 +134,7 @@ impl<F: Features> PathIntegrator<'_, F> {
         sampler: &Sampler,
         counters: &mut Counters,
     ) -> Option<(SurfacePoint<'_>, f32)> {
-        let context = self.context;
+        let context = &self.context;
         let mut segment = Segment::first(ray);
         let (mut width, mut seen) = (0.0, Via::Specular);
         for segments in 1..=MOST_BOUNCES {

@@ -1,11 +1,11 @@
-//! Light paths for caustics: from the lights by mirrors and glass to the first rough surface, where a photon is left
-//! (Jensen 1996), weighted for the paths from the eye that it shares its light with (`merge.rs`).
+//! Light paths for caustics: from the lights by mirrors and glass to the first rough surface, where a photon
+//! is left (Jensen 1996), weighted for the paths from the eye that it shares its light with (`merge.rs`).
 //!
-//! From there paths go on in whatever way, and leave a photon on each rough surface, so that paths from the eye need not
-//! find the caustic by chance. A path that meets a rough surface first goes on by what a smooth coat mirrors there alone.
-//! Beside the records of an irradiance cache a photon is left only by what comes straight from a mirror or smooth glass:
-//! records have all that something rough sent.
-//! How paths go is in `walk/light.rs`.
+//! From there paths go on in whatever way, and leave a photon on each rough surface, so that paths from the
+//! eye need not find the caustic by chance. A path that meets a rough surface first goes on by what a smooth
+//! coat mirrors there alone. Beside the records of an irradiance cache a photon is left only by what comes
+//! straight from a mirror or smooth glass: records have all that something rough sent. How paths go is in
+//! `walk/light.rs`.
 
 use crate::bsdf::{BsdfSample, Features};
 use crate::bvh::Bvh;
@@ -14,13 +14,14 @@ use crate::light::{EmissionSampler, LightSampler, LightType, luminance};
 use crate::memory::{Arena, Footprint, OutOfMemory};
 use crate::photon::Photon;
 use crate::scene::Scene;
-use crate::transport::caustics::merge::{ChainLink, is_wide_enough};
-use crate::transport::estimator::{Counters, UNLIMITED};
+use crate::transport::caustics::merge::is_wide_enough;
 use crate::transport::photon_mapping::deposit::PhotonTracerSettings;
 use crate::transport::photon_mapping::radius::RadiusSchedule;
+use crate::transport::settings::{Counters, UNLIMITED};
 use crate::transport::walk::context::SceneContext;
 pub use crate::transport::walk::light::PATHS;
 use crate::transport::walk::light::{Continuation, LightPathState, LightWalk, PhotonBuffer, Vertex, Visitor};
+use crate::transport::walk::mis::{ChainLink, merging_weight};
 use crate::{Level, Rgb};
 use core::f32::consts::PI;
 use glam::{Vec2, Vec3};
@@ -40,8 +41,8 @@ const INDIRECT: f32 = 0.02;
 /// What a surface is thought to reflect.
 const REFLECTED: f32 = 0.5;
 
-/// Surfaces of glass between the eye and what it sees, at most, and how far from both ends it is looked for them, in
-/// shares of the distance.
+/// Surfaces of glass between the eye and what it sees, at most, and how far from both ends it is looked for
+/// them, in shares of the distance.
 const MOST_GLASS: u32 = 16;
 const NEAR: f32 = 1e-4;
 
@@ -76,8 +77,9 @@ pub struct GuideSample {
 pub const BLOCKS: u32 = 16;
 
 impl<'a, F: Features> CausticPhotonTracer<'a, F> {
-    /// A shooter over frozen structures, for photons that will be gathered from `discs` in a picture of so many pixels
-    /// across and down. `F` has at least the features of the scene. All photons are kept, whatever `settings` say.
+    /// A shooter over frozen structures, for photons that will be gathered from `discs` in a picture of so
+    /// many pixels across and down. `F` has at least the features of the scene. All photons are kept,
+    /// whatever `settings` say.
     pub fn new(
         (scene, bvh, lights): (&'a Scene<'a>, &'a Bvh<'a>, &'a LightSampler<'a>),
         emission: &'a EmissionSampler<'a>,
@@ -91,7 +93,8 @@ impl<'a, F: Features> CausticPhotonTracer<'a, F> {
         Self { flight, discs, frame, beside_records: false }
     }
 
-    /// The same, of photons for [`CausticMerging::beside_records`](crate::transport::CausticMerging::beside_records), if so.
+    /// The same, of photons for
+    /// [`CausticMerging::beside_records`](crate::transport::CausticMerging::beside_records), if so.
     pub fn beside_records(self, beside_records: bool) -> Self {
         Self { beside_records, ..self }
     }
@@ -111,8 +114,8 @@ impl<'a, F: Features> CausticPhotonTracer<'a, F> {
         LightWalk::<F>::scratch()
     }
 
-    /// Shoots the photons of task `task` of map number `map` (below 2^31). All of `out` is written; what is not needed,
-    /// with photons of no place, which a map refuses. Room for [`ROOM`] is enough.
+    /// Shoots the photons of task `task` of map number `map` (below 2^31). All of `out` is written; what is
+    /// not needed, with photons of no place, which a map refuses. Room for [`ROOM`] is enough.
     ///
     /// # Errors
     /// [`OutOfMemory`] where `scratch` has less than [`CausticPhotonTracer::scratch`] bytes.
@@ -135,8 +138,8 @@ impl<'a, F: Features> CausticPhotonTracer<'a, F> {
         Ok(counters)
     }
 
-    /// Shoots the same photons to see where those are from that show in the picture. `out` gets one for each path, up
-    /// to [`PATHS`].
+    /// Shoots the same photons to see where those are from that show in the picture. `out` gets one for each
+    /// path, up to [`PATHS`].
     ///
     /// # Errors
     /// As [`CausticPhotonTracer::run`].
@@ -171,8 +174,8 @@ impl<'a, F: Features> CausticPhotonTracer<'a, F> {
         self.flight.follow(task, map, scratch, &mut MisDepositor { shooter: self, leave, goes_on: false })
     }
 
-    /// In which block of the picture light at `place` shows, straight or through glass; `None` where it is outside, or
-    /// hidden from the eye: some of it comes back.
+    /// In which block of the picture light at `place` shows, straight or through glass; `None` where it is
+    /// outside, or hidden from the eye: some of it comes back.
     fn block(&self, place: Vec3) -> Option<u32> {
         let context = &self.flight.context;
         let camera = &context.scene.camera;
@@ -203,14 +206,14 @@ impl<'a, F: Features> CausticPhotonTracer<'a, F> {
     /// The share that photons have in the light of this path at `place`.
     fn share(&self, state: &LightPathState, place: Vec3) -> CausticShare {
         let ratio = state.others / (self.discs.reach(place, self.flight.paths as f32) * state.chain);
-        let weight = 1.0 / (1.0 + ratio * ratio);
+        let weight = merging_weight(ratio);
         // Zero over zero: without any other technique photons have it all.
         let weight = if state.others == 0.0 { 1.0 } else { weight };
         CausticShare { weight, chance: (weight / LEAST_WEIGHT).min(1.0), ratio }
     }
 
-    /// `chain` and `others` before the first surface: `back` is the density of the direction to the light, where it is
-    /// not the only one.
+    /// `chain` and `others` before the first surface: `back` is the density of the direction to the light,
+    /// where it is not the only one.
     fn first(&self, state: &LightPathState, vertex: &Vertex, back: Option<f32>) -> (f32, f32) {
         let LightWalk { context: SceneContext { scene, lights, .. }, emission, .. } = self.flight;
         let &Vertex { point, bsdf, to_light, .. } = vertex;
@@ -268,8 +271,8 @@ impl CausticShare {
     }
 }
 
-/// `LightPathState::others` of a path that a rough surface has scattered: its power has its weight, and `LightPathState::chain` is the radius
-/// of discs at the last.
+/// `LightPathState::others` of a path that a rough surface has scattered: its power has its weight, and
+/// `LightPathState::chain` is the radius of discs at the last.
 const SCATTERED: f32 = -1.0;
 
 /// Leaves photons with their weights.
@@ -331,8 +334,8 @@ impl<F: Features, L: FnMut(&LightPathState, Photon, CausticShare, &mut Counters)
         state.segments > 1 && vertex.bsdf.is_varnished(self.shooter.flight.context.separates_coats())
     }
 
-    /// Takes note of what a surface does with the densities of both ways, at the first of a path also of how the path
-    /// tracer finds its light.
+    /// Takes note of what a surface does with the densities of both ways, at the first of a path also of how
+    /// the path tracer finds its light.
     #[inline]
     fn leave(
         &self,
@@ -357,7 +360,7 @@ impl<F: Features, L: FnMut(&LightPathState, Photon, CausticShare, &mut Counters)
         let Vertex { point, bsdf, .. } = *vertex;
         let coat_alone = is_narrow && !sample.delta;
         let there = ChainLink { point, bsdf, near: from, far: sample.direction, coat_alone };
-        let back = if sample.delta { 1.0 } else { there.density(&self.shooter.flight.context) };
+        let back = if sample.delta { 1.0 } else { there.pdf(&self.shooter.flight.context) };
         if state.segments == 1 {
             let back = (!sample.delta).then_some(back);
             (state.chain, state.others) = self.shooter.first(state, vertex, back);

@@ -2,131 +2,109 @@
 //! (Veach 1997, chapter 9).
 
 use super::PathIntegrator;
-use super::shade::{Known, Vertex};
-use super::shadow_rays::{Shadows, TO_ENVIRONMENT};
+use super::estimator::{Estimator, Rest};
+use super::sharing::Sharing;
+use super::vertex::PathVertex;
 use crate::Rgb;
 use crate::bsdf::Features;
 use crate::geometry::Ray;
 use crate::light::LightSample;
-use crate::transport::caustics::merge::ChainLink;
-use crate::transport::estimator::{dimension, environment_heuristic, power_heuristic};
-use crate::transport::path::reuse::ReuseState;
-use crate::transport::path::state::PathState;
+use crate::sampling::Sampler;
+use crate::transport::walk::dimension;
+use crate::transport::walk::mis::{environment_heuristic, power_heuristic};
 use crate::transport::walk::visibility::shadow_ray;
+use crate::transport::wavefront::Wavefront;
+use crate::transport::wavefront::driver::TO_ENVIRONMENT;
 use glam::Vec3;
 
-impl<F: Features> PathIntegrator<'_, F> {
+impl<F: Features, E: Estimator<F>, R: Sharing> PathIntegrator<'_, F, E, R> {
     /// Takes light samples at `vertex`, and puts their shadow rays into the queue.
     #[inline]
     pub(super) fn direct(
         &self,
-        path: &PathState,
-        exchange: &mut ReuseState,
-        vertex: &Vertex,
-        known: &Known,
-        shadows: &mut Shadows,
+        (state, shared): (&E::State, &mut R::State),
+        vertex: &PathVertex,
+        rest: &Rest,
+        wave: &mut Wavefront,
     ) {
-        let is_left = !known.said.is_lit || vertex.apart;
-        if self.context.lights.is_empty() || vertex.bsdf.is_delta() || !is_left {
+        let (scene, lights) = (self.context.scene, self.context.lights);
+        let is_left = !rest.is_lit || vertex.apart;
+        if lights.is_empty() || vertex.bsdf.is_delta() || !is_left {
             return;
         }
         let (point, normal) = (vertex.point, vertex.normal);
         // A visibility table is of one side.
-        let table = if normal == Vec3::ZERO {
-            None
-        } else {
-            self.context.lights.visibility(point.position, point.frame.normal)
-        };
-        for part in 0..known.points {
-            let is_several = known.points > 1;
-            let sampler = if is_several { path.part(self.settings.seed, part) } else { vertex.sampler };
+        let table =
+            if normal == Vec3::ZERO { None } else { lights.visibility(point.position, point.frame.normal) };
+        for part in 0..rest.light_samples {
+            let sampler = match rest.light_samples {
+                1 => vertex.sampler,
+                // The samples of all paths of the pixel are a net.
+                count => {
+                    let PathVertex { pixel, sample, .. } = *vertex;
+                    let index = (sample >> 1).wrapping_mul(count).wrapping_add(part);
+                    Sampler::replicate(self.settings.seed, pixel, sample & 1, index)
+                }
+            };
             let [u, v] = sampler.pair(vertex.first + dimension::LIGHT);
-            let aim = table.map(|table| table.warp([u, v]));
-            let choice = if self.context.lights.have_choice() {
+            let warped = table.map(|table| table.warp([u, v]));
+            let choice = if lights.have_choice() {
                 sampler.single(vertex.first + dimension::LIGHT_CHOICE)
             } else {
                 0.0
             };
-            let sample = self.context.lights.sample_deferred(
-                self.context.scene,
-                point.position,
-                normal,
-                [u, v, choice],
-                aim,
-            );
+            let sample = lights.sample_deferred(scene, point.position, normal, [u, v, choice], warped);
             if let Some((sample, later)) = sample
-                && let Some((shadow, light)) =
-                    self.light_contribution(path, exchange, vertex, known, (&sample, later))
+                && let Some((ray, light)) =
+                    self.light_contribution((state, &mut *shared), vertex, rest, (&sample, later))
             {
-                shadows.push(shadow, light);
+                let tag = vertex.path as u32 | if later { TO_ENVIRONMENT } else { 0 };
+                wave.push_shadow_ray(Ray { tag, ..ray }, light);
             }
         }
     }
 
-    /// The shadow ray of a light sample, and the light that it brings to the camera if nothing is in its way. The
+    /// The shadow ray of a light sample, and its contribution to the pixel if nothing is in its way. The
     /// radiance of the environment is looked up `later`.
     #[inline]
     fn light_contribution(
         &self,
-        path: &PathState,
-        exchange: &mut ReuseState,
-        vertex: &Vertex,
-        known: &Known,
+        (state, shared): (&E::State, &mut R::State),
+        vertex: &PathVertex,
+        rest: &Rest,
         (sample, later): (&LightSample, bool),
     ) -> Option<(Ray, Rgb)> {
-        let Vertex { point, ref bsdf, wo, apart, throughput, .. } = *vertex;
+        let PathVertex { point, ref bsdf, wo, apart, throughput, .. } = *vertex;
         let wi = point.frame.to_local(sample.direction);
         if !point.sides_agree(wi, sample.direction) {
             return None;
         }
-        let ([(mut f, pdf), coat], is_rough) = match apart {
-            true => (bsdf.evaluate_apart::<F>(wo, wi), true),
-            false => ([bsdf.evaluate::<F>(wo, wi), (Rgb::ZERO, 0.0)], bsdf.is_receiver()),
+        let [(mut f, pdf), coat] = match apart {
+            true => bsdf.evaluate_apart::<F>(wo, wi),
+            false => [bsdf.evaluate::<F>(wo, wi), (Rgb::ZERO, 0.0)],
         };
-        if apart && known.said.is_lit {
+        if apart && rest.is_lit {
             f = Rgb::ZERO;
         }
         if f == Rgb::ZERO && coat.0 == Rgb::ZERO {
             return None;
         }
-        let shadow = shadow_ray(point, sample)?;
-        let alone = sample.delta || known.ends;
-        let each = 1.0 / known.points as f32;
+        let ray = shadow_ray(point, sample)?;
+        let alone = sample.delta || rest.ends;
+        let each = 1.0 / rest.light_samples as f32;
         let weigh = |pdf: f32| match alone {
             true => each,
             false if later => each * environment_heuristic(self.context.lights, sample.pdf, each * pdf),
             false => each * power_heuristic(sample.pdf, each * pdf),
         };
-        let mut weight = weigh(pdf);
-        if let Some(merging) = &self.merging
-            && !is_rough
-            && merging.may_come_by(bsdf, path.chain)
-        {
-            let there = ChainLink { point, bsdf, near: wo, far: wi, coat_alone: false };
-            let to_light = there.reverse(&self.context) / sample.pdf;
-            weight = merging.beside_photons(weight, path.chain.abs() * to_light, || {
-                merging.emission.density_of_sample(
-                    self.context.scene,
-                    self.context.lights,
-                    sample,
-                    point.position,
-                )
-            });
-        }
+        let weight = self.estimator.weight_light(&self.context, vertex, state, (sample, wi), weigh(pdf));
         let of_base = f * weight;
-        let contribution = if apart {
+        if apart {
             let both = of_base + coat.0 * weigh(coat.1);
-            if self.settings.reuse && exchange.is_lit() {
-                exchange.light_is_of_base(Rgb::select(both.cmpgt(of_base), of_base / both, Rgb::ONE));
-            }
-            throughput * both * sample.radiance / sample.pdf
-        } else {
-            if self.settings.reuse && exchange.is_lit() {
-                exchange.light_is_of_base(bsdf.base_part(wo, wi, f));
-            }
-            throughput * f * sample.radiance * (weight / sample.pdf)
-        };
-        let tag = vertex.ray.tag | if later { TO_ENVIRONMENT } else { 0 };
-        Some((Ray { tag, ..shadow }, contribution))
+            R::sample_light(shared, || Rgb::select(both.cmpgt(of_base), of_base / both, Rgb::ONE));
+            return Some((ray, throughput * both * sample.radiance / sample.pdf));
+        }
+        R::sample_light(shared, || bsdf.base_part(wo, wi, f));
+        Some((ray, throughput * f * sample.radiance * (weight / sample.pdf)))
     }
 }

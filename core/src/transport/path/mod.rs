@@ -2,75 +2,61 @@
 //! (Kajiya 1986; Veach 1997, chapter 9).
 //!
 //! The plain algorithm is [`crate::transport::path::reference`]. Departures from it:
-//! 1. All paths of a wave advance together, one segment at a time, so that the tracer sees batches of rays:
-//!    first alike (camera rays along the Z-curve of a tile), then in no order (bounces).
-//! 2. Queues are compacted in place: the ray of a path that goes on overwrites one that was already shaded.
-//! 3. Shadow rays are traced after all vertices of the wave are shaded, or as many as there is room for; light is added to
-//!    the path then.
-//! 4. Code for what the scene does not have is not compiled in ([`Features`]).
-//! 5. Where that pays, pixels of a circle share what their paths find (`reuse.rs`).
-//! 6. Where an irradiance cache knows the indirect light of a diffuse point, the path need not find it (`lookup.rs`), or a
-//!    map of photons does one bounce later, and may ask several points of lights; nor where photons do (`density.rs`, `final_gather.rs`).
-//! 7. Pixels at the border of a lamp look at it with rays of their own (`silhouette.rs`).
-//! 8. Where photons of caustics lie, paths and photons share the light that both find (`merge.rs`).
+//! 1. All paths of a wave advance together (`wavefront/`).
+//! 2. Shadow rays are traced after all vertices of the wave are shaded; light is added to the path then.
+//! 3. Code for features that the scene does not have is not compiled in ([`Features`]).
+//! 4. An [`Estimator`] knows some of the light at a vertex: a cache, photon maps, photons that paths merge
+//!    with. A path tracer without one is the plain algorithm, to the bit.
+//! 5. Where that pays, pixels of a circle share the light that their paths find ([`PathReuse`]).
+//! 6. Pixels at the border of a lamp trace rays of their own for its emission (`silhouette.rs`).
 //!
-//! The price: about 400 bytes for each path of a wave. What a pixel sees depends on (seed, sample) and the pixels of
-//! its circle only, no wave cuts a circle, and samples are summed in their order: the picture has the same bits for
-//! any size of wave and any distribution of tasks.
+//! The price: about 200 bytes for each path of a wave. The radiance of a pixel depends on (seed, sample) and
+//! the pixels of its circle only, no wave cuts a circle, and samples are summed in their order: the picture
+//! has the same bits for any size of wave and any distribution of tasks.
 
+mod connection;
 mod direct;
-mod driver;
+pub(in crate::transport) mod estimator;
 pub(in crate::transport) mod pixels;
 pub mod reference;
 pub(in crate::transport) mod reuse;
 pub mod reuse_pilot;
 mod scatter;
 mod shade;
-mod shadow_rays;
+pub(in crate::transport) mod sharing;
 pub(in crate::transport) mod silhouette;
-pub(in crate::transport) mod state;
 pub(in crate::transport) mod tile;
+pub(in crate::transport) mod vertex;
+pub(in crate::transport) mod wave;
+
+pub use crate::transport::wavefront::WAVE;
+pub use estimator::Estimator;
+pub use reuse::PathReuse;
+pub use sharing::Sharing;
 
 use crate::Level;
 use crate::bsdf::Features;
-use crate::bvh::Bvh;
-use crate::cache::irradiance::{CachedIrradiance, IrradianceCache, POINTS};
+use crate::bvh::{Bvh, Coherence};
 use crate::film::Tile;
 use crate::geometry::Ray;
 use crate::light::LightSampler;
 use crate::memory::Footprint;
 use crate::sampling::Sampler;
-use crate::scene::{Scene, SurfacePoint};
-use crate::transport::cached::lookup::CacheView;
-use crate::transport::caustics::merge::CausticMerging;
-use crate::transport::estimator::{PathSettings, dimension};
-use crate::transport::path::state::Wavefront;
-use crate::transport::photon_mapping::density::PhotonLight;
-use crate::transport::photon_mapping::final_gather::PhotonMaps;
+use crate::scene::Scene;
+use crate::transport::path::shade::Shading;
+use crate::transport::path::wave::PathWave;
+use crate::transport::settings::{Counters, PathSettings};
 use crate::transport::walk::context::SceneContext;
+use crate::transport::walk::dimension;
 
-/// Paths that advance together where memory allows: enough to fill the tracer's batches, few enough to
-/// stay in the second cache.
-pub const WAVE: usize = 2048;
-
-/// Vertices that are looked at together before they are shaded.
-pub(super) const BLOCK: usize = POINTS;
-
-/// Light samples of a path of the picture at a vertex whose other light a cache knows.
-pub(super) const LIGHT_SAMPLES: usize = 4;
-
-/// Path tracing of one scene: a pass whose tasks are the tiles of the picture.
+/// Path tracing of one scene: a pass whose tasks are the tiles of the picture. The estimator `E` knows some
+/// of the light from a structure; by the rule `R` pixels share the light that their paths find.
 #[derive(Clone, Copy)]
-pub struct PathIntegrator<'a, F> {
-    pub(super) context: SceneContext<'a, F>,
-    pub(super) settings: PathSettings,
-    pub(super) caches: Option<CacheView<'a>>,
-    photons: Option<PhotonLight<'a>>,
-    /// Of even and of odd samples.
-    maps: Option<&'a [PhotonMaps<'a>; 2]>,
-    merging: Option<CausticMerging<'a>>,
-    /// Light that is not all shared, for each sample; see `reuse.rs`.
-    pub(super) flash: f32,
+pub struct PathIntegrator<'a, F, E = (), R = ()> {
+    pub(in crate::transport) context: SceneContext<'a, F>,
+    pub(in crate::transport) settings: PathSettings,
+    pub(in crate::transport) estimator: E,
+    pub(in crate::transport) sharing: R,
 }
 
 impl<'a, F: Features> PathIntegrator<'a, F> {
@@ -83,51 +69,32 @@ impl<'a, F: Features> PathIntegrator<'a, F> {
         settings: PathSettings,
         level: Level,
     ) -> Self {
-        Self {
-            context: SceneContext::new(scene, bvh, lights, level),
-            settings,
-            caches: None,
-            photons: None,
-            maps: None,
-            merging: None,
-            flash: f32::INFINITY,
-        }
+        let context = SceneContext::new(scene, bvh, lights, level);
+        Self { context, settings, estimator: (), sharing: () }
     }
 
-    /// The same, where diffuse points have their indirect light from a cache as far as it reaches: even samples from the
-    /// first, odd ones from the second. Pixels must not share their paths as well. Where depth is limited only the
-    /// first point of a path is served, for records do not know how far they are from the camera.
-    pub fn with_caches(&self, caches: [&'a IrradianceCache<'a>; 2]) -> Self {
-        Self { caches: Some(CacheView::Pair(caches)), ..*self }
+    /// Working memory of one task that advances `wave` paths together.
+    pub fn scratch(wave: usize) -> Footprint {
+        Self::scratch_with::<(), ()>(wave)
     }
 
-    /// The same, for rays that gather for the cache itself, as it is now.
-    pub fn with_growing_cache(&self, cache: &'a IrradianceCache<'a>) -> Self {
-        Self { caches: Some(CacheView::UnderConstruction(cache)), ..*self }
+    /// The same with an estimator and a rule of sharing.
+    pub fn scratch_with<E: Estimator<F>, R: Sharing>(wave: usize) -> Footprint {
+        PathWave::<E::State, R>::footprint(wave)
+    }
+}
+
+impl<'a, F: Features, E: Estimator<F>, R: Sharing> PathIntegrator<'a, F, E, R> {
+    /// The same with another estimator.
+    pub(in crate::transport) fn with_estimator<O>(&self, estimator: O) -> PathIntegrator<'a, F, O, R> {
+        let Self { context, settings, sharing, .. } = *self;
+        PathIntegrator { context, settings, estimator, sharing }
     }
 
-    /// The same, where surfaces with a diffuse part have from photons what light is reflected onto them. Pixels must
-    /// not share their paths as well. Where depth is limited only the first point of a path is served, for photons do
-    /// not know how far they are from their light.
-    pub fn with_photons(&self, photons: PhotonLight<'a>) -> Self {
-        Self { photons: Some(photons), ..*self }
-    }
-
-    /// The same, where surfaces with a diffuse part have caustics from photons, and rays that gather from there end in a
-    /// map of photons: even samples in the first, odd ones in the second. Pixels must not share their paths as well.
-    /// Where depth is limited only the first point of a path is served.
-    pub fn with_maps(&self, maps: &'a [PhotonMaps<'a>; 2]) -> Self {
-        Self { maps: Some(maps), ..*self }
-    }
-
-    /// The same, joined with photons of caustics.
-    pub fn with_caustics(&self, merging: CausticMerging<'a>) -> Self {
-        Self { merging: Some(merging), ..*self }
-    }
-
-    /// The same, where pixels share what their paths find, or do not.
-    pub fn with_reuse(&self, reuse: bool) -> Self {
-        Self { settings: PathSettings { reuse, ..self.settings }, ..*self }
+    /// The same with another rule of sharing.
+    pub(in crate::transport) fn with_sharing<O>(&self, sharing: O) -> PathIntegrator<'a, F, E, O> {
+        let Self { context, settings, estimator, .. } = *self;
+        PathIntegrator { context, settings, estimator, sharing }
     }
 
     /// Whether paths have a limit of depth.
@@ -140,26 +107,34 @@ impl<'a, F: Features> PathIntegrator<'a, F> {
         Tile::count(self.settings.width, self.settings.height)
     }
 
-    /// Working memory of one task that advances `wave` paths together.
-    pub fn scratch(wave: usize) -> Footprint {
-        Wavefront::footprint(wave)
-    }
-
     /// The camera ray of a sample of the pixel in column `x` and row `y`.
     #[inline]
-    pub(super) fn camera_ray(&self, [x, y]: [u32; 2], sampler: &Sampler) -> Ray {
+    pub(in crate::transport) fn camera_ray(&self, [x, y]: [u32; 2], sampler: &Sampler) -> Ray {
         let PathSettings { width, height, .. } = self.settings;
+        let camera = &self.context.scene.camera;
         let [dx, dy] = sampler.pair(dimension::PIXEL);
-        let has_lens = self.context.scene.camera.lens_radius > 0.0;
-        let lens = if has_lens { sampler.pair(dimension::LENS) } else { [0.0; 2] };
-        self.context.scene.camera.ray(width, height, x as f32 + dx, y as f32 + dy, lens)
+        let lens = if camera.lens_radius > 0.0 { sampler.pair(dimension::LENS) } else { [0.0; 2] };
+        camera.ray(width, height, x as f32 + dx, y as f32 + dy, lens)
     }
-}
 
-/// A vertex that is about to be shaded.
-#[derive(Clone, Copy)]
-pub(super) struct SurfaceInteraction<'a> {
-    pub(super) point: SurfacePoint<'a>,
-    /// What a cache says of it.
-    pub(super) indirect: Option<CachedIrradiance>,
+    /// Traces the first `count` rays of the wave, and follows their paths to the end.
+    pub(in crate::transport) fn advance(
+        &self,
+        wave: &mut PathWave<E::State, R>,
+        count: usize,
+        counters: &mut Counters,
+    ) {
+        wave.wave.trace(&self.context, count, Coherence::Coherent, counters);
+        self.trace_to_end(wave, count, counters);
+    }
+
+    /// Follows the paths of the first `count` rays, which were traced, to the end.
+    pub(in crate::transport) fn trace_to_end(
+        &self,
+        PathWave { wave, memory }: &mut PathWave<E::State, R>,
+        count: usize,
+        counters: &mut Counters,
+    ) {
+        wave.follow(&self.context, count, &mut Shading { integrator: self, memory }, counters);
+    }
 }

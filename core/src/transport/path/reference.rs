@@ -1,18 +1,18 @@
-//! The path tracer of the textbook: one path at a time, one ray at a time. It is what [`crate::transport::path`] is tested
-//! against, and it says in order what that does in pieces.
+//! The path tracer of the textbook: one path at a time, one ray at a time. It is what
+//! [`crate::transport::path`] is tested against, and it says in order what that does in pieces.
 
+use super::silhouette::{self, is_outlined};
 use crate::bsdf::All;
 use crate::bvh::Bvh;
 use crate::geometry::MISS;
 use crate::light::{LightSampler, emitted};
 use crate::sampling::Sampler;
 use crate::scene::Scene;
-use crate::transport::estimator::{
-    MAX_CROSSINGS, MAX_VERTICES, PathSettings, continuation_probability, dimension, environment_heuristic,
-    is_cut, power_heuristic,
-};
-use crate::transport::path::silhouette::{self, is_outlined};
+use crate::transport::settings::PathSettings;
 use crate::transport::walk::context::SceneContext;
+use crate::transport::walk::dimension;
+use crate::transport::walk::mis::{environment_heuristic, power_heuristic};
+use crate::transport::walk::termination::{MAX_CROSSINGS, MAX_VERTICES, continuation_probability, is_cut};
 use crate::transport::walk::visibility::shadow_ray;
 use crate::{Level, Rgb};
 use glam::Vec3;

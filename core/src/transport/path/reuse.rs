@@ -1,38 +1,39 @@
-//! Paths of neighbouring pixels share what they find (Bekaert, Sbert and Halton, "Accelerating path tracing by
-//! re-using paths", 2002).
+//! Paths of neighbouring pixels share what they find (Bekaert, Sbert and Halton, "Accelerating path tracing
+//! by re-using paths", 2002).
 //!
-//! Path j starts from a diffuse point x_j in its pixel and meets a diffuse point y_j, which reflects L_j. From
-//! every x_i of the circle y_j could have been met as well. The balance heuristic over all of them gives pixel i
-//! a share w_ij of what path j found:
+//! Path j starts from a diffuse point x_j in its pixel and meets a diffuse point y_j, which reflects L_j.
+//! From every x_i of the circle y_j could have been met as well. The balance heuristic over all of them gives
+//! pixel i a share w_ij of what path j found:
 //!
 //!   w_ij = V_ij g_ij / Σ_k V_kj g_kj,    g_kj = cos θ_k cos θ_y / |x_k - y_j|²
 //!
 //! with V the visibility between the two. The shares of one y_j add up to one: nothing is lost and nothing is
-//! counted twice, whatever V and g are, so the picture stays right in the mean. The price is one shadow ray for
-//! each pair, and errors that neighbours have in common.
+//! counted twice, whatever V and g are, so the picture stays right in the mean. The price is one shadow ray
+//! for each pair, and errors that neighbours have in common.
 //!
-//! Light that would show in the picture wherever it is shared, a flash, is shared up to a limit, which grows with the number
-//! of the sample; the rest stays with the path that found it. The limit is of the light of y, the same for all paths.
+//! Light that would show in the picture wherever it is shared, a flash, is shared up to a limit, which grows
+//! with the number of the sample; the rest stays with the path that found it. The limit is of the light of y,
+//! the same for all paths.
 //!
-//! Where y has a coat, what its diffuse part sends back is shared, times T(to x_i) / T(to x_j), the shares that pass the
-//! coat; what the coat mirrors belongs to path j alone.
+//! Where y has a coat, what its diffuse part sends back is shared, times T(to x_i) / T(to x_j), the shares
+//! that pass the coat; what the coat mirrors belongs to path j alone.
 
+use super::PathIntegrator;
+use super::connection::{ConnectionVertex, density};
+use super::estimator::Estimator;
+use super::sharing::Sharing;
+use super::wave::{PathMemory, PathWave};
 use crate::Rgb;
-use crate::bsdf::{Cover, Features};
-use crate::bvh::Coherence;
+use crate::bsdf::{Bsdf, Cover, Features};
 use crate::film::CIRCLE;
 use crate::geometry::Ray;
 use crate::scene::SurfacePoint;
-use crate::transport::estimator::{Counters, MAX_CROSSINGS};
-use crate::transport::path::PathIntegrator;
-use crate::transport::path::state::{PathState, Wavefront};
-use crate::transport::walk::visibility::FEW;
+use crate::transport::settings::Counters;
+use crate::transport::walk::context::SceneContext;
+use crate::transport::walk::visibility::ShadowRays;
+use crate::transport::wavefront::{PathState, Wavefront};
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
-
-/// Below this cosine of the viewer the shading normal may have been turned to him: no two viewers then see the
-/// same surface.
-const HORIZON: f32 = 2e-3;
 
 /// A flash of the `n`th sample is what brings more light than this times the mean of the picture, times n and
 /// [`BEFORE_FLASHES`]: a sixteenth of it, in the mean of n samples, is a quarter of the mean.
@@ -41,61 +42,8 @@ const FLASH: f32 = 4.0;
 /// With few samples all is noise, and flashes hardly show.
 const BEFORE_FLASHES: u32 = 16;
 
-/// One end of a connection. Both normals are on the side of the other end.
-#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
-#[repr(C)]
-pub(in crate::transport) struct ConnectionVertex {
-    position: [f32; 3],
-    /// Bound of the error of `position`.
-    error: f32,
-    /// The shading normal.
-    normal: [f32; 3],
-    geometric_normal: [f32; 3],
-}
-
-impl ConnectionVertex {
-    pub(in crate::transport) fn of(point: &SurfacePoint) -> Self {
-        Self {
-            position: point.position.to_array(),
-            error: point.error,
-            normal: point.frame.normal.to_array(),
-            geometric_normal: point.geometric_normal.to_array(),
-        }
-    }
-
-    /// The position, moved off the surface.
-    #[inline]
-    fn outside(&self) -> Vec3 {
-        Vec3::from(self.position) + self.error * Vec3::from(self.geometric_normal)
-    }
-
-    /// The ray from here to `other` that meets neither surface.
-    #[inline]
-    fn ray_to(&self, other: &ConnectionVertex) -> Ray {
-        let origin = self.outside();
-        Ray::segment(origin, other.outside() - origin, 1.0 - f32::EPSILON)
-    }
-}
-
-/// g = cos θ_x cos θ_y / |x - y|²: density per area, up to π, with which a path from the diffuse point `x` meets
-/// `y`. Zero where the two are not on the same side of each other.
-#[inline]
-fn density(x: &ConnectionVertex, y: &ConnectionVertex) -> f32 {
-    let between = Vec3::from(y.position) - Vec3::from(x.position);
-    let square = between.length_squared();
-    let leaving = between.dot(x.normal.into());
-    let arriving = -between.dot(y.geometric_normal.into());
-    let shading = -between.dot(y.normal.into());
-    let faces = leaving > 0.0
-        && arriving > 0.0
-        && shading > 0.0
-        && between.dot(x.geometric_normal.into()) > 0.0
-        && shading * shading > HORIZON * HORIZON * square;
-    if faces { leaving * arriving / square / square } else { 0.0 }
-}
-
-/// What covers the diffuse part of y. Only the light of that part is shared: what leaves y elsewhere is known from what
-/// left it here. The light of a coat is for the path alone that found it.
+/// What covers the diffuse part of y. Only the light of that part is shared: what leaves y elsewhere is known
+/// from what left it here. The light of a coat is for the path alone that found it.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C)]
 struct Coated {
@@ -111,7 +59,7 @@ struct Coated {
 /// What a path offers to its circle, and what it gets.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C)]
-pub(in crate::transport) struct ReuseState {
+pub struct ReuseState {
     x: ConnectionVertex,
     y: ConnectionVertex,
     /// β behind x: what radiance from y is worth in the pixel.
@@ -141,19 +89,10 @@ const LIT: u16 = 4;
 const BEHIND: u16 = 5;
 
 impl ReuseState {
-    pub(in crate::transport) fn new(circle: u32) -> Self {
-        Self { circle, ..Self::default() }
-    }
-
-    /// The path scatters at a diffuse `point`, its x if it has none. Whether it has become that: it must go on for
-    /// certain then, if it carries any `throughput` from there.
+    /// The path scatters at a diffuse `point`, its x if it has none. Whether it has become that: it must go
+    /// on for certain then, if it carries any `throughput` from there.
     #[inline]
-    pub(in crate::transport) fn leave(
-        &mut self,
-        point: &SurfacePoint,
-        throughput: Rgb,
-        segments: u32,
-    ) -> bool {
+    fn leave(&mut self, point: &SurfacePoint, throughput: Rgb, segments: u32) -> bool {
         if self.stage != ALONE || throughput == Rgb::ZERO {
             return false;
         }
@@ -164,15 +103,10 @@ impl ReuseState {
         true
     }
 
-    /// The path is about to scatter at the next surface after x. Where that is fit to be met from elsewhere, it
-    /// becomes y: the path then gathers for all its circle, with throughput 1.
+    /// The path is about to scatter at the next surface after x. Where that is fit to be met from elsewhere,
+    /// it becomes y: the path then gathers for all its circle, with throughput 1.
     #[inline]
-    pub(in crate::transport) fn arrive(
-        &mut self,
-        point: &SurfacePoint,
-        cover: Option<Cover>,
-        path: &mut PathState,
-    ) {
+    fn arrive(&mut self, point: &SurfacePoint, cover: Option<Cover>, path: &mut PathState) {
         if self.stage != LEAVING {
             return;
         }
@@ -189,27 +123,9 @@ impl ReuseState {
         }
     }
 
-    /// Whether the path is at a coated y.
-    #[inline]
-    pub(in crate::transport) fn is_lit(&self) -> bool {
-        self.stage == LIT
-    }
-
-    /// At a coated y: which part of the light that a shadow ray brings is the base's.
-    #[inline]
-    pub(in crate::transport) fn light_is_of_base(&mut self, part: Rgb) {
-        self.coated.of_light = part.to_array();
-    }
-
-    /// At a coated y: which part of what is found behind it is the base's.
-    #[inline]
-    pub(in crate::transport) fn path_is_of_base(&mut self, part: Rgb) {
-        self.coated.of_path = part.to_array();
-    }
-
     /// The path has left y: what it has gathered so far came from a light.
     #[inline]
-    pub(in crate::transport) fn go_behind(&mut self, path: &mut PathState) {
+    fn go_behind(&mut self, path: &mut PathState) {
         if self.stage == LIT {
             self.divide(self.coated.of_light, path);
             self.stage = BEHIND;
@@ -244,33 +160,10 @@ impl ReuseState {
         self.coated.cover.transmittance(cosine.clamp(0.0, 1.0))
     }
 
-    /// What a throughput is worth in the pixel.
-    #[inline]
-    pub(in crate::transport) fn worth(&self, throughput: Rgb) -> Rgb {
-        if self.stage >= OFFERING { throughput * Rgb::from(self.throughput) } else { throughput }
-    }
-
-    /// What the pixel sees in the end, `path` being what the path gathered.
-    #[inline]
-    pub(in crate::transport) fn seen(&self, path: &PathState) -> Rgb {
-        let own = if self.stage >= OFFERING { Rgb::ZERO } else { Rgb::from(path.radiance) };
-        own + Rgb::from(self.radiance)
-    }
-
     /// What the pixel would see if nothing were shared, before it is.
-    pub(in crate::transport) fn alone(&self, path: &PathState) -> Rgb {
+    pub(super) fn alone(&self, path: &PathState) -> Rgb {
         let worth = if self.stage >= OFFERING { Rgb::from(self.throughput) } else { Rgb::ONE };
         Rgb::from(self.radiance) + worth * (Rgb::from(path.radiance) + Rgb::from(self.coated.base))
-    }
-
-    /// Adds `light` that belongs to `path` alone, wherever it is met.
-    #[inline]
-    pub(in crate::transport) fn keep(&mut self, path: &mut PathState, light: Rgb) {
-        if self.stage >= OFFERING {
-            self.take(1.0, light);
-        } else {
-            path.add(light);
-        }
     }
 
     #[inline]
@@ -282,141 +175,209 @@ impl ReuseState {
 /// That path `taking` might have met what path `offering` did.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C)]
-pub(in crate::transport) struct Connection {
+pub struct Connection {
     offering: u32,
     taking: u32,
     /// V g.
     density: f32,
 }
 
-impl<F: Features> PathIntegrator<'_, F> {
-    /// The same, where samples that are bright next to the `mean` radiance of the picture are shared in part only.
-    pub fn with_flashes(&self, mean: f32) -> Self {
-        let mut other = *self;
-        other.flash = if mean > 0.0 { FLASH * mean } else { f32::INFINITY };
-        other
+/// Path reuse: pixels of a circle share the light that their paths find.
+#[derive(Clone, Copy, Debug)]
+pub struct PathReuse {
+    /// Light of a sample, times the number of samples, above which it is shared in part only.
+    flash: f32,
+}
+
+impl Sharing for PathReuse {
+    type State = ReuseState;
+    type Pair = Connection;
+    const IN_CIRCLES: bool = true;
+
+    #[inline]
+    fn begin(circle: u32) -> ReuseState {
+        ReuseState { circle, ..ReuseState::default() }
     }
 
-    /// Deals out what the first `count` paths of the wave have gathered behind their y.
-    pub(in crate::transport) fn share(&self, wave: &mut Wavefront, count: usize, counters: &mut Counters) {
-        for (exchange, path) in wave.exchanges.iter_mut().zip(wave.paths.iter_mut()).take(count) {
-            exchange.finish(path);
+    #[inline]
+    fn resume(state: &mut ReuseState, path: &mut PathState) {
+        state.go_behind(path);
+    }
+
+    #[inline]
+    fn arrive(state: &mut ReuseState, point: &SurfacePoint, bsdf: &Bsdf, path: &mut PathState) {
+        state.arrive(point, bsdf.cover(), path);
+    }
+
+    #[inline]
+    fn sample_light(state: &mut ReuseState, base: impl FnOnce() -> Rgb) {
+        if state.stage == LIT {
+            state.coated.of_light = base().to_array();
+        }
+    }
+
+    #[inline]
+    fn sample_bsdf(state: &mut ReuseState, base: impl FnOnce() -> Rgb) {
+        if state.stage == LIT {
+            state.coated.of_path = base().to_array();
+        }
+    }
+
+    #[inline]
+    fn leave(
+        state: &mut ReuseState,
+        (point, bsdf): (&SurfacePoint, &Bsdf),
+        throughput: Rgb,
+        segments: u32,
+    ) -> bool {
+        matches!(bsdf, Bsdf::Diffuse(_)) && state.leave(point, throughput, segments)
+    }
+
+    #[inline]
+    fn worth(state: &ReuseState, throughput: Rgb) -> Rgb {
+        if state.stage >= OFFERING { throughput * Rgb::from(state.throughput) } else { throughput }
+    }
+
+    #[inline]
+    fn keep(state: &mut ReuseState, path: &mut PathState, light: Rgb) {
+        if state.stage >= OFFERING {
+            state.take(1.0, light);
+        } else {
+            path.add(light);
+        }
+    }
+
+    #[inline]
+    fn radiance(state: &ReuseState, path: &PathState) -> Rgb {
+        let own = if state.stage >= OFFERING { Rgb::ZERO } else { Rgb::from(path.radiance) };
+        own + Rgb::from(state.radiance)
+    }
+
+    fn share<F: Features, S>(
+        &self,
+        (context, is_limited): (&SceneContext<F>, bool),
+        PathWave { wave, memory }: &mut PathWave<S, Self>,
+        count: usize,
+        counters: &mut Counters,
+    ) {
+        for (state, path) in memory.shared.iter_mut().zip(wave.paths.iter_mut()).take(count) {
+            state.finish(path);
         }
         let (mut pairs, mut rays, mut circle) = (0, 0, 0..0);
         for j in 0..count {
             if j >= circle.end {
-                circle = j..end_of_circle(&wave.exchanges[..count], j);
+                circle = j..end_of_circle(&memory.shared[..count], j);
             }
-            let offer = wave.exchanges[j];
+            let offer = memory.shared[j];
             if offer.stage != OFFERING {
                 continue;
             }
-            if pairs + CIRCLE > wave.pairs.len() {
-                self.deal(wave, pairs, rays, counters);
+            if pairs + CIRCLE > memory.pairs.len() {
+                self.divide(context, wave, memory, (pairs, rays), counters);
                 (pairs, rays) = (0, 0);
             }
             for k in circle.clone() {
-                let taker = &wave.exchanges[k];
-                if taker.stage == ALONE || (self.is_limited() && taker.segments != offer.segments) {
+                let taker = &memory.shared[k];
+                if taker.stage == ALONE || (is_limited && taker.segments != offer.segments) {
                     continue;
                 }
                 let density = density(&taker.x, &offer.y);
                 if density > 0.0 && density < f32::INFINITY {
-                    wave.pairs[pairs] = Connection { offering: j as u32, taking: k as u32, density };
+                    memory.pairs[pairs] = Connection { offering: j as u32, taking: k as u32, density };
                     if k != j {
                         wave.shadow_rays[rays] = Ray { tag: pairs as u32, ..offer.y.ray_to(&taker.x) };
+                        wave.shadow_light[rays] = [density; 3];
                         rays += 1;
                     }
                     pairs += 1;
                 }
             }
         }
-        self.deal(wave, pairs, rays, counters);
+        self.divide(context, wave, memory, (pairs, rays), counters);
     }
+}
 
-    /// Traces the first `rays` connections of the first `pairs` pairs and gives each path its shares.
-    fn deal(&self, wave: &mut Wavefront, pairs: usize, rays: usize, counters: &mut Counters) {
-        self.see(wave, rays, counters);
-        let mut rest = &wave.pairs[..pairs];
+impl PathReuse {
+    /// Traces the first `rays` connections of the first `pairs` pairs, and gives each path its shares.
+    fn divide<F: Features, S>(
+        &self,
+        context: &SceneContext<F>,
+        wave: &mut Wavefront,
+        memory: &mut PathMemory<S, Self>,
+        (pairs, rays): (usize, usize),
+        counters: &mut Counters,
+    ) {
+        see(context, wave, memory.pairs, rays, counters);
+        let PathMemory { shared, pairs: all, .. } = memory;
+        let mut rest = &all[..pairs];
         while let Some(first) = rest.first() {
             let count = rest.iter().take_while(|pair| pair.offering == first.offering).count();
             let (takers, others) = rest.split_at(count);
             rest = others;
-            let light = Rgb::from(wave.paths[first.offering as usize].radiance);
+            let path = wave.paths[first.offering as usize];
+            let light = Rgb::from(path.radiance);
             if light == Rgb::ZERO {
                 continue;
             }
-            // What is no light spoils, and is counted in, one pixel only.
+            // Light that is not finite spoils, and is counted in, one pixel only.
             if !light.is_finite() {
-                wave.exchanges[first.offering as usize].take(1.0, light);
+                shared[first.offering as usize].take(1.0, light);
                 continue;
             }
             let total: f32 = takers.iter().map(|pair| pair.density).sum();
-            let offer = wave.exchanges[first.offering as usize];
+            let offer = shared[first.offering as usize];
             let coated = offer.coated.cover != Cover::NONE;
             let here = if coated { offer.transmittance(&offer.x) } else { Rgb::ONE };
             let base = Rgb::select(here.cmpgt(Rgb::ZERO), light / here, Rgb::ZERO);
-            let most = self.flash * (BEFORE_FLASHES + wave.paths[first.offering as usize].sample) as f32;
-            let shared = (most / base.max_element()).min(1.0);
-            if shared < 1.0 {
-                wave.exchanges[first.offering as usize].take(1.0 - shared, light);
+            let most = self.flash * (BEFORE_FLASHES + path.sample) as f32;
+            let part = (most / base.max_element()).min(1.0);
+            if part < 1.0 {
+                shared[first.offering as usize].take(1.0 - part, light);
             }
             for pair in takers.iter().filter(|pair| pair.density > 0.0) {
-                let taker = &mut wave.exchanges[pair.taking as usize];
+                let taker = &mut shared[pair.taking as usize];
                 let there = if coated { offer.transmittance(&taker.x) } else { Rgb::ONE };
-                taker.take(shared * pair.density / total, base * there);
+                taker.take(part * pair.density / total, base * there);
             }
-        }
-    }
-
-    /// Multiplies the densities of the pairs with what the rays between them let pass: V.
-    fn see(&self, wave: &mut Wavefront, mut rays: usize, counters: &mut Counters) {
-        if !self.context.has_cutouts {
-            counters.shadow_rays += rays as u64;
-            let (shadow_rays, hidden) = (&wave.shadow_rays[..rays], &mut wave.hidden[..rays]);
-            self.context.bvh.occluded_batch(self.context.level, shadow_rays, hidden);
-            for (ray, _) in shadow_rays.iter().zip(&*hidden).filter(|(_, hidden)| **hidden != 0) {
-                wave.pairs[ray.tag as usize].density = 0.0;
-            }
-            return;
-        }
-        for _ in 0..=MAX_CROSSINGS {
-            if rays <= FEW {
-                break;
-            }
-            counters.shadow_rays += rays as u64;
-            let (shadow_rays, hits) = (&wave.shadow_rays[..rays], &mut wave.hits[..rays]);
-            self.context.nearest_batch(shadow_rays, Coherence::Incoherent, hits);
-            let mut left = 0;
-            for i in 0..rays {
-                let (ray, hit) = (wave.shadow_rays[i], wave.hits[i]);
-                if !hit.is_some() {
-                    continue;
-                }
-                let pair = &mut wave.pairs[ray.tag as usize];
-                match self.context.pass_cutout(&ray, &hit) {
-                    Some((through, transmittance)) => {
-                        pair.density *= transmittance;
-                        wave.shadow_rays[left] = through;
-                        left += 1;
-                    }
-                    None => pair.density = 0.0,
-                }
-            }
-            rays = left;
-        }
-        for ray in &wave.shadow_rays[..rays] {
-            let density = &mut wave.pairs[ray.tag as usize].density;
-            let light = Rgb::splat(*density);
-            let rays = &mut counters.shadow_rays;
-            let passed = self.context.transmit(*ray, light, rays);
-            *density = passed.unwrap_or_default().x;
         }
     }
 }
 
-/// Where the circle of path `first` ends.
-fn end_of_circle(exchanges: &[ReuseState], first: usize) -> usize {
-    let members = |other: &&ReuseState| other.circle == exchanges[first].circle;
-    first + exchanges[first..].iter().take_while(members).count()
+/// Multiplies the densities of `pairs` with the transmittance V of the first `rays` rays between them.
+fn see<F: Features>(
+    context: &SceneContext<F>,
+    wave: &mut Wavefront,
+    pairs: &mut [Connection],
+    rays: usize,
+    counters: &mut Counters,
+) {
+    for ray in &wave.shadow_rays[..rays] {
+        pairs[ray.tag as usize].density = 0.0;
+    }
+    let Wavefront { shadow_rays: rays_of, shadow_light: light, hits, hidden, .. } = wave;
+    let mut shadows = ShadowRays { rays: rays_of, light, hits, hidden };
+    let arrive = |ray: &Ray, density: Rgb| pairs[ray.tag as usize].density = density.x;
+    context.trace_shadow_rays(&mut shadows, rays, &mut counters.shadow_rays, arrive);
+}
+
+/// The end of the circle of path `first`.
+fn end_of_circle(states: &[ReuseState], first: usize) -> usize {
+    let members = |other: &&ReuseState| other.circle == states[first].circle;
+    first + states[first..].iter().take_while(members).count()
+}
+
+impl<'a, F: Features, E: Estimator<F>, R: Sharing> PathIntegrator<'a, F, E, R> {
+    /// The same, where pixels of a circle share the light that their paths find.
+    pub fn with_reuse(&self) -> PathIntegrator<'a, F, E, PathReuse> {
+        self.with_sharing(PathReuse { flash: f32::INFINITY })
+    }
+}
+
+impl<F: Features, E: Estimator<F>> PathIntegrator<'_, F, E, PathReuse> {
+    /// The same, where samples that are bright next to the `mean` radiance of the picture are shared in part
+    /// only.
+    pub fn with_flashes(&self, mean: f32) -> Self {
+        let flash = if mean > 0.0 { FLASH * mean } else { f32::INFINITY };
+        Self { sharing: PathReuse { flash }, ..*self }
+    }
 }

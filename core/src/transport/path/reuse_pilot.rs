@@ -1,17 +1,22 @@
 //! A look at a few tiles before the picture: whether it pays that pixels share what their paths find.
 //!
-//! The same samples tell both: what a pixel would see by its own path alone, and what it sees with the shares.
-//! Sharing pays where the variance falls by a larger factor than the work grows. It does not where most of the
-//! error is in the direct light, or behind mirrors and glass.
+//! The same samples tell both: what a pixel would see by its own path alone, and what it sees with the
+//! shares. Sharing pays where the variance falls by a larger factor than the work grows. It does not where
+//! most of the error is in the direct light, or behind mirrors and glass.
 
+use super::PathIntegrator;
+use super::estimator::Estimator;
+use super::reuse::PathReuse;
+use super::sharing::Sharing;
+use super::tile::TileSampler;
+use super::wave::PathWave;
 use crate::Rgb;
 use crate::bsdf::Features;
 use crate::film::{PIXELS_PER_TILE, Tile};
 use crate::memory::{Arena, OutOfMemory};
-use crate::transport::estimator::Counters;
-use crate::transport::path::PathIntegrator;
-use crate::transport::path::state::{Components, Wavefront};
-use crate::transport::path::tile::TileSampler;
+use crate::transport::settings::Counters;
+use crate::transport::walk::component::Components;
+use bytemuck::Pod;
 
 /// Samples of each pixel of the pilot. The first alone tells how bright the picture is.
 const SAMPLES: u32 = 4;
@@ -19,8 +24,8 @@ const SAMPLES: u32 = 4;
 /// Tiles that a pilot needs: in all about as much work as two samples of every pixel of a thumbnail.
 pub const PILOT_TILES: usize = 16;
 
-/// What a connection between two paths costs, in rays of the other kinds with all that is shaded at their ends
-/// (measured: 0.2 in a box, 0.3 in a room of 400,000 triangles).
+/// What a connection between two paths costs, in rays of the other kinds with all that is shaded at their
+/// ends (measured: 0.2 in a box, 0.3 in a room of 400,000 triangles).
 const CONNECTION: f32 = 0.3;
 
 /// The same where the light through cut-outs is followed from surface to surface.
@@ -68,13 +73,15 @@ impl Pilot {
         1.0 + (self.connections / self.rays.max(1.0)) as f32
     }
 
-    /// The relative variance of a sample, as the relMSE has it; where no sample counts more than it has itself.
+    /// The relative variance of a sample, as the relMSE has it; where no sample counts more than it has
+    /// itself.
     pub fn noise(&self, shared: bool) -> f64 {
         // Of three channels, and twice that of one sample.
         (if shared { self.shared } else { self.alone }) / (6.0 * self.pairs.max(1.0))
     }
 
-    /// The same relative to the light of blocks of 8 × 8 pixels, so that a sample counts as much as it scatters.
+    /// The same relative to the light of blocks of 8 × 8 pixels, so that a sample counts as much as it
+    /// scatters.
     pub fn scatter(&self, shared: bool) -> f64 {
         self.scatter[usize::from(shared)] / (6.0 * self.blocks.max(1.0))
     }
@@ -104,9 +111,9 @@ impl core::ops::AddAssign for Pilot {
     }
 }
 
-impl<F: Features> PathIntegrator<'_, F> {
+impl<F: Features, E: Estimator<F>> PathIntegrator<'_, F, E> {
     /// The tiles at which a pilot looks, spread over the picture.
-    pub fn pilot_tasks(&self) -> impl Iterator<Item = usize> + use<F> {
+    pub fn pilot_tasks(&self) -> impl Iterator<Item = usize> + use<F, E> {
         let (tasks, pilots) = (self.tasks(), self.tasks().min(PILOT_TILES));
         (0..pilots).map(move |i| (2 * i + 1) * tasks / (2 * pilots))
     }
@@ -114,13 +121,14 @@ impl<F: Features> PathIntegrator<'_, F> {
     /// The mean radiance of one tile by a first look.
     ///
     /// # Errors
-    /// [`OutOfMemory`] where `scratch` has less than [`PathIntegrator::scratch`] bytes.
+    /// [`OutOfMemory`] where `scratch` has less than [`PathIntegrator::scratch_with`] bytes.
     pub fn pilot_mean(&self, task: usize, wave: usize, scratch: &mut Arena) -> Result<f32, OutOfMemory> {
         self.mean_of(None, task, wave, scratch)
     }
 
-    /// The same of light that is there beside the photons of [`PathIntegrator::with_caustics`]: paths that meet a lamp by chance
-    /// count by their weight, and lamps that the eye sees, itself or by mirrors and glass, do not.
+    /// The same of light that is there beside the photons of [`PathIntegrator::with_caustics`]: paths that
+    /// meet a lamp by chance count by their weight, and lamps that the eye sees, itself or by mirrors and
+    /// glass, do not.
     ///
     /// # Errors
     /// As [`PathIntegrator::pilot_mean`].
@@ -128,16 +136,16 @@ impl<F: Features> PathIntegrator<'_, F> {
         self.mean_of(Some(Components::UNSEEN), task, wave, scratch)
     }
 
-    /// The mean radiance of the `share` of the light.
+    /// The mean radiance of light of these classes, or of all.
     fn mean_of(
         &self,
-        share: Option<Components>,
+        components: Option<Components>,
         task: usize,
         wave: usize,
         scratch: &mut Arena,
     ) -> Result<f32, OutOfMemory> {
         let mut arena = scratch.scratch();
-        let mut wave = Wavefront::new(wave, &mut arena)?;
+        let mut wave = PathWave::<E::State, ()>::new(wave, &mut arena)?;
         let tile = Tile::new(self.settings.width, self.settings.height, task);
         let (mut sum, mut all) = (0.0, 0);
         let mut places = TileSampler::new(tile, 0..1);
@@ -146,11 +154,12 @@ impl<F: Features> PathIntegrator<'_, F> {
             if count == 0 {
                 return Ok(sum / all.max(1) as f32);
             }
-            for path in &mut wave.paths[..count] {
-                path.share = share.unwrap_or(path.share);
+            for path in &mut wave.wave.paths[..count] {
+                path.components = components.unwrap_or(path.components);
             }
             self.advance(&mut wave, count, &mut Counters::default());
-            let light = wave.paths[..count].iter().map(|path| Rgb::from(path.radiance).element_sum() / 3.0);
+            let paths = &wave.wave.paths[..count];
+            let light = paths.iter().map(|path| Rgb::from(path.radiance).element_sum() / 3.0);
             sum += light.filter(|light| light.is_finite()).sum::<f32>();
             all += count;
         }
@@ -159,7 +168,7 @@ impl<F: Features> PathIntegrator<'_, F> {
     /// Looks at one tile of a picture whose `mean` radiance is about that; nothing of it reaches the film.
     ///
     /// # Errors
-    /// [`OutOfMemory`] where `scratch` has less than [`PathIntegrator::scratch`] bytes.
+    /// [`OutOfMemory`] where `scratch` has less than [`PathIntegrator::scratch_with`] bytes.
     pub fn pilot(
         &self,
         task: usize,
@@ -167,10 +176,10 @@ impl<F: Features> PathIntegrator<'_, F> {
         wave: usize,
         scratch: &mut Arena,
     ) -> Result<Pilot, OutOfMemory> {
-        let sharing = self.with_reuse(true).with_flashes(mean);
+        let sharing = self.with_reuse().with_flashes(mean);
         let connection = if self.context.has_cutouts { CONNECTION_THROUGH_CUTOUTS } else { CONNECTION };
         let mut arena = scratch.scratch();
-        let mut wave = Wavefront::new(wave, &mut arena)?;
+        let mut wave = PathWave::<E::State, PathReuse>::new(wave, &mut arena)?;
         let tile = Tile::new(self.settings.width, self.settings.height, task);
         let mut pilot = Pilot::default();
         // A layer of all pixels after the other, as many at a time as there is memory for.
@@ -183,13 +192,13 @@ impl<F: Features> PathIntegrator<'_, F> {
             let mut counters = Counters::default();
             sharing.advance(&mut wave, count, &mut counters);
             pilot.rays += (counters.rays + counters.shadow_rays) as f64;
-            for (alone, (path, exchange)) in
-                wave.shadow_light.iter_mut().zip(wave.paths.iter().zip(&*wave.exchanges))
-            {
-                *alone = exchange.alone(path).to_array();
+            // The throughput of a path that has ended is free.
+            for (path, state) in wave.wave.paths.iter_mut().zip(&*wave.memory.shared).take(count) {
+                path.throughput = state.alone(path).to_array();
             }
             let before = counters.shadow_rays;
-            sharing.share(&mut wave, count, &mut counters);
+            let context = (&self.context, self.is_limited());
+            sharing.sharing.share(context, &mut wave, count, &mut counters);
             pilot.connections += f64::from(connection) * (counters.shadow_rays - before) as f64;
             pilot.samples += count as f64;
             pilot.compare(&wave, count, mean);
@@ -199,15 +208,16 @@ impl<F: Features> PathIntegrator<'_, F> {
 
 impl Pilot {
     /// Adds the squared differences between samples of the same pixel.
-    fn compare(&mut self, wave: &Wavefront, count: usize, mean: f32) {
-        let shared = |i: usize| wave.exchanges[i].seen(&wave.paths[i]);
-        let layer = wave.paths[..count].iter().take_while(|path| path.sample == wave.paths[0].sample).count();
+    fn compare<S: Pod>(&mut self, wave: &PathWave<S, PathReuse>, count: usize, mean: f32) {
+        let paths = &wave.wave.paths;
+        let shared = |i: usize| wave.radiance(i);
+        let layer = paths[..count].iter().take_while(|path| path.sample == paths[0].sample).count();
         let mut blocks = [Block::default(); PIXELS_PER_TILE / BLOCK];
         for i in layer..count {
             let (a, b) = (shared(i), shared(i - layer));
             let light = (a + b).element_sum() / 6.0;
             let weight = 1.0 / (light * light + 0.01 * mean * mean);
-            let alone = Rgb::from(wave.shadow_light[i]) - Rgb::from(wave.shadow_light[i - layer]);
+            let alone = Rgb::from(paths[i].throughput) - Rgb::from(paths[i - layer].throughput);
             let squares = [alone.length_squared(), (a - b).length_squared()];
             // No light, or one that cannot be compared.
             let [alone, shared] = squares.map(|square| square * weight);
@@ -215,7 +225,7 @@ impl Pilot {
                 self.alone += f64::from(alone);
                 self.shared += f64::from(shared);
                 self.pairs += 1.0;
-                if let Some(block) = blocks.get_mut(wave.paths[i].place as usize / BLOCK) {
+                if let Some(block) = blocks.get_mut(paths[i].place as usize / BLOCK) {
                     block.light += light;
                     block.squares = [0, 1].map(|k| block.squares[k] + squares[k]);
                     block.pairs += 1.0;

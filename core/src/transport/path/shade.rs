@@ -1,82 +1,123 @@
-//! One vertex of a path, in the order of the textbook: light that escapes to the environment, emission of the surface,
-//! light that a structure knows, next-event estimation (`direct.rs`), the next direction (`scatter.rs`).
+//! Shading of a block of vertices, in the order of the textbook and in steps over the block: escape and
+//! emission, light that an estimator knows, next-event estimation (`direct.rs`), the next direction
+//! (`scatter.rs`).
 
-use super::shadow_rays::Shadows;
-use super::{PathIntegrator, SurfaceInteraction};
+use super::PathIntegrator;
+use super::estimator::{EmissionHit, Estimator, KnownLight, Rest};
+use super::sharing::Sharing;
+use super::vertex::PathVertex;
+use super::wave::PathMemory;
 use crate::Rgb;
-use crate::bsdf::{Bsdf, Features};
+use crate::bsdf::Features;
 use crate::geometry::{Hit, Ray};
 use crate::light::emitted;
 use crate::sampling::Sampler;
 use crate::scene::SurfacePoint;
-use crate::transport::estimator::{Counters, dimension, environment_heuristic, power_heuristic};
-use crate::transport::path::reuse::ReuseState;
-use crate::transport::path::state::{Components, MergeState, PathState};
-use crate::transport::photon_mapping::final_gather::MapLookup;
-use core::f32::consts::FRAC_1_PI;
+use crate::transport::settings::Counters;
+use crate::transport::walk::dimension;
+use crate::transport::walk::mis::{environment_heuristic, power_heuristic};
+use crate::transport::wavefront::{BLOCK, PathState, Shade, Wavefront};
+use bytemuck::Zeroable;
+use core::ops::Range;
 use glam::Vec3;
 
-/// Lights that fill a smaller share of a hemisphere, weighted by cosines, are found by shadow rays alone as well as with
-/// the help of rays that find them by chance.
-const SMALL: f32 = 0.1;
-
-/// A vertex at which a path is scattered.
-pub(super) struct Vertex<'v, 'a> {
-    /// The ray that met it, and the triangle.
-    pub(super) ray: &'v Ray,
-    pub(super) hit: &'v Hit,
-    pub(super) met: &'v SurfaceInteraction<'a>,
-    pub(super) point: &'v SurfacePoint<'a>,
-    pub(super) bsdf: Bsdf,
-    /// The random numbers of the path, and the first dimension of this vertex.
-    pub(super) sampler: Sampler,
-    pub(super) first: u32,
-    /// Segments of the path up to here.
-    pub(super) segments: u32,
-    /// Direction to the vertex before, local.
-    pub(super) wo: Vec3,
-    /// The normal as light sampling knows it: zero where light comes from both sides.
-    pub(super) normal: Vec3,
-    /// Distance from the vertex before, and from the camera.
-    pub(super) distance: f32,
-    pub(super) travelled: f32,
-    /// β: throughput of the path up to here.
-    pub(super) throughput: Rgb,
-    /// Photons are those of its base alone; its coat is sampled apart.
-    pub(super) apart: bool,
+/// The path tracer at work on a wave, of which it has the part that the wavefront does not know.
+pub(super) struct Shading<'i, 'a, 'm, F: Features, E: Estimator<F>, R: Sharing> {
+    pub(super) integrator: &'i PathIntegrator<'a, F, E, R>,
+    pub(super) memory: &'i mut PathMemory<'m, E::State, R>,
 }
 
-/// Light that structures know at a vertex, and the light that is left for the path to find.
-pub(super) struct Known {
-    /// A photon map's answer.
-    pub(super) said: MapLookup,
-    /// Light samples of next-event estimation.
-    pub(super) points: u32,
-    /// Next-event estimation is all that is left: the path ends here.
-    pub(super) ends: bool,
+/// One path of a wave, with the states of the estimator and of sharing.
+pub(super) struct Path<'p, S, T> {
+    pub(super) path: &'p mut PathState,
+    pub(super) state: &'p mut S,
+    pub(super) shared: &'p mut T,
 }
 
-impl<'a, F: Features> PathIntegrator<'a, F> {
-    /// Shades the `hit` of `ray`, the last segment of `path`. The ray by which the path goes on.
+impl<F: Features, E: Estimator<F>, R: Sharing> Shade for Shading<'_, '_, '_, F, E, R> {
+    fn shadow_rays(&self) -> usize {
+        self.integrator.estimator.light_samples(&self.integrator.context) as usize
+    }
+
+    fn shade(&mut self, wave: &mut Wavefront, range: Range<usize>, counters: &mut Counters) {
+        let Self { integrator, memory } = self;
+        let PathIntegrator { context, settings, estimator, .. } = integrator;
+        // For estimators and sharing without a state.
+        let mut none = (E::State::zeroed(), R::State::zeroed());
+
+        let mut points = [const { None }; BLOCK];
+        for (point, i) in points.iter_mut().zip(range.clone()) {
+            *point = context.surface_at(&wave.rays[i], &wave.hits[i]);
+        }
+        let mut found = [E::Found::default(); BLOCK];
+        estimator.look_up((context, settings), (wave, range.clone()), &points, &mut found, counters);
+
+        let mut vertices = [const { None }; BLOCK];
+        for ((vertex, point), i) in vertices.iter_mut().zip(&points).zip(range) {
+            let (ray, hit) = (wave.rays[i], wave.hits[i]);
+            let index = ray.tag as usize;
+            let Some(path) = memory.path(wave, index, &mut none) else { continue };
+            match integrator.arrive(path, (&ray, &hit), point.as_ref(), counters) {
+                Ok(met) => *vertex = Some(met),
+                Err(Some(through)) => wave.push_ray(index, through),
+                Err(None) => {}
+            }
+        }
+        let mut rests = [const { None }; BLOCK];
+        for ((rest, vertex), found) in rests.iter_mut().zip(&vertices).zip(found) {
+            let Some(vertex) = vertex else { continue };
+            let Some(path) = memory.path(wave, vertex.path, &mut none) else { continue };
+            *rest = Some(integrator.known(path, vertex, found));
+        }
+        let lit = || vertices.iter().flatten().zip(rests.iter().flatten());
+        for (vertex, rest) in lit() {
+            let state = memory.states.get(vertex.path).unwrap_or(&none.0);
+            let shared = memory.shared.get_mut(vertex.path).unwrap_or(&mut none.1);
+            integrator.direct((state, shared), vertex, rest, wave);
+        }
+        for (vertex, rest) in lit().filter(|(_, rest)| !rest.ends) {
+            let Some(path) = memory.path(wave, vertex.path, &mut none) else { continue };
+            if let Some(ray) = integrator.scatter(path, vertex, rest, counters) {
+                wave.push_ray(vertex.path, ray);
+            }
+        }
+    }
+}
+
+impl<S, R: Sharing> PathMemory<'_, S, R> {
+    /// Path number `index`; `none` stands for states that are not there.
     #[inline]
-    pub(super) fn shade(
+    fn path<'p>(
+        &'p mut self,
+        wave: &'p mut Wavefront,
+        index: usize,
+        none: &'p mut (S, R::State),
+    ) -> Option<Path<'p, S, R::State>> {
+        Some(Path {
+            path: wave.paths.get_mut(index)?,
+            state: self.states.get_mut(index).unwrap_or(&mut none.0),
+            shared: self.shared.get_mut(index).unwrap_or(&mut none.1),
+        })
+    }
+}
+
+impl<'a, F: Features, E: Estimator<F>, R: Sharing> PathIntegrator<'a, F, E, R> {
+    /// Adds the emission that `ray` has met, and prepares the vertex at which its path scatters. If there is
+    /// none, the ray behind a surface that the path skips.
+    #[inline]
+    fn arrive<'v>(
         &self,
-        path: &mut PathState,
-        exchange: &mut ReuseState,
+        Path { path, state, shared }: Path<E::State, R::State>,
         (ray, hit): (&Ray, &Hit),
-        met: Option<&SurfaceInteraction<'a>>,
-        shadows: &mut Shadows,
+        point: Option<&'v SurfacePoint<'a>>,
         counters: &mut Counters,
-    ) -> Option<Ray> {
-        if self.settings.reuse {
-            exchange.go_behind(path);
-        }
+    ) -> Result<PathVertex<'v, 'a>, Option<Ray>> {
+        R::resume(shared, path);
         if !hit.is_some() {
-            self.escape(path, ray);
-            return None;
+            self.escape(path, state, ray);
+            return Err(None);
         }
-        let met = met?;
-        let point = &met.point;
+        let point = point.ok_or(None)?;
         let segments = u32::from(path.segments);
         let direction = Vec3::from(ray.direction);
         let sampler = Sampler::new(self.settings.seed, path.pixel, path.sample);
@@ -86,29 +127,24 @@ impl<'a, F: Features> PathIntegrator<'a, F> {
         if segments == 1 && point.is_left_by(ray)
             || self.context.is_passed(point, hit, path.triangle, opacity)
         {
-            return path.cross(point.spawn(direction), hit, counters);
+            return Err(path.cross(point.spawn(direction), hit.triangle, counters));
         }
-        self.emission(path, point, (ray, hit));
+        self.emission(path, state, point, direction);
         if segments >= self.settings.max_depth {
-            return None;
+            return Err(None);
         }
         let bsdf = self.context.bsdf_at(point);
-        if path.share.ends_at(&bsdf) {
-            return None;
+        if path.components.ends_at(&bsdf) {
+            return Err(None);
         }
-        let came = path.share;
-        path.share = came.behind(&bsdf);
-        if self.settings.reuse {
-            exchange.arrive(point, bsdf.cover(), path);
-        }
+        R::arrive(shared, point, &bsdf, path);
 
         let near = if segments == 1 { self.context.scene.camera.eye } else { path.position.into() };
         let distance = near.distance(point.position);
-        let has_photons = self.merging.is_some() || self.photons.is_some() || self.maps.is_some();
-        let vertex = Vertex {
-            ray,
-            hit,
-            met,
+        Ok(PathVertex {
+            path: ray.tag as usize,
+            pixel: path.pixel,
+            sample: path.sample,
             point,
             sampler,
             first: dimension::vertex(segments),
@@ -118,146 +154,69 @@ impl<'a, F: Features> PathIntegrator<'a, F> {
             distance,
             travelled: path.travelled + distance,
             throughput: path.throughput.into(),
-            apart: F::GLOSSY && has_photons && bsdf.is_varnished(self.context.separates_coats()),
+            apart: F::GLOSSY && E::SEPARATES_COATS && bsdf.is_varnished(self.context.separates_coats()),
+            came: path.components,
+            rest: path.components.behind(&bsdf),
             bsdf,
-        };
-        let known = self.known(path, exchange, &vertex, came);
-        self.direct(path, exchange, &vertex, &known, shadows);
-        if known.ends {
-            return None;
-        }
-        let gathered = self.photons_at(path, exchange, &vertex);
-        let merged = self.merge_at(path, exchange, &vertex);
-        self.scatter(path, exchange, &vertex, (&known, gathered, merged), counters)
+        })
     }
 
     /// Adds light of the environment, which the ray reaches.
-    fn escape(&self, path: &mut PathState, ray: &Ray) {
-        let Some(environment) =
-            self.context.scene.environment.as_ref().filter(|_| path.share.sees_emitters())
+    fn escape(&self, path: &mut PathState, state: &E::State, ray: &Ray) {
+        let scene = self.context.scene;
+        let Some(environment) = scene.environment.as_ref().filter(|_| path.components.has_environment())
         else {
             return;
         };
         let (position, direction) = (Vec3::from(path.position), Vec3::from(ray.direction));
-        let radiance = environment.radiance(self.context.scene, direction);
+        let radiance = environment.radiance(scene, direction);
         let mut weight = 1.0;
         if path.pdf < f32::INFINITY && radiance != Rgb::ZERO {
-            let pdf =
-                self.context.lights.pdf_escape(self.context.scene, position, path.normal.into(), direction);
+            let pdf = self.context.lights.pdf_escape(scene, position, path.normal.into(), direction);
             weight = environment_heuristic(self.context.lights, path.pdf, pdf);
         }
-        if let Some(merging) = &self.merging {
-            weight = merging.beside_photons(weight, path.chain_to_light(), || {
-                merging.emission.density_of_sky(self.context.scene, self.context.lights, direction, position)
-            });
-        }
+        let hit = EmissionHit::Environment { direction, position };
+        let weight = self.estimator.weight_hit(&self.context, state, hit, weight);
         path.add(Rgb::from(path.throughput) * radiance * weight);
     }
 
     /// Adds light that the surface at `point` emits.
     #[inline]
-    fn emission(&self, path: &mut PathState, point: &SurfacePoint, (ray, hit): (&Ray, &Hit)) {
-        if !(point.material.emits() && path.share.sees_lamps()) {
+    fn emission(&self, path: &mut PathState, state: &E::State, point: &SurfacePoint, direction: Vec3) {
+        if !(point.material.emits() && path.components.has_emission()) {
             return;
         }
-        let radiance = emitted(self.context.scene, hit.triangle, point.uv, point.front);
+        let (scene, triangle) = (self.context.scene, point.triangle);
+        let radiance = emitted(scene, triangle, point.uv, point.front);
         if radiance == Rgb::ZERO {
             return;
         }
-        let (position, direction) = (Vec3::from(path.position), Vec3::from(ray.direction));
+        let position = Vec3::from(path.position);
         let mut weight = 1.0;
         if path.pdf < f32::INFINITY {
             let distance = position.distance(point.position);
             let normal = path.normal.into();
-            let pdf = self.context.lights.pdf_hit(
-                self.context.scene,
-                position,
-                normal,
-                hit.triangle,
-                distance,
-                direction,
-            );
+            let pdf = self.context.lights.pdf_hit(scene, position, normal, triangle, distance, direction);
             weight = power_heuristic(path.pdf, pdf);
         }
-        if let Some(merging) = &self.merging {
-            weight = merging.beside_photons(weight, path.chain_to_light(), || {
-                let from = (point.position, -direction);
-                merging.emission.density_of_surface(
-                    self.context.scene,
-                    self.context.lights,
-                    hit.triangle,
-                    from,
-                )
-            });
-        }
+        let hit = EmissionHit::Surface { triangle, position: point.position, direction: -direction };
+        let weight = self.estimator.weight_hit(&self.context, state, hit, weight);
         path.add(Rgb::from(path.throughput) * radiance * weight);
     }
 
-    /// Adds light that a photon map or an irradiance cache knows, and says which light is left. `came` is the light
-    /// that the path was to find when it came here.
+    /// Adds light that the estimator knows at `vertex`. Returns the light that is left.
     #[inline]
     fn known(
         &self,
-        path: &mut PathState,
-        exchange: &mut ReuseState,
-        vertex: &Vertex,
-        came: Components,
-    ) -> Known {
-        let Vertex { point, ref bsdf, throughput, segments, .. } = *vertex;
-        let mut said = MapLookup::default();
-        if let Some(maps) = self.maps {
-            let turns = vertex.sampler.single(dimension::PROBES + segments);
-            let limit = if self.is_limited() { segments } else { 0 };
-            let maps = &maps[path.sample as usize & 1];
-            let surface = (point, bsdf);
-            let from = (vertex.wo, vertex.travelled);
-            said = maps.ask(&self.context, (came, limit, vertex.distance), surface, from, turns);
-            path.gather(throughput, exchange, said.gathered);
-        }
-        let mut known = Known { said, points: 1, ends: false };
-        // Where lights are small all around, and nothing mirrors them, a shadow ray alone finds the direct light. Not
-        // that of an environment, which is not sampled where it seemed to be hidden. Both take several light samples.
-        if let (Some(indirect), Bsdf::Diffuse(diffuse)) = (vertex.met.indirect, bsdf)
-            && !known.said.is_all
-        {
-            path.add(throughput * diffuse.reflectance * indirect.irradiance * FRAC_1_PI);
-            path.share = Components::DIRECT;
-            known.said.next = Components::DIRECT;
-            let has_environment = self.context.scene.environment.is_some();
-            known.ends = indirect.shining < SMALL && !self.context.has_mirrors && !has_environment;
-            known.points = if known.ends || has_environment { path.lights.max(1).into() } else { 1 };
-        }
-        known
-    }
-
-    /// Adds light reflected from photons (`density.rs`); whether the surface stores any.
-    #[inline]
-    fn photons_at(&self, path: &mut PathState, exchange: &mut ReuseState, vertex: &Vertex) -> bool {
-        let Some(photons) = self.photons.as_ref().filter(|_| vertex.segments == 1 || !self.is_limited())
-        else {
-            return false;
+        Path { path, state, shared }: Path<E::State, R::State>,
+        vertex: &PathVertex,
+        found: E::Found,
+    ) -> Rest {
+        let mut add = |KnownLight { contribution, blur }: KnownLight| {
+            // For this path alone: others look the structure up where they are.
+            R::keep(shared, path, contribution);
+            path.blur = (Rgb::from(path.blur) + R::worth(shared, vertex.throughput) * blur).to_array();
         };
-        let turns = vertex.sampler.single(dimension::PROBES + vertex.segments);
-        let surface = (vertex.point, &vertex.bsdf);
-        let from = (vertex.wo, vertex.travelled);
-        let reflected = photons.reflected(&self.context, surface, from, turns);
-        path.gather(vertex.throughput, exchange, reflected.unwrap_or_default());
-        reflected.is_some()
-    }
-
-    /// Adds caustics from photons, where the path merges with them at this vertex (`merge.rs`).
-    #[inline]
-    fn merge_at(&self, path: &mut PathState, exchange: &mut ReuseState, vertex: &Vertex) -> MergeState {
-        let merged = path.merged;
-        let Some(merging) = self.merging.as_ref().filter(|_| merged.may_come()) else { return merged };
-        let met = merging.met(path, vertex.point.position, vertex.segments, self.is_limited());
-        met.unwrap_or_else(|| {
-            let turns = || vertex.sampler.single(dimension::PROBES + vertex.segments);
-            let from = (vertex.wo, if path.disc == 0.0 { vertex.travelled } else { 0.0 });
-            let surface = (vertex.point, &vertex.bsdf);
-            let gathered = merging.reflected(&self.context, path.sample, surface, from, turns);
-            path.gather(vertex.throughput, exchange, gathered);
-            MergeState::LATER
-        })
+        self.estimator.at_vertex((&self.context, &self.settings), vertex, state, found, &mut add)
     }
 }

@@ -1,10 +1,14 @@
-//! Pixels that see the border of a lamp. A lamp that fills a hundredth of a pixel is met by few samples, and is then all
-//! that the pixel shows: a row of such pixels has most of the error of a picture, and hides it from estimates. So what they
-//! see of the lamp itself comes from many camera rays for each sample, which ask for nothing but emission; the path of
-//! the sample sees all else.
+//! Pixels that see the border of a lamp. A lamp that fills a hundredth of a pixel is met by few samples, and
+//! is then all that the pixel shows: a row of such pixels has most of the error of a picture, and hides it
+//! from estimates. So what they see of the lamp itself comes from many camera rays for each sample, which ask
+//! for nothing but emission; the path of the sample sees all else.
 //!
-//! Which pixels these are follows from the camera and the corners of the lamps alone, so that nothing is biased.
+//! Which pixels these are follows from the camera and the corners of the lamps alone, so that nothing is
+//! biased.
 
+use super::PathIntegrator;
+use super::estimator::Estimator;
+use super::sharing::Sharing;
 use crate::Rgb;
 use crate::bsdf::Features;
 use crate::bvh::Coherence;
@@ -13,18 +17,19 @@ use crate::geometry::{Hit, MISS, Ray};
 use crate::light::{LightSampler, emitted};
 use crate::sampling::Sampler;
 use crate::scene::{Camera, Material, Scene};
-use crate::transport::estimator::{Counters, MAX_CROSSINGS, PathSettings, dimension};
-use crate::transport::path::PathIntegrator;
-use crate::transport::path::state::Wavefront;
+use crate::transport::settings::{Counters, PathSettings};
 use crate::transport::walk::context::SceneContext;
+use crate::transport::walk::dimension;
+use crate::transport::walk::termination::MAX_CROSSINGS;
+use crate::transport::wavefront::Wavefront;
 use glam::{Vec2, Vec3};
 
-/// Camera rays for each sample, a power of two: their places in the pixel stay a net. They take about as long as two
-/// samples, in a pixel of a hundred.
+/// Camera rays for each sample, a power of two: their places in the pixel stay a net. They take about as long
+/// as two samples, in a pixel of a hundred.
 const RAYS: u32 = 32;
 
-/// Where a tile sees more triangles of lamps than this they are smaller than its pixels, and to look at all borders would
-/// take its time.
+/// Where a tile sees more triangles of lamps than this they are smaller than its pixels, and to look at all
+/// borders would take its time.
 const MOST_LAMPS: usize = 4096;
 
 /// Borders count as seen from so many pixels away: more than rounding.
@@ -33,7 +38,8 @@ const MARGIN: f32 = 0.01;
 /// A border that begins behind the camera is seen from this share of its greatest depth on.
 const NEAR: f32 = 1e-3;
 
-/// Adds the pixels that the segment from `a` to `b` passes through, in raster coordinates from the tile's corner.
+/// Adds the pixels that the segment from `a` to `b` passes through, in raster coordinates from the tile's
+/// corner.
 fn add(pixels: &mut PixelSet, a: Vec2, b: Vec2) {
     let (a, b) = if a.y <= b.y { (a, b) } else { (b, a) };
     let side = TILE as f32;
@@ -90,8 +96,8 @@ impl View {
     }
 }
 
-/// The pixels of a tile that see the border of a lamp, as far as nothing is in the way. None where a sharp border is not
-/// seen: through a lens, or where surfaces have cut-outs.
+/// The pixels of a tile that see the border of a lamp, as far as nothing is in the way. None where a sharp
+/// border is not seen: through a lens, or where surfaces have cut-outs.
 pub(in crate::transport) fn outlined(
     scene: &Scene,
     lights: &LightSampler,
@@ -154,8 +160,8 @@ pub(in crate::transport) fn rays(
     })
 }
 
-/// The share of one of [`rays`], which met `hit`, in what its pixel sees of lamps. As a path does it passes a surface
-/// that the camera stands on.
+/// The share of one of [`rays`], which met `hit`, in what its pixel sees of lamps. As a path does it passes a
+/// surface that the camera stands on.
 pub(in crate::transport) fn emission<F: Features>(
     context: &SceneContext<F>,
     mut ray: Ray,
@@ -177,10 +183,10 @@ pub(in crate::transport) fn emission<F: Features>(
     Rgb::ZERO
 }
 
-impl<F: Features> PathIntegrator<'_, F> {
-    /// What the first `count` paths of the wave see of lamps, in `wave.shadow_light`: those whose pixel is `outlined`, by
-    /// its place; nothing for the others.
-    pub(in crate::transport) fn look_at_lamps(
+impl<F: Features, E: Estimator<F>, R: Sharing> PathIntegrator<'_, F, E, R> {
+    /// Writes the emission of lamps in the pixels of the first `count` paths of the wave into
+    /// `wave.shadow_light`, where the place of the pixel is `outlined`, and zero elsewhere.
+    pub(super) fn trace_lamps(
         &self,
         mut outlined: impl FnMut(u32) -> bool,
         wave: &mut Wavefront,
@@ -199,16 +205,16 @@ impl<F: Features> PathIntegrator<'_, F> {
                 wave.rays[filled] = Ray { tag: i as u32, ..ray };
                 filled += 1;
                 if filled == capacity {
-                    self.gather_emission(wave, core::mem::take(&mut filled), counters);
+                    self.add_emission(wave, core::mem::take(&mut filled), counters);
                 }
             }
         }
-        self.gather_emission(wave, filled, counters);
+        self.add_emission(wave, filled, counters);
     }
 
-    /// Adds what the first `count` rays of the wave see.
-    fn gather_emission(&self, wave: &mut Wavefront, count: usize, counters: &mut Counters) {
-        self.trace(wave, count, Coherence::Coherent, counters);
+    /// Adds the emission that the first `count` rays of the wave meet.
+    fn add_emission(&self, wave: &mut Wavefront, count: usize, counters: &mut Counters) {
+        wave.trace(&self.context, count, Coherence::Coherent, counters);
         for (ray, hit) in wave.rays.iter().zip(&*wave.hits).take(count) {
             let light = emission(&self.context, *ray, *hit);
             if let Some(sum) = wave.shadow_light.get_mut(ray.tag as usize) {

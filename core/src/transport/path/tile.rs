@@ -1,19 +1,22 @@
-//! The samples of a tile: in which order they are taken, how their paths begin, and what becomes of their light.
+//! The samples of a tile: their order, the start of their paths, and the sum of their light.
 //!
-//! Layer after layer, one sample of each pixel. Where pixels share their paths, those of a
-//! circle stay together; else all go along the Z-curve, so that neighbours ask caches together.
+//! Layer after layer, one sample of each pixel. Where pixels share light, those of a circle stay together;
+//! else all go along the Z-curve, so that neighbours look a cache up together.
 
+use super::PathIntegrator;
+use super::estimator::Estimator;
+use super::sharing::Sharing;
+use super::silhouette::outlined;
+use super::wave::PathWave;
 use crate::Rgb;
 use crate::bsdf::Features;
 use crate::film::{CIRCLE, CIRCLES, PIXELS_PER_TILE, Pixel, PixelSet, Tile};
-use crate::geometry::{MISS, Ray};
+use crate::geometry::Ray;
 use crate::memory::{Arena, OutOfMemory};
 use crate::sampling::Sampler;
-use crate::transport::estimator::{Counters, PathSettings};
-use crate::transport::path::reuse::ReuseState;
-use crate::transport::path::silhouette::outlined;
-use crate::transport::path::state::{Components, PathState, Wavefront};
-use crate::transport::path::{LIGHT_SAMPLES, PathIntegrator};
+use crate::transport::settings::{Counters, PathSettings};
+use crate::transport::walk::component::Components;
+use crate::transport::wavefront::PathState;
 use core::ops::Range;
 
 /// All samples of a tile that are still to be taken.
@@ -44,11 +47,11 @@ impl TileSampler {
     }
 }
 
-impl<F: Features> PathIntegrator<'_, F> {
+impl<F: Features, E: Estimator<F>, R: Sharing> PathIntegrator<'_, F, E, R> {
     /// Traces `samples` of tile `task` and adds them to `out`, the tile's pixels of the film.
     ///
     /// # Errors
-    /// [`OutOfMemory`] where `scratch` has less than [`PathIntegrator::scratch`] bytes.
+    /// [`OutOfMemory`] where `scratch` has less than [`PathIntegrator::scratch_with`] bytes.
     pub fn run(
         &self,
         task: usize,
@@ -64,7 +67,7 @@ impl<F: Features> PathIntegrator<'_, F> {
         let most = samples.len().saturating_mul(PIXELS_PER_TILE);
         let mut places = TileSampler::new(tile, samples);
         places.outlined = outlined(self.context.scene, self.context.lights, &self.settings, tile);
-        let mut wave = Wavefront::new(wave.min(most), &mut arena)?;
+        let mut wave = PathWave::<E::State, R>::new(wave.min(most), &mut arena)?;
         let has_outlines = !places.outlined.is_empty();
         loop {
             let count = self.start(&mut places, &mut wave);
@@ -73,43 +76,47 @@ impl<F: Features> PathIntegrator<'_, F> {
             }
             counters.paths += count as u64;
             self.advance(&mut wave, count, &mut counters);
-            if self.settings.reuse {
-                self.share(&mut wave, count, &mut counters);
-            }
+            self.sharing.share((&self.context, self.is_limited()), &mut wave, count, &mut counters);
             if has_outlines {
                 let outlined = |place| places.outlined.contains(place as usize);
-                self.look_at_lamps(outlined, &mut wave, count, &mut counters);
+                self.trace_lamps(outlined, &mut wave.wave, count, &mut counters);
             }
-            for (i, (path, exchange)) in wave.paths.iter().zip(&*wave.exchanges).take(count).enumerate() {
-                let lamps = if has_outlines { Rgb::from(wave.shadow_light[i]) } else { Rgb::ZERO };
-                let seen = exchange.seen(path) + lamps;
+            for i in 0..count {
+                let path = wave.wave.paths[i];
+                let lamps = if has_outlines { Rgb::from(wave.wave.shadow_light[i]) } else { Rgb::ZERO };
+                let radiance = wave.radiance(i) + lamps;
                 let Some(pixel) = out.get_mut(path.place as usize) else { continue };
-                if pixel.add(path.sample, seen, &mut counters.dropped) {
+                if pixel.add(path.sample, radiance, &mut counters.dropped) {
                     pixel.add_blur(path.sample, Rgb::from(path.blur));
                 }
             }
         }
     }
 
-    /// Fills the wave with camera rays; returns how many. Circles stay together.
-    pub(in crate::transport) fn start(&self, places: &mut TileSampler, wave: &mut Wavefront) -> usize {
+    /// Fills the wave with camera rays; returns their number. Circles stay together where their pixels share.
+    pub(in crate::transport) fn start(
+        &self,
+        places: &mut TileSampler,
+        wave: &mut PathWave<E::State, R>,
+    ) -> usize {
         let mut count = 0;
-        if self.settings.reuse {
-            while count + CIRCLE <= wave.paths.len()
+        let capacity = wave.wave.paths.len();
+        if R::IN_CIRCLES {
+            while count + CIRCLE <= capacity
                 && let Some((circle, sample)) = places.next_of(CIRCLES)
             {
                 // Another number for each circle that a wave can hold.
-                let exchange = ReuseState::new(sample.wrapping_mul(CIRCLES as u32) + circle as u32);
+                let number = sample.wrapping_mul(CIRCLES as u32) + circle as u32;
                 for place in places.tile.circle(circle, self.settings.seed, sample) {
-                    self.begin(places, place, sample, exchange, wave, &mut count);
+                    self.begin(places, (place, sample), number, wave, &mut count);
                 }
             }
             return count;
         }
-        while count < wave.paths.len()
+        while count < capacity
             && let Some((place, sample)) = places.next_of(PIXELS_PER_TILE)
         {
-            self.begin(places, place, sample, ReuseState::new(0), wave, &mut count);
+            self.begin(places, (place, sample), 0, wave, &mut count);
         }
         count
     }
@@ -119,31 +126,39 @@ impl<F: Features> PathIntegrator<'_, F> {
     fn begin(
         &self,
         places: &TileSampler,
-        place: usize,
-        sample: u32,
-        exchange: ReuseState,
-        wave: &mut Wavefront,
+        (place, sample): (usize, u32),
+        circle: u32,
+        wave: &mut PathWave<E::State, R>,
         count: &mut usize,
     ) {
-        let PathSettings { width, seed, .. } = self.settings;
         let Some((x, y)) = places.tile.pixel(place) else { return };
-        let index = y * width + x;
-        let ray = self.camera_ray([x, y], &Sampler::new(seed, index, sample));
-        wave.rays[*count] = Ray { tag: *count as u32, ..ray };
-        wave.paths[*count] = PathState {
-            throughput: [1.0; 3],
-            pdf: f32::INFINITY,
-            pixel: index,
-            place: place as u32,
-            sample,
-            segments: 1,
-            share: if places.outlined.contains(place) { Components::BESIDE_LAMP } else { Components::ALL },
-            triangle: MISS,
-            eta_squared: 1.0,
-            lights: if self.context.has_cutouts { 1 } else { LIGHT_SAMPLES as u16 },
-            ..PathState::default()
-        };
-        wave.exchanges[*count] = exchange;
+        self.begin_path(
+            wave,
+            *count,
+            ([x, y], place as u32, sample),
+            places.outlined.contains(place),
+            circle,
+        );
         *count += 1;
+    }
+
+    /// Path number `index` of the wave: a sample of the pixel in this column and row, which has a place among
+    /// others.
+    #[inline]
+    pub(super) fn begin_path(
+        &self,
+        wave: &mut PathWave<E::State, R>,
+        index: usize,
+        ([x, y], place, sample): ([u32; 2], u32, u32),
+        is_outlined: bool,
+        circle: u32,
+    ) {
+        let PathSettings { width, seed, .. } = self.settings;
+        let pixel = y * width + x;
+        let ray = self.camera_ray([x, y], &Sampler::new(seed, pixel, sample));
+        let components = if is_outlined { Components::BESIDE_LAMP } else { Components::ALL };
+        wave.wave.rays[index] = Ray { tag: index as u32, ..ray };
+        wave.wave.paths[index] = PathState::new(pixel, place, sample, components);
+        wave.begin(index, circle);
     }
 }

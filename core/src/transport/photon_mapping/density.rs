@@ -6,8 +6,14 @@ use crate::bvh::clearance::{Clearance, ClearanceQuery};
 use crate::geometry::Ray;
 use crate::photon::{Density, FLATNESS, Fence, Kernel, PROBES, PhotonMap, QueryDisc, Uniform};
 use crate::scene::SurfacePoint;
+use crate::transport::path::PathIntegrator;
+use crate::transport::path::estimator::{Estimator, KnownLight, Rest};
+use crate::transport::path::vertex::PathVertex;
 use crate::transport::photon_mapping::radius::RadiusSchedule;
+use crate::transport::settings::PathSettings;
+use crate::transport::walk::component::Components;
 use crate::transport::walk::context::SceneContext;
+use crate::transport::walk::dimension;
 use crate::{Level, Rgb};
 use core::f32::consts::FRAC_1_PI;
 use glam::Vec3;
@@ -15,8 +21,8 @@ use glam::Vec3;
 /// Cosine below which that of a photon counts as this: its direction is not known better.
 const GRAZING: f32 = 0.01;
 
-/// How steeply probes for walls rise from the surface: what is lower than that is a step, not a wall, and what the
-/// surface bends less is none either.
+/// How steeply probes for walls rise from the surface: what is lower than that is a step, not a wall, and
+/// what the surface bends less is none either.
 const LIFT: f32 = 0.1;
 
 /// Ways to look for what hangs over a disc: upwards, and at half a right angle to all sides.
@@ -58,8 +64,8 @@ impl<'a> PhotonLight<'a> {
         Self { kernel, ..self }
     }
 
-    /// The same, where discs are no wider than it takes for `enough` photons, if those lie evenly: where they crowd, an eighth of
-    /// the radius may do.
+    /// The same, where discs are no wider than it takes for `enough` photons, if those lie evenly: where they
+    /// crowd, an eighth of the radius may do.
     pub fn with_enough(self, enough: f32) -> Self {
         Self { enough, ..self }
     }
@@ -69,8 +75,9 @@ impl<'a> PhotonLight<'a> {
         Self { is_sparse: true, ..self }
     }
 
-    /// The reflected light that `point` sends to `wo`, itself reflected, at the end of a path that has come so far from the
-    /// eye; `None` where no photons are left on such a surface. `turns`, from 0 to 1, turns the probes for walls. Those are not counted as rays.
+    /// The reflected light that `point` sends to `wo`, itself reflected, at the end of a path that has come
+    /// so far from the eye; `None` where no photons are left on such a surface. `turns`, from 0 to 1, turns
+    /// the probes for walls. Those are not counted as rays.
     #[inline]
     pub(in crate::transport) fn reflected<F: Features>(
         &self,
@@ -97,16 +104,61 @@ impl<'a> PhotonLight<'a> {
     }
 }
 
+impl<F: Features> Estimator<F> for PhotonLight<'_> {
+    type State = ();
+    type Found = ();
+    const SEPARATES_COATS: bool = true;
+
+    /// Surfaces with a diffuse part have all reflected light from photons. Where depth is limited only the
+    /// first point of a path has, as photons do not know their distance from the light.
+    #[inline]
+    fn at_vertex(
+        &self,
+        (context, settings): (&SceneContext<F>, &PathSettings),
+        vertex: &PathVertex,
+        _: &mut (),
+        _: (),
+        add: &mut impl FnMut(KnownLight),
+    ) -> Rest {
+        let mut rest = Rest::all(vertex);
+        if vertex.segments > 1 && settings.is_limited() {
+            return rest;
+        }
+        let turns = vertex.sampler.single(dimension::PROBES + vertex.segments);
+        let from = (vertex.wo, vertex.travelled);
+        let reflected = self.reflected(context, (vertex.point, &vertex.bsdf), from, turns);
+        add(reflected.unwrap_or_default().known(vertex));
+        if reflected.is_some() {
+            rest.wide = Some(Components::EMITTED);
+        }
+        rest
+    }
+}
+
+impl<'a, F: Features> PathIntegrator<'a, F> {
+    /// The same, where surfaces with a diffuse part have reflected light from photons. Where depth is limited
+    /// only the first point of a path has.
+    pub fn with_photons(&self, photons: PhotonLight<'a>) -> PathIntegrator<'a, F, PhotonLight<'a>> {
+        self.with_estimator(photons)
+    }
+}
+
 /// What a disc of photons sends to the eye.
 #[derive(Clone, Copy, Debug, Default)]
 pub(in crate::transport) struct Gathered {
     pub(in crate::transport) light: Rgb,
-    /// By how much that is too bright for its width, in the mean: what it differs by from a disc of half the radius, and
-    /// what that blurs itself, a quarter of it all where light is smooth.
+    /// By how much that is too bright for its width, in the mean: what it differs by from a disc of half the
+    /// radius, and what that blurs itself, a quarter of it all where light is smooth.
     pub(in crate::transport) blur: Rgb,
 }
 
 impl Gathered {
+    /// As an estimator knows it at `vertex`.
+    #[inline]
+    pub(in crate::transport) fn known(self, vertex: &PathVertex) -> KnownLight {
+        KnownLight { contribution: vertex.throughput * self.light, blur: self.blur }
+    }
+
     /// By a disc that is no wider than it takes for `enough` photons.
     fn of(density: Density, enough: f32, response: Rgb) -> Self {
         let [chosen, finer] = density.of_enough(enough);
@@ -123,8 +175,8 @@ pub(in crate::transport) struct Light<'a> {
     pub(in crate::transport) enough: f32,
 }
 
-/// What `point` reflects to `wo` of the light of the photons on `disc`, as far as it is seen from there; `all` is the
-/// density of all of them, where it is known. By its base alone where it `is_varnished`.
+/// What `point` reflects to `wo` of the light of the photons on `disc`, as far as it is seen from there;
+/// `all` is the density of all of them, where it is known. By its base alone where it `is_varnished`.
 #[inline]
 pub(in crate::transport) fn reflected<F: Features>(
     Light { map, is_caustic, enough }: Light,
@@ -160,8 +212,8 @@ pub(in crate::transport) fn reflected<F: Features>(
     Gathered::of(map.gather_within(context.level, disc, &fence, &response), enough, Rgb::ONE)
 }
 
-/// Looks for walls on `disc`, and for its edges, by probes from `origin`, just above its middle; and for what hangs over
-/// it, but for caustics.
+/// Looks for walls on `disc`, and for its edges, by probes from `origin`, just above its middle; and for what
+/// hangs over it, but for caustics.
 pub(in crate::transport) fn fence(
     bvh: &Bvh,
     level: Level,

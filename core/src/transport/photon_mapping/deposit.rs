@@ -1,13 +1,15 @@
-//! Light paths: photons from the lights, left on every rough surface that they meet after the first (Jensen 1996).
+//! Light paths: photons from the lights, left on every rough surface that they meet after the first (Jensen
+//! 1996).
 //!
-//! What they leave is, by [`PhotonFilter`], the light that surfaces reflect onto each other, and that mirrors and glass throw onto
-//! surfaces, where light straight from a light is for shadow rays to find; all light; or caustics alone. How they get there
-//! is in `walk/light.rs`.
+//! What they leave is, by [`PhotonFilter`], the light that surfaces reflect onto each other, and that mirrors
+//! and glass throw onto surfaces, where light straight from a light is for shadow rays to find; all light; or
+//! caustics alone. How they get there is in `walk/light.rs`.
 //!
 //! Departures from the plain algorithm:
-//! 1. After a photon was left, its path goes on with a probability of at most [`MOST`]. A path then leaves five photons
-//!    on average at most, wherever it runs, so that [`ROOM`] for a task is enough: to be 14 standard deviations above
-//!    the mean it would have to live through as many ends as no sequence of random numbers holds.
+//! 1. After a photon was left, its path goes on with a probability of at most [`MOST`]. A path then leaves
+//!    five photons on average at most, wherever it runs, so that [`ROOM`] for a task is enough: to be 14
+//!    standard deviations above the mean it would have to live through as many ends as no sequence of random
+//!    numbers holds.
 //! 2. The price: where surfaces are lighter than that, photons differ in power.
 
 use crate::bsdf::Features;
@@ -16,8 +18,8 @@ use crate::light::{EmissionSampler, LightSampler, luminance};
 use crate::memory::{Arena, Footprint, OutOfMemory};
 use crate::photon::Photon;
 use crate::scene::Scene;
-use crate::transport::estimator::Counters;
 use crate::transport::photon_mapping::visible_points::VisiblePoints;
+use crate::transport::settings::Counters;
 use crate::transport::walk::context::SceneContext;
 pub use crate::transport::walk::light::PATHS;
 use crate::transport::walk::light::{Continuation, LightPathState, LightWalk, PhotonBuffer, Vertex, Visitor};
@@ -119,8 +121,8 @@ impl<'a, F: Features> PhotonTracer<'a, F> {
         if self.keep == PhotonFilter::Caustic { PATHS } else { ROOM }
     }
 
-    /// Shoots the photons of task `task` of map number `map` (below 2^31). All of `out` is written; what is not needed,
-    /// with photons of no place, which a map refuses. Room for [`PhotonTracer::room`] is enough.
+    /// Shoots the photons of task `task` of map number `map` (below 2^31). All of `out` is written; what is
+    /// not needed, with photons of no place, which a map refuses. Room for [`PhotonTracer::room`] is enough.
     ///
     /// # Errors
     /// [`OutOfMemory`] where `scratch` has less than [`PhotonTracer::scratch`] bytes.

@@ -1,45 +1,42 @@
-//! The light of photon maps for final gathering (Jensen 1996): a gather ray that meets a surface with a diffuse part
-//! ends there, with the light that the global map says is reflected. Of every [`STRIDE`]th photon the irradiance is
-//! worked out beforehand, from the photons nearest to it; a gather ray then takes what the nearest such photons say
-//! (Christensen 1999, "Faster Photon Map Global Illumination").
+//! Final gathering in a photon map (Jensen 1996): a gather ray that meets a surface with a diffuse part ends
+//! there, with the reflected light that the global map knows. The ray takes irradiance that was precomputed
+//! at the photons nearest to its end (`irradiance.rs`).
 //!
 //! Departures:
-//! 1. A gather ray ends in the map only where that is sure. It goes on, as a path does, where it is shorter than the
-//!    blur of the map at its end is wide (Jensen's secondary gathering, by a measured distance), where there are few
-//!    photons, where none lies on a surface like that of the point, or where a wall is in between.
-//! 2. A photon knows whether there is a wall within the disc of its estimate. If not, it need not be asked for again.
-//! 3. The ray takes the harmonic mean of the nearest irradiances that its end sees, not the nearest one. Photons lie where light is: of the
-//!    nearest to a place in the shade most are of the light beside it, more than their share of the area. As many lie on an
-//!    area as it is bright, so that weights of one over brightness give each area its share.
+//! 1. A gather ray ends in the map only where the map is sure. It goes on, as a path does, where it is
+//!    shorter than the blur of the map at its end is wide (Jensen's secondary gathering, by a measured
+//!    distance), where there are few photons, where none lies on a surface like that of the point, or where a
+//!    wall is in between.
+//! 2. A photon stores whether there is a wall within the disc of its estimate. If not, the ray needs no test
+//!    for walls.
+//! 3. The ray takes the harmonic mean of the nearest irradiances that its end sees, not the nearest one.
+//!    Photons lie where light is: of the nearest to a place in the shade most are of the light beside it,
+//!    more than their share of the area. The number of photons on an area is in proportion to its brightness,
+//!    so that weights of one over brightness give each area its share.
 
 use crate::bsdf::{Bsdf, Features};
 use crate::bvh::Bvh;
 use crate::geometry::Ray;
 use crate::light::luminance;
-use crate::memory::{Arena, Footprint, Line, OutOfMemory};
-use crate::photon::{ALIKE, FLATNESS, Kernel, Neighbours, Photon, PhotonMap, QueryDisc, Uniform};
-use crate::sampling::mix;
+use crate::memory::{Arena, Line};
+use crate::photon::{ALIKE, FLATNESS, Kernel, Neighbours, Photon, PhotonMap, QueryDisc};
 use crate::scene::{Material, Scene, SurfacePoint};
-use crate::transport::PhotonLight;
-use crate::transport::estimator::Counters;
-use crate::transport::path::state::Components;
-use crate::transport::photon_mapping::density::{Gathered, Light, fence, reflected};
+use crate::transport::path::PathIntegrator;
+use crate::transport::path::estimator::{Estimator, KnownLight, Rest};
+use crate::transport::path::vertex::PathVertex;
+use crate::transport::photon_mapping::density::{Gathered, Light, PhotonLight, reflected};
+use crate::transport::photon_mapping::irradiance::ABOVE;
+pub use crate::transport::photon_mapping::irradiance::{IRRADIANCES, PrecomputedIrradiance, STRIDE};
+use crate::transport::settings::PathSettings;
+use crate::transport::walk::component::Components;
 use crate::transport::walk::context::SceneContext;
+use crate::transport::walk::dimension;
 use crate::{Level, Rgb};
 use core::f32::consts::{FRAC_1_PI, SQRT_2};
 use glam::Vec3;
 
-/// Of so many photons one gets an irradiance.
-pub const STRIDE: usize = 4;
-
-/// Irradiances of one task.
-pub const IRRADIANCES: usize = 256;
-
-/// Photons that an irradiance is estimated from.
-const NEAREST: usize = 64;
-
-/// Irradiances that a gather ray chooses from, and whose distance tells how wide the blur of the map is: the photons of
-/// an estimate reach [`BLUR`] times as far.
+/// Irradiances that a gather ray chooses from. Their distance measures the blur of the map: the photons of an
+/// estimate reach [`BLUR`] times as far.
 const CHOICE: usize = 8;
 
 /// sqrt(NEAREST / (CHOICE · STRIDE)), as photons lie on surfaces.
@@ -48,102 +45,12 @@ const BLUR: f32 = SQRT_2;
 /// The least length of a gather ray that ends in the map, in radii of the discs there.
 const SHORTEST: f32 = 1.5;
 
-/// How far from the middle of a disc the centroid of the irradiances that a gather ray chooses from may be, and that of
-/// the light of the photons of an estimate, in radii. Chance puts one in thirteen of the first farther off where all is
-/// even, one in a hundred of the second; on a straight edge of light both are at 0.42.
-const EVEN_CHOICE: f32 = 0.4;
-const EVEN_LIGHT: f32 = 0.2;
+/// Largest distance of the centroid of those irradiances from the middle of their disc, in radii. Chance puts
+/// one in thirteen farther off where all is even; on a straight edge of light it is at 0.42.
+const EVEN: f32 = 0.4;
 
 /// Working memory for a choice, on the stack: [`Neighbours::footprint`] of [`CHOICE`].
 const LINES: usize = 32;
-
-/// The least share of a disc that must be seen: in a slit a few photons would tell of all of it.
-const LEAST_SEEN: f32 = 0.1;
-
-/// How far above its surface a photon looks for walls, in radii of its disc: what is lower is no wall.
-const ABOVE: f32 = 1e-3;
-
-/// Works out the irradiance of photons: a pass over tasks of [`IRRADIANCES`].
-#[derive(Clone, Copy)]
-pub struct PrecomputedIrradiance<'a> {
-    bvh: &'a Bvh<'a>,
-    global: &'a PhotonMap<'a>,
-    /// Largest radius of a disc.
-    farthest: f32,
-    kernel: Kernel,
-    level: Level,
-}
-
-impl<'a> PrecomputedIrradiance<'a> {
-    /// For a map of all photons; discs of at most `farthest`.
-    pub fn new(
-        bvh: &'a Bvh<'a>,
-        global: &'a PhotonMap<'a>,
-        farthest: f32,
-        kernel: Kernel,
-        level: Level,
-    ) -> Self {
-        Self { bvh, global, farthest, kernel, level }
-    }
-
-    /// How many there are.
-    pub fn count(&self) -> usize {
-        self.global.len().div_ceil(STRIDE)
-    }
-
-    /// Working memory of one task.
-    pub fn scratch() -> Footprint {
-        Neighbours::footprint(NEAREST)
-    }
-
-    /// Those of task `task`: photons whose power is an irradiance, and which came from where their normal points if no
-    /// wall is near, otherwise from the other side. What is not needed of `out` is filled with photons of no place.
-    ///
-    /// # Errors
-    /// [`OutOfMemory`] where `scratch` has less than [`PrecomputedIrradiance::scratch`] bytes.
-    pub fn run(&self, task: usize, scratch: &mut Arena, out: &mut [Photon]) -> Result<Counters, OutOfMemory> {
-        let mut arena = scratch.scratch();
-        let mut neighbours = Neighbours::new(NEAREST, &mut arena)?;
-        for (i, slot) in out.iter_mut().enumerate() {
-            let index = (task * IRRADIANCES + i) * STRIDE;
-            let photon = u32::try_from(index).ok().and_then(|index| self.global.get(index));
-            *slot = photon.map_or(Photon::NONE, |photon| self.at(&photon, index, &mut neighbours));
-        }
-        Ok(Counters::default())
-    }
-
-    fn at(&self, photon: &Photon, index: usize, neighbours: &mut Neighbours) -> Photon {
-        let (place, normal) = (photon.position(), photon.normal());
-        let (disc, factor) =
-            self.global.disc_of_nearest(self.level, (place, normal), self.farthest, self.kernel, neighbours);
-        let above = ABOVE * disc.radius + 16.0 * f32::EPSILON * place.abs().max_element();
-        let turns = (mix(index as u64) >> 40) as f32 / (1u64 << 24) as f32;
-        let fence = fence(self.bvh, self.level, (place + above * normal, false), &disc, turns);
-        if fence.share(self.kernel, 1.0) < LEAST_SEEN {
-            return Photon::NONE;
-        }
-        if fence.is_open() && !self.is_even(&disc, neighbours) {
-            return Photon::NONE;
-        }
-        let response = Uniform(Rgb::splat(factor));
-        let density = self.global.gather_within(self.level, &disc, &fence, &response);
-        let tells = if fence.is_open() { normal } else { -normal };
-        Photon::new(place, tells, normal, density.radiance)
-    }
-
-    /// Whether light comes to `disc`, of those nearest photons, on all sides of its middle alike.
-    fn is_even(&self, disc: &QueryDisc, neighbours: &Neighbours) -> bool {
-        let (mut sum, mut moment) = (0.0, Vec3::ZERO);
-        for photon in neighbours.iter().filter_map(|(index, _)| self.global.get(index)) {
-            if photon.normal().dot(disc.normal) >= ALIKE {
-                let power = luminance(photon.power());
-                sum += power;
-                moment += power * (photon.position() - disc.place);
-            }
-        }
-        moment.length() <= EVEN_LIGHT * disc.radius * sum
-    }
-}
 
 /// Photons as gather rays use them.
 #[derive(Clone, Copy)]
@@ -165,8 +72,9 @@ impl<'a> GlobalMapLookup<'a> {
         Self { global, irradiances, farthest, kernel }
     }
 
-    /// The light that `point`, at the end of a gather ray of length `distance`, reflects to `wo`, except what a narrow
-    /// coat does. `None` where the map should not tell. `turns`, from 0 to 1, turns probes for walls.
+    /// The light that `point`, at the end of a gather ray of length `distance`, reflects to `wo`, except what
+    /// a narrow coat does. `None` where the map should not tell. `turns`, from 0 to 1, turns probes for
+    /// walls.
     pub(in crate::transport) fn reflected<F: Features>(
         &self,
         context: &SceneContext<F>,
@@ -185,8 +93,8 @@ impl<'a> GlobalMapLookup<'a> {
         Some(reflected(light, context, (&disc, None), (point, bsdf), wo, turns).light)
     }
 
-    /// The irradiance of the photons at `point`, at the end of a gather ray of length `distance`, and the radius of their
-    /// discs. `None` where the map should not tell.
+    /// The irradiance of the photons at `point`, at the end of a gather ray of length `distance`, and the
+    /// radius of their discs. `None` where the map should not tell.
     pub(in crate::transport) fn irradiance(
         &self,
         (bvh, level): (&Bvh, Level),
@@ -232,7 +140,7 @@ impl<'a> GlobalMapLookup<'a> {
             }
         }
         // Beside a bright spot all irradiances are of the spot.
-        let is_even = moment.length_squared() <= EVEN_CHOICE * EVEN_CHOICE * count * count * squared;
+        let is_even = moment.length_squared() <= EVEN * EVEN * count * count * squared;
         let (_, (_, nearest)) = nearest.filter(|(photon, _)| is_even && is_seen(photon))?;
         let (mut sum, mut weights) = (Rgb::ZERO, 0.0);
         for (photon, _) in
@@ -251,72 +159,82 @@ impl<'a> GlobalMapLookup<'a> {
 /// The maps that the samples of a picture share.
 #[derive(Clone, Copy)]
 pub struct PhotonMaps<'a> {
-    /// Light that mirrors and glass throw onto surfaces; `None` where paths find it for themselves, or there is none.
+    /// Light that mirrors and glass throw onto surfaces; `None` where paths find it for themselves, or there
+    /// is none.
     pub caustic: Option<PhotonLight<'a>>,
     /// All light.
     pub global: GlobalMapLookup<'a>,
 }
 
-/// What maps say of a vertex of a path.
-#[derive(Clone, Copy, Debug, Default)]
-pub(in crate::transport) struct MapLookup {
-    /// Reflected light.
-    pub(in crate::transport) gathered: Gathered,
-    /// Whether that is all light but what a narrow coat reflects.
-    pub(in crate::transport) is_all: bool,
-    /// Whether no light need be asked for by a shadow ray.
-    pub(in crate::transport) is_lit: bool,
-    /// What a path finds that goes on from here,
-    pub(in crate::transport) next: Components,
-    /// and what it finds by a narrow coat.
-    pub(in crate::transport) mirrored: Components,
-}
-
 impl PhotonMaps<'_> {
-    /// Asks the maps about a vertex that a path which was to find `came` reached by a ray of length `distance`, having
-    /// `travelled` as far as that from the eye.
-    /// `limited` is the number of its segments where depth is limited, otherwise zero.
+    /// Light of the global map and of the caustic map at `vertex`, and the light that is left.
     #[inline]
-    pub(in crate::transport) fn ask<F: Features>(
+    fn at<F: Features>(
         &self,
-        context: &SceneContext<F>,
-        (came, limited, distance): (Components, u32, f32),
-        (point, bsdf): (&SurfacePoint, &Bsdf),
-        (wo, travelled): (Vec3, f32),
-        turns: f32,
-    ) -> MapLookup {
-        // What was scattered by something with a diffuse part stays so.
-        let rest = if came.gathers() { Components::GATHERED } else { Components::ALL };
-        let all = MapLookup { next: rest, mirrored: rest, ..MapLookup::default() };
+        (context, settings): (&SceneContext<F>, &PathSettings),
+        vertex: &PathVertex,
+    ) -> (Gathered, Rest) {
+        let PathVertex { point, ref bsdf, wo, came, segments, distance, travelled, .. } = *vertex;
+        let is_limited = settings.is_limited();
+        let turns = vertex.sampler.single(dimension::PROBES + segments);
+        // Light that a surface with a diffuse part has scattered stays so.
+        let all = Rest::of(if came.is_gathered() { Components::GATHERED } else { Components::ALL });
         if !bsdf.gathers_photons(context.separates_coats()) {
-            return match came {
-                Components::NO_CAUSTIC | Components::BEHIND_MIRROR if bsdf.is_caustic_caster() => MapLookup {
-                    is_lit: true,
-                    next: Components::BEHIND_MIRROR,
-                    mirrored: Components::BEHIND_MIRROR,
-                    ..MapLookup::default()
-                },
-                _ => all,
-            };
+            if came.leaves_caustics() && bsdf.is_caustic_caster() {
+                let rest = Rest { is_lit: true, ..Rest::of(Components::BEHIND_MIRROR) };
+                return (Gathered::default(), rest);
+            }
+            return (Gathered::default(), all);
         }
-        if came.gathers()
-            && (limited == 0 || limited == 2)
+        if came.is_gathered()
+            && (!is_limited || segments == 2)
             && let Some(light) = self.global.reflected(context, (point, bsdf), wo, distance, turns)
         {
-            let gathered = Gathered { light, ..Gathered::default() };
-            return MapLookup { gathered, is_all: true, is_lit: true, ..all };
+            let rest = Rest { wide: None, is_lit: true, ..all };
+            return (Gathered { light, ..Gathered::default() }, rest);
         }
-        if limited > 1 {
-            return MapLookup::default();
+        if is_limited && segments > 1 {
+            return (Gathered::default(), Rest::of(Components::ALL));
         }
         match &self.caustic {
             Some(caustic) => {
-                let travelled = if came.gathers() { 0.0 } else { travelled };
+                let travelled = if came.is_gathered() { 0.0 } else { travelled };
                 let gathered = caustic.reflected(context, (point, bsdf), (wo, travelled), turns);
-                MapLookup { gathered: gathered.unwrap_or_default(), next: Components::NO_CAUSTIC, ..all }
+                let rest = Rest { wide: Some(Components::NO_CAUSTIC), ..all };
+                (gathered.unwrap_or_default(), rest)
             }
-            None => MapLookup { next: Components::GATHERED, ..all },
+            None => (Gathered::default(), Rest { wide: Some(Components::GATHERED), ..all }),
         }
+    }
+}
+
+/// Maps of even and of odd samples.
+impl<F: Features> Estimator<F> for &[PhotonMaps<'_>; 2] {
+    type State = ();
+    type Found = ();
+    const SEPARATES_COATS: bool = true;
+
+    #[inline]
+    fn at_vertex(
+        &self,
+        scene: (&SceneContext<F>, &PathSettings),
+        vertex: &PathVertex,
+        _: &mut (),
+        _: (),
+        add: &mut impl FnMut(KnownLight),
+    ) -> Rest {
+        let (gathered, rest) = self[vertex.sample as usize & 1].at(scene, vertex);
+        add(gathered.known(vertex));
+        rest
+    }
+}
+
+impl<'a, F: Features> PathIntegrator<'a, F> {
+    /// The same, where surfaces with a diffuse part have caustics from photons, and gather rays from there
+    /// end in a photon map: even samples in the first, odd ones in the second. Where depth is limited only
+    /// the first point of a path has light from photons.
+    pub fn with_maps(&self, maps: &'a [PhotonMaps<'a>; 2]) -> PathIntegrator<'a, F, &'a [PhotonMaps<'a>; 2]> {
+        self.with_estimator(maps)
     }
 }
 

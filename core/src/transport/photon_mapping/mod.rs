@@ -1,8 +1,9 @@
-//! Photon mapping (Jensen 1996; Hachisuka and Jensen 2009): photons, points visible from the camera, density estimates
-//! and final gathering.
+//! Photon mapping (Jensen 1996; Hachisuka and Jensen 2009): photons, points visible from the camera, density
+//! estimates and final gathering.
 
 pub(in crate::transport) mod density;
 pub mod deposit;
 pub mod final_gather;
+pub mod irradiance;
 pub(in crate::transport) mod radius;
 pub mod visible_points;

@@ -1,14 +1,15 @@
-//! What the camera sees that holds photons: places of a raster of camera rays, straight on, in mirrors and behind glass,
-//! in a map of their own. A photon counts as seen where one of them lies near it. That need not be exact: emission guided
-//! by it sends some light everywhere.
+//! What the camera sees that holds photons: places of a raster of camera rays, straight on, in mirrors and
+//! behind glass, in a map of their own. A photon counts as seen where one of them lies near it. That need not
+//! be exact: emission guided by it sends some light everywhere.
 
 use crate::bsdf::Features;
 use crate::memory::Footprint;
 use crate::photon::{Kernel, Photon, PhotonMap, Photons, QueryDisc, Uniform};
 use crate::sampling::Sampler;
-use crate::transport::estimator::{Counters, dimension};
 use crate::transport::photon_mapping::radius::RadiusSchedule;
+use crate::transport::settings::Counters;
 use crate::transport::walk::context::{SceneContext, Segment};
+use crate::transport::walk::dimension;
 use crate::{Level, Rgb};
 use core::mem;
 use glam::Vec3;
@@ -61,8 +62,8 @@ impl VisiblePointSampler {
         Photons::footprint(self.rays())
     }
 
-    /// What the rays of task `task`, [`VisiblePointSampler::TASK`] of them, find: places, as photons without power; where there is
-    /// none, one that a map refuses.
+    /// What the rays of task `task`, [`VisiblePointSampler::TASK`] of them, find: places, as photons without
+    /// power; where there is none, one that a map refuses.
     pub fn run<F: Features>(
         &self,
         task: usize,
@@ -129,8 +130,8 @@ enum Reach {
 }
 
 impl<'a> VisiblePoints<'a> {
-    /// Of the places in `map`, which `raster` found. Light is gathered from discs of so many pixels, at most; `discs` are
-    /// those of one.
+    /// Of the places in `map`, which `raster` found. Light is gathered from discs of so many pixels, at most;
+    /// `discs` are those of one.
     pub fn new(
         map: &'a PhotonMap<'a>,
         raster: &VisiblePointSampler,

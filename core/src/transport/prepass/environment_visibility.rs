@@ -1,13 +1,14 @@
-//! A first look from the surfaces of the scene to the sky: which of its light reaches which place. What is learned
-//! are the [`EnvironmentVisibility`] through which the environment is then sampled.
+//! A first look from the surfaces of the scene to the sky: which of its light reaches which place. What is
+//! learned are the [`EnvironmentVisibility`] through which the environment is then sampled.
 //!
-//! 1. Paths from the camera, few and in all of the picture, leave a vertex wherever they meet a surface that scatters.
+//! 1. Paths from the camera, few and in all of the picture, leave a vertex wherever they meet a surface that
+//!    scatters.
 //! 2. Vertices are sorted by their place, a cell of a grid and the side that the surface faces.
-//! 3. From each place rays go to the bins of the sky, from one vertex after the other: one to every other bin, then some
-//!    to each of those near which light was seen.
+//! 3. From each place rays go to the bins of the sky, from one vertex after the other: one to every other
+//!    bin, then some to each of those near which light was seen.
 //!
-//! Windows pay where most of the sky is hidden, as in a room, and cost a little where it is not: the same rays tell
-//! which it is.
+//! Windows pay where most of the sky is hidden, as in a room, and cost a little where it is not: the same
+//! rays tell which it is.
 
 use crate::Rgb;
 use crate::bsdf::Features;
@@ -16,9 +17,10 @@ use crate::geometry::{Bounds, Hit, Ray};
 use crate::light::{Bins, EnvironmentVisibility, VisibilityGrid, VisibilityTable};
 use crate::memory::{Arena, Footprint, OutOfMemory};
 use crate::sampling::Sampler;
-use crate::transport::estimator::{Counters, dimension};
 use crate::transport::path::PathIntegrator;
+use crate::transport::settings::Counters;
 use crate::transport::walk::context::Segment;
+use crate::transport::walk::dimension;
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
@@ -33,7 +35,8 @@ const SURFACES: usize = 8;
 /// Places with fewer vertices have no window.
 const FEWEST: usize = 4;
 
-/// Rays to the sky: so many for each pixel, between these in all, and at most as many for each bin of a window.
+/// Rays to the sky: so many for each pixel, between these in all, and at most as many for each bin of a
+/// window.
 const RAYS_PER_PIXEL: usize = 64;
 const RAYS: core::ops::Range<usize> = 1 << 18..1 << 22;
 const PASSES: usize = 4;
@@ -44,7 +47,8 @@ const BINS: usize = size_of::<Bins>() / size_of::<f32>();
 /// By how much the variance of the light from the sky has to fall.
 const LEAST_GAIN: f64 = 1.25;
 
-/// A look is not to know the random numbers of the picture: windows must not depend on what is then sampled with them.
+/// A look is not to know the random numbers of the picture: windows must not depend on what is then sampled
+/// with them.
 const STREAM: u32 = 0x6c00_7517;
 
 /// Where a path was scattered. All normals are on the side that was seen.

@@ -1,5 +1,5 @@
-//! The scene as transport sees it: geometry, hierarchy, lights and instruction set, and the walk from surface to
-//! surface that all subpaths share.
+//! The scene as transport sees it: geometry, hierarchy, lights and instruction set, and the walk from surface
+//! to surface that all subpaths share.
 
 use crate::Level;
 use crate::bsdf::{Bsdf, Features};
@@ -7,7 +7,8 @@ use crate::bvh::{Bvh, Coherence};
 use crate::geometry::{Hit, MISS, Ray};
 use crate::light::LightSampler;
 use crate::scene::{Material, Scene, SurfacePoint};
-use crate::transport::estimator::{Counters, MAX_CROSSINGS};
+use crate::transport::settings::Counters;
+use crate::transport::walk::termination::MAX_CROSSINGS;
 use core::marker::PhantomData;
 use glam::Vec3;
 
@@ -85,15 +86,16 @@ impl<'a, F: Features> SceneContext<'a, F> {
         Bsdf::at::<F>(self.scene, point.material, point.uv, point.front)
     }
 
-    /// Whether photons are stored on the bases of narrow coats alone ([`Bsdf::is_varnished`]), whose coats are then
-    /// sampled apart: where every light can be met by chance.
+    /// Whether photons are stored on the bases of narrow coats alone ([`Bsdf::is_varnished`]), whose coats
+    /// are then sampled apart: where every light can be met by chance.
     #[inline]
     pub(in crate::transport) fn separates_coats(&self) -> bool {
         !self.lights.have_deltas()
     }
 
-    /// Whether a ray that started on triangle `left` passes `point` as if it were not there: by a cut-out, whose
-    /// opacity does not exceed `random` (called for surfaces that have one), or by rounding on its own triangle.
+    /// Whether a ray that started on triangle `left` passes `point` as if it were not there: by a cut-out,
+    /// whose opacity does not exceed `random` (called for surfaces that have one), or by rounding on its own
+    /// triangle.
     #[inline]
     pub(in crate::transport) fn is_passed(
         &self,

@@ -1,8 +1,8 @@
-//! Light paths under way: from the lights, over surfaces, until they end. What is done where they meet one is for a
-//! [`Visitor`] to say: `deposit.rs` leaves photons of all light, `caustics.rs` those of caustics.
+//! Light paths under way: from the lights, over surfaces, until they end. What is done where they meet one is
+//! for a [`Visitor`] to say: `deposit.rs` leaves photons of all light, `caustics.rs` those of caustics.
 //!
-//! All paths of a task advance together, so that the tracer sees batches of rays. Path `i` of map `n` follows from
-//! (seed, n, i) alone.
+//! All paths of a task advance together, so that the tracer sees batches of rays. Path `i` of map `n` follows
+//! from (seed, n, i) alone.
 
 use crate::Rgb;
 use crate::bsdf::{Bsdf, BsdfSample, Features};
@@ -13,16 +13,17 @@ use crate::memory::{Arena, Footprint, OutOfMemory};
 use crate::photon::Photon;
 use crate::sampling::{Numbers, Sampler, mix};
 use crate::scene::SurfacePoint;
-use crate::transport::estimator::{CERTAIN_BELOW, Counters, MAX_CROSSINGS, is_cut};
+use crate::transport::settings::Counters;
 use crate::transport::walk::context::SceneContext;
+use crate::transport::walk::termination::{MAX_CROSSINGS, is_cut, survival_limit};
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
 /// Light paths of a task.
 pub const PATHS: usize = 1024;
 
-/// Dimensions of the sampler at a vertex: where the path goes on, by which lobe, whether it does; and one that a visitor
-/// may have.
+/// Dimensions of the sampler at a vertex: where the path goes on, by which lobe, whether it does; and one
+/// that a visitor may have.
 const SCATTERING: u32 = 0;
 const LOBE: u32 = 1;
 const ROULETTE: u32 = 2;
@@ -51,8 +52,8 @@ pub(in crate::transport) struct LightPathState {
     pub cell: u32,
     /// R / (π² r² N) so far, for visitors that weigh photons (`merge.rs`, `caustics.rs`).
     pub chain: f32,
-    /// Root of the sum of squares of the densities of the path tracer's techniques, over that of which `chain` tells:
-    /// 1 where that is the only one, 0 where there is none.
+    /// Root of the sum of squares of the densities of the path tracer's techniques, over that of which
+    /// `chain` tells: 1 where that is the only one, 0 where there is none.
     pub others: f32,
     /// 1 where the last surface only mirrors or refracts.
     pub mirrored: u32,
@@ -113,8 +114,8 @@ pub(in crate::transport) trait Visitor {
         false
     }
 
-    /// It is about to leave it by `sample`, having come from `from`, local. That `is_narrow` where it is mirrored, or by a coat
-    /// alone.
+    /// It is about to leave it by `sample`, having come from `from`, local. That `is_narrow` where it is
+    /// mirrored, or by a coat alone.
     #[inline]
     fn leave(
         &self,
@@ -251,8 +252,8 @@ impl<F: Features> LightWalk<'_, F> {
             return None;
         }
         visitor.leave(state, &vertex, from, (&sample, is_narrow));
-        // Power is not squeezed by refraction, as radiance is; and where the shading normal is not that of the
-        // triangle, it is the other cosine that counts (Veach 1997, sections 5.2 and 5.3).
+        // Power is not squeezed by refraction, as radiance is; and where the shading normal is not that of
+        // the triangle, it is the other cosine that counts (Veach 1997, sections 5.2 and 5.3).
         let power = Rgb::from(state.power);
         if power.max_element() <= 0.0 {
             return None;
@@ -265,7 +266,7 @@ impl<F: Features> LightWalk<'_, F> {
         // Power that goes on is the same where it can be: what is absorbed ends paths.
         let continuation_probability = (next.max_element() / power.max_element()).min(onward.most);
         let continuation_probability =
-            continuation_probability.min(reaching(state.segments + 1) / state.survived);
+            continuation_probability.min(survival_limit(state.segments + 1) / state.survived);
         if !(continuation_probability > 0.0
             && numbers.single(first + ROULETTE) < continuation_probability
             && next.is_finite())
@@ -282,13 +283,6 @@ impl<F: Features> LightWalk<'_, F> {
         state.survived *= continuation_probability;
         Some(point.spawn(towards))
     }
-}
-
-/// The share of paths that come to so many segments at most. Between perfect mirrors, and by total reflection in a
-/// piece of glass, nothing else ends them; where a fortieth of the light is lost at each surface, fewer come so far.
-/// The paths carry more power instead, as those of the path tracer do (`continuation_probability` in `estimator.rs`): there is no bias.
-fn reaching(segments: u32) -> f32 {
-    CERTAIN_BELOW as f32 / segments.max(CERTAIN_BELOW) as f32
 }
 
 /// Where the photons of a task go.

@@ -1,4 +1,5 @@
-//! Shadow rays from a surface point to a light, and the fraction of the light that cut-outs on their way transmit.
+//! Shadow rays from a surface point to a light, and the fraction of the light that cut-outs on their way
+//! transmit.
 
 use crate::Rgb;
 use crate::bsdf::Features;
@@ -6,12 +7,13 @@ use crate::bvh::Coherence;
 use crate::geometry::{Hit, Ray};
 use crate::light::LightSample;
 use crate::scene::SurfacePoint;
-use crate::transport::estimator::MAX_CROSSINGS;
 use crate::transport::walk::context::SceneContext;
+use crate::transport::walk::termination::MAX_CROSSINGS;
 use glam::Vec3;
 
-/// The shadow ray from `point` to the light of `sample`, which meets neither end. `None` where the light, moved off its
-/// surface, is no longer on the side on which it was seen: rounding may put `point` behind the light that it lies on.
+/// The shadow ray from `point` to the light of `sample`, which meets neither end. `None` where the light,
+/// moved off its surface, is no longer on the side on which it was seen: rounding may put `point` behind the
+/// light that it lies on.
 #[inline]
 pub(in crate::transport) fn shadow_ray(point: &SurfacePoint, sample: &LightSample) -> Option<Ray> {
     if let Some(target) = sample.target {
@@ -27,7 +29,7 @@ pub(in crate::transport) fn shadow_ray(point: &SurfacePoint, sample: &LightSampl
 }
 
 /// Fewer rays than this are followed one by one: a batch takes some time to set up.
-pub(in crate::transport) const FEW: usize = 32;
+const FEW: usize = 32;
 
 /// Shadow rays that are traced together, with working memory for as many.
 pub(in crate::transport) struct ShadowRays<'w> {
@@ -39,8 +41,9 @@ pub(in crate::transport) struct ShadowRays<'w> {
 }
 
 impl<F: Features> SceneContext<'_, F> {
-    /// Traces the first `count` of `shadows`, and calls `arrive` with each ray that reaches its light and with the light
-    /// that cut-outs transmit. Returns the number of rays that met too many cut-outs. Adds to the number of `rays`.
+    /// Traces the first `count` of `shadows`, and calls `arrive` with each ray that reaches its light and
+    /// with the light that cut-outs transmit. Returns the number of rays that met too many cut-outs. Adds to
+    /// the number of `rays`.
     pub(in crate::transport) fn trace_shadow_rays(
         &self,
         shadows: &mut ShadowRays,
@@ -102,8 +105,8 @@ impl<F: Features> SceneContext<'_, F> {
         unfinished
     }
 
-    /// The part of `light` that arrives along `ray`, through cut-outs as well. `None` where the ray met too many of them.
-    /// Adds to the number of `rays`.
+    /// The part of `light` that arrives along `ray`, through cut-outs as well. `None` where the ray met too
+    /// many of them. Adds to the number of `rays`.
     pub(in crate::transport) fn transmit(&self, mut ray: Ray, mut light: Rgb, rays: &mut u64) -> Option<Rgb> {
         for _ in 0..=MAX_CROSSINGS {
             *rays += 1;

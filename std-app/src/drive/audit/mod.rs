@@ -46,6 +46,11 @@ type Truth<'a> = dyn Fn(Samples, Option<CausticMerging>, &mut Arena, &mut [Pixel
 /// Samples of the pixels in these columns and rows.
 type Samples<'s> = (&'s [[u32; 2]], Range<u32>);
 
+/// Working memory of a thread.
+fn scratch<F: Features>() -> Footprint {
+    PathIntegrator::<F>::scratch_with::<((), CausticMerging), ()>(WAVE)
+}
+
 /// See the file.
 pub(super) struct Audit<'a> {
     truth: Box<Truth<'a>>,
@@ -119,7 +124,7 @@ impl<'a> Audit<'a> {
     ) -> Result<Option<Self>, RenderError> {
         let Stage { settings, workers, .. } = *stage;
         let Some(share) = share(settings, method.is_biased()) else { return Ok(None) };
-        let mut scratch = memory.take_each("audit", PathIntegrator::<F>::scratch(WAVE), workers.count())?;
+        let mut scratch = memory.take_each("audit", scratch::<F>(), workers.count())?;
         // The pixels themselves are counted and not taken: they are kept where a film file can find them.
         let pixels = choice::count(settings.width, settings.height);
         memory.set_aside("audit", Footprint::default().slice::<Pixel>(pixels))?;
@@ -132,9 +137,9 @@ impl<'a> Audit<'a> {
             false => 0.0,
         };
         Ok(Some(Self {
-            truth: Box::new(move |(places, samples), photons, arena, out| {
-                let tracer = photons.map_or(tracer, |photons| tracer.with_caustics(photons));
-                tracer.probe(places, samples, WAVE, arena, out)
+            truth: Box::new(move |(places, samples), photons, arena, out| match photons {
+                Some(photons) => tracer.with_caustics(photons).probe(places, samples, WAVE, arena, out),
+                None => tracer.probe(places, samples, WAVE, arena, out),
             }),
             shard: settings.shard,
             by_clock: settings.stop.error.is_none(),
@@ -152,7 +157,7 @@ impl<'a> Audit<'a> {
             return 0;
         }
         let pixels = Footprint::default().slice::<Pixel>(choice::count(settings.width, settings.height));
-        let threads = PathIntegrator::<F>::scratch(WAVE).bytes().saturating_mul(workers.count());
+        let threads = scratch::<F>().bytes().saturating_mul(workers.count());
         threads.saturating_add(pixels.bytes())
     }
 

@@ -8,8 +8,7 @@ use crate::drive::audit::Audit;
 use halflight_core::bsdf::Features;
 use halflight_core::cache::irradiance::{CellFlux, IrradianceCache};
 use halflight_core::memory::Footprint;
-use halflight_core::transport::PathIntegrator;
-use halflight_core::transport::path::WAVE;
+use halflight_core::transport::{CausticMerging, PathIntegrator, path::WAVE};
 
 /// Strata along a side are multiples of this.
 const BLOCK: usize = 8;
@@ -28,7 +27,9 @@ impl Needs {
         let Stage { settings, .. } = *stage;
         let strata = settings.cache.strata() as usize;
         let coarse = strata.div_ceil(2 * BLOCK) * BLOCK;
-        let scratch = PathIntegrator::<F>::scratch(WAVE).or(PathIntegrator::<F>::gather_scratch(strata));
+        // Of paths that look caches up, and of gather rays, both beside photons.
+        let gathering = PathIntegrator::<F>::gather_scratch_with::<((), CausticMerging)>(strata);
+        let scratch = PathIntegrator::<F>::scratch_with::<((), CausticMerging), ()>(WAVE).or(gathering);
         let scratch = if has_caustics { scratch.or(caustics::scratch::<F>()) } else { scratch };
         Self { strata: [coarse, strata], scratch }
     }

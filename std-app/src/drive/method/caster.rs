@@ -16,8 +16,9 @@ use halflight_core::memory::{Arena, Line, OutOfMemory};
 use halflight_core::method::{MapUse, PhotonUse};
 use halflight_core::photon::{MapShape, Photon, PhotonMap, Photons};
 use halflight_core::transport::caustics::tracer::{CausticPhotonTracer, PATHS, ROOM};
+use halflight_core::transport::path::WAVE;
 use halflight_core::transport::photon_mapping::deposit::{PhotonFilter, PhotonTracerSettings};
-use halflight_core::transport::{CausticMerging, PathIntegrator, RadiusSchedule, path::WAVE};
+use halflight_core::transport::{CausticMerging, Estimator, PathIntegrator, RadiusSchedule, Sharing};
 use std::time::Instant;
 
 /// Radius of the discs of the first sample, in pixels, where photons are not what is noisy.
@@ -182,9 +183,9 @@ impl<'a> Caster<'a> {
     }
 
     /// Brings the tiles of `crew` to their targets by `tracer`, joined with photons; less where the round is cut.
-    pub(super) fn round<F: Features>(
+    pub(super) fn round<F: Features, E: Estimator<F, State = ()>, R: Sharing>(
         &mut self,
-        tracer: &PathIntegrator<F>,
+        tracer: &PathIntegrator<F, E, R>,
         scratch: &mut [Vec<Line>],
         crew: &mut Crew,
     ) -> Result<(), RenderError> {

@@ -21,7 +21,7 @@ use halflight_core::memory::{Arena, Footprint, Line};
 use halflight_core::method::PhotonUse;
 use halflight_core::photon::Photons;
 use halflight_core::transport::caustics::tracer::{CausticPhotonTracer, GuideSample, PATHS, ROOM};
-use halflight_core::transport::{CausticMerging, PathIntegrator, RadiusSchedule, path::WAVE};
+use halflight_core::transport::{CausticMerging, PathIntegrator, PathReuse, RadiusSchedule, path::WAVE};
 
 /// Light paths of a glance, which tells where there is next to nothing to find, and of each look after it.
 const GLANCE: usize = 4 * PATHS;
@@ -63,7 +63,8 @@ fn may_be(stage: &Stage) -> bool {
 
 /// Working memory of paths and of light paths.
 pub(super) fn scratch<F: Features>() -> Footprint {
-    PathIntegrator::<F>::scratch(WAVE).or(CausticPhotonTracer::<F>::scratch())
+    PathIntegrator::<F>::scratch_with::<((), CausticMerging), PathReuse>(WAVE)
+        .or(CausticPhotonTracer::<F>::scratch())
 }
 
 /// Memory of a look.
@@ -195,7 +196,7 @@ fn beside<F: Features>(
     let none = Photons::new(0, &mut Arena::new(bytemuck::cast_slice_mut(&mut line)))?.build(0);
     let merging =
         CausticMerging::new([&none; 2], emission, discs, LOOK as u32).beside_records(eye.beside_records);
-    let tracer = paths.tracer().with_reuse(false).with_caustics(merging);
+    let tracer = paths.tracer().with_caustics(merging);
     Ok(stage.workers.pilot_rest(&tracer, &mut paths.scratch)?)
 }
 
@@ -268,7 +269,10 @@ struct Joined<'a, F> {
 impl<F: Features> Renderer for Joined<'_, F> {
     fn round(&mut self, crew: &mut Crew) -> Result<(), RenderError> {
         let Paths { method, scratch, .. } = &mut self.paths;
-        self.caster.round(method.integrator(), scratch, crew)
+        match method.reusing() {
+            Some(tracer) => self.caster.round(&tracer, scratch, crew),
+            None => self.caster.round(method.integrator(), scratch, crew),
+        }
     }
 
     fn reuse(&self) -> Reuse {

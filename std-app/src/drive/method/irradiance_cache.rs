@@ -241,19 +241,18 @@ impl<F: Features> Cached<'_, F> {
         let Self { tracer, gathering, coarse, haste, size, halves, caster, scratch, .. } = self;
         let mut all = true;
         for (i, half) in halves.iter_mut().enumerate() {
-            let photons;
-            let mut tracer = *tracer;
+            let mut photons = None;
             // Where depth is limited, rays that gather ask for none.
             if let Some(caster) = caster.as_mut().filter(|_| !half.is_finished() && !tracer.is_limited()) {
                 let Some(found) = caster.for_records::<F>(i as u32, scratch, crew)? else {
                     all = false;
                     break;
                 };
-                photons = found;
-                tracer = tracer.with_caustics(photons.merging());
+                photons = Some(found);
             }
             let until = haste.and_then(|haste| haste.end(i));
-            let overture = Overture { tracer: &tracer, gathering: *gathering, coarse, size: *size };
+            let photons = photons.as_ref().map(|photons| photons.merging());
+            let overture = Overture { tracer, photons, gathering: *gathering, coarse, size: *size };
             if !crew.hurry(until, |crew| overture.fill(half, crew, scratch))? {
                 if crew.is_over() {
                     all = false;

@@ -9,7 +9,7 @@ use halflight_core::cache::irradiance::{CellFlux, IrradianceCache, Record};
 use halflight_core::memory::{Arena, Line};
 use halflight_core::transport::cached::gather::{GatherPoint, Gathering};
 use halflight_core::transport::cached::placement::{PIXELS, ProgressiveOrder, Via};
-use halflight_core::transport::{Counters, PathIntegrator};
+use halflight_core::transport::{CausticMerging, Counters, PathIntegrator};
 
 /// It looks at every other pixel of every other row: what lies between is reached from there, or path traced.
 const STRIDE: u32 = 2;
@@ -169,6 +169,8 @@ impl<'a> Growing<'a> {
 /// See the file.
 pub(in crate::drive) struct Overture<'o, 'a, F> {
     pub(in crate::drive) tracer: &'o PathIntegrator<'a, F>,
+    /// Photons of caustics that gather rays merge with.
+    pub(in crate::drive) photons: Option<CausticMerging<'o>>,
     pub(in crate::drive) gathering: Gathering<'o>,
     /// Of fewer strata, for what rough surfaces see: a pixel has the mean of many records there.
     pub(in crate::drive) coarse: &'o CellFlux<'o>,
@@ -316,7 +318,13 @@ impl<F: Features> Overture<'_, '_, F> {
             let mut counters = Counters::default();
             if let (Some(found), Some(place)) = (out.first_mut(), places.get(task)) {
                 let number = growing.number(task);
-                found.record = tracer.gather(place, number, &gathering, arena, &mut counters)?;
+                found.record = match self.photons {
+                    Some(photons) => {
+                        let tracer = tracer.with_caustics(photons);
+                        tracer.gather(place, number, &gathering, arena, &mut counters)?
+                    }
+                    None => tracer.gather(place, number, &gathering, arena, &mut counters)?,
+                };
                 found.effort = counters.rays as f32 / counters.paths.max(1) as f32;
             }
             Ok(counters)

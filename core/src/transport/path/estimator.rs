@@ -1,0 +1,237 @@
+//! The boundary between the path tracer and the methods that build on it: an [`Estimator`] knows some of the
+//! light at the vertices of a path from a structure of its own, and the path finds the rest.
+
+use super::vertex::PathVertex;
+use crate::Rgb;
+use crate::bsdf::{BsdfSample, Features};
+use crate::light::LightSample;
+use crate::scene::SurfacePoint;
+use crate::transport::settings::{Counters, PathSettings};
+use crate::transport::walk::component::Components;
+use crate::transport::walk::context::SceneContext;
+use crate::transport::wavefront::{BLOCK, Wavefront};
+use bytemuck::Pod;
+use core::ops::Range;
+use glam::Vec3;
+
+/// Light that an estimator knows at a vertex.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct KnownLight {
+    /// Contribution to the pixel: radiance times the throughput of the path.
+    pub contribution: Rgb,
+    /// Expected error of the radiance by the width of a density estimate.
+    pub blur: Rgb,
+}
+
+/// Light that is left for the path at a vertex.
+#[derive(Clone, Copy, Debug)]
+pub struct Rest {
+    /// Classes behind the wide lobes of the surface; `None` where the estimator knows them all.
+    pub(in crate::transport) wide: Option<Components>,
+    /// Classes behind a mirror or a narrow coat.
+    pub(in crate::transport) narrow: Components,
+    /// Whether direct light is known, except that of a narrow coat.
+    pub(in crate::transport) is_lit: bool,
+    /// Number of light samples of next-event estimation.
+    pub(in crate::transport) light_samples: u32,
+    /// Whether next-event estimation finds all of the rest, so that the path ends.
+    pub(in crate::transport) ends: bool,
+}
+
+impl Rest {
+    /// All light that the path of `vertex` is to find.
+    #[inline]
+    pub(in crate::transport) fn all(vertex: &PathVertex) -> Self {
+        Self::of(vertex.rest)
+    }
+
+    /// Light of these classes.
+    #[inline]
+    pub(in crate::transport) fn of(classes: Components) -> Self {
+        Self { wide: Some(classes), narrow: classes, is_lit: false, light_samples: 1, ends: false }
+    }
+
+    /// Light that neither of two estimators knows.
+    #[inline]
+    fn and(self, other: Self) -> Self {
+        Self {
+            wide: self.wide.zip(other.wide).map(|(a, b)| a.and(b)),
+            narrow: self.narrow.and(other.narrow),
+            is_lit: self.is_lit || other.is_lit,
+            light_samples: self.light_samples.max(other.light_samples),
+            ends: self.ends || other.ends,
+        }
+    }
+}
+
+/// Emission that a path meets by BSDF sampling.
+#[derive(Clone, Copy, Debug)]
+pub enum EmissionHit {
+    /// Of the environment, in a direction from a position.
+    Environment { direction: Vec3, position: Vec3 },
+    /// Of a triangle, from a position on it in a direction.
+    Surface { triangle: u32, position: Vec3, direction: Vec3 },
+}
+
+/// What a method adds to path tracing, at the places where light enters a path. Every default adds nothing:
+/// with `()` the path tracer is that of the textbook.
+pub trait Estimator<F: Features>: Copy + Send + Sync {
+    /// Carried by each path beside the state of the path tracer; all zero at the start.
+    type State: Pod;
+    /// Result of the look-up for a vertex.
+    type Found: Copy + Default;
+    /// Whether the estimator knows the bases of narrow coats alone, so that those coats are sampled apart.
+    const SEPARATES_COATS: bool = false;
+
+    /// Light samples of a vertex, at most.
+    #[inline]
+    fn light_samples(&self, _context: &SceneContext<F>) -> u32 {
+        1
+    }
+
+    /// Looks a structure up for a block of surface points, those at the ends of the rays of `range`, before
+    /// they are shaded.
+    #[inline]
+    fn look_up(
+        &self,
+        (_context, _settings): (&SceneContext<F>, &PathSettings),
+        (_wave, _range): (&Wavefront, Range<usize>),
+        _points: &[Option<SurfacePoint>; BLOCK],
+        _found: &mut [Self::Found; BLOCK],
+        _counters: &mut Counters,
+    ) {
+    }
+
+    /// Calls `add` with light that is known at `vertex`. Returns the light that is left for the path.
+    #[inline]
+    fn at_vertex(
+        &self,
+        (_context, _settings): (&SceneContext<F>, &PathSettings),
+        vertex: &PathVertex,
+        _state: &mut Self::State,
+        _found: Self::Found,
+        _add: &mut impl FnMut(KnownLight),
+    ) -> Rest {
+        Rest::all(vertex)
+    }
+
+    /// MIS weight of emission that was met by BSDF sampling, from its `weight` in plain path tracing.
+    #[inline]
+    fn weight_hit(
+        &self,
+        _context: &SceneContext<F>,
+        _state: &Self::State,
+        _hit: EmissionHit,
+        weight: f32,
+    ) -> f32 {
+        weight
+    }
+
+    /// MIS weight of a light sample in the local direction `wi`, from its `weight` in plain path tracing.
+    #[inline]
+    fn weight_light(
+        &self,
+        _context: &SceneContext<F>,
+        _vertex: &PathVertex,
+        _state: &Self::State,
+        (_sample, _wi): (&LightSample, Vec3),
+        weight: f32,
+    ) -> f32 {
+        weight
+    }
+
+    /// The path leaves `vertex` by `sample`, of a narrow lobe or a wide one.
+    #[inline]
+    fn scattered(
+        &self,
+        _context: &SceneContext<F>,
+        _vertex: &PathVertex,
+        _state: &mut Self::State,
+        (_sample, _is_narrow): (&BsdfSample, bool),
+    ) {
+    }
+}
+
+impl<F: Features> Estimator<F> for () {
+    type State = ();
+    type Found = ();
+}
+
+/// Two estimators, the first of which has no state: a cache, and merging beside it.
+impl<F: Features, A: Estimator<F, State = ()>, B: Estimator<F>> Estimator<F> for (A, B) {
+    type State = B::State;
+    type Found = (A::Found, B::Found);
+    const SEPARATES_COATS: bool = A::SEPARATES_COATS || B::SEPARATES_COATS;
+
+    #[inline]
+    fn light_samples(&self, context: &SceneContext<F>) -> u32 {
+        self.0.light_samples(context).max(self.1.light_samples(context))
+    }
+
+    #[inline]
+    fn look_up(
+        &self,
+        scene: (&SceneContext<F>, &PathSettings),
+        (wave, range): (&Wavefront, Range<usize>),
+        points: &[Option<SurfacePoint>; BLOCK],
+        found: &mut [Self::Found; BLOCK],
+        counters: &mut Counters,
+    ) {
+        let (mut first, mut second) = ([A::Found::default(); BLOCK], [B::Found::default(); BLOCK]);
+        self.0.look_up(scene, (wave, range.clone()), points, &mut first, counters);
+        self.1.look_up(scene, (wave, range), points, &mut second, counters);
+        found.iter_mut().zip(first.into_iter().zip(second)).for_each(|(found, both)| *found = both);
+    }
+
+    #[inline]
+    fn at_vertex(
+        &self,
+        scene: (&SceneContext<F>, &PathSettings),
+        vertex: &PathVertex,
+        state: &mut Self::State,
+        found: Self::Found,
+        add: &mut impl FnMut(KnownLight),
+    ) -> Rest {
+        let rest = self.0.at_vertex(scene, vertex, &mut (), found.0, add);
+        if rest.ends {
+            return rest;
+        }
+        rest.and(self.1.at_vertex(scene, vertex, state, found.1, add))
+    }
+
+    #[inline]
+    fn weight_hit(
+        &self,
+        context: &SceneContext<F>,
+        state: &Self::State,
+        hit: EmissionHit,
+        weight: f32,
+    ) -> f32 {
+        self.1.weight_hit(context, state, hit, self.0.weight_hit(context, &(), hit, weight))
+    }
+
+    #[inline]
+    fn weight_light(
+        &self,
+        context: &SceneContext<F>,
+        vertex: &PathVertex,
+        state: &Self::State,
+        sample: (&LightSample, Vec3),
+        weight: f32,
+    ) -> f32 {
+        let weight = self.0.weight_light(context, vertex, &(), sample, weight);
+        self.1.weight_light(context, vertex, state, sample, weight)
+    }
+
+    #[inline]
+    fn scattered(
+        &self,
+        context: &SceneContext<F>,
+        vertex: &PathVertex,
+        state: &mut Self::State,
+        sample: (&BsdfSample, bool),
+    ) {
+        self.0.scattered(context, vertex, &mut (), sample);
+        self.1.scattered(context, vertex, state, sample);
+    }
+}

@@ -1,0 +1,156 @@
+//! Working memory of a wavefront: the state of every path, and the queues of rays.
+
+use crate::Rgb;
+use crate::film::CIRCLE;
+use crate::geometry::{Hit, MISS, Ray};
+use crate::memory::{Arena, Footprint, OutOfMemory};
+use crate::transport::settings::Counters;
+use crate::transport::walk::component::Components;
+use crate::transport::walk::termination::MAX_CROSSINGS;
+use bytemuck::{Pod, Zeroable};
+
+/// A camera path between two of its vertices.
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[repr(C)]
+pub struct PathState {
+    /// β, the factor from radiance at the end of the ray to radiance in the pixel.
+    pub(in crate::transport) throughput: [f32; 3],
+    /// Pdf of the ray in solid angle; infinite where no other technique could choose it.
+    pub(in crate::transport) pdf: f32,
+    /// L, the radiance that the path has found.
+    pub(in crate::transport) radiance: [f32; 3],
+    /// The part of `radiance` that density estimates blur.
+    pub(in crate::transport) blur: [f32; 3],
+    /// Index of the pixel in the picture.
+    pub(in crate::transport) pixel: u32,
+    /// The last vertex at which the path was scattered.
+    pub(in crate::transport) position: [f32; 3],
+    /// Index of the pixel in its tile.
+    pub(in crate::transport) place: u32,
+    /// Number of the sample of the pixel.
+    pub(in crate::transport) sample: u32,
+    /// The normal at `position`, for light sampling.
+    pub(in crate::transport) normal: [f32; 3],
+    /// Segments traced, the current one included.
+    pub(in crate::transport) segments: u16,
+    /// Surfaces passed by cut-out or coincidence.
+    pub(in crate::transport) crossings: u16,
+    /// The triangle that the ray starts on, which it cannot meet again.
+    pub(in crate::transport) triangle: u32,
+    /// Product of the squared relative indices of refraction so far.
+    pub(in crate::transport) eta_squared: f32,
+    /// Classes of light that the path is to find at the end of the ray.
+    pub(in crate::transport) components: Components,
+    /// Length of the path from the camera to its last vertex.
+    pub(in crate::transport) travelled: f32,
+}
+
+impl PathState {
+    /// A path before its first segment: a sample of a pixel, which has an index in the picture and a place in
+    /// its tile.
+    pub(in crate::transport) fn new(pixel: u32, place: u32, sample: u32, components: Components) -> Self {
+        Self {
+            throughput: [1.0; 3],
+            pdf: f32::INFINITY,
+            pixel,
+            place,
+            sample,
+            segments: 1,
+            components,
+            triangle: MISS,
+            eta_squared: 1.0,
+            ..Self::default()
+        }
+    }
+
+    /// Adds to the radiance that the path has found.
+    #[inline]
+    pub(in crate::transport) fn add(&mut self, radiance: Rgb) {
+        self.radiance = (Rgb::from(self.radiance) + radiance).to_array();
+    }
+
+    /// Goes on by `next` behind the triangle of `hit`, which it skips.
+    #[cold]
+    pub(in crate::transport) fn cross(
+        &mut self,
+        next: Ray,
+        triangle: u32,
+        counters: &mut Counters,
+    ) -> Option<Ray> {
+        if u32::from(self.crossings) >= MAX_CROSSINGS {
+            counters.dropped.unfinished += 1;
+            return None;
+        }
+        self.crossings += 1;
+        self.triangle = triangle;
+        Some(next)
+    }
+}
+
+/// Slices for up to `capacity` paths. The tag of a ray is the index of its path.
+pub struct Wavefront<'m> {
+    pub(in crate::transport) paths: &'m mut [PathState],
+    pub(in crate::transport) rays: &'m mut [Ray],
+    pub(in crate::transport) hits: &'m mut [Hit],
+    /// The first of `rays` that are those of the next segment, while the current one is shaded.
+    pub(in crate::transport) next: usize,
+    pub(in crate::transport) shadow_rays: &'m mut [Ray],
+    /// Contribution of each shadow ray if nothing is in its way.
+    pub(in crate::transport) shadow_light: &'m mut [[f32; 3]],
+    pub(in crate::transport) hidden: &'m mut [u8],
+    /// Shadow rays in the queue.
+    pub(in crate::transport) shadows: usize,
+}
+
+impl<'m> Wavefront<'m> {
+    /// Paths in a wave of `capacity`: at least those of a circle of pixels.
+    pub(in crate::transport) const fn capacity(capacity: usize) -> usize {
+        if capacity < CIRCLE { CIRCLE } else { capacity }
+    }
+
+    /// Bytes that [`Wavefront::new`] takes.
+    pub(in crate::transport) fn footprint(capacity: usize) -> Footprint {
+        let capacity = Self::capacity(capacity);
+        Footprint::default()
+            .slice::<PathState>(capacity)
+            .slice::<Ray>(capacity)
+            .slice::<Hit>(capacity)
+            .slice::<Ray>(capacity)
+            .slice::<[f32; 3]>(capacity)
+            .slice::<u8>(capacity)
+    }
+
+    /// An empty wave.
+    pub(in crate::transport) fn new(capacity: usize, arena: &mut Arena<'m>) -> Result<Self, OutOfMemory> {
+        let capacity = Self::capacity(capacity);
+        Ok(Self {
+            paths: arena.slice(capacity)?,
+            rays: arena.slice(capacity)?,
+            hits: arena.slice(capacity)?,
+            next: 0,
+            shadow_rays: arena.slice(capacity)?,
+            shadow_light: arena.slice(capacity)?,
+            hidden: arena.slice(capacity)?,
+            shadows: 0,
+        })
+    }
+
+    /// The path of index `path` goes on by `ray`, in place of a ray that is shaded.
+    #[inline]
+    pub(in crate::transport) fn push_ray(&mut self, path: usize, ray: Ray) {
+        if let Some(slot) = self.rays.get_mut(self.next) {
+            *slot = Ray { tag: path as u32, ..ray };
+            self.next += 1;
+        }
+    }
+
+    /// Puts a shadow ray into the queue.
+    #[inline]
+    pub(in crate::transport) fn push_shadow_ray(&mut self, ray: Ray, light: Rgb) {
+        let slots = (self.shadow_rays.get_mut(self.shadows), self.shadow_light.get_mut(self.shadows));
+        if let (Some(slot), Some(contribution)) = slots {
+            (*slot, *contribution) = (ray, light.to_array());
+            self.shadows += 1;
+        }
+    }
+}
