@@ -1,6 +1,6 @@
-//! The layers of the core: a folder imports only from folders below it, and the files of a folder import each
-//! other without circles. The `mod.rs` of a folder names the items that its files offer, and its files may
-//! import it.
+//! The layers of the core: a folder imports only from folders below it, the same holds for the folders of light
+//! transport, and the files of a folder import each other without circles. The `mod.rs` of a folder names the items
+//! that its files offer, and its files may import it.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -23,11 +23,10 @@ const LAYERS: &[&str] = &[
     "method",
 ];
 
-/// Folders of core/src whose files form no circle.
-const WITHOUT_CIRCLES: &[&str] = &[
-    "memory", "geometry", "sampling", "scene", "bsdf", "bvh", "light", "film", "photon", "cache", "estimate",
-    "census",
-];
+/// Folders and files of core/src/transport, lowest first: subpaths, the wavefront, the path tracer, and the methods
+/// that build on it.
+const TRANSPORT: &[&str] =
+    &["settings", "walk", "wavefront", "path", "photon_mapping", "caustics", "cached", "prepass"];
 
 /// A file of core/src: its path below that folder, and its numbered lines of code.
 pub(crate) struct Source<'t> {
@@ -45,20 +44,20 @@ pub(crate) fn check(sources: &[Source]) -> Vec<String> {
     let mut edges: BTreeMap<Path, BTreeMap<String, BTreeSet<String>>> = BTreeMap::new();
     for (source, imports) in sources.iter().zip(&tree.imports) {
         let from = module_of(source.name);
-        let Some(first) = from.first() else { continue };
-        let Some(layer) = layer(first) else {
-            complaints.push(format!("core/src/{}: `{first}` is not among the layers", source.name));
+        if let Some(missing) = (0..from.len()).find(|depth| layer(&from, *depth).is_err()) {
+            let missing = &from[missing];
+            complaints.push(format!("core/src/{}: `{missing}` is not among the layers", source.name));
             continue;
-        };
+        }
         for import in imports {
             let Some(to) = tree.target(&from, &import.path) else { continue };
             let shared = from.iter().zip(&to).take_while(|(a, b)| a == b).count();
             match (from.get(shared), to.get(shared)) {
-                (Some(_), Some(higher)) if shared == 0 && self::layer(higher) > Some(layer) => {
+                (Some(lower), Some(higher)) if layer(&to, shared) > layer(&from, shared) => {
                     let (name, line) = (source.name, import.line);
-                    complaints.push(format!("core/src/{name}:{line}: `{higher}` is a layer above `{first}`"));
+                    complaints.push(format!("core/src/{name}:{line}: `{higher}` is a layer above `{lower}`"));
                 }
-                (Some(a), Some(b)) if shared > 0 && WITHOUT_CIRCLES.contains(&first.as_str()) => {
+                (Some(a), Some(b)) if shared > 0 => {
                     let folder = edges.entry(from[..shared].to_vec()).or_default();
                     folder.entry(a.clone()).or_default().insert(b.clone());
                 }
@@ -74,8 +73,15 @@ pub(crate) fn check(sources: &[Source]) -> Vec<String> {
     complaints
 }
 
-fn layer(name: &str) -> Option<usize> {
-    LAYERS.iter().position(|layer| *layer == name)
+/// The layer of name number `depth` of a path, where names at that place have layers; an error if it has none.
+fn layer(path: &[String], depth: usize) -> Result<Option<usize>, ()> {
+    let layers = match (depth, path.first().map(String::as_str)) {
+        (0, _) => LAYERS,
+        (1, Some("transport")) => TRANSPORT,
+        _ => return Ok(None),
+    };
+    let name = path.get(depth).ok_or(())?;
+    layers.iter().position(|layer| layer == name).map(Some).ok_or(())
 }
 
 /// `a/b.rs` and `a/b/mod.rs` are module a::b.
@@ -281,6 +287,20 @@ mod tests {
         // One that only imports from the circle is not part of it.
         let c = ("bvh/c.rs", "use super::a::A;\n");
         assert_eq!(complaints(&[face, a, b, c]), ["core/src/bvh: a, b import in a circle"]);
+    }
+
+    #[test]
+    fn a_folder_of_transport_imports_those_below_it() {
+        let path = ("transport/path/mod.rs", "use crate::transport::walk::mis;\nuse super::cached::X;\n");
+        let others = [("transport/walk/mis.rs", ""), ("transport/cached.rs", "use super::path::Y;\n")];
+        assert_eq!(
+            complaints(&[path, others[0], others[1]]),
+            ["core/src/transport/path/mod.rs:2: `cached` is a layer above `path`"]
+        );
+        assert_eq!(
+            complaints(&[("transport/extra.rs", "")]),
+            ["core/src/transport/extra.rs: `extra` is not among the layers"]
+        );
     }
 
     #[test]
