@@ -58,7 +58,7 @@ fn with_room(check: impl FnOnce(&RenderContext)) {
     let bvh = Bvh::build(&scene.mesh, &mut Arena::new(bytemuck::cast_slice_mut(&mut bvh))).unwrap();
     let mut lights = lines(LightSampler::footprint(&scene).and(LightSampler::scratch(&scene)).bytes());
     let lights = LightSampler::build(&scene, &mut Arena::new(bytemuck::cast_slice_mut(&mut lights))).unwrap();
-    let settings = PathSettings { width: 20, height: 20, seed: 1, max_depth: 8, reuse: false };
+    let settings = PathSettings { width: 20, height: 20, seed: 1, max_depth: 8 };
     check(&RenderContext { scene: &scene, bvh: &bvh, lights: &lights, settings, level: Level::BASELINE });
 }
 
