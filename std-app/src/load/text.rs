@@ -1,16 +1,15 @@
-//! Bytes of a text file as OBJ and MTL readers want them: decoded, continued lines joined, line by line,
-//! word by word. Names stay bytes until somebody shows them; numbers are checked, not guessed.
+//! Text of OBJ and MTL files: decoded, with continued lines joined, then lines and words. Names stay bytes until
+//! they are shown.
 
-/// Why bytes cannot be text.
+/// The bytes are not text.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Binary;
 
-/// The vertical tab stands for the end of a line that was joined to the next: blank to [`words`], and still
-/// counted by [`Lines`].
+/// Replaces the end of a line that continues: blank to [`words`], but counted by [`Lines`]. The vertical tab.
 const JOINED: u8 = 0x0b;
 
 /// Decodes UTF-8 and UTF-16 with or without a byte-order mark, turns lone carriage returns into line ends and
-/// joins lines that end in a backslash (not in comments). Ill-formed UTF-8 is kept as it is.
+/// joins lines that end in a backslash, except comments. Ill-formed UTF-8 is kept.
 pub(super) fn normalise(mut bytes: Vec<u8>) -> Result<Vec<u8>, Binary> {
     if let Some(decoded) = decode_utf16(&bytes) {
         bytes = decoded;
@@ -21,7 +20,11 @@ pub(super) fn normalise(mut bytes: Vec<u8>) -> Result<Vec<u8>, Binary> {
         return Err(Binary);
     }
     if bytes.contains(&b'\r') {
-        end_lines_at_lone_carriage_returns(&mut bytes);
+        for i in 0..bytes.len() {
+            if bytes[i] == b'\r' && bytes.get(i + 1) != Some(&b'\n') {
+                bytes[i] = b'\n';
+            }
+        }
     }
     if bytes.contains(&b'\\') {
         join_continued_lines(&mut bytes);
@@ -29,7 +32,7 @@ pub(super) fn normalise(mut bytes: Vec<u8>) -> Result<Vec<u8>, Binary> {
     Ok(bytes)
 }
 
-/// The text in UTF-8, if the bytes are UTF-16: by their mark, or by a zero in one half of the first two pairs.
+/// UTF-8 of UTF-16, which has a byte-order mark, or a zero in the same half of the first two pairs.
 fn decode_utf16(bytes: &[u8]) -> Option<Vec<u8>> {
     let (start, big_endian) = match *bytes {
         [0xff, 0xfe, ..] => (2, false),
@@ -38,38 +41,25 @@ fn decode_utf16(bytes: &[u8]) -> Option<Vec<u8>> {
         [0, a, 0, b, ..] if a != 0 && b != 0 => (0, true),
         _ => return None,
     };
-    let unit = |pair: &[u8]| {
-        let pair = [pair[0], pair[1]];
-        if big_endian { u16::from_be_bytes(pair) } else { u16::from_le_bytes(pair) }
-    };
-    let units = bytes[start..].chunks_exact(2).map(unit);
+    let from_bytes = if big_endian { u16::from_be_bytes } else { u16::from_le_bytes };
+    let units = bytes[start..].chunks_exact(2).map(|pair| from_bytes([pair[0], pair[1]]));
     let text: String = char::decode_utf16(units).map(|c| c.unwrap_or(char::REPLACEMENT_CHARACTER)).collect();
     Some(text.into_bytes())
 }
 
-fn end_lines_at_lone_carriage_returns(bytes: &mut [u8]) {
-    for i in 0..bytes.len() {
-        if bytes[i] == b'\r' && bytes.get(i + 1) != Some(&b'\n') {
-            bytes[i] = b'\n';
-        }
-    }
-}
-
 fn join_continued_lines(bytes: &mut [u8]) {
-    let mut start = 0; // of the logical line
+    let mut start = 0; // of the joined line
     for end in 0..bytes.len() {
         if bytes[end] != b'\n' {
             continue;
         }
-        let line = &bytes[start..end];
-        let comment = line.iter().find(|b| !is_blank(**b)) == Some(&b'#');
-        let last = line.iter().rposition(|b| !is_blank(*b));
-        match last {
-            Some(last) if line[last] == b'\\' && !comment => {
-                bytes[start + last] = b' ';
-                bytes[end] = JOINED;
-            }
-            _ => start = end + 1,
+        let line = trimmed(&bytes[start..end]);
+        if line.ends_with(b"\\") && !line.starts_with(b"#") {
+            let last = bytes[start..end].iter().rposition(|b| !is_blank(*b)).unwrap_or_default();
+            bytes[start + last] = b' ';
+            bytes[end] = JOINED;
+        } else {
+            start = end + 1;
         }
     }
 }
@@ -80,7 +70,7 @@ pub(super) fn is_blank(byte: u8) -> bool {
     matches!(byte, b' ' | b'\t' | b'\r' | JOINED | 0x0c)
 }
 
-/// The lines of normalised text with their numbers in the file.
+/// Lines of normalised text with their numbers in the file.
 #[derive(Clone, Debug)]
 pub(super) struct Lines<'a> {
     rest: &'a [u8],
@@ -88,12 +78,12 @@ pub(super) struct Lines<'a> {
 }
 
 impl<'a> Lines<'a> {
-    /// From `text` on, whose first line has the number `first`.
+    /// Lines of `text`, numbered from `first`.
     pub(super) fn new(text: &'a [u8], first: u32) -> Self {
         Self { rest: text, next: first }
     }
 
-    /// The number of the line that comes next.
+    /// Number of the next line.
     pub(super) fn number(&self) -> u32 {
         self.next
     }
@@ -112,8 +102,7 @@ impl<'a> Iterator for Lines<'a> {
             joined += u32::from(b == JOINED);
             b == b'\n'
         });
-        let end = end.unwrap_or(self.rest.len());
-        let (line, rest) = self.rest.split_at(end);
+        let (line, rest) = self.rest.split_at(end.unwrap_or(self.rest.len()));
         let number = self.next;
         self.next += 1 + joined;
         self.rest = rest.get(1..).unwrap_or_default();
@@ -121,37 +110,22 @@ impl<'a> Iterator for Lines<'a> {
     }
 }
 
-/// The words of a line up to a comment.
+/// Words of a line up to a comment.
 #[derive(Clone, Debug)]
 pub(super) struct Words<'a>(&'a [u8]);
 
-/// The words of `line` up to a comment.
+/// Words of `line` up to a comment.
 #[inline]
 pub(super) fn words(line: &[u8]) -> Words<'_> {
     Words(line)
 }
 
 impl<'a> Words<'a> {
-    /// All that follows the words taken so far and one blank, to the end of the line: an operand that holds a name.
+    /// The line after the words taken so far and one blank: an operand that holds a name.
     pub(super) fn rest(self) -> &'a [u8] {
         let rest = self.0.split_first().map_or(self.0, |(_, rest)| rest);
         rest.strip_suffix(b"\r").unwrap_or(rest)
     }
-}
-
-/// Without blanks at its ends.
-pub(super) fn trimmed(mut text: &[u8]) -> &[u8] {
-    while let [first, tail @ ..] = text
-        && is_blank(*first)
-    {
-        text = tail;
-    }
-    while let [head @ .., last] = text
-        && is_blank(*last)
-    {
-        text = head;
-    }
-    text
 }
 
 impl<'a> Iterator for Words<'a> {
@@ -172,60 +146,40 @@ impl<'a> Iterator for Words<'a> {
     }
 }
 
-/// What a word is as a number.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Numeral {
-    /// Sign, digits with a point somewhere, exponent: what `f64::from_str` reads.
-    Finite,
-    /// NaN or infinity in one of the spellings that programs write.
-    NotFinite,
-    /// Something else.
-    Malformed,
+/// Starts of the words of an operand, in which `#` begins no comment.
+pub(super) fn word_starts(operand: &[u8]) -> impl Iterator<Item = usize> {
+    (0..operand.len()).filter(|&i| !is_blank(operand[i]) && (i == 0 || is_blank(operand[i - 1])))
 }
 
-/// Checks the spelling of a number without reading it.
+/// The text without blanks at its ends.
+pub(super) fn trimmed(text: &[u8]) -> &[u8] {
+    let start = text.iter().position(|b| !is_blank(*b)).unwrap_or(text.len());
+    let end = text.iter().rposition(|b| !is_blank(*b)).map_or(start, |last| last + 1);
+    &text[start..end]
+}
+
+/// The value of a number: sign, digits with a point anywhere, exponent. NaN for NaN and infinity in any of the
+/// spellings of other programs; infinite if it is too large for f64; `None` if it is malformed.
 #[inline]
-pub(super) fn numeral(word: &[u8]) -> Numeral {
-    let digits = |at: usize| word[at..].iter().take_while(|b| b.is_ascii_digit()).count();
-    let sign = |at: usize| usize::from(matches!(word.get(at), Some(b'+' | b'-')));
-    let mut at = sign(0);
-    let whole = digits(at);
-    at += whole;
-    let mut fraction = 0;
-    if word.get(at) == Some(&b'.') {
-        fraction = digits(at + 1);
-        at += 1 + fraction;
+pub(super) fn parse_number(word: &[u8]) -> Option<f64> {
+    let is_decimal = |byte: &u8| matches!(byte, b'0'..=b'9' | b'+' | b'-' | b'.' | b'e' | b'E');
+    match word.iter().all(is_decimal) {
+        true => core::str::from_utf8(word).ok()?.parse().ok(),
+        false => not_finite(word),
     }
-    if whole + fraction > 0 && matches!(word.get(at), Some(b'e' | b'E')) {
-        let exponent = at + 1 + sign(at + 1);
-        let length = digits(exponent);
-        at = if length > 0 { exponent + length } else { at };
-    }
-    if whole + fraction > 0 && at == word.len() { Numeral::Finite } else { not_finite(word) }
 }
 
 #[cold]
-fn not_finite(word: &[u8]) -> Numeral {
+fn not_finite(word: &[u8]) -> Option<f64> {
     let lower = String::from_utf8_lossy(word).to_ascii_lowercase();
     let bare = lower.trim_start_matches(['+', '-']);
-    // `1.#QNAN`, `-1.#IND00` and the like are what older C libraries print.
-    match bare.starts_with("nan") || bare.starts_with("inf") || bare.starts_with("1.#") {
-        true => Numeral::NotFinite,
-        false => Numeral::Malformed,
-    }
+    // Older C libraries print `1.#QNAN`, `-1.#IND00` and the like.
+    ["nan", "inf", "1.#"].iter().any(|spelling| bare.starts_with(spelling)).then_some(f64::NAN)
 }
 
-/// Whether a well-formed number is zero: no digit but 0 before its exponent.
-#[inline]
-pub(super) fn is_zero(word: &[u8]) -> bool {
-    let mantissa = word.iter().take_while(|b| !matches!(b, b'e' | b'E'));
-    mantissa.clone().all(|b| !matches!(b, b'1'..=b'9' | b'n'))
-}
-
-/// Reads a number; `None` where it is malformed or not finite.
+/// The value of a finite number; `None` for anything else.
 pub(super) fn number(word: &[u8]) -> Option<f64> {
-    let text = core::str::from_utf8(word).ok()?;
-    (numeral(word) == Numeral::Finite).then(|| text.parse().ok()).flatten().filter(|x: &f64| x.is_finite())
+    parse_number(word).filter(|value| value.is_finite())
 }
 
 #[cfg(test)]
@@ -240,7 +194,7 @@ mod tests {
     }
 
     #[test]
-    fn line_ends_marks_and_continuations() {
+    fn line_ends_byte_order_marks_and_continuations() {
         let expected = [(1, "v 1 2 3".to_string()), (3, "f 1".into()), (4, "".into()), (5, "x".into())];
         assert_eq!(lines("\u{feff}v 1 \\\n 2 3\nf 1\n# c \\\nx"), expected);
         assert_eq!(lines("v 1 \\\r\n 2 3\r\nf 1\r\n# c \\\r\nx"), expected);
@@ -248,7 +202,7 @@ mod tests {
     }
 
     #[test]
-    fn utf16_is_decoded_and_binary_refused() {
+    fn utf16_is_decoded_and_binary_is_refused() {
         let little: Vec<u8> = "v 1".encode_utf16().flat_map(u16::to_le_bytes).collect();
         let big: Vec<u8> = "\u{feff}v 1".encode_utf16().flat_map(u16::to_be_bytes).collect();
         assert_eq!(normalise(little).unwrap(), b"v 1");
@@ -257,22 +211,21 @@ mod tests {
     }
 
     #[test]
-    fn spelling_of_numbers() {
+    fn spellings_of_numbers() {
         for good in ["0", "-1", "+1", "2.", ".5", "1e5", "1.5E-3", "3.1e+2"] {
-            assert_eq!(numeral(good.as_bytes()), Numeral::Finite, "{good}");
-            assert!(good.parse::<f64>().is_ok());
+            assert_eq!(parse_number(good.as_bytes()), good.parse().ok(), "{good}");
         }
         for odd in ["nan", "-NaN(ind)", "inf", "1.#QNAN", "-1.#IND"] {
-            assert_eq!(numeral(odd.as_bytes()), Numeral::NotFinite, "{odd}");
+            assert!(parse_number(odd.as_bytes()).is_some_and(f64::is_nan), "{odd}");
         }
         for bad in ["", "-", ".", "1,5", "3.1+e2", "1e", "e5", "0x10", "1.2.3", "--1"] {
-            assert_eq!(numeral(bad.as_bytes()), Numeral::Malformed, "{bad}");
+            assert_eq!(parse_number(bad.as_bytes()), None, "{bad}");
         }
-        assert_eq!(number(b"1e999"), None);
+        assert_eq!((parse_number(b"1e999"), number(b"1e999")), (Some(f64::INFINITY), None));
     }
 
     #[test]
-    fn operands_are_what_stands_there() {
+    fn operands_keep_blanks_and_comments() {
         let mut line = words(b"usemtl  dark  wood #3 # old \r");
         assert_eq!(line.next(), Some(&b"usemtl"[..]));
         assert_eq!(line.clone().rest(), b" dark  wood #3 # old ");

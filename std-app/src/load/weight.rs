@@ -1,5 +1,5 @@
-//! How much memory a text takes on its way into a scene, told before it is read in earnest: for each
-//! statement what the worst of its kind takes, as measured.
+//! Upper bounds of the memory that reading a text takes, computed before it is read: the measured worst case of
+//! each statement.
 
 use super::geometry::Placed;
 use super::obj::{Group, Obj};
@@ -9,95 +9,69 @@ use halflight_core::sampling::mix;
 use halflight_core::scene::{Material, Surface};
 use rayon::prelude::*;
 
-/// Bytes for each byte of text: itself, cleaned, and room to grow.
+/// Bytes for each byte of text: itself, decoded.
 const TEXT: usize = 4;
-/// For each `v`, `vt` and `vn`, in each of the readers.
+/// For each `v`, `vt` and `vn`: in its piece, and in the list of all pieces.
 const VERTEX: usize = 80;
-/// Readers that work side by side, each on its megabyte of faces.
-const READERS: usize = 4;
-/// For each corner of a face.
+/// For each corner of a face: read, as an index, and in a triangle.
 const CORNER: usize = 50;
 /// For each corner that is a vertex of its own.
 const UNIQUE: usize = 130;
 /// For each run of faces of a material.
 const RUN: usize = 700;
-/// For each line that may end in a note of its own.
+/// For each line that may have a note of its own.
 const NOTE: usize = 300;
-/// For each material: as read, as used, as the core has it.
+/// For each material: as written, as used, and in the core.
 const MATERIAL: usize = 4096;
-/// For each byte of a scene file: values of two characters take most.
+/// For each byte of a scene file; values of two characters take most.
 const SCENE_FILE: usize = 220;
-
 /// For each piece of a triangle that is cut: four corners and two triangles that may be lamps.
 const PIECE: usize = 860;
 
-/// What an OBJ file has, counted.
-#[derive(Clone, Copy, Debug, Default)]
-struct Counts {
-    vertices: usize,
-    /// `vt` and `vn`.
-    others: usize,
-    corners: usize,
-    /// Of those, corners counted from the end: the same word may mean any vertex.
-    relative: usize,
-    runs: usize,
-    notes: usize,
-}
+/// Counts of an OBJ file: vertices, corners of faces, corners with negative indices, runs, other lines.
+type Counts = [usize; 5];
 
-impl Counts {
-    fn and(self, other: Self) -> Self {
-        Self {
-            vertices: self.vertices + other.vertices,
-            others: self.others + other.others,
-            corners: self.corners + other.corners,
-            relative: self.relative + other.relative,
-            runs: self.runs + other.runs,
-            notes: self.notes + other.notes,
-        }
-    }
-}
-
-/// Bytes that [`super::obj::parse`] takes at most.
+/// Upper bound of the bytes that [`super::obj::parse`] takes.
 pub(super) fn of_obj(text: &[u8]) -> usize {
-    let words_seen = Distinct::new(text.len() / 2);
-    let corners = |words: Words, counts: &mut Counts| {
+    let distinct = Distinct::new(text.len() / 2);
+    let count_corners = |words: Words, counts: &mut Counts| {
         for word in words {
-            counts.corners += 1;
-            counts.relative += usize::from(word.contains(&b'-'));
-            words_seen.add(word);
+            counts[1] += 1;
+            // The same negative index may mean any vertex.
+            counts[2] += usize::from(word.contains(&b'-'));
+            distinct.add(word);
         }
     };
     let count = |mut counts: Counts, line: &[u8]| {
         let mut operands = words(line);
         match operands.next() {
-            Some(b"v") => counts.vertices += 1,
-            Some(b"vt" | b"vn") => counts.others += 1,
-            Some(b"f" | b"fo") => corners(operands, &mut counts),
-            Some(b"usemtl") => counts.runs += 1,
-            // A line that goes on.
-            Some(first) if first[0].is_ascii_digit() || first[0] == b'-' => corners(words(line), &mut counts),
-            Some(_) => counts.notes += 1,
+            Some(b"v" | b"vt" | b"vn") => counts[0] += 1,
+            Some(b"f" | b"fo") => count_corners(operands, &mut counts),
+            Some(b"usemtl") => counts[3] += 1,
+            // A continued line.
+            Some([b'0'..=b'9' | b'-', ..]) => count_corners(words(line), &mut counts),
+            Some(_) => counts[4] += 1,
             None => {}
         }
         counts
     };
+    let sum = |a: Counts, b: Counts| core::array::from_fn(|i| a[i] + b[i]);
     let lines = text.par_split(|&b| matches!(b, b'\n' | b'\r'));
-    let Counts { vertices, others, corners, relative, runs, notes } =
-        lines.fold(Counts::default, count).reduce(Counts::default, Counts::and);
-    let readers = (1 + (text.len() >> 20)).min(READERS);
-    let unique = corners.min(relative + words_seen.at_most());
+    let [vertices, corners, relative, runs, notes] =
+        lines.fold(Counts::default, count).reduce(Counts::default, sum);
+    let unique = corners.min(relative + distinct.upper_bound());
     (text.len() * TEXT)
-        .saturating_add(readers * VERTEX * (vertices + others))
+        .saturating_add(VERTEX * vertices)
         .saturating_add(CORNER * corners + UNIQUE * unique)
         .saturating_add(RUN * runs + NOTE * notes)
 }
 
-/// About how many different words there are, by how many bits their hashes set (Whang et al., "A linear-time
+/// Approximate number of distinct words, by the number of bits that their hashes set (Whang et al., "A linear-time
 /// probabilistic counting algorithm", 1990).
 struct Distinct(Vec<AtomicU64>);
 
 impl Distinct {
-    /// For up to about `most` words.
+    /// A counter of up to about `most` words.
     fn new(most: usize) -> Self {
         Self((0..=most / 64).map(|_| AtomicU64::new(0)).collect())
     }
@@ -107,12 +81,12 @@ impl Distinct {
             (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3)
         });
         let hash = mix(hash);
-        let place = (hash >> 6) as usize % self.0.len();
-        self.0[place].fetch_or(1 << (hash & 63), Ordering::Relaxed);
+        let index = (hash >> 6) as usize % self.0.len();
+        self.0[index].fetch_or(1 << (hash & 63), Ordering::Relaxed);
     }
 
-    /// The estimate and five of its standard deviations.
-    fn at_most(&self) -> usize {
+    /// The estimate plus five of its standard deviations.
+    fn upper_bound(&self) -> usize {
         let bits = (self.0.len() * 64) as f64;
         let set: u32 = self.0.iter().map(|word| word.load(Ordering::Relaxed).count_ones()).sum();
         let estimate = -bits * (1.0 - f64::from(set) / bits).max(1.0 / bits).ln();
@@ -120,7 +94,7 @@ impl Distinct {
     }
 }
 
-/// Bytes that [`super::mtl::parse`] takes at most.
+/// Upper bound of the bytes that [`super::mtl::parse`] takes.
 pub(super) fn of_mtl(text: &[u8]) -> usize {
     let [mut materials, mut others] = [0usize; 2];
     for line in text.split(|&b| matches!(b, b'\n' | b'\r')) {
@@ -133,12 +107,12 @@ pub(super) fn of_mtl(text: &[u8]) -> usize {
     (text.len() * TEXT).saturating_add(MATERIAL * materials + NOTE * others)
 }
 
-/// Bytes that a scene file takes, with all that it says.
+/// Upper bound of the bytes that a scene file takes.
 pub(super) fn of_scene_file(text: &[u8]) -> usize {
     text.len().saturating_mul(SCENE_FILE)
 }
 
-/// Bytes of what was read.
+/// Bytes of a mesh.
 pub(super) fn of_mesh(obj: &Obj) -> usize {
     let of_group = |group: &Group| {
         size_of_val(&group.positions[..])
@@ -150,9 +124,8 @@ pub(super) fn of_mesh(obj: &Obj) -> usize {
     obj.groups.iter().map(of_group).sum::<usize>() + MATERIAL * obj.materials.len()
 }
 
-/// Bytes that [`super::geometry::assemble`] takes: of each vertex its exact place, its place, normal and
-/// texture coordinates, of each triangle itself, and all of that twice where parts are put together. Lamps are
-/// searched for doubles and glass for holes, which takes as much again.
+/// Bytes that [`super::geometry::assemble`] takes: vertices in f64 and f32, triangles, and both twice while parts
+/// are joined. The search for duplicate lamps and open glass takes as much again.
 pub(super) fn of_scene(parts: &[Placed], materials: &[Material]) -> usize {
     let is_searched =
         |material: &Material| material.emits() || matches!(material.surface, Surface::Dielectric { .. });
@@ -164,7 +137,7 @@ pub(super) fn of_scene(parts: &[Placed], materials: &[Material]) -> usize {
     parts.iter().fold(0, |sum, part| sum.saturating_add(of_part(part)))
 }
 
-/// Bytes of so many pieces of triangles that are cut; of none where they are too many.
+/// Bytes of the pieces of triangles that are cut; 0 if they are too many.
 pub(super) fn of_pieces(pieces: f64) -> usize {
     if super::split::is_affordable(pieces) { pieces as usize * PIECE } else { 0 }
 }
@@ -174,7 +147,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_takes_more_weighs_more() {
+    fn larger_statements_weigh_more() {
         let face = of_obj(b"f 1 2 3\n");
         assert!(of_obj(b"f 1 2 3 4\n") > face && of_obj(b"f 1 2 \\\n3 4\n") > face);
         let same = of_obj(&b"f 1 2 3\n".repeat(1000));
@@ -187,13 +160,13 @@ mod tests {
     }
 
     #[test]
-    fn different_words_are_counted() {
+    fn distinct_words_are_counted() {
         for count in [0usize, 1, 100, 10_000, 100_000] {
             let distinct = Distinct::new(100_000);
             for i in 0..2 * count {
                 distinct.add((i % count).to_string().as_bytes());
             }
-            let most = distinct.at_most();
+            let most = distinct.upper_bound();
             assert!(most >= count && most <= count + count / 20 + 700, "{count}: {most}");
         }
     }

@@ -1,30 +1,26 @@
-//! Faces with more than three corners become triangles by clipping ears (Meisters 1975): exact for any simple
-//! polygon, concave or not, in the plane that fits it best. All decisions are signs of sums of products, so
-//! that a polygon scaled by a power of two is cut in the same way.
+//! Triangulation of polygons by ear clipping (Meisters 1975), in the coordinate plane in which the polygon has
+//! the largest area. Exact for simple polygons, concave ones included. All decisions are signs of sums of
+//! products, so a scale by a power of two changes none.
 
 use crate::load::notes::Notes;
 
-/// Beyond this many corners the quadratic time of ear clipping is not worth it: a fan, and a note.
+/// Larger polygons are cut as a fan, with a note: ear clipping takes quadratic time.
 const MOST_CORNERS: usize = 4096;
 
-/// A polygon that has no ear so often crosses itself all over, and looking further is wasted.
+/// Cuts without an ear before the rest of a polygon that crosses itself is cut as a fan.
 const MOST_GUESSES: usize = 16;
 
-/// Triangles of the faces whose corners follow each other in `indices`; `arities` holds their numbers of
-/// corners, or nothing where all are triangles.
+/// Triangles of consecutive faces. `arities`: number of corners of each face.
 pub(super) fn triangulate(
     positions: &[[f64; 3]],
     indices: &[u32],
     arities: &[u32],
     notes: &mut Notes,
 ) -> Vec<[u32; 3]> {
-    if arities.is_empty() {
-        return indices.chunks_exact(3).map(|c| [c[0], c[1], c[2]]).collect();
-    }
-    let mut triangles = Vec::with_capacity(indices.len() / 2);
+    let mut triangles = Vec::with_capacity(indices.len() - 2 * arities.len());
     let mut rest = indices;
     for &arity in arities {
-        let (face, later) = rest.split_at((arity as usize).min(rest.len()));
+        let (face, later) = rest.split_at(arity as usize);
         rest = later;
         match *face {
             [a, b, c] => triangles.push([a, b, c]),
@@ -35,24 +31,20 @@ pub(super) fn triangulate(
 }
 
 fn polygon(positions: &[[f64; 3]], face: &[u32], triangles: &mut Vec<[u32; 3]>, notes: &mut Notes) {
-    let point = |v: u32| positions.get(v as usize).copied().unwrap_or([f64::NAN; 3]);
-    // A corner that repeats the one before it cuts nothing off.
-    let mut ring: Vec<u32> = Vec::with_capacity(face.len());
-    for &v in face {
-        if ring.last().is_none_or(|&last| point(last) != point(v)) {
-            ring.push(v);
-        }
-    }
+    let point = |v: u32| positions[v as usize];
+    // Repeated corners have no area.
+    let mut ring = face.to_vec();
+    ring.dedup_by(|v, last| point(*v) == point(*last));
     while ring.len() > 1 && point(ring[0]) == point(ring[ring.len() - 1]) {
         ring.pop();
     }
-    if ring.iter().any(|&v| point(v).iter().any(|x| !x.is_finite())) {
+    if ring.iter().flat_map(|&v| point(v)).any(|x| !x.is_finite()) {
         return notes.add(1, "polygon with a corner that is not finite left out");
     }
     if ring.len() < 3 {
         return notes.add(1, "polygon without area left out");
     }
-    let points: Vec<[f64; 2]> = flatten(&ring.iter().map(|&v| point(v)).collect::<Vec<_>>());
+    let points = flatten(&ring.iter().map(|&v| point(v)).collect::<Vec<_>>());
     if ring.len() > MOST_CORNERS {
         notes.add(1, format!("polygon of more than {MOST_CORNERS} corners is cut as a fan"));
         return fan(&ring, triangles);
@@ -66,8 +58,7 @@ fn fan(ring: &[u32], triangles: &mut Vec<[u32; 3]>) {
     triangles.extend(ring.windows(2).skip(1).map(|pair| [ring[0], pair[0], pair[1]]));
 }
 
-/// Corners in a plane, counter-clockwise on the whole: along the axis in which the polygon's area vector
-/// (Newell's formula) is largest.
+/// Corners without the coordinate in which the area vector (Newell's formula) is largest, counter-clockwise.
 fn flatten(corners: &[[f64; 3]]) -> Vec<[f64; 2]> {
     let origin = corners[0];
     let relative = |p: [f64; 3]| [p[0] - origin[0], p[1] - origin[1], p[2] - origin[2]];
@@ -88,21 +79,22 @@ fn flatten(corners: &[[f64; 3]]) -> Vec<[f64; 2]> {
     corners.iter().map(|&p| relative(p)).map(|p| [p[u], p[v]]).collect()
 }
 
-/// Twice the signed area of a triangle: positive where it winds counter-clockwise.
-fn turn(a: [f64; 2], b: [f64; 2], c: [f64; 2]) -> f64 {
+/// Twice the signed area of a triangle; positive if counter-clockwise.
+fn signed_area(a: [f64; 2], b: [f64; 2], c: [f64; 2]) -> f64 {
     (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
 }
 
-/// Cuts ears off until a triangle is left; `false` where the polygon is not simple and some cut was a guess.
+/// Cuts ears off until a triangle is left. `false` if the polygon is not simple and a corner without an ear was
+/// cut.
 fn clip_ears(ring: &[u32], points: &[[f64; 2]], triangles: &mut Vec<[u32; 3]>) -> bool {
     let mut left: Vec<usize> = (0..ring.len()).collect();
     let mut guesses = 0;
-    let mut at = 0; // the corner tried next
+    let mut at = 0; // the corner to try next
     let mut tried = 0;
     while left.len() > 3 {
         let count = left.len();
         let (a, b, c) = (left[(at + count - 1) % count], left[at % count], left[(at + 1) % count]);
-        let flat = turn(points[a], points[b], points[c]) == 0.0;
+        let flat = signed_area(points[a], points[b], points[c]) == 0.0;
         let guess = tried >= count;
         if guess || is_ear(points, &left, [a, b, c]) {
             guesses += usize::from(guess);
@@ -127,14 +119,15 @@ fn clip_ears(ring: &[u32], points: &[[f64; 2]], triangles: &mut Vec<[u32; 3]>) -
     guesses == 0
 }
 
-/// Whether the corner `b` sticks out and no other corner lies in the triangle that it makes with its
-/// neighbours.
+/// Whether corner `b` is convex and the triangle with its neighbours contains no other corner.
 fn is_ear(points: &[[f64; 2]], left: &[usize], [a, b, c]: [usize; 3]) -> bool {
     let (pa, pb, pc) = (points[a], points[b], points[c]);
-    if turn(pa, pb, pc) <= 0.0 {
+    if signed_area(pa, pb, pc) <= 0.0 {
         return false;
     }
-    let inside = |p: [f64; 2]| turn(pa, pb, p) >= 0.0 && turn(pb, pc, p) >= 0.0 && turn(pc, pa, p) >= 0.0;
+    let inside = |p: [f64; 2]| {
+        signed_area(pa, pb, p) >= 0.0 && signed_area(pb, pc, p) >= 0.0 && signed_area(pc, pa, p) >= 0.0
+    };
     let corner = |p: [f64; 2]| p == pa || p == pb || p == pc;
     !left.iter().any(|&i| i != a && i != b && i != c && !corner(points[i]) && inside(points[i]))
 }
@@ -148,20 +141,21 @@ mod tests {
         let indices: Vec<u32> = (0..corners.len() as u32).collect();
         let triangles = triangulate(corners, &indices, &[corners.len() as u32], &mut notes);
         let flat = flatten(corners);
-        let areas =
-            triangles.iter().map(|t| turn(flat[t[0] as usize], flat[t[1] as usize], flat[t[2] as usize]));
+        let areas = triangles
+            .iter()
+            .map(|t| signed_area(flat[t[0] as usize], flat[t[1] as usize], flat[t[2] as usize]));
         let areas: Vec<f64> = areas.collect();
-        assert!(areas.iter().all(|&a| a >= 0.0), "a triangle winds against its polygon: {areas:?}");
+        assert!(areas.iter().all(|&a| a >= 0.0), "reversed triangle: {areas:?}");
         (triangles, areas.iter().sum::<f64>() / 2.0, notes.sentences())
     }
 
     #[test]
-    fn convex_and_concave_quads() {
+    fn convex_and_concave_quads_are_exact() {
         let square = [[0., 0., 5.], [1., 0., 5.], [1., 1., 5.], [0., 1., 5.]];
         let (triangles, area, notes) = cut(&square);
         assert_eq!((triangles.len(), area, notes.len()), (2, 1.0, 0));
         for reflex in 0..4 {
-            // An arrowhead whose reflex corner is corner `reflex`.
+            // Arrowhead with reflex corner `reflex`.
             let mut arrow = [[0., 0., 0.], [4., 1., 0.], [0., 2., 0.], [1., 1., 0.]];
             arrow.rotate_right((reflex + 1) % 4);
             let (triangles, area, notes) = cut(&arrow);
@@ -170,7 +164,7 @@ mod tests {
     }
 
     #[test]
-    fn a_comb_is_cut_exactly_in_any_plane() {
+    fn comb_is_exact_in_any_plane() {
         // Area 2 n + n of a comb with n teeth.
         let teeth = 20;
         let mut comb = Vec::new();
@@ -187,12 +181,12 @@ mod tests {
             (0..comb.len()).map(shoelace).sum::<f64>() / 2.0
         };
         for axis in 0..3 {
-            let place = |p: &[f64; 2]| {
+            let embed = |p: &[f64; 2]| {
                 let mut q = [3.0; 3];
                 (q[(axis + 1) % 3], q[(axis + 2) % 3]) = (p[0], p[1]);
                 q
             };
-            let mut corners: Vec<_> = comb.iter().map(place).collect();
+            let mut corners: Vec<_> = comb.iter().map(embed).collect();
             assert_eq!(cut(&corners).1, expected);
             corners.reverse();
             assert_eq!(cut(&corners).1, expected);
@@ -200,7 +194,7 @@ mod tests {
     }
 
     #[test]
-    fn odd_polygons_end() {
+    fn degenerate_polygons_terminate() {
         let twice = [[0., 0., 0.], [0., 0., 0.], [1., 0., 0.], [1., 1., 0.], [1., 1., 0.], [0., 0., 0.]];
         assert_eq!(cut(&twice).0.len(), 1);
         let line = [[0., 0., 0.], [1., 0., 0.], [2., 0., 0.], [3., 0., 0.]];
