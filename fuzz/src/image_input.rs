@@ -1,7 +1,7 @@
 //! Pictures: any bytes give pixels of the size that their header says, in the memory that it says, or an
 //! error; and what was read can be written and read again.
 
-use halflight::picture::{Samples, decode, survey};
+use halflight::picture::{Samples, decode, read_info};
 use halflight::save::{Format, Image, encode};
 use std::path::Path;
 
@@ -16,9 +16,9 @@ pub fn run(data: &[u8]) {
     // The name matters where the bytes do not tell the format.
     let name = Path::new("fuzz.tga");
     let Ok(picture) = decode(file, name, MOST) else { return };
-    let survey = survey(file, name).expect("what was decoded has a header");
-    assert_eq!((picture.width, picture.height), (survey.width, survey.height));
-    assert!(picture.bytes() <= survey.kept && survey.kept <= survey.peak && survey.peak <= MOST);
+    let info = read_info(file, name).expect("what was decoded has a header");
+    assert_eq!((picture.width, picture.height), (info.width, info.height));
+    assert!(picture.bytes() <= info.kept && info.kept <= info.peak && info.peak <= MOST);
     let pixels = picture.width as usize * picture.height as usize;
     match &picture.samples {
         Samples::Bytes(samples) => assert_eq!(samples.len(), 4 * pixels),

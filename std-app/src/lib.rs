@@ -1,7 +1,7 @@
-//! halflight, the app: files in, pictures and reports out, with the core's passes run on all cores.
+//! The halflight app: loads scenes, renders them with all processors, saves pictures and reports.
 //!
-//! A picture takes four steps: [`load`] a scene, choose a camera, [`drive`] the render, [`save`] the image;
-//! [`compare`] says how far two images are apart, [`report`] tells a person how it went.
+//! A picture takes four steps: [`load`] a scene, choose a camera, [`drive`] the render, [`save`] the image.
+//! [`compare`] computes the difference between two images, [`report`] describes a render.
 //!
 //! ```no_run
 //! use core::sync::atomic::AtomicBool;

@@ -1,4 +1,4 @@
-//! The command line. See `halflight --help`, and docs/cli.md for what scripts may rely on.
+//! The command line; `halflight --help` lists its flags, docs/cli.md its interface for scripts.
 #![forbid(unsafe_code)]
 
 mod cli;

@@ -1,18 +1,18 @@
-//! How much memory there is to take: a limit that holds from the first byte that is read. Whatever is read
-//! says how much it takes before it takes it.
+//! The memory budget: a limit that holds from the first byte read. Every reader states its memory before it
+//! allocates.
 
 use crate::report::words::readable_bytes;
 use std::fs::File;
 use std::io::{self, Read};
 use std::path::Path;
 
-/// The share of the machine's memory that is taken where nobody says how much, in parts of a hundred.
-const SHARE: usize = 80;
+/// Default limit in percent of the memory of the machine.
+const DEFAULT_PERCENT: usize = 80;
 
-/// Bytes where the machine does not say how many it has.
+/// Bytes of a machine that does not report its memory.
 const UNKNOWN: usize = 4 << 30;
 
-/// Bytes that were allowed, and how many of them are taken.
+/// Limit in bytes, and bytes in use.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Budget {
     limit: usize,
@@ -20,25 +20,25 @@ pub struct Budget {
 }
 
 impl Budget {
-    /// Of `limit` bytes; without one, of four fifths of what the machine has, or the process may have.
+    /// A budget of `limit` bytes; by default four fifths of the memory of the machine or process.
     pub fn new(limit: Option<usize>) -> Self {
-        Self { limit: limit.unwrap_or_else(of_machine), taken: 0 }
+        Self { limit: limit.unwrap_or_else(default_limit), taken: 0 }
     }
 
-    /// Bytes that are allowed in all.
+    /// Total bytes.
     pub fn limit(&self) -> usize {
         self.limit
     }
 
-    /// Bytes that may still be taken.
+    /// Bytes not in use.
     pub fn left(&self) -> usize {
         self.limit.saturating_sub(self.taken)
     }
 
-    /// Whether `bytes` are left, for what is given back before anything else is taken.
+    /// Checks that `bytes` are left, for memory that is given back before the next use.
     ///
     /// # Errors
-    /// Fewer are left: says how many.
+    /// Fewer bytes are left.
     pub fn has(&self, bytes: usize) -> Result<(), Shortage> {
         if bytes > self.left() { Err(Shortage { needed: bytes, left: self.left() }) } else { Ok(()) }
     }
@@ -46,20 +46,20 @@ impl Budget {
     /// Takes `bytes`.
     ///
     /// # Errors
-    /// As [`Self::has`]; none are taken.
+    /// Fewer bytes are left; the budget is unchanged.
     pub fn take(&mut self, bytes: usize) -> Result<(), Shortage> {
         self.has(bytes)?;
         self.taken += bytes;
         Ok(())
     }
 
-    /// Gives back `bytes` of those that were taken.
+    /// Gives back `bytes`.
     pub fn give_back(&mut self, bytes: usize) {
         self.taken = self.taken.saturating_sub(bytes);
     }
 }
 
-/// Memory that was asked for and is not there.
+/// Missing memory.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Shortage {
     /// Bytes.
@@ -77,10 +77,10 @@ impl core::fmt::Display for Shortage {
 
 impl core::error::Error for Shortage {}
 
-/// The bytes of a file that is no longer than `most`.
+/// Reads a file of at most `most` bytes.
 ///
 /// # Errors
-/// As reading a file; a longer one has the kind [`io::ErrorKind::FileTooLarge`].
+/// Those of reading; [`io::ErrorKind::FileTooLarge`] for a longer file.
 pub fn read_file(path: &Path, most: usize) -> io::Result<Vec<u8>> {
     let mut file = File::open(path)?;
     let length = usize::try_from(file.metadata()?.len()).unwrap_or(usize::MAX);
@@ -89,12 +89,12 @@ pub fn read_file(path: &Path, most: usize) -> io::Result<Vec<u8>> {
     if length > most || bytes.try_reserve_exact(length).is_err() {
         return Err(too_large(length));
     }
-    // A pipe or a device does not say how long it is, and a file may grow while it is read.
-    let piece = 1 << 16;
+    // The length of a pipe or device is unknown, and a file may grow while it is read.
+    let chunk = 1 << 16;
     loop {
         let before = bytes.len();
         if bytes.capacity() == before {
-            let more = before.max(piece).min(most.saturating_add(1) - before);
+            let more = before.max(chunk).min(most.saturating_add(1) - before);
             bytes.try_reserve_exact(more).map_err(|_| too_large(before + more))?;
         }
         let room = (bytes.capacity() - before) as u64;
@@ -107,23 +107,20 @@ pub fn read_file(path: &Path, most: usize) -> io::Result<Vec<u8>> {
     }
 }
 
-/// Bytes that a process takes by itself.
-fn of_machine() -> usize {
+/// The default share of RAM, cgroup limit or `ulimit -v`, whichever is smallest, in bytes.
+fn default_limit() -> usize {
+    let read = |path: &str| std::fs::read_to_string(path).unwrap_or_default();
     let limits = [
-        std::fs::read_to_string("/proc/meminfo").ok().and_then(|text| field(&text, "MemTotal:", 1024)),
-        std::fs::read_to_string("/sys/fs/cgroup/memory.max").ok().and_then(|text| text.trim().parse().ok()),
-        std::fs::read_to_string("/sys/fs/cgroup/memory/memory.limit_in_bytes")
-            .ok()
-            .and_then(|text| text.trim().parse().ok()),
-        std::fs::read_to_string("/proc/self/limits")
-            .ok()
-            .and_then(|text| field(&text, "Max address space", 1)),
+        field(&read("/proc/meminfo"), "MemTotal:", 1024),
+        field(&read("/sys/fs/cgroup/memory.max"), "", 1),
+        field(&read("/sys/fs/cgroup/memory/memory.limit_in_bytes"), "", 1),
+        field(&read("/proc/self/limits"), "Max address space", 1),
     ];
     let least = limits.into_iter().flatten().filter(|bytes| *bytes > 0).min().unwrap_or(UNKNOWN);
-    least / 100 * SHARE
+    least / 100 * DEFAULT_PERCENT
 }
 
-/// The number behind `name` in a file of the system, in bytes.
+/// The number after `name` in a file of the system, times `unit`.
 fn field(text: &str, name: &str, unit: usize) -> Option<usize> {
     let rest = text.lines().find_map(|line| line.strip_prefix(name))?;
     rest.split_whitespace().next()?.parse::<usize>().ok()?.checked_mul(unit)
@@ -134,7 +131,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_taken_is_counted_and_comes_back() {
+    fn budget_counts_taken_and_returned_bytes() {
         let mut budget = Budget::new(Some(100));
         assert_eq!(budget.take(60), Ok(()));
         assert_eq!(budget.take(41), Err(Shortage { needed: 41, left: 40 }));
@@ -144,7 +141,7 @@ mod tests {
     }
 
     #[test]
-    fn files_of_the_system_are_read() {
+    fn system_files_are_parsed() {
         assert_eq!(
             field("MemTotal:       24683656 kB\nMemFree: 1 kB\n", "MemTotal:", 1024),
             Some(24_683_656 << 10)
@@ -155,7 +152,7 @@ mod tests {
     }
 
     #[test]
-    fn a_file_is_read_whole_or_not_at_all() {
+    fn file_is_read_whole_or_refused() {
         let path = std::env::temp_dir().join(format!("halflight-memory-{}", std::process::id()));
         let content: Vec<u8> = (0..200_000u32).map(|i| i as u8).collect();
         std::fs::write(&path, &content).unwrap();

@@ -1,11 +1,11 @@
-//! Memory for what rays read in no order: huge pages where the system has them, for with small ones half of the
-//! reads miss the table of pages as well as the cache.
+//! Memory in huge pages, for data that rays read in random order: with small pages half of the reads miss the
+//! page table as well as the cache.
 
 use core::ops::{Deref, DerefMut};
 use halflight_core::memory::{Footprint, Line, OutOfMemory};
 use memmap2::MmapMut;
 
-/// Zeroed lines straight from the system.
+/// Zeroed cache lines, mapped from the system.
 #[derive(Debug, Default)]
 pub(crate) struct Pages(Option<MmapMut>);
 
@@ -13,7 +13,7 @@ impl Pages {
     /// Lines of `footprint` bytes.
     ///
     /// # Errors
-    /// [`OutOfMemory`] where the system has no such piece.
+    /// [`OutOfMemory`] if the system refuses.
     pub(crate) fn new(footprint: Footprint) -> Result<Self, OutOfMemory> {
         let needed = footprint.bytes();
         if needed == 0 {
@@ -22,7 +22,7 @@ impl Pages {
         let bytes = needed.checked_next_multiple_of(size_of::<Line>());
         let map = bytes.and_then(|bytes| MmapMut::map_anon(bytes).ok());
         let map = map.ok_or(OutOfMemory { needed, available: 0 })?;
-        // Only advice: a system that does not take it gives small pages.
+        // Advice only: a system without huge pages gives small ones.
         #[cfg(target_os = "linux")]
         let _ = map.advise(memmap2::Advice::HugePage);
         Ok(Self(Some(map)))
@@ -48,7 +48,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn as_many_zeroed_lines_as_are_asked_for() {
+    fn footprint_in_zeroed_lines() {
         for bytes in [0, 1, 64, 65, 5 << 20] {
             let mut pages = Pages::new(Footprint::default().slice::<u8>(bytes)).expect("there is memory");
             assert_eq!(pages.len(), Footprint::default().slice::<u8>(bytes).bytes().div_ceil(64));

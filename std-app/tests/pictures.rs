@@ -214,9 +214,9 @@ fn numbers_that_light_cannot_be_reach_no_pixel() {
     let output = folder.run("render sky.toml --size 32x32 --spp 16 --threads 1 -o out.pfm");
     let said = String::from_utf8_lossy(&output.stderr);
     for what in [
-        "odd.exr: infinite numbers are 1000000",
-        "not finite or negative are 0 now, 3 times",
-        "numbers above 1e15",
+        "odd.exr: infinite texels are set to 1000000",
+        "NaN or negative are set to 0, 3 times",
+        "texels above 1e15",
     ] {
         assert!(said.contains(what), "{said}");
     }

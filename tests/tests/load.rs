@@ -50,11 +50,11 @@ fn what_is_refused_names_its_line() {
     refuses("", 0, "neither vertices nor faces");
     refuses("# nothing\n", 0, "neither vertices nor faces");
     refuses("v 0 0 0\nl 1 1\n", 0, "no faces");
-    refuses(&format!("{SQUARE}f 1 2 9\n"), 5, "`9` refers to a vertex that is not there");
+    refuses(&format!("{SQUARE}f 1 2 9\n"), 5, "`9` refers to a vertex that does not exist");
     refuses(&format!("{SQUARE}f 1 2 -5\n"), 5, "`-5` refers to a vertex");
     refuses(&format!("{SQUARE}f 0 1 2\n"), 5, "`0` refers to a vertex");
-    refuses(&format!("{SQUARE}f 1/1 2/1 3/1\n"), 5, "texture coordinate that is not there");
-    refuses(&format!("{SQUARE}f 1//1 2//1 3//1\n"), 5, "normal that is not there");
+    refuses(&format!("{SQUARE}f 1/1 2/1 3/1\n"), 5, "texture coordinate that does not exist");
+    refuses(&format!("{SQUARE}f 1//1 2//1 3//1\n"), 5, "normal that does not exist");
     refuses(&format!("{SQUARE}f 1 2 99999999999999999999999\n"), 5, "not there");
     refuses(&format!("{SQUARE}f 1 2 x\n"), 5, "not a corner");
     refuses(&format!("{SQUARE}f 1////1 2 3\n"), 5, "not a corner");
@@ -198,7 +198,7 @@ fn materials_and_textures_are_found() {
         said.contains("texture `gone.png` is missing") && said.contains("broken.png cannot be read"),
         "{said}"
     );
-    assert!(said.contains("`.\\tex\\my wood.bmp` is not there under this name"), "{said}");
+    assert!(said.contains("`.\\tex\\my wood.bmp` does not exist"), "{said}");
     assert_eq!(scene.repairs.len(), 3, "{said}");
 }
 

@@ -77,7 +77,7 @@ fn a_name_in_another_case_or_encoding_is_found_with_a_note() {
     let mtl = b"newmtl Gr\xfcn\nKd .1 0 0\nnewmtl WOOD\nKd .2 0 0\n";
     let (rgb, notes) = two(b"mtllib m.mtl", ["Grün".as_bytes(), b"wood"], &[("m.mtl", mtl)]);
     assert_eq!((greys(rgb), notes.len()), ([0.1, 0.2], 2), "{notes:?}");
-    assert!(notes[1].contains("`wood`") && notes[1].contains("`WOOD` is taken"), "{notes:?}");
+    assert!(notes[1].contains("`wood`") && notes[1].contains("`WOOD` is used"), "{notes:?}");
 }
 
 #[test]
@@ -172,7 +172,7 @@ fn textures_are_found_whatever_their_path_is_like() {
     let (found, notes) =
         texture(b"map_Kd T.bmp", &[("sub/t.BMP", &pictures[0]), ("sub/t.bmp", &pictures[1])]);
     assert_eq!(found, None);
-    assert!(notes[0].contains("t.BMP and ") && notes[0].contains("fit equally well"), "{notes:?}");
+    assert!(notes[0].contains("t.BMP and ") && notes[0].contains("match equally well"), "{notes:?}");
 }
 
 #[test]
@@ -185,5 +185,5 @@ fn a_scene_file_finds_files_as_an_mtl_does() {
     let scene = Files::new(&files).load("s.toml").unwrap();
     assert_eq!(scene.textures.len(), 1);
     assert_eq!(scene.repairs.len(), 2, "{:?}", scene.repairs);
-    assert!(scene.repairs[0].contains("wood.bmp is taken") && scene.repairs[0].contains("s.toml:4"));
+    assert!(scene.repairs[0].contains("wood.bmp is used") && scene.repairs[0].contains("s.toml:4"));
 }

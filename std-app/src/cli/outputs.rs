@@ -7,7 +7,7 @@ use super::interrupt::INTERRUPT;
 use super::stdio::{say, tell};
 use halflight::drive;
 use halflight::report::{self, Files};
-use halflight::save::{self, Identity, Image, Patience, Place};
+use halflight::save::{self, Destination, Identity, Image, Patience};
 use std::io::{stderr, stdout};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -95,7 +95,7 @@ impl Outputs {
             Role::Checkpoint | Role::Cache => drive::check_writable(path)?,
             Role::Report | Role::Standard => {}
         }
-        if Place::of(path).is_ok_and(|place| place.is_stdout()) {
+        if Destination::of(path).is_ok_and(|destination| destination.is_stdout()) {
             if self.is_json {
                 let what =
                     format!("{} ({}) and --json both go to standard output", path.display(), role.flag());
@@ -157,7 +157,8 @@ impl Outputs {
 
     /// Writes a picture to all of `paths`, to files before it waits for readers of pipes; where it is.
     pub(super) fn save_to<'p>(&mut self, paths: &'p [PathBuf], image: &Image) -> Vec<&'p PathBuf> {
-        let is_stream = |path: &PathBuf| Place::of(path).is_ok_and(|place| place.is_stream());
+        let is_stream =
+            |path: &PathBuf| Destination::of(path).is_ok_and(|destination| destination.is_stream());
         let mut order: Vec<usize> = (0..paths.len()).collect();
         order.sort_by_key(|&i| is_stream(&paths[i]));
         order.retain(|&i| self.save(&paths[i], image));

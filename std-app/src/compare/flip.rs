@@ -1,16 +1,14 @@
-//! LDR-FLIP: the difference that an eye sees when it alternates between two pictures on a display.
+//! LDR-FLIP (Andersson et al., "FLIP: A Difference Evaluator for Alternating Images", HPG 2020): the visible
+//! difference of two pictures that alternate on a display. Values are clamped to [0, 1]; 67 pixels cover a degree of
+//! vision: 3840 pixels on 0.7 m at a distance of 0.7 m, the default of the paper.
 //!
-//! Andersson, Nilsson, Akenine-Möller, Oskarsson, Åström, Fairchild: "FLIP: A Difference Evaluator for
-//! Alternating Images", HPG 2020. Pictures are shown as our PNGs are, clamped to [0, 1], at 67 pixels a
-//! degree of vision: a display of 3840 pixels on 0.7 m seen from 0.7 m, the paper's default.
-//!
-//! 1. Colour: opponent channels blurred by the eye's contrast sensitivity, then the HyAB distance of
+//! 1. Colour: opponent channels blurred by the contrast sensitivity of the eye, then the HyAB distance of
 //!    Hunt-adjusted L*a*b*, compressed to [0, 1].
 //! 2. Features: first and second derivatives of the achromatic channel at the scale of visible detail.
 //! 3. The colour error to the power of one minus the feature error.
 //!
-//! All kernels are products of a function of x and one of y (of the two-term blue-yellow one, each term
-//! is), so they run along rows and then along columns. Pictures continue with their outermost pixels.
+//! All kernels are separable (both terms of the blue-yellow one are), so they run along rows, then along columns.
+//! The outermost pixels continue outside the picture.
 
 use super::Image;
 use core::f64::consts::PI;
@@ -18,29 +16,29 @@ use rayon::prelude::*;
 
 type Colour = [f32; 3];
 
-/// The FLIP error of each pixel, in [0, 1]. The pictures are of one size. NaN is seen as black.
+/// The FLIP error of each pixel, in [0, 1], of pictures of the same size. NaN counts as black.
 pub fn flip(image: &Image, reference: &Image) -> Vec<f32> {
     Observer::of(reference).flip(image)
 }
 
-/// An observer who has looked at the reference, and compares pictures of its size with it.
+/// A filtered reference, to compare pictures of the same size with it.
 pub struct Observer {
-    eye: Eye,
-    reference: Seen,
+    filters: Filters,
+    reference: Filtered,
 }
 
 impl Observer {
-    /// Looks at `reference`.
+    /// Filters `reference`.
     pub fn of(reference: &Image) -> Self {
-        let degree = 0.7 * 3840.0 / 0.7 * PI / 180.0;
-        let eye = Eye::new(degree);
-        let reference = eye.look(reference);
-        Self { eye, reference }
+        let pixels_per_degree = 0.7 * 3840.0 / 0.7 * PI / 180.0;
+        let filters = Filters::new(pixels_per_degree);
+        let reference = filters.apply(reference);
+        Self { filters, reference }
     }
 
     /// The FLIP error of each pixel of `image`.
     pub fn flip(&self, image: &Image) -> Vec<f32> {
-        let (r, t) = (&self.reference, self.eye.look(image));
+        let (r, t) = (&self.reference, self.filters.apply(image));
         let largest = hyab(hunt(to_lab([0.0, 1.0, 0.0])), hunt(to_lab([0.0, 0.0, 1.0]))).powf(QC);
         let error = |index: usize| {
             let colour = redistribute(hyab(r.lab[index], t.lab[index]).powf(QC), largest);
@@ -53,17 +51,21 @@ impl Observer {
         (0..image.pixels.len().min(r.lab.len())).into_par_iter().map(error).collect()
     }
 
-    /// Their mean.
+    /// The mean FLIP error of `image`.
     pub fn mean(&self, image: &Image) -> f64 {
-        let map = self.flip(image);
-        map.iter().map(|&error| f64::from(error)).sum::<f64>() / map.len().max(1) as f64
+        mean(&self.flip(image))
     }
+}
+
+/// The mean of a FLIP map.
+pub(super) fn mean(map: &[f32]) -> f64 {
+    map.iter().map(|&error| f64::from(error)).sum::<f64>() / map.len().max(1) as f64
 }
 
 /// Exponent on the colour difference (section 4.1.3).
 const QC: f32 = 0.7;
 
-/// Differences below `PC` of the largest take the range up to `PT`, the rest is for the extremes.
+/// Differences below `PC` of the largest are mapped to 0 ... `PT`, larger ones to `PT` ... 1 (section 4.1.3).
 const PC: f32 = 0.4;
 const PT: f32 = 0.95;
 
@@ -76,39 +78,39 @@ fn redistribute(difference: f32, largest: f32) -> f32 {
     }
 }
 
-/// Contrast sensitivity (table 1): weights and widths a and b of the sums of Gaussians.
+/// Contrast sensitivity (table 1): weights a and widths b of the Gaussians.
 const ACHROMATIC: [(f64, f64); 1] = [(1.0, 0.0047)];
 const RED_GREEN: [(f64, f64); 1] = [(1.0, 0.0053)];
 const BLUE_YELLOW: [(f64, f64); 2] = [(34.1, 0.04), (13.5, 0.025)];
 
-/// Full width, in degrees, of the smallest feature that counts.
+/// Full width of the smallest feature, in degrees.
 const FEATURE: f64 = 0.082;
 
-/// The filters of an observer.
-struct Eye {
-    /// For each opponent channel: Gaussians along an axis, whose outer products add up to the filter.
+/// The filters of the eye.
+struct Filters {
+    /// Gaussians of each opponent channel along an axis; the filter is the sum of their outer products.
     sensitivity: [Vec<Vec<f32>>; 3],
     smooth: Vec<f32>,
     edge: Vec<f32>,
     point: Vec<f32>,
 }
 
-/// What the eye makes of one picture.
-struct Seen {
+/// A filtered picture.
+struct Filtered {
     lab: Vec<Colour>,
     edge: Vec<f32>,
     point: Vec<f32>,
 }
 
-impl Eye {
+impl Filters {
     fn new(pixels_per_degree: f64) -> Self {
         // Three standard deviations of the widest Gaussian.
-        let reach = (3.0 * (0.04 / (2.0 * PI * PI)).sqrt() * pixels_per_degree).ceil() as i32;
+        let radius = (3.0 * (0.04 / (2.0 * PI * PI)).sqrt() * pixels_per_degree).ceil() as i32;
         let sensitivity = |terms: &[(f64, f64)]| {
             let axis = |&(a, b): &(f64, f64)| -> Vec<f64> {
                 let weight = (a * (PI / b).sqrt()).sqrt();
                 let at = |x: i32| f64::from(x) / pixels_per_degree;
-                (-reach..=reach).map(|x| weight * (-PI * PI * at(x) * at(x) / b).exp()).collect()
+                (-radius..=radius).map(|x| weight * (-PI * PI * at(x) * at(x) / b).exp()).collect()
             };
             let axes: Vec<Vec<f64>> = terms.iter().map(axis).collect();
             let total: f64 = axes.iter().map(|axis| axis.iter().sum::<f64>().powi(2)).sum();
@@ -116,10 +118,10 @@ impl Eye {
         };
 
         let deviation = 0.5 * FEATURE * pixels_per_degree;
-        let reach = (3.0 * deviation).ceil() as i32;
+        let radius = (3.0 * deviation).ceil() as i32;
         let along = |weight: fn(f64, f64) -> f64| -> Vec<f64> {
             let gauss = |x: f64| (-x * x / (2.0 * deviation * deviation)).exp();
-            (-reach..=reach).map(|x| weight(x.into(), deviation) * gauss(x.into())).collect()
+            (-radius..=radius).map(|x| weight(x.into(), deviation) * gauss(x.into())).collect()
         };
         Self {
             sensitivity: [sensitivity(&ACHROMATIC), sensitivity(&RED_GREEN), sensitivity(&BLUE_YELLOW)],
@@ -129,9 +131,9 @@ impl Eye {
         }
     }
 
-    fn look(&self, picture: &Image) -> Seen {
+    fn apply(&self, picture: &Image) -> Filtered {
         let width = picture.width as usize;
-        // What a display can show; `clamp` keeps a NaN, `max` drops it.
+        // Displayable values; `clamp` keeps NaN, `max` drops it.
         let shown = |pixel: &Colour| to_opponent(pixel.map(|c| c.clamp(0.0, 1.0).max(0.0)));
         let opponent: Vec<Colour> = picture.pixels.par_iter().map(shown).collect();
         let channel = |c: usize| opponent.iter().map(|colour| colour[c]).collect::<Vec<f32>>();
@@ -153,7 +155,7 @@ impl Eye {
             let y = filter(&luma, width, &self.smooth, across);
             x.iter().zip(&y).map(|(x, y)| x.hypot(*y)).collect()
         };
-        Seen {
+        Filtered {
             lab: (0..opponent.len()).into_par_iter().map(lab).collect(),
             edge: strength(&self.edge),
             point: strength(&self.point),
@@ -168,18 +170,18 @@ fn balanced(weights: &[f64]) -> Vec<f32> {
     weights.iter().map(|&w| (w / if w > 0.0 { positive } else { negative.max(1e-30) }) as f32).collect()
 }
 
-/// `values` filtered by `across` along the rows and by `down` along the columns. All pixels of a row take one tap after
-/// the other, so that they fill registers.
+/// Filters `values` by `across` along the rows and by `down` along the columns. Each tap is applied to a whole row,
+/// which vectorises.
 fn filter(values: &[f32], width: usize, across: &[f32], down: &[f32]) -> Vec<f32> {
     let height = values.len() / width;
     let mut rows = vec![0.0; values.len()];
     let filter_row = |wide: &mut Vec<f32>, (to, from): (&mut [f32], &[f32])| {
         let (left, right) = (from[0], from[width - 1]);
-        let reach = across.len() / 2;
+        let radius = across.len() / 2;
         wide.clear();
-        wide.resize(reach, left);
+        wide.resize(radius, left);
         wide.extend_from_slice(from);
-        wide.resize(width + 2 * reach, right);
+        wide.resize(width + 2 * radius, right);
         for (k, w) in across.iter().enumerate() {
             to.iter_mut().zip(&wide[k..]).for_each(|(to, from)| *to += w * from);
         }
@@ -191,7 +193,7 @@ fn filter(values: &[f32], width: usize, across: &[f32], down: &[f32]) -> Vec<f32
     let mut columns = vec![0.0; values.len()];
     columns.par_chunks_mut(width).with_min_len(ROWS).enumerate().for_each(|(y, to)| {
         for (k, w) in down.iter().enumerate() {
-            // Rows outside are those of the border.
+            // The border rows continue outside.
             let row = (y + k).saturating_sub(down.len() / 2).min(height - 1);
             to.iter_mut().zip(&rows[row * width..][..width]).for_each(|(to, from)| *to += w * from);
         }
@@ -199,10 +201,10 @@ fn filter(values: &[f32], width: usize, across: &[f32], down: &[f32]) -> Vec<f32
     columns
 }
 
-/// Rows that are worth a task.
+/// Rows of a task, at least.
 const ROWS: usize = 16;
 
-/// Linear sRGB to XYZ, and what it makes of white (D65).
+/// Linear sRGB to XYZ, and XYZ of white (D65).
 const TO_XYZ: [[f32; 3]; 3] = [
     [0.412_386_56, 0.357_591_5, 0.180_450_49],
     [0.212_636_82, 0.715_183, 0.072_180_2],
@@ -242,12 +244,12 @@ fn to_lab(linear: Colour) -> Colour {
     [116.0 * y - 16.0, 500.0 * (x - y), 200.0 * (y - z)]
 }
 
-/// Colours look more colourful where it is bright (the Hunt effect).
+/// The Hunt effect: chroma increases with lightness.
 fn hunt([l, a, b]: Colour) -> Colour {
     [l, 0.01 * l * a, 0.01 * l * b]
 }
 
-/// City-block in lightness, Euclidean in chroma: fit for large differences (Abasi et al. 2020).
+/// City-block distance in lightness, Euclidean in chroma, for large differences (Abasi et al. 2020).
 fn hyab(r: Colour, t: Colour) -> f32 {
     (r[0] - t[0]).abs() + (r[1] - t[1]).hypot(r[2] - t[2])
 }
@@ -257,7 +259,7 @@ mod tests {
     use super::*;
     use crate::save::from_srgb;
 
-    /// Our filters are computed in another order of f32 operations than those of the published program.
+    /// The published program computes its filters in another order of f32 operations.
     const TOLERANCE: f64 = 1e-4;
 
     const WIDTH: u32 = 61;
@@ -279,9 +281,9 @@ mod tests {
         ((hash ^ (hash >> 15)).wrapping_mul(2246822519) >> 13) & 255
     }
 
-    /// The values are those of the authors' program (Python package `flip-evaluator` 1.7, numpy arrays of
-    /// these pictures divided by 255): `evaluate(reference, test, "LDR", applyMagma=False)` gives the map,
-    /// here at column 30 of row 20, and its mean.
+    /// Values of the authors' program (Python package `flip-evaluator` 1.7, numpy arrays of these pictures divided
+    /// by 255): `evaluate(reference, test, "LDR", applyMagma=False)` gives the map, here at column 30 of row 20, and
+    /// its mean.
     #[test]
     fn agrees_with_the_authors_program() {
         let noisy = |x, y, c| (ramp(x, y, c) + noise(x, y, c) / 8).min(255);
@@ -294,7 +296,7 @@ mod tests {
         ];
         for (number, (reference, test, mean, middle)) in pairs.into_iter().enumerate() {
             let map = flip(&test, &reference);
-            let ours = map.iter().map(|&e| f64::from(e)).sum::<f64>() / map.len() as f64;
+            let ours = super::mean(&map);
             assert!((ours - mean).abs() < TOLERANCE, "pair {number}: {ours} and {mean}");
             let ours = f64::from(map[20 * WIDTH as usize + 30]);
             assert!((ours - middle).abs() < TOLERANCE, "pair {number}, middle: {ours} and {middle}");
@@ -302,7 +304,7 @@ mod tests {
     }
 
     #[test]
-    fn an_observer_remembers_the_reference() {
+    fn observer_gives_the_same_map() {
         let observer = Observer::of(&picture(ramp));
         let other = picture(noise);
         let map = flip(&other, &picture(ramp));
@@ -311,7 +313,7 @@ mod tests {
     }
 
     #[test]
-    fn equal_pictures_do_not_differ_and_one_pixel_is_a_picture() {
+    fn equal_pictures_have_no_error_and_one_pixel_suffices() {
         assert!(flip(&picture(noise), &picture(noise)).iter().all(|&error| error == 0.0));
         let dot = |value| Image { width: 1, height: 1, pixels: vec![[value; 3]] };
         assert!(flip(&dot(f32::NAN), &dot(f32::INFINITY)).iter().all(|error| error.is_finite()));

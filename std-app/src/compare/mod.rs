@@ -1,5 +1,4 @@
-//! Two pictures side by side: errors in linear light and as an eye would see them, and a picture of the
-//! difference.
+//! Comparison of two pictures: errors in linear light, visible differences (FLIP), and pictures of the difference.
 
 mod flip;
 pub(crate) mod heat;
@@ -12,10 +11,10 @@ use crate::save::Image;
 use core::fmt;
 use halflight_core::estimate::Difference;
 
-/// What [`compare`] finds.
+/// Result of [`compare`].
 #[derive(Clone, Debug)]
 pub struct Comparison {
-    /// MSE, relMSE, means, and the pixels that are not finite.
+    /// MSE, relMSE, means, and the number of pixels that are not finite.
     pub linear: Difference,
     /// Mean of the LDR-FLIP map: 0 is no visible difference, 1 the largest.
     pub flip: f64,
@@ -26,12 +25,12 @@ pub struct Comparison {
     flip_map: Vec<f32>,
 }
 
-/// Pictures of two sizes have no difference.
+/// Two pictures differ in size.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SizeMismatch {
-    /// Width and height of the first.
+    /// Width and height of the picture.
     pub image: [u32; 2],
-    /// Width and height of the second.
+    /// Width and height of the reference.
     pub reference: [u32; 2],
 }
 
@@ -44,7 +43,7 @@ impl fmt::Display for SizeMismatch {
 
 impl core::error::Error for SizeMismatch {}
 
-/// Bytes that [`compare`] takes beside two pictures of the size of `image`: planes of colours, blurred and not, of both.
+/// Bytes that [`compare`] takes for pictures of the size of `image`, without the pictures: filtered planes.
 pub fn working_bytes(image: &Image) -> usize {
     const OF_PIXEL: usize = 84;
     image.pixels.len().saturating_mul(OF_PIXEL)
@@ -53,18 +52,16 @@ pub fn working_bytes(image: &Image) -> usize {
 /// Compares `image` with `reference`.
 ///
 /// # Errors
-/// When their sizes differ.
+/// The sizes differ.
 pub fn compare(image: &Image, reference: &Image) -> Result<Comparison, SizeMismatch> {
     if (image.width, image.height) != (reference.width, reference.height) {
-        return Err(SizeMismatch {
-            image: [image.width, image.height],
-            reference: [reference.width, reference.height],
-        });
+        let size = |image: &Image| [image.width, image.height];
+        return Err(SizeMismatch { image: size(image), reference: size(reference) });
     }
     let flip_map = flip(image, reference);
     Ok(Comparison {
         linear: Difference::between(image.colours(), reference.colours()),
-        flip: flip_map.iter().map(|&error| f64::from(error)).sum::<f64>() / flip_map.len().max(1) as f64,
+        flip: flip::mean(&flip_map),
         width: image.width,
         height: image.height,
         flip_map,

@@ -1,10 +1,10 @@
-//! Pictures of a difference: what is shown, and the false colours in which a PNG shows it.
+//! Pictures of a difference, as values and in false colours.
 
 use super::heat::{heat, signed};
 use super::{Comparison, Image};
 use crate::save::from_srgb;
 
-/// What a picture of the difference between A and its reference B shows.
+/// Content of a picture of the difference between A and its reference B.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Shown {
     /// A − B.
@@ -18,18 +18,17 @@ pub enum Shown {
 }
 
 impl Shown {
-    /// Whether it has values below zero.
+    /// Whether values may be negative.
     pub fn is_signed(self) -> bool {
         matches!(self, Shown::Signed | Shown::Relative)
     }
 }
 
-/// Largest share of pixels that a scale of false colours leaves beyond its end: a few outliers should not make
-/// all others look alike.
+/// Fraction of pixels beyond the end of a scale, at most, so that outliers do not compress the scale.
 const BEYOND: f64 = 0.005;
 
 impl Comparison {
-    /// The values of the difference between the pictures that were compared.
+    /// The values of the difference; `image` and `reference` are the compared pictures.
     pub fn values(&self, image: &Image, reference: &Image, shown: Shown) -> Image {
         let floor = (0.01 * self.linear.reference_mean * self.linear.reference_mean) as f32;
         let value = |a: f32, b: f32| match shown {
@@ -49,28 +48,27 @@ impl Comparison {
     }
 }
 
-/// `values` of a difference in false colours, by the mean of the channels, and the value at the end of the
-/// scale: blue to red from minus that for signed ones, black to yellow from 0 for the others. That of FLIP
-/// is 1.
+/// The mean of the channels of `values` in false colours, and the end e of the scale: −e ... e for signed values, 0
+/// ... e for others, 1 for FLIP.
 pub fn false_colours(values: &Image, shown: Shown) -> (Image, f32) {
     let means: Vec<f32> = values.pixels.iter().map(|pixel| pixel.iter().sum::<f32>() / 3.0).collect();
     let end = if shown == Shown::Flip { 1.0 } else { scale_end(&means) };
     let colour = |&mean: &f32| {
-        let place = if mean == 0.0 { 0.0 } else { mean / end };
-        (if shown.is_signed() { signed(place) } else { heat(place) }).map(from_srgb)
+        let relative = if mean == 0.0 { 0.0 } else { mean / end };
+        (if shown.is_signed() { signed(relative) } else { heat(relative) }).map(from_srgb)
     };
     let pixels = means.iter().map(colour).collect();
     (Image { pixels, ..*values }, end)
 }
 
-/// What all but [`BEYOND`] of the finite `values` are at most, whatever their sign; 0 where there are none.
+/// The magnitude that all but [`BEYOND`] of the finite `values` do not exceed; 0 if there are none.
 fn scale_end(values: &[f32]) -> f32 {
     let mut sizes: Vec<f32> = values.iter().map(|v| v.abs()).filter(|v| v.is_finite()).collect();
     if sizes.is_empty() {
         return 0.0;
     }
-    let place = ((sizes.len() - 1) as f64 * (1.0 - BEYOND)).ceil() as usize;
-    *sizes.select_nth_unstable_by(place, f32::total_cmp).1
+    let index = ((sizes.len() - 1) as f64 * (1.0 - BEYOND)).ceil() as usize;
+    *sizes.select_nth_unstable_by(index, f32::total_cmp).1
 }
 
 #[cfg(test)]
@@ -79,7 +77,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_relative_difference_squares_to_the_relmse() {
+    fn mean_square_of_the_relative_difference_is_relmse() {
         let picture = |values: [f32; 3]| Image { width: 3, height: 1, pixels: values.map(|v| [v; 3]).into() };
         let (a, b) = (picture([1.0, 2.0, 0.0]), picture([2.0, 1.5, 0.0]));
         let comparison = compare(&a, &b).unwrap();
@@ -92,7 +90,7 @@ mod tests {
     }
 
     #[test]
-    fn false_colours_tell_the_sign_and_ignore_outliers() {
+    fn false_colours_have_signs_and_ignore_outliers() {
         let mut values = Image { width: 1000, height: 1, pixels: vec![[0.5; 3]; 1000] };
         values.pixels[0] = [1e9; 3];
         values.pixels[1] = [f32::NAN; 3];

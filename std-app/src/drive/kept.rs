@@ -2,7 +2,7 @@
 //! A write that fails on the way costs nothing but the file: the last whole one stays, the next write tries again.
 
 use super::FileError;
-use crate::save::{Patience, Place};
+use crate::save::{Destination, Patience};
 use core::cell::Cell;
 use std::path::Path;
 
@@ -21,7 +21,8 @@ pub(super) struct Kept<'a> {
 impl<'a> Kept<'a> {
     /// In the file of this name.
     pub(super) fn in_file(path: Option<&'a Path>) -> Self {
-        let is_stream = path.is_some_and(|path| Place::of(path).is_ok_and(|place| place.is_stream()));
+        let is_stream =
+            path.is_some_and(|path| Destination::of(path).is_ok_and(|destination| destination.is_stream()));
         Self { path, is_stream, ..Self::default() }
     }
 

@@ -1,5 +1,5 @@
-//! Lamps that are there twice: files with doubled faces are common, and where a face shines, each copy would add its
-//! light though only one of them is seen.
+//! Duplicate emitters. Files with doubled faces are common; each copy would add its light, although only one is
+//! visible.
 
 use super::geometry::Geometry;
 use super::notes::Notes;
@@ -7,19 +7,14 @@ use glam::DVec3;
 use halflight_core::scene::{Material, Triangle};
 use std::collections::HashMap;
 
-/// Pairs of lamps that may lie over each other; more are not compared.
+/// Pairs of coplanar lamps that are compared.
 const MOST_PAIRS: usize = 10_000_000;
-/// A point is in a triangle up to this error of its barycentric coordinates.
+/// Least barycentric coordinate of a point inside a triangle.
 const INSIDE: f64 = -1e-6;
 
-/// Leaves out emitting triangles that are there already, with the same corners and emission; notes lamps that
-/// overlap in another way.
-pub(super) fn leave_out(
-    geometry: &mut Geometry,
-    materials: &[Material],
-    names: &[String],
-    notes: &mut Notes,
-) {
+/// Removes emitting triangles with the corners and emission of an earlier one; notes lamps that overlap in another
+/// way.
+pub(super) fn remove(geometry: &mut Geometry, materials: &[Material], names: &[String], notes: &mut Notes) {
     let material = |t: &Triangle| &materials[t.material as usize];
     if !materials.iter().any(Material::emits) {
         return;
@@ -38,25 +33,26 @@ pub(super) fn leave_out(
         });
         if is_there {
             let name = &names[triangle.material as usize];
-            notes
-                .add(1, format!("triangle of the lamp `{name}` is there twice, in the same place: left out"));
+            let what =
+                format!("triangle of the lamp `{name}` occurs twice in the same place: the copy is left out");
+            notes.add(1, what);
         } else {
             same.push((front, triangle.material));
         }
         !is_there
     });
-    let shining = geometry.triangles.iter().filter(|t| material(t).emits());
-    let lamps: Vec<Lamp> = shining.filter_map(|t| Lamp::new(t, &geometry.positions)).collect();
+    let emitting = geometry.triangles.iter().filter(|t| material(t).emits());
+    let lamps: Vec<Lamp> = emitting.filter_map(|t| Lamp::new(t, &geometry.positions)).collect();
     for material in overlapping(&lamps) {
         let name = &names[material as usize];
-        let what = format!("triangle of the lamp `{name}` lies in the same place as another: both shine");
+        let what = format!("triangle of the lamp `{name}` lies in the same place as another: both emit");
         notes.add(1, what);
     }
 }
 
-/// The corners in an order of their own, and whether they wind as before.
+/// The corners in ascending order, and whether they keep their winding.
 fn unordered(corners: [[f32; 3]; 3]) -> ([[u32; 3]; 3], bool) {
-    // + 0 makes one zero of two.
+    // Adding 0 turns -0 into 0.
     let mut corners = corners.map(|p| p.map(|x| (x + 0.0).to_bits()));
     let mut front = true;
     for (i, j) in [(0, 1), (1, 2), (0, 1)] {
@@ -82,13 +78,13 @@ impl Lamp {
         Some(Self { corners, normal, material: triangle.material })
     }
 
-    /// Lamps of one plane that shine to the same side have one key, as a rule.
+    /// A key that lamps in one plane with the same front usually have in common.
     fn plane(&self) -> [i64; 4] {
         let distance = self.normal.dot(self.corners[0]);
         [self.normal.x, self.normal.y, self.normal.z, distance].map(|x| (x * 1024.0).round() as i64)
     }
 
-    /// Whether the centre of `other`, in the same plane, is inside.
+    /// Whether the centre of `other`, in the same plane, lies inside.
     fn covers(&self, other: &Lamp) -> bool {
         let [a, b, c] = self.corners;
         let centre = (other.corners[0] + other.corners[1] + other.corners[2]) / 3.0;

@@ -1,25 +1,25 @@
-//! What a load can end with instead of a scene: where the input is wrong, and what to do about it.
+//! The error of a load: file, line, problem and help.
 
 use core::fmt;
 use std::path::{Path, PathBuf};
 
-/// A file that cannot be loaded. Displays as `FILE:LINE: what is wrong` and a line of help.
+/// A file that cannot be loaded. Displays as `FILE:LINE:COLUMN: problem` and a line of help.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct LoadError {
     /// The file.
     pub file: PathBuf,
-    /// Line, counted from 1; 0 where the problem has no line.
+    /// Line, from 1; 0: none.
     pub line: u32,
-    /// Column in characters, counted from 1; 0 where it is not known.
+    /// Column in characters, from 1; 0: unknown.
     pub column: u32,
-    /// What is wrong, one sentence without a full stop.
+    /// One sentence without a full stop.
     pub problem: String,
-    /// What can be done about it; may be empty.
+    /// Advice to the user; may be empty.
     pub help: String,
 }
 
 impl LoadError {
-    /// An error about a whole file.
+    /// An error of a whole file.
     pub fn of_file(file: &Path, problem: impl Into<String>, help: impl Into<String>) -> Self {
         Self::at(file, 0, problem, help)
     }

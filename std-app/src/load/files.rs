@@ -1,32 +1,32 @@
-//! The one lookup of files that statements name. Names come from other machines: with folders of theirs, with
-//! backslashes, in another case or encoding. The exact name comes first, then each tail of the path, the longest
-//! first, then the same without regard to case and encoding, where just one file fits.
+//! Lookup of the files that statements name. Names come from other machines: with their folders, with
+//! backslashes, in another case or encoding. The exact name is tried first, then each tail of the path, the
+//! longest first, then the same without regard to case and encoding if exactly one file matches.
 
 use super::name::{folded, path, shown};
 use std::collections::{BTreeSet, HashMap};
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
-/// Longer names are those of no file.
+/// Longest name that is tried, in bytes.
 const LONGEST_NAME: usize = 4096;
-/// Parts of a path from its end that are tried.
+/// Parts of a path that are tried, from its end.
 const MOST_PARTS: usize = 64;
 
-/// The file that one of several names means.
+/// Result of a lookup. Numbers are those of the names.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum Found {
-    /// Under exactly the name with this number.
+    /// A file of exactly this name.
     Exact(PathBuf, usize),
-    /// Under another name than that with this number.
+    /// A file of a similar name.
     Instead(PathBuf, usize),
-    /// Several files fit equally well.
+    /// Several files match equally well.
     Ambiguous(Vec<PathBuf>),
-    /// No file fits.
+    /// No file matches.
     Missing,
 }
 
 impl Found {
-    /// The file.
+    /// The file, if there is exactly one.
     pub(super) fn file(&self) -> Option<&Path> {
         match self {
             Found::Exact(file, _) | Found::Instead(file, _) => Some(file),
@@ -34,35 +34,35 @@ impl Found {
         }
     }
 
-    /// A note for people unless the file has exactly this name.
+    /// A note, unless the name is exact.
     pub(super) fn note(&self, what: &str, name: &[u8]) -> Option<String> {
         let name = shown(name);
-        match self {
-            Found::Exact(..) => None,
+        Some(match self {
+            Found::Exact(..) => return None,
             Found::Instead(file, _) => {
-                Some(format!("{what} `{name}` is not there under this name, {} is taken", file.display()))
+                format!("{what} `{name}` does not exist: {} is used instead", file.display())
             }
             Found::Ambiguous(files) => {
                 let files: Vec<String> = files.iter().map(|file| file.display().to_string()).collect();
-                Some(format!("{what} `{name}` is missing, and {} fit equally well", files.join(" and ")))
+                format!("{what} `{name}` is missing: {} match equally well", files.join(" and "))
             }
-            Found::Missing => Some(format!("{what} `{name}` is missing")),
-        }
+            Found::Missing => format!("{what} `{name}` is missing"),
+        })
     }
 }
 
-/// Looks for files, and remembers the directories that it had to read.
+/// Locates files and caches the listings of directories.
 #[derive(Debug, Default)]
 pub(super) struct Lookup {
-    /// Entries of a directory by their folded names.
+    /// Entries of a directory by folded name.
     listings: HashMap<PathBuf, HashMap<String, Vec<OsString>>>,
-    /// All that was found, whatever became of it.
+    /// All located files.
     files: BTreeSet<PathBuf>,
 }
 
 impl Lookup {
-    /// The file that one of `names`, the likeliest first, means in one of `directories`, the likeliest first.
-    pub(super) fn find(&mut self, names: &[&[u8]], directories: &[&Path]) -> Found {
+    /// The file of one of `names` in one of `directories`; the likeliest come first in both.
+    pub(super) fn locate(&mut self, names: &[&[u8]], directories: &[&Path]) -> Found {
         let found = self.search(names, directories);
         match &found {
             Found::Ambiguous(files) => self.files.extend(files.iter().cloned()),
@@ -71,31 +71,23 @@ impl Lookup {
         found
     }
 
-    /// All files that were found so far.
+    /// All files located so far.
     pub(super) fn into_files(self) -> BTreeSet<PathBuf> {
         self.files
-    }
-
-    /// Counts what `other` has found as its own.
-    pub(super) fn adopt(&mut self, other: Lookup) {
-        self.files.extend(other.files);
     }
 
     fn search(&mut self, names: &[&[u8]], directories: &[&Path]) -> Found {
         let names = || names.iter().enumerate().filter(|(_, name)| name.len() <= LONGEST_NAME);
         for (number, name) in names() {
-            for directory in directories {
-                if let Some(file) = exact(directory, name) {
-                    return Found::Exact(file, number);
-                }
+            if let Some(file) = directories.iter().find_map(|directory| exact(directory, name)) {
+                return Found::Exact(file, number);
             }
         }
         for (number, name) in names() {
             let parts = parts(name);
-            for tail in (1..parts.len()).map(|first| parts[first..].join(&b'/')) {
-                let file =
-                    directories.iter().map(|directory| directory.join(path(&tail))).find(|f| f.is_file());
-                if let Some(file) = file {
+            for tail in (1..parts.len()).map(|first| path(&parts[first..].join(&b'/'))) {
+                let mut files = directories.iter().map(|directory| directory.join(&tail));
+                if let Some(file) = files.find(|file| file.is_file()) {
                     return Found::Instead(file, number);
                 }
             }
@@ -116,23 +108,22 @@ impl Lookup {
         Found::Missing
     }
 
-    /// All files of `directory` whose path is `parts` without regard to case, in the order of their names.
+    /// All files at `parts` in `directory` without regard to case, in the order of their names.
     fn any_case(&mut self, directory: &Path, parts: &[&[u8]]) -> Vec<PathBuf> {
-        let mut places = vec![directory.to_path_buf()];
+        let mut paths = vec![directory.to_path_buf()];
         for part in parts {
             let mut next = Vec::new();
-            for place in places {
+            for path in paths {
                 if *part == b".." {
-                    next.push(place.join(".."));
-                    continue;
+                    next.push(path.join(".."));
+                } else if let Some(entries) = self.listing(&path).get(&folded(part)) {
+                    next.extend(entries.iter().map(|entry| path.join(entry)));
                 }
-                let entries = self.listing(&place).get(&folded(part)).cloned().unwrap_or_default();
-                next.extend(entries.iter().map(|entry| place.join(entry)));
             }
-            places = next;
+            paths = next;
         }
-        places.retain(|file| file.is_file());
-        places
+        paths.retain(|file| file.is_file());
+        paths
     }
 
     fn listing(&mut self, directory: &Path) -> &HashMap<String, Vec<OsString>> {
@@ -149,13 +140,13 @@ impl Lookup {
     }
 }
 
-/// The file of exactly this name, or of this name with slashes for its backslashes.
+/// The file of exactly this name, or of this name with slashes for backslashes.
 fn exact(directory: &Path, name: &[u8]) -> Option<PathBuf> {
     let slashes: Vec<u8> = name.iter().map(|&byte| if byte == b'\\' { b'/' } else { byte }).collect();
     [name, &slashes].into_iter().map(|name| directory.join(path(name))).find(|file| file.is_file())
 }
 
-/// The parts of a path of any system, without those that say nothing.
+/// The last parts of a path of any system, without empty ones and `.`.
 fn parts(name: &[u8]) -> Vec<&[u8]> {
     let parts = name.split(|byte| matches!(byte, b'/' | b'\\' | b':'));
     let parts: Vec<&[u8]> = parts.filter(|part| !part.is_empty() && *part != b".").collect();
@@ -168,8 +159,8 @@ mod tests {
     use super::*;
     use std::fs;
 
-    /// A directory with these files, in `check`.
-    fn with(test: &str, files: &[&str], check: impl Fn(&Path)) {
+    /// Runs `check` in a directory with these files.
+    fn with_files(test: &str, files: &[&str], check: impl Fn(&Path)) {
         let directory = std::env::temp_dir().join(format!("halflight-files-{}-{test}", std::process::id()));
         for file in files {
             let file = directory.join(file);
@@ -181,49 +172,49 @@ mod tests {
     }
 
     #[test]
-    fn exact_then_tails_then_any_case() {
-        with("order", &["a/tex/x.png", "a/x.png", "b/x.png", "b/Tex/Y.png"], |root| {
+    fn exact_name_then_tails_then_any_case() {
+        with_files("order", &["a/tex/x.png", "a/x.png", "b/x.png", "b/Tex/Y.png"], |root| {
             let (a, b) = (root.join("a"), root.join("b"));
-            let find = |name: &str| Lookup::default().find(&[name.as_bytes()], &[&a, &b]);
-            assert_eq!(find("x.png"), Found::Exact(a.join("x.png"), 0));
-            assert_eq!(find("tex\\x.png"), Found::Exact(a.join("tex/x.png"), 0));
-            assert_eq!(find("Tex/Y.png"), Found::Exact(b.join("Tex/Y.png"), 0));
-            assert_eq!(find("C:\\art\\tex\\x.png"), Found::Instead(a.join("tex/x.png"), 0));
-            assert_eq!(find("Disk:art:x.png"), Found::Instead(a.join("x.png"), 0));
-            assert_eq!(find("//server/art/TEX/X.PNG"), Found::Instead(a.join("tex/x.png"), 0));
-            assert_eq!(find("art/tex/y.PNG"), Found::Instead(b.join("Tex/Y.png"), 0));
-            assert_eq!(find("../a/X.png"), Found::Instead(a.join("../a/x.png"), 0));
-            assert_eq!(find("z.png"), Found::Missing);
-            assert_eq!(find(&"x/".repeat(10_000)), Found::Missing);
+            let locate = |name: &str| Lookup::default().locate(&[name.as_bytes()], &[&a, &b]);
+            assert_eq!(locate("x.png"), Found::Exact(a.join("x.png"), 0));
+            assert_eq!(locate("tex\\x.png"), Found::Exact(a.join("tex/x.png"), 0));
+            assert_eq!(locate("Tex/Y.png"), Found::Exact(b.join("Tex/Y.png"), 0));
+            assert_eq!(locate("C:\\art\\tex\\x.png"), Found::Instead(a.join("tex/x.png"), 0));
+            assert_eq!(locate("Disk:art:x.png"), Found::Instead(a.join("x.png"), 0));
+            assert_eq!(locate("//server/art/TEX/X.PNG"), Found::Instead(a.join("tex/x.png"), 0));
+            assert_eq!(locate("art/tex/y.PNG"), Found::Instead(b.join("Tex/Y.png"), 0));
+            assert_eq!(locate("../a/X.png"), Found::Instead(a.join("../a/x.png"), 0));
+            assert_eq!(locate("z.png"), Found::Missing);
+            assert_eq!(locate(&"x/".repeat(10_000)), Found::Missing);
         });
     }
 
     #[test]
-    fn what_fits_twice_is_not_guessed() {
-        with("twice", &["wood.png", "Wood.png", "t/stone.png", "T/Stone.png", "T/only.png"], |root| {
-            let find = |name: &str| Lookup::default().find(&[name.as_bytes()], &[root]);
-            assert_eq!(find("wood.png"), Found::Exact(root.join("wood.png"), 0));
+    fn ambiguous_names_are_not_guessed() {
+        with_files("twice", &["wood.png", "Wood.png", "t/stone.png", "T/Stone.png", "T/only.png"], |root| {
+            let locate = |name: &str| Lookup::default().locate(&[name.as_bytes()], &[root]);
+            assert_eq!(locate("wood.png"), Found::Exact(root.join("wood.png"), 0));
             let both = [root.join("Wood.png"), root.join("wood.png")].to_vec();
-            assert_eq!(find("WOOD.png"), Found::Ambiguous(both));
-            assert!(matches!(find("T/STONE.png"), Found::Ambiguous(files) if files.len() == 2));
-            assert_eq!(find("t/Only.png"), Found::Instead(root.join("T/only.png"), 0));
+            assert_eq!(locate("WOOD.png"), Found::Ambiguous(both));
+            assert!(matches!(locate("T/STONE.png"), Found::Ambiguous(files) if files.len() == 2));
+            assert_eq!(locate("t/Only.png"), Found::Instead(root.join("T/only.png"), 0));
         });
     }
 
     #[test]
-    fn names_in_latin_1_find_files_in_utf_8() {
-        with("latin", &["grün.png"], |root| {
-            let found = Lookup::default().find(&[b"gr\xfcn.png"], &[root]);
+    fn latin_1_names_match_utf_8_files() {
+        with_files("latin", &["grün.png"], |root| {
+            let found = Lookup::default().locate(&[b"gr\xfcn.png"], &[root]);
             assert_eq!(found, Found::Instead(root.join("grün.png"), 0));
         });
     }
 
     #[test]
-    fn the_likelier_name_wins_where_both_are_there() {
-        with("likelier", &["a b", "a"], |root| {
+    fn likelier_name_wins() {
+        with_files("likelier", &["a b", "a"], |root| {
             let mut lookup = Lookup::default();
-            assert_eq!(lookup.find(&[b"a b", b"a"], &[root]), Found::Exact(root.join("a b"), 0));
-            assert_eq!(lookup.find(&[b"c", b"a"], &[root]), Found::Exact(root.join("a"), 1));
+            assert_eq!(lookup.locate(&[b"a b", b"a"], &[root]), Found::Exact(root.join("a b"), 0));
+            assert_eq!(lookup.locate(&[b"c", b"a"], &[root]), Found::Exact(root.join("a"), 1));
         });
     }
 }

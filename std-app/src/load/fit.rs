@@ -1,27 +1,27 @@
-//! Where a scene is fine: the part whose precision counts. The core computes in f32, whose numbers are densest at the origin.
-//! As a rule the origin is the centre of the bounding box; where few large triangles, a ground or a sun, reach very much
-//! further than all that is small, it is the centre of the latter, and large triangles are cut ([`super::split`]).
+//! Choice of origin and scale. The core computes in f32, which is densest at the origin, so the origin is usually
+//! the centre of the bounding box. If a few large triangles (a ground, a sun) extend much further than the detail,
+//! the detail determines origin and scale, and large triangles are cut ([`super::split`]).
 
 use super::geometry::{Placed, bounds};
 use super::transform::SceneTransform;
 use glam::DVec3;
 
-/// A bounding box that is longer than this many times what is small: f32 would round the latter to a thousandth.
+/// Extent of the scene over that of the detail above which the detail decides: f32 would round it to a thousandth.
 const FAR: f64 = 8192.0;
 
-/// The farthest in units of what is small: squares of areas stay numbers.
+/// Largest extent over the detail: squares of areas stay finite.
 const FARTHEST: f64 = (1u64 << 30) as f64;
 
-/// Triangles that are looked at, about.
-const LOOKS: usize = 1 << 16;
+/// Triangles that are examined, approximately.
+const SAMPLES: usize = 1 << 16;
 
-/// What is small lies between these quantiles of the triangles, weighted by one over their size.
+/// The detail lies between these quantiles of the triangles, weighted by one over their size.
 const QUANTILES: [f64; 2] = [0.05, 0.95];
 
-/// The centre of a triangle, and its weight: one over its size.
-type Look = (DVec3, f64);
+/// Centre of a triangle, and its weight: one over its size.
+type Sample = (DVec3, f64);
 
-/// How the scene comes to the coordinates of the core, and whether it is cut there.
+/// Transform to the coordinates of the core; whether large triangles are cut there.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Fit {
     pub(super) transform: SceneTransform,
@@ -31,11 +31,11 @@ pub(super) struct Fit {
 impl Fit {
     pub(super) fn of(parts: &[Placed]) -> Self {
         let (min, max) = bounds(parts);
-        let longest = (0..3).map(|i| max[i] - min[i]).fold(0.0, f64::max);
-        let plain = Self { transform: SceneTransform::fitting(min, max), is_far: false };
+        let longest = (max - min).max_element().max(0.0);
+        let plain = Self { transform: SceneTransform::fitting(min.into(), max.into()), is_far: false };
         let triangles: usize = parts.iter().map(|part| part.group.triangles.len()).sum();
-        let step = triangles.div_ceil(LOOKS).max(1);
-        let looks = parts.iter().flat_map(|part| {
+        let step = triangles.div_ceil(SAMPLES).max(1);
+        let samples = parts.iter().flat_map(|part| {
             let corner = |v: u32| DVec3::from(part.placement.point(part.group.positions[v as usize]));
             let corners = part.group.triangles.iter().step_by(step).map(move |t| t.map(corner));
             corners.filter_map(|[p, q, r]| {
@@ -44,34 +44,34 @@ impl Fit {
                 (size > 0.0 && size.is_finite()).then_some((0.5 * low + 0.5 * high, 1.0 / size))
             })
         });
-        let looks: Vec<Look> = looks.collect();
-        let smallest = looks.iter().fold(0.0, |most, (_, weight)| f64::max(most, *weight)).recip();
+        let samples: Vec<Sample> = samples.collect();
+        let smallest = samples.iter().fold(0.0, |most, (_, weight)| f64::max(most, *weight)).recip();
         if !(longest > FAR * smallest && smallest > 0.0) {
             return plain;
         }
-        let sum: f64 = looks.iter().map(|(_, weight)| weight).sum();
-        let quantile = |value: &dyn Fn(&Look) -> f64, share| quantile(&looks, value, share * sum);
+        let sum: f64 = samples.iter().map(|(_, weight)| weight).sum();
+        let quantile = |value: &dyn Fn(&Sample) -> f64, part| quantile(&samples, value, part * sum);
         let [low, high] =
-            QUANTILES.map(|share| DVec3::from([0, 1, 2].map(|i| quantile(&|(center, _)| center[i], share))));
+            QUANTILES.map(|part| DVec3::from([0, 1, 2].map(|i| quantile(&|(center, _)| center[i], part))));
         let size = quantile(&|(_, weight)| 1.0 / weight, 0.5);
-        let small = (high - low).max_element().max(size).max(longest / FARTHEST);
-        if longest <= FAR * small {
+        let detail = (high - low).max_element().max(size).max(longest / FARTHEST);
+        if longest <= FAR * detail {
             return plain;
         }
         let center = 0.5 * low + 0.5 * high;
-        let corners = [-0.5, 0.5].map(|half| (center + half * small).to_array());
-        Self { transform: SceneTransform::fitting(corners[0], corners[1]), is_far: true }
+        let [low, high] = [-0.5, 0.5].map(|half| (center + half * detail).to_array());
+        Self { transform: SceneTransform::fitting(low, high), is_far: true }
     }
 }
 
-/// The value up to which the weights of all triangles sum up to `share`.
-fn quantile(looks: &[Look], value: impl Fn(&Look) -> f64, share: f64) -> f64 {
-    let mut values: Vec<(f64, f64)> = looks.iter().map(|look| (value(look), look.1)).collect();
+/// The value at which the sum of the weights of smaller values reaches `weight`.
+fn quantile(samples: &[Sample], value: impl Fn(&Sample) -> f64, weight: f64) -> f64 {
+    let mut values: Vec<(f64, f64)> = samples.iter().map(|sample| (value(sample), sample.1)).collect();
     values.sort_by(|a, b| a.0.total_cmp(&b.0));
     let mut sum = 0.0;
-    let reached = values.iter().find(|(_, weight)| {
-        sum += weight;
-        sum >= share
+    let at = values.iter().find(|(_, own)| {
+        sum += own;
+        sum >= weight
     });
-    reached.or(values.last()).map_or(0.0, |(value, _)| *value)
+    at.or(values.last()).map_or(0.0, |(value, _)| *value)
 }

@@ -1,5 +1,5 @@
-//! All triangles of a scene in one mesh, in the coordinates of the core: placed, centred, scaled, checked.
-//! Everything is f64 until the last step.
+//! Assembly of all triangles into one mesh in the coordinates of the core: placed, centred, scaled and checked.
+//! Computed in f64 and rounded last.
 
 use super::fit::Fit;
 use super::notes::Notes;
@@ -10,20 +10,18 @@ use glam::{DMat3, DVec2, DVec3};
 use halflight_core::scene::Triangle;
 use rayon::prelude::*;
 
-/// Coordinates beyond this count as not finite: their squares would be.
+/// Larger coordinates count as not finite, because their squares are infinite.
 const LARGEST: f64 = 1e150;
 
-/// Where a mesh stands: `linear * p + offset`.
+/// Position and orientation of a mesh: `linear * p + offset`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Placement {
-    /// Rotation, scale and whatever else is linear.
     pub(super) linear: DMat3,
-    /// Translation.
     pub(super) offset: DVec3,
 }
 
 impl Placement {
-    /// Where the file puts it.
+    /// The coordinates of the file.
     pub(super) const IDENTITY: Self = Self { linear: DMat3::IDENTITY, offset: DVec3::ZERO };
 
     pub(super) fn point(&self, p: [f64; 3]) -> [f64; 3] {
@@ -33,15 +31,14 @@ impl Placement {
         (self.linear * DVec3::from(p) + self.offset).into()
     }
 
-    /// The matrix that keeps normals normal to their surface and on its side: the inverse transposed, up to a
-    /// positive factor.
+    /// Transform of normals that keeps their side: the inverse transpose, up to a positive factor.
     fn normal_matrix(&self) -> DMat3 {
         let [x, y, z] = [self.linear.x_axis, self.linear.y_axis, self.linear.z_axis];
         DMat3::from_cols(y.cross(z), z.cross(x), x.cross(y)) * self.linear.determinant().signum()
     }
 }
 
-/// Triangles of one material, in one place.
+/// Triangles of one material with their placement.
 pub(super) struct Placed<'a> {
     pub(super) group: &'a Group,
     pub(super) placement: Placement,
@@ -59,22 +56,17 @@ pub(super) struct Geometry {
     pub(super) triangles: Vec<Triangle>,
 }
 
-/// The bounding box of all finite vertices.
-pub(super) fn bounds(parts: &[Placed]) -> ([f64; 3], [f64; 3]) {
-    const EMPTY: ([f64; 3], [f64; 3]) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
-    let grow = |(min, max): ([f64; 3], [f64; 3]), (low, high): ([f64; 3], [f64; 3])| {
-        let least = core::array::from_fn(|i| f64::min(min[i], low[i]));
-        (least, core::array::from_fn(|i| f64::max(max[i], high[i])))
-    };
+/// Bounding box of all finite vertices; infinite and inverted if there are none.
+pub(super) fn bounds(parts: &[Placed]) -> (DVec3, DVec3) {
+    const EMPTY: (DVec3, DVec3) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
     let of_part = |part: &Placed| {
-        let placed = part.group.positions.iter().map(|&p| part.placement.point(p));
-        placed.filter(is_usable).fold(EMPTY, |bounds, p| grow(bounds, (p, p)))
+        let placed = part.group.positions.iter().map(|&p| part.placement.point(p)).filter(is_usable);
+        placed.map(DVec3::from).fold(EMPTY, |(min, max), p| (min.min(p), max.max(p)))
     };
-    parts.par_iter().map(of_part).reduce(|| EMPTY, grow)
+    parts.par_iter().map(of_part).reduce(|| EMPTY, |a, b| (a.0.min(b.0), a.1.max(b.1)))
 }
 
-/// Puts everything into one mesh. The order of triangles is that of `parts`.
-/// `pieces` is what [`pieces`] counts.
+/// Assembles all parts, in their order. `pieces` is the result of [`pieces`].
 pub(super) fn assemble(parts: &[Placed], fit: &Fit, pieces: f64, notes: &mut Notes) -> Geometry {
     let with_normals = parts.iter().any(|part| !part.group.normals.is_empty());
     let with_texcoords = parts.iter().any(|part| !part.group.texcoords.is_empty());
@@ -82,15 +74,14 @@ pub(super) fn assemble(parts: &[Placed], fit: &Fit, pieces: f64, notes: &mut Not
     if pieces > 0.0 && !cut {
         notes.add(1, "very many triangles are very large: none is cut, and their shading is coarse");
     }
-    let build = |part| build(part, fit, cut, with_normals, with_texcoords);
-    let built: Vec<(Geometry, Repairs)> = parts.par_iter().map(build).collect();
+    let build = |part| Builder::new(part, fit, with_normals, with_texcoords).build(cut);
+    let built: Vec<(Geometry, Notes)> = parts.par_iter().map(build).collect();
     let mut all = Geometry::default();
     let vertices = built.iter().map(|(part, _)| part.positions.len()).sum();
     all.positions.reserve_exact(vertices);
     all.normals.reserve_exact(if with_normals { vertices } else { 0 });
     all.texcoords.reserve_exact(if with_texcoords { vertices } else { 0 });
     all.triangles.reserve_exact(built.iter().map(|(part, _)| part.triangles.len()).sum());
-    let mut repairs = Repairs::default();
     for (part, of_part) in built {
         let first = all.positions.len() as u32;
         all.positions.extend(part.positions);
@@ -98,58 +89,25 @@ pub(super) fn assemble(parts: &[Placed], fit: &Fit, pieces: f64, notes: &mut Not
         all.texcoords.extend(part.texcoords);
         let moved = |t: Triangle| Triangle { vertices: t.vertices.map(|v| v + first), ..t };
         all.triangles.extend(part.triangles.into_iter().map(moved));
-        repairs.add(of_part);
+        notes.merge(of_part);
     }
-    notes.add(repairs.not_finite, "triangle with a vertex that is not finite left out");
-    notes.add(repairs.without_area, "triangle without area left out");
-    notes.add(repairs.broken_normals, "normal that is not finite is shaded flat");
-    notes.add(repairs.broken_texcoords, "texture coordinate that is not finite is 0 0 now");
-    notes.add(repairs.blurred_textures, texcoords::BLURRED);
-    notes.add(
-        repairs.too_far,
-        "triangle that is smaller than 1e-5 of its distance from the detail of the scene: rounding bends it",
-    );
-    notes.add(repairs.against_winding, "triangle whose normals point against its winding (kept as it is)");
     all
-}
-
-#[derive(Clone, Copy, Debug, Default)]
-struct Repairs {
-    not_finite: u64,
-    without_area: u64,
-    broken_normals: u64,
-    broken_texcoords: u64,
-    blurred_textures: u64,
-    against_winding: u64,
-    too_far: u64,
-}
-
-impl Repairs {
-    fn add(&mut self, other: Repairs) {
-        self.not_finite += other.not_finite;
-        self.without_area += other.without_area;
-        self.broken_normals += other.broken_normals;
-        self.broken_texcoords += other.broken_texcoords;
-        self.blurred_textures += other.blurred_textures;
-        self.against_winding += other.against_winding;
-        self.too_far += other.too_far;
-    }
 }
 
 fn is_usable(p: &[f64; 3]) -> bool {
     p.iter().all(|x| x.abs() <= LARGEST)
 }
 
-/// The corners of the triangles of a part, in the coordinates of the core; not numbers where they are of no use.
+/// Vertices of a part in the coordinates of the core; NaN if they are not finite.
 fn exact(part: &Placed, fit: &Fit) -> Vec<DVec3> {
-    let place = |&p: &[f64; 3]| {
+    let exact = |&p: &[f64; 3]| {
         let placed = part.placement.point(p);
         DVec3::from(if is_usable(&placed) { fit.transform.point_f64(placed) } else { [f64::NAN; 3] })
     };
-    part.group.positions.iter().map(place).collect()
+    part.group.positions.iter().map(exact).collect()
 }
 
-/// How many pieces, at most, those triangles become that are to be cut.
+/// Upper bound of the number of pieces of all triangles that are to be cut.
 pub(super) fn pieces(parts: &[Placed], fit: &Fit) -> f64 {
     let of_part = |part: &Placed| {
         let exact = exact(part, fit);
@@ -159,111 +117,143 @@ pub(super) fn pieces(parts: &[Placed], fit: &Fit) -> f64 {
     if fit.is_far { parts.iter().map(of_part).sum() } else { 0.0 }
 }
 
-/// A triangle smaller than this share of its coordinates is bent by rounding.
-const BENT: f64 = 1e-5;
+/// A triangle smaller than this, relative to its coordinates, is deformed by rounding.
+const DEFORMED: f64 = 1e-5;
 
-fn build(
-    part: &Placed,
-    fit: &Fit,
-    cut: bool,
-    with_normals: bool,
-    with_texcoords: bool,
-) -> (Geometry, Repairs) {
-    let group = part.group;
-    let mut repairs = Repairs::default();
-    let exact = exact(part, fit);
-    let rounded = |p: &DVec3| if p.is_nan() { [0.0; 3] } else { p.as_vec3().to_array() };
-    let mut positions: Vec<[f32; 3]> = exact.iter().map(rounded).collect();
-    let vertices = positions.len();
-
-    let normal_matrix = part.placement.normal_matrix();
-    let mut normal = |n: &[f64; 3]| unit_normal(normal_matrix * DVec3::from(*n), &mut repairs);
-    let mut normals: Vec<[f32; 3]> = match (with_normals, group.normals.is_empty()) {
-        (false, _) => Vec::new(),
-        (true, true) => vec![[0.0; 3]; vertices],
-        (true, false) => group.normals.iter().map(&mut normal).collect(),
-    };
-
-    let mut placed = part.texcoords.placed(&group.texcoords, &mut repairs.broken_texcoords);
-    let mut texcoords: Vec<[f32; 2]> = match (with_texcoords, group.texcoords.is_empty()) {
-        (false, _) => Vec::new(),
-        (true, true) => vec![[0.0; 2]; vertices],
-        (true, false) => placed.iter().map(|uv| uv.map(|x| x as f32)).collect(),
-    };
-
-    let mirrored = part.placement.linear.determinant() < 0.0;
-    let mut triangles = Vec::with_capacity(group.triangles.len());
-    for &[a, b, c] in &group.triangles {
-        // A reflection turns the winding around; turned back, the front stays the front.
-        let corners = if mirrored { [a, c, b] } else { [a, b, c] };
-        let [p, q, r] = corners.map(|v| exact[v as usize]);
-        let area = (q - p).cross(r - p);
-        if !area.is_finite() {
-            repairs.not_finite += 1;
-        } else if area == DVec3::ZERO {
-            repairs.without_area += 1;
-        } else {
-            let against = |v: u32| {
-                normals.get(v as usize).is_some_and(|&n| area.dot(DVec3::from(n.map(f64::from))) < 0.0)
-            };
-            repairs.against_winding += u64::from(corners.iter().all(|&v| against(v)));
-            if fit.is_far {
-                let (low, high) = (p.min(q).min(r), p.max(q).max(r));
-                let farthest = low.abs().max(high.abs()).max_element();
-                repairs.too_far += u64::from((high - low).max_element() < BENT * farthest);
-            }
-            let material = part.material;
-            if !(cut && split::count([p, q, r]) > 1.0) {
-                triangles.push(Triangle { vertices: corners, material });
-                continue;
-            }
-            for piece in split::pieces([p, q, r]) {
-                let first = positions.len() as u32;
-                for corner in &piece {
-                    positions.push(rounded(&corner.position));
-                    if with_normals {
-                        normals.push(normal_between(corners.map(|v| normals[v as usize]), corner.weights));
-                    }
-                    if with_texcoords {
-                        let ends = corners.map(|v| placed.get(v as usize).copied().unwrap_or_default());
-                        let between: DVec2 = (0..3).map(|i| corner.weights[i] * DVec2::from(ends[i])).sum();
-                        texcoords.push(between.as_vec2().to_array());
-                        if !placed.is_empty() {
-                            placed.push(between.into());
-                        }
-                    }
-                }
-                let fan = (1..piece.len() as u32 - 1).map(|i| [first, first + i, first + i + 1]);
-                triangles.extend(fan.map(|vertices| Triangle { vertices, material }));
-            }
-        }
-    }
-    let mut geometry = Geometry { positions, normals, texcoords, triangles };
-    repairs.blurred_textures = texcoords::take_whole_numbers_off(&part.texcoords, &placed, &mut geometry);
-    (geometry, repairs)
+/// A part under construction.
+struct Builder<'a> {
+    part: &'a Placed<'a>,
+    is_far: bool,
+    exact: Vec<DVec3>,
+    /// Texture coordinates before rounding; empty if the part has none.
+    placed_texcoords: Vec<[f64; 2]>,
+    geometry: Geometry,
+    notes: Notes,
 }
 
-/// The unit normal between three, or zero where one of them is.
-fn normal_between(normals: [[f32; 3]; 3], weights: DVec3) -> [f32; 3] {
+impl<'a> Builder<'a> {
+    fn new(part: &'a Placed, fit: &Fit, with_normals: bool, with_texcoords: bool) -> Self {
+        let group = part.group;
+        let mut notes = Notes::default();
+        let exact = exact(part, fit);
+        let mut geometry = Geometry { positions: exact.iter().map(rounded).collect(), ..Geometry::default() };
+        if with_normals {
+            let matrix = part.placement.normal_matrix();
+            let normal = |n: &[f64; 3]| unit_normal(matrix * DVec3::from(*n), &mut notes);
+            geometry.normals = group.normals.iter().map(normal).collect();
+            geometry.normals.resize(exact.len(), [0.0; 3]);
+        }
+        let placed_texcoords = part.texcoords.placed(&group.texcoords, &mut notes);
+        if with_texcoords {
+            geometry.texcoords = placed_texcoords.iter().map(|uv| uv.map(|x| x as f32)).collect();
+            geometry.texcoords.resize(exact.len(), [0.0; 2]);
+        }
+        Self { part, is_far: fit.is_far, exact, placed_texcoords, geometry, notes }
+    }
+
+    /// All usable triangles; large ones are cut if `cut`.
+    fn build(mut self, cut: bool) -> (Geometry, Notes) {
+        let Placed { group, placement, material, texcoords } = self.part;
+        let is_mirrored = placement.linear.determinant() < 0.0;
+        self.geometry.triangles.reserve_exact(group.triangles.len());
+        for &[a, b, c] in &group.triangles {
+            // A reflection reverses the winding; reversed again, the front stays the front.
+            let vertices = if is_mirrored { [a, c, b] } else { [a, b, c] };
+            let corners = vertices.map(|v| self.exact[v as usize]);
+            if !self.is_usable(vertices, corners) {
+                continue;
+            }
+            if cut && split::count(corners) > 1.0 {
+                self.push_pieces(vertices, corners);
+            } else {
+                self.geometry.triangles.push(Triangle { vertices, material: *material });
+            }
+        }
+        let blurred = texcoords::subtract_periods(texcoords, &self.placed_texcoords, &mut self.geometry);
+        self.notes.add(blurred, texcoords::BLURRED);
+        (self.geometry, self.notes)
+    }
+
+    /// Whether a triangle is finite and has an area; notes doubtful ones.
+    fn is_usable(&mut self, vertices: [u32; 3], corners: [DVec3; 3]) -> bool {
+        let [p, q, r] = corners;
+        let area = (q - p).cross(r - p);
+        if !area.is_finite() {
+            self.notes.add(1, "triangle with a vertex that is not finite left out");
+            return false;
+        }
+        if area == DVec3::ZERO {
+            self.notes.add(1, "triangle without area left out");
+            return false;
+        }
+        let normals = &self.geometry.normals;
+        let is_against = |&v: &u32| {
+            normals.get(v as usize).is_some_and(|&n| area.dot(DVec3::from(n.map(f64::from))) < 0.0)
+        };
+        if vertices.iter().all(is_against) {
+            self.notes.add(1, "triangle whose normals point against its winding (kept as it is)");
+        }
+        let (low, high) = (p.min(q).min(r), p.max(q).max(r));
+        let farthest = low.abs().max(high.abs()).max_element();
+        if self.is_far && (high - low).max_element() < DEFORMED * farthest {
+            let what = "triangle smaller than 1e-5 of its distance from the detail of the scene: rounding deforms it";
+            self.notes.add(1, what);
+        }
+        true
+    }
+
+    /// Adds the pieces of a large triangle, with vertices of their own.
+    fn push_pieces(&mut self, vertices: [u32; 3], corners: [DVec3; 3]) {
+        let Self { part, placed_texcoords, geometry, .. } = self;
+        for piece in split::pieces(corners) {
+            let first = geometry.positions.len() as u32;
+            for corner in &piece {
+                geometry.positions.push(rounded(&corner.position));
+                if !geometry.normals.is_empty() {
+                    let ends = vertices.map(|v| geometry.normals[v as usize]);
+                    geometry.normals.push(interpolated_normal(ends, corner.weights));
+                }
+                if !geometry.texcoords.is_empty() {
+                    let ends =
+                        vertices.map(|v| placed_texcoords.get(v as usize).copied().unwrap_or_default());
+                    let uv: DVec2 = (0..3).map(|i| corner.weights[i] * DVec2::from(ends[i])).sum();
+                    geometry.texcoords.push(uv.as_vec2().to_array());
+                    if !placed_texcoords.is_empty() {
+                        placed_texcoords.push(uv.into());
+                    }
+                }
+            }
+            let fan = (1..piece.len() as u32 - 1).map(|i| [first, first + i, first + i + 1]);
+            geometry.triangles.extend(fan.map(|vertices| Triangle { vertices, material: part.material }));
+        }
+    }
+}
+
+/// The position in f32; the origin for NaN.
+fn rounded(p: &DVec3) -> [f32; 3] {
+    if p.is_nan() { [0.0; 3] } else { p.as_vec3().to_array() }
+}
+
+/// The interpolated unit normal, or zero if one of the three is zero.
+fn interpolated_normal(normals: [[f32; 3]; 3], weights: DVec3) -> [f32; 3] {
     let ends = normals.map(|n| DVec3::from(n.map(f64::from)));
     if ends.contains(&DVec3::ZERO) {
         return [0.0; 3];
     }
-    let between: DVec3 = (0..3).map(|i| weights[i] * ends[i]).sum();
-    between.normalize_or_zero().as_vec3().into()
+    let sum: DVec3 = (0..3).map(|i| weights[i] * ends[i]).sum();
+    sum.normalize_or_zero().as_vec3().into()
 }
 
-/// The unit normal, or zero (flat) where there is none.
-fn unit_normal(n: DVec3, repairs: &mut Repairs) -> [f32; 3] {
-    let largest = n.abs().max_element();
+/// The unit normal, or zero (flat) if there is none.
+fn unit_normal(n: DVec3, notes: &mut Notes) -> [f32; 3] {
     if !n.is_finite() {
-        repairs.broken_normals += 1;
+        notes.add(1, "normal that is not finite is shaded flat");
         return [0.0; 3];
     }
-    if largest == 0.0 {
-        return [0.0; 3];
+    match n.abs().max_element() {
+        0.0 => [0.0; 3],
+        largest => (n / largest).normalize().as_vec3().into(),
     }
-    (n / largest).normalize().as_vec3().into()
 }
 
 #[cfg(test)]
@@ -286,7 +276,7 @@ mod tests {
     }
 
     #[test]
-    fn broken_triangles_are_left_out_and_said() {
+    fn broken_triangles_are_noted() {
         let (geometry, notes) =
             all(&triangle([[0., 0., 0.], [1., 1., 1.], [3., 3., 3.]]), Placement::IDENTITY);
         assert!(geometry.triangles.is_empty());
@@ -301,7 +291,7 @@ mod tests {
     }
 
     #[test]
-    fn a_reflection_keeps_the_front() {
+    fn reflection_keeps_the_front() {
         let mut group = triangle([[0., 0., 0.], [1., 0., 0.], [0., 1., 0.]]);
         group.normals = vec![[0.0, 0.0, 2.0]; 3];
         let mirror =

@@ -1,25 +1,24 @@
-//! What `illum` says of a material, where nothing more precise does: `Pr`, `Pm` and their maps win, and so do `Ni`,
-//! `Tf`, `d` and `Kd` where no exporter can have meant glass. `docs/loading.md` has the table.
+//! Meaning of `illum`, which applies only if no statement is more precise: `Pr`, `Pm` and their maps override it,
+//! and so do `Ni`, `Tf`, `d` and `Kd` if they exclude glass. `docs/loading.md` has the table.
 
-use super::mtl::MtlMaterial;
+use super::mtl::{MapKind, MtlMaterial};
 use super::notes::Notes;
 
-/// A base whose brightest channel reflects less is black beside a mirror or a glass: some exporters do not write 0.
+/// Reflectance up to which the base of a mirror or glass is black: some exporters do not write 0.
 pub(super) const DARK_BASE: f64 = 0.02;
-/// How far `Ni` may be from 1 and still bend no ray.
+/// Difference of `Ni` and 1 up to which no ray is refracted.
 const INDEX_TOLERANCE: f64 = 1e-3;
 
-/// Whether `illum` makes a boundary between two media of the material, and nothing speaks against it: a metal is no
-/// glass; `Ni 1` bends no ray, and exporters write it for what is opaque; glass without ray tracing (`illum 9`) that
-/// has a `d` is what shows through by opacity; and without `Ni` and `Tf`, `illum 4` and `9` say less than a `Kd`.
+/// Whether the material is a dielectric by its `illum`. Exceptions: metals; `Ni 1`, which exporters write for
+/// opaque materials; `illum 9` with a `d`, which means opacity; `illum 4` and `9` with a `Kd` but no `Ni` and `Tf`.
 pub(super) fn is_glass(mtl: &MtlMaterial) -> bool {
     let Some(model @ (4 | 6 | 7 | 9)) = mtl.illumination else { return false };
     if mtl.surely_glass {
         return true;
     }
     let has_base = has_base(mtl);
-    let is_metal = mtl.metallic.is_some_and(|pm| pm > 0.0) || mtl.metallic_map.is_some();
-    let is_cut_out = mtl.opacity.is_some_and(|d| d < 1.0) || mtl.opacity_map.is_some();
+    let is_metal = mtl.metallic.is_some_and(|pm| pm > 0.0) || mtl.has_map(MapKind::Metallic);
+    let is_cut_out = mtl.opacity.is_some_and(|d| d < 1.0) || mtl.has_map(MapKind::Opacity);
     let filters = mtl.tint.is_some_and(|tint| tint != [1.0; 3]);
     match index(mtl) {
         _ if is_metal => false,
@@ -29,30 +28,30 @@ pub(super) fn is_glass(mtl: &MtlMaterial) -> bool {
     }
 }
 
-/// Whether there is a diffuse base that can be seen.
+/// Whether the diffuse base is visible.
 fn has_base(mtl: &MtlMaterial) -> bool {
-    mtl.diffuse_map.is_some() || mtl.diffuse.is_some_and(|kd| kd.iter().any(|&x| x > DARK_BASE))
+    mtl.has_map(MapKind::Diffuse) || mtl.diffuse.is_some_and(|kd| kd.iter().any(|&x| x > DARK_BASE))
 }
 
-/// `Ni`, where it can be one: within the limits of the MTL specification, with room.
+/// `Ni`, if it is within the limits of the MTL specification, generously.
 pub(super) fn index(mtl: &MtlMaterial) -> Option<f64> {
     mtl.ior.filter(|ior| (0.001..=100.0).contains(ior))
 }
 
-/// Whether `Pr`, `Pm` or a map of them says what the surface is.
+/// Whether `Pr`, `Pm` or one of their maps specifies the surface.
 pub(super) fn is_pbr(mtl: &MtlMaterial) -> bool {
     mtl.roughness.is_some()
-        || mtl.roughness_map.is_some()
+        || mtl.has_map(MapKind::Roughness)
         || mtl.metallic.is_some_and(|pm| pm > 0.0)
-        || mtl.metallic_map.is_some()
+        || mtl.has_map(MapKind::Metallic)
 }
 
-/// Says what a material loses by its `illum`, or its `illum` by what is more precise.
-pub(super) fn note_what_is_lost(mtl: &MtlMaterial, notes: &mut Notes) {
+/// Notes statements that `illum` makes ineffective, and an ineffective `illum`.
+pub(super) fn note_ignored_statements(mtl: &MtlMaterial, notes: &mut Notes) {
     let Some(model) = mtl.illumination else { return };
     let name = &mtl.name;
     let mut note = |what: String| notes.add(1, what);
-    let shines = mtl.specular.is_some_and(|ks| ks != [0.0; 3]) || mtl.specular_map.is_some();
+    let shines = mtl.specular.is_some_and(|ks| ks != [0.0; 3]) || mtl.has_map(MapKind::Specular);
     match model {
         0 | 1 if shines && !is_pbr(mtl) => {
             note(format!("`Ks` of material `{name}` left out: `illum {model}` has no highlight"));
@@ -66,7 +65,7 @@ pub(super) fn note_what_is_lost(mtl: &MtlMaterial, notes: &mut Notes) {
             note(format!("material `{name}` is no glass in spite of `illum {model}`{lost}: docs/loading.md"));
         }
         3 | 5 if mtl.metallic.is_some_and(|pm| pm > 0.0) && has_base(mtl) => {
-            note(format!("`illum {model}` of material `{name}` left out: `Pm` says what it is"));
+            note(format!("`illum {model}` of material `{name}` left out: `Pm` specifies the surface"));
         }
         _ => {}
     }

@@ -1,23 +1,22 @@
-//! The material libraries of an OBJ file: which files they are, and which of their materials a `usemtl` means.
-//! Libraries are searched in the order in which they are named, and materials in that of the file: the first counts.
+//! Material libraries of an OBJ file: lookup of their files, and of the material of a `usemtl`. Libraries are
+//! searched in the order of their statements, materials in that of the file; the first match counts.
 
 use super::files::{Found, Lookup};
 use super::mtl::{self, MtlMaterial};
 use super::name::{Kind, Name, folded, readings};
 use super::notes::Notes;
-use super::surface;
-use super::text::{is_blank, trimmed};
+use super::text::{trimmed, word_starts};
 use super::{read, weight};
 use crate::memory::Budget;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
-/// More words of one `mtllib` are not tried.
+/// Words of an `mtllib` statement that are tried.
 const MOST_WORDS: usize = 256;
-/// Unless it is all of the statement, a name of a library has at most this many words.
+/// Words of a library name, unless it is the whole statement.
 const LONGEST_NAME: usize = 8;
 
-/// The materials of all libraries.
+/// Materials of all libraries.
 #[derive(Debug, Default)]
 pub(super) struct Library {
     materials: Vec<MtlMaterial>,
@@ -26,173 +25,154 @@ pub(super) struct Library {
     files: Vec<PathBuf>,
 }
 
-/// The material that comes first under a name, and whether there are others.
+/// The first material of a name.
 #[derive(Clone, Copy, Debug)]
 struct Known {
     kind: Kind,
     number: usize,
-    others: bool,
+    /// Other materials have this name too.
+    is_shared: bool,
 }
 
 impl Known {
-    fn one(kind: Kind, number: usize) -> Self {
-        Self { kind, number, others: false }
-    }
-
-    fn or(&mut self, later: Known) {
-        self.others |= self.number != later.number;
+    fn merge(&mut self, later: Known) {
+        self.is_shared |= self.number != later.number;
         if later.kind < self.kind {
             (self.kind, self.number) = (later.kind, later.number);
         }
     }
 }
 
+/// Everything that reading a library needs besides its file.
+pub(super) struct Sources<'a> {
+    pub(super) lookup: &'a mut Lookup,
+    pub(super) budget: &'a Budget,
+    pub(super) notes: &'a mut Notes,
+}
+
 impl Library {
-    /// Reads the libraries of the OBJ file `obj`: those of its `mtllib` statements, and the one of its own name where
-    /// they lack one of the materials `used`.
-    pub(super) fn read(
-        obj: &Path,
-        statements: &[(u32, Name)],
-        used: &[Name],
-        (lookup, budget): (&mut Lookup, &Budget),
-        notes: &mut Notes,
-    ) -> Self {
+    /// Reads the libraries of the OBJ file `obj`: those of its `mtllib` statements, and the one of its own name if
+    /// they lack one of the `used` materials.
+    pub(super) fn read(obj: &Path, statements: &[(u32, Name)], used: &[Name], mut sources: Sources) -> Self {
         let directory = obj.parent().unwrap_or(Path::new(""));
         let mut library = Self::default();
         for (line, operand) in statements {
-            let place = format!("({}:{line})", obj.display());
-            for file in named_files(operand, directory, lookup, &place, notes) {
-                library.add(&file, directory, (lookup, budget), notes);
+            let position = format!("({}:{line})", obj.display());
+            for file in named_files(operand.bytes(), directory, &position, &mut sources) {
+                library.add(&file, directory, &mut sources);
             }
         }
-        if used.iter().any(|name| library.find(name).is_none()) {
+        if used.iter().any(|name| library.material(name).is_none()) {
             let own = obj.with_extension("mtl");
             let name = own.file_name().unwrap_or_default().as_encoded_bytes();
-            let found = lookup.find(&[name], &[directory]);
-            if let Some(own) = found.file()
-                && !library.files.iter().any(|file| file == own)
-            {
-                notes.add(1, format!("{} is read for materials that no library has", own.display()));
-                library.add(own, directory, (lookup, budget), notes);
+            let found = sources.lookup.locate(&[name], &[directory]);
+            if let Some(own) = found.file().filter(|own| !library.files.iter().any(|file| file == own)) {
+                let note = format!("{} is read for materials that no library has", own.display());
+                sources.notes.add(1, note);
+                library.add(own, directory, &mut sources);
             }
         }
         library
     }
 
-    /// The material that the operand of a `usemtl` means, under the name that both sides have, and whether that is
-    /// beyond doubt.
-    pub(super) fn find(&self, used: &Name) -> Option<(MtlMaterial, bool)> {
-        self.shared(used).or_else(|| Some((self.alike(used)?, false)))
+    /// The material of the operand of a `usemtl`, under the name that both have, and whether it is certain.
+    pub(super) fn material(&self, used: &Name) -> Option<(MtlMaterial, bool)> {
+        self.by_common_reading(used).or_else(|| Some((self.by_any_case(used)?, false)))
     }
 
-    /// The material that shares the longest reading. Where both sides have to lose what may be a comment, it has to
-    /// be the only one: `Material #3` is neither `Material #1` nor `Material #2`.
-    fn shared(&self, used: &Name) -> Option<(MtlMaterial, bool)> {
+    /// The material with the longest common reading. If both names lose a possible comment, it must be the only
+    /// one: `Material #3` is neither `Material #1` nor `Material #2`.
+    fn by_common_reading(&self, used: &Name) -> Option<(MtlMaterial, bool)> {
         readings(used.bytes()).into_iter().find_map(|reading| {
             let name = Name::from(reading.name);
             let known = self.by_reading.get(&name)?;
             let is_doubtful = reading.kind == Kind::Cut && known.kind == Kind::Cut;
             let material = MtlMaterial { name, ..self.materials[known.number].clone() };
-            (!(is_doubtful && known.others)).then_some((material, !is_doubtful))
+            (!(is_doubtful && known.is_shared)).then_some((material, !is_doubtful))
         })
     }
 
     /// The only material whose name differs in nothing but case or encoding.
-    fn alike(&self, used: &Name) -> Option<MtlMaterial> {
-        let known = self.by_folded.get(&folded(trimmed(used.bytes()))).filter(|known| !known.others)?;
+    fn by_any_case(&self, used: &Name) -> Option<MtlMaterial> {
+        let known = self.by_folded.get(&folded(trimmed(used.bytes()))).filter(|known| !known.is_shared)?;
         let material = self.materials[known.number].clone();
         Some(MtlMaterial { name: material.name.trimmed(), ..material })
     }
 
-    fn add(
-        &mut self,
-        file: &Path,
-        beside: &Path,
-        (lookup, budget): (&mut Lookup, &Budget),
-        notes: &mut Notes,
-    ) {
+    /// Reads a library; maps are relative to it, then to the folder `obj_folder`.
+    fn add(&mut self, file: &Path, obj_folder: &Path, sources: &mut Sources) {
         if self.files.iter().any(|known| known == file) {
             return;
         }
         self.files.push(file.into());
         let shown = file.display();
-        let bytes = match read(file, budget, weight::of_mtl) {
+        let bytes = match read(file, sources.budget, weight::of_mtl) {
             Ok(bytes) => bytes,
             Err(error) => {
-                return notes.add(1, format!("material library {shown} is left out: {}", error.problem));
+                let note = format!("material library {shown} is left out: {}", error.problem);
+                return sources.notes.add(1, note);
             }
         };
         let mut mtl = mtl::parse(bytes, &shown.to_string());
-        let directories = [file.parent().unwrap_or(Path::new("")), beside];
+        let directories = [file.parent().unwrap_or(Path::new("")), obj_folder];
         for mut material in mtl.materials {
-            for map in surface::maps_mut(&mut material) {
-                map.locate(lookup, &directories, &mut mtl.notes);
+            for map in material.maps.values_mut() {
+                map.locate(sources.lookup, &directories, &mut mtl.notes);
             }
             if self.by_reading.get(&material.name).is_some_and(|known| known.kind == Kind::Whole) {
-                let what = format!("material defined again in {shown}: the first of its name counts");
-                mtl.notes.add(1, what);
+                mtl.notes.add(1, format!("material defined again in {shown}: the first of its name counts"));
             }
             let number = self.materials.len();
+            let known = |kind| Known { kind, number, is_shared: false };
             for reading in readings(material.name.bytes()) {
-                let known = Known::one(reading.kind, number);
-                self.by_reading
-                    .entry(reading.name.into())
-                    .and_modify(|first| first.or(known))
-                    .or_insert(known);
+                let known = known(reading.kind);
+                let entry = self.by_reading.entry(reading.name.into());
+                entry.and_modify(|first| first.merge(known)).or_insert(known);
             }
-            let known = Known::one(Kind::Whole, number);
-            let folded = folded(trimmed(material.name.bytes()));
-            self.by_folded.entry(folded).and_modify(|first| first.or(known)).or_insert(known);
+            let known = known(Kind::Whole);
+            let entry = self.by_folded.entry(folded(trimmed(material.name.bytes())));
+            entry.and_modify(|first| first.merge(known)).or_insert(known);
             self.materials.push(material);
         }
-        notes.merge(mtl.notes);
+        sources.notes.merge(mtl.notes);
     }
 }
 
-/// The files of an `mtllib` statement: names with blanks or quotes, one or several.
-fn named_files(
-    operand: &Name,
-    directory: &Path,
-    lookup: &mut Lookup,
-    place: &str,
-    notes: &mut Notes,
-) -> Vec<PathBuf> {
-    let operand = operand.bytes();
-    let begins = |&i: &usize| !is_blank(operand[i]) && (i == 0 || is_blank(operand[i - 1]));
-    let mut words: Vec<usize> = (0..operand.len()).filter(begins).take(MOST_WORDS).collect();
+/// Files of an `mtllib` statement: one or several, names with blanks or quotes.
+fn named_files(operand: &[u8], directory: &Path, position: &str, sources: &mut Sources) -> Vec<PathBuf> {
+    const WHAT: &str = "material library";
+    let mut words: Vec<usize> = word_starts(operand).take(MOST_WORDS).collect();
     words.push(operand.len());
     let last = words.len() - 1;
+    let text = |first: usize, end: usize| trimmed(&operand[words[first]..words[end]]);
     let mut files = Vec::new();
     let mut missing: Option<usize> = None;
     let mut first = 0;
     while first < last {
-        let mut find = |end: usize| {
+        let mut locate = |end: usize| {
             let readings = readings(&operand[words[first]..words[end]]);
             let names: Vec<&[u8]> = readings.iter().map(|reading| reading.name).collect();
-            (end, lookup.find(&names, &[directory]))
+            (end, sources.lookup.locate(&names, &[directory]))
         };
-        // The longest name that is there; else the shortest that is there under another name, for the tail of a
-        // longer one may be that of the next library.
+        // The longest exact name; else the shortest similar one, because the tail of a longer one may belong to the
+        // next library.
         let ends = || (first + 1..last.min(first + 1 + LONGEST_NAME)).chain([last]);
-        let exact = ends().rev().map(&mut find).find(|(_, found)| matches!(found, Found::Exact(..)));
-        let found = exact.or_else(|| ends().map(&mut find).find(|(_, found)| *found != Found::Missing));
+        let exact = ends().rev().map(&mut locate).find(|(_, found)| matches!(found, Found::Exact(..)));
+        let found = exact.or_else(|| ends().map(&mut locate).find(|(_, found)| *found != Found::Missing));
         let Some((end, found)) = found else {
             missing.get_or_insert(first);
             first += 1;
             continue;
         };
-        let name = &operand[words[first]..words[end]];
-        let gap = missing.take().map(|gap| &operand[words[gap]..words[first]]);
-        let gap = gap.and_then(|gap| Found::Missing.note("material library", trimmed(gap)));
-        for note in gap.into_iter().chain(found.note("material library", trimmed(name))) {
-            notes.add(1, format!("{note} {place}"));
+        let gap = missing.take().and_then(|gap| Found::Missing.note(WHAT, text(gap, first)));
+        for note in gap.into_iter().chain(found.note(WHAT, text(first, end))) {
+            sources.notes.add(1, format!("{note} {position}"));
         }
         files.extend(found.file().map(Path::to_path_buf));
         first = end;
     }
-    let gap = missing.map(|gap| &operand[words[gap]..]);
-    if let Some(note) = gap.and_then(|gap| Found::Missing.note("material library", trimmed(gap))) {
-        notes.add(1, format!("{note} {place}"));
+    if let Some(note) = missing.and_then(|gap| Found::Missing.note(WHAT, text(gap, last))) {
+        sources.notes.add(1, format!("{note} {position}"));
     }
     files
 }

@@ -1,10 +1,10 @@
-//! Texture statements: `[-option values]... file name with blanks`. Options may stand behind the name as well, names
-//! may look like options or hold ` #`; which reading is meant is settled by the file that is there.
+//! Texture statements: `[-option values]... file name with blanks`. Options may follow the name too, and names may
+//! resemble options or contain ` #`; the existing file decides among the readings.
 
 use super::files::{Found, Lookup};
 use super::name::{Name, unquoted, without_comments};
 use super::notes::Notes;
-use super::text::{self, is_blank, trimmed};
+use super::text::{self, is_blank, trimmed, word_starts};
 use std::path::{Path, PathBuf};
 
 /// A texture statement.
@@ -12,11 +12,11 @@ use std::path::{Path, PathBuf};
 pub struct Map {
     /// All that follows the keyword.
     pub operand: Name,
-    /// Line of the statement; 0 where it has none.
+    /// Line of the statement; 0: none.
     pub line: u32,
-    /// The file that this means, once it has been looked for and is there.
+    /// The located file, if it exists.
     pub found: Option<PathBuf>,
-    /// As the statement has them, in the reading that was found.
+    /// Options of the reading that names the file.
     pub options: MapOptions,
 }
 
@@ -51,21 +51,21 @@ impl Default for MapOptions {
 }
 
 impl Map {
-    /// A map that has been found.
+    /// A map of a located file.
     pub(super) fn of_file(name: &str, found: PathBuf) -> Self {
         Self { operand: name.into(), found: Some(found), ..Self::default() }
     }
 
-    /// The statement with this operand; `None` where it names no file.
+    /// The statement with this operand; `None` if it names no file.
     pub(super) fn of_statement(operand: &[u8], line: u32) -> Option<Self> {
         (!plain_name(operand).is_empty()).then(|| Self { operand: operand.into(), line, ..Self::default() })
     }
 
-    /// Finds the file in one of `directories`, the likeliest first, and with it the options.
+    /// Locates the file in one of `directories`, the likeliest first, and sets the options.
     pub(super) fn locate(&mut self, lookup: &mut Lookup, directories: &[&Path], notes: &mut Notes) {
         let mut readings = readings(self.operand.bytes());
         let names: Vec<&[u8]> = readings.iter().map(|reading| reading.name).collect();
-        let found = lookup.find(&names, directories);
+        let found = lookup.locate(&names, directories);
         let name = match found {
             Found::Exact(_, number) | Found::Instead(_, number) => readings[number].name,
             _ => plain_name(self.operand.bytes()),
@@ -83,43 +83,41 @@ impl Map {
     }
 }
 
-/// More readings of one statement are not tried.
+/// Readings of a statement that are tried.
 const MOST_READINGS: usize = 64;
-/// More places where a name may begin, or end before options, are not tried.
-const MOST_PLACES: usize = 8;
-/// An operand of more words is a name without options.
+/// Possible starts and ends of a name that are tried.
+const MOST_STARTS: usize = 8;
+/// A longer operand, in words, is a name without options.
 const MOST_WORDS: usize = 128;
-/// An option that is not known has at most this many values.
+/// Values of an unknown option.
 const MOST_VALUES: usize = 3;
 
-/// What a texture statement may mean.
+/// A possible meaning of a texture statement.
 #[derive(Clone, Debug, PartialEq)]
 struct Reading<'a> {
     name: &'a [u8],
     options: MapOptions,
 }
 
-/// A word and where it begins.
+/// Start of a word, and the word.
 type Token<'a> = (usize, &'a [u8]);
 
-/// The words of an operand; a `#` is part of one.
+/// Words of an operand, in which `#` begins no comment.
 fn tokens(operand: &[u8]) -> Vec<Token<'_>> {
-    let begins = |&i: &usize| !is_blank(operand[i]) && (i == 0 || is_blank(operand[i - 1]));
-    let word = |i: usize| {
-        let length = operand[i..].iter().position(|&byte| is_blank(byte));
-        (i, &operand[i..length.map_or(operand.len(), |length| i + length)])
-    };
-    let tokens: Vec<Token> = (0..operand.len()).filter(begins).map(word).take(MOST_WORDS + 1).collect();
+    let end =
+        |i: usize| operand[i..].iter().position(|&byte| is_blank(byte)).map_or(operand.len(), |n| i + n);
+    let tokens: Vec<Token> =
+        word_starts(operand).map(|i| (i, &operand[i..end(i)])).take(MOST_WORDS + 1).collect();
     if tokens.len() > MOST_WORDS { vec![(0, operand)] } else { tokens }
 }
 
-/// The readings of an operand, the likeliest first: all leading options taken, then fewer of them; of what
-/// follows the whole, then without options behind it, then without comments; unknown options come last.
+/// Readings of an operand, the likeliest first: all leading options, then fewer; of the rest the whole, then
+/// without options after the name, then without comments; unknown options last.
 fn readings(operand: &[u8]) -> Vec<Reading<'_>> {
     let tokens = tokens(operand);
     let mut starts = leading(&tokens);
     starts.reverse();
-    starts.truncate(MOST_PLACES);
+    starts.truncate(MOST_STARTS);
     let known = starts.len();
     starts.extend(beyond_unknown(&tokens, starts.first()));
     let mut readings: Vec<Reading> = Vec::new();
@@ -128,7 +126,7 @@ fn readings(operand: &[u8]) -> Vec<Reading<'_>> {
         let text = if *at == 0 { operand } else { &operand[begin..] };
         for head in [text].into_iter().chain(without_comments(text)) {
             add(&mut readings, head, options);
-            behind(head, options, number < known, &mut readings);
+            add_with_trailing_options(&mut readings, head, options, number < known);
         }
     }
     readings.truncate(MOST_READINGS);
@@ -143,7 +141,7 @@ fn add<'a>(readings: &mut Vec<Reading<'a>>, name: &'a [u8], options: &MapOptions
     }
 }
 
-/// Where a name may begin before which all words are options: number of words, and what they say.
+/// Possible starts of the name after known options only: number of words, and the options.
 fn leading(tokens: &[Token]) -> Vec<(usize, MapOptions)> {
     let mut starts = vec![(0, MapOptions::default())];
     while let Some((at, options)) = starts.last() {
@@ -154,68 +152,71 @@ fn leading(tokens: &[Token]) -> Vec<(usize, MapOptions)> {
     starts
 }
 
-/// The same behind one option that is not known and its values.
+/// Possible starts of the name after an unknown option and its values.
 fn beyond_unknown(tokens: &[Token], start: Option<&(usize, MapOptions)>) -> Vec<(usize, MapOptions)> {
     let Some((at, options)) = start else { return Vec::new() };
     let Some((_, word @ [b'-', _, ..])) = tokens.get(*at) else { return Vec::new() };
     let skip = |values: usize| {
         let mut options = options.clone();
         options.unsupported.push((*word).into());
-        let mut at = at + 1 + values;
-        while let Some(next) = option(tokens, at, &mut options) {
-            at = next;
-        }
-        (at, options)
+        (known_options(tokens, at + 1 + values, &mut options), options)
     };
     (0..=MOST_VALUES).map(skip).collect()
 }
 
-/// The readings of `head` with options behind the name, the longest name first; and with what looks like options but
-/// is not known.
-fn behind<'a>(head: &'a [u8], options: &MapOptions, unknown: bool, readings: &mut Vec<Reading<'a>>) {
+/// Adds the readings of `head` with options after the name, the longest name first; then, if `allow_unknown`,
+/// those with unknown options.
+fn add_with_trailing_options<'a>(
+    readings: &mut Vec<Reading<'a>>,
+    head: &'a [u8],
+    options: &MapOptions,
+    allow_unknown: bool,
+) {
     let tokens = tokens(head);
     let mut later = Vec::new();
-    let places = (1..tokens.len()).rev().filter(|&at| tokens[at].1.starts_with(b"-"));
-    for at in places.take(MOST_PLACES) {
-        let mut all = options.clone();
-        let mut next = at;
+    let starts = (1..tokens.len()).rev().filter(|&at| tokens[at].1.starts_with(b"-"));
+    for start in starts.take(MOST_STARTS) {
+        let mut options = options.clone();
+        let mut next = start;
         let mut known = true;
         while next < tokens.len() {
-            next = option(&tokens, next, &mut all).unwrap_or_else(|| {
+            next = option(&tokens, next, &mut options).unwrap_or_else(|| {
                 known = false;
                 if tokens[next].1.starts_with(b"-") {
-                    all.unsupported.push(tokens[next].1.into());
+                    options.unsupported.push(tokens[next].1.into());
                 }
                 next + 1
             });
         }
-        let name = &head[..tokens[at].0];
+        let name = trimmed(&head[..tokens[start].0]);
         if known {
-            add(readings, trimmed(name), &all);
-        } else if unknown {
-            later.push((name, all));
+            add(readings, name, &options);
+        } else if allow_unknown {
+            later.push((name, options));
         }
     }
-    later.into_iter().for_each(|(name, all)| add(readings, trimmed(name), &all));
+    later.into_iter().for_each(|(name, options)| add(readings, name, &options));
 }
 
-/// The name where no file settles it: without options before and behind it, and no comment.
+/// The name for messages if no file exists: the operand without leading and trailing options.
 fn plain_name(operand: &[u8]) -> &[u8] {
     let tokens = tokens(operand);
-    let first = leading(&tokens).last().map_or(0, |(at, _)| *at);
+    let first = known_options(&tokens, 0, &mut MapOptions::default());
     let Some(&(begin, _)) = tokens.get(first) else { return &[] };
-    let all_options = |at: &usize| {
-        let mut next = *at;
-        while let Some(after) = option(&tokens, next, &mut MapOptions::default()) {
-            next = after;
-        }
-        next == tokens.len()
-    };
+    let all_options = |at: &usize| known_options(&tokens, *at, &mut MapOptions::default()) == tokens.len();
     let end = (first + 1..tokens.len()).find(all_options).map_or(operand.len(), |at| tokens[at].0);
     unquoted(trimmed(&operand[begin..end]))
 }
 
-/// Reads the option that begins with word `at`; the number of the word behind it, `None` where it is none.
+/// Reads known options from word `at` on. Returns the number of the word after them.
+fn known_options(tokens: &[Token], mut at: usize, options: &mut MapOptions) -> usize {
+    while let Some(next) = option(tokens, at, options) {
+        at = next;
+    }
+    at
+}
+
+/// Reads the option at word `at`. Returns the number of the word after it; `None` if it is no known option.
 fn option(tokens: &[Token], at: usize, options: &mut MapOptions) -> Option<usize> {
     let (_, word) = tokens.get(at)?;
     let name = word.strip_prefix(b"-")?.to_ascii_lowercase();
@@ -293,7 +294,7 @@ mod tests {
     }
 
     #[test]
-    fn options_stand_before_or_behind_the_name() {
+    fn options_precede_or_follow_the_name() {
         let expected =
             MapOptions { scale: [2.0, 3.0], offset: [0.5, 0.0], clamp: true, ..Default::default() };
         for operand in [
@@ -312,7 +313,7 @@ mod tests {
     }
 
     #[test]
-    fn options_take_only_values_that_can_be_theirs() {
+    fn options_take_only_valid_values() {
         for operand in
             ["-mm 0 t.png", "-bm t.png", "-clamp t.png", "-imfchan t.png", "-boost t.png", "-s t.png"]
         {
@@ -323,7 +324,7 @@ mod tests {
     }
 
     #[test]
-    fn names_that_look_like_options_or_comments_are_readings() {
+    fn names_may_resemble_options_or_comments() {
         assert_eq!(names("-s.png"), ["-s.png"]);
         assert_eq!(names("-s 2.png"), ["2.png", "-s 2.png"]);
         assert_eq!(names("Map #5.png"), ["Map #5.png", "Map"]);

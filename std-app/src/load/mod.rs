@@ -1,10 +1,9 @@
-//! Scenes from files: OBJ with MTL ([`obj`], [`mtl`], [`surface`]), pictures ([`crate::picture`]), and the scene
-//! file that places meshes and adds camera, lights and settings ([`scene_file`]). Names are bytes ([`name`]), and
-//! one lookup finds the files that they mean ([`files`]).
+//! Loading of scenes: OBJ with MTL ([`obj`], [`mtl`]), pictures ([`crate::picture`]), and the scene file that places
+//! meshes and adds camera, lights and settings ([`scene_file`]).
 //!
-//! A load repairs what it can and says each kind of repair once; what it cannot repair is a [`LoadError`]
-//! with file, line and what to do. The table of both is `docs/loading.md`. The parsers take bytes, so that
-//! they can be fed anything: [`obj::parse`], [`mtl::parse`], [`scene_file::parse`].
+//! A load repairs its input as far as possible and notes each kind of repair once; everything else is a [`LoadError`]
+//! with file, line and help. `docs/loading.md` has the table of both. The parsers take arbitrary bytes:
+//! [`obj::parse`], [`mtl::parse`], [`scene_file::parse`].
 
 mod doubled;
 mod error;
@@ -46,7 +45,7 @@ use crate::memory::{self, Budget, Shortage};
 use files::Lookup;
 use geometry::{Placed, Placement};
 use halflight_core::scene::{Environment, Material};
-use library::Library;
+use library::{Library, Sources};
 use mtl::MtlMaterial;
 use name::readings;
 use scene_file::{EnvironmentChange, MaterialChange};
@@ -55,12 +54,12 @@ use std::io;
 use std::path::{Path, PathBuf};
 use texcoords::Texcoords;
 
-/// What to load of a scene.
+/// Options of a load.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct LoadOptions {
     /// Whether to decode textures; without them, materials have their constant values.
     pub textures: bool,
-    /// Most bytes to take, for what stays and for what is taken on the way; `None`: a share of what the machine has.
+    /// Memory limit in bytes, temporary memory included; `None`: four fifths of that of the machine.
     pub memory: Option<usize>,
 }
 
@@ -84,12 +83,12 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<LoadedScene, LoadError
     }
 }
 
-/// Reads a whole text file, which `weight` must find room for in `budget`; with an error that names it.
+/// Reads a text file; `weight` is the memory that parsing it takes.
 fn read(path: &Path, budget: &Budget, weight: fn(&[u8]) -> usize) -> Result<Vec<u8>, LoadError> {
     let bytes = memory::read_file(path, budget.left()).map_err(|error| {
         let help = match error.kind() {
             io::ErrorKind::FileTooLarge => MORE_MEMORY,
-            _ => "is the path right, relative to where you are?",
+            _ => "check the path, which is relative to the current folder",
         };
         LoadError::of_file(path, format!("cannot be read: {error}"), help)
     })?;
@@ -103,17 +102,17 @@ fn too_large(path: &Path, why: &Shortage) -> LoadError {
     LoadError::of_file(path, why.to_string(), MORE_MEMORY)
 }
 
-/// Meshes and materials on their way to a scene.
+/// Meshes and materials of a scene under construction.
 struct SceneBuilder {
     budget: Budget,
     meshes: Vec<PlacedMesh>,
-    /// Each OBJ file once, however often it is placed.
-    files: HashMap<PathBuf, usize>,
     objs: Vec<obj::Obj>,
+    /// Index into `objs` of each OBJ file; a file is read once, however often it is placed.
+    obj_numbers: HashMap<PathBuf, usize>,
     materials: Vec<MtlMaterial>,
-    /// By file (none for materials of the scene file) and name.
-    by_name: HashMap<(Option<usize>, Name), u32>,
-    /// Changes by the scene file, by name of the material.
+    /// By OBJ file (`None` for materials of the scene file) and name.
+    material_numbers: HashMap<(Option<usize>, Name), u32>,
+    /// Changes of the scene file, by name of the material.
     overrides: BTreeMap<String, MaterialChange>,
     used_overrides: BTreeSet<String>,
     lookup: Lookup,
@@ -123,7 +122,7 @@ struct SceneBuilder {
 struct PlacedMesh {
     obj: usize,
     placement: Placement,
-    /// For each material of the OBJ, and last for faces without one: index into the materials of the scene.
+    /// Index into the materials of the scene for each material of the OBJ, and last for faces without material.
     materials: Vec<u32>,
 }
 
@@ -132,10 +131,10 @@ impl SceneBuilder {
         Self {
             budget: Budget::new(options.memory),
             meshes: Vec::new(),
-            files: HashMap::new(),
             objs: Vec::new(),
+            obj_numbers: HashMap::new(),
             materials: Vec::new(),
-            by_name: HashMap::new(),
+            material_numbers: HashMap::new(),
             overrides: BTreeMap::new(),
             used_overrides: BTreeSet::new(),
             lookup: Lookup::default(),
@@ -143,14 +142,14 @@ impl SceneBuilder {
         }
     }
 
-    /// Places an OBJ file. `material` replaces those of the file;
+    /// Places an OBJ file; `material` replaces all of its materials.
     fn add_mesh(
         &mut self,
         path: &Path,
         placement: Placement,
         material: Option<&str>,
     ) -> Result<(), LoadError> {
-        let number = match self.files.get(path) {
+        let number = match self.obj_numbers.get(path) {
             Some(&number) => number,
             None => {
                 let text = read(path, &self.budget, weight::of_obj)?;
@@ -158,62 +157,59 @@ impl SceneBuilder {
                 self.budget.take(weight::of_mesh(&obj)).map_err(|why| too_large(path, &why))?;
                 self.notes.merge(core::mem::take(&mut obj.notes));
                 self.objs.push(obj);
-                self.files.insert(path.into(), self.objs.len() - 1);
+                self.obj_numbers.insert(path.into(), self.objs.len() - 1);
                 self.objs.len() - 1
             }
         };
         let names = self.objs[number].materials.clone();
-        let mut library = Library::default();
-        if material.is_none() {
-            let statements = &self.objs[number].libraries;
-            let sources = (&mut self.lookup, &self.budget);
-            library = Library::read(path, statements, &names, sources, &mut self.notes);
-        }
-        let mut materials = Vec::with_capacity(names.len() + 1);
-        for name in &names {
-            materials.push(match material {
-                Some(material) => self.material(None, material.into(), None),
-                None => self.file_material(number, name, &library, path),
-            });
-        }
+        let mut materials: Vec<u32> = match material {
+            Some(material) => vec![self.material(None, material.into(), None); names.len()],
+            None => {
+                let Self { lookup, budget, notes, .. } = self;
+                let sources = Sources { lookup, budget, notes };
+                let library = Library::read(path, &self.objs[number].libraries, &names, sources);
+                names.iter().map(|name| self.file_material(number, name, &library, path)).collect()
+            }
+        };
         materials.push(self.material(None, material.unwrap_or_default().into(), None));
         self.meshes.push(PlacedMesh { obj: number, placement, materials });
         Ok(())
     }
 
-    /// The number of the material that the operand of a `usemtl` means.
-    fn file_material(&mut self, file: usize, used: &Name, library: &Library, path: &Path) -> u32 {
-        let found = library.find(used);
-        let is_changed = |name: &Name| self.overrides.contains_key(&name.to_string());
-        let place = path.display();
-        let name = match &found {
-            Some((material, _)) => material.name.clone(),
+    /// The material of the operand of a `usemtl`.
+    fn file_material(&mut self, obj: usize, used: &Name, library: &Library, path: &Path) -> u32 {
+        let path = path.display();
+        let is_overridden = |name: &Name| self.overrides.contains_key(&name.to_string());
+        let (name, found) = match library.material(used) {
+            Some((material, is_certain)) => {
+                let name = material.name.clone();
+                if !is_certain {
+                    let used = used.trimmed();
+                    let what = format!("material `{used}` of {path} is missing: `{name}` is used instead");
+                    self.notes.add(1, what);
+                }
+                (name, Some(material))
+            }
             None => {
-                let names = readings(used.bytes());
-                let mut names = names.iter().map(|reading| Name::from(reading.name));
-                names.find(is_changed).unwrap_or_else(|| used.trimmed())
+                let readings = readings(used.bytes());
+                let mut names = readings.iter().map(|reading| Name::from(reading.name));
+                let name = names.find(is_overridden).unwrap_or_else(|| {
+                    let used = used.trimmed();
+                    let what =
+                        format!("material `{used}` of {path} is in none of its libraries: grey is used");
+                    self.notes.add(1, what);
+                    used
+                });
+                (name, None)
             }
         };
-        match &found {
-            Some((_, false)) => {
-                let what =
-                    format!("material `{}` of {place} is not there, `{name}` is taken", used.trimmed());
-                self.notes.add(1, what);
-            }
-            None if !is_changed(&name) => {
-                let what = format!("material `{name}` of {place} is not in its material libraries: grey");
-                self.notes.add(1, what);
-            }
-            _ => {}
-        }
-        let found = found.map(|(material, _)| material);
-        self.material(Some(file), name, found)
+        self.material(Some(obj), name, found)
     }
 
-    /// The number of a material; a new one unless this name of this file has one.
-    fn material(&mut self, file: Option<usize>, name: Name, found: Option<MtlMaterial>) -> u32 {
-        let key = (file, name.clone());
-        if let Some(&number) = self.by_name.get(&key) {
+    /// The number of the material of this name of this file; a new one if there is none.
+    fn material(&mut self, obj: Option<usize>, name: Name, found: Option<MtlMaterial>) -> u32 {
+        let key = (obj, name.clone());
+        if let Some(&number) = self.material_numbers.get(&key) {
             return number;
         }
         let shown = name.to_string();
@@ -224,11 +220,26 @@ impl SceneBuilder {
         }
         let number = self.materials.len() as u32;
         self.materials.push(material);
-        self.by_name.insert(key, number);
+        self.material_numbers.insert(key, number);
         number
     }
 
-    /// Buffers for the core.
+    /// Decodes the textures of all materials and of the environment.
+    fn textures(
+        &mut self,
+        options: &LoadOptions,
+        environment: Option<&EnvironmentChange>,
+    ) -> Result<TextureSet, LoadError> {
+        let of_environment = || environment.iter().flat_map(|environment| &environment.map);
+        let file = |map: &Map| map.found.clone();
+        let maps = self.materials.iter().flat_map(|mtl| mtl.maps.values()).chain(of_environment());
+        let files = maps.filter_map(file).filter(|_| options.textures);
+        let required = self.overrides.values().flat_map(|change| change.material().maps.values());
+        let required = required.chain(of_environment()).filter_map(file).collect();
+        TextureSet::decode(files, &required, &mut self.budget, &mut self.notes)
+    }
+
+    /// The scene with the buffers of the core.
     fn build(
         mut self,
         path: &Path,
@@ -236,28 +247,18 @@ impl SceneBuilder {
         environment: Option<EnvironmentChange>,
     ) -> Result<LoadedScene, LoadError> {
         for name in self.overrides.keys().filter(|name| !self.used_overrides.contains(*name)) {
-            self.notes.add(
-                1,
-                format!("no mesh has a material `{name}`: what the scene file says of it is not used"),
-            );
+            self.notes
+                .add(1, format!("no mesh has a material `{name}`: its entry in the scene file is not used"));
         }
-        let maps =
-            self.materials.iter().flat_map(surface::maps).chain(environment.iter().flat_map(|e| &e.map));
-        let files = maps.filter_map(|map| map.found.clone()).filter(|_| options.textures);
-        let by_scene_file = self.overrides.values().flat_map(|change| surface::maps(change.material()));
-        let by_scene_file = by_scene_file.chain(environment.iter().flat_map(|e| &e.map));
-        let required = by_scene_file.filter_map(|map| map.found.clone()).collect();
-        let mut textures = TextureSet::decode(files, &required, &mut self.budget, &mut self.notes)?;
+        let mut textures = self.textures(options, environment.as_ref())?;
         let notes = &mut self.notes;
         let of_maps = |mtl: &mut MtlMaterial| {
-            Texcoords::of_maps(
-                &mut surface::maps_mut(mtl).filter(|map| map.found.is_some()).collect::<Vec<_>>(),
-            )
+            let maps = mtl.maps.values_mut().filter(|map| map.found.is_some());
+            Texcoords::of_maps(&mut maps.collect::<Vec<_>>())
         };
         let texcoords: Vec<Texcoords> = self.materials.iter_mut().map(of_maps).collect();
         let materials: Vec<Material> =
             self.materials.iter().map(|mtl| surface::resolve(mtl, &mut textures, notes)).collect();
-
         let environment = environment.map(|entry| Environment {
             radiance: entry.radiance,
             map: textures.colour(entry.map.as_ref()),
@@ -267,8 +268,7 @@ impl SceneBuilder {
         let mut parts = Vec::new();
         for mesh in &self.meshes {
             for group in &self.objs[mesh.obj].groups {
-                let last = mesh.materials.len() - 1;
-                let material = mesh.materials[group.material.map_or(last, |number| number.min(last))];
+                let material = mesh.materials[group.material.unwrap_or(mesh.materials.len() - 1)];
                 let texcoords = texcoords[material as usize];
                 parts.push(Placed { group, placement: mesh.placement, material, texcoords });
             }
@@ -281,7 +281,7 @@ impl SceneBuilder {
         let mut geometry = geometry::assemble(&parts, &fit, pieces, notes);
         count_vertices(path, geometry.positions.len())?;
         let names: Vec<String> = self.materials.iter().map(|mtl| mtl.name.to_string()).collect();
-        doubled::leave_out(&mut geometry, &materials, &names, notes);
+        doubled::remove(&mut geometry, &materials, &names, notes);
         open_glass::note(&geometry, &materials, &names, notes);
         Ok(LoadedScene {
             positions: geometry.positions,

@@ -1,12 +1,13 @@
-//! MTL files, as their statements say them; [`super::surface`] decides what they mean. A statement that
-//! cannot be read is left out with a note: a picture with one wrong material is better than none.
+//! MTL files: statements as written; [`super::surface`] gives them their meaning. An unreadable statement is left
+//! out with a note.
 
 use super::map::Map;
 use super::name::Name;
 use super::notes::Notes;
 use super::text::{self, Lines, Words, words};
+use std::collections::BTreeMap;
 
-/// A material as written. `None` where the file says nothing.
+/// A material as written; `None` for absent statements.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct MtlMaterial {
     /// `newmtl`: all that follows the keyword.
@@ -31,172 +32,178 @@ pub struct MtlMaterial {
     pub metallic: Option<f64>,
     /// `illum`.
     pub illumination: Option<u32>,
-    /// Not in MTL: whether somebody calls it glass, who knows what that is.
+    /// Not in MTL: the scene file specifies glass, whatever the other statements suggest.
     pub surely_glass: bool,
-    /// Not in MTL: whether both sides emit.
+    /// Not in MTL: both sides emit.
     pub two_sided: bool,
-    /// `map_Kd`.
-    pub diffuse_map: Option<Map>,
-    /// `map_Ks`.
-    pub specular_map: Option<Map>,
-    /// `map_Ke`.
-    pub emission_map: Option<Map>,
-    /// `map_Pr`.
-    pub roughness_map: Option<Map>,
-    /// `map_Pm`.
-    pub metallic_map: Option<Map>,
-    /// `map_d`.
-    pub opacity_map: Option<Map>,
-    /// `bump`, `map_bump`: heights.
-    pub bump_map: Option<Map>,
-    /// `norm`: tangent-space normals.
-    pub normal_map: Option<Map>,
+    /// Texture statements.
+    pub maps: BTreeMap<MapKind, Map>,
 }
 
-/// What an MTL file says.
+/// The statement of a map.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum MapKind {
+    /// `map_Kd`.
+    Diffuse,
+    /// `map_Ks`.
+    Specular,
+    /// `map_Ke`.
+    Emission,
+    /// `map_Pr`.
+    Roughness,
+    /// `map_Pm`.
+    Metallic,
+    /// `map_d`.
+    Opacity,
+    /// `bump`, `map_bump`: heights.
+    Bump,
+    /// `norm`, `map_Kn`: tangent-space normals.
+    Normal,
+}
+
+impl MtlMaterial {
+    /// The map of a kind.
+    pub fn map(&self, kind: MapKind) -> Option<&Map> {
+        self.maps.get(&kind)
+    }
+
+    /// Whether there is a map of a kind.
+    pub fn has_map(&self, kind: MapKind) -> bool {
+        self.maps.contains_key(&kind)
+    }
+}
+
+/// Content of an MTL file.
 #[derive(Clone, Debug, Default)]
 pub struct Mtl {
-    /// In the order of the file.
+    /// Materials in the order of the file.
     pub materials: Vec<MtlMaterial>,
-    /// What was left out.
+    /// Statements that were left out.
     pub notes: Notes,
 }
 
 /// Reads the bytes of an MTL file; never fails. `file` is for messages only.
 pub fn parse(bytes: Vec<u8>, file: &str) -> Mtl {
-    let mut reader = Reader { materials: Vec::new(), opacity_by_d: false, notes: Notes::of(file) };
-    match text::normalise(bytes) {
-        Err(text::Binary) => reader.notes.at(0, "material library that is not text left out"),
-        Ok(text) => Lines::new(&text, 1).for_each(|(number, line)| reader.line(number, line)),
-    }
-    Mtl { materials: reader.materials, notes: reader.notes }
-}
-
-struct Reader {
-    materials: Vec<MtlMaterial>,
-    opacity_by_d: bool,
-    notes: Notes,
-}
-
-impl Reader {
-    fn line(&mut self, line: u32, text: &[u8]) {
+    let mut mtl = Mtl { materials: Vec::new(), notes: Notes::of(file) };
+    let Ok(text) = text::normalise(bytes) else {
+        mtl.notes.at(0, "material library that is not text left out");
+        return mtl;
+    };
+    let mut has_d = false;
+    for (line, text) in Lines::new(&text, 1) {
         let mut operands = words(text);
-        let Some(keyword) = operands.next() else { return };
+        let Some(keyword) = operands.next() else { continue };
         let keyword = String::from_utf8_lossy(keyword).to_ascii_lowercase();
         if keyword == "newmtl" {
             let name = operands.rest().into();
-            self.materials.push(MtlMaterial { name, ..MtlMaterial::default() });
-            self.opacity_by_d = false;
-            return;
+            mtl.materials.push(MtlMaterial { name, ..MtlMaterial::default() });
+            has_d = false;
+            continue;
         }
-        let Self { materials, opacity_by_d, notes } = self;
-        let Some(material) = materials.last_mut() else {
-            return notes.at(line, "statement before the first `newmtl` left out");
+        let notes = &mut mtl.notes;
+        let Some(material) = mtl.materials.last_mut() else {
+            notes.at(line, "statement before the first `newmtl` left out");
+            continue;
         };
-        let known = statement(material, opacity_by_d, &keyword, operands, line, notes);
-        if !known {
-            let short: String = keyword.chars().take(24).collect();
-            notes.at(line, format!("material statement `{short}` is not supported: left out"));
-        }
+        Statement { keyword: &keyword, operands, line, notes }.apply(material, &mut has_d);
     }
+    mtl
 }
 
-/// Applies one statement; `false` where the keyword is not known.
-fn statement(
-    material: &mut MtlMaterial,
-    opacity_by_d: &mut bool,
-    keyword: &str,
-    operands: Words,
+struct Statement<'a> {
+    keyword: &'a str,
+    operands: Words<'a>,
     line: u32,
-    notes: &mut Notes,
-) -> bool {
-    match keyword {
-        "kd" => set(&mut material.diffuse, colour(operands, keyword, line, notes)),
-        "ks" => set(&mut material.specular, colour(operands, keyword, line, notes)),
-        "ke" => set(&mut material.emission, colour(operands, keyword, line, notes)),
-        "tf" => set(&mut material.tint, colour(operands, keyword, line, notes)),
-        "ns" => set(&mut material.shininess, scalar(operands, keyword, line, notes)),
-        "ni" => set(&mut material.ior, scalar(operands, keyword, line, notes)),
-        "pr" => set(&mut material.roughness, scalar(operands, keyword, line, notes)),
-        "pm" => set(&mut material.metallic, scalar(operands, keyword, line, notes)),
-        "d" => {
-            let halo = operands.clone().next() == Some(b"-halo");
-            if halo {
-                notes.at(line, "`d -halo` is read as a plain opacity");
+    notes: &'a mut Notes,
+}
+
+impl Statement<'_> {
+    /// Sets the value of the statement. `has_d`: a `d` precedes it.
+    fn apply(mut self, material: &mut MtlMaterial, has_d: &mut bool) {
+        match self.keyword {
+            "kd" => self.colour(&mut material.diffuse),
+            "ks" => self.colour(&mut material.specular),
+            "ke" => self.colour(&mut material.emission),
+            "tf" => self.colour(&mut material.tint),
+            "ns" => self.scalar(&mut material.shininess),
+            "ni" => self.scalar(&mut material.ior),
+            "pr" => self.scalar(&mut material.roughness),
+            "pm" => self.scalar(&mut material.metallic),
+            "d" => {
+                let mut rest = self.operands.clone();
+                if rest.next() == Some(b"-halo") {
+                    self.operands = rest;
+                    self.notes.at(self.line, "`d -halo` is read as a plain opacity");
+                }
+                let mut opacity = None;
+                self.scalar(&mut opacity);
+                *has_d |= opacity.is_some();
+                material.opacity = opacity.or(material.opacity);
             }
-            let opacity = scalar(operands.skip(usize::from(halo)), keyword, line, notes);
-            *opacity_by_d |= opacity.is_some();
-            set(&mut material.opacity, opacity);
+            // Some exporters write `Tr` with the value of `d`, so `d` wins.
+            "tr" if *has_d => {}
+            "tr" => {
+                let mut transparency = None;
+                self.scalar(&mut transparency);
+                material.opacity = transparency.map(|tr| 1.0 - tr).or(material.opacity);
+            }
+            "illum" => {
+                let mut model = None;
+                self.scalar(&mut model);
+                let model = model.filter(|model| (0.0..=10.0).contains(model)).map(|model| model as u32);
+                material.illumination = model.or(material.illumination);
+            }
+            "map_kd" => self.map(material, MapKind::Diffuse),
+            "map_ks" => self.map(material, MapKind::Specular),
+            "map_ke" => self.map(material, MapKind::Emission),
+            "map_pr" => self.map(material, MapKind::Roughness),
+            "map_pm" => self.map(material, MapKind::Metallic),
+            "map_d" => self.map(material, MapKind::Opacity),
+            "bump" | "map_bump" => self.map(material, MapKind::Bump),
+            "norm" | "map_kn" => self.map(material, MapKind::Normal),
+            // Ambient light is computed, and maps are filtered by the renderer.
+            "ka" | "map_ka" | "sharpness" | "map_aat" => {}
+            keyword => {
+                let short: String = keyword.chars().take(24).collect();
+                self.notes.at(self.line, format!("material statement `{short}` is not supported: left out"));
+            }
         }
-        // Some exporters write `Tr` as they write `d`: where both stand, `d` is believed.
-        "tr" if *opacity_by_d => {}
-        "tr" => set(&mut material.opacity, scalar(operands, keyword, line, notes).map(|tr| 1.0 - tr)),
-        "illum" => {
-            let model = scalar(operands, keyword, line, notes).filter(|model| (0.0..=10.0).contains(model));
-            set(&mut material.illumination, model.map(|model| model as u32));
+    }
+
+    /// Sets `r g b`, or `r` for a grey.
+    fn colour(&mut self, value: &mut Option<[f64; 3]>) {
+        if matches!(self.operands.clone().next(), Some(b"spectral" | b"xyz")) {
+            return self
+                .notes
+                .at(self.line, "colour given as `spectral` or `xyz` is not supported: left out");
         }
-        "map_kd" => set(&mut material.diffuse_map, map(operands, line, notes)),
-        "map_ks" => set(&mut material.specular_map, map(operands, line, notes)),
-        "map_ke" => set(&mut material.emission_map, map(operands, line, notes)),
-        "map_pr" => set(&mut material.roughness_map, map(operands, line, notes)),
-        "map_pm" => set(&mut material.metallic_map, map(operands, line, notes)),
-        "map_d" => set(&mut material.opacity_map, map(operands, line, notes)),
-        "bump" | "map_bump" => set(&mut material.bump_map, map(operands, line, notes)),
-        "norm" | "map_kn" => set(&mut material.normal_map, map(operands, line, notes)),
-        // Ambient light is computed, not invented; smoothing of maps is the renderer's.
-        "ka" | "map_ka" | "sharpness" | "map_aat" => {}
-        _ => return false,
+        let numbers: Option<Vec<f64>> = self.operands.clone().take(3).map(text::number).collect();
+        match numbers.as_deref() {
+            Some(&[r, g, b]) => *value = Some([r, g, b]),
+            Some(&[grey]) => *value = Some([grey; 3]),
+            _ => self.unreadable(),
+        }
     }
-    true
-}
 
-/// A statement that could not be read leaves what an earlier one said.
-fn set<T>(place: &mut Option<T>, value: Option<T>) {
-    if value.is_some() {
-        *place = value;
+    fn scalar(&mut self, value: &mut Option<f64>) {
+        match self.operands.next().and_then(text::number) {
+            Some(number) => *value = Some(number),
+            None => self.unreadable(),
+        }
     }
-}
 
-/// `r g b`, or `r` alone for a grey.
-fn colour<'a>(
-    operands: impl Iterator<Item = &'a [u8]> + Clone,
-    keyword: &str,
-    line: u32,
-    notes: &mut Notes,
-) -> Option<[f64; 3]> {
-    if matches!(operands.clone().next(), Some(b"spectral" | b"xyz")) {
-        notes.at(line, "colour given as `spectral` or `xyz` is not supported: left out");
-        return None;
+    fn unreadable(&mut self) {
+        let what = format!("material statement `{}` whose numbers cannot be read left out", self.keyword);
+        self.notes.at(self.line, what);
     }
-    let numbers: Option<Vec<f64>> = operands.take(3).map(text::number).collect();
-    match numbers.as_deref() {
-        Some(&[r, g, b]) => Some([r, g, b]),
-        Some(&[grey]) => Some([grey; 3]),
-        _ => unreadable(keyword, line, notes),
+
+    /// Sets `[-option values]... file name with blanks`.
+    fn map(self, material: &mut MtlMaterial, kind: MapKind) {
+        match Map::of_statement(self.operands.rest(), self.line) {
+            Some(map) => drop(material.maps.insert(kind, map)),
+            None => self.notes.at(self.line, "map without a file name left out"),
+        }
     }
-}
-
-fn scalar<'a>(
-    mut operands: impl Iterator<Item = &'a [u8]>,
-    keyword: &str,
-    line: u32,
-    notes: &mut Notes,
-) -> Option<f64> {
-    operands.next().and_then(text::number).or_else(|| unreadable(keyword, line, notes))
-}
-
-fn unreadable<T>(keyword: &str, line: u32, notes: &mut Notes) -> Option<T> {
-    notes.at(line, format!("material statement `{keyword}` whose numbers cannot be read left out"));
-    None
-}
-
-/// `[-option values]... file name with blanks`
-fn map(operands: Words, line: u32, notes: &mut Notes) -> Option<Map> {
-    let map = Map::of_statement(operands.rest(), line);
-    if map.is_none() {
-        notes.at(line, "map without a file name left out");
-    }
-    map
 }
 
 #[cfg(test)]
@@ -209,7 +216,7 @@ mod tests {
     }
 
     #[test]
-    fn values_and_comments() {
+    fn values_and_comments_are_read() {
         let (material, notes) =
             one("newmtl red wall \n\tKd 0.63 0.065 0.05 # Red\nKs 0.4\nNs 10.0\r\nillum 2\nKe 1e1 2 3\n");
         assert_eq!(material.name, "red wall ".into());
@@ -221,7 +228,7 @@ mod tests {
     }
 
     #[test]
-    fn opacity_in_its_spellings() {
+    fn d_wins_over_tr() {
         assert_eq!(one("newmtl a\nTr 0.25").0.opacity, Some(0.75));
         assert_eq!(one("newmtl a\nd 1\nTr 1").0.opacity, Some(1.0));
         assert_eq!(one("newmtl a\nTr 1\nd 1").0.opacity, Some(1.0));
@@ -233,13 +240,13 @@ mod tests {
         let mtl = parse(b"newmtl gr\xfcn #1\nmap_Kd -s 2 2 gr\xfcn #1.png\r\nbump".to_vec(), "m.mtl");
         let material = &mtl.materials[0];
         assert_eq!(material.name, b"gr\xfcn #1"[..].into());
-        let map = material.diffuse_map.as_ref().unwrap();
+        let map = &material.maps[&MapKind::Diffuse];
         assert_eq!((map.operand.bytes(), map.line, &map.found), (&b"-s 2 2 gr\xfcn #1.png"[..], 2, &None));
         assert_eq!(mtl.notes.sentences(), ["map without a file name left out (m.mtl:3)"]);
     }
 
     #[test]
-    fn what_cannot_be_read_is_left_out_and_said() {
+    fn unreadable_statements_are_noted() {
         let (material, notes) =
             one("Kd 1 1 1\nnewmtl a\nKd spectral x.rfl\nNs abc\nPe 10\nPe 10\nKs 1 nan 1\nmap_Kd");
         assert_eq!(material, MtlMaterial { name: "a".into(), ..Default::default() });

@@ -1,5 +1,5 @@
-//! Names as files write them: bytes of whatever encoding, which become text only where somebody reads them. A name
-//! may hold blanks, quotes and `#`; what an operand names is settled by what is there, so it has several readings.
+//! Names of materials and files: bytes of any encoding, shown as text in messages. A name may contain blanks,
+//! quotes and `#`, so an operand has several readings; the existing names decide among them.
 
 use core::fmt;
 use std::borrow::Cow;
@@ -7,7 +7,7 @@ use std::path::PathBuf;
 
 use super::text::{is_blank, trimmed};
 
-/// A name of a material or a file, in the bytes of the file that says it.
+/// Name of a material or file, in the bytes of the file that contains it.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct Name(Vec<u8>);
 
@@ -17,7 +17,7 @@ impl Name {
         &self.0
     }
 
-    /// Without blanks at its ends.
+    /// The name without blanks at its ends.
     pub(super) fn trimmed(&self) -> Name {
         trimmed(&self.0).into()
     }
@@ -41,7 +41,7 @@ impl fmt::Display for Name {
     }
 }
 
-/// The path of these bytes; where paths are no bytes, of the text that they show.
+/// Path of these bytes; on systems whose paths are text, of the text that they show.
 pub(super) fn path(bytes: &[u8]) -> PathBuf {
     #[cfg(unix)]
     let path: &std::ffi::OsStr = std::os::unix::ffi::OsStrExt::from_bytes(bytes);
@@ -50,7 +50,7 @@ pub(super) fn path(bytes: &[u8]) -> PathBuf {
     PathBuf::from(path)
 }
 
-/// Bytes as text for people: UTF-8, or Latin-1 where they are not. Different bytes of one encoding stay different.
+/// Bytes as text for messages: UTF-8, or Latin-1 if they are not UTF-8.
 pub(super) fn shown(bytes: &[u8]) -> Cow<'_, str> {
     match core::str::from_utf8(bytes) {
         Ok(text) => text.into(),
@@ -58,12 +58,12 @@ pub(super) fn shown(bytes: &[u8]) -> Cow<'_, str> {
     }
 }
 
-/// What names that differ only in case or encoding have in common.
+/// Equal for names that differ only in case or encoding.
 pub(super) fn folded(bytes: &[u8]) -> String {
     shown(bytes).to_lowercase()
 }
 
-/// How much of an operand a reading leaves out.
+/// Part of an operand that a reading leaves out, the likeliest first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Kind {
     /// Nothing.
@@ -72,22 +72,21 @@ pub(super) enum Kind {
     Trimmed,
     /// Quotes around it.
     Unquoted,
-    /// What may be a comment.
+    /// A possible comment.
     Cut,
 }
 
-/// What an operand may name.
+/// A possible name in an operand.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Reading<'a> {
     pub(super) name: &'a [u8],
     pub(super) kind: Kind,
 }
 
-/// More comments in a line are not tried.
+/// Possible comments of a line that are tried.
 const MOST_COMMENTS: usize = 16;
 
-/// The readings of an operand, the likeliest first: a name is what stands there, and ` #` begins a comment only
-/// where the whole is no name.
+/// Readings of an operand, the likeliest first: the whole operand, then parts of it.
 pub(super) fn readings(operand: &[u8]) -> Vec<Reading<'_>> {
     let mut readings: Vec<Reading> = Vec::with_capacity(3);
     let mut add = |name, kind| {
@@ -106,13 +105,14 @@ pub(super) fn readings(operand: &[u8]) -> Vec<Reading<'_>> {
     readings
 }
 
-/// What stands before each ` #`, trimmed, the longest first.
+/// The text before each ` #`, trimmed, the longest first.
 pub(super) fn without_comments(operand: &[u8]) -> impl Iterator<Item = &[u8]> {
-    let begins = |&i: &usize| operand[i] == b'#' && (i == 0 || is_blank(operand[i - 1]));
-    (0..operand.len()).rev().filter(begins).take(MOST_COMMENTS).map(|i| trimmed(&operand[..i]))
+    let starts = (0..operand.len()).rev().filter(|&i| operand[i..].starts_with(b"#"));
+    let starts = starts.filter(|&i| i == 0 || is_blank(operand[i - 1]));
+    starts.take(MOST_COMMENTS).map(|i| trimmed(&operand[..i]))
 }
 
-/// Without quotes around it.
+/// The name without quotes around it.
 pub(super) fn unquoted(name: &[u8]) -> &[u8] {
     match name {
         [b'"', inner @ .., b'"'] | [b'\'', inner @ .., b'\''] => inner,
@@ -129,7 +129,7 @@ mod tests {
     }
 
     #[test]
-    fn the_whole_comes_before_what_is_left_of_it() {
+    fn whole_operand_comes_before_its_parts() {
         assert_eq!(names("wood"), ["wood"]);
         assert_eq!(names(" wood "), [" wood ", "wood"]);
         assert_eq!(names("\"old wood\""), ["\"old wood\"", "old wood"]);
@@ -141,7 +141,7 @@ mod tests {
     }
 
     #[test]
-    fn bytes_that_are_not_utf_8_are_shown_as_latin_1() {
+    fn invalid_utf_8_is_shown_as_latin_1() {
         assert_eq!(Name::from(&b"m\xe4"[..]).to_string(), "mä");
         assert_eq!(Name::from("mä").to_string(), "mä");
         assert_eq!(folded(b"M\xc4\xd6"), folded("mäö".as_bytes()));

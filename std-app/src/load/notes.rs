@@ -1,89 +1,77 @@
-//! What was repaired or left out on the way in: said once for each kind, with a count and the first place.
+//! Notes on repairs: one sentence for each kind, with its count and first line.
 
-use core::fmt::Write;
 use std::borrow::Cow;
 use std::collections::HashMap;
-
-/// Where a thing was first met: a file and a line of it, 0 where there is none.
-#[derive(Clone, Debug, PartialEq, Eq)]
-struct Place {
-    file: String,
-    line: u32,
-}
 
 #[derive(Clone, Debug)]
 struct Note {
     what: Cow<'static, str>,
     count: u64,
-    first: Option<Place>,
+    /// File and line, or file, of the first case.
+    first: Option<String>,
 }
 
-/// A list of notes in the order of their first appearance.
+/// Notes in the order of their first appearance.
 #[derive(Clone, Debug, Default)]
 pub struct Notes {
     file: String,
     notes: Vec<Note>,
-    /// Where in `notes` each kind is.
-    places: HashMap<Cow<'static, str>, usize>,
+    /// Index of each kind in `notes`.
+    numbers: HashMap<Cow<'static, str>, usize>,
 }
 
 impl Notes {
-    /// An empty list; lines given to [`Notes::at`] are those of `file`.
+    /// An empty list; `file` is that of the lines given to [`Notes::at`].
     pub fn of(file: impl Into<String>) -> Self {
         Self { file: file.into(), ..Self::default() }
     }
 
-    /// One more of `what`, at `line` of the file.
+    /// Adds a case of `what` at a line of the file, or 0.
     pub fn at(&mut self, line: u32, what: impl Into<Cow<'static, str>>) {
-        let first = Place { file: self.file.clone(), line };
-        self.push(Note { what: what.into(), count: 1, first: Some(first) });
+        let what = what.into();
+        let is_known = self.numbers.get(&what).is_some_and(|number| self.notes[*number].first.is_some());
+        let first = (!is_known).then(|| match line {
+            0 => self.file.clone(),
+            _ => format!("{}:{line}", self.file),
+        });
+        self.push(Note { what, count: 1, first });
     }
 
-    /// `count` more of `what`, wherever they are; nothing where `count` is 0.
+    /// Adds `count` cases of `what` without a line; none if `count` is 0.
     pub fn add(&mut self, count: u64, what: impl Into<Cow<'static, str>>) {
         if count > 0 {
             self.push(Note { what: what.into(), count, first: None });
         }
     }
 
-    /// Everything of `later`, after what is here.
+    /// Appends all notes of `later`.
     pub fn merge(&mut self, later: Notes) {
         later.notes.into_iter().for_each(|note| self.push(note));
     }
 
     /// One sentence for each kind.
     pub fn sentences(&self) -> Vec<String> {
-        self.notes.iter().map(Note::sentence).collect()
+        let sentence = |Note { what, count, first }: &Note| match (count, first) {
+            (1, None) => what.to_string(),
+            (1, Some(first)) => format!("{what} ({first})"),
+            (_, None) => format!("{what}, {count} times"),
+            (_, Some(first)) => format!("{what}, {count} times (first: {first})"),
+        };
+        self.notes.iter().map(sentence).collect()
     }
 
     fn push(&mut self, note: Note) {
-        match self.places.get(&note.what).and_then(|place| self.notes.get_mut(*place)) {
-            Some(known) => {
+        match self.numbers.get(&note.what) {
+            Some(&number) => {
+                let known = &mut self.notes[number];
                 known.count += note.count;
                 known.first = known.first.take().or(note.first);
             }
             None => {
-                self.places.insert(note.what.clone(), self.notes.len());
+                self.numbers.insert(note.what.clone(), self.notes.len());
                 self.notes.push(note);
             }
         }
-    }
-}
-
-impl Note {
-    fn sentence(&self) -> String {
-        let mut sentence = self.what.to_string();
-        if self.count > 1 {
-            let _ = write!(sentence, ", {} times", self.count);
-        }
-        if let Some(Place { file, line }) = &self.first {
-            let first = if self.count > 1 { "first: " } else { "" };
-            let _ = match line {
-                0 => write!(sentence, " ({first}{file})"),
-                _ => write!(sentence, " ({first}{file}:{line})"),
-            };
-        }
-        sentence
     }
 }
 
@@ -92,7 +80,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_kind_is_said_once_with_its_count_and_first_place() {
+    fn each_kind_has_a_count_and_its_first_line() {
         let mut notes = Notes::of("a.obj");
         notes.at(7, "face with two corners left out");
         let mut later = Notes::of("a.obj");

@@ -1,26 +1,26 @@
-//! Glass that is open: the inside of a dielectric is what lies behind its faces, so that a single pane fills half of
-//! the world with glass. Nothing is changed, but it is said.
+//! Notes on open glass: the inside of a dielectric lies behind its faces, so a single pane fills half of the space
+//! with glass.
 
 use super::geometry::Geometry;
 use super::notes::Notes;
 use halflight_core::scene::{Material, Surface};
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
-/// Notes the pieces of glass with edges that belong to one face only, whatever material that is of.
+/// Notes glass with edges of one face only, counting faces of all materials.
 pub(super) fn note(geometry: &Geometry, materials: &[Material], names: &[String], notes: &mut Notes) {
     let is_glass = |t: u32| matches!(materials[t as usize].surface, Surface::Dielectric { .. });
     if !(0..materials.len() as u32).any(is_glass) {
         return;
     }
-    // Corners in the same place are one, whatever their normals and texture coordinates.
-    let mut places: HashMap<[u32; 3], u32> = HashMap::new();
-    let place = |v: u32| geometry.positions[v as usize].map(|x| (x + 0.0).to_bits());
+    // Corners at the same position are one, regardless of normals and texture coordinates.
+    let mut points: HashMap<[u32; 3], u32> = HashMap::new();
+    let position = |v: u32| geometry.positions[v as usize].map(|x| (x + 0.0).to_bits());
     let mut pieces = Pieces::default();
     let mut edges: HashMap<[u32; 2], (u32, u32)> = HashMap::new();
     for triangle in geometry.triangles.iter().filter(|t| is_glass(t.material)) {
         let corners = triangle.vertices.map(|v| {
-            let next = places.len() as u32;
-            *places.entry(place(v)).or_insert(next)
+            let next = points.len() as u32;
+            *points.entry(position(v)).or_insert(next)
         });
         pieces.join(corners);
         for edge in edges_of(corners) {
@@ -32,7 +32,7 @@ pub(super) fn note(geometry: &Geometry, materials: &[Material], names: &[String]
         return;
     }
     for triangle in geometry.triangles.iter().filter(|t| !is_glass(t.material)) {
-        let corners = triangle.vertices.map(|v| places.get(&place(v)).copied());
+        let corners = triangle.vertices.map(|v| points.get(&position(v)).copied());
         for edge in [(0, 1), (1, 2), (2, 0)].map(|(i, j)| (corners[i], corners[j])) {
             if let (Some(a), Some(b)) = edge {
                 edges.remove(&[a.min(b), a.max(b)]);
@@ -48,8 +48,8 @@ pub(super) fn note(geometry: &Geometry, materials: &[Material], names: &[String]
     for (material, (count, roots)) in open {
         let (name, pieces) = (&names[material as usize], roots.len());
         let what = format!(
-            "glass `{name}` is open ({count} edges of one face, in {pieces} of its pieces): all that lies behind it \
-             counts as its inside; a pane needs two faces"
+            "glass `{name}` is open ({count} edges of one face, in {pieces} of its pieces): everything behind it is \
+             its inside; a pane needs two faces"
         );
         notes.add(1, what);
     }
@@ -59,18 +59,18 @@ fn edges_of([a, b, c]: [u32; 3]) -> impl Iterator<Item = [u32; 2]> {
     [[a, b], [b, c], [c, a]].into_iter().filter(|[p, q]| p != q).map(|[p, q]| [p.min(q), p.max(q)])
 }
 
-/// Places that triangles connect (Tarjan 1975).
+/// Connected components of points (union-find, Tarjan 1975).
 #[derive(Default)]
 struct Pieces(Vec<u32>);
 
 impl Pieces {
-    fn root(&mut self, mut place: u32) -> u32 {
-        while self.0[place as usize] != place {
-            let above = self.0[self.0[place as usize] as usize];
-            self.0[place as usize] = above;
-            place = above;
+    fn root(&mut self, mut point: u32) -> u32 {
+        while self.0[point as usize] != point {
+            let above = self.0[self.0[point as usize] as usize];
+            self.0[point as usize] = above;
+            point = above;
         }
-        place
+        point
     }
 
     fn join(&mut self, corners: [u32; 3]) {

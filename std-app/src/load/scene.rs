@@ -1,4 +1,4 @@
-//! A loaded scene: the buffers that the core borrows, and what is known of where they came from.
+//! A loaded scene: the buffers that the core borrows, their files and repairs.
 
 use super::far_camera::start;
 use super::settings::RenderSettings;
@@ -9,7 +9,7 @@ use halflight_core::geometry::Bounds;
 use halflight_core::scene::{Camera, Environment, Material, Mesh, PointLight, Scene, Texture, Triangle};
 use std::path::PathBuf;
 
-/// Everything of a scene, owned, in the coordinates of the core.
+/// A scene with its buffers, in the coordinates of the core.
 #[derive(Clone, Debug)]
 pub struct LoadedScene {
     /// Vertex positions.
@@ -20,39 +20,38 @@ pub struct LoadedScene {
     pub texcoords: Vec<[f32; 2]>,
     /// All triangles.
     pub triangles: Vec<Triangle>,
-    /// Referred to by the triangles.
+    /// Materials of the triangles.
     pub materials: Vec<Material>,
-    /// Names of the materials, one for each.
+    /// Names of the materials.
     pub material_names: Vec<String>,
-    /// Referred to by the materials and the environment.
+    /// Textures of the materials and the environment.
     pub textures: TextureSet,
     /// Lights without surface.
     pub lights: Vec<PointLight>,
-    /// What is seen where nothing is.
+    /// Light from infinity.
     pub environment: Option<Environment>,
     /// The camera of the scene file.
     pub camera: Option<Camera>,
-    /// Where that stands and looks.
+    /// Its position and direction.
     pub view: Option<View>,
     /// Settings of the scene file.
     pub settings: RenderSettings,
-    /// From the coordinates of the file to those of the buffers.
+    /// Transform from the coordinates of the file to those of the buffers.
     pub transform: SceneTransform,
-    /// Every file that was looked at: the scene, its meshes, their materials, all pictures that these name and that
-    /// are there, whether they could be read or not.
+    /// All existing files that the scene names: itself, meshes, materials and pictures, unreadable ones included.
     pub files: Vec<PathBuf>,
-    /// What was repaired or left out, a sentence for each kind.
+    /// Repairs, one sentence for each kind.
     pub repairs: Vec<String>,
 }
 
-/// Where a camera stands and looks, in the coordinates of the files.
+/// Position and direction of a camera, in the coordinates of the files.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct View {
-    /// Where from.
+    /// Position.
     pub eye: [f64; 3],
-    /// Where to.
+    /// A point on the optical axis.
     pub look_at: [f64; 3],
-    /// Up in the picture.
+    /// Direction that is up in the picture.
     pub up: [f64; 3],
 }
 
@@ -64,7 +63,7 @@ pub struct SceneViews<'a> {
 }
 
 impl LoadedScene {
-    /// Views for the core.
+    /// The scene with its texture views.
     pub fn views(&self) -> SceneViews<'_> {
         SceneViews { loaded: self, textures: self.textures.views() }
     }
@@ -79,22 +78,18 @@ impl LoadedScene {
         }
     }
 
-    /// `camera`, whose rays start before all that it sees, if it stands at `view` very far from there.
+    /// `camera` at `view`; if it is very far from the scene, its rays start before all visible surfaces.
     pub fn with_start(&self, camera: Camera, view: View) -> Camera {
         Camera { start: start(self, &camera, view), ..camera }
     }
 
-    /// The middle of the scene in the coordinates of the core: of its bounding box, or of what is fine in it.
+    /// The centre of the scene in the coordinates of the core: of its bounding box or its detail.
     pub fn middle(&self) -> Vec3 {
-        let bounds = self.bounds();
+        let bounds = Bounds::around(self.positions.iter().map(|&p| p.into()));
         if bounds.extent().max_element() > CENTRED { Vec3::ZERO } else { bounds.center() }
     }
 
-    fn bounds(&self) -> Bounds {
-        Bounds::around(self.positions.iter().map(|&p| p.into()))
-    }
-
-    /// A pinhole that stands and looks as said in the coordinates of the files; `None` where both points are the same.
+    /// A pinhole camera at `view`; `None` if both of its points are equal.
     pub fn camera_at(&self, view: View, fov_degrees: f64) -> Option<Camera> {
         direction(view.eye, view.look_at)?;
         let distance = DVec3::from(view.eye).distance(view.look_at.into());
@@ -102,17 +97,17 @@ impl LoadedScene {
         Some(Camera { focus_distance: self.transform.length(distance) as f32, ..camera })
     }
 
-    /// The camera of the scene file, else one that frames everything.
+    /// The camera of the scene file, else one that frames the scene.
     pub fn camera_or_default(&self) -> Camera {
         self.camera.unwrap_or_else(|| Camera::framing(&self.mesh()))
     }
 }
 
-/// A scene whose bounding box is at the origin is not longer than this.
+/// Largest extent of a scene whose bounding box is centred at the origin.
 const CENTRED: f32 = 4.0;
 
 impl SceneViews<'_> {
-    /// The scene as the core sees it, looked at by `camera`.
+    /// The scene for the core, with `camera`.
     pub fn scene(&self, camera: Camera) -> Scene<'_> {
         let loaded = self.loaded;
         Scene {

@@ -1,8 +1,8 @@
-//! What a scene file may ask of the renderer. Flags of the command line win over it.
+//! Render settings of a scene file; flags of the command line override them.
 
 use serde::Deserialize;
 
-/// Render settings of a scene file; `None` where it says nothing.
+/// Render settings; `None` if not given.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RenderSettings {
@@ -10,11 +10,11 @@ pub struct RenderSettings {
     pub size: Option<[u32; 2]>,
     /// Samples per pixel.
     pub spp: Option<u32>,
-    /// Rendering time at which to stop, in seconds.
+    /// Rendering time limit, in seconds.
     pub time: Option<f64>,
     /// relMSE at which to stop.
     pub error: Option<f64>,
-    /// Longest path, in segments; 1 is directly seen light.
+    /// Longest path, in segments; 1: directly visible light.
     pub max_depth: Option<u32>,
     /// Seed of all random numbers.
     pub seed: Option<u32>,

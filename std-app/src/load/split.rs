@@ -1,21 +1,21 @@
-//! Large triangles are cut into pieces that are not much larger than they are far from the origin, where the detail of a scene
-//! is ([`super::fit`]): a point on a piece is then as precise as its distance asks for.
+//! Cutting of large triangles. The detail of the scene is at the origin ([`super::fit`]), and a piece is not much
+//! larger than its distance from it, so points on a piece are as precise as their distance requires.
 //!
-//! The planes x, y, z = ±16 · 4^k cut whatever lies on both sides of them, however small. A cut of an edge follows from its
-//! ends and the plane alone, so that neighbours agree on it to the bit and no gap opens.
+//! The planes x, y, z = ±16 · 4^k cut every triangle that crosses them. The cut of an edge depends only on its ends
+//! and the plane, so neighbours agree to the bit and no gap opens.
 
 use glam::DVec3;
 
-/// The planes next to the origin are this far from it; what is fine there is about 1 across.
+/// Distance of the first planes; the size of the detail is about 1.
 const NEAREST: f64 = 16.0;
 
-/// How much farther the next one is.
+/// Ratio of the distances of successive planes.
 const STEP: f64 = 4.0;
 
-/// Planes on each side: the last is at 16 · 4^15, beyond all that there is.
+/// Planes on each side; the last, at 16 · 4^15, is beyond every scene.
 const PLANES: i32 = 16;
 
-/// Pieces beyond which nothing is cut: a file of very many large triangles is no ground.
+/// Most pieces of a scene; scenes of very many large triangles are not cut.
 const MOST: f64 = 1e6;
 
 /// A corner of a piece.
@@ -26,7 +26,7 @@ pub(super) struct Corner {
     pub(super) weights: DVec3,
 }
 
-/// Planes between two coordinates.
+/// The planes between two coordinates.
 fn planes(low: f64, high: f64) -> impl Iterator<Item = f64> {
     let all = (0..PLANES).flat_map(|k| {
         let distance = NEAREST * STEP.powi(k);
@@ -40,18 +40,18 @@ fn extent(corners: [DVec3; 3]) -> [DVec3; 2] {
     [p.min(q).min(r), p.max(q).max(r)]
 }
 
-/// At most how many pieces a triangle falls into; 1 where it stays whole.
+/// Upper bound of the number of pieces of a triangle; 1 if it is not cut.
 pub(super) fn count(corners: [DVec3; 3]) -> f64 {
     let [low, high] = extent(corners);
     (0..3).map(|axis| 1.0 + planes(low[axis], high[axis]).count() as f64).product()
 }
 
-/// Whether so many pieces in all, of triangles that do not stay whole, are worth it.
+/// Whether this many pieces of a scene are cut.
 pub(super) fn is_affordable(pieces: f64) -> bool {
     pieces <= MOST
 }
 
-/// The convex pieces of a triangle, wound as it is.
+/// The convex pieces of a triangle, with its winding.
 pub(super) fn pieces(corners: [DVec3; 3]) -> Vec<Vec<Corner>> {
     let [low, high] = extent(corners);
     let corner = |i: usize| Corner { position: corners[i], weights: DVec3::AXES[i] };
@@ -64,7 +64,7 @@ pub(super) fn pieces(corners: [DVec3; 3]) -> Vec<Vec<Corner>> {
     pieces
 }
 
-/// What of a convex polygon is below and above a plane.
+/// The parts of a convex polygon below and above a plane.
 fn cut(polygon: Vec<Corner>, axis: usize, at: f64) -> Vec<Vec<Corner>> {
     let height = |corner: &Corner| corner.position[axis] - at;
     if polygon.iter().all(|corner| height(corner) <= 0.0)
@@ -90,7 +90,7 @@ fn cut(polygon: Vec<Corner>, axis: usize, at: f64) -> Vec<Vec<Corner>> {
     vec![below, above]
 }
 
-/// Where the edge between two corners meets a plane: the same whichever comes first.
+/// Intersection of an edge with a plane; the same in both directions of the edge.
 fn crossing(a: &Corner, b: &Corner, axis: usize, at: f64) -> Corner {
     let is_first = a.position.to_array() < b.position.to_array();
     let (a, b) = if is_first { (a, b) } else { (b, a) };
@@ -135,18 +135,18 @@ mod tests {
     }
 
     #[test]
-    fn neighbours_agree_on_every_cut_to_the_bit() {
+    fn neighbours_have_equal_cuts() {
         let at = |x: f64, z: f64| DVec3::new(x, 0.3 * x - 0.7 * z, z);
         let [a, b, c, d] = [at(-1e7, -3e3), at(77.3, 5e6), at(3e6, -11.0), at(9e6, 8e6)];
-        // Along the edge from b to c, once each way.
-        let mut seen: HashMap<[u64; 3], u32> = HashMap::new();
+        // Along the edge from b to c, in both directions.
+        let mut sides: HashMap<[u64; 3], u32> = HashMap::new();
         for (triangle, apart) in [([a, b, c], 0), ([c, b, d], 2)] {
             for corner in pieces(triangle).into_iter().flatten().filter(|corner| corner.weights[apart] == 0.0)
             {
                 let key = corner.position.to_array().map(f64::to_bits);
-                *seen.entry(key).or_default() |= if apart == 0 { 1 } else { 2 };
+                *sides.entry(key).or_default() |= if apart == 0 { 1 } else { 2 };
             }
         }
-        assert!(seen.len() > 15 && seen.values().all(|sides| *sides == 3), "{seen:?}");
+        assert!(sides.len() > 15 && sides.values().all(|sides| *sides == 3), "{sides:?}");
     }
 }

@@ -1,25 +1,24 @@
-//! What the statements of an MTL file mean: from [`MtlMaterial`] to the core's [`Material`]. The conventions
-//! are those of `docs/loading.md`; that of plastics is argued in `docs/decisions/0002-plastic-from-mtl.md`.
+//! Meaning of MTL statements: from [`MtlMaterial`] to the core's [`Material`], by the conventions of
+//! `docs/loading.md`. `docs/decisions/0002-plastic-from-mtl.md` explains that of plastics.
 
 mod inputs;
 
 use super::illum::{self, DARK_BASE, is_glass, is_pbr};
-use super::map::Map;
-use super::mtl::MtlMaterial;
+use super::mtl::{MapKind, MtlMaterial};
 use super::notes::Notes;
 use super::texture_set::TextureSet;
 use halflight_core::Rgb;
 use halflight_core::scene::{ColorInput, Material, ScalarInput, Surface};
 
-/// How far `Ks` may be from the Fresnel reflectance of `Ni` for a coat to be read as a dielectric: files are
-/// written with two or three digits.
+/// Relative difference of `Ks` and the Fresnel reflectance of `Ni` up to which a coat is a dielectric: files have
+/// two or three digits.
 const PLASTIC_TOLERANCE: f64 = 0.05;
-/// Index of refraction where a file has glass or a PBR coat without `Ni`.
+/// Index of refraction of glass and PBR coats without `Ni`.
 const DEFAULT_IOR: f64 = 1.5;
 
-/// The core's material for what the file says, with views of the textures that it needs.
+/// The material of the core; adds the views of its textures to `textures`.
 pub(super) fn resolve(mtl: &MtlMaterial, textures: &mut TextureSet, notes: &mut Notes) -> Material {
-    illum::note_what_is_lost(mtl, notes);
+    illum::note_ignored_statements(mtl, notes);
     let mut resolver = Resolver { mtl, textures, notes };
     let surface = resolver.surface();
     Material {
@@ -31,24 +30,6 @@ pub(super) fn resolve(mtl: &MtlMaterial, textures: &mut TextureSet, notes: &mut 
     }
 }
 
-/// The maps of a material.
-pub(super) fn maps(mtl: &MtlMaterial) -> impl Iterator<Item = &Map> {
-    let MtlMaterial { diffuse_map, specular_map, emission_map, roughness_map, .. } = mtl;
-    let MtlMaterial { metallic_map, opacity_map, bump_map, normal_map, .. } = mtl;
-    let colours = [diffuse_map, specular_map, emission_map];
-    let numbers = [roughness_map, metallic_map, opacity_map, bump_map, normal_map];
-    colours.into_iter().chain(numbers).flatten()
-}
-
-/// The same, to be changed.
-pub(super) fn maps_mut(mtl: &mut MtlMaterial) -> impl Iterator<Item = &mut Map> {
-    let MtlMaterial { diffuse_map, specular_map, emission_map, roughness_map, .. } = mtl;
-    let MtlMaterial { metallic_map, opacity_map, bump_map, normal_map, .. } = mtl;
-    let colours = [diffuse_map, specular_map, emission_map];
-    let numbers = [roughness_map, metallic_map, opacity_map, bump_map, normal_map];
-    colours.into_iter().chain(numbers).flatten()
-}
-
 struct Resolver<'a> {
     mtl: &'a MtlMaterial,
     textures: &'a mut TextureSet,
@@ -56,7 +37,7 @@ struct Resolver<'a> {
 }
 
 impl Resolver<'_> {
-    /// `illum` decides what nothing more precise says: `Pr`, `Pm` and their maps win, and a diffuse base stays.
+    /// `Pr`, `Pm`, their maps and a diffuse base override `illum`.
     fn surface(&mut self) -> Surface {
         if is_glass(self.mtl) {
             return self.glass();
@@ -73,7 +54,7 @@ impl Resolver<'_> {
     }
 
     fn glass(&mut self) -> Surface {
-        let roughness = match (self.mtl.roughness, &self.mtl.roughness_map) {
+        let roughness = match (self.mtl.roughness, self.mtl.map(MapKind::Roughness)) {
             (None, None) => 0.0.into(),
             _ => self.roughness(),
         };
@@ -81,19 +62,18 @@ impl Resolver<'_> {
         Surface::Dielectric { ior: self.ior().unwrap_or(DEFAULT_IOR) as f32, tint, roughness }
     }
 
-    /// A metal of colour `Kd`, or `Ks` where that is black or absent; a perfect mirror where `Pr` is 0.
+    /// A metal of colour `Kd`, or `Ks` if `Kd` is black or absent; a perfect mirror if `Pr` is 0.
     fn metal(&mut self, base: ColorInput) -> Surface {
-        let is_absent = self.mtl.diffuse.is_none() && self.mtl.diffuse_map.is_none();
+        let is_absent = self.mtl.diffuse.is_none() && !self.mtl.has_map(MapKind::Diffuse);
         let by_specular = self.has_specular() && (is_black(&base) || is_absent);
         let reflectance = if by_specular { self.specular() } else { base };
-        if self.mtl.roughness == Some(0.0) && self.mtl.roughness_map.is_none() {
+        if self.mtl.roughness == Some(0.0) && !self.mtl.has_map(MapKind::Roughness) {
             return Surface::Mirror { reflectance };
         }
         Surface::Conductor { reflectance, roughness: self.roughness() }
     }
 
-    /// Whether `illum 3` or `5` leaves nothing but a reflection: by `Ks`, with as good as no base, or by `Kd` alone,
-    /// which is its colour then.
+    /// Whether `illum 3` or `5` is a pure reflection: by `Ks` over a dark base, or by `Kd` without `Ks`.
     fn is_mirror(&mut self, base: &ColorInput) -> bool {
         let Some(model @ (3 | 5)) = self.mtl.illumination else { return false };
         let is_dark = base.texture.is_none() && f64::from(base.value.max_element()) <= DARK_BASE;
@@ -102,7 +82,7 @@ impl Resolver<'_> {
             (true, true) => ("is a mirror: its dark `Kd` is left out", true),
             (true, false) => ("is a reflection `Ks` over its `Kd`", false),
             (false, _) if is_pbr(self.mtl) || self.mtl.metallic.is_some() => {
-                ("is what `Pr` and `Pm` say", false)
+                ("is as `Pr` and `Pm` specify", false)
             }
             (false, _) if base.texture.is_some() => ("is diffuse: there is no `Ks` to reflect by", false),
             (false, _) => ("is a mirror of colour `Kd`: there is no `Ks`", true),
@@ -112,10 +92,10 @@ impl Resolver<'_> {
         is_mirror
     }
 
-    /// `illum 3` reflects alike at all angles, `illum 5` by Fresnel's law; `Pr` may make either rough.
+    /// `illum 3` reflects equally at all angles, `illum 5` by Fresnel's law; `Pr` makes either rough.
     fn mirror(&mut self, base: ColorInput) -> Surface {
         let reflectance = if self.has_specular() { self.specular() } else { base };
-        let is_smooth = self.mtl.roughness.is_none_or(|pr| pr == 0.0) && self.mtl.roughness_map.is_none();
+        let is_smooth = self.mtl.roughness.unwrap_or(0.0) == 0.0 && !self.mtl.has_map(MapKind::Roughness);
         match (self.mtl.illumination, is_smooth) {
             (Some(3), true) => Surface::Mirror { reflectance },
             (_, true) => Surface::Conductor { reflectance, roughness: 0.0.into() },
@@ -123,7 +103,7 @@ impl Resolver<'_> {
         }
     }
 
-    /// Diffuse, under a coat where there is one.
+    /// Diffuse, under a coat if there is one.
     fn coated(&mut self, base: ColorInput, metallic: ScalarInput) -> Surface {
         let (specular, ior) = if self.has_specular() {
             (self.specular(), self.plastic_ior())
@@ -139,24 +119,24 @@ impl Resolver<'_> {
         Surface::Glossy { base, specular, roughness: self.roughness(), metallic, ior }
     }
 
-    /// The index of a coat whose `Ks` is the Fresnel reflectance of its `Ni`.
+    /// Index of a coat whose `Ks` is the Fresnel reflectance of its `Ni`.
     fn plastic_ior(&mut self) -> Option<f32> {
         let ior = self.ior()?;
-        let specular = self.mtl.specular.filter(|_| self.mtl.specular_map.is_none())?;
+        let specular = self.mtl.specular.filter(|_| !self.mtl.has_map(MapKind::Specular))?;
         let expected = fresnel(ior);
         let agrees = specular.iter().all(|ks| (ks - expected).abs() <= PLASTIC_TOLERANCE * expected);
         (matches!(self.mtl.illumination, Some(2 | 3 | 5)) && expected > 0.0 && agrees).then_some(ior as f32)
     }
 
-    /// Whether `Ks` counts: `illum 0` and `1` have no highlight unless `Pr` or `Pm` speaks of one.
+    /// Whether `Ks` counts: `illum 0` and `1` have no highlight without `Pr` or `Pm`.
     fn has_specular(&self) -> bool {
         let mtl = self.mtl;
         let is_matt = matches!(mtl.illumination, Some(0 | 1)) && !is_pbr(mtl);
-        !is_matt && (mtl.specular.is_some() || mtl.specular_map.is_some())
+        !is_matt && (mtl.specular.is_some() || mtl.has_map(MapKind::Specular))
     }
 
     fn specular(&mut self) -> ColorInput {
-        let texture = self.textures.colour(self.mtl.specular_map.as_ref());
+        let texture = self.textures.colour(self.mtl.map(MapKind::Specular));
         let factor = self.factor("Ks", self.mtl.specular, [1.0; 3], texture.is_some());
         ColorInput { value: self.reflectance("Ks", factor), texture }
     }

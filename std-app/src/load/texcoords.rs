@@ -1,31 +1,32 @@
-//! Texture coordinates on their way to f32. Far from 0 they would lose their fraction, which is all that a texture
-//! that repeats needs of them: the whole number is taken off in f64, for each triangle.
+//! Rounding of texture coordinates to f32. Large ones would lose their fraction, the only part that a repeating
+//! texture needs, so whole periods are subtracted in f64, per triangle.
 
 use super::geometry::Geometry;
 use super::map::Map;
+use super::notes::Notes;
 use std::collections::HashMap;
 
-/// From here on a coordinate is far: f32 still has 1/65536 there, a sixteenth of a texel of 4096.
+/// Least coordinate that is reduced: f32 resolves 1/65536 below, a sixteenth of a texel of 4096.
 const FAR: f64 = 256.0;
-/// Whole numbers are taken off in steps of this, so that neighbours share their vertices.
+/// Multiples of this are subtracted, so that neighbours share their vertices.
 const STEP: f64 = 64.0;
-/// The longest period of maps of different scales.
+/// Longest common period of maps of different scales.
 const LONGEST_PERIOD: u32 = 1000;
-/// From here on a coordinate that is left keeps less than 1/128.
+/// Reduced coordinate above which f32 resolves less than 1/128.
 const BLURS: f64 = 65536.0;
 
-/// Says of triangles what [`take_whole_numbers_off`] counts.
+/// The note on triangles that [`subtract_periods`] counts.
 pub(super) const BLURRED: &str =
-    "triangle with texture coordinates beyond 65536, which leave no detail of its textures";
+    "triangle with texture coordinates beyond 65536: its textures lose all detail";
 
-/// What becomes of the texture coordinates of a material.
+/// Transform of the texture coordinates of a material.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Texcoords {
-    /// Factor on them.
+    /// Factor.
     scale: [f64; 2],
-    /// Added after that.
+    /// Added after the scale.
     offset: [f64; 2],
-    /// All maps are the same this much further; `None` where some are not, or there are none.
+    /// Common period of all maps; `None` if there is none.
     period: Option<f64>,
 }
 
@@ -36,13 +37,13 @@ impl Default for Texcoords {
 }
 
 impl Texcoords {
-    /// Of a material with `maps`. Scale and offset that all of them share become those of the coordinates.
+    /// The transform for `maps`; takes over a scale and offset that all maps have in common.
     pub(super) fn of_maps(maps: &mut [&mut Map]) -> Self {
         let mut texcoords = Self::default();
         let Some(first) = maps.first() else { return texcoords };
-        let shared = (first.options.scale, first.options.offset);
-        if maps.iter().all(|map| (map.options.scale, map.options.offset) == shared) {
-            (texcoords.scale, texcoords.offset) = shared;
+        let common = (first.options.scale, first.options.offset);
+        if maps.iter().all(|map| (map.options.scale, map.options.offset) == common) {
+            (texcoords.scale, texcoords.offset) = common;
             for map in maps.iter_mut() {
                 (map.options.scale, map.options.offset) = ([1.0; 2], [0.0; 2]);
             }
@@ -54,41 +55,36 @@ impl Texcoords {
         texcoords
     }
 
-    /// The coordinates, not yet rounded; those that are not finite are 0 and counted.
-    pub(super) fn placed(&self, texcoords: &[[f64; 2]], broken: &mut u64) -> Vec<[f64; 2]> {
-        let place = |uv: &[f64; 2]| {
+    /// The coordinates before rounding; 0 with a note if they are not finite.
+    pub(super) fn placed(&self, texcoords: &[[f64; 2]], notes: &mut Notes) -> Vec<[f64; 2]> {
+        let transform = |uv: &[f64; 2]| {
             let uv = [0, 1].map(|i| uv[i] * self.scale[i] + self.offset[i]);
             if uv.iter().all(|&x| (x as f32).is_finite()) {
                 return uv;
             }
-            *broken += 1;
+            notes.add(1, "texture coordinate that is not finite is set to 0 0");
             [0.0; 2]
         };
-        texcoords.iter().map(place).collect()
+        texcoords.iter().map(transform).collect()
     }
 }
 
-/// The least whole number that all scales take to whole numbers.
+/// The least whole number whose products with all scales are whole.
 fn period(scales: &[f64]) -> Option<f64> {
     let is_whole = |x: f64| (x - x.round()).abs() <= 1e-9 * x.abs().max(1.0);
     (1..=LONGEST_PERIOD).map(f64::from).find(|period| scales.iter().all(|scale| is_whole(scale * period)))
 }
 
-/// Takes whole numbers off the texture coordinates of triangles that are far from 0; a vertex that triangles far from
-/// each other share becomes several. `placed` are the coordinates of the vertices in f64. Returns the number of
-/// triangles whose coordinates are still so large that no detail is left.
-pub(super) fn take_whole_numbers_off(
-    texcoords: &Texcoords,
-    placed: &[[f64; 2]],
-    geometry: &mut Geometry,
-) -> u64 {
+/// Subtracts whole periods from large texture coordinates; a vertex between distant triangles is duplicated.
+/// `placed`: the coordinates in f64. Returns the number of triangles that lose all detail.
+pub(super) fn subtract_periods(texcoords: &Texcoords, placed: &[[f64; 2]], geometry: &mut Geometry) -> u64 {
     let Some(period) = texcoords.period else { return 0 };
     if placed.iter().flatten().all(|x| x.abs() < FAR) {
         return 0;
     }
     let step = period * (STEP / period).ceil();
     let mut blurred = 0;
-    // The vertex that stands for a vertex of the file less a multiple of the step.
+    // The vertex for a vertex of the file minus a multiple of the step.
     let mut vertices: HashMap<(u32, [i64; 2]), u32> = HashMap::new();
     let mut is_taken = vec![false; placed.len()];
     for triangle in &mut geometry.triangles {
@@ -125,7 +121,7 @@ mod tests {
     use super::*;
     use halflight_core::scene::Triangle;
 
-    /// Two triangles that share an edge, the texture coordinates of whose corners are `u` along u.
+    /// Two triangles with a common edge; `u` are the texture coordinates of the corners along u.
     fn strip(u: [f64; 4], texcoords: Texcoords) -> (Geometry, u64) {
         let uv = u.map(|u| [u, 0.25]);
         let triangles = [[0, 1, 2], [1, 3, 2]].map(|vertices| Triangle { vertices, material: 0 }).to_vec();
@@ -135,7 +131,7 @@ mod tests {
             triangles,
             ..Geometry::default()
         };
-        let blurred = take_whole_numbers_off(&texcoords, &uv, &mut geometry);
+        let blurred = subtract_periods(&texcoords, &uv, &mut geometry);
         (geometry, blurred)
     }
 
@@ -152,7 +148,7 @@ mod tests {
     }
 
     #[test]
-    fn the_fraction_stays_whatever_the_whole_number() {
+    fn large_coordinates_keep_their_fraction() {
         for whole in [1e3, 1e5, 1e7, 1e12, -1e5, -1e12] {
             let (geometry, blurred) = strip([0.25, 0.5, 0.75, 1.0].map(|u| whole + u), repeating([1.0; 2]));
             let [a, b, c] = of_triangle(&geometry, 0);
@@ -163,7 +159,7 @@ mod tests {
     }
 
     #[test]
-    fn coordinates_near_0_and_those_that_clamp_keep_their_bits() {
+    fn small_and_clamped_coordinates_keep_their_bits() {
         let near = [0.1, -200.0, 255.9, 0.3];
         assert_eq!(strip(near, repeating([1.0; 2])).0.texcoords[1][0], -200.0);
         let far = [1e6, 1e6 + 1.0, 1e6, 1e6];
@@ -174,7 +170,7 @@ mod tests {
     }
 
     #[test]
-    fn a_vertex_between_triangles_far_apart_becomes_two() {
+    fn vertex_between_distant_triangles_is_duplicated() {
         let (geometry, _) = strip([0.0, 300.5, 301.0, 1000.25], repeating([1.0; 2]));
         assert_eq!(of_triangle(&geometry, 0), [0.0, 300.5, 301.0]);
         assert_eq!(of_triangle(&geometry, 1), [44.5, 744.25, 45.0]);
@@ -185,7 +181,7 @@ mod tests {
     }
 
     #[test]
-    fn maps_of_different_scales_have_a_period_in_common() {
+    fn maps_of_different_scales_have_a_common_period() {
         assert_eq!(period(&[1.0, 1.0]), Some(1.0));
         assert_eq!(period(&[1.0, 0.5, 0.1]), Some(10.0));
         assert_eq!(period(&[0.0, -2.0]), Some(1.0));
@@ -197,7 +193,7 @@ mod tests {
     }
 
     #[test]
-    fn what_all_maps_share_is_applied_once() {
+    fn common_transform_is_applied_once() {
         let mut maps = [1.0, 1.0].map(|_| Map::of_statement(b"a.png", 1).unwrap());
         maps.iter_mut().for_each(|map| map.options.scale = [0.37, 2.0]);
         let [a, b] = &mut maps;

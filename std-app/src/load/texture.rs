@@ -1,32 +1,31 @@
-//! Pictures that become textures and skies: their numbers made finite and not negative, and the views of them
-//! that the core sees.
+//! Pictures as textures and environment maps: finite values that are not negative, and their views for the core.
 
 use crate::picture::{Picture, Samples};
 use halflight_core::scene::{Texels, Texture, TextureTransform, Wrap};
 
-/// What an infinite texel becomes where nothing in the picture is brighter: the largest half float.
+/// Least replacement of an infinite texel: the largest half float.
 const LARGEST_HALF: f32 = 65504.0;
 
-/// No texel is larger: products of a few of them, and the squares that the film sums, stay finite.
+/// Largest texel: products of a few texels, and the squares that the film sums, stay finite.
 const LARGEST: f32 = 1e15;
 
-/// Which numbers of a picture a view shows.
+/// Content of a view of a picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Shown {
+pub(super) enum Content {
     /// Colours.
     Colour,
-    /// Plain numbers.
+    /// Numbers.
     Data,
     /// Opacity, in all channels.
     Alpha,
 }
 
-/// The picture as textures have it: 8 bits or floats, no number that light cannot be.
+/// The picture as a texture: 8 bits or floats, finite and not negative.
 pub(super) fn prepared(mut picture: Picture) -> Picture {
     match &mut picture.samples {
         Samples::Bytes(_) => {}
         Samples::Words(words) => {
-            // As `image` rounds them.
+            // Rounded like the `image` crate.
             let byte = |&word: &u16| ((u32::from(word) + 128) / 257) as u8;
             picture.samples = Samples::Bytes(words.iter().map(byte).collect());
         }
@@ -49,9 +48,9 @@ pub(super) fn prepared(mut picture: Picture) -> Picture {
                 *value = value.clamp(0.0, 1.0).max(0.0);
             }
             let notes = [
-                (broken, "numbers that are not finite or negative are 0 now".to_string()),
-                (infinite, format!("infinite numbers are {sun} now")),
-                (large, format!("numbers above {LARGEST:e} are {LARGEST:e} now")),
+                (broken, "texels that are NaN or negative are set to 0".to_string()),
+                (infinite, format!("infinite texels are set to {sun}")),
+                (large, format!("texels above {LARGEST:e} are set to {LARGEST:e}")),
             ];
             for (count, what) in notes.into_iter().filter(|(count, _)| *count > 0) {
                 picture.notes.push(if count == 1 { what } else { format!("{what}, {count} times") });
@@ -61,14 +60,14 @@ pub(super) fn prepared(mut picture: Picture) -> Picture {
     picture
 }
 
-/// The picture as the core sees it. Bytes are colours in the sRGB curve, or plain numbers; floats are both.
-pub(super) fn view(picture: &Picture, shown: Shown, wrap: Wrap) -> Texture<'_> {
-    let texels = match (&picture.samples, shown) {
-        (Samples::Floats { alpha, .. }, Shown::Alpha) => Texels::Number(alpha),
+/// A view for the core. Bytes are colours in the sRGB curve, or numbers; floats are both.
+pub(super) fn view(picture: &Picture, content: Content, wrap: Wrap) -> Texture<'_> {
+    let texels = match (&picture.samples, content) {
+        (Samples::Floats { alpha, .. }, Content::Alpha) => Texels::Number(alpha),
         (Samples::Floats { rgb, .. }, _) => Texels::Float(rgb),
-        (Samples::Bytes(bytes), Shown::Colour) => Texels::Srgb8(bytemuck::cast_slice(bytes)),
+        (Samples::Bytes(bytes), Content::Colour) => Texels::Srgb8(bytemuck::cast_slice(bytes)),
         (Samples::Bytes(bytes), _) => Texels::Linear8(bytemuck::cast_slice(bytes)),
-        // There are none once they are prepared.
+        // Prepared pictures have none.
         (Samples::Words(_), _) => Texels::Float(&[]),
     };
     let transform = TextureTransform::IDENTITY;
@@ -91,19 +90,19 @@ mod tests {
     }
 
     #[test]
-    fn numbers_are_what_light_can_be() {
+    fn texels_become_finite_and_not_negative() {
         let odd =
             floats(vec![[1.0, f32::NAN, -2.0], [f32::INFINITY, 3.0, f32::NEG_INFINITY]], vec![2.0, f32::NAN]);
         let rgb = vec![[1.0, 0.0, 0.0], [65504.0, 3.0, 0.0]];
         assert_eq!(odd.samples, Samples::Floats { rgb, alpha: vec![1.0, 0.0] });
         let expected =
-            ["numbers that are not finite or negative are 0 now, 4 times", "infinite numbers are 65504 now"];
+            ["texels that are NaN or negative are set to 0, 4 times", "infinite texels are set to 65504"];
         assert_eq!(odd.notes, expected);
         assert_eq!(floats(vec![[0.0, -0.0, 1e15]], vec![1.0]).notes, [""; 0]);
     }
 
     #[test]
-    fn the_sun_is_no_darker_than_anything_else() {
+    fn infinite_texels_become_the_brightest() {
         let of = |brightest: f32| match floats(vec![[f32::INFINITY, brightest, 0.0]], vec![]).samples {
             Samples::Floats { rgb, .. } => rgb[0],
             other => panic!("{other:?}"),
@@ -113,7 +112,7 @@ mod tests {
     }
 
     #[test]
-    fn words_become_bytes() {
+    fn sixteen_bits_become_eight() {
         let words = Picture {
             width: 1,
             height: 1,

@@ -1,24 +1,24 @@
-//! The textures of a scene: every picture is found, decoded once, and used under as many views as the
-//! materials need (as colours, as plain numbers, wrapped or clamped).
+//! Textures of a scene: each picture is decoded once and has a view for each use: as colours or numbers, repeated
+//! or clamped.
 
 use super::error::LoadError;
 use super::map::{Map, MapOptions};
 use super::notes::Notes;
 use super::relief::{self, Relief};
-use super::texture::{self, Shown};
+use super::texture::{self, Content};
 use crate::memory::{self, Budget, Shortage};
-use crate::picture::{self, Picture, PictureError, Samples};
+use crate::picture::{self, Info, Picture, PictureError, Samples, fail};
 use halflight_core::scene::{Texture, TextureId, TextureTransform, Wrap};
 use rayon::prelude::*;
-use std::collections::{BTreeSet, HashMap};
+use std::collections::{BTreeSet, HashMap, HashSet};
 use std::path::{Path, PathBuf};
 
-/// The channel of alpha.
+/// Number of the alpha channel.
 const ALPHA: u8 = 3;
 /// Longest side of a texture in pixels.
 const LONGEST_SIDE: u32 = 1 << 15;
 
-/// Pictures and the views of them that materials refer to by [`TextureId`].
+/// Pictures, and their views, to which materials refer by [`TextureId`].
 #[derive(Clone, Debug, Default)]
 pub struct TextureSet {
     pictures: Vec<Picture>,
@@ -29,36 +29,32 @@ pub struct TextureSet {
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct View {
     picture: usize,
-    shown: Shown,
+    content: Content,
     wrap: Wrap,
     transform: TextureTransform,
 }
 
 impl TextureSet {
-    /// Decodes `files`, each once, in parallel as far as `budget` allows, of which their pixels stay taken.
+    /// Decodes each of `files` once, in parallel as far as `budget` allows. Pixels stay taken from the budget.
     ///
     /// # Errors
-    /// A picture of `required` that cannot be decoded, or does not fit. Others are left out with a note.
+    /// A `required` picture that is unreadable or too large; others are left out with a note.
     pub(super) fn decode(
         files: impl Iterator<Item = PathBuf>,
         required: &BTreeSet<PathBuf>,
         budget: &mut Budget,
         notes: &mut Notes,
     ) -> Result<Self, LoadError> {
-        let mut unique: Vec<PathBuf> = Vec::new();
-        files.for_each(|file| {
-            if !unique.contains(&file) {
-                unique.push(file);
-            }
-        });
+        let mut known = HashSet::new();
+        let unique: Vec<PathBuf> = files.filter(|file| known.insert(file.clone())).collect();
         let mut set = Self::default();
         let mut rest = &unique[..];
         while !rest.is_empty() {
-            // Headers come first, one after the other: which pictures fit does not depend on the threads.
+            // Headers are read one after the other: the set of pictures that fit does not depend on threads.
             let (mut batch, mut peaks) = (Vec::new(), 0usize);
             while let Some((file, later)) = rest.split_first() {
                 match measure(file, budget.left()) {
-                    // It has its turn when those before it are decoded.
+                    // The next batch decodes it.
                     Ok(peak) if !batch.is_empty() && peaks.saturating_add(peak) > budget.left() => break,
                     Ok(peak) => {
                         peaks += peak;
@@ -101,53 +97,53 @@ impl TextureSet {
         Ok(())
     }
 
-    /// The picture of a map as colours; `None` where it could not be decoded.
-    pub fn colour(&mut self, map: Option<&Map>) -> Option<TextureId> {
-        self.view(map?, Shown::Colour)
+    /// The picture of a map as colours; `None` if it was not decoded.
+    pub(super) fn colour(&mut self, map: Option<&Map>) -> Option<TextureId> {
+        self.view(map?, Content::Colour)
     }
 
-    /// The picture of a map as plain numbers.
-    pub fn data(&mut self, map: Option<&Map>) -> Option<TextureId> {
-        self.view(map?, Shown::Data)
+    /// The picture of a map as numbers.
+    pub(super) fn data(&mut self, map: Option<&Map>) -> Option<TextureId> {
+        self.view(map?, Content::Data)
     }
 
-    /// The channel of a scalar map: the one it names, else red.
-    pub fn scalar(&mut self, map: Option<&Map>) -> Option<(TextureId, u8)> {
+    /// The channel of a scalar map, by default red.
+    pub(super) fn scalar(&mut self, map: Option<&Map>) -> Option<(TextureId, u8)> {
         let map = map?;
         self.channel(map, map.options.channel.unwrap_or(0))
     }
 
-    /// The channel of an opacity map: the one it names, else alpha where there is one, else red.
-    pub fn opacity(&mut self, map: Option<&Map>) -> Option<(TextureId, u8)> {
+    /// The channel of an opacity map, by default alpha if there is one, else red.
+    pub(super) fn opacity(&mut self, map: Option<&Map>) -> Option<(TextureId, u8)> {
         let map = map?;
-        let picture = *self.by_file.get(map.found.as_ref()?)?;
-        let alpha = self.pictures[picture].has_alpha.then_some(ALPHA);
+        let alpha = self.picture(map)?.has_alpha.then_some(ALPHA);
         self.channel(map, map.options.channel.or(alpha).unwrap_or(0))
     }
 
     fn channel(&mut self, map: &Map, channel: u8) -> Option<(TextureId, u8)> {
-        let picture = *self.by_file.get(map.found.as_ref()?)?;
-        let picture = &self.pictures[picture];
-        let shown = match (&picture.samples, channel) {
-            (Samples::Floats { .. }, ALPHA) if picture.has_alpha => Shown::Alpha,
-            // Alpha of bytes is the same number in both views: share the one that is likely there, the
-            // colour's.
-            (Samples::Bytes(_), ALPHA) => Shown::Colour,
-            _ => Shown::Data,
+        let picture = self.picture(map)?;
+        let content = match (&picture.samples, channel) {
+            (Samples::Floats { .. }, ALPHA) if picture.has_alpha => Content::Alpha,
+            // Alpha of bytes is equal in both views; the view of the colour usually exists already.
+            (Samples::Bytes(_), ALPHA) => Content::Colour,
+            _ => Content::Data,
         };
-        Some((self.view(map, shown)?, channel))
+        Some((self.view(map, content)?, channel))
     }
 
-    /// What kind of relief the picture of a map is; `None` where it could not be decoded.
+    /// The kind of relief in the picture of a map; `None` if it was not decoded.
     pub(super) fn relief(&self, map: &Map) -> Option<Relief> {
-        let picture = *self.by_file.get(map.found.as_ref()?)?;
-        Some(relief::relief(&texture::view(&self.pictures[picture], Shown::Data, Wrap::Repeat)))
+        Some(relief::classify(&texture::view(self.picture(map)?, Content::Data, Wrap::Repeat)))
+    }
+
+    fn picture(&self, map: &Map) -> Option<&Picture> {
+        self.by_file.get(map.found.as_ref()?).map(|&number| &self.pictures[number])
     }
 
     /// The views, in the order of their ids.
     pub fn views(&self) -> Vec<Texture<'_>> {
         let view = |view: &View| {
-            let texture = texture::view(&self.pictures[view.picture], view.shown, view.wrap);
+            let texture = texture::view(&self.pictures[view.picture], view.content, view.wrap);
             Texture { transform: view.transform, ..texture }
         };
         self.views.iter().map(view).collect()
@@ -163,21 +159,22 @@ impl TextureSet {
         self.views.is_empty()
     }
 
-    /// Bytes that the decoded pictures take.
+    /// Bytes of all decoded pictures.
     pub fn bytes(&self) -> usize {
         self.pictures.iter().map(Picture::bytes).sum()
     }
 
-    fn view(&mut self, map: &Map, shown: Shown) -> Option<TextureId> {
+    fn view(&mut self, map: &Map, content: Content) -> Option<TextureId> {
         let picture = *self.by_file.get(map.found.as_ref()?)?;
-        let shown = match (&self.pictures[picture].samples, shown) {
-            (Samples::Floats { .. }, Shown::Colour) => Shown::Data,
-            _ => shown,
+        let content = match (&self.pictures[picture].samples, content) {
+            (Samples::Floats { .. }, Content::Colour) => Content::Data,
+            _ => content,
         };
         let MapOptions { scale, offset, clamp, .. } = map.options;
         let [scale, offset] = [scale, offset].map(|uv| uv.map(|x| x as f32).into());
         let transform = TextureTransform { scale, offset };
-        let view = View { picture, shown, wrap: if clamp { Wrap::Clamp } else { Wrap::Repeat }, transform };
+        let wrap = if clamp { Wrap::Clamp } else { Wrap::Repeat };
+        let view = View { picture, content, wrap, transform };
         let id = self.views.iter().position(|known| *known == view).unwrap_or_else(|| {
             self.views.push(view);
             self.views.len() - 1
@@ -186,30 +183,24 @@ impl TextureSet {
     }
 }
 
-/// The most bytes that reading a picture takes, those of its file included, by its header.
+/// Bytes that decoding a picture takes, including its file, by its header.
 ///
 /// # Errors
-/// It is no picture, or takes more than `most`.
+/// The file is no picture, or needs more than `most` bytes.
 fn measure(file: &Path, most: usize) -> Result<usize, PictureError> {
     let bytes = memory::read_file(file, most).map_err(PictureError::new)?;
-    let survey = picture::survey(&bytes, file)?;
-    let (width, height) = (survey.width, survey.height);
+    let Info { width, height, peak, .. } = picture::read_info(&bytes, file)?;
     if width.max(height) > LONGEST_SIDE {
-        return Err(PictureError::new(format!(
-            "it has {width}x{height} pixels; a texture has at most {LONGEST_SIDE} a side"
-        )));
+        fail!("it has {width}x{height} pixels; a texture has at most {LONGEST_SIDE} a side");
     }
-    let peak = survey.peak.saturating_add(bytes.len());
+    let peak = peak.saturating_add(bytes.len());
     if peak > most {
-        return Err(PictureError::new(format!(
-            "{width}x{height} pixels: {}",
-            Shortage { needed: peak, left: most }
-        )));
+        fail!("{width}x{height} pixels: {}", Shortage { needed: peak, left: most });
     }
     Ok(peak)
 }
 
-/// A picture that cannot be had.
+/// Notes an unreadable picture; an error if it is required.
 fn leave_out(
     file: &Path,
     why: &PictureError,

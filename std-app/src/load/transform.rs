@@ -1,11 +1,10 @@
-//! From the coordinates of the files to those of the core: centred on the scene and scaled by a power of two,
-//! so that the core sees numbers of order one whatever the unit and wherever the origin. The factor is exact:
-//! a scene scaled by a power of two gives the same bits.
+//! Transform from the coordinates of the files to those of the core: centred on the scene and scaled by a power of
+//! two, so that coordinates are about 1. The factor is exact: a scene scaled by a power of two gives the same bits.
 
 use glam::{DVec3, Vec3};
 use halflight_core::scene::Camera;
 
-/// `core = (user - offset) / 2^exponent`, in f64 until the last step.
+/// `core = (user - offset) / 2^exponent`, computed in f64 and rounded last.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SceneTransform {
     /// The point of the file that becomes the origin.
@@ -15,11 +14,11 @@ pub struct SceneTransform {
 }
 
 impl SceneTransform {
-    /// Changes nothing.
+    /// The identity.
     pub const IDENTITY: Self = Self { offset: [0.0; 3], exponent: 0 };
 
-    /// Puts the centre of a bounding box at the origin and its longest side between 1 and 2. An empty box
-    /// gives the identity, a box without extent is only moved.
+    /// Moves the centre of a bounding box to the origin and scales its longest side to 1 ... 2. The identity for
+    /// an empty box, a translation for a box without extent.
     pub fn fitting(min: [f64; 3], max: [f64; 3]) -> Self {
         if !(0..3).all(|i| min[i] <= max[i]) {
             return Self::IDENTITY;
@@ -29,53 +28,53 @@ impl SceneTransform {
         Self { offset, exponent: exponent(longest) }
     }
 
-    /// A point.
+    /// Transforms a point.
     pub fn point(&self, user: [f64; 3]) -> Vec3 {
         self.point_f64(user).map(|x| x as f32).into()
     }
 
-    /// A point, not yet rounded.
+    /// Transforms a point, without rounding to f32.
     pub fn point_f64(&self, user: [f64; 3]) -> [f64; 3] {
         let factor = self.factor();
         core::array::from_fn(|i| (user[i] - self.offset[i]) * factor)
     }
 
-    /// A pinhole that stands and looks as said in the coordinates of the files.
+    /// A pinhole camera given in the coordinates of the files.
     pub fn camera(&self, eye: [f64; 3], look_at: [f64; 3], up: [f64; 3], fov_degrees: f64) -> Camera {
         let along = direction(eye, look_at).unwrap_or(DVec3::NEG_Z);
         let up = direction([0.0; 3], up).unwrap_or(DVec3::Y);
         Camera::towards(self.point(eye), along.as_vec3(), up.as_vec3(), fov_degrees as f32)
     }
 
-    /// A length.
+    /// Transforms a length.
     pub fn length(&self, user: f64) -> f64 {
         user * self.factor()
     }
 
-    /// The factor on a radiant intensity (W/sr) that keeps irradiances as they are: lengths squared.
+    /// The factor on radiant intensities (W/sr) that keeps irradiances: that of lengths, squared.
     pub fn intensity_factor(&self) -> f64 {
         self.factor() * self.factor()
     }
 
-    /// Back to the coordinates of the files.
+    /// Transforms a point back to the coordinates of the files.
     pub fn to_user(&self, core: Vec3) -> [f64; 3] {
         let core = core.to_array();
         core::array::from_fn(|i| f64::from(core[i]) / self.factor() + self.offset[i])
     }
 
-    /// 2^-exponent; exact, since exponents are those of f64 that are far from its limits.
+    /// 2^-exponent, exactly.
     fn factor(&self) -> f64 {
         f64::from_bits(((1023 - i64::from(self.exponent.clamp(-1000, 1000))) as u64) << 52)
     }
 }
 
-/// The unit vector from one point to another, however near they are to each other; `None` where they are the same.
+/// The unit vector from one point to another; `None` if they are equal.
 pub fn direction(from: [f64; 3], to: [f64; 3]) -> Option<DVec3> {
     let along = DVec3::from(to) - DVec3::from(from);
     (along / along.abs().max_element()).try_normalize()
 }
 
-/// The exponent of two in `x`: x = m 2^e with 1 <= m < 2; 0 for zero, subnormal and infinite numbers.
+/// The exponent e of x = m 2^e with 1 <= m < 2; 0 for zero, subnormal and infinite numbers.
 fn exponent(x: f64) -> i32 {
     match (x.to_bits() >> 52) & 0x7ff {
         0 | 0x7ff => 0,
@@ -88,7 +87,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn powers_of_two_do_not_change_a_bit() {
+    fn scale_by_a_power_of_two_keeps_bits() {
         let min = [0.1, -2.7, 1e-3];
         let max = [55.3, 0.4, 0.7];
         let point = [17.31, -0.333, 0.0123];
@@ -104,7 +103,7 @@ mod tests {
     }
 
     #[test]
-    fn odd_boxes() {
+    fn empty_and_point_boxes() {
         assert_eq!(
             SceneTransform::fitting([f64::INFINITY; 3], [-f64::INFINITY; 3]),
             SceneTransform::IDENTITY

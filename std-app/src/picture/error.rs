@@ -1,9 +1,9 @@
-//! What can go wrong with a picture file, in words for the person who named the file.
+//! The error of reading or writing a picture, for the user who named the file.
 
 use core::fmt;
 use std::path::{Path, PathBuf};
 
-/// A picture that cannot be read or written, and why.
+/// A picture that cannot be read or written; displays as `FILE: reason`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct PictureError {
     file: Option<PathBuf>,
@@ -11,17 +11,17 @@ pub struct PictureError {
 }
 
 impl PictureError {
-    /// An error of bytes that have no name yet. What a decoder says in several lines becomes one.
+    /// An error without a file. Messages of several lines are joined.
     pub(crate) fn new(reason: impl fmt::Display) -> Self {
         Self { file: None, reason: reason.to_string().trim().replace('\n', ", ") }
     }
 
-    /// The same error, of this file.
+    /// The error, for this file.
     pub(crate) fn at(self, path: &Path) -> Self {
         Self { file: Some(path.to_owned()), ..self }
     }
 
-    /// The file, where there is one.
+    /// The file, if it is known.
     pub fn file(&self) -> Option<&Path> {
         self.file.as_deref()
     }
@@ -37,3 +37,11 @@ impl fmt::Display for PictureError {
 }
 
 impl core::error::Error for PictureError {}
+
+/// Returns a [`PictureError`] with a formatted reason.
+macro_rules! fail {
+    ($($reason:tt)*) => {
+        return Err($crate::picture::PictureError::new(format!($($reason)*)))
+    };
+}
+pub(crate) use fail;

@@ -1,9 +1,8 @@
-//! OpenEXR: half, float or integer channels, any lossless or lossy compression that the `exr` crate knows,
-//! scanlines or tiles, several parts, any data window. Only the blocks of the part that is wanted are
-//! decompressed.
+//! OpenEXR: half, float or integer channels, any compression of the `exr` crate, scanlines or tiles, several parts,
+//! any data window. Only blocks of the chosen part are decompressed.
 
 use super::layers::{self, Choice};
-use super::{Kind, Picture, PictureError, Samples, Survey, filled, pixels};
+use super::{Info, Kind, Picture, PictureError, Samples, black, fail, pixels};
 use exr::block::UncompressedBlock;
 use exr::block::reader::{ChunksReader, Reader};
 use exr::math::Vec2;
@@ -12,47 +11,45 @@ use exr::meta::header::Header;
 use exr::prelude::f16;
 use std::io::Cursor;
 
-/// Channels that one part may have.
+/// Most channels of a part.
 const MOST_CHANNELS: usize = 1024;
 
-/// Pictures up to this many samples are read by one thread: starting more costs longer.
+/// Most samples of a picture that one thread reads faster than several.
 const SINGLE_THREAD: usize = 1 << 20;
 
-/// Bytes that a block takes while it is decompressed, over its own: compressed, unpacked, put into order, and
-/// handed on.
+/// Bytes of a block during decompression over its own: compressed, unpacked, ordered, returned.
 const COPIES: usize = 5;
 
-/// A file whose header has been read, and what is wanted of it.
+/// A file whose header is read, and the chosen channels.
 struct File<'a> {
     reader: Reader<Cursor<&'a [u8]>>,
     choice: Choice,
-    /// Of the display window.
+    /// Size of the display window.
     width: usize,
     height: usize,
     notes: Vec<String>,
 }
 
-pub(super) fn survey(bytes: &[u8]) -> Result<Survey, PictureError> {
+pub(super) fn info(bytes: &[u8]) -> Result<Info, PictureError> {
     let file = open(bytes)?;
     let header = file.header();
     let of_pixel = size_of::<[f32; 3]>() + if file.choice.alpha.is_some() { size_of::<f32>() } else { 0 };
     let kept = file.width * file.height * of_pixel;
-    // Tiles may say that they are larger than the picture.
+    // The header may state tiles larger than the picture.
     let (Vec2(columns, rows), Vec2(width, height)) = (header.max_block_pixel_size(), header.layer_size);
     let block = columns.min(width).saturating_mul(rows.min(height));
     let block = block.saturating_mul(header.channels.bytes_per_pixel);
-    // The offsets of blocks are no longer than the file.
+    // The table of block offsets is not longer than the file.
     let scratch = block.saturating_mul(COPIES * file.blocks_at_once()).saturating_add(2 * bytes.len());
     let (width, height) = (file.width as u32, file.height as u32);
-    Ok(Survey { kind: Kind::Exr, width, height, kept, peak: kept.saturating_add(scratch) })
+    Ok(Info { kind: Kind::Exr, width, height, kept, peak: kept.saturating_add(scratch) })
 }
 
 pub(super) fn decode(bytes: &[u8]) -> Result<Picture, PictureError> {
     let file = open(bytes)?;
     let (width, height, has_alpha) = (file.width, file.height, file.choice.alpha.is_some());
-    // Outside of the data window a picture is black, and nothing is there.
-    let mut rgb = filled(width * height, [0.0; 3])?;
-    let mut alpha = filled(if has_alpha { width * height } else { 0 }, 0.0)?;
+    // The picture is black and transparent outside the data window.
+    let (mut rgb, mut alpha) = black(width * height, has_alpha)?;
     let wanted = file.columns();
     let origin = file.origin();
     let in_parallel = file.blocks_at_once() > 1;
@@ -80,7 +77,7 @@ pub(super) fn decode(bytes: &[u8]) -> Result<Picture, PictureError> {
     Ok(Picture { width: width as u32, height: height as u32, samples, has_alpha, notes })
 }
 
-/// Hands the blocks of a part to `insert`, in any order.
+/// Calls `insert` with each block of a part, in any order.
 fn read_blocks(
     reader: Reader<Cursor<&[u8]>>,
     part: usize,
@@ -92,7 +89,7 @@ fn read_blocks(
         .filter_chunks(false, |_, tile, block| is_wanted(block.layer, tile.level_index))
         .map_err(PictureError::new)?;
     let insert = |meta: &exr::meta::MetaData, block: UncompressedBlock| {
-        // A file may say one thing in its table and another in its blocks.
+        // The table and the blocks of a file may disagree.
         if is_wanted(block.index.layer, block.index.level) {
             insert(&meta.headers[block.index.layer], block);
         }
@@ -112,13 +109,13 @@ fn open(bytes: &[u8]) -> Result<File<'_>, PictureError> {
     let parts: Vec<Vec<String>> = headers.iter().map(names).collect();
     let Some((choice, layer)) = layers::choose(&parts) else {
         let all: Vec<&str> = parts.iter().flatten().take(12).map(String::as_str).collect();
-        return Err(PictureError::new(format!("no R, G, B and no Y among its channels: {}", all.join(", "))));
+        fail!("no R, G, B and no Y among its channels: {}", all.join(", "));
     };
     check(&headers[choice.part])?;
     let display = headers[choice.part].shared_attributes.display_window.size;
     let (width, height) = (display.x(), display.y());
     pixels(width, height)?;
-    let notes = layer.map(|layer| format!("of its layers `{layer}` is read")).into_iter().collect();
+    let notes = layer.map(|layer| format!("its layer `{layer}` is read")).into_iter().collect();
     Ok(File { reader, choice, width, height, notes })
 }
 
@@ -126,31 +123,25 @@ fn check(header: &Header) -> Result<(), PictureError> {
     pixels(header.layer_size.x(), header.layer_size.y())?;
     let channels = &header.channels.list;
     if header.deep {
-        return Err(PictureError::new("deep pictures are not supported"));
+        fail!("deep pictures are not supported");
     }
     if channels.len() > MOST_CHANNELS {
-        return Err(PictureError::new(format!("more than {MOST_CHANNELS} channels are not supported")));
+        fail!("more than {MOST_CHANNELS} channels are not supported");
     }
-    if channels
-        .iter()
-        .any(|c| c.sampling != Vec2(1, 1) || ["RY", "BY"].contains(&c.name.to_string().as_str()))
-    {
-        return Err(PictureError::new("luminance with chroma (RY, BY) is not supported"));
+    let is_chroma = |name: String| ["RY", "BY"].contains(&name.as_str());
+    if channels.iter().any(|c| c.sampling != Vec2(1, 1) || is_chroma(c.name.to_string())) {
+        fail!("luminance with chroma (RY, BY) is not supported");
     }
     Ok(())
 }
 
-fn area(header: &Header) -> usize {
-    header.layer_size.x().saturating_mul(header.layer_size.y())
-}
-
 impl File<'_> {
-    /// Of the part that is read.
+    /// Header of the chosen part.
     fn header(&self) -> &Header {
         &self.reader.headers()[self.choice.part]
     }
 
-    /// From the data window to the display window.
+    /// Origin of the data window in the display window.
     fn origin(&self) -> [i64; 2] {
         let header = self.header();
         let (data, display) =
@@ -158,15 +149,16 @@ impl File<'_> {
         [i64::from(data.x()) - i64::from(display.x()), i64::from(data.y()) - i64::from(display.y())]
     }
 
-    /// Blocks that are decompressed at the same time.
+    /// Blocks that are decompressed at once.
     fn blocks_at_once(&self) -> usize {
-        match area(self.header()) < SINGLE_THREAD {
+        let Vec2(width, height) = self.header().layer_size;
+        match width.saturating_mul(height) < SINGLE_THREAD {
             true => 1,
             false => rayon::current_num_threads() + 4,
         }
     }
 
-    /// Where the wanted channels are in a line of a block.
+    /// Positions of the chosen channels in a line of a block.
     fn columns(&self) -> Columns {
         let column = |channel: usize| {
             let channels = &self.header().channels.list;
@@ -182,10 +174,10 @@ struct Columns {
     alpha: Option<Column>,
 }
 
-/// A channel within the lines of blocks, which hold the values of one channel after those of another.
+/// A channel in a line of a block, which stores its channels one after the other.
 #[derive(Clone, Copy)]
 struct Column {
-    /// Bytes of a pixel in the channels before it.
+    /// Bytes of a pixel in the channels before this one.
     before: usize,
     kind: SampleType,
 }
@@ -235,7 +227,7 @@ mod tests {
     }
 
     #[test]
-    fn channels_of_every_type_and_layers_of_every_name() {
+    fn channel_types_and_layers() {
         let half = FlatSamples::F16(vec![f16::from_f32(0.25), f16::INFINITY]);
         let whole = FlatSamples::U32(vec![7, 9]);
         let mixed = file(vec![layer(
@@ -256,11 +248,11 @@ mod tests {
         let layered = layered.iter().map(|(name, samples)| (name.as_str(), samples.clone())).collect();
         let (colours, _, notes) = read(&file(vec![layer("", layered)]));
         assert_eq!(colours, [[3.0; 3]; 2]);
-        assert_eq!(notes, ["of its layers `beauty` is read"]);
+        assert_eq!(notes, ["its layer `beauty` is read"]);
     }
 
     #[test]
-    fn the_picture_is_found_in_a_later_part() {
+    fn picture_in_a_later_part_is_chosen() {
         let depth = layer("depth", vec![("Z", floats([9.0; 2]))]);
         let colour =
             layer("colour", vec![("R", floats([1.0; 2])), ("G", floats([2.0; 2])), ("B", floats([3.0; 2]))]);
@@ -268,7 +260,7 @@ mod tests {
     }
 
     #[test]
-    fn outside_of_the_data_window_it_is_black() {
+    fn outside_of_the_data_window_is_black() {
         let mut image =
             Image::from_layer(layer("", vec![("Y", floats([5.0, 6.0])), ("A", floats([1.0; 2]))]));
         image.attributes.display_window = IntegerBounds::new((-1, 0), (2, 2));
@@ -280,7 +272,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_cut_short_is_refused() {
+    fn truncated_files_are_refused() {
         let bytes = file(vec![layer("", vec![("Y", floats([5.0, 6.0]))])]);
         for length in 0..bytes.len() {
             assert!(super::super::decode(&bytes[..length], Path::new("a"), 1 << 24).is_err(), "{length}");

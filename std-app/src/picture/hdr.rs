@@ -1,15 +1,15 @@
-//! Radiance pictures, by the documentation of the format (Ward, "Radiance File Formats"): any program's name
-//! after `#?`, all eight orders of rows and columns, RGBE and XYZE, and the header lines that change values.
+//! Radiance pictures (Ward, "Radiance File Formats"): any program after `#?`, all eight orders of rows and columns,
+//! RGBE and XYZE, and the header lines that scale values.
 
 use super::rgbe::read_scanline;
-use super::{Kind, Picture, PictureError, Samples, Survey, filled, pixels};
+use super::{Info, Kind, Picture, PictureError, Samples, black, fail, filled, pixels};
 
-/// Chromaticities of red, green, blue and white that count as those of sRGB: its own, and those of Radiance.
+/// Chromaticities of red, green, blue and white that count as sRGB: those of sRGB and of Radiance.
 const PRIMARIES: [[f64; 8]; 2] = [
     [0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290],
     [0.64, 0.33, 0.29, 0.60, 0.15, 0.06, 0.3333, 0.3333],
 ];
-/// How far chromaticities may be from them: files are written with two to four digits.
+/// Error of chromaticities: files have two to four digits.
 const PRIMARIES_TOLERANCE: f64 = 0.006;
 
 /// CIE XYZ to linear sRGB (IEC 61966-2-1).
@@ -19,30 +19,30 @@ const TO_SRGB: [[f32; 3]; 3] = [
     [0.055_63, -0.203_977, 1.056_972],
 ];
 
-/// Header lines, at most: what has more is no picture.
+/// Most lines of a header.
 const MOST_LINES: usize = 1 << 16;
 
-/// What a header says.
+/// The header.
 struct Header<'a> {
     order: Order,
     is_xyz: bool,
-    /// What the values of each channel have been multiplied by.
+    /// Factors that the values of each channel contain.
     applied: [f64; 3],
     notes: Vec<String>,
-    /// The pixels.
+    /// Bytes of the pixels.
     rest: &'a [u8],
 }
 
-/// How the pixels of the file lie in the picture.
+/// Size of the picture and order of its pixels.
 #[derive(Clone, Copy)]
 struct Order {
     width: usize,
     height: usize,
     /// Scanlines are columns.
     columns: bool,
-    /// From the right to the left.
+    /// From right to left.
     leftwards: bool,
-    /// From the bottom to the top.
+    /// From bottom to top.
     upwards: bool,
 }
 
@@ -52,8 +52,8 @@ impl Order {
         if self.columns { (self.width, self.height) } else { (self.height, self.width) }
     }
 
-    /// Place in the picture, row by row from the top left, of a pixel of a scanline.
-    fn place(&self, scanline: usize, pixel: usize) -> usize {
+    /// Index in the picture of a pixel of a scanline.
+    fn index(&self, scanline: usize, pixel: usize) -> usize {
         let (x, y) = if self.columns { (scanline, pixel) } else { (pixel, scanline) };
         let x = if self.leftwards { self.width - 1 - x } else { x };
         let y = if self.upwards { self.height - 1 - y } else { y };
@@ -61,31 +61,31 @@ impl Order {
     }
 }
 
-pub(super) fn survey(bytes: &[u8]) -> Result<Survey, PictureError> {
+pub(super) fn info(bytes: &[u8]) -> Result<Info, PictureError> {
     let Header { order, .. } = read_header(bytes)?;
     let Order { width, height, .. } = order;
     let kept = width * height * size_of::<[f32; 3]>();
     let peak = kept + order.scanlines().1 * size_of::<[u8; 4]>();
-    Ok(Survey { kind: Kind::Hdr, width: width as u32, height: height as u32, kept, peak })
+    Ok(Info { kind: Kind::Hdr, width: width as u32, height: height as u32, kept, peak })
 }
 
 pub(super) fn decode(bytes: &[u8]) -> Result<Picture, PictureError> {
     let Header { order, is_xyz, applied, notes, mut rest } = read_header(bytes)?;
     let (scanlines, length) = order.scanlines();
-    let mut rgb = filled(order.width * order.height, [0.0; 3])?;
+    let (mut rgb, alpha) = black(order.width * order.height, false)?;
     let mut line = filled(length, [0u8; 4])?;
     for scanline in 0..scanlines {
         read_scanline(&mut rest, &mut line)?;
         for (pixel, &rgbe) in line.iter().enumerate() {
-            rgb[order.place(scanline, pixel)] = colour(rgbe, applied, is_xyz);
+            rgb[order.index(scanline, pixel)] = colour(rgbe, applied, is_xyz);
         }
     }
-    let samples = Samples::Floats { rgb, alpha: Vec::new() };
+    let samples = Samples::Floats { rgb, alpha };
     let (width, height) = (order.width as u32, order.height as u32);
     Ok(Picture { width, height, samples, has_alpha: false, notes })
 }
 
-/// Mantissas count as they are, not half a step more, as in most programs that write and read the format.
+/// Mantissas are not increased by half a step, as in most programs.
 fn colour([r, g, b, exponent]: [u8; 4], applied: [f64; 3], is_xyz: bool) -> [f32; 3] {
     if exponent == 0 {
         return [0.0; 3];
@@ -109,9 +109,9 @@ fn read_header(bytes: &[u8]) -> Result<Header<'_>, PictureError> {
         let line = line(&mut rest)?;
         if line.is_empty() {
             header.order = resolution(self::line(&mut rest)?)?;
-            // Each scanline takes at least one pixel.
+            // A scanline takes at least four bytes.
             if rest.len() / 4 < header.order.scanlines().0 {
-                return Err(PictureError::new("truncated: there are fewer pixels than scanlines"));
+                fail!("truncated: there are fewer pixels than scanlines");
             }
             header.rest = rest;
             return Ok(header);
@@ -124,18 +124,16 @@ fn read_header(bytes: &[u8]) -> Result<Header<'_>, PictureError> {
 }
 
 impl Header<'_> {
-    /// A line of the header that may change what the pixels mean.
+    /// Applies a line of the header.
     fn variable(&mut self, key: &str, value: &str) -> Result<(), PictureError> {
         let numbers = || value.split_whitespace().map(|word| word.parse().ok()).collect::<Option<Vec<f64>>>();
         match key {
             "FORMAT" => match value.to_ascii_lowercase().as_str() {
                 "32-bit_rle_rgbe" => self.is_xyz = false,
                 "32-bit_rle_xyze" => self.is_xyz = true,
-                _ => return Err(PictureError::new(format!("its format `{value}` is not supported"))),
+                _ => fail!("its format `{value}` is not supported"),
             },
-            "NCOMP" if value != "3" => {
-                return Err(PictureError::new(format!("{value} components of colour are not supported")));
-            }
+            "NCOMP" if value != "3" => fail!("{value} components of colour are not supported"),
             "EXPOSURE" => self.apply(key, value, numbers().filter(|n| n.len() == 1)),
             "COLORCORR" => self.apply(key, value, numbers().filter(|n| n.len() == 3)),
             "PRIMARIES" => {
@@ -145,8 +143,8 @@ impl Header<'_> {
                 };
                 let given = numbers().unwrap_or_default();
                 if !PRIMARIES.iter().any(|known| is_near(known, &given)) {
-                    self.notes
-                        .push(format!("its colours are taken as those of sRGB, not of PRIMARIES={value}"));
+                    let note = format!("its colours are taken as those of sRGB, not of PRIMARIES={value}");
+                    self.notes.push(note);
                 }
             }
             _ => {}
@@ -154,11 +152,11 @@ impl Header<'_> {
         Ok(())
     }
 
-    /// A factor that pixels have been multiplied by; several count together.
+    /// Accumulates a factor that the pixels contain.
     fn apply(&mut self, key: &str, value: &str, factors: Option<Vec<f64>>) {
         let usable = factors.filter(|factors| factors.iter().all(|f| *f > 0.0 && f.is_finite()));
         let Some(factors) = usable else {
-            self.notes.push(format!("{key}={value} is left out: it is no factor"));
+            self.notes.push(format!("{key}={value} is ignored: it is no factor"));
             return;
         };
         let factor = |c: usize| if factors.len() == 3 { factors[c] } else { factors[0] };
@@ -173,11 +171,11 @@ fn line<'a>(rest: &mut &'a [u8]) -> Result<&'a str, PictureError> {
         bytes.iter().position(|&b| b == b'\n').ok_or_else(|| PictureError::new("its header has no end"))?;
     *rest = &bytes[end + 1..];
     let line = &bytes[..end];
-    // A comment in another encoding is none of our business.
+    // A line in another encoding is a comment.
     Ok(core::str::from_utf8(line).unwrap_or("#").trim_end_matches('\r'))
 }
 
-/// `-Y 512 +X 1024`: the axis from scanline to scanline, then that within them; y is up.
+/// Parses `-Y 512 +X 1024`: the axis across scanlines, then the axis along them; y is up.
 fn resolution(line: &str) -> Result<Order, PictureError> {
     let unknown = || PictureError::new(format!("`{line}` is no order of rows and columns"));
     let words: Vec<&str> = line.split_whitespace().collect();
@@ -212,8 +210,8 @@ mod tests {
     }
 
     #[test]
-    fn all_eight_orders_show_the_same_picture() {
-        // 3 by 2, seen from the top left: 1 2 3 / 4 5 6.
+    fn all_eight_orders_give_the_same_picture() {
+        // 3 by 2, from the top left: 1 2 3 / 4 5 6.
         let orders = [
             ("-Y 2 +X 3", [1, 2, 3, 4, 5, 6]),
             ("-Y 2 -X 3", [3, 2, 1, 6, 5, 4]),
@@ -234,7 +232,7 @@ mod tests {
     }
 
     #[test]
-    fn factors_that_were_applied_are_divided_out() {
+    fn exposure_and_colour_correction_are_divided_out() {
         let of = |lines: &str| {
             let picture = read(&format!("#?x\n{lines}\n-Y 1 +X 1\n"), &[[64, 32, 16, 129]]).unwrap();
             (colours(&picture)[0], picture.notes)
@@ -252,7 +250,7 @@ mod tests {
 
     #[test]
     fn xyz_becomes_rgb() {
-        // D65 white has Y = 1, and the primaries add up to it.
+        // D65 white has Y = 1, the sum of the primaries.
         let bytes = |xyz: [f64; 3]| [0, 1, 2].map(|c: usize| (xyz[c] * 128.0).round() as u8);
         for (rgb, xyz) in [
             ([1.0, 1.0, 1.0], [0.9505, 1.0, 1.0888]),
@@ -269,7 +267,7 @@ mod tests {
     }
 
     #[test]
-    fn other_primaries_are_noted_and_other_formats_refused() {
+    fn other_primaries_are_noted_and_other_formats_are_refused() {
         let header = |line: &str| read(&format!("#?x\n{line}\n\n-Y 1 +X 1\n"), &[[64, 32, 16, 129]]);
         for same in
             ["0.64 0.33 0.3 0.6 0.15 0.06 0.3127 0.329", ".6400 .3300 .2900 .6000 .1500 .0600 .3333 .3333"]
@@ -284,7 +282,7 @@ mod tests {
     }
 
     #[test]
-    fn lies_about_the_size_are_refused() {
+    fn impossible_sizes_are_refused() {
         for line in [
             "-Y 1 +Y 1",
             "-Y 1",

@@ -1,33 +1,33 @@
-//! JPEG. The decoder goes on where a file is damaged, and fills what is missing with grey; here it is held to
-//! the format first, so that a repair can be noted.
+//! JPEG. The decoder repairs damaged files and fills missing parts with grey; a strict pass comes first, so that
+//! repairs are noted.
 
-use super::{Kind, Picture, PictureError, Samples, Survey, filled, pixels};
+use super::{Info, Kind, Picture, PictureError, Samples, fail, filled, pixels};
 use zune_core::bytestream::ZCursor;
 use zune_core::colorspace::ColorSpace;
 use zune_core::options::DecoderOptions;
 use zune_jpeg::JpegDecoder;
 
-/// Rows of blocks with what the decoder does to them, in bytes for each pixel across.
+/// Bytes of the decoder for each pixel of the width: rows of blocks.
 const ROWS: usize = 1 << 10;
 
-pub(super) fn survey(bytes: &[u8]) -> Result<Survey, PictureError> {
+pub(super) fn info(bytes: &[u8]) -> Result<Info, PictureError> {
     let (_, width, height, channels) = open(bytes, false)?;
     let pixels = pixels(width, height)?;
     let kept = 4 * pixels;
-    // Progressive pictures are kept as coefficients of 16 bits until the last scan, in whole blocks.
-    let coefficients = if walk(bytes).is_progressive { 8 * (width + 32) * (height + 32) } else { 0 };
+    // Progressive pictures are coefficients of 16 bits, in whole blocks, until the last scan.
+    let coefficients = if scan_markers(bytes).is_progressive { 8 * (width + 32) * (height + 32) } else { 0 };
     let peak = kept + channels * pixels + coefficients + ROWS * (width + 32) + 2 * bytes.len();
-    Ok(Survey { kind: Kind::Jpeg, width: width as u32, height: height as u32, kept, peak })
+    Ok(Info { kind: Kind::Jpeg, width: width as u32, height: height as u32, kept, peak })
 }
 
 pub(super) fn decode(bytes: &[u8]) -> Result<Picture, PictureError> {
     let mut notes = Vec::new();
-    if !walk(bytes).is_complete {
+    if !scan_markers(bytes).is_complete {
         notes.push("its end is missing, and grey or wrong in the picture".into());
     }
     let strictly = read(bytes, true);
     if let (Err(why), true) = (&strictly, notes.is_empty()) {
-        notes.push(format!("it is damaged ({why}); what can be read is used"));
+        notes.push(format!("it is damaged ({why}); the readable part is used"));
     }
     let (width, height, raw) = strictly.or_else(|_| read(bytes, false))?;
     let channels = raw.len() / (width * height);
@@ -49,7 +49,7 @@ fn read(bytes: &[u8], strictly: bool) -> Result<(usize, usize, Vec<u8>), Picture
 
 type Decoder<'a> = JpegDecoder<ZCursor<&'a [u8]>>;
 
-/// A decoder that has read the headers, the width and height, and the channels that it will give, 1 or 3.
+/// A decoder that has read the headers, the width, the height, and the number of channels, 1 or 3.
 fn open(bytes: &[u8], strictly: bool) -> Result<(Decoder<'_>, usize, usize, usize), PictureError> {
     let options = DecoderOptions::default()
         .set_strict_mode(strictly)
@@ -58,7 +58,7 @@ fn open(bytes: &[u8], strictly: bool) -> Result<(Decoder<'_>, usize, usize, usiz
     let mut decoder = JpegDecoder::new_with_options(ZCursor::new(bytes), options);
     decoder.decode_headers().map_err(PictureError::new)?;
     let (Some((width, height)), Some(colours)) = (decoder.dimensions(), decoder.input_colorspace()) else {
-        return Err(PictureError::new("it has no size"));
+        fail!("it has no size");
     };
     let (wanted, channels) = match colours {
         ColorSpace::Luma => (ColorSpace::Luma, 1),
@@ -68,37 +68,37 @@ fn open(bytes: &[u8], strictly: bool) -> Result<(Decoder<'_>, usize, usize, usiz
     Ok((decoder, width, height, channels))
 }
 
-/// What the markers of a file say.
-struct Walk {
+/// Properties that the markers of a file reveal.
+struct Markers {
     is_progressive: bool,
-    /// The marker of the end is there.
+    /// The end marker exists.
     is_complete: bool,
 }
 
-/// From marker to marker.
-fn walk(bytes: &[u8]) -> Walk {
-    let mut walk = Walk { is_progressive: false, is_complete: false };
+/// Reads the markers of a file.
+fn scan_markers(bytes: &[u8]) -> Markers {
+    let mut markers = Markers { is_progressive: false, is_complete: false };
     let (mut at, mut scans) = (2, 0);
     while let Some(next) = bytes.get(at..).and_then(|rest| rest.iter().position(|&b| b == 0xff)) {
         at += next + 1;
         let length = |at: usize| Some(usize::from(*bytes.get(at)?) << 8 | usize::from(*bytes.get(at + 1)?));
         match bytes.get(at) {
             None => break,
-            // A value of the pixels, a restart, a filler, or a marker without content.
+            // Pixels, a restart, or a marker without content.
             Some(0 | 1 | 0xd0..=0xd8) => at += 1,
             Some(0xff) => {}
             Some(0xd9) => {
-                walk.is_complete = true;
+                markers.is_complete = true;
                 break;
             }
             Some(&marker) => {
                 scans += u32::from(marker == 0xda);
-                walk.is_progressive |= marker == 0xc2 || scans > 1;
+                markers.is_progressive |= marker == 0xc2 || scans > 1;
                 at += 1 + length(at + 1).unwrap_or(0);
             }
         }
     }
-    walk
+    markers
 }
 
 #[cfg(test)]
@@ -118,20 +118,20 @@ mod tests {
     }
 
     #[test]
-    fn whole_files_are_as_the_image_crate_has_them() {
+    fn whole_files_agree_with_the_image_crate() {
         let bytes = file();
         let picture = super::super::decode(&bytes, Path::new("a"), 1 << 22).unwrap();
         let expected = image::load_from_memory(&bytes).unwrap().into_rgba8().into_raw();
         assert_eq!((picture.width, picture.height, picture.has_alpha), (60, 41, false));
         assert_eq!(picture.samples, Samples::Bytes(expected));
         assert_eq!(picture.notes, [""; 0]);
-        // Something behind the end is none of the picture.
+        // Bytes after the end do not matter.
         let longer = [&bytes[..], b"more"].concat();
         assert_eq!(super::super::decode(&longer, Path::new("a"), 1 << 22).unwrap().notes, [""; 0]);
     }
 
     #[test]
-    fn what_is_cut_short_is_refused_or_noted() {
+    fn truncated_files_are_refused_or_noted() {
         let bytes = file();
         for length in (2..bytes.len()).step_by(61).chain(bytes.len() - 3..bytes.len()) {
             let read = super::super::decode(&bytes[..length], Path::new("a"), 1 << 22);

@@ -1,6 +1,6 @@
-//! Formats, told by the bytes of a file, and by its name only where they do not say.
+//! Detection of the format by the first bytes of a file, for TGA by its name.
 
-use super::PictureError;
+use super::{PictureError, fail};
 use std::path::Path;
 
 /// The format of a picture file.
@@ -12,11 +12,11 @@ pub enum Kind {
     Jpeg,
     /// Windows bitmap.
     Bmp,
-    /// Truevision TGA, which nothing at its beginning tells.
+    /// Truevision TGA; older files have no signature.
     Tga,
-    /// WebP, the first picture of an animation.
+    /// WebP; the first frame of an animation.
     WebP,
-    /// TIFF, integers or floats, the first picture of several.
+    /// TIFF, integers or floats; the first of several pictures.
     Tiff,
     /// Radiance.
     Hdr,
@@ -26,14 +26,14 @@ pub enum Kind {
     Pfm,
 }
 
-/// All of them, for a message.
+/// All formats, for a message.
 const NAMES: &str = "png, jpg, bmp, tga, webp, tiff, hdr, exr, pfm";
 
 impl Kind {
     /// The format of a file.
     ///
     /// # Errors
-    /// Neither its bytes nor its name say one.
+    /// The format is unknown.
     pub fn of(bytes: &[u8], name: &Path) -> Result<Self, PictureError> {
         let extension = name.extension().map(|extension| extension.to_string_lossy().to_ascii_lowercase());
         let by_name = matches!(extension.as_deref(), Some("tga" | "targa" | "icb" | "vda" | "vst"));
@@ -47,7 +47,7 @@ impl Kind {
             [b'I', b'I', b'*' | b'+', 0, ..] | [b'M', b'M', 0, b'*' | b'+', ..] => Self::Tiff,
             [b'B', b'M', ..] => Self::Bmp,
             _ if by_name || bytes.ends_with(b"TRUEVISION-XFILE.\0") => Self::Tga,
-            _ => return Err(PictureError::new(format!("it is in no format that is known ({NAMES})"))),
+            _ => fail!("it is in no format that is known ({NAMES})"),
         })
     }
 }
@@ -57,7 +57,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn bytes_win_over_names() {
+    fn content_overrides_the_name() {
         assert_eq!(Kind::of(b"\x89PNG\r\n\x1a\n", Path::new("a.jpg")), Ok(Kind::Png));
         assert_eq!(Kind::of(b"#?\n", Path::new("sky.exr")), Ok(Kind::Hdr));
         assert_eq!(Kind::of(b"PF\n1 1\n-1\n", Path::new("a")), Ok(Kind::Pfm));

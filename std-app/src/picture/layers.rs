@@ -1,13 +1,12 @@
-//! Which channels of an EXR make its picture: names may have a layer before their last point, as in
-//! `beauty.R`.
+//! Choice of the colour channels of an EXR. The name of a channel may start with a layer, as in `beauty.R`.
 
-/// The last part of the name of a layer that is the picture, where there are several.
+/// Last part of the name of the main layer, the likeliest first.
 const MAIN: [&str; 6] = ["combined", "beauty", "rgba", "rgb", "color", "main"];
 
 /// Indices of channels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Choice {
-    /// The part of a file that has them.
+    /// The part of the file.
     pub(super) part: usize,
     /// Red, green, blue.
     pub(super) colour: [usize; 3],
@@ -15,21 +14,20 @@ pub(super) struct Choice {
     pub(super) alpha: Option<usize>,
 }
 
-/// One way to read channels as a picture.
+/// A possible choice.
 struct Candidate {
     choice: Choice,
     layer: String,
-    /// The lowest comes first.
+    /// The lowest rank is chosen.
     rank: usize,
 }
 
-/// The channels to read of `parts`, each the names of its channels, and the layer they are of where there
-/// were others to choose from. In this order: R, G and B without a layer, with one; Y without, with one; any
-/// channel that is alone.
+/// The channels of the picture, and their layer if there are other candidates. `parts`: names of the channels of
+/// each part. In this order: R, G and B without a layer, in one; Y without a layer, in one; a single channel.
 pub(super) fn choose(parts: &[Vec<String>]) -> Option<(Choice, Option<String>)> {
     let mut candidates: Vec<Candidate> =
         parts.iter().enumerate().flat_map(|(part, names)| candidates(part, names)).collect();
-    // Stable: the first of the file among equals.
+    // The sort is stable: the first in the file wins.
     candidates.sort_by_key(|candidate| candidate.rank);
     let others = candidates.len() > 1;
     let Candidate { choice, layer, .. } = candidates.into_iter().next()?;
@@ -55,18 +53,18 @@ fn candidates(part: usize, names: &[String]) -> Vec<Candidate> {
         };
         let alpha = channel(&["a", "alpha"]);
         let last = layer.rsplit('.').next().unwrap_or_default().to_ascii_lowercase();
-        let place = match layer.is_empty() {
+        let rank = match layer.is_empty() {
             true => 0,
             false => 1 + MAIN.iter().position(|name| *name == last).unwrap_or(MAIN.len()),
         };
         let rgb = [channel(&["r", "red"]), channel(&["g", "green"]), channel(&["b", "blue"])];
         let others = || split.iter().enumerate().filter(|&(at, (of, _))| of == layer && Some(at) != alpha);
         let (colour, rank) = if let [Some(r), Some(g), Some(b)] = rgb {
-            ([r, g, b], place)
+            ([r, g, b], rank)
         } else if let Some(y) = channel(&["y"]) {
-            ([y; 3], 100 + place)
+            ([y; 3], 100 + rank)
         } else if let (1, Some((only, _))) = (others().count(), others().next()) {
-            ([only; 3], 200 + place)
+            ([only; 3], 200 + rank)
         } else {
             continue;
         };
@@ -86,7 +84,7 @@ mod tests {
     }
 
     #[test]
-    fn the_picture_is_found_among_layers_and_parts() {
+    fn picture_among_layers_and_parts() {
         let at = |part, colour, alpha| Choice { part, colour, alpha };
         assert_eq!(chosen(&[&["A", "B", "G", "R"]]), Some((at(0, [3, 2, 1], Some(0)), None)));
         assert_eq!(chosen(&[&["Y"]]), Some((at(0, [0; 3], None), None)));

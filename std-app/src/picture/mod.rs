@@ -1,8 +1,7 @@
-//! The one reader of pictures: textures, skies, references and the pictures of `compare` all come through
-//! here.
+//! Reading of pictures: textures, environment maps, references and the pictures of `compare`.
 //!
-//! The bytes say the format, and the name where they do not. Reading believes nothing: the header says how
-//! much memory the picture takes, and that is held against what is allowed before anything is decoded.
+//! The content determines the format (the name only for TGA). The header gives the memory that decoding takes,
+//! which is compared with the limit before anything is decoded.
 
 mod error;
 mod exr;
@@ -16,26 +15,27 @@ mod rgbe;
 mod tiff;
 
 pub use error::PictureError;
+pub(crate) use error::fail;
 pub use kind::Kind;
 
 use crate::report::words::readable_bytes;
 use std::path::Path;
 
-/// Largest number of pixels of a picture, 16384².
+/// Most pixels of a picture, 16384².
 pub const MAX_PIXELS: usize = 1 << 28;
 
-/// Pixels of a decoded picture, row by row from the top.
+/// Pixels of a decoded picture, in rows from the top.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Samples {
     /// RGBA of 8 bits. Colours are in the sRGB curve.
     Bytes(Vec<u8>),
     /// RGBA of 16 bits. Colours are in the sRGB curve.
     Words(Vec<u16>),
-    /// RGB, linear, as the file has them: not always finite, not always positive.
+    /// Linear RGB of the file; values may be negative, infinite or NaN.
     Floats {
         /// Colours.
         rgb: Vec<[f32; 3]>,
-        /// Opacity, where the file has it; else empty.
+        /// Opacity; empty if the file has none.
         alpha: Vec<f32>,
     },
 }
@@ -51,12 +51,12 @@ pub struct Picture {
     pub samples: Samples,
     /// Whether the file has an alpha channel.
     pub has_alpha: bool,
-    /// What had to be repaired, chosen or left out; each follows the name of the file and a colon.
+    /// Repairs and choices, each to follow the name of the file and a colon.
     pub notes: Vec<String>,
 }
 
 impl Picture {
-    /// Bytes of its pixels.
+    /// Bytes of the pixels.
     pub fn bytes(&self) -> usize {
         match &self.samples {
             Samples::Bytes(samples) => samples.len(),
@@ -66,9 +66,9 @@ impl Picture {
     }
 }
 
-/// What a header says of a picture.
+/// Format, size and memory of a picture, from its header.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Survey {
+pub struct Info {
     /// The format.
     pub kind: Kind,
     /// Pixels across, at least 1.
@@ -77,74 +77,66 @@ pub struct Survey {
     pub height: u32,
     /// Bytes of the decoded pixels.
     pub kept: usize,
-    /// The most bytes at any time of decoding: `kept` and what the decoder takes, without the file.
+    /// Most bytes at any time of decoding, without the file.
     pub peak: usize,
 }
 
-/// Reads the header of a picture. `name` gives the format where `bytes` do not (TGA).
+/// Reads the header of a picture. `name` identifies TGA files.
 ///
 /// # Errors
-/// Bytes that are no picture, are of a kind that is not supported, or claim what cannot be.
-pub fn survey(bytes: &[u8], name: &Path) -> Result<Survey, PictureError> {
+/// Bytes that are no picture, of an unsupported kind, or of an impossible size.
+pub fn read_info(bytes: &[u8], name: &Path) -> Result<Info, PictureError> {
     let kind = Kind::of(bytes, name)?;
     match kind {
-        Kind::Exr => exr::survey(bytes),
-        Kind::Hdr => hdr::survey(bytes),
-        Kind::Pfm => pfm::survey(bytes),
-        Kind::Jpeg => jpeg::survey(bytes),
-        Kind::Tiff => tiff::survey(bytes),
-        Kind::Png | Kind::Bmp | Kind::Tga | Kind::WebP => raster::survey(bytes, kind),
+        Kind::Exr => exr::info(bytes),
+        Kind::Hdr => hdr::info(bytes),
+        Kind::Pfm => pfm::info(bytes),
+        Kind::Jpeg => jpeg::info(bytes),
+        Kind::Tiff => tiff::info(bytes),
+        Kind::Png | Kind::Bmp | Kind::Tga | Kind::WebP => raster::info(bytes, kind),
     }
 }
 
-/// Decodes a picture in no more than `most` bytes beside `bytes` themselves.
+/// Decodes a picture in at most `most` bytes, without `bytes` themselves.
 ///
 /// # Errors
-/// As [`survey`]; pixels that cannot be read; a picture that needs more memory.
+/// Those of [`read_info`]; unreadable pixels; a picture that needs more memory.
 pub fn decode(bytes: &[u8], name: &Path, most: usize) -> Result<Picture, PictureError> {
-    let survey = survey(bytes, name)?;
-    if survey.peak > most {
-        return Err(PictureError::new(format!(
-            "its {}x{} pixels need {} to be read, and {} of memory are left",
-            survey.width,
-            survey.height,
-            readable_bytes(survey.peak),
-            readable_bytes(most)
-        )));
+    let info = read_info(bytes, name)?;
+    if info.peak > most {
+        let [needed, left] = [info.peak, most].map(readable_bytes);
+        let Info { width, height, .. } = info;
+        fail!("its {width}x{height} pixels need {needed} to be read, and {left} of memory are left");
     }
-    match survey.kind {
+    match info.kind {
         Kind::Exr => exr::decode(bytes),
         Kind::Hdr => hdr::decode(bytes),
         Kind::Pfm => pfm::decode(bytes),
         Kind::Jpeg => jpeg::decode(bytes),
-        Kind::Tiff => tiff::decode(bytes, &survey),
-        Kind::Png | Kind::Bmp | Kind::Tga | Kind::WebP => raster::decode(bytes, &survey),
+        Kind::Tiff => tiff::decode(bytes, &info),
+        Kind::Png | Kind::Bmp | Kind::Tga | Kind::WebP => raster::decode(bytes, &info),
     }
 }
 
-/// The number of pixels, where there is such a picture.
+/// The number of pixels, if it is possible.
 fn pixels(width: usize, height: usize) -> Result<usize, PictureError> {
     match width.checked_mul(height).filter(|&pixels| pixels <= MAX_PIXELS) {
         Some(0) => Err(PictureError::new("it has no pixels")),
         Some(pixels) => Ok(pixels),
-        None => Err(PictureError::new(format!(
-            "it claims {width}x{height} pixels; at most {MAX_PIXELS} are read"
-        ))),
+        None => fail!("it claims {width}x{height} pixels; at most {MAX_PIXELS} are read"),
     }
 }
 
-/// As [`pixels`], of a file of `bytes` bytes, each of which stands for at most `most` pixels.
+/// As [`pixels`], for a file of `bytes` bytes that each encode at most `most` pixels.
 fn plausible(width: usize, height: usize, bytes: usize, most: usize) -> Result<usize, PictureError> {
     let pixels = pixels(width, height)?;
     if pixels > bytes.saturating_mul(most) {
-        return Err(PictureError::new(format!(
-            "it claims {width}x{height} pixels but is only {bytes} bytes long: truncated or malicious"
-        )));
+        fail!("it claims {width}x{height} pixels but is only {bytes} bytes long: truncated or malicious");
     }
     Ok(pixels)
 }
 
-/// `count` copies of `value`; an error where the system does not give the memory.
+/// `count` copies of `value`; an error if the system has no memory.
 fn filled<T: Clone>(count: usize, value: T) -> Result<Vec<T>, PictureError> {
     let mut values = Vec::new();
     values.try_reserve_exact(count).map_err(|_| PictureError::new("there is not enough memory for it"))?;
@@ -152,15 +144,20 @@ fn filled<T: Clone>(count: usize, value: T) -> Result<Vec<T>, PictureError> {
     Ok(values)
 }
 
+/// Black linear pixels, and their opacity (zero) if there is one.
+fn black(pixels: usize, has_alpha: bool) -> Result<(Vec<[f32; 3]>, Vec<f32>), PictureError> {
+    Ok((filled(pixels, [0.0; 3])?, filled(if has_alpha { pixels } else { 0 }, 0.0)?))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    /// Enough for the pictures of tests.
+    /// Enough for the pictures of the tests.
     const MOST: usize = 1 << 24;
 
     #[test]
-    fn bytes_that_are_no_picture_are_refused() {
+    fn damaged_files_are_refused() {
         let files = [
             &b""[..],
             b"GIF89a",
@@ -180,7 +177,7 @@ mod tests {
     }
 
     #[test]
-    fn a_picture_that_needs_more_than_there_is_is_not_decoded() {
+    fn picture_beyond_the_memory_limit_is_not_decoded() {
         let mut bytes = std::io::Cursor::new(Vec::new());
         image::GrayImage::new(1, 1).write_to(&mut bytes, image::ImageFormat::Bmp).unwrap();
         let mut bytes = bytes.into_inner();

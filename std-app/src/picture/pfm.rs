@@ -1,26 +1,26 @@
-//! Portable float map: a text header of three words, then f32 rows from the bottom up.
+//! Portable float map: a text header of four words, then rows of f32 from the bottom up.
 
-use super::{Kind, Picture, PictureError, Samples, Survey, filled, pixels};
+use super::{Info, Kind, Picture, PictureError, Samples, black, fail, pixels};
 
-/// What a header says.
+/// The header.
 struct Header<'a> {
     width: usize,
     height: usize,
     /// Values of a pixel: 1 grey, 3 RGB, 4 RGBA.
     channels: usize,
     little_endian: bool,
-    /// Factor on all values.
+    /// Factor on all colours.
     scale: f32,
     notes: Vec<String>,
-    /// The pixels.
+    /// Bytes of the pixels.
     rest: &'a [u8],
 }
 
-pub(super) fn survey(bytes: &[u8]) -> Result<Survey, PictureError> {
+pub(super) fn info(bytes: &[u8]) -> Result<Info, PictureError> {
     let header = read_header(bytes)?;
     let of_pixel = if header.channels == 4 { 16 } else { 12 };
     let kept = header.width * header.height * of_pixel;
-    Ok(Survey { kind: Kind::Pfm, width: header.width as u32, height: header.height as u32, kept, peak: kept })
+    Ok(Info { kind: Kind::Pfm, width: header.width as u32, height: header.height as u32, kept, peak: kept })
 }
 
 /// Colour (`PF`), grey (`Pf`) and colour with alpha (`PF4`), of either byte order.
@@ -31,8 +31,7 @@ pub(super) fn decode(bytes: &[u8]) -> Result<Picture, PictureError> {
         if little_endian { f32::from_le_bytes(bytes) } else { f32::from_be_bytes(bytes) }
     };
     let has_alpha = channels == 4;
-    let mut rgb = filled(width * height, [0.0; 3])?;
-    let mut alpha = filled(if has_alpha { width * height } else { 0 }, 0.0)?;
+    let (mut rgb, mut alpha) = black(width * height, has_alpha)?;
     let rows = rest.chunks_exact(width * channels * 4);
     for (y, bytes) in (0..height).rev().zip(rows) {
         for (x, bytes) in bytes.chunks_exact(channels * 4).enumerate() {
@@ -54,7 +53,7 @@ fn read_header(bytes: &[u8]) -> Result<Header<'_>, PictureError> {
         Some("PF") => 3,
         Some("Pf") => 1,
         Some("PF4") => 4,
-        _ => return Err(PictureError::new("not a PFM: it does not begin with PF or Pf")),
+        _ => fail!("not a PFM: it does not begin with PF or Pf"),
     };
     let mut number = |what| {
         let text = word(&mut rest).unwrap_or("");
@@ -65,23 +64,20 @@ fn read_header(bytes: &[u8]) -> Result<Header<'_>, PictureError> {
         (value >= 1.0 && value <= f64::from(u32::MAX) && value.fract() == 0.0).then_some(value as usize)
     };
     let (Some(width), Some(height)) = (side(width), side(height)) else {
-        return Err(PictureError::new(format!("a size of {width} by {height} is impossible")));
+        fail!("a size of {width} by {height} is impossible");
     };
     let expected = pixels(width, height)? * channels * 4;
     if rest.len() < expected {
-        let found = rest.len();
-        return Err(PictureError::new(format!(
-            "truncated: {expected} bytes of pixels expected, {found} found"
-        )));
+        fail!("truncated: {expected} bytes of pixels expected, {} found", rest.len());
     }
     let factor = scale.abs() as f32;
     let is_usable = factor > 0.0 && factor.is_finite();
-    let notes = if is_usable { Vec::new() } else { vec![format!("its scale of {scale} is left out")] };
-    let scale_used = if is_usable { factor } else { 1.0 };
-    Ok(Header { width, height, channels, little_endian: scale < 0.0, scale: scale_used, notes, rest })
+    let notes = if is_usable { Vec::new() } else { vec![format!("its scale of {scale} is ignored")] };
+    let factor = if is_usable { factor } else { 1.0 };
+    Ok(Header { width, height, channels, little_endian: scale < 0.0, scale: factor, notes, rest })
 }
 
-/// The next word of the header, with the one blank behind it: pixels may follow at once.
+/// The next word of the header; consumes the one blank after it, because pixels may follow.
 fn word<'a>(rest: &mut &'a [u8]) -> Option<&'a str> {
     let bytes = rest.trim_ascii_start();
     let length = bytes.iter().take(32).position(u8::is_ascii_whitespace)?;
@@ -102,14 +98,14 @@ mod tests {
     }
 
     #[test]
-    fn grey_big_endian_from_the_bottom() {
+    fn rows_are_stored_from_the_bottom() {
         let mut bytes = b"Pf\n1 2\n1.0\n".to_vec();
         bytes.extend([1.0f32, 2.0].iter().flat_map(|v| v.to_be_bytes()));
         assert_eq!(colours(&bytes), [[2.0; 3], [1.0; 3]]);
     }
 
     #[test]
-    fn the_magnitude_of_the_scale_is_a_factor() {
+    fn magnitude_of_the_scale_is_a_factor() {
         let pixel: Vec<u8> = [1.0f32, 2.0, 3.0].iter().flat_map(|v| v.to_le_bytes()).collect();
         assert_eq!(colours(&[b"PF 1 1 -2.5\n", &pixel[..]].concat()), [[2.5, 5.0, 7.5]]);
         let zero = decode(&[b"PF 1 1 -0.0\n", &pixel[..]].concat()).unwrap();
@@ -125,13 +121,13 @@ mod tests {
     }
 
     #[test]
-    fn a_first_pixel_that_looks_like_a_blank_is_kept() {
+    fn first_pixel_may_resemble_a_blank() {
         let bytes = [b"Pf 1 1 -1\n".as_slice(), &[0x20, 0x20, 0x20, 0x20]].concat();
         assert_eq!(colours(&bytes), [[f32::from_le_bytes([0x20; 4]); 3]]);
     }
 
     #[test]
-    fn lies_about_the_size_are_refused() {
+    fn impossible_sizes_are_refused() {
         for header in
             ["PF\n4000000000 4000000000\n-1\n", "PF\n9 9\n-1\n", "PF\n-1 1\n-1\n", "PF\n1 nan\n1\n", "P6\n"]
         {

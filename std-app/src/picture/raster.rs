@@ -1,21 +1,20 @@
-//! What the `image` crate decodes: PNG, BMP, TGA, WebP.
+//! PNG, BMP, TGA and WebP, decoded by the `image` crate.
 
-use super::{Kind, Picture, PictureError, Samples, Survey, filled, plausible};
+use super::{Info, Kind, Picture, PictureError, Samples, black, filled, plausible};
 use image::{ColorType, ImageDecoder, ImageFormat, ImageReader, Limits};
 use std::io::Cursor;
 
-/// Pixels that one byte of a file can stand for: deflate yields at most 1032 bytes from one, and a PNG packs
-/// 8 pixels in each.
+/// Pixels that one byte can encode: at most 1032 bytes of deflate, with 8 pixels of a PNG in each.
 const PIXELS_PER_BYTE: usize = 8 * 1032;
 
-/// Bytes for a decoder's tables.
+/// Bytes of the tables of a decoder.
 pub(super) const TABLES: usize = 1 << 19;
 
-pub(super) fn survey(bytes: &[u8], kind: Kind) -> Result<Survey, PictureError> {
+pub(super) fn info(bytes: &[u8], kind: Kind) -> Result<Info, PictureError> {
     let decoder = open(bytes, kind)?;
     let (width, height) = decoder.dimensions();
     let most = match kind {
-        // Codes of four bytes may stand for any number of equal pixels, but not in vain.
+        // A code may stand for any number of equal pixels.
         Kind::WebP => usize::MAX,
         _ => PIXELS_PER_BYTE,
     };
@@ -23,29 +22,28 @@ pub(super) fn survey(bytes: &[u8], kind: Kind) -> Result<Survey, PictureError> {
     let colour = decoder.color_type();
     let raw = pixels.saturating_mul(usize::from(colour.bytes_per_pixel()));
     let scratch = match kind {
-        // Planes of luminance and chroma in whole blocks; or all four channels, and tables for parts of the
-        // picture.
+        // Planes of luminance and chroma in whole blocks; or all four channels, and tables.
         Kind::WebP => 6 * pixels + 64 * (width + height) as usize + 2 * bytes.len() + (4 << 20),
-        // Indices, or pixels of 15 bits, before they are expanded.
+        // Indices, or pixels of 15 bits, before expansion.
         Kind::Tga => raw,
-        Kind::Png => beside_pixels(bytes),
+        Kind::Png => png_scratch(bytes),
         // Two rows.
         _ => 16 * width as usize,
     };
     let kept = kept(colour, pixels);
     let converted = if is_rgba(colour) { 0 } else { kept };
-    Ok(Survey { kind, width, height, kept, peak: raw.saturating_add(converted + scratch + TABLES) })
+    Ok(Info { kind, width, height, kept, peak: raw.saturating_add(converted + scratch + TABLES) })
 }
 
-pub(super) fn decode(bytes: &[u8], survey: &Survey) -> Result<Picture, PictureError> {
-    let mut picture = read(open(bytes, survey.kind)?)?;
-    if survey.kind == Kind::WebP && is_short_webp(bytes) {
-        picture.notes.push("its end is missing; what is there is used".into());
+pub(super) fn decode(bytes: &[u8], info: &Info) -> Result<Picture, PictureError> {
+    let mut picture = read(open(bytes, info.kind)?)?;
+    if info.kind == Kind::WebP && is_short_webp(bytes) {
+        picture.notes.push("its end is missing; the rest is used".into());
     }
     Ok(picture)
 }
 
-/// The pixels that `decoder` has.
+/// The pixels of a decoder.
 pub(super) fn read(decoder: impl ImageDecoder) -> Result<Picture, PictureError> {
     let (width, height) = decoder.dimensions();
     let colour = decoder.color_type();
@@ -56,7 +54,7 @@ pub(super) fn read(decoder: impl ImageDecoder) -> Result<Picture, PictureError> 
     Ok(Picture { width, height, samples: samples(buffer, colour)?, has_alpha, notes: Vec::new() })
 }
 
-/// What the decoder of a file of `kind` says, before any pixel is decoded.
+/// The decoder of a file, which has read the header.
 pub(super) fn open(bytes: &[u8], kind: Kind) -> Result<impl ImageDecoder + '_, PictureError> {
     let format = match kind {
         Kind::Png => ImageFormat::Png,
@@ -66,15 +64,15 @@ pub(super) fn open(bytes: &[u8], kind: Kind) -> Result<impl ImageDecoder + '_, P
         _ => ImageFormat::Tiff,
     };
     let mut reader = ImageReader::with_format(Cursor::new(bytes), format);
-    // Pixels are the caller's matter, who knows what is left.
+    // The caller checks the memory of the pixels.
     let mut limits = Limits::no_limits();
-    limits.max_alloc = (kind == Kind::Png).then(|| beside_pixels(bytes) as u64);
+    limits.max_alloc = (kind == Kind::Png).then(|| png_scratch(bytes) as u64);
     reader.limits(limits);
     reader.into_decoder().map_err(PictureError::new)
 }
 
-/// Bytes that a PNG may take beside its pixels: chunks, a profile that is unpacked, and rows.
-fn beside_pixels(bytes: &[u8]) -> usize {
+/// Bytes that a PNG takes without its pixels: chunks, an unpacked profile, and rows.
+fn png_scratch(bytes: &[u8]) -> usize {
     const PROFILE: usize = 2 << 20;
     const WIDEST: usize = 1 << 20;
     let width =
@@ -93,12 +91,12 @@ pub(super) fn kept(colour: ColorType, pixels: usize) -> usize {
     pixels.saturating_mul(of_pixel)
 }
 
-/// Whether bytes of that colour are used as they are.
+/// Whether the decoded bytes are used directly.
 fn is_rgba(colour: ColorType) -> bool {
     colour == ColorType::Rgba8
 }
 
-/// All channels of all pixels as four.
+/// The pixels with four channels.
 fn samples(buffer: Vec<u8>, colour: ColorType) -> Result<Samples, PictureError> {
     if is_rgba(colour) {
         return Ok(Samples::Bytes(buffer));
@@ -111,8 +109,7 @@ fn samples(buffer: Vec<u8>, colour: ColorType) -> Result<Samples, PictureError> 
         1 => Samples::Bytes(expanded(&buffer, channels, 1, pixels, |bytes| bytes[0], u8::MAX)?),
         2 => Samples::Words(expanded(&buffer, channels, 2, pixels, words, u16::MAX)?),
         _ => {
-            let mut rgb = filled(pixels, [0.0; 3])?;
-            let mut alpha = filled(if colour.has_alpha() { pixels } else { 0 }, 0.0)?;
+            let (mut rgb, mut alpha) = black(pixels, colour.has_alpha())?;
             for (i, pixel) in buffer.chunks_exact(4 * channels).enumerate() {
                 rgb[i] = [0, 4, 8].map(|at| floats(&pixel[at..]));
                 if let Some(alpha) = alpha.get_mut(i) {
@@ -124,7 +121,7 @@ fn samples(buffer: Vec<u8>, colour: ColorType) -> Result<Samples, PictureError> 
     })
 }
 
-/// Grey, grey with alpha, or RGB as RGBA.
+/// RGBA of grey, grey with alpha, or RGB.
 fn expanded<T: Copy>(
     buffer: &[u8],
     channels: usize,
@@ -145,10 +142,10 @@ fn expanded<T: Copy>(
     Ok(rgba)
 }
 
-/// A WebP says how long it is.
+/// Whether a WebP is shorter than its header states.
 fn is_short_webp(bytes: &[u8]) -> bool {
-    let says = bytes.get(4..8).map_or(0, |says| u32::from_le_bytes([says[0], says[1], says[2], says[3]]));
-    bytes.len() < says as usize + 8
+    let stated = bytes.get(4..8).map_or(0, |b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]));
+    bytes.len() < stated as usize + 8
 }
 
 #[cfg(test)]
@@ -157,7 +154,7 @@ mod tests {
     use image::{DynamicImage, ImageBuffer};
     use std::path::Path;
 
-    fn there_and_back(picture: DynamicImage, format: ImageFormat, name: &str) -> Picture {
+    fn round_trip(picture: DynamicImage, format: ImageFormat, name: &str) -> Picture {
         let mut bytes = Cursor::new(Vec::new());
         picture.write_to(&mut bytes, format).unwrap();
         super::super::decode(bytes.get_ref(), Path::new(name), 1 << 24).unwrap()
@@ -173,7 +170,7 @@ mod tests {
             (ImageFormat::Tga, "a.tga"),
         ] {
             let picture = ImageBuffer::from_raw(2, 1, pixels.clone()).unwrap();
-            let picture = there_and_back(DynamicImage::ImageRgba8(picture), format, name);
+            let picture = round_trip(DynamicImage::ImageRgba8(picture), format, name);
             assert_eq!((picture.width, picture.height, picture.has_alpha), (2, 1, true), "{format:?}");
             assert_eq!(picture.samples, Samples::Bytes(pixels.clone()), "{format:?}");
             assert_eq!(picture.notes, [""; 0]);
@@ -184,16 +181,16 @@ mod tests {
     fn fewer_channels_become_four() {
         let grey = DynamicImage::ImageLuma8(ImageBuffer::from_raw(2, 1, vec![7, 9]).unwrap());
         let expected = Samples::Bytes(vec![7, 7, 7, 255, 9, 9, 9, 255]);
-        assert_eq!(there_and_back(grey, ImageFormat::Png, "a").samples, expected);
+        assert_eq!(round_trip(grey, ImageFormat::Png, "a").samples, expected);
         let rgb = DynamicImage::ImageRgb8(ImageBuffer::from_raw(1, 1, vec![7, 8, 9]).unwrap());
-        assert_eq!(there_and_back(rgb, ImageFormat::Bmp, "a").samples, Samples::Bytes(vec![7, 8, 9, 255]));
+        assert_eq!(round_trip(rgb, ImageFormat::Bmp, "a").samples, Samples::Bytes(vec![7, 8, 9, 255]));
         let words = DynamicImage::ImageLumaA16(ImageBuffer::from_raw(1, 1, vec![700, 900]).unwrap());
-        let picture = there_and_back(words, ImageFormat::Png, "a");
+        let picture = round_trip(words, ImageFormat::Png, "a");
         assert_eq!((picture.samples, picture.has_alpha), (Samples::Words(vec![700, 700, 700, 900]), true));
     }
 
     #[test]
-    fn what_is_cut_short_is_refused_or_noted() {
+    fn truncated_files_are_refused_or_noted() {
         let noise = |i: u32| (i.wrapping_mul(2_654_435_761) >> 24) as u8;
         let pixels: Vec<u8> = (0..40 * 30 * 3).map(noise).collect();
         let picture = DynamicImage::ImageRgb8(ImageBuffer::from_raw(40, 30, pixels).unwrap());

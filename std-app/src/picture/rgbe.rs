@@ -1,16 +1,16 @@
-//! Scanlines of Radiance pictures: flat, or in one of the two run-length encodings of the format.
+//! Scanlines of Radiance pictures: flat, or in one of two run-length encodings.
 
-use super::PictureError;
+use super::{PictureError, fail};
 
 /// Lengths of scanlines in the newer encoding.
 const NEWER: core::ops::RangeInclusive<usize> = 8..=0x7fff;
 
-/// The next scanline of `rest`: three mantissas and an exponent for each pixel of `line`.
+/// Reads the next scanline of `rest` into `line`: three mantissas and an exponent for each pixel.
 pub(super) fn read_scanline(rest: &mut &[u8], line: &mut [[u8; 4]]) -> Result<(), PictureError> {
     match **rest {
         [2, 2, high, low, ..] if NEWER.contains(&line.len()) && high < 128 => {
             if usize::from(high) << 8 | usize::from(low) != line.len() {
-                return Err(PictureError::new("damaged: a scanline has another length than the picture"));
+                fail!("damaged: a scanline has another length than the picture");
             }
             *rest = &rest[4..];
             (0..4).try_for_each(|component| read_component(rest, line, component))
@@ -19,14 +19,14 @@ pub(super) fn read_scanline(rest: &mut &[u8], line: &mut [[u8; 4]]) -> Result<()
     }
 }
 
-/// One component of all pixels: runs of one value, and values that stand for themselves.
+/// Reads one component of all pixels: runs of one value, and runs of literal values.
 fn read_component(rest: &mut &[u8], line: &mut [[u8; 4]], component: usize) -> Result<(), PictureError> {
     let mut pixels = line.iter_mut();
     while pixels.len() > 0 {
         let code = usize::from(take(rest)?);
         let (count, run) = if code > 128 { (code - 128, Some(take(rest)?)) } else { (code, None) };
         if count == 0 || count > pixels.len() {
-            return Err(PictureError::new("damaged: a run does not fit into its scanline"));
+            fail!("damaged: a run does not fit into its scanline");
         }
         for pixel in pixels.by_ref().take(count) {
             pixel[component] = match run {
@@ -38,8 +38,7 @@ fn read_component(rest: &mut &[u8], line: &mut [[u8; 4]], component: usize) -> R
     Ok(())
 }
 
-/// Flat pixels, of which 1 1 1 n repeats the last one n times, 256 n where it follows such another, and so
-/// on.
+/// Reads flat pixels. 1 1 1 n repeats the last pixel n times, 256 n times after another repetition, and so on.
 fn read_pixels(rest: &mut &[u8], line: &mut [[u8; 4]]) -> Result<(), PictureError> {
     let (mut at, mut shift) = (0, 0);
     while at < line.len() {
@@ -50,7 +49,7 @@ fn read_pixels(rest: &mut &[u8], line: &mut [[u8; 4]]) -> Result<(), PictureErro
             continue;
         };
         let Some(&last) = at.checked_sub(1).and_then(|last| line.get(last)) else {
-            return Err(PictureError::new("damaged: a scanline begins with a repetition"));
+            fail!("damaged: a scanline begins with a repetition");
         };
         let count = usize::from(count).checked_shl(shift).unwrap_or(usize::MAX);
         let end = at.saturating_add(count).min(line.len());
@@ -79,7 +78,7 @@ mod tests {
     }
 
     #[test]
-    fn the_older_encoding_repeats_the_last_pixel() {
+    fn older_encoding_repeats_the_last_pixel() {
         let mut expected = [[7, 8, 9, 130]; 300];
         expected[0] = [1, 2, 3, 129];
         // 43 and 256 times 1.
@@ -89,7 +88,7 @@ mod tests {
     }
 
     #[test]
-    fn the_newer_encoding_has_its_components_one_after_the_other() {
+    fn newer_encoding_separates_components() {
         let mut bytes = vec![2, 2, 0, 9];
         for component in [10, 20, 30, 128] {
             bytes.extend([128 + 7, component, 2, component + 1, component + 2]);
@@ -107,7 +106,7 @@ mod tests {
     }
 
     #[test]
-    fn short_lines_may_begin_like_the_newer_encoding() {
+    fn short_lines_may_resemble_the_newer_encoding() {
         assert_eq!(line(&[2, 2, 0, 7, 5, 5, 5, 128]).unwrap(), [[2, 2, 0, 7], [5, 5, 5, 128]]);
     }
 }

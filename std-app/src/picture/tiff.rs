@@ -1,16 +1,16 @@
-//! TIFF: grey floats, which the `image` crate does not take, here; all else through it.
+//! TIFF: by the `image` crate, except grey floats, which it does not support.
 
 use super::raster::{self, TABLES};
-use super::{Kind, Picture, PictureError, Samples, Survey, filled, plausible};
+use super::{Info, Kind, Picture, PictureError, Samples, black, fail, plausible};
 use image::ImageDecoder;
 use std::io::Cursor;
 use tiff::ColorType;
 use tiff::decoder::{Decoder, DecodingResult, Limits};
 
-/// Pixels that one byte can stand for: 1032 bytes of deflate, of 8 pixels each.
+/// Pixels that one byte can encode: 1032 bytes of deflate with 8 pixels each.
 const PIXELS_PER_BYTE: usize = 8 * 1032;
 
-pub(super) fn survey(bytes: &[u8]) -> Result<Survey, PictureError> {
+pub(super) fn info(bytes: &[u8]) -> Result<Info, PictureError> {
     let (width, height, raw, kept) = match grey_floats(bytes)? {
         Some((width, height, channels)) => {
             let area = width as usize * height as usize;
@@ -24,33 +24,31 @@ pub(super) fn survey(bytes: &[u8]) -> Result<Survey, PictureError> {
             (width, height, raw, raster::kept(decoder.color_type(), pixels))
         }
     };
-    // The decoder's pixels, a copy, one strip or tile unpacked, and four channels of ink instead of three of
-    // light.
+    // The pixels of the decoder, a copy, an unpacked strip or tile, and four channels of CMYK instead of three.
     let peak = kept.saturating_add(raw.saturating_mul(4)).saturating_add(2 * bytes.len() + TABLES);
-    Ok(Survey { kind: Kind::Tiff, width, height, kept, peak })
+    Ok(Info { kind: Kind::Tiff, width, height, kept, peak })
 }
 
-pub(super) fn decode(bytes: &[u8], survey: &Survey) -> Result<Picture, PictureError> {
+pub(super) fn decode(bytes: &[u8], info: &Info) -> Result<Picture, PictureError> {
     let Some((width, height, channels)) = grey_floats(bytes)? else {
         let mut decoder = raster::open(bytes, Kind::Tiff)?;
         let mut limits = image::Limits::no_limits();
-        limits.max_alloc = Some(survey.peak as u64);
+        limits.max_alloc = Some(info.peak as u64);
         decoder.set_limits(limits).map_err(PictureError::new)?;
         return raster::read(decoder);
     };
     let mut limits = Limits::default();
-    (limits.decoding_buffer_size, limits.intermediate_buffer_size) = (survey.peak, survey.peak);
+    (limits.decoding_buffer_size, limits.intermediate_buffer_size) = (info.peak, info.peak);
     let mut decoder = Decoder::new(Cursor::new(bytes)).map_err(PictureError::new)?.with_limits(limits);
     let DecodingResult::F32(values) = decoder.read_image().map_err(PictureError::new)? else {
-        return Err(PictureError::new("its kind of numbers is not supported"));
+        fail!("its kind of numbers is not supported");
     };
     let pixels = width as usize * height as usize;
     if values.len() < pixels * channels {
-        return Err(PictureError::new("truncated: pixels are missing"));
+        fail!("truncated: pixels are missing");
     }
     let has_alpha = channels == 2;
-    let mut rgb = filled(pixels, [0.0; 3])?;
-    let mut alpha = filled(if has_alpha { pixels } else { 0 }, 0.0)?;
+    let (mut rgb, mut alpha) = black(pixels, has_alpha)?;
     for (i, pixel) in values.chunks_exact(channels).take(pixels).enumerate() {
         rgb[i] = [pixel[0]; 3];
         if let Some(alpha) = alpha.get_mut(i) {
@@ -60,7 +58,7 @@ pub(super) fn decode(bytes: &[u8], survey: &Survey) -> Result<Picture, PictureEr
     Ok(Picture { width, height, samples: Samples::Floats { rgb, alpha }, has_alpha, notes: Vec::new() })
 }
 
-/// Size and channels of a picture of grey floats; `None` for another.
+/// Width, height and channels of a picture of grey floats; `None` for others.
 fn grey_floats(bytes: &[u8]) -> Result<Option<(u32, u32, usize)>, PictureError> {
     let mut decoder = Decoder::new(Cursor::new(bytes)).map_err(PictureError::new)?;
     let channels = match decoder.colortype().map_err(PictureError::new)? {
@@ -80,7 +78,7 @@ mod tests {
     use tiff::encoder::{TiffEncoder, colortype};
 
     #[test]
-    fn floats_are_linear_and_grey_ones_too() {
+    fn grey_and_rgb_floats_are_linear() {
         let mut bytes = Cursor::new(Vec::new());
         let mut encoder = TiffEncoder::new(&mut bytes).unwrap();
         encoder.write_image::<colortype::Gray32Float>(2, 1, &[0.25, -7.5]).unwrap();
@@ -96,7 +94,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_cut_short_is_refused() {
+    fn truncated_files_are_refused() {
         let mut bytes = Cursor::new(Vec::new());
         let mut encoder = TiffEncoder::new(&mut bytes).unwrap();
         encoder.write_image::<colortype::Gray32Float>(8, 8, &[0.5; 64]).unwrap();

@@ -1,7 +1,7 @@
 //! The folder of a report: found usable before a long render, filled after it.
 
 use super::Files;
-use crate::save::{Patience, PictureError, Place, check_place, not_written, replace, words};
+use crate::save::{Destination, Patience, PictureError, check_destination, io_reason, not_written, replace};
 use std::fs::{self, File};
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
@@ -32,10 +32,10 @@ pub fn check_folder(folder: &Path) -> Result<(), PictureError> {
     }
     if !folder.exists() {
         // As of a file: the folder above is there and writable.
-        return check_place(folder).map_err(refuse);
+        return check_destination(folder).map_err(refuse);
     }
     for (path, (_, marks)) in report_files(folder).iter().zip(FILES) {
-        check_place(path).map_err(|why| PictureError::new(why).at(path))?;
+        check_destination(path).map_err(|why| PictureError::new(why).at(path))?;
         let is_ours = is_ours(path, marks);
         if !is_ours.map_err(|error| PictureError::new(not_written(&error)).at(path))? {
             let why = "would be overwritten by the report, and is not of one: give the report another folder";
@@ -47,7 +47,7 @@ pub fn check_folder(folder: &Path) -> Result<(), PictureError> {
 
 /// Whether `path` may be replaced by a file of a report.
 fn is_ours(path: &Path, marks: &[&str]) -> io::Result<bool> {
-    if Place::of(path)?.is_stream() || !path.exists() {
+    if Destination::of(path)?.is_stream() || !path.exists() {
         return Ok(true);
     }
     let mut bytes = Vec::new();
@@ -63,9 +63,9 @@ fn is_ours(path: &Path, marks: &[&str]) -> io::Result<bool> {
 /// For each file that is not there, its name and why.
 pub fn write_folder(folder: &Path, files: &Files, patience: Patience) -> Result<(), Vec<PictureError>> {
     if !folder.is_dir()
-        && let Err(error) = Place::of(folder).and_then(|place| fs::create_dir(place.path()))
+        && let Err(error) = Destination::of(folder).and_then(|destination| fs::create_dir(destination.path()))
     {
-        let why = format!("cannot be made: {}", words(&error));
+        let why = format!("cannot be made: {}", io_reason(&error));
         return Err(vec![PictureError::new(why).at(folder)]);
     }
     let write = |(name, bytes): &(&str, Vec<u8>)| replace(&folder.join(name), bytes, patience).err();

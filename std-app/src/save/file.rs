@@ -1,9 +1,8 @@
-//! Reading and writing whole files: the one reader of pictures by name, and the one writer of everything. A file
-//! is written beside its place and then renamed into it, so that whenever the program ends the old file or the new
-//! one is there, whole.
+//! Reading of picture files, and atomic writing of all files: a file is written under a temporary name in its folder
+//! and then renamed, so that either the old or the new file exists, complete, whenever the program ends.
 
-use super::part::Part;
-use super::place::{Place, folder};
+use super::destination::{Destination, folder};
+use super::partial_file::PartialFile;
 use super::stream::{self, Patience};
 use super::{Format, Image, PictureError, encode};
 use crate::memory::{self, Budget};
@@ -12,22 +11,22 @@ use std::fs::{File, OpenOptions};
 use std::io::{self, BufWriter, Write};
 use std::path::Path;
 
-/// Bytes that are gathered before they are handed to the system.
+/// Bytes of the write buffer.
 const BUFFER: usize = 1 << 20;
 
-/// The picture in a file, whose bytes say the format, in no more than `most` bytes of memory; and what had to be
-/// repaired, a sentence for each that names the file. See [`Image::from`].
+/// Reads a picture in at most `most` bytes of memory. Also returns one sentence for each repair, with the file.
 ///
 /// # Errors
-/// Names the file and what is wrong with it.
+/// An unreadable picture; the message names the file.
 pub fn read_within(path: &Path, most: usize) -> Result<(Image, Vec<String>), PictureError> {
-    let bytes = memory::read_file(path, most).map_err(|error| PictureError::new(words(&error)).at(path))?;
+    let bytes =
+        memory::read_file(path, most).map_err(|error| PictureError::new(io_reason(&error)).at(path))?;
     let about = |error: PictureError| error.at(path);
-    let survey = picture::survey(&bytes, path).map_err(about)?;
-    // Whole numbers become floats, in memory of their own.
-    let image = match survey.kind {
+    let info = picture::read_info(&bytes, path).map_err(about)?;
+    // Integers become floats, in memory of their own.
+    let image = match info.kind {
         Kind::Exr | Kind::Hdr | Kind::Pfm => 0,
-        _ => survey.width as usize * survey.height as usize * size_of::<[f32; 3]>(),
+        _ => info.width as usize * info.height as usize * size_of::<[f32; 3]>(),
     };
     let most = most.saturating_sub(bytes.len()).saturating_sub(image);
     let mut picture = picture::decode(&bytes, path, most).map_err(about)?;
@@ -35,53 +34,53 @@ pub fn read_within(path: &Path, most: usize) -> Result<(Image, Vec<String>), Pic
     Ok((Image::from(picture), notes))
 }
 
-/// As [`read_within`], in the memory that is the default ([`Budget::new`]), and without a word of repairs.
+/// As [`read_within`], in the default memory ([`Budget::new`]), without repairs.
 ///
 /// # Errors
-/// Names the file and what is wrong with it.
+/// An unreadable picture; the message names the file.
 pub fn read(path: &Path) -> Result<Image, PictureError> {
     read_within(path, Budget::new(None).limit()).map(|(image, _)| image)
 }
 
-/// Writes a picture; the extension says the format. A file appears whole or not at all; a pipe or a device is
-/// written in place, and a reader of it is waited for two and a half seconds.
+/// Writes a picture in the format of its extension. A file is replaced atomically; a pipe or device is written in
+/// place, after a wait of 2.5 s for its reader.
 ///
 /// # Errors
-/// Names the file and why it cannot be written.
+/// A file that cannot be written; the message names it.
 pub fn write(path: &Path, image: &Image) -> Result<(), PictureError> {
     write_with(path, image, Patience::least())
 }
 
-/// The same, with more patience for the reader of a pipe.
+/// As [`write()`], with another wait for the reader of a pipe.
 ///
 /// # Errors
-/// Names the file and why it cannot be written.
+/// A file that cannot be written; the message names it.
 pub fn write_with(path: &Path, image: &Image, patience: Patience) -> Result<(), PictureError> {
     let bytes = encode(image, Format::of(path)?).map_err(|error| error.at(path))?;
     replace(path, &bytes, patience)
 }
 
-/// Writes `bytes` to a file, which appears whole or not at all.
+/// Writes `bytes` to a file atomically.
 pub(crate) fn replace(path: &Path, bytes: &[u8], patience: Patience) -> Result<(), PictureError> {
     replace_with(path, patience, |file| file.write_all(bytes))
         .map_err(|error| PictureError::new(not_written(&error)).at(path))
 }
 
-/// Writes what `put` puts into a file, which appears whole or not at all.
+/// Writes the output of `put` to a file atomically.
 pub(crate) fn replace_with(
     path: &Path,
     patience: Patience,
     put: impl FnOnce(&mut dyn Write) -> io::Result<()>,
 ) -> io::Result<()> {
-    let place = Place::of(path)?;
-    if place.is_stream() {
+    let destination = Destination::of(path)?;
+    if destination.is_stream() {
         let mut bytes = Vec::new();
         put(&mut bytes)?;
-        return stream::write(&place, bytes, patience);
+        return stream::write(&destination, bytes, patience);
     }
-    let (part, file) = Part::create(place.path())?;
+    let (part, file) = PartialFile::create(destination.path())?;
     fill(file, put)?;
-    part.rename(place.path())
+    part.rename(destination.path())
 }
 
 fn fill(file: File, put: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> io::Result<()> {
@@ -90,26 +89,26 @@ fn fill(file: File, put: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> io::R
     file.into_inner().map_err(io::IntoInnerError::into_error)?.sync_all()
 }
 
-/// Finds out, before a long render, whether [`write()`] will find its way: the extension is known, the
-/// folder is there and takes files, and the file may be replaced.
+/// Checks before a long render that [`write()`] can succeed: the extension is known, the folder exists and is
+/// writable, and the file may be replaced.
 ///
 /// # Errors
-/// Names the file and what to do.
+/// A file that cannot be written; the message names it and the remedy.
 pub fn check_writable(path: &Path) -> Result<(), PictureError> {
     Format::of(path)?;
-    check_place(path).map_err(|why| PictureError::new(why).at(path))
+    check_destination(path).map_err(|why| PictureError::new(why).at(path))
 }
 
-/// The same of a file that is no picture; why not.
-pub(crate) fn check_place(path: &Path) -> Result<(), String> {
-    let place = Place::of(path).map_err(|error| not_written(&error))?;
-    if place.is_folder() {
+/// As [`check_writable`], for files other than pictures; the error is the reason.
+pub(crate) fn check_destination(path: &Path) -> Result<(), String> {
+    let destination = Destination::of(path).map_err(|error| not_written(&error))?;
+    if destination.is_folder() {
         return Err("cannot be written: it is a folder".into());
     }
-    if place.is_stream() {
+    if destination.is_stream() {
         return Ok(());
     }
-    let (target, folder) = (place.path(), folder(place.path()));
+    let (target, folder) = (destination.path(), folder(destination.path()));
     if target.file_name().is_none() || !folder.is_dir() {
         return Err(format!("cannot be written: there is no folder {}", folder.display()));
     }
@@ -118,20 +117,22 @@ pub(crate) fn check_place(path: &Path) -> Result<(), String> {
     {
         return Err(not_written(&error));
     }
-    let created = Part::create(target);
-    created.map(drop).map_err(|error| format!("cannot be written in {}: {}", folder.display(), words(&error)))
+    let created = PartialFile::create(target);
+    created
+        .map(drop)
+        .map_err(|error| format!("cannot be written in {}: {}", folder.display(), io_reason(&error)))
 }
 
-/// Why a file is not there, or not the new one.
+/// The reason why a file was not written.
 pub(crate) fn not_written(error: &io::Error) -> String {
     match error.kind() {
-        io::ErrorKind::NotFound => "cannot be written: its folder is not there any more".into(),
-        _ => format!("cannot be written: {}", words(error)),
+        io::ErrorKind::NotFound => "cannot be written: its folder does not exist any more".into(),
+        _ => format!("cannot be written: {}", io_reason(error)),
     }
 }
 
-/// The error without the number of the operating system.
-pub(crate) fn words(error: &io::Error) -> String {
+/// The error, without the error number of the system.
+pub(crate) fn io_reason(error: &io::Error) -> String {
     match error.kind() {
         io::ErrorKind::NotFound => "no such file".into(),
         io::ErrorKind::PermissionDenied => "permission denied".into(),

@@ -1,10 +1,10 @@
-//! A picture in memory: linear RGB, rows from the top.
+//! A picture in memory: linear RGB.
 
 use super::from_srgb;
 use crate::picture::{Picture, Samples};
 use halflight_core::Rgb;
 
-/// Linear radiance, `width * height` pixels, row by row from the top left.
+/// Linear radiance of `width * height` pixels, in rows from the top left.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Image {
     /// Pixels in a row.
@@ -40,7 +40,7 @@ impl Image {
     }
 }
 
-/// The colours in linear light: whole numbers go back through the sRGB curve. Alpha is left out.
+/// Linear colours: integers pass through the inverse sRGB curve. Alpha is ignored.
 impl From<Picture> for Image {
     fn from(picture: Picture) -> Self {
         let pixels = match picture.samples {

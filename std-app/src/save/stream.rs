@@ -1,7 +1,7 @@
-//! Writing to pipes and devices. A pipe that nobody reads blocks whoever opens it, and a reader that has stopped
-//! blocks whoever writes: a thread of its own does both, and is left alone where patience ends.
+//! Writing to pipes and devices. Opening a pipe without a reader blocks, and so does writing to a stopped reader, so
+//! a thread of its own does both; it is abandoned after a timeout.
 
-use super::place::Place;
+use super::destination::Destination;
 use core::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use core::time::Duration;
 use std::fs::OpenOptions;
@@ -11,44 +11,44 @@ use std::sync::mpsc::{self, RecvTimeoutError};
 use std::thread;
 use std::time::Instant;
 
-/// Bytes between two looks at how far it is.
+/// Bytes between two reports of progress.
 const CHUNK: usize = 1 << 16;
 
-/// Time between two looks at the flag.
+/// Time between two tests of the interrupt flag.
 const TICK: Duration = Duration::from_millis(20);
 
 /// The longest wait for the reader of a pipe.
 #[derive(Clone, Copy, Debug)]
 pub struct Patience<'a> {
-    /// The start of the work: a reader may come as late again.
+    /// Start of the work; the wait for a reader is at least as long as the work took.
     pub since: Instant,
-    /// Raised when it should end.
+    /// Raised to stop waiting.
     pub interrupt: &'a AtomicBool,
 }
 
 impl Patience<'_> {
-    /// A reader that comes late has so long at least.
+    /// Shortest wait.
     pub const LEAST: Duration = Duration::from_millis(2500);
 
-    /// For those who have nothing to interrupt them.
+    /// The shortest wait, without interruption.
     pub fn least() -> Patience<'static> {
         static NEVER: AtomicBool = AtomicBool::new(false);
         Patience { since: Instant::now(), interrupt: &NEVER }
     }
 }
 
-/// Writes `bytes` to the stream at `place`.
-pub(super) fn write(place: &Place, bytes: Vec<u8>, patience: Patience) -> io::Result<()> {
+/// Writes `bytes` to a pipe or device.
+pub(super) fn write(destination: &Destination, bytes: Vec<u8>, patience: Patience) -> io::Result<()> {
     let longest = patience.since.elapsed().max(Patience::LEAST);
-    // 0 until the stream is open, then one for each chunk.
+    // 0 until the stream is open, then incremented for each chunk.
     let steps = Arc::new(AtomicUsize::new(0));
     let (sender, ended) = mpsc::channel();
-    let (place, progress) = (place.clone(), steps.clone());
+    let (destination, progress) = (destination.clone(), steps.clone());
     thread::Builder::new().spawn(move || {
-        // Nobody receives it after the end of patience.
-        let _ = sender.send(open(&place).and_then(|stream| put(stream, &bytes, &progress)));
+        // After a timeout there is no receiver.
+        let _ = sender.send(open(&destination).and_then(|stream| put(stream, &bytes, &progress)));
     })?;
-    let (mut seen, mut since) = (0, Instant::now());
+    let (mut last, mut since) = (0, Instant::now());
     loop {
         match ended.recv_timeout(TICK) {
             Ok(written) => return written,
@@ -56,8 +56,8 @@ pub(super) fn write(place: &Place, bytes: Vec<u8>, patience: Patience) -> io::Re
             Err(RecvTimeoutError::Timeout) => {}
         }
         let step = steps.load(Ordering::Relaxed);
-        if step != seen {
-            (seen, since) = (step, Instant::now());
+        if step != last {
+            (last, since) = (step, Instant::now());
         }
         let limit = match (patience.interrupt.load(Ordering::Relaxed), step) {
             (true, _) => Patience::LEAST,
@@ -71,11 +71,11 @@ pub(super) fn write(place: &Place, bytes: Vec<u8>, patience: Patience) -> io::Re
     }
 }
 
-fn open(place: &Place) -> io::Result<Box<dyn Write>> {
-    Ok(match place {
-        place if place.is_stdout() => Box::new(stdout()),
-        place if place.is_stderr() => Box::new(stderr()),
-        place => Box::new(OpenOptions::new().write(true).truncate(true).open(place.path())?),
+fn open(destination: &Destination) -> io::Result<Box<dyn Write>> {
+    Ok(match destination {
+        destination if destination.is_stdout() => Box::new(stdout()),
+        destination if destination.is_stderr() => Box::new(stderr()),
+        destination => Box::new(OpenOptions::new().write(true).truncate(true).open(destination.path())?),
     })
 }
 

@@ -10,7 +10,7 @@ pub(super) use hash::Hash;
 
 use super::error::FileError;
 use crate::memory::Shortage;
-use crate::save::{Patience, check_place, not_written, replace_with};
+use crate::save::{Patience, check_destination, not_written, replace_with};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use std::fs::File;
@@ -79,7 +79,7 @@ pub(super) fn write(
 
 /// Whether a file will find its way to `path`: the folder is there and takes files.
 pub(super) fn check_writable(path: &Path) -> Result<(), FileError> {
-    check_place(path).map_err(|why| FileError::new(path, why))
+    check_destination(path).map_err(|why| FileError::new(path, why))
 }
 
 /// A file whose header has been read, and whose sections are to be.

@@ -1,4 +1,4 @@
-//! `[[light]]` and `[environment]`: lights that have no surface.
+//! `[[light]]` and `[environment]`: lights without surface.
 
 use super::values::{BRIGHTEST, Colour, Degrees, Matrix, Number, Rotation};
 use super::{LoadError, Source};
@@ -14,52 +14,52 @@ use toml::Spanned;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum LightKind {
-    /// Shines alike in all directions.
+    /// Equal intensity in all directions.
     Point,
-    /// Shines into a cone.
+    /// Emission into a cone.
     Spot,
-    /// Parallel, from infinitely far.
+    /// Parallel light.
     Directional,
 }
 
-/// A light without surface; which keys it needs depends on its kind.
+/// A light without surface; its kind determines the keys that it needs.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct LightEntry {
-    /// Which keys are needed.
+    /// Kind of the light.
     pub kind: LightKind,
-    /// Where a point or spot light is.
+    /// Position of a point or spot light.
     pub position: Option<[Number; 3]>,
-    /// Where a spot or directional light shines to: a direction,
+    /// Direction of the emission of a spot or directional light,
     pub direction: Option<[Number; 3]>,
-    /// or, for a spot light, a point.
+    /// or a point on the axis of a spot light.
     pub look_at: Option<[Number; 3]>,
     /// Radiant intensity of a point or spot light, W/sr.
     pub intensity: Option<Colour>,
     /// Irradiance of a directional light on a surface that faces it, W/m².
     pub irradiance: Option<Colour>,
-    /// Half-angle of a spot's cone, where it has faded to nothing.
+    /// Half-angle of the cone of a spot light.
     pub outer_degrees: Option<Degrees>,
-    /// Half-angle up to which it is full; three quarters of the outer one.
+    /// Half-angle of full intensity; by default three quarters of the outer one.
     pub inner_degrees: Option<Degrees>,
 }
 
-/// What is seen where nothing is.
+/// Light from infinity.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct EnvironmentEntry {
-    /// Radiance, or factor on the map; 1.
+    /// Radiance, or factor on the map; 1 by default.
     pub radiance: Option<Colour>,
-    /// A latitude-longitude picture.
+    /// A latitude-longitude image.
     pub map: Option<Spanned<String>>,
-    /// Turns the map in the world.
+    /// Rotation of the map.
     pub rotate: Option<Spanned<Rotation>>,
-    /// From directions of the map to those of the world, instead of `rotate`: rows of a matrix whose
-    /// translation does not count.
+    /// Transform of directions from the map to the world, instead of `rotate`: rows of a matrix, without its
+    /// translation.
     pub to_world: Option<Spanned<Matrix>>,
 }
 
-/// An environment whose map has been found.
+/// An environment with a located map.
 #[derive(Clone, Debug)]
 pub(in crate::load) struct EnvironmentChange {
     pub(in crate::load) radiance: Rgb,
@@ -67,7 +67,7 @@ pub(in crate::load) struct EnvironmentChange {
     pub(in crate::load) to_map: Mat3,
 }
 
-/// How far a matrix may be from a rotation: files carry six or more digits.
+/// Error of a rotation matrix: files have six or more digits.
 const ROTATION_TOLERANCE: f64 = 1e-4;
 
 impl EnvironmentEntry {
@@ -79,16 +79,13 @@ impl EnvironmentEntry {
                 let linear = matrix.get_ref().linear();
                 if !(linear * linear.transpose()).abs_diff_eq(DMat3::IDENTITY, ROTATION_TOLERANCE) {
                     let problem = "the matrix of the environment does not keep angles and lengths";
-                    return Err(source.error(
-                        matrix.span(),
-                        problem,
-                        "give a rotation, or one with a reflection",
-                    ));
+                    let help = "give a rotation, or one with a reflection";
+                    return Err(source.error(matrix.span(), problem, help));
                 }
                 linear
             }
             (Some(_), Some(matrix)) => {
-                let problem = "the environment is turned in two ways";
+                let problem = "the environment is rotated in two ways";
                 return Err(source.error(matrix.span(), problem, "give either `rotate` or `to_world`"));
             }
         };
@@ -129,9 +126,10 @@ pub(super) fn light(
             (None, Some(look_at), Some(from)) => (from, look_at),
             _ => return Err(needs(if from.is_some() { "direction` or `look_at" } else { "direction" })),
         };
-        direction_between(from, to.map(f64::from)).map(|unit| unit.as_vec3()).ok_or_else(|| {
+        let unit = direction_between(from, to.map(f64::from)).ok_or_else(|| {
             source.error(entry.span(), "the direction of this light is zero", "give it a length")
-        })
+        })?;
+        Ok(unit.as_vec3())
     };
     Ok(match light.kind {
         LightKind::Point => {

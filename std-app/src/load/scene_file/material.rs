@@ -1,14 +1,12 @@
-//! `[material.NAME]`: a material in plain words. Without `kind` it changes what the mesh's own material of
-//! that name says; with `kind` it starts afresh.
+//! `[material.NAME]`: with `kind` a new material, without it changes to the material of that name.
 
 use super::values::{Colour, Number};
 use super::{LoadError, Source};
-use crate::load::mtl::MtlMaterial;
-use crate::load::name::Name;
+use crate::load::mtl::{MapKind, MtlMaterial};
 use serde::Deserialize;
 use toml::Spanned;
 
-/// What kind of material starts afresh.
+/// Kind of a new material.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum MaterialKind {
@@ -27,11 +25,11 @@ pub enum MaterialKind {
 /// Reflectance of a mirror without `color`.
 const DEFAULT_MIRROR: f64 = 0.5;
 
-/// A material in plain words; what is not given stays as it was.
+/// A material; absent keys change nothing.
 #[derive(Clone, Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct MaterialEntry {
-    /// Start afresh from this kind.
+    /// Kind of a new material.
     pub kind: Option<MaterialKind>,
     /// Diffuse reflectance, or that of the metal (`Kd`).
     pub color: Option<Colour>,
@@ -41,7 +39,7 @@ pub struct MaterialEntry {
     pub specular: Option<Colour>,
     /// Texture of `specular` (`map_Ks`).
     pub specular_map: Option<Spanned<String>>,
-    /// Phong exponent (`Ns`); `roughness` wins.
+    /// Phong exponent (`Ns`); `roughness` overrides it.
     pub shininess: Option<Number>,
     /// 0 smooth ... 1 rough; GGX alpha is its square (`Pr`).
     pub roughness: Option<Number>,
@@ -53,9 +51,9 @@ pub struct MaterialEntry {
     pub metallic_map: Option<Spanned<String>>,
     /// Index of refraction (`Ni`).
     pub ior: Option<Number>,
-    /// Factor on light that a glass lets through (`Tf`).
+    /// Factor on the transmission of glass (`Tf`).
     pub tint: Option<Colour>,
-    /// Probability that a ray meets the surface (`d`).
+    /// Probability that a ray hits the surface (`d`).
     pub opacity: Option<Number>,
     /// Texture of `opacity` (`map_d`).
     pub opacity_map: Option<Spanned<String>>,
@@ -63,7 +61,7 @@ pub struct MaterialEntry {
     pub emission: Option<Colour>,
     /// Texture of `emission` (`map_Ke`).
     pub emission_map: Option<Spanned<String>>,
-    /// Whether the back emits as well.
+    /// Whether the back emits too.
     pub two_sided: Option<bool>,
     /// Heights (`bump`).
     pub bump_map: Option<Spanned<String>>,
@@ -73,10 +71,10 @@ pub struct MaterialEntry {
     pub normal_map: Option<Spanned<String>>,
 }
 
-/// A change to a material, its textures found.
+/// A change to a material, with its textures located.
 #[derive(Clone, Debug)]
 pub(in crate::load) struct MaterialChange {
-    afresh: bool,
+    is_new: bool,
     change: MtlMaterial,
     two_sided: Option<bool>,
     bump_scale: Option<f64>,
@@ -84,11 +82,9 @@ pub(in crate::load) struct MaterialChange {
 
 impl MaterialEntry {
     pub(super) fn resolved(&self, source: &Source) -> Result<MaterialChange, LoadError> {
-        let map = |path: &Option<Spanned<String>>| path.as_ref().map(|path| source.map(path)).transpose();
         let colour = |colour: Option<Colour>| colour.map(Colour::channels);
         let number = |number: Option<Number>| number.map(f64::from);
         let mut change = MtlMaterial {
-            name: Name::default(),
             diffuse: colour(self.color),
             specular: colour(self.specular),
             emission: colour(self.emission),
@@ -98,86 +94,88 @@ impl MaterialEntry {
             opacity: number(self.opacity),
             roughness: number(self.roughness),
             metallic: number(self.metallic),
-            illumination: None,
             surely_glass: self.kind == Some(MaterialKind::Glass),
-            two_sided: false,
-            diffuse_map: map(&self.color_map)?,
-            specular_map: map(&self.specular_map)?,
-            emission_map: map(&self.emission_map)?,
-            roughness_map: map(&self.roughness_map)?,
-            metallic_map: map(&self.metallic_map)?,
-            opacity_map: map(&self.opacity_map)?,
-            bump_map: map(&self.bump_map)?,
-            normal_map: map(&self.normal_map)?,
+            ..MtlMaterial::default()
         };
-        match self.kind {
-            None => {}
-            Some(MaterialKind::Diffuse) => change.illumination = Some(1),
-            Some(MaterialKind::Plastic) => {
-                // Roughness without `specular` is a dielectric coat: see `surface`.
-                change.illumination = Some(2);
-                change.roughness.get_or_insert(0.0);
+        let maps = [
+            (MapKind::Diffuse, &self.color_map),
+            (MapKind::Specular, &self.specular_map),
+            (MapKind::Emission, &self.emission_map),
+            (MapKind::Roughness, &self.roughness_map),
+            (MapKind::Metallic, &self.metallic_map),
+            (MapKind::Opacity, &self.opacity_map),
+            (MapKind::Bump, &self.bump_map),
+            (MapKind::Normal, &self.normal_map),
+        ];
+        for (kind, path) in maps {
+            if let Some(path) = path {
+                change.maps.insert(kind, source.map(path)?);
             }
-            Some(MaterialKind::Metal) => {
-                change.illumination = Some(2);
-                change.metallic.get_or_insert(1.0);
-                change.roughness.get_or_insert(0.0);
-            }
-            Some(MaterialKind::Mirror) => {
-                // A mirror reflects by `Ks` and has no base.
-                change.illumination = Some(3);
-                if change.specular.is_none() && change.specular_map.is_none() {
-                    let plain = change.diffuse_map.is_none().then_some([DEFAULT_MIRROR; 3]);
-                    change.specular = change.diffuse.take().or(plain);
-                    change.specular_map = change.diffuse_map.take();
-                }
-                (change.diffuse, change.diffuse_map) = (None, None);
-            }
-            Some(MaterialKind::Glass) => change.illumination = Some(7),
         }
-        let bump_scale = number(self.bump_scale);
-        Ok(MaterialChange { afresh: self.kind.is_some(), change, two_sided: self.two_sided, bump_scale })
+        if let Some(kind) = self.kind {
+            kind.complete(&mut change);
+        }
+        let (is_new, bump_scale) = (self.kind.is_some(), number(self.bump_scale));
+        Ok(MaterialChange { is_new, change, two_sided: self.two_sided, bump_scale })
+    }
+}
+
+impl MaterialKind {
+    /// Sets the statements of this kind.
+    fn complete(self, material: &mut MtlMaterial) {
+        match self {
+            Self::Diffuse => material.illumination = Some(1),
+            Self::Plastic => {
+                // Roughness without `specular` is a dielectric coat: see `surface`.
+                material.illumination = Some(2);
+                material.roughness.get_or_insert(0.0);
+            }
+            Self::Metal => {
+                material.illumination = Some(2);
+                material.metallic.get_or_insert(1.0);
+                material.roughness.get_or_insert(0.0);
+            }
+            Self::Mirror => {
+                // A mirror reflects by `Ks` and has no base.
+                material.illumination = Some(3);
+                let (colour, map) = (material.diffuse.take(), material.maps.remove(&MapKind::Diffuse));
+                if material.specular.is_none() && !material.has_map(MapKind::Specular) {
+                    let default = map.is_none().then_some([DEFAULT_MIRROR; 3]);
+                    material.specular = colour.or(default);
+                    material.maps.extend(map.map(|map| (MapKind::Specular, map)));
+                }
+            }
+            Self::Glass => material.illumination = Some(7),
+        }
     }
 }
 
 impl MaterialChange {
-    /// What is said, as statements of an MTL.
+    /// The change as statements of an MTL.
     pub(in crate::load) fn material(&self) -> &MtlMaterial {
         &self.change
     }
 
-    /// Applies what is given.
+    /// Applies the change.
     pub(in crate::load) fn apply(&self, material: &mut MtlMaterial) {
-        if self.afresh {
+        if self.is_new {
             *material = MtlMaterial { name: core::mem::take(&mut material.name), ..MtlMaterial::default() };
         }
         let change = self.change.clone();
-        // A coat that the scene file gives is there, whatever `illum` says.
+        // A coat of the scene file overrides `illum`.
         let is_coated =
-            change.specular.is_some() || change.specular_map.is_some() || change.shininess.is_some();
+            change.specular.is_some() || change.has_map(MapKind::Specular) || change.shininess.is_some();
         if is_coated && matches!(material.illumination, Some(0 | 1)) {
             material.illumination = Some(2);
         }
         macro_rules! replace {
-            ($($field:ident),*) => { $( if change.$field.is_some() { material.$field = change.$field; } )* };
+            ($($field:ident)*) => { $( material.$field = change.$field.or(material.$field); )* };
         }
-        replace!(
-            diffuse,
-            specular,
-            emission,
-            tint,
-            shininess,
-            ior,
-            opacity,
-            roughness,
-            metallic,
-            illumination
-        );
-        replace!(diffuse_map, specular_map, emission_map, roughness_map, metallic_map, opacity_map);
-        replace!(bump_map, normal_map);
+        replace!(diffuse specular emission tint shininess ior opacity roughness metallic illumination);
+        material.maps.extend(change.maps);
         material.surely_glass |= change.surely_glass;
         material.two_sided = self.two_sided.unwrap_or(material.two_sided);
-        if let (Some(map), Some(scale)) = (&mut material.bump_map, self.bump_scale) {
+        if let (Some(map), Some(scale)) = (material.maps.get_mut(&MapKind::Bump), self.bump_scale) {
             map.options.bump_multiplier = Some(scale);
         }
     }

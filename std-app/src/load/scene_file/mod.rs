@@ -1,6 +1,5 @@
-//! The scene file: TOML that places meshes and adds materials, camera, lights, environment and settings.
-//! `docs/scene-file.md` describes it. Every error names line and column; an unknown key is an error, with the
-//! keys that there are.
+//! The scene file: TOML that places meshes and adds materials, camera, lights, environment and settings, as
+//! described in `docs/scene-file.md`. Errors have line and column; that of an unknown key lists the valid ones.
 
 mod light;
 mod material;
@@ -22,6 +21,7 @@ use super::scene::{LoadedScene, View};
 use super::settings::RenderSettings;
 use super::{LoadOptions, SceneBuilder, read, too_large, weight};
 use core::cell::RefCell;
+use core::ops::Range;
 use glam::{DMat3, DVec3};
 use halflight_core::scene::Camera;
 use serde::Deserialize;
@@ -29,11 +29,11 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use toml::Spanned;
 
-/// What a scene file says, as written.
+/// A scene file as written.
 #[derive(Clone, Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SceneFile {
-    /// `[[mesh]]`: what to place where.
+    /// `[[mesh]]`: meshes and their placement.
     #[serde(default)]
     pub mesh: Vec<MeshEntry>,
     /// `[material.NAME]`: new materials, and changes to those of the meshes.
@@ -44,14 +44,14 @@ pub struct SceneFile {
     /// `[[light]]`: lights without surface.
     #[serde(default)]
     pub light: Vec<Spanned<LightEntry>>,
-    /// `[environment]`: light from infinitely far.
+    /// `[environment]`: infinitely distant light.
     pub environment: Option<EnvironmentEntry>,
     /// `[render]`.
     #[serde(default)]
     pub render: RenderSettings,
 }
 
-/// A mesh and where it stands: scaled, then rotated, then translated; or by a matrix.
+/// A mesh and its placement: scaled, then rotated, then translated; or by a matrix.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct MeshEntry {
@@ -65,134 +65,115 @@ pub struct MeshEntry {
     /// In units of the scene.
     #[serde(default)]
     pub translate: [Number; 3],
-    /// Three or four rows of four, instead of all the above.
+    /// Three or four rows of four, instead of scale, rotation and translation.
     pub matrix: Option<Matrix>,
     /// Name of the `[material.NAME]` that replaces all materials of the file.
     pub material: Option<Spanned<String>>,
 }
 
-/// Who looks.
+/// The camera.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CameraEntry {
-    /// Where from.
+    /// Position.
     pub eye: [Number; 3],
-    /// Where to.
+    /// A point on the optical axis.
     pub look_at: [Number; 3],
-    /// Up in the picture; +y.
+    /// Direction that is up in the picture; +y by default.
     pub up: Option<[Number; 3]>,
-    /// Vertical field of view; 40 degrees.
+    /// Vertical field of view; 40 degrees by default.
     pub fov: Option<FieldOfView>,
     /// Radius of the lens; 0 is a pinhole.
     #[serde(default)]
     pub lens_radius: NotNegative,
-    /// Distance of what is sharp; that of `look_at`.
+    /// Distance of the plane in focus; by default that of `look_at`.
     pub focus_distance: Option<Positive>,
 }
 
-/// Reads the text of a scene file; opens nothing. `file` is for messages.
+/// Parses a scene file; opens no other file. `file` is for messages only.
 pub fn parse(text: &str, file: &Path) -> Result<SceneFile, LoadError> {
     toml::from_str(text).map_err(|error| {
-        // serde says `unknown field ..., expected one of ...`: the second half is the help.
+        // serde writes `unknown field ..., expected one of ...`: the second half is the help.
         let message = error.message().replace('\n', " ");
         let (problem, help) = match message.split_once(", expected ") {
             Some((problem, expected)) => (problem.to_string(), format!("expected {expected}")),
             None => (message, "docs/scene-file.md describes the scene file".into()),
         };
-        Source { text, file, looked: &Looked::default() }.error(
-            error.span().unwrap_or_default(),
-            problem,
-            help,
-        )
+        Source::new(text, file).error(error.span().unwrap_or_default(), problem, help)
     })
 }
 
-/// The text of a scene file, for errors that point into it.
-#[derive(Clone, Copy)]
+/// Text of a scene file, for errors with line and column, and the files that it names.
 struct Source<'a> {
     text: &'a str,
     file: &'a Path,
-    looked: &'a Looked,
-}
-
-/// Looks for files, and notes which were taken.
-#[derive(Default)]
-struct Looked {
     lookup: RefCell<Lookup>,
     notes: RefCell<Notes>,
 }
 
-impl Source<'_> {
-    fn error(
-        &self,
-        span: core::ops::Range<usize>,
-        problem: impl Into<String>,
-        help: impl Into<String>,
-    ) -> LoadError {
+impl<'a> Source<'a> {
+    fn new(text: &'a str, file: &'a Path) -> Self {
+        let notes = Notes::of(file.display().to_string());
+        Self { text, file, lookup: RefCell::default(), notes: notes.into() }
+    }
+
+    fn error(&self, span: Range<usize>, problem: impl Into<String>, help: impl Into<String>) -> LoadError {
         let before = self.text.get(..span.start).unwrap_or(self.text);
         let line = before.matches('\n').count() as u32 + 1;
         let column = before.rsplit('\n').next().unwrap_or_default().chars().count() as u32 + 1;
         LoadError { column, ..LoadError::at(self.file, line, problem, help) }
     }
 
-    /// The file that a path of the scene file means.
+    /// The file at a path of the scene file.
     fn resolve(&self, path: &Spanned<String>) -> Result<PathBuf, LoadError> {
         let directory = self.file.parent().unwrap_or(Path::new(""));
         let name = path.get_ref();
-        let found = self.looked.lookup.borrow_mut().find(&[name.as_bytes()], &[directory]);
+        let found = self.lookup.borrow_mut().locate(&[name.as_bytes()], &[directory]);
+        let note = found.note("file", name.as_bytes());
         if let Some(file) = found.file() {
-            let place = self.error(path.span(), "", "").line;
-            let note = found
-                .note("file", name.as_bytes())
-                .map(|note| format!("{note} ({}:{place})", self.file.display()));
-            note.into_iter().for_each(|note| self.looked.notes.borrow_mut().add(1, note));
+            let line = self.error(path.span(), "", "").line;
+            note.into_iter().for_each(|note| self.notes.borrow_mut().at(line, note));
             return Ok(file.into());
         }
         let problem = match found {
             Found::Missing => format!("there is no file {}", directory.join(name).display()),
-            _ => found.note("file", name.as_bytes()).unwrap_or_default(),
+            _ => note.unwrap_or_default(),
         };
         Err(self.error(path.span(), problem, "paths are relative to the scene file"))
     }
 
-    /// A texture that has to be there.
+    /// The texture at a path of the scene file.
     fn map(&self, path: &Spanned<String>) -> Result<Map, LoadError> {
         Ok(Map::of_file(path.get_ref(), self.resolve(path)?))
     }
 }
 
-/// Loads a scene file with all that it names.
+/// Loads a scene file and all files that it names.
 pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<LoadedScene, LoadError> {
     let mut builder = SceneBuilder::new(options);
     let bytes = read(path, &builder.budget, weight::of_scene_file)?;
     builder.budget.take(weight::of_scene_file(&bytes)).map_err(|why| too_large(path, &why))?;
     let text = String::from_utf8(bytes).map_err(|error| {
-        let line =
-            error.as_bytes()[..error.utf8_error().valid_up_to()].iter().filter(|&&b| b == b'\n').count();
-        LoadError::at(path, line as u32 + 1, "this is not UTF-8 text", "save the scene file as UTF-8")
+        let valid = &error.as_bytes()[..error.utf8_error().valid_up_to()];
+        let line = valid.iter().filter(|&&b| b == b'\n').count() as u32 + 1;
+        LoadError::at(path, line, "this is not UTF-8 text", "save the scene file as UTF-8")
     })?;
     let text = text.strip_prefix('\u{feff}').unwrap_or(&text);
-    let looked = Looked::default();
-    let source = Source { text, file: path, looked: &looked };
+    let source = Source::new(text, path);
     let scene = parse(text, path)?;
 
     for (name, entry) in &scene.material {
-        let material = entry.get_ref().resolved(&source)?;
-        builder.overrides.insert(name.clone(), material);
+        builder.overrides.insert(name.clone(), entry.get_ref().resolved(&source)?);
     }
-    for mesh in &scene.mesh {
-        let file = source.resolve(&mesh.file)?;
-        if let Some(name) = mesh.material.as_ref().filter(|name| !scene.material.contains_key(name.get_ref()))
-        {
-            let problem = format!("there is no material `{}` in this scene file", name.get_ref());
-            return Err(source.error(name.span(), problem, format!("add a [material.{}]", name.get_ref())));
-        }
+    let mesh_files: Vec<PathBuf> =
+        scene.mesh.iter().map(|mesh| mesh.checked_file(&scene, &source)).collect::<Result<_, _>>()?;
+    let environment = scene.environment.as_ref().map(|entry| entry.resolved(&source)).transpose()?;
+    builder.notes = source.notes.take();
+    builder.lookup = source.lookup.take();
+    for (mesh, file) in scene.mesh.iter().zip(mesh_files) {
         let material = mesh.material.as_ref().map(|name| name.get_ref().as_str());
         builder.add_mesh(&file, mesh.placement(&source)?, material)?;
     }
-    let environment = scene.environment.as_ref().map(|entry| entry.resolved(&source)).transpose()?;
-    builder.notes.merge(looked.notes.take());
-    builder.lookup.adopt(looked.lookup.take());
     let mut loaded = builder.build(path, options, environment)?;
     let transform = loaded.transform;
     loaded.lights =
@@ -205,6 +186,19 @@ pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<LoadedScene, Lo
 }
 
 impl MeshEntry {
+    /// The OBJ file; checks that the material exists.
+    fn checked_file(&self, scene: &SceneFile, source: &Source) -> Result<PathBuf, LoadError> {
+        let file = source.resolve(&self.file)?;
+        match &self.material {
+            Some(material) if !scene.material.contains_key(material.get_ref()) => {
+                let name = material.get_ref();
+                let problem = format!("there is no material `{name}` in this scene file");
+                Err(source.error(material.span(), problem, format!("add a [material.{name}]")))
+            }
+            _ => Ok(file),
+        }
+    }
+
     fn placement(&self, source: &Source) -> Result<Placement, LoadError> {
         let is_default = self.scale == Factors::default()
             && self.rotate.is_none()
@@ -253,35 +247,35 @@ mod tests {
     }
 
     #[test]
-    fn errors_name_line_and_column() {
-        let place = |text: &str, line: u32, says: &str| {
+    fn errors_have_line_and_column() {
+        let check = |text: &str, line: u32, problem: &str| {
             let error = error(text);
-            assert!(error.starts_with(&format!("a.toml:{line}:")) && error.contains(says), "{error}");
+            assert!(error.starts_with(&format!("a.toml:{line}:")) && error.contains(problem), "{error}");
         };
-        place(
+        check(
             "[camera]\neyes = [0, 0, 0]\n",
             2,
             "unknown field `eyes`\n  help: expected one of `eye`, `look_at`",
         );
-        place("\n  [render\n", 2, "");
-        place("[camera]\neye = [0, 0]\nlook_at = [0, 0, 1]", 2, "");
-        place("[camera]\neye = [0, 0, nan]\nlook_at = [0, 0, 1]", 2, "must be finite");
-        place("[camera]\neye = [0, 0, 0]\nlook_at = [0, 0, 1]\nfov = 180", 4, "between 0 and 180");
-        place("[[mesh]]\nfile = \"a.obj\"\nscale = \"big\"", 3, "a number or three numbers");
+        check("\n  [render\n", 2, "");
+        check("[camera]\neye = [0, 0]\nlook_at = [0, 0, 1]", 2, "");
+        check("[camera]\neye = [0, 0, nan]\nlook_at = [0, 0, 1]", 2, "must be finite");
+        check("[camera]\neye = [0, 0, 0]\nlook_at = [0, 0, 1]\nfov = 180", 4, "between 0 and 180");
+        check("[[mesh]]\nfile = \"a.obj\"\nscale = \"big\"", 3, "a number or three numbers");
         let light = "[[light]]\nkind = \"point\"\nposition = [0, 0, 0]\nintensity = ";
-        place(&format!("{light}-9"), 4, "-9.0 is negative");
-        place(&format!("{light}[1, 2, 1e38]"), 4, "1e38 is too large: light and colours are at most 1e15");
-        place(&format!("{light}[1, 2]"), 4, "three numbers");
-        place(&format!("{light}nan"), 4, "finite");
-        place("[environment]\nradiance = 1e30", 2, "at most 1e15");
-        place("[environment]\nradiance = [0, -1e-9, 0]", 2, "negative");
-        place("[material.a]\nemission = inf", 2, "too large");
-        place("[material.a]\ncolor = -0.5", 2, "negative");
-        place("[[mesh]]\nfile = \"a.obj\"\nscale = 1e31", 3, "at most 1e30");
-        place("[[mesh]]\nfile = \"a.obj\"\nscale = [1, 1, nan]", 3, "finite");
-        place("[camera]\neye = [0, 0, 0]\nlook_at = [0, 0, 1]\nlens_radius = -1", 4, "negative");
-        place("[render]\nspp = -1", 2, "");
-        place("[[light]]\nkind = \"laser\"", 2, "`point`, `spot`");
-        place("[[mesh]]\nfile = \"a.obj\"\nmatrix = [[1, 0, 0, 0]]", 3, "three or four rows");
+        check(&format!("{light}-9"), 4, "-9.0 is negative");
+        check(&format!("{light}[1, 2, 1e38]"), 4, "1e38 is too large: light and colours are at most 1e15");
+        check(&format!("{light}[1, 2]"), 4, "three numbers");
+        check(&format!("{light}nan"), 4, "finite");
+        check("[environment]\nradiance = 1e30", 2, "at most 1e15");
+        check("[environment]\nradiance = [0, -1e-9, 0]", 2, "negative");
+        check("[material.a]\nemission = inf", 2, "too large");
+        check("[material.a]\ncolor = -0.5", 2, "negative");
+        check("[[mesh]]\nfile = \"a.obj\"\nscale = 1e31", 3, "at most 1e30");
+        check("[[mesh]]\nfile = \"a.obj\"\nscale = [1, 1, nan]", 3, "finite");
+        check("[camera]\neye = [0, 0, 0]\nlook_at = [0, 0, 1]\nlens_radius = -1", 4, "negative");
+        check("[render]\nspp = -1", 2, "");
+        check("[[light]]\nkind = \"laser\"", 2, "`point`, `spot`");
+        check("[[mesh]]\nfile = \"a.obj\"\nmatrix = [[1, 0, 0, 0]]", 3, "three or four rows");
     }
 }

@@ -1,42 +1,28 @@
-//! Values of a scene file that are checked as they are read, so that errors point at them.
+//! Values of a scene file, checked during parsing, so that errors have their line and column.
 
 use crate::load::geometry::Placement;
 use crate::load::transform::direction;
 use glam::{DMat3, DVec3};
 use serde::Deserialize;
 
-/// A finite number.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize)]
-#[serde(try_from = "f64")]
-pub struct Number(f64);
+/// Largest number: beyond it, f32 has no room for a change of scale.
+const LARGEST: f64 = 1e30;
 
-/// A finite number, zero or above.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize)]
-#[serde(try_from = "f64")]
-pub struct NotNegative(f64);
-
-/// A finite number above zero.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
-#[serde(try_from = "f64")]
-pub struct Positive(f64);
-
-/// An angle between 0 and 180 degrees, both excluded.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
-#[serde(try_from = "f64")]
-pub struct FieldOfView(f64);
-
-/// An angle between 0 and 180 degrees.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
-#[serde(try_from = "f64")]
-pub struct Degrees(f64);
+/// Largest radiance, irradiance or intensity: its square, and sums of squares of a picture, are finite in f32.
+pub(in crate::load) const BRIGHTEST: f64 = 1e15;
 
 macro_rules! checked {
-    ($($type:ident: $x:ident => $valid:expr, $says:literal;)*) => {$(
+    ($($(#[$meta:meta])* $type:ident: $x:ident => $valid:expr, $problem:literal;)*) => {$(
+        $(#[$meta])*
+        #[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+        #[serde(try_from = "f64")]
+        pub struct $type(f64);
+
         impl TryFrom<f64> for $type {
             type Error = &'static str;
 
             fn try_from($x: f64) -> Result<Self, Self::Error> {
-                if $valid { Ok(Self($x)) } else { Err($says) }
+                if $valid { Ok(Self($x)) } else { Err($problem) }
             }
         }
 
@@ -48,23 +34,22 @@ macro_rules! checked {
     )*};
 }
 
-/// Beyond this, numbers of a scene have no room in f32 for the change of scale.
-const LARGEST: f64 = 1e30;
-
-/// The greatest radiance, irradiance or intensity that is read: its square is a number of f32, and so is what a
-/// picture adds up of it.
-pub(in crate::load) const BRIGHTEST: f64 = 1e15;
-
 checked! {
+    /// A finite number.
+    #[derive(Default)]
     Number: x => x.abs() <= LARGEST, "this number must be finite and at most 1e30 in size";
+    /// A finite number, zero or above.
+    #[derive(Default)]
     NotNegative: x => (0.0..=LARGEST).contains(&x), "this number must not be negative, and at most 1e30";
+    /// A finite number above zero.
     Positive: x => x > 0.0 && x <= LARGEST, "this number must be above zero and at most 1e30";
+    /// An angle between 0 and 180 degrees, exclusive.
     FieldOfView: x => x > 0.0 && x < 180.0, "this angle must lie between 0 and 180 degrees";
+    /// An angle from 0 to 180 degrees.
     Degrees: x => (0.0..=180.0).contains(&x), "this angle must lie between 0 and 180 degrees";
 }
 
-/// A value for all of three, or three; checked by the type that it is meant for, so that the reason of a refusal is
-/// that type's.
+/// One number for all three, or three. The type that it becomes checks it and explains a refusal.
 #[derive(Clone, Copy, Deserialize)]
 #[serde(untagged, expecting = "a number or three numbers are needed here, like 0.5 or [0.2, 0.5, 1]")]
 enum OneOrThree {
@@ -81,7 +66,7 @@ impl OneOrThree {
     }
 }
 
-/// Red, green, blue, linear, in 0 ... 1e15: one number for all three, or three.
+/// Linear red, green, blue in 0 ... 1e15: one number for all three, or three.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
 #[serde(try_from = "OneOrThree")]
 pub struct Colour([f64; 3]);
@@ -135,7 +120,7 @@ impl Factors {
     }
 }
 
-/// A rotation around an axis, counter-clockwise when the axis points at the viewer.
+/// A rotation around an axis, counter-clockwise if the axis points at the viewer.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
 #[serde(try_from = "RotationEntry")]
 pub struct Rotation {
@@ -168,12 +153,11 @@ impl Rotation {
         if !(quarters == quarters.round() && along_axis) {
             return matrix;
         }
-        let round = |v: DVec3| v.round();
-        DMat3::from_cols(round(matrix.x_axis), round(matrix.y_axis), round(matrix.z_axis))
+        DMat3::from_cols(matrix.x_axis.round(), matrix.y_axis.round(), matrix.z_axis.round())
     }
 }
 
-/// An affine matrix: three or four rows of four numbers, the fourth being 0 0 0 1.
+/// An affine matrix: three or four rows of four numbers, the fourth row 0 0 0 1.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(try_from = "Vec<[Number; 4]>")]
 pub struct Matrix([[f64; 4]; 3]);
@@ -193,7 +177,7 @@ impl TryFrom<Vec<[Number; 4]>> for Matrix {
 }
 
 impl Matrix {
-    /// The upper left three by three.
+    /// The upper left 3 x 3 matrix.
     pub fn linear(&self) -> DMat3 {
         let [a, b, c] = self.0;
         DMat3::from_cols_array_2d(&[[a[0], a[1], a[2]], [b[0], b[1], b[2]], [c[0], c[1], c[2]]]).transpose()

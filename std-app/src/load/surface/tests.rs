@@ -1,4 +1,4 @@
-//! Surfaces of statements as files have them.
+//! Surfaces of typical statements.
 
 use super::*;
 use crate::load::mtl;
@@ -20,7 +20,7 @@ fn rgb(r: f32, g: f32, b: f32) -> ColorInput {
 }
 
 #[test]
-fn diffuse() {
+fn statements_without_highlight_are_diffuse() {
     let grey = Surface::Diffuse { reflectance: rgb(0.5, 0.5, 0.5) };
     assert_eq!(surface(""), grey);
     assert_eq!(surface("Kd 0.5 0.5 0.5\nKs 0 0 0\nNs 10\nNi 1.5\nillum 2"), grey);
@@ -29,7 +29,7 @@ fn diffuse() {
 }
 
 #[test]
-fn coats() {
+fn ks_is_a_coat() {
     let plastic = "Kd 0.8 0.8 0.8\nKs 0.04 0.04 0.04\nNs 48\nNi 1.5\nPr 0.447214\nPm 0\n";
     let expected = |ior| Surface::Glossy {
         base: rgb(0.8, 0.8, 0.8),
@@ -51,7 +51,7 @@ fn coats() {
 }
 
 #[test]
-fn metals_and_mirrors() {
+fn pm_and_illum_make_metals_and_mirrors() {
     let conductor = |reflectance| Surface::Conductor { reflectance, roughness: 0.5.into() };
     assert_eq!(surface("Kd 0 0 0\nKs 0.9 0.8 0.7\nPr 0.5\nPm 1"), conductor(rgb(0.9, 0.8, 0.7)));
     assert_eq!(surface("Kd 1 0.5 0\nKs 0.9 0.8 0.7\nPr 0.5\nPm 1"), conductor(rgb(1.0, 0.5, 0.0)));
@@ -68,7 +68,7 @@ fn metals_and_mirrors() {
 }
 
 #[test]
-fn illum_decides_only_what_nothing_more_precise_says() {
+fn precise_statements_override_illum() {
     // Blender's metals: the colour is `Kd`, `Ks` a grey specular.
     let gold = "Kd 0.8 0.6 0.2\nKs 0.5 0.5 0.5\nNs 250\nNi 1.45\n";
     for pbr in ["Pr 0.5\nPm 1", "Pr 0.5\nPm 0.5", "Pr 0.2\nPm 0.1", "Pr 0\nPm 1"] {
@@ -122,7 +122,7 @@ fn illum_0_and_1_have_no_highlight() {
 }
 
 #[test]
-fn glass_that_bends_no_ray_is_opaque() {
+fn glass_that_refracts_no_ray_is_opaque() {
     let kd = Surface::Diffuse { reflectance: rgb(0.5, 0.25, 0.125) };
     for (statements, opacity) in [
         ("Ni 1\nTf 1 1 1\nillum 4", 1.0),
@@ -150,7 +150,7 @@ fn glass_that_bends_no_ray_is_opaque() {
 }
 
 #[test]
-fn glass() {
+fn glass_has_index_tint_and_roughness() {
     let glass =
         |ior, roughness: f32| Surface::Dielectric { ior, tint: Rgb::ONE, roughness: roughness.into() };
     for model in [4, 6, 7, 9] {
@@ -165,7 +165,7 @@ fn glass() {
 }
 
 #[test]
-fn energy_is_limited_and_said() {
+fn clamped_values_are_noted() {
     let (material, notes) = material("Kd 2 0.5 -1\nKe -1 2 3\nd 0");
     assert_eq!(material.surface, Surface::Diffuse { reflectance: rgb(1.0, 0.5, 0.0) });
     assert_eq!(material.emission.value, Rgb::new(0.0, 2.0, 3.0));

@@ -1,38 +1,38 @@
-//! The place of an output, links followed: a file, which is replaced whole, or a pipe or a device, which is written
-//! in place. Nothing is opened here: a pipe that is opened and closed ends its reader.
+//! Destinations of outputs, with links resolved: files, which are replaced, and pipes and devices, which are written
+//! in place. Nothing is opened here, because opening and closing a pipe ends its reader.
 
 use std::ffi::OsString;
 use std::fs::{self, Metadata};
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// Links that are followed one after the other, as Linux has it.
+/// Longest chain of links; the limit of Linux.
 const MOST_LINKS: usize = 40;
 
-/// The end of all links of a name.
+/// The target of all links of a name.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Place {
+pub struct Destination {
     path: PathBuf,
     kind: Kind,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Kind {
-    /// A file, or nothing yet.
+    /// A file, which may not exist yet.
     File,
     /// A folder.
     Folder,
     /// A pipe or a device.
     Stream,
-    /// A file descriptor that the program was started with.
+    /// A file descriptor inherited by the program.
     Descriptor(u32),
 }
 
-impl Place {
-    /// Follows the links of `path`; the last may lead to a file that is not there yet.
+impl Destination {
+    /// Resolves the links of `path`; the target need not exist.
     ///
     /// # Errors
-    /// Links in a circle, and whatever the system says of a name that it cannot look up.
+    /// A circle of links, or an error of the system.
     pub fn of(path: &Path) -> io::Result<Self> {
         let mut path = path.to_owned();
         for _ in 0..MOST_LINKS {
@@ -52,10 +52,10 @@ impl Place {
             };
             return Ok(Self { path, kind });
         }
-        Err(io::Error::other("its links lead in a circle"))
+        Err(io::Error::other("its links form a circle"))
     }
 
-    /// The name, links followed.
+    /// The name, with links resolved.
     pub(crate) fn path(&self) -> &Path {
         &self.path
     }
@@ -81,20 +81,20 @@ impl Place {
     }
 }
 
-/// N of `/proc/self/fd/N`, under whatever name: the link there leads to no name that could be opened again.
+/// N of `/proc/self/fd/N`, whose link may not be openable.
 fn descriptor(path: &Path) -> Option<u32> {
     let folder = folder(path).canonicalize().ok()?;
     let is_open = folder.starts_with("/proc") && folder.ends_with("fd");
     path.file_name()?.to_str()?.parse().ok().filter(|_| is_open)
 }
 
-/// The folder that a file is in.
+/// The folder of a file.
 pub(crate) fn folder(path: &Path) -> &Path {
     path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
-/// Two names with the same identity are one file: device and inode, or those of the folder and a name if there is no
-/// file yet. Other spellings, links and hard links are the same.
+/// Identity of a file under all its spellings, links and hard links: device and inode, or those of the folder and a
+/// name if the file does not exist yet.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Identity {
     key: Key,
@@ -107,12 +107,12 @@ type Key = (u64, u64);
 type Key = PathBuf;
 
 impl Identity {
-    /// Identity of the file at `path`. `None` for devices, which keep nothing, and for folders that are not there.
+    /// Identity of the file at `path`. `None` for devices, and for files in missing folders.
     pub fn of(path: &Path) -> Option<Self> {
         if let Ok(data) = fs::metadata(path) {
             return Some(Self { key: key(path, &data)?, name: None });
         }
-        let path = Place::of(path).ok()?.path;
+        let path = Destination::of(path).ok()?.path;
         let folder = folder(&path);
         let key = key(folder, &fs::metadata(folder).ok()?)?;
         Some(Self { key, name: Some(path.file_name()?.to_owned()) })
@@ -125,7 +125,7 @@ impl Identity {
         Some(Self { key: key(Path::new(""), &file.metadata().ok()?)?, name: None })
     }
 
-    /// Not known.
+    /// Unknown on this system.
     #[cfg(not(unix))]
     pub fn of_open<T>(_: T) -> Option<Self> {
         None
@@ -148,16 +148,17 @@ mod tests {
     use super::*;
     use std::os::unix::fs::symlink;
 
-    /// A folder that is empty, with what `fill` puts into it.
+    /// Runs `check` in an empty folder.
     fn in_folder(name: &str, check: impl FnOnce(&Path)) {
-        let folder = std::env::temp_dir().join(format!("halflight-place-{name}-{}", std::process::id()));
+        let folder =
+            std::env::temp_dir().join(format!("halflight-destination-{name}-{}", std::process::id()));
         fs::create_dir_all(folder.join("sub")).unwrap();
         check(&folder);
         fs::remove_dir_all(folder).unwrap();
     }
 
     #[test]
-    fn one_file_has_one_identity_under_all_its_names() {
+    fn names_of_one_file_have_one_identity() {
         in_folder("names", |folder| {
             let file = folder.join("a");
             fs::write(&file, "a").unwrap();
@@ -175,7 +176,7 @@ mod tests {
     }
 
     #[test]
-    fn files_that_are_not_there_yet_have_one_too() {
+    fn missing_files_have_identities() {
         in_folder("missing", |folder| {
             symlink("new", folder.join("link")).unwrap();
             symlink("sub", folder.join("other")).unwrap();
@@ -188,16 +189,16 @@ mod tests {
     }
 
     #[test]
-    fn links_lead_to_what_is_not_there_and_never_in_circles() {
+    fn links_to_missing_files_and_circles() {
         in_folder("links", |folder| {
             symlink("sub/new", folder.join("link")).unwrap();
             symlink("y", folder.join("x")).unwrap();
             symlink("x", folder.join("y")).unwrap();
-            let place = Place::of(&folder.join("link")).unwrap();
-            assert_eq!((place.path(), place.is_stream()), (&*folder.join("sub/new"), false));
-            assert!(Place::of(&folder.join("x")).unwrap_err().to_string().contains("circle"));
-            assert!(Place::of(Path::new("/dev/null")).unwrap().is_stream());
-            assert!(Place::of(Path::new("/dev/stdout")).unwrap().is_stdout());
+            let destination = Destination::of(&folder.join("link")).unwrap();
+            assert_eq!((destination.path(), destination.is_stream()), (&*folder.join("sub/new"), false));
+            assert!(Destination::of(&folder.join("x")).unwrap_err().to_string().contains("circle"));
+            assert!(Destination::of(Path::new("/dev/null")).unwrap().is_stream());
+            assert!(Destination::of(Path::new("/dev/stdout")).unwrap().is_stdout());
         });
     }
 }

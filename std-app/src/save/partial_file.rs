@@ -1,25 +1,25 @@
-//! A file that is being written: beside its place under a name of its own, and renamed into it when all of it is on
-//! the disk. A part that is not finished is removed, even if the program is to end at once.
+//! A file under construction: written under a temporary name in the folder of its target, and renamed when it is
+//! complete on the disk. Incomplete files are removed, even if the program is terminated by a signal.
 
-use super::place::folder;
+use super::destination::folder;
 use std::ffi::OsString;
 use std::fs::{self, File};
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-/// Those that are being written.
-static PARTS: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
+/// All files under construction.
+static PARTIAL_FILES: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
 
-fn parts() -> MutexGuard<'static, Vec<PathBuf>> {
-    PARTS.lock().unwrap_or_else(PoisonError::into_inner)
+fn partial_files() -> MutexGuard<'static, Vec<PathBuf>> {
+    PARTIAL_FILES.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// The name of such a file.
-pub(super) struct Part(PathBuf);
+/// The temporary name of a file under construction.
+pub(super) struct PartialFile(PathBuf);
 
-impl Part {
-    /// An empty file beside `target`. One that a program of the same number has left when it was killed is removed.
+impl PartialFile {
+    /// Creates an empty file in the folder of `target`; removes that of a killed process of the same number.
     pub(super) fn create(target: &Path) -> io::Result<(Self, File)> {
         let mut name = OsString::from(".");
         name.push(target.file_name().unwrap_or_default());
@@ -27,30 +27,30 @@ impl Part {
         let path = folder(target).join(name);
         let _ = fs::remove_file(&path);
         let file = File::create_new(&path)?;
-        parts().push(path.clone());
+        partial_files().push(path.clone());
         Ok((Self(path), file))
     }
 
-    /// Moves it to `target`.
+    /// Renames the file to `target`.
     pub(super) fn rename(self, target: &Path) -> io::Result<()> {
         fs::rename(&self.0, target)?;
-        // The new name is on the disk when the folder is. Some systems cannot open folders, and need not.
+        // The folder stores the new name. Some systems cannot open folders, and need not.
         let _ = File::open(folder(target)).and_then(|folder| folder.sync_all());
         Ok(())
     }
 }
 
-impl Drop for Part {
+impl Drop for PartialFile {
     fn drop(&mut self) {
-        parts().retain(|part| *part != self.0);
-        // It has another name, or is of no use to anybody.
+        partial_files().retain(|path| *path != self.0);
+        // It is renamed, or incomplete.
         let _ = fs::remove_file(&self.0);
     }
 }
 
-/// Removes all that is half written: for a program that ends at once.
+/// Removes all incomplete files, before the program exits early.
 pub fn abandon() {
-    parts().drain(..).for_each(|part| drop(fs::remove_file(part)));
+    partial_files().drain(..).for_each(|path| drop(fs::remove_file(path)));
 }
 
 #[cfg(test)]
@@ -59,22 +59,22 @@ mod tests {
     use std::io::Write;
 
     #[test]
-    fn what_does_not_get_to_its_place_is_removed() {
+    fn incomplete_files_are_removed() {
         let folder = std::env::temp_dir().join(format!("halflight-part-{}", std::process::id()));
         fs::create_dir_all(&folder).unwrap();
         let files = || fs::read_dir(&folder).unwrap().count();
         let target = folder.join("a");
-        let (part, mut file) = Part::create(&target).unwrap();
+        let (part, mut file) = PartialFile::create(&target).unwrap();
         file.write_all(b"whole").unwrap();
         part.rename(&target).unwrap();
         assert_eq!((files(), fs::read(&target).unwrap()), (1, b"whole".to_vec()));
 
-        drop(Part::create(&target).unwrap());
+        drop(PartialFile::create(&target).unwrap());
         assert_eq!(files(), 1);
-        // Left by a program that was killed.
-        core::mem::forget(Part::create(&target).unwrap());
+        // The file of a killed program.
+        core::mem::forget(PartialFile::create(&target).unwrap());
         assert_eq!(files(), 2);
-        drop(Part::create(&target).unwrap());
+        drop(PartialFile::create(&target).unwrap());
         assert_eq!((files(), fs::read(&target).unwrap()), (1, b"whole".to_vec()));
         fs::remove_dir_all(folder).unwrap();
     }

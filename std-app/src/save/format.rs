@@ -1,0 +1,148 @@
+//! File formats of pictures, and their encoders.
+
+use super::Image;
+use crate::picture::{MAX_PIXELS, PictureError, fail};
+use exr::image::{Blocks, Encoding, SpecificChannels};
+use exr::math::Vec2;
+use exr::prelude::{Compression, LineOrder, WritableImage};
+use image::codecs::{hdr::HdrEncoder, png::PngEncoder};
+use image::{ExtendedColorType, ImageEncoder, Rgb};
+use std::io::Cursor;
+use std::path::Path;
+
+/// A file format, chosen by the extension of the file name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Format {
+    /// 8 bits a channel, clamped to [0, 1] and through the sRGB curve.
+    Png,
+    /// OpenEXR, linear f32, ZIP compressed, lossless.
+    Exr,
+    /// Radiance RGBE, linear, 8 bits of mantissa; negative values become 0.
+    Hdr,
+    /// Portable float map, linear f32, uncompressed, lossless.
+    Pfm,
+}
+
+impl Format {
+    /// All formats, in the order of help texts.
+    pub const ALL: [Format; 4] = [Format::Png, Format::Exr, Format::Hdr, Format::Pfm];
+
+    /// The extension, without its dot.
+    pub fn extension(self) -> &'static str {
+        match self {
+            Format::Png => "png",
+            Format::Exr => "exr",
+            Format::Hdr => "hdr",
+            Format::Pfm => "pfm",
+        }
+    }
+
+    /// The format for a file name, in any case.
+    ///
+    /// # Errors
+    /// The name ends in none of the four extensions.
+    pub fn of(path: &Path) -> Result<Format, PictureError> {
+        let extension = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
+        Format::ALL
+            .into_iter()
+            .find(|format| extension.as_deref() == Some(format.extension()))
+            .ok_or_else(|| PictureError::new("the name must end in .png, .exr, .hdr or .pfm").at(path))
+    }
+
+    /// Whether the values are linear radiance and not display values.
+    pub fn is_linear(self) -> bool {
+        self != Format::Png
+    }
+}
+
+/// The bytes of a file with `image`.
+///
+/// # Errors
+/// A picture without pixels or with more than [`MAX_PIXELS`].
+pub fn encode(image: &Image, format: Format) -> Result<Vec<u8>, PictureError> {
+    if image.pixels.is_empty() || image.pixels.len() > MAX_PIXELS {
+        fail!("{}x{} pixels cannot be written", image.width, image.height);
+    }
+    match format {
+        Format::Png => encode_png(image),
+        Format::Exr => encode_exr(image),
+        Format::Hdr => encode_hdr(image),
+        Format::Pfm => Ok(encode_pfm(image)),
+    }
+}
+
+/// Linear value to display value in [0, 1] (IEC 61966-2-1); 0 for NaN.
+pub fn to_srgb(linear: f32) -> f32 {
+    // `clamp` keeps NaN, `max` drops it.
+    let linear = linear.clamp(0.0, 1.0).max(0.0);
+    if linear <= 0.003_130_8 { 12.92 * linear } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 }
+}
+
+/// Display value to linear value, the inverse of [`to_srgb`].
+pub fn from_srgb(display: f32) -> f32 {
+    if display <= 0.040_45 { display / 12.92 } else { ((display + 0.055) / 1.055).powf(2.4) }
+}
+
+fn encode_png(picture: &Image) -> Result<Vec<u8>, PictureError> {
+    let display = |&value: &f32| (to_srgb(value) * 255.0 + 0.5) as u8;
+    let samples: Vec<u8> = picture.pixels.iter().flatten().map(display).collect();
+    let mut bytes = Vec::new();
+    PngEncoder::new(&mut bytes)
+        .write_image(&samples, picture.width, picture.height, ExtendedColorType::Rgb8)
+        .map_err(PictureError::new)?;
+    Ok(bytes)
+}
+
+fn encode_exr(picture: &Image) -> Result<Vec<u8>, PictureError> {
+    let size = Vec2(picture.width as usize, picture.height as usize);
+    let pixel = |at: Vec2<usize>| <(f32, f32, f32)>::from(picture.pixels[at.y() * size.x() + at.x()]);
+    let (compression, blocks, line_order) = (Compression::ZIP16, Blocks::ScanLines, LineOrder::Increasing);
+    let encoding = Encoding { compression, blocks, line_order };
+    let mut bytes = Vec::new();
+    exr::image::Image::from_encoded_channels(size, encoding, SpecificChannels::rgb(pixel))
+        .write()
+        .to_buffered(Cursor::new(&mut bytes))
+        .map_err(PictureError::new)?;
+    Ok(bytes)
+}
+
+/// Largest value of RGBE: 8 bits of mantissa and a common exponent.
+const LARGEST_RGBE: f32 = 255.0 / 256.0 * 1.701_411_8e38;
+
+fn encode_hdr(picture: &Image) -> Result<Vec<u8>, PictureError> {
+    let storable = |value: f32| value.clamp(0.0, LARGEST_RGBE).max(0.0);
+    let pixels: Vec<Rgb<f32>> = picture.pixels.iter().map(|pixel| Rgb(pixel.map(storable))).collect();
+    let mut bytes = Vec::new();
+    HdrEncoder::new(&mut bytes)
+        .encode(&pixels, picture.width as usize, picture.height as usize)
+        .map_err(PictureError::new)?;
+    Ok(bytes)
+}
+
+/// A text header of three lines, then rows of little-endian RGB from the bottom up.
+fn encode_pfm(picture: &Image) -> Vec<u8> {
+    let mut bytes = format!("PF\n{} {}\n-1.0\n", picture.width, picture.height).into_bytes();
+    bytes.reserve(picture.pixels.len() * 12);
+    for row in picture.pixels.chunks(picture.width as usize).rev() {
+        bytes.extend(row.iter().flatten().flat_map(|value| value.to_le_bytes()));
+    }
+    bytes
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn srgb_curve_has_published_values_and_inverts() {
+        for (linear, display) in
+            [(0.0, 0), (0.5, 188), (0.18, 118), (1.0, 255), (7.0, 255), (-1.0, 0), (f32::NAN, 0)]
+        {
+            assert_eq!((to_srgb(linear) * 255.0 + 0.5) as u8, display, "{linear}");
+        }
+        for byte in 0..=255u8 {
+            let display = f32::from(byte) / 255.0;
+            assert!((to_srgb(from_srgb(display)) - display).abs() < 1e-6);
+        }
+    }
+}
