@@ -1,14 +1,14 @@
 //! LDR-FLIP (Andersson et al., "FLIP: A Difference Evaluator for Alternating Images", HPG 2020): the visible
-//! difference of two pictures that alternate on a display. Values are clamped to [0, 1]; 67 pixels cover a degree of
-//! vision: 3840 pixels on 0.7 m at a distance of 0.7 m, the default of the paper.
+//! difference of two pictures that alternate on a display. Values are clamped to [0, 1]; 67 pixels cover a
+//! degree of vision: 3840 pixels on 0.7 m at a distance of 0.7 m, the default of the paper.
 //!
 //! 1. Colour: opponent channels blurred by the contrast sensitivity of the eye, then the HyAB distance of
 //!    Hunt-adjusted L*a*b*, compressed to [0, 1].
 //! 2. Features: first and second derivatives of the achromatic channel at the scale of visible detail.
 //! 3. The colour error to the power of one minus the feature error.
 //!
-//! All kernels are separable (both terms of the blue-yellow one are), so they run along rows, then along columns.
-//! The outermost pixels continue outside the picture.
+//! All kernels are separable (both terms of the blue-yellow one are), so they run along rows, then along
+//! columns. The outermost pixels continue outside the picture.
 
 use super::Image;
 use core::f64::consts::PI;
@@ -170,8 +170,8 @@ fn balanced(weights: &[f64]) -> Vec<f32> {
     weights.iter().map(|&w| (w / if w > 0.0 { positive } else { negative.max(1e-30) }) as f32).collect()
 }
 
-/// Filters `values` by `across` along the rows and by `down` along the columns. Each tap is applied to a whole row,
-/// which vectorises.
+/// Filters `values` by `across` along the rows and by `down` along the columns. Each tap is applied to a
+/// whole row, which vectorises.
 fn filter(values: &[f32], width: usize, across: &[f32], down: &[f32]) -> Vec<f32> {
     let height = values.len() / width;
     let mut rows = vec![0.0; values.len()];
@@ -281,9 +281,9 @@ mod tests {
         ((hash ^ (hash >> 15)).wrapping_mul(2246822519) >> 13) & 255
     }
 
-    /// Values of the authors' program (Python package `flip-evaluator` 1.7, numpy arrays of these pictures divided
-    /// by 255): `evaluate(reference, test, "LDR", applyMagma=False)` gives the map, here at column 30 of row 20, and
-    /// its mean.
+    /// Values of the authors' program (Python package `flip-evaluator` 1.7, numpy arrays of these pictures
+    /// divided by 255): `evaluate(reference, test, "LDR", applyMagma=False)` gives the map, here at column 30
+    /// of row 20, and its mean.
     #[test]
     fn agrees_with_the_authors_program() {
         let noisy = |x, y, c| (ramp(x, y, c) + noise(x, y, c) / 8).min(255);

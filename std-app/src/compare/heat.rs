@@ -1,5 +1,5 @@
-//! False colours, as display values. Errors: black, violet, red, orange, pale yellow, with increasing lightness, so
-//! that the map is readable in grey. Signed errors: blue below zero, white at zero, red above.
+//! False colours, as display values. Errors: black, violet, red, orange, pale yellow, with increasing
+//! lightness, so that the map is readable in grey. Signed errors: blue below zero, white at zero, red above.
 
 type Stops = [[f32; 3]; 5];
 

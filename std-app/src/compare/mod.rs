@@ -1,4 +1,5 @@
-//! Comparison of two pictures: errors in linear light, visible differences (FLIP), and pictures of the difference.
+//! Comparison of two pictures: errors in linear light, visible differences (FLIP), and pictures of the
+//! difference.
 
 mod flip;
 pub(crate) mod heat;

@@ -48,8 +48,8 @@ impl Comparison {
     }
 }
 
-/// The mean of the channels of `values` in false colours, and the end e of the scale: −e ... e for signed values, 0
-/// ... e for others, 1 for FLIP.
+/// The mean of the channels of `values` in false colours, and the end e of the scale: −e ... e for signed
+/// values, 0 ... e for others, 1 for FLIP.
 pub fn false_colours(values: &Image, shown: Shown) -> (Image, f32) {
     let means: Vec<f32> = values.pixels.iter().map(|pixel| pixel.iter().sum::<f32>() / 3.0).collect();
     let end = if shown == Shown::Flip { 1.0 } else { scale_end(&means) };

@@ -1,5 +1,5 @@
-//! Duplicate emitters. Files with doubled faces are common; each copy would add its light, although only one is
-//! visible.
+//! Duplicate emitters. Files with doubled faces are common; each copy would add its light, although only one
+//! is visible.
 
 use super::geometry::Geometry;
 use super::notes::Notes;
@@ -12,8 +12,8 @@ const MOST_PAIRS: usize = 10_000_000;
 /// Least barycentric coordinate of a point inside a triangle.
 const INSIDE: f64 = -1e-6;
 
-/// Removes emitting triangles with the corners and emission of an earlier one; notes lamps that overlap in another
-/// way.
+/// Removes emitting triangles with the corners and emission of an earlier one; notes lamps that overlap in
+/// another way.
 pub(super) fn remove(geometry: &mut Geometry, materials: &[Material], names: &[String], notes: &mut Notes) {
     let material = |t: &Triangle| &materials[t.material as usize];
     if !materials.iter().any(Material::emits) {

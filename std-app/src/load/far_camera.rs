@@ -1,5 +1,5 @@
-//! Cameras with a long lens very far from the scene: relative to the eye, f32 would round the visible surfaces.
-//! Their rays start on a plane before all visible surfaces, where coordinates are small.
+//! Cameras with a long lens very far from the scene: relative to the eye, f32 would round the visible
+//! surfaces. Their rays start on a plane before all visible surfaces, where coordinates are small.
 
 use super::scene::{LoadedScene, View};
 use super::transform::direction;

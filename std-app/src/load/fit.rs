@@ -1,12 +1,13 @@
-//! Choice of origin and scale. The core computes in f32, which is densest at the origin, so the origin is usually
-//! the centre of the bounding box. If a few large triangles (a ground, a sun) extend much further than the detail,
-//! the detail determines origin and scale, and large triangles are cut ([`super::split`]).
+//! Choice of origin and scale. The core computes in f32, which is densest at the origin, so the origin is
+//! usually the centre of the bounding box. If a few large triangles (a ground, a sun) extend much further
+//! than the detail, the detail determines origin and scale, and large triangles are cut ([`super::split`]).
 
 use super::geometry::{Placed, bounds};
 use super::transform::SceneTransform;
 use glam::DVec3;
 
-/// Extent of the scene over that of the detail above which the detail decides: f32 would round it to a thousandth.
+/// Extent of the scene over that of the detail above which the detail decides: f32 would round it to a
+/// thousandth.
 const FAR: f64 = 8192.0;
 
 /// Largest extent over the detail: squares of areas stay finite.

@@ -1,5 +1,5 @@
-//! Assembly of all triangles into one mesh in the coordinates of the core: placed, centred, scaled and checked.
-//! Computed in f64 and rounded last.
+//! Assembly of all triangles into one mesh in the coordinates of the core: placed, centred, scaled and
+//! checked. Computed in f64 and rounded last.
 
 use super::fit::Fit;
 use super::notes::Notes;
@@ -196,7 +196,7 @@ impl<'a> Builder<'a> {
         let (low, high) = (p.min(q).min(r), p.max(q).max(r));
         let farthest = low.abs().max(high.abs()).max_element();
         if self.is_far && (high - low).max_element() < DEFORMED * farthest {
-            let what = "triangle smaller than 1e-5 of its distance from the detail of the scene: rounding deforms it";
+            let what = "triangle smaller than 1e-5 of its distance from the detail: rounding deforms it";
             self.notes.add(1, what);
         }
         true

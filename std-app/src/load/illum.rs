@@ -1,5 +1,5 @@
-//! Meaning of `illum`, which applies only if no statement is more precise: `Pr`, `Pm` and their maps override it,
-//! and so do `Ni`, `Tf`, `d` and `Kd` if they exclude glass. `docs/loading.md` has the table.
+//! Meaning of `illum`, which applies only if no statement is more precise: `Pr`, `Pm` and their maps override
+//! it, and so do `Ni`, `Tf`, `d` and `Kd` if they exclude glass. `docs/loading.md` has the table.
 
 use super::mtl::{MapKind, MtlMaterial};
 use super::notes::Notes;
@@ -10,7 +10,8 @@ pub(super) const DARK_BASE: f64 = 0.02;
 const INDEX_TOLERANCE: f64 = 1e-3;
 
 /// Whether the material is a dielectric by its `illum`. Exceptions: metals; `Ni 1`, which exporters write for
-/// opaque materials; `illum 9` with a `d`, which means opacity; `illum 4` and `9` with a `Kd` but no `Ni` and `Tf`.
+/// opaque materials; `illum 9` with a `d`, which means opacity; `illum 4` and `9` with a `Kd` but no `Ni` and
+/// `Tf`.
 pub(super) fn is_glass(mtl: &MtlMaterial) -> bool {
     let Some(model @ (4 | 6 | 7 | 9)) = mtl.illumination else { return false };
     if mtl.surely_glass {

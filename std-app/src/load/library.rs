@@ -51,8 +51,8 @@ pub(super) struct Sources<'a> {
 }
 
 impl Library {
-    /// Reads the libraries of the OBJ file `obj`: those of its `mtllib` statements, and the one of its own name if
-    /// they lack one of the `used` materials.
+    /// Reads the libraries of the OBJ file `obj`: those of its `mtllib` statements, and the one of its own
+    /// name if they lack one of the `used` materials.
     pub(super) fn read(obj: &Path, statements: &[(u32, Name)], used: &[Name], mut sources: Sources) -> Self {
         let directory = obj.parent().unwrap_or(Path::new(""));
         let mut library = Self::default();
@@ -80,8 +80,8 @@ impl Library {
         self.by_common_reading(used).or_else(|| Some((self.by_any_case(used)?, false)))
     }
 
-    /// The material with the longest common reading. If both names lose a possible comment, it must be the only
-    /// one: `Material #3` is neither `Material #1` nor `Material #2`.
+    /// The material with the longest common reading. If both names lose a possible comment, it must be the
+    /// only one: `Material #3` is neither `Material #1` nor `Material #2`.
     fn by_common_reading(&self, used: &Name) -> Option<(MtlMaterial, bool)> {
         readings(used.bytes()).into_iter().find_map(|reading| {
             let name = Name::from(reading.name);
@@ -154,8 +154,8 @@ fn named_files(operand: &[u8], directory: &Path, position: &str, sources: &mut S
             let names: Vec<&[u8]> = readings.iter().map(|reading| reading.name).collect();
             (end, sources.lookup.locate(&names, &[directory]))
         };
-        // The longest exact name; else the shortest similar one, because the tail of a longer one may belong to the
-        // next library.
+        // The longest exact name; else the shortest similar one, because the tail of a longer one may belong
+        // to the next library.
         let ends = || (first + 1..last.min(first + 1 + LONGEST_NAME)).chain([last]);
         let exact = ends().rev().map(&mut locate).find(|(_, found)| matches!(found, Found::Exact(..)));
         let found = exact.or_else(|| ends().map(&mut locate).find(|(_, found)| *found != Found::Missing));

@@ -1,5 +1,5 @@
-//! Texture statements: `[-option values]... file name with blanks`. Options may follow the name too, and names may
-//! resemble options or contain ` #`; the existing file decides among the readings.
+//! Texture statements: `[-option values]... file name with blanks`. Options may follow the name too, and
+//! names may resemble options or contain ` #`; the existing file decides among the readings.
 
 use super::files::{Found, Lookup};
 use super::name::{Name, unquoted, without_comments};

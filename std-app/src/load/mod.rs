@@ -1,9 +1,9 @@
-//! Loading of scenes: OBJ with MTL ([`obj`], [`mtl`]), pictures ([`crate::picture`]), and the scene file that places
-//! meshes and adds camera, lights and settings ([`scene_file`]).
+//! Loading of scenes: OBJ with MTL ([`obj`], [`mtl`]), pictures ([`crate::picture`]), and the scene file that
+//! places meshes and adds camera, lights and settings ([`scene_file`]).
 //!
-//! A load repairs its input as far as possible and notes each kind of repair once; everything else is a [`LoadError`]
-//! with file, line and help. `docs/loading.md` has the table of both. The parsers take arbitrary bytes:
-//! [`obj::parse`], [`mtl::parse`], [`scene_file::parse`].
+//! A load repairs its input as far as possible and notes each kind of repair once; everything else is a
+//! [`LoadError`] with file, line and help. `docs/loading.md` has the table of both. The parsers take
+//! arbitrary bytes: [`obj::parse`], [`mtl::parse`], [`scene_file::parse`].
 
 mod doubled;
 mod error;
@@ -122,7 +122,8 @@ struct SceneBuilder {
 struct PlacedMesh {
     obj: usize,
     placement: Placement,
-    /// Index into the materials of the scene for each material of the OBJ, and last for faces without material.
+    /// Index into the materials of the scene for each material of the OBJ, and last for faces without
+    /// material.
     materials: Vec<u32>,
 }
 

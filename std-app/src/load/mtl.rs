@@ -1,5 +1,5 @@
-//! MTL files: statements as written; [`super::surface`] gives them their meaning. An unreadable statement is left
-//! out with a note.
+//! MTL files: statements as written; [`super::surface`] gives them their meaning. An unreadable statement is
+//! left out with a note.
 
 use super::map::Map;
 use super::name::Name;

@@ -38,7 +38,8 @@ pub struct LoadedScene {
     pub settings: RenderSettings,
     /// Transform from the coordinates of the file to those of the buffers.
     pub transform: SceneTransform,
-    /// All existing files that the scene names: itself, meshes, materials and pictures, unreadable ones included.
+    /// All existing files that the scene names: itself, meshes, materials and pictures, unreadable ones
+    /// included.
     pub files: Vec<PathBuf>,
     /// Repairs, one sentence for each kind.
     pub repairs: Vec<String>,

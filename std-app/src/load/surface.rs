@@ -10,8 +10,8 @@ use super::texture_set::TextureSet;
 use halflight_core::Rgb;
 use halflight_core::scene::{ColorInput, Material, ScalarInput, Surface};
 
-/// Relative difference of `Ks` and the Fresnel reflectance of `Ni` up to which a coat is a dielectric: files have
-/// two or three digits.
+/// Relative difference of `Ks` and the Fresnel reflectance of `Ni` up to which a coat is a dielectric: files
+/// have two or three digits.
 const PLASTIC_TOLERANCE: f64 = 0.05;
 /// Index of refraction of glass and PBR coats without `Ni`.
 const DEFAULT_IOR: f64 = 1.5;

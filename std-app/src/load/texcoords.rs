@@ -1,5 +1,5 @@
-//! Rounding of texture coordinates to f32. Large ones would lose their fraction, the only part that a repeating
-//! texture needs, so whole periods are subtracted in f64, per triangle.
+//! Rounding of texture coordinates to f32. Large ones would lose their fraction, the only part that a
+//! repeating texture needs, so whole periods are subtracted in f64, per triangle.
 
 use super::geometry::Geometry;
 use super::map::Map;

@@ -1,5 +1,5 @@
-//! Text of OBJ and MTL files: decoded, with continued lines joined, then lines and words. Names stay bytes until
-//! they are shown.
+//! Text of OBJ and MTL files: decoded, with continued lines joined, then lines and words. Names stay bytes
+//! until they are shown.
 
 /// The bytes are not text.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -158,8 +158,8 @@ pub(super) fn trimmed(text: &[u8]) -> &[u8] {
     &text[start..end]
 }
 
-/// The value of a number: sign, digits with a point anywhere, exponent. NaN for NaN and infinity in any of the
-/// spellings of other programs; infinite if it is too large for f64; `None` if it is malformed.
+/// The value of a number: sign, digits with a point anywhere, exponent. NaN for NaN and infinity in any of
+/// the spellings of other programs; infinite if it is too large for f64; `None` if it is malformed.
 #[inline]
 pub(super) fn parse_number(word: &[u8]) -> Option<f64> {
     let is_decimal = |byte: &u8| matches!(byte, b'0'..=b'9' | b'+' | b'-' | b'.' | b'e' | b'E');

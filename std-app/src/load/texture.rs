@@ -1,4 +1,5 @@
-//! Pictures as textures and environment maps: finite values that are not negative, and their views for the core.
+//! Pictures as textures and environment maps: finite values that are not negative, and their views for the
+//! core.
 
 use crate::picture::{Picture, Samples};
 use halflight_core::scene::{Texels, Texture, TextureTransform, Wrap};

@@ -1,5 +1,5 @@
-//! Textures of a scene: each picture is decoded once and has a view for each use: as colours or numbers, repeated
-//! or clamped.
+//! Textures of a scene: each picture is decoded once and has a view for each use: as colours or numbers,
+//! repeated or clamped.
 
 use super::error::LoadError;
 use super::map::{Map, MapOptions};
@@ -35,7 +35,8 @@ struct View {
 }
 
 impl TextureSet {
-    /// Decodes each of `files` once, in parallel as far as `budget` allows. Pixels stay taken from the budget.
+    /// Decodes each of `files` once, in parallel as far as `budget` allows. Pixels stay taken from the
+    /// budget.
     ///
     /// # Errors
     /// A `required` picture that is unreadable or too large; others are left out with a note.

@@ -1,5 +1,6 @@
-//! Transform from the coordinates of the files to those of the core: centred on the scene and scaled by a power of
-//! two, so that coordinates are about 1. The factor is exact: a scene scaled by a power of two gives the same bits.
+//! Transform from the coordinates of the files to those of the core: centred on the scene and scaled by a
+//! power of two, so that coordinates are about 1. The factor is exact: a scene scaled by a power of two gives
+//! the same bits.
 
 use glam::{DVec3, Vec3};
 use halflight_core::scene::Camera;
@@ -17,8 +18,8 @@ impl SceneTransform {
     /// The identity.
     pub const IDENTITY: Self = Self { offset: [0.0; 3], exponent: 0 };
 
-    /// Moves the centre of a bounding box to the origin and scales its longest side to 1 ... 2. The identity for
-    /// an empty box, a translation for a box without extent.
+    /// Moves the centre of a bounding box to the origin and scales its longest side to 1 ... 2. The identity
+    /// for an empty box, a translation for a box without extent.
     pub fn fitting(min: [f64; 3], max: [f64; 3]) -> Self {
         if !(0..3).all(|i| min[i] <= max[i]) {
             return Self::IDENTITY;

@@ -1,5 +1,5 @@
-//! Upper bounds of the memory that reading a text takes, computed before it is read: the measured worst case of
-//! each statement.
+//! Upper bounds of the memory that reading a text takes, computed before it is read: the measured worst case
+//! of each statement.
 
 use super::geometry::Placed;
 use super::obj::{Group, Obj};
@@ -66,8 +66,8 @@ pub(super) fn of_obj(text: &[u8]) -> usize {
         .saturating_add(RUN * runs + NOTE * notes)
 }
 
-/// Approximate number of distinct words, by the number of bits that their hashes set (Whang et al., "A linear-time
-/// probabilistic counting algorithm", 1990).
+/// Approximate number of distinct words, by the number of bits that their hashes set (Whang et al., "A
+/// linear-time probabilistic counting algorithm", 1990).
 struct Distinct(Vec<AtomicU64>);
 
 impl Distinct {
@@ -124,8 +124,8 @@ pub(super) fn of_mesh(obj: &Obj) -> usize {
     obj.groups.iter().map(of_group).sum::<usize>() + MATERIAL * obj.materials.len()
 }
 
-/// Bytes that [`super::geometry::assemble`] takes: vertices in f64 and f32, triangles, and both twice while parts
-/// are joined. The search for duplicate lamps and open glass takes as much again.
+/// Bytes that [`super::geometry::assemble`] takes: vertices in f64 and f32, triangles, and both twice while
+/// parts are joined. The search for duplicate lamps and open glass takes as much again.
 pub(super) fn of_scene(parts: &[Placed], materials: &[Material]) -> usize {
     let is_searched =
         |material: &Material| material.emits() || matches!(material.surface, Surface::Dielectric { .. });

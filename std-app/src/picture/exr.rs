@@ -1,5 +1,5 @@
-//! OpenEXR: half, float or integer channels, any compression of the `exr` crate, scanlines or tiles, several parts,
-//! any data window. Only blocks of the chosen part are decompressed.
+//! OpenEXR: half, float or integer channels, any compression of the `exr` crate, scanlines or tiles, several
+//! parts, any data window. Only blocks of the chosen part are decompressed.
 
 use super::layers::{self, Choice};
 use super::{Info, Kind, Picture, PictureError, Samples, black, fail, pixels};

@@ -1,5 +1,5 @@
-//! Radiance pictures (Ward, "Radiance File Formats"): any program after `#?`, all eight orders of rows and columns,
-//! RGBE and XYZE, and the header lines that scale values.
+//! Radiance pictures (Ward, "Radiance File Formats"): any program after `#?`, all eight orders of rows and
+//! columns, RGBE and XYZE, and the header lines that scale values.
 
 use super::rgbe::read_scanline;
 use super::{Info, Kind, Picture, PictureError, Samples, black, fail, filled, pixels};

@@ -1,5 +1,5 @@
-//! JPEG. The decoder repairs damaged files and fills missing parts with grey; a strict pass comes first, so that
-//! repairs are noted.
+//! JPEG. The decoder repairs damaged files and fills missing parts with grey; a strict pass comes first, so
+//! that repairs are noted.
 
 use super::{Info, Kind, Picture, PictureError, Samples, fail, filled, pixels};
 use zune_core::bytestream::ZCursor;

@@ -22,8 +22,9 @@ struct Candidate {
     rank: usize,
 }
 
-/// The channels of the picture, and their layer if there are other candidates. `parts`: names of the channels of
-/// each part. In this order: R, G and B without a layer, in one; Y without a layer, in one; a single channel.
+/// The channels of the picture, and their layer if there are other candidates. `parts`: names of the channels
+/// of each part. In this order: R, G and B without a layer, in one; Y without a layer, in one; a single
+/// channel.
 pub(super) fn choose(parts: &[Vec<String>]) -> Option<(Choice, Option<String>)> {
     let mut candidates: Vec<Candidate> =
         parts.iter().enumerate().flat_map(|(part, names)| candidates(part, names)).collect();

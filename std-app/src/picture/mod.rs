@@ -1,7 +1,7 @@
 //! Reading of pictures: textures, environment maps, references and the pictures of `compare`.
 //!
-//! The content determines the format (the name only for TGA). The header gives the memory that decoding takes,
-//! which is compared with the limit before anything is decoded.
+//! The content determines the format (the name only for TGA). The header gives the memory that decoding
+//! takes, which is compared with the limit before anything is decoded.
 
 mod error;
 mod exr;

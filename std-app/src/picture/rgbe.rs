@@ -38,7 +38,8 @@ fn read_component(rest: &mut &[u8], line: &mut [[u8; 4]], component: usize) -> R
     Ok(())
 }
 
-/// Reads flat pixels. 1 1 1 n repeats the last pixel n times, 256 n times after another repetition, and so on.
+/// Reads flat pixels. 1 1 1 n repeats the last pixel n times, 256 n times after another repetition, and so
+/// on.
 fn read_pixels(rest: &mut &[u8], line: &mut [[u8; 4]]) -> Result<(), PictureError> {
     let (mut at, mut shift) = (0, 0);
     while at < line.len() {

@@ -24,7 +24,8 @@ pub(super) fn info(bytes: &[u8]) -> Result<Info, PictureError> {
             (width, height, raw, raster::kept(decoder.color_type(), pixels))
         }
     };
-    // The pixels of the decoder, a copy, an unpacked strip or tile, and four channels of CMYK instead of three.
+    // The pixels of the decoder, a copy, an unpacked strip or tile, and four channels of CMYK instead of
+    // three.
     let peak = kept.saturating_add(raw.saturating_mul(4)).saturating_add(2 * bytes.len() + TABLES);
     Ok(Info { kind: Kind::Tiff, width, height, kept, peak })
 }

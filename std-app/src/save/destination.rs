@@ -1,5 +1,5 @@
-//! Destinations of outputs, with links resolved: files, which are replaced, and pipes and devices, which are written
-//! in place. Nothing is opened here, because opening and closing a pipe ends its reader.
+//! Destinations of outputs, with links resolved: files, which are replaced, and pipes and devices, which are
+//! written in place. Nothing is opened here, because opening and closing a pipe ends its reader.
 
 use std::ffi::OsString;
 use std::fs::{self, Metadata};
@@ -93,8 +93,8 @@ pub(crate) fn folder(path: &Path) -> &Path {
     path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
-/// Identity of a file under all its spellings, links and hard links: device and inode, or those of the folder and a
-/// name if the file does not exist yet.
+/// Identity of a file under all its spellings, links and hard links: device and inode, or those of the folder
+/// and a name if the file does not exist yet.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Identity {
     key: Key,

@@ -1,5 +1,6 @@
-//! Reading of picture files, and atomic writing of all files: a file is written under a temporary name in its folder
-//! and then renamed, so that either the old or the new file exists, complete, whenever the program ends.
+//! Reading of picture files, and atomic writing of all files: a file is written under a temporary name in its
+//! folder and then renamed, so that either the old or the new file exists, complete, whenever the program
+//! ends.
 
 use super::destination::{Destination, folder};
 use super::partial_file::PartialFile;
@@ -14,7 +15,8 @@ use std::path::Path;
 /// Bytes of the write buffer.
 const BUFFER: usize = 1 << 20;
 
-/// Reads a picture in at most `most` bytes of memory. Also returns one sentence for each repair, with the file.
+/// Reads a picture in at most `most` bytes of memory. Also returns one sentence for each repair, with the
+/// file.
 ///
 /// # Errors
 /// An unreadable picture; the message names the file.
@@ -42,8 +44,8 @@ pub fn read(path: &Path) -> Result<Image, PictureError> {
     read_within(path, Budget::new(None).limit()).map(|(image, _)| image)
 }
 
-/// Writes a picture in the format of its extension. A file is replaced atomically; a pipe or device is written in
-/// place, after a wait of 2.5 s for its reader.
+/// Writes a picture in the format of its extension. A file is replaced atomically; a pipe or device is
+/// written in place, after a wait of 2.5 s for its reader.
 ///
 /// # Errors
 /// A file that cannot be written; the message names it.

@@ -1,5 +1,5 @@
-//! A file under construction: written under a temporary name in the folder of its target, and renamed when it is
-//! complete on the disk. Incomplete files are removed, even if the program is terminated by a signal.
+//! A file under construction: written under a temporary name in the folder of its target, and renamed when it
+//! is complete on the disk. Incomplete files are removed, even if the program is terminated by a signal.
 
 use super::destination::folder;
 use std::ffi::OsString;

@@ -1,6 +1,6 @@
-//! OBJ files. The text is cut into pieces of whole lines. A first pass counts their vertices, because negative
-//! indices count back from their own line; a second pass reads the pieces in parallel ([`reader`]). Faces of one
-//! material become a [`Group`], whose polygons are triangulated ([`polygon`]).
+//! OBJ files. The text is cut into pieces of whole lines. A first pass counts their vertices, because
+//! negative indices count back from their own line; a second pass reads the pieces in parallel ([`reader`]).
+//! Faces of one material become a [`Group`], whose polygons are triangulated ([`polygon`]).
 
 mod polygon;
 mod reader;

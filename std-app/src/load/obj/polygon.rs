@@ -1,5 +1,5 @@
-//! Triangulation of polygons by ear clipping (Meisters 1975), in the coordinate plane in which the polygon has
-//! the largest area. Exact for simple polygons, concave ones included. All decisions are signs of sums of
+//! Triangulation of polygons by ear clipping (Meisters 1975), in the coordinate plane in which the polygon
+//! has the largest area. Exact for simple polygons, concave ones included. All decisions are signs of sums of
 //! products, so a scale by a power of two changes none.
 
 use crate::load::notes::Notes;
@@ -84,8 +84,8 @@ fn signed_area(a: [f64; 2], b: [f64; 2], c: [f64; 2]) -> f64 {
     (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
 }
 
-/// Cuts ears off until a triangle is left. `false` if the polygon is not simple and a corner without an ear was
-/// cut.
+/// Cuts ears off until a triangle is left. `false` if the polygon is not simple and a corner without an ear
+/// was cut.
 fn clip_ears(ring: &[u32], points: &[[f64; 2]], triangles: &mut Vec<[u32; 3]>) -> bool {
     let mut left: Vec<usize> = (0..ring.len()).collect();
     let mut guesses = 0;

@@ -1,5 +1,5 @@
-//! Statements of a piece of an OBJ file: checked numbers, and faces of three or more corners whose indices are
-//! absolute and in range.
+//! Statements of a piece of an OBJ file: checked numbers, and faces of three or more corners whose indices
+//! are absolute and in range.
 
 use crate::load::error::LoadError;
 use crate::load::name::Name;

@@ -1,5 +1,6 @@
 //! The scene file: TOML that places meshes and adds materials, camera, lights, environment and settings, as
-//! described in `docs/scene-file.md`. Errors have line and column; that of an unknown key lists the valid ones.
+//! described in `docs/scene-file.md`. Errors have line and column; that of an unknown key lists the valid
+//! ones.
 
 mod light;
 mod material;

@@ -8,7 +8,8 @@ use serde::Deserialize;
 /// Largest number: beyond it, f32 has no room for a change of scale.
 const LARGEST: f64 = 1e30;
 
-/// Largest radiance, irradiance or intensity: its square, and sums of squares of a picture, are finite in f32.
+/// Largest radiance, irradiance or intensity: its square, and sums of squares of a picture, are finite in
+/// f32.
 pub(in crate::load) const BRIGHTEST: f64 = 1e15;
 
 macro_rules! checked {

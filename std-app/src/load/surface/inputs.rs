@@ -8,8 +8,8 @@ use crate::load::scene_file::BRIGHTEST;
 use halflight_core::Rgb;
 use halflight_core::scene::{ColorInput, NormalMap, ScalarInput};
 
-/// Factor on heights without `-bm`, in texture-coordinate units: a picture of a square metre of bricks has joints
-/// a centimetre deep.
+/// Factor on heights without `-bm`, in texture-coordinate units: a picture of a square metre of bricks has
+/// joints a centimetre deep.
 const DEFAULT_BUMP: f64 = 0.01;
 
 impl Resolver<'_> {
@@ -58,7 +58,8 @@ impl Resolver<'_> {
         ColorInput { value, texture }
     }
 
-    /// The factor on a map, or the value without one. Exporters write 0 if only the map counts, so 0 becomes 1.
+    /// The factor on a map, or the value without one. Exporters write 0 if only the map counts, so 0 becomes
+    /// 1.
     pub(super) fn factor<const N: usize>(
         &mut self,
         what: &str,
