@@ -55,7 +55,7 @@ fn what_is_refused_names_its_line() {
     refuses(&format!("{SQUARE}f 0 1 2\n"), 5, "`0` refers to a vertex");
     refuses(&format!("{SQUARE}f 1/1 2/1 3/1\n"), 5, "texture coordinate that does not exist");
     refuses(&format!("{SQUARE}f 1//1 2//1 3//1\n"), 5, "normal that does not exist");
-    refuses(&format!("{SQUARE}f 1 2 99999999999999999999999\n"), 5, "not there");
+    refuses(&format!("{SQUARE}f 1 2 99999999999999999999999\n"), 5, "does not exist");
     refuses(&format!("{SQUARE}f 1 2 x\n"), 5, "not a corner");
     refuses(&format!("{SQUARE}f 1////1 2 3\n"), 5, "not a corner");
     refuses("v 0 0 zero\n", 1, "`zero` in a `v` statement is not a number");

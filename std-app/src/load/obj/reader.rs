@@ -5,6 +5,7 @@ use crate::load::error::LoadError;
 use crate::load::name::Name;
 use crate::load::notes::Notes;
 use crate::load::text::{Lines, Words, parse_number, words};
+use core::num::IntErrorKind::{NegOverflow, PosOverflow};
 use std::path::Path;
 
 /// Numbers of `v`, `vt` and `vn` statements.
@@ -222,8 +223,12 @@ impl Indices<'_> {
             if text.is_empty() && (1..3).contains(&part) {
                 continue;
             }
-            let index = core::str::from_utf8(text).ok().and_then(|text| text.parse::<i64>().ok());
-            let Some(index) = index.filter(|_| part < 3) else { return Err(self.bad_corner(line, word)) };
+            let text = core::str::from_utf8(text).ok().filter(|_| part < 3);
+            let index = match text.map(str::parse::<i64>) {
+                Some(Ok(index)) => index,
+                Some(Err(why)) if matches!(why.kind(), PosOverflow | NegOverflow) => i64::MAX,
+                _ => return Err(self.bad_corner(line, word)),
+            };
             let (before, total) = (self.before[part] as i64, self.total[part] as i64);
             let number = if index < 0 { before + index } else { index - 1 };
             if !(0..total).contains(&number) {
