@@ -106,7 +106,7 @@ impl<'m> LightSampler<'m> {
     }
 
     /// Whether the environment is sampled by its visibility.
-    pub(crate) fn has_visibility(&self) -> bool {
+    pub fn has_visibility(&self) -> bool {
         self.visibility.is_some()
     }
 

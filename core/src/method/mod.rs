@@ -5,6 +5,7 @@
 //! no method knows of threads, clocks or files.
 
 pub mod emission_guide;
+pub mod environment_visibility;
 pub mod executor;
 pub mod path;
 pub mod photon_map;

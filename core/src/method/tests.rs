@@ -1,6 +1,7 @@
 //! Methods on one small scene: the same picture for any division into rounds and steps, from one buffer; and errors,
 //! not panics, where memory is short.
 
+use super::environment_visibility;
 use super::photon_map::PhotonMapping;
 use super::sppm::ProgressivePhotonMapping;
 use super::{Loop, MapUse, Method, PhotonSettings, PhotonUse, RenderContext, RenderState, Round, Shard};
@@ -9,11 +10,11 @@ use crate::bvh::Bvh;
 use crate::film::Pixel;
 use crate::light::LightSampler;
 use crate::memory::{Arena, Buffer, Footprint, Line, OutOfMemory};
-use crate::scene::{Camera, Material, Mesh, Scene, Surface, Triangle};
+use crate::scene::{Camera, Environment, Material, Mesh, Scene, Surface, Triangle};
 use crate::transport::PathSettings;
 use crate::{Level, Rgb};
 use core::cell::Cell;
-use glam::Vec3;
+use glam::{Mat3, Vec3};
 use std::vec;
 use std::vec::Vec;
 
@@ -205,5 +206,33 @@ fn rounds_that_end_early_leave_the_picture_as_it_is() {
             method.round(round)
         });
         assert!(pixels.unwrap() == whole && method.photons() == used && rounds > 3, "{rounds}");
+    });
+}
+
+#[test]
+fn environment_visibility_is_learned_in_rooms_that_see_little_of_it() {
+    with_room(|context| {
+        let environment = Some(Environment { radiance: Rgb::ONE, map: None, to_map: Mat3::IDENTITY });
+        let scene = Scene { environment, lights: &[], ..*context.scene };
+        let mut memory = lines(LightSampler::footprint(&scene).and(LightSampler::scratch(&scene)).bytes());
+        let lights =
+            LightSampler::build(&scene, &mut Arena::new(bytemuck::cast_slice_mut(&mut memory))).unwrap();
+        let context = RenderContext { scene: &scene, lights: &lights, ..*context };
+        let learn = |bytes: usize, most: u32| {
+            let (mut memory, mut scratch) =
+                (lines(bytes), lines(environment_visibility::scratch::<All>().bytes()));
+            let mut buffer = Buffer::new(bytemuck::cast_slice_mut(&mut memory));
+            let asked = Cell::new(0);
+            let is_over = || asked.replace(asked.get() + 1) >= most;
+            let mut executor = Loop::new(bytemuck::cast_slice_mut(&mut scratch)).until(&is_over);
+            environment_visibility::learn::<All>(&context, Some(true), &mut buffer, &mut executor)
+                .map(|(lights, gain)| (lights.has_visibility(), gain.map(|gain| gain.factor())))
+        };
+        let bytes = environment_visibility::footprint().bytes();
+        let (used, gain) = learn(bytes, u32::MAX).unwrap();
+        assert!(used && gain.is_some_and(|gain| gain > 0.0), "{gain:?}");
+        assert_eq!(learn(bytes, 3).unwrap(), (false, None));
+        assert_eq!(learn(bytes, 70).unwrap(), (false, None));
+        assert!(learn(bytes - 64, u32::MAX).is_err_and(|short| short.needed > short.available));
     });
 }

@@ -19,7 +19,7 @@ use halflight_core::light::LightSampler;
 use halflight_core::memory::{Arena, Footprint};
 use halflight_core::method::RenderState;
 use halflight_core::scene::Scene;
-use halflight_core::transport::{PathIntegrator, PathSettings, UNLIMITED};
+use halflight_core::transport::{PathSettings, UNLIMITED};
 use std::time::Instant;
 
 /// A render to be compiled for the features of its scene.
@@ -76,10 +76,8 @@ impl WithFeatures for Render<'_> {
         let workers = workers.watched(Watch::until(interrupt).within(left));
         let mut film_arena = Arena::new(bytemuck::cast_slice_mut(&mut film_lines));
         let state = RenderState::new(width, height, settings.shard, &mut film_arena)?;
-        let mut window_lines = Vec::new();
-        let paths = PathIntegrator::<F>::new(scene, &bvh, &lights, path_settings(settings), settings.level);
-        let (lights, windows) =
-            windows::learn(&paths, &lights, settings.windows, &workers, &mut memory, &mut window_lines)?;
+        let plain = Stage { scene, bvh: &bvh, lights: &lights, settings, workers: &workers };
+        let (lights, windows) = windows::learn::<F>(&plain, &mut memory)?;
         let stage = Stage { scene, bvh: &bvh, lights: &lights, settings, workers: &workers };
         let plain = stage.paths::<F>(settings.seed);
         let sketch = |workers: &Workers| gaps::sketch(&plain, [width, height], workers);

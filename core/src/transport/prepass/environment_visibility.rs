@@ -78,7 +78,8 @@ pub struct Outlook<'m> {
 }
 
 /// What windows make of the variance of light from the sky.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[repr(C)]
 pub struct WindowGain {
     before: f64,
     after: f64,

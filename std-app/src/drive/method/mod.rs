@@ -174,7 +174,7 @@ impl<'a> Stage<'a> {
     }
 
     /// The same for methods of the core.
-    fn context(&self) -> RenderContext<'a> {
+    pub(super) fn context(&self) -> RenderContext<'a> {
         let Self { scene, bvh, lights, settings, .. } = *self;
         RenderContext { scene, bvh, lights, settings: path_settings(settings), level: settings.level }
     }

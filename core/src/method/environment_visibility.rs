@@ -1,0 +1,75 @@
+//! Environment visibility: before the picture, some paths and rays learn which part of the environment each place
+//! sees, and the environment is then sampled by it, where that reduces variance
+//! (`transport/prepass/environment_visibility.rs`).
+
+use super::RenderContext;
+use super::executor::Executor;
+use crate::bsdf::Features;
+use crate::light::{EnvironmentVisibility, LightSampler};
+use crate::memory::{Footprint, MemorySource, OutOfMemory};
+use crate::transport::{Counters, Outlook, PathIntegrator, WindowGain};
+
+/// Bytes that [`learn`] takes.
+pub fn footprint() -> Footprint {
+    working().and(EnvironmentVisibility::footprint())
+}
+
+/// Working memory of a worker.
+pub fn scratch<F: Features>() -> Footprint {
+    PathIntegrator::<F>::learn_scratch()
+}
+
+fn working() -> Footprint {
+    Outlook::footprint().slice::<WindowGain>(EnvironmentVisibility::MOST)
+}
+
+/// Learns the visibility of the environment of `context`, and returns its lights with it where that pays or is
+/// `wanted`. The gain is `None` where the executor ended early or there is no environment.
+///
+/// # Errors
+/// [`OutOfMemory`] where `memory` has less than [`footprint`] bytes, or the executor less than [`scratch`].
+pub fn learn<'a, F: Features>(
+    context: &RenderContext<'a>,
+    wanted: Option<bool>,
+    memory: &mut impl MemorySource<'a>,
+    executor: &mut impl Executor,
+) -> Result<(LightSampler<'a>, Option<WindowGain>), OutOfMemory> {
+    let lights = context.lights;
+    if lights.environment_is_constant().is_none() {
+        return Ok((*lights, None));
+    }
+    let integrator = context.integrator::<F>();
+    memory.lend("look at the sky", working(), |memory, working| {
+        let mut outlook = Outlook::new(working)?;
+        let gains = working.slice::<WindowGain>(EnvironmentVisibility::MOST)?;
+        let mut kept = memory.take("windows", EnvironmentVisibility::footprint())?;
+        let (slots, tables) = EnvironmentVisibility::memory(&mut kept)?;
+
+        let passed = executor.pass(outlook.parts(), |_, (task, part), _| {
+            integrator.look(task, part);
+            Ok(Counters::default())
+        })?;
+        // A place that was not looked at may see anything.
+        if !passed.is_complete {
+            return Ok((*lights, None));
+        }
+        integrator.aim_at_sky(&mut outlook);
+        let Some((grid, count)) = outlook.settle(slots) else {
+            return Ok((*lights, Some(WindowGain::default())));
+        };
+        let pieces = tables.iter_mut().zip(gains.iter_mut()).take(count);
+        let passed = executor.pass(pieces, |number, (table, gain), worker| {
+            *gain = integrator.learn(&outlook, number, count, &mut worker.scratch, table)?;
+            Ok(Counters::default())
+        })?;
+        if !passed.is_complete {
+            return Ok((*lights, None));
+        }
+        let mut gain = WindowGain::default();
+        gains.iter().take(count).for_each(|other| gain += *other);
+        let tables = tables.get(..count).unwrap_or_default();
+        let visibility =
+            wanted.unwrap_or(gain.pays()).then(|| EnvironmentVisibility::new(grid, slots, tables));
+        Ok((lights.with_visibility(visibility), Some(gain)))
+    })
+}
