@@ -7,8 +7,9 @@
 //! A and B it would be the squared error of the pixel: the difference, ((A − B) / 2)², is the variance that
 //! the picture tells of itself, in all of its pixels instead of a few.
 
-use super::interval::{ErrorEstimate, Z};
+use super::interval::ErrorEstimate;
 use super::metric::{DARK, ROUNDING};
+use super::student::NORMAL_95 as Z;
 use crate::Rgb;
 use crate::film::Pixel;
 use libm::{cbrt, fabs, hypot, sqrt};

@@ -21,6 +21,7 @@
 //! The price: about as much time as a tenth of a sample for each pixel.
 
 use super::TileError;
+use super::student::{NORMAL_95, student_quantile};
 use super::tile::{BLOCK, Parts};
 use crate::film::{CIRCLE, GROUP};
 use libm::{exp, fmax, fmin, hypot, log, sqrt};
@@ -36,9 +37,6 @@ pub struct ErrorEstimate {
     /// Upper end of the interval.
     pub upper: f64,
 }
-
-/// The normal distribution lies between this and its negative with 95 %.
-pub(super) const Z: f64 = 1.959_963_984_540_054;
 
 /// Where fewer independent pixels have nearly all of the noise, intervals are those of Student's t with as
 /// many degrees of freedom. Where more have it they are those of the normal distribution: squares of heavy
@@ -79,7 +77,7 @@ impl ErrorEstimate {
     /// standard error to the upper end, as if they shared nothing, if that is less than to the lower.
     fn with_shared(sum: &TileError, shared: f64, above: f64) -> Option<Self> {
         let flashes = freedom(sum.squares, sum.fourths) / shared;
-        let quantile = if flashes < FEWEST { student_95(FEWEST) } else { Z };
+        let quantile = if flashes < FEWEST { student_quantile(NORMAL_95, FEWEST) } else { NORMAL_95 };
         Self::with_reach(sum, quantile * sqrt(shared), above, flashes)
     }
 
@@ -139,15 +137,6 @@ fn by_parts(sum: &TileError, parts: Parts, pixels: f64) -> f64 {
 /// Degrees of freedom of a sum, from the sums of the squares and fourth powers of what is added up.
 fn freedom(squares: f64, fourths: f64) -> f64 {
     if fourths > 0.0 { squares * squares / fourths } else { 1.0 }
-}
-
-/// Student's t of `freedom` degrees lies between this and its negative with 95 % (expansion of Cornish and
-/// Fisher; too small by a tenth for two degrees, and taken at one for fewer).
-fn student_95(freedom: f64) -> f64 {
-    const FIRST: f64 = (Z * Z * Z + Z) / 4.0;
-    const SECOND: f64 = (5.0 * Z * Z * Z * Z * Z + 16.0 * Z * Z * Z + 3.0 * Z) / 96.0;
-    let freedom = fmax(freedom, 1.0);
-    Z + FIRST / freedom + SECOND / (freedom * freedom)
 }
 
 #[cfg(test)]
@@ -369,12 +358,5 @@ mod tests {
         assert!((0.6..1.6).contains(&ratios[30]), "{ratios:?}");
         // 90 % of 60 are 54; fewer than 48 have a chance of 1 %.
         assert!(held >= 48, "{held} of {pictures}");
-    }
-
-    #[test]
-    fn quantiles_are_those_of_the_tables() {
-        for (freedom, table) in [(4.0, 2.776), (10.0, 2.228), (100.0, 1.984)] {
-            assert!((student_95(freedom) / table - 1.0).abs() < 0.02);
-        }
     }
 }

@@ -7,6 +7,7 @@ mod empirical_bayes;
 mod filter;
 mod interval;
 mod metric;
+mod student;
 mod tile;
 mod tile_statistics;
 
@@ -17,4 +18,5 @@ pub use empirical_bayes::{BrightnessClasses, Shrinkage};
 pub use filter::{filtered, filtered_pixel};
 pub use interval::ErrorEstimate;
 pub use metric::{Difference, mse, relmse, rmse};
+pub use student::{NORMAL_95, student_quantile};
 pub use tile::{TileError, TileLight};

@@ -1,49 +1,52 @@
-//! How fast the error falls: the slope of a straight line through the curve of error against time on
-//! logarithmic axes, with its interval.
+//! Power law of error against time: a line through the curve on logarithmic axes, with the interval of its slope.
 //!
-//! The points of a curve are not independent: each picture holds the samples of all before it. The error of a
-//! mean of samples over the time t is W(t)/t, W a random walk, so two of them, at times s < t, have the
-//! correlation √(s/t), and their squares s/t. That is a Markov chain in log t; subtracting from each point
-//! what the one before foretells leaves independent ones, to which ordinary least squares applies. Logarithms of
-//! errors stray equally, whatever the error: all points have the same weight.
+//! The points of a curve are correlated, because each picture holds the samples of all earlier ones. The error of
+//! a mean over the time t is W(t)/t with a random walk W. Errors at times s < t have the correlation √(s/t), and
+//! their squares s/t: a Markov chain in log t. Each point minus its prediction from the one before is
+//! independent, so ordinary least squares applies. Logarithms of errors have equal variances: weights are equal.
 
-/// A point of a curve.
+use halflight_core::estimate::{NORMAL_95, student_quantile};
+
+/// Point of a curve.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Point {
-    /// Seconds.
+    /// Rendering time in seconds.
     pub(super) seconds: f64,
-    /// The error.
+    /// relMSE.
     pub(super) error: f64,
 }
 
-/// The line error = exp(level) · seconds^slope.
+/// Line error = exp(level) · seconds^slope.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Fit {
     pub(super) level: f64,
     pub(super) slope: f64,
-    /// Where the slope lies with 95 % confidence.
+    /// 95 % interval of the slope.
     pub(super) interval: [f64; 2],
-    /// Seconds from which on points were taken.
+    /// Seconds of the first point used.
     pub(super) from: f64,
 }
 
-/// What is fitted: from the last point over this.
+/// Range of times of a fit: the last point over the first.
 const DECADE: f64 = 10.0;
 
-/// Points below which a slope has no interval worth telling.
-const FEWEST: usize = 5;
+/// Fewest points of a fit.
+const MIN_POINTS: usize = 5;
+
+/// Largest correlation, for two rounds at nearly the same time.
+const MAX_CORRELATION: f64 = 1.0 - 1e-9;
 
 impl Fit {
-    /// Through the points of the last decade of time, or the last six, for the first samples often tell of a start
-    /// and not of a pace. The points are in the order of time; those that have no logarithm are left out. `None`
-    /// where there are fewer than five.
+    /// Fit of the last decade of time or the last six points: early samples often show the start, not the rate.
+    ///
+    /// Points are in the order of time. Points without a logarithm are ignored. `None` below five points.
     pub(super) fn through(points: impl Iterator<Item = Point>) -> Option<Fit> {
         let positive = |value: f64| value > 0.0 && value.is_finite();
         let mut points: Vec<Point> = points.filter(|p| positive(p.seconds) && positive(p.error)).collect();
         let decade = points.last()?.seconds / DECADE;
         let first = points.partition_point(|point| point.seconds < decade);
-        points.drain(..first.min(points.len().saturating_sub(FEWEST + 1)));
-        if points.len() < FEWEST {
+        points.drain(..first.min(points.len().saturating_sub(MIN_POINTS + 1)));
+        if points.len() < MIN_POINTS {
             return None;
         }
         let values = |p: &Point| [1.0, p.seconds.ln(), p.error.ln()];
@@ -53,10 +56,10 @@ impl Fit {
         for point in &points {
             let mut row = values(point);
             if let Some(before) = before {
-                let correlation = (before.seconds / point.seconds).min(MOST_ALIKE);
-                let foretold = values(before);
+                let correlation = (before.seconds / point.seconds).min(MAX_CORRELATION);
+                let predicted = values(before);
                 let rest = (1.0 - correlation * correlation).sqrt();
-                row = core::array::from_fn(|i| (row[i] - correlation * foretold[i]) / rest);
+                row = core::array::from_fn(|i| (row[i] - correlation * predicted[i]) / rest);
             }
             let [a, b, y] = row;
             xx = [xx[0] + a * a, xx[1] + a * b, xx[2] + b * b];
@@ -71,34 +74,19 @@ impl Fit {
         let slope = (xx[0] * xy[1] - xx[1] * xy[0]) / determinant;
         let freedom = (points.len() - 2) as f64;
         let residual = (xy[2] - level * xy[0] - slope * xy[1]).max(0.0) / freedom;
-        let reach = student_95(freedom) * (residual * xx[0] / determinant).sqrt();
-        Some(Fit { level, slope, interval: [slope - reach, slope + reach], from: points[0].seconds })
+        let width = student_quantile(NORMAL_95, freedom) * (residual * xx[0] / determinant).sqrt();
+        Some(Fit { level, slope, interval: [slope - width, slope + width], from: points[0].seconds })
     }
 
-    /// The error after `seconds`.
-    pub(super) fn at(&self, seconds: f64) -> f64 {
+    /// Error after `seconds`.
+    pub(super) fn error_at(&self, seconds: f64) -> f64 {
         (self.level + self.slope * seconds.ln()).exp()
     }
 
-    /// Seconds until the error is `error`; infinite where it never falls.
-    pub(super) fn when(&self, error: f64) -> f64 {
+    /// Seconds to the error `error`; infinite if the error does not fall.
+    pub(super) fn seconds_to(&self, error: f64) -> f64 {
         if self.slope < 0.0 { ((error.ln() - self.level) / self.slope).exp() } else { f64::INFINITY }
     }
-}
-
-/// Correlation of two rounds at almost the same time.
-const MOST_ALIKE: f64 = 1.0 - 1e-9;
-
-/// The 97.5 % quantile of Student's t with `freedom` ≥ 3 degrees of freedom, to 1 % (Cornish–Fisher expansion:
-/// Abramowitz and Stegun 26.7.5).
-fn student_95(freedom: f64) -> f64 {
-    let z: f64 = 1.959_964;
-    let terms = [
-        (z.powi(3) + z) / 4.0,
-        (5.0 * z.powi(5) + 16.0 * z.powi(3) + 3.0 * z) / 96.0,
-        (3.0 * z.powi(7) + 19.0 * z.powi(5) + 17.0 * z.powi(3) - 15.0 * z) / 384.0,
-    ];
-    z + terms[0] / freedom + terms[1] / freedom.powi(2) + terms[2] / freedom.powi(3)
 }
 
 #[cfg(test)]
@@ -110,36 +98,29 @@ mod tests {
     }
 
     #[test]
-    fn a_power_law_is_found_again() {
+    fn fit_recovers_a_power_law() {
         let points = (0..12).map(|i| f64::from(1 << i)).map(|t| point(t, 0.3 * t.powf(-0.8)));
         let fit = Fit::through(points).unwrap();
-        assert!((fit.slope + 0.8).abs() < 1e-9 && (fit.at(1.0) - 0.3).abs() < 1e-9);
+        assert!((fit.slope + 0.8).abs() < 1e-9 && (fit.error_at(1.0) - 0.3).abs() < 1e-9);
         assert!(fit.interval[1] - fit.interval[0] < 1e-6);
-        assert!((fit.when(fit.at(77.0)) - 77.0).abs() < 1e-6);
+        assert!((fit.seconds_to(fit.error_at(77.0)) - 77.0).abs() < 1e-6);
     }
 
     #[test]
-    fn what_has_no_slope_has_no_fit() {
+    fn fit_needs_five_points_at_several_times() {
         let falling = |n: i32| (1..=n).map(|i| point(f64::from(i), 1.0 / f64::from(i)));
         assert!(Fit::through(falling(4)).is_none() && Fit::through(falling(5)).is_some());
         assert!(Fit::through((0..9).map(|_| point(1.0, 0.5))).is_none(), "all at one time");
         assert!(Fit::through((1..9).map(|i| point(f64::from(i), 0.0))).is_none(), "no error");
         assert!(Fit::through((1..9).map(|i| point(f64::from(i), f64::NAN))).is_none());
         let rising = Fit::through((1..9).map(|i| point(f64::from(i), f64::from(i)))).unwrap();
-        assert_eq!(rising.when(0.1), f64::INFINITY);
+        assert_eq!(rising.seconds_to(0.1), f64::INFINITY);
     }
 
+    /// Errors of 200 independent pixels are random walks over time, so the slope is −1. A correct 95 % interval
+    /// misses it in more than 36 or fewer than 8 of 400 renders with a probability below 1e-3.
     #[test]
-    fn students_quantiles_are_those_of_the_tables() {
-        for (freedom, expected) in [(3.0, 3.182), (5.0, 2.571), (10.0, 2.228), (30.0, 2.042), (1e6, 1.960)] {
-            assert!((student_95(freedom) / expected - 1.0).abs() < 0.01, "{freedom}");
-        }
-    }
-
-    /// Renders of 200 independent pixels, whose halves are random walks; the slope is −1 by construction. The
-    /// chance that an honest 95 % interval misses it in more than 36 or fewer than 8 of 400 renders is below 1e-3.
-    #[test]
-    fn the_interval_holds_the_slope_as_often_as_it_says() {
+    fn interval_holds_the_slope_in_95_percent_of_renders() {
         let mut state = 1u64;
         let mut uniform = || {
             state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
