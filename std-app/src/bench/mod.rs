@@ -1,4 +1,4 @@
-//! Speed of the kernels on this machine, on one thread. Rivals that the caller brings are measured in the same run.
+//! Speed of the kernels on one thread of this machine. Rival libraries of the caller are measured in the same run.
 
 pub mod eigen;
 pub mod knn;
@@ -7,15 +7,15 @@ pub mod rays;
 use core::fmt;
 use halflight_core::memory::OutOfMemory;
 
-/// Times that everything is measured; the median counts.
+/// Number of measurements, of which the median is reported.
 pub const REPETITIONS: usize = 7;
 
-/// Why there is no measurement.
+/// Reason why a measurement failed.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum BenchError {
-    /// The system does not give the memory.
+    /// The system refuses the memory.
     Memory(OutOfMemory),
-    /// The rival does not start, or does not take the scene.
+    /// The rival does not start or refuses the data.
     Rival(String),
 }
 
@@ -36,7 +36,7 @@ impl From<OutOfMemory> for BenchError {
     }
 }
 
-/// The middle one of `values`, or the mean of the two in the middle; NaN where there are none.
+/// Median of `values`, NaN if empty.
 pub fn median(mut values: Vec<f64>) -> f64 {
     values.sort_by(f64::total_cmp);
     let middle = |i: usize| values.get(i).copied().unwrap_or(f64::NAN);
@@ -49,7 +49,7 @@ mod tests {
     use super::median;
 
     #[test]
-    fn medians() {
+    fn median_of_even_and_odd_counts() {
         assert_eq!(median(vec![3.0, 1.0, 2.0]), 2.0);
         assert_eq!(median(vec![4.0, 1.0, 2.0, 3.0]), 2.5);
         assert!(median(vec![]).is_nan());

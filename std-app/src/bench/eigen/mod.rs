@@ -1,9 +1,9 @@
-//! Eigen decompositions per second of symmetric matrices on one thread: 2×2, as the radii of irradiance records want
-//! them, and 3×3.
+//! Eigen decompositions per second of symmetric matrices on one thread: 2×2, as in the radii of irradiance records,
+//! and 3×3.
 //!
-//! A batch of [`BATCH`] random matrices stays in the first-level cache with its results and is decomposed again and
-//! again, for [`SECONDS`] at a time; that [`REPETITIONS`] times, ours and the rival's in turn, and the median counts.
-//! Values and vectors of all are computed and stored, of ours sorted by magnitude.
+//! [`BATCH`] random matrices and their results fit into the first-level cache and are decomposed repeatedly for
+//! [`SECONDS`]. Each library does so [`REPETITIONS`] times in turn; the median is reported. Values and vectors are
+//! computed and stored, ours sorted by magnitude.
 
 use super::{REPETITIONS, median};
 use core::hint::black_box;
@@ -14,30 +14,30 @@ use halflight_simd::kernels::eigen::{
 };
 use std::time::Instant;
 
-/// Matrices of a batch.
+/// Matrices per batch.
 pub const BATCH: usize = 512;
-/// How long each measurement lasts at least.
+/// Shortest measurement in seconds.
 pub const SECONDS: f64 = 0.02;
 
 /// Matrices per second.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Speeds {
-    /// Of 2×2.
+    /// 2×2 matrices.
     pub sym2: f64,
-    /// Of 3×3.
+    /// 3×3 matrices.
     pub sym3: f64,
 }
 
-/// What was measured.
+/// Result of the measurement.
 #[derive(Clone, Debug, PartialEq)]
 pub struct EigenReport {
-    /// Level of our kernels.
+    /// Instruction set of our kernels.
     pub level: Level,
-    /// Ours.
+    /// Speeds of our kernels.
     pub ours: Speeds,
 }
 
-/// One way of decomposing batches.
+/// Library that decomposes batches.
 pub trait Entry {
     /// Decomposes 2×2 matrices.
     fn sym2(&mut self, matrices: &[Matrices2]);
@@ -47,11 +47,11 @@ pub trait Entry {
 
 /// Measures the kernels of `level`.
 pub fn run(level: Level) -> EigenReport {
-    run_beside(level, None).0
+    run_with_rival(level, None).0
 }
 
-/// [`run`] with a rival whose repetitions alternate with ours, and its speeds.
-pub fn run_beside(level: Level, rival: Option<&mut dyn Entry>) -> (EigenReport, Option<Speeds>) {
+/// [`run`] with a rival, measured in turn, and its speeds.
+pub fn run_with_rival(level: Level, rival: Option<&mut dyn Entry>) -> (EigenReport, Option<Speeds>) {
     let numbers: Vec<f32> = numbers().take(6 * BATCH).collect();
     let (rows, _) = numbers.as_chunks::<16>();
     let (small, large): (&[Matrices2], &[Matrices3]) =
@@ -72,12 +72,12 @@ pub fn run_beside(level: Level, rival: Option<&mut dyn Entry>) -> (EigenReport, 
     (EigenReport { level, ours }, measured.next())
 }
 
-/// Numbers from -1 to 1.
+/// Random numbers in [−1, 1).
 fn numbers() -> impl Iterator<Item = f32> {
     (0..).map(|i| 2.0 * unit_float((mix(i) >> 32) as u32) - 1.0)
 }
 
-/// Matrices per second of something that decomposes a batch.
+/// Matrices per second of `batch`, which decomposes one batch.
 fn per_second(mut batch: impl FnMut()) -> f64 {
     let start = Instant::now();
     let mut batches = 0.0;

@@ -1,10 +1,8 @@
-//! Searches per second of the photon map on one thread: the k nearest, with and without a radius, and the density
-//! estimate.
-//!
+//! Photon searches per second on one thread: the k nearest photons, with and without a radius, and density estimates.
 //! The build is timed on two threads as well.
 //!
-//! Everything is timed [`REPETITIONS`] times by the wall clock, and the median counts; ours and the rivals'
-//! repetitions alternate, so that other load of the machine slows all.
+//! Each library is timed [`REPETITIONS`] times in turn by the wall clock, so other load of the machine affects all of
+//! them; the median is reported.
 
 mod data;
 mod ours;
@@ -23,42 +21,42 @@ use halflight_core::photon::Photons;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use std::time::Instant;
 
-/// How much is searched, and how often.
+/// Size of the benchmark.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Amount {
+pub struct WorkSize {
     /// Photons in the map.
     pub photons: usize,
-    /// Searches for the nearest; a tenth of it for gathering.
+    /// Nearest-photon searches; density estimates are a tenth of them.
     pub queries: usize,
 }
 
-impl Amount {
-    /// What results are told of.
-    pub const FULL: Amount = Amount { photons: 1_000_000, queries: 200_000 };
+impl WorkSize {
+    /// Size of published results.
+    pub const FULL: WorkSize = WorkSize { photons: 1_000_000, queries: 200_000 };
 }
 
-/// What is looked for.
+/// Kind of searches.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Task {
     /// The `k` nearest within a radius.
     Nearest {
-        /// How many.
+        /// Number of photons.
         k: usize,
-        /// Infinite where there is none.
+        /// Largest distance, or infinity.
         radius: f32,
     },
-    /// All within a radius: the density estimate.
+    /// Density estimate over a disc.
     Gather {
-        /// Of the disc.
+        /// Radius of the disc.
         radius: f32,
     },
 }
 
-/// Radius of bounded searches: about what holds fifty photons away from the focus.
-const WITHIN: f32 = 0.01;
+/// Radius of bounded searches, which hold about fifty photons outside the caustic.
+const BOUND: f32 = 0.01;
 
 impl Task {
-    /// Everything that is measured.
+    /// All tasks.
     pub const ALL: [Task; 10] = {
         const fn nearest(k: usize, radius: f32) -> Task {
             Task::Nearest { k, radius }
@@ -68,16 +66,16 @@ impl Task {
             nearest(50, f32::INFINITY),
             nearest(100, f32::INFINITY),
             nearest(200, f32::INFINITY),
-            nearest(8, WITHIN),
-            nearest(50, WITHIN),
-            nearest(100, WITHIN),
-            nearest(200, WITHIN),
+            nearest(8, BOUND),
+            nearest(50, BOUND),
+            nearest(100, BOUND),
+            nearest(200, BOUND),
             Task::Gather { radius: 0.045 },
             Task::Gather { radius: 0.075 },
         ]
     };
 
-    /// Its name in reports.
+    /// Name in reports.
     pub fn name(self) -> String {
         match self {
             Task::Nearest { k, radius } if radius.is_finite() => format!("k{k}_within"),
@@ -86,7 +84,7 @@ impl Task {
         }
     }
 
-    /// The queries that it takes of the data.
+    /// Queries of the task.
     pub fn queries(self, data: &Data) -> &[Surfel] {
         match self {
             Task::Nearest { .. } => &data.queries,
@@ -95,45 +93,45 @@ impl Task {
     }
 }
 
-/// One way of searching.
+/// Library that searches.
 pub trait Searcher {
-    /// Runs every query of `task`; returns the number of photons found in all.
+    /// Runs every query of `task`; returns the total number of photons found.
     ///
     /// # Errors
-    /// [`BenchError`] where memory is missing.
+    /// [`BenchError`] without memory.
     fn run(&mut self, task: Task, data: &Data) -> Result<u64, BenchError>;
 }
 
 /// Another library's tree over the same points.
 pub trait Rival {
-    /// Its name and version.
+    /// Name and version.
     fn name(&self) -> String;
-    /// A tree, built anew.
+    /// New tree.
     ///
     /// # Errors
-    /// [`BenchError::Rival`] if it does not take the points.
+    /// [`BenchError::Rival`] if it refuses the points.
     fn build(&self) -> Result<Box<dyn Searcher + '_>, BenchError>;
 }
 
 /// Measures with the kernels of `level`.
 ///
 /// # Errors
-/// [`BenchError`] where memory is missing.
-pub fn run(amount: Amount, level: Level) -> Result<KnnReport, BenchError> {
-    Ok(run_beside(&Data::new(amount.photons, amount.queries), level, &[])?.0)
+/// [`BenchError`] without memory.
+pub fn run(size: WorkSize, level: Level) -> Result<KnnReport, BenchError> {
+    Ok(run_with_rivals(&Data::new(size.photons, size.queries), level, &[])?.0)
 }
 
-/// [`run`] on `data` with rivals whose repetitions alternate with ours.
+/// [`run`] on `data` with rivals, measured in turn.
 ///
 /// # Errors
-/// [`BenchError`] where memory is missing or a rival refuses.
-pub fn run_beside(
+/// [`BenchError`] without memory, or if a rival refuses the points.
+pub fn run_with_rivals(
     data: &Data,
     level: Level,
     rivals: &[&dyn Rival],
 ) -> Result<(KnnReport, Vec<RivalReport>), BenchError> {
     let records = ours::records(&data.photons);
-    let two = Two::new()?;
+    let two = TwoThreads::new()?;
     let (mut build, mut build_on_two) = (Vec::new(), Vec::new());
     let mut rival_builds = vec![Vec::new(); rivals.len()];
     for _ in 0..REPETITIONS {
@@ -151,9 +149,9 @@ pub fn run_beside(
     let mut memory = Vec::new();
     let map = ours::build(&records, &mut memory, &Serial)?;
     let bytes = Photons::footprint(records.len()).bytes();
-    let (mut singly, mut together) = (ours::Singly { map: &map, level }, ours::Together { map: &map, level });
+    let (mut single, mut batched) = (ours::Single { map: &map, level }, ours::Batched { map: &map, level });
     let mut trees = rivals.iter().map(|rival| rival.build()).collect::<Result<Vec<_>, _>>()?;
-    let mut searchers: Vec<&mut dyn Searcher> = vec![&mut singly, &mut together];
+    let mut searchers: Vec<&mut dyn Searcher> = vec![&mut single, &mut batched];
     for tree in &mut trees {
         searchers.push(tree.as_mut());
     }
@@ -165,15 +163,15 @@ pub fn run_beside(
         }
     }
     let mut speeds = speeds.into_iter();
-    let (singly, together) = (speeds.next().unwrap_or_default(), speeds.next().unwrap_or_default());
+    let (single, batched) = (speeds.next().unwrap_or_default(), speeds.next().unwrap_or_default());
     let report = KnnReport {
         level,
-        amount: Amount { photons: data.photons.len(), queries: data.queries.len() },
+        size: WorkSize { photons: data.photons.len(), queries: data.queries.len() },
         build_seconds: median(build),
         build_seconds_on_two: median(build_on_two),
         bytes,
-        singly,
-        together,
+        single,
+        batched,
     };
     let theirs = rivals.iter().zip(rival_builds).zip(speeds).map(|((rival, builds), speeds)| RivalReport {
         name: rival.name(),
@@ -183,30 +181,30 @@ pub fn run_beside(
     Ok((report, theirs.collect()))
 }
 
-/// Two threads.
-struct Two(ThreadPool);
+/// Pool of two threads.
+struct TwoThreads(ThreadPool);
 
-impl Two {
+impl TwoThreads {
     fn new() -> Result<Self, BenchError> {
         let pool = ThreadPoolBuilder::new().num_threads(2).build();
         pool.map(Self).map_err(|error| BenchError::Rival(format!("no threads: {error}")))
     }
 }
 
-impl ForkJoin for Two {
+impl ForkJoin for TwoThreads {
     fn join(&self, a: impl FnOnce() + Send, b: impl FnOnce() + Send) {
         rayon::join(a, b);
     }
 }
 
-/// What `work` gives, and how long it takes.
+/// Seconds and result of `work`.
 fn seconds<T>(work: impl FnOnce() -> Result<T, BenchError>) -> Result<(f64, T), BenchError> {
     let start = Instant::now();
     let result = black_box(work()?);
     Ok((start.elapsed().as_secs_f64(), result))
 }
 
-/// Runs a task by each searcher in turn, again and again.
+/// Speeds of all searchers for a task, measured in turn.
 fn measure(searchers: &mut [&mut dyn Searcher], task: Task, data: &Data) -> Result<Vec<Speed>, BenchError> {
     let mut times = vec![Vec::new(); searchers.len()];
     let mut found = vec![0; searchers.len()];
@@ -221,7 +219,7 @@ fn measure(searchers: &mut [&mut dyn Searcher], task: Task, data: &Data) -> Resu
     let speed = |(times, found): (Vec<f64>, u64)| Speed {
         task,
         queries_per_second: queries / median(times),
-        found: found as f64 / queries,
+        photons: found as f64 / queries,
     };
     Ok(times.into_iter().zip(found).map(speed).collect())
 }

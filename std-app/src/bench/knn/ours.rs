@@ -1,4 +1,4 @@
-//! Our photon map as the bench drives it: one search after the other, and all of them at once.
+//! Our photon map: one query per call, and all queries in one call.
 
 use super::{Data, Searcher, Surfel, Task};
 use crate::bench::BenchError;
@@ -10,13 +10,13 @@ use halflight_core::photon::{
 };
 use halflight_core::{Level, Rgb};
 
-/// Photons as a renderer has them when it builds: as records, in the order in which they were shot.
+/// Photons of the renderer, in the order of emission.
 pub(super) fn records(photons: &[Surfel]) -> Vec<Photon> {
-    let record = |surfel: &Surfel| Photon::new(surfel.place, surfel.normal, surfel.normal, Rgb::ONE);
+    let record = |surfel: &Surfel| Photon::new(surfel.position, surfel.normal, surfel.normal, Rgb::ONE);
     photons.iter().map(record).collect()
 }
 
-/// Puts the records into fresh memory and builds the map there.
+/// Builds the map of `records` in new memory.
 pub(super) fn build<'m>(
     records: &[Photon],
     memory: &'m mut Vec<Line>,
@@ -37,20 +37,20 @@ fn lines(footprint: Footprint) -> Result<Vec<Line>, OutOfMemory> {
     Ok(lines)
 }
 
-/// One search after the other, in the order of the queries.
-pub(super) struct Singly<'a> {
+/// One query per call, in the order of the queries.
+pub(super) struct Single<'a> {
     pub map: &'a PhotonMap<'a>,
     pub level: Level,
 }
 
-/// All searches in one call.
-pub(super) struct Together<'a> {
+/// All queries in one call.
+pub(super) struct Batched<'a> {
     pub map: &'a PhotonMap<'a>,
     pub level: Level,
 }
 
 fn disc(query: &Surfel, radius: f32) -> QueryDisc {
-    QueryDisc { place: query.place, normal: query.normal, radius, kernel: Kernel::Epanechnikov }
+    QueryDisc { place: query.position, normal: query.normal, radius, kernel: Kernel::Epanechnikov }
 }
 
 /// Runs `search` with working memory for `k` neighbours.
@@ -60,13 +60,13 @@ fn with_neighbours<T>(k: usize, search: impl FnOnce(&mut Neighbours) -> T) -> Re
     Ok(search(&mut neighbours))
 }
 
-impl Searcher for Singly<'_> {
+impl Searcher for Single<'_> {
     fn run(&mut self, task: Task, data: &Data) -> Result<u64, BenchError> {
         let mut found = 0;
         match task {
             Task::Nearest { k, radius } => with_neighbours(k, |neighbours| {
                 for query in task.queries(data) {
-                    self.map.nearest(self.level, query.place, radius, neighbours);
+                    self.map.nearest(self.level, query.position, radius, neighbours);
                     found += neighbours.len() as u64;
                 }
             })?,
@@ -81,24 +81,31 @@ impl Searcher for Singly<'_> {
     }
 }
 
-impl Searcher for Together<'_> {
+impl Searcher for Batched<'_> {
     fn run(&mut self, task: Task, data: &Data) -> Result<u64, BenchError> {
         let queries = task.queries(data);
-        let mut turns = vec![QueryOrder::default(); queries.len()];
+        let mut order = vec![QueryOrder::default(); queries.len()];
         let mut found = 0;
         match task {
             Task::Nearest { k, radius } => {
-                let places: Vec<Vec3> = queries.iter().map(|query| query.place).collect();
+                let positions: Vec<Vec3> = queries.iter().map(|query| query.position).collect();
                 with_neighbours(k, |neighbours| {
-                    self.map.nearest_batch(self.level, &places, radius, &mut turns, neighbours, |_, near| {
-                        found += near.len() as u64;
-                    });
+                    self.map.nearest_batch(
+                        self.level,
+                        &positions,
+                        radius,
+                        &mut order,
+                        neighbours,
+                        |_, near| {
+                            found += near.len() as u64;
+                        },
+                    );
                 })?;
             }
             Task::Gather { radius } => {
                 let discs: Vec<QueryDisc> = queries.iter().map(|query| disc(query, radius)).collect();
                 let mut densities = vec![Density::default(); discs.len()];
-                self.map.gather_batch(self.level, &discs, &Uniform(Rgb::ONE), &mut turns, &mut densities);
+                self.map.gather_batch(self.level, &discs, &Uniform(Rgb::ONE), &mut order, &mut densities);
                 found = densities.iter().map(|density| u64::from(density.photons)).sum();
             }
         }

@@ -1,52 +1,52 @@
-//! Results of the measurement.
+//! Results of the photon benchmark.
 
-use super::{Amount, Task};
+use super::{Task, WorkSize};
 use halflight_core::Level;
 
-/// Our numbers.
+/// Result of our photon map.
 #[derive(Clone, Debug)]
 pub struct KnnReport {
-    /// The instruction set of our kernels.
+    /// Instruction set of our kernels.
     pub level: Level,
-    /// How much was searched.
-    pub amount: Amount,
-    /// Seconds to put the photons into memory and build the map there.
+    /// Size of the benchmark.
+    pub size: WorkSize,
+    /// Seconds to copy the photons and build the map.
     pub build_seconds: f64,
-    /// The same on two threads.
+    /// Seconds of the same on two threads.
     pub build_seconds_on_two: f64,
-    /// Bytes of the map, its photons included.
+    /// Bytes of the map with its photons.
     pub bytes: usize,
-    /// One search after the other, one for each of [`Task::ALL`].
-    pub singly: Vec<Speed>,
-    /// All searches in one call.
-    pub together: Vec<Speed>,
+    /// Speeds with one query per call, for each of [`Task::ALL`].
+    pub single: Vec<Speed>,
+    /// Speeds with all queries in one call, for each of [`Task::ALL`].
+    pub batched: Vec<Speed>,
 }
 
-/// The numbers of a rival.
+/// Result of a rival.
 #[derive(Clone, Debug)]
 pub struct RivalReport {
-    /// Its name and version.
+    /// Name and version.
     pub name: String,
-    /// Seconds to build its tree.
+    /// Seconds to build the tree.
     pub build_seconds: f64,
-    /// One for each of [`Task::ALL`].
+    /// Speeds for each of [`Task::ALL`].
     pub speeds: Vec<Speed>,
 }
 
-/// How fast a task is done.
+/// Speed of a task.
 #[derive(Clone, Copy, Debug)]
 pub struct Speed {
-    /// Which.
+    /// Task.
     pub task: Task,
-    /// Searches; NaN where there are none.
+    /// Queries per second, NaN without queries.
     pub queries_per_second: f64,
-    /// Photons found by a search, on average: of a density estimate, those that were weighed.
-    pub found: f64,
+    /// Mean number of photons found by a query.
+    pub photons: f64,
 }
 
 impl KnnReport {
-    /// Bytes of the map for each photon.
+    /// Bytes of the map per photon.
     pub fn bytes_per_photon(&self) -> f64 {
-        self.bytes as f64 / self.amount.photons as f64
+        self.bytes as f64 / self.size.photons as f64
     }
 }

@@ -1,30 +1,30 @@
-//! The photons are where they are said to be, and all ways of searching find the same.
+//! Distribution of the photons, and agreement of single and batched queries.
 
 use super::*;
 
-const FEW: Amount = Amount { photons: 20_000, queries: 400 };
+const FEW: WorkSize = WorkSize { photons: 20_000, queries: 400 };
 
 #[test]
-fn three_tenths_of_the_photons_are_in_the_focus() {
+fn three_tenths_of_the_photons_are_in_the_caustic() {
     let data = Data::new(100_000, 10);
     let near = |surfel: &&Surfel| {
-        surfel.normal == glam::Vec3::Y && surfel.place.distance(glam::Vec3::new(0.7, 0.0, 0.6)) <= 0.05
+        surfel.normal == glam::Vec3::Y && surfel.position.distance(glam::Vec3::new(0.7, 0.0, 0.6)) <= 0.05
     };
-    let share = data.photons.iter().filter(near).count() as f64 / 100_000.0;
-    // 0.3, and 0.7 of the share of the focus in the surfaces, 0.0014; five standard deviations of a count.
-    assert!((share - 0.301).abs() < 0.0075, "{share}");
+    let fraction = data.photons.iter().filter(near).count() as f64 / 100_000.0;
+    // 0.3 plus 0.7 times the fraction 0.0014 of the caustic's area; five standard deviations of a count.
+    assert!((fraction - 0.301).abs() < 0.0075, "{fraction}");
 }
 
 #[test]
-fn all_ways_find_the_same_number_of_photons() {
+fn single_and_batched_queries_find_as_many_photons() {
     let data = Data::new(FEW.photons, FEW.queries);
     let records = ours::records(&data.photons);
     let mut memory = Vec::new();
     let map = ours::build(&records, &mut memory, &Serial).unwrap();
     let level = Level::detect();
     for task in Task::ALL {
-        let found = ours::Singly { map: &map, level }.run(task, &data).unwrap();
-        assert_eq!(ours::Together { map: &map, level }.run(task, &data).unwrap(), found, "{task:?}");
+        let found = ours::Single { map: &map, level }.run(task, &data).unwrap();
+        assert_eq!(ours::Batched { map: &map, level }.run(task, &data).unwrap(), found, "{task:?}");
         if let Task::Nearest { k, radius } = task
             && !radius.is_finite()
         {
@@ -34,11 +34,11 @@ fn all_ways_find_the_same_number_of_photons() {
 }
 
 #[test]
-fn the_report_has_every_task() {
+fn report_has_every_task() {
     let report = run(FEW, Level::BASELINE).unwrap();
-    for speeds in [&report.singly, &report.together] {
+    for speeds in [&report.single, &report.batched] {
         assert_eq!(speeds.len(), Task::ALL.len());
-        assert!(speeds.iter().all(|speed| speed.queries_per_second > 0.0 && speed.found > 0.0));
+        assert!(speeds.iter().all(|speed| speed.queries_per_second > 0.0 && speed.photons > 0.0));
     }
     assert!(report.build_seconds > 0.0 && report.bytes_per_photon() < 24.0);
     assert!(report.build_seconds_on_two > 0.0);

@@ -1,4 +1,4 @@
-//! The rays: what a camera sees, where light bounces from there, and what is in its way nearby.
+//! Rays of the benchmark: camera rays, diffuse bounces and shadow rays.
 
 use halflight_core::Level;
 use halflight_core::bsdf::DiffuseOnly;
@@ -8,32 +8,31 @@ use halflight_core::memory::OutOfMemory;
 use halflight_core::sampling::{Sampler, warp};
 use halflight_core::scene::{Scene, SurfacePoint};
 
-/// Pixels across and down where nothing else is asked for.
+/// Default width and height of the picture.
 pub const SIZE: [u32; 2] = [1024; 2];
 
-/// Pixels of a tile a side.
+/// Side of a tile in pixels.
 const TILE: u32 = 8;
 
-/// The longest shadow ray in diagonals of the scene.
+/// Length of shadow rays in diagonals of the scene.
 const SHADOW_LENGTH: f32 = 0.25;
 
-/// A kind of rays.
+/// Kind of rays.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Class {
-    /// Through the middles of the pixels of a picture, tile by tile; the nearest hit counts.
+    /// Camera rays through pixel centres, tile by tile; nearest hit.
     Primary,
-    /// One from each point that the camera sees, cosine-distributed about the normal, in the order of the
-    /// primary hits; the nearest hit counts.
+    /// One cosine-distributed ray from each primary hit, in the same order; nearest hit.
     Diffuse,
-    /// The same, ending after a quarter of the scene's diagonal; any hit counts.
+    /// Diffuse rays that end after a quarter of the scene's diagonal; any hit.
     Shadow,
 }
 
 impl Class {
-    /// All of them, each made of the hits of the one before or with the same rays.
+    /// All classes.
     pub const ALL: [Class; 3] = [Class::Primary, Class::Diffuse, Class::Shadow];
 
-    /// Its name in reports.
+    /// Name in reports.
     pub const fn name(self) -> &'static str {
         match self {
             Class::Primary => "primary",
@@ -43,7 +42,7 @@ impl Class {
     }
 }
 
-/// Rays of every class.
+/// Rays of all classes.
 pub(super) struct Rays {
     primary: Vec<Ray>,
     diffuse: Vec<Ray>,
@@ -51,10 +50,10 @@ pub(super) struct Rays {
 }
 
 impl Rays {
-    /// The rays of `scene` seen by its camera in a picture of `size`; `bvh` is the scene's.
+    /// Rays of `scene` with the hierarchy `bvh`, for a picture of `size`.
     ///
     /// # Errors
-    /// Memory that the system does not give.
+    /// [`OutOfMemory`] if the system refuses the memory.
     pub(super) fn of(scene: &Scene, bvh: &Bvh, level: Level, size: [u32; 2]) -> Result<Self, OutOfMemory> {
         let count = size[0] as usize * size[1] as usize;
         let mut primary: Vec<Ray> = reserved(count)?;
@@ -62,12 +61,12 @@ impl Rays {
         let mut hits = reserved(count)?;
         hits.resize(count, Hit::NONE);
         bvh.nearest_batch(level, &primary, Coherence::Coherent, &mut hits);
-        let seen = pixels(size).zip(primary.iter().zip(&hits)).filter(|(_, (_, hit))| hit.is_some());
+        let with_hit = pixels(size).zip(primary.iter().zip(&hits)).filter(|(_, (_, hit))| hit.is_some());
         let mut diffuse: Vec<Ray> = reserved(hits.iter().filter(|hit| hit.is_some()).count())?;
-        diffuse.extend(seen.filter_map(|([x, y], (ray, hit))| bounce(scene, ray, hit, y * size[0] + x)));
-        let reach = SHADOW_LENGTH * bvh.bounds().diagonal();
+        diffuse.extend(with_hit.filter_map(|([x, y], (ray, hit))| bounce(scene, ray, hit, y * size[0] + x)));
+        let length = SHADOW_LENGTH * bvh.bounds().diagonal();
         let mut shadow = reserved(diffuse.len())?;
-        shadow.extend(diffuse.iter().map(|ray| Ray { t_max: reach, ..*ray }));
+        shadow.extend(diffuse.iter().map(|ray| Ray { t_max: length, ..*ray }));
         Ok(Self { primary, diffuse, shadow })
     }
 
@@ -80,7 +79,7 @@ impl Rays {
     }
 }
 
-/// Room for so many, where the system has it.
+/// Empty vector with memory for `count` values.
 fn reserved<T>(count: usize) -> Result<Vec<T>, OutOfMemory> {
     let mut empty = Vec::new();
     let needed = count.saturating_mul(size_of::<T>());
@@ -88,7 +87,7 @@ fn reserved<T>(count: usize) -> Result<Vec<T>, OutOfMemory> {
     Ok(empty)
 }
 
-/// All pixels of a picture, tile by tile; tiles at the right and at the bottom are cut.
+/// Pixels of a picture, tile by tile; tiles at the right and bottom borders are cut.
 pub(super) fn pixels([width, height]: [u32; 2]) -> impl Iterator<Item = [u32; 2]> {
     let steps = |side: u32| (0..side).step_by(TILE as usize);
     let tiles = steps(height).flat_map(move |y| steps(width).map(move |x| [x, y]));
@@ -99,11 +98,11 @@ pub(super) fn pixels([width, height]: [u32; 2]) -> impl Iterator<Item = [u32; 2]
 }
 
 fn primary(scene: &Scene, [width, height]: [u32; 2], [x, y]: [u32; 2]) -> Ray {
-    let middle_of_the_lens = [0.5; 2];
-    scene.camera.ray(width, height, x as f32 + 0.5, y as f32 + 0.5, middle_of_the_lens)
+    let lens_centre = [0.5; 2];
+    scene.camera.ray(width, height, x as f32 + 0.5, y as f32 + 0.5, lens_centre)
 }
 
-/// A ray that leaves the surface as paths do.
+/// Cosine-distributed ray from the hit, offset as in path tracing.
 fn bounce(scene: &Scene, ray: &Ray, hit: &Hit, pixel: u32) -> Option<Ray> {
     let point = SurfacePoint::at::<DiffuseOnly>(scene, ray, hit)?;
     let local = warp::cosine_hemisphere(Sampler::new(0, pixel, 0).pair(0));

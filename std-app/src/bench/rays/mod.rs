@@ -1,9 +1,7 @@
-//! Rays per second of building and tracing the hierarchy on one thread: camera rays, diffuse bounces and
-//! shadow rays.
+//! Rays per second on one thread, for camera rays, diffuse bounces and shadow rays, and the time to build the BVH.
 //!
-//! Everything is timed [`REPETITIONS`] times by the wall clock, and the median counts; ours and the rival's
-//! repetitions alternate, so that other load of the machine slows both. Rays come in batches; bringing a batch into
-//! the form that a tracer reads is not timed.
+//! Each library is timed [`REPETITIONS`] times in turn by the wall clock, so other load of the machine affects both;
+//! the median is reported. Rays come in batches. The conversion of a batch to a library's format is not timed.
 
 mod classes;
 mod ours;
@@ -21,47 +19,47 @@ use halflight_core::geometry::Ray;
 use halflight_core::scene::{Mesh, Scene};
 use std::time::Instant;
 
-/// Rays of a batch: what a tile's wavefront may hold, and more than any packet.
+/// Rays per batch: the wavefront of a tile.
 pub const BATCH: usize = 65536;
 
-/// One way of tracing rays.
+/// Function of a library that traces rays.
 pub trait Entry {
-    /// The function of its library.
+    /// Name of the function.
     fn name(&self) -> &'static str;
-    /// Takes over the rays to be traced next. Not timed.
+    /// Converts the next rays; not timed.
     fn load(&mut self, rays: &[Ray]);
-    /// Traces them.
+    /// Traces the rays.
     fn trace(&mut self);
-    /// Rays that met something.
+    /// Number of rays with a hit.
     fn hits(&self) -> usize;
 }
 
-/// Another library's tracer.
+/// Ray tracer of another library.
 pub trait Rival {
-    /// Its name and version.
+    /// Name and version.
     fn name(&self) -> String;
-    /// Builds its hierarchy anew.
+    /// Builds a new hierarchy.
     ///
     /// # Errors
-    /// [`BenchError::Rival`] if it does not take the mesh.
+    /// [`BenchError::Rival`] if it refuses the mesh.
     fn build(&mut self, mesh: &Mesh) -> Result<(), BenchError>;
-    /// All its ways of tracing rays of `class`.
+    /// All functions for rays of `class`.
     fn entries(&self, class: Class) -> Vec<Box<dyn Entry + '_>>;
 }
 
-/// Measures `scene` from its camera, in a picture of `size` (pixels across and down), with the kernels of `level`.
+/// Measures `scene` from its camera with the kernels of `level`; `size` is the picture's width and height.
 ///
 /// # Errors
-/// [`BenchError`] where memory is missing.
+/// [`BenchError`] without memory.
 pub fn run(scene: &Scene, level: Level, size: [u32; 2]) -> Result<RaysReport, BenchError> {
-    Ok(run_beside(scene, level, size, None)?.0)
+    Ok(run_with_rival(scene, level, size, None)?.0)
 }
 
-/// [`run`] with a rival whose repetitions alternate with ours.
+/// [`run`] with a rival, measured in turn.
 ///
 /// # Errors
-/// [`BenchError`] where memory is missing or the rival refuses.
-pub fn run_beside(
+/// [`BenchError`] without memory, or if the rival refuses the mesh.
+pub fn run_with_rival(
     scene: &Scene,
     level: Level,
     size: [u32; 2],
@@ -116,22 +114,22 @@ pub fn run_beside(
     Ok((report, theirs))
 }
 
-/// Traces `rays` by each entry in turn, again and again.
+/// Speeds of all entries for `rays`, measured in turn.
 fn measure(entries: &mut [Box<dyn Entry + '_>], rays: &[Ray]) -> Vec<RivalClass> {
     let mut seconds = vec![Vec::new(); entries.len()];
     let mut hits = vec![0; entries.len()];
     for _ in 0..REPETITIONS {
         for (i, entry) in entries.iter_mut().enumerate() {
-            let (mut sum, mut met) = (0.0, 0);
+            let (mut sum, mut batch_hits) = (0.0, 0);
             for batch in rays.chunks(BATCH) {
                 entry.load(batch);
                 let start = Instant::now();
                 entry.trace();
                 sum += start.elapsed().as_secs_f64();
-                met += entry.hits();
+                batch_hits += entry.hits();
             }
             seconds[i].push(sum);
-            hits[i] = met;
+            hits[i] = batch_hits;
         }
     }
     let mut measured = Vec::new();

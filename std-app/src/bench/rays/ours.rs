@@ -1,4 +1,4 @@
-//! Our tracer as the bench drives it.
+//! Our ray tracer in the benchmark.
 
 use super::{BATCH, BenchError, Class, Entry};
 use crate::pages::Pages;
@@ -8,8 +8,7 @@ use halflight_core::geometry::{Hit, Ray};
 use halflight_core::memory::Arena;
 use halflight_core::scene::Mesh;
 
-/// The hierarchy as a render keeps it: built in fresh memory, copied to `kept`, the memory of the build
-/// given back.
+/// BVH as in a render: built in new memory, copied to `kept`; the memory of the build is freed.
 pub(super) fn build<'m>(mesh: &Mesh, level: Level, kept: &'m mut Pages) -> Result<Bvh<'m>, BenchError> {
     let mut working = Pages::new(Bvh::footprint(mesh.triangles.len()))?;
     let mut arena = Arena::new(bytemuck::cast_slice_mut(&mut working));
@@ -18,7 +17,7 @@ pub(super) fn build<'m>(mesh: &Mesh, level: Level, kept: &'m mut Pages) -> Resul
     Ok(built.copied(&mut Arena::new(bytemuck::cast_slice_mut(kept)))?)
 }
 
-/// Our way of tracing rays of `class`.
+/// Our function for rays of `class`.
 pub(super) fn entry<'a>(bvh: &'a Bvh<'a>, level: Level, class: Class) -> Box<dyn Entry + 'a> {
     let rays = Vec::with_capacity(BATCH);
     match class {
@@ -28,7 +27,7 @@ pub(super) fn entry<'a>(bvh: &'a Bvh<'a>, level: Level, class: Class) -> Box<dyn
         Class::Diffuse => {
             Box::new(Nearest { bvh, level, coherence: Coherence::Incoherent, rays, hits: Vec::new() })
         }
-        Class::Shadow => Box::new(Occluded { bvh, level, rays, hidden: Vec::new() }),
+        Class::Shadow => Box::new(Occluded { bvh, level, rays, occluded: Vec::new() }),
     }
 }
 
@@ -65,7 +64,7 @@ struct Occluded<'a> {
     bvh: &'a Bvh<'a>,
     level: Level,
     rays: Vec<Ray>,
-    hidden: Vec<u8>,
+    occluded: Vec<u8>,
 }
 
 impl Entry for Occluded<'_> {
@@ -76,15 +75,15 @@ impl Entry for Occluded<'_> {
     fn load(&mut self, rays: &[Ray]) {
         self.rays.clear();
         self.rays.extend_from_slice(rays);
-        self.hidden.clear();
-        self.hidden.resize(rays.len(), 0);
+        self.occluded.clear();
+        self.occluded.resize(rays.len(), 0);
     }
 
     fn trace(&mut self) {
-        self.bvh.occluded_batch(self.level, &self.rays, &mut self.hidden);
+        self.bvh.occluded_batch(self.level, &self.rays, &mut self.occluded);
     }
 
     fn hits(&self) -> usize {
-        self.hidden.iter().filter(|&&hidden| hidden != 0).count()
+        self.occluded.iter().filter(|&&occluded| occluded != 0).count()
     }
 }

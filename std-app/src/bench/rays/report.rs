@@ -1,62 +1,62 @@
-//! Results of the measurement.
+//! Results of the ray benchmark.
 
 use super::Class;
 use halflight_core::Level;
 
-/// Our numbers.
+/// Result of our ray tracer.
 #[derive(Clone, Debug)]
 pub struct RaysReport {
-    /// The instruction set of our kernels.
+    /// Instruction set of our kernels.
     pub level: Level,
-    /// Pixels across and down: one camera ray for each.
+    /// Width and height of the picture, with one camera ray per pixel.
     pub size: [u32; 2],
     /// Triangles of the scene.
     pub triangles: usize,
-    /// Seconds to build the hierarchy, the memory for it included.
+    /// Seconds to allocate memory and build the BVH.
     pub build_seconds: f64,
-    /// Bytes that the hierarchy keeps, its copy of the triangles included.
+    /// Bytes of the BVH with its copy of the triangles.
     pub bytes: usize,
-    /// One for each of [`Class::ALL`].
+    /// Results for each of [`Class::ALL`].
     pub classes: Vec<ClassReport>,
 }
 
-/// Rays of one class, traced by us.
+/// Result of our ray tracer for one class.
 #[derive(Clone, Debug)]
 pub struct ClassReport {
-    /// Which.
+    /// Class.
     pub class: Class,
-    /// How many there are.
+    /// Number of rays.
     pub rays: usize,
-    /// How many met something.
+    /// Number of rays with a hit.
     pub hits: usize,
-    /// Millions of rays per second; NaN where there are none.
+    /// Millions of rays per second, NaN without rays.
     pub mrays_per_second: f64,
 }
 
-/// The rival's numbers.
+/// Result of a rival.
 #[derive(Clone, Debug)]
 pub struct RivalReport {
-    /// Its name and version.
+    /// Name and version.
     pub name: String,
-    /// Seconds to build its best hierarchy.
+    /// Seconds to build the hierarchy.
     pub build_seconds: f64,
-    /// All its ways, for each of [`Class::ALL`].
+    /// Results of all functions, for each of [`Class::ALL`].
     pub classes: Vec<Vec<RivalClass>>,
 }
 
-/// Rays of one class, traced in one way.
+/// Result of one function for one class.
 #[derive(Clone, Debug)]
 pub struct RivalClass {
-    /// The function of the library.
+    /// Name of the function.
     pub entry: &'static str,
-    /// How many rays met something.
+    /// Number of rays with a hit.
     pub hits: usize,
-    /// Millions of rays per second; NaN where there are none.
+    /// Millions of rays per second, NaN without rays.
     pub mrays_per_second: f64,
 }
 
 impl RaysReport {
-    /// Bytes that the hierarchy keeps for each triangle.
+    /// Bytes of the BVH per triangle.
     pub fn bytes_per_triangle(&self) -> f64 {
         self.bytes as f64 / self.triangles as f64
     }

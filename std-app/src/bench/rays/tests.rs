@@ -1,4 +1,4 @@
-//! The rays are those of their class.
+//! Properties of the rays of each class.
 
 use super::*;
 use crate::load::{LoadOptions, load};
@@ -6,8 +6,8 @@ use crate::pages::Pages;
 use halflight_core::Level;
 use halflight_core::scene::Camera;
 
-/// Checks of the repository's own Cornell box, seen as it was measured.
-fn in_the_box(check: impl FnOnce(&Scene, &halflight_core::bvh::Bvh)) {
+/// Runs `check` on the Cornell box of the repository.
+fn in_cornell_box(check: impl FnOnce(&Scene, &halflight_core::bvh::Bvh)) {
     let file = concat!(env!("CARGO_MANIFEST_DIR"), "/../scenes/cornell/cornell.obj");
     let loaded = load(file.as_ref(), &LoadOptions::default()).unwrap();
     let views = loaded.views();
@@ -19,8 +19,8 @@ fn in_the_box(check: impl FnOnce(&Scene, &halflight_core::bvh::Bvh)) {
 }
 
 #[test]
-fn bounces_leave_the_surface_cosine_distributed() {
-    in_the_box(|scene, bvh| {
+fn diffuse_rays_are_cosine_distributed() {
+    in_cornell_box(|scene, bvh| {
         let level = Level::detect();
         let rays = Rays::of(scene, bvh, level, SIZE).unwrap();
         let [primary, diffuse, shadow] = Class::ALL.map(|class| rays.of_class(class));
@@ -38,7 +38,10 @@ fn bounces_leave_the_surface_cosine_distributed() {
             cosines += f64::from(cosine);
             count += 1;
             if count % 101 == 0 {
-                assert!(bvh.nearest(level, bounce).triangle != hit.triangle, "it meets where it left");
+                assert!(
+                    bvh.nearest(level, bounce).triangle != hit.triangle,
+                    "a ray hits the triangle that it leaves"
+                );
             }
         }
         assert!(bounces.next().is_none());
@@ -51,11 +54,11 @@ fn bounces_leave_the_surface_cosine_distributed() {
 }
 
 #[test]
-fn tiles_cover_the_picture() {
+fn tiles_cover_every_pixel_once() {
     for size in [SIZE, [8, 8], [13, 9], [1, 20], [20, 1]] {
-        let mut seen = vec![0; (size[0] * size[1]) as usize];
-        classes::pixels(size).for_each(|[x, y]| seen[(y * size[0] + x) as usize] += 1);
-        assert!(seen.iter().all(|&times| times == 1), "{size:?}");
+        let mut visits = vec![0; (size[0] * size[1]) as usize];
+        classes::pixels(size).for_each(|[x, y]| visits[(y * size[0] + x) as usize] += 1);
+        assert!(visits.iter().all(|&count| count == 1), "{size:?}");
     }
     assert_eq!(classes::pixels(SIZE).nth(64 + 9), Some([9, 1]));
     assert_eq!(classes::pixels([13, 9]).nth(64 + 5), Some([8, 1]), "the second tile has five columns");

@@ -2,7 +2,7 @@
 
 use crate::{level, row, tier};
 use halflight::bench::REPETITIONS;
-use halflight::bench::eigen::{BATCH, Entry, Speeds, run_beside};
+use halflight::bench::eigen::{BATCH, Entry, Speeds, run_with_rival};
 use halflight_simd::Tier;
 
 #[derive(clap::Args)]
@@ -17,7 +17,7 @@ impl Eigen {
         let mut rival: Option<Box<dyn Entry>> = None;
         #[cfg(feature = "nalgebra")]
         rival.replace(Box::new(crate::nalgebra::Nalgebra::default()));
-        let (ours, theirs) = run_beside(level(self.simd), rival.as_deref_mut().map(|rival| rival as _));
+        let (ours, theirs) = run_with_rival(level(self.simd), rival.as_deref_mut().map(|rival| rival as _));
         let millions =
             |speeds: &Speeds| [speeds.sym2, speeds.sym3].map(|speed| format!("{:.1}", 1e-6 * speed));
         let level = ours.level.name();

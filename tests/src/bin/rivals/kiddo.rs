@@ -27,7 +27,7 @@ impl Searcher for Tree {
     fn run(&mut self, task: Task, data: &Data) -> Result<u64, BenchError> {
         let mut found = 0;
         for query in task.queries(data) {
-            let place = query.place.to_array();
+            let place = query.position.to_array();
             let query = self.0.query(&place);
             found += match task {
                 Task::Nearest { k, radius } => {

@@ -1,17 +1,17 @@
 //! Searches of the photon map per second.
 
 use crate::{level, row, tier};
-use halflight::bench::knn::{Amount, Data, KnnReport, Rival, RivalReport, Speed, run_beside};
+use halflight::bench::knn::{Data, KnnReport, Rival, RivalReport, Speed, WorkSize, run_with_rivals};
 use halflight::bench::{BenchError, REPETITIONS};
 use halflight_simd::{Level, Tier};
 
 #[derive(clap::Args)]
 pub(crate) struct Knn {
     /// Photons in the map
-    #[arg(long, value_name = "N", default_value_t = Amount::FULL.photons)]
+    #[arg(long, value_name = "N", default_value_t = WorkSize::FULL.photons)]
     photons: usize,
     /// Searches for the nearest photons; of density estimates a tenth of them
-    #[arg(long, value_name = "N", default_value_t = Amount::FULL.queries)]
+    #[arg(long, value_name = "N", default_value_t = WorkSize::FULL.queries)]
     queries: usize,
     /// Highest instruction set of our kernels: baseline, avx2 or avx512 [default: the processor's]
     #[arg(long, value_name = "LEVEL", value_parser = tier)]
@@ -22,14 +22,14 @@ type Measured = (KnnReport, Vec<RivalReport>);
 
 fn measure(data: &Data, level: Level) -> Result<Measured, BenchError> {
     #[cfg(any(feature = "kiddo", feature = "nanoflann"))]
-    let points: Vec<[f32; 3]> = data.photons.iter().map(|surfel| surfel.place.to_array()).collect();
+    let points: Vec<[f32; 3]> = data.photons.iter().map(|surfel| surfel.position.to_array()).collect();
     let rivals: &[&dyn Rival] = &[
         #[cfg(feature = "kiddo")]
         &crate::kiddo::Kiddo(&points),
         #[cfg(feature = "nanoflann")]
         &crate::nanoflann::Nanoflann(&points),
     ];
-    run_beside(data, level, rivals)
+    run_with_rivals(data, level, rivals)
 }
 
 impl Knn {
@@ -56,9 +56,9 @@ impl Knn {
             heads.extend([&rival.name, "ratio", "in batches"].map(String::from));
         }
         lines.push(row("", heads));
-        for (i, (one, all)) in ours.singly.iter().zip(&ours.together).enumerate() {
+        for (i, (one, all)) in ours.single.iter().zip(&ours.batched).enumerate() {
             let thousands = |speed: &Speed| format!("{:.1}", 1e-3 * speed.queries_per_second);
-            let mut cells = vec![format!("{:.1}", one.found), thousands(one), thousands(all)];
+            let mut cells = vec![format!("{:.1}", one.photons), thousands(one), thousands(all)];
             for theirs in rivals.iter().filter_map(|rival| rival.speeds.get(i)) {
                 let ratio =
                     |ours: &Speed| format!("{:.2}", ours.queries_per_second / theirs.queries_per_second);
@@ -81,9 +81,9 @@ mod tests {
         let expected = usize::from(cfg!(feature = "kiddo")) + usize::from(cfg!(feature = "nanoflann"));
         assert_eq!(rivals.len(), expected);
         for rival in &rivals {
-            for (ours, theirs) in ours.singly.iter().zip(&rival.speeds) {
+            for (ours, theirs) in ours.single.iter().zip(&rival.speeds) {
                 if let Task::Nearest { .. } = ours.task {
-                    assert_eq!(theirs.found, ours.found, "{} {:?}", rival.name, ours.task);
+                    assert_eq!(theirs.photons, ours.photons, "{} {:?}", rival.name, ours.task);
                 }
             }
         }

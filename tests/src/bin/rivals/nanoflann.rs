@@ -23,8 +23,8 @@ impl Rival for Nanoflann<'_> {
 impl Searcher for Built<'_> {
     fn run(&mut self, task: Task, data: &Data) -> Result<u64, BenchError> {
         let search = |query: &Surfel| match task {
-            Task::Nearest { k, radius } => self.0.nearest(query.place.to_array(), k, radius * radius),
-            Task::Gather { radius } => self.0.within(query.place.to_array(), radius * radius),
+            Task::Nearest { k, radius } => self.0.nearest(query.position.to_array(), k, radius * radius),
+            Task::Gather { radius } => self.0.within(query.position.to_array(), radius * radius),
         };
         Ok(task.queries(data).iter().map(search).sum::<usize>() as u64)
     }

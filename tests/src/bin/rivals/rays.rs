@@ -2,7 +2,7 @@
 
 use crate::{level, row, tier};
 use core::error::Error;
-use halflight::bench::rays::{RaysReport, Rival, RivalClass, RivalReport, SIZE, run_beside};
+use halflight::bench::rays::{RaysReport, Rival, RivalClass, RivalReport, SIZE, run_with_rival};
 use halflight::bench::{BenchError, REPETITIONS};
 use halflight::load::{LoadOptions, LoadedScene, View, load};
 use halflight_core::scene::{Camera, Scene};
@@ -44,7 +44,7 @@ fn measure(scene: &Scene, level: Level, side: u32) -> Result<Measured, BenchErro
     let mut rival: Option<Box<dyn Rival>> = None;
     #[cfg(feature = "embree")]
     rival.replace(Box::new(crate::embree::Embree::new()?));
-    run_beside(scene, level, [side; 2], rival.as_deref_mut().map(|rival| rival as _))
+    run_with_rival(scene, level, [side; 2], rival.as_deref_mut().map(|rival| rival as _))
 }
 
 impl Rays {
