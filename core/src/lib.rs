@@ -6,6 +6,7 @@
 //! The modules are layers: each imports only those above it in this list, which `cargo verify source`
 //! enforces.
 //!
+//! - [`findings`]: decisions and numbers of a method, for reports.
 //! - [`memory`], [`geometry`], [`sampling`]: arenas, vectors and rays, random numbers and their warps.
 //! - [`scene`]: borrowed views of the meshes, materials, textures, lights and the camera to render.
 //! - [`bsdf`]: scattering at a point. [`bvh`]: ray tracing. [`light`]: sampling of all lights together.
@@ -26,6 +27,7 @@ pub mod census;
 pub mod estimate;
 mod features;
 pub mod film;
+pub mod findings;
 pub mod geometry;
 pub mod light;
 pub mod memory;

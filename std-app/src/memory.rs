@@ -1,7 +1,7 @@
 //! The memory budget: a limit that holds from the first byte read. Every reader states its memory before it
 //! allocates.
 
-use crate::report::words::readable_bytes;
+use crate::report::quantity::readable_bytes;
 use std::fs::File;
 use std::io::{self, Read};
 use std::path::Path;

@@ -1,4 +1,4 @@
-//! `halflight compare`: two picture files, their errors, and a picture of the difference.
+//! `halflight compare`: errors of a picture against a reference, and pictures of the difference.
 
 use super::failure::Failure;
 use super::outputs::{Outputs, Role};
@@ -14,21 +14,19 @@ use std::process::ExitCode;
 
 /// Compare a picture with a reference: relMSE, MSE, RMSE and FLIP
 ///
-/// relMSE is the mean over pixels and channels of (A - B)^2 / (B^2 + 0.01 m^2), m the mean of B. It, MSE
-/// and RMSE are taken in linear light (PNGs go back through the sRGB curve). FLIP is LDR-FLIP (Andersson et
-/// al. 2020) of the pictures as a PNG shows them, at 67 pixels per degree. Pixels that are infinite or not
-/// a number are left out of the linear errors, and counted.
+/// relMSE is the mean over pixels and channels of (A - B)^2 / (B^2 + 0.01 m^2), with the mean m of B. relMSE, MSE and
+/// RMSE are errors of linear radiance; PNG and JPEG are decoded from sRGB. FLIP is the LDR-FLIP error (Andersson et al.
+/// 2020) of the sRGB pictures at 67 pixels per degree. Infinite and NaN pixels are left out of the linear errors.
 #[derive(Args)]
 pub(super) struct Compare {
-    /// The picture, of any format that is read: EXR, HDR, PFM, PNG, JPEG, TIFF, WebP, BMP, TGA
+    /// Picture: EXR, HDR, PFM, PNG, JPEG, TIFF, WebP, BMP or TGA
     a: PathBuf,
-    /// The reference, likewise
+    /// Reference, in the same formats
     b: PathBuf,
-    /// Also write a picture of the difference: its values, or, as .png, in false colours; may be given
-    /// several times
+    /// Picture of the difference: values in linear formats, false colours in .png; may be repeated
     #[arg(short, long, value_name = "FILE")]
     output: Vec<PathBuf>,
-    /// What it shows [default: flip as .png, absolute in the linear formats]
+    /// Kind of the difference [default: flip for .png, otherwise absolute]
     #[arg(long, requires = "output")]
     difference: Option<Difference>,
     /// Print one JSON object instead of text
@@ -38,14 +36,34 @@ pub(super) struct Compare {
 
 #[derive(Clone, Copy, ValueEnum)]
 enum Difference {
-    /// A - B; as .png blue where A is too dark, red where it is too bright
+    /// A - B; as .png blue is too dark, red is too bright
     Signed,
     /// |A - B|
     Absolute,
     /// (A - B) / sqrt(B^2 + 0.01 m^2), whose mean square is the relMSE
     Relative,
-    /// The FLIP error of each pixel
+    /// FLIP error of each pixel
     Flip,
+}
+
+impl Difference {
+    const fn shown(self) -> Shown {
+        match self {
+            Difference::Signed => Shown::Signed,
+            Difference::Absolute => Shown::Absolute,
+            Difference::Relative => Shown::Relative,
+            Difference::Flip => Shown::Flip,
+        }
+    }
+
+    const fn name(self) -> &'static str {
+        match self {
+            Difference::Signed => "signed",
+            Difference::Absolute => "absolute",
+            Difference::Relative => "relative",
+            Difference::Flip => "flip",
+        }
+    }
 }
 
 impl Compare {
@@ -53,7 +71,7 @@ impl Compare {
         let mut outputs = Outputs::new(self.json);
         let plan = self.output.iter().map(|file| self.plan(file, &mut outputs));
         let plan = plan.collect::<Result<Vec<_>, _>>()?;
-        [&self.a, &self.b].into_iter().try_for_each(|picture| outputs.spare(picture))?;
+        [&self.a, &self.b].into_iter().try_for_each(|picture| outputs.protect(picture))?;
         let mut budget = Budget::new(None);
         let (a, b) = (read_picture(&self.a, &mut budget)?, read_picture(&self.b, &mut budget)?);
         budget.has(working_bytes(&b)).map_err(|why| {
@@ -64,7 +82,8 @@ impl Compare {
                 .advice("render both with the same --size; nothing is resampled")
         })?;
         let mut saved = Vec::new();
-        for (file, shown) in plan {
+        for (file, difference) in plan {
+            let shown = difference.shown();
             let values = comparison.values(&a, &b, shown);
             let (picture, scale) = if Format::of(file)?.is_linear() {
                 (values, None)
@@ -73,82 +92,73 @@ impl Compare {
                 (colours, Some([if shown.is_signed() { -end } else { 0.0 }, end]))
             };
             if outputs.save(file, &picture) {
-                saved.push(Saved { file, shown, scale });
+                saved.push(Saved { file, difference, scale });
             }
         }
-        let results =
-            if self.json { told(&comparison, &saved).to_string() } else { page(&comparison, &saved) };
+        let results = if self.json {
+            let mut object = comparison_object(&comparison);
+            object["outputs"] = saved.iter().map(Saved::object).collect();
+            object.to_string()
+        } else {
+            let lines = saved.iter().map(Saved::text);
+            [text(&comparison)].into_iter().chain(lines).collect::<Vec<_>>().join("\n")
+        };
         Ok(outputs.end(&results, ExitCode::SUCCESS))
     }
 
-    /// What `file` is going to show, where that can be written.
-    fn plan<'a>(&self, file: &'a PathBuf, outputs: &mut Outputs) -> Result<(&'a PathBuf, Shown), Failure> {
+    /// Plans the output `file`, and determines its kind of difference.
+    fn plan<'a>(
+        &self,
+        file: &'a PathBuf,
+        outputs: &mut Outputs,
+    ) -> Result<(&'a PathBuf, Difference), Failure> {
         outputs.plan(Role::Picture, file)?;
         let format = Format::of(file)?;
-        let shown = match self.difference {
-            Some(Difference::Signed) => Shown::Signed,
-            Some(Difference::Absolute) => Shown::Absolute,
-            Some(Difference::Relative) => Shown::Relative,
-            Some(Difference::Flip) => Shown::Flip,
-            None if format.is_linear() => Shown::Absolute,
-            None => Shown::Flip,
-        };
-        if format == Format::Hdr && shown.is_signed() {
+        let default = if format.is_linear() { Difference::Absolute } else { Difference::Flip };
+        let difference = self.difference.unwrap_or(default);
+        if format == Format::Hdr && difference.shown().is_signed() {
             return Err(Failure::new(format!("{}: .hdr holds no values below zero", file.display()))
                 .advice("write a signed difference as .exr, .pfm or .png"));
         }
-        Ok((file, shown))
+        Ok((file, difference))
     }
 }
 
-/// A picture of the difference that was written.
+/// Picture of the difference that was written.
 struct Saved<'a> {
     file: &'a PathBuf,
-    shown: Shown,
-    /// The values of the first and the last of its false colours.
+    difference: Difference,
+    /// Values of the first and the last false colour.
     scale: Option<[f32; 2]>,
 }
 
 impl Saved<'_> {
-    fn name(&self) -> &'static str {
-        match self.shown {
-            Shown::Signed => "signed",
-            Shown::Absolute => "absolute",
-            Shown::Relative => "relative",
-            Shown::Flip => "flip",
-        }
+    fn object(&self) -> Value {
+        json!({ "file": self.file, "difference": self.difference.name(), "scale": self.scale })
+    }
+
+    fn text(&self) -> String {
+        let scale = self.scale.map(|[from, to]| format!(", colours from {from:.3e} to {to:.3e}"));
+        let (file, name) = (self.file.display(), self.difference.name());
+        format!("saved  {file}: {name} difference{}", scale.unwrap_or_default())
     }
 }
 
-fn told(comparison: &Comparison, saved: &[Saved]) -> Value {
-    let mut object = comparison_object(comparison);
-    let outputs = saved
-        .iter()
-        .map(|saved| json!({ "file": saved.file, "difference": saved.name(), "scale": saved.scale }));
-    object["outputs"] = outputs.collect();
-    object
-}
-
-fn page(comparison: &Comparison, saved: &[Saved]) -> String {
-    saved.iter().fold(text(comparison), |text, saved| {
-        let scale = saved.scale.map(|[from, to]| format!(", colours from {from:.3e} to {to:.3e}"));
-        let scale = scale.unwrap_or_default();
-        format!("{text}\nsaved  {}: {} difference{scale}", saved.file.display(), saved.name())
-    })
-}
-
-/// The lines for a person.
+/// Lines of a comparison.
 pub(super) fn text(comparison: &Comparison) -> String {
     let linear = &comparison.linear;
+    let ratio = match linear.reference_mean {
+        0.0 => String::new(),
+        reference => format!(" ({:+.3} %)", (linear.mean / reference - 1.0) * 100.0),
+    };
     let mut text = format!(
-        "relMSE {:.6e}\nMSE    {:.6e}\nRMSE   {:.6e}\nFLIP   {:.6}\nmean   {:.6} against {:.6}{}",
+        "relMSE {:.6e}\nMSE    {:.6e}\nRMSE   {:.6e}\nFLIP   {:.6}\nmean   {:.6} against {:.6}{ratio}",
         linear.relmse,
         linear.mse,
         linear.rmse(),
         comparison.flip,
         linear.mean,
         linear.reference_mean,
-        ratio(linear.mean, linear.reference_mean),
     );
     for (count, which) in [(linear.non_finite, "picture"), (linear.reference_non_finite, "reference")] {
         if count > 0 {
@@ -156,8 +166,4 @@ pub(super) fn text(comparison: &Comparison) -> String {
         }
     }
     text
-}
-
-fn ratio(mean: f64, reference: f64) -> String {
-    if reference == 0.0 { String::new() } else { format!(" ({:+.3} %)", (mean / reference - 1.0) * 100.0) }
 }

@@ -1,9 +1,8 @@
-//! How a command ends when it cannot do what was asked: one block of text that names the file, the reason
-//! and, where there is one, the way out.
+//! Failure of a command: one message with the file, the reason and advice.
 
 use core::fmt;
 
-/// Bad input or usage: exit code 2.
+/// Bad input or usage, exit code 2.
 #[derive(Debug)]
 pub(super) struct Failure {
     reason: String,
@@ -15,7 +14,7 @@ impl Failure {
         Self { reason: reason.to_string(), advice: None }
     }
 
-    /// What to do about it.
+    /// The failure with advice for the user.
     pub(super) fn advice(self, advice: impl fmt::Display) -> Self {
         Self { advice: Some(advice.to_string()), ..self }
     }

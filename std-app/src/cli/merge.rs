@@ -1,8 +1,8 @@
-//! `halflight merge`: the films of shards, put together to a picture.
+//! `halflight merge`: a picture from the films of all shards.
 
 use super::failure::Failure;
 use super::outputs::{Outputs, Role};
-use super::{ledger, summary};
+use super::{dropped, summary};
 use clap::Args;
 use halflight::drive::{self, Merged};
 use halflight::report::{dropped_object, error_object};
@@ -12,14 +12,14 @@ use std::process::ExitCode;
 
 /// Merge the films of all shards of a picture
 ///
-/// The films are those of `halflight render --shard I/N --checkpoint FILE`, in any order. The picture has the same
-/// bits as one render. Films of other scenes, settings or numbers of samples are refused.
+/// The films come from `halflight render --shard I/N --checkpoint FILE`, in any order. The picture has the bits of
+/// one render. Films of different scenes, settings or numbers of samples are refused.
 #[derive(Args)]
 pub(super) struct Merge {
-    /// The films: one of each shard
+    /// Films, one of each shard
     #[arg(required = true)]
     films: Vec<PathBuf>,
-    /// Where the picture goes (.png, .exr, .hdr or .pfm); may be given several times
+    /// Picture: .png, .exr, .hdr or .pfm; may be repeated
     #[arg(short, long, value_name = "FILE", required = true)]
     output: Vec<PathBuf>,
     /// Print one JSON object instead of text
@@ -31,11 +31,11 @@ impl Merge {
     pub(super) fn run(&self) -> Result<ExitCode, Failure> {
         let mut outputs = Outputs::new(self.json);
         self.output.iter().try_for_each(|output| outputs.plan(Role::Picture, output))?;
-        self.films.iter().try_for_each(|film| outputs.spare(film))?;
+        self.films.iter().try_for_each(|film| outputs.protect(film))?;
         let merged = drive::merge(&self.films)?;
         let saved = outputs.save_to(&self.output, &merged.image);
         let results =
-            if self.json { self.object(&merged, &saved).to_string() } else { self.text(&merged, &saved) };
+            if self.json { self.object(&merged, &saved).to_string() } else { text(&merged, &saved) };
         Ok(outputs.end(&results, ExitCode::SUCCESS))
     }
 
@@ -57,16 +57,16 @@ impl Merge {
             "outputs": saved,
         })
     }
+}
 
-    fn text(&self, merged: &Merged, saved: &[&PathBuf]) -> String {
-        let mut lines: Vec<_> = saved.iter().map(|output| format!("saved  {}", output.display())).collect();
-        let (width, height) = (merged.image.width, merged.image.height);
-        lines.push(format!("image  {width}x{height}, {} samples per pixel", merged.spp));
-        match &merged.audit {
-            Some(audit) => lines.extend(summary::audited(audit)),
-            None => lines.extend(summary::estimate(merged.error, merged.blurred, merged.is_biased)),
-        }
-        lines.extend(ledger::text(&merged.counters, &merged.places, merged.empty_pixels));
-        lines.join("\n")
+fn text(merged: &Merged, saved: &[&PathBuf]) -> String {
+    let mut lines: Vec<_> = saved.iter().map(|output| format!("saved  {}", output.display())).collect();
+    let (width, height) = (merged.image.width, merged.image.height);
+    lines.push(format!("image  {width}x{height}, {} samples per pixel", merged.spp));
+    match &merged.audit {
+        Some(audit) => lines.extend(summary::audited(audit)),
+        None => lines.extend(summary::estimate(merged.error, merged.blurred, merged.is_biased)),
     }
+    lines.extend(dropped::text(&merged.counters, &merged.places, merged.empty_pixels));
+    lines.join("\n")
 }

@@ -1,25 +1,25 @@
-//! The command line: what was asked for, who does it, and how it ends.
+//! Command line: commands, their exit codes and internal errors.
 
 mod bench;
+mod camera_args;
 mod compare;
+mod dropped;
 mod failure;
 mod info;
 mod interrupt;
-mod ledger;
 mod merge;
-mod method;
+mod method_args;
 mod outputs;
+mod picture_args;
 mod progress;
 mod race;
-mod racer;
+mod race_entry;
 mod render;
-mod shot;
 mod stability;
 mod stdio;
 mod study;
 mod summary;
 mod values;
-mod view;
 
 use clap::{Parser, Subcommand};
 use failure::Failure;
@@ -29,9 +29,9 @@ use std::io::{Write, stdout};
 use std::panic;
 use std::path::Path;
 use std::process::ExitCode;
-use stdio::{heard, say, tell, warn};
+use stdio::{check_output, print_message, print_note};
 
-/// Renders scenes, and says how wrong the pictures are.
+/// Renders scenes and estimates the error of the pictures.
 #[derive(Parser)]
 #[command(name = "halflight", version, about, max_term_width = 100, arg_required_else_help = true)]
 struct Cli {
@@ -51,11 +51,10 @@ enum Command {
     Study(study::Study),
 }
 
-/// Runs the program. The exit codes are a contract: 0 done, 2 usage or bad input, 3 stopped early with a
-/// valid picture saved.
+/// Runs the program. Exit codes are a contract (docs/cli.md).
 pub(crate) fn main() -> ExitCode {
-    interrupt::outlive_limits();
-    panic::set_hook(Box::new(|panic| tell(format_args!("halflight met an error of its own: {panic}"))));
+    interrupt::block_file_size_signal();
+    panic::set_hook(Box::new(|panic| print_message(format_args!("internal error of halflight: {panic}"))));
     let command = match Cli::try_parse() {
         Ok(cli) => cli.command,
         Err(message) => return end_with(&message),
@@ -72,26 +71,27 @@ pub(crate) fn main() -> ExitCode {
     }));
     match outcome {
         Ok(Ok(code)) => return code,
-        Ok(Err(failure)) => tell(failure),
-        Err(_) => tell("  help: please report it, with the command and the scene"),
+        Ok(Err(failure)) => print_message(failure),
+        Err(_) => print_message("  help: please report it, with the command and the scene"),
     }
     ExitCode::from(2)
 }
 
-/// The picture in a file, whose pixels `budget` has taken; says what had to be repaired.
+/// Picture in a file, whose pixels count in `budget`. Repairs are printed as notes.
 fn read_picture(path: &Path, budget: &mut Budget) -> Result<Image, Failure> {
     let (image, notes) = save::read_within(path, budget.left())?;
-    notes.iter().for_each(warn);
+    notes.iter().for_each(print_note);
     budget.take(size_of_val(&image.pixels[..]))?;
     Ok(image)
 }
 
-/// Prints clap's own message: help and version are results, wrong usage is none.
+/// Prints help, version or wrong usage, which clap reports alike.
 fn end_with(message: &clap::Error) -> ExitCode {
+    let is_usage = message.use_stderr();
     let printed = message.print().and_then(|()| stdout().flush());
-    match heard(printed).err().filter(|_| !message.use_stderr()) {
-        Some(failure) => tell(failure),
-        None if !message.use_stderr() => return ExitCode::SUCCESS,
+    match check_output(printed).err().filter(|_| !is_usage) {
+        Some(failure) => print_message(failure),
+        None if !is_usage => return ExitCode::SUCCESS,
         None => {}
     }
     ExitCode::from(2)

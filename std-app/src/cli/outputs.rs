@@ -1,10 +1,9 @@
-//! The files that a command writes. Before anything is done they are found writable, and told apart as files, not as
-//! names, from each other and from all that the command reads. In the end each is written, whatever becomes of the
-//! others; then all that failed is said, and the exit code is 2.
+//! Output files of a command. All are checked before the work starts: that they can be written, and that none is
+//! the same file as another output or an input. At the end each is written even if others fail.
 
 use super::failure::Failure;
 use super::interrupt::INTERRUPT;
-use super::stdio::{say, tell};
+use super::stdio::{print_message, print_result};
 use halflight::drive;
 use halflight::report::{self, Files};
 use halflight::save::{self, Destination, Identity, Image, Patience};
@@ -13,65 +12,66 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Instant;
 
-/// The purpose of an output, with the flag that names it.
+/// Purpose of an output.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Role {
-    /// A picture.
+    /// Picture of `-o`.
     Picture,
-    /// A picture that no flag has named.
+    /// Picture without `-o`.
     Default,
-    /// A film that grows.
+    /// Film of `--checkpoint`.
     Checkpoint,
-    /// Irradiance caches.
+    /// Irradiance caches of `--save-cache`.
     Cache,
-    /// A file of a report.
+    /// File of a report.
     Report,
     /// Standard output or standard error.
     Standard,
 }
 
 impl Role {
-    const fn flag(self) -> &'static str {
+    /// Flag or words that name the output in messages.
+    const fn label(self) -> &'static str {
         match self {
             Role::Picture => "-o",
             Role::Default => "the picture, without -o",
             Role::Checkpoint => "--checkpoint",
             Role::Cache => "--save-cache",
             Role::Report => "--report",
-            Role::Standard => "where results and notes go",
+            Role::Standard => "results and notes",
         }
     }
 
     const fn advice(self) -> &'static str {
         match self {
-            Role::Default => "say where the picture goes, as in -o picture.png",
-            Role::Report => "give the report another folder",
-            _ => "give it another name",
+            Role::Default => "name the picture, as in -o picture.png",
+            Role::Report => "choose another folder for the report",
+            _ => "choose another name",
         }
     }
 }
 
-/// A file that is going to be written.
+/// File to be written.
 struct Output {
     role: Role,
     path: PathBuf,
     identity: Identity,
 }
 
-/// The files of a command.
+/// Output files of a command.
 pub(super) struct Outputs {
-    since: Instant,
+    start: Instant,
     planned: Vec<Output>,
     is_json: bool,
-    /// Whether a file is standard output, so that the text for a person is not.
+    /// Whether a file is standard output, so that the summary goes to standard error.
     has_stdout: bool,
-    failed: Vec<Failure>,
+    failures: Vec<Failure>,
 }
 
 impl Outputs {
-    /// None yet, of a command that prints text or, where it `is_json`, an object.
+    /// Outputs of a command that prints text, or an object if `is_json`.
     pub(super) fn new(is_json: bool) -> Self {
-        // `> picture.png` makes a file of them that another one must not replace.
+        // With `> picture.png` standard output is a file that no output may replace.
         let standard = [
             (Identity::of_open(stdout()), "standard output"),
             (Identity::of_open(stderr()), "standard error"),
@@ -79,16 +79,14 @@ impl Outputs {
         let planned = standard.into_iter().filter_map(|(identity, name)| {
             Some(Output { role: Role::Standard, path: name.into(), identity: identity? })
         });
-        Self {
-            since: Instant::now(),
-            planned: planned.collect(),
-            is_json,
-            has_stdout: false,
-            failed: Vec::new(),
-        }
+        let planned = planned.collect();
+        Self { start: Instant::now(), planned, is_json, has_stdout: false, failures: Vec::new() }
     }
 
-    /// One more, of which it is found out whether it can be written.
+    /// Plans an output.
+    ///
+    /// # Errors
+    /// Files that cannot be written or are planned already.
     pub(super) fn plan(&mut self, role: Role, path: &Path) -> Result<(), Failure> {
         match role {
             Role::Picture | Role::Default => save::check_writable(path)?,
@@ -97,9 +95,9 @@ impl Outputs {
         }
         if Destination::of(path).is_ok_and(|destination| destination.is_stdout()) {
             if self.is_json {
-                let what =
-                    format!("{} ({}) and --json both go to standard output", path.display(), role.flag());
-                return Err(Failure::new(what).advice("send one of them elsewhere"));
+                let (path, label) = (path.display(), role.label());
+                return Err(Failure::new(format!("{path} ({label}) and --json both go to standard output"))
+                    .advice("send one of them elsewhere"));
             }
             self.has_stdout = true;
             return Ok(());
@@ -109,9 +107,9 @@ impl Outputs {
             return Err(Failure::new(format!(
                 "{} ({}) is the same file as {} ({}): one would overwrite the other",
                 path.display(),
-                role.flag(),
+                role.label(),
                 other.path.display(),
-                other.role.flag(),
+                other.role.label(),
             ))
             .advice(role.advice()));
         }
@@ -119,43 +117,42 @@ impl Outputs {
         Ok(())
     }
 
-    /// The files of a report in `folder`.
+    /// Plans the files of a report in `folder`.
     pub(super) fn plan_report(&mut self, folder: &Path) -> Result<(), Failure> {
         report::check_folder(folder)?;
         report::report_files(folder).iter().try_for_each(|file| self.plan(Role::Report, file))
     }
 
-    /// Refuses to overwrite `path`, which the command reads.
-    pub(super) fn spare(&self, path: &Path) -> Result<(), Failure> {
-        self.spare_but(path, Role::Standard)
+    /// Refuses outputs that would overwrite the input `path`.
+    pub(super) fn protect(&self, path: &Path) -> Result<(), Failure> {
+        self.protect_except(path, Role::Standard)
     }
 
-    /// The same, of a file that may be continued by the output of `role`.
-    pub(super) fn spare_but(&self, path: &Path, role: Role) -> Result<(), Failure> {
+    /// [`Self::protect`] for an input that the output of `role` may continue.
+    pub(super) fn protect_except(&self, path: &Path, role: Role) -> Result<(), Failure> {
         let Some(identity) = Identity::of(path) else { return Ok(()) };
         let mut written = self.planned.iter().filter(|output| ![role, Role::Standard].contains(&output.role));
         let Some(output) = written.find(|output| output.identity == identity) else { return Ok(()) };
         Err(Failure::new(format!(
-            "{} ({}) would overwrite {}, which is read here: it is the same file",
+            "{} ({}) would overwrite the input {}: both are the same file",
             output.path.display(),
-            output.role.flag(),
+            output.role.label(),
             path.display(),
         ))
         .advice(output.role.advice()))
     }
 
-    /// How long readers of pipes are waited for.
     fn patience(&self) -> Patience<'static> {
-        Patience { since: self.since, interrupt: &INTERRUPT }
+        Patience { since: self.start, interrupt: &INTERRUPT }
     }
 
-    /// Writes a picture; whether it is there.
+    /// Writes a picture; returns whether it was written.
     pub(super) fn save(&mut self, path: &Path, image: &Image) -> bool {
         let saved = save::write_with(path, image, self.patience());
         saved.map_err(|error| self.fail(error)).is_ok()
     }
 
-    /// Writes a picture to all of `paths`, to files before it waits for readers of pipes; where it is.
+    /// Writes a picture to all of `paths`, to files before pipes, whose readers may be slow; returns those written.
     pub(super) fn save_to<'p>(&mut self, paths: &'p [PathBuf], image: &Image) -> Vec<&'p PathBuf> {
         let is_stream =
             |path: &PathBuf| Destination::of(path).is_ok_and(|destination| destination.is_stream());
@@ -166,25 +163,25 @@ impl Outputs {
         order.into_iter().map(|i| &paths[i]).collect()
     }
 
-    /// Writes a report; whether its page is there.
-    pub(super) fn report(&mut self, folder: &Path, files: &Files) -> bool {
+    /// Writes a report; returns whether all of it was written.
+    pub(super) fn save_report(&mut self, folder: &Path, files: &Files) -> bool {
         let failed = report::write_folder(folder, files, self.patience());
         failed.map_err(|errors| errors.into_iter().for_each(|error| self.fail(error))).is_ok()
     }
 
-    /// Something could not be written.
+    /// Records the failure of an output.
     pub(super) fn fail(&mut self, error: impl Into<Failure>) {
-        self.failed.push(error.into());
+        self.failures.push(error.into());
     }
 
-    /// Prints the results, then what failed. `code` is for a command of which nothing did.
+    /// Prints results and failures. Returns `code`, or 2 after a failure.
     pub(super) fn end(mut self, results: &str, code: ExitCode) -> ExitCode {
         if self.has_stdout {
-            tell(results);
-        } else if let Err(failure) = say(results) {
-            self.failed.push(failure);
+            print_message(results);
+        } else if let Err(failure) = print_result(results) {
+            self.failures.push(failure);
         }
-        self.failed.iter().for_each(tell);
-        if self.failed.is_empty() { code } else { ExitCode::from(2) }
+        self.failures.iter().for_each(print_message);
+        if self.failures.is_empty() { code } else { ExitCode::from(2) }
     }
 }

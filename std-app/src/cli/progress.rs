@@ -1,56 +1,52 @@
-//! Progress on stderr: a bar with the time left on a terminal, a plain line every few seconds elsewhere.
+//! Progress on standard error: a bar on a terminal, otherwise a line every five seconds.
 
-use super::stdio::{tell, warn};
+use super::stdio::{print_message, print_note};
 use halflight::drive::Progress;
-use halflight::report::words::readable_seconds;
+use halflight::report::quantity::readable_seconds;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::io::{IsTerminal, stderr};
 
-/// Seconds between plain lines.
-const EVERY: f64 = 5.0;
+/// Seconds between lines.
+const INTERVAL: f64 = 5.0;
 
 /// Steps of the bar.
 const STEPS: u64 = 1000;
 
-/// Tells how a render goes.
-pub(super) struct Teller {
+/// Reports the progress of one or several renders.
+pub(super) struct ProgressReporter {
     bar: Option<ProgressBar>,
-    told: f64,
+    /// Rendering seconds of the last line.
+    last_line: f64,
 }
 
-impl Teller {
+impl ProgressReporter {
     pub(super) fn new() -> Self {
         let style = ProgressStyle::with_template("{bar:30} {percent:>3} %  {msg}");
-        let bar = stderr().is_terminal().then(|| ProgressBar::new(STEPS));
-        Self { bar: bar.map(|bar| bar.with_style(style.unwrap_or(ProgressStyle::default_bar()))), told: 0.0 }
+        let style = style.unwrap_or(ProgressStyle::default_bar());
+        let bar = stderr().is_terminal().then(|| ProgressBar::new(STEPS).with_style(style));
+        Self { bar, last_line: 0.0 }
     }
 
-    /// After each round.
-    pub(super) fn tell(&mut self, progress: &Progress) {
-        self.tell_words(progress, words(progress));
-    }
-
-    /// After each round of one of several.
-    pub(super) fn tell_of(&mut self, name: &str, progress: &Progress) {
-        self.tell_words(progress, format!("{name}: {}", words(progress)));
-    }
-
-    fn tell_words(&mut self, progress: &Progress, words: String) {
-        if let Some(why) = &progress.unsaved {
-            let note = || warn(format_args!("{why}; the render goes on, and tries again"));
+    /// Reports a round of the render `name`, which is empty for a single render.
+    pub(super) fn report(&mut self, name: &str, progress: &Progress) {
+        let separator = if name.is_empty() { "" } else { ": " };
+        let text = format!("{name}{separator}{}", text(progress));
+        if let Some(error) = &progress.unsaved {
+            let note = || print_note(format_args!("{error}; the render continues and tries again"));
             self.bar.as_ref().map_or_else(note, |bar| bar.suspend(note));
         }
-        let share = progress.seconds_left.map(|left| progress.seconds / (progress.seconds + left).max(1e-9));
+        let left = progress.seconds_left;
+        let done = left.map_or(0.0, |left| progress.seconds / (progress.seconds + left).max(1e-9));
         if let Some(bar) = &self.bar {
-            bar.set_position((share.unwrap_or(0.0) * STEPS as f64) as u64);
-            bar.set_message(words);
-        } else if progress.seconds >= self.told + EVERY {
-            self.told = progress.seconds;
-            tell(format_args!("{:>3.0} %  {words}", 100.0 * share.unwrap_or(0.0)));
+            bar.set_position((done * STEPS as f64) as u64);
+            bar.set_message(text);
+        } else if progress.seconds >= self.last_line + INTERVAL {
+            self.last_line = progress.seconds;
+            print_message(format_args!("{:>3.0} %  {text}", 100.0 * done));
         }
     }
 
-    /// Takes the bar away.
+    /// Removes the bar.
     pub(super) fn end(self) {
         if let Some(bar) = self.bar {
             bar.finish_and_clear();
@@ -58,14 +54,9 @@ impl Teller {
     }
 }
 
-fn words(progress: &Progress) -> String {
-    let mut words = format!("{} spp", progress.spp);
-    if let Some(error) = progress.error {
-        words += &format!(", relMSE {:.2e}", error.relmse);
-    }
-    words += &format!(", {}", readable_seconds(progress.seconds));
-    if let Some(left) = progress.seconds_left {
-        words += &format!(", {} left", readable_seconds(left));
-    }
-    words
+fn text(progress: &Progress) -> String {
+    let error = progress.error.map_or(String::new(), |error| format!(", relMSE {:.2e}", error.relmse));
+    let left = progress.seconds_left.map(|left| format!(", {} left", readable_seconds(left)));
+    let seconds = readable_seconds(progress.seconds);
+    format!("{} spp{error}, {seconds}{}", progress.spp, left.unwrap_or_default())
 }

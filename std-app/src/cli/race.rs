@@ -1,18 +1,19 @@
-//! `halflight race`: several methods on one scene for the same time, and a report that lays them side by side.
+//! `halflight race`: several methods on one scene for the same time.
 
 use super::failure::Failure;
 use super::interrupt::{self, INTERRUPT};
+use super::method_args::MethodArgs;
 use super::outputs::Outputs;
-use super::progress::Teller;
-use super::racer::{self, Racer};
-use super::shot::{self, Options, Shot};
-use super::{values, warn};
+use super::picture_args::{PictureArgs, file_name, render_failure};
+use super::progress::ProgressReporter;
+use super::race_entry::{RaceEntry, race_entry};
+use super::{print_note, values};
 use clap::Args;
 use core::sync::atomic::Ordering;
 use halflight::compare::{Comparison, compare};
 use halflight::drive::{self, Progress, RenderResult, Settings, Stop, Turns};
 use halflight::load;
-use halflight::report::{self, Maker, Run, words::readable_seconds};
+use halflight::report::{self, Provenance, Run, quantity::readable_seconds};
 use halflight_core::scene::Scene;
 use std::panic::resume_unwind;
 use std::path::{Path, PathBuf};
@@ -20,29 +21,29 @@ use std::process::ExitCode;
 use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
 
-/// Compare methods on a scene: the error of each against run time
+/// Compare the error of several methods against run time
 ///
-/// All methods render for the same time, on all threads, in turns, round by round, so that other load of the
-/// machine slows all of them. Errors are measured against --reference, or estimated. Ctrl-C ends the race early;
-/// it then exits with 3.
+/// The methods render in turns, round by round, each on all threads and for the same time, so other load of the
+/// machine affects all of them. Errors are measured against --reference, or estimated. Ctrl-C ends the race early
+/// with exit code 3.
 #[derive(Args)]
 pub(super) struct Race {
-    /// The scene: a mesh (.obj) or a scene file (.toml)
+    /// Scene: a mesh (.obj) or a scene file (.toml)
     scene: PathBuf,
-    /// Methods, as in path,path:max-depth=2: a method of `render`, then options, which are its flags without dashes
-    /// and win over those of the race
-    #[arg(long, value_name = "METHOD[:OPTION=VALUE]...,...", value_parser = racer::racer, value_delimiter = ',',
+    /// Methods of `render`, each with options after colons, as in path,path:max-depth=2; an option is a flag below
+    /// without dashes, and wins over the flag of the race
+    #[arg(long, value_name = "METHOD[:OPTION=VALUE]...,...", value_parser = race_entry, value_delimiter = ',',
         required = true, display_order = 1)]
-    methods: Vec<Racer>,
-    /// Time of rendering for each method, as in 30s, 2m, 1h
+    methods: Vec<RaceEntry>,
+    /// Rendering time of each method, as in 30s, 2m, 1h
     #[arg(long, value_name = "TIME", value_parser = values::duration, display_order = 5)]
     time: f64,
     #[command(flatten)]
-    options: Options,
+    method_args: MethodArgs,
     #[command(flatten)]
-    shot: Shot,
+    picture: PictureArgs,
 
-    /// Write a report into this folder: index.html, a page that needs no other file, curve.csv and run.json
+    /// Write a report into this folder: index.html, curve.csv and run.json
     #[arg(long, value_name = "DIR", display_order = 10)]
     report: Option<PathBuf>,
     /// Print one JSON object instead of text
@@ -50,7 +51,7 @@ pub(super) struct Race {
     json: bool,
 }
 
-/// A picture of the race.
+/// Picture of a method.
 struct Done {
     result: RenderResult,
     comparison: Option<Comparison>,
@@ -61,30 +62,28 @@ impl Race {
         self.check_names()?;
         let mut outputs = Outputs::new(self.json);
         self.report.iter().try_for_each(|folder| outputs.plan_report(folder))?;
-        outputs.spare(&self.scene)?;
-        self.shot.reference_file().map_or(Ok(()), |reference| outputs.spare(reference))?;
-        let reference = self.shot.reference()?;
+        outputs.protect(&self.scene)?;
+        self.picture.reference_file().map_or(Ok(()), |reference| outputs.protect(reference))?;
+        let reference = self.picture.reference()?;
 
         let loading = Instant::now();
-        let loaded = load::load(&self.scene, &self.shot.load_options(reference.as_deref()))?;
+        let loaded = load::load(&self.scene, &self.picture.load_options(reference.as_deref()))?;
         let load_seconds = loading.elapsed().as_secs_f64();
-        loaded.files.iter().try_for_each(|file| outputs.spare(file))?;
-        for repair in &loaded.repairs {
-            warn(repair);
-        }
+        loaded.files.iter().try_for_each(|file| outputs.protect(file))?;
+        loaded.repairs.iter().for_each(print_note);
         let stop = Stop { seconds: Some(self.time), ..Stop::default() };
-        let settings = |racer: &Racer| -> Result<Settings, Failure> {
-            let options = racer.options.over(&self.options);
-            self.shot.settings(&loaded, racer.method, &options, stop, reference.clone())
+        let settings = |entry: &RaceEntry| {
+            let args = entry.args.over(&self.method_args);
+            self.picture.settings(&loaded, entry.method, &args, stop, reference.clone())
         };
         let all = self.methods.iter().map(settings).collect::<Result<Vec<_>, _>>()?;
         let views = loaded.views();
-        let scene = views.scene(self.shot.view.camera(&loaded)?);
+        let scene = views.scene(self.picture.camera.camera(&loaded)?);
 
-        interrupt::listen()?;
+        interrupt::install_handler()?;
         let results = self.renders(&scene, &all)?;
-        let (maker, name) = (Maker::here(), shot::name(&self.scene));
-        let racers = self.methods.iter().zip(&all).zip(&results).map(|((racer, settings), done)| {
+        let (provenance, name) = (Provenance::here(), file_name(&self.scene));
+        let entries = self.methods.iter().zip(&all).zip(&results).map(|((entry, settings), done)| {
             let seconds = &done.result.seconds;
             let run = Run {
                 scene: &scene,
@@ -96,30 +95,30 @@ impl Race {
                 outputs: &[],
                 load_seconds,
                 total_seconds: load_seconds + seconds.build + seconds.render,
-                maker: &maker,
+                provenance: &provenance,
             };
-            report::Racer { name: racer.name.clone(), run }
+            report::RaceEntry { name: entry.name.clone(), run }
         });
-        let race = report::Race { racers: racers.collect(), seconds: self.time, maker: &maker };
-        let early = INTERRUPT.load(Ordering::Relaxed);
-        let reported = self.report.as_deref().filter(|folder| outputs.report(folder, &race.files()));
+        let race = report::Race { entries: entries.collect(), seconds: self.time, provenance: &provenance };
+        let is_early = INTERRUPT.load(Ordering::Relaxed);
+        let reported = self.report.as_deref().filter(|folder| outputs.save_report(folder, &race.files()));
         let results = if self.json { race.object().to_string() } else { self.text(&race, reported) };
-        Ok(outputs.end(&results, if early { ExitCode::from(3) } else { ExitCode::SUCCESS }))
+        Ok(outputs.end(&results, if is_early { ExitCode::from(3) } else { ExitCode::SUCCESS }))
     }
 
-    /// The pictures of all methods, made in turns.
+    /// Pictures of all methods, rendered in turns.
     fn renders(&self, scene: &Scene, settings: &[Settings]) -> Result<Vec<Done>, Failure> {
         let turns = Turns::new(settings.len());
-        let teller = Mutex::new(Teller::new());
+        let reporter = Mutex::new(ProgressReporter::new());
         let render = |index: usize| {
             let turn = turns.join(index);
-            let tell = &mut |progress: &Progress| {
-                let mut teller = teller.lock().unwrap_or_else(PoisonError::into_inner);
-                teller.tell_of(&self.methods[index].name, progress);
-                drop(teller);
+            let progress = &mut |progress: &Progress| {
+                let mut reporter = reporter.lock().unwrap_or_else(PoisonError::into_inner);
+                reporter.report(&self.methods[index].name, progress);
+                drop(reporter);
                 turn.pass(progress.seconds);
             };
-            drive::render(scene, &settings[index], tell, &INTERRUPT)
+            drive::render(scene, &settings[index], progress, &INTERRUPT)
         };
         let results: Vec<_> = std::thread::scope(|scope| {
             let started: Vec<_> =
@@ -129,18 +128,18 @@ impl Race {
                 .map(|thread| thread.join().unwrap_or_else(|panic| resume_unwind(panic)))
                 .collect()
         });
-        teller.into_inner().unwrap_or_else(PoisonError::into_inner).end();
+        reporter.into_inner().unwrap_or_else(PoisonError::into_inner).end();
         let done = results.into_iter().zip(settings).map(|(result, settings)| {
-            let result = result.map_err(|error| shot::explain(&self.scene, &error))?;
+            let result = result.map_err(|error| render_failure(&self.scene, &error))?;
             let comparison = settings.reference.as_ref().map(|r| compare(&result.image, r)).transpose()?;
             Ok(Done { result, comparison })
         });
         done.collect()
     }
 
-    /// Two curves of one name could not be told apart.
+    /// Refuses two methods of one name, whose curves would look alike.
     fn check_names(&self) -> Result<(), Failure> {
-        let names: Vec<_> = self.methods.iter().map(|racer| racer.name.as_str()).collect();
+        let names: Vec<_> = self.methods.iter().map(|entry| entry.name.as_str()).collect();
         match names.iter().enumerate().find(|(index, name)| names[..*index].contains(name)) {
             Some((_, name)) => Err(Failure::new(format!("{name} is in the race twice"))
                 .advice("give one of them another option, as in path:seed=1")),
@@ -148,42 +147,37 @@ impl Race {
         }
     }
 
-    /// The lines for a person.
-    fn text(&self, race: &report::Race, reported: Option<&Path>) -> String {
-        let width = race.racers.iter().map(|racer| racer.name.chars().count()).max().unwrap_or(0).max(6);
+    fn text(&self, race: &report::Race, report: Option<&Path>) -> String {
+        let width = race.entries.iter().map(|entry| entry.name.chars().count()).max().unwrap_or(0).max(6);
         let mut lines = Vec::new();
-        if let Some(folder) = reported {
-            lines.push(format!("report {}", folder.join("index.html").display()));
-        }
-        let truth = if race.has_reference() { "against the reference" } else { "as estimated" };
-        lines.push(format!("errors {truth}, {} of rendering each", readable_seconds(self.time)));
-        lines.push(format!(
-            "{:<width$}  {:>8}  {:>10}  {:>10}  {:>8}  95 % interval",
-            "method", "spp", "relMSE", "efficiency", "ratio"
-        ));
-        for (index, racer) in race.racers.iter().enumerate() {
-            let known = |value: Option<String>| value.unwrap_or("-".into());
+        lines.extend(report.map(|folder| format!("report {}", folder.join("index.html").display())));
+        let source = if race.has_reference() { "against the reference" } else { "estimated" };
+        lines.push(format!("errors {source}, {} of rendering each", readable_seconds(self.time)));
+        let row = |cells: [String; 6]| {
+            let [name, spp, error, efficiency, ratio, interval] = cells;
+            let line =
+                format!("{name:<width$}  {spp:>8}  {error:>10}  {efficiency:>10}  {ratio:>8}  {interval}");
+            line.trim_end().to_owned()
+        };
+        let head = ["method", "spp", "relMSE", "efficiency", "ratio", "95 % interval"];
+        lines.push(row(head.map(String::from)));
+        for (index, entry) in race.entries.iter().enumerate() {
+            let scientific = |value: Option<f64>| value.map_or("-".into(), |value| format!("{value:.3e}"));
             let ratio = race.ratio(index);
             let interval = ratio.and_then(|ratio| ratio.interval);
-            let line = format!(
-                "{:<width$}  {:>8}  {:>10}  {:>10}  {:>8}  {}",
-                racer.name,
-                racer.run.result.spp,
-                known(race.error(index).map(|error| format!("{error:.3e}"))),
-                known(race.efficiency(index).map(|efficiency| format!("{efficiency:.3e}"))),
-                known(ratio.map(|ratio| format!("{:.3}", ratio.value))),
+            lines.push(row([
+                entry.name.clone(),
+                entry.run.result.spp.to_string(),
+                scientific(race.error(index)),
+                scientific(race.efficiency(index)),
+                ratio.map_or("-".into(), |ratio| format!("{:.3}", ratio.value)),
                 interval.map_or(String::new(), |[lower, upper]| format!("{lower:.3} to {upper:.3}")),
-            );
-            lines.push(line.trim_end().to_owned());
+            ]));
         }
-        for lead in race.leads() {
-            let who = lead.who.map_or("too close to tell", |who| &race.racers[who].name);
-            lines.push(format!(
-                "ahead  {} to {}: {who}",
-                readable_seconds(lead.from),
-                readable_seconds(lead.to)
-            ));
-        }
+        lines.extend(race.leads().iter().map(|lead| {
+            let leader = lead.leader.map_or("no clear leader", |leader| &race.entries[leader].name);
+            format!("leader {} to {}: {leader}", readable_seconds(lead.from), readable_seconds(lead.to))
+        }));
         lines.join("\n")
     }
 }

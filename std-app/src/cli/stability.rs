@@ -1,20 +1,20 @@
-//! `halflight stability`: the table of stiff and extreme cases, each with what it must give and what it gives.
+//! `halflight stability`: stiff and extreme cases with known answers.
 
 use super::failure::Failure;
-use super::say;
+use super::stdio::print_result;
 use clap::Args;
-use halflight::report::words::plural;
+use halflight::report::quantity::plural;
 use halflight::stability::{self, Outcome};
 use serde_json::{Value, json};
 use std::process::ExitCode;
 
-/// Run the table of stiff and extreme cases on this machine
+/// Run stiff and extreme cases with known answers on this machine
 ///
-/// Sizes from 1e-6 to 1e6, lights from 1e-9 to 1e9 of the scene, needles, perfect mirrors, cameras within glass:
-/// each case has an answer known by theory. Exits with 1 where one is missed.
+/// The cases are scenes of size 1e-6 to 1e6, lights of size 1e-9 to 1e9, needles, perfect mirrors, cameras in glass, and
+/// kernels against f64. The exit code is 1 if a case differs from its answer.
 #[derive(Args)]
 pub(super) struct Stability {
-    /// Only those whose kind or name has this in it
+    /// Run only cases whose kind or name contains this word
     #[arg(long, value_name = "WORD")]
     only: Option<String>,
     /// Print one JSON object instead of text
@@ -24,28 +24,24 @@ pub(super) struct Stability {
 
 impl Stability {
     pub(super) fn run(&self) -> Result<ExitCode, Failure> {
-        let wanted = |name: &str| self.only.as_ref().is_none_or(|word| name.contains(word.as_str()));
-        let (mut group, mut said) = ("", Ok(()));
-        let outcomes = stability::run(&wanted, &mut |outcome| {
-            if !self.json && said.is_ok() {
+        let is_selected = |name: &str| self.only.as_ref().is_none_or(|word| name.contains(word.as_str()));
+        let (mut group, mut printed) = ("", Ok(()));
+        let outcomes = stability::run(&is_selected, &mut |outcome| {
+            if !self.json && printed.is_ok() {
                 let head =
                     if outcome.group == group { String::new() } else { format!("{}\n", outcome.group) };
                 group = outcome.group;
-                said = say(&(head + &line(outcome)));
+                printed = print_result(&(head + &line(outcome)));
             }
         });
+        printed?;
         let failed = outcomes.iter().filter(|outcome| !outcome.passed).count();
-        said?;
-        if self.json {
-            let object = json!({
-                "cases": outcomes.iter().map(object).collect::<Vec<_>>(),
-                "passed": outcomes.len() - failed,
-                "failed": failed,
-            });
-            say(&object.to_string())?;
+        print_result(&if self.json {
+            let cases: Value = outcomes.iter().map(object).collect();
+            json!({ "cases": cases, "passed": outcomes.len() - failed, "failed": failed }).to_string()
         } else {
-            say(&format!("{}, {failed} not as expected", plural(outcomes.len() as u64, "case")))?;
-        }
+            format!("{}, {failed} not as expected", plural(outcomes.len() as u64, "case"))
+        })?;
         Ok(if failed == 0 { ExitCode::SUCCESS } else { ExitCode::from(1) })
     }
 }

@@ -1,9 +1,10 @@
-//! `halflight study`: experiments that tell how good the parts of a method are, each by one command.
+//! `halflight study`: experiments on parts of a method.
 
 use super::failure::Failure;
-use super::method::Choice;
-use super::shot::{self, Options, Shot};
-use super::{say, values, warn};
+use super::method_args::{MethodArg, MethodArgs};
+use super::picture_args::{PictureArgs, render_failure};
+use super::stdio::{print_note, print_result};
+use super::values;
 use clap::{Args, Subcommand};
 use halflight::drive::{IrradianceStudy, MetricError, Stop, study_irradiance};
 use halflight::load;
@@ -12,7 +13,7 @@ use serde_json::{Value, json};
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-/// Compare the parts of a method on a scene
+/// Compare variants of a part of a method
 #[derive(Args)]
 #[command(arg_required_else_help = true)]
 pub(super) struct Study {
@@ -25,30 +26,32 @@ enum Subject {
     Irradiance(Box<Irradiance>),
 }
 
-/// The error metrics of the irradiance cache with the same number of records
+/// Error metrics of the irradiance cache at equal numbers of records
 ///
-/// For each metric the error is searched that fills the cache of the picture with so many records, to 2 %; what the cache
-/// says of the indirect irradiance is then held against exact values at points of the picture.
+/// For each metric the error is searched that fills the cache of the picture with the number of records, to 2 %. The
+/// cached irradiance is then compared with many gather rays at points of the picture.
 #[derive(Args)]
 struct Irradiance {
-    /// The scene: a mesh (.obj) or a scene file (.toml)
+    /// Scene: a mesh (.obj) or a scene file (.toml)
     scene: PathBuf,
-    /// Records of each metric
-    #[arg(long, value_name = "N", default_value = "1700", value_parser = clap::value_parser!(u64).range(1..=1 << 20))]
+    /// Records per metric
+    #[arg(long, value_name = "N", default_value = "1700",
+        value_parser = clap::value_parser!(u64).range(1..=1 << 20))]
     records: u64,
-    /// The metrics [default: all]
+    /// Metrics to compare [default: all]
     #[arg(long, value_name = "METRIC,...", value_delimiter = ',', value_parser = values::metric)]
     metrics: Vec<Metric>,
-    /// Points at which the irradiance is compared, about
-    #[arg(long, value_name = "N", default_value = "2000", value_parser = clap::value_parser!(u32).range(1..=1 << 20))]
+    /// Points of comparison, about
+    #[arg(long, value_name = "N", default_value = "2000",
+        value_parser = clap::value_parser!(u32).range(1..=1 << 20))]
     points: u32,
-    /// Fill caches progressively: first with four times the radii, then with twice, then with what the error allows
+    /// Fill caches first with four times the radii, then with twice, then with those of the error
     #[arg(long)]
     progressive: bool,
     #[command(flatten)]
-    shot: Shot,
+    picture: PictureArgs,
     #[command(flatten)]
-    options: Options,
+    method_args: MethodArgs,
     /// Print one JSON object instead of text
     #[arg(long, help_heading = "Results")]
     json: bool,
@@ -63,37 +66,37 @@ impl Study {
 
 impl Irradiance {
     fn run(&self) -> Result<ExitCode, Failure> {
-        let loaded = load::load(&self.scene, &self.shot.load_options(None))?;
-        loaded.repairs.iter().for_each(warn);
-        let settings = self.shot.settings(&loaded, Choice(None), &self.options, Stop::default(), None)?;
+        let loaded = load::load(&self.scene, &self.picture.load_options(None))?;
+        loaded.repairs.iter().for_each(print_note);
+        let settings =
+            self.picture.settings(&loaded, MethodArg(None), &self.method_args, Stop::default(), None)?;
         let views = loaded.views();
-        let scene = views.scene(self.shot.view.camera(&loaded)?);
+        let scene = views.scene(self.picture.camera.camera(&loaded)?);
         let metrics = if self.metrics.is_empty() { Metric::ALL.to_vec() } else { self.metrics.clone() };
         let Self { records, points, progressive, .. } = *self;
         let study = IrradianceStudy { metrics, records, points, progressive };
-        let mut said = if self.json { Ok(()) } else { say(HEAD) };
+        let mut printed = if self.json { Ok(()) } else { print_result(HEAD) };
         let mut rows = Vec::new();
         study_irradiance(&scene, &settings, &study, &mut |row| {
-            if !self.json && said.is_ok() {
-                said = say(&text(row));
+            if !self.json && printed.is_ok() {
+                printed = print_result(&text(row));
             }
             rows.push(object(row));
         })
-        .map_err(|error| shot::explain(&self.scene, &error))?;
+        .map_err(|error| render_failure(&self.scene, &error))?;
+        printed?;
         if self.json {
             let rays = settings.cache.strata().pow(2);
-            said = say(
-                &json!({ "records": self.records, "rays_per_record": rays, "metrics": rows }).to_string()
-            );
+            let object = json!({ "records": records, "rays_per_record": rays, "metrics": rows });
+            print_result(&object.to_string())?;
         }
-        said?;
         Ok(ExitCode::SUCCESS)
     }
 }
 
-/// Above the rows.
+/// Head of the table.
 const HEAD: &str =
-    "metric                    error   records       RMSE     noise  1 in 100  reached  predicted   achieved";
+    "metric                    error   records       RMSE     noise  1 in 100  covered  predicted   achieved";
 
 fn text(row: &MetricError) -> String {
     format!(

@@ -1,23 +1,18 @@
-//! Summary of a render: lines for a person. The object of `--json` is that of the report.
+//! Summary of a render as text.
 
 use super::compare as comparing;
-use super::ledger;
-use halflight::drive::{Audited, BiasEstimate, Blurred, CacheUse, Ending, ErrorEstimate, MapUse, PhotonUse};
+use super::dropped;
+use halflight::drive::{Audited, BiasEstimate, Blurred, Ending, ErrorEstimate};
 use halflight::report::Run;
-use halflight::report::words::{plural, readable_bytes, readable_seconds};
-use halflight_core::cache::irradiance::Metric;
+use halflight::report::quantity::{plural, readable_bytes, readable_name, readable_seconds, readable_value};
+use halflight_core::findings::Finding;
 use std::path::Path;
 
-/// The lines of `run`; `report` is the folder of its report.
+/// Lines of `run`; `report` is the folder of its report.
 pub(super) fn text(run: &Run, report: Option<&Path>) -> String {
     let (result, settings) = (run.result, run.settings);
-    let mut lines = Vec::new();
-    for output in run.outputs {
-        lines.push(format!("saved  {}", output.display()));
-    }
-    if let Some(folder) = report {
-        lines.push(format!("report {}", folder.join("index.html").display()));
-    }
+    let mut lines: Vec<_> = run.outputs.iter().map(|output| format!("saved  {}", output.display())).collect();
+    lines.extend(report.map(|folder| format!("report {}", folder.join("index.html").display())));
     let early = if result.ending == Ending::Interrupted { ", stopped early" } else { "" };
     let (width, height, samples) = (settings.width, settings.height, plural(result.spp.into(), "sample"));
     lines.push(format!("image  {width}x{height}, {samples} per pixel{early}"));
@@ -29,168 +24,117 @@ pub(super) fn text(run: &Run, report: Option<&Path>) -> String {
             lines.extend(doubt.map(|doubt| format!("       but {doubt}")));
         }
     }
-    match result.ending {
-        Ending::Biased => lines.push(
-            "       the bias alone is larger than the error asked for: more samples would not help".into(),
-        ),
-        Ending::NoiseFloor => lines.push(
-            "       noise that all samples share stays above the error asked for: more samples would not help; for an \
-             irradiance cache more rays per record (--cache-rays) would"
+    lines.extend(match result.ending {
+        Ending::Biased => Some("       the bias alone exceeds --error: more samples do not help".into()),
+        Ending::NoiseFloor => Some(
+            "       noise that all samples share exceeds --error: more samples do not help; for an irradiance \
+             cache more --cache-rays do"
                 .into(),
         ),
-        Ending::Done | Ending::Interrupted => (),
-    }
+        Ending::Done | Ending::Interrupted => None,
+    });
     if let Some(comparison) = run.comparison {
         lines.extend(comparing::text(comparison).lines().map(|line| format!("       {line}")));
     }
-    let rays = result.counters.all_rays();
     lines.push(format!(
         "time   {} rendering, {} building, {} loading; {:.1} million rays/s on {} ({}, {})",
         readable_seconds(result.seconds.render),
         readable_seconds(result.seconds.build),
         readable_seconds(run.load_seconds),
-        rays as f64 / result.seconds.render.max(1e-9) * 1e-6,
+        result.counters.all_rays() as f64 / result.seconds.render.max(1e-9) * 1e-6,
         plural(result.threads as u64, "thread"),
         result.method.name(),
         settings.level.name(),
     ));
-    lines.extend(result.cache.as_ref().map(|cache| cached(cache, settings.cache.metric)));
-    lines.extend(result.photons.iter().flat_map(|photons| photon_maps(photons, result.seconds.photons)));
-    if result.windows.lacks_memory {
-        lines.push(
-            "light  not enough memory for environment visibility sampling: sky light may be noisier".into(),
-        );
-    }
-    if result.caustics.lacks_memory {
-        lines.push("light  not enough memory for caustic photons: caustics may be missing or noisy".into());
-    }
+    lines.extend(
+        run.findings()
+            .iter()
+            .zip(["method "].into_iter().chain(core::iter::repeat("       ")))
+            .map(|(finding, label)| format!("{label}{}", self::finding(finding))),
+    );
     lines.push(format!(
         "memory {}, {} at its peak",
         readable_bytes(result.memory.iter().map(|part| part.bytes).sum()),
         readable_bytes(result.memory_peak),
     ));
-    lines.extend(ledger::text(&result.counters, &result.places, result.empty_pixels));
+    lines.extend(dropped::text(&result.counters, &result.places, result.empty_pixels));
     if result.filled_pixels > 0 {
-        lines.push(format!(
-            "       {} had no sample when the render ended, and show the mean of the pixels around them",
-            plural(result.filled_pixels, "pixel")
-        ));
+        let pixels = plural(result.filled_pixels, "pixel");
+        lines.push(format!("       {pixels} without a sample show the mean of their neighbours"));
     }
     lines.join("\n")
 }
 
-/// The line of an irradiance cache.
-fn cached(cache: &CacheUse, metric: Metric) -> String {
-    let lost = match cache.refused {
-        0 => String::new(),
-        refused => format!("; {refused} more did not fit into memory"),
-    };
-    let loaded = match cache.loaded {
-        0 => String::new(),
-        loaded => format!(", {loaded} of them loaded,"),
-    };
-    let cut = if cache.is_cut { "; cut short: points without a record are path traced" } else { "" };
+/// Line of a finding: topic, decision, reason and values.
+fn finding(finding: &Finding) -> String {
+    let values: Vec<_> = finding
+        .values()
+        .map(|(name, value)| format!("{} {}", readable_name(name), readable_value(value)))
+        .collect();
+    let parts = [finding.reason, &values.join(", ")].map(|part| match part {
+        "" => String::new(),
+        part => format!("; {part}"),
+    });
+    let line = format!("{}: {}{}", readable_name(finding.topic), finding.decision.name(), parts.concat());
+    line.replace('\u{202f}', " ")
+}
+
+/// relMSE with its interval.
+fn error(error: &ErrorEstimate) -> String {
+    format!("error  relMSE {:.3e} (95 %: {:.3e} to {:.3e})", error.relmse, error.lower, error.upper)
+}
+
+/// Line of noise and another part of the error.
+fn parts(noise: &ErrorEstimate, name: &str, part: &BiasEstimate) -> String {
     format!(
-        "cache  {}{loaded} of {} rays in {} by {}{lost}{cut}",
-        plural(cache.records, "record"),
-        cache.rays,
-        readable_seconds(cache.seconds),
-        metric.name(),
+        "       noise {:.3e}; {name} {:.3e} (95 %: {:.3e} to {:.3e})",
+        noise.relmse,
+        part.relmse.max(0.0),
+        part.lower,
+        part.upper
     )
 }
 
-/// The lines of photon maps.
-fn photon_maps(photons: &PhotonUse, seconds: f64) -> Vec<String> {
-    let kinds = [(photons.global, "photon"), (photons.caustic, "caustic photon")];
-    let stored: Vec<_> = kinds.iter().filter_map(|(map, name)| Some(map_text(map.as_ref()?, name))).collect();
-    let mut lines = vec![format!(
-        "light  {} in {}: {}",
-        plural(photons.maps, "map"),
-        readable_seconds(seconds),
-        stored.join("; "),
-    )];
-    for (map, name) in [(photons.global, ""), (photons.caustic, " of caustics")] {
-        if let Some(MapUse { seen: Some(seen), by_power: Some(by_power), .. }) = map {
-            lines.push(format!(
-                "       emission guiding: {:.2} % of light paths{name} reach visible surfaces ({:.2} % without)",
-                100.0 * seen,
-                100.0 * by_power
-            ));
-        }
-    }
-    for (map, name) in [(photons.global, "global"), (photons.caustic, "caustic")] {
-        if let Some(map) = map.filter(|map| map.given < map.wanted) {
-            lines.push(format!(
-                "       not enough memory: {} of {} light paths for the {name} map, the picture is noisier",
-                map.given, map.wanted
-            ));
-        }
-    }
-    lines
-}
-
-/// The lines of an audited estimate.
+/// Lines of an error with an audit.
 pub(super) fn audited(audit: &Audited) -> Vec<String> {
-    let ErrorEstimate { relmse, lower, upper } = audit.total;
+    let error = error(&audit.total);
     if audit.is_blind {
+        let unseen = 100.0 * audit.unseen;
         return vec![
-            format!(
-                "error  relMSE {relmse:.3e} (95 %: {lower:.3e} to {upper:.3e}), of noise; the bias is unknown:"
-            ),
-            format!(
-                "audit  its paths cannot find about {:.0} % of the light, which arrives through mirrors and glass",
-                100.0 * audit.unseen
-            ),
+            format!("{error}, noise alone; the bias is unknown:"),
+            format!("audit  its paths miss about {unseen:.0} % of the light, through mirrors and glass"),
         ];
     }
-    let BiasEstimate { relmse: bias, lower: least, upper: most, detectable, .. } = audit.bias;
-    let found = if audit.is_biased() { "bias found" } else { "no bias found" };
+    let verdict = if audit.is_biased() { "bias found" } else { "no bias found" };
     vec![
-        format!("error  relMSE {relmse:.3e} (95 %: {lower:.3e} to {upper:.3e}), noise and bias"),
+        format!("{error}, noise and bias"),
+        parts(&audit.noise, "bias", &audit.bias),
         format!(
-            "       {:.3e} of it is noise; bias {:.3e} (95 %: {least:.3e} to {most:.3e})",
-            audit.noise.relmse,
-            bias.max(0.0)
-        ),
-        format!(
-            "audit  {found}: {} with {} each, off by {:+.2} % ± {:.2} % as a whole; a bias of {detectable:.1e} would be found",
+            "audit  {verdict}: {} with {} each; whole picture off by {:+.2} % ± {:.2} %; detectable bias {:.1e}",
             plural(audit.pixels.into(), "pixel"),
             plural(audit.samples.into(), "sample"),
             100.0 * audit.whole.mean,
             100.0 * audit.whole.error,
+            audit.bias.detectable,
         ),
     ]
 }
 
-/// The lines of an estimate that nobody audited, of a method that may have a bias.
+/// Lines of an error without an audit; `is_biased` if the method may have a bias.
 pub(super) fn estimate(
-    error: Option<ErrorEstimate>,
+    estimate: Option<ErrorEstimate>,
     blurred: Option<Blurred>,
     is_biased: bool,
 ) -> Vec<String> {
-    let Some(ErrorEstimate { relmse, lower, upper }) = error else {
+    let Some(estimate) = estimate else {
         return vec!["error  unknown: the estimate needs four samples per pixel and some light".into()];
     };
-    let bias = match (is_biased, blurred) {
-        (true, Some(_)) => "; other bias is not in it",
-        (true, None) => "; bias is not in it",
-        (false, _) => "",
-    };
-    let from = if blurred.is_some() { "noise and what photons blur" } else { "estimated from its own noise" };
-    let mut lines =
-        vec![format!("error  relMSE {relmse:.3e} (95 %: {lower:.3e} to {upper:.3e}), {from}{bias}")];
-    lines.extend(blurred.map(|Blurred { noise, blur, .. }| {
-        let BiasEstimate { relmse: bias, lower, upper, .. } = blur;
-        let bias = bias.max(0.0);
-        format!(
-            "       {:.3e} of it is noise; blur {bias:.3e} (95 %: {lower:.3e} to {upper:.3e})",
-            noise.relmse
-        )
-    }));
-    lines
-}
-
-/// What became of the maps of one kind.
-fn map_text(map: &MapUse, name: &str) -> String {
-    format!("{} of {}", plural(map.stored, name), plural(map.shot, "light path"))
+    let error = error(&estimate);
+    let bias = if is_biased { "; other bias is not included" } else { "" };
+    match blurred {
+        Some(Blurred { noise, blur, .. }) => {
+            vec![format!("{error}, noise and blur of photons{bias}"), parts(&noise, "blur", &blur)]
+        }
+        None => vec![format!("{error}, noise alone{}", bias.replace("other bias", "bias"))],
+    }
 }

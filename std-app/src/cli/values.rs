@@ -1,17 +1,17 @@
-//! Values of flags as people write them: `1,2,3`, `640x480`, `90s`, `512M`.
+//! Parsers of flag values: `1,2,3`, `640x480`, `90s`, `512M`.
 
 use core::str::FromStr;
 use halflight::drive::Shard;
 use halflight_core::cache::irradiance::Metric;
 use halflight_simd::Tier;
 
-/// Three numbers, `X,Y,Z`.
+/// Vector `X,Y,Z`.
 pub(super) fn vector(text: &str) -> Result<[f64; 3], String> {
     let numbers = text.split(',').map(|number| finite(number.trim())).collect::<Result<Vec<_>, _>>()?;
     numbers.try_into().map_err(|_| "three numbers are expected, as in 0,1.5,-2".into())
 }
 
-/// Radius of the lens and, where given, the distance of what is sharp: `RADIUS[,DISTANCE]`.
+/// Lens `RADIUS[,DISTANCE]`.
 pub(super) fn lens(text: &str) -> Result<Lens, String> {
     let (radius, distance) = match text.split_once(',') {
         Some((radius, distance)) => (radius, Some(positive(distance.trim())?)),
@@ -24,21 +24,21 @@ pub(super) fn lens(text: &str) -> Result<Lens, String> {
     Ok(Lens { radius, distance })
 }
 
-/// See [`lens`].
+/// Radius of the lens, and the distance in focus.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Lens {
     pub(super) radius: f64,
     pub(super) distance: Option<f64>,
 }
 
-/// Vertical field of view in degrees.
+/// Vertical field of view in degrees, above 0 and below 178.
 pub(super) fn degrees(text: &str) -> Result<f64, String> {
     let degrees = finite(text)?;
     let usable = degrees > 0.0 && degrees < 178.0;
     usable.then_some(degrees).ok_or("a field of view is more than 0 and less than 178 degrees".into())
 }
 
-/// Width and height in pixels, `WxH`.
+/// Size `WxH` in pixels.
 pub(super) fn size(text: &str) -> Result<[u32; 2], String> {
     let side = |text: &str| text.parse().ok().filter(|side| (1..=MAX_SIDE).contains(side));
     text.split_once(['x', 'X'])
@@ -49,10 +49,10 @@ pub(super) fn size(text: &str) -> Result<[u32; 2], String> {
         ))
 }
 
-/// Longest side of a picture in pixels: what formats and raster coordinates hold.
+/// Longest side of a picture in pixels, a limit of formats and of raster coordinates.
 const MAX_SIDE: u32 = 1 << 20;
 
-/// Seconds: `30s`, `2m`, `1.5h`, `250ms`, or a bare number of seconds.
+/// Time in seconds: `30s`, `2m`, `1.5h`, `250ms`, or a number of seconds.
 pub(super) fn duration(text: &str) -> Result<f64, String> {
     let units = [("ms", 1e-3), ("s", 1.0), ("m", 60.0), ("h", 3600.0), ("", 1.0)];
     with_unit(text, &units)
@@ -60,7 +60,7 @@ pub(super) fn duration(text: &str) -> Result<f64, String> {
         .ok_or("a time is expected, as in 30s, 2m or 1h".into())
 }
 
-/// Bytes: `512M`, `2G`, `64K`, in powers of 1024, or a bare number of bytes.
+/// Bytes: `64K`, `512M`, `2G`, `1T` in powers of 1024, or a number of bytes.
 pub(super) fn bytes(text: &str) -> Result<usize, String> {
     let plain = text.strip_suffix("iB").or(text.strip_suffix('B')).unwrap_or(text);
     let units =
@@ -71,35 +71,35 @@ pub(super) fn bytes(text: &str) -> Result<usize, String> {
         .ok_or("a number of bytes is expected, as in 512M or 2G".into())
 }
 
-/// An instruction set by its name.
+/// Instruction set by name.
 pub(super) fn tier(name: &str) -> Result<Tier, String> {
     let names = Tier::ALL.map(Tier::name).join(", ");
     Tier::named(name).ok_or(format!("the levels are {names}"))
 }
 
-/// An error metric of the irradiance cache by its name.
+/// Error metric of the irradiance cache by name.
 pub(super) fn metric(name: &str) -> Result<Metric, String> {
     let names = Metric::ALL.map(Metric::name).join(", ");
     Metric::named(name).ok_or(format!("the metrics are {names}"))
 }
 
-/// Rays of a record: strata in blocks of 8 x 8.
+/// Gather rays of a record: squares of multiples of 8.
 pub(super) fn gather_rays(text: &str) -> Result<u32, String> {
     let known = text.parse().ok().filter(|rays| [64, 256, 576, 1024, 2304, 4096].contains(rays));
     known.ok_or("64, 256, 576, 1024, 2304 or 4096 rays are expected".into())
 }
 
-/// A part of a picture: `I/N`, counted from 1.
+/// Shard `I/N`, counted from 1.
 pub(super) fn shard(text: &str) -> Result<Shard, String> {
-    let numbers =
-        text.split_once('/').and_then(|(i, n)| Some((i.parse::<u32>().ok()?, n.parse::<u32>().ok()?)));
-    let (index, count) = numbers
+    let (index, count) = text
+        .split_once('/')
+        .and_then(|(index, count)| Some((index.parse::<u32>().ok()?, count.parse::<u32>().ok()?)))
         .filter(|(index, count)| (1..=*count).contains(index))
-        .ok_or("a part of the whole is expected, as in 1/4, the first of four")?;
+        .ok_or("a shard is expected, as in 1/4, the first of four")?;
     Ok(Shard { index: index - 1, count })
 }
 
-/// A share of the work for the audit: `5%`, `0.05`, or `off`.
+/// Share of the work for the audit: `5%`, `0.05`, or `off`.
 pub(super) fn audit(text: &str) -> Result<f64, String> {
     if text == "off" {
         return Ok(0.0);
@@ -112,7 +112,7 @@ pub(super) fn audit(text: &str) -> Result<f64, String> {
     usable.then_some(share).ok_or("a share up to a half is expected, as in 5%, or off".into())
 }
 
-/// A number above 0.
+/// Number above 0.
 pub(super) fn positive(text: &str) -> Result<f64, String> {
     let number = finite(text)?;
     (number > 0.0).then_some(number).ok_or("a number above 0 is expected".into())
@@ -122,7 +122,7 @@ fn finite(text: &str) -> Result<f64, String> {
     f64::from_str(text).ok().filter(|number| number.is_finite()).ok_or(format!("`{text}` is not a number"))
 }
 
-/// A finite number and one of the units; the first that fits counts.
+/// Finite number with the first of the units that fits.
 fn with_unit(text: &str, units: &[(&str, f64)]) -> Option<f64> {
     units.iter().find_map(|(unit, factor)| {
         let number = finite(text.strip_suffix(unit)?).ok()? * factor;
@@ -135,7 +135,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn values_as_people_write_them() {
+    fn values_parse_with_units() {
         assert_eq!(vector("-1,2.5,3e2"), Ok([-1.0, 2.5, 300.0]));
         assert_eq!(size("640x480"), Ok([640, 480]));
         assert_eq!(
@@ -157,7 +157,7 @@ mod tests {
     }
 
     #[test]
-    fn values_that_make_no_sense() {
+    fn invalid_values_are_refused() {
         for text in ["", "1,2", "1,2,3,4", "a,b,c", "1,nan,3", "1,2,inf"] {
             assert!(vector(text).is_err(), "{text}");
         }

@@ -18,7 +18,7 @@ pub use error::PictureError;
 pub(crate) use error::fail;
 pub use kind::Kind;
 
-use crate::report::words::readable_bytes;
+use crate::report::quantity::readable_bytes;
 use std::path::Path;
 
 /// Most pixels of a picture, 16384².

@@ -1,9 +1,9 @@
-//! The census in the order in which it is told, by name.
+//! Contents of a scene as named counts.
 
 use halflight_core::census::{Census, EnvironmentKind};
 use halflight_core::scene::Scene;
 
-/// What `scene` holds: name and number. The names are JSON keys, and words with spaces for underscores.
+/// Names and counts in the order of reports. Names are JSON keys in snake case.
 pub fn counts(census: &Census, scene: &Scene) -> Vec<(&'static str, u64)> {
     let kinds = &census.surfaces;
     vec![

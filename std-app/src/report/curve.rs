@@ -1,40 +1,31 @@
-//! `curve.csv`: the error against run time, a line for each round.
+//! `curve.csv`: error against rendering time, one line per round.
 
 use crate::drive::Round;
-use core::fmt::Write;
 
-/// The histories of one render without a name, or of several with the names of their methods. What is not known
-/// is an empty field.
+/// Text of the file. Histories of a race have names; unknown values are empty fields.
 pub(super) fn csv(histories: &[(Option<&str>, &[Round])]) -> String {
-    let named = histories.iter().any(|(name, _)| name.is_some());
-    let mut text = String::from(if named { "method," } else { "" });
+    let is_named = histories.iter().any(|(name, _)| name.is_some());
+    let mut text = String::from(if is_named { "method," } else { "" });
     text += "seconds,spp,rays,relmse,lower,upper,reference_relmse,reference_mse,reference_flip\n";
     for (name, rounds) in histories {
         for round in *rounds {
-            if named {
-                text += &field(name.unwrap_or_default());
-                text.push(',');
-            }
             let error = round.error.map(|error| [error.relmse, error.lower, error.upper]);
-            let against = round.reference.map(|r| (r.linear.relmse, r.linear.mse, r.flip));
-            // Writing to a string does not fail.
-            let _ = write!(text, "{},{},{}", round.seconds, round.spp, round.rays);
-            for value in (0..3).map(|i| error.map(|error| error[i])).chain([
-                against.map(|(relmse, _, _)| relmse),
-                against.map(|(_, mse, _)| mse),
-                against.map(|(_, _, flip)| flip),
-            ]) {
-                text.push(',');
-                let _ = value.map_or(Ok(()), |value| write!(text, "{value:e}"));
-            }
+            let reference = round.reference.map(|r| [r.linear.relmse, r.linear.mse, r.flip]);
+            let values = [error, reference].into_iter().flat_map(|values| match values {
+                Some(values) => values.map(|value| format!("{value:e}")),
+                None => [const { String::new() }; 3],
+            });
+            let counts = [round.seconds.to_string(), round.spp.to_string(), round.rays.to_string()];
+            let name = is_named.then(|| quoted(name.unwrap_or_default()));
+            text += &name.into_iter().chain(counts).chain(values).collect::<Vec<_>>().join(",");
             text.push('\n');
         }
     }
     text
 }
 
-/// Quoted where it must be (RFC 4180).
-fn field(name: &str) -> String {
+/// CSV field, in quotes if it needs them (RFC 4180).
+fn quoted(name: &str) -> String {
     if name.contains([',', '"', '\n', '\r']) {
         format!("\"{}\"", name.replace('"', "\"\""))
     } else {
@@ -48,7 +39,7 @@ mod tests {
     use crate::drive::ErrorEstimate;
 
     #[test]
-    fn a_line_for_each_round() {
+    fn every_round_is_a_line() {
         let round = Round { seconds: 0.5, spp: 1, rays: 10, error: None, reference: None };
         let error = ErrorEstimate { relmse: 0.25, lower: 0.125, upper: 0.5 };
         let rounds = [round, Round { seconds: 1.5, spp: 2, error: Some(error), ..round }];

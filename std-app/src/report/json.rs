@@ -1,35 +1,19 @@
-//! The objects of `--json`, which scripts rely on (docs/cli.md). `run.json` is the same.
+//! Objects of `--json` and `run.json`: a contract with scripts (docs/cli.md).
 
-use super::{Maker, Race, Run};
+use super::{Provenance, Race, Run};
 use crate::compare::Comparison;
 use crate::drive::{
-    Against, Audited, Blurred, CausticUse, Deviation, Ending, ErrorEstimate, MapUse, Place, Region,
-    RenderResult, Round, Shard,
+    Against, Audited, Blurred, Deviation, Ending, ErrorEstimate, Place, Region, RenderResult, Round, Shard,
 };
 use halflight_core::film::Dropped;
+use halflight_core::findings::{Findings, Value as FindingValue};
 use serde_json::{Map, Value, json};
 
-/// A render.
+/// Object of a render.
 pub(super) fn run(run: &Run) -> Value {
-    let CausticUse { used, share, lacks_memory } = run.result.caustics;
-    let map = run.result.photons.and_then(|photons| photons.caustic).filter(|_| used).unwrap_or_default();
-    let mut object = most(run);
-    object["caustics"] = json!({
-        "used": used,
-        "share": share,
-        "lacks_memory": lacks_memory,
-        "paths": map.shot,
-        "photons": map.stored,
-    });
-    object
-}
-
-fn most(run: &Run) -> Value {
     let (result, settings) = (run.result, run.settings);
-    let left_out: Vec<Value> =
-        run.left_out().iter().map(|(what, why)| json!({ "what": what, "why": why })).collect();
-    let memory: Map<String, Value> =
-        result.memory.iter().map(|part| (part.structure.into(), part.bytes.into())).collect();
+    let plan = halflight_core::census::Census::of(run.scene).plan();
+    let memory = result.memory.iter().map(|part| (part.structure.into(), part.bytes.into()));
     let shard = settings.shard;
     json!({
         "method": result.method.name(),
@@ -58,107 +42,75 @@ fn most(run: &Run) -> Value {
         "paths": result.counters.paths,
         "mean_radiance": result.image.mean(),
         "error": error(run),
-        "history": result.history.iter().map(round).collect::<Vec<_>>(),
+        "history": result.history.iter().map(round).collect::<Value>(),
         "dropped": dropped_object(&result.counters.dropped, &result.places, result.empty_pixels),
         "filled_pixels": result.filled_pixels,
-        "memory": memory,
+        "memory": memory.collect::<Map<_, _>>(),
         "memory_peak": result.memory_peak,
-        "windows": {
-            "used": result.windows.used,
-            "gain": result.windows.gain.map(|gain| gain.factor()),
-            "lacks_memory": result.windows.lacks_memory,
-        },
-        "reuse": {
-            "used": result.reuse.used,
-            "gain": result.reuse.pilot.map(|pilot| pilot.gain()),
-            "cost": result.reuse.pilot.map(|pilot| pilot.cost()),
-        },
-        "cache": cache(run),
-        "photons": result.photons.map(|photons| {
-            let map = |map: MapUse| json!({
-                "paths_wanted": map.wanted,
-                "paths_given": map.given,
-                "paths_shot": map.shot,
-                "stored": map.stored,
-                "seen": map.seen,
-                "seen_by_power": map.by_power,
-            });
-            json!({
-                "maps": photons.maps,
-                "global": photons.global.map(map),
-                "caustic": photons.caustic.map(map),
-                "irradiances": photons.irradiances,
-                "seconds": result.seconds.photons,
-            })
-        }),
-        "left_out": left_out,
+        "findings": findings(&run.findings()),
+        "left_out": left_out_array(plan.left_out()),
         "outputs": run.outputs,
         "checkpoint": settings.checkpoint.as_ref().map(|checkpoint| &checkpoint.path),
         "shard": (shard != Shard::WHOLE).then(|| [shard.index + 1, shard.count]),
-        "made": made(run.maker),
+        "made": made(run.provenance),
     })
 }
 
-/// What became of the irradiance cache.
-fn cache(run: &Run) -> Value {
-    let (result, settings) = (run.result, run.settings);
-    json!(result.cache.map(|cache| json!({
-        "metric": settings.cache.metric.name(),
-        "rays_per_record": cache.rays,
-        "records": cache.records,
-        "capacity": cache.capacity,
-        "refused": cache.refused,
-        "loaded": cache.loaded,
-        "gathered": cache.gathered,
-        "cut": cache.is_cut,
-        "seconds": cache.seconds,
-        "allowed": settings.cache.allowed(),
-        "survey": result.survey.as_ref().map(|survey| json!({
-            "points": survey.points,
-            "reached": survey.checks.len() as f64 / survey.points.max(1) as f64,
-            "predicted": survey.predicted,
-            "achieved": survey.achieved,
-            "rms": survey.rms,
-            "noise": survey.noise,
-            "seconds": survey.seconds,
-        })),
-    })))
+/// Findings by topic: decision, reason and values.
+fn findings(findings: &Findings) -> Value {
+    let value = |value| match value {
+        FindingValue::Count(count) => count.into(),
+        FindingValue::Seconds(value) | FindingValue::Fraction(value) | FindingValue::Number(value) => {
+            Value::from(value)
+        }
+        FindingValue::Name(name) => name.into(),
+    };
+    let object = |finding: &halflight_core::findings::Finding| {
+        let mut object = json!({ "decision": finding.decision.name(), "reason": finding.reason });
+        finding.values().for_each(|(name, number)| object[name] = value(number));
+        (finding.topic.into(), object)
+    };
+    findings.iter().map(object).collect::<Map<_, _>>().into()
 }
 
-/// A race.
+/// Array `left_out`: features that a scene does not need, with reasons.
+pub fn left_out_array<'a>(features: impl Iterator<Item = (&'a str, &'a str)>) -> Value {
+    features.map(|(what, why)| json!({ "what": what, "why": why })).collect()
+}
+
+/// Object of a race.
 pub(super) fn race(race: &Race) -> Value {
-    let racers = race.racers.iter().enumerate().map(|(index, racer)| {
-        let mut object = run(&racer.run);
-        object["name"] = racer.name.clone().into();
+    let entries = race.entries.iter().enumerate().map(|(index, entry)| {
+        let mut object = run(&entry.run);
+        object["name"] = entry.name.clone().into();
         object["efficiency"] = race.efficiency(index).into();
         object["ratio"] = race.ratio(index).map(|ratio| ratio.value).into();
         object["ratio_interval"] = race.ratio(index).and_then(|ratio| ratio.interval).into();
         object
     });
-    let name = |index: usize| race.racers[index].name.as_str();
-    let leads = race.leads();
-    let leads =
-        leads.iter().map(|lead| json!({ "from": lead.from, "to": lead.to, "name": lead.who.map(name) }));
+    let name = |index: usize| race.entries[index].name.as_str();
+    let leads = race.leads().into_iter();
+    let leads = leads.map(|lead| json!({ "from": lead.from, "to": lead.to, "name": lead.leader.map(name) }));
     json!({
         "time": race.seconds,
         "against": if race.has_reference() { "reference" } else { "estimate" },
-        "methods": racers.collect::<Vec<_>>(),
-        "leads": leads.collect::<Vec<_>>(),
-        "made": made(race.maker),
+        "methods": entries.collect::<Value>(),
+        "leads": leads.collect::<Value>(),
+        "made": made(race.provenance),
     })
 }
 
-fn made(maker: &Maker) -> Value {
+fn made(provenance: &Provenance) -> Value {
     json!({
-        "command": maker.command,
-        "version": maker.version,
-        "machine": maker.machine,
-        "processors": maker.processors,
-        "date": maker.date,
+        "command": provenance.command,
+        "version": provenance.version,
+        "machine": provenance.machine,
+        "processors": provenance.processors,
+        "date": provenance.date,
     })
 }
 
-/// Against the reference where there is one, else as estimated; then `estimate` has the estimate too.
+/// Error against the reference, with the estimate in `estimate`; without a reference the estimate.
 fn error(run: &Run) -> Value {
     let RenderResult { error: estimate, blurred, audit, .. } = run.result;
     let (blurred, audit) = (*blurred, audit.as_ref());
@@ -168,7 +120,7 @@ fn error(run: &Run) -> Value {
             let mut error = comparison_object(comparison);
             error["interval"] = Value::Null;
             error["against"] = "reference".into();
-            error["estimate"] = estimate_object(*estimate, "estimate");
+            error["estimate"] = estimate_object(*estimate);
             with_bias(error, blurred, audit)
         }
     };
@@ -178,40 +130,39 @@ fn error(run: &Run) -> Value {
     error
 }
 
-/// The object of an estimate, with what photons blur, or an audit has found.
+/// Object of an estimate, with the blur of photons or the result of an audit.
 pub fn error_object(
     error: Option<ErrorEstimate>,
     blurred: Option<Blurred>,
     audit: Option<&Audited>,
 ) -> Value {
-    with_bias(estimate_object(error, "estimate"), blurred, audit)
+    with_bias(estimate_object(error), blurred, audit)
 }
 
-/// An error, with what photons blur, or an audit has found.
 fn with_bias(mut object: Value, blurred: Option<Blurred>, audit: Option<&Audited>) -> Value {
     if let Some(Blurred { noise, blur, .. }) = blurred {
-        object["noise"] = estimate_object(Some(noise), "estimate");
+        object["noise"] = estimate_object(Some(noise));
         object["blur"] = json!({ "relmse": blur.relmse, "interval": [blur.lower, blur.upper] });
     }
     if let Some(audit) = audit {
-        object["noise"] = estimate_object(Some(audit.noise), "estimate");
+        object["noise"] = estimate_object(Some(audit.noise));
         object["bias"] = bias(audit);
     }
     object
 }
 
-/// What an audit has found.
 fn bias(audit: &Audited) -> Value {
     let deviation = |deviation: &Deviation| json!({ "mean": deviation.mean, "error": deviation.error });
     let region = |region: &Region| {
-        let mut object = deviation(&region.deviation);
-        for (name, value) in
-            [("x", region.x), ("y", region.y), ("width", region.width), ("height", region.height)]
-        {
-            object[name] = value.into();
-        }
-        object["found"] = region.is_biased.into();
-        object
+        json!({
+            "x": region.x,
+            "y": region.y,
+            "width": region.width,
+            "height": region.height,
+            "mean": region.deviation.mean,
+            "error": region.deviation.error,
+            "found": region.is_biased,
+        })
     };
     json!({
         "found": audit.is_biased(),
@@ -219,7 +170,7 @@ fn bias(audit: &Audited) -> Value {
         "interval": [audit.bias.lower, audit.bias.upper],
         "detectable": audit.bias.detectable,
         "deviation": deviation(&audit.whole),
-        "regions": audit.regions.iter().map(region).collect::<Vec<_>>(),
+        "regions": audit.regions.iter().map(region).collect::<Value>(),
         "audit": {
             "share": audit.share,
             "pixels": audit.pixels,
@@ -233,17 +184,15 @@ fn bias(audit: &Audited) -> Value {
     })
 }
 
-/// The object of an estimate.
-fn estimate_object(error: Option<ErrorEstimate>, against: &str) -> Value {
-    match error {
-        Some(ErrorEstimate { relmse, lower, upper }) => {
-            json!({ "relmse": relmse, "interval": [lower, upper], "against": against })
-        }
-        None => json!({ "relmse": null, "interval": null, "against": against }),
-    }
+fn estimate_object(error: Option<ErrorEstimate>) -> Value {
+    json!({
+        "relmse": error.map(|error| error.relmse),
+        "interval": error.map(|error| [error.lower, error.upper]),
+        "against": "estimate",
+    })
 }
 
-/// An entry of `history`.
+/// Entry of `history`.
 fn round(round: &Round) -> Value {
     let mut object = json!({
         "seconds": round.seconds,
@@ -259,7 +208,7 @@ fn round(round: &Round) -> Value {
     object
 }
 
-/// The object of `compare --json`. Errors that are infinite are `null`: JSON has no infinity.
+/// Object of `compare --json`. Infinite errors are `null`, because JSON has no infinity.
 pub fn comparison_object(comparison: &Comparison) -> Value {
     let linear = &comparison.linear;
     json!({
@@ -276,23 +225,22 @@ pub fn comparison_object(comparison: &Comparison) -> Value {
     })
 }
 
-/// Places that are listed: those with the most.
-const LISTED: usize = 64;
+/// Tiles listed in `dropped`, worst first.
+const MAX_TILES: usize = 64;
 
-/// The object `dropped`.
-pub fn dropped_object(dropped: &Dropped, places: &[Place], empty_pixels: u64) -> Value {
-    let mut object = causes(dropped);
-    object["empty_pixels"] = empty_pixels.into();
-    object["tiles"] = places.len().into();
-    let place = |place: &Place| {
-        let mut object = causes(&place.dropped);
-        object["x"] = place.x.into();
-        object["y"] = place.y.into();
-        object["width"] = place.width.into();
-        object["height"] = place.height.into();
+/// Object `dropped`: rejected samples by cause, and the worst tiles.
+pub fn dropped_object(dropped: &Dropped, tiles: &[Place], empty_pixels: u64) -> Value {
+    let tile = |tile: &Place| {
+        let mut object = causes(&tile.dropped);
+        for (name, value) in [("x", tile.x), ("y", tile.y), ("width", tile.width), ("height", tile.height)] {
+            object[name] = value.into();
+        }
         object
     };
-    object["places"] = places.iter().take(LISTED).map(place).collect();
+    let mut object = causes(dropped);
+    object["empty_pixels"] = empty_pixels.into();
+    object["tiles"] = tiles.len().into();
+    object["places"] = tiles.iter().take(MAX_TILES).map(tile).collect();
     object
 }
 

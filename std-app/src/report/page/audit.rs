@@ -1,78 +1,80 @@
-//! What the audit has found: in words, in numbers, as a map.
+//! Audit of the bias: verdict, numbers and a map.
 
 use super::map::difference;
-use super::{fill, parts};
+use super::parts;
 use crate::compare::Shown;
 use crate::drive::{Audited, Deviation, Region};
 use crate::report::Run;
-use crate::report::words::{number, plural, readable_seconds};
+use crate::report::quantity::{number, plural, readable_seconds};
 use crate::save::Image;
+use maud::{Markup, html};
 
-/// The section of the audit; nothing where there was none.
-pub(super) fn section(run: &Run) -> String {
-    let Some(audit) = &run.result.audit else { return String::new() };
+/// Section of the audit; empty without one.
+pub(super) fn section(run: &Run) -> Markup {
+    let Some(audit) = &run.result.audit else { return html! {} };
     let facts = [
         ("Bias, as relMSE", number(audit.bias.relmse.max(0.0), 2)),
-        ("With 95&#8239;% at most", number(audit.bias.upper, 2)),
+        ("Upper bound, 95\u{202f}%", number(audit.bias.upper, 2)),
         ("Noise, as relMSE", number(audit.noise.relmse, 2)),
-        ("The whole picture is off by", percent(&audit.whole)),
+        ("Deviation of the whole picture", percent(&audit.whole)),
         ("Time of the audit", readable_seconds(audit.seconds)),
     ];
-    let pixels =
-        plural(audit.pixels.into(), "pixel") + ", with " + &plural(audit.samples.into(), "sample") + " each,";
-    fill(
-        include_str!("audit.html"),
-        &[("words", &words(audit, run.doubt())), ("facts", &parts::facts(&facts)), ("pixels", &pixels)],
-    )
+    html! {
+        section {
+            h2 { "Audit of the bias" }
+            p { (verdict(audit, run.doubt())) }
+            dl class="facts row" { (parts::facts(&facts)) }
+            p.note {
+                "Unbiased path tracing renders " (plural(audit.pixels.into(), "pixel")) " with "
+                (plural(audit.samples.into(), "sample")) " each, in step with the picture. Differences beyond the noise \
+                of both are bias. Means of regions are more certain than pixels, so a bias of one sign is detected \
+                before one that averages out. A bias below the noise is not detected."
+            }
+        }
+    }
 }
 
-/// The verdict.
-fn words(audit: &Audited, doubt: Option<&str>) -> String {
+fn verdict(audit: &Audited, doubt: Option<&str>) -> Markup {
     if let Some(doubt) = doubt.filter(|_| audit.is_blind) {
-        return format!("No verdict: {doubt}. The error is that of noise.");
+        return html! { "No verdict: " (doubt) ". The error is that of the noise." };
     }
     if !audit.is_biased() {
         let least = number(audit.bias.detectable, 1);
-        return format!("No bias was found. One of less than {least} in relMSE might not have been.");
+        return html! { "No bias was found. A relMSE below " (least) " may remain undetected." };
     }
     let biased = audit.regions.iter().filter(|region| region.is_biased);
-    let far = |a: &&Region, b: &&Region| a.deviation.mean.abs().total_cmp(&b.deviation.mean.abs());
-    let (count, worst) = (biased.clone().count(), biased.max_by(far));
-    let mut words = String::from("<strong>This picture is biased</strong>");
-    match worst {
-        Some(worst) => {
-            words += &format!(
-                ": {} of {} regions are, by {} in the worst.",
-                count,
-                audit.regions.len(),
-                percent(&worst.deviation)
-            );
+    let deviation = |region: &&Region| region.deviation.mean.abs();
+    let worst = biased.clone().max_by(|a, b| deviation(a).total_cmp(&deviation(b)));
+    html! {
+        strong { "This picture is biased" }
+        @if let Some(worst) = worst {
+            ": " (biased.count()) " of " (audit.regions.len()) " regions, the worst by "
+            (percent(&worst.deviation)) "."
+        } @else if audit.whole_is_biased() {
+            ": by " (percent(&audit.whole)) " as a whole."
+        } @else {
+            ", but in no single region significantly."
         }
-        None if audit.whole_is_biased() => words += &format!(": by {} as a whole.", percent(&audit.whole)),
-        None => words += ", by too little to say where.",
+        @if let Some(doubt) = doubt { " This is uncertain: " (doubt) "." }
     }
-    if let Some(doubt) = doubt {
-        words += &format!(" Or not: {doubt}.");
-    }
-    words
 }
 
-/// A deviation with its standard error.
+/// Deviation with its standard error.
 fn percent(deviation: &Deviation) -> String {
     let sign = if deviation.mean < 0.0 { '−' } else { '+' };
     let [mean, error] = [deviation.mean.abs(), deviation.error].map(|value| number(100.0 * value, 2));
-    format!("{sign}{mean}&#8239;% ± {error}&#8239;%")
+    format!("{sign}{mean}\u{202f}% ± {error}\u{202f}%")
 }
 
-/// The regions in false colours, where there is a bias. Those that chance may explain are white.
-pub(super) fn map(run: &Run) -> String {
+/// Map of the deviations of regions, if a bias was found. Regions within two standard errors are white.
+pub(super) fn map(run: &Run) -> Markup {
     let Some(audit) = run.result.audit.as_ref().filter(|audit| audit.is_biased()) else {
-        return String::new();
+        return html! {};
     };
     let Image { width, height, .. } = run.result.image;
     let mut values = Image::black(width, height);
-    let told = |region: &&Region| region.deviation.mean.abs() > 2.0 * region.deviation.error;
-    for region in audit.regions.iter().filter(told) {
+    let is_shown = |region: &&Region| region.deviation.mean.abs() > 2.0 * region.deviation.error;
+    for region in audit.regions.iter().filter(is_shown) {
         for y in region.y..region.y + region.height {
             let row = (y * width) as usize;
             values.pixels[row + region.x as usize..row + (region.x + region.width) as usize]
@@ -83,7 +85,7 @@ pub(super) fn map(run: &Run) -> String {
         &values,
         Shown::Relative,
         "Bias",
-        "Blue where a region is too dark, red where it is too bright, relative to what it shows; white where it is off \
-         by less than two standard errors. Of regions without a bias one in twenty has a colour.",
+        "Relative deviation of regions: blue is too dark, red is too bright, white is within two standard errors. One \
+         unbiased region in twenty has a colour.",
     )
 }

@@ -1,22 +1,15 @@
-//! Curves of error against time as SVG on logarithmic axes. Colours come from the style of the page, so that a
-//! chart follows it into the dark; every chart is drawn for windows of three widths, and one is shown.
+//! Curves of error against time as SVG, on logarithmic axes. Colours come from the style sheet, so charts follow
+//! the dark mode. A chart has three widths, of which the style sheet shows one.
 
-use super::escape;
 use crate::report::fit::Fit;
+use crate::report::quantity::{number, power_of_ten, readable_seconds};
 use crate::report::race::Lead;
-use crate::report::words::{number, power_of_ten, readable_seconds};
 use core::fmt::Write;
+use maud::{Markup, html};
 
-/// Writes to a string, which does not fail.
-macro_rules! put {
-    ($text:ident, $($arguments:tt)+) => {
-        let _ = write!($text, $($arguments)+);
-    };
-}
-
-/// A curve.
+/// Curve.
 pub(super) struct Series {
-    /// Its name.
+    /// Name in the legend.
     pub(super) name: String,
     /// Number of its colour and dash in the style sheet.
     pub(super) style: usize,
@@ -24,69 +17,80 @@ pub(super) struct Series {
     pub(super) points: Vec<[f64; 2]>,
     /// Seconds, and the ends of the interval.
     pub(super) band: Vec<[f64; 3]>,
-    /// The line through them.
+    /// Line through the points.
     pub(super) fit: Option<Fit>,
 }
 
-/// Curves together.
+/// Curves on common axes.
 pub(super) struct Chart {
-    /// What it shows, for those who do not see it.
+    /// Description for screen readers.
     pub(super) title: String,
     pub(super) series: Vec<Series>,
-    /// Who is ahead when; a strip along the axis.
+    /// Leaders over time, in a strip at the axis.
     pub(super) leads: Vec<Lead>,
 }
 
-/// Colours in the style sheet.
+/// Number of styles in the style sheet.
 pub(super) const STYLES: usize = 6;
 
-/// Points closer than this in ln(seconds) are not told apart.
-const NEAR: f64 = 0.004;
+/// Distance in ln(seconds) below which points merge.
+const MIN_DISTANCE: f64 = 0.004;
 
-/// Points up to which each has a mark.
-const MARKED: usize = 40;
+/// Number of points up to which each has a mark.
+const MAX_MARKS: usize = 40;
 
-/// Margins around the plot.
+/// Margins of the plot.
 const LEFT: f64 = 62.0;
 const RIGHT: f64 = 14.0;
 const TOP: f64 = 12.0;
 const BOTTOM: f64 = 46.0;
 
+/// Classes, widths and heights of the three plots.
+const SIZES: [(&str, f64, f64); 3] =
+    [("wide", 1080.0, 440.0), ("medium", 680.0, 380.0), ("narrow", 360.0, 330.0)];
+
+impl Series {
+    /// Class of the style sheet.
+    fn class(&self) -> String {
+        format!("s{}", self.style % STYLES)
+    }
+}
+
 impl Chart {
-    /// The chart and its legend; nothing where there are no curves.
-    pub(super) fn figure(&self) -> String {
-        let Some([x, y]) = self.axes() else { return String::new() };
-        let sizes = [("wide", 1080.0, 440.0), ("medium", 680.0, 380.0), ("narrow", 360.0, 330.0)];
-        let plots =
-            sizes.map(|(class, width, height)| Plot { width, height, x, y }.svg(self, class)).concat();
-        format!("<div class=\"chart\">{}{plots}</div>", self.legend())
+    /// Chart with its legend; empty without curves.
+    pub(super) fn figure(&self) -> Markup {
+        let Some([x, y]) = self.axes() else { return html! {} };
+        html! {
+            div.chart {
+                (self.legend())
+                @for (class, width, height) in SIZES { (Plot { width, height, x, y }.svg(self, class)) }
+            }
+        }
     }
 
-    fn legend(&self) -> String {
-        let entry = |series: &Series| {
-            let style = series.style % STYLES;
-            let line = format!(
-                "<svg viewBox=\"0 0 28 8\" aria-hidden=\"true\"><path class=\"curve s{style}\" d=\"M0 4H28\"/></svg>"
-            );
-            format!("<li>{line}{}</li>", escape(&series.name))
+    fn legend(&self) -> Markup {
+        let entry = |sample: &Markup, name: &str| {
+            html! { li { svg viewBox="0 0 28 8" aria-hidden="true" { (sample) } (name) } }
         };
-        let mut entries: String = self.series.iter().map(entry).collect();
-        if self.series.iter().any(|series| !series.band.is_empty()) {
-            entries += "<li><svg viewBox=\"0 0 28 8\" aria-hidden=\"true\"><rect class=\"band s0\" width=\"28\" height=\"8\"/></svg>\
-                        95 % interval</li>";
+        let line = |class: &str| html! { path class=(class) d="M0 4H28" {} };
+        let band = html! { rect class="band s0" width="28" height="8" {} };
+        html! {
+            ul.legend {
+                @for series in &self.series {
+                    (entry(&line(&format!("curve {}", series.class())), &series.name))
+                }
+                @if self.series.iter().any(|series| !series.band.is_empty()) { (entry(&band, "95 % interval")) }
+                @if self.series.iter().any(|series| series.fit.is_some()) { (entry(&line("fit"), "fitted line")) }
+            }
         }
-        if self.series.iter().any(|series| series.fit.is_some()) {
-            entries += "<li><svg viewBox=\"0 0 28 8\" aria-hidden=\"true\"><path class=\"fit\" d=\"M0 4H28\"/></svg>fitted line</li>";
-        }
-        format!("<ul class=\"legend\">{entries}</ul>")
     }
 
-    /// Axes that hold all points and bands.
+    /// Axes around all points and bands.
     fn axes(&self) -> Option<[Axis; 2]> {
         let points = || self.series.iter().flat_map(|series| &series.points);
         let bands = self.series.iter().flat_map(|series| &series.band);
         let x = Axis::close(points().map(|point| point[0]))?;
-        // Intervals that reach far below the curve would flatten it.
+        // Intervals far below the curve would flatten it.
         let lowest = points().map(|point| point[1]).fold(f64::INFINITY, f64::min);
         let y =
             Axis::around(points().map(|p| p[1]).chain(bands.flat_map(|b| [b[1].max(0.5 * lowest), b[2]])))?;
@@ -94,7 +98,7 @@ impl Chart {
     }
 }
 
-/// A logarithmic axis.
+/// Logarithmic axis.
 #[derive(Clone, Copy)]
 struct Axis {
     low: f64,
@@ -102,7 +106,7 @@ struct Axis {
 }
 
 impl Axis {
-    /// From the last round number below the positive `values` to the first above.
+    /// Axis from the last round number below the positive `values` to the first above.
     fn around(values: impl Iterator<Item = f64>) -> Option<Axis> {
         let (low, high) = ends(values);
         let rounds = || (-324..309).flat_map(|decade| [1.0, 2.0, 5.0].map(|d| d * 10f64.powi(decade)));
@@ -111,56 +115,61 @@ impl Axis {
         (low < high).then_some(Axis { low, high })
     }
 
-    /// From a little below the positive `values` to a little above.
+    /// Axis from slightly below the positive `values` to slightly above.
     fn close(values: impl Iterator<Item = f64>) -> Option<Axis> {
         let (low, high) = ends(values);
-        let little = (high / low).powf(0.02).max(1.1);
-        (low <= high).then_some(Axis { low: low / little, high: high * little })
+        let margin = (high / low).powf(0.02).max(1.1);
+        (low <= high).then_some(Axis { low: low / margin, high: high * margin })
     }
 
-    fn place(&self, value: f64) -> f64 {
+    /// Position of a value, from 0 at the low end to 1.
+    fn position(&self, value: f64) -> f64 {
         (value / self.low).ln() / (self.high / self.low).ln()
     }
 
-    /// Values of the grid, and whether each has a label: every decade, 2 and 5 where there are few, and all digits
-    /// within one.
+    /// Grid values, and whether each has a label: every decade; 2 and 5 on short axes; all digits within a decade.
     fn ticks(&self) -> Vec<(f64, bool)> {
         let decades = (self.high / self.low).log10();
         let first = self.low.log10().floor() as i32;
         let last = self.high.log10().ceil() as i32;
-        let every = (decades / 8.0).ceil().max(1.0) as i32;
+        let step = (decades / 8.0).ceil().max(1.0) as i32;
         let digits = (1..10).filter(|digit| [1, 2, 5].contains(digit) || decades < 0.8);
         let ticks = (first..=last).flat_map(|decade| {
             digits.clone().map(move |digit| {
-                let labelled = if digit == 1 { decade % every == 0 } else { decades < 2.3 };
-                (f64::from(digit) * 10f64.powi(decade), labelled)
+                let has_label = if digit == 1 { decade % step == 0 } else { decades < 2.3 };
+                (f64::from(digit) * 10f64.powi(decade), has_label)
             })
         });
         let inside = |value: f64| value >= self.low * (1.0 - 1e-9) && value <= self.high * (1.0 + 1e-9);
-        ticks.filter(|&(value, labelled)| inside(value) && (labelled || decades < 5.0)).collect()
+        ticks.filter(|&(value, has_label)| inside(value) && (has_label || decades < 5.0)).collect()
     }
 }
 
-/// The smallest and the largest of the positive `values`.
+/// Smallest and largest of the positive `values`.
 fn ends(values: impl Iterator<Item = f64>) -> (f64, f64) {
     let positive = values.filter(|value| *value > 0.0 && value.is_finite());
     positive.fold((f64::INFINITY, 0.0), |(low, high): (f64, f64), value| (low.min(value), high.max(value)))
 }
 
-/// A value of the grid in as few signs as it takes.
-fn label(value: f64, seconds: bool) -> String {
+/// Shortest label of a grid value.
+fn label(value: f64, is_seconds: bool) -> String {
     let decade = value.log10().floor() as i32;
     let digit = (value / 10f64.powi(decade)).round();
     match (digit, decade) {
         (_, 0..=3) => format!("{value:.0}"),
         (_, -2..=-1) => format!("{value:.*}", -decade as usize),
-        (_, -3) if seconds => format!("{value:.3}"),
+        (_, -3) if is_seconds => format!("{value:.3}"),
         (1.0, _) => power_of_ten(decade),
         _ => number(value, 1).replace(' ', ""),
     }
 }
 
-/// A chart of a size, in units of about a pixel.
+/// Coordinate in tenths of a pixel.
+fn px(value: f64) -> String {
+    format!("{value:.1}")
+}
+
+/// Chart of one size, in units of about a pixel.
 struct Plot {
     width: f64,
     height: f64,
@@ -170,97 +179,83 @@ struct Plot {
 
 impl Plot {
     fn x(&self, seconds: f64) -> f64 {
-        LEFT + self.x.place(seconds) * (self.width - LEFT - RIGHT)
+        LEFT + self.x.position(seconds) * (self.width - LEFT - RIGHT)
     }
 
-    /// Nothing is drawn below the plot.
+    /// Coordinate of an error, clamped to the lower end of the axis.
     fn y(&self, error: f64) -> f64 {
-        let place = self.y.place(error.max(self.y.low));
-        self.height - BOTTOM - place * (self.height - TOP - BOTTOM)
+        let position = self.y.position(error.max(self.y.low));
+        self.height - BOTTOM - position * (self.height - TOP - BOTTOM)
     }
 
-    fn svg(&self, chart: &Chart, class: &str) -> String {
-        let Plot { width, height, .. } = *self;
-        let mut svg = format!(
-            "<svg class=\"plot {class}\" viewBox=\"0 0 {width} {height}\" role=\"img\" aria-label=\"{}\">",
-            escape(&chart.title)
-        );
-        self.grid(&mut svg);
-        for series in &chart.series {
-            self.series(&mut svg, series);
+    fn svg(&self, chart: &Chart, class: &str) -> Markup {
+        let view_box = format!("0 0 {} {}", self.width, self.height);
+        html! {
+            svg class={ "plot " (class) } viewBox=(view_box) role="img" aria-label=(chart.title) {
+                (self.grid())
+                @for series in &chart.series { (self.series(series)) }
+                (self.leads(chart))
+            }
         }
-        self.leads(&mut svg, chart);
-        svg + "</svg>"
     }
 
-    fn grid(&self, svg: &mut String) {
+    fn grid(&self) -> Markup {
         let (left, right, top, bottom) = (LEFT, self.width - RIGHT, TOP, self.height - BOTTOM);
-        for (seconds, labelled) in self.x.ticks() {
-            let x = self.x(seconds);
-            let class = if labelled { "" } else { " class=\"minor\"" };
-            put!(svg, "<path{class} d=\"M{x:.1} {top}V{bottom}\"/>");
-            if labelled {
-                let y = bottom + 18.0;
-                put!(svg, "<text class=\"below\" x=\"{x:.1}\" y=\"{y}\">{}</text>", label(seconds, true));
-            }
-        }
-        for (error, labelled) in self.y.ticks() {
-            let y = self.y(error);
-            let class = if labelled { "" } else { " class=\"minor\"" };
-            put!(svg, "<path{class} d=\"M{left} {y:.1}H{right}\"/>");
-            if labelled {
-                let (x, y) = (left - 8.0, y + 4.5);
-                put!(svg, "<text class=\"beside\" x=\"{x}\" y=\"{y:.1}\">{}</text>", label(error, false));
-            }
-        }
-        let (middle, foot) = (0.5 * (left + right), self.height - 6.0);
-        put!(svg, "<text class=\"axis below\" x=\"{middle}\" y=\"{foot}\">seconds of rendering</text>");
         let middle = 0.5 * (top + bottom);
-        put!(
-            svg,
-            "<text class=\"axis below\" transform=\"translate(14 {middle}) rotate(-90)\">relMSE</text>"
-        );
+        let class = |has_label: bool| (!has_label).then_some("minor");
+        html! {
+            @for (seconds, has_label) in self.x.ticks() {
+                @let x = px(self.x(seconds));
+                path class=[class(has_label)] d=(format!("M{x} {top}V{bottom}")) {}
+                @if has_label { text.below x=(x) y=(bottom + 18.0) { (label(seconds, true)) } }
+            }
+            @for (error, has_label) in self.y.ticks() {
+                @let y = self.y(error);
+                path class=[class(has_label)] d=(format!("M{left} {y:.1}H{right}")) {}
+                @if has_label { text.beside x=(left - 8.0) y=(px(y + 4.5)) { (label(error, false)) } }
+            }
+            text class="axis below" x=(0.5 * (left + right)) y=(self.height - 6.0) { "seconds of rendering" }
+            text class="axis below" transform=(format!("translate(14 {middle}) rotate(-90)")) { "relMSE" }
+        }
     }
 
-    fn series(&self, svg: &mut String, series: &Series) {
-        let style = series.style % STYLES;
+    fn series(&self, series: &Series) -> Markup {
+        let class = series.class();
         let band = thinned(&series.band, |point| point[0]);
-        if band.len() > 1 {
-            let upper = band.iter().map(|[t, _, upper]| (*t, *upper));
-            let lower = band.iter().rev().map(|[t, lower, _]| (*t, *lower));
-            put!(svg, "<path class=\"band s{style}\" d=\"{}Z\"/>", self.path(upper.chain(lower)));
-        }
+        let upper = band.iter().map(|[t, _, upper]| (*t, *upper));
+        let lower = band.iter().rev().map(|[t, lower, _]| (*t, *lower));
         let points = thinned(&series.points, |point| point[0]);
-        if let (Some(fit), Some(first), Some(last)) = (&series.fit, points.first(), points.last()) {
-            let ends = [first[0].max(fit.from), last[0]].map(|seconds| (seconds, fit.at(seconds)));
-            put!(svg, "<path class=\"fit\" d=\"{}\"/>", self.path(ends.into_iter()));
-        }
-        let path = self.path(points.iter().map(|point| (point[0], point[1])));
-        put!(svg, "<path class=\"curve s{style}\" d=\"{path}\"/>");
-        for [seconds, error] in points.iter().filter(|_| points.len() <= MARKED) {
-            let (x, y) = (self.x(*seconds), self.y(*error));
-            let words =
-                format!("{}: {} after {}", series.name, number(*error, 3), readable_seconds(*seconds));
-            put!(
-                svg,
-                "<circle class=\"s{style}\" cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"3\"><title>{}</title></circle>",
-                escape(&words)
-            );
+        let fit = series.fit.as_ref().zip(points.first().zip(points.last()));
+        let fit = fit.map(|(fit, (first, last))| {
+            [first[0].max(fit.from), last[0]].map(|seconds| (seconds, fit.error_at(seconds)))
+        });
+        html! {
+            @if band.len() > 1 {
+                path class={ "band " (class) } d={ (self.path(upper.chain(lower))) "Z" } {}
+            }
+            @if let Some(ends) = fit { path.fit d=(self.path(ends.into_iter())) {} }
+            path class={ "curve " (class) } d=(self.path(points.iter().map(|point| (point[0], point[1])))) {}
+            @for [seconds, error] in points.iter().filter(|_| points.len() <= MAX_MARKS) {
+                circle class=(class) cx=(px(self.x(*seconds))) cy=(px(self.y(*error))) r="3" {
+                    title {
+                        (series.name) ": " (number(*error, 3)) " after " (readable_seconds(*seconds))
+                    }
+                }
+            }
         }
     }
 
-    fn leads(&self, svg: &mut String, chart: &Chart) {
+    fn leads(&self, chart: &Chart) -> Markup {
         let y = self.height - BOTTOM - 7.0;
-        for lead in &chart.leads {
-            let (x, width) = (self.x(lead.from), self.x(lead.to) - self.x(lead.from));
-            let series = lead.who.and_then(|who| chart.series.get(who));
-            let class = series.map_or("open".into(), |series| format!("s{}", series.style % STYLES));
-            let name = series.map_or("too close to tell", |series| &series.name);
-            put!(
-                svg,
-                "<rect class=\"lead {class}\" x=\"{x:.1}\" y=\"{y}\" width=\"{width:.1}\" height=\"7\"><title>{}</title></rect>",
-                escape(name)
-            );
+        html! {
+            @for lead in &chart.leads {
+                @let series = lead.leader.and_then(|leader| chart.series.get(leader));
+                @let class = series.map_or("open".into(), Series::class);
+                @let (x, end) = (self.x(lead.from), self.x(lead.to));
+                rect class={ "lead " (class) } x=(px(x)) y=(y) width=(px(end - x)) height="7" {
+                    title { (series.map_or("no clear leader", |series| &series.name)) }
+                }
+            }
         }
     }
 
@@ -268,18 +263,19 @@ impl Plot {
         let mut path = String::new();
         for (seconds, error) in points.filter(|(seconds, error)| *seconds > 0.0 && error.is_finite()) {
             let sign = if path.is_empty() { 'M' } else { 'L' };
-            put!(path, "{sign}{:.1} {:.1}", self.x(seconds), self.y(error));
+            // Writing to a string does not fail.
+            let _ = write!(path, "{sign}{:.1} {:.1}", self.x(seconds), self.y(error));
         }
         path
     }
 }
 
-/// Points that can be told apart, the last always among them.
+/// Points at visible distances, and the last one.
 fn thinned<T: Copy>(points: &[T], seconds: impl Fn(&T) -> f64) -> Vec<T> {
     let mut kept: Vec<T> = Vec::new();
     for (index, point) in points.iter().enumerate() {
-        let far = kept.last().is_none_or(|last| seconds(point) >= seconds(last) * (1.0 + NEAR));
-        if far || index + 1 == points.len() {
+        let is_far = kept.last().is_none_or(|last| seconds(point) >= seconds(last) * (1.0 + MIN_DISTANCE));
+        if is_far || index + 1 == points.len() {
             kept.push(*point);
         }
     }
@@ -294,8 +290,8 @@ mod tests {
     fn axes_end_at_round_numbers() {
         let axis = Axis::around([0.031, 7.0].into_iter()).unwrap();
         assert!((axis.low - 0.02).abs() < 1e-9 && axis.high == 10.0);
-        assert!(axis.place(axis.low).abs() < 1e-12 && (axis.place(10.0) - 1.0).abs() < 1e-12);
-        assert!(axis.ticks().iter().any(|&(value, labelled)| value == 1.0 && labelled));
+        assert!(axis.position(axis.low).abs() < 1e-12 && (axis.position(10.0) - 1.0).abs() < 1e-12);
+        assert!(axis.ticks().iter().any(|&(value, has_label)| value == 1.0 && has_label));
         let point = Axis::around([1.0].into_iter()).unwrap();
         assert_eq!((point.low, point.high), (1.0, 2.0));
         assert!(Axis::around([0.0, f64::NAN, f64::INFINITY].into_iter()).is_none());
@@ -321,8 +317,8 @@ mod tests {
         assert!(kept.len() < 1000 && kept.last() == points.last());
         let series = Series { name: "<a>".into(), style: 9, points, band: vec![], fit: None };
         let chart = Chart { title: "\"t\"".into(), series: vec![series], leads: vec![] };
-        let figure = chart.figure();
+        let figure = chart.figure().into_string();
         assert!(!figure.contains("<a>") && figure.contains("&lt;a&gt;") && figure.contains("&quot;t&quot;"));
-        assert_eq!(Chart { title: String::new(), series: vec![], leads: vec![] }.figure(), "");
+        assert_eq!(Chart { title: String::new(), series: vec![], leads: vec![] }.figure().into_string(), "");
     }
 }

@@ -1,217 +1,179 @@
-//! The error of a render in words, as a curve and round by round.
+//! Error of a render in sentences, as a curve and by rounds.
 
 use super::chart::{Chart, Series};
+use super::parts;
 use crate::drive::{ErrorEstimate, RenderResult, Round};
 use crate::report::Run;
 use crate::report::fit::{Fit, Point};
-use crate::report::words::{grouped, number, readable_seconds};
+use crate::report::quantity::{grouped, number, readable_seconds};
+use maud::{Markup, html};
 
-/// `a × 10⁻³`, in 2 digits.
-fn short(value: f64) -> String {
-    number(value, 2)
-}
-
-/// Two ends of an interval.
-pub(super) fn between(lower: f64, upper: f64) -> String {
+/// Ends of an interval.
+pub(super) fn range(lower: f64, upper: f64) -> String {
     format!("{} to {}", number(lower, 3), number(upper, 3))
 }
 
-/// An interval is vague whose ends differ by more than this factor.
-const VAGUE: f64 = 10.0;
+/// Ratio of the ends above which an interval is called uncertain.
+const UNCERTAIN: f64 = 10.0;
 
-/// The first sentences of the page, as HTML.
-pub(super) fn lead(run: &Run) -> String {
+/// First sentences of the page.
+pub(super) fn lead(run: &Run) -> Markup {
     let interval = |error: ErrorEstimate| {
-        format!(
-            "<strong>{}</strong> (95&#8239;%: {})",
-            number(error.relmse, 3),
-            between(error.lower, error.upper)
-        )
+        html! {
+            strong { (number(error.relmse, 3)) } " (95\u{202f}%: " (range(error.lower, error.upper)) ")"
+        }
+    };
+    let source = match run.result {
+        RenderResult { audit: Some(_), .. } => "noise and audit",
+        RenderResult { blurred: Some(_), .. } => "noise and blur of photons",
+        _ => "noise",
     };
     match (run.comparison, run.result.error) {
-        (Some(comparison), estimate) => {
-            let relmse = comparison.linear.relmse;
-            let estimate = estimate.map_or("unknown".into(), interval);
-            format!(
-                "Against the reference this picture has a relMSE of <strong>{}</strong>{}. \
-                 Estimated from its own noise{} it would be {estimate}.",
-                number(relmse, 3),
-                typical(relmse),
-                match run.result {
-                    RenderResult { audit: Some(_), .. } => " and an audit of its bias",
-                    RenderResult { blurred: Some(_), .. } => " and what its photons blur",
-                    _ => "",
-                },
-            )
-        }
-        (None, Some(error)) if error.upper > VAGUE * error.lower => format!(
-            "The relMSE of this picture is not well known: with 95&#8239;% confidence it lies in {}, and is \
-             estimated at <strong>{}</strong>. A few samples that are far brighter than the others decide.",
-            between(error.lower, error.upper),
-            number(error.relmse, 2)
-        ),
-        (None, Some(error)) => format!(
-            "This picture has a relMSE of about {}, as its own noise {}{}.",
-            interval(error),
-            match run.result {
-                RenderResult { audit: Some(_), .. } => "and an audit of its bias tell",
-                RenderResult { blurred: Some(_), .. } => "and what its photons blur tell",
-                _ => "tells",
-            },
-            typical(error.relmse),
-        ),
-        (None, None) => {
-            "The error of this picture is not known: it takes four samples of each pixel, and some light."
-                .into()
-        }
+        (Some(comparison), estimate) => html! {
+            "This picture has a relMSE of " strong { (number(comparison.linear.relmse, 3)) }
+            " against the reference" (typical(comparison.linear.relmse)) ". The estimate from its " (source) " is "
+            @if let Some(error) = estimate { (interval(error)) } @else { "unknown" } "."
+        },
+        (None, Some(error)) if error.upper > UNCERTAIN * error.lower => html! {
+            "The relMSE of this picture is uncertain: the estimate is " strong { (number(error.relmse, 2)) }
+            ", the 95\u{202f}% interval " (range(error.lower, error.upper))
+            ". A few very bright samples dominate the error."
+        },
+        (None, Some(error)) => html! {
+            "This picture has a relMSE of about " (interval(error)) ", estimated from its " (source)
+            (typical(error.relmse)) "."
+        },
+        (None, None) => html! {
+            "The error of this picture is unknown: the estimate needs four samples per pixel and some light."
+        },
     }
 }
 
-/// What a relMSE means for a pixel.
+/// Typical error of a pixel with this relMSE.
 fn typical(relmse: f64) -> String {
-    if !relmse.is_finite() {
-        return String::new();
+    match relmse.is_finite() {
+        true => format!(": a typical pixel is off by {}\u{202f}%", number(100.0 * relmse.sqrt(), 2)),
+        false => String::new(),
     }
-    format!(": a pixel is off by about {}&#8239;% of its brightness", short(100.0 * relmse.sqrt()))
 }
 
 /// Styles of the curves.
 const ESTIMATE: usize = 0;
 const REFERENCE: usize = 1;
 
-/// The curves of a render: as estimated, and against the reference.
+/// Curves of a render: estimate, and error against the reference.
 pub(super) fn chart(run: &Run) -> Chart {
     let history = &run.result.history;
     let mut series = vec![estimated(history, "estimate", ESTIMATE)];
-    if run.settings.reference.is_some() {
+    if run.reference().is_some() {
         series.push(measured(history, "against the reference", REFERENCE));
     }
     series.retain(|series| !series.points.is_empty());
-    Chart {
-        title: "The error, relMSE, against seconds of rendering, on logarithmic axes".into(),
-        series,
-        leads: Vec::new(),
-    }
+    let title = "relMSE against seconds of rendering, on logarithmic axes".into();
+    Chart { title, series, leads: Vec::new() }
 }
 
-/// The curve of the estimates, with its band and line.
+/// Curve of the estimates, with its interval and fit.
 pub(super) fn estimated(history: &[Round], name: &str, style: usize) -> Series {
-    let known = || history.iter().filter_map(|round| Some((round.seconds, round.error?)));
-    let known = || known().filter(|(_, error)| error.relmse > 0.0);
-    let point = |(seconds, error): (f64, ErrorEstimate)| Point { seconds, error: error.relmse };
-    Series {
-        name: name.into(),
-        style,
-        points: known().map(|(seconds, error)| [seconds, error.relmse]).collect(),
-        band: known().map(|(seconds, error)| [seconds, error.lower, error.upper]).collect(),
-        fit: Fit::through(known().map(point)),
-    }
+    let rounds = history.iter().filter_map(|round| Some((round.seconds, round.error?)));
+    let rounds: Vec<_> = rounds.filter(|(_, error)| error.relmse > 0.0).collect();
+    let points = rounds.iter().map(|(seconds, error)| [*seconds, error.relmse]).collect();
+    let band = rounds.iter().map(|(seconds, error)| [*seconds, error.lower, error.upper]).collect();
+    series(name, style, points, band)
 }
 
-/// The curve against the reference, with its line.
+/// Curve against the reference, with its fit.
 pub(super) fn measured(history: &[Round], name: &str, style: usize) -> Series {
-    let known = || history.iter().filter_map(|round| Some((round, round.reference?.linear.relmse)));
-    let known = || known().filter(|(_, relmse)| *relmse > 0.0 && relmse.is_finite());
-    let point = |(round, error): (&Round, f64)| Point { seconds: round.seconds, error };
-    Series {
-        name: name.into(),
-        style,
-        points: known().map(|(round, relmse)| [round.seconds, relmse]).collect(),
-        band: Vec::new(),
-        fit: Fit::through(known().map(point)),
+    let points = history.iter().filter_map(|round| Some([round.seconds, round.reference?.linear.relmse]));
+    let is_positive = |[_, relmse]: &[f64; 2]| *relmse > 0.0 && relmse.is_finite();
+    series(name, style, points.filter(is_positive).collect(), Vec::new())
+}
+
+fn series(name: &str, style: usize, points: Vec<[f64; 2]>, band: Vec<[f64; 3]>) -> Series {
+    let fit = Fit::through(points.iter().map(|&[seconds, error]| Point { seconds, error }));
+    Series { name: name.into(), style, points, band, fit }
+}
+
+/// Slopes of the curves and the time to the next power of ten.
+pub(super) fn slopes(chart: &Chart) -> Markup {
+    let fits: Vec<_> =
+        chart.series.iter().filter_map(|series| Some((series, series.fit.as_ref()?))).collect();
+    // The curve against the reference, the last one, is the better one.
+    let Some((series, fit)) = fits.last() else {
+        return html! { p { "A fit needs five rounds." } };
+    };
+    html! {
+        p {
+            "From " (time(fit.from)) " on, the error falls as a power of time: "
+            @for (index, (series, fit)) in fits.iter().enumerate() {
+                @if index > 0 { ", " }
+                strong { (hundredths(fit.slope)) } " (95\u{202f}%: " (hundredths(fit.interval[0])) " to "
+                (hundredths(fit.interval[1])) ") " (if series.style == ESTIMATE { "estimated" } else { &series.name })
+            }
+            ". Independent samples give −1." (prediction(series, fit))
+        }
     }
 }
 
-/// What the slope of the curves is, and what it promises.
-pub(super) fn slopes(chart: &Chart) -> String {
-    let fitted = || chart.series.iter().filter_map(|series| Some((series, series.fit.as_ref()?)));
-    let slope = |(series, fit): (&Series, &Fit)| {
-        let [lower, upper] = fit.interval.map(decimal);
-        let which = if series.style == ESTIMATE { "as estimated" } else { "against the reference" };
-        format!("<strong>{}</strong> (95&#8239;%: {lower} to {upper}) {which}", decimal(fit.slope))
-    };
-    let words: Vec<String> = fitted().map(slope).collect();
-    // The last is the better one, where there are two.
-    let Some((series, fit)) = fitted().next_back() else {
-        return "<p>Too few rounds to fit a line: five are needed.</p>".into();
-    };
-    format!(
-        "<p>From {} on, the error falls as time to the power {}; independent samples give −1.{}</p>",
-        time(fit.from),
-        words.join(" and "),
-        promise(series, fit),
-    )
-}
-
-/// In hundredths.
-fn decimal(value: f64) -> String {
+fn hundredths(value: f64) -> String {
     format!("{value:.2}").replace('-', "−")
 }
 
-/// Seconds that stay on one line.
+/// Seconds without a line break.
 fn time(seconds: f64) -> String {
     readable_seconds(seconds).replace(' ', "\u{a0}")
 }
 
-/// Longest time that is foretold, as a multiple of the time that was rendered.
-const FURTHEST: f64 = 1000.0;
+/// Longest predicted time, as a multiple of the rendering time.
+const MAX_PREDICTION: f64 = 1000.0;
 
-/// The time for the next power of ten below.
-fn promise(series: &Series, fit: &Fit) -> String {
+/// Time to the next power of ten below the error.
+fn prediction(series: &Series, fit: &Fit) -> String {
     let Some([now, error]) = series.points.last().copied() else { return String::new() };
     let goal = 10f64.powf((0.99 * error).log10().floor());
-    let seconds = fit.when(goal);
-    if fit.interval[1] >= 0.0 || !(now..now * FURTHEST).contains(&seconds) {
+    let seconds = fit.seconds_to(goal);
+    if fit.interval[1] >= 0.0 || !(now..now * MAX_PREDICTION).contains(&seconds) {
         return String::new();
     }
-    format!(" At this pace a relMSE of {} would take {}.", number(goal, 1), time(seconds))
+    format!(" At this rate a relMSE of {} takes {}.", number(goal, 1), time(seconds))
 }
 
-/// Rounds of the table at most; the others are in `curve.csv`.
-const ROWS: usize = 40;
+/// Rounds of the table, at most.
+const MAX_ROWS: usize = 40;
 
-/// The rounds as a table.
-pub(super) fn rounds(run: &Run) -> String {
+/// Table of rounds, spread evenly over the logarithm of time.
+pub(super) fn rounds(run: &Run) -> Markup {
     let history = &run.result.history;
     let mut rows: Vec<&Round> = Vec::new();
     for (index, round) in history.iter().enumerate() {
-        let growth = (history[history.len() - 1].seconds / history[0].seconds).powf(1.0 / ROWS as f64);
-        let far = rows.last().is_none_or(|last| round.seconds >= last.seconds * growth);
-        if history.len() <= ROWS || far || index + 1 == history.len() {
+        let growth = (history[history.len() - 1].seconds / history[0].seconds).powf(1.0 / MAX_ROWS as f64);
+        let is_later = rows.last().is_none_or(|last| round.seconds >= last.seconds * growth);
+        if history.len() <= MAX_ROWS || is_later || index + 1 == history.len() {
             rows.push(round);
         }
     }
-    let reference = run.settings.reference.is_some();
+    let has_reference = run.reference().is_some();
     let mut head = vec!["time", "samples per pixel", "rays", "relMSE, estimated", "95 % interval"];
-    if reference {
-        head.extend(["relMSE", "FLIP"]);
-    }
-    let head: String = head.iter().map(|name| format!("<th scope=\"col\">{name}</th>")).collect();
-    let dash = || "–".to_string();
-    let body = rows.iter().map(|round| {
+    head.extend(if has_reference { &["relMSE", "FLIP"][..] } else { &[] });
+    let number_or_dash = |value: Option<f64>| value.map_or("–".into(), |value| number(value, 3));
+    let cells = |round: &&Round| {
         let mut cells = vec![
             readable_seconds(round.seconds),
             grouped(round.spp.into()),
             grouped(round.rays),
-            round.error.map_or_else(dash, |error| number(error.relmse, 3)),
-            round.error.map_or_else(dash, |error| between(error.lower, error.upper)),
+            number_or_dash(round.error.map(|error| error.relmse)),
+            round.error.map_or("–".into(), |error| range(error.lower, error.upper)),
         ];
-        if reference {
-            let against = round.reference;
-            cells.push(against.map_or_else(dash, |against| number(against.linear.relmse, 3)));
-            cells.push(against.map_or_else(dash, |against| number(against.flip, 3)));
+        if has_reference {
+            cells.push(number_or_dash(round.reference.map(|reference| reference.linear.relmse)));
+            cells.push(number_or_dash(round.reference.map(|reference| reference.flip)));
         }
-        let cells: String = cells.iter().map(|cell| format!("<td>{cell}</td>")).collect();
-        format!("<tr>{cells}</tr>")
-    });
-    let all = if rows.len() < history.len() {
-        format!("<p>{} of {} rounds; all are in <code>curve.csv</code>.</p>", rows.len(), history.len())
-    } else {
-        String::new()
+        cells
     };
-    let body: String = body.collect();
-    format!(
-        "<div class=\"scroll\" tabindex=\"0\" role=\"region\" aria-label=\"Rounds\"><table class=\"numbers\">\
-         <thead><tr>{head}</tr></thead><tbody>{body}</tbody></table></div>{all}"
-    )
+    html! {
+        (parts::table("Rounds", &head, &rows.iter().map(cells).collect::<Vec<_>>(), false))
+        @if rows.len() < history.len() {
+            p { (rows.len()) " of " (history.len()) " rounds; all rounds are in " code { "curve.csv" } "." }
+        }
+    }
 }

@@ -1,103 +1,98 @@
-//! Maps of what is known of each pixel, in false colours on a logarithmic scale.
+//! Maps of values per pixel, in false colours on a logarithmic scale.
 
 use super::picture::{img, reduced};
-use super::{escape, fill};
 use crate::compare::heat::{HEAT, SIGNED, heat};
 use crate::compare::{Shown, false_colours};
-use crate::report::words::{grouped, number};
+use crate::report::quantity::{grouped, number};
 use crate::save::{Image, from_srgb};
+use maud::{Markup, html};
 
-/// Widest scale that is shown.
-const MOST_RANGE: f32 = 1e6;
-/// Narrowest one.
-const LEAST_RANGE: f32 = 10.0;
+/// Limits of the ratio of the ends of a scale.
+const MAX_RANGE: f32 = 1e6;
+const MIN_RANGE: f32 = 10.0;
 
-/// A value for each pixel.
+/// Value for each pixel.
 pub(super) struct Map {
-    /// Pixels in a row.
+    /// Pixels per row.
     pub(super) width: u32,
-    /// Row by row.
+    /// Values, row by row.
     pub(super) values: Vec<f32>,
 }
 
 impl Map {
-    /// The mean of the square of `2 * reach + 1` pixels around each.
-    pub(super) fn smoothed(&self, reach: usize) -> Map {
+    /// Means over squares of `2 * radius + 1` pixels around each pixel.
+    pub(super) fn smoothed(&self, radius: usize) -> Map {
         let width = self.width as usize;
-        let rows = blurred(&self.values, width, reach);
-        let turned = transposed(&rows, width);
+        let rows = blurred(&self.values, width, radius);
+        let columns = transposed(&rows, width);
         let height = self.values.len() / width.max(1);
-        Map { values: transposed(&blurred(&turned, height, reach), height), ..*self }
+        Map { values: transposed(&blurred(&columns, height, radius), height), ..*self }
     }
 
-    /// A figure of the map, on a scale from the hundredth part to all but the last of its pixels.
-    pub(super) fn figure(&self, title: &str, words: &str) -> String {
+    /// Figure on a scale from the 1 % quantile to the 99.5 % quantile of the positive values.
+    pub(super) fn figure(&self, title: &str, text: &str) -> Markup {
         let mut sorted: Vec<f32> =
             self.values.iter().copied().filter(|&v| v > 0.0 && v.is_finite()).collect();
         sorted.sort_unstable_by(f32::total_cmp);
-        let part =
-            |share: f64| sorted.get((sorted.len().max(1) - 1).min((sorted.len() as f64 * share) as usize));
-        let (Some(&low), Some(&high)) = (part(0.01), part(0.995)) else {
-            return format!(
-                "<figure><figcaption><h3>{title}</h3><p>Zero everywhere.</p></figcaption></figure>"
-            );
+        let last = sorted.len().saturating_sub(1);
+        let quantile = |order: f64| sorted.get(last.min((sorted.len() as f64 * order) as usize));
+        let (Some(&low), Some(&high)) = (quantile(0.01), quantile(0.995)) else {
+            return html! { figure { figcaption { h3 { (title) } p { "Zero everywhere." } } } };
         };
-        let low = low.max(high / MOST_RANGE).min(high / LEAST_RANGE);
-        let place = |value: f32| if value > 0.0 { (value / low).ln() / (high / low).ln() } else { 0.0 };
+        let low = low.max(high / MAX_RANGE).min(high / MIN_RANGE);
+        let scale = |value: f32| if value > 0.0 { (value / low).ln() / (high / low).ln() } else { 0.0 };
         let labels = [low, (low * high).sqrt(), high].map(|value| number(value.into(), 2));
-        figure(&self.coloured(place), title, words, &HEAT, &labels)
+        figure(&self.coloured(scale), title, text, &HEAT, &labels)
     }
 
-    /// A figure of counts, on a linear scale from the least to the most.
-    pub(super) fn counts_figure(&self, title: &str, words: &str, least: u32, most: u32) -> String {
+    /// Figure of counts, on a linear scale.
+    pub(super) fn counts_figure(&self, title: &str, text: &str, least: u32, most: u32) -> Markup {
         let (low, high) = (least as f32, most as f32);
         let labels = [least, least + (most - least) / 2, most].map(|count| grouped(count.into()));
-        figure(&self.coloured(|value| (value - low) / (high - low)), title, words, &HEAT, &labels)
+        figure(&self.coloured(|value| (value - low) / (high - low)), title, text, &HEAT, &labels)
     }
 
-    fn coloured(&self, place: impl Fn(f32) -> f32) -> Image {
+    fn coloured(&self, scale: impl Fn(f32) -> f32) -> Image {
         let height = (self.values.len() / self.width.max(1) as usize) as u32;
-        let pixels = self.values.iter().map(|&value| heat(place(value)).map(from_srgb)).collect();
+        let pixels = self.values.iter().map(|&value| heat(scale(value)).map(from_srgb)).collect();
         Image { width: self.width, height, pixels }
     }
 }
 
-/// A figure of a difference between the picture and a reference.
-pub(super) fn difference(values: &Image, shown: Shown, title: &str, words: &str) -> String {
+/// Figure of a difference from a reference.
+pub(super) fn difference(values: &Image, shown: Shown, title: &str, text: &str) -> Markup {
     let (colours, end) = false_colours(values, shown);
     let end = f64::from(end);
-    let labels = if shown.is_signed() { [-end, 0.0, end] } else { [0.0, 0.5 * end, end] };
-    let stops = if shown.is_signed() { &SIGNED } else { &HEAT };
-    figure(&colours, title, words, stops, &labels.map(|value| number(value, 2)))
+    let (labels, stops) =
+        if shown.is_signed() { ([-end, 0.0, end], &SIGNED) } else { ([0.0, 0.5 * end, end], &HEAT) };
+    figure(&colours, title, text, stops, &labels.map(|value| number(value, 2)))
 }
 
-/// A figure with its scale; `words` are HTML.
-fn figure(colours: &Image, title: &str, words: &str, stops: &[[f32; 3]], labels: &[String; 3]) -> String {
-    let stop = |[r, g, b]: &[f32; 3]| {
-        let byte = |c: &f32| (c * 255.0 + 0.5) as u8;
-        format!("rgb({} {} {})", byte(r), byte(g), byte(b))
+/// Figure with its scale.
+fn figure(colours: &Image, title: &str, text: &str, stops: &[[f32; 3]], labels: &[String; 3]) -> Markup {
+    let stop = |colour: &[f32; 3]| {
+        let [r, g, b] = colour.map(|channel| (channel * 255.0 + 0.5) as u8);
+        format!("rgb({r} {g} {b})")
     };
-    let gradient: Vec<String> = stops.iter().map(stop).collect();
+    let gradient = stops.iter().map(stop).collect::<Vec<_>>().join(",");
     let alt = format!("{title} in false colours, from {} to {}", labels[0], labels[2]);
-    fill(
-        include_str!("map.html"),
-        &[
-            ("image", &img(&reduced(colours).0, &alt)),
-            ("title", &escape(title)),
-            ("words", words),
-            ("gradient", &gradient.join(",")),
-            ("low", &labels[0]),
-            ("middle", &labels[1]),
-            ("high", &labels[2]),
-        ],
-    )
+    html! {
+        figure {
+            (img(&reduced(colours).0, &alt))
+            figcaption {
+                div.scale style={ "--colours:" (gradient) } { @for label in labels { span { (label) } } }
+                h3 { (title) }
+                p { (text) }
+            }
+        }
+    }
 }
 
-/// Each value of a row the mean of those at most `reach` away in it.
-fn blurred(values: &[f32], width: usize, reach: usize) -> Vec<f32> {
+/// Means of each row over `2 * radius + 1` values.
+fn blurred(values: &[f32], width: usize, radius: usize) -> Vec<f32> {
     let row = |row: &[f32]| -> Vec<f32> {
         let mean = |x: usize| {
-            let near = &row[x.saturating_sub(reach)..(x + reach + 1).min(row.len())];
+            let near = &row[x.saturating_sub(radius)..(x + radius + 1).min(row.len())];
             near.iter().sum::<f32>() / near.len() as f32
         };
         (0..row.len()).map(mean).collect()
@@ -105,7 +100,7 @@ fn blurred(values: &[f32], width: usize, reach: usize) -> Vec<f32> {
     values.chunks(width.max(1)).flat_map(row).collect()
 }
 
-/// Columns for rows.
+/// Transposed matrix.
 fn transposed(values: &[f32], width: usize) -> Vec<f32> {
     let height = values.len() / width.max(1);
     (0..width).flat_map(|x| (0..height).map(move |y| values[y * width + x])).collect()
@@ -116,7 +111,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn smoothing_keeps_flat_maps_and_the_shape() {
+    fn smoothing_keeps_flat_maps_and_spreads_points() {
         let flat = Map { width: 5, values: vec![2.0; 15] };
         assert_eq!(flat.smoothed(2).values, flat.values);
         let mut values = vec![0.0; 35];
@@ -128,10 +123,10 @@ mod tests {
     }
 
     #[test]
-    fn a_map_of_nothing_says_so() {
+    fn maps_without_positive_values_have_no_picture() {
         let nothing = Map { width: 4, values: vec![0.0; 16] };
-        assert!(nothing.figure("Variance", "").contains("Zero everywhere"));
+        assert!(nothing.figure("Variance", "").into_string().contains("Zero everywhere"));
         let odd = Map { width: 2, values: vec![f32::NAN, f32::INFINITY, 1.0, 1.0] };
-        assert!(odd.figure("Variance", "").contains("<img"));
+        assert!(odd.figure("Variance", "").into_string().contains("<img"));
     }
 }

@@ -1,13 +1,12 @@
-//! Pages: templates that are read as HTML, filled with what was measured. Whatever comes from outside (names of
-//! scenes and files, repairs, the command) passes through [`escape`].
+//! Report pages as HTML, whose text `maud` escapes.
 
 mod audit;
-mod cache;
+mod cache_survey;
 mod chart;
 mod error;
 mod map;
 mod parts;
-mod photons;
+mod photon_maps;
 mod picture;
 mod race;
 mod run;
@@ -15,50 +14,40 @@ mod run;
 pub(super) use race::page as race;
 pub(super) use run::page as run;
 
-/// A whole page around `body`. All is HTML but `title`.
-fn shell(title: &str, body: &str) -> String {
-    fill(
-        include_str!("shell.html"),
-        &[
-            ("title", &escape(title)),
-            ("style", include_str!("style.css")),
-            ("script", include_str!("script.js")),
-            ("body", body),
-        ],
-    )
-}
+use maud::{Markup, PreEscaped, html};
 
-/// `template` with each `{{name}}` replaced by its value; what is not given becomes nothing. Values are not looked
-/// into.
-fn fill(template: &str, values: &[(&str, &str)]) -> String {
-    let mut parts = template.split("{{");
-    let mut text = parts.next().unwrap_or_default().to_owned();
-    for part in parts {
-        let (name, rest) = part.split_once("}}").unwrap_or(("", part));
-        let value = values.iter().find(|(known, _)| *known == name);
-        debug_assert!(value.is_some(), "{name} has no value");
-        text += value.map_or("", |(_, value)| value);
-        text += rest;
-    }
-    text
-}
+/// Content of the page that loads nothing: pictures are data, style and script are inline.
+const POLICY: &str =
+    "default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'unsafe-inline'";
 
-/// Text as HTML shows it, in elements and in quoted attributes.
-fn escape(text: &str) -> String {
-    let mut escaped = String::with_capacity(text.len());
-    for c in text.chars() {
-        match c {
-            '&' => escaped += "&amp;",
-            '<' => escaped += "&lt;",
-            '>' => escaped += "&gt;",
-            '"' => escaped += "&quot;",
-            '\'' => escaped += "&#39;",
-            // Of no meaning in text, and not allowed in HTML.
-            c if c.is_control() && !"\n\t".contains(c) => escaped.push('\u{fffd}'),
-            c => escaped.push(c),
+/// Whole document with a heading, an introduction and the sections `main`.
+fn document(heading: &str, introduction: Option<Markup>, main: &Markup) -> String {
+    let document = html! {
+        (PreEscaped("<!doctype html>\n"))
+        html lang="en" {
+            head {
+                meta charset="utf-8";
+                meta name="viewport" content="width=device-width, initial-scale=1";
+                meta name="color-scheme" content="light dark";
+                meta http-equiv="Content-Security-Policy" content=(POLICY);
+                title { (heading) " – halflight" }
+                link rel="icon" href="data:,";
+                style { (PreEscaped(include_str!("style.css"))) }
+            }
+            body {
+                header {
+                    p.brand { "halflight" }
+                    h1 { (heading) }
+                    @if let Some(text) = introduction { p.lead { (text) } }
+                }
+                main { (main) }
+                footer { "All numbers are in " code { "run.json" } " and " code { "curve.csv" } "." }
+                script { (PreEscaped(include_str!("script.js"))) }
+            }
         }
-    }
-    escaped
+        "\n"
+    };
+    document.into_string()
 }
 
 #[cfg(test)]
@@ -66,15 +55,9 @@ mod tests {
     use super::*;
 
     #[test]
-    fn values_are_not_looked_into() {
-        assert_eq!(fill("{{a}} and {{b}}.", &[("a", "{{b}}"), ("b", "x")]), "{{b}} and x.");
-    }
-
-    #[test]
-    fn what_comes_from_outside_stays_text() {
-        assert_eq!(
-            escape("<img src=\"x\" onerror='y'>&\u{1}"),
-            "&lt;img src=&quot;x&quot; onerror=&#39;y&#39;&gt;&amp;\u{fffd}"
-        );
+    fn text_is_escaped() {
+        let page = document("<img src=\"x\">&", None, &html! {});
+        assert!(page.contains("<h1>&lt;img src=&quot;x&quot;&gt;&amp;</h1>"), "{page}");
+        assert!(page.starts_with("<!doctype html>\n") && page.ends_with("</html>\n"));
     }
 }

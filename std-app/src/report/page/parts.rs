@@ -1,173 +1,207 @@
-//! What the pages of renders and of races share: where time and memory went, what the scene holds and what was
-//! left out, the ledger of dropped samples, and how the picture was made.
+//! Sections and elements that the pages of renders and races share.
 
-use super::escape;
-use crate::report::words::{grouped, number, plural, readable_bytes, readable_seconds};
-use crate::report::{Maker, Run, counts};
-use core::fmt::Write;
+use crate::drive::Place;
+use crate::report::quantity::{
+    grouped, percent, plural, readable_bytes, readable_name, readable_seconds, readable_value,
+};
+use crate::report::{Provenance, Run, counts};
 use halflight_core::census::Census;
+use maud::{Markup, html};
 
-/// Rows of a name, an amount in words, and a bar of its share of the largest.
-fn bars(caption: &str, rows: &[(String, String, f64)]) -> String {
-    let most = rows.iter().map(|row| row.2).fold(f64::MIN_POSITIVE, f64::max);
-    let row = |(name, amount, value): &(String, String, f64)| {
-        let width = 100.0 * value / most;
-        format!(
-            "<tr><th scope=\"row\">{}</th><td>{amount}</td>\
-             <td class=\"bar\" aria-hidden=\"true\"><i style=\"width:{width:.2}%\"></i></td></tr>",
-            escape(name)
-        )
-    };
-    let rows: String = rows.iter().map(row).collect();
-    format!("<table class=\"bars\"><caption>{caption}</caption><tbody>{rows}</tbody></table>")
+/// Definition of relMSE.
+pub(super) fn relmse_definition() -> Markup {
+    html! {
+        "relMSE is the mean over pixels and channels of "
+        span.formula { "(I − R)² / (R² + 0.01 m²)" }
+        ", with the picture I, the truth R and the mean m of R. "
+    }
 }
 
-/// Seconds of each phase.
-pub(super) fn time(run: &Run) -> String {
-    let seconds = &run.result.seconds;
+/// Slider that changes the exposure of the pictures of a figure; `probe` shows the radiance at the pointer.
+pub(super) fn exposure(probe: bool) -> Markup {
+    html! {
+        div.exposure hidden {
+            label { "Exposure " input type="range" min="-8" max="8" step="0.25" value="0"; }
+            output { "0" }
+            button type="button" { "reset" }
+            @if probe { span.probe aria-live="off" {} }
+        }
+    }
+}
+
+/// Two pictures, one over the other, with a slider at their boundary.
+pub(super) fn split(left: &Markup, right: &Markup) -> Markup {
+    html! {
+        div.split {
+            div.side { (left) }
+            div class="side over" { (right) }
+            input type="range" min="0" max="100" step="0.5" value="50" aria-label="Boundary of the pictures" hidden;
+        }
+    }
+}
+
+/// Table of numbers. The first cell of a row is its header if `has_row_headers`.
+pub(super) fn table(label: &str, head: &[&str], rows: &[Vec<String>], has_row_headers: bool) -> Markup {
+    html! {
+        div.scroll tabindex="0" role="region" aria-label=(label) {
+            table.numbers {
+                thead { tr { @for name in head { th scope="col" { (name) } } } }
+                tbody {
+                    @for row in rows {
+                        tr {
+                            @for (column, cell) in row.iter().enumerate() {
+                                @if column == 0 && has_row_headers { th scope="row" { (cell) } }
+                                @else { td { (cell) } }
+                            }
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Table of names and values under a caption.
+fn pairs(caption: &str, rows: impl Iterator<Item = (String, String)>) -> Markup {
+    html! {
+        table.counts {
+            caption { (caption) }
+            tbody { @for (name, value) in rows { tr { th scope="row" { (name) } td { (value) } } } }
+        }
+    }
+}
+
+/// Names and values of a `dl`.
+pub(super) fn facts(pairs: &[(impl AsRef<str>, String)]) -> Markup {
+    html! { @for (name, value) in pairs { div { dt { (name.as_ref()) } dd { (value) } } } }
+}
+
+/// Table of names, amounts, and bars in proportion to the largest value.
+fn bars(caption: &str, rows: &[(&str, String, f64)]) -> Markup {
+    let most = rows.iter().map(|row| row.2).fold(f64::MIN_POSITIVE, f64::max);
+    html! {
+        table.bars {
+            caption { (caption) }
+            tbody {
+                @for (name, amount, value) in rows {
+                    tr {
+                        th scope="row" { (name) }
+                        td { (amount) }
+                        td.bar aria-hidden="true" { i style=(format!("width:{:.2}%", 100.0 * value / most)) {} }
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Section of time and memory.
+pub(super) fn resources(run: &Run) -> Markup {
+    let (result, seconds) = (run.result, &run.result.seconds);
     let rest = run.total_seconds - run.load_seconds - seconds.build - seconds.render;
-    let other = if run.comparison.is_some() { "comparing and saving" } else { "saving and the rest" };
-    let rows = [
+    let time = [
         ("loading", run.load_seconds),
         ("building", seconds.build),
         ("rendering", seconds.render),
-        (other, rest.max(0.0)),
+        ("comparing, saving and the rest", rest.max(0.0)),
     ];
-    bars("Time", &rows.map(|(name, seconds)| (name.into(), readable_seconds(seconds), seconds)))
+    let time = time.map(|(name, seconds)| (name, readable_seconds(seconds), seconds));
+    let bytes = result.memory.iter().map(|part| (part.structure, part.bytes));
+    let bytes = bytes.chain([("at the peak", result.memory_peak)]);
+    let memory: Vec<_> = bytes.map(|(name, bytes)| (name, readable_bytes(bytes), bytes as f64)).collect();
+    html! {
+        section {
+            h2 { "Time and memory" }
+            div.columns { (bars("Time", &time)) (bars("Memory", &memory)) }
+        }
+    }
 }
 
-/// Bytes of each structure.
-pub(super) fn memory(run: &Run) -> String {
-    let row = |name: &str, bytes: usize| (name.into(), readable_bytes(bytes), bytes as f64);
-    let mut rows: Vec<_> = run.result.memory.iter().map(|part| row(part.structure, part.bytes)).collect();
-    rows.push(row("at the peak", run.result.memory_peak));
-    bars("Memory", &rows)
+/// Section of findings: decisions and numbers of the method.
+pub(super) fn findings(run: &Run) -> Markup {
+    let findings = run.findings();
+    html! {
+        @if findings.iter().next().is_some() {
+            section {
+                h2 { "Decisions of the method" }
+                @for finding in findings.iter() {
+                    h3 { (readable_name(finding.topic)) ": " (finding.decision.name()) }
+                    @if !finding.reason.is_empty() { p { (finding.reason) "." } }
+                    dl class="facts row" {
+                        @for (name, value) in finding.values() {
+                            div { dt { (readable_name(name)) } dd { (readable_value(value)) } }
+                        }
+                    }
+                }
+            }
+        }
+    }
 }
 
-/// What the scene holds, as a table.
-pub(super) fn census(run: &Run) -> String {
+/// Section of the scene: contents, features that it does not need, repairs.
+pub(super) fn scene(run: &Run) -> Markup {
     let census = Census::of(run.scene);
-    let mut rows = String::new();
-    for (name, count) in counts(&census, run.scene).into_iter().filter(|(_, count)| *count > 0) {
-        let name = name.replace('_', " ");
-        // Writing to a string does not fail.
-        let _ = write!(rows, "<tr><th scope=\"row\">{name}</th><td>{}</td></tr>", grouped(count));
+    let counts = counts(&census, run.scene).into_iter().filter(|(_, count)| *count > 0);
+    let counts = counts.map(|(name, count)| (readable_name(name), grouped(count)));
+    let left_out: Vec<_> = census.plan().left_out().map(|(what, why)| (what.into(), why.into())).collect();
+    html! {
+        section {
+            h2 { "Scene" }
+            div.columns {
+                (pairs("Contents", counts))
+                @if !left_out.is_empty() { (pairs("Not needed", left_out.into_iter())) }
+            }
+            @if !run.repairs.is_empty() {
+                h3 { "Repaired while loading" }
+                ul.plain { @for repair in run.repairs { li { (repair) } } }
+            }
+        }
     }
-    format!("<table class=\"counts\"><caption>The scene holds</caption><tbody>{rows}</tbody></table>")
 }
 
-/// What was left out and why.
-pub(super) fn left_out(run: &Run) -> String {
-    let rows: String = run
-        .left_out()
-        .iter()
-        .map(|(what, why)| {
-            format!("<tr><th scope=\"row\">{}</th><td>{}</td></tr>", escape(what), escape(why))
-        })
-        .collect();
-    if rows.is_empty() {
-        return "<p>Nothing was left out: the scene needs all of it.</p>".into();
-    }
-    format!("<table class=\"counts\"><caption>Left out, and why</caption><tbody>{rows}</tbody></table>")
-}
+/// Tiles in the list of rejected samples.
+const MAX_TILES: usize = 12;
 
-/// What the loader repaired.
-pub(super) fn repairs(run: &Run) -> String {
-    if run.repairs.is_empty() {
-        return String::new();
-    }
-    let items: String = run.repairs.iter().map(|repair| format!("<li>{}</li>", escape(repair))).collect();
-    format!("<h3>Repaired while loading</h3><ul class=\"plain\">{items}</ul>")
-}
-
-/// The samples that did not reach the picture: how many, why, where.
-pub(super) fn ledger(run: &Run) -> String {
+/// Rejected samples: numbers, causes and tiles.
+pub(super) fn dropped(run: &Run) -> Markup {
     let (dropped, paths) = (&run.result.counters.dropped, run.result.counters.paths);
     if dropped.total() == 0 {
-        return format!("<p>Not one of {} samples had to be dropped.</p>", grouped(paths));
+        return html! { p { "None of " (grouped(paths)) " samples was dropped." } };
     }
-    let outside = "left out of the picture";
-    let cut = "cut at the technical limit of paths; what they saw up to there is in the picture";
-    let rows = [
-        ("not a number", outside, dropped.nan),
-        ("infinite", outside, dropped.infinite),
-        ("negative", outside, dropped.negative),
-        ("unfinished", cut, dropped.unfinished),
+    let causes = [
+        ("not a number", dropped.nan),
+        ("infinite", dropped.infinite),
+        ("negative", dropped.negative),
+        ("unfinished", dropped.unfinished),
     ];
-    let rows = rows.map(|(cause, then, count)| {
-        let share = number(100.0 * count as f64 / paths.max(1) as f64, 2);
-        vec![cause.into(), grouped(count), format!("{share}&#8239;%"), then.into()]
-    });
-    let causes = table("Dropped samples", &["cause", "samples", "of all", "and then"], &rows);
-    let black = match run.result.empty_pixels {
-        0 => String::new(),
-        count => format!(" {} are black for want of any sample.", grouped(count) + " pixels"),
-    };
-    format!(
-        "<p>{} of {} samples did not reach the picture whole.{black}</p>{causes}{}",
-        grouped(dropped.total()),
-        grouped(paths),
-        places(run)
-    )
-}
-
-/// Tiles of the ledger that are listed.
-const WORST: usize = 12;
-
-/// Where samples were dropped, the worst first.
-fn places(run: &Run) -> String {
+    let fraction = |count: u64| percent(count as f64 / paths.max(1) as f64);
+    let causes = causes.map(|(cause, count)| vec![cause.into(), grouped(count), fraction(count)]);
     let all = &run.result.places;
-    let rows: Vec<Vec<String>> = all
-        .iter()
-        .take(WORST)
-        .map(|place| {
-            let (right, bottom) = (place.x + place.width - 1, place.y + place.height - 1);
-            let tile = format!("columns {} to {right}, rows {} to {bottom}", place.x, place.y);
-            vec![tile, grouped(place.dropped.total())]
-        })
-        .collect();
-    let most = if rows.len() < all.len() {
-        format!(", the worst {WORST} of {}", grouped(all.len() as u64))
-    } else {
-        String::new()
+    let tile = |tile: &Place| {
+        let (right, bottom) = (tile.x + tile.width - 1, tile.y + tile.height - 1);
+        let name = format!("columns {} to {right}, rows {} to {bottom}", tile.x, tile.y);
+        vec![name, grouped(tile.dropped.total())]
     };
-    format!(
-        "<h3>Where{most}</h3>{}",
-        table("Where samples were dropped", &["tile of the picture", "samples"], &rows)
-    )
+    let tiles: Vec<_> = all.iter().take(MAX_TILES).map(tile).collect();
+    html! {
+        p {
+            (grouped(dropped.total())) " of " (grouped(paths)) " samples were dropped. Unfinished paths were cut at a \
+            technical limit, and the picture has their light up to there. Other dropped samples do not count."
+            @if run.result.empty_pixels > 0 {
+                " " (plural(run.result.empty_pixels, "pixel")) " without any sample left: black."
+            }
+        }
+        (table("Dropped samples", &["cause", "samples", "of all"], &causes, true))
+        h3 {
+            "Tiles with dropped samples"
+            @if tiles.len() < all.len() { ", the worst " (MAX_TILES) " of " (grouped(all.len() as u64)) }
+        }
+        (table("Tiles with dropped samples", &["tile of the picture", "samples"], &tiles, true))
+    }
 }
 
-/// A table of numbers; the first cell of each row is its head, a fourth one text. Cells are HTML.
-fn table(label: &str, head: &[&str], rows: &[Vec<String>]) -> String {
-    let class = |column: usize| if column == 3 { " class=\"text\"" } else { "" };
-    let head = head.iter().enumerate().map(|(i, name)| format!("<th scope=\"col\"{}>{name}</th>", class(i)));
-    let row = |cells: &Vec<String>| {
-        let cells = cells.iter().enumerate().map(|(i, cell)| match i {
-            0 => format!("<th scope=\"row\">{cell}</th>"),
-            _ => format!("<td{}>{cell}</td>", class(i)),
-        });
-        format!("<tr>{}</tr>", cells.collect::<String>())
-    };
-    format!(
-        "<div class=\"scroll\" tabindex=\"0\" role=\"region\" aria-label=\"{label}\"><table class=\"numbers\">\
-         <thead><tr>{}</tr></thead><tbody>{}</tbody></table></div>",
-        head.collect::<String>(),
-        rows.iter().map(row).collect::<String>()
-    )
-}
-
-/// A share as it is read.
-pub(super) fn percent(share: f64) -> String {
-    format!("{}&#8239;%", number(100.0 * share, 2))
-}
-
-/// Name and value pairs of a `dl`. The values are HTML.
-pub(super) fn facts(pairs: &[(&str, String)]) -> String {
-    pairs.iter().map(|(name, value)| format!("<div><dt>{name}</dt><dd>{value}</dd></div>")).collect()
-}
-
-/// Command, machine and settings.
-pub(super) fn made(maker: &Maker, run: &Run) -> String {
+/// Section of command, machine and settings.
+pub(super) fn made(provenance: &Provenance, run: &Run) -> Markup {
     let (settings, result) = (run.settings, run.result);
     let plan = Census::of(run.scene).plan();
     let depth = settings.max_depth.map_or("no limit".into(), |depth| plural(depth.into(), "segment"));
@@ -176,15 +210,17 @@ pub(super) fn made(maker: &Maker, run: &Run) -> String {
         ("Size", format!("{} × {} pixels", settings.width, settings.height)),
         ("Longest path", depth),
         ("Seed", settings.seed.to_string()),
-        ("Threads", format!("{} of {}", result.threads, maker.processors)),
-        ("Instructions", settings.level.name().to_owned()),
-        ("Machine", escape(&maker.machine)),
-        ("Program", maker.version.to_owned()),
-        ("Date", maker.date.clone()),
+        ("Threads", format!("{} of {}", result.threads, provenance.processors)),
+        ("Instruction set", settings.level.name().to_owned()),
+        ("Machine", provenance.machine.clone()),
+        ("Program", provenance.version.to_owned()),
+        ("Date", provenance.date.clone()),
     ];
-    format!(
-        "<pre class=\"scroll\" tabindex=\"0\"><code>{}</code></pre><dl class=\"made\">{}</dl>",
-        escape(&maker.shell()),
-        facts(&pairs)
-    )
+    html! {
+        section {
+            h2 { "Command and settings" }
+            pre.scroll tabindex="0" { code { (provenance.shell()) } }
+            dl.made { (facts(&pairs)) }
+        }
+    }
 }

@@ -1,20 +1,21 @@
-//! Pictures as data in the page: a PNG to look at, and one that keeps the range of the radiance for the
-//! exposure slider.
+//! Pictures of a page as data: a PNG for display, and one with the radiance for the exposure slider.
 
-use super::escape;
 use crate::save::{Image, to_srgb};
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD;
 use image::{ExtendedColorType, ImageEncoder};
+use maud::{Markup, html};
 
-/// Pixels above which a picture is shown smaller.
-const MOST_PIXELS: usize = 1 << 21;
+/// Larger pictures are reduced.
+const MAX_PIXELS: usize = 1 << 21;
 
-/// Pictures narrower than this are shown with sharp pixels.
+/// Narrower pictures are shown with sharp pixels.
 const NARROW: u32 = 400;
 
-/// A picture reduced by a whole factor, 1 where it is small enough: each pixel is the mean of a square.
+/// Picture reduced by a whole factor, 1 up to 2^21 pixels; each pixel is the mean of a square.
 pub(super) fn reduced(image: &Image) -> (Image, u32) {
     let mut factor = 1;
-    while image.pixels.len() / (factor * factor) as usize > MOST_PIXELS {
+    while image.pixels.len() / (factor * factor) as usize > MAX_PIXELS {
         factor += 1;
     }
     let (width, height) = (image.width.div_ceil(factor), image.height.div_ceil(factor));
@@ -23,48 +24,44 @@ pub(super) fn reduced(image: &Image) -> (Image, u32) {
         let (left, top) = (index as u32 % width * factor, index as u32 / width * factor);
         let (right, bottom) = ((left + factor).min(image.width), (top + factor).min(image.height));
         let square = (top..bottom).flat_map(|y| (left..right).map(move |x| (x, y)));
-        let share = 1.0 / ((right - left) * (bottom - top)) as f32;
+        let weight = 1.0 / ((right - left) * (bottom - top)) as f32;
         for (x, y) in square {
             let from = image.pixels[y as usize * image.width as usize + x as usize];
-            pixel.iter_mut().zip(from).for_each(|(sum, value)| *sum += value * share);
+            pixel.iter_mut().zip(from).for_each(|(sum, value)| *sum += value * weight);
         }
     }
     (small, factor)
 }
 
-/// An `img` of display values as a PNG shows them.
-pub(super) fn img(image: &Image, alt: &str) -> String {
-    element(image, alt, "")
+/// `img` of the picture as a PNG shows it.
+pub(super) fn img(image: &Image, alt: &str) -> Markup {
+    element(image, alt, None)
 }
 
-/// An `img` whose exposure can be changed.
-pub(super) fn exposable(image: &Image, alt: &str) -> String {
-    element(
-        image,
-        alt,
-        &format!(" data-radiance=\"{}\"", uri(image.width, 2 * image.height, &radiance(image))),
-    )
+/// `img` with the radiance, whose exposure can be changed.
+pub(super) fn exposable(image: &Image, alt: &str) -> Markup {
+    element(image, alt, Some(uri(image.width, 2 * image.height, &radiance(image))))
 }
 
-fn element(image: &Image, alt: &str, more: &str) -> String {
+fn element(image: &Image, alt: &str, radiance: Option<String>) -> Markup {
     let Image { width, height, .. } = *image;
-    let display: Vec<u8> =
+    let bytes: Vec<u8> =
         image.pixels.iter().flatten().map(|&value| (to_srgb(value) * 255.0 + 0.5) as u8).collect();
-    let class = if width < NARROW { " class=\"sharp\"" } else { "" };
-    let source = uri(width, height, &display);
-    format!(
-        "<img{class} width=\"{width}\" height=\"{height}\" alt=\"{}\" src=\"{source}\"{more}>",
-        escape(alt)
-    )
+    let class = (width < NARROW).then_some("sharp");
+    let source = uri(width, height, &bytes);
+    html! {
+        img class=[class] width=(width) height=(height) alt=(alt) src=(source) data-radiance=[radiance];
+    }
 }
 
-/// The radiance in bytes: above, the mantissas of red, green and blue, below, three times their common exponent
-/// (Ward 1991): value = mantissa · 2^(exponent − 136).
+/// Radiance in bytes: all mantissas, then three times all shared exponents (Ward 1991).
+///
+/// A value is mantissa · 2^(exponent − 136).
 fn radiance(image: &Image) -> Vec<u8> {
     let shared = |pixel: &[f32; 3]| {
         let pixel = pixel.map(|value| if value.is_nan() { 0.0 } else { value.clamp(0.0, 1e30) });
         let most = pixel.into_iter().fold(0.0, f32::max);
-        // Least exponent e with most < 2^e: that of the bits is one less and has a bias of 127.
+        // Least e with most < 2^e; the exponent in the bits is e − 1 with a bias of 127.
         let exponent = (most.to_bits() >> 23) as i32 - 126;
         let scale = f64::from(8 - exponent).exp2();
         let mantissas = pixel.map(|value| (f64::from(value) * scale).round().min(255.0) as u8);
@@ -74,44 +71,20 @@ fn radiance(image: &Image) -> Vec<u8> {
     mantissas.into_iter().chain(exponents.into_iter().map(|e| [e; 3])).flatten().collect()
 }
 
-/// A PNG of 8-bit RGB as a data URI; empty for a picture that no PNG can hold.
+/// PNG of 8-bit RGB as a data URI; empty if the size does not fit into a PNG.
 fn uri(width: u32, height: u32, bytes: &[u8]) -> String {
     use image::codecs::png::{CompressionType, FilterType, PngEncoder};
     let mut png = Vec::new();
     let encoder = PngEncoder::new_with_quality(&mut png, CompressionType::Default, FilterType::Adaptive);
     match encoder.write_image(bytes, width, height, ExtendedColorType::Rgb8) {
-        Ok(()) => format!("data:image/png;base64,{}", base64(&png)),
+        Ok(()) => format!("data:image/png;base64,{}", STANDARD.encode(&png)),
         Err(_) => String::new(),
     }
-}
-
-/// RFC 4648, with padding.
-fn base64(bytes: &[u8]) -> String {
-    const DIGITS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-    let mut text = String::with_capacity(bytes.len().div_ceil(3) * 4);
-    for three in bytes.chunks(3) {
-        let [a, b, c] = core::array::from_fn(|i| u32::from(three.get(i).copied().unwrap_or_default()));
-        let bits = a << 16 | b << 8 | c;
-        for place in 0..4 {
-            let digit = DIGITS[(bits >> (18 - 6 * place) & 63) as usize];
-            text.push(if place <= three.len() { digit.into() } else { '=' });
-        }
-    }
-    text
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn base64_has_the_values_of_the_standard() {
-        for (plain, coded) in
-            [("", ""), ("f", "Zg=="), ("fo", "Zm8="), ("foo", "Zm9v"), ("foobar", "Zm9vYmFy")]
-        {
-            assert_eq!(base64(plain.as_bytes()), coded);
-        }
-    }
 
     #[test]
     fn radiance_keeps_eight_bits_of_any_range() {

@@ -1,153 +1,165 @@
-//! The page of a race.
+//! Page of a race.
 
 use super::chart::Chart;
-use super::error::{between, estimated, measured};
+use super::error::{estimated, measured, range};
 use super::picture::{exposable, reduced};
-use super::run::{layout, smaller};
-use super::{escape, fill, parts, shell};
-use crate::report::race::Lead;
-use crate::report::words::{grouped, number, plural, readable_seconds};
-use crate::report::{Race, Racer};
+use super::run::{layout, reduction};
+use super::{document, parts};
+use crate::report::quantity::{grouped, number, plural, readable_seconds};
+use crate::report::{Race, RaceEntry};
+use maud::{Markup, html};
 
-/// The whole page.
+/// Whole page; empty for a race without methods.
 pub(in crate::report) fn page(race: &Race) -> String {
-    let Some(first) = race.racers.first().map(|racer| &racer.run) else { return String::new() };
-    let chart = chart(race);
-    let title = format!("{}: a race of {}", first.name, plural(race.racers.len() as u64, "method"));
-    let body = fill(
-        include_str!("race.html"),
-        &[
-            ("name", &escape(&title)),
-            ("layout", layout(&first.result.image)),
-            ("lead", &lead(race)),
-            ("truth", truth(race)),
-            ("chart", &chart.figure()),
-            ("leads", &leads(race)),
-            ("table", &table(race)),
-            ("options", &options(race)),
-            ("pictures", &pictures(race)),
-            ("census", &parts::census(first)),
-            ("left_out", &parts::left_out(first)),
-            ("repairs", &parts::repairs(first)),
-            ("ledgers", &ledgers(race)),
-            ("made", &parts::made(race.maker, first)),
-        ],
-    );
-    shell(&format!("{title} – halflight"), &body)
+    let Some(first) = race.entries.first().map(|entry| &entry.run) else { return String::new() };
+    let heading = format!("{}: a race of {}", first.name, plural(race.entries.len() as u64, "method"));
+    let main = html! {
+        section {
+            h2 { "Results" }
+            p {
+                @if race.has_reference() { "Errors are measured against the reference." }
+                @else {
+                    "Errors are estimated, with 95\u{202f}% intervals. The estimate covers sampled noise and the blur of \
+                    photons, but no other bias."
+                }
+            }
+            (table(race))
+            p.note {
+                "Efficiency is 1 / (relMSE · seconds of rendering): twice the efficiency takes half the time for the same \
+                picture, if the error falls as 1 / time. Intervals cover the noise of the pictures, but not the \
+                variation of times. "
+                (parts::relmse_definition())
+            }
+        }
+        section {
+            h2 { "Error against run time" }
+            (chart(race).figure())
+            p.note { "The strip at the axis shows the leader; grey if the intervals of the best two overlap." }
+            (leads(race))
+        }
+        (pictures(race, layout(&first.result.image)))
+        (parts::scene(first))
+        section {
+            h2 { "Dropped samples" }
+            @for entry in &race.entries { h3 { (entry.name) } (parts::dropped(&entry.run)) }
+        }
+        (parts::made(race.provenance, first))
+    };
+    document(&heading, Some(lead(race)), &main)
 }
 
-/// Who won, in a sentence.
-fn lead(race: &Race) -> String {
+/// Sentence about the best method.
+fn lead(race: &Race) -> Markup {
     let time = readable_seconds(race.seconds);
-    let best = (0..race.racers.len())
+    let best = (0..race.entries.len())
         .filter_map(|index| Some((index, race.efficiency(index)?)))
         .max_by(|a, b| a.1.total_cmp(&b.1));
     let Some((best, _)) = best else {
-        return format!("{} of rendering each; no picture has an error that is known.", escape(&time));
+        return html! { "The error of every picture is unknown, after " (time) " of rendering each." };
     };
-    let name = |index: usize| escape(&race.racers[index].name);
-    let open = race.leads().last().is_none_or(|lead| lead.who.is_none());
-    let verdict = if race.racers.len() == 1 {
-        format!("<strong>{}</strong> had nobody to race against", name(best))
-    } else if open {
-        "The intervals of the best overlap: <strong>too close to tell</strong>".into()
-    } else {
-        format!("<strong>{}</strong> has the highest efficiency", name(best))
-    };
-    let ratio = race.ratio(best).filter(|_| best > 0 && !open);
-    let ratio = ratio.map(|ratio| format!(", {} times that of {}", number(ratio.value, 3), name(0)));
-    format!("{verdict}{}, after {time} of rendering each.", ratio.unwrap_or_default())
-}
-
-fn truth(race: &Race) -> &'static str {
-    if race.has_reference() {
-        "Errors are measured against the reference."
-    } else {
-        "There is no reference: errors are estimated, each with the interval that holds it with 95 % confidence. \
-         An estimate knows the noise that was seen and what photons blur, but no other bias of a biased method."
+    let is_open = race.leads().last().is_none_or(|lead| lead.leader.is_none());
+    let ratio = race.ratio(best).filter(|_| best > 0 && !is_open);
+    html! {
+        @if race.entries.len() == 1 { strong { (race.entries[best].name) } " is the only method" }
+        @else if is_open { "The intervals of the best methods overlap: " strong { "no clear winner" } }
+        @else { strong { (race.entries[best].name) } " has the highest efficiency" }
+        @if let Some(ratio) = ratio { ", " (number(ratio.value, 3)) " times that of " (race.entries[0].name) }
+        ", after " (time) " of rendering each."
     }
 }
 
 fn chart(race: &Race) -> Chart {
     let curve = if race.has_reference() { measured } else { estimated };
-    let series = race.racers.iter().enumerate().map(|(index, racer)| {
-        let mut series = curve(&racer.run.result.history, &racer.name, index);
+    let series = race.entries.iter().enumerate().map(|(index, entry)| {
+        let mut series = curve(&entry.run.result.history, &entry.name, index);
         series.fit = None;
         series
     });
     Chart {
-        title: "The error of each method, relMSE, against seconds of rendering, on logarithmic axes".into(),
+        title: "relMSE of each method against seconds of rendering, on logarithmic axes".into(),
         series: series.collect(),
         leads: race.leads(),
     }
 }
 
-/// Who is ahead when, in words.
-fn leads(race: &Race) -> String {
-    let line = |lead: &Lead| {
-        let who = lead.who.map_or("too close to tell".into(), |who| escape(&race.racers[who].name));
-        format!("<li>{} to {}: {who}</li>", readable_seconds(lead.from), readable_seconds(lead.to))
-    };
-    let lines: String = race.leads().iter().map(line).collect();
-    if lines.is_empty() { String::new() } else { format!("<h3>Ahead</h3><ol class=\"leads\">{lines}</ol>") }
+/// Leaders over time.
+fn leads(race: &Race) -> Markup {
+    let leads = race.leads();
+    html! {
+        @if !leads.is_empty() {
+            h3 { "Leaders" }
+            ol.leads {
+                @for lead in &leads {
+                    li {
+                        (readable_seconds(lead.from)) " to " (readable_seconds(lead.to)) ": "
+                        (lead.leader.map_or("no clear leader", |leader| &race.entries[leader].name))
+                    }
+                }
+            }
+        }
+    }
 }
 
-/// The methods with their results.
-fn table(race: &Race) -> String {
-    let dash = || "–".to_string();
-    let intervals = !race.has_reference();
+/// Table of methods and results.
+fn table(race: &Race) -> Markup {
+    let has_intervals = !race.has_reference();
+    let interval = has_intervals.then_some("95 % interval");
     let mut head = vec!["method", "samples per pixel", "time", "relMSE"];
-    head.extend(intervals.then_some("95 % interval"));
+    head.extend(interval);
     head.extend(["efficiency", "over the first"]);
-    head.extend(intervals.then_some("95 % interval"));
-    let head: String = head.iter().map(|name| format!("<th scope=\"col\">{name}</th>")).collect();
-    let row = |(index, racer): (usize, &Racer)| {
-        let result = racer.run.result;
-        let ratio = race.ratio(index);
-        let interval = ratio.and_then(|ratio| ratio.interval);
+    head.extend(interval);
+    let number_or_dash = |value: Option<f64>| value.map_or("–".into(), |value| number(value, 3));
+    let range_or_dash = |ends: Option<[f64; 2]>| ends.map_or("–".into(), |[low, high]| range(low, high));
+    let row = |(index, entry): (usize, &RaceEntry)| {
+        let (result, ratio) = (entry.run.result, race.ratio(index));
         let mut cells = vec![
+            entry.name.clone(),
             grouped(result.spp.into()),
             readable_seconds(result.seconds.render),
-            race.error(index).map_or_else(dash, |error| number(error, 3)),
+            number_or_dash(race.error(index)),
         ];
-        cells.extend(intervals.then(|| result.error.map_or_else(dash, |e| between(e.lower, e.upper))));
-        cells.push(race.efficiency(index).map_or_else(dash, |efficiency| number(efficiency, 3)));
-        cells.push(ratio.map_or_else(dash, |ratio| number(ratio.value, 3)));
-        cells.extend(intervals.then(|| interval.map_or_else(dash, |[lower, upper]| between(lower, upper))));
-        let cells: String = cells.iter().map(|cell| format!("<td>{cell}</td>")).collect();
-        format!("<tr><th scope=\"row\">{}</th>{cells}</tr>", escape(&racer.name))
+        cells.extend(has_intervals.then(|| range_or_dash(result.error.map(|e| [e.lower, e.upper]))));
+        cells.push(number_or_dash(race.efficiency(index)));
+        cells.push(number_or_dash(ratio.map(|ratio| ratio.value)));
+        cells.extend(has_intervals.then(|| range_or_dash(ratio.and_then(|ratio| ratio.interval))));
+        cells
     };
-    let rows: String = race.racers.iter().enumerate().map(row).collect();
-    format!(
-        "<div class=\"scroll\" tabindex=\"0\" role=\"region\" aria-label=\"Results\"><table class=\"numbers\">\
-         <thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table></div>"
-    )
+    let rows: Vec<_> = race.entries.iter().enumerate().map(row).collect();
+    parts::table("Results", &head, &rows, true)
 }
 
-/// The methods as choices of the two sides.
-fn options(race: &Race) -> String {
-    let option = |racer: &Racer| format!("<option>{}</option>", escape(&racer.name));
-    race.racers.iter().map(option).collect()
-}
-
-/// The pictures side by side.
-fn pictures(race: &Race) -> String {
-    let figure = |racer: &Racer| {
-        let (picture, factor) = reduced(&racer.run.result.image);
-        let method = racer.run.result.method.name();
-        format!(
-            "<figure>{}<figcaption><h3>{}</h3><p>{} samples per pixel by {method}</p>{}</figcaption></figure>",
-            exposable(&picture, &format!("The picture by {}", racer.name)),
-            escape(&racer.name),
-            grouped(racer.run.result.spp.into()),
-            smaller(factor)
-        )
+/// Section of the pictures, two of them over each other.
+fn pictures(race: &Race, layout: &str) -> Markup {
+    let options = html! { @for entry in &race.entries { option { (entry.name) } } };
+    let figure = |entry: &RaceEntry| {
+        let result = entry.run.result;
+        let (picture, factor) = reduced(&result.image);
+        html! {
+            figure {
+                (exposable(&picture, &format!("Picture by {}", entry.name)))
+                figcaption {
+                    h3 { (entry.name) }
+                    p { (grouped(result.spp.into())) " samples per pixel by " (result.method.name()) }
+                    (reduction(factor))
+                }
+            }
+        }
     };
-    race.racers.iter().map(figure).collect()
-}
-
-/// Dropped samples of each.
-fn ledgers(race: &Race) -> String {
-    let one = |racer: &Racer| format!("<h3>{}</h3>{}", escape(&racer.name), parts::ledger(&racer.run));
-    race.racers.iter().map(one).collect()
+    html! {
+        section {
+            h2 { "Pictures" }
+            figure class={ "picture compared " (layout) } hidden {
+                (parts::split(&html! {}, &html! {}))
+                figcaption {
+                    p.sides {
+                        @for side in ["Left picture", "Right picture"] {
+                            label { span.unseen { (side) } select { (options) } }
+                        }
+                    }
+                    (parts::exposure(false))
+                }
+            }
+            div.maps #pictures { @for entry in &race.entries { (figure(entry)) } }
+        }
+    }
 }

@@ -6,6 +6,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 /// Folders and files of core/src, lowest first. A new one has to find its place here.
 const LAYERS: &[&str] = &[
+    "findings",
     "memory",
     "geometry",
     "features",

@@ -83,6 +83,7 @@ const NARROW: &[&str] = &[
     "core/src/estimate",
     "core/src/features.rs",
     "core/src/film",
+    "core/src/findings.rs",
     "core/src/geometry",
     "core/src/lib.rs",
     "core/src/light",

@@ -1,5 +1,4 @@
-//! The camera flags, which `render`, `info` and `bench` share: each replaces its part of the camera of the
-//! scene file, or of the one that frames everything.
+//! Camera flags: each replaces one part of the scene file's camera, or of a camera that frames the whole scene.
 
 use super::failure::Failure;
 use super::values::{self, Lens};
@@ -7,39 +6,39 @@ use clap::Args;
 use halflight::load::{LoadedScene, View, direction};
 use halflight_core::scene::Camera;
 
-/// Heading of the flags. `next_help_heading` would cover the flags of other structs as well.
-const CAMERA: &str = "Camera [default: of the scene file, else one that frames everything]";
+/// Heading of the flags. `next_help_heading` would include flags of other structs.
+const CAMERA: &str = "Camera [default: that of the scene file, or one that frames the scene]";
 
-/// The view, in the units of the scene.
+/// Camera in the units of the scene.
 #[derive(Args)]
-pub(super) struct ViewFlags {
+pub(super) struct CameraArgs {
     /// Position of the camera
     #[arg(long, value_name = "X,Y,Z", value_parser = values::vector, allow_hyphen_values = true,
         help_heading = CAMERA)]
     eye: Option<[f64; 3]>,
-    /// Point in the middle of the picture; with --eye alone, the middle of the scene
+    /// Point that the camera looks at [default with --eye alone: middle of the scene]
     #[arg(long, value_name = "X,Y,Z", value_parser = values::vector, allow_hyphen_values = true,
         help_heading = CAMERA)]
     look_at: Option<[f64; 3]>,
-    /// Direction that points up in the picture; 0,1,0 if --eye or --look-at is given
+    /// Up direction [default for a changed view: 0,1,0]
     #[arg(long, value_name = "X,Y,Z", value_parser = values::vector, allow_hyphen_values = true,
         help_heading = CAMERA)]
     up: Option<[f64; 3]>,
     /// Vertical field of view in degrees
     #[arg(long, value_name = "DEG", value_parser = values::degrees, help_heading = CAMERA)]
     fov: Option<f64>,
-    /// Radius of the lens, 0 for a pinhole, and distance in focus [default: that of --look-at]
+    /// Radius of the thin lens, 0 for a pinhole, and distance in focus [default: that of --look-at]
     #[arg(long, value_name = "RADIUS[,DISTANCE]", value_parser = values::lens, help_heading = CAMERA)]
     lens: Option<Lens>,
 }
 
-impl ViewFlags {
-    /// The camera that looks at `scene`, in the coordinates of the core.
+impl CameraArgs {
+    /// Camera of `scene` with these flags, in the coordinates of the core.
     pub(super) fn camera(&self, scene: &LoadedScene) -> Result<Camera, Failure> {
         let (mut camera, mut view) = (scene.camera_or_default(), scene.view);
         if self.eye.is_some() || self.look_at.is_some() || self.up.is_some() {
-            let (turned, there) = self.turned(&camera, scene)?;
-            (camera, view) = (turned, Some(there));
+            let (moved, moved_view) = self.moved(&camera, scene)?;
+            (camera, view) = (moved, Some(moved_view));
         }
         if let Some(degrees) = self.fov {
             camera.tan_half_fov = (0.5 * degrees).to_radians().tan() as f32;
@@ -53,7 +52,8 @@ impl ViewFlags {
         Ok(view.map_or(camera, |view| scene.with_start(camera, view)))
     }
 
-    fn turned(&self, old: &Camera, scene: &LoadedScene) -> Result<(Camera, View), Failure> {
+    /// Camera with another position or direction.
+    fn moved(&self, old: &Camera, scene: &LoadedScene) -> Result<(Camera, View), Failure> {
         let to_user = |point| scene.transform.to_user(point);
         let file = scene.view;
         let eye = self.eye.unwrap_or_else(|| file.map_or_else(|| to_user(old.eye), |file| file.eye));
@@ -66,22 +66,22 @@ impl ViewFlags {
         };
         let up = self.up.unwrap_or([0.0, 1.0, 0.0]);
         let view = View { eye, look_at, up };
-        let Some(turned) = scene.camera_at(view, 1.0) else {
+        let Some(moved) = scene.camera_at(view, 1.0) else {
             return Err(
                 Failure::new("--eye and --look-at are the same point").advice("give two different points")
             );
         };
         let up = direction([0.0; 3], up).unwrap_or_default();
-        if turned.forward.as_dvec3().cross(up).length() < PARALLEL {
+        if moved.forward.as_dvec3().cross(up).length() < PARALLEL {
             return Err(Failure::new("the camera looks along its up vector")
-                .advice("give another one, as in --up 0,0,1"));
+                .advice("give another up vector, as in --up 0,0,1"));
         }
         let Camera { tan_half_fov, lens_radius, .. } = *old;
-        let moved = self.eye.is_some() || self.look_at.is_some();
-        let focus_distance = if moved { turned.focus_distance } else { old.focus_distance };
-        Ok((Camera { tan_half_fov, lens_radius, focus_distance, ..turned }, view))
+        let has_target = self.eye.is_some() || self.look_at.is_some();
+        let focus_distance = if has_target { moved.focus_distance } else { old.focus_distance };
+        Ok((Camera { tan_half_fov, lens_radius, focus_distance, ..moved }, view))
     }
 }
 
-/// Sine of the angle between view and up below which the picture would turn with rounding errors.
+/// Sine of the angle between view and up below which rounding errors would rotate the picture.
 const PARALLEL: f64 = 1e-4;

@@ -1,20 +1,20 @@
-//! Amounts as people read them.
+//! Quantities as text for people.
 
-/// Bytes.
+use halflight_core::findings::Value;
+
+/// Bytes with one decimal, in powers of 1024.
 pub fn readable_bytes(bytes: usize) -> String {
-    let units = ["KiB", "MiB", "GiB", "TiB"];
     let mut value = bytes as f64 / 1024.0;
-    let mut unit = units[0];
-    for larger in &units[1..] {
-        if value >= 1000.0 {
-            value /= 1024.0;
-            unit = larger;
-        }
-    }
-    if bytes < 1024 { format!("{bytes} bytes") } else { format!("{value:.1} {unit}") }
+    let mut units = ["KiB", "MiB", "GiB"].into_iter();
+    let unit = units.find(|_| {
+        let fits = value < 1000.0;
+        value /= if fits { 1.0 } else { 1024.0 };
+        fits
+    });
+    if bytes < 1024 { format!("{bytes} bytes") } else { format!("{value:.1} {}", unit.unwrap_or("TiB")) }
 }
 
-/// Seconds.
+/// Seconds as `12 ms`, `3.2 s`, `2 min 05 s` or `2 h 01 min`.
 pub fn readable_seconds(seconds: f64) -> String {
     match seconds {
         s if s < 0.0995 => format!("{:.0} ms", s * 1e3),
@@ -24,20 +24,41 @@ pub fn readable_seconds(seconds: f64) -> String {
     }
 }
 
-/// A count with its noun.
+/// Count with its noun, which takes an `s` in the plural.
 pub fn plural(count: u64, noun: &str) -> String {
     format!("{count} {noun}{}", if count == 1 { "" } else { "s" })
 }
 
-/// A count, with a thin space between thousands from five digits on.
+/// Name in snake case, with spaces.
+pub fn readable_name(name: &str) -> String {
+    name.replace('_', " ")
+}
+
+/// Value of a finding, with narrow no-break spaces.
+pub fn readable_value(value: Value) -> String {
+    match value {
+        Value::Count(count) => grouped(count),
+        Value::Seconds(seconds) => readable_seconds(seconds),
+        Value::Fraction(fraction) => percent(fraction),
+        Value::Number(value) => number(value, 3),
+        Value::Name(name) => name.to_owned(),
+    }
+}
+
+/// Fraction as a percentage with two significant digits.
+pub(super) fn percent(fraction: f64) -> String {
+    format!("{}\u{202f}%", number(100.0 * fraction, 2))
+}
+
+/// Count, with thin spaces between thousands from five digits on.
 pub(super) fn grouped(count: u64) -> String {
     let digits = count.to_string();
     if digits.len() < 5 {
         return digits;
     }
     let mut text = String::new();
-    for (place, digit) in digits.chars().enumerate() {
-        if place > 0 && (digits.len() - place).is_multiple_of(3) {
+    for (index, digit) in digits.chars().enumerate() {
+        if index > 0 && (digits.len() - index).is_multiple_of(3) {
             text.push('\u{202f}');
         }
         text.push(digit);
@@ -45,7 +66,7 @@ pub(super) fn grouped(count: u64) -> String {
     text
 }
 
-/// A number with `digits` significant digits: plain where that is short, else as 2.4 × 10⁻³.
+/// Number with `digits` significant digits, plain from 0.01 to 9999 and otherwise as 2.4 × 10⁻³.
 pub(super) fn number(value: f64, digits: usize) -> String {
     if value == 0.0 {
         return "0".into();
@@ -53,7 +74,7 @@ pub(super) fn number(value: f64, digits: usize) -> String {
     if !value.is_finite() {
         return if value.is_nan() { "unknown".into() } else { format!("{}∞", minus(value)) };
     }
-    // Rounding may carry into the next decade: let the formatter decide.
+    // Rounding may carry into the next decade, so the formatter determines the exponent.
     let scientific = format!("{:.*e}", digits.saturating_sub(1), value.abs());
     let (mantissa, exponent) = scientific.split_once('e').unwrap_or((&scientific, "0"));
     let exponent: i32 = exponent.parse().unwrap_or_default();
@@ -65,7 +86,7 @@ pub(super) fn number(value: f64, digits: usize) -> String {
     minus(value).to_owned() + &text
 }
 
-/// A power of ten, 10⁻³, or 1 and 10 as they are.
+/// Power of ten as 10⁻³, or 1 and 10.
 pub(super) fn power_of_ten(exponent: i32) -> String {
     match exponent {
         0 => "1".into(),
@@ -84,7 +105,7 @@ fn superscript(exponent: i32) -> String {
         '1' => '¹',
         '2' => '²',
         '3' => '³',
-        // ⁰ and ⁴ to ⁹ follow each other.
+        // ⁰ and ⁴ to ⁹ are consecutive.
         digit => char::from_u32(0x2070 + digit.to_digit(10).unwrap_or_default()).unwrap_or(digit),
     };
     exponent.to_string().chars().map(raised).collect()
@@ -95,10 +116,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn amounts_as_people_read_them() {
+    fn quantities_have_short_texts() {
         assert_eq!(
-            [0, 1023, 1024, 90 << 20].map(readable_bytes),
-            ["0 bytes", "1023 bytes", "1.0 KiB", "90.0 MiB"]
+            [0, 1023, 1024, 90 << 20, 1000 << 30, 3 << 50].map(readable_bytes),
+            ["0 bytes", "1023 bytes", "1.0 KiB", "90.0 MiB", "1.0 TiB", "3072.0 TiB"]
         );
         assert_eq!(
             [0.012, 3.21, 125.0, 7260.0].map(readable_seconds),

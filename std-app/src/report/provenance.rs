@@ -1,26 +1,26 @@
-//! Who made a picture: the command, the program, the machine and the date.
+//! Provenance of a picture: command, program, machine and date.
 
 use core::fmt::Write;
 use std::env::consts::{ARCH, OS};
 use std::time::SystemTime;
 
-/// What made a picture.
+/// Command, program, machine and date of a picture.
 #[derive(Clone, Debug)]
-pub struct Maker {
-    /// The command line, word by word.
+pub struct Provenance {
+    /// Words of the command line.
     pub command: Vec<String>,
     /// Name and version of the program.
     pub version: &'static str,
-    /// The processor by name where the system tells it, and the system.
+    /// Name of the processor if the system gives it, architecture and system.
     pub machine: String,
-    /// Processors that the program may use at once.
+    /// Number of processors available to the program.
     pub processors: usize,
-    /// When, in UTC.
+    /// Date and time in UTC, to the minute.
     pub date: String,
 }
 
-impl Maker {
-    /// This program, on this machine, now.
+impl Provenance {
+    /// Provenance of a picture made by this process, now.
     pub fn here() -> Self {
         Self {
             command: std::env::args_os().map(|word| word.to_string_lossy().into_owned()).collect(),
@@ -31,9 +31,9 @@ impl Maker {
         }
     }
 
-    /// The command as a POSIX shell reads it.
+    /// Command line for a POSIX shell.
     pub fn shell(&self) -> String {
-        self.command.iter().map(|word| quoted(word)).collect::<Vec<_>>().join(" ")
+        shell_words::join(&self.command)
     }
 }
 
@@ -43,22 +43,12 @@ fn processor() -> Option<String> {
     Some(line.split_once(':')?.1.trim().to_owned())
 }
 
-fn quoted(word: &str) -> String {
-    let plain = |c: char| c.is_ascii_alphanumeric() || "-_./,:=+@%".contains(c);
-    if !word.is_empty() && word.chars().all(plain) {
-        word.to_owned()
-    } else {
-        format!("'{}'", word.replace('\'', r"'\''"))
-    }
-}
-
-/// A time as people write it, in UTC and to the minute; clocks before 1970 show 1970.
+/// Date as `2000-02-29 00:00 UTC`, 1970 for earlier times.
 fn date(time: SystemTime) -> String {
-    let mut text = String::new();
+    let mut stamp = String::new();
     // Fails after the year 9999.
-    let _ = write!(text, "{}", humantime::format_rfc3339_seconds(time.max(SystemTime::UNIX_EPOCH)));
-    let (day, time) = text.split_once('T').unwrap_or((&text, ""));
-    format!("{day} {} UTC", time.get(..5).unwrap_or_default())
+    let _ = write!(stamp, "{}", humantime::format_rfc3339_seconds(time.max(SystemTime::UNIX_EPOCH)));
+    format!("{} UTC", stamp.get(..16).unwrap_or_default().replace('T', " "))
 }
 
 #[cfg(test)]
@@ -67,7 +57,7 @@ mod tests {
     use core::time::Duration;
 
     #[test]
-    fn dates_as_the_calendar_has_them() {
+    fn dates_follow_the_calendar() {
         for (seconds, expected) in [
             (0, "1970-01-01 00:00 UTC"),
             (951_782_399, "2000-02-28 23:59 UTC"),
@@ -79,9 +69,9 @@ mod tests {
     }
 
     #[test]
-    fn a_shell_reads_the_command_again() {
+    fn shell_commands_split_into_the_same_words() {
         let command = ["halflight", "render", "my scene.obj", "it's", "", "--eye=1,-2,3", "$HOME"];
-        let maker = Maker { command: command.map(String::from).into(), ..Maker::here() };
-        assert_eq!(maker.shell(), r"halflight render 'my scene.obj' 'it'\''s' '' --eye=1,-2,3 '$HOME'");
+        let provenance = Provenance { command: command.map(String::from).into(), ..Provenance::here() };
+        assert_eq!(shell_words::split(&provenance.shell()).unwrap(), command);
     }
 }

@@ -1,0 +1,139 @@
+//! Findings: decisions and numbers of a method, in one form for every report.
+//!
+//! A method pushes one [`Finding`] for each of its parts. JSON, report page and summary print the list without
+//! knowing the method.
+
+/// Values of a finding, at most.
+const MAX_VALUES: usize = 12;
+
+/// Findings of a list, at most.
+const MAX_FINDINGS: usize = 8;
+
+/// Whether a part of a method was used.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Decision {
+    /// Used in full.
+    #[default]
+    Used,
+    /// Used with fewer records or photons than wanted.
+    Limited,
+    /// Not used.
+    LeftOut,
+}
+
+impl Decision {
+    /// Name in reports: `used`, `limited` or `left out`.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Used => "used",
+            Self::Limited => "limited",
+            Self::LeftOut => "left out",
+        }
+    }
+}
+
+/// Value of a finding, with its unit.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Value {
+    /// Number of things.
+    Count(u64),
+    /// Wall-clock time in seconds.
+    Seconds(f64),
+    /// Fraction of a whole, mostly in [0, 1]; reports print percent.
+    Fraction(f64),
+    /// Number without a unit.
+    Number(f64),
+    /// Name of a choice.
+    Name(&'static str),
+}
+
+/// Decision on one part of a method, with its reason and numbers.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Finding {
+    /// Part of the method in snake case, as `caustic_photons`; a JSON key, unique in a list.
+    pub topic: &'static str,
+    /// Whether the part was used.
+    pub decision: Decision,
+    /// Reason of the decision: a phrase without a full stop, or empty.
+    pub reason: &'static str,
+    values: [Option<(&'static str, Value)>; MAX_VALUES],
+}
+
+impl Finding {
+    /// Finding without values.
+    pub const fn new(topic: &'static str, decision: Decision, reason: &'static str) -> Self {
+        Self { topic, decision, reason, values: [None; MAX_VALUES] }
+    }
+
+    /// This finding with one more value; `name` in snake case. A thirteenth value is ignored.
+    pub fn with(mut self, name: &'static str, value: Value) -> Self {
+        if let Some(free) = self.values.iter_mut().find(|slot| slot.is_none()) {
+            *free = Some((name, value));
+        }
+        self
+    }
+
+    /// [`Self::with`] if there is a value.
+    pub fn with_some(self, name: &'static str, value: Option<Value>) -> Self {
+        match value {
+            Some(value) => self.with(name, value),
+            None => self,
+        }
+    }
+
+    /// [`Self::with`] for a count above zero.
+    pub fn with_count(self, name: &'static str, count: u64) -> Self {
+        self.with_some(name, (count > 0).then_some(Value::Count(count)))
+    }
+
+    /// Names and values in order.
+    pub fn values(&self) -> impl Iterator<Item = (&'static str, Value)> {
+        self.values.iter().flatten().copied()
+    }
+}
+
+/// List of at most eight findings.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Findings([Option<Finding>; MAX_FINDINGS]);
+
+impl Findings {
+    /// Appends a finding. A ninth finding is ignored.
+    pub fn push(&mut self, finding: Finding) {
+        if let Some(free) = self.0.iter_mut().find(|slot| slot.is_none()) {
+            *free = Some(finding);
+        }
+    }
+
+    /// Findings in order.
+    pub fn iter(&self) -> impl Iterator<Item = &Finding> {
+        self.0.iter().flatten()
+    }
+}
+
+impl Extend<Finding> for Findings {
+    fn extend<I: IntoIterator<Item = Finding>>(&mut self, findings: I) {
+        findings.into_iter().for_each(|finding| self.push(finding));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::vec::Vec;
+
+    #[test]
+    fn lists_keep_order_and_ignore_entries_beyond_capacity() {
+        let mut finding = Finding::new("path_reuse", Decision::Used, "");
+        for count in 1..20 {
+            finding = finding.with_count("pixels", count);
+        }
+        let values: Vec<_> = finding.with_count("none", 0).values().collect();
+        let expected: Vec<_> = (1..=MAX_VALUES as u64).map(|count| ("pixels", Value::Count(count))).collect();
+        assert_eq!(values, expected);
+
+        let topics = ["a", "b", "c", "d", "e", "f", "g", "h", "i"];
+        let mut list = Findings::default();
+        list.extend(topics.map(|topic| Finding::new(topic, Decision::LeftOut, "")));
+        assert!(list.iter().map(|finding| finding.topic).eq(topics.into_iter().take(MAX_FINDINGS)));
+    }
+}

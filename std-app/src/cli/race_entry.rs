@@ -1,0 +1,93 @@
+//! Method of a race: `NAME[:OPTION[=VALUE]]…` as in `path:max-depth=2:seed=7`. Options are the flags of
+//! [`MethodArgs`] without dashes, so every new flag is an option as well.
+
+use super::method_args::{MethodArg, MethodArgs};
+use clap::error::{ContextKind, ContextValue, ErrorKind};
+use clap::{CommandFactory, Parser, ValueEnum};
+
+/// Method of a race with its options.
+#[derive(Clone)]
+pub(super) struct RaceEntry {
+    /// Text of the command line.
+    pub(super) name: String,
+    pub(super) method: MethodArg,
+    pub(super) args: MethodArgs,
+}
+
+/// Options as flags.
+#[derive(Parser)]
+#[command(no_binary_name = true, disable_help_flag = true)]
+struct Flags {
+    #[command(flatten)]
+    args: MethodArgs,
+}
+
+/// Parses one method of `--methods`.
+pub(super) fn race_entry(text: &str) -> Result<RaceEntry, String> {
+    let mut parts = text.split(':').map(str::trim);
+    let name = parts.next().unwrap_or_default();
+    let method =
+        MethodArg::from_str(name, false).map_err(|_| format!("the methods are {}", MethodArg::names()))?;
+    let flags: Vec<String> = parts.map(|option| format!("--{option}")).collect();
+    if flags.iter().any(|flag| flag == "--") {
+        return Err("no option follows the colon".into());
+    }
+    let args = Flags::try_parse_from(&flags).map_err(|error| message(&error))?.args;
+    Ok(RaceEntry { name: text.trim().into(), method, args })
+}
+
+/// Message of clap in terms of options.
+fn message(error: &clap::Error) -> String {
+    if error.kind() == ErrorKind::UnknownArgument {
+        let unknown = match error.get(ContextKind::InvalidArg) {
+            Some(ContextValue::String(text)) => text.trim_start_matches("--"),
+            _ => "",
+        };
+        let command = Flags::command();
+        let names: Vec<_> = command.get_arguments().filter_map(|argument| argument.get_long()).collect();
+        return format!("there is no option `{unknown}`; the options are {}", names.join(", "));
+    }
+    // The first line has the error, the others are about flags.
+    let text = error.to_string();
+    text.lines().next().unwrap_or_default().trim_start_matches("error: ").replace("'--", "'")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn options_follow_colons_and_win_over_the_race() {
+        let plain = race_entry("path").unwrap();
+        assert_eq!(plain.name, "path");
+        let special = race_entry("auto:max-depth=3:precise:seed=7").unwrap();
+        assert_eq!(special.name, "auto:max-depth=3:precise:seed=7");
+        let args = format!("{:?}", special.args);
+        for part in ["max_depth: Some(3)", "seed: Some(7)", "precise: true"] {
+            assert!(args.contains(part), "{args}");
+        }
+        let args = format!("{:?}", race_entry("path:seed=1").unwrap().args.over(&special.args));
+        assert!(args.contains("max_depth: Some(3)") && args.contains("seed: Some(1)"), "{args}");
+    }
+
+    #[test]
+    fn invalid_entries_name_the_reason() {
+        for (text, reason) in [
+            ("", "the methods are auto, path, irradiance-cache, photon-map, sppm"),
+            ("paths", "the methods are auto, path, irradiance-cache, photon-map, sppm"),
+            (
+                "path:sparkle=1",
+                "there is no option `sparkle`; the options are caustics, reuse, windows, max-depth",
+            ),
+            ("path:", "no option"),
+            ("path:max-depth=0", "max-depth"),
+            ("path:max-depth", "max-depth"),
+            ("path:simd=mmx", "the levels are"),
+            ("path:seed=1:seed=2", "seed"),
+            ("path:help", "there is no option `help`"),
+        ] {
+            let error = race_entry(text).map(|entry| entry.name).unwrap_err();
+            assert!(error.contains(reason), "{text}: {error}");
+        }
+    }
+}

@@ -1,0 +1,117 @@
+//! Findings of a render, from the fields of its result. Methods that emit findings make this file superfluous.
+
+use super::Run;
+use crate::drive::{CacheUse, CausticUse, MapUse, Method, PhotonUse, Reuse, Settings, Survey, WindowUse};
+use halflight_core::findings::Decision::{LeftOut, Limited, Used};
+use halflight_core::findings::{Finding, Findings, Value};
+
+/// Findings of `run`, in the order of the method's steps.
+pub(super) fn of(run: &Run) -> Findings {
+    let (result, settings) = (run.result, run.settings);
+    let photons = result.photons.unwrap_or_default();
+    let mut findings = Findings::default();
+    findings.extend(environment_visibility(&result.windows));
+    findings.extend(path_reuse(&result.reuse));
+    findings.extend(result.cache.map(|cache| irradiance_cache(&cache, settings)));
+    findings.extend(result.survey.as_ref().map(cache_survey));
+    findings.extend(photon_maps(&photons, result.seconds.photons));
+    findings.extend(photons.global.map(|map| map_finding("global_photons", &map)));
+    findings.extend(caustic_photons(result.method, &result.caustics, &photons));
+    findings
+}
+
+fn environment_visibility(windows: &WindowUse) -> Option<Finding> {
+    let finding = |decision, reason| Finding::new("environment_visibility", decision, reason);
+    if windows.lacks_memory {
+        return Some(finding(LeftOut, "not enough memory: sky light may be noisier"));
+    }
+    let gain = Value::Number(windows.gain?.factor().into());
+    let finding = match windows.used {
+        true => finding(Used, "the environment is sampled by its visibility"),
+        false => finding(LeftOut, "most of the environment is visible from everywhere"),
+    };
+    Some(finding.with("gain", gain))
+}
+
+fn path_reuse(reuse: &Reuse) -> Option<Finding> {
+    let decision = if reuse.used { Used } else { LeftOut };
+    let Some(pilot) = reuse.pilot else {
+        return reuse.used.then_some(Finding::new("path_reuse", Used, "requested"));
+    };
+    let reason = if reuse.used { "it pays by a pilot" } else { "it costs more than it gains by a pilot" };
+    let finding =
+        Finding::new("path_reuse", decision, reason).with("gain", Value::Number(pilot.gain().into()));
+    Some(finding.with("cost", Value::Number(pilot.cost().into())))
+}
+
+fn irradiance_cache(cache: &CacheUse, settings: &Settings) -> Finding {
+    let (decision, reason) = match cache {
+        CacheUse { is_cut: true, .. } => (Limited, "filling was cut short: other points are path traced"),
+        CacheUse { refused: 1.., .. } => (Limited, "not enough memory: other points are path traced"),
+        _ => (Used, "indirect light of diffuse surfaces is interpolated"),
+    };
+    Finding::new("irradiance_cache", decision, reason)
+        .with("metric", Value::Name(settings.cache.metric.name()))
+        .with("error", Value::Number(settings.cache.allowed().into()))
+        .with("rays_per_record", Value::Count(cache.rays.into()))
+        .with("records", Value::Count(cache.records))
+        .with("capacity", Value::Count(cache.capacity))
+        .with("gathered", Value::Count(cache.gathered))
+        .with_count("loaded", cache.loaded)
+        .with_count("refused", cache.refused)
+        .with("seconds", Value::Seconds(cache.seconds))
+}
+
+fn cache_survey(survey: &Survey) -> Finding {
+    let Survey { predicted, achieved, .. } = *survey;
+    let reason = match predicted / achieved.max(f64::MIN_POSITIVE) {
+        _ if survey.checks.is_empty() => "no record covers a test point",
+        0.0 => "the metric predicts no error",
+        ratio if ratio > 2.0 => "the error is less than half of the prediction",
+        ratio if ratio < 0.5 => "the error is more than twice the prediction",
+        _ => "the error is within a factor of two of the prediction",
+    };
+    Finding::new("cache_survey", Used, reason)
+        .with("points", Value::Count(survey.points))
+        .with("covered", Value::Fraction(survey.checks.len() as f64 / survey.points.max(1) as f64))
+        .with("predicted", Value::Fraction(predicted))
+        .with("achieved", Value::Fraction(achieved))
+        .with("rms", Value::Fraction(survey.rms))
+        .with("noise", Value::Fraction(survey.noise))
+        .with("seconds", Value::Seconds(survey.seconds))
+}
+
+fn photon_maps(photons: &PhotonUse, seconds: f64) -> Option<Finding> {
+    let finding = Finding::new("photon_maps", Used, "").with("maps", Value::Count(photons.maps));
+    let finding = finding.with_count("irradiances", photons.irradiances);
+    (photons.maps > 0).then_some(finding.with("seconds", Value::Seconds(seconds)))
+}
+
+fn caustic_photons(method: Method, caustics: &CausticUse, photons: &PhotonUse) -> Option<Finding> {
+    let left_out = |reason| Some(Finding::new("caustic_photons", LeftOut, reason));
+    let finding = match (photons.caustic, caustics.share) {
+        _ if caustics.lacks_memory => left_out("not enough memory: caustics may be missing or noisy"),
+        (Some(map), None) => Some(map_finding("caustic_photons", &map)),
+        (map, Some(_)) if caustics.used => Some(map_finding("caustic_photons", &map.unwrap_or_default())),
+        (_, Some(_)) => left_out("they carry too little light by a pilot"),
+        (None, None) if method == Method::PhotonMap => left_out("no surface is specular enough"),
+        (None, None) => None,
+    };
+    Some(finding?.with_some("share_of_light", caustics.share.map(Value::Fraction)))
+}
+
+fn map_finding(topic: &'static str, map: &MapUse) -> Finding {
+    let (decision, reason) = match map.given < map.wanted {
+        true => (Limited, "not enough memory: the picture is noisier"),
+        false if map.by_power.is_some() => (Used, "emission is guided to the view"),
+        false => (Used, ""),
+    };
+    let limited = (decision == Limited).then_some(());
+    Finding::new(topic, decision, reason)
+        .with("light_paths", Value::Count(map.shot))
+        .with("photons", Value::Count(map.stored))
+        .with_some("light_paths_per_map", limited.map(|()| Value::Count(map.given)))
+        .with_some("light_paths_wanted", limited.map(|()| Value::Count(map.wanted)))
+        .with_some("useful_light_paths", map.seen.map(Value::Fraction))
+        .with_some("useful_without_guiding", map.by_power.map(Value::Fraction))
+}
