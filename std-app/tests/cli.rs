@@ -110,6 +110,10 @@ fn a_render_writes_every_picture_and_says_the_contract() {
     assert!(object["error"]["relmse"].is_number() && object["error"]["interval"].is_array());
     assert!(object["dropped"].is_object() && object["memory"]["bvh"].is_number());
     assert_eq!(object["mean_radiance"].as_array().unwrap().len(), 3);
+    let findings = object["findings"].as_object().unwrap();
+    assert!(
+        findings.values().all(|finding| finding["decision"].is_string() && finding["reason"].is_string())
+    );
     let left_out = object["left_out"].as_array().unwrap();
     assert!(left_out.iter().all(|entry| entry["what"].is_string() && entry["why"].is_string()));
 }

@@ -32,7 +32,7 @@ fn held(folder: &Folder, arguments: &str) -> Output {
     assert!(start.elapsed() < DEADLINE, "{arguments}: {:?}", start.elapsed());
     let said = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.code().is_some(), "{arguments} ends by a signal: {said}");
-    assert!(!said.contains("panicked") && !said.contains("error of its own"), "{arguments}: {said}");
+    assert!(!said.contains("panicked") && !said.contains("internal error"), "{arguments}: {said}");
     output
 }
 

@@ -56,7 +56,7 @@ fn pipes_get_what_they_are_named_for() {
     let again = folder.object(
         "render scene.obj --method irradiance-cache --size 16x16 --spp 1 -o c.png --load-cache kept.cache --json",
     );
-    assert_eq!(again["cache"]["gathered"], 0);
+    assert_eq!(again["findings"]["irradiance_cache"]["gathered"], 0);
     assert_eq!(folder.object("merge kept.film -o d.png --json")["spp"], 16);
     assert_eq!(picture, read(&folder.path("d.png")).unwrap());
 

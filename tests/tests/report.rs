@@ -5,7 +5,7 @@ use core::sync::atomic::AtomicBool;
 use halflight::compare::compare;
 use halflight::drive::{Place, RenderResult, Settings, Stop, render};
 use halflight::load::{self, LoadOptions, LoadedScene};
-use halflight::report::{Maker, Race, Racer, Run};
+use halflight::report::{Provenance, Race, RaceEntry, Run};
 use halflight::save::to_srgb;
 use halflight_core::film::Dropped;
 use std::path::{Path, PathBuf};
@@ -45,7 +45,8 @@ fn settings(loaded: &LoadedScene, seed: u32) -> Settings {
 
 fn run_page(loaded: &LoadedScene, settings: &Settings, result: &RenderResult) -> String {
     let views = loaded.views();
-    let maker = Maker { command: vec!["halflight".into(), EVIL.into()], ..Maker::here() };
+    let command = vec!["halflight".into(), EVIL.into()];
+    let provenance = Provenance { command, ..Provenance::here() };
     let comparison = compare(&result.image, settings.reference.as_ref().unwrap()).unwrap();
     let run = Run {
         scene: &views.scene(loaded.camera_or_default()),
@@ -57,7 +58,7 @@ fn run_page(loaded: &LoadedScene, settings: &Settings, result: &RenderResult) ->
         outputs: &[],
         load_seconds: 0.1,
         total_seconds: 1.0,
-        maker: &maker,
+        provenance: &provenance,
     };
     index(run.files())
 }
@@ -65,8 +66,8 @@ fn run_page(loaded: &LoadedScene, settings: &Settings, result: &RenderResult) ->
 fn race_page(loaded: &LoadedScene, settings: &Settings, result: &RenderResult) -> String {
     let views = loaded.views();
     let scene = views.scene(loaded.camera_or_default());
-    let maker = Maker::here();
-    let racer = |name: &str| Racer {
+    let provenance = Provenance::here();
+    let entry = |name: &str| RaceEntry {
         name: name.into(),
         run: Run {
             scene: &scene,
@@ -78,10 +79,10 @@ fn race_page(loaded: &LoadedScene, settings: &Settings, result: &RenderResult) -
             outputs: &[],
             load_seconds: 0.1,
             total_seconds: 1.0,
-            maker: &maker,
+            provenance: &provenance,
         },
     };
-    let race = Race { racers: vec![racer("path"), racer(EVIL)], seconds: 1.0, maker: &maker };
+    let race = Race { entries: vec![entry("path"), entry(EVIL)], seconds: 1.0, provenance: &provenance };
     index(race.files())
 }
 
