@@ -1,8 +1,8 @@
-//! The kernels of the irradiance cache against f64: decompositions of 3 x 3 matrices, and what an edge of the
-//! environment adds to the derivatives of irradiance.
+//! Kernels of the irradiance cache against f64: decompositions of 3 x 3 matrices, and derivatives of irradiance along
+//! edges.
 
 use super::Table;
-use super::kernels::{unit, worst};
+use super::kernels::{ulp, worst};
 use core::f64::consts::FRAC_PI_2;
 use glam::{DMat3, DVec3};
 use halflight_core::Level;
@@ -10,7 +10,7 @@ use halflight_core::sampling::Random;
 use halflight_simd::kernels::edge::flux_of;
 use halflight_simd::kernels::eigen::decompose3;
 
-/// Draws from −1 to 1, each once.
+/// Stream of random numbers in [−1, 1).
 struct Draws(Random, u32);
 
 impl Draws {
@@ -59,17 +59,17 @@ pub(super) fn cases(table: &mut Table) {
     }
 }
 
-/// Values and A v − λ v of matrices of these eigenvalues in any position, in units of the largest value.
+/// Errors of eigenvalues and of A v − λ v in ulp of the largest eigenvalue, for random eigenvectors.
 fn decompositions(table: &mut Table, case: &str, values: [f64; 3]) {
     let mut draws = Draws::new(4);
-    let (mut off, mut left) = (Vec::new(), Vec::new());
+    let (mut value_errors, mut residuals) = (Vec::new(), Vec::new());
     for _ in 0..64 {
         let mut matrices = [[0.0f32; 16]; 6];
         for lane in 0..16 {
             let u = draws.direction();
             let v = u.cross(draws.direction()).normalize();
-            let turn = DMat3::from_cols(u, v, u.cross(v));
-            let a = turn * DMat3::from_diagonal(DVec3::from_array(values)) * turn.transpose();
+            let rotation = DMat3::from_cols(u, v, u.cross(v));
+            let a = rotation * DMat3::from_diagonal(DVec3::from_array(values)) * rotation.transpose();
             let entries = [a.x_axis.x, a.x_axis.y, a.x_axis.z, a.y_axis.y, a.y_axis.z, a.z_axis.z];
             for (row, entry) in matrices.iter_mut().zip(entries) {
                 row[lane] = entry as f32;
@@ -82,23 +82,32 @@ fn decompositions(table: &mut Table, case: &str, values: [f64; 3]) {
             let a = DMat3::from_cols_array(&[xx, xy, xz, xy, yy, yz, xz, yz, zz]);
             let exact = eigenvalues(a);
             let at = |row: usize| f64::from(results[0][row][lane]);
-            let size = unit(exact[0].abs().max(exact[2].abs()));
-            let mut found = [0, 1, 2].map(at);
-            for (i, value) in found.into_iter().enumerate() {
+            let size = ulp(exact[0].abs().max(exact[2].abs()));
+            let mut computed = [0, 1, 2].map(at);
+            for (i, value) in computed.into_iter().enumerate() {
                 let v = DVec3::new(at(3 + 3 * i), at(4 + 3 * i), at(5 + 3 * i));
-                left.push((a * v - value * v).length() / size);
-                left.push((v.length() - 1.0).abs() / unit(1.0));
+                residuals.push((a * v - value * v).length() / size);
+                residuals.push((v.length() - 1.0).abs() / ulp(1.0));
             }
-            found.sort_by(f64::total_cmp);
-            off.extend(found.iter().zip(exact).map(|(found, exact)| (found - exact).abs() / size));
+            computed.sort_by(f64::total_cmp);
+            value_errors
+                .extend(computed.iter().zip(exact).map(|(computed, exact)| (computed - exact).abs() / size));
         }
     }
-    // Four sweeps of rotations, each a dozen roundings of numbers up to the largest value.
-    table.units(format!("eigenvalues of 3 x 3, {case}, of the largest"), 8.0, worst(off.into_iter()));
-    table.units(format!("eigenvectors of 3 x 3, {case}: A v − λ v, of λ"), 10.0, worst(left.into_iter()));
+    // Four sweeps of rotations, each with a dozen roundings of numbers up to the largest value.
+    table.units(
+        format!("eigenvalues of 3 x 3, {case}, of the largest"),
+        8.0,
+        worst(value_errors.into_iter()),
+    );
+    table.units(
+        format!("eigenvectors of 3 x 3, {case}: A v − λ v, of λ"),
+        10.0,
+        worst(residuals.into_iter()),
+    );
 }
 
-/// Eigenvalues in rising order, by Jacobi's rotations until nothing is left.
+/// Eigenvalues in ascending order, by Jacobi rotations.
 fn eigenvalues(a: DMat3) -> [f64; 3] {
     let mut a = a.to_cols_array_2d();
     for _ in 0..12 {
@@ -123,8 +132,8 @@ fn eigenvalues(a: DMat3) -> [f64; 3] {
     values
 }
 
-/// Gradients and Hessians of edges of an angle between two, in units of what an edge so long and near can add, against
-/// their integrals along the edge.
+/// Gradients and Hessians of random edges against integrals along the edge, in ulp of the largest possible
+/// contribution of an edge of that angle and distance.
 fn edges(table: &mut Table, case: &str, [least, most]: [f64; 2], inverse: [f64; 2]) {
     let mut draws = Draws::new(5);
     let (mut first, mut second) = (Vec::new(), Vec::new());
@@ -135,24 +144,25 @@ fn edges(table: &mut Table, case: &str, [least, most]: [f64; 2], inverse: [f64; 
         let b = angle.cos() * a + angle.sin() * side;
         let [a, b] = [a, b].map(|v| DVec3::new(v.x, v.y, v.z.abs()).as_vec3());
         let [u, v] = inverse.map(|distance| distance as f32);
-        let found = flux_of(a.to_array(), u, b.to_array(), v);
+        let computed = flux_of(a.to_array(), u, b.to_array(), v);
         let (a, b, u, v) = (a.as_dvec3().normalize(), b.as_dvec3().normalize(), f64::from(u), f64::from(v));
         let angle = a.cross(b).length().atan2(a.dot(b));
         let (gradient, hessian) = integrated(a, u, b, v);
         let near = u.max(v);
-        let off = |found: &[f32], exact: &[f64]| {
-            let squares = found.iter().zip(exact).map(|(found, exact)| (f64::from(*found) - exact).powi(2));
+        let distance = |computed: &[f32], exact: &[f64]| {
+            let squares =
+                computed.iter().zip(exact).map(|(computed, exact)| (f64::from(*computed) - exact).powi(2));
             squares.sum::<f64>().sqrt()
         };
-        first.push(off(&found.gradient, &gradient) / (angle * near) / unit(1.0));
-        second.push(off(&found.hessian, &hessian) / (angle * near * near) / unit(1.0));
+        first.push(distance(&computed.gradient, &gradient) / (angle * near) / ulp(1.0));
+        second.push(distance(&computed.hessian, &hessian) / (angle * near * near) / ulp(1.0));
     }
-    // Twenty roundings of the largest term; unit vectors of f32 are off by one themselves.
+    // Twenty roundings of the largest term; f32 unit vectors themselves have an error of one ulp.
     table.units(format!("gradient of irradiance, {case}, of angle / r"), 8.0, worst(first.into_iter()));
     table.units(format!("Hessian of irradiance, {case}, of angle / r²"), 8.0, worst(second.into_iter()));
 }
 
-/// ∫ cos ν/r ds and ∫ 4 cos Sym(ν ⊗ w)/r² ds along an edge, by Simpson's rule over the angle.
+/// Integrals ∫ cos ν/r ds and ∫ 4 cos Sym(ν ⊗ w)/r² ds along an edge, by Simpson's rule over the angle.
 fn integrated(a: DVec3, u: f64, b: DVec3, v: f64) -> ([f64; 2], [f64; 3]) {
     const STEPS: u32 = 256;
     let normal = a.cross(b);

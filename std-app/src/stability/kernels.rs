@@ -1,5 +1,5 @@
-//! Kernels against f64, over the inputs that hurt them. A unit is the distance of neighbouring f32: of the value itself,
-//! or of 1 where what counts is the error in a sum of parts of 1.
+//! Kernels against f64, over difficult inputs. Errors are in ulp, the distance of neighbouring f32: of the value, or of
+//! 1 for terms of a sum of order 1.
 
 use super::Table;
 use glam::{DVec3, Vec3};
@@ -11,19 +11,19 @@ use halflight_core::sampling::{Random, sin_cos_turns};
 use halflight_simd::kernels::eigen::decompose2;
 use halflight_simd::kernels::triangles::{Shear, intersect};
 
-/// The distance from f32 `exact` to the next.
-pub(super) fn unit(exact: f64) -> f64 {
+/// Distance of neighbouring f32 at `exact`.
+pub(super) fn ulp(exact: f64) -> f64 {
     let exponent = exact.abs().max(f64::from(f32::MIN_POSITIVE)).log2().floor();
     (exponent - 23.0).exp2()
 }
 
-fn units(found: f32, exact: f64) -> f64 {
-    (f64::from(found) - exact).abs() / unit(exact)
+fn ulps(computed: f32, exact: f64) -> f64 {
+    (f64::from(computed) - exact).abs() / ulp(exact)
 }
 
-/// The same, of 1 where the value is smaller.
-fn units_of_one(found: f32, exact: f64) -> f64 {
-    (f64::from(found) - exact).abs() / unit(exact.abs().max(1.0))
+/// Error in ulp of the value, or of 1 if the value is smaller.
+fn ulps_of_one(computed: f32, exact: f64) -> f64 {
+    (f64::from(computed) - exact).abs() / ulp(exact.abs().max(1.0))
 }
 
 pub(super) fn worst(errors: impl Iterator<Item = f64>) -> f64 {
@@ -34,7 +34,7 @@ pub(super) fn cases(table: &mut Table) {
     let turns = (0..=200_000).map(|i| i as f32 / 200_000.0).flat_map(|u| {
         let (sin, cos) = sin_cos_turns(u);
         let angle = f64::from(u) * core::f64::consts::TAU;
-        [units_of_one(sin, angle.sin()), units_of_one(cos, angle.cos())]
+        [ulps_of_one(sin, angle.sin()), ulps_of_one(cos, angle.cos())]
     });
     // Two roundings of numbers up to 1, one of the angle.
     table.units("sine and cosine of a turn, of 1", 2.0, worst(turns));
@@ -65,12 +65,12 @@ fn fresnel_cases(table: &mut Table) {
             indices
                 .iter()
                 .filter(move |&&eta| {
-                    // Where total reflection begins the slope is infinite.
+                    // The slope is infinite at the onset of total reflection.
                     let g2 = f64::from(eta) * f64::from(eta) - 1.0 + f64::from(c) * f64::from(c);
                     g2 < 0.0 || g2 > 1e-3 * f64::from(c) * f64::from(c)
                 })
                 .map(move |&eta| {
-                    units_of_one(fresnel::dielectric(c, eta), exact(f64::from(c), f64::from(eta)))
+                    ulps_of_one(fresnel::dielectric(c, eta), exact(f64::from(c), f64::from(eta)))
                 })
         });
         // The larger of both terms is a square of a quotient of rounded sums: six roundings, twice.
@@ -78,7 +78,7 @@ fn fresnel_cases(table: &mut Table) {
     }
 }
 
-/// D and G1 over all roughnesses and angles, of themselves: a lobe of alpha 1e-4 has a peak of 3e7.
+/// D and G1 over all roughnesses and angles; a lobe of alpha 1e-4 has a peak of 3e7.
 fn ggx(table: &mut Table) {
     const ALPHAS: [f32; 6] = [1e-4, 1e-3, 1e-2, 0.1, 0.5, 1.0];
     const ANGLES: [f64; 10] = [0.0, 1e-8, 1e-5, 1e-4, 1e-3, 1e-2, 0.1, 0.7, 1.5, 1.57];
@@ -89,7 +89,7 @@ fn ggx(table: &mut Table) {
         let (d, a2) = (m.as_dvec3(), f64::from(alpha) * f64::from(alpha));
         let (xy2, z2) = (d.x * d.x + d.y * d.y, d.z * d.z);
         let q = (xy2 + z2) / (xy2 + a2 * z2);
-        units(Ggx::new(alpha).density(m), a2 / core::f64::consts::PI * q * q)
+        ulps(Ggx::new(alpha).density(m), a2 / core::f64::consts::PI * q * q)
     });
     // Ten roundings, those before the square count twice.
     table.units("GGX density, alpha 1e-4 to 1, of itself", 16.0, worst(density));
@@ -97,12 +97,12 @@ fn ggx(table: &mut Table) {
         let v = direction(angle);
         let (d, a2) = (v.as_dvec3(), f64::from(alpha) * f64::from(alpha));
         let stretch = (a2 * (d.x * d.x + d.y * d.y) + d.z * d.z).sqrt();
-        units(Ggx::new(alpha).masking(v), 2.0 * d.z.abs() / (d.z.abs() + stretch))
+        ulps(Ggx::new(alpha).masking(v), 2.0 * d.z.abs() / (d.z.abs() + stretch))
     });
     table.units("Smith masking, alpha 1e-4 to 1, of itself", 6.0, worst(masking));
 }
 
-/// Frames around any normal, the poles among them: a vector keeps its length.
+/// Frames around normals, poles included: vectors keep their length.
 fn frames(table: &mut Table) {
     let random = Random::new(1, 0);
     let normals = (0..4096u32).map(|i| {
@@ -114,7 +114,7 @@ fn frames(table: &mut Table) {
         let frame = Frame::from_normal(normal);
         let v = frame.to_world(Vec3::new(0.48, -0.6, 0.64));
         let length = v.as_dvec3().length();
-        (length - f64::from(Vec3::new(0.48, -0.6, 0.64).length())).abs() / unit(1.0)
+        (length - f64::from(Vec3::new(0.48, -0.6, 0.64).length())).abs() / ulp(1.0)
     });
     table.units("frames around normals, lengths, of 1", 4.0, worst(errors));
 }
@@ -139,15 +139,14 @@ fn eigen(table: &mut Table) {
             let mut results = [[[0.0f32; 16]; 4]];
             decompose2(Level::detect(), &[matrices], &mut results);
             for lane in 0..16 {
-                // Of the matrix as it was rounded. Products of two f32 are exact in f64, so is their difference where
-                // it is small.
+                // Eigenvalues of the rounded matrix. Products of f32 are exact in f64, and so are small differences.
                 let [a, b, c] = [0, 1, 2].map(|row| f64::from(matrices[row][lane]));
                 let (mean, half) = (0.5 * (a + c), 0.5 * (a - c));
                 let radius = (half * half + b * b).sqrt();
                 let large = if mean < 0.0 { mean - radius } else { mean + radius };
                 let small = (a * c - b * b) / large;
-                errors.push(units(results[0][0][lane], large));
-                errors.push(units(results[0][1][lane], small));
+                errors.push(ulps(results[0][0][lane], large));
+                errors.push(ulps(results[0][1][lane], small));
             }
         }
         table.units(
@@ -163,31 +162,31 @@ fn triangles(table: &mut Table) {
     for exponent in [-6, -3, 0, 3, 6] {
         let side = 10f32.powi(exponent);
         let random = Random::new(3, exponent.unsigned_abs());
-        let mut met = 0;
+        let mut hits = 0;
         let errors: Vec<f64> = (0..4096u32)
             .filter_map(|i| {
                 let draw = |k: u32| 2.0 * random.single(8 * i + k) - 1.0;
                 let direction = Vec3::new(0.3 * draw(0), 0.3 * draw(1), 1.0);
-                let at = direction;
-                // Its middle is where the ray goes.
+                let centre = direction;
+                // The ray passes through the centroid.
                 let tilt = [0.2 * draw(2), 0.2 * draw(3)];
                 let corners = [
-                    at + side * Vec3::new(-1.0, -0.5, tilt[0]),
-                    at + side * Vec3::new(1.0, -0.5, tilt[1]),
-                    at + side * Vec3::new(0.0, 1.0, -tilt[0] - tilt[1]),
+                    centre + side * Vec3::new(-1.0, -0.5, tilt[0]),
+                    centre + side * Vec3::new(1.0, -0.5, tilt[1]),
+                    centre + side * Vec3::new(0.0, 1.0, -tilt[0] - tilt[1]),
                 ];
                 let shear = Shear::new(direction.to_array());
                 let (t, ..) = intersect([0.0; 3], &shear, f32::MAX, corners.map(|c| c.to_array()))?;
-                met += 1;
-                // The plane of the corners as they were rounded.
+                hits += 1;
+                // Plane of the rounded corners.
                 let [a, b, c] = corners.map(|corner| corner.as_dvec3());
                 let normal = (b - a).cross(c - a);
                 let exact = normal.dot(a) / normal.dot(direction.as_dvec3());
-                // In units of how large coordinates are.
-                Some((f64::from(t) - exact).abs() / unit(f64::from(side.max(1.0))))
+                // In ulp of the largest coordinate.
+                Some((f64::from(t) - exact).abs() / ulp(f64::from(side.max(1.0))))
             })
             .collect();
-        let worst = if met > 4000 { worst(errors.into_iter()) } else { f64::INFINITY };
+        let worst = if hits > 4000 { worst(errors.into_iter()) } else { f64::INFINITY };
         table.units(
             format!("distance to triangles of side 1e{exponent}, of the largest coordinate"),
             8.0,

@@ -1,44 +1,44 @@
-//! The table of stiff and extreme cases: what a picture or a kernel must give by theory, and what it gives.
+//! Stiff and extreme cases of pictures and kernels, against known answers.
 //!
-//! Every expectation is a known answer (a furnace, a formula, an invariance, an f64 reference), none a recorded result. A
-//! random picture may be off by [`SIGMAS`] of its standard errors; what has no noise by rounding alone.
+//! Answers are furnaces, formulas, invariances or f64 references, never recorded results. A picture with noise may
+//! differ by [`SIGMAS`] standard errors, a picture without noise by rounding alone.
 
 mod derivatives;
 mod geometry;
 mod kernels;
 mod light;
+mod scene;
 mod searches;
 mod surfaces;
 mod view;
-mod world;
 
-use world::{Measured, World};
+use scene::{Measured, TestScene};
 
-/// Standard errors that a picture may be off by. Estimated from some hundred pixels; chance alone breaks one case of a
-/// hundred thousand.
+/// Tolerance in standard errors, which are estimated from some hundred pixels. By chance one case in a hundred
+/// thousand fails.
 const SIGMAS: f64 = 4.5;
 
-/// What rounding in f32 may do to the mean of a picture without noise: paths of a few dozen products.
+/// Relative tolerance without noise: f32 rounding of paths of a few dozen products.
 const ROUNDING: f64 = 2e-5;
 
-/// A case and how it went.
+/// Result of a case.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Outcome {
-    /// What kind of case it is.
+    /// Kind of the case.
     pub group: &'static str,
-    /// What is stiff about it.
+    /// Name of the case.
     pub case: String,
-    /// What it must give.
+    /// Known answer.
     pub expected: String,
-    /// What it gives.
+    /// Measured answer.
     pub measured: String,
     /// Whether both agree.
     pub passed: bool,
 }
 
-/// Runs the cases whose kind or name is `wanted`; `tell` sees each as it ends.
-pub fn run(wanted: &dyn Fn(&str) -> bool, tell: &mut dyn FnMut(&Outcome)) -> Vec<Outcome> {
-    let mut table = Table { wanted, tell, outcomes: Vec::new() };
+/// Runs the cases whose kind or name `is_selected`; `report` receives each result at once.
+pub fn run(is_selected: &dyn Fn(&str) -> bool, report: &mut dyn FnMut(&Outcome)) -> Vec<Outcome> {
+    let mut table = Table { is_selected, report, outcomes: Vec::new() };
     geometry::cases(&mut table);
     light::cases(&mut table);
     surfaces::cases(&mut table);
@@ -49,57 +49,58 @@ pub fn run(wanted: &dyn Fn(&str) -> bool, tell: &mut dyn FnMut(&Outcome)) -> Vec
     table.outcomes
 }
 
-/// What cases write to.
+/// Table of results, which the cases fill.
 struct Table<'a> {
-    wanted: &'a dyn Fn(&str) -> bool,
-    tell: &'a mut dyn FnMut(&Outcome),
+    is_selected: &'a dyn Fn(&str) -> bool,
+    report: &'a mut dyn FnMut(&Outcome),
     outcomes: Vec<Outcome>,
 }
 
 impl Table<'_> {
-    fn wants(&self, group: &str, case: &str) -> bool {
-        (self.wanted)(group) || (self.wanted)(case)
+    fn selects(&self, group: &str, case: &str) -> bool {
+        (self.is_selected)(group) || (self.is_selected)(case)
     }
 
     fn add(&mut self, outcome: Outcome) {
-        (self.tell)(&outcome);
+        (self.report)(&outcome);
         self.outcomes.push(outcome);
     }
 
-    /// The mean radiance of the picture of `world` is `expected`, and each of its pixels is a number.
-    fn radiance(&mut self, group: &'static str, case: impl Into<String>, world: &World, expected: f64) {
-        self.radiance_within(group, case, world, expected, ROUNDING);
+    /// Case: the mean radiance of a picture is `expected`, and all its pixels are finite.
+    fn radiance(&mut self, group: &'static str, case: impl Into<String>, scene: &TestScene, expected: f64) {
+        self.radiance_within(group, case, scene, expected, ROUNDING);
     }
 
-    /// The same with another relative `tolerance` beside the noise, for a reason that the caller knows.
+    /// [`Self::radiance`] with another relative `tolerance` in addition to the noise.
     fn radiance_within(
         &mut self,
         group: &'static str,
         case: impl Into<String>,
-        world: &World,
+        scene: &TestScene,
         expected: f64,
         tolerance: f64,
     ) {
         let case = case.into();
-        if !self.wants(group, &case) {
+        if !self.selects(group, &case) {
             return;
         }
-        let (measured, passed) = match world.measure() {
+        let (measured, passed) = match scene.measure() {
             Err(error) => (error, false),
-            Ok(Measured { mean, error, lost }) => {
-                let reach = SIGMAS * error + tolerance * expected.abs();
-                let passed = (mean - expected).abs() <= reach && lost == 0;
-                let lost = if lost > 0 { format!(", {lost} samples lost") } else { String::new() };
-                (format!("{} ± {}{lost}", short(mean), short(error)), passed)
+            Ok(Measured { mean, error, rejected }) => {
+                let tolerance = SIGMAS * error + tolerance * expected.abs();
+                let passed = (mean - expected).abs() <= tolerance && rejected == 0;
+                let rejected =
+                    if rejected > 0 { format!(", {rejected} samples rejected") } else { String::new() };
+                (format!("{} ± {}{rejected}", short(mean), short(error)), passed)
             }
         };
         self.add(Outcome { group, case, expected: short(expected), measured, passed });
     }
 
-    /// A kernel is off by `most` units at most; `measured` is the worst that was found.
+    /// Case: the largest error of a kernel, `measured`, is at most `most` ulp.
     fn units(&mut self, case: impl Into<String>, most: f64, measured: f64) {
         let case = case.into();
-        if !self.wants("kernels", &case) {
+        if !self.selects("kernels", &case) {
             return;
         }
         self.add(Outcome {
@@ -111,10 +112,10 @@ impl Table<'_> {
         });
     }
 
-    /// A kernel whose answers are right or wrong: `wrong` of `all` are. Less than a thousand would say nothing.
+    /// Case: none of `all` answers is wrong. Fewer than a thousand answers fail, as they prove little.
     fn exact(&mut self, case: impl Into<String>, wrong: u32, all: u32) {
         let case = case.into();
-        if !self.wants("kernels", &case) {
+        if !self.selects("kernels", &case) {
             return;
         }
         let (expected, measured) = ("none wrong".into(), format!("{wrong} of {all} wrong"));
@@ -122,7 +123,7 @@ impl Table<'_> {
     }
 }
 
-/// A number in five digits.
+/// Number with five digits.
 fn short(value: f64) -> String {
     if value == 0.0 || (1e-3..1e4).contains(&value.abs()) {
         let digits = 4 - value.abs().max(1e-3).log10().floor() as i32;
@@ -136,7 +137,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_table_holds() {
+    fn all_cases_have_their_known_answers() {
         let outcomes = run(&|_| true, &mut |_| {});
         let failed: Vec<_> = outcomes.iter().filter(|outcome| !outcome.passed).collect();
         assert!(failed.is_empty(), "{failed:#?}");
@@ -144,7 +145,7 @@ mod tests {
     }
 
     #[test]
-    fn numbers_are_short() {
+    fn numbers_have_five_digits() {
         assert_eq!([0.0, 1.0, 123.456789, 0.0123].map(short), ["0.0000000", "1.0000", "123.46", "0.012300"]);
         assert_eq!(short(1e20), "1.0000e20");
     }

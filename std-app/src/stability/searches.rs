@@ -1,4 +1,4 @@
-//! Kernels whose answer is right or wrong: rays against boxes in f64, photon searches against every photon.
+//! Kernels with exact answers: rays against boxes in f64, photon searches against brute force.
 
 use super::Table;
 use glam::{DVec3, Vec3};
@@ -22,7 +22,7 @@ pub(super) fn cases(table: &mut Table) {
     photons(table);
 }
 
-/// Eight boxes at once.
+/// Test of a ray against eight boxes.
 struct Eight<'a>(&'a SlabRay, &'a Boxes8);
 
 impl Kernel for Eight<'_> {
@@ -33,9 +33,9 @@ impl Kernel for Eight<'_> {
     }
 }
 
-/// Rays towards points within boxes: none may be missed, at any level. A flat box has no thickness along z.
+/// Rays towards points in boxes: no box may be missed at any level. `thickness` 0 makes boxes flat along z.
 fn boxes(table: &mut Table, case: &str, size: f32, thickness: f32, stretch: Vec3) {
-    let (mut meetings, mut missed) = (0, 0);
+    let (mut hits, mut missed) = (0, 0);
     const BATCHES: u32 = 1024;
     let random = Random::new(6, 0);
     for batch in 0..BATCHES {
@@ -46,33 +46,33 @@ fn boxes(table: &mut Table, case: &str, size: f32, thickness: f32, stretch: Vec3
         let mut planes: Boxes8 = [[0.0; 8]; 8];
         let origin = size * (10.0 * point(0, 3) - Vec3::splat(5.0));
         for i in 0..8 {
-            // A point of the ray as nearly as f32 holds it, in a box around it that has room for its rounding.
+            // A point of the ray in f32, in a box with room for its rounding.
             let along = direction.as_dvec3() * (f64::from(size) * f64::from(2.0 * draw(i, 6)));
             let at = origin.as_dvec3() + along;
             let room = f64::from(size) * (1e-6 * 16.0);
             for axis in 0..3 {
                 let thick = if axis == 2 { thickness } else { 1.0 };
-                let reach = |k| f64::from(thick) * (room + f64::from(size * draw(i, k)));
-                planes[2 * axis][i as usize] = (at[axis] - reach(7)) as f32;
-                planes[2 * axis + 1][i as usize] = (at[axis] + reach(8)) as f32;
+                let extent = |k| f64::from(thick) * (room + f64::from(size * draw(i, k)));
+                planes[2 * axis][i as usize] = (at[axis] - extent(7)) as f32;
+                planes[2 * axis + 1][i as usize] = (at[axis] + extent(8)) as f32;
             }
         }
         let ray = SlabRay::new(origin.to_array(), direction.to_array());
         for level in [Level::BASELINE, Level::detect()] {
-            let met = level.dispatch(Eight(&ray, &planes));
+            let entered = level.dispatch(Eight(&ray, &planes));
             for i in 0..8u32 {
-                let exact = meets(&planes, i as usize, origin.as_dvec3(), direction.as_dvec3());
-                let found = met >> i & 1 == 1 && ray.enters(&planes, i as usize, f32::MAX).is_some();
-                meetings += u32::from(exact);
+                let exact = enters(&planes, i as usize, origin.as_dvec3(), direction.as_dvec3());
+                let found = entered >> i & 1 == 1 && ray.enters(&planes, i as usize, f32::MAX).is_some();
+                hits += u32::from(exact);
                 missed += u32::from(exact && !found);
             }
         }
     }
-    table.exact(format!("rays and boxes, {case}: none is missed"), missed, meetings);
+    table.exact(format!("rays and boxes, {case}: none is missed"), missed, hits);
 }
 
-/// The slab test in f64, with divisions.
-fn meets(boxes: &Boxes8, i: usize, origin: DVec3, direction: DVec3) -> bool {
+/// Slab test in f64.
+fn enters(boxes: &Boxes8, i: usize, origin: DVec3, direction: DVec3) -> bool {
     let (mut entry, mut exit) = (0.0f64, f64::INFINITY);
     for axis in 0..3 {
         let [low, high] = [2 * axis, 2 * axis + 1].map(|row| f64::from(boxes[row][i]) - origin[axis]);
@@ -89,8 +89,9 @@ fn meets(boxes: &Boxes8, i: usize, origin: DVec3, direction: DVec3) -> bool {
     entry <= exit
 }
 
-/// Clouds that are hard to search: the `i`th of the photons, and the radii to search within.
+/// Distributions of photons that are difficult to search.
 fn photons(table: &mut Table) {
+    /// Position of the `i`th photon from random numbers.
     type Cloud = fn(&dyn Fn(u32) -> f32, u32) -> Vec3;
     let clouds: [(&str, Cloud); 6] = [
         ("in one point", |_, _| Vec3::new(0.3, -0.2, 0.1)),
@@ -108,23 +109,23 @@ fn photons(table: &mut Table) {
     const COUNT: u32 = 3000;
     for (name, cloud) in clouds {
         let random = Random::new(7, 0);
-        let place = |i: u32| cloud(&|k| random.single(4 * i + k), i);
+        let position = |i: u32| cloud(&|k| random.single(4 * i + k), i);
         let mut lines = vec![Line([0; 64]); Photons::footprint(COUNT as usize).bytes().div_ceil(64)];
         let mut arena = Arena::new(bytemuck::cast_slice_mut(&mut lines));
         let Ok(mut photons) = Photons::new(COUNT as usize, &mut arena) else { continue };
         for (i, photon) in photons.as_mut_slice().iter_mut().enumerate() {
-            *photon = Photon::new(place(i as u32), Vec3::Z, Vec3::Z, Rgb::ONE);
+            *photon = Photon::new(position(i as u32), Vec3::Z, Vec3::Z, Rgb::ONE);
         }
         let map = photons.build(COUNT as usize);
         let (mut wrong, mut searches) = (0, 0);
         for i in 0..96 {
-            let around = place(31 * i);
-            let far = (place(31 * i + 1) - around).length();
+            let centre = position(31 * i);
+            let far = (position(31 * i + 1) - centre).length();
             for radius in [0.0, 0.1 * far, far, f32::INFINITY] {
                 for level in [Level::BASELINE, Level::detect()] {
                     searches += 2;
-                    wrong += u32::from(!finds_all(&map, level, around, radius));
-                    wrong += u32::from(!finds_nearest(&map, level, around, radius));
+                    wrong += u32::from(!finds_all(&map, level, centre, radius));
+                    wrong += u32::from(!finds_nearest(&map, level, centre, radius));
                 }
             }
         }
@@ -132,22 +133,22 @@ fn photons(table: &mut Table) {
     }
 }
 
-fn finds_all(map: &PhotonMap, level: Level, place: Vec3, radius: f32) -> bool {
+fn finds_all(map: &PhotonMap, level: Level, centre: Vec3, radius: f32) -> bool {
     let mut found = vec![0; map.len()];
-    let count = map.within(level, place, radius, &mut found);
-    brute::within(map, place, radius).map(|(index, _)| index).eq(found.into_iter().take(count))
+    let count = map.within(level, centre, radius, &mut found);
+    brute::within(map, centre, radius).map(|(index, _)| index).eq(found.into_iter().take(count))
 }
 
-fn finds_nearest(map: &PhotonMap, level: Level, place: Vec3, radius: f32) -> bool {
+fn finds_nearest(map: &PhotonMap, level: Level, centre: Vec3, radius: f32) -> bool {
     const K: usize = 50;
     let mut lines = vec![Line([0; 64]); Neighbours::footprint(K).bytes().div_ceil(64)];
     let Ok(mut neighbours) = Neighbours::new(K, &mut Arena::new(bytemuck::cast_slice_mut(&mut lines))) else {
         return false;
     };
-    map.nearest(level, place, radius, &mut neighbours);
+    map.nearest(level, centre, radius, &mut neighbours);
     let mut found: Vec<u32> = neighbours.iter().map(|(index, _)| index).collect();
-    let mut all: Vec<(u32, f32)> = brute::within(map, place, radius).collect();
-    // Of photons at the same distance those with the lower index.
+    let mut all: Vec<(u32, f32)> = brute::within(map, centre, radius).collect();
+    // Ties in distance go to the lower index.
     all.sort_by(|a, b| a.1.total_cmp(&b.1).then(a.0.cmp(&b.0)));
     let mut nearest: Vec<u32> = all.into_iter().take(K).map(|(index, _)| index).collect();
     found.sort_unstable();

@@ -1,4 +1,4 @@
-//! Small scenes in f64, as files have them, and what their pictures show.
+//! Small scenes in f64, as in files, and the mean radiance of their pictures.
 
 use crate::drive::{Settings, Stop, render};
 use crate::load::SceneTransform;
@@ -7,14 +7,14 @@ use glam::{DVec3, Mat3};
 use halflight_core::Rgb;
 use halflight_core::scene::{ColorInput, Environment, Material, Mesh, PointLight, Scene, Surface, Triangle};
 
-/// A scene, its camera and its picture.
+/// Scene with its camera and the settings of its picture.
 #[derive(Clone, Debug)]
-pub(super) struct World {
+pub(super) struct TestScene {
     pub(super) positions: Vec<[f64; 3]>,
     pub(super) triangles: Vec<Triangle>,
     pub(super) materials: Vec<Material>,
     pub(super) lights: Vec<PointLight>,
-    /// Radiance of the sky; black where `None`.
+    /// Radiance of the sky; `None` for no sky.
     pub(super) sky: Option<f32>,
     pub(super) eye: DVec3,
     pub(super) look_at: DVec3,
@@ -24,17 +24,17 @@ pub(super) struct World {
     pub(super) spp: u32,
 }
 
-/// The mean radiance of a picture.
+/// Mean radiance of a picture.
 pub(super) struct Measured {
     pub(super) mean: f64,
-    /// Its standard error, from the halves of all pixels.
+    /// Standard error, from the halves of all pixels.
     pub(super) error: f64,
-    /// Samples that were dropped, and pixels that are no number.
-    pub(super) lost: u64,
+    /// Rejected samples and pixels that are not finite.
+    pub(super) rejected: u64,
 }
 
-impl World {
-    /// Nothing, seen from `eye`.
+impl TestScene {
+    /// Empty scene, seen from `eye`.
     pub(super) fn new(eye: DVec3, look_at: DVec3, fov: f64) -> Self {
         Self {
             positions: Vec::new(),
@@ -50,12 +50,12 @@ impl World {
         }
     }
 
-    /// A closed box of side 2 around the origin, seen from within, whose walls all have `reflectance` and emit.
+    /// Closed box of side 2 around the origin, seen from inside, whose walls reflect and emit.
     pub(super) fn furnace(reflectance: f32, radiance: f32) -> Self {
-        let mut world = Self::new(DVec3::new(0.1, -0.2, 0.3), DVec3::new(0.1, -0.2, -1.0), 70.0);
-        let glow = world.material(glowing(reflectance, radiance));
-        world.cuboid(DVec3::NEG_ONE, DVec3::ONE, true, glow);
-        world
+        let mut scene = Self::new(DVec3::new(0.1, -0.2, 0.3), DVec3::new(0.1, -0.2, -1.0), 70.0);
+        let material = scene.material(emitter(reflectance, radiance));
+        scene.cuboid(DVec3::NEG_ONE, DVec3::ONE, true, material);
+        scene
     }
 
     pub(super) fn material(&mut self, material: Material) -> u32 {
@@ -69,13 +69,13 @@ impl World {
         self.triangles.push(Triangle { vertices: [first, first + 1, first + 2], material });
     }
 
-    /// Counter-clockwise seen from the front.
+    /// Quadrilateral, counter-clockwise from its front.
     pub(super) fn quad(&mut self, [a, b, c, d]: [DVec3; 4], material: u32) {
         self.triangle([a, b, c], material);
         self.triangle([a, c, d], material);
     }
 
-    /// A square in a plane of constant y, facing up or down.
+    /// Square in a plane of constant y, facing up or down.
     pub(super) fn square(&mut self, center: DVec3, side: f64, up: bool, material: u32) {
         let corner = |x: f64, z: f64| center + 0.5 * side * DVec3::new(x, 0.0, z);
         let mut corners = [corner(-1.0, -1.0), corner(-1.0, 1.0), corner(1.0, 1.0), corner(1.0, -1.0)];
@@ -85,7 +85,7 @@ impl World {
         self.quad(corners, material);
     }
 
-    /// A closed box whose faces look outwards, or inwards.
+    /// Closed box with faces that look outwards or inwards.
     pub(super) fn cuboid(&mut self, min: DVec3, max: DVec3, inwards: bool, material: u32) {
         for mut face in faces(min, max) {
             if inwards {
@@ -95,7 +95,7 @@ impl World {
         }
     }
 
-    /// The same, `factor` times as large, and moved.
+    /// Scene scaled by `factor`, then moved by `offset`.
     pub(super) fn moved(mut self, factor: f64, offset: DVec3) -> Self {
         let point = |p: DVec3| p * factor + offset;
         for position in &mut self.positions {
@@ -105,7 +105,7 @@ impl World {
         self
     }
 
-    /// What a picture shows that was loaded as files are.
+    /// Mean radiance of the picture, after the transform that the loader applies.
     pub(super) fn measure(&self) -> Result<Measured, String> {
         let mut bounds = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];
         for position in &self.positions {
@@ -139,16 +139,16 @@ impl World {
         let picture = picture.map_err(|error| error.to_string())?;
         let count = picture.image.pixels.len() as f64;
         let sum = |pixels: &[[f32; 3]]| pixels.iter().map(|pixel| f64::from(pixel[0])).sum::<f64>();
-        let wrong = picture.image.pixels.iter().flatten().filter(|value| !value.is_finite()).count() as u64;
+        let invalid = picture.image.pixels.iter().flatten().filter(|value| !value.is_finite()).count() as u64;
         Ok(Measured {
             mean: sum(&picture.image.pixels) / count,
             error: sum(&picture.variance.pixels).sqrt() / count,
-            lost: picture.counters.dropped.total() + wrong,
+            rejected: picture.counters.dropped.total() + invalid,
         })
     }
 }
 
-/// The faces of a box, looking outwards.
+/// Faces of a box, looking outwards.
 pub(super) fn faces(min: DVec3, max: DVec3) -> [[DVec3; 4]; 6] {
     let at = |i: usize| {
         DVec3::new(
@@ -161,15 +161,15 @@ pub(super) fn faces(min: DVec3, max: DVec3) -> [[DVec3; 4]; 6] {
     faces.map(|face| face.map(at))
 }
 
-/// A diffuse surface that emits.
-pub(super) fn glowing(reflectance: f32, radiance: f32) -> Material {
+/// Diffuse emitter.
+pub(super) fn emitter(reflectance: f32, radiance: f32) -> Material {
     Material {
         emission: ColorInput::from(Rgb::splat(radiance)),
         ..Material::diffuse(Rgb::splat(reflectance))
     }
 }
 
-/// Any surface.
-pub(super) fn made_of(surface: Surface) -> Material {
+/// Material with a surface and no emission.
+pub(super) fn with_surface(surface: Surface) -> Material {
     Material { surface, ..Material::GREY }
 }
