@@ -1,4 +1,4 @@
-//! Speed of the kernels on one thread of this machine. Rival libraries of the caller are measured in the same run.
+//! Speed of the kernels on one thread of this machine. Rival libraries are measured in the same run.
 
 pub mod eigen;
 pub mod knn;

@@ -1,4 +1,5 @@
-//! Camera flags: each replaces one part of the scene file's camera, or of a camera that frames the whole scene.
+//! Camera flags: each replaces one part of the scene file's camera, or of a camera that frames the whole
+//! scene.
 
 use super::failure::Failure;
 use super::values::{self, Lens};

@@ -14,9 +14,10 @@ use std::process::ExitCode;
 
 /// Compare a picture with a reference: relMSE, MSE, RMSE and FLIP
 ///
-/// relMSE is the mean over pixels and channels of (A - B)^2 / (B^2 + 0.01 m^2), with the mean m of B. relMSE, MSE and
-/// RMSE are errors of linear radiance; PNG and JPEG are decoded from sRGB. FLIP is the LDR-FLIP error (Andersson et al.
-/// 2020) of the sRGB pictures at 67 pixels per degree. Infinite and NaN pixels are left out of the linear errors.
+/// relMSE is the mean over pixels and channels of (A - B)^2 / (B^2 + 0.01 m^2), with the mean m of B. relMSE,
+/// MSE and RMSE are errors of linear radiance; PNG and JPEG are decoded from sRGB. FLIP is the LDR-FLIP error
+/// (Andersson et al. 2020) of the sRGB pictures at 67 pixels per degree. Infinite and NaN pixels are left out
+/// of the linear errors.
 #[derive(Args)]
 pub(super) struct Compare {
     /// Picture: EXR, HDR, PFM, PNG, JPEG, TIFF, WebP, BMP or TGA

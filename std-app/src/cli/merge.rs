@@ -12,8 +12,8 @@ use std::process::ExitCode;
 
 /// Merge the films of all shards of a picture
 ///
-/// The films come from `halflight render --shard I/N --checkpoint FILE`, in any order. The picture has the bits of
-/// one render. Films of different scenes, settings or numbers of samples are refused.
+/// The films come from `halflight render --shard I/N --checkpoint FILE`, in any order. The picture has the
+/// bits of one render. Films of different scenes, settings or numbers of samples are refused.
 #[derive(Args)]
 pub(super) struct Merge {
     /// Films, one of each shard

@@ -60,7 +60,8 @@ pub(super) struct MethodArgs {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..),
         help_heading = "Light transport")]
     max_depth: Option<u32>,
-    /// Share of the work for path tracing some pixels to measure the bias [default: 5% if the method is biased]
+    /// Share of the work for path tracing some pixels to measure the bias [default: 5% if the method is
+    /// biased]
     #[arg(long, value_name = "SHARE|off", value_parser = values::audit, help_heading = "Light transport")]
     audit: Option<f64>,
     /// Seed of the random numbers [default: 0]

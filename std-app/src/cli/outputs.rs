@@ -1,5 +1,5 @@
-//! Output files of a command. All are checked before the work starts: that they can be written, and that none is
-//! the same file as another output or an input. At the end each is written even if others fail.
+//! Output files of a command. All are checked before the work starts: that they can be written, and that none
+//! is the same file as another output or an input. At the end each is written even if others fail.
 
 use super::failure::Failure;
 use super::interrupt::INTERRUPT;
@@ -152,7 +152,8 @@ impl Outputs {
         saved.map_err(|error| self.fail(error)).is_ok()
     }
 
-    /// Writes a picture to all of `paths`, to files before pipes, whose readers may be slow; returns those written.
+    /// Writes a picture to all of `paths`, to files before pipes, whose readers may be slow; returns those
+    /// written.
     pub(super) fn save_to<'p>(&mut self, paths: &'p [PathBuf], image: &Image) -> Vec<&'p PathBuf> {
         let is_stream =
             |path: &PathBuf| Destination::of(path).is_ok_and(|destination| destination.is_stream());

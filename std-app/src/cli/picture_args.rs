@@ -27,7 +27,8 @@ pub(super) struct PictureArgs {
     /// Number of threads [default: all hardware threads]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=4096), display_order = 8)]
     threads: Option<u32>,
-    /// Memory limit for files, scene and all structures, as in 512M or 2G [default: four fifths of the machine's]
+    /// Memory limit for files, scene and all structures, as in 512M or 2G [default: four fifths of the
+    /// machine's]
     #[arg(long, value_name = "BYTES", value_parser = values::bytes, display_order = 9)]
     memory: Option<usize>,
 }

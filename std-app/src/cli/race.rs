@@ -23,15 +23,15 @@ use std::time::Instant;
 
 /// Compare the error of several methods against run time
 ///
-/// The methods render in turns, round by round, each on all threads and for the same time, so other load of the
-/// machine affects all of them. Errors are measured against --reference, or estimated. Ctrl-C ends the race early
-/// with exit code 3.
+/// The methods render in turns, round by round, each on all threads and for the same time, so other load of
+/// the machine affects all of them. Errors are measured against --reference, or estimated. Ctrl-C ends the
+/// race early with exit code 3.
 #[derive(Args)]
 pub(super) struct Race {
     /// Scene: a mesh (.obj) or a scene file (.toml)
     scene: PathBuf,
-    /// Methods of `render`, each with options after colons, as in path,path:max-depth=2; an option is a flag below
-    /// without dashes, and wins over the flag of the race
+    /// Methods of `render`, each with options after colons, as in path,path:max-depth=2; an option is a flag
+    /// below without dashes, and wins over the flag of the race
     #[arg(long, value_name = "METHOD[:OPTION=VALUE]...,...", value_parser = race_entry, value_delimiter = ',',
         required = true, display_order = 1)]
     methods: Vec<RaceEntry>,

@@ -18,14 +18,14 @@ use std::time::Instant;
 
 /// Render a scene to pictures
 ///
-/// The first of --spp, --time and --error that holds ends the render. Flags win over the scene file; any of these three
-/// replaces all three of it. Ctrl-C ends the render early with a valid picture and exit code 3.
+/// The first of --spp, --time and --error that holds ends the render. Flags win over the scene file; any of
+/// these three replaces all three of it. Ctrl-C ends the render early with a valid picture and exit code 3.
 #[derive(Args)]
 pub(super) struct Render {
     /// Scene: a mesh (.obj) or a scene file (.toml)
     scene: PathBuf,
-    /// Picture: .png, .exr, .hdr or .pfm; may be repeated [default: name of the scene with .png, in the current
-    /// folder]
+    /// Picture: .png, .exr, .hdr or .pfm; may be repeated [default: name of the scene with .png, in the
+    /// current folder]
     #[arg(short, long, value_name = "FILE", display_order = 1)]
     output: Vec<PathBuf>,
     /// Method of light transport

@@ -10,8 +10,8 @@ use std::process::ExitCode;
 
 /// Run stiff and extreme cases with known answers on this machine
 ///
-/// The cases are scenes of size 1e-6 to 1e6, lights of size 1e-9 to 1e9, needles, perfect mirrors, cameras in glass, and
-/// kernels against f64. The exit code is 1 if a case differs from its answer.
+/// The cases are scenes of size 1e-6 to 1e6, lights of size 1e-9 to 1e9, needles, perfect mirrors, cameras in
+/// glass, and kernels against f64. The exit code is 1 if a case differs from its answer.
 #[derive(Args)]
 pub(super) struct Stability {
     /// Run only cases whose kind or name contains this word

@@ -1,5 +1,5 @@
-//! Standard output and standard error without the panics of `println!`. A failed write of results is a failure,
-//! unless the reader has closed the pipe. A failed write of notes is ignored.
+//! Standard output and standard error without the panics of `println!`. A failed write of results is a
+//! failure, unless the reader has closed the pipe. A failed write of notes is ignored.
 
 use super::failure::Failure;
 use core::fmt::Display;

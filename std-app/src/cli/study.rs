@@ -28,8 +28,8 @@ enum Subject {
 
 /// Error metrics of the irradiance cache at equal numbers of records
 ///
-/// For each metric the error is searched that fills the cache of the picture with the number of records, to 2 %. The
-/// cached irradiance is then compared with many gather rays at points of the picture.
+/// For each metric the error is searched that fills the cache of the picture with the number of records, to
+/// 2 %. The cached irradiance is then compared with many gather rays at points of the picture.
 #[derive(Args)]
 struct Irradiance {
     /// Scene: a mesh (.obj) or a scene file (.toml)

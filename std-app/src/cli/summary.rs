@@ -27,8 +27,8 @@ pub(super) fn text(run: &Run, report: Option<&Path>) -> String {
     lines.extend(match result.ending {
         Ending::Biased => Some("       the bias alone exceeds --error: more samples do not help".into()),
         Ending::NoiseFloor => Some(
-            "       noise that all samples share exceeds --error: more samples do not help; for an irradiance \
-             cache more --cache-rays do"
+            "       noise that all samples share exceeds --error: more samples do not help; for an \
+            irradiance cache more --cache-rays do"
                 .into(),
         ),
         Ending::Done | Ending::Interrupted => None,
@@ -110,7 +110,8 @@ pub(super) fn audited(audit: &Audited) -> Vec<String> {
         format!("{error}, noise and bias"),
         parts(&audit.noise, "bias", &audit.bias),
         format!(
-            "audit  {verdict}: {} with {} each; whole picture off by {:+.2} % ± {:.2} %; detectable bias {:.1e}",
+            "audit  {verdict}: {} with {} each; whole picture off by {:+.2} % ± {:.2} %; detectable bias \
+            {:.1e}",
             plural(audit.pixels.into(), "pixel"),
             plural(audit.samples.into(), "sample"),
             100.0 * audit.whole.mean,

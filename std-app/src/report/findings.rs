@@ -1,4 +1,4 @@
-//! Findings of a render, from the fields of its result. Methods that emit findings make this file superfluous.
+//! Findings of a render, from the fields of its result. It goes when methods emit them.
 
 use super::Run;
 use crate::drive::{CacheUse, CausticUse, MapUse, Method, PhotonUse, Reuse, Settings, Survey, WindowUse};

@@ -1,9 +1,11 @@
-//! Power law of error against time: a line through the curve on logarithmic axes, with the interval of its slope.
+//! Power law of error against time: a line through the curve on logarithmic axes, with the interval of its
+//! slope.
 //!
-//! The points of a curve are correlated, because each picture holds the samples of all earlier ones. The error of
-//! a mean over the time t is W(t)/t with a random walk W. Errors at times s < t have the correlation √(s/t), and
-//! their squares s/t: a Markov chain in log t. Each point minus its prediction from the one before is
-//! independent, so ordinary least squares applies. Logarithms of errors have equal variances: weights are equal.
+//! The points of a curve are correlated, because each picture holds the samples of all earlier ones. The
+//! error of a mean over the time t is W(t)/t with a random walk W. Errors at times s < t have the correlation
+//! √(s/t), and their squares s/t: a Markov chain in log t. Each point minus its prediction from the one
+//! before is independent, so ordinary least squares applies. Logarithms of errors have equal variances:
+//! weights are equal.
 
 use halflight_core::estimate::{NORMAL_95, student_quantile};
 
@@ -37,7 +39,8 @@ const MIN_POINTS: usize = 5;
 const MAX_CORRELATION: f64 = 1.0 - 1e-9;
 
 impl Fit {
-    /// Fit of the last decade of time or the last six points: early samples often show the start, not the rate.
+    /// Fit of the last decade of time or the last six points: early samples often show the start, not the
+    /// rate.
     ///
     /// Points are in the order of time. Points without a logarithm are ignored. `None` below five points.
     pub(super) fn through(points: impl Iterator<Item = Point>) -> Option<Fit> {
@@ -117,8 +120,8 @@ mod tests {
         assert_eq!(rising.seconds_to(0.1), f64::INFINITY);
     }
 
-    /// Errors of 200 independent pixels are random walks over time, so the slope is −1. A correct 95 % interval
-    /// misses it in more than 36 or fewer than 8 of 400 renders with a probability below 1e-3.
+    /// Errors of 200 independent pixels are random walks over time, so the slope is −1. A correct 95 %
+    /// interval misses it in more than 36 or fewer than 8 of 400 renders with a probability below 1e-3.
     #[test]
     fn interval_holds_the_slope_in_95_percent_of_renders() {
         let mut state = 1u64;

@@ -56,8 +56,8 @@ fn is_ours(path: &Path, marks: &[&str]) -> io::Result<bool> {
     Ok(marks.iter().any(|mark| text.contains(mark)))
 }
 
-/// Writes the files of a report, and creates the folder if its parent exists. Files are whole or absent, and a
-/// failure does not affect the other files.
+/// Writes the files of a report, and creates the folder if its parent exists. Files are whole or absent, and
+/// a failure does not affect the other files.
 ///
 /// # Errors
 /// Every file that was not written, with the reason.

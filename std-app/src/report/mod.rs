@@ -1,5 +1,5 @@
-//! Reports: a page for people, `curve.csv` and `run.json` for programs. The page is one file without references
-//! to others: pictures are data URIs, charts are SVG.
+//! Reports: a page for people, `curve.csv` and `run.json` for programs. The page is one file without
+//! references to others: pictures are data URIs, charts are SVG.
 
 mod census;
 mod curve;

@@ -1,5 +1,5 @@
-//! Kernels of the irradiance cache against f64: decompositions of 3 x 3 matrices, and derivatives of irradiance along
-//! edges.
+//! Kernels of the irradiance cache against f64: decompositions of 3 x 3 matrices, and derivatives of
+//! irradiance along edges.
 
 use super::Table;
 use super::kernels::{ulp, worst};

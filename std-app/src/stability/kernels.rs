@@ -1,5 +1,5 @@
-//! Kernels against f64, over difficult inputs. Errors are in ulp, the distance of neighbouring f32: of the value, or of
-//! 1 for terms of a sum of order 1.
+//! Kernels against f64, over difficult inputs. Errors are in ulp, the distance of neighbouring f32: of the
+//! value, or of 1 for terms of a sum of order 1.
 
 use super::Table;
 use glam::{DVec3, Vec3};
@@ -139,7 +139,8 @@ fn eigen(table: &mut Table) {
             let mut results = [[[0.0f32; 16]; 4]];
             decompose2(Level::detect(), &[matrices], &mut results);
             for lane in 0..16 {
-                // Eigenvalues of the rounded matrix. Products of f32 are exact in f64, and so are small differences.
+                // Eigenvalues of the rounded matrix. Products of f32 are exact in f64, and so are small
+                // differences.
                 let [a, b, c] = [0, 1, 2].map(|row| f64::from(matrices[row][lane]));
                 let (mean, half) = (0.5 * (a + c), 0.5 * (a - c));
                 let radius = (half * half + b * b).sqrt();

@@ -7,8 +7,8 @@ use glam::{DQuat, DVec3};
 use halflight_core::Rgb;
 use halflight_core::scene::Material;
 
-/// Irradiance below the centre of a parallel square of side `s` and radiance 1 at distance 1: π times four times
-/// the form factor of a quarter (Howell's catalogue, B-3).
+/// Irradiance below the centre of a parallel square of side `s` and radiance 1 at distance 1: π times four
+/// times the form factor of a quarter (Howell's catalogue, B-3).
 fn under_a_square(s: f64) -> f64 {
     let a = 0.5 * s;
     let root = (1.0 + a * a).sqrt();

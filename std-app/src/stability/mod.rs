@@ -1,7 +1,7 @@
 //! Stiff and extreme cases of pictures and kernels, against known answers.
 //!
-//! Answers are furnaces, formulas, invariances or f64 references, never recorded results. A picture with noise may
-//! differ by [`SIGMAS`] standard errors, a picture without noise by rounding alone.
+//! Answers are furnaces, formulas, invariances or f64 references, never recorded results. A picture with
+//! noise may differ by [`SIGMAS`] standard errors, a picture without noise by rounding alone.
 
 mod derivatives;
 mod geometry;
@@ -14,8 +14,8 @@ mod view;
 
 use scene::{Measured, TestScene};
 
-/// Tolerance in standard errors, which are estimated from some hundred pixels. By chance one case in a hundred
-/// thousand fails.
+/// Tolerance in standard errors, which are estimated from some hundred pixels. By chance one case in a
+/// hundred thousand fails.
 const SIGMAS: f64 = 4.5;
 
 /// Relative tolerance without noise: f32 rounding of paths of a few dozen products.

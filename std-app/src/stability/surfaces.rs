@@ -38,8 +38,8 @@ fn under_the_sky(material: Material) -> TestScene {
     scene
 }
 
-/// Albedo of a white GGX surface for vertical light and one reflection: the mean of Smith's masking over reflected
-/// directions, with half-vectors distributed by D cos (Walter 2007, eq. 33 to 35).
+/// Albedo of a white GGX surface for vertical light and one reflection: the mean of Smith's masking over
+/// reflected directions, with half-vectors distributed by D cos (Walter 2007, eq. 33 to 35).
 fn ggx_albedo(alpha: f64) -> f64 {
     const STEPS: u32 = 1 << 20;
     let a2 = alpha * alpha;

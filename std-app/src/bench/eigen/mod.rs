@@ -1,9 +1,9 @@
-//! Eigen decompositions per second of symmetric matrices on one thread: 2×2, as in the radii of irradiance records,
-//! and 3×3.
+//! Eigen decompositions per second of symmetric matrices on one thread: 2×2, as in the radii of irradiance
+//! records, and 3×3.
 //!
-//! [`BATCH`] random matrices and their results fit into the first-level cache and are decomposed repeatedly for
-//! [`SECONDS`]. Each library does so [`REPETITIONS`] times in turn; the median is reported. Values and vectors are
-//! computed and stored, ours sorted by magnitude.
+//! [`BATCH`] random matrices and their results fit into the first-level cache and are decomposed repeatedly
+//! for [`SECONDS`]. Each library does so [`REPETITIONS`] times in turn; the median is reported. Values and
+//! vectors are computed and stored, ours sorted by magnitude.
 
 use super::{REPETITIONS, median};
 use core::hint::black_box;

@@ -1,5 +1,5 @@
-//! Photons and queries of the benchmark: photons on the surfaces of a room, three tenths of them in a caustic, and
-//! queries at surface points.
+//! Photons and queries of the benchmark: photons on the surfaces of a room, three tenths of them in a
+//! caustic, and queries at surface points.
 
 use glam::Vec3;
 

@@ -1,8 +1,8 @@
-//! Photon searches per second on one thread: the k nearest photons, with and without a radius, and density estimates.
-//! The build is timed on two threads as well.
+//! Photon searches per second on one thread: the k nearest photons, with and without a radius, and density
+//! estimates. The build is timed on two threads as well.
 //!
-//! Each library is timed [`REPETITIONS`] times in turn by the wall clock, so other load of the machine affects all of
-//! them; the median is reported.
+//! Each library is timed [`REPETITIONS`] times in turn by the wall clock, so other load of the machine
+//! affects all of them; the median is reported.
 
 mod data;
 mod ours;

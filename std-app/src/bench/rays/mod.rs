@@ -1,7 +1,9 @@
-//! Rays per second on one thread, for camera rays, diffuse bounces and shadow rays, and the time to build the BVH.
+//! Rays per second on one thread, for camera rays, diffuse bounces and shadow rays, and the time to
+//! build the BVH.
 //!
-//! Each library is timed [`REPETITIONS`] times in turn by the wall clock, so other load of the machine affects both;
-//! the median is reported. Rays come in batches. The conversion of a batch to a library's format is not timed.
+//! Each library is timed [`REPETITIONS`] times in turn by the wall clock, so other load of the machine
+//! affects both; the median is reported. Rays come in batches. The conversion of a batch to a library's
+//! format is not timed.
 
 mod classes;
 mod ours;

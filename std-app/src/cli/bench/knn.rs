@@ -14,8 +14,8 @@ const QUERIES: NonZero<usize> = NonZero::new(WorkSize::FULL.queries).unwrap();
 
 /// Photon searches per second on one thread
 ///
-/// The photons lie on the surfaces of a room, three tenths of them in a caustic. The tasks are the 8, 50, 100 and
-/// 200 nearest photons of surface points, with and without a radius, and density estimates.
+/// The photons lie on the surfaces of a room, three tenths of them in a caustic. The tasks are the 8, 50, 100
+/// and 200 nearest photons of surface points, with and without a radius, and density estimates.
 #[derive(Args)]
 pub(super) struct Knn {
     /// Photons in the map

@@ -26,9 +26,9 @@ pub(super) fn section(run: &Run) -> Markup {
             dl class="facts row" { (parts::facts(&facts)) }
             p.note {
                 "Unbiased path tracing renders " (plural(audit.pixels.into(), "pixel")) " with "
-                (plural(audit.samples.into(), "sample")) " each, in step with the picture. Differences beyond the noise \
-                of both are bias. Means of regions are more certain than pixels, so a bias of one sign is detected \
-                before one that averages out. A bias below the noise is not detected."
+                (plural(audit.samples.into(), "sample")) " each, in step with the picture. Differences \
+                beyond the noise of both are bias. Means of regions are more certain than pixels, so a bias \
+                of one sign is detected before one that averages out. A bias below the noise is not detected."
             }
         }
     }
@@ -85,7 +85,7 @@ pub(super) fn map(run: &Run) -> Markup {
         &values,
         Shown::Relative,
         "Bias",
-        "Relative deviation of regions: blue is too dark, red is too bright, white is within two standard errors. One \
-         unbiased region in twenty has a colour.",
+        "Relative deviation of regions: blue is too dark, red is too bright, white is within two standard \
+        errors. One unbiased region in twenty has a colour.",
     )
 }

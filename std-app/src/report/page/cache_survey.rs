@@ -30,8 +30,8 @@ pub(super) fn section(run: &Run) -> Markup {
                 (records(run, survey))
                 (map(|look| look.radius).figure(
                     "Radii",
-                    "Mean validity radius of the records at a pixel, in pixels. Black pixels have no record and are path \
-                     traced.",
+                    "Mean validity radius of the records at a pixel, in pixels. Black pixels have no record \
+                    and are path traced.",
                 ))
                 (map(|look| look.predicted).figure(
                     "Predicted error",
@@ -41,14 +41,16 @@ pub(super) fn section(run: &Run) -> Markup {
                     &errors(run, survey),
                     Shown::Relative,
                     "True error",
-                    "Relative error at the test points: blue is too dark, red is too bright, white was not tested.",
+                    "Relative error at the test points: blue is too dark, red is too bright, white was not \
+                    tested.",
                 ))
             }
             p.note {
-                "The true error is that of the mean of both caches at " (plural(survey.points, "point")) ", against 2 × \
-                4096 gather rays. The noise of these rays is part of the achieved error but not of its root mean \
-                square. Errors are relative to the irradiance, or to a tenth of its mean if that is larger. The \
-                prediction covers interpolation, up to 100\u{202f}%, but not the noise of records."
+                "The true error is that of the mean of both caches at " (plural(survey.points, "point")) ", \
+                against 2 × 4096 gather rays. The noise of these rays is part of the achieved error but not \
+                of its root mean square. Errors are relative to the irradiance, or to a tenth of its mean if \
+                that is larger. The prediction covers interpolation, up to 100\u{202f}%, but not the noise \
+                of records."
             }
         }
     }
@@ -73,7 +75,8 @@ fn records(run: &Run, survey: &Survey) -> Markup {
             (img(&reduced(&drawn).0, "Records and their borders over the picture"))
             figcaption {
                 h3 { "Records" }
-                p { "Records of the cache of even samples: dots are records, lines are the borders of their validity." }
+                p { "Records of the cache of even samples: dots are records, lines are the borders of their \
+                validity." }
             }
         }
     }

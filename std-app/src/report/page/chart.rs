@@ -1,5 +1,5 @@
-//! Curves of error against time as SVG, on logarithmic axes. Colours come from the style sheet, so charts follow
-//! the dark mode. A chart has three widths, of which the style sheet shows one.
+//! Curves of error against time as SVG, on logarithmic axes. Colours come from the style sheet, so charts
+//! follow the dark mode. A chart has three widths, of which the style sheet shows one.
 
 use crate::report::fit::Fit;
 use crate::report::quantity::{number, power_of_ten, readable_seconds};
@@ -79,8 +79,10 @@ impl Chart {
                 @for series in &self.series {
                     (entry(&line(&format!("curve {}", series.class())), &series.name))
                 }
-                @if self.series.iter().any(|series| !series.band.is_empty()) { (entry(&band, "95 % interval")) }
-                @if self.series.iter().any(|series| series.fit.is_some()) { (entry(&line("fit"), "fitted line")) }
+                @if self.series.iter().any(|series| !series.band.is_empty()) { (entry(&band, "95 % \
+                interval")) }
+                @if self.series.iter().any(|series| series.fit.is_some()) { (entry(&line("fit"), "fitted \
+                line")) }
             }
         }
     }
@@ -127,7 +129,8 @@ impl Axis {
         (value / self.low).ln() / (self.high / self.low).ln()
     }
 
-    /// Grid values, and whether each has a label: every decade; 2 and 5 on short axes; all digits within a decade.
+    /// Grid values, and whether each has a label: every decade; 2 and 5 on short axes; all digits within a
+    /// decade.
     fn ticks(&self) -> Vec<(f64, bool)> {
         let decades = (self.high / self.low).log10();
         let first = self.low.log10().floor() as i32;

@@ -31,7 +31,8 @@ pub(super) fn lead(run: &Run) -> Markup {
     match (run.comparison, run.result.error) {
         (Some(comparison), estimate) => html! {
             "This picture has a relMSE of " strong { (number(comparison.linear.relmse, 3)) }
-            " against the reference" (typical(comparison.linear.relmse)) ". The estimate from its " (source) " is "
+            " against the reference" (typical(comparison.linear.relmse)) ". The estimate from its " (source)
+            " is "
             @if let Some(error) = estimate { (interval(error)) } @else { "unknown" } "."
         },
         (None, Some(error)) if error.upper > UNCERTAIN * error.lower => html! {
@@ -108,7 +109,8 @@ pub(super) fn slopes(chart: &Chart) -> Markup {
             @for (index, (series, fit)) in fits.iter().enumerate() {
                 @if index > 0 { ", " }
                 strong { (hundredths(fit.slope)) } " (95\u{202f}%: " (hundredths(fit.interval[0])) " to "
-                (hundredths(fit.interval[1])) ") " (if series.style == ESTIMATE { "estimated" } else { &series.name })
+                (hundredths(fit.interval[1])) ") "
+                (if series.style == ESTIMATE { "estimated" } else { &series.name })
             }
             ". Independent samples give −1." (prediction(series, fit))
         }

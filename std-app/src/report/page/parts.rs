@@ -35,7 +35,8 @@ pub(super) fn split(left: &Markup, right: &Markup) -> Markup {
         div.split {
             div.side { (left) }
             div class="side over" { (right) }
-            input type="range" min="0" max="100" step="0.5" value="50" aria-label="Boundary of the pictures" hidden;
+            input type="range" min="0" max="100" step="0.5" value="50" aria-label="Boundary of the \
+            pictures" hidden;
         }
     }
 }
@@ -87,7 +88,8 @@ fn bars(caption: &str, rows: &[(&str, String, f64)]) -> Markup {
                     tr {
                         th scope="row" { (name) }
                         td { (amount) }
-                        td.bar aria-hidden="true" { i style=(format!("width:{:.2}%", 100.0 * value / most)) {} }
+                        @let width = format!("width:{:.2}%", 100.0 * value / most);
+                        td.bar aria-hidden="true" { i style=(width) {} }
                     }
                 }
             }
@@ -185,8 +187,9 @@ pub(super) fn dropped(run: &Run) -> Markup {
     let tiles: Vec<_> = all.iter().take(MAX_TILES).map(tile).collect();
     html! {
         p {
-            (grouped(dropped.total())) " of " (grouped(paths)) " samples were dropped. Unfinished paths were cut at a \
-            technical limit, and the picture has their light up to there. Other dropped samples do not count."
+            (grouped(dropped.total())) " of " (grouped(paths)) " samples were dropped. Unfinished paths were \
+            cut at a technical limit, and the picture has their light up to there. Other dropped samples do \
+            not count."
             @if run.result.empty_pixels > 0 {
                 " " (plural(run.result.empty_pixels, "pixel")) " without any sample left: black."
             }

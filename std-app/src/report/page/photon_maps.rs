@@ -34,8 +34,8 @@ fn figures(name: &str, width: u32, view: &MapView) -> Markup {
         ))
         (map(&view.density).figure(
             &format!("Density of {name}"),
-            "Photons per square metre of surface, from the nearest 64. Glass and mirrors hold no photons and show the \
-             density nearby.",
+            "Photons per square metre of surface, from the nearest 64. Glass and mirrors hold no photons and \
+            show the density nearby.",
         ))
         (map(&view.radius).figure(
             &format!("Radius of {name}"),

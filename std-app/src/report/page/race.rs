@@ -19,22 +19,23 @@ pub(in crate::report) fn page(race: &Race) -> String {
             p {
                 @if race.has_reference() { "Errors are measured against the reference." }
                 @else {
-                    "Errors are estimated, with 95\u{202f}% intervals. The estimate covers sampled noise and the blur of \
-                    photons, but no other bias."
+                    "Errors are estimated, with 95\u{202f}% intervals. The estimate covers sampled noise and \
+                    the blur of photons, but no other bias."
                 }
             }
             (table(race))
             p.note {
-                "Efficiency is 1 / (relMSE · seconds of rendering): twice the efficiency takes half the time for the same \
-                picture, if the error falls as 1 / time. Intervals cover the noise of the pictures, but not the \
-                variation of times. "
+                "Efficiency is 1 / (relMSE · seconds of rendering): twice the efficiency takes half the time \
+                for the same picture, if the error falls as 1 / time. Intervals cover the noise of the \
+                pictures, but not the variation of times. "
                 (parts::relmse_definition())
             }
         }
         section {
             h2 { "Error against run time" }
             (chart(race).figure())
-            p.note { "The strip at the axis shows the leader; grey if the intervals of the best two overlap." }
+            p.note { "The strip at the axis shows the leader; grey if the intervals of the best two \
+            overlap." }
             (leads(race))
         }
         (pictures(race, layout(&first.result.image)))

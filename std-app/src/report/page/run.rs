@@ -25,8 +25,8 @@ pub(in crate::report) fn page(run: &Run) -> String {
             details { summary { "Rounds" } (error::rounds(run)) }
             p.note {
                 (parts::relmse_definition())
-                "Without a reference the error is estimated from two halves of the picture with independent samples. It \
-                covers noise that was sampled, but not light that no sample has found."
+                "Without a reference the error is estimated from two halves of the picture with independent \
+                samples. It covers noise that was sampled, but not light that no sample has found."
             }
         }
         (audit::section(run))
@@ -64,12 +64,12 @@ fn first(run: &Run) -> Markup {
         Ending::Done => "",
         Ending::Interrupted => " The render was stopped early.",
         Ending::Biased => {
-            " The render stopped because the bias alone exceeds the requested error: more samples do not help, another \
-             method may."
+            " The render stopped because the bias alone exceeds the requested error: more samples do not \
+            help, another method may."
         }
         Ending::NoiseFloor => {
-            " The render stopped because noise that all samples share exceeds the requested error: more samples do not \
-             help."
+            " The render stopped because noise that all samples share exceeds the requested error: more \
+            samples do not help."
         }
     };
     html! {
@@ -120,7 +120,8 @@ fn maps(run: &Run) -> Markup {
         ))
         (root(map(relative.collect())).figure(
             "Relative error",
-            "Standard error over the brightness of the pixel, as in relMSE: bright pixels dominate the error.",
+            "Standard error over the brightness of the pixel, as in relMSE: bright pixels dominate the \
+            error.",
         ))
         (map(of_sample).figure(
             "Variance of a sample",
@@ -158,8 +159,8 @@ fn note(run: &Run) -> String {
         _ => String::new(),
     };
     let maps = run.result.error.map_or("An error estimate needs four samples.", |_| {
-        "Errors are estimated from the halves of each pixel and averaged over a few pixels. Scales are logarithmic and \
-         leave out the lowest 1\u{202f}% and the highest 0.5\u{202f}% of the pixels."
+        "Errors are estimated from the halves of each pixel and averaged over a few pixels. Scales are \
+        logarithmic and leave out the lowest 1\u{202f}% and the highest 0.5\u{202f}% of the pixels."
     });
     samples + maps
 }
