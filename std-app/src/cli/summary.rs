@@ -110,8 +110,8 @@ pub(super) fn audited(audit: &Audited) -> Vec<String> {
         format!("{error}, noise and bias"),
         parts(&audit.noise, "bias", &audit.bias),
         format!(
-            "audit  {verdict}: {} with {} each; whole picture off by {:+.2} % ± {:.2} %; detectable bias \
-            {:.1e}",
+            "audit  {verdict}: {} with {} each; whole picture off by {:+.2} % ± {:.2} %; \
+             detectable bias {:.1e}",
             plural(audit.pixels.into(), "pixel"),
             plural(audit.samples.into(), "sample"),
             100.0 * audit.whole.mean,

@@ -1,4 +1,4 @@
-//! Findings of a render, from the fields of its result. It goes when methods emit them.
+//! Findings of a render, from the fields of its result. This file goes when methods emit findings.
 
 use super::Run;
 use crate::drive::{CacheUse, CausticUse, MapUse, Method, PhotonUse, Reuse, Settings, Survey, WindowUse};
