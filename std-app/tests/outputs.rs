@@ -55,21 +55,21 @@ fn what_is_read_is_never_written() {
     for (arguments, names) in [
         (format!("{render} -o hard.png"), ["hard.png", "wood.png"]),
         (format!("{render} -o sub/../wood.png"), ["sub/../wood.png", "wood.png"]),
-        (format!("{render} -o ok.png -o sky.exr"), ["sky.exr (-o)", "sky.exr, which"]),
-        (format!("{render} -o unused.png"), ["unused.png (-o)", "unused.png, which"]),
-        (format!("{render} -o steel.png"), ["steel.png (-o)", "steel.png, which"]),
-        (format!("{render} -o ok.png --checkpoint room.toml"), ["--checkpoint", "room.toml, which"]),
+        (format!("{render} -o ok.png -o sky.exr"), ["sky.exr (-o)", "sky.exr: both"]),
+        (format!("{render} -o unused.png"), ["unused.png (-o)", "unused.png: both"]),
+        (format!("{render} -o steel.png"), ["steel.png (-o)", "steel.png: both"]),
+        (format!("{render} -o ok.png --checkpoint room.toml"), ["--checkpoint", "room.toml: both"]),
         (format!("{render} -o reference.exr --reference ./reference.exr"), ["(-o)", "./reference.exr"]),
         (format!("{render} --save-cache scene.mtl --method irradiance-cache"), ["--save-cache", "scene.mtl"]),
         (format!("{render} --checkpoint old.cache --load-cache old.cache"), ["--checkpoint", "old.cache"]),
         (format!("{render} --save-cache sub/hard.film --resume old.film"), ["--save-cache", "old.film"]),
-        (format!("render scene.obj {SMALL}"), ["without -o", "scene.png, which"]),
-        ("compare sky.exr reference.exr -o reference.exr".into(), ["(-o)", "reference.exr, which"]),
+        (format!("render scene.obj {SMALL}"), ["without -o", "scene.png: both"]),
+        ("compare sky.exr reference.exr -o reference.exr".into(), ["(-o)", "reference.exr: both"]),
         (
             "compare sky.exr reference.exr -o d.png -o sub/../sky.exr".into(),
-            ["sub/../sky.exr", "sky.exr, which"],
+            ["sub/../sky.exr", "sky.exr: both"],
         ),
-        ("merge film.png -o film.png".into(), ["film.png (-o)", "film.png, which"]),
+        ("merge film.png -o film.png".into(), ["film.png (-o)", "film.png: both"]),
     ] {
         let said = folder.refused(&arguments);
         assert!(names.iter().all(|name| said.contains(name)), "{arguments}: {said}");

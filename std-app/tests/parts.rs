@@ -114,9 +114,9 @@ fn a_merged_picture_knows_what_its_samples_share() {
     let render =
         |scene: &str, method: &str| format!("render {scene} --size 64x64 --spp 8 --method {method} --json");
     let cases = [
-        (caustic.to_str().unwrap(), "path", false, "noise and what photons blur"),
-        ("scene.obj", "path", false, "estimated from its own noise"),
-        ("scene.obj", "sppm", true, "estimated from its own noise; bias is not in it"),
+        (caustic.to_str().unwrap(), "path", false, "noise and blur of photons"),
+        ("scene.obj", "path", false, "noise alone"),
+        ("scene.obj", "sppm", true, "noise alone; bias is not included"),
     ];
     for (scene, method, biased, words) in cases {
         let render = render(scene, method);
