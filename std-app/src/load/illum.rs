@@ -18,11 +18,10 @@ pub(super) fn is_glass(mtl: &MtlMaterial) -> bool {
         return true;
     }
     let has_base = has_base(mtl);
-    let is_metal = mtl.metallic.is_some_and(|pm| pm > 0.0) || mtl.has_map(MapKind::Metallic);
     let is_cut_out = mtl.opacity.is_some_and(|d| d < 1.0) || mtl.has_map(MapKind::Opacity);
     let filters = mtl.tint.is_some_and(|tint| tint != [1.0; 3]);
     match index(mtl) {
-        _ if is_metal => false,
+        _ if is_metal(mtl) => false,
         Some(ni) if (ni - 1.0).abs() <= INDEX_TOLERANCE => filters && !has_base,
         Some(_) => !(model == 9 && is_cut_out && has_base && mtl.tint.is_none()),
         None => matches!(model, 6 | 7) || mtl.tint.is_some() || !has_base,
@@ -41,10 +40,11 @@ pub(super) fn index(mtl: &MtlMaterial) -> Option<f64> {
 
 /// Whether `Pr`, `Pm` or one of their maps specifies the surface.
 pub(super) fn is_pbr(mtl: &MtlMaterial) -> bool {
-    mtl.roughness.is_some()
-        || mtl.has_map(MapKind::Roughness)
-        || mtl.metallic.is_some_and(|pm| pm > 0.0)
-        || mtl.has_map(MapKind::Metallic)
+    mtl.roughness.is_some() || mtl.has_map(MapKind::Roughness) || is_metal(mtl)
+}
+
+fn is_metal(mtl: &MtlMaterial) -> bool {
+    mtl.metallic.is_some_and(|pm| pm > 0.0) || mtl.has_map(MapKind::Metallic)
 }
 
 /// Notes statements that `illum` makes ineffective, and an ineffective `illum`.

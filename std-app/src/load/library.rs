@@ -6,7 +6,7 @@ use super::mtl::{self, MtlMaterial};
 use super::name::{Kind, Name, folded, readings};
 use super::notes::Notes;
 use super::text::{trimmed, word_starts};
-use super::{read, weight};
+use super::{memory_estimate, read};
 use crate::memory::Budget;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -106,7 +106,7 @@ impl Library {
         }
         self.files.push(file.into());
         let shown = file.display();
-        let bytes = match read(file, sources.budget, weight::of_mtl) {
+        let bytes = match read(file, sources.budget, memory_estimate::of_mtl) {
             Ok(bytes) => bytes,
             Err(error) => {
                 let note = format!("material library {shown} is left out: {}", error.problem);

@@ -5,7 +5,7 @@
 //! [`LoadError`] with file, line and help. `docs/loading.md` has the table of both. The parsers take
 //! arbitrary bytes: [`obj::parse`], [`mtl::parse`], [`scene_file::parse`].
 
-mod doubled;
+mod duplicate_emitters;
 mod error;
 mod far_camera;
 mod files;
@@ -14,6 +14,7 @@ mod geometry;
 mod illum;
 mod library;
 mod map;
+mod memory_estimate;
 pub mod mtl;
 mod name;
 mod notes;
@@ -30,7 +31,6 @@ mod text;
 mod texture;
 mod texture_set;
 mod transform;
-mod weight;
 
 pub use error::LoadError;
 pub use map::{Map, MapOptions};
@@ -83,8 +83,8 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<LoadedScene, LoadError
     }
 }
 
-/// Reads a text file; `weight` is the memory that parsing it takes.
-fn read(path: &Path, budget: &Budget, weight: fn(&[u8]) -> usize) -> Result<Vec<u8>, LoadError> {
+/// Reads a text file; `estimate` gives the memory that parsing it takes.
+fn read(path: &Path, budget: &Budget, estimate: fn(&[u8]) -> usize) -> Result<Vec<u8>, LoadError> {
     let bytes = memory::read_file(path, budget.left()).map_err(|error| {
         let help = match error.kind() {
             io::ErrorKind::FileTooLarge => MORE_MEMORY,
@@ -92,7 +92,7 @@ fn read(path: &Path, budget: &Budget, weight: fn(&[u8]) -> usize) -> Result<Vec<
         };
         LoadError::of_file(path, format!("cannot be read: {error}"), help)
     })?;
-    budget.has(weight(&bytes)).map_err(|why| too_large(path, &why))?;
+    budget.has(estimate(&bytes)).map_err(|why| too_large(path, &why))?;
     Ok(bytes)
 }
 
@@ -153,9 +153,9 @@ impl SceneBuilder {
         let number = match self.obj_numbers.get(path) {
             Some(&number) => number,
             None => {
-                let text = read(path, &self.budget, weight::of_obj)?;
+                let text = read(path, &self.budget, memory_estimate::of_obj)?;
                 let mut obj = obj::parse(text, path)?;
-                self.budget.take(weight::of_mesh(&obj)).map_err(|why| too_large(path, &why))?;
+                self.budget.take(memory_estimate::of_mesh(&obj)).map_err(|why| too_large(path, &why))?;
                 self.notes.merge(core::mem::take(&mut obj.notes));
                 self.objs.push(obj);
                 self.obj_numbers.insert(path.into(), self.objs.len() - 1);
@@ -277,12 +277,13 @@ impl SceneBuilder {
         count_vertices(path, parts.iter().map(|part| part.group.positions.len()).sum())?;
         let fit = fit::Fit::of(&parts);
         let pieces = geometry::pieces(&parts, &fit);
-        let weight = weight::of_scene(&parts, &materials).saturating_add(weight::of_pieces(pieces));
-        self.budget.take(weight).map_err(|why| too_large(path, &why))?;
+        let bytes =
+            memory_estimate::of_scene(&parts, &materials).saturating_add(memory_estimate::of_pieces(pieces));
+        self.budget.take(bytes).map_err(|why| too_large(path, &why))?;
         let mut geometry = geometry::assemble(&parts, &fit, pieces, notes);
         count_vertices(path, geometry.positions.len())?;
         let names: Vec<String> = self.materials.iter().map(|mtl| mtl.name.to_string()).collect();
-        doubled::remove(&mut geometry, &materials, &names, notes);
+        duplicate_emitters::remove(&mut geometry, &materials, &names, notes);
         open_glass::note(&geometry, &materials, &names, notes);
         Ok(LoadedScene {
             positions: geometry.positions,

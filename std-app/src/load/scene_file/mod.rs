@@ -20,7 +20,7 @@ use super::map::Map;
 use super::notes::Notes;
 use super::scene::{LoadedScene, View};
 use super::settings::RenderSettings;
-use super::{LoadOptions, SceneBuilder, read, too_large, weight};
+use super::{LoadOptions, SceneBuilder, memory_estimate, read, too_large};
 use core::cell::RefCell;
 use core::ops::Range;
 use glam::{DMat3, DVec3};
@@ -152,8 +152,8 @@ impl<'a> Source<'a> {
 /// Loads a scene file and all files that it names.
 pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<LoadedScene, LoadError> {
     let mut builder = SceneBuilder::new(options);
-    let bytes = read(path, &builder.budget, weight::of_scene_file)?;
-    builder.budget.take(weight::of_scene_file(&bytes)).map_err(|why| too_large(path, &why))?;
+    let bytes = read(path, &builder.budget, memory_estimate::of_scene_file)?;
+    builder.budget.take(memory_estimate::of_scene_file(&bytes)).map_err(|why| too_large(path, &why))?;
     let text = String::from_utf8(bytes).map_err(|error| {
         let valid = &error.as_bytes()[..error.utf8_error().valid_up_to()];
         let line = valid.iter().filter(|&&b| b == b'\n').count() as u32 + 1;
