@@ -7,6 +7,7 @@
 //! their density; [`caustics`] merges them with paths; [`cached`] places, gathers and looks up records of the
 //! irradiance cache. `prepass` learns what the first sample needs.
 
+pub mod bidirectional;
 pub mod cached;
 pub mod caustics;
 pub mod path;
