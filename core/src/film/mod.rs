@@ -2,10 +2,12 @@
 
 mod pixel;
 mod samples;
+mod splat;
 mod tile;
 
 pub use pixel::{Dropped, Half, Pixel};
 pub use samples::{CIRCLE, CIRCLES, GROUP, GROUPS};
+pub use splat::{STRIPS, Splat, StripOffsets, add_strip, sort_by_strip, strip_length};
 pub use tile::{PIXELS_PER_TILE, PixelSet, TILE, Tile};
 
 use crate::Rgb;

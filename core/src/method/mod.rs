@@ -4,6 +4,7 @@
 //! scene needs, and adds samples to a film in [`Round`]s. An [`Executor`] of the caller runs the tasks of its passes:
 //! no method knows of threads, clocks or files.
 
+pub mod bidirectional;
 pub mod emission_guide;
 pub mod environment_visibility;
 pub mod executor;

@@ -309,7 +309,7 @@ impl<F: Features, L: FnMut(&LightPathState, Photon, CausticShare, &mut Counters)
     #[inline]
     fn meet(
         &mut self,
-        state: &LightPathState,
+        state: &mut LightPathState,
         vertex: &Vertex,
         counters: &mut Counters,
     ) -> Option<Continuation> {

@@ -176,7 +176,12 @@ impl Visitor for VisibilityCounter<'_> {
     const SEED: u64 = Depositor::SEED;
 
     #[inline]
-    fn meet(&mut self, state: &LightPathState, vertex: &Vertex, _: &mut Counters) -> Option<Continuation> {
+    fn meet(
+        &mut self,
+        state: &mut LightPathState,
+        vertex: &Vertex,
+        _: &mut Counters,
+    ) -> Option<Continuation> {
         let leaves = self.keep.leaves(state, vertex);
         if leaves && self.sight.shows(vertex.point.position, vertex.point.geometric_normal) {
             let power = luminance(Rgb::from(state.power));
@@ -198,7 +203,7 @@ impl Visitor for Depositor<'_> {
     #[inline]
     fn meet(
         &mut self,
-        state: &LightPathState,
+        state: &mut LightPathState,
         vertex: &Vertex,
         counters: &mut Counters,
     ) -> Option<Continuation> {

@@ -50,6 +50,11 @@ pub(in crate::transport) struct LightPathState {
     pub origin: [f32; 3],
     /// From which cell of the guide.
     pub cell: u32,
+    /// The last vertex, for visitors that note it.
+    pub position: [f32; 3],
+    /// Sums of a bidirectional path (`bidirectional/mis.rs`).
+    pub last: f32,
+    pub rest: f32,
     /// R / (π² r² N) so far, for visitors that weigh photons (`merge.rs`, `caustics.rs`).
     pub chain: f32,
     /// Root of the sum of squares of the densities of the path tracer's techniques, over that of which
@@ -65,6 +70,8 @@ pub(in crate::transport) struct LightPathState {
 pub(in crate::transport) struct Vertex<'v> {
     pub point: &'v SurfacePoint<'v>,
     pub bsdf: &'v Bsdf,
+    /// Barycentric weights of the second and third corner of the triangle.
+    pub barycentric: [f32; 2],
     /// Unit direction to where the light comes from.
     pub to_light: Vec3,
     numbers: &'v dyn Numbers,
@@ -76,6 +83,11 @@ impl Vertex<'_> {
     /// The visitor's own random number.
     pub(in crate::transport) fn own(&self) -> f32 {
         self.numbers.single(self.first + OWN)
+    }
+
+    /// Two random numbers of the visitor's own.
+    pub(in crate::transport) fn own_pair(&self) -> [f32; 2] {
+        self.numbers.pair(self.first + OWN)
     }
 
     /// The photon of light of such power that has come here.
@@ -103,7 +115,7 @@ pub(in crate::transport) trait Visitor {
     /// A path has met a surface. `None` ends it.
     fn meet(
         &mut self,
-        state: &LightPathState,
+        state: &mut LightPathState,
         vertex: &Vertex,
         counters: &mut Counters,
     ) -> Option<Continuation>;
@@ -233,7 +245,8 @@ impl<F: Features> LightWalk<'_, F> {
         }
         let bsdf = self.context.bsdf_at(&point);
         let first = EMISSION_DIMENSIONS + V::DIMENSIONS * (state.segments - 1);
-        let vertex = Vertex { point: &point, bsdf: &bsdf, to_light: -direction, numbers, first };
+        let barycentric = [hit.u, hit.v];
+        let vertex = Vertex { point: &point, bsdf: &bsdf, barycentric, to_light: -direction, numbers, first };
         let onward = visitor.meet(state, &vertex, counters)?;
         if state.segments + 1 >= self.max_depth {
             return None;

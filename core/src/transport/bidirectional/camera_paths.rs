@@ -1,0 +1,520 @@
+//! Camera paths of a tile: path tracing whose vertices are connected to stored light vertices as well (Veach 1997,
+//! section 10.2; light vertex cache of Davidovič et al. 2014). All paths of a sample advance together, so that the
+//! tracer sees batches of rays.
+
+use crate::Rgb;
+use crate::bsdf::{Bsdf, BsdfSample, Features};
+use crate::bvh::Coherence;
+use crate::film::{PIXELS_PER_TILE, Pixel, Tile};
+use crate::geometry::{Hit, MISS, Ray};
+use crate::light::{EmissionSampler, emitted};
+use crate::memory::{Arena, Footprint, OutOfMemory};
+use crate::sampling::{ONE_MINUS_EPSILON, Sampler};
+use crate::scene::SurfacePoint;
+use crate::transport::bidirectional::mis::{
+    Counts, End, Sums, weight_of_connection, weight_of_hit, weight_of_light_sample,
+};
+use crate::transport::bidirectional::vertex::{
+    LightVertex, Scattering, is_bent, reverse_pdf, scattering, scattering_from_light,
+};
+use crate::transport::estimator::{
+    Counters, MAX_CROSSINGS, PathSettings, continuation_probability, dimension, is_cut,
+};
+use crate::transport::walk::context::SceneContext;
+use crate::transport::walk::visibility::{ShadowRays, shadow_ray};
+use bytemuck::{Pod, Zeroable};
+use core::ops::Range;
+use glam::Vec3;
+
+/// Dimensions of the choice of light vertices at the vertex at the end of the n-th segment: `CONNECTION + n`.
+const CONNECTION: u32 = 1 << 28;
+
+/// A camera path between two of its vertices.
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[repr(C)]
+struct CameraPath {
+    throughput: [f32; 3],
+    /// Density of the ray's direction per solid angle; infinite after a delta lobe and at the lens.
+    pdf: f32,
+    radiance: [f32; 3],
+    /// Index of the pixel in its tile.
+    place: u32,
+    /// The last vertex, and its normal for light sampling.
+    position: [f32; 3],
+    normal: [f32; 3],
+    /// Sums after the last scattering.
+    last: f32,
+    rest: f32,
+    segments: u32,
+    crossings: u32,
+    /// Triangle that the ray starts on.
+    triangle: u32,
+    /// Product of the squared relative indices of refraction.
+    eta_squared: f32,
+    /// Random numbers of the lens, which the first vertex is projected with.
+    lens: [f32; 2],
+}
+
+impl CameraPath {
+    fn add(&mut self, radiance: Rgb) {
+        if radiance.is_finite() {
+            self.radiance = (Rgb::from(self.radiance) + radiance).to_array();
+        }
+    }
+
+    fn sums(&self) -> Sums {
+        Sums { last: self.last, rest: self.rest }
+    }
+}
+
+/// The light vertices of a sample of the picture.
+#[derive(Clone, Copy)]
+pub struct Connections<'a> {
+    /// All vertices.
+    pub vertices: &'a [LightVertex],
+    /// Vertices that a camera vertex is connected to.
+    pub count: u32,
+}
+
+/// Traces camera paths.
+#[derive(Clone, Copy)]
+pub struct CameraPaths<'a, F> {
+    context: SceneContext<'a, F>,
+    emission: &'a EmissionSampler<'a>,
+    settings: PathSettings,
+    counts: Counts,
+    connections: Connections<'a>,
+}
+
+/// A vertex that a path has arrived at.
+struct Vertex<'v> {
+    point: &'v SurfacePoint<'v>,
+    bsdf: &'v Bsdf,
+    /// Direction to the vertex before, local.
+    wo: Vec3,
+    /// Sums on arrival.
+    sums: Sums,
+    /// The shading normal depends on the camera path: no light path can come here.
+    is_bent: bool,
+    sampler: Sampler,
+}
+
+/// Shadow rays of a wave, whose tag is the index of their path.
+struct Queue<'w> {
+    shadows: ShadowRays<'w>,
+    count: usize,
+}
+
+impl Queue<'_> {
+    fn push(&mut self, path: u32, ray: Ray, light: Rgb) {
+        let slots = (self.shadows.rays.get_mut(self.count), self.shadows.light.get_mut(self.count));
+        if let (Some(slot), Some(arrives)) = slots {
+            (*slot, *arrives) = (Ray { tag: path, ..ray }, light.to_array());
+            self.count += 1;
+        }
+    }
+}
+
+impl<'a, F: Features> CameraPaths<'a, F> {
+    /// Camera paths with the techniques of `counts`, connected to `connections`.
+    pub fn new(
+        context: SceneContext<'a, F>,
+        emission: &'a EmissionSampler<'a>,
+        settings: PathSettings,
+        counts: Counts,
+        connections: Connections<'a>,
+    ) -> Self {
+        Self { context, emission, settings, counts, connections }
+    }
+
+    /// Working memory of a task with so many connections of a vertex.
+    pub fn scratch(connections: u32) -> Footprint {
+        let shadows = PIXELS_PER_TILE * (1 + connections as usize);
+        Footprint::default()
+            .slice::<CameraPath>(PIXELS_PER_TILE)
+            .slice::<Ray>(PIXELS_PER_TILE)
+            .slice::<Hit>(PIXELS_PER_TILE)
+            .slice::<Ray>(shadows)
+            .slice::<[f32; 3]>(shadows)
+            .slice::<Hit>(shadows)
+            .slice::<u8>(shadows)
+    }
+
+    /// Adds `samples` of tile `tile` to its pixels `out`, each with the light of `splats`, those of the tile's pixels.
+    ///
+    /// # Errors
+    /// [`OutOfMemory`] where `scratch` has less than [`CameraPaths::scratch`].
+    pub fn run(
+        &self,
+        tile: usize,
+        samples: Range<u32>,
+        splats: &[[f32; 3]],
+        scratch: &mut Arena,
+        out: &mut [Pixel],
+    ) -> Result<Counters, OutOfMemory> {
+        let mut arena = scratch.scratch();
+        let paths: &mut [CameraPath] = arena.slice(PIXELS_PER_TILE)?;
+        let rays: &mut [Ray] = arena.slice(PIXELS_PER_TILE)?;
+        let hits: &mut [Hit] = arena.slice(PIXELS_PER_TILE)?;
+        let shadows = PIXELS_PER_TILE * (1 + self.connections.count as usize);
+        let mut queue = Queue {
+            shadows: ShadowRays {
+                rays: arena.slice(shadows)?,
+                light: arena.slice(shadows)?,
+                hits: arena.slice(shadows)?,
+                hidden: arena.slice(shadows)?,
+            },
+            count: 0,
+        };
+        let tile = Tile::new(self.settings.width, self.settings.height, tile);
+        let mut counters = Counters::default();
+        for sample in samples {
+            let count = self.start(&tile, sample, paths, rays);
+            counters.paths += count as u64;
+            self.trace(sample, &tile, (paths, rays, hits), count, &mut queue, &mut counters);
+            for path in &paths[..count] {
+                let splat = splats.get(path.place as usize).copied().unwrap_or_default();
+                if let Some(pixel) = out.get_mut(path.place as usize) {
+                    let radiance = Rgb::from(path.radiance) + Rgb::from(splat);
+                    pixel.add(sample, radiance, &mut counters.dropped);
+                }
+            }
+        }
+        Ok(counters)
+    }
+
+    /// Fills `paths` and `rays` with those of the camera; returns how many.
+    fn start(&self, tile: &Tile, sample: u32, paths: &mut [CameraPath], rays: &mut [Ray]) -> usize {
+        let PathSettings { width, height, seed, .. } = self.settings;
+        let mut count = 0;
+        for place in 0..PIXELS_PER_TILE {
+            let Some((x, y)) = tile.pixel(place) else { continue };
+            let sampler = Sampler::new(seed, y * width + x, sample);
+            let [dx, dy] = sampler.pair(dimension::PIXEL);
+            let lens = sampler.pair(dimension::LENS);
+            let ray = self.context.scene.camera.ray(width, height, x as f32 + dx, y as f32 + dy, lens);
+            rays[count] = Ray { tag: count as u32, ..ray };
+            paths[count] = CameraPath {
+                throughput: [1.0; 3],
+                pdf: f32::INFINITY,
+                place: place as u32,
+                segments: 1,
+                triangle: MISS,
+                eta_squared: 1.0,
+                lens,
+                ..CameraPath::default()
+            };
+            count += 1;
+        }
+        count
+    }
+
+    /// Advances the first `count` paths until none is left.
+    fn trace(
+        &self,
+        sample: u32,
+        tile: &Tile,
+        (paths, rays, hits): (&mut [CameraPath], &mut [Ray], &mut [Hit]),
+        count: usize,
+        queue: &mut Queue,
+        counters: &mut Counters,
+    ) {
+        let mut active = count;
+        let mut coherence = Coherence::Coherent;
+        while active > 0 {
+            counters.rays += active as u64;
+            self.context.nearest_batch(&rays[..active], coherence, &mut hits[..active]);
+            coherence = Coherence::Incoherent;
+            let mut left = 0;
+            queue.count = 0;
+            for i in 0..active {
+                let (ray, hit) = (rays[i], hits[i]);
+                let Some(path) = paths.get_mut(ray.tag as usize) else { continue };
+                let (x, y) = tile.pixel(path.place as usize).unwrap_or_default();
+                let sampler = Sampler::new(self.settings.seed, y * self.settings.width + x, sample);
+                if let Some(next) = self.step(path, sampler, &ray, &hit, queue, counters) {
+                    rays[left] = Ray { tag: ray.tag, ..next };
+                    left += 1;
+                }
+            }
+            active = left;
+            let Queue { shadows, count } = queue;
+            let arrive = |ray: &Ray, light: Rgb| {
+                if let Some(path) = paths.get_mut(ray.tag as usize) {
+                    path.add(light);
+                }
+            };
+            let rays = &mut counters.shadow_rays;
+            counters.dropped.unfinished += self.context.trace_shadow_rays(shadows, *count, rays, arrive);
+        }
+    }
+
+    /// One vertex of a path. The ray by which the path goes on.
+    fn step(
+        &self,
+        path: &mut CameraPath,
+        sampler: Sampler,
+        ray: &Ray,
+        hit: &Hit,
+        queue: &mut Queue,
+        counters: &mut Counters,
+    ) -> Option<Ray> {
+        let direction = Vec3::from(ray.direction);
+        if !hit.is_some() {
+            self.escape(path, direction);
+            return None;
+        }
+        let point = self.context.surface_at(ray, hit)?;
+        let opacity = || sampler.single(dimension::CROSSING + path.crossings);
+        let is_passed = self.context.is_passed(&point, hit, path.triangle, opacity)
+            || path.segments == 1 && point.is_left_by(ray);
+        if is_passed {
+            if path.crossings >= MAX_CROSSINGS {
+                counters.dropped.unfinished += 1;
+                return None;
+            }
+            path.crossings += 1;
+            path.triangle = hit.triangle;
+            return Some(point.spawn(direction));
+        }
+        self.emission(path, &point, hit, direction);
+        if path.segments >= self.settings.max_depth {
+            return None;
+        }
+        let bsdf = self.context.bsdf_at(&point);
+        let wo = point.frame.to_local(-direction);
+        let is_bent = is_bent(&point, wo);
+        let sums = if is_bent { Sums::default() } else { self.arrive(path, &point, &bsdf, direction) };
+        let vertex = Vertex { point: &point, bsdf: &bsdf, wo, sums, is_bent, sampler };
+        if !bsdf.is_delta() {
+            self.light_sample(path, &vertex, ray.tag, queue);
+            if !is_bent {
+                self.connect(path, &vertex, ray.tag, queue);
+            }
+        }
+        self.scatter(path, &vertex, hit, direction, counters)
+    }
+
+    /// Light of the environment.
+    fn escape(&self, path: &mut CameraPath, direction: Vec3) {
+        let Self { context, emission, counts, .. } = self;
+        let Some(environment) = &context.scene.environment else { return };
+        let radiance = environment.radiance(context.scene, direction);
+        if radiance == Rgb::ZERO {
+            return;
+        }
+        let mut weight = 1.0;
+        if path.segments > 1 {
+            let (position, normal) = (Vec3::from(path.position), Vec3::from(path.normal));
+            let pdf = (path.pdf < f32::INFINITY).then_some(path.pdf);
+            let pdf_light = context.lights.pdf_escape(context.scene, position, normal, direction);
+            let density = match counts.light_paths > 0.0 {
+                true => emission.density_of_sky(context.scene, context.lights, direction, position),
+                false => 0.0,
+            };
+            weight = weight_of_hit(counts, &path.sums(), pdf, pdf_light, density);
+        }
+        path.add(Rgb::from(path.throughput) * radiance * weight);
+    }
+
+    /// Light of the surface that was hit.
+    fn emission(&self, path: &mut CameraPath, point: &SurfacePoint, hit: &Hit, direction: Vec3) {
+        let Self { context, emission, counts, .. } = self;
+        let (scene, lights) = (context.scene, context.lights);
+        let radiance = emitted(scene, hit.triangle, point.uv, point.front);
+        if radiance == Rgb::ZERO {
+            return;
+        }
+        let mut weight = 1.0;
+        if path.segments > 1 {
+            let (position, normal) = (Vec3::from(path.position), Vec3::from(path.normal));
+            let pdf = (path.pdf < f32::INFINITY).then_some(path.pdf);
+            let distance = position.distance(point.position);
+            let pdf_light = lights.pdf_hit(scene, position, normal, hit.triangle, distance, direction);
+            let from = (point.position, -direction);
+            let density = match counts.light_paths > 0.0 {
+                true => emission.density_of_surface(scene, lights, hit.triangle, from),
+                false => 0.0,
+            };
+            weight = weight_of_hit(counts, &path.sums(), pdf, pdf_light, density);
+        }
+        path.add(Rgb::from(path.throughput) * radiance * weight);
+    }
+
+    /// Sums where the path arrives at `point`.
+    fn arrive(&self, path: &CameraPath, point: &SurfacePoint, bsdf: &Bsdf, direction: Vec3) -> Sums {
+        let cos = direction.dot(point.geometric_normal).abs();
+        let is_delta = bsdf.is_delta();
+        if path.segments > 1 {
+            let squared = point.position.distance_squared(path.position.into());
+            return path.sums().arrive(squared, cos, is_delta);
+        }
+        let PathSettings { width, height, .. } = self.settings;
+        let camera = &self.context.scene.camera;
+        let seen = camera.project(width, height, point.position, path.lens);
+        seen.map_or(Sums::default(), |seen| {
+            let pixels = width as f32 * height as f32;
+            let sums = Sums::at_camera(&self.counts, pixels * seen.pdf);
+            sums.arrive(seen.distance * seen.distance, cos, is_delta)
+        })
+    }
+
+    /// A light sample: its shadow ray, with what arrives if nothing is in its way.
+    fn light_sample(&self, path: &CameraPath, vertex: &Vertex, tag: u32, queue: &mut Queue) -> Option<()> {
+        let Self { context, emission, counts, .. } = self;
+        let (scene, lights) = (context.scene, context.lights);
+        let Vertex { point, bsdf, wo, sums, sampler, .. } = *vertex;
+        let normal = normal_for_lights(point, bsdf);
+        let first = dimension::vertex(path.segments);
+        let [u, v] = sampler.pair(first + dimension::LIGHT);
+        let choice = sampler.single(first + dimension::LIGHT_CHOICE);
+        let light = lights.sample(scene, point.position, normal, [u, v, choice])?;
+        let wi = point.frame.to_local(light.direction);
+        if !point.sides_agree(wi, light.direction) {
+            return None;
+        }
+        let (value, pdf) = bsdf.evaluate::<F>(wo, wi);
+        if value == Rgb::ZERO {
+            return None;
+        }
+        let pdf = if light.delta { 0.0 } else { pdf };
+        let mut emitted = (0.0, 0.0);
+        let mut density = 0.0;
+        if counts.light_paths > 0.0 && !vertex.is_bent {
+            let cos = light.direction.dot(point.geometric_normal).abs();
+            emitted = (cos, reverse_pdf(context, (point, bsdf), wo, wi));
+            density = emission.density_of_sample(scene, lights, &light, point.position);
+        }
+        let weight = weight_of_light_sample(counts, &sums, (pdf, light.pdf), density, emitted);
+        let radiance = Rgb::from(path.throughput) * value * light.radiance * (weight / light.pdf);
+        queue.push(tag, shadow_ray(point, &light)?, radiance);
+        Some(())
+    }
+
+    /// Connections to light vertices, one of each of as many parts of their list.
+    fn connect(&self, path: &CameraPath, vertex: &Vertex, tag: u32, queue: &mut Queue) {
+        let Connections { vertices, count } = self.connections;
+        if vertices.is_empty() || count == 0 {
+            return;
+        }
+        let random = vertex.sampler.single(CONNECTION + path.segments);
+        let each = vertices.len() as f32 / count as f32;
+        for part in 0..count {
+            let at = ((part as f32 + random) / count as f32).min(ONE_MINUS_EPSILON);
+            let index = (at * vertices.len() as f32) as usize;
+            if let Some(light) = vertices.get(index)
+                && let Some((ray, radiance)) = self.connection(path, vertex, light)
+            {
+                queue.push(tag, ray, radiance * each);
+            }
+        }
+    }
+
+    /// The connection of a camera vertex with a light vertex: its shadow ray, and what arrives if nothing is in its way.
+    fn connection(&self, path: &CameraPath, vertex: &Vertex, light: &LightVertex) -> Option<(Ray, Rgb)> {
+        let Self { context, counts, settings, .. } = self;
+        if path.segments + light.segments + 1 > settings.max_depth {
+            return None;
+        }
+        let Vertex { point, bsdf, wo, sums, .. } = *vertex;
+        let between = Vec3::from(light.position) - point.position;
+        let squared = between.length_squared();
+        let to_light = between.try_normalize()?;
+        let wi = point.frame.to_local(to_light);
+        if !point.sides_agree(wi, to_light) {
+            return None;
+        }
+        let at_camera = scattering(context, (point, bsdf), wo, wi);
+        if at_camera.value == Rgb::ZERO {
+            return None;
+        }
+        let other = light.point(context)?;
+        let other_bsdf = context.bsdf_at(&other);
+        let (out, back) = (other.frame.to_local(-to_light), other.frame.to_local(light.to_light.into()));
+        if !other.sides_agree(out, -to_light) {
+            return None;
+        }
+        let at_light = scattering_from_light(context, (&other, &other_bsdf), out, back);
+        if at_light.value == Rgb::ZERO {
+            return None;
+        }
+        let cos = |point: &SurfacePoint, direction: Vec3| direction.dot(point.geometric_normal).abs();
+        let (cos_camera, cos_light) = (cos(point, to_light), cos(&other, to_light));
+        let Scattering { to_light: pdf, to_camera: reverse, .. } = at_camera;
+        let camera_end = End { sums, pdf, reverse, cos: cos_camera };
+        let Scattering { to_light: reverse, to_camera: pdf, .. } = at_light;
+        let light_end = End { sums: light.sums(), pdf, reverse, cos: cos_light };
+        let weight = weight_of_connection(counts, &camera_end, &light_end, squared);
+        let cos_in = cos(&other, light.to_light.into());
+        let power = Rgb::from(light.power) * at_light.value * (cos_light / (cos_in * squared));
+        let radiance = Rgb::from(path.throughput) * at_camera.value * power * weight;
+        let target = other.spawn(-to_light).origin;
+        (radiance.max_element() > 0.0 && radiance.is_finite())
+            .then(|| (point.spawn_to(target.into()), radiance))
+    }
+
+    /// The path goes on where the BSDF sends it.
+    fn scatter(
+        &self,
+        path: &mut CameraPath,
+        vertex: &Vertex,
+        hit: &Hit,
+        direction: Vec3,
+        counters: &mut Counters,
+    ) -> Option<Ray> {
+        let Vertex { point, bsdf, wo, sampler, .. } = *vertex;
+        let [u, v] = dimension::scattering(&sampler, path.segments);
+        let first = dimension::vertex(path.segments);
+        let lobe = sampler.single(first + dimension::LOBE);
+        let sample = bsdf.sample::<F>(wo, [u, v, lobe])?;
+        let towards = point.frame.to_world(sample.direction);
+        if !point.sides_agree(sample.direction, towards) {
+            return None;
+        }
+        let mut throughput = Rgb::from(path.throughput) * sample.weight;
+        path.eta_squared *= sample.eta * sample.eta;
+        let probability = continuation_probability(path.segments, throughput * path.eta_squared);
+        if probability < 1.0 {
+            if sampler.single(first + dimension::ROULETTE) >= probability {
+                return None;
+            }
+            throughput /= probability;
+        }
+        if is_cut(path.segments, bsdf, &sample) {
+            counters.dropped.unfinished += 1;
+            return None;
+        }
+        if throughput == Rgb::ZERO {
+            return None;
+        }
+        let sums = self.leave(vertex, &sample, (direction, towards));
+        (path.last, path.rest) = (sums.last, sums.rest);
+        path.throughput = throughput.to_array();
+        path.pdf = if sample.delta { f32::INFINITY } else { sample.pdf };
+        path.position = point.position.to_array();
+        path.normal = normal_for_lights(point, bsdf).to_array();
+        path.triangle = hit.triangle;
+        path.segments += 1;
+        Some(point.spawn(towards))
+    }
+
+    /// Sums after scattering at `vertex`.
+    fn leave(&self, vertex: &Vertex, sample: &BsdfSample, (from, towards): (Vec3, Vec3)) -> Sums {
+        let Vertex { point, bsdf, wo, sums, is_bent, .. } = *vertex;
+        if is_bent {
+            return Sums::default();
+        }
+        let cos_in = from.dot(point.geometric_normal).abs();
+        if sample.delta {
+            return sums.scatter_delta(cos_in, sample.eta);
+        }
+        let cos_out = towards.dot(point.geometric_normal).abs();
+        let reverse = reverse_pdf(&self.context, (point, bsdf), wo, sample.direction);
+        sums.scatter(&self.counts, sample.pdf, reverse, cos_out)
+    }
+}
+
+/// The normal that light sampling takes: none where light comes from both sides.
+fn normal_for_lights(point: &SurfacePoint, bsdf: &Bsdf) -> Vec3 {
+    if bsdf.transmits() { Vec3::ZERO } else { point.frame.normal }
+}

@@ -1,0 +1,324 @@
+//! The light pass of a sample of the picture: light paths whose vertices are stored for connections, and splatted where
+//! the camera sees them (Veach 1997, section 10.2; Dutré et al. 1993).
+
+use crate::Rgb;
+use crate::bsdf::{BsdfSample, Features};
+use crate::film::{Splat, StripOffsets, Tile, sort_by_strip};
+use crate::geometry::{Hit, Ray};
+use crate::light::{EmissionSampler, LightType};
+use crate::memory::{Arena, Footprint, OutOfMemory};
+use crate::sampling::warp::concentric_disk;
+use crate::transport::bidirectional::mis::{Counts, Sums, weight_of_splat};
+use crate::transport::bidirectional::vertex::{LightVertex, is_bent, reverse_pdf, scattering_from_light};
+use crate::transport::estimator::{Counters, PathSettings};
+use crate::transport::walk::context::SceneContext;
+use crate::transport::walk::light::{Continuation, LightPathState, LightWalk, Vertex, Visitor};
+use crate::transport::walk::visibility::ShadowRays;
+use bytemuck::{Pod, Zeroable};
+use glam::Vec3;
+
+pub use crate::transport::walk::light::PATHS;
+
+/// Vertices that there is room for, for each light path. Where paths go on with a probability of at most 0.8 their mean
+/// is no more than five.
+pub const ROOM: usize = 6 * PATHS;
+
+/// Probability with which a path goes on, at most.
+const MOST: f32 = 0.8;
+
+/// Shadow rays to the camera that are traced together.
+const SHADOW_RAYS: usize = 1024;
+
+/// The outcome of a task beside its vertices and splats.
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[repr(C)]
+pub struct TaskOutput {
+    /// Vertices stored.
+    pub vertices: u32,
+    offsets: StripOffsets,
+}
+
+impl TaskOutput {
+    /// The splats of each strip in the task's list.
+    pub fn offsets(&self) -> &StripOffsets {
+        &self.offsets
+    }
+}
+
+/// Traces the light paths of a sample.
+#[derive(Clone, Copy)]
+pub struct LightPass<'a, F> {
+    context: SceneContext<'a, F>,
+    emission: &'a EmissionSampler<'a>,
+    settings: PathSettings,
+    counts: Counts,
+}
+
+impl<'a, F: Features> LightPass<'a, F> {
+    /// A pass with the light paths of `counts`.
+    pub fn new(
+        context: SceneContext<'a, F>,
+        emission: &'a EmissionSampler<'a>,
+        settings: PathSettings,
+        counts: Counts,
+    ) -> Self {
+        Self { context, emission, settings, counts }
+    }
+
+    /// Working memory of a task.
+    pub fn scratch() -> Footprint {
+        LightWalk::<F>::scratch()
+            .slice::<Splat>(ROOM)
+            .slice::<Ray>(SHADOW_RAYS)
+            .slice::<[f32; 3]>(SHADOW_RAYS)
+            .slice::<Hit>(SHADOW_RAYS)
+            .slice::<u8>(SHADOW_RAYS)
+    }
+
+    /// Traces the paths of `task` for sample number `sample`: their vertices into `vertices`, splats sorted by strips
+    /// into `splats`, each with room for [`ROOM`].
+    ///
+    /// # Errors
+    /// [`OutOfMemory`] where `scratch` has less than [`LightPass::scratch`].
+    pub fn run(
+        &self,
+        (task, sample): (usize, u32),
+        scratch: &mut Arena,
+        vertices: &mut [LightVertex],
+        splats: &mut [Splat],
+        output: &mut TaskOutput,
+    ) -> Result<Counters, OutOfMemory> {
+        let Self { context, emission, settings, counts } = *self;
+        let mut arena = scratch.scratch();
+        let mut writer = Writer {
+            context,
+            emission,
+            settings,
+            counts,
+            vertices,
+            stored: 0,
+            splats: arena.slice(ROOM)?,
+            splatted: 0,
+            shadows: ShadowRays {
+                rays: arena.slice(SHADOW_RAYS)?,
+                light: arena.slice(SHADOW_RAYS)?,
+                hits: arena.slice(SHADOW_RAYS)?,
+                hidden: arena.slice(SHADOW_RAYS)?,
+            },
+            pending: 0,
+        };
+        let (paths, max_depth) = (counts.light_paths as u32, settings.max_depth);
+        let walk = LightWalk { context, emission, seed: settings.seed, paths, max_depth };
+        let mut counters = walk.follow(task, sample, &mut arena, &mut writer)?;
+        writer.trace(&mut counters);
+        let pixels = Tile::count(settings.width, settings.height) * crate::film::PIXELS_PER_TILE;
+        *output = TaskOutput {
+            vertices: writer.stored as u32,
+            offsets: sort_by_strip(&writer.splats[..writer.splatted], pixels, splats),
+        };
+        Ok(counters)
+    }
+
+    /// Tasks of a pass.
+    pub fn tasks(&self) -> usize {
+        (self.counts.light_paths as usize).div_ceil(PATHS)
+    }
+}
+
+/// Stores and splats the vertices of a task.
+struct Writer<'w, F> {
+    context: SceneContext<'w, F>,
+    emission: &'w EmissionSampler<'w>,
+    settings: PathSettings,
+    counts: Counts,
+    vertices: &'w mut [LightVertex],
+    stored: usize,
+    splats: &'w mut [Splat],
+    splatted: usize,
+    /// To the camera; the tag is the position of the pixel in the film.
+    shadows: ShadowRays<'w>,
+    pending: usize,
+}
+
+impl<F: Features> Writer<'_, F> {
+    /// Sums where the path arrives at its first vertex: both densities of its light as they are from there.
+    fn at_first_vertex(&self, state: &LightPathState, vertex: &Vertex, cos: f32) -> Sums {
+        let Self { context, emission, counts, .. } = self;
+        let (scene, lights) = (context.scene, context.lights);
+        let (position, to_light) = (vertex.point.position, vertex.to_light);
+        let normal = if vertex.bsdf.transmits() { Vec3::ZERO } else { vertex.point.frame.normal };
+        let kind = emission.found(lights, state.light);
+        let (pdf_light, density) = match kind {
+            LightType::Area => {
+                let origin = Vec3::from(state.origin);
+                let triangle = lights.triangle_of(state.light).unwrap_or_default();
+                let distance = position.distance(origin);
+                let pdf = lights.pdf_hit(scene, position, normal, triangle, distance, to_light);
+                let index = state.light as usize;
+                (pdf, emission.density_of_emitter(scene, lights, index, (origin, -to_light)))
+            }
+            LightType::Infinite => (
+                lights.pdf_escape(scene, position, normal, to_light),
+                emission.density_of_sky(scene, lights, to_light, position),
+            ),
+            LightType::Delta => (
+                lights.probability(state.light, position, normal),
+                emission.density_of_choice(scene, lights, state.light, position),
+            ),
+        };
+        Sums::at_light(counts, pdf_light, density, cos, kind != LightType::Delta)
+    }
+
+    fn arrive(&self, state: &LightPathState, vertex: &Vertex, cos: f32) -> Sums {
+        let is_delta = vertex.bsdf.is_delta();
+        if state.segments == 1 {
+            let sums = self.at_first_vertex(state, vertex, cos);
+            return Sums { last: if is_delta { 0.0 } else { sums.last }, ..sums };
+        }
+        let squared = vertex.point.position.distance_squared(state.position.into());
+        Sums { last: state.last, rest: state.rest }.arrive(squared, cos, is_delta)
+    }
+
+    fn store(&mut self, state: &LightPathState, vertex: &Vertex, counters: &mut Counters) {
+        if self.counts.connections == 0.0 {
+            return;
+        }
+        let Some(slot) = self.vertices.get_mut(self.stored) else {
+            counters.dropped.unfinished += 1;
+            return;
+        };
+        *slot = LightVertex {
+            position: vertex.point.position.to_array(),
+            triangle: vertex.point.triangle,
+            power: state.power,
+            segments: state.segments,
+            to_light: vertex.to_light.to_array(),
+            barycentric: vertex.barycentric,
+            last: state.last,
+            rest: state.rest,
+            unused: 0,
+        };
+        self.stored += 1;
+    }
+
+    /// Sends a shadow ray from the vertex to the lens, if the picture has a pixel there.
+    fn splat(&mut self, state: &LightPathState, vertex: &Vertex, cos_in: f32) -> Option<()> {
+        let PathSettings { width, height, max_depth, .. } = self.settings;
+        if state.segments + 1 > max_depth {
+            return None;
+        }
+        let (camera, point) = (&self.context.scene.camera, vertex.point);
+        let lens = if camera.lens_radius > 0.0 { vertex.own_pair() } else { [0.5; 2] };
+        let seen = camera.project(width, height, point.position, lens)?;
+        let is_inside = seen.raster.cmpge(glam::Vec2::ZERO).all()
+            && seen.raster.x < width as f32
+            && seen.raster.y < height as f32;
+        if !is_inside {
+            return None;
+        }
+        let to_camera = -seen.direction;
+        let (wo, wi) = (point.frame.to_local(to_camera), point.frame.to_local(vertex.to_light));
+        if !point.sides_agree(wo, to_camera) {
+            return None;
+        }
+        let scattering = scattering_from_light(&self.context, (point, vertex.bsdf), wo, wi);
+        let cos_out = to_camera.dot(point.geometric_normal).abs();
+        let pixels = width as f32 * height as f32;
+        let pdf_area = pixels * seen.pdf * cos_out / seen.distance / seen.distance;
+        let sums = Sums { last: state.last, rest: state.rest };
+        let weight = weight_of_splat(&self.counts, &sums, pdf_area, scattering.to_light);
+        // Where the shading normal differs from the geometric one, power was counted by the latter (Veach 1997, 5.3).
+        let radiance = Rgb::from(state.power) * scattering.value * (pdf_area * weight / cos_in);
+        if !(radiance.max_element() > 0.0 && radiance.is_finite()) {
+            return None;
+        }
+        let ray = point.spawn_to(lens_point(camera, lens, point.position, &seen));
+        let pixel = Tile::position(width, seen.raster.x as u32, seen.raster.y as u32) as u32;
+        self.shadows.rays[self.pending] = Ray { tag: pixel, ..ray };
+        self.shadows.light[self.pending] = radiance.to_array();
+        self.pending += 1;
+        Some(())
+    }
+
+    /// Traces the pending shadow rays and adds the splats of those that reach the lens to the list.
+    fn trace(&mut self, counters: &mut Counters) {
+        let Self { context, shadows, pending, splats, splatted, .. } = self;
+        let mut overflow = 0;
+        let arrive = |ray: &Ray, light: Rgb| match splats.get_mut(*splatted) {
+            Some(slot) => {
+                *slot = Splat { pixel: ray.tag, radiance: light.to_array() };
+                *splatted += 1;
+            }
+            None => overflow += 1,
+        };
+        let unfinished = context.trace_shadow_rays(shadows, *pending, &mut counters.shadow_rays, arrive);
+        counters.dropped.unfinished += unfinished + overflow;
+        *pending = 0;
+    }
+}
+
+/// The point of the lens from which the camera sees `position` as `seen`.
+fn lens_point(
+    camera: &crate::scene::Camera,
+    lens: [f32; 2],
+    position: Vec3,
+    seen: &crate::scene::Projection,
+) -> Vec3 {
+    if let Some(start) = camera.start {
+        // Where rays of a far camera start: the eye is too far for f32.
+        let beyond = seen.distance - start.depth / seen.direction.dot(camera.forward);
+        return position - seen.direction * beyond.max(0.0);
+    }
+    let offset = camera.lens_radius * concentric_disk(lens);
+    camera.eye + offset.x * camera.right + offset.y * camera.up
+}
+
+impl<F: Features> Visitor for Writer<'_, F> {
+    const DIMENSIONS: u32 = 5;
+    const SEED: u64 = 0x6269_6469_7265_6374;
+
+    fn meet(
+        &mut self,
+        state: &mut LightPathState,
+        vertex: &Vertex,
+        counters: &mut Counters,
+    ) -> Option<Continuation> {
+        let wi = vertex.point.frame.to_local(vertex.to_light);
+        if is_bent(vertex.point, wi) {
+            return None;
+        }
+        let cos_in = vertex.to_light.dot(vertex.point.geometric_normal).abs();
+        let sums = self.arrive(state, vertex, cos_in);
+        (state.last, state.rest) = (sums.last, sums.rest);
+        if !vertex.bsdf.is_delta() {
+            self.store(state, vertex, counters);
+            if self.pending == SHADOW_RAYS {
+                self.trace(counters);
+            }
+            let _ = self.splat(state, vertex, cos_in);
+        }
+        Some(Continuation { most: MOST, mirrored: false })
+    }
+
+    fn leave(
+        &self,
+        state: &mut LightPathState,
+        vertex: &Vertex,
+        from: Vec3,
+        (sample, _): (&BsdfSample, bool),
+    ) {
+        let (point, bsdf) = (vertex.point, vertex.bsdf);
+        let cos_in = vertex.to_light.dot(point.geometric_normal).abs();
+        let sums = Sums { last: state.last, rest: state.rest };
+        let sums = if sample.delta {
+            sums.scatter_delta(cos_in, sample.eta)
+        } else {
+            let towards = point.frame.to_world(sample.direction);
+            let cos_out = towards.dot(point.geometric_normal).abs();
+            let reverse = reverse_pdf(&self.context, (point, bsdf), from, sample.direction);
+            sums.scatter(&self.counts, sample.pdf, reverse, cos_out)
+        };
+        (state.last, state.rest) = (sums.last, sums.rest);
+        state.position = point.position.to_array();
+    }
+}

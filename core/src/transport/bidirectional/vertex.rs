@@ -1,0 +1,119 @@
+//! Vertices of light paths that camera paths are connected to, and scattering at a vertex seen from both sides.
+
+use crate::Rgb;
+use crate::bsdf::{Bsdf, Features};
+use crate::geometry::{Hit, Ray};
+use crate::scene::SurfacePoint;
+use crate::transport::bidirectional::mis::Sums;
+use crate::transport::walk::context::SceneContext;
+use bytemuck::{Pod, Zeroable};
+use glam::Vec3;
+
+/// A vertex of a light path: one cache line.
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[repr(C, align(64))]
+pub struct LightVertex {
+    /// Position, m.
+    pub(super) position: [f32; 3],
+    /// Triangle of the surface.
+    pub(super) triangle: u32,
+    /// W per light path of the pass, on arrival.
+    pub(super) power: [f32; 3],
+    /// Segments of the path up to here.
+    pub(super) segments: u32,
+    /// Unit direction to the vertex before.
+    pub(super) to_light: [f32; 3],
+    /// Barycentric weights of the second and third corner of the triangle.
+    pub(super) barycentric: [f32; 2],
+    /// Sums on arrival.
+    pub(super) last: f32,
+    pub(super) rest: f32,
+    pub(super) unused: u32,
+}
+
+impl LightVertex {
+    pub(super) fn sums(&self) -> Sums {
+        Sums { last: self.last, rest: self.rest }
+    }
+
+    /// The surface point, as the light path saw it.
+    pub(super) fn point<'a, F: Features>(&self, context: &SceneContext<'a, F>) -> Option<SurfacePoint<'a>> {
+        let [u, v] = self.barycentric;
+        let direction = -Vec3::from(self.to_light);
+        let ray = Ray::new(Vec3::from(self.position) - direction, direction);
+        context.surface_at(&ray, &Hit { t: 1.0, u, v, triangle: self.triangle })
+    }
+}
+
+/// f |cos| of the direction of the light, and the densities of both walks at a vertex.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Scattering {
+    /// f(wo, wi) |cos wi|, for radiance that leaves by `wo`.
+    pub value: Rgb,
+    /// Density with which a camera walk that comes by `wo` goes on to `wi`.
+    pub to_light: f32,
+    /// Density with which a light walk that comes by `wi` goes on to `wo`.
+    pub to_camera: f32,
+}
+
+/// Directions in the frame of the other side of a surface.
+fn flipped(direction: Vec3) -> Vec3 {
+    Vec3::new(direction.x, direction.y, -direction.z)
+}
+
+/// Scattering between local directions `wo` to the camera and `wi` to the light, for a `bsdf` on the side of the
+/// camera.
+pub(super) fn scattering<F: Features>(
+    context: &SceneContext<F>,
+    (point, bsdf): (&SurfacePoint, &Bsdf),
+    wo: Vec3,
+    wi: Vec3,
+) -> Scattering {
+    let (value, to_light) = bsdf.evaluate::<F>(wo, wi);
+    Scattering { value, to_light, to_camera: reverse_pdf(context, (point, bsdf), wo, wi) }
+}
+
+/// The same for a `bsdf` on the side of the light, as a light path has it.
+pub(super) fn scattering_from_light<F: Features>(
+    context: &SceneContext<F>,
+    (point, bsdf): (&SurfacePoint, &Bsdf),
+    wo: Vec3,
+    wi: Vec3,
+) -> Scattering {
+    if wo.z > 0.0 {
+        return scattering(context, (point, bsdf), wo, wi);
+    }
+    if !bsdf.transmits() {
+        return Scattering::default();
+    }
+    let behind = Bsdf::at::<F>(context.scene, point.material, point.uv, !point.front);
+    let (value, to_light) = behind.evaluate::<F>(flipped(wo), flipped(wi));
+    Scattering { value, to_light, to_camera: bsdf.evaluate::<F>(wi, wo).1 }
+}
+
+/// Density of the walk opposite to one that came by `from` and left by `to`, both local on the side of `from`.
+pub(super) fn reverse_pdf<F: Features>(
+    context: &SceneContext<F>,
+    (point, bsdf): (&SurfacePoint, &Bsdf),
+    from: Vec3,
+    to: Vec3,
+) -> f32 {
+    if to.z > 0.0 {
+        return bsdf.evaluate::<F>(to, from).1;
+    }
+    if !bsdf.transmits() {
+        return 0.0;
+    }
+    let behind = Bsdf::at::<F>(context.scene, point.material, point.uv, !point.front);
+    behind.evaluate::<F>(flipped(to), flipped(from)).1
+}
+
+/// Lowest cosine of a direction of arrival to the shading normal: below it the normal may have been turned to the
+/// viewer, and depends on the walk.
+const LOWEST_COS: f32 = 2e-3;
+
+/// Whether the shading normal of `point` may have been turned towards local direction `wo`. Light paths end there,
+/// camera paths are not connected.
+pub(super) fn is_bent(point: &SurfacePoint, wo: Vec3) -> bool {
+    wo.z < LOWEST_COS && point.frame.normal != point.geometric_normal
+}
