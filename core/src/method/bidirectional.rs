@@ -35,6 +35,12 @@ pub struct BidirectionalSettings {
     pub connections: u32,
 }
 
+impl Default for BidirectionalSettings {
+    fn default() -> Self {
+        Self { light_paths: None, connections: 1 }
+    }
+}
+
 /// A picture by bidirectional path tracing.
 pub struct Bidirectional<'a, F> {
     context: RenderContext<'a>,

@@ -3,7 +3,7 @@
 use super::values;
 use clap::builder::PossibleValue;
 use clap::{Args, ValueEnum};
-use halflight::drive::{CacheSettings, Method, PhotonSettings, Settings};
+use halflight::drive::{BidirectionalSettings, CacheSettings, Method, PhotonSettings, Settings};
 use halflight_core::cache::irradiance::Metric;
 use halflight_core::photon;
 use halflight_simd::{Level, Tier};
@@ -93,6 +93,14 @@ pub(super) struct MethodArgs {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1 << 28),
         help_heading = "Photons")]
     caustic_photons: Option<u32>,
+    /// Light paths per sample of the picture with light and bdpt [default: pixels / 2]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1 << 20),
+        help_heading = "Light paths")]
+    light_paths: Option<u32>,
+    /// Light vertices that each camera vertex is connected to with bdpt [default: 1]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=64),
+        help_heading = "Light paths")]
+    connections: Option<u32>,
 }
 
 /// Kernel of a density estimate.
@@ -147,6 +155,8 @@ impl MethodArgs {
             photon_kernel: self.photon_kernel.or(base.photon_kernel),
             global_photons: self.global_photons.or(base.global_photons),
             caustic_photons: self.caustic_photons.or(base.caustic_photons),
+            light_paths: self.light_paths.or(base.light_paths),
+            connections: self.connections.or(base.connections),
             windows: self.windows.or(base.windows),
             max_depth: self.max_depth.or(base.max_depth),
             audit: self.audit.or(base.audit),
@@ -177,6 +187,10 @@ impl MethodArgs {
                 strata: self.cache_rays.map(u32::isqrt),
             },
             photons: PhotonSettings { kernel, global: self.global_photons, caustic: self.caustic_photons },
+            bidirectional: BidirectionalSettings {
+                light_paths: self.light_paths,
+                connections: self.connections.unwrap_or(BidirectionalSettings::default().connections),
+            },
             audit: self.audit,
             level: self.simd.map_or(level, |tier| level.capped(tier)),
             ..settings

@@ -38,6 +38,7 @@ pub use blurred::Blurred;
 pub use cache_file::inspect as inspect_cache;
 pub use error::{FileError, RenderError};
 pub use halflight_core::estimate::{BiasEstimate, Deviation, ErrorEstimate};
+pub use halflight_core::method::bidirectional::BidirectionalSettings;
 pub use halflight_core::method::{Shard, path::Reuse};
 pub use history::{Against, Round};
 pub use ledger::Place;
@@ -84,6 +85,8 @@ pub struct Settings {
     pub cache: CacheSettings,
     /// How photons are used, where the method has any.
     pub photons: PhotonSettings,
+    /// Counts of the techniques of bidirectional methods.
+    pub bidirectional: BidirectionalSettings,
     /// Whether maps of photons are looked at in the end, for a report. The time that this takes does not count.
     pub photon_view: bool,
     /// Whether the environment is sampled through windows that a first look finds; `None` where it is to tell.
@@ -143,6 +146,7 @@ impl Default for Settings {
             caustics: true,
             cache: CacheSettings::default(),
             photons: PhotonSettings::default(),
+            bidirectional: BidirectionalSettings::default(),
             photon_view: false,
             windows: None,
             threads: None,

@@ -42,6 +42,9 @@ impl Identity {
         if let Some(Method::PhotonMap | Method::ProgressivePhotons) = Method::named(method) {
             cache += &format!(", {:?}", settings.photons);
         }
+        if let Some(Method::LightTracing | Method::Bidirectional) = Method::named(method) {
+            cache += &format!(", {:?}", settings.bidirectional);
+        }
         let may_join = [Method::Path, Method::IrradianceCache].map(Method::name).contains(&method);
         let joined = may_join && settings.caustics;
         let caustics = if joined { ", caustics" } else { "" };

@@ -4,6 +4,7 @@
 //! [`Crew`] runs in parallel ("The unit of work" in docs/architecture.md). To add a method: a variant of [`Method`]
 //! with its words, a file with its [`Renderer`], a line in [`Method::with`].
 
+mod bidirectional;
 mod cache_memory;
 mod cache_settings;
 mod caster;
@@ -53,6 +54,10 @@ pub enum Method {
     PhotonMap,
     /// Stochastic progressive photon mapping.
     ProgressivePhotons,
+    /// Path tracing with splats of light paths.
+    LightTracing,
+    /// Bidirectional path tracing.
+    Bidirectional,
     /// Path tracing that is wrong on purpose.
     #[cfg(test)]
     Wrong,
@@ -60,8 +65,14 @@ pub enum Method {
 
 impl Method {
     /// All of them.
-    pub const ALL: [Method; 4] =
-        [Method::Path, Method::IrradianceCache, Method::PhotonMap, Method::ProgressivePhotons];
+    pub const ALL: [Method; 6] = [
+        Method::Path,
+        Method::IrradianceCache,
+        Method::PhotonMap,
+        Method::ProgressivePhotons,
+        Method::LightTracing,
+        Method::Bidirectional,
+    ];
 
     /// Its name on the command line, in films and in reports.
     pub const fn name(self) -> &'static str {
@@ -70,6 +81,8 @@ impl Method {
             Method::IrradianceCache => "irradiance-cache",
             Method::PhotonMap => "photon-map",
             Method::ProgressivePhotons => "sppm",
+            Method::LightTracing => "light",
+            Method::Bidirectional => "bdpt",
             #[cfg(test)]
             Method::Wrong => "wrong",
         }
@@ -88,6 +101,8 @@ impl Method {
             Method::ProgressivePhotons => {
                 "Stochastic progressive photon mapping: reflected light from photons, blurred ever less"
             }
+            Method::LightTracing => "Path tracing, and light paths whose vertices the camera sees",
+            Method::Bidirectional => "Bidirectional path tracing with a cache of light vertices",
             #[cfg(test)]
             Method::Wrong => "Wrong on purpose",
         }
@@ -101,7 +116,7 @@ impl Method {
     /// Whether its pictures converge to another one than that of the scene: no noise of their own tells of that.
     pub const fn is_biased(self) -> bool {
         match self {
-            Method::Path => false,
+            Method::Path | Method::LightTracing | Method::Bidirectional => false,
             Method::IrradianceCache | Method::PhotonMap | Method::ProgressivePhotons => true,
             #[cfg(test)]
             Method::Wrong => true,
@@ -111,7 +126,7 @@ impl Method {
     /// Whether enough samples bring its pictures as near to that of the scene as anybody wishes.
     pub const fn converges(self) -> bool {
         match self {
-            Method::Path | Method::ProgressivePhotons => true,
+            Method::Path | Method::ProgressivePhotons | Method::LightTracing | Method::Bidirectional => true,
             Method::IrradianceCache | Method::PhotonMap => false,
             #[cfg(test)]
             Method::Wrong => false,
@@ -128,7 +143,11 @@ impl Method {
     pub const fn shares(self) -> bool {
         match self {
             Method::Path => false,
-            Method::IrradianceCache | Method::PhotonMap | Method::ProgressivePhotons => true,
+            Method::IrradianceCache
+            | Method::PhotonMap
+            | Method::ProgressivePhotons
+            | Method::LightTracing
+            | Method::Bidirectional => true,
             #[cfg(test)]
             Method::Wrong => false,
         }
@@ -148,6 +167,12 @@ impl Method {
             Method::PhotonMap => then(&mut photon_map::TwoPasses::<F>::new(stage, memory)?, memory),
             Method::ProgressivePhotons => {
                 then(&mut sppm::ProgressivePhotons::<F>::new(stage, memory)?, memory)
+            }
+            Method::LightTracing => {
+                then(&mut bidirectional::BidirectionalPaths::<F>::new(stage, memory, false)?, memory)
+            }
+            Method::Bidirectional => {
+                then(&mut bidirectional::BidirectionalPaths::<F>::new(stage, memory, true)?, memory)
             }
             #[cfg(test)]
             Method::Wrong => then(&mut wrong::Wrong::<F>::new(stage, memory)?, memory),
