@@ -1,7 +1,9 @@
 //! Methods on one small scene: the same picture for any division into rounds and steps, from one buffer; and errors,
 //! not panics, where memory is short.
 
+use super::bidirectional::{Bidirectional, BidirectionalSettings};
 use super::environment_visibility;
+use super::path::PathTracing;
 use super::photon_map::PhotonMapping;
 use super::sppm::ProgressivePhotonMapping;
 use super::{Loop, MapUse, Method, PhotonSettings, PhotonUse, RenderContext, RenderState, Round, Shard};
@@ -235,4 +237,68 @@ fn environment_visibility_is_learned_in_rooms_that_see_little_of_it() {
         assert_eq!(learn(bytes, 70).unwrap(), (false, None));
         assert!(learn(bytes - 64, u32::MAX).is_err_and(|short| short.needed > short.available));
     });
+}
+/// A picture by bidirectional path tracing, likewise.
+fn bidirectional(
+    context: &RenderContext,
+    (memory, scratch): (usize, Footprint),
+    settings: &BidirectionalSettings,
+    division: [u32; 3],
+) -> Result<Vec<Pixel>, OutOfMemory> {
+    let (mut memory, mut scratch) = (lines(memory), lines(scratch.bytes()));
+    let mut buffer = Buffer::new(bytemuck::cast_slice_mut(&mut memory));
+    let mut executor = Loop::new(bytemuck::cast_slice_mut(&mut scratch));
+    let mut method = Bidirectional::<All>::new(context, settings, &mut buffer, &mut executor, 0)?;
+    film(context, &mut executor, division, |round| method.round(round))
+}
+
+#[test]
+fn bidirectional_paths_do_not_depend_on_rounds_or_steps_and_need_memory() {
+    with_room(|context| {
+        let settings = BidirectionalSettings { light_paths: Some(1), connections: 2 };
+        let scratch = Bidirectional::<All>::scratch(&settings);
+        let pixels = bidirectional(context, (PLENTY, scratch), &settings, [3, 3, 8]).unwrap();
+        assert!(pixels.iter().filter(|pixel| pixel.mean().min_element() > 0.0).count() > 200);
+        for division in [[3, 1, 1], [3, 2, 1]] {
+            assert!(
+                bidirectional(context, (PLENTY, scratch), &settings, division).unwrap() == pixels,
+                "{division:?}"
+            );
+        }
+        let few = Footprint::default().slice::<u8>(scratch.bytes() / 2);
+        assert!(bidirectional(context, (PLENTY, few), &settings, [3, 3, 8]).is_err());
+        for bytes in [0, 1 << 10, 1 << 16] {
+            assert!(bidirectional(context, (bytes, scratch), &settings, [3, 3, 8]).is_err());
+        }
+    });
+}
+
+#[test]
+fn any_counts_of_techniques_have_the_mean_of_path_tracing() {
+    with_room(|context| {
+        let mut scratch = lines(PathTracing::<All>::scratch().bytes());
+        let mut executor = Loop::new(bytemuck::cast_slice_mut(&mut scratch));
+        let mut method = PathTracing::<All>::new(context, Some(false), &mut executor).unwrap();
+        let pixels = film(context, &mut executor, [1024, 1024, 8], |round| method.round(round)).unwrap();
+        let (expected, deviation) = mean(&pixels);
+        for (light_paths, connections) in [(1, 0), (1, 1), (1, 4), (4096, 1)] {
+            let settings = BidirectionalSettings { light_paths: Some(light_paths), connections };
+            let scratch = Bidirectional::<All>::scratch(&settings);
+            let pixels = bidirectional(context, (PLENTY, scratch), &settings, [1024, 1024, 8]).unwrap();
+            let (found, other) = mean(&pixels);
+            // Four standard deviations, of a test of four.
+            let allowed = 4.0 * deviation.hypot(other);
+            assert!((found - expected).abs() < allowed, "{settings:?}: {found} {expected} ± {allowed}");
+            assert!(allowed < 0.01 * expected, "{allowed}");
+        }
+    });
+}
+
+/// The mean radiance of a film, and its standard deviation by the halves.
+fn mean(pixels: &[Pixel]) -> (f32, f32) {
+    let count = pixels.iter().filter(|pixel| pixel.count() > 0).count() as f32;
+    let sum = |of: &dyn Fn(&Pixel) -> Rgb| pixels.iter().map(of).sum::<Rgb>().element_sum() / (3.0 * count);
+    let [even, odd] = [sum(&|pixel| pixel.even.mean()), sum(&|pixel| pixel.odd.mean())];
+    let scatter = pixels.iter().map(|pixel| pixel.variance().element_sum() / 3.0).sum::<f32>();
+    (0.5 * (even + odd), scatter.sqrt() / count)
 }

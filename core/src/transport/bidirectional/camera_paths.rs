@@ -17,17 +17,14 @@ use crate::transport::bidirectional::mis::{
 use crate::transport::bidirectional::vertex::{
     LightVertex, Scattering, is_bent, reverse_pdf, scattering, scattering_from_light,
 };
-use crate::transport::estimator::{
-    Counters, MAX_CROSSINGS, PathSettings, continuation_probability, dimension, is_cut,
-};
+use crate::transport::settings::{Counters, PathSettings};
 use crate::transport::walk::context::SceneContext;
+use crate::transport::walk::dimension;
+use crate::transport::walk::termination::{MAX_CROSSINGS, continuation_probability, is_cut};
 use crate::transport::walk::visibility::{ShadowRays, shadow_ray};
 use bytemuck::{Pod, Zeroable};
 use core::ops::Range;
 use glam::Vec3;
-
-/// Dimensions of the choice of light vertices at the vertex at the end of the n-th segment: `CONNECTION + n`.
-const CONNECTION: u32 = 1 << 28;
 
 /// A camera path between two of its vertices.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
@@ -397,7 +394,7 @@ impl<'a, F: Features> CameraPaths<'a, F> {
         if vertices.is_empty() || count == 0 {
             return;
         }
-        let random = vertex.sampler.single(CONNECTION + path.segments);
+        let random = vertex.sampler.single(dimension::CONNECTION + path.segments);
         let each = vertices.len() as f32 / count as f32;
         for part in 0..count {
             let at = ((part as f32 + random) / count as f32).min(ONE_MINUS_EPSILON);

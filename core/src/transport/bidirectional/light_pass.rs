@@ -10,7 +10,7 @@ use crate::memory::{Arena, Footprint, OutOfMemory};
 use crate::sampling::warp::concentric_disk;
 use crate::transport::bidirectional::mis::{Counts, Sums, weight_of_splat};
 use crate::transport::bidirectional::vertex::{LightVertex, is_bent, reverse_pdf, scattering_from_light};
-use crate::transport::estimator::{Counters, PathSettings};
+use crate::transport::settings::{Counters, PathSettings};
 use crate::transport::walk::context::SceneContext;
 use crate::transport::walk::light::{Continuation, LightPathState, LightWalk, Vertex, Visitor};
 use crate::transport::walk::visibility::ShadowRays;

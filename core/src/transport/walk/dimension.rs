@@ -13,6 +13,9 @@ pub(in crate::transport) const PROBES: u32 = 1 << 30;
 /// Point in the pixel of rays for the emission of lamps alone.
 pub(in crate::transport) const OUTLINE: u32 = 1 << 29;
 
+/// Choice of light vertices at the vertex at the end of the `n`th segment: `CONNECTION + n`.
+pub(in crate::transport) const CONNECTION: u32 = 1 << 28;
+
 // At every vertex, from `vertex(n)` on:
 /// Point on the light.
 pub(in crate::transport) const LIGHT: u32 = 0;

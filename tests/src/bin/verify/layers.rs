@@ -26,8 +26,17 @@ const LAYERS: &[&str] = &[
 
 /// Folders and files of core/src/transport, lowest first: subpaths, the wavefront, the path tracer, and the methods
 /// that build on it.
-const TRANSPORT: &[&str] =
-    &["settings", "walk", "wavefront", "path", "photon_mapping", "caustics", "cached", "prepass"];
+const TRANSPORT: &[&str] = &[
+    "settings",
+    "walk",
+    "wavefront",
+    "path",
+    "photon_mapping",
+    "caustics",
+    "cached",
+    "prepass",
+    "bidirectional",
+];
 
 /// A file of core/src: its path below that folder, and its numbered lines of code.
 pub(crate) struct Source<'t> {
