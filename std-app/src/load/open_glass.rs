@@ -48,8 +48,8 @@ pub(super) fn note(geometry: &Geometry, materials: &[Material], names: &[String]
     for (material, (count, roots)) in open {
         let (name, pieces) = (&names[material as usize], roots.len());
         let what = format!(
-            "glass `{name}` is open ({count} edges of one face, in {pieces} of its pieces): everything behind \
-             it is its inside; a pane needs two faces"
+            "glass `{name}` is open ({count} edges of one face, in {pieces} of its pieces): everything \
+             behind it is its inside; a pane needs two faces"
         );
         notes.add(1, what);
     }
