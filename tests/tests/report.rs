@@ -175,11 +175,11 @@ fn pages_open_in_a_browser_without_an_error() {
 }
 
 #[test]
-fn the_ledger_tells_how_many_why_and_where() {
+fn dropped_samples_have_counts_causes_and_tiles() {
     let loaded = cornell();
     let settings = settings(&loaded, 3);
     let mut result = picture(&loaded, &settings);
-    assert!(run_page(&loaded, &settings, &result).contains("samples had to be dropped"));
+    assert!(run_page(&loaded, &settings, &result).contains("samples was dropped"));
     let dropped = Dropped { nan: 3, unfinished: 40_000, ..Dropped::default() };
     result.counters.dropped = dropped;
     result.places = vec![Place { x: 16, y: 0, width: 8, height: 16, dropped }];
@@ -187,7 +187,7 @@ fn the_ledger_tells_how_many_why_and_where() {
     let page = run_page(&loaded, &settings, &result);
     for words in [
         "40\u{202f}003 of 36\u{202f}864 samples",
-        "2 pixels are black",
+        "2 pixels without any sample left",
         "<th scope=\"row\">not a number</th><td>3</td>",
         "columns 16 to 23, rows 0 to 15",
     ] {
