@@ -28,8 +28,14 @@ const SPP: u32 = 9;
 
 const SEEDS: [u32; 2] = [0, 77];
 
-const METHODS: [Method; 4] =
-    [Method::Path, Method::IrradianceCache, Method::PhotonMap, Method::ProgressivePhotons];
+const METHODS: [Method; 6] = [
+    Method::Path,
+    Method::IrradianceCache,
+    Method::PhotonMap,
+    Method::ProgressivePhotons,
+    Method::LightTracing,
+    Method::Bidirectional,
+];
 
 /// The scenes: those of the repository as they are loaded, and others made by hand.
 fn for_each_scene(mut each: impl FnMut(&str, &Scene)) {
