@@ -69,11 +69,11 @@ struct Maps<'m> {
     global: PhotonMapStore<'m>,
     irradiances: PhotonMapStore<'m>,
     caustic: PhotonMapStore<'m>,
-    /// Their number; `None` before they are complete.
+    /// The number of these maps; `None` while one is missing.
     number: Option<u32>,
 }
 
-/// They, once they are complete.
+/// Complete maps of one half.
 struct Built<'m> {
     global: PhotonMap<'m>,
     irradiances: PhotonMap<'m>,
@@ -82,7 +82,8 @@ struct Built<'m> {
 
 /// Capacities of the maps of one half, for tasks of global and caustic light paths.
 fn capacities(global: usize, caustic: usize) -> [usize; 3] {
-    [global * ROOM, global * ROOM / STRIDE, caustic * PATHS]
+    let global = global.saturating_mul(ROOM);
+    [global, global / STRIDE, caustic.saturating_mul(PATHS)]
 }
 
 impl<'m> Maps<'m> {
@@ -156,7 +157,7 @@ impl<'a, F: Features> PhotonMapping<'a, F> {
             ..PhotonUse::default()
         };
         let photons = |guide, keep, seed, tasks: usize, max_depth| {
-            let paths = (tasks * PATHS) as u32;
+            let paths = u32::try_from(tasks.saturating_mul(PATHS)).unwrap_or(u32::MAX);
             Photons { guide, settings: PhotonTracerSettings { keep, seed, paths, max_depth } }
         };
         let caustic_photons =
@@ -215,7 +216,8 @@ impl<'a, F: Features> PhotonMapping<'a, F> {
         }
         let Some(map) = maps.global.map()? else { return Ok(false) };
         let all = PrecomputedIrradiance::new(bvh, &map, *farthest, *kernel, level);
-        let size = (global.settings.paths as usize / PATHS * ROOM / STRIDE, IRRADIANCES);
+        let [_, count, _] = capacities(global.settings.paths as usize / PATHS, 0);
+        let size = (count, IRRADIANCES);
         let irradiances = &mut maps.irradiances;
         let passed = round.executor.timed("photons", |executor| {
             irradiances.fill(executor, size, |task, scratch, out| all.run(task, scratch, out))

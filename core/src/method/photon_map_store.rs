@@ -66,7 +66,7 @@ impl<'m> PhotonMapStore<'m> {
         tracer: &PhotonTracer<F>,
         map: u32,
     ) -> Result<Passed, OutOfMemory> {
-        let size = (tracer.tasks() * tracer.room(), tracer.room());
+        let size = (tracer.tasks().saturating_mul(tracer.room()), tracer.room());
         executor.timed("photons", |executor| {
             self.fill(executor, size, |task, scratch, photons| tracer.run(task, map, scratch, photons))
         })

@@ -35,7 +35,7 @@ pub struct MapUse {
 impl MapUse {
     /// Maps of `given` tasks of light paths each, of `wanted` ones.
     pub fn of_tasks(wanted: usize, given: usize) -> Self {
-        let [wanted, given] = [wanted, given].map(|tasks| (tasks * PATHS) as u64);
+        let [wanted, given] = [wanted, given].map(|tasks| (tasks as u64).saturating_mul(PATHS as u64));
         Self { wanted, given, ..Self::default() }
     }
 

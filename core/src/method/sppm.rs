@@ -81,8 +81,8 @@ impl<'a, F: Features> ProgressivePhotonMapping<'a, F> {
             integrator: context.integrator(),
             radii: context.radii(),
             kernel: settings.kernel,
-            paths: tasks * PATHS,
-            photons: PhotonMapStore::new(tasks * ROOM, memory)?,
+            paths: tasks.saturating_mul(PATHS),
+            photons: PhotonMapStore::new(tasks.saturating_mul(ROOM), memory)?,
             sample: None,
             used: PhotonUse { global: Some(guide.map_use(wanted, tasks)), ..PhotonUse::default() },
             guide,
@@ -112,7 +112,7 @@ impl<'a, F: Features> ProgressivePhotonMapping<'a, F> {
         let settings = PhotonTracerSettings {
             keep: PhotonFilter::Reflected,
             seed: settings.seed,
-            paths: self.paths as u32,
+            paths: u32::try_from(self.paths).unwrap_or(u32::MAX),
             max_depth: settings.max_depth,
         };
         let tracer = PhotonTracer::<F>::new(scene, bvh, lights, &self.guide.emission, settings, level);

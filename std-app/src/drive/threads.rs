@@ -181,7 +181,7 @@ mod tests {
             let workers = Workers::new(Some(threads)).unwrap();
             let mut scratch = vec![vec![]; threads];
             let mut executor = Threads::new(&workers, &mut scratch);
-            let mut out = vec![0; 23];
+            let mut out = [0; 23];
             let passed = executor.pass(out.chunks_mut(5), |number, out, _| {
                 out.iter_mut().for_each(|value| *value += 100 * number + 1);
                 Ok(Counters { rays: out.len() as u64, ..Counters::default() })
@@ -198,10 +198,10 @@ mod tests {
         let workers = Workers::new(Some(2)).unwrap().watched(Watch::until(&flag).within(Some(3600.0)));
         let mut scratch = vec![vec![]; 2];
         let mut executor = Threads::new(&workers, &mut scratch).until(End::Round(None));
-        let mut is_complete = |executor: &mut Threads| {
+        let is_complete = |executor: &mut Threads| {
             executor.pass(0..9, |_, _, _| Ok(Counters::default())).unwrap().is_complete
         };
-        assert!(!executor.within(0.0, &mut is_complete) && executor.within(0.5, &mut is_complete));
+        assert!(!executor.within(0.0, is_complete) && executor.within(0.5, is_complete));
         assert!(is_complete(&mut executor));
         flag.store(true, core::sync::atomic::Ordering::Relaxed);
         assert!(!is_complete(&mut executor) && executor.is_over());

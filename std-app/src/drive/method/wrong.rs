@@ -5,9 +5,10 @@ use super::{Renderer, Stage};
 use crate::drive::RenderError;
 use crate::drive::crew::Crew;
 use crate::drive::memory::Memory;
+use core::ops::Range;
 use halflight_core::bsdf::Features;
 use halflight_core::film::{Dropped, PIXELS_PER_TILE, Pixel, Tile};
-use halflight_core::memory::Line;
+use halflight_core::memory::{Arena, Line};
 use halflight_core::transport::{Counters, PathIntegrator, path::WAVE};
 
 pub(in crate::drive) const FACTOR: f32 = 1.1;
@@ -30,7 +31,7 @@ impl<'a, F: Features> Wrong<'a, F> {
 impl<F: Features> Renderer for Wrong<'_, F> {
     fn round(&mut self, crew: &mut Crew) -> Result<(), RenderError> {
         let Self { tracer, scratch, size: [width, height] } = self;
-        crew.tiles(u32::MAX, scratch, &|task, samples, arena, pixels| {
+        let sample = |task: usize, samples: Range<u32>, arena: &mut Arena, pixels: &mut [Pixel]| {
             let tile = Tile::new(*width, *height, task);
             let mut counters = Counters::default();
             for sample in samples {
@@ -44,7 +45,7 @@ impl<F: Features> Renderer for Wrong<'_, F> {
                 }
             }
             Ok(counters)
-        })?;
-        Ok(())
+        };
+        Ok(crew.round(scratch, |round| round.tiles(u32::MAX, sample))?)
     }
 }
