@@ -4,7 +4,7 @@
 //! A light path leaves its light at x₀ into ω with density p(x₀) p(ω), of which the étendue dA cos θ dω takes
 //! p(x₀) p(ω) / cos θ. The étendue is kept on the way, so the same number, over the density of the direction
 //! in which a path from the eye meets x₀, tells how much likelier one is than the other
-//! (`transport/merge.rs`).
+//! (`transport/caustics/merge.rs`).
 
 use super::EmissionSampler;
 use crate::light::sampler::{LightSample, LightSampler};
