@@ -68,10 +68,12 @@ pub(crate) fn check(project: &Project) -> Outcome {
     let example = "cargo run --quiet --release --locked -p halflight-core --example tiny_render";
     let picture = output(&mut command(&project.root, example))?;
     println!("{picture}");
-    let expected = picture.lines().last().unwrap_or_default();
+    // A fingerprint for each method, after the pictures.
+    let is_fingerprint = |line: &&str| line.len() == 16 && line.bytes().all(|byte| byte.is_ascii_hexdigit());
+    let expected: Vec<&str> = picture.lines().filter(is_fingerprint).collect();
 
     // Every build is tried, so that one missing tool does not hide a failure elsewhere.
-    let results: Vec<_> = BUILDS.iter().map(|build| (build, one(project, build, expected))).collect();
+    let results: Vec<_> = BUILDS.iter().map(|build| (build, one(project, build, &expected))).collect();
     for (build, result) in &results {
         let text = match result {
             Ok(text) | Err(Failure::Missing(text)) | Err(Failure::Failed(text)) => text,
@@ -83,12 +85,15 @@ pub(crate) fn check(project: &Project) -> Outcome {
     errors.sort_by_key(|(_, result)| !failed(result));
     match errors.into_iter().next() {
         Some((_, error)) => error,
-        None => Ok(format!("{} builds and the example agree: {expected}", BUILDS.len())),
+        None => Ok(format!("{} builds and the example agree on {} pictures", BUILDS.len(), expected.len())),
     }
 }
 
+/// The fingerprint of a picture for which memory is too short.
+const ZEROS: &str = "0000000000000000";
+
 /// Builds, runs and compares one.
-fn one(project: &Project, build: &Build, expected: &str) -> Outcome {
+fn one(project: &Project, build: &Build, expected: &[&str]) -> Outcome {
     let folder = project.root.join("tests/targets");
     let target = folder.join("target").join(format!("{}{}", build.package, build.features.replace('+', "-")));
     let mut cargo = match build.run {
@@ -128,9 +133,15 @@ fn one(project: &Project, build: &Build, expected: &str) -> Outcome {
     if let Some(simd) = build.simd {
         instructions_as_promised(&file, simd)?;
     }
-    match seen == expected {
-        true => Ok(format!("{seen} ({})", size(&file))),
-        false => Err(Failure::Failed(format!("{}: {seen}, the example gives {expected}", build.name))),
+    // Of the methods that fit into the memory of the board: the others give zeros there.
+    let is_short = |line: &str| matches!(build.run, Run::Board) && line == ZEROS;
+    let lines: Vec<&str> = seen.lines().collect();
+    let is_same = lines.len() == expected.len()
+        && lines.iter().zip(expected).all(|(line, expected)| line == expected || is_short(line));
+    let fitting = lines.iter().filter(|line| !is_short(line)).count();
+    match is_same && fitting > 0 {
+        true => Ok(format!("{fitting} of {} methods ({})", lines.len(), size(&file))),
+        false => Err(Failure::Failed(format!("{}: {lines:?}, the example gives {expected:?}", build.name))),
     }
 }
 

@@ -4,7 +4,8 @@
 
 use core::arch::{asm, naked_asm};
 
-static mut MEMORY: tiny::Memory = tiny::Memory::new();
+/// 512 KiB: what does not fit says so by zeros.
+static mut MEMORY: tiny::Memory<8192> = tiny::Memory::new();
 
 /// What follows the stack's top in the vector table: reset, and every fault.
 #[used]
@@ -30,12 +31,13 @@ extern "C" fn run() -> ! {
     let memory = &raw mut MEMORY;
     // SAFETY: called once, by `reset`, on the only core.
     let memory = unsafe { &mut *memory };
-    let fingerprint = memory.render();
-    let mut text = [0; 18];
-    text[..17].copy_from_slice(&tiny::digits(fingerprint));
-    const WRITE_TEXT: usize = 4;
-    semihost(WRITE_TEXT, text.as_ptr() as usize);
-    exit(fingerprint != 0)
+    for method in 0..tiny::METHODS {
+        let mut text = [0; 18];
+        text[..17].copy_from_slice(&tiny::digits(memory.render(method)));
+        const WRITE_TEXT: usize = 4;
+        semihost(WRITE_TEXT, text.as_ptr() as usize);
+    }
+    exit(true)
 }
 
 extern "C" fn fault() -> ! {

@@ -8,15 +8,16 @@ use core::arch::{asm, global_asm};
 
 global_asm!(".globl _start", "_start: and rsp, -16", "call {run}", "ud2", run = sym run);
 
-static mut MEMORY: tiny::Memory = tiny::Memory::new();
+static mut MEMORY: tiny::Memory<{ tiny::LINES }> = tiny::Memory::new();
 
 extern "C" fn run() -> ! {
     let memory = &raw mut MEMORY;
     // SAFETY: called once, by `_start`, on the only thread.
     let memory = unsafe { &mut *memory };
-    let fingerprint = memory.render();
-    write(&tiny::digits(fingerprint));
-    exit(if fingerprint == 0 { 1 } else { 0 })
+    for method in 0..tiny::METHODS {
+        write(&tiny::digits(memory.render(method)));
+    }
+    exit(0)
 }
 
 fn write(text: &[u8]) {

@@ -21,32 +21,38 @@ macro_rules! println {
 #[path = "../../../../core/examples/tiny_render.rs"]
 mod example;
 
-use example::{LINES, SIZE, fingerprint, render};
+use example::{SIZE, fingerprint, render};
 use halflight_core::Rgb;
 use halflight_core::memory::Line;
 
-/// Where the structures and the picture live: a static of the program.
-pub struct Memory {
+/// Number of methods.
+pub const METHODS: usize = example::METHODS.len();
+
+/// Cache lines that are enough for every method.
+pub const LINES: usize = example::LINES;
+
+/// All structures and the picture: a static of the program.
+pub struct Memory<const LINES: usize> {
     lines: [Line; LINES],
     pixels: [Rgb; SIZE * SIZE],
 }
 
-impl Memory {
+impl<const LINES: usize> Memory<LINES> {
     /// All zero, so that it costs no room in the program file.
     pub const fn new() -> Self {
         Self { lines: [Line([0; 64]); LINES], pixels: [Rgb::ZERO; SIZE * SIZE] }
     }
 
-    /// The fingerprint of the picture, or 0 where the memory is too small.
-    pub fn render(&mut self) -> u64 {
-        match render(&mut self.lines, &mut self.pixels) {
+    /// The fingerprint of the picture by method number `method`, or 0 where the memory is too small.
+    pub fn render(&mut self, method: usize) -> u64 {
+        match render(method, &mut self.lines, &mut self.pixels) {
             Ok(()) => fingerprint(&self.pixels),
             Err(_) => 0,
         }
     }
 }
 
-impl Default for Memory {
+impl<const LINES: usize> Default for Memory<LINES> {
     fn default() -> Self {
         Self::new()
     }
