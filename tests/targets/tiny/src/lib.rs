@@ -17,6 +17,13 @@ macro_rules! println {
     };
 }
 
+/// Likewise, without a heap.
+macro_rules! vec {
+    ($value:expr; $count:expr) => {
+        [$value; $count]
+    };
+}
+
 #[allow(dead_code, unused_variables, unused_macros)]
 #[path = "../../../../core/examples/tiny_render.rs"]
 mod example;
