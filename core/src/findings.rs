@@ -1,7 +1,7 @@
 //! Findings: decisions and numbers of a method, in one form for every report.
 //!
-//! A method pushes one [`Finding`] for each of its parts. JSON, report page and summary print the list without
-//! knowing the method.
+//! A method pushes one [`Finding`] for each of its parts. JSON, report page and summary print the list
+//! without knowing the method.
 
 /// Values of a finding, at most.
 const MAX_VALUES: usize = 12;

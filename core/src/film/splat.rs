@@ -1,8 +1,9 @@
-//! Splats: light that a light path brings to a pixel of the picture, added up in the order of the tasks that found it.
+//! Splats: light that a light path brings to a pixel of the picture, added up in the order of the tasks that
+//! found it.
 //!
-//! A task collects its splats in a list and sorts them by strips, runs of pixels of the film. One work item per strip
-//! then adds the splats of task 0, 1, 2 … to its pixels. The order of the additions to a pixel does not depend on
-//! threads, and there are no atomics.
+//! A task collects its splats in a list and sorts them by strips, runs of pixels of the film. One work item
+//! per strip then adds the splats of task 0, 1, 2 … to its pixels. The order of the additions to a pixel does
+//! not depend on threads, and there are no atomics.
 
 use bytemuck::{Pod, Zeroable};
 
@@ -35,7 +36,8 @@ pub fn strip_length(pixels: usize) -> usize {
     pixels.div_ceil(STRIPS).max(1)
 }
 
-/// Sorts `splats` by the strips of a film of `pixels` into `sorted`, which is as long, keeping the order within each.
+/// Sorts `splats` by the strips of a film of `pixels` into `sorted`, which is as long, keeping the order
+/// within each.
 pub fn sort_by_strip(splats: &[Splat], pixels: usize, sorted: &mut [Splat]) -> StripOffsets {
     let length = strip_length(pixels);
     let strip = |splat: &Splat| (splat.pixel as usize / length).min(STRIPS - 1);
@@ -55,8 +57,8 @@ pub fn sort_by_strip(splats: &[Splat], pixels: usize, sorted: &mut [Splat]) -> S
     StripOffsets(offsets)
 }
 
-/// Makes of `pixels`, those of strip `strip`, the sums of the splats of all tasks, which are pairs of a sorted list and
-/// its offsets.
+/// Makes of `pixels`, those of strip `strip`, the sums of the splats of all tasks, which are pairs of a
+/// sorted list and its offsets.
 pub fn add_strip<'s>(
     strip: usize,
     length: usize,

@@ -4,7 +4,8 @@ use super::{Arena, Footprint, OutOfMemory};
 
 /// A supply of memory that lives as long as the picture. Each piece has a name for reports.
 pub trait MemorySource<'m> {
-    /// Bytes that may still be taken: the limit of structures that can be smaller. `usize::MAX` without a limit.
+    /// Bytes that may still be taken: the limit of structures that can be smaller. `usize::MAX` without a
+    /// limit.
     fn available(&self) -> usize;
 
     /// Memory of `footprint` bytes.

@@ -1,27 +1,23 @@
-//! Camera paths of a tile: path tracing whose vertices are connected to stored light vertices as well (Veach 1997,
-//! section 10.2; light vertex cache of Davidovič et al. 2014). All paths of a sample advance together, so that the
-//! tracer sees batches of rays.
+//! Camera paths of a tile: path tracing whose vertices are connected to stored light vertices as well (Veach
+//! 1997, section 10.2; light vertex cache of Davidovič et al. 2014). All paths of a sample advance together,
+//! so that the tracer sees batches of rays.
 
 use crate::Rgb;
 use crate::bsdf::{Bsdf, BsdfSample, Features};
 use crate::bvh::Coherence;
 use crate::film::{PIXELS_PER_TILE, Pixel, Tile};
 use crate::geometry::{Hit, MISS, Ray};
-use crate::light::{EmissionSampler, emitted};
+use crate::light::EmissionSampler;
 use crate::memory::{Arena, Footprint, OutOfMemory};
-use crate::sampling::{ONE_MINUS_EPSILON, Sampler};
+use crate::sampling::Sampler;
 use crate::scene::SurfacePoint;
-use crate::transport::bidirectional::mis::{
-    Counts, End, Sums, weight_of_connection, weight_of_hit, weight_of_light_sample,
-};
-use crate::transport::bidirectional::vertex::{
-    LightVertex, Scattering, is_bent, reverse_pdf, scattering, scattering_from_light,
-};
+use crate::transport::bidirectional::mis::{Counts, Sums};
+use crate::transport::bidirectional::vertex::{LightVertex, is_bent, reverse_pdf};
 use crate::transport::settings::{Counters, PathSettings};
 use crate::transport::walk::context::SceneContext;
 use crate::transport::walk::dimension;
 use crate::transport::walk::termination::{MAX_CROSSINGS, continuation_probability, is_cut};
-use crate::transport::walk::visibility::{ShadowRays, shadow_ray};
+use crate::transport::walk::visibility::ShadowRays;
 use bytemuck::{Pod, Zeroable};
 use core::ops::Range;
 use glam::Vec3;
@@ -29,20 +25,20 @@ use glam::Vec3;
 /// A camera path between two of its vertices.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C)]
-struct CameraPath {
-    throughput: [f32; 3],
+pub(super) struct CameraPath {
+    pub(super) throughput: [f32; 3],
     /// Density of the ray's direction per solid angle; infinite after a delta lobe and at the lens.
-    pdf: f32,
+    pub(super) pdf: f32,
     radiance: [f32; 3],
     /// Index of the pixel in its tile.
     place: u32,
     /// The last vertex, and its normal for light sampling.
-    position: [f32; 3],
-    normal: [f32; 3],
+    pub(super) position: [f32; 3],
+    pub(super) normal: [f32; 3],
     /// Sums after the last scattering.
     last: f32,
     rest: f32,
-    segments: u32,
+    pub(super) segments: u32,
     crossings: u32,
     /// Triangle that the ray starts on.
     triangle: u32,
@@ -53,13 +49,13 @@ struct CameraPath {
 }
 
 impl CameraPath {
-    fn add(&mut self, radiance: Rgb) {
+    pub(super) fn add(&mut self, radiance: Rgb) {
         if radiance.is_finite() {
             self.radiance = (Rgb::from(self.radiance) + radiance).to_array();
         }
     }
 
-    fn sums(&self) -> Sums {
+    pub(super) fn sums(&self) -> Sums {
         Sums { last: self.last, rest: self.rest }
     }
 }
@@ -76,34 +72,34 @@ pub struct Connections<'a> {
 /// Traces camera paths.
 #[derive(Clone, Copy)]
 pub struct CameraPaths<'a, F> {
-    context: SceneContext<'a, F>,
-    emission: &'a EmissionSampler<'a>,
-    settings: PathSettings,
-    counts: Counts,
-    connections: Connections<'a>,
+    pub(super) context: SceneContext<'a, F>,
+    pub(super) emission: &'a EmissionSampler<'a>,
+    pub(super) settings: PathSettings,
+    pub(super) counts: Counts,
+    pub(super) connections: Connections<'a>,
 }
 
 /// A vertex that a path has arrived at.
-struct Vertex<'v> {
-    point: &'v SurfacePoint<'v>,
-    bsdf: &'v Bsdf,
+pub(super) struct Vertex<'v> {
+    pub(super) point: &'v SurfacePoint<'v>,
+    pub(super) bsdf: &'v Bsdf,
     /// Direction to the vertex before, local.
-    wo: Vec3,
+    pub(super) wo: Vec3,
     /// Sums on arrival.
-    sums: Sums,
+    pub(super) sums: Sums,
     /// The shading normal depends on the camera path: no light path can come here.
-    is_bent: bool,
-    sampler: Sampler,
+    pub(super) is_bent: bool,
+    pub(super) sampler: Sampler,
 }
 
 /// Shadow rays of a wave, whose tag is the index of their path.
-struct Queue<'w> {
+pub(super) struct Queue<'w> {
     shadows: ShadowRays<'w>,
     count: usize,
 }
 
 impl Queue<'_> {
-    fn push(&mut self, path: u32, ray: Ray, light: Rgb) {
+    pub(super) fn push(&mut self, path: u32, ray: Ray, light: Rgb) {
         let slots = (self.shadows.rays.get_mut(self.count), self.shadows.light.get_mut(self.count));
         if let (Some(slot), Some(arrives)) = slots {
             (*slot, *arrives) = (Ray { tag: path, ..ray }, light.to_array());
@@ -137,7 +133,8 @@ impl<'a, F: Features> CameraPaths<'a, F> {
             .slice::<u8>(shadows)
     }
 
-    /// Adds `samples` of tile `tile` to its pixels `out`, each with the light of `splats`, those of the tile's pixels.
+    /// Adds `samples` of tile `tile` to its pixels `out`, each with the light of `splats`, those of the
+    /// tile's pixels.
     ///
     /// # Errors
     /// [`OutOfMemory`] where `scratch` has less than [`CameraPaths::scratch`].
@@ -292,52 +289,6 @@ impl<'a, F: Features> CameraPaths<'a, F> {
         self.scatter(path, &vertex, hit, direction, counters)
     }
 
-    /// Light of the environment.
-    fn escape(&self, path: &mut CameraPath, direction: Vec3) {
-        let Self { context, emission, counts, .. } = self;
-        let Some(environment) = &context.scene.environment else { return };
-        let radiance = environment.radiance(context.scene, direction);
-        if radiance == Rgb::ZERO {
-            return;
-        }
-        let mut weight = 1.0;
-        if path.segments > 1 {
-            let (position, normal) = (Vec3::from(path.position), Vec3::from(path.normal));
-            let pdf = (path.pdf < f32::INFINITY).then_some(path.pdf);
-            let pdf_light = context.lights.pdf_escape(context.scene, position, normal, direction);
-            let density = match counts.light_paths > 0.0 {
-                true => emission.density_of_sky(context.scene, context.lights, direction, position),
-                false => 0.0,
-            };
-            weight = weight_of_hit(counts, &path.sums(), pdf, pdf_light, density);
-        }
-        path.add(Rgb::from(path.throughput) * radiance * weight);
-    }
-
-    /// Light of the surface that was hit.
-    fn emission(&self, path: &mut CameraPath, point: &SurfacePoint, hit: &Hit, direction: Vec3) {
-        let Self { context, emission, counts, .. } = self;
-        let (scene, lights) = (context.scene, context.lights);
-        let radiance = emitted(scene, hit.triangle, point.uv, point.front);
-        if radiance == Rgb::ZERO {
-            return;
-        }
-        let mut weight = 1.0;
-        if path.segments > 1 {
-            let (position, normal) = (Vec3::from(path.position), Vec3::from(path.normal));
-            let pdf = (path.pdf < f32::INFINITY).then_some(path.pdf);
-            let distance = position.distance(point.position);
-            let pdf_light = lights.pdf_hit(scene, position, normal, hit.triangle, distance, direction);
-            let from = (point.position, -direction);
-            let density = match counts.light_paths > 0.0 {
-                true => emission.density_of_surface(scene, lights, hit.triangle, from),
-                false => 0.0,
-            };
-            weight = weight_of_hit(counts, &path.sums(), pdf, pdf_light, density);
-        }
-        path.add(Rgb::from(path.throughput) * radiance * weight);
-    }
-
     /// Sums where the path arrives at `point`.
     fn arrive(&self, path: &CameraPath, point: &SurfacePoint, bsdf: &Bsdf, direction: Vec3) -> Sums {
         let cos = direction.dot(point.geometric_normal).abs();
@@ -354,100 +305,6 @@ impl<'a, F: Features> CameraPaths<'a, F> {
             let sums = Sums::at_camera(&self.counts, pixels * seen.pdf);
             sums.arrive(seen.distance * seen.distance, cos, is_delta)
         })
-    }
-
-    /// A light sample: its shadow ray, with what arrives if nothing is in its way.
-    fn light_sample(&self, path: &CameraPath, vertex: &Vertex, tag: u32, queue: &mut Queue) -> Option<()> {
-        let Self { context, emission, counts, .. } = self;
-        let (scene, lights) = (context.scene, context.lights);
-        let Vertex { point, bsdf, wo, sums, sampler, .. } = *vertex;
-        let normal = normal_for_lights(point, bsdf);
-        let first = dimension::vertex(path.segments);
-        let [u, v] = sampler.pair(first + dimension::LIGHT);
-        let choice = sampler.single(first + dimension::LIGHT_CHOICE);
-        let light = lights.sample(scene, point.position, normal, [u, v, choice])?;
-        let wi = point.frame.to_local(light.direction);
-        if !point.sides_agree(wi, light.direction) {
-            return None;
-        }
-        let (value, pdf) = bsdf.evaluate::<F>(wo, wi);
-        if value == Rgb::ZERO {
-            return None;
-        }
-        let pdf = if light.delta { 0.0 } else { pdf };
-        let mut emitted = (0.0, 0.0);
-        let mut density = 0.0;
-        if counts.light_paths > 0.0 && !vertex.is_bent {
-            let cos = light.direction.dot(point.geometric_normal).abs();
-            emitted = (cos, reverse_pdf(context, (point, bsdf), wo, wi));
-            density = emission.density_of_sample(scene, lights, &light, point.position);
-        }
-        let weight = weight_of_light_sample(counts, &sums, (pdf, light.pdf), density, emitted);
-        let radiance = Rgb::from(path.throughput) * value * light.radiance * (weight / light.pdf);
-        queue.push(tag, shadow_ray(point, &light)?, radiance);
-        Some(())
-    }
-
-    /// Connections to light vertices, one of each of as many parts of their list.
-    fn connect(&self, path: &CameraPath, vertex: &Vertex, tag: u32, queue: &mut Queue) {
-        let Connections { vertices, count } = self.connections;
-        if vertices.is_empty() || count == 0 {
-            return;
-        }
-        let random = vertex.sampler.single(dimension::CONNECTION + path.segments);
-        let each = vertices.len() as f32 / count as f32;
-        for part in 0..count {
-            let at = ((part as f32 + random) / count as f32).min(ONE_MINUS_EPSILON);
-            let index = (at * vertices.len() as f32) as usize;
-            if let Some(light) = vertices.get(index)
-                && let Some((ray, radiance)) = self.connection(path, vertex, light)
-            {
-                queue.push(tag, ray, radiance * each);
-            }
-        }
-    }
-
-    /// The connection of a camera vertex with a light vertex: its shadow ray, and what arrives if nothing is in its way.
-    fn connection(&self, path: &CameraPath, vertex: &Vertex, light: &LightVertex) -> Option<(Ray, Rgb)> {
-        let Self { context, counts, settings, .. } = self;
-        if path.segments + light.segments + 1 > settings.max_depth {
-            return None;
-        }
-        let Vertex { point, bsdf, wo, sums, .. } = *vertex;
-        let between = Vec3::from(light.position) - point.position;
-        let squared = between.length_squared();
-        let to_light = between.try_normalize()?;
-        let wi = point.frame.to_local(to_light);
-        if !point.sides_agree(wi, to_light) {
-            return None;
-        }
-        let at_camera = scattering(context, (point, bsdf), wo, wi);
-        if at_camera.value == Rgb::ZERO {
-            return None;
-        }
-        let other = light.point(context)?;
-        let other_bsdf = context.bsdf_at(&other);
-        let (out, back) = (other.frame.to_local(-to_light), other.frame.to_local(light.to_light.into()));
-        if !other.sides_agree(out, -to_light) {
-            return None;
-        }
-        let at_light = scattering_from_light(context, (&other, &other_bsdf), out, back);
-        if at_light.value == Rgb::ZERO {
-            return None;
-        }
-        let cos = |point: &SurfacePoint, direction: Vec3| direction.dot(point.geometric_normal).abs();
-        let (cos_camera, cos_light) = (cos(point, to_light), cos(&other, to_light));
-        let Scattering { to_light: pdf, to_camera: reverse, .. } = at_camera;
-        let camera_end = End { sums, pdf, reverse, cos: cos_camera };
-        let Scattering { to_light: reverse, to_camera: pdf, .. } = at_light;
-        let light_end = End { sums: light.sums(), pdf, reverse, cos: cos_light };
-        let weight = weight_of_connection(counts, &camera_end, &light_end, squared);
-        let cos_in = cos(&other, light.to_light.into());
-        let power = Rgb::from(light.power) * at_light.value * (cos_light / (cos_in * squared));
-        let radiance = Rgb::from(path.throughput) * at_camera.value * power * weight;
-        let target = other.spawn(-to_light).origin;
-        (radiance.max_element() > 0.0 && radiance.is_finite())
-            .then(|| (point.spawn_to(target.into()), radiance))
     }
 
     /// The path goes on where the BSDF sends it.
@@ -512,6 +369,6 @@ impl<'a, F: Features> CameraPaths<'a, F> {
 }
 
 /// The normal that light sampling takes: none where light comes from both sides.
-fn normal_for_lights(point: &SurfacePoint, bsdf: &Bsdf) -> Vec3 {
+pub(super) fn normal_for_lights(point: &SurfacePoint, bsdf: &Bsdf) -> Vec3 {
     if bsdf.transmits() { Vec3::ZERO } else { point.frame.normal }
 }

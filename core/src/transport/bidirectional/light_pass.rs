@@ -1,5 +1,5 @@
-//! The light pass of a sample of the picture: light paths whose vertices are stored for connections, and splatted where
-//! the camera sees them (Veach 1997, section 10.2; Dutré et al. 1993).
+//! The light pass of a sample of the picture: light paths whose vertices are stored for connections, and
+//! splatted where the camera sees them (Veach 1997, section 10.2; Dutré et al. 1993).
 
 use crate::Rgb;
 use crate::bsdf::{BsdfSample, Features};
@@ -19,8 +19,8 @@ use glam::Vec3;
 
 pub use crate::transport::walk::light::PATHS;
 
-/// Vertices that there is room for, for each light path. Where paths go on with a probability of at most 0.8 their mean
-/// is no more than five.
+/// Vertices that there is room for, for each light path. Where paths go on with a probability of at most 0.8
+/// their mean is no more than five.
 pub const ROOM: usize = 6 * PATHS;
 
 /// Probability with which a path goes on, at most.
@@ -75,8 +75,8 @@ impl<'a, F: Features> LightPass<'a, F> {
             .slice::<u8>(SHADOW_RAYS)
     }
 
-    /// Traces the paths of `task` for sample number `sample`: their vertices into `vertices`, splats sorted by strips
-    /// into `splats`, each with room for [`ROOM`].
+    /// Traces the paths of `task` for sample number `sample`: their vertices into `vertices`, splats sorted
+    /// by strips into `splats`, each with room for [`ROOM`].
     ///
     /// # Errors
     /// [`OutOfMemory`] where `scratch` has less than [`LightPass::scratch`].
@@ -227,7 +227,8 @@ impl<F: Features> Writer<'_, F> {
         let pdf_area = pixels * seen.pdf * cos_out / seen.distance / seen.distance;
         let sums = Sums { last: state.last, rest: state.rest };
         let weight = weight_of_splat(&self.counts, &sums, pdf_area, scattering.to_light);
-        // Where the shading normal differs from the geometric one, power was counted by the latter (Veach 1997, 5.3).
+        // Where the shading normal differs from the geometric one, power was counted by the latter (Veach
+        // 1997, 5.3).
         let radiance = Rgb::from(state.power) * scattering.value * (pdf_area * weight / cos_in);
         if !(radiance.max_element() > 0.0 && radiance.is_finite()) {
             return None;

@@ -1,24 +1,25 @@
-//! Multiple importance sampling of bidirectional techniques by running sums (Georgiev 2012, "Implementing Vertex
-//! Connection and Merging", in étendue and with counts).
+//! Multiple importance sampling of bidirectional techniques by running sums (Georgiev 2012, "Implementing
+//! Vertex Connection and Merging", in étendue and with counts).
 //!
-//! A path x₀ … x_k from a light to the lens can be found by every technique: the camera walk hits the light, a light
-//! sample, a connection of two vertices, a splat of a light vertex. The balance heuristic divides the count times the
-//! density of a technique by the sum over all of them. Each subpath carries two numbers, with which the sum is known:
+//! A path x₀ … x_k from a light to the lens can be found by every technique: the camera walk hits the light,
+//! a light sample, a connection of two vertices, a splat of a light vertex. The balance heuristic divides the
+//! count times the density of a technique by the sum over all of them. Each subpath carries two numbers, with
+//! which the sum is known:
 //!
 //! - `last`: the technique that connects over the latest segment,
 //! - `rest`: all techniques before it, still to be multiplied with the reverse density at the latest vertex.
 //!
-//! p is the density per solid angle with which a walk goes on, p← that of the opposite walk, c a cosine to the
-//! geometric normal, d a distance, e the density of emission per étendue (`light/emission/pdf.rs`), q the density of
-//! the rays of one pixel. Roulette stays out of the weights, which add up to one without it.
+//! p is the density per solid angle with which a walk goes on, p← that of the opposite walk, c a cosine to
+//! the geometric normal, d a distance, e the density of emission per étendue (`light/emission/pdf.rs`), q the
+//! density of the rays of one pixel. Roulette stays out of the weights, which add up to one without it.
 
 /// How often each technique is used for a sample of a pixel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Counts {
     /// L: light paths of a sample of the picture; every vertex of them is splatted. 0 without splats.
     pub light_paths: f32,
-    /// n_C: expected number of connections of a camera vertex to the vertices of one position in a light path,
-    /// C L / M̄.
+    /// n_C: expected number of connections of a camera vertex to the vertices of one position in a light
+    /// path, C L / M̄.
     pub connections: f32,
     /// Light samples of a camera vertex.
     pub light_samples: f32,
@@ -34,8 +35,8 @@ pub struct Sums {
 }
 
 impl Sums {
-    /// Of a light path that arrives at its first vertex, whose light has density `pdf_light` for a light sample there
-    /// (a probability for lights without extent) and `emission` per étendue.
+    /// Of a light path that arrives at its first vertex, whose light has density `pdf_light` for a light
+    /// sample there (a probability for lights without extent) and `emission` per étendue.
     pub fn at_light(counts: &Counts, pdf_light: f32, emission: f32, cos_in: f32, can_be_hit: bool) -> Self {
         let inverse = 1.0 / (emission * cos_in);
         Self {
@@ -62,28 +63,29 @@ impl Sums {
         Self { last: counts.connections / pdf, rest: cos_out / pdf * self.before(reverse) }
     }
 
-    /// After reflection or refraction by a delta lobe; `eta` is the index behind over that before, in the walk's
-    /// direction. Refraction keeps n² dA cos dω.
+    /// After reflection or refraction by a delta lobe; `eta` is the index behind over that before, in the
+    /// walk's direction. Refraction keeps n² dA cos dω.
     pub fn scatter_delta(self, cos_in: f32, eta: f32) -> Self {
         Self { last: 0.0, rest: self.rest * cos_in / (eta * eta) }
     }
 
-    /// All techniques of this subpath, where the opposite walk goes on with density `reverse` at the latest vertex.
+    /// All techniques of this subpath, where the opposite walk goes on with density `reverse` at the latest
+    /// vertex.
     pub fn before(&self, reverse: f32) -> f32 {
         self.last + self.rest * reverse
     }
 }
 
-/// Weight of emission that a camera path hits, whose `sums` are those after its latest scattering. `pdf` is that of
-/// the direction, `None` after a delta lobe; `pdf_light` and `emission` as in [`Sums::at_light`].
+/// Weight of emission that a camera path hits, whose `sums` are those after its latest scattering. `pdf` is
+/// that of the direction, `None` after a delta lobe; `pdf_light` and `emission` as in [`Sums::at_light`].
 pub fn weight_of_hit(counts: &Counts, sums: &Sums, pdf: Option<f32>, pdf_light: f32, emission: f32) -> f32 {
     let by_light_sample = pdf.map_or(0.0, |pdf| counts.light_samples * pdf_light / pdf);
     weight(1.0, by_light_sample + emission * sums.rest)
 }
 
-/// Weight of a light sample at a camera vertex with `sums` on arrival. `pdf` is the density with which the walk would
-/// hit the light, 0 if it cannot; `emission_per_pdf` the density of emission over that of the sample; `reverse` the
-/// density of the walk from the light through the vertex to the one before.
+/// Weight of a light sample at a camera vertex with `sums` on arrival. `pdf` is the density with which the
+/// walk would hit the light, 0 if it cannot; `emission_per_pdf` the density of emission over that of the
+/// sample; `reverse` the density of the walk from the light through the vertex to the one before.
 pub fn weight_of_light_sample(
     counts: &Counts,
     sums: &Sums,
@@ -102,7 +104,8 @@ pub struct End {
     pub sums: Sums,
     /// Density per solid angle of the direction to the other end.
     pub pdf: f32,
-    /// Density per solid angle of the direction to the vertex before, of a walk that comes from the other end.
+    /// Density per solid angle of the direction to the vertex before, of a walk that comes from the other
+    /// end.
     pub reverse: f32,
     /// Cosine of the direction to the other end.
     pub cos: f32,
@@ -116,8 +119,8 @@ pub fn weight_of_connection(counts: &Counts, camera: &End, light: &End, distance
     weight(counts.connections, by_camera + by_light)
 }
 
-/// Weight of the splat of a light vertex. `pdf_area` is the density per area with which rays of the pixel meet it,
-/// `reverse` the density of the walk from the lens to the vertex before.
+/// Weight of the splat of a light vertex. `pdf_area` is the density per area with which rays of the pixel
+/// meet it, `reverse` the density of the walk from the lens to the vertex before.
 pub fn weight_of_splat(counts: &Counts, sums: &Sums, pdf_area: f32, reverse: f32) -> f32 {
     weight(counts.light_paths, pdf_area * sums.before(reverse))
 }

@@ -1,11 +1,13 @@
-//! Bidirectional methods (Veach 1997, chapter 10; Davidovič et al. 2014): light paths whose vertices are stored and
-//! splatted, camera paths whose vertices are connected to stored ones.
+//! Bidirectional methods (Veach 1997, chapter 10; Davidovič et al. 2014): light paths whose vertices are
+//! stored and splatted, camera paths whose vertices are connected to stored ones.
 //!
-//! [`light_pass`] traces the light paths of a sample of the picture, [`camera_paths`] the camera paths of a tile. Both
-//! carry the running sums of [`mis`]. How often each technique is used is a matter of [`mis::Counts`]: without light
-//! paths the camera paths are path tracing, without connections both together are light tracing beside path tracing.
+//! [`light_pass`] traces the light paths of a sample of the picture, [`camera_paths`] the camera paths of a
+//! tile. Both carry the running sums of [`mis`]. How often each technique is used is a matter of
+//! [`mis::Counts`]: without light paths the camera paths are path tracing, without connections both together
+//! are light tracing beside path tracing.
 
 pub mod camera_paths;
 pub mod light_pass;
 pub mod mis;
+mod techniques;
 pub mod vertex;

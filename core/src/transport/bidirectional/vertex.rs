@@ -1,4 +1,5 @@
-//! Vertices of light paths that camera paths are connected to, and scattering at a vertex seen from both sides.
+//! Vertices of light paths that camera paths are connected to, and scattering at a vertex seen from both
+//! sides.
 
 use crate::Rgb;
 use crate::bsdf::{Bsdf, Features};
@@ -61,8 +62,8 @@ fn flipped(direction: Vec3) -> Vec3 {
     Vec3::new(direction.x, direction.y, -direction.z)
 }
 
-/// Scattering between local directions `wo` to the camera and `wi` to the light, for a `bsdf` on the side of the
-/// camera.
+/// Scattering between local directions `wo` to the camera and `wi` to the light, for a `bsdf` on the side of
+/// the camera.
 pub(super) fn scattering<F: Features>(
     context: &SceneContext<F>,
     (point, bsdf): (&SurfacePoint, &Bsdf),
@@ -91,7 +92,8 @@ pub(super) fn scattering_from_light<F: Features>(
     Scattering { value, to_light, to_camera: bsdf.evaluate::<F>(wi, wo).1 }
 }
 
-/// Density of the walk opposite to one that came by `from` and left by `to`, both local on the side of `from`.
+/// Density of the walk opposite to one that came by `from` and left by `to`, both local on the side of
+/// `from`.
 pub(super) fn reverse_pdf<F: Features>(
     context: &SceneContext<F>,
     (point, bsdf): (&SurfacePoint, &Bsdf),
@@ -108,12 +110,12 @@ pub(super) fn reverse_pdf<F: Features>(
     behind.evaluate::<F>(flipped(to), flipped(from)).1
 }
 
-/// Lowest cosine of a direction of arrival to the shading normal: below it the normal may have been turned to the
-/// viewer, and depends on the walk.
+/// Lowest cosine of a direction of arrival to the shading normal: below it the normal may have been turned to
+/// the viewer, and depends on the walk.
 const LOWEST_COS: f32 = 2e-3;
 
-/// Whether the shading normal of `point` may have been turned towards local direction `wo`. Light paths end there,
-/// camera paths are not connected.
+/// Whether the shading normal of `point` may have been turned towards local direction `wo`. Light paths end
+/// there, camera paths are not connected.
 pub(super) fn is_bent(point: &SurfacePoint, wo: Vec3) -> bool {
     wo.z < LOWEST_COS && point.frame.normal != point.geometric_normal
 }

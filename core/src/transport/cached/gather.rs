@@ -14,7 +14,7 @@ use crate::memory::{Arena, Footprint, OutOfMemory};
 use crate::sampling::Sampler;
 use crate::sampling::warp::cosine_hemisphere;
 use crate::scene::SurfacePoint;
-use crate::transport::path::wave::PathWave;
+use crate::transport::path::sharing::PathWave;
 use crate::transport::path::{Estimator, PathIntegrator};
 use crate::transport::settings::Counters;
 use crate::transport::walk::component::Components;

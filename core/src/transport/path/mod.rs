@@ -27,7 +27,6 @@ pub(in crate::transport) mod sharing;
 pub(in crate::transport) mod silhouette;
 pub(in crate::transport) mod tile;
 pub(in crate::transport) mod vertex;
-pub(in crate::transport) mod wave;
 
 pub use crate::transport::wavefront::WAVE;
 pub use estimator::Estimator;
@@ -44,7 +43,7 @@ use crate::memory::Footprint;
 use crate::sampling::Sampler;
 use crate::scene::Scene;
 use crate::transport::path::shade::Shading;
-use crate::transport::path::wave::PathWave;
+use crate::transport::path::sharing::PathWave;
 use crate::transport::settings::{Counters, PathSettings};
 use crate::transport::walk::context::SceneContext;
 use crate::transport::walk::dimension;

@@ -2,8 +2,8 @@
 
 use super::PathIntegrator;
 use super::estimator::Estimator;
+use super::sharing::PathWave;
 use super::silhouette::is_outlined;
-use super::wave::PathWave;
 use crate::Rgb;
 use crate::bsdf::Features;
 use crate::film::Pixel;

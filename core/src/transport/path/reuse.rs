@@ -21,8 +21,7 @@
 use super::PathIntegrator;
 use super::connection::{ConnectionVertex, density};
 use super::estimator::Estimator;
-use super::sharing::Sharing;
-use super::wave::{PathMemory, PathWave};
+use super::sharing::{PathMemory, PathWave, Sharing};
 use crate::Rgb;
 use crate::bsdf::{Bsdf, Cover, Features};
 use crate::film::CIRCLE;

@@ -7,9 +7,9 @@
 use super::PathIntegrator;
 use super::estimator::Estimator;
 use super::reuse::PathReuse;
+use super::sharing::PathWave;
 use super::sharing::Sharing;
 use super::tile::TileSampler;
-use super::wave::PathWave;
 use crate::Rgb;
 use crate::bsdf::Features;
 use crate::film::{PIXELS_PER_TILE, Tile};

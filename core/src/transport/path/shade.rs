@@ -4,9 +4,9 @@
 
 use super::PathIntegrator;
 use super::estimator::{EmissionHit, Estimator, KnownLight, Rest};
+use super::sharing::PathMemory;
 use super::sharing::Sharing;
 use super::vertex::PathVertex;
-use super::wave::PathMemory;
 use crate::Rgb;
 use crate::bsdf::Features;
 use crate::geometry::{Hit, Ray};

@@ -5,9 +5,9 @@
 
 use super::PathIntegrator;
 use super::estimator::Estimator;
+use super::sharing::PathWave;
 use super::sharing::Sharing;
 use super::silhouette::outlined;
-use super::wave::PathWave;
 use crate::Rgb;
 use crate::bsdf::Features;
 use crate::film::{CIRCLE, CIRCLES, PIXELS_PER_TILE, Pixel, PixelSet, Tile};

@@ -1,6 +1,6 @@
-//! The layers of the core: a folder imports only from folders below it, the same holds for the folders of light
-//! transport, and the files of a folder import each other without circles. The `mod.rs` of a folder names the items
-//! that its files offer, and its files may import it.
+//! The layers of the core: a folder imports only from folders below it, the same holds for the folders of
+//! light transport, and the files of a folder import each other without circles. The `mod.rs` of a folder
+//! names the items that its files offer, and its files may import it.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -24,8 +24,8 @@ const LAYERS: &[&str] = &[
     "method",
 ];
 
-/// Folders and files of core/src/transport, lowest first: subpaths, the wavefront, the path tracer, and the methods
-/// that build on it.
+/// Folders and files of core/src/transport, lowest first: subpaths, the wavefront, the path tracer, and the
+/// methods that build on it.
 const TRANSPORT: &[&str] = &[
     "settings",
     "walk",
@@ -83,7 +83,8 @@ pub(crate) fn check(sources: &[Source]) -> Vec<String> {
     complaints
 }
 
-/// The layer of name number `depth` of a path, where names at that place have layers; an error if it has none.
+/// The layer of name number `depth` of a path, where names at that place have layers; an error if it has
+/// none.
 fn layer(path: &[String], depth: usize) -> Result<Option<usize>, ()> {
     let layers = match (depth, path.first().map(String::as_str)) {
         (0, _) => LAYERS,

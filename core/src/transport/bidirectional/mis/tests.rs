@@ -1,5 +1,5 @@
-//! The running sums against all densities written down: random paths over five kinds of lights, diffuse and glossy
-//! vertices, mirrors and refraction.
+//! The running sums against all densities written down: random paths over five kinds of lights, diffuse and
+//! glossy vertices, mirrors and refraction.
 
 use super::*;
 use crate::sampling::Random;
@@ -52,7 +52,8 @@ enum Mistake {
     CameraStart,
     /// The number of light paths is missing at the camera.
     NoCount,
-    /// Light samples and light paths choose lights by different distributions, and one side takes the wrong one.
+    /// Light samples and light paths choose lights by different distributions, and one side takes the wrong
+    /// one.
     LightChoice,
     /// The light sample's density of hitting the light has a roulette that the walk has not.
     Roulette,

@@ -1,0 +1,170 @@
+//! The techniques of a camera path: it hits a light, samples one, or is connected to a vertex of a light path
+//! (Veach 1997, section 10.2).
+
+use crate::Rgb;
+use crate::bsdf::Features;
+use crate::geometry::{Hit, Ray};
+use crate::light::emitted;
+use crate::sampling::ONE_MINUS_EPSILON;
+use crate::scene::SurfacePoint;
+use crate::transport::bidirectional::camera_paths::{
+    CameraPath, CameraPaths, Connections, Queue, Vertex, normal_for_lights,
+};
+use crate::transport::bidirectional::mis::{
+    End, weight_of_connection, weight_of_hit, weight_of_light_sample,
+};
+use crate::transport::bidirectional::vertex::{
+    LightVertex, Scattering, reverse_pdf, scattering, scattering_from_light,
+};
+use crate::transport::walk::dimension;
+use crate::transport::walk::visibility::shadow_ray;
+use glam::Vec3;
+
+impl<F: Features> CameraPaths<'_, F> {
+    /// Light of the environment.
+    pub(super) fn escape(&self, path: &mut CameraPath, direction: Vec3) {
+        let Self { context, emission, counts, .. } = self;
+        let Some(environment) = &context.scene.environment else { return };
+        let radiance = environment.radiance(context.scene, direction);
+        if radiance == Rgb::ZERO {
+            return;
+        }
+        let mut weight = 1.0;
+        if path.segments > 1 {
+            let (position, normal) = (Vec3::from(path.position), Vec3::from(path.normal));
+            let pdf = (path.pdf < f32::INFINITY).then_some(path.pdf);
+            let pdf_light = context.lights.pdf_escape(context.scene, position, normal, direction);
+            let density = match counts.light_paths > 0.0 {
+                true => emission.density_of_sky(context.scene, context.lights, direction, position),
+                false => 0.0,
+            };
+            weight = weight_of_hit(counts, &path.sums(), pdf, pdf_light, density);
+        }
+        path.add(Rgb::from(path.throughput) * radiance * weight);
+    }
+
+    /// Light of the surface that was hit.
+    pub(super) fn emission(&self, path: &mut CameraPath, point: &SurfacePoint, hit: &Hit, direction: Vec3) {
+        let Self { context, emission, counts, .. } = self;
+        let (scene, lights) = (context.scene, context.lights);
+        let radiance = emitted(scene, hit.triangle, point.uv, point.front);
+        if radiance == Rgb::ZERO {
+            return;
+        }
+        let mut weight = 1.0;
+        if path.segments > 1 {
+            let (position, normal) = (Vec3::from(path.position), Vec3::from(path.normal));
+            let pdf = (path.pdf < f32::INFINITY).then_some(path.pdf);
+            let distance = position.distance(point.position);
+            let pdf_light = lights.pdf_hit(scene, position, normal, hit.triangle, distance, direction);
+            let from = (point.position, -direction);
+            let density = match counts.light_paths > 0.0 {
+                true => emission.density_of_surface(scene, lights, hit.triangle, from),
+                false => 0.0,
+            };
+            weight = weight_of_hit(counts, &path.sums(), pdf, pdf_light, density);
+        }
+        path.add(Rgb::from(path.throughput) * radiance * weight);
+    }
+
+    /// A light sample: its shadow ray, with what arrives if nothing is in its way.
+    pub(super) fn light_sample(
+        &self,
+        path: &CameraPath,
+        vertex: &Vertex,
+        tag: u32,
+        queue: &mut Queue,
+    ) -> Option<()> {
+        let Self { context, emission, counts, .. } = self;
+        let (scene, lights) = (context.scene, context.lights);
+        let Vertex { point, bsdf, wo, sums, sampler, .. } = *vertex;
+        let normal = normal_for_lights(point, bsdf);
+        let first = dimension::vertex(path.segments);
+        let [u, v] = sampler.pair(first + dimension::LIGHT);
+        let choice = sampler.single(first + dimension::LIGHT_CHOICE);
+        let light = lights.sample(scene, point.position, normal, [u, v, choice])?;
+        let wi = point.frame.to_local(light.direction);
+        if !point.sides_agree(wi, light.direction) {
+            return None;
+        }
+        let (value, pdf) = bsdf.evaluate::<F>(wo, wi);
+        if value == Rgb::ZERO {
+            return None;
+        }
+        let pdf = if light.delta { 0.0 } else { pdf };
+        let mut emitted = (0.0, 0.0);
+        let mut density = 0.0;
+        if counts.light_paths > 0.0 && !vertex.is_bent {
+            let cos = light.direction.dot(point.geometric_normal).abs();
+            emitted = (cos, reverse_pdf(context, (point, bsdf), wo, wi));
+            density = emission.density_of_sample(scene, lights, &light, point.position);
+        }
+        let weight = weight_of_light_sample(counts, &sums, (pdf, light.pdf), density, emitted);
+        let radiance = Rgb::from(path.throughput) * value * light.radiance * (weight / light.pdf);
+        queue.push(tag, shadow_ray(point, &light)?, radiance);
+        Some(())
+    }
+
+    /// Connections to light vertices, one of each of as many parts of their list.
+    pub(super) fn connect(&self, path: &CameraPath, vertex: &Vertex, tag: u32, queue: &mut Queue) {
+        let Connections { vertices, count } = self.connections;
+        if vertices.is_empty() || count == 0 {
+            return;
+        }
+        let random = vertex.sampler.single(dimension::CONNECTION + path.segments);
+        let each = vertices.len() as f32 / count as f32;
+        for part in 0..count {
+            let at = ((part as f32 + random) / count as f32).min(ONE_MINUS_EPSILON);
+            let index = (at * vertices.len() as f32) as usize;
+            if let Some(light) = vertices.get(index)
+                && let Some((ray, radiance)) = self.connection(path, vertex, light)
+            {
+                queue.push(tag, ray, radiance * each);
+            }
+        }
+    }
+
+    /// The connection of a camera vertex with a light vertex: its shadow ray, and what arrives if nothing is
+    /// in its way.
+    fn connection(&self, path: &CameraPath, vertex: &Vertex, light: &LightVertex) -> Option<(Ray, Rgb)> {
+        let Self { context, counts, settings, .. } = self;
+        if path.segments + light.segments + 1 > settings.max_depth {
+            return None;
+        }
+        let Vertex { point, bsdf, wo, sums, .. } = *vertex;
+        let between = Vec3::from(light.position) - point.position;
+        let squared = between.length_squared();
+        let to_light = between.try_normalize()?;
+        let wi = point.frame.to_local(to_light);
+        if !point.sides_agree(wi, to_light) {
+            return None;
+        }
+        let at_camera = scattering(context, (point, bsdf), wo, wi);
+        if at_camera.value == Rgb::ZERO {
+            return None;
+        }
+        let other = light.point(context)?;
+        let other_bsdf = context.bsdf_at(&other);
+        let (out, back) = (other.frame.to_local(-to_light), other.frame.to_local(light.to_light.into()));
+        if !other.sides_agree(out, -to_light) {
+            return None;
+        }
+        let at_light = scattering_from_light(context, (&other, &other_bsdf), out, back);
+        if at_light.value == Rgb::ZERO {
+            return None;
+        }
+        let cos = |point: &SurfacePoint, direction: Vec3| direction.dot(point.geometric_normal).abs();
+        let (cos_camera, cos_light) = (cos(point, to_light), cos(&other, to_light));
+        let Scattering { to_light: pdf, to_camera: reverse, .. } = at_camera;
+        let camera_end = End { sums, pdf, reverse, cos: cos_camera };
+        let Scattering { to_light: reverse, to_camera: pdf, .. } = at_light;
+        let light_end = End { sums: light.sums(), pdf, reverse, cos: cos_light };
+        let weight = weight_of_connection(counts, &camera_end, &light_end, squared);
+        let cos_in = cos(&other, light.to_light.into());
+        let power = Rgb::from(light.power) * at_light.value * (cos_light / (cos_in * squared));
+        let radiance = Rgb::from(path.throughput) * at_camera.value * power * weight;
+        let target = other.spawn(-to_light).origin;
+        (radiance.max_element() > 0.0 && radiance.is_finite())
+            .then(|| (point.spawn_to(target.into()), radiance))
+    }
+}
