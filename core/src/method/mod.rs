@@ -5,14 +5,18 @@
 //! no method knows of threads, clocks or files.
 
 pub mod bidirectional;
+#[cfg(test)]
+mod closed_box;
 pub mod emission_guide;
 pub mod environment_visibility;
 pub mod executor;
+pub mod irradiance_cache;
 pub mod path;
 pub mod photon_map;
 pub mod photon_map_store;
 pub mod photons;
 pub mod pilot;
+pub mod record_placement;
 pub mod round;
 pub mod sppm;
 

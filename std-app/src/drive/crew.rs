@@ -20,8 +20,7 @@ pub(super) struct Round<'a> {
     pub(super) step: u32,
     /// When it is cut.
     pub(super) deadline: Option<Instant>,
-    /// Cuts it when the render is interrupted; the first when the watch is late, but for what is done in a
-    /// [`Crew::hurry`].
+    /// Cuts it when the render is interrupted; the first when the watch is late.
     pub(super) watch: &'a Watch<'a>,
     pub(super) is_first: bool,
 }
@@ -54,20 +53,6 @@ impl Crew<'_, '_> {
     pub(super) fn next_sample(&self) -> Option<u32> {
         let spp = self.canvas.spp();
         (spp < self.round.target && !self.round.is_over()).then_some(spp)
-    }
-
-    /// Whether the round is over.
-    pub(super) fn is_over(&self) -> bool {
-        self.round.is_over()
-    }
-
-    /// Does work that the picture can be without: cut at `deadline`, and where the render is interrupted, which the first
-    /// round as a whole is not.
-    pub(super) fn hurry<T>(&mut self, deadline: Option<Instant>, work: impl FnOnce(&mut Crew) -> T) -> T {
-        let Round { watch, deadline: end, .. } = *self.round;
-        let deadline = [deadline, end].into_iter().flatten().min();
-        let round = Round { target: 0, step: 1, deadline, watch, is_first: false };
-        work(&mut Crew { workers: self.workers, round: &round, canvas: self.canvas })
     }
 
     /// A pass: task `i` writes to the `i`th piece of `size` values of `out`, and what they count is the round's. Returns
@@ -202,18 +187,6 @@ mod tests {
     fn a_pass_that_is_cut_says_so() {
         let task = |_: usize, _: &mut Arena, _: &mut [u8]| Ok(Counters::default());
         crew(2, 1, true, |crew, scratch| assert_eq!(crew.pass(&mut [0; 9], 2, scratch, &task), Ok(false)));
-    }
-
-    #[test]
-    fn what_is_done_in_a_hurry_is_cut_and_the_round_goes_on() {
-        let task = |_: usize, _: &mut Arena, _: &mut [u8]| Ok(Counters::default());
-        let (late, soon) = (Instant::now(), Instant::now() + core::time::Duration::from_secs(3600));
-        crew(2, 1, false, |crew, scratch| {
-            let mut pass = |crew: &mut Crew| crew.pass(&mut [0; 9], 2, scratch, &task);
-            assert_eq!(crew.hurry(Some(late), &mut pass), Ok(false));
-            assert_eq!(crew.hurry(Some(soon), &mut pass), Ok(true));
-            assert_eq!((pass(crew), crew.is_over()), (Ok(true), false));
-        });
     }
 
     #[test]

@@ -1,11 +1,11 @@
 //! Points of a picture that no record was made for, and the exact indirect irradiance there.
 
 use super::RenderError;
-use super::workers::Workers;
 use halflight_core::Rgb;
 use halflight_core::bsdf::Features;
 use halflight_core::cache::irradiance::{CellFlux, Metric, metric};
 use halflight_core::memory::{Arena, Line};
+use halflight_core::method::Executor;
 use halflight_core::transport::cached::gather::{GatherPoint, Gathering};
 use halflight_core::transport::cached::placement::{PIXELS, ProgressiveOrder, Via};
 use halflight_core::transport::{Counters, PathIntegrator};
@@ -38,24 +38,23 @@ pub(super) fn stride([width, height]: [u32; 2], points: u32) -> u32 {
 }
 
 /// About `points` points, spread evenly over the picture; at each is gathered `repeats` times, at least twice.
-/// `None` where `is_over` says so before.
+/// `None` where the executor ends it early.
 pub(super) fn held_out<F: Features>(
     tracer: &PathIntegrator<F>,
     size: [u32; 2],
     [points, repeats]: [u32; 2],
-    (workers, is_over): (&Workers, &(dyn Fn() -> bool + Sync)),
-    scratch: &mut [Vec<Line>],
+    executor: &mut impl Executor,
 ) -> Result<Option<Vec<Point>>, RenderError> {
     let [width, height] = size;
     let order = ProgressiveOrder::new(width, height, stride(size, points));
     let mut places = vec![GatherPoint::NONE; order.len() as usize];
-    let look = |task: usize, _: &mut Arena, out: &mut [GatherPoint]| {
+    let passed = executor.pass(places.chunks_mut(PIXELS), |task, out, _| {
         let mut counters = Counters::default();
         tracer.places(&order, (task * PIXELS) as u64, (SAMPLE, Via::Specular), out, &mut counters);
         tracer.look_up(out, &mut counters);
         Ok(counters)
-    };
-    if !workers.pass(&mut places, PIXELS, scratch, is_over, &look)?.1 {
+    })?;
+    if !passed.is_complete {
         return Ok(None);
     }
     let pixel = |i: usize| order.pixel(i as u64).map_or([0; 2], |(x, y)| [x, y]);
@@ -69,16 +68,14 @@ pub(super) fn held_out<F: Features>(
     // Mean and variance of the mean.
     let mut known: Vec<Option<[f64; 2]>> = vec![None; places.len()];
     let repeats = repeats.max(2);
-    let gather = |task: usize, arena: &mut Arena, out: &mut [Option<[f64; 2]>]| {
+    let passed = executor.pass(places.iter().zip(&mut known), |task, ((place, _), out), worker| {
         let mut counters = Counters::default();
-        let (Some(out), Some((place, _))) = (out.first_mut(), places.get(task)) else { return Ok(counters) };
         let mut found = Vec::new();
         for repeat in 0..repeats {
             // Numbers that no record has.
             let number = 1 << 29 | (repeats * task as u32 + repeat);
-            let Some(record) = tracer.gather(place, number, &gathering, arena, &mut counters)? else {
-                return Ok(counters);
-            };
+            let gathered = tracer.gather(place, number, &gathering, &mut worker.scratch, &mut counters)?;
+            let Some(record) = gathered else { return Ok(counters) };
             found.push(luminance(record.irradiance.into()));
         }
         let count = f64::from(repeats);
@@ -86,8 +83,8 @@ pub(super) fn held_out<F: Features>(
         let squares: f64 = found.iter().map(|found| (found - mean).powi(2)).sum();
         *out = Some([mean, squares / (count * (count - 1.0))]);
         Ok(counters)
-    };
-    if !workers.pass(&mut known, 1, scratch, is_over, &gather)?.1 {
+    })?;
+    if !passed.is_complete {
         return Ok(None);
     }
     let point = |((place, pixel), known): ((GatherPoint, [u32; 2]), Option<[f64; 2]>)| {

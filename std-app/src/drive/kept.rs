@@ -64,11 +64,6 @@ impl<'a> Kept<'a> {
         failed.filter(|_| !self.is_known.replace(true))
     }
 
-    /// Whether anything is kept at all.
-    pub(super) fn is_some(&self) -> bool {
-        self.path.is_some()
-    }
-
     /// Why it is not there as it should be.
     pub(super) fn failed(&self) -> Option<FileError> {
         self.failed.clone()

@@ -1,12 +1,11 @@
 //! Studies of the irradiance cache: what each error metric makes of the same number of records, against irradiance that
 //! is gathered at points of the picture that no cache has seen.
 
-use super::crew::{Crew, Round};
 use super::held_out::{EXACT, Point, held_out, luminance};
 use super::memory::{Bank, Memory};
-use super::method::{Growing, LEAST_PIXELS, Overture};
 use super::run::{build_bvh, path_settings};
 use super::survey::means;
+use super::threads::{End, Threads};
 use super::workers::Workers;
 use super::{RenderError, Settings};
 use crate::pages::Pages;
@@ -15,10 +14,10 @@ use halflight_core::cache::irradiance::{CellFlux, IrradianceCache, Metric, metri
 use halflight_core::census::{Census, WithFeatures};
 use halflight_core::light::LightSampler;
 use halflight_core::memory::{Arena, Line};
-use halflight_core::method::{RenderState, Shard};
+use halflight_core::method::irradiance_cache::LEAST_PIXELS;
+use halflight_core::method::record_placement::{CacheBuilder, RecordPlacement, step_footprint, step_points};
 use halflight_core::scene::Scene;
 use halflight_core::transport::PathIntegrator;
-use halflight_core::transport::cached::gather::Gathering;
 
 /// What to study.
 #[derive(Clone, Debug)]
@@ -108,44 +107,44 @@ impl WithFeatures for Study<'_> {
             PathIntegrator::<F>::gather_scratch(strata).or(PathIntegrator::<F>::gather_scratch(EXACT));
         let mut scratch = memory.take_each("paths", scratch, workers.count())?;
 
-        // Passes count what they do on a canvas, of which there is no picture.
-        let mut film_lines = memory.take("film", RenderState::footprint(1, 1))?;
-        let mut canvas = RenderState::new(1, 1, Shard::WHOLE, &mut arena(&mut film_lines))?;
-        let round = Round { target: 0, step: 1, deadline: None, watch: &workers.watch, is_first: false };
-        let mut crew = Crew { workers: &workers, round: &round, canvas: &mut canvas };
-
+        let mut executor = Threads::new(&workers, &mut scratch).until(End::Round(None));
         let size = [settings.width, settings.height];
         let extent = 0.5 * bvh.bounds().diagonal();
-        let never = || false;
-        let points = held_out(&tracer, size, [study.points, REPEATS], (&workers, &never), &mut scratch)?;
+        let points = held_out(&tracer, size, [study.points, REPEATS], &mut executor)?;
         let points = points.unwrap_or_default();
-        let mut tables = memory.take("gathering", CellFlux::footprint(strata))?;
-        let flux = CellFlux::build(strata, &mut arena(&mut tables))?;
+        let mut tables = memory.take("gathering", CellFlux::footprint(strata).and(step_footprint()))?;
+        let mut tables = arena(&mut tables);
+        let flux = CellFlux::build(strata, &mut tables)?;
+        let step = step_points(&mut tables)?;
         let capacity = (study.records as usize).saturating_mul(4);
-        let mut lines = memory.take("cache", IrradianceCache::footprint(capacity))?;
+        let mut lines = memory.take("cache", CacheBuilder::footprint(capacity))?;
         for &metric in &study.metrics {
             let usual = metric::Settings::new(metric, extent);
             let mut search = Search::new(study.records, usual.error);
             loop {
-                let cache = IrradianceCache::new(&bvh.bounds(), capacity, &mut arena(&mut lines))?;
-                let mut growing = Growing::new(cache, 0);
+                let mut builder = CacheBuilder::new(&bvh.bounds(), capacity, 0, &mut arena(&mut lines))?;
                 for pass in (0..if study.progressive { PASSES } else { 1 }).rev() {
                     // Radii are in proportion to the error, or to its fourth root.
                     let wider = 2f32.powi(pass);
                     let looser = if metric.takes_distances() { wider } else { wider.powi(4) };
-                    let settings = metric::Settings { error: looser * search.error, ..usual };
-                    let least_pixels = wider * LEAST_PIXELS;
-                    let gathering = Gathering { flux: &flux, metric: settings, least_pixels };
-                    let overture =
-                        Overture { tracer: &tracer, photons: None, gathering, coarse: gathering.flux, size };
-                    overture.fill(&mut growing, &mut crew, &mut scratch)?;
+                    let mut placement = RecordPlacement {
+                        integrator: &tracer,
+                        photons: None,
+                        flux: [&flux; 2],
+                        metric: metric::Settings { error: looser * search.error, ..usual },
+                        least_pixels: wider * LEAST_PIXELS,
+                        size,
+                        step: &mut *step,
+                    };
+                    // Nothing ends it early.
+                    let _ = placement.fill(&mut builder, &mut executor)?;
                     if pass > 0 {
-                        growing.tighten(0.5);
+                        builder.tighten(0.5);
                     }
                 }
                 let error = search.error;
-                if search.is_done(growing.cache.records().len() as u64) {
-                    tell(&judge(metric, error, &growing.cache, &points));
+                if search.is_done(builder.cache.records().len() as u64) {
+                    tell(&judge(metric, error, &builder.cache, &points));
                     break;
                 }
             }

@@ -3,10 +3,11 @@
 
 use super::RenderError;
 use super::held_out::{Point, held_out, luminance, stride};
-use super::workers::Workers;
+use super::threads::{End, Threads};
+use core::time::Duration;
 use halflight_core::bsdf::Features;
 use halflight_core::cache::irradiance::{IrradianceCache, Record};
-use halflight_core::memory::{Arena, Line};
+use halflight_core::method::Executor;
 use halflight_core::transport::cached::gather::GatherPoint;
 use halflight_core::transport::cached::placement::{PIXELS, ProgressiveOrder, Via};
 use halflight_core::transport::{Counters, PathIntegrator};
@@ -98,13 +99,12 @@ pub(super) fn survey<F: Features>(
     tracer: &PathIntegrator<F>,
     caches: [&IrradianceCache; 2],
     size: [u32; 2],
-    points: u32,
-    (workers, seconds): (&Workers, Option<f64>),
-    scratch: &mut [Vec<Line>],
+    (points, seconds): (u32, Option<f64>),
+    executor: Threads,
 ) -> Result<Option<Survey>, RenderError> {
     let start = Instant::now();
-    let limit = seconds.map_or(f64::INFINITY, |seconds| seconds.max(SHORT));
-    let is_over = || workers.watch.is_interrupted() || start.elapsed().as_secs_f64() > limit;
+    let limit = seconds.and_then(|seconds| Duration::try_from_secs_f64(seconds.max(SHORT)).ok());
+    let mut executor = executor.until(End::Round(limit.and_then(|limit| start.checked_add(limit))));
     let [width, height] = size;
     let mut step = 1;
     while u64::from(width.div_ceil(step)) * u64::from(height.div_ceil(step)) > MOST_PIXELS {
@@ -112,7 +112,7 @@ pub(super) fn survey<F: Features>(
     }
     let order = ProgressiveOrder::new(width, height, step);
     let mut found = vec![Look::default(); order.len() as usize];
-    let task = |task: usize, _: &mut Arena, out: &mut [Look]| {
+    let passed = executor.pass(found.chunks_mut(PIXELS), |task, out, _| {
         let (mut counters, mut places) = (Counters::default(), [GatherPoint::NONE; PIXELS]);
         tracer.places(&order, (task * PIXELS) as u64, (0, Via::Specular), &mut places, &mut counters);
         tracer.look_up(&mut places, &mut counters);
@@ -120,8 +120,8 @@ pub(super) fn survey<F: Features>(
             *look = look_at(place, caches, step);
         }
         Ok(counters)
-    };
-    if !workers.pass(&mut found, PIXELS, scratch, &is_over, &task)?.1 {
+    })?;
+    if !passed.is_complete {
         return Ok(None);
     }
     let (columns, rows) = (width.div_ceil(step), height.div_ceil(step));
@@ -133,9 +133,7 @@ pub(super) fn survey<F: Features>(
     }
 
     let points_asked = [points, REPEATS];
-    let Some(points) = held_out(tracer, size, points_asked, (workers, &is_over), scratch)? else {
-        return Ok(None);
-    };
+    let Some(points) = held_out(tracer, size, points_asked, &mut executor)? else { return Ok(None) };
     let mean = points.iter().map(|point| point.exact).sum::<f64>() / points.len().max(1) as f64;
     let checked: Vec<_> = points.iter().filter_map(|point| check(point, mean, caches)).collect();
     let count = checked.len().max(1) as f64;
@@ -164,8 +162,7 @@ pub(super) fn risks<F: Features>(
     tracer: &PathIntegrator<F>,
     caches: [&IrradianceCache; 2],
     size: [u32; 2],
-    workers: &Workers,
-    scratch: &mut [Vec<Line>],
+    executor: &mut impl Executor,
 ) -> Result<Vec<f32>, RenderError> {
     let [width, height] = size;
     let mut step = 1;
@@ -174,15 +171,15 @@ pub(super) fn risks<F: Features>(
     }
     let order = ProgressiveOrder::new(width, height, step);
     let mut found = vec![[0.0; 2]; order.len() as usize];
-    let task = |task: usize, _: &mut Arena, out: &mut [[f32; 2]]| {
+    let passed = executor.pass(found.chunks_mut(PIXELS), |task, out, _| {
         let (mut counters, mut places) = (Counters::default(), [GatherPoint::NONE; PIXELS]);
         tracer.places(&order, (task * PIXELS) as u64, (0, Via::Specular), &mut places, &mut counters);
         for (out, place) in out.iter_mut().zip(&places).filter(|(_, place)| place.is_some()) {
             *out = said_at(place, caches);
         }
         Ok(counters)
-    };
-    if !workers.pass(&mut found, PIXELS, scratch, &|| workers.watch.is_interrupted(), &task)?.1 {
+    })?;
+    if !passed.is_complete {
         return Ok(Vec::new());
     }
     let known = || found.iter().filter(|[said, _]| *said > 0.0);

@@ -184,12 +184,20 @@ impl<'m> IrradianceCache<'m> {
         true
     }
 
-    /// Takes `record` in place of that of that number, which stands at the same place. The cache is to be
-    /// settled when all are replaced: what is wider is not found before.
-    pub fn replace(&mut self, number: usize, record: Record) {
-        if let Some(slot) = self.records.get_mut(..self.used).and_then(|all| all.get_mut(number)) {
-            *slot = record;
+    /// The records, to be changed where they are. [`IrradianceCache::rebuild`] is to follow where one becomes wider.
+    pub fn records_mut(&mut self) -> &mut [Record] {
+        self.records.get_mut(..self.used).unwrap_or_default()
+    }
+
+    /// Keeps the records of these numbers, in their order.
+    pub fn retain(&mut self, is_kept: impl Fn(usize) -> bool) {
+        let mut kept = 0;
+        for index in (0..self.used).filter(|&index| is_kept(index)) {
+            self.records.copy_within(index..index + 1, kept);
+            kept += 1;
         }
+        self.used = kept;
+        self.rebuild();
     }
 
     /// Makes all radii smaller by a factor, as for an error allowed that is smaller by its fourth power. What

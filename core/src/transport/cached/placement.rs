@@ -1,11 +1,5 @@
-//! The overture of the irradiance cache: a look over the picture, from coarse to fine, for places that no
-//! record reaches yet (Krivanek, Bouatouch, Pattanaik and Zara 2006, §5).
-//!
-//! It goes over the pixels in an order in which the first n of them are spread evenly, whatever n is, in
-//! steps. A step has two passes: tasks find the diffuse points that its pixels see, directly or through
-//! mirrors and glass; then tasks gather where no record reaches, some places at a time, and each time all
-//! records are committed in their order. Then it goes over them again, for the diffuse points that are seen
-//! in rough surfaces ([`Via`]).
+//! Gather points of the picture: the order of its pixels from coarse to fine, in which the first n pixels are spread
+//! evenly, whatever n is, and the diffuse point that a pixel sees directly or through other surfaces ([`Via`]).
 
 use crate::bsdf::{Bsdf, Features};
 use crate::bvh::Coherence;

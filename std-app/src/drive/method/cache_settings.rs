@@ -50,8 +50,8 @@ pub struct CacheUse {
     pub gathered: u64,
     /// Rays of each of them.
     pub rays: u32,
-    /// They were left as they were when their share of the time was over, or the render was interrupted.
+    /// They were left as they were when their part of the time was over, or the render was interrupted.
     pub is_cut: bool,
-    /// Seconds of the overture.
+    /// Seconds of filling both.
     pub seconds: f64,
 }

@@ -10,9 +10,7 @@ mod cache_settings;
 mod caster;
 mod caustic_look;
 mod caustics;
-mod haste;
 mod irradiance_cache;
-mod overture;
 mod path;
 mod photon_map;
 mod photon_view;
@@ -24,8 +22,6 @@ pub use cache_settings::{CacheSettings, CacheUse};
 pub use caustics::CausticUse;
 pub(super) use caustics::unseen;
 pub use halflight_core::method::{MapUse, PhotonSettings, PhotonUse};
-pub(super) use irradiance_cache::LEAST_PIXELS;
-pub(super) use overture::{Growing, Overture};
 pub use photon_view::{MapView, PhotonView};
 
 use super::crew::Crew;

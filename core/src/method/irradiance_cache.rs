@@ -1,0 +1,311 @@
+//! Irradiance caching (Ward, Rubinstein and Clear 1988): the indirect light of diffuse surfaces is gathered at few points
+//! and interpolated between them. Paths find all other light.
+//!
+//! One cache serves the even samples, another the odd ones, and each is filled without the other: the difference of
+//! the halves of the film shows the errors of records too. First both caches are filled, then they are frozen. Paths go
+//! on where no record is valid.
+
+use super::executor::{Executor, Passed};
+use super::record_placement::{CacheBuilder, RecordPlacement, step_footprint, step_points};
+use super::{Method, RenderContext, Round};
+use crate::bsdf::Features;
+use crate::cache::irradiance::{CellFlux, IrradianceCache, Metric, Record, metric};
+use crate::memory::{Footprint, MemorySource, OutOfMemory};
+use crate::transport::cached::gather::GatherPoint;
+use crate::transport::{CacheView, CausticMerging, PathIntegrator, path::WAVE};
+
+/// Pixels for each record of a cache without a limit of memory.
+const PIXELS_PER_RECORD: usize = 8;
+
+/// The fewest records that it has memory for, for small pictures.
+const FEWEST_RECORDS: usize = 4096;
+
+/// Least radius of a record in pixels: pixels that placement looks at and that are neighbours share it.
+pub const LEAST_PIXELS: f32 = 2.0;
+
+/// The fraction of the time of a picture in which each cache is to be filled. What no record reaches by then is path
+/// traced.
+const TIME: f32 = 0.25;
+
+/// Strata along a side behind rough surfaces are half as many, in multiples of this.
+const BLOCK: usize = 8;
+
+/// How caches are made.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CacheSettings {
+    /// The rule of the validity radii.
+    pub metric: Metric,
+    /// Error allowed, in the unit of the metric.
+    pub error: f32,
+    /// Strata along a side of the hemisphere of a record.
+    pub strata: usize,
+    /// Records that each cache has memory for at least, whatever is available.
+    pub fewest: usize,
+    /// Bytes that are to stay available.
+    pub reserve: usize,
+    /// Whether records become wider where there was no time to fill the caches.
+    pub widens: bool,
+}
+
+impl CacheSettings {
+    /// Strata along a side behind rough surfaces, of which a pixel sees the mean.
+    fn coarse(&self) -> usize {
+        self.strata.div_ceil(2 * BLOCK) * BLOCK
+    }
+
+    /// Bytes of the tables of strata, and of the points of placement.
+    pub fn gathering_footprint(&self) -> Footprint {
+        let tables = CellFlux::footprint(self.coarse()).and(CellFlux::footprint(self.strata));
+        tables.and(step_footprint())
+    }
+}
+
+/// Irradiance caching of one picture.
+pub struct IrradianceCaching<'a, F> {
+    integrator: PathIntegrator<'a, F>,
+    metric: metric::Settings,
+    /// Tables of the strata of records, and of those behind rough surfaces.
+    flux: [CellFlux<'a>; 2],
+    size: [u32; 2],
+    builders: [CacheBuilder<'a>; 2],
+    step: &'a mut [GatherPoint],
+    widens: bool,
+    is_frozen: bool,
+    is_cut: bool,
+}
+
+impl<'a, F: Features> IrradianceCaching<'a, F> {
+    /// Working memory of a worker, for paths and for gather rays, both with photons of caustics.
+    pub fn scratch(settings: &CacheSettings) -> Footprint {
+        let gathering = PathIntegrator::<F>::gather_scratch_with::<((), CausticMerging)>(settings.strata);
+        PathIntegrator::<F>::scratch_with::<((), CausticMerging), ()>(WAVE).or(gathering)
+    }
+
+    /// Irradiance caching of `context`, with empty caches.
+    ///
+    /// # Errors
+    /// [`OutOfMemory`] where `memory` has too little for the tables and [`CacheSettings::fewest`] records.
+    pub fn new(
+        context: &RenderContext<'a>,
+        settings: &CacheSettings,
+        memory: &mut impl MemorySource<'a>,
+    ) -> Result<Self, OutOfMemory> {
+        let mut arena = memory.take("gathering", settings.gathering_footprint())?;
+        let coarse = CellFlux::build(settings.coarse(), &mut arena)?;
+        let flux = [CellFlux::build(settings.strata, &mut arena)?, coarse];
+        let step = step_points(&mut arena)?;
+
+        let available = memory.available().saturating_sub(settings.reserve);
+        let wanted = (context.pixels() / PIXELS_PER_RECORD).max(FEWEST_RECORDS);
+        let wanted = wanted.saturating_add(settings.fewest);
+        let capacity = wanted.min(CacheBuilder::capacity_of(available / 2)).max(settings.fewest);
+        let bounds = context.bvh.bounds();
+        let mut builder = |index| {
+            let mut arena = memory.take("cache", CacheBuilder::footprint(capacity))?;
+            CacheBuilder::new(&bounds, capacity, index, &mut arena)
+        };
+        let builders = [builder(0)?, builder(1)?];
+        let usual = metric::Settings::new(settings.metric, 0.5 * bounds.diagonal());
+        let mut method = Self {
+            integrator: context.integrator(),
+            metric: metric::Settings { error: settings.error, ..usual },
+            flux,
+            size: [context.settings.width, context.settings.height],
+            builders,
+            step,
+            widens: settings.widens,
+            is_frozen: false,
+            is_cut: false,
+        };
+        // No surface reflects light onto the one that is seen.
+        if context.settings.max_depth <= 2 {
+            method.finish();
+        }
+        Ok(method)
+    }
+
+    /// Begins with the records of other caches of the scene, for which light was gathered at `gathered` points.
+    pub fn restore(&mut self, records: [&[Record]; 2], gathered: [u32; 2]) {
+        for ((builder, records), gathered) in self.builders.iter_mut().zip(records).zip(gathered) {
+            builder.restore(records, gathered);
+        }
+    }
+
+    /// Leaves the caches as they are.
+    pub fn finish(&mut self) {
+        self.builders.iter_mut().for_each(CacheBuilder::finish);
+    }
+
+    /// The caches of even and of odd samples.
+    pub fn caches(&self) -> [&IrradianceCache<'a>; 2] {
+        self.builders.each_ref().map(|builder| &builder.cache)
+    }
+
+    /// Points at which light was gathered for each of them.
+    pub fn gathered(&self) -> [u32; 2] {
+        self.builders.each_ref().map(CacheBuilder::gathered)
+    }
+
+    /// Whether both are frozen.
+    pub fn is_frozen(&self) -> bool {
+        self.is_frozen
+    }
+
+    /// Whether there was no time to fill them.
+    pub fn is_cut(&self) -> bool {
+        self.is_cut
+    }
+
+    /// Paths that ask no cache.
+    pub fn paths(&self) -> &PathIntegrator<'a, F> {
+        &self.integrator
+    }
+
+    /// Paths of the picture.
+    pub fn cached_paths(&self) -> PathIntegrator<'_, F, CacheView<'_>> {
+        self.integrator.with_caches(self.caches())
+    }
+
+    /// Whether cache `number` is as it will be.
+    pub fn is_filled(&self, number: usize) -> bool {
+        self.builders.get(number).is_none_or(CacheBuilder::is_finished)
+    }
+
+    /// Fills cache `number`, 0 or 1, or goes on with it. Gather rays end in `photons`, which paths of limited depth
+    /// must not ask for. Returns whether that is done.
+    ///
+    /// # Errors
+    /// [`OutOfMemory`] where the executor's scratch is too small.
+    pub fn fill<E: Executor>(
+        &mut self,
+        number: usize,
+        photons: Option<CausticMerging>,
+        round: &mut Round<E>,
+    ) -> Result<bool, OutOfMemory> {
+        let Some(builder) = self.builders.get_mut(number) else { return Ok(true) };
+        let mut placement = RecordPlacement {
+            integrator: &self.integrator,
+            photons,
+            flux: self.flux.each_ref(),
+            metric: self.metric,
+            least_pixels: LEAST_PIXELS,
+            size: self.size,
+            step: &mut *self.step,
+        };
+        let Round { executor, state, .. } = round;
+        let Passed { counters, is_complete } = executor.timed("cache", |executor| {
+            let fraction = TIME * (number as f32 + 1.0);
+            executor.within(fraction, |executor| placement.fill(builder, executor))
+        })?;
+        state.counters += counters;
+        if is_complete || executor.is_over() {
+            return Ok(is_complete);
+        }
+        if self.widens {
+            state.counters += placement.widen(builder, *executor)?.counters;
+        }
+        builder.finish();
+        self.is_cut = true;
+        Ok(true)
+    }
+
+    /// Ends the filling of both caches.
+    pub fn freeze(&mut self) {
+        self.builders.iter_mut().for_each(|builder| builder.cache.rebuild());
+        self.is_frozen = true;
+    }
+}
+
+impl<F: Features> Method for IrradianceCaching<'_, F> {
+    fn round<E: Executor>(&mut self, round: &mut Round<E>) -> Result<(), OutOfMemory> {
+        if !self.is_frozen {
+            if !(self.fill(0, None, round)? && self.fill(1, None, round)?) {
+                return Ok(());
+            }
+            self.freeze();
+        }
+        let integrator = self.cached_paths();
+        round.tiles(u32::MAX, |tile, samples, scratch, pixels| {
+            integrator.run(tile, samples, WAVE, scratch, pixels)
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bsdf::DiffuseOnly;
+    use crate::memory::{Buffer, Line};
+    use crate::method::closed_box::{SIDE, cornell, furnace, with_box};
+    use crate::method::{Loop, RenderState, Shard};
+    use crate::scene::Material;
+    use std::vec;
+    use std::vec::Vec;
+
+    type Caching<'a> = IrradianceCaching<'a, DiffuseOnly>;
+
+    const SETTINGS: CacheSettings = CacheSettings {
+        metric: Metric::Halflight,
+        error: 1e-4,
+        strata: 8,
+        fewest: 1000,
+        reserve: 0,
+        widens: true,
+    };
+
+    fn lines() -> usize {
+        let caches = CacheBuilder::footprint(SETTINGS.fewest);
+        let film = RenderState::footprint(SIDE, SIDE);
+        let all = Caching::scratch(&SETTINGS).and(film).and(SETTINGS.gathering_footprint());
+        all.and(caches).and(caches).bytes() / 64
+    }
+
+    /// Renders in `lines` lines of memory, in rounds to these numbers of samples, `step` samples of a tile at a time.
+    /// Returns the mean radiance of each pixel, and the number of records.
+    fn render(
+        materials: [Material; 4],
+        lines: usize,
+        rounds: &[u32],
+        step: u32,
+    ) -> Result<(Vec<[f32; 3]>, usize), OutOfMemory> {
+        let mut lines = vec![Line([0; 64]); lines];
+        with_box(materials, |context| {
+            let mut buffer = Buffer::new(bytemuck::cast_slice_mut(&mut lines));
+            let scratch = Caching::scratch(&SETTINGS);
+            let scratch = buffer.take("paths", scratch)?.slice::<u8>(scratch.bytes())?;
+            let mut film = buffer.take("film", RenderState::footprint(SIDE, SIDE))?;
+            let mut state = RenderState::new(SIDE, SIDE, Shard::WHOLE, &mut film)?;
+            let mut method = Caching::new(context, &SETTINGS, &mut buffer)?;
+            let mut executor = Loop::new(scratch);
+            for &target in rounds {
+                method.round(&mut Round { executor: &mut executor, state: &mut state, target, step })?;
+            }
+            assert_eq!(state.spp(), *rounds.last().unwrap());
+            let records = method.caches().map(|cache| cache.records().len());
+            assert!(records.iter().all(|records| (50..1000).contains(records)), "{records:?}");
+            let mean = |pixel: &crate::film::Pixel| pixel.mean().to_array();
+            Ok((state.film.pixels().iter().map(mean).collect(), records[0] + records[1]))
+        })
+    }
+
+    #[test]
+    fn a_cornell_box_has_the_same_bits_for_any_rounds_and_steps() {
+        let at_once = render(cornell(), lines(), &[6], 6).unwrap();
+        assert!(render(cornell(), lines(), &[1, 2, 6], 1).unwrap() == at_once);
+    }
+
+    #[test]
+    fn a_furnace_has_the_radiance_of_the_series() {
+        let (pixels, _) = render(furnace(), lines(), &[8], 8).unwrap();
+        let mean = pixels.iter().flatten().sum::<f32>() / (3 * pixels.len()) as f32;
+        assert!((mean / 2.0 - 1.0).abs() < 0.01, "{mean}");
+    }
+
+    #[test]
+    fn exact_memory_is_enough_and_a_line_less_is_an_error() {
+        assert!(render(cornell(), lines(), &[2], 2).is_ok());
+        for less in [1, 100, lines() / 2, lines()] {
+            assert!(render(cornell(), lines() - less, &[2], 2).is_err(), "{less}");
+        }
+    }
+}

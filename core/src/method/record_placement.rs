@@ -1,0 +1,434 @@
+//! Placement of the records of an irradiance cache, from coarse to fine (Krivanek, Bouatouch, Pattanaik and Zara 2006,
+//! section 5).
+//!
+//! The pixels of the picture come in an order that is spread evenly from its first pixel on. Where no record is valid,
+//! light is gathered, and the new records are committed in the order of their pixels. Sweeps are repeated: first for
+//! diffuse points that are seen directly or through mirrors and glass, then for those behind rough surfaces.
+
+use super::executor::{Executor, Passed};
+use crate::bsdf::Features;
+use crate::cache::irradiance::{CellFlux, IrradianceCache, Record, metric};
+use crate::geometry::Bounds;
+use crate::memory::{Arena, Footprint, OutOfMemory};
+use crate::transport::cached::gather::{GatherPoint, Gathering};
+use crate::transport::cached::placement::{PIXELS, ProgressiveOrder, Via};
+use crate::transport::{CausticMerging, Counters, PathIntegrator};
+
+/// Pixels along the side of the square of which one pixel is looked at.
+const STRIDE: u32 = 2;
+
+/// Pixels of a step: those of 16 tasks of [`PIXELS`].
+const STEP: usize = 16 * PIXELS;
+
+/// Records shrink when their neighbours clamp them, so sweeps are repeated, at most this many times, or until a sweep
+/// adds less than one record in [`FEW`]. Behind rough surfaces each sweep sees other points.
+const SWEEPS: u32 = 4;
+const FEW: usize = 50;
+
+/// The first gather rays end in no record, so they are long. After the first sweep the records that took more rays than
+/// this for each path, over the median, are gathered again.
+const LONG: f32 = 1.3;
+
+/// Gather points between two commits: a part of the records, within these limits. The first records soon serve others.
+const FEWEST_POINTS: usize = 8;
+const MOST_POINTS: usize = 32;
+const POINTS_PER_RECORD: usize = 4;
+
+/// The records of a cache that had no time become wider by this factor until they serve this share of the picture, or
+/// are this many times as wide.
+const WIDER: f32 = 1.3;
+const WIDEST: f32 = 6.0;
+const NEARLY_ALL: f64 = 0.98;
+
+/// A cache under construction.
+pub struct CacheBuilder<'m> {
+    /// Its records so far.
+    pub cache: IrradianceCache<'m>,
+    /// Which of independent caches: each looks at other samples of the pixels and gathers with other rays.
+    index: u32,
+    /// The points that this sweep looks for; `None` at the end.
+    via: Option<Via>,
+    /// Next step of the order.
+    next: u64,
+    /// Sweeps for these points that are done, and the records before the current sweep.
+    sweeps: u32,
+    before: usize,
+    /// Points at which light was gathered.
+    gathered: u32,
+    /// Records that came from elsewhere, which are first in the cache.
+    restored: usize,
+    /// Rays for each gather path, of each record.
+    efforts: &'m mut [f32],
+    /// Gather point of each record; [`GatherPoint::NONE`] of those that were restored.
+    points: &'m mut [GatherPoint],
+}
+
+impl<'m> CacheBuilder<'m> {
+    /// Bytes for `capacity` records.
+    pub fn footprint(capacity: usize) -> Footprint {
+        IrradianceCache::footprint(capacity).slice::<f32>(capacity).slice::<GatherPoint>(capacity)
+    }
+
+    /// How many records fit into `bytes`.
+    pub fn capacity_of(bytes: usize) -> usize {
+        let mut capacity = IrradianceCache::capacity_of(bytes);
+        while capacity > 0 && Self::footprint(capacity).bytes() > bytes {
+            capacity -= 1 + capacity / 64;
+        }
+        capacity
+    }
+
+    /// An empty cache, number 0 or 1, of a scene within `bounds`, with memory for `capacity` records.
+    ///
+    /// # Errors
+    /// [`OutOfMemory`] where `arena` has less than [`CacheBuilder::footprint`].
+    pub fn new(
+        bounds: &Bounds,
+        capacity: usize,
+        index: u32,
+        arena: &mut Arena<'m>,
+    ) -> Result<Self, OutOfMemory> {
+        Ok(Self {
+            cache: IrradianceCache::new(bounds, capacity, arena)?,
+            index,
+            via: Some(Via::Specular),
+            next: 0,
+            sweeps: 0,
+            before: 0,
+            gathered: 0,
+            restored: 0,
+            efforts: arena.slice(capacity)?,
+            points: arena.slice(capacity)?,
+        })
+    }
+
+    /// Begins with `records`, for which light was gathered at `gathered` points.
+    pub fn restore(&mut self, records: &[Record], gathered: u32) {
+        self.cache.restore(records);
+        self.restored = self.cache.records().len();
+        self.points.iter_mut().take(self.restored).for_each(|point| *point = GatherPoint::NONE);
+        self.gathered = gathered;
+    }
+
+    /// Begins again with the records that there are, their radii times `factor`, at most 1.
+    pub fn tighten(&mut self, factor: f32) {
+        self.cache.scale_radii(factor);
+        self.restored = self.cache.records().len();
+        (self.via, self.next, self.sweeps, self.before) = (Some(Via::Specular), 0, 0, self.restored);
+    }
+
+    /// Leaves the cache as it is.
+    pub fn finish(&mut self) {
+        self.via = None;
+    }
+
+    /// Whether no record will be added.
+    pub fn is_finished(&self) -> bool {
+        self.via.is_none() || self.cache.is_full()
+    }
+
+    /// Points at which light was gathered.
+    pub fn gathered(&self) -> u32 {
+        self.gathered
+    }
+
+    /// The points of the current sweep, and the sample of each pixel that finds them.
+    fn target(&self) -> Option<(u32, Via)> {
+        self.via.map(|via| match via {
+            Via::Specular => (self.index, via),
+            Via::Glossy => (self.index + 2 * self.sweeps, via),
+        })
+    }
+
+    /// Ends a sweep: another one follows, or the first for points behind rough surfaces, if the scene has any.
+    fn end_sweep(&mut self, has_rough: bool) {
+        (self.next, self.sweeps) = (0, self.sweeps + 1);
+        let is_first = self.via == Some(Via::Specular) && self.sweeps == 1;
+        if is_first {
+            self.forget_long();
+        }
+        let records = self.cache.records().len();
+        let adds_few = (records - self.before.min(records)) * FEW < records;
+        self.before = records;
+        if !is_first && adds_few || self.sweeps == SWEEPS {
+            let is_next = has_rough && self.via == Some(Via::Specular);
+            (self.via, self.sweeps) = (is_next.then_some(Via::Glossy), 0);
+        }
+    }
+
+    /// Forgets the records whose gather rays were long. Their rays decide and not their light, so that no light is
+    /// preferred.
+    fn forget_long(&mut self) {
+        let Self { cache, restored, efforts, points, .. } = self;
+        let count = cache.records().len();
+        let median = efforts.get(*restored..count).and_then(median);
+        let most = LONG * median.unwrap_or(f32::INFINITY);
+        let is_kept = |index: usize| index < *restored || efforts.get(index).is_some_and(|&e| e <= most);
+        for (kept, index) in (0..count).filter(|&index| is_kept(index)).enumerate() {
+            points.copy_within(index..index + 1, kept);
+        }
+        cache.retain(is_kept);
+    }
+
+    /// Whether nothing is to be gathered at `point`, for records of at least `least_pixels` pixels.
+    fn is_served(&self, point: &GatherPoint, least_pixels: f32) -> bool {
+        self.cache.is_full() || point.is_confined(least_pixels) || self.cache.covers(&point.asker())
+    }
+
+    /// Commits the record of `point`.
+    fn insert(&mut self, record: Record, effort: f32, point: GatherPoint) {
+        let index = self.cache.records().len();
+        if self.cache.insert(record)
+            && let Some((of_effort, of_point)) = self.efforts.get_mut(index).zip(self.points.get_mut(index))
+        {
+            (*of_effort, *of_point) = (effort, point);
+        }
+    }
+}
+
+/// The value in the middle of positive `values`, the upper one of two; `None` of none.
+fn median(values: &[f32]) -> Option<f32> {
+    let below = |bits: u32| values.iter().filter(|value| value.to_bits() < bits).count();
+    // Positive floats are ordered as their bits: the largest number with no more than half of the values below it.
+    let largest = (0..31).rev().fold(0, |bits, bit| {
+        let more = bits | 1 << bit;
+        if below(more) <= values.len() / 2 { more } else { bits }
+    });
+    (!values.is_empty()).then(|| f32::from_bits(largest))
+}
+
+/// Bytes of [`step_points`].
+pub fn step_footprint() -> Footprint {
+    Footprint::default().slice::<GatherPoint>(STEP)
+}
+
+/// Memory for the points of a step.
+///
+/// # Errors
+/// [`OutOfMemory`] where `arena` has less than [`step_footprint`].
+pub fn step_points<'m>(arena: &mut Arena<'m>) -> Result<&'m mut [GatherPoint], OutOfMemory> {
+    arena.slice(STEP)
+}
+
+/// Places records for one picture.
+pub struct RecordPlacement<'p, 'a, F> {
+    /// Traces the camera rays and the gather rays.
+    pub integrator: &'p PathIntegrator<'a, F>,
+    /// Photons of caustics that gather rays merge with. Paths of limited depth must not have any.
+    pub photons: Option<CausticMerging<'p>>,
+    /// Tables of the strata of records that are seen, and of those behind rough surfaces, of which a pixel sees the mean.
+    pub flux: [&'p CellFlux<'p>; 2],
+    /// How far records are valid.
+    pub metric: metric::Settings,
+    /// Least radius of a record, in pixels.
+    pub least_pixels: f32,
+    /// Width and height of the picture.
+    pub size: [u32; 2],
+    /// [`step_points`].
+    pub step: &'p mut [GatherPoint],
+}
+
+impl<F: Features> RecordPlacement<'_, '_, F> {
+    /// Fills the cache of `builder`, or goes on with it. Incomplete where the executor ends it early.
+    ///
+    /// # Errors
+    /// [`OutOfMemory`] where scratch has less than [`PathIntegrator::gather_scratch_with`].
+    pub fn fill(
+        &mut self,
+        builder: &mut CacheBuilder,
+        executor: &mut impl Executor,
+    ) -> Result<Passed, OutOfMemory> {
+        let mut counters = Counters::default();
+        let order = self.order();
+        let least_pixels = self.least_pixels;
+        // With a limit of depth only points that are seen ask for records.
+        let has_rough = self.integrator.has_rough_surfaces() && !self.integrator.is_limited();
+        while let Some(target) = builder.target()
+            && !builder.is_finished()
+        {
+            if builder.next >= order.len() {
+                builder.end_sweep(has_rough);
+                continue;
+            }
+            let is_missing = |point: &GatherPoint| !builder.is_served(point, least_pixels);
+            let Some(mut end) = self.look(builder.next, target, &is_missing, executor, &mut counters)? else {
+                return Ok(Passed { counters, is_complete: false });
+            };
+            let mut first = 0;
+            while first < end {
+                let missing = self.step.get_mut(first..end).unwrap_or_default();
+                end = first + retain(missing, |point| !builder.is_served(point, least_pixels));
+                let most = builder.cache.records().len() / POINTS_PER_RECORD;
+                let next = end.min(first + most.clamp(FEWEST_POINTS, MOST_POINTS));
+                if !self.gather(first..next, builder, executor, &mut counters)? {
+                    return Ok(Passed { counters, is_complete: false });
+                }
+                first = next;
+            }
+            builder.next += STEP as u64;
+        }
+        Ok(Passed { counters, is_complete: true })
+    }
+
+    /// Makes all records wider, by the same factor, until they serve nearly all that the camera sees or are
+    /// [`WIDEST`] times as wide. A cache that had no time is coarse everywhere rather than good in places.
+    ///
+    /// # Errors
+    /// Those of [`Executor::pass`].
+    pub fn widen(
+        &mut self,
+        builder: &mut CacheBuilder,
+        executor: &mut impl Executor,
+    ) -> Result<Passed, OutOfMemory> {
+        let mut counters = Counters::default();
+        let mut factor = 1.0;
+        while factor < WIDEST
+            && !builder.cache.records().is_empty()
+            && self.served(builder, executor, &mut counters)?.is_some_and(|served| served < NEARLY_ALL)
+        {
+            factor *= WIDER;
+            let integrator = self.integrator;
+            let records = builder.cache.records_mut().iter_mut().zip(&*builder.points);
+            let passed = executor.pass(records, |_, (record, point), _| {
+                let mut counters = Counters::default();
+                if point.is_some() {
+                    *record = integrator.widened(record, point, WIDER, &mut counters);
+                }
+                Ok(counters)
+            })?;
+            builder.cache.rebuild();
+            counters += passed.counters;
+            if !passed.is_complete {
+                return Ok(Passed { counters, is_complete: false });
+            }
+        }
+        Ok(Passed { counters, is_complete: true })
+    }
+
+    fn order(&self) -> ProgressiveOrder {
+        let [width, height] = self.size;
+        ProgressiveOrder::new(width, height, STRIDE)
+    }
+
+    /// The share of the points that the camera sees which records serve, by the last step of the order; `None` where
+    /// the executor ends it early, or the camera sees none.
+    fn served(
+        &mut self,
+        builder: &CacheBuilder,
+        executor: &mut impl Executor,
+        counters: &mut Counters,
+    ) -> Result<Option<f64>, OutOfMemory> {
+        let first = self.order().len().saturating_sub(STEP as u64);
+        let target = (builder.index, Via::Specular);
+        let Some(count) = self.look(first, target, &|_| true, executor, counters)? else { return Ok(None) };
+        let points = self.step.get(..count).unwrap_or_default();
+        let served = points.iter().filter(|point| builder.is_served(point, self.least_pixels)).count();
+        Ok((count > 0).then(|| served as f64 / count as f64))
+    }
+
+    /// Finds the points of the step that begins with pixel `first` of the order, as far as they are wanted, and returns
+    /// their number; `None` where the executor ends it early.
+    fn look(
+        &mut self,
+        first: u64,
+        target: (u32, Via),
+        is_wanted: &(dyn Fn(&GatherPoint) -> bool + Sync),
+        executor: &mut impl Executor,
+        counters: &mut Counters,
+    ) -> Result<Option<usize>, OutOfMemory> {
+        let (order, integrator) = (self.order(), self.integrator);
+        let leave_out = |points: &mut [GatherPoint]| {
+            points.iter_mut().filter(|point| !is_wanted(point)).for_each(|point| *point = GatherPoint::NONE);
+        };
+        let passed = executor.pass(self.step.chunks_mut(PIXELS), |task, points, _| {
+            let mut counters = Counters::default();
+            integrator.places(&order, first + (task * PIXELS) as u64, target, points, &mut counters);
+            leave_out(points);
+            integrator.look_up(points, &mut counters);
+            leave_out(points);
+            Ok(counters)
+        })?;
+        *counters += passed.counters;
+        Ok(passed.is_complete.then(|| retain(self.step, GatherPoint::is_some)))
+    }
+
+    /// Gathers at these points of the step, at most [`MOST_POINTS`], and commits the records in their order. Returns
+    /// whether that is done.
+    fn gather(
+        &self,
+        points: core::ops::Range<usize>,
+        builder: &mut CacheBuilder,
+        executor: &mut impl Executor,
+        counters: &mut Counters,
+    ) -> Result<bool, OutOfMemory> {
+        let points = self.step.get(points).unwrap_or_default();
+        let [flux, behind_rough] = self.flux;
+        let flux = if builder.via == Some(Via::Glossy) { behind_rough } else { flux };
+        let gathering = Gathering { flux, metric: self.metric, least_pixels: self.least_pixels };
+        // Gather rays end in the records that there are.
+        let integrator = self.integrator.with_growing_cache(&builder.cache);
+        let number = |point: usize| 2 * (builder.gathered + point as u32) + builder.index;
+        let mut found = [None; MOST_POINTS];
+        let passed = executor.pass(points.iter().zip(&mut found), |i, (point, found), worker| {
+            let mut counters = Counters::default();
+            let scratch = &mut worker.scratch;
+            let record = match self.photons {
+                Some(photons) => {
+                    let integrator = integrator.with_caustics(photons);
+                    integrator.gather(point, number(i), &gathering, scratch, &mut counters)?
+                }
+                None => integrator.gather(point, number(i), &gathering, scratch, &mut counters)?,
+            };
+            let effort = counters.rays as f32 / counters.paths.max(1) as f32;
+            *found = record.map(|record| (record, effort));
+            Ok(counters)
+        })?;
+        *counters += passed.counters;
+        if passed.is_complete {
+            builder.gathered += points.len() as u32;
+            for (found, point) in found.into_iter().zip(points) {
+                if let Some((record, effort)) = found {
+                    builder.insert(record, effort, *point);
+                }
+            }
+        }
+        Ok(passed.is_complete)
+    }
+}
+
+/// Moves the values that are to be kept to the front, in their order, and returns their number.
+fn retain<T: Copy>(values: &mut [T], is_kept: impl Fn(&T) -> bool) -> usize {
+    let mut kept = 0;
+    for i in 0..values.len() {
+        if is_kept(&values[i]) {
+            values[kept] = values[i];
+            kept += 1;
+        }
+    }
+    kept
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_median_is_that_of_a_sort() {
+        let mut values = [3.5, 1.0, 2.0, 7.25, 2.0, 0.0, 1e-30, 1e30];
+        for count in 1..=values.len() {
+            let found = median(&values[..count]);
+            let mut sorted = values;
+            sorted[..count].sort_by(f32::total_cmp);
+            assert_eq!(found, Some(sorted[count / 2]), "{count}");
+        }
+        values.fill(f32::INFINITY);
+        assert_eq!((median(&values), median(&[])), (Some(f32::INFINITY), None));
+    }
+
+    #[test]
+    fn values_that_are_kept_keep_their_order() {
+        let mut values = [5, 2, 8, 3, 4, 7];
+        let kept = retain(&mut values, |value| value % 2 == 0);
+        assert_eq!(values[..kept], [2, 8, 4]);
+    }
+}
