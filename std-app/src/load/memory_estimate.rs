@@ -9,10 +9,12 @@ use halflight_core::sampling::mix;
 use halflight_core::scene::{Material, Surface};
 use rayon::prelude::*;
 
-/// Bytes for each byte of text: itself, decoded.
+/// Bytes for each byte of text: itself, decoded, cleaned, and spare capacity.
 const TEXT: usize = 4;
-/// For each `v`, `vt` and `vn`: in its piece, and in the list of all pieces.
+/// For each `v`, `vt` and `vn`, in each of the workers.
 const VERTEX: usize = 80;
+/// Workers that read an OBJ file, each a megabyte of faces or more.
+const WORKERS: usize = 4;
 /// For each corner of a face: read, as an index, and in a triangle.
 const CORNER: usize = 50;
 /// For each corner that is a vertex of its own.
@@ -59,9 +61,10 @@ pub(super) fn of_obj(text: &[u8]) -> usize {
     let lines = text.par_split(|&b| matches!(b, b'\n' | b'\r'));
     let [vertices, corners, relative, runs, notes] =
         lines.fold(Counts::default, count).reduce(Counts::default, sum);
+    let workers = (1 + (text.len() >> 20)).min(WORKERS);
     let unique = corners.min(relative + distinct.upper_bound());
     (text.len() * TEXT)
-        .saturating_add(VERTEX * vertices)
+        .saturating_add(workers * VERTEX * vertices)
         .saturating_add(CORNER * corners + UNIQUE * unique)
         .saturating_add(RUN * runs + NOTE * notes)
 }

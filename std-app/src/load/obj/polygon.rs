@@ -10,13 +10,16 @@ const MOST_CORNERS: usize = 4096;
 /// Cuts without an ear before the rest of a polygon that crosses itself is cut as a fan.
 const MOST_GUESSES: usize = 16;
 
-/// Triangles of consecutive faces. `arities`: number of corners of each face.
+/// Triangles of consecutive faces. `arities`: number of corners of each face; empty if all are triangles.
 pub(super) fn triangulate(
     positions: &[[f64; 3]],
     indices: &[u32],
     arities: &[u32],
     notes: &mut Notes,
 ) -> Vec<[u32; 3]> {
+    if arities.is_empty() {
+        return indices.as_chunks().0.to_vec();
+    }
     let mut triangles = Vec::with_capacity(indices.len() - 2 * arities.len());
     let mut rest = indices;
     for &arity in arities {

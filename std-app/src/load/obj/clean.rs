@@ -1,5 +1,5 @@
-//! Statements of a piece of an OBJ file: checked numbers, and faces of three or more corners whose indices
-//! are absolute and in range.
+//! The first stage: checks a piece of an OBJ file and rewrites it as plain ASCII for tobj. All numbers are
+//! valid; faces have three or more corners, absolute indices in range, and the same parts in every corner.
 
 use crate::load::error::LoadError;
 use crate::load::name::Name;
@@ -12,24 +12,26 @@ use std::path::Path;
 pub(super) type Counts = [usize; 3];
 
 /// Index of a texture coordinate or normal that a corner does not have.
-pub(super) const ABSENT: u32 = u32::MAX;
+const ABSENT: usize = 0;
+
+/// Statements that follow those of the file: texture coordinate and normal of corners that have none. A zero
+/// normal means flat shading.
+pub(super) const DEFAULTS: &[u8] = b"vt 0 0\nvn 0 0 0\n";
 
 /// Faces between two `usemtl` statements.
 #[derive(Debug, Default)]
 pub(super) struct Run {
     /// `None` continues the material of the previous run.
     pub(super) material: Option<Name>,
-    /// Indices of position, texture coordinate and normal, from 0.
-    pub(super) corners: Vec<[u32; 3]>,
-    /// Numbers of corners of the faces.
-    pub(super) arities: Vec<u32>,
+    /// `f` statements.
+    pub(super) faces: Vec<u8>,
 }
 
-/// Content of a piece.
+/// A clean piece.
 #[derive(Debug, Default)]
 pub(super) struct Piece {
-    /// Values of `v`, `vt` and `vn`.
-    pub(super) vertices: [Vec<[f64; 3]>; 3],
+    /// `v`, `vt` and `vn` statements.
+    pub(super) vertices: Vec<u8>,
     pub(super) runs: Vec<Run>,
     /// `mtllib` statements: line and operand.
     pub(super) libraries: Vec<(u32, Name)>,
@@ -67,26 +69,27 @@ pub(super) fn count(text: &[u8]) -> (Counts, u32) {
     (counts, lines.number())
 }
 
-/// Reads a piece that starts at `line`. `counts`: vertices before the piece, in it, and in the whole file.
-pub(super) fn read(file: &Path, text: &[u8], line: u32, counts: [Counts; 3]) -> Result<Piece, LoadError> {
-    let [before, own, total] = counts;
+/// Cleans a piece that starts at `line`. `counts`: vertices before the piece, and in the whole file.
+pub(super) fn clean(file: &Path, text: &[u8], line: u32, counts: [Counts; 2]) -> Result<Piece, LoadError> {
+    let [before, total] = counts;
     let piece = Piece {
-        vertices: own.map(Vec::with_capacity),
         runs: vec![Run::default()],
         notes: Notes::of(file.display().to_string()),
         ..Piece::default()
     };
-    let mut reader = Reader { indices: Indices { file, before, total }, piece };
-    Lines::new(text, line).try_for_each(|(number, line)| reader.line(number, line))?;
-    Ok(reader.piece)
+    let mut cleaner = Cleaner { indices: Indices { file, before, total }, corners: Vec::new(), piece };
+    Lines::new(text, line).try_for_each(|(number, line)| cleaner.line(number, line))?;
+    Ok(cleaner.piece)
 }
 
-struct Reader<'a> {
+struct Cleaner<'a> {
     indices: Indices<'a>,
+    /// Of the current face.
+    corners: Vec<[usize; 3]>,
     piece: Piece,
 }
 
-impl Reader<'_> {
+impl Cleaner<'_> {
     #[inline]
     fn line(&mut self, number: u32, line: &[u8]) -> Result<(), LoadError> {
         let mut operands = words(line);
@@ -99,7 +102,7 @@ impl Reader<'_> {
             b"usemtl" => {
                 let material = Some(operands.rest().into());
                 let runs = &mut self.piece.runs;
-                runs.pop_if(|run| run.arities.is_empty());
+                runs.pop_if(|run| run.faces.is_empty());
                 if runs.last().is_none_or(|run| run.material != material) {
                     runs.push(Run { material, ..Run::default() });
                 }
@@ -133,8 +136,9 @@ impl Reader<'_> {
     #[inline]
     fn vertex(&mut self, line: u32, kind: usize, operands: Words) -> Result<(), LoadError> {
         let VertexKind { keyword, needed, kept } = KINDS[kind];
-        let notes = &mut self.piece.notes;
+        let Piece { vertices, notes, .. } = &mut self.piece;
         let mut values = [0.0; 3];
+        vertices.extend_from_slice(keyword.as_bytes());
         let mut weight = 1.0;
         let mut count = 0;
         for word in operands {
@@ -145,8 +149,12 @@ impl Reader<'_> {
             };
             if count < kept {
                 values[count] = value;
+                vertices.push(b' ');
                 if value.is_nan() {
+                    vertices.extend_from_slice(b"nan");
                     notes.at(line, "number that is not finite: its faces are left out or lose their normals");
+                } else {
+                    vertices.extend_from_slice(word);
                 }
             } else if count == 3 {
                 weight = value;
@@ -162,6 +170,8 @@ impl Reader<'_> {
                 "the file may have been cut off here",
             ));
         }
+        (count..kept).for_each(|_| vertices.extend_from_slice(b" 0"));
+        vertices.push(b'\n');
         match (kind, count) {
             (POSITION, 4) if weight != 1.0 => {
                 notes.at(line, "weight of a `v` left out: only curves and free-form surfaces have weights");
@@ -173,37 +183,69 @@ impl Reader<'_> {
             _ => {}
         }
         self.indices.before[kind] += 1;
-        self.piece.vertices[kind].push(values);
         Ok(())
     }
 
     /// `f v/vt/vn ...`
     #[inline]
     fn face(&mut self, line: u32, operands: Words) -> Result<(), LoadError> {
-        let Piece { runs, notes, .. } = &mut self.piece;
-        let Some(run) = runs.last_mut() else { return Ok(()) };
-        let first = run.corners.len();
+        let Self { indices, corners, piece: Piece { runs, notes, .. } } = self;
+        let Some(Run { faces, .. }) = runs.last_mut() else { return Ok(()) };
+        corners.clear();
         for word in operands {
-            run.corners.push(self.indices.corner(line, word)?);
+            corners.push(indices.corner(line, word)?);
         }
-        let face = &mut run.corners[first..];
-        if face.len() < 3 {
+        if corners.len() < 3 {
             notes.at(line, "face with fewer than three corners left out");
-            run.corners.truncate(first);
             return Ok(());
         }
         let [without_uv, without_normal] =
-            [TEXCOORD, NORMAL].map(|part| face.iter().filter(|corner| corner[part] == ABSENT).count());
-        if (1..face.len()).contains(&without_uv) {
+            [TEXCOORD, NORMAL].map(|part| corners.iter().filter(|corner| corner[part] == ABSENT).count());
+        if (1..corners.len()).contains(&without_uv) {
             notes.at(line, "face with a texture coordinate in only some corners, 0 0 in the others");
         }
-        if (1..face.len()).contains(&without_normal) {
+        if (1..corners.len()).contains(&without_normal) {
             notes.at(line, "face with a normal in only some corners is shaded flat");
-            face.iter_mut().for_each(|corner| corner[NORMAL] = ABSENT);
+            corners.iter_mut().for_each(|corner| corner[NORMAL] = ABSENT);
         }
-        run.arities.push(face.len() as u32);
+        faces.push(b'f');
+        corners.iter().for_each(|corner| write_corner(faces, *corner, indices.total));
+        faces.push(b'\n');
         Ok(())
     }
+}
+
+/// Writes `v`, `v/vt`, `v//vn` or `v/vt/vn`: the parts that the file has, [`DEFAULTS`] for absent ones.
+#[inline]
+fn write_corner(out: &mut Vec<u8>, corner: [usize; 3], total: Counts) {
+    let or_default = |part: usize| if corner[part] == ABSENT { total[part] + 1 } else { corner[part] };
+    write_index(out, b' ', corner[POSITION]);
+    if total[TEXCOORD] > 0 {
+        write_index(out, b'/', or_default(TEXCOORD));
+    }
+    if total[NORMAL] > 0 {
+        if total[TEXCOORD] == 0 {
+            out.push(b'/');
+        }
+        write_index(out, b'/', or_default(NORMAL));
+    }
+}
+
+/// Writes a separator and a decimal number.
+#[inline]
+fn write_index(out: &mut Vec<u8>, separator: u8, mut index: usize) {
+    let mut digits = [0; 20];
+    let mut start = digits.len();
+    loop {
+        start -= 1;
+        digits[start] = b'0' + (index % 10) as u8;
+        index /= 10;
+        if index == 0 {
+            break;
+        }
+    }
+    out.push(separator);
+    out.extend_from_slice(&digits[start..]);
 }
 
 /// Counts of vertices, which resolve indices.
@@ -215,9 +257,9 @@ struct Indices<'a> {
 }
 
 impl Indices<'_> {
-    /// Indices from 0 of `v`, `v/vt`, `v//vn` or `v/vt/vn`; [`ABSENT`] for an absent part.
+    /// Indices from 1 of `v`, `v/vt`, `v//vn` or `v/vt/vn`; [`ABSENT`] for an absent part.
     #[inline]
-    fn corner(&self, line: u32, word: &[u8]) -> Result<[u32; 3], LoadError> {
+    fn corner(&self, line: u32, word: &[u8]) -> Result<[usize; 3], LoadError> {
         let mut corner = [ABSENT; 3];
         for (part, text) in word.split(|&b| b == b'/').enumerate() {
             if text.is_empty() && (1..3).contains(&part) {
@@ -230,11 +272,11 @@ impl Indices<'_> {
                 _ => return Err(self.bad_corner(line, word)),
             };
             let (before, total) = (self.before[part] as i64, self.total[part] as i64);
-            let number = if index < 0 { before + index } else { index - 1 };
-            if !(0..total).contains(&number) {
+            let number = if index < 0 { before + 1 + index } else { index };
+            if !(1..=total).contains(&number) {
                 return Err(self.out_of_range(line, word, part));
             }
-            corner[part] = number as u32;
+            corner[part] = number as usize;
         }
         Ok(corner)
     }
