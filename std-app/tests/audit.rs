@@ -1,4 +1,5 @@
-//! `render --audit`: what it says, and that it changes neither the picture nor what comes after an interruption.
+//! `render --audit`: what it says, and that it changes neither the picture nor what comes after an
+//! interruption.
 
 use crate::support::Folder;
 

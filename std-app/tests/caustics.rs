@@ -8,7 +8,8 @@ const ROOM: &str = "mtllib room.mtl\n\
     usemtl wall\nf 1 4 3 2\nf 5 6 7 8\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\n";
 const WALL: &str = "newmtl wall\nKd 0.6 0.6 0.6\n";
 
-/// Of some samples none meets the lamp by way of the glass, and the next one shines as bright as all that they have seen.
+/// Of some samples none meets the lamp by way of the glass, and the next one shines as bright as all that
+/// they have seen.
 #[test]
 fn a_lamp_in_glass_is_for_photons_by_any_seed() {
     let folder = Folder::new("bulb");

@@ -1,4 +1,5 @@
-//! The program as scripts and people run it: each test starts it as a process of its own, in a folder of its own.
+//! The program as scripts and people run it: each test starts it as a process of its own, in a folder of its
+//! own.
 
 mod audit;
 mod caustics;

@@ -1,5 +1,5 @@
-//! Renders in parts: killed and resumed, cut into shards and merged; the same bits, or a refusal with a reason.
-//! And renders that end by time or error.
+//! Renders in parts: killed and resumed, cut into shards and merged; the same bits, or a refusal with a
+//! reason. And renders that end by time or error.
 
 use crate::support::Folder;
 use core::time::Duration;
@@ -9,7 +9,8 @@ use std::path::Path;
 use std::process::Stdio;
 use std::time::Instant;
 
-/// Seconds by which a render may be late. More than the 50 ms of an idle machine: other tests run at the same time.
+/// Seconds by which a render may be late. More than the 50 ms of an idle machine: other tests run at the same
+/// time.
 const LATE: f64 = 0.25;
 
 /// Renders of which one has to be on time, on a machine that does other things.

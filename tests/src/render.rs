@@ -1,4 +1,5 @@
-//! Pictures by the renderer itself, with the settings that a test is about, and how far two of them are apart.
+//! Pictures by the renderer itself, with the settings that a test is about, and how far two of them are
+//! apart.
 
 use crate::statistics;
 use core::sync::atomic::AtomicBool;
@@ -6,7 +7,8 @@ use halflight::drive::{self, Method, RenderError, RenderResult, Settings, Stop};
 use halflight::save::Image;
 use halflight_core::scene::Scene;
 
-/// A square picture of `size` pixels across by `spp` samples, not audited; `change` has the last word on its settings.
+/// A square picture of `size` pixels across by `spp` samples, not audited; `change` has the last word on its
+/// settings.
 ///
 /// # Panics
 /// Where it cannot be rendered.

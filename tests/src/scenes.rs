@@ -183,8 +183,8 @@ pub fn cornell_box() -> SceneBuffers {
     scene
 }
 
-/// A lamp of `size` that faces something of `surface` at its back, and a floor that both shine on: a caustic where that
-/// throws the light, so large that paths find it as well.
+/// A lamp of `size` that faces something of `surface` at its back, and a floor that both shine on: a caustic
+/// where that throws the light, so large that paths find it as well.
 pub fn lamp_before(surface: Surface, size: f32) -> SceneBuffers {
     let camera = Camera::look_at(Vec3::new(0.0, 2.5, 3.0), Vec3::new(0.0, 0.0, 0.5), Vec3::Y, 40.0);
     let mut buffers = SceneBuffers::new(camera);
@@ -251,7 +251,8 @@ pub fn glass(roughness: f32) -> Surface {
     Surface::Dielectric { ior: 1.5, tint: Rgb::ONE, roughness: roughness.into() }
 }
 
-/// A bright room and a dark one, with a wall between them that is as thin as a thousandth; seen from the dark one.
+/// A bright room and a dark one, with a wall between them that is as thin as a thousandth; seen from the dark
+/// one.
 pub fn bright_and_dark() -> SceneBuffers {
     let camera = Camera::look_at(Vec3::new(0.52, 0.5, 0.95), Vec3::new(0.52, 0.45, 0.0), Vec3::Y, 80.0);
     let mut buffers = SceneBuffers::new(camera);
@@ -298,7 +299,8 @@ pub fn everything() -> SceneBuffers {
     scene
 }
 
-/// A unit room with a lamp of `opacity` and radiance `radiance` under its ceiling, which is behind the camera.
+/// A unit room with a lamp of `opacity` and radiance `radiance` under its ceiling, which is behind the
+/// camera.
 pub fn room_with_lamp(opacity: f32, radiance: f32) -> SceneBuffers {
     let camera = Camera::look_at(Vec3::new(0.5, 0.6, 0.05), Vec3::new(0.5, 0.2, 1.0), Vec3::Y, 60.0);
     let mut buffers = SceneBuffers::new(camera);

@@ -1,9 +1,10 @@
-//! The judge of random pictures: a t-test of every pixel over independent replicas, with the significance level
-//! shared out over the pixels (Šidák 1967).
+//! The judge of random pictures: a t-test of every pixel over independent replicas, with the significance
+//! level shared out over the pixels (Šidák 1967).
 
-use halflight_core::estimate::student_quantile;
+use core::f64::consts::FRAC_PI_2;
 
-/// The probability with which a test fails that should pass. Seeds are fixed, so it either does or never does.
+/// The probability with which a test fails that should pass. Seeds are fixed, so it either does or never
+/// does.
 pub const SIGNIFICANCE: f64 = 0.01;
 
 /// Relative rounding that even a picture without noise may have.
@@ -16,7 +17,7 @@ pub const ROUNDING: f64 = 2e-5;
 pub fn judge(replicas: &[Vec<f64>], expected: &[f64]) -> Result<(), String> {
     let count = replicas.len() as f64;
     let each = 1.0 - (1.0 - SIGNIFICANCE).powf(1.0 / (expected.len() + 1) as f64);
-    let limit = student_quantile(normal_quantile(0.5 * each), count - 1.0);
+    let limit = student_quantile(0.5 * each, replicas.len() as u32 - 1);
     let test = |name: &str, values: &dyn Fn(&Vec<f64>) -> f64, expected: f64| {
         let mean = replicas.iter().map(values).sum::<f64>() / count;
         let variance = replicas.iter().map(|r| (values(r) - mean).powi(2)).sum::<f64>() / (count - 1.0);
@@ -45,8 +46,8 @@ pub fn blocks(pixels: &[[f32; 3]], width: u32, size: u32) -> Vec<f64> {
     sums
 }
 
-/// Judges whether two lots of pictures have the same means: none of their values may be more than `widest` deviations
-/// apart (Welch's t).
+/// Judges whether two lots of pictures have the same means: none of their values may be more than `widest`
+/// deviations apart (Welch's t).
 ///
 /// # Errors
 /// The first value that is, in words.
@@ -61,6 +62,37 @@ pub fn agree(a: &[Vec<f64>], b: &[Vec<f64>], widest: f64) -> Result<(), String> 
     Ok(())
 }
 
+/// The same, where the values of `a` may have a bias of up to `allowed(i, b)` in value `i`, whose mean in the
+/// other lot is `b`. The significance level is shared out over the values and `comparisons` of this kind.
+///
+/// # Errors
+/// The worst value, in words.
+pub fn agree_within(
+    a: &[Vec<f64>],
+    b: &[Vec<f64>],
+    comparisons: usize,
+    allowed: impl Fn(usize, f64) -> f64,
+) -> Result<(), String> {
+    let count = comparisons * a[0].len();
+    let each = 1.0 - (1.0 - SIGNIFICANCE).powf(1.0 / count as f64);
+    let [of_a, of_b] = [a, b].map(|lot| (lot.len() - 1) as f64);
+    let moments = moments(a).into_iter().zip(moments(b)).enumerate();
+    let all = moments.map(|(i, ((a, va), (b, vb)))| {
+        // Welch 1947; at least those of the smaller lot.
+        let freedom = (va + vb).powi(2) / (va * va / of_a + vb * vb / of_b);
+        let widest = student_quantile(0.5 * each, freedom.max(of_a.min(of_b)) as u32);
+        let error = widest * (va + vb).sqrt() + ROUNDING * b.abs();
+        let limit = error + allowed(i, b);
+        let text = format!("value {i}: {a:.5} and {b:.5} ± {error:.5}, {:.5} allowed", allowed(i, b));
+        // Values without any light are equal.
+        let excess = if a == b { 0.0 } else { (a - b).abs() / limit };
+        (excess, text)
+    });
+    let (excess, text) = all.max_by(|a, b| a.0.total_cmp(&b.0)).unwrap_or_default();
+    // Also false for NaN.
+    if excess <= 1.0 { Ok(()) } else { Err(format!("{excess:.2} of the limit: {text}")) }
+}
+
 /// Mean and variance of the mean of each value.
 fn moments(pictures: &[Vec<f64>]) -> Vec<(f64, f64)> {
     let count = pictures.len() as f64;
@@ -72,21 +104,25 @@ fn moments(pictures: &[Vec<f64>]) -> Vec<(f64, f64)> {
     (0..pictures[0].len()).map(of).collect()
 }
 
-/// The value that a normal variable exceeds with probability `tail` < 0.02.
-fn normal_quantile(tail: f64) -> f64 {
-    let (mut low, mut high) = (2.0, 20.0);
+/// The value that Student's t with `freedom` degrees exceeds with probability `tail` < 0.5.
+fn student_quantile(tail: f64, freedom: u32) -> f64 {
+    // With t = √freedom cot φ the density is a power of sin φ.
+    let below = |angle: f64| {
+        let at = |i: u32| (angle * f64::from(i) / f64::from(STEPS)).sin().powi(freedom as i32 - 1);
+        let simpson = |i: u32| (if i % 2 == 1 { 4.0 } else { 2.0 }) * at(i);
+        angle * ((1..STEPS).map(simpson).sum::<f64>() + at(0) + at(STEPS)) / f64::from(3 * STEPS)
+    };
+    let wanted = 2.0 * below(FRAC_PI_2) * tail;
+    let (mut low, mut high) = (0.0, FRAC_PI_2);
     for _ in 0..60 {
         let middle = 0.5 * (low + high);
-        if normal_tail(middle) > tail { low = middle } else { high = middle }
+        if below(middle) < wanted { low = middle } else { high = middle }
     }
-    low
+    f64::from(freedom).sqrt() / low.tan()
 }
 
-/// Laplace's continued fraction for the upper tail of the normal distribution.
-fn normal_tail(z: f64) -> f64 {
-    let density = (-0.5 * z * z).exp() / core::f64::consts::TAU.sqrt();
-    density / (1..60).rev().fold(z, |fraction, i| z + f64::from(i) / fraction)
-}
+/// Steps of an integral, an even number.
+const STEPS: u32 = 256;
 
 #[cfg(test)]
 mod tests {
@@ -94,7 +130,29 @@ mod tests {
 
     #[test]
     fn quantiles_are_those_of_the_tables() {
-        assert!((normal_quantile(0.005) - 2.5758).abs() < 1e-4);
+        // Also far out, which series in the inverse of the degrees do not reach.
+        let table = [
+            (0.025, 1, 12.7062),
+            (0.005, 7, 3.4995),
+            (0.0005, 30, 3.6460),
+            (0.0005, 2, 31.599),
+            (0.025, 1000, 1.9623),
+        ];
+        for (tail, freedom, quantile) in table {
+            assert!((student_quantile(tail, freedom) / quantile - 1.0).abs() < 5e-5, "{freedom}");
+        }
+    }
+
+    #[test]
+    fn a_bias_up_to_what_is_allowed_is_none() {
+        let lot = |mean: f64| (0..16).map(|i| vec![mean + 0.001 * f64::from(i % 4)]).collect::<Vec<_>>();
+        let judged = |mean| agree_within(&lot(mean), &lot(1.0), 1, |_, b| 0.1 * b);
+        assert!(
+            judged(1.09).is_ok()
+                && judged(0.91).is_ok()
+                && judged(1.12).is_err()
+                && judged(f64::NAN).is_err()
+        );
     }
 
     #[test]

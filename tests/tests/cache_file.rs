@@ -1,5 +1,5 @@
-//! Irradiance caches in files: the same bits for the same view, fewer gatherings for another one, and a refusal where
-//! the scene or the settings are not those of the file.
+//! Irradiance caches in files: the same bits for the same view, fewer gatherings for another one, and a
+//! refusal where the scene or the settings are not those of the file.
 
 use core::sync::atomic::AtomicBool;
 use glam::Vec3;

@@ -1,14 +1,14 @@
-//! Path tracing joined with photons of caustics: right in the mean whatever the surfaces and lights, nothing counted
-//! twice, also beside records (`caustics_cached.rs`), the same bits on any number of threads, and none of it where there is
-//! no caustic.
+//! Path tracing merged with photons of caustics: unbiased for all surfaces and lights, also beside records
+//! (`caustics_cached.rs`), within the memory that is given, and absent where there is no caustic.
 
+use crate::table::scenes::everything_by_a_mirror;
 use glam::Vec3;
 use halflight::drive::{Checkpoint, Method, RenderResult, Settings};
 use halflight_core::bsdf::All;
 use halflight_core::bvh::Bvh;
 use halflight_core::film::Film;
 use halflight_core::light::{EmissionSampler, GuideStats, LightSampler};
-use halflight_core::memory::{Arena, Footprint, Line};
+use halflight_core::memory::Arena;
 use halflight_core::photon::{Photon, Photons};
 use halflight_core::scene::PointLight;
 use halflight_core::scene::{Camera, Material, Scene, Surface};
@@ -16,10 +16,11 @@ use halflight_core::transport::caustics::tracer::{CausticPhotonTracer, GuideSamp
 use halflight_core::transport::photon_mapping::deposit::{PhotonFilter, PhotonTracerSettings};
 use halflight_core::transport::{CausticMerging, PathIntegrator, PathSettings, RadiusSchedule, UNLIMITED};
 use halflight_core::{Level, Rgb};
+use halflight_tests::memory::TestArena;
 use halflight_tests::render::{has_photons, render};
 use halflight_tests::scenes::{
-    IN_THE_BRIGHT_ROOM, SceneBuffers, bright_and_dark, constant_environment, cornell_box, emitter,
-    everything, glass, in_a_room, lamp_before, lamp_over_ball, metal, varnished,
+    SceneBuffers, constant_environment, cornell_box, emitter, everything, glass, in_a_room, lamp_before,
+    lamp_over_ball, metal, varnished,
 };
 use halflight_tests::statistics::{agree, blocks};
 use std::time::Instant;
@@ -33,37 +34,29 @@ const BLOCK: u32 = 7;
 /// Independent pictures of each kind.
 const SEEDS: u32 = 16;
 
-/// Normal quantile for one error in ten thousand over all blocks and channels of all scenes (Šidák; 51 comparisons of 48
-/// values), with Student's wider tails of 2 × 15 degrees of freedom.
+/// Normal quantile for one error in ten thousand over all blocks and channels of all scenes (Šidák; 51
+/// comparisons of 48 values), with Student's wider tails of 2 × 15 degrees of freedom.
 const WIDEST: f64 = 6.8;
 
-fn lines(footprint: Footprint) -> Vec<Line> {
-    vec![Line([0; 64]); footprint.bytes() / 64]
-}
-
-fn arena(lines: &mut [Line]) -> Arena<'_> {
-    Arena::new(bytemuck::cast_slice_mut(lines))
-}
-
-/// Photons of a picture: tasks, the radius of discs in pixels, and whether they are those beside records of an irradiance
-/// cache. There, too, nothing is lost or counted twice where no record is.
+/// Photons of a picture: tasks, the radius of discs in pixels, and whether they are those beside records of
+/// an irradiance cache. There, too, nothing is lost or counted twice where no record is.
 type Shot = (usize, f32, bool);
 
 /// Blocks of pictures of `scene` by 16 samples, joined with photons if there are any.
 fn pictures(scene: &Scene, first: u32, (tasks, pixels, is_beside): Shot, max_depth: u32) -> Vec<Vec<f64>> {
     let level = Level::detect();
-    let mut bvh_lines = lines(Bvh::footprint(scene.mesh.triangles.len()));
-    let bvh = Bvh::build(&scene.mesh, &mut arena(&mut bvh_lines)).unwrap();
-    let mut light_lines = lines(LightSampler::footprint(scene).and(LightSampler::scratch(scene)));
-    let lights = LightSampler::build(scene, &mut arena(&mut light_lines)).unwrap();
-    let mut emission_lines = lines(EmissionSampler::footprint(&lights));
+    let mut bvh_memory = TestArena::new(Bvh::footprint(scene.mesh.triangles.len()));
+    let bvh = Bvh::build(&scene.mesh, &mut bvh_memory.arena()).unwrap();
+    let mut light_memory = TestArena::new(LightSampler::footprint(scene).and(LightSampler::scratch(scene)));
+    let lights = LightSampler::build(scene, &mut light_memory.arena()).unwrap();
+    let mut emission_memory = TestArena::new(EmissionSampler::footprint(&lights));
     let emission =
-        EmissionSampler::build(scene, &lights, &bvh.bounds(), &mut arena(&mut emission_lines)).unwrap();
+        EmissionSampler::build(scene, &lights, &bvh.bounds(), &mut emission_memory.arena()).unwrap();
     let paths = PathIntegrator::<All>::scratch_with::<((), CausticMerging), ()>(2048);
-    let mut scratch = lines(paths.or(CausticPhotonTracer::<All>::scratch()));
-    let mut scratch = arena(&mut scratch);
-    let mut film_lines = lines(Film::footprint(SIZE, SIZE));
-    let mut photon_lines = [0, 1].map(|_| lines(Photons::footprint(tasks * ROOM)));
+    let mut scratch_memory = TestArena::new(paths.or(CausticPhotonTracer::<All>::scratch()));
+    let mut scratch = scratch_memory.arena();
+    let mut film_memory = TestArena::new(Film::footprint(SIZE, SIZE));
+    let mut photon_memory = [0, 1].map(|_| TestArena::new(Photons::footprint(tasks * ROOM)));
     let one = |seed: u32| {
         let paths = (tasks * PATHS) as u32;
         let discs = RadiusSchedule::new((scene, &bvh), [SIZE; 2], level).of_pixels(pixels);
@@ -76,23 +69,22 @@ fn pictures(scene: &Scene, first: u32, (tasks, pixels, is_beside): Shot, max_dep
             level,
         );
         let shooter = shooter.beside_records(is_beside);
-        let [even, odd] = &mut photon_lines;
+        let [even, odd] = &mut photon_memory;
         let mut map = 0;
-        let mut shoot = |lines| {
-            let mut photons = Photons::new(tasks * ROOM, &mut arena(lines)).unwrap();
+        let maps = [even.arena(), odd.arena()].map(|mut arena| {
+            let mut photons = Photons::new(tasks * ROOM, &mut arena).unwrap();
             for (task, out) in photons.as_mut_slice().chunks_mut(ROOM).enumerate() {
                 assert_eq!(shooter.run(task, map, &mut scratch, out).unwrap().dropped.total(), 0);
             }
             map += 1;
             photons.build(tasks * ROOM)
-        };
-        let maps = [shoot(even), shoot(odd)];
+        });
         let settings = PathSettings { width: SIZE, height: SIZE, seed, max_depth };
         let tracer = PathIntegrator::<All>::new(scene, &bvh, &lights, settings, level);
         let merging = CausticMerging::new([&maps[0], &maps[1]], &emission, discs, paths);
         let merging = tracer.with_caustics(merging.beside_records(is_beside));
         assert!(tasks <= 1 || is_beside || !maps[0].is_empty());
-        let mut film = Film::new(SIZE, SIZE, &mut arena(&mut film_lines)).unwrap();
+        let mut film = Film::new(SIZE, SIZE, &mut film_memory.arena()).unwrap();
         film.pixels_mut().fill(Default::default());
         for (task, out) in film.pixels_mut().chunks_mut(halflight_core::film::PIXELS_PER_TILE).enumerate() {
             let counters = match tasks {
@@ -107,7 +99,7 @@ fn pictures(scene: &Scene, first: u32, (tasks, pixels, is_beside): Shot, max_dep
     (first..first + SEEDS).map(one).collect()
 }
 
-fn is_right_in_the_mean(name: &str, buffers: &SceneBuffers, max_depth: u32) {
+fn assert_unbiased(name: &str, buffers: &SceneBuffers, max_depth: u32) {
     let scene = buffers.scene();
     let off = pictures(&scene, 0, (0, 0.3, false), max_depth);
     // Photons against paths from a hundredth to a hundred and more.
@@ -117,8 +109,9 @@ fn is_right_in_the_mean(name: &str, buffers: &SceneBuffers, max_depth: u32) {
     }
 }
 
-/// A room of mirrors with a floor, a lamp on it that faces up, and a plate below the ceiling, right over the eye: light goes from
-/// the floor by a mirror to the plate, where discs are small, and from there by another to the floor again.
+/// A room of mirrors with a floor, a lamp on it that faces up, and a plate below the ceiling, right over the
+/// eye: light goes from the floor by a mirror to the plate, where discs are small, and from there by another
+/// to the floor again.
 fn between_mirrors() -> SceneBuffers {
     let camera = Camera::look_at(Vec3::new(0.0, 2.7, 0.0), Vec3::new(0.1, 0.0, -0.1), Vec3::Z, 40.0);
     let mut buffers = SceneBuffers::new(camera);
@@ -134,38 +127,38 @@ fn between_mirrors() -> SceneBuffers {
 }
 
 #[test]
-fn what_a_mirror_throws_is_right_in_the_mean() {
-    is_right_in_the_mean("mirror", &lamp_before(metal(0.0), 0.6), UNLIMITED);
-    is_right_in_the_mean("mirror, limited", &lamp_before(metal(0.0), 0.6), 3);
-    is_right_in_the_mean("rough metal", &lamp_before(metal(0.5), 0.3), UNLIMITED);
+fn merging_is_unbiased_for_caustics_of_metal() {
+    assert_unbiased("mirror", &lamp_before(metal(0.0), 0.6), UNLIMITED);
+    assert_unbiased("mirror, limited", &lamp_before(metal(0.0), 0.6), 3);
+    assert_unbiased("rough metal", &lamp_before(metal(0.5), 0.3), UNLIMITED);
 }
 
 #[test]
-fn what_mirrors_throw_after_each_other_is_right_in_the_mean() {
-    is_right_in_the_mean("between mirrors", &between_mirrors(), UNLIMITED);
+fn merging_is_unbiased_for_chains_of_mirrors() {
+    assert_unbiased("between mirrors", &between_mirrors(), UNLIMITED);
 }
 
 #[test]
-fn what_glass_throws_is_right_in_the_mean() {
-    is_right_in_the_mean("glass", &lamp_over_ball(glass(0.0), 2.0), UNLIMITED);
-    is_right_in_the_mean("frosted glass", &lamp_over_ball(glass(0.4), 2.0), UNLIMITED);
+fn merging_is_unbiased_for_caustics_of_glass() {
+    assert_unbiased("glass", &lamp_over_ball(glass(0.0), 2.0), UNLIMITED);
+    assert_unbiased("frosted glass", &lamp_over_ball(glass(0.4), 2.0), UNLIMITED);
 }
 
 #[test]
-fn what_varnish_reflects_is_right_in_the_mean() {
+fn merging_is_unbiased_on_varnish() {
     // Its base is merged with photons, its coat is not: all that comes by both is found once.
-    is_right_in_the_mean("varnish", &varnished(lamp_over_ball(glass(0.0), 2.0), 0.2), UNLIMITED);
-    is_right_in_the_mean("varnish, limited", &varnished(in_a_room(lamp_before(metal(0.0), 0.6)), 0.3), 4);
+    assert_unbiased("varnish", &varnished(lamp_over_ball(glass(0.0), 2.0), 0.2), UNLIMITED);
+    assert_unbiased("varnish, limited", &varnished(in_a_room(lamp_before(metal(0.0), 0.6)), 0.3), 4);
     let room = varnished(in_a_room(lamp_before(metal(0.0), 0.6)), 0.3);
-    is_right_in_the_mean("varnished room", &room, UNLIMITED);
-    is_right_in_the_mean("along a varnished wall", &along_a_wall(room), UNLIMITED);
+    assert_unbiased("varnished room", &room, UNLIMITED);
+    assert_unbiased("along a varnished wall", &along_a_wall(room), UNLIMITED);
 }
 
 #[test]
-fn what_a_caustic_lights_is_right_in_the_mean() {
-    is_right_in_the_mean("mirror in a room", &in_a_room(lamp_before(metal(0.0), 0.6)), UNLIMITED);
-    is_right_in_the_mean("mirror in a room, limited", &in_a_room(lamp_before(metal(0.0), 0.6)), 4);
-    is_right_in_the_mean("glass in a room", &in_a_room(lamp_over_ball(glass(0.0), 1.0)), UNLIMITED);
+fn merging_is_unbiased_for_light_that_a_caustic_sends_on() {
+    assert_unbiased("mirror in a room", &in_a_room(lamp_before(metal(0.0), 0.6)), UNLIMITED);
+    assert_unbiased("mirror in a room, limited", &in_a_room(lamp_before(metal(0.0), 0.6)), 4);
+    assert_unbiased("glass in a room", &in_a_room(lamp_over_ball(glass(0.0), 1.0)), UNLIMITED);
 }
 
 /// The same room, seen from a hundredth before its right wall.
@@ -175,14 +168,14 @@ fn along_a_wall(mut buffers: SceneBuffers) -> SceneBuffers {
 }
 
 #[test]
-fn what_a_caustic_lights_before_the_eye_is_right_in_the_mean() {
+fn merging_is_unbiased_close_to_the_camera() {
     let room = along_a_wall(in_a_room(lamp_before(metal(0.0), 0.6)));
-    is_right_in_the_mean("along a wall", &room, UNLIMITED);
-    is_right_in_the_mean("along a wall, limited", &room, 4);
+    assert_unbiased("along a wall", &room, UNLIMITED);
+    assert_unbiased("along a wall, limited", &room, 4);
 }
 
 #[test]
-fn what_a_focus_lights_has_no_spikes() {
+fn light_from_a_focus_has_no_fireflies() {
     let mut buffers = in_a_room(lamp_over_ball(glass(0.0), 0.1));
     buffers.camera = Camera::look_at(Vec3::new(0.0, 2.0, 4.0), Vec3::new(0.0, 1.0, 0.0), Vec3::Y, 40.0);
     let scene = buffers.scene();
@@ -207,7 +200,7 @@ fn scatter(buffers: &SceneBuffers) -> f64 {
 }
 
 #[test]
-fn nor_has_it_before_the_eye() {
+fn merging_makes_no_fireflies_close_to_the_camera() {
     let all = scatter(&along_a_wall(in_a_room(lamp_over_ball(glass(0.0), 0.1))));
     // With discs as small as that wall is near: 0.20.
     assert!(all < 0.1, "{all}");
@@ -222,7 +215,7 @@ fn hang_a_mirror(room: &mut SceneBuffers) {
 }
 
 #[test]
-fn nor_has_it_in_a_mirror() {
+fn merging_makes_no_fireflies_in_a_mirror() {
     let mut buffers = in_a_room(lamp_over_ball(glass(0.0), 0.1));
     hang_a_mirror(&mut buffers);
     // It shows the wall right behind the camera, between lamp and ball.
@@ -233,9 +226,9 @@ fn nor_has_it_in_a_mirror() {
 }
 
 #[test]
-fn every_kind_of_surface_and_light_is_right_in_the_mean() {
+fn merging_is_unbiased_for_each_kind_of_surface_and_light() {
     let mut buffers = everything();
-    is_right_in_the_mean("everything", &buffers, UNLIMITED);
+    assert_unbiased("everything", &buffers, UNLIMITED);
     // Lights that rough metal and frosted glass alone can throw without photons.
     buffers = lamp_before(metal(0.5), 0.3);
     buffers.environment = constant_environment(0.3);
@@ -251,41 +244,24 @@ fn every_kind_of_surface_and_light_is_right_in_the_mean() {
         cos_inner,
         cos_outer,
     });
-    is_right_in_the_mean("lights without surface", &buffers, UNLIMITED);
+    assert_unbiased("lights without surface", &buffers, UNLIMITED);
 }
 
 fn path(scene: &Scene, spp: u32, change: impl FnOnce(&mut Settings)) -> RenderResult {
     render(scene, Method::Path, 40, spp, change)
 }
 
-/// Everything, and caustics that are worth photons: of a lamp that has no size, by a wide mirror.
-fn lit_by_a_mirror() -> SceneBuffers {
-    let mut buffers = everything();
-    let mirror = buffers.material(Material { surface: metal(0.0), ..Material::GREY });
-    buffers.square(Vec3::new(0.95, 0.4, 0.5), Vec3::NEG_X, 0.6, mirror);
-    buffers.normals.resize(buffers.positions.len(), [0.0; 3]);
-    let position = Vec3::new(0.5, 0.2, 0.3);
-    buffers.lights.push(PointLight::Point { position, intensity: Rgb::splat(0.2) });
-    buffers
-}
-
 #[test]
-fn bits_do_not_depend_on_threads_or_level_and_off_is_off() {
-    let buffers = lit_by_a_mirror();
+fn photons_can_be_turned_off() {
+    let buffers = everything_by_a_mirror();
     let scene = buffers.scene();
-    let one = path(&scene, 11, |s| s.threads = Some(1));
-    assert!(has_photons(&one), "{:?}", one.caustics);
-    assert_eq!(path(&scene, 11, |s| s.threads = Some(2)).image, one.image);
-    for level in Level::detect().and_below() {
-        assert_eq!(path(&scene, 11, |s| s.level = level).image, one.image, "{level:?}");
-    }
-    let off = path(&scene, 11, |s| s.caustics = false);
-    assert!(!has_photons(&off) && off.image != one.image);
+    let [on, off] = [true, false].map(|caustics| path(&scene, 3, |s| s.caustics = caustics));
+    assert!(has_photons(&on) && !has_photons(&off) && off.image != on.image, "{:?}", on.caustics);
 }
 
 #[test]
-fn little_memory_makes_few_photons_and_none_none_and_both_are_told() {
-    let buffers = lit_by_a_mirror();
+fn photons_fit_the_memory_and_their_lack_is_reported() {
+    let buffers = everything_by_a_mirror();
     let scene = buffers.scene();
     let map = |result: &RenderResult| result.photons.unwrap().caustic.unwrap();
     let bytes = |result: &RenderResult| {
@@ -310,7 +286,7 @@ fn little_memory_makes_few_photons_and_none_none_and_both_are_told() {
 }
 
 #[test]
-fn where_there_is_no_caustic_the_picture_is_that_without_photons() {
+fn without_caustics_photons_leave_the_bits_alone() {
     let boxed = cornell_box();
     // A mirror that no light reaches: it stands behind the wall.
     let mut hidden = cornell_box();
@@ -333,22 +309,7 @@ fn where_there_is_no_caustic_the_picture_is_that_without_photons() {
 }
 
 #[test]
-fn no_caustic_leaks_through_a_thin_wall() {
-    let mut buffers = bright_and_dark();
-    let mirror = buffers.material(Material { surface: metal(0.0), ..Material::GREY });
-    buffers.square(Vec3::new(0.1, 0.3, 0.5), Vec3::new(1.0, 1.0, 0.0).normalize(), 0.3, mirror);
-    // Paths never meet its light by the mirror.
-    let position = Vec3::new(0.3, 0.6, 0.5);
-    buffers.lights.push(PointLight::Point { position, intensity: Rgb::splat(0.3) });
-    let image = path(&buffers.scene(), 8, |_| ()).image;
-    assert_eq!(image.mean(), [0.0; 3], "the camera is in the dark room");
-    let camera = Camera { eye: IN_THE_BRIGHT_ROOM, ..buffers.camera };
-    let bright = path(&Scene { camera, ..buffers.scene() }, 8, |_| ());
-    assert!(has_photons(&bright) && bright.image.mean()[1] > 0.1);
-}
-
-#[test]
-fn where_all_light_is_caustics_photons_may_have_all_of_it_unless_paths_are_asked_for() {
+fn sppm_is_chosen_where_all_light_is_caustics() {
     let glass = Surface::Dielectric { ior: 1.5, tint: Rgb::ONE, roughness: 0.0.into() };
     let auto = |buffers: &SceneBuffers, spp, change: fn(&mut Settings)| {
         render(&buffers.scene(), Method::Path, 32, spp, |s| {
@@ -391,7 +352,7 @@ fn where_all_light_is_caustics_photons_may_have_all_of_it_unless_paths_are_asked
 }
 
 #[test]
-fn where_photons_of_all_light_would_miss_the_picture_paths_have_those_that_are_aimed() {
+fn path_tracing_is_chosen_where_few_photons_reach_the_picture() {
     // A small window in a large roof under the sun.
     let camera = Camera::look_at(Vec3::new(0.0, 1.0, 2.0), Vec3::ZERO, Vec3::Y, 40.0);
     let mut buffers = SceneBuffers::new(camera);
@@ -436,29 +397,29 @@ fn stadium(side: f32) -> SceneBuffers {
 const MIRRORED: f32 = 0.9;
 
 #[test]
-fn in_a_stadium_photons_go_to_the_glass_and_their_power_is_right() {
+fn guided_photons_reach_a_small_mirror_with_the_right_power() {
     let side = 1.0;
     let buffers = stadium(side);
     let scene = buffers.scene();
     let level = Level::detect();
-    let mut bvh_lines = lines(Bvh::footprint(scene.mesh.triangles.len()));
-    let bvh = Bvh::build(&scene.mesh, &mut arena(&mut bvh_lines)).unwrap();
-    let mut light_lines = lines(LightSampler::footprint(&scene).and(LightSampler::scratch(&scene)));
-    let lights = LightSampler::build(&scene, &mut arena(&mut light_lines)).unwrap();
+    let mut bvh_memory = TestArena::new(Bvh::footprint(scene.mesh.triangles.len()));
+    let bvh = Bvh::build(&scene.mesh, &mut bvh_memory.arena()).unwrap();
+    let mut light_memory = TestArena::new(LightSampler::footprint(&scene).and(LightSampler::scratch(&scene)));
+    let lights = LightSampler::build(&scene, &mut light_memory.arena()).unwrap();
     let guided = GuideStats::guide_footprint(&lights);
-    let mut all = lines(
+    let mut all = TestArena::new(
         EmissionSampler::footprint(&lights)
             .and(GuideStats::footprint(&lights))
             .and(guided)
             .and(guided)
             .and(guided),
     );
-    let mut memory = arena(&mut all);
+    let mut memory = all.arena();
     let plain = EmissionSampler::build(&scene, &lights, &bvh.bounds(), &mut memory).unwrap();
     let mut worth = GuideStats::aimed(&scene, &lights, &plain, &mut memory).unwrap().unwrap();
     let aimed = worth.guide(&plain, &mut memory).unwrap();
-    let mut scratch = lines(CausticPhotonTracer::<All>::scratch());
-    let mut scratch = arena(&mut scratch);
+    let mut scratch_memory = TestArena::new(CausticPhotonTracer::<All>::scratch());
+    let mut scratch = scratch_memory.arena();
     const TASKS: usize = 64;
     const MAPS: u32 = 16;
     // No further than to the caustic: what that lights is not of its power.

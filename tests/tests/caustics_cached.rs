@@ -1,7 +1,7 @@
-//! An irradiance cache beside photons of caustics: nothing is counted twice, the same bits on any number of threads, records
-//! come first where memory is short, and the audit asks the same photons.
+//! An irradiance cache beside photons of caustics: no light is counted twice, records come first where memory
+//! is short, and the audit merges the same photons.
 
-use halflight::drive::{Checkpoint, Method, RenderResult, Settings};
+use halflight::drive::{Method, RenderResult, Settings};
 use halflight_core::scene::Scene;
 use halflight_tests::render::{difference, has_photons, render, try_render};
 use halflight_tests::scenes::{SceneBuffers, glass, in_a_room, lamp_before, lamp_over_ball, metal};
@@ -18,7 +18,8 @@ fn cached(scene: &Scene, spp: u32, change: impl FnOnce(&mut Settings)) -> Render
     })
 }
 
-/// Whether a picture of `spp` samples with records and photons is that of paths, with the same `change` of settings.
+/// Whether a picture of `spp` samples with records and photons is that of paths, with the same `change` of
+/// settings.
 fn have_no_light_in_common(name: &str, buffers: &SceneBuffers, spp: u32, change: fn(&mut Settings)) {
     let scene = buffers.scene();
     let truth = path(&scene, 256, change);
@@ -33,7 +34,7 @@ fn have_no_light_in_common(name: &str, buffers: &SceneBuffers, spp: u32, change:
 }
 
 #[test]
-fn records_and_photons_have_no_light_in_common() {
+fn records_and_photons_count_no_light_twice() {
     let glass = in_a_room(lamp_over_ball(glass(0.0), 0.7));
     have_no_light_in_common("glass", &glass, 64, |_| ());
     have_no_light_in_common("mirror", &in_a_room(lamp_before(metal(0.0), 0.6)), 64, |_| ());
@@ -41,25 +42,20 @@ fn records_and_photons_have_no_light_in_common() {
 }
 
 #[test]
-fn beside_records_bits_are_the_same_and_off_is_off() {
+fn loaded_records_leave_the_bits_and_photons_can_be_turned_off() {
     let buffers = in_a_room(lamp_over_ball(glass(0.0), 0.3));
     let scene = buffers.scene();
-    let temporary = |name: &str| std::env::temp_dir().join(format!("{}-{name}", std::process::id()));
-    let [film, records] = ["cached-caustics.film", "cached-caustics.records"].map(temporary);
-    let one = cached(&scene, 11, |s| (s.threads, s.save_cache) = (Some(1), Some(records.clone())));
+    let records = std::env::temp_dir().join(format!("{}-cached-caustics.records", std::process::id()));
+    let one = cached(&scene, 3, |s| s.save_cache = Some(records.clone()));
     assert!(has_photons(&one), "{:?}", one.caustics);
-    assert_eq!(cached(&scene, 11, |s| s.threads = Some(2)).image, one.image);
-    assert_eq!(cached(&scene, 11, |s| s.load_cache = Some(records.clone())).image, one.image);
-    let keep = Some(Checkpoint { path: film.clone(), every: f64::INFINITY });
-    let _ = cached(&scene, 5, |s| s.checkpoint = keep.clone());
-    assert_eq!(cached(&scene, 11, |s| s.resume = Some(film.clone())).image, one.image);
-    let off = cached(&scene, 11, |s| s.caustics = false);
+    assert_eq!(cached(&scene, 3, |s| s.load_cache = Some(records.clone())).image, one.image);
+    let off = cached(&scene, 3, |s| s.caustics = false);
     assert!(!has_photons(&off) && off.image != one.image);
-    [film, records].into_iter().for_each(|file| std::fs::remove_file(file).unwrap());
+    std::fs::remove_file(records).unwrap();
 }
 
 #[test]
-fn beside_records_little_memory_is_enough() {
+fn photons_beside_records_fit_the_memory() {
     let buffers = in_a_room(lamp_over_ball(glass(0.0), 0.3));
     let scene = buffers.scene();
     let limited = |memory, caustics| {
@@ -79,7 +75,7 @@ fn beside_records_little_memory_is_enough() {
 }
 
 #[test]
-fn what_suffices_for_records_suffices_beside_photons_too() {
+fn photons_leave_enough_memory_for_records() {
     let buffers = in_a_room(lamp_over_ball(glass(0.0), 0.3));
     let scene = buffers.scene();
     let limited = |memory, caustics| {
@@ -107,9 +103,10 @@ fn what_suffices_for_records_suffices_beside_photons_too() {
     }
 }
 
-/// Rays of the audit in a room that is lit by a caustic hardly ever meet it by chance; joined with photons they do not have to.
+/// Rays of the audit in a room that is lit by a caustic hardly ever meet it by chance; joined with photons
+/// they do not have to.
 #[test]
-fn the_audit_asks_the_same_photons() {
+fn the_audit_merges_the_same_photons() {
     let buffers = in_a_room(lamp_over_ball(glass(0.0), 0.3));
     let scene = buffers.scene();
     let audited = |share, allowed| {

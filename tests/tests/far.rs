@@ -1,5 +1,5 @@
-//! Far away and large: grounds, suns and planets of 1e7 beside a cube of side 2, and cameras a million sizes away, show what smaller
-//! and nearer ones do.
+//! Far away and large: grounds, suns and planets of 1e7 beside a cube of side 2, and cameras a million sizes
+//! away, show what smaller and nearer ones do.
 
 use crate::load_support::Files;
 use core::fmt::Write;
@@ -75,7 +75,8 @@ fn picture(faces: &Faces, placed: &str, camera: &str, light: &str) -> Vec<f64> {
     result.image.pixels.iter().map(|pixel| f64::from(pixel[0])).collect()
 }
 
-/// The relative root of the mean square of their differences is small: noise of the same seed is mostly the same.
+/// The relative root of the mean square of their differences is small: noise of the same seed is mostly the
+/// same.
 fn alike(name: &str, a: &[f64], b: &[f64]) {
     let mean = b.iter().sum::<f64>() / b.len() as f64;
     let square = a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum::<f64>() / b.len() as f64;

@@ -1,7 +1,7 @@
 //! Golden table: pictures of every method, scene, seed and instruction set, to the bit.
 //!
-//! The renderer is deterministic, so that a change of structure leaves each row as it is. Rows change in commits
-//! that mend a fault or delete a mechanism, and those say so:
+//! The renderer is deterministic, so that a change of structure leaves each row as it is. Rows change in
+//! commits that mend a fault or delete a mechanism, and those say so:
 //!
 //!     GOLDEN=write cargo test --profile quick -p halflight-tests --test main golden::
 //!

@@ -1,5 +1,6 @@
-//! Rooms that are hard for an irradiance cache: its pictures against those of the path tracer where a wall is thin, where
-//! nothing reflects, where all light comes from one small place, and where a needle stands in the way.
+//! Rooms that are hard for an irradiance cache: its pictures against those of the path tracer where a wall is
+//! thin, where nothing reflects, where all light comes from one small place, and where a needle stands in the
+//! way.
 
 use glam::Vec3;
 use halflight::drive::Method;
@@ -8,6 +9,7 @@ use halflight_core::Rgb;
 use halflight_core::scene::{Camera, Material, Scene};
 use halflight_tests::render::{blocks_of, render};
 use halflight_tests::scenes::{SceneBuffers, constant_environment, cornell_box, emitter, metal};
+use halflight_tests::statistics::agree_within;
 
 const SIZE: u32 = 64;
 
@@ -17,25 +19,42 @@ fn picture(scene: &Scene, method: Method, spp: u32) -> Image {
     result.image
 }
 
-/// The cache's picture is the path tracer's: in the mean to `mean`, and in no block is the difference above `most` of its
-/// light and of a tenth of the mean.
-#[track_caller]
-fn agrees(scene: &Scene, mean: f64, most: f64) {
-    let (path, cache) = (picture(scene, Method::Path, 1024), picture(scene, Method::IrradianceCache, 128));
-    let [ratio, worst] = compared(&cache, &path, 4);
-    assert!((ratio - 1.0).abs() < mean && worst < most, "mean {ratio}, worst block {worst}");
-}
+/// Independent pictures that are judged together.
+const REPLICAS: u32 = 8;
 
-/// The mean over that of `reference`, and the largest difference of blocks over their light and a tenth of the mean.
-fn compared(image: &Image, reference: &Image, side: u32) -> [f64; 2] {
-    let (image, reference) = (blocks_of(image, side), blocks_of(reference, side));
-    let average = |blocks: &[f64]| blocks.iter().sum::<f64>() / blocks.len() as f64;
-    let mean = average(&reference);
-    let error = |(a, b): (&f64, &f64)| (a - b).abs() / (b + 0.1 * mean);
-    let worst = image.iter().zip(&reference).map(error).fold(0.0, f64::max);
-    let ratio = average(&image) / mean;
-    println!("mean {ratio:.4}, worst block {worst:.3}");
-    [ratio, worst]
+/// Comparisons of this kind in this file.
+const COMPARISONS: usize = 5;
+
+/// Largest bias of a block of 6 × 6 pixels: a share of its light and of a tenth of the mean. Interpolated
+/// light is wrong close to small things.
+const BIAS: f64 = 0.08;
+
+/// The same of the picture.
+const BIAS_OF_MEAN: f64 = 0.01;
+
+/// Means of blocks by the cache are those of path tracing, within the noise of both and a bias of `bias` for
+/// blocks and `bias_of_mean` for the picture.
+#[track_caller]
+fn agrees(scene: &Scene, bias: f64, bias_of_mean: f64) {
+    let values = |method, spp| -> Vec<Vec<f64>> {
+        let one = |seed| {
+            let result = render(scene, method, 48, spp, |s| (s.seed, s.cache.strata) = (seed, Some(16)));
+            assert_eq!(result.counters.dropped.total(), 0);
+            let mut values = blocks_of(&result.image, 6);
+            values.push(values.iter().sum::<f64>() / values.len() as f64);
+            values
+        };
+        (0..REPLICAS).map(one).collect()
+    };
+    let (path, cache) = (values(Method::Path, 128), values(Method::IrradianceCache, 16));
+    let (last, light) = (path[0].len() - 1, path[0][path[0].len() - 1]);
+    let allowed = |i: usize, b: f64| if i < last { bias * (b + 0.1 * light) } else { bias_of_mean * b };
+    let least = (0..100).map(|i| f64::from(i) / 200.0).find(|b| {
+        agree_within(&cache, &path, COMPARISONS, |i, l| if i < last { b * (l + 0.1 * light) } else { l })
+            .is_ok()
+    });
+    println!("bias of blocks {least:?}");
+    agree_within(&cache, &path, COMPARISONS, allowed).unwrap_or_else(|why| panic!("{why}"));
 }
 
 fn diffuse(reflectance: f32) -> Material {
@@ -56,20 +75,6 @@ fn lamp(buffers: &mut SceneBuffers, center: Vec3, normal: Vec3, size: f32, radia
     buffers.square(center, normal, size, lamp);
 }
 
-#[test]
-fn nothing_leaks_through_a_thin_wall() {
-    for thickness in [1e-3, 1e-4] {
-        let camera = Camera::look_at(Vec3::new(0.95, 0.5, 0.9), Vec3::new(0.5, 0.3, 0.2), Vec3::Y, 70.0);
-        let mut buffers = SceneBuffers::new(camera);
-        let wall = buffers.material(diffuse(0.8));
-        buffers.cuboid(Vec3::ZERO, Vec3::new(0.5, 1.0, 1.0), true, wall);
-        buffers.cuboid(Vec3::new(0.5 + thickness, 0.0, 0.0), Vec3::ONE, true, wall);
-        lamp(&mut buffers, Vec3::new(0.25, 0.99, 0.5), Vec3::NEG_Y, 0.3, 10.0);
-        let image = picture(&buffers.scene(), Method::IrradianceCache, 16);
-        assert!(image.pixels.iter().flatten().all(|&light| light == 0.0));
-    }
-}
-
 /// Light goes over a wall that is one sheet: records of both sides lie in the same place.
 #[test]
 fn a_sheet_between_light_and_dark_has_two_sides() {
@@ -78,11 +83,11 @@ fn a_sheet_between_light_and_dark_has_two_sides() {
     let corner = |x, y| Vec3::new(x, y, 0.5);
     buffers.quad([corner(0.0, 0.0), corner(1.0, 0.0), corner(1.0, 0.7), corner(0.0, 0.7)], sheet);
     lamp(&mut buffers, Vec3::new(0.5, 0.4, 0.02), Vec3::Z, 0.3, 10.0);
-    agrees(&buffers.scene(), 0.02, 0.25);
+    agrees(&buffers.scene(), BIAS, BIAS_OF_MEAN);
 }
 
 #[test]
-fn a_black_room_is_black_but_for_what_is_not() {
+fn a_black_room_has_no_indirect_light_except_on_white_boxes() {
     let mut buffers = room(0.0);
     lamp(&mut buffers, Vec3::new(0.5, 0.99, 0.5), Vec3::NEG_Y, 0.2, 10.0);
     let image = picture(&buffers.scene(), Method::IrradianceCache, 16);
@@ -91,19 +96,19 @@ fn a_black_room_is_black_but_for_what_is_not() {
     let white = buffers.material(diffuse(0.8));
     buffers.cuboid(Vec3::new(0.2, 0.0, 0.2), Vec3::new(0.5, 0.3, 0.5), false, white);
     buffers.cuboid(Vec3::new(0.6, 0.0, 0.1), Vec3::new(0.8, 0.5, 0.3), false, white);
-    agrees(&buffers.scene(), 0.02, 0.25);
+    agrees(&buffers.scene(), BIAS, BIAS_OF_MEAN);
 }
 
 /// It fills a hundredth of a hemisphere, so few of the 256 rays of a record.
 #[test]
-fn one_bright_place_lights_a_room() {
+fn a_small_bright_spot_lights_a_room() {
     let mut buffers = room(0.5);
     lamp(&mut buffers, Vec3::new(0.1, 0.6, 0.6), Vec3::NEG_X, 0.05, 1e3);
-    agrees(&buffers.scene(), 0.02, 0.25);
+    agrees(&buffers.scene(), BIAS, BIAS_OF_MEAN);
 }
 
-/// The first records have nothing but paths, whose light is luck where it comes by many bounces: they are gathered again when
-/// there are others.
+/// The first records have nothing but paths, whose light is luck where it comes by many bounces: they are
+/// gathered again when there are others.
 #[test]
 fn the_first_records_are_gathered_again() {
     let result = render(&cornell_box().scene(), Method::IrradianceCache, SIZE, 1, |settings| {
@@ -114,7 +119,8 @@ fn the_first_records_are_gathered_again() {
     assert!((0.05..0.5).contains(&again), "{again} of them");
 }
 
-/// Several points of lights are asked beside the ray that may meet the sky or the lamp: each kind by its weight.
+/// Several points of lights are asked beside the ray that may meet the sky or the lamp: each kind by its
+/// weight.
 #[test]
 fn a_court_under_a_sky_has_its_light_once() {
     let camera = Camera::look_at(Vec3::new(0.8, 1.2, 2.2), Vec3::new(0.0, 0.3, 0.0), Vec3::Y, 50.0);
@@ -131,7 +137,7 @@ fn a_court_under_a_sky_has_its_light_once() {
     let [few, more] = [1, 3].map(asked);
     let each = (more.shadow_rays - few.shadow_rays) as f64 / (more.paths - few.paths) as f64;
     assert!(each > 2.0, "{each} shadow rays for each path");
-    agrees(&scene, 0.004, 0.05);
+    agrees(&scene, 0.03, 0.003);
 }
 
 /// A wall of brushed metal is all that is seen: its light comes from where no pixel looks.
@@ -153,17 +159,17 @@ fn a_room_is_seen_in_brushed_metal() {
     let [few, many] = [&cache, &path].map(|result| result.error.unwrap().relmse);
     println!("{few:.2e} {many:.2e}, {:?}", cache.cache);
     assert!(few < 0.5 * many && cache.cache.unwrap().records > 50, "{few} {many}");
-    agrees(&scene, 0.02, 0.25);
+    agrees(&scene, BIAS, BIAS_OF_MEAN);
 }
 
 #[test]
-fn a_needle_stands_in_the_way() {
+fn thin_bars_cast_their_shadows() {
     let mut buffers = room(0.5);
     let needle = buffers.material(diffuse(0.1));
     buffers.cuboid(Vec3::new(0.4, 0.0, 0.3), Vec3::new(0.403, 0.9, 0.303), false, needle);
     buffers.cuboid(Vec3::new(0.2, 0.3, 0.2), Vec3::new(0.8, 0.302, 0.202), false, needle);
     lamp(&mut buffers, Vec3::new(0.5, 0.99, 0.5), Vec3::NEG_Y, 0.2, 10.0);
-    agrees(&buffers.scene(), 0.02, 0.25);
+    agrees(&buffers.scene(), BIAS, BIAS_OF_MEAN);
 }
 
 /// Rays along the wall pass under the board; what hangs over the wall is met by the strata.
@@ -176,7 +182,9 @@ fn a_slot_behind_a_board_is_dark_to_the_last_pixel() {
     lamp(&mut buffers, Vec3::new(0.5, 0.99, 0.5), Vec3::NEG_Y, 0.1, 80.0);
     let scene = buffers.scene();
     let (path, cache) = (picture(&scene, Method::Path, 1024), picture(&scene, Method::IrradianceCache, 128));
-    let [_, worst] = compared(&cache, &path, 1);
+    let mean = path.mean()[1];
+    let pairs = blocks_of(&cache, 1).into_iter().zip(blocks_of(&path, 1));
+    let worst = pairs.map(|(a, b)| (a - b).abs() / (b + 0.1 * mean)).fold(0.0, f64::max);
     // 0.19 to 0.27 with walls alone, 0.09 to 0.10 by what hangs.
     assert!(worst < 0.14, "worst pixel {worst}");
 }

@@ -9,8 +9,8 @@ use halflight_tests::scenes::{SceneBuffers, emitter};
 const SIZE: u32 = 32;
 const RADIANCE: f32 = 20.0;
 
-/// What a pixel sees of a strip is known to less than a fourteenth: of 2048 points, in two nets of 1024, at least 13 of
-/// each lie in a strip of a hundredth of the pixel and less than 16.
+/// What a pixel sees of a strip is known to less than a fourteenth: of 2048 points, in two nets of 1024, at
+/// least 13 of each lie in a strip of a hundredth of the pixel and less than 16.
 const TOLERANCE: f32 = 0.2;
 
 fn camera() -> Camera {
@@ -29,7 +29,8 @@ fn seen(scene: &SceneBuffers) -> Vec<f32> {
     picture.image.pixels.iter().map(|pixel| pixel[1] / RADIANCE).collect()
 }
 
-/// A lamp from a hundredth of a pixel before whole pixels to a hundredth behind them, of `pieces` by `pieces` squares.
+/// A lamp from a hundredth of a pixel before whole pixels to a hundredth behind them, of `pieces` by `pieces`
+/// squares.
 fn lamp(camera: Camera, pieces: u32) -> (SceneBuffers, [Vec2; 2]) {
     let mut scene = SceneBuffers::new(camera);
     let lamp = scene.material(emitter(0.0, RADIANCE));

@@ -1,5 +1,5 @@
-//! Lamps with holes: emission is there where the surface is, in every method. Their opacity is a probability, and so what
-//! is seen of them and what they send are in proportion to it.
+//! Lamps with holes: emission is there where the surface is, in every method. Their opacity is a probability,
+//! and so what is seen of them and what they send are in proportion to it.
 
 use glam::Vec3;
 use halflight::drive::{Method, Settings};

@@ -5,10 +5,11 @@ use crate::light_support::{Lamp, Stage, random_direction};
 use glam::{Mat3, Vec2, Vec3};
 use halflight_core::Rgb;
 use halflight_core::light::{LightSampler, emitted};
-use halflight_core::memory::{Arena, Line};
+use halflight_core::memory::Arena;
 use halflight_core::sampling::{Random, Sampler, warp};
 use halflight_core::scene::{Environment, PointLight};
 use halflight_core::scene::{Texels, Texture, TextureId, TextureTransform, Wrap};
+use halflight_tests::memory::TestArena;
 
 /// Standard errors that an estimate may be off.
 const SIGMAS: f64 = 4.0;
@@ -261,9 +262,9 @@ fn one_byte_less_is_an_error_and_nothing_needs_nothing() {
         PointLight::Directional { direction: Vec3::X, irradiance: Rgb::ONE },
     ];
     let scene = stage.scene();
-    let bytes = LightSampler::footprint(&scene).and(LightSampler::scratch(&scene)).bytes();
-    let mut lines = vec![Line([0; 64]); bytes / 64];
-    let memory: &mut [u8] = bytemuck::cast_slice_mut(&mut lines);
+    let footprint = LightSampler::footprint(&scene).and(LightSampler::scratch(&scene));
+    let mut memory = TestArena::new(footprint);
+    let (memory, bytes) = (memory.bytes(), footprint.bytes());
     assert!(LightSampler::build(&scene, &mut Arena::new(&mut memory[..bytes - 1])).is_err());
     assert!(LightSampler::build(&scene, &mut Arena::new(memory)).is_ok());
 

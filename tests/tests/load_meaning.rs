@@ -1,5 +1,5 @@
-//! Materials, texture coordinates and meshes that mean something else than the letter of the file: as exporters write
-//! them, and as they go wrong.
+//! Materials, texture coordinates and meshes that mean something else than the letter of the file: as
+//! exporters write them, and as they go wrong.
 
 use crate::load_support::{Files, bmp};
 use glam::Vec2;

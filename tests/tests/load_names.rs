@@ -1,5 +1,5 @@
-//! Names of materials and files as programs write them: with `#`, quotes, blanks and options, in Latin-1, in another
-//! case, with the folders of another machine.
+//! Names of materials and files as programs write them: with `#`, quotes, blanks and options, in Latin-1, in
+//! another case, with the folders of another machine.
 
 use crate::load_support::{Files, bmp};
 use halflight::load::LoadedScene;
@@ -115,7 +115,8 @@ fn the_library_of_the_same_name_has_what_others_lack() {
     assert_eq!(grey(b"", &[("other.mtl", own)]), [GREY; 2]);
 }
 
-/// The red byte of the texture of a square whose material has this statement, and the notes. `None` without texture.
+/// The red byte of the texture of a square whose material has this statement, and the notes. `None` without
+/// texture.
 fn texture(statement: &[u8], files: &[(&str, &[u8])]) -> (Option<u8>, Vec<String>) {
     let obj = join(&[b"mtllib sub/m.mtl\n", SQUARE, b"usemtl a\nf 1/1 2/1 3/1\n"]);
     let mtl = join(&[b"newmtl a\n", statement, b"\n"]);

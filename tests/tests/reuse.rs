@@ -1,17 +1,15 @@
-//! Pixels that share what their paths find: the picture is right in the mean, the noise is less, and nothing hangs on
-//! threads, waves or rounds.
+//! Pixels that share what their paths find: the picture is right in the mean, the noise is less, and nothing
+//! hangs on threads, waves or rounds.
 
 use core::sync::atomic::AtomicBool;
 use glam::Vec3;
 use halflight::drive::{self, RenderResult, Settings, Stop};
 use halflight_core::bsdf::All;
-use halflight_core::bvh::Bvh;
 use halflight_core::film::Film;
-use halflight_core::light::LightSampler;
-use halflight_core::memory::{Arena, Footprint, Line};
 use halflight_core::scene::{Material, Scene, Surface};
 use halflight_core::transport::{PathIntegrator, PathReuse, PathSettings, UNLIMITED};
 use halflight_core::{Level, Rgb};
+use halflight_tests::memory::{TestArena, with_structures};
 use halflight_tests::scenes::{SceneBuffers, cornell_box, emitter, everything};
 use halflight_tests::statistics::{agree, blocks};
 
@@ -24,8 +22,8 @@ const BLOCK: u32 = 7;
 /// Independent pictures of each kind.
 const SEEDS: u32 = 24;
 
-/// Normal quantile for one error in ten thousand over all blocks and channels of all scenes (Šidák; 6 scenes of 48
-/// values), with Student's wider tails of 2 × 23 degrees of freedom.
+/// Normal quantile for one error in ten thousand over all blocks and channels of all scenes (Šidák; at most 6
+/// scenes of 48 values), with Student's wider tails of 2 × 23 degrees of freedom.
 const WIDEST: f64 = 6.2;
 
 fn render(scene: &Scene, spp: u32, change: impl FnOnce(&mut Settings)) -> RenderResult {
@@ -47,7 +45,8 @@ fn black_and_white() -> SceneBuffers {
     scene
 }
 
-/// Coats of all kinds over colours, met from diffuse walls: what their bases send back is shared, what they mirror is not.
+/// Coats of all kinds over colours, met from diffuse walls: what their bases send back is shared, what they
+/// mirror is not.
 fn coated() -> SceneBuffers {
     let mut scene = cornell_box();
     let coat = |roughness: f32, metallic: f32, ior| Surface::Glossy {
@@ -67,7 +66,7 @@ fn coated() -> SceneBuffers {
     scene
 }
 
-fn is_right_in_the_mean(name: &str, buffers: &SceneBuffers, max_depth: Option<u32>) {
+fn assert_unbiased(name: &str, buffers: &SceneBuffers, max_depth: Option<u32>) {
     let scene = buffers.scene();
     let pictures = |reuse: bool, first: u32| -> Vec<Vec<f64>> {
         let one = |seed| {
@@ -84,17 +83,14 @@ fn is_right_in_the_mean(name: &str, buffers: &SceneBuffers, max_depth: Option<u3
 }
 
 #[test]
-fn sharing_is_right_in_the_mean() {
-    is_right_in_the_mean("box", &cornell_box(), None);
-    is_right_in_the_mean("black and white", &black_and_white(), None);
-    is_right_in_the_mean("everything", &everything(), None);
-    is_right_in_the_mean("coated", &coated(), None);
-    is_right_in_the_mean("one bounce", &cornell_box(), Some(3));
-    is_right_in_the_mean("everything, three bounces", &everything(), Some(5));
+fn reuse_is_unbiased_beside_black_surfaces_and_coats() {
+    assert_unbiased("black and white", &black_and_white(), None);
+    assert_unbiased("coated", &coated(), None);
+    assert_unbiased("coated, three bounces", &coated(), Some(5));
 }
 
 #[test]
-fn sharing_makes_less_noise() {
+fn reuse_halves_the_variance() {
     let buffers = cornell_box();
     let scene = buffers.scene();
     // Relative, so that the few pixels on the edge of the lamp do not speak for all.
@@ -110,53 +106,36 @@ fn sharing_makes_less_noise() {
 }
 
 #[test]
-fn bits_hang_on_neither_threads_nor_waves_nor_rounds() {
+fn bits_do_not_depend_on_waves_or_rounds() {
     for buffers in [cornell_box(), everything(), coated()] {
         let scene = buffers.scene();
-        let image = render(&scene, 8, |s| (s.threads, s.reuse) = (Some(1), Some(true))).image;
-        for threads in [2, 5] {
-            let other = render(&scene, 8, |s| (s.threads, s.reuse) = (Some(threads), Some(true))).image;
-            assert_eq!(other, image, "{threads} threads");
-        }
-        for level in Level::detect().and_below() {
-            let other = render(&scene, 8, |s| (s.level, s.reuse) = (level, Some(true))).image;
-            assert_eq!(other, image, "{level:?}");
-        }
-
         let settings = PathSettings { width: SIZE, height: SIZE, seed: 3, max_depth: UNLIMITED };
-        let mut bvh_lines = lines(Bvh::footprint(scene.mesh.triangles.len()));
-        let bvh = Bvh::build(&scene.mesh, &mut Arena::new(bytemuck::cast_slice_mut(&mut bvh_lines))).unwrap();
-        let mut light_lines = lines(LightSampler::footprint(&scene).and(LightSampler::scratch(&scene)));
-        let lights =
-            LightSampler::build(&scene, &mut Arena::new(bytemuck::cast_slice_mut(&mut light_lines))).unwrap();
-        let tracer =
-            PathIntegrator::<All>::new(&scene, &bvh, &lights, settings, Level::detect()).with_reuse();
-        let picture = |wave: usize, cuts: &[u32]| {
-            let mut scratch = lines(PathIntegrator::<All>::scratch_with::<(), PathReuse>(wave));
-            let mut scratch = Arena::new(bytemuck::cast_slice_mut(&mut scratch));
-            let mut film_lines = lines(Film::footprint(SIZE, SIZE));
-            let mut film =
-                Film::new(SIZE, SIZE, &mut Arena::new(bytemuck::cast_slice_mut(&mut film_lines))).unwrap();
-            for (task, pixels) in film.pixels_mut().chunks_mut(256).enumerate() {
-                for cut in cuts.windows(2) {
-                    tracer.run(task, cut[0]..cut[1], wave, &mut scratch, pixels).unwrap();
+        with_structures(&scene, |bvh, lights| {
+            let tracer =
+                PathIntegrator::<All>::new(&scene, bvh, lights, settings, Level::detect()).with_reuse();
+            let picture = |wave: usize, cuts: &[u32]| {
+                let mut scratch_memory =
+                    TestArena::new(PathIntegrator::<All>::scratch_with::<(), PathReuse>(wave));
+                let mut scratch = scratch_memory.arena();
+                let mut film_memory = TestArena::new(Film::footprint(SIZE, SIZE));
+                let mut film = Film::new(SIZE, SIZE, &mut film_memory.arena()).unwrap();
+                for (task, pixels) in film.pixels_mut().chunks_mut(256).enumerate() {
+                    for cut in cuts.windows(2) {
+                        tracer.run(task, cut[0]..cut[1], wave, &mut scratch, pixels).unwrap();
+                    }
                 }
+                film.pixels().to_vec()
+            };
+            let all = picture(2048, &[0, 40]);
+            for (wave, cuts) in [(1, [0, 40].as_slice()), (100, &[0, 1, 40]), (5000, &[0, 3, 33, 40])] {
+                assert!(picture(wave, cuts) == all, "waves of {wave}, rounds {cuts:?}");
             }
-            film.pixels().to_vec()
-        };
-        let all = picture(2048, &[0, 40]);
-        for (wave, cuts) in [(1, [0, 40].as_slice()), (100, &[0, 1, 40]), (5000, &[0, 3, 33, 40])] {
-            assert!(picture(wave, cuts) == all, "waves of {wave}, rounds {cuts:?}");
-        }
+        });
     }
 }
 
-fn lines(footprint: Footprint) -> Vec<Line> {
-    vec![Line([0; 64]); footprint.bytes() / 64]
-}
-
 #[test]
-fn a_look_at_a_few_tiles_tells_whether_it_pays() {
+fn reuse_is_chosen_where_it_pays() {
     let buffers = cornell_box();
     let scene = buffers.scene();
     let indirect = render(&scene, 4, |_| ()).reuse;
@@ -195,7 +174,7 @@ fn blocks_of(size: u32) -> impl Iterator<Item = [usize; 64]> {
 }
 
 #[test]
-fn no_lattice_shows() {
+fn reuse_leaves_no_lattice() {
     let buffers = cornell_box();
     let (size, seeds) = (64, 8);
     // The first circles alone, and two rounds of them.
@@ -227,14 +206,15 @@ fn no_lattice_shows() {
                 count += 1;
             }
             let ratio = ratios / f64::from(count);
-            // Every other pixel of a block: 12 for 2 x 2, 2.7 for 4 x 4. 400 and more degrees of freedom: ± 0.07.
+            // Every other pixel of a block: 12 for 2 x 2, 2.7 for 4 x 4. 400 and more degrees of freedom: ±
+            // 0.07.
             assert!(count >= 16 && ratio < 1.3, "{spp} samples, {side} x {side}: {ratio}, {count} blocks");
         }
     }
 }
 
 #[test]
-fn flashes_stay_with_their_pixels() {
+fn fireflies_are_not_shared() {
     // A mirror shows a small bright lamp to few paths.
     let mut buffers = cornell_box();
     let surface = Surface::Mirror { reflectance: Rgb::splat(0.9).into() };

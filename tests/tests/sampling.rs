@@ -1,8 +1,10 @@
 //! The sample streams: nets in every power-of-two prefix, no correlation between dimensions and pixels,
-//! errors that fall faster than those of independent samples; warps and distributions against their densities.
+//! errors that fall faster than those of independent samples; warps and distributions against their
+//! densities.
 
-use halflight_core::memory::{Arena, Line};
+use halflight_core::memory::Arena;
 use halflight_core::sampling::{AliasTable, Distribution2d, Random, Sampler, sin_cos_turns, warp};
+use halflight_tests::memory::TestArena;
 
 /// Normal quantile of a one-sided chance of 3e-5, for each chi-squared test here.
 const CHI_SQUARED_SIGMAS: f64 = 4.0;
@@ -118,7 +120,8 @@ fn mixed_projections_of_quads_are_nets_but_for_a_factor_of_two() {
 
 #[test]
 fn each_point_is_uniform_over_keys() {
-    // Of Owen-scrambled points every single one is uniform: sample 3 of many pixels, in 2 and in 4 dimensions.
+    // Of Owen-scrambled points every single one is uniform: sample 3 of many pixels, in 2 and in 4
+    // dimensions.
     let (mut squares, mut tesseracts) = (vec![0; 1024], vec![0; 4096]);
     for pixel in 0..200_000 {
         let sampler = Sampler::new(9, pixel, 6);
@@ -259,10 +262,6 @@ fn points_of_the_disk_find_where_they_came_from() {
     assert_eq!(warp::concentric_square(glam::Vec2::ZERO), [0.5; 2]);
 }
 
-fn memory(bytes: usize) -> Vec<Line> {
-    vec![Line([0; 64]); bytes / 64]
-}
-
 #[test]
 fn alias_tables_pick_by_weight() {
     let heavy_tail = |i: usize| 1.0 / (1.0 + i as f32).powi(2);
@@ -273,8 +272,8 @@ fn alias_tables_pick_by_weight() {
         [("heavy tail", &heavy_tail), ("holes", &holes), ("one", &one), ("broken", &broken)];
     for (name, weight) in weights {
         let count = 100;
-        let mut lines = memory(AliasTable::footprint(count).bytes());
-        let mut arena = Arena::new(bytemuck::cast_slice_mut(&mut lines));
+        let mut memory = TestArena::new(AliasTable::footprint(count));
+        let mut arena = memory.arena();
         let table = AliasTable::build(count, weight, &mut arena).expect("it fits");
         assert_eq!(arena.available(), 0);
         let n = 1 << 18;
@@ -294,8 +293,8 @@ fn alias_tables_pick_by_weight() {
             assert_expected(name, &counts, &expected);
         }
     }
-    let mut none = memory(0);
-    let table = AliasTable::build(0, |_| 1.0, &mut Arena::new(bytemuck::cast_slice_mut(&mut none)));
+    let mut none = TestArena::new(AliasTable::footprint(0));
+    let table = AliasTable::build(0, |_| 1.0, &mut none.arena());
     assert!(table.is_ok_and(|t| t.sample(0.5).is_none()));
 }
 
@@ -303,9 +302,9 @@ fn alias_tables_pick_by_weight() {
 fn grids_are_sampled_by_weight_and_know_their_density() {
     let weight = |x: usize, y: usize| if y == 2 { 0.0 } else { ((x * 7 + y * 3) % 11) as f32 };
     let (width, height) = (24, 10);
-    let footprint = Distribution2d::footprint(width, height).bytes();
-    let mut lines = memory(footprint);
-    let bytes: &mut [u8] = bytemuck::cast_slice_mut(&mut lines);
+    let footprint = Distribution2d::footprint(width, height);
+    let mut memory = TestArena::new(footprint);
+    let (bytes, footprint) = (memory.bytes(), footprint.bytes());
     assert!(
         Distribution2d::build(width, height, weight, &mut Arena::new(&mut bytes[..footprint - 1])).is_err()
     );

@@ -8,13 +8,13 @@ use halflight_core::bsdf::All;
 use halflight_core::bvh::Bvh;
 use halflight_core::cache::irradiance::{CellFlux, Metric, metric};
 use halflight_core::film::Film;
-use halflight_core::light::LightSampler;
-use halflight_core::memory::{Arena, Footprint, Line};
+use halflight_core::memory::Arena;
 use halflight_core::scene::Scene;
 use halflight_core::transport::cached::gather::{GatherPoint, Gathering};
 use halflight_core::transport::cached::placement::{PIXELS, ProgressiveOrder, Via};
 use halflight_core::transport::path::reference;
 use halflight_core::transport::{Counters, PathIntegrator, PathSettings, UNLIMITED};
+use halflight_tests::memory::{TestArena, with_structures};
 use halflight_tests::scenes::{cornell_box, everything, room_with_lamp};
 
 /// Mean radiance of the box, from 4 million paths that sampled the lamp uniformly by area.
@@ -25,10 +25,6 @@ fn render(scene: &Scene, size: u32, spp: u32, change: impl FnOnce(&mut Settings)
     let mut settings = Settings { width: size, height: size, stop, ..Settings::default() };
     change(&mut settings);
     drive::render(scene, &settings, &mut |_| (), &AtomicBool::new(false)).unwrap()
-}
-
-fn lines(footprint: Footprint) -> Vec<Line> {
-    vec![Line([0; 64]); footprint.bytes() / 64]
 }
 
 #[test]
@@ -43,46 +39,33 @@ fn the_cornell_box_has_the_light_it_had() {
 }
 
 #[test]
-fn bits_do_not_depend_on_threads_or_level() {
-    let scene = cornell_box();
-    let image = render(&scene.scene(), 40, 8, |s| s.threads = Some(1)).image;
-    assert!(image.pixels.iter().any(|p| p[0] > 0.0));
-    for threads in [2, 7] {
-        assert_eq!(render(&scene.scene(), 40, 8, |s| s.threads = Some(threads)).image, image);
-    }
-    for level in Level::detect().and_below() {
-        assert_eq!(render(&scene.scene(), 40, 8, |s| s.level = level).image, image, "{level:?}");
-    }
-}
-
-#[test]
 fn the_wavefront_is_the_textbook_to_the_bit_for_any_wave() {
     for buffers in [cornell_box(), everything(), room_with_lamp(0.3, 5.0)] {
         let scene = buffers.scene();
         let settings = PathSettings { width: 24, height: 20, seed: 3, max_depth: UNLIMITED };
         let samples = 0..3;
-        let mut bvh_lines = lines(Bvh::footprint(scene.mesh.triangles.len()));
-        let bvh = Bvh::build(&scene.mesh, &mut Arena::new(bytemuck::cast_slice_mut(&mut bvh_lines))).unwrap();
-        let mut light_lines = lines(LightSampler::footprint(&scene).and(LightSampler::scratch(&scene)));
-        let lights =
-            LightSampler::build(&scene, &mut Arena::new(bytemuck::cast_slice_mut(&mut light_lines))).unwrap();
-        let tracer = PathIntegrator::<All>::new(&scene, &bvh, &lights, settings, Level::detect());
-        for wave in [1, 100, 5000] {
-            let mut scratch = lines(PathIntegrator::<All>::scratch(wave));
-            let mut scratch = Arena::new(bytemuck::cast_slice_mut(&mut scratch));
-            let mut film_lines = lines(Film::footprint(24, 20));
-            let mut film =
-                Film::new(24, 20, &mut Arena::new(bytemuck::cast_slice_mut(&mut film_lines))).unwrap();
-            for (task, pixels) in film.pixels_mut().chunks_mut(256).enumerate() {
-                tracer.run(task, samples.clone(), wave, &mut scratch, pixels).unwrap();
+        with_structures(&scene, |bvh, lights| {
+            let tracer = PathIntegrator::<All>::new(&scene, bvh, lights, settings, Level::detect());
+            for wave in [1, 100, 5000] {
+                let mut scratch_memory = TestArena::new(PathIntegrator::<All>::scratch(wave));
+                let mut scratch = scratch_memory.arena();
+                let mut film_memory = TestArena::new(Film::footprint(24, 20));
+                let mut film = Film::new(24, 20, &mut film_memory.arena()).unwrap();
+                for (task, pixels) in film.pixels_mut().chunks_mut(256).enumerate() {
+                    tracer.run(task, samples.clone(), wave, &mut scratch, pixels).unwrap();
+                }
+                for (x, y) in (0..20).flat_map(|y| (0..24).map(move |x| (x, y))) {
+                    let [a, b, c] =
+                        [0, 1, 2].map(|s| reference::radiance(&scene, bvh, lights, &settings, [x, y], s));
+                    let pixel = film.pixel(x, y);
+                    assert_eq!(
+                        (pixel.even.sum(), pixel.odd.sum()),
+                        (a + c, b),
+                        "({x}, {y}) in waves of {wave}"
+                    );
+                }
             }
-            for (x, y) in (0..20).flat_map(|y| (0..24).map(move |x| (x, y))) {
-                let [a, b, c] =
-                    [0, 1, 2].map(|s| reference::radiance(&scene, &bvh, &lights, &settings, [x, y], s));
-                let pixel = film.pixel(x, y);
-                assert_eq!((pixel.even.sum(), pixel.odd.sum()), (a + c, b), "({x}, {y}) in waves of {wave}");
-            }
-        }
+        });
     }
 }
 
@@ -91,20 +74,17 @@ fn in_the_box(work: impl FnOnce(&PathIntegrator<All>)) {
     let buffers = cornell_box();
     let scene = buffers.scene();
     let settings = PathSettings { width: 16, height: 16, seed: 0, max_depth: UNLIMITED };
-    let mut bvh_lines = lines(Bvh::footprint(scene.mesh.triangles.len()));
-    let bvh = Bvh::build(&scene.mesh, &mut Arena::new(bytemuck::cast_slice_mut(&mut bvh_lines))).unwrap();
-    let mut light_lines = lines(LightSampler::footprint(&scene).and(LightSampler::scratch(&scene)));
-    let lights =
-        LightSampler::build(&scene, &mut Arena::new(bytemuck::cast_slice_mut(&mut light_lines))).unwrap();
-    work(&PathIntegrator::new(&scene, &bvh, &lights, settings, Level::detect()));
+    with_structures(&scene, |bvh, lights| {
+        work(&PathIntegrator::new(&scene, bvh, lights, settings, Level::detect()));
+    });
 }
 
 #[test]
 fn scratch_is_exactly_what_it_says() {
     in_the_box(|tracer| {
-        let mut scratch = lines(PathIntegrator::<All>::scratch(100));
+        let mut scratch = TestArena::new(PathIntegrator::<All>::scratch(100));
         let mut pixels = vec![Default::default(); 256];
-        let bytes: &mut [u8] = bytemuck::cast_slice_mut(&mut scratch);
+        let bytes = scratch.bytes();
         assert!(tracer.run(0, 0..1, 100, &mut Arena::new(bytes), &mut pixels).is_ok());
         let short = bytes.len() - 1;
         assert!(tracer.run(0, 0..1, 100, &mut Arena::new(&mut bytes[..short]), &mut pixels).is_err());
@@ -125,15 +105,14 @@ fn a_gathering_does_not_know_what_its_memory_was() {
         );
         let place = places.iter().find(|place| place.is_some()).unwrap();
         for n in [8, 16, 64] {
-            let mut tables = lines(CellFlux::footprint(n));
-            let flux = CellFlux::build(n, &mut Arena::new(bytemuck::cast_slice_mut(&mut tables))).unwrap();
+            let mut tables = TestArena::new(CellFlux::footprint(n));
+            let flux = CellFlux::build(n, &mut tables.arena()).unwrap();
             let metric = metric::Settings::new(Metric::Halflight, 1.0);
             let gathering = Gathering { flux: &flux, metric, least_pixels: 1.0 };
             let gather = |left_over: u8| {
-                let mut scratch = lines(PathIntegrator::<All>::gather_scratch(n));
-                scratch.fill(Line([left_over; 64]));
-                let mut arena = Arena::new(bytemuck::cast_slice_mut(&mut scratch));
-                let record = tracer.gather(place, 0, &gathering, &mut arena, &mut Counters::default());
+                let mut scratch = TestArena::filled(PathIntegrator::<All>::gather_scratch(n), left_over);
+                let scratch = &mut scratch.arena();
+                let record = tracer.gather(place, 0, &gathering, scratch, &mut Counters::default());
                 record.unwrap().unwrap()
             };
             assert_eq!(gather(0), gather(1), "{n}");

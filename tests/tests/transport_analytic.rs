@@ -107,7 +107,8 @@ fn all_lights_together_add_up() {
 #[test]
 fn cutouts_let_through_what_they_do_not_cover() {
     // Seen through a black sheet: the floor, lit through two more. The opacities are multiples of 1/64, the
-    // samples of a pixel, so that stratification makes them exact and the t-test is not fooled by rare events.
+    // samples of a pixel, so that stratification makes them exact and the t-test is not fooled by rare
+    // events.
     let mut scene = floor();
     let camera = scene.camera;
     let sheet = |opacity: f32| Material { opacity: opacity.into(), ..Material::diffuse(Rgb::ZERO) };

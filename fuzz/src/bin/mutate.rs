@@ -1,6 +1,6 @@
-//! The stable driver: `mutate TARGET [--seconds N] [--seed N]` runs a target over its corpus and then over
-//! seeded mutations of it. It sees no coverage, so it finds less than libFuzzer; it needs no nightly.
-//! The input that failed is left in `fuzz/artifacts/TARGET/`.
+//! The stable driver: `mutate TARGET [--seconds N] [--runs N] [--seed N]` runs a target over its corpus and
+//! then over seeded mutations of it, until one of both ends. It sees no coverage, so it finds less than
+//! libFuzzer; it needs no nightly. The input that failed is left in `fuzz/artifacts/TARGET/`.
 #![forbid(unsafe_code)]
 
 use halflight_fuzz::{TARGETS, Target};
@@ -22,17 +22,19 @@ fn main() -> ExitCode {
     let name = arguments.first().map_or("", |name| name);
     let Some(Target { name, run }) = TARGETS.iter().find(|target| target.name == name) else {
         let names: Vec<_> = TARGETS.iter().map(|target| target.name).collect();
-        eprintln!("mutate TARGET [--seconds N] [--seed N]; targets: {}", names.join(", "));
+        eprintln!("mutate TARGET [--seconds N] [--runs N] [--seed N]; targets: {}", names.join(", "));
         return ExitCode::from(2);
     };
     let home = Path::new(env!("CARGO_MANIFEST_DIR"));
     let corpus = files(&home.join("corpus").join(name));
     let mut random = Random(number("--seed", 1));
     let end = Instant::now() + Duration::from_secs(number("--seconds", 20));
+    // A negative number is none: no limit.
+    let most_runs = number("--runs", u64::MAX);
 
     let mut runs = 0u64;
     let mut inputs = corpus.iter().cloned();
-    while runs < corpus.len() as u64 || Instant::now() < end {
+    while runs < corpus.len() as u64 || runs < most_runs && Instant::now() < end {
         let input = inputs.next().unwrap_or_else(|| mutated(&corpus, &mut random));
         if panic::catch_unwind(|| run(&input)).is_err() {
             let folder = home.join("artifacts").join(name);

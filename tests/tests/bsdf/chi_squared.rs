@@ -1,7 +1,7 @@
-//! Pearson's chi-squared test of `sample` against the density of `evaluate`, for every BSDF and view. Bins lie
-//! around the direction where the lobe peaks, logarithmic in the angle from it, so that a lobe of alpha 1e-4
-//! fills as many of them as one of alpha 1. Delta samples and absorbed ones share one bin: its expectation is
-//! what the density leaves of 1.
+//! Pearson's chi-squared test of `sample` against the density of `evaluate`, for every BSDF and view. Bins
+//! lie around the direction where the lobe peaks, logarithmic in the angle from it, so that a lobe of alpha
+//! 1e-4 fills as many of them as one of alpha 1. Delta samples and absorbed ones share one bin: its
+//! expectation is what the density leaves of 1.
 
 use super::cases::{VIEWS, draw, scattering, view};
 use core::f64::consts::{SQRT_2, TAU};

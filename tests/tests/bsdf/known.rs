@@ -6,8 +6,8 @@ use halflight_core::Rgb;
 use halflight_core::bsdf::{All, Bsdf, DiffuseOnly};
 use halflight_core::scene::Surface;
 
-/// Base of `plastic` (alpha 0) and `roughplastic` (GGX) of Mitsuba 3.9.1, `nonlinear`, without its specular part:
-/// alpha, index, albedo, and f cos θ_i for (cos θ_o, cos θ_i) = (1, 0.8), (0.5, 0.5), (0.2, 0.7).
+/// Base of `plastic` (alpha 0) and `roughplastic` (GGX) of Mitsuba 3.9.1, `nonlinear`, without its specular
+/// part: alpha, index, albedo, and f cos θ_i for (cos θ_o, cos θ_i) = (1, 0.8), (0.5, 0.5), (0.2, 0.7).
 const MITSUBA: [(f32, f32, f32, [f32; 3]); 11] = [
     (0.0, 1.5, 0.5, [0.074032, 0.041820, 0.044282]),
     (0.0, 1.5, 1.0, [0.257647, 0.145542, 0.154110]),

@@ -70,8 +70,9 @@ fn everything() -> Vec<(String, Bsdf)> {
     all
 }
 
-/// Models of one lobe weigh at most 1; of two, the share of one may fall on the other, and directions from a coat
-/// are taken twice as often as its energy asks for, which doubles what the rare ones from the base weigh.
+/// Models of one lobe weigh at most 1; of two, the share of one may fall on the other, and directions from a
+/// coat are taken twice as often as its energy asks for, which doubles what the rare ones from the base
+/// weigh.
 const GREATEST_WEIGHT: f32 = 8.0;
 
 #[test]

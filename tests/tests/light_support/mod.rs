@@ -5,10 +5,10 @@ use halflight_core::Rgb;
 use halflight_core::bvh::brute::intersect;
 use halflight_core::geometry::Ray;
 use halflight_core::light::LightSampler;
-use halflight_core::memory::{Arena, Line};
 use halflight_core::sampling::{Random, warp};
 use halflight_core::scene::{Camera, Material, Mesh, Scene, Texture, Triangle};
 use halflight_core::scene::{Environment, PointLight};
+use halflight_tests::memory::TestArena;
 
 /// A flat light.
 #[derive(Clone)]
@@ -113,9 +113,9 @@ impl Stage {
     /// Calls `use_them` with the lights, built in an arena of exactly the stated bytes.
     pub(crate) fn with_lights<T>(&self, use_them: impl FnOnce(&Scene, &LightSampler) -> T) -> T {
         let scene = self.scene();
-        let bytes = LightSampler::footprint(&scene).and(LightSampler::scratch(&scene)).bytes();
-        let mut lines = vec![Line([0; 64]); bytes / 64];
-        let mut arena = Arena::new(bytemuck::cast_slice_mut(&mut lines));
+        let footprint = LightSampler::footprint(&scene).and(LightSampler::scratch(&scene));
+        let mut memory = TestArena::new(footprint);
+        let mut arena = memory.arena();
         let lights = LightSampler::build(&scene, &mut arena).expect("the footprint is what the build takes");
         assert_eq!(arena.available(), LightSampler::scratch(&scene).bytes(), "what is kept is the footprint");
         use_them(&scene, &lights)

@@ -9,8 +9,8 @@ use std::process::{Command, Stdio};
 /// Longest smoke run of a target; what is asked to run longer is a campaign.
 pub(crate) const SMOKE_SECONDS: u32 = 20;
 
-/// Runs of each target in a smoke run.
-const SMOKE_RUNS: i32 = 4000;
+/// Runs of each target in a smoke run: the corpus and some hundreds of mutations. Campaigns find more.
+const SMOKE_RUNS: i32 = 400;
 
 pub(crate) fn smoke(project: &Project) -> Outcome {
     let folder = project.root.join("fuzz");
@@ -23,7 +23,8 @@ pub(crate) fn smoke(project: &Project) -> Outcome {
     targets.sort();
 
     let coverage = has_cargo_fuzz();
-    // A smoke run ends after the same runs on every machine, so that it says the same; a campaign by the clock.
+    // A smoke run ends after the same runs on every machine, so that it says the same; a campaign by the
+    // clock.
     let runs = if seconds <= SMOKE_SECONDS { SMOKE_RUNS } else { -1 };
     for target in &targets {
         if coverage {
@@ -38,7 +39,7 @@ pub(crate) fn smoke(project: &Project) -> Outcome {
         } else {
             let line = format!(
                 "cargo run --quiet --release --locked --target-dir target/stable --no-default-features --features app --bin mutate -- \
-                 {target} --seconds {seconds} --seed 1"
+                 {target} --seconds {seconds} --runs {runs} --seed 1"
             );
             println!("{}", output(&mut fresh_cargo(&folder, &line))?);
         }

@@ -1,5 +1,6 @@
 //! Every check of the project in one program, the same for a person and for CI:
-//! `cargo verify [STEP…] [--allow-missing] [--fuzz-seconds N]`, all steps when none is named.
+//! `cargo verify [STEP…] [--allow-missing] [--fuzz-seconds N]`, all steps when none is named;
+//! `cargo verify quick` runs those that take a minute after a build.
 #![forbid(unsafe_code)]
 
 mod command;
@@ -18,7 +19,22 @@ struct Step {
     name: &'static str,
     what: &'static str,
     run: fn(&Project) -> Outcome,
+    when: When,
 }
+
+/// Which runs without the names of steps have a step.
+#[derive(Clone, Copy, PartialEq)]
+enum When {
+    /// All, and the quick one.
+    Always,
+    /// The whole one.
+    Whole,
+    /// The quick one: a part of a step of the whole one.
+    Quick,
+}
+
+/// The name of all quick steps.
+const QUICK: &str = "quick";
 
 /// One line that says what was done, or why it went wrong.
 type Outcome = Result<String, Failure>;
@@ -39,14 +55,20 @@ struct Project {
 }
 
 const STEPS: &[Step] = &[
-    Step { name: "source", what: "house rules that no compiler checks", run: source::check },
-    Step { name: "fmt", what: "rustfmt leaves every workspace as it is", run: quality::fmt },
-    Step { name: "clippy", what: "no warning in any workspace", run: quality::clippy },
-    Step { name: "test", what: "cargo test --release --workspace", run: quality::test },
-    Step { name: "docs", what: "rustdoc without a warning", run: quality::docs },
-    Step { name: "targets", what: "the tiny render on every target: same bits", run: targets::check },
-    Step { name: "fuzz", what: "a short run of every fuzz target", run: fuzz::smoke },
+    step("source", "house rules that no compiler checks", source::check, When::Always),
+    step("fmt", "rustfmt leaves every workspace as it is", quality::fmt, When::Always),
+    step("clippy", "no warning in any workspace", quality::clippy, When::Whole),
+    step("test", "cargo test --profile quick --workspace", quality::test, When::Whole),
+    step("docs", "rustdoc without a warning", quality::docs, When::Whole),
+    step("targets", "the tiny render on every target: same bits", targets::check, When::Whole),
+    step("fuzz", "a short run of every fuzz target", fuzz::smoke, When::Whole),
+    step("unit", "unit tests of core and simd", quality::unit, When::Quick),
+    step("table", "methods × scenes × properties, in small pictures", quality::table, When::Quick),
 ];
+
+const fn step(name: &'static str, what: &'static str, run: fn(&Project) -> Outcome, when: When) -> Step {
+    Step { name, what, run, when }
+}
 
 fn main() -> ExitCode {
     let mut allow_missing = false;
@@ -63,7 +85,7 @@ fn main() -> ExitCode {
                 }
             },
             "--allow-missing" => allow_missing = true,
-            name if STEPS.iter().any(|step| step.name == name) => names.push(argument),
+            name if name == QUICK || STEPS.iter().any(|step| step.name == name) => names.push(argument),
             "--help" | "-h" => {
                 println!("{}", usage());
                 return ExitCode::SUCCESS;
@@ -77,7 +99,14 @@ fn main() -> ExitCode {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
     let project = Project { root: root.canonicalize().unwrap_or(root), fuzz_seconds };
 
-    let chosen = STEPS.iter().filter(|step| names.is_empty() || names.iter().any(|name| name == step.name));
+    let is_named = |step: &Step, name: &String| match name == QUICK {
+        true => step.when != When::Whole,
+        false => name == step.name,
+    };
+    let chosen = STEPS.iter().filter(|step| match names.is_empty() {
+        true => step.when != When::Quick,
+        false => names.iter().any(|name| is_named(step, name)),
+    });
     let results: Vec<_> = chosen.map(|step| run(step, &project, allow_missing)).collect();
     println!("\nverify:");
     for (line, _) in &results {
@@ -106,6 +135,7 @@ fn usage() -> String {
     for step in STEPS {
         text += &format!("  {:<8} {}\n", step.name, step.what);
     }
+    text += &format!("  {QUICK:<8} source, fmt, unit and table: what to run after an edit\n");
     text + "\n--allow-missing    a step whose tool is not on this machine is skipped instead of failing\n\
             --fuzz-seconds N   how long each fuzz target runs; 20 if not said, 600 for a campaign"
 }

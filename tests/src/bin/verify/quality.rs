@@ -6,11 +6,12 @@ use crate::{Outcome, Project};
 /// Folders with a workspace of their own.
 const WORKSPACES: &[&str] = &[".", "tests/targets", "fuzz"];
 
-/// What clippy looks at: folder, and what is built there.
+/// The selections that clippy reads: folder, and what is built there. Those of the workspace have the profile
+/// of the tests, so that compiled macros and build scripts are shared.
 const CLIPPY: &[(&str, &str)] = &[
-    (".", "--workspace --all-targets"),
+    (".", "--profile quick --workspace --all-targets"),
     // Without the default features: what a microcontroller gets.
-    (".", "-p halflight-core -p halflight-simd --lib"),
+    (".", "--profile quick -p halflight-core -p halflight-simd --lib"),
     ("tests/targets", "-p tiny -p host"),
     ("fuzz", "--no-default-features --features app --lib --bins"),
 ];
@@ -31,12 +32,24 @@ pub(crate) fn clippy(project: &Project) -> Outcome {
 }
 
 pub(crate) fn test(project: &Project) -> Outcome {
-    run(&mut command(&project.root, "cargo test --release --workspace --locked"))?;
+    run(&mut command(&project.root, "cargo test --profile quick --workspace --locked"))?;
+    Ok("all passed".to_owned())
+}
+
+pub(crate) fn unit(project: &Project) -> Outcome {
+    let line = "cargo test --profile quick --locked --quiet -p halflight-core -p halflight-simd --lib";
+    run(&mut command(&project.root, line))?;
+    Ok("all passed".to_owned())
+}
+
+pub(crate) fn table(project: &Project) -> Outcome {
+    let line = "cargo test --profile quick --locked --quiet -p halflight-tests --test main table::";
+    run(command(&project.root, line).env("TABLE", "small"))?;
     Ok("all passed".to_owned())
 }
 
 pub(crate) fn docs(project: &Project) -> Outcome {
-    let line = "cargo doc --quiet --workspace --no-deps --document-private-items --locked";
+    let line = "cargo doc --profile quick --quiet --workspace --no-deps --document-private-items --locked";
     // Links to private modules are for those who read the code, and work in these pages.
     let flags = "-D warnings -A rustdoc::private_intra_doc_links";
     run(command(&project.root, line).env("RUSTDOCFLAGS", flags))?;

@@ -65,7 +65,7 @@ const BUILDS: &[Build] = &[
 ];
 
 pub(crate) fn check(project: &Project) -> Outcome {
-    let example = "cargo run --quiet --release --locked -p halflight-core --example tiny_render";
+    let example = "cargo run --profile quick --quiet --locked -p halflight-core --example tiny_render";
     let picture = output(&mut command(&project.root, example))?;
     println!("{picture}");
     // A fingerprint for each method, after the pictures.

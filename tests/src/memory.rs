@@ -1,0 +1,43 @@
+//! Memory for tests that call the core: as many bytes as a footprint states.
+
+use halflight_core::bvh::Bvh;
+use halflight_core::light::LightSampler;
+use halflight_core::memory::{ALIGNMENT, Arena, Footprint, Line};
+use halflight_core::scene::Scene;
+
+/// Bytes that an [`Arena`] is made of.
+pub struct TestArena(Vec<Line>);
+
+impl TestArena {
+    /// The bytes of `footprint`, all zero.
+    pub fn new(footprint: Footprint) -> Self {
+        Self::filled(footprint, 0)
+    }
+
+    /// The same, where every byte is `value`.
+    pub fn filled(footprint: Footprint, value: u8) -> Self {
+        Self(vec![Line([value; ALIGNMENT]); footprint.bytes() / ALIGNMENT])
+    }
+
+    /// An arena over all bytes.
+    pub fn arena(&mut self) -> Arena<'_> {
+        Arena::new(self.bytes())
+    }
+
+    /// The bytes.
+    pub fn bytes(&mut self) -> &mut [u8] {
+        bytemuck::cast_slice_mut(&mut self.0)
+    }
+}
+
+/// Calls `work` with the hierarchy and the lights of a scene.
+///
+/// # Panics
+/// Where a footprint is less than a build takes.
+pub fn with_structures<T>(scene: &Scene, work: impl FnOnce(&Bvh, &LightSampler) -> T) -> T {
+    let mut bvh = TestArena::new(Bvh::footprint(scene.mesh.triangles.len()));
+    let bvh = Bvh::build(&scene.mesh, &mut bvh.arena()).expect("the footprint suffices");
+    let mut lights = TestArena::new(LightSampler::footprint(scene).and(LightSampler::scratch(scene)));
+    let lights = LightSampler::build(scene, &mut lights.arena()).expect("the footprint suffices");
+    work(&bvh, &lights)
+}

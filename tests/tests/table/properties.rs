@@ -1,0 +1,203 @@
+//! The properties that each method has in each scene.
+
+use super::pictures::{is_small, picture, reference, replicas, values};
+use super::scenes::{SCENES, TableScene, traps};
+use super::{METHODS, Row};
+use core::sync::atomic::{AtomicBool, Ordering};
+use core::time::Duration;
+use glam::Vec3;
+use halflight::drive::{self, Checkpoint, Ending, RenderError, RenderResult, Settings, Stop};
+use halflight_core::Rgb;
+use halflight_core::scene::{Camera, Material, PointLight};
+use halflight_simd::Level;
+use halflight_tests::render::{render, try_render};
+use halflight_tests::scenes::{IN_THE_BRIGHT_ROOM, SceneBuffers, bright_and_dark, cornell_box, metal};
+use halflight_tests::statistics::agree_within;
+use std::sync::mpsc;
+use std::thread;
+use std::time::Instant;
+
+/// Samples of a pixel where bits are compared: more than one set of photon maps.
+const FEW_SPP: u32 = 9;
+
+/// A picture whose bits are compared: not audited, and its tiles are cut at the border.
+fn few(scene: &TableScene, row: &Row, spp: u32, change: impl FnOnce(&mut Settings)) -> RenderResult {
+    picture(scene, row.method, spp, |s| {
+        (s.width, s.height) = (20, 20);
+        change(s);
+    })
+}
+
+/// Calls `each` with every scene and complains of all that failed at once.
+fn in_each_scene(each: impl Fn(&TableScene) -> Result<(), String>) {
+    let judged = SCENES.iter().map(|scene| each(scene).map_err(|why| format!("{}: {why}", scene.name)));
+    let failed: Vec<String> = judged.filter_map(Result::err).collect();
+    assert!(failed.is_empty(), "{}", failed.join("\n"));
+}
+
+fn equal(a: &RenderResult, b: &RenderResult, text: &str) -> Result<(), String> {
+    if a.image == b.image { Ok(()) } else { Err(format!("other bits {text}")) }
+}
+
+/// Pictures are the same on one thread and on more, by the lowest and by the highest instruction set.
+pub(super) fn same_bits(row: &Row) {
+    in_each_scene(|scene| {
+        let with =
+            |threads, level| few(scene, row, FEW_SPP, |s| (s.threads, s.level) = (Some(threads), level));
+        let one = with(1, Level::detect());
+        equal(&with(3, Level::detect()), &one, "on three threads")?;
+        let lowest = Level::detect().and_below().last().expect("a level");
+        equal(&with(2, lowest), &one, &format!("by {}", lowest.name()))
+    });
+}
+
+/// Means of blocks are those of plain path tracing, within the noise of both and the bias that the method may
+/// have.
+pub(super) fn agreement(row: &Row) {
+    in_each_scene(|scene| {
+        let reference = reference(scene);
+        let pictures: Vec<_> = replicas(row, scene).iter().map(|replica| values(&replica.image)).collect();
+        let means = pictures[0].len() - 3;
+        let light = reference.image.mean().iter().sum::<f64>() / 3.0;
+        let judge = |bias: f64, bias_of_mean: f64| {
+            agree_within(&pictures, &reference.values, METHODS.len() * SCENES.len(), |i, b| match i < means {
+                true => bias * (b + 0.1 * light),
+                false => bias_of_mean * b,
+            })
+        };
+        // For those who choose the bias of a row.
+        let least = |judge: &dyn Fn(f64) -> bool| (0..100).map(|i| f64::from(i) / 200.0).find(|b| judge(*b));
+        let (blocks, mean) = (least(&|b| judge(b, 1.0).is_ok()), least(&|b| judge(1.0, b).is_ok()));
+        println!("{} {}: bias of blocks {blocks:?}, of the mean {mean:?}", row.method.name(), scene.name);
+        let known = row.known.iter().find(|(name, ..)| *name == scene.name);
+        let (bias, bias_of_mean) = known.map_or((row.bias, row.bias_of_mean), |known| (known.1, known.2));
+        judge(bias, bias_of_mean)
+    });
+}
+
+/// A dark room beside a bright one is black to the last pixel, whether its light is thrown by a mirror or
+/// not.
+pub(super) fn no_leak(row: &Row) {
+    let mut mirrored = bright_and_dark();
+    let mirror = mirrored.material(Material { surface: metal(0.0), ..Material::GREY });
+    mirrored.square(Vec3::new(0.1, 0.3, 0.5), Vec3::new(1.0, 1.0, 0.0).normalize(), 0.3, mirror);
+    let position = Vec3::new(0.3, 0.6, 0.5);
+    mirrored.lights.push(PointLight::Point { position, intensity: Rgb::splat(0.3) });
+    for mut buffers in [bright_and_dark(), mirrored] {
+        let image = |buffers: &SceneBuffers| render(&buffers.scene(), row.method, 64, 8, |_| ()).image;
+        let dark = image(&buffers);
+        let lit = dark.pixels.iter().filter(|pixel| **pixel != [0.0; 3]).count();
+        assert_eq!((lit, dark.mean()), (0, [0.0; 3]), "the camera is in the dark room");
+        buffers.camera = Camera { eye: IN_THE_BRIGHT_ROOM, ..buffers.camera };
+        assert!(image(&buffers).mean()[1] > 0.1, "the same place in the bright room");
+    }
+}
+
+/// A render takes no byte more than it is given, says so where that does not suffice, and takes as much for
+/// many samples as for few.
+pub(super) fn exact_memory(row: &Row) {
+    let buffers = cornell_box();
+    let scene = buffers.scene();
+    let with =
+        |spp, memory| try_render(&scene, row.method, 32, spp, |s| (s.threads, s.memory) = (Some(1), memory));
+    let whole = with(2, None).expect("no limit");
+    let peak = whole.memory_peak;
+    assert!(whole.memory.iter().map(|part| part.bytes).sum::<usize>() <= peak);
+    assert_eq!(with(40, None).map(|more| more.memory_peak), Ok(peak), "for more samples");
+    assert_eq!(with(2, Some(2 * peak)).map(|same| same.image), Ok(whole.image), "with more than it needs");
+    for quarters in (0..=4).rev() {
+        let limit = peak * quarters / 4;
+        match with(2, Some(limit)) {
+            Ok(less) => assert!(less.memory_peak <= limit && limit > 0, "{} of {limit}", less.memory_peak),
+            Err(RenderError::Memory { needed, available }) => {
+                assert!(needed > limit && available <= limit, "{needed} and {available} of {limit}");
+                assert!(limit < peak, "what was used suffices");
+            }
+            Err(other) => panic!("{other}"),
+        }
+    }
+}
+
+/// A film that was left in the middle goes on to the bits of one run, whatever its rounds and threads were.
+pub(super) fn resume(row: &Row) {
+    in_each_scene(|scene| {
+        let name = format!("halflight-table-{}-{}-{}", std::process::id(), row.method.name(), scene.name);
+        let path = std::env::temp_dir().join(name);
+        let keep = Some(Checkpoint { path: path.clone(), every: f64::INFINITY });
+        let whole = few(scene, row, FEW_SPP, |_| ());
+        few(scene, row, 4, |s| (s.checkpoint, s.threads) = (keep, Some(1)));
+        let resumed = few(scene, row, FEW_SPP, |s| s.resume = Some(path.clone()));
+        std::fs::remove_file(path).map_err(|error| error.to_string())?;
+        equal(&resumed, &whole, "after a resumption")
+    });
+}
+
+/// The share of pictures whose interval has to cover their error. Intervals of 95 % are estimates, wide and
+/// narrow by turns at the few samples of these pictures.
+const COVERED: f64 = 0.85;
+
+/// Intervals of relMSE cover the relMSE against the reference as often as they promise, over all scenes.
+pub(super) fn coverage(row: &Row) {
+    let (mut covered, mut count, mut text) = (0, 0, String::new());
+    for scene in SCENES {
+        let reference = reference(scene);
+        let mut here = 0;
+        for replica in replicas(row, scene).iter() {
+            let error = reference.error(&replica.image);
+            let interval = replica.error.expect("an estimate");
+            // The noise of the reference is known on average, not in this picture.
+            let range = interval.lower - reference.relmse..=interval.upper + reference.relmse;
+            here += u32::from(range.contains(&error));
+            count += 1;
+        }
+        text += &format!(" {}: {here}", scene.name);
+        covered += here;
+    }
+    println!("{}: {covered} of {count},{text}", row.method.name());
+    assert!(is_small() || f64::from(covered) >= COVERED * f64::from(count), "{covered} of {count}:{text}");
+}
+
+/// No render here takes longer, on a machine that does much else.
+const DEADLINE: Duration = Duration::from_secs(120);
+
+/// Seconds after which a render is ended.
+const SECONDS: f64 = 0.4;
+
+/// Scenes that keep light for good are ended by the clock and by an interruption, with a picture.
+pub(super) fn ends(row: &Row) {
+    for is_interrupted in [false, true] {
+        for (name, buffers) in traps() {
+            let result = ended(buffers, row, is_interrupted);
+            let ending = if is_interrupted { Ending::Interrupted } else { Ending::Done };
+            assert_eq!(result.ending, ending, "{name}");
+            // On a machine that does much else the end may come before each pixel has a sample.
+            assert_eq!(result.spp > 0, result.filled_pixels == 0, "{name}");
+            assert!(result.image.pixels.iter().flatten().all(|value| value.is_finite()), "{name}");
+            assert!(result.image.mean()[1] > 0.0, "{name}");
+        }
+    }
+}
+
+/// The picture of `buffers`, which the clock or an interruption ends after [`SECONDS`].
+fn ended(buffers: SceneBuffers, row: &Row, is_interrupted: bool) -> RenderResult {
+    let (sender, receiver) = mpsc::channel();
+    let method = Some(row.method);
+    thread::spawn(move || {
+        let seconds = Some(if is_interrupted { 3600.0 } else { SECONDS });
+        let stop = Stop { seconds, ..Stop::default() };
+        let settings =
+            Settings { method, width: 24, height: 24, threads: Some(2), stop, ..Settings::default() };
+        let settings = Settings { survey: Some(20), ..settings };
+        let (flag, start) = (AtomicBool::new(false), Instant::now());
+        let done = thread::scope(|scope| {
+            let render = scope.spawn(|| drive::render(&buffers.scene(), &settings, &mut |_| (), &flag));
+            while is_interrupted && start.elapsed().as_secs_f64() < SECONDS {
+                thread::sleep(Duration::from_millis(5));
+            }
+            flag.store(is_interrupted, Ordering::Relaxed);
+            render.join().expect("it does not panic")
+        });
+        let _ = sender.send(done.expect("it can be rendered"));
+    });
+    receiver.recv_timeout(DEADLINE).expect("it ends")
+}
