@@ -5,6 +5,7 @@
 //! no method knows of threads, clocks or files.
 
 pub mod bidirectional;
+pub mod caustics;
 #[cfg(test)]
 mod closed_box;
 pub mod emission_guide;

@@ -45,6 +45,16 @@ impl<'m> Memory<'m> {
         memory
     }
 
+    /// The same limits, for memory that lives as long as another `bank`, until [`Memory::rejoin`].
+    pub(super) fn within<'n>(&mut self, bank: &'n Bank) -> Memory<'n> {
+        Memory { bank, uses: core::mem::take(&mut self.uses), ..*self }
+    }
+
+    /// Counts what was taken by [`Memory::within`].
+    pub(super) fn rejoin(&mut self, other: Memory) {
+        (self.uses, self.peak) = (other.uses, other.peak);
+    }
+
     /// Bytes that a file may take while it is read.
     pub(super) fn for_file(&self) -> usize {
         self.wall.saturating_sub(self.total())

@@ -114,49 +114,6 @@ impl<'w> Workers<'w> {
         Some(light.mean()).filter(|mean| *mean > 0.0)
     }
 
-    /// A look at a few tiles before the picture, whose mean radiance is about that.
-    pub(super) fn pilot<F: Features, E: Estimator<F>>(
-        &self,
-        tracer: &PathIntegrator<F, E>,
-        mean: f32,
-        scratch: &mut [Vec<Line>],
-    ) -> Result<Pilot, OutOfMemory> {
-        let tasks = tracer.pilot_tasks();
-        let mut pilot = Pilot::default();
-        for tile in self.each(tasks, scratch, |task, arena| tracer.pilot(task, mean, WAVE, arena))? {
-            pilot += tile;
-        }
-        Ok(pilot)
-    }
-
-    /// The mean radiance of the picture, by a look at the same tiles.
-    pub(super) fn pilot_mean<F: Features, E: Estimator<F>>(
-        &self,
-        tracer: &PathIntegrator<F, E>,
-        scratch: &mut [Vec<Line>],
-    ) -> Result<f32, OutOfMemory> {
-        self.mean_of(tracer.pilot_tasks(), scratch, |task, arena| tracer.pilot_mean(task, WAVE, arena))
-    }
-
-    /// The same of light that is there beside photons.
-    pub(super) fn pilot_rest<F: Features, E: Estimator<F>>(
-        &self,
-        tracer: &PathIntegrator<F, E>,
-        scratch: &mut [Vec<Line>],
-    ) -> Result<f32, OutOfMemory> {
-        self.mean_of(tracer.pilot_tasks(), scratch, |task, arena| tracer.pilot_rest(task, WAVE, arena))
-    }
-
-    fn mean_of(
-        &self,
-        tasks: impl Iterator<Item = usize> + Send,
-        scratch: &mut [Vec<Line>],
-        of_task: impl Fn(usize, &mut Arena) -> Result<f32, OutOfMemory> + Sync,
-    ) -> Result<f32, OutOfMemory> {
-        let means = self.each(tasks, scratch, of_task)?;
-        Ok(means.iter().sum::<f32>() / means.len().max(1) as f32)
-    }
-
     /// Builds the map over the first `count` of `photons` on all cores.
     pub(super) fn build_photons<'m>(&self, photons: Photons<'m>, count: usize) -> PhotonMap<'m> {
         self.fork.0.install(|| photons.build_with(count, &self.fork))

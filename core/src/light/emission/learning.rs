@@ -160,11 +160,11 @@ impl<'m> GuideStats<'m> {
     ///
     /// # Errors
     /// [`OutOfMemory`] where it has less.
-    pub fn guide(
+    pub fn guide<'g>(
         &self,
-        emission: &EmissionSampler<'m>,
-        arena: &mut Arena<'m>,
-    ) -> Result<EmissionSampler<'m>, OutOfMemory> {
+        emission: &EmissionSampler<'g>,
+        arena: &mut Arena<'g>,
+    ) -> Result<EmissionSampler<'g>, OutOfMemory> {
         let side = self.side;
         let of_light = side * side;
         let power = |i: usize| emission.table.pdf(i / of_light) / of_light as f32;

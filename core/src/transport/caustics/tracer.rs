@@ -23,6 +23,7 @@ pub use crate::transport::walk::light::PATHS;
 use crate::transport::walk::light::{Continuation, LightPathState, LightWalk, PhotonBuffer, Vertex, Visitor};
 use crate::transport::walk::mis::{ChainLink, merging_weight};
 use crate::{Level, Rgb};
+use bytemuck::{Pod, Zeroable};
 use core::f32::consts::PI;
 use glam::{Vec2, Vec3};
 
@@ -57,7 +58,8 @@ pub struct CausticPhotonTracer<'a, F> {
 }
 
 /// What became of a light path: what its photons are worth, and from which cell of the guide it came.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[repr(C)]
 pub struct GuideSample {
     /// Its cell.
     pub cell: u32,

@@ -8,7 +8,8 @@ mod verdict;
 pub use verdict::{Audited, Region};
 
 use super::memory::Memory;
-use super::method::{Method, Stage, unseen};
+use super::method::{Method, Stage};
+use super::threads::Threads;
 use super::workers::Workers;
 use super::{ErrorEstimate, RenderError, Settings, Shard};
 use choice::Grid;
@@ -16,6 +17,7 @@ use core::ops::Range;
 use halflight_core::bsdf::Features;
 use halflight_core::film::{Film, Pixel};
 use halflight_core::memory::{Arena, Footprint, Line, OutOfMemory};
+use halflight_core::method::caustics::{unseen, unseen_footprint};
 use halflight_core::transport::{CausticMerging, Counters, PathIntegrator, path::WAVE};
 use serde::{Deserialize, Serialize};
 use std::time::Instant;
@@ -133,7 +135,10 @@ impl<'a> Audit<'a> {
         // Others lend the audit the photons that they have, or find no more than its paths.
         let samples = SEEN * pixels as f64 / (f64::from(settings.width) * f64::from(settings.height));
         let unseen = match method.finds_caustics() {
-            true => unseen::<F>(stage, samples, &mut scratch, memory)?.unwrap_or(0.0),
+            true => {
+                let mut executor = Threads::new(workers, &mut scratch);
+                unseen::<F>(&stage.context(), samples, memory, &mut executor)?.unwrap_or(0.0)
+            }
             false => 0.0,
         };
         Ok(Some(Self {
@@ -152,13 +157,14 @@ impl<'a> Audit<'a> {
 
     /// Bytes that it is going to take: a method that takes what it can get leaves so many.
     pub(super) fn bytes<F: Features>(stage: &Stage, is_biased: bool) -> usize {
-        let Stage { settings, workers, .. } = *stage;
+        let Stage { settings, workers, lights, .. } = *stage;
         if share(settings, is_biased).is_none() {
             return 0;
         }
         let pixels = Footprint::default().slice::<Pixel>(choice::count(settings.width, settings.height));
         let threads = scratch::<F>().bytes().saturating_mul(workers.count());
-        threads.saturating_add(pixels.bytes())
+        let unseen = if is_biased { unseen_footprint(lights).bytes() } else { 0 };
+        threads.saturating_add(pixels.bytes()).saturating_add(unseen)
     }
 
     /// Whether its pixels are still to be chosen.

@@ -1,11 +1,11 @@
 //! Memory of cached pictures beside their records and photons: tables of the strata that may be gathered, working memory
 //! of threads.
 
-use super::caustics;
 use super::{Method, Stage};
 use crate::drive::audit::Audit;
 use halflight_core::bsdf::Features;
 use halflight_core::memory::Footprint;
+use halflight_core::method::caustics;
 use halflight_core::method::irradiance_cache::{CacheSettings, IrradianceCaching};
 use halflight_core::method::record_placement::CacheBuilder;
 

@@ -2,9 +2,7 @@
 
 use super::cache_memory;
 use super::cache_settings::CacheUse;
-use super::caster::{Cast, Caster};
-use super::caustics::{self, CausticUse};
-use super::path::Paths;
+use super::caustics;
 use super::photon_view::PhotonView;
 use super::{Borrower, Renderer, Stage};
 use crate::drive::RenderError;
@@ -12,15 +10,20 @@ use crate::drive::cache_file::{self, Half, Header, Reader, View};
 use crate::drive::crew::Crew;
 use crate::drive::held_out::EXACT;
 use crate::drive::kept::Kept;
-use crate::drive::memory::Memory;
+use crate::drive::memory::{Bank, Memory};
 use crate::drive::survey::{self, Survey};
 use crate::drive::threads::{End, Threads};
 use crate::drive::workers::Workers;
 use crate::save::Patience;
 use halflight_core::bsdf::Features;
 use halflight_core::cache::irradiance::{IrradianceCache, Record};
-use halflight_core::memory::{Arena, Footprint, Line};
+use halflight_core::memory::{Footprint, Line};
+use halflight_core::method::caustics::{
+    CausticEmission, CausticPhotons, CausticSettings, CausticUse, Decision, Prepass, least_footprint,
+    prepass, scratch,
+};
 use halflight_core::method::irradiance_cache::{CacheSettings, IrradianceCaching};
+use halflight_core::method::path::PathTracing;
 use halflight_core::method::{Method as _, PhotonUse};
 use halflight_core::transport::PathIntegrator;
 
@@ -37,44 +40,47 @@ pub(super) fn with<'m, F: Features, T>(
     memory.set_aside(LOADED, bytes)?;
     let loaded = Loaded { header, records: file.map(Reader::records).transpose()?.unwrap_or_default() };
     let cache = cache_memory::settings::<F>(stage, loaded.fewest());
-    let mut lines = Vec::new();
-    let (cast, caustics) = find_caustics::<F>(stage, memory, &cache, &mut lines)?;
-    if cast.is_some() {
-        return set_up::<F, T>(stage, memory, (loaded, &cache), (cast, caustics), then);
-    }
-    // As if nobody had looked.
-    drop(lines);
-    memory.give_back("emission");
-    set_up::<F, T>(stage, memory, (loaded, &cache), (None, caustics), then)
+    let bank = Bank::new();
+    let mut own = memory.within(&bank);
+    let found = find_caustics::<F>(stage, &mut own, &cache)?;
+    let done = set_up::<F, T>(stage, &mut own, (loaded, &cache), found, then);
+    memory.rejoin(own);
+    done
 }
 
-/// How photons of caustics are to be shot, by what is kept in `lines`, if they are worth it and there is memory for them
-/// beside what `cache` needs.
-fn find_caustics<'l, F: Features>(
-    stage: &Stage,
-    memory: &mut Memory,
+/// How caustic photons are emitted, if they pay and there is memory for them beside what `cache` needs.
+fn find_caustics<'m, F: Features>(
+    stage: &Stage<'m>,
+    memory: &mut Memory<'m>,
     cache: &CacheSettings,
-    lines: &'l mut Vec<Line>,
-) -> Result<(Option<Cast<'l>>, CausticUse), RenderError> {
-    let Stage { lights, workers, .. } = *stage;
+) -> Result<(Option<CausticEmission<'m>>, CausticUse), RenderError> {
+    let Stage { workers, .. } = *stage;
     if !caustics::are_possible(stage) {
         return Ok((None, CausticUse::default()));
     }
-    let scratch = cache_memory::scratch::<F>(cache, true).bytes().saturating_mul(workers.count());
+    let needed = cache_memory::scratch::<F>(cache, true).bytes().saturating_mul(workers.count());
     // As much for records as for photons.
-    let others = scratch.saturating_add(cache_memory::later(cache)).saturating_add(caustics::least_photons());
-    if !caustics::has_memory(memory, lights, others) {
+    let reserved = needed.saturating_add(cache_memory::later(cache));
+    let reserved = reserved.saturating_add(least_footprint().bytes());
+    let scratch = scratch::<F>();
+    if scratch.bytes().saturating_mul(workers.count()) > memory.available() {
         return Ok((None, CausticUse { lacks_memory: true, ..CausticUse::default() }));
     }
-    let scratch = memory.take_each("paths", caustics::scratch::<F>(), workers.count())?;
-    let mut paths = Paths::<F>::alone(stage, scratch);
-    *lines = memory.take("emission", caustics::footprint(lights))?;
-    let mut arena = Arena::new(bytemuck::cast_slice_mut(lines));
-    let (cast, _) = caustics::look_first::<F>(stage, &mut paths, true, &mut arena)?;
-    let caustics = paths.caustics;
-    drop(paths);
+    let mut scratch = memory.take_each("paths", scratch, workers.count())?;
+    let context = stage.context();
+    let mut paths = PathTracing::<F>::plain(&context);
+    let settings = CausticSettings { beside_records: true, allows_photons_alone: false, reserved };
+    let mut executor = Threads::new(workers, &mut scratch);
+    let Prepass { decision, share, lacks_memory } =
+        prepass(&context, &mut paths, settings, memory, &mut executor)?;
+    drop(scratch);
     memory.give_back("paths");
-    Ok((cast, caustics))
+    let emission = match decision {
+        Decision::Photons(emission) => Some(emission),
+        Decision::Paths | Decision::ProgressivePhotons => None,
+    };
+    let caustics = CausticUse { used: emission.is_some(), share, lacks_memory };
+    Ok((emission, caustics))
 }
 
 /// What the memory of records of a file is counted as, until caches have them.
@@ -93,19 +99,23 @@ impl Loaded {
     }
 }
 
-/// Takes the memory, sets the method up, and hands it to `then`; with photons, if there is a cast of them.
+/// Takes the memory, sets the method up, and hands it to `then`; with photons of an `emission`, if there is one.
 fn set_up<'m, F: Features, T>(
     stage: &Stage<'m>,
     memory: &mut Memory<'m>,
     (loaded, cache): (Loaded, &CacheSettings),
-    (cast, caustics): (Option<Cast>, CausticUse),
+    (emission, caustics): (Option<CausticEmission<'m>>, CausticUse),
     then: impl FnOnce(&mut dyn Renderer, &mut Memory) -> Result<T, RenderError>,
 ) -> Result<T, RenderError> {
     let Stage { scene, settings, workers, .. } = *stage;
-    let scratch = cache_memory::scratch::<F>(cache, cast.is_some());
+    let scratch = cache_memory::scratch::<F>(cache, emission.is_some());
     let scratch = memory.take_each("paths", scratch, workers.count())?;
-    let caster = match cast {
-        Some(cast) => Some(Caster::new(stage, memory, cast, true, cache_memory::later(cache))?),
+    let photons = match emission {
+        Some(emission) => {
+            let reserved = cache_memory::later(cache);
+            let settings = CausticSettings { beside_records: true, allows_photons_alone: false, reserved };
+            CausticPhotons::new(&stage.context(), emission, settings, memory)?
+        }
         None => None,
     };
     let mut method = IrradianceCaching::<F>::new(&stage.context(), cache, memory)?;
@@ -126,7 +136,7 @@ fn set_up<'m, F: Features, T>(
     let mut cached = Cached {
         method,
         stage: *stage,
-        caster,
+        photons,
         caustics,
         scratch,
         survey,
@@ -143,8 +153,8 @@ fn set_up<'m, F: Features, T>(
 struct Cached<'c, 'm, F> {
     method: IrradianceCaching<'m, F>,
     stage: Stage<'c>,
-    /// Of photons of caustics, where they are worth it.
-    caster: Option<Caster<'c>>,
+    /// Of caustics, where they pay.
+    photons: Option<CausticPhotons<'m>>,
     caustics: CausticUse,
     scratch: Vec<Vec<Line>>,
     /// Points, and memory for gathering there.
@@ -163,19 +173,21 @@ struct Cached<'c, 'm, F> {
 impl<F: Features> Cached<'_, '_, F> {
     /// Fills both caches, or goes on with them, and keeps them in their file.
     fn fill(&mut self, crew: &mut Crew) -> Result<(), RenderError> {
-        let Self { method, caster, scratch, .. } = self;
+        let Self { method, photons: maps, scratch, .. } = self;
         let mut all = true;
         for number in 0..2 {
             // With a limit of depth gather rays ask for no photons.
             let asks = !method.is_filled(number) && !method.paths().is_limited();
-            let photons = match caster.as_mut().filter(|_| asks) {
-                Some(caster) => match caster.for_records::<F>(number as u32, scratch, crew)? {
-                    Some(photons) => Some(photons),
-                    None => {
-                        all = false;
-                        break;
+            let photons = match maps.as_mut().filter(|_| asks) {
+                Some(maps) => {
+                    match crew.round(scratch, |round| maps.for_records::<F, _>(number as u32, round))? {
+                        Some(photons) => Some(photons),
+                        None => {
+                            all = false;
+                            break;
+                        }
                     }
-                },
+                }
                 None => None,
             };
             let merging = photons.as_ref().map(|photons| photons.merging());
@@ -220,17 +232,15 @@ impl<F: Features> Renderer for Cached<'_, '_, F> {
                 crew.canvas.counters = counted;
             }
         }
-        match &mut self.caster {
-            Some(caster) => caster.round(&self.method.cached_paths(), &mut self.scratch, crew),
-            None => Ok(crew.round(&mut self.scratch, |round| self.method.round(round))?),
-        }
+        let Self { method, photons, scratch, .. } = self;
+        Ok(crew.round(scratch, |round| match photons {
+            Some(photons) => photons.round(&method.cached_paths(), round),
+            None => method.round(round),
+        })?)
     }
 
     fn lend_photons(&mut self, then: &mut Borrower) -> Result<(), RenderError> {
-        match &mut self.caster {
-            Some(caster) => caster.lend(then),
-            None => then(None),
-        }
+        caustics::lend(self.photons.as_mut(), then)
     }
 
     fn risks(&mut self, workers: &Workers) -> Result<Vec<f32>, RenderError> {
@@ -281,10 +291,11 @@ impl<F: Features> Renderer for Cached<'_, '_, F> {
     }
 
     fn photon_view(&mut self) -> Result<Option<PhotonView>, RenderError> {
-        self.caster.as_mut().map_or(Ok(None), |caster| caster.view::<F>())
+        let Self { stage, photons, .. } = self;
+        photons.as_mut().map_or(Ok(None), |photons| caustics::view::<F>(stage, photons))
     }
 
     fn photons(&self) -> Option<PhotonUse> {
-        self.caster.as_ref().map(|caster| caster.used)
+        self.photons.as_ref().map(|photons| photons.statistics())
     }
 }

@@ -7,8 +7,6 @@
 mod bidirectional;
 mod cache_memory;
 mod cache_settings;
-mod caster;
-mod caustic_look;
 mod caustics;
 mod irradiance_cache;
 mod path;
@@ -19,8 +17,7 @@ mod sppm;
 mod wrong;
 
 pub use cache_settings::{CacheSettings, CacheUse};
-pub use caustics::CausticUse;
-pub(super) use caustics::unseen;
+pub use halflight_core::method::caustics::CausticUse;
 pub use halflight_core::method::{MapUse, PhotonSettings, PhotonUse};
 pub use photon_view::{MapView, PhotonView};
 

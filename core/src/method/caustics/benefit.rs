@@ -1,0 +1,264 @@
+//! The benefit of caustic photons, from the light paths of a prepass.
+//!
+//! Photons pay in two cases: they carry much of the light; or they carry a little of it that path tracing finds so
+//! rarely that it would be most of the noise, such as the caustic of a small glass in a large room.
+
+use crate::transport::Pilot;
+use crate::transport::caustics::tracer::{BLOCKS, GuideSample};
+use core::f64::consts::PI;
+
+/// Least fraction of the picture's light for which photons pay, of light that path tracing finds badly.
+const LEAST_SHARE: f64 = 3.5e-2;
+
+/// Least relative variance of that light by path tracing alone, over that of all other light, for which photons pay
+/// as well, and the fraction of light paths that the camera must see then: few photons are noise too.
+const LEAST_NOISE: f64 = 0.5;
+const LEAST_VISIBLE: f64 = 0.2;
+
+/// The parts of these limits from which on a first test is undecided. The test finds a half to twice the share, and a
+/// tenth of the visible paths as long as it has not learned which of many lights matter; half of that once more, as its
+/// sample is small.
+const DOUBT_SHARE: f64 = 0.25;
+const DOUBT_VISIBLE: f64 = 0.0625;
+
+/// Samples of a picture, and how often its paths must find light for this light to be noise. Light that is found less
+/// often is missing.
+const SAMPLES: f64 = 64.0;
+const LEAST_HITS: f64 = 4.0;
+
+/// Fraction of the picture's light from which on photons stay because path tracing never finds it. No pilot sees it.
+const MOST_MISSING: f64 = 5e-3;
+
+/// Samples of a pilot. It does not see light that is found less often.
+const PILOT_SAMPLES: f64 = 4.0 * 16.0 * 1024.0;
+
+/// Work of a path that gathers photons, relative to one that does not, for the same rays.
+const GATHERING: f64 = 1.3;
+
+/// Largest photon budget, relative to the usual one; and the ratio of the photons' light to all other from which on the
+/// budget grows.
+const MOST_BUDGET: f64 = 4.0;
+const BUDGET_RATIO: f64 = 0.4;
+
+const ALL: usize = (BLOCKS * BLOCKS) as usize;
+
+/// A block of the picture: means over its pixels.
+#[derive(Clone, Copy, Default)]
+struct Block {
+    /// Radiance of photons.
+    light: f64,
+    /// Its part that path tracing never finds.
+    missing: f64,
+    /// Mean square of a sample of the other part by path tracing alone.
+    square: f64,
+    /// Its part that is too rare for a pilot.
+    rare: f64,
+}
+
+/// What caustic photons bring to a picture.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Benefit {
+    /// Their fraction of the mean radiance.
+    pub(super) share: f64,
+    /// Fraction of the light paths that the camera sees.
+    pub(super) visible: f64,
+    /// Relative variance of a sample of their light by path tracing alone.
+    noise: f64,
+    /// Its part that is too rare for a pilot.
+    rare: f64,
+    /// Fraction of the light that path tracing never finds.
+    missing: f64,
+    /// Mean radiance of all other light.
+    pub(super) mean: f64,
+}
+
+/// The fraction of light paths that the camera sees.
+pub(super) fn visible(found: &[GuideSample]) -> f64 {
+    found.iter().filter(|path| path.light > 0.0).count() as f64 / found.len().max(1) as f64
+}
+
+/// Mean radiance that the light paths `found` bring to a picture of so many `pixels`, in discs of `radius` pixels, and
+/// that path tracing with `samples` of each pixel finds less often than `least` times in all. Sorts `found`.
+pub(super) fn missing(
+    found: &mut [GuideSample],
+    radius: f64,
+    pixels: f64,
+    (samples, least): (f64, f64),
+) -> f64 {
+    let disc = PI * radius * radius;
+    let (mut hits, mut missing) = (0.0, 0.0);
+    for path in brightest_first(found) {
+        hits += samples * disc * f64::from(path.hits);
+        if hits >= least {
+            break;
+        }
+        missing += disc * f64::from(path.light) / pixels;
+    }
+    missing
+}
+
+/// Sorts `found` by the radiance of a hit; those that the camera sees. The order does not depend on that of `found`.
+fn brightest_first(found: &mut [GuideSample]) -> impl Iterator<Item = &GuideSample> {
+    found.sort_unstable_by(|a, b| {
+        let flash = b.flash.total_cmp(&a.flash).then(b.light.total_cmp(&a.light));
+        flash.then(b.hits.total_cmp(&a.hits)).then(a.block.cmp(&b.block))
+    });
+    found.iter().filter(|path| path.light > 0.0)
+}
+
+impl Benefit {
+    /// By the light paths `found`, in discs of `radius` pixels, for a picture of so many `pixels` in which all other
+    /// light has a `mean` radiance. Sorts `found`.
+    pub(super) fn new(found: &mut [GuideSample], radius: f64, pixels: f64, mean: f64) -> Self {
+        // Power over the area of a disc, on a diffuse surface of albedo 0.5.
+        let worth = found.iter().map(|path| f64::from(path.worth)).sum::<f64>();
+        let radiance = 0.5 / PI * worth * radius * radius / pixels;
+        let share = if radiance > 0.0 { radiance / (mean + radiance) } else { 0.0 };
+        let visible = visible(found);
+
+        let mut blocks = [Block::default(); ALL];
+        let disc = PI * radius * radius;
+        let of_block = disc * ALL as f64 / pixels;
+        let mut hits = 0.0;
+        for path in brightest_first(found) {
+            let Some(block) = blocks.get_mut(path.block as usize) else { continue };
+            let light = of_block * f64::from(path.light);
+            hits += SAMPLES * disc * f64::from(path.hits);
+            block.light += light;
+            if hits < LEAST_HITS {
+                block.missing += light;
+                continue;
+            }
+            let flash = f64::from(path.flash);
+            let square = of_block * f64::from(path.hits) * (flash * flash);
+            block.square += square;
+            if hits * PILOT_SAMPLES < LEAST_HITS * SAMPLES * pixels {
+                block.rare += square;
+            }
+        }
+        let relative = |square: f64, block: &Block| {
+            let square = square + SAMPLES * (block.missing * block.missing);
+            let light = mean + block.light;
+            if square > 0.0 { square / (light * light) } else { 0.0 }
+        };
+        let over_blocks = |of: &dyn Fn(&Block) -> f64| blocks.iter().map(of).sum::<f64>() / ALL as f64;
+        let noise = over_blocks(&|block| relative(block.square, block));
+        let rare = over_blocks(&|block| relative(block.rare, block));
+        let missing = over_blocks(&|block| block.missing);
+        let missing = if missing > 0.0 { missing / (mean + radiance) } else { 0.0 };
+        Self { share, visible, noise, rare, missing, mean }
+    }
+
+    /// The photon budget, relative to the usual one. The relative variance of photons is that of the few photons of a
+    /// disc, and counts by the square of their share: the best number of light paths grows with the ratio of their
+    /// light to the other.
+    pub(super) fn photon_budget(&self) -> f64 {
+        (self.share / (BUDGET_RATIO * (1.0 - self.share))).clamp(1.0, MOST_BUDGET)
+    }
+
+    /// Whether more light paths may find that photons pay.
+    pub(super) fn may_pay(&self) -> bool {
+        self.share >= DOUBT_SHARE * LEAST_SHARE || self.visible >= DOUBT_VISIBLE * LEAST_VISIBLE
+    }
+
+    /// Whether photons may pay; `None` where that depends on the noise of the picture, for
+    /// [`Benefit::pays_beside`].
+    pub(super) fn pays(&self) -> Option<bool> {
+        if self.share >= LEAST_SHARE {
+            return Some(true);
+        }
+        (self.visible < LEAST_VISIBLE).then_some(false)
+    }
+
+    /// Whether photons may pay in a picture whose samples have the relative variance `noise`.
+    pub(super) fn pays_beside(&self, noise: f64) -> bool {
+        self.noise >= LEAST_NOISE * noise
+    }
+
+    /// Variance and work of path tracing alone, whose `pilot` ran with path reuse or not, for a comparison with photons.
+    pub(super) fn path_tracing(&self, pilot: &Pilot, has_reuse: bool) -> PathTracingCost {
+        // Light that is never found is not noise: without photons the picture would lack it.
+        let rare = if self.missing >= MOST_MISSING { f64::INFINITY } else { self.rare };
+        PathTracingCost { scatter: pilot.scatter(has_reuse) + rare, work: pilot.work(has_reuse) }
+    }
+}
+
+/// Variance and work of a sample of a pixel by path tracing alone.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct PathTracingCost {
+    /// Variance, relative to the light of a block.
+    scatter: f64,
+    /// Rays.
+    work: f64,
+}
+
+impl PathTracingCost {
+    /// Whether the variance times the work is larger than that of paths with photons, by their `pilot`, whose light
+    /// paths take `light_rays` for each sample of a pixel.
+    pub(super) fn exceeds(&self, pilot: &Pilot, has_reuse: bool, light_rays: f64) -> bool {
+        let work = GATHERING * pilot.work(has_reuse) + light_rays;
+        pilot.scatter(has_reuse) * work < self.scatter * self.work
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const PIXELS: f64 = 1024.0;
+
+    fn path(light: f32, hits: f32, flash: f32) -> GuideSample {
+        GuideSample { worth: light, light, hits, flash, ..GuideSample::default() }
+    }
+
+    #[test]
+    fn the_photon_budget_grows_with_their_share_of_the_light() {
+        let budget = |share| {
+            Benefit { share, visible: 1.0, noise: 0.0, rare: 0.0, missing: 0.0, mean: 1.0 }.photon_budget()
+        };
+        // A caustic beside a lamp, as many as ever; a room behind glass; and a lamp in a bulb.
+        assert_eq!([0.0, 0.05, 0.28].map(budget), [1.0; 3]);
+        assert!((2.0..4.0).contains(&budget(0.5)), "{}", budget(0.5));
+        assert_eq!([0.7, 0.96, 1.0].map(budget), [4.0; 3]);
+    }
+
+    #[test]
+    fn light_is_missing_that_is_found_less_often_than_the_limit() {
+        // Discs of area one: each path is hit once in two samples of its pixel.
+        let radius = libm::sqrt(1.0 / PI);
+        let mut found = [path(1.0, 0.5, 3.0), path(2.0, 0.5, 2.0), path(4.0, 0.5, 1.0), path(0.0, 9.0, 9.0)];
+        let lacking =
+            |samples, found: &mut [GuideSample]| PIXELS * missing(found, radius, PIXELS, (samples, 4.0));
+        for (samples, expected) in [(2.0, 7.0), (3.0, 3.0), (5.0, 1.0), (9.0, 0.0)] {
+            let missing = lacking(samples, &mut found);
+            assert!((missing - expected).abs() < 1e-9, "{samples}: {missing}");
+        }
+        // Light that no path finds is always missing.
+        assert!((lacking(1e9, &mut [path(1.0, 0.0, f32::INFINITY)]) - 1.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn the_share_is_that_of_a_diffuse_surface_and_does_not_depend_on_the_order() {
+        let mut found = [path(3.0, 0.1, 7.0), path(0.0, 0.0, 0.0), path(5.0, 0.0, 7.0), path(5.0, 0.2, 7.0)];
+        let one = Benefit::new(&mut found, 1.0, PIXELS, 0.01);
+        let radiance = 0.5 / PI * 13.0 / PIXELS;
+        assert!((one.share / (radiance / (0.01 + radiance)) - 1.0).abs() < 1e-12);
+        assert_eq!(one.visible, 0.75);
+        found.reverse();
+        let other = Benefit::new(&mut found, 1.0, PIXELS, 0.01);
+        assert_eq!([one.noise, one.rare, one.missing], [other.noise, other.rare, other.missing]);
+    }
+
+    #[test]
+    fn photons_pay_for_much_light_or_for_noise_that_many_of_them_reduce() {
+        let benefit =
+            |share, visible| Benefit { share, visible, noise: 1.0, rare: 0.0, missing: 0.0, mean: 1.0 };
+        assert_eq!(benefit(0.04, 0.0).pays(), Some(true));
+        assert_eq!(benefit(0.03, 0.1).pays(), Some(false));
+        assert_eq!(benefit(0.03, 0.3).pays(), None);
+        assert!(benefit(0.03, 0.3).pays_beside(1.9) && !benefit(0.03, 0.3).pays_beside(2.1));
+        assert!(
+            benefit(0.01, 0.0).may_pay() && benefit(0.0, 0.02).may_pay() && !benefit(0.001, 0.01).may_pay()
+        );
+    }
+}

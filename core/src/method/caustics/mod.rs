@@ -1,0 +1,121 @@
+//! Path tracing joined with caustic photons by vertex merging (Georgiev et al. 2012).
+//!
+//! A prepass learns where photons should go, and whether they pay; if not, the picture is path traced alone, with the
+//! same bits as without a prepass. An irradiance cache uses the same photons for its picture and its records.
+
+mod benefit;
+mod photons;
+mod prepass;
+#[cfg(test)]
+mod tests;
+
+pub use photons::{CausticPhotons, RecordPhotons, least_footprint};
+pub use prepass::{CausticEmission, CausticSettings, Decision, Prepass, prepass, unseen, unseen_footprint};
+
+use super::path::{PathTracing, Reuse};
+use super::{Executor, Method, PhotonUse, RenderContext, Round};
+use crate::bsdf::Features;
+use crate::census::Census;
+use crate::memory::{Footprint, MemorySource, OutOfMemory};
+use crate::scene::Scene;
+use crate::transport::caustics::tracer::CausticPhotonTracer;
+use crate::transport::path::WAVE;
+use crate::transport::{CausticMerging, PathIntegrator, PathReuse};
+
+/// Working memory of a worker: that of paths or of light paths.
+pub fn scratch<F: Features>() -> Footprint {
+    PathIntegrator::<F>::scratch_with::<((), CausticMerging), PathReuse>(WAVE)
+        .or(CausticPhotonTracer::<F>::scratch())
+}
+
+/// Whether `scene` has casters, receivers and light.
+pub fn are_possible(scene: &Scene) -> bool {
+    let census = Census::of(scene);
+    let kinds = &census.surfaces;
+    let casters = kinds.mirror + kinds.conductor + kinds.glossy + kinds.dielectric + kinds.rough_dielectric;
+    casters > 0 && kinds.diffuse + kinds.glossy > 0 && census.has_light()
+}
+
+/// Whether paths were joined with caustic photons.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct CausticUse {
+    /// They were.
+    pub used: bool,
+    /// Estimated fraction of the picture's light that photons carry and path tracing finds badly; `None` without a
+    /// prepass.
+    pub share: Option<f64>,
+    /// There was not enough memory for a prepass.
+    pub lacks_memory: bool,
+}
+
+/// Path tracing of one picture, with caustic photons where they pay.
+pub struct CausticPathTracing<'a, F> {
+    paths: PathTracing<'a, F>,
+    photons: Option<CausticPhotons<'a>>,
+    finding: CausticUse,
+}
+
+impl<'a, F: Features> CausticPathTracing<'a, F> {
+    /// `paths` joined with photons if a prepass finds that they pay. `None` if photons should carry all of the light,
+    /// by [`Decision::ProgressivePhotons`].
+    ///
+    /// # Errors
+    /// [`OutOfMemory`] where the executor's scratch is smaller than [`scratch`].
+    pub fn new(
+        context: &RenderContext<'a>,
+        mut paths: PathTracing<'a, F>,
+        settings: CausticSettings,
+        memory: &mut impl MemorySource<'a>,
+        executor: &mut impl Executor,
+    ) -> Result<Option<Self>, OutOfMemory> {
+        let Prepass { decision, share, lacks_memory } =
+            prepass(context, &mut paths, settings, memory, executor)?;
+        let mut method =
+            Self { paths, photons: None, finding: CausticUse { used: false, share, lacks_memory } };
+        let emission = match decision {
+            Decision::Paths => return Ok(Some(method)),
+            Decision::ProgressivePhotons => return Ok(None),
+            Decision::Photons(emission) => emission,
+        };
+        match CausticPhotons::new(context, emission, settings, memory)? {
+            None => method.finding.lacks_memory = true,
+            Some(mut photons) => {
+                method.finding.used = photons.pays(&method.paths, executor)?;
+                method.photons = method.finding.used.then_some(photons);
+            }
+        }
+        Ok(Some(method))
+    }
+
+    /// Whether photons are used, and why.
+    pub fn finding(&self) -> CausticUse {
+        self.finding
+    }
+
+    /// Whether neighbouring pixels reuse paths, and why.
+    pub fn reuse(&self) -> Reuse {
+        self.paths.reuse()
+    }
+
+    /// Statistics of its photon maps, if it has some.
+    pub fn statistics(&self) -> Option<PhotonUse> {
+        self.photons.as_ref().map(|photons| photons.statistics())
+    }
+
+    /// Its photons, if it has some.
+    pub fn photons(&mut self) -> Option<&mut CausticPhotons<'a>> {
+        self.photons.as_mut()
+    }
+}
+
+impl<F: Features> Method for CausticPathTracing<'_, F> {
+    fn round<E: Executor>(&mut self, round: &mut Round<E>) -> Result<(), OutOfMemory> {
+        match &mut self.photons {
+            None => self.paths.round(round),
+            Some(photons) => match self.paths.reusing() {
+                Some(integrator) => photons.round(&integrator, round),
+                None => photons.round(self.paths.integrator(), round),
+            },
+        }
+    }
+}

@@ -1,0 +1,272 @@
+//! The prepass of caustic photons: light paths aimed at all mirrors and dielectrics teach the emission guide which of
+//! them the camera sees, and show whether photons pay.
+
+use super::benefit::{Benefit, missing, visible};
+use super::photons::{FIRST_RADIUS, least_footprint, photon_tracer};
+use crate::bsdf::Features;
+use crate::light::{EmissionSampler, GuideStats, LightSampler};
+use crate::memory::{Arena, Footprint, Line, MemorySource, OutOfMemory};
+use crate::method::path::PathTracing;
+use crate::method::{Executor, RenderContext, pilot};
+use crate::photon::Photons;
+use crate::transport::caustics::tracer::{GuideSample, PATHS};
+use crate::transport::{CausticMerging, RadiusSchedule};
+
+/// Light paths of the first test, which ends the prepass where there is next to nothing to find, and of each later
+/// step.
+const FIRST_TEST: usize = 4 * PATHS;
+const STEP: usize = 32 * PATHS;
+
+/// Numbers of the photon maps whose light paths are used.
+const AIMED_MAP: u32 = 0;
+const LEARNED_MAP: u32 = 1;
+const BY_POWER_MAP: u32 = 2;
+const AUDIT_MAP: u32 = 0x7fff_ff00;
+
+/// Fraction of the picture's light from which on photons may carry all of it: path tracing finds next to none. The
+/// photons of that method are not aimed: so many of them must be visible, relative to those that are.
+const MOST_SHARE: f64 = 0.75;
+const LEAST_BY_POWER: f64 = 0.25;
+
+/// How often the paths of an audit must find light to know of it.
+const FEWEST_HITS: f64 = 64.0;
+
+/// The name of the emission sampler and its guide in reports of memory.
+const EMISSION: &str = "emission";
+
+/// What a prepass needs to know of the picture.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct CausticSettings {
+    /// Whether an irradiance cache has the light that rough surfaces reflect.
+    pub beside_records: bool,
+    /// Whether [`Decision::ProgressivePhotons`] is a choice.
+    pub allows_photons_alone: bool,
+    /// Bytes that photons leave for others.
+    pub reserved: usize,
+}
+
+/// The method that suits a picture.
+pub enum Decision<'a> {
+    /// Paths alone.
+    Paths,
+    /// Paths joined with caustic photons.
+    Photons(CausticEmission<'a>),
+    /// Stochastic progressive photon mapping: photons for all of the light.
+    ProgressivePhotons,
+}
+
+/// The result of a prepass.
+pub struct Prepass<'a> {
+    /// What suits the picture.
+    pub decision: Decision<'a>,
+    /// Estimated fraction of the picture's light that photons carry and path tracing finds badly; `None` if there was
+    /// not enough memory.
+    pub share: Option<f64>,
+    /// There was not enough memory for a prepass.
+    pub lacks_memory: bool,
+}
+
+/// How caustic photons are emitted and gathered.
+#[derive(Clone, Copy)]
+pub struct CausticEmission<'a> {
+    pub(super) sampler: EmissionSampler<'a>,
+    /// Of one pixel.
+    pub(super) radii: RadiusSchedule,
+    pub(super) benefit: Benefit,
+}
+
+/// Memory that a picture with photons keeps of its prepass.
+fn kept(lights: &LightSampler) -> Footprint {
+    EmissionSampler::footprint(lights).and(GuideStats::guide_footprint(lights))
+}
+
+/// Memory of the prepass itself.
+fn lent(lights: &LightSampler) -> Footprint {
+    let stats = GuideStats::footprint(lights).and(GuideStats::guide_footprint(lights));
+    EmissionSampler::footprint(lights).and(stats).slice::<GuideSample>(STEP)
+}
+
+/// Runs a prepass for a picture of `context`; `paths` measure it without photons.
+///
+/// # Errors
+/// [`OutOfMemory`] where the executor's scratch is smaller than [`scratch`](super::scratch).
+pub fn prepass<'a, F: Features>(
+    context: &RenderContext<'a>,
+    paths: &mut PathTracing<F>,
+    settings: CausticSettings,
+    memory: &mut impl MemorySource<'a>,
+    executor: &mut impl Executor,
+) -> Result<Prepass<'a>, OutOfMemory> {
+    let RenderContext { scene, bvh, lights, .. } = *context;
+    let (kept, lent) = (kept(lights), lent(lights));
+    let later = kept.and(least_footprint()).bytes().saturating_add(settings.reserved);
+    if !memory.has(kept.and(lent)) || later > memory.available() {
+        return Ok(Prepass { decision: Decision::Paths, share: None, lacks_memory: true });
+    }
+    memory.lend(EMISSION, lent, |memory, arena| {
+        let light_paths = LightPaths {
+            context,
+            radii: context.radii().after(FIRST_RADIUS, 0),
+            beside_records: settings.beside_records,
+            found: arena.slice(STEP)?,
+            executor,
+        };
+        let by_power = EmissionSampler::build(scene, lights, &bvh.bounds(), arena)?;
+        let mut learning = Learning { light_paths, paths, share: None };
+        let decision = match learning.run(&by_power, settings.allows_photons_alone, arena)? {
+            Learned::Paths => Decision::Paths,
+            Learned::ProgressivePhotons => Decision::ProgressivePhotons,
+            Learned::Photons(stats, benefit) => {
+                let mut arena = memory.take(EMISSION, kept)?;
+                let by_power = EmissionSampler::build(scene, lights, &bvh.bounds(), &mut arena)?;
+                let sampler = stats.guide(&by_power, &mut arena)?;
+                Decision::Photons(CausticEmission { sampler, radii: context.radii(), benefit })
+            }
+        };
+        Ok(Prepass { decision, share: learning.share, lacks_memory: false })
+    })
+}
+
+/// As [`Decision`], with what the emission guide is built from.
+enum Learned<'l> {
+    Paths,
+    Photons(GuideStats<'l>, Benefit),
+    ProgressivePhotons,
+}
+
+/// A prepass at work.
+struct Learning<'p, 'a, F, E> {
+    light_paths: LightPaths<'p, E>,
+    paths: &'p mut PathTracing<'a, F>,
+    share: Option<f64>,
+}
+
+impl<F: Features, E: Executor> Learning<'_, '_, F, E> {
+    fn run<'l>(
+        &mut self,
+        by_power: &EmissionSampler<'l>,
+        allows_photons_alone: bool,
+        arena: &mut Arena<'l>,
+    ) -> Result<Learned<'l>, OutOfMemory> {
+        let RenderContext { scene, lights, .. } = *self.light_paths.context;
+        let Some(mut stats) = GuideStats::aimed(scene, lights, by_power, arena)? else {
+            return Ok(Learned::Paths);
+        };
+        let aimed = stats.guide(by_power, &mut arena.scratch())?;
+        self.light_paths.trace::<F>(&aimed, FIRST_TEST, AIMED_MAP)?;
+        let mean = self.paths.mean_radiance(self.light_paths.executor)?;
+        if !self.benefit(FIRST_TEST, mean).may_pay() {
+            return Ok(Learned::Paths);
+        }
+        self.light_paths.trace::<F>(&aimed, STEP, AIMED_MAP)?;
+        self.light_paths.teach(&mut stats);
+        let learned = stats.guide(by_power, &mut arena.scratch())?;
+        self.light_paths.trace::<F>(&learned, STEP, LEARNED_MAP)?;
+        self.light_paths.teach(&mut stats);
+        let mean = self.other_light(&learned)?;
+        let benefit = self.benefit(STEP, mean);
+        if allows_photons_alone && benefit.share >= MOST_SHARE {
+            self.light_paths.trace::<F>(by_power, STEP, BY_POWER_MAP)?;
+            let visible = visible(self.light_paths.found);
+            if visible > 0.0 && visible >= LEAST_BY_POWER * benefit.visible {
+                return Ok(Learned::ProgressivePhotons);
+            }
+        }
+        Ok(if self.pays(&benefit)? { Learned::Photons(stats, benefit) } else { Learned::Paths })
+    }
+
+    /// The benefit by the first `count` light paths, in a picture in which all other light has a `mean` radiance.
+    fn benefit(&mut self, count: usize, mean: f32) -> Benefit {
+        let LightPaths { context, found, .. } = &mut self.light_paths;
+        let found = found.get_mut(..count).unwrap_or_default();
+        let benefit = Benefit::new(found, FIRST_RADIUS, context.pixels() as f64, f64::from(mean));
+        self.share = Some(benefit.share);
+        benefit
+    }
+
+    /// Mean radiance of light that photons of `sampler` do not carry. It is not that of the picture: a visible lamp, or
+    /// a path that meets one through glass, may be nearly all of that, or be absent by chance.
+    fn other_light(&mut self, sampler: &EmissionSampler) -> Result<f32, OutOfMemory> {
+        let LightPaths { radii, beside_records, ref mut executor, .. } = self.light_paths;
+        // Weights alone: an empty map adds no light.
+        let mut line = [Line([0; _])];
+        let empty = Photons::new(0, &mut Arena::new(bytemuck::cast_slice_mut(&mut line)))?.build(0);
+        let merging = CausticMerging::new([&empty; 2], sampler, radii, STEP as u32);
+        let integrator = self.paths.integrator().with_caustics(merging.beside_records(beside_records));
+        pilot::mean_radiance_without_photons(&integrator, *executor)
+    }
+
+    fn pays(&mut self, benefit: &Benefit) -> Result<bool, OutOfMemory> {
+        if let Some(pays) = benefit.pays() {
+            return Ok(pays);
+        }
+        let pilot = self.paths.variance(benefit.mean as f32, self.light_paths.executor)?;
+        Ok(benefit.pays_beside(pilot.noise(self.paths.reuse().used)))
+    }
+}
+
+/// Light paths of the prepass, and what they found.
+struct LightPaths<'p, E> {
+    context: &'p RenderContext<'p>,
+    radii: RadiusSchedule,
+    beside_records: bool,
+    found: &'p mut [GuideSample],
+    executor: &'p mut E,
+}
+
+impl<E: Executor> LightPaths<'_, E> {
+    /// Replaces what was found by `count` light paths of `sampler`, those of a `map`. If the executor ends early, the
+    /// paths that are missing found nothing.
+    fn trace<F: Features>(
+        &mut self,
+        sampler: &EmissionSampler,
+        count: usize,
+        map: u32,
+    ) -> Result<(), OutOfMemory> {
+        let Self { context, radii, beside_records, found, executor } = self;
+        let tracer = photon_tracer::<F>(context, sampler, count, *radii, *beside_records);
+        found.fill(GuideSample::default());
+        let pieces = found.get_mut(..count).unwrap_or_default().chunks_mut(PATHS);
+        let _ = executor
+            .pass(pieces, |task, found, worker| tracer.look(task, map, &mut worker.scratch, found))?;
+        Ok(())
+    }
+
+    fn teach(&self, stats: &mut GuideStats) {
+        self.found.iter().for_each(|path| stats.learn(path.cell, path.worth));
+    }
+}
+
+/// Memory that [`unseen`] borrows.
+pub fn unseen_footprint(lights: &LightSampler) -> Footprint {
+    EmissionSampler::footprint(lights).slice::<GuideSample>(STEP)
+}
+
+/// Estimated fraction of the picture's light that photons find and path tracing with `samples` of each pixel hardly ever
+/// does: that of very small lights by mirrors and dielectrics. `None` if it is zero, or without memory.
+///
+/// # Errors
+/// [`OutOfMemory`] where the executor's scratch is smaller than [`scratch`](super::scratch).
+pub fn unseen<'m, F: Features>(
+    context: &RenderContext,
+    samples: f64,
+    memory: &mut impl MemorySource<'m>,
+    executor: &mut impl Executor,
+) -> Result<Option<f64>, OutOfMemory> {
+    let RenderContext { scene, bvh, lights, .. } = *context;
+    let lent = unseen_footprint(lights);
+    if !super::are_possible(scene) || !memory.has(lent) {
+        return Ok(None);
+    }
+    memory.lend("audit", lent, |_, arena| {
+        let found = arena.slice(STEP)?;
+        let by_power = EmissionSampler::build(scene, lights, &bvh.bounds(), arena)?;
+        let radii = context.radii().after(FIRST_RADIUS, 0);
+        let mut light_paths = LightPaths { context, radii, beside_records: false, found, executor };
+        light_paths.trace::<F>(&by_power, STEP, AUDIT_MAP)?;
+        let LightPaths { found, executor, .. } = light_paths;
+        let missing = missing(found, FIRST_RADIUS, context.pixels() as f64, (samples, FEWEST_HITS));
+        let mean = f64::from(pilot::mean_radiance(&context.integrator::<F>(), executor)?);
+        Ok((missing > 0.0).then(|| missing / (missing + mean)))
+    })
+}
