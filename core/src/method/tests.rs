@@ -24,12 +24,12 @@ type Photons<'a> = ProgressivePhotonMapping<'a, All>;
 type TwoPasses<'a> = PhotonMapping<'a, All>;
 
 /// A buffer of `bytes` bytes.
-fn lines(bytes: usize) -> Vec<Line> {
+pub(super) fn lines(bytes: usize) -> Vec<Line> {
     vec![Line([0; 64]); bytes.div_ceil(64)]
 }
 
 /// Calls `check` with a white room with a mirror in it and a lamp.
-fn with_room(check: impl FnOnce(&RenderContext)) {
+pub(super) fn with_room(check: impl FnOnce(&RenderContext)) {
     let positions = [
         [-2.0, 0.0, -2.0],
         [2.0, 0.0, -2.0],
@@ -66,7 +66,7 @@ fn with_room(check: impl FnOnce(&RenderContext)) {
 }
 
 /// Brings a film to `spp` samples by `round`, in rounds of `samples` and steps of `step`; returns its pixels.
-fn film(
+pub(super) fn film(
     context: &RenderContext,
     executor: &mut Loop,
     [spp, samples, step]: [u32; 3],
@@ -122,7 +122,7 @@ fn two_passes(
 }
 
 /// Bytes that are enough for all maps and guides of these pictures.
-const PLENTY: usize = 8 << 20;
+pub(super) const PLENTY: usize = 8 << 20;
 
 /// Light paths that the pictures' maps were given and wanted.
 fn paths(used: Option<MapUse>) -> [u64; 2] {

@@ -158,7 +158,6 @@ impl<'a> Progressive<'a> {
             target: plan.target,
             step: step(plan, state.tiles(), workers.count()),
             deadline,
-            watch: &workers.watch,
             is_first: plan.first,
         };
         renderer.round(&mut Crew { workers, round: &round, canvas: state })?;

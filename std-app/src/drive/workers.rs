@@ -1,22 +1,23 @@
 //! The threads: each takes the next task when it is done with one, and has working memory of its own.
 
-use super::crew::Task;
 use super::watch::Watch;
 use super::{RenderError, regions};
 use halflight_core::Level;
-use halflight_core::bsdf::Features;
 use halflight_core::bvh::{Bvh, ForkJoin};
 use halflight_core::estimate::{
     BiasEstimate, BrightnessClasses, ErrorEstimate, TileBlur, TileError, TileLight,
 };
 use halflight_core::film::{Film, PIXELS_PER_TILE, Pixel};
 use halflight_core::memory::{Arena, Line, OutOfMemory};
-use halflight_core::photon::{PhotonMap, Photons};
 use halflight_core::scene::Mesh;
-use halflight_core::transport::{Counters, Estimator, PathIntegrator, Pilot, path::WAVE};
+use halflight_core::transport::Counters;
 use rayon::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use std::sync::Mutex;
+
+/// A task of a pass: its number, working memory, its piece of the output.
+pub(super) type Task<'t, T> =
+    dyn Fn(usize, &mut Arena, &mut [T]) -> Result<Counters, OutOfMemory> + Sync + 't;
 
 /// A pool of threads.
 pub(super) struct Workers<'w> {
@@ -114,11 +115,6 @@ impl<'w> Workers<'w> {
         Some(light.mean()).filter(|mean| *mean > 0.0)
     }
 
-    /// Builds the map over the first `count` of `photons` on all cores.
-    pub(super) fn build_photons<'m>(&self, photons: Photons<'m>, count: usize) -> PhotonMap<'m> {
-        self.fork.0.install(|| photons.build_with(count, &self.fork))
-    }
-
     /// Runs `work` once on every thread, each with working memory of its own.
     pub(super) fn on_all<T: Send>(
         &self,
@@ -159,39 +155,6 @@ impl<'w> Workers<'w> {
             done += tasks;
         }
         Ok((counters, done == tasks))
-    }
-
-    /// A pass before the picture, or after it, which ends where the render is over. Whether all tasks ran: if not, what
-    /// was to be found is not known.
-    pub(super) fn look<T: Send>(
-        &self,
-        out: &mut [T],
-        size: usize,
-        scratch: &mut [Vec<Line>],
-        task: &Task<T>,
-    ) -> Result<bool, OutOfMemory> {
-        Ok(self.pass(out, size, scratch, &|| self.watch.is_over(), task)?.1)
-    }
-
-    /// What `look` says of each of `tasks`, in their order; of fewer where the render is over.
-    pub(super) fn each<P: Send, T: Send>(
-        &self,
-        tasks: impl Iterator<Item = P> + Send,
-        scratch: &mut [Vec<Line>],
-        look: impl Fn(P, &mut Arena) -> Result<T, OutOfMemory> + Sync,
-    ) -> Result<Vec<T>, OutOfMemory> {
-        let queue = Mutex::new(tasks.enumerate());
-        let next = || queue.lock().unwrap_or_else(|poisoned| poisoned.into_inner()).next();
-        let seen = self.on_all(scratch, |arena| {
-            let mut seen = Vec::new();
-            while let Some((index, task)) = next().filter(|_| !self.watch.is_over()) {
-                seen.push((index, look(task, arena)?));
-            }
-            Ok(seen)
-        });
-        let mut seen: Vec<(usize, T)> = seen?.into_iter().flatten().collect();
-        seen.sort_by_key(|(index, _)| *index);
-        Ok(seen.into_iter().map(|(_, value)| value).collect())
     }
 
     /// The error of `film`; `None` for fewer than four samples as well.

@@ -34,7 +34,7 @@ use halflight_core::bvh::Bvh;
 use halflight_core::light::LightSampler;
 use halflight_core::method::RenderContext;
 use halflight_core::scene::Scene;
-use halflight_core::transport::{CausticMerging, PathIntegrator, PathSettings, RadiusSchedule};
+use halflight_core::transport::{CausticMerging, PathIntegrator, PathSettings};
 
 /// A way to make a picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -195,12 +195,6 @@ impl<'a> Stage<'a> {
     pub(super) fn context(&self) -> RenderContext<'a> {
         let Self { scene, bvh, lights, settings, .. } = *self;
         RenderContext { scene, bvh, lights, settings: path_settings(settings), level: settings.level }
-    }
-
-    /// RadiusSchedule that photons are gathered from, of one pixel.
-    fn discs(&self) -> RadiusSchedule {
-        let Self { scene, bvh, settings, .. } = self;
-        RadiusSchedule::new((scene, bvh), [settings.width, settings.height], settings.level)
     }
 }
 
