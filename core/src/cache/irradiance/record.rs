@@ -155,8 +155,15 @@ impl Record {
     /// Position and gradient are given in these axes: R1, R2, normal.
     #[inline]
     pub(super) fn local(&self, offset: Vec3) -> Vec3 {
-        let (axis, normal) = (Vec3::from(self.axis), Vec3::from(self.normal));
-        Vec3::new(offset.dot(axis), offset.dot(normal.cross(axis)), offset.dot(normal))
+        let [first, second] = self.axes();
+        Vec3::new(offset.dot(first), offset.dot(second), offset.dot(self.normal.into()))
+    }
+
+    /// The two axes of the tangent plane, R1 and R2.
+    #[inline]
+    pub(crate) fn axes(&self) -> [Vec3; 2] {
+        let axis = Vec3::from(self.axis);
+        [axis, Vec3::from(self.normal).cross(axis)]
     }
 
     /// How far a point is, in radii: 1 on the rim of what the record covers.

@@ -119,14 +119,18 @@ impl<F: Features, E: Estimator<F>> PathIntegrator<'_, F, E> {
         let along = (Vec3::ONE - normal * normal).max(Vec3::ZERO).to_array().map(libm::sqrtf);
         let half = reach * Vec3::from(along) + 0.5 * height * normal.abs();
         let center = middle + 0.5 * height * normal;
-        let local = |corner: Vec3| {
-            let offset = corner - middle;
-            record.along_axes(offset).extend(offset.dot(normal))
-        };
+        let [first, second] = record.axes();
         let flat = FLAT * place.error.max(FLATTEST * reach);
         let mut noted = *record;
         let is_whole = self.context.bvh.overlapping(center - half, center + half, |corners| {
-            if let Some(overhang) = Overhang::of(corners.map(local), reach, flat) {
+            let offsets = corners.map(|corner| corner - middle);
+            let heights = offsets.map(|offset| offset.dot(normal));
+            // Most triangles near a record are the surface itself.
+            if heights.iter().all(|height| *height <= flat) {
+                return true;
+            }
+            let local = |i: usize| Vec3::new(offsets[i].dot(first), offsets[i].dot(second), heights[i]);
+            if let Some(overhang) = Overhang::of([0, 1, 2].map(local), reach, flat) {
                 let Overhang { sectors, from, height } = overhang;
                 let close = if CLOSE * height < least { 0.0 } else { CLOSE * height };
                 noted.note_overhang(sectors, close.max(from - height));
@@ -155,10 +159,13 @@ impl Overhang {
     fn of(corners: [Vec3; 3], reach: f32, flat: f32) -> Option<Self> {
         let [a, b, c] = corners;
         let (highest, lowest) = (a.max(b).max(c), a.min(b).min(c));
+        let [x, y] = [highest.x.min(-lowest.x), highest.y.min(-lowest.y)];
+        if x.min(y) < -reach || highest.z <= flat {
+            return None;
+        }
         let normal = (b - a).cross(c - a);
         let is_steep = normal.z.abs() <= STEEP * normal.length();
-        let [x, y] = [highest.x.min(-lowest.x), highest.y.min(-lowest.y)];
-        if is_steep || x.min(y) < -reach || highest.z <= flat {
+        if is_steep {
             return None;
         }
         // The height of its plane over the middle, and its slope.
