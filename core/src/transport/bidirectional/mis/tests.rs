@@ -188,7 +188,7 @@ impl Path {
         let mut light = vec![Sums::default(); k + 1];
         let mut sums = Sums::default();
         let choice = if mistake == Mistake::LightChoice { self.choice } else { 1.0 };
-        for i in 1..k {
+        for (i, arrived) in light.iter_mut().enumerate().take(k).skip(1) {
             let vertex = at(i);
             sums = match i {
                 1 => {
@@ -200,7 +200,7 @@ impl Path {
                 }
                 _ => sums.arrive(f(self.squared[i - 1]), f(vertex.cos[0]), vertex.is_delta),
             };
-            light[i] = sums;
+            *arrived = sums;
             sums = match vertex.is_delta {
                 true => sums.scatter_delta(f(vertex.cos[0]), f(vertex.eta)),
                 false => sums.scatter(counts, f(vertex.pdf[0]), f(vertex.pdf[1]), f(vertex.cos[1])),
