@@ -184,7 +184,8 @@ impl<'m> IrradianceCache<'m> {
         true
     }
 
-    /// The records, to be changed where they are. [`IrradianceCache::rebuild`] is to follow where one becomes wider.
+    /// The records, to be changed where they are. [`IrradianceCache::rebuild`] is to follow where one becomes
+    /// wider.
     pub fn records_mut(&mut self) -> &mut [Record] {
         self.records.get_mut(..self.used).unwrap_or_default()
     }

@@ -4,13 +4,15 @@
 //! same bits as without a prepass. An irradiance cache uses the same photons for its picture and its records.
 
 mod benefit;
+mod emission;
 mod photons;
 mod prepass;
 #[cfg(test)]
 mod tests;
 
-pub use photons::{CausticPhotons, RecordPhotons, least_footprint};
-pub use prepass::{CausticEmission, CausticSettings, Decision, Prepass, prepass, unseen, unseen_footprint};
+pub use emission::{CausticEmission, CausticSettings, least_footprint};
+pub use photons::{CausticPhotons, RecordPhotons};
+pub use prepass::{Decision, Prepass, prepass, unseen, unseen_footprint};
 
 use super::path::{PathTracing, Reuse};
 use super::{Executor, Method, PhotonUse, RenderContext, Round};

@@ -2,20 +2,16 @@
 //! for the odd samples, so that the halves of the film stay independent. Radii shrink from one pair of maps to the next
 //! as those of progressive photon mapping do (Knaus and Zwicker 2011), so that the blur vanishes.
 
-use super::prepass::{CausticEmission, CausticSettings};
+use super::emission::{CausticEmission, CausticSettings, FIRST_RADIUS, least_footprint, photon_tracer};
 use crate::bsdf::Features;
 use crate::light::EmissionSampler;
-use crate::memory::{Footprint, MemorySource, OutOfMemory};
+use crate::memory::{MemorySource, OutOfMemory};
 use crate::method::executor::{Executor, Passed};
 use crate::method::path::PathTracing;
 use crate::method::{MapUse, PhotonMapPair, PhotonMapStore, PhotonUse, RenderContext, Round, pilot};
 use crate::photon::PhotonMap;
-use crate::transport::caustics::tracer::{CausticPhotonTracer, PATHS, ROOM};
-use crate::transport::photon_mapping::deposit::{PhotonFilter, PhotonTracerSettings};
+use crate::transport::caustics::tracer::{PATHS, ROOM};
 use crate::transport::{CausticMerging, Estimator, PathIntegrator, RadiusSchedule, Sharing, path::WAVE};
-
-/// Radius of the discs of the first sample, in pixels, with the usual photon budget.
-pub(super) const FIRST_RADIUS: f64 = 1.0;
 
 /// Light paths of a map for each pixel of the picture and each sample that the map serves, with the usual photon budget;
 /// at least and at most.
@@ -33,12 +29,6 @@ const RECORD_RADIUS: f32 = 3.0;
 /// Maps for records have one in so many of the light paths of a map for the picture, and numbers of their own.
 const RECORD_PART: usize = 4;
 const RECORD_MAP: u32 = 1 << 30;
-
-/// Memory for the fewest photons.
-pub fn least_footprint() -> Footprint {
-    let map = PhotonMapStore::footprint(ROOM);
-    map.and(map)
-}
 
 /// Caustic photons of one picture.
 pub struct CausticPhotons<'a> {
@@ -277,26 +267,6 @@ impl<'a> CausticPhotons<'a> {
         }
         Ok(passed)
     }
-}
-
-/// A tracer of so many light `paths` by `sampler`, for discs of `radii`.
-pub(super) fn photon_tracer<'a, F: Features>(
-    context: &RenderContext<'a>,
-    sampler: &'a EmissionSampler<'a>,
-    paths: usize,
-    radii: RadiusSchedule,
-    beside_records: bool,
-) -> CausticPhotonTracer<'a, F> {
-    let RenderContext { scene, bvh, lights, settings, level } = *context;
-    let traced = PhotonTracerSettings {
-        keep: PhotonFilter::Caustic,
-        seed: settings.seed,
-        paths: paths as u32,
-        max_depth: settings.max_depth,
-    };
-    let frame = (radii, [settings.width, settings.height]);
-    CausticPhotonTracer::new((scene, bvh, lights), sampler, traced, frame, level)
-        .beside_records(beside_records)
 }
 
 #[cfg(test)]

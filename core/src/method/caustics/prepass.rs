@@ -2,7 +2,7 @@
 //! them the camera sees, and show whether photons pay.
 
 use super::benefit::{Benefit, missing, visible};
-use super::photons::{FIRST_RADIUS, least_footprint, photon_tracer};
+use super::emission::{CausticEmission, CausticSettings, FIRST_RADIUS, least_footprint, photon_tracer};
 use crate::bsdf::Features;
 use crate::light::{EmissionSampler, GuideStats, LightSampler};
 use crate::memory::{Arena, Footprint, Line, MemorySource, OutOfMemory};
@@ -34,17 +34,6 @@ const FEWEST_HITS: f64 = 64.0;
 /// The name of the emission sampler and its guide in reports of memory.
 const EMISSION: &str = "emission";
 
-/// What a prepass needs to know of the picture.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct CausticSettings {
-    /// Whether an irradiance cache has the light that rough surfaces reflect.
-    pub beside_records: bool,
-    /// Whether [`Decision::ProgressivePhotons`] is a choice.
-    pub allows_photons_alone: bool,
-    /// Bytes that photons leave for others.
-    pub reserved: usize,
-}
-
 /// The method that suits a picture.
 pub enum Decision<'a> {
     /// Paths alone.
@@ -64,15 +53,6 @@ pub struct Prepass<'a> {
     pub share: Option<f64>,
     /// There was not enough memory for a prepass.
     pub lacks_memory: bool,
-}
-
-/// How caustic photons are emitted and gathered.
-#[derive(Clone, Copy)]
-pub struct CausticEmission<'a> {
-    pub(super) sampler: EmissionSampler<'a>,
-    /// Of one pixel.
-    pub(super) radii: RadiusSchedule,
-    pub(super) benefit: Benefit,
 }
 
 /// Memory that a picture with photons keeps of its prepass.

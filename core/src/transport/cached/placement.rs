@@ -1,5 +1,6 @@
-//! Gather points of the picture: the order of its pixels from coarse to fine, in which the first n pixels are spread
-//! evenly, whatever n is, and the diffuse point that a pixel sees directly or through other surfaces ([`Via`]).
+//! Gather points of the picture: the order of its pixels from coarse to fine, in which the first n pixels are
+//! spread evenly, whatever n is, and the diffuse point that a pixel sees directly or through other surfaces
+//! ([`Via`]).
 
 use crate::bsdf::{Bsdf, Features};
 use crate::bvh::Coherence;
