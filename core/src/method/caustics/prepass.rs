@@ -13,7 +13,7 @@ use crate::transport::caustics::tracer::{GuideSample, PATHS};
 use crate::transport::{CausticMerging, RadiusSchedule};
 
 /// Light paths of the first test, which ends the prepass where there is next to nothing to find, and of each later
-/// step.
+/// step; where memory is short, fewer, but no fewer than those of the test.
 const FIRST_TEST: usize = 4 * PATHS;
 const STEP: usize = 32 * PATHS;
 
@@ -60,10 +60,17 @@ fn kept(lights: &LightSampler) -> Footprint {
     EmissionSampler::footprint(lights).and(GuideStats::guide_footprint(lights))
 }
 
-/// Memory of the prepass itself.
-fn lent(lights: &LightSampler) -> Footprint {
+/// Memory of the prepass itself, with so many light paths in a step.
+fn lent(lights: &LightSampler, step: usize) -> Footprint {
     let stats = GuideStats::footprint(lights).and(GuideStats::guide_footprint(lights));
-    EmissionSampler::footprint(lights).and(stats).slice::<GuideSample>(STEP)
+    EmissionSampler::footprint(lights).and(stats).slice::<GuideSample>(step)
+}
+
+/// Light paths of a step that there is memory for within `available` bytes.
+fn step(lights: &LightSampler, available: usize) -> usize {
+    let left = available.saturating_sub(kept(lights).and(lent(lights, 0)).bytes());
+    let task = Footprint::default().slice::<GuideSample>(PATHS);
+    (left / task.bytes() * PATHS).clamp(FIRST_TEST, STEP)
 }
 
 /// Runs a prepass for a picture of `context`; `paths` measure it without photons.
@@ -78,7 +85,8 @@ pub fn prepass<'a, F: Features>(
     executor: &mut impl Executor,
 ) -> Result<Prepass<'a>, OutOfMemory> {
     let RenderContext { scene, bvh, lights, .. } = *context;
-    let (kept, lent) = (kept(lights), lent(lights));
+    let step = step(lights, memory.available());
+    let (kept, lent) = (kept(lights), lent(lights, step));
     let later = kept.and(least_footprint()).bytes().saturating_add(settings.reserved);
     if !memory.has(kept.and(lent)) || later > memory.available() {
         return Ok(Prepass { decision: Decision::Paths, share: None, lacks_memory: true });
@@ -88,7 +96,7 @@ pub fn prepass<'a, F: Features>(
             context,
             radii: context.radii().after(FIRST_RADIUS, 0),
             beside_records: settings.beside_records,
-            found: arena.slice(STEP)?,
+            found: arena.slice(step)?,
             executor,
         };
         let by_power = EmissionSampler::build(scene, lights, &bvh.bounds(), arena)?;
@@ -138,15 +146,16 @@ impl<F: Features, E: Executor> Learning<'_, '_, F, E> {
         if !self.benefit(FIRST_TEST, mean).may_pay() {
             return Ok(Learned::Paths);
         }
-        self.light_paths.trace::<F>(&aimed, STEP, AIMED_MAP)?;
+        let step = self.light_paths.found.len();
+        self.light_paths.trace::<F>(&aimed, step, AIMED_MAP)?;
         self.light_paths.teach(&mut stats);
         let learned = stats.guide(by_power, &mut arena.scratch())?;
-        self.light_paths.trace::<F>(&learned, STEP, LEARNED_MAP)?;
+        self.light_paths.trace::<F>(&learned, step, LEARNED_MAP)?;
         self.light_paths.teach(&mut stats);
         let mean = self.other_light(&learned)?;
-        let benefit = self.benefit(STEP, mean);
+        let benefit = self.benefit(step, mean);
         if allows_photons_alone && benefit.share >= MOST_SHARE {
-            self.light_paths.trace::<F>(by_power, STEP, BY_POWER_MAP)?;
+            self.light_paths.trace::<F>(by_power, step, BY_POWER_MAP)?;
             let visible = visible(self.light_paths.found);
             if visible > 0.0 && visible >= LEAST_BY_POWER * benefit.visible {
                 return Ok(Learned::ProgressivePhotons);
@@ -167,11 +176,11 @@ impl<F: Features, E: Executor> Learning<'_, '_, F, E> {
     /// Mean radiance of light that photons of `sampler` do not carry. It is not that of the picture: a visible lamp, or
     /// a path that meets one through glass, may be nearly all of that, or be absent by chance.
     fn other_light(&mut self, sampler: &EmissionSampler) -> Result<f32, OutOfMemory> {
-        let LightPaths { radii, beside_records, ref mut executor, .. } = self.light_paths;
+        let LightPaths { radii, beside_records, ref found, ref mut executor, .. } = self.light_paths;
         // Weights alone: an empty map adds no light.
         let mut line = [Line([0; _])];
         let empty = Photons::new(0, &mut Arena::new(bytemuck::cast_slice_mut(&mut line)))?.build(0);
-        let merging = CausticMerging::new([&empty; 2], sampler, radii, STEP as u32);
+        let merging = CausticMerging::new([&empty; 2], sampler, radii, found.len() as u32);
         let integrator = self.paths.integrator().with_caustics(merging.beside_records(beside_records));
         pilot::mean_radiance_without_photons(&integrator, *executor)
     }
