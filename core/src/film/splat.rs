@@ -20,7 +20,7 @@ pub struct Splat {
     pub radiance: [f32; 3],
 }
 
-/// Where the splats of each strip begin in a sorted list, and where the last ends.
+/// Start of each strip in a sorted list, and the end of the last.
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct StripOffsets([u32; STRIPS + 1]);

@@ -55,7 +55,7 @@ struct Block {
     rare: f64,
 }
 
-/// What caustic photons bring to a picture.
+/// Benefit of caustic photons for a picture.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Benefit {
     /// Their fraction of the mean radiance.

@@ -12,7 +12,7 @@ use crate::transport::photon_mapping::deposit::{PhotonFilter, PhotonTracerSettin
 /// Radius of the discs of the first sample, in pixels, with the usual photon budget.
 pub(super) const FIRST_RADIUS: f64 = 1.0;
 
-/// What a prepass needs to know of the picture.
+/// Conditions of a prepass.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct CausticSettings {
     /// Whether an irradiance cache has the light that rough surfaces reflect.

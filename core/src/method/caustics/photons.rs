@@ -41,11 +41,11 @@ pub struct CausticPhotons<'a> {
     /// Light paths of a map that there is memory for.
     most_paths: usize,
     statistics: PhotonUse,
-    /// What the last maps are for; `None` without maps.
+    /// Samples and discs of the last maps; `None` without maps.
     made: Option<Made>,
 }
 
-/// What a pair of maps is for.
+/// Samples, discs and light paths of a pair of maps.
 #[derive(Clone, Copy)]
 struct Made {
     block: Block,

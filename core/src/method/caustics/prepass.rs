@@ -46,7 +46,7 @@ pub enum Decision<'a> {
 
 /// The result of a prepass.
 pub struct Prepass<'a> {
-    /// What suits the picture.
+    /// Choice for the picture.
     pub decision: Decision<'a>,
     /// Estimated fraction of the picture's light that photons carry and path tracing finds badly; `None` if there was
     /// not enough memory.
