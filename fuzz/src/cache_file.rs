@@ -1,7 +1,7 @@
 //! Files of irradiance caches: any bytes are a cache, or give a reason why they are none. What is read fits into the
 //! bytes that were there.
 
-use halflight::drive::inspect_cache;
+use halflight::render::inspect_cache;
 
 /// Bytes of a record in a file.
 const RECORD: usize = 160;

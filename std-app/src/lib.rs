@@ -1,11 +1,11 @@
 //! The halflight app: loads scenes, renders them with all processors, saves pictures and reports.
 //!
-//! A picture takes four steps: [`load`] a scene, choose a camera, [`drive`] the render, [`save`] the image.
+//! A picture takes four steps: [`load`] a scene, choose a camera, [`render`] the picture, [`save`] the image.
 //! [`compare`] computes the difference between two images, [`report`] describes a render.
 //!
 //! ```no_run
 //! use core::sync::atomic::AtomicBool;
-//! use halflight::drive::{Settings, render};
+//! use halflight::render::{Settings, render};
 //! use halflight::{load, save};
 //!
 //! let loaded = load::load("scenes/cornell/cornell.obj".as_ref(), &load::LoadOptions::default())?;
@@ -20,11 +20,11 @@
 
 pub mod bench;
 pub mod compare;
-pub mod drive;
 pub mod load;
 pub mod memory;
 mod pages;
 pub mod picture;
+pub mod render;
 pub mod report;
 pub mod save;
 pub mod stability;

@@ -7,8 +7,8 @@
 //! `--error 0` goes on to the last sample, also where a method's bias is found.
 
 use core::sync::atomic::AtomicBool;
-use halflight::drive::{ErrorEstimate, Method, RenderResult, Round, Settings, Stop, render};
 use halflight::load::{self, LoadOptions};
+use halflight::render::{ErrorEstimate, Method, RenderResult, Round, Settings, Stop, render};
 use halflight::save::Image;
 use halflight_core::estimate::relmse;
 use std::path::{Path, PathBuf};

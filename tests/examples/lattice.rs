@@ -9,8 +9,8 @@
 //! SCENE…`, scene files. Processor seconds are read from /proc, with one thread for each render.
 
 use core::sync::atomic::AtomicBool;
-use halflight::drive::{Progress, Settings, Stop, render};
 use halflight::load::{self, LoadOptions};
+use halflight::render::{Progress, Settings, Stop, render};
 use std::path::Path;
 
 /// Pixels along a block.

@@ -3,7 +3,7 @@
 
 use crate::statistics;
 use core::sync::atomic::AtomicBool;
-use halflight::drive::{self, Method, RenderError, RenderResult, Settings, Stop};
+use halflight::render::{self, Method, RenderError, RenderResult, Settings, Stop};
 use halflight::save::Image;
 use halflight_core::scene::Scene;
 
@@ -34,7 +34,7 @@ pub fn try_render(
     let (method, audit) = (Some(method), Some(0.0));
     let mut settings = Settings { method, width: size, height: size, stop, audit, ..Settings::default() };
     change(&mut settings);
-    drive::render(scene, &settings, &mut |_| (), &AtomicBool::new(false))
+    render::render(scene, &settings, &mut |_| (), &AtomicBool::new(false))
 }
 
 /// Whether it has memory of photons.

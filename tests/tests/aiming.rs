@@ -2,7 +2,7 @@
 //! Their light against that of the path tracer is a column of the table.
 
 use crate::table::scenes::{rooms, rooms_with_balls};
-use halflight::drive::{MapUse, Method, PhotonUse, RenderResult};
+use halflight::render::{MapUse, Method, PhotonUse, RenderResult};
 use halflight_tests::render::render;
 use halflight_tests::scenes::cornell_box;
 

@@ -3,7 +3,7 @@
 
 use core::sync::atomic::AtomicBool;
 use glam::Vec3;
-use halflight::drive::{self, CacheUse, Method, RenderResult, Settings, Stop};
+use halflight::render::{self, CacheUse, Method, RenderResult, Settings, Stop};
 use halflight_core::scene::Camera;
 use halflight_tests::scenes::{SceneBuffers, cornell_box};
 use std::path::{Path, PathBuf};
@@ -21,7 +21,7 @@ fn render(
     settings.load_cache = load.map(Path::to_owned);
     settings.save_cache = save.map(Path::to_owned);
     change(&mut settings);
-    let done = drive::render(&buffers.scene(), &settings, &mut |_| (), &AtomicBool::new(false));
+    let done = render::render(&buffers.scene(), &settings, &mut |_| (), &AtomicBool::new(false));
     done.map_err(|error| error.to_string())
 }
 

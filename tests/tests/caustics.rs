@@ -3,7 +3,7 @@
 
 use crate::table::scenes::everything_by_a_mirror;
 use glam::Vec3;
-use halflight::drive::{Checkpoint, Method, RenderResult, Settings};
+use halflight::render::{Checkpoint, Method, RenderResult, Settings};
 use halflight_core::bsdf::All;
 use halflight_core::bvh::Bvh;
 use halflight_core::film::Film;

@@ -1,7 +1,7 @@
 //! An irradiance cache beside photons of caustics: no light is counted twice, records come first where memory
 //! is short, and the audit merges the same photons.
 
-use halflight::drive::{Method, RenderResult, Settings};
+use halflight::render::{Method, RenderResult, Settings};
 use halflight_core::scene::Scene;
 use halflight_tests::render::{difference, has_photons, render, try_render};
 use halflight_tests::scenes::{SceneBuffers, glass, in_a_room, lamp_before, lamp_over_ball, metal};

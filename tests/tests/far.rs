@@ -4,7 +4,7 @@
 use crate::load_support::Files;
 use core::fmt::Write;
 use core::sync::atomic::AtomicBool;
-use halflight::drive::{Settings, Stop, render};
+use halflight::render::{Settings, Stop, render};
 
 const MTL: &[u8] = b"newmtl a\nKd 0.5 0.5 0.5\nnewmtl lamp\nKd 0 0 0\nKe 3 3 3\n";
 

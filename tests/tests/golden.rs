@@ -8,8 +8,8 @@
 //! rewrites `golden.txt`, for the instruction sets of this machine; the others keep their rows.
 
 use glam::Vec3;
-use halflight::drive::{Method, RenderResult, Settings};
 use halflight::load::{self, LoadOptions};
+use halflight::render::{Method, RenderResult, Settings};
 use halflight_core::scene::Scene;
 use halflight_simd::Level;
 use halflight_tests::render::render;

@@ -3,7 +3,7 @@
 
 use core::sync::atomic::AtomicBool;
 use glam::Vec3;
-use halflight::drive::{CacheUse, Checkpoint, Ending, Mark, Method, RenderResult, Settings};
+use halflight::render::{CacheUse, Checkpoint, Ending, Mark, Method, RenderResult, Settings};
 use halflight_core::Rgb;
 use halflight_core::scene::{Material, Scene};
 use halflight_tests::render::{blocks, difference, render};
@@ -63,7 +63,7 @@ fn filling_a_cache_ends_at_an_interrupt() {
     let settings =
         Settings { method: Some(Method::IrradianceCache), width: 64, height: 64, ..Settings::default() };
     let result =
-        halflight::drive::render(&buffers.scene(), &settings, &mut |_| (), &AtomicBool::new(true)).unwrap();
+        halflight::render::render(&buffers.scene(), &settings, &mut |_| (), &AtomicBool::new(true)).unwrap();
     assert_eq!((result.spp, result.ending, cache(&result).records), (1, Ending::Interrupted, 0));
 }
 

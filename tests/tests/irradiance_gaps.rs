@@ -2,7 +2,7 @@
 //! under the ceiling there is the light that paths find, however narrow the gap is beside the room.
 
 use glam::Vec3;
-use halflight::drive::{Method, RenderResult};
+use halflight::render::{Method, RenderResult};
 use halflight_core::Rgb;
 use halflight_core::scene::Camera;
 use halflight_core::scene::{Material, Scene};

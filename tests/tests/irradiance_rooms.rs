@@ -3,7 +3,7 @@
 //! way.
 
 use glam::Vec3;
-use halflight::drive::Method;
+use halflight::render::Method;
 use halflight::save::Image;
 use halflight_core::Rgb;
 use halflight_core::scene::{Camera, Material, Scene};

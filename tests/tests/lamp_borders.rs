@@ -1,7 +1,7 @@
 //! Pixels at the border of a lamp show as much of it as they see, however little that is.
 
 use glam::{Vec2, Vec3};
-use halflight::drive::Method;
+use halflight::render::Method;
 use halflight_core::scene::Camera;
 use halflight_tests::render::render;
 use halflight_tests::scenes::{SceneBuffers, emitter};

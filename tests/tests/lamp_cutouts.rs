@@ -2,7 +2,7 @@
 //! and so what is seen of them and what they send are in proportion to it.
 
 use glam::Vec3;
-use halflight::drive::{Method, Settings};
+use halflight::render::{Method, Settings};
 use halflight_core::Rgb;
 use halflight_core::scene::{Camera, Material, Scene};
 use halflight_tests::render::{difference, render};

@@ -1,7 +1,7 @@
 //! Photon mapping in two passes: its kernels and maps, light through a slit, and less memory.
 
-use halflight::drive::{Method, PhotonUse, RenderResult, Settings};
 use halflight::load::{self, LoadOptions};
+use halflight::render::{Method, PhotonUse, RenderResult, Settings};
 use halflight::save::Image;
 use halflight_core::Rgb;
 use halflight_core::photon::Kernel;

@@ -3,8 +3,8 @@
 
 use core::sync::atomic::AtomicBool;
 use halflight::compare::compare;
-use halflight::drive::{Place, RenderResult, Settings, Stop, render};
 use halflight::load::{self, LoadOptions, LoadedScene};
+use halflight::render::{Place, RenderResult, Settings, Stop, render};
 use halflight::report::{Provenance, Race, RaceEntry, Run};
 use halflight::save::to_srgb;
 use halflight_core::film::Dropped;

@@ -3,7 +3,7 @@
 
 use core::sync::atomic::AtomicBool;
 use glam::Vec3;
-use halflight::drive::{self, RenderResult, Settings, Stop};
+use halflight::render::{self, RenderResult, Settings, Stop};
 use halflight_core::bsdf::All;
 use halflight_core::film::Film;
 use halflight_core::scene::{Material, Scene, Surface};
@@ -30,7 +30,7 @@ fn render(scene: &Scene, spp: u32, change: impl FnOnce(&mut Settings)) -> Render
     let stop = Stop { spp: Some(spp), ..Stop::default() };
     let mut settings = Settings { width: SIZE, height: SIZE, stop, ..Settings::default() };
     change(&mut settings);
-    drive::render(scene, &settings, &mut |_| (), &AtomicBool::new(false)).unwrap()
+    render::render(scene, &settings, &mut |_| (), &AtomicBool::new(false)).unwrap()
 }
 
 /// Black boxes among white ones: who has no light to take must not take part.

@@ -1,8 +1,8 @@
 //! Progressive photon mapping: the power of photons, discs under overhangs, and memory.
 
 use glam::Vec3;
-use halflight::drive::{Method, RenderResult, Settings};
 use halflight::load::{self, LoadOptions};
+use halflight::render::{Method, RenderResult, Settings};
 use halflight::save::Image;
 use halflight_core::bsdf::All;
 use halflight_core::light::EmissionSampler;

@@ -5,7 +5,7 @@ use crate::table::scenes::glass_cube;
 use core::sync::atomic::AtomicBool;
 use core::time::Duration;
 use glam::Vec3;
-use halflight::drive::{self, Ending, Method, RenderResult, Settings, Stop};
+use halflight::render::{self, Ending, Method, RenderResult, Settings, Stop};
 use halflight_core::Rgb;
 use halflight_core::scene::{Camera, Material};
 use halflight_tests::scenes::{SceneBuffers, emitter};
@@ -22,7 +22,7 @@ fn light_leaves_glass_before_the_limit_of_bounces_and_cut_paths_are_counted() {
         let (method, audit) = (Some(method), Some(0.0));
         let settings = Settings { method, width: 48, height: 48, stop, audit, ..Settings::default() };
         let settings = Settings { max_depth: depth, ..settings };
-        drive::render(&glass_cube(false).scene(), &settings, &mut |_| (), &AtomicBool::new(false)).unwrap()
+        render::render(&glass_cube(false).scene(), &settings, &mut |_| (), &AtomicBool::new(false)).unwrap()
     };
     // Columns and rows of the floor alone.
     let floor = |result: &RenderResult| {
@@ -53,7 +53,8 @@ fn a_picture_that_ends_before_its_first_sample_is_whole() {
         let (width, height, threads, method) = (2560, 2560, Some(1), Some(method));
         let settings = Settings { width, height, threads, method, stop, ..Settings::default() };
         let start = Instant::now();
-        let result = drive::render(&buffers.scene(), &settings, &mut |_| (), &AtomicBool::new(true)).unwrap();
+        let result =
+            render::render(&buffers.scene(), &settings, &mut |_| (), &AtomicBool::new(true)).unwrap();
         assert!(start.elapsed() < DEADLINE);
         assert_eq!((result.ending, result.spp), (Ending::Interrupted, u32::from(result.filled_pixels == 0)));
         let dark = result.image.pixels.iter().filter(|pixel| pixel[1] == 0.0).count();
@@ -67,7 +68,7 @@ fn an_audit_that_finds_no_light_reports_no_bias() {
         let stop = Stop { spp: Some(512), error: Some(0.02), ..Stop::default() };
         let settings = Settings { method: Some(method), width: 32, height: 32, stop, ..Settings::default() };
         let flag = AtomicBool::new(false);
-        let result = drive::render(&glass_cube(false).scene(), &settings, &mut |_| (), &flag).unwrap();
+        let result = render::render(&glass_cube(false).scene(), &settings, &mut |_| (), &flag).unwrap();
         let (audit, error) = (result.audit.unwrap(), result.error.unwrap());
         assert!(audit.is_blind && audit.unseen > 0.9 && !audit.is_biased(), "{audit:?}");
         assert!(result.ending == Ending::Done && result.spp < 512 && error.upper <= 0.02, "{error:?}");

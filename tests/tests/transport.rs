@@ -2,7 +2,7 @@
 
 use core::sync::atomic::AtomicBool;
 use glam::Vec3;
-use halflight::drive::{self, RenderResult, Settings, Stop};
+use halflight::render::{self, RenderResult, Settings, Stop};
 use halflight_core::Level;
 use halflight_core::bsdf::All;
 use halflight_core::bvh::Bvh;
@@ -24,7 +24,7 @@ fn render(scene: &Scene, size: u32, spp: u32, change: impl FnOnce(&mut Settings)
     let stop = Stop { spp: Some(spp), ..Stop::default() };
     let mut settings = Settings { width: size, height: size, stop, ..Settings::default() };
     change(&mut settings);
-    drive::render(scene, &settings, &mut |_| (), &AtomicBool::new(false)).unwrap()
+    render::render(scene, &settings, &mut |_| (), &AtomicBool::new(false)).unwrap()
 }
 
 #[test]
@@ -154,12 +154,12 @@ fn memory_that_does_not_suffice_is_named() {
     let scene = cornell_box();
     let mut settings = Settings { width: 64, height: 64, memory: Some(10_000), ..Settings::default() };
     let flag = AtomicBool::new(false);
-    let error = drive::render(&scene.scene(), &settings, &mut |_| (), &flag).unwrap_err();
-    let drive::RenderError::Memory { needed, available } = error else { panic!("{error}") };
+    let error = render::render(&scene.scene(), &settings, &mut |_| (), &flag).unwrap_err();
+    let render::RenderError::Memory { needed, available } = error else { panic!("{error}") };
     assert!(needed > 10_000 && available == 10_000);
     settings.width = 0;
-    let error = drive::render(&scene.scene(), &settings, &mut |_| (), &flag).unwrap_err();
-    assert_eq!(error, drive::RenderError::Size);
+    let error = render::render(&scene.scene(), &settings, &mut |_| (), &flag).unwrap_err();
+    assert_eq!(error, render::RenderError::Size);
 }
 
 #[test]
@@ -180,8 +180,8 @@ fn an_interrupted_picture_is_valid() {
     let flag = AtomicBool::new(false);
     let settings = Settings { width: 32, height: 32, ..Settings::default() };
     let scene = cornell_box();
-    let mut raise = |_: &drive::Progress| flag.store(true, core::sync::atomic::Ordering::Relaxed);
-    let result = drive::render(&scene.scene(), &settings, &mut raise, &flag).unwrap();
-    assert_eq!((result.ending, result.spp), (drive::Ending::Interrupted, 1));
+    let mut raise = |_: &render::Progress| flag.store(true, core::sync::atomic::Ordering::Relaxed);
+    let result = render::render(&scene.scene(), &settings, &mut raise, &flag).unwrap();
+    assert_eq!((result.ending, result.spp), (render::Ending::Interrupted, 1));
     assert!(result.image.mean()[0] > 0.05);
 }

@@ -4,7 +4,7 @@
 use crate::table::scenes::{SKY, room_with_window, with_sky};
 use core::sync::atomic::AtomicBool;
 use glam::Vec3;
-use halflight::drive::{self, RenderResult, Settings, Stop};
+use halflight::render::{self, RenderResult, Settings, Stop};
 use halflight_core::scene::{Camera, Material, Scene};
 use halflight_tests::scenes::{SceneBuffers, constant_environment};
 use halflight_tests::statistics::{agree, blocks};
@@ -29,7 +29,7 @@ fn render(scene: &Scene, spp: u32, change: impl FnOnce(&mut Settings)) -> Render
     let mut settings =
         Settings { width: SIZE, height: SIZE, stop, reuse: Some(false), ..Settings::default() };
     change(&mut settings);
-    drive::render(scene, &settings, &mut |_| (), &AtomicBool::new(false)).unwrap()
+    render::render(scene, &settings, &mut |_| (), &AtomicBool::new(false)).unwrap()
 }
 
 fn assert_unbiased(name: &str, scene: &Scene, max_depth: Option<u32>) {

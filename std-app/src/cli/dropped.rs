@@ -1,6 +1,6 @@
 //! Rejected samples as lines of a summary.
 
-use halflight::drive::Place;
+use halflight::render::Place;
 use halflight::report::quantity::plural;
 use halflight_core::transport::Counters;
 

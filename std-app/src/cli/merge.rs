@@ -4,7 +4,7 @@ use super::failure::Failure;
 use super::outputs::{Outputs, Role};
 use super::{dropped, summary};
 use clap::Args;
-use halflight::drive::{self, Merged};
+use halflight::render::{self, Merged};
 use halflight::report::{dropped_object, error_object};
 use serde_json::{Value, json};
 use std::path::PathBuf;
@@ -32,7 +32,7 @@ impl Merge {
         let mut outputs = Outputs::new(self.json);
         self.output.iter().try_for_each(|output| outputs.plan(Role::Picture, output))?;
         self.films.iter().try_for_each(|film| outputs.protect(film))?;
-        let merged = drive::merge(&self.films)?;
+        let merged = render::merge(&self.films)?;
         let saved = outputs.save_to(&self.output, &merged.image);
         let results =
             if self.json { self.object(&merged, &saved).to_string() } else { text(&merged, &saved) };

@@ -3,7 +3,7 @@
 use super::values;
 use clap::builder::PossibleValue;
 use clap::{Args, ValueEnum};
-use halflight::drive::{BidirectionalSettings, CacheSettings, Method, PhotonSettings, Settings};
+use halflight::render::{BidirectionalSettings, CacheSettings, Method, PhotonSettings, Settings};
 use halflight_core::cache::irradiance::Metric;
 use halflight_core::photon;
 use halflight_simd::{Level, Tier};

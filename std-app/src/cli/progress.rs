@@ -1,7 +1,7 @@
 //! Progress on standard error: a bar on a terminal, otherwise a line every five seconds.
 
 use super::stdio::{print_message, print_note};
-use halflight::drive::Progress;
+use halflight::render::Progress;
 use halflight::report::quantity::readable_seconds;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::io::{IsTerminal, stderr};

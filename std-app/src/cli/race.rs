@@ -11,8 +11,8 @@ use super::{print_note, values};
 use clap::Args;
 use core::sync::atomic::Ordering;
 use halflight::compare::{Comparison, compare};
-use halflight::drive::{self, Progress, RenderResult, Settings, Stop, Turns};
 use halflight::load;
+use halflight::render::{self, Progress, RenderResult, Settings, Stop, Turns};
 use halflight::report::{self, Provenance, Run, quantity::readable_seconds};
 use halflight_core::scene::Scene;
 use std::panic::resume_unwind;
@@ -118,7 +118,7 @@ impl Race {
                 drop(reporter);
                 turn.pass(progress.seconds);
             };
-            drive::render(scene, &settings[index], progress, &INTERRUPT)
+            render::render(scene, &settings[index], progress, &INTERRUPT)
         };
         let results: Vec<_> = std::thread::scope(|scope| {
             let started: Vec<_> =

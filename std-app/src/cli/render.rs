@@ -9,8 +9,8 @@ use super::progress::ProgressReporter;
 use super::{print_note, summary, values};
 use clap::{Args, ValueEnum};
 use halflight::compare::compare;
-use halflight::drive::{self, Checkpoint, Ending, Settings, Shard, Stop};
 use halflight::load::{self, LoadedScene};
+use halflight::render::{self, Checkpoint, Ending, Settings, Shard, Stop};
 use halflight::report::{Provenance, Run};
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -112,7 +112,7 @@ impl Render {
         interrupt::install_handler()?;
         let mut reporter = ProgressReporter::new();
         let result =
-            drive::render(&scene, &settings, &mut |progress| reporter.report("", progress), &INTERRUPT);
+            render::render(&scene, &settings, &mut |progress| reporter.report("", progress), &INTERRUPT);
         reporter.end();
         let result = result.map_err(|error| render_failure(&self.scene, &error))?;
 

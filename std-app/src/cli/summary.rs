@@ -2,7 +2,7 @@
 
 use super::compare as comparing;
 use super::dropped;
-use halflight::drive::{Audited, BiasEstimate, Blurred, Ending, ErrorEstimate};
+use halflight::render::{Audited, BiasEstimate, Blurred, Ending, ErrorEstimate};
 use halflight::report::Run;
 use halflight::report::quantity::{plural, readable_bytes, readable_name, readable_seconds, readable_value};
 use halflight_core::findings::Finding;

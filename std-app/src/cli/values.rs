@@ -1,7 +1,7 @@
 //! Parsers of flag values: `1,2,3`, `640x480`, `90s`, `512M`.
 
 use core::str::FromStr;
-use halflight::drive::Shard;
+use halflight::render::Shard;
 use halflight_core::cache::irradiance::Metric;
 use halflight_simd::Tier;
 

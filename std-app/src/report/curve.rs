@@ -1,6 +1,6 @@
 //! `curve.csv`: error against rendering time, one line per round.
 
-use crate::drive::Round;
+use crate::render::Round;
 
 /// Text of the file. Histories of a race have names; unknown values are empty fields.
 pub(super) fn csv(histories: &[(Option<&str>, &[Round])]) -> String {
@@ -36,7 +36,7 @@ fn quoted(name: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::drive::ErrorEstimate;
+    use crate::render::ErrorEstimate;
 
     #[test]
     fn every_round_is_a_line() {

@@ -1,7 +1,7 @@
 //! Findings of a render, from the fields of its result. This file goes when methods emit findings.
 
 use super::Run;
-use crate::drive::{CacheUse, CausticUse, MapUse, Method, PhotonUse, Reuse, Settings, Survey, WindowUse};
+use crate::render::{CacheUse, CausticUse, MapUse, Method, PhotonUse, Reuse, Settings, Survey, WindowUse};
 use halflight_core::findings::Decision::{LeftOut, Limited, Used};
 use halflight_core::findings::{Finding, Findings, Value};
 

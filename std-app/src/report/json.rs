@@ -2,7 +2,7 @@
 
 use super::{Provenance, Race, Run};
 use crate::compare::Comparison;
-use crate::drive::{
+use crate::render::{
     Against, Audited, Blurred, Deviation, Ending, ErrorEstimate, Place, Region, RenderResult, Round, Shard,
 };
 use halflight_core::film::Dropped;

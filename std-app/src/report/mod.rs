@@ -19,7 +19,7 @@ pub use provenance::Provenance;
 pub use race::{Race, RaceEntry};
 
 use crate::compare::Comparison;
-use crate::drive::{RenderResult, Settings};
+use crate::render::{RenderResult, Settings};
 use crate::save::Image;
 use halflight_core::census::Census;
 use halflight_core::findings::Findings;

@@ -1,7 +1,7 @@
 //! Race of several methods on one scene: leaders over time, and efficiencies at the end.
 
 use super::{Provenance, Run};
-use crate::drive::{ErrorEstimate, Round};
+use crate::render::{ErrorEstimate, Round};
 use halflight_core::estimate::NORMAL_95;
 
 /// Finished race.

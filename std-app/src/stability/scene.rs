@@ -1,7 +1,7 @@
 //! Small scenes in f64, as in files, and the mean radiance of their pictures.
 
-use crate::drive::{Settings, Stop, render};
 use crate::load::SceneTransform;
+use crate::render::{Settings, Stop, render};
 use core::sync::atomic::AtomicBool;
 use glam::{DVec3, Mat3};
 use halflight_core::Rgb;

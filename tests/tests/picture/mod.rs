@@ -1,7 +1,7 @@
 //! Small grey pictures, rendered several times with different seeds and held against what they should be.
 
 use core::sync::atomic::AtomicBool;
-use halflight::drive::{self, Settings, Stop};
+use halflight::render::{self, Settings, Stop};
 use halflight_tests::scenes::SceneBuffers;
 use halflight_tests::statistics::judge;
 
@@ -19,7 +19,7 @@ pub(crate) fn render(scene: &SceneBuffers, seed: u32, change: impl FnOnce(&mut S
     let stop = Stop { spp: Some(SPP), ..Stop::default() };
     let mut settings = Settings { width: SIZE, height: SIZE, seed, stop, ..Settings::default() };
     change(&mut settings);
-    let result = drive::render(&scene.scene(), &settings, &mut |_| (), &AtomicBool::new(false));
+    let result = render::render(&scene.scene(), &settings, &mut |_| (), &AtomicBool::new(false));
     let result = result.unwrap_or_else(|error| panic!("{error}"));
     assert_eq!(result.counters.dropped.total(), 0, "{:?}", result.counters);
     result.image.pixels.iter().map(|pixel| f64::from(pixel[0])).collect()

@@ -10,7 +10,7 @@ mod pictures;
 mod properties;
 pub(crate) mod scenes;
 
-use halflight::drive::Method;
+use halflight::render::Method;
 
 /// A method, and the bias that it is allowed.
 struct Row {

@@ -3,7 +3,7 @@
 
 use super::Row;
 use super::scenes::TableScene;
-use halflight::drive::{Method, RenderResult, Settings};
+use halflight::render::{Method, RenderResult, Settings};
 use halflight::save::Image;
 use halflight_tests::render::render;
 use halflight_tests::statistics::blocks;

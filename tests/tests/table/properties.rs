@@ -6,7 +6,7 @@ use super::{METHODS, Row};
 use core::sync::atomic::{AtomicBool, Ordering};
 use core::time::Duration;
 use glam::Vec3;
-use halflight::drive::{self, Checkpoint, Ending, RenderError, RenderResult, Settings, Stop};
+use halflight::render::{self, Checkpoint, Ending, RenderError, RenderResult, Settings, Stop};
 use halflight_core::Rgb;
 use halflight_core::scene::{Camera, Material, PointLight};
 use halflight_simd::Level;
@@ -190,7 +190,7 @@ fn ended(buffers: SceneBuffers, row: &Row, is_interrupted: bool) -> RenderResult
         let settings = Settings { survey: Some(20), ..settings };
         let (flag, start) = (AtomicBool::new(false), Instant::now());
         let done = thread::scope(|scope| {
-            let render = scope.spawn(|| drive::render(&buffers.scene(), &settings, &mut |_| (), &flag));
+            let render = scope.spawn(|| render::render(&buffers.scene(), &settings, &mut |_| (), &flag));
             while is_interrupted && start.elapsed().as_secs_f64() < SECONDS {
                 thread::sleep(Duration::from_millis(5));
             }

@@ -3,7 +3,7 @@
 use super::map::difference;
 use super::parts;
 use crate::compare::Shown;
-use crate::drive::{Audited, Deviation, Region};
+use crate::render::{Audited, Deviation, Region};
 use crate::report::Run;
 use crate::report::quantity::{number, plural, readable_seconds};
 use crate::save::Image;

@@ -3,7 +3,7 @@
 use super::map::{Map, difference};
 use super::picture::{img, reduced};
 use crate::compare::Shown;
-use crate::drive::{Check, Look, Mark, Survey};
+use crate::render::{Check, Look, Mark, Survey};
 use crate::report::Run;
 use crate::report::quantity::plural;
 use crate::save::{Image, from_srgb};

@@ -2,7 +2,7 @@
 
 use super::chart::{Chart, Series};
 use super::parts;
-use crate::drive::{ErrorEstimate, RenderResult, Round};
+use crate::render::{ErrorEstimate, RenderResult, Round};
 use crate::report::Run;
 use crate::report::fit::{Fit, Point};
 use crate::report::quantity::{grouped, number, readable_seconds};

@@ -1,6 +1,6 @@
 //! Sections and elements that the pages of renders and races share.
 
-use crate::drive::Place;
+use crate::render::Place;
 use crate::report::quantity::{
     grouped, percent, plural, readable_bytes, readable_name, readable_seconds, readable_value,
 };

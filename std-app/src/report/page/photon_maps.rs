@@ -1,7 +1,7 @@
 //! Last photon maps as the camera sees them: photons, density and radius.
 
 use super::map::Map;
-use crate::drive::MapView;
+use crate::render::MapView;
 use crate::report::Run;
 use crate::report::quantity::percent;
 use maud::{Markup, html};

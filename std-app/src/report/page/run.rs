@@ -4,7 +4,7 @@ use super::map::{Map, difference};
 use super::picture::{exposable, reduced};
 use super::{audit, cache_survey, document, error, parts, photon_maps};
 use crate::compare::Shown;
-use crate::drive::Ending;
+use crate::render::Ending;
 use crate::report::Run;
 use crate::report::quantity::{grouped, number, plural, readable_bytes, readable_seconds};
 use crate::save::Image;

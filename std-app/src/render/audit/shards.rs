@@ -7,7 +7,7 @@ use std::collections::HashMap;
 
 impl State {
     /// Of the whole picture `film`, of mean `mean`, from those of all of its shards; `None` where one has nothing.
-    pub(in crate::drive) fn merged(states: Vec<(Shard, Self)>, film: &Film, mean: f64) -> Option<Self> {
+    pub(in crate::render) fn merged(states: Vec<(Shard, Self)>, film: &Film, mean: f64) -> Option<Self> {
         let count = states.iter().map(|(_, state)| state.places.len()).sum();
         let grid = Grid::new([film.width(), film.height()], count);
         let order = ordered(film, Shard::WHOLE, mean, grid);

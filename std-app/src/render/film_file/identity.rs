@@ -1,13 +1,13 @@
 //! Which picture a film is of: films can be continued and merged only where all of this is the same.
 
-use crate::drive::{Method, Settings, fingerprint};
+use crate::render::{Method, Settings, fingerprint};
 use halflight_core::scene::Scene;
 use halflight_core::transport::PathSettings;
 use serde::{Deserialize, Serialize};
 
 /// All that the bits of a film follow from, but the samples.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub(in crate::drive) struct Identity {
+pub(in crate::render) struct Identity {
     /// Of the program.
     version: String,
     pub(super) method: String,
@@ -27,7 +27,7 @@ pub(in crate::drive) struct Identity {
 
 impl Identity {
     /// `loaded` tells of the cache that the render begins with.
-    pub(in crate::drive) fn of(
+    pub(in crate::render) fn of(
         scene: &Scene,
         method: &str,
         paths: &PathSettings,

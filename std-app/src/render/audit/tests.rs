@@ -1,8 +1,8 @@
 //! The audit finds what is wrong, and only that.
 
 use super::*;
-use crate::drive::{Audited, Checkpoint, Ending, Method, RenderResult, Stop, merge, render};
 use crate::load::{LoadOptions, load};
+use crate::render::{Audited, Checkpoint, Ending, Method, RenderResult, Stop, merge, render};
 use core::sync::atomic::AtomicBool;
 use halflight_core::estimate::Difference;
 

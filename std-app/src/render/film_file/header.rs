@@ -1,9 +1,9 @@
 //! The header of a film file: one JSON object, which a person can read with `head -c`.
 
 use super::identity::Identity;
-use crate::drive::audit::{self, Audit};
-use crate::drive::rounds::{Estimates, Rounds};
-use crate::drive::{ErrorEstimate, Method, Round};
+use crate::render::audit::{self, Audit};
+use crate::render::rounds::{Estimates, Rounds};
+use crate::render::{ErrorEstimate, Method, Round};
 use halflight_core::film::Dropped;
 use halflight_core::method::{RenderState, Shard};
 use halflight_core::transport::Counters;
@@ -11,15 +11,15 @@ use serde::{Deserialize, Serialize};
 
 /// What is known of a film beside its pixels.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub(in crate::drive) struct Header {
+pub(in crate::render) struct Header {
     pub(super) identity: Identity,
     /// Which of how many, counted from 1.
     shard: [u32; 2],
-    pub(in crate::drive) shares: bool,
-    pub(in crate::drive) spp: u32,
-    pub(in crate::drive) rounds: u32,
-    pub(in crate::drive) estimates: Estimates,
-    pub(in crate::drive) seconds: f64,
+    pub(in crate::render) shares: bool,
+    pub(in crate::render) spp: u32,
+    pub(in crate::render) rounds: u32,
+    pub(in crate::render) estimates: Estimates,
+    pub(in crate::render) seconds: f64,
     paths: u64,
     rays: u64,
     shadow_rays: u64,
@@ -37,7 +37,7 @@ type Causes = [u64; 4];
 type Entry = (f64, u32, u64, Option<[f64; 3]>);
 
 impl Header {
-    pub(in crate::drive) fn new(
+    pub(in crate::render) fn new(
         identity: Identity,
         state: &RenderState,
         rounds: &Rounds,
@@ -70,35 +70,35 @@ impl Header {
     }
 
     /// Pixels across and down.
-    pub(in crate::drive) fn size(&self) -> [u32; 2] {
+    pub(in crate::render) fn size(&self) -> [u32; 2] {
         [self.identity.width, self.identity.height]
     }
 
     /// `None` for one of another version.
-    pub(in crate::drive) fn method(&self) -> Option<Method> {
+    pub(in crate::render) fn method(&self) -> Option<Method> {
         Method::named(&self.identity.method)
     }
 
-    pub(in crate::drive) fn shard(&self) -> Shard {
+    pub(in crate::render) fn shard(&self) -> Shard {
         Shard { index: self.shard[0].wrapping_sub(1), count: self.shard[1] }
     }
 
-    pub(in crate::drive) fn counters(&self) -> Counters {
+    pub(in crate::render) fn counters(&self) -> Counters {
         let dropped = dropped(self.dropped);
         Counters { paths: self.paths, rays: self.rays, shadow_rays: self.shadow_rays, dropped }
     }
 
     /// Tiles with rejected samples.
-    pub(in crate::drive) fn dropped(&self) -> impl Iterator<Item = (usize, Dropped)> {
+    pub(in crate::render) fn dropped(&self) -> impl Iterator<Item = (usize, Dropped)> {
         self.ledger.iter().map(|(tile, causes)| (*tile as usize, dropped(*causes)))
     }
 
     /// How far the audit is, where there is one.
-    pub(in crate::drive) fn audit(&self) -> Option<audit::State> {
+    pub(in crate::render) fn audit(&self) -> Option<audit::State> {
         self.audit.clone().filter(audit::State::is_whole)
     }
 
-    pub(in crate::drive) fn history(&self) -> Vec<Round> {
+    pub(in crate::render) fn history(&self) -> Vec<Round> {
         let error = |[relmse, lower, upper]: [f64; 3]| ErrorEstimate { relmse, lower, upper };
         let round = |&(seconds, spp, rays, estimate): &Entry| {
             let error = estimate.map(error);

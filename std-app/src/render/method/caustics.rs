@@ -4,11 +4,11 @@ use super::path::Paths;
 use super::photon_view::{self, PhotonView};
 use super::sppm::ProgressivePhotons;
 use super::{Borrower, Method, Renderer, Stage};
-use crate::drive::audit::Audit;
-use crate::drive::crew::Crew;
-use crate::drive::memory::{Bank, Memory};
-use crate::drive::threads::Threads;
-use crate::drive::{RenderError, Reuse};
+use crate::render::audit::Audit;
+use crate::render::crew::Crew;
+use crate::render::memory::{Bank, Memory};
+use crate::render::threads::Threads;
+use crate::render::{RenderError, Reuse};
 use halflight_core::bsdf::Features;
 use halflight_core::memory::Line;
 use halflight_core::method::caustics::{

@@ -4,11 +4,11 @@ use halflight_core::sampling::mix;
 
 /// A hash over sections of bytes, whose lengths count.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(in crate::drive) struct Hash(u64);
+pub(in crate::render) struct Hash(u64);
 
 impl Hash {
     /// Adds a section.
-    pub(in crate::drive) fn section(&mut self, bytes: &[u8]) {
+    pub(in crate::render) fn section(&mut self, bytes: &[u8]) {
         self.word(bytes.len() as u64);
         let (words, rest) = bytes.as_chunks::<8>();
         words.iter().for_each(|word| self.word(u64::from_le_bytes(*word)));
@@ -18,7 +18,7 @@ impl Hash {
     }
 
     /// What it comes to.
-    pub(in crate::drive) fn value(self) -> u64 {
+    pub(in crate::render) fn value(self) -> u64 {
         self.0
     }
 

@@ -2,11 +2,11 @@
 
 use super::photon_view::{self, PhotonView};
 use super::{Method, Renderer, Stage};
-use crate::drive::RenderError;
-use crate::drive::audit::Audit;
-use crate::drive::crew::Crew;
-use crate::drive::memory::Memory;
-use crate::drive::threads::Threads;
+use crate::render::RenderError;
+use crate::render::audit::Audit;
+use crate::render::crew::Crew;
+use crate::render::memory::Memory;
+use crate::render::threads::Threads;
 use halflight_core::bsdf::Features;
 use halflight_core::memory::Line;
 use halflight_core::method::photon_map::PhotonMapping;

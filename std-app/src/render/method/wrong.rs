@@ -2,16 +2,16 @@
 //! that is 10 % too large there. No noise of its own tells of it.
 
 use super::{Renderer, Stage};
-use crate::drive::RenderError;
-use crate::drive::crew::Crew;
-use crate::drive::memory::Memory;
+use crate::render::RenderError;
+use crate::render::crew::Crew;
+use crate::render::memory::Memory;
 use core::ops::Range;
 use halflight_core::bsdf::Features;
 use halflight_core::film::{Dropped, PIXELS_PER_TILE, Pixel, Tile};
 use halflight_core::memory::{Arena, Line};
 use halflight_core::transport::{Counters, PathIntegrator, path::WAVE};
 
-pub(in crate::drive) const FACTOR: f32 = 1.1;
+pub(in crate::render) const FACTOR: f32 = 1.1;
 
 pub(super) struct Wrong<'a, F> {
     tracer: PathIntegrator<'a, F>,

@@ -1,7 +1,7 @@
 //! What the audited pixels say together: how large the bias is, and where.
 
 use super::choice::Grid;
-use crate::drive::ErrorEstimate;
+use crate::render::ErrorEstimate;
 use halflight_core::estimate::{BiasEstimate, Deviation, Finding, filtered_pixel};
 use halflight_core::film::{Film, PIXELS_PER_TILE, Pixel, Tile};
 

@@ -6,7 +6,7 @@
 //! bias. Where a method knows at which pixels it may be wrong, these have a greater chance and count for as
 //! much less, so that a few pixels that carry most of the error are not missed.
 
-use crate::drive::Shard;
+use crate::render::Shard;
 use halflight_core::Rgb;
 use halflight_core::estimate::filtered;
 use halflight_core::film::{Film, PIXELS_PER_TILE, Tile};

@@ -2,7 +2,7 @@
 //! of threads.
 
 use super::{Method, Stage};
-use crate::drive::audit::Audit;
+use crate::render::audit::Audit;
 use halflight_core::bsdf::Features;
 use halflight_core::memory::Footprint;
 use halflight_core::method::caustics;

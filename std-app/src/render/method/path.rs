@@ -1,10 +1,10 @@
 //! Path tracing for the program.
 
 use super::{CausticUse, Renderer, Stage};
-use crate::drive::crew::Crew;
-use crate::drive::memory::Memory;
-use crate::drive::threads::Threads;
-use crate::drive::{RenderError, Reuse};
+use crate::render::crew::Crew;
+use crate::render::memory::Memory;
+use crate::render::threads::Threads;
+use crate::render::{RenderError, Reuse};
 use halflight_core::bsdf::Features;
 use halflight_core::memory::Line;
 use halflight_core::method::Method as _;
