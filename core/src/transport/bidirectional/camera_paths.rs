@@ -369,6 +369,6 @@ impl<'a, F: Features> CameraPaths<'a, F> {
 }
 
 /// The normal that light sampling takes: none where light comes from both sides.
-pub(super) fn normal_for_lights(point: &SurfacePoint, bsdf: &Bsdf) -> Vec3 {
+pub(in crate::transport) fn normal_for_lights(point: &SurfacePoint, bsdf: &Bsdf) -> Vec3 {
     if bsdf.transmits() { Vec3::ZERO } else { point.frame.normal }
 }

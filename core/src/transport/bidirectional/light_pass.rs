@@ -259,7 +259,7 @@ impl<F: Features> Writer<'_, F> {
 }
 
 /// The point of the lens from which the camera sees `position` as `seen`.
-fn lens_point(
+pub(in crate::transport) fn lens_point(
     camera: &crate::scene::Camera,
     lens: [f32; 2],
     position: Vec3,

@@ -48,7 +48,7 @@ impl LightVertex {
 
 /// f |cos| of the direction of the light, and the densities of both walks at a vertex.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Scattering {
+pub(in crate::transport) struct Scattering {
     /// f(wo, wi) |cos wi|, for radiance that leaves by `wo`.
     pub value: Rgb,
     /// Density with which a camera walk that comes by `wo` goes on to `wi`.
@@ -64,7 +64,7 @@ fn flipped(direction: Vec3) -> Vec3 {
 
 /// Scattering between local directions `wo` to the camera and `wi` to the light, for a `bsdf` on the side of
 /// the camera.
-pub(super) fn scattering<F: Features>(
+pub(in crate::transport) fn scattering<F: Features>(
     context: &SceneContext<F>,
     (point, bsdf): (&SurfacePoint, &Bsdf),
     wo: Vec3,
@@ -75,7 +75,7 @@ pub(super) fn scattering<F: Features>(
 }
 
 /// The same for a `bsdf` on the side of the light, as a light path has it.
-pub(super) fn scattering_from_light<F: Features>(
+pub(in crate::transport) fn scattering_from_light<F: Features>(
     context: &SceneContext<F>,
     (point, bsdf): (&SurfacePoint, &Bsdf),
     wo: Vec3,
@@ -94,7 +94,7 @@ pub(super) fn scattering_from_light<F: Features>(
 
 /// Density of the walk opposite to one that came by `from` and left by `to`, both local on the side of
 /// `from`.
-pub(super) fn reverse_pdf<F: Features>(
+pub(in crate::transport) fn reverse_pdf<F: Features>(
     context: &SceneContext<F>,
     (point, bsdf): (&SurfacePoint, &Bsdf),
     from: Vec3,
@@ -116,6 +116,6 @@ const LOWEST_COS: f32 = 2e-3;
 
 /// Whether the shading normal of `point` may have been turned towards local direction `wo`. Light paths end
 /// there, camera paths are not connected.
-pub(super) fn is_bent(point: &SurfacePoint, wo: Vec3) -> bool {
+pub(in crate::transport) fn is_bent(point: &SurfacePoint, wo: Vec3) -> bool {
     wo.z < LOWEST_COS && point.frame.normal != point.geometric_normal
 }
