@@ -78,13 +78,7 @@ methods! {
     // Discs of photons reach over edges and around corners.
     photon_map: Row { method: Method::PhotonMap, bias: 0.02, bias_of_mean: 0.01, known: &[] };
     // The same, by radii that shrink with samples.
-    sppm: Row {
-        method: Method::ProgressivePhotons,
-        bias: 0.02,
-        bias_of_mean: 0.01,
-        // Photons are left on a cut-out as often as it is met, and seen as often again: its opacity counts twice.
-        known: &[("cut-outs", 0.15, 0.06)],
-    };
+    sppm: Row { method: Method::ProgressivePhotons, bias: 0.02, bias_of_mean: 0.01, known: &[] };
     light: Row { method: Method::LightTracing, bias: 0.0, bias_of_mean: 0.0, known: &[] };
     bdpt: Row { method: Method::Bidirectional, bias: 0.0, bias_of_mean: 0.0, known: &[] };
 }

@@ -104,10 +104,13 @@ impl<'a, F: Features> SceneContext<'a, F> {
         left: u32,
         random: impl FnOnce() -> f32,
     ) -> bool {
-        hit.triangle == left
-            || F::CUTOUT
-                && point.material.has_cutout()
-                && random() >= point.material.opacity.at::<F>(self.scene, point.uv)
+        hit.triangle == left || F::CUTOUT && point.material.has_cutout() && random() >= self.opacity_at(point)
+    }
+
+    /// The opacity of the surface at `point`: 1 unless it has a cut-out.
+    #[inline]
+    pub(in crate::transport) fn opacity_at(&self, point: &SurfacePoint) -> f32 {
+        if F::CUTOUT { point.material.opacity.at::<F>(self.scene, point.uv).min(1.0) } else { 1.0 }
     }
 
     /// Follows `segment` to the surface that scatters it; the n-th surface with a cut-out takes `random(n)`.

@@ -74,6 +74,8 @@ pub(in crate::transport) struct Vertex<'v> {
     pub barycentric: [f32; 2],
     /// Unit direction to where the light comes from.
     pub to_light: Vec3,
+    /// Fraction of the light paths here that the surface meets, above 0.
+    opacity: f32,
     numbers: &'v dyn Numbers,
     /// Its first dimension.
     first: u32,
@@ -90,8 +92,10 @@ impl Vertex<'_> {
         self.numbers.pair(self.first + OWN)
     }
 
-    /// The photon of light of such power that has come here.
+    /// The photon of light of such power that has come here. Camera paths that meet a cut-out see the light on
+    /// what is there of it, of which photons hold the fraction that its opacity lets them meet.
     pub(in crate::transport) fn photon(&self, power: Rgb) -> Photon {
+        let power = power / self.opacity;
         Photon::new(self.point.position, self.to_light, self.point.geometric_normal, power)
     }
 }
@@ -245,8 +249,8 @@ impl<F: Features> LightWalk<'_, F> {
         }
         let bsdf = self.context.bsdf_at(&point);
         let first = EMISSION_DIMENSIONS + V::DIMENSIONS * (state.segments - 1);
-        let barycentric = [hit.u, hit.v];
-        let vertex = Vertex { point: &point, bsdf: &bsdf, barycentric, to_light: -direction, numbers, first };
+        let (barycentric, to_light, opacity) = ([hit.u, hit.v], -direction, self.context.opacity_at(&point));
+        let vertex = Vertex { point: &point, bsdf: &bsdf, barycentric, to_light, opacity, numbers, first };
         let onward = visitor.meet(state, &vertex, counters)?;
         if state.segments + 1 >= self.max_depth {
             return None;
