@@ -4,7 +4,7 @@
 use glam::Vec3;
 use halflight::render::{Method, Settings};
 use halflight_core::Rgb;
-use halflight_core::scene::{Camera, Material, Scene};
+use halflight_core::scene::{Camera, Material, Scene, Surface};
 use halflight_tests::render::{difference, render};
 use halflight_tests::scenes::{
     SceneBuffers, constant_environment, emitter, glass, lamp_over_ball, room_with_lamp,
@@ -46,6 +46,20 @@ fn a_lamp_behind_a_veil_shows_in_its_holes() {
         let lamp = buffers.material(Material { opacity: 0.5.into(), ..emitter(0.0, 8.0) });
         buffers.square(Vec3::NEG_Z, Vec3::Z, 5.0, lamp);
         let expected = 0.4 + 0.6 * (0.5 * 8.0 + 0.5 * 0.3);
+        let found = mean(&buffers.scene(), method, |_| ());
+        assert!((found / expected - 1.0).abs() < TOLERANCE, "{}: {found}, not {expected}", method.name());
+    }
+}
+
+#[test]
+fn a_cut_out_is_met_as_often_after_another_that_scattered() {
+    // A mirror of opacity 0.5 sends half of the paths to a black sheet of opacity 0.5 behind the camera.
+    for method in Method::ALL {
+        let mirror = Surface::Mirror { reflectance: Rgb::ONE.into() };
+        let mut buffers = sheet(Material { opacity: 0.5.into(), surface: mirror, ..emitter(0.0, 0.0) });
+        let black = buffers.material(Material { opacity: 0.5.into(), ..emitter(0.0, 0.0) });
+        buffers.square(Vec3::Z * 2.0, Vec3::NEG_Z, 9.0, black);
+        let expected = 0.3 * (0.5 + 0.5 * 0.5);
         let found = mean(&buffers.scene(), method, |_| ());
         assert!((found / expected - 1.0).abs() < TOLERANCE, "{}: {found}, not {expected}", method.name());
     }

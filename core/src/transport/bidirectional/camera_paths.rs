@@ -259,7 +259,7 @@ impl<'a, F: Features> CameraPaths<'a, F> {
             return None;
         }
         let point = self.context.surface_at(ray, hit)?;
-        let opacity = || sampler.single(dimension::CROSSING + path.crossings);
+        let opacity = || sampler.single(dimension::CROSSING + path.segments - 1 + path.crossings);
         let is_passed = self.context.is_passed(&point, hit, path.triangle, opacity)
             || path.segments == 1 && point.is_left_by(ray);
         if is_passed {

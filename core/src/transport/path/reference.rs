@@ -63,8 +63,8 @@ pub fn radiance(
         // Rounding, or a hole in the surface: on in the same direction.
         let opacity = point.material.opacity.at::<All>(scene, point.uv);
         let met_again = hit.triangle == left || (segments == 1 && point.is_left_by(&ray));
-        let transparent =
-            point.material.has_cutout() && sampler.single(dimension::CROSSING + crossings) >= opacity;
+        let transparent = point.material.has_cutout()
+            && sampler.single(dimension::CROSSING + segments - 1 + crossings) >= opacity;
         if met_again || transparent {
             ray = point.spawn(direction);
             left = hit.triangle;

@@ -36,8 +36,8 @@ pub(in crate::transport) struct Segment {
     pub(in crate::transport) ray: Ray,
     /// The triangle that the ray starts on, which it cannot meet again; [`MISS`] at the camera.
     pub(in crate::transport) triangle: u32,
-    /// Surfaces of the subpath passed by cut-out or coincidence.
-    pub(in crate::transport) crossings: u32,
+    /// Surfaces of the subpath so far, scattered at or passed by cut-out or coincidence.
+    pub(in crate::transport) surfaces: u32,
     /// Distance from the last surface that scattered, over that of the ray's direction.
     pub(in crate::transport) length: f32,
 }
@@ -45,12 +45,12 @@ pub(in crate::transport) struct Segment {
 impl Segment {
     /// The first of a subpath, from the camera or a light.
     pub(in crate::transport) fn first(ray: Ray) -> Self {
-        Self { ray, triangle: MISS, crossings: 0, length: 0.0 }
+        Self { ray, triangle: MISS, surfaces: 0, length: 0.0 }
     }
 
     /// The next, from `point` of the triangle that `hit` tells in a `direction` of the world.
     pub(in crate::transport) fn onward(&self, point: &SurfacePoint, hit: &Hit, direction: Vec3) -> Self {
-        Self { ray: point.spawn(direction), triangle: hit.triangle, crossings: self.crossings, length: 0.0 }
+        Self { ray: point.spawn(direction), triangle: hit.triangle, surfaces: self.surfaces + 1, length: 0.0 }
     }
 }
 
@@ -113,7 +113,7 @@ impl<'a, F: Features> SceneContext<'a, F> {
         if F::CUTOUT { point.material.opacity.at::<F>(self.scene, point.uv).min(1.0) } else { 1.0 }
     }
 
-    /// Follows `segment` to the surface that scatters it; the n-th surface with a cut-out takes `random(n)`.
+    /// Follows `segment` to the surface that scatters it; a cut-out after n surfaces takes `random(n)`.
     /// `None` where it leaves the scene.
     pub(in crate::transport) fn next_surface(
         &self,
@@ -136,17 +136,17 @@ impl<'a, F: Features> SceneContext<'a, F> {
     ) -> Option<(Hit, SurfacePoint<'a>)> {
         loop {
             let point = self.surface_at(&segment.ray, &hit)?;
-            let (crossings, length) = (segment.crossings, segment.length + hit.t);
-            if !self.is_passed(&point, &hit, segment.triangle, || random(crossings)) {
+            let (surfaces, length) = (segment.surfaces, segment.length + hit.t);
+            if !self.is_passed(&point, &hit, segment.triangle, || random(surfaces)) {
                 segment.length = length;
                 return Some((hit, point));
             }
-            if crossings >= MAX_CROSSINGS {
+            if surfaces >= MAX_CROSSINGS {
                 counters.dropped.unfinished += 1;
                 return None;
             }
             let onward = segment.onward(&point, &hit, segment.ray.direction.into());
-            *segment = Segment { crossings: crossings + 1, length, ..onward };
+            *segment = Segment { length, ..onward };
             counters.rays += 1;
             hit = self.nearest(&segment.ray);
         }

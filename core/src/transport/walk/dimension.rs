@@ -6,7 +6,7 @@ use crate::sampling::Sampler;
 pub(in crate::transport) const PIXEL: u32 = 0;
 /// Point on the lens.
 pub(in crate::transport) const LENS: u32 = 1;
-/// Opacity of the `n`th surface with a cut-out: `CROSSING + n`.
+/// Opacity of the surface that is met after `n` others, scattered at or passed: `CROSSING + n`.
 pub(in crate::transport) const CROSSING: u32 = 1 << 31;
 /// Rotation of the probes for walls at the vertex at the end of the `n`th segment: `PROBES + n`.
 pub(in crate::transport) const PROBES: u32 = 1 << 30;

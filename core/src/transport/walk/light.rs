@@ -29,7 +29,7 @@ const LOBE: u32 = 1;
 const ROULETTE: u32 = 2;
 const OWN: u32 = 3;
 
-/// Whether the `n`th surface with a cut-out is met: `CROSSING + n`.
+/// Opacity of the surface that is met after `n` others, scattered at or passed: `CROSSING + n`.
 const CROSSING: u32 = 1 << 31;
 
 /// A path between two of its vertices.
@@ -234,7 +234,7 @@ impl<F: Features> LightWalk<'_, F> {
     ) -> Option<Ray> {
         let point = self.context.surface_at(ray, hit)?;
         let direction = Vec3::from(ray.direction);
-        let opacity = || numbers.single(CROSSING + state.crossings);
+        let opacity = || numbers.single(CROSSING + state.segments - 1 + state.crossings);
         if self.context.is_passed(&point, hit, state.triangle, opacity) {
             if state.crossings >= MAX_CROSSINGS {
                 counters.dropped.unfinished += 1;
