@@ -8,14 +8,19 @@ use halflight_core::bsdf::All;
 use halflight_core::bvh::Bvh;
 use halflight_core::cache::irradiance::{CellFlux, Metric, metric};
 use halflight_core::film::Film;
+use halflight_core::geometry::Ray;
 use halflight_core::memory::Arena;
-use halflight_core::scene::Scene;
+use halflight_core::sampling::Sampler;
+use halflight_core::scene::{Camera, Scene, SurfacePoint};
 use halflight_core::transport::cached::gather::{GatherPoint, Gathering};
 use halflight_core::transport::cached::placement::{PIXELS, ProgressiveOrder, Via};
 use halflight_core::transport::path::reference;
 use halflight_core::transport::{Counters, PathIntegrator, PathSettings, UNLIMITED};
 use halflight_tests::memory::{TestArena, with_structures};
-use halflight_tests::scenes::{cornell_box, everything, room_with_lamp};
+use halflight_tests::scenes::{
+    SceneBuffers, constant_environment, cornell_box, emitter, everything, room_with_lamp,
+};
+use std::f64::consts::PI;
 
 /// Mean radiance of the box, from 4 million paths that sampled the lamp uniformly by area.
 const CORNELL_MEAN: [f64; 3] = [0.2123, 0.1509, 0.0652];
@@ -67,6 +72,34 @@ fn the_wavefront_is_the_textbook_to_the_bit_for_any_wave() {
             }
         });
     }
+}
+
+#[test]
+fn irradiance_under_a_square_lamp_is_that_of_its_form_factor() {
+    // A lamp of side 1 and radiance 5, 1 above a black floor, under a sky of 0.2.
+    let camera = Camera::look_at(Vec3::splat(3.0), Vec3::ZERO, Vec3::Y, 40.0);
+    let mut buffers = SceneBuffers::new(camera);
+    let [floor, lamp] = [emitter(0.0, 0.0), emitter(0.0, 5.0)].map(|material| buffers.material(material));
+    buffers.square(Vec3::ZERO, Vec3::Y, 8.0, floor);
+    buffers.square(Vec3::Y, Vec3::NEG_Y, 1.0, lamp);
+    buffers.environment = constant_environment(0.2);
+    let scene = buffers.scene();
+    let slant = 1.25_f64.sqrt();
+    let form_factor = 4.0 / PI * (0.5 / slant) * (0.5 / slant).atan();
+    let expected = PI * (5.0 * form_factor + 0.2 * (1.0 - form_factor));
+
+    with_structures(&scene, |bvh, lights| {
+        let down = Ray::new(Vec3::Y * 0.5, Vec3::NEG_Y);
+        let hit = bvh.nearest(Level::detect(), &down);
+        let point = SurfacePoint::at::<All>(&scene, &down, &hit).expect("the floor");
+        let paths = 1 << 14;
+        let sample = |path| {
+            let sampler = Sampler::new(7, 0, path);
+            f64::from(reference::irradiance(&scene, bvh, lights, UNLIMITED, &sampler, &point).y)
+        };
+        let mean = (0..paths).map(sample).sum::<f64>() / f64::from(paths);
+        assert!((mean / expected - 1.0).abs() < 3e-3, "{mean}, not {expected}");
+    });
 }
 
 /// A path tracer of the box, of 16 x 16 pixels.

@@ -2,12 +2,12 @@
 //! [`crate::transport::path`] is tested against, and it says in order what that does in pieces.
 
 use super::silhouette::{self, is_outlined};
-use crate::bsdf::All;
+use crate::bsdf::{All, Bsdf, Diffuse};
 use crate::bvh::Bvh;
-use crate::geometry::MISS;
+use crate::geometry::{MISS, Ray};
 use crate::light::{LightSampler, emitted};
 use crate::sampling::Sampler;
-use crate::scene::Scene;
+use crate::scene::{Scene, SurfacePoint};
 use crate::transport::settings::PathSettings;
 use crate::transport::walk::context::SceneContext;
 use crate::transport::walk::dimension;
@@ -15,6 +15,7 @@ use crate::transport::walk::mis::{environment_heuristic, power_heuristic};
 use crate::transport::walk::termination::{MAX_CROSSINGS, MAX_VERTICES, continuation_probability, is_cut};
 use crate::transport::walk::visibility::shadow_ray;
 use crate::{Level, Rgb};
+use core::f32::consts::PI;
 use glam::Vec3;
 
 /// The radiance that sample number `sample` of the pixel in column `x` and row `y` sees.
@@ -31,17 +32,91 @@ pub fn radiance(
     let sampler = Sampler::new(seed, y * width + x, sample);
     let [dx, dy] = sampler.pair(dimension::PIXEL);
     let lens = sampler.pair(dimension::LENS);
-    let mut ray = scene.camera.ray(width, height, x as f32 + dx, y as f32 + dy, lens);
+    let ray = scene.camera.ray(width, height, x as f32 + dx, y as f32 + dy, lens);
 
     // The border of a lamp is looked at by other rays.
     let is_outlined = is_outlined(scene, lights, settings, [x, y]);
+    let (from, normal) = (Vec3::ZERO, Vec3::ZERO);
+    let start = Start { ray, from, normal, pdf: f32::INFINITY, triangle: MISS, segments: 1 };
+    let radiance = follow(&context, &sampler, max_depth, is_outlined, start);
+    let mut lamps = Rgb::ZERO;
+    if is_outlined {
+        for ray in silhouette::rays(scene, settings, [x, y], sample) {
+            let hit = context.nearest(&ray);
+            lamps += silhouette::emission(&context, ray, hit);
+        }
+    }
+    radiance + lamps
+}
 
+/// An estimate of the irradiance of `point` on the side of its normal, in W/m², by one path: π times the radiance
+/// that a white diffuse surface would reflect. Each `sampler` gives an independent one.
+pub fn irradiance(
+    scene: &Scene,
+    bvh: &Bvh,
+    lights: &LightSampler,
+    max_depth: u32,
+    sampler: &Sampler,
+    point: &SurfacePoint,
+) -> Rgb {
+    let context = SceneContext::<All>::new(scene, bvh, lights, Level::BASELINE);
+    let (white, wo, first) =
+        (Bsdf::Diffuse(Diffuse { reflectance: Rgb::ONE }), Vec3::Z, dimension::vertex(1));
+    let direct = match lights.is_empty() || max_depth < 2 {
+        true => Rgb::ZERO,
+        false => light_sample(&context, point, &white, wo, light_numbers(sampler, first), Rgb::ONE),
+    };
+    let [u, v] = dimension::scattering(sampler, 1);
+    let Some(scattered) = white.sample::<All>(wo, [u, v, 0.0]) else { return direct * PI };
+    let direction = point.frame.to_world(scattered.direction);
+    if max_depth < 2 || !point.sides_agree(scattered.direction, direction) {
+        return direct * PI;
+    }
+    let start = Start {
+        ray: point.spawn(direction),
+        from: point.position,
+        normal: point.frame.normal,
+        pdf: scattered.pdf,
+        triangle: point.triangle,
+        segments: 2,
+    };
+    (direct + follow(&context, sampler, max_depth, false, start)) * PI
+}
+
+/// Random numbers of the light sample at the vertex whose dimensions begin with `first`.
+fn light_numbers(sampler: &Sampler, first: u32) -> [f32; 3] {
+    let [u, v] = sampler.pair(first + dimension::LIGHT);
+    [u, v, sampler.single(first + dimension::LIGHT_CHOICE)]
+}
+
+/// The ray by which a path begins, and the vertex that it leaves.
+struct Start {
+    ray: Ray,
+    from: Vec3,
+    /// Shading normal there; zero where it transmits.
+    normal: Vec3,
+    /// Solid-angle density of the ray's direction; infinite if nothing else could have chosen it.
+    pdf: f32,
+    triangle: u32,
+    /// The number of the ray's segment.
+    segments: u32,
+}
+
+/// The radiance along the ray of `start`, without the emission of the first surface where that `is_outlined`.
+fn follow(
+    context: &SceneContext<All>,
+    sampler: &Sampler,
+    max_depth: u32,
+    is_outlined: bool,
+    start: Start,
+) -> Rgb {
+    let (scene, lights) = (context.scene, context.lights);
     let mut radiance = Rgb::ZERO; // L
     let mut throughput = Rgb::ONE; // β
     let mut eta_squared = 1.0;
-    // The vertex before: where it is, its normal, the density with which it chose the ray, its triangle.
-    let (mut from, mut from_normal, mut pdf, mut left) = (Vec3::ZERO, Vec3::ZERO, f32::INFINITY, MISS);
-    let (mut segments, mut crossings) = (1, 0);
+    let Start { mut ray, mut from, normal: mut from_normal, mut pdf, triangle: mut left, mut segments } =
+        start;
+    let mut crossings = 0;
 
     while segments <= MAX_VERTICES && crossings <= MAX_CROSSINGS {
         let direction = Vec3::from(ray.direction);
@@ -91,32 +166,12 @@ pub fn radiance(
 
         // Next-event estimation: light that a shadow ray reaches.
         if !bsdf.is_delta() && !lights.is_empty() {
-            let [u, v] = sampler.pair(first + dimension::LIGHT);
-            let choice = sampler.single(first + dimension::LIGHT_CHOICE);
-            let u = [u, v, choice];
-            let aim = lights.warp(point.position, normal, u);
-            if let Some((light, later)) = lights.sample_deferred(scene, point.position, normal, u, aim) {
-                let wi = point.frame.to_local(light.direction);
-                let (f, pdf) = bsdf.evaluate::<All>(wo, wi);
-                let same_side = point.sides_agree(wi, light.direction);
-                if same_side && f != Rgb::ZERO {
-                    let weight = match light.delta {
-                        true => 1.0,
-                        false if later => environment_heuristic(lights, light.pdf, pdf),
-                        false => power_heuristic(light.pdf, pdf),
-                    };
-                    let sent = throughput * f * light.radiance * (weight / light.pdf);
-                    let arriving =
-                        shadow_ray(&point, &light).and_then(|ray| context.transmit(ray, sent, &mut 0));
-                    let environment = scene.environment.as_ref().filter(|_| later);
-                    let seen = environment.map_or(Rgb::ONE, |e| e.radiance(scene, light.direction));
-                    radiance += arriving.unwrap_or_default() * seen;
-                }
-            }
+            let u = light_numbers(sampler, first);
+            radiance += light_sample(context, &point, &bsdf, wo, u, throughput);
         }
 
         // The path goes on where the BSDF sends it.
-        let [u, v] = dimension::scattering(&sampler, segments);
+        let [u, v] = dimension::scattering(sampler, segments);
         let lobe = sampler.single(first + dimension::LOBE);
         let Some(scattered) = bsdf.sample::<All>(wo, [u, v, lobe]) else { break };
         let direction = point.frame.to_world(scattered.direction);
@@ -142,12 +197,38 @@ pub fn radiance(
         ray = point.spawn(direction);
         segments += 1;
     }
-    let mut lamps = Rgb::ZERO;
-    if is_outlined {
-        for ray in silhouette::rays(scene, settings, [x, y], sample) {
-            let hit = context.nearest(&ray);
-            lamps += silhouette::emission(&context, ray, hit);
-        }
+    radiance
+}
+
+/// Next-event estimation at `point`: what its `bsdf` scatters towards `wo` from a light chosen by `u`, times
+/// `throughput`.
+fn light_sample(
+    context: &SceneContext<All>,
+    point: &SurfacePoint,
+    bsdf: &Bsdf,
+    wo: Vec3,
+    u: [f32; 3],
+    throughput: Rgb,
+) -> Rgb {
+    let (scene, lights) = (context.scene, context.lights);
+    let normal = if bsdf.transmits() { Vec3::ZERO } else { point.frame.normal };
+    let aim = lights.warp(point.position, normal, u);
+    let Some((light, later)) = lights.sample_deferred(scene, point.position, normal, u, aim) else {
+        return Rgb::ZERO;
+    };
+    let wi = point.frame.to_local(light.direction);
+    let (f, pdf) = bsdf.evaluate::<All>(wo, wi);
+    if !point.sides_agree(wi, light.direction) || f == Rgb::ZERO {
+        return Rgb::ZERO;
     }
-    radiance + lamps
+    let weight = match light.delta {
+        true => 1.0,
+        false if later => environment_heuristic(lights, light.pdf, pdf),
+        false => power_heuristic(light.pdf, pdf),
+    };
+    let sent = throughput * f * light.radiance * (weight / light.pdf);
+    let arriving = shadow_ray(point, &light).and_then(|ray| context.transmit(ray, sent, &mut 0));
+    let environment = scene.environment.as_ref().filter(|_| later);
+    let seen = environment.map_or(Rgb::ONE, |e| e.radiance(scene, light.direction));
+    arriving.unwrap_or_default() * seen
 }
