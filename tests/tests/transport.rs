@@ -1,5 +1,6 @@
 //! The path tracer as a whole: the wavefront against the textbook, bits against threads, waves and scale.
 
+use core::f64::consts::PI;
 use core::sync::atomic::AtomicBool;
 use glam::Vec3;
 use halflight::render::{self, RenderResult, Settings, Stop};
@@ -20,7 +21,6 @@ use halflight_tests::memory::{TestArena, with_structures};
 use halflight_tests::scenes::{
     SceneBuffers, constant_environment, cornell_box, emitter, everything, room_with_lamp,
 };
-use std::f64::consts::PI;
 
 /// Mean radiance of the box, from 4 million paths that sampled the lamp uniformly by area.
 const CORNELL_MEAN: [f64; 3] = [0.2123, 0.1509, 0.0652];
