@@ -4,11 +4,11 @@ use super::ErrorEstimate;
 use super::audit::{self, Audited};
 use super::blurred::Blurred;
 use super::error::{FileError, RenderError};
+use super::error_report::ErrorReport;
 use super::film_file::Reader;
 use super::ledger::{self, Place, empty_pixels};
 use super::method::Method;
 use super::picture::image;
-use super::told::Told;
 use super::workers::Workers;
 use crate::memory::Budget;
 use crate::save::Image;
@@ -85,7 +85,7 @@ pub fn merge(files: &[PathBuf]) -> Result<Merged, RenderError> {
         film.read_into(&mut state)?;
     }
     let workers = Workers::new(None)?;
-    let told = Told::by(&workers, &state, |noise| {
+    let report = ErrorReport::with(&workers, &state, |noise| {
         let (mean, audits) = workers.mean(&state.film).zip(audits)?;
         audit::State::merged(audits, &state.film, mean)?.verdict(&state.film, mean, noise)
     });
@@ -96,9 +96,9 @@ pub fn merge(files: &[PathBuf]) -> Result<Merged, RenderError> {
         counters: state.counters,
         places: ledger::places(state.dropped, width, height),
         empty_pixels: empty_pixels(&state.film, |_| true),
-        error: told.error(),
-        blurred: told.blurred,
-        audit: told.audited,
+        error: report.error(),
+        blurred: report.blurred,
+        audit: report.audited,
         is_biased,
     })
 }

@@ -2,14 +2,14 @@
 
 use super::audit::Audit;
 use super::crew::{self, Crew};
+use super::error_report::ErrorReport;
 use super::film_file::{self, Header, Identity, Reader};
 use super::gaps::{self, Sketch};
 use super::history::{Clock, Reference, Round};
-use super::kept::Kept;
 use super::ledger::{self, empty_pixels};
 use super::method::{Method, Renderer, Stage};
+use super::rewritten_file::RewrittenFile;
 use super::rounds::{Plan, Rounds};
-use super::told::Told;
 use super::workers::Workers;
 use super::{Ending, ErrorEstimate, Progress, RenderError, RenderResult, Seconds, WindowUse};
 use crate::save::{Image, Patience};
@@ -20,13 +20,13 @@ use halflight_core::method::{RenderState, Shard};
 use std::path::Path;
 use std::time::Instant;
 
-/// A thread looks at the clock, and at the flag, after about so many seconds.
+/// Seconds after which a thread checks the clock and the interrupt flag.
 const STEP_SECONDS: f64 = 0.01;
 
 /// Samples of a tile that fill a wave: steps are multiples of it where time allows.
 const FULL_STEP: u32 = 8;
 
-/// Seconds that are kept free for an estimate of the error, for each pixel and thread, before the first has been made.
+/// Seconds reserved for an estimate of the error, per pixel and thread, before the first has been timed.
 const ESTIMATING: f64 = 1e-7;
 
 /// A picture to be rendered.
@@ -40,7 +40,7 @@ pub(super) struct Picture<'a> {
     pub(super) clock: Clock,
     pub(super) progress: &'a mut dyn FnMut(&Progress),
     pub(super) interrupt: &'a AtomicBool,
-    /// For a picture without samples.
+    /// Stands in for a picture without samples.
     pub(super) sketch: &'a Sketch<'a>,
 }
 
@@ -67,15 +67,15 @@ struct Progressive<'a> {
     /// The last estimate of the error.
     latest: Option<ErrorEstimate>,
     /// The last estimate with its parts, if the last round had one.
-    report: Option<Told>,
+    report: Option<ErrorReport>,
     /// Seconds of the last estimate, and of all.
     estimating: f64,
     estimated: f64,
     /// The film file, and when it was written last.
-    kept: Kept<'a>,
+    kept: RewrittenFile<'a>,
     saved: Instant,
     began: Instant,
-    /// Why the error that was asked for is out of reach.
+    /// Why the requested error is out of reach.
     lost: Option<Ending>,
 }
 
@@ -111,7 +111,7 @@ impl<'a> Progressive<'a> {
             report: None,
             estimating,
             estimated: 0.0,
-            kept: Kept::in_file(file),
+            kept: RewrittenFile::in_file(file),
             saved: Instant::now(),
             began: Instant::now(),
             lost: None,
@@ -141,7 +141,7 @@ impl<'a> Progressive<'a> {
             self.write_film(seconds, None);
             self.saved = Instant::now();
         }
-        let unsaved = self.kept.news().or_else(|| renderer.kept()?.news());
+        let unsaved = self.kept.new_failure().or_else(|| renderer.kept()?.new_failure());
         let known = Progress { unsaved, ..self.rounds.progress(seconds, self.latest) };
         let Picture { clock, progress, .. } = &mut self.picture;
         clock.pause(|| progress(&known));
@@ -170,7 +170,7 @@ impl<'a> Progressive<'a> {
         self.step_audit(renderer)?;
         let start = Instant::now();
         let Picture { stage, state, audit, .. } = &mut self.picture;
-        let mut report = Told::of(stage.workers, state, audit.as_ref());
+        let mut report = ErrorReport::new(stage.workers, state, audit.as_ref());
         self.estimating = start.elapsed().as_secs_f64();
         self.estimated += self.estimating;
         report = self.extend_audit(report, renderer)?;
@@ -203,7 +203,11 @@ impl<'a> Progressive<'a> {
 
     /// Focuses the audit after its first samples, and goes on with it alone where it alone keeps the picture from its
     /// end.
-    fn extend_audit(&mut self, report: Told, renderer: &mut dyn Renderer) -> Result<Told, RenderError> {
+    fn extend_audit(
+        &mut self,
+        report: ErrorReport,
+        renderer: &mut dyn Renderer,
+    ) -> Result<ErrorReport, RenderError> {
         let Picture { stage, state, audit, clock, progress, interrupt, .. } = &mut self.picture;
         let (Stage { settings, workers, .. }, rounds) = (*stage, &self.rounds);
         let Some(audit) = audit else { return Ok(report) };
@@ -232,7 +236,7 @@ impl<'a> Progressive<'a> {
                 break;
             }
             let verdict = |noise| audit.verdict(workers, &state.film, noise);
-            report = Told::beside(report.noise, workers, state, verdict);
+            report = ErrorReport::of_noise(report.noise, workers, state, verdict);
         }
         Ok(report)
     }
@@ -281,14 +285,15 @@ impl<'a> Progressive<'a> {
         }
         let start = Instant::now();
         let Picture { stage, state, audit, .. } = &self.picture;
-        let report = self.report.take().unwrap_or_else(|| Told::of(stage.workers, state, audit.as_ref()));
+        let report =
+            self.report.take().unwrap_or_else(|| ErrorReport::new(stage.workers, state, audit.as_ref()));
         self.estimated += start.elapsed().as_secs_f64();
         self.result(report, renderer, interrupted)
     }
 
     fn result(
         mut self,
-        report: Told,
+        report: ErrorReport,
         renderer: &mut dyn Renderer,
         interrupted: bool,
     ) -> Result<RenderResult, RenderError> {
@@ -329,7 +334,12 @@ impl<'a> Progressive<'a> {
             audit: report.audited,
             memory: Vec::new(),
             memory_peak: 0,
-            unsaved: self.kept.failed().into_iter().chain(renderer.kept().and_then(Kept::failed)).collect(),
+            unsaved: self
+                .kept
+                .failed()
+                .into_iter()
+                .chain(renderer.kept().and_then(RewrittenFile::failed))
+                .collect(),
             ending: if interrupted { Ending::Interrupted } else { self.lost.unwrap_or(Ending::Done) },
         })
     }

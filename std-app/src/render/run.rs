@@ -1,12 +1,12 @@
 //! One render from the first structure to the last round.
 
 use super::audit::Audit;
+use super::deadline::Deadline;
 use super::film_file::{Identity, Reader};
 use super::history::Clock;
 use super::memory::{Bank, Memory};
 use super::method::{Method, Stage};
 use super::picture::Picture;
-use super::watch::Watch;
 use super::workers::Workers;
 use super::{Progress, RenderError, RenderResult, Seconds, Settings, cache_file, gaps, windows};
 use crate::pages::Pages;
@@ -73,7 +73,7 @@ impl WithFeatures for Render<'_> {
 
         let clock = Clock::start(resumed.as_ref().map_or(0.0, |film| film.header.seconds));
         let left = settings.stop.seconds.map(|limit| limit - clock.seconds());
-        let workers = workers.watched(Watch::until(interrupt).within(left));
+        let workers = workers.ending_at(Deadline::until(interrupt).within(left));
         let mut film_arena = Arena::new(bytemuck::cast_slice_mut(&mut film_lines));
         let state = RenderState::new(width, height, settings.shard, &mut film_arena)?;
         let plain = Stage { scene, bvh: &bvh, lights: &lights, settings, workers: &workers };

@@ -1,7 +1,7 @@
 //! The executor of the program: threads, which the clock and interrupts end.
 
 use super::crew::Crew;
-use super::watch::Watch;
+use super::deadline::Deadline;
 use super::workers::{Fork, Workers};
 use halflight_core::memory::{Line, OutOfMemory};
 use halflight_core::method::{Executor, Passed, Round, Worker};
@@ -21,12 +21,12 @@ pub(super) enum End {
 }
 
 impl End {
-    fn is_over(self, watch: &Watch) -> bool {
+    fn is_over(self, render: &Deadline) -> bool {
         let is_past = |deadline: Option<Instant>| deadline.is_some_and(|deadline| Instant::now() >= deadline);
         match self {
-            End::Prepass => watch.is_over(),
-            End::FirstRound(deadline) => watch.is_late() || is_past(deadline),
-            End::Round(deadline) => watch.is_interrupted() || is_past(deadline),
+            End::Prepass => render.is_over(),
+            End::FirstRound(deadline) => render.is_late() || is_past(deadline),
+            End::Round(deadline) => render.is_interrupted() || is_past(deadline),
         }
     }
 
@@ -63,11 +63,11 @@ impl<'t> Threads<'t> {
         task: impl Fn(usize, P, &mut Worker) -> Result<Counters, OutOfMemory> + Sync,
     ) -> Result<Passed, OutOfMemory> {
         let Self { workers, scratch, end } = self;
-        let (watch, end) = (&workers.watch, *end);
+        let (deadline, end) = (&workers.deadline, *end);
         let queue = Mutex::new(queue);
         let next = || queue.lock().unwrap_or_else(|poisoned| poisoned.into_inner()).next();
         let passed = workers.on_all(scratch, |arena| {
-            let is_over = || end.is_over(watch);
+            let is_over = || end.is_over(deadline);
             let mut worker = Worker::new(arena.scratch(), &is_over);
             let mut counters = Counters::default();
             while let Some((number, piece)) = next() {
@@ -107,7 +107,7 @@ impl Executor for Threads<'_> {
     }
 
     fn is_over(&self) -> bool {
-        self.end.is_over(&self.workers.watch)
+        self.end.is_over(&self.workers.deadline)
     }
 
     fn fork(&self) -> &Fork {
@@ -116,7 +116,7 @@ impl Executor for Threads<'_> {
 
     fn within<T>(&mut self, fraction: f32, work: impl FnOnce(&mut Self) -> T) -> T {
         let before = self.end;
-        let deadlines = [self.workers.watch.after(fraction), before.deadline()];
+        let deadlines = [self.workers.deadline.after(fraction), before.deadline()];
         self.end = End::Round(deadlines.into_iter().flatten().min());
         let done = work(self);
         self.end = before;
@@ -195,7 +195,7 @@ mod tests {
     #[test]
     fn an_interrupt_ends_a_pass_and_a_fraction_of_no_time_ends_its_work_alone() {
         let flag = AtomicBool::new(false);
-        let workers = Workers::new(Some(2)).unwrap().watched(Watch::until(&flag).within(Some(3600.0)));
+        let workers = Workers::new(Some(2)).unwrap().ending_at(Deadline::until(&flag).within(Some(3600.0)));
         let mut scratch = vec![vec![]; 2];
         let mut executor = Threads::new(&workers, &mut scratch).until(End::Round(None));
         let is_complete = |executor: &mut Threads| {

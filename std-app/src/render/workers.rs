@@ -1,6 +1,6 @@
 //! The threads: each takes the next task when it is done with one, and has working memory of its own.
 
-use super::watch::Watch;
+use super::deadline::Deadline;
 use super::{RenderError, regions};
 use halflight_core::Level;
 use halflight_core::bvh::{Bvh, ForkJoin};
@@ -21,8 +21,8 @@ pub(super) type Task<'t, T> =
 
 /// A pool of threads.
 pub(super) struct Workers<'w> {
-    /// When what they do must end.
-    pub(super) watch: Watch<'w>,
+    /// When their passes must end.
+    pub(super) deadline: Deadline<'w>,
     /// The pool, and forks on it.
     pub(super) fork: Fork,
     /// Seconds of each phase of the render.
@@ -34,13 +34,13 @@ impl<'w> Workers<'w> {
     pub(super) fn new(threads: Option<usize>) -> Result<Self, RenderError> {
         let pool = ThreadPoolBuilder::new().num_threads(threads.unwrap_or(0)).build();
         let phases = Mutex::default();
-        pool.map(|pool| Self { fork: Fork(pool), watch: Watch::default(), phases })
+        pool.map(|pool| Self { fork: Fork(pool), deadline: Deadline::default(), phases })
             .map_err(|error| RenderError::Threads(error.to_string()))
     }
 
-    /// The same, which are watched.
-    pub(super) fn watched(self, watch: Watch<'w>) -> Self {
-        Self { watch, ..self }
+    /// The same, whose passes end at `deadline`.
+    pub(super) fn ending_at(self, deadline: Deadline<'w>) -> Self {
+        Self { deadline, ..self }
     }
 
     /// Adds to the `seconds` of a phase.

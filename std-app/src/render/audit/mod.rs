@@ -286,7 +286,7 @@ impl<'a> Audit<'a> {
         let places = &state.places;
         let pixels: &mut [Pixel] = bytemuck::cast_slice_mut(&mut state.pixels);
         let before = pixels.to_vec();
-        let is_over = || workers.watch.is_interrupted();
+        let is_over = || workers.deadline.is_interrupted();
         let (counters, all) =
             workers.pass(pixels, PIXELS_PER_TASK, scratch, &is_over, &|task, arena, out| {
                 let first = task * PIXELS_PER_TASK;

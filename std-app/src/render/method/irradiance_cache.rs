@@ -9,8 +9,8 @@ use crate::render::RenderError;
 use crate::render::cache_file::{self, Half, Header, Reader, View};
 use crate::render::crew::Crew;
 use crate::render::held_out::EXACT;
-use crate::render::kept::Kept;
 use crate::render::memory::{Bank, Memory};
+use crate::render::rewritten_file::RewrittenFile;
 use crate::render::survey::{self, Survey};
 use crate::render::threads::{End, Threads};
 use crate::render::workers::Workers;
@@ -143,7 +143,7 @@ fn set_up<'m, F: Features, T>(
         view,
         loaded: header.halves,
         header,
-        kept: Kept::in_file(settings.save_cache.as_deref()),
+        kept: RewrittenFile::in_file(settings.save_cache.as_deref()),
         rays: cache.strata.pow(2) as u32,
     };
     then(&mut cached, memory)
@@ -165,7 +165,7 @@ struct Cached<'c, 'm, F> {
     /// What came from a file.
     loaded: [Half; 2],
     /// Where they are kept.
-    kept: Kept<'c>,
+    kept: RewrittenFile<'c>,
     /// Gather rays of a record.
     rays: u32,
 }
@@ -282,7 +282,7 @@ impl<F: Features> Renderer for Cached<'_, '_, F> {
         self.keep(Some(patience));
     }
 
-    fn kept(&self) -> Option<&Kept<'_>> {
+    fn kept(&self) -> Option<&RewrittenFile<'_>> {
         Some(&self.kept)
     }
 

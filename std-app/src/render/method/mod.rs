@@ -22,8 +22,8 @@ pub use halflight_core::method::{MapUse, PhotonSettings, PhotonUse};
 pub use photon_view::{MapView, PhotonView};
 
 use super::crew::Crew;
-use super::kept::Kept;
 use super::memory::Memory;
+use super::rewritten_file::RewrittenFile;
 use super::run::path_settings;
 use super::survey::Survey;
 use super::workers::Workers;
@@ -264,7 +264,7 @@ pub(super) trait Renderer {
     fn finish(&mut self, _patience: Patience) {}
 
     /// That file.
-    fn kept(&self) -> Option<&Kept<'_>> {
+    fn kept(&self) -> Option<&RewrittenFile<'_>> {
         None
     }
 

@@ -103,7 +103,7 @@ fn look_at<F: Features>(
     for pixel in 0..pixels as u32 {
         let (x, y) = (pixel % width, pixel / width);
         // Black from here on: nobody waits for it any more.
-        if x == 0 && stage.workers.watch.is_interrupted() {
+        if x == 0 && stage.workers.deadline.is_interrupted() {
             break;
         }
         let ray = camera.ray(width, height, x as f32 + 0.5, y as f32 + 0.5, [0.5; 2]);

@@ -1,32 +1,32 @@
-//! A file that is written while a picture grows, and again at the end: the film of a checkpoint, irradiance caches.
-//! A write that fails on the way costs nothing but the file: the last whole one stays, the next write tries again.
+//! A file that is rewritten during a render and at its end: the film of a checkpoint, irradiance caches. A write
+//! that fails leaves the last complete file; the next write tries again.
 
 use super::FileError;
 use crate::save::{Destination, Patience};
 use core::cell::Cell;
 use std::path::Path;
 
-/// Such a file; without a name there is none.
+/// A file that is rewritten; none without a path.
 #[derive(Default)]
-pub(super) struct Kept<'a> {
+pub(super) struct RewrittenFile<'a> {
     path: Option<&'a Path>,
-    /// Pipes and devices cannot be replaced: they have the last of all alone.
+    /// Whether it is a pipe or device, which cannot be replaced: only the last write goes there.
     is_stream: bool,
-    /// Whether there is something newer than the file.
+    /// Whether the file is older than the state of the render.
     is_owed: bool,
     failed: Option<FileError>,
     is_known: Cell<bool>,
 }
 
-impl<'a> Kept<'a> {
-    /// In the file of this name.
+impl<'a> RewrittenFile<'a> {
+    /// At `path`.
     pub(super) fn in_file(path: Option<&'a Path>) -> Self {
         let is_stream =
             path.is_some_and(|path| Destination::of(path).is_ok_and(|destination| destination.is_stream()));
         Self { path, is_stream, ..Self::default() }
     }
 
-    /// On the way.
+    /// Writes during the render.
     pub(super) fn update(&mut self, write: impl FnOnce(&Path, Patience) -> Result<(), FileError>) {
         if self.is_stream {
             self.is_owed = true;
@@ -35,7 +35,7 @@ impl<'a> Kept<'a> {
         }
     }
 
-    /// On the way, or in the `last` place, where the write before failed or was put off.
+    /// Writes during the render; with the `last` patience only if the write before failed or was postponed.
     pub(super) fn keep(
         &mut self,
         last: Option<Patience>,
@@ -48,7 +48,7 @@ impl<'a> Kept<'a> {
         }
     }
 
-    /// At the end, whatever was written before.
+    /// Writes at the end, whatever was written before.
     pub(super) fn finish(
         &mut self,
         patience: Patience,
@@ -58,13 +58,13 @@ impl<'a> Kept<'a> {
         self.is_owed = self.failed.is_some();
     }
 
-    /// Why the last write failed, asked for the first time.
-    pub(super) fn news(&self) -> Option<FileError> {
+    /// Why the last write failed, on the first call.
+    pub(super) fn new_failure(&self) -> Option<FileError> {
         let failed = self.failed.clone();
         failed.filter(|_| !self.is_known.replace(true))
     }
 
-    /// Why it is not there as it should be.
+    /// Why the file is missing or out of date.
     pub(super) fn failed(&self) -> Option<FileError> {
         self.failed.clone()
     }
@@ -75,30 +75,33 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_fails_is_news_once_and_forgotten_when_it_is_there() {
-        let mut kept = Kept::in_file(Some(Path::new("film")));
+    fn a_failure_is_reported_once_and_cleared_by_the_next_write() {
+        let mut file = RewrittenFile::in_file(Some(Path::new("film")));
         let fail = |path: &Path, _: Patience| Err(FileError::new(path, "cannot be written"));
-        kept.update(fail);
-        assert_eq!(kept.news().map(|error| error.to_string()).as_deref(), Some("film: cannot be written"));
-        kept.update(fail);
-        assert_eq!((kept.news(), kept.failed().is_some()), (None, true));
-        kept.keep(Some(Patience::least()), |_, _| Ok(()));
-        assert_eq!((kept.news(), kept.failed()), (None, None));
-        kept.keep(Some(Patience::least()), |_, _| panic!("it is there already"));
+        file.update(fail);
+        assert_eq!(
+            file.new_failure().map(|error| error.to_string()).as_deref(),
+            Some("film: cannot be written")
+        );
+        file.update(fail);
+        assert_eq!((file.new_failure(), file.failed().is_some()), (None, true));
+        file.keep(Some(Patience::least()), |_, _| Ok(()));
+        assert_eq!((file.new_failure(), file.failed()), (None, None));
+        file.keep(Some(Patience::least()), |_, _| panic!("it is written already"));
     }
 
     #[test]
     fn without_a_name_nothing_is_written() {
-        Kept::default().finish(Patience::least(), |_, _| panic!("there is no file"));
+        RewrittenFile::default().finish(Patience::least(), |_, _| panic!("there is no file"));
     }
 
     #[cfg(unix)]
     #[test]
-    fn a_device_has_the_last_of_all_alone() {
+    fn a_device_gets_the_last_write_alone() {
         let mut count = 0;
-        let mut kept = Kept::in_file(Some(Path::new("/dev/null")));
-        kept.update(|_, _| panic!("not on the way"));
-        kept.finish(Patience::least(), |_, _| {
+        let mut file = RewrittenFile::in_file(Some(Path::new("/dev/null")));
+        file.update(|_, _| panic!("not during the render"));
+        file.finish(Patience::least(), |_, _| {
             count += 1;
             Ok(())
         });

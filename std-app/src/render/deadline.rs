@@ -1,35 +1,35 @@
-//! When a render comes to its end: at a time, or when somebody says so. Whoever works on it asks from task to task.
+//! The end of a render: a time limit or an interruption. Passes check it before each task.
 
 use core::sync::atomic::{AtomicBool, Ordering};
 use core::time::Duration;
 use std::sync::OnceLock;
 use std::time::Instant;
 
-/// How long after its end first looks may go on: the picture is the better for them, and mostly they take less.
-const LOOKING: Duration = Duration::from_secs(2);
+/// Time after the end that prepasses may take: the picture gains by them, and most take less.
+const PREPASS_GRACE: Duration = Duration::from_secs(2);
 
-/// How long after its end the first sample of each pixel, and what it needs, may go on. A picture of ordinary size
-/// takes less; a larger one is cut then, and its gaps are filled (`gaps.rs`).
-const GRACE: Duration = Duration::from_secs(5);
+/// Time after the end that the first sample of each pixel may take, with its preparation. A picture of ordinary
+/// size takes less; a larger one is cut then, and its gaps are filled (`gaps.rs`).
+const FIRST_SAMPLE_GRACE: Duration = Duration::from_secs(5);
 
-/// See the file. By default it never ends.
+/// A time limit, an interrupt flag, or both; by default the render never ends.
 #[derive(Default)]
-pub(super) struct Watch<'w> {
+pub(super) struct Deadline<'w> {
     interrupt: Option<&'w AtomicBool>,
     deadline: Option<Instant>,
-    /// Start of the render, and its seconds where they are limited.
+    /// Start of the render and its limit in seconds.
     limit: Option<(Instant, f64)>,
     /// When the interruption was noticed.
     noticed: OnceLock<Instant>,
 }
 
-impl<'w> Watch<'w> {
+impl<'w> Deadline<'w> {
     /// Ends when `interrupt` is raised.
     pub(super) fn until(interrupt: &'w AtomicBool) -> Self {
         Self { interrupt: Some(interrupt), ..Self::default() }
     }
 
-    /// The same, which ends after so many `seconds` from now as well; `None` is never.
+    /// The same, which also ends `seconds` from now; `None`: no limit.
     pub(super) fn within(self, seconds: Option<f64>) -> Self {
         let later = |seconds: f64| Duration::try_from_secs_f64(seconds.max(0.0)).ok();
         let deadline = seconds.and_then(later).and_then(|later| Instant::now().checked_add(later));
@@ -43,7 +43,7 @@ impl<'w> Watch<'w> {
         start.checked_add(Duration::try_from_secs_f64(f64::from(fraction) * seconds).ok()?)
     }
 
-    /// Whether somebody said so.
+    /// Whether the interrupt flag is raised.
     pub(super) fn is_interrupted(&self) -> bool {
         let is_raised = self.interrupt.is_some_and(|flag| flag.load(Ordering::Relaxed));
         if is_raised {
@@ -52,14 +52,14 @@ impl<'w> Watch<'w> {
         is_raised
     }
 
-    /// Whether first looks are to end: a picture can be made without them.
+    /// Whether prepasses are to end: a picture can be made without them.
     pub(super) fn is_over(&self) -> bool {
-        self.has_ended_for(LOOKING)
+        self.has_ended_for(PREPASS_GRACE)
     }
 
     /// Whether the first sample of each pixel is to end.
     pub(super) fn is_late(&self) -> bool {
-        self.has_ended_for(GRACE)
+        self.has_ended_for(FIRST_SAMPLE_GRACE)
     }
 
     fn has_ended_for(&self, time: Duration) -> bool {
@@ -80,17 +80,18 @@ mod tests {
     #[test]
     fn the_first_sample_has_a_grace_whatever_ends_the_render() {
         let flag = AtomicBool::new(false);
-        let [never, timed, told] = [None, Some(0.0), None].map(|end| Watch::until(&flag).within(end));
+        let [never, timed, interrupted] =
+            [None, Some(0.0), None].map(|end| Deadline::until(&flag).within(end));
         assert!(!never.is_over() && !never.is_late());
         assert!(!timed.is_over() && !timed.is_interrupted() && !timed.is_late());
         flag.store(true, Ordering::Relaxed);
-        assert!(told.is_interrupted() && !told.is_over() && !told.is_late());
+        assert!(interrupted.is_interrupted() && !interrupted.is_over() && !interrupted.is_late());
         let ago = |time: Duration| Instant::now().checked_sub(time).unwrap();
-        let noticed = |at: Instant| Watch { noticed: at.into(), ..Watch::until(&flag) };
-        assert!(noticed(ago(LOOKING)).is_over() && !noticed(ago(LOOKING)).is_late());
-        assert!(noticed(ago(GRACE)).is_late());
-        let timed = Watch { deadline: Some(ago(GRACE)), ..Watch::default() };
+        let noticed = |at: Instant| Deadline { noticed: at.into(), ..Deadline::until(&flag) };
+        assert!(noticed(ago(PREPASS_GRACE)).is_over() && !noticed(ago(PREPASS_GRACE)).is_late());
+        assert!(noticed(ago(FIRST_SAMPLE_GRACE)).is_late());
+        let timed = Deadline { deadline: Some(ago(FIRST_SAMPLE_GRACE)), ..Deadline::default() };
         assert!(timed.is_over() && timed.is_late());
-        assert!(!Watch::default().within(Some(1e300)).is_over());
+        assert!(!Deadline::default().within(Some(1e300)).is_over());
     }
 }
