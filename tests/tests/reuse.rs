@@ -105,6 +105,52 @@ fn reuse_halves_the_variance() {
     assert!(with < 0.5 * without, "{with} {without}");
 }
 
+/// Blocks of pixels that share have errors in common, but no borders: what differs across the lines between blocks
+/// is hardly more than what differs across their middles.
+#[test]
+fn blocks_of_pixels_that_share_have_no_borders() {
+    const ACROSS: u32 = 64;
+    let buffers = cornell_box();
+    let scene = buffers.scene();
+    let pictures: Vec<Vec<f64>> = (0..12)
+        .map(|seed| {
+            let result = render(&scene, 4, |s| {
+                (s.width, s.height, s.seed, s.reuse) = (ACROSS, ACROSS, seed, Some(true));
+            });
+            result.image.pixels.iter().map(|[r, g, b]| f64::from(r + g + b)).collect()
+        })
+        .collect();
+    let mean = |x: u32, y: u32| {
+        pictures.iter().map(|picture| picture[(y * ACROSS + x) as usize]).sum::<f64>() / pictures.len() as f64
+    };
+    // The squared error in the difference of 4 x 8 pixels on both sides of the columns and the rows of lines.
+    let step = |first: u32| {
+        let lines =
+            (first..ACROSS - 4).step_by(8).flat_map(|line| (0..ACROSS / 8).map(move |k| (line, 8 * k)));
+        let one = |(line, from): (u32, u32)| {
+            let of = |picture: &[f64], turned: bool| {
+                let both = (line - 4..line + 4).flat_map(|a| (from..from + 8).map(move |b| (a, b)));
+                both.map(|(a, b)| {
+                    let (x, y) = if turned { (b, a) } else { (a, b) };
+                    let error = picture[(y * ACROSS + x) as usize] - mean(x, y);
+                    if a < line { error } else { -error }
+                })
+                .sum::<f64>()
+            };
+            // A lamp at the edge of a pixel does not speak for all.
+            let square =
+                |picture: &Vec<f64>| [false, true].map(|turned| of(picture, turned).powi(2).min(1e2));
+            pictures.iter().flat_map(square).sum::<f64>()
+        };
+        lines.map(one).sum::<f64>()
+    };
+    // 56 and 64 lines: the quotient is of means. With sharp borders it is 5 and more.
+    let (borders, middles) = (step(8), step(12));
+    let ratio = borders / middles;
+    println!("{borders} {middles} {ratio}");
+    assert!(ratio < 3.0, "{borders} {middles}");
+}
+
 #[test]
 fn bits_do_not_depend_on_waves_or_rounds() {
     for buffers in [cornell_box(), everything(), coated()] {

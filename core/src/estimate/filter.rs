@@ -33,7 +33,7 @@ pub fn filtered(pixels: &[Pixel], mean: f64) -> [Rgb; PIXELS_PER_TILE] {
 pub fn filtered_pixel(pixels: &[Pixel], mean: f64, i: usize) -> Rgb {
     let scale = (1.0 / mean) as f32;
     let at = |place: usize| {
-        let other = Tile::position(TILE, (place % SIDE) as u32, (place / SIDE) as u32);
+        let other = Tile::index_of_place((place % SIDE) as u32, (place / SIDE) as u32);
         pixels.get(other).map_or((Vec4::ZERO, Vec4::ZERO), |pixel| seen(pixel, scale))
     };
     lee(at, raster(i)).truncate() / scale

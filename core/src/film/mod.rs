@@ -8,7 +8,7 @@ mod tile;
 pub use pixel::{Dropped, Half, Pixel};
 pub use samples::{CIRCLE, CIRCLES, GROUP, GROUPS};
 pub use splat::{STRIPS, Splat, StripOffsets, add_strip, sort_by_strip, strip_length};
-pub use tile::{PIXELS_PER_TILE, PixelSet, TILE, Tile};
+pub use tile::{PIXELS_PER_TILE, PixelSet, REACH, TILE, Tile};
 
 use crate::Rgb;
 use crate::memory::{Arena, Footprint, OutOfMemory};
@@ -57,9 +57,11 @@ impl<'m> Film<'m> {
 
     /// The pixel in column `x` and row `y`, counted from the upper left; empty outside of the picture.
     pub fn pixel(&self, x: u32, y: u32) -> Pixel {
-        let index = Tile::position(self.width, x, y);
-        let inside = x < self.width && y < self.height;
-        self.pixels.get(index).copied().filter(|_| inside).unwrap_or_default()
+        if x >= self.width || y >= self.height {
+            return Pixel::default();
+        }
+        let index = Tile::position([self.width, self.height], x, y);
+        self.pixels.get(index).copied().unwrap_or_default()
     }
 
     /// The mean of all samples of a pixel; black where there are none.
@@ -88,18 +90,44 @@ mod tests {
 
     #[test]
     fn every_pixel_has_its_own_place() {
-        let (width, height) = (35, 18);
-        let mut seen = vec![false; Tile::count(width, height) * PIXELS_PER_TILE];
-        for task in 0..Tile::count(width, height) {
-            let tile = Tile::new(width, height, task);
-            for i in 0..PIXELS_PER_TILE {
-                if let Some((x, y)) = tile.pixel(i) {
-                    let place = Tile::position(width, x, y);
-                    assert_eq!(place, task * PIXELS_PER_TILE + i);
-                    assert!(!core::mem::replace(&mut seen[place], true));
+        for (width, height) in [(35, 18), (1, 1), (3, 40), (64, 48), (17, 16)] {
+            let mut seen = vec![false; Tile::count(width, height) * PIXELS_PER_TILE];
+            for task in 0..Tile::count(width, height) {
+                let tile = Tile::new(width, height, task);
+                for i in 0..PIXELS_PER_TILE {
+                    if let Some((x, y)) = tile.pixel(i) {
+                        let place = Tile::position([width, height], x, y);
+                        assert_eq!(place, task * PIXELS_PER_TILE + i);
+                        assert!(!core::mem::replace(&mut seen[place], true));
+                        let [left, top] = tile.corner();
+                        let near =
+                            |at: u32, first: u32| (first..first + TILE + 2 * REACH).contains(&(at + REACH));
+                        assert!(near(x, left) && near(y, top));
+                    }
                 }
             }
+            assert_eq!(seen.iter().filter(|&&s| s).count(), (width * height) as usize);
         }
-        assert_eq!(seen.iter().filter(|&&s| s).count(), (width * height) as usize);
+    }
+
+    #[test]
+    fn blocks_dissolve_into_each_other() {
+        let size = [256, 256];
+        // How many pixels of each column of blocks lie beyond its borders.
+        let block = |place: usize| {
+            let tile = place / PIXELS_PER_TILE % 16;
+            tile as u32 * 2 + Tile::place(place % PIXELS_PER_TILE).0 / 8
+        };
+        let mut beyond = [0; 8];
+        for (x, y) in (8..248).flat_map(|x| (0..256).map(move |y| (x, y))) {
+            beyond[x as usize % 8] += u32::from(block(Tile::position(size, x, y)) != x / 8);
+        }
+        // Of 30 columns of 256 pixels each; within five standard deviations.
+        for (column, count) in beyond.into_iter().enumerate() {
+            let share = f64::from([7, 5, 3, 1, 1, 3, 5, 7][column]) / 16.0;
+            let pixels = 30.0 * 256.0;
+            let deviation = (share * (1.0 - share) * pixels).sqrt();
+            assert!((f64::from(count) - share * pixels).abs() < 5.0 * deviation, "{column}: {count}");
+        }
     }
 }

@@ -1,11 +1,24 @@
 //! How a picture is cut into tiles, and the order of the pixels within one: the Z-curve, so that any run of
 //! pixels is a compact patch and its camera rays are alike.
+//!
+//! Pixels of a block of 8 × 8 may share their samples, and then have an error in common. A sharp border between
+//! two blocks would show, so blocks dissolve into each other: a pixel changes places with its mirror image beyond
+//! the nearest border of its block, with a probability that falls from a half at the border to zero in the
+//! middle of the block.
+
+use crate::sampling::mix;
 
 /// Pixels along the side of a tile.
 pub const TILE: u32 = 16;
 
 /// Pixels of a tile.
 pub const PIXELS_PER_TILE: usize = (TILE * TILE) as usize;
+
+/// Pixels along the side of a block.
+const BLOCK: u32 = 8;
+
+/// A tile has pixels up to this far outside of its square.
+pub const REACH: u32 = BLOCK / 2;
 
 /// One tile of a picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -34,26 +47,58 @@ impl Tile {
         [self.left, self.top]
     }
 
-    /// Column and row of the `i`th pixel, counted from the upper left of its tile.
+    /// Column and row of the `i`th place, counted from the upper left of its tile.
     #[inline]
     pub const fn place(i: usize) -> (u32, u32) {
         (even_bits(i as u32), even_bits(i as u32 >> 1))
     }
 
-    /// Column and row of the `i`th pixel of the tile; `None` outside of the picture.
+    /// The inverse of [`Tile::place`].
+    #[inline]
+    pub const fn index_of_place(x: u32, y: u32) -> usize {
+        (spread(x % TILE) | spread(y % TILE) << 1) as usize
+    }
+
+    /// Column and row of the `i`th pixel of the tile, near its `i`th place; `None` outside of the picture.
     #[inline]
     pub const fn pixel(&self, i: usize) -> Option<(u32, u32)> {
         let (x, y) = Self::place(i);
         let (x, y) = (self.left + x, self.top + y);
+        let x = dissolved(x, y, whole(self.width));
+        let y = dissolved(y, !x, whole(self.height));
         if x < self.width && y < self.height { Some((x, y)) } else { None }
     }
 
-    /// Where the film keeps the pixel in column `x` and row `y`.
+    /// Where a film of `width` × `height` keeps the pixel in column `x` and row `y`.
     #[inline]
-    pub const fn position(width: u32, x: u32, y: u32) -> usize {
+    pub const fn position([width, height]: [u32; 2], x: u32, y: u32) -> usize {
+        let y = dissolved(y, !x, whole(height));
+        let x = dissolved(x, y, whole(width));
         let tile = (y / TILE) as usize * width.div_ceil(TILE) as usize + (x / TILE) as usize;
-        tile * PIXELS_PER_TILE + (spread(x % TILE) | spread(y % TILE) << 1) as usize
+        tile * PIXELS_PER_TILE + Self::index_of_place(x, y)
     }
+}
+
+/// Pixels across all tiles of a picture that is `size` pixels across.
+#[inline]
+const fn whole(size: u32) -> u32 {
+    size.div_ceil(TILE) * TILE
+}
+
+/// The coordinate with which `at` changes places along `line`, or `at` itself; the inverse of itself. `size` is a
+/// multiple of the side of a block.
+#[inline]
+const fn dissolved(at: u32, line: u32, size: u32) -> u32 {
+    let border = (at + REACH) / BLOCK * BLOCK;
+    if border == 0 || border >= size {
+        return at;
+    }
+    let mirrored = 2 * border - 1 - at;
+    let first = if at < border { at } else { mirrored };
+    // From 0 beside the border to REACH - 1.
+    let distance = border - 1 - first;
+    let lot = (mix((first as u64) << 32 | line as u64) >> 32) as u32 % (4 * REACH);
+    if lot < 2 * (REACH - distance) - 1 { mirrored } else { at }
 }
 
 /// Bits 0, 2, 4, 6 of `i`, moved together.

@@ -2,7 +2,7 @@
 
 use halflight_core::film::{Dropped, Film, TILE, Tile};
 
-/// A part of the picture in which samples were dropped.
+/// A part of the picture, up to four pixels at its borders, in which samples were dropped.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Place {
     /// Column of its upper left pixel.
@@ -20,7 +20,7 @@ pub struct Place {
 /// The tiles of a picture that have rejected samples, those with the most first.
 pub(super) fn places(dropped: &[Dropped], width: u32, height: u32) -> Vec<Place> {
     let of_tile = |(task, &dropped): (usize, &Dropped)| {
-        let (x, y) = Tile::new(width, height, task).pixel(0)?;
+        let [x, y] = Tile::new(width, height, task).corner();
         Some(Place { x, y, width: TILE.min(width - x), height: TILE.min(height - y), dropped })
     };
     let some = dropped.iter().enumerate().filter(|(_, dropped)| dropped.total() > 0);

@@ -12,7 +12,7 @@ use super::sharing::Sharing;
 use crate::Rgb;
 use crate::bsdf::Features;
 use crate::bvh::Coherence;
-use crate::film::{PixelSet, TILE, Tile};
+use crate::film::{PIXELS_PER_TILE, PixelSet, REACH, TILE, Tile};
 use crate::geometry::{Hit, MISS, Ray};
 use crate::light::{LightSampler, emitted};
 use crate::sampling::Sampler;
@@ -38,11 +38,17 @@ const MARGIN: f32 = 0.01;
 /// A border that begins behind the camera is seen from this share of its greatest depth on.
 const NEAR: f32 = 1e-3;
 
-/// Adds the pixels that the segment from `a` to `b` passes through, in raster coordinates from the tile's
+/// Pixels along the side of the square in which all pixels of a tile lie.
+const SIDE: u32 = TILE + 2 * REACH;
+
+/// Some pixels of this square: a bit for each column of each row.
+type Rows = [u32; SIDE as usize];
+
+/// Adds the pixels that the segment from `a` to `b` passes through, in raster coordinates from the square's
 /// corner.
-fn add(pixels: &mut PixelSet, a: Vec2, b: Vec2) {
+fn add(pixels: &mut Rows, a: Vec2, b: Vec2) {
     let (a, b) = if a.y <= b.y { (a, b) } else { (b, a) };
-    let side = TILE as f32;
+    let side = SIDE as f32;
     let (low, high) = (a.min(b) - MARGIN, a.max(b) + MARGIN);
     if !(low.x < side && high.x >= 0.0 && low.y < side && high.y >= 0.0) {
         return;
@@ -50,14 +56,14 @@ fn add(pixels: &mut PixelSet, a: Vec2, b: Vec2) {
     let slope = if b.y > a.y { (b.x - a.x) / (b.y - a.y) } else { 0.0 };
     let at = |y: f32| if slope == 0.0 { [a.x, b.x] } else { [a.x + slope * (y.clamp(a.y, b.y) - a.y); 2] };
     // Casts saturate.
-    for y in low.y.max(0.0) as u32..=(high.y as u32).min(TILE - 1) {
+    for y in low.y.max(0.0) as u32..=(high.y as u32).min(SIDE - 1) {
         let ([p, q], [r, s]) = (at(y as f32 - MARGIN), at(y as f32 + 1.0 + MARGIN));
         let (left, right) = (p.min(q).min(r.min(s)) - MARGIN, p.max(q).max(r.max(s)) + MARGIN);
         if right < 0.0 {
             continue;
         }
-        for x in left.max(0.0) as u32..=(right as u32).min(TILE - 1) {
-            pixels.insert(Tile::position(TILE, x, y));
+        for x in left.max(0.0) as u32..=(right as u32).min(SIDE - 1) {
+            pixels[y as usize] |= 1 << x;
         }
     }
 }
@@ -76,7 +82,8 @@ impl View {
             camera.ray(settings.width, settings.height, x, y, [0.0; 2]).direction.into()
         };
         // A pixel more to each side.
-        let [near, far] = [-1.0, TILE as f32 + 1.0].map(|by| tile.corner().map(|c| c as f32 + by));
+        let beyond = REACH as f32 + 1.0;
+        let [near, far] = [-beyond, TILE as f32 + beyond].map(|by| tile.corner().map(|c| c as f32 + by));
         let axis = direction([0, 1].map(|i| 0.5 * (near[i] + far[i])));
         let corners = [near, far, [near[0], far[1]], [far[0], near[1]]];
         let cos = corners.map(|corner| direction(corner).dot(axis)).into_iter().fold(1.0, f32::min);
@@ -108,8 +115,8 @@ pub(in crate::transport) fn outlined(
     if camera.lens_radius > 0.0 {
         return PixelSet::default();
     }
-    let mut pixels = PixelSet::default();
-    let corner = Vec2::from(tile.corner().map(|c| c as f32));
+    let mut rows = Rows::default();
+    let corner = Vec2::from(tile.corner().map(|c| c as f32 - REACH as f32));
     let on_raster = |point| {
         let seen = camera.project(settings.width, settings.height, point, [0.0; 2])?;
         Some(seen.raster - corner)
@@ -124,11 +131,23 @@ pub(in crate::transport) fn outlined(
             if depth < least { point + (other - point) * ((least - depth) / (beyond - depth)) } else { point }
         };
         if let (Some(a), Some(b)) = (on_raster(cut(a, near, b, far)), on_raster(cut(b, far, a, near))) {
-            add(&mut pixels, a, b);
+            add(&mut rows, a, b);
         }
     });
     let has_cutouts = || scene.materials.iter().any(Material::has_cutout);
-    if pixels.is_empty() || has_cutouts() { PixelSet::default() } else { pixels }
+    let mut pixels = PixelSet::default();
+    if rows == Rows::default() || has_cutouts() {
+        return pixels;
+    }
+    for i in 0..PIXELS_PER_TILE {
+        let Some((x, y)) = tile.pixel(i) else { continue };
+        let [left, top] = tile.corner();
+        let row = rows.get((y + REACH - top) as usize).copied().unwrap_or_default();
+        if row >> (x + REACH - left) & 1 == 1 {
+            pixels.insert(i);
+        }
+    }
+    pixels
 }
 
 /// Whether the pixel in column `x` and row `y` is one of [`outlined`].
@@ -138,9 +157,9 @@ pub(in crate::transport) fn is_outlined(
     settings: &PathSettings,
     [x, y]: [u32; 2],
 ) -> bool {
-    let index = y / TILE * settings.width.div_ceil(TILE) + x / TILE;
-    let tile = Tile::new(settings.width, settings.height, index as usize);
-    outlined(scene, lights, settings, tile).contains(Tile::position(TILE, x % TILE, y % TILE))
+    let position = Tile::position([settings.width, settings.height], x, y);
+    let tile = Tile::new(settings.width, settings.height, position / PIXELS_PER_TILE);
+    outlined(scene, lights, settings, tile).contains(position % PIXELS_PER_TILE)
 }
 
 /// The rays that look at lamps for one sample of the pixel in column `x` and row `y`.
@@ -227,44 +246,41 @@ impl<F: Features, E: Estimator<F>, R: Sharing> PathIntegrator<'_, F, E, R> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::film::PIXELS_PER_TILE;
     use crate::sampling::Random;
 
     #[test]
     fn every_pixel_on_the_way_is_marked_and_few_others() {
         for n in 0..200 {
             let random = Random::new(7, n);
-            let at = |i: u32| Vec2::new(random.single(i), random.single(i + 1)) * 40.0 - 12.0;
+            let at = |i: u32| Vec2::new(random.single(i), random.single(i + 1)) * 48.0 - 12.0;
             let (a, mut b) = (at(0), at(2));
             match n % 4 {
                 0 => b.y = a.y,
                 1 => b.x = a.x,
                 _ => (),
             }
-            let mut pixels = PixelSet::default();
+            let mut pixels = Rows::default();
             add(&mut pixels, a, b);
-            let mut near = PixelSet::default();
+            let mut near = Rows::default();
             for step in 0..=4000 {
                 let point = a.lerp(b, step as f32 / 4000.0);
                 for (x, y) in [(0, 0), (1, 0), (0, 1), (1, 1)] {
                     let [x, y] = [point.x - 0.03 + 0.06 * x as f32, point.y - 0.03 + 0.06 * y as f32];
-                    if (0.0..TILE as f32).contains(&x) && (0.0..TILE as f32).contains(&y) {
-                        let place = Tile::position(TILE, x as u32, y as u32);
-                        near.insert(place);
+                    if (0.0..SIDE as f32).contains(&x) && (0.0..SIDE as f32).contains(&y) {
+                        near[y as usize] |= 1 << x as u32;
                     }
                 }
-                if point.cmpge(Vec2::ZERO).all() && point.cmplt(Vec2::splat(TILE as f32)).all() {
-                    let place = Tile::position(TILE, point.x as u32, point.y as u32);
-                    assert!(pixels.contains(place), "{a} {b} {point}");
+                if point.cmpge(Vec2::ZERO).all() && point.cmplt(Vec2::splat(SIDE as f32)).all() {
+                    assert!(pixels[point.y as usize] >> point.x as u32 & 1 == 1, "{a} {b} {point}");
                 }
             }
-            assert!((0..PIXELS_PER_TILE).all(|i| near.contains(i) || !pixels.contains(i)), "{a} {b}");
+            assert!(pixels.iter().zip(near).all(|(pixels, near)| pixels & !near == 0), "{a} {b}");
         }
     }
 
     #[test]
     fn segments_that_are_no_numbers_are_none() {
-        let mut pixels = PixelSet::default();
+        let mut pixels = Rows::default();
         add(&mut pixels, Vec2::splat(f32::NAN), Vec2::splat(3.0));
         add(&mut pixels, Vec2::new(f32::NEG_INFINITY, 3.0), Vec2::new(f32::INFINITY, f32::NAN));
         add(&mut pixels, Vec2::new(-1e30, -1e30), Vec2::new(1e30, 1e30));

@@ -172,7 +172,7 @@ mod tests {
             Film::new(width, height, &mut Arena::new(bytemuck::cast_slice_mut(&mut lines))).unwrap();
         for y in 0..height {
             for x in 0..width {
-                let place = Tile::position(width, x, y);
+                let place = Tile::position([width, height], x, y);
                 for sample in 0..4 {
                     let colour = Rgb::splat(light(x, y));
                     film.pixels_mut()[place].add(sample, colour, &mut Dropped::default());
@@ -214,7 +214,7 @@ mod tests {
                     // A third of 256, as nearly as tiles of 16 x 16 divide 50 x 40.
                     assert!((70..105).contains(&pixels.len()), "{}", pixels.len());
                     assert!((shares.iter().sum::<f32>() / pixels.len() as f32 - 1.0).abs() < 1e-5);
-                    let tile = |[x, y]: [u32; 2]| Tile::position(50, x, y) / PIXELS_PER_TILE;
+                    let tile = |[x, y]: [u32; 2]| Tile::position([50, 40], x, y) / PIXELS_PER_TILE;
                     assert!(pixels.into_iter().all(|pixel| shard.owns(tile(pixel))));
                 }
             },

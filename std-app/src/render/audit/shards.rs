@@ -12,7 +12,8 @@ impl State {
         let grid = Grid::new([film.width(), film.height()], count);
         let order = ordered(film, Shard::WHOLE, mean, grid);
         let owner = |shard: Shard| {
-            move |[x, y]: &&[u32; 2]| shard.owns(Tile::position(film.width(), *x, *y) / PIXELS_PER_TILE)
+            let size = [film.width(), film.height()];
+            move |[x, y]: &&[u32; 2]| shard.owns(Tile::position(size, *x, *y) / PIXELS_PER_TILE)
         };
         // Pixels of a stratum in the mean of all.
         let mean_size = order.len() as f64 / count as f64;

@@ -93,7 +93,7 @@ pub(super) fn findings(
     truth: &[Pixel],
 ) -> Vec<(usize, Finding)> {
     let finding = |(index, (place, truth)): (usize, (&[u32; 2], &Pixel))| {
-        let position = Tile::position(film.width(), place[0], place[1]);
+        let position = Tile::position([film.width(), film.height()], place[0], place[1]);
         let first = position / PIXELS_PER_TILE * PIXELS_PER_TILE;
         let tile = film.pixels().get(first..first + PIXELS_PER_TILE)?;
         let colour = filtered_pixel(tile, mean, position - first);

@@ -14,7 +14,7 @@ use halflight_core::film::{PIXELS_PER_TILE, Pixel, Tile};
 use halflight_core::method::{RenderState, Shard};
 use std::path::Path;
 
-const KIND: Kind = Kind { magic: *b"HLFILM", version: 7, name: "film" };
+const KIND: Kind = Kind { magic: *b"HLFILM", version: 8, name: "film" };
 
 /// Writes the film of `state` to `path`, whole or not at all.
 pub(super) fn write(
