@@ -234,7 +234,7 @@ impl<F: Features> Writer<'_, F> {
             return None;
         }
         let ray = point.spawn_to(lens_point(camera, lens, point.position, &seen));
-        let pixel = Tile::position(width, seen.raster.x as u32, seen.raster.y as u32) as u32;
+        let pixel = Tile::position([width, height], seen.raster.x as u32, seen.raster.y as u32) as u32;
         self.shadows.rays[self.pending] = Ray { tag: pixel, ..ray };
         self.shadows.light[self.pending] = radiance.to_array();
         self.pending += 1;
