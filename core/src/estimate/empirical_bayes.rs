@@ -6,7 +6,7 @@
 
 use super::metric::DARK;
 use super::tile_statistics::{FAINT, TileStatistics, brightness};
-use crate::film::Pixel;
+use crate::film::{Pixel, Tile};
 use glam::Vec4;
 
 /// Octaves of what a pixel has more than its neighbours, over theirs; less than the first is as good as
@@ -93,10 +93,10 @@ impl BrightnessClasses {
         (u64::from(turns) * count as u64) >> 32 < ENOUGH
     }
 
-    /// Learns from one tile of a picture of mean `mean` > 0. Pixels whose halves have no two samples each are
-    /// left out.
-    pub fn add(&mut self, pixels: &[Pixel], mean: f64) {
-        let seen = TileStatistics::new(pixels, (1.0 / mean) as f32);
+    /// Learns from the `pixels` of `tile` in a picture of mean `mean` > 0. Pixels whose halves have no two
+    /// samples each are left out.
+    pub fn add(&mut self, tile: Tile, pixels: &[Pixel], mean: f64) {
+        let seen = TileStatistics::new(tile, pixels, (1.0 / mean) as f32);
         let whole = |value: f64| (value.clamp(-MOST, MOST) / UNIT) as i64;
         for (quarters, around) in seen.quarters.iter().zip(&seen.around) {
             let Some(quarters) = quarters else { continue };
@@ -253,14 +253,17 @@ impl Pair {
 mod tests {
     use super::*;
     use crate::Rgb;
-    use crate::film::{Dropped, PIXELS_PER_TILE, TILE, Tile};
+    use crate::film::{Dropped, PIXELS_PER_TILE, SPAN, TILE};
     use crate::sampling::Random;
     use std::vec::Vec;
+
+    /// A picture of one tile.
+    const ALONE: Tile = Tile::new(TILE, TILE, 0);
 
     /// A tile whose pixels have `light(x, y, sample)` in each of 16 samples.
     fn tile(light: impl Fn(u32, u32, u32) -> f32) -> [Pixel; PIXELS_PER_TILE] {
         core::array::from_fn(|i| {
-            let (x, y) = Tile::place(i);
+            let (x, y) = ALONE.pixel(i).unwrap();
             let mut pixel = Pixel::default();
             for sample in 0..16 {
                 pixel.add(sample, Rgb::splat(light(x, y, sample)), &mut Dropped::default());
@@ -272,9 +275,10 @@ mod tests {
     /// What both pairs of each pixel take R² + 0.01 for, row by row.
     fn squares(pixels: &[Pixel; PIXELS_PER_TILE]) -> [[f32; 2]; PIXELS_PER_TILE] {
         let mut alike = BrightnessClasses::default();
-        alike.add(pixels, 1.0);
-        let (shrinkage, seen) = (alike.shrinkage(), TileStatistics::new(pixels, 1.0));
-        core::array::from_fn(|place| {
+        alike.add(ALONE, pixels, 1.0);
+        let (shrinkage, seen) = (alike.shrinkage(), TileStatistics::new(ALONE, pixels, 1.0));
+        core::array::from_fn(|pixel| {
+            let place = (pixel / 16 + 4) * SPAN as usize + pixel % 16 + 4;
             let pairs = seen.quarters[place].map(Pair::both).unwrap();
             pairs.map(|pair| {
                 let posterior = shrinkage.posterior(pair, &Neighbourhood::new(seen.around[place]));
@@ -324,7 +328,11 @@ mod tests {
     fn coloured_rare_light_does_not_lead_through_black() {
         let mut alike = BrightnessClasses::default();
         // Dark to one pair, bright to the other: a share below zero is learnt.
-        alike.add(&tile(|x, y, sample| if (x + y) % 4 == 0 && sample % 4 < 2 { 4.0 } else { 0.1 }), 1.0);
+        alike.add(
+            ALONE,
+            &tile(|x, y, sample| if (x + y) % 4 == 0 && sample % 4 < 2 { 4.0 } else { 0.1 }),
+            1.0,
+        );
         let shrinkage = alike.shrinkage();
         assert!(shrinkage.classes.iter().any(|class| class.share < 0.0));
         let around = Vec4::new(1.0, 1.0, 0.1, 0.0);
@@ -367,7 +375,7 @@ mod tests {
             let mut all = BrightnessClasses::default();
             for i in order {
                 let mut one = BrightnessClasses::default();
-                one.add(&tiles[i], 30.0);
+                one.add(ALONE, &tiles[i], 30.0);
                 all += &one;
             }
             all

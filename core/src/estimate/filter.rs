@@ -4,39 +4,49 @@
 //! for itself. Between both the filter goes by roots, so that what is a hundred times as bright next door
 //! does not drown a dark pixel.
 
-use super::tile_statistics::raster;
+use super::tile_statistics::{PLACES, SIDE};
 use crate::Rgb;
-use crate::film::{PIXELS_PER_TILE, Pixel, TILE, Tile};
+use crate::film::{PIXELS_PER_TILE, Pixel, Tile};
 use glam::Vec4;
 
-/// Neighbours on each side: windows of 5 x 5 pixels, cut at the border of the tile.
+/// Neighbours on each side: windows of 5 x 5 pixels, as far as they belong to the tile.
 const REACH: usize = 2;
 
 /// What differs around a pixel is taken for noise up to this many times the estimated variance, which is as
 /// uncertain itself: with 1.5 it leaves too much noise.
 const NOISE: f32 = 2.0;
 
-const SIDE: usize = TILE as usize;
-
-/// What the pixels of a tile of a picture of mean `mean` probably are: filtered, in the order of the tile's
+/// What the `pixels` of `tile` probably are, in a picture of mean `mean`: filtered, in the order of the tile's
 /// pixels.
-pub fn filtered(pixels: &[Pixel], mean: f64) -> [Rgb; PIXELS_PER_TILE] {
-    let scale = (1.0 / mean) as f32;
-    let [mut picture, mut noise] = [[Vec4::ZERO; PIXELS_PER_TILE]; 2];
-    for (i, pixel) in pixels.iter().enumerate().take(PIXELS_PER_TILE) {
-        (picture[raster(i)], noise[raster(i)]) = seen(pixel, scale);
-    }
-    core::array::from_fn(|i| lee(|place| (picture[place], noise[place]), raster(i)).truncate() / scale)
+pub fn filtered(tile: Tile, pixels: &[Pixel], mean: f64) -> [Rgb; PIXELS_PER_TILE] {
+    let square = Square::new(tile, pixels, mean);
+    core::array::from_fn(|i| square.filtered(tile.index_in_square(i)))
 }
 
 /// The same of the pixel with number `i` alone.
-pub fn filtered_pixel(pixels: &[Pixel], mean: f64, i: usize) -> Rgb {
-    let scale = (1.0 / mean) as f32;
-    let at = |place: usize| {
-        let other = Tile::index_of_place((place % SIDE) as u32, (place / SIDE) as u32);
-        pixels.get(other).map_or((Vec4::ZERO, Vec4::ZERO), |pixel| seen(pixel, scale))
-    };
-    lee(at, raster(i)).truncate() / scale
+pub fn filtered_pixel(tile: Tile, pixels: &[Pixel], mean: f64, i: usize) -> Rgb {
+    Square::new(tile, pixels, mean).filtered(tile.index_in_square(i))
+}
+
+/// The square around a tile, row by row: what pixels show and the variance of that.
+struct Square {
+    places: [(Vec4, Vec4); PLACES],
+    scale: f32,
+}
+
+impl Square {
+    fn new(tile: Tile, pixels: &[Pixel], mean: f64) -> Self {
+        let scale = (1.0 / mean) as f32;
+        let mut places = [(Vec4::ZERO, Vec4::ZERO); PLACES];
+        for (i, pixel) in pixels.iter().enumerate().take(PIXELS_PER_TILE) {
+            places[tile.index_in_square(i)] = seen(pixel, scale);
+        }
+        Self { places, scale }
+    }
+
+    fn filtered(&self, place: usize) -> Rgb {
+        lee(|place| self.places[place], place).truncate() / self.scale
+    }
 }
 
 /// What a pixel shows and the variance of that: a colour with a 1 in the fourth place, or all zero where
@@ -94,7 +104,7 @@ mod tests {
     use super::*;
     use crate::film::Dropped;
 
-    fn filter(value: impl Fn(usize, usize) -> f32, variance: f32) -> [Vec4; PIXELS_PER_TILE] {
+    fn filter(value: impl Fn(usize, usize) -> f32, variance: f32) -> [Vec4; PLACES] {
         let picture = |place| Vec4::new(value(place % SIDE, place / SIDE), 0.5, 0.0, 1.0);
         core::array::from_fn(|place| lee(|place| (picture(place), Vec4::splat(variance)), place))
     }
@@ -124,19 +134,27 @@ mod tests {
     }
 
     #[test]
-    fn a_pixel_alone_is_what_it_is_among_all() {
-        // The last row lies outside of the picture.
-        let pixels: [Pixel; PIXELS_PER_TILE] = core::array::from_fn(|i| {
-            let (x, y) = Tile::place(i);
-            let mut pixel = Pixel::default();
-            for sample in 0..if y < 15 { 8 } else { 0 } {
-                let light = Rgb::new(x as f32, (y * sample) as f32, 1.0);
-                pixel.add(sample, light, &mut Dropped::default());
+    fn neighbours_are_neighbours_in_the_picture() {
+        // Noisy stripes: a pixel that took another's neighbours would become bright or dark.
+        let (width, height) = (48, 41);
+        for task in 0..Tile::count(width, height) {
+            let tile = Tile::new(width, height, task);
+            let light = |x: u32| if x / 6 % 2 == 0 { 8.0 } else { 1.0 };
+            let pixels: [Pixel; PIXELS_PER_TILE] = core::array::from_fn(|i| {
+                let mut pixel = Pixel::default();
+                for sample in 0..if tile.pixel(i).is_some() { 8 } else { 0 } {
+                    let noise = if sample % 4 < 2 { 0.9 } else { 1.1 };
+                    let light = light(tile.pixel(i).unwrap().0) * noise;
+                    pixel.add(sample, Rgb::splat(light), &mut Dropped::default());
+                }
+                pixel
+            });
+            let all = filtered(tile, &pixels, 2.5);
+            for i in 0..PIXELS_PER_TILE {
+                assert_eq!(filtered_pixel(tile, &pixels, 2.5, i), all[i], "{i}");
+                let Some((x, _)) = tile.pixel(i) else { continue };
+                assert!((all[i].x / light(x) - 1.0).abs() < 0.05, "{x}: {}", all[i]);
             }
-            pixel
-        });
-        for (i, colour) in filtered(&pixels, 2.5).iter().enumerate() {
-            assert_eq!(filtered_pixel(&pixels, 2.5, i), *colour, "{i}");
         }
     }
 }

@@ -144,9 +144,12 @@ mod tests {
     use super::*;
     use crate::Rgb;
     use crate::estimate::{BrightnessClasses, TileLight};
-    use crate::film::{Dropped, PIXELS_PER_TILE, Pixel, Tile};
+    use crate::film::{Dropped, PIXELS_PER_TILE, Pixel, TILE, Tile};
     use crate::sampling::Random;
     use std::vec::Vec;
+
+    /// A picture of one tile.
+    const ALONE: Tile = Tile::new(TILE, TILE, 0);
 
     /// A picture of `tiles` tiles of radiance 1 with uniform noise: samples between 1 − `noise` and 1 +
     /// `noise`.
@@ -188,9 +191,9 @@ mod tests {
         let mut light = TileLight::default();
         picture.iter().for_each(|tile| light += TileLight::of(tile));
         let (mean, mut alike) = (light.mean(), BrightnessClasses::default());
-        picture.iter().for_each(|tile| alike.add(tile, mean));
+        picture.iter().for_each(|tile| alike.add(ALONE, tile, mean));
         let shrinkage = alike.shrinkage();
-        picture.iter().map(|tile| TileError::of(tile, mean, &shrinkage)).collect()
+        picture.iter().map(|tile| TileError::of(ALONE, tile, mean, &shrinkage)).collect()
     }
 
     /// The error that a picture of radiance 1 has.
@@ -325,7 +328,7 @@ mod tests {
             let tile = |tile: u32| {
                 (0..PIXELS_PER_TILE).map(move |i| {
                     let random = Random::new(seed, tile << 8 | i as u32);
-                    let row = Tile::place(i).1;
+                    let row = ALONE.pixel(i).unwrap().1;
                     let mut pixel = Pixel::default();
                     for sample in 0..samples {
                         let met = row == 8 && random.single(2 * sample) < share;
@@ -345,7 +348,7 @@ mod tests {
             };
             let mean = (0..16).map(|row| f64::from(light(row)) / 16.0).sum::<f64>();
             let errors = picture.iter().flat_map(|tile| tile.iter().enumerate()).map(|(i, pixel)| {
-                let truth = f64::from(light(Tile::place(i).1));
+                let truth = f64::from(light(ALONE.pixel(i).unwrap().1));
                 let error = f64::from(pixel.mean().x) - truth;
                 error * error / (truth * truth + 0.01 * mean * mean)
             });

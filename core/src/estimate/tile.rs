@@ -2,7 +2,7 @@
 
 use super::empirical_bayes::{Neighbourhood, Pair, Posterior, Shrinkage};
 use super::metric::DARK;
-use super::tile_statistics::{TileStatistics, brightness, raster};
+use super::tile_statistics::{TileStatistics, brightness};
 use crate::film::{GROUPS, PIXELS_PER_TILE, Pixel, Tile};
 use glam::Vec4;
 
@@ -103,15 +103,15 @@ impl core::ops::AddAssign for Parts {
 }
 
 impl TileError {
-    /// Of the pixels of one tile of a picture of mean `mean` > 0, with what its tiles tell of it. Pixels
+    /// Of the `pixels` of `tile` in a picture of mean `mean` > 0, with what its tiles tell of it. Pixels
     /// whose halves have no two samples each are left out.
-    pub fn of(pixels: &[Pixel], mean: f64, shrinkage: &Shrinkage) -> Self {
+    pub fn of(tile: Tile, pixels: &[Pixel], mean: f64, shrinkage: &Shrinkage) -> Self {
         let scale = (1.0 / mean) as f32;
-        let seen = TileStatistics::new(pixels, scale);
+        let seen = TileStatistics::new(tile, pixels, scale);
         let mut sums = Self::default();
         let (mut groups, mut blocks) = ([[0.0; 2]; GROUPS], [[0.0; 2]; BLOCKS]);
         for (i, pixel) in pixels.iter().enumerate().take(PIXELS_PER_TILE) {
-            let place = raster(i);
+            let place = tile.index_in_square(i);
             let Some(quarters @ [a1, a2, b1, b2]) = seen.quarters[place] else { continue };
             let (pairs, around) = (Pair::both(quarters), Neighbourhood::new(seen.around[place]));
             let posterior = pairs.map(|pair| shrinkage.posterior(pair, &around));

@@ -1,7 +1,7 @@
 //! What the quarters of the pixels of a tile saw, and what is seen around each pixel: what
 //! [`BrightnessClasses`](super::BrightnessClasses) are told by.
 
-use crate::film::{PIXELS_PER_TILE, Pixel, TILE, Tile};
+use crate::film::{PIXELS_PER_TILE, Pixel, SPAN, Tile};
 use glam::Vec4;
 
 /// Light that is added to that of the neighbours before anything is divided by it, in units of the picture's
@@ -12,26 +12,31 @@ pub(super) const FAINT: f32 = 0.01;
 /// edge, and says nothing of what the pixel is.
 const SURELY: f32 = 2.0;
 
-/// A tile, row by row, of a picture times some scale.
+/// Pixels along the side of the square around a tile that holds all of its pixels.
+pub(super) const SIDE: usize = SPAN as usize;
+
+/// Places of this square.
+pub(super) const PLACES: usize = SIDE * SIDE;
+
+/// The square around a tile, row by row, of a picture times some scale. Pixels of other tiles are missing.
 pub(super) struct TileStatistics {
-    /// A₁, A₂, B₁, B₂ of each pixel, the parts of its halves; `None` where one is empty.
-    pub(super) quarters: [Option<[Vec4; 4]>; PIXELS_PER_TILE],
+    /// A₁, A₂, B₁, B₂ of each pixel, the parts of its halves; `None` where one is empty or the pixel is missing.
+    pub(super) quarters: [Option<[Vec4; 4]>; PLACES],
     /// The mean light of the eight neighbours of each pixel, as far as they lie in the tile and are not
     /// surely brighter; its own where there are none.
-    pub(super) around: [Vec4; PIXELS_PER_TILE],
+    pub(super) around: [Vec4; PLACES],
 }
 
 impl TileStatistics {
-    /// Of the pixels of one tile, times `scale`.
-    pub(super) fn new(pixels: &[Pixel], scale: f32) -> Self {
-        const SIDE: usize = TILE as usize;
-        let mut quarters = [None; PIXELS_PER_TILE];
-        let [mut picture, mut around] = [[Vec4::ZERO; PIXELS_PER_TILE]; 2];
+    /// Of the `pixels` of `tile`, times `scale`.
+    pub(super) fn new(tile: Tile, pixels: &[Pixel], scale: f32) -> Self {
+        let mut quarters = [None; PLACES];
+        let [mut picture, mut around] = [[Vec4::ZERO; PLACES]; 2];
         // Of the quarters of a pixel, the darkest and the brightest.
-        let [mut darkest, mut brightest] = [[0.0f32; PIXELS_PER_TILE]; 2];
+        let [mut darkest, mut brightest] = [[0.0f32; PLACES]; 2];
         for (i, pixel) in pixels.iter().enumerate().take(PIXELS_PER_TILE) {
             let (Some([a1, a2]), Some([b1, b2])) = (pixel.even.parts(), pixel.odd.parts()) else { continue };
-            let place = raster(i);
+            let place = tile.index_in_square(i);
             let parts = [a1, a2, b1, b2].map(|mean| scale * mean.extend(0.0));
             quarters[place] = Some(parts);
             let [a1, a2, b1, b2] = parts;
@@ -42,6 +47,9 @@ impl TileStatistics {
         }
         let near = |c: usize| c.saturating_sub(1)..(c + 2).min(SIDE);
         for (place, around) in around.iter_mut().enumerate() {
+            if quarters[place].is_none() {
+                continue;
+            }
             let (x, y) = (place % SIDE, place / SIDE);
             let mut others = Vec4::ZERO;
             for other in near(y).flat_map(|row| near(x).map(move |x| row * SIDE + x)) {
@@ -52,12 +60,6 @@ impl TileStatistics {
         }
         Self { quarters, around }
     }
-}
-
-/// Where the `i`th pixel of a tile stands in its rows.
-pub(super) fn raster(i: usize) -> usize {
-    let (x, y) = Tile::place(i);
-    (y * TILE + x) as usize
 }
 
 /// Of all channels.

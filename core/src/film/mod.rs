@@ -8,7 +8,7 @@ mod tile;
 pub use pixel::{Dropped, Half, Pixel};
 pub use samples::{CIRCLE, CIRCLES, GROUP, GROUPS};
 pub use splat::{STRIPS, Splat, StripOffsets, add_strip, sort_by_strip, strip_length};
-pub use tile::{PIXELS_PER_TILE, PixelSet, REACH, TILE, Tile};
+pub use tile::{PIXELS_PER_TILE, PixelSet, REACH, SPAN, TILE, Tile};
 
 use crate::Rgb;
 use crate::memory::{Arena, Footprint, OutOfMemory};

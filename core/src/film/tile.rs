@@ -20,6 +20,9 @@ const BLOCK: u32 = 8;
 /// A tile has pixels up to this far outside of its square.
 pub const REACH: u32 = BLOCK / 2;
 
+/// Pixels along the side of the square around a tile that holds all of its pixels.
+pub const SPAN: u32 = TILE + 2 * REACH;
+
 /// One tile of a picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Tile {
@@ -62,11 +65,23 @@ impl Tile {
     /// Column and row of the `i`th pixel of the tile, near its `i`th place; `None` outside of the picture.
     #[inline]
     pub const fn pixel(&self, i: usize) -> Option<(u32, u32)> {
+        let (x, y) = self.moved(i);
+        if x < self.width && y < self.height { Some((x, y)) } else { None }
+    }
+
+    /// Index of the `i`th pixel in the square of [`SPAN`] × [`SPAN`] around the tile, row by row.
+    #[inline]
+    pub const fn index_in_square(&self, i: usize) -> usize {
+        let (x, y) = self.moved(i);
+        ((y + REACH - self.top) * SPAN + x + REACH - self.left) as usize
+    }
+
+    /// Column and row of the `i`th pixel, which may lie outside of the picture.
+    const fn moved(&self, i: usize) -> (u32, u32) {
         let (x, y) = Self::place(i);
         let (x, y) = (self.left + x, self.top + y);
         let x = dissolved(x, y, whole(self.width));
-        let y = dissolved(y, !x, whole(self.height));
-        if x < self.width && y < self.height { Some((x, y)) } else { None }
+        (x, dissolved(y, !x, whole(self.height)))
     }
 
     /// Where a film of `width` × `height` keeps the pixel in column `x` and row `y`.

@@ -35,7 +35,7 @@ mod tests {
     use super::*;
     use halflight_core::Rgb;
     use halflight_core::estimate::BrightnessClasses;
-    use halflight_core::film::{Dropped, PIXELS_PER_TILE, Pixel};
+    use halflight_core::film::{Dropped, PIXELS_PER_TILE, Pixel, Tile};
 
     #[test]
     fn regions_cover_the_picture_and_change_the_interval_alone() {
@@ -47,8 +47,9 @@ mod tests {
             }
             let pixels = [pixel; PIXELS_PER_TILE];
             let mut alike = BrightnessClasses::default();
-            alike.add(&pixels, 3.0);
-            TileError::of(&pixels, 3.0, &alike.shrinkage())
+            let tile = Tile::new(TILE, TILE, 0);
+            alike.add(tile, &pixels, 3.0);
+            TileError::of(tile, &pixels, 3.0, &alike.shrinkage())
         };
         // 20 x 5 tiles are 7 x 2 regions of 3 x 3.
         let tiles: Vec<_> = (0..100).map(tile).collect();

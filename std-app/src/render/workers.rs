@@ -7,7 +7,7 @@ use halflight_core::bvh::{Bvh, ForkJoin};
 use halflight_core::estimate::{
     BiasEstimate, BrightnessClasses, ErrorEstimate, TileBlur, TileError, TileLight,
 };
-use halflight_core::film::{Film, PIXELS_PER_TILE, Pixel};
+use halflight_core::film::{Film, PIXELS_PER_TILE, Pixel, Tile};
 use halflight_core::memory::{Arena, Line, OutOfMemory};
 use halflight_core::scene::Mesh;
 use halflight_core::transport::Counters;
@@ -77,8 +77,9 @@ impl<'w> Workers<'w> {
     fn errors(&self, film: &Film) -> Option<Vec<TileError>> {
         let mean = self.mean(film)?;
         let tiles = film.pixels().par_chunks(PIXELS_PER_TILE);
-        let learn = |mut known: BrightnessClasses, (_, tile): (usize, &[Pixel])| {
-            known.add(tile, mean);
+        let tile = |index: usize| Tile::new(film.width(), film.height(), index);
+        let learn = |mut known: BrightnessClasses, (index, pixels): (usize, &[Pixel])| {
+            known.add(tile(index), pixels, mean);
             known
         };
         let both = |mut one: BrightnessClasses, other: BrightnessClasses| {
@@ -91,7 +92,8 @@ impl<'w> Workers<'w> {
             let alike =
                 asked.fold(BrightnessClasses::default, learn).reduce(BrightnessClasses::default, both);
             let shrinkage = alike.shrinkage();
-            tiles.map(|tile| TileError::of(tile, mean, &shrinkage)).collect()
+            let error = |(index, pixels)| TileError::of(tile(index), pixels, mean, &shrinkage);
+            tiles.enumerate().map(error).collect()
         }))
     }
 

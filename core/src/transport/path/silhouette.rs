@@ -12,7 +12,7 @@ use super::sharing::Sharing;
 use crate::Rgb;
 use crate::bsdf::Features;
 use crate::bvh::Coherence;
-use crate::film::{PIXELS_PER_TILE, PixelSet, REACH, TILE, Tile};
+use crate::film::{PIXELS_PER_TILE, PixelSet, REACH, SPAN, TILE, Tile};
 use crate::geometry::{Hit, MISS, Ray};
 use crate::light::{LightSampler, emitted};
 use crate::sampling::Sampler;
@@ -38,17 +38,14 @@ const MARGIN: f32 = 0.01;
 /// A border that begins behind the camera is seen from this share of its greatest depth on.
 const NEAR: f32 = 1e-3;
 
-/// Pixels along the side of the square in which all pixels of a tile lie.
-const SIDE: u32 = TILE + 2 * REACH;
-
-/// Some pixels of this square: a bit for each column of each row.
-type Rows = [u32; SIDE as usize];
+/// Some pixels of the square around a tile: a bit for each column of each row.
+type Rows = [u32; SPAN as usize];
 
 /// Adds the pixels that the segment from `a` to `b` passes through, in raster coordinates from the square's
 /// corner.
 fn add(pixels: &mut Rows, a: Vec2, b: Vec2) {
     let (a, b) = if a.y <= b.y { (a, b) } else { (b, a) };
-    let side = SIDE as f32;
+    let side = SPAN as f32;
     let (low, high) = (a.min(b) - MARGIN, a.max(b) + MARGIN);
     if !(low.x < side && high.x >= 0.0 && low.y < side && high.y >= 0.0) {
         return;
@@ -56,13 +53,13 @@ fn add(pixels: &mut Rows, a: Vec2, b: Vec2) {
     let slope = if b.y > a.y { (b.x - a.x) / (b.y - a.y) } else { 0.0 };
     let at = |y: f32| if slope == 0.0 { [a.x, b.x] } else { [a.x + slope * (y.clamp(a.y, b.y) - a.y); 2] };
     // Casts saturate.
-    for y in low.y.max(0.0) as u32..=(high.y as u32).min(SIDE - 1) {
+    for y in low.y.max(0.0) as u32..=(high.y as u32).min(SPAN - 1) {
         let ([p, q], [r, s]) = (at(y as f32 - MARGIN), at(y as f32 + 1.0 + MARGIN));
         let (left, right) = (p.min(q).min(r.min(s)) - MARGIN, p.max(q).max(r.max(s)) + MARGIN);
         if right < 0.0 {
             continue;
         }
-        for x in left.max(0.0) as u32..=(right as u32).min(SIDE - 1) {
+        for x in left.max(0.0) as u32..=(right as u32).min(SPAN - 1) {
             pixels[y as usize] |= 1 << x;
         }
     }
@@ -140,10 +137,9 @@ pub(in crate::transport) fn outlined(
         return pixels;
     }
     for i in 0..PIXELS_PER_TILE {
-        let Some((x, y)) = tile.pixel(i) else { continue };
-        let [left, top] = tile.corner();
-        let row = rows.get((y + REACH - top) as usize).copied().unwrap_or_default();
-        if row >> (x + REACH - left) & 1 == 1 {
+        let [row, column] =
+            [tile.index_in_square(i) / SPAN as usize, tile.index_in_square(i) % SPAN as usize];
+        if tile.pixel(i).is_some() && rows.get(row).is_some_and(|row| row >> column & 1 == 1) {
             pixels.insert(i);
         }
     }
@@ -266,11 +262,11 @@ mod tests {
                 let point = a.lerp(b, step as f32 / 4000.0);
                 for (x, y) in [(0, 0), (1, 0), (0, 1), (1, 1)] {
                     let [x, y] = [point.x - 0.03 + 0.06 * x as f32, point.y - 0.03 + 0.06 * y as f32];
-                    if (0.0..SIDE as f32).contains(&x) && (0.0..SIDE as f32).contains(&y) {
+                    if (0.0..SPAN as f32).contains(&x) && (0.0..SPAN as f32).contains(&y) {
                         near[y as usize] |= 1 << x as u32;
                     }
                 }
-                if point.cmpge(Vec2::ZERO).all() && point.cmplt(Vec2::splat(SIDE as f32)).all() {
+                if point.cmpge(Vec2::ZERO).all() && point.cmplt(Vec2::splat(SPAN as f32)).all() {
                     assert!(pixels[point.y as usize] >> point.x as u32 & 1 == 1, "{a} {b} {point}");
                 }
             }

@@ -139,7 +139,7 @@ pub(super) fn ordered(film: &Film, shard: Shard, mean: f64, grid: Grid) -> Vec<[
     let tiles = film.pixels().chunks(PIXELS_PER_TILE).enumerate();
     for (task, pixels) in tiles.filter(|(task, _)| shard.owns(*task)) {
         let tile = Tile::new(width, height, task);
-        let colours = filtered(pixels, mean);
+        let colours = filtered(tile, pixels, mean);
         for (i, colour) in colours.into_iter().enumerate() {
             if let Some((x, y)) = tile.pixel(i) {
                 let region = grid.region([x, y]);

@@ -94,10 +94,11 @@ pub(super) fn findings(
 ) -> Vec<(usize, Finding)> {
     let finding = |(index, (place, truth)): (usize, (&[u32; 2], &Pixel))| {
         let position = Tile::position([film.width(), film.height()], place[0], place[1]);
-        let first = position / PIXELS_PER_TILE * PIXELS_PER_TILE;
-        let tile = film.pixels().get(first..first + PIXELS_PER_TILE)?;
-        let colour = filtered_pixel(tile, mean, position - first);
-        Some((index, Finding::of(&tile[position - first], truth, colour, mean)?))
+        let (task, number) = (position / PIXELS_PER_TILE, position % PIXELS_PER_TILE);
+        let tile = Tile::new(film.width(), film.height(), task);
+        let pixels = film.pixels().chunks(PIXELS_PER_TILE).nth(task)?;
+        let colour = filtered_pixel(tile, pixels, mean, number);
+        Some((index, Finding::of(pixels.get(number)?, truth, colour, mean)?))
     };
     places.iter().zip(truth).enumerate().filter_map(finding).collect()
 }
