@@ -327,8 +327,8 @@ mod tests {
         for seed in 0..pictures {
             let tile = |tile: u32| {
                 (0..PIXELS_PER_TILE).map(move |i| {
-                    let random = Random::new(seed, tile << 8 | i as u32);
-                    let row = ALONE.pixel(i).unwrap().1;
+                    let (column, row) = ALONE.pixel(i).unwrap();
+                    let random = Random::new(seed, tile << 8 | Tile::index_of_place(column, row) as u32);
                     let mut pixel = Pixel::default();
                     for sample in 0..samples {
                         let met = row == 8 && random.single(2 * sample) < share;
