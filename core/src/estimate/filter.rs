@@ -139,7 +139,7 @@ mod tests {
         let (width, height) = (48, 41);
         for task in 0..Tile::count(width, height) {
             let tile = Tile::new(width, height, task);
-            let light = |x: u32| if x / 6 % 2 == 0 { 8.0 } else { 1.0 };
+            let light = |x: u32| if (x / 6).is_multiple_of(2) { 8.0 } else { 1.0 };
             let pixels: [Pixel; PIXELS_PER_TILE] = core::array::from_fn(|i| {
                 let mut pixel = Pixel::default();
                 for sample in 0..if tile.pixel(i).is_some() { 8 } else { 0 } {
@@ -150,10 +150,10 @@ mod tests {
                 pixel
             });
             let all = filtered(tile, &pixels, 2.5);
-            for i in 0..PIXELS_PER_TILE {
-                assert_eq!(filtered_pixel(tile, &pixels, 2.5, i), all[i], "{i}");
+            for (i, colour) in all.into_iter().enumerate() {
+                assert_eq!(filtered_pixel(tile, &pixels, 2.5, i), colour, "{i}");
                 let Some((x, _)) = tile.pixel(i) else { continue };
-                assert!((all[i].x / light(x) - 1.0).abs() < 0.05, "{x}: {}", all[i]);
+                assert!((colour.x / light(x) - 1.0).abs() < 0.05, "{x}: {colour}");
             }
         }
     }
