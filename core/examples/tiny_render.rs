@@ -19,7 +19,7 @@ use halflight_core::{Level, Rgb};
 /// Pixels across and down.
 pub const SIZE: usize = 32;
 /// Methods, those that need least memory first.
-pub const METHODS: [&str; 5] = ["path", "light", "sppm", "bdpt", "photon-map"];
+pub const METHODS: [&str; 6] = ["path", "light", "sppm", "bdpt", "photon-map", "vcm"];
 /// Cache lines that all structures of any method take together.
 pub const LINES: usize = 1 << 16;
 /// Bytes of working memory at most.
@@ -43,7 +43,11 @@ pub fn render(
     // Working memory of tasks, less than Method::scratch() where they take one sample after the other.
     let paths = if method == 4 { 8192 } else { 1024 };
     let photons = PhotonSettings { global: Some(paths), ..PhotonSettings::default() };
-    let counts = BidirectionalSettings { light_paths: Some(1024), connections: u32::from(method == 3) };
+    let counts = BidirectionalSettings {
+        light_paths: Some(1024),
+        connections: u32::from(method >= 3),
+        merging: Some(method == 5),
+    };
     let scratch = (arena.available() * 5 / 8).min(SCRATCH) / 64 * 64;
     let mut executor = Loop::new(arena.slice(scratch)?);
     let mut buffer = Buffer::new(arena.slice(arena.available())?);

@@ -28,13 +28,14 @@ const SPP: u32 = 9;
 
 const SEEDS: [u32; 2] = [0, 77];
 
-const METHODS: [Method; 6] = [
+const METHODS: [Method; 7] = [
     Method::Path,
     Method::IrradianceCache,
     Method::PhotonMap,
     Method::ProgressivePhotons,
     Method::LightTracing,
     Method::Bidirectional,
+    Method::VertexMerging,
 ];
 
 /// The scenes: those of the repository as they are loaded, and others made by hand.

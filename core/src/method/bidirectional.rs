@@ -1,27 +1,38 @@
 //! Bidirectional path tracing (Lafortune and Willems 1993; Veach 1997, chapter 10) with a cache of light vertices
-//! (Davidovič et al. 2014), and light tracing as the choice without connections.
+//! (Davidovič et al. 2014), light tracing as the choice without connections, and vertex connection and merging
+//! (Georgiev et al. 2012) as the one with all techniques.
 //!
-//! For each sample of the picture light paths are traced anew: the camera sees their vertices as splats, and each vertex
-//! of a camera path is connected to a few of them. Even and odd samples have light paths of their own, so that the
-//! halves of the film stay independent.
+//! For each sample of the picture light paths are traced anew: the camera sees their vertices as splats, each vertex
+//! of a camera path is connected to a few of them, and some are merged with those around them
+//! (`transport/bidirectional/merging.rs`). The radii of merges shrink with samples as those of progressive photon
+//! mapping do. Even and odd samples have light paths of their own, so that the halves of the film stay independent.
 
+use super::emission_guide::{EmissionGuide, GuideSettings, Target};
 use super::executor::{Executor, Passed};
-use super::{Method, RenderContext, Round};
+use super::{Method, PhotonMapStore, RenderContext, Round, caustics};
 use crate::bsdf::Features;
 use crate::film::{PIXELS_PER_TILE, Splat, Tile, add_strip, strip_length};
 use crate::light::EmissionSampler;
 use crate::memory::{Footprint, MemorySource, OutOfMemory};
 use crate::transport::bidirectional::camera_paths::{CameraPaths, Connections};
 use crate::transport::bidirectional::light_pass::{LightPass, ROOM, TaskOutput};
+use crate::transport::bidirectional::merging::{MergeRadii, Merging};
 use crate::transport::bidirectional::mis::Counts;
 use crate::transport::bidirectional::vertex::LightVertex;
-use crate::transport::{Counters, bidirectional::light_pass::PATHS};
+use crate::transport::photon_mapping::deposit::PhotonFilter;
+use crate::transport::{Counters, RadiusSchedule, bidirectional::light_pass::PATHS};
 
-/// Pixels for each light path, where their number is left open.
+/// Pixels for each light path, where their number is left open; one where vertices are merged.
 const PIXELS_PER_LIGHT_PATH: usize = 2;
 
 /// Light paths of a sample at most.
 const MOST_TASKS: usize = 1024;
+
+/// Radius of merges of the first sample, in pixels.
+const FIRST_RADIUS: f64 = 3.0;
+
+/// Photons that a task brings to the map.
+const PIECE: usize = 4096;
 
 /// Number of the pass that measures how many vertices light paths have.
 const PILOT: u32 = 1 << 30;
@@ -29,15 +40,23 @@ const PILOT: u32 = 1 << 30;
 /// How often each technique is used.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct BidirectionalSettings {
-    /// Light paths for each sample of the picture, in tasks of 1024; `None`: half as many as pixels.
+    /// Light paths for each sample of the picture, in tasks of 1024; `None`: half as many as pixels, or as many
+    /// where vertices are merged.
     pub light_paths: Option<u32>,
     /// Light vertices that a camera vertex is connected to; 0 is light tracing.
     pub connections: u32,
+    /// Whether vertices are merged; `None`: where the scene has caustics.
+    pub merging: Option<bool>,
+}
+
+impl BidirectionalSettings {
+    /// Light tracing: neither connections nor merges.
+    pub const LIGHT_TRACING: Self = Self { light_paths: None, connections: 0, merging: Some(false) };
 }
 
 impl Default for BidirectionalSettings {
     fn default() -> Self {
-        Self { light_paths: None, connections: 1 }
+        Self { light_paths: None, connections: 1, merging: None }
     }
 }
 
@@ -47,6 +66,7 @@ pub struct Bidirectional<'a, F> {
     emission: EmissionSampler<'a>,
     counts: Counts,
     connections: u32,
+    merging: Option<VertexMerging<'a>>,
     vertices: &'a mut [LightVertex],
     splats: &'a mut [Splat],
     outputs: &'a mut [TaskOutput],
@@ -59,15 +79,27 @@ pub struct Bidirectional<'a, F> {
     features: core::marker::PhantomData<F>,
 }
 
+/// Radii of one pixel, and photons of a sample.
+struct VertexMerging<'a> {
+    radii: RadiusSchedule,
+    photons: PhotonMapStore<'a>,
+}
+
+impl VertexMerging<'_> {
+    /// Radii of `sample`, which has so many light paths; those of the pilot are the first.
+    fn radii(&self, sample: u32, light_paths: f32) -> MergeRadii {
+        MergeRadii { radii: self.radii.after(FIRST_RADIUS, sample % PILOT / 2), light_paths }
+    }
+}
+
 impl<'a, F: Features> Bidirectional<'a, F> {
     /// Working memory of a worker.
     pub fn scratch(settings: &BidirectionalSettings) -> Footprint {
         LightPass::<F>::scratch().or(CameraPaths::<F>::scratch(settings.connections))
     }
 
-    /// Memory of `tasks` of light paths.
-    fn footprint(tasks: usize, connections: u32) -> Footprint {
-        let vertices = if connections > 0 { tasks * ROOM } else { 0 };
+    /// Memory of `tasks` of light paths, with room for so many vertices.
+    fn footprint(tasks: usize, vertices: usize) -> Footprint {
         Footprint::default()
             .slice::<LightVertex>(vertices)
             .slice::<Splat>(tasks * ROOM)
@@ -85,25 +117,46 @@ impl<'a, F: Features> Bidirectional<'a, F> {
         executor: &mut impl Executor,
         others: usize,
     ) -> Result<Self, OutOfMemory> {
-        let RenderContext { scene, bvh, lights, settings: paths, .. } = *context;
-        let footprint = EmissionSampler::footprint(lights);
-        let emission =
-            EmissionSampler::build(scene, lights, &bvh.bounds(), &mut memory.take("emission", footprint)?)?;
+        let RenderContext { scene, lights, settings: paths, .. } = *context;
         let pixels = Tile::count(paths.width, paths.height) * PIXELS_PER_TILE;
         let picture = Footprint::default().slice::<[f32; 3]>(pixels);
         let picture = memory.take("splats", picture)?.slice(pixels)?;
-        let wanted =
-            settings.light_paths.map_or(context.pixels() / PIXELS_PER_LIGHT_PATH, |paths| paths as usize);
+        let merges = settings.merging.unwrap_or_else(|| caustics::are_possible(scene));
+        let pixels_per_path = if merges { 1 } else { PIXELS_PER_LIGHT_PATH };
+        let wanted = settings.light_paths.map_or(context.pixels() / pixels_per_path, |paths| paths as usize);
         let wanted = if lights.is_empty() { 0 } else { wanted.div_ceil(PATHS).clamp(1, MOST_TASKS) };
-        let each = Self::footprint(1, settings.connections).bytes();
-        let tasks = wanted.min(memory.available().saturating_sub(others) / each).max(wanted.min(1));
-        let mut arena = memory.take("light paths", Self::footprint(tasks, settings.connections))?;
-        let stored = if settings.connections > 0 { tasks * ROOM } else { 0 };
+        let has_vertices = settings.connections > 0 || merges;
+        let stored = |tasks: usize| if has_vertices { tasks * ROOM } else { 0 };
+        let bytes = |tasks: usize| {
+            let photons = if merges { PhotonMapStore::footprint(tasks * ROOM).bytes() } else { 0 };
+            Self::footprint(tasks, stored(tasks)).bytes() + photons
+        };
+        let guide = GuideSettings {
+            filter: PhotonFilter::Reflected,
+            max_depth: paths.max_depth,
+            target: Target::Visible(FIRST_RADIUS as f32),
+            reserve: others.saturating_add(bytes(1)),
+        };
+        let emission = EmissionGuide::learn::<F>(context, guide, memory, executor)?.emission;
+        let available = memory.available().saturating_sub(others);
+        let mut tasks = wanted.min(available / bytes(1)).max(wanted.min(1));
+        while tasks > 1 && bytes(tasks) > available {
+            tasks -= 1;
+        }
+        let stored = stored(tasks);
+        let mut arena = memory.take("light paths", Self::footprint(tasks, stored))?;
+        let merging = match merges && tasks > 0 {
+            true => {
+                Some(VertexMerging { radii: context.radii(), photons: PhotonMapStore::new(stored, memory)? })
+            }
+            false => None,
+        };
         let mut method = Self {
             context: *context,
             emission,
             counts: Counts { light_paths: (tasks * PATHS) as f32, connections: 0.0, light_samples: 1.0 },
             connections: settings.connections,
+            merging,
             vertices: arena.slice(stored)?,
             splats: arena.slice(tasks * ROOM)?,
             outputs: arena.slice(tasks)?,
@@ -137,8 +190,10 @@ impl<'a, F: Features> Bidirectional<'a, F> {
         sample: u32,
         executor: &mut impl Executor,
     ) -> Result<Option<(usize, Counters)>, OutOfMemory> {
-        let Self { context, emission, counts, vertices, splats, outputs, picture, .. } = self;
-        let pass = LightPass::<F>::new(context.scene_context(), emission, context.settings, *counts);
+        let Self { context, emission, counts, vertices, splats, outputs, picture, merging, .. } = self;
+        let scene = context.scene_context::<F>();
+        let radii = merging.as_ref().map(|merging| merging.radii(sample, counts.light_paths));
+        let pass = LightPass::new(scene, emission, context.settings, *counts, radii);
         let rooms = vertices.chunks_mut(ROOM).map(Some).chain(core::iter::repeat_with(|| None));
         let tasks = splats.chunks_mut(ROOM).zip(outputs.iter_mut()).zip(rooms);
         let Passed { counters, is_complete } =
@@ -169,6 +224,19 @@ impl<'a, F: Features> Bidirectional<'a, F> {
             }
             stored += count;
         }
+        if let Some(VertexMerging { photons, .. }) = merging {
+            let vertices = &vertices[..stored];
+            let passed = photons.fill(executor, (stored, PIECE), |piece, _, photons| {
+                let rest = vertices.get(piece * PIECE..).unwrap_or_default();
+                for (i, (photon, vertex)) in photons.iter_mut().zip(rest).enumerate() {
+                    *photon = vertex.photon(&scene, (piece * PIECE + i) as u32);
+                }
+                Ok(Counters::default())
+            })?;
+            if !passed.is_complete {
+                return Ok(None);
+            }
+        }
         Ok(Some((stored, counters)))
     }
 
@@ -198,15 +266,16 @@ impl<F: Features> Method for Bidirectional<'_, F> {
                 self.traced = Some((sample, stored));
             }
             let stored = self.traced.map_or(0, |(_, stored)| stored);
-            let Self { context, emission, counts, connections, vertices, picture, .. } = &*self;
-            let connections = Connections { vertices: &vertices[..stored], count: *connections };
-            let paths = CameraPaths::<F>::new(
-                context.scene_context(),
-                emission,
-                context.settings,
-                *counts,
-                connections,
-            );
+            let Self { context, emission, counts, connections, vertices, picture, merging, .. } = self;
+            let vertices = &vertices[..stored];
+            let radii = merging.as_ref().map(|merging| merging.radii(sample, counts.light_paths));
+            let map = merging.as_mut().map(|merging| merging.photons.map()).transpose()?.flatten();
+            let merging =
+                map.as_ref().zip(radii).map(|(photons, radii)| Merging { photons, vertices, radii });
+            let connections = Connections { vertices, count: *connections };
+            let (scene, emission) = (context.scene_context::<F>(), &*emission);
+            let paths = CameraPaths::new(scene, emission, context.settings, *counts, connections)
+                .with_merging(merging);
             round.tiles(sample + 1, |tile, samples, scratch, pixels| {
                 let first = tile * PIXELS_PER_TILE;
                 let splats = picture.get(first..first + PIXELS_PER_TILE).unwrap_or_default();

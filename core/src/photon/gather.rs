@@ -114,17 +114,10 @@ pub(super) fn gather<S: Simd, R: Response>(
     fence: Option<&Fence>,
     response: &R,
 ) -> Density {
-    let squared_radius = map.space.squared(disc.radius).unwrap_or(-1.0);
-    if !(squared_radius > 0.0 && squared_radius < f32::MAX) {
-        return Density::default();
-    }
-    let place = Place16::new(simd, map.space.enter(disc.place.to_array()));
+    let Some(test) = DiscTest::new(simd, map, disc, fence) else { return Density::default() };
+    let DiscTest { place, squared_radius, .. } = test;
     let mut sum = Sum {
-        place,
-        normal: splat(simd, disc.normal),
-        fence,
-        squared_radius,
-        thickness: simd.splat16(FLATNESS * libm::sqrtf(squared_radius)),
+        test,
         disc: Weighed::new(simd, squared_radius, disc.kernel),
         finer: [
             Weighed::new(simd, squared_radius / 4.0, disc.kernel),
@@ -150,13 +143,68 @@ fn added(lanes: [f32; 16]) -> f32 {
     lanes.iter().fold(0.0, |sum, lane| sum + lane)
 }
 
+/// Which photons lie on a disc.
+pub(super) struct DiscTest<'a, S: Simd> {
+    pub place: Place16<S>,
+    pub squared_radius: f32,
+    limit: S::F16,
+    normal: [S::F16; 3],
+    thickness: S::F16,
+    fence: Option<&'a Fence>,
+}
+
+/// Squared distances to the middle of a disc, directions of arrival, and which lanes count.
+type OnDisc<S> = (<S as Simd>::F16, [<S as Simd>::F16; 3], <<S as Simd>::F16 as Lanes>::Mask);
+
+impl<'a, S: Simd> DiscTest<'a, S> {
+    /// The test for photons of `map`; `None` where the radius is none.
+    #[inline(always)]
+    pub(super) fn new(simd: S, map: &PhotonMap, disc: &QueryDisc, fence: Option<&'a Fence>) -> Option<Self> {
+        let squared_radius = map.space.squared(disc.radius).unwrap_or(-1.0);
+        (squared_radius > 0.0 && squared_radius < f32::MAX).then(|| Self {
+            place: Place16::new(simd, map.space.enter(disc.place.to_array())),
+            squared_radius,
+            limit: simd.splat16(squared_radius),
+            normal: splat(simd, disc.normal),
+            thickness: simd.splat16(FLATNESS * libm::sqrtf(squared_radius)),
+            fence,
+        })
+    }
+
+    /// The photons of half a leaf; `None` where none is on the disc.
+    #[inline(always)]
+    pub(super) fn photons(&self, simd: S, leaf: &Leaf, half: usize) -> Option<OnDisc<S>> {
+        let offset = self.place.less(simd, leaf.half(half));
+        let distance = squared(offset);
+        let in_sphere = distance.le(self.limit);
+        if !in_sphere.any() {
+            return None;
+        }
+        let zero = simd.splat16(0.0);
+        let in_disc = in_sphere & dot(offset, self.normal).abs().le(self.thickness);
+
+        let [a, b] = &leaf.normal;
+        let (a, b) = (simd.bytes16(&a[half % HALVES]), simd.bytes16(&b[half % HALVES]));
+        let surface = unfolded(simd, a, b, NORMAL_STEPS);
+        let along = dot(surface, self.normal);
+        let alike = zero.lt(along) & (squared(surface) * simd.splat16(ALIKE * ALIKE)).le(along * along);
+
+        let light = &leaf.light[half % HALVES];
+        let u = simd.field16(light, 0, DIRECTION_BITS);
+        let v = simd.field16(light, DIRECTION_BITS, DIRECTION_BITS);
+        let came = unfolded(simd, u, v, DIRECTION_STEPS);
+        let counted = in_disc & alike & zero.lt(dot(came, self.normal));
+        let counted = match self.fence {
+            Some(fence) => counted & fence.sees(simd, offset, distance, self.squared_radius),
+            None => counted,
+        };
+        counted.any().then_some((distance, came, counted))
+    }
+}
+
 /// Everything of a gathering, in lanes.
 struct Sum<'a, S: Simd, R> {
-    place: Place16<S>,
-    normal: [S::F16; 3],
-    fence: Option<&'a Fence>,
-    squared_radius: f32,
-    thickness: S::F16,
+    test: DiscTest<'a, S>,
     disc: Weighed<S>,
     finer: [Weighed<S>; FINER],
     response: &'a R,
@@ -189,33 +237,8 @@ impl<S: Simd, R: Response> Sum<'_, S, R> {
     /// Adds the photons of half a leaf.
     #[inline(always)]
     fn add(&mut self, simd: S, leaf: &Leaf, half: usize) {
-        let offset = self.place.less(simd, leaf.half(half));
-        let distance = squared(offset);
-        let in_sphere = distance.le(self.disc.limit);
-        if !in_sphere.any() {
-            return;
-        }
-        let zero = simd.splat16(0.0);
-        let in_disc = in_sphere & dot(offset, self.normal).abs().le(self.thickness);
-
-        let [a, b] = &leaf.normal;
-        let (a, b) = (simd.bytes16(&a[half % HALVES]), simd.bytes16(&b[half % HALVES]));
-        let surface = unfolded(simd, a, b, NORMAL_STEPS);
-        let along = dot(surface, self.normal);
-        let alike = zero.lt(along) & (squared(surface) * simd.splat16(ALIKE * ALIKE)).le(along * along);
-
+        let Some((distance, came, counted)) = self.test.photons(simd, leaf, half) else { return };
         let light = &leaf.light[half % HALVES];
-        let u = simd.field16(light, 0, DIRECTION_BITS);
-        let v = simd.field16(light, DIRECTION_BITS, DIRECTION_BITS);
-        let came = unfolded(simd, u, v, DIRECTION_STEPS);
-        let counted = in_disc & alike & zero.lt(dot(came, self.normal));
-        let counted = match self.fence {
-            Some(fence) => counted & fence.sees(simd, offset, distance, self.squared_radius),
-            None => counted,
-        };
-        if !counted.any() {
-            return;
-        }
         let power = &leaf.power[half % HALVES];
         let scale = simd.powers16(light);
         let blue = simd.field16(power, 2 * POWER_BITS, POWER_BITS - 1);
@@ -278,7 +301,7 @@ impl<S: Simd> Weighed<S> {
     ) {
         let mut bits = counted.bits();
         self.photons += bits.count_ones();
-        let weight = self.nearness(simd, photons.distance) * photons.scale;
+        let weight = nearness(simd, self.kernel, photons.distance * self.reciprocal) * photons.scale;
         let weight = weight.select(counted, simd.splat16(0.0));
         let [red, green, blue] = photons.power;
         let (red, green, blue) = (red * weight, green * weight, blue * weight);
@@ -295,19 +318,6 @@ impl<S: Simd> Weighed<S> {
             let direction = Vec3::new(x[lane], y[lane], z[lane]).normalize_or(Vec3::Z);
             self.singles += Rgb::new(r[lane], g[lane], b[lane]) * response.of(direction);
             bits &= bits - 1;
-        }
-    }
-
-    /// The weights of photons by their squared distances.
-    #[inline(always)]
-    fn nearness(&self, simd: S, distance: S::F16) -> S::F16 {
-        let one = simd.splat16(1.0);
-        // Rounding must not make a weight negative.
-        let squared = (distance * self.reciprocal).min(one);
-        match self.kernel {
-            Kernel::Constant => one,
-            Kernel::Cone => simd.splat16(3.0) * (one - squared.sqrt()),
-            Kernel::Epanechnikov => simd.splat16(2.0) * (one - squared),
         }
     }
 
@@ -329,6 +339,19 @@ impl<S: Simd> Weighed<S> {
         let radius = part * disc.radius;
         let per_area = if seen > 0.0 { 1.0 / (PI * seen * radius) / radius } else { 0.0 };
         responded * per_area
+    }
+}
+
+/// The weights of photons by their squared distances, in squared radii.
+#[inline(always)]
+pub(super) fn nearness<S: Simd>(simd: S, kernel: Kernel, squared: S::F16) -> S::F16 {
+    let one = simd.splat16(1.0);
+    // Rounding must not make a weight negative.
+    let squared = squared.min(one);
+    match kernel {
+        Kernel::Constant => one,
+        Kernel::Cone => simd.splat16(3.0) * (one - squared.sqrt()),
+        Kernel::Epanechnikov => simd.splat16(2.0) * (one - squared),
     }
 }
 

@@ -18,6 +18,7 @@ mod nearest;
 mod range;
 mod record;
 mod space;
+mod tagged;
 
 pub use fence::{Fence, PROBES};
 pub use gather::{ALIKE, Density, FINER, FLATNESS, Response, Uniform};
@@ -199,6 +200,19 @@ impl PhotonMap<'_> {
     ) -> Density {
         let fence = Some(fence).filter(|fence| !fence.is_open());
         level.dispatch(gather::Gather { map: self, disc, fence, response })
+    }
+
+    /// Calls `each` with the tag of every photon on a disc, as far as that is seen, and with its kernel weights
+    /// per area, 1/m²: that on the disc, and that on one of half the radius.
+    pub fn tagged_within(
+        &self,
+        level: Level,
+        disc: &QueryDisc,
+        fence: Option<&Fence>,
+        each: impl FnMut(u32, [f32; 2]),
+    ) {
+        let fence = fence.filter(|fence| !fence.is_open());
+        level.dispatch(tagged::TaggedPhotons { map: self, disc, fence, each });
     }
 
     /// [`PhotonMap::nearest`] for many places, of which `each` gets the index and what was found; in an order in

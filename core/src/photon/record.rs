@@ -52,6 +52,11 @@ impl Photon {
         }
     }
 
+    /// A photon without power, with a `tag` in place of it: an index into other data.
+    pub fn tagged(position: Vec3, direction: Vec3, normal: Vec3, tag: u32) -> Self {
+        Self { power: tag, ..Self::new(position, direction, normal, Rgb::ZERO) }
+    }
+
     /// Where it lies.
     pub fn position(&self) -> Vec3 {
         Vec3::from_array(self.position)

@@ -93,14 +93,17 @@ pub(super) struct MethodArgs {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1 << 28),
         help_heading = "Photons")]
     caustic_photons: Option<u32>,
-    /// Light paths per sample of the picture with light and bdpt [default: pixels / 2]
+    /// Light paths per sample of the picture with light, bdpt and vcm [default: pixels / 2]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1 << 20),
         help_heading = "Light paths")]
     light_paths: Option<u32>,
-    /// Light vertices that each camera vertex is connected to with bdpt [default: 1]
+    /// Light vertices that each camera vertex is connected to with bdpt and vcm [default: 1]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=64),
         help_heading = "Light paths")]
     connections: Option<u32>,
+    /// Merging with vcm [default: where the scene has caustics]
+    #[arg(long, value_name = "WHEN", help_heading = "Light paths")]
+    merging: Option<When>,
 }
 
 /// Kernel of a density estimate.
@@ -157,6 +160,7 @@ impl MethodArgs {
             caustic_photons: self.caustic_photons.or(base.caustic_photons),
             light_paths: self.light_paths.or(base.light_paths),
             connections: self.connections.or(base.connections),
+            merging: self.merging.or(base.merging),
             windows: self.windows.or(base.windows),
             max_depth: self.max_depth.or(base.max_depth),
             audit: self.audit.or(base.audit),
@@ -190,6 +194,7 @@ impl MethodArgs {
             bidirectional: BidirectionalSettings {
                 light_paths: self.light_paths,
                 connections: self.connections.unwrap_or(BidirectionalSettings::default().connections),
+                merging: When::forced(self.merging),
             },
             audit: self.audit,
             level: self.simd.map_or(level, |tier| level.capped(tier)),

@@ -81,6 +81,8 @@ methods! {
     sppm: Row { method: Method::ProgressivePhotons, bias: 0.02, bias_of_mean: 0.01, known: &[] };
     light: Row { method: Method::LightTracing, bias: 0.0, bias_of_mean: 0.0, known: &[] };
     bdpt: Row { method: Method::Bidirectional, bias: 0.0, bias_of_mean: 0.0, known: &[] };
+    // Caustics are blurred, by radii that shrink with samples.
+    vcm: Row { method: Method::VertexMerging, bias: 0.02, bias_of_mean: 0.01, known: &[] };
 }
 
 #[test]

@@ -11,6 +11,7 @@ use crate::light::EmissionSampler;
 use crate::memory::{Arena, Footprint, OutOfMemory};
 use crate::sampling::Sampler;
 use crate::scene::SurfacePoint;
+use crate::transport::bidirectional::merging::{Arrival, Merging};
 use crate::transport::bidirectional::mis::{Counts, Sums};
 use crate::transport::bidirectional::vertex::{LightVertex, is_bent, reverse_pdf};
 use crate::transport::settings::{Counters, PathSettings};
@@ -30,6 +31,8 @@ pub(super) struct CameraPath {
     /// Density of the ray's direction per solid angle; infinite after a delta lobe and at the lens.
     pub(super) pdf: f32,
     radiance: [f32; 3],
+    /// The part of `radiance` by which merges are too bright for their width.
+    blur: [f32; 3],
     /// Index of the pixel in its tile.
     place: u32,
     /// The last vertex, and its normal for light sampling.
@@ -38,7 +41,14 @@ pub(super) struct CameraPath {
     /// Sums after the last scattering.
     last: f32,
     rest: f32,
+    merge: f32,
     pub(super) segments: u32,
+    /// 1 behind the first rough vertex.
+    has_rough: u32,
+    /// η: count of merges at the last vertex.
+    merge_count: f32,
+    /// m: length from the lens to the last vertex.
+    pub(super) travelled: f32,
     crossings: u32,
     /// Triangle that the ray starts on.
     triangle: u32,
@@ -55,8 +65,19 @@ impl CameraPath {
         }
     }
 
+    pub(super) fn add_blur(&mut self, blur: Rgb) {
+        if blur.is_finite() {
+            self.blur = (Rgb::from(self.blur) + blur).to_array();
+        }
+    }
+
+    /// Whether a rough vertex lies behind it.
+    pub(super) fn has_rough(&self) -> bool {
+        self.has_rough == 1
+    }
+
     pub(super) fn sums(&self) -> Sums {
-        Sums { last: self.last, rest: self.rest }
+        Sums { last: self.last, rest: self.rest, merge: self.merge }
     }
 }
 
@@ -77,6 +98,7 @@ pub struct CameraPaths<'a, F> {
     pub(super) settings: PathSettings,
     pub(super) counts: Counts,
     pub(super) connections: Connections<'a>,
+    pub(super) merging: Option<Merging<'a>>,
 }
 
 /// A vertex that a path has arrived at.
@@ -87,6 +109,10 @@ pub(super) struct Vertex<'v> {
     pub(super) wo: Vec3,
     /// Sums on arrival.
     pub(super) sums: Sums,
+    /// No rough vertex lies before it.
+    pub(super) is_first_rough: bool,
+    /// η: count of merges here, 0 where there is none.
+    pub(super) merge: f32,
     /// The shading normal depends on the camera path: no light path can come here.
     pub(super) is_bent: bool,
     pub(super) sampler: Sampler,
@@ -117,7 +143,12 @@ impl<'a, F: Features> CameraPaths<'a, F> {
         counts: Counts,
         connections: Connections<'a>,
     ) -> Self {
-        Self { context, emission, settings, counts, connections }
+        Self { context, emission, settings, counts, connections, merging: None }
+    }
+
+    /// The same, merged with photons.
+    pub fn with_merging(self, merging: Option<Merging<'a>>) -> Self {
+        Self { merging, ..self }
     }
 
     /// Working memory of a task with so many connections of a vertex.
@@ -170,7 +201,9 @@ impl<'a, F: Features> CameraPaths<'a, F> {
                 let splat = splats.get(path.place as usize).copied().unwrap_or_default();
                 if let Some(pixel) = out.get_mut(path.place as usize) {
                     let radiance = Rgb::from(path.radiance) + Rgb::from(splat);
-                    pixel.add(sample, radiance, &mut counters.dropped);
+                    if pixel.add(sample, radiance, &mut counters.dropped) {
+                        pixel.add_blur(sample, Rgb::from(path.blur));
+                    }
                 }
             }
         }
@@ -272,6 +305,7 @@ impl<'a, F: Features> CameraPaths<'a, F> {
             return Some(point.spawn(direction));
         }
         self.emission(path, &point, hit, direction);
+        path.travelled += hit.t;
         if path.segments >= self.settings.max_depth {
             return None;
         }
@@ -279,7 +313,13 @@ impl<'a, F: Features> CameraPaths<'a, F> {
         let wo = point.frame.to_local(-direction);
         let is_bent = is_bent(&point, wo);
         let sums = if is_bent { Sums::default() } else { self.arrive(path, &point, &bsdf, direction) };
-        let vertex = Vertex { point: &point, bsdf: &bsdf, wo, sums, is_bent, sampler };
+        let is_first_rough = path.has_rough == 0 && !bsdf.is_caustic_caster();
+        let merge = match self.merging {
+            Some(merging) if is_first_rough && !is_bent => merging.radii.count(&bsdf, point.position),
+            _ => 0.0,
+        };
+        let vertex = Vertex { point: &point, bsdf: &bsdf, wo, sums, is_first_rough, merge, is_bent, sampler };
+        self.merge(path, &vertex);
         if !bsdf.is_delta() {
             self.light_sample(path, &vertex, ray.tag, queue);
             if !is_bent {
@@ -295,7 +335,11 @@ impl<'a, F: Features> CameraPaths<'a, F> {
         let is_delta = bsdf.is_delta();
         if path.segments > 1 {
             let squared = point.position.distance_squared(path.position.into());
-            return path.sums().arrive(squared, cos, is_delta);
+            let sums = path.sums().arrive(squared, cos, is_delta);
+            let arrival = Arrival::of(bsdf.is_caustic_caster(), squared, path.merge_count);
+            // The segment is that behind the vertex of the merge.
+            let is_merged = arrival.is_some_and(|arrival| arrival.is_merged(path.segments - 1));
+            return if is_merged { sums.with_merge() } else { sums };
         }
         let PathSettings { width, height, .. } = self.settings;
         let camera = &self.context.scene.camera;
@@ -342,7 +386,9 @@ impl<'a, F: Features> CameraPaths<'a, F> {
             return None;
         }
         let sums = self.leave(vertex, &sample, (direction, towards));
-        (path.last, path.rest) = (sums.last, sums.rest);
+        (path.last, path.rest, path.merge) = (sums.last, sums.rest, sums.merge);
+        path.merge_count = if sample.delta { 0.0 } else { vertex.merge };
+        path.has_rough |= u32::from(!bsdf.is_caustic_caster() && !sample.delta);
         path.throughput = throughput.to_array();
         path.pdf = if sample.delta { f32::INFINITY } else { sample.pdf };
         path.position = point.position.to_array();
@@ -354,17 +400,18 @@ impl<'a, F: Features> CameraPaths<'a, F> {
 
     /// Sums after scattering at `vertex`.
     fn leave(&self, vertex: &Vertex, sample: &BsdfSample, (from, towards): (Vec3, Vec3)) -> Sums {
-        let Vertex { point, bsdf, wo, sums, is_bent, .. } = *vertex;
+        let Vertex { point, bsdf, wo, sums, merge, is_bent, .. } = *vertex;
         if is_bent {
             return Sums::default();
         }
         let cos_in = from.dot(point.geometric_normal).abs();
         if sample.delta {
-            return sums.scatter_delta(cos_in, sample.eta);
+            return sums.with_merge().scatter_delta(cos_in, sample.eta);
         }
         let cos_out = towards.dot(point.geometric_normal).abs();
         let reverse = reverse_pdf(&self.context, (point, bsdf), wo, sample.direction);
-        sums.scatter(&self.counts, sample.pdf, reverse, cos_out)
+        let merge = (!bsdf.is_caustic_caster()).then_some(merge);
+        sums.scatter(&self.counts, sample.pdf, reverse, cos_out, merge)
     }
 }
 

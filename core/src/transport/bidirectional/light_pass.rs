@@ -8,6 +8,7 @@ use crate::geometry::{Hit, Ray};
 use crate::light::{EmissionSampler, LightType};
 use crate::memory::{Arena, Footprint, OutOfMemory};
 use crate::sampling::warp::concentric_disk;
+use crate::transport::bidirectional::merging::{Arrival, MergeRadii};
 use crate::transport::bidirectional::mis::{Counts, Sums, weight_of_splat};
 use crate::transport::bidirectional::vertex::{LightVertex, is_bent, reverse_pdf, scattering_from_light};
 use crate::transport::settings::{Counters, PathSettings};
@@ -52,17 +53,19 @@ pub struct LightPass<'a, F> {
     emission: &'a EmissionSampler<'a>,
     settings: PathSettings,
     counts: Counts,
+    merging: Option<MergeRadii>,
 }
 
 impl<'a, F: Features> LightPass<'a, F> {
-    /// A pass with the light paths of `counts`.
+    /// A pass with the light paths of `counts`, for merges where there are some.
     pub fn new(
         context: SceneContext<'a, F>,
         emission: &'a EmissionSampler<'a>,
         settings: PathSettings,
         counts: Counts,
+        merging: Option<MergeRadii>,
     ) -> Self {
-        Self { context, emission, settings, counts }
+        Self { context, emission, settings, counts, merging }
     }
 
     /// Working memory of a task.
@@ -88,13 +91,14 @@ impl<'a, F: Features> LightPass<'a, F> {
         splats: &mut [Splat],
         output: &mut TaskOutput,
     ) -> Result<Counters, OutOfMemory> {
-        let Self { context, emission, settings, counts } = *self;
+        let Self { context, emission, settings, counts, merging } = *self;
         let mut arena = scratch.scratch();
         let mut writer = Writer {
             context,
             emission,
             settings,
             counts,
+            merging,
             vertices,
             stored: 0,
             splats: arena.slice(ROOM)?,
@@ -131,6 +135,7 @@ struct Writer<'w, F> {
     emission: &'w EmissionSampler<'w>,
     settings: PathSettings,
     counts: Counts,
+    merging: Option<MergeRadii>,
     vertices: &'w mut [LightVertex],
     stored: usize,
     splats: &'w mut [Splat],
@@ -176,13 +181,30 @@ impl<F: Features> Writer<'_, F> {
             return Sums { last: if is_delta { 0.0 } else { sums.last }, ..sums };
         }
         let squared = vertex.point.position.distance_squared(state.position.into());
-        Sums { last: state.last, rest: state.rest }.arrive(squared, cos, is_delta)
+        sums(state).arrive(squared, cos, is_delta)
+    }
+
+    /// η at a rough vertex and the way by which light comes there, if it may be merged. `None` at a narrow
+    /// vertex.
+    fn merge(&self, state: &LightPathState, vertex: &Vertex) -> Option<(f32, Option<Arrival>)> {
+        if vertex.bsdf.is_caustic_caster() {
+            return None;
+        }
+        let position = vertex.point.position;
+        let count = self.merging.map_or(0.0, |radii| radii.count(vertex.bsdf, position));
+        if count == 0.0 || state.segments == 1 {
+            return Some((0.0, None));
+        }
+        let squared = position.distance_squared(state.position.into());
+        let arrival = Arrival::of(state.mirrored == 1, squared, count);
+        Some((if arrival.is_some() { count } else { 0.0 }, arrival))
     }
 
     fn store(&mut self, state: &LightPathState, vertex: &Vertex, counters: &mut Counters) {
-        if self.counts.connections == 0.0 {
+        if self.counts.connections == 0.0 && self.merging.is_none() {
             return;
         }
+        let merge = self.merge(state, vertex);
         let Some(slot) = self.vertices.get_mut(self.stored) else {
             counters.dropped.unfinished += 1;
             return;
@@ -191,13 +213,15 @@ impl<F: Features> Writer<'_, F> {
             position: vertex.point.position.to_array(),
             triangle: vertex.point.triangle,
             power: state.power,
-            segments: state.segments,
+            segments: state.segments.min(u32::from(u16::MAX)) as u16,
             to_light: vertex.to_light.to_array(),
             barycentric: vertex.barycentric,
             last: state.last,
             rest: state.rest,
-            unused: 0,
-        };
+            merge: merge.map_or(state.merge, |(count, _)| count),
+            ..LightVertex::default()
+        }
+        .with_arrival(merge.and_then(|(_, arrival)| arrival));
         self.stored += 1;
     }
 
@@ -225,8 +249,12 @@ impl<F: Features> Writer<'_, F> {
         let cos_out = to_camera.dot(point.geometric_normal).abs();
         let pixels = width as f32 * height as f32;
         let pdf_area = pixels * seen.pdf * cos_out / seen.distance / seen.distance;
-        let sums = Sums { last: state.last, rest: state.rest };
-        let weight = weight_of_splat(&self.counts, &sums, pdf_area, scattering.to_light);
+        let merge = match self.merge(state, vertex) {
+            None => state.merge * scattering.to_light,
+            Some((count, Some(arrival))) if arrival.is_merged(1) => count,
+            Some(_) => 0.0,
+        };
+        let weight = weight_of_splat(&self.counts, &sums(state), pdf_area, scattering.to_light, merge);
         // Where the shading normal differs from the geometric one, power was counted by the latter (Veach
         // 1997, 5.3).
         let radiance = Rgb::from(state.power) * scattering.value * (pdf_area * weight / cos_in);
@@ -256,6 +284,10 @@ impl<F: Features> Writer<'_, F> {
         counters.dropped.unfinished += unfinished + overflow;
         *pending = 0;
     }
+}
+
+fn sums(state: &LightPathState) -> Sums {
+    Sums { last: state.last, rest: state.rest, merge: state.merge }
 }
 
 /// The point of the lens from which the camera sees `position` as `seen`.
@@ -290,7 +322,7 @@ impl<F: Features> Visitor for Writer<'_, F> {
         }
         let cos_in = vertex.to_light.dot(vertex.point.geometric_normal).abs();
         let sums = self.arrive(state, vertex, cos_in);
-        (state.last, state.rest) = (sums.last, sums.rest);
+        (state.last, state.rest, state.merge) = (sums.last, sums.rest, sums.merge);
         if !vertex.bsdf.is_delta() {
             self.store(state, vertex, counters);
             if self.pending == SHADOW_RAYS {
@@ -310,16 +342,18 @@ impl<F: Features> Visitor for Writer<'_, F> {
     ) {
         let (point, bsdf) = (vertex.point, vertex.bsdf);
         let cos_in = vertex.to_light.dot(point.geometric_normal).abs();
-        let sums = Sums { last: state.last, rest: state.rest };
+        let sums = sums(state);
         let sums = if sample.delta {
             sums.scatter_delta(cos_in, sample.eta)
         } else {
             let towards = point.frame.to_world(sample.direction);
             let cos_out = towards.dot(point.geometric_normal).abs();
             let reverse = reverse_pdf(&self.context, (point, bsdf), from, sample.direction);
-            sums.scatter(&self.counts, sample.pdf, reverse, cos_out)
+            let merge = self.merge(state, vertex).map(|(count, _)| count);
+            sums.scatter(&self.counts, sample.pdf, reverse, cos_out, merge)
         };
-        (state.last, state.rest) = (sums.last, sums.rest);
+        (state.last, state.rest, state.merge) = (sums.last, sums.rest, sums.merge);
+        state.mirrored = u32::from(sample.delta || bsdf.is_caustic_caster());
         state.position = point.position.to_array();
     }
 }

@@ -2,16 +2,24 @@
 //! Vertex Connection and Merging", in étendue and with counts).
 //!
 //! A path x₀ … x_k from a light to the lens can be found by every technique: the camera walk hits the light,
-//! a light sample, a connection of two vertices, a splat of a light vertex. The balance heuristic divides the
-//! count times the density of a technique by the sum over all of them. Each subpath carries two numbers, with
-//! which the sum is known:
+//! a light sample, a connection of two vertices, a merge at one vertex, a splat of a light vertex. The balance
+//! heuristic divides the count times the density of a technique by the sum over all of them. Each subpath
+//! carries three numbers, with which the sum is known:
 //!
 //! - `last`: the technique that connects over the latest segment,
-//! - `rest`: all techniques before it, still to be multiplied with the reverse density at the latest vertex.
+//! - `rest`: all techniques before it, still to be multiplied with the reverse density at the latest vertex,
+//! - `merge`: the merge at the latest rough vertex, likewise, as long as it may turn out not to be one.
+//!
+//! A path is merged at one vertex at most (`merging.rs`): the first rough one from the camera, if narrow
+//! vertices lie on both sides of it, or a near one on that of the light. Neither subpath knows both sides, so that the merge has a number of its
+//! own: the next rough vertex of a light path takes its place, and a camera path adds it to `rest` if its next
+//! vertex is narrow or near. Georgiev's dVCM, dVC and dVM are `last`, `rest` and `rest` / η where every vertex is
+//! merged.
 //!
 //! p is the density per solid angle with which a walk goes on, p← that of the opposite walk, c a cosine to
 //! the geometric normal, d a distance, e the density of emission per étendue (`light/emission/pdf.rs`), q the
-//! density of the rays of one pixel. Roulette stays out of the weights, which add up to one without it.
+//! density of the rays of one pixel, η = L π r² the expected number of light paths in the disc of a merge.
+//! Roulette stays out of the weights, which add up to one without it.
 
 /// How often each technique is used for a sample of a pixel.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -32,6 +40,8 @@ pub struct Sums {
     pub last: f32,
     /// Techniques before it.
     pub rest: f32,
+    /// Merge at the latest rough vertex.
+    pub merge: f32,
 }
 
 impl Sums {
@@ -42,12 +52,13 @@ impl Sums {
         Self {
             last: counts.light_samples * pdf_light * inverse,
             rest: if can_be_hit { inverse } else { 0.0 },
+            merge: 0.0,
         }
     }
 
     /// Of a camera path that leaves the lens by a ray of density `pdf_pixel` among those of its pixel.
     pub fn at_camera(counts: &Counts, pdf_pixel: f32) -> Self {
-        Self { last: counts.light_paths / pdf_pixel, rest: 0.0 }
+        Self { last: counts.light_paths / pdf_pixel, rest: 0.0, merge: 0.0 }
     }
 
     /// At the end of a segment. The first segment of a light path is in [`Sums::at_light`].
@@ -55,18 +66,30 @@ impl Sums {
         Self {
             last: if is_delta { 0.0 } else { self.last * distance_squared / cos_in },
             rest: self.rest / cos_in,
+            merge: self.merge / cos_in,
         }
     }
 
-    /// After scattering with density `pdf`; `reverse` is the density of the opposite walk.
-    pub fn scatter(self, counts: &Counts, pdf: f32, reverse: f32, cos_out: f32) -> Self {
-        Self { last: counts.connections / pdf, rest: cos_out / pdf * self.before(reverse) }
+    /// Of a camera path that can be merged at the vertex before, as this vertex shows.
+    pub fn with_merge(self) -> Self {
+        Self { rest: self.rest + self.merge, merge: 0.0, ..self }
+    }
+
+    /// After scattering with density `pdf`; `reverse` is the density of the opposite walk, `merge` the count
+    /// of merges there if the vertex is rough.
+    pub fn scatter(self, counts: &Counts, pdf: f32, reverse: f32, cos_out: f32, merge: Option<f32>) -> Self {
+        Self {
+            last: counts.connections / pdf,
+            rest: cos_out / pdf * self.before(reverse),
+            merge: cos_out / pdf * merge.unwrap_or(self.merge * reverse),
+        }
     }
 
     /// After reflection or refraction by a delta lobe; `eta` is the index behind over that before, in the
     /// walk's direction. Refraction keeps n² dA cos dω.
     pub fn scatter_delta(self, cos_in: f32, eta: f32) -> Self {
-        Self { last: 0.0, rest: self.rest * cos_in / (eta * eta) }
+        let factor = cos_in / (eta * eta);
+        Self { last: 0.0, rest: self.rest * factor, merge: self.merge * factor }
     }
 
     /// All techniques of this subpath, where the opposite walk goes on with density `reverse` at the latest
@@ -109,20 +132,36 @@ pub struct End {
     pub reverse: f32,
     /// Cosine of the direction to the other end.
     pub cos: f32,
+    /// Merge of the whole path on this side of the connection; 0 where there is none.
+    pub merge: f32,
+}
+
+impl End {
+    /// All techniques on this side.
+    fn before(&self) -> f32 {
+        self.sums.before(self.reverse) + self.merge
+    }
 }
 
 /// Weight of a connection of a camera vertex with a light vertex.
 pub fn weight_of_connection(counts: &Counts, camera: &End, light: &End, distance_squared: f32) -> f32 {
     let per_area = |from: &End, to: &End| from.pdf * to.cos / distance_squared;
-    let by_camera = per_area(camera, light) * light.sums.before(light.reverse);
-    let by_light = per_area(light, camera) * camera.sums.before(camera.reverse);
+    let by_camera = per_area(camera, light) * light.before();
+    let by_light = per_area(light, camera) * camera.before();
     weight(counts.connections, by_camera + by_light)
 }
 
 /// Weight of the splat of a light vertex. `pdf_area` is the density per area with which rays of the pixel
-/// meet it, `reverse` the density of the walk from the lens to the vertex before.
-pub fn weight_of_splat(counts: &Counts, sums: &Sums, pdf_area: f32, reverse: f32) -> f32 {
-    weight(counts.light_paths, pdf_area * sums.before(reverse))
+/// meet it, `reverse` the density of the walk from the lens to the vertex before, `merge` the merge of the
+/// path, or 0.
+pub fn weight_of_splat(counts: &Counts, sums: &Sums, pdf_area: f32, reverse: f32, merge: f32) -> f32 {
+    weight(counts.light_paths, pdf_area * (sums.before(reverse) + merge))
+}
+
+/// Weight of the merge of two subpaths that have arrived at one vertex, where `count` light paths are
+/// expected. Each has its sums and the density of the opposite walk to the vertex before.
+pub fn weight_of_merge(count: f32, (camera, reverse): (&Sums, f32), (light, to_light): (&Sums, f32)) -> f32 {
+    weight(count, camera.before(reverse) + light.before(to_light))
 }
 
 /// `own` over the sum of `own` and `others`; 0 where that is not a number.

@@ -1,5 +1,5 @@
 //! Bidirectional methods (Veach 1997, chapter 10; Davidovič et al. 2014): light paths whose vertices are
-//! stored and splatted, camera paths whose vertices are connected to stored ones.
+//! stored and splatted, camera paths whose vertices are connected to stored ones or merged with them.
 //!
 //! [`light_pass`] traces the light paths of a sample of the picture, [`camera_paths`] the camera paths of a
 //! tile. Both carry the running sums of [`mis`]. How often each technique is used is a matter of
@@ -8,6 +8,7 @@
 
 pub mod camera_paths;
 pub mod light_pass;
+pub mod merging;
 pub mod mis;
 mod techniques;
 pub mod vertex;

@@ -4,7 +4,9 @@
 use crate::Rgb;
 use crate::bsdf::{Bsdf, Features};
 use crate::geometry::{Hit, Ray};
+use crate::photon::Photon;
 use crate::scene::SurfacePoint;
+use crate::transport::bidirectional::merging::Arrival;
 use crate::transport::bidirectional::mis::Sums;
 use crate::transport::walk::context::SceneContext;
 use bytemuck::{Pod, Zeroable};
@@ -21,7 +23,9 @@ pub struct LightVertex {
     /// W per light path of the pass, on arrival.
     pub(super) power: [f32; 3],
     /// Segments of the path up to here.
-    pub(super) segments: u32,
+    pub(super) segments: u16,
+    /// The way by which light comes to it, where it is merged.
+    pub(super) arrival: u16,
     /// Unit direction to the vertex before.
     pub(super) to_light: [f32; 3],
     /// Barycentric weights of the second and third corner of the triangle.
@@ -29,12 +33,28 @@ pub struct LightVertex {
     /// Sums on arrival.
     pub(super) last: f32,
     pub(super) rest: f32,
-    pub(super) unused: u32,
+    /// The merge of paths whose camera vertices are all narrow: still to be multiplied with the reverse
+    /// density if this vertex is narrow.
+    pub(super) merge: f32,
 }
 
 impl LightVertex {
     pub(super) fn sums(&self) -> Sums {
-        Sums { last: self.last, rest: self.rest }
+        Sums { last: self.last, rest: self.rest, merge: self.merge }
+    }
+
+    /// With an `arrival`.
+    pub(super) fn with_arrival(self, arrival: Option<Arrival>) -> Self {
+        Self { arrival: arrival.map_or(0, |arrival| 1 + arrival as u16), ..self }
+    }
+
+    /// The way by which light comes to it; `None` where it is not merged.
+    pub(super) fn arrival(&self) -> Option<Arrival> {
+        match self.arrival {
+            0 => None,
+            1 => Some(Arrival::Narrow),
+            _ => Some(Arrival::Near),
+        }
     }
 
     /// The surface point, as the light path saw it.
@@ -43,6 +63,15 @@ impl LightVertex {
         let direction = -Vec3::from(self.to_light);
         let ray = Ray::new(Vec3::from(self.position) - direction, direction);
         context.surface_at(&ray, &Hit { t: 1.0, u, v, triangle: self.triangle })
+    }
+
+    /// The photon that leads to this vertex, number `index` of its list; none where nothing is merged.
+    pub fn photon<F: Features>(&self, context: &SceneContext<F>, index: u32) -> Photon {
+        let point = self.arrival().and_then(|_| self.point(context));
+        let direction = self.to_light.into();
+        point.map_or(Photon::NONE, |point| {
+            Photon::tagged(point.position, direction, point.geometric_normal, index)
+        })
     }
 }
 

@@ -19,7 +19,7 @@ use core::f32::consts::FRAC_1_PI;
 use glam::Vec3;
 
 /// Cosine below which that of a photon counts as this: its direction is not known better.
-const GRAZING: f32 = 0.01;
+pub(in crate::transport) const GRAZING: f32 = 0.01;
 
 /// How steeply probes for walls rise from the surface: what is lower than that is a step, not a wall, and
 /// what the surface bends less is none either.

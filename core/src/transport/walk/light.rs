@@ -55,12 +55,13 @@ pub(in crate::transport) struct LightPathState {
     /// Sums of a bidirectional path (`bidirectional/mis.rs`).
     pub last: f32,
     pub rest: f32,
+    pub merge: f32,
     /// R / (π² r² N) so far, for visitors that weigh photons (`merge.rs`, `caustics.rs`).
     pub chain: f32,
     /// Root of the sum of squares of the densities of the path tracer's techniques, over that of which
     /// `chain` tells: 1 where that is the only one, 0 where there is none.
     pub others: f32,
-    /// 1 where the last surface only mirrors or refracts.
+    /// 1 where the last surface only mirrors or refracts; for bidirectional paths, or does so narrowly.
     pub mirrored: u32,
     /// Probability with which it has come so far.
     survived: f32,

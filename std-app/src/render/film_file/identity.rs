@@ -42,7 +42,9 @@ impl Identity {
         if let Some(Method::PhotonMap | Method::ProgressivePhotons) = Method::named(method) {
             cache += &format!(", {:?}", settings.photons);
         }
-        if let Some(Method::LightTracing | Method::Bidirectional) = Method::named(method) {
+        if let Some(Method::LightTracing | Method::Bidirectional | Method::VertexMerging) =
+            Method::named(method)
+        {
             cache += &format!(", {:?}", settings.bidirectional);
         }
         let may_join = [Method::Path, Method::IrradianceCache].map(Method::name).contains(&method);

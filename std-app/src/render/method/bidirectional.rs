@@ -1,4 +1,4 @@
-//! Bidirectional path tracing and light tracing for the program.
+//! Bidirectional path tracing, light tracing, vertex connection and merging for the program.
 
 use super::{Method, Renderer, Stage};
 use crate::render::RenderError;
@@ -18,18 +18,24 @@ pub(super) struct BidirectionalPaths<'a, F> {
 }
 
 impl<'a, F: Features> BidirectionalPaths<'a, F> {
-    /// With connections, or with splats alone.
+    /// By the techniques of `chosen`.
     pub(super) fn new(
         stage: &Stage<'a>,
         memory: &mut Memory<'a>,
-        has_connections: bool,
+        chosen: Method,
     ) -> Result<Self, RenderError> {
         let Stage { settings, workers, .. } = *stage;
-        let connections = if has_connections { settings.bidirectional.connections } else { 0 };
-        let bidirectional = BidirectionalSettings { connections, ..settings.bidirectional };
+        let BidirectionalSettings { light_paths, connections, merging } = settings.bidirectional;
+        let bidirectional = match chosen {
+            Method::LightTracing => {
+                BidirectionalSettings { light_paths, ..BidirectionalSettings::LIGHT_TRACING }
+            }
+            Method::Bidirectional => BidirectionalSettings { light_paths, connections, merging: Some(false) },
+            _ => BidirectionalSettings { light_paths, connections, merging },
+        };
         let scratch = Bidirectional::<F>::scratch(&bidirectional);
         let mut scratch = memory.take_each("paths", scratch, workers.count())?;
-        let others = Audit::bytes::<F>(stage, Method::Bidirectional.is_biased());
+        let others = Audit::bytes::<F>(stage, chosen.is_biased());
         let mut executor = Threads::new(workers, &mut scratch);
         let method = Bidirectional::new(&stage.context(), &bidirectional, memory, &mut executor, others)?;
         Ok(Self { method, scratch })

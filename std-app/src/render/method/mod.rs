@@ -51,6 +51,8 @@ pub enum Method {
     LightTracing,
     /// Bidirectional path tracing.
     Bidirectional,
+    /// Vertex connection and merging.
+    VertexMerging,
     /// Path tracing that is wrong on purpose.
     #[cfg(test)]
     Wrong,
@@ -58,13 +60,14 @@ pub enum Method {
 
 impl Method {
     /// All of them.
-    pub const ALL: [Method; 6] = [
+    pub const ALL: [Method; 7] = [
         Method::Path,
         Method::IrradianceCache,
         Method::PhotonMap,
         Method::ProgressivePhotons,
         Method::LightTracing,
         Method::Bidirectional,
+        Method::VertexMerging,
     ];
 
     /// Its name on the command line, in films and in reports.
@@ -76,6 +79,7 @@ impl Method {
             Method::ProgressivePhotons => "sppm",
             Method::LightTracing => "light",
             Method::Bidirectional => "bdpt",
+            Method::VertexMerging => "vcm",
             #[cfg(test)]
             Method::Wrong => "wrong",
         }
@@ -96,6 +100,9 @@ impl Method {
             }
             Method::LightTracing => "Path tracing, and light paths whose vertices the camera sees",
             Method::Bidirectional => "Bidirectional path tracing with a cache of light vertices",
+            Method::VertexMerging => {
+                "Vertex connection and merging: bidirectional path tracing, and photons of caustics behind mirrors and glass"
+            }
             #[cfg(test)]
             Method::Wrong => "Wrong on purpose",
         }
@@ -110,7 +117,10 @@ impl Method {
     pub const fn is_biased(self) -> bool {
         match self {
             Method::Path | Method::LightTracing | Method::Bidirectional => false,
-            Method::IrradianceCache | Method::PhotonMap | Method::ProgressivePhotons => true,
+            Method::IrradianceCache
+            | Method::PhotonMap
+            | Method::ProgressivePhotons
+            | Method::VertexMerging => true,
             #[cfg(test)]
             Method::Wrong => true,
         }
@@ -119,7 +129,11 @@ impl Method {
     /// Whether enough samples bring its pictures as near to that of the scene as anybody wishes.
     pub const fn converges(self) -> bool {
         match self {
-            Method::Path | Method::ProgressivePhotons | Method::LightTracing | Method::Bidirectional => true,
+            Method::Path
+            | Method::ProgressivePhotons
+            | Method::LightTracing
+            | Method::Bidirectional
+            | Method::VertexMerging => true,
             Method::IrradianceCache | Method::PhotonMap => false,
             #[cfg(test)]
             Method::Wrong => false,
@@ -128,7 +142,7 @@ impl Method {
 
     /// Whether it finds light that path tracing may miss: that of small lamps through mirrors and glass.
     pub const fn finds_caustics(self) -> bool {
-        matches!(self, Method::PhotonMap | Method::ProgressivePhotons)
+        matches!(self, Method::PhotonMap | Method::ProgressivePhotons | Method::VertexMerging)
     }
 
     /// Whether samples of pixels far from each other err together, through a structure that they share: their errors
@@ -140,7 +154,8 @@ impl Method {
             | Method::PhotonMap
             | Method::ProgressivePhotons
             | Method::LightTracing
-            | Method::Bidirectional => true,
+            | Method::Bidirectional
+            | Method::VertexMerging => true,
             #[cfg(test)]
             Method::Wrong => false,
         }
@@ -161,11 +176,8 @@ impl Method {
             Method::ProgressivePhotons => {
                 then(&mut sppm::ProgressivePhotons::<F>::new(stage, memory)?, memory)
             }
-            Method::LightTracing => {
-                then(&mut bidirectional::BidirectionalPaths::<F>::new(stage, memory, false)?, memory)
-            }
-            Method::Bidirectional => {
-                then(&mut bidirectional::BidirectionalPaths::<F>::new(stage, memory, true)?, memory)
+            Method::LightTracing | Method::Bidirectional | Method::VertexMerging => {
+                then(&mut bidirectional::BidirectionalPaths::<F>::new(stage, memory, self)?, memory)
             }
             #[cfg(test)]
             Method::Wrong => then(&mut wrong::Wrong::<F>::new(stage, memory)?, memory),
