@@ -20,7 +20,8 @@ pub(super) const PLACES: usize = SIDE * SIDE;
 
 /// The square around a tile, row by row, of a picture times some scale. Pixels of other tiles are missing.
 pub(super) struct TileStatistics {
-    /// A₁, A₂, B₁, B₂ of each pixel, the parts of its halves; `None` where one is empty or the pixel is missing.
+    /// A₁, A₂, B₁, B₂ of each pixel, the parts of its halves; `None` where one is empty or the pixel is
+    /// missing.
     pub(super) quarters: [Option<[Vec4; 4]>; PLACES],
     /// The mean light of the eight neighbours of each pixel, as far as they lie in the tile and are not
     /// surely brighter; its own where there are none.

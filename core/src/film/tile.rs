@@ -1,10 +1,10 @@
 //! How a picture is cut into tiles, and the order of the pixels within one: the Z-curve, so that any run of
 //! pixels is a compact patch and its camera rays are alike.
 //!
-//! Pixels of a block of 8 × 8 may share their samples, and then have an error in common. A sharp border between
-//! two blocks would show, so blocks dissolve into each other: a pixel changes places with its mirror image beyond
-//! the nearest border of its block, with a probability that falls from a half at the border to zero in the
-//! middle of the block.
+//! Pixels of a block of 8 × 8 may share their samples, and then have an error in common. A sharp border
+//! between two blocks would show, so blocks dissolve into each other: a pixel changes places with its mirror
+//! image beyond the nearest border of its block, with a probability that falls from a half at the border to
+//! zero in the middle of the block.
 
 use crate::sampling::mix;
 
@@ -100,8 +100,8 @@ const fn whole(size: u32) -> u32 {
     size.div_ceil(TILE) * TILE
 }
 
-/// The coordinate with which `at` changes places along `line`, or `at` itself; the inverse of itself. `size` is a
-/// multiple of the side of a block.
+/// The coordinate with which `at` changes places along `line`, or `at` itself; the inverse of itself. `size`
+/// is a multiple of the side of a block.
 #[inline]
 const fn dissolved(at: u32, line: u32, size: u32) -> u32 {
     let border = (at + REACH) / BLOCK * BLOCK;

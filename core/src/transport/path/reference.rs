@@ -49,8 +49,8 @@ pub fn radiance(
     radiance + lamps
 }
 
-/// An estimate of the irradiance of `point` on the side of its normal, in W/m², by one path: π times the radiance
-/// that a white diffuse surface would reflect. Each `sampler` gives an independent one.
+/// An estimate of the irradiance of `point` on the side of its normal, in W/m², by one path: π times the
+/// radiance that a white diffuse surface would reflect. Each `sampler` gives an independent one.
 pub fn irradiance(
     scene: &Scene,
     bvh: &Bvh,
@@ -89,7 +89,7 @@ fn light_numbers(sampler: &Sampler, first: u32) -> [f32; 3] {
     [u, v, sampler.single(first + dimension::LIGHT_CHOICE)]
 }
 
-/// The ray by which a path begins, and the vertex that it leaves.
+/// A ray of a path, and the vertex that it leaves.
 struct Start {
     ray: Ray,
     from: Vec3,
@@ -102,57 +102,66 @@ struct Start {
     segments: u32,
 }
 
+impl Start {
+    /// Light from infinitely far, and its weight.
+    fn escape(&self, context: &SceneContext<All>, direction: Vec3) -> (Rgb, f32) {
+        let (scene, lights) = (context.scene, context.lights);
+        let Some(environment) = &scene.environment else { return (Rgb::ZERO, 0.0) };
+        let seen = environment.radiance(scene, direction);
+        if seen == Rgb::ZERO {
+            return (seen, 0.0);
+        }
+        let light_pdf = lights.pdf_escape(scene, self.from, self.normal, direction);
+        let is_alone = self.pdf == f32::INFINITY;
+        (seen, if is_alone { 1.0 } else { environment_heuristic(lights, self.pdf, light_pdf) })
+    }
+
+    /// Light of the surface that the ray has met at `point`, and its weight.
+    fn emission(&self, context: &SceneContext<All>, point: &SurfacePoint, direction: Vec3) -> (Rgb, f32) {
+        let (scene, lights) = (context.scene, context.lights);
+        let seen = emitted(scene, point.triangle, point.uv, point.front);
+        if seen == Rgb::ZERO {
+            return (seen, 0.0);
+        }
+        let distance = self.from.distance(point.position);
+        let light_pdf = lights.pdf_hit(scene, self.from, self.normal, point.triangle, distance, direction);
+        (seen, if self.pdf == f32::INFINITY { 1.0 } else { power_heuristic(self.pdf, light_pdf) })
+    }
+}
+
 /// The radiance along the ray of `start`, without the emission of the first surface where that `is_outlined`.
 fn follow(
     context: &SceneContext<All>,
     sampler: &Sampler,
     max_depth: u32,
     is_outlined: bool,
-    start: Start,
+    mut start: Start,
 ) -> Rgb {
-    let (scene, lights) = (context.scene, context.lights);
-    let mut radiance = Rgb::ZERO; // L
-    let mut throughput = Rgb::ONE; // β
-    let mut eta_squared = 1.0;
-    let Start { mut ray, mut from, normal: mut from_normal, mut pdf, triangle: mut left, mut segments } =
-        start;
-    let mut crossings = 0;
-
-    while segments <= MAX_VERTICES && crossings <= MAX_CROSSINGS {
+    let (mut radiance, mut throughput) = (Rgb::ZERO, Rgb::ONE); // L, β
+    let (mut eta_squared, mut crossings) = (1.0, 0);
+    while start.segments <= MAX_VERTICES && crossings <= MAX_CROSSINGS {
+        let (ray, segments) = (start.ray, start.segments);
         let direction = Vec3::from(ray.direction);
         let hit = context.nearest(&ray);
-
-        // Light from infinitely far.
         if !hit.is_some() {
-            if let Some(environment) = &scene.environment {
-                let light_pdf = lights.pdf_escape(scene, from, from_normal, direction);
-                let weight =
-                    if pdf == f32::INFINITY { 1.0 } else { environment_heuristic(lights, pdf, light_pdf) };
-                let seen = environment.radiance(scene, direction);
-                radiance += throughput * seen * if seen == Rgb::ZERO { 0.0 } else { weight };
-            }
+            let (seen, weight) = start.escape(context, direction);
+            radiance += throughput * seen * weight;
             break;
         }
         let Some(point) = context.surface_at(&ray, &hit) else { break };
 
         // Rounding, or a hole in the surface: on in the same direction.
-        let opacity = point.material.opacity.at::<All>(scene, point.uv);
-        let met_again = hit.triangle == left || (segments == 1 && point.is_left_by(&ray));
+        let opacity = point.material.opacity.at::<All>(context.scene, point.uv);
+        let met_again = hit.triangle == start.triangle || (segments == 1 && point.is_left_by(&ray));
         let transparent = point.material.has_cutout()
             && sampler.single(dimension::CROSSING + segments - 1 + crossings) >= opacity;
         if met_again || transparent {
-            ray = point.spawn(direction);
-            left = hit.triangle;
+            (start.ray, start.triangle) = (point.spawn(direction), hit.triangle);
             crossings += 1;
             continue;
         }
-
-        // Light from the surface itself.
-        let seen = emitted(scene, hit.triangle, point.uv, point.front);
-        if seen != Rgb::ZERO && !(is_outlined && segments == 1) {
-            let distance = from.distance(point.position);
-            let light_pdf = lights.pdf_hit(scene, from, from_normal, hit.triangle, distance, direction);
-            let weight = if pdf == f32::INFINITY { 1.0 } else { power_heuristic(pdf, light_pdf) };
+        if !(is_outlined && segments == 1) {
+            let (seen, weight) = start.emission(context, &point, direction);
             radiance += throughput * seen * weight;
         }
         if segments >= max_depth {
@@ -161,11 +170,8 @@ fn follow(
 
         let bsdf = context.bsdf_at(&point);
         let wo = point.frame.to_local(-direction);
-        let normal = if bsdf.transmits() { Vec3::ZERO } else { point.frame.normal };
         let first = dimension::vertex(segments);
-
-        // Next-event estimation: light that a shadow ray reaches.
-        if !bsdf.is_delta() && !lights.is_empty() {
+        if !bsdf.is_delta() && !context.lights.is_empty() {
             let u = light_numbers(sampler, first);
             radiance += light_sample(context, &point, &bsdf, wo, u, throughput);
         }
@@ -192,10 +198,14 @@ fn follow(
         if throughput == Rgb::ZERO || is_cut(segments, &bsdf, &scattered) {
             break;
         }
-        pdf = if scattered.delta { f32::INFINITY } else { scattered.pdf };
-        (from, from_normal, left) = (point.position, normal, hit.triangle);
-        ray = point.spawn(direction);
-        segments += 1;
+        start = Start {
+            ray: point.spawn(direction),
+            from: point.position,
+            normal: if bsdf.transmits() { Vec3::ZERO } else { point.frame.normal },
+            pdf: if scattered.delta { f32::INFINITY } else { scattered.pdf },
+            triangle: hit.triangle,
+            segments: segments + 1,
+        };
     }
     radiance
 }

@@ -93,8 +93,8 @@ impl Vertex<'_> {
         self.numbers.pair(self.first + OWN)
     }
 
-    /// The photon of light of such power that has come here. Camera paths that meet a cut-out see the light on
-    /// what is there of it, of which photons hold the fraction that its opacity lets them meet.
+    /// The photon of light of such power that has come here. Camera paths that meet a cut-out see the light
+    /// on its solid part, of which photons hold the fraction that its opacity lets them meet.
     pub(in crate::transport) fn photon(&self, power: Rgb) -> Photon {
         let power = power / self.opacity;
         Photon::new(self.point.position, self.to_light, self.point.geometric_normal, power)
