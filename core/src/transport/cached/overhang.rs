@@ -122,7 +122,12 @@ impl<F: Features, E: Estimator<F>> PathIntegrator<'_, F, E> {
         let [first, second] = record.axes();
         let flat = FLAT * place.error.max(FLATTEST * reach);
         let mut noted = *record;
-        let is_whole = self.context.bvh.overlapping(center - half, center + half, |corners| {
+        let (lo, hi) = (center - half, center + half);
+        let is_whole = self.context.bvh.overlapping(lo, hi, |corners| {
+            let [a, b, c] = corners;
+            if a.max(b).max(c).cmplt(lo).any() || a.min(b).min(c).cmpgt(hi).any() {
+                return true;
+            }
             let offsets = corners.map(|corner| corner - middle);
             let heights = offsets.map(|offset| offset.dot(normal));
             // Most triangles near a record are the surface itself.
