@@ -176,14 +176,14 @@ impl ErrorEstimate {
     /// Of noise and bias together: both add up, and so do the squares of how unsure they are. A squared bias
     /// b counts as b − 2 σ² / b, with the standard error σ, and not at all below the root of that: one
     /// audited pixel with a firefly is enough for a b of many times the error, and for a σ nearly as large.
-    /// Its lower end errs in 2.5 %: that of likelihood ratios, which errs in 5 % where there is no bias,
-    /// would be beside what noise errs by.
+    /// Its lower end has only the bias that is certain by four standard errors: where the audit is much
+    /// noisier than the picture, a bias found by chance, in 2.5 % of pictures, is many times the error.
     pub fn with_bias(self, bias: BiasEstimate) -> Self {
         let error = bias.error;
         let squared = if bias.relmse > 0.0 { bias.relmse - 2.0 * error * error / bias.relmse } else { 0.0 };
         let squared = squared.max(0.0);
         let skew = bias.detectable / (Z * error);
-        let certain = (bias.relmse - skew * (bias.upper - bias.relmse)).max(0.0);
+        let certain = (bias.relmse - skew * (bias.upper - bias.relmse)).clamp(0.0, bias.least());
         let relmse = self.relmse + squared;
         let below = hypot(self.relmse - self.lower, (squared - certain).max(0.0));
         let above = hypot(self.upper - self.relmse, (bias.upper - squared).max(0.0));
@@ -347,6 +347,21 @@ mod tests {
         // 6.1 %; it would be 7.1 % with the lower end that likelihood ratios give the bias. One standard
         // error is 0.08 %.
         assert!(missed * 1000 < runs * 65, "{missed} of {runs}");
+    }
+
+    #[test]
+    fn a_bias_found_by_chance_leaves_the_lower_end_to_noise() {
+        let noise = ErrorEstimate { relmse: 1.0, lower: 0.9, upper: 1.1 };
+        for error in [1.0, 10.0, 1e3] {
+            for found in [0.0, 1.0, 2.4, 3.0, 3.9] {
+                let sum = noise.with_bias(BiasEstimate::known(found * error, error * error, 0.0, 0.0));
+                assert!(sum.lower <= noise.relmse, "{found} standard errors of {error}: {sum:?}");
+                assert!(sum.upper >= noise.upper + found * error);
+            }
+            // Twenty standard errors are no chance.
+            let sum = noise.with_bias(BiasEstimate::known(20.0 * error, error * error, 0.0, 0.0));
+            assert!(sum.lower > 15.0 * error, "{sum:?}");
+        }
     }
 
     #[test]

@@ -157,10 +157,11 @@ mod tests {
             error: 0.004 / 1.959964,
         };
         let sum = noise.with_bias(bias);
-        // 0.03, less twice the square of the standard error over 0.02; the distance to the ends of both.
+        // 0.03, less twice the square of the standard error over 0.02; the distance to the upper end of both, and to the bias
+        // that is certain by four standard errors.
         let less = 2.0 * (0.004f64 / 1.96).powi(2) / 0.02;
         assert!((sum.relmse - (0.03 - less)).abs() < 1e-7, "{sum:?}");
-        assert!((sum.relmse - sum.lower - 0.002f64.hypot(0.004 - less)).abs() < 1e-7, "{sum:?}");
+        assert!((sum.relmse - sum.lower - 0.002f64.hypot(0.008 - less)).abs() < 1e-7, "{sum:?}");
         assert!((sum.upper - sum.relmse - 0.003f64.hypot(0.004 + less)).abs() < 1e-7, "{sum:?}");
         let none =
             BiasEstimate { relmse: -0.001, lower: 0.0, upper: 0.002, detectable: 0.003, error: 0.0015 };
