@@ -4,6 +4,7 @@
 use crate::load_support::Files;
 use core::fmt::Write;
 use core::sync::atomic::AtomicBool;
+use halflight::load::LoadedScene;
 use halflight::render::{Settings, Stop, render};
 
 const MTL: &[u8] = b"newmtl a\nKd 0.5 0.5 0.5\nnewmtl lamp\nKd 0 0 0\nKe 3 3 3\n";
@@ -55,13 +56,16 @@ impl Faces {
     }
 }
 
-/// Brightnesses of pixels.
-fn picture(faces: &Faces, placed: &str, camera: &str, light: &str) -> Vec<f64> {
+fn load(faces: &Faces, placed: &str, camera: &str, light: &str) -> LoadedScene {
     let scene = format!("[[mesh]]\nfile = \"q.obj\"\n{placed}\n[camera]\n{camera}\n{light}");
     let files =
         [("q.obj", faces.obj().into_bytes()), ("m.mtl", MTL.to_vec()), ("s.toml", scene.into_bytes())];
-    let loaded =
-        Files::new(&files.each_ref().map(|(name, bytes)| (*name, bytes.as_slice()))).load("s.toml").unwrap();
+    Files::new(&files.each_ref().map(|(name, bytes)| (*name, bytes.as_slice()))).load("s.toml").unwrap()
+}
+
+/// Brightnesses of pixels.
+fn picture(faces: &Faces, placed: &str, camera: &str, light: &str) -> Vec<f64> {
+    let loaded = load(faces, placed, camera, light);
     assert_eq!(loaded.repairs, [""; 0]);
     let settings = Settings {
         width: 32,
@@ -146,5 +150,20 @@ fn a_camera_a_million_sizes_away_sees_what_one_at_a_thousand_does() {
             let [far, near] = [1e6, 1e3].map(|distance| picture(&scene, "", &camera(distance, lens), SKY));
             alike(&format!("ground {extent}, lens {lens}"), &far, &near);
         }
+    }
+}
+
+#[test]
+fn a_detail_too_small_for_its_distance_is_noted() {
+    let pair = |distance: f64| {
+        let mut faces = Faces::cube();
+        faces.0.extend(Faces::cube().moved([distance, 0.0, 0.0]).0);
+        load(&faces, "", CAMERA, SKY).repairs
+    };
+    assert_eq!(pair(1e4), [""; 0]);
+    // Neither of two cubes is the detail: the middle between them is as far from both.
+    for distance in [1e7, 1e9] {
+        let notes = pair(distance);
+        assert!(notes.iter().any(|note| note.contains("rounding deforms")), "{distance}: {notes:?}");
     }
 }

@@ -11,6 +11,7 @@ mod caustics_cached;
 mod far;
 mod furnace;
 mod golden;
+mod hall;
 mod irradiance_cache;
 mod irradiance_gaps;
 mod irradiance_rooms;

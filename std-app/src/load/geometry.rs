@@ -123,7 +123,6 @@ const DEFORMED: f64 = 1e-5;
 /// A part under construction.
 struct Builder<'a> {
     part: &'a Placed<'a>,
-    is_far: bool,
     exact: Vec<DVec3>,
     /// Texture coordinates before rounding; empty if the part has none.
     placed_texcoords: Vec<[f64; 2]>,
@@ -148,7 +147,7 @@ impl<'a> Builder<'a> {
             geometry.texcoords = placed_texcoords.iter().map(|uv| uv.map(|x| x as f32)).collect();
             geometry.texcoords.resize(exact.len(), [0.0; 2]);
         }
-        Self { part, is_far: fit.is_far, exact, placed_texcoords, geometry, notes }
+        Self { part, exact, placed_texcoords, geometry, notes }
     }
 
     /// All usable triangles; large ones are cut if `cut`.
@@ -195,7 +194,7 @@ impl<'a> Builder<'a> {
         }
         let (low, high) = (p.min(q).min(r), p.max(q).max(r));
         let farthest = low.abs().max(high.abs()).max_element();
-        if self.is_far && (high - low).max_element() < DEFORMED * farthest {
+        if (high - low).max_element() < DEFORMED * farthest {
             let what = "triangle smaller than 1e-5 of its distance from the detail: rounding deforms it";
             self.notes.add(1, what);
         }
