@@ -1,11 +1,12 @@
-//! Bidirectional path tracing (Lafortune and Willems 1993; Veach 1997, chapter 10) with a cache of light vertices
-//! (Davidovič et al. 2014), light tracing as the choice without connections, and vertex connection and merging
-//! (Georgiev et al. 2012) as the one with all techniques.
+//! Bidirectional path tracing (Lafortune and Willems 1993; Veach 1997, chapter 10) with a cache of light
+//! vertices (Davidovič et al. 2014), light tracing as the choice without connections, and vertex connection
+//! and merging (Georgiev et al. 2012) as the one with all techniques.
 //!
-//! For each sample of the picture light paths are traced anew: the camera sees their vertices as splats, each vertex
-//! of a camera path is connected to a few of them, and some are merged with those around them
-//! (`transport/bidirectional/merging.rs`). The radii of merges shrink with samples as those of progressive photon
-//! mapping do. Even and odd samples have light paths of their own, so that the halves of the film stay independent.
+//! For each sample of the picture light paths are traced anew: the camera sees their vertices as splats,
+//! each vertex of a camera path is connected to a few of them, and some are merged with those around them
+//! (`transport/bidirectional/merging.rs`). The radii of merges shrink with samples as those of progressive
+//! photon mapping do. Even and odd samples have light paths of their own, so that the halves of the film
+//! stay independent.
 
 use super::emission_guide::{EmissionGuide, GuideSettings, Target};
 use super::executor::{Executor, Passed};
@@ -40,8 +41,8 @@ const PILOT: u32 = 1 << 30;
 /// How often each technique is used.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct BidirectionalSettings {
-    /// Light paths for each sample of the picture, in tasks of 1024; `None`: half as many as pixels, or as many
-    /// where vertices are merged.
+    /// Light paths for each sample of the picture, in tasks of 1024; `None`: half as many as pixels, or as
+    /// many where vertices are merged.
     pub light_paths: Option<u32>,
     /// Light vertices that a camera vertex is connected to; 0 is light tracing.
     pub connections: u32,
@@ -106,7 +107,8 @@ impl<'a, F: Features> Bidirectional<'a, F> {
             .slice::<TaskOutput>(tasks)
     }
 
-    /// Bidirectional path tracing of `context`, with fewer light paths where memory is short, leaving `others` bytes.
+    /// Bidirectional path tracing of `context`, with fewer light paths where memory is short, leaving
+    /// `others` bytes.
     ///
     /// # Errors
     /// [`OutOfMemory`] where there is no memory for 1024 light paths, or too little scratch.
@@ -171,7 +173,8 @@ impl<'a, F: Features> Bidirectional<'a, F> {
         Ok(method)
     }
 
-    /// Measures the mean number of vertices of a pass, M̄, and fixes the count of connections by it: C L / M̄.
+    /// Measures the mean number of vertices of a pass, M̄, and fixes the count of connections by it: C L /
+    /// M̄.
     fn measure(&mut self, executor: &mut impl Executor) -> Result<(), OutOfMemory> {
         self.counts.connections = 1.0;
         let stored = self.light_pass(PILOT, executor)?.map(|(stored, _)| stored);
@@ -183,8 +186,8 @@ impl<'a, F: Features> Bidirectional<'a, F> {
         Ok(())
     }
 
-    /// Traces the light paths of `sample` and adds up their splats. The vertices stored, and the work; `None` where the
-    /// executor is over.
+    /// Traces the light paths of `sample` and adds up their splats. The vertices stored, and the work;
+    /// `None` where the executor is over.
     fn light_pass(
         &mut self,
         sample: u32,

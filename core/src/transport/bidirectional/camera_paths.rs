@@ -118,6 +118,16 @@ pub(super) struct Vertex<'v> {
     pub(super) sampler: Sampler,
 }
 
+/// The paths of a tile that advance together.
+struct Wave<'w> {
+    paths: &'w mut [CameraPath],
+    rays: &'w mut [Ray],
+    hits: &'w mut [Hit],
+    /// The light vertices that each is connected to: where they are stored, and as they are.
+    indices: &'w mut [u32],
+    drawn: &'w mut [LightVertex],
+}
+
 /// Shadow rays of a wave, whose tag is the index of their path.
 pub(super) struct Queue<'w> {
     shadows: ShadowRays<'w>,
@@ -158,6 +168,8 @@ impl<'a, F: Features> CameraPaths<'a, F> {
             .slice::<CameraPath>(PIXELS_PER_TILE)
             .slice::<Ray>(PIXELS_PER_TILE)
             .slice::<Hit>(PIXELS_PER_TILE)
+            .slice::<u32>(PIXELS_PER_TILE * connections as usize)
+            .slice::<LightVertex>(PIXELS_PER_TILE * connections as usize)
             .slice::<Ray>(shadows)
             .slice::<[f32; 3]>(shadows)
             .slice::<Hit>(shadows)
@@ -181,6 +193,8 @@ impl<'a, F: Features> CameraPaths<'a, F> {
         let paths: &mut [CameraPath] = arena.slice(PIXELS_PER_TILE)?;
         let rays: &mut [Ray] = arena.slice(PIXELS_PER_TILE)?;
         let hits: &mut [Hit] = arena.slice(PIXELS_PER_TILE)?;
+        let indices: &mut [u32] = arena.slice(PIXELS_PER_TILE * self.connections.count as usize)?;
+        let drawn: &mut [LightVertex] = arena.slice(PIXELS_PER_TILE * self.connections.count as usize)?;
         let shadows = PIXELS_PER_TILE * (1 + self.connections.count as usize);
         let mut queue = Queue {
             shadows: ShadowRays {
@@ -196,7 +210,14 @@ impl<'a, F: Features> CameraPaths<'a, F> {
         for sample in samples {
             let count = self.start(&tile, sample, paths, rays);
             counters.paths += count as u64;
-            self.trace(sample, &tile, (paths, rays, hits), count, &mut queue, &mut counters);
+            let wave = Wave {
+                paths: &mut *paths,
+                rays: &mut *rays,
+                hits: &mut *hits,
+                indices: &mut *indices,
+                drawn: &mut *drawn,
+            };
+            self.trace(sample, &tile, wave, count, &mut queue, &mut counters);
             for path in &paths[..count] {
                 let splat = splats.get(path.place as usize).copied().unwrap_or_default();
                 if let Some(pixel) = out.get_mut(path.place as usize) {
@@ -241,7 +262,7 @@ impl<'a, F: Features> CameraPaths<'a, F> {
         &self,
         sample: u32,
         tile: &Tile,
-        (paths, rays, hits): (&mut [CameraPath], &mut [Ray], &mut [Hit]),
+        Wave { paths, rays, hits, indices, drawn }: Wave,
         count: usize,
         queue: &mut Queue,
         counters: &mut Counters,
@@ -252,14 +273,30 @@ impl<'a, F: Features> CameraPaths<'a, F> {
             counters.rays += active as u64;
             self.context.nearest_batch(&rays[..active], coherence, &mut hits[..active]);
             coherence = Coherence::Incoherent;
+            let sampler_of = |path: &CameraPath| {
+                let (x, y) = tile.pixel(path.place as usize).unwrap_or_default();
+                Sampler::new(self.settings.seed, y * self.settings.width + x, sample)
+            };
+            let vertices = self.connections.vertices;
+            let each = if vertices.is_empty() { 0 } else { self.connections.count as usize };
+            for (i, ray) in rays[..active].iter().enumerate() {
+                let indices = indices.get_mut(i * each..(i + 1) * each).unwrap_or_default();
+                if let Some(path) = paths.get(ray.tag as usize) {
+                    self.draw(path, &sampler_of(path), indices);
+                }
+            }
+            // In a loop of their own, so that the memory is waited for once.
+            for (index, drawn) in indices[..active * each].iter().zip(&mut *drawn) {
+                *drawn = vertices.get(*index as usize).copied().unwrap_or_default();
+            }
             let mut left = 0;
             queue.count = 0;
             for i in 0..active {
                 let (ray, hit) = (rays[i], hits[i]);
                 let Some(path) = paths.get_mut(ray.tag as usize) else { continue };
-                let (x, y) = tile.pixel(path.place as usize).unwrap_or_default();
-                let sampler = Sampler::new(self.settings.seed, y * self.settings.width + x, sample);
-                if let Some(next) = self.step(path, sampler, &ray, &hit, queue, counters) {
+                let sampler = sampler_of(path);
+                let drawn = drawn.get(i * each..(i + 1) * each).unwrap_or_default();
+                if let Some(next) = self.step(path, (sampler, drawn), &ray, &hit, queue, counters) {
                     rays[left] = Ray { tag: ray.tag, ..next };
                     left += 1;
                 }
@@ -280,7 +317,7 @@ impl<'a, F: Features> CameraPaths<'a, F> {
     fn step(
         &self,
         path: &mut CameraPath,
-        sampler: Sampler,
+        (sampler, drawn): (Sampler, &[LightVertex]),
         ray: &Ray,
         hit: &Hit,
         queue: &mut Queue,
@@ -323,7 +360,7 @@ impl<'a, F: Features> CameraPaths<'a, F> {
         if !bsdf.is_delta() {
             self.light_sample(path, &vertex, ray.tag, queue);
             if !is_bent {
-                self.connect(path, &vertex, ray.tag, queue);
+                self.connect(path, &vertex, drawn, ray.tag, queue);
             }
         }
         self.scatter(path, &vertex, hit, direction, counters)

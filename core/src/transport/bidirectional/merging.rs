@@ -1,11 +1,11 @@
-//! Vertex merging (Georgiev et al. 2012) at one vertex of a path: the first rough one from the camera, if light
-//! comes to it by mirrors, glass or narrow gloss; or, where the camera sees it by others of them, from a rough
-//! surface so near that its connections would be fireflies.
+//! Vertex merging (Georgiev et al. 2012) at one vertex of a path: the first rough one from the camera, if
+//! light comes to it by mirrors, glass or narrow gloss; or, where the camera sees it by others of them, from
+//! a rough surface so near that its connections would be fireflies.
 //!
-//! No connection finds such light, which light samples and paths by chance find badly, and splats find it on the
-//! area of a pixel alone. The rest of what density estimation could find has better techniques: light between
-//! rough surfaces is connected. The photons of a kernel do not pass for independent samples of a path then, as
-//! they do where every vertex is merged (Grittmann et al. 2021).
+//! No connection finds such light, which light samples and paths by chance find badly, and splats find it on
+//! the area of a pixel alone. The rest of what density estimation could find has better techniques: light
+//! between rough surfaces is connected. The photons of a kernel do not pass for independent samples of a
+//! path then, as they do where every vertex is merged (Grittmann et al. 2021).
 
 use crate::Rgb;
 use crate::bsdf::{Bsdf, Features};
@@ -102,10 +102,7 @@ impl<F: Features> CameraPaths<'_, F> {
             density = self.density(path, vertex, (&disc, Some(&fence)));
         }
         // Both paths have met the cut-out, which the light passes but once.
-        let opacity = match F::CUTOUT && point.material.has_cutout() {
-            true => point.material.opacity.at::<F>(self.context.scene, point.uv),
-            false => 1.0,
-        };
+        let opacity = self.context.opacity_at(point);
         let [light, finer] = density.map(|light| Rgb::from(path.throughput) * light / opacity);
         path.add(light);
         path.add_blur((light - finer) * (4.0 / 3.0));

@@ -2,19 +2,19 @@
 //! Vertex Connection and Merging", in étendue and with counts).
 //!
 //! A path x₀ … x_k from a light to the lens can be found by every technique: the camera walk hits the light,
-//! a light sample, a connection of two vertices, a merge at one vertex, a splat of a light vertex. The balance
-//! heuristic divides the count times the density of a technique by the sum over all of them. Each subpath
-//! carries three numbers, with which the sum is known:
+//! a light sample, a connection of two vertices, a merge at one vertex, a splat of a light vertex. The
+//! balance heuristic divides the count times the density of a technique by the sum over all of them. Each
+//! subpath carries three numbers, with which the sum is known:
 //!
 //! - `last`: the technique that connects over the latest segment,
 //! - `rest`: all techniques before it, still to be multiplied with the reverse density at the latest vertex,
 //! - `merge`: the merge at the latest rough vertex, likewise, as long as it may turn out not to be one.
 //!
-//! A path is merged at one vertex at most (`merging.rs`): the first rough one from the camera, if narrow
-//! vertices lie on both sides of it, or a near one on that of the light. Neither subpath knows both sides, so that the merge has a number of its
-//! own: the next rough vertex of a light path takes its place, and a camera path adds it to `rest` if its next
-//! vertex is narrow or near. Georgiev's dVCM, dVC and dVM are `last`, `rest` and `rest` / η where every vertex is
-//! merged.
+//! A path is merged at one vertex at most (`merging.rs`): the first rough one from the camera, if the vertex
+//! before it on the way from the light is narrow or near. Neither subpath knows both sides, so that the merge
+//! has a number of its own: the next rough vertex of a light path takes its place, and a camera path adds it
+//! to `rest` if its next vertex is narrow or near. Georgiev's dVCM, dVC and dVM are `last`, `rest` and
+//! `rest` / η where every vertex is merged.
 //!
 //! p is the density per solid angle with which a walk goes on, p← that of the opposite walk, c a cosine to
 //! the geometric normal, d a distance, e the density of emission per étendue (`light/emission/pdf.rs`), q the

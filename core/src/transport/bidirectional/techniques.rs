@@ -5,7 +5,7 @@ use crate::Rgb;
 use crate::bsdf::Features;
 use crate::geometry::{Hit, Ray};
 use crate::light::emitted;
-use crate::sampling::ONE_MINUS_EPSILON;
+use crate::sampling::{ONE_MINUS_EPSILON, Sampler};
 use crate::scene::SurfacePoint;
 use crate::transport::bidirectional::camera_paths::{
     CameraPath, CameraPaths, Connections, Queue, Vertex, normal_for_lights,
@@ -106,20 +106,29 @@ impl<F: Features> CameraPaths<'_, F> {
         Some(())
     }
 
-    /// Connections to light vertices, one of each of as many parts of their list.
-    pub(super) fn connect(&self, path: &CameraPath, vertex: &Vertex, tag: u32, queue: &mut Queue) {
+    /// Draws the light vertices that the vertex at the end of a path's segment is connected to, one of each
+    /// of as many parts of their list.
+    pub(super) fn draw(&self, path: &CameraPath, sampler: &Sampler, drawn: &mut [u32]) {
         let Connections { vertices, count } = self.connections;
-        if vertices.is_empty() || count == 0 {
-            return;
-        }
-        let random = vertex.sampler.single(dimension::CONNECTION + path.segments);
-        let each = vertices.len() as f32 / count as f32;
-        for part in 0..count {
+        let random = sampler.single(dimension::CONNECTION + path.segments);
+        for (part, index) in drawn.iter_mut().enumerate() {
             let at = ((part as f32 + random) / count as f32).min(ONE_MINUS_EPSILON);
-            let index = (at * vertices.len() as f32) as usize;
-            if let Some(light) = vertices.get(index)
-                && let Some((ray, radiance)) = self.connection(path, vertex, light)
-            {
+            *index = (at * vertices.len() as f32) as u32;
+        }
+    }
+
+    /// Connections to the light vertices `drawn`.
+    pub(super) fn connect(
+        &self,
+        path: &CameraPath,
+        vertex: &Vertex,
+        drawn: &[LightVertex],
+        tag: u32,
+        queue: &mut Queue,
+    ) {
+        let each = self.connections.vertices.len() as f32 / self.connections.count as f32;
+        for light in drawn {
+            if let Some((ray, radiance)) = self.connection(path, vertex, light) {
                 queue.push(tag, ray, radiance * each);
             }
         }

@@ -1,5 +1,5 @@
-//! The running sums against all densities written down: random paths over all kinds of lights, rough and narrow
-//! vertices, mirrors and refraction.
+//! The running sums against all densities written down: random paths over all kinds of lights, rough and
+//! narrow vertices, mirrors and refraction.
 
 use super::*;
 use crate::sampling::Random;
@@ -143,8 +143,8 @@ impl Path {
         (self.is_caustic(first) && self.vertices[first - 1].merge > 0.0).then_some(first)
     }
 
-    /// Counts times densities of all techniques, as products over the vertices that are not delta; that of the
-    /// merge comes last.
+    /// Counts times densities of all techniques, as products over the vertices that are not delta; that of
+    /// the merge comes last.
     fn brute(&self, counts: [f64; 3], merges: bool) -> Vec<f64> {
         let [light_paths, connections, light_samples] = counts;
         let k = self.vertices.len() + 1;
