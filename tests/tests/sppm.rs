@@ -1,4 +1,4 @@
-//! Progressive photon mapping: the power of photons, discs under overhangs, and memory.
+//! Progressive photon mapping: the power of photons, discs under overhangs, narrow coats, and memory.
 
 use glam::Vec3;
 use halflight::load::{self, LoadOptions};
@@ -7,7 +7,7 @@ use halflight::save::Image;
 use halflight_core::bsdf::All;
 use halflight_core::light::EmissionSampler;
 use halflight_core::photon::{Photon, Photons};
-use halflight_core::scene::{Camera, Material, Scene};
+use halflight_core::scene::{Camera, Material, PointLight, Scene};
 use halflight_core::transport::UNLIMITED;
 use halflight_core::transport::photon_mapping::deposit::{
     PATHS, PhotonFilter, PhotonTracer, PhotonTracerSettings, ROOM,
@@ -15,7 +15,8 @@ use halflight_core::transport::photon_mapping::deposit::{
 use halflight_core::{Level, Rgb};
 use halflight_tests::memory::{TestArena, with_structures};
 use halflight_tests::render::render;
-use halflight_tests::scenes::{SceneBuffers, cornell_box, emitter};
+use halflight_tests::scenes::{SceneBuffers, cornell_box, emitter, metal, varnished};
+use halflight_tests::statistics::{agree_within, blocks};
 use std::path::Path;
 
 fn sppm(scene: &Scene, size: u32, spp: u32, change: impl FnOnce(&mut Settings)) -> RenderResult {
@@ -111,4 +112,70 @@ fn a_limit_of_memory_makes_fewer_photons_with_the_same_light() {
     let less = sppm(&scene, 64, 32, |s| s.memory = Some(tight));
     assert!(less.memory_peak <= tight && bytes(&less) < bytes(&few));
     assert_means(&less.image, &many.image, 0.03);
+}
+
+/// The Cornell box with varnish of `roughness` on all surfaces, and a bar of narrow metal before its back wall.
+fn varnished_room(roughness: f32) -> SceneBuffers {
+    let mut room = varnished(cornell_box(), roughness);
+    let bar = room.material(Material { surface: metal(0.1), ..Material::GREY });
+    room.cuboid(Vec3::new(0.1, 0.75, 0.85), Vec3::new(0.9, 0.8, 0.9), false, bar);
+    room
+}
+
+/// The same room by a point light in place of its lamp.
+fn by_a_point_light(mut room: SceneBuffers) -> SceneBuffers {
+    for material in &mut room.materials {
+        material.emission = Rgb::ZERO.into();
+    }
+    let (position, intensity) = (Vec3::new(0.5, 0.8, 0.4), Rgb::new(0.4, 0.35, 0.3));
+    room.lights.push(PointLight::Point { position, intensity });
+    room
+}
+
+/// The same room, seen along its floor.
+fn at_a_grazing_angle(mut room: SceneBuffers) -> SceneBuffers {
+    room.camera = Camera::look_at(Vec3::new(0.5, 0.06, -0.4), Vec3::new(0.5, 0.0, 0.6), Vec3::Y, 45.0);
+    room
+}
+
+#[test]
+fn narrow_coats_have_the_light_of_path_tracing_without_fireflies() {
+    const SIZE: u32 = 32;
+    let rooms = [
+        ("lamp, 0.05", varnished_room(0.05)),
+        ("lamp, 0.1, grazing", at_a_grazing_angle(varnished_room(0.1))),
+        ("point, 0.1", by_a_point_light(varnished_room(0.1))),
+        ("point, 0.05, grazing", at_a_grazing_angle(by_a_point_light(varnished_room(0.05)))),
+    ];
+    for (name, buffers) in &rooms {
+        let scene = buffers.scene();
+        let pictures = |method, count: u32| -> Vec<Vec<[f32; 3]>> {
+            let one = |seed| render(&scene, method, SIZE, 64, |s| (s.seed, s.caustics) = (seed, false));
+            (0..count).map(|seed| one(seed).image.pixels).collect()
+        };
+        let (photons, paths) = (pictures(Method::ProgressivePhotons, 4), pictures(Method::Path, 8));
+        let sums = |pictures: &[Vec<[f32; 3]>]| -> Vec<Vec<f64>> {
+            pictures.iter().map(|pixels| blocks(pixels, SIZE, 8)).collect()
+        };
+        // Discs blur by a few percent.
+        agree_within(&sums(&photons), &sums(&paths), rooms.len(), |_, light| 0.04 * light)
+            .unwrap_or_else(|worst| panic!("{name}: {worst}"));
+        // A photon in the lobe of a coat is a firefly.
+        let [by_photons, by_paths] = [&photons, &paths].map(|pictures| scatter(pictures));
+        println!("{name}: {by_photons} {by_paths}");
+        assert!(by_photons < by_paths, "{name}: {by_photons} {by_paths}");
+    }
+}
+
+/// Variance of a picture relative to its squared radiance, in green, by pictures that are independent.
+fn scatter(pictures: &[Vec<[f32; 3]>]) -> f64 {
+    let (count, pixels) = (pictures.len() as f64, pictures[0].len());
+    let values = |i: usize| pictures.iter().map(move |picture| f64::from(picture[i][1]));
+    let means: Vec<f64> = (0..pixels).map(|i| values(i).sum::<f64>() / count).collect();
+    let of_picture = means.iter().sum::<f64>() / pixels as f64;
+    let of_pixel = |(i, mean): (usize, &f64)| {
+        let squares = values(i).map(|value| (value - mean).powi(2)).sum::<f64>();
+        squares / (count - 1.0) / (mean * mean + 0.01 * of_picture * of_picture)
+    };
+    means.iter().enumerate().map(of_pixel).sum::<f64>() / pixels as f64
 }

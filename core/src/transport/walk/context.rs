@@ -87,10 +87,11 @@ impl<'a, F: Features> SceneContext<'a, F> {
     }
 
     /// Whether photons are stored on the bases of narrow coats alone ([`Bsdf::is_varnished`]), whose coats
-    /// are then sampled apart: where every light can be met by chance.
+    /// are then sampled apart: where paths that leave by a coat find all light. They cannot find point and
+    /// directional lights by mirrors and smooth glass.
     #[inline]
     pub(in crate::transport) fn separates_coats(&self) -> bool {
-        !self.lights.have_deltas()
+        !(self.has_mirrors && self.lights.have_deltas())
     }
 
     /// Whether a ray that started on triangle `left` passes `point` as if it were not there: by a cut-out,
