@@ -28,7 +28,7 @@ const SPP: u32 = 9;
 
 const SEEDS: [u32; 2] = [0, 77];
 
-const METHODS: [Method; 7] = [
+const METHODS: [Method; 9] = [
     Method::Path,
     Method::IrradianceCache,
     Method::PhotonMap,
@@ -36,6 +36,8 @@ const METHODS: [Method; 7] = [
     Method::LightTracing,
     Method::Bidirectional,
     Method::VertexMerging,
+    Method::InstantRadiosity,
+    Method::ClampedInstantRadiosity,
 ];
 
 /// The scenes: those of the repository as they are loaded, and others made by hand.

@@ -35,8 +35,14 @@ fn light_leaves_glass_before_the_limit_of_bounces_and_cut_paths_are_counted() {
         let found = floor(&result);
         assert!((found / known - 1.0).abs() < 0.03, "{}: {found}, not {known}", method.name());
         // Roulette ends the light paths of bidirectional methods long before the limit.
-        let has_roulette =
-            matches!(method, Method::LightTracing | Method::Bidirectional | Method::VertexMerging);
+        let has_roulette = matches!(
+            method,
+            Method::LightTracing
+                | Method::Bidirectional
+                | Method::VertexMerging
+                | Method::InstantRadiosity
+                | Method::ClampedInstantRadiosity
+        );
         assert_eq!(result.counters.dropped.unfinished > 0, !has_roulette, "{}", method.name());
     }
 }

@@ -11,6 +11,7 @@ mod closed_box;
 pub mod emission_guide;
 pub mod environment_visibility;
 pub mod executor;
+pub mod instant_radiosity;
 pub mod irradiance_cache;
 pub mod path;
 pub mod photon_map;

@@ -3,6 +3,7 @@
 
 use super::bidirectional::{Bidirectional, BidirectionalSettings};
 use super::environment_visibility;
+use super::instant_radiosity::{InstantRadiosity, VirtualLightSettings, VirtualLightUse};
 use super::path::PathTracing;
 use super::photon_map::PhotonMapping;
 use super::sppm::ProgressivePhotonMapping;
@@ -291,6 +292,76 @@ fn any_counts_of_techniques_have_the_mean_of_path_tracing() {
             let allowed = 4.0 * deviation.hypot(other);
             assert!((found - expected).abs() < allowed, "{settings:?}: {found} {expected} ± {allowed}");
             assert!(allowed < 0.01 * expected, "{allowed}");
+        }
+    });
+}
+
+/// A picture by instant radiosity, likewise, with path reuse or without, and the use of its virtual lights.
+fn instant_radiosity(
+    context: &RenderContext,
+    (memory, scratch): (usize, Footprint),
+    (connections, is_clamped, reuse): (u32, bool, bool),
+    division: [u32; 3],
+) -> Result<(Vec<Pixel>, VirtualLightUse), OutOfMemory> {
+    let (mut memory, mut scratch) = (lines(memory), lines(scratch.bytes()));
+    let mut buffer = Buffer::new(bytemuck::cast_slice_mut(&mut memory));
+    let mut executor = Loop::new(bytemuck::cast_slice_mut(&mut scratch));
+    let settings = VirtualLightSettings { light_paths: None, connections: Some(connections) };
+    let form = (is_clamped, Some(reuse));
+    let mut method = InstantRadiosity::<All>::new(context, &settings, form, &mut buffer, &mut executor, 0)?;
+    let pixels = film(context, &mut executor, division, |round| method.round(round))?;
+    Ok((pixels, method.used()))
+}
+
+#[test]
+fn instant_radiosity_does_not_depend_on_rounds_or_steps_and_needs_memory() {
+    with_room(|context| {
+        let scratch = InstantRadiosity::<All>::scratch();
+        for form in [(2, false, false), (2, false, true), (2, true, false)] {
+            let render = |memory, division| instant_radiosity(context, memory, form, division);
+            let (pixels, used) = render((PLENTY, scratch), [3, 3, 8]).unwrap();
+            assert!(pixels.iter().filter(|pixel| pixel.mean().min_element() > 0.0).count() > 200);
+            assert!(used.lights > used.light_paths / 10 && used.area > 1.0, "{used:?}");
+            assert_eq!(used.cut.is_some(), form.1);
+            for division in [[3, 1, 1], [3, 2, 1]] {
+                assert!(
+                    render((PLENTY, scratch), division).unwrap() == (pixels.clone(), used),
+                    "{division:?}"
+                );
+            }
+            let few = Footprint::default().slice::<u8>(1 << 12);
+            assert!(render((PLENTY, few), [3, 3, 8]).is_err());
+            for bytes in [0, 1 << 10, 1 << 16] {
+                assert!(render((bytes, scratch), [3, 3, 8]).is_err());
+            }
+        }
+    });
+}
+
+#[test]
+fn any_number_of_virtual_lights_has_the_mean_of_path_tracing_and_clamping_the_loss_that_it_reports() {
+    with_room(|context| {
+        let mut scratch = lines(PathTracing::<All>::scratch().bytes());
+        let mut executor = Loop::new(bytemuck::cast_slice_mut(&mut scratch));
+        let mut method = PathTracing::<All>::new(context, Some(false), &mut executor).unwrap();
+        let pixels = film(context, &mut executor, [1024, 1024, 8], |round| method.round(round)).unwrap();
+        let (expected, deviation) = mean(&pixels);
+        let memory = (PLENTY, InstantRadiosity::<All>::scratch());
+        for form in
+            [(1, false, false), (4, false, false), (16, false, false), (2, false, true), (4, true, false)]
+        {
+            let (pixels, used) = instant_radiosity(context, memory, form, [1024, 1024, 8]).unwrap();
+            let (found, other) = mean(&pixels);
+            let cut = used.cut.unwrap_or_default() as f32;
+            assert!((cut > 0.0) == form.1, "{form:?} {cut}");
+            // Four standard deviations, of a test of five; the estimate of the loss has an error of its own.
+            let allowed = 4.0 * deviation.hypot(other) + 0.2 * cut * expected;
+            let whole = found / (1.0 - cut);
+            assert!(
+                (whole - expected).abs() < allowed,
+                "{form:?}: {found} {expected} ± {allowed}, cut {cut}"
+            );
+            assert!(allowed < 0.015 * expected, "{allowed}");
         }
     });
 }

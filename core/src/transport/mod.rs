@@ -10,6 +10,7 @@
 pub mod bidirectional;
 pub mod cached;
 pub mod caustics;
+pub mod instant_radiosity;
 pub mod path;
 pub mod photon_mapping;
 mod prepass;

@@ -3,7 +3,9 @@
 use super::values;
 use clap::builder::PossibleValue;
 use clap::{Args, ValueEnum};
-use halflight::render::{BidirectionalSettings, CacheSettings, Method, PhotonSettings, Settings};
+use halflight::render::{
+    BidirectionalSettings, CacheSettings, Method, PhotonSettings, Settings, VirtualLightSettings,
+};
 use halflight_core::cache::irradiance::Metric;
 use halflight_core::photon;
 use halflight_simd::{Level, Tier};
@@ -93,11 +95,11 @@ pub(super) struct MethodArgs {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1 << 28),
         help_heading = "Photons")]
     caustic_photons: Option<u32>,
-    /// Light paths per sample of the picture with light, bdpt and vcm [default: pixels / 2]
+    /// Light paths per sample of the picture [default: pixels / 2; instant radiosity: pixels / 16]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1 << 20),
         help_heading = "Light paths")]
     light_paths: Option<u32>,
-    /// Light vertices that each camera vertex is connected to with bdpt and vcm [default: 1]
+    /// Light vertices that a camera vertex is connected to [default: 1; instant radiosity: 4, or 2 with reuse]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=64),
         help_heading = "Light paths")]
     connections: Option<u32>,
@@ -195,6 +197,10 @@ impl MethodArgs {
                 light_paths: self.light_paths,
                 connections: self.connections.unwrap_or(BidirectionalSettings::default().connections),
                 merging: When::forced(self.merging),
+            },
+            virtual_lights: VirtualLightSettings {
+                light_paths: self.light_paths,
+                connections: self.connections,
             },
             audit: self.audit,
             level: self.simd.map_or(level, |tier| level.capped(tier)),

@@ -39,6 +39,7 @@ pub use cache_file::inspect as inspect_cache;
 pub use error::{FileError, RenderError};
 pub use halflight_core::estimate::{BiasEstimate, Deviation, ErrorEstimate};
 pub use halflight_core::method::bidirectional::BidirectionalSettings;
+pub use halflight_core::method::instant_radiosity::VirtualLightSettings;
 pub use halflight_core::method::{Shard, path::Reuse};
 pub use history::{Against, Round};
 pub use ledger::Place;
@@ -46,6 +47,7 @@ pub use memory::MemoryUse;
 pub use merge::{Merged, merge};
 pub use method::{
     CacheSettings, CacheUse, CausticUse, MapUse, MapView, Method, PhotonSettings, PhotonUse, PhotonView,
+    VirtualLightUse,
 };
 pub use rounds::Stop;
 pub use study::{IrradianceStudy, MetricError, study_irradiance};
@@ -87,6 +89,8 @@ pub struct Settings {
     pub photons: PhotonSettings,
     /// Counts of the techniques of bidirectional methods.
     pub bidirectional: BidirectionalSettings,
+    /// How virtual lights are used, where the method has any.
+    pub virtual_lights: VirtualLightSettings,
     /// Whether maps of photons are looked at in the end, for a report. The time that this takes does not count.
     pub photon_view: bool,
     /// Whether the environment is sampled through windows that a first look finds; `None` where it is to tell.
@@ -147,6 +151,7 @@ impl Default for Settings {
             cache: CacheSettings::default(),
             photons: PhotonSettings::default(),
             bidirectional: BidirectionalSettings::default(),
+            virtual_lights: VirtualLightSettings::default(),
             photon_view: false,
             windows: None,
             threads: None,
@@ -243,6 +248,8 @@ pub struct RenderResult {
     pub survey: Option<Survey>,
     /// What became of photons, where the method has any.
     pub photons: Option<PhotonUse>,
+    /// The use of virtual lights, where the method has any.
+    pub virtual_lights: Option<VirtualLightUse>,
     /// The last maps of photons as the camera sees them, where that was asked for.
     pub photon_view: Option<PhotonView>,
     /// Whether the sky was sampled through windows.

@@ -324,6 +324,7 @@ impl<'a> Progressive<'a> {
             // The picture is there: a report for which there is no memory is left out.
             survey: if interrupted { None } else { renderer.survey(workers).unwrap_or_default() },
             photons: renderer.photons(),
+            virtual_lights: renderer.virtual_lights(),
             photon_view: if is_viewed { renderer.photon_view().unwrap_or_default() } else { None },
             windows: WindowUse::default(),
             places: ledger::places(state.dropped, settings.width, settings.height),

@@ -1,7 +1,9 @@
 //! Findings of a render, from the fields of its result. This file goes when methods emit findings.
 
 use super::Run;
-use crate::render::{CacheUse, CausticUse, MapUse, Method, PhotonUse, Reuse, Settings, Survey, WindowUse};
+use crate::render::{
+    CacheUse, CausticUse, MapUse, Method, PhotonUse, Reuse, Settings, Survey, VirtualLightUse, WindowUse,
+};
 use halflight_core::findings::Decision::{LeftOut, Limited, Used};
 use halflight_core::findings::{Finding, Findings, Value};
 
@@ -16,6 +18,8 @@ pub(super) fn of(run: &Run) -> Findings {
     findings.extend(result.survey.as_ref().map(cache_survey));
     findings.extend(photon_maps(&photons, result.seconds.photons));
     findings.extend(photons.global.map(|map| map_finding("global_photons", &map)));
+    findings.extend(result.virtual_lights.map(|used| virtual_lights(&used, result.reuse.used)));
+    findings.extend(result.virtual_lights.and_then(|used| cut_light(&used)));
     findings.extend(caustic_photons(result.method, &result.caustics, &photons));
     findings
 }
@@ -85,6 +89,30 @@ fn photon_maps(photons: &PhotonUse, seconds: f64) -> Option<Finding> {
     let finding = Finding::new("photon_maps", Used, "").with("maps", Value::Count(photons.maps));
     let finding = finding.with_count("irradiances", photons.irradiances);
     (photons.maps > 0).then_some(finding.with("seconds", Value::Seconds(seconds)))
+}
+
+fn virtual_lights(used: &VirtualLightUse, has_reuse: bool) -> Finding {
+    let (decision, reason) = match has_reuse {
+        _ if used.given < used.wanted => (Limited, "not enough memory: the picture is noisier"),
+        _ if used.area == 0.0 => (LeftOut, "a pilot found none: paths find all light"),
+        true => (Used, "they light the second vertex of paths, whose light neighbouring pixels share"),
+        false => (Used, "they light the first rough vertex of paths"),
+    };
+    let limited = |paths: u32| (decision == Limited).then_some(Value::Count(paths.into()));
+    Finding::new("virtual_lights", decision, reason)
+        .with("light_paths", Value::Count(used.light_paths))
+        .with("virtual_lights", Value::Count(used.lights))
+        .with("connections", Value::Count(used.connections.into()))
+        .with("lit_area", Value::Number(used.area.into()))
+        .with_some("light_paths_given", limited(used.given))
+        .with_some("light_paths_wanted", limited(used.wanted))
+}
+
+/// Light that the bound of the geometry term cuts, where it is left out.
+fn cut_light(used: &VirtualLightUse) -> Option<Finding> {
+    let share = Value::Fraction(used.cut?);
+    let reason = "the bound of the geometry term cuts it, in corners most";
+    Some(Finding::new("cut_light", LeftOut, reason).with("share_of_light", share))
 }
 
 fn caustic_photons(method: Method, caustics: &CausticUse, photons: &PhotonUse) -> Option<Finding> {

@@ -83,6 +83,15 @@ methods! {
     bdpt: Row { method: Method::Bidirectional, bias: 0.0, bias_of_mean: 0.0, known: &[] };
     // Caustics are blurred, by radii that shrink with samples.
     vcm: Row { method: Method::VertexMerging, bias: 0.02, bias_of_mean: 0.01, known: &[] };
+    instant_radiosity: Row { method: Method::InstantRadiosity, bias: 0.0, bias_of_mean: 0.0, known: &[] };
+    // The bound cuts light in corners.
+    instant_radiosity_clamped: Row {
+        method: Method::ClampedInstantRadiosity,
+        bias: 0.06,
+        bias_of_mean: 0.04,
+        // The area by which the bound is set has all twelve rooms.
+        known: &[("twelve-rooms", 0.3, 0.1)],
+    };
 }
 
 #[test]

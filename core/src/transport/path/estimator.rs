@@ -3,7 +3,8 @@
 
 use super::vertex::PathVertex;
 use crate::Rgb;
-use crate::bsdf::{BsdfSample, Features};
+use crate::bsdf::{Bsdf, BsdfSample, Features};
+use crate::geometry::Ray;
 use crate::light::LightSample;
 use crate::scene::SurfacePoint;
 use crate::transport::settings::{Counters, PathSettings};
@@ -87,6 +88,36 @@ pub trait Estimator<F: Features>: Copy + Send + Sync {
     #[inline]
     fn light_samples(&self, _context: &SceneContext<F>) -> u32 {
         1
+    }
+
+    /// Light of a sample of the pixel at `place` in its tile that its path has no part in.
+    #[inline]
+    fn splat(&self, _place: u32) -> Rgb {
+        Rgb::ZERO
+    }
+
+    /// Shadow rays of a vertex beside those of light samples, at most.
+    #[inline]
+    fn connections(&self) -> u32 {
+        0
+    }
+
+    /// Factor on light that `point` reflects to the path, which arrives from its last vertex at `from`.
+    #[inline]
+    fn share_left(&self, _state: &Self::State, _from: Vec3, (_point, _bsdf): (&SurfacePoint, &Bsdf)) -> f32 {
+        1.0
+    }
+
+    /// Calls `push` with shadow rays from `vertex`, each with its contribution to the pixel if nothing is in
+    /// its way.
+    #[inline]
+    fn connect(
+        &self,
+        (_context, _settings): (&SceneContext<F>, &PathSettings),
+        _vertex: &PathVertex,
+        _state: &mut Self::State,
+        _push: &mut impl FnMut(Ray, Rgb),
+    ) {
     }
 
     /// Looks a structure up for a block of surface points, those at the ends of the rays of `range`, before

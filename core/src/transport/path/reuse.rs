@@ -208,6 +208,13 @@ impl Sharing for PathReuse {
         state.arrive(point, bsdf.cover(), path);
     }
 
+    /// Behind x, whose light is shared, except at a coated y: of light that comes there in several ways the
+    /// base has no common part.
+    #[inline]
+    fn may_connect(state: &ReuseState) -> bool {
+        state.stage == OFFERING || state.stage == BEHIND
+    }
+
     #[inline]
     fn sample_light(state: &mut ReuseState, base: impl FnOnce() -> Rgb) {
         if state.stage == LIT {

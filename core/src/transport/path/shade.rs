@@ -36,7 +36,8 @@ pub(super) struct Path<'p, S, T> {
 
 impl<F: Features, E: Estimator<F>, R: Sharing> Shade for Shading<'_, '_, '_, F, E, R> {
     fn shadow_rays(&self) -> usize {
-        self.integrator.estimator.light_samples(&self.integrator.context) as usize
+        let PathIntegrator { context, estimator, .. } = self.integrator;
+        (estimator.light_samples(context) + estimator.connections()) as usize
     }
 
     fn shade(&mut self, wave: &mut Wavefront, range: Range<usize>, counters: &mut Counters) {
@@ -71,9 +72,14 @@ impl<F: Features, E: Estimator<F>, R: Sharing> Shade for Shading<'_, '_, '_, F, 
         }
         let lit = || vertices.iter().flatten().zip(rests.iter().flatten());
         for (vertex, rest) in lit() {
-            let state = memory.states.get(vertex.path).unwrap_or(&none.0);
+            let state = memory.states.get_mut(vertex.path).unwrap_or(&mut none.0);
             let shared = memory.shared.get_mut(vertex.path).unwrap_or(&mut none.1);
-            integrator.direct((state, shared), vertex, rest, wave);
+            integrator.direct((&*state, &mut *shared), vertex, rest, wave);
+            if R::may_connect(shared) {
+                let tag = vertex.path as u32;
+                let mut push = |ray, light| wave.push_shadow_ray(Ray { tag, ..ray }, light);
+                estimator.connect((context, settings), vertex, state, &mut push);
+            }
         }
         for (vertex, rest) in lit().filter(|(_, rest)| !rest.ends) {
             let Some(path) = memory.path(wave, vertex.path, &mut none) else { continue };
@@ -136,6 +142,14 @@ impl<'a, F: Features, E: Estimator<F>, R: Sharing> PathIntegrator<'a, F, E, R> {
         let bsdf = self.context.bsdf_at(point);
         if path.components.ends_at(&bsdf) {
             return Err(None);
+        }
+        if segments > 1 {
+            let from = Vec3::from(path.position);
+            let share = self.estimator.share_left(state, from, (point, &bsdf));
+            if share == 0.0 {
+                return Err(None);
+            }
+            path.throughput = (share * Rgb::from(path.throughput)).to_array();
         }
         R::arrive(shared, point, &bsdf, path);
 

@@ -33,6 +33,12 @@ pub trait Sharing: Copy + Send + Sync {
     #[inline]
     fn arrive(_state: &mut Self::State, _point: &SurfacePoint, _bsdf: &Bsdf, _path: &mut PathState) {}
 
+    /// Whether an estimator may connect the vertex that the path has arrived at.
+    #[inline]
+    fn may_connect(_state: &Self::State) -> bool {
+        true
+    }
+
     /// The path takes a light sample. `base` is the part that the base of the surface reflects.
     #[inline]
     fn sample_light(_state: &mut Self::State, _base: impl FnOnce() -> Rgb) {}

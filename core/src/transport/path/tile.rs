@@ -84,7 +84,7 @@ impl<F: Features, E: Estimator<F>, R: Sharing> PathIntegrator<'_, F, E, R> {
             for i in 0..count {
                 let path = wave.wave.paths[i];
                 let lamps = if has_outlines { Rgb::from(wave.wave.shadow_light[i]) } else { Rgb::ZERO };
-                let radiance = wave.radiance(i) + lamps;
+                let radiance = wave.radiance(i) + lamps + self.estimator.splat(path.place);
                 let Some(pixel) = out.get_mut(path.place as usize) else { continue };
                 if pixel.add(path.sample, radiance, &mut counters.dropped) {
                     pixel.add_blur(path.sample, Rgb::from(path.blur));

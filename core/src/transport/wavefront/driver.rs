@@ -84,7 +84,7 @@ impl Wavefront<'_> {
     /// Traces the queue of shadow rays, and adds the light of those that arrive to their paths.
     fn trace_shadow_rays<F: Features>(&mut self, context: &SceneContext<F>, counters: &mut Counters) {
         let count = core::mem::take(&mut self.shadows);
-        let Self { paths, shadow_rays: rays, shadow_light: light, hits, hidden, .. } = self;
+        let Self { paths, shadow_rays: rays, shadow_light: light, shadow_hits: hits, hidden, .. } = self;
         let arrive = |ray: &Ray, light: Rgb| {
             let environment = context.scene.environment.as_ref().filter(|_| ray.tag & TO_ENVIRONMENT != 0);
             let radiance = environment.map_or(Rgb::ONE, |e| e.radiance(context.scene, ray.direction.into()));

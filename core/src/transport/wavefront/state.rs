@@ -97,6 +97,8 @@ pub struct Wavefront<'m> {
     pub(in crate::transport) shadow_rays: &'m mut [Ray],
     /// Contribution of each shadow ray if nothing is in its way.
     pub(in crate::transport) shadow_light: &'m mut [[f32; 3]],
+    /// Hits of shadow rays at surfaces with cut-outs.
+    pub(in crate::transport) shadow_hits: &'m mut [Hit],
     pub(in crate::transport) hidden: &'m mut [u8],
     /// Shadow rays in the queue.
     pub(in crate::transport) shadows: usize,
@@ -117,6 +119,7 @@ impl<'m> Wavefront<'m> {
             .slice::<Hit>(capacity)
             .slice::<Ray>(capacity)
             .slice::<[f32; 3]>(capacity)
+            .slice::<Hit>(capacity)
             .slice::<u8>(capacity)
     }
 
@@ -130,6 +133,7 @@ impl<'m> Wavefront<'m> {
             next: 0,
             shadow_rays: arena.slice(capacity)?,
             shadow_light: arena.slice(capacity)?,
+            shadow_hits: arena.slice(capacity)?,
             hidden: arena.slice(capacity)?,
             shadows: 0,
         })

@@ -47,6 +47,9 @@ impl Identity {
         {
             cache += &format!(", {:?}", settings.bidirectional);
         }
+        if let Some(Method::InstantRadiosity | Method::ClampedInstantRadiosity) = Method::named(method) {
+            cache += &format!(", {:?}", settings.virtual_lights);
+        }
         let may_join = [Method::Path, Method::IrradianceCache].map(Method::name).contains(&method);
         let joined = may_join && settings.caustics;
         let caustics = if joined { ", caustics" } else { "" };

@@ -8,6 +8,7 @@ mod bidirectional;
 mod cache_memory;
 mod cache_settings;
 mod caustics;
+mod instant_radiosity;
 mod irradiance_cache;
 mod path;
 mod photon_map;
@@ -18,6 +19,7 @@ mod wrong;
 
 pub use cache_settings::{CacheSettings, CacheUse};
 pub use halflight_core::method::caustics::CausticUse;
+pub use halflight_core::method::instant_radiosity::VirtualLightUse;
 pub use halflight_core::method::{MapUse, PhotonSettings, PhotonUse};
 pub use photon_view::{MapView, PhotonView};
 
@@ -53,6 +55,10 @@ pub enum Method {
     Bidirectional,
     /// Vertex connection and merging.
     VertexMerging,
+    /// Instant radiosity; paths find what its bound cuts.
+    InstantRadiosity,
+    /// Instant radiosity without what its bound cuts.
+    ClampedInstantRadiosity,
     /// Path tracing that is wrong on purpose.
     #[cfg(test)]
     Wrong,
@@ -60,7 +66,7 @@ pub enum Method {
 
 impl Method {
     /// All of them.
-    pub const ALL: [Method; 7] = [
+    pub const ALL: [Method; 9] = [
         Method::Path,
         Method::IrradianceCache,
         Method::PhotonMap,
@@ -68,6 +74,8 @@ impl Method {
         Method::LightTracing,
         Method::Bidirectional,
         Method::VertexMerging,
+        Method::InstantRadiosity,
+        Method::ClampedInstantRadiosity,
     ];
 
     /// Its name on the command line, in films and in reports.
@@ -80,6 +88,8 @@ impl Method {
             Method::LightTracing => "light",
             Method::Bidirectional => "bdpt",
             Method::VertexMerging => "vcm",
+            Method::InstantRadiosity => "instant-radiosity",
+            Method::ClampedInstantRadiosity => "instant-radiosity-clamped",
             #[cfg(test)]
             Method::Wrong => "wrong",
         }
@@ -103,6 +113,10 @@ impl Method {
             Method::VertexMerging => {
                 "Vertex connection and merging: bidirectional path tracing, and photons of caustics behind mirrors and glass"
             }
+            Method::InstantRadiosity => "Virtual point lights, and paths for the light that their bound cuts",
+            Method::ClampedInstantRadiosity => {
+                "Virtual point lights with a bounded geometry term: dark corners"
+            }
             #[cfg(test)]
             Method::Wrong => "Wrong on purpose",
         }
@@ -116,11 +130,12 @@ impl Method {
     /// Whether its pictures converge to another one than that of the scene: no noise of their own tells of that.
     pub const fn is_biased(self) -> bool {
         match self {
-            Method::Path | Method::LightTracing | Method::Bidirectional => false,
+            Method::Path | Method::LightTracing | Method::Bidirectional | Method::InstantRadiosity => false,
             Method::IrradianceCache
             | Method::PhotonMap
             | Method::ProgressivePhotons
-            | Method::VertexMerging => true,
+            | Method::VertexMerging
+            | Method::ClampedInstantRadiosity => true,
             #[cfg(test)]
             Method::Wrong => true,
         }
@@ -133,8 +148,9 @@ impl Method {
             | Method::ProgressivePhotons
             | Method::LightTracing
             | Method::Bidirectional
-            | Method::VertexMerging => true,
-            Method::IrradianceCache | Method::PhotonMap => false,
+            | Method::VertexMerging
+            | Method::InstantRadiosity => true,
+            Method::IrradianceCache | Method::PhotonMap | Method::ClampedInstantRadiosity => false,
             #[cfg(test)]
             Method::Wrong => false,
         }
@@ -155,7 +171,9 @@ impl Method {
             | Method::ProgressivePhotons
             | Method::LightTracing
             | Method::Bidirectional
-            | Method::VertexMerging => true,
+            | Method::VertexMerging
+            | Method::InstantRadiosity
+            | Method::ClampedInstantRadiosity => true,
             #[cfg(test)]
             Method::Wrong => false,
         }
@@ -178,6 +196,9 @@ impl Method {
             }
             Method::LightTracing | Method::Bidirectional | Method::VertexMerging => {
                 then(&mut bidirectional::BidirectionalPaths::<F>::new(stage, memory, self)?, memory)
+            }
+            Method::InstantRadiosity | Method::ClampedInstantRadiosity => {
+                then(&mut instant_radiosity::VirtualLights::<F>::new(stage, memory, self)?, memory)
             }
             #[cfg(test)]
             Method::Wrong => then(&mut wrong::Wrong::<F>::new(stage, memory)?, memory),
@@ -286,6 +307,11 @@ pub(super) trait Renderer {
     /// Memory that does not suffice.
     fn photon_view(&mut self) -> Result<Option<PhotonView>, RenderError> {
         Ok(None)
+    }
+
+    /// The use of its virtual lights.
+    fn virtual_lights(&self) -> Option<VirtualLightUse> {
+        None
     }
 
     /// What became of its photons.

@@ -36,6 +36,7 @@ const TRANSPORT: &[&str] = &[
     "cached",
     "prepass",
     "bidirectional",
+    "instant_radiosity",
 ];
 
 /// A file of core/src: its path below that folder, and its numbered lines of code.
