@@ -117,12 +117,19 @@ pub(super) fn pieces(parts: &[Placed], fit: &Fit) -> f64 {
     if fit.is_far { parts.iter().map(of_part).sum() } else { 0.0 }
 }
 
-/// A triangle smaller than this, relative to its coordinates, is deformed by rounding.
-const DEFORMED: f64 = 1e-5;
+/// A triangle smaller than this, relative to its coordinates, is deformed by rounding; the note of it.
+const DEFORMED: (f64, &str) =
+    (1e-5, "triangle smaller than 1e-5 of its distance from the detail: rounding deforms it");
+
+/// The same of scenes without large surroundings, whose files often have small triangles that nobody sees: these are
+/// smaller than the spacing of coordinates.
+const COLLAPSED: (f64, &str) =
+    (1e-7, "triangle smaller than 1e-7 of its distance from the middle of the scene: rounding deforms it");
 
 /// A part under construction.
 struct Builder<'a> {
     part: &'a Placed<'a>,
+    is_far: bool,
     exact: Vec<DVec3>,
     /// Texture coordinates before rounding; empty if the part has none.
     placed_texcoords: Vec<[f64; 2]>,
@@ -147,7 +154,7 @@ impl<'a> Builder<'a> {
             geometry.texcoords = placed_texcoords.iter().map(|uv| uv.map(|x| x as f32)).collect();
             geometry.texcoords.resize(exact.len(), [0.0; 2]);
         }
-        Self { part, exact, placed_texcoords, geometry, notes }
+        Self { part, is_far: fit.is_far, exact, placed_texcoords, geometry, notes }
     }
 
     /// All usable triangles; large ones are cut if `cut`.
@@ -194,8 +201,8 @@ impl<'a> Builder<'a> {
         }
         let (low, high) = (p.min(q).min(r), p.max(q).max(r));
         let farthest = low.abs().max(high.abs()).max_element();
-        if (high - low).max_element() < DEFORMED * farthest {
-            let what = "triangle smaller than 1e-5 of its distance from the detail: rounding deforms it";
+        let (least, what) = if self.is_far { DEFORMED } else { COLLAPSED };
+        if (high - low).max_element() < least * farthest {
             self.notes.add(1, what);
         }
         true
