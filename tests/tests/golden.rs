@@ -28,7 +28,7 @@ const SPP: u32 = 9;
 
 const SEEDS: [u32; 2] = [0, 77];
 
-const METHODS: [Method; 9] = [
+const METHODS: [Method; 10] = [
     Method::Path,
     Method::IrradianceCache,
     Method::PhotonMap,
@@ -38,6 +38,7 @@ const METHODS: [Method; 9] = [
     Method::VertexMerging,
     Method::InstantRadiosity,
     Method::ClampedInstantRadiosity,
+    Method::Metropolis,
 ];
 
 /// The scenes: those of the repository as they are loaded, and others made by hand.

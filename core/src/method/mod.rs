@@ -13,6 +13,7 @@ pub mod environment_visibility;
 pub mod executor;
 pub mod instant_radiosity;
 pub mod irradiance_cache;
+pub mod metropolis;
 pub mod path;
 pub mod photon_map;
 pub mod photon_map_store;

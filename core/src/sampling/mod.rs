@@ -15,7 +15,7 @@ pub use alias::{AliasEntry, AliasTable};
 pub use distribution::{Cell, Distribution2d};
 pub use hash::{Random, mix};
 pub use numbers::Numbers;
-pub use primary_sample::{MutatedSample, Mutation};
+pub use primary_sample::Mutation;
 pub use sobol::Sampler;
 pub use trigonometry::sin_cos_turns;
 

@@ -1,6 +1,5 @@
 //! Random numbers of a light path: numbers in [0, 1) by the names of their dimensions. Those of a [`Sampler`]
-//! are points of a sequence; those of a [`MutatedSample`](super::MutatedSample) are a step of a Markov chain
-//! away from a point.
+//! are points of a sequence; those of Markov chains are a [`Mutation`](super::Mutation) away from a point.
 
 use super::Sampler;
 

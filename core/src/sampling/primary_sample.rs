@@ -8,9 +8,12 @@
 //! A departure from the paper: s is not fixed, but drawn for each small step from 1/512 to 1/8, evenly over
 //! its logarithm. No single size suits a large lamp and a small one.
 //!
-//! A mutation follows from its key and number alone, and nothing is stored until it is accepted.
+//! A third kind of step draws some numbers anew and keeps the others: a tail of a subpath, for instance. It is as likely
+//! as its reverse as long as the choice of those numbers does not depend on them.
+//!
+//! A mutation follows from its key and number alone.
 
-use super::{Numbers, ONE_MINUS_EPSILON, Random};
+use super::{ONE_MINUS_EPSILON, Random};
 
 /// The largest change of a number by a small step.
 const LARGEST: f32 = 0.125;
@@ -18,92 +21,97 @@ const LARGEST: f32 = 0.125;
 /// The range of step sizes, and of changes within a step, as a binary logarithm.
 const OCTAVES: f32 = 6.0;
 
+/// The range of changes of wide slots.
+const WIDE_OCTAVES: f32 = 1.0;
+
+/// Counters of the step's own random numbers; slots of points are far below.
+const SIZE: u32 = u32::MAX;
+const KIND: u32 = u32::MAX - 1;
+const ACCEPTANCE: u32 = u32::MAX - 2;
+const CHOICE: u32 = u32::MAX - 3;
+
 /// One step from a point of primary sample space.
 #[derive(Clone, Copy, Debug)]
 pub struct Mutation {
     random: Random,
-    /// The largest change, in (0, [`LARGEST`]]; `None` for a large step.
-    size: Option<f32>,
 }
 
 impl Mutation {
-    /// Small step `number` of the chain with `key`.
-    pub fn small_step(key: u32, number: u32) -> Self {
-        let random = Random::new(key, number);
-        let size = LARGEST * libm::exp2f(-OCTAVES * random.single(u32::MAX));
-        Self { random, size: Some(size) }
+    /// Step `number` of the chain with `key`.
+    pub fn new(key: u32, number: u32) -> Self {
+        Self { random: Random::new(key, number) }
     }
 
-    /// Large step `number` of the chain with `key`: no number depends on the one before.
-    pub fn large_step(key: u32, number: u32) -> Self {
-        Self { random: Random::new(key, number), size: None }
+    /// The number in [0, 1) that decides which kind of step it is.
+    pub fn kind(&self) -> f32 {
+        self.random.single(KIND)
     }
 
-    /// The proposed number in [0, 1) for number `slot` of the point, which is `u`.
-    #[inline]
-    pub fn mutate(&self, u: f32, slot: u32) -> f32 {
-        let Some(size) = self.size else { return self.draw(slot) };
-        let chance = 2.0 * self.random.single(slot);
-        let (chance, sign) = if chance < 1.0 { (chance, 1.0) } else { (chance - 1.0, -1.0) };
-        let moved = u + sign * size * libm::exp2f(-OCTAVES * chance);
-        (moved - libm::floorf(moved)).min(ONE_MINUS_EPSILON)
+    /// Two numbers in [0, 1) that decide which numbers of a point are drawn anew.
+    pub fn choice(&self) -> [f32; 2] {
+        [self.random.single(CHOICE), self.random.single(CHOICE - 1)]
     }
 
-    /// A number that depends on no other one.
-    #[inline]
-    fn draw(&self, slot: u32) -> f32 {
-        self.random.single(slot)
+    /// The number in [0, 1) that decides whether the proposal is accepted.
+    pub fn acceptance(&self) -> f32 {
+        self.random.single(ACCEPTANCE)
     }
 
-    /// Makes the proposal the new point. Slots 2 d and 2 d + 1 of `point` are the numbers of dimension d.
-    pub fn accept(&self, point: &mut [f32]) {
-        point.iter_mut().zip(0..).for_each(|(u, slot)| *u = self.mutate(*u, slot));
+    /// Its random numbers, by the slots of a point. Numbers that a point does not store are drawn from here.
+    pub fn random(&self) -> Random {
+        self.random
     }
-}
 
-/// The random numbers of a proposal: those of `point`, mutated. Dimensions beyond the end of `point` are
-/// drawn anew.
-#[derive(Clone, Copy, Debug)]
-pub struct MutatedSample<'p> {
-    /// Two numbers for each dimension, as [`Mutation::accept`] has them.
-    pub point: &'p [f32],
-    /// The step.
-    pub mutation: Mutation,
-}
+    /// A step that draws all numbers for which `is_new` anew, in [0, 1).
+    pub fn renew(&self, point: &[f32], proposal: &mut [f32], is_new: impl Fn(usize) -> bool) {
+        for (slot, (proposed, u)) in proposal.iter_mut().zip(point).enumerate() {
+            *proposed = if is_new(slot) { self.random.single(slot as u32) } else { *u };
+        }
+    }
 
-impl MutatedSample<'_> {
-    #[inline]
-    fn slot(&self, slot: u32) -> f32 {
-        let u = self.point.get(slot as usize);
-        u.map_or_else(|| self.mutation.draw(slot), |&u| self.mutation.mutate(u, slot))
+    /// A small step. Those of the first `wide` slots are of the whole size.
+    pub fn perturb(&self, point: &[f32], proposal: &mut [f32], wide: usize) {
+        let slots = proposal.iter_mut().zip(0..);
+        let size = LARGEST * power_of_two(-OCTAVES * self.random.single(SIZE));
+        for ((proposed, slot), u) in slots.zip(point) {
+            let bits = self.random.bits(slot);
+            let chance = (bits >> 8) as f32 * (1.0 / (1u32 << 24) as f32);
+            let octaves = if (slot as usize) < wide { WIDE_OCTAVES } else { OCTAVES };
+            let change = size * power_of_two(-octaves * chance);
+            // The lowest bit is not in the chance.
+            let moved = if bits & 1 == 0 { u + change } else { u - change };
+            let wrapped = moved + f32::from(u8::from(moved < 0.0)) - f32::from(u8::from(moved >= 1.0));
+            *proposed = wrapped.clamp(0.0, ONE_MINUS_EPSILON);
+        }
     }
 }
 
-impl Numbers for MutatedSample<'_> {
-    #[inline]
-    fn single(&self, dimension: u32) -> f32 {
-        self.slot(dimension.wrapping_mul(2))
-    }
-
-    #[inline]
-    fn pair(&self, dimension: u32) -> [f32; 2] {
-        let first = dimension.wrapping_mul(2);
-        [self.slot(first), self.slot(first.wrapping_add(1))]
-    }
+/// About 2^x for x in [-64, 0], within 0.02 %: the size of a step needs no more.
+fn power_of_two(x: f32) -> f32 {
+    let whole = (x + 64.0) as i32 - 64;
+    let rest = x - whole as f32;
+    let mantissa = 1.0 + rest * (0.695_556_9 + rest * (0.226_173_2 + rest * 0.078_269_9));
+    f32::from_bits(((whole + 127) << 23) as u32) * mantissa
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    /// The proposal for `u` in slot `slot` of a step that is small.
+    fn small(key: u32, number: u32, u: f32, slot: usize) -> f32 {
+        let mut proposal = [0.0; 8];
+        Mutation::new(key, number).perturb(&[u; 8], &mut proposal, 0);
+        proposal[slot]
+    }
+
     #[test]
     fn small_steps_go_up_as_often_as_down_and_stay_in_the_unit_interval() {
         let (mut up, mut sum) = (0, 0.0);
         for number in 0..20_000 {
-            let step = Mutation::small_step(5, number);
-            let moved = step.mutate(0.5, 7);
+            let moved = small(5, number, 0.5, 7);
             let change = (moved - 0.5).abs();
-            assert!(change > 0.0 && change <= LARGEST && (0.0..1.0).contains(&step.mutate(0.0, 7)));
+            assert!(change > 0.0 && change <= LARGEST && (0.0..1.0).contains(&small(5, number, 0.0, 7)));
             up += i32::from(moved > 0.5);
             sum += f64::from(moved - 0.5);
         }
@@ -113,13 +121,34 @@ mod tests {
     }
 
     #[test]
+    fn changes_are_spread_evenly_over_their_logarithm() {
+        let mut octaves = [0u32; 12];
+        for number in 0..20_000 {
+            let change = (small(9, number, 0.5, 3) - 0.5).abs() / LARGEST;
+            octaves[(-change.log2()).clamp(0.0, 11.9) as usize] += 1;
+        }
+        // The sum of two even distributions over six octaves: a triangle.
+        for (octave, &count) in octaves.iter().enumerate() {
+            let expected = 20_000.0 / 36.0 * (6.0 - (octave as f64 - 5.5).abs());
+            assert!((f64::from(count) - expected).abs() < 5.0 * expected.sqrt() + 5.0, "{octaves:?}");
+        }
+    }
+
+    #[test]
     fn a_chain_that_accepts_all_steps_is_uniform() {
         // Chi-squared with 15 degrees of freedom over independent chains; 37.7 is the level of 0.1 %.
         let mut bins = [0u32; 16];
         for chain in 0..4000 {
             let mut point = [0.3, 0.99];
-            (0..40).for_each(|step| Mutation::large_step(chain, step).accept(&mut point));
-            (40..80).for_each(|step| Mutation::small_step(chain, step).accept(&mut point));
+            for step in 0..80 {
+                let mut proposal = [0.0; 2];
+                let mutation = Mutation::new(chain, step);
+                match step {
+                    0..40 => mutation.renew(&point, &mut proposal, |_| true),
+                    _ => mutation.perturb(&point, &mut proposal, 1),
+                }
+                point = proposal;
+            }
             bins[(point[1] * 16.0) as usize] += 1;
         }
         let chi: f64 = bins.iter().map(|&n| (f64::from(n) - 250.0).powi(2) / 250.0).sum();
@@ -127,18 +156,17 @@ mod tests {
     }
 
     #[test]
-    fn a_proposal_is_the_point_that_its_acceptance_makes() {
-        let mut point = [0.1, 0.2, 0.3, 0.4];
-        for (number, mutation) in [Mutation::small_step(1, 0), Mutation::large_step(1, 1)].iter().enumerate()
-        {
-            let proposal = MutatedSample { point: &point, mutation: *mutation };
-            let pairs = [proposal.pair(0), proposal.pair(1)];
-            assert_eq!(proposal.single(1), pairs[1][0]);
-            // Dimension 2 is not stored.
-            let beyond = proposal.pair(2);
-            assert!(beyond.iter().all(|u| (0.0..1.0).contains(u)), "{number}");
-            mutation.accept(&mut point);
-            assert_eq!(point.as_slice(), pairs.as_flattened());
+    fn a_renewal_keeps_the_other_numbers() {
+        let (point, mut proposal) = ([0.25, 0.5, 0.75], [0.0; 3]);
+        Mutation::new(3, 9).renew(&point, &mut proposal, |slot| slot == 1);
+        assert!(proposal[0] == 0.25 && proposal[1] != 0.5 && proposal[2] == 0.75);
+    }
+
+    #[test]
+    fn the_power_of_two_is_near() {
+        for i in 0..=1200 {
+            let x = -i as f32 / 100.0;
+            assert!((power_of_two(x) / x.exp2() - 1.0).abs() < 3e-4, "{x}");
         }
     }
 }

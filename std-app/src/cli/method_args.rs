@@ -4,7 +4,8 @@ use super::values;
 use clap::builder::PossibleValue;
 use clap::{Args, ValueEnum};
 use halflight::render::{
-    BidirectionalSettings, CacheSettings, Method, PhotonSettings, Settings, VirtualLightSettings,
+    BidirectionalSettings, CacheSettings, Method, MetropolisSettings, PhotonSettings, PrimarySpace, Settings,
+    VirtualLightSettings,
 };
 use halflight_core::cache::irradiance::Metric;
 use halflight_core::photon;
@@ -106,6 +107,26 @@ pub(super) struct MethodArgs {
     /// Merging with vcm [default: where the scene has caustics]
     #[arg(long, value_name = "WHEN", help_heading = "Light paths")]
     merging: Option<When>,
+    /// What a point of a Markov chain makes with mlt [default: multiplexed]
+    #[arg(long, value_name = "SPACE", help_heading = "Markov chains")]
+    mlt: Option<Space>,
+    /// Mutations per pixel and sample with mlt, a quarter of them independent [default: 4]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=64),
+        help_heading = "Markov chains")]
+    mutations: Option<u32>,
+    /// Largest contribution of a traced path beside the chains of mlt, relative to the pixel; chains find
+    /// the rest; 0: all of it [default: 2]
+    #[arg(long, value_name = "RATIO", value_parser = values::not_negative, help_heading = "Markov chains")]
+    path_limit: Option<f64>,
+}
+
+/// Primary sample space of Markov chains.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum Space {
+    /// One bidirectional technique of a path of one length
+    Multiplexed,
+    /// A whole path from the camera
+    Pssmlt,
 }
 
 /// Kernel of a density estimate.
@@ -163,6 +184,9 @@ impl MethodArgs {
             light_paths: self.light_paths.or(base.light_paths),
             connections: self.connections.or(base.connections),
             merging: self.merging.or(base.merging),
+            mlt: self.mlt.or(base.mlt),
+            mutations: self.mutations.or(base.mutations),
+            path_limit: self.path_limit.or(base.path_limit),
             windows: self.windows.or(base.windows),
             max_depth: self.max_depth.or(base.max_depth),
             audit: self.audit.or(base.audit),
@@ -201,6 +225,14 @@ impl MethodArgs {
             virtual_lights: VirtualLightSettings {
                 light_paths: self.light_paths,
                 connections: self.connections,
+            },
+            metropolis: MetropolisSettings {
+                space: match self.mlt {
+                    Some(Space::Pssmlt) => PrimarySpace::PathTracing,
+                    _ => PrimarySpace::Multiplexed,
+                },
+                mutations: self.mutations.unwrap_or(settings.metropolis.mutations),
+                threshold: self.path_limit.map_or(settings.metropolis.threshold, |limit| limit as f32),
             },
             audit: self.audit,
             level: self.simd.map_or(level, |tier| level.capped(tier)),

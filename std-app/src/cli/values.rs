@@ -118,6 +118,12 @@ pub(super) fn positive(text: &str) -> Result<f64, String> {
     (number > 0.0).then_some(number).ok_or("a number above 0 is expected".into())
 }
 
+/// Number of at least 0.
+pub(super) fn not_negative(text: &str) -> Result<f64, String> {
+    let number = finite(text)?;
+    (number >= 0.0).then_some(number).ok_or("a number of at least 0 is expected".into())
+}
+
 fn finite(text: &str) -> Result<f64, String> {
     f64::from_str(text).ok().filter(|number| number.is_finite()).ok_or(format!("`{text}` is not a number"))
 }

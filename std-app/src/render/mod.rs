@@ -40,14 +40,15 @@ pub use error::{FileError, RenderError};
 pub use halflight_core::estimate::{BiasEstimate, Deviation, ErrorEstimate};
 pub use halflight_core::method::bidirectional::BidirectionalSettings;
 pub use halflight_core::method::instant_radiosity::VirtualLightSettings;
+pub use halflight_core::method::metropolis::{MetropolisSettings, PrimarySpace};
 pub use halflight_core::method::{Shard, path::Reuse};
 pub use history::{Against, Round};
 pub use ledger::Place;
 pub use memory::MemoryUse;
 pub use merge::{Merged, merge};
 pub use method::{
-    CacheSettings, CacheUse, CausticUse, MapUse, MapView, Method, PhotonSettings, PhotonUse, PhotonView,
-    VirtualLightUse,
+    CacheSettings, CacheUse, CausticUse, ChainUse, MapUse, MapView, Method, PhotonSettings, PhotonUse,
+    PhotonView, VirtualLightUse,
 };
 pub use rounds::Stop;
 pub use study::{IrradianceStudy, MetricError, study_irradiance};
@@ -91,6 +92,8 @@ pub struct Settings {
     pub bidirectional: BidirectionalSettings,
     /// How virtual lights are used, where the method has any.
     pub virtual_lights: VirtualLightSettings,
+    /// Choices of Metropolis light transport.
+    pub metropolis: MetropolisSettings,
     /// Whether maps of photons are looked at in the end, for a report. The time that this takes does not count.
     pub photon_view: bool,
     /// Whether the environment is sampled through windows that a first look finds; `None` where it is to tell.
@@ -152,6 +155,7 @@ impl Default for Settings {
             photons: PhotonSettings::default(),
             bidirectional: BidirectionalSettings::default(),
             virtual_lights: VirtualLightSettings::default(),
+            metropolis: MetropolisSettings::default(),
             photon_view: false,
             windows: None,
             threads: None,
@@ -246,6 +250,8 @@ pub struct RenderResult {
     /// What the irradiance cache looks like and how wrong it is, where that was asked for, the method has one and there
     /// is memory for it.
     pub survey: Option<Survey>,
+    /// Use of Markov chains, where the method has any.
+    pub chains: Option<ChainUse>,
     /// What became of photons, where the method has any.
     pub photons: Option<PhotonUse>,
     /// The use of virtual lights, where the method has any.

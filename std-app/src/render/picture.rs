@@ -323,6 +323,7 @@ impl<'a> Progressive<'a> {
             cache: renderer.cache(),
             // The picture is there: a report for which there is no memory is left out.
             survey: if interrupted { None } else { renderer.survey(workers).unwrap_or_default() },
+            chains: renderer.chains(),
             photons: renderer.photons(),
             virtual_lights: renderer.virtual_lights(),
             photon_view: if is_viewed { renderer.photon_view().unwrap_or_default() } else { None },

@@ -2,7 +2,8 @@
 
 use super::Run;
 use crate::render::{
-    CacheUse, CausticUse, MapUse, Method, PhotonUse, Reuse, Settings, Survey, VirtualLightUse, WindowUse,
+    CacheUse, CausticUse, ChainUse, MapUse, Method, PhotonUse, Reuse, Settings, Survey, VirtualLightUse,
+    WindowUse,
 };
 use halflight_core::findings::Decision::{LeftOut, Limited, Used};
 use halflight_core::findings::{Finding, Findings, Value};
@@ -16,6 +17,7 @@ pub(super) fn of(run: &Run) -> Findings {
     findings.extend(path_reuse(&result.reuse));
     findings.extend(result.cache.map(|cache| irradiance_cache(&cache, settings)));
     findings.extend(result.survey.as_ref().map(cache_survey));
+    findings.extend(result.chains.map(|chains| markov_chains(&chains)));
     findings.extend(photon_maps(&photons, result.seconds.photons));
     findings.extend(photons.global.map(|map| map_finding("global_photons", &map)));
     findings.extend(result.virtual_lights.map(|used| virtual_lights(&used, result.reuse.used)));
@@ -64,6 +66,23 @@ fn irradiance_cache(cache: &CacheUse, settings: &Settings) -> Finding {
         .with_count("loaded", cache.loaded)
         .with_count("refused", cache.refused)
         .with("seconds", Value::Seconds(cache.seconds))
+}
+
+fn markov_chains(chains: &ChainUse) -> Finding {
+    let (decision, reason) = match chains.share {
+        0.0 => (LeftOut, "path tracing finds all light well"),
+        _ => (Used, "light that path tracing finds badly is found by Markov chains"),
+    };
+    let [small, large, subpath] = chains.accepted;
+    Finding::new("markov_chains", decision, reason)
+        .with("chains", Value::Count(chains.chains.into()))
+        .with("mutations_per_chain", Value::Count(chains.mutations.into()))
+        .with("independent_points", Value::Count(chains.candidates.into()))
+        .with("accepted_small_steps", Value::Fraction(small))
+        .with("accepted_large_steps", Value::Fraction(large))
+        .with("accepted_subpath_steps", Value::Fraction(subpath))
+        .with("share_of_light", Value::Fraction(chains.share))
+        .with("share_error", Value::Fraction(chains.share_error))
 }
 
 fn cache_survey(survey: &Survey) -> Finding {

@@ -92,6 +92,7 @@ methods! {
         // The area by which the bound is set has all twelve rooms.
         known: &[("twelve-rooms", 0.3, 0.1)],
     };
+    mlt: Row { method: Method::Metropolis, bias: 0.0, bias_of_mean: 0.0, known: &[] };
 }
 
 #[test]

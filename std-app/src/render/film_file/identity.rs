@@ -50,6 +50,9 @@ impl Identity {
         if let Some(Method::InstantRadiosity | Method::ClampedInstantRadiosity) = Method::named(method) {
             cache += &format!(", {:?}", settings.virtual_lights);
         }
+        if let Some(Method::Metropolis) = Method::named(method) {
+            cache += &format!(", {:?}", settings.metropolis);
+        }
         let may_join = [Method::Path, Method::IrradianceCache].map(Method::name).contains(&method);
         let joined = may_join && settings.caustics;
         let caustics = if joined { ", caustics" } else { "" };

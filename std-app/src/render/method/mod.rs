@@ -10,6 +10,7 @@ mod cache_settings;
 mod caustics;
 mod instant_radiosity;
 mod irradiance_cache;
+mod metropolis;
 mod path;
 mod photon_map;
 mod photon_view;
@@ -20,6 +21,7 @@ mod wrong;
 pub use cache_settings::{CacheSettings, CacheUse};
 pub use halflight_core::method::caustics::CausticUse;
 pub use halflight_core::method::instant_radiosity::VirtualLightUse;
+pub use halflight_core::method::metropolis::ChainUse;
 pub use halflight_core::method::{MapUse, PhotonSettings, PhotonUse};
 pub use photon_view::{MapView, PhotonView};
 
@@ -59,6 +61,8 @@ pub enum Method {
     InstantRadiosity,
     /// Instant radiosity without what its bound cuts.
     ClampedInstantRadiosity,
+    /// Metropolis light transport.
+    Metropolis,
     /// Path tracing that is wrong on purpose.
     #[cfg(test)]
     Wrong,
@@ -66,7 +70,7 @@ pub enum Method {
 
 impl Method {
     /// All of them.
-    pub const ALL: [Method; 9] = [
+    pub const ALL: [Method; 10] = [
         Method::Path,
         Method::IrradianceCache,
         Method::PhotonMap,
@@ -76,6 +80,7 @@ impl Method {
         Method::VertexMerging,
         Method::InstantRadiosity,
         Method::ClampedInstantRadiosity,
+        Method::Metropolis,
     ];
 
     /// Its name on the command line, in films and in reports.
@@ -90,6 +95,7 @@ impl Method {
             Method::VertexMerging => "vcm",
             Method::InstantRadiosity => "instant-radiosity",
             Method::ClampedInstantRadiosity => "instant-radiosity-clamped",
+            Method::Metropolis => "mlt",
             #[cfg(test)]
             Method::Wrong => "wrong",
         }
@@ -117,6 +123,9 @@ impl Method {
             Method::ClampedInstantRadiosity => {
                 "Virtual point lights with a bounded geometry term: dark corners"
             }
+            Method::Metropolis => {
+                "Metropolis light transport, beside path tracing of light that it finds well"
+            }
             #[cfg(test)]
             Method::Wrong => "Wrong on purpose",
         }
@@ -130,7 +139,11 @@ impl Method {
     /// Whether its pictures converge to another one than that of the scene: no noise of their own tells of that.
     pub const fn is_biased(self) -> bool {
         match self {
-            Method::Path | Method::LightTracing | Method::Bidirectional | Method::InstantRadiosity => false,
+            Method::Path
+            | Method::LightTracing
+            | Method::Bidirectional
+            | Method::InstantRadiosity
+            | Method::Metropolis => false,
             Method::IrradianceCache
             | Method::PhotonMap
             | Method::ProgressivePhotons
@@ -149,7 +162,8 @@ impl Method {
             | Method::LightTracing
             | Method::Bidirectional
             | Method::VertexMerging
-            | Method::InstantRadiosity => true,
+            | Method::InstantRadiosity
+            | Method::Metropolis => true,
             Method::IrradianceCache | Method::PhotonMap | Method::ClampedInstantRadiosity => false,
             #[cfg(test)]
             Method::Wrong => false,
@@ -173,7 +187,8 @@ impl Method {
             | Method::Bidirectional
             | Method::VertexMerging
             | Method::InstantRadiosity
-            | Method::ClampedInstantRadiosity => true,
+            | Method::ClampedInstantRadiosity
+            | Method::Metropolis => true,
             #[cfg(test)]
             Method::Wrong => false,
         }
@@ -200,6 +215,7 @@ impl Method {
             Method::InstantRadiosity | Method::ClampedInstantRadiosity => {
                 then(&mut instant_radiosity::VirtualLights::<F>::new(stage, memory, self)?, memory)
             }
+            Method::Metropolis => then(&mut metropolis::Chains::<F>::new(stage, memory)?, memory),
             #[cfg(test)]
             Method::Wrong => then(&mut wrong::Wrong::<F>::new(stage, memory)?, memory),
         }
@@ -311,6 +327,11 @@ pub(super) trait Renderer {
 
     /// The use of its virtual lights.
     fn virtual_lights(&self) -> Option<VirtualLightUse> {
+        None
+    }
+
+    /// Use of its Markov chains.
+    fn chains(&self) -> Option<ChainUse> {
         None
     }
 

@@ -37,6 +37,7 @@ const TRANSPORT: &[&str] = &[
     "prepass",
     "bidirectional",
     "instant_radiosity",
+    "metropolis",
 ];
 
 /// A file of core/src: its path below that folder, and its numbered lines of code.

@@ -1,0 +1,414 @@
+//! Metropolis light transport (Veach and Guibas 1997) in primary sample space: multiplexed (Hachisuka et al. 2014) or
+//! over path tracing (Kelemen et al. 2002), and selective (Bitterli and Jarosz 2019).
+//!
+//! For each sample of the picture independent points are drawn, chains start from them, and their splats make the
+//! sample together with a path that is traced for each pixel. The mean density of the points is the brightness of the
+//! chains' light. Points, starts and chains are new for each sample: it has no bias however short the chains are, the
+//! halves of the film stay independent, and no brightness is estimated once and for all.
+
+use super::executor::{Executor, Passed};
+use super::{Method, RenderContext, Round};
+use crate::bsdf::Features;
+use crate::film::{PIXELS_PER_TILE, Pixel, Splat, Tile, add_strip, strip_length};
+use crate::light::{EmissionSampler, luminance};
+use crate::memory::{Arena, Footprint, MemorySource, OutOfMemory};
+use crate::transport::Counters;
+use crate::transport::metropolis::chain::{Chains, ChainsOutput, Steps, room};
+use crate::transport::metropolis::look::{CANDIDATES, Lengths, Look};
+use crate::transport::metropolis::paths::Paths;
+use crate::transport::metropolis::split::{CELL, MAX_SEGMENTS, Split};
+use crate::transport::metropolis::target::{LANES, Target};
+use core::ops::Range;
+
+pub use crate::transport::metropolis::target::PrimarySpace;
+
+/// One of so many points that are evaluated for a sample is independent.
+const INDEPENDENT: usize = 4;
+
+/// Chains that a sample has at least, while each has [`SHORTEST`] mutations; and mutations of a chain.
+const FEWEST_CHAINS: usize = 64;
+const SHORTEST: usize = 16;
+const LONGEST: usize = 256;
+
+/// Independent points of a sample at least.
+const FEWEST_CANDIDATES: usize = 64;
+
+/// Number of the first pass of the pilot.
+const PILOT: u32 = 1 << 30;
+
+/// Points of the pilot, in so many passes at most.
+const PILOT_POINTS: usize = 1 << 17;
+const MOST_PASSES: usize = 32;
+
+/// Least level of a pixel, relative to the mean of the picture.
+const LEAST_LEVEL: f32 = 0.1;
+
+/// Choices of Metropolis light transport.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MetropolisSettings {
+    /// What a point of a chain makes.
+    pub space: PrimarySpace,
+    /// Points evaluated for each pixel of a sample, a quarter of them independent.
+    pub mutations: u32,
+    /// Largest contribution of path tracing relative to the rough brightness of a pixel; chains have the rest. 0
+    /// leaves all light to chains, except that of paths of fewer than 3 or more than 20 segments.
+    pub threshold: f32,
+}
+
+impl Default for MetropolisSettings {
+    fn default() -> Self {
+        Self { space: PrimarySpace::default(), mutations: 4, threshold: 2.0 }
+    }
+}
+
+/// Use of chains.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ChainUse {
+    /// Chains of a sample of the picture, and mutations of each.
+    pub chains: u32,
+    /// Mutations of each chain.
+    pub mutations: u32,
+    /// Independent points of a sample.
+    pub candidates: u32,
+    /// Shares of small steps, of large steps and of steps of a subpath that were accepted.
+    pub accepted: [f64; 3],
+    /// Light of chains over that of the picture, about.
+    pub share: f64,
+    /// Relative standard deviation of that share's mean over the samples; 0 of one sample.
+    pub share_error: f64,
+}
+
+/// Sums over samples, for [`ChainUse`].
+#[derive(Clone, Copy, Default)]
+struct Totals {
+    samples: u32,
+    brightness: f64,
+    squares: f64,
+    proposed: [u64; 3],
+    accepted: [u64; 3],
+}
+
+/// Sizes of a sample.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Plan {
+    candidates: usize,
+    chains: usize,
+    mutations: usize,
+}
+
+impl Plan {
+    /// For `budget` points.
+    fn new(budget: usize) -> Self {
+        let visits = budget - budget / INDEPENDENT;
+        let mutations = (visits / FEWEST_CHAINS).clamp(SHORTEST, LONGEST);
+        let chains = visits.div_ceil(mutations).max(1);
+        Self { candidates: (budget / INDEPENDENT).max(FEWEST_CANDIDATES), chains, mutations }
+    }
+
+    fn tasks(&self) -> usize {
+        self.chains.div_ceil(LANES)
+    }
+
+    fn footprint(&self) -> Footprint {
+        Footprint::default()
+            .slice::<f32>(self.candidates)
+            .slice::<u32>(self.chains)
+            .slice::<Splat>(self.tasks() * room(self.mutations))
+            .slice::<ChainsOutput>(self.tasks())
+    }
+
+    /// As large as `bytes` allow, with one task at least.
+    fn within(self, bytes: usize) -> Self {
+        let mut plan = self;
+        while plan.footprint().bytes() > bytes && plan.tasks() > 1 {
+            plan.chains = (plan.tasks() - 1) * LANES;
+            plan.candidates = plan.candidates.min((plan.chains * plan.mutations).div_ceil(INDEPENDENT - 1));
+        }
+        plan
+    }
+}
+
+/// A picture by Metropolis light transport.
+pub struct Metropolis<'a, F> {
+    context: RenderContext<'a>,
+    emission: EmissionSampler<'a>,
+    space: PrimarySpace,
+    split: Split<'a>,
+    lengths: Lengths,
+    plan: Plan,
+    densities: &'a mut [f32],
+    starts: &'a mut [u32],
+    splats: &'a mut [Splat],
+    outputs: &'a mut [ChainsOutput],
+    /// Splats of the sample, in the order of the film.
+    picture: &'a mut [[f32; 3]],
+    /// The sample whose splats they are.
+    traced: Option<u32>,
+    totals: Totals,
+    features: core::marker::PhantomData<F>,
+}
+
+impl<'a, F: Features> Metropolis<'a, F> {
+    /// Working memory of a worker.
+    pub fn scratch() -> Footprint {
+        let pilot = Footprint::default().slice::<Pixel>(PIXELS_PER_TILE).and(Paths::<F>::scratch());
+        Chains::<F>::scratch(LONGEST).or(Look::<F>::scratch()).or(pilot)
+    }
+
+    /// Metropolis light transport of `context`, with fewer chains where memory is short, leaving `others` bytes.
+    ///
+    /// # Errors
+    /// [`OutOfMemory`] where there is no memory for 128 chains, or too little scratch.
+    pub fn new(
+        context: &RenderContext<'a>,
+        settings: &MetropolisSettings,
+        memory: &mut impl MemorySource<'a>,
+        executor: &mut impl Executor,
+        others: usize,
+    ) -> Result<Self, OutOfMemory> {
+        let RenderContext { scene, bvh, lights, settings: paths, .. } = *context;
+        let footprint = EmissionSampler::footprint(lights);
+        let emission =
+            EmissionSampler::build(scene, lights, &bvh.bounds(), &mut memory.take("emission", footprint)?)?;
+        let pixels = Tile::count(paths.width, paths.height) * PIXELS_PER_TILE;
+        let footprint = Footprint::default().slice::<[f32; 3]>(pixels).slice::<f32>(pixels / CELL);
+        let mut arena = memory.take("splats", footprint)?;
+        let (picture, levels) = (arena.slice(pixels)?, arena.slice(pixels / CELL)?);
+        let plan = Plan::new(context.pixels().saturating_mul(settings.mutations.max(1) as usize));
+        let plan = plan.within(memory.available().saturating_sub(others));
+        let mut arena = memory.take("chains", plan.footprint())?;
+        let max_segments = match settings.space {
+            PrimarySpace::Multiplexed => MAX_SEGMENTS.min(paths.max_depth),
+            PrimarySpace::PathTracing => u32::MAX,
+        };
+        let mut method = Self {
+            context: *context,
+            emission,
+            space: settings.space,
+            split: Split { levels: &[], threshold: 0.0, max_segments },
+            lengths: Lengths::new(3..=3, |_| 1.0),
+            plan,
+            densities: arena.slice(plan.candidates)?,
+            starts: arena.slice(plan.chains)?,
+            splats: arena.slice(plan.tasks() * room(plan.mutations))?,
+            outputs: arena.slice(plan.tasks())?,
+            picture,
+            traced: None,
+            totals: Totals::default(),
+            features: core::marker::PhantomData,
+        };
+        method.pilot(levels, settings.threshold, executor)?;
+        Ok(method)
+    }
+
+    fn target(&self) -> Target<'_, F> {
+        let Self { context, emission, split, space, .. } = self;
+        Target::new(context.scene_context(), emission, context.settings, *split, *space)
+    }
+
+    fn paths(&self) -> Paths<'_, F> {
+        let Self { context, emission, split, .. } = self;
+        Paths::new(context.scene_context(), emission, context.settings, *split)
+    }
+
+    /// Whether there is light that chains could find.
+    fn is_needed(&self) -> bool {
+        !self.context.lights.is_empty() && self.context.settings.max_depth >= self.lengths.first()
+    }
+
+    /// Finds a rough picture, and how much light paths of each length bring to chains.
+    fn pilot(
+        &mut self,
+        levels: &'a mut [f32],
+        threshold: f32,
+        executor: &mut impl Executor,
+    ) -> Result<(), OutOfMemory> {
+        if !self.is_needed() {
+            return Ok(());
+        }
+        let points = self.plan.candidates + self.plan.chains * self.plan.mutations;
+        let passes = (PILOT_POINTS / points).clamp(1, MOST_PASSES) as u32;
+        self.lengths = Lengths::new(self.target().lengths(), |_| 1.0);
+        self.measure_lengths(PILOT..PILOT + passes, executor)?;
+        levels.fill(0.0);
+        for sample in PILOT + passes..PILOT + 2 * passes {
+            if self.chain_pass(sample, executor)?.is_none() {
+                return Ok(());
+            }
+            let cells = levels.iter_mut().zip(self.picture.chunks(CELL));
+            cells.for_each(|(level, cell)| *level += cell.iter().map(|&c| luminance(c.into())).sum::<f32>());
+        }
+        if !self.measure_levels(levels, passes as f32, executor)? {
+            return Ok(());
+        }
+        self.split = Split { levels, threshold, ..self.split };
+        self.measure_lengths(PILOT + 2 * passes..PILOT + 3 * passes, executor)?;
+        self.totals = Totals::default();
+        Ok(())
+    }
+
+    /// Makes of `levels`, the light of so many `passes` of chains in each cell, its mean radiance with the light that
+    /// is not for chains. Whether the executor was not over.
+    fn measure_levels(
+        &self,
+        levels: &mut [f32],
+        passes: f32,
+        executor: &mut impl Executor,
+    ) -> Result<bool, OutOfMemory> {
+        let paths = self.paths();
+        let cells = levels.chunks_mut(PIXELS_PER_TILE / CELL);
+        let rough = executor.pass(cells, |tile, levels, worker| {
+            let mut arena = worker.scratch.scratch();
+            let pixels: &mut [Pixel] = arena.slice(PIXELS_PER_TILE)?;
+            pixels.fill(Pixel::default());
+            let counters = paths.run(tile, PILOT..PILOT + 1, &[], &mut arena, pixels)?;
+            for (level, pixels) in levels.iter_mut().zip(pixels.chunks(CELL)) {
+                let seen = pixels.iter().filter(|pixel| pixel.count() > 0);
+                let sum: f32 = seen.clone().map(|pixel| luminance(pixel.mean())).sum();
+                *level = (*level / passes + sum) / seen.count().max(1) as f32;
+            }
+            Ok(counters)
+        })?;
+        let mean = levels.iter().sum::<f32>() / levels.len() as f32;
+        let least = if mean > 0.0 { LEAST_LEVEL * mean } else { 1.0 };
+        levels.iter_mut().for_each(|level| *level = level.max(least));
+        Ok(rough.is_complete)
+    }
+
+    /// Sets the probabilities of lengths by the independent points of `samples`.
+    fn measure_lengths(
+        &mut self,
+        samples: Range<u32>,
+        executor: &mut impl Executor,
+    ) -> Result<(), OutOfMemory> {
+        let mut sums = [0.0; MAX_SEGMENTS as usize + 1];
+        for sample in samples {
+            if self.look(sample, executor)?.is_none() {
+                return Ok(());
+            }
+            let look = Look::new(self.target(), self.lengths, self.context.settings.seed, sample);
+            for (&density, candidate) in self.densities.iter().zip(0..) {
+                if let Some(sum) = sums.get_mut(look.length(candidate).0 as usize) {
+                    *sum += f64::from(density);
+                }
+            }
+        }
+        self.lengths = Lengths::new(self.target().lengths(), |segments| sums[segments as usize]);
+        Ok(())
+    }
+
+    /// Evaluates the independent points of a sample. The work; `None` where the executor is over.
+    fn look(&mut self, sample: u32, executor: &mut impl Executor) -> Result<Option<Counters>, OutOfMemory> {
+        let densities = core::mem::take(&mut self.densities);
+        let look = Look::new(self.target(), self.lengths, self.context.settings.seed, sample);
+        let passed = executor.pass(densities.chunks_mut(CANDIDATES), |task, densities, worker| {
+            look.run(task, &mut worker.scratch, densities)
+        });
+        self.densities = densities;
+        let Passed { counters, is_complete } = passed?;
+        Ok(is_complete.then_some(counters))
+    }
+
+    /// Makes the splats of a sample. The work; `None` where the executor is over.
+    fn chain_pass(
+        &mut self,
+        sample: u32,
+        executor: &mut impl Executor,
+    ) -> Result<Option<Counters>, OutOfMemory> {
+        if !self.is_needed() {
+            self.picture.fill([0.0; 3]);
+            return Ok(Some(Counters::default()));
+        }
+        let Some(mut counters) = self.look(sample, executor)? else { return Ok(None) };
+        let Self { context, emission, split, space, lengths, plan, .. } = *self;
+        let Self { densities, starts, splats, outputs, picture, .. } = self;
+        let (pixels, seed) = (picture.len(), context.settings.seed);
+        let target = Target::<F>::new(context.scene_context(), &emission, context.settings, split, space);
+        let look = Look::new(target, lengths, seed, sample);
+        let brightness = look.choose(densities, starts);
+        self.totals.add(brightness);
+        if brightness == 0.0 {
+            picture.fill([0.0; 3]);
+            return Ok(Some(counters));
+        }
+        let visits = plan.chains as f64 * plan.mutations as f64;
+        let scale = (brightness * context.pixels() as f64 / visits) as f32;
+        let chains = Chains::new(look, (seed, sample), pixels, plan.mutations as u32, scale);
+        let room = room(plan.mutations);
+        let tasks = starts.chunks(LANES).zip(splats.chunks_mut(room)).zip(outputs.iter_mut());
+        let passed = executor.pass(tasks, |task, ((starts, splats), output), worker| {
+            chains.run(task, starts, &mut worker.scratch, splats, output)
+        })?;
+        if !passed.is_complete {
+            return Ok(None);
+        }
+        counters += passed.counters;
+        let (splats, outputs) = (&**splats, &**outputs);
+        outputs.iter().for_each(|output| self.totals.count(&output.steps));
+        let length = strip_length(pixels);
+        let added = executor.pass(picture.chunks_mut(length), |strip, pixels, _| {
+            let tasks = splats.chunks(room).zip(outputs.iter().map(|output| &output.offsets));
+            add_strip(strip, length, tasks, pixels);
+            Ok(Counters::default())
+        })?;
+        Ok(added.is_complete.then_some(counters))
+    }
+
+    /// Use of chains so far.
+    pub fn chains(&self) -> ChainUse {
+        let Plan { candidates, chains, mutations } = self.plan;
+        let Totals { samples, brightness, squares, proposed, accepted } = self.totals;
+        let count = f64::from(samples.max(1));
+        let share = brightness / count;
+        let variance = (squares / count - share * share).max(0.0) / (count - 1.0).max(1.0);
+        let ratio = |kind: usize| accepted[kind] as f64 / proposed[kind].max(1) as f64;
+        ChainUse {
+            chains: chains as u32,
+            mutations: mutations as u32,
+            candidates: candidates as u32,
+            accepted: [0, 1, 2].map(ratio),
+            share,
+            share_error: if share > 0.0 { libm::sqrt(variance) / share } else { 0.0 },
+        }
+    }
+}
+
+impl Totals {
+    fn add(&mut self, brightness: f64) {
+        self.samples += 1;
+        self.brightness += brightness;
+        self.squares += brightness * brightness;
+    }
+
+    fn count(&mut self, steps: &[Steps; 3]) {
+        for (kind, steps) in steps.iter().enumerate() {
+            self.proposed[kind] += u64::from(steps.proposed);
+            self.accepted[kind] += u64::from(steps.accepted);
+        }
+    }
+}
+
+impl<F: Features> Method for Metropolis<'_, F> {
+    fn round<E: Executor>(&mut self, round: &mut Round<E>) -> Result<(), OutOfMemory> {
+        while let Some(sample) = round.next_sample() {
+            // A round that ended within a sample has left its splats.
+            if self.traced != Some(sample) {
+                self.traced = None;
+                let traced = round.executor.timed("chains", |executor| self.chain_pass(sample, executor))?;
+                let Some(counters) = traced else { return Ok(()) };
+                round.state.counters += counters;
+                self.traced = Some(sample);
+            }
+            let (paths, picture) = (self.paths(), &*self.picture);
+            round.tiles(sample + 1, |tile, samples, scratch: &mut Arena, pixels| {
+                let first = tile * PIXELS_PER_TILE;
+                let splats = picture.get(first..first + PIXELS_PER_TILE).unwrap_or_default();
+                paths.run(tile, samples, splats, scratch, pixels)
+            })?;
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests;

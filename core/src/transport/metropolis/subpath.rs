@@ -1,0 +1,552 @@
+//! Subpaths of given random numbers, from the camera or from a light, and the techniques that join them. The
+//! weights are those of `bidirectional/mis.rs`, with as many light paths as pixels and one connection.
+
+use super::split::Contribution;
+use crate::Rgb;
+use crate::bsdf::{Bsdf, BsdfSample, Features};
+use crate::film::Tile;
+use crate::geometry::{Hit, MISS, Ray};
+use crate::light::{EmissionSampler, LightType, emitted};
+use crate::sampling::Numbers;
+use crate::scene::SurfacePoint;
+use crate::transport::bidirectional::camera_paths::normal_for_lights;
+use crate::transport::bidirectional::light_pass::lens_point;
+use crate::transport::bidirectional::mis::{
+    Counts, End, Sums, weight_of_connection, weight_of_hit, weight_of_light_sample, weight_of_splat,
+};
+use crate::transport::bidirectional::vertex::{is_bent, reverse_pdf, scattering, scattering_from_light};
+use crate::transport::settings::Counters;
+use crate::transport::walk::context::SceneContext;
+use crate::transport::walk::termination::MAX_CROSSINGS;
+use crate::transport::walk::visibility::{ShadowRays, shadow_ray};
+use bytemuck::{Pod, Zeroable};
+use glam::{Vec2, Vec3};
+
+/// Counts of path tracing.
+pub(super) const PATH_TRACING: Counts = Counts { light_paths: 0.0, connections: 0.0, light_samples: 1.0 };
+
+/// A subpath between two of its vertices.
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[repr(C)]
+pub(super) struct Subpath {
+    /// Throughput of a camera subpath; W of a light subpath, over the number of pixels.
+    pub throughput: [f32; 3],
+    /// Density of the ray's direction per solid angle; infinite after a delta lobe and at the lens.
+    pub pdf: f32,
+    /// The last vertex: at first the origin of a light subpath.
+    pub position: [f32; 3],
+    /// Segments, the one under way included.
+    pub segments: u32,
+    /// Normal of the last vertex for light sampling.
+    pub normal: [f32; 3],
+    /// Surfaces passed by cut-out or coincidence.
+    pub crossings: u32,
+    /// Triangle that the ray starts on.
+    pub triangle: u32,
+    /// Light that a light subpath left.
+    pub light: u32,
+    /// Sums after the last scattering, or on arrival where the subpath has ended.
+    last: f32,
+    rest: f32,
+    /// The sums of the techniques of path tracing alone.
+    path_last: f32,
+    path_rest: f32,
+}
+
+impl Subpath {
+    #[inline]
+    fn sums(&self) -> Sums {
+        Sums { last: self.last, rest: self.rest, merge: 0.0 }
+    }
+
+    #[inline]
+    fn path_sums(&self) -> Sums {
+        Sums { last: self.path_last, rest: self.path_rest, merge: 0.0 }
+    }
+
+    /// Sets the sums of all techniques and those of path tracing.
+    #[inline]
+    fn set(&mut self, [all, paths]: [Sums; 2]) {
+        (self.last, self.rest) = (all.last, all.rest);
+        (self.path_last, self.path_rest) = (paths.last, paths.rest);
+    }
+}
+
+/// The end of a ray.
+pub(super) enum Met<'a> {
+    /// A surface that scatters.
+    Surface(SurfacePoint<'a>),
+    /// A surface that the subpath passes: its next ray.
+    Passed(Ray),
+    /// No surface.
+    Nothing,
+    /// Nothing that a subpath can go on from.
+    Lost,
+}
+
+/// A vertex that a subpath has arrived at.
+pub(super) struct Vertex<'v> {
+    pub point: SurfacePoint<'v>,
+    pub bsdf: Bsdf,
+    /// Unit direction to the vertex before.
+    pub back: Vec3,
+    /// The same, local.
+    pub wo: Vec3,
+    /// Sums of all techniques and of path tracing, on arrival.
+    pub sums: [Sums; 2],
+    /// The shading normal depends on the subpath ([`is_bent`]).
+    pub is_bent: bool,
+}
+
+impl Vertex<'_> {
+    #[inline]
+    fn cos(&self, direction: Vec3) -> f32 {
+        direction.dot(self.point.geometric_normal).abs()
+    }
+}
+
+/// Shadow rays of a batch.
+pub(super) struct Shadows<'w> {
+    pub rays: ShadowRays<'w>,
+    pub count: usize,
+}
+
+impl Shadows<'_> {
+    pub(super) fn push(&mut self, tag: u32, ray: Ray, light: Rgb) {
+        let slots = (self.rays.rays.get_mut(self.count), self.rays.light.get_mut(self.count));
+        if let (Some(slot), Some(arrives)) = slots {
+            (*slot, *arrives) = (Ray { tag, ..ray }, light.to_array());
+            self.count += 1;
+        }
+    }
+
+    /// Traces and forgets them; `arrive` gets those that nothing stops.
+    pub(super) fn trace<F: Features>(
+        &mut self,
+        context: &SceneContext<F>,
+        counters: &mut Counters,
+        arrive: impl FnMut(&Ray, Rgb),
+    ) {
+        let rays = &mut counters.shadow_rays;
+        counters.dropped.unfinished += context.trace_shadow_rays(&mut self.rays, self.count, rays, arrive);
+        self.count = 0;
+    }
+}
+
+/// Makes subpaths and joins them.
+#[derive(Clone, Copy)]
+pub(super) struct Walk<'a, F> {
+    pub context: SceneContext<'a, F>,
+    pub emission: &'a EmissionSampler<'a>,
+    /// Pixels across and down.
+    pub size: [u32; 2],
+    pub counts: Counts,
+}
+
+impl<'a, F: Features> Walk<'a, F> {
+    /// For pictures of `size` pixels, with the techniques of bidirectional path tracing.
+    pub(super) fn new(
+        context: SceneContext<'a, F>,
+        emission: &'a EmissionSampler<'a>,
+        size: [u32; 2],
+    ) -> Self {
+        let light_paths = size[0] as f32 * size[1] as f32;
+        let counts = Counts { light_paths, connections: 1.0, light_samples: 1.0 };
+        Self { context, emission, size, counts }
+    }
+
+    fn has_light_paths(&self) -> bool {
+        self.counts.light_paths > 0.0
+    }
+
+    /// A camera subpath through `raster`.
+    pub(super) fn from_camera(&self, raster: Vec2, lens: [f32; 2]) -> (Subpath, Ray) {
+        let ray = self.context.scene.camera.ray(self.size[0], self.size[1], raster.x, raster.y, lens);
+        let pdf = f32::INFINITY;
+        let subpath =
+            Subpath { throughput: [1.0; 3], pdf, segments: 1, triangle: MISS, ..Subpath::default() };
+        (subpath, ray)
+    }
+
+    /// A light subpath by the dimensions of emission of `numbers`.
+    pub(super) fn from_light(&self, numbers: &impl Numbers) -> Option<(Subpath, Ray)> {
+        let emitted = self.emission.emit(self.context.scene, self.context.lights, numbers)?;
+        let subpath = Subpath {
+            throughput: (emitted.power / self.counts.light_paths).to_array(),
+            position: emitted.ray.origin,
+            segments: 1,
+            triangle: emitted.triangle,
+            light: emitted.light,
+            ..Subpath::default()
+        };
+        Some((subpath, emitted.ray))
+    }
+
+    /// The end of `ray`, which met `hit`. `opacity` gives the random number of the n-th surface with a
+    /// cut-out.
+    pub(super) fn meet(
+        &self,
+        subpath: &mut Subpath,
+        (ray, hit): (&Ray, &Hit),
+        at_lens: bool,
+        opacity: impl Fn(u32) -> f32,
+        counters: &mut Counters,
+    ) -> Met<'a> {
+        if !hit.is_some() {
+            return Met::Nothing;
+        }
+        let Some(point) = self.context.surface_at(ray, hit) else { return Met::Lost };
+        let is_passed = self.context.is_passed(&point, hit, subpath.triangle, || opacity(subpath.crossings))
+            || at_lens && subpath.segments == 1 && point.is_left_by(ray);
+        if !is_passed {
+            return Met::Surface(point);
+        }
+        if subpath.crossings >= MAX_CROSSINGS {
+            counters.dropped.unfinished += 1;
+            return Met::Lost;
+        }
+        subpath.crossings += 1;
+        subpath.triangle = hit.triangle;
+        Met::Passed(point.spawn(ray.direction.into()))
+    }
+
+    /// The vertex where a camera subpath arrives.
+    pub(super) fn camera_vertex<'p>(
+        &self,
+        subpath: &Subpath,
+        point: SurfacePoint<'p>,
+        direction: Vec3,
+        lens: [f32; 2],
+    ) -> Vertex<'p> {
+        let bsdf = self.context.bsdf_at(&point);
+        let wo = point.frame.to_local(-direction);
+        let is_bent = is_bent(&point, wo);
+        let mut vertex = Vertex { point, bsdf, back: -direction, wo, sums: [Sums::default(); 2], is_bent };
+        if self.has_light_paths() && !is_bent {
+            vertex.sums[0] = self.sums_at_camera_vertex(subpath, &vertex, lens);
+        }
+        vertex
+    }
+
+    fn sums_at_camera_vertex(&self, subpath: &Subpath, vertex: &Vertex, lens: [f32; 2]) -> Sums {
+        let (point, cos) = (&vertex.point, vertex.cos(vertex.back));
+        let is_delta = vertex.bsdf.is_delta();
+        if subpath.segments > 1 {
+            let squared = point.position.distance_squared(subpath.position.into());
+            return subpath.sums().arrive(squared, cos, is_delta);
+        }
+        let [width, height] = self.size;
+        let seen = self.context.scene.camera.project(width, height, point.position, lens);
+        seen.map_or(Sums::default(), |seen| {
+            let sums = Sums::at_camera(&self.counts, width as f32 * height as f32 * seen.pdf);
+            sums.arrive(seen.distance * seen.distance, cos, is_delta)
+        })
+    }
+
+    /// The vertex where a light subpath arrives. `None` where its shading normal depends on the subpath.
+    pub(super) fn light_vertex<'p>(
+        &self,
+        subpath: &Subpath,
+        point: SurfacePoint<'p>,
+        direction: Vec3,
+    ) -> Option<Vertex<'p>> {
+        let mut vertex = self.light_surface(point, direction)?;
+        let (cos, is_delta) = (vertex.cos(direction), vertex.bsdf.is_delta());
+        vertex.sums = match subpath.segments {
+            1 => self.sums_at_first_vertex(subpath, &vertex, cos),
+            _ => {
+                let squared = vertex.point.position.distance_squared(subpath.position.into());
+                [subpath.sums(), subpath.path_sums()].map(|sums| sums.arrive(squared, cos, is_delta))
+            }
+        };
+        Some(vertex)
+    }
+
+    /// The same without sums.
+    pub(super) fn light_surface<'p>(&self, point: SurfacePoint<'p>, direction: Vec3) -> Option<Vertex<'p>> {
+        let wo = point.frame.to_local(-direction);
+        let bsdf = self.context.bsdf_at(&point);
+        let sums = [Sums::default(); 2];
+        (!is_bent(&point, wo)).then_some(Vertex { point, bsdf, back: -direction, wo, sums, is_bent: false })
+    }
+
+    /// Sums where a light subpath arrives at its first vertex: both densities of its light as they are from
+    /// there.
+    fn sums_at_first_vertex(&self, subpath: &Subpath, vertex: &Vertex, cos: f32) -> [Sums; 2] {
+        let Self { context, emission, counts, .. } = self;
+        let (scene, lights) = (context.scene, context.lights);
+        let (position, to_light) = (vertex.point.position, vertex.back);
+        let normal = normal_for_lights(&vertex.point, &vertex.bsdf);
+        let kind = emission.found(lights, subpath.light);
+        let (pdf_light, density) = match kind {
+            LightType::Area => {
+                let origin = Vec3::from(subpath.position);
+                let triangle = lights.triangle_of(subpath.light).unwrap_or_default();
+                let distance = position.distance(origin);
+                let pdf = lights.pdf_hit(scene, position, normal, triangle, distance, to_light);
+                let index = subpath.light as usize;
+                (pdf, emission.density_of_emitter(scene, lights, index, (origin, -to_light)))
+            }
+            LightType::Infinite => (
+                lights.pdf_escape(scene, position, normal, to_light),
+                emission.density_of_sky(scene, lights, to_light, position),
+            ),
+            LightType::Delta => (
+                lights.probability(subpath.light, position, normal),
+                emission.density_of_choice(scene, lights, subpath.light, position),
+            ),
+        };
+        let sums = Sums::at_light(counts, pdf_light, density, cos, kind != LightType::Delta);
+        let last = if vertex.bsdf.is_delta() { 0.0 } else { sums.last };
+        [Sums { last, ..sums }; 2]
+    }
+
+    /// The subpath goes on from `vertex` by the numbers `u`. Its next ray, and the sample of the BSDF.
+    pub(super) fn scatter(
+        &self,
+        subpath: &mut Subpath,
+        vertex: &Vertex,
+        from_light: bool,
+        u: [f32; 3],
+    ) -> Option<(Ray, BsdfSample)> {
+        let Vertex { point, bsdf, back, wo, .. } = vertex;
+        let sample = bsdf.sample::<F>(*wo, u)?;
+        let towards = point.frame.to_world(sample.direction);
+        if !point.sides_agree(sample.direction, towards) {
+            return None;
+        }
+        let mut throughput = Rgb::from(subpath.throughput) * sample.weight;
+        if from_light {
+            // Power is not squeezed by refraction, as radiance is; and where the shading normal is not that
+            // of the triangle, it is the other cosine that counts (Veach 1997, sections 5.2 and 5.3).
+            throughput *= sample.eta * sample.eta;
+            if point.frame.normal != point.geometric_normal {
+                let cosines = wo.z * vertex.cos(towards);
+                throughput *= cosines / (vertex.cos(*back) * sample.direction.z.abs());
+            }
+        }
+        if !(throughput.max_element() > 0.0 && throughput.is_finite()) {
+            return None;
+        }
+        let sums = self.sums_after(vertex, &sample, towards, from_light);
+        subpath.set(sums);
+        subpath.throughput = throughput.to_array();
+        subpath.pdf = if sample.delta { f32::INFINITY } else { sample.pdf };
+        subpath.position = point.position.to_array();
+        subpath.normal = normal_for_lights(point, bsdf).to_array();
+        subpath.triangle = point.triangle;
+        subpath.segments += 1;
+        Some((point.spawn(towards), sample))
+    }
+
+    fn sums_after(&self, vertex: &Vertex, sample: &BsdfSample, towards: Vec3, from_light: bool) -> [Sums; 2] {
+        if vertex.is_bent || !self.has_light_paths() {
+            return [Sums::default(); 2];
+        }
+        if sample.delta {
+            let cos_in = vertex.cos(vertex.back);
+            return vertex.sums.map(|sums| sums.scatter_delta(cos_in, sample.eta));
+        }
+        let cos_out = vertex.cos(towards);
+        let reverse = reverse_pdf(&self.context, (&vertex.point, &vertex.bsdf), vertex.wo, sample.direction);
+        let all = vertex.sums[0].scatter(&self.counts, sample.pdf, reverse, cos_out, None);
+        let paths = match from_light {
+            true => vertex.sums[1].scatter(&PATH_TRACING, sample.pdf, reverse, cos_out, None),
+            false => Sums::default(),
+        };
+        [all, paths]
+    }
+
+    /// Ends a light subpath at `vertex`: it keeps the sums on arrival.
+    pub(super) fn end(&self, subpath: &mut Subpath, vertex: &Vertex) {
+        subpath.set(vertex.sums);
+    }
+
+    /// Light of the environment that a camera subpath meets in `direction`.
+    pub(super) fn escape(&self, subpath: &Subpath, direction: Vec3) -> Option<Contribution> {
+        let Self { context, emission, .. } = self;
+        let (scene, lights) = (context.scene, context.lights);
+        let radiance = scene.environment.as_ref()?.radiance(scene, direction);
+        let densities = || {
+            let (position, normal) = (Vec3::from(subpath.position), Vec3::from(subpath.normal));
+            let density = match self.has_light_paths() {
+                true => emission.density_of_sky(scene, lights, direction, position),
+                false => 0.0,
+            };
+            (lights.pdf_escape(scene, position, normal, direction), density)
+        };
+        self.hit(subpath, radiance, densities)
+    }
+
+    /// Light of the surface that a camera subpath meets.
+    pub(super) fn emission(
+        &self,
+        subpath: &Subpath,
+        point: &SurfacePoint,
+        direction: Vec3,
+    ) -> Option<Contribution> {
+        let Self { context, emission, .. } = self;
+        let (scene, lights) = (context.scene, context.lights);
+        let radiance = emitted(scene, point.triangle, point.uv, point.front);
+        let densities = || {
+            let (position, normal) = (Vec3::from(subpath.position), Vec3::from(subpath.normal));
+            let distance = position.distance(point.position);
+            let density = match self.has_light_paths() {
+                true => {
+                    let from = (point.position, -direction);
+                    emission.density_of_surface(scene, lights, point.triangle, from)
+                }
+                false => 0.0,
+            };
+            (lights.pdf_hit(scene, position, normal, point.triangle, distance, direction), density)
+        };
+        self.hit(subpath, radiance, densities)
+    }
+
+    /// The contribution of light of `radiance` that is met; `densities` are those of light samples and of
+    /// emission.
+    fn hit(
+        &self,
+        subpath: &Subpath,
+        radiance: Rgb,
+        densities: impl Fn() -> (f32, f32),
+    ) -> Option<Contribution> {
+        if radiance == Rgb::ZERO {
+            return None;
+        }
+        let (mut weight, mut of_paths) = (1.0, 1.0);
+        if subpath.segments > 1 {
+            let pdf = (subpath.pdf < f32::INFINITY).then_some(subpath.pdf);
+            let (pdf_light, density) = densities();
+            weight = weight_of_hit(&self.counts, &subpath.sums(), pdf, pdf_light, density);
+            of_paths = weight_of_hit(&PATH_TRACING, &Sums::default(), pdf, pdf_light, 0.0);
+        }
+        contribution(Rgb::from(subpath.throughput) * radiance * weight, weight / of_paths)
+    }
+
+    /// A light sample at `vertex` by the numbers `u`: its shadow ray, with the light that arrives if nothing is
+    /// in its way.
+    pub(super) fn light_sample(
+        &self,
+        subpath: &Subpath,
+        vertex: &Vertex,
+        u: [f32; 3],
+    ) -> Option<(Ray, Contribution)> {
+        let Self { context, emission, counts, .. } = self;
+        let (scene, lights) = (context.scene, context.lights);
+        let Vertex { point, bsdf, wo, sums: [sums, _], is_bent, .. } = vertex;
+        let light = lights.sample(scene, point.position, normal_for_lights(point, bsdf), u)?;
+        let wi = point.frame.to_local(light.direction);
+        if !point.sides_agree(wi, light.direction) {
+            return None;
+        }
+        let (value, pdf) = bsdf.evaluate::<F>(*wo, wi);
+        if value == Rgb::ZERO {
+            return None;
+        }
+        let densities = (if light.delta { 0.0 } else { pdf }, light.pdf);
+        let (mut emitted, mut density) = ((0.0, 0.0), 0.0);
+        if self.has_light_paths() && !is_bent {
+            emitted = (vertex.cos(light.direction), reverse_pdf(context, (point, bsdf), *wo, wi));
+            density = emission.density_of_sample(scene, lights, &light, point.position);
+        }
+        let weight = weight_of_light_sample(counts, sums, densities, density, emitted);
+        let of_paths = weight_of_light_sample(&PATH_TRACING, &Sums::default(), densities, 0.0, (0.0, 0.0));
+        let radiance = Rgb::from(subpath.throughput) * value * light.radiance * (weight / light.pdf);
+        Some((shadow_ray(point, &light)?, contribution(radiance, weight / of_paths)?))
+    }
+
+    /// The connection of a camera subpath at `vertex` with a `light` subpath that has ended at `other`.
+    pub(super) fn connection(
+        &self,
+        (camera, vertex): (&Subpath, &Vertex),
+        (light, other): (&Subpath, &Vertex),
+    ) -> Option<(Ray, Contribution)> {
+        let Self { context, counts, .. } = self;
+        if vertex.is_bent || vertex.bsdf.is_delta() || other.bsdf.is_delta() {
+            return None;
+        }
+        let between = other.point.position - vertex.point.position;
+        let squared = between.length_squared();
+        let towards = between.try_normalize()?;
+        let wi = vertex.point.frame.to_local(towards);
+        let out = other.point.frame.to_local(-towards);
+        if !(vertex.point.sides_agree(wi, towards) && other.point.sides_agree(out, -towards)) {
+            return None;
+        }
+        let at_camera = scattering(context, (&vertex.point, &vertex.bsdf), vertex.wo, wi);
+        if at_camera.value == Rgb::ZERO {
+            return None;
+        }
+        let at_light = scattering_from_light(context, (&other.point, &other.bsdf), out, other.wo);
+        if at_light.value == Rgb::ZERO {
+            return None;
+        }
+        let camera_end = End {
+            sums: vertex.sums[0],
+            pdf: at_camera.to_light,
+            reverse: at_camera.to_camera,
+            cos: vertex.cos(towards),
+            merge: 0.0,
+        };
+        let light_end = End {
+            sums: light.sums(),
+            pdf: at_light.to_camera,
+            reverse: at_light.to_light,
+            cos: other.cos(towards),
+            merge: 0.0,
+        };
+        let weight = weight_of_connection(counts, &camera_end, &light_end, squared);
+        let pdf_area = camera_end.pdf * light_end.cos / squared;
+        let by_paths = weight * pdf_area * light.path_sums().before(light_end.reverse);
+        let power = Rgb::from(light.throughput) * at_light.value;
+        let power = power * (light_end.cos / (other.cos(other.back) * squared));
+        // The power of a light subpath is over the number of pixels, as if all of them were traced.
+        let power = power * counts.light_paths;
+        let radiance = Rgb::from(camera.throughput) * at_camera.value * power * weight;
+        let target = other.point.spawn(-towards).origin;
+        Some((vertex.point.spawn_to(target.into()), contribution(radiance, by_paths)?))
+    }
+
+    /// The splat of a light subpath at `vertex`: the pixel's position in the film, and the shadow ray.
+    pub(super) fn splat(
+        &self,
+        light: &Subpath,
+        vertex: &Vertex,
+        lens: [f32; 2],
+    ) -> Option<(u32, Ray, Contribution)> {
+        let Self { context, counts, size: [width, height], .. } = *self;
+        let Vertex { point, bsdf, back, wo: wi, sums: [sums, path_sums], .. } = vertex;
+        let camera = &context.scene.camera;
+        if bsdf.is_delta() {
+            return None;
+        }
+        let lens = if camera.lens_radius > 0.0 { lens } else { [0.5; 2] };
+        let seen = camera.project(width, height, point.position, lens)?;
+        let is_inside = seen.raster.cmpge(Vec2::ZERO).all()
+            && seen.raster.x < width as f32
+            && seen.raster.y < height as f32;
+        if !is_inside {
+            return None;
+        }
+        let to_camera = -seen.direction;
+        let wo = point.frame.to_local(to_camera);
+        if !point.sides_agree(wo, to_camera) {
+            return None;
+        }
+        let scattering = scattering_from_light(&context, (point, bsdf), wo, *wi);
+        let pixels = width as f32 * height as f32;
+        let pdf_area = pixels * seen.pdf * vertex.cos(to_camera) / seen.distance / seen.distance;
+        let weight = weight_of_splat(&counts, sums, pdf_area, scattering.to_light, 0.0);
+        let by_paths = weight * pdf_area * path_sums.before(scattering.to_light) / counts.light_paths;
+        let power = Rgb::from(light.throughput) * scattering.value;
+        let radiance = power * (pdf_area * weight / vertex.cos(*back));
+        let ray = point.spawn_to(lens_point(camera, lens, point.position, &seen));
+        let pixel = Tile::position([width, height], seen.raster.x as u32, seen.raster.y as u32) as u32;
+        Some((pixel, ray, contribution(radiance, by_paths)?))
+    }
+}
+
+fn contribution(radiance: Rgb, by_paths: f32) -> Option<Contribution> {
+    (radiance.max_element() > 0.0 && radiance.is_finite()).then_some(Contribution { radiance, by_paths })
+}

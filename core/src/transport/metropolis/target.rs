@@ -1,0 +1,474 @@
+//! Evaluation of points of primary sample space, a batch together: the light that each brings to a pixel.
+//!
+//! By multiplexed chains (Hachisuka et al. 2014) a point makes one technique of paths of one length: a number
+//! chooses it among all (s, t), and its light is that of the technique by its weight, times the number of
+//! techniques. By PSSMLT (Kelemen et al. 2002) a point makes a whole path of path tracing.
+
+use super::numbers::{
+    EmissionNumbers, PLACE_IN_PICTURE, Point, SLOTS_OF_PATH, TECHNIQUE, Tail, slots_of_technique,
+};
+use super::paths::{Part, Path, Paths, shadows, shadows_footprint};
+use super::split::{Contribution, MIN_SEGMENTS, Split};
+use super::subpath::{Met, Shadows, Subpath, Vertex, Walk};
+use crate::Rgb;
+use crate::bsdf::Features;
+use crate::bvh::Coherence;
+use crate::film::Tile;
+use crate::geometry::{Hit, Ray};
+use crate::light::{EmissionSampler, luminance};
+use crate::memory::{Arena, Footprint, OutOfMemory};
+use crate::sampling::Mutation;
+use crate::transport::settings::{Counters, PathSettings};
+use crate::transport::walk::context::SceneContext;
+use bytemuck::{Pod, Zeroable};
+use glam::{Vec2, Vec3};
+
+/// Points that are evaluated together.
+pub const LANES: usize = 128;
+
+/// Vertices from which a path of path tracing may be drawn anew.
+const VERTICES_OF_TAILS: u32 = 4;
+
+/// Kinds of steps.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Step {
+    /// All numbers change a little.
+    Small,
+    /// All numbers are drawn anew.
+    Large,
+    /// Those of a tail of one subpath are drawn anew.
+    Subpath,
+}
+
+/// Kinds of points.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum PrimarySpace {
+    /// One technique of a path of one length.
+    #[default]
+    Multiplexed,
+    /// All light of a path from the camera.
+    PathTracing,
+}
+
+/// The light of a point.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub(super) struct Value {
+    /// Radiance for the pixel, if all of the picture's samples fell into it.
+    pub radiance: [f32; 3],
+    /// Position of the pixel in the film.
+    pub pixel: u32,
+}
+
+/// A technique for paths of so many segments.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Technique {
+    /// The camera subpath meets a light.
+    Hit,
+    /// Light sample at the end of the camera subpath.
+    LightSample,
+    /// Connection with a light subpath of so many segments.
+    Connection(u32),
+    /// Splat of the light subpath's end.
+    Splat,
+}
+
+impl Technique {
+    /// Techniques for paths of so many segments.
+    fn count(segments: u32) -> u32 {
+        if segments == 1 { 1 } else { segments + 1 }
+    }
+
+    /// The technique that number `u` in [0, 1) chooses.
+    fn choose(segments: u32, u: f32) -> Self {
+        let count = Self::count(segments);
+        match ((u * count as f32) as u32).min(count - 1) {
+            0 => Self::Hit,
+            1 => Self::LightSample,
+            number if number == segments => Self::Splat,
+            number => Self::Connection(number - 1),
+        }
+    }
+
+    /// Segments of the light subpath and of the camera subpath.
+    fn subpaths(self, segments: u32) -> [u32; 2] {
+        match self {
+            Self::Hit => [0, segments],
+            Self::LightSample => [0, segments - 1],
+            Self::Connection(light) => [light, segments - 1 - light],
+            Self::Splat => [segments - 1, 0],
+        }
+    }
+}
+
+/// The technique of a point.
+fn technique(segments: u32, numbers: &[f32]) -> Technique {
+    Technique::choose(segments, numbers.get(TECHNIQUE).copied().unwrap_or_default())
+}
+
+/// Evaluates points.
+#[derive(Clone, Copy)]
+pub struct Target<'a, F> {
+    walk: Walk<'a, F>,
+    paths: Paths<'a, F>,
+    pub(super) split: Split<'a>,
+    pub(super) space: PrimarySpace,
+}
+
+/// Working memory of evaluations.
+pub(super) struct Lanes<'w> {
+    lights: &'w mut [Subpath],
+    /// The last ray of each light subpath, and its hit.
+    end_rays: &'w mut [Ray],
+    end_hits: &'w mut [Hit],
+    cameras: &'w mut [Subpath],
+    paths: &'w mut [Path],
+    rays: &'w mut [Ray],
+    hits: &'w mut [Hit],
+    shadows: Shadows<'w>,
+}
+
+impl<'w> Lanes<'w> {
+    pub(super) fn footprint() -> Footprint {
+        Footprint::default()
+            .slice::<Subpath>(LANES)
+            .slice::<Ray>(LANES)
+            .slice::<Hit>(LANES)
+            .slice::<Subpath>(LANES)
+            .slice::<Path>(LANES)
+            .slice::<Ray>(LANES)
+            .slice::<Hit>(LANES)
+            .and(shadows_footprint(LANES))
+    }
+
+    pub(super) fn new(arena: &mut Arena<'w>) -> Result<Self, OutOfMemory> {
+        Ok(Self {
+            lights: arena.slice(LANES)?,
+            end_rays: arena.slice(LANES)?,
+            end_hits: arena.slice(LANES)?,
+            cameras: arena.slice(LANES)?,
+            paths: arena.slice(LANES)?,
+            rays: arena.slice(LANES)?,
+            hits: arena.slice(LANES)?,
+            shadows: shadows(LANES, arena)?,
+        })
+    }
+}
+
+/// A technique of one lane.
+struct Lane<'p> {
+    number: usize,
+    segments: u32,
+    technique: Technique,
+    point: Point<'p>,
+}
+
+impl<'a, F: Features> Target<'a, F> {
+    /// The part of chains of the light of a picture by `settings`, divided by `split`.
+    pub fn new(
+        context: SceneContext<'a, F>,
+        emission: &'a EmissionSampler<'a>,
+        settings: PathSettings,
+        split: Split<'a>,
+        space: PrimarySpace,
+    ) -> Self {
+        let PathSettings { width, height, .. } = settings;
+        let walk = Walk::new(context, emission, [width, height]);
+        Self { walk, paths: Paths::new(context, emission, settings, split), split, space }
+    }
+
+    /// Numbers of a point for paths of so many segments.
+    pub(super) fn slots(&self, segments: u32) -> usize {
+        match self.space {
+            PrimarySpace::Multiplexed => slots_of_technique(segments),
+            PrimarySpace::PathTracing => SLOTS_OF_PATH,
+        }
+    }
+
+    /// Proposes a point.
+    pub(super) fn propose(
+        &self,
+        step: Step,
+        mutation: &Mutation,
+        segments: u32,
+        from: &[f32],
+        to: &mut [f32],
+    ) {
+        match step {
+            Step::Small => mutation.perturb(from, to, PLACE_IN_PICTURE),
+            Step::Large => mutation.renew(from, to, |_| true),
+            Step::Subpath => {
+                let tail = self.tail(segments, from, mutation.choice());
+                match self.space {
+                    PrimarySpace::Multiplexed => {
+                        mutation.renew(from, to, |slot| tail.has_slot_of_technique(slot));
+                    }
+                    PrimarySpace::PathTracing => mutation.renew(from, to, |slot| tail.has_slot_of_path(slot)),
+                }
+            }
+        }
+    }
+
+    /// The tail of a subpath that numbers `u` choose. It depends on the technique alone.
+    fn tail(&self, segments: u32, numbers: &[f32], [side, vertex]: [f32; 2]) -> Tail {
+        let of = |from_light, vertices: u32| Tail { from_light, first: (vertex * vertices as f32) as u32 };
+        if self.space == PrimarySpace::PathTracing {
+            return of(false, VERTICES_OF_TAILS);
+        }
+        match technique(segments, numbers) {
+            Technique::Hit => of(false, segments),
+            Technique::LightSample => of(false, segments),
+            Technique::Splat => of(true, segments - 1),
+            Technique::Connection(light) if side < 0.5 => of(true, light),
+            Technique::Connection(light) => of(false, segments - 1 - light),
+        }
+    }
+
+    /// Numbers of segments that points are for.
+    pub fn lengths(&self) -> core::ops::RangeInclusive<u32> {
+        match self.space {
+            PrimarySpace::Multiplexed => MIN_SEGMENTS..=self.split.max_segments,
+            PrimarySpace::PathTracing => MIN_SEGMENTS..=MIN_SEGMENTS,
+        }
+    }
+
+    /// The density that chains have, up to a factor: luminance, relative to the level of the pixel.
+    pub(super) fn density(&self, value: &Value) -> f32 {
+        let density = luminance(value.radiance.into()) / self.split.level(value.pixel);
+        if density > 0.0 && density < f32::INFINITY { density } else { 0.0 }
+    }
+
+    /// Evaluates the first `values.len()` lanes: `point` of each, for paths of so many segments.
+    pub(super) fn evaluate<'p>(
+        &self,
+        lanes: &mut Lanes,
+        point: impl Fn(usize) -> (Point<'p>, u32),
+        values: &mut [Value],
+        counters: &mut Counters,
+    ) {
+        values.fill(Value::default());
+        if self.space == PrimarySpace::PathTracing {
+            return self.evaluate_paths(lanes, |lane| point(lane).0, values, counters);
+        }
+        let lane = |number| {
+            let (point, segments) = point(number);
+            Lane { number, segments, technique: technique(segments, point.numbers), point }
+        };
+        self.trace_lights(lanes, &lane, values, counters);
+        self.trace_cameras(lanes, &lane, values, counters);
+        let Lanes { shadows, .. } = lanes;
+        shadows.trace(&self.walk.context, counters, |ray, light| {
+            if let Some(value) = values.get_mut(ray.tag as usize) {
+                value.radiance = light.to_array();
+            }
+        });
+    }
+
+    /// Light subpaths, and their splats.
+    fn trace_lights<'p>(
+        &self,
+        lanes: &mut Lanes,
+        lane: &impl Fn(usize) -> Lane<'p>,
+        values: &mut [Value],
+        counters: &mut Counters,
+    ) {
+        let mut active = 0;
+        for number in 0..values.len().min(LANES) {
+            lanes.end_hits[number] = Hit::NONE;
+            let Lane { segments, technique, point, .. } = lane(number);
+            if technique.subpaths(segments)[0] == 0 {
+                continue;
+            }
+            if let Some((subpath, ray)) = self.walk.from_light(&EmissionNumbers(point)) {
+                lanes.lights[number] = subpath;
+                lanes.rays[active] = Ray { tag: number as u32, ..ray };
+                active += 1;
+            }
+        }
+        while active > 0 {
+            counters.rays += active as u64;
+            let (rays, hits) = (&lanes.rays[..active], &mut lanes.hits[..active]);
+            self.walk.context.nearest_batch(rays, Coherence::Incoherent, hits);
+            let mut left = 0;
+            for i in 0..active {
+                let (ray, hit) = (lanes.rays[i], lanes.hits[i]);
+                let lane = lane(ray.tag as usize);
+                let value = &mut values[lane.number];
+                if let Some(next) = self.light_step(&lane, lanes, (&ray, &hit), value, counters) {
+                    lanes.rays[left] = Ray { tag: ray.tag, ..next };
+                    left += 1;
+                }
+            }
+            active = left;
+        }
+    }
+
+    fn light_step(
+        &self,
+        lane: &Lane,
+        lanes: &mut Lanes,
+        (ray, hit): (&Ray, &Hit),
+        value: &mut Value,
+        counters: &mut Counters,
+    ) -> Option<Ray> {
+        let Lane { number, segments, technique, point: numbers } = *lane;
+        let subpath = &mut lanes.lights[number];
+        let opacity = |n| numbers.opacity(n, true);
+        let point = match self.walk.meet(subpath, (ray, hit), false, opacity, counters) {
+            Met::Surface(point) => point,
+            Met::Passed(next) => return Some(next),
+            Met::Nothing | Met::Lost => return None,
+        };
+        let vertex = self.walk.light_vertex(subpath, point, ray.direction.into())?;
+        if subpath.segments < technique.subpaths(segments)[0] {
+            let u = numbers.scattering(subpath.segments, true);
+            return self.walk.scatter(subpath, &vertex, true, u).map(|(next, _)| next);
+        }
+        self.walk.end(subpath, &vertex);
+        if technique == Technique::Splat {
+            let (pixel, shadow, contribution) = self.walk.splat(subpath, &vertex, numbers.lens())?;
+            value.pixel = pixel;
+            lanes.shadows.push(number as u32, shadow, self.part(pixel, segments, &contribution));
+        } else if !vertex.bsdf.is_delta() {
+            (lanes.end_rays[number], lanes.end_hits[number]) = (*ray, *hit);
+        }
+        None
+    }
+
+    /// Camera subpaths, and the techniques at their ends.
+    fn trace_cameras<'p>(
+        &self,
+        lanes: &mut Lanes,
+        lane: &impl Fn(usize) -> Lane<'p>,
+        values: &mut [Value],
+        counters: &mut Counters,
+    ) {
+        let mut active = 0;
+        for (number, value) in values.iter_mut().enumerate().take(LANES) {
+            let Lane { technique, point, .. } = lane(number);
+            let is_alone = matches!(technique, Technique::Hit | Technique::LightSample);
+            if is_alone || technique != Technique::Splat && lanes.end_hits[number].is_some() {
+                let (raster, pixel) = self.raster(&point);
+                value.pixel = pixel;
+                let (subpath, ray) = self.walk.from_camera(raster, point.lens());
+                lanes.cameras[number] = subpath;
+                lanes.rays[active] = Ray { tag: number as u32, ..ray };
+                active += 1;
+            }
+        }
+        while active > 0 {
+            counters.rays += active as u64;
+            let (rays, hits) = (&lanes.rays[..active], &mut lanes.hits[..active]);
+            self.walk.context.nearest_batch(rays, Coherence::Incoherent, hits);
+            let mut left = 0;
+            for i in 0..active {
+                let (ray, hit) = (lanes.rays[i], lanes.hits[i]);
+                let lane = lane(ray.tag as usize);
+                let value = &mut values[lane.number];
+                if let Some(next) = self.camera_step(&lane, lanes, (&ray, &hit), value, counters) {
+                    lanes.rays[left] = Ray { tag: ray.tag, ..next };
+                    left += 1;
+                }
+            }
+            active = left;
+        }
+    }
+
+    fn camera_step(
+        &self,
+        lane: &Lane,
+        lanes: &mut Lanes,
+        (ray, hit): (&Ray, &Hit),
+        value: &mut Value,
+        counters: &mut Counters,
+    ) -> Option<Ray> {
+        let Lane { number, segments, technique, point: numbers } = *lane;
+        let subpath = &mut lanes.cameras[number];
+        let direction = Vec3::from(ray.direction);
+        let opacity = |n| numbers.opacity(n, false);
+        let is_last = subpath.segments == technique.subpaths(segments)[1];
+        let is_hit = technique == Technique::Hit && is_last;
+        let point = match self.walk.meet(subpath, (ray, hit), true, opacity, counters) {
+            Met::Surface(point) => point,
+            Met::Passed(next) => return Some(next),
+            Met::Nothing if is_hit => {
+                let seen = self.walk.escape(subpath, direction)?;
+                value.radiance = self.part(value.pixel, segments, &seen).to_array();
+                return None;
+            }
+            Met::Nothing | Met::Lost => return None,
+        };
+        if is_hit {
+            let seen = self.walk.emission(subpath, &point, direction)?;
+            value.radiance = self.part(value.pixel, segments, &seen).to_array();
+            return None;
+        }
+        let vertex = self.walk.camera_vertex(subpath, point, direction, numbers.lens());
+        if !is_last {
+            let u = numbers.scattering(subpath.segments, false);
+            return self.walk.scatter(subpath, &vertex, false, u).map(|(next, _)| next);
+        }
+        if vertex.bsdf.is_delta() {
+            return None;
+        }
+        let (shadow, contribution) = match technique {
+            Technique::LightSample => self.walk.light_sample(subpath, &vertex, numbers.light_sample())?,
+            _ => {
+                let (light, end) =
+                    (&lanes.lights[number], (&lanes.end_rays[number], &lanes.end_hits[number]));
+                self.connect((subpath, &vertex), light, end)?
+            }
+        };
+        lanes.shadows.push(number as u32, shadow, self.part(value.pixel, segments, &contribution));
+        None
+    }
+
+    /// The connection with a light subpath that has ended where its `ray` met `hit`.
+    fn connect(
+        &self,
+        camera: (&Subpath, &Vertex),
+        light: &Subpath,
+        (ray, hit): (&Ray, &Hit),
+    ) -> Option<(Ray, Contribution)> {
+        let point = self.walk.context.surface_at(ray, hit)?;
+        let other = self.walk.light_surface(point, ray.direction.into())?;
+        self.walk.connection(camera, (light, &other))
+    }
+
+    /// The part of chains of a technique's light, times the number of techniques.
+    fn part(&self, pixel: u32, segments: u32, contribution: &Contribution) -> Rgb {
+        let rest = 1.0 - self.split.of_paths(pixel, segments, contribution);
+        contribution.radiance * (rest * Technique::count(segments) as f32)
+    }
+
+    /// The place in the picture of a camera subpath, and the position of its pixel in the film.
+    fn raster(&self, point: &Point) -> (Vec2, u32) {
+        let [width, height] = self.walk.size;
+        let [u, v] = point.pixel();
+        let raster = Vec2::new(u * width as f32, v * height as f32);
+        let [x, y] = [(raster.x as u32).min(width - 1), (raster.y as u32).min(height - 1)];
+        (raster, Tile::position(self.walk.size, x, y) as u32)
+    }
+
+    fn evaluate_paths<'p>(
+        &self,
+        lanes: &mut Lanes,
+        point: impl Fn(usize) -> Point<'p>,
+        values: &mut [Value],
+        counters: &mut Counters,
+    ) {
+        let Lanes { paths, rays, hits, shadows, .. } = lanes;
+        let count = values.len().min(LANES);
+        for number in 0..count {
+            let point = point(number);
+            let (raster, pixel) = self.raster(&point);
+            (paths[number], rays[number]) = self.paths.start(pixel, raster, &point);
+            rays[number].tag = number as u32;
+        }
+        let numbers = |_: &Path, lane| point(lane as usize);
+        self.paths.trace((paths, rays, hits), count, shadows, numbers, Part::Chains, counters);
+        for (value, path) in values.iter_mut().zip(paths.iter()) {
+            *value = Value { radiance: path.radiance, pixel: path.pixel };
+        }
+    }
+}
