@@ -138,7 +138,7 @@ impl<'a, F: Features> Paths<'a, F> {
 
     /// The path through `raster`, and its first ray.
     pub(super) fn start(&self, pixel: u32, raster: Vec2, numbers: &impl PathNumbers) -> (Path, Ray) {
-        let (subpath, ray) = self.walk.from_camera(raster, numbers.lens());
+        let (subpath, ray) = self.walk.start_at_camera(raster, numbers.lens());
         (Path { subpath, pixel, eta_squared: 1.0, survival: 1.0, ..Path::default() }, ray)
     }
 

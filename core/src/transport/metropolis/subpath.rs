@@ -160,7 +160,7 @@ impl<'a, F: Features> Walk<'a, F> {
     }
 
     /// A camera subpath through `raster`.
-    pub(super) fn from_camera(&self, raster: Vec2, lens: [f32; 2]) -> (Subpath, Ray) {
+    pub(super) fn start_at_camera(&self, raster: Vec2, lens: [f32; 2]) -> (Subpath, Ray) {
         let ray = self.context.scene.camera.ray(self.size[0], self.size[1], raster.x, raster.y, lens);
         let pdf = f32::INFINITY;
         let subpath =
@@ -169,7 +169,7 @@ impl<'a, F: Features> Walk<'a, F> {
     }
 
     /// A light subpath by the dimensions of emission of `numbers`.
-    pub(super) fn from_light(&self, numbers: &impl Numbers) -> Option<(Subpath, Ray)> {
+    pub(super) fn start_at_light(&self, numbers: &impl Numbers) -> Option<(Subpath, Ray)> {
         let emitted = self.emission.emit(self.context.scene, self.context.lights, numbers)?;
         let subpath = Subpath {
             throughput: (emitted.power / self.counts.light_paths).to_array(),

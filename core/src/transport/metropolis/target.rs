@@ -279,7 +279,7 @@ impl<'a, F: Features> Target<'a, F> {
             if technique.subpaths(segments)[0] == 0 {
                 continue;
             }
-            if let Some((subpath, ray)) = self.walk.from_light(&EmissionNumbers(point)) {
+            if let Some((subpath, ray)) = self.walk.start_at_light(&EmissionNumbers(point)) {
                 lanes.lights[number] = subpath;
                 lanes.rays[active] = Ray { tag: number as u32, ..ray };
                 active += 1;
@@ -350,7 +350,7 @@ impl<'a, F: Features> Target<'a, F> {
             if is_alone || technique != Technique::Splat && lanes.end_hits[number].is_some() {
                 let (raster, pixel) = self.raster(&point);
                 value.pixel = pixel;
-                let (subpath, ray) = self.walk.from_camera(raster, point.lens());
+                let (subpath, ray) = self.walk.start_at_camera(raster, point.lens());
                 lanes.cameras[number] = subpath;
                 lanes.rays[active] = Ray { tag: number as u32, ..ray };
                 active += 1;
