@@ -7,6 +7,7 @@
 //! which part of a path's light belongs to whom.
 
 pub mod chain;
+mod join;
 pub mod look;
 pub(in crate::transport) mod numbers;
 pub mod paths;
