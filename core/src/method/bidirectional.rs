@@ -17,7 +17,7 @@ use crate::light::EmissionSampler;
 use crate::memory::{Footprint, MemorySource, OutOfMemory};
 use crate::transport::bidirectional::camera_paths::{CameraPaths, Connections};
 use crate::transport::bidirectional::light_pass::{LightPass, ROOM, TaskOutput};
-use crate::transport::bidirectional::merging::{MergeRadii, Merging};
+use crate::transport::bidirectional::merge_photons::{MergeRadii, Merging};
 use crate::transport::bidirectional::mis::Counts;
 use crate::transport::bidirectional::vertex::LightVertex;
 use crate::transport::photon_mapping::deposit::PhotonFilter;

@@ -11,7 +11,9 @@ use crate::light::EmissionSampler;
 use crate::memory::{Arena, Footprint, OutOfMemory};
 use crate::sampling::Sampler;
 use crate::scene::SurfacePoint;
-use crate::transport::bidirectional::merging::{Arrival, Merging};
+use crate::transport::bidirectional::arrival::Arrival;
+use crate::transport::bidirectional::camera_path::{CameraPath, Queue, Vertex};
+use crate::transport::bidirectional::merge_photons::Merging;
 use crate::transport::bidirectional::mis::{Counts, Sums};
 use crate::transport::bidirectional::vertex::{LightVertex, is_bent, reverse_pdf};
 use crate::transport::settings::{Counters, PathSettings};
@@ -19,67 +21,8 @@ use crate::transport::walk::context::SceneContext;
 use crate::transport::walk::dimension;
 use crate::transport::walk::termination::{MAX_CROSSINGS, continuation_probability, is_cut};
 use crate::transport::walk::visibility::ShadowRays;
-use bytemuck::{Pod, Zeroable};
 use core::ops::Range;
 use glam::Vec3;
-
-/// A camera path between two of its vertices.
-#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
-#[repr(C)]
-pub(super) struct CameraPath {
-    pub(super) throughput: [f32; 3],
-    /// Density of the ray's direction per solid angle; infinite after a delta lobe and at the lens.
-    pub(super) pdf: f32,
-    radiance: [f32; 3],
-    /// The part of `radiance` by which merges are too bright for their width.
-    blur: [f32; 3],
-    /// Index of the pixel in its tile.
-    place: u32,
-    /// The last vertex, and its normal for light sampling.
-    pub(super) position: [f32; 3],
-    pub(super) normal: [f32; 3],
-    /// Sums after the last scattering.
-    last: f32,
-    rest: f32,
-    merge: f32,
-    pub(super) segments: u32,
-    /// 1 behind the first rough vertex.
-    has_rough: u32,
-    /// η: count of merges at the last vertex.
-    merge_count: f32,
-    /// m: length from the lens to the last vertex.
-    pub(super) travelled: f32,
-    crossings: u32,
-    /// Triangle that the ray starts on.
-    triangle: u32,
-    /// Product of the squared relative indices of refraction.
-    eta_squared: f32,
-    /// Random numbers of the lens, which the first vertex is projected with.
-    lens: [f32; 2],
-}
-
-impl CameraPath {
-    pub(super) fn add(&mut self, radiance: Rgb) {
-        if radiance.is_finite() {
-            self.radiance = (Rgb::from(self.radiance) + radiance).to_array();
-        }
-    }
-
-    pub(super) fn add_blur(&mut self, blur: Rgb) {
-        if blur.is_finite() {
-            self.blur = (Rgb::from(self.blur) + blur).to_array();
-        }
-    }
-
-    /// Whether a rough vertex lies behind it.
-    pub(super) fn has_rough(&self) -> bool {
-        self.has_rough == 1
-    }
-
-    pub(super) fn sums(&self) -> Sums {
-        Sums { last: self.last, rest: self.rest, merge: self.merge }
-    }
-}
 
 /// The light vertices of a sample of the picture.
 #[derive(Clone, Copy)]
@@ -101,23 +44,6 @@ pub struct CameraPaths<'a, F> {
     pub(super) merging: Option<Merging<'a>>,
 }
 
-/// A vertex that a path has arrived at.
-pub(super) struct Vertex<'v> {
-    pub(super) point: &'v SurfacePoint<'v>,
-    pub(super) bsdf: &'v Bsdf,
-    /// Direction to the vertex before, local.
-    pub(super) wo: Vec3,
-    /// Sums on arrival.
-    pub(super) sums: Sums,
-    /// No rough vertex lies before it.
-    pub(super) is_first_rough: bool,
-    /// η: count of merges here, 0 where there is none.
-    pub(super) merge: f32,
-    /// The shading normal depends on the camera path: no light path can come here.
-    pub(super) is_bent: bool,
-    pub(super) sampler: Sampler,
-}
-
 /// The paths of a tile that advance together.
 struct Wave<'w> {
     paths: &'w mut [CameraPath],
@@ -126,22 +52,6 @@ struct Wave<'w> {
     /// The light vertices that each is connected to: where they are stored, and as they are.
     indices: &'w mut [u32],
     drawn: &'w mut [LightVertex],
-}
-
-/// Shadow rays of a wave, whose tag is the index of their path.
-pub(super) struct Queue<'w> {
-    shadows: ShadowRays<'w>,
-    count: usize,
-}
-
-impl Queue<'_> {
-    pub(super) fn push(&mut self, path: u32, ray: Ray, light: Rgb) {
-        let slots = (self.shadows.rays.get_mut(self.count), self.shadows.light.get_mut(self.count));
-        if let (Some(slot), Some(arrives)) = slots {
-            (*slot, *arrives) = (Ray { tag: path, ..ray }, light.to_array());
-            self.count += 1;
-        }
-    }
 }
 
 impl<'a, F: Features> CameraPaths<'a, F> {

@@ -8,73 +8,16 @@
 //! path then, as they do where every vertex is merged (Grittmann et al. 2021).
 
 use crate::Rgb;
-use crate::bsdf::{Bsdf, Features};
-use crate::photon::{Fence, Kernel, PhotonMap, QueryDisc};
-use crate::transport::bidirectional::camera_paths::{CameraPath, CameraPaths, Vertex};
+use crate::bsdf::Features;
+use crate::photon::{Fence, Kernel, QueryDisc};
+use crate::transport::bidirectional::camera_path::{CameraPath, Vertex};
+use crate::transport::bidirectional::camera_paths::CameraPaths;
+use crate::transport::bidirectional::merge_photons::Merging;
 use crate::transport::bidirectional::mis::weight_of_merge;
 use crate::transport::bidirectional::vertex::{LightVertex, scattering};
 use crate::transport::photon_mapping::density::{GRAZING, fence};
-use crate::transport::photon_mapping::radius::RadiusSchedule;
 use crate::transport::walk::dimension;
-use core::f32::consts::PI;
 use glam::Vec3;
-
-/// Radii of merges for a sample of the picture.
-#[derive(Clone, Copy, Debug)]
-pub struct MergeRadii {
-    /// Radii of kernels.
-    pub radii: RadiusSchedule,
-    /// Light paths of the sample.
-    pub light_paths: f32,
-}
-
-impl MergeRadii {
-    /// η: expected number of light paths in the disc at `position`, if each has one vertex per m² there; 0
-    /// where nothing is merged.
-    pub(super) fn count(&self, bsdf: &Bsdf, position: Vec3) -> f32 {
-        if !bsdf.is_receiver() {
-            return 0.0;
-        }
-        let radius = self.radii.radius(position);
-        self.light_paths * PI * radius * radius
-    }
-}
-
-/// The way by which light comes to a vertex where it is merged.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Arrival {
-    /// From a narrow vertex.
-    Narrow,
-    /// From a rough one that is near.
-    Near,
-}
-
-impl Arrival {
-    /// From a vertex that `is_narrow`, or at this squared distance, to one with a count of merges η: about
-    /// there merges and connections are as good as each other. `None` where light is not merged.
-    pub(super) fn of(is_narrow: bool, squared: f32, count: f32) -> Option<Self> {
-        match is_narrow {
-            true => Some(Arrival::Narrow),
-            false => (squared < count).then_some(Arrival::Near),
-        }
-    }
-
-    /// Whether light is merged that comes so to the vertex at the end of segment `segments` of a camera path.
-    pub(super) fn is_merged(self, segments: u32) -> bool {
-        self == Arrival::Narrow || segments > 1
-    }
-}
-
-/// The photons of a sample of the picture.
-#[derive(Clone, Copy)]
-pub struct Merging<'a> {
-    /// Photons whose tags are indices of `vertices`.
-    pub photons: &'a PhotonMap<'a>,
-    /// All light vertices.
-    pub vertices: &'a [LightVertex],
-    /// Kernels.
-    pub radii: MergeRadii,
-}
 
 impl<F: Features> CameraPaths<'_, F> {
     /// Light of the photons around `vertex`.

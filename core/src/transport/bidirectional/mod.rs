@@ -6,9 +6,12 @@
 //! [`mis::Counts`]: without light paths the camera paths are path tracing, without connections both together
 //! are light tracing beside path tracing.
 
+mod arrival;
+mod camera_path;
 pub mod camera_paths;
 pub mod light_pass;
-pub mod merging;
+pub mod merge_photons;
+mod merging;
 pub mod mis;
 mod techniques;
 pub mod vertex;

@@ -7,10 +7,9 @@ use crate::geometry::{Hit, Ray};
 use crate::light::emitted;
 use crate::sampling::{ONE_MINUS_EPSILON, Sampler};
 use crate::scene::SurfacePoint;
-use crate::transport::bidirectional::camera_paths::{
-    CameraPath, CameraPaths, Connections, Queue, Vertex, normal_for_lights,
-};
-use crate::transport::bidirectional::merging::Arrival;
+use crate::transport::bidirectional::arrival::Arrival;
+use crate::transport::bidirectional::camera_path::{CameraPath, Queue, Vertex};
+use crate::transport::bidirectional::camera_paths::{CameraPaths, Connections, normal_for_lights};
 use crate::transport::bidirectional::mis::{
     End, weight_of_connection, weight_of_hit, weight_of_light_sample,
 };

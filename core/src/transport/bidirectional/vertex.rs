@@ -6,7 +6,7 @@ use crate::bsdf::{Bsdf, Features};
 use crate::geometry::{Hit, Ray};
 use crate::photon::Photon;
 use crate::scene::SurfacePoint;
-use crate::transport::bidirectional::merging::Arrival;
+use crate::transport::bidirectional::arrival::Arrival;
 use crate::transport::bidirectional::mis::Sums;
 use crate::transport::walk::context::SceneContext;
 use bytemuck::{Pod, Zeroable};

@@ -3,7 +3,7 @@
 
 use super::*;
 use crate::sampling::Random;
-use crate::transport::bidirectional::merging::Arrival;
+use crate::transport::bidirectional::arrival::Arrival;
 use std::vec;
 use std::vec::Vec;
 
@@ -101,6 +101,18 @@ fn random_path(random: &Random, counter: &mut u32) -> Path {
         pdf_light: within(0.1, 30.0),
         pixel: within(1.0, 1e5),
     }
+}
+
+/// Sums of a camera path.
+struct CameraSums {
+    /// On arrival at each vertex.
+    arrived: Vec<Sums>,
+    /// After the last scattering, at the light.
+    at_light: Sums,
+    /// η at each vertex that the path may be merged at.
+    merge: Vec<f32>,
+    /// Whether a rough vertex lies between the camera and each vertex.
+    has_rough: Vec<bool>,
 }
 
 impl Path {
@@ -220,21 +232,28 @@ impl Path {
         weights
     }
 
-    /// The weights by running sums, in the same order.
-    fn recursive(&self, counts: &Counts, merges: bool, mistake: Mistake) -> Vec<f32> {
+    /// The count of merges at vertex `i`.
+    fn count(&self, i: usize, merges: bool) -> f32 {
+        if merges { self.vertices[i - 1].merge as f32 } else { 0.0 }
+    }
+
+    /// The sums after a delta vertex with cosines `cos` to both sides.
+    fn scatter_delta(sums: Sums, cos: [f64; 2], eta: f64, mistake: Mistake) -> Sums {
+        match mistake {
+            Mistake::Etendue => sums.scatter_delta(cos[1] as f32, 1.0),
+            _ => sums.scatter_delta(cos[0] as f32, eta as f32),
+        }
+    }
+
+    /// The sums of the light path on arrival at each vertex.
+    fn light_sums(&self, counts: &Counts, merges: bool, mistake: Mistake) -> Vec<Sums> {
         let k = self.vertices.len() + 1;
         let f = |x: f64| x as f32;
-        let at = |i: usize| &self.vertices[i - 1];
-        let count = |i: usize| if merges { f(at(i).merge) } else { 0.0 };
-        let delta = |sums: Sums, cos: [f64; 2], eta: f64| match mistake {
-            Mistake::Etendue => sums.scatter_delta(f(cos[1]), 1.0),
-            _ => sums.scatter_delta(f(cos[0]), f(eta)),
-        };
         let mut light = vec![Sums::default(); k + 1];
         let mut sums = Sums::default();
         let choice = if mistake == Mistake::LightChoice { self.choice } else { 1.0 };
         for (i, arrived) in light.iter_mut().enumerate().take(k).skip(1) {
-            let vertex = at(i);
+            let vertex = &self.vertices[i - 1];
             sums = match i {
                 1 => {
                     let pdf_light = f(self.pdf_light * choice);
@@ -245,36 +264,57 @@ impl Path {
                 }
                 _ => sums.arrive(f(self.squared[i - 1]), f(vertex.cos[0]), vertex.is_delta),
             };
-            let merge = vertex.is_rough.then(|| if self.arrival(i).is_some() { count(i) } else { 0.0 });
+            let has_merges = merges && self.arrival(i).is_some();
+            let merge = vertex.is_rough.then(|| self.count(i, has_merges));
             *arrived = Sums { merge: merge.unwrap_or(sums.merge), ..sums };
             sums = match vertex.is_delta {
-                true => delta(sums, vertex.cos, vertex.eta),
+                true => Self::scatter_delta(sums, vertex.cos, vertex.eta, mistake),
                 false => sums.scatter(counts, f(vertex.pdf[0]), f(vertex.pdf[1]), f(vertex.cos[1]), merge),
             };
         }
-        let mut camera = vec![Sums::default(); k + 1];
+        light
+    }
+
+    /// The sums of the camera path.
+    fn camera_sums(&self, counts: &Counts, merges: bool, mistake: Mistake) -> CameraSums {
+        let k = self.vertices.len() + 1;
+        let f = |x: f64| x as f32;
+        let mut arrived = vec![Sums::default(); k + 1];
         let paths = if mistake == Mistake::NoCount { 1.0 } else { counts.light_paths };
         let mut sums = Sums::at_camera(&Counts { light_paths: paths, ..*counts }, f(self.pixel));
         if mistake == Mistake::CameraStart {
             sums.rest = 1.0;
         }
-        // η at each vertex that the camera path may be merged at, and whether it has met a rough one before.
         let (mut merge, mut has_rough) = (vec![0.0; k + 1], vec![false; k + 1]);
         for i in (1..k).rev() {
-            let vertex = at(i);
+            let vertex = &self.vertices[i - 1];
             sums = sums.arrive(f(self.squared[i]), f(vertex.cos[1]), vertex.is_delta);
             if i + 1 < k && self.is_caustic(i + 1) {
                 sums = sums.with_merge();
             }
-            camera[i] = sums;
+            arrived[i] = sums;
             has_rough[i - 1] = has_rough[i] || vertex.is_rough;
-            merge[i] = if vertex.is_rough && !has_rough[i] { count(i) } else { 0.0 };
+            merge[i] = if vertex.is_rough && !has_rough[i] { self.count(i, merges) } else { 0.0 };
             let here = vertex.is_rough.then_some(merge[i]);
             sums = match vertex.is_delta {
-                true => delta(sums, [vertex.cos[1], vertex.cos[0]], 1.0 / vertex.eta),
+                true => {
+                    let cos = [vertex.cos[1], vertex.cos[0]];
+                    Self::scatter_delta(sums, cos, 1.0 / vertex.eta, mistake)
+                }
                 false => sums.scatter(counts, f(vertex.pdf[1]), f(vertex.pdf[0]), f(vertex.cos[0]), here),
             };
         }
+        CameraSums { arrived, at_light: sums, merge, has_rough }
+    }
+
+    /// The weights by running sums, in the same order.
+    fn recursive(&self, counts: &Counts, merges: bool, mistake: Mistake) -> Vec<f32> {
+        let k = self.vertices.len() + 1;
+        let f = |x: f64| x as f32;
+        let at = |i: usize| &self.vertices[i - 1];
+        let light = self.light_sums(counts, merges, mistake);
+        let CameraSums { arrived: camera, at_light: sums, merge, has_rough } =
+            self.camera_sums(counts, merges, mistake);
         let mut weights = vec![0.0; k + 1];
         let first = at(1);
         let (pdf_light, emission) = (f(self.pdf_light), f(self.emission()));
