@@ -1,10 +1,11 @@
-//! Metropolis light transport (Veach and Guibas 1997) in primary sample space: multiplexed (Hachisuka et al. 2014) or
-//! over path tracing (Kelemen et al. 2002), and selective (Bitterli and Jarosz 2019).
+//! Metropolis light transport (Veach and Guibas 1997) in primary sample space: multiplexed (Hachisuka et al.
+//! 2014) or over path tracing (Kelemen et al. 2002), and selective (Bitterli and Jarosz 2019).
 //!
-//! For each sample of the picture independent points are drawn, chains start from them, and their splats make the
-//! sample together with a path that is traced for each pixel. The mean density of the points is the brightness of the
-//! chains' light. Points, starts and chains are new for each sample: it has no bias however short the chains are, the
-//! halves of the film stay independent, and no brightness is estimated once and for all.
+//! For each sample of the picture independent points are drawn, chains start from them, and their splats make
+//! the sample together with a path that is traced for each pixel. The mean density of the points is the
+//! brightness of the chains' light. Points, starts and chains are new for each sample: it has no bias however
+//! short the chains are, the halves of the film stay independent, and no brightness is estimated once and for
+//! all.
 
 use super::executor::{Executor, Passed};
 use super::{Method, RenderContext, Round};
@@ -14,13 +15,17 @@ use crate::light::{EmissionSampler, luminance};
 use crate::memory::{Arena, Footprint, MemorySource, OutOfMemory};
 use crate::transport::Counters;
 use crate::transport::metropolis::chain::{Chains, ChainsOutput, Steps, room};
+use crate::transport::metropolis::lanes::LANES;
 use crate::transport::metropolis::look::{CANDIDATES, Lengths, Look};
 use crate::transport::metropolis::paths::Paths;
 use crate::transport::metropolis::split::{CELL, MAX_SEGMENTS, Split};
-use crate::transport::metropolis::target::{LANES, Target};
+use crate::transport::metropolis::target::Target;
 use core::ops::Range;
 
+mod settings;
+
 pub use crate::transport::metropolis::target::PrimarySpace;
+pub use settings::{ChainUse, MetropolisSettings};
 
 /// One of so many points that are evaluated for a sample is independent.
 const INDEPENDENT: usize = 4;
@@ -42,41 +47,6 @@ const MOST_PASSES: usize = 32;
 
 /// Least level of a pixel, relative to the mean of the picture.
 const LEAST_LEVEL: f32 = 0.1;
-
-/// Choices of Metropolis light transport.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct MetropolisSettings {
-    /// What a point of a chain makes.
-    pub space: PrimarySpace,
-    /// Points evaluated for each pixel of a sample, a quarter of them independent.
-    pub mutations: u32,
-    /// Largest contribution of path tracing relative to the rough brightness of a pixel; chains have the rest. 0
-    /// leaves all light to chains, except that of paths of fewer than 3 or more than 20 segments.
-    pub threshold: f32,
-}
-
-impl Default for MetropolisSettings {
-    fn default() -> Self {
-        Self { space: PrimarySpace::default(), mutations: 4, threshold: 2.0 }
-    }
-}
-
-/// Use of chains.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct ChainUse {
-    /// Chains of a sample of the picture, and mutations of each.
-    pub chains: u32,
-    /// Mutations of each chain.
-    pub mutations: u32,
-    /// Independent points of a sample.
-    pub candidates: u32,
-    /// Shares of small steps, of large steps and of steps of a subpath that were accepted.
-    pub accepted: [f64; 3],
-    /// Light of chains over that of the picture, about.
-    pub share: f64,
-    /// Relative standard deviation of that share's mean over the samples; 0 of one sample.
-    pub share_error: f64,
-}
 
 /// Sums over samples, for [`ChainUse`].
 #[derive(Clone, Copy, Default)]
@@ -155,7 +125,8 @@ impl<'a, F: Features> Metropolis<'a, F> {
         Chains::<F>::scratch(LONGEST).or(Look::<F>::scratch()).or(pilot)
     }
 
-    /// Metropolis light transport of `context`, with fewer chains where memory is short, leaving `others` bytes.
+    /// Metropolis light transport of `context`, with fewer chains where memory is short, leaving `others`
+    /// bytes.
     ///
     /// # Errors
     /// [`OutOfMemory`] where there is no memory for 128 chains, or too little scratch.
@@ -247,8 +218,8 @@ impl<'a, F: Features> Metropolis<'a, F> {
         Ok(())
     }
 
-    /// Makes of `levels`, the light of so many `passes` of chains in each cell, its mean radiance with the light that
-    /// is not for chains. Whether the executor was not over.
+    /// Makes of `levels`, the light of so many `passes` of chains in each cell, its mean radiance with the
+    /// light that is not for chains. Whether the executor was not over.
     fn measure_levels(
         &self,
         levels: &mut [f32],

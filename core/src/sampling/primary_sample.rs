@@ -8,8 +8,8 @@
 //! A departure from the paper: s is not fixed, but drawn for each small step from 1/512 to 1/8, evenly over
 //! its logarithm. No single size suits a large lamp and a small one.
 //!
-//! A third kind of step draws some numbers anew and keeps the others: a tail of a subpath, for instance. It is as likely
-//! as its reverse as long as the choice of those numbers does not depend on them.
+//! A third kind of step draws some numbers anew and keeps the others: a tail of a subpath, for instance. It
+//! is as likely as its reverse as long as the choice of those numbers does not depend on them.
 //!
 //! A mutation follows from its key and number alone.
 

@@ -5,8 +5,8 @@
 //! at a time, kept to test the other against. The other folders hold methods that know some of the light from
 //! a structure, each an [`Estimator`] of the path tracer: [`photon_mapping`] traces photons and estimates
 //! their density; [`caustics`] merges them with paths; [`cached`] places, gathers and looks up records of the
-//! irradiance cache. [`metropolis`] runs Markov chains over the random numbers of paths. `prepass` learns what
-//! the first sample needs.
+//! irradiance cache. [`metropolis`] runs Markov chains over the random numbers of paths. `prepass` learns
+//! what the first sample needs.
 
 pub mod bidirectional;
 pub mod cached;

@@ -1,8 +1,9 @@
 //! Markov chains in primary sample space, all of a task in lockstep, so that the tracer sees batches of rays.
 
+use super::lanes::{LANES, Lanes};
 use super::look::Look;
 use super::numbers::{NUMBERS, Point, Source};
-use super::target::{LANES, Lanes, Step, Value};
+use super::target::{Step, Value};
 use crate::Rgb;
 use crate::bsdf::Features;
 use crate::film::{Splat, StripOffsets, sort_by_strip};
@@ -81,8 +82,8 @@ pub struct Chains<'a, F> {
 }
 
 impl<'a, F: Features> Chains<'a, F> {
-    /// Chains of `mutations` that start from points of `look`, for a film of `pixels`; `scale` is the radiance
-    /// that one visit of density 1 brings to a pixel.
+    /// Chains of `mutations` that start from points of `look`, for a film of `pixels`; `scale` is the
+    /// radiance that one visit of density 1 brings to a pixel.
     pub fn new(
         look: Look<'a, F>,
         (seed, sample): (u32, u32),
@@ -102,8 +103,8 @@ impl<'a, F: Features> Chains<'a, F> {
             .slice::<Splat>(room(mutations))
     }
 
-    /// Runs the chains of `task` from the candidates `starts`, up to [`LANES`]; their splats, sorted by strips,
-    /// go into `splats`, which has [`room`] for all.
+    /// Runs the chains of `task` from the candidates `starts`, up to [`LANES`]; their splats, sorted by
+    /// strips, go into `splats`, which has [`room`] for all.
     ///
     /// # Errors
     /// [`OutOfMemory`] where `scratch` has less than [`Chains::scratch`].

@@ -81,8 +81,8 @@ impl<F: Features> Walk<'_, F> {
         contribution(Rgb::from(subpath.throughput) * radiance * weight, weight / of_paths)
     }
 
-    /// A light sample at `vertex` by the numbers `u`: its shadow ray, with the light that arrives if nothing is
-    /// in its way.
+    /// A light sample at `vertex` by the numbers `u`: its shadow ray, with the light that arrives if nothing
+    /// is in its way.
     pub(super) fn light_sample(
         &self,
         subpath: &Subpath,

@@ -1,9 +1,11 @@
-//! Independent points, of which chains start (Veach 1997, section 11.3.1): their mean density is the brightness
-//! of the picture, and a chain that starts from a point drawn in proportion to its density has no start-up bias.
+//! Independent points, of which chains start (Veach 1997, section 11.3.1): their mean density is the
+//! brightness of the picture, and a chain that starts from a point drawn in proportion to its density has no
+//! start-up bias.
 
+use super::lanes::{LANES, Lanes};
 use super::numbers::{NUMBERS, Point, Source};
 use super::split::MAX_SEGMENTS;
-use super::target::{LANES, Lanes, Target, Value};
+use super::target::{Target, Value};
 use crate::bsdf::Features;
 use crate::memory::{Arena, Footprint, OutOfMemory};
 use crate::sampling::{Random, Sampler, mix};

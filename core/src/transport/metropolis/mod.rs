@@ -1,6 +1,6 @@
-//! Metropolis light transport in primary sample space: Markov chains over the random numbers of paths (Kelemen
-//! et al. 2002), one technique of a bidirectional path tracer at a time (Hachisuka et al. 2014), and the path
-//! tracer that leaves to them the light that it finds badly (Bitterli and Jarosz 2019).
+//! Metropolis light transport in primary sample space: Markov chains over the random numbers of paths
+//! (Kelemen et al. 2002), one technique of a bidirectional path tracer at a time (Hachisuka et al. 2014), and
+//! the path tracer that leaves to them the light that it finds badly (Bitterli and Jarosz 2019).
 //!
 //! [`target`] evaluates points of primary sample space, a batch together; [`look`] draws independent points,
 //! the candidates of chains; [`chain`] runs chains; [`paths`] is the path tracer beside them; [`split`] says
@@ -8,12 +8,14 @@
 
 pub mod chain;
 mod join;
+pub mod lanes;
 pub mod look;
 pub(in crate::transport) mod numbers;
 pub mod paths;
 pub mod split;
 mod subpath;
 pub mod target;
+mod technique;
 
 #[cfg(test)]
 mod tests;

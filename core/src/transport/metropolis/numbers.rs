@@ -18,8 +18,8 @@ const EMISSION_PLACE: usize = 8;
 const EMISSION_DIRECTION: usize = 10;
 const EMISSION_CHOICE: usize = 12;
 
-/// The first slot of the vertices, and the slots of each: directions in which the camera subpath and the light
-/// subpath leave their n-th vertex, and lobes of both.
+/// The first slot of the vertices, and the slots of each: directions in which the camera subpath and the
+/// light subpath leave their n-th vertex, and lobes of both.
 const VERTICES: usize = 14;
 const VERTEX: usize = 6;
 

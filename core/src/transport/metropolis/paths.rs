@@ -1,5 +1,5 @@
-//! The path tracer beside Markov chains: it adds its part of the light of each path ([`Split`]). The same paths
-//! by mutated numbers, with the other part, are the points of PSSMLT (Kelemen et al. 2002).
+//! The path tracer beside Markov chains: it adds its part of the light of each path ([`Split`]). The same
+//! paths by mutated numbers, with the other part, are the points of PSSMLT (Kelemen et al. 2002).
 
 use super::numbers::PathNumbers;
 use super::split::{Contribution, Split};
@@ -84,8 +84,8 @@ impl<'a, F: Features> Paths<'a, F> {
             .and(shadows_footprint(PIXELS_PER_TILE))
     }
 
-    /// Adds `samples` of tile `tile` to its pixels `out`, each with the light of `splats`, those of the tile's
-    /// pixels.
+    /// Adds `samples` of tile `tile` to its pixels `out`, each with the light of `splats`, those of the
+    /// tile's pixels.
     ///
     /// # Errors
     /// [`OutOfMemory`] where `scratch` has less than [`Paths::scratch`].

@@ -1,10 +1,10 @@
 //! The division of light between path tracing and Markov chains (selective Metropolis light transport,
 //! Bitterli and Jarosz 2019).
 //!
-//! A path of contribution F, which path tracing finds with density p by all of its techniques, would add F / p
-//! to a pixel. Path tracing adds λ F / p with λ = min(1, T m / (F / p)), for a pixel of radiance about m: no
-//! contribution exceeds T m. Chains have the rest, (1 − λ) F. λ depends on the path alone, so that both parts
-//! add up to F whatever m and T are.
+//! A path of contribution F, which path tracing finds with density p by all of its techniques, would add F /
+//! p to a pixel. Path tracing adds λ F / p with λ = min(1, T m / (F / p)), for a pixel of radiance about m:
+//! no contribution exceeds T m. Chains have the rest, (1 − λ) F. λ depends on the path alone, so that both
+//! parts add up to F whatever m and T are.
 
 use crate::Rgb;
 use crate::light::luminance;
@@ -12,8 +12,8 @@ use crate::light::luminance;
 /// Pixels of a cell of the rough picture: 8 × 8, a run of the film.
 pub const CELL: usize = 64;
 
-/// Fewest segments of paths whose light may be left to chains. Path tracing samples the light that is seen, and
-/// direct light, by stratified numbers.
+/// Fewest segments of paths whose light may be left to chains. Path tracing samples the light that is seen,
+/// and direct light, by stratified numbers.
 pub const MIN_SEGMENTS: u32 = 3;
 
 /// Most segments of such paths.

@@ -4,27 +4,23 @@
 //! chooses it among all (s, t), and its light is that of the technique by its weight, times the number of
 //! techniques. By PSSMLT (Kelemen et al. 2002) a point makes a whole path of path tracing.
 
-use super::numbers::{
-    EmissionNumbers, PLACE_IN_PICTURE, Point, SLOTS_OF_PATH, TECHNIQUE, Tail, slots_of_technique,
-};
-use super::paths::{Part, Path, Paths, shadows, shadows_footprint};
+use super::lanes::{LANES, Lanes};
+use super::numbers::{EmissionNumbers, PLACE_IN_PICTURE, Point, SLOTS_OF_PATH, Tail, slots_of_technique};
+use super::paths::{Part, Path, Paths};
 use super::split::{Contribution, MIN_SEGMENTS, Split};
-use super::subpath::{Met, Shadows, Subpath, Vertex, Walk};
+use super::subpath::{Met, Subpath, Vertex, Walk};
+use super::technique::{Technique, technique};
 use crate::Rgb;
 use crate::bsdf::Features;
 use crate::bvh::Coherence;
 use crate::film::Tile;
 use crate::geometry::{Hit, Ray};
 use crate::light::{EmissionSampler, luminance};
-use crate::memory::{Arena, Footprint, OutOfMemory};
 use crate::sampling::Mutation;
 use crate::transport::settings::{Counters, PathSettings};
 use crate::transport::walk::context::SceneContext;
 use bytemuck::{Pod, Zeroable};
 use glam::{Vec2, Vec3};
-
-/// Points that are evaluated together.
-pub const LANES: usize = 128;
 
 /// Vertices from which a path of path tracing may be drawn anew.
 const VERTICES_OF_TAILS: u32 = 4;
@@ -60,52 +56,6 @@ pub(super) struct Value {
     pub pixel: u32,
 }
 
-/// A technique for paths of so many segments.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Technique {
-    /// The camera subpath meets a light.
-    Hit,
-    /// Light sample at the end of the camera subpath.
-    LightSample,
-    /// Connection with a light subpath of so many segments.
-    Connection(u32),
-    /// Splat of the light subpath's end.
-    Splat,
-}
-
-impl Technique {
-    /// Techniques for paths of so many segments.
-    fn count(segments: u32) -> u32 {
-        if segments == 1 { 1 } else { segments + 1 }
-    }
-
-    /// The technique that number `u` in [0, 1) chooses.
-    fn choose(segments: u32, u: f32) -> Self {
-        let count = Self::count(segments);
-        match ((u * count as f32) as u32).min(count - 1) {
-            0 => Self::Hit,
-            1 => Self::LightSample,
-            number if number == segments => Self::Splat,
-            number => Self::Connection(number - 1),
-        }
-    }
-
-    /// Segments of the light subpath and of the camera subpath.
-    fn subpaths(self, segments: u32) -> [u32; 2] {
-        match self {
-            Self::Hit => [0, segments],
-            Self::LightSample => [0, segments - 1],
-            Self::Connection(light) => [light, segments - 1 - light],
-            Self::Splat => [segments - 1, 0],
-        }
-    }
-}
-
-/// The technique of a point.
-fn technique(segments: u32, numbers: &[f32]) -> Technique {
-    Technique::choose(segments, numbers.get(TECHNIQUE).copied().unwrap_or_default())
-}
-
 /// Evaluates points.
 #[derive(Clone, Copy)]
 pub struct Target<'a, F> {
@@ -113,46 +63,6 @@ pub struct Target<'a, F> {
     paths: Paths<'a, F>,
     pub(super) split: Split<'a>,
     pub(super) space: PrimarySpace,
-}
-
-/// Working memory of evaluations.
-pub(super) struct Lanes<'w> {
-    lights: &'w mut [Subpath],
-    /// The last ray of each light subpath, and its hit.
-    end_rays: &'w mut [Ray],
-    end_hits: &'w mut [Hit],
-    cameras: &'w mut [Subpath],
-    paths: &'w mut [Path],
-    rays: &'w mut [Ray],
-    hits: &'w mut [Hit],
-    shadows: Shadows<'w>,
-}
-
-impl<'w> Lanes<'w> {
-    pub(super) fn footprint() -> Footprint {
-        Footprint::default()
-            .slice::<Subpath>(LANES)
-            .slice::<Ray>(LANES)
-            .slice::<Hit>(LANES)
-            .slice::<Subpath>(LANES)
-            .slice::<Path>(LANES)
-            .slice::<Ray>(LANES)
-            .slice::<Hit>(LANES)
-            .and(shadows_footprint(LANES))
-    }
-
-    pub(super) fn new(arena: &mut Arena<'w>) -> Result<Self, OutOfMemory> {
-        Ok(Self {
-            lights: arena.slice(LANES)?,
-            end_rays: arena.slice(LANES)?,
-            end_hits: arena.slice(LANES)?,
-            cameras: arena.slice(LANES)?,
-            paths: arena.slice(LANES)?,
-            rays: arena.slice(LANES)?,
-            hits: arena.slice(LANES)?,
-            shadows: shadows(LANES, arena)?,
-        })
-    }
 }
 
 /// A technique of one lane.

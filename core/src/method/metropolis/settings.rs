@@ -1,0 +1,38 @@
+//! Choices of Metropolis light transport, and the use of its chains.
+
+use super::PrimarySpace;
+
+/// Choices of Metropolis light transport.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MetropolisSettings {
+    /// What a point of a chain makes.
+    pub space: PrimarySpace,
+    /// Points evaluated for each pixel of a sample, a quarter of them independent.
+    pub mutations: u32,
+    /// Largest contribution of path tracing relative to the rough brightness of a pixel; chains have the rest. 0
+    /// leaves all light to chains, except that of paths of fewer than 3 or more than 20 segments.
+    pub threshold: f32,
+}
+
+impl Default for MetropolisSettings {
+    fn default() -> Self {
+        Self { space: PrimarySpace::default(), mutations: 4, threshold: 2.0 }
+    }
+}
+
+/// Use of chains.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ChainUse {
+    /// Chains of a sample of the picture, and mutations of each.
+    pub chains: u32,
+    /// Mutations of each chain.
+    pub mutations: u32,
+    /// Independent points of a sample.
+    pub candidates: u32,
+    /// Shares of small steps, of large steps and of steps of a subpath that were accepted.
+    pub accepted: [f64; 3],
+    /// Light of chains over that of the picture, about.
+    pub share: f64,
+    /// Relative standard deviation of that share's mean over the samples; 0 of one sample.
+    pub share_error: f64,
+}
