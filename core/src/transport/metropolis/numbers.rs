@@ -134,7 +134,7 @@ impl Point<'_> {
         [u, v, self.at(vertex + 4 + side)]
     }
 
-    /// Number of the `n`th surface with a cut-out.
+    /// Number of a surface with a cut-out after `n` others, scattered at or passed.
     pub(super) fn opacity(&self, n: u32, from_light: bool) -> f32 {
         self.draw(n + if from_light { LIGHT_CROSSING } else { CAMERA_CROSSING })
     }
@@ -173,7 +173,7 @@ pub(super) trait PathNumbers {
     fn scattering(&self, n: u32) -> [f32; 3];
     /// Russian roulette there.
     fn roulette(&self, n: u32) -> f32;
-    /// The `n`th surface with a cut-out.
+    /// A surface with a cut-out after `n` others, scattered at or passed.
     fn opacity(&self, n: u32) -> f32;
 }
 

@@ -177,8 +177,8 @@ impl<'a, F: Features> Walk<'a, F> {
         Some((subpath, emitted.ray))
     }
 
-    /// The end of `ray`, which met `hit`. `opacity` gives the random number of the n-th surface with a
-    /// cut-out.
+    /// The end of `ray`, which met `hit`. `opacity` gives the random number of a surface with a
+    /// cut-out after n others.
     pub(super) fn meet(
         &self,
         subpath: &mut Subpath,
@@ -191,7 +191,9 @@ impl<'a, F: Features> Walk<'a, F> {
             return Met::Nothing;
         }
         let Some(point) = self.context.surface_at(ray, hit) else { return Met::Lost };
-        let is_passed = self.context.is_passed(&point, hit, subpath.triangle, || opacity(subpath.crossings))
+        // Scattered at or passed before.
+        let surfaces = subpath.segments - 1 + subpath.crossings;
+        let is_passed = self.context.is_passed(&point, hit, subpath.triangle, || opacity(surfaces))
             || at_lens && subpath.segments == 1 && point.is_left_by(ray);
         if !is_passed {
             return Met::Surface(point);
