@@ -61,3 +61,13 @@ unsafe extern "C" fn memcmp(a: *const u8, b: *const u8, n: usize) -> i32 {
     }
     0
 }
+
+/// Compares `n` bytes for equality; optimised code calls it in place of memcmp.
+///
+/// # Safety
+/// As bcmp of C.
+#[unsafe(no_mangle)]
+unsafe extern "C" fn bcmp(a: *const u8, b: *const u8, n: usize) -> i32 {
+    // SAFETY: the caller's promises are those of memcmp.
+    unsafe { memcmp(a, b, n) }
+}
