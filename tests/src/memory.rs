@@ -33,7 +33,7 @@ impl TestArena {
 /// Calls `work` with the hierarchy and the lights of a scene.
 ///
 /// # Panics
-/// Where a footprint is less than a build takes.
+/// If a footprint is less than a build takes.
 pub fn with_structures<T>(scene: &Scene, work: impl FnOnce(&Bvh, &LightSampler) -> T) -> T {
     let mut bvh = TestArena::new(Bvh::footprint(scene.mesh.triangles.len()));
     let bvh = Bvh::build(&scene.mesh, &mut bvh.arena()).expect("the footprint suffices");

@@ -28,19 +28,6 @@ const SPP: u32 = 9;
 
 const SEEDS: [u32; 2] = [0, 77];
 
-const METHODS: [Method; 10] = [
-    Method::Path,
-    Method::IrradianceCache,
-    Method::PhotonMap,
-    Method::ProgressivePhotons,
-    Method::LightTracing,
-    Method::Bidirectional,
-    Method::VertexMerging,
-    Method::InstantRadiosity,
-    Method::ClampedInstantRadiosity,
-    Method::Metropolis,
-];
-
 /// The scenes: those of the repository as they are loaded, and others made by hand.
 fn for_each_scene(mut each: impl FnMut(&str, &Scene)) {
     for file in
@@ -109,7 +96,7 @@ fn pictures_are_the_same_to_the_bit() {
     let is_written = std::env::var_os("GOLDEN").is_some_and(|value| value == "write");
     let mut changed = Vec::new();
     for_each_scene(|name, scene| {
-        for method in METHODS {
+        for method in Method::ALL {
             for seed in SEEDS {
                 for level in Level::detect().and_below() {
                     let key = format!("{name} {} {seed} {}", method.name(), level.name());

@@ -16,7 +16,7 @@ const REACH: usize = 2;
 /// uncertain itself: with 1.5 it leaves too much noise.
 const NOISE: f32 = 2.0;
 
-/// What the `pixels` of `tile` probably are, in a picture of mean `mean`: filtered, in the order of the
+/// The likely values of the `pixels` of `tile`, in a picture of mean `mean`: filtered, in the order of the
 /// tile's pixels.
 pub fn filtered(tile: Tile, pixels: &[Pixel], mean: f64) -> [Rgb; PIXELS_PER_TILE] {
     let square = Square::new(tile, pixels, mean);

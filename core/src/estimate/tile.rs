@@ -103,8 +103,8 @@ impl core::ops::AddAssign for Parts {
 }
 
 impl TileError {
-    /// Of the `pixels` of `tile` in a picture of mean `mean` > 0, with what its tiles tell of it. Pixels
-    /// whose halves have no two samples each are left out.
+    /// The error of the `pixels` of `tile` in a picture of mean `mean` > 0, with what its tiles tell of it.
+    /// Pixels whose halves have no two samples each are left out.
     pub fn of(tile: Tile, pixels: &[Pixel], mean: f64, shrinkage: &Shrinkage) -> Self {
         let scale = (1.0 / mean) as f32;
         let seen = TileStatistics::new(tile, pixels, scale);

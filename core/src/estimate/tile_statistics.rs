@@ -29,7 +29,7 @@ pub(super) struct TileStatistics {
 }
 
 impl TileStatistics {
-    /// Of the `pixels` of `tile`, times `scale`.
+    /// The statistics of the `pixels` of `tile`, times `scale`.
     pub(super) fn new(tile: Tile, pixels: &[Pixel], scale: f32) -> Self {
         let mut quarters = [None; PLACES];
         let [mut picture, mut around] = [[Vec4::ZERO; PLACES]; 2];

@@ -84,7 +84,7 @@ impl Tile {
         (x, dissolved(y, !x, whole(self.height)))
     }
 
-    /// Where a film of `width` × `height` keeps the pixel in column `x` and row `y`.
+    /// Position in a film of `width` × `height` of the pixel in column `x` and row `y`.
     #[inline]
     pub const fn position([width, height]: [u32; 2], x: u32, y: u32) -> usize {
         let y = dissolved(y, !x, whole(height));

@@ -10,9 +10,10 @@
 
 use super::emission_guide::{EmissionGuide, GuideSettings, Target};
 use super::executor::{Executor, Passed};
+use super::splats::{add_splats, splats_of_tile};
 use super::{Method, PhotonMapStore, RenderContext, Round, caustics};
 use crate::bsdf::Features;
-use crate::film::{PIXELS_PER_TILE, Splat, Tile, add_strip, strip_length};
+use crate::film::{PIXELS_PER_TILE, Splat, Tile};
 use crate::light::EmissionSampler;
 use crate::memory::{Footprint, MemorySource, OutOfMemory};
 use crate::transport::bidirectional::camera_paths::{CameraPaths, Connections};
@@ -87,7 +88,7 @@ struct VertexMerging<'a> {
 }
 
 impl VertexMerging<'_> {
-    /// Radii of `sample`, which has so many light paths; those of the pilot are the first.
+    /// Radii of `sample`, which has `light_paths`; those of the pilot are the first.
     fn radii(&self, sample: u32, light_paths: f32) -> MergeRadii {
         MergeRadii { radii: self.radii.after(FIRST_RADIUS, sample % PILOT / 2), light_paths }
     }
@@ -99,7 +100,7 @@ impl<'a, F: Features> Bidirectional<'a, F> {
         LightPass::<F>::scratch().or(CameraPaths::<F>::scratch(settings.connections))
     }
 
-    /// Memory of `tasks` of light paths, with room for so many vertices.
+    /// Memory of `tasks` of light paths, with room for `vertices`.
     fn footprint(tasks: usize, vertices: usize) -> Footprint {
         Footprint::default()
             .slice::<LightVertex>(vertices)
@@ -208,13 +209,8 @@ impl<'a, F: Features> Bidirectional<'a, F> {
             return Ok(None);
         }
         let (splats, outputs) = (&**splats, &**outputs);
-        let length = strip_length(picture.len());
-        let added = executor.pass(picture.chunks_mut(length), |strip, pixels, _| {
-            let tasks = splats.chunks(ROOM).zip(outputs.iter().map(TaskOutput::offsets));
-            add_strip(strip, length, tasks, pixels);
-            Ok(Counters::default())
-        })?;
-        if !added.is_complete {
+        let lists = splats.chunks(ROOM).zip(outputs.iter().map(TaskOutput::offsets));
+        if !add_splats(executor, picture, lists)? {
             return Ok(None);
         }
         // The vertices of all tasks, one after the other.
@@ -280,9 +276,7 @@ impl<F: Features> Method for Bidirectional<'_, F> {
             let paths = CameraPaths::new(scene, emission, context.settings, *counts, connections)
                 .with_merging(merging);
             round.tiles(sample + 1, |tile, samples, scratch, pixels| {
-                let first = tile * PIXELS_PER_TILE;
-                let splats = picture.get(first..first + PIXELS_PER_TILE).unwrap_or_default();
-                paths.run(tile, samples, splats, scratch, pixels)
+                paths.run(tile, samples, splats_of_tile(picture, tile), scratch, pixels)
             })?;
         }
         Ok(())

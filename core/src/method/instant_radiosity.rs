@@ -2,14 +2,15 @@
 //! light camera paths as virtual point lights. The geometry term is bounded, and camera paths go on for what
 //! the bound cuts (Kollig and Keller 2004); the clamped form leaves that out and estimates how much it is.
 //!
-//! Where neighbouring pixels reuse paths, virtual lights light the second vertex, whose light all pixels of a
+//! If neighbouring pixels reuse paths, virtual lights light the second vertex, whose light all pixels of a
 //! circle receive; otherwise the first.
 
 use super::executor::{Executor, Passed};
 use super::path::{PathTracing, Reuse};
+use super::splats::{add_splats, splats_of_tile};
 use super::{Method, RenderContext, Round};
 use crate::bsdf::Features;
-use crate::film::{PIXELS_PER_TILE, Pixel, Splat, Tile, add_strip, strip_length};
+use crate::film::{PIXELS_PER_TILE, Pixel, Splat, Tile};
 use crate::light::{EmissionSampler, luminance};
 use crate::memory::{Arena, Footprint, MemorySource, OutOfMemory};
 use crate::transport::instant_radiosity::light_pass::{
@@ -39,7 +40,7 @@ const BOUND: f32 = 4.0;
 /// Number of the pass that the lit area is estimated from.
 const PILOT: u32 = 1 << 30;
 
-/// One tile of so many is rendered twice, to estimate the light that the bound cuts.
+/// One of this number of tiles is rendered twice, to estimate the light that the bound cuts.
 const TILES_PER_ESTIMATE: usize = 16;
 
 /// How virtual lights are used.
@@ -89,7 +90,7 @@ pub struct InstantRadiosity<'a, F> {
     /// Splats of each set, and of the sample in the order of the film; none where nothing needs them.
     splats: &'a mut [Splat],
     picture: &'a mut [[f32; 3]],
-    /// Of each tile, where light is left out.
+    /// Light of each tile, if some is left out.
     cut: &'a mut [TileLight],
     bound: f32,
     /// The sample that the sets are of.
@@ -106,7 +107,7 @@ impl<'a, F: Features> InstantRadiosity<'a, F> {
             .or(LightPass::<F>::scratch())
     }
 
-    /// Memory of so many `sets` of virtual lights.
+    /// Memory of `sets` of virtual lights.
     fn footprint(sets: usize, has_splats: bool) -> Footprint {
         let splats = if has_splats { sets * PATHS } else { 0 };
         Footprint::default()
@@ -201,13 +202,8 @@ impl<'a, F: Features> InstantRadiosity<'a, F> {
             return Ok(None);
         }
         let (splats, outputs) = (&**splats, &**outputs);
-        let length = strip_length(picture.len());
-        let added = executor.pass(picture.chunks_mut(length), |strip, pixels, _| {
-            let tasks = splats.chunks(PATHS).zip(outputs.iter().map(SetOutput::offsets));
-            add_strip(strip, length, tasks, pixels);
-            Ok(Counters::default())
-        })?;
-        Ok(added.is_complete.then_some(counters))
+        let lists = splats.chunks(PATHS).zip(outputs.iter().map(SetOutput::offsets));
+        Ok(add_splats(executor, picture, lists)?.then_some(counters))
     }
 
     /// The virtual lights of tile `tile`.
@@ -218,8 +214,7 @@ impl<'a, F: Features> InstantRadiosity<'a, F> {
 
     fn lighting(&self, tile: usize, is_clamped: bool) -> VirtualLighting<'_> {
         let (connections, bound) = (self.used.connections, self.bound);
-        let first = tile * PIXELS_PER_TILE;
-        let splats = self.picture.get(first..first + PIXELS_PER_TILE).unwrap_or_default();
+        let splats = splats_of_tile(self.picture, tile);
         VirtualLighting { lights: self.set(tile), connections, bound, is_clamped, splats }
     }
 

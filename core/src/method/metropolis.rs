@@ -8,9 +8,10 @@
 //! all.
 
 use super::executor::{Executor, Passed};
+use super::splats::{add_splats, splats_of_tile};
 use super::{Method, RenderContext, Round};
 use crate::bsdf::Features;
-use crate::film::{PIXELS_PER_TILE, Pixel, Splat, Tile, add_strip, strip_length};
+use crate::film::{PIXELS_PER_TILE, Pixel, Splat, Tile};
 use crate::light::{EmissionSampler, luminance};
 use crate::memory::{Arena, Footprint, MemorySource, OutOfMemory};
 use crate::transport::Counters;
@@ -27,7 +28,7 @@ mod settings;
 pub use crate::transport::metropolis::target::PrimarySpace;
 pub use settings::{ChainUse, MetropolisSettings};
 
-/// One of so many points that are evaluated for a sample is independent.
+/// One of this number of points that are evaluated for a sample is independent.
 const INDEPENDENT: usize = 4;
 
 /// Chains that a sample has at least, while each has [`SHORTEST`] mutations; and mutations of a chain.
@@ -41,7 +42,7 @@ const FEWEST_CANDIDATES: usize = 64;
 /// Number of the first pass of the pilot.
 const PILOT: u32 = 1 << 30;
 
-/// Points of the pilot, in so many passes at most.
+/// Points of the pilot, and its passes at most.
 const PILOT_POINTS: usize = 1 << 17;
 const MOST_PASSES: usize = 32;
 
@@ -218,7 +219,7 @@ impl<'a, F: Features> Metropolis<'a, F> {
         Ok(())
     }
 
-    /// Makes of `levels`, the light of so many `passes` of chains in each cell, its mean radiance with the
+    /// Makes of `levels`, the light of `passes` passes of chains in each cell, its mean radiance with the
     /// light that is not for chains. Whether the executor was not over.
     fn measure_levels(
         &self,
@@ -316,13 +317,8 @@ impl<'a, F: Features> Metropolis<'a, F> {
         counters += passed.counters;
         let (splats, outputs) = (&**splats, &**outputs);
         outputs.iter().for_each(|output| self.totals.count(&output.steps));
-        let length = strip_length(pixels);
-        let added = executor.pass(picture.chunks_mut(length), |strip, pixels, _| {
-            let tasks = splats.chunks(room).zip(outputs.iter().map(|output| &output.offsets));
-            add_strip(strip, length, tasks, pixels);
-            Ok(Counters::default())
-        })?;
-        Ok(added.is_complete.then_some(counters))
+        let lists = splats.chunks(room).zip(outputs.iter().map(|output| &output.offsets));
+        Ok(add_splats(executor, picture, lists)?.then_some(counters))
     }
 
     /// Use of chains so far.
@@ -372,9 +368,7 @@ impl<F: Features> Method for Metropolis<'_, F> {
             }
             let (paths, picture) = (self.paths(), &*self.picture);
             round.tiles(sample + 1, |tile, samples, scratch: &mut Arena, pixels| {
-                let first = tile * PIXELS_PER_TILE;
-                let splats = picture.get(first..first + PIXELS_PER_TILE).unwrap_or_default();
-                paths.run(tile, samples, splats, scratch, pixels)
+                paths.run(tile, samples, splats_of_tile(picture, tile), scratch, pixels)
             })?;
         }
         Ok(())

@@ -1,8 +1,8 @@
 //! Methods of rendering: one file each, in the order of its paper.
 //!
-//! A method takes its memory from a [`MemorySource`](crate::memory::MemorySource), learns in its constructor what the
-//! scene needs, and adds samples to a film in [`Round`]s. An [`Executor`] of the caller runs the tasks of its passes:
-//! no method knows of threads, clocks or files.
+//! A method takes its memory from a [`MemorySource`](crate::memory::MemorySource), learns in its constructor
+//! what the scene needs, and adds samples to a film in [`Round`]s. An [`Executor`] of the caller runs the
+//! tasks of its passes: no method knows of threads, clocks or files.
 
 pub mod bidirectional;
 pub mod caustics;
@@ -21,6 +21,7 @@ pub mod photons;
 pub mod pilot;
 pub mod record_placement;
 pub mod round;
+mod splats;
 pub mod sppm;
 
 pub use executor::{Executor, Loop, Passed, Worker};
@@ -76,9 +77,9 @@ impl<'a> RenderContext<'a> {
 
 /// A method at work on one scene.
 ///
-/// Sample `n` of a pixel follows from the scene, the settings and `n`: neither from the division of samples into
-/// rounds nor from threads. A structure that several pixels use is drawn anew, or kept twice, for even and odd `n`:
-/// the halves of the film stay independent, and their difference shows all that is random.
+/// Sample `n` of a pixel follows from the scene, the settings and `n`: neither from the division of samples
+/// into rounds nor from threads. A structure that several pixels use is drawn anew, or kept twice, for even
+/// and odd `n`: the halves of the film stay independent, and their difference shows all that is random.
 pub trait Method {
     /// One round: brings the tiles of the film to their target, or less if the executor ends it early.
     ///

@@ -107,7 +107,7 @@ pub(super) struct MethodArgs {
     /// Merging with vcm [default: where the scene has caustics]
     #[arg(long, value_name = "WHEN", help_heading = "Light paths")]
     merging: Option<When>,
-    /// What a point of a Markov chain makes with mlt [default: multiplexed]
+    /// Kind of the points of Markov chains with mlt [default: multiplexed]
     #[arg(long, value_name = "SPACE", help_heading = "Markov chains")]
     mlt: Option<Space>,
     /// Mutations per pixel and sample with mlt, a quarter of them independent [default: 4]

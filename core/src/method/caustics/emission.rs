@@ -27,7 +27,7 @@ pub struct CausticSettings {
 #[derive(Clone, Copy)]
 pub struct CausticEmission<'a> {
     pub(super) sampler: EmissionSampler<'a>,
-    /// Of one pixel.
+    /// Radii of one pixel.
     pub(super) radii: RadiusSchedule,
     pub(super) benefit: Benefit,
 }
@@ -38,7 +38,7 @@ pub fn least_footprint() -> Footprint {
     map.and(map)
 }
 
-/// A tracer of so many light `paths` by `sampler`, for discs of `radii`.
+/// A tracer of `paths` light paths by `sampler`, for discs of `radii`.
 pub(super) fn photon_tracer<'a, F: Features>(
     context: &RenderContext<'a>,
     sampler: &'a EmissionSampler<'a>,

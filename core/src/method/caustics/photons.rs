@@ -1,6 +1,7 @@
-//! Caustic photon maps of one picture. Photons are traced anew for every few samples, into one map for the even and one
-//! for the odd samples, so that the halves of the film stay independent. Radii shrink from one pair of maps to the next
-//! as those of progressive photon mapping do (Knaus and Zwicker 2011), so that the blur vanishes.
+//! Caustic photon maps of one picture. Photons are traced anew for every few samples, into one map for the
+//! even and one for the odd samples, so that the halves of the film stay independent. Radii shrink from one
+//! pair of maps to the next as those of progressive photon mapping do (Knaus and Zwicker 2011), so that the
+//! blur vanishes.
 
 use super::emission::{CausticEmission, CausticSettings, FIRST_RADIUS, least_footprint, photon_tracer};
 use crate::bsdf::Features;
@@ -13,8 +14,8 @@ use crate::photon::PhotonMap;
 use crate::transport::caustics::tracer::{PATHS, ROOM};
 use crate::transport::{CausticMerging, Estimator, PathIntegrator, RadiusSchedule, Sharing, path::WAVE};
 
-/// Light paths of a map for each pixel of the picture and each sample that the map serves, with the usual photon budget;
-/// at least and at most.
+/// Light paths of a map for each pixel of the picture and each sample that the map serves, with the usual
+/// photon budget; at least and at most.
 const PATHS_PER_SAMPLE: f64 = 0.5;
 const FEWEST_PATHS: usize = 16 * PATHS;
 const MOST_PATHS: usize = 4096 * PATHS;
@@ -22,11 +23,12 @@ const MOST_PATHS: usize = 4096 * PATHS;
 /// Samples that share a pair of maps, at most: fewer would not fill the wavefront of a tile.
 const MOST_SAMPLES: u32 = 8;
 
-/// Radius of the discs in which gather rays look for photons, in pixels. Records are means over many rays, and the blur
-/// does not show in them.
+/// Radius of the discs in which gather rays look for photons, in pixels. Records are means over many rays,
+/// and the blur does not show in them.
 const RECORD_RADIUS: f32 = 3.0;
 
-/// Maps for records have one in so many of the light paths of a map for the picture, and numbers of their own.
+/// Maps for records have one in so many of the light paths of a map for the picture, and numbers of their
+/// own.
 const RECORD_PART: usize = 4;
 const RECORD_MAP: u32 = 1 << 30;
 
@@ -93,8 +95,8 @@ impl Block {
 }
 
 impl<'a> CausticPhotons<'a> {
-    /// Memory for photons of `emission`, as many as there is memory for beside what is reserved; beside records, half as
-    /// many. `None` where there is none.
+    /// Memory for photons of `emission`, as many as there is memory for beside what is reserved; beside
+    /// records, half as many. `None` where there is none.
     ///
     /// # Errors
     /// Those of [`MemorySource::take`].
@@ -131,8 +133,8 @@ impl<'a> CausticPhotons<'a> {
         self.statistics
     }
 
-    /// Whether the photons of the first samples leave less variance for the work than `paths` alone. They are then the
-    /// photons of the first samples of the picture.
+    /// Whether the photons of the first samples leave less variance for the work than `paths` alone. They are
+    /// then the photons of the first samples of the picture.
     ///
     /// # Errors
     /// [`OutOfMemory`] where the executor's scratch is smaller than [`scratch`](super::scratch).
@@ -185,8 +187,8 @@ impl<'a> CausticPhotons<'a> {
         Ok(())
     }
 
-    /// Photons for the gather rays of the cache of even samples, `half` 0, or of odd ones, 1; `None` where the round is
-    /// over.
+    /// Photons for the gather rays of the cache of even samples, `half` 0, or of odd ones, 1; `None` where
+    /// the round is over.
     ///
     /// # Errors
     /// [`OutOfMemory`] where the executor's scratch is smaller than [`scratch`](super::scratch).
@@ -246,7 +248,7 @@ impl<'a> CausticPhotons<'a> {
         Ok(passed)
     }
 
-    /// Makes map `number` of so many light `paths`, among those of even or of odd samples.
+    /// Makes map `number` of `paths` light paths, among those of even or of odd samples.
     fn trace<F: Features>(
         &mut self,
         number: u32,

@@ -5,12 +5,12 @@ use super::PrimarySpace;
 /// Choices of Metropolis light transport.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MetropolisSettings {
-    /// What a point of a chain makes.
+    /// Kind of the points of chains.
     pub space: PrimarySpace,
     /// Points evaluated for each pixel of a sample, a quarter of them independent.
     pub mutations: u32,
-    /// Largest contribution of path tracing relative to the rough brightness of a pixel; chains have the rest. 0
-    /// leaves all light to chains, except that of paths of fewer than 3 or more than 20 segments.
+    /// Largest contribution of path tracing relative to the rough brightness of a pixel; chains have the
+    /// rest. 0 leaves all light to chains, except that of paths of fewer than 3 or more than 20 segments.
     pub threshold: f32,
 }
 

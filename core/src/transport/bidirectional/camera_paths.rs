@@ -13,9 +13,10 @@ use crate::sampling::Sampler;
 use crate::scene::SurfacePoint;
 use crate::transport::bidirectional::arrival::Arrival;
 use crate::transport::bidirectional::camera_path::{CameraPath, Queue, Vertex};
+use crate::transport::bidirectional::ends::{End, sums_from_camera};
 use crate::transport::bidirectional::merge_photons::Merging;
 use crate::transport::bidirectional::mis::{Counts, Sums};
-use crate::transport::bidirectional::vertex::{LightVertex, is_bent, reverse_pdf};
+use crate::transport::bidirectional::vertex::{LightVertex, is_bent, normal_for_lights, reverse_pdf};
 use crate::transport::settings::{Counters, PathSettings};
 use crate::transport::walk::context::SceneContext;
 use crate::transport::walk::dimension;
@@ -239,7 +240,7 @@ impl<'a, F: Features> CameraPaths<'a, F> {
             return None;
         }
         let point = self.context.surface_at(ray, hit)?;
-        let opacity = || sampler.single(dimension::CROSSING + path.segments - 1 + path.crossings);
+        let opacity = || sampler.single(dimension::opacity(path.segments, path.crossings));
         let is_passed = self.context.is_passed(&point, hit, path.triangle, opacity)
             || path.segments == 1 && point.is_left_by(ray);
         if is_passed {
@@ -289,13 +290,7 @@ impl<'a, F: Features> CameraPaths<'a, F> {
             return if is_merged { sums.with_merge() } else { sums };
         }
         let PathSettings { width, height, .. } = self.settings;
-        let camera = &self.context.scene.camera;
-        let seen = camera.project(width, height, point.position, path.lens);
-        seen.map_or(Sums::default(), |seen| {
-            let pixels = width as f32 * height as f32;
-            let sums = Sums::at_camera(&self.counts, pixels * seen.pdf);
-            sums.arrive(seen.distance * seen.distance, cos, is_delta)
-        })
+        sums_from_camera(&self.context, &self.counts, [width, height], path.lens, End { point, bsdf, cos })
     }
 
     /// The path goes on where the BSDF sends it.
@@ -360,9 +355,4 @@ impl<'a, F: Features> CameraPaths<'a, F> {
         let merge = (!bsdf.is_caustic_caster()).then_some(merge);
         sums.scatter(&self.counts, sample.pdf, reverse, cos_out, merge)
     }
-}
-
-/// The normal that light sampling takes: none where light comes from both sides.
-pub(in crate::transport) fn normal_for_lights(point: &SurfacePoint, bsdf: &Bsdf) -> Vec3 {
-    if bsdf.transmits() { Vec3::ZERO } else { point.frame.normal }
 }

@@ -5,28 +5,24 @@ use crate::Rgb;
 use crate::bsdf::{BsdfSample, Features};
 use crate::film::{Splat, StripOffsets, Tile, sort_by_strip};
 use crate::geometry::{Hit, Ray};
-use crate::light::{EmissionSampler, LightType};
+use crate::light::EmissionSampler;
 use crate::memory::{Arena, Footprint, OutOfMemory};
 use crate::sampling::warp::concentric_disk;
 use crate::transport::bidirectional::arrival::Arrival;
+use crate::transport::bidirectional::ends::{End, sums_from_light};
 use crate::transport::bidirectional::merge_photons::MergeRadii;
 use crate::transport::bidirectional::mis::{Counts, Sums, weight_of_splat};
 use crate::transport::bidirectional::vertex::{LightVertex, is_bent, reverse_pdf, scattering_from_light};
 use crate::transport::settings::{Counters, PathSettings};
 use crate::transport::walk::context::SceneContext;
-use crate::transport::walk::light::{Continuation, LightPathState, LightWalk, Vertex, Visitor};
+use crate::transport::walk::light::{
+    Continuation, LightPathState, LightWalk, MAX_CONTINUATION, Vertex, Visitor,
+};
 use crate::transport::walk::visibility::ShadowRays;
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
-pub use crate::transport::walk::light::PATHS;
-
-/// Vertices that there is room for, for each light path. Where paths go on with a probability of at most 0.8
-/// their mean is no more than five.
-pub const ROOM: usize = 6 * PATHS;
-
-/// Probability with which a path goes on, at most.
-const MOST: f32 = 0.8;
+pub use crate::transport::walk::light::{PATHS, ROOM};
 
 /// Shadow rays to the camera that are traced together.
 const SHADOW_RAYS: usize = 1024;
@@ -147,39 +143,13 @@ struct Writer<'w, F> {
 }
 
 impl<F: Features> Writer<'_, F> {
-    /// Sums where the path arrives at its first vertex: both densities of its light as they are from there.
-    fn at_first_vertex(&self, state: &LightPathState, vertex: &Vertex, cos: f32) -> Sums {
-        let Self { context, emission, counts, .. } = self;
-        let (scene, lights) = (context.scene, context.lights);
-        let (position, to_light) = (vertex.point.position, vertex.to_light);
-        let normal = if vertex.bsdf.transmits() { Vec3::ZERO } else { vertex.point.frame.normal };
-        let kind = emission.found(lights, state.light);
-        let (pdf_light, density) = match kind {
-            LightType::Area => {
-                let origin = Vec3::from(state.origin);
-                let triangle = lights.triangle_of(state.light).unwrap_or_default();
-                let distance = position.distance(origin);
-                let pdf = lights.pdf_hit(scene, position, normal, triangle, distance, to_light);
-                let index = state.light as usize;
-                (pdf, emission.density_of_emitter(scene, lights, index, (origin, -to_light)))
-            }
-            LightType::Infinite => (
-                lights.pdf_escape(scene, position, normal, to_light),
-                emission.density_of_sky(scene, lights, to_light, position),
-            ),
-            LightType::Delta => (
-                lights.probability(state.light, position, normal),
-                emission.density_of_choice(scene, lights, state.light, position),
-            ),
-        };
-        Sums::at_light(counts, pdf_light, density, cos, kind != LightType::Delta)
-    }
-
     fn arrive(&self, state: &LightPathState, vertex: &Vertex, cos: f32) -> Sums {
         let is_delta = vertex.bsdf.is_delta();
         if state.segments == 1 {
-            let sums = self.at_first_vertex(state, vertex, cos);
-            return Sums { last: if is_delta { 0.0 } else { sums.last }, ..sums };
+            let Self { context, emission, counts, .. } = self;
+            let origin = (state.light, state.origin.into());
+            let end = End { point: vertex.point, bsdf: vertex.bsdf, cos };
+            return sums_from_light(context, emission, counts, origin, end, vertex.to_light);
         }
         let squared = vertex.point.position.distance_squared(state.position.into());
         sums(state).arrive(squared, cos, is_delta)
@@ -331,7 +301,7 @@ impl<F: Features> Visitor for Writer<'_, F> {
             }
             let _ = self.splat(state, vertex, cos_in);
         }
-        Some(Continuation { most: MOST, mirrored: false })
+        Some(Continuation { most: MAX_CONTINUATION, mirrored: false })
     }
 
     fn leave(

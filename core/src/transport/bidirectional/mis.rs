@@ -70,7 +70,7 @@ impl Sums {
         }
     }
 
-    /// Of a camera path that can be merged at the vertex before, as this vertex shows.
+    /// Sums of a camera path that can be merged at the vertex before, as this vertex shows.
     pub fn with_merge(self) -> Self {
         Self { rest: self.rest + self.merge, merge: 0.0, ..self }
     }

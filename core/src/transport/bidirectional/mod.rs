@@ -9,6 +9,7 @@
 mod arrival;
 mod camera_path;
 pub mod camera_paths;
+pub(in crate::transport) mod ends;
 pub mod light_pass;
 pub mod merge_photons;
 mod merging;

@@ -148,3 +148,8 @@ const LOWEST_COS: f32 = 2e-3;
 pub(in crate::transport) fn is_bent(point: &SurfacePoint, wo: Vec3) -> bool {
     wo.z < LOWEST_COS && point.frame.normal != point.geometric_normal
 }
+
+/// The normal that light sampling takes: none where light comes from both sides.
+pub(in crate::transport) fn normal_for_lights(point: &SurfacePoint, bsdf: &Bsdf) -> Vec3 {
+    if bsdf.transmits() { Vec3::ZERO } else { point.frame.normal }
+}

@@ -8,17 +8,12 @@ use crate::light::{EmissionSampler, LightType};
 use crate::memory::{Arena, Footprint, OutOfMemory};
 use crate::transport::settings::{Counters, PathSettings};
 use crate::transport::walk::context::SceneContext;
-use crate::transport::walk::light::{Continuation, LightPathState, LightWalk, Vertex, Visitor};
+use crate::transport::walk::light::{
+    Continuation, LightPathState, LightWalk, MAX_CONTINUATION, Vertex, Visitor,
+};
 use bytemuck::{Pod, Zeroable};
 
-pub use crate::transport::walk::light::PATHS;
-
-/// Virtual lights that a set has room for. Where paths go on with a probability of at most 0.8 their mean is
-/// no more than five for each path.
-pub const ROOM: usize = 6 * PATHS;
-
-/// Probability with which a path goes on, at most.
-const MOST: f32 = 0.8;
+pub use crate::transport::walk::light::{PATHS, ROOM};
 
 /// The outcome of a task beside its virtual lights and splats.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
@@ -52,7 +47,7 @@ pub struct LightPass<'a, F> {
 }
 
 impl<'a, F: Features> LightPass<'a, F> {
-    /// A pass that makes so many `sets`.
+    /// A pass that makes `sets` sets.
     pub fn new(
         context: SceneContext<'a, F>,
         emission: &'a EmissionSampler<'a>,
@@ -139,7 +134,7 @@ impl<F: Features> Visitor for Writer<'_, F> {
                 None => counters.dropped.unfinished += 1,
             }
         }
-        Some(Continuation { most: MOST, mirrored: false })
+        Some(Continuation { most: MAX_CONTINUATION, mirrored: false })
     }
 
     fn leave(&self, state: &mut LightPathState, _: &Vertex, _: glam::Vec3, (sample, _): (&BsdfSample, bool)) {

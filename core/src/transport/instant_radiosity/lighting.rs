@@ -47,7 +47,7 @@ pub struct VirtualLighting<'l> {
     pub splats: &'l [[f32; 3]],
 }
 
-/// What virtual lights add to the state of a path.
+/// Virtual lighting's part of the state of a path.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C)]
 pub struct LightingState {

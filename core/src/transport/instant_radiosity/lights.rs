@@ -22,12 +22,12 @@ pub struct VirtualLight {
     normal: [f32; 3],
     /// Segments of the light path up to here, [`DIFFUSE`] and [`HIDDEN`].
     segments: u32,
-    /// Of a diffuse surface the radiance that it reflects times area, W/sr; of others the power that arrives,
+    /// On a diffuse surface the radiance that it reflects times area, W/sr; on others the power that arrives,
     /// W.
     power: [f32; 3],
-    /// Of a diffuse surface the shading normal; of others the direction to the vertex before.
+    /// On a diffuse surface the shading normal; on others the direction to the vertex before.
     direction: [f32; 3],
-    /// Of a diffuse surface the bound of the error of the position; of others the barycentric weights of the
+    /// On a diffuse surface the bound of the error of the position; on others the barycentric weights of the
     /// second and third corner of the triangle.
     place: [f32; 2],
 }

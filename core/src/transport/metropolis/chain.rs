@@ -30,7 +30,7 @@ fn kind(mutation: &Mutation) -> Step {
 /// Distinguishes the numbers of chains from others.
 const SEED: u64 = 0x6d75_7461_7469_6f6e;
 
-/// Splats of a task whose chains have so many mutations: one of each mutation, and one of each last state.
+/// Splats of a task whose chains have `mutations`: one of each mutation, and one of each last state.
 pub const fn room(mutations: usize) -> usize {
     LANES * (mutations + 1)
 }
@@ -64,7 +64,7 @@ struct Chain {
     /// Expected number of mutations after which the chain was in this state.
     weight: f32,
     segments: u32,
-    /// Of its random numbers.
+    /// Seed of its random numbers.
     key: u32,
 }
 

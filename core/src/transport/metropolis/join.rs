@@ -9,11 +9,11 @@ use crate::film::Tile;
 use crate::geometry::Ray;
 use crate::light::emitted;
 use crate::scene::SurfacePoint;
-use crate::transport::bidirectional::camera_paths::normal_for_lights;
 use crate::transport::bidirectional::light_pass::lens_point;
 use crate::transport::bidirectional::mis::{
     End, Sums, weight_of_connection, weight_of_hit, weight_of_light_sample, weight_of_splat,
 };
+use crate::transport::bidirectional::vertex::normal_for_lights;
 use crate::transport::bidirectional::vertex::{reverse_pdf, scattering, scattering_from_light};
 use crate::transport::walk::visibility::shadow_ray;
 use glam::{Vec2, Vec3};

@@ -28,7 +28,7 @@ const VERTEX: usize = 6;
 const PATH_VERTICES: usize = 4;
 const PATH_VERTEX: usize = 8;
 
-/// Slots of a technique of paths of so many `segments`.
+/// Slots of a technique of paths of `segments` segments.
 pub(super) const fn slots_of_technique(segments: u32) -> usize {
     let slots = VERTICES + VERTEX * segments.saturating_sub(1) as usize;
     if slots < NUMBERS { slots } else { NUMBERS }
@@ -80,9 +80,9 @@ const LIGHT_CROSSING: u32 = 1 << 22;
 /// A source of numbers beyond the slots.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Source {
-    /// Of a point of a sequence.
+    /// Numbers of a point of a sequence.
     Sequence(Sampler),
-    /// Of a mutation.
+    /// Numbers of a mutation.
     Mutation(Random),
 }
 

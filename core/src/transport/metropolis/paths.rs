@@ -177,7 +177,7 @@ impl<'a, F: Features> Paths<'a, F> {
         }
     }
 
-    /// The part of a contribution of a path of so many `segments` that is added up.
+    /// The part of a contribution of a path of `segments` segments that is added up.
     fn part(&self, path: &Path, segments: u32, part: Part, contribution: &Contribution) -> Rgb {
         // Roulette is no property of the path: the division does not know it.
         let alone = Contribution { radiance: contribution.radiance * path.survival, ..*contribution };

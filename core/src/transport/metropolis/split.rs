@@ -45,7 +45,7 @@ impl Split<'_> {
         self.levels.get(position as usize / CELL).copied().unwrap_or(1.0)
     }
 
-    /// λ: the fraction of a path of so many `segments` that belongs to path tracing.
+    /// λ: the fraction of a path of `segments` segments that belongs to path tracing.
     pub(super) fn of_paths(&self, position: u32, segments: u32, contribution: &Contribution) -> f32 {
         if !(MIN_SEGMENTS..=self.max_segments).contains(&segments) {
             return 1.0;

@@ -4,11 +4,12 @@
 use crate::Rgb;
 use crate::bsdf::{Bsdf, BsdfSample, Features};
 use crate::geometry::{Hit, MISS, Ray};
-use crate::light::{EmissionSampler, LightType};
+use crate::light::EmissionSampler;
 use crate::sampling::Numbers;
 use crate::scene::SurfacePoint;
-use crate::transport::bidirectional::camera_paths::normal_for_lights;
+use crate::transport::bidirectional::ends::{End, sums_from_camera, sums_from_light};
 use crate::transport::bidirectional::mis::{Counts, Sums};
+use crate::transport::bidirectional::vertex::normal_for_lights;
 use crate::transport::bidirectional::vertex::{is_bent, reverse_pdf};
 use crate::transport::settings::Counters;
 use crate::transport::walk::context::SceneContext;
@@ -232,12 +233,8 @@ impl<'a, F: Features> Walk<'a, F> {
             let squared = point.position.distance_squared(subpath.position.into());
             return subpath.sums().arrive(squared, cos, is_delta);
         }
-        let [width, height] = self.size;
-        let seen = self.context.scene.camera.project(width, height, point.position, lens);
-        seen.map_or(Sums::default(), |seen| {
-            let sums = Sums::at_camera(&self.counts, width as f32 * height as f32 * seen.pdf);
-            sums.arrive(seen.distance * seen.distance, cos, is_delta)
-        })
+        let end = End { point, bsdf: &vertex.bsdf, cos };
+        sums_from_camera(&self.context, &self.counts, self.size, lens, end)
     }
 
     /// The vertex where a light subpath arrives. `None` where its shading normal depends on the subpath.
@@ -250,7 +247,12 @@ impl<'a, F: Features> Walk<'a, F> {
         let mut vertex = self.light_surface(point, direction)?;
         let (cos, is_delta) = (vertex.cos(direction), vertex.bsdf.is_delta());
         vertex.sums = match subpath.segments {
-            1 => self.sums_at_first_vertex(subpath, &vertex, cos),
+            1 => {
+                let Self { context, emission, counts, .. } = self;
+                let origin = (subpath.light, subpath.position.into());
+                let end = End { point: &vertex.point, bsdf: &vertex.bsdf, cos };
+                [sums_from_light(context, emission, counts, origin, end, vertex.back); 2]
+            }
             _ => {
                 let squared = vertex.point.position.distance_squared(subpath.position.into());
                 [subpath.sums(), subpath.path_sums()].map(|sums| sums.arrive(squared, cos, is_delta))
@@ -265,37 +267,6 @@ impl<'a, F: Features> Walk<'a, F> {
         let bsdf = self.context.bsdf_at(&point);
         let sums = [Sums::default(); 2];
         (!is_bent(&point, wo)).then_some(Vertex { point, bsdf, back: -direction, wo, sums, is_bent: false })
-    }
-
-    /// Sums where a light subpath arrives at its first vertex: both densities of its light as they are from
-    /// there.
-    fn sums_at_first_vertex(&self, subpath: &Subpath, vertex: &Vertex, cos: f32) -> [Sums; 2] {
-        let Self { context, emission, counts, .. } = self;
-        let (scene, lights) = (context.scene, context.lights);
-        let (position, to_light) = (vertex.point.position, vertex.back);
-        let normal = normal_for_lights(&vertex.point, &vertex.bsdf);
-        let kind = emission.found(lights, subpath.light);
-        let (pdf_light, density) = match kind {
-            LightType::Area => {
-                let origin = Vec3::from(subpath.position);
-                let triangle = lights.triangle_of(subpath.light).unwrap_or_default();
-                let distance = position.distance(origin);
-                let pdf = lights.pdf_hit(scene, position, normal, triangle, distance, to_light);
-                let index = subpath.light as usize;
-                (pdf, emission.density_of_emitter(scene, lights, index, (origin, -to_light)))
-            }
-            LightType::Infinite => (
-                lights.pdf_escape(scene, position, normal, to_light),
-                emission.density_of_sky(scene, lights, to_light, position),
-            ),
-            LightType::Delta => (
-                lights.probability(subpath.light, position, normal),
-                emission.density_of_choice(scene, lights, subpath.light, position),
-            ),
-        };
-        let sums = Sums::at_light(counts, pdf_light, density, cos, kind != LightType::Delta);
-        let last = if vertex.bsdf.is_delta() { 0.0 } else { sums.last };
-        [Sums { last, ..sums }; 2]
     }
 
     /// The subpath goes on from `vertex` by the numbers `u`. Its next ray, and the sample of the BSDF.

@@ -87,7 +87,7 @@ impl<'a, F: Features> Target<'a, F> {
         Self { walk, paths: Paths::new(context, emission, settings, split), split, space }
     }
 
-    /// Numbers of a point for paths of so many segments.
+    /// Numbers of a point for paths of a length.
     pub(super) fn slots(&self, segments: u32) -> usize {
         match self.space {
             PrimarySpace::Multiplexed => slots_of_technique(segments),
@@ -148,7 +148,7 @@ impl<'a, F: Features> Target<'a, F> {
         if density > 0.0 && density < f32::INFINITY { density } else { 0.0 }
     }
 
-    /// Evaluates the first `values.len()` lanes: `point` of each, for paths of so many segments.
+    /// Evaluates the first `values.len()` lanes: `point` of each, for paths of a length.
     pub(super) fn evaluate<'p>(
         &self,
         lanes: &mut Lanes,
@@ -195,6 +195,21 @@ impl<'a, F: Features> Target<'a, F> {
                 active += 1;
             }
         }
+        self.advance(lanes, active, counters, |lanes, ray, hit, counters| {
+            let lane = lane(ray.tag as usize);
+            self.light_step(&lane, lanes, (ray, hit), &mut values[lane.number], counters)
+        });
+    }
+
+    /// Advances subpaths by the first `active` rays of `lanes`, whose tags are their lanes, until none is
+    /// left. One `step` handles the end of a ray and gives the next.
+    fn advance(
+        &self,
+        lanes: &mut Lanes,
+        mut active: usize,
+        counters: &mut Counters,
+        mut step: impl FnMut(&mut Lanes, &Ray, &Hit, &mut Counters) -> Option<Ray>,
+    ) {
         while active > 0 {
             counters.rays += active as u64;
             let (rays, hits) = (&lanes.rays[..active], &mut lanes.hits[..active]);
@@ -202,9 +217,7 @@ impl<'a, F: Features> Target<'a, F> {
             let mut left = 0;
             for i in 0..active {
                 let (ray, hit) = (lanes.rays[i], lanes.hits[i]);
-                let lane = lane(ray.tag as usize);
-                let value = &mut values[lane.number];
-                if let Some(next) = self.light_step(&lane, lanes, (&ray, &hit), value, counters) {
+                if let Some(next) = step(lanes, &ray, &hit, counters) {
                     lanes.rays[left] = Ray { tag: ray.tag, ..next };
                     left += 1;
                 }
@@ -266,22 +279,10 @@ impl<'a, F: Features> Target<'a, F> {
                 active += 1;
             }
         }
-        while active > 0 {
-            counters.rays += active as u64;
-            let (rays, hits) = (&lanes.rays[..active], &mut lanes.hits[..active]);
-            self.walk.context.nearest_batch(rays, Coherence::Incoherent, hits);
-            let mut left = 0;
-            for i in 0..active {
-                let (ray, hit) = (lanes.rays[i], lanes.hits[i]);
-                let lane = lane(ray.tag as usize);
-                let value = &mut values[lane.number];
-                if let Some(next) = self.camera_step(&lane, lanes, (&ray, &hit), value, counters) {
-                    lanes.rays[left] = Ray { tag: ray.tag, ..next };
-                    left += 1;
-                }
-            }
-            active = left;
-        }
+        self.advance(lanes, active, counters, |lanes, ray, hit, counters| {
+            let lane = lane(ray.tag as usize);
+            self.camera_step(&lane, lanes, (ray, hit), &mut values[lane.number], counters)
+        });
     }
 
     fn camera_step(

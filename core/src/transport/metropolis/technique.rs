@@ -2,21 +2,21 @@
 
 use super::numbers::TECHNIQUE;
 
-/// A technique for paths of so many segments.
+/// A technique for paths of one length.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Technique {
     /// The camera subpath meets a light.
     Hit,
     /// Light sample at the end of the camera subpath.
     LightSample,
-    /// Connection with a light subpath of so many segments.
+    /// Connection with a light subpath of this number of segments.
     Connection(u32),
     /// Splat of the light subpath's end.
     Splat,
 }
 
 impl Technique {
-    /// Techniques for paths of so many segments.
+    /// Number of techniques for paths of `segments`.
     pub(super) fn count(segments: u32) -> u32 {
         if segments == 1 { 1 } else { segments + 1 }
     }

@@ -153,8 +153,8 @@ fn follow(
         // Rounding, or a hole in the surface: on in the same direction.
         let opacity = point.material.opacity.at::<All>(context.scene, point.uv);
         let met_again = hit.triangle == start.triangle || (segments == 1 && point.is_left_by(&ray));
-        let transparent = point.material.has_cutout()
-            && sampler.single(dimension::CROSSING + segments - 1 + crossings) >= opacity;
+        let transparent =
+            point.material.has_cutout() && sampler.single(dimension::opacity(segments, crossings)) >= opacity;
         if met_again || transparent {
             (start.ray, start.triangle) = (point.spawn(direction), hit.triangle);
             crossings += 1;

@@ -129,7 +129,7 @@ impl<'a, F: Features, E: Estimator<F>, R: Sharing> PathIntegrator<'a, F, E, R> {
         let sampler = Sampler::new(self.settings.seed, path.pixel, path.sample);
 
         // A camera on a surface does not see its back.
-        let opacity = || sampler.single(dimension::CROSSING + segments - 1 + u32::from(path.crossings));
+        let opacity = || sampler.single(dimension::opacity(segments, u32::from(path.crossings)));
         if segments == 1 && point.is_left_by(ray)
             || self.context.is_passed(point, hit, path.triangle, opacity)
         {

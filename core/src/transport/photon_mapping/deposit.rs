@@ -6,10 +6,10 @@
 //! caustics alone. How they get there is in `walk/light.rs`.
 //!
 //! Departures from the plain algorithm:
-//! 1. After a photon was left, its path goes on with a probability of at most [`MOST`]. A path then leaves
-//!    five photons on average at most, wherever it runs, so that [`ROOM`] for a task is enough: to be 14
-//!    standard deviations above the mean it would have to live through as many ends as no sequence of random
-//!    numbers holds.
+//! 1. After a photon was left, its path goes on with a probability of at most [`MAX_CONTINUATION`]. A path
+//!    then leaves five photons on average at most, wherever it runs, so that [`ROOM`] for a task is enough:
+//!    to be 14 standard deviations above the mean it would have to live through as many ends as no sequence
+//!    of random numbers holds.
 //! 2. The price: where surfaces are lighter than that, photons differ in power.
 
 use crate::bsdf::Features;
@@ -21,15 +21,11 @@ use crate::scene::Scene;
 use crate::transport::photon_mapping::visible_points::VisiblePoints;
 use crate::transport::settings::Counters;
 use crate::transport::walk::context::SceneContext;
-pub use crate::transport::walk::light::PATHS;
-use crate::transport::walk::light::{Continuation, LightPathState, LightWalk, PhotonBuffer, Vertex, Visitor};
+use crate::transport::walk::light::{
+    Continuation, LightPathState, LightWalk, MAX_CONTINUATION, PhotonBuffer, Vertex, Visitor,
+};
+pub use crate::transport::walk::light::{PATHS, ROOM};
 use crate::{Level, Rgb};
-
-/// Photons that a task has room for.
-pub const ROOM: usize = 6 * PATHS;
-
-/// Probability with which a path goes on, at most, where it leaves a photon.
-pub(in crate::transport) const MOST: f32 = 0.8;
 
 /// Which photons are left.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -59,7 +55,7 @@ impl PhotonFilter {
     pub(in crate::transport) fn onward(self, vertex: &Vertex, leaves: bool) -> Option<Continuation> {
         let ends = self == PhotonFilter::Caustic
             && (vertex.bsdf.stores_photons() || !vertex.bsdf.is_caustic_caster());
-        (!ends).then_some(Continuation { most: if leaves { MOST } else { 1.0 }, mirrored: false })
+        (!ends).then_some(Continuation { most: if leaves { MAX_CONTINUATION } else { 1.0 }, mirrored: false })
     }
 }
 

@@ -8,6 +8,13 @@ pub(in crate::transport) const PIXEL: u32 = 0;
 pub(in crate::transport) const LENS: u32 = 1;
 /// Opacity of the surface that is met after `n` others, scattered at or passed: `CROSSING + n`.
 pub(in crate::transport) const CROSSING: u32 = 1 << 31;
+
+/// Opacity of the surface that segment number `segments` of a subpath meets after `crossings` others that the
+/// subpath has passed.
+#[inline]
+pub(in crate::transport) const fn opacity(segments: u32, crossings: u32) -> u32 {
+    CROSSING + segments - 1 + crossings
+}
 /// Rotation of the probes for walls at the vertex at the end of the `n`th segment: `PROBES + n`.
 pub(in crate::transport) const PROBES: u32 = 1 << 30;
 /// Point in the pixel of rays for the emission of lamps alone.

@@ -15,6 +15,7 @@ use crate::sampling::{Numbers, Sampler, mix};
 use crate::scene::SurfacePoint;
 use crate::transport::settings::Counters;
 use crate::transport::walk::context::SceneContext;
+use crate::transport::walk::dimension;
 use crate::transport::walk::termination::{MAX_CROSSINGS, is_cut, survival_limit};
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
@@ -22,15 +23,19 @@ use glam::Vec3;
 /// Light paths of a task.
 pub const PATHS: usize = 1024;
 
+/// Vertices of a task's paths that there is room for, where paths go on with a probability of at most
+/// [`MAX_CONTINUATION`]: their mean is then no more than five for each path.
+pub const ROOM: usize = 6 * PATHS;
+
+/// Largest probability with which a path goes on that stores its vertices.
+pub(in crate::transport) const MAX_CONTINUATION: f32 = 0.8;
+
 /// Dimensions of the sampler at a vertex: where the path goes on, by which lobe, whether it does; and one
 /// that a visitor may have.
 const SCATTERING: u32 = 0;
 const LOBE: u32 = 1;
 const ROULETTE: u32 = 2;
 const OWN: u32 = 3;
-
-/// Opacity of the surface that is met after `n` others, scattered at or passed: `CROSSING + n`.
-const CROSSING: u32 = 1 << 31;
 
 /// A path between two of its vertices.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
@@ -235,7 +240,7 @@ impl<F: Features> LightWalk<'_, F> {
     ) -> Option<Ray> {
         let point = self.context.surface_at(ray, hit)?;
         let direction = Vec3::from(ray.direction);
-        let opacity = || numbers.single(CROSSING + state.segments - 1 + state.crossings);
+        let opacity = || numbers.single(dimension::opacity(state.segments, state.crossings));
         if self.context.is_passed(&point, hit, state.triangle, opacity) {
             if state.crossings >= MAX_CROSSINGS {
                 counters.dropped.unfinished += 1;

@@ -153,7 +153,7 @@ fn set_up<'m, F: Features, T>(
 struct Cached<'c, 'm, F> {
     method: IrradianceCaching<'m, F>,
     stage: Stage<'c>,
-    /// Of caustics, where they pay.
+    /// Photons of caustics, if they pay.
     photons: Option<CausticPhotons<'m>>,
     caustics: CausticUse,
     scratch: Vec<Vec<Line>>,

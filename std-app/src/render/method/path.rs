@@ -14,7 +14,7 @@ use halflight_core::method::path::PathTracing;
 pub(super) struct Paths<'a, F> {
     pub(super) method: PathTracing<'a, F>,
     pub(super) scratch: Vec<Vec<Line>>,
-    /// What a prepass of caustic photons found, which do not pay.
+    /// The finding of a prepass of caustic photons, which do not pay.
     pub(super) caustics: CausticUse,
 }
 

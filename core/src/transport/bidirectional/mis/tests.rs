@@ -133,7 +133,7 @@ impl Path {
         if i > 1 { of(i) } else { None }
     }
 
-    /// Whether it is merged there, in a path of so many segments.
+    /// Whether it is merged there, in a path of this length.
     fn is_caustic(&self, i: usize) -> bool {
         let segments = (self.vertices.len() + 1 - i) as u32;
         self.arrival(i).is_some_and(|arrival| arrival.is_merged(segments))
