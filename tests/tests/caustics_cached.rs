@@ -2,6 +2,7 @@
 //! is short, and the audit merges the same photons.
 
 use halflight::render::{Method, RenderResult, Settings};
+use halflight_core::cache::irradiance::Metric;
 use halflight_core::scene::Scene;
 use halflight_tests::render::{difference, has_photons, render, try_render};
 use halflight_tests::scenes::{SceneBuffers, glass, in_a_room, lamp_before, lamp_over_ball, metal};
@@ -109,8 +110,19 @@ fn photons_leave_enough_memory_for_records() {
 fn the_audit_merges_the_same_photons() {
     let buffers = in_a_room(lamp_over_ball(glass(0.0), 0.3));
     let scene = buffers.scene();
-    let fine = cached(&scene, 128, |s| s.stop.error = Some(1e-9));
+    let fine = cached(&scene, 128, |s| (s.audit, s.stop.error) = (None, Some(1e-9)));
     let audit = fine.audit.as_ref().unwrap();
     println!("{:?} {:?} {:?}", fine.error, audit.bias, audit.whole);
     assert!(audit.has_photons && !audit.is_biased() && audit.bias.detectable < 0.02);
+
+    // Records ten times too wide, by a metric that lets them be: the audit sees their bias.
+    for seed in 0..4 {
+        let coarse = cached(&scene, 128, |s| {
+            (s.seed, s.audit) = (seed, Some(0.5));
+            (s.cache.metric, s.cache.error) = (Metric::MinDistance, Some(3.0));
+        });
+        let audit = coarse.audit.as_ref().unwrap();
+        println!("seed {seed}: {:?} {:?}", audit.bias, audit.whole);
+        assert!(audit.has_photons && audit.is_biased());
+    }
 }
