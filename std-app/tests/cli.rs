@@ -119,6 +119,20 @@ fn a_render_writes_every_picture_and_says_the_contract() {
 }
 
 #[test]
+fn a_render_without_a_stop_rule_ends_by_its_error_and_says_so() {
+    let folder = Folder::new("sensible");
+    let object = folder.object("render scene.obj --size 16x16 --json");
+    assert_eq!((&object["ending"], &object["stop_rule"]), (&"done".into(), &"error".into()));
+    assert!(object["error"]["interval"][1].as_f64().unwrap() <= 1e-3, "{}", object["error"]);
+    let output = folder.run("render scene.obj --size 16x16");
+    assert!(String::from_utf8(output.stdout).unwrap().contains("ended at relMSE 1e-3, the default"));
+
+    assert_eq!(folder.object("render scene.obj --size 16x16 --spp 4 --json")["stop_rule"], "spp");
+    let object = folder.object("render scene.obj --size 64x64 --time 0.2s --json");
+    assert_eq!(object["stop_rule"], "time");
+}
+
+#[test]
 fn a_report_is_a_page_a_curve_and_the_same_object() {
     let folder = Folder::new("report");
     let object = folder.object("render scene.obj -o a.png --size 20x16 --spp 16 --report out --json");

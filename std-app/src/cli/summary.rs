@@ -2,10 +2,10 @@
 
 use super::compare as comparing;
 use super::dropped;
-use halflight::render::{Audited, BiasEstimate, Blurred, Ending, ErrorEstimate};
+use halflight::render::{Audited, BiasEstimate, Blurred, Ending, ErrorEstimate, Stop, StopRule};
 use halflight::report::Run;
 use halflight::report::quantity::{plural, readable_bytes, readable_name, readable_seconds, readable_value};
-use halflight_core::findings::Finding;
+use halflight_core::findings::{Finding, Value};
 use std::path::Path;
 
 /// Lines of `run`; `report` is the folder of its report.
@@ -24,14 +24,20 @@ pub(super) fn text(run: &Run, report: Option<&Path>) -> String {
             lines.extend(doubt.map(|doubt| format!("       but {doubt}")));
         }
     }
-    lines.extend(match result.ending {
-        Ending::Biased => Some("       the bias alone exceeds --error: more samples do not help".into()),
-        Ending::NoiseFloor => Some(
-            "       noise that all samples share exceeds --error: more samples do not help; for an \
+    let error = readable_value(Value::Number(settings.stop.error.unwrap_or_default()));
+    lines.extend(match (result.ending, result.stop_rule) {
+        (Ending::Biased, _) => {
+            Some(format!("       the bias alone exceeds relMSE {error}: more samples do not help"))
+        }
+        (Ending::NoiseFloor, _) => Some(format!(
+            "       noise that all samples share exceeds relMSE {error}: more samples do not help; for an \
             irradiance cache more --cache-rays do"
-                .into(),
-        ),
-        Ending::Done | Ending::Interrupted => None,
+        )),
+        (_, Some(rule)) if settings.stop == Stop::SENSIBLE => {
+            let end = if rule == StopRule::Error { "at relMSE 1e-3" } else { "after 60 s" };
+            Some(format!("       ended {end}, the default; --spp, --time or --error set another end"))
+        }
+        _ => None,
     });
     if let Some(comparison) = run.comparison {
         lines.extend(comparing::text(comparison).lines().map(|line| format!("       {line}")));

@@ -50,7 +50,7 @@ pub use method::{
     CacheSettings, CacheUse, CausticUse, ChainUse, MapUse, MapView, Method, PhotonSettings, PhotonUse,
     PhotonView, VirtualLightUse,
 };
-pub use rounds::Stop;
+pub use rounds::{Stop, StopRule};
 pub use study::{IrradianceStudy, MetricError, study_irradiance};
 pub use survey::{Check, Look, Mark, Survey};
 pub use turns::{Turn, Turns};
@@ -281,6 +281,8 @@ pub struct RenderResult {
     pub unsaved: Vec<FileError>,
     /// Why rendering ended.
     pub ending: Ending,
+    /// The stop rule that held, if one did.
+    pub stop_rule: Option<StopRule>,
 }
 
 /// Whether a film or a cache will find its way to `path`: the folder is there and takes files.

@@ -306,6 +306,7 @@ impl<'a> Progressive<'a> {
         }
         let film = &state.film;
         let (image, filled_pixels) = without_gaps(state, sketch, workers);
+        let ending = if interrupted { Ending::Interrupted } else { self.lost.unwrap_or(Ending::Done) };
         let is_viewed = settings.photon_view && !interrupted;
         Ok(RenderResult {
             method: *method,
@@ -342,7 +343,8 @@ impl<'a> Progressive<'a> {
                 .into_iter()
                 .chain(renderer.kept().and_then(RewrittenFile::failed))
                 .collect(),
-            ending: if interrupted { Ending::Interrupted } else { self.lost.unwrap_or(Ending::Done) },
+            ending,
+            stop_rule: (ending == Ending::Done).then(|| self.rounds.rule()),
         })
     }
 }

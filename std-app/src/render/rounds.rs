@@ -18,10 +18,25 @@ impl Stop {
     /// Samples per pixel where no rule is given.
     pub const DEFAULT_SPP: u32 = 256;
 
+    /// The end of a picture for which a user of the command line gave no rule: an error that the eye does not
+    /// see, or a minute.
+    pub const SENSIBLE: Self = Self { spp: None, seconds: Some(60.0), error: Some(1e-3) };
+
     /// Samples per pixel at most, where there is a limit.
     pub(super) fn most_samples(&self) -> Option<u32> {
         if *self == Self::default() { Some(Self::DEFAULT_SPP) } else { self.spp }
     }
+}
+
+/// The rule that ended a render.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum StopRule {
+    /// Samples per pixel.
+    Samples,
+    /// Seconds of rendering.
+    Time,
+    /// Upper end of the interval of relMSE.
+    Error,
 }
 
 /// Samples that a pixel can have at most: the sampler's points repeat after 2^32, and a half must count.
@@ -227,6 +242,15 @@ impl Rounds {
         let (before, was) = *self.first_noise.get_or_insert((self.spp, noise.upper));
         let [n, m] = [before, self.spp].map(f64::from);
         noise.lower * m > SHARED * was * n && noise.upper * m - was * n > wanted * (m - n)
+    }
+
+    /// The rule that holds. The clock is not asked: without another rule it is time.
+    pub(super) fn rule(&self) -> StopRule {
+        match self.stop.spp {
+            _ if self.error_reached() => StopRule::Error,
+            Some(most) if self.spp >= most => StopRule::Samples,
+            _ => StopRule::Time,
+        }
     }
 
     fn error_reached(&self) -> bool {

@@ -4,6 +4,7 @@ use super::{Provenance, Race, Run};
 use crate::compare::Comparison;
 use crate::render::{
     Against, Audited, Blurred, Deviation, Ending, ErrorEstimate, Place, Region, RenderResult, Round, Shard,
+    StopRule,
 };
 use halflight_core::film::Dropped;
 use halflight_core::findings::{Findings, Value as FindingValue};
@@ -30,6 +31,11 @@ pub(super) fn run(run: &Run) -> Value {
             Ending::Biased => "biased",
             Ending::NoiseFloor => "noise-floor",
         },
+        "stop_rule": result.stop_rule.map(|rule| match rule {
+            StopRule::Samples => "spp",
+            StopRule::Time => "time",
+            StopRule::Error => "error",
+        }),
         "seconds": {
             "load": run.load_seconds,
             "build": result.seconds.build,
