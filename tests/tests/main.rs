@@ -4,6 +4,7 @@
 //! `cargo test --profile quick -p halflight-tests --test main golden::` runs one module of it.
 
 mod aiming;
+mod bidirectional_reference;
 mod bsdf;
 mod cache_file;
 mod caustics;

@@ -36,7 +36,7 @@ pub struct LightSample {
     /// Whether the light has no surface: no ray can find it by chance.
     pub delta: bool,
     /// Which light: emitters, points and spots, directional lights, the environment, in this order.
-    pub(super) light: u32,
+    pub(crate) light: u32,
 }
 
 impl LightSample {

@@ -24,6 +24,18 @@ pub(crate) enum LightType {
     Delta,
 }
 
+impl LightSampler<'_> {
+    /// The number of the emitter that `triangle` is a part of.
+    pub(crate) fn emitter_index(&self, triangle: u32) -> Option<u32> {
+        self.emitter_of(triangle).map(|(index, _)| index as u32)
+    }
+
+    /// The number of the environment among all lights: the last.
+    pub(crate) fn environment_index(&self) -> u32 {
+        (self.near() + self.distant.len()) as u32
+    }
+}
+
 impl EmissionSampler<'_> {
     /// Of an emissive `triangle` at `place` in unit direction `way`: per m² sr of étendue.
     pub(crate) fn density_of_surface(

@@ -24,6 +24,12 @@ use glam::Vec3;
 
 pub use crate::transport::walk::light::{PATHS, ROOM};
 
+/// Dimensions of the sampler at a vertex of a light path.
+pub(super) const DIMENSIONS: u32 = 5;
+
+/// Distinguishes the random numbers of light paths from others.
+pub(super) const SEED: u64 = 0x6269_6469_7265_6374;
+
 /// Shadow rays to the camera that are traced together.
 const SHADOW_RAYS: usize = 1024;
 
@@ -278,8 +284,8 @@ pub(in crate::transport) fn lens_point(
 }
 
 impl<F: Features> Visitor for Writer<'_, F> {
-    const DIMENSIONS: u32 = 5;
-    const SEED: u64 = 0x6269_6469_7265_6374;
+    const DIMENSIONS: u32 = DIMENSIONS;
+    const SEED: u64 = SEED;
 
     fn meet(
         &mut self,

@@ -14,5 +14,6 @@ pub mod light_pass;
 pub mod merge_photons;
 mod merging;
 pub mod mis;
+pub mod reference;
 mod techniques;
 pub mod vertex;
