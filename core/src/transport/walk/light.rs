@@ -1,8 +1,8 @@
-//! Light paths under way: from the lights, over surfaces, until they end. What is done where they meet one is
-//! for a [`Visitor`] to say: `deposit.rs` leaves photons of all light, `caustics.rs` those of caustics.
+//! Random walk of light subpaths, from the emission to the last surface. A [`Visitor`] acts at each vertex:
+//! `deposit.rs` stores photons of all light, `caustics.rs` those of caustics.
 //!
-//! All paths of a task advance together, so that the tracer sees batches of rays. Path `i` of map `n` follows
-//! from (seed, n, i) alone.
+//! All paths of a task advance together, so that rays are traced in batches. Path `i` of map `n` depends on
+//! (seed, n, i) alone.
 
 use crate::Rgb;
 use crate::bsdf::{Bsdf, BsdfSample, Features};
@@ -20,109 +20,109 @@ use crate::transport::walk::termination::{MAX_CROSSINGS, is_cut, survival_limit}
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
-/// Light paths of a task.
+/// Number of light paths of a task.
 pub const PATHS: usize = 1024;
 
-/// Vertices of a task's paths that there is room for, where paths go on with a probability of at most
-/// [`MAX_CONTINUATION`]: their mean is then no more than five for each path.
+/// Capacity of a task in vertices. With a continuation probability of at most [`MAX_CONTINUATION`] the mean
+/// is at most five vertices per path.
 pub const ROOM: usize = 6 * PATHS;
 
-/// Largest probability with which a path goes on that stores its vertices.
+/// Maximum continuation probability of a path that stores its vertices.
 pub(in crate::transport) const MAX_CONTINUATION: f32 = 0.8;
 
-/// Dimensions of the sampler at a vertex: where the path goes on, by which lobe, whether it does; and one
-/// that a visitor may have.
+/// Dimensions of the sampler at a vertex: scattered direction, lobe, Russian roulette, and one for the
+/// visitor.
 const SCATTERING: u32 = 0;
 const LOBE: u32 = 1;
 const ROULETTE: u32 = 2;
 const OWN: u32 = 3;
 
-/// A path between two of its vertices.
+/// State of one light subpath between two vertices.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C)]
 pub(in crate::transport) struct LightPathState {
     pub power: [f32; 3],
-    /// Which path of the map.
+    /// Index of the path in its map.
     pub number: u32,
-    /// Segments traced, the one under way included.
+    /// Segments traced, including the current one.
     pub segments: u32,
-    /// Surfaces passed through by cut-out.
+    /// Number of skipped surfaces.
     crossings: u32,
-    /// The triangle that the ray starts on, which it cannot meet again.
+    /// Triangle at the origin of the ray, which the ray cannot hit again.
     triangle: u32,
-    /// Which light it left, and where.
+    /// Index of the light, and below the position of emission.
     pub light: u32,
     pub origin: [f32; 3],
-    /// From which cell of the guide.
+    /// Cell of the emission guide.
     pub cell: u32,
-    /// The last vertex, for visitors that note it.
+    /// Last vertex, for visitors that store it.
     pub position: [f32; 3],
-    /// Sums of a bidirectional path (`bidirectional/mis.rs`).
+    /// Running MIS quantities of a bidirectional path (`bidirectional/mis.rs`).
     pub last: f32,
     pub rest: f32,
     pub merge: f32,
-    /// R / (π² r² N) so far, for visitors that weigh photons (`merge.rs`, `caustics.rs`).
+    /// R / (π² r² N) so far, for visitors that weight photons (`merge.rs`, `caustics.rs`).
     pub chain: f32,
-    /// Root of the sum of squares of the densities of the path tracer's techniques, over that of which
-    /// `chain` tells: 1 where that is the only one, 0 where there is none.
+    /// Root of the sum of squared pdfs of the techniques of path tracing, over the pdf of the technique of
+    /// `chain`: 1 if that is the only technique, 0 if there is none.
     pub others: f32,
-    /// 1 where the last surface only mirrors or refracts; for bidirectional paths, or does so narrowly.
+    /// 1 if the last surface scatters by a delta function only; for bidirectional paths, also if narrowly.
     pub mirrored: u32,
-    /// Probability with which it has come so far.
+    /// Product of the continuation probabilities so far.
     survived: f32,
 }
 
-/// Where a path meets a surface.
+/// Vertex of a light subpath.
 pub(in crate::transport) struct Vertex<'v> {
     pub point: &'v SurfacePoint<'v>,
     pub bsdf: &'v Bsdf,
-    /// Barycentric weights of the second and third corner of the triangle.
+    /// Barycentric coordinates of the second and third corner of the triangle.
     pub barycentric: [f32; 2],
-    /// Unit direction to where the light comes from.
+    /// Unit direction from which the light arrives.
     pub to_light: Vec3,
-    /// Fraction of the light paths here that the surface meets, above 0.
+    /// Opacity, above 0: the fraction of the light paths here that hit the surface.
     opacity: f32,
     numbers: &'v dyn Numbers,
-    /// Its first dimension.
+    /// First dimension of the vertex.
     first: u32,
 }
 
 impl Vertex<'_> {
-    /// The visitor's own random number.
+    /// Random number of the visitor.
     pub(in crate::transport) fn own(&self) -> f32 {
         self.numbers.single(self.first + OWN)
     }
 
-    /// Two random numbers of the visitor's own.
+    /// Two random numbers of the visitor.
     pub(in crate::transport) fn own_pair(&self) -> [f32; 2] {
         self.numbers.pair(self.first + OWN)
     }
 
-    /// The photon of light of such power that has come here. Camera paths that meet a cut-out see the light
-    /// on its solid part, of which photons hold the fraction that its opacity lets them meet.
+    /// Photon of light that arrives with `power`. A camera path at a cut-out sees the light on its solid
+    /// part; photons carry only the fraction opacity of it, hence the division.
     pub(in crate::transport) fn photon(&self, power: Rgb) -> Photon {
         let power = power / self.opacity;
         Photon::new(self.point.position, self.to_light, self.point.geometric_normal, power)
     }
 }
 
-/// How a path goes on.
+/// Continuation of a path behind a vertex.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::transport) struct Continuation {
-    /// With this probability at most.
+    /// Upper bound of the continuation probability.
     pub most: f32,
-    /// Only where it is mirrored.
+    /// Whether the path survives only if it scatters by a delta function or by a coat alone.
     pub mirrored: bool,
 }
 
-/// What is done with light paths.
+/// Action of a method at the vertices of light subpaths.
 pub(in crate::transport) trait Visitor {
-    /// Dimensions of the sampler at a vertex.
+    /// Number of dimensions of the sampler at a vertex.
     const DIMENSIONS: u32 = 3;
-    /// Distinguishes its random numbers from those of others, and of pixels.
+    /// Seed that separates these random numbers from those of other visitors and of pixels.
     const SEED: u64;
 
-    /// A path has met a surface. `None` ends it.
+    /// Called at each surface. `None` ends the path.
     fn meet(
         &mut self,
         state: &mut LightPathState,
@@ -130,14 +130,14 @@ pub(in crate::transport) trait Visitor {
         counters: &mut Counters,
     ) -> Option<Continuation>;
 
-    /// Whether it goes on by the base or the coat of `vertex` alone.
+    /// Whether the path samples the base or the coat of `vertex` separately.
     #[inline]
     fn is_apart(&self, _state: &LightPathState, _vertex: &Vertex) -> bool {
         false
     }
 
-    /// It is about to leave it by `sample`, having come from `from`, local. That `is_narrow` where it is
-    /// mirrored, or by a coat alone.
+    /// Called before the path leaves the vertex by `sample`, from the local direction `from`. The flag
+    /// `is_narrow` marks a delta function or a coat alone.
     #[inline]
     fn leave(
         &self,
@@ -149,13 +149,13 @@ pub(in crate::transport) trait Visitor {
     }
 }
 
-/// What is shot: all but its visitor.
+/// Random walk of all light subpaths of a map, without its visitor.
 #[derive(Clone, Copy)]
 pub(in crate::transport) struct LightWalk<'a, F> {
     pub context: SceneContext<'a, F>,
     pub emission: &'a EmissionSampler<'a>,
     pub seed: u32,
-    /// Light paths of a map.
+    /// Number of light paths of a map.
     pub paths: u32,
     pub max_depth: u32,
 }
@@ -166,12 +166,12 @@ impl<F: Features> LightWalk<'_, F> {
         (self.paths as usize).div_ceil(PATHS)
     }
 
-    /// Working memory of one task.
+    /// Scratch memory of one task.
     pub(in crate::transport) fn scratch() -> Footprint {
         Footprint::default().slice::<LightPathState>(PATHS).slice::<Ray>(PATHS).slice::<Hit>(PATHS)
     }
 
-    /// Follows the paths of task `task` of map number `map`.
+    /// Follows the paths of task `task` of map `map`.
     pub(in crate::transport) fn follow<V: Visitor>(
         &self,
         task: usize,
@@ -181,7 +181,7 @@ impl<F: Features> LightWalk<'_, F> {
     ) -> Result<Counters, OutOfMemory> {
         let first = task * PATHS;
         let paths = (self.paths as usize).saturating_sub(first).min(PATHS);
-        // A point of a sequence for each path: even and odd maps are independent.
+        // Each path has one point of the sequence; even and odd maps are independent.
         let seed = mix(V::SEED ^ u64::from(self.seed)) as u32;
         let numbers_of = |number| Sampler::replicate(seed, map >> 1, map & 1, number);
         let mut arena = scratch.scratch();
@@ -228,7 +228,7 @@ impl<F: Features> LightWalk<'_, F> {
         Ok(counters)
     }
 
-    /// One vertex: what the path of `ray` met. The ray by which it goes on.
+    /// One vertex at `hit` of `ray`; returns the next ray.
     fn step<V: Visitor, N: Numbers>(
         &self,
         state: &mut LightPathState,
@@ -275,8 +275,8 @@ impl<F: Features> LightWalk<'_, F> {
             return None;
         }
         visitor.leave(state, &vertex, from, (&sample, is_narrow));
-        // Power is not squeezed by refraction, as radiance is; and where the shading normal is not that of
-        // the triangle, it is the other cosine that counts (Veach 1997, sections 5.2 and 5.3).
+        // Unlike radiance, power is not scaled by refraction; with a shading normal, the other cosine counts
+        // (Veach 1997, sections 5.2 and 5.3).
         let power = Rgb::from(state.power);
         if power.max_element() <= 0.0 {
             return None;
@@ -286,7 +286,7 @@ impl<F: Features> LightWalk<'_, F> {
             let flat = |way: Vec3| way.dot(point.geometric_normal).abs();
             next *= from.z * flat(towards) / (flat(direction) * sample.direction.z.abs());
         }
-        // Power that goes on is the same where it can be: what is absorbed ends paths.
+        // Paths keep their power where possible: absorption ends paths instead.
         let continuation_probability = (next.max_element() / power.max_element()).min(onward.most);
         let continuation_probability =
             continuation_probability.min(survival_limit(state.segments + 1) / state.survived);
@@ -308,7 +308,7 @@ impl<F: Features> LightWalk<'_, F> {
     }
 }
 
-/// Where the photons of a task go.
+/// Photon memory of a task.
 pub(in crate::transport) struct PhotonBuffer<'p> {
     photons: &'p mut [Photon],
     count: usize,
@@ -329,7 +329,7 @@ impl<'p> PhotonBuffer<'p> {
         }
     }
 
-    /// What is left of it has photons of no place, which a map refuses.
+    /// Fills the rest with photons without position, which a map rejects.
     pub(in crate::transport) fn finish(self) {
         let Self { photons, count } = self;
         if let Some(rest) = photons.get_mut(count..) {

@@ -1,15 +1,15 @@
-//! Multiple importance sampling (Veach 1997, chapter 9): the heuristics, and the running quantities R and ρ
-//! by which camera and light subpaths weigh vertex merging against path tracing (`caustics/merge.rs`).
+//! Multiple importance sampling (Veach 1997, chapter 9): heuristics, and the running quantities R and ρ by
+//! which camera and light subpaths weight vertex merging against path tracing (`caustics/merge.rs`).
 //!
-//! With étendue in place of areas (`light/emission/pdf.rs`) distances cancel. The pdf of a photon near the
-//! rough vertex xⱼ over that of a camera path from xⱼ by x₍ⱼ₋₁₎ … x₁ to the light vertex x₀ is
+//! Étendue in place of area (`light/emission/pdf.rs`) cancels the distances. R is the pdf of a photon near
+//! the rough vertex xⱼ over the pdf of a camera path from xⱼ by x₍ⱼ₋₁₎ … x₁ to the light vertex x₀:
 //!
 //!   R = N π r² cos θⱼ / p(xⱼ → x₍ⱼ₋₁₎) · Π ρᵢ · p(x₀) p(ω₀) / cos θ₀
 //!   ρᵢ = p(x₍ᵢ₋₁₎ → xᵢ → x₍ᵢ₊₁₎) cos θ(x₍ᵢ₋₁₎) / (p(x₍ᵢ₊₁₎ → xᵢ → x₍ᵢ₋₁₎) cos θ(x₍ᵢ₊₁₎))
 //!
-//! of N light paths and kernels of radius r. At a mirror ρ = 1; where light is refracted, ρ is the squared
-//! ratio of the indices of refraction. Both subpaths know all of it when they meet: no vertex needs to be
-//! traced back.
+//! Here N is the number of light paths and r the kernel radius. ρ = 1 at a mirror; at a refraction ρ is the
+//! squared ratio of the indices of refraction. Both subpaths know all factors when they meet, so that no
+//! vertex is traced back.
 
 use crate::bsdf::{Bsdf, BsdfSample, Features};
 use crate::light::LightSampler;
@@ -17,55 +17,55 @@ use crate::scene::SurfacePoint;
 use crate::transport::walk::context::SceneContext;
 use glam::Vec3;
 
-/// Weight of a sample of pdf `own` beside a technique of pdf `other`: the power heuristic (Veach and Guibas
-/// 1995, section 4.1). Any two numbers, not both zero.
+/// Power heuristic (Veach and Guibas 1995, section 4.1): weight of a sample of pdf `own` beside a technique
+/// of pdf `other`. One of the two may be zero.
 #[inline]
 pub(in crate::transport) fn power_heuristic(own: f32, other: f32) -> f32 {
     let ratio = other / own;
     1.0 / (1.0 + ratio * ratio)
 }
 
-/// The same for light of the environment. The visible environment is known by place, not by point: its pdf is
-/// less certain than it seems, and the square would trust it too much.
+/// Weight of a sample of the environment. With environment visibility the balance heuristic: visibility is
+/// learned per place, not per point, so the pdf is uncertain and its square would trust it too much.
 #[inline]
 pub(in crate::transport) fn environment_heuristic(lights: &LightSampler, own: f32, other: f32) -> f32 {
     if lights.has_visibility() { 1.0 / (1.0 + other / own) } else { power_heuristic(own, other) }
 }
 
-/// The `weight` of a contribution among the techniques of path tracing, once more beside vertex merging,
-/// whose pdf is `ratio` times that of path tracing.
+/// Weight of a contribution of path tracing that vertex merging can sample as well: `weight` is its weight
+/// among the techniques of path tracing, `ratio` the pdf of merging over the pdf of path tracing.
 #[inline]
 pub(in crate::transport) fn weight_beside_merging(weight: f32, ratio: f32) -> f32 {
     weight / (1.0 + weight * ratio * ratio)
 }
 
-/// Weight of a photon, `ratio` being the pdf of path tracing over that of vertex merging.
+/// Weight of a photon; `ratio` is the pdf of path tracing over the pdf of vertex merging.
 #[inline]
 pub(in crate::transport) fn merging_weight(ratio: f32) -> f32 {
     1.0 / (1.0 + ratio * ratio)
 }
 
-/// A vertex of a chain of specular surfaces: light comes from `far`, the side of the light, and leaves to
-/// `near`, the side of the camera.
+/// Vertex of a specular chain: light arrives from `far`, towards the light, and leaves to `near`, towards the
+/// camera.
 pub(in crate::transport) struct ChainLink<'p> {
     pub(in crate::transport) point: &'p SurfacePoint<'p>,
-    /// As seen from one of the two sides.
+    /// BSDF seen from the side of `near`.
     pub(in crate::transport) bsdf: &'p Bsdf,
-    /// The side from which the BSDF is seen; local, as `far`.
+    /// Local direction on the side of the BSDF.
     pub(in crate::transport) near: Vec3,
     pub(in crate::transport) far: Vec3,
-    /// Whether the coat alone scatters.
+    /// Whether only the coat scatters.
     pub(in crate::transport) coat_alone: bool,
 }
 
 impl ChainLink<'_> {
-    /// The pdf of scattering from `far` to `near`, times the ratio of the cosines of `far` and of `near`.
-    /// Over the pdf of the other direction it is ρ.
+    /// Pdf of scattering from `far` to `near`, times cos(far) / cos(near). Divided by the pdf of the other
+    /// direction it is ρ.
     pub(in crate::transport) fn reverse<F: Features>(&self, context: &SceneContext<F>) -> f32 {
         self.pdf(context) * (self.far.z / self.near.z).abs()
     }
 
-    /// The pdf of scattering from `far` to `near`.
+    /// Pdf of scattering from `far` to `near`.
     pub(in crate::transport) fn pdf<F: Features>(&self, context: &SceneContext<F>) -> f32 {
         let Self { point, bsdf, near, far, coat_alone } = *self;
         if F::GLOSSY && coat_alone {
@@ -80,7 +80,7 @@ impl ChainLink<'_> {
     }
 }
 
-/// R of a camera path behind a specular vertex, which it left by `sample`: R so far times ρ.
+/// R of a camera path behind a specular vertex that it left by `sample`: R so far times ρ.
 #[inline]
 pub(in crate::transport) fn ratio_behind<F: Features>(
     ratio: f32,

@@ -1,20 +1,20 @@
-//! The end of subpaths: Russian roulette, and limits of length that make termination a fact.
+//! End of subpaths: Russian roulette, and limits of length that guarantee termination.
 
 use crate::Rgb;
 use crate::bsdf::{Bsdf, BsdfSample};
 
-/// Surfaces passed by cut-out after which a path is cut and counted as unfinished. Roulette makes this limit,
-/// and [`MAX_VERTICES`], as good as unreachable.
+/// Skipped surfaces after which a path is cut and counted as unfinished. Roulette makes this limit and
+/// [`MAX_VERTICES`] practically unreachable.
 pub(in crate::transport) const MAX_CROSSINGS: u32 = 1024;
-/// Vertices after which a path is cut.
+/// Number of vertices after which a path is cut.
 pub(in crate::transport) const MAX_VERTICES: u32 = 1 << 13;
 
-/// Vertices after which total reflection ends a path as well. Light that glass has held for so long does not
-/// leave it in theory; in practice a ray in 10⁴ slips out by rounding where it meets an edge, and over
-/// thousands of reflections that is much of the light. A light guide has a hundred.
+/// Number of vertices after which total reflection also ends a path. In theory light inside glass for so long
+/// never leaves it; in practice one ray in 10⁴ escapes by rounding at an edge, over thousands of reflections
+/// much of the light. A light guide has a hundred reflections.
 const TRAPPED_FROM: u32 = 256;
 
-/// Whether a path is cut, and so unfinished, at the end of its `segments`th segment, which it leaves by
+/// Whether a path is cut, and so unfinished, at the vertex that ends segment `segments` and that it leaves by
 /// `sample` of `bsdf`.
 #[inline]
 pub(in crate::transport) fn is_cut(segments: u32, bsdf: &Bsdf, sample: &BsdfSample) -> bool {
@@ -25,21 +25,21 @@ pub(in crate::transport) fn is_cut(segments: u32, bsdf: &Bsdf, sample: &BsdfSamp
     is_total || segments >= MAX_VERTICES
 }
 
-/// A path of at least this throughput goes on for certain; one of half of it, every other time. There is no
-/// fewest number of segments: early ends of dark paths are what pays
+/// Throughput from which a path survives with certainty; below, the probability is proportional to it. There
+/// is no minimum number of segments: early ends of dark paths save the most time
 /// (docs/decisions/0023-russian-roulette.md).
 const CERTAIN_FROM: f32 = 0.25;
 
-/// From this many segments on no path survives for certain, so that paths end even between perfect mirrors:
-/// of those that lose nothing 1 / n come to n times this length, and carry n times the light. Any fixed
+/// Number of segments from which no path survives with certainty, so that paths end even between perfect
+/// mirrors. A fraction 1 / n of lossless paths reaches n times this length, with n times the light. Any fixed
 /// probability would make the variance of light that loses less than half as much infinite.
 const CERTAIN_BELOW: u32 = 16;
 
-/// From this many segments on paths end soon.
+/// Number of segments from which the continuation probability is at most 0.99.
 const ENDLESS: u32 = 2048;
 
-/// The continuation probability of a path of `segments` segments with this `throughput` (without the factor
-/// of refraction, which comes back where the light leaves the glass).
+/// Continuation probability of a path of `segments` segments and this `throughput`, without the factor of
+/// refraction, which cancels when the light leaves the glass.
 #[inline]
 pub(in crate::transport) fn continuation_probability(segments: u32, throughput: Rgb) -> f32 {
     let most = match segments {
@@ -50,9 +50,9 @@ pub(in crate::transport) fn continuation_probability(segments: u32, throughput: 
     (throughput.max_element() / CERTAIN_FROM).min(most)
 }
 
-/// The fraction of light subpaths that come to so many segments at most. Between perfect mirrors, and by
-/// total reflection in glass, nothing else ends them; where a fortieth of the light is lost at each surface,
-/// fewer come so far. The survivors carry more power instead, so that there is no bias.
+/// Upper bound of the fraction of light subpaths that reach `segments` segments. Nothing else ends paths
+/// between perfect mirrors and by total reflection in glass; where each surface absorbs a fortieth of the
+/// light, fewer paths get this far. Survivors carry more power, so that there is no bias.
 pub(in crate::transport) fn survival_limit(segments: u32) -> f32 {
     CERTAIN_BELOW as f32 / segments.max(CERTAIN_BELOW) as f32
 }

@@ -1,5 +1,4 @@
-//! Shadow rays from a surface point to a light, and the fraction of the light that cut-outs on their way
-//! transmit.
+//! Shadow rays from a surface point to a light, and their transmittance through cut-outs.
 
 use crate::Rgb;
 use crate::bsdf::Features;
@@ -11,13 +10,12 @@ use crate::transport::walk::context::SceneContext;
 use crate::transport::walk::termination::MAX_CROSSINGS;
 use glam::Vec3;
 
-/// The shadow ray from `point` to the light of `sample`, which meets neither end. `None` where the light,
-/// moved off its surface, is no longer on the side on which it was seen: rounding may put `point` behind the
-/// light that it lies on.
+/// Shadow ray from `point` to the light of `sample`, which hits neither end. `None` if the offset light point
+/// is on the other side of the surface: rounding may put a `point` that lies on the light behind it.
 #[inline]
 pub(in crate::transport) fn shadow_ray(point: &SurfacePoint, sample: &LightSample) -> Option<Ray> {
     if let Some(target) = sample.target {
-        // Off the light's surface, to the side from which it is seen.
+        // Offset from the light's surface, to the side of `point`.
         let end = target.position + target.error * target.normal;
         let heights = [end - point.position, sample.direction].map(|to| to.dot(point.geometric_normal));
         return (heights[0] * heights[1] > 0.0).then(|| point.spawn_to(end));
@@ -28,22 +26,22 @@ pub(in crate::transport) fn shadow_ray(point: &SurfacePoint, sample: &LightSampl
     Some(point.spawn(sample.direction))
 }
 
-/// Fewer rays than this are followed one by one: a batch takes some time to set up.
+/// Number of rays below which rays are traced one by one, since a batch has a setup cost.
 const FEW: usize = 32;
 
-/// Shadow rays that are traced together, with working memory for as many.
+/// Shadow rays that are traced together, and working memory for them.
 pub(in crate::transport) struct ShadowRays<'w> {
     pub(in crate::transport) rays: &'w mut [Ray],
-    /// Contribution of each ray if nothing is in its way.
+    /// Unoccluded contribution of each ray.
     pub(in crate::transport) light: &'w mut [[f32; 3]],
     pub(in crate::transport) hits: &'w mut [Hit],
     pub(in crate::transport) hidden: &'w mut [u8],
 }
 
 impl<F: Features> SceneContext<'_, F> {
-    /// Traces the first `count` of `shadows`, and calls `arrive` with each ray that reaches its light and
-    /// with the light that cut-outs transmit. Returns the number of rays that met too many cut-outs. Adds to
-    /// the number of `rays`.
+    /// Traces the first `count` of `shadows` and calls `arrive` with each ray that reaches its light and with
+    /// the transmitted light. Returns the number of rays that hit too many cut-outs. Increments `rays` per
+    /// ray.
     pub(in crate::transport) fn trace_shadow_rays(
         &self,
         shadows: &mut ShadowRays,
@@ -66,7 +64,7 @@ impl<F: Features> SceneContext<'_, F> {
         0
     }
 
-    /// The same where some surfaces have cut-outs: round after round, each ray to its next surface.
+    /// [`Self::trace_shadow_rays`] with cut-outs: in each pass every ray advances to its next surface.
     fn trace_through_cutouts(
         &self,
         shadows: &mut ShadowRays,
@@ -105,8 +103,8 @@ impl<F: Features> SceneContext<'_, F> {
         unfinished
     }
 
-    /// The part of `light` that arrives along `ray`, through cut-outs as well. `None` where the ray met too
-    /// many of them. Adds to the number of `rays`.
+    /// Part of `light` that arrives along `ray` through cut-outs. `None` if the ray hits more than
+    /// [`MAX_CROSSINGS`] of them. Increments `rays` per ray.
     pub(in crate::transport) fn transmit(&self, mut ray: Ray, mut light: Rgb, rays: &mut u64) -> Option<Rgb> {
         for _ in 0..=MAX_CROSSINGS {
             *rays += 1;
@@ -121,9 +119,9 @@ impl<F: Features> SceneContext<'_, F> {
         None
     }
 
-    /// The rest of a shadow ray behind its `hit`, and the factor on its light. `None` where nothing passes.
+    /// Rest of a shadow ray behind `hit`, and the transmittance; `None` at an opaque surface.
     pub(in crate::transport) fn pass_cutout(&self, ray: &Ray, hit: &Hit) -> Option<(Ray, f32)> {
-        // Most are opaque, which is known before anything is computed.
+        // Most surfaces are opaque: leave before the surface point is computed.
         let triangle = self.scene.mesh.triangles.get(hit.triangle as usize)?;
         if !self.scene.materials.get(triangle.material as usize)?.has_cutout() {
             return None;
