@@ -1,4 +1,4 @@
-//! Searches for many places, in an order of our own.
+//! Batches of searches in Morton order, each bounded by the result of the previous search.
 
 use super::PhotonMap;
 use super::gather::{Density, Response, gather};
@@ -8,13 +8,13 @@ use super::nearest::{Neighbours, search};
 use glam::Vec3;
 use halflight_simd::{Kernel, Simd};
 
-/// What roundings can add to a distance, relative, and as much again.
+/// Bound of the relative rounding error of a distance, with a factor of two to spare.
 const ROUNDING: f32 = 1.0 + 8.0 * f32::EPSILON;
 
-/// And to the square of one that is too small for relative roundings.
+/// Absolute bound for squared distances too small for a relative one.
 const TINY: f32 = f32::MIN_POSITIVE;
 
-/// The nearest photons of each place.
+/// The nearest photons of each place, in Morton order.
 pub(super) struct Searches<'a, 'm, 'n, F> {
     pub map: &'a PhotonMap<'m>,
     pub places: &'a [Vec3],
@@ -30,14 +30,13 @@ impl<F: FnMut(usize, &Neighbours)> Kernel for Searches<'_, '_, '_, F> {
     #[inline(always)]
     fn run<S: Simd>(mut self, simd: S) {
         let map = self.map;
-        // Where the search before was, and how far its k-th photon.
+        // Place of the previous search and the distance of its k-th photon.
         let mut last: Option<([f32; 3], f32)> = None;
         for next in morton::along(map, self.places.iter().copied(), self.order) {
             let index = next.index as usize;
             let Some(place) = self.places.get(index) else { continue };
             let place = map.space.enter(place.to_array());
-            // The k photons of the last search are no farther from here than this, by the triangle's
-            // inequality.
+            // Triangle inequality: the k photons of the previous search are no farther from here than this.
             let near = last.map_or(f32::MAX, |(last, distance)| {
                 let way = Vec3::from_array(last).distance(Vec3::from_array(place));
                 let most = (way + distance) * ROUNDING;
@@ -45,14 +44,14 @@ impl<F: FnMut(usize, &Neighbours)> Kernel for Searches<'_, '_, '_, F> {
             });
             search(simd, map, place, self.squared_radius.min(near), self.neighbours);
             let limit = self.neighbours.limit();
-            // A place that is not a number tells nothing to the next.
+            // The result at a NaN place bounds nothing.
             last = (limit < f32::INFINITY).then(|| (place, libm::sqrtf(limit)));
             (self.each)(index, self.neighbours);
         }
     }
 }
 
-/// The density at each disc, with one response for all.
+/// Density estimates at discs in Morton order, with one response for all.
 pub(super) struct Gathers<'a, 'm, R> {
     pub map: &'a PhotonMap<'m>,
     pub discs: &'a [QueryDisc],

@@ -1,4 +1,4 @@
-//! The reference: every photon of a map is looked at. For tests, and for those who doubt.
+//! Brute-force reference of the searches, for tests: it visits every photon of a map.
 
 use super::{ALIKE, Density, FLATNESS, Kernel, PhotonMap, QueryDisc, Response, layout::LEAF};
 use core::f32::consts::PI;
@@ -17,7 +17,7 @@ pub fn within(map: &PhotonMap, place: Vec3, radius: f32) -> impl Iterator<Item =
     all.filter(move |&(_, distance)| distance <= squared_radius)
 }
 
-/// What [`PhotonMap::gather`] estimates, photon by photon: the same photons, their sum in another order.
+/// Reference of [`PhotonMap::gather`]: the same photons, summed in another order.
 pub fn gather<R: Response>(map: &PhotonMap, disc: &QueryDisc, response: &R) -> Density {
     let mut density = Density::default();
     let squared_radius = map.space.squared(disc.radius).unwrap_or(0.0);

@@ -1,7 +1,6 @@
-//! The build, in the bytes of the photons themselves: they are brought into the order of the leaves by
-//! selection, level by level (Bentley 1975, with leaves; the halves are chosen so that all leaves but the
-//! last are full), then each leaf is turned from rows to columns in its place, and boxes are put around them
-//! from below.
+//! Build of the photon map in the memory of its photons. Selection brings the photons into the order of the
+//! leaves, level by level (Bentley 1975, with leaves). Its split positions leave only the last leaf partly
+//! full. Each leaf is then transposed from rows to columns in place, and the boxes are computed bottom-up.
 
 use super::PhotonMap;
 use super::layout::{LEAF, Leaf, Levels, Node, WIDTH};
@@ -10,10 +9,10 @@ use super::space::Space;
 use crate::bvh::ForkJoin;
 use core::cmp::Ordering;
 
-/// Ranges shorter than this are not worth another core.
+/// Ranges of fewer photons do not repay a second core.
 const PARALLEL_MIN: usize = 8192;
 
-/// Builds over the first `count` photons of `leaves`; `nodes` holds what [`Levels`] says.
+/// Builds over the first `count` photons of `leaves`. `nodes` has the length that [`Levels`] gives.
 pub(super) fn build<'m, J: ForkJoin>(
     leaves: &'m mut [Leaf],
     count: usize,
@@ -36,7 +35,7 @@ pub(super) fn build<'m, J: ForkJoin>(
     PhotonMap { leaves, nodes, levels, count: kept, refused: offered - kept, space }
 }
 
-/// Brings the photons of finite places to the front, in units of the map. How many those are.
+/// Moves the photons of finite places to the front, in units of the map. Returns their number.
 fn admit(photons: &mut [Photon]) -> (usize, Space) {
     let (mut kept, mut largest) = (0, 0.0f32);
     for i in 0..photons.len() {
@@ -55,11 +54,11 @@ fn admit(photons: &mut [Photon]) -> (usize, Space) {
     (kept, space)
 }
 
-/// Orders what is under a node of `level`.
+/// Orders the photons under a node of `level`.
 fn order<J: ForkJoin>(photons: &mut [Photon], level: usize, join: &J) {
     let child = LEAF * WIDTH.pow(level as u32);
     if photons.len() > child {
-        // All children but the last are full, and the left half of them goes left.
+        // All children except the last are full. The left half of the children goes left.
         let children = photons.len().div_ceil(child);
         let middle = children.div_ceil(2) * child;
         match widest_axis(photons) {
@@ -80,8 +79,8 @@ fn order<J: ForkJoin>(photons: &mut [Photon], level: usize, join: &J) {
     }
 }
 
-/// Brings those that come first along an axis to the front. Places are finite: they need no total order of
-/// floats, which takes longer.
+/// Moves the `middle` photons that come first along an axis to the front. Finite coordinates need no total
+/// order of floats, which is slower.
 fn halve<const AXIS: usize>(photons: &mut [Photon], middle: usize) {
     photons.select_nth_unstable_by(middle, |a, b| {
         let (a, b) = (a.position[AXIS], b.position[AXIS]);
@@ -89,7 +88,7 @@ fn halve<const AXIS: usize>(photons: &mut [Photon], middle: usize) {
     });
 }
 
-/// The axis along which the photons extend most.
+/// Axis of the largest extent.
 fn widest_axis(photons: &[Photon]) -> usize {
     let (mut lo, mut hi) = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
     for photon in photons {
@@ -109,8 +108,8 @@ fn widest_axis(photons: &[Photon]) -> usize {
     }
 }
 
-/// Turns the leaves of `count` photons from rows to columns, and puts boxes around them: into `nodes`, those
-/// above.
+/// Transposes the leaves of `count` photons from rows to columns and writes their boxes into `nodes`, the
+/// level above.
 fn next<J: ForkJoin>(leaves: &mut [Leaf], count: usize, nodes: &mut [Node], join: &J) {
     if count > PARALLEL_MIN && nodes.len() > 1 {
         let half = nodes.len() / 2;
@@ -134,7 +133,7 @@ fn next<J: ForkJoin>(leaves: &mut [Leaf], count: usize, nodes: &mut [Node], join
     }
 }
 
-/// Puts boxes around nodes, in the levels above the lowest.
+/// Computes the boxes of the levels above the lowest.
 fn bound(nodes: &mut [Node], levels: &Levels) {
     for level in 1..levels.count {
         let (below, here) = nodes.split_at_mut(levels.at(level, 0));
@@ -148,7 +147,7 @@ fn bound(nodes: &mut [Node], levels: &Levels) {
     }
 }
 
-/// The box of child `i` of a level.
+/// Writes the box of child `i` of a level.
 fn put(nodes: &mut [Node], i: usize, lo: [f32; 3], hi: [f32; 3]) {
     for axis in 0..3 {
         nodes[i / WIDTH].boxes[axis][i % WIDTH] = lo[axis];

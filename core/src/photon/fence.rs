@@ -1,10 +1,12 @@
-//! What of a disc is on this side of the walls around it. A wall that is thinner than the disc has photons of another
-//! room behind it, on the same floor, which no test of planes and normals tells apart; and in a corner a part of the
-//! disc is no surface at all, so that its photons are too few for its area.
+//! Kernel boundary by eight probes: a density estimate without the part of its disc behind walls and edges
+//! (boundary bias, Hey and Purgathofer 2002). Behind a wall thinner than the disc the same floor goes on and
+//! holds photons of another room, which no test of planes and normals rejects. In a corner a part of the disc
+//! is no surface, so that it holds too few photons for its area.
 //!
-//! Eight probes along the surface say how far it is to the next wall, or to its own edge. What lies between two of them is seen as far as
-//! the nearer, less what a straight wall comes nearer in between. Photons beyond are left out, and the weights of the
-//! rest divided by what they integrate to over what is seen.
+//! Eight probes along the surface measure the distance to the next wall or to the edge of the surface itself.
+//! A sector between two probes reaches as far as the shorter probe, less the most that a straight wall can
+//! come nearer in between. Photons beyond are rejected, and the sum is divided by the integral of the kernel
+//! over the rest.
 
 use super::kernel::Kernel;
 use crate::geometry::Frame;
@@ -12,14 +14,14 @@ use crate::sampling::sin_cos_turns;
 use glam::{Vec2, Vec3};
 use halflight_simd::{Lanes, Mask, Simd, dot};
 
-/// Probes, and parts of a disc between them.
+/// Number of probes, and of sectors between them.
 pub const PROBES: usize = 8;
 
-/// The cosine of half the angle between two probes: a wall that both meet at one is at least so far away between them.
+/// Cosine of half the angle between two probes. A straight wall that neither probe meets before length d is at
+/// least this times d away between them.
 const BETWEEN: f32 = 0.923_879_5;
 
-/// For each part: whether the first coordinate of its places is below zero, the second, and whether the second is
-/// larger in magnitude.
+/// The sectors in the coordinates (u, v) of the disc: u < 0, v < 0, |u| < |v|.
 const PARTS: [[bool; 3]; PROBES] = [
     [false, false, false],
     [false, false, true],
@@ -31,20 +33,20 @@ const PARTS: [[bool; 3]; PROBES] = [
     [false, true, false],
 ];
 
-/// How far a disc is seen, part by part.
+/// Visible part of a disc, sector by sector.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Fence {
     axes: [Vec3; 2],
-    /// Shares of the radius.
+    /// Visible radius of each sector, in radii of the disc.
     reach: [f32; PROBES],
 }
 
 impl Fence {
-    /// How far probes must go, in shares of the radius, so that no wall slips between two of them.
+    /// Length of the probes, in radii of the disc, at which no wall passes between two of them.
     pub const FARTHEST: f32 = 1.0 / BETWEEN;
 
-    /// The directions of the probes, of unit length, along the axes of [`Fence::frame`]. They must go as far as
-    /// [`Fence::FARTHEST`] of the radius.
+    /// Unit directions of the probes, in the tangent axes of [`Fence::frame`]. Probes must reach
+    /// [`Fence::FARTHEST`] radii.
     pub const WAYS: [Vec2; PROBES] = {
         const D: f32 = core::f32::consts::FRAC_1_SQRT_2;
         let way = Vec2::new;
@@ -60,14 +62,14 @@ impl Fence {
         ]
     };
 
-    /// The frame around `normal` whose other axes, turned by `turns`, probes and parts go by.
+    /// Frame around `normal` for probes and sectors, its tangent axes turned by `turns`.
     pub fn frame(normal: Vec3, turns: f32) -> Frame {
         let Frame { tangent, bitangent, .. } = Frame::from_normal(normal);
         let (sin, cos) = sin_cos_turns(turns);
         Frame { tangent: cos * tangent + sin * bitangent, bitangent: cos * bitangent - sin * tangent, normal }
     }
 
-    /// From the shares of the radius that probes get along, infinite where they meet nothing.
+    /// Fence from the free lengths of the probes, in radii of the disc; infinite without a hit.
     pub fn new(frame: &Frame, shares: [f32; PROBES]) -> Self {
         let mut reach = [1.0; PROBES];
         for (i, reach) in reach.iter_mut().enumerate() {
@@ -77,18 +79,19 @@ impl Fence {
         Self { axes: [frame.tangent, frame.bitangent], reach }
     }
 
-    /// Of a disc that is seen all over.
+    /// Fence of a disc that is visible as a whole.
     pub fn open(frame: &Frame) -> Self {
         Self::new(frame, [f32::INFINITY; PROBES])
     }
 
-    /// Whether the whole disc is seen.
+    /// True if the whole disc is visible.
     #[inline]
     pub fn is_open(&self) -> bool {
         self.reach.iter().all(|&reach| reach == 1.0)
     }
 
-    /// What the weights of a disc with that `part` of the radius integrate to over what is seen of it, of 1.
+    /// Integral of the kernel over the visible part of the disc of `part` of the radius; 1 if all of it is
+    /// visible.
     pub fn share(&self, kernel: Kernel, part: f32) -> f32 {
         let parts = self.reach.iter().map(|&r| (r / part).min(1.0)).map(|r| match kernel {
             Kernel::Constant => r * r,
@@ -98,8 +101,8 @@ impl Fence {
         parts.sum::<f32>() / PROBES as f32
     }
 
-    /// Which photons are seen: `offset` leads from each to the middle of the disc, `distance` is squared, and the
-    /// limit of it `squared_radius`.
+    /// Mask of the visible photons. `offset` leads from each photon to the centre of the disc, `distance` is
+    /// its square, and `squared_radius` is the square of the disc's radius.
     #[inline(always)]
     pub(super) fn sees<S: Simd>(
         &self,
@@ -108,7 +111,7 @@ impl Fence {
         distance: S::F16,
         squared_radius: f32,
     ) -> <S::F16 as Lanes>::Mask {
-        // Backwards, for offsets are.
+        // The sign turns offsets to the centre into positions around it.
         let [right, up] = self.axes;
         let (u, v) = (-dot(offset, splat(simd, right)), -dot(offset, splat(simd, up)));
         let zero = simd.splat16(0.0);

@@ -1,16 +1,17 @@
-//! The density estimate, fused with the walk: photons are weighed where they lie, sixteen at a time, and no list of
-//! them is made (Jensen 1996, with the disc of Jensen 2001, section 7.2).
+//! Density estimate fused with the traversal: photons are weighted in their leaves, sixteen at a time, and
+//! never listed (Jensen 1996, with the disc of Jensen 2001, section 7.2).
 //!
-//! L = sum over photons of f(w_p) Phi_p k(d / r) / (pi r²). The sphere around a place also holds photons of other
-//! surfaces: behind a thin wall, around an edge, on the other side of a leaf. They are left out by three tests:
-//! 1. a photon lies in a flat disc, near the plane of the place;
-//! 2. the normal where it lies is much like that of the place;
-//! 3. it came from the side to which the normal points.
+//! L = sum over photons of f(w_p) Phi_p k(d / r) / (pi r²). The sphere around a place also holds photons of
+//! other surfaces: behind a thin wall, around an edge, on the other side of a leaf. Three tests reject them:
+//! 1. the photon lies in a flat disc, near the tangent plane of the place;
+//! 2. the normal at the photon is close to the normal of the place;
+//! 3. the photon arrived from the side to which the normal points.
 //!
-//! Unit vectors are not normalised for that: a photon's grid holds whole numbers, which are compared squared.
+//! The tests need no normalised vectors: octahedral coordinates are integers, and the tests compare squares.
 //!
-//! The same walk weighs the photons of finer discs once more, of half the radius and less, as if there were no others: for
-//! places where photons crowd, and to know what a disc blurs (`docs/decisions/0043-density-bias.md`).
+//! The same traversal also estimates the density over finer discs, of half the radius and less. They serve
+//! places where photons are dense, and they show the blur of the whole disc
+//! (`docs/decisions/0043-density-bias.md`).
 
 use super::PhotonMap;
 use super::fence::{Fence, splat};
@@ -24,21 +25,21 @@ use glam::Vec3;
 use halflight_simd::kernels::points::{Place16, squared};
 use halflight_simd::{Kernel as SimdKernel, Lanes, Mask, Simd, dot};
 
-/// How far from the plane of a disc its photons may lie, in radii: what a surface bends in it, when its radius of
-/// curvature is two and a half times as large.
+/// Largest distance of a photon from the plane of its disc, in radii: the sagitta of a surface whose radius
+/// of curvature is 2.5 times as large.
 pub const FLATNESS: f32 = 0.2;
 
-/// Cosine of the largest angle between the normal of a disc and that of a photon in it.
+/// Cosine of the largest angle between the normals of a disc and of a photon in it.
 pub const ALIKE: f32 = 0.7;
 
-/// Finer discs in a disc, each of half the radius of the one before.
+/// Number of finer discs, each of half the radius of the previous one.
 pub const FINER: usize = 3;
 
-/// What a surface makes of the light from a direction: its BSDF towards the eye, without a cosine.
+/// Response of a surface to light from a direction: its BSDF towards the camera, without a cosine.
 pub trait Response {
-    /// Whether it is one for all directions.
+    /// True if the response is the same for all directions.
     const UNIFORM: bool = false;
-    /// The response to light from `direction`, which points away from the surface and is of unit length.
+    /// Response to light from the unit vector `direction`, which points away from the surface.
     fn of(&self, direction: Vec3) -> Rgb;
 }
 
@@ -48,7 +49,7 @@ impl<F: Fn(Vec3) -> Rgb> Response for F {
     }
 }
 
-/// The same for all directions: a diffuse surface of albedo `a` has a / pi, and one makes the sum an irradiance.
+/// Response that is the same for all directions: a / pi for a diffuse surface of albedo a; 1 for irradiance.
 #[derive(Clone, Copy, Debug)]
 pub struct Uniform(pub Rgb);
 
@@ -59,20 +60,21 @@ impl Response for Uniform {
     }
 }
 
-/// What is gathered from a disc.
+/// Result of a density estimate.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Density {
-    /// Responses times power per area: W/(m² sr), or W/m² for a response of one.
+    /// Response times power per area: W/(m² sr), or W/m² for a response of 1.
     pub radiance: Rgb,
-    /// The same by the photons of each finer disc alone: blurred less, and noisier.
+    /// Estimates of the finer discs: less blur, more noise.
     pub finer: [Rgb; FINER],
-    /// Photons that were weighed.
+    /// Number of photons on the disc.
     pub photons: u32,
 }
 
 impl Density {
-    /// The radiance by the finest disc that has `enough` photons, if they lie evenly; and that by a disc of half the radius;
-    /// for the last of them, what it would be if blur went on falling with the square of the radius.
+    /// Radiance of the finest disc that has `enough` photons, assuming even density, and of the disc of half
+    /// its radius. For the finest disc the second value is extrapolated: blur falls with the square of the
+    /// radius.
     #[inline]
     pub fn of_enough(&self, enough: f32) -> [Rgb; 2] {
         let (mut chosen, mut photons) = (self.radiance, self.photons as f32);
@@ -88,7 +90,7 @@ impl Density {
     }
 }
 
-/// One gathering.
+/// Kernel of one density estimate.
 pub(super) struct Gather<'a, 'm, R> {
     pub map: &'a PhotonMap<'m>,
     pub disc: &'a QueryDisc,
@@ -105,7 +107,7 @@ impl<R: Response> SimdKernel for Gather<'_, '_, R> {
     }
 }
 
-/// Gathers from a disc.
+/// Density over a disc and its finer discs.
 #[inline(always)]
 pub(super) fn gather<S: Simd, R: Response>(
     simd: S,
@@ -137,13 +139,13 @@ pub(super) fn gather<S: Simd, R: Response>(
     density
 }
 
-/// Lane after lane, so that the bits are those of every level.
+/// Sum in the order of the lanes, which has the same bits at every level.
 #[inline(always)]
 fn added(lanes: [f32; 16]) -> f32 {
     lanes.iter().fold(0.0, |sum, lane| sum + lane)
 }
 
-/// Which photons lie on a disc.
+/// Test for the photons that lie on a disc.
 pub(super) struct DiscTest<'a, S: Simd> {
     pub place: Place16<S>,
     pub squared_radius: f32,
@@ -153,11 +155,11 @@ pub(super) struct DiscTest<'a, S: Simd> {
     fence: Option<&'a Fence>,
 }
 
-/// Squared distances to the middle of a disc, directions of arrival, and which lanes count.
+/// Squared distances to the centre of a disc, directions of arrival, and mask of the photons that count.
 type OnDisc<S> = (<S as Simd>::F16, [<S as Simd>::F16; 3], <<S as Simd>::F16 as Lanes>::Mask);
 
 impl<'a, S: Simd> DiscTest<'a, S> {
-    /// The test for photons of `map`; `None` where the radius is none.
+    /// Test for photons of `map`; `None` if the radius is not finite and positive.
     #[inline(always)]
     pub(super) fn new(simd: S, map: &PhotonMap, disc: &QueryDisc, fence: Option<&'a Fence>) -> Option<Self> {
         let squared_radius = map.space.squared(disc.radius).unwrap_or(-1.0);
@@ -171,7 +173,7 @@ impl<'a, S: Simd> DiscTest<'a, S> {
         })
     }
 
-    /// The photons of half a leaf; `None` where none is on the disc.
+    /// Photons of half a leaf; `None` if none is on the disc.
     #[inline(always)]
     pub(super) fn photons(&self, simd: S, leaf: &Leaf, half: usize) -> Option<OnDisc<S>> {
         let offset = self.place.less(simd, leaf.half(half));
@@ -202,7 +204,7 @@ impl<'a, S: Simd> DiscTest<'a, S> {
     }
 }
 
-/// Everything of a gathering, in lanes.
+/// Sums of one density estimate, in lanes.
 struct Sum<'a, S: Simd, R> {
     test: DiscTest<'a, S>,
     disc: Weighed<S>,
@@ -210,16 +212,16 @@ struct Sum<'a, S: Simd, R> {
     response: &'a R,
 }
 
-/// Photons of a disc, weighed by distance.
+/// Kernel-weighted sum over the photons of one disc.
 struct Weighed<S: Simd> {
-    /// The squared radius, and
+    /// Squared radius.
     limit: S::F16,
-    /// one over that.
+    /// One over the squared radius.
     reciprocal: S::F16,
     kernel: Kernel,
-    /// Weighed power: where the response is uniform,
+    /// Weighted power of a uniform response, lane by lane, without the response.
     lanes: [S::F16; 3],
-    /// and where it is not, with the response.
+    /// Weighted power times response of a response that depends on direction.
     singles: Rgb,
     photons: u32,
 }
@@ -264,20 +266,20 @@ impl<S: Simd, R: Response> Sum<'_, S, R> {
     }
 }
 
-/// Sixteen photons.
+/// Sixteen photons, unpacked.
 struct Photons16<S: Simd> {
-    /// Squared, to the middle of the disc.
+    /// Squared distance to the centre of the disc.
     distance: S::F16,
-    /// What the unit of their power is, and
+    /// Unit of the power, from the common exponent.
     scale: S::F16,
-    /// how many they have of it.
+    /// Mantissas of the power.
     power: [S::F16; 3],
-    /// Where they came from.
+    /// Directions of arrival, in whole steps.
     came: [S::F16; 3],
 }
 
 impl<S: Simd> Weighed<S> {
-    /// Nothing yet, of a disc of this squared radius.
+    /// Empty sum of a disc of this squared radius.
     #[inline(always)]
     fn new(simd: S, squared_radius: f32, kernel: Kernel) -> Self {
         Self {
@@ -321,7 +323,7 @@ impl<S: Simd> Weighed<S> {
         }
     }
 
-    /// Of so large a `part` of the radius of `disc`.
+    /// Density over the disc of `part` of the radius of `disc`.
     #[inline(always)]
     fn density<R: Response>(
         &self,
@@ -342,7 +344,7 @@ impl<S: Simd> Weighed<S> {
     }
 }
 
-/// The weights of photons by their squared distances, in squared radii.
+/// Kernel weights by squared distance, in squared radii.
 #[inline(always)]
 pub(super) fn nearness<S: Simd>(simd: S, kernel: Kernel, squared: S::F16) -> S::F16 {
     let one = simd.splat16(1.0);
@@ -355,7 +357,7 @@ pub(super) fn nearness<S: Simd>(simd: S, kernel: Kernel, squared: S::F16) -> S::
     }
 }
 
-/// The directions of points of an octahedral grid, in whole numbers of its steps.
+/// Directions of points of the octahedral grid, in whole steps.
 #[inline(always)]
 fn unfolded<S: Simd>(simd: S, u: S::F16, v: S::F16, steps: f32) -> [S::F16; 3] {
     let (zero, steps) = (simd.splat16(0.0), simd.splat16(steps));

@@ -1,12 +1,11 @@
-//! The kernel of a density estimate, and the disc over which it is taken.
+//! Kernel of a density estimate (Silverman 1986), and its disc.
 
 use glam::Vec3;
 
-/// How the weight of a photon falls with its distance from the middle of the disc. All of them integrate to
-/// one over it.
+/// Weight of a photon by its distance d from the centre of a disc of radius r. Its mean over the disc is one.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Kernel {
-    /// The same everywhere.
+    /// 1.
     Constant,
     /// 3 (1 - d / r).
     Cone,
@@ -15,15 +14,15 @@ pub enum Kernel {
     Epanechnikov,
 }
 
-/// Where the density of photons is asked for.
+/// Oriented disc of a density estimate.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct QueryDisc {
-    /// Its middle.
+    /// Centre.
     pub place: Vec3,
-    /// Its normal, of unit length, on the side from which light is looked for.
+    /// Unit normal, on the side from which light arrives.
     pub normal: Vec3,
-    /// Its radius; finite and above zero, or nothing is found.
+    /// Radius; the result is empty unless it is finite and positive.
     pub radius: f32,
-    /// How its photons are weighed.
+    /// Weight of its photons.
     pub kernel: Kernel,
 }

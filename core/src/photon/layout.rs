@@ -1,6 +1,6 @@
-//! The map as it lies in memory: leaves of thirty-two photons, column by column, and above them levels of
-//! nodes of sixteen boxes. Every leaf and node is full but the last of its level, so that no child needs a
-//! name: node `i` of a level has the sixteen from `16 i` on of the level below.
+//! Memory layout of the photon map: leaves of 32 photons in columns, and above them levels of nodes of 16
+//! boxes. Every leaf and node except the last of its level is full, so that no child needs a pointer: node
+//! `i` of a level has the children `16 i` to `16 i + 15` of the level below.
 
 use super::record::Photon;
 use bytemuck::{Pod, Zeroable};
@@ -9,23 +9,23 @@ use halflight_simd::kernels::points::Boxes16;
 /// Photons in a leaf.
 pub(super) const LEAF: usize = 32;
 
-/// Halves of a leaf: what is in one register.
+/// Halves of a leaf; each column of a half fills one register.
 pub(super) const HALVES: usize = LEAF / 16;
 
 /// Children of a node.
 pub(super) const WIDTH: usize = 16;
 
-/// Most levels of nodes: enough for all photons that a u32 can name.
+/// Largest number of levels: enough for all photons that a u32 can index.
 pub(super) const LEVELS: usize = 7;
 
 const _: () = assert!((LEAF as u64) * (WIDTH as u64).pow(LEVELS as u32) >= 1 << 32);
 
-/// Columns of a leaf, each in halves: the bytes of so many [`Photon`]s in another order. Eleven cache lines.
-/// Places without a photon are infinitely far.
+/// Columns of a leaf, each in halves: the bytes of 32 [`Photon`]s in another order, eleven cache lines.
+/// Unused lanes have infinite positions.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C, align(64))]
 pub(super) struct Leaf {
-    /// Coordinates, in the units of the map.
+    /// Coordinates, in units of the map.
     pub position: [[[f32; 16]; HALVES]; 3],
     pub light: [[u32; 16]; HALVES],
     pub power: [[u32; 16]; HALVES],
@@ -42,7 +42,7 @@ impl Leaf {
         [&x[half & 1], &y[half & 1], &z[half & 1]]
     }
 
-    /// Photon `i`, below [`LEAF`], its place in the units of the map.
+    /// Photon `i`, below [`LEAF`], with its position in units of the map.
     #[inline(always)]
     pub(super) fn photon(&self, i: usize) -> Photon {
         let (half, lane) = (i / 16 % HALVES, i % 16);
@@ -54,7 +54,7 @@ impl Leaf {
         }
     }
 
-    /// From at most [`LEAF`] photons.
+    /// Fills the leaf with at most [`LEAF`] photons.
     pub(super) fn set(&mut self, photons: &[Photon]) {
         *self = Leaf { position: [[[f32::INFINITY; 16]; HALVES]; 3], ..Leaf::zeroed() };
         for (i, photon) in photons.iter().take(LEAF).enumerate() {
@@ -70,7 +70,7 @@ impl Leaf {
     }
 }
 
-/// Sixteen boxes. Those of children that are not there are empty: infinitely far.
+/// Boxes of sixteen children. The box of a missing child is empty and infinitely far.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C, align(64))]
 pub(super) struct Node {
@@ -84,10 +84,10 @@ impl Node {
     };
 }
 
-/// How many nodes there are on each level above so many leaves, and where each level starts.
+/// Number of nodes on each level, and start of each level in the slice of nodes.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Levels {
-    /// Levels, at most [`LEVELS`]; zero where there are no leaves.
+    /// Number of levels, at most [`LEVELS`]; zero without leaves.
     pub count: usize,
     starts: [u32; LEVELS + 1],
     /// Nodes of all levels.
@@ -107,8 +107,8 @@ impl Levels {
         levels
     }
 
-    /// Where in the slice of nodes node `i` of a level is; level 0 is the one above the leaves. Node 0 of the
-    /// level behind the last is where the nodes end.
+    /// Position of node `i` of a level in the slice of nodes. Level 0 is above the leaves. Node 0 of the
+    /// level after the last marks the end of the slice.
     #[inline(always)]
     pub(super) fn at(&self, level: usize, i: usize) -> usize {
         self.starts.get(level).map_or(usize::MAX, |&start| start as usize + i)

@@ -1,10 +1,9 @@
-//! The photon map (Jensen 1996): photons on surfaces, sorted so that those near a place are found quickly, and the
-//! density estimate over them. Built in the bytes of the photons; with its tree it takes less than 24 of them for
-//! each photon.
+//! Photon map (Jensen 1996): an exact k-d tree over photons on surfaces, and the density estimate over them.
+//! The map is built in the memory of the photons; tree and photon together take less than 24 bytes a photon.
 //!
-//! Searches are exact: they find what brute force finds, by the same distances to the bit, and of photons at the
-//! same distance those with the lower index. An index is a photon's place in the map, which is the same for the
-//! same photons in the same order, on any number of threads and at any level.
+//! Searches are exact: they find the photons of brute force, with the same distances to the bit; among
+//! photons at equal distance the lower index wins. The index of a photon is its position in the map. It
+//! depends only on the photons and their order, not on the number of threads or the level.
 
 mod batch;
 pub mod brute;
@@ -34,10 +33,10 @@ use glam::Vec3;
 use layout::{LEAF, Leaf, Levels, Node};
 use space::Space;
 
-/// Most photons of a map: what an index can name.
+/// Largest number of photons of a map, by the range of an index.
 pub const PHOTONS_MAX: usize = u32::MAX as usize;
 
-/// Memory for photons and for the map over them: filled first, then built.
+/// Memory for photons and the map over them: filled first, then built.
 pub struct Photons<'m> {
     leaves: &'m mut [Leaf],
     nodes: &'m mut [Node],
@@ -45,7 +44,7 @@ pub struct Photons<'m> {
 }
 
 impl<'m> Photons<'m> {
-    /// Bytes for `capacity` photons, and for the map over them.
+    /// Bytes for `capacity` photons and the map over them.
     pub fn footprint(capacity: usize) -> Footprint {
         let leaves = capacity.div_ceil(LEAF);
         Footprint::default().slice::<Leaf>(leaves).slice::<Node>(Levels::of(leaves).nodes)
@@ -61,7 +60,7 @@ impl<'m> Photons<'m> {
         Ok(Self { leaves: arena.slice(leaves)?, nodes: arena.slice(Levels::of(leaves).nodes)?, capacity })
     }
 
-    /// Where the photons go.
+    /// The photons, to be filled in.
     pub fn as_mut_slice(&mut self) -> &mut [Photon] {
         let all: &mut [Photon] = bytemuck::cast_slice_mut(self.leaves);
         all.get_mut(..self.capacity).unwrap_or_default()
@@ -72,13 +71,13 @@ impl<'m> Photons<'m> {
         self.build_with(count, &Serial)
     }
 
-    /// Builds it on the cores that `join` brings. The same map, to the bit.
+    /// Builds the map over the first `count` photons on the cores of `join`; same bits as [`Photons::build`].
     pub fn build_with<J: ForkJoin>(self, count: usize, join: &J) -> PhotonMap<'m> {
         build::build(self.leaves, count.min(self.capacity), self.nodes, join)
     }
 }
 
-/// Photons that can be searched.
+/// Map of photons, ready for searches.
 #[derive(Clone, Copy, Debug)]
 pub struct PhotonMap<'m> {
     leaves: &'m [Leaf],
@@ -89,7 +88,7 @@ pub struct PhotonMap<'m> {
     space: Space,
 }
 
-/// What a map is besides the bytes that it lies in.
+/// Everything of a map except the memory that holds it.
 #[derive(Clone, Copy, Debug)]
 pub struct MapShape {
     levels: Levels,
@@ -99,14 +98,14 @@ pub struct MapShape {
 }
 
 impl<'m> PhotonMap<'m> {
-    /// All that [`PhotonMap::again`] needs.
+    /// Shape of this map, for [`PhotonMap::again`].
     pub fn shape(&self) -> MapShape {
         let Self { levels, count, refused, space, .. } = *self;
         MapShape { levels, count, refused, space }
     }
 
-    /// The map of this shape that was built in the bytes of `arena`, over [`Photons`] with room for `capacity`, and left
-    /// there. Over other bytes it is a map of anything.
+    /// Map of this shape that was built before in the bytes of `arena`, over [`Photons`] of this `capacity`,
+    /// and is still there. Other bytes give a map of arbitrary photons.
     ///
     /// # Errors
     /// [`OutOfMemory`] when the arena is smaller than [`Photons::footprint`], or than the shape.
@@ -123,22 +122,22 @@ impl<'m> PhotonMap<'m> {
 }
 
 impl PhotonMap<'_> {
-    /// How many photons there are.
+    /// Number of photons.
     pub fn len(&self) -> usize {
         self.count
     }
 
-    /// Whether there is none.
+    /// True without photons.
     pub fn is_empty(&self) -> bool {
         self.count == 0
     }
 
-    /// How many were left out because their place is not finite.
+    /// Number of photons left out because their position is not finite.
     pub fn refused(&self) -> usize {
         self.refused
     }
 
-    /// A photon by its index.
+    /// Photon at an index.
     pub fn get(&self, index: u32) -> Option<Photon> {
         let index = index as usize;
         let leaf = self.leaves.get(index / LEAF).filter(|_| index < self.count)?;
@@ -146,19 +145,19 @@ impl PhotonMap<'_> {
         Some(Photon { position: self.space.leave(photon.position), ..photon })
     }
 
-    /// Finds the nearest photons of `place` within `radius`, as many as `neighbours` was made for. Infinity is a
-    /// radius; nothing is found within a negative one or one that is NaN, or from a place that is.
+    /// Finds the photons nearest to `place` within `radius`, at most the `k` of `neighbours`. The radius may
+    /// be infinite. A negative or NaN radius and a NaN place find nothing.
     pub fn nearest(&self, level: Level, place: Vec3, radius: f32, neighbours: &mut Neighbours) {
         let place = self.space.enter(place.to_array());
-        // Nothing is at a negative squared distance.
+        // No photon has a negative squared distance.
         let squared_radius = self.space.squared(radius).unwrap_or(-1.0);
         level.dispatch(nearest::Search { map: self, place, squared_radius, neighbours });
     }
 
-    /// The disc of the photons that are nearest to `place` by a search of `neighbours`, but of no larger radius than
-    /// `farthest`, and a factor on densities there. The last of k photons says how far the disc reaches, so that only
-    /// k - 1 of them are chance: E\[(k - 1) / (pi r²)\] is the density, E\[k / (pi r²)\] is larger. Where weights are zero
-    /// on the edge of the disc, the last photon leaves itself out.
+    /// Disc through the k-th nearest photon of `place`, of radius at most `farthest`, and a factor on its
+    /// density. The k-th photon defines the radius, so that only k - 1 photons are random: E\[(k - 1) / (pi
+    /// r²)\] is the density, E\[k / (pi r²)\] is larger. A kernel that is zero on the edge of the disc
+    /// excludes the last photon by itself.
     pub fn disc_of_nearest(
         &self,
         level: Level,
@@ -172,25 +171,25 @@ impl PhotonMap<'_> {
         let k = neighbours.len() as f32;
         let is_full = squared < f32::INFINITY && k > 1.0;
         let factor = if is_full && kernel == Kernel::Constant { (k - 1.0) / k } else { 1.0 };
-        // Rounding must not decide about the last one.
+        // Rounding must not exclude the last photon.
         let radius = if is_full { libm::sqrtf(squared) * (1.0 + 2.0 * f32::EPSILON) } else { farthest };
         (QueryDisc { place, normal, radius: radius.max(f32::MIN_POSITIVE), kernel }, factor)
     }
 
-    /// Finds all photons within `radius` of `place`: how many they are, and in `found` their indices in rising
-    /// order, as many as there is room for; what is in the rest of it is unspecified.
+    /// Finds all photons within `radius` of `place` and returns their number. `found` receives their indices
+    /// in ascending order, as far as there is room; its remaining elements are unspecified.
     pub fn within(&self, level: Level, place: Vec3, radius: f32, found: &mut [u32]) -> usize {
         let place = self.space.enter(place.to_array());
         let Some(squared_radius) = self.space.squared(radius) else { return 0 };
         level.dispatch(range::Range { map: self, place, squared_radius, found })
     }
 
-    /// Estimates the density of photons on a disc, each with the response of the surface.
+    /// Density of photons on a disc, each weighted with the response of the surface.
     pub fn gather<R: Response>(&self, level: Level, disc: &QueryDisc, response: &R) -> Density {
         level.dispatch(gather::Gather { map: self, disc, fence: None, response })
     }
 
-    /// The same from what is seen of the disc.
+    /// Density over the part of the disc that is visible by `fence`.
     pub fn gather_within<R: Response>(
         &self,
         level: Level,
@@ -202,8 +201,8 @@ impl PhotonMap<'_> {
         level.dispatch(gather::Gather { map: self, disc, fence, response })
     }
 
-    /// Calls `each` with the tag of every photon on a disc, as far as that is seen, and with its kernel weights
-    /// per area, 1/m²: that on the disc, and that on one of half the radius.
+    /// Calls `each` for every photon on the visible part of a disc, with its tag and two kernel weights per
+    /// area in 1/m²: on the disc, and on the disc of half the radius.
     pub fn tagged_within(
         &self,
         level: Level,
@@ -215,8 +214,8 @@ impl PhotonMap<'_> {
         level.dispatch(tagged::TaggedPhotons { map: self, disc, fence, each });
     }
 
-    /// [`PhotonMap::nearest`] for many places, of which `each` gets the index and what was found; in an order in
-    /// which neighbours follow each other. `order` is working memory, one for each place: those beyond are left out.
+    /// [`PhotonMap::nearest`] for many places, in Morton order. `each` receives the index of a place and its
+    /// photons. `order` is working memory, one element for each place; places beyond it are skipped.
     pub fn nearest_batch(
         &self,
         level: Level,
@@ -230,8 +229,8 @@ impl PhotonMap<'_> {
         level.dispatch(batch::Searches { map: self, places, squared_radius, order, neighbours, each });
     }
 
-    /// [`PhotonMap::gather`] for many discs, in such an order. `order` is working memory, one for each disc: those
-    /// beyond are left out, as are those for which there is no density.
+    /// [`PhotonMap::gather`] for many discs, in Morton order. `order` is working memory, one element for each
+    /// disc. Discs beyond `order` or `densities` are skipped.
     pub fn gather_batch<R: Response>(
         &self,
         level: Level,
@@ -243,7 +242,7 @@ impl PhotonMap<'_> {
         level.dispatch(batch::Gathers { map: self, discs, response, order, densities });
     }
 
-    /// Lowest and highest corner of the box around the photons, in units of the map; empty where there are none.
+    /// Lower and upper corner of the bounding box of the photons, in units of the map; empty without photons.
     fn bounds(&self) -> [[f32; 3]; 2] {
         let boxes = self.nodes.last().unwrap_or(&Node::EMPTY).boxes;
         let lo = [0, 1, 2].map(|row| boxes[row].iter().fold(f32::INFINITY, |a, &b| a.min(b)));

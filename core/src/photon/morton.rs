@@ -1,5 +1,6 @@
-//! Places in an order in which neighbours follow each other: along the Z curve (Morton 1966). A search then
-//! finds in the cache what the one before it has read, and how far the k-th photon can be at most.
+//! Morton order of queries (Morton 1966): neighbouring places follow each other. A search then finds in the
+//! cache the nodes that the previous search read, and takes from it a bound on the distance of the k-th
+//! photon.
 
 use super::PhotonMap;
 use bytemuck::{Pod, Zeroable};
@@ -8,16 +9,17 @@ use glam::Vec3;
 /// Bits of a code for each axis.
 const BITS: u32 = 10;
 
-/// When it is the turn of a place.
+/// Morton code and index of a place.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Pod, Zeroable)]
 #[repr(C)]
 pub struct QueryOrder {
     code: u32,
-    /// Which place it is.
+    /// Index of the place.
     pub index: u32,
 }
 
-/// Fills `order` with the first so many of `places`, along the curve. Gives those that it filled.
+/// Fills `order` with the first of `places`, as far as there is room, in Morton order. Returns the filled
+/// part.
 pub(super) fn along<'t>(
     map: &PhotonMap,
     places: impl ExactSizeIterator<Item = Vec3>,
@@ -30,8 +32,7 @@ pub(super) fn along<'t>(
     for (index, (next, place)) in order.iter_mut().zip(places).enumerate() {
         let place = map.space.enter(place.to_array());
         let cell = [0, 1, 2].map(|axis| {
-            // From anywhere, NaN included, to one of the cells: floats saturate when they become whole
-            // numbers.
+            // The cast saturates, so that every place, NaN included, falls into a cell.
             ((place[axis] - lo[axis]) / (hi[axis] - lo[axis]) * cells) as u32
         });
         let [x, y, z] = cell.map(|cell| spread(cell.min((1 << BITS) - 1)));
@@ -41,7 +42,7 @@ pub(super) fn along<'t>(
     order
 }
 
-/// Ten bits, with two zeros after each.
+/// Spreads ten bits, with two zeros after each.
 fn spread(bits: u32) -> u32 {
     let bits = (bits | bits << 16) & 0x0300_00ff;
     let bits = (bits | bits << 8) & 0x0300_f00f;

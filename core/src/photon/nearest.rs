@@ -1,10 +1,10 @@
-//! The k nearest photons: depth first, the nearest child that is left first, until none can hold a nearer
+//! Search for the k nearest photons: depth first, nearest child first, until no node can hold a nearer
 //! photon.
 //!
-//! Distances of a node's children are computed once, sixteen at a time, and stay where they are until it is
-//! done: a stack of at most [`LEVELS`] rows. Photons of a leaf that are near enough are appended to the
-//! candidates, which are cut back now and then ([`halflight_simd::kernels::select`]); their limit prunes the
-//! walk.
+//! The distances of a node's children are computed once, sixteen at a time, and stay on a stack of at most
+//! [`LEVELS`] rows until the node is done. Photons of a leaf within the limit are appended to the candidates.
+//! A selection cuts the candidates back to k now and then ([`halflight_simd::kernels::select`]) and lowers
+//! the limit, which prunes the search.
 
 use super::PhotonMap;
 use super::layout::{HALVES, LEAF, LEVELS, WIDTH};
@@ -13,25 +13,26 @@ use halflight_simd::kernels::points::Place16;
 use halflight_simd::kernels::select::{Candidates, OVERRUN};
 use halflight_simd::{Kernel, Lanes, Mask, Simd};
 
-/// Candidates at which `k` of them are selected: more is less work for each, but prunes later.
+/// Number of candidates that starts a selection of `k`. A larger number means fewer selections, but later
+/// pruning.
 const fn patience(k: usize) -> usize {
     k.saturating_add(k / 4).saturating_add(8)
 }
 
-/// Room for candidates of `k` photons: a leaf more than what starts a selection.
+/// Room for candidates of `k` photons: a leaf more than the number that starts a selection.
 const fn room(k: usize) -> usize {
     patience(k).saturating_add(LEAF + OVERRUN)
 }
 
-/// What a search for the `k` nearest photons finds, and its working memory.
+/// The `k` nearest photons of a search, and its working memory.
 pub struct Neighbours<'m> {
     k: usize,
     values: [&'m mut [f32]; 2],
     numbers: [&'m mut [f32]; 2],
     count: usize,
-    /// Squared distance of the last in units of the map; infinite where fewer than `k` were found.
+    /// Squared distance of the k-th photon in units of the map; infinite if fewer than `k` were found.
     limit: f32,
-    /// From units of the map to those of the scene.
+    /// Units of the map, for conversion to units of the scene.
     space: super::space::Space,
 }
 
@@ -42,7 +43,7 @@ impl<'m> Neighbours<'m> {
         one.and(one).and(one).and(one)
     }
 
-    /// For searches of the `k` nearest.
+    /// Memory for searches of the `k` nearest.
     ///
     /// # Errors
     /// [`OutOfMemory`] when the arena is smaller than [`Neighbours::footprint`].
@@ -52,34 +53,34 @@ impl<'m> Neighbours<'m> {
         Ok(Self { k, values, numbers, count: 0, limit: f32::INFINITY, space: super::space::Space::of(0.0) })
     }
 
-    /// How many were found: `k`, or fewer where there are not so many within the radius.
+    /// Number of photons found: `k`, or fewer if the radius holds fewer.
     pub fn len(&self) -> usize {
         self.count
     }
 
-    /// Whether none was found.
+    /// True if no photon was found.
     pub fn is_empty(&self) -> bool {
         self.count == 0
     }
 
-    /// The photons that were found, by their index in the map and the square of their distance; in no order.
+    /// Indices in the map and squared distances of the photons found, in no order.
     pub fn iter(&self) -> impl Iterator<Item = (u32, f32)> + '_ {
         let found = self.values[0].iter().zip(self.numbers[0].iter()).take(self.count);
         found.map(|(&value, number)| (number.to_bits(), self.space.leave_squared(value)))
     }
 
-    /// That in units of the map.
+    /// Squared distance of the k-th photon in units of the map; infinite if fewer than `k` were found.
     pub(super) fn limit(&self) -> f32 {
         self.limit
     }
 
-    /// The square of the distance of the last of `k` photons; infinite where fewer were found.
+    /// Squared distance of the k-th photon; infinite if fewer were found.
     pub fn squared_radius(&self) -> f32 {
         self.space.leave_squared(self.limit)
     }
 }
 
-/// One search, from a place in units of the map.
+/// Kernel of one search, from a place in units of the map.
 pub(super) struct Search<'a, 'm, 'n> {
     pub map: &'a PhotonMap<'m>,
     pub place: [f32; 3],
@@ -96,7 +97,7 @@ impl Kernel for Search<'_, '_, '_> {
     }
 }
 
-/// Finds the nearest photons within a squared radius (below infinity) of a place in units of the map.
+/// Finds the nearest photons within a finite squared radius of a place, in units of the map.
 #[inline(always)]
 pub(super) fn search<S: Simd>(
     simd: S,
@@ -121,7 +122,7 @@ pub(super) fn search<S: Simd>(
 struct Walk<'a, 'm, S: Simd> {
     map: &'a PhotonMap<'m>,
     place: Place16<S>,
-    /// Photons beyond this are not among the nearest.
+    /// Photons beyond this squared distance are not among the nearest.
     limit: f32,
     k: usize,
     candidates: Candidates<'a>,
@@ -131,8 +132,8 @@ impl<S: Simd> Walk<'_, '_, S> {
     #[inline(always)]
     fn run(&mut self, simd: S) {
         let Some(top) = self.map.levels.count.checked_sub(1) else { return };
-        // Of each node on the way down: its index on its level, and the distances of its children that are
-        // left.
+        // Index on its level of each node on the path from the root, and the distances of its remaining
+        // children.
         let mut indices = [0; LEVELS];
         let mut rows = [[f32::INFINITY; 16]; LEVELS];
         let mut level = top;
@@ -150,7 +151,8 @@ impl<S: Simd> Walk<'_, '_, S> {
                 }
                 (index, row) = (indices[level], simd.load16(&rows[level]));
             }
-            // Down to the nearest child that is left of this node, or of the first one above that has any.
+            // Descends to the nearest remaining child of this node, or of the lowest ancestor that still has
+            // one.
             index = loop {
                 if let Some(child) = self.nearest_child(simd, &mut row) {
                     (indices[level], rows[level]) = (index, row.to_array());
@@ -166,7 +168,7 @@ impl<S: Simd> Walk<'_, '_, S> {
         }
     }
 
-    /// The nearest child within the limit, which it takes out of the row.
+    /// Removes and returns the nearest child of the row that is within the limit.
     #[inline(always)]
     fn nearest_child(&self, simd: S, row: &mut S::F16) -> Option<usize> {
         let nearest = row.smallest();

@@ -1,22 +1,20 @@
-//! All leaves within a radius, one after the other in the order of the map: what range queries and gathering
-//! have in common.
+//! Traversal of all leaves within a radius, in the order of the map, for range queries and density estimates.
 
 use super::PhotonMap;
 use super::layout::{HALVES, LEAF, LEVELS, Leaf, WIDTH};
 use halflight_simd::kernels::points::Place16;
 use halflight_simd::{Kernel, Lanes, Mask, Simd};
 
-/// What is done with leaves. A trait, for a closure might be compiled apart, without the instructions of the
-/// level.
+/// Visitor of leaves. A trait, because a closure might be compiled without the instructions of the level.
 pub(super) trait Visit<S: Simd> {
-    /// One leaf, and its index. To be inlined always.
+    /// Visits a leaf of this index. Implementations must be `inline(always)`.
     fn leaf(&mut self, simd: S, index: usize, leaf: &Leaf);
 }
 
-/// How many leaves ahead of the one that is visited the memory is asked for.
+/// Number of leaves that are prefetched ahead of the visited leaf.
 const AHEAD: usize = 4;
 
-/// Shows every leaf to `visitor` that has a box within the squared radius (below infinity) of a place.
+/// Calls `visitor` with every leaf that has a box within the finite squared radius of a place.
 #[inline(always)]
 pub(super) fn leaves_within<S: Simd>(
     simd: S,
@@ -27,7 +25,7 @@ pub(super) fn leaves_within<S: Simd>(
 ) {
     let Some(top) = map.levels.count.checked_sub(1) else { return };
     let mut walk = Walk::new(simd, map, place, squared_radius, top);
-    // Leaves wait in a ring until their bytes have come.
+    // Ring of leaves whose prefetch is under way.
     let mut ring = [0; AHEAD];
     let (mut put, mut taken) = (0, 0);
     loop {
@@ -48,12 +46,12 @@ pub(super) fn leaves_within<S: Simd>(
     }
 }
 
-/// On the way through the nodes.
+/// State of the traversal.
 struct Walk<'a, 'm, S: Simd> {
     map: &'a PhotonMap<'m>,
     place: &'a Place16<S>,
     limit: S::F16,
-    /// Of each node on the way down: its index on its level, and the set of its children that are left.
+    /// Index on its level of each node on the path from the root, and the mask of its remaining children.
     path: [(usize, u32); LEVELS + 1],
     level: usize,
     top: usize,
@@ -63,13 +61,13 @@ impl<'a, 'm, S: Simd> Walk<'a, 'm, S> {
     #[inline(always)]
     fn new(simd: S, map: &'a PhotonMap<'m>, place: &'a Place16<S>, squared_radius: f32, top: usize) -> Self {
         let limit = simd.splat16(squared_radius);
-        // Above the root, whose only child it is.
+        // An artificial parent whose only child is the root.
         let mut path = [(0, 0); LEVELS + 1];
         path[(top + 1) % (LEVELS + 1)] = (0, 1);
         Self { map, place, limit, path, level: top + 1, top: top + 1 }
     }
 
-    /// The next leaf.
+    /// Index of the next leaf.
     #[inline(always)]
     fn next(&mut self, simd: S) -> Option<usize> {
         loop {
@@ -94,7 +92,7 @@ impl<'a, 'm, S: Simd> Walk<'a, 'm, S> {
     }
 }
 
-/// Asks the memory for a leaf: three times four cache lines.
+/// Prefetches a leaf: three times four cache lines.
 #[inline(always)]
 fn prefetch<S: Simd>(simd: S, map: &PhotonMap, leaf: usize) {
     const LINES: usize = size_of::<Leaf>() / 64;
@@ -104,8 +102,8 @@ fn prefetch<S: Simd>(simd: S, map: &PhotonMap, leaf: usize) {
     }
 }
 
-/// All photons within a squared radius of a place in units of the map: their indices, in rising order, to
-/// `found` as far as there is room, and how many there are.
+/// Kernel of a range query from a place in units of the map. Writes the indices of the photons in ascending
+/// order to `found`, as far as there is room, and returns their number.
 pub(super) struct Range<'a, 'm> {
     pub map: &'a PhotonMap<'m>,
     pub place: [f32; 3],
@@ -127,7 +125,7 @@ impl Kernel for Range<'_, '_> {
     }
 }
 
-/// The photons that were found.
+/// Photons found by a range query.
 struct List<'a, S: Simd> {
     place: Place16<S>,
     limit: S::F16,
@@ -147,7 +145,7 @@ impl<S: Simd> Visit<S> for List<'_, S> {
     }
 }
 
-/// Packs the numbers `wanted` to `found[at..]`, as many as there is room for.
+/// Packs the numbers that are `wanted` to `found[at..]`, as far as there is room.
 #[inline(always)]
 fn put<S: Simd>(simd: S, wanted: <S::F16 as Lanes>::Mask, numbers: S::F16, found: &mut [f32], at: usize) {
     let Some(rest) = found.get_mut(at..) else { return };

@@ -1,31 +1,31 @@
-//! A photon in 22 bytes: an exact place, the direction from which it came, its power, and the normal of the
-//! surface that it met.
+//! Photon in 22 bytes: exact position, direction of arrival, power, and surface normal.
 //!
-//! Unit vectors are octahedral (Cigolle et al. 2014, "A Survey of Efficient Representations for Independent Unit
-//! Vectors") on odd grids, which hold the axes exactly: 12 bits a side for the direction, within 0.06
-//! degrees; 8 for the normal, within a degree. The power has an exponent for its three channels in common (Ward
-//! 1991, "Real Pixels"), with 11, 11 and 10 bits: within 0.05 % of its largest channel, 0.1 % in blue.
+//! Unit vectors are octahedral (Cigolle et al. 2014, "A Survey of Efficient Representations for Independent
+//! Unit Vectors") on odd grids, which represent the axes exactly. The direction has 12 bits a side, error
+//! below 0.06 degrees; the normal 8 bits, error below a degree. The channels of the power share an exponent
+//! (Ward 1991, "Real Pixels") and have 11, 11 and 10 bits; the error is below 0.05 % of the largest channel,
+//! 0.1 % in blue.
 
 use crate::Rgb;
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
-/// Steps from the middle to the end of a side of the grid of directions, and of normals.
+/// Steps from the centre to the end of a side of the grid, of directions and of normals.
 pub(super) const DIRECTION_STEPS: f32 = 2047.0;
 pub(super) const NORMAL_STEPS: f32 = 127.0;
 
 /// Bits of a side of the grid of directions.
 pub(super) const DIRECTION_BITS: u32 = 12;
 
-/// Bits of red and green, of which blue has one less.
+/// Mantissa bits of red and green; blue has one less.
 pub(super) const POWER_BITS: u32 = 11;
 
-/// A photon as it is left on a surface.
+/// Photon stored on a surface.
 #[derive(Clone, Copy, Pod, Zeroable)]
 #[repr(C, packed(2))]
 pub struct Photon {
     pub(super) position: [f32; 3],
-    /// Direction in the low bits, the exponent of the power in the high eight.
+    /// Direction in the low 24 bits, exponent of the power in the high eight.
     pub(super) light: u32,
     /// Mantissas of red, green, blue from the lowest bit on.
     pub(super) power: u32,
@@ -35,11 +35,11 @@ pub struct Photon {
 const _: () = assert!(size_of::<Photon>() == 22);
 
 impl Photon {
-    /// A photon of no place, which maps refuse.
+    /// Photon without a position, which maps reject.
     pub const NONE: Photon = Photon { position: [f32::NAN; 3], light: 0, power: 0, normal: [0; 2] };
 
-    /// A photon of `power` (W, for each channel; negative and NaN count as none, less than 1e-35 is none) that
-    /// came from `direction`, which points away from the surface of `normal`. Neither need be of unit length.
+    /// Photon of `power` (W per channel) from `direction`, which points away from the surface. Negative, NaN
+    /// and less than 1e-35 W count as zero. `direction` and `normal` may have any length.
     pub fn new(position: Vec3, direction: Vec3, normal: Vec3, power: Rgb) -> Self {
         let [u, v] = octahedral(direction, DIRECTION_STEPS);
         let [a, b] = octahedral(normal, NORMAL_STEPS);
@@ -52,40 +52,40 @@ impl Photon {
         }
     }
 
-    /// A photon without power, with a `tag` in place of it: an index into other data.
+    /// Photon that stores a `tag`, an index into other data, in place of its power.
     pub fn tagged(position: Vec3, direction: Vec3, normal: Vec3, tag: u32) -> Self {
         Self { power: tag, ..Self::new(position, direction, normal, Rgb::ZERO) }
     }
 
-    /// Where it lies.
+    /// Position.
     pub fn position(&self) -> Vec3 {
         Vec3::from_array(self.position)
     }
 
-    /// Where it came from; of unit length.
+    /// Unit direction towards the origin of the light.
     pub fn direction(&self) -> Vec3 {
         self.direction_in_steps().normalize_or(Vec3::Z)
     }
 
-    /// The normal of the surface where it lies; of unit length.
+    /// Unit normal of the surface.
     pub fn normal(&self) -> Vec3 {
         self.normal_in_steps().normalize_or(Vec3::Z)
     }
 
-    /// Its direction in whole numbers, of no particular length.
+    /// Direction in whole steps, not normalised.
     pub(super) fn direction_in_steps(&self) -> Vec3 {
         let side = (1 << DIRECTION_BITS) - 1;
         let [u, v] = [self.light & side, self.light >> DIRECTION_BITS & side];
         unfolded(u as f32, v as f32, DIRECTION_STEPS)
     }
 
-    /// The normal in whole numbers, of no particular length.
+    /// Normal in whole steps, not normalised.
     pub(super) fn normal_in_steps(&self) -> Vec3 {
         let [a, b] = self.normal;
         unfolded(f32::from(a), f32::from(b), NORMAL_STEPS)
     }
 
-    /// Its power.
+    /// Power, W per channel.
     pub fn power(&self) -> Rgb {
         let unit = f32::from_bits(self.light >> 24 << 23);
         let field = |from: u32, bits: u32| (self.power >> from & ((1 << bits) - 1)) as f32;
@@ -95,11 +95,11 @@ impl Photon {
     }
 }
 
-/// The nearest point of the grid, both coordinates counted from its corner.
+/// Nearest point of the octahedral grid; coordinates from its corner.
 fn octahedral(direction: Vec3, steps: f32) -> [u32; 2] {
     let [x, y, z] = direction.to_array();
     let sum = x.abs() + y.abs() + z.abs();
-    // Zero, NaN and infinity have no direction: theirs is +z.
+    // Vectors that are zero, NaN or infinite become +z.
     if !(sum > 0.0 && sum < f32::INFINITY) {
         return [steps as u32; 2];
     }
@@ -109,7 +109,7 @@ fn octahedral(direction: Vec3, steps: f32) -> [u32; 2] {
     [u, v].map(|side| (side * steps + (steps + 0.5)) as u32)
 }
 
-/// The direction of a point of the grid, of no particular length: whole numbers of steps.
+/// Direction of a grid point in whole steps, not normalised.
 fn unfolded(u: f32, v: f32, steps: f32) -> Vec3 {
     let [u, v] = [u - steps, v - steps];
     let z = (steps - u.abs()) - v.abs();
@@ -118,14 +118,14 @@ fn unfolded(u: f32, v: f32, steps: f32) -> Vec3 {
     Vec3::new(towards(u), towards(v), z)
 }
 
-/// The biased exponent of the unit of the mantissas, and the mantissas.
+/// Biased exponent of the unit of the mantissas, and the mantissas.
 fn shared_exponent(power: Rgb) -> (u32, u32) {
     let [r, g, b] = power.to_array().map(|channel| if channel > 0.0 { channel.min(f32::MAX) } else { 0.0 });
     let exponent = (r.max(g).max(b).to_bits() >> 23).saturating_sub(POWER_BITS - 1);
     if exponent == 0 {
         return (0, 0);
     }
-    // Twice, because the reciprocal of the smallest unit is too large for a float.
+    // Blue is halved before the product, because its unit is twice as large.
     let reciprocal = f32::from_bits((254 - exponent) << 23);
     let most = (1 << POWER_BITS) - 1;
     let [r, g, b] = [r, g, 0.5 * b].map(|channel| (channel * reciprocal + 0.5) as u32);
@@ -147,8 +147,8 @@ mod tests {
 
     #[test]
     fn directions_and_normals_are_near_and_axes_exact() {
-        // Half a step along both sides of the grid is sqrt(3/2) along the octahedron, and at most sqrt(3) times
-        // that on the sphere.
+        // Half a step along both sides of the grid is sqrt(3/2) along the octahedron, and at most sqrt(3)
+        // times as long on the sphere.
         let [direction_error, normal_error] = [DIRECTION_STEPS, NORMAL_STEPS].map(|steps| 2.13 / steps);
         for way in sphere(20_000) {
             let photon = Photon::new(Vec3::ZERO, way * 3.0, way * 0.01, Rgb::ONE);

@@ -1,22 +1,22 @@
-//! The units of a map: coordinates are scaled by a power of two, which is exact, so that the largest is about
-//! 2^40. Squares of distances then neither overflow nor vanish, whatever the units of the scene: from its
-//! extent down to 1e-30 of it.
+//! Units of the map: coordinates scaled by a power of two, which is exact, so that the largest is about 2^40.
+//! Squared distances neither overflow nor underflow in any units of the scene, from its extent down to 1e-30
+//! of it.
 
 /// Binary exponent of the largest coordinate of a map.
 const LARGEST: i32 = 40;
 
-/// Where places asked for are held: four million times the extent of the map, beyond which all photons are
-/// equally far in f32 anyway.
+/// Clamp of query coordinates: four million times the extent of the map. Farther away all photons are equally
+/// far in f32.
 const EDGE: f32 = (1u64 << 62) as f32;
 
-/// From the units of the scene to those of the map.
+/// Scale from the units of the scene to those of the map.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Space {
     scale: f32,
 }
 
 impl Space {
-    /// For photons of which `largest` is the largest coordinate in magnitude.
+    /// Units for photons whose largest coordinate in magnitude is `largest`.
     pub(super) fn of(largest: f32) -> Self {
         let exponent = (largest.to_bits() >> 23) as i32 - 127;
         let scale = (LARGEST - exponent).clamp(-126, 127);
@@ -29,7 +29,7 @@ impl Space {
         place.map(|coordinate| (coordinate * self.scale).clamp(-EDGE, EDGE))
     }
 
-    /// The square of a radius in units of the map, below infinity; `None` where it is negative or NaN.
+    /// Squared radius in units of the map, finite; `None` if it is negative or NaN.
     #[inline(always)]
     pub(super) fn squared(self, radius: f32) -> Option<f32> {
         let radius = radius * self.scale;
@@ -41,7 +41,7 @@ impl Space {
         place.map(|coordinate| coordinate / self.scale)
     }
 
-    /// A squared distance in units of the scene; infinite or zero where those cannot hold it.
+    /// Squared distance in units of the scene; infinite or zero where f32 cannot represent it.
     #[inline(always)]
     pub(super) fn leave_squared(self, distance: f32) -> f32 {
         distance / self.scale / self.scale

@@ -1,4 +1,5 @@
-//! Photons one by one: their tags and kernel weights, for vertex merging, where each has a weight of its own.
+//! Photons of a disc one by one, with tags and kernel weights: for vertex merging, where each has its own MIS
+//! weight.
 
 use super::PhotonMap;
 use super::fence::Fence;
@@ -9,7 +10,7 @@ use super::range::{Visit, leaves_within};
 use core::f32::consts::PI;
 use halflight_simd::{Kernel, Lanes, Mask, Simd};
 
-/// A visit to the photons of a disc.
+/// Kernel that visits the photons of a disc.
 pub(super) struct TaggedPhotons<'a, 'm, E> {
     pub map: &'a PhotonMap<'m>,
     pub disc: &'a QueryDisc,
@@ -41,17 +42,17 @@ impl<E: FnMut(u32, [f32; 2])> Kernel for TaggedPhotons<'_, '_, E> {
     }
 }
 
-/// A disc of a part of the radius.
+/// Disc of a part of the radius.
 struct PartOfDisc<S: Simd> {
-    /// The squared radius, and
+    /// Squared radius.
     limit: S::F16,
-    /// one over that.
+    /// One over the squared radius.
     reciprocal: S::F16,
-    /// One over the area of what is seen of the disc.
+    /// One over the visible area of the disc.
     per_area: S::F16,
 }
 
-/// Everything of a visit, in lanes.
+/// State of a visit, in lanes.
 struct List<'a, S: Simd, E> {
     test: DiscTest<'a, S>,
     kernel: super::Kernel,

@@ -1,4 +1,4 @@
-//! Searches against brute force, on point sets that are known to break trees; and the memory they take.
+//! Searches against brute force, on point sets that are known to break trees; and their memory.
 
 use super::*;
 use crate::Rgb;
@@ -6,7 +6,7 @@ use crate::memory::Line;
 use std::vec;
 use std::vec::Vec;
 
-/// A source of numbers that needs nothing.
+/// Random numbers without dependencies.
 pub(super) struct Random(pub u64);
 
 impl Random {
@@ -44,7 +44,7 @@ pub(crate) fn with_map_of(photons: &[Photon], check: impl FnOnce(&PhotonMap)) {
     check(&room.build(photons.len()));
 }
 
-/// What the nearest should be: bits of squared distances in units of the map, and indices, sorted.
+/// The expected nearest photons: bits of squared distances in units of the map, and indices, sorted.
 fn expected(map: &PhotonMap, place: Vec3, radius: f32, k: usize) -> Vec<(u32, u32)> {
     let mut all: Vec<_> = brute::within(map, place, radius).map(|(i, d)| (d.to_bits(), i)).collect();
     all.sort_unstable();
@@ -224,7 +224,7 @@ fn with_light(places: &[Vec3], check: impl FnOnce(&PhotonMap)) {
     check(&photons.build(places.len()));
 }
 
-/// Relative; thousands of photons are added in another order.
+/// Relative error; thousands of photons are added in another order.
 const ROUNDING: f32 = 2e-5;
 
 #[test]
@@ -273,7 +273,7 @@ fn what_is_gathered_is_what_brute_force_gathers() {
     });
 }
 
-/// Of a disc and its finer ones.
+/// Radiance of a disc and of its finer discs.
 fn radiances(density: Density) -> [Rgb; 1 + FINER] {
     let [half, quarter, eighth] = density.finer;
     [density.radiance, half, quarter, eighth]
@@ -304,8 +304,8 @@ fn an_even_floor_has_the_irradiance_that_was_put_there_by_every_falloff() {
         for kernel in [Kernel::Constant, Kernel::Cone, Kernel::Epanechnikov] {
             let disc = QueryDisc { place: Vec3::new(0.5, 0.5, 0.0), normal: Vec3::Z, radius: 0.2, kernel };
             let found = map.gather(Level::detect(), &disc, &Uniform(Rgb::ONE));
-            // One watt each on one square metre; about 50 000 photons, four standard deviations of the least even
-            // weights (E[k²] = 3/2): 2 %; and a quarter as many in each finer disc.
+            // 1 W per photon on 1 m²; about 50 000 photons. Four standard deviations of the kernel of largest
+            // variance (E[k²] = 3/2) are 2 %. Each finer disc has a quarter of the photons.
             let mut most = 0.022;
             for radiance in radiances(found) {
                 let off = (radiance / count as f32 - 1.0).abs().max_element();
@@ -318,7 +318,7 @@ fn an_even_floor_has_the_irradiance_that_was_put_there_by_every_falloff() {
 
 #[test]
 fn nothing_leaks_through_a_thin_wall_or_around_an_edge() {
-    // Light on one side of a wall a thousandth thick, and on a floor that meets it.
+    // Light on one side of a wall of thickness 1e-3, and on a floor that meets the wall.
     let mut random = Random(41);
     let mut memory = lines(Photons::footprint(40_000));
     let mut photons = Photons::new(40_000, &mut Arena::new(bytemuck::cast_slice_mut(&mut memory))).unwrap();
@@ -338,7 +338,7 @@ fn nothing_leaks_through_a_thin_wall_or_around_an_edge() {
     assert!(at(Vec3::new(0.5, 0.0, 0.0), Vec3::Z) > 500, "the lit floor");
     assert_eq!(at(Vec3::new(-1e-3, 0.0, 0.5), Vec3::NEG_X), 0, "the dark side");
     assert_eq!(at(Vec3::new(-0.05, 0.0, 0.0), Vec3::NEG_Z), 0, "the floor from below");
-    // In the corner the floor does not see the photons of the wall, and the other way about.
+    // In the corner the estimate on the floor excludes photons of the wall, and vice versa.
     let corner = at(Vec3::ZERO, Vec3::Z);
     let mut expected = 0;
     for (index, _) in brute::within(&map, Vec3::ZERO, 0.1) {
@@ -398,7 +398,7 @@ fn batches_find_what_single_searches_find() {
     }
 }
 
-/// Both at once, on two threads.
+/// Runs both at once, on two threads.
 struct Threads;
 
 impl ForkJoin for Threads {
@@ -438,7 +438,7 @@ fn a_fence_leaves_out_what_is_behind_it_and_makes_up_for_it() {
             let disc = QueryDisc { place: Vec3::new(0.5, 0.5, 0.0), normal: Vec3::Z, radius: 0.2, kernel };
             let level = Level::detect();
             let open = map.gather(level, &disc, &Uniform(Rgb::ONE));
-            // A wall along x = 0.55: probes get as far as it is on their way.
+            // A wall at x = 0.55 ends the probes that hit it.
             let frame = Fence::frame(Vec3::Z, 0.2);
             let fence = Fence::new(
                 &frame,
@@ -449,9 +449,9 @@ fn a_fence_leaves_out_what_is_behind_it_and_makes_up_for_it() {
             );
             let fenced = map.gather_within(level, &disc, &fence, &Uniform(Rgb::ONE));
             assert!(fenced.photons < open.photons * 9 / 10, "{fenced:?} {open:?}");
-            // As many as without a fence, less a third: 2.5 % is four standard deviations.
+            // A third of the photons is missing: 2.5 % is four standard deviations.
             assert!((fenced.radiance / count as f32 - 1.0).abs().max_element() < 0.025, "{fenced:?}");
-            // All that is left is before the wall: without the photons behind it nothing changes.
+            // All photons that count lie before the wall: removing those behind it changes nothing.
             let before: Vec<_> = places.iter().copied().filter(|place| place.x <= 0.55).collect();
             with_map(&before, |map| {
                 let alone = map.gather_within(level, &disc, &fence, &Uniform(Rgb::ONE));
