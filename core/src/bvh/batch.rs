@@ -1,4 +1,4 @@
-//! Batches of rays: tiles of neighbours that go the same way as packets, all others in step.
+//! Batches of rays: coherent rays of a tile are traced as packets, all others as a stream.
 
 use super::Bvh;
 use super::packet::{CLASSES, Columns, Packet, RAYS_MAX, class};
@@ -8,7 +8,7 @@ use super::traversal_ray::traceable;
 use crate::geometry::Ray;
 use halflight_simd::{Kernel, Simd, Stack};
 
-/// Rays in no order.
+/// Kernel for a batch of incoherent rays.
 pub(super) struct Stream<'a, 'm, T, const ANY: bool> {
     pub bvh: &'a Bvh<'m>,
     pub rays: &'a [Ray],
@@ -26,17 +26,17 @@ impl<T: Sink, const ANY: bool> Kernel for Stream<'_, '_, T, ANY> {
     }
 }
 
-/// Rays of a tile: neighbours.
+/// Rays of a tile.
 const TILE: usize = RAYS_MAX;
 
-/// Rays of a class that are not worth a packet.
+/// Fewest rays of a class that repay a packet.
 const PACKET_MIN: usize = 12;
 
-/// Most rays that wait to be traced in step.
+/// Room for rays that wait for the stream.
 const ALONE: usize = 512;
 
-/// Rays that come tile by tile. Those of a tile that go the same way make a packet, the others are left for
-/// the stream.
+/// Kernel for a batch that comes tile by tile. Rays of a tile that share a class make a packet; the others go
+/// to the stream.
 pub(super) struct Tiles<'a, 'm> {
     pub bvh: &'a Bvh<'m>,
     pub rays: &'a [Ray],
@@ -55,7 +55,7 @@ impl Kernel for Tiles<'_, '_> {
         loop {
             let tile = tiles.next();
             if let Some(rays) = tile {
-                // Mostly all rays of a tile are of one class.
+                // In most tiles all rays are of one class.
                 let whole = Columns::whole(simd, rays);
                 let mut classes = Classes::ALL;
                 if whole.is_none() {
@@ -91,12 +91,12 @@ impl Kernel for Tiles<'_, '_> {
     }
 }
 
-/// The rays of a tile by class.
+/// Rays of a tile, sorted by class.
 struct Classes {
     order: [u8; TILE],
-    /// Where each class ends in the order.
+    /// End of each class in the order.
     ends: [u8; CLASSES],
-    /// The class that comes next.
+    /// Next class.
     class: usize,
     from: usize,
 }
@@ -113,7 +113,7 @@ impl Classes {
         Classes { order, ends: [TILE as u8; CLASSES], class: CLASSES - 1, from: 0 }
     };
 
-    /// Of the rays that can be traced.
+    /// Classes of the traceable rays.
     #[inline(always)]
     fn new(rays: &[Ray]) -> Self {
         let mut classes = [u8::MAX; TILE];
@@ -139,7 +139,7 @@ impl Classes {
         Self { order, ends, class: 0, from: 0 }
     }
 
-    /// The rays of the next class that has some.
+    /// Rays of the next class that is not empty.
     #[inline(always)]
     fn next(&mut self) -> Option<&[u8]> {
         while let Some(&end) = self.ends.get(self.class) {

@@ -1,8 +1,8 @@
-//! The binary tree on the way to the wide one: divided down to single references, in preorder.
+//! Binary tree in preorder, the first stage of the wide tree: its leaves are single references.
 //!
 //! A range of `n` references makes a subtree of exactly `2 n - 1` nodes: the node, its left subtree, its
-//! right subtree. So every subtree knows its slice of the nodes before it is built, and two of them can be
-//! built at the same time.
+//! right subtree. The slice of nodes of every subtree is therefore known before it is built, and two subtrees
+//! can be built in parallel.
 
 use super::fork_join::ForkJoin;
 use super::layout::DEPTH_MAX;
@@ -12,7 +12,7 @@ use crate::Level;
 use bytemuck::{Pod, Zeroable};
 use glam::Vec4;
 
-/// A box with the number of references under it (bits of `hi.w`).
+/// Box with the number of references below it (bits of `hi.w`).
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C)]
 pub(super) struct BinaryNode {
@@ -27,7 +27,7 @@ impl BinaryNode {
         node
     }
 
-    /// References under this node.
+    /// Number of references below this node.
     #[inline(always)]
     pub(super) fn count(&self) -> usize {
         self.hi.w.to_bits() as usize
@@ -40,7 +40,7 @@ impl BinaryNode {
     }
 }
 
-/// Index of the left child of node `index`; its right child is at `right_child`.
+/// Index of the left child of node `index`. For the right child see [`right_child`].
 #[inline(always)]
 pub(super) fn left_child(index: usize) -> usize {
     index + 1
@@ -52,18 +52,18 @@ pub(super) fn right_child(nodes: &[BinaryNode], index: usize) -> usize {
     index + 2 * nodes[index + 1].count()
 }
 
-/// Nodes of a tree over so many references.
+/// Number of nodes of a tree over this number of references.
 pub(super) const fn nodes_of(references: usize) -> usize {
     if references == 0 { 0 } else { 2 * references - 1 }
 }
 
-/// Ranges shorter than this are not worth another core.
+/// Ranges of fewer references do not repay a second core.
 const PARALLEL_MIN: usize = 4096;
 
 /// Depth from which ranges are halved by count, which ends within 28 more levels.
 const HALVE_FROM: usize = DEPTH_MAX - 32;
 
-/// Sorts `references` and fills `nodes`, which holds [`nodes_of`] them.
+/// Sorts `references` and fills `nodes`, which has the length of [`nodes_of`].
 pub(super) fn build<J: ForkJoin>(
     level: Level,
     references: &mut [Reference],
@@ -74,7 +74,7 @@ pub(super) fn build<J: ForkJoin>(
     Division { level, join }.subtree(references, nodes, &extent, 0);
 }
 
-/// How ranges are divided.
+/// Recursive division of ranges.
 struct Division<'j, J> {
     level: Level,
     join: &'j J,

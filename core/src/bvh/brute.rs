@@ -1,4 +1,4 @@
-//! The scalar truth: one ray against every triangle of a mesh. All tracing is tested against it.
+//! Scalar reference of ray tracing: one ray against every triangle of a mesh. Tests hold all tracing to it.
 
 use super::references::hittable;
 use super::traversal_ray::traceable;
@@ -6,13 +6,13 @@ use crate::geometry::{Hit, MISS, Ray};
 use crate::scene::Mesh;
 use halflight_simd::kernels::triangles::{self, Shear};
 
-/// `(t, u, v)` where the ray meets the triangle with these corners at `0 <= t <= ray.t_max`
-/// (see [`halflight_simd::kernels::triangles`]).
+/// `(t, u, v)` of the intersection of the ray with a triangle at `0 <= t <= ray.t_max` (see
+/// [`halflight_simd::kernels::triangles`]).
 pub fn intersect(ray: &Ray, corners: [[f32; 3]; 3]) -> Option<(f32, f32, f32)> {
     triangles::intersect(ray.origin, &Shear::new(ray.direction), ray.t_max, corners)
 }
 
-/// The nearest hit among all triangles; of hits at the same distance, that of the lowest index.
+/// Nearest hit among all triangles; among hits at equal distance the lowest index.
 pub fn nearest(mesh: &Mesh, ray: &Ray) -> Hit {
     let mut best = Hit { t: ray.t_max, u: 0.0, v: 0.0, triangle: MISS };
     if !traceable(ray) {

@@ -1,4 +1,4 @@
-//! The build, step by step: references, binary tree, costs, wide tree. All of it in the caller's memory.
+//! Stages of the BVH build in the caller's memory: references, binary tree, costs, wide tree.
 
 use super::Bvh;
 use super::binary::{self, BinaryNode, nodes_of};
@@ -12,16 +12,16 @@ use crate::memory::{Arena, Footprint, OutOfMemory};
 use crate::scene::Mesh;
 use glam::Vec4Swizzles;
 
-/// Wide nodes that suffice for so many references (see [`Emitter::frugal`]).
+/// Number of wide nodes that suffices for this number of references (see [`Emitter::frugal`]).
 const fn nodes_max(references: usize) -> usize {
     references / 7 + 1
 }
 
-/// By how much boxes are widened, in units of the largest coordinate: two of its last places. A ray that
-/// runs in the face of a box is then inside, and a part of a triangle is inside its box despite rounding.
+/// Margin of the boxes in units of the largest coordinate: two units in its last place. A ray in the plane of
+/// a face is then inside the box, and a part of a triangle is inside its box despite rounding.
 const SLACK: f32 = 2.0 * f32::EPSILON;
 
-/// Floats readable behind the last run of coordinates.
+/// Floats that may be read beyond the last run of coordinates.
 const PADDING: usize = LEAF_MAX;
 
 pub(super) fn kept_footprint(triangles: usize) -> Footprint {

@@ -1,6 +1,6 @@
-//! The surroundings of a point on a surface, in one traversal: whether anything rises above the tangent plane
-//! or overhangs the point, and where the surface continues. Rays answer the same questions
-//! (`transport/density.rs`) at ten times the cost.
+//! Clearance query: the surroundings of a point on a surface in one traversal. The query finds whether
+//! anything rises above the tangent plane or overhangs the point, and where the surface continues. Rays
+//! answer the same questions (`transport/photon_mapping/density.rs`) at ten times the cost.
 //!
 //! The answer is conservative: "nothing rises", "nothing overhangs" and "the surface continues" are certain;
 //! the opposite answers are not, and rays may refute them.
@@ -11,45 +11,46 @@ use super::leaf::corners_of;
 use crate::geometry::Frame;
 use glam::Vec3;
 
-/// Points at which the surface is looked for.
+/// Number of points at which the query searches for the surface.
 pub const POINTS: usize = 8;
 
 /// Size of the traversal stack. If it overflows, the surroundings count as closed.
 const WAITING: usize = 64;
 
-/// An overhang has a plane at least this high above the point, in units of the reach, and at most sixty
-/// degrees steep. The planes of a surface that bends upwards pass below.
+/// An overhang has a plane at least `STEP` times the reach above the point, and the cosine of its slope is at
+/// least `STEEPEST`: at most sixty degrees. The planes of a surface that bends upwards pass below.
 const STEP: f32 = 0.01;
 const STEEPEST: f32 = 0.5;
 
-/// Where to look.
+/// Region and points of a clearance query.
 #[derive(Clone, Copy, Debug)]
 pub struct ClearanceQuery {
-    /// The middle.
+    /// Centre.
     pub place: Vec3,
-    /// Whose z axis is the normal.
+    /// Frame whose z axis is the normal.
     pub frame: Frame,
     /// Half the edge of the axis-aligned cube that is searched.
     pub reach: f32,
-    /// Points on the plane relative to the middle, along the two tangents of the frame.
+    /// Points in the tangent plane relative to the centre, along the two tangents of the frame.
     pub points: [[f32; POINTS]; 2],
-    /// Largest distance of the surface from the plane there, within the cube.
+    /// Largest distance of the surface from the plane at a point, within the cube.
     pub depth: f32,
 }
 
-/// What is there.
+/// Result of a clearance query.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Clearance {
-    /// Something may be above the plane.
+    /// True if something may rise above the plane.
     pub rises: bool,
-    /// Something may be above the place, across the plane: then nothing else was looked at.
+    /// True if something may overhang the place. The query then ends early, and the other results are
+    /// incomplete.
     pub hangs: bool,
-    /// The surface is there: bit i for point i.
+    /// Bit i: the surface continues at point i.
     pub surface: u32,
 }
 
 impl Clearance {
-    /// Nothing rises, and the surface is all there.
+    /// Nothing rises, and the surface continues at all points.
     pub const OPEN: Clearance = Clearance { rises: false, hangs: false, surface: (1 << POINTS) - 1 };
 }
 
@@ -68,8 +69,8 @@ impl Bvh<'_> {
         clearance
     }
 
-    /// Calls `visit` with the triangles whose leaves overlap a box, as long as it says yes. `false` where the
-    /// place is too crowded for all of them to be found.
+    /// Calls `visit` with the triangles of leaves that overlap a box, until it returns `false`. Returns
+    /// `false` if the stack overflows, so that triangles are missing.
     #[inline(always)]
     pub(crate) fn overlapping(&self, lo: Vec3, hi: Vec3, mut visit: impl FnMut([Vec3; 3]) -> bool) -> bool {
         let mut waiting = [0u32; WAITING];
@@ -103,7 +104,7 @@ impl Bvh<'_> {
     }
 }
 
-/// Which children of a node have a part between `lo` and `hi`.
+/// Mask of the children of a node that overlap the box from `lo` to `hi`.
 #[inline]
 fn overlapping(node: &Node, lo: Vec3, hi: Vec3) -> u32 {
     let mut inside = [1; WIDTH];
@@ -122,7 +123,7 @@ fn bits(lanes: [u32; 8]) -> u32 {
 }
 
 impl ClearanceQuery {
-    /// Takes note of one triangle.
+    /// Adds one triangle to the result.
     #[inline]
     fn meet(&self, corners: [Vec3; 3], clearance: &mut Clearance) {
         let [a, b, c] = corners;
@@ -132,7 +133,7 @@ impl ClearanceQuery {
             return;
         }
         let [a, b, c] = corners.map(|corner| self.frame.to_local(corner - self.place));
-        // What is not a number rises.
+        // A NaN coordinate counts as rising.
         let is_low = |corner: Vec3| corner.z <= 0.0;
         if !(is_low(a) && is_low(b) && is_low(c)) {
             clearance.rises = true;
@@ -142,8 +143,8 @@ impl ClearanceQuery {
             clearance.hangs |= !(is_steep || passes_below);
             return;
         }
-        // Twice the areas that a point makes with the sides, which are linear in it; and what these are in
-        // weights of the corners' heights.
+        // Twice the signed areas of a point with the sides, as linear functions of the point. They weight the
+        // heights of the corners.
         let side = |from: Vec3, to: Vec3| [from.x * to.y - from.y * to.x, from.y - to.y, to.x - from.x];
         let sides = [side(b, c), side(c, a), side(a, b)];
         let mut surface = [0; POINTS];

@@ -1,8 +1,8 @@
-//! From the binary tree to the wide one: which binary nodes become children of which wide node, and where
-//! leaves begin, is chosen by dynamic programming over the surface area cost (Ylitie, Karras, Laine 2017,
-//! "Efficient Incoherent Ray Traversal on GPUs Through Compressed Wide BVHs", section 3.1).
+//! Collapse of the binary tree into the wide tree. Dynamic programming over the surface area cost chooses the
+//! binary nodes that become children of each wide node, and those that become leaves (Ylitie, Karras, Laine
+//! 2017, "Efficient Incoherent Ray Traversal on GPUs Through Compressed Wide BVHs", section 3.1).
 //!
-//! cost[i - 1] of a binary node is the least cost of the forest of at most `i` roots that stands for it.
+//! cost[i - 1] of a binary node is the least cost of a forest of at most `i` roots that represents it.
 
 use super::binary::{BinaryNode, left_child, right_child};
 use super::layout::{Child, LEAF_MAX, Node, WIDTH, ranks};
@@ -10,14 +10,14 @@ use super::references::Reference;
 use crate::scene::Mesh;
 use glam::Vec4Swizzles;
 
-/// Cost of visiting a node, in the unit of the area heuristic.
+/// Cost of visiting a node, in units of the surface area heuristic.
 const NODE_COST: f32 = 1.0;
-/// Cost of opening a leaf,
+/// Cost of opening a leaf.
 const LEAF_COST: f32 = 1.3;
-/// and of each triangle in it.
+/// Cost of each triangle of a leaf.
 const TRIANGLE_COST: f32 = 0.08;
 
-/// Least costs of a forest of 1 … 7 roots; the eighth entry is that of a leaf or infinite.
+/// Least costs of a forest of 1 … 7 roots. The eighth entry is the cost of a leaf, or infinite.
 pub(super) type Costs = [f32; 8];
 
 fn leaf_cost(node: &BinaryNode) -> f32 {
@@ -25,7 +25,7 @@ fn leaf_cost(node: &BinaryNode) -> f32 {
     if n > LEAF_MAX { f32::INFINITY } else { node.half_area() * (LEAF_COST + TRIANGLE_COST * n as f32) }
 }
 
-/// Least cost of dividing `roots` roots between two subtrees, and how many go left.
+/// Least cost of `roots` roots over two subtrees, and the number of roots of the left one.
 #[inline(always)]
 fn distribute(left: &Costs, right: &Costs, roots: usize) -> (f32, usize) {
     let mut best = (f32::INFINITY, 1);
@@ -58,7 +58,7 @@ pub(super) fn evaluate(nodes: &[BinaryNode], costs: &mut [Costs]) {
     }
 }
 
-/// Where the wide tree is written.
+/// Memory of the wide tree.
 pub(super) struct Output<'a> {
     pub nodes: &'a mut [Node],
     pub coordinates: &'a mut [f32],
@@ -67,7 +67,7 @@ pub(super) struct Output<'a> {
     pub used: (usize, usize),
 }
 
-/// Binary nodes chosen as children of one wide node, with their first references.
+/// Binary nodes chosen as children of one wide node, with the index of their first reference.
 struct Children {
     chosen: [(usize, usize); WIDTH],
     count: usize,
@@ -78,22 +78,22 @@ pub(super) struct Emitter<'a> {
     pub references: &'a [Reference],
     pub binary: &'a [BinaryNode],
     pub costs: &'a [Costs],
-    /// By how much boxes are widened.
+    /// Margin of the boxes.
     pub slack: f32,
-    /// Prefer leaves wherever one fits and divide the largest box first: a tree of at most one node for
-    /// seven references, whatever the scene.
+    /// Makes a leaf wherever one fits and divides the largest box first: at most one node for seven
+    /// references in any scene.
     pub frugal: bool,
 }
 
 impl Emitter<'_> {
-    /// Writes the whole tree; `false` where it does not fit.
+    /// Writes the whole tree; `false` if it does not fit.
     pub(super) fn emit(&self, out: &mut Output) -> bool {
         out.used = (0, 0);
         self.node(0, 0, out).is_some()
     }
 
-    /// Writes the wide node that stands for binary node `index`, and all below it. Last among its children is
-    /// that of the least cost for its area: any-hit rays take it from the stack first.
+    /// Writes the wide node of binary node `index` and its subtree. The child of the least cost per area
+    /// comes last: any-hit rays pop it from the stack first.
     fn node(&self, index: usize, first: usize, out: &mut Output) -> Option<u32> {
         let at = out.used.0;
         *out.nodes.get_mut(at)? = Node::EMPTY;
@@ -115,7 +115,7 @@ impl Emitter<'_> {
         Some(at as u32)
     }
 
-    /// The same children, those of the least cost for their area last.
+    /// The children in order of descending cost per area.
     fn by_effort(&self, children: &Children) -> Children {
         let mut efforts = [f32::NEG_INFINITY; WIDTH];
         for (effort, &(child, _)) in efforts.iter_mut().zip(&children.chosen[..children.count]) {
@@ -138,7 +138,7 @@ impl Emitter<'_> {
         let count = self.binary[index].count();
         let at = out.used.1;
         let references = self.references.get(first..first + count)?;
-        // Parts of one triangle that ended in one leaf are tested once.
+        // Parts of one triangle in the same leaf are tested once.
         let mut ids = [u32::MAX; LEAF_MAX];
         let mut kept = 0;
         for r in references {
@@ -160,11 +160,11 @@ impl Emitter<'_> {
         Some(Child::leaf(at as u32, kept as u32))
     }
 
-    /// The children that the costs were evaluated for.
+    /// The children of least cost by the dynamic programme.
     fn cheapest(&self, index: usize, first: usize) -> Children {
         let mut children = Children { chosen: [(0, 0); WIDTH], count: 0 };
         if self.is_leaf(index) {
-            // Only at the root: a tree of one leaf.
+            // Only the root can be a leaf here: a tree of one leaf.
             children.chosen[0] = (index, first);
             children.count = 1;
         } else {
@@ -181,7 +181,7 @@ impl Emitter<'_> {
         self.choose(right, middle, roots - k, children);
     }
 
-    /// Adds the cheapest forest of at most `roots` roots for `index`.
+    /// Adds the forest of at most `roots` roots that represents `index` at the least cost.
     fn choose(&self, index: usize, first: usize, roots: usize, children: &mut Children) {
         let costs = &self.costs[index];
         // The fewest roots that reach the least cost.
@@ -199,7 +199,7 @@ impl Emitter<'_> {
 
     fn largest_first(&self, index: usize, first: usize) -> Children {
         let mut children = Children { chosen: [(index, first); WIDTH], count: 1 };
-        // The node itself is divided even if it would fit a leaf, unless it is a single reference.
+        // The node itself is divided even if it fits into a leaf, unless it is a single reference.
         let mut next = (!self.is_leaf(index)).then_some(0);
         while let Some(slot) = next {
             let (node, first) = children.chosen[slot];

@@ -1,12 +1,12 @@
-//! How a build uses more than one core without the core owning a thread: the caller brings the fork.
+//! Fork and join of parallel builds. The caller supplies the threads; the core owns none.
 
-/// Runs two independent pieces of work, perhaps at the same time.
+/// Runs two independent tasks, possibly in parallel.
 pub trait ForkJoin: Sync {
     /// Runs both and returns when both are done.
     fn join(&self, a: impl FnOnce() + Send, b: impl FnOnce() + Send);
 }
 
-/// One after the other.
+/// Runs one task after the other.
 #[derive(Clone, Copy, Debug)]
 pub struct Serial;
 

@@ -1,24 +1,24 @@
-//! The hierarchy as it lies in memory: nodes of eight boxes, and leaves of up to eight triangles whose
-//! coordinates stand in runs, so that one load fills a register and no lane is padded.
+//! Memory layout of the BVH: nodes of eight boxes, and leaves of up to eight triangles. The coordinates of a
+//! leaf lie in runs, so that one load fills a register and no lane is padded.
 
 use bytemuck::{Pod, Zeroable};
 use halflight_simd::kernels::boxes::Boxes8;
 
-/// Most triangles in a leaf: one register of them.
+/// Largest number of triangles in a leaf: one register.
 pub(super) const LEAF_MAX: usize = 8;
 
 /// Children per node.
 pub(super) const WIDTH: usize = 8;
 
-/// Deepest path from the root; the build turns to halving by count before it gets there.
+/// Greatest depth of the tree. The build halves ranges by count before it reaches this depth.
 pub(super) const DEPTH_MAX: usize = 96;
 
 pub(super) use halflight_simd::STACK;
 
 const _: () = assert!(STACK >= (WIDTH - 1) * DEPTH_MAX + 2 * WIDTH);
 
-/// Eight boxes (rows 0 … 5), what is in them (row 6, the bits of a [`Child`] each), and for each octant of
-/// directions their order from far to near (row 7, a nibble each). Four cache lines.
+/// Eight boxes (rows 0 … 5), the bits of their [`Child`]ren (row 6), and for each octant of directions their
+/// order from far to near (row 7, four bits each). Four cache lines.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C, align(64))]
 pub(super) struct Node {
@@ -40,7 +40,7 @@ impl Node {
         self.rows[6][i] = f32::from_bits(child.0);
     }
 
-    /// Fills row 7: along the diagonal of an octant, the box with the farthest centre comes first.
+    /// Fills row 7. The box with the farthest centre along the diagonal of an octant comes first.
     pub(super) fn order(&mut self) {
         let mut twice = [[0.0; WIDTH]; 3];
         for (axis, twice) in twice.iter_mut().enumerate() {
@@ -75,7 +75,7 @@ impl Node {
     }
 }
 
-/// The place of each key when the largest comes first, and of equals the first. NaN counts as infinite.
+/// Rank of each key in descending order; among equal keys the first comes first. NaN counts as infinite.
 pub(super) fn ranks(mut keys: [f32; WIDTH]) -> [u32; WIDTH] {
     for key in &mut keys {
         *key = if key.is_nan() { f32::INFINITY } else { *key };
@@ -89,17 +89,17 @@ pub(super) fn ranks(mut keys: [f32; WIDTH]) -> [u32; WIDTH] {
     ranks
 }
 
-/// What a box holds: a node by its index, or a leaf by its first reference and their count.
+/// Content of a box: a node by its index, or a leaf by its first reference and their number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Child(pub(super) u32);
 
 impl Child {
     const LEAF: u32 = 1 << 31;
 
-    /// Most references: what a leaf's 28 bits can name.
+    /// Largest number of references, by the 28 bits of a leaf.
     pub(super) const REFERENCES_MAX: usize = 1 << 28;
 
-    /// An empty leaf far outside: found nowhere.
+    /// A leaf out of range, for empty boxes and the bottom of a stack.
     pub(super) const NONE: Child = Child(u32::MAX);
 
     pub(super) fn node(index: u32) -> Self {
@@ -115,7 +115,7 @@ impl Child {
         self.0 & Self::LEAF != 0
     }
 
-    /// First reference and count (1 … 8) of a leaf.
+    /// First reference and number of references (1 … 8) of a leaf.
     #[inline(always)]
     pub(super) fn triangles(self) -> (usize, usize) {
         ((self.0 & 0x0fff_ffff) as usize, (self.0 >> 28 & 7) as usize + 1)

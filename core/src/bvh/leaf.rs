@@ -1,4 +1,4 @@
-//! Taking over what the test of a leaf has found.
+//! Update of the best hit from the tests of a leaf.
 
 use super::Bvh;
 use super::layout::Child;
@@ -7,7 +7,7 @@ use crate::geometry::{Hit, MISS};
 use halflight_simd::Simd;
 use halflight_simd::kernels::triangles::{Areas, intersect};
 
-/// The corners of triangle `i` of a leaf of `count`, from its runs of coordinates.
+/// Corners of triangle `i` of a leaf of `count` triangles, from its runs of coordinates.
 #[inline(always)]
 pub(super) fn corners_of(runs: &[f32], count: usize, i: usize) -> [[f32; 3]; 3] {
     let mut corners = [[f32::NAN; 3]; 3];
@@ -21,8 +21,8 @@ pub(super) fn corners_of(runs: &[f32], count: usize, i: usize) -> [[f32; 3]; 3] 
     corners
 }
 
-/// Takes over the best hit of a leaf into `best`: the nearest, and of equals that of the lowest index. `best`
-/// is no hit, or no nearer than where `ray` ends.
+/// Updates `best` with the best hit of a leaf: the nearest, and among equals the lowest index. `best` is no
+/// hit, or at most at `ray.t_max`.
 #[inline(always)]
 pub(super) fn take<S: Simd>(
     simd: S,
@@ -48,7 +48,7 @@ pub(super) fn take<S: Simd>(
     }
 }
 
-/// Whether one of the triangles on whose edge the ray is in f32 is met.
+/// True if the ray meets one of the `doubtful` triangles, on whose edge it lies in f32.
 pub(super) fn meets_doubtful(bvh: &Bvh, ray: &TraversalRay, leaf: Child, doubtful: u32) -> bool {
     let (first, count) = leaf.triangles();
     let mut best = Hit::NONE;
@@ -63,7 +63,7 @@ pub(super) fn meets_doubtful(bvh: &Bvh, ray: &TraversalRay, leaf: Child, doubtfu
     best.is_some()
 }
 
-/// By the scalar reference.
+/// Tests the `doubtful` triangles by the scalar reference.
 #[cold]
 fn take_doubtful(
     bvh: &Bvh,

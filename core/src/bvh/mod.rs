@@ -1,5 +1,5 @@
-//! The bounding volume hierarchy: built over a mesh in the caller's memory, traced for the nearest hit or
-//! any hit by single rays and by batches. What is hit never depends on how: all ways agree to the bit.
+//! Bounding volume hierarchy (BVH) with eight children per node, built over a mesh in the caller's memory.
+//! Single rays and batches find the nearest hit or any hit. All ways of tracing agree to the bit.
 
 mod batch;
 mod binary;
@@ -29,31 +29,31 @@ use halflight_simd::{Kernel, Simd};
 use layout::Node;
 use query::{Nearest, Occluded};
 
-/// How alike the rays of a batch are.
+/// Coherence of the rays of a batch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Coherence {
-    /// Neighbours in the slice are neighbours in space: camera rays, tile by tile.
+    /// Neighbours in the slice are neighbours in space, such as camera rays tile by tile.
     Coherent,
-    /// In no order: bounces. Traced in the tracer's own order; the results do not depend on it.
+    /// Rays in no order, such as bounces. The tracer reorders them; the results are the same.
     Incoherent,
 }
 
-/// A hierarchy over the triangles of a mesh, in the memory of an arena.
+/// BVH over the triangles of a mesh, in the memory of an arena.
 #[derive(Clone, Copy, Debug)]
 pub struct Bvh<'m> {
     nodes: &'m [Node],
-    /// Runs of corner coordinates, leaf by leaf.
+    /// Corner coordinates in runs, leaf by leaf.
     coordinates: &'m [f32],
-    /// The mesh's index of each triangle in the leaves.
+    /// Index in the mesh of each triangle in the leaves.
     triangles: &'m [u32],
     bounds: Bounds,
-    /// By how much boxes are wider than what is in them.
+    /// Margin of the boxes.
     slack: f32,
 }
 
 impl<'m> Bvh<'m> {
-    /// Bytes that [`Bvh::build`] wants of the arena. What it keeps of them is [`Bvh::kept_footprint`]; the
-    /// rest is working memory, free again when it returns.
+    /// Bytes that [`Bvh::build`] takes from the arena. [`Bvh::kept_footprint`] of them stay taken; the rest
+    /// is working memory, free again after the build.
     pub fn footprint(triangles: usize) -> Footprint {
         build::kept_footprint(triangles).and(build::working_footprint(triangles))
     }
@@ -63,7 +63,7 @@ impl<'m> Bvh<'m> {
         build::kept_footprint(triangles)
     }
 
-    /// Builds over `mesh`, on one core with the instructions that every processor has.
+    /// Builds over `mesh` on one core at the baseline level.
     ///
     /// # Errors
     /// [`OutOfMemory`] when the arena is smaller than [`Bvh::footprint`].
@@ -71,8 +71,7 @@ impl<'m> Bvh<'m> {
         build::build(mesh, arena, Level::BASELINE, &Serial)
     }
 
-    /// Builds over `mesh` with the instructions of `level` on the cores that `join` brings. The same tree, to
-    /// the bit.
+    /// Builds over `mesh` at `level` on the cores of `join`; the tree is the same to the bit.
     ///
     /// # Errors
     /// [`OutOfMemory`] when the arena is smaller than [`Bvh::footprint`].
@@ -85,8 +84,7 @@ impl<'m> Bvh<'m> {
         build::build(mesh, arena, level, join)
     }
 
-    /// Bytes that the hierarchy really uses, its copy of the triangles included: what
-    /// [`Bvh::copied`] takes from an arena.
+    /// Bytes of the tree and its copy of the triangles, which [`Bvh::copied`] takes from an arena.
     pub fn used(&self) -> Footprint {
         Footprint::default()
             .slice::<Node>(self.nodes.len())
@@ -94,7 +92,7 @@ impl<'m> Bvh<'m> {
             .slice::<u32>(self.triangles.len())
     }
 
-    /// A copy in another arena, of exactly [`Bvh::used`] bytes: the memory of the build can go.
+    /// Copy in another arena, of exactly [`Bvh::used`] bytes, so that the memory of the build can be freed.
     ///
     /// # Errors
     /// [`OutOfMemory`] when the arena is smaller.
@@ -108,22 +106,22 @@ impl<'m> Bvh<'m> {
         Ok(Bvh { nodes, coordinates, triangles, ..*self })
     }
 
-    /// The box around all that can be hit.
+    /// Bounding box of all triangles that a ray can hit.
     pub fn bounds(&self) -> Bounds {
         self.bounds
     }
 
-    /// The nearest hit of one ray.
+    /// Nearest hit of one ray.
     pub fn nearest(&self, level: Level, ray: &Ray) -> Hit {
         level.dispatch(Single::<false> { bvh: self, ray })
     }
 
-    /// Whether the ray meets anything.
+    /// True if the ray hits anything.
     pub fn occluded(&self, level: Level, ray: &Ray) -> bool {
         level.dispatch(Single::<true> { bvh: self, ray }).is_some()
     }
 
-    /// The nearest hit of each ray.
+    /// Nearest hit of each ray.
     pub fn nearest_batch(&self, level: Level, rays: &[Ray], coherence: Coherence, hits: &mut [Hit]) {
         let sink = Nearest(hits);
         match coherence {
@@ -132,13 +130,13 @@ impl<'m> Bvh<'m> {
         }
     }
 
-    /// For each ray 1 where something is in the way and 0 where not.
+    /// For each ray 1 if it hits anything, else 0.
     pub fn occluded_batch(&self, level: Level, rays: &[Ray], hidden: &mut [u8]) {
         level.dispatch(Stream::<_, true> { bvh: self, rays, sink: Occluded(hidden) });
     }
 }
 
-/// One ray.
+/// Kernel for one ray.
 struct Single<'a, 'm, const ANY: bool> {
     bvh: &'a Bvh<'m>,
     ray: &'a Ray,

@@ -1,15 +1,15 @@
-//! Packets of rays that go about the same way: camera rays of a tile, as [`REGISTERS`] registers of sixteen.
+//! Packet traversal of coherent rays: camera rays of a tile in [`REGISTERS`] registers of sixteen.
 //!
-//! Plainly: all rays of the packet walk the tree together, so a node is fetched and tested once for all.
-//! 1. A node's eight boxes are tested at once against the interval of all rays, and visited in the order that
-//!    the build has prepared for the octant of the directions.
-//! 2. At a leaf the rays are tested against its box, sixteen at a time. The interval of all rays leaves out
-//!    the triangles that none can meet, and the rest is tested against sixteen rays at a time.
+//! All rays of a packet traverse the tree together, so that a node is fetched and tested once for all.
+//! 1. A node's eight boxes are tested together against the interval of all rays, and visited in the order
+//!    that the build has prepared for the octant of the directions.
+//! 2. At a leaf the rays are tested against its box, sixteen at a time. The interval of all rays rejects the
+//!    triangles that no ray can meet. The others are tested against sixteen rays at a time.
 //! 3. The rays of a packet agree in the signs of their directions and in their dominant axis: the caller
-//!    sorts them so ([`class`]).
-//! 4. Where all start at the same point, as those of a pinhole do, that is subtracted once for all.
+//!    sorts them by [`class`].
+//! 4. A common origin, as of a pinhole camera, is subtracted once for all rays.
 //!
-//! The price: a packet whose rays diverge visits nodes that few rays of it meet.
+//! The cost: a packet whose rays diverge visits nodes that few of its rays meet.
 
 use super::Bvh;
 use super::layout::Child;
@@ -24,7 +24,7 @@ use halflight_simd::{Lanes, Mask, Simd, Stack};
 /// Registers of sixteen rays.
 const REGISTERS: usize = 4;
 
-/// Most rays of a packet.
+/// Largest number of rays of a packet.
 pub(super) const RAYS_MAX: usize = 16 * REGISTERS;
 
 /// Sixteen rays and their best hits.
@@ -37,47 +37,48 @@ struct Lane16<S: Simd> {
     v: S::F16,
     /// Bits of the triangle's index.
     triangle: S::F16,
-    /// Lanes whose ray has hit something.
+    /// Lanes whose ray has a hit.
     found: u32,
     /// Lanes that hold a ray.
     active: u32,
 }
 
-/// Rays on their way to be traced together: 1 … [`RAYS_MAX`], all of one class and traceable.
+/// Rays to be traced together: 1 … [`RAYS_MAX`], all traceable and of one class.
 pub(super) struct Packet<'a, S: Simd> {
     pub columns: Columns<S>,
-    /// The tile, and which of its rays these are.
+    /// The tile, and the indices of the packet's rays in it.
     pub rays: &'a [Ray],
     pub order: &'a [u8],
     /// Index of the tile's first ray in the batch.
     pub base: u32,
-    /// Whether it is all rays of the tile in their order.
+    /// True if the packet holds all rays of the tile in their order.
     pub whole: bool,
 }
 
-/// A packet under way.
+/// State of a packet's traversal.
 struct Walk<'a, S: Simd> {
     lanes: [Lane16<S>; REGISTERS],
     rays: &'a [Ray],
     order: &'a [u8],
 }
 
-/// Signs of the direction (three bits) and dominant axis: what rays of one packet share. Below [`CLASSES`].
+/// Class that the rays of a packet share: signs of the direction (three bits) and dominant axis. Below
+/// [`CLASSES`].
 #[inline(always)]
 pub(super) fn class(direction: [f32; 3]) -> usize {
     let [x, y, z] = direction.map(|d| (d.to_bits() >> 31) as usize);
     x | y << 1 | z << 2 | dominant_axis(direction) << 3
 }
 
-/// How many classes of rays there are.
+/// Number of classes.
 pub(super) const CLASSES: usize = 24;
 
-/// The floats of rays, one register for each kind of them and for sixteen rays.
+/// The eight floats of sixteen rays, a register each, for each register of rays.
 #[derive(Clone, Copy)]
 pub(super) struct Columns<S: Simd>([[S::F16; 8]; REGISTERS]);
 
 impl<S: Simd> Columns<S> {
-    /// Of a full tile whose rays are all traceable and of one class.
+    /// Columns of a full tile whose rays are all traceable and of one class.
     #[inline(always)]
     pub(super) fn whole(simd: S, rays: &[Ray]) -> Option<Self> {
         let records: &[[f32; 8]] = bytemuck::cast_slice(rays);
@@ -87,7 +88,7 @@ impl<S: Simd> Columns<S> {
         columns.agree(simd).then_some(columns)
     }
 
-    /// Of the rays `order`. Lanes without a ray repeat the first one: they change no interval.
+    /// Columns of the rays `order`. Lanes without a ray repeat the first ray, which changes no interval.
     #[inline(always)]
     pub(super) fn gathered(simd: S, rays: &[Ray], order: &[u8]) -> Self {
         let mut records = [[[0.0; 8]; 16]; REGISTERS];
@@ -102,7 +103,7 @@ impl<S: Simd> Columns<S> {
         Self([simd.columns16(a), simd.columns16(b), simd.columns16(c), simd.columns16(d)])
     }
 
-    /// Whether all rays are traceable (as [`super::traversal_ray::traceable`] has it) and of one [`class`].
+    /// True if all rays are traceable (by [`super::traversal_ray::traceable`]) and of one [`class`].
     #[inline(always)]
     fn agree(&self, simd: S) -> bool {
         const ALL: u32 = 0xffff;
@@ -120,7 +121,7 @@ impl<S: Simd> Columns<S> {
                 plus[axis] &= !signs[axis] & ALL;
                 along[axis] &= dominant[axis];
             }
-            // No comparison is true of NaN; a maximum may lose one.
+            // Every comparison with NaN is false, whereas a maximum may lose it.
             traceable &= (x.lt(limit) & y.lt(limit) & z.lt(limit) & zero.lt(x.max(y).max(z))).bits();
             traceable &= (ox.abs().lt(limit) & oy.abs().lt(limit) & oz.abs().lt(limit) & zero.le(t)).bits();
         }
@@ -131,7 +132,7 @@ impl<S: Simd> Columns<S> {
 }
 
 impl<'a, S: Simd> Packet<'a, S> {
-    /// Traces the rays and puts their hits.
+    /// Traces the rays and passes their hits to `sink`.
     #[inline(always)]
     pub(super) fn trace(self, simd: S, bvh: &Bvh, stack: &mut Stack, sink: &mut Nearest) {
         let Self { columns, rays, order, base, whole } = self;
@@ -171,7 +172,7 @@ impl<'a, S: Simd> Packet<'a, S> {
 }
 
 impl<S: Simd> Lane16<S> {
-    /// Of the first `count` of sixteen rays.
+    /// The first `count` of sixteen rays.
     #[inline(always)]
     fn new(simd: S, columns: &[S::F16; 8], near: [usize; 3], axes: [usize; 3], count: usize) -> Self {
         let [ox, oy, oz, t, dx, dy, dz, _] = *columns;
@@ -197,7 +198,7 @@ impl<S: Simd> Lane16<S> {
     }
 }
 
-/// [`halflight_simd::kernels::safe_reciprocal`] of all lanes.
+/// [`halflight_simd::kernels::safe_reciprocal`] in all lanes.
 #[inline(always)]
 fn reciprocal<S: Simd>(simd: S, d: S::F16) -> S::F16 {
     let limit = simd.splat16(RECIPROCAL_MAX);
@@ -205,7 +206,7 @@ fn reciprocal<S: Simd>(simd: S, d: S::F16) -> S::F16 {
 }
 
 impl<S: Simd> Walk<'_, S> {
-    /// What the rays have in common, and whether that is their origin.
+    /// Interval of all rays, and whether they share their origin.
     #[inline(always)]
     fn interval(&self, near: [usize; 3]) -> (SlabInterval, bool) {
         let (mut origin, mut reciprocal) = ([[0.0; 3]; 2], [[0.0; 3]; 2]);
@@ -223,7 +224,7 @@ impl<S: Simd> Walk<'_, S> {
         (SlabInterval::new(near, origin, reciprocal), origin[0] == origin[1])
     }
 
-    /// The farthest that any ray still looks.
+    /// Largest `t` that any ray still searches.
     #[inline(always)]
     fn farthest(&self) -> f32 {
         let [a, b, c, d] = &self.lanes;
@@ -246,7 +247,7 @@ impl<S: Simd> Walk<'_, S> {
             if !child.is_leaf() {
                 let Some(node) = bvh.nodes.get(child.0 as usize) else { return };
                 let (entry, exit) = interval.interval(simd, &node.rows, t_max);
-                // On the stack are places of boxes: node and slot.
+                // The stack holds the places of boxes: node and slot.
                 let mut places = [0.0; 8];
                 for (slot, place) in places.iter_mut().enumerate() {
                     *place = f32::from_bits(child.0 << 3 | slot as u32);
@@ -263,8 +264,8 @@ impl<S: Simd> Walk<'_, S> {
         }
     }
 
-    /// Tests the rays that meet the leaf's box, which is at `place`, against its triangles; whether a hit was
-    /// taken.
+    /// Tests the rays that meet the box of the leaf, at `place`, against its triangles. Returns true if a hit
+    /// was taken.
     #[inline(always)]
     fn leaf<const PINHOLE: bool>(
         &mut self,
@@ -322,14 +323,14 @@ impl<S: Simd> Walk<'_, S> {
     }
 }
 
-/// Takes over what a triangle test found; the bits of the rays that have a better hit now.
+/// Takes the hits of a triangle test. Returns the mask of the rays whose hit improved.
 #[inline(always)]
 fn take<S: Simd>(simd: S, lane: &mut Lane16<S>, found: &Found<S::F16>, id: u32) -> u32 {
     let nearer = found.t.lt(lane.t).bits() & found.hits;
     let same = found.hits & !nearer;
     let mut hits = nearer;
     if same != 0 {
-        // As near as the best: the lower index wins, and no hit at all is the highest.
+        // At equal distance the lower index wins. No hit has the highest index.
         let ids = lane.triangle.to_array();
         for (l, other) in ids.iter().enumerate() {
             hits |= ((same >> l & 1 == 1 && id < other.to_bits()) as u32) << l;
@@ -343,7 +344,7 @@ fn take<S: Simd>(simd: S, lane: &mut Lane16<S>, found: &Found<S::F16>, id: u32) 
     hits
 }
 
-/// The rays on an edge in f32, by the scalar reference.
+/// Tests the `doubtful` rays, which lie on an edge in f32, by the scalar reference.
 #[cold]
 fn take_doubtful<S: Simd>(
     simd: S,

@@ -1,19 +1,19 @@
-//! The results that a batch of rays is traced for: nearest hits, or whether anything occludes.
+//! Results of a batch of rays: nearest hits, or occlusion.
 
 use crate::geometry::Hit;
 
-/// Use of the hits of a batch of rays. All start as [`Hit::NONE`].
+/// Receiver of the hits of a batch of rays. All start as [`Hit::NONE`].
 pub(super) trait Sink {
-    /// No hit for any of `count` rays from `base` on.
+    /// Resets `count` rays from `base` on to no hit.
     fn clear(&mut self, base: u32, count: usize);
-    /// Takes the hit of a ray, or none. An index beyond the end is harmless.
+    /// Takes the hit of a ray, or none. An index beyond the end is ignored.
     fn put(&mut self, index: u32, hit: Hit);
 }
 
-/// Keeps the hits.
+/// Stores the hits.
 pub(super) struct Nearest<'a>(pub &'a mut [Hit]);
 
-/// Keeps whether there was one.
+/// Stores 1 for a hit, else 0.
 pub(super) struct Occluded<'a>(pub &'a mut [u8]);
 
 impl Sink for Nearest<'_> {
@@ -31,7 +31,7 @@ impl Sink for Nearest<'_> {
 }
 
 impl Nearest<'_> {
-    /// Takes the hits of as many rays from `base` on; whether there is room.
+    /// Takes the hits of consecutive rays from `base` on; `false` if they do not fit.
     #[inline(always)]
     pub(super) fn put_all(&mut self, base: u32, hits: &[Hit]) -> bool {
         let from = base as usize;

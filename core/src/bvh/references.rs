@@ -1,4 +1,4 @@
-//! What the build sorts: boxes of triangles, or of parts of large triangles.
+//! References of the build: boxes of triangles, or of parts of large triangles (Karras, Aila 2013).
 
 use super::layout::Child;
 use crate::geometry::Bounds;
@@ -6,8 +6,8 @@ use crate::scene::Mesh;
 use bytemuck::{Pod, Zeroable};
 use glam::{Vec3, Vec4, Vec4Swizzles};
 
-/// The box of a triangle or of a part of it. `lo.w` holds the bits of the triangle's index, `hi.w` how much
-/// would be gained by cutting it.
+/// Box of a triangle or of a part of it. `lo.w` holds the bits of the triangle's index, `hi.w` the priority
+/// of splitting it.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C)]
 pub(super) struct Reference {
@@ -29,35 +29,35 @@ impl Reference {
     }
 }
 
-/// Parts that large triangles may be cut into, for each `SPLIT_SHARE` triangles one.
+/// One part of a split triangle is allowed for every `SPLIT_SHARE` triangles.
 const SPLIT_SHARE: usize = 3;
 
-/// Most references that a mesh of so many triangles is built over.
+/// Largest number of references to this number of triangles.
 pub(super) fn capacity(triangles: usize) -> usize {
     triangles.saturating_add(triangles / SPLIT_SHARE).min(Child::REFERENCES_MAX)
 }
 
-/// Corners of a triangle that a ray can hit: finite, and not all on one line. Areas of a triangle without
-/// area are rounding alone, so that a ray might meet it anywhere.
+/// Corners of a triangle that a ray can hit: finite, and not collinear. A triangle without area has signed
+/// areas of mere rounding, so that a ray might meet it anywhere.
 pub(super) fn hittable(mesh: &Mesh, triangle: u32) -> Option<[Vec3; 3]> {
     let [a, b, c] = mesh.corners(triangle);
     let finite = a.is_finite() && b.is_finite() && c.is_finite();
     (finite && has_area([a, b, c])).then_some([a, b, c])
 }
 
-/// Whether the corners span a plane. In f64, where it is exact for coordinates of 24 bits on one grid.
+/// True if the corners span a plane. In f64, which is exact for coordinates of 24 bits on one grid.
 fn has_area([a, b, c]: [Vec3; 3]) -> bool {
     let [p, q] = [b, c].map(|corner| core::array::from_fn(|i| f64::from(corner[i]) - f64::from(a[i])));
     let [p, q]: [[f64; 3]; 2] = [p, q];
     (0..3).any(|i| p[i] * q[(i + 1) % 3] != p[(i + 1) % 3] * q[i])
 }
 
-/// Fills `references` with the hittable triangles, and the rest of it with parts of the largest of them.
-/// Returns how many there are.
+/// Fills `references` with the hittable triangles, and the room that is left with parts of the largest.
+/// Returns their number.
 ///
-/// Which triangles are cut follows Karras, Aila 2013, "Fast Parallel Construction of High-Quality Bounding
-/// Volume Hierarchies", section 4.3: those whose box is much larger than they are, and that cross the
-/// planes on which the hierarchy will divide space early.
+/// The choice of triangles follows Karras, Aila 2013, "Fast Parallel Construction of High-Quality Bounding
+/// Volume Hierarchies", section 4.3: those much smaller than their box that cross the planes at which the
+/// hierarchy will divide space early.
 pub(super) fn collect(mesh: &Mesh, references: &mut [Reference]) -> usize {
     let mut count = 0;
     let mut scene = Bounds::EMPTY;
@@ -73,7 +73,8 @@ pub(super) fn collect(mesh: &Mesh, references: &mut [Reference]) -> usize {
     count + split_large(mesh, scene, references, count, spare)
 }
 
-/// Cuts of the largest triangles, into the `spare` references behind the first `count`.
+/// Splits the largest triangles into the `spare` references after the first `count`. Returns the number of
+/// new references.
 fn split_large(
     mesh: &Mesh,
     scene: Bounds,
@@ -90,7 +91,7 @@ fn split_large(
     if !(total > 0.0 && total.is_finite()) || spare == 0 {
         return 0;
     }
-    // The largest scale whose rounded-down shares still fit, by bisection over a factor of two each way.
+    // Bisection over a factor of two for the largest scale whose rounded-down shares still fit.
     let shares = |scale: f32| -> usize {
         references[..count].iter().map(|r| share(scale, r.hi.w)).fold(0, usize::saturating_add)
     };
@@ -112,14 +113,14 @@ fn split_large(
     free - count
 }
 
-/// Most cuts of one triangle.
+/// Largest number of splits of one triangle.
 const CUTS_MAX: usize = 31;
 
 fn share(scale: f32, priority: f32) -> usize {
     ((scale * priority) as usize).min(CUTS_MAX)
 }
 
-/// Replaces reference `slot` by `cuts + 1` parts of the box `bounds` of a triangle; the new ones go to
+/// Replaces reference `slot` by `cuts + 1` parts of the box `bounds` of a triangle. The new parts go to
 /// `free` and after. Returns the next free index.
 #[allow(clippy::too_many_arguments)]
 fn cut(
@@ -149,7 +150,7 @@ fn cut(
     cut(grid, corners, right, triangle, rest - left_cuts, free, next, references)
 }
 
-/// The boxes of the parts of a triangle inside `bounds` on either side of a plane.
+/// Boxes of the parts of a triangle inside `bounds` on either side of a plane.
 pub(super) fn divide(corners: [Vec3; 3], bounds: Bounds, axis: usize, plane: f32) -> (Bounds, Bounds) {
     let (mut left, mut right) = (Bounds::EMPTY, Bounds::EMPTY);
     for i in 0..3 {
@@ -162,12 +163,11 @@ pub(super) fn divide(corners: [Vec3; 3], bounds: Bounds, axis: usize, plane: f32
             right = right.including(p);
         }
         if (a < plane && b > plane) || (a > plane && b < plane) {
-            // Interpolated the same way for both directions of the edge, and put on the plane exactly.
+            // Both directions of the edge interpolate alike, and the point lies exactly on the plane.
             let (p, q, a, b) = if a < b { (p, q, a, b) } else { (q, p, b, a) };
             let mut x = p.lerp(q, ((plane - a) / (b - a)).clamp(0.0, 1.0));
             x[axis] = plane;
-            // The interpolated point is off the edge by the rounding of the weight and of the sum: widen by
-            // both.
+            // Rounding of the weight and of the sum moves the point off the edge: the box is widened by both.
             let slack = (p.abs().max(q.abs())) * (4.0 * f32::EPSILON);
             left = left.union(Bounds { min: x - slack, max: x + slack });
             right = right.union(Bounds { min: x - slack, max: x + slack });
@@ -179,7 +179,7 @@ pub(super) fn divide(corners: [Vec3; 3], bounds: Bounds, axis: usize, plane: f32
     (inside(left), inside(right))
 }
 
-/// The planes of a midpoint octree over the scene.
+/// Planes of a midpoint octree over the scene.
 struct Grid {
     origin: Vec3,
     to_cells: Vec3,
@@ -197,7 +197,7 @@ impl Grid {
         Self { origin: scene.min, to_cells: cells / safe, to_world: safe / cells }
     }
 
-    /// The plane highest in the octree that crosses the box, its axis and coordinate; of equals the one
+    /// Axis and coordinate of the highest plane of the octree that crosses the box; among equals the one
     /// across the longest edge.
     fn dividing_plane(&self, bounds: Bounds) -> Option<(usize, f32)> {
         let (level, axis, cell) = self.crossing(bounds)?;
@@ -205,7 +205,7 @@ impl Grid {
         (plane > bounds.min[axis] && plane < bounds.max[axis]).then_some((axis, plane))
     }
 
-    /// Height of the highest plane that crosses the box (`LEVELS - 1` is the middle of the scene), its axis,
+    /// Level of the highest plane that crosses the box (`LEVELS - 1` is the middle of the scene), its axis,
     /// and the cell of the box's maximum.
     fn crossing(&self, bounds: Bounds) -> Option<(u32, usize, u32)> {
         let lo = (bounds.min - self.origin) * self.to_cells;
@@ -226,14 +226,14 @@ impl Grid {
     }
 }
 
-/// How much is gained by cutting: cube root of the box's superfluous area, weighted by the height of the
-/// plane that it crosses (Karras, Aila, equation 3).
+/// Priority of splitting: cube root of the superfluous area of the box, weighted by the level of the plane
+/// that crosses it (Karras, Aila, equation 3).
 fn priority(mesh: &Mesh, grid: &Grid, r: &Reference) -> f32 {
     let bounds = r.bounds();
     let Some((level, _, _)) = grid.crossing(bounds) else { return 0.0 };
     let [a, b, c] = mesh.corners(r.triangle());
     let cross = (b - a).cross(c - a).abs();
-    // Twice the triangle's projected areas is the least area of boxes around its parts.
+    // Twice the sum of the triangle's projected areas is the least area of boxes around its parts.
     let superfluous = bounds.half_area() - 0.5 * (cross.x + cross.y + cross.z);
     let weight = libm::ldexpf(superfluous.max(0.0), level as i32 - LEVELS as i32);
     libm::cbrtf(weight)

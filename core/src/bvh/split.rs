@@ -1,11 +1,11 @@
-//! One step of the build: a range of references is divided in two where the surface area heuristic
-//! (Goldsmith, Salmon 1987) over binned centroids (Wald 2007) is least.
+//! Division of a range of references at the least cost of the surface area heuristic (Goldsmith, Salmon 1987)
+//! over binned centroids (Wald 2007).
 
 use super::references::Reference;
 use glam::{Vec3, Vec4, Vec4Swizzles};
 use halflight_simd::{Kernel, Level, Simd};
 
-/// A box in registers; `w` is of no meaning.
+/// Box in registers; `w` is unused.
 #[derive(Clone, Copy)]
 pub(super) struct Box4 {
     pub lo: Vec4,
@@ -28,7 +28,7 @@ impl Box4 {
     }
 }
 
-/// Boxes of some references and of their centroids (twice them: lo + hi).
+/// Bounds of some references and of their doubled centroids (lo + hi).
 #[derive(Clone, Copy)]
 pub(super) struct Extent {
     pub boxes: Box4,
@@ -55,7 +55,7 @@ impl Extent {
     }
 }
 
-/// Where references go: the left side gets the bins below `bin` of `axis`.
+/// Best cut: the left side gets the bins below `bin` of `axis`.
 #[derive(Clone, Copy)]
 struct Cut {
     cost: f32,
@@ -63,7 +63,7 @@ struct Cut {
     bin: usize,
 }
 
-/// From a centroid to its bin, on all axes.
+/// Map from a centroid to its bin, on all axes.
 #[derive(Clone, Copy)]
 struct Binning {
     origin: Vec4,
@@ -74,7 +74,7 @@ impl Binning {
     #[inline(always)]
     fn new(centroids: &Box4, bins: usize) -> Self {
         let extent = (centroids.hi - centroids.lo).xyz();
-        // A little under the number of bins, so that the largest centroid falls into the last one.
+        // Slightly below the number of bins, so that the largest centroid falls into the last bin.
         let scale = bins as f32 * (1.0 - 1e-5) / extent;
         let usable = scale.is_finite_mask() & extent.cmpgt(Vec3::ZERO);
         Self { origin: centroids.lo, scale: Vec3::select(usable, scale, Vec3::ZERO) }
@@ -87,8 +87,8 @@ impl Binning {
     }
 }
 
-/// Divides `references` and returns how many went left, with the extents of both sides. At least one
-/// reference is on either side of two or more.
+/// Divides `references` and returns the number on the left, with the extents of both sides. Each side of two
+/// or more references gets at least one.
 pub(super) fn divide(level: Level, references: &mut [Reference], extent: &Extent) -> (usize, Extent, Extent) {
     if references.len() == 2 {
         return halve(references);
@@ -96,7 +96,7 @@ pub(super) fn divide(level: Level, references: &mut [Reference], extent: &Extent
     level.dispatch(Divide { references, extent })
 }
 
-/// The same instructions at every level, hence the same tree; only their encoding gets shorter.
+/// Kernel of one division. All levels compute alike, so that the tree is the same; only the encoding differs.
 struct Divide<'a> {
     references: &'a mut [Reference],
     extent: &'a Extent,
@@ -128,7 +128,7 @@ fn divide_binned<const BINS: usize>(
     }
 }
 
-/// Bins all references on all axes and sweeps for the least cost.
+/// Bins all references on all axes and sweeps for the cut of least cost.
 #[inline(always)]
 fn best_cut<const BINS: usize>(references: &[Reference], binning: &Binning) -> Option<Cut> {
     let mut bins = [[(Box4::EMPTY, 0u32); BINS]; 3];
@@ -161,7 +161,7 @@ fn best_cut<const BINS: usize>(references: &[Reference], binning: &Binning) -> O
             if count == 0 {
                 continue;
             }
-            // NaN where the right side is empty: never the best.
+            // NaN if the right side is empty: never the best.
             let cost = count as f32 * side.half_area() + right_cost[bin];
             if best.map_or(cost < f32::INFINITY, |b| cost < b.cost) {
                 best = Some(Cut { cost, axis, bin });
@@ -171,7 +171,7 @@ fn best_cut<const BINS: usize>(references: &[Reference], binning: &Binning) -> O
     best
 }
 
-/// Moves the left side of a cut to the front.
+/// Moves the references on the left of a cut to the front.
 #[inline(always)]
 fn partition<const BINS: usize>(
     references: &mut [Reference],
@@ -194,7 +194,7 @@ fn partition<const BINS: usize>(
     if i == 0 || i == references.len() { halve(references) } else { (i, left, right) }
 }
 
-/// The last resort: half by count, for references that no plane tells apart.
+/// Halves by count, for references that no plane separates.
 #[inline(always)]
 pub(super) fn halve(references: &[Reference]) -> (usize, Extent, Extent) {
     let (left, right) = references.split_at(references.len() / 2);

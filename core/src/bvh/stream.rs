@@ -1,14 +1,15 @@
-//! Rays in no order, each on its own way but in step: of [`SLOTS`] rays in flight, first all those at a node
-//! take a step, then all those at a leaf, then those that found something, and those that are done make room.
+//! Stream traversal of incoherent rays: independent traversals in step. Of [`SLOTS`] rays in flight, first
+//! all rays at a node take a step, then all at a leaf, then all with a hit. Rays that are done make room for
+//! new ones.
 //!
-//! A walk alone is a chain of dependent steps with branches that cannot be guessed. In step, the same is done
-//! for one independent walk after the other:
-//! 1. Which walks do the same next is a set of bits. What is guessed wrong is the end of a set, not every
-//!    step.
-//! 2. Nothing on a stack needs a test when it is taken: a new best hit has taken off all that is farther.
-//! 3. Rays are set up in a loop of their own, [`AHEAD`] at a time.
-//! 4. Any-hit walks visit what is cheap for its size first ([`super::collapse`] lays the children out so):
-//!    near boxes first was slower.
+//! A single traversal is a chain of dependent steps with unpredictable branches. In step, the processor does
+//! the same for one independent ray after the other:
+//! 1. A mask holds the rays that do the same step next. The branch predictor misses the end of a mask, not
+//!    every step.
+//! 2. Stack entries need no test when popped: a new best hit has removed all that are farther.
+//! 3. Rays are prepared in a loop of their own, [`AHEAD`] at a time.
+//! 4. Any-hit rays visit children of the least cost per area first ([`super::collapse`] orders the children
+//!    so). Near boxes first was slower.
 
 use super::Bvh;
 use super::layout::Child;
@@ -21,10 +22,10 @@ use halflight_simd::kernels::boxes::ROBUST;
 use halflight_simd::kernels::triangles::Areas;
 use halflight_simd::{Simd, Stack, StackMemory};
 
-/// Rays in flight. Few on small machines: each has a stack.
+/// Rays in flight. Few on small machines, because each has a stack.
 const SLOTS: usize = if cfg!(target_pointer_width = "64") { 32 } else { 4 };
 
-/// Rays set up at a time.
+/// Rays prepared at a time.
 const AHEAD: usize = 64;
 
 /// A ray in flight.
@@ -39,10 +40,10 @@ impl Slot {
     const EMPTY: Slot = Slot { ray: TraversalRay::NONE, hit: Hit::NONE };
 }
 
-/// At the bottom of every stack.
+/// Entry at the bottom of every stack.
 const DONE: Child = Child::NONE;
 
-/// The rays to be traced, set up some time ahead.
+/// Queue of rays, prepared ahead of their traversal.
 struct Queue<'a, I> {
     rays: &'a [Ray],
     indices: I,
@@ -64,7 +65,7 @@ impl<I: Iterator<Item = u32>> Queue<'_, I> {
         self.ahead.get(self.taken - 1)
     }
 
-    /// Sets up the next rays; leaves out those that cannot be traced.
+    /// Prepares the next rays, without those that cannot be traced.
     #[inline(always)]
     fn fill(&mut self) {
         (self.count, self.taken) = (0, 0);
@@ -77,7 +78,7 @@ impl<I: Iterator<Item = u32>> Queue<'_, I> {
     }
 }
 
-/// Traces the rays `indices` of `rays` and puts what is found.
+/// Traces the rays `indices` of `rays` and passes their hits to `sink`.
 #[inline(always)]
 pub(super) fn trace<S: Simd, T: Sink, const ANY: bool>(
     simd: S,
@@ -151,7 +152,7 @@ pub(super) fn trace<S: Simd, T: Sink, const ANY: bool>(
                 if areas.doubtful != 0 {
                     any |= meets_doubtful(bvh, ray, leaf, areas.doubtful);
                 }
-                // A hit is as likely as not: not to be guessed.
+                // Hits are unpredictable: no branch.
                 hit.triangle = select_unpredictable(any, 0, hit.triangle);
                 stack.truncate(select_unpredictable(any, 1, usize::MAX));
                 next[i] = take_next::<S, ANY>(simd, bvh, stack);
@@ -177,7 +178,7 @@ pub(super) fn trace<S: Simd, T: Sink, const ANY: bool>(
     }
 }
 
-/// Takes the lowest slot out of a set of them.
+/// Removes and returns the lowest slot of a mask.
 #[inline(always)]
 fn pop(slots: &mut u32) -> Option<usize> {
     if *slots == 0 {
@@ -188,8 +189,8 @@ fn pop(slots: &mut u32) -> Option<usize> {
     Some(lowest)
 }
 
-/// Takes a child from the stack, and asks the memory for what is in it; for any-hit rays, which take fewer
-/// steps, that costs more than it brings.
+/// Pops a child from the stack and prefetches its content. Any-hit rays take fewer steps, for which a
+/// prefetch costs more than it gains.
 #[inline(always)]
 fn take_next<S: Simd, const ANY: bool>(simd: S, bvh: &Bvh, stack: &mut Stack) -> u32 {
     let child = Child(stack.pop().unwrap_or(DONE.0));

@@ -1,4 +1,4 @@
-//! Every way of tracing against brute force, on scenes that are hard on a hierarchy.
+//! Every way of tracing against brute force, on scenes that are hard for a BVH.
 
 use super::clearance::{Clearance, ClearanceQuery, POINTS};
 use super::*;
@@ -8,7 +8,7 @@ use crate::scene::Triangle;
 use glam::Vec3;
 use std::vec::Vec;
 
-/// A plain generator for scenes and rays.
+/// Random numbers for scenes and rays.
 struct Random(u32);
 
 impl Random {
@@ -57,7 +57,7 @@ fn random_soup(count: usize, size: f32, offset: Vec3) -> Soup {
     }))
 }
 
-/// A wavy sheet: shared edges, so that every ray through it must hit.
+/// Wavy sheet of triangles that share edges, so that every ray through it must hit.
 fn sheet(n: usize) -> Soup {
     let at = |x: usize, z: usize| {
         let (x, z) = (x as f32 / n as f32 * 2.0 - 1.0, z as f32 / n as f32 * 2.0 - 1.0);
@@ -70,7 +70,7 @@ fn sheet(n: usize) -> Soup {
     }))
 }
 
-/// Traces random rays in all ways at all levels and holds them to brute force, to the bit.
+/// Traces rays in all ways at all levels and compares with brute force, to the bit.
 fn agrees(soup: &Soup, rays: &[Ray]) {
     let mesh = soup.mesh();
     let mut memory = lines(Bvh::footprint(mesh.triangles.len()).bytes());
@@ -138,7 +138,8 @@ fn tiles_of_a_pinhole_and_of_a_lens() {
             })
             .collect();
         agrees(&soup, &rays);
-        // One ray that cannot be traced, one that is off and one that ends early do not spoil their tiles.
+        // A ray that cannot be traced, one with a negative t_max, one that ends early and one without a
+        // direction.
         rays[3].origin[1] = f32::NAN;
         rays[70].t_max = -1.0;
         rays[200].t_max = 8.0;
@@ -281,7 +282,7 @@ fn a_copy_takes_exactly_what_it_says() {
     }
 }
 
-/// Points of a survey, in radii.
+/// Points of a clearance query, in radii.
 const POINTS_ASIDE: [[f32; POINTS]; 2] =
     [[0.6, 0.0, -0.6, 0.0, 0.4, -0.4, 0.3, -0.1], [0.0, 0.6, 0.0, -0.6, 0.4, 0.4, -0.5, 0.0]];
 

@@ -1,4 +1,4 @@
-//! Rays set up to be traced, once for all steps of their way.
+//! Ray prepared for traversal (`TravRay`, Embree).
 
 use crate::geometry::Ray;
 use glam::{Vec4, Vec4Swizzles};
@@ -7,22 +7,22 @@ use halflight_simd::kernels::RECIPROCAL_MAX;
 use halflight_simd::kernels::boxes::SlabRay8;
 use halflight_simd::kernels::triangles::{Shear, ShearRay8};
 
-/// All that a step wants to know of a ray, in one cache line.
+/// Everything of a ray that a traversal step reads, in one cache line.
 #[derive(Clone, Copy)]
 #[repr(C, align(64))]
 pub(super) struct TraversalRay {
     pub origin: [f32; 3],
-    /// The farthest that it still looks.
+    /// Largest `t` that is still searched.
     pub t_max: f32,
     reciprocal: [f32; 3],
     /// Signs of the direction: bit `i` of axis `i`.
     octant: u32,
-    /// The origin along the axes of the shear.
+    /// Origin along the axes of the shear.
     sheared: [f32; 3],
     /// [`Shear::axes`], a byte each.
     axes: u32,
     factors: [f32; 3],
-    /// Of the ray in its batch.
+    /// Index of the ray in its batch.
     pub index: u32,
 }
 
@@ -39,7 +39,7 @@ impl TraversalRay {
         index: u32::MAX,
     };
 
-    /// From a ray that is [`traceable`]; of others comes nothing useful. Without branches.
+    /// Prepares a [`traceable`] ray; the result for others is meaningless. Without branches.
     #[inline(always)]
     pub(super) fn new(ray: &Ray, index: u32) -> Self {
         let [x, y, z] = ray.direction;
@@ -92,8 +92,8 @@ fn unpack(axes: u32) -> [usize; 3] {
     [axes as usize & 3, (axes >> 8) as usize & 3, (axes >> 16) as usize & 3]
 }
 
-/// [`Shear::axes`], a byte each, by the signs of the direction (low three bits) and by which of its
-/// components are the larger ones: x of x and y, x of x and z, y of y and z.
+/// [`Shear::axes`], a byte each, by the signs of the direction (low three bits) and by three comparisons of
+/// its components: x > y, x > z, y > z in magnitude.
 static AXES: [u32; 64] = {
     let mut table = [0; 64];
     let mut i = 0;
@@ -111,7 +111,7 @@ static AXES: [u32; 64] = {
     table
 };
 
-/// Whether the ray can be traced at all: finite, and going somewhere. Without branches.
+/// True if the ray can be traced: finite, with a direction, and `t_max` not negative. Without branches.
 #[inline(always)]
 pub(super) fn traceable(ray: &Ray) -> bool {
     let magnitude = |x: f32| x.to_bits() & 0x7fff_ffff;

@@ -1,12 +1,13 @@
-//! One ray through the tree: nearest hit or any hit.
+//! Traversal of the BVH by one ray: nearest hit or any hit.
 //!
-//! Plainly: visit the boxes that the ray meets, near ones first, and skip those beyond the best hit so far.
-//! 1. Eight boxes are tested at once. Those that are met go on the stack without a branch, in an order that
-//!    the build has prepared for the octant of the direction: nearly that of distance, and not sorted.
+//! The ray visits the boxes that it meets, near ones first, and skips those beyond the best hit.
+//! 1. Eight boxes are tested at once. Those that the ray meets go on the stack without a branch, in an order
+//!    that the build has prepared for the octant of the direction. This is nearly the order of distance,
+//!    without sorting.
 //! 2. Up to eight triangles are tested at once.
-//! 3. A new best hit takes all that is farther off the stack.
-//! 4. Of hits at the same distance the lowest triangle index wins, and a box at exactly the best distance
-//!    is still entered: so the hit does not depend on the order of the walk.
+//! 3. A new best hit removes all farther boxes from the stack.
+//! 4. Among hits at equal distance the lowest triangle index wins, and a box at exactly the best distance is
+//!    still entered: the hit does not depend on the order of traversal.
 
 use super::Bvh;
 use super::layout::Child;
@@ -16,7 +17,7 @@ use crate::geometry::{Hit, Ray};
 use halflight_simd::kernels::boxes::ROBUST;
 use halflight_simd::{Simd, Stack};
 
-/// The whole way of one ray.
+/// Traces one ray.
 #[inline(always)]
 pub(super) fn trace<S: Simd, const ANY: bool>(simd: S, bvh: &Bvh, ray: &Ray) -> Hit {
     let mut best = Hit::NONE;
