@@ -1,5 +1,5 @@
-//! Guided photons: the lights that they come from where few lights shine on anything that the camera sees.
-//! Their light against that of the path tracer is a column of the table.
+//! Emission guiding of photons where few lights reach visible surfaces. The table compares the radiance of
+//! these scenes with path tracing.
 
 use crate::table::scenes::{rooms, rooms_with_balls};
 use halflight::render::{MapUse, Method, PhotonUse, RenderResult};
@@ -24,7 +24,8 @@ fn unseen_lights_emit_few_photons() {
         for method in METHODS {
             let found = render(&scene, method, 48, 8, |_| ());
             let MapUse { seen, by_power, .. } = all(&found);
-            // One lamp of so many, which gets three quarters and its part of the rest.
+            // Guiding gives the one visible lamp of `count` three quarters of the photons and its share of
+            // the rest.
             let (seen, by_power) = (seen.unwrap(), by_power.unwrap());
             assert!(by_power < 0.1 && seen > 6.0 * by_power, "{method:?}: {by_power} {seen}");
         }

@@ -1,5 +1,5 @@
-//! Irradiance caches in files: the same bits for the same view, fewer gatherings for another one, and a
-//! refusal where the scene or the settings are not those of the file.
+//! Irradiance caches in files: the same view has the same bits, another view gathers fewer records, and
+//! another scene or other settings are refused.
 
 use core::sync::atomic::AtomicBool;
 use glam::Vec3;
@@ -45,7 +45,7 @@ fn a_loaded_cache_gives_the_same_picture_and_gathers_nothing() {
     assert!(records > 100 && gathered >= records, "{records} {gathered}");
     let again = cache(&loaded);
     assert_eq!((again.loaded, again.gathered, again.records), (records, 0, records));
-    // Another seed looks at the same places, with other noise.
+    // Another seed uses the records of the file, with other noise of samples.
     let other = render(&buffers, Some(&file), None, |s| s.seed = 1).unwrap();
     assert!(cache(&other).gathered == 0 && other.image.pixels != loaded.image.pixels);
     std::fs::remove_file(file).unwrap();
@@ -63,7 +63,7 @@ fn another_view_uses_the_records_and_adds_to_them() {
     let helped = render(&buffers, Some(&first), Some(&second), |_| ()).unwrap();
     let (most, fewer) = (cache(&alone).gathered, cache(&helped).gathered);
     assert!(fewer > 0 && 3 * fewer < most, "{fewer} of {most}");
-    // Rays of a record are few here: a percent of noise for each cache.
+    // Records have few gather rays here: one percent of noise in each cache.
     for (a, b) in helped.image.mean().into_iter().zip(alone.image.mean()) {
         assert!((a / b - 1.0).abs() < 0.02, "{a} {b}");
     }

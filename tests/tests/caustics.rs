@@ -1,5 +1,5 @@
-//! Path tracing merged with photons of caustics: unbiased for all surfaces and lights, also beside records
-//! (`caustics_cached.rs`), within the memory that is given, and absent where there is no caustic.
+//! Path tracing with vertex merging of caustic photons: unbiased for all surfaces and lights, also beside
+//! records (`caustics_cached.rs`), within its memory, and off in scenes without caustics.
 
 use crate::table::scenes::everything_by_a_mirror;
 use glam::Vec3;
@@ -28,21 +28,21 @@ use std::time::Instant;
 /// Pixels across and down.
 const SIZE: u32 = 28;
 
-/// Blocks of so many pixels are judged together.
+/// Side in pixels of the blocks that are judged.
 const BLOCK: u32 = 7;
 
 /// Independent pictures of each kind.
 const SEEDS: u32 = 16;
 
 /// Normal quantile for one error in ten thousand over all blocks and channels of all scenes (Šidák; 51
-/// comparisons of 48 values), with Student's wider tails of 2 × 15 degrees of freedom.
+/// comparisons of 48 values), widened for Student's t with 2 × 15 degrees of freedom.
 const WIDEST: f64 = 6.8;
 
-/// Photons of a picture: tasks, the radius of discs in pixels, and whether they are those beside records of
-/// an irradiance cache. There, too, nothing is lost or counted twice where no record is.
+/// Photons of a picture: tasks, disc radius in pixels, and whether the photons are those used beside an
+/// irradiance cache. No light may be lost or counted twice by the latter, although this test has no records.
 type Shot = (usize, f32, bool);
 
-/// Blocks of pictures of `scene` by 16 samples, joined with photons if there are any.
+/// Sums of blocks of pictures of `scene` by 16 samples, merged with photons if `tasks` > 0.
 fn pictures(scene: &Scene, first: u32, (tasks, pixels, is_beside): Shot, max_depth: u32) -> Vec<Vec<f64>> {
     let level = Level::detect();
     let mut bvh_memory = TestArena::new(Bvh::footprint(scene.mesh.triangles.len()));
@@ -102,16 +102,16 @@ fn pictures(scene: &Scene, first: u32, (tasks, pixels, is_beside): Shot, max_dep
 fn assert_unbiased(name: &str, buffers: &SceneBuffers, max_depth: u32) {
     let scene = buffers.scene();
     let off = pictures(&scene, 0, (0, 0.3, false), max_depth);
-    // Photons against paths from a hundredth to a hundred and more.
+    // Photon densities from a hundredth of path densities to more than a hundred times as much.
     for (shot, first) in [((1, 0.15, false), 100), ((16, 0.3, false), 200), ((16, 0.3, true), 300)] {
         let joined = pictures(&scene, first, shot, max_depth);
         agree(&joined, &off, WIDEST).unwrap_or_else(|why| panic!("{name}, {shot:?}, {why}"));
     }
 }
 
-/// A room of mirrors with a floor, a lamp on it that faces up, and a plate below the ceiling, right over the
-/// eye: light goes from the floor by a mirror to the plate, where discs are small, and from there by another
-/// to the floor again.
+/// A room of mirrors with a floor, a lamp on it that faces up, and a plate below the ceiling right above the
+/// camera. A mirror throws light of the floor onto the plate, where discs are small, and a second mirror from
+/// there back to the floor.
 fn between_mirrors() -> SceneBuffers {
     let camera = Camera::look_at(Vec3::new(0.0, 2.7, 0.0), Vec3::new(0.1, 0.0, -0.1), Vec3::Z, 40.0);
     let mut buffers = SceneBuffers::new(camera);
@@ -146,7 +146,7 @@ fn merging_is_unbiased_for_caustics_of_glass() {
 
 #[test]
 fn merging_is_unbiased_on_varnish() {
-    // Its base is merged with photons, its coat is not: all that comes by both is found once.
+    // The base is merged with photons, the coat is not: light of both is counted once.
     assert_unbiased("varnish", &varnished(lamp_over_ball(glass(0.0), 2.0), 0.2), UNLIMITED);
     assert_unbiased("varnish, limited", &varnished(in_a_room(lamp_before(metal(0.0), 0.6)), 0.3), 4);
     let room = varnished(in_a_room(lamp_before(metal(0.0), 0.6)), 0.3);
@@ -161,7 +161,7 @@ fn merging_is_unbiased_for_light_that_a_caustic_sends_on() {
     assert_unbiased("glass in a room", &in_a_room(lamp_over_ball(glass(0.0), 1.0)), UNLIMITED);
 }
 
-/// The same room, seen from a hundredth before its right wall.
+/// The room seen from 0.01 in front of its right wall.
 fn along_a_wall(mut buffers: SceneBuffers) -> SceneBuffers {
     buffers.camera = Camera::look_at(Vec3::new(2.99, 1.5, 3.0), Vec3::new(1.5, 0.5, 0.0), Vec3::Y, 70.0);
     buffers
@@ -181,14 +181,14 @@ fn light_from_a_focus_has_no_fireflies() {
     let scene = buffers.scene();
     let picture = path(&scene, 16, |settings| settings.reuse = Some(false));
     assert!(has_photons(&picture));
-    // The wall behind the ball, above it.
+    // Pixels of the back wall above the ball.
     let mut lit: Vec<_> = picture.image.pixels.iter().take(8 * 40).map(|pixel| pixel[1]).collect();
     lit.sort_by(f32::total_cmp);
     let (middle, brightest) = (lit[lit.len() / 2], lit[lit.len() - 1]);
     assert!(brightest < 3.0 * middle, "{brightest} beside {middle}");
 }
 
-/// How far blocks of pictures with few photons scatter, over their means, at worst.
+/// Largest relative standard deviation of a block over pictures with few photons.
 fn scatter(buffers: &SceneBuffers) -> f64 {
     let pictures = pictures(&buffers.scene(), 0, (4, 0.5, false), UNLIMITED);
     let of_block = |i: usize| {
@@ -202,11 +202,11 @@ fn scatter(buffers: &SceneBuffers) -> f64 {
 #[test]
 fn merging_makes_no_fireflies_close_to_the_camera() {
     let all = scatter(&along_a_wall(in_a_room(lamp_over_ball(glass(0.0), 0.1))));
-    // With discs as small as that wall is near: 0.20.
+    // 0.20 with disc radii in proportion to the distance of that wall.
     assert!(all < 0.1, "{all}");
 }
 
-/// Before the wall at the back.
+/// Adds a mirror in front of the back wall.
 fn hang_a_mirror(room: &mut SceneBuffers) {
     let reflectance = Rgb::splat(0.9).into();
     let mirror = room.material(Material { surface: Surface::Mirror { reflectance }, ..Material::GREY });
@@ -218,10 +218,10 @@ fn hang_a_mirror(room: &mut SceneBuffers) {
 fn merging_makes_no_fireflies_in_a_mirror() {
     let mut buffers = in_a_room(lamp_over_ball(glass(0.0), 0.1));
     hang_a_mirror(&mut buffers);
-    // It shows the wall right behind the camera, between lamp and ball.
+    // The mirror shows the wall right behind the camera, between lamp and ball.
     buffers.camera = Camera::look_at(Vec3::new(0.0, 2.0, 4.4), Vec3::new(0.0, 2.0, 0.0), Vec3::Y, 8.0);
     let all = scatter(&buffers);
-    // With discs as small as that wall is near: 0.46.
+    // 0.46 with disc radii in proportion to the distance of that wall.
     assert!(all < 0.28, "{all}");
 }
 
@@ -229,7 +229,7 @@ fn merging_makes_no_fireflies_in_a_mirror() {
 fn merging_is_unbiased_for_each_kind_of_surface_and_light() {
     let mut buffers = everything();
     assert_unbiased("everything", &buffers, UNLIMITED);
-    // Lights that rough metal and frosted glass alone can throw without photons.
+    // Lights whose caustics path tracing finds by rough metal and frosted glass alone.
     buffers = lamp_before(metal(0.5), 0.3);
     buffers.environment = constant_environment(0.3);
     let at = Vec3::new(0.0, 1.5, 0.5);
@@ -267,7 +267,7 @@ fn photons_fit_the_memory_and_their_lack_is_reported() {
     let bytes = |result: &RenderResult| {
         result.memory.iter().find(|one| one.structure == "photons").map_or(0, |one| one.bytes)
     };
-    // Windows are left out before photons are.
+    // Environment visibility tables give up their memory before photons do.
     let limited = |bytes| path(&scene, 16, |s| (s.windows, s.memory) = (Some(false), bytes));
     let whole = limited(None);
     assert_eq!(map(&whole).given, map(&whole).wanted);
@@ -288,7 +288,7 @@ fn photons_fit_the_memory_and_their_lack_is_reported() {
 #[test]
 fn without_caustics_photons_leave_the_bits_alone() {
     let boxed = cornell_box();
-    // A mirror that no light reaches: it stands behind the wall.
+    // A mirror behind the wall, which no light reaches.
     let mut hidden = cornell_box();
     let mirror = hidden.material(Material { surface: metal(0.0), ..Material::GREY });
     hidden.square(Vec3::new(0.5, 0.5, 3.0), Vec3::Z, 0.5, mirror);
@@ -337,7 +337,7 @@ fn sppm_is_chosen_where_all_light_is_caustics() {
         assert!((a / b - 1.0).abs() < 0.02, "{a} {b}");
     }
 
-    // A film that it was chosen for goes on with it.
+    // A resumed film keeps the method that was chosen for it.
     let file = std::env::temp_dir().join(format!("caustics-{}.film", std::process::id()));
     let keep = Some(Checkpoint { path: file.clone(), every: f64::INFINITY });
     let resumed = |resume, spp| {
@@ -374,7 +374,7 @@ fn path_tracing_is_chosen_where_few_photons_reach_the_picture() {
     assert!(picture.method == Method::Path && picture.caustics.used);
 }
 
-/// A hall with fifty lamps, of which a wall hides all but one from a mirror of such a side on the floor.
+/// A hall with fifty lamps. A wall hides all but one of them from a mirror of side `side` on the floor.
 fn stadium(side: f32) -> SceneBuffers {
     let camera = Camera::look_at(Vec3::new(47.5, 1.0, 20.0), Vec3::new(47.5, 10.0, 25.0), Vec3::Y, 60.0);
     let mut buffers = SceneBuffers::new(camera);
@@ -393,7 +393,7 @@ fn stadium(side: f32) -> SceneBuffers {
     buffers
 }
 
-/// What the mirror in the stadium reflects.
+/// Reflectance of the mirror in the stadium.
 const MIRRORED: f32 = 0.9;
 
 #[test]
@@ -422,7 +422,7 @@ fn guided_photons_reach_a_small_mirror_with_the_right_power() {
     let mut scratch = scratch_memory.arena();
     const TASKS: usize = 64;
     const MAPS: u32 = 16;
-    // No further than to the caustic: what that lights is not of its power.
+    // Paths end at the caustic: light that it scatters on is not part of its power.
     let shot = PhotonTracerSettings {
         keep: PhotonFilter::Caustic,
         seed: 3,
@@ -449,7 +449,7 @@ fn guided_photons_reach_a_small_mirror_with_the_right_power() {
     assert_eq!(memory.available(), 0, "footprints are exact");
     assert!(GuideStats::aimed(&scene, &lights, &plain, &mut memory).is_err());
 
-    // Photons that were left, their power, the rays and the seconds that it took.
+    // Caustic photons, their power, rays traced and seconds.
     let mut shoot = |emission| {
         let (mut rays, mut useful, mut power) = (0, 0, 0.0);
         let start = Instant::now();
@@ -465,13 +465,13 @@ fn guided_photons_reach_a_small_mirror_with_the_right_power() {
     let (useful, power, rays, seconds) = shoot(&learned);
     let (by_chance, _, unguided_rays, unguided_seconds) = shoot(&plain);
     let power = power / f64::from(MAPS);
-    // The solid angle of a square over its middle.
+    // Solid angle of a square seen from above its centre.
     let (half, height) = (f64::from(side) / 2.0, 8.99f64);
     let angle = 4.0 * (half * half / (height * (height * height + 2.0 * half * half).sqrt())).atan();
     let expected = f64::from(MIRRORED) * angle;
-    // More than three standard deviations of the number of photons; those of one cell have the same power.
+    // More than three standard deviations of the number of photons. Photons of one cell have equal power.
     assert!((power / expected - 1.0).abs() < 0.01, "{power} W, not {expected}");
-    // Of a millionth of all directions nothing is found by chance.
+    // Unguided photons hit a millionth of all directions too rarely.
     let gain = useful / rays / (by_chance.max(1.0) / unguided_rays);
     assert!(gain > 10.0, "useful photons per ray are {gain} times as many, {useful} and {by_chance}");
     println!(

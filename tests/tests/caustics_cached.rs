@@ -1,5 +1,5 @@
-//! An irradiance cache beside photons of caustics: no light is counted twice, records come first where memory
-//! is short, and the audit merges the same photons.
+//! An irradiance cache beside caustic photons: no light is counted twice, records come first if memory is
+//! short, and the audit merges the same photons.
 
 use halflight::render::{Method, RenderResult, Settings};
 use halflight_core::cache::irradiance::Metric;
@@ -11,7 +11,7 @@ fn path(scene: &Scene, spp: u32, change: impl FnOnce(&mut Settings)) -> RenderRe
     render(scene, Method::Path, 40, spp, change)
 }
 
-/// The same with an irradiance cache.
+/// A picture of `scene` with an irradiance cache.
 fn cached(scene: &Scene, spp: u32, change: impl FnOnce(&mut Settings)) -> RenderResult {
     render(scene, Method::IrradianceCache, 40, spp, |settings| {
         settings.cache.strata = Some(16);
@@ -19,8 +19,8 @@ fn cached(scene: &Scene, spp: u32, change: impl FnOnce(&mut Settings)) -> Render
     })
 }
 
-/// Whether a picture of `spp` samples with records and photons is that of paths, with the same `change` of
-/// settings.
+/// Asserts that a picture of `spp` samples with records and photons agrees with path tracing; `change`
+/// applies to both.
 fn have_no_light_in_common(name: &str, buffers: &SceneBuffers, spp: u32, change: fn(&mut Settings)) {
     let scene = buffers.scene();
     let truth = path(&scene, 256, change);
@@ -104,8 +104,8 @@ fn photons_leave_enough_memory_for_records() {
     }
 }
 
-/// Rays of the audit in a room that is lit by a caustic hardly ever meet it by chance; joined with photons
-/// they do not have to.
+/// Audit paths hardly ever hit by chance the caustic that lights this room. Merged with photons they need
+/// not.
 #[test]
 fn the_audit_merges_the_same_photons() {
     let buffers = in_a_room(lamp_over_ball(glass(0.0), 0.3));
@@ -115,7 +115,7 @@ fn the_audit_merges_the_same_photons() {
     println!("{:?} {:?} {:?}", fine.error, audit.bias, audit.whole);
     assert!(audit.has_photons && !audit.is_biased() && audit.bias.detectable < 0.02);
 
-    // Records ten times too wide, by a metric that lets them be: the audit sees their bias.
+    // Records ten times too wide, by a metric that allows it: the audit detects their bias.
     for seed in 0..4 {
         let coarse = cached(&scene, 128, |s| {
             (s.seed, s.audit) = (seed, Some(0.5));

@@ -1,5 +1,5 @@
-//! Far away and large: grounds, suns and planets of 1e7 beside a cube of side 2, and cameras a million sizes
-//! away, show what smaller and nearer ones do.
+//! Large and distant geometry: grounds, suns and planets of 1e7 beside a cube of side 2, and cameras a
+//! million sizes away, give the pictures of smaller and nearer scenes.
 
 use crate::load_support::Files;
 use core::fmt::Write;
@@ -14,7 +14,7 @@ const SKY: &str = "[environment]\nradiance = 0.2\n[[light]]\nkind = \"directiona
 
 const CAMERA: &str = "eye = [3, 2, 4]\nlook_at = [0, 0, 0]\nfov = 30\n";
 
-/// Faces of four corners, each with its material.
+/// Quadrilaterals with the names of their materials.
 #[derive(Clone)]
 struct Faces(Vec<([[f64; 3]; 4], &'static str)>);
 
@@ -31,13 +31,13 @@ impl Faces {
         self
     }
 
-    /// With a ground from `low` to `high` in x and z, `height` above the point.
+    /// Adds a ground from `low` to `high` in x and z, at `height(x, z)`.
     fn ground(self, [x, z]: [[f64; 2]; 2], height: impl Fn(f64, f64) -> f64) -> Self {
         let corner = |x, z| [x, height(x, z), z];
         self.with([corner(x[0], z[0]), corner(x[0], z[1]), corner(x[1], z[1]), corner(x[1], z[0])], "a")
     }
 
-    /// Moved by so much.
+    /// Moves all corners by a vector.
     fn moved(mut self, by: [f64; 3]) -> Self {
         for corner in self.0.iter_mut().flat_map(|(corners, _)| corners) {
             *corner = [0, 1, 2].map(|i| corner[i] + by[i]);
@@ -79,8 +79,8 @@ fn picture(faces: &Faces, placed: &str, camera: &str, light: &str) -> Vec<f64> {
     result.image.pixels.iter().map(|pixel| f64::from(pixel[0])).collect()
 }
 
-/// The relative root of the mean square of their differences is small: noise of the same seed is mostly the
-/// same.
+/// Asserts a small relative root mean squared difference. Pictures of the same seed share most of their
+/// noise.
 fn alike(name: &str, a: &[f64], b: &[f64]) {
     let mean = b.iter().sum::<f64>() / b.len() as f64;
     let square = a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum::<f64>() / b.len() as f64;
@@ -131,7 +131,7 @@ fn far_from_the_origin_and_back_again_all_is_the_same() {
     let camera = "eye = [1000003, -2999998, 2000004]\nlook_at = [1e6, -3e6, 2e6]\nfov = 30\n";
     alike("far", &picture(&far, "", camera, SKY), &here);
     alike("back", &picture(&far, "translate = [-1e6, 3e6, -2e6]", CAMERA, SKY), &here);
-    // Along the same line, to a point as near as f64 has it.
+    // The same view direction, with the target as close to the eye as f64 resolves.
     let near = "eye = [1000003, -2999998, 2000004]\n\
                 look_at = [1000002.99999976, -2999998.00000016, 2000003.99999968]\nfov = 30\n";
     alike("look near", &picture(&far, "", near, SKY), &here);
@@ -161,7 +161,7 @@ fn a_detail_too_small_for_its_distance_is_noted() {
         load(&faces, "", CAMERA, SKY).repairs
     };
     assert_eq!(pair(1e4), [""; 0]);
-    // Neither of two cubes is the detail: the middle between them is as far from both.
+    // No cube is the detail: the middle between the two is equally far from both.
     for distance in [1e8, 1e10] {
         let notes = pair(distance);
         assert!(notes.iter().any(|note| note.contains("rounding deforms")), "{distance}: {notes:?}");

@@ -1,4 +1,4 @@
-//! Furnaces: places where light is the same everywhere, so that every error of a factor shows.
+//! Furnaces: scenes of constant radiance, in which every wrong factor shows.
 
 use crate::picture::{self, assert_picture};
 use glam::Vec3;

@@ -1,11 +1,11 @@
-//! Golden table: pictures of every method, scene, seed and instruction set, to the bit.
+//! Golden table: hashes of pictures of every method, scene, seed and instruction set.
 //!
-//! The renderer is deterministic, so that a change of structure leaves each row as it is. Rows change in
-//! commits that mend a fault or delete a mechanism, and those say so:
+//! The renderer is deterministic, so a change of structure keeps every row. Rows change in commits that fix
+//! an error or delete a mechanism, and these commits say so:
 //!
 //!     GOLDEN=write cargo test --profile quick -p halflight-tests --test main golden::
 //!
-//! rewrites `golden.txt`, for the instruction sets of this machine; the others keep their rows.
+//! rewrites `golden.txt` for the instruction sets of this machine; the rows of others stay.
 
 use glam::Vec3;
 use halflight::load::{self, LoadOptions};
@@ -23,12 +23,12 @@ use std::path::{Path, PathBuf};
 /// Pixels across and down: tiles of 16 pixels are cut at the border.
 const SIZE: u32 = 20;
 
-/// Samples of a pixel: an estimate of the error, and more than one set of photon maps.
+/// Samples per pixel: enough for an error estimate and for more than one set of photon maps.
 const SPP: u32 = 9;
 
 const SEEDS: [u32; 2] = [0, 77];
 
-/// The scenes: those of the repository as they are loaded, and others made by hand.
+/// Calls `each` with the scenes of the repository as loaded, and with scenes made by hand.
 fn for_each_scene(mut each: impl FnMut(&str, &Scene)) {
     for file in
         ["cornell/cornell.obj", "caustic/caustic.toml", "glossy/glossy.toml", "two-rooms/two-rooms.toml"]
@@ -66,7 +66,7 @@ fn hash(result: &RenderResult) -> u64 {
     bytes.fold(0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x100_0000_01b3))
 }
 
-/// A row: what was rendered, and the picture that came, with the error that was estimated.
+/// A row: the render's name, the hash of its picture, and its estimated error.
 fn row(scene: &Scene, method: Method, seed: u32, level: Level) -> String {
     let result = render(scene, method, SIZE, SPP, |settings: &mut Settings| {
         settings.seed = seed;
@@ -83,7 +83,7 @@ fn table() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/golden.txt")
 }
 
-/// Rows of the file by what was rendered.
+/// Rows of the file by name of the render.
 fn read_rows() -> BTreeMap<String, String> {
     let text = fs::read_to_string(table()).unwrap_or_default();
     let lines = text.lines().filter(|line| !line.starts_with('#'));

@@ -1,4 +1,4 @@
-//! A hall of many lamps: what one bright lamp and a glass ball on a table add to the work of a picture.
+//! A hall of n² lamps: extra rays for one bright lamp and a glass ball on a table.
 
 use glam::Vec3;
 use halflight::render::Method;
@@ -10,10 +10,11 @@ use halflight_tests::scenes::{SceneBuffers, emitter, glass};
 const SIDE: f32 = 40.0;
 const HEIGHT: f32 = 8.0;
 
-/// Rays with photons of caustics over those without: emission guides and photon maps of the first samples.
+/// Largest ratio of rays with caustic photons to rays without: emission guides and photon maps of the first
+/// samples.
 const MOST: f64 = 1.25;
 
-/// `count` x `count` lamps under the ceiling, of 2.1 / `count` to each side.
+/// `count` x `count` lamps under the ceiling, each of side 2.1 / `count`.
 fn hall(count: u32) -> SceneBuffers {
     let camera = Camera::look_at(Vec3::new(20.0, 2.5, 27.0), Vec3::new(20.0, 1.2, 19.0), Vec3::Y, 50.0);
     let mut buffers = SceneBuffers::new(camera);

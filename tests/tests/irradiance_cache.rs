@@ -1,5 +1,5 @@
-//! The irradiance cache as a method of the renderer: its records against the unit of the scene, and pictures
-//! without time or memory for them.
+//! Irradiance caching as a method: records do not depend on the scene's unit of length, and pictures need
+//! neither time nor memory for records.
 
 use core::sync::atomic::AtomicBool;
 use glam::Vec3;
@@ -10,7 +10,7 @@ use halflight_tests::render::{blocks, difference, render};
 use halflight_tests::scenes::{SceneBuffers, cornell_box, emitter};
 use std::path::Path;
 
-/// Rays of a record are 16² in these tests: one percent of noise in each record, at worst.
+/// Gather rays are 16² per record in these tests: at worst one percent of noise in each record.
 const STRATA: u32 = 16;
 
 fn cached(scene: &Scene, size: u32, spp: u32, change: impl FnOnce(&mut Settings)) -> RenderResult {
@@ -37,12 +37,12 @@ fn filling_a_cache_ends_at_the_deadline() {
     let buffers = cornell_box();
     let scene = buffers.scene();
     let path = render(&scene, Method::Path, 64, 64, |_| ());
-    // No time at all: the one sample that every picture has is path traced.
+    // Without time, the one sample that every picture has is path traced.
     let timed = |seconds: f64| cached(&scene, 64, 64, |s| s.stop.seconds = Some(seconds));
     let none = timed(0.0);
     assert_eq!((none.spp, cache(&none)), (1, CacheUse { records: 0, is_cut: true, ..cache(&none) }));
     assert!(difference(&none.image, &path.image) < 0.4);
-    // With time enough they are as without a limit.
+    // A generous time limit gives the bits of a render without limit.
     let (long, unlimited) = (timed(1e6), cached(&scene, 64, 64, |_| ()));
     assert!(long.image == unlimited.image && cache(&long) == cache(&unlimited));
     assert!(!cache(&long).is_cut);
@@ -87,7 +87,7 @@ fn radiance_in_a_furnace_is_constant() {
     buffers.cuboid(Vec3::ZERO, Vec3::ONE, true, wall);
     let image = cached(&buffers.scene(), 32, 64, |_| ()).image;
     assert!(image.mean().into_iter().all(|mean| (mean / 2.0 - 1.0).abs() < 0.005), "{:?}", image.mean());
-    // Errors of a record are shared by many pixels: 16² rays whose last bounces come and go.
+    // Many pixels share the error of a record of 16² rays with Russian roulette.
     assert!(blocks(&image).into_iter().all(|block| (block / 2.0 - 1.0).abs() < 0.05));
 }
 
@@ -153,14 +153,14 @@ fn a_survey_reports_places_and_errors_of_records() {
     assert!(survey.points >= 40 && survey.checks.len() as u64 <= survey.points);
     let served = survey.looks.iter().filter(|look| look.radius > 0.0).count();
     assert!(served > 3000 && survey.looks.iter().filter(|look| look.mark == Mark::Record).count() > 50);
-    // 256 rays a record: a few percent of noise, of which half is left where records overlap.
+    // 256 gather rays: a few percent of noise per record. Overlapping records halve it.
     assert!(survey.achieved > 1e-4 && survey.achieved < 0.1, "{}", survey.achieved);
     assert!(survey.predicted > 1e-4 && survey.predicted < 1.0, "{}", survey.predicted);
     assert!(cached(&scene, 64, 2, |s| s.max_depth = Some(2)).survey.is_none());
 }
 
-/// Sixteen rays a record: noise that no number of samples takes away ends the render, and so it does in a
-/// film that goes on.
+/// With sixteen gather rays per record, noise that no number of samples removes ends the render, also in a
+/// resumed film.
 #[test]
 fn noise_of_records_ends_the_render_with_the_same_bits_after_a_resumption() {
     let buffers = cornell_box();

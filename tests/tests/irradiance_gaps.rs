@@ -1,5 +1,5 @@
-//! Records of the irradiance cache do not leak into gaps: behind a picture, beneath a bench, over a board
-//! under the ceiling there is the light that paths find, however narrow the gap is beside the room.
+//! Records do not leak into gaps: behind a picture, beneath a bench and above a board under the ceiling the
+//! cache agrees with path tracing, however narrow the gap is relative to the room.
 
 use glam::Vec3;
 use halflight::render::{Method, RenderResult};
@@ -11,14 +11,14 @@ use halflight_tests::scenes::{SceneBuffers, emitter};
 
 const SIZE: u32 = 48;
 
-/// A room of 4 x 3 x 4 with a lamp, and a board that lies a gap away from one of its walls.
+/// A room of 4 x 3 x 4 with a lamp, and a board at distance `gap` from one wall.
 struct Slot {
-    /// Of the wall: its axis, where it is along that, and which way is inside.
+    /// Axis of the wall's normal; then its coordinate on that axis, and the sign of the inward direction.
     axis: usize,
     wall: f32,
     inside: f32,
     gap: f32,
-    /// The board, along the other two axes.
+    /// Corners of the board along the other two axes.
     low: Vec3,
     high: Vec3,
     eye: Vec3,
@@ -33,7 +33,7 @@ impl Slot {
         let board = buffers.material(Material::diffuse(Rgb::new(0.5, 0.3, 0.2)));
         let lamp = buffers.material(emitter(0.0, 10.0));
         buffers.cuboid(Vec3::new(-2.0, 0.0, -2.0), Vec3::new(2.0, 3.0, 2.0), true, white);
-        // In the middle, away from all walls.
+        // The lamp hangs in the middle, away from all walls.
         buffers.square(Vec3::new(0.0, 1.7, 0.8), Vec3::NEG_Y, 0.6, lamp);
         buffers.square(Vec3::new(0.0, 1.701, 0.8), Vec3::Y, 0.6, lamp);
         let (mut low, mut high) = (self.low, self.high);
@@ -43,7 +43,7 @@ impl Slot {
         buffers
     }
 
-    /// Whether the middle of a pixel shows the wall behind the board.
+    /// Whether the centre of a pixel shows the wall behind the board.
     fn is_behind(&self, scene: &Scene, [x, y]: [u32; 2]) -> bool {
         let camera = &scene.camera;
         let at = |i: u32| (2.0 * (i as f32 + 0.5) / SIZE as f32 - 1.0) * camera.tan_half_fov;
@@ -57,7 +57,7 @@ impl Slot {
         covers(0.0) && !covers(self.gap) && !covers(self.gap + 0.02)
     }
 
-    /// How much too bright the gap is in the mean of its pixels, relative to them.
+    /// Relative excess of the cache over path tracing, averaged over the pixels of the gap.
     fn leak(&self, scene: &Scene, path: &RenderResult, cached: &RenderResult) -> f64 {
         let (mut sums, mut count) = ([0.0; 2], 0);
         for (i, (a, b)) in path.image.pixels.iter().zip(&cached.image.pixels).enumerate() {
@@ -72,7 +72,7 @@ impl Slot {
     }
 }
 
-/// A picture on the wall, from the side; a bench on the floor; a board under the ceiling.
+/// A picture on the wall seen from the side, a bench on the floor, a board under the ceiling.
 fn slots(gap: f32) -> [Slot; 3] {
     let picture = Slot {
         axis: 2,
@@ -107,7 +107,7 @@ fn slots(gap: f32) -> [Slot; 3] {
     [picture, bench, board]
 }
 
-/// The same, and a wardrobe beside a wall, from as near as the gap is wide.
+/// Slots as in [`slots`] and a wardrobe beside a wall, seen from about one gap's width.
 fn slots_from_near(gap: f32) -> [Slot; 4] {
     let away = 0.05 + 4.0 * gap;
     let above = |share: f32| 0.5 * gap + share * away;

@@ -1,6 +1,5 @@
-//! Rooms that are hard for an irradiance cache: its pictures against those of the path tracer where a wall is
-//! thin, where nothing reflects, where all light comes from one small place, and where a needle stands in the
-//! way.
+//! Rooms that are hard for an irradiance cache, against path tracing: a thin wall, black surfaces, one small
+//! bright source, and a needle in front of the surface.
 
 use glam::Vec3;
 use halflight::render::Method;
@@ -19,21 +18,21 @@ fn picture(scene: &Scene, method: Method, spp: u32) -> Image {
     result.image
 }
 
-/// Independent pictures that are judged together.
+/// Independent pictures of each method.
 const REPLICAS: u32 = 8;
 
-/// Comparisons of this kind in this file.
+/// Number of comparisons in this file, which share the significance level.
 const COMPARISONS: usize = 5;
 
-/// Largest bias of a block of 6 × 6 pixels: a share of its light and of a tenth of the mean. Interpolated
-/// light is wrong close to small things.
+/// Largest bias of a block of 6 × 6 pixels, as a share of its light plus a tenth of the mean. Interpolation
+/// errs near small objects.
 const BIAS: f64 = 0.08;
 
-/// The same of the picture.
+/// Largest relative bias of the picture's mean.
 const BIAS_OF_MEAN: f64 = 0.01;
 
-/// Means of blocks by the cache are those of path tracing, within the noise of both and a bias of `bias` for
-/// blocks and `bias_of_mean` for the picture.
+/// Asserts that block means of the cache agree with path tracing within the noise of both, a bias of `bias`
+/// per block and of `bias_of_mean` for the picture.
 #[track_caller]
 fn agrees(scene: &Scene, bias: f64, bias_of_mean: f64) {
     let values = |method, spp| -> Vec<Vec<f64>> {
@@ -61,7 +60,7 @@ fn diffuse(reflectance: f32) -> Material {
     Material::diffuse(Rgb::splat(reflectance))
 }
 
-/// A closed room from 0 to 1, seen from a corner.
+/// A closed unit room seen from a corner.
 fn room(reflectance: f32) -> SceneBuffers {
     let camera = Camera::look_at(Vec3::new(0.9, 0.8, 0.95), Vec3::new(0.3, 0.25, 0.0), Vec3::Y, 70.0);
     let mut buffers = SceneBuffers::new(camera);
@@ -75,7 +74,7 @@ fn lamp(buffers: &mut SceneBuffers, center: Vec3, normal: Vec3, size: f32, radia
     buffers.square(center, normal, size, lamp);
 }
 
-/// Light goes over a wall that is one sheet: records of both sides lie in the same place.
+/// Light passes over a wall that is one sheet: records of both sides lie in the same place.
 #[test]
 fn a_sheet_between_light_and_dark_has_two_sides() {
     let mut buffers = room(0.5);
@@ -92,14 +91,14 @@ fn a_black_room_has_no_indirect_light_except_on_white_boxes() {
     lamp(&mut buffers, Vec3::new(0.5, 0.99, 0.5), Vec3::NEG_Y, 0.2, 10.0);
     let image = picture(&buffers.scene(), Method::IrradianceCache, 16);
     assert!(image.pixels.iter().flatten().all(|&light| light == 0.0));
-    // One box that reflects, between black walls.
+    // A reflecting box between black walls.
     let white = buffers.material(diffuse(0.8));
     buffers.cuboid(Vec3::new(0.2, 0.0, 0.2), Vec3::new(0.5, 0.3, 0.5), false, white);
     buffers.cuboid(Vec3::new(0.6, 0.0, 0.1), Vec3::new(0.8, 0.5, 0.3), false, white);
     agrees(&buffers.scene(), BIAS, BIAS_OF_MEAN);
 }
 
-/// It fills a hundredth of a hemisphere, so few of the 256 rays of a record.
+/// The spot fills a hundredth of the hemisphere: few of a record's 256 gather rays hit it.
 #[test]
 fn a_small_bright_spot_lights_a_room() {
     let mut buffers = room(0.5);
@@ -107,8 +106,8 @@ fn a_small_bright_spot_lights_a_room() {
     agrees(&buffers.scene(), BIAS, BIAS_OF_MEAN);
 }
 
-/// The first records have nothing but paths, whose light is luck where it comes by many bounces: they are
-/// gathered again when there are others.
+/// Gather rays of the first records continue as paths, whose light of many bounces is noisy. Such records are
+/// gathered again as soon as others exist.
 #[test]
 fn the_first_records_are_gathered_again() {
     let result = render(&cornell_box().scene(), Method::IrradianceCache, SIZE, 1, |settings| {
@@ -119,8 +118,7 @@ fn the_first_records_are_gathered_again() {
     assert!((0.05..0.5).contains(&again), "{again} of them");
 }
 
-/// Several points of lights are asked beside the ray that may meet the sky or the lamp: each kind by its
-/// weight.
+/// Several light samples per vertex beside a ray that may hit sky or lamp: MIS weights each technique.
 #[test]
 fn a_court_under_a_sky_has_its_light_once() {
     let camera = Camera::look_at(Vec3::new(0.8, 1.2, 2.2), Vec3::new(0.0, 0.3, 0.0), Vec3::Y, 50.0);
@@ -140,7 +138,7 @@ fn a_court_under_a_sky_has_its_light_once() {
     agrees(&scene, 0.03, 0.003);
 }
 
-/// A wall of brushed metal is all that is seen: its light comes from where no pixel looks.
+/// Only a wall of brushed metal is visible: its light comes from surfaces that no pixel sees.
 #[test]
 fn a_room_is_seen_in_brushed_metal() {
     let camera = Camera::look_at(Vec3::new(0.5, 0.5, 0.5), Vec3::new(0.5, 0.5, 0.0), Vec3::Y, 60.0);
@@ -172,7 +170,7 @@ fn thin_bars_cast_their_shadows() {
     agrees(&buffers.scene(), BIAS, BIAS_OF_MEAN);
 }
 
-/// Rays along the wall pass under the board; what hangs over the wall is met by the strata.
+/// Gather rays along the wall pass below the board; strata detect geometry that overhangs the wall.
 #[test]
 fn a_slot_behind_a_board_is_dark_to_the_last_pixel() {
     let mut buffers = room(0.73);
@@ -185,6 +183,6 @@ fn a_slot_behind_a_board_is_dark_to_the_last_pixel() {
     let mean = path.mean()[1];
     let pairs = blocks_of(&cache, 1).into_iter().zip(blocks_of(&path, 1));
     let worst = pairs.map(|(a, b)| (a - b).abs() / (b + 0.1 * mean)).fold(0.0, f64::max);
-    // 0.19 to 0.27 with walls alone, 0.09 to 0.10 by what hangs.
+    // Measured: 0.19 to 0.27 with walls alone, 0.09 to 0.10 with overhangs as well.
     assert!(worst < 0.14, "worst pixel {worst}");
 }

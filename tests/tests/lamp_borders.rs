@@ -1,4 +1,4 @@
-//! Pixels at the border of a lamp show as much of it as they see, however little that is.
+//! Pixels at the border of a lamp show the part of it that they cover, however small.
 
 use glam::{Vec2, Vec3};
 use halflight::render::Method;
@@ -9,15 +9,15 @@ use halflight_tests::scenes::{SceneBuffers, emitter};
 const SIZE: u32 = 32;
 const RADIANCE: f32 = 20.0;
 
-/// What a pixel sees of a strip is known to less than a fourteenth: of 2048 points, in two nets of 1024, at
-/// least 13 of each lie in a strip of a hundredth of the pixel and less than 16.
+/// Relative error of a pixel's part of the lamp is below a fourteenth: 2048 samples form two nets of 1024,
+/// and between 13 and 16 points of each lie in a strip of a hundredth of the pixel.
 const TOLERANCE: f32 = 0.2;
 
 fn camera() -> Camera {
     Camera::look_at(Vec3::new(0.3, 0.2, 0.5), Vec3::new(0.1, -0.4, -3.0), Vec3::Y, 50.0)
 }
 
-/// Where a point of the raster lies on the plane before the camera at distance 1.
+/// Point of the raster on the plane at distance 1 in front of the camera.
 fn through(camera: &Camera, raster: Vec2) -> Vec3 {
     let direction = Vec3::from(camera.ray(SIZE, SIZE, raster.x, raster.y, [0.5; 2]).direction);
     camera.eye + direction / direction.dot(camera.forward)
@@ -29,8 +29,8 @@ fn seen(scene: &SceneBuffers) -> Vec<f32> {
     picture.image.pixels.iter().map(|pixel| pixel[1] / RADIANCE).collect()
 }
 
-/// A lamp from a hundredth of a pixel before whole pixels to a hundredth behind them, of `pieces` by `pieces`
-/// squares.
+/// A lamp of `pieces` by `pieces` squares that extends a hundredth of a pixel beyond whole pixels on each
+/// side.
 fn lamp(camera: Camera, pieces: u32) -> (SceneBuffers, [Vec2; 2]) {
     let mut scene = SceneBuffers::new(camera);
     let lamp = scene.material(emitter(0.0, RADIANCE));
@@ -48,27 +48,27 @@ fn lamp(camera: Camera, pieces: u32) -> (SceneBuffers, [Vec2; 2]) {
 #[test]
 fn an_audit_sees_borders_as_the_picture_does() {
     let (scene, _) = lamp(camera(), 1);
-    // With an error to reach, the work of an audit is counted in rays: the same each time.
+    // With an error target the work of the audit is counted in rays, so it is the same in each run.
     let picture = render(&scene.scene(), Method::Path, SIZE, 256, |settings| {
         settings.stop.error = Some(1e-9);
         settings.audit = Some(0.5);
     });
     let bias = picture.audit.expect("an audit").bias;
-    // 0.3 by the paths of the samples alone, which meet the border once in seventy times.
+    // 0.3 with paths of the samples alone, which hit the border once in seventy times.
     assert!(bias.detectable < 0.01, "{bias:?}");
 }
 
 #[test]
 fn a_hundredth_of_a_pixel_is_seen_by_every_pixel() {
     let camera = camera();
-    // Of 1250 triangles as of two.
+    // Lamps of 2 and of 1250 triangles.
     for pieces in [1, 25] {
         let (scene, [low, high]) = lamp(camera, pieces);
         for (i, seen) in seen(&scene).into_iter().enumerate() {
             let pixel = Vec2::new((i as u32 % SIZE) as f32, (i as u32 / SIZE) as f32);
             let inside = (high.min(pixel + 1.0) - low.max(pixel)).max(Vec2::ZERO);
             let share = inside.x * inside.y;
-            // In the corners a ten-thousandth.
+            // Corner pixels show a ten-thousandth.
             if share < 0.001 {
                 assert!(seen < 0.003, "{pixel}: {seen} of {share}");
             } else {

@@ -1,5 +1,5 @@
-//! Lamps with holes: emission is there where the surface is, in every method. Their opacity is a probability,
-//! and so what is seen of them and what they send are in proportion to it.
+//! Emitters with cut-outs: only the opaque part emits, in every method. Opacity is a probability: visible and
+//! emitted light are proportional to it.
 
 use glam::Vec3;
 use halflight::render::{Method, Settings};
@@ -10,7 +10,8 @@ use halflight_tests::scenes::{
     SceneBuffers, constant_environment, emitter, glass, lamp_over_ball, room_with_lamp,
 };
 
-/// Means of pictures of 24 x 24 pixels and 64 samples: their standard errors are below a quarter of this.
+/// Relative tolerance of means of 24 x 24 pixels and 64 samples; their standard errors are below a quarter of
+/// it.
 const TOLERANCE: f64 = 0.02;
 
 fn mean(scene: &Scene, method: Method, change: impl FnOnce(&mut Settings)) -> f64 {
@@ -74,7 +75,7 @@ fn a_lamp_lights_as_much_as_is_there_of_it() {
         };
         let (all, none) = (render(1.0), render(0.0));
         assert!(all.mean()[1] > 0.02 && none.mean() == [0.0; 3], "{}", method.name());
-        // The holes let light pass that is reflected upwards, too: one part in a hundred.
+        // The holes also transmit light that is reflected upwards: one part in a hundred.
         let mut quarter = render(0.25);
         quarter.pixels.iter_mut().flatten().for_each(|value| *value *= 4.0);
         let (found, expected) = (quarter.mean()[1], all.mean()[1]);
@@ -85,7 +86,7 @@ fn a_lamp_lights_as_much_as_is_there_of_it() {
 
 #[test]
 fn photons_and_paths_share_the_light_of_a_lamp_with_holes() {
-    // A ball of glass under a lamp: its caustic is found by both.
+    // A glass ball under a lamp: photons and paths both find its caustic.
     let render = |opacity: f32, radiance: f32, spp: u32, change: fn(&mut Settings)| {
         let mut buffers = lamp_over_ball(glass(0.0), 0.3);
         let lamp = buffers.materials.last_mut().unwrap();

@@ -11,7 +11,7 @@ const SIGMAS: f64 = 4.0;
 /// Relative rounding of a single-precision estimate.
 const ROUNDING: f64 = 1e-5;
 
-/// How far the density of a sample and that of the same point when hit may lie apart.
+/// Relative tolerance between the density of a sample and the density of the same point when hit.
 const DENSITY_TOLERANCE: f32 = 1e-4;
 
 /// Lambert 1760: irradiance at `point` by a polygon of unit radiance, all of it over the horizon.

@@ -1,5 +1,5 @@
-//! Lights of every kind together: environments by chi-squared, lights without surface, shares of kinds,
-//! emission with textures, and memory to the byte.
+//! Lights of every kind together: environments by chi-squared, lights without surface, probabilities of
+//! kinds, emission with textures, and exact memory.
 
 use crate::light_support::{Lamp, Stage, random_direction};
 use glam::{Mat3, Vec2, Vec3};
@@ -14,7 +14,7 @@ use halflight_tests::memory::TestArena;
 /// Standard errors that an estimate may be off.
 const SIGMAS: f64 = 4.0;
 
-/// A small sky: dark, with a sun that is a thousand times brighter, off the poles.
+/// A small dark sky with a sun a thousand times brighter, away from the poles.
 static SKY: [[f32; 3]; 16 * 8] = {
     let mut texels = [[0.1, 0.2, 0.3]; 16 * 8];
     texels[2 * 16 + 5] = [300.0, 280.0, 200.0];
@@ -48,14 +48,14 @@ fn the_sky_has_its_sun_where_the_convention_says() {
     let on_map = Vec3::new(theta.sin() * phi.cos(), theta.cos(), theta.sin() * phi.sin());
     let radiance = environment.radiance(&scene, environment.to_map.transpose() * on_map);
     assert!((radiance / Rgb::new(150.0, 140.0, 100.0) - Rgb::ONE).abs().max_element() < 1e-4, "{radiance}");
-    // The poles hold the rows next to them.
+    // The poles have the value of the adjacent row.
     let pole = environment.radiance(&scene, environment.to_map.transpose() * Vec3::NEG_Y);
     assert!(pole.distance(Rgb::new(0.05, 0.1, 0.15)) < 1e-4, "{pole}");
 }
 
 #[test]
 fn environment_samples_have_the_density_that_is_stated() {
-    // The estimate of ∫ dω over each of 8 × 16 cells of directions, by weights 1 / pdf: a z-test each.
+    // Estimates ∫ dω over each of 8 × 16 cells of directions by weights 1 / pdf; a z-test each.
     let stage = sky();
     stage.with_lights(|scene, lights| {
         let n = 1 << 18;
@@ -67,7 +67,7 @@ fn environment_samples_have_the_density_that_is_stated() {
             let sample = lights.sample(scene, Vec3::ZERO, Vec3::ZERO, u).expect("the sky is all around");
             let pdf = lights.pdf_escape(scene, Vec3::ZERO, Vec3::ZERO, sample.direction);
             assert!(sample.distance == f32::INFINITY && !sample.delta);
-            // On the edge of two texels the direction may round to the other one.
+            // At the edge of two texels rounding may move the direction to the other one.
             edges += u32::from((pdf / sample.pdf - 1.0).abs() > 1e-4);
             let d = sample.direction;
             let ring = ((0.5 * d.z + 0.5) * 8.0).min(7.0) as usize;
@@ -148,7 +148,7 @@ fn lights_without_surface_have_their_intensity() {
     assert!(of_point.delta && of_point.pdf == 1.0 && of_point.target.is_none());
     assert!((of_point.distance - 5.0).abs() < 1e-6 && of_point.direction.distance(at / 5.0) < 1e-6);
     assert!(of_point.radiance.distance(Rgb::new(2.0, 1.0, 0.2)) < 1e-6);
-    // Even in the angle from the outer cone to the inner one.
+    // Linear in the angle between the outer and the inner cone.
     let fade = (0.5f32.acos() - 0.6f32.acos()) / (0.5f32.acos() - 0.9f32.acos());
     let of_spot = seen(spot).expect("within the cone");
     assert!((of_spot.radiance.x - 2.0 * fade).abs() < 1e-5, "{}", of_spot.radiance);

@@ -1,4 +1,4 @@
-//! Very many lights: built from exact memory, chosen by what they can do, cheaply.
+//! 300,000 lights: exact memory, low variance and low cost of the light tree.
 
 use crate::light_support::{Lamp, Stage, random_direction};
 use glam::Vec3;
@@ -26,7 +26,7 @@ fn one_of_very_many_is_found_quickly_and_well() {
     stage.with_lights(|scene, lights| {
         println!("built in {:.3} s", start.elapsed().as_secs_f64());
         let (point, normal) = (Vec3::new(0.2, 0.1, 0.0), Vec3::Z);
-        // The tree against the truth: the irradiance summed over all lights, each a point of its intensity.
+        // Light tree against the exact irradiance, summed over all lights as points of their intensity.
         let of_lamp = |triangle| {
             let [a, b, c] = scene.mesh.corners(triangle);
             let (to_light, area_normal) = ((a + b + c) / 3.0 - point, 0.5 * (b - a).cross(c - a));
@@ -35,7 +35,7 @@ fn one_of_very_many_is_found_quickly_and_well() {
             radiance * f64::from(front.max(0.0) * normal.dot(to_light).max(0.0) / (distance2 * distance2))
         };
         let exact: f64 = (0..LAMPS).map(of_lamp).sum();
-        // The relative deviation of one sample where every lamp is as likely as any other.
+        // Relative deviation of one sample with equal probabilities for all lamps.
         let squares: f64 = (0..LAMPS).map(of_lamp).map(|e| e * e).sum();
         let even = (f64::from(LAMPS) * squares / (exact * exact) - 1.0).sqrt();
         let n = 1 << 16;
@@ -64,7 +64,7 @@ fn one_of_very_many_is_found_quickly_and_well() {
 
 #[test]
 fn identical_lamps_and_lamps_in_one_place_can_be_told_apart() {
-    // No plane divides them: halves by count.
+    // No plane separates the lamps: the build halves them by count.
     let lamp = Lamp::triangle([Vec3::ZERO, Vec3::X, Vec3::Y]);
     let stage = Stage::of(&vec![lamp; 1000]);
     stage.with_lights(|scene, lights| {

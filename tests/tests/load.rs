@@ -1,5 +1,4 @@
-//! Loading as a user meets it: small files on disk, each with one thing that has to be repaired, refused, or
-//! understood.
+//! Loading of small files on disk, each with one thing that has to be repaired, refused or understood.
 
 use crate::load_support::{Files, bmp};
 use glam::Vec3;
@@ -145,7 +144,7 @@ fn scaling_by_a_power_of_two_gives_the_same_bits() {
 
 #[test]
 fn many_pieces_give_what_one_would() {
-    // Several megabytes, so that pieces and shares are at work; indices of all kinds reach across them.
+    // Several megabytes, so that the reader splits the text; indices of all kinds refer across the pieces.
     let mut text = String::new();
     let count = 120_000u32;
     for i in 0..count {
@@ -254,7 +253,7 @@ fn a_scene_file_places_lights_and_looks() {
     assert_eq!(diffuse(&scene, "red"), Rgb::new(0.5, 0.0, 0.0).into());
     assert_eq!(diffuse(&scene, "blue"), Rgb::new(0.0, 0.0, 1.0).into());
     assert!(scene.materials[0].two_sided);
-    // x of the second square goes to y, y to -x: the square spans 4 ... 8 by 0 ... 4 at z = 1.
+    // x of the second square becomes y, y becomes -x: the square spans 4 ... 8 by 0 ... 4 at z = 1.
     assert_eq!((scene.transform.offset, scene.transform.exponent), ([4.0, 2.0, 0.5], 3));
     let user: Vec<_> = scene.positions.iter().map(|&p| scene.transform.to_user(p.into())).collect();
     assert!(user.contains(&[8.0, 4.0, 1.0]) && user.contains(&[4.0, 0.0, 1.0]));
@@ -268,7 +267,7 @@ fn a_scene_file_places_lights_and_looks() {
     let irradiance = Rgb::splat(3.0);
     assert_eq!(scene.lights[2], PointLight::Directional { direction: Vec3::NEG_Z, irradiance });
     let environment = scene.environment.unwrap();
-    // A quarter turn around y takes the map's x to -z of the world.
+    // A quarter turn around y takes x of the map to -z of the world.
     assert_eq!(environment.to_map * Vec3::NEG_Z, Vec3::X);
     let camera = scene.camera.unwrap();
     assert_eq!((camera.lens_radius, camera.focus_distance), (0.0625, 1.25));
@@ -300,7 +299,7 @@ fn a_scene_file_that_is_wrong_says_where() {
     assert!(empty.triangles.is_empty() && empty.camera.is_none());
 }
 
-/// A deterministic stream of bytes to damage files with.
+/// Deterministic random bytes that damage files.
 struct Noise(u64);
 
 impl Noise {

@@ -1,5 +1,5 @@
-//! Every file of the collection of published scenes that may lie beside the repository loads or is refused
-//! clearly. Skipped where the collection is not there: it is no part of the project.
+//! Every file of the collection of published scenes loads or is refused with a clear message. Skipped without
+//! the collection, which is not part of the project.
 
 use halflight::load::{LoadError, LoadOptions, LoadedScene, load};
 use std::path::{Path, PathBuf};
@@ -49,10 +49,10 @@ fn report(path: &Path) -> Result<LoadedScene, LoadError> {
     result
 }
 
-/// A scene that reaches very much farther than its detail, which lies within 1, and its largest coordinate.
+/// A scene whose detail lies within 1, and its largest coordinate, which is far beyond.
 const FAR: (&str, f32) = ("teapot-in-stadium.obj", (1u32 << 31) as f32);
 
-/// What the core relies on.
+/// Asserts the invariants on which the core relies.
 fn assert_sound(name: &str, scene: &LoadedScene) {
     let farthest = if name == FAR.0 { FAR.1 } else { 1.0 };
     assert_eq!(scene.mesh().validate(scene.materials.len()), Ok(()));
@@ -67,7 +67,7 @@ fn assert_sound(name: &str, scene: &LoadedScene) {
     scene.views();
 }
 
-/// Files of the torture folder that must be refused, and what the message must say.
+/// Files of the torture folder that must be refused, and a part of the message.
 const REFUSED: &[(&str, &str)] = &[
     ("invalid_empty.obj", "neither vertices nor faces"),
     ("invalid_index.obj", "invalid_index.obj:"),

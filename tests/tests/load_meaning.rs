@@ -1,5 +1,5 @@
-//! Materials, texture coordinates and meshes that mean something else than the letter of the file: as
-//! exporters write them, and as they go wrong.
+//! Materials, texture coordinates and meshes whose meaning differs from the letter of the file, as exporters
+//! write them, and common mistakes in them.
 
 use crate::load_support::{Files, bmp};
 use glam::Vec2;
@@ -10,7 +10,7 @@ use halflight_core::scene::{ColorInput, NormalMap, Surface};
 const SQUARE: &str = "v 0 0 0\nv 4 0 0\nv 4 4 0\nv 0 4 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n";
 const FACE: &str = "usemtl a\nf 1/1 2/2 3/3 4/4\n";
 
-/// A bitmap, `size` by `size`, of these colours from the bottom.
+/// A bitmap, `size` by `size`, with `texel(x, y)` from the bottom up.
 fn picture(size: u32, texel: impl Fn(u32, u32) -> [u8; 3]) -> Vec<u8> {
     let row = (3 * size).next_multiple_of(4);
     let mut bytes = b"BM".to_vec();
@@ -78,7 +78,7 @@ fn a_factor_of_0_does_not_hide_its_own_map() {
         matches!(maya.materials[0].surface, Surface::Diffuse { reflectance } if orange(reflectance, 1.0))
     );
     assert_eq!(maya.repairs.len(), 2, "{:?}", maya.repairs);
-    // A map that is not there leaves the constant value.
+    // A missing map leaves the constant value.
     let gone = material("Kd 0 0 0\nmap_Kd gone.bmp");
     assert!(
         matches!(gone.materials[0].surface, Surface::Diffuse { reflectance } if reflectance.value == Rgb::ZERO)
@@ -118,7 +118,7 @@ fn each_map_has_its_own_scale_and_offset() {
     assert_eq!((colour.scale, colour.offset), (Vec2::new(4.0, 1.0), Vec2::new(0.5, 0.0)));
     let Some(NormalMap::Tangent(id, _)) = scene.materials[0].normal_map else { panic!("no normals") };
     assert_eq!(views[id.0 as usize].transform.scale, Vec2::ONE);
-    // What all share is in the texture coordinates, as ever.
+    // A transform that all maps share goes into the texture coordinates.
     let shared = material("Kd 1 1 1\nmap_Kd -s 4 1 1 o.bmp\nnorm -s 4 1 1 n.bmp");
     assert_eq!(shared.texcoords[1], [4.0, 0.0]);
     assert!(shared.textures.views().iter().all(|view| view.transform.scale == Vec2::ONE));
@@ -141,7 +141,7 @@ fn texture_coordinates_keep_their_fraction_far_from_0() {
         assert_eq!(fraction(&far), fraction(&near), "{u} {v}");
         assert!(far.repairs.is_empty() && far.positions.len() == 4);
     }
-    // Clamped textures end at 1; without a texture nothing depends on it; nor do ordinary coordinates change.
+    // Clamped textures end at 1; untextured materials and ordinary coordinates do not change.
     assert_eq!(at(1e5, 0.0, "map_Kd -clamp on o.bmp").texcoords[0], [1e5, 0.0]);
     assert_eq!(at(1e5, 0.0, "Kd 1 1 1").texcoords[0], [1e5, 0.0]);
     assert_eq!(at(200.0, 0.0, "map_Kd o.bmp").texcoords[1], [200.75, 0.0]);
@@ -157,7 +157,7 @@ fn a_lamp_that_is_there_twice_shines_once() {
     let twice = of("usemtl a\nf 1 2 3\nf 5 6 7\nf 2 3 1\nf 1 3 4\nf 5 7 8\n");
     assert_eq!(twice.triangles.len(), 2);
     says(&twice, &["lamp `a`", "twice", "3 times"]);
-    // Back to back, beside each other, and what does not shine.
+    // Two-sided pairs, adjacent triangles, and surfaces that do not emit.
     for faces in
         ["usemtl a\nf 1 2 3 4\nf 4 3 2 1\n", "usemtl a\nf 1 2 3\nf 1 3 4\n", "usemtl w\nf 1 2 3\nf 1 2 3\n"]
     {
@@ -180,7 +180,7 @@ fn open_glass_is_said() {
     let sides = "f 1 4 3 2\nf 5 6 7 8\nf 1 2 6 5\nf 4 8 7 3\nf 1 5 8 4\n";
     let closed = of(&format!("{sides}f 2 3 7 6\n"));
     assert!(closed.repairs.is_empty(), "{:?}", closed.repairs);
-    // Water in a basin: the basin closes it.
+    // Water in a basin, which closes it.
     let basin = of(&format!("{sides}usemtl w\nf 2 3 7 6\n"));
     assert!(basin.repairs.is_empty(), "{:?}", basin.repairs);
     says(&of(sides), &["glass `a` is open", "4 edges", "1 of its pieces"]);

@@ -1,5 +1,5 @@
-//! Names of materials and files as programs write them: with `#`, quotes, blanks and options, in Latin-1, in
-//! another case, with the folders of another machine.
+//! Names of materials and files as exporters write them: with `#`, quotes, blanks and options, in Latin-1, in
+//! another case, with directories of another machine.
 
 use crate::load_support::{Files, bmp};
 use halflight::load::LoadedScene;
@@ -62,10 +62,10 @@ fn comments_quotes_and_blanks_count_only_where_names_differ_in_nothing_else() {
         let (rgb, notes) = one(name);
         assert_eq!((greys(rgb), notes.len()), ([grey, 0.4], 0), "{name:?} {notes:?}");
     }
-    // Comments on both sides are likely, and said.
+    // Text after `#` is taken as a comment, with a note.
     let (rgb, notes) = one(b"a # other");
     assert_eq!((greys(rgb), notes.len()), ([0.1, 0.4], 1), "{notes:?}");
-    // Neither of the materials whose names begin alike.
+    // A name that only begins like two materials matches neither.
     let mtl = b"newmtl M #1\nKd .1 0 0\nnewmtl M #2\nKd .2 0 0\n";
     let (rgb, notes) = two(b"mtllib m.mtl", [b"M #3", b"M #2"], &[("m.mtl", mtl)]);
     assert_eq!(greys(rgb), [GREY, 0.2]);
@@ -115,8 +115,7 @@ fn the_library_of_the_same_name_has_what_others_lack() {
     assert_eq!(grey(b"", &[("other.mtl", own)]), [GREY; 2]);
 }
 
-/// The red byte of the texture of a square whose material has this statement, and the notes. `None` without
-/// texture.
+/// Red byte of the texture of a square whose material has `statement`, `None` without texture; and the notes.
 fn texture(statement: &[u8], files: &[(&str, &[u8])]) -> (Option<u8>, Vec<String>) {
     let obj = join(&[b"mtllib sub/m.mtl\n", SQUARE, b"usemtl a\nf 1/1 2/1 3/1\n"]);
     let mtl = join(&[b"newmtl a\n", statement, b"\n"]);

@@ -1,5 +1,5 @@
 //! Tests that cross crates, in one program: pictures against known answers and against each other, lights,
-//! surfaces, loading and saving.
+//! BSDFs, loading and saving.
 //!
 //! `cargo test --profile quick -p halflight-tests --test main golden::` runs one module of it.
 

@@ -1,4 +1,4 @@
-//! Photon mapping in two passes: its kernels and maps, light through a slit, and less memory.
+//! Photon mapping in two passes: kernels and maps, light through a slit, and reduced memory.
 
 use halflight::load::{self, LoadOptions};
 use halflight::render::{Method, PhotonUse, RenderResult, Settings};
@@ -20,12 +20,12 @@ fn deviation(a: &Image, b: &Image) -> f64 {
     ratios.fold(0.0, |largest: f64, ratio| if ratio.abs() > largest.abs() { ratio } else { largest })
 }
 
-/// The bias of the mean that the map's blur may cause in a room whose indirect light is most of its light:
-/// photons are too few in a strip along open edges.
+/// Largest bias of the mean by blur in a room lit mostly by indirect light: photons are too few along open
+/// edges.
 const BIAS: f64 = 0.01;
 
-/// The same where all light comes through the slit of a door, with the few photons of a picture this small:
-/// the blur is as wide as the slit. 2 % were measured, and the noise of both is one.
+/// Largest bias of the mean where all light passes a door slit that is as narrow as the blur of so small a
+/// picture's few photons. Measured: 2 %, with 1 % of noise in both.
 const SLIT_BIAS: f64 = 0.05;
 
 #[test]

@@ -1,5 +1,5 @@
-//! Reports in a real browser: nothing in the console, names that stay text, and an exposure slider that shows
-//! the radiance. Skipped, and said so, where there is no Chromium.
+//! Reports in a real browser: an empty console, names that stay text, and an exposure slider with the right
+//! radiance. Skipped with a message without Chromium.
 
 use core::sync::atomic::AtomicBool;
 use halflight::compare::compare;
@@ -12,14 +12,14 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::sync::Arc;
 
-/// A name that would be seen in the console if it were not taken as text.
+/// A scene name that shows in the console unless it is escaped.
 const EVIL: &str =
     "<script>console.error('name')</script>\"'><img src=x onerror=console.error(1)>{{body}}.obj";
 
-/// Display values may differ by this much: the radiance of the page has eight bits, and is rounded twice.
+/// Tolerance of display values: the page's radiance has eight bits and is rounded twice.
 const TOLERANCE: f32 = 2.5;
 
-/// Where the test looks into the picture.
+/// Pixel that the test reads.
 const PIXEL: [u32; 2] = [11, 7];
 
 const SIZE: u32 = 24;
@@ -91,7 +91,7 @@ fn index(files: halflight::report::Files) -> String {
     String::from_utf8(page).unwrap()
 }
 
-/// The browser, where there is one.
+/// The installed browser, if any.
 fn browser() -> Option<&'static str> {
     ["chromium", "chromium-browser", "google-chrome"].into_iter().find(|name| {
         let version =
@@ -100,7 +100,7 @@ fn browser() -> Option<&'static str> {
     })
 }
 
-/// A folder of its own, gone when the test ends well.
+/// A directory of its own, removed if the test passes.
 struct Folder(PathBuf);
 
 impl Drop for Folder {
@@ -111,7 +111,7 @@ impl Drop for Folder {
     }
 }
 
-/// What is in the console after `page` with `script` at its end was opened, and the document then.
+/// Console lines after `page` ran with `script` at its end, and the document then.
 fn opened(browser: &str, folder: &Path, page: &str, script: &str) -> (Vec<String>, String) {
     let file = folder.join("page.html");
     std::fs::write(&file, page.replace("</body>", &format!("<script>{script}</script></body>"))).unwrap();

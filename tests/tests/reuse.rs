@@ -1,5 +1,4 @@
-//! Pixels that share what their paths find: the picture is right in the mean, the noise is less, and nothing
-//! hangs on threads, waves or rounds.
+//! Path reuse among neighbouring pixels: unbiased, less noisy, and independent of threads, waves and rounds.
 
 use core::sync::atomic::AtomicBool;
 use glam::Vec3;
@@ -16,14 +15,14 @@ use halflight_tests::statistics::{agree, blocks};
 /// Pixels across and down: four tiles, the outer ones cut by the border.
 const SIZE: u32 = 28;
 
-/// Blocks of so many pixels are judged together: groups share within 8 × 8.
+/// Side in pixels of the blocks that are judged; groups share within 8 × 8.
 const BLOCK: u32 = 7;
 
 /// Independent pictures of each kind.
 const SEEDS: u32 = 24;
 
 /// Normal quantile for one error in ten thousand over all blocks and channels of all scenes (Šidák; at most 6
-/// scenes of 48 values), with Student's wider tails of 2 × 23 degrees of freedom.
+/// scenes of 48 values), widened for Student's t with 2 × 23 degrees of freedom.
 const WIDEST: f64 = 6.2;
 
 fn render(scene: &Scene, spp: u32, change: impl FnOnce(&mut Settings)) -> RenderResult {
@@ -33,7 +32,7 @@ fn render(scene: &Scene, spp: u32, change: impl FnOnce(&mut Settings)) -> Render
     render::render(scene, &settings, &mut |_| (), &AtomicBool::new(false)).unwrap()
 }
 
-/// Black boxes among white ones: who has no light to take must not take part.
+/// Black boxes among white ones: pixels that reflect nothing must not take part in reuse.
 fn black_and_white() -> SceneBuffers {
     let mut scene = cornell_box();
     let black = scene
@@ -45,8 +44,8 @@ fn black_and_white() -> SceneBuffers {
     scene
 }
 
-/// Coats of all kinds over colours, met from diffuse walls: what their bases send back is shared, what they
-/// mirror is not.
+/// Coats of all kinds over colours, seen from diffuse walls: light of the base is shared, light of the coat
+/// is not.
 fn coated() -> SceneBuffers {
     let mut scene = cornell_box();
     let coat = |roughness: f32, metallic: f32, ior| Surface::Glossy {
@@ -93,7 +92,7 @@ fn reuse_is_unbiased_beside_black_surfaces_and_coats() {
 fn reuse_halves_the_variance() {
     let buffers = cornell_box();
     let scene = buffers.scene();
-    // Relative, so that the few pixels on the edge of the lamp do not speak for all.
+    // Relative variance: the few pixels at the lamp's edge must not dominate.
     let variance = |reuse| {
         let result = render(&scene, 64, |s| s.reuse = Some(reuse));
         let relative = |(variance, mean): (&[f32; 3], &[f32; 3])| -> f32 {
@@ -105,8 +104,8 @@ fn reuse_halves_the_variance() {
     assert!(with < 0.5 * without, "{with} {without}");
 }
 
-/// Blocks of pixels that share have errors in common, but no borders: what differs across the lines between blocks
-/// is hardly more than what differs across their middles.
+/// Pixels of a block share errors, but blocks have no visible borders: differences across borders of blocks
+/// hardly exceed differences across their middles.
 #[test]
 fn blocks_of_pixels_that_share_have_no_borders() {
     const ACROSS: u32 = 64;
@@ -123,7 +122,7 @@ fn blocks_of_pixels_that_share_have_no_borders() {
     let mean = |x: u32, y: u32| {
         pictures.iter().map(|picture| picture[(y * ACROSS + x) as usize]).sum::<f64>() / pictures.len() as f64
     };
-    // The squared error in the difference of 4 x 8 pixels on both sides of the columns and the rows of lines.
+    // Squared difference of errors between 4 x 8 pixels on both sides of column and row lines.
     let step = |first: u32| {
         let lines =
             (first..ACROSS - 4).step_by(8).flat_map(|line| (0..ACROSS / 8).map(move |k| (line, 8 * k)));
@@ -137,14 +136,14 @@ fn blocks_of_pixels_that_share_have_no_borders() {
                 })
                 .sum::<f64>()
             };
-            // A lamp at the edge of a pixel does not speak for all.
+            // Clamped, so that a lamp at the edge of a pixel does not dominate.
             let square =
                 |picture: &Vec<f64>| [false, true].map(|turned| of(picture, turned).powi(2).min(1e2));
             pictures.iter().flat_map(square).sum::<f64>()
         };
         lines.map(one).sum::<f64>()
     };
-    // 56 and 64 lines: the quotient is of means. With sharp borders it is 5 and more.
+    // 56 and 64 lines, so the ratio is of means. Sharp borders give 5 and more.
     let (borders, middles) = (step(8), step(12));
     let ratio = borders / middles;
     println!("{borders} {middles} {ratio}");
@@ -186,15 +185,15 @@ fn reuse_is_chosen_where_it_pays() {
     let scene = buffers.scene();
     let indirect = render(&scene, 4, |_| ()).reuse;
     assert!(indirect.used && indirect.pilot.is_some_and(|pilot| pilot.gain() > 3.0));
-    // Direct light alone: there is nothing to share.
+    // Direct light alone cannot be shared.
     let direct = render(&scene, 4, |s| s.max_depth = Some(2)).reuse;
     assert!(!direct.used && direct.pilot.is_some_and(|pilot| pilot.gain() == 1.0));
-    // What is asked for is done, and nobody looks.
+    // An explicit setting needs no pilot.
     let asked = render(&scene, 4, |s| s.reuse = Some(false)).reuse;
     assert!(!asked.used && asked.pilot.is_none());
 }
 
-/// Pictures of `seeds` seeds as brightnesses, and their mean.
+/// Luminance of pictures of `seeds` seeds, and their mean.
 fn seen(scene: &Scene, size: u32, spp: u32, seeds: u32) -> (Vec<Vec<f64>>, Vec<f64>) {
     let one = |seed| {
         let result = render(scene, spp, |s| {
@@ -210,7 +209,7 @@ fn seen(scene: &Scene, size: u32, spp: u32, seeds: u32) -> (Vec<Vec<f64>>, Vec<f
     (pictures, mean)
 }
 
-/// The pixels of each block of 8 × 8.
+/// Pixel indices of each block of 8 × 8.
 fn blocks_of(size: u32) -> impl Iterator<Item = [usize; 64]> {
     let (across, width) = (size as usize / 8, size as usize);
     (0..across * across).map(move |block| {
@@ -223,11 +222,11 @@ fn blocks_of(size: u32) -> impl Iterator<Item = [usize; 64]> {
 fn reuse_leaves_no_lattice() {
     let buffers = cornell_box();
     let (size, seeds) = (64, 8);
-    // The first circles alone, and two rounds of them.
+    // The first circle of groups alone, and two rounds of circles.
     for spp in [8, 64] {
         let (pictures, mean) = seen(&buffers.scene(), size, spp, seeds);
         for side in [2, 4] {
-            // The variance between the means of the sublattices of a block over that of independent pixels.
+            // Variance between the means of a block's sublattices, relative to independent pixels.
             let (mut ratios, mut count, parts) = (0.0, 0, side * side);
             for block in blocks_of(size) {
                 let level = block.iter().map(|i| mean[*i]).sum::<f64>() / 64.0;
@@ -245,15 +244,15 @@ fn reuse_leaves_no_lattice() {
                     }
                     let all = sums.iter().sum::<f64>() / parts as f64;
                     let scatter = sums.iter().map(|sum| (sum - all).powi(2)).sum::<f64>();
-                    // Of sums of 64 / parts pixels.
+                    // Variance of sums of 64 / parts pixels.
                     between += scatter / (parts - 1) as f64 / (64 / parts) as f64;
                 }
                 ratios += between / alone;
                 count += 1;
             }
             let ratio = ratios / f64::from(count);
-            // Every other pixel of a block: 12 for 2 x 2, 2.7 for 4 x 4. 400 and more degrees of freedom: ±
-            // 0.07.
+            // Sharing by every other pixel of a block gives 12 for 2 x 2 and 2.7 for 4 x 4. 400 degrees of
+            // freedom or more: ± 0.07.
             assert!(count >= 16 && ratio < 1.3, "{spp} samples, {side} x {side}: {ratio}, {count} blocks");
         }
     }
@@ -276,7 +275,7 @@ fn fireflies_are_not_shared() {
         for block in blocks_of(size) {
             let excess = block.map(|i| picture[i] - mean[i]);
             let most = excess.iter().copied().fold(0.0, f64::max);
-            // Light of a sample that is far more than what is shared of it.
+            // Only samples far brighter than the light that others take from them.
             if most > 16.0 * level {
                 let all: f64 = excess.iter().filter(|e| **e > 0.02 * most).sum();
                 ratios.push(all / most);
@@ -286,6 +285,6 @@ fn fireflies_are_not_shared() {
     }
     ratios.sort_by(f64::total_cmp);
     assert!(flashes >= 4, "{flashes}");
-    // In a circle of sixteen: 16.
+    // 16 in a circle of sixteen pixels.
     assert!(ratios[flashes / 2] < 3.0, "{ratios:?}");
 }

@@ -1,6 +1,5 @@
-//! The sample streams: nets in every power-of-two prefix, no correlation between dimensions and pixels,
-//! errors that fall faster than those of independent samples; warps and distributions against their
-//! densities.
+//! Sample streams: nets in every power-of-two prefix, dimensions and pixels without correlation, errors that
+//! fall faster than with independent samples; warps and distributions against their densities.
 
 use halflight_core::memory::Arena;
 use halflight_core::sampling::{AliasTable, Distribution2d, Random, Sampler, sin_cos_turns, warp};
@@ -9,13 +8,13 @@ use halflight_tests::memory::TestArena;
 /// Normal quantile of a one-sided chance of 3e-5, for each chi-squared test here.
 const CHI_SQUARED_SIGMAS: f64 = 4.0;
 
-/// Asserts that `counts` are multinomial with equal chances.
+/// Asserts that `counts` are multinomial with equal probabilities.
 fn assert_uniform(name: &str, counts: &[u32]) {
     let expected = counts.iter().map(|&c| f64::from(c)).sum::<f64>() / counts.len() as f64;
     assert_expected(name, counts, &vec![expected; counts.len()]);
 }
 
-/// Pearson's test; cells with less than 5 expected are pooled. The quantile by Wilson and Hilferty 1931.
+/// Pearson's test, pooling cells that expect fewer than 5. Quantile by Wilson and Hilferty 1931.
 fn assert_expected(name: &str, counts: &[u32], expected: &[f64]) {
     let (mut pooled, mut cells, mut chi2) = ([0.0; 2], 0, 0.0);
     let mut add = |observed: f64, expected: f64| {
@@ -120,8 +119,7 @@ fn mixed_projections_of_quads_are_nets_but_for_a_factor_of_two() {
 
 #[test]
 fn each_point_is_uniform_over_keys() {
-    // Of Owen-scrambled points every single one is uniform: sample 3 of many pixels, in 2 and in 4
-    // dimensions.
+    // Every single Owen-scrambled point is uniform: sample 3 of 200,000 pixels, in 2 and in 4 dimensions.
     let (mut squares, mut tesseracts) = (vec![0; 1024], vec![0; 4096]);
     for pixel in 0..200_000 {
         let sampler = Sampler::new(9, pixel, 6);
@@ -238,7 +236,8 @@ fn warps_have_their_densities() {
         sphere[eighth(0.5 * s.z + 0.5) * 8 + azimuth(s.x, s.y)] += 1;
         let c = warp::uniform_cone(u, 0.25);
         cone[eighth((1.0 - c.z) * 4.0) * 8 + azimuth(c.x, c.y)] += 1;
-        // The square root of what is left of the first corner, and the ratio along the line: uniform both.
+        // Both are uniform: the square of the distance from the first corner, and the ratio along the
+        // opposite edge.
         let (b1, b2) = warp::uniform_triangle(u);
         assert!(b1 >= 0.0 && b2 >= 0.0 && b1 + b2 <= 1.0);
         triangle[eighth((b1 + b2).powi(2)) * 8 + eighth(b2 / (b1 + b2))] += 1;

@@ -1,4 +1,4 @@
-//! Pictures written and read back, and files that lie.
+//! Pictures written and read back, and files with false headers.
 
 use halflight::picture::{self, PictureError};
 use halflight::save::{Format, Image, check_writable, encode, read, read_within, to_srgb, write};
@@ -17,7 +17,7 @@ fn picture() -> Image {
     Image { width: 37, height: 23, pixels }
 }
 
-/// Bytes that reading may take.
+/// Memory limit of reading, bytes.
 const MOST: usize = 1 << 24;
 
 fn decode(bytes: &[u8]) -> Result<Image, PictureError> {

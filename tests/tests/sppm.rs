@@ -1,4 +1,4 @@
-//! Progressive photon mapping: the power of photons, discs under overhangs, narrow coats, and memory.
+//! Progressive photon mapping: power of photons, discs under overhangs, narrow coats, and memory.
 
 use glam::Vec3;
 use halflight::load::{self, LoadOptions};
@@ -23,7 +23,7 @@ fn sppm(scene: &Scene, size: u32, spp: u32, change: impl FnOnce(&mut Settings)) 
     render(scene, Method::ProgressivePhotons, size, spp, change)
 }
 
-/// All photons of a map of `scene`, and the power of its lights in the same units.
+/// Photons of a map of `scene` with `tasks` tasks.
 fn photons(scene: &Scene, tasks: usize) -> Vec<Photon> {
     with_structures(scene, |bvh, lights| {
         let mut emission_memory = TestArena::new(EmissionSampler::footprint(lights));
@@ -48,8 +48,7 @@ fn photons(scene: &Scene, tasks: usize) -> Vec<Photon> {
     })
 }
 
-/// The inside of a unit cube, all of it of `reflectance`, with a lamp of one square tenth under its ceiling
-/// that shines down.
+/// A closed unit cube of `reflectance` with a lamp of side 0.1 under its ceiling, facing down.
 fn lit_room(reflectance: f32) -> SceneBuffers {
     let camera = Camera::look_at(Vec3::splat(0.1), Vec3::splat(0.9), Vec3::Y, 60.0);
     let mut buffers = SceneBuffers::new(camera);
@@ -66,13 +65,13 @@ fn stored_photons_carry_the_power_that_surfaces_reflect() {
         let buffers = lit_room(reflectance);
         let photons = photons(&buffers.scene(), 64);
         let power: f64 = photons.iter().map(|photon| f64::from(photon.power().x)).sum();
-        // The lamp is black and small: the room keeps what it reflects, ρ + ρ² + ..., but for what the lamp
-        // takes.
+        // The lamp is black and small: photons hold the power ρ + ρ² + ... less the part that the lamp
+        // absorbs.
         let emitted = core::f64::consts::PI * 0.01;
         let kept = f64::from(reflectance) / (1.0 - f64::from(reflectance));
         let expected = emitted * kept;
-        // Both sides of the lamp are 0.02 of 6 square metres: a share 0.0033 of what is on its way at each
-        // turn.
+        // Both sides of the lamp are 0.02 of 6 square metres: it absorbs a share 0.0033 of the power at each
+        // bounce.
         let lost = (1.0 + kept) * 0.0033;
         let ratio = power / expected;
         assert!(ratio < 1.01 && ratio > 0.99 - lost, "{reflectance}: {ratio}");
@@ -88,8 +87,8 @@ fn assert_means(a: &Image, b: &Image, tolerance: f64) {
 
 #[test]
 fn discs_take_no_light_from_beyond_an_overhang() {
-    // The jamb is seen through a slit of a centimetre, in front of which discs of a decimetre had light of
-    // beyond the door: 5 % of the picture's.
+    // The jamb is seen through a slit of 1 cm. Discs of 10 cm in front of it took light from beyond the door:
+    // 5 % of the picture's light.
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../scenes/two-rooms/two-rooms.toml");
     let loaded = load::load(&file, &LoadOptions::default()).unwrap();
     let views = loaded.views();
@@ -114,7 +113,8 @@ fn a_limit_of_memory_makes_fewer_photons_with_the_same_light() {
     assert_means(&less.image, &many.image, 0.03);
 }
 
-/// The Cornell box with varnish of `roughness` on all surfaces, and a bar of narrow metal before its back wall.
+/// The Cornell box with varnish of `roughness` on all surfaces, and a bar of narrow-lobed metal in front of
+/// its back wall.
 fn varnished_room(roughness: f32) -> SceneBuffers {
     let mut room = varnished(cornell_box(), roughness);
     let bar = room.material(Material { surface: metal(0.1), ..Material::GREY });
@@ -122,7 +122,7 @@ fn varnished_room(roughness: f32) -> SceneBuffers {
     room
 }
 
-/// The same room by a point light in place of its lamp.
+/// The room lit by a point light instead of its lamp.
 fn by_a_point_light(mut room: SceneBuffers) -> SceneBuffers {
     for material in &mut room.materials {
         material.emission = Rgb::ZERO.into();
@@ -132,7 +132,7 @@ fn by_a_point_light(mut room: SceneBuffers) -> SceneBuffers {
     room
 }
 
-/// The same room, seen along its floor.
+/// The room seen along its floor.
 fn at_a_grazing_angle(mut room: SceneBuffers) -> SceneBuffers {
     room.camera = Camera::look_at(Vec3::new(0.5, 0.06, -0.4), Vec3::new(0.5, 0.0, 0.6), Vec3::Y, 45.0);
     room
@@ -160,14 +160,14 @@ fn narrow_coats_have_the_light_of_path_tracing_without_fireflies() {
         // Discs blur by a few percent.
         agree_within(&sums(&photons), &sums(&paths), rooms.len(), |_, light| 0.04 * light)
             .unwrap_or_else(|worst| panic!("{name}: {worst}"));
-        // A photon in the lobe of a coat is a firefly.
+        // A photon in the narrow lobe of a coat would be a firefly.
         let [by_photons, by_paths] = [&photons, &paths].map(|pictures| scatter(pictures));
         println!("{name}: {by_photons} {by_paths}");
         assert!(by_photons < by_paths, "{name}: {by_photons} {by_paths}");
     }
 }
 
-/// Variance of a picture relative to its squared radiance, in green, by pictures that are independent.
+/// Variance of green over independent pictures, relative to the squared radiance.
 fn scatter(pictures: &[Vec<[f32; 3]>]) -> f64 {
     let (count, pixels) = (pictures.len() as f64, pictures[0].len());
     let values = |i: usize| pictures.iter().map(move |picture| f64::from(picture[i][1]));

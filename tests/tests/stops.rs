@@ -1,5 +1,5 @@
-//! Renders that end early: before their first sample, and of light that stays in glass for good. That each
-//! method obeys a deadline and an interrupt is a property of the table.
+//! Renders that end early: before their first sample, and with light that stays in glass. The table tests
+//! deadlines and interrupts for each method.
 
 use crate::table::scenes::glass_cube;
 use core::sync::atomic::AtomicBool;
@@ -12,12 +12,12 @@ use halflight_tests::scenes::{SceneBuffers, emitter};
 use halflight_tests::statistics::judge;
 use std::time::Instant;
 
-/// No render here takes longer, on a machine that does much else.
+/// Upper bound on the time of a render, on a busy machine.
 const DEADLINE: Duration = Duration::from_secs(120);
 
 #[test]
 fn light_leaves_glass_before_the_limit_of_bounces_and_cut_paths_are_counted() {
-    // The floor beside the cube; what total reflection keeps does not reach it.
+    // The floor beside the cube, out of reach of light that total reflection traps.
     let render = |method: Method, depth: Option<u32>, seed: u32| {
         let stop = Stop { spp: Some(32), ..Stop::default() };
         let (method, audit) = (Some(method), Some(0.0));
@@ -25,7 +25,7 @@ fn light_leaves_glass_before_the_limit_of_bounces_and_cut_paths_are_counted() {
         let settings = Settings { max_depth: depth, seed, ..settings };
         render::render(&glass_cube(false).scene(), &settings, &mut |_| (), &AtomicBool::new(false)).unwrap()
     };
-    // Columns and rows of the floor alone.
+    // Columns and rows that show the floor alone.
     let floor = |result: &RenderResult| {
         let rows = result.image.pixels.chunks(48).skip(33);
         rows.map(|row| row[10..38].iter().map(|pixel| f64::from(pixel[1])).sum::<f64>()).sum::<f64>()
@@ -35,14 +35,14 @@ fn light_leaves_glass_before_the_limit_of_bounces_and_cut_paths_are_counted() {
         let result = render(method, None, 0);
         let found = floor(&result);
         if method == Method::Metropolis {
-            // Few points of primary sample space are splats, which alone find this light.
+            // Only splats find this light, and few points of primary sample space are splats.
             let replicas: Vec<_> = (0..24).map(|seed| vec![floor(&render(method, None, seed))]).collect();
             judge(&replicas, &[known]).unwrap();
         } else {
             assert!((found / known - 1.0).abs() < 0.03, "{}: {found}, not {known}", method.name());
         }
-        // Roulette ends the light paths of bidirectional methods long before the limit; subpaths of chains are
-        // short.
+        // Russian roulette ends light subpaths of bidirectional methods long before the limit, and subpaths
+        // of chains are short.
         let has_roulette = matches!(
             method,
             Method::LightTracing
@@ -58,7 +58,7 @@ fn light_leaves_glass_before_the_limit_of_bounces_and_cut_paths_are_counted() {
 
 #[test]
 fn a_picture_that_ends_before_its_first_sample_is_whole() {
-    // More pixels than there is time for where the flag is up from the beginning, on one thread: a lit floor.
+    // An interrupt from the start on one thread, with more pixels than there is time for: a lit floor.
     let mut buffers = SceneBuffers::new(Camera::look_at(Vec3::Y, Vec3::ZERO, Vec3::Z, 40.0));
     let floor = buffers.material(Material::diffuse(Rgb::splat(0.5)));
     let lamp = buffers.material(emitter(0.5, 1.0));

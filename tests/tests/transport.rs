@@ -1,4 +1,4 @@
-//! The path tracer as a whole: the wavefront against the textbook, bits against threads, waves and scale.
+//! The path tracer as a whole: wavefront against textbook, and bits against threads, waves and scale.
 
 use core::f64::consts::PI;
 use core::sync::atomic::AtomicBool;
@@ -102,7 +102,7 @@ fn irradiance_under_a_square_lamp_is_that_of_its_form_factor() {
     });
 }
 
-/// A path tracer of the box, of 16 x 16 pixels.
+/// Calls `work` with a path tracer of the box, 16 x 16 pixels.
 fn in_the_box(work: impl FnOnce(&PathIntegrator<All>)) {
     let buffers = cornell_box();
     let scene = buffers.scene();
@@ -124,7 +124,7 @@ fn scratch_is_exactly_what_it_says() {
     });
 }
 
-/// Paths that gather end by what they are worth: not by what the memory of their wave held before.
+/// Russian roulette of gather rays must not depend on left-over memory of the wavefront.
 #[test]
 fn a_gathering_does_not_know_what_its_memory_was() {
     in_the_box(|tracer| {

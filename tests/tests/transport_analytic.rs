@@ -1,4 +1,4 @@
-//! Direct light whose irradiance has a formula, and what cut-outs let through of it.
+//! Direct light with an analytic irradiance, and transmittance of cut-outs.
 
 use crate::picture::{SIZE, assert_picture};
 use core::f64::consts::PI;
@@ -19,7 +19,7 @@ fn floor() -> SceneBuffers {
     scene
 }
 
-/// The mean over pixel (x, y) of the radiance that the floor reflects, from the irradiance at its points.
+/// Mean over pixel (x, y) of the floor's reflected radiance, from the irradiance at its points.
 fn seen(camera: &Camera, x: u32, y: u32, irradiance: impl Fn(DVec3) -> f64) -> f64 {
     const SUB: u32 = 16;
     let mut sum = 0.0;
@@ -45,7 +45,7 @@ fn polygon_irradiance(corners: &[DVec3], at: DVec3) -> f64 {
 fn a_parallel_square_lights_the_floor_by_its_form_factor() {
     for depth in [Some(2), None] {
         let mut scene = floor();
-        // Black, so that no light comes back from it; without limit there is nothing to bounce between.
+        // A black lamp, so that no light bounces between it and the floor.
         let lamp = scene.material(emitter(0.0, 3.0));
         scene.square(Vec3::new(0.0, 0.7, -0.6), Vec3::NEG_Y, 1.0, lamp);
         let corners =
@@ -76,7 +76,7 @@ fn lights_without_surface_light_the_floor_by_their_formulas() {
     let expected = 1.5 * f64::from(-direction.y);
     assert_picture(&scene, |_| (), |x, y| seen(&camera, x, y, |_| expected));
 
-    // Wide enough that the whole picture is in its full cone.
+    // The full cone covers the whole picture.
     let down = Vec3::NEG_Y;
     scene.lights[0] =
         PointLight::Spot { position, direction: down, intensity, cos_inner: 0.01, cos_outer: 0.0 };
@@ -106,9 +106,9 @@ fn all_lights_together_add_up() {
 
 #[test]
 fn cutouts_let_through_what_they_do_not_cover() {
-    // Seen through a black sheet: the floor, lit through two more. The opacities are multiples of 1/64, the
-    // samples of a pixel, so that stratification makes them exact and the t-test is not fooled by rare
-    // events.
+    // The floor, lit through two sheets, is seen through a third, black one. Opacities are multiples of 1/64,
+    // the samples of a pixel, so that stratification makes them exact and rare events do not mislead the
+    // t-test.
     let mut scene = floor();
     let camera = scene.camera;
     let sheet = |opacity: f32| Material { opacity: opacity.into(), ..Material::diffuse(Rgb::ZERO) };

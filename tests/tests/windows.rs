@@ -1,5 +1,5 @@
-//! The sky sampled through windows that a first look finds: the picture is right in the mean, the noise is
-//! less in a room, and where all sky is open nothing is changed.
+//! Environment visibility: sky sampled through windows that a prepass finds is unbiased, reduces noise in a
+//! room, and changes nothing under an open sky.
 
 use crate::table::scenes::{SKY, room_with_window, with_sky};
 use core::sync::atomic::AtomicBool;
@@ -16,7 +16,7 @@ const SIZE: u32 = 32;
 const SEEDS: u32 = 32;
 
 /// Normal quantile for one error in ten thousand over all tiles and channels of all scenes (Šidák; 4 scenes
-/// of 48 values), with Student's wider tails of 2 × 31 degrees of freedom.
+/// of 48 values), widened for Student's t with 2 × 31 degrees of freedom.
 const WIDEST: f64 = 5.6;
 
 fn with_constant(mut scene: SceneBuffers) -> SceneBuffers {
@@ -54,7 +54,7 @@ fn windows_are_unbiased() {
     assert_unbiased("sky with a sun", &with_sky(room_with_window()).textured(&SKY), Some(2));
 }
 
-/// The sum over pixels of relative variance.
+/// Relative variance summed over pixels.
 fn noise(result: &RenderResult) -> f32 {
     let relative = |(variance, mean): (&[f32; 3], &[f32; 3])| -> f32 {
         variance.iter().zip(mean).map(|(variance, mean)| variance / (mean * mean + 1e-4)).sum()

@@ -1,4 +1,4 @@
-//! The BSDFs under test, and the directions from which they are seen.
+//! BSDFs under test, and directions of their viewers.
 
 use glam::{Vec2, Vec3};
 use halflight_core::Rgb;
@@ -7,7 +7,7 @@ use halflight_core::sampling::Random;
 use halflight_core::scene::Camera;
 use halflight_core::scene::{ColorInput, Material, Mesh, ScalarInput, Scene, Surface};
 
-/// A scene with nothing in it, for materials without textures.
+/// A scene without meshes, lights and textures.
 pub(crate) fn empty_scene() -> Scene<'static> {
     Scene {
         mesh: Mesh::default(),
@@ -24,7 +24,7 @@ pub(crate) fn resolve(surface: Surface, front: bool) -> Bsdf {
     Bsdf::at::<All>(&empty_scene(), &material, Vec2::splat(0.5), front)
 }
 
-/// `roughness` of an input: its square is alpha.
+/// Input `roughness` whose square is `alpha`.
 fn rough(alpha: f32) -> ScalarInput {
     alpha.sqrt().into()
 }
@@ -48,7 +48,7 @@ pub(crate) fn dielectric(ior: f32, tint: Rgb, alpha: f32, front: bool) -> Bsdf {
     resolve(Surface::Dielectric { ior, tint, roughness: rough(alpha) }, front)
 }
 
-/// Everything that scatters, of all kinds and sides.
+/// BSDFs of all kinds that scatter, from both sides.
 pub(crate) fn scattering() -> Vec<(String, Bsdf)> {
     let mut all = vec![(
         "diffuse".to_string(),
@@ -73,10 +73,10 @@ pub(crate) fn scattering() -> Vec<(String, Bsdf)> {
     all
 }
 
-/// Cosines of the viewer.
+/// Cosines of `wo`.
 pub(crate) const VIEWS: [f32; 5] = [1.0, 0.8, 0.4, 0.1, 0.01];
 
-/// The unit direction of cosine `c`, off the axes where there is room.
+/// Unit direction of cosine `c`, off the coordinate axes except at normal incidence.
 pub(crate) fn view(c: f32) -> Vec3 {
     let sin = (1.0 - c * c).sqrt();
     Vec3::new(0.8 * sin, -0.6 * sin, c)

@@ -1,7 +1,7 @@
 //! Pearson's chi-squared test of `sample` against the density of `evaluate`, for every BSDF and view. Bins
-//! lie around the direction where the lobe peaks, logarithmic in the angle from it, so that a lobe of alpha
-//! 1e-4 fills as many of them as one of alpha 1. Delta samples and absorbed ones share one bin: its
-//! expectation is what the density leaves of 1.
+//! surround the peak of the lobe and are logarithmic in the angle from it: a lobe of alpha 1e-4 fills as many
+//! bins as a lobe of alpha 1. Delta samples and absorbed samples share one bin, which expects 1 minus the
+//! integral of the density.
 
 use super::cases::{VIEWS, draw, scattering, view};
 use core::f64::consts::{SQRT_2, TAU};
@@ -9,26 +9,26 @@ use glam::{DVec3, Vec3};
 use halflight_core::bsdf::{All, Bsdf};
 use halflight_core::sampling::Random;
 
-/// Of all tests together (Šidák): one wrong alarm in a hundred seeds; the seed is fixed.
+/// Significance of all tests together (Šidák): one false alarm in a hundred seeds. The seed is fixed.
 const SIGNIFICANCE: f64 = 0.01;
 const SAMPLES: u32 = 200_000;
 const RINGS: usize = 40;
 const SECTORS: usize = 24;
-/// Cosines of the viewer; nearer to the horizon the bins' quadrature fails before the density does.
+/// Cosines of the viewer. Nearer to the horizon the quadrature of bins fails before the density does.
 const CHI_VIEWS: [f32; 4] = [1.0, 0.8, 0.4, 0.1];
 /// Points per bin and axis of the integral of the density.
 const SUBDIVISION: usize = 12;
 /// Bins that expect fewer are pooled.
 const LEAST_EXPECTED: f64 = 10.0;
 
-/// Where the lobe peaks: the mirror direction, and the refracted one.
+/// Peaks of the lobe: the mirror direction, and for glass the refracted direction.
 fn peaks(bsdf: &Bsdf, wo: Vec3) -> Vec<Rings> {
     let wo = wo.as_dvec3();
     let mut peaks = vec![Rings::new(DVec3::new(-wo.x, -wo.y, wo.z), width(bsdf))];
     if let Bsdf::RoughDielectric(b) = bsdf {
         let eta = f64::from(b.eta);
         let c2 = 1.0 - (1.0 - wo.z * wo.z) / (eta * eta);
-        // Refraction along the surface where reflection is total.
+        // Total reflection: the axis lies in the surface.
         let axis = DVec3::new(-wo.x / eta, -wo.y / eta, -c2.max(0.0).sqrt()).normalize();
         peaks.push(Rings::new(axis, width(bsdf) * (eta - 1.0).abs()));
     }
@@ -62,7 +62,7 @@ impl Rings {
         ring.min(RINGS - 1) * SECTORS + sector.min(SECTORS - 1)
     }
 
-    /// The direction at fractions of rings and sectors, and the solid angle per unit of both.
+    /// Direction at fractions of rings and sectors, and the solid angle per unit of both.
     fn direction(&self, ring: f64, turn: f64) -> (DVec3, f64) {
         let x = (self.core * ((ring * self.span()).exp() - 1.0)).min(2.0);
         let radius = (x * (2.0 - x)).max(0.0).sqrt();
@@ -194,8 +194,8 @@ fn samples_follow_the_density_and_weights_the_value() {
                     total_seen / n
                 ));
             }
-            // The same integral by samples: five standard deviations of three channels and all cases, plus
-            // what the bins' quadrature leaves.
+            // Integral by samples: five standard deviations for three channels and all cases, plus the error
+            // of quadrature.
             let mean = sum / n;
             let deviation = ((squares / n - mean * mean).max(DVec3::ZERO) / n).map(f64::sqrt);
             let allowed = 5.0 * deviation + DVec3::splat(2e-3) * integral;
@@ -207,7 +207,7 @@ fn samples_follow_the_density_and_weights_the_value() {
     assert!(failures.is_empty(), "{} of {tests}:\n{}", failures.len(), failures.join("\n"));
 }
 
-/// Width of the narrow lobe.
+/// Alpha of the narrow lobe, 1 without one.
 fn width(bsdf: &Bsdf) -> f64 {
     let alpha = f64::from(match bsdf {
         Bsdf::Conductor(b) => b.alpha,
@@ -247,5 +247,5 @@ fn samples_carry_what_evaluate_says() {
     }
 }
 
-/// Rounding of a direction, against which a lobe is wide or narrow.
+/// Rounding of a unit direction. Values of lobes narrower than this are noise.
 const RESOLUTION: f64 = 1e-6;

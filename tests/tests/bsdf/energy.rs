@@ -8,8 +8,8 @@ use halflight_core::sampling::Random;
 
 const SAMPLES: u32 = 100_000;
 
-/// What a surface returns of white surroundings, per channel, with its standard deviation. Radiance that
-/// crossed a boundary is counted as power: times eta².
+/// Albedo per channel in white surroundings, with its standard deviation. Transmitted radiance counts as
+/// power: times eta².
 fn furnace(bsdf: &Bsdf, wo: Vec3, stream: u32) -> (DVec3, DVec3) {
     let random = Random::new(7, stream);
     let (mut sum, mut squares) = (DVec3::ZERO, DVec3::ZERO);
@@ -25,7 +25,7 @@ fn furnace(bsdf: &Bsdf, wo: Vec3, stream: u32) -> (DVec3, DVec3) {
     (mean, ((squares / n - mean * mean).max(DVec3::ZERO) / n).map(f64::sqrt))
 }
 
-/// Interpolation of the albedo tables; zero for every model without them.
+/// Interpolation error of the albedo tables, zero for models without tables.
 const TABLE_ERROR: f64 = 5e-3;
 
 #[test]
@@ -53,13 +53,13 @@ fn nothing_returns_more_than_it_gets() {
 
 #[test]
 fn white_surfaces_in_a_white_furnace_vanish() {
-    // All that the coat does not reflect, once, the base returns.
+    // A white base returns all light that the coat transmits.
     for alpha in [0.0, 1e-3, 0.05, 0.2, 0.5, 1.0] {
         for specular in [0.0, 0.04, 0.5] {
             let bsdf = coated(Rgb::ONE, Rgb::splat(specular), alpha, 0.0, None);
             for cosine in VIEWS {
                 let (mean, deviation) = furnace(&bsdf, view(cosine), 1);
-                // The last view stands between two nodes of the table where the albedo bends most.
+                // The last view lies between two nodes of the table where the albedo bends most.
                 let error = if cosine < 0.05 { 10.0 * TABLE_ERROR } else { 2.0 * TABLE_ERROR };
                 assert!(
                     (mean.x - 1.0).abs() < error + 5.0 * deviation.x,
@@ -78,7 +78,7 @@ fn white_surfaces_in_a_white_furnace_vanish() {
     ] {
         for cosine in VIEWS {
             let (mean, deviation) = furnace(&bsdf, view(cosine), 2);
-            // The polynomial of the mean reflectance is right to 6e-4.
+            // The polynomial fit of mean reflectance is right to 6e-4.
             assert!(
                 (mean.x - 1.0).abs() < 2e-3 + 5.0 * deviation.x,
                 "{name} from {cosine}: {mean} ± {deviation}"
@@ -87,7 +87,7 @@ fn white_surfaces_in_a_white_furnace_vanish() {
     }
 }
 
-/// A few roundings of numbers that cancel at grazing angles.
+/// Relative rounding of terms that cancel at grazing angles.
 const RECIPROCITY: f32 = 2e-4;
 
 #[test]
@@ -118,7 +118,7 @@ fn refraction_is_symmetric_up_to_the_indices() {
             let a = view(0.05 + 0.95 * random.single(2 * i));
             let b = view(0.05 + 0.95 * random.single(2 * i + 1));
             let below = Vec3::new(-b.x, -b.y, -b.z);
-            // Seen from inside, up is down.
+            // Seen from inside, the normal points the other way.
             let flip = |v: Vec3| Vec3::new(v.x, v.y, -v.z);
             let there = outside.evaluate::<All>(a, below).0.x / b.z;
             let back = inside.evaluate::<All>(flip(below), flip(a)).0.x / a.z;

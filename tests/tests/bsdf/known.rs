@@ -1,4 +1,4 @@
-//! Numbers that are known from elsewhere.
+//! BSDFs against values of Mitsuba, Fresnel and Snell.
 
 use super::cases::{coated, conductor, dielectric, plastic, resolve, view};
 use glam::Vec3;
@@ -6,7 +6,7 @@ use halflight_core::Rgb;
 use halflight_core::bsdf::{All, Bsdf, DiffuseOnly};
 use halflight_core::scene::Surface;
 
-/// Base of `plastic` (alpha 0) and `roughplastic` (GGX) of Mitsuba 3.9.1, `nonlinear`, without its specular
+/// Base of Mitsuba 3.9.1's `plastic` (alpha 0) and `roughplastic` (GGX), `nonlinear`, without the specular
 /// part: alpha, index, albedo, and f cos θ_i for (cos θ_o, cos θ_i) = (1, 0.8), (0.5, 0.5), (0.2, 0.7).
 const MITSUBA: [(f32, f32, f32, [f32; 3]); 11] = [
     (0.0, 1.5, 0.5, [0.074032, 0.041820, 0.044282]),
@@ -21,13 +21,13 @@ const MITSUBA: [(f32, f32, f32, [f32; 3]); 11] = [
     (0.6, 1.5, 0.5, [0.053749, 0.026165, 0.031588]),
     (1.0, 1.5, 0.7, [0.061300, 0.022898, 0.025550]),
 ];
-/// Their tables and ours are both interpolated, and their mean Fresnel reflectance is a fit.
+/// Relative tolerance: both programs interpolate tables, and Mitsuba fits the mean Fresnel reflectance.
 const AGREEMENT: f32 = 1e-2;
 
 #[test]
 fn the_base_of_plastics_agrees_with_mitsuba() {
     for (alpha, ior, albedo, expected) in MITSUBA {
-        // A coat without reflectance of its own leaves the base alone.
+        // A coat of reflectance 0 leaves the base alone.
         let bsdf = coated(Rgb::splat(albedo), Rgb::ZERO, alpha, 0.0, Some(ior));
         for ((o, i), expected) in [(1.0, 0.8), (0.5, 0.5), (0.2, 0.7)].into_iter().zip(expected) {
             let value = bsdf.evaluate::<All>(view(o), view(i)).0.x;
@@ -45,10 +45,10 @@ fn the_smooth_coat_is_a_mirror_over_its_base() {
     let bsdf = plastic(Rgb::splat(0.5), 0.0, 1.5);
     let coat = bsdf.sample::<All>(wo, [0.5, 0.5, 0.0]).expect("the coat reflects");
     assert!(coat.delta && coat.direction == Vec3::new(-wo.x, -wo.y, wo.z));
-    // Weight times probability is Fresnel's reflectance: 0.064525 at cos 0.6 for 1.5.
+    // Weight times probability is the Fresnel reflectance: 0.064525 at cos 0.6 for index 1.5.
     assert!((coat.weight.x * coat.pdf - 0.064_525).abs() < 1e-6, "{coat:?}");
     assert!(!bsdf.is_delta() && plastic(Rgb::ZERO, 0.0, 1.5).is_delta());
-    // Half a mirror direction has no density.
+    // The density at the mirror direction is that of the base: a delta lobe has none.
     assert!(bsdf.evaluate::<All>(wo, coat.direction).1 < 1.0);
 }
 
@@ -63,7 +63,7 @@ fn delta_lobes() {
         assert!(s.delta && !s.transmitted && s.eta == 1.0);
     }
     let s = dielectric(1.5, Rgb::ONE, 0.0, true).sample::<All>(wo, [0.3, 0.6, 0.99]).expect("refracts");
-    // Snell: sin θ_t = sin θ / 1.5; radiance grows thinner by eta² on the way out of what is denser.
+    // Snell: sin θ_t = sin θ / 1.5. Radiance is divided by eta² on the way out of the denser medium.
     assert!(s.transmitted && (s.direction.truncate().length() - 0.8 / 1.5).abs() < 1e-6);
     assert!((s.weight.x - 1.0 / 2.25).abs() < 1e-6 && s.eta == 1.5);
     let s = dielectric(1.5, Rgb::ONE, 0.0, false).sample::<All>(wo, [0.3, 0.6, 0.99]).expect("reflects");

@@ -1,5 +1,5 @@
-//! BSDFs judged from outside: what `sample` draws is what `evaluate` says (chi-squared), no energy is gained,
-//! light can be followed both ways, pictures agree with the models they claim, and nothing stiff makes a NaN.
+//! BSDFs by their public functions: samples follow `evaluate` (chi-squared), energy is not gained, reflection
+//! is reciprocal, values agree with published models, and stiff inputs give no NaN.
 
 mod cases;
 mod chi_squared;

@@ -1,4 +1,4 @@
-//! The table of stiff inputs: every roughness, index and angle that a file can ask for, at the corners of the
+//! Stiff inputs: every roughness, index and angle that a file can hold, at the corners of the unit cube of
 //! random numbers.
 
 use super::cases::{coated, conductor, dielectric, empty_scene, resolve};
@@ -70,9 +70,9 @@ fn everything() -> Vec<(String, Bsdf)> {
     all
 }
 
-/// Models of one lobe weigh at most 1; of two, the share of one may fall on the other, and directions from a
-/// coat are taken twice as often as its energy asks for, which doubles what the rare ones from the base
-/// weigh.
+/// Largest weight of a sample. Models of one lobe weigh at most 1. With two lobes, samples of one may carry
+/// the energy of the other; and the coat is sampled twice as often as its energy asks, which doubles the
+/// weight of rare samples of the base.
 const GREATEST_WEIGHT: f32 = 8.0;
 
 #[test]

@@ -1,4 +1,4 @@
-//! Scenes of lamps and nothing else, for the tests of lights.
+//! Scenes that hold lamps alone, for tests of lights.
 
 use glam::{DVec3, Vec3};
 use halflight_core::Rgb;
@@ -13,7 +13,7 @@ use halflight_tests::memory::TestArena;
 /// A flat light.
 #[derive(Clone)]
 pub(crate) struct Lamp {
-    /// The outline, counter-clockwise from the side that shines.
+    /// Outline, counter-clockwise seen from the emitting side.
     pub(crate) corners: Vec<Vec3>,
     pub(crate) radiance: f32,
     pub(crate) two_sided: bool,
@@ -110,7 +110,7 @@ impl Stage {
         }
     }
 
-    /// Calls `use_them` with the lights, built in an arena of exactly the stated bytes.
+    /// Calls `use_them` with lights built in an arena of exactly the footprint.
     pub(crate) fn with_lights<T>(&self, use_them: impl FnOnce(&Scene, &LightSampler) -> T) -> T {
         let scene = self.scene();
         let footprint = LightSampler::footprint(&scene).and(LightSampler::scratch(&scene));
@@ -121,7 +121,7 @@ impl Stage {
         use_them(&scene, &lights)
     }
 
-    /// Every triangle that the ray meets, in the order of the mesh.
+    /// Every triangle that the ray hits, in mesh order.
     pub(crate) fn all_hits(&self, origin: Vec3, direction: Vec3) -> impl Iterator<Item = (u32, f32)> + '_ {
         let mesh = Mesh { positions: &self.positions, triangles: &self.triangles, ..Mesh::default() };
         let ray = Ray::new(origin, direction);
@@ -131,7 +131,7 @@ impl Stage {
         })
     }
 
-    /// The triangle that the ray meets at `distance`, and where exactly.
+    /// The triangle hit at about `distance`, with the exact distance.
     pub(crate) fn hit_near(&self, origin: Vec3, direction: Vec3, distance: f32) -> Option<(u32, f32)> {
         self.all_hits(origin, direction).find(|(_, t)| (t / distance - 1.0).abs() < 1e-4)
     }

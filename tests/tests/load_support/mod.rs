@@ -5,7 +5,7 @@ use halflight::load::{LoadError, LoadOptions, LoadedScene, load};
 use std::fs;
 use std::path::PathBuf;
 
-/// A directory of small files that goes away with the test.
+/// A directory of small files that is removed with the test.
 pub(crate) struct Files(PathBuf);
 
 impl Files {

@@ -1,4 +1,4 @@
-//! Small grey pictures, rendered several times with different seeds and held against what they should be.
+//! Small grey pictures, rendered with several seeds and judged against expected values.
 
 use core::sync::atomic::AtomicBool;
 use halflight::render::{self, Settings, Stop};
@@ -8,10 +8,10 @@ use halflight_tests::statistics::judge;
 /// Pixels along a side.
 pub(crate) const SIZE: u32 = 12;
 
-/// Independent pictures: enough for a variance, and for a mean of them to be as good as normal.
+/// Independent pictures: enough for a variance and for an almost normal mean.
 const REPLICAS: u32 = 32;
 
-/// Samples of a pixel in each.
+/// Samples per pixel of each.
 const SPP: u32 = 64;
 
 /// The first channel of a picture of `scene`.

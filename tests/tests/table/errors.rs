@@ -1,5 +1,5 @@
-//! A snapshot of errors: relMSE of each method in each scene after several budgets of samples, against plain
-//! path tracing. The bits of pictures are deterministic, so the numbers are too.
+//! Snapshot of relMSE of each method in each scene for several sample budgets, against plain path tracing.
+//! Pictures are deterministic, so the numbers are too.
 //!
 //!     ERRORS=write cargo test --profile quick -p halflight-tests --test main table::errors::
 //!
@@ -11,7 +11,7 @@ use super::scenes::SCENES;
 use std::fs;
 use std::path::Path;
 
-/// Budgets in samples of a pixel.
+/// Budgets in samples per pixel.
 const BUDGETS: [u32; 3] = [1, 8, 64];
 
 /// The table as it is today.

@@ -1,9 +1,8 @@
-//! One table: methods × scenes × properties. A new method is one row of [`methods!`], and has every property
-//! here judged in every scene of [`scenes::SCENES`].
+//! One table: methods × scenes × properties. A new method is one row of [`methods!`]; every property here is
+//! then judged in every scene of [`scenes::SCENES`].
 //!
 //! `cargo test --profile quick -p halflight-tests --test main table::sppm::` judges one method. `TABLE=small`
-//! makes pictures of a quarter of the pixels and fewer replicas, for a quick look; the snapshot of errors is
-//! left out then.
+//! renders a quarter of the pixels and fewer replicas, without the snapshot of errors.
 
 mod errors;
 mod pictures;
@@ -12,15 +11,15 @@ pub(crate) mod scenes;
 
 use halflight::render::Method;
 
-/// A method, and the bias that it is allowed.
+/// A method and its largest allowed bias.
 struct Row {
     method: Method,
-    /// Largest bias of a block of 8 × 8 pixels: a share of its light and of a tenth of the picture's mean. A
-    /// method without bias has 0 here.
+    /// Largest bias of a block of 8 × 8 pixels, as a share of its light plus a tenth of the picture's mean; 0
+    /// if unbiased.
     bias: f64,
-    /// The same of the mean of the picture.
+    /// Largest relative bias of the picture's mean.
     bias_of_mean: f64,
-    /// Scenes of a larger bias that is known, with both.
+    /// Scenes with a larger known bias: of blocks, and of the mean.
     known: &'static [(&'static str, f64, f64)],
 }
 
@@ -73,23 +72,23 @@ macro_rules! methods {
 
 methods! {
     path: Row { method: Method::Path, bias: 0.0, bias_of_mean: 0.0, known: &[] };
-    // Records are a pixel apart at best and interpolate between them.
+    // Records are at best a pixel apart and interpolate between them.
     irradiance_cache: Row { method: Method::IrradianceCache, bias: 0.02, bias_of_mean: 0.005, known: &[] };
-    // Discs of photons reach over edges and around corners.
+    // Photon discs reach over edges and around corners.
     photon_map: Row { method: Method::PhotonMap, bias: 0.02, bias_of_mean: 0.01, known: &[] };
-    // The same, by radii that shrink with samples.
+    // Photon discs as above, with radii that shrink with samples.
     sppm: Row { method: Method::ProgressivePhotons, bias: 0.02, bias_of_mean: 0.01, known: &[] };
     light: Row { method: Method::LightTracing, bias: 0.0, bias_of_mean: 0.0, known: &[] };
     bdpt: Row { method: Method::Bidirectional, bias: 0.0, bias_of_mean: 0.0, known: &[] };
-    // Caustics are blurred, by radii that shrink with samples.
+    // Blurred caustics, by radii that shrink with samples.
     vcm: Row { method: Method::VertexMerging, bias: 0.02, bias_of_mean: 0.01, known: &[] };
     instant_radiosity: Row { method: Method::InstantRadiosity, bias: 0.0, bias_of_mean: 0.0, known: &[] };
-    // The bound cuts light in corners.
+    // The bound of the geometry term cuts light in corners.
     instant_radiosity_clamped: Row {
         method: Method::ClampedInstantRadiosity,
         bias: 0.06,
         bias_of_mean: 0.04,
-        // The area by which the bound is set has all twelve rooms.
+        // The area that sets the bound includes all twelve rooms.
         known: &[("twelve-rooms", 0.3, 0.1)],
     };
     mlt: Row { method: Method::Metropolis, bias: 0.0, bias_of_mean: 0.0, known: &[] };

@@ -1,4 +1,4 @@
-//! Pictures of the table: references by plain path tracing and replicas of each method, rendered once for all
+//! Pictures of the table: plain path-traced references, and replicas of each method, rendered once for all
 //! properties.
 
 use super::Row;
@@ -10,25 +10,25 @@ use halflight_tests::statistics::blocks;
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, OnceLock};
 
-/// Sizes of the table.
+/// Sizes of renders in the table.
 pub(super) struct Sizes {
     /// Pixels across and down.
     pub(super) pixels: u32,
-    /// Independent pictures of each method.
+    /// Independent pictures per method.
     pub(super) replicas: u32,
-    /// Samples of a pixel of a replica.
+    /// Samples per pixel of a replica.
     pub(super) spp: u32,
-    /// Samples of a pixel of a reference, in each of [`REFERENCES`] pictures.
+    /// Samples per pixel of each of the [`REFERENCES`] pictures of a reference.
     pub(super) reference_spp: u32,
 }
 
-/// Independent pictures that make a reference.
+/// Independent pictures of a reference.
 pub(super) const REFERENCES: u32 = 16;
 
-/// Pixels along a side of a block that is judged.
+/// Side in pixels of the blocks that are judged.
 const BLOCK: u32 = 8;
 
-/// Whether `TABLE=small` asks for less.
+/// Whether `TABLE=small` asks for smaller pictures.
 pub(super) fn is_small() -> bool {
     std::env::var_os("TABLE").is_some_and(|value| value == "small")
 }
@@ -40,7 +40,7 @@ pub(super) fn sizes() -> Sizes {
     }
 }
 
-/// A picture of the scene by a method, with the scene's limit of segments.
+/// A picture of the scene by a method, with the scene's limit of path segments.
 pub(super) fn picture(
     scene: &TableScene,
     method: Method,
@@ -55,7 +55,7 @@ pub(super) fn picture(
     })
 }
 
-/// Means of blocks and of the picture, all channels: the values of a picture that are judged.
+/// Means of blocks and of the picture, all channels: the values that tests judge.
 pub(super) fn values(image: &Image) -> Vec<f64> {
     let mut values = blocks(&image.pixels, image.width, BLOCK);
     values.iter_mut().for_each(|value| *value /= f64::from(BLOCK * BLOCK));
@@ -63,13 +63,13 @@ pub(super) fn values(image: &Image) -> Vec<f64> {
     values
 }
 
-/// The light of a scene by textbook path tracing: no path reuse, no photons, no windows.
+/// Radiance of a scene by textbook path tracing: no path reuse, photons or environment visibility.
 pub(super) struct Reference {
-    /// The mean of all pictures.
+    /// Mean of all pictures.
     pub(super) image: Image,
-    /// The values of each.
+    /// Values of each picture.
     pub(super) values: Vec<Vec<f64>>,
-    /// relMSE that the noise of `image` makes on average.
+    /// Expected relMSE from the noise of `image`.
     pub(super) relmse: f64,
 }
 
@@ -100,14 +100,14 @@ impl Reference {
         Self { image: Image { pixels, ..images[0] }, values, relmse }
     }
 
-    /// relMSE of a picture against this, less what the noise of this adds.
+    /// relMSE of a picture against the reference, less the expected part of the reference's noise.
     pub(super) fn error(&self, image: &Image) -> f64 {
         let measured = halflight::compare::compare(image, &self.image).expect("equal sizes");
         measured.linear.relmse - self.relmse
     }
 }
 
-/// Values by name, each made once.
+/// Values by name, each computed once.
 struct Shared<T>(Mutex<BTreeMap<String, Arc<OnceLock<Arc<T>>>>>);
 
 impl<T> Shared<T> {
@@ -126,14 +126,15 @@ pub(super) fn reference(scene: &TableScene) -> Arc<Reference> {
     ALL.get(scene.name.to_owned(), || Reference::new(scene))
 }
 
-/// Pictures of a method by different seeds, audited where the method is biased.
+/// Pictures of a method by different seeds, audited if the method is biased.
 pub(super) fn replicas(row: &Row, scene: &TableScene) -> Arc<Vec<RenderResult>> {
     static ALL: Shared<Vec<RenderResult>> = Shared::new();
     ALL.get(format!("{} {}", row.method.name(), scene.name), || {
         let one = |seed| {
             let result = picture(scene, row.method, sizes().spp, |settings| {
                 (settings.seed, settings.audit) = (seed, None);
-                // Out of reach: an audit towards an error counts its work in rays, not in seconds.
+                // Unreachable target: with an error target the audit counts its work in rays instead of
+                // seconds.
                 settings.stop.error = Some(1e-12);
             });
             assert_eq!(result.counters.dropped.total(), 0, "{}", scene.name);

@@ -1,4 +1,4 @@
-//! The properties that each method has in each scene.
+//! Properties of each method in each scene.
 
 use super::pictures::{is_small, picture, reference, replicas, values};
 use super::scenes::{SCENES, TableScene, traps};
@@ -17,10 +17,10 @@ use std::sync::mpsc;
 use std::thread;
 use std::time::Instant;
 
-/// Samples of a pixel where bits are compared: more than one set of photon maps.
+/// Samples per pixel in comparisons of bits: more than one set of photon maps.
 const FEW_SPP: u32 = 9;
 
-/// A picture whose bits are compared: not audited, and its tiles are cut at the border.
+/// An unaudited picture for comparisons of bits; the border cuts its tiles.
 fn few(scene: &TableScene, row: &Row, spp: u32, change: impl FnOnce(&mut Settings)) -> RenderResult {
     picture(scene, row.method, spp, |s| {
         (s.width, s.height) = (20, 20);
@@ -28,7 +28,7 @@ fn few(scene: &TableScene, row: &Row, spp: u32, change: impl FnOnce(&mut Setting
     })
 }
 
-/// Calls `each` with every scene and complains of all that failed at once.
+/// Calls `each` with every scene and reports all failures at once.
 fn in_each_scene(each: impl Fn(&TableScene) -> Result<(), String>) {
     let judged = SCENES.iter().map(|scene| each(scene).map_err(|why| format!("{}: {why}", scene.name)));
     let failed: Vec<String> = judged.filter_map(Result::err).collect();
@@ -39,7 +39,7 @@ fn equal(a: &RenderResult, b: &RenderResult, text: &str) -> Result<(), String> {
     if a.image == b.image { Ok(()) } else { Err(format!("other bits {text}")) }
 }
 
-/// Pictures are the same on one thread and on more, by the lowest and by the highest instruction set.
+/// Pictures have the same bits on one thread and on more, with the lowest and the highest instruction set.
 pub(super) fn same_bits(row: &Row) {
     in_each_scene(|scene| {
         let with =
@@ -51,8 +51,7 @@ pub(super) fn same_bits(row: &Row) {
     });
 }
 
-/// Means of blocks are those of plain path tracing, within the noise of both and the bias that the method may
-/// have.
+/// Means of blocks agree with plain path tracing within the noise of both and the method's allowed bias.
 pub(super) fn agreement(row: &Row) {
     in_each_scene(|scene| {
         let reference = reference(scene);
@@ -65,7 +64,7 @@ pub(super) fn agreement(row: &Row) {
                 false => bias_of_mean * b,
             })
         };
-        // For those who choose the bias of a row.
+        // Prints the smallest bias that passes, for the choice of a row's bias.
         let least = |judge: &dyn Fn(f64) -> bool| (0..100).map(|i| f64::from(i) / 200.0).find(|b| judge(*b));
         let (blocks, mean) = (least(&|b| judge(b, 1.0).is_ok()), least(&|b| judge(1.0, b).is_ok()));
         println!("{} {}: bias of blocks {blocks:?}, of the mean {mean:?}", row.method.name(), scene.name);
@@ -75,8 +74,7 @@ pub(super) fn agreement(row: &Row) {
     });
 }
 
-/// A dark room beside a bright one is black to the last pixel, whether its light is thrown by a mirror or
-/// not.
+/// A dark room beside a bright one is black in every pixel, with and without a caustic mirror.
 pub(super) fn no_leak(row: &Row) {
     let mut mirrored = bright_and_dark();
     let mirror = mirrored.material(Material { surface: metal(0.0), ..Material::GREY });
@@ -93,8 +91,8 @@ pub(super) fn no_leak(row: &Row) {
     }
 }
 
-/// A render takes no byte more than it is given, says so where that does not suffice, and takes as much for
-/// many samples as for few.
+/// A render never exceeds its memory, reports memory that does not suffice, and needs no more for 40 samples
+/// than for 2.
 pub(super) fn exact_memory(row: &Row) {
     let buffers = cornell_box();
     let scene = buffers.scene();
@@ -118,7 +116,7 @@ pub(super) fn exact_memory(row: &Row) {
     }
 }
 
-/// A film that was left in the middle goes on to the bits of one run, whatever its rounds and threads were.
+/// A resumed film has the bits of an uninterrupted one, whatever its rounds and threads were.
 pub(super) fn resume(row: &Row) {
     in_each_scene(|scene| {
         let name = format!("halflight-table-{}-{}-{}", std::process::id(), row.method.name(), scene.name);
@@ -132,8 +130,8 @@ pub(super) fn resume(row: &Row) {
     });
 }
 
-/// The share of pictures whose interval has to cover their error. Intervals of 95 % are estimates, wide and
-/// narrow by turns at the few samples of these pictures.
+/// Share of pictures whose 95 % interval must cover their error. With few samples the intervals themselves
+/// are noisy estimates.
 const COVERED: f64 = 0.85;
 
 /// Intervals of relMSE cover the relMSE against the reference as often as they promise, over all scenes.
@@ -145,7 +143,7 @@ pub(super) fn coverage(row: &Row) {
         for replica in replicas(row, scene).iter() {
             let error = reference.error(&replica.image);
             let interval = replica.error.expect("an estimate");
-            // The noise of the reference is known on average, not in this picture.
+            // Only the expected noise of the reference is known, not its noise in this picture.
             let range = interval.lower - reference.relmse..=interval.upper + reference.relmse;
             here += u32::from(range.contains(&error));
             count += 1;
@@ -157,20 +155,20 @@ pub(super) fn coverage(row: &Row) {
     assert!(is_small() || f64::from(covered) >= COVERED * f64::from(count), "{covered} of {count}:{text}");
 }
 
-/// No render here takes longer, on a machine that does much else.
+/// Upper bound on the time of a render, on a busy machine.
 const DEADLINE: Duration = Duration::from_secs(120);
 
-/// Seconds after which a render is ended.
+/// Time limit of a render, seconds.
 const SECONDS: f64 = 0.4;
 
-/// Scenes that keep light for good are ended by the clock and by an interruption, with a picture.
+/// The clock and an interrupt end scenes that trap light, with a picture.
 pub(super) fn ends(row: &Row) {
     for is_interrupted in [false, true] {
         for (name, buffers) in traps() {
             let result = ended(buffers, row, is_interrupted);
             let ending = if is_interrupted { Ending::Interrupted } else { Ending::Done };
             assert_eq!(result.ending, ending, "{name}");
-            // On a machine that does much else the end may come before each pixel has a sample.
+            // On a busy machine the end may come before each pixel has a sample.
             assert_eq!(result.spp > 0, result.filled_pixels == 0, "{name}");
             assert!(result.image.pixels.iter().flatten().all(|value| value.is_finite()), "{name}");
             assert!(result.image.mean()[1] > 0.0, "{name}");
@@ -178,7 +176,7 @@ pub(super) fn ends(row: &Row) {
     }
 }
 
-/// The picture of `buffers`, which the clock or an interruption ends after [`SECONDS`].
+/// Picture of `buffers`, ended by the clock or an interrupt after [`SECONDS`].
 fn ended(buffers: SceneBuffers, row: &Row, is_interrupted: bool) -> RenderResult {
     let (sender, receiver) = mpsc::channel();
     let method = Some(row.method);

@@ -1,4 +1,4 @@
-//! The scenes of the table: small, and each with light that some method gets wrong first.
+//! Small scenes of the table, each with light that some method is prone to get wrong.
 
 use glam::{Mat3, Vec3};
 use halflight_core::Rgb;
@@ -11,7 +11,7 @@ use halflight_tests::scenes::{
     lamp_before, lamp_over_ball, metal, varnish, varnished,
 };
 
-/// A scene by name, with the limit of segments that its pictures have.
+/// A named scene with the limit of path segments of its pictures.
 pub(crate) struct TableScene {
     pub(crate) name: &'static str,
     make: fn() -> SceneBuffers,
@@ -30,7 +30,7 @@ impl TableScene {
     }
 }
 
-/// The columns of the table.
+/// Columns of the table.
 pub(crate) const SCENES: &[TableScene] = &[
     TableScene::new("box", cornell_box),
     TableScene { max_depth: Some(3), ..TableScene::new("box-one-bounce", cornell_box) },
@@ -52,7 +52,7 @@ fn bright_room() -> SceneBuffers {
     buffers
 }
 
-/// A row of closed rooms, a lamp in each; the camera is in the first.
+/// A row of closed rooms with a lamp in each; the camera is in the first.
 pub(crate) fn rooms(count: u16) -> SceneBuffers {
     let camera = Camera::look_at(Vec3::new(0.1, 0.5, 0.9), Vec3::new(0.6, 0.4, 0.2), Vec3::Y, 70.0);
     let mut buffers = SceneBuffers::new(camera);
@@ -66,7 +66,7 @@ pub(crate) fn rooms(count: u16) -> SceneBuffers {
     buffers
 }
 
-/// Twelve of them, with a ball of metal in the first and in the last.
+/// Twelve rooms with a metal ball in the first and the last.
 pub(crate) fn rooms_with_balls() -> SceneBuffers {
     let mut buffers = rooms(12);
     let metal = buffers.material(Material { surface: metal(0.0), ..Material::GREY });
@@ -77,7 +77,7 @@ pub(crate) fn rooms_with_balls() -> SceneBuffers {
     buffers
 }
 
-/// A room with one window, and a pillar in it. The camera is inside.
+/// A room with one window and a pillar, seen from inside.
 pub(crate) fn room_with_window() -> SceneBuffers {
     let camera = Camera::look_at(Vec3::new(0.2, 1.2, 0.2), Vec3::new(3.0, 0.6, 2.0), Vec3::Y, 70.0);
     let mut scene = SceneBuffers::new(camera);
@@ -89,7 +89,7 @@ pub(crate) fn room_with_window() -> SceneBuffers {
     scene.quad([a, corner(4.0, 0.0, 0.0), corner(4.0, 2.0, 0.0), corner(0.0, 2.0, 0.0)], grey);
     scene.quad([a, corner(0.0, 2.0, 0.0), corner(0.0, 2.0, 3.0), corner(0.0, 0.0, 3.0)], grey);
     scene.quad([corner(0.0, 0.0, 3.0), corner(0.0, 2.0, 3.0), b, corner(4.0, 0.0, 3.0)], grey);
-    // The wall with the window: below, above, and on both sides of it.
+    // Wall with the window: below, above and on both sides of it.
     for (low, high) in [([0.0, 0.0], [0.8, 3.0]), ([1.6, 0.0], [2.0, 3.0])] {
         let at = |y: f32, z: f32| corner(4.0, y, z);
         scene.quad([at(low[0], 0.0), at(low[0], 3.0), at(high[0], 3.0), at(high[0], 0.0)], grey);
@@ -114,7 +114,7 @@ const SKY_TEXELS: [[f32; 3]; 32] = {
     texels
 };
 
-/// The map of [`with_sky`].
+/// Map of [`with_sky`].
 pub(crate) static SKY: [Texture<'static>; 1] = [Texture {
     width: 8,
     height: 4,
@@ -123,7 +123,7 @@ pub(crate) static SKY: [Texture<'static>; 1] = [Texture {
     transform: TextureTransform::IDENTITY,
 }];
 
-/// The same scene under [`SKY`].
+/// The scene lit by [`SKY`].
 pub(crate) fn with_sky(mut scene: SceneBuffers) -> SceneBuffers {
     let to_map = Mat3::from_rotation_y(0.7);
     scene.environment = Some(Environment { radiance: Rgb::ONE, map: Some(TextureId(0)), to_map });
@@ -161,8 +161,8 @@ fn cut_outs() -> SceneBuffers {
     scene
 }
 
-/// The Cornell box with varnish on all of its surfaces, a ball of rough metal and one of varnish, seen along
-/// its floor.
+/// The Cornell box with varnish on all surfaces, a ball of rough metal and a varnished ball, seen along its
+/// floor.
 pub(crate) fn varnished_box(roughness: f32) -> SceneBuffers {
     let mut buffers = varnished(cornell_box(), roughness);
     buffers.normals = vec![[0.0; 3]; buffers.positions.len()];
@@ -174,7 +174,7 @@ pub(crate) fn varnished_box(roughness: f32) -> SceneBuffers {
     buffers
 }
 
-/// Lights of each kind without a surface, in a room with rough metal and a mirror.
+/// Every kind of light without surface, in a room with rough metal and a mirror.
 fn point_lights() -> SceneBuffers {
     let mut buffers = in_a_room(lamp_before(metal(0.5), 0.3));
     let at = Vec3::new(0.0, 1.5, 0.5);
@@ -192,14 +192,14 @@ fn point_lights() -> SceneBuffers {
     buffers
 }
 
-/// Everything except the point light: no path finds its caustics by chance, and references are by such paths.
+/// [`everything`] without its point light, whose caustics no path of a reference finds by chance.
 fn everything_that_paths_find() -> SceneBuffers {
     let mut buffers = everything();
     buffers.lights.clear();
     buffers
 }
 
-/// Everything, and caustics that are worth photons: of a lamp that has no size, by a wide mirror.
+/// [`everything`] with a caustic worth photons: a wide mirror throws light of a delta light.
 pub(crate) fn everything_by_a_mirror() -> SceneBuffers {
     let mut buffers = everything();
     let mirror = buffers.material(Material { surface: metal(0.0), ..Material::GREY });
@@ -210,7 +210,7 @@ pub(crate) fn everything_by_a_mirror() -> SceneBuffers {
     buffers
 }
 
-/// Scenes in which light stays for good.
+/// Scenes that trap light.
 pub(crate) fn traps() -> [(&'static str, SceneBuffers); 4] {
     let mut mirrors = closed_box(Surface::Mirror { reflectance: Rgb::ONE.into() });
     mirrors.lights.push(point_light(Vec3::new(0.5, 0.9, 0.5)));
@@ -229,7 +229,7 @@ fn point_light(position: Vec3) -> PointLight {
     PointLight::Point { position, intensity: Rgb::splat(10.0) }
 }
 
-/// A point light in a cube of glass over a floor; in a second cube within the first, if `nested`.
+/// A point light in a glass cube over a floor; if `nested`, in a second cube within the first.
 pub(crate) fn glass_cube(nested: bool) -> SceneBuffers {
     let camera = Camera::look_at(Vec3::new(6.0, 3.0, 5.0), Vec3::NEG_Y, Vec3::Y, 50.0);
     let mut buffers = SceneBuffers::new(camera);
