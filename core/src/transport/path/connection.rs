@@ -1,23 +1,22 @@
-//! Connections between the vertices of neighbouring paths, for path reuse: their geometry, and the form
-//! factor between them.
+//! Connections between vertices of neighbouring paths for path reuse: geometry and form factor.
 
 use crate::geometry::Ray;
 use crate::scene::SurfacePoint;
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
-/// Below this cosine of the viewer the shading normal may have been turned to the viewer: no two viewers then
-/// see the same surface.
+/// Minimum cosine of the viewer. Below it the shading normal may have been turned to the viewer, so that two
+/// viewers do not see the same surface.
 const HORIZON: f32 = 2e-3;
 
-/// One end of a connection. Both normals are on the side of the other end.
+/// End of a connection. Both normals point to the side of the other end.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C)]
 pub(super) struct ConnectionVertex {
     pub(super) position: [f32; 3],
-    /// Bound of the error of `position`.
+    /// Error bound of `position`.
     error: f32,
-    /// The shading normal.
+    /// Shading normal.
     pub(super) normal: [f32; 3],
     geometric_normal: [f32; 3],
 }
@@ -32,13 +31,13 @@ impl ConnectionVertex {
         }
     }
 
-    /// The position, moved off the surface.
+    /// Position, offset from the surface.
     #[inline]
     fn outside(&self) -> Vec3 {
         Vec3::from(self.position) + self.error * Vec3::from(self.geometric_normal)
     }
 
-    /// The ray from here to `other` that meets neither surface.
+    /// Ray to `other` that hits neither surface.
     #[inline]
     pub(super) fn ray_to(&self, other: &ConnectionVertex) -> Ray {
         let origin = self.outside();
@@ -46,8 +45,8 @@ impl ConnectionVertex {
     }
 }
 
-/// g = cos θ_x cos θ_y / |x - y|²: density per area, up to π, with which a path from the diffuse point `x`
-/// meets `y`. Zero where the two are not on the same side of each other.
+/// g = cos θ_x cos θ_y / |x - y|²: density per area, up to a factor π, with which a path from the diffuse
+/// point `x` hits `y`. Zero if x and y do not face each other.
 #[inline]
 pub(super) fn density(x: &ConnectionVertex, y: &ConnectionVertex) -> f32 {
     let between = Vec3::from(y.position) - Vec3::from(x.position);

@@ -18,7 +18,7 @@ use crate::transport::wavefront::driver::TO_ENVIRONMENT;
 use glam::Vec3;
 
 impl<F: Features, E: Estimator<F>, R: Sharing> PathIntegrator<'_, F, E, R> {
-    /// Takes light samples at `vertex`, and puts their shadow rays into the queue.
+    /// Takes light samples at `vertex` and queues their shadow rays.
     #[inline]
     pub(super) fn direct(
         &self,
@@ -33,13 +33,13 @@ impl<F: Features, E: Estimator<F>, R: Sharing> PathIntegrator<'_, F, E, R> {
             return;
         }
         let (point, normal) = (vertex.point, vertex.normal);
-        // A visibility table is of one side.
+        // A visibility table holds for one side only.
         let table =
             if normal == Vec3::ZERO { None } else { lights.visibility(point.position, point.frame.normal) };
         for part in 0..rest.light_samples {
             let sampler = match rest.light_samples {
                 1 => vertex.sampler,
-                // The samples of all paths of the pixel are a net.
+                // The light samples of all paths of a pixel together form a net.
                 count => {
                     let PathVertex { pixel, sample, .. } = *vertex;
                     let index = (sample >> 1).wrapping_mul(count).wrapping_add(part);
@@ -64,8 +64,8 @@ impl<F: Features, E: Estimator<F>, R: Sharing> PathIntegrator<'_, F, E, R> {
         }
     }
 
-    /// The shadow ray of a light sample, and its contribution to the pixel if nothing is in its way. The
-    /// radiance of the environment is looked up `later`.
+    /// Shadow ray of a light sample, and its unoccluded contribution to the pixel. With `later` the radiance
+    /// of the environment is looked up after the shadow ray.
     #[inline]
     fn light_contribution(
         &self,

@@ -1,5 +1,5 @@
-//! The boundary between the path tracer and the methods that build on it: an [`Estimator`] knows some of the
-//! light at the vertices of a path from a structure of its own, and the path finds the rest.
+//! Interface between the path tracer and the methods that build on it: an [`Estimator`] supplies part of the
+//! light at a vertex from a data structure, and the path finds the rest.
 
 use super::vertex::PathVertex;
 use crate::Rgb;
@@ -15,23 +15,23 @@ use bytemuck::Pod;
 use core::ops::Range;
 use glam::Vec3;
 
-/// Light that an estimator knows at a vertex.
+/// Light that an estimator supplies at a vertex.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct KnownLight {
     /// Contribution to the pixel: radiance times the throughput of the path.
     pub contribution: Rgb,
-    /// Expected error of the radiance by the width of a density estimate.
+    /// Expected error of the radiance due to the kernel width of a density estimate.
     pub blur: Rgb,
 }
 
-/// Light that is left for the path at a vertex.
+/// Light that the path still has to find behind a vertex.
 #[derive(Clone, Copy, Debug)]
 pub struct Rest {
-    /// Classes behind the wide lobes of the surface; `None` where the estimator knows them all.
+    /// Classes behind the wide lobes of the surface; `None` if the estimator supplies all of them.
     pub(in crate::transport) wide: Option<Components>,
     /// Classes behind a mirror or a narrow coat.
     pub(in crate::transport) narrow: Components,
-    /// Whether direct light is known, except that of a narrow coat.
+    /// Whether the estimator supplies direct light, except through a narrow coat.
     pub(in crate::transport) is_lit: bool,
     /// Number of light samples of next-event estimation.
     pub(in crate::transport) light_samples: u32,
@@ -40,19 +40,19 @@ pub struct Rest {
 }
 
 impl Rest {
-    /// All light that the path of `vertex` is to find.
+    /// All light that the path of `vertex` still has to find.
     #[inline]
     pub(in crate::transport) fn all(vertex: &PathVertex) -> Self {
         Self::of(vertex.rest)
     }
 
-    /// Light of these classes.
+    /// Light of `classes`.
     #[inline]
     pub(in crate::transport) fn of(classes: Components) -> Self {
         Self { wide: Some(classes), narrow: classes, is_lit: false, light_samples: 1, ends: false }
     }
 
-    /// Light that neither of two estimators knows.
+    /// Light that neither of two estimators supplies.
     #[inline]
     fn and(self, other: Self) -> Self {
         Self {
@@ -65,51 +65,51 @@ impl Rest {
     }
 }
 
-/// Emission that a path meets by BSDF sampling.
+/// Emission that a path hits by BSDF sampling.
 #[derive(Clone, Copy, Debug)]
 pub enum EmissionHit {
-    /// Of the environment, in a direction from a position.
+    /// Emission of the environment along `direction`, seen from `position`.
     Environment { direction: Vec3, position: Vec3 },
-    /// Of a triangle, from a position on it in a direction.
+    /// Emission of a triangle from `position` along `direction`.
     Surface { triangle: u32, position: Vec3, direction: Vec3 },
 }
 
-/// What a method adds to path tracing, at the places where light enters a path. Every default adds nothing:
-/// with `()` the path tracer is that of the textbook.
+/// Extension of path tracing by a method, at the vertices where light enters a path. The defaults add
+/// nothing: with `()` the integrator is the plain path tracer.
 pub trait Estimator<F: Features>: Copy + Send + Sync {
-    /// Carried by each path beside the state of the path tracer; all zero at the start.
+    /// State per path beside the state of the path tracer; zero at the start.
     type State: Pod;
-    /// Result of the look-up for a vertex.
+    /// Result of the lookup for a vertex.
     type Found: Copy + Default;
-    /// Whether the estimator knows the bases of narrow coats alone, so that those coats are sampled apart.
+    /// Whether the estimator supplies light of the bases of narrow coats only, so that these coats are
+    /// sampled separately.
     const SEPARATES_COATS: bool = false;
 
-    /// Light samples of a vertex, at most.
+    /// Maximum number of light samples per vertex.
     #[inline]
     fn light_samples(&self, _context: &SceneContext<F>) -> u32 {
         1
     }
 
-    /// Light of a sample of the pixel at `place` in its tile that its path has no part in.
+    /// Light added to a sample of the pixel `place` of the tile, independent of the sample's path.
     #[inline]
     fn splat(&self, _place: u32) -> Rgb {
         Rgb::ZERO
     }
 
-    /// Shadow rays of a vertex beside those of light samples, at most.
+    /// Maximum number of shadow rays per vertex beside those of light samples.
     #[inline]
     fn connections(&self) -> u32 {
         0
     }
 
-    /// Factor on light that `point` reflects to the path, which arrives from its last vertex at `from`.
+    /// Factor on the light that `point` reflects to the path, whose last vertex is at `from`.
     #[inline]
     fn share_left(&self, _state: &Self::State, _from: Vec3, (_point, _bsdf): (&SurfacePoint, &Bsdf)) -> f32 {
         1.0
     }
 
-    /// Calls `push` with shadow rays from `vertex`, each with its contribution to the pixel if nothing is in
-    /// its way.
+    /// Calls `push` with shadow rays from `vertex` and their unoccluded contributions to the pixel.
     #[inline]
     fn connect(
         &self,
@@ -120,7 +120,7 @@ pub trait Estimator<F: Features>: Copy + Send + Sync {
     ) {
     }
 
-    /// Looks a structure up for a block of surface points, those at the ends of the rays of `range`, before
+    /// Looks up the data structure for a block of surface points, the hits of the rays in `range`, before
     /// they are shaded.
     #[inline]
     fn look_up(
@@ -133,7 +133,7 @@ pub trait Estimator<F: Features>: Copy + Send + Sync {
     ) {
     }
 
-    /// Calls `add` with light that is known at `vertex`. Returns the light that is left for the path.
+    /// Calls `add` with the light supplied at `vertex`. Returns the light that the path still has to find.
     #[inline]
     fn at_vertex(
         &self,
@@ -146,7 +146,7 @@ pub trait Estimator<F: Features>: Copy + Send + Sync {
         Rest::all(vertex)
     }
 
-    /// MIS weight of emission that was met by BSDF sampling, from its `weight` in plain path tracing.
+    /// MIS weight of emission hit by BSDF sampling, given its `weight` in plain path tracing.
     #[inline]
     fn weight_hit(
         &self,
@@ -158,7 +158,7 @@ pub trait Estimator<F: Features>: Copy + Send + Sync {
         weight
     }
 
-    /// MIS weight of a light sample in the local direction `wi`, from its `weight` in plain path tracing.
+    /// MIS weight of a light sample in the local direction `wi`, given its `weight` in plain path tracing.
     #[inline]
     fn weight_light(
         &self,
@@ -171,7 +171,7 @@ pub trait Estimator<F: Features>: Copy + Send + Sync {
         weight
     }
 
-    /// The path leaves `vertex` by `sample`, of a narrow lobe or a wide one.
+    /// Called when the path leaves `vertex` by `sample`, of a narrow or a wide lobe.
     #[inline]
     fn scattered(
         &self,
@@ -188,7 +188,7 @@ impl<F: Features> Estimator<F> for () {
     type Found = ();
 }
 
-/// Two estimators, the first of which has no state: a cache, and merging beside it.
+/// Pair of estimators, the first of them stateless: a cache, and merging beside it.
 impl<F: Features, A: Estimator<F, State = ()>, B: Estimator<F>> Estimator<F> for (A, B) {
     type State = B::State;
     type Found = (A::Found, B::Found);

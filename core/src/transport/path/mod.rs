@@ -1,18 +1,18 @@
-//! The path tracer that renders: unidirectional, with next-event estimation and multiple importance sampling
-//! (Kajiya 1986; Veach 1997, chapter 9).
+//! Unidirectional path tracer with next-event estimation and multiple importance sampling (Kajiya 1986; Veach
+//! 1997, chapter 9).
 //!
 //! The plain algorithm is [`crate::transport::path::reference`]. Departures from it:
 //! 1. All paths of a wave advance together (`wavefront/`).
-//! 2. Shadow rays are traced after all vertices of the wave are shaded; light is added to the path then.
+//! 2. Shadow rays are traced after all vertices of the wave are shaded; their light is added to the path then.
 //! 3. Code for features that the scene does not have is not compiled in ([`Features`]).
-//! 4. An [`Estimator`] knows some of the light at a vertex: a cache, photon maps, photons that paths merge
-//!    with. A path tracer without one is the plain algorithm, to the bit.
-//! 5. Where that pays, pixels of a circle share the light that their paths find ([`PathReuse`]).
-//! 6. Pixels at the border of a lamp trace rays of their own for its emission (`silhouette.rs`).
+//! 4. An [`Estimator`] supplies part of the light at a vertex: a cache, photon maps, or photons to merge with.
+//!    Without one the result equals the plain algorithm to the bit.
+//! 5. If it pays, pixels of a circle share the light that their paths find ([`PathReuse`]).
+//! 6. Pixels on the border of a lamp trace extra rays for its emission (`silhouette.rs`).
 //!
-//! The price: about 200 bytes for each path of a wave. The radiance of a pixel depends on (seed, sample) and
-//! the pixels of its circle only, no wave cuts a circle, and samples are summed in their order: the picture
-//! has the same bits for any size of wave and any distribution of tasks.
+//! The price: about 200 bytes per path of a wave. The radiance of a pixel depends only on (seed, sample) and
+//! the pixels of its circle, no wave cuts a circle, and samples are summed in order: the picture has the same
+//! bits for any wave size and any distribution of tasks.
 
 mod connection;
 mod direct;
@@ -48,8 +48,8 @@ use crate::transport::settings::{Counters, PathSettings};
 use crate::transport::walk::context::SceneContext;
 use crate::transport::walk::dimension;
 
-/// Path tracing of one scene: a pass whose tasks are the tiles of the picture. The estimator `E` knows some
-/// of the light from a structure; by the rule `R` pixels share the light that their paths find.
+/// Path tracing of one scene: a pass whose tasks are the tiles of the picture. The estimator `E` supplies
+/// part of the light; the rule `R` shares the light of paths among pixels.
 #[derive(Clone, Copy)]
 pub struct PathIntegrator<'a, F, E = (), R = ()> {
     pub(in crate::transport) context: SceneContext<'a, F>,
@@ -59,8 +59,7 @@ pub struct PathIntegrator<'a, F, E = (), R = ()> {
 }
 
 impl<'a, F: Features> PathIntegrator<'a, F> {
-    /// A path tracer over frozen structures. `F` has at least the features of the scene
-    /// ([`crate::census`] tells which).
+    /// A path tracer over frozen structures. `F` has at least the features of the scene ([`crate::census`]).
     pub fn new(
         scene: &'a Scene<'a>,
         bvh: &'a Bvh<'a>,
@@ -72,41 +71,41 @@ impl<'a, F: Features> PathIntegrator<'a, F> {
         Self { context, settings, estimator: (), sharing: () }
     }
 
-    /// Working memory of one task that advances `wave` paths together.
+    /// Scratch memory of one task that advances `wave` paths together.
     pub fn scratch(wave: usize) -> Footprint {
         Self::scratch_with::<(), ()>(wave)
     }
 
-    /// The same with an estimator and a rule of sharing.
+    /// Scratch memory with an estimator and a sharing rule.
     pub fn scratch_with<E: Estimator<F>, R: Sharing>(wave: usize) -> Footprint {
         PathWave::<E::State, R>::footprint(wave)
     }
 }
 
 impl<'a, F: Features, E: Estimator<F>, R: Sharing> PathIntegrator<'a, F, E, R> {
-    /// The same with another estimator.
+    /// This path tracer with another estimator.
     pub(in crate::transport) fn with_estimator<O>(&self, estimator: O) -> PathIntegrator<'a, F, O, R> {
         let Self { context, settings, sharing, .. } = *self;
         PathIntegrator { context, settings, estimator, sharing }
     }
 
-    /// The same with another rule of sharing.
+    /// This path tracer with another sharing rule.
     pub(in crate::transport) fn with_sharing<O>(&self, sharing: O) -> PathIntegrator<'a, F, E, O> {
         let Self { context, settings, estimator, .. } = *self;
         PathIntegrator { context, settings, estimator, sharing }
     }
 
-    /// Whether paths have a limit of depth.
+    /// Whether the depth of paths is limited.
     pub fn is_limited(&self) -> bool {
         self.settings.is_limited()
     }
 
-    /// Number of tasks: tiles of the film.
+    /// Number of tasks, the tiles of the film.
     pub fn tasks(&self) -> usize {
         Tile::count(self.settings.width, self.settings.height)
     }
 
-    /// The camera ray of a sample of the pixel in column `x` and row `y`.
+    /// Camera ray of a sample of the pixel in column `x` and row `y`.
     #[inline]
     pub(in crate::transport) fn camera_ray(&self, [x, y]: [u32; 2], sampler: &Sampler) -> Ray {
         let PathSettings { width, height, .. } = self.settings;
@@ -116,7 +115,7 @@ impl<'a, F: Features, E: Estimator<F>, R: Sharing> PathIntegrator<'a, F, E, R> {
         camera.ray(width, height, x as f32 + dx, y as f32 + dy, lens)
     }
 
-    /// Traces the first `count` rays of the wave, and follows their paths to the end.
+    /// Traces the first `count` rays of the wave and follows their paths to the end.
     pub(in crate::transport) fn advance(
         &self,
         wave: &mut PathWave<E::State, R>,
@@ -127,7 +126,7 @@ impl<'a, F: Features, E: Estimator<F>, R: Sharing> PathIntegrator<'a, F, E, R> {
         self.trace_to_end(wave, count, counters);
     }
 
-    /// Follows the paths of the first `count` rays, which were traced, to the end.
+    /// Follows the paths of the first `count` rays, already traced, to the end.
     pub(in crate::transport) fn trace_to_end(
         &self,
         PathWave { wave, memory }: &mut PathWave<E::State, R>,

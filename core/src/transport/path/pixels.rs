@@ -1,4 +1,4 @@
-//! Path tracing of single pixels, far apart, for an audit ([`crate::estimate`]).
+//! Path tracing of scattered single pixels for an audit ([`crate::estimate`]).
 
 use super::PathIntegrator;
 use super::estimator::Estimator;
@@ -12,10 +12,11 @@ use crate::transport::settings::Counters;
 use core::ops::Range;
 
 impl<F: Features, E: Estimator<F>> PathIntegrator<'_, F, E> {
-    /// Traces `samples` of the pixels in these columns and rows, and adds them to `out`, one for one.
+    /// Traces `samples` of the pixels in these columns and rows, and adds them to `out`, in the order of
+    /// `pixels`.
     ///
     /// # Errors
-    /// [`OutOfMemory`] where `scratch` has less than [`PathIntegrator::scratch_with`] bytes.
+    /// [`OutOfMemory`] if `scratch` has less than [`PathIntegrator::scratch_with`] bytes.
     pub fn probe(
         &self,
         pixels: &[[u32; 2]],
@@ -32,7 +33,7 @@ impl<F: Features, E: Estimator<F>> PathIntegrator<'_, F, E> {
             .enumerate()
             .flat_map(|(place, pixel)| samples.clone().map(move |sample| (place as u32, *pixel, sample)));
         let mut all = all.peekable();
-        // A bit for each of the first pixels; others are path traced alone.
+        // One bit for each of the first 64 pixels; the others take no extra rays for lamps.
         let outlined = pixels.iter().take(u64::BITS as usize).enumerate().fold(0, |bits, (place, pixel)| {
             let is = is_outlined(self.context.scene, self.context.lights, &self.settings, *pixel);
             bits | u64::from(is) << place

@@ -1,5 +1,5 @@
-//! The path tracer of the textbook: one path at a time, one ray at a time. It is what
-//! [`crate::transport::path`] is tested against, and it says in order what that does in pieces.
+//! Textbook path tracer: one path and one ray at a time, in the order of the theory.
+//! [`crate::transport::path`] is tested against it.
 
 use super::silhouette::{self, is_outlined};
 use crate::bsdf::{All, Bsdf, Diffuse};
@@ -18,7 +18,7 @@ use crate::{Level, Rgb};
 use core::f32::consts::PI;
 use glam::Vec3;
 
-/// The radiance that sample number `sample` of the pixel in column `x` and row `y` sees.
+/// Radiance of sample `sample` of the pixel in column `x` and row `y`.
 pub fn radiance(
     scene: &Scene,
     bvh: &Bvh,
@@ -34,7 +34,7 @@ pub fn radiance(
     let lens = sampler.pair(dimension::LENS);
     let ray = scene.camera.ray(width, height, x as f32 + dx, y as f32 + dy, lens);
 
-    // The border of a lamp is looked at by other rays.
+    // Extra rays cover the lamps at pixels on their borders.
     let is_outlined = is_outlined(scene, lights, settings, [x, y]);
     let (from, normal) = (Vec3::ZERO, Vec3::ZERO);
     let start = Start { ray, from, normal, pdf: f32::INFINITY, triangle: MISS, segments: 1 };
@@ -49,8 +49,8 @@ pub fn radiance(
     radiance + lamps
 }
 
-/// An estimate of the irradiance of `point` on the side of its normal, in W/m², by one path: π times the
-/// radiance that a white diffuse surface would reflect. Each `sampler` gives an independent one.
+/// Irradiance estimate in W/m² at `point`, on the side of its normal, by one path: π times the radiance that
+/// a white diffuse surface would reflect. Each `sampler` gives an independent estimate.
 pub fn irradiance(
     scene: &Scene,
     bvh: &Bvh,
@@ -83,27 +83,27 @@ pub fn irradiance(
     (direct + follow(&context, sampler, max_depth, false, start)) * PI
 }
 
-/// Random numbers of the light sample at the vertex whose dimensions begin with `first`.
+/// Random numbers of the light sample at the vertex whose first dimension is `first`.
 fn light_numbers(sampler: &Sampler, first: u32) -> [f32; 3] {
     let [u, v] = sampler.pair(first + dimension::LIGHT);
     [u, v, sampler.single(first + dimension::LIGHT_CHOICE)]
 }
 
-/// A ray of a path, and the vertex that it leaves.
+/// Ray of a path, and the vertex at its origin.
 struct Start {
     ray: Ray,
     from: Vec3,
-    /// Shading normal there; zero where it transmits.
+    /// Shading normal at `from`; zero if the surface transmits.
     normal: Vec3,
-    /// Solid-angle density of the ray's direction; infinite if nothing else could have chosen it.
+    /// Solid-angle pdf of the ray's direction; infinite if no other technique can sample it.
     pdf: f32,
     triangle: u32,
-    /// The number of the ray's segment.
+    /// Segment number of the ray.
     segments: u32,
 }
 
 impl Start {
-    /// Light from infinitely far, and its weight.
+    /// Radiance of the environment and its MIS weight.
     fn escape(&self, context: &SceneContext<All>, direction: Vec3) -> (Rgb, f32) {
         let (scene, lights) = (context.scene, context.lights);
         let Some(environment) = &scene.environment else { return (Rgb::ZERO, 0.0) };
@@ -116,7 +116,7 @@ impl Start {
         (seen, if is_alone { 1.0 } else { environment_heuristic(lights, self.pdf, light_pdf) })
     }
 
-    /// Light of the surface that the ray has met at `point`, and its weight.
+    /// Emission of the surface at `point` and its MIS weight.
     fn emission(&self, context: &SceneContext<All>, point: &SurfacePoint, direction: Vec3) -> (Rgb, f32) {
         let (scene, lights) = (context.scene, context.lights);
         let seen = emitted(scene, point.triangle, point.uv, point.front);
@@ -129,7 +129,7 @@ impl Start {
     }
 }
 
-/// The radiance along the ray of `start`, without the emission of the first surface where that `is_outlined`.
+/// Radiance along the ray of `start`; if `is_outlined`, without emission of the first surface.
 fn follow(
     context: &SceneContext<All>,
     sampler: &Sampler,
@@ -150,7 +150,7 @@ fn follow(
         }
         let Some(point) = context.surface_at(&ray, &hit) else { break };
 
-        // Rounding, or a hole in the surface: on in the same direction.
+        // Skipped surface: by rounding, or a cut-out.
         let opacity = point.material.opacity.at::<All>(context.scene, point.uv);
         let met_again = hit.triangle == start.triangle || (segments == 1 && point.is_left_by(&ray));
         let transparent =
@@ -176,7 +176,7 @@ fn follow(
             radiance += light_sample(context, &point, &bsdf, wo, u, throughput);
         }
 
-        // The path goes on where the BSDF sends it.
+        // BSDF sampling.
         let [u, v] = dimension::scattering(sampler, segments);
         let lobe = sampler.single(first + dimension::LOBE);
         let Some(scattered) = bsdf.sample::<All>(wo, [u, v, lobe]) else { break };
@@ -187,7 +187,7 @@ fn follow(
         throughput *= scattered.weight;
         eta_squared *= scattered.eta * scattered.eta;
 
-        // Roulette.
+        // Russian roulette.
         let continuation_probability = continuation_probability(segments, throughput * eta_squared);
         if continuation_probability < 1.0 {
             if sampler.single(first + dimension::ROULETTE) >= continuation_probability {
@@ -210,7 +210,7 @@ fn follow(
     radiance
 }
 
-/// Next-event estimation at `point`: what its `bsdf` scatters towards `wo` from a light chosen by `u`, times
+/// Next-event estimation at `point`: light sampled by `u` that `bsdf` scatters towards `wo`, times
 /// `throughput`.
 fn light_sample(
     context: &SceneContext<All>,

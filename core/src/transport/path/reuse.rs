@@ -1,22 +1,21 @@
-//! Paths of neighbouring pixels share what they find (Bekaert, Sbert and Halton, "Accelerating path tracing
-//! by re-using paths", 2002).
+//! Path reuse among neighbouring pixels (Bekaert, Sbert and Halton, "Accelerating path tracing by re-using
+//! paths", 2002).
 //!
-//! Path j starts from a diffuse point x_j in its pixel and meets a diffuse point y_j, which reflects L_j.
-//! From every x_i of the circle y_j could have been met as well. The balance heuristic over all of them gives
-//! pixel i a share w_ij of what path j found:
+//! Path j leaves a diffuse point x_j of its pixel and hits a diffuse point y_j, which reflects L_j. A path
+//! from any other x_i of the circle could have hit y_j as well. The balance heuristic over all of them gives
+//! pixel i a share w_ij of L_j:
 //!
 //!   w_ij = V_ij g_ij / Σ_k V_kj g_kj,    g_kj = cos θ_k cos θ_y / |x_k - y_j|²
 //!
-//! with V the visibility between the two. The shares of one y_j add up to one: nothing is lost and nothing is
-//! counted twice, whatever V and g are, so the picture stays right in the mean. The price is one shadow ray
-//! for each pair, and errors that neighbours have in common.
+//! Here V is the visibility between the two points. The shares of one y_j sum to one for any V and g, so that
+//! the picture is unbiased. The price is one shadow ray per pair, and correlated errors of neighbours.
 //!
-//! Light that would show in the picture wherever it is shared, a flash, is shared up to a limit, which grows
-//! with the number of the sample; the rest stays with the path that found it. The limit is of the light of y,
-//! the same for all paths.
+//! A firefly that is shared shows in all pixels of its circle. Each sample is therefore shared up to a limit,
+//! which grows with the sample number; the rest stays with the path that found it. The limit applies to the
+//! light of y and is the same for all paths.
 //!
-//! Where y has a coat, what its diffuse part sends back is shared, times T(to x_i) / T(to x_j), the shares
-//! that pass the coat; what the coat mirrors belongs to path j alone.
+//! At a coated y, only light of the diffuse base is shared, times T(to x_i) / T(to x_j), the transmittances
+//! of the coat; light that the coat reflects belongs to path j alone.
 
 use super::PathIntegrator;
 use super::connection::{ConnectionVertex, density};
@@ -34,62 +33,62 @@ use crate::transport::wavefront::{PathState, Wavefront};
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
-/// A flash of the `n`th sample is what brings more light than this times the mean of the picture, times n and
-/// [`BEFORE_FLASHES`]: a sixteenth of it, in the mean of n samples, is a quarter of the mean.
+/// Firefly limit of sample n over the mean radiance of the picture and over (n + [`BEFORE_FLASHES`]). A
+/// sixteenth of 4 n, averaged over n samples, is a quarter of the mean.
 const FLASH: f32 = 4.0;
 
-/// With few samples all is noise, and flashes hardly show.
+/// Offset of the sample number: with few samples fireflies hardly stand out from noise.
 const BEFORE_FLASHES: u32 = 16;
 
-/// What covers the diffuse part of y. Only the light of that part is shared: what leaves y elsewhere is known
-/// from what left it here. The light of a coat is for the path alone that found it.
+/// Coat over the diffuse part of y. Only light of the base is shared, whose radiance towards x_i follows from
+/// that towards x_j by the transmittances. Light that the coat reflects stays with the path that found it.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C)]
 struct Coated {
     cover: Cover,
-    /// The part of the base in the light that a shadow ray brings to y.
+    /// Fraction of the base in the reflected light of the light sample at y.
     of_light: [f32; 3],
-    /// The part of the base in what the path finds behind y.
+    /// Fraction of the base in the reflected light that the path finds behind y.
     of_path: [f32; 3],
-    /// What of all this is known to be of the base.
+    /// Light of the base so far.
     base: [f32; 3],
 }
 
-/// What a path offers to its circle, and what it gets.
+/// State of path reuse per path: the light that it offers to its circle, and the light that it receives.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C)]
 pub struct ReuseState {
     x: ConnectionVertex,
     y: ConnectionVertex,
-    /// β behind x: what radiance from y is worth in the pixel.
+    /// β behind x: factor from radiance of y to the pixel.
     throughput: [f32; 3],
-    /// What the path gathered before y, and its shares of all L_j.
+    /// Radiance found before y, and the received shares of all L_j.
     radiance: [f32; 3],
-    /// Which circle the path belongs to.
+    /// Number of the circle of the path.
     circle: u32,
-    /// Segments up to x: under a limit of depth only equals can share.
+    /// Segments up to x. With a limit of depth only paths of equal `segments` share.
     segments: u16,
-    /// [`ALONE`] and so on.
+    /// Stage of the path: [`ALONE`], [`LEAVING`], [`TAKING`], [`OFFERING`], [`LIT`] or [`BEHIND`].
     stage: u16,
     coated: Coated,
 }
 
-/// The path has met no diffuse point yet.
+/// The path has not hit a diffuse point yet.
 const ALONE: u16 = 0;
-/// It has left x; what it meets is not known yet.
+/// The path has left x; its next surface is unknown.
 const LEAVING: u16 = 1;
-/// It met nothing that others can use, but takes part in what they offer.
+/// The surface after x cannot be shared, but the path receives shares of others.
 const TAKING: u16 = 2;
-/// It has met y, and gathers L.
+/// The path has hit y and gathers L.
 const OFFERING: u16 = 3;
-/// The same, y being coated: what the path has gathered came from a light.
+/// The path has hit a coated y; its radiance since then is of the light sample.
 const LIT: u16 = 4;
-/// The same, but it came from behind y.
+/// The path has left a coated y; its radiance since then comes from behind y.
 const BEHIND: u16 = 5;
 
 impl ReuseState {
-    /// The path scatters at a diffuse `point`, its x if it has none. Whether it has become that: it must go
-    /// on for certain then, if it carries any `throughput` from there.
+    /// Called when the path scatters at a diffuse `point`, which becomes x if the path has none. Returns
+    /// whether it became x; the path must then survive, if it carries any `throughput`.
     #[inline]
     fn leave(&mut self, point: &SurfacePoint, throughput: Rgb, segments: u32) -> bool {
         if self.stage != ALONE || throughput == Rgb::ZERO {
@@ -102,8 +101,8 @@ impl ReuseState {
         true
     }
 
-    /// The path is about to scatter at the next surface after x. Where that is fit to be met from elsewhere,
-    /// it becomes y: the path then gathers for all its circle, with throughput 1.
+    /// Called before the path scatters at the surface after x. If other paths can connect to this surface, it
+    /// becomes y, and the path gathers light for its circle, with throughput 1.
     #[inline]
     fn arrive(&mut self, point: &SurfacePoint, cover: Option<Cover>, path: &mut PathState) {
         if self.stage != LEAVING {
@@ -122,7 +121,7 @@ impl ReuseState {
         }
     }
 
-    /// The path has left y: what it has gathered so far came from a light.
+    /// Called after the path has left y: its radiance so far is of the light sample.
     #[inline]
     fn go_behind(&mut self, path: &mut PathState) {
         if self.stage == LIT {
@@ -131,7 +130,7 @@ impl ReuseState {
         }
     }
 
-    /// The path has ended: what it offers is what it has gathered, less what is its own.
+    /// Called after the path has ended: its offer is its radiance, less the part that belongs to it alone.
     #[inline]
     fn finish(&mut self, path: &mut PathState) {
         match self.stage {
@@ -143,7 +142,7 @@ impl ReuseState {
         self.stage = OFFERING;
     }
 
-    /// Divides what the path has gathered between base and coat.
+    /// Divides the radiance of the path between base and coat.
     fn divide(&mut self, part: [f32; 3], path: &mut PathState) {
         let light = Rgb::from(core::mem::take(&mut path.radiance));
         let base = light * Rgb::from(part);
@@ -151,7 +150,7 @@ impl ReuseState {
         self.take(1.0, light - base);
     }
 
-    /// What T of y at `x` is.
+    /// Transmittance T of the coat of y towards `x`.
     #[inline]
     fn transmittance(&self, x: &ConnectionVertex) -> Rgb {
         let to_x = Vec3::from(x.position) - Vec3::from(self.y.position);
@@ -159,7 +158,7 @@ impl ReuseState {
         self.coated.cover.transmittance(cosine.clamp(0.0, 1.0))
     }
 
-    /// What the pixel would see if nothing were shared, before it is.
+    /// Radiance of the sample without sharing; valid before shares are distributed.
     pub(super) fn alone(&self, path: &PathState) -> Rgb {
         let worth = if self.stage >= OFFERING { Rgb::from(self.throughput) } else { Rgb::ONE };
         Rgb::from(self.radiance) + worth * (Rgb::from(path.radiance) + Rgb::from(self.coated.base))
@@ -171,7 +170,7 @@ impl ReuseState {
     }
 }
 
-/// That path `taking` might have met what path `offering` did.
+/// Pair of paths: `taking` might have hit the point y of `offering`.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C)]
 pub struct Connection {
@@ -184,7 +183,7 @@ pub struct Connection {
 /// Path reuse: pixels of a circle share the light that their paths find.
 #[derive(Clone, Copy, Debug)]
 pub struct PathReuse {
-    /// Light of a sample, times the number of samples, above which it is shared in part only.
+    /// Radiance over the sample number, above which a sample is shared in part only.
     flash: f32,
 }
 
@@ -208,8 +207,8 @@ impl Sharing for PathReuse {
         state.arrive(point, bsdf.cover(), path);
     }
 
-    /// Behind x, whose light is shared, except at a coated y: of light that comes there in several ways the
-    /// base has no common part.
+    /// Light behind x is shared, except at a coated y before the path has left it: the fraction of the base
+    /// is not common to light from several directions.
     #[inline]
     fn may_connect(state: &ReuseState) -> bool {
         state.stage == OFFERING || state.stage == BEHIND
@@ -304,7 +303,7 @@ impl Sharing for PathReuse {
 }
 
 impl PathReuse {
-    /// Traces the first `rays` connections of the first `pairs` pairs, and gives each path its shares.
+    /// Traces the first `rays` connections of the first `pairs` pairs and distributes the shares.
     fn divide<F: Features, S>(
         &self,
         context: &SceneContext<F>,
@@ -325,7 +324,7 @@ impl PathReuse {
             if light == Rgb::ZERO {
                 continue;
             }
-            // Light that is not finite spoils, and is counted in, one pixel only.
+            // Light that is not finite stays in one pixel, where it is counted.
             if !light.is_finite() {
                 shared[first.offering as usize].take(1.0, light);
                 continue;
@@ -349,7 +348,7 @@ impl PathReuse {
     }
 }
 
-/// Multiplies the densities of `pairs` with the transmittance V of the first `rays` rays between them.
+/// Multiplies the densities of `pairs` by the transmittance V of the first `rays` rays between them.
 fn see<F: Features>(
     context: &SceneContext<F>,
     wave: &mut Wavefront,
@@ -366,22 +365,22 @@ fn see<F: Features>(
     context.trace_shadow_rays(&mut shadows, rays, &mut counters.shadow_rays, arrive);
 }
 
-/// The end of the circle of path `first`.
+/// End of the circle of path `first`.
 fn end_of_circle(states: &[ReuseState], first: usize) -> usize {
     let members = |other: &&ReuseState| other.circle == states[first].circle;
     first + states[first..].iter().take_while(members).count()
 }
 
 impl<'a, F: Features, E: Estimator<F>, R: Sharing> PathIntegrator<'a, F, E, R> {
-    /// The same, where pixels of a circle share the light that their paths find.
+    /// This path tracer with path reuse: pixels of a circle share the light that their paths find.
     pub fn with_reuse(&self) -> PathIntegrator<'a, F, E, PathReuse> {
         self.with_sharing(PathReuse { flash: f32::INFINITY })
     }
 }
 
 impl<F: Features, E: Estimator<F>> PathIntegrator<'_, F, E, PathReuse> {
-    /// The same, where samples that are bright next to the `mean` radiance of the picture are shared in part
-    /// only.
+    /// This path tracer with a firefly limit: samples much brighter than the `mean` radiance of the picture
+    /// are shared in part only.
     pub fn with_flashes(&self, mean: f32) -> Self {
         let flash = if mean > 0.0 { FLASH * mean } else { f32::INFINITY };
         Self { sharing: PathReuse { flash }, ..*self }

@@ -1,8 +1,8 @@
-//! A look at a few tiles before the picture: whether it pays that pixels share what their paths find.
+//! Reuse pilot: a test on a few tiles before the picture, whether path reuse pays.
 //!
-//! The same samples tell both: what a pixel would see by its own path alone, and what it sees with the
-//! shares. Sharing pays where the variance falls by a larger factor than the work grows. It does not where
-//! most of the error is in the direct light, or behind mirrors and glass.
+//! The same samples give both radiances of a pixel: of its own path alone, and with shares. Path reuse pays
+//! if the variance falls by a larger factor than the work grows. It does not pay if most of the error is in
+//! direct light, or behind mirrors and glass.
 
 use super::PathIntegrator;
 use super::estimator::Estimator;
@@ -18,80 +18,80 @@ use crate::transport::settings::Counters;
 use crate::transport::walk::component::Components;
 use bytemuck::Pod;
 
-/// Samples of each pixel of the pilot. The first alone tells how bright the picture is.
+/// Samples per pixel of the pilot. The mean radiance of the picture comes from sample 0 alone.
 const SAMPLES: u32 = 4;
 
-/// Tiles that a pilot needs: in all about as much work as two samples of every pixel of a thumbnail.
+/// Tiles of a pilot: in total about the work of two samples per pixel of a thumbnail.
 pub const PILOT_TILES: usize = 16;
 
-/// What a connection between two paths costs, in rays of the other kinds with all that is shaded at their
-/// ends (measured: 0.2 in a box, 0.3 in a room of 400,000 triangles).
+/// Cost of a connection between two paths, in other rays including the shading of their hits (measured: 0.2
+/// in a box, 0.3 in a room of 400,000 triangles).
 const CONNECTION: f32 = 0.3;
 
-/// The same where the light through cut-outs is followed from surface to surface.
+/// Cost of a connection in scenes with cut-outs, where shadow rays advance from surface to surface.
 const CONNECTION_THROUGH_CUTOUTS: f32 = 1.0;
 
-/// What the pilot has seen so far.
+/// Sums of a pilot.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Pilot {
-    /// Relative variance of samples that share nothing, added up over pixels.
+    /// Relative variance of samples without sharing, summed over pixels.
     alone: f64,
-    /// Relative variance of the same samples with sharing.
+    /// Relative variance of the same samples with sharing, summed over pixels.
     shared: f64,
-    /// Rays of paths.
+    /// Number of rays of paths.
     rays: f64,
-    /// Connections, in what they cost.
+    /// Cost of all connections, in rays.
     connections: f64,
-    /// Pairs of samples that were compared.
+    /// Number of pairs of samples compared.
     pairs: f64,
-    /// Variances alone and with sharing, relative to the light of a block, added up over so many blocks.
+    /// Variances without and with sharing, relative to the light of a block, summed over `blocks`.
     scatter: [f64; 2],
     blocks: f64,
     samples: f64,
 }
 
-/// Pixels of a block of a tile, 8 × 8.
+/// Pixels per block of a tile, 8 × 8.
 const BLOCK: usize = 64;
 
-/// What pairs of samples of a block have in common.
+/// Sums over the pairs of samples of a block.
 #[derive(Clone, Copy, Default)]
 struct Block {
     light: f32,
-    /// Squared differences alone, and with sharing.
+    /// Squared differences without and with sharing.
     squares: [f32; 2],
     pairs: f32,
 }
 
 impl Pilot {
-    /// By which factor sharing makes the variance smaller.
+    /// Factor by which sharing reduces the variance.
     pub fn gain(&self) -> f32 {
         if self.shared > 0.0 { (self.alone / self.shared) as f32 } else { 1.0 }
     }
 
-    /// By which factor it makes the work larger.
+    /// Factor by which sharing increases the work.
     pub fn cost(&self) -> f32 {
         1.0 + (self.connections / self.rays.max(1.0)) as f32
     }
 
-    /// The relative variance of a sample, as the relMSE has it; where no sample counts more than it has
-    /// itself.
+    /// Relative variance of a sample, as in relMSE. Each difference is relative to the light of its own pair,
+    /// so that no sample counts more than its own light.
     pub fn noise(&self, shared: bool) -> f64 {
-        // Of three channels, and twice that of one sample.
+        // Sums of three channels, and of differences, whose variance is twice that of a sample.
         (if shared { self.shared } else { self.alone }) / (6.0 * self.pairs.max(1.0))
     }
 
-    /// The same relative to the light of blocks of 8 × 8 pixels, so that a sample counts as much as it
-    /// scatters.
+    /// Relative variance of a sample over the light of blocks of 8 × 8 pixels, so that a sample counts by its
+    /// deviation.
     pub fn scatter(&self, shared: bool) -> f64 {
         self.scatter[usize::from(shared)] / (6.0 * self.blocks.max(1.0))
     }
 
-    /// The work of a sample of a pixel, in rays.
+    /// Work of a sample of a pixel, in rays.
     pub fn work(&self, shared: bool) -> f64 {
         (self.rays + if shared { self.connections } else { 0.0 }) / self.samples.max(1.0)
     }
 
-    /// Whether pixels should share.
+    /// Whether sharing pays.
     pub fn pays(&self) -> bool {
         self.gain() > self.cost()
     }
@@ -112,23 +112,22 @@ impl core::ops::AddAssign for Pilot {
 }
 
 impl<F: Features, E: Estimator<F>> PathIntegrator<'_, F, E> {
-    /// The tiles at which a pilot looks, spread over the picture.
+    /// Tiles of the pilot, spread over the picture.
     pub fn pilot_tasks(&self) -> impl Iterator<Item = usize> + use<F, E> {
         let (tasks, pilots) = (self.tasks(), self.tasks().min(PILOT_TILES));
         (0..pilots).map(move |i| (2 * i + 1) * tasks / (2 * pilots))
     }
 
-    /// The mean radiance of one tile by a first look.
+    /// Mean radiance of one tile, by one sample per pixel.
     ///
     /// # Errors
-    /// [`OutOfMemory`] where `scratch` has less than [`PathIntegrator::scratch_with`] bytes.
+    /// [`OutOfMemory`] if `scratch` has less than [`PathIntegrator::scratch_with`] bytes.
     pub fn pilot_mean(&self, task: usize, wave: usize, scratch: &mut Arena) -> Result<f32, OutOfMemory> {
         self.mean_of(None, task, wave, scratch)
     }
 
-    /// The same of light that is there beside the photons of [`PathIntegrator::with_caustics`]: paths that
-    /// meet a lamp by chance count by their weight, and lamps that the eye sees, itself or by mirrors and
-    /// glass, do not.
+    /// Mean radiance beside the photons of [`PathIntegrator::with_caustics`]: emission hit by BSDF sampling
+    /// counts by its weight; emitters that the camera sees, directly or by mirrors and glass, do not count.
     ///
     /// # Errors
     /// As [`PathIntegrator::pilot_mean`].
@@ -136,7 +135,7 @@ impl<F: Features, E: Estimator<F>> PathIntegrator<'_, F, E> {
         self.mean_of(Some(Components::UNSEEN), task, wave, scratch)
     }
 
-    /// The mean radiance of light of these classes, or of all.
+    /// Mean radiance of the classes `components`, or of all light.
     fn mean_of(
         &self,
         components: Option<Components>,
@@ -165,10 +164,10 @@ impl<F: Features, E: Estimator<F>> PathIntegrator<'_, F, E> {
         }
     }
 
-    /// Looks at one tile of a picture whose `mean` radiance is about that; nothing of it reaches the film.
+    /// Runs the pilot on one tile of a picture of about this `mean` radiance; no sample reaches the film.
     ///
     /// # Errors
-    /// [`OutOfMemory`] where `scratch` has less than [`PathIntegrator::scratch_with`] bytes.
+    /// [`OutOfMemory`] if `scratch` has less than [`PathIntegrator::scratch_with`] bytes.
     pub fn pilot(
         &self,
         task: usize,
@@ -182,7 +181,7 @@ impl<F: Features, E: Estimator<F>> PathIntegrator<'_, F, E> {
         let mut wave = PathWave::<E::State, PathReuse>::new(wave, &mut arena)?;
         let tile = Tile::new(self.settings.width, self.settings.height, task);
         let mut pilot = Pilot::default();
-        // A layer of all pixels after the other, as many at a time as there is memory for.
+        // One sample of all pixels after another, in batches of the wave's capacity.
         let mut places = TileSampler::new(tile, 0..SAMPLES);
         loop {
             let count = sharing.start(&mut places, &mut wave);
@@ -192,7 +191,7 @@ impl<F: Features, E: Estimator<F>> PathIntegrator<'_, F, E> {
             let mut counters = Counters::default();
             sharing.advance(&mut wave, count, &mut counters);
             pilot.rays += (counters.rays + counters.shadow_rays) as f64;
-            // The throughput of a path that has ended is free.
+            // The throughput of an ended path is free: it holds the radiance without sharing.
             for (path, state) in wave.wave.paths.iter_mut().zip(&*wave.memory.shared).take(count) {
                 path.throughput = state.alone(path).to_array();
             }
@@ -219,7 +218,7 @@ impl Pilot {
             let weight = 1.0 / (light * light + 0.01 * mean * mean);
             let alone = Rgb::from(paths[i].throughput) - Rgb::from(paths[i - layer].throughput);
             let squares = [alone.length_squared(), (a - b).length_squared()];
-            // No light, or one that cannot be compared.
+            // Skip pairs without light, or with light that is not finite.
             let [alone, shared] = squares.map(|square| square * weight);
             if alone.is_finite() && shared.is_finite() {
                 self.alone += f64::from(alone);

@@ -1,5 +1,4 @@
-//! The next direction of a path: BSDF sampling, Russian roulette, and the quantities that the next vertex
-//! needs for its weights.
+//! Next direction of a path: BSDF sampling, Russian roulette, and the MIS quantities of the next vertex.
 
 use super::PathIntegrator;
 use super::estimator::{Estimator, Rest};
@@ -14,7 +13,7 @@ use crate::transport::walk::dimension;
 use crate::transport::walk::termination::{continuation_probability, is_cut};
 
 impl<F: Features, E: Estimator<F>, R: Sharing> PathIntegrator<'_, F, E, R> {
-    /// The ray by which the path goes on from `vertex`, if it does, to find the `rest` of the light.
+    /// Next ray of the path from `vertex`, if the path survives, to find the `rest` of the light.
     #[inline]
     pub(super) fn scatter(
         &self,
@@ -60,7 +59,7 @@ impl<F: Features, E: Estimator<F>, R: Sharing> PathIntegrator<'_, F, E, R> {
         }
         self.estimator.scattered(&self.context, vertex, state, (&sample, is_narrow));
         path.throughput = throughput.to_array();
-        // BSDF sampling has one sample beside n of the lights.
+        // MIS compares one BSDF sample with n light samples.
         path.pdf = if sample.delta { f32::INFINITY } else { sample.pdf / rest.light_samples as f32 };
         path.position = point.position.to_array();
         path.normal = vertex.normal.to_array();

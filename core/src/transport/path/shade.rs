@@ -1,6 +1,5 @@
-//! Shading of a block of vertices, in the order of the textbook and in steps over the block: escape and
-//! emission, light that an estimator knows, next-event estimation (`direct.rs`), the next direction
-//! (`scatter.rs`).
+//! Shading of a block of vertices in textbook order, step by step for the whole block: escape and emission,
+//! light of the estimator, next-event estimation (`direct.rs`), next direction (`scatter.rs`).
 
 use super::PathIntegrator;
 use super::estimator::{EmissionHit, Estimator, KnownLight, Rest};
@@ -21,7 +20,7 @@ use bytemuck::Zeroable;
 use core::ops::Range;
 use glam::Vec3;
 
-/// The path tracer at work on a wave, of which it has the part that the wavefront does not know.
+/// Path tracer and the memory of a wave beside the wavefront.
 pub(super) struct Shading<'i, 'a, 'm, F: Features, E: Estimator<F>, R: Sharing> {
     pub(super) integrator: &'i PathIntegrator<'a, F, E, R>,
     pub(super) memory: &'i mut PathMemory<'m, E::State, R>,
@@ -43,7 +42,7 @@ impl<F: Features, E: Estimator<F>, R: Sharing> Shade for Shading<'_, '_, '_, F, 
     fn shade(&mut self, wave: &mut Wavefront, range: Range<usize>, counters: &mut Counters) {
         let Self { integrator, memory } = self;
         let PathIntegrator { context, settings, estimator, .. } = integrator;
-        // For estimators and sharing without a state.
+        // Placeholders of stateless estimators and sharing rules.
         let mut none = (E::State::zeroed(), R::State::zeroed());
 
         let mut points = [const { None }; BLOCK];
@@ -91,7 +90,7 @@ impl<F: Features, E: Estimator<F>, R: Sharing> Shade for Shading<'_, '_, '_, F, 
 }
 
 impl<S, R: Sharing> PathMemory<'_, S, R> {
-    /// Path number `index`; `none` stands for states that are not there.
+    /// Path `index` of the wave; `none` replaces missing states.
     #[inline]
     fn path<'p>(
         &'p mut self,
@@ -108,8 +107,8 @@ impl<S, R: Sharing> PathMemory<'_, S, R> {
 }
 
 impl<'a, F: Features, E: Estimator<F>, R: Sharing> PathIntegrator<'a, F, E, R> {
-    /// Adds the emission that `ray` has met, and prepares the vertex at which its path scatters. If there is
-    /// none, the ray behind a surface that the path skips.
+    /// Adds the emission at the hit of `ray` and prepares the scattering vertex. `Err` if there is none:
+    /// `Some` next ray behind a skipped surface, or `None` if the path ends.
     #[inline]
     fn arrive<'v>(
         &self,
@@ -128,7 +127,7 @@ impl<'a, F: Features, E: Estimator<F>, R: Sharing> PathIntegrator<'a, F, E, R> {
         let direction = Vec3::from(ray.direction);
         let sampler = Sampler::new(self.settings.seed, path.pixel, path.sample);
 
-        // A camera on a surface does not see its back.
+        // A camera on a surface does not see the back of that surface.
         let opacity = || sampler.single(dimension::opacity(segments, u32::from(path.crossings)));
         if segments == 1 && point.is_left_by(ray)
             || self.context.is_passed(point, hit, path.triangle, opacity)
@@ -175,7 +174,7 @@ impl<'a, F: Features, E: Estimator<F>, R: Sharing> PathIntegrator<'a, F, E, R> {
         })
     }
 
-    /// Adds light of the environment, which the ray reaches.
+    /// Adds radiance of the environment along the escaping ray.
     fn escape(&self, path: &mut PathState, state: &E::State, ray: &Ray) {
         let scene = self.context.scene;
         let Some(environment) = scene.environment.as_ref().filter(|_| path.components.has_environment())
@@ -194,7 +193,7 @@ impl<'a, F: Features, E: Estimator<F>, R: Sharing> PathIntegrator<'a, F, E, R> {
         path.add(Rgb::from(path.throughput) * radiance * weight);
     }
 
-    /// Adds light that the surface at `point` emits.
+    /// Adds emission of the surface at `point`.
     #[inline]
     fn emission(&self, path: &mut PathState, state: &E::State, point: &SurfacePoint, direction: Vec3) {
         if !(point.material.emits() && path.components.has_emission()) {
@@ -218,7 +217,7 @@ impl<'a, F: Features, E: Estimator<F>, R: Sharing> PathIntegrator<'a, F, E, R> {
         path.add(Rgb::from(path.throughput) * radiance * weight);
     }
 
-    /// Adds light that the estimator knows at `vertex`. Returns the light that is left.
+    /// Adds light that the estimator supplies at `vertex`. Returns the light that the path still has to find.
     #[inline]
     fn known(
         &self,
@@ -227,7 +226,7 @@ impl<'a, F: Features, E: Estimator<F>, R: Sharing> PathIntegrator<'a, F, E, R> {
         found: E::Found,
     ) -> Rest {
         let mut add = |KnownLight { contribution, blur }: KnownLight| {
-            // For this path alone: others look the structure up where they are.
+            // Not shared: other paths look up the data structure at their own vertices.
             R::keep(shared, path, contribution);
             path.blur = (Rgb::from(path.blur) + R::worth(shared, vertex.throughput) * blur).to_array();
         };

@@ -1,5 +1,6 @@
-//! The pixels that receive the light of a path: its own, with `()`, or others too (`reuse.rs`); and the
-//! working memory of the path tracer, which holds the state of such a rule beside the wavefront.
+//! Rule for the pixels that receive the light of a path: its own alone with `()`, or neighbours too
+//! (`reuse.rs`); and the working memory of the path tracer, with the states of the rule and of the estimator
+//! beside the wavefront.
 
 use crate::Rgb;
 use crate::bsdf::{Bsdf, Features};
@@ -10,44 +11,44 @@ use crate::transport::walk::context::SceneContext;
 use crate::transport::wavefront::{PathState, Wavefront};
 use bytemuck::{Pod, Zeroable};
 
-/// The rule by which pixels receive light. By the defaults each has that of its own path.
+/// Sharing rule of the light of paths. By default each pixel receives the light of its own path.
 pub trait Sharing: Copy + Send + Sync {
-    /// Carried by each path.
+    /// State per path.
     type State: Pod;
-    /// A pair of paths, one of which receives light of the other.
+    /// Pair of paths, one of which receives light of the other.
     type Pair: Pod;
     /// Whether the pixels of a circle are sampled together.
     const IN_CIRCLES: bool = false;
 
-    /// State of a path at its start. The paths of a circle have one number in common.
+    /// State at the start of a path. All paths of a circle have the same number `circle`.
     #[inline]
     fn begin(_circle: u32) -> Self::State {
         Self::State::zeroed()
     }
 
-    /// The ray of `path` was traced; the light samples of its last vertex have arrived.
+    /// Called after the next ray of `path` was traced and the light samples of its last vertex have arrived.
     #[inline]
     fn resume(_state: &mut Self::State, _path: &mut PathState) {}
 
-    /// The path is about to scatter at `point`.
+    /// Called before the path scatters at `point`.
     #[inline]
     fn arrive(_state: &mut Self::State, _point: &SurfacePoint, _bsdf: &Bsdf, _path: &mut PathState) {}
 
-    /// Whether an estimator may connect the vertex that the path has arrived at.
+    /// Whether an estimator may connect the current vertex of the path.
     #[inline]
     fn may_connect(_state: &Self::State) -> bool {
         true
     }
 
-    /// The path takes a light sample. `base` is the part that the base of the surface reflects.
+    /// Called at a light sample. `base` is the fraction of the light that the base of the surface reflects.
     #[inline]
     fn sample_light(_state: &mut Self::State, _base: impl FnOnce() -> Rgb) {}
 
-    /// The path samples a direction. `base` is the part that the base of the surface reflects.
+    /// Called at a BSDF sample. `base` is the fraction of the light that the base of the surface reflects.
     #[inline]
     fn sample_bsdf(_state: &mut Self::State, _base: impl FnOnce() -> Rgb) {}
 
-    /// The path leaves `point` with this `throughput`. Whether it must survive.
+    /// Called when the path leaves `point` with `throughput`. Returns whether the path must survive.
     #[inline]
     fn leave(
         _state: &mut Self::State,
@@ -58,26 +59,26 @@ pub trait Sharing: Copy + Send + Sync {
         false
     }
 
-    /// The factor from radiance to the pixel for a path of this `throughput`.
+    /// Factor from radiance to the pixel for a path of `throughput`.
     #[inline]
     fn worth(_state: &Self::State, throughput: Rgb) -> Rgb {
         throughput
     }
 
-    /// Adds `light` that belongs to the pixel of `path` alone.
+    /// Adds `light` to the pixel of `path` alone.
     #[inline]
     fn keep(_state: &mut Self::State, path: &mut PathState, light: Rgb) {
         path.add(light);
     }
 
-    /// Radiance of the sample, after [`Sharing::share`].
+    /// Radiance of the sample, valid after [`Sharing::share`].
     #[inline]
     fn radiance(_state: &Self::State, path: &PathState) -> Rgb {
         Rgb::from(path.radiance)
     }
 
-    /// Gives other pixels their shares of the light of the first `count` paths, which have ended. Only paths
-    /// of equal length share where depth `is_limited`.
+    /// Distributes the light of the first `count` paths, which have ended, among pixels. If depth
+    /// `is_limited`, only paths of equal length share.
     #[inline]
     fn share<F: Features, S>(
         &self,
@@ -94,13 +95,13 @@ impl Sharing for () {
     type Pair = ();
 }
 
-/// A wavefront, with an estimator's state `S` of each path and the working memory of sharing.
+/// Wavefront, with an estimator's state `S` per path and the memory of the sharing rule.
 pub struct PathWave<'m, S, R: Sharing> {
     pub(in crate::transport) wave: Wavefront<'m>,
     pub(in crate::transport) memory: PathMemory<'m, S, R>,
 }
 
-/// The part of the memory that the wavefront does not know. Slices are empty where there is no state.
+/// Memory of a wave beside the wavefront. Slices of types without size are empty.
 pub(in crate::transport) struct PathMemory<'m, S, R: Sharing> {
     pub(in crate::transport) states: &'m mut [S],
     pub(in crate::transport) shared: &'m mut [R::State],
@@ -108,7 +109,7 @@ pub(in crate::transport) struct PathMemory<'m, S, R: Sharing> {
 }
 
 impl<'m, S: Pod, R: Sharing> PathWave<'m, S, R> {
-    /// Bytes that [`PathWave::new`] takes.
+    /// Footprint of [`PathWave::new`].
     pub(in crate::transport) fn footprint(capacity: usize) -> Footprint {
         let paths = Wavefront::capacity(capacity);
         Wavefront::footprint(capacity).slice::<S>(paths).slice::<R::State>(paths).slice::<R::Pair>(paths)
@@ -122,14 +123,14 @@ impl<'m, S: Pod, R: Sharing> PathWave<'m, S, R> {
         Ok(Self { wave, memory: PathMemory { states, shared, pairs: slice(paths, arena)? } })
     }
 
-    /// Radiance of the sample of path number `path`.
+    /// Radiance of the sample of path `path`.
     #[inline]
     pub(in crate::transport) fn radiance(&self, path: usize) -> Rgb {
         let none = R::State::zeroed();
         R::radiance(self.memory.shared.get(path).unwrap_or(&none), &self.wave.paths[path])
     }
 
-    /// Resets what is beside the wavefront for path number `path`, of this circle.
+    /// Resets the states of path `path` of this circle.
     #[inline]
     pub(in crate::transport) fn begin(&mut self, path: usize, circle: u32) {
         let PathMemory { states, shared, .. } = &mut self.memory;
@@ -142,7 +143,7 @@ impl<'m, S: Pod, R: Sharing> PathWave<'m, S, R> {
     }
 }
 
-/// A slice of `count` values; an empty one of values without size.
+/// Slice of `count` values; empty for types without size.
 fn slice<'m, T: Pod>(count: usize, arena: &mut Arena<'m>) -> Result<&'m mut [T], OutOfMemory> {
     if size_of::<T>() == 0 { Ok(&mut []) } else { arena.slice(count) }
 }

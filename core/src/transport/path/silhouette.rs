@@ -1,10 +1,9 @@
-//! Pixels that see the border of a lamp. A lamp that fills a hundredth of a pixel is met by few samples, and
-//! is then all that the pixel shows: a row of such pixels has most of the error of a picture, and hides it
-//! from estimates. So what they see of the lamp itself comes from many camera rays for each sample, which ask
-//! for nothing but emission; the path of the sample sees all else.
+//! Extra camera rays for the emission of lamps in pixels on the border of a lamp. A lamp that covers a
+//! hundredth of a pixel is hit by few samples and dominates the pixel: a row of such pixels has most of the
+//! error of a picture, and estimates miss it. In these pixels direct emission comes from many camera rays per
+//! sample, which evaluate emission only; the path of the sample finds all other light.
 //!
-//! Which pixels these are follows from the camera and the corners of the lamps alone, so that nothing is
-//! biased.
+//! The set of these pixels depends only on the camera and the corners of the lamps, so that there is no bias.
 
 use super::PathIntegrator;
 use super::estimator::Estimator;
@@ -24,25 +23,24 @@ use crate::transport::walk::termination::MAX_CROSSINGS;
 use crate::transport::wavefront::Wavefront;
 use glam::{Vec2, Vec3};
 
-/// Camera rays for each sample, a power of two: their places in the pixel stay a net. They take about as long
-/// as two samples, in a pixel of a hundred.
+/// Camera rays per sample; a power of two, so that their positions in the pixel form a net. They take about
+/// as long as two samples, in one pixel of a hundred.
 const RAYS: u32 = 32;
 
-/// Where a tile sees more triangles of lamps than this they are smaller than its pixels, and to look at all
-/// borders would take its time.
+/// Maximum number of lamp triangles in view of a tile. With more, the triangles are smaller than pixels, and
+/// testing all borders would take too long.
 const MOST_LAMPS: usize = 4096;
 
-/// Borders count as seen from so many pixels away: more than rounding.
+/// Distance in pixels within which a border counts as seen; exceeds rounding.
 const MARGIN: f32 = 0.01;
 
-/// A border that begins behind the camera is seen from this share of its greatest depth on.
+/// Near plane of a border that starts behind the camera, as a fraction of the border's maximum depth.
 const NEAR: f32 = 1e-3;
 
-/// Some pixels of the square around a tile: a bit for each column of each row.
+/// Set of pixels of the square around a tile: one bit per column for each row.
 type Rows = [u32; SPAN as usize];
 
-/// Adds the pixels that the segment from `a` to `b` passes through, in raster coordinates from the square's
-/// corner.
+/// Adds the pixels on the segment from `a` to `b`, in raster coordinates relative to the square's corner.
 fn add(pixels: &mut Rows, a: Vec2, b: Vec2) {
     let (a, b) = if a.y <= b.y { (a, b) } else { (b, a) };
     let side = SPAN as f32;
@@ -65,7 +63,7 @@ fn add(pixels: &mut Rows, a: Vec2, b: Vec2) {
     }
 }
 
-/// A cone around what a tile sees.
+/// Cone around the view of a tile.
 struct View {
     eye: Vec3,
     axis: Vec3,
@@ -78,7 +76,7 @@ impl View {
         let direction = |[x, y]: [f32; 2]| -> Vec3 {
             camera.ray(settings.width, settings.height, x, y, [0.0; 2]).direction.into()
         };
-        // A pixel more to each side.
+        // One more pixel on each side.
         let beyond = REACH as f32 + 1.0;
         let [near, far] = [-beyond, TILE as f32 + beyond].map(|by| tile.corner().map(|c| c as f32 + by));
         let axis = direction([0, 1].map(|i| 0.5 * (near[i] + far[i])));
@@ -87,7 +85,7 @@ impl View {
         Self { eye: camera.eye, axis, cos, sin: libm::sqrtf((1.0 - cos * cos).max(0.0)) }
     }
 
-    /// Whether a sphere reaches into the cone.
+    /// Whether the sphere overlaps the cone.
     fn meets(&self, center: Vec3, radius: f32) -> bool {
         let to = center - self.eye;
         let distance = to.length();
@@ -100,8 +98,8 @@ impl View {
     }
 }
 
-/// The pixels of a tile that see the border of a lamp, as far as nothing is in the way. None where a sharp
-/// border is not seen: through a lens, or where surfaces have cut-outs.
+/// Pixels of a tile that see the border of a lamp, without regard to occlusion. Empty with a lens or with
+/// cut-outs, where borders are not sharp.
 pub(in crate::transport) fn outlined(
     scene: &Scene,
     lights: &LightSampler,
@@ -121,7 +119,7 @@ pub(in crate::transport) fn outlined(
     let view = View::of(camera, settings, tile);
     let meets = |center, radius| view.meets(center, radius);
     lights.borders(&scene.mesh, camera.eye, MOST_LAMPS, meets, |[a, b]| {
-        // What is behind the camera is cut off.
+        // Clips the part behind the camera.
         let [near, far] = [a, b].map(|point| (point - camera.eye).dot(camera.forward));
         let least = NEAR * near.max(far);
         let cut = |point: Vec3, depth: f32, other: Vec3, beyond: f32| {
@@ -146,7 +144,7 @@ pub(in crate::transport) fn outlined(
     pixels
 }
 
-/// Whether the pixel in column `x` and row `y` is one of [`outlined`].
+/// Whether [`outlined`] has the pixel in column `x` and row `y`.
 pub(in crate::transport) fn is_outlined(
     scene: &Scene,
     lights: &LightSampler,
@@ -158,7 +156,7 @@ pub(in crate::transport) fn is_outlined(
     outlined(scene, lights, settings, tile).contains(position % PIXELS_PER_TILE)
 }
 
-/// The rays that look at lamps for one sample of the pixel in column `x` and row `y`.
+/// Extra rays of one sample of the pixel in column `x` and row `y`.
 pub(in crate::transport) fn rays(
     scene: &Scene,
     settings: &PathSettings,
@@ -175,8 +173,8 @@ pub(in crate::transport) fn rays(
     })
 }
 
-/// The share of one of [`rays`], which met `hit`, in what its pixel sees of lamps. As a path does it passes a
-/// surface that the camera stands on.
+/// Contribution of one of [`rays`], with result `hit`, to its pixel. Like a camera path, the ray skips a
+/// surface that the camera lies on.
 pub(in crate::transport) fn emission<F: Features>(
     context: &SceneContext<F>,
     mut ray: Ray,
@@ -199,8 +197,8 @@ pub(in crate::transport) fn emission<F: Features>(
 }
 
 impl<F: Features, E: Estimator<F>, R: Sharing> PathIntegrator<'_, F, E, R> {
-    /// Writes the emission of lamps in the pixels of the first `count` paths of the wave into
-    /// `wave.shadow_light`, where the place of the pixel is `outlined`, and zero elsewhere.
+    /// Sets `wave.shadow_light` of the first `count` paths to the emission of lamps in their pixels, or to
+    /// zero if the place of the pixel is not `outlined`.
     pub(super) fn trace_lamps(
         &self,
         mut outlined: impl FnMut(u32) -> bool,
@@ -227,7 +225,7 @@ impl<F: Features, E: Estimator<F>, R: Sharing> PathIntegrator<'_, F, E, R> {
         self.add_emission(wave, filled, counters);
     }
 
-    /// Adds the emission that the first `count` rays of the wave meet.
+    /// Adds the emission at the hits of the first `count` rays of the wave.
     fn add_emission(&self, wave: &mut Wavefront, count: usize, counters: &mut Counters) {
         wave.trace(&self.context, count, Coherence::Coherent, counters);
         for (ray, hit) in wave.rays.iter().zip(&*wave.hits).take(count) {

@@ -1,7 +1,7 @@
-//! The samples of a tile: their order, the start of their paths, and the sum of their light.
+//! Samples of a tile: their order, the start of their paths, and the sum of their light.
 //!
-//! Layer after layer, one sample of each pixel. Where pixels share light, those of a circle stay together;
-//! else all go along the Z-curve, so that neighbours look a cache up together.
+//! Samples are taken in layers, one per pixel. With path reuse the pixels of a circle stay together;
+//! otherwise pixels follow the Z-curve, so that neighbours look up a cache together.
 
 use super::PathIntegrator;
 use super::estimator::Estimator;
@@ -19,13 +19,13 @@ use crate::transport::walk::component::Components;
 use crate::transport::wavefront::PathState;
 use core::ops::Range;
 
-/// All samples of a tile that are still to be taken.
+/// Remaining samples of a tile.
 pub(in crate::transport) struct TileSampler {
     tile: Tile,
     left: Range<u32>,
-    /// The next circle of the layer; where nothing is shared, the next pixel.
+    /// Next circle of the layer, or next pixel without path reuse.
     next: usize,
-    /// Pixels whose paths leave the lamp that they see to others.
+    /// Pixels whose camera paths leave direct emission to extra rays.
     outlined: PixelSet,
 }
 
@@ -34,7 +34,7 @@ impl TileSampler {
         Self { tile, left: samples, next: 0, outlined: PixelSet::default() }
     }
 
-    /// The next of the `count` parts of a layer, and which of their samples.
+    /// Next of the `count` parts of a layer, and its sample number.
     fn next_of(&mut self, count: usize) -> Option<(usize, u32)> {
         if self.next == count {
             (self.next, self.left.start) = (0, self.left.start.saturating_add(1));
@@ -51,7 +51,7 @@ impl<F: Features, E: Estimator<F>, R: Sharing> PathIntegrator<'_, F, E, R> {
     /// Traces `samples` of tile `task` and adds them to `out`, the tile's pixels of the film.
     ///
     /// # Errors
-    /// [`OutOfMemory`] where `scratch` has less than [`PathIntegrator::scratch_with`] bytes.
+    /// [`OutOfMemory`] if `scratch` has less than [`PathIntegrator::scratch_with`] bytes.
     pub fn run(
         &self,
         task: usize,
@@ -63,7 +63,7 @@ impl<F: Features, E: Estimator<F>, R: Sharing> PathIntegrator<'_, F, E, R> {
         let mut arena = scratch.scratch();
         let tile = Tile::new(self.settings.width, self.settings.height, task);
         let mut counters = Counters::default();
-        // No larger than there are paths: the memory of a wave is cleared.
+        // At most the number of paths, since the memory of a wave is cleared.
         let most = samples.len().saturating_mul(PIXELS_PER_TILE);
         let mut places = TileSampler::new(tile, samples);
         places.outlined = outlined(self.context.scene, self.context.lights, &self.settings, tile);
@@ -93,7 +93,7 @@ impl<F: Features, E: Estimator<F>, R: Sharing> PathIntegrator<'_, F, E, R> {
         }
     }
 
-    /// Fills the wave with camera rays; returns their number. Circles stay together where their pixels share.
+    /// Fills the wave with camera rays and returns their number. With path reuse no circle is cut.
     pub(in crate::transport) fn start(
         &self,
         places: &mut TileSampler,
@@ -105,7 +105,7 @@ impl<F: Features, E: Estimator<F>, R: Sharing> PathIntegrator<'_, F, E, R> {
             while count + CIRCLE <= capacity
                 && let Some((circle, sample)) = places.next_of(CIRCLES)
             {
-                // Another number for each circle that a wave can hold.
+                // Distinct for all circles in a wave.
                 let number = sample.wrapping_mul(CIRCLES as u32) + circle as u32;
                 for place in places.tile.circle(circle, self.settings.seed, sample) {
                     self.begin(places, (place, sample), number, wave, &mut count);
@@ -121,7 +121,7 @@ impl<F: Features, E: Estimator<F>, R: Sharing> PathIntegrator<'_, F, E, R> {
         count
     }
 
-    /// Puts a path into the wave, where there is such a pixel.
+    /// Puts a path into the wave, if the tile has a pixel at `place`.
     #[inline]
     fn begin(
         &self,
@@ -142,8 +142,7 @@ impl<F: Features, E: Estimator<F>, R: Sharing> PathIntegrator<'_, F, E, R> {
         *count += 1;
     }
 
-    /// Path number `index` of the wave: a sample of the pixel in this column and row, which has a place among
-    /// others.
+    /// Starts path `index` of the wave: a sample of the pixel in column `x` and row `y`, stored at `place`.
     #[inline]
     pub(super) fn begin_path(
         &self,
