@@ -1,4 +1,4 @@
-//! libFuzzer's way into [`halflight_fuzz::derivatives`].
+//! libFuzzer entry point of [`halflight_fuzz::derivatives`].
 #![no_main]
 
 libfuzzer_sys::fuzz_target!(|data: &[u8]| halflight_fuzz::derivatives::run(data));

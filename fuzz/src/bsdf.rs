@@ -1,5 +1,5 @@
-//! Any material, with any texture, seen from anywhere: no number that is none, no negative light, no
-//! density that contradicts the sample.
+//! BSDFs of any material and texture for any directions: no NaN, no negative light, and densities that agree
+//! with samples.
 
 use crate::numbers::{coordinate, fraction, point};
 use arbitrary::{Result, Unstructured};
@@ -12,7 +12,7 @@ use halflight_core::scene::{
     TextureTransform, Wrap,
 };
 
-/// Lengths of unit vectors may be off by so much.
+/// Largest deviation of a unit vector's length from 1.
 const UNIT_TOLERANCE: f32 = 1e-3;
 
 /// One input.
@@ -25,7 +25,7 @@ fn attempt(input: &mut Unstructured) -> Result<()> {
     let floats = (0..input.int_in_range(0..=9)?).map(|_| point(input)).collect::<Result<Vec<_>>>()?;
     let bytes = input.arbitrary::<[[u8; 4]; 4]>()?;
     let wrap = if input.arbitrary()? { Wrap::Repeat } else { Wrap::Clamp };
-    // Fewer texels than the size promises are the caller's mistake, and must not be the end of it.
+    // A texture with fewer texels than its size promises is the caller's mistake, and must not crash.
     let textures = [Texels::Float(&floats), Texels::Srgb8(&bytes), Texels::Linear8(&bytes)]
         .map(|texels| Texture { width, height, texels, wrap, transform: TextureTransform::IDENTITY });
     let mesh = Mesh::default();
@@ -36,7 +36,7 @@ fn attempt(input: &mut Unstructured) -> Result<()> {
     let bsdf = Bsdf::at::<All>(&scene, &material, uv, input.arbitrary()?);
 
     let mut wo = uniform_sphere([fraction(input)?, fraction(input)?]);
-    // Straight down and grazing are where formulas end.
+    // Normal incidence and grazing directions are the limits of the formulas.
     wo.z = match input.arbitrary::<u8>()? {
         0 => 1.0,
         1 => f32::MIN_POSITIVE,
@@ -59,7 +59,7 @@ fn check(bsdf: &Bsdf, wo: Vec3, u: [f32; 3]) {
     assert!(sample.pdf > 0.0 && sample.pdf < f32::INFINITY, "{}", context());
     assert_eq!(sample.direction.z < 0.0, sample.transmitted, "{}", context());
     let (_, pdf) = evaluated(bsdf, wo, sample.direction);
-    // Only where the lobe is wide enough for the direction's rounding not to move its density.
+    // Only wide lobes, whose density does not change by the rounding of a direction.
     if !sample.delta && sample.pdf < 100.0 && sample.direction.z.abs() > 1e-3 && wo.z > 1e-3 {
         let ratio = pdf / sample.pdf;
         assert!((0.9..1.1).contains(&ratio), "pdf {pdf} evaluated; {}", context());

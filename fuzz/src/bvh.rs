@@ -1,5 +1,5 @@
-//! Build over any triangles and trace any rays, by every entry point at every level: the answers must be
-//! those of the brute force over all triangles, and all of them the same to the bit.
+//! BVH over any triangles, traced with any rays through every entry point at every level: hits agree with
+//! brute force, and all entry points with each other to the bit.
 
 use crate::numbers::traceable_point as point;
 use arbitrary::{Result, Unstructured};
@@ -11,19 +11,19 @@ use halflight_core::memory::{Arena, Line};
 use halflight_core::scene::{Mesh, Triangle};
 
 const MAX_TRIANGLES: usize = 128;
-/// One packet of sixteen, and some more.
+/// One packet of sixteen and a remainder.
 const MAX_RAYS: usize = 20;
 
-/// Of hits whose distances differ by less than the rounding of a distance, relative, any may be the nearest:
-/// the box of one may be entered a rounding behind the hit of the other.
+/// Relative difference of distances below which any hit may be the nearest: the box of one triangle may be
+/// entered a rounding behind the hit of another.
 const TIE: f32 = 1e-6;
 
-/// What a distance may differ by from that computed in f64, relative, for its hit to be judged.
+/// Largest relative difference between a distance and its f64 value for a hit to be judged.
 const NOISE: f64 = 1e-5;
 
 /// One input.
 pub fn run(data: &[u8]) {
-    // An input that is too short ends somewhere in here, as an error that means nothing.
+    // Inputs that are too short end in an error, which is ignored.
     let _ = attempt(&mut Unstructured::new(data));
 }
 
@@ -35,7 +35,7 @@ fn attempt(input: &mut Unstructured) -> Result<()> {
         Ok(Triangle { vertices: input.arbitrary::<[u8; 3]>()?.map(corner), material: 0 })
     };
     let mut triangles = (0..triangles % 64).map(&mut indices).collect::<Result<Vec<_>>>()?;
-    // The same again, many times over: duplicates in one place are what stops a split.
+    // Many copies: duplicates in one place stop the builder from splitting.
     let copies = 1 + usize::from(input.arbitrary::<u8>()? % 8);
     triangles = triangles.repeat(copies);
     triangles.truncate(MAX_TRIANGLES);
@@ -58,7 +58,7 @@ fn attempt(input: &mut Unstructured) -> Result<()> {
     Ok(())
 }
 
-/// A ray from anywhere, or one that aims at a corner, an edge or the inside of a triangle.
+/// A ray from anywhere, or one towards a corner, an edge or the inside of a triangle.
 fn ray(input: &mut Unstructured, mesh: &Mesh) -> Result<Ray> {
     let origin = Vec3::from(point(input)?);
     let [kind, triangle, u, v, end] = input.arbitrary::<[u8; 5]>()?;
@@ -106,19 +106,20 @@ fn against_brute_force(mesh: &Mesh, level: Level, ray: &Ray, hit: &Hit, best: &H
     }
     let context = || format!("{level:?} {ray:?}: {hit:?}, brute force {best:?}");
     if !hit.is_some() {
-        // A box ends where its triangles do: a ray through a corner or an edge may pass it by a rounding.
+        // Boxes are as tight as their triangles: a ray through a corner or an edge may miss them by a
+        // rounding.
         let on_edge = best.u == 0.0 || best.v == 0.0 || best.u + best.v >= 1.0 - TIE;
         return assert!(best.is_some() && on_edge, "{}", context());
     }
     assert!(best.is_some(), "{}", context());
-    // What was hit is hit there by the reference as well, and no farther than the nearest.
+    // Brute force hits this triangle at the same distance, which is no farther than its nearest.
     let corners = mesh.corners(hit.triangle).map(|corner| corner.to_array());
     assert_eq!(brute::intersect(ray, corners), Some((hit.t, hit.u, hit.v)), "{}", context());
     assert!((hit.t - best.t).abs() <= TIE * best.t, "{}", context());
 }
 
-/// Whether what the reference says of this ray is more than rounding: a needle seen from its edge has areas
-/// that are noise, and so is the distance made of them.
+/// Whether the reference's distances are more than rounding: the areas of a needle seen edge-on are noise,
+/// and so are distances derived from them.
 fn well_conditioned(mesh: &Mesh, ray: &Ray) -> bool {
     (0..mesh.triangles.len() as u32).all(|triangle| {
         let corners = mesh.corners(triangle);

@@ -1,5 +1,5 @@
-//! Files of irradiance caches: any bytes are a cache, or give a reason why they are none. What is read fits into the
-//! bytes that were there.
+//! Irradiance cache files: any bytes are a cache or an error with a reason. A cache has no more records than
+//! its bytes hold.
 
 use halflight::render::inspect_cache;
 

@@ -1,6 +1,6 @@
-//! The mathematics of irradiance records. At every level the same bits: eigen decompositions, edges, hemispheres by
-//! both kernels. Eigenvalues against f64; sums against their scalar references; radii within their limits, whatever
-//! a hemisphere holds.
+//! Derivatives of irradiance records. All levels agree to the bit: eigen decompositions, edges, hemispheres
+//! by both kernels. Eigenvalues are compared with f64, sums with scalar references; radii stay within their
+//! limits for any hemisphere.
 
 use crate::numbers::{coordinate, fraction};
 use arbitrary::{Result, Unstructured};
@@ -23,7 +23,7 @@ pub fn run(data: &[u8]) {
     let _ = eigen(&mut input).and_then(|()| hemisphere(&mut input));
 }
 
-/// Entries of matrices as they come, some equal, some of very different size.
+/// Eigen decompositions of any matrices, with some equal entries and some of very different size.
 fn eigen(input: &mut Unstructured) -> Result<()> {
     let mut entries = [[0.0; 16]; 6];
     for entry in entries.as_flattened_mut() {
@@ -54,17 +54,18 @@ fn eigen(input: &mut Unstructured) -> Result<()> {
     Ok(())
 }
 
-/// The same bits, or both no number.
+/// Asserts equal bits, or NaN in both.
 fn same(level: Level, of: &[f32], wanted: impl Iterator<Item = f32>, found: impl Iterator<Item = f32>) {
     for (wanted, found) in wanted.zip(found) {
-        // Of zeros, min and max may give either.
+        // min and max may return either of two zeros.
         let zeros = wanted == 0.0 && found == 0.0;
         let same = wanted.to_bits() == found.to_bits() || zeros || wanted.is_nan() && found.is_nan();
         assert!(same, "{level:?} of {of:?}: {found:e} for {wanted:e}");
     }
 }
 
-/// Four units in the last place of both values, where f32 holds them and the smaller is not beyond 1e-30 of the larger.
+/// Asserts eigenvalues within four units in the last place, where f32 holds them and the smaller is at least
+/// 1e-30 of the larger.
 fn check2([a, b, c]: [f32; 3], values: [f32; 2], axis: [f32; 2]) {
     let [xx, xy, yy] = [a, b, c].map(f64::from);
     let (mean, radius) = (0.5 * (xx + yy), (0.5 * (xx - yy)).hypot(xy));
@@ -74,7 +75,7 @@ fn check2([a, b, c]: [f32; 3], values: [f32; 2], axis: [f32; 2]) {
     let small = if large == 0.0 { 0.0 } else { ((p - q) + (p_rest - q_rest)) / large };
     let unit = |value: f64| (value.abs() * f64::from(f32::EPSILON)).max(f64::from(f32::from_bits(1)));
     let off = |found: f32, wanted: f64| (f64::from(found) - wanted).abs() / unit(wanted);
-    // Of values that are as large in f32 either may come first.
+    // Values of equal magnitude in f32 may come in either order.
     let swapped = large as f32 == -(small as f32) && f64::from(values[0]) * large < 0.0;
     let (large, small) = if swapped { (small, large) } else { (large, small) };
     let stored = f64::from(f32::MAX) * 0.99;
@@ -86,13 +87,13 @@ fn check2([a, b, c]: [f32; 3], values: [f32; 2], axis: [f32; 2]) {
     }
     let ([x, y], value) = (axis.map(f64::from), f64::from(values[0]));
     assert!((x.hypot(y) - 1.0).abs() < 1e-6, "{a:e} {b:e} {c:e}: {axis:?}");
-    // The vector belongs to the value.
+    // The vector is an eigenvector of this value.
     let residual = (xx * x + xy * y - value * x).hypot(xy * x + yy * y - value * y);
     let tolerance = 1e-6 * large.abs() + 2.0 * f64::from(f32::from_bits(1));
     assert!(value.is_infinite() || residual <= tolerance, "{a:e} {b:e} {c:e}: {values:?} along {axis:?}");
 }
 
-/// Residuals of the largest value's size, and vectors of length 1.
+/// Asserts residuals small relative to the largest entry, and unit vectors.
 fn check3(matrix: [f32; 6], values: [f32; 3], vectors: [[f32; 3]; 3]) {
     let [xx, xy, xz, yy, yz, zz] = matrix.map(f64::from);
     let norm = matrix.iter().fold(0.0, |norm, x| x.abs().max(norm));
@@ -110,12 +111,12 @@ fn check3(matrix: [f32; 6], values: [f32; 3], vectors: [[f32; 3]; 3]) {
     }
 }
 
-/// A hemisphere of some strata, of which radiance and distances may be anything.
+/// A hemisphere of a few strata with any radiances and distances.
 fn hemisphere(input: &mut Unstructured) -> Result<()> {
     let n = input.int_in_range(1..=18)?;
     let (mut radiance, mut inverse) = (Vec::new(), Vec::new());
     let (mut directions, mut normals) = (Vec::new(), Vec::new());
-    // The rest is the last of what was given, so that short inputs make large hemispheres.
+    // The last stratum of the input repeats, so that short inputs make large hemispheres.
     let mut last = ([0.5; 3], 1.0);
     for at in 0..n * n {
         let (i, j) = (at / n, at % n);
@@ -149,7 +150,7 @@ fn hemisphere(input: &mut Unstructured) -> Result<()> {
             same(level, &inverse, numbers(found), numbers(&again));
         }
     }
-    // Sums of ordinary numbers, but for their order.
+    // Sums of ordinary numbers agree up to the order of summation.
     let ordinary = |x: &f32| *x == 0.0 || (1e-3..1e3).contains(x);
     if radiance.as_flattened().iter().all(ordinary) && inverse.iter().all(ordinary) {
         for (rule, found) in [(Rule::DepthAware, &found[1]), (Rule::Farthest, &found[2])] {
@@ -161,7 +162,7 @@ fn hemisphere(input: &mut Unstructured) -> Result<()> {
             let near = |found: f32, wanted: f32, size: f32| {
                 assert!((found - wanted).abs() <= 1e-4 * size, "{rule:?} {n}: {found} for {wanted}");
             };
-            // Each of a few hundred edges is at most its length times these.
+            // Bound of each term, for a few hundred edges.
             for (found, wanted) in found.gradient.iter().zip(gradient) {
                 near(found.x, wanted[0], 10.0 * light * most);
                 near(found.y, wanted[1], 10.0 * light * most);
@@ -186,7 +187,7 @@ fn numbers(derivatives: &Derivatives) -> impl Iterator<Item = f32> {
     irradiance.to_array().into_iter().chain(vectors).chain(hessians)
 }
 
-/// Every metric gives an ellipse within its limits.
+/// Asserts that every metric gives an ellipse within its limits.
 fn radii(of: &[Derivatives]) {
     for derivatives in of {
         for metric in Metric::ALL {

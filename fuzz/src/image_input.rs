@@ -1,19 +1,19 @@
-//! Pictures: any bytes give pixels of the size that their header says, in the memory that it says, or an
-//! error; and what was read can be written and read again.
+//! Images: any bytes give pixels of the header's size within its stated memory, or an error. Decoded images
+//! survive encoding and decoding.
 
 use halflight::picture::{Samples, decode, read_info};
 use halflight::save::{Format, Image, encode};
 use std::path::Path;
 
-/// Bytes that a decoder may take.
+/// Memory limit of a decoder, bytes.
 const MOST: usize = 1 << 26;
-/// Larger pictures are not written again: that would only test patience.
+/// Larger images are not encoded again, to save time.
 const MOST_PIXELS: usize = 1 << 14;
 
-/// One input: a byte that chooses the format to write, and the file.
+/// One input: a byte that selects the format to write, then the file.
 pub fn run(data: &[u8]) {
     let Some((&choice, file)) = data.split_first() else { return };
-    // The name matters where the bytes do not tell the format.
+    // The extension matters if the bytes do not identify the format.
     let name = Path::new("fuzz.tga");
     let Ok(picture) = decode(file, name, MOST) else { return };
     let info = read_info(file, name).expect("what was decoded has a header");

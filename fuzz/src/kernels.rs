@@ -1,4 +1,4 @@
-//! The kernels of traversal at every level against their scalar references, lane by lane and to the bit.
+//! Traversal kernels at every level against their scalar references, lane by lane to the bit.
 
 use crate::numbers::{coordinate, traceable_point as point};
 use arbitrary::{Result, Unstructured};
@@ -56,7 +56,7 @@ fn attempt(input: &mut Unstructured) -> Result<()> {
     Ok(())
 }
 
-/// Sixteen rays of one direction, eight boxes, `count` triangles.
+/// Sixteen parallel rays, eight boxes, `count` triangles.
 #[derive(Debug)]
 struct Work {
     count: usize,
@@ -67,7 +67,8 @@ struct Work {
     corners: [[[f32; 3]; 3]; 8],
 }
 
-/// Distances with the bits of the lanes that hit, of which those on an edge are left to the reference.
+/// Distances, with a bit for each lane that hits; `doubtful` lanes lie on an edge and are left to the
+/// reference.
 struct Seen<const N: usize> {
     t: [f32; N],
     u: [f32; N],
@@ -76,7 +77,7 @@ struct Seen<const N: usize> {
     doubtful: u32,
 }
 
-/// What the kernels give: the first ray against all, and all rays against the first box and triangle.
+/// Results: the first ray against all items, and all rays against the first box and triangle.
 struct Answers {
     boxes: ([f32; 8], u32),
     triangles: Seen<8>,
@@ -92,7 +93,7 @@ impl Kernel for &Work {
         let slab = SlabRay::new(self.origins[0], self.direction);
         let shear = Shear::new(self.direction);
         let (entry, bits) = SlabRay8::new(simd, &slab).enters(simd, &self.boxes, self.t_max);
-        // Nine runs of `count` floats, and room to read eight from the last.
+        // Nine runs of `count` floats, padded so that the last one can be read as eight.
         let mut values = [0.0; 80];
         for (triangle, corners) in self.corners.iter().take(self.count).enumerate() {
             for (run, value) in corners.as_flattened().iter().enumerate() {
@@ -193,8 +194,8 @@ impl Work {
     }
 }
 
-/// The children of rows 0 and 1 of the boxes, taken as entries and exits, onto a stack of some height; of which
-/// then only those up to the first entry of row 3 are kept.
+/// Pushes rows 0 and 1 of the boxes, as entries and exits, onto a stack of height `height`, and then keeps
+/// only entries up to the first value of row 3.
 #[derive(Clone, Copy)]
 struct Push {
     order: u32,
@@ -202,7 +203,7 @@ struct Push {
     boxes: Boxes8,
 }
 
-/// The same, with the stack.
+/// The kernel of [`Push`] with its stack.
 struct PushOnto<'a>(Push, &'a mut Stack);
 
 impl Kernel for PushOnto<'_> {

@@ -1,4 +1,4 @@
-//! Every lane operation at every level against the scalar operation, to the bit.
+//! Every lane operation at every level against its scalar operation, to the bit.
 
 use crate::numbers::coordinate;
 use arbitrary::{Result, Unstructured};
@@ -27,7 +27,7 @@ fn attempt(input: &mut Unstructured) -> Result<()> {
     Ok(())
 }
 
-/// Sixteen pairs of numbers, of which eight lanes take the first eight.
+/// Sixteen pairs of numbers; eight lanes use the first eight.
 #[derive(Clone, Copy, Debug)]
 struct Operands {
     a: [f32; 16],
@@ -36,7 +36,7 @@ struct Operands {
     chosen: u32,
 }
 
-/// What the operations gave, in the order of [`NUMBERS`] and [`MASKS`].
+/// Results of the operations in the order of [`NUMBERS`] and [`MASKS`].
 struct Results<A> {
     numbers: [A; NUMBERS.len()],
     picked: A,
@@ -102,7 +102,7 @@ fn check<const N: usize>(level: Level, operands: &Operands, chosen: u32, results
         for ((name, scalar), lanes) in NUMBERS.iter().zip(&results.numbers) {
             let (expected, got) = (scalar(a, b), lanes[i]);
             let unspecified = ["min", "max"].contains(name) && (a.is_nan() || b.is_nan());
-            // Of zeros, min and max may give either.
+            // min and max may return either of two zeros.
             let same = expected.to_bits() == got.to_bits()
                 || expected.is_nan() && got.is_nan()
                 || ["min", "max"].contains(name) && expected == got;
@@ -134,7 +134,7 @@ fn check<const N: usize>(level: Level, operands: &Operands, chosen: u32, results
     );
 }
 
-/// What only kernels of photon maps use: lanes packed, and fields of words.
+/// Operations of photon map kernels: packed lanes, and bit fields of words.
 struct Packing {
     operands: Operands,
     words: [u32; 16],
@@ -150,10 +150,10 @@ struct Packed {
     smallest: f32,
 }
 
-/// Where fields of a word start, and how wide they are.
+/// First bit and width of fields of a word.
 const FIELDS: [(u32, u32); 3] = [(0, 12), (22, 10), (8, 24)];
 
-/// Numbers from 0 to below 16.
+/// Numbers in [0, 16).
 fn places(words: &[u32; 16]) -> [f32; 16] {
     words.map(|word| (word >> 8 & 0xffff) as f32 / 4096.0)
 }

@@ -1,5 +1,5 @@
-//! Fuzz targets as plain functions of bytes, so that libFuzzer and the stable driver call the same code.
-//! A target panics where something is wrong, and returns otherwise.
+//! Fuzz targets as plain functions of bytes, called by libFuzzer and by the driver `mutate` alike. A target
+//! panics on an error and otherwise returns.
 #![forbid(unsafe_code)]
 
 pub mod bsdf;
@@ -23,9 +23,9 @@ pub mod sampling;
 #[cfg(feature = "app")]
 pub mod scene_file;
 
-/// What is fuzzed: a name and its function.
+/// A fuzz target: name and function.
 pub struct Target {
-    /// As on the command line.
+    /// Name on the command line.
     pub name: &'static str,
     /// Runs one input.
     pub run: fn(&[u8]),

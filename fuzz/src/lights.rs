@@ -1,5 +1,5 @@
-//! Any lamps, lit points anywhere: at every level the same light is chosen with the same probability, and no density or
-//! radiance is less than nothing or no number.
+//! Light sampling for any lamps and any lit points: all levels choose the same light with the same
+//! probability; densities and radiance are neither negative nor NaN.
 
 use crate::numbers::{fraction, traceable_point as point};
 use arbitrary::{Result, Unstructured};

@@ -1,8 +1,8 @@
-//! Material libraries: any bytes give materials, and numbers in them that are numbers.
+//! Material libraries: any bytes give materials without a panic.
 
 /// One input.
 pub fn run(data: &[u8]) {
     let mtl = halflight::load::mtl::parse(data.to_vec(), "fuzz.mtl");
-    // What `info` and the report will print.
+    // Printed by `info` and the report.
     let _ = format!("{:?}", mtl.materials);
 }

@@ -1,5 +1,5 @@
-//! Numbers that hurt: most of them ordinary and on a coarse grid, so that things coincide; some from the
-//! far ends of f32.
+//! Numbers for fuzzing: mostly ordinary ones on a coarse grid, so that values coincide; some from the
+//! extremes of f32.
 
 use arbitrary::{Result, Unstructured};
 
@@ -22,9 +22,9 @@ pub(crate) fn point(input: &mut Unstructured) -> Result<[f32; 3]> {
     Ok([coordinate(input)?, coordinate(input)?, coordinate(input)?])
 }
 
-/// A point where the ray tracer's arithmetic holds, or one that is not finite: products of three coordinates
-/// must neither overflow nor vanish, as the doubt of a zero area would. Scenes are scaled to the order of 1
-/// before they are traced.
+/// A point within the range of the ray tracer's arithmetic, or not finite. Products of three coordinates must
+/// neither overflow nor vanish, as the error bound of a zero area would. Scenes are scaled to the order of 1
+/// before tracing.
 pub(crate) fn traceable_point(input: &mut Unstructured) -> Result<[f32; 3]> {
     const RANGE: core::ops::RangeInclusive<f32> = 1e-10..=1e10;
     let within = |x: f32| if RANGE.contains(&x.abs()) || !x.is_finite() { x } else { 0.0f32.copysign(x) };
@@ -46,7 +46,7 @@ const SPECIAL: [f32; 12] = [
     -1.0,
 ];
 
-/// A number in [0, 1), often at the ends.
+/// A number in [0, 1), often near the ends.
 pub(crate) fn fraction(input: &mut Unstructured) -> Result<f32> {
     const BELOW_ONE: f32 = 1.0 - f32::EPSILON / 2.0;
     let bits: u16 = input.arbitrary()?;

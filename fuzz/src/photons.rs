@@ -1,5 +1,5 @@
-//! Build over photons in any places and search from anywhere, by every entry point at every level: what is found
-//! must be what brute force finds, ties included; and a density the same to the bit at every level.
+//! Photon maps of any photons, searched from anywhere through every entry point at every level: results agree
+//! with brute force, ties included, and densities with each other to the bit.
 
 use crate::numbers::{coordinate, fraction, point};
 use arbitrary::{Result, Unstructured};
@@ -10,10 +10,10 @@ use halflight_core::photon::{
 };
 use halflight_core::{Level, Rgb};
 
-/// More than the leaves under one node.
+/// More photons than the leaves of one node hold.
 const MAX_PHOTONS: usize = 1024;
 
-/// Relative; a thousand terms are added in another order.
+/// Relative tolerance: up to a thousand terms are summed in another order.
 const ROUNDING: f32 = 1e-4;
 
 /// One input.
@@ -28,7 +28,7 @@ fn attempt(input: &mut Unstructured) -> Result<()> {
         photons.push(photon(input)?);
     }
     let places: Vec<Vec3> = photons.iter().map(Photon::position).collect();
-    // The same again, many times over: then it is for the order of the photons to say which are nearer.
+    // Many copies: the index of photons then decides which are nearer.
     photons = photons.repeat(copies);
     photons.truncate(MAX_PHOTONS);
 
@@ -50,7 +50,7 @@ fn attempt(input: &mut Unstructured) -> Result<()> {
     let normal = Vec3::from(point(input)?).normalize_or(Vec3::Z);
     let kernel =
         [Kernel::Constant, Kernel::Cone, Kernel::Epanechnikov][usize::from(input.arbitrary::<u8>()? % 3)];
-    // What brute force finds is the same for all levels.
+    // Brute force gives one answer for all levels.
     let orders: Vec<Vec<u32>> = asked.iter().map(|&place| expected(&map, place, radius)).collect();
     for level in Level::detect().and_below() {
         search(&map, level, &asked, &orders, radius, k);
@@ -72,7 +72,7 @@ fn lines(footprint: Footprint) -> Vec<Line> {
     vec![Line([0; 64]); footprint.bytes() / 64]
 }
 
-/// By rising distance and index.
+/// Indices of photons within `radius` by ascending distance, then index.
 fn expected(map: &PhotonMap, place: Vec3, radius: f32) -> Vec<u32> {
     let mut all: Vec<_> = brute::within(map, place, radius).map(|(i, d)| (d.to_bits(), i)).collect();
     all.sort_unstable();

@@ -1,5 +1,5 @@
-//! Records of irradiance anywhere, of any shape, and sixteen points that ask for it at once: at every level each is told
-//! what it is told alone, to the bit.
+//! Irradiance caches of any records, queried by sixteen points at once: at every level each point gets the
+//! bits of a single query.
 
 use crate::numbers::{fraction, point};
 use arbitrary::{Result, Unstructured};
@@ -63,14 +63,14 @@ fn within(input: &mut Unstructured) -> Result<Vec3> {
     Ok(Vec3::new(fraction(input)?, fraction(input)?, fraction(input)?))
 }
 
-/// Mostly within 0.2 rad of upright.
+/// A normal, mostly within 0.2 rad of z.
 fn normal(input: &mut Unstructured) -> Result<Vec3> {
     let wide = if input.arbitrary::<u8>()? < 200 { 0.2 } else { 4.0 };
     let [x, y] = [fraction(input)?, fraction(input)?].map(|u| wide * (u - 0.5));
     Ok(Vec3::new(x, y, 1.0).normalize())
 }
 
-/// What a cache may hold: unit axes, numbers of ordinary size, or none at all.
+/// A record of unit axes and of numbers of ordinary size.
 fn record(input: &mut Unstructured) -> Result<Record> {
     let normal = normal(input)?;
     let mut number = || Ok(2.0 * fraction(input)? - 1.0);

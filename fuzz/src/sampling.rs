@@ -1,14 +1,14 @@
-//! Streams, warps and tables: what comes out is in range, whatever goes in.
+//! Sample streams, warps and tables: outputs stay in their ranges for any input.
 
 use crate::numbers::{coordinate, fraction};
 use arbitrary::{Result, Unstructured};
 use halflight_core::memory::{Arena, Line};
 use halflight_core::sampling::{AliasTable, Distribution2d, Sampler, warp};
 
-/// Lengths of unit vectors may be off by so much.
+/// Largest deviation of a unit vector's length from 1.
 const UNIT_TOLERANCE: f32 = 1e-5;
 
-/// Probabilities of all items may add up to 1 but for so much: 64 roundings of f32.
+/// Largest deviation of the sum of probabilities from 1: 64 roundings of f32.
 const SUM_TOLERANCE: f32 = 1e-4;
 
 /// One input.

@@ -1,11 +1,11 @@
-//! Memory for tests that call the core: as many bytes as a footprint states.
+//! Memory for tests of the core: exactly the bytes of a footprint.
 
 use halflight_core::bvh::Bvh;
 use halflight_core::light::LightSampler;
 use halflight_core::memory::{ALIGNMENT, Arena, Footprint, Line};
 use halflight_core::scene::Scene;
 
-/// Bytes that an [`Arena`] is made of.
+/// Bytes of an [`Arena`].
 pub struct TestArena(Vec<Line>);
 
 impl TestArena {
@@ -14,7 +14,7 @@ impl TestArena {
         Self::filled(footprint, 0)
     }
 
-    /// The same, where every byte is `value`.
+    /// Bytes of `footprint`, all equal to `value`.
     pub fn filled(footprint: Footprint, value: u8) -> Self {
         Self(vec![Line([value; ALIGNMENT]); footprint.bytes() / ALIGNMENT])
     }
@@ -30,10 +30,10 @@ impl TestArena {
     }
 }
 
-/// Calls `work` with the hierarchy and the lights of a scene.
+/// Calls `work` with the BVH and the lights of a scene.
 ///
 /// # Panics
-/// If a footprint is less than a build takes.
+/// If a footprint is smaller than a build needs.
 pub fn with_structures<T>(scene: &Scene, work: impl FnOnce(&Bvh, &LightSampler) -> T) -> T {
     let mut bvh = TestArena::new(Bvh::footprint(scene.mesh.triangles.len()));
     let bvh = Bvh::build(&scene.mesh, &mut bvh.arena()).expect("the footprint suffices");

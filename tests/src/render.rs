@@ -1,5 +1,4 @@
-//! Pictures by the renderer itself, with the settings that a test is about, and how far two of them are
-//! apart.
+//! Pictures of tests with given settings, and differences between pictures.
 
 use crate::statistics;
 use core::sync::atomic::AtomicBool;
@@ -7,11 +6,11 @@ use halflight::render::{self, Method, RenderError, RenderResult, Settings, Stop}
 use halflight::save::Image;
 use halflight_core::scene::Scene;
 
-/// A square picture of `size` pixels across by `spp` samples, not audited; `change` has the last word on its
-/// settings.
+/// A square picture of `size` pixels across with `spp` samples, not audited; `change` edits the settings
+/// last.
 ///
 /// # Panics
-/// Where it cannot be rendered.
+/// If the render fails.
 pub fn render(
     scene: &Scene,
     method: Method,
@@ -22,7 +21,7 @@ pub fn render(
     try_render(scene, method, size, spp, change).expect("it can be rendered")
 }
 
-/// The same, where it may fail.
+/// As [`render`], with errors returned.
 pub fn try_render(
     scene: &Scene,
     method: Method,
@@ -37,12 +36,12 @@ pub fn try_render(
     render::render(scene, &settings, &mut |_| (), &AtomicBool::new(false))
 }
 
-/// Whether it has memory of photons.
+/// Whether the render had memory for photons.
 pub fn has_photons(result: &RenderResult) -> bool {
     result.memory.iter().any(|one| one.structure == "photons" && one.bytes > 0)
 }
 
-/// Means of green over blocks of 4 × 4 pixels: what is left of noise is a quarter.
+/// Means of green over blocks of 4 × 4 pixels, which quarters the noise.
 pub fn blocks(image: &Image) -> Vec<f64> {
     blocks_of(image, 4)
 }
@@ -53,7 +52,7 @@ pub fn blocks_of(image: &Image, side: u32) -> Vec<f64> {
     sums.chunks_exact(3).map(|sum| sum[1] / f64::from(side * side)).collect()
 }
 
-/// Root of the mean squared difference of blocks over their mean in `b`.
+/// Root mean squared difference of block means, relative to the mean of `b`.
 pub fn difference(a: &Image, b: &Image) -> f64 {
     let (a, b) = (blocks(a), blocks(b));
     let squares: f64 = a.iter().zip(&b).map(|(a, b)| (a - b).powi(2)).sum();

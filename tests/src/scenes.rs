@@ -1,4 +1,4 @@
-//! Small scenes made by hand, whose pictures are known or can be reasoned about.
+//! Small scenes made by hand, whose radiance is known or can be reasoned about.
 
 use glam::{Mat3, Vec3};
 use halflight_core::Rgb;
@@ -6,7 +6,7 @@ use halflight_core::scene::{
     Camera, ColorInput, Environment, Material, Mesh, PointLight, Scene, Surface, Texture, Triangle,
 };
 
-/// Buffers of a scene, and a camera.
+/// Buffers of a scene with a camera.
 #[derive(Clone, Debug)]
 pub struct SceneBuffers {
     /// Vertex positions.
@@ -19,16 +19,16 @@ pub struct SceneBuffers {
     pub triangles: Vec<Triangle>,
     /// Materials.
     pub materials: Vec<Material>,
-    /// Lights without surface.
+    /// Delta lights.
     pub lights: Vec<PointLight>,
-    /// Light from infinitely far.
+    /// Environment.
     pub environment: Option<Environment>,
-    /// Who looks.
+    /// Camera.
     pub camera: Camera,
 }
 
 impl SceneBuffers {
-    /// Nothing but a camera.
+    /// A scene without geometry and lights.
     pub fn new(camera: Camera) -> Self {
         Self {
             positions: Vec::new(),
@@ -42,12 +42,12 @@ impl SceneBuffers {
         }
     }
 
-    /// The scene as the core sees it.
+    /// The scene without textures.
     pub fn scene(&self) -> Scene<'_> {
         self.textured(&[])
     }
 
-    /// The scene with textures.
+    /// The scene with `textures`.
     pub fn textured<'a>(&'a self, textures: &'a [Texture<'a>]) -> Scene<'a> {
         Scene {
             mesh: Mesh {
@@ -81,7 +81,7 @@ impl SceneBuffers {
         face([0, 2, 3]);
     }
 
-    /// Adds the unit square around `center` that faces `normal`, times `size`.
+    /// Adds a square of side `size` around `center` that faces `normal`.
     pub fn square(&mut self, center: Vec3, normal: Vec3, size: f32, material: u32) {
         let (u, v) = normal.any_orthonormal_pair();
         let (u, v) = if u.cross(v).dot(normal) > 0.0 { (u, v) } else { (v, u) };
@@ -107,7 +107,7 @@ impl SceneBuffers {
         }
     }
 
-    /// Adds a sphere of `2 * rings²` quadrilaterals or so, with smooth normals where the scene has normals.
+    /// Adds a sphere of about `2 * rings²` quadrilaterals, with smooth normals if the scene has normals.
     pub fn sphere(&mut self, center: Vec3, radius: f32, rings: u32, material: u32) {
         let first = self.positions.len() as u32;
         let segments = 2 * rings;
@@ -145,12 +145,12 @@ pub fn emitter(reflectance: f32, radiance: f32) -> Material {
     }
 }
 
-/// The same radiance from everywhere.
+/// An environment of constant radiance.
 pub fn constant_environment(radiance: f32) -> Option<Environment> {
     Some(Environment { radiance: Rgb::splat(radiance), map: None, to_map: Mat3::IDENTITY })
 }
 
-/// The Cornell box: walls from the published measurements, in units of 555.2 mm, two blocks, a lamp.
+/// The Cornell box by its published measurements, in units of 555.2 mm: walls, two blocks, a lamp.
 pub fn cornell_box() -> SceneBuffers {
     const UNIT: f32 = 1.0 / 555.2;
     let eye = Vec3::new(278.0, 273.0, -800.0) * UNIT;
@@ -183,8 +183,8 @@ pub fn cornell_box() -> SceneBuffers {
     scene
 }
 
-/// A lamp of `size` that faces something of `surface` at its back, and a floor that both shine on: a caustic
-/// where that throws the light, so large that paths find it as well.
+/// A lamp of side `size` in front of an object of `surface`, and a floor lit by both: a caustic if `surface`
+/// is specular, large enough for paths to find it.
 pub fn lamp_before(surface: Surface, size: f32) -> SceneBuffers {
     let camera = Camera::look_at(Vec3::new(0.0, 2.5, 3.0), Vec3::new(0.0, 0.0, 0.5), Vec3::Y, 40.0);
     let mut buffers = SceneBuffers::new(camera);
@@ -197,7 +197,7 @@ pub fn lamp_before(surface: Surface, size: f32) -> SceneBuffers {
     buffers
 }
 
-/// A ball between floor and a lamp of `size`.
+/// A ball of `surface` between a floor and a lamp of side `size`.
 pub fn lamp_over_ball(surface: Surface, size: f32) -> SceneBuffers {
     let camera = Camera::look_at(Vec3::new(0.0, 2.0, 3.5), Vec3::new(0.0, 0.3, 0.0), Vec3::Y, 40.0);
     let mut buffers = SceneBuffers::new(camera);
@@ -212,7 +212,7 @@ pub fn lamp_over_ball(surface: Surface, size: f32) -> SceneBuffers {
     buffers
 }
 
-/// The same in a room, so that the caustic lights walls.
+/// Puts the scene into a room, whose walls the caustic then lights.
 pub fn in_a_room(mut buffers: SceneBuffers) -> SceneBuffers {
     let wall = buffers.material(Material::diffuse(Rgb::splat(0.6)));
     buffers.cuboid(Vec3::new(-3.0, -0.5, -3.0), Vec3::new(3.0, 3.5, 4.5), true, wall);
@@ -220,12 +220,12 @@ pub fn in_a_room(mut buffers: SceneBuffers) -> SceneBuffers {
     buffers
 }
 
-/// Metal, which is a mirror where it is not rough.
+/// Metal: a mirror at roughness 0.
 pub fn metal(roughness: f32) -> Surface {
     Surface::Conductor { reflectance: Rgb::splat(0.9).into(), roughness: roughness.into() }
 }
 
-/// A diffuse surface under a coat of such roughness.
+/// A diffuse surface under a coat of `roughness`.
 pub fn varnish(roughness: f32) -> Surface {
     Surface::Glossy {
         base: Rgb::new(0.5, 0.35, 0.2).into(),
@@ -236,7 +236,7 @@ pub fn varnish(roughness: f32) -> Surface {
     }
 }
 
-/// The same scene with such a varnish on all that was diffuse.
+/// The scene with varnish of `roughness` in place of all diffuse surfaces that do not emit.
 pub fn varnished(mut buffers: SceneBuffers, roughness: f32) -> SceneBuffers {
     for material in &mut buffers.materials {
         if matches!(material.surface, Surface::Diffuse { .. }) && !material.emits() {
@@ -246,13 +246,12 @@ pub fn varnished(mut buffers: SceneBuffers, roughness: f32) -> SceneBuffers {
     buffers
 }
 
-/// Glass.
+/// Glass of index 1.5.
 pub fn glass(roughness: f32) -> Surface {
     Surface::Dielectric { ior: 1.5, tint: Rgb::ONE, roughness: roughness.into() }
 }
 
-/// A bright room and a dark one, with a wall between them that is as thin as a thousandth; seen from the dark
-/// one.
+/// A bright and a dark room separated by a wall of thickness 0.001, seen from the dark one.
 pub fn bright_and_dark() -> SceneBuffers {
     let camera = Camera::look_at(Vec3::new(0.52, 0.5, 0.95), Vec3::new(0.52, 0.45, 0.0), Vec3::Y, 80.0);
     let mut buffers = SceneBuffers::new(camera);
@@ -264,7 +263,7 @@ pub fn bright_and_dark() -> SceneBuffers {
     buffers
 }
 
-/// Where the camera of [`bright_and_dark`] would be in the bright room.
+/// Camera position in the bright room, opposite the camera of [`bright_and_dark`].
 pub const IN_THE_BRIGHT_ROOM: Vec3 = Vec3::new(0.48, 0.5, 0.95);
 
 /// The Cornell box with a mirror, glass, a coat, a cut-out, smooth normals, a lens, a sky and a point light.
@@ -299,8 +298,7 @@ pub fn everything() -> SceneBuffers {
     scene
 }
 
-/// A unit room with a lamp of `opacity` and radiance `radiance` under its ceiling, which is behind the
-/// camera.
+/// A unit room with a lamp of `opacity` and `radiance` under its ceiling, outside the view.
 pub fn room_with_lamp(opacity: f32, radiance: f32) -> SceneBuffers {
     let camera = Camera::look_at(Vec3::new(0.5, 0.6, 0.05), Vec3::new(0.5, 0.2, 1.0), Vec3::Y, 60.0);
     let mut buffers = SceneBuffers::new(camera);

@@ -1,19 +1,19 @@
-//! The judge of random pictures: a t-test of every pixel over independent replicas, with the significance
-//! level shared out over the pixels (Šidák 1967).
+//! Tests of random pictures: a t-test of every pixel over independent replicas, with the significance level
+//! shared among the pixels (Šidák 1967).
 
 use core::f64::consts::FRAC_PI_2;
 
-/// The probability with which a test fails that should pass. Seeds are fixed, so it either does or never
-/// does.
+/// Probability that a correct renderer fails a test. Seeds are fixed, so a test always passes or always
+/// fails.
 pub const SIGNIFICANCE: f64 = 0.01;
 
-/// Relative rounding that even a picture without noise may have.
+/// Relative rounding error allowed in pictures without noise.
 pub const ROUNDING: f64 = 2e-5;
 
 /// Judges whether the mean of `replicas` (each a list of pixels) is `expected`.
 ///
 /// # Errors
-/// The worst pixel, in words.
+/// Text about the first pixel that differs.
 pub fn judge(replicas: &[Vec<f64>], expected: &[f64]) -> Result<(), String> {
     let count = replicas.len() as f64;
     let each = 1.0 - (1.0 - SIGNIFICANCE).powf(1.0 / (expected.len() + 1) as f64);
@@ -33,7 +33,7 @@ pub fn judge(replicas: &[Vec<f64>], expected: &[f64]) -> Result<(), String> {
     test("mean of the picture", &|replica| mean(replica), mean(expected))
 }
 
-/// The sums of blocks of `size` × `size` pixels of a picture that is `width` pixels across, all channels.
+/// Sums over blocks of `size` × `size` pixels of a picture `width` pixels across, all channels.
 pub fn blocks(pixels: &[[f32; 3]], width: u32, size: u32) -> Vec<f64> {
     let (across, down) = (width / size, pixels.len() as u32 / width / size);
     let mut sums = vec![0.0; (across * down * 3) as usize];
@@ -46,14 +46,14 @@ pub fn blocks(pixels: &[[f32; 3]], width: u32, size: u32) -> Vec<f64> {
     sums
 }
 
-/// Judges whether two lots of pictures have the same means: none of their values may be more than `widest`
-/// deviations apart (Welch's t).
+/// Judges whether two sets of pictures have equal means: no value may differ by more than `widest` standard
+/// deviations (Welch's t).
 ///
 /// # Errors
-/// The first value that is, in words.
+/// Text about the first value that differs.
 pub fn agree(a: &[Vec<f64>], b: &[Vec<f64>], widest: f64) -> Result<(), String> {
     for (i, ((a, va), (b, vb))) in moments(a).into_iter().zip(moments(b)).enumerate() {
-        // Values without any noise are equal up to rounding.
+        // Values without noise are equal up to rounding.
         let deviation = (a - b).abs() / (va + vb).sqrt().max(1e-6 * (a + b));
         if !(a == b || deviation < widest) {
             return Err(format!("value {i}: {a} and {b}, {deviation:.1} deviations"));
@@ -62,11 +62,11 @@ pub fn agree(a: &[Vec<f64>], b: &[Vec<f64>], widest: f64) -> Result<(), String> 
     Ok(())
 }
 
-/// The same, where the values of `a` may have a bias of up to `allowed(i, b)` in value `i`, whose mean in the
-/// other lot is `b`. The significance level is shared out over the values and `comparisons` of this kind.
+/// As [`agree`], with a bias of up to `allowed(i, b)` in value `i` of `a`, where `b` is the mean of the other
+/// set. The significance level is shared among the values and `comparisons` comparisons.
 ///
 /// # Errors
-/// The worst value, in words.
+/// Text about the worst value.
 pub fn agree_within(
     a: &[Vec<f64>],
     b: &[Vec<f64>],
@@ -78,13 +78,13 @@ pub fn agree_within(
     let [of_a, of_b] = [a, b].map(|lot| (lot.len() - 1) as f64);
     let moments = moments(a).into_iter().zip(moments(b)).enumerate();
     let all = moments.map(|(i, ((a, va), (b, vb)))| {
-        // Welch 1947; at least those of the smaller lot.
+        // Welch 1947; at least the degrees of freedom of the smaller set.
         let freedom = (va + vb).powi(2) / (va * va / of_a + vb * vb / of_b);
         let widest = student_quantile(0.5 * each, freedom.max(of_a.min(of_b)) as u32);
         let error = widest * (va + vb).sqrt() + ROUNDING * b.abs();
         let limit = error + allowed(i, b);
         let text = format!("value {i}: {a:.5} and {b:.5} ± {error:.5}, {:.5} allowed", allowed(i, b));
-        // Values without any light are equal.
+        // Black values are equal.
         let excess = if a == b { 0.0 } else { (a - b).abs() / limit };
         (excess, text)
     });
@@ -93,7 +93,7 @@ pub fn agree_within(
     if excess <= 1.0 { Ok(()) } else { Err(format!("{excess:.2} of the limit: {text}")) }
 }
 
-/// Mean and variance of the mean of each value.
+/// Mean of each value, and the variance of that mean.
 fn moments(pictures: &[Vec<f64>]) -> Vec<(f64, f64)> {
     let count = pictures.len() as f64;
     let of = |i: usize| {
@@ -104,7 +104,7 @@ fn moments(pictures: &[Vec<f64>]) -> Vec<(f64, f64)> {
     (0..pictures[0].len()).map(of).collect()
 }
 
-/// The value that Student's t with `freedom` degrees exceeds with probability `tail` < 0.5.
+/// Quantile of Student's t with `freedom` degrees: exceeded with probability `tail` < 0.5.
 fn student_quantile(tail: f64, freedom: u32) -> f64 {
     // With t = √freedom cot φ the density is a power of sin φ.
     let below = |angle: f64| {
@@ -121,7 +121,7 @@ fn student_quantile(tail: f64, freedom: u32) -> f64 {
     f64::from(freedom).sqrt() / low.tan()
 }
 
-/// Steps of an integral, an even number.
+/// Steps of Simpson's rule, an even number.
 const STEPS: u32 = 256;
 
 #[cfg(test)]
@@ -130,7 +130,7 @@ mod tests {
 
     #[test]
     fn quantiles_are_those_of_the_tables() {
-        // Also far out, which series in the inverse of the degrees do not reach.
+        // The tails too, where series in the inverse of the degrees of freedom fail.
         let table = [
             (0.025, 1, 12.7062),
             (0.005, 7, 3.4995),

@@ -1,6 +1,6 @@
-//! The stable driver: `mutate TARGET [--seconds N] [--runs N] [--seed N]` runs a target over its corpus and
-//! then over seeded mutations of it, until one of both ends. It sees no coverage, so it finds less than
-//! libFuzzer; it needs no nightly. The input that failed is left in `fuzz/artifacts/TARGET/`.
+//! Driver without nightly: `mutate TARGET [--seconds N] [--runs N] [--seed N]` runs a target over its corpus,
+//! then over seeded mutations of it until either limit. Without coverage feedback it finds less than
+//! libFuzzer. The input that failed stays in `fuzz/artifacts/TARGET/`.
 #![forbid(unsafe_code)]
 
 use halflight_fuzz::{TARGETS, Target};
@@ -29,7 +29,7 @@ fn main() -> ExitCode {
     let corpus = files(&home.join("corpus").join(name));
     let mut random = Random(number("--seed", 1));
     let end = Instant::now() + Duration::from_secs(number("--seconds", 20));
-    // A negative number is none: no limit.
+    // A negative number means no limit.
     let most_runs = number("--runs", u64::MAX);
 
     let mut runs = 0u64;
@@ -49,7 +49,7 @@ fn main() -> ExitCode {
     ExitCode::SUCCESS
 }
 
-/// An input of the corpus with bytes changed, removed, doubled or replaced by a piece of another.
+/// An input of the corpus with bytes changed, removed, doubled or replaced by a part of another input.
 fn mutated(corpus: &[Vec<u8>], random: &mut Random) -> Vec<u8> {
     let pick = |random: &mut Random| corpus.get(random.below(corpus.len())).cloned().unwrap_or_default();
     let mut input = pick(random);
@@ -92,7 +92,7 @@ impl Random {
         b ^ (b >> 31)
     }
 
-    /// 0 … bound − 1; 0 where the bound is 0.
+    /// Uniform in 0 … bound − 1; 0 if the bound is 0.
     fn below(&mut self, bound: usize) -> usize {
         (self.next() % bound.max(1) as u64) as usize
     }

@@ -1,5 +1,5 @@
-//! Embree 3: its high-quality hierarchy on one thread, and every entry point for single rays and packets of 8 and 16,
-//! with the coherent and the incoherent flag.
+//! Embree 3: its high-quality BVH on one thread, with every entry point for single rays and packets of 8 and
+//! 16, coherent and incoherent.
 
 use crate::packets;
 use embree3::{

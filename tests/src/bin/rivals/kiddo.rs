@@ -1,4 +1,4 @@
-//! kiddo's immutable tree, and the query that suits the task best. It only finds what the density estimate weighs.
+//! kiddo's immutable tree with the query that suits each task best. For density estimates it only searches photons, without weights.
 
 use core::num::NonZero;
 use halflight::bench::BenchError;

@@ -1,5 +1,6 @@
-//! The kernels of `halflight bench` beside other libraries in the same run, repetition by repetition: `rivals rays
-//! SCENE`, `rivals eigen`, `rivals knn`. Each library is a feature: `embree`, `nalgebra`, `kiddo`, `nanoflann`.
+//! Kernels of `halflight bench` against other libraries in one run, alternating by repetition: `rivals rays
+//! SCENE`, `rivals eigen`, `rivals knn`. Each library is a feature: `embree`, `nalgebra`, `kiddo`,
+//! `nanoflann`.
 #![forbid(unsafe_code)]
 
 mod eigen;

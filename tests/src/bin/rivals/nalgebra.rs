@@ -5,7 +5,7 @@ use halflight::bench::eigen::Entry;
 use halflight_simd::kernels::eigen::{Matrices2, Matrices3};
 use nalgebra::{Matrix2, Matrix3, SymmetricEigen, U2, U3};
 
-/// Its results.
+/// Decompositions of both sizes.
 #[derive(Default)]
 pub(crate) struct Nalgebra {
     small: Vec<SymmetricEigen<f32, U2>>,
@@ -39,7 +39,7 @@ mod tests {
     use halflight_core::sampling::{mix, unit_float};
     use halflight_simd::kernels::eigen::{symmetric2, symmetric3};
 
-    /// Of the largest value.
+    /// Relative to the largest eigenvalue.
     const TOLERANCE: f32 = 2e-6;
 
     #[test]

@@ -1,4 +1,4 @@
-//! Rays in the forms that Embree reads: alone, by 8 and by 16, with room for a hit or without.
+//! Rays in Embree's layouts: single, by 8 and by 16, with or without a hit.
 
 use core::array::from_fn;
 use embree3::{
@@ -8,20 +8,20 @@ use embree3::{
 use halflight::bench::rays::Entry;
 use halflight_core::geometry::Ray;
 
-/// What one call takes: a ray or a packet of them, and in it what comes back.
+/// Argument of one Embree call: a ray or packet, which also receives the result.
 pub(crate) trait Packet: Sized {
     /// Rays of a packet.
     const WIDTH: usize;
-    /// Its function, for coherent rays and for incoherent ones.
+    /// Names of its function for coherent and for incoherent rays.
     const NAMES: [&'static str; 2];
     /// Up to [`Packet::WIDTH`] rays.
     fn pack(rays: &[Ray]) -> Self;
     fn trace(&mut self, scene: &Scene, context: &mut IntersectContext);
-    /// How many rays met something.
+    /// Number of rays that hit.
     fn hits(&self) -> usize;
 }
 
-/// The function of `P` told that rays are coherent, and told that they are not.
+/// Entry points of `P` with the coherent and with the incoherent flag.
 pub(crate) fn both<'a, P: Packet + 'a>(scene: &'a Scene<'static>) -> [Box<dyn Entry + 'a>; 2] {
     let [coherent, incoherent] = P::NAMES;
     let entry = |name, context| -> Box<dyn Entry + 'a> {
@@ -58,10 +58,10 @@ impl<P: Packet> Entry for Packets<'_, P> {
     }
 }
 
-/// What Embree writes to the end of a ray that is occluded.
+/// Value of `tfar` that Embree writes if a ray is occluded.
 const OCCLUDED: f32 = f32::NEG_INFINITY;
 
-/// Every lane is traced. The AVX functions load masks whole, so they must not straddle their size.
+/// A mask with all lanes active. Embree's AVX functions load aligned masks, hence the alignment.
 #[repr(align(64))]
 struct Mask<const N: usize>(ValidMaskN<N>);
 
@@ -114,7 +114,7 @@ macro_rules! packet {
             const NAMES: [&'static str; 2] = $occluded_names;
 
             fn pack(rays: &[Ray]) -> Self {
-                // A ray that ends before it begins is none: it fills up the last packet.
+                // The last packet is filled with inactive rays, which end before they begin.
                 let lane = |i: usize| rays.get(i).copied().unwrap_or(Ray { t_max: -1.0, ..rays[0] });
                 $ray::segment(
                     from_fn(|i| lane(i).origin),

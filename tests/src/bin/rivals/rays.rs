@@ -75,7 +75,7 @@ impl Rays {
     }
 }
 
-/// The rival's best entry point for each class, and our speed over its.
+/// The rival's fastest entry point of each class, and our speed relative to it.
 fn beside(ours: &RaysReport, theirs: &RivalReport) -> Vec<String> {
     let fastest = |entries: &Vec<RivalClass>| {
         entries.iter().max_by(|a, b| a.mrays_per_second.total_cmp(&b.mrays_per_second)).cloned()
@@ -99,7 +99,7 @@ fn beside(ours: &RaysReport, theirs: &RivalReport) -> Vec<String> {
 mod tests {
     use super::*;
 
-    /// Share of rays that may differ: Embree's test of a triangle is not watertight, and rounds otherwise.
+    /// Share of rays that may differ: Embree's triangle test is not watertight and rounds differently.
     const DIFFERENT: f64 = 1e-4;
 
     #[test]
@@ -107,7 +107,7 @@ mod tests {
         let file = concat!(env!("CARGO_MANIFEST_DIR"), "/../scenes/cornell/cornell.obj");
         let loaded = load(file.as_ref(), &LoadOptions::default()).unwrap();
         let views = loaded.views();
-        // 10,201 rays: not a multiple of any packet.
+        // 10,201 rays: no multiple of a packet size.
         let scene = views.scene(loaded.camera_or_default());
         let (ours, theirs) = measure(&scene, Level::detect(), 101).unwrap();
         assert_eq!(theirs.is_some(), cfg!(feature = "embree"));

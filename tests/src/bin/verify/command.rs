@@ -1,10 +1,10 @@
-//! Running other programs: what is run is printed, and a failure names it.
+//! Child processes: prints each command line, and names it if it fails.
 
 use crate::{Failure, Outcome};
 use std::path::Path;
 use std::process::{Command, Stdio};
 
-/// `program arguments…` in `directory`; arguments are separated by spaces.
+/// `program arguments…` in `directory`, split at spaces.
 pub(crate) fn command(directory: &Path, line: &str) -> Command {
     let mut words = line.split_whitespace();
     let mut command = Command::new(words.next().unwrap_or_default());
@@ -12,7 +12,7 @@ pub(crate) fn command(directory: &Path, line: &str) -> Command {
     command
 }
 
-/// Cargo (of another toolchain where `line` says so) without what the outer cargo told this program.
+/// Cargo (of another toolchain if `line` names one) without the environment that the outer cargo set.
 pub(crate) fn fresh_cargo(directory: &Path, line: &str) -> Command {
     let mut command = command(directory, line);
     for (name, _) in std::env::vars_os() {
@@ -25,7 +25,7 @@ pub(crate) fn fresh_cargo(directory: &Path, line: &str) -> Command {
     command
 }
 
-/// Runs to the end with the output on the terminal.
+/// Runs a command with its output on the terminal.
 pub(crate) fn run(command: &mut Command) -> Result<(), Failure> {
     let shown = show(command);
     println!("$ {shown}");
@@ -36,7 +36,7 @@ pub(crate) fn run(command: &mut Command) -> Result<(), Failure> {
     }
 }
 
-/// Runs to the end; what it wrote to standard output, trimmed.
+/// Runs a command and returns its standard output, trimmed.
 pub(crate) fn output(command: &mut Command) -> Outcome {
     let shown = show(command);
     match command.stdin(Stdio::null()).stderr(Stdio::inherit()).output() {
@@ -46,7 +46,7 @@ pub(crate) fn output(command: &mut Command) -> Outcome {
     }
 }
 
-/// Whether a program can be started at all.
+/// Whether a program can be started.
 pub(crate) fn exists(program: &str) -> bool {
     let quiet = |mut c: Command| c.stdout(Stdio::null()).stderr(Stdio::null()).stdin(Stdio::null()).status();
     let mut version = Command::new(program);

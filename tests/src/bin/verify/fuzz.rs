@@ -1,15 +1,15 @@
-//! A short run of every fuzz target from its corpus: through cargo-fuzz where it and a nightly toolchain
-//! are installed, else through the stable driver of `fuzz/`.
+//! A short run of every fuzz target from its corpus: by cargo-fuzz if it and a nightly toolchain are
+//! installed, else by the driver `mutate`.
 
 use crate::command::{fresh_cargo, output, run};
 use crate::{Failure, Outcome, Project};
 use std::fs;
 use std::process::{Command, Stdio};
 
-/// Longest smoke run of a target; what is asked to run longer is a campaign.
+/// Longest smoke run of a target, seconds; anything longer is a campaign.
 pub(crate) const SMOKE_SECONDS: u32 = 20;
 
-/// Runs of each target in a smoke run: the corpus and some hundreds of mutations. Campaigns find more.
+/// Runs of each target in a smoke run: the corpus and some hundreds of mutations.
 const SMOKE_RUNS: i32 = 400;
 
 pub(crate) fn smoke(project: &Project) -> Outcome {
@@ -23,18 +23,18 @@ pub(crate) fn smoke(project: &Project) -> Outcome {
     targets.sort();
 
     let coverage = has_cargo_fuzz();
-    // A smoke run ends after the same runs on every machine, so that it says the same; a campaign by the
-    // clock.
+    // Smoke runs end after a fixed number of runs, so that every machine has the same result; campaigns end
+    // by the clock.
     let runs = if seconds <= SMOKE_SECONDS { SMOKE_RUNS } else { -1 };
     for target in &targets {
         if coverage {
-            // What libFuzzer finds goes to the first folder; the second is the one in the repository.
+            // libFuzzer writes new inputs to the first directory; the second is the corpus of the repository.
             fs::create_dir_all(folder.join("corpus-run").join(target)).map_err(io)?;
             let line = format!(
                 "cargo +nightly fuzz run --fuzz-dir . {target} corpus-run/{target} corpus/{target} -- \
                  -seed=1 -runs={runs} -max_total_time={seconds} -timeout=10 -verbosity=0 -print_final_stats=1"
             );
-            // Leaks are not what is looked for, and looking for them needs ptrace, which sandboxes forbid.
+            // No leak detection: it needs ptrace, which sandboxes forbid.
             run(fresh_cargo(&folder, &line).env("ASAN_OPTIONS", "detect_leaks=0"))?;
         } else {
             let line = format!(

@@ -1,10 +1,10 @@
-//! The layers of the core: a folder imports only from folders below it, the same holds for the folders of
-//! light transport, and the files of a folder import each other without circles. The `mod.rs` of a folder
-//! names the items that its files offer, and its files may import it.
+//! Layers of the core: a folder imports only from lower folders, also within light transport, and the files
+//! of a folder do not import each other in a cycle. The `mod.rs` of a folder re-exports items of its files,
+//! and its files may import it.
 
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Folders and files of core/src, lowest first. A new one has to find its place here.
+/// Folders and files of core/src, lowest first. A new folder or file must be added here.
 const LAYERS: &[&str] = &[
     "findings",
     "memory",
@@ -24,8 +24,8 @@ const LAYERS: &[&str] = &[
     "method",
 ];
 
-/// Folders and files of core/src/transport, lowest first: subpaths, the wavefront, the path tracer, and the
-/// methods that build on it.
+/// Folders and files of core/src/transport, lowest first: subpaths, wavefront, path tracer, and the methods
+/// built on it.
 const TRANSPORT: &[&str] = &[
     "settings",
     "walk",
@@ -46,10 +46,10 @@ pub(crate) struct Source<'t> {
     pub code: Vec<(usize, &'t str)>,
 }
 
-/// A path of modules from the root of the crate, perhaps with the name of an item at its end.
+/// A path of modules from the crate root, optionally ending in an item.
 type Path = Vec<String>;
 
-/// A complaint for each import from a higher layer and for each circle.
+/// A complaint for each import from a higher layer and for each import cycle.
 pub(crate) fn check(sources: &[Source]) -> Vec<String> {
     let tree = Tree::new(sources);
     let mut complaints = Vec::new();
@@ -85,8 +85,8 @@ pub(crate) fn check(sources: &[Source]) -> Vec<String> {
     complaints
 }
 
-/// The layer of name number `depth` of a path, where names at that place have layers; an error if it has
-/// none.
+/// Layer of component `depth` of a path, `None` if that depth has no layers; an error if the component is not
+/// listed.
 fn layer(path: &[String], depth: usize) -> Result<Option<usize>, ()> {
     let layers = match (depth, path.first().map(String::as_str)) {
         (0, _) => LAYERS,
@@ -105,7 +105,7 @@ fn module_of(name: &str) -> Path {
     path
 }
 
-/// The names that are left when those that import none of the others, and those that none imports, are gone.
+/// Nodes of the graph that remain after repeated removal of nodes without outgoing or without incoming edges.
 fn circle(mut edges: BTreeMap<String, BTreeSet<String>>) -> Vec<String> {
     loop {
         let count = edges.values().map(BTreeSet::len).sum::<usize>();
@@ -124,15 +124,15 @@ fn circle(mut edges: BTreeMap<String, BTreeSet<String>>) -> Vec<String> {
 struct Import {
     line: usize,
     path: Path,
-    /// By which others find it here, if it is exported.
+    /// Name of a re-export.
     exported: Option<String>,
 }
 
-/// All modules, and what they import.
+/// All modules with their imports.
 struct Tree {
     modules: BTreeSet<Path>,
     imports: Vec<Vec<Import>>,
-    /// For a module and a name that it exports: where that comes from.
+    /// Target of each name that a module re-exports.
     exports: BTreeMap<(Path, String), Path>,
 }
 
@@ -152,7 +152,7 @@ impl Tree {
         tree
     }
 
-    /// From a path as `module` writes it to one from the root; `None` where it leads to another crate.
+    /// Absolute form of a path written in `module`; `None` for a path into another crate.
     fn absolute(&self, module: &Path, path: &[String]) -> Option<Path> {
         let ups = path.iter().take_while(|name| *name == "super").count();
         let base = module.len().checked_sub(ups)?;
@@ -167,7 +167,7 @@ impl Tree {
         }
     }
 
-    /// The module in which an import finds its item, through what others export.
+    /// Module that defines the item of an import, through re-exports.
     fn target(&self, module: &Path, path: &[String]) -> Option<Path> {
         let mut path = self.absolute(module, path)?;
         for _ in 0..LAYERS.len() {
@@ -186,7 +186,7 @@ impl Tree {
     }
 }
 
-/// The imports of a file, and the paths that begin with `crate` or `super` in its other code.
+/// Imports of a file, and paths in its other code that begin with `crate` or `super`.
 fn imports(code: &[(usize, &str)]) -> Vec<Import> {
     let mut found = Vec::new();
     let mut lines = code.iter();
@@ -217,7 +217,7 @@ fn is_visibility(before: &str) -> bool {
     before.is_empty() || before == "pub" || before.starts_with("pub(") && before.ends_with(')')
 }
 
-/// `a::{b, c as d}` is a::b, and a::c by the name of d.
+/// `a::{b, c as d}` gives a::b, and a::c by the name d.
 fn expand(tree: &str, outer: &[String], all: &mut Vec<(Path, String)>) {
     let segments = |text: &str| -> Path {
         text.split("::").map(str::trim).filter(|name| !name.is_empty()).map(str::to_owned).collect()
@@ -239,7 +239,7 @@ fn expand(tree: &str, outer: &[String], all: &mut Vec<(Path, String)>) {
     all.push((path, name));
 }
 
-/// Paths such as `crate::a::b` in a line of code.
+/// Paths that begin with `crate::` or `super::` in a line of code.
 fn paths(line: &str) -> impl Iterator<Item = Path> {
     let words = line.split(|c: char| !(c.is_alphanumeric() || c == '_' || c == ':'));
     let from_here = |word: &&str| word.starts_with("crate::") || word.starts_with("super::");
@@ -297,7 +297,7 @@ mod tests {
             (("bvh/a.rs", "use super::b::B;\nuse super::Bvh;\n"), ("bvh/b.rs", "use crate::bvh::a;\n"));
         assert_eq!(complaints(&[face, a, ("bvh/b.rs", "use super::Bvh;\n")]), [""; 0]);
         assert_eq!(complaints(&[face, a, b]), ["core/src/bvh: a, b import in a circle"]);
-        // One that only imports from the circle is not part of it.
+        // A file that only imports from the cycle is not part of it.
         let c = ("bvh/c.rs", "use super::a::A;\n");
         assert_eq!(complaints(&[face, a, b, c]), ["core/src/bvh: a, b import in a circle"]);
     }

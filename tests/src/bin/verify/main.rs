@@ -1,6 +1,6 @@
-//! Every check of the project in one program, the same for a person and for CI:
-//! `cargo verify [STEP…] [--allow-missing] [--fuzz-seconds N]`, all steps when none is named;
-//! `cargo verify quick` runs those that take a minute after a build.
+//! All checks of the project, for developers and CI: `cargo verify [STEP…] [--allow-missing] [--fuzz-seconds
+//! N]` runs the named steps or all; `cargo verify quick` runs the steps that take about a minute after a
+//! build.
 #![forbid(unsafe_code)]
 
 mod command;
@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Instant;
 
-/// A check by name.
+/// A named check.
 struct Step {
     name: &'static str,
     what: &'static str,
@@ -22,35 +22,35 @@ struct Step {
     when: When,
 }
 
-/// Which runs without the names of steps have a step.
+/// Runs without named steps that include a step.
 #[derive(Clone, Copy, PartialEq)]
 enum When {
-    /// All, and the quick one.
+    /// The full run and the quick run.
     Always,
-    /// The whole one.
+    /// The full run.
     Whole,
-    /// The quick one: a part of a step of the whole one.
+    /// The quick run; the full run has a step that includes this one.
     Quick,
 }
 
 /// The name of all quick steps.
 const QUICK: &str = "quick";
 
-/// One line that says what was done, or why it went wrong.
+/// Summary of a step in one line, or why it failed.
 type Outcome = Result<String, Failure>;
 
-/// Why a step did not pass.
+/// Reasons why a step did not pass.
 enum Failure {
-    /// A tool is not on this machine: how to get it. Passes with `--allow-missing`.
+    /// A tool is not installed, with instructions; passes with `--allow-missing`.
     Missing(String),
     /// The check failed.
     Failed(String),
 }
 
-/// What the steps need to know.
+/// Options of a run.
 struct Project {
     root: PathBuf,
-    /// How long each fuzz target runs.
+    /// Run time of each fuzz target, seconds.
     fuzz_seconds: u32,
 }
 
@@ -115,7 +115,7 @@ fn main() -> ExitCode {
     if results.iter().all(|(_, good)| *good) { ExitCode::SUCCESS } else { ExitCode::FAILURE }
 }
 
-/// Runs one step; its line of the summary, and whether it passed.
+/// Runs a step and returns its summary line, and whether it passed.
 fn run(step: &Step, project: &Project, allow_missing: bool) -> (String, bool) {
     println!("\n== {}: {}", step.name, step.what);
     let start = Instant::now();

@@ -1,16 +1,16 @@
-//! Format, lints, tests and documentation, through cargo.
+//! Format, lints, tests and documentation, by cargo.
 
 use crate::command::{command, run};
 use crate::{Outcome, Project};
 
-/// Folders with a workspace of their own.
+/// Directories with their own workspace.
 const WORKSPACES: &[&str] = &[".", "tests/targets", "fuzz"];
 
-/// The selections that clippy reads: folder, and what is built there. Those of the workspace have the profile
-/// of the tests, so that compiled macros and build scripts are shared.
+/// Clippy selections: directory and arguments. The main workspace uses the profile of tests, to share
+/// compiled macros and build scripts.
 const CLIPPY: &[(&str, &str)] = &[
     (".", "--profile quick --workspace --all-targets"),
-    // Without the default features: what a microcontroller gets.
+    // Without default features, as a microcontroller builds it.
     (".", "--profile quick -p halflight-core -p halflight-simd --lib"),
     ("tests/targets", "-p tiny -p host"),
     ("fuzz", "--no-default-features --features app --lib --bins"),
@@ -50,7 +50,7 @@ pub(crate) fn table(project: &Project) -> Outcome {
 
 pub(crate) fn docs(project: &Project) -> Outcome {
     let line = "cargo doc --profile quick --quiet --workspace --no-deps --document-private-items --locked";
-    // Links to private modules are for those who read the code, and work in these pages.
+    // Links to private modules are for readers of the code, and work in these pages.
     let flags = "-D warnings -A rustdoc::private_intra_doc_links";
     run(command(&project.root, line).env("RUSTDOCFLAGS", flags))?;
     Ok("no warnings".to_owned())

@@ -1,11 +1,11 @@
-//! The house rules that no compiler checks, by reading the source line by line.
+//! House rules that no compiler checks, verified line by line in the source.
 
 use crate::layers::{self, Source};
 use crate::{Failure, Outcome, Project};
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Words that must not stand in the code of some folders. Tests and comments are not looked at.
+/// Words forbidden in the code of some folders; tests and comments are exempt.
 struct Rule {
     folders: &'static [&'static str],
     words: &'static [&'static str],
@@ -27,7 +27,7 @@ const RULES: &[Rule] = &[
             "assert_eq!(",
             "assert_ne!(",
         ],
-        // Those that the compiler evaluates.
+        // Assertions that the compiler evaluates or leaves out.
         unless: &["const _", "const {", "debug_assert"],
         because: "the core returns values, it does not panic",
     },
@@ -57,10 +57,10 @@ const RULES: &[Rule] = &[
     },
 ];
 
-/// No file is longer: one idea per file.
+/// Most lines of a file.
 const MAX_LINES: usize = 600;
 
-/// Most lines of a file of the core, unit tests included, and the files that are still longer.
+/// Most lines of a file of the core, unit tests included; then the files that still exceed it.
 const MAX_CORE_LINES: usize = 400;
 const LONG_FILES: &[&str] = &[
     "core/src/cache/octree.rs",
@@ -69,16 +69,16 @@ const LONG_FILES: &[&str] = &[
     "core/src/photon/tests.rs",
 ];
 
-/// Most lines of a function of the core, and the functions that are longer: a kernel, and the path tracer of the
-/// textbook, which is one page to be read in one piece.
+/// Most lines of a function of the core; then the exceptions: a kernel, and the textbook path tracer, which
+/// is read as a whole.
 const MAX_FUNCTION_LINES: usize = 80;
 const LONG_FUNCTIONS: &[&str] =
     &["core/src/bvh/stream.rs: trace", "core/src/transport/path/reference.rs: radiance"];
 
-/// Most columns of a line, comments included: rustfmt does not wrap those.
+/// Most columns of a line, comments included, which rustfmt does not wrap.
 const COLUMNS: usize = 110;
 
-/// Where no line is longer.
+/// Folders whose lines have at most [`COLUMNS`] columns.
 const NARROW: &[&str] = &[
     "core/src/bsdf",
     "core/src/bvh",
@@ -98,7 +98,7 @@ const NARROW: &[&str] = &[
     "tests/src/bin/verify/layers.rs",
 ];
 
-/// Folders of tests, and the program of which each file in them is a module.
+/// Folders of tests, each with the program that has their files as modules.
 const TEST_PROGRAMS: [(&str, &str); 2] =
     [("tests/tests/", "tests/tests/main.rs"), ("std-app/tests/", "std-app/tests/main.rs")];
 
@@ -179,7 +179,7 @@ fn broken_rules(name: &str, text: &str) -> Vec<String> {
     complaints
 }
 
-/// Files in the folder of a program that are no modules of it: their tests would never run.
+/// Files that are no modules of the program of their folder: their tests would never run.
 fn modules_left_out<'t>(
     program: &'t str,
     files: impl Iterator<Item = &'t str>,
@@ -191,8 +191,8 @@ fn modules_left_out<'t>(
     })
 }
 
-/// A complaint for each function that is longer than [`MAX_FUNCTION_LINES`]. In code that rustfmt has formatted a function
-/// ends at the first brace below its beginning.
+/// A complaint for each function longer than [`MAX_FUNCTION_LINES`]. In code formatted by rustfmt a function
+/// ends at the first closing brace in its own column.
 fn long_functions(name: &str, text: &str) -> Vec<String> {
     let lines: Vec<&str> = text.lines().collect();
     let function = |line: &str| {
@@ -220,13 +220,13 @@ fn long_functions(name: &str, text: &str) -> Vec<String> {
     complaints
 }
 
-/// The numbers of the lines that are longer than [`COLUMNS`].
+/// Numbers of the lines longer than [`COLUMNS`].
 fn wide_lines(text: &str) -> impl Iterator<Item = usize> {
     let wide = |(_, line): &(usize, &str)| line.chars().count() > COLUMNS;
     text.lines().enumerate().filter(wide).map(|(index, _)| index + 1)
 }
 
-/// Modules in files of their own that only tests have: their paths without `.rs`.
+/// File modules that are compiled for tests alone: paths without `.rs`.
 fn test_modules(path: &Path, text: &str) -> Vec<PathBuf> {
     let stem = path.file_stem().unwrap_or_default();
     let own = path.parent().unwrap_or(path);
@@ -240,7 +240,7 @@ fn test_modules(path: &Path, text: &str) -> Vec<PathBuf> {
         .collect()
 }
 
-/// The numbered lines of code: without comments, and without what only tests or `std` builds have.
+/// Numbered lines of code, without comments, tests and code of `std` builds.
 fn code(text: &str) -> Vec<(usize, &str)> {
     let bare = |line: &'_ str| line.split("//").next().unwrap_or_default().trim_end().len();
     let mut lines = text.lines().enumerate().map(|(index, line)| (index + 1, &line[..bare(line)]));
@@ -253,7 +253,7 @@ fn code(text: &str) -> Vec<(usize, &str)> {
             kept.push((number, line));
             continue;
         }
-        // The item below, with its body where it has one.
+        // The item below the attribute, with its body if any.
         let item = lines.find(|(_, line)| !line.is_empty() && !attribute(line)).map_or("", |(_, item)| item);
         let indent = |line: &str| line.len() - line.trim_start().len();
         if item.ends_with('{') {
@@ -263,7 +263,7 @@ fn code(text: &str) -> Vec<(usize, &str)> {
     kept
 }
 
-/// Every `.rs` file below `folder`, but for build products and files of tests.
+/// Collects every `.rs` file below `folder`, except build products and tests.
 fn rust_files(folder: &Path, files: &mut Vec<PathBuf>) {
     let Ok(entries) = fs::read_dir(folder) else { return };
     for path in entries.flatten().map(|entry| entry.path()) {

@@ -1,5 +1,5 @@
-//! The tiny render (`core/examples/tiny_render.rs`) on every constrained target: it must build there,
-//! and where it can be run it must give the bits of the ordinary example.
+//! The tiny render (`core/examples/tiny_render.rs`) on every constrained target: it must build, and where it
+//! can run its bits must equal those of the ordinary example.
 
 use crate::command::{command, exists, fresh_cargo, output, run};
 use crate::{Failure, Outcome, Project};
@@ -10,22 +10,22 @@ use std::process::Command;
 /// One build of the tiny render.
 struct Build {
     name: &'static str,
-    /// Member of the workspace `tests/targets`.
+    /// Package of the workspace `tests/targets`.
     package: &'static str,
     triple: &'static str,
     features: &'static str,
     run: Run,
-    /// Whether a WebAssembly module may hold SIMD instructions: then it must, else it must not.
+    /// WebAssembly: whether the module must contain SIMD instructions (`true`) or must not (`false`).
     simd: Option<bool>,
 }
 
-/// How its result is seen.
+/// How to run a build.
 enum Run {
-    /// As a program of this machine.
+    /// On this machine.
     Here,
     /// Under node.
     Node,
-    /// Under QEMU where that is installed; a build that links is enough elsewhere.
+    /// Under QEMU if installed; otherwise linking suffices.
     Board,
 }
 
@@ -68,11 +68,11 @@ pub(crate) fn check(project: &Project) -> Outcome {
     let example = "cargo run --profile quick --quiet --locked -p halflight-core --example tiny_render";
     let picture = output(&mut command(&project.root, example))?;
     println!("{picture}");
-    // A fingerprint for each method, after the pictures.
+    // Each picture is followed by a fingerprint per method.
     let is_fingerprint = |line: &&str| line.len() == 16 && line.bytes().all(|byte| byte.is_ascii_hexdigit());
     let expected: Vec<&str> = picture.lines().filter(is_fingerprint).collect();
 
-    // Every build is tried, so that one missing tool does not hide a failure elsewhere.
+    // All builds are tried, so that a missing tool hides no failure.
     let results: Vec<_> = BUILDS.iter().map(|build| (build, one(project, build, &expected))).collect();
     for (build, result) in &results {
         let text = match result {
@@ -89,10 +89,10 @@ pub(crate) fn check(project: &Project) -> Outcome {
     }
 }
 
-/// The fingerprint of a picture for which memory is too short.
+/// Fingerprint of a method that lacks memory.
 const ZEROS: &str = "0000000000000000";
 
-/// Builds, runs and compares one.
+/// Builds, runs and compares one build.
 fn one(project: &Project, build: &Build, expected: &[&str]) -> Outcome {
     let folder = project.root.join("tests/targets");
     let target = folder.join("target").join(format!("{}{}", build.package, build.features.replace('+', "-")));
@@ -133,7 +133,7 @@ fn one(project: &Project, build: &Build, expected: &[&str]) -> Outcome {
     if let Some(simd) = build.simd {
         instructions_as_promised(&file, simd)?;
     }
-    // Of the methods that fit into the memory of the board: the others give zeros there.
+    // Methods that do not fit into the board's memory give zeros there.
     let is_short = |line: &str| matches!(build.run, Run::Board) && line == ZEROS;
     let lines: Vec<&str> = seen.lines().collect();
     let is_same = lines.len() == expected.len()
@@ -145,8 +145,8 @@ fn one(project: &Project, build: &Build, expected: &[&str]) -> Outcome {
     }
 }
 
-/// A cargo that can build for `triple`: rustup's where it has the target, else Debian's compiler with the
-/// source of `core` (packages rustc-web, cargo-web, rust-web-src) and rustup's linker.
+/// A cargo that builds for `triple`: rustup's if it has the target, else Debian's compiler with the source of
+/// `core` (packages rustc-web, cargo-web, rust-web-src) and rustup's linker.
 fn cross_cargo(folder: &Path, triple: &str) -> Result<Command, Failure> {
     let libraries = output(command(folder, "rustc --print target-libdir --target").arg(triple))?;
     if Path::new(&libraries).exists() {
@@ -168,7 +168,8 @@ fn cross_cargo(folder: &Path, triple: &str) -> Result<Command, Failure> {
     Ok(cargo)
 }
 
-/// A module built without simd128 must be valid for a parser that knows no SIMD; one with must not.
+/// A module without simd128 must be valid for a parser without SIMD; a module with simd128 must be invalid
+/// for it.
 fn instructions_as_promised(module: &Path, simd: bool) -> Result<(), Failure> {
     let failed = |text: String| Failure::Failed(format!("{}: {text}", module.display()));
     let bytes = fs::read(module).map_err(|error| failed(error.to_string()))?;
