@@ -1,4 +1,5 @@
-//! kiddo's immutable tree with the query that suits each task best. For density estimates it only searches photons, without weights.
+//! kiddo's immutable tree with the query that suits each task best. For density estimates it only searches
+//! photons, without weights.
 
 use core::num::NonZero;
 use halflight::bench::BenchError;

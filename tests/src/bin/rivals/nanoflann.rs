@@ -1,4 +1,5 @@
-//! nanoflann's tree with leaves of ten points and unsorted results. For density estimates it only searches photons, without weights.
+//! nanoflann's tree with leaves of ten points and unsorted results. For density estimates it only searches
+//! photons, without weights.
 
 use halflight::bench::BenchError;
 use halflight::bench::knn::{Data, Rival, Searcher, Surfel, Task};
