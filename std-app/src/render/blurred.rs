@@ -1,4 +1,4 @@
-//! The error of a picture with photons that nobody audited: its noise, and what photons blur.
+//! Error of an unaudited picture with photons: noise and photon blur.
 
 use super::workers::Workers;
 use super::{BiasEstimate, ErrorEstimate};
@@ -7,16 +7,16 @@ use halflight_core::film::Film;
 /// Noise and blur of a picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Blurred {
-    /// The error that the picture's own noise tells of.
+    /// Noise of the picture, from its half-films.
     pub noise: ErrorEstimate,
-    /// The square of what photons blur, as samples tell.
+    /// Squared bias by photon blur, estimated from the samples.
     pub blur: BiasEstimate,
-    /// The sum of both.
+    /// Sum of both.
     pub total: ErrorEstimate,
 }
 
 impl Blurred {
-    /// Of `film`, whose noise is known; `None` where photons blur nothing.
+    /// Error of `film` with known noise; `None` without blur.
     pub(super) fn of(workers: &Workers, film: &Film, noise: Option<ErrorEstimate>) -> Option<Self> {
         let (noise, blur) = noise.zip(workers.blur(film))?;
         Some(Self { noise, blur, total: noise.with_bias(blur) })

@@ -1,4 +1,4 @@
-//! Irradiance caches in files: gathered once, used for other views of the same scene. The format is docs/cache-file.md.
+//! Irradiance cache files: gathered once, reused for other views of the scene. Format: docs/cache-file.md.
 
 use super::error::FileError;
 use super::sealed::{self, Kind};
@@ -11,20 +11,20 @@ use std::path::Path;
 
 const KIND: Kind = Kind { magic: *b"HLCACH", version: 3, name: "cache" };
 
-/// Records of a section.
+/// Records per section.
 const AT_ONCE: usize = 1 << 12;
 
-/// What records follow from, but where they are: that is for the views.
+/// Inputs that determine the values of records. Their positions depend on the views.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 struct Identity {
-    /// Of the program.
+    /// Version of the program.
     version: String,
     scene: fingerprint::Parts,
     max_depth: Option<u32>,
     metric: String,
-    /// Error allowed, in the unit of the metric.
+    /// Allowed error, in the unit of the metric.
     error: String,
-    /// Of each record.
+    /// Gather rays per record.
     rays: u32,
 }
 
@@ -40,7 +40,7 @@ impl Identity {
         }
     }
 
-    /// In what `self`, that of a file, is not `other`, in words.
+    /// First difference between `self`, the identity of a file, and `other`, in words.
     fn difference(&self, other: &Self) -> Option<String> {
         let depth = |depth: Option<u32>| depth.map_or("no limit of".into(), |depth| depth.to_string());
         let said =
@@ -55,7 +55,7 @@ impl Identity {
     }
 }
 
-/// A picture for which a cache was filled.
+/// View for which a cache was filled.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub(super) struct View {
     camera: String,
@@ -70,59 +70,59 @@ impl View {
         Self { camera: fingerprint::camera(&scene.camera), width, height, seed }
     }
 
-    /// Whether a cache that was filled for `self` has all that `other` needs: another seed looks at the same places.
+    /// Whether a cache filled for `self` suffices for `other`: another seed has the same gather points.
     fn serves(&self, other: &Self) -> bool {
         *self == View { seed: self.seed, ..other.clone() }
     }
 }
 
-/// One of the two caches of a file.
+/// One of the two caches in a file.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub(super) struct Half {
     pub(super) records: u32,
-    /// Places at which it has gathered: the next one takes other rays.
+    /// Places gathered so far, which number the random streams of gather rays.
     pub(super) gathered: u32,
 }
 
-/// What is known of a cache beside its records.
+/// Header of a cache file.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub(super) struct Header {
     identity: Identity,
-    /// The views for which nothing is missing.
+    /// Views for which the cache is complete.
     views: Vec<View>,
     pub(super) halves: [Half; 2],
 }
 
 impl Header {
-    /// Of a cache without records.
+    /// Header of a cache without records.
     pub(super) fn new(scene: &Scene, settings: &Settings) -> Self {
         Self { identity: Identity::of(scene, settings), views: Vec::new(), halves: [Half::default(); 2] }
     }
 
-    /// Of both halves.
+    /// Records of both halves.
     pub(super) fn records(&self) -> usize {
         self.halves.iter().map(|half| half.records as usize).sum()
     }
 
-    /// Whether nothing is to be gathered for `view`.
+    /// Whether the cache is complete for `view`.
     pub(super) fn serves(&self, view: &View) -> bool {
         self.views.iter().any(|known| known.serves(view))
     }
 
-    /// Notes that nothing is to be gathered for `view` any more.
+    /// Adds `view` to the views for which the cache is complete.
     pub(super) fn is_filled_for(&mut self, view: View) {
         if !self.serves(&view) {
             self.views.push(view);
         }
     }
 
-    /// Tells caches apart: with the scene and the settings it is all that their records follow from.
+    /// Identifies the records of this cache, given scene and settings.
     pub(super) fn fingerprint(&self) -> String {
         format!("{:?} {:?}", self.views, self.halves)
     }
 }
 
-/// Writes both caches to `path`, whole or not at all.
+/// Writes both caches to `path`, completely or not at all.
 pub(super) fn write(
     path: &Path,
     header: &Header,
@@ -135,7 +135,8 @@ pub(super) fn write(
     })
 }
 
-/// The cache that `settings` want to be loaded, in no more than `most` bytes; refused where it is of something else.
+/// Opens the cache that `settings` name, within `most` bytes; an error if it belongs to another scene or
+/// other settings.
 pub(super) fn open(
     scene: &Scene,
     settings: &Settings,
@@ -145,14 +146,14 @@ pub(super) fn open(
     settings.load_cache.as_deref().map(open).transpose()
 }
 
-/// A cache file whose header has been read.
+/// A cache file after its header was read.
 pub(super) struct Reader<'r> {
     file: sealed::Reader<'r>,
     pub(super) header: Header,
 }
 
 impl<'r> Reader<'r> {
-    /// Opens `path`, reads its header, and refuses a cache that is of something else.
+    /// Opens `path`, reads its header and refuses a cache of another identity.
     fn open(path: &Path, identity: &Identity, most: usize) -> Result<Self, FileError> {
         let reader = Self::new(sealed::Reader::open(path, &KIND, most)?)?;
         let difference = reader.header.identity.difference(identity);
@@ -166,7 +167,7 @@ impl<'r> Reader<'r> {
         Ok(Self { file, header })
     }
 
-    /// The records of both caches.
+    /// Records of both caches.
     pub(super) fn records(mut self) -> Result<[Vec<Record>; 2], FileError> {
         let halves = [self.half(0)?, self.half(1)?];
         if !halves.iter().flatten().all(is_sound) {
@@ -193,7 +194,7 @@ impl<'r> Reader<'r> {
     }
 }
 
-/// Whether a cache can hold such a record.
+/// Whether a cache can hold this record.
 fn is_sound(record: &Record) -> bool {
     let Record { position, normal, axis, irradiance, radii, overlap, reach, .. } = *record;
     let finite = |values: &[f32]| values.iter().all(|value| value.is_finite());
@@ -208,10 +209,10 @@ fn is_sound(record: &Record) -> bool {
         && overlap >= 0.0
 }
 
-/// Reads a cache file out of `bytes`, whatever scene it is of: how many records each of its two caches has.
+/// Numbers of records of both caches in a cache file given as `bytes`, of any scene.
 ///
 /// # Errors
-/// Why it is none.
+/// Why `bytes` are no cache file.
 pub fn inspect(bytes: &[u8]) -> Result<[usize; 2], FileError> {
     let file = (Box::new(bytes) as Box<dyn std::io::Read>, bytes.len() as u64);
     let reader = Reader::new(sealed::Reader::read(Path::new("cache"), &KIND, file, 1 << 30)?)?;
@@ -225,7 +226,7 @@ mod tests {
     use halflight_core::geometry::Bounds;
     use halflight_core::memory::{Arena, Line};
 
-    /// Bytes that reading may take.
+    /// Memory limit of reading, bytes.
     const MOST: usize = 1 << 24;
 
     fn parts([geometry, materials, textures, lights]: [&str; 4]) -> fingerprint::Parts {
@@ -261,7 +262,7 @@ mod tests {
         }
     }
 
-    /// A file of caches of these many records.
+    /// A file of two caches with `counts` records.
     fn file(name: &str, counts: [u32; 2]) -> (std::path::PathBuf, Vec<u8>) {
         let path = std::env::temp_dir().join(format!("halflight-{}-{name}.cache", std::process::id()));
         let bounds = Bounds { min: glam::Vec3::ZERO, max: glam::Vec3::ONE };

@@ -16,7 +16,7 @@ pub(super) struct Round {
     pub(super) is_first: bool,
 }
 
-/// See the file. Methods of the core run on it by [`Crew::round`].
+/// Threads, round and film. Methods of the core run on them by [`Crew::round`].
 pub(super) struct Crew<'r, 'm> {
     pub(super) workers: &'r Workers<'r>,
     pub(super) round: &'r Round,

@@ -19,7 +19,7 @@ pub(super) struct Deadline<'w> {
     deadline: Option<Instant>,
     /// Start of the render and its limit in seconds.
     limit: Option<(Instant, f64)>,
-    /// When the interruption was noticed.
+    /// Time at which the interruption was noticed.
     noticed: OnceLock<Instant>,
 }
 
@@ -29,7 +29,7 @@ impl<'w> Deadline<'w> {
         Self { interrupt: Some(interrupt), ..Self::default() }
     }
 
-    /// The same, which also ends `seconds` from now; `None`: no limit.
+    /// Adds an end `seconds` from now; `None` means no limit.
     pub(super) fn within(self, seconds: Option<f64>) -> Self {
         let later = |seconds: f64| Duration::try_from_secs_f64(seconds.max(0.0)).ok();
         let deadline = seconds.and_then(later).and_then(|later| Instant::now().checked_add(later));
@@ -37,7 +37,7 @@ impl<'w> Deadline<'w> {
         Self { deadline, limit, ..self }
     }
 
-    /// The end of a `fraction` of the seconds of the render; `None` where they are not limited.
+    /// End of a `fraction` of the render's time limit; `None` without a limit.
     pub(super) fn after(&self, fraction: f32) -> Option<Instant> {
         let (start, seconds) = self.limit?;
         start.checked_add(Duration::try_from_secs_f64(f64::from(fraction) * seconds).ok()?)
@@ -52,12 +52,12 @@ impl<'w> Deadline<'w> {
         is_raised
     }
 
-    /// Whether prepasses are to end: a picture can be made without them.
+    /// Whether prepasses must end.
     pub(super) fn is_over(&self) -> bool {
         self.has_ended_for(PREPASS_GRACE)
     }
 
-    /// Whether the first sample of each pixel is to end.
+    /// Whether the first sample of each pixel must end.
     pub(super) fn is_late(&self) -> bool {
         self.has_ended_for(FIRST_SAMPLE_GRACE)
     }

@@ -1,11 +1,11 @@
-//! Fingerprints: 64 bits, in hexadecimal, by which files know what they are of.
+//! Fingerprints of 64 bits in hexadecimal, by which files identify their scene.
 
 use super::sealed::Hash;
 use halflight_core::scene::Camera;
 use halflight_core::scene::{Scene, Texels};
 use serde::{Deserialize, Serialize};
 
-/// Of all that is in a scene but its camera, part by part.
+/// Fingerprints of a scene without its camera, part by part.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub(super) struct Parts {
     geometry: String,
@@ -24,7 +24,7 @@ impl Parts {
         }
     }
 
-    /// Parts that are not those of `other`, by name.
+    /// Names of the parts that differ from `other`.
     pub(super) fn differences(&self, other: &Self) -> Vec<&'static str> {
         let parts = [
             ("geometry", self.geometry != other.geometry),
@@ -36,7 +36,7 @@ impl Parts {
     }
 }
 
-/// Of all that is in the scene but its camera.
+/// Fingerprint of a scene without its camera.
 pub(super) fn scene(scene: &Scene) -> String {
     sections(|hash| {
         geometry(scene, hash);
@@ -46,7 +46,7 @@ pub(super) fn scene(scene: &Scene) -> String {
     })
 }
 
-/// Of a camera. Debug formatting tells floats apart to the last bit.
+/// Fingerprint of a camera. Debug formatting is exact for floats.
 pub(super) fn camera(camera: &Camera) -> String {
     sections(|hash| hash.section(format!("{camera:?}").as_bytes()))
 }

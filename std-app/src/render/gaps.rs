@@ -1,5 +1,5 @@
-//! A picture that was ended before each of its pixels had a sample: pixels without one show the mean of those around
-//! them. Where there is no sample at all, some pixels are path traced first, for a short time.
+//! Filling of pixels without samples in a picture that ended early: each gets the mean of its surroundings.
+//! If there is no sample at all, some pixels are path traced first for a short time.
 
 use super::workers::Workers;
 use crate::save::Image;
@@ -10,19 +10,19 @@ use halflight_core::memory::{Arena, Line};
 use halflight_core::transport::PathIntegrator;
 use std::time::Instant;
 
-/// How long pixels are path traced where there is no sample.
+/// Time for path tracing if there is no sample.
 const SKETCHING: Duration = Duration::from_secs(1);
 
-/// Paths that a thread advances together there, each of another pixel.
+/// Paths per wave of a thread, each of another pixel.
 const WAVE: usize = 64;
 
-/// Column and row of a pixel, and what it sees.
+/// Column and row of a pixel, and its radiance.
 pub(super) type Sketched = ([u32; 2], [f32; 3]);
 
-/// Single pixels of a picture, path traced.
+/// Path tracing of single pixels.
 pub(super) type Sketch<'a> = dyn Fn(&Workers) -> Vec<Sketched> + 'a;
 
-/// The sketch of what `tracer` sees: pixels that are spread evenly, ever more of them as long as there is time.
+/// Path-traced pixels on a grid that is refined until time is over.
 pub(super) fn sketch<F: Features>(
     tracer: &PathIntegrator<F>,
     size: [u32; 2],
@@ -34,7 +34,7 @@ pub(super) fn sketch<F: Features>(
     let mut all = Vec::new();
     let mut step = size[0].max(size[1]).next_power_of_two();
     while step > 0 && Instant::now() < end {
-        // Those that coarser steps have not had.
+        // Points that coarser grids do not have.
         let is_new = |x: u32, y: u32| all.is_empty() || ((x / step) | (y / step)) & 1 == 1;
         let middle = |at: u32, size: u32| (at + step / 2).min(size - 1);
         let rows = (0..size[1]).step_by(step as usize);
@@ -57,8 +57,8 @@ pub(super) fn sketch<F: Features>(
     all
 }
 
-/// Gives pixels of `image` that are not `known`, row by row, the mean of those in the smallest square of a raster that
-/// has some; squares have sides of powers of two.
+/// Sets pixels of `image` that are not `known` (row by row) to the mean over the smallest aligned square that
+/// has known pixels. Squares have sides of powers of two.
 pub(super) fn fill(image: &mut Image, known: &[bool]) {
     let [width, height] = [image.width, image.height].map(|side| side as usize);
     if width.max(height) < 2 {
@@ -83,7 +83,7 @@ pub(super) fn fill(image: &mut Image, known: &[bool]) {
     }
 }
 
-/// Means over squares of 2 x 2 of something, and of how many.
+/// Means over squares of 2 x 2, each with its number of known values.
 struct Sums {
     width: usize,
     height: usize,
@@ -91,7 +91,7 @@ struct Sums {
 }
 
 impl Sums {
-    /// Of a raster of so many values across and down.
+    /// Means of a raster of `width` x `height` values.
     fn of(width: usize, height: usize, value: impl Fn(usize) -> ([f32; 3], f32)) -> Self {
         let halves = [width, height].map(|side| side.div_ceil(2));
         let mean = |i: usize| {
@@ -108,7 +108,7 @@ impl Sums {
         Self { width: halves[0], height: halves[1], means: (0..halves[0] * halves[1]).map(mean).collect() }
     }
 
-    /// The mean of the square that has the value in this column and row.
+    /// Mean of the square that holds the value in this column and row.
     fn above(&self, x: usize, y: usize) -> ([f32; 3], f32) {
         self.means.get(y / 2 * self.width + x / 2).copied().unwrap_or_default()
     }
@@ -128,7 +128,7 @@ mod tests {
         fill(&mut image, &known);
         let shown: Vec<f32> = image.pixels.iter().map(|pixel| pixel[0]).collect();
         assert_eq!(shown, [1., 2., 2., 2., 8., 2., 3., 2., 2., 8., 2., 2., 2., 2., 8.]);
-        // Nothing is known.
+        // A picture without known pixels stays black.
         let mut black = Image::black(3, 2);
         fill(&mut black, &[false; 6]);
         assert_eq!(black, Image::black(3, 2));

@@ -1,10 +1,10 @@
-//! Which pixels are audited: one of each stratum, at random. Strata are equal parts of the picture in an order in which
-//! neighbours are alike: region by region, within each by brightness. So dark corners, bright patches, and whatever a
-//! region holds have pixels in the audit by their share.
+//! Stratified choice of the audited pixels: one random pixel per stratum. Strata are equal parts of the
+//! picture in an order that puts similar pixels together: by region, and by brightness within each region.
+//! Dark corners and bright patches thus get audited pixels in proportion to their area.
 //!
-//! Every pixel of a stratum has the same chance, whatever its own noise has put it there: the choice has no
-//! bias. Where a method knows at which pixels it may be wrong, these have a greater chance and count for as
-//! much less, so that a few pixels that carry most of the error are not missed.
+//! The choice is unbiased, because every pixel of a stratum has the same probability whatever its noise. A
+//! method may know risks of pixels; riskier pixels then have a greater probability and an inversely smaller
+//! weight, so that the audit does not miss a few pixels that carry most of the error.
 
 use crate::render::Shard;
 use halflight_core::Rgb;
@@ -12,25 +12,25 @@ use halflight_core::estimate::filtered;
 use halflight_core::film::{Film, PIXELS_PER_TILE, Tile};
 use halflight_core::sampling::Random;
 
-/// Fewest pixels that are audited, where the picture has as many.
+/// Fewest audited pixels, if the picture has as many.
 const FEWEST: usize = 256;
 
-/// Most pixels that are audited.
+/// Most audited pixels.
 const MOST: usize = 8192;
 
-/// A region has so many of them at least, and so has a signed deviation with an error.
+/// Fewest audited pixels of a region, enough for a mean deviation with a standard error.
 const PER_REGION: usize = 12;
 
-/// Regions along each side at most.
+/// Most regions along each side.
 const SIDE: u32 = 8;
 
-/// So many pixels are enough for all regions.
+/// Audited pixels that suffice for all regions.
 pub(super) const ENOUGH: usize = PER_REGION * (SIDE * SIDE) as usize;
 
-/// How many times the chance of most pixels the riskiest have, at most.
+/// Largest ratio of a pixel's probability to the usual one.
 const RISKIEST: f64 = 16.0;
 
-/// The regions of a picture: a grid of `side` x `side`.
+/// Regions of a picture: a grid of `side` x `side`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Grid {
     size: [u32; 2],
@@ -38,20 +38,20 @@ pub(super) struct Grid {
 }
 
 impl Grid {
-    /// For `pixels` audited pixels.
+    /// The grid for `pixels` audited pixels.
     pub(super) fn new(size: [u32; 2], pixels: usize) -> Self {
         let side = ((pixels / PER_REGION).isqrt() as u32).clamp(1, SIDE).min(size[0]).min(size[1]);
         Self { size, side }
     }
 
-    /// The region of a pixel, row by row from the upper left.
+    /// Region of a pixel, row by row from the upper left.
     pub(super) fn region(&self, pixel: [u32; 2]) -> usize {
         let [column, row] =
             [0, 1].map(|i| (u64::from(pixel[i]) * u64::from(self.side) / u64::from(self.size[i])) as usize);
         row * self.side as usize + column
     }
 
-    /// First and last column and row, those after the last.
+    /// Column range and row range of a region, each with its end excluded.
     pub(super) fn bounds(&self, region: usize) -> [[u32; 2]; 2] {
         let place = [region as u32 % self.side, region as u32 / self.side];
         let border =
@@ -60,14 +60,13 @@ impl Grid {
     }
 }
 
-/// How many pixels of a picture are audited.
+/// Number of audited pixels of a picture.
 pub(super) fn count(width: u32, height: u32) -> usize {
     Tile::count(width, height).clamp(FEWEST, MOST).min(width as usize * height as usize)
 }
 
-/// Pixels of the tiles of a shard that are audited, and how much of the picture each stands for over the
-/// mean, in the order of the strata. `risks` says of each pixel, row by row, how large the square of its bias
-/// may be; it may be empty.
+/// Audited pixels of a shard, in the order of strata, each with its share of the picture relative to the mean
+/// share. `risks` holds per pixel, row by row, an upper estimate of the squared bias; it may be empty.
 pub(super) fn choose(
     film: &Film,
     shard: Shard,
@@ -84,7 +83,7 @@ pub(super) fn choose(
     let place = |[x, y]: [u32; 2]| y as usize * width as usize + x as usize;
     let risks: Vec<f32> =
         order.iter().map(|pixel| risks.get(place(*pixel)).copied().unwrap_or(0.0)).collect();
-    // No pixel is as much as a stratum.
+    // Limited so that no pixel fills a stratum alone.
     let chances = chances(&risks, RISKIEST.min(order.len() as f64 / strata as f64));
     let mut sums = vec![0.0];
     sums.extend(chances.iter().scan(0.0, |sum, chance| {
@@ -107,8 +106,7 @@ pub(super) fn choose(
     (0..strata).map(stratum).unzip()
 }
 
-/// The chances of pixels: 1 for those of no more than the median of all risks that there are, and for more of
-/// them more, but no more than `most`.
+/// Relative probabilities of pixels: risk over the median of all known risks, clamped to 1 … `most`.
 fn chances(risks: &[f32], most: f64) -> Vec<f64> {
     let mut known: Vec<f32> = risks.iter().copied().filter(|risk| *risk > 0.0 && risk.is_finite()).collect();
     if known.is_empty() {
@@ -119,8 +117,8 @@ fn chances(risks: &[f32], most: f64) -> Vec<f64> {
     risks.iter().map(|risk| (f64::from(*risk) / median).max(1.0).min(most)).collect()
 }
 
-/// Of strata whose pixels stand for these `shares` of the picture, which are to become so `many` by joining
-/// neighbours: the one of each whose pixel stays, each with the same chance, and what it stands for then.
+/// Joins neighbouring strata until `many` are left. `shares` are the picture shares of their pixels. Returns
+/// for each the index of the pixel that stays, chosen uniformly, and its new share.
 pub(super) fn join(shares: &[f32], many: usize, seed: u32) -> Vec<(usize, f32)> {
     let random = Random::new(seed, STREAM ^ u32::MAX);
     let border = |i: usize| i * shares.len() / many;
@@ -132,7 +130,7 @@ pub(super) fn join(shares: &[f32], many: usize, seed: u32) -> Vec<(usize, f32)> 
     (0..many).map(joined).collect()
 }
 
-/// The pixels of a shard, region by region, within each by brightness.
+/// Pixels of a shard by region, and by brightness within each.
 pub(super) fn ordered(film: &Film, shard: Shard, mean: f64, grid: Grid) -> Vec<[u32; 2]> {
     let (width, height) = (film.width(), film.height());
     let mut order: Vec<(usize, f32, [u32; 2])> = Vec::with_capacity(width as usize * height as usize);
@@ -151,10 +149,10 @@ pub(super) fn ordered(film: &Film, shard: Shard, mean: f64, grid: Grid) -> Vec<[
     order.into_iter().map(|(_, _, place)| place).collect()
 }
 
-/// Of the choice of pixels, among the streams of its seed.
+/// Random stream of the choice.
 const STREAM: u32 = 0x6175_6469;
 
-/// Rising in one region and falling in the next: the last stratum of a region is like the first of the next.
+/// Ascending in one region and descending in the next, so that adjacent strata of two regions are similar.
 fn brightness(colour: Rgb, region: usize) -> f32 {
     let sum = colour.element_sum();
     if region.is_multiple_of(2) { sum } else { -sum }
@@ -197,7 +195,8 @@ mod tests {
                 }
             });
         }
-        // Strata of 4 and 5: 80 to 100 times of 400. Less than 40 or more than 150: five standard deviations.
+        // Strata of 4 and 5 pixels: expected 80 to 100 of 400 times. Below 40 or above 150 is five standard
+        // deviations off.
         assert!(times.iter().all(|count| (40..150).contains(count)), "{:?}", times.iter().min());
     }
 
@@ -211,7 +210,7 @@ mod tests {
                 for index in 0..3 {
                     let shard = Shard { index, count: 3 };
                     let (pixels, shares) = choose(film, shard, 25.0, 1, &[]);
-                    // A third of 256, as nearly as tiles of 16 x 16 divide 50 x 40.
+                    // A third of 256, as closely as tiles of 16 x 16 divide 50 x 40.
                     assert!((70..105).contains(&pixels.len()), "{}", pixels.len());
                     assert!((shares.iter().sum::<f32>() / pixels.len() as f32 - 1.0).abs() < 1e-5);
                     let tile = |[x, y]: [u32; 2]| Tile::position([50, 40], x, y) / PIXELS_PER_TILE;
@@ -223,7 +222,7 @@ mod tests {
 
     #[test]
     fn what_is_rare_has_its_share() {
-        // A bright stripe of a hundredth of the picture: 16 of 1600 rows of strata… of 256 audited pixels 2 or 3.
+        // A bright stripe of a hundredth of the picture: 2 or 3 of 256 audited pixels.
         film(
             100,
             100,
@@ -236,8 +235,8 @@ mod tests {
         );
     }
 
-    /// 20 of 10,000 pixels carry the error: of 256 audited ones they have 8 or so instead of one half, and
-    /// the error that follows has no bias.
+    /// 20 of 10,000 pixels carry the error: about 8 of 256 audited pixels instead of 0.5 lie there, and the
+    /// estimated error stays unbiased.
     #[test]
     fn what_may_be_wrong_is_audited_more_often_and_counts_less() {
         let is_wrong = |[x, y]: [u32; 2]| y == 40 && (30..50).contains(&x);
@@ -256,8 +255,8 @@ mod tests {
                         (found, sum) = (found + 1, sum + f64::from(*share));
                     }
                 }
-                // 16 * 20 / 10,300 * 256 of each choice: 7.95, so 1590 ± 40 of all; and 0.512 by what they
-                // stand for.
+                // Expected: 16 * 20 / 10,300 * 256 = 7.95 per choice, so 1590 ± 40 in all, and 0.512 by
+                // weight.
                 assert!((1450..1730).contains(&found), "{found}");
                 assert!((sum / 200.0 - 0.512).abs() < 0.05, "{}", sum / 200.0);
             },
@@ -276,7 +275,7 @@ mod tests {
             assert!((sum / 300.0 - 1.0).abs() < 0.05, "{sum}");
             joined.iter().for_each(|(i, _)| kept[usize::from(i % 3 == 0)] += 1);
         }
-        // A third of 6000, so that the standard deviation is 37.
+        // A third of 6000, with a standard deviation of 37.
         assert!((2000 - 150..2000 + 150).contains(&kept[1]), "{kept:?}");
         assert_eq!(
             join(&shares, 1000, 1).iter().map(|(i, _)| *i).collect::<Vec<_>>(),

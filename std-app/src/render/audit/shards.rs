@@ -1,4 +1,4 @@
-//! The audits of the shards of one picture, put together: their strata are strata of the picture.
+//! Merged audits of the shards of a picture: strata of shards are strata of the picture.
 
 use super::choice::{Grid, ordered};
 use super::{Shard, State};
@@ -6,7 +6,8 @@ use halflight_core::film::{Film, PIXELS_PER_TILE, Tile};
 use std::collections::HashMap;
 
 impl State {
-    /// Of the whole picture `film`, of mean `mean`, from those of all of its shards; `None` where one has nothing.
+    /// Audit of the whole picture `film`, whose mean is `mean`, from the audits of all shards; `None` if a
+    /// shard has no samples.
     pub(in crate::render) fn merged(states: Vec<(Shard, Self)>, film: &Film, mean: f64) -> Option<Self> {
         let count = states.iter().map(|(_, state)| state.places.len()).sum();
         let grid = Grid::new([film.width(), film.height()], count);
@@ -15,7 +16,7 @@ impl State {
             let size = [film.width(), film.height()];
             move |[x, y]: &&[u32; 2]| shard.owns(Tile::position(size, *x, *y) / PIXELS_PER_TILE)
         };
-        // Pixels of a stratum in the mean of all.
+        // Mean number of pixels per stratum.
         let mean_size = order.len() as f64 / count as f64;
 
         let mut merged = Self { taken: u32::MAX, ..Self::default() };
@@ -42,7 +43,7 @@ impl State {
                 merged.pixels.push(pixel);
             }
         }
-        // Places outside the picture are none that were written.
+        // Positions outside the picture mean a damaged state.
         strata.is_empty().then_some(merged)
     }
 }

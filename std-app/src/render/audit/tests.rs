@@ -1,4 +1,4 @@
-//! The audit finds what is wrong, and only that.
+//! The audit finds bias where it exists, and nowhere else.
 
 use super::*;
 use crate::load::{LoadOptions, load};
@@ -43,7 +43,7 @@ fn a_region_that_is_a_tenth_too_bright_is_found() {
         let result = picture(settings(Method::Wrong, 128, seed, 0.3));
         let (image, audit) = (&result.image, result.audit.as_ref().unwrap());
         assert!(audit.is_biased(), "{audit:?}");
-        // The same samples without the factor are as good as the truth here.
+        // The same samples without the factor are an exact reference.
         let path = picture(settings(Method::Path, 128, seed, 0.0)).image;
         truth = Difference::between(image.colours(), path.colours()).relmse;
         held += u32::from((audit.bias.lower..audit.bias.upper).contains(&truth));
@@ -51,13 +51,13 @@ fn a_region_that_is_a_tenth_too_bright_is_found() {
         for region in &audit.regions {
             let deviation = region.deviation;
             let expected = if 2 * region.x >= SIZE { 0.1 } else { 0.0 };
-            // Five standard errors, and what a denominator that is too large takes off.
+            // Five standard errors, plus the reduction by an overestimated denominator.
             assert!((deviation.mean - expected).abs() < 5.0 * deviation.error + 0.02, "{region:?}");
             assert!(!region.is_biased || 2 * region.x >= SIZE, "{region:?}");
         }
         assert!(audit.regions.iter().filter(|region| region.is_biased).count() >= 2, "{:?}", audit.regions);
     }
-    // Two of four out of an interval of 95 % have a chance of 1.4 %; a mean that is off by a half, one of 0.1 %.
+    // Probability of two of four outside a 95 % interval: 1.4 %; of a mean off by half: 0.1 %.
     assert!(held >= 3, "{held}");
     assert!((0.5..1.5).contains(&(sum / 4.0 / truth)), "{sum} {truth}");
 }
@@ -66,7 +66,7 @@ fn a_region_that_is_a_tenth_too_bright_is_found() {
 fn path_tracing_is_found_unbiased() {
     let runs = 60;
     let found = (0..runs).filter(|&seed| audited(settings(Method::Path, 16, seed, 0.2)).is_biased()).count();
-    // At a level of 5 % three of 60 are expected; more than 8 have a chance of 0.4 %.
+    // At a level of 5 %, three of 60 are expected; more than 8 have a probability of 0.4 %.
     assert!(found <= 8, "{found} of {runs}");
 }
 
@@ -89,7 +89,7 @@ fn an_error_above_the_bias_is_the_sum_of_both() {
 
 #[test]
 fn an_audit_that_alone_keeps_a_picture_from_its_end_goes_on() {
-    // The default share, and the same share where it was asked for: work of pictures and audits of some seeds.
+    // Total work with the default share, and with the same share requested explicitly, over several seeds.
     let stop = Stop { spp: Some(4096), error: Some(0.02), ..Stop::default() };
     let work = |audit: Option<f64>| {
         let mut sums = (0, 0);
@@ -114,7 +114,7 @@ fn an_audit_that_alone_keeps_a_picture_from_its_end_goes_on() {
 fn a_large_picture_that_is_hardly_audited_has_few_pixels_audited() {
     let large = |audit| picture(Settings { width: 512, height: 416, ..settings(Method::Wrong, 8, 3, audit) });
     let [few, all] = [0.001, 0.3].map(|share| large(share).audit.unwrap());
-    // Twelve for each of 8 x 8 regions, and one for each tile.
+    // Twelve pixels for each of 8 x 8 regions, and one per tile.
     assert_eq!([few.pixels, all.pixels], [768, 832]);
     assert_eq!(few.regions.len(), 64);
 }
@@ -141,7 +141,7 @@ fn the_share_of_the_work_is_kept() {
     let by_rays = picture(Settings { stop, audit: Some(0.05), ..settings(Method::Path, 0, 3, 0.05) });
     let exact = by_rays.audit.unwrap().rays as f64 / by_rays.counters.all_rays() as f64;
     assert!((0.045..0.0535).contains(&exact), "{exact}");
-    // By the clock, on a machine with other work: a factor.
+    // By the clock, on a busy machine: only the order of magnitude.
     assert!((0.01..0.25).contains(&(audit.rays as f64 / rays)), "{audit:?}");
 }
 
@@ -166,7 +166,7 @@ fn shards_are_audited_together() {
     let merged = merge(&films).unwrap();
     std::fs::remove_dir_all(&folder).unwrap();
     let (audit, whole) = (merged.audit.unwrap(), audited(settings));
-    // 256 of all, and no more than one a shard for what does not divide.
+    // 256 of the whole, rounded up in each shard.
     assert!((256..259).contains(&audit.pixels), "{audit:?}");
     assert_eq!((audit.noise, merged.error), (whole.noise, Some(audit.total)));
     for region in &audit.regions {

@@ -1,46 +1,46 @@
-//! What the audited pixels say together: how large the bias is, and where.
+//! Size and place of a bias, estimated from the audited pixels.
 
 use super::choice::Grid;
 use crate::render::ErrorEstimate;
 use halflight_core::estimate::{BiasEstimate, Deviation, Finding, filtered_pixel};
 use halflight_core::film::{Film, PIXELS_PER_TILE, Pixel, Tile};
 
-/// A region is told to be biased where chance alone would say so of any of them in one picture of so many.
+/// Significance level of regions and whole picture together: one false alarm in 40 pictures.
 const LEVEL: f64 = 0.025;
 
-/// The share of a picture's light that its judge may be without.
+/// Share of the picture's light below which audit paths may miss light and still judge it.
 const MOST_UNSEEN: f64 = 0.01;
 
-/// What an audit has found.
+/// Result of an audit.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Audited {
-    /// Its share of the work that was asked for.
+    /// Requested share of the work.
     pub share: f64,
     /// Audited pixels.
     pub pixels: u32,
-    /// Samples of each of them.
+    /// Samples per audited pixel.
     pub samples: u32,
-    /// Rays of the audit; those of the picture do not count them.
+    /// Rays of the audit, not included in the rays of the picture.
     pub rays: u64,
-    /// Seconds of the audit; those of rendering have them in.
+    /// Seconds of the audit, included in the seconds of rendering.
     pub seconds: f64,
-    /// Whether its paths were joined with the photons of the picture: their blur is not in the bias.
+    /// Whether audit paths were merged with the picture's photons: their blur is not in the bias.
     pub has_photons: bool,
-    /// The error that the picture's own noise tells of.
+    /// Noise of the picture, from its half-films.
     pub noise: ErrorEstimate,
-    /// The squared bias.
+    /// Squared bias.
     pub bias: BiasEstimate,
-    /// How much noisier pixels are in the audit than in the picture: the quotient of their variances, in the root mean square.
+    /// Root mean square ratio of pixel variances, audit over picture.
     pub imbalance: f64,
-    /// The sum of both, and of what photons blur that the audit does not see.
+    /// Noise plus squared bias, plus photon blur that the audit does not see.
     pub total: ErrorEstimate,
-    /// By how much the whole picture is too bright.
+    /// Relative excess of the whole picture's brightness.
     pub whole: Deviation,
-    /// By how much its parts are, row by row.
+    /// Relative excess of each region, row by row.
     pub regions: Vec<Region>,
-    /// The share of the picture's light that its paths cannot find, by a first look with photons.
+    /// Share of the picture's light that audit paths cannot find, by a prepass with photons.
     pub unseen: f64,
-    /// Whether it can tell a bias from light that its paths do not find: if not, `total` is without bias.
+    /// Whether the audit cannot separate bias from light that its paths miss; `total` is then noise alone.
     pub is_blind: bool,
 }
 
@@ -55,14 +55,14 @@ pub struct Region {
     pub width: u32,
     /// Pixels down.
     pub height: u32,
-    /// By how much it is too bright.
+    /// Relative excess of its brightness.
     pub deviation: Deviation,
-    /// Whether chance can be ruled out, at a level of 2.5 % for all regions and the whole together.
+    /// Whether the deviation is significant, at 2.5 % for all regions and the whole picture together.
     pub is_biased: bool,
 }
 
 impl Audited {
-    /// Whether there is a bias. Where there is none, this says so in 5 % of all pictures at most.
+    /// Whether a bias is significant. Unbiased pictures are reported biased in at most 5 % of cases.
     pub fn is_biased(&self) -> bool {
         let is_found = self.bias.is_found()
             || self.whole_is_biased()
@@ -70,8 +70,8 @@ impl Audited {
         is_found && !self.is_blind
     }
 
-    /// The same by a judge whose paths do not find a share `unseen` of the picture's light. Where that is more than next to
-    /// nothing, a picture that is brighter than the judge's may be right; one that is darker is wrong all the same.
+    /// Result for audit paths that miss a share `unseen` of the picture's light. If that share is not
+    /// negligible, a picture brighter than the audit may be right, whereas a darker one is certainly wrong.
     pub(super) fn by_a_judge_without(self, unseen: f64) -> Self {
         let Deviation { mean, error, .. } = self.whole;
         let is_blind = unseen >= MOST_UNSEEN && mean > -2.0 * error;
@@ -79,13 +79,13 @@ impl Audited {
         Self { unseen, is_blind, total, ..self }
     }
 
-    /// Whether the whole picture is too bright or too dark.
+    /// Whether the deviation of the whole picture is significant.
     pub fn whole_is_biased(&self) -> bool {
         self.whole.chance() < LEVEL / (self.regions.len() + 1) as f64
     }
 }
 
-/// What each audited pixel says, with its number.
+/// Differences at the audited pixels, each with the pixel's index.
 pub(super) fn findings(
     film: &Film,
     mean: f64,
@@ -103,7 +103,7 @@ pub(super) fn findings(
     places.iter().zip(truth).enumerate().filter_map(finding).collect()
 }
 
-/// All but what the audit has cost. `None` for fewer findings than say anything.
+/// Result without the costs of the audit; `None` with too few findings.
 pub(super) fn verdict(
     findings: &[(usize, Finding)],
     shares: &[f32],
@@ -113,7 +113,7 @@ pub(super) fn verdict(
 ) -> Option<Audited> {
     let bias = BiasEstimate::of(findings.iter().map(|(i, finding)| (*finding, f64::from(shares[*i]))))?;
     let count = (grid.side * grid.side) as usize;
-    // The noise of a product is the product of those of both halves, each of picture and audit.
+    // Noise of a product: the product of the noise of both halves, each for picture and audit.
     let squares = |of: usize| findings.iter().map(|(_, finding)| finding.variances[of].powi(2)).sum::<f64>();
     let region = |index: usize| {
         let inside = || findings.iter().filter(|(i, _)| grid.region(places[*i]) == index);
@@ -157,8 +157,8 @@ mod tests {
             error: 0.004 / 1.959964,
         };
         let sum = noise.with_bias(bias);
-        // 0.03, less twice the square of the standard error over 0.02; the distance to the upper end of both, and to the bias
-        // that is certain by four standard errors.
+        // 0.03, less twice the squared standard error over 0.02. Distances to the upper ends, and to the bias
+        // that is certain by four standard errors, add in quadrature.
         let less = 2.0 * (0.004f64 / 1.96).powi(2) / 0.02;
         assert!((sum.relmse - (0.03 - less)).abs() < 1e-7, "{sum:?}");
         assert!((sum.relmse - sum.lower - 0.002f64.hypot(0.008 - less)).abs() < 1e-7, "{sum:?}");

@@ -1,4 +1,4 @@
-//! The header of a film file: one JSON object, which a person can read with `head -c`.
+//! Header of a film file: one JSON object, readable with `head -c`.
 
 use super::identity::Identity;
 use crate::render::audit::{self, Audit};
@@ -9,11 +9,11 @@ use halflight_core::method::{RenderState, Shard};
 use halflight_core::transport::Counters;
 use serde::{Deserialize, Serialize};
 
-/// What is known of a film beside its pixels.
+/// State of a film besides its pixels.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(in crate::render) struct Header {
     pub(super) identity: Identity,
-    /// Which of how many, counted from 1.
+    /// Shard number, from 1, and number of shards.
     shard: [u32; 2],
     pub(in crate::render) shares: bool,
     pub(in crate::render) spp: u32,
@@ -24,13 +24,13 @@ pub(in crate::render) struct Header {
     rays: u64,
     shadow_rays: u64,
     dropped: Causes,
-    /// Tiles and what they dropped.
+    /// Tiles with rejected samples, and their numbers by cause.
     ledger: Vec<(u32, Causes)>,
     history: Vec<Entry>,
     audit: Option<audit::State>,
 }
 
-/// Not a number, infinite, negative, unfinished.
+/// Rejected samples: NaN, infinite, negative, unfinished.
 type Causes = [u64; 4];
 
 /// A round: seconds, samples, rays, and the estimated error with its interval.
@@ -74,7 +74,7 @@ impl Header {
         [self.identity.width, self.identity.height]
     }
 
-    /// `None` for one of another version.
+    /// `None` if this version does not know the method.
     pub(in crate::render) fn method(&self) -> Option<Method> {
         Method::named(&self.identity.method)
     }
@@ -93,7 +93,7 @@ impl Header {
         self.ledger.iter().map(|(tile, causes)| (*tile as usize, dropped(*causes)))
     }
 
-    /// How far the audit is, where there is one.
+    /// State of the audit, if there is one.
     pub(in crate::render) fn audit(&self) -> Option<audit::State> {
         self.audit.clone().filter(audit::State::is_whole)
     }

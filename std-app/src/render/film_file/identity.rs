@@ -1,32 +1,32 @@
-//! Which picture a film is of: films can be continued and merged only where all of this is the same.
+//! Identity of a film's picture: films can be continued and merged only if their identities agree.
 
 use crate::render::{Method, Settings, fingerprint};
 use halflight_core::scene::Scene;
 use halflight_core::transport::PathSettings;
 use serde::{Deserialize, Serialize};
 
-/// All that the bits of a film follow from, but the samples.
+/// Everything that determines the bits of a film, except its samples.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub(in crate::render) struct Identity {
-    /// Of the program.
+    /// Version of the program.
     version: String,
     pub(super) method: String,
     pub(super) width: u32,
     pub(super) height: u32,
     seed: u32,
     max_depth: Option<u32>,
-    /// What was asked for; what comes of it follows from the scene.
+    /// Requested choices; their outcome follows from the scene.
     reuse: Option<bool>,
     windows: Option<bool>,
-    /// Everything that the method is told.
+    /// Settings of the method.
     settings: String,
-    /// Fingerprint of all that is in the scene.
+    /// Fingerprint of the scene's content.
     scene: String,
     camera: String,
 }
 
 impl Identity {
-    /// `loaded` tells of the cache that the render begins with.
+    /// Identity of a render; `loaded` is the fingerprint of the cache it begins with.
     pub(in crate::render) fn of(
         scene: &Scene,
         method: &str,
@@ -71,7 +71,7 @@ impl Identity {
         }
     }
 
-    /// In what `self`, that of a film, is not `other`, in words.
+    /// First difference between `self`, the identity of a film file, and `other`, in words.
     pub(super) fn difference(&self, other: &Self) -> Option<String> {
         let depth = |depth: Option<u32>| depth.map_or("no limit of".into(), |depth| depth.to_string());
         let choice = |asked: Option<bool>| match asked {

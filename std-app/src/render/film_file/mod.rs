@@ -1,4 +1,4 @@
-//! Films in files: checkpoints of a render, and shards to be merged. The format is docs/film-file.md.
+//! Film files: checkpoints of a render, and shards to merge. Format: docs/film-file.md.
 
 mod header;
 mod identity;
@@ -16,7 +16,7 @@ use std::path::Path;
 
 const KIND: Kind = Kind { magic: *b"HLFILM", version: 8, name: "film" };
 
-/// Writes the film of `state` to `path`, whole or not at all.
+/// Writes the film of `state` to `path`, completely or not at all.
 pub(super) fn write(
     path: &Path,
     header: &Header,
@@ -30,20 +30,20 @@ pub(super) fn write(
     })
 }
 
-/// Tiles that have samples: the others are not stored.
+/// Tiles with samples; others are not stored.
 fn tiles<'a>(pixels: &'a [Pixel], taken: &'a [u32]) -> impl Iterator<Item = &'a [Pixel]> {
     let tiles = pixels.chunks(PIXELS_PER_TILE).zip(taken);
     tiles.filter(|(_, taken)| **taken > 0).map(|(pixels, _)| pixels)
 }
 
-/// A film file whose header has been read.
+/// A film file after its header was read.
 pub(super) struct Reader {
     file: sealed::Reader<'static>,
     pub(super) header: Header,
 }
 
 impl Reader {
-    /// Opens `path` and reads its header, in no more than `most` bytes.
+    /// Opens `path` and reads its header, within `most` bytes.
     pub(super) fn open(path: &Path, most: usize) -> Result<Self, FileError> {
         let (file, header): (_, Header) = sealed::Reader::open(path, &KIND, most)?;
         let Shard { index, count } = header.shard();
@@ -55,7 +55,7 @@ impl Reader {
         Ok(Self { file, header })
     }
 
-    /// Refuses a film that is of something else.
+    /// Refuses a film of another identity or shard.
     pub(super) fn check(&self, identity: &Identity, shard: Shard) -> Result<(), FileError> {
         let words = |shard: Shard| format!("shard {}/{}", shard.index + 1, shard.count);
         let own = self.header.shard();
@@ -65,7 +65,7 @@ impl Reader {
         difference.map_or(Ok(()), |difference| Err(self.file.refusal(format!("is a film {difference}"))))
     }
 
-    /// Refuses a film that cannot be merged with that of `first`.
+    /// Refuses a film that cannot be merged with `first`.
     pub(super) fn check_sibling(&self, first: &Self) -> Result<(), FileError> {
         let (own, other) = (&self.header, &first.header);
         let refuse = |why: String| {
@@ -84,7 +84,7 @@ impl Reader {
         Ok(())
     }
 
-    /// Reads the pixels of its tiles into those of `state`, a film of the same size.
+    /// Reads the stored tiles into `state`, a film of the same size.
     pub(super) fn read_into(mut self, state: &mut RenderState) -> Result<(), FileError> {
         let [width, height] = self.header.size();
         let mut taken = vec![0u32; Tile::count(width, height)];
