@@ -1,21 +1,20 @@
-//! The edges of lamps that are made of many triangles: those that two triangles of one material share which
-//! are both seen from the front, or both from behind, lie within what is seen of the lamp and are no border
-//! of it.
+//! Border edges of lights made of many triangles. An edge between two triangles of one material that both
+//! show their front, or both their back, lies inside the visible light and is no border.
 
 use crate::sampling::mix;
 use glam::Vec3;
 
-/// Places for edges, a power of two.
+/// Slots of the hash table, a power of two.
 const PLACES: usize = 1 << 13;
 
-/// Places that an edge may have. One that finds all of them taken counts as a border.
+/// Slots that an edge may use. An edge that finds all of them taken counts as a border.
 const TRIES: u64 = 64;
 
-/// Bits of a place that count, modulo their number: up for an edge, down for one that goes back.
+/// Bits of a slot that count modulo their range: up for an edge, down for its reverse.
 const COUNTER: u32 = 7;
 
-/// How often edges came, less how often they came the other way round. What an edge is known by is a hash of
-/// its ends: two that are taken for the same may cost a border, and so noise, now and then.
+/// Hash table of edges, with the number of occurrences of each less those of its reverse. The key is a hash
+/// of both ends. A collision may drop a border now and then, which costs only noise.
 pub(super) struct Edges([u32; PLACES]);
 
 impl Edges {
@@ -23,7 +22,7 @@ impl Edges {
         Self([0; PLACES])
     }
 
-    /// An edge came, of a triangle seen from a `side`, by number.
+    /// Adds an edge of a triangle seen from a `side`, a number.
     pub(super) fn add(&mut self, edge: [Vec3; 2], side: u64) {
         let (key, step) = key(edge, side);
         let free = places(key).find(|place| self.0[*place] == 0 || self.0[*place] & !COUNTER == key);
@@ -32,7 +31,7 @@ impl Edges {
         }
     }
 
-    /// Whether such an edge is a border.
+    /// True if the edge is a border of that side.
     pub(super) fn is_border(&self, edge: [Vec3; 2], side: u64) -> bool {
         let (key, _) = key(edge, side);
         let known = places(key).map(|place| self.0[place]).find(|known| known & !COUNTER == key);
@@ -40,9 +39,9 @@ impl Edges {
     }
 }
 
-/// The same for an edge and for one that goes back, but for the step of the counter.
+/// Key of an edge, equal for its reverse, and the step of its counter.
 fn key([a, b]: [Vec3; 2], side: u64) -> (u32, u32) {
-    // No zero is negative.
+    // The sum turns negative zero into zero.
     let end = |point: Vec3| {
         (point + 0.0).to_array().iter().fold(side, |hash, x| mix(hash ^ u64::from(x.to_bits())))
     };
@@ -70,12 +69,12 @@ mod tests {
         };
         const SIDE: u32 = 40;
         let all = || (0..SIDE * SIDE).flat_map(|i| square(i % SIDE, i / SIDE));
-        // Also where every face is there twice.
+        // Also if every face occurs twice.
         for _ in 0..2 {
             all().for_each(|edge| edges.add(edge, 1));
             assert_eq!(all().filter(|edge| edges.is_border(*edge, 1)).count(), 4 * SIDE as usize);
         }
-        // Another side of it, or another material.
+        // The other side of the light, or another material.
         let edge = [at(3, 3), at(3, 4)];
         edges.add(edge, 0);
         assert!(edges.is_border(edge, 0) && !edges.is_border(edge, 1));

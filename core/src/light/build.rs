@@ -1,4 +1,4 @@
-//! Building of the sampler: the lights of a scene are found, weighed by their power and put into the tree.
+//! Build of the light sampler: collects the lights of a scene and builds the light tree by their power.
 
 use super::area::Emitter;
 use super::emitted::{mean_luminance, strength};
@@ -10,10 +10,10 @@ use crate::memory::{Arena, Footprint, OutOfMemory};
 use crate::sampling::AliasTable;
 use crate::scene::{PointLight, Scene};
 
-/// Least weight of a light, relative to the strongest: none that shines is ever left out.
+/// Least weight of a light relative to the strongest: no light that emits is ever left out.
 const LEAST_POWER: f64 = 1e-30;
 
-/// What [`LightSampler::build`] is about to hold.
+/// Numbers of lights in [`LightSampler::build`].
 #[derive(Clone, Copy, Default)]
 struct Counts {
     emitters: usize,
@@ -52,11 +52,10 @@ impl<'m> LightSampler<'m> {
         Footprint::default().slice::<Item>(Counts::of(scene).in_tree())
     }
 
-    /// Finds and orders the lights of `scene`.
+    /// Collects and orders the lights of `scene`.
     ///
     /// # Errors
-    /// [`OutOfMemory`] where the arena has less than [`LightSampler::footprint`] and
-    /// [`LightSampler::scratch`] ask for.
+    /// [`OutOfMemory`] if the arena has less than [`LightSampler::footprint`] and [`LightSampler::scratch`].
     pub fn build(scene: &Scene, arena: &mut Arena<'m>) -> Result<Self, OutOfMemory> {
         let counts = Counts::of(scene);
         let kept: &mut [Emitter] = arena.slice(counts.emitters)?;
@@ -76,7 +75,7 @@ impl<'m> LightSampler<'m> {
         let items: &mut [Item] = scratch.slice(counts.in_tree())?;
         let sides = |e: &Emitter| if e.is_two_sided() { 2.0 } else { 1.0 };
         let area_powers = kept.iter().map(|e| mean_luminance(scene, e) * f64::from(e.area) * sides(e));
-        // As a ball that shows a quarter of its area.
+        // A light that emits in all directions counts as a ball, which shows a quarter of its area.
         let all_around = |light| if place_of(scene, light).1.is_all() { 4.0 } else { 1.0 };
         let point_powers = points.iter().map(|&light| strength_of(scene, light) * all_around(light));
         let unit = area_powers.clone().chain(point_powers.clone()).fold(0.0, f64::max);
@@ -111,7 +110,7 @@ impl<'m> LightSampler<'m> {
     }
 }
 
-/// The emissive triangles of `scene`, two that make a parallelogram as one.
+/// Emissive triangles of `scene`; two that make a parallelogram count as one.
 fn emitters(scene: &Scene) -> impl Iterator<Item = Emitter> {
     let mut next = 0u32;
     core::iter::from_fn(move || {

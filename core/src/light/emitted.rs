@@ -1,4 +1,4 @@
-//! The radiance and the power that one light emits.
+//! Radiance and power of a single light.
 
 use super::area::{Emitter, Place};
 use super::luminance;
@@ -8,23 +8,23 @@ use crate::sampling::{Sampler, warp::uniform_triangle};
 use crate::scene::{Material, PointLight, Scene};
 use glam::Vec2;
 
-/// Points at which the mean of a textured emission is taken.
+/// Points for the mean of a textured emission.
 const TEXTURE_SAMPLES: u32 = 16;
 
-/// The radiance that `triangle` emits at texture coordinates `uv`, to its front or its back.
+/// Radiance that `triangle` emits at texture coordinates `uv`, to its front or its back.
 #[inline]
 pub fn emitted(scene: &Scene, triangle: u32, uv: Vec2, front: bool) -> Rgb {
     let material = scene.mesh.triangles.get(triangle as usize).map(|t| t.material as usize);
     match material.and_then(|m| scene.materials.get(m)) {
         Some(material) if front || material.two_sided => {
-            // Maps may hold anything; light is never negative.
+            // Textures may hold negative numbers; radiance may not.
             material.emission.at::<All>(scene, uv).max(Rgb::ZERO)
         }
         _ => Rgb::ZERO,
     }
 }
 
-/// What the light emits at a place; of a cut-out surface, what is left of it.
+/// Radiance of the light at a point, times the opacity of a cut-out surface.
 #[inline]
 pub(super) fn emitted_at(scene: &Scene, emitter: &Emitter, place: &Place, front: bool) -> Rgb {
     if !emitter.is_textured() {
@@ -37,7 +37,7 @@ pub(super) fn emitted_at(scene: &Scene, emitter: &Emitter, place: &Place, front:
     emitted(scene, place.triangle, uv, front) * opacity.clamp(0.0, 1.0)
 }
 
-/// The mean luminance of a light, positive where its material emits at all.
+/// Mean luminance of a light, positive if its material emits at all.
 pub(super) fn mean_luminance(scene: &Scene, emitter: &Emitter) -> f64 {
     let Some(material) = material_of(scene, emitter.triangle) else { return 0.0 };
     let constant = f64::from(luminance(material.emission.value));
@@ -50,7 +50,7 @@ pub(super) fn mean_luminance(scene: &Scene, emitter: &Emitter) -> f64 {
         f64::from(luminance(emitted_at(scene, emitter, &place, true)))
     });
     let mean = samples.filter(|l| l.is_finite()).sum::<f64>() / f64::from(TEXTURE_SAMPLES);
-    // What sixteen points have missed may still be there.
+    // Sixteen points may miss emission.
     mean.max(1e-3 * constant)
 }
 
@@ -58,7 +58,7 @@ fn material_of<'s>(scene: &'s Scene, triangle: u32) -> Option<&'s Material> {
     scene.materials.get(scene.mesh.triangles.get(triangle as usize)?.material as usize)
 }
 
-/// Luminance of the intensity or irradiance; zero where it is no number.
+/// Luminance of the intensity or irradiance; zero if not finite.
 pub(super) fn strength(light: &PointLight) -> f64 {
     let color = match light {
         PointLight::Point { intensity, .. } | PointLight::Spot { intensity, .. } => intensity,
@@ -68,7 +68,7 @@ pub(super) fn strength(light: &PointLight) -> f64 {
     if strength.is_finite() { strength.max(0.0) } else { 0.0 }
 }
 
-/// 1 inside the inner cone, 0 outside the outer one, and linear in the angle in between.
+/// 1 inside the inner cone, 0 outside the outer cone, and linear in the angle in between.
 pub(super) fn spot_falloff(cos: f32, cos_inner: f32, cos_outer: f32) -> f32 {
     if cos >= cos_inner {
         return 1.0;

@@ -1,4 +1,4 @@
-//! Light from infinitely far: what a ray sees that leaves the scene, and how to find its bright parts.
+//! Environment light: radiance of a ray that leaves the scene, and importance sampling of it.
 
 use super::environment_visibility::{VisibilityTable, WarpedSample};
 use crate::Rgb;
@@ -13,7 +13,7 @@ use core::f32::consts::{PI, TAU};
 use glam::{Vec2, Vec3};
 
 impl Environment {
-    /// The radiance from unit `direction`, which points away from the scene.
+    /// Radiance from unit `direction`, which points away from the scene.
     #[inline]
     pub fn radiance(&self, scene: &Scene, direction: Vec3) -> Rgb {
         match self.texture(scene) {
@@ -28,8 +28,8 @@ impl Environment {
             .filter(|texture| texture.width > 0 && texture.height > 0)
     }
 
-    /// At (azimuth, polar angle) as fractions of the map. Between a pole and the centres of the row next to
-    /// it that row is held: the other pole must not be mixed in.
+    /// Radiance at (azimuth, polar angle) as fractions of the map. Between a pole and the centres of its
+    /// nearest row the value of that row is kept, because interpolation would mix in the other pole.
     #[inline]
     fn looked_up(&self, texture: &Texture, at: Vec2) -> Rgb {
         let half_row = 0.5 / texture.height as f32;
@@ -38,7 +38,7 @@ impl Environment {
     }
 }
 
-/// The place of a direction on the map, both coordinates in 0 … 1.
+/// Position of a direction on the map, both coordinates in 0 … 1.
 #[inline]
 fn square(d: Vec3) -> Vec2 {
     let azimuth = libm::atan2f(d.z, d.x) * (1.0 / TAU);
@@ -46,14 +46,14 @@ fn square(d: Vec3) -> Vec2 {
     Vec2::new(if azimuth < 0.0 { azimuth + 1.0 } else { azimuth }, polar)
 }
 
-/// Cells that are too many for the second cache.
+/// Number of cells beyond which the density does not fit into the second-level cache.
 const MANY_CELLS: usize = 1 << 16;
 
-/// By how much larger cells may raise the second moment of the light.
+/// Largest increase of the light's second moment by larger cells.
 const LOSS: f64 = 0.02;
 
-/// Texels along a side of a cell of the density: as many as lose next to nothing, for a density that stays in
-/// the cache is several times as fast. A sky may have large cells, one with a sun may not.
+/// Texels along a side of a cell of the density: as many as lose next to nothing. A density that stays in the
+/// cache is several times as fast. A sky may have large cells, a sky with a sun may not.
 fn block(texture: &Texture) -> usize {
     let (width, height) = (texture.width as usize, texture.height as usize);
     let mut block = 1;
@@ -67,8 +67,7 @@ fn block(texture: &Texture) -> usize {
     block
 }
 
-/// By which part the second moment of the light grows where cells of `block`² texels are sampled by their
-/// means.
+/// Relative increase of the light's second moment if cells of `block`² texels are sampled by their means.
 fn loss(texture: &Texture, block: usize) -> f64 {
     let (width, height) = (texture.width as usize, texture.height as usize);
     let (mut by_texels, mut by_cells) = (0.0, 0.0);
@@ -93,10 +92,10 @@ fn loss(texture: &Texture, block: usize) -> f64 {
     if by_texels > 0.0 { by_cells / by_texels - 1.0 } else { 0.0 }
 }
 
-/// Samples an environment: a map by its luminance, a constant one by the cosine of the receiver.
+/// Sampler of an environment: a map by its luminance, constant radiance by the cosine at the receiver.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct EnvironmentSampler<'m> {
-    /// `None` where radiance is constant.
+    /// `None` for constant radiance.
     map: Option<Distribution2d<'m>>,
     /// Mean luminance over the sphere.
     pub(super) mean: f32,
@@ -113,7 +112,7 @@ impl<'m> EnvironmentSampler<'m> {
         }
     }
 
-    /// `None` where the environment is black.
+    /// `None` if the environment is black.
     pub(super) fn build(scene: &Scene, arena: &mut Arena<'m>) -> Result<Option<Self>, OutOfMemory> {
         let Some(environment) = &scene.environment else { return Ok(None) };
         let Some(texture) = environment.texture(scene) else {
@@ -124,8 +123,8 @@ impl<'m> EnvironmentSampler<'m> {
         let texel = Vec2::new(1.0 / width as f32, 1.0 / height as f32);
         let (mut sum, mut sines) = (0.0, 0.0);
         let mut weight = |x: usize, y: usize| {
-            // The mean over the texel's square of the bilinear map is the mean of its values at the
-            // middles of the four quarters.
+            // The mean of the bilinear map over the texel is the mean of its values at the centres of the
+            // four quarters.
             let center = Vec2::new(x as f32 + 0.5, y as f32 + 0.5);
             let quarters = [(-0.25, -0.25), (0.25, -0.25), (-0.25, 0.25), (0.25, 0.25)];
             let value = |(dx, dy)| {
@@ -143,7 +142,7 @@ impl<'m> EnvironmentSampler<'m> {
         let block = block(texture);
         let weight = |x: usize, y: usize| {
             let texels = (0..block * block).map(|i| (block * x + i % block, block * y + i / block));
-            // A texel that is no number darkens its cell no more than itself.
+            // A NaN texel darkens its cell by no more than itself.
             texels.map(|(x, y)| weight(x, y)).filter(|weight| weight.is_finite()).sum()
         };
         let map = Distribution2d::build(width / block, height / block, weight, arena)?;
@@ -151,14 +150,14 @@ impl<'m> EnvironmentSampler<'m> {
         Ok((mean > 0.0).then_some(Self { map: Some(map), mean }))
     }
 
-    /// A direction and its density in solid angle, where a visibility table has chosen.
+    /// Direction and density in solid angle for a sample of a visibility table.
     #[inline]
     pub(super) fn sample_at(&self, environment: &Environment, warped: WarpedSample) -> Option<(Vec3, f32)> {
         let (direction, pdf) = self.sample(environment, Vec3::ZERO, warped.place)?;
         Some((direction, pdf * warped.density))
     }
 
-    /// The density of [`EnvironmentSampler::sample_at`] for unit `direction`, where `table` chose.
+    /// Density of [`EnvironmentSampler::sample_at`] in unit `direction`, with samples of `table`.
     #[inline]
     pub(super) fn pdf_through(
         &self,
@@ -176,12 +175,12 @@ impl<'m> EnvironmentSampler<'m> {
         }
     }
 
-    /// Whether the radiance of `environment` is constant.
+    /// True if the radiance of `environment` is constant.
     pub(super) fn is_constant(&self) -> bool {
         self.map.is_none()
     }
 
-    /// A direction and its density in solid angle.
+    /// Direction and density in solid angle.
     #[inline]
     pub(super) fn sample(&self, environment: &Environment, normal: Vec3, u: [f32; 2]) -> Option<(Vec3, f32)> {
         let Some(map) = &self.map else {
@@ -200,7 +199,7 @@ impl<'m> EnvironmentSampler<'m> {
         (pdf > 0.0).then(|| (environment.to_map.transpose() * direction, pdf))
     }
 
-    /// The density of [`EnvironmentSampler::sample`] for unit `direction`.
+    /// Density of [`EnvironmentSampler::sample`] in unit `direction`.
     #[inline]
     pub(super) fn pdf(&self, environment: &Environment, normal: Vec3, direction: Vec3) -> f32 {
         let Some(map) = &self.map else {
@@ -214,7 +213,7 @@ impl<'m> EnvironmentSampler<'m> {
     }
 }
 
-/// From density over the map's unit square to solid angle: dω = 2π² sin θ du dv.
+/// Density over the map's unit square, converted to solid angle: dω = 2π² sin θ du dv.
 #[inline]
 fn solid_angle_pdf(pdf: f32, sin: f32) -> f32 {
     if sin > 0.0 { pdf / (TAU * PI * sin) } else { 0.0 }

@@ -1,48 +1,48 @@
-//! The visibility of the environment from each place of the scene, learned before the picture, to importance
-//! sample the part that is not occluded.
+//! Environment visibility: importance sampling of the part of the environment that is visible from each place
+//! of the scene, learned in a prepass (portals, Bitterli 2015, solve this for given windows).
 //!
-//! The unit square from which the environment is sampled is cut into bins of equal power. Each place, a cell
-//! of a grid and the axis that its surface faces most, has a table of the shares of the bins. The table warps
-//! the square monotonically in both coordinates, which preserves stratification.
-//! [`crate::transport::Outlook`] learns the tables; any table gives unbiased estimates.
+//! The unit square that samples the environment is divided into bins of equal power. Each place, a cell of a
+//! grid and the axis that its surface faces most, has a table of the probabilities of the bins. The table
+//! warps the square monotonically in both coordinates, which preserves stratification.
+//! [`crate::transport::Outlook`] learns the tables. Estimates are unbiased with any table.
 
 use crate::geometry::Bounds;
 use crate::memory::{Arena, Footprint, OutOfMemory};
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
-/// Bins across: most of the light of a sky comes from a few rows, and windows are upright.
+/// Bins along the azimuth: most of the light of a sky comes from a few rows, and windows are upright.
 const COLUMNS: usize = 64;
 const ROWS: usize = 32;
 
 /// A number for each bin, row by row.
 pub type Bins = [f32; COLUMNS * ROWS];
 
-/// The share of samples that all bins have alike: the prepass may have missed light.
+/// Share of samples that is uniform over all bins, because the prepass may have missed light.
 const DEFENCE: f32 = 0.1;
 
-/// The density over the unit square for one place.
+/// Density over the unit square for one place.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
 #[repr(C)]
 pub struct VisibilityTable {
-    /// The last 65536th of each row.
+    /// Last unit of each row, of 65536.
     rows: [u16; ROWS],
-    /// The last 65536th of each cell in its row.
+    /// Last unit of each cell in its row, of 65536.
     cells: [[u16; COLUMNS]; ROWS],
 }
 
-/// A point of the environment's square that a table chose.
+/// Sample of a visibility table.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct WarpedSample {
-    /// The point, in the unit square.
+    /// Point in the unit square of the environment.
     pub place: [f32; 2],
-    /// Density of samples there, relative to sampling without the table.
+    /// Density relative to sampling without the table.
     pub density: f32,
 }
 
 impl VisibilityTable {
-    /// From how much each bin matters, on average over bins whole or in part: for the least variance, the
-    /// root of the mean square of what arrives from it. What is no number counts as zero.
+    /// Table for the mean importance of each bin, over whole bins or parts. The root mean square of the
+    /// incident radiance gives the least variance. NaN counts as zero.
     pub fn new(bins: &Bins) -> Self {
         let probabilities = Self::probabilities(bins);
         let mut table = Self { rows: [0; ROWS], cells: [[0; COLUMNS]; ROWS] };
@@ -55,7 +55,7 @@ impl VisibilityTable {
         table
     }
 
-    /// What a bin's share of samples is about to be; the sum is one.
+    /// Probabilities of samples in each bin; their sum is one.
     pub fn probabilities(bins: &Bins) -> Bins {
         let count = bins.len() as f32;
         let finite = |x: f32| if x > 0.0 && x < f32::INFINITY { x } else { 0.0 };
@@ -65,8 +65,7 @@ impl VisibilityTable {
         bins.map(|x| rest + share * finite(x))
     }
 
-    /// Where in the square of the environment a point of the unit square leads, and how dense samples are
-    /// there.
+    /// Point of the environment's square for a point of the unit square, and its relative density.
     #[inline]
     pub fn warp(&self, [u, v]: [f32; 2]) -> WarpedSample {
         let (y, v, share) = pick(&self.rows, v);
@@ -76,7 +75,7 @@ impl VisibilityTable {
         WarpedSample { place: place.map(|u| u.min(crate::sampling::ONE_MINUS_EPSILON)), density }
     }
 
-    /// How much denser samples are at a point of the environment's square than without the table.
+    /// Density at a point of the environment's square relative to sampling without the table.
     #[inline]
     pub fn density(&self, [u, v]: [f32; 2]) -> f32 {
         let y = ((v * ROWS as f32) as usize).min(ROWS - 1);
@@ -85,18 +84,18 @@ impl VisibilityTable {
         cell(&self.rows, y) * cell(&self.cells[y], x) * (COLUMNS * ROWS) as f32
     }
 
-    /// Whether `bin` is black where bins are the squares of a chessboard.
+    /// True if `bin` is a black square of a chessboard.
     pub fn is_black(bin: usize) -> bool {
         (bin % COLUMNS + bin / COLUMNS).is_multiple_of(2)
     }
 
-    /// A point of the environment's square in `bin`, at `offset` of the bin's unit square.
+    /// Point of the environment's square in `bin`, at `offset` of the bin's unit square.
     pub fn place(bin: usize, offset: [f32; 2]) -> [f32; 2] {
         let (x, y) = (bin % COLUMNS, bin / COLUMNS);
         [(x as f32 + offset[0]) / COLUMNS as f32, (y as f32 + offset[1]) / ROWS as f32]
     }
 
-    /// `bins`, each a weighted mean of itself and its neighbours. Columns go round the horizon.
+    /// Weighted mean of each bin and its neighbours. Columns wrap around the horizon.
     pub fn smoothed(bins: &Bins) -> Bins {
         const WEIGHTS: [f32; 3] = [0.25, 0.5, 0.25];
         core::array::from_fn(|bin| {
@@ -115,7 +114,7 @@ impl VisibilityTable {
 
 const WHOLE: f32 = 65536.0;
 
-/// Shares of a whole as the last unit of each, none without a unit.
+/// Shares converted to the last unit of each bin; every bin gets at least one unit.
 fn ends<const N: usize>(shares: &[f32]) -> [u16; N]
 where
 {
@@ -140,7 +139,7 @@ fn start(ends: &[u16], i: usize) -> u32 {
     if i == 0 { 0 } else { last(ends, i - 1) + 1 }
 }
 
-/// The bin at `u`, where in it, and its probability. Counts all bins: that is a few vector instructions.
+/// Bin at `u`, position in it, and its probability. Counting all bins takes only a few vector instructions.
 #[inline]
 fn pick<const N: usize>(ends: &[u16; N], u: f32) -> (usize, f32, f32) {
     let at = u.clamp(0.0, crate::sampling::ONE_MINUS_EPSILON) * WHOLE;
@@ -152,23 +151,23 @@ fn pick<const N: usize>(ends: &[u16; N], u: f32) -> (usize, f32, f32) {
     (bin, (at - start as f32) / width, width / WHOLE)
 }
 
-/// Cells of equal size over the places that matter.
+/// Grid of equal cells over the places that matter.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct VisibilityGrid {
     origin: Vec3,
-    /// Cells for each unit of length.
+    /// Cells per unit of length.
     per_length: f32,
     counts: [u32; 3],
 }
 
-/// Cells along the longest side, where they are not too many in all.
+/// Cells along the longest side, unless the grid exceeds `CELLS`.
 const LONGEST: f32 = 24.0;
 const CELLS: usize = 4096;
-/// A surface faces along ±x, ±y or ±z.
+/// Sides ±x, ±y, ±z that a surface may face.
 const SIDES: usize = 6;
 
 impl VisibilityGrid {
-    /// A grid over `bounds`; `None` where they hold nothing or are no numbers.
+    /// Grid over `bounds`; `None` if they are empty or not finite.
     pub fn over(bounds: &Bounds) -> Option<Self> {
         let (origin, size) = (bounds.min, bounds.max - bounds.min);
         let longest = size.max_element();
@@ -187,12 +186,12 @@ impl VisibilityGrid {
         }
     }
 
-    /// The number of the place of a surface; `None` outside.
+    /// Index of the place of a surface; `None` outside the grid.
     #[inline]
     pub fn place(&self, position: Vec3, normal: Vec3) -> Option<usize> {
         let at = (position - self.origin) * self.per_length;
         let [nx, ny, nz] = self.counts.map(|count| count as f32);
-        // NaN is outside as well.
+        // NaN counts as outside.
         if !(at.min_element() >= 0.0 && at.x < nx && at.y < ny && at.z < nz) {
             return None;
         }
@@ -204,41 +203,40 @@ impl VisibilityGrid {
     }
 }
 
-/// The visibility tables of all places.
+/// Visibility tables of all places.
 #[derive(Clone, Copy, Debug)]
 pub struct EnvironmentVisibility<'m> {
     grid: VisibilityGrid,
-    /// For each place of the grid the number of its table, from 1; 0 where it has none.
+    /// Number of the table of each place, from 1; 0 without a table.
     slots: &'m [u16],
     visibility: &'m [VisibilityTable],
 }
 
 impl<'m> EnvironmentVisibility<'m> {
-    /// Windows that there can be.
+    /// Largest number of tables.
     pub const MOST: usize = 2048;
 
-    /// Bytes of all that is kept.
+    /// Bytes of all tables and their indices.
     pub fn footprint() -> Footprint {
         Footprint::default().slice::<u16>(CELLS * SIDES).slice::<VisibilityTable>(Self::MOST)
     }
 
-    /// The memory that [`EnvironmentVisibility::new`] takes, to be filled: numbers of tables by place, all
-    /// zero, and tables.
+    /// Memory for [`EnvironmentVisibility::new`], to be filled: table numbers by place, all zero, and tables.
     ///
     /// # Errors
-    /// [`OutOfMemory`] where the arena has less than [`EnvironmentVisibility::footprint`].
+    /// [`OutOfMemory`] if the arena has less than [`EnvironmentVisibility::footprint`].
     pub fn memory(arena: &mut Arena<'m>) -> Result<(&'m mut [u16], &'m mut [VisibilityTable]), OutOfMemory> {
         let slots: &mut [u16] = arena.slice(CELLS * SIDES)?;
         slots.fill(0);
         Ok((slots, arena.slice(Self::MOST)?))
     }
 
-    /// Of what [`EnvironmentVisibility::memory`] gave.
+    /// Tables in memory of [`EnvironmentVisibility::memory`].
     pub fn new(grid: VisibilityGrid, slots: &'m [u16], visibility: &'m [VisibilityTable]) -> Self {
         Self { grid, slots, visibility }
     }
 
-    /// The table of a surface with unit `normal`; `None` where nothing is known.
+    /// Table of a surface with unit `normal`; `None` without one.
     #[inline]
     pub fn at(&self, position: Vec3, normal: Vec3) -> Option<&'m VisibilityTable> {
         if normal == Vec3::ZERO {
@@ -254,7 +252,7 @@ mod tests {
     use super::*;
     use crate::sampling::Sampler;
 
-    /// A table with a bright corner, a bin of nothing, one of no number.
+    /// Table with a bright corner, a bin of zero and a bin of NaN.
     fn table() -> VisibilityTable {
         let mut bins: Bins =
             core::array::from_fn(|i| if i % COLUMNS < 5 && i < 128 { i as f32 } else { 0.1 });
@@ -275,7 +273,7 @@ mod tests {
         for (bin, found) in counts.into_iter().enumerate() {
             let expected =
                 table.density(VisibilityTable::place(bin, [0.5; 2])) * count as f32 / counts.len() as f32;
-            // Of a sequence that fills bins evenly: a few more or less at the borders.
+            // The sequence fills bins evenly, except for a few points at the borders.
             assert!((found - expected).abs() < 4.0 + 0.05 * expected, "bin {bin}: {found}, {expected}");
         }
     }

@@ -1,4 +1,4 @@
-//! Sampling of all lights of a scene together, from surfaces and for light paths that start on them.
+//! Sampling of all lights of a scene, from surfaces and as the start of light paths.
 
 mod area;
 mod border;

@@ -1,8 +1,8 @@
-//! All lights of a scene together: choose one, sample it, and give the density of both.
+//! Light sampler: chooses one of all lights of a scene, samples it, and evaluates the density of both.
 //!
-//! Three kinds take part: lights at finite places (emissive triangles, points, spots), which a light tree
-//! chooses among; the environment; directional lights. Which kind is decided by estimates of the irradiance
-//! they bring, with a floor for each, since nobody knows yet what is hidden.
+//! There are three kinds: lights at finite places (emissive triangles, points, spots), chosen by a light
+//! tree; the environment; directional lights. The kind is chosen by estimates of its irradiance, with a
+//! minimum for each kind, since occlusion is unknown.
 
 use super::area::Emitter;
 use super::border::Edges;
@@ -15,27 +15,27 @@ use crate::scene::{Mesh, PointLight, Scene};
 use crate::{Level, Rgb};
 use glam::Vec3;
 
-/// The least share of each kind of light that is there.
+/// Least probability of each kind of light that exists.
 const FLOOR: f32 = 0.1;
 
-/// One direction from which light may come.
+/// Sample of a light: a direction from which light may come.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LightSample {
-    /// Unit, towards the light.
+    /// Unit direction towards the light.
     pub direction: Vec3,
-    /// To the light; infinite for the environment and directional lights.
+    /// Distance to the light; infinite for the environment and directional lights.
     pub distance: f32,
-    /// The point on an area light, to end the shadow ray safely.
+    /// Point on an area light, for the end of the shadow ray.
     pub target: Option<LightPoint>,
-    /// What arrives if nothing is in the way: radiance; for a light without surface the irradiance on a
-    /// surface that faces it.
+    /// Unoccluded radiance; for a delta light the irradiance of a surface that faces it.
     pub radiance: Rgb,
-    /// Density in solid angle, the choice of the light included. For a light without surface the
-    /// probability of its choice.
+    /// Density in solid angle, including the choice of the light; for a delta light the probability of the
+    /// choice.
     pub pdf: f32,
-    /// Whether the light has no surface: no ray can find it by chance.
+    /// True for a light without surface, which no ray can hit.
     pub delta: bool,
-    /// Which light: emitters, points and spots, directional lights, the environment, in this order.
+    /// Index of the light in the order of emission: emitters, points and spots, directional lights, the
+    /// environment.
     pub(crate) light: u32,
 }
 
@@ -45,38 +45,38 @@ impl LightSample {
     }
 }
 
-/// A point on an area light.
+/// Point on an area light.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LightPoint {
-    /// Where.
+    /// Position.
     pub position: Vec3,
-    /// Unit normal, to the side from which it is seen.
+    /// Unit normal of the side from which the point is seen.
     pub normal: Vec3,
     /// Bound of the rounding error in each coordinate of `position`.
     pub error: f32,
 }
 
-/// The lights of a scene, ready to be sampled.
+/// Lights of a scene, ready for sampling.
 #[derive(Clone, Copy, Debug)]
 pub struct LightSampler<'m> {
-    /// Emissive triangles and parallelograms, in the order of the mesh. Light `i` of the tree is emitter
-    /// `i`; then come the points and spots.
+    /// Emissive triangles and parallelograms in the order of the mesh. They are the first lights of the tree;
+    /// points and spots follow.
     pub(super) emitters: &'m [Emitter],
-    /// Indices into the scene's lights: points and spots.
+    /// Indices of points and spots in the scene's lights.
     pub(super) points: &'m [u32],
     pub(super) tree: Tree<'m>,
     pub(super) environment: Option<EnvironmentSampler<'m>>,
-    /// The part of the environment that each place sees, where that has been learned.
+    /// Visible part of the environment at each place, if learned.
     pub(super) visibility: Option<EnvironmentVisibility<'m>>,
-    /// Indices into the scene's lights: directional.
+    /// Indices of directional lights in the scene's lights.
     pub(super) distant: &'m [u32],
     pub(super) distant_table: AliasTable<'m>,
-    /// Irradiance by environment and directional lights, in the unit of the tree's powers.
+    /// Irradiance of the environment and of directional lights, in the unit of the tree's powers.
     pub(super) environment_weight: f32,
     pub(super) distant_weight: f32,
 }
 
-/// Kinds of lights, and the probability of each.
+/// Probability of each kind of light.
 struct Shares {
     tree: f32,
     environment: f32,
@@ -84,52 +84,51 @@ struct Shares {
 }
 
 impl<'m> LightSampler<'m> {
-    /// The same lights, chosen with the instructions of `level`.
+    /// Sampler of the same lights that chooses with the instructions of `level`.
     pub fn with_level(&self, level: Level) -> Self {
         Self { tree: self.tree.with_level(level), ..*self }
     }
 
-    /// The same lights, with the environment sampled by its `visibility`.
+    /// Sampler of the same lights that samples the environment by its `visibility`.
     pub fn with_visibility(&self, visibility: Option<EnvironmentVisibility<'m>>) -> Self {
         Self { visibility, ..*self }
     }
 
-    /// Whether there is an environment that shines, and whether its radiance is constant.
+    /// True if the environment has constant radiance; `None` without an environment that shines.
     pub fn environment_is_constant(&self) -> Option<bool> {
         self.environment.as_ref().map(EnvironmentSampler::is_constant)
     }
 
-    /// A direction in which the environment is found at `u`, by its own light alone; not any surface's.
+    /// Unit direction towards the environment, sampled at `u` by its radiance alone, without any surface.
     pub fn sample_environment(&self, scene: &Scene, u: [f32; 2]) -> Option<Vec3> {
         let sample = self.environment?.sample(scene.environment.as_ref()?, Vec3::ZERO, u)?;
         Some(sample.0)
     }
 
-    /// Whether the environment is sampled by its visibility.
+    /// True if the environment is sampled by its visibility.
     pub fn has_visibility(&self) -> bool {
         self.visibility.is_some()
     }
 
-    /// The visibility of the environment from a surface, where it is known.
+    /// Visibility of the environment from a surface, if known.
     #[inline]
     pub(crate) fn visibility(&self, position: Vec3, normal: Vec3) -> Option<&'m VisibilityTable> {
         self.visibility.as_ref()?.at(position, normal)
     }
 
-    /// The point of the environment that the visibility table of a surface maps `u` to.
+    /// Sample of the visibility table of a surface at `u`.
     #[inline]
     pub(crate) fn warp(&self, position: Vec3, normal: Vec3, [u, v, _]: [f32; 3]) -> Option<WarpedSample> {
         Some(self.visibility(position, normal)?.warp([u, v]))
     }
 
-    /// Whether there is nothing that shines.
+    /// True without lights.
     pub fn is_empty(&self) -> bool {
         self.in_tree() == 0 && self.environment.is_none() && self.distant.is_empty()
     }
 
-    /// A direction from which light may reach `position`; of a surface only the side of `normal` counts,
-    /// unless it is zero. `u[2]` chooses the light. `None` where no light was found: it counts as a sample
-    /// of nothing.
+    /// Samples a direction from which light may reach `position`. On a surface only the side of `normal`
+    /// counts, unless it is zero. `u[2]` chooses the light. `None` is a sample without light.
     #[inline]
     pub fn sample(&self, scene: &Scene, position: Vec3, normal: Vec3, u: [f32; 3]) -> Option<LightSample> {
         let (sample, later) =
@@ -139,9 +138,9 @@ impl<'m> LightSampler<'m> {
         Some(LightSample { radiance: sample.radiance * radiance, ..sample })
     }
 
-    /// As [`LightSampler::sample`], with `warped` from [`LightSampler::warp`]. The flag says that the
-    /// radiance is still to be multiplied by that of the environment: its look-up is deferred until the
-    /// shadow ray is known to be free.
+    /// [`LightSampler::sample`] with `warped` from [`LightSampler::warp`]. If the flag is set, the radiance
+    /// is still to be multiplied by that of the environment. Its lookup waits until the shadow ray is known
+    /// to be unoccluded.
     #[inline]
     pub fn sample_deferred(
         &self,
@@ -186,8 +185,8 @@ impl<'m> LightSampler<'m> {
         }
     }
 
-    /// The density of [`LightSampler::sample`] for a point of emissive `triangle` that is seen from
-    /// `position` in unit `direction` at `hit_distance`. Zero for a triangle that does not shine this way.
+    /// Density of [`LightSampler::sample`] at a point of emissive `triangle`, in unit `direction` at
+    /// `hit_distance` from `position`. Zero if the triangle does not emit this way.
     #[inline]
     pub fn pdf_hit(
         &self,
@@ -207,7 +206,7 @@ impl<'m> LightSampler<'m> {
         pdf * share * self.tree.pdf(position, normal, index as u32)
     }
 
-    /// The emitter that `triangle` is a part of, and its index.
+    /// Index and emitter of `triangle`.
     #[inline]
     pub(super) fn emitter_of(&self, triangle: u32) -> Option<(usize, &Emitter)> {
         let index = self.emitters.partition_point(|e| e.triangle <= triangle).checked_sub(1)?;
@@ -215,9 +214,9 @@ impl<'m> LightSampler<'m> {
         (triangle - emitter.triangle <= u32::from(emitter.is_pair())).then_some((index, emitter))
     }
 
-    /// Draws the borders of lamps that shine towards `eye`, of those that `meets` does not rule out by the
-    /// centre and the radius of spheres around them; nothing where they are more than `most` triangles and
-    /// parallelograms.
+    /// Calls `draw` with the border edges of emitters that emit towards `eye`. `meets` rejects groups by the
+    /// centre and the radius of their bounding sphere. Draws nothing if more than `most` triangles and
+    /// parallelograms are left.
     pub(crate) fn borders(
         &self,
         mesh: &Mesh,
@@ -253,17 +252,17 @@ impl<'m> LightSampler<'m> {
         });
     }
 
-    /// Whether some are points or directional: no path meets these by chance.
+    /// True if there are point or directional lights, which no path hits.
     pub(crate) fn have_deltas(&self) -> bool {
         !self.points.is_empty() || !self.distant.is_empty()
     }
 
-    /// A triangle of emitter `light`.
+    /// Triangle of emitter `light`.
     pub(crate) fn triangle_of(&self, light: u32) -> Option<u32> {
         self.emitters.get(light as usize).map(|emitter| emitter.triangle)
     }
 
-    /// Light number `light` in the order of emission, if it is a point, a spot or directional.
+    /// Delta light number `light` in the order of emission; `None` for other kinds.
     #[inline]
     pub(super) fn without_surface<'s>(&self, scene: &Scene<'s>, light: usize) -> Option<&'s PointLight> {
         let mut all = self.points.iter().chain(self.distant);
@@ -271,8 +270,7 @@ impl<'m> LightSampler<'m> {
         scene.lights.get(*index as usize)
     }
 
-    /// The probability of [`LightSampler::sample`] for light `light`, one without surface, in the order of
-    /// emission.
+    /// Probability that [`LightSampler::sample`] chooses the delta light `light`, in the order of emission.
     pub(crate) fn probability(&self, light: u32, position: Vec3, normal: Vec3) -> f32 {
         let index = light as usize;
         let shares = self.shares(position, normal);
@@ -282,7 +280,7 @@ impl<'m> LightSampler<'m> {
         }
     }
 
-    /// The density of [`LightSampler::sample`] for the environment in unit `direction`.
+    /// Density of [`LightSampler::sample`] for the environment in unit `direction`.
     #[inline]
     pub fn pdf_escape(&self, scene: &Scene, position: Vec3, normal: Vec3, direction: Vec3) -> f32 {
         match (&self.environment, &scene.environment) {
@@ -297,19 +295,18 @@ impl<'m> LightSampler<'m> {
         }
     }
 
-    /// Whether there is more than one light to choose from; otherwise `u[2]` of [`LightSampler::sample`] does
-    /// not matter.
+    /// True with more than one light; otherwise `u[2]` of [`LightSampler::sample`] is unused.
     #[inline]
     pub fn have_choice(&self) -> bool {
         self.count() > 1
     }
 
-    /// Lights of all kinds, in the order of emission.
+    /// Number of lights of all kinds, in the order of emission.
     pub(super) fn count(&self) -> usize {
         self.near() + self.distant.len() + usize::from(self.environment.is_some())
     }
 
-    /// Those that are not infinitely far.
+    /// Number of lights at finite places.
     pub(super) fn near(&self) -> usize {
         self.in_tree()
     }
@@ -318,7 +315,7 @@ impl<'m> LightSampler<'m> {
         self.emitters.len() + self.points.len()
     }
 
-    /// Probabilities of the kinds at a point. Where there is only one kind nothing is computed.
+    /// Probabilities of the kinds at a point. With a single kind nothing is computed.
     #[inline]
     fn shares(&self, position: Vec3, normal: Vec3) -> Shares {
         let (sky, sun) = (self.environment_weight, self.distant_weight);
@@ -328,7 +325,7 @@ impl<'m> LightSampler<'m> {
         let near = if self.in_tree() == 0 { 0.0 } else { self.tree.importance(position, normal) };
         let kinds = [near, sky, sun].map(|weight| if weight > 0.0 { 1.0 } else { 0.0 });
         let count = kinds[0] + kinds[1] + kinds[2];
-        // Divided before they are added: the sum of three large floats must not overflow.
+        // Divided before the sum, because three large floats may overflow.
         let largest = near.max(sky).max(sun);
         let relative = [near, sky, sun].map(|weight| weight / largest);
         let by_weight = (1.0 - FLOOR * count) / (relative[0] + relative[1] + relative[2]);
@@ -390,7 +387,7 @@ fn sample_emitter(
     Some(LightSample { distance, target: Some(target), ..LightSample::far(direction, radiance, pdf, 0) })
 }
 
-/// Whether a surface with `normal` can be lit from `direction`.
+/// True if light from `direction` reaches the front of a surface with `normal`.
 #[inline]
 fn faces(normal: Vec3, direction: Vec3) -> bool {
     normal == Vec3::ZERO || normal.dot(direction) > 0.0

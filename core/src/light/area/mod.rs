@@ -1,6 +1,6 @@
-//! Emissive surfaces as lights: a triangle, or two that make a parallelogram and are sampled as one. Near
-//! lights are sampled by solid angle, far ones by area; the choice depends on the shaded point only, so that
-//! [`Emitter::pdf`] gives the density of [`Emitter::sample`] whoever found the point.
+//! Area lights: an emissive triangle, or two that make a parallelogram and are sampled as one. Near lights
+//! are sampled by solid angle, far ones by area. The choice depends on the shaded point only, so that
+//! [`Emitter::pdf`] is the density of [`Emitter::sample`] for a point found in any other way.
 
 mod rectangle;
 mod triangle;
@@ -13,19 +13,19 @@ use glam::Vec3;
 use rectangle::SphericalRectangle;
 use triangle::SphericalTriangle;
 
-/// A light whose radius is less than this fraction of its distance is sampled by area. On the Cornell box the
+/// A light whose radius is below this fraction of its distance is sampled by area. On the Cornell box the
 /// squared error of a sample grows by 5 %, and its time shrinks by a quarter.
 const FAR: f32 = 0.35;
 
-/// Steradians below which solid angles are too small to divide in single precision: a light may be near
-/// and still a sliver.
+/// Solid angle in steradians below which single precision cannot invert it. A light may be near and still a
+/// sliver.
 const SLIVER: f32 = 1e-3;
 
-/// Largest deviation from a parallelogram and from a right angle, as a fraction of the edges: far below what
-/// a density can show, far above the rounding of coordinates.
+/// Largest deviation from a parallelogram and from a right angle, as a fraction of the edges: far below a
+/// visible error of the density, far above the rounding of coordinates.
 const SHAPE_TOLERANCE: f32 = 1e-5;
 
-/// How the unit square lies on the light.
+/// Map of the unit square to the light.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Shape {
     Triangle,
@@ -33,35 +33,35 @@ enum Shape {
     Rectangle,
 }
 
-/// A flat light of one or two triangles: `origin + a * edges[0] + b * edges[1]`.
+/// Flat light of one or two triangles: `origin + a * edges[0] + b * edges[1]`.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C)]
 pub(super) struct Emitter {
     pub(super) origin: [f32; 3],
     pub(super) edges: [[f32; 3]; 2],
-    /// Unit, to the side that emits.
+    /// Unit normal of the emitting side.
     pub(super) normal: [f32; 3],
     pub(super) area: f32,
-    /// Index in the mesh; the other half of a parallelogram is the next one.
+    /// Index in the mesh. The other half of a parallelogram is the next triangle.
     pub(super) triangle: u32,
-    /// Squared distance up to which the light is near.
+    /// Squared distance below which the light is near.
     near: f32,
     /// Bits 0-1 shape, 2-3 and 4-5 the corners at `origin` and opposite to it, 6 two-sided, 7 textured.
     flags: u32,
 }
 
-/// Where on a light.
+/// Point on a light.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Place {
     pub(super) position: Vec3,
     pub(super) triangle: u32,
-    /// Weights of the second and third vertex.
+    /// Barycentric weights of the second and third vertex.
     pub(super) barycentric: [f32; 2],
 }
 
 impl Emitter {
-    /// The light of triangle `index`, together with the one after it where `pairs` says that it emits the
-    /// same and the two make a parallelogram. `None` where there is no area.
+    /// Light of triangle `index`, joined with the next triangle if `pairs` says that both emit alike and if
+    /// they make a parallelogram. `None` without area.
     pub(super) fn new(mesh: &Mesh, index: u32, pairs: bool, two_sided: bool, textured: bool) -> Option<Self> {
         let flags = u32::from(two_sided) << 6 | u32::from(textured) << 7;
         let pair = if pairs { Self::parallelogram(mesh, index) } else { None };
@@ -76,7 +76,7 @@ impl Emitter {
         if !(size > 0.0 && size < f32::INFINITY && corners[0].is_finite()) {
             return None;
         }
-        // In units of its size: products of tiny edges would underflow.
+        // In units of the size: products of tiny edges would underflow.
         let cross = (edges[0] / size).cross(edges[1] / size);
         let normal = cross.try_normalize()?;
         let halves = if shape == Shape::Triangle { 0.5 } else { 1.0 };
@@ -96,8 +96,7 @@ impl Emitter {
         })
     }
 
-    /// If triangles `index` and `index + 1` make a parallelogram: which corner of the first is not shared,
-    /// which of the second, and the shape.
+    /// If triangles `index` and `index + 1` make a parallelogram: the unshared corner of each, and the shape.
     fn parallelogram(mesh: &Mesh, index: u32) -> Option<(u32, u32, Shape)> {
         let (first, second) = (mesh.corners(index), mesh.corners(index.checked_add(1)?));
         for turn in 0..3 {
@@ -106,7 +105,7 @@ impl Emitter {
                 let [c, d, e] = rotated(second, other);
                 let (u, v) = (a - o, b - o);
                 let tolerance = SHAPE_TOLERANCE * u.length().min(v.length());
-                // The shared edge runs a → b in one and b → a in the other.
+                // The shared edge runs a → b in one triangle and b → a in the other.
                 if d == b && e == a && (c - (o + u + v)).length() <= tolerance {
                     let right = u.dot(v).abs() <= SHAPE_TOLERANCE * u.length() * v.length();
                     let shape = if right { Shape::Rectangle } else { Shape::Parallelogram };
@@ -123,7 +122,7 @@ impl Emitter {
         [o, o + u, o + v, o + u + v].into_iter().take(count)
     }
 
-    /// Its edges, between corners of the mesh: those of its neighbours are the same to the bit.
+    /// Edges between corners of the mesh, equal to the bit to those of neighbouring lights.
     pub(super) fn border(&self, mesh: &Mesh) -> impl Iterator<Item = [Vec3; 2]> + use<> {
         let [o, a, b] = rotated(mesh.corners(self.triangle), self.flags >> 2 & 3);
         let (last, count) = match self.is_pair() {
@@ -133,7 +132,8 @@ impl Emitter {
         [[o, a], [a, last], [last, if count == 4 { b } else { o }], [b, o]].into_iter().take(count)
     }
 
-    /// Whether its front is seen from `eye`, if any of its light goes there.
+    /// Some(true) if the front faces `eye`, Some(false) if the emitting back does; `None` if no light goes
+    /// there.
     pub(super) fn faces(&self, eye: Vec3) -> Option<bool> {
         let front = self.height(eye) > 0.0;
         (front || self.is_two_sided()).then_some(front)
@@ -164,7 +164,7 @@ impl Emitter {
         }
     }
 
-    /// Height of `point` over the plane, positive in front.
+    /// Height of `point` above the plane, positive in front.
     #[inline]
     fn height(&self, point: Vec3) -> f32 {
         (point - Vec3::from(self.origin)).dot(self.normal.into())
@@ -188,8 +188,8 @@ impl Emitter {
         SphericalTriangle::new(Vec3::from(self.origin), self.edges.map(Vec3::from), from)
     }
 
-    /// A point of the light as seen from `from`, and its density if that is one of solid angle; density
-    /// of area otherwise. `None` where the light turns its back.
+    /// Samples a point of the light as seen from `from`, with its density in solid angle; `None` in place of
+    /// the density means uniform in area. `None` if the light faces away.
     #[inline]
     pub(super) fn sample(&self, from: Vec3, u: [f32; 2]) -> Option<(Place, Option<f32>)> {
         let height = self.height(from);
@@ -210,8 +210,8 @@ impl Emitter {
         Some((self.place(at), None))
     }
 
-    /// Density in solid angle of [`Emitter::sample`] for a point of the light that is seen from `from` in
-    /// unit `direction` at `distance`.
+    /// Density of [`Emitter::sample`] in solid angle, for a point of the light in unit `direction` at
+    /// `distance` from `from`.
     #[inline]
     pub(super) fn pdf(&self, from: Vec3, direction: Vec3, distance: f32) -> f32 {
         let height = self.height(from);
@@ -231,11 +231,11 @@ impl Emitter {
         self.area_pdf(direction, distance)
     }
 
-    /// Uniform density of area, turned into one of solid angle.
+    /// Uniform density in area, converted to solid angle.
     #[inline]
     pub(super) fn area_pdf(&self, direction: Vec3, distance: f32) -> f32 {
         let cos = direction.dot(self.normal.into()).abs();
-        // In this order neither a tiny area nor a large distance overflows before the other meets it.
+        // This order avoids overflow of a tiny area and of a large distance.
         if cos > 0.0 { distance / (self.area * cos) * distance } else { 0.0 }
     }
 
@@ -246,7 +246,7 @@ impl Emitter {
         4.0 * f32::EPSILON * (Vec3::from(self.origin).abs().max(position.abs())).max_element()
     }
 
-    /// The point at edge coordinates `[a, b]`, and the triangle it lies on.
+    /// Point at edge coordinates `[a, b]`, and its triangle.
     #[inline]
     pub(super) fn place(&self, [a, b]: [f32; 2]) -> Place {
         let [o, u, v] = [self.origin, self.edges[0], self.edges[1]].map(Vec3::from);
@@ -255,13 +255,13 @@ impl Emitter {
             let weights = unrotated([1.0 - a - b, a, b], self.flags >> 2 & 3);
             return Place { position, triangle: self.triangle, barycentric: [weights[1], weights[2]] };
         }
-        // The second half: around its unshared corner, with the edges run backwards.
+        // The second half is relative to its unshared corner, with the edges reversed.
         let weights = unrotated([a + b - 1.0, 1.0 - a, 1.0 - b], self.flags >> 4 & 3);
         Place { position, triangle: self.triangle + 1, barycentric: [weights[1], weights[2]] }
     }
 }
 
-/// Corner `turn` first, the cyclic order kept.
+/// Rotates corner `turn` to the front.
 fn rotated<T: Copy>(c: [T; 3], turn: u32) -> [T; 3] {
     match turn {
         0 => c,
@@ -270,7 +270,7 @@ fn rotated<T: Copy>(c: [T; 3], turn: u32) -> [T; 3] {
     }
 }
 
-/// The inverse of [`rotated`].
+/// Inverse of [`rotated`].
 #[inline]
 fn unrotated<T: Copy>(c: [T; 3], turn: u32) -> [T; 3] {
     match turn {

@@ -1,18 +1,18 @@
-//! Rectangles seen from a point, sampled uniformly in solid angle (Ureña, Fajardo and King 2013, "An
-//! Area-Preserving Parametrization for Spherical Rectangles"). Keeps the stratification of the unit square.
+//! Uniform sampling of a rectangle's solid angle (Ureña, Fajardo and King 2013, "An Area-Preserving
+//! Parametrization for Spherical Rectangles"). The map preserves the stratification of the unit square.
 //!
-//! Departures: no inverse cosine is taken. The angles of the paper only ever appear as sums under sine and
-//! cosine, which are products of complex numbers; the one arc tangent is that of the solid angle, in a form
-//! (van Oosterom and Strackee 1983, for both triangles) that stays precise for small ones.
+//! Departure: no inverse cosines. The paper's angles occur only as sums under sine and cosine, which are
+//! products of complex numbers. The single arc tangent gives the solid angle, in a form that stays precise
+//! for small ones (van Oosterom and Strackee 1983, for both triangles).
 
 use crate::sampling::sin_cos_turns;
 use core::f32::consts::TAU;
 use glam::{Vec2, Vec3};
 
-/// A rectangle projected to the unit sphere around a point. x and y run along its edges; the plane lies at
-/// height `z` over the point. Lengths are in units of the largest coordinate.
+/// Rectangle projected to the unit sphere around a point. The axes x and y run along its edges; its plane
+/// lies at height `z` above the point. Lengths are in units of the largest coordinate.
 pub(super) struct SphericalRectangle {
-    /// Steradians.
+    /// Solid angle in steradians.
     pub(super) solid_angle: f32,
     x: [f32; 2],
     y: [f32; 2],
@@ -22,8 +22,8 @@ pub(super) struct SphericalRectangle {
 }
 
 impl SphericalRectangle {
-    /// The rectangle with a corner at `origin`, its two edges from there and its unit normal, seen from
-    /// `from`. `None` if that point lies in its plane or too near to tell.
+    /// Rectangle with corner `origin`, two edges and a unit normal, seen from `from`. `None` if that point
+    /// lies in its plane within rounding.
     #[inline]
     pub(super) fn new(origin: Vec3, [ex, ey]: [Vec3; 2], normal: Vec3, from: Vec3) -> Option<Self> {
         let (width, depth) = (ex.length(), ey.length());
@@ -37,8 +37,8 @@ impl SphericalRectangle {
             [(x[0], y[0]), (x[1], y[0]), (x[1], y[1]), (x[0], y[1])].map(|(x, y)| Vec3::new(x, y, z));
         let [l0, l1, l2, l3] = corners.map(Vec3::length);
         let [c0, c1, c2, c3] = corners;
-        // tan(Ω/2) of a triangle is the ratio of `volume` to its `sum`; the halves add as arguments of
-        // complex numbers. Both halves have the same volume.
+        // tan(Ω/2) of a triangle is the ratio of `volume` to its `sum`. The halves add as arguments of
+        // complex numbers. Both have the same volume.
         let volume = width * scale * (depth * scale) * z;
         let diagonal = c0.dot(c2) + l0 * l2;
         let sum_1 = diagonal * l1 + c0.dot(c1) * l2 + c1.dot(c2) * l0;
@@ -50,7 +50,7 @@ impl SphericalRectangle {
         Some(Self { solid_angle, x, y, z, lengths: [l0, l3] })
     }
 
-    /// Edge coordinates of a point of the rectangle.
+    /// Edge coordinates of a sampled point of the rectangle.
     #[inline]
     pub(super) fn sample(&self, u: [f32; 2]) -> [f32; 2] {
         let Self { x: [x0, x1], y: [y0, y1], z, .. } = *self;

@@ -1,40 +1,40 @@
-//! Triangles seen from a point, sampled uniformly in solid angle (Arvo 1995, in the form without inverse
-//! cosines of Peters 2021, "BRDF Importance Sampling for Polygonal Lights", section 4).
+//! Uniform sampling of a triangle's solid angle (Arvo 1995), in the form without inverse cosines (Peters
+//! 2021, "BRDF Importance Sampling for Polygonal Lights", section 4).
 
 use crate::sampling::sin_cos_turns;
 use core::f32::consts::TAU;
 use glam::Vec3;
 
-/// A triangle projected to the unit sphere around a point.
+/// Triangle projected to the unit sphere around a point.
 pub(super) struct SphericalTriangle {
-    /// Steradians.
+    /// Solid angle in steradians.
     pub(super) solid_angle: f32,
     /// Unit directions of the corners.
     v: [Vec3; 3],
-    /// The triple product of the corners: volume of the simplex times 6.
+    /// Triple product of the corner directions: six times the volume of the simplex.
     g0: f32,
     /// v0 · v2 + v1 · v2.
     g1: f32,
     /// 1 + v0 · v1.
     g2: f32,
-    /// The corner and the edges of the triangle, relative to the point and in units of `scale`.
+    /// First corner and edges of the triangle, relative to the point and scaled.
     p: Vec3,
     edges: [Vec3; 2],
 }
 
 impl SphericalTriangle {
-    /// The triangle `origin`, `origin + edges[0]`, `origin + edges[1]`, seen from `from`. `None` if that
-    /// point lies in its plane or too near to tell.
+    /// Triangle `origin`, `origin + edges[0]`, `origin + edges[1]`, seen from `from`. `None` if that point
+    /// lies in its plane within rounding.
     #[inline]
     pub(super) fn new(origin: Vec3, edges: [Vec3; 2], from: Vec3) -> Option<Self> {
         let p = origin - from;
-        // In units of the distance: products of three lengths would leave the range of floats.
+        // In units of the size: products of three lengths would leave the range of floats.
         let scale = 1.0 / p.abs().max(edges[0].abs()).max(edges[1].abs()).max_element();
         let (p, edges) = (p * scale, edges.map(|e| e * scale));
         let corners = [p, p + edges[0], p + edges[1]];
         let lengths = corners.map(Vec3::length);
         let product = lengths[0] * lengths[1] * lengths[2];
-        // The height keeps its precision where the triple product of directions would not.
+        // Edge vectors keep the precision that the triple product of directions loses.
         let g0 = p.dot(edges[0].cross(edges[1])).abs() / product;
         if !(product > 0.0 && g0 > 0.0) {
             return None;
@@ -47,16 +47,16 @@ impl SphericalTriangle {
         Some(Self { solid_angle, v, g0, g1, g2, p, edges })
     }
 
-    /// Edge coordinates of a point of the triangle.
+    /// Edge coordinates of a sampled point of the triangle.
     #[inline]
     pub(super) fn sample(&self, u: [f32; 2]) -> [f32; 2] {
         let [v0, v1, v2] = self.v;
-        // The third corner of the part v0, v1, c that has the fraction u0 of the solid angle, by the
-        // half vector of v0 and c.
+        // Third corner c of the part v0, v1, c that has the fraction u0 of the solid angle, by the half
+        // vector of v0 and c.
         let (sin, cos) = sin_cos_turns(0.5 * u[0] * self.solid_angle / TAU);
         let half = (self.g0 * cos - self.g1 * sin) * v0 + self.g2 * sin * v2;
         let c = (2.0 * v0.dot(half) / half.length_squared()) * half - v0;
-        // Along the arc from v1 to c, uniform in the cosine.
+        // A point of the arc from v1 to c, uniform in the cosine.
         let d = v1.dot(c);
         let s = 1.0 - u[1] * (1.0 - d);
         let t = libm::sqrtf((u[1] * (1.0 + s) / (1.0 + d)).max(0.0));
@@ -64,7 +64,7 @@ impl SphericalTriangle {
         self.meet(direction)
     }
 
-    /// Where the ray from the point in `direction` meets the triangle, kept inside it.
+    /// Intersection of the ray from the point in `direction` with the triangle, clamped to it.
     #[inline]
     fn meet(&self, direction: Vec3) -> [f32; 2] {
         let [e1, e2] = self.edges;

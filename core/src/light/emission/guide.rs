@@ -1,25 +1,25 @@
-//! The emission guide: a distribution over lights and cells of the square of random numbers that choose a
-//! direction. Emission samples it; it knows nothing of emission.
+//! Emission guide: a distribution over lights and over cells of the unit square whose random numbers choose
+//! the direction of emission.
 
 use crate::sampling::{AliasTable, ONE_MINUS_EPSILON};
 
-/// Cells by what they are worth. Those of a light follow each other.
+/// Distribution over cells by their benefit. The cells of a light are contiguous.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct EmissionGuide<'m> {
     table: AliasTable<'m>,
     side: usize,
 }
 
-/// Where a photon is to come from and to go.
+/// Light and cell that the guide chose for a photon.
 #[derive(Default)]
 pub(super) struct GuideSample {
     pub(super) light: usize,
     pub(super) cell: usize,
-    /// Numbers from here.
+    /// Cell from which to draw the random numbers; `None` without a guide.
     pub(super) square: Option<Cell>,
 }
 
-/// A cell of the square of random numbers.
+/// Cell of the unit square of random numbers.
 #[derive(Clone, Copy)]
 pub(super) struct Cell {
     corner: [f32; 2],
@@ -27,7 +27,7 @@ pub(super) struct Cell {
 }
 
 impl Cell {
-    /// The numbers at a place within.
+    /// Random numbers at the point `within` of the cell's own unit square.
     pub(super) fn at(&self, within: [f32; 2]) -> [f32; 2] {
         let Self { corner: [x, y], side } = *self;
         [x + within[0], y + within[1]].map(|u| (u / side).min(ONE_MINUS_EPSILON))
@@ -35,12 +35,12 @@ impl Cell {
 }
 
 impl<'m> EmissionGuide<'m> {
-    /// A distribution over `side` × `side` cells for each light.
+    /// Distribution over `side` × `side` cells for each light.
     pub(super) fn new(table: AliasTable<'m>, side: usize) -> Self {
         Self { table, side }
     }
 
-    /// A light and one of its cells, by what they are worth.
+    /// Samples a light and one of its cells.
     pub(super) fn pick(&self, choice: f32) -> Option<GuideSample> {
         let (cell, _, _) = self.table.sample(choice)?;
         let (light, own) = (cell / self.cells(), cell % self.cells());
@@ -49,7 +49,7 @@ impl<'m> EmissionGuide<'m> {
         Some(GuideSample { light, cell, square: Some(Cell { corner, side: side as f32 }) })
     }
 
-    /// The density of `light` times that of the numbers of `place`, which aim its photon.
+    /// Probability of `light` times the density of the random numbers `place` that direct its photon.
     pub(super) fn density(&self, light: usize, place: [f32; 2]) -> f32 {
         let cells = self.cells();
         self.table.pdf(light * cells + cell(self.side, place)) * cells as f32

@@ -1,10 +1,10 @@
-//! Learning of the emission guide. The square of random numbers that decides the direction of a photon is cut
-//! into cells for each light. Cells are chosen by the benefit of earlier photons from them (guided emission
-//! in primary sample space, as in Grittmann et al. 2018). Every cell keeps some probability, so that each
-//! light that shines has photons.
+//! Learning of the emission guide. The unit square of random numbers that determine the direction of a photon
+//! is divided into cells for each light. Cells are chosen by the benefit of earlier photons from them (guided
+//! emission in primary sample space, as in Grittmann et al. 2018). Every cell keeps some probability, so that
+//! every light that shines emits photons.
 //!
-//! For photons of caustics, cells that lead to mirrors and glass are preferred from the start. For photons of
-//! all light there is nothing to aim at: cells are fewer, and their benefit is learned alone.
+//! Photons of caustics prefer cells that lead to casters from the start. Photons of all light have no target:
+//! their cells are fewer, and the benefit is only learned.
 
 use super::EmissionSampler;
 use super::guide::EmissionGuide;
@@ -14,65 +14,64 @@ use crate::sampling::{AliasTable, Sampler};
 use crate::scene::{Material, Scene};
 use glam::Vec3;
 
-/// Cells along a side of the square of a light, at most, and of all squares together where there are many
-/// lights.
+/// Largest number of cells along a side of a light's square, and of all cells together with many lights.
 const MOST_SIDE: usize = 64;
 const MOST_CELLS: usize = 1 << 16;
 
-/// Shares of emission: aimed nowhere; where mirrors and glass are; the rest where photons were seen to be
-/// useful.
+/// Shares of emission: by power over all cells, and towards casters. The rest follows the learned benefit.
 const DEFENSIVE: f32 = 0.1;
 const AIMED: f32 = 0.2;
 
-/// The same where photons of all light are wanted: by power, so that none has more than four times that of
-/// the others; evenly from lights by what they are worth.
+/// Shares of emission for photons of all light: by power, so that no photon has more than four times the mean
+/// power; and evenly over the cells of each light by its total benefit.
 const DEFENSIVE_OF_ALL: f32 = 0.25;
 const EVENLY_OF_ALL: f32 = 0.25;
 
-/// Cells of all squares together there, where lights are few, so that each is learned from many photons.
+/// Largest number of cells for photons of all light: few, so that each is learned from many photons.
 const CELLS_OF_ALL: usize = 1 << 10;
 
-/// What a cell gets of what each of its neighbours was worth.
+/// Weight of the benefit of each neighbouring cell.
 const BESIDE: f32 = 0.125;
 
-/// Points on mirrors and glass that are aimed at, over all lights together, at most for each light, and at
-/// least for each of its cells: of thousands of lights each has a few cells only.
+/// Target points on casters: over all lights together, at most for each light, and at least for each of its
+/// cells. With thousands of lights each has only a few cells.
 const AIMS: usize = 1 << 17;
 const MOST_AIMS: usize = 1 << 14;
 const FEWEST_AIMS: usize = 2;
 
-/// Cells around a point that count as aimed at with it.
+/// Cells around the cell of a target point that count as aimed at.
 const AROUND: isize = 1;
 
-/// What the cells of all lights are worth, while that is being learned.
+/// Benefit of the cells of all lights, while it is being learned.
 pub struct GuideStats<'m> {
-    /// 1 where mirrors and glass are, or by what all of a light is worth, times its power.
+    /// 1 for cells that lead to casters; with [`GuideStats::even_out`] the total benefit of the light over
+    /// its power.
     aimed: &'m mut [f32],
-    /// What photons were worth.
+    /// Sum of the benefit of photons.
     learned: &'m mut [f32],
     side: usize,
-    /// Shares of emission: aimed nowhere, and at `aimed`.
+    /// Shares of emission: by power, and by `aimed`.
     shares: [f32; 2],
 }
 
 impl<'m> GuideStats<'m> {
-    /// Cells that [`GuideStats::of_all`] has.
+    /// Number of cells of [`GuideStats::of_all`].
     fn cells_of_all(lights: &LightSampler) -> usize {
         let side = side(lights.count(), CELLS_OF_ALL);
         lights.count() * side * side
     }
 
-    /// Bytes that [`GuideStats::of_all`] takes together with [`GuideStats::guide`].
+    /// Bytes of [`GuideStats::of_all`] together with [`GuideStats::guide`].
     pub fn footprint_of_all(lights: &LightSampler) -> Footprint {
         let cells = Self::cells_of_all(lights);
         let worth = Footprint::default().slice::<f32>(cells).slice::<f32>(cells);
         worth.and(AliasTable::footprint(cells))
     }
 
-    /// For photons of all light: by power, as long as nothing was learned.
+    /// Statistics for photons of all light. The guide follows power until something is learned.
     ///
     /// # Errors
-    /// [`OutOfMemory`] where the arena has less than [`GuideStats::footprint_of_all`].
+    /// [`OutOfMemory`] if the arena has less than [`GuideStats::footprint_of_all`].
     pub fn of_all(lights: &LightSampler, arena: &mut Arena<'m>) -> Result<Self, OutOfMemory> {
         let cells = Self::cells_of_all(lights);
         let (aimed, learned) = (arena.slice::<f32>(cells)?, arena.slice::<f32>(cells)?);
@@ -82,28 +81,28 @@ impl<'m> GuideStats<'m> {
         Ok(Self { aimed, learned, side, shares: [DEFENSIVE_OF_ALL, EVENLY_OF_ALL] })
     }
 
-    /// A part of the photons of all light comes evenly from each light by what it was worth altogether, as
-    /// far as that was learned: few have looked.
+    /// Sends a share of the photons of all light evenly over the cells of each light, by the light's total
+    /// benefit. Few photons taught the single cells.
     pub fn even_out(&mut self, emission: &EmissionSampler) {
         let of_light = (self.side * self.side).max(1);
         let lights = self.aimed.chunks_mut(of_light).zip(self.learned.chunks(of_light));
         for (light, (aimed, learned)) in lights.enumerate() {
-            // By its power once more, as what is aimed at is.
+            // [`GuideStats::guide`] multiplies by power again.
             let worth = learned.iter().sum::<f32>() / emission.table.pdf(light);
             aimed.fill(if worth.is_finite() { worth } else { 0.0 });
         }
     }
 
-    /// Bytes that [`GuideStats::aimed`] takes.
+    /// Bytes of [`GuideStats::aimed`].
     pub fn footprint(lights: &LightSampler) -> Footprint {
         let cells = cells(lights);
         Footprint::default().slice::<f32>(cells).slice::<f32>(cells)
     }
 
-    /// Aims at everything that mirrors or refracts. `None` where there is nothing such, or no light.
+    /// Statistics that aim at all casters. `None` without casters or lights.
     ///
     /// # Errors
-    /// [`OutOfMemory`] where the arena has less than [`GuideStats::footprint`].
+    /// [`OutOfMemory`] if the arena has less than [`GuideStats::footprint`].
     pub fn aimed(
         scene: &Scene,
         lights: &LightSampler,
@@ -138,28 +137,28 @@ impl<'m> GuideStats<'m> {
         Ok(any.then_some(Self { aimed, learned, side, shares: [DEFENSIVE, AIMED] }))
     }
 
-    /// The same for photons that have all of their light, with no paths beside them: as many go by power as
-    /// of all light, so that none has more than four times that of the others.
+    /// Statistics for photons that alone carry their light, without other paths: the share by power is that
+    /// of photons of all light, so that no photon has more than four times the mean power.
     pub fn alone(self) -> Self {
         Self { shares: [DEFENSIVE_OF_ALL, AIMED], ..self }
     }
 
-    /// A photon from `cell` was worth so much.
+    /// Adds the benefit `worth` of a photon from `cell`.
     pub fn learn(&mut self, cell: u32, worth: f32) {
         if let Some(slot) = self.learned.get_mut(cell as usize).filter(|_| worth.is_finite()) {
             *slot += worth;
         }
     }
 
-    /// Whether any photon was worth anything.
+    /// True if any photon had a benefit.
     pub fn is_any(&self) -> bool {
         self.learned.iter().any(|&worth| worth > 0.0)
     }
 
-    /// `emission` by what is known so far. `arena` needs [`GuideStats::guide_footprint`].
+    /// `emission` with a guide by the benefit so far. `arena` needs [`GuideStats::guide_footprint`].
     ///
     /// # Errors
-    /// [`OutOfMemory`] where it has less.
+    /// [`OutOfMemory`] if the arena has less.
     pub fn guide<'g>(
         &self,
         emission: &EmissionSampler<'g>,
@@ -183,7 +182,7 @@ impl<'m> GuideStats<'m> {
         Ok(EmissionSampler { guide: Some(EmissionGuide::new(table, side)), ..*emission })
     }
 
-    /// What was learned around cell `i`: what few photons have seen may go on beside it.
+    /// Benefit of cell `i` and part of that of its neighbours: few photons show only part of what is useful.
     fn spread(&self, i: usize) -> f32 {
         let side = self.side;
         let of_light = side * side;
@@ -200,13 +199,13 @@ impl<'m> GuideStats<'m> {
         sum
     }
 
-    /// Bytes that [`GuideStats::guide`] takes.
+    /// Bytes of [`GuideStats::guide`].
     pub fn guide_footprint(lights: &LightSampler) -> Footprint {
         AliasTable::footprint(cells(lights))
     }
 }
 
-/// Cells along a side, for so many lights, of `most` cells in all.
+/// Cells along a side for this number of lights, with at most `most` cells in all.
 fn side(lights: usize, most: usize) -> usize {
     let mut side = MOST_SIDE;
     while side > 1 && lights.saturating_mul(side * side) > most {
@@ -220,7 +219,7 @@ fn cells(lights: &LightSampler) -> usize {
     lights.count() * side * side
 }
 
-/// Shows about `count` points, evenly spread over all surfaces that throw caustics.
+/// Calls `show` with about `count` points, evenly spread over all surfaces that cast caustics.
 fn throwing_points(scene: &Scene, count: usize, mut show: impl FnMut(u32, Vec3)) {
     let area = |index: u32| {
         let [a, b, c] = scene.mesh.corners(index);

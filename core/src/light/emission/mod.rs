@@ -1,8 +1,8 @@
-//! Light as it leaves: all lights together as the source of photons. One is chosen by its power, a place on
-//! it and a direction by what it emits there; what a photon carries is the power over the density of all
-//! that, so that the powers of photons sum up to that of the lights.
+//! Emission of photons from all lights of a scene. A light is chosen by its power, then a point on it and a
+//! direction by its emission. The power of a photon is the emitted power over the density of all choices, so
+//! that the powers of photons sum to the power of the lights.
 //!
-//! Light from infinitely far is sent through the disc that the scene's bounding sphere shows to it.
+//! Infinite light enters through the disc that the scene's bounding sphere presents to it.
 
 mod guide;
 mod learning;
@@ -27,39 +27,40 @@ use core::f32::consts::{PI, TAU};
 use glam::Vec3;
 use guide::{EmissionGuide, GuideSample};
 
-/// Dimensions of the sampler of a photon that its emission takes: from 0 on so many.
+/// Dimensions of a photon's sampler that emission uses, from 0 on.
 pub const DIMENSIONS: u32 = 3;
 const CHOICE: u32 = 0;
 const PLACE: u32 = 1;
 const DIRECTION: u32 = 2;
 
-/// By how much the bounding sphere is larger than the scene, so that rounding puts nothing outside of it.
+/// Factor on the radius of the bounding sphere, so that rounding leaves nothing outside.
 const AROUND: f32 = 1.0 + 1e-5;
 
-/// A photon on its way from a light.
+/// Photon that leaves a light.
 #[derive(Clone, Copy, Debug)]
 pub struct EmissionSample {
-    /// From the light.
+    /// Ray from the light.
     pub ray: Ray,
-    /// W: what it carries if it is the only one.
+    /// Power in W if the photon is the only one.
     pub power: Rgb,
-    /// The triangle that it leaves; [`MISS`] where it is none.
+    /// Triangle that the photon leaves; [`MISS`] without one.
     pub triangle: u32,
-    /// Which light it leaves, in the order of the table.
+    /// Light that the photon leaves, in the order of emission.
     pub(crate) light: u32,
-    /// From which cell of the guide, where there is one.
+    /// Cell of the guide that chose the photon, if there is a guide.
     pub(crate) cell: u32,
 }
 
-/// The lights of a scene as a source of photons.
+/// Lights of a scene as a source of photons.
 #[derive(Clone, Copy, Debug)]
 pub struct EmissionSampler<'m> {
-    /// Emitters, points and spots, directional lights, the environment, by their power.
+    /// Emitters, points and spots, directional lights, the environment, by their power: the order of
+    /// emission.
     pub(super) table: AliasTable<'m>,
     pub(super) center: Vec3,
-    /// Of the bounding sphere.
+    /// Radius of the bounding sphere.
     pub(super) radius: f32,
-    /// Where photons are wanted.
+    /// Learned distribution of useful photons.
     guide: Option<EmissionGuide<'m>>,
 }
 
@@ -69,10 +70,10 @@ impl<'m> EmissionSampler<'m> {
         AliasTable::footprint(lights.count())
     }
 
-    /// For the lights of a scene within `bounds`.
+    /// Sampler for the lights of a scene within `bounds`.
     ///
     /// # Errors
-    /// [`OutOfMemory`] where the arena has less than [`EmissionSampler::footprint`].
+    /// [`OutOfMemory`] if the arena has less than [`EmissionSampler::footprint`].
     pub fn build(
         scene: &Scene,
         lights: &LightSampler,
@@ -84,12 +85,12 @@ impl<'m> EmissionSampler<'m> {
         let radius = 0.5 * diagonal * AROUND;
         let power = |i| power(scene, lights, radius, i);
         let largest = (0..lights.count()).map(power).fold(0.0, f64::max);
-        // Relative, so that f32 holds them.
+        // Relative to the largest, to fit into f32.
         let relative = |i| if largest > 0.0 { (power(i) / largest) as f32 } else { 0.0 };
         Ok(Self { table: AliasTable::build(lights.count(), relative, arena)?, center, radius, guide: None })
     }
 
-    /// The photon of `numbers`. `None` where it leaves no light, or none shines.
+    /// Photon of the random `numbers`. `None` without light, or without power.
     pub fn emit<N: Numbers>(
         &self,
         scene: &Scene,
@@ -102,7 +103,8 @@ impl<'m> EmissionSampler<'m> {
             None => GuideSample { light: self.table.sample(choice)?.0, ..GuideSample::default() },
             Some(guide) => guide.pick(choice)?,
         };
-        // Light from infinitely far goes its way; what is aimed is where it comes through.
+        // The guide controls the direction of light from finite places, and the entry point of light from
+        // infinity.
         let aiming = if light < lights.near() { &mut direction } else { &mut place };
         *aiming = square.map_or(*aiming, |square| square.at(*aiming));
         let square = square.map(|_| *aiming);
@@ -126,9 +128,9 @@ impl<'m> EmissionSampler<'m> {
         })
     }
 
-    /// The density of light `light`, in the order of the table, times that of the numbers that aim its
-    /// photon; 1 / area and the like are not in it. The photon goes along unit `way` from the place `on` of
-    /// the light, or comes through `on` from infinitely far.
+    /// Probability of `light`, in the order of emission, times the density of the random numbers that direct
+    /// its photon. Factors such as 1 / area are left out. The photon leaves the point `on` of the light along
+    /// unit `way`, or enters through `on` from infinity.
     pub(super) fn density(
         &self,
         scene: &Scene,
@@ -140,7 +142,7 @@ impl<'m> EmissionSampler<'m> {
         self.density_with(scene, lights, light, (way, on), None)
     }
 
-    /// The same, where the numbers may be known.
+    /// As [`EmissionSampler::density`], with the random numbers if they are `known`.
     fn density_with(
         &self,
         scene: &Scene,
@@ -154,7 +156,7 @@ impl<'m> EmissionSampler<'m> {
         square.map_or(0.0, |square| guide.density(light, square))
     }
 
-    /// The numbers that aim a photon of light `light` along unit `way` through `to`.
+    /// Random numbers that direct a photon of `light` along unit `way` through `to`.
     fn square(
         &self,
         scene: &Scene,
@@ -187,8 +189,8 @@ impl<'m> EmissionSampler<'m> {
         }
     }
 
-    /// The numbers that aim a photon of light `light` at `target`, from anywhere on it; `None` where it does
-    /// not shine there.
+    /// Random numbers that direct a photon of `light` at `target`, from a random point on the light; `None`
+    /// if it does not emit towards it.
     pub(super) fn aim(
         &self,
         scene: &Scene,
@@ -242,7 +244,8 @@ impl<'m> EmissionSampler<'m> {
         }
     }
 
-    /// Parallel light of `irradiance`, through a point of the disc that the scene shows to it.
+    /// Parallel light of `irradiance`, through a point of the disc that the scene's bounding sphere presents
+    /// to it.
     fn parallel(&self, direction: Vec3, irradiance: Rgb, place: [f32; 2]) -> Option<EmissionSample> {
         let frame = Frame::from_normal(direction);
         let across = frame.to_world((concentric_disk(place) * self.radius).extend(-self.radius));
@@ -263,7 +266,7 @@ fn from_surface(
     [a, b]: [f32; 2],
     direction: [f32; 2],
 ) -> Option<EmissionSample> {
-    // Of a two-sided light the first half of the numbers is for its front.
+    // The first half of the numbers belongs to the front of a two-sided light.
     let sides = if emitter.is_two_sided() { 2.0 } else { 1.0 };
     let front = sides * a < 1.0 || sides == 1.0;
     let a = if sides == 1.0 { a } else { 2.0 * a - if front { 0.0 } else { 1.0 } };
@@ -284,7 +287,7 @@ fn from_surface(
     })
 }
 
-/// The luminance of the power of light `i`, or about that.
+/// Approximate luminance of the power of light `i`.
 fn power(scene: &Scene, lights: &LightSampler, radius: f32, i: usize) -> f64 {
     const PI: f64 = core::f64::consts::PI;
     let disc = PI * f64::from(radius) * f64::from(radius);
@@ -309,7 +312,7 @@ mod tests {
     use crate::scene::{Camera, Environment, Material, Mesh, Triangle};
     use std::vec;
 
-    /// A unit square light that faces +z, with `material`.
+    /// Unit square light that faces +z, with `material`.
     fn with_square(material: Material, check: impl FnOnce(&Scene)) {
         let positions = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]];
         let triangles = [[0, 1, 2], [0, 2, 3]].map(|vertices| Triangle { vertices, material: 0 });
@@ -325,7 +328,7 @@ mod tests {
         });
     }
 
-    /// The mean power of photons, each of which is shown to `look`.
+    /// Mean power of photons; calls `look` with each.
     fn mean_power(scene: &Scene, mut look: impl FnMut(&EmissionSample)) -> Rgb {
         const PHOTONS: u32 = 1 << 16;
         let bounds = Bounds { min: Vec3::splat(-1.0), max: Vec3::splat(1.0) };
@@ -350,7 +353,7 @@ mod tests {
         Rgb::from_array(sum.map(|sum| (sum / f64::from(PHOTONS)) as f32))
     }
 
-    /// Relative, of the mean of 65 536 stratified photons.
+    /// Relative error of the mean of 65 536 stratified photons.
     const NOISE: f32 = 2e-3;
 
     fn assert_near(power: Rgb, expected: Rgb) {
@@ -384,7 +387,7 @@ mod tests {
         let color = Rgb::new(0.5, 1.0, 2.0);
         let (cos_inner, cos_outer) = (0.9, 0.8);
         let direction = Vec3::new(0.6, 0.0, 0.8);
-        // The integral over the cone where intensity falls linearly in the angle, by small steps.
+        // Integral of the linear falloff in angle, by small steps.
         let (inner, outer) = (0.9f32.acos(), 0.8f32.acos());
         let step = (outer - inner) / 4096.0;
         let falling: f32 = (0..4096)
@@ -411,7 +414,7 @@ mod tests {
             let scene = Scene { environment: Some(environment), ..*scene };
             let from_sky = 4.0 * PI * disc;
             assert_near(mean_power(&scene, |_| {}), color * from_sky);
-            // All of them together, each by its share.
+            // All lights together, each by its share.
             let lights = cases.map(|(light, _)| light);
             let power = mean_power(&Scene { lights: &lights, ..scene }, |emitted| {
                 assert!(emitted.ray.origin.iter().all(|x| x.abs() < 3.0));

@@ -1,9 +1,8 @@
-//! How densely emission covers what paths from the eye find: what multiple importance sampling between the
-//! two needs.
+//! Density of emission at paths from the camera, for MIS between light paths and camera paths.
 //!
-//! A light path leaves its light at x₀ into ω with density p(x₀) p(ω), of which the étendue dA cos θ dω takes
-//! p(x₀) p(ω) / cos θ. The étendue is kept on the way, so the same number, over the density of the direction
-//! in which a path from the eye meets x₀, tells how much likelier one is than the other
+//! A light path leaves its light at x₀ into ω with density p(x₀) p(ω). The étendue dA cos θ dω therefore has
+//! density p(x₀) p(ω) / cos θ. Étendue is invariant along the path. The same number over the density of the
+//! direction in which a camera path hits x₀ is the ratio of the densities of both paths
 //! (`transport/caustics/merge.rs`).
 
 use super::EmissionSampler;
@@ -13,31 +12,31 @@ use crate::scene::{PointLight, Scene};
 use core::f32::consts::{FRAC_1_PI, PI};
 use glam::Vec3;
 
-/// How paths from the eye can find a light.
+/// Kinds of light by the techniques of camera paths that find them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum LightType {
-    /// By chance, or by next-event estimation: it has a surface.
+    /// Light with a surface, found by hits and by next-event estimation.
     Area,
-    /// The same, in the sky.
+    /// Environment, found by escape and by next-event estimation.
     Infinite,
-    /// By next-event estimation alone: it has no extent.
+    /// Light without extent, found by next-event estimation alone.
     Delta,
 }
 
 impl LightSampler<'_> {
-    /// The number of the emitter that `triangle` is a part of.
+    /// Density of emissive `triangle` at `place` in unit direction `way`, per m² sr of étendue.
     pub(crate) fn emitter_index(&self, triangle: u32) -> Option<u32> {
         self.emitter_of(triangle).map(|(index, _)| index as u32)
     }
 
-    /// The number of the environment among all lights: the last.
+    /// Density of emitter `index` at `place` in unit direction `way`, per m² sr of étendue.
     pub(crate) fn environment_index(&self) -> u32 {
         (self.near() + self.distant.len()) as u32
     }
 }
 
 impl EmissionSampler<'_> {
-    /// Of an emissive `triangle` at `place` in unit direction `way`: per m² sr of étendue.
+    /// Density of the environment in unit `direction` from `position`, per m² sr of étendue.
     pub(crate) fn density_of_surface(
         &self,
         scene: &Scene,
@@ -50,7 +49,7 @@ impl EmissionSampler<'_> {
             .map_or(0.0, |(index, _)| self.density_of_emitter(scene, lights, index, (place, way)))
     }
 
-    /// Of emitter `index` at `place` in unit direction `way`: per m² sr of étendue.
+    /// Density of a light without extent at `position`, per m² of surface that faces it.
     pub(crate) fn density_of_emitter(
         &self,
         scene: &Scene,
@@ -63,7 +62,7 @@ impl EmissionSampler<'_> {
         self.density(scene, lights, index, way, place) * FRAC_1_PI / (emitter.area * sides)
     }
 
-    /// Of the environment in unit `direction`, seen from `position`: per m² sr of étendue.
+    /// Density of the light of `sample`, drawn at `position`, in the unit of its [`LightType`].
     pub(crate) fn density_of_sky(
         &self,
         scene: &Scene,
@@ -81,7 +80,7 @@ impl EmissionSampler<'_> {
         }
     }
 
-    /// Of a light without extent, seen from `position`: per m² of surface that faces it.
+    /// Type of `light`, in the order of emission.
     pub(crate) fn density_of_choice(
         &self,
         scene: &Scene,
@@ -104,7 +103,7 @@ impl EmissionSampler<'_> {
         self.density(scene, lights, index, way.normalize_or_zero(), on) * density
     }
 
-    /// Of the light of `sample`, which was drawn at `position`: for each density of the sample.
+    /// Density per area of the disc through which infinite light enters.
     pub(crate) fn density_of_sample(
         &self,
         scene: &Scene,

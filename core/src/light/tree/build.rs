@@ -1,4 +1,5 @@
-//! Building of a light tree: splits by the surface area orientation heuristic, three levels to a node.
+//! Build of the light tree: splits by the surface area orientation heuristic (SAOH), three binary levels to a
+//! node.
 
 use super::importance::{GROUPS, LightBounds};
 use super::{LEAF, LEVELS, Node, Tree, WAITING};
@@ -7,13 +8,13 @@ use crate::geometry::{Bounds, Cone};
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
-/// Bins of the split search, for each axis.
+/// Bins of the split search on each axis.
 const BINS: usize = 12;
 
-/// From this depth on nodes are halved by count, so that no path is longer than the bits of a trail.
+/// Depth from which nodes are halved by count, so that no path exceeds the bits of a trail.
 const DEPTH_OF_HALVING: u32 = 30;
 
-/// A light that is to go into a tree: scratch memory of the build.
+/// Light to be put into a tree: working memory of the build.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C)]
 pub(in crate::light) struct Item {
@@ -35,7 +36,7 @@ impl Item {
 }
 
 impl<'m> Tree<'m> {
-    /// Over `items`, whose order changes. Their `light`s are 0 … `items.len()` - 1, each once.
+    /// Tree over `items`, which are reordered. Their `light`s are 0 … `items.len()` - 1, each once.
     pub(in crate::light) fn build(items: &mut [Item], nodes: &'m mut [Node], trails: &'m mut [u64]) -> Self {
         let whole = items.iter().fold(Sum::NONE, |sum, item| sum.and(Sum::of(item)));
         let whole = if items.is_empty() { LightBounds::default() } else { whole.group(items) };
@@ -70,20 +71,19 @@ impl<'m> Tree<'m> {
     }
 }
 
-/// A range of items that waits for its node.
+/// Range of items that waits for its node.
 #[derive(Clone, Copy, Default)]
 struct Work {
     start: usize,
     end: usize,
     node: usize,
-    /// Bits of the trail, as many as the binary tree is deep.
+    /// Depth in the binary tree, which is the number of bits of the trail.
     depth: u32,
     trail: u64,
 }
 
 impl Work {
-    /// The ranges of [`LEVELS`] branchings; which way each goes is a bit of its number, that of the first one
-    /// lowest.
+    /// Ranges after [`LEVELS`] binary splits. Bit i of a range's number is its side of split i.
     fn parts(&self, items: &mut [Item]) -> [(usize, usize); GROUPS] {
         let mut parts = [(0, 0); GROUPS];
         parts[0] = (self.start, self.end);
@@ -103,11 +103,11 @@ impl Work {
     }
 }
 
-/// Some items together.
+/// Sum over some items.
 #[derive(Clone, Copy)]
 struct Sum {
     bounds: Bounds,
-    /// Axes times powers; a light that shines everywhere adds nothing.
+    /// Sum of axes times powers; a light that emits in all directions adds nothing.
     axis: Vec3,
     power: f32,
     count: usize,
@@ -130,38 +130,38 @@ impl Sum {
         }
     }
 
-    /// The group of `items`, whose sum this is.
+    /// Light bounds of `items`, whose sum this is.
     fn group(&self, items: &[Item]) -> LightBounds {
         LightBounds::new(&self.bounds, self.cone(items), self.power)
     }
 
-    /// A cone around the mean axis that holds those of all `items`.
+    /// Cone around the mean axis that contains the cones of all `items`.
     fn cone(&self, items: &[Item]) -> Cone {
         if let [item] = items {
             return item.cone;
         }
         let Some(axis) = (self.axis / self.power).try_normalize() else { return Cone::ALL };
         let cos = items.iter().fold(1f32, |cos, item| cos.min(item.cone.cos_around(axis)));
-        // A little wider, against the rounding of axes.
+        // A margin for the rounding of axes.
         Cone { axis: axis.to_array(), cos: (cos - 1e-5).max(-1.0) }
     }
 
     /// Power times the measures of directions and space (M_Ω and M_A of eq. 1).
     fn cost(&self, unit: f32) -> f32 {
-        // The mean of unit axes has the length (1 + cos θ) / 2 where they fill a cone of half-angle θ.
+        // The mean of unit axes has length (1 + cos θ) / 2 if they fill a cone of half-angle θ.
         let cos = 2.0 * (self.axis.length() / self.power) - 1.0;
-        // M_Ω for lights that shine into half-spaces: a quadratic through π, 2π + π²/2 and 4π at cosines
-        // of 1, 0 and -1.
+        // M_Ω of lights that emit into half-spaces: a quadratic through π, 2π + π²/2 and 4π at cosines of 1,
+        // 0 and -1.
         let directions = 11.218 - (4.712 + 3.365 * cos) * cos;
         let e = self.bounds.extent() / unit;
-        // Lines and points of lights have no area and still a size.
+        // Lights on a line or at a point have no area, but extent.
         let area = e.x * (e.y + e.z) + e.y * e.z + 1e-3 * e.length_squared();
         self.power * directions * area
     }
 }
 
-/// Orders `items` into two parts and returns the size of the first: the best of [`BINS`] planes for each
-/// axis by the surface area orientation heuristic (SAOH, eq. 2 of the paper), or halves where none divides.
+/// Partitions `items` and returns the size of the first part: the best of [`BINS`] planes on each axis by the
+/// surface area orientation heuristic (SAOH, eq. 2 of the paper), or halves if no plane divides them.
 fn split(items: &mut [Item], whole: &Sum, depth: u32) -> usize {
     let half = items.len() / 2;
     let extent = whole.bounds.extent();
@@ -213,7 +213,7 @@ fn bin_of(item: &Item, bounds: &Bounds, axis: usize) -> usize {
     ((place * BINS as f32) as usize).min(BINS - 1)
 }
 
-/// Those of which `first` holds to the front; how many they are.
+/// Moves the items of which `first` holds to the front; returns their number.
 fn partition(items: &mut [Item], first: impl Fn(&Item) -> bool) -> usize {
     let mut middle = 0;
     for i in 0..items.len() {

@@ -1,36 +1,36 @@
-//! Bounds of a group of lights (position, directions, power) and the importance of the group for a point
+//! Bounds of a group of lights (position, directions, power) and the importance of the group at a point
 //! (Conty Estevez and Kulla 2018, "Importance Sampling of Many Lights with Adaptive Tree Splitting", section
-//! 4). The same code weighs one group or eight, with equal bits.
+//! 4). The same code evaluates one group or eight, with equal bits.
 //!
-//! Departure: cosines are averaged over a group; the paper takes their maximum (docs/decisions/0059).
+//! Departure: cosines are averaged over a group, whereas the paper takes their maximum (docs/decisions/0059).
 
 use crate::geometry::{Bounds, Cone};
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 use halflight_simd::{Lanes, Simd, dot};
 
-/// Importances are kept below this, so that their sums stay finite at a point on a light.
+/// Upper limit of importances, so that their sums stay finite at a point on a light.
 const LARGEST: f32 = 1e30;
 
-/// The mean of max(cos, 0) for cosines of mean µ and variance σ² is approximated by (µ + √(µ² + k σ²)) / 2
-/// with this k: right for all directions at once, and for a hemisphere seen from its side.
+/// Coefficient k of the approximation (µ + √(µ² + k σ²)) / 2 to the mean of max(cos, 0) for cosines of mean µ
+/// and variance σ². Exact for all directions at once, and for a hemisphere seen from its side.
 const CLAMPED: f32 = 0.75;
 
-/// k σ² of the cosines to points of a ball that is seen under a half-angle of sine 1: right for a ball on the
+/// k σ² of the cosines to points of a ball that is seen under a half-angle of sine 1. Exact for a ball on the
 /// horizon.
 const SPREAD: f32 = 0.14;
 
-/// The mean of max(cos, 0) over all directions, for lights that shine everywhere.
+/// Mean of max(cos, 0) over all directions, for lights that emit in all directions.
 const ALL_AROUND: f32 = 0.25;
 
-/// Lower limit of a cosine, as a share of its largest possible value.
+/// Lower limit of a cosine, as a fraction of its largest possible value.
 const LEAST: f32 = 0.1;
 
-/// Groups that are weighed at once.
+/// Groups that are evaluated at once.
 pub(super) const GROUPS: usize = 8;
 
-/// A bounding sphere, a cone that holds the normals, and the power of some lights; or those of several
-/// groups, in lanes. Every light is taken to shine into the half-space around its normal.
+/// Bounding sphere, cone of normals, and power of some lights; or those of several groups, in lanes. Every
+/// light is assumed to emit into the half-space around its normal.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct LightBounds<L = f32> {
     center: [L; 3],
@@ -38,12 +38,13 @@ pub(super) struct LightBounds<L = f32> {
     axis: [L; 3],
     sin_cone: L,
     cos_cone: L,
-    /// Luminance times area, of both sides if both shine, or luminous intensity, four times that of what
-    /// shines everywhere (a ball shows a quarter of its area); in units of the strongest light.
+    /// Luminance times area, of both sides if both emit, or luminous intensity. Four times the intensity for
+    /// a light that emits in all directions, because a ball shows a quarter of its area. In units of the
+    /// strongest light.
     power: L,
 }
 
-/// Eight groups. One without power is none.
+/// Bounds of eight groups. A group without power is absent.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C)]
 pub(super) struct LightBounds8 {
@@ -59,7 +60,7 @@ impl LightBounds {
     pub(super) fn new(bounds: &Bounds, cone: Cone, power: f32) -> Self {
         Self {
             center: bounds.center().to_array(),
-            // A little larger, against the rounding of the corners.
+            // A margin for the rounding of the corners.
             radius: 0.5 * bounds.diagonal() * (1.0 + 1e-5),
             axis: cone.axis,
             sin_cone: sine(cone.cos, 0.0, 1.0),
@@ -68,13 +69,13 @@ impl LightBounds {
         }
     }
 
-    /// The centre and the radius of the sphere.
+    /// Centre and radius of the sphere.
     pub(super) fn sphere(&self) -> (Vec3, f32) {
         (self.center.into(), self.radius)
     }
 
-    /// An estimate of the irradiance at `point` on a surface with `normal` (zero: facing everywhere). Zero
-    /// only where no light of the group can reach the front of the surface.
+    /// Estimate of the irradiance at `point` on a surface with `normal` (zero: facing everywhere). Zero only
+    /// if no light of the group can reach the front of the surface.
     #[inline]
     pub(super) fn importance(&self, point: Vec3, normal: Vec3) -> f32 {
         importance(|value| value, self, point, normal)
@@ -82,7 +83,7 @@ impl LightBounds {
 }
 
 impl LightBounds8 {
-    /// Makes it group `i`, of [`GROUPS`].
+    /// Stores `group` as group `i`, below [`GROUPS`].
     pub(super) fn set(&mut self, i: usize, group: &LightBounds) {
         let i = i % GROUPS;
         for k in 0..3 {
@@ -95,13 +96,13 @@ impl LightBounds8 {
         self.power[i] = group.power;
     }
 
-    /// [`LightBounds::sphere`] of group `i`, of [`GROUPS`]; `None` where there is none.
+    /// [`LightBounds::sphere`] of group `i`, below [`GROUPS`]; `None` if the group is absent.
     pub(super) fn sphere(&self, i: usize) -> Option<(Vec3, f32)> {
         let i = i % GROUPS;
         (self.power[i] > 0.0).then(|| (self.center.map(|all| all[i]).into(), self.radius[i]))
     }
 
-    /// [`LightBounds::importance`] of each.
+    /// [`LightBounds::importance`] of each group.
     #[inline(always)]
     pub(super) fn importance<S: Simd>(&self, simd: S, point: Vec3, normal: Vec3) -> [f32; GROUPS] {
         let load = |values: &[f32; GROUPS]| simd.load8(values);
@@ -117,7 +118,7 @@ impl LightBounds8 {
     }
 }
 
-/// See [`LightBounds::importance`]; `all` makes all lanes the same.
+/// See [`LightBounds::importance`]; `all` puts a value into all lanes.
 #[inline(always)]
 fn importance<L: Lanes>(all: impl Fn(f32) -> L, group: &LightBounds<L>, point: Vec3, normal: Vec3) -> L {
     let (zero, one) = (all(0.0), all(1.0));
@@ -127,7 +128,7 @@ fn importance<L: Lanes>(all: impl Fn(f32) -> L, group: &LightBounds<L>, point: V
     let (square, distance2) = (group.radius * group.radius, dot(to_light, to_light));
     let inverse = one / distance2.sqrt();
     let direction = to_light.map(|along| along * inverse);
-    // θ_u: half-angle of the cone in which the sphere is seen.
+    // θ_u: half-angle of the cone that the sphere fills.
     let sin_u = group.radius * inverse;
     let uncertainty = (sin_u, sine(sin_u, zero, one));
     let spread = all(SPREAD) * sin_u * sin_u;
@@ -136,8 +137,8 @@ fn importance<L: Lanes>(all: impl Fn(f32) -> L, group: &LightBounds<L>, point: V
     // θ' = max(θ - θ_o - θ_u, 0), the least angle to a normal of the group.
     let angle = minus_clamped((sin, cos), (group.sin_cone, group.cos_cone), zero, one);
     let most = minus_clamped(angle, uncertainty, zero, one).1;
-    // Normals that fill a cone of half-angle θ_o evenly have a mean of m = (1 + cos θ_o) / 2 along its axis,
-    // and there a variance of (1 - m)² / 3; the rest of 1 is across.
+    // Normals that fill a cone of half-angle θ_o evenly have the mean m = (1 + cos θ_o) / 2 along its axis,
+    // with variance (1 - m)² / 3; the rest of 1 is across.
     let mean = all(0.5) * (one + group.cos_cone);
     let along = (one - mean) * (one - mean) * all(1.0 / 3.0);
     let across = all(0.5) * (one - mean * mean - along);
@@ -150,28 +151,28 @@ fn importance<L: Lanes>(all: impl Fn(f32) -> L, group: &LightBounds<L>, point: V
         let most = minus_clamped((sine(cos, zero, one), cos), uncertainty, zero, one).1;
         strength = strength * facing(cos, spread, most, parts);
     }
-    // Within the sphere lights may lie in any direction.
+    // Inside the sphere lights may lie in any direction.
     let within = all(ALL_AROUND) * group.power / square.max(all(f32::MIN_POSITIVE));
     let strength = within.select(distance2.le(square), strength);
-    // Comparison with NaN is false: a point that is no number sees no light.
+    // Comparison with NaN is false: a NaN point receives no light.
     strength.min(all(LARGEST)).select(zero.lt(strength), zero)
 }
 
-/// The mean of what is above zero of cosines of this mean and variance, of which the largest is `most`. No
-/// closure: what is not inlined has not the instructions of its kernel, and calls a function for each.
+/// Mean of the positive part of cosines of this mean and variance, whose largest is `most`. No closure: one
+/// that is not inlined lacks the instructions of its kernel and calls a function for each operation.
 #[inline(always)]
 fn facing<L: Lanes>(mean: L, variance: L, most: L, [zero, half, least]: [L; 3]) -> L {
     let about = half * (mean + (mean * mean + variance).sqrt());
     about.max(least * most).select(zero.lt(most), zero)
 }
 
-/// The sine to a cosine, or the cosine to a sine.
+/// Sine of a cosine, or cosine of a sine.
 #[inline(always)]
 fn sine<L: Lanes>(cos: L, zero: L, one: L) -> L {
     (one - cos * cos).max(zero).sqrt()
 }
 
-/// (sin, cos) of max(a - b, 0) for angles of 0 … π.
+/// (sin, cos) of max(a - b, 0) for angles in 0 … π.
 #[inline(always)]
 fn minus_clamped<L: Lanes>((sin_a, cos_a): (L, L), (sin_b, cos_b): (L, L), zero: L, one: L) -> (L, L) {
     let is_less = cos_b.lt(cos_a);
@@ -198,8 +199,8 @@ mod tests {
         }
     }
 
-    /// Groups as they come and groups that are points, hold the point, shine everywhere, or have powers that
-    /// overflow.
+    /// Random groups, and groups that are points, contain the point, emit in all directions, or have powers
+    /// that overflow.
     fn group(random: &Random, i: u32) -> LightBounds {
         let [x, y, z, size, u, v, cos, power] = [0, 1, 2, 3, 4, 5, 6, 7].map(|k| random.single(8 * i + k));
         let center = 4.0 * Vec3::new(x, y, z) - 2.0;
@@ -221,7 +222,7 @@ mod tests {
         for case in 0..2000u32 {
             let all: Vec<LightBounds> = (0..GROUPS as u32).map(|i| group(&random, 8 * case + i)).collect();
             let mut groups = LightBounds8::zeroed();
-            // The last is none in every other case.
+            // The last group is absent in every other case.
             let count = GROUPS - (case as usize & 1);
             all.iter().take(count).enumerate().for_each(|(i, group)| groups.set(i, group));
             let [x, y, z, u, v] = [0, 1, 2, 3, 4].map(|k| random.single(1_000_000 + 5 * case + k));

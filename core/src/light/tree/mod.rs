@@ -1,6 +1,6 @@
-//! The light tree (Conty Estevez and Kulla 2018) chooses one of many lights by its importance for a point, in
-//! as many steps as the tree is deep. It is built as a binary tree, and three of its levels make a node:
-//! eight groups are weighed at once.
+//! Light tree (Conty Estevez and Kulla 2018): chooses one of many lights by its importance at a point, in as
+//! many steps as the tree is deep. Three levels of a binary tree make a node, so that eight groups are
+//! evaluated at once.
 
 mod build;
 mod importance;
@@ -20,27 +20,28 @@ use importance::{GROUPS, LightBounds, LightBounds8};
 #[repr(C)]
 pub(super) struct Node {
     groups: LightBounds8,
-    /// The node of each group, or [`LEAF`] and the light.
+    /// Index of each group's node, or [`LEAF`] and the light.
     links: [u32; GROUPS],
 }
 
 const LEAF: u32 = 1 << 31;
 
-/// Levels of a binary tree in a node.
+/// Levels of the binary tree in a node.
 const LEVELS: u32 = GROUPS.trailing_zeros();
 
-/// The most nodes that wait while all are visited: no path has more than 21 of them, as trails have bits.
+/// Largest number of nodes on the stack of a visit to all. A path has at most 21 nodes, by the bits of a
+/// trail.
 const WAITING: usize = 1 + (u64::BITS / LEVELS) as usize * (GROUPS - 1);
 
-/// A tree over lights. Built from [`Item`]s; a light is its `light` number there.
+/// Tree over lights, built from [`Item`]s and indexed by their `light`.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Tree<'m> {
     level: Level,
-    /// All lights.
+    /// Bounds of all lights.
     whole: LightBounds,
-    /// None where there is one light only.
+    /// Empty if there is only one light.
     nodes: &'m [Node],
-    /// For each light the groups from the first node to it, [`LEVELS`] bits for each, the first one lowest.
+    /// Groups on the path from the first node to each light, [`LEVELS`] bits for each, the first one lowest.
     trails: &'m [u64],
 }
 
@@ -49,24 +50,24 @@ impl<'m> Tree<'m> {
         Footprint::default().slice::<Node>(most_nodes(lights)).slice::<u64>(lights)
     }
 
-    /// The slices that [`Tree::build`] fills.
+    /// Slices that [`Tree::build`] fills.
     pub(super) fn memory(lights: usize, arena: &mut Arena<'m>) -> Result<Memory<'m>, OutOfMemory> {
         Ok((arena.slice(most_nodes(lights))?, arena.slice(lights)?))
     }
 
-    /// The same, with the instructions of `level`.
+    /// Tree that chooses with the instructions of `level`.
     pub(super) fn with_level(self, level: Level) -> Self {
         Self { level, ..self }
     }
 
-    /// The estimate of what all lights together can do.
+    /// Importance of all lights together.
     #[inline]
     pub(super) fn importance(&self, point: Vec3, normal: Vec3) -> f32 {
         self.whole.importance(point, normal)
     }
 
-    /// A light, its probability, and what is left of `u`, a number in [0, 1) again. `None` where no light
-    /// can reach the point.
+    /// Samples a light. Returns the light, its probability, and the remainder of `u` rescaled to [0, 1).
+    /// `None` if no light can reach the point.
     #[inline]
     pub(super) fn sample(&self, point: Vec3, normal: Vec3, u: f32) -> Option<(u32, f32, f32)> {
         match self.trails.len() {
@@ -76,7 +77,7 @@ impl<'m> Tree<'m> {
         }
     }
 
-    /// The probability with which [`Tree::sample`] finds `light`.
+    /// Probability that [`Tree::sample`] chooses `light`.
     #[inline]
     pub(super) fn pdf(&self, point: Vec3, normal: Vec3, light: u32) -> f32 {
         match self.trails.get(light as usize) {
@@ -86,8 +87,8 @@ impl<'m> Tree<'m> {
         }
     }
 
-    /// Every light of a group that `meets` does not rule out, by the centre and the radius of a sphere around
-    /// it.
+    /// Calls `each` with every light, without groups that `meets` rejects by the centre and the radius of
+    /// their bounding sphere.
     pub(super) fn visit(&self, meets: impl Fn(Vec3, f32) -> bool, mut each: impl FnMut(u32)) {
         let (center, radius) = self.whole.sphere();
         if self.trails.is_empty() || !meets(center, radius) {
@@ -116,14 +117,14 @@ impl<'m> Tree<'m> {
     }
 }
 
-/// The most nodes of a tree. One with c nodes below it has b of the n - 1 branchings: at least 1 where c is
-/// 0, 3 where it is 2, 4, 6 and 7 where it is 4, 6 and 8, so that 4 b >= 4 + 3 c. The sum over all of w
-/// nodes, of which all but the first are below another: 4 (n - 1) >= 4 w + 3 (w - 1).
+/// Largest number of nodes of a tree. A node with c nodes below it has b of the n - 1 branchings: at least 1
+/// if c is 0, 3 if it is 2, and 4, 6 and 7 if it is 4, 6 and 8, so that 4 b >= 4 + 3 c. All w nodes except
+/// the first are below another, so that the sum over all nodes is 4 (n - 1) >= 4 w + 3 (w - 1).
 fn most_nodes(lights: usize) -> usize {
     lights.checked_sub(1).map_or(0, |branchings| (branchings.saturating_mul(4).saturating_add(3)) / 7)
 }
 
-/// See [`Tree::sample`].
+/// Kernel of [`Tree::sample`].
 struct Choose<'t> {
     nodes: &'t [Node],
     point: Vec3,
@@ -144,10 +145,10 @@ impl Kernel for Choose<'_> {
             let ends = ends(&weights);
             let sum = ends[GROUPS - 1];
             let wanted = u * sum;
-            // Without a branch, which would be guessed wrong most of the time.
+            // Without a branch, which would be mispredicted most of the time.
             let mut i = ends.iter().map(|end| usize::from(*end <= wanted)).sum::<usize>();
             if i == GROUPS {
-                // Nothing shines, or rounding went beyond the last that does.
+                // No light reaches the point, or rounding exceeds the last light that does.
                 i = weights.iter().rposition(|weight| *weight > 0.0)?;
             }
             let before = if i == 0 { 0.0 } else { ends[i - 1] };
@@ -162,7 +163,7 @@ impl Kernel for Choose<'_> {
     }
 }
 
-/// See [`Tree::pdf`].
+/// Kernel of [`Tree::pdf`].
 struct Follow<'t> {
     nodes: &'t [Node],
     point: Vec3,
@@ -194,8 +195,8 @@ impl Kernel for Follow<'_> {
     }
 }
 
-/// Sums of the first one, two … all of `weights`: each larger than the one before where its weight is not
-/// zero and rounding does not swallow it, and the same where it is.
+/// Prefix sums of `weights`, in ascending order. Sums differ where the weight is not zero and rounding does
+/// not swallow it; a weight of zero leaves the sum unchanged.
 #[inline(always)]
 fn ends(&[a, b, c, d, e, f, g, h]: &[f32; GROUPS]) -> [f32; GROUPS] {
     let two = a + b;
@@ -204,7 +205,7 @@ fn ends(&[a, b, c, d, e, f, g, h]: &[f32; GROUPS]) -> [f32; GROUPS] {
     [a, two, two + c, four, four + e, six, six + g, six + g + h]
 }
 
-/// Nodes and trails of a tree that is about to be built.
+/// Nodes and trails for a tree to be built.
 pub(super) type Memory<'m> = (&'m mut [Node], &'m mut [u64]);
 
 #[cfg(test)]
@@ -216,7 +217,7 @@ mod tests {
     use std::vec;
     use std::vec::Vec;
 
-    /// Lights that lie as `place` says, and shine as they come.
+    /// Lights at the positions of `place`, with random emission.
     fn items(count: u32, place: impl Fn(&Random, u32) -> Vec3) -> Vec<Item> {
         let random = Random::new(3, count);
         let item = |i: u32| {
@@ -276,7 +277,8 @@ mod tests {
                             assert_eq!(same.pdf(point, normal, light), probability);
                         }
                     }
-                    // A group may be better than all that is in it: what is lost is a sample of nothing.
+                    // The importance of a group may exceed that of its members: the difference is the
+                    // probability of `None`.
                     let share = found as f32 / steps as f32;
                     assert!((sum - share).abs() < 0.02 && sum < 1.0 + 1e-4, "{case} {i}: {sum} {share}");
                 }
