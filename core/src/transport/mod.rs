@@ -1,12 +1,12 @@
-//! Light transport, in folders by idea; each file is readable beside its paper.
+//! Light transport: one folder per algorithm, each file readable beside its paper.
 //!
-//! `walk` leads subpaths from surface to surface. `wavefront` advances many camera paths together. [`path`]
-//! is the path tracer that renders; [`path::reference`] is the same estimator as a textbook has it, one path
-//! at a time, kept to test the other against. The other folders hold methods that know some of the light from
-//! a structure, each an [`Estimator`] of the path tracer: [`photon_mapping`] traces photons and estimates
-//! their density; [`caustics`] merges them with paths; [`cached`] places, gathers and looks up records of the
-//! irradiance cache. [`metropolis`] runs Markov chains over the random numbers of paths. `prepass` learns
-//! what the first sample needs.
+//! `walk` traces subpaths from surface to surface. `wavefront` advances many camera paths together. [`path`]
+//! is the path tracer that renders; [`path::reference`] is the textbook form of the same estimator, one path
+//! at a time, against which the path tracer is tested. The other folders hold methods that supply part of the
+//! light from a data structure, each an [`Estimator`] of the path tracer: [`photon_mapping`] traces photons
+//! and estimates their density; [`caustics`] merges photons with paths; [`cached`] places, gathers and looks
+//! up records of the irradiance cache. [`metropolis`] runs Markov chains over the random numbers of paths.
+//! `prepass` learns structures before the first sample.
 
 pub mod bidirectional;
 pub mod cached;

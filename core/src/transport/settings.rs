@@ -2,45 +2,45 @@
 
 use crate::film::Dropped;
 
-/// No limit on the length of paths.
+/// `max_depth` without a limit.
 pub const UNLIMITED: u32 = u32::MAX;
 
-/// Settings of a picture by path tracing.
+/// Settings of a path-traced picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PathSettings {
-    /// Pixels across.
+    /// Width of the picture in pixels.
     pub width: u32,
-    /// Pixels down.
+    /// Height of the picture in pixels.
     pub height: u32,
     /// Seed of all random numbers.
     pub seed: u32,
-    /// The largest number of segments between camera and light: 1 shows emission, 2 adds direct light, 3 one
-    /// bounce, [`UNLIMITED`] all.
+    /// Maximum number of segments between camera and light: 1 shows emission, 2 adds direct light, 3 one
+    /// bounce, [`UNLIMITED`] all light.
     pub max_depth: u32,
 }
 
 impl PathSettings {
-    /// Whether paths have a limit of depth.
+    /// Whether the depth of paths is limited.
     pub fn is_limited(&self) -> bool {
         self.max_depth != UNLIMITED
     }
 }
 
-/// Counts of work done.
+/// Counters of work.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Counters {
-    /// Paths started: samples of pixels.
+    /// Number of paths started, one per sample of a pixel.
     pub paths: u64,
-    /// Rays traced for the nearest hit: camera rays and bounces.
+    /// Number of rays traced for the nearest hit: camera rays and bounces.
     pub rays: u64,
-    /// Shadow rays, to lights.
+    /// Number of shadow rays to lights.
     pub shadow_rays: u64,
-    /// Samples that did not reach the picture.
+    /// Rejected samples.
     pub dropped: Dropped,
 }
 
 impl Counters {
-    /// Rays of every kind.
+    /// Number of rays of all kinds.
     pub fn all_rays(&self) -> u64 {
         self.rays + self.shadow_rays
     }

@@ -1,14 +1,13 @@
-//! A first look from the surfaces of the scene to the sky: which of its light reaches which place. What is
-//! learned are the [`EnvironmentVisibility`] through which the environment is then sampled.
+//! Prepass that learns the [`EnvironmentVisibility`]: the part of the environment that each place of the scene
+//! sees. The environment is then sampled by these tables.
 //!
-//! 1. Paths from the camera, few and in all of the picture, leave a vertex wherever they meet a surface that
-//!    scatters.
-//! 2. Vertices are sorted by their place, a cell of a grid and the side that the surface faces.
-//! 3. From each place rays go to the bins of the sky, from one vertex after the other: one to every other
-//!    bin, then some to each of those near which light was seen.
+//! 1. A few camera paths over the whole picture store a vertex at each scattering surface.
+//! 2. Vertices are sorted by place: a cell of a grid and the side that the surface faces.
+//! 3. Rays go from the vertices of each place, in turn, to the bins of the environment: one to every other bin,
+//!    then several to each bin near visible light.
 //!
-//! Windows pay where most of the sky is hidden, as in a room, and cost a little where it is not: the same
-//! rays tell which it is.
+//! Visibility tables pay if most of the environment is hidden, as in a room, and cost a little otherwise. The
+//! same rays estimate the gain.
 
 use crate::Rgb;
 use crate::bsdf::Features;
@@ -24,60 +23,59 @@ use crate::transport::walk::dimension;
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
-/// Tasks of the look.
+/// Number of tasks of the prepass.
 const TASKS: usize = 64;
-/// Paths of a task: in all a quarter of the pixels, between these.
+/// Range of the number of paths per task; all tasks together have a quarter of the number of pixels.
 const PATHS: core::ops::Range<usize> = 16..256;
-/// Vertices that a path leaves at most, and surfaces that it meets.
+/// Maximum number of vertices that a path stores, and of surfaces that it hits.
 const VERTICES: usize = 3;
 const SURFACES: usize = 8;
 
-/// Places with fewer vertices have no window.
+/// Minimum number of vertices of a place with a table.
 const FEWEST: usize = 4;
 
-/// Rays to the sky: so many for each pixel, between these in all, and at most as many for each bin of a
-/// window.
+/// Number of rays to the environment: per pixel; range of the total; maximum per bin of a table.
 const RAYS_PER_PIXEL: usize = 64;
 const RAYS: core::ops::Range<usize> = 1 << 18..1 << 22;
 const PASSES: usize = 4;
 
-/// Bins of a window.
+/// Number of bins of a table.
 const BINS: usize = size_of::<Bins>() / size_of::<f32>();
 
-/// By how much the variance of the light from the sky has to fall.
+/// Minimum factor by which the variance of environment light has to fall.
 const LEAST_GAIN: f64 = 1.25;
 
-/// A look is not to know the random numbers of the picture: windows must not depend on what is then sampled
-/// with them.
+/// Seed of the prepass, distinct from the seed of the picture: tables must be independent of the samples that
+/// use them.
 const STREAM: u32 = 0x6c00_7517;
 
-/// Where a path was scattered. All normals are on the side that was seen.
+/// Scattering vertex of a path. All normals are on the side of the viewer.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C)]
 pub struct Vertex {
     position: [f32; 3],
-    /// Bound of the error of `position`.
+    /// Error bound of `position`.
     error: f32,
     geometric_normal: [f32; 3],
-    /// The shading normal.
+    /// Shading normal.
     normal: [f32; 3],
-    /// The number of the place, and of the vertex: together they sort.
+    /// Sort key: number of the place, then of the vertex.
     place: u32,
     index: u32,
 }
 
-/// A vertex that is not there.
+/// Place of a missing vertex.
 const NOWHERE: u32 = u32::MAX;
 
-/// Vertices, and where those of one place begin and end.
+/// Vertices of the prepass, and their range for each place with a table.
 pub struct Outlook<'m> {
     vertices: &'m mut [Vertex],
     ranges: &'m mut [[u32; 2]],
-    /// For each pass, where in the sky each bin is looked at, from every place.
+    /// For each pass, the direction to each bin of the environment, common to all places.
     directions: &'m mut [[f32; 3]],
 }
 
-/// What windows make of the variance of light from the sky.
+/// Variance of environment light without and with visibility tables, summed over places.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct WindowGain {
@@ -86,12 +84,12 @@ pub struct WindowGain {
 }
 
 impl WindowGain {
-    /// By which factor the variance becomes smaller.
+    /// Factor by which the variance falls.
     pub fn factor(&self) -> f32 {
         if self.after > 0.0 { (self.before / self.after) as f32 } else { 1.0 }
     }
 
-    /// Whether the sky should be sampled through windows.
+    /// Whether the environment should be sampled by visibility tables.
     pub fn pays(&self) -> bool {
         self.before > LEAST_GAIN * self.after
     }
@@ -105,7 +103,7 @@ impl core::ops::AddAssign for WindowGain {
 }
 
 impl<'m> Outlook<'m> {
-    /// Bytes that [`Outlook::new`] takes.
+    /// Footprint of [`Outlook::new`].
     pub fn footprint() -> Footprint {
         Footprint::default()
             .slice::<Vertex>(TASKS * PATHS.end * VERTICES)
@@ -113,23 +111,23 @@ impl<'m> Outlook<'m> {
             .slice::<[f32; 3]>(PASSES * BINS)
     }
 
-    /// An empty one.
+    /// Outlook without vertices.
     ///
     /// # Errors
-    /// [`OutOfMemory`] where the arena has less than [`Outlook::footprint`].
+    /// [`OutOfMemory`] if the arena has less than [`Outlook::footprint`].
     pub fn new(arena: &mut Arena<'m>) -> Result<Self, OutOfMemory> {
         let vertices = arena.slice(TASKS * PATHS.end * VERTICES)?;
         let ranges = arena.slice(EnvironmentVisibility::MOST)?;
         Ok(Self { vertices, ranges, directions: arena.slice(PASSES * BINS)? })
     }
 
-    /// What each task of the look fills, by [`PathIntegrator::look`].
+    /// Memory of each task, to be filled by [`PathIntegrator::look`].
     pub fn parts(&mut self) -> impl Iterator<Item = (usize, &mut [Vertex])> {
         self.vertices.chunks_mut(PATHS.end * VERTICES).enumerate()
     }
 
-    /// Sorts the vertices by their places and numbers the windows that there will be in `slots`. Returns the
-    /// grid of places and how many windows there are.
+    /// Sorts the vertices by place and numbers the tables in `slots`. Returns the grid of places and the
+    /// number of tables.
     pub fn settle(&mut self, slots: &mut [u16]) -> Option<(VisibilityGrid, usize)> {
         let seen = || self.vertices.iter().filter(|vertex| vertex.place != NOWHERE);
         let grid = VisibilityGrid::over(&Bounds::around(seen().map(|vertex| vertex.position.into())))?;
@@ -174,7 +172,7 @@ impl<'m> Outlook<'m> {
     }
 }
 
-/// Rays from one place to the sky, at most one for each bin, which is their tag.
+/// Rays from one place to the environment, at most one per bin. The tag of a ray is its bin.
 struct Glances<'m> {
     rays: &'m mut [Ray],
     cosines: &'m mut [f32],
@@ -188,7 +186,7 @@ impl<'m> Glances<'m> {
         Ok(Self { rays, cosines, hits: arena.slice(BINS)?, count: 0 })
     }
 
-    /// A ray into each of `bins` above the horizon, from one of the `vertices` after the other.
+    /// Makes one ray to each of `bins` above the horizon, from the `vertices` in turn.
     fn ask(
         &mut self,
         bins: impl Iterator<Item = usize>,
@@ -199,7 +197,7 @@ impl<'m> Glances<'m> {
         self.count = 0;
         for bin in bins {
             let index = (bin * PASSES + pass) as u32;
-            // The golden ratio spreads neighbouring bins over the vertices.
+            // Golden-ratio stride, which spreads neighbouring bins over the vertices.
             let pick = (u64::from(index.wrapping_mul(0x9e37_79b9)) * vertices.len() as u64) >> 32;
             let Some(vertex) = vertices.get(pick as usize) else { continue };
             let Some(&direction) = outlook.directions.get(pass * BINS + bin) else { continue };
@@ -216,7 +214,7 @@ impl<'m> Glances<'m> {
 }
 
 impl<F: Features> PathIntegrator<'_, F> {
-    /// Leaves the vertices of task `task` of a look in its part of the [`Outlook`].
+    /// Stores the vertices of task `task` in its part of the [`Outlook`].
     pub fn look(&self, task: usize, part: &mut [Vertex]) {
         part.fill(Vertex { place: NOWHERE, ..Vertex::default() });
         let crate::transport::PathSettings { width, height, seed, .. } = self.settings;
@@ -231,7 +229,7 @@ impl<F: Features> PathIntegrator<'_, F> {
         }
     }
 
-    /// Follows one path until all `vertices` are filled, or it ends.
+    /// Follows one path until all `vertices` are filled or the path ends.
     fn follow(&self, ray: Ray, sampler: &Sampler, vertices: &mut [Vertex]) {
         let (context, counters) = (self.context, &mut Counters::default());
         let mut segment = Segment::first(ray);
@@ -263,7 +261,7 @@ impl<F: Features> PathIntegrator<'_, F> {
         }
     }
 
-    /// The directions in which a sky is asked for, into `outlook`. There is one.
+    /// Writes the directions to the bins of the environment, which the scene must have, into `outlook`.
     pub fn aim_at_sky(&self, outlook: &mut Outlook) {
         for (i, direction) in outlook.directions.iter_mut().enumerate() {
             let (bin, pass) = (i % BINS, i / BINS);
@@ -276,15 +274,15 @@ impl<F: Features> PathIntegrator<'_, F> {
         }
     }
 
-    /// Bytes of working memory of [`PathIntegrator::learn`].
+    /// Scratch memory of [`PathIntegrator::learn`].
     pub fn learn_scratch() -> Footprint {
         Footprint::default().slice::<Ray>(BINS).slice::<f32>(BINS).slice::<Hit>(BINS)
     }
 
-    /// Makes window number `number` of `count`. Returns what it does to the variance, by how much it matters.
+    /// Learns table `number` of `count`. Returns its variances, weighted by the number of vertices.
     ///
     /// # Errors
-    /// [`OutOfMemory`] where `scratch` has less than [`PathIntegrator::learn_scratch`] bytes.
+    /// [`OutOfMemory`] if `scratch` has less than [`PathIntegrator::learn_scratch`] bytes.
     pub fn learn(
         &self,
         outlook: &Outlook,
@@ -297,7 +295,8 @@ impl<F: Features> PathIntegrator<'_, F> {
         let mut glances = Glances::new(&mut arena)?;
         let vertices = outlook.of_window(number);
 
-        // Every other bin has a ray, which speaks for its neighbours. Where light may come from has more.
+        // One ray to every other bin also stands for the neighbouring bins. Bins near visible light get more
+        // rays.
         let mut squares: Bins = [0.0; _];
         glances.ask((0..squares.len()).filter(|&bin| VisibilityTable::is_black(bin)), 0, outlook, vertices);
         self.send(&mut glances, |bin, light| squares[bin] = light);
@@ -326,7 +325,8 @@ impl<F: Features> PathIntegrator<'_, F> {
         if seen <= 0.0 {
             return Ok(WindowGain::default());
         }
-        // Second moments, of the light in units of the environment's mean over its square.
+        // Second moments of the light in units of the environment's mean; `relative` divides by the squared
+        // light.
         let cosine_sampled = self.context.lights.environment_is_constant() == Some(true);
         let before = if cosine_sampled { seen / 4.0 } else { mean(&smooth) };
         let shares = VisibilityTable::probabilities(&shares);
@@ -336,7 +336,7 @@ impl<F: Features> PathIntegrator<'_, F> {
         Ok(WindowGain { before: relative(before), after: relative(after) })
     }
 
-    /// Follows all rays of `glances`; tells the light, times the cosine, of each bin.
+    /// Traces all rays of `glances`, and calls `tell` with the bin and with transmittance times cosine.
     fn send(&self, glances: &mut Glances, mut tell: impl FnMut(usize, f32)) {
         let (rays, hits) = (&glances.rays[..glances.count], &mut glances.hits[..glances.count]);
         self.context.nearest_batch(rays, Coherence::Incoherent, hits);
@@ -345,7 +345,7 @@ impl<F: Features> PathIntegrator<'_, F> {
         }
     }
 
-    /// Which part of the light at the end of `ray` arrives, where it first meets `hit`.
+    /// Transmittance along `ray`, whose first hit is `hit`.
     fn arriving(&self, ray: &Ray, hit: &Hit) -> f32 {
         if !hit.is_some() {
             return 1.0;

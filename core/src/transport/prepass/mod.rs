@@ -1,3 +1,3 @@
-//! Structures learned before the first sample.
+//! Prepasses: structures learned before the first sample.
 
 pub(in crate::transport) mod environment_visibility;

@@ -1,5 +1,5 @@
-//! The loop of the wavefront: trace, shade, trace shadow rays, until no path is left. Queues are compacted in
-//! place: the ray of a path that goes on overwrites one that was already shaded.
+//! Loop of the wavefront: trace, shade, trace shadow rays, until no path is left. Queues are compacted in
+//! place: the next ray of a path overwrites a shaded ray.
 
 use super::{BLOCK, Wavefront};
 use crate::Rgb;
@@ -11,23 +11,22 @@ use crate::transport::walk::context::SceneContext;
 use crate::transport::walk::visibility::ShadowRays;
 use core::ops::Range;
 
-/// In the tag of a shadow ray: the ray goes to the environment, whose radiance is looked up when it has
-/// arrived. Most are hidden, and an environment map is large.
+/// Tag bit of shadow rays to the environment, whose radiance is looked up after arrival: most are occluded,
+/// and an environment map is large.
 pub(in crate::transport) const TO_ENVIRONMENT: u32 = 1 << 31;
 
-/// The part of a method that the wavefront calls.
+/// Shading by a method, called by the wavefront.
 pub(in crate::transport) trait Shade {
-    /// Shadow rays of a vertex, at most.
+    /// Maximum number of shadow rays per vertex.
     fn shadow_rays(&self) -> usize;
 
-    /// Shades the vertices at the ends of the rays of `range`, [`BLOCK`] at most: adds to the radiance of
-    /// their paths, and pushes shadow rays and the rays by which the paths go on, one for each ray of `range`
-    /// at most.
+    /// Shades the vertices at the hits of the rays in `range`, at most [`BLOCK`]: adds to the radiance of
+    /// their paths, and pushes shadow rays and at most one next ray per ray of `range`.
     fn shade(&mut self, wave: &mut Wavefront, range: Range<usize>, counters: &mut Counters);
 }
 
 impl Wavefront<'_> {
-    /// Finds the hits of the first `count` rays.
+    /// Finds the nearest hits of the first `count` rays.
     pub(in crate::transport) fn trace<F: Features>(
         &mut self,
         context: &SceneContext<F>,
@@ -39,7 +38,7 @@ impl Wavefront<'_> {
         context.nearest_batch(&self.rays[..count], coherence, &mut self.hits[..count]);
     }
 
-    /// Shades the first `count` rays, which were traced, and traces on until no path is left.
+    /// Shades the first `count` rays, already traced, and continues until no path is left.
     pub(in crate::transport) fn follow<F: Features>(
         &mut self,
         context: &SceneContext<F>,
@@ -56,7 +55,7 @@ impl Wavefront<'_> {
         }
     }
 
-    /// Shades the hits of the first `count` rays. Returns the number of rays by which paths go on.
+    /// Shades the hits of the first `count` rays. Returns the number of next rays.
     fn shade_all<F: Features>(
         &mut self,
         context: &SceneContext<F>,
@@ -70,7 +69,7 @@ impl Wavefront<'_> {
         let mut start = 0;
         while start < count {
             let end = count.min(start + block);
-            // One shadow ray a vertex always has a place.
+            // One shadow ray per vertex always fits.
             if self.shadows + each * (end - start) > self.shadow_rays.len() {
                 self.trace_shadow_rays(context, counters);
             }
@@ -81,7 +80,7 @@ impl Wavefront<'_> {
         self.next
     }
 
-    /// Traces the queue of shadow rays, and adds the light of those that arrive to their paths.
+    /// Traces the queue of shadow rays, and adds the light of unoccluded ones to their paths.
     fn trace_shadow_rays<F: Features>(&mut self, context: &SceneContext<F>, counters: &mut Counters) {
         let count = core::mem::take(&mut self.shadows);
         let Self { paths, shadow_rays: rays, shadow_light: light, shadow_hits: hits, hidden, .. } = self;

@@ -1,4 +1,4 @@
-//! Working memory of a wavefront: the state of every path, and the queues of rays.
+//! Working memory of a wavefront: the states of all paths, and the queues of rays.
 
 use crate::Rgb;
 use crate::film::CIRCLE;
@@ -9,45 +9,45 @@ use crate::transport::walk::component::Components;
 use crate::transport::walk::termination::MAX_CROSSINGS;
 use bytemuck::{Pod, Zeroable};
 
-/// A camera path between two of its vertices.
+/// State of one camera path between two vertices.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C)]
 pub struct PathState {
-    /// β, the factor from radiance at the end of the ray to radiance in the pixel.
+    /// β, the factor from radiance at the hit of the ray to radiance in the pixel.
     pub(in crate::transport) throughput: [f32; 3],
-    /// Pdf of the ray in solid angle; infinite where no other technique could choose it.
+    /// Solid-angle pdf of the ray; infinite if no other technique can sample it.
     pub(in crate::transport) pdf: f32,
-    /// L, the radiance that the path has found.
+    /// L, the radiance that the path has found so far.
     pub(in crate::transport) radiance: [f32; 3],
-    /// The part of `radiance` that density estimates blur.
+    /// Part of `radiance` that is blur of density estimates.
     pub(in crate::transport) blur: [f32; 3],
     /// Index of the pixel in the picture.
     pub(in crate::transport) pixel: u32,
-    /// The last vertex at which the path was scattered.
+    /// Position of the last scattering vertex.
     pub(in crate::transport) position: [f32; 3],
     /// Index of the pixel in its tile.
     pub(in crate::transport) place: u32,
-    /// Number of the sample of the pixel.
+    /// Sample number of the pixel.
     pub(in crate::transport) sample: u32,
-    /// The normal at `position`, for light sampling.
+    /// Normal at `position` for light sampling.
     pub(in crate::transport) normal: [f32; 3],
-    /// Segments traced, the current one included.
+    /// Segments traced, including the current one.
     pub(in crate::transport) segments: u16,
-    /// Surfaces passed by cut-out or coincidence.
+    /// Number of skipped surfaces.
     pub(in crate::transport) crossings: u16,
-    /// The triangle that the ray starts on, which it cannot meet again.
+    /// Triangle at the origin of the ray, which the ray cannot hit again.
     pub(in crate::transport) triangle: u32,
     /// Product of the squared relative indices of refraction so far.
     pub(in crate::transport) eta_squared: f32,
-    /// Classes of light that the path is to find at the end of the ray.
+    /// Classes of light that the path has to find behind its ray.
     pub(in crate::transport) components: Components,
     /// Length of the path from the camera to its last vertex.
     pub(in crate::transport) travelled: f32,
 }
 
 impl PathState {
-    /// A path before its first segment: a sample of a pixel, which has an index in the picture and a place in
-    /// its tile.
+    /// Path before its first segment: sample `sample` of pixel `pixel` of the picture, at `place` in its
+    /// tile.
     pub(in crate::transport) fn new(pixel: u32, place: u32, sample: u32, components: Components) -> Self {
         Self {
             throughput: [1.0; 3],
@@ -63,13 +63,13 @@ impl PathState {
         }
     }
 
-    /// Adds to the radiance that the path has found.
+    /// Adds to the radiance of the path.
     #[inline]
     pub(in crate::transport) fn add(&mut self, radiance: Rgb) {
         self.radiance = (Rgb::from(self.radiance) + radiance).to_array();
     }
 
-    /// Goes on by `next` behind the triangle of `hit`, which it skips.
+    /// Continues with `next` behind the skipped `triangle`. `None` after [`MAX_CROSSINGS`] skipped surfaces.
     #[cold]
     pub(in crate::transport) fn cross(
         &mut self,
@@ -87,30 +87,30 @@ impl PathState {
     }
 }
 
-/// Slices for up to `capacity` paths. The tag of a ray is the index of its path.
+/// Slices for `capacity` paths. The tag of a ray is the index of its path.
 pub struct Wavefront<'m> {
     pub(in crate::transport) paths: &'m mut [PathState],
     pub(in crate::transport) rays: &'m mut [Ray],
     pub(in crate::transport) hits: &'m mut [Hit],
-    /// The first of `rays` that are those of the next segment, while the current one is shaded.
+    /// Number of rays of the next segment, at the front of `rays`, while the current segment is shaded.
     pub(in crate::transport) next: usize,
     pub(in crate::transport) shadow_rays: &'m mut [Ray],
-    /// Contribution of each shadow ray if nothing is in its way.
+    /// Unoccluded contribution of each shadow ray.
     pub(in crate::transport) shadow_light: &'m mut [[f32; 3]],
-    /// Hits of shadow rays at surfaces with cut-outs.
+    /// Hits of shadow rays in scenes with cut-outs.
     pub(in crate::transport) shadow_hits: &'m mut [Hit],
     pub(in crate::transport) hidden: &'m mut [u8],
-    /// Shadow rays in the queue.
+    /// Number of shadow rays in the queue.
     pub(in crate::transport) shadows: usize,
 }
 
 impl<'m> Wavefront<'m> {
-    /// Paths in a wave of `capacity`: at least those of a circle of pixels.
+    /// Number of paths of a wave of `capacity`: at least one circle of pixels.
     pub(in crate::transport) const fn capacity(capacity: usize) -> usize {
         if capacity < CIRCLE { CIRCLE } else { capacity }
     }
 
-    /// Bytes that [`Wavefront::new`] takes.
+    /// Footprint of [`Wavefront::new`].
     pub(in crate::transport) fn footprint(capacity: usize) -> Footprint {
         let capacity = Self::capacity(capacity);
         Footprint::default()
@@ -139,7 +139,7 @@ impl<'m> Wavefront<'m> {
         })
     }
 
-    /// The path of index `path` goes on by `ray`, in place of a ray that is shaded.
+    /// Queues `ray` of path `path`, in place of a shaded ray.
     #[inline]
     pub(in crate::transport) fn push_ray(&mut self, path: usize, ray: Ray) {
         if let Some(slot) = self.rays.get_mut(self.next) {
@@ -148,7 +148,7 @@ impl<'m> Wavefront<'m> {
         }
     }
 
-    /// Puts a shadow ray into the queue.
+    /// Queues a shadow ray with its contribution `light`.
     #[inline]
     pub(in crate::transport) fn push_shadow_ray(&mut self, ray: Ray, light: Rgb) {
         let slots = (self.shadow_rays.get_mut(self.shadows), self.shadow_light.get_mut(self.shadows));
