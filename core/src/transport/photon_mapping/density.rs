@@ -1,4 +1,4 @@
-//! Paths that end where photons lie: reflected light by the density of photons, direct light by shadow rays.
+//! Path tracing with photon maps: reflected light by density estimation, direct light by shadow rays.
 
 use crate::bsdf::{Bsdf, Features};
 use crate::bvh::Bvh;
@@ -18,66 +18,67 @@ use crate::{Level, Rgb};
 use core::f32::consts::FRAC_1_PI;
 use glam::Vec3;
 
-/// Cosine below which that of a photon counts as this: its direction is not known better.
+/// Minimum cosine of a photon's direction, whose precision is no better.
 pub(in crate::transport) const GRAZING: f32 = 0.01;
 
-/// How steeply probes for walls rise from the surface: what is lower than that is a step, not a wall, and
-/// what the surface bends less is none either.
+/// Slope of the probes for walls. Lower obstacles are steps, not walls, and a surface that bends less is no
+/// wall either.
 const LIFT: f32 = 0.1;
 
-/// Ways to look for what hangs over a disc: upwards, and at half a right angle to all sides.
+/// Directions of probes for overhangs: up, and at 45 degrees to four sides.
 const UPWARDS: [Vec3; 5] = {
     const D: f32 = core::f32::consts::FRAC_1_SQRT_2;
     let way = Vec3::new;
     [Vec3::Z, way(D, 0.0, D), way(0.0, D, D), way(-D, 0.0, D), way(0.0, -D, D)]
 };
 
-/// Less is not left of a disc for what hangs over it, as a share of its radius: a photon would be a spike.
+/// Minimum radius of a disc under an overhang, as a fraction of its radius; with less, a photon would be a
+/// firefly.
 const LOWEST: f32 = 0.125;
 
-/// How far of the way to a wall its foot is looked for.
+/// Fraction of the way to a wall at which the surface is tested.
 const BEFORE: f32 = 0.99;
 
-/// Steps by which the edge of a surface is found: to a sixteenth of the radius.
+/// Bisection steps to the edge of a surface: precision is a sixteenth of the radius.
 const HALVINGS: u32 = 4;
 
-/// A photon map as paths from the eye use it.
+/// Photon map as an estimator of camera paths.
 #[derive(Clone, Copy)]
 pub struct PhotonLight<'a> {
     map: &'a PhotonMap<'a>,
     discs: RadiusSchedule,
     kernel: Kernel,
-    /// Most discs have no photon, so that to look for one first is worth it.
+    /// Whether most discs hold no photon, so that a disc is first tested for photons.
     is_sparse: bool,
-    /// Photons that a disc needs.
+    /// Number of photons that a disc needs.
     enough: f32,
 }
 
 impl<'a> PhotonLight<'a> {
-    /// The photons of `map`, gathered from `discs`.
+    /// Photon map with density estimates over `discs`.
     pub fn new(map: &'a PhotonMap<'a>, discs: RadiusSchedule) -> Self {
         Self { map, discs, kernel: Kernel::default(), is_sparse: false, enough: f32::INFINITY }
     }
 
-    /// The same, with photons weighed by `kernel`.
+    /// This map with another `kernel`.
     pub fn with_kernel(self, kernel: Kernel) -> Self {
         Self { kernel, ..self }
     }
 
-    /// The same, where discs are no wider than it takes for `enough` photons, if those lie evenly: where they
-    /// crowd, an eighth of the radius may do.
+    /// This map with discs no wider than `enough` evenly spread photons require; an eighth of the radius may
+    /// do where photons are dense.
     pub fn with_enough(self, enough: f32) -> Self {
         Self { enough, ..self }
     }
 
-    /// The same for a map of caustics, which are on few surfaces.
+    /// This map for caustics, which lie on few surfaces.
     pub fn of_caustics(self) -> Self {
         Self { is_sparse: true, ..self }
     }
 
-    /// The reflected light that `point` sends to `wo`, itself reflected, at the end of a path that has come
-    /// so far from the eye; `None` where no photons are left on such a surface. `turns`, from 0 to 1, turns
-    /// the probes for walls. Those are not counted as rays.
+    /// Radiance of reflected light from `point` to `wo`, at the end of a path of length `travelled` from the
+    /// camera; `None` if surfaces like `bsdf` store no photons. `turns`, from 0 to 1, rotates the probes for
+    /// walls, which are not counted as rays.
     #[inline]
     pub(in crate::transport) fn reflected<F: Features>(
         &self,
@@ -109,8 +110,8 @@ impl<F: Features> Estimator<F> for PhotonLight<'_> {
     type Found = ();
     const SEPARATES_COATS: bool = true;
 
-    /// Surfaces with a diffuse part have all reflected light from photons. Where depth is limited only the
-    /// first point of a path has, as photons do not know their distance from the light.
+    /// Surfaces with a diffuse part take all reflected light from photons. With a limit of depth only the
+    /// first vertex of a path does, since photons do not store their path length.
     #[inline]
     fn at_vertex(
         &self,
@@ -136,47 +137,48 @@ impl<F: Features> Estimator<F> for PhotonLight<'_> {
 }
 
 impl<'a, F: Features> PathIntegrator<'a, F> {
-    /// The same, where surfaces with a diffuse part have reflected light from photons. Where depth is limited
-    /// only the first point of a path has.
+    /// This path tracer with photons: surfaces with a diffuse part take reflected light from photons. With a
+    /// limit of depth only the first vertex of a path does.
     pub fn with_photons(&self, photons: PhotonLight<'a>) -> PathIntegrator<'a, F, PhotonLight<'a>> {
         self.with_estimator(photons)
     }
 }
 
-/// What a disc of photons sends to the eye.
+/// Radiance of a density estimate.
 #[derive(Clone, Copy, Debug, Default)]
 pub(in crate::transport) struct Gathered {
     pub(in crate::transport) light: Rgb,
-    /// By how much that is too bright for its width, in the mean: what it differs by from a disc of half the
-    /// radius, and what that blurs itself, a quarter of it all where light is smooth.
+    /// Expected blur: the difference to a disc of half the radius, times 4/3, since in smooth light the finer
+    /// disc has a quarter of the blur.
     pub(in crate::transport) blur: Rgb,
 }
 
 impl Gathered {
-    /// As an estimator knows it at `vertex`.
+    /// Light for the estimator at `vertex`.
     #[inline]
     pub(in crate::transport) fn known(self, vertex: &PathVertex) -> KnownLight {
         KnownLight { contribution: vertex.throughput * self.light, blur: self.blur }
     }
 
-    /// By a disc that is no wider than it takes for `enough` photons.
+    /// Density estimate over the smallest disc of `enough` photons.
     fn of(density: Density, enough: f32, response: Rgb) -> Self {
         let [chosen, finer] = density.of_enough(enough);
         Self { light: chosen * response, blur: (chosen - finer) * (4.0 / 3.0) * response }
     }
 }
 
-/// Photons, and whether they are those of caustics: what hangs over a disc may be what throws them there.
+/// Photons of a density estimate. An overhang does not narrow the disc of caustics, since it may be their
+/// caster.
 #[derive(Clone, Copy)]
 pub(in crate::transport) struct Light<'a> {
     pub(in crate::transport) map: &'a PhotonMap<'a>,
     pub(in crate::transport) is_caustic: bool,
-    /// RadiusSchedule are no wider than it takes for so many photons.
+    /// Number of photons above which discs are narrowed.
     pub(in crate::transport) enough: f32,
 }
 
-/// What `point` reflects to `wo` of the light of the photons on `disc`, as far as it is seen from there;
-/// `all` is the density of all of them, where it is known. By its base alone where it `is_varnished`.
+/// Radiance from `point` to `wo` of the photons on the visible part of `disc`; `all` is their density without
+/// regard to visibility, if known. If the BSDF `is_varnished`, light of its base alone.
 #[inline]
 pub(in crate::transport) fn reflected<F: Features>(
     Light { map, is_caustic, enough }: Light,
@@ -201,7 +203,7 @@ pub(in crate::transport) fn reflected<F: Features>(
         };
     }
     let seen = bsdf.seen_apart::<F>(wo, bsdf.is_varnished(context.separates_coats()));
-    // A photon's power has met the triangle: the cosine is in it already, and that of the triangle's normal.
+    // The power of a photon includes the cosine to the triangle's normal, hence the division.
     let response = |from: Vec3| {
         let wi = point.frame.to_local(from);
         if !point.sides_agree(wi, from) {
@@ -212,8 +214,8 @@ pub(in crate::transport) fn reflected<F: Features>(
     Gathered::of(map.gather_within(context.level, disc, &fence, &response), enough, Rgb::ONE)
 }
 
-/// Looks for walls on `disc`, and for its edges, by probes from `origin`, just above its middle; and for what
-/// hangs over it, but for caustics.
+/// Kernel boundary on `disc`: walls and edges by probes from `origin`, just above its centre; and overhangs,
+/// except for caustics.
 pub(in crate::transport) fn fence(
     bvh: &Bvh,
     level: Level,
@@ -223,10 +225,10 @@ pub(in crate::transport) fn fence(
 ) -> Fence {
     let frame = Fence::frame(disc.normal, turns);
     let radius = disc.radius;
-    // Where there is no surface within the thickness of the disc, there are no photons, and no area.
+    // Without a surface within the thickness of the disc there are no photons and no area.
     let depth = FLATNESS * radius;
     let reach = Fence::FARTHEST * radius;
-    // Most discs lie in the open, which one look around tells.
+    // Most discs are unobstructed, which one clearance query proves.
     let query = ClearanceQuery {
         place: origin,
         frame,
@@ -245,7 +247,7 @@ pub(in crate::transport) fn fence(
     for (i, share) in shares.iter_mut().enumerate() {
         let way = frame.to_world(Fence::WAYS[i].extend(0.0));
         if clearance.rises {
-            // One by one: the setup of a batch costs more than it gains for eight.
+            // One by one: for eight rays the setup of a batch costs more than it gains.
             let hit = bvh.nearest(level, &Ray::segment(origin, way + LIFT * disc.normal, reach));
             if hit.is_some() {
                 *share = hit.t / radius;
@@ -274,7 +276,7 @@ pub(in crate::transport) fn fence(
         *share = 0.5 * (low + high);
     }
     if clearance.hangs && !is_caustic {
-        // Under something that hangs lower than the disc is wide, the light changes over as little.
+        // Under an overhang lower than the disc is wide, light changes over a distance of its height.
         for way in UPWARDS {
             let hit = bvh.nearest(level, &Ray::segment(origin, frame.to_world(way), radius / way.z));
             if hit.is_some() {

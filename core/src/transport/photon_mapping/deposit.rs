@@ -1,16 +1,13 @@
-//! Light paths: photons from the lights, left on every rough surface that they meet after the first (Jensen
-//! 1996).
+//! Photon tracing: light paths that store photons on rough surfaces (Jensen 1996).
 //!
-//! What they leave is, by [`PhotonFilter`], the light that surfaces reflect onto each other, and that mirrors
-//! and glass throw onto surfaces, where light straight from a light is for shadow rays to find; all light; or
-//! caustics alone. How they get there is in `walk/light.rs`.
+//! A [`PhotonFilter`] selects the stored light: light reflected by surfaces, mirrors and glass, beside which
+//! shadow rays find direct light; all light; or caustics alone. `walk/light.rs` traces the paths.
 //!
 //! Departures from the plain algorithm:
-//! 1. After a photon was left, its path goes on with a probability of at most [`MAX_CONTINUATION`]. A path
-//!    then leaves five photons on average at most, wherever it runs, so that [`ROOM`] for a task is enough:
-//!    to be 14 standard deviations above the mean it would have to live through as many ends as no sequence
-//!    of random numbers holds.
-//! 2. The price: where surfaces are lighter than that, photons differ in power.
+//! 1. After a photon is stored, the continuation probability is at most [`MAX_CONTINUATION`]. A path then stores
+//!    at most five photons on average in any scene, so that [`ROOM`] for a task is enough: an overflow is 14
+//!    standard deviations above the mean, more survivals than any sequence of random numbers contains.
+//! 2. The price: on surfaces of higher albedo, photons differ in power.
 
 use crate::bsdf::Features;
 use crate::bvh::Bvh;
@@ -27,20 +24,20 @@ use crate::transport::walk::light::{
 pub use crate::transport::walk::light::{PATHS, ROOM};
 use crate::{Level, Rgb};
 
-/// Which photons are left.
+/// Selection of the photons to store.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum PhotonFilter {
-    /// All but those that come straight from a light.
+    /// All except those directly from a light.
     #[default]
     Reflected,
-    /// All.
+    /// All photons.
     All,
-    /// Those that came from a light by mirrors and glass alone, at least one of them. Their paths end there.
+    /// Photons whose path from the light has specular vertices alone, and at least one. The path ends there.
     Caustic,
 }
 
 impl PhotonFilter {
-    /// Whether a path leaves a photon where it met a surface.
+    /// Whether the path stores a photon at `vertex`.
     #[inline]
     pub(in crate::transport) fn leaves(self, state: &LightPathState, vertex: &Vertex) -> bool {
         vertex.bsdf.stores_photons()
@@ -50,7 +47,7 @@ impl PhotonFilter {
             }
     }
 
-    /// How it goes on from there.
+    /// Continuation of the path behind `vertex`.
     #[inline]
     pub(in crate::transport) fn onward(self, vertex: &Vertex, leaves: bool) -> Option<Continuation> {
         let ends = self == PhotonFilter::Caustic
@@ -59,20 +56,20 @@ impl PhotonFilter {
     }
 }
 
-/// What is shot.
+/// Settings of a photon tracer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PhotonTracerSettings {
-    /// Which photons are left.
+    /// Selection of the photons to store.
     pub keep: PhotonFilter,
-    /// Another seed, other photons.
+    /// Seed of the random numbers of photons.
     pub seed: u32,
-    /// Light paths for each map.
+    /// Number of light paths per map.
     pub paths: u32,
-    /// The largest number of segments between camera and light, of which the last is the camera's.
+    /// Maximum number of segments between camera and light, including the camera's segment.
     pub max_depth: u32,
 }
 
-/// Shoots the photons of one scene: a pass of tasks of [`PATHS`] paths.
+/// Photon tracer of one scene: a pass of tasks of [`PATHS`] paths.
 #[derive(Clone, Copy)]
 pub struct PhotonTracer<'a, F> {
     pub(in crate::transport) flight: LightWalk<'a, F>,
@@ -80,7 +77,7 @@ pub struct PhotonTracer<'a, F> {
 }
 
 impl<'a, F: Features> PhotonTracer<'a, F> {
-    /// A shooter over frozen structures. `F` has at least the features of the scene.
+    /// Photon tracer over frozen structures. `F` has at least the features of the scene.
     pub fn new(
         scene: &'a Scene<'a>,
         bvh: &'a Bvh<'a>,
@@ -107,21 +104,21 @@ impl<'a, F: Features> PhotonTracer<'a, F> {
         self.flight.tasks()
     }
 
-    /// Working memory of one task.
+    /// Scratch memory of one task.
     pub fn scratch() -> Footprint {
         LightWalk::<F>::scratch()
     }
 
-    /// Photons that a task needs room for.
+    /// Photon capacity that a task needs.
     pub fn room(&self) -> usize {
         if self.keep == PhotonFilter::Caustic { PATHS } else { ROOM }
     }
 
-    /// Shoots the photons of task `task` of map number `map` (below 2^31). All of `out` is written; what is
-    /// not needed, with photons of no place, which a map refuses. Room for [`PhotonTracer::room`] is enough.
+    /// Traces the photons of task `task` of map `map` (below 2³¹). Fills the rest of `out` with photons
+    /// without position, which a map rejects. A capacity of [`PhotonTracer::room`] is enough.
     ///
     /// # Errors
-    /// [`OutOfMemory`] where `scratch` has less than [`PhotonTracer::scratch`] bytes.
+    /// [`OutOfMemory`] if `scratch` has less than [`PhotonTracer::scratch`] bytes.
     pub fn run(
         &self,
         task: usize,
@@ -135,10 +132,10 @@ impl<'a, F: Features> PhotonTracer<'a, F> {
         Ok(counters)
     }
 
-    /// Which photons of task `task` of map number `map` are left in `sight`: `seen` is told of each.
+    /// Calls `seen` for each photon of task `task` of map `map` that lies near a visible point of `sight`.
     ///
     /// # Errors
-    /// Those of [`PhotonTracer::run`].
+    /// Errors of [`PhotonTracer::run`].
     pub fn look(
         &self,
         (task, map): (usize, u32),
@@ -150,18 +147,18 @@ impl<'a, F: Features> PhotonTracer<'a, F> {
     }
 }
 
-/// A photon that is seen.
+/// Photon near a visible point.
 #[derive(Clone, Copy, Debug)]
 pub struct Seen {
-    /// The number of its path among those of its task.
+    /// Index of its path in the task.
     pub path: usize,
-    /// From which cell of a guide it came.
+    /// Cell of the emission guide.
     pub cell: u32,
-    /// W: the luminance of its power.
+    /// Luminance of its power in W.
     pub power: f32,
 }
 
-/// Tells of photons that are seen.
+/// Visitor that reports photons near visible points.
 struct VisibilityCounter<'s> {
     keep: PhotonFilter,
     sight: VisiblePoints<'s>,
@@ -187,7 +184,7 @@ impl Visitor for VisibilityCounter<'_> {
     }
 }
 
-/// Leaves the photons that are wanted.
+/// Visitor that stores the selected photons.
 pub(in crate::transport) struct Depositor<'p> {
     keep: PhotonFilter,
     pile: PhotonBuffer<'p>,

@@ -1,18 +1,17 @@
-//! Final gathering in a photon map (Jensen 1996): a gather ray that meets a surface with a diffuse part ends
-//! there, with the reflected light that the global map knows. The ray takes irradiance that was precomputed
-//! at the photons nearest to its end (`irradiance.rs`).
+//! Final gathering (Jensen 1996): a gather ray ends at the next surface with a diffuse part, with reflected
+//! light of the global map. The ray takes irradiance precomputed at the photons nearest to its hit
+//! (`irradiance.rs`).
 //!
 //! Departures:
-//! 1. A gather ray ends in the map only where the map is sure. It goes on, as a path does, where it is
-//!    shorter than the blur of the map at its end is wide (Jensen's secondary gathering, by a measured
-//!    distance), where there are few photons, where none lies on a surface like that of the point, or where a
-//!    wall is in between.
-//! 2. A photon stores whether there is a wall within the disc of its estimate. If not, the ray needs no test
-//!    for walls.
-//! 3. The ray takes the harmonic mean of the nearest irradiances that its end sees, not the nearest one.
-//!    Photons lie where light is: of the nearest to a place in the shade most are of the light beside it,
-//!    more than their share of the area. The number of photons on an area is in proportion to its brightness,
-//!    so that weights of one over brightness give each area its share.
+//! 1. A gather ray ends in the map only if the map is reliable. It continues as a path if it is shorter than
+//!    the blur of the map at its hit (Jensen's secondary gathering, by a measured distance), if photons are
+//!    few, if no photon lies on a surface like that of the hit, or if a wall is in between.
+//! 2. A photon stores whether there is a wall within the disc of its estimate. Without a wall, the ray needs
+//!    no visibility test.
+//! 3. The ray takes the harmonic mean of the nearest visible irradiances, not the nearest one. Photons lie
+//!    where light is: most of the photons nearest to a point in shadow belong to the light beside it, beyond
+//!    their share of the area. The number of photons on an area is proportional to its brightness, so that
+//!    weights of 1 / brightness give each area its share.
 
 use crate::bsdf::{Bsdf, Features};
 use crate::bvh::Bvh;
@@ -35,24 +34,24 @@ use crate::{Level, Rgb};
 use core::f32::consts::{FRAC_1_PI, SQRT_2};
 use glam::Vec3;
 
-/// Irradiances that a gather ray chooses from. Their distance measures the blur of the map: the photons of an
-/// estimate reach [`BLUR`] times as far.
+/// Number of nearest irradiances. Their distance measures the blur of the map: the photons of an estimate
+/// reach [`BLUR`] times as far.
 const CHOICE: usize = 8;
 
-/// sqrt(NEAREST / (CHOICE · STRIDE)), as photons lie on surfaces.
+/// sqrt(NEAREST / (CHOICE · STRIDE)), since photons lie on surfaces.
 const BLUR: f32 = SQRT_2;
 
-/// The least length of a gather ray that ends in the map, in radii of the discs there.
+/// Minimum length of a gather ray that ends in the map, in radii of the discs at its hit.
 const SHORTEST: f32 = 1.5;
 
-/// Largest distance of the centroid of those irradiances from the middle of their disc, in radii. Chance puts
-/// one in thirteen farther off where all is even; on a straight edge of light it is at 0.42.
+/// Maximum distance of the centroid of these irradiances from the centre of their disc, in radii. In even
+/// light one of thirteen exceeds it by chance; at a straight edge of light it is 0.42.
 const EVEN: f32 = 0.4;
 
-/// Working memory for a choice, on the stack: [`Neighbours::footprint`] of [`CHOICE`].
+/// Stack memory of a lookup, in lines: [`Neighbours::footprint`] of [`CHOICE`].
 const LINES: usize = 32;
 
-/// Photons as gather rays use them.
+/// Global photon map for gather rays.
 #[derive(Clone, Copy)]
 pub struct GlobalMapLookup<'a> {
     global: &'a PhotonMap<'a>,
@@ -62,7 +61,8 @@ pub struct GlobalMapLookup<'a> {
 }
 
 impl<'a> GlobalMapLookup<'a> {
-    /// With the map of the [`PrecomputedIrradiance`] of `global`, and what those were made with.
+    /// Lookup in the map `irradiances`, the [`PrecomputedIrradiance`] of `global`, with the radius limit and
+    /// kernel of their computation.
     pub fn new(
         global: &'a PhotonMap<'a>,
         irradiances: &'a PhotonMap<'a>,
@@ -72,9 +72,8 @@ impl<'a> GlobalMapLookup<'a> {
         Self { global, irradiances, farthest, kernel }
     }
 
-    /// The light that `point`, at the end of a gather ray of length `distance`, reflects to `wo`, except what
-    /// a narrow coat does. `None` where the map should not tell. `turns`, from 0 to 1, turns probes for
-    /// walls.
+    /// Radiance of light from `point`, the hit of a gather ray of length `distance`, to `wo`, except by a
+    /// narrow coat. `None` if the map is unreliable. `turns`, from 0 to 1, rotates the probes for walls.
     pub(in crate::transport) fn reflected<F: Features>(
         &self,
         context: &SceneContext<F>,
@@ -93,15 +92,15 @@ impl<'a> GlobalMapLookup<'a> {
         Some(reflected(light, context, (&disc, None), (point, bsdf), wo, turns).light)
     }
 
-    /// The irradiance of the photons at `point`, at the end of a gather ray of length `distance`, and the
-    /// radius of their discs. `None` where the map should not tell.
+    /// Irradiance at `point`, the hit of a gather ray of length `distance`, and the radius of its discs.
+    /// `None` if the map is unreliable.
     pub(in crate::transport) fn irradiance(
         &self,
         (bvh, level): (&Bvh, Level),
         point: &SurfacePoint,
         distance: f32,
     ) -> Option<(Rgb, f32)> {
-        // A ray that cannot be long enough need not look.
+        // Limits the search radius: beyond it the ray would be too short.
         let within = self.farthest.min(distance / (SHORTEST * BLUR));
         let mut lines = [Line([0; 64]); LINES];
         let mut neighbours =
@@ -139,7 +138,7 @@ impl<'a> GlobalMapLookup<'a> {
                 nearest = Some((photon, (squared, index)));
             }
         }
-        // Beside a bright spot all irradiances are of the spot.
+        // Beside a bright spot all irradiances belong to the spot.
         let is_even = moment.length_squared() <= EVEN * EVEN * count * count * squared;
         let (_, (_, nearest)) = nearest.filter(|(photon, _)| is_even && is_seen(photon))?;
         let (mut sum, mut weights) = (Rgb::ZERO, 0.0);
@@ -156,18 +155,17 @@ impl<'a> GlobalMapLookup<'a> {
     }
 }
 
-/// The maps that the samples of a picture share.
+/// Photon maps of a picture.
 #[derive(Clone, Copy)]
 pub struct PhotonMaps<'a> {
-    /// Light that mirrors and glass throw onto surfaces; `None` where paths find it for themselves, or there
-    /// is none.
+    /// Caustic map; `None` if paths find caustics themselves, or there are none.
     pub caustic: Option<PhotonLight<'a>>,
-    /// All light.
+    /// Global map of all light.
     pub global: GlobalMapLookup<'a>,
 }
 
 impl PhotonMaps<'_> {
-    /// Light of the global map and of the caustic map at `vertex`, and the light that is left.
+    /// Light of both maps at `vertex`, and the light that the path still has to find.
     #[inline]
     fn at<F: Features>(
         &self,
@@ -177,7 +175,7 @@ impl PhotonMaps<'_> {
         let PathVertex { point, ref bsdf, wo, came, segments, distance, travelled, .. } = *vertex;
         let is_limited = settings.is_limited();
         let turns = vertex.sampler.single(dimension::PROBES + segments);
-        // Light that a surface with a diffuse part has scattered stays so.
+        // A path that may end in the map keeps this right behind the vertex.
         let all = Rest::of(if came.is_gathered() { Components::GATHERED } else { Components::ALL });
         if !bsdf.gathers_photons(context.separates_coats()) {
             if came.leaves_caustics() && bsdf.is_caustic_caster() {
@@ -208,7 +206,7 @@ impl PhotonMaps<'_> {
     }
 }
 
-/// Maps of even and of odd samples.
+/// Photon maps of even and of odd samples.
 impl<F: Features> Estimator<F> for &[PhotonMaps<'_>; 2] {
     type State = ();
     type Found = ();
@@ -230,15 +228,15 @@ impl<F: Features> Estimator<F> for &[PhotonMaps<'_>; 2] {
 }
 
 impl<'a, F: Features> PathIntegrator<'a, F> {
-    /// The same, where surfaces with a diffuse part have caustics from photons, and gather rays from there
-    /// end in a photon map: even samples in the first, odd ones in the second. Where depth is limited only
-    /// the first point of a path has light from photons.
+    /// This path tracer with photon maps: surfaces with a diffuse part take caustics from photons, and gather
+    /// rays from them end in a photon map: even samples in the first, odd samples in the second. With a limit
+    /// of depth only the first vertex of a path takes light from photons.
     pub fn with_maps(&self, maps: &'a [PhotonMaps<'a>; 2]) -> PathIntegrator<'a, F, &'a [PhotonMaps<'a>; 2]> {
         self.with_estimator(maps)
     }
 }
 
-/// Whether something in `scene` may make caustics.
+/// Whether a material of `scene` may cast caustics.
 pub fn may_have_caustics(scene: &Scene) -> bool {
     scene.materials.iter().any(Material::may_be_caustic_caster)
 }
@@ -256,7 +254,7 @@ mod tests {
 
     #[test]
     fn an_even_floor_is_even_and_the_dark_stays_behind_its_wall() {
-        // Upright in the middle of a floor of 1 × 1.
+        // Vertical wall in the middle of a floor of 1 × 1.
         let positions = [
             [0.5, -9.0, 0.0],
             [0.5, 9.0, 0.0],
@@ -271,7 +269,7 @@ mod tests {
         let mut memory = lines(Bvh::footprint(triangles.len()));
         let bvh = Bvh::build(&mesh, &mut Arena::new(bytemuck::cast_slice_mut(&mut memory))).unwrap();
 
-        // An irradiance of one on its left, of a tenth on its right.
+        // Irradiance is 1 on the left, 0.1 on the right.
         const PER_AREA: u32 = 20_000;
         let random = Random::new(1, 0);
         let mut photons = Vec::new();
@@ -296,7 +294,7 @@ mod tests {
         });
     }
 
-    /// Asks `light` on both sides of the wall.
+    /// Tests `light` on both sides of the wall.
     fn check(light: &GlobalMapLookup, tracer: (&Bvh, Level), random: Random) {
         let material = Material::diffuse(Rgb::ONE);
         let ask = |x: f32, y: f32| {

@@ -1,5 +1,5 @@
-//! Irradiance precomputed at photons (Christensen 1999, "Faster Photon Map Global Illumination"): that of
-//! every [`STRIDE`]th photon, from the photons nearest to it.
+//! Irradiance precomputed at photons (Christensen 1999, "Faster Photon Map Global Illumination"): at every
+//! [`STRIDE`]th photon, from the nearest photons.
 
 use crate::bvh::Bvh;
 use crate::light::luminance;
@@ -11,38 +11,38 @@ use crate::transport::settings::Counters;
 use crate::{Level, Rgb};
 use glam::Vec3;
 
-/// Of so many photons one gets an irradiance.
+/// Number of photons per irradiance.
 pub const STRIDE: usize = 4;
 
-/// Irradiances of one task.
+/// Number of irradiances of one task.
 pub const IRRADIANCES: usize = 256;
 
-/// Photons that an irradiance is estimated from.
+/// Number of photons of an irradiance estimate.
 const NEAREST: usize = 64;
 
-/// Largest distance of the centroid of the light of those photons from the middle of their disc, in radii.
-/// Chance puts one in a hundred farther off where all is even; on a straight edge of light it is at 0.42.
+/// Maximum distance of the light's centroid of these photons from the centre of their disc, in radii. In even
+/// light one of a hundred exceeds it by chance; at a straight edge of light it is 0.42.
 const EVEN: f32 = 0.2;
 
-/// The least share of a disc that must be seen: in a slit a few photons would tell of all of it.
+/// Minimum visible fraction of a disc: in a slit, a few photons would stand for all of it.
 const LEAST_SEEN: f32 = 0.1;
 
-/// How far above its surface a photon looks for walls, in radii of its disc: what is lower is no wall.
+/// Height of the visibility test above the surface, in radii of the disc; lower obstacles are no walls.
 pub(super) const ABOVE: f32 = 1e-3;
 
-/// Works out the irradiance of photons: a pass over tasks of [`IRRADIANCES`].
+/// Precomputation of irradiance at photons: a pass of tasks of [`IRRADIANCES`].
 #[derive(Clone, Copy)]
 pub struct PrecomputedIrradiance<'a> {
     bvh: &'a Bvh<'a>,
     global: &'a PhotonMap<'a>,
-    /// Largest radius of a disc.
+    /// Maximum radius of a disc.
     farthest: f32,
     kernel: Kernel,
     level: Level,
 }
 
 impl<'a> PrecomputedIrradiance<'a> {
-    /// For a map of all photons; discs of at most `farthest`.
+    /// Irradiances of `global`, a map of all photons, over discs of radius at most `farthest`.
     pub fn new(
         bvh: &'a Bvh<'a>,
         global: &'a PhotonMap<'a>,
@@ -53,22 +53,21 @@ impl<'a> PrecomputedIrradiance<'a> {
         Self { bvh, global, farthest, kernel, level }
     }
 
-    /// How many there are.
+    /// Number of irradiances.
     pub fn count(&self) -> usize {
         self.global.len().div_ceil(STRIDE)
     }
 
-    /// Working memory of one task.
+    /// Scratch memory of one task.
     pub fn scratch() -> Footprint {
         Neighbours::footprint(NEAREST)
     }
 
-    /// Those of task `task`: photons whose power is an irradiance, and which came from where their normal
-    /// points if no wall is near, otherwise from the other side. What is not needed of `out` is filled with
-    /// photons of no place.
+    /// Irradiances of task `task`, as photons whose power is the irradiance. Their direction is the normal if
+    /// no wall is near, otherwise the opposite. Fills the rest of `out` with photons without position.
     ///
     /// # Errors
-    /// [`OutOfMemory`] where `scratch` has less than [`PrecomputedIrradiance::scratch`] bytes.
+    /// [`OutOfMemory`] if `scratch` has less than [`PrecomputedIrradiance::scratch`] bytes.
     pub fn run(&self, task: usize, scratch: &mut Arena, out: &mut [Photon]) -> Result<Counters, OutOfMemory> {
         let mut arena = scratch.scratch();
         let mut neighbours = Neighbours::new(NEAREST, &mut arena)?;
@@ -99,7 +98,7 @@ impl<'a> PrecomputedIrradiance<'a> {
         Photon::new(place, tells, normal, density.radiance)
     }
 
-    /// Whether light comes to `disc`, of those nearest photons, on all sides of its middle alike.
+    /// Whether the light of the nearest photons on `disc` is even around its centre.
     fn is_even(&self, disc: &QueryDisc, neighbours: &Neighbours) -> bool {
         let (mut sum, mut moment) = (0.0, Vec3::ZERO);
         for photon in neighbours.iter().filter_map(|(index, _)| self.global.get(index)) {

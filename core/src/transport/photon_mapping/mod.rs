@@ -1,5 +1,5 @@
-//! Photon mapping (Jensen 1996; Hachisuka and Jensen 2009): photons, points visible from the camera, density
-//! estimates and final gathering.
+//! Photon mapping (Jensen 1996; Hachisuka and Jensen 2009): photon tracing, visible points, density
+//! estimation and final gathering.
 
 pub(in crate::transport) mod density;
 pub mod deposit;

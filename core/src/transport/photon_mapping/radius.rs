@@ -1,4 +1,4 @@
-//! Radii of density estimates: a kernel is as wide as a number of pixels where the camera sees it. Density
+//! Radii of density estimates: a kernel covers a fixed number of pixels in the view of the camera. Density
 //! estimation, vertex merging and the map of visible points share one schedule; passes scale it.
 
 use crate::Level;
@@ -7,31 +7,31 @@ use crate::scene::Scene;
 use core::f32::consts::PI;
 use glam::Vec3;
 
-/// The least distance from the eye by which radii are reckoned, as what is seen through a mirror may lie near
-/// the eye: in diagonals of the scene, or in distances of the nearest that is seen, where that is less.
+/// Minimum camera distance of radii, since a surface in a mirror may lie near the camera: the lesser of
+/// [`NEAREST`] diagonals of the scene and [`NEAREST_SEEN`] times the distance of the nearest visible surface.
 const NEAREST: f32 = 0.05;
 const NEAREST_SEEN: f32 = 0.5;
 
-/// What is nearer than this share of the scene is what the camera stands on.
+/// Fraction of the scene's diagonal below which a surface is the one that the camera lies on.
 const STANDS_ON: f32 = 1e-6;
 
-/// Rays across and down that look for the nearest.
+/// Number of rays across and down that search for the nearest visible surface.
 const GLANCES: u32 = 32;
 
-/// How fast radii shrink, a: with 2/3 the variance and the squared bias both fall as n^(-2/3).
+/// Shrinkage exponent a: with 2/3 both variance and squared bias fall as n^(-2/3).
 const ALPHA: f64 = 2.0 / 3.0;
 
-/// The radii of discs: as far on a surface as so many pixels at that distance from the eye.
+/// Kernel radius by distance: the width of a number of pixels at that distance from the camera.
 #[derive(Clone, Copy, Debug)]
 pub struct RadiusSchedule {
     eye: Vec3,
-    /// At distance one.
+    /// Radius at distance 1.
     radius: f32,
     nearest: f32,
 }
 
 impl RadiusSchedule {
-    /// Of one pixel in radius, for a picture of `scene` that is `frame` pixels wide and high.
+    /// Schedule of one pixel in radius, for a picture of `scene` of `frame` pixels across and down.
     pub fn new((scene, bvh): (&Scene, &Bvh), frame: [u32; 2], level: Level) -> Self {
         let camera = &scene.camera;
         let mut seen = f32::INFINITY;
@@ -49,37 +49,37 @@ impl RadiusSchedule {
         Self { eye: camera.eye, radius, nearest }
     }
 
-    /// The same, of so many pixels in radius.
+    /// This schedule with a radius of `pixels` pixels.
     pub fn of_pixels(self, pixels: f32) -> Self {
         Self { radius: pixels * self.radius, ..self }
     }
 
-    /// The same, of so many `pixels` in radius for the first sample, for the sample after `samples` more of a
-    /// progressive method.
+    /// Schedule of a progressive method after `samples` samples; the first sample has a radius of `pixels`
+    /// pixels.
     pub fn after(self, pixels: f64, samples: u32) -> Self {
         self.of_pixels((pixels * libm::sqrt(Self::shrinkage(samples))) as f32)
     }
 
-    /// Fraction of the first squared radius that is left after `samples` (Knaus and Zwicker 2011):
-    /// r² (i + 1) = r² (i) (i + a) / (i + 1).
+    /// Squared radius after `samples` over the initial squared radius (Knaus and Zwicker 2011): r² (i + 1) =
+    /// r² (i) (i + a) / (i + 1).
     pub fn shrinkage(samples: u32) -> f64 {
         (1..=samples).map(f64::from).fold(1.0, |squared, i| squared * (i + ALPHA) / (i + 1.0))
     }
 
-    /// The radius around `place`.
+    /// Kernel radius at `place`.
     #[inline]
     pub fn radius(&self, place: Vec3) -> f32 {
         self.radius * place.distance(self.eye).max(self.nearest)
     }
 
-    /// The same for a path that has come so far from the eye: what mirrors show of the place is as small in
-    /// the picture as the way to it is long. Weights know the place alone.
+    /// Kernel radius at `place` for a path of length `travelled` from the camera: a surface in a mirror
+    /// appears as small as the whole path is long. MIS weights use the place alone.
     #[inline]
     pub(in crate::transport) fn radius_after(&self, travelled: f32, place: Vec3) -> f32 {
         self.radius(place).max(self.radius * travelled)
     }
 
-    /// π² r² N: R where nothing lies between, and light is emitted with a density of one.
+    /// π² r² N: R of a path without vertices in between, for emission with a density of one.
     #[inline]
     pub(in crate::transport) fn reach(&self, place: Vec3, paths: f32) -> f32 {
         let radius = PI * self.radius(place);

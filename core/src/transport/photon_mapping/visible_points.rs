@@ -1,6 +1,6 @@
-//! What the camera sees that holds photons: places of a raster of camera rays, straight on, in mirrors and
-//! behind glass, in a map of their own. A photon counts as seen where one of them lies near it. That need not
-//! be exact: emission guided by it sends some light everywhere.
+//! Visible points: surfaces that store photons, seen by a raster of camera rays directly, in mirrors and
+//! through glass, in a map of their own. A photon counts as visible if a visible point is near. This may be
+//! inexact, since guided emission sends some light everywhere.
 
 use crate::bsdf::Features;
 use crate::memory::Footprint;
@@ -14,30 +14,30 @@ use crate::{Level, Rgb};
 use core::mem;
 use glam::Vec3;
 
-/// Camera rays, at most.
+/// Maximum number of camera rays.
 const MOST_RAYS: u32 = 1 << 14;
 
-/// Mirrors and surfaces of glass on the way, at most.
+/// Maximum number of specular surfaces on a camera ray.
 const MOST_MIRRORS: u32 = 16;
 
-/// How far places stand for others, in distances between two.
+/// Radius around a visible point, in distances between two rays.
 const REACH: f32 = 1.5;
 
-/// The camera rays that look for places.
+/// Raster of camera rays that find visible points.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct VisiblePointSampler {
     frame: [u32; 2],
-    /// Pixels from ray to ray.
+    /// Distance between rays, in pixels.
     step: u32,
-    /// Whether places are those that rays go to from what is seen, as they gather light for it.
+    /// Whether the points are the hits of gather rays from the visible points.
     gathers: bool,
 }
 
 impl VisiblePointSampler {
-    /// Rays of a task.
+    /// Number of rays of a task.
     pub const TASK: usize = 256;
 
-    /// For a picture that is `frame` pixels wide and high.
+    /// Raster for a picture of `frame` pixels across and down.
     pub fn new(frame: [u32; 2]) -> Self {
         let across = |step: u32| frame.map(|pixels| u64::from(pixels.div_ceil(step)));
         let mut step = 1;
@@ -47,23 +47,23 @@ impl VisiblePointSampler {
         Self { frame, step, gathers: false }
     }
 
-    /// The same one bounce further: from each place one ray goes on, to what lights it.
+    /// This raster with one more bounce: one ray from each visible point to a surface that lights it.
     pub fn gathering(self) -> Self {
         Self { gathers: true, ..self }
     }
 
-    /// How many rays there are.
+    /// Number of rays.
     pub fn rays(&self) -> usize {
         self.frame.iter().map(|pixels| pixels.div_ceil(self.step) as usize).product()
     }
 
-    /// Bytes of the map of the places.
+    /// Footprint of the map of visible points.
     pub fn footprint(&self) -> Footprint {
         Photons::footprint(self.rays())
     }
 
-    /// What the rays of task `task`, [`VisiblePointSampler::TASK`] of them, find: places, as photons without
-    /// power; where there is none, one that a map refuses.
+    /// Visible points of task `task`, one per ray, as photons without power; a ray that finds none writes a
+    /// photon that a map rejects. A task has [`VisiblePointSampler::TASK`] rays.
     pub fn run<F: Features>(
         &self,
         task: usize,
@@ -114,7 +114,7 @@ impl VisiblePointSampler {
     }
 }
 
-/// The places, and how far each stands for others.
+/// Visible points and their radius.
 #[derive(Clone, Copy)]
 pub struct VisiblePoints<'a> {
     map: &'a PhotonMap<'a>,
@@ -122,7 +122,7 @@ pub struct VisiblePoints<'a> {
     level: Level,
 }
 
-/// How far a place stands for others.
+/// Radius around a visible point.
 #[derive(Clone, Copy)]
 enum Reach {
     RadiusSchedule(RadiusSchedule),
@@ -130,8 +130,8 @@ enum Reach {
 }
 
 impl<'a> VisiblePoints<'a> {
-    /// Of the places in `map`, which `raster` found. Light is gathered from discs of so many pixels, at most;
-    /// `discs` are those of one.
+    /// Visible points `map` of `raster`. Density estimates have a radius of at most `pixels` pixels; `discs`
+    /// is the schedule of one pixel.
     pub fn new(
         map: &'a PhotonMap<'a>,
         raster: &VisiblePointSampler,
@@ -146,12 +146,12 @@ impl<'a> VisiblePoints<'a> {
         }
     }
 
-    /// Of the places in `map`, each of which stands for what is no further from it than `radius`.
+    /// Visible points `map` with a constant `radius`.
     pub fn within(map: &'a PhotonMap<'a>, radius: f32, level: Level) -> Self {
         Self { map, reach: Reach::Everywhere(radius), level }
     }
 
-    /// Whether a photon at `place`, on a surface of `normal`, is seen.
+    /// Whether a photon at `place`, on a surface with this `normal`, is visible.
     pub(in crate::transport) fn shows(&self, place: Vec3, normal: Vec3) -> bool {
         let radius = match self.reach {
             Reach::RadiusSchedule(discs) => discs.radius(place),
