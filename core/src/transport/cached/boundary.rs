@@ -1,6 +1,6 @@
-//! Fences around the records of the irradiance cache: where, in each direction along the surface, a record
-//! ceases to know what the surface sees. Behind a wall that is seen by rays along the surface; beneath what
-//! hangs low over it, which such rays pass under, and that the strata of the hemisphere have met.
+//! Boundaries of irradiance records: the distance, per direction along the surface, beyond which a record is
+//! not valid. Walls are found by rays along the surface; low overhangs, which these rays pass below, by the
+//! hits of the gather rays.
 
 use crate::bsdf::Features;
 use crate::bvh::Coherence;
@@ -11,25 +11,26 @@ use crate::transport::path::{Estimator, PathIntegrator};
 use crate::transport::settings::Counters;
 use glam::{Vec2, Vec3};
 
-/// Rays along the surface in a ring, for each sector of a record's fence.
+/// Rays along the surface per sector of a record, and per ring.
 const RAYS_PER_SECTOR: usize = 2;
 const RING: usize = SECTORS * RAYS_PER_SECTOR;
 
-/// By how much they rise: low enough for low walls, high enough for the surface's own roundness. Most strata
-/// are higher, and those of a second ring are between.
+/// Slopes of the rays of both rings: low enough for low walls, high enough for the surface's own curvature.
+/// Most gather rays are steeper; the second ring fills the gap.
 const SLOPE: f32 = 0.05;
 const SECOND_SLOPE: f32 = 0.12;
 
-/// What is met lower than so much of its distance along the surface takes so small a part of the hemisphere
-/// that neither gradient nor Hessian tell of what is beneath it.
+/// Slope below which hits of gather rays cover so little of the hemisphere that gradient and Hessian do not
+/// account for the area beneath.
 const LOW: f32 = 0.5;
 
-/// A wall is not nearer between two rays along the surface than by so much; what is hangs.
+/// A hit below this fraction of the wall distance beside it is an overhang: walls do not come nearer between
+/// two rays of a ring.
 const NEARER: f32 = 0.95;
 
 impl<F: Features, E: Estimator<F>> PathIntegrator<'_, F, E> {
-    /// Looks for walls around a record at `place`, and for what hangs over its surroundings in what its
-    /// `strata`, which are local to `frame`, have met.
+    /// Finds walls around a record at `place` by rays, and overhangs around it from the hits of its `strata`,
+    /// which are local to `frame`.
     pub(in crate::transport) fn fence(
         &self,
         record: &mut Record,
@@ -42,7 +43,7 @@ impl<F: Features, E: Estimator<F>> PathIntegrator<'_, F, E> {
         for (&direction, &inverse) in strata.directions.iter().zip(&*strata.inverse_distance) {
             let direction = Vec3::from(direction);
             let along = direction.truncate().length();
-            // Lower ones would meet the surface's own roundness; the surface itself is met at no distance.
+            // Lower rays may hit the surface's own curvature; the surface itself has distance 0.
             let hangs = (SLOPE * along..LOW * along).contains(&direction.z) && inverse.is_finite();
             if hangs && along < record.reach * inverse {
                 let towards = record.along_axes(frame.to_world(direction));
@@ -51,8 +52,8 @@ impl<F: Features, E: Estimator<F>> PathIntegrator<'_, F, E> {
         }
     }
 
-    /// The record of `place`, so many times as wide: it looks farther for walls and for what hangs over it,
-    /// and light changes over its support by as much as before.
+    /// The record of `place` with radii, and search for walls and overhangs, scaled by `factor`; light
+    /// changes over the larger support by as much as before.
     pub fn widened(
         &self,
         record: &Record,
@@ -66,7 +67,7 @@ impl<F: Features, E: Estimator<F>> PathIntegrator<'_, F, E> {
         wide
     }
 
-    /// Looks for walls by rays along the surface, and returns how far they are from ray to ray.
+    /// Finds walls by rays along the surface and returns the distance per ray.
     fn fence_along(&self, record: &mut Record, place: &GatherPoint, counters: &mut Counters) -> [f32; RING] {
         let origin = place.position() + place.error * Vec3::from(place.geometric_normal);
         let rays: [Ray; 2 * RING] = core::array::from_fn(|i| {
@@ -95,13 +96,13 @@ impl<F: Features, E: Estimator<F>> PathIntegrator<'_, F, E> {
     }
 }
 
-/// The direction of ray `i` of a ring, in sectors.
+/// Azimuth of ray `i` of a ring, in sectors.
 fn azimuth(i: usize) -> f32 {
     ((i % RING) as f32 + 0.5) / RAYS_PER_SECTOR as f32
 }
 
-/// Fences off what is met at `distance` in the direction `towards`, where it is nearer than the walls that
-/// the two rays of the first ring beside it have met.
+/// Limits the record at `distance` in the direction `towards`, if that is nearer than the walls hit by the
+/// adjacent rays of the first ring.
 fn hang(record: &mut Record, walls: &[f32; RING], towards: Vec2, distance: f32) {
     let after = (Record::sector(towards) * RAYS_PER_SECTOR as f32 + 0.5) as usize;
     let wall = walls[(after + RING - 1) % RING].min(walls[after % RING]);

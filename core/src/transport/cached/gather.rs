@@ -1,10 +1,9 @@
-//! Final gathering for the irradiance cache: what a diffuse point sees, stratum by stratum, and the record
-//! made of it.
+//! Gather rays of the irradiance cache: one ray per stratum of the hemisphere of a diffuse point, and the
+//! record made from them.
 //!
-//! A gather ray finds the light that what it meets reflects, by path tracing on from there; what it meets
-//! emits or mirrors is direct light, which each path of the picture finds for itself ([`Components`]). All N²
-//! rays of a point make one wave, or several; blocks of 8 × 8 strata go together, so that neighbours reach
-//! the hierarchy together.
+//! A gather ray finds the light that its hit reflects, by path tracing; light that its hit emits or mirrors
+//! is direct light, which each path of the picture finds itself ([`Components`]). All N² rays of a point form
+//! one or several waves, in blocks of 8 × 8 strata for coherent traversal.
 
 use crate::bsdf::Features;
 use crate::bvh::Coherence;
@@ -23,32 +22,33 @@ use crate::transport::wavefront::{PathState, WAVE};
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
-/// Gatherings have numbers of pixels that no picture has.
+/// Offset of the pixel numbers of gathers, beyond those of any picture.
 pub(in crate::transport) const NO_PIXEL: u32 = 1 << 30;
 
-/// From so many strata along a side on those of a block go much the same way: packets save time. Of fewer
-/// they cost it, a quarter of the time of a record in Sponza with 16, a tenth with 32.
+/// Minimum strata along a side for packets. With fewer, the rays of a block diverge, and packets cost a
+/// quarter of the time of a record in Sponza with 16, a tenth with 32.
 const NARROW: usize = 64;
 
-/// A diffuse point where the irradiance is wanted. Both normals are on the side of the viewer.
+/// Diffuse point at which irradiance is gathered. Both normals are on the side of the viewer.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C)]
 pub struct GatherPoint {
     pub(in crate::transport) position: [f32; 3],
-    /// Bound of the error of `position`.
+    /// Error bound of `position`.
     pub(in crate::transport) error: f32,
-    /// The shading normal, of which the hemisphere is gathered.
+    /// Shading normal, the axis of the hemisphere.
     pub(in crate::transport) normal: [f32; 3],
     pub(in crate::transport) geometric_normal: [f32; 3],
     pub(in crate::transport) triangle: u32,
-    /// How wide a pixel is here.
+    /// Width of a pixel at this point.
     pub(in crate::transport) pixel: f32,
-    /// Records that are farther than this are not for it, nor its own for what is: [`QueryPoint::within`].
+    /// Maximum distance of records that are valid here, and of points at which the record of this point is
+    /// valid: [`QueryPoint::within`].
     pub(in crate::transport) within: f32,
 }
 
 impl GatherPoint {
-    /// No place.
+    /// No point.
     pub const NONE: GatherPoint = GatherPoint {
         position: [0.0; 3],
         error: 0.0,
@@ -59,12 +59,12 @@ impl GatherPoint {
         within: f32::INFINITY,
     };
 
-    /// Whether it is a place.
+    /// Whether this is a point.
     pub fn is_some(&self) -> bool {
         self.triangle != MISS
     }
 
-    /// The place of `point`, on which a pixel is as wide as `pixel`.
+    /// Gather point at `point`, where a pixel has the width `pixel`.
     pub(in crate::transport) fn of(point: &SurfacePoint, pixel: f32) -> Self {
         Self {
             position: point.position.to_array(),
@@ -77,40 +77,40 @@ impl GatherPoint {
         }
     }
 
-    /// Where it is.
+    /// Position of the point.
     pub fn position(&self) -> Vec3 {
         self.position.into()
     }
 
-    /// How it asks a cache.
+    /// Query of this point to a cache.
     pub fn asker(&self) -> QueryPoint {
         QueryPoint { position: self.position(), normal: self.normal(), within: self.within }
     }
 
-    /// Whether something hangs so close over it that records of so many pixels are too coarse.
+    /// Whether an overhang is so close that records with radii of `pixels` pixels are too coarse.
     pub fn is_confined(&self, pixels: f32) -> bool {
         self.within < FINE * pixels * self.pixel
     }
 
-    /// The shading normal.
+    /// Shading normal.
     pub fn normal(&self) -> Vec3 {
         self.normal.into()
     }
 
-    /// The width of a pixel here.
+    /// Width of a pixel at this point.
     pub fn pixel(&self) -> f32 {
         self.pixel
     }
 
-    /// A ray into unit `direction` of the world.
+    /// Gather ray along the unit vector `direction`, in world space.
     pub(in crate::transport) fn ray(&self, direction: Vec3) -> Ray {
         let geometric = Vec3::from(self.geometric_normal);
         let ray = Ray::new(self.position() + self.error * geometric, direction);
-        // No light comes from under the surface.
+        // No light arrives from below the surface.
         if direction.dot(geometric) > 0.0 { ray } else { Ray { t_max: -1.0, ..ray } }
     }
 
-    /// The path of a gather ray; `index` says where its light belongs.
+    /// Path of a gather ray; its light belongs to stratum `index`.
     pub(in crate::transport) fn path(&self, pixel: u32, sample: u32, index: usize) -> PathState {
         PathState {
             position: self.position,
@@ -121,26 +121,26 @@ impl GatherPoint {
     }
 }
 
-/// How records are made.
+/// Settings of gathering.
 #[derive(Clone, Copy)]
 pub struct Gathering<'a> {
-    /// Tables for as many strata as are gathered.
+    /// Tables for the number of strata to gather.
     pub flux: &'a CellFlux<'a>,
-    /// How far records are relied upon: within the side of the picture at their place.
+    /// Error metric; its extent is limited to the side of the picture at the distance of the record.
     pub metric: metric::Settings,
-    /// The least radius of a record, in pixels.
+    /// Minimum radius of a record, in pixels.
     pub least_pixels: f32,
 }
 
-/// What the strata of a hemisphere see.
+/// Results of the gather rays per stratum.
 pub(in crate::transport) struct HemisphereSamples<'m> {
     pub(in crate::transport) n: usize,
     pub(in crate::transport) radiance: &'m mut [[f32; 3]],
     pub(in crate::transport) inverse_distance: &'m mut [f32],
     pub(in crate::transport) directions: &'m mut [[f32; 3]],
-    /// Of what is seen, local; empty where the metric does not ask for them.
+    /// Local normals of the hits; empty if the metric does not need them.
     normals: &'m mut [[f32; 3]],
-    /// How many of them see light directly.
+    /// Number of strata that see an emitter or the environment.
     shining: u32,
 }
 
@@ -170,12 +170,12 @@ impl<'m> HemisphereSamples<'m> {
 }
 
 impl<F: Features> PathIntegrator<'_, F> {
-    /// Working memory of [`PathIntegrator::gather`] with n × n strata.
+    /// Scratch memory of [`PathIntegrator::gather`] with n × n strata.
     pub fn gather_scratch(n: usize) -> Footprint {
         Self::gather_scratch_with::<()>(n)
     }
 
-    /// The same with an estimator.
+    /// Scratch memory with an estimator.
     pub fn gather_scratch_with<E: Estimator<F>>(n: usize) -> Footprint {
         let wave = PathWave::<E::State, ()>::footprint(n.saturating_mul(n).min(WAVE));
         wave.and(HemisphereSamples::footprint(n))
@@ -183,11 +183,11 @@ impl<F: Features> PathIntegrator<'_, F> {
 }
 
 impl<F: Features, E: Estimator<F>> PathIntegrator<'_, F, E> {
-    /// Gathers at `place`. `number` names the gathering: another one, other rays. `None` where what was
-    /// found is not a number; it is counted as dropped.
+    /// Gathers a record at `place`. Each `number` has different rays. `None` if the irradiance is not finite,
+    /// which is counted as dropped.
     ///
     /// # Errors
-    /// [`OutOfMemory`] where `scratch` has less than [`PathIntegrator::gather_scratch_with`].
+    /// [`OutOfMemory`] if `scratch` has less than [`PathIntegrator::gather_scratch_with`].
     pub fn gather(
         &self,
         place: &GatherPoint,
@@ -244,7 +244,7 @@ impl<F: Features, E: Estimator<F>> PathIntegrator<'_, F, E> {
         Ok(Some(record))
     }
 
-    /// The `i`th ray of a gathering, and its path.
+    /// Ray `i` of a gather, and its path.
     fn aim(
         &self,
         place: &GatherPoint,
@@ -266,7 +266,7 @@ impl<F: Features, E: Estimator<F>> PathIntegrator<'_, F, E> {
         (ray, place.path(pixel, sample, stratum))
     }
 
-    /// Notes what the ray of a stratum met.
+    /// Stores distance, emission and normal of the hit of a stratum.
     fn note(&self, stratum: usize, hit: &Hit, frame: &Frame, strata: &mut HemisphereSamples) {
         if let Some(slot) = strata.inverse_distance.get_mut(stratum) {
             *slot = 1.0 / hit.t;
@@ -286,7 +286,7 @@ impl<F: Features, E: Estimator<F>> PathIntegrator<'_, F, E> {
     }
 }
 
-/// The stratum of the `i`th ray: blocks of 8 × 8 one after the other where the side allows.
+/// Stratum of ray `i`, in blocks of 8 × 8 if `n` is a multiple of 8.
 #[inline]
 fn stratum(n: usize, i: usize) -> usize {
     if !n.is_multiple_of(8) {

@@ -1,4 +1,4 @@
-//! Irradiance caches as an estimator of the path tracer: reflected light at diffuse points, looked up for a
+//! Irradiance cache as an estimator of the path tracer: reflected light at diffuse vertices, looked up for a
 //! block of vertices at once.
 
 use crate::bsdf::{Bsdf, Features};
@@ -18,11 +18,11 @@ use core::ops::Range;
 
 const _: () = assert!(BLOCK == POINTS, "a block of vertices is looked up at once");
 
-/// Light samples of a path of the picture at a vertex where a cache knows all but direct light.
+/// Number of light samples at a vertex whose indirect light comes from the cache.
 const LIGHT_SAMPLES: u32 = 4;
 
-/// Lights that fill a smaller fraction of a hemisphere, weighted by cosines, are found by shadow rays alone
-/// as well as with the help of BSDF sampling.
+/// Cosine-weighted fraction of the hemisphere below which light samples alone find the lights as well as with
+/// BSDF sampling.
 const SMALL: f32 = 0.1;
 
 /// Irradiance caches that paths look up.
@@ -30,13 +30,14 @@ const SMALL: f32 = 0.1;
 pub enum CacheView<'a> {
     /// Frozen caches of even and of odd samples.
     Pair([&'a IrradianceCache<'a>; 2]),
-    /// The present records of one cache. One record is enough for rays that are averaged.
+    /// One cache with its present records. The first valid record is enough for gather rays, which are
+    /// averaged.
     UnderConstruction(&'a IrradianceCache<'a>),
 }
 
 impl CacheView<'_> {
-    /// Looks up those of `queries` that there are, each with its sample. Writes the distance as far as each
-    /// is `exposed` ([`IrradianceCache::at_all`]).
+    /// Looks up all `queries`, each with its sample number. Writes the distance up to which each is `exposed`
+    /// ([`IrradianceCache::at_all`]).
     fn find(
         &self,
         level: Level,
@@ -65,13 +66,13 @@ impl CacheView<'_> {
     }
 }
 
-/// Whether the path of a ray looks a cache up at `point`, the ray's end; if so, the number of its sample.
+/// Sample number of a path, if the path looks up the cache at `point`, the hit of its ray.
 fn sample_of(wave: &Wavefront, ray: usize, point: &SurfacePoint, settings: &PathSettings) -> Option<u32> {
     let path = wave.paths.get(wave.rays.get(ray)?.tag as usize)?;
     let asks = point.material.surface.may_be_diffuse()
         && path.components.goes_on_from_rough()
         && u32::from(path.segments) < settings.max_depth
-        // Records do not know their distance from the camera.
+        // Records do not store their distance from the camera.
         && (path.segments == 1 || !settings.is_limited());
     asks.then_some(path.sample)
 }
@@ -83,7 +84,7 @@ impl<F: Features> Estimator<F> for CacheView<'_> {
     #[inline]
     fn light_samples(&self, context: &SceneContext<F>) -> u32 {
         match self {
-            // Through cut-outs each path has a place for one shadow ray.
+            // With cut-outs each path has memory for one shadow ray.
             CacheView::Pair(_) if !context.has_cutouts => LIGHT_SAMPLES,
             _ => 1,
         }
@@ -109,7 +110,7 @@ impl<F: Features> Estimator<F> for CacheView<'_> {
         if exposed == [0.0; BLOCK] {
             return;
         }
-        // Points with something close over them are looked up once more.
+        // Points below a close overhang are looked up again.
         let points = asking.map(|asking| asking.map(|(point, _)| point));
         let within = overhang::within(context, &points, &exposed, counters);
         let again = core::array::from_fn(|i| {
@@ -133,8 +134,8 @@ impl<F: Features> Estimator<F> for CacheView<'_> {
         };
         let contribution = vertex.throughput * diffuse.reflectance * indirect.irradiance * FRAC_1_PI;
         add(KnownLight { contribution, blur: Rgb::ZERO });
-        // Where lights are small all around, and nothing mirrors them, a shadow ray alone finds the direct
-        // light. Not that of an environment, which is not sampled where it seemed to be hidden. Both take
+        // Light samples alone estimate direct light if few gather rays saw an emitter and nothing is
+        // specular, but not with an environment, which is not sampled where it seemed hidden. Both cases take
         // several light samples.
         let has_environment = context.scene.environment.is_some();
         let ends = indirect.shining < SMALL && !context.has_mirrors && !has_environment;
@@ -144,14 +145,14 @@ impl<F: Features> Estimator<F> for CacheView<'_> {
 }
 
 impl<'a, F: Features> PathIntegrator<'a, F> {
-    /// The same, where diffuse points have indirect light from a cache as far as it reaches: even samples
-    /// from the first, odd ones from the second. Where depth is limited only the first point of a path has,
-    /// as records do not know their distance from the camera.
+    /// This path tracer with caches of indirect light at diffuse vertices with a valid record: even samples
+    /// use the first, odd samples the second. With a limit of depth only the first vertex of a path does,
+    /// since records do not store their distance from the camera.
     pub fn with_caches(&self, caches: [&'a IrradianceCache<'a>; 2]) -> PathIntegrator<'a, F, CacheView<'a>> {
         self.with_estimator(CacheView::Pair(caches))
     }
 
-    /// The same, for rays that gather for the cache itself, in its present state.
+    /// This path tracer for gather rays, with the records that `cache` has so far.
     pub fn with_growing_cache(&self, cache: &'a IrradianceCache<'a>) -> PathIntegrator<'a, F, CacheView<'a>> {
         self.with_estimator(CacheView::UnderConstruction(cache))
     }

@@ -1,5 +1,5 @@
-//! The irradiance cache in transport: placement of records, their gather rays and boundaries, and their
-//! look-up by paths (Ward et al. 1988; Krivanek et al. 2006).
+//! Irradiance caching in transport: placement of records, their gather rays and boundaries, and lookup by
+//! paths (Ward et al. 1988; Krivanek et al. 2006).
 
 pub(in crate::transport) mod boundary;
 pub mod gather;

@@ -1,8 +1,8 @@
-//! What hangs over places of surfaces: shelves, panels, lamps under ceilings, boards behind furniture. Where
-//! it hangs close, light changes over as little as it is high, and it is seen edge-on from farther away,
-//! where hardly a ray of a hemisphere meets it. So a record knows how low anything hangs over its support, by
-//! a walk through the hierarchy that misses none; and a point that asks it from farther away than that would
-//! allow looks upwards once.
+//! Overhangs above surface points: shelves, panels, lamps below ceilings, boards behind furniture. Below a
+//! close overhang light changes over a distance of its height, and farther points see it edge-on, so that
+//! hardly a gather ray hits it. A record therefore stores the height of overhangs above its support, found by
+//! a complete BVH query; a point farther from the record than this height permits sends probe rays upwards
+//! once.
 
 use crate::bsdf::Features;
 use crate::bvh::Coherence;
@@ -16,30 +16,30 @@ use crate::transport::walk::context::SceneContext;
 use crate::transport::wavefront::BLOCK;
 use glam::{Vec2, Vec3};
 
-/// No record reaches farther, in diagonals of the scene.
+/// Maximum distance to records, in diagonals of the scene.
 const MOST: f32 = 0.25;
 
-/// Ways to look upwards: along the normal, and at half a right angle to all sides.
+/// Directions of the upward probes: along the normal, and at 45 degrees to four sides.
 const WAYS: usize = 5;
 const TILTS: [[f32; 2]; WAYS] = [[0.0, 0.0], [1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]];
 
-/// What is met on one side hangs where it is at most sixty degrees steep; otherwise it is a wall.
+/// Minimum cosine of an overhang's normal to the surface normal, 60 degrees; a steeper hit is a wall.
 const STEEPEST: f32 = 0.5;
 
-/// Of what may hang over a record the planes are less steep than this (the cosine to its normal): the normals
-/// of a record and of the points that ask it differ.
+/// Minimum cosine of an overhang's plane to the normal of a record. It is lower than [`STEEPEST`], since the
+/// normals of a record and of a query point differ.
 const STEEP: f32 = 0.25;
 
-/// A surface that bends upwards, whose heights go with the square of the distance, has risen twice as much
-/// where it is met as it is high there. What hangs has risen less.
+/// Maximum rise of an overhang's plane from the record to its hit, over the height there. A surface that
+/// curves upwards, with heights quadratic in the distance, has a ratio of 2.
 const BENDS: f32 = 1.8;
 
-/// What is no higher over the plane than its points are uncertain, or than so small a part of the reach, is
-/// the same surface.
+/// Height below which a triangle belongs to the surface itself: in error bounds of its points, and as a
+/// fraction of the reach.
 const FLAT: f32 = 4.0;
 const FLATTEST: f32 = 2.5e-5;
 
-/// Where to look from.
+/// Origin, axis and length of upward probes.
 #[derive(Clone, Copy)]
 struct Probe {
     origin: Vec3,
@@ -47,8 +47,8 @@ struct Probe {
     length: f32,
 }
 
-/// The distance as far as records may be used ([`crate::cache::irradiance::QueryPoint::within`]) at each of
-/// `points`, for records that are as far as it is `exposed`.
+/// Distance up to which records are valid at each of `points`
+/// ([`crate::cache::irradiance::QueryPoint::within`]), for records at distances up to `exposed`.
 pub(super) fn within<F: Features>(
     context: &SceneContext<F>,
     points: &[Option<&SurfacePoint>; BLOCK],
@@ -67,8 +67,7 @@ pub(super) fn within<F: Features>(
     within
 }
 
-/// The distance to a surface that hangs over a point and hides light; infinite where it is farther than the
-/// probe is long.
+/// Distance to an overhang that occludes light; infinite if it exceeds the length of the probe.
 fn headroom<F: Features>(context: &SceneContext<F>, probe: &Probe) -> f32 {
     let frame = Frame::from_normal(probe.normal);
     let rays = TILTS.map(|[x, y]| {
@@ -81,7 +80,7 @@ fn headroom<F: Features>(context: &SceneContext<F>, probe: &Probe) -> f32 {
     hanging.map(|hit| hit.t).fold(f32::INFINITY, f32::min)
 }
 
-/// Whether the surface of `hit` hangs over a surface of that normal and hides light. Glass and cut-outs do
+/// Whether `hit` is an overhang above a surface with this `normal`, and occludes light. Glass and cut-outs do
 /// not.
 fn hangs<F>(context: &SceneContext<F>, hit: &Hit, normal: Vec3) -> bool {
     let mesh = &context.scene.mesh;
@@ -96,7 +95,7 @@ fn hangs<F>(context: &SceneContext<F>, hit: &Hit, normal: Vec3) -> bool {
 }
 
 impl<F: Features, E: Estimator<F>> PathIntegrator<'_, F, E> {
-    /// Measures the height of surfaces that hang over each of `places`, as far as records reach.
+    /// Measures the height of overhangs above each of `places`, up to the maximum distance to records.
     pub fn look_up(&self, places: &mut [GatherPoint], counters: &mut Counters) {
         let length = MOST * self.context.bvh.bounds().diagonal();
         for place in places.iter_mut().filter(|place| place.is_some()) {
@@ -108,11 +107,11 @@ impl<F: Features, E: Estimator<F>> PathIntegrator<'_, F, E> {
         }
     }
 
-    /// Notes what hangs over the support of a record at `place`, and over the place.
+    /// Stores the overhangs above the support of a record at `place`, and above the place itself.
     pub(in crate::transport) fn note_overhangs(&self, record: &mut Record, place: &GatherPoint) {
         record.confine(place.within);
         let least = FINE * record.least;
-        // Higher than this nothing matters, and what is met at a tilt is as far outside.
+        // Higher overhangs do not matter; a tilted probe may hit one outside by as much as this height.
         let height = record.reach.max(least) / CLOSE;
         let reach = record.reach + height;
         let (middle, normal) = (place.position(), Vec3::from(place.geometric_normal));
@@ -130,7 +129,7 @@ impl<F: Features, E: Estimator<F>> PathIntegrator<'_, F, E> {
             }
             let offsets = corners.map(|corner| corner - middle);
             let heights = offsets.map(|offset| offset.dot(normal));
-            // Most triangles near a record are the surface itself.
+            // Most triangles near a record belong to the surface itself.
             if heights.iter().all(|height| *height <= flat) {
                 return true;
             }
@@ -149,18 +148,18 @@ impl<F: Features, E: Estimator<F>> PathIntegrator<'_, F, E> {
     }
 }
 
-/// A triangle that hangs over a disc.
+/// Triangle above a disc.
 struct Overhang {
-    /// The sectors that it may take, which count on around the circle.
+    /// First and last sector of the triangle, beyond 16 around the circle.
     sectors: [i32; 2],
-    /// How far from the middle it may begin, and how low it may come.
+    /// Minimum distance from the centre, and minimum height.
     from: f32,
     height: f32,
 }
 
 impl Overhang {
-    /// The triangle of these corners, over a disc of that radius around the origin in the plane z = 0; what
-    /// is no higher than `flat` is the plane.
+    /// Triangle `corners` above the disc of radius `reach` around the origin in the plane z = 0. Heights up
+    /// to `flat` belong to the plane.
     fn of(corners: [Vec3; 3], reach: f32, flat: f32) -> Option<Self> {
         let [a, b, c] = corners;
         let (highest, lowest) = (a.max(b).max(c), a.min(b).min(c));
@@ -173,7 +172,7 @@ impl Overhang {
         if is_steep {
             return None;
         }
-        // The height of its plane over the middle, and its slope.
+        // Height of the triangle's plane above the centre, and its slope.
         let (middle, slope) = (normal.dot(a) / normal.z, normal.truncate().length() / normal.z.abs());
         let height = lowest.z.max(middle - reach * slope).max(0.0);
         let bends = middle <= 0.0 && height - middle >= BENDS * height;
@@ -185,18 +184,18 @@ impl Overhang {
         if from <= 2.0 * height {
             return Some(Self { sectors: [0, SECTORS as i32 - 1], from, height });
         }
-        // The origin is outside: no corner is half a circle away from another.
+        // The origin is outside: no two corners are half a circle apart.
         let [first, second, third] = flat.map(Record::sector);
         let half = SECTORS as f32 / 2.0;
         let turn = |to: f32| (to - first + 3.0 * half) % (2.0 * half) - half;
         let (low, high) = (turn(second).min(turn(third)).min(0.0), turn(second).max(turn(third)).max(0.0));
-        // What is met at a tilt is at most in the next sector.
+        // A tilted probe hits at most the adjacent sector.
         let sectors = [libm::floorf(first + low) as i32 - 1, libm::floorf(first + high) as i32 + 1];
         Some(Self { sectors, from, height })
     }
 }
 
-/// How far the origin is from a triangle; 0 inside.
+/// Distance from the origin to a triangle; 0 inside.
 fn distance(corners: [Vec2; 3]) -> f32 {
     let [a, b, c] = corners;
     let sides = [(a, b), (b, c), (c, a)];

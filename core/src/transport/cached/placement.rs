@@ -1,6 +1,5 @@
-//! Gather points of the picture: the order of its pixels from coarse to fine, in which the first n pixels are
-//! spread evenly, whatever n is, and the diffuse point that a pixel sees directly or through other surfaces
-//! ([`Via`]).
+//! Gather points of the picture: its pixels in coarse-to-fine order, of which the first n are evenly spread
+//! for any n, and the diffuse point that a pixel sees directly or through other surfaces ([`Via`]).
 
 use crate::bsdf::{Bsdf, Features};
 use crate::bvh::Coherence;
@@ -15,61 +14,60 @@ use crate::transport::walk::dimension;
 use core::f32::consts::PI;
 use glam::Vec3;
 
-/// Pixels that a task looks through.
+/// Number of pixels of a task.
 pub const PIXELS: usize = 64;
 
-/// Mirrors and panes behind each other that it looks through.
+/// Maximum number of surfaces on the way to the diffuse point.
 const MOST_BOUNCES: u32 = 16;
 
-/// Where the shading normal deviates by more than this from that of the surface (a cosine), it is of details
-/// that no record could serve.
+/// Minimum cosine of the shading normal to the geometric normal; beyond it the normals are of details too
+/// small for records.
 const SMOOTH: f32 = 0.9;
 
-/// A record that is seen in a rough surface is one of many that a pixel sees: in the lobe of a direction of
-/// density p, whose radius is about 1 / √(π p), there is room for so many pixels' widths side by side.
+/// Number of pixel widths across a lobe of pdf p, whose radius is about 1 / √(π p). A record seen in a rough
+/// surface is one of many in the pixel, and may be as coarse as that.
 const PER_LOBE: f32 = 16.0;
 
-/// How the points that are looked for are seen.
+/// Way in which the camera sees gather points.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Via {
-    /// Directly, or through mirrors and glass.
+    /// Directly, or by specular surfaces.
     Specular,
-    /// By light that a rough surface scatters, once or more often.
+    /// After one or more scatterings at rough surfaces.
     Glossy,
 }
 
-/// The pixels of a picture, evenly spread from the first on: every other of every `stride`th column and row
-/// last.
+/// Pixels of a picture in an evenly spread order, restricted to every `stride`th column and row.
 #[derive(Clone, Copy, Debug)]
 pub struct ProgressiveOrder {
     width: u32,
     height: u32,
     stride: u32,
-    /// Bits of a column or row, in strides.
+    /// Number of bits of a column or row, in strides.
     bits: u32,
 }
 
 impl ProgressiveOrder {
-    /// Every `stride`th pixel across and down of `width` by `height`; the stride is brought up to a power of
-    /// two.
+    /// Order of every `stride`th pixel across and down of `width` by `height`; the stride is rounded up to a
+    /// power of two.
     pub fn new(width: u32, height: u32, stride: u32) -> Self {
         let stride = stride.clamp(1, 1 << 15).next_power_of_two();
         let longest = width.max(height).div_ceil(stride).max(1);
         Self { width, height, stride, bits: longest.next_power_of_two().trailing_zeros() }
     }
 
-    /// Steps of the order; some have no pixel.
+    /// Number of steps; some have no pixel.
     pub fn len(&self) -> u64 {
         1 << (2 * self.bits)
     }
 
-    /// Never: there is always one step.
+    /// Always false: there is at least one step.
     pub fn is_empty(&self) -> bool {
         false
     }
 
-    /// Column and row of step `i`, where there is such a pixel: the bits of i, dealt out from the highest of
-    /// the column and the row down.
+    /// Column and row of step `i`, if that pixel exists. The bits of i alternate between column and row, from
+    /// the highest bit of each down.
     pub fn pixel(&self, i: u64) -> Option<(u32, u32)> {
         let (mut x, mut y) = (0, 0);
         for bit in 0..self.bits {
@@ -82,9 +80,9 @@ impl ProgressiveOrder {
 }
 
 impl<F: Features, E: Estimator<F>> PathIntegrator<'_, F, E> {
-    /// What sample `sample` of the pixels of [`PIXELS`] steps from `first` on sees first that is diffuse, in
-    /// the way of `sight`; into `out`, in their order. Places without triangle ([`GatherPoint::is_some`])
-    /// where there is no pixel or nothing diffuse.
+    /// First diffuse points that sample `sample` of the pixels of [`PIXELS`] steps from `first` sees in the
+    /// way `sight`, written to `out` in order. A step without pixel or diffuse point gives a place without
+    /// triangle ([`GatherPoint::is_some`]).
     pub fn places(
         &self,
         order: &ProgressiveOrder,
@@ -114,13 +112,13 @@ impl<F: Features, E: Estimator<F>> PathIntegrator<'_, F, E> {
         }
     }
 
-    /// Whether anything may be seen in a rough surface.
+    /// Whether the scene may have rough surfaces.
     pub fn has_rough_surfaces(&self) -> bool {
         self.context.scene.materials.iter().any(|material| material.surface.may_be_rough())
     }
 
-    /// The diffuse point that a camera ray comes to from `hit` on, and the width of a pixel there, which is
-    /// `spread` at a distance of 1.
+    /// First diffuse point of a camera ray with first hit `hit`, and the width of a pixel there; `spread` is
+    /// the width at distance 1.
     fn first_diffuse(
         &self,
         (ray, mut hit): (Ray, Hit),
