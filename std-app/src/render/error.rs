@@ -4,27 +4,27 @@ use halflight_core::memory::OutOfMemory;
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// Why there is no picture.
+/// Reasons why there is no picture.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum RenderError {
-    /// The picture has no pixels, or more than can be counted.
+    /// The picture has no pixels, or more than 2^28.
     Size,
-    /// The reference has another size.
+    /// The reference differs in size.
     Reference,
-    /// The memory allowed does not suffice.
+    /// The memory limit does not suffice.
     Memory {
-        /// Bytes that are needed by what was asked for until then.
+        /// Bytes needed up to the failing structure.
         needed: usize,
-        /// Bytes that were allowed, or that the system gave.
+        /// Bytes allowed by the limit or given by the system.
         available: usize,
     },
     /// The threads could not be started.
     Threads(String),
-    /// There are not as many tiles as shards, or no such shard.
+    /// No such shard, or more shards than tiles.
     Shard,
-    /// A cache is to be loaded or saved, and the method has none.
+    /// A cache is to be loaded or saved, but the method has none.
     NoCache,
-    /// A file of a film or a cache cannot be used.
+    /// A film or cache file cannot be used.
     File(FileError),
 }
 
@@ -58,7 +58,7 @@ impl From<FileError> for RenderError {
     }
 }
 
-/// A film or a cache that cannot be read, written, continued or merged, and why.
+/// A film or cache file that cannot be read, written, continued or merged, with the reason.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct FileError {
     file: PathBuf,
@@ -70,7 +70,7 @@ impl FileError {
         Self { file: file.to_owned(), reason: reason.into() }
     }
 
-    /// An error of reading.
+    /// An error of reading a file.
     pub(super) fn io(file: &Path, error: &io::Error) -> Self {
         let reason = match error.kind() {
             io::ErrorKind::NotFound => "no such file".into(),

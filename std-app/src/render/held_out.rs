@@ -1,4 +1,4 @@
-//! Points of a picture that no record was made for, and the exact indirect irradiance there.
+//! Held-out points of a picture, for which no record was made, with their exact indirect irradiance.
 
 use super::RenderError;
 use halflight_core::Rgb;
@@ -10,13 +10,13 @@ use halflight_core::transport::cached::gather::{GatherPoint, Gathering};
 use halflight_core::transport::cached::placement::{PIXELS, ProgressiveOrder, Via};
 use halflight_core::transport::{Counters, PathIntegrator};
 
-/// Rays along a side of a gathering at such a point.
+/// Strata along a side of the hemisphere at a held-out point.
 pub(super) const EXACT: usize = 64;
 
-/// A sample of its own for the points.
+/// Sample number reserved for held-out points.
 const SAMPLE: u32 = 1000;
 
-/// See the file.
+/// A held-out point.
 pub(super) struct Point {
     pub(super) place: GatherPoint,
     /// Column and row.
@@ -31,14 +31,14 @@ pub(super) fn luminance(light: Rgb) -> f64 {
     f64::from(halflight_core::light::luminance(light))
 }
 
-/// The picture in so many squares: pixels along the side of one, a power of two.
+/// Side in pixels of the squares that divide the picture into about `points` parts; a power of two.
 pub(super) fn stride([width, height]: [u32; 2], points: u32) -> u32 {
     let each = f64::from(width) * f64::from(height) / f64::from(points.max(1));
     (each.sqrt() as u32).max(1).next_power_of_two()
 }
 
-/// About `points` points, spread evenly over the picture; at each is gathered `repeats` times, at least twice.
-/// `None` where the executor ends it early.
+/// About `points` points, spread evenly over the picture, each gathered `repeats` times and at least twice.
+/// `None` if the executor ends early.
 pub(super) fn held_out<F: Features>(
     tracer: &PathIntegrator<F>,
     size: [u32; 2],
@@ -72,7 +72,7 @@ pub(super) fn held_out<F: Features>(
         let mut counters = Counters::default();
         let mut found = Vec::new();
         for repeat in 0..repeats {
-            // Numbers that no record has.
+            // Random streams that no record uses.
             let number = 1 << 29 | (repeats * task as u32 + repeat);
             let gathered = tracer.gather(place, number, &gathering, &mut worker.scratch, &mut counters)?;
             let Some(record) = gathered else { return Ok(counters) };

@@ -1,5 +1,5 @@
-//! How a picture came to be: what was known after each round. Comparing with a reference is measuring, not
-//! rendering, so the clock stands still meanwhile.
+//! State of a picture after each round. Comparison with a reference is no part of rendering, so it pauses the
+//! clock.
 
 use super::ErrorEstimate;
 use crate::compare::Observer;
@@ -8,23 +8,23 @@ use core::time::Duration;
 use halflight_core::estimate::Difference;
 use std::time::Instant;
 
-/// What was known after a round.
+/// State after a round.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Round {
     /// Seconds of rendering up to here.
     pub seconds: f64,
-    /// Samples of each pixel.
+    /// Samples per pixel.
     pub spp: u32,
     /// Rays of every kind.
     pub rays: u64,
-    /// The error as estimated; of the last round, and of those before it that have an eighth more samples than the last with it,
-    /// and sixteen or twice as many.
+    /// Estimated error: of the last round, and of earlier rounds after an eighth more samples each, sixteen
+    /// more, or twice as many.
     pub error: Option<ErrorEstimate>,
-    /// The error against the reference, where there is one.
+    /// Error against the reference, if there is one.
     pub reference: Option<Against>,
 }
 
-/// The error against a reference.
+/// Error against a reference.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Against {
     /// MSE and relMSE.
@@ -33,7 +33,7 @@ pub struct Against {
     pub flip: f64,
 }
 
-/// A reference, and what the observer of FLIP has seen of it.
+/// A reference, prepared for FLIP.
 pub(super) struct Reference<'a> {
     image: &'a Image,
     observer: Observer,
@@ -44,7 +44,7 @@ impl<'a> Reference<'a> {
         Self { image, observer: Observer::of(image) }
     }
 
-    /// The error of `image`, of the size of the reference.
+    /// Error of `image`, which has the size of the reference.
     pub(super) fn compare(&self, image: &Image) -> Against {
         let linear = Difference::between(image.colours(), self.image.colours());
         Against { linear, flip: self.observer.mean(image) }
@@ -59,7 +59,7 @@ pub(super) struct Clock {
 }
 
 impl Clock {
-    /// `before` seconds were spent in earlier runs.
+    /// Starts after `before` seconds of earlier runs.
     pub(super) fn start(before: f64) -> Self {
         Self { start: Instant::now(), paused: Duration::ZERO, before }
     }
@@ -68,7 +68,7 @@ impl Clock {
         self.before + self.start.elapsed().saturating_sub(self.paused).as_secs_f64()
     }
 
-    /// Runs `work` while the clock stands still.
+    /// Runs `work` with the clock paused.
     pub(super) fn pause<T>(&mut self, work: impl FnOnce() -> T) -> T {
         let begin = Instant::now();
         let result = work();

@@ -2,7 +2,7 @@
 
 use halflight_core::film::{Dropped, Film, TILE, Tile};
 
-/// A part of the picture, up to four pixels at its borders, in which samples were dropped.
+/// A tile with rejected samples, smaller at the borders of the picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Place {
     /// Column of its upper left pixel.
@@ -13,7 +13,7 @@ pub struct Place {
     pub width: u32,
     /// Pixels down.
     pub height: u32,
-    /// How many, by cause.
+    /// Number of rejected samples by cause.
     pub dropped: Dropped,
 }
 
@@ -29,7 +29,7 @@ pub(super) fn places(dropped: &[Dropped], width: u32, height: u32) -> Vec<Place>
     places
 }
 
-/// Pixels of the tiles in `tasks` without a single sample: all of theirs were dropped.
+/// Pixels of the tiles in `tasks` without samples, because all were rejected.
 pub(super) fn empty_pixels(film: &Film, tasks: impl Fn(usize) -> bool) -> u64 {
     let inside = |task: usize, i: usize| Tile::new(film.width(), film.height(), task).pixel(i).is_some();
     let tiles = film.pixels().chunks(halflight_core::film::PIXELS_PER_TILE).enumerate();

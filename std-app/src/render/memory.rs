@@ -1,4 +1,5 @@
-//! The bytes behind the arenas: counted, held against the limit, asked of the system without aborting.
+//! Memory of arenas: counted, checked against the limit, and requested from the system without aborting on
+//! failure.
 
 use super::{RenderError, Settings};
 use crate::compare::working_bytes;
@@ -16,22 +17,22 @@ pub struct MemoryUse {
     pub bytes: usize,
 }
 
-/// The owner of memory that lives as long as the picture.
+/// Owner of memory that lives as long as the picture.
 pub(super) type Bank = typed_arena::Arena<Vec<Line>>;
 
-/// What is taken now, and the most that ever was.
+/// Bytes in use, and their peak.
 pub(super) struct Memory<'m> {
     bank: &'m Bank,
-    /// What was asked for: structures that can be smaller are, where it is short.
+    /// Requested limit; near it, optional structures are smaller.
     limit: Option<usize>,
-    /// What nothing goes beyond. Without a limit it depends on the machine, and nothing else may.
+    /// Hard limit. Without a requested limit it depends on the machine, and must influence nothing else.
     wall: usize,
     uses: Vec<MemoryUse>,
     peak: usize,
 }
 
 impl<'m> Memory<'m> {
-    /// Counts the buffers of `scene`, and the reference with what comparing takes, as taken.
+    /// Counts as taken: the buffers of `scene`, and the reference with the memory of comparisons.
     pub(super) fn new(scene: &Scene, settings: &Settings, bank: &'m Bank) -> Self {
         let limit = settings.memory;
         let wall = Budget::new(limit).limit();
@@ -45,22 +46,22 @@ impl<'m> Memory<'m> {
         memory
     }
 
-    /// The same limits, for memory that lives as long as another `bank`, until [`Memory::rejoin`].
+    /// The same accounts for memory of another `bank`, until [`Memory::rejoin`].
     pub(super) fn within<'n>(&mut self, bank: &'n Bank) -> Memory<'n> {
         Memory { bank, uses: core::mem::take(&mut self.uses), ..*self }
     }
 
-    /// Counts what was taken by [`Memory::within`].
+    /// Takes over the counts of memory from [`Memory::within`].
     pub(super) fn rejoin(&mut self, other: Memory) {
         (self.uses, self.peak) = (other.uses, other.peak);
     }
 
-    /// Bytes that a file may take while it is read.
+    /// Bytes available for reading a file.
     pub(super) fn for_file(&self) -> usize {
         self.wall.saturating_sub(self.total())
     }
 
-    /// Lines of `footprint` bytes for `structure`.
+    /// Takes `footprint` bytes for `structure`.
     pub(super) fn take(
         &mut self,
         structure: &'static str,
@@ -80,7 +81,7 @@ impl<'m> Memory<'m> {
         Ok(lines)
     }
 
-    /// Counts `footprint` bytes for `structure`, which takes them elsewhere.
+    /// Counts `footprint` bytes of `structure` that are allocated elsewhere.
     pub(super) fn set_aside(
         &mut self,
         structure: &'static str,
@@ -91,7 +92,7 @@ impl<'m> Memory<'m> {
         Ok(())
     }
 
-    /// As [`Self::take`], for what is read in no order.
+    /// As [`Self::take`], for memory read in random order.
     pub(super) fn take_pages(
         &mut self,
         structure: &'static str,
@@ -104,7 +105,7 @@ impl<'m> Memory<'m> {
         Ok(pages)
     }
 
-    /// All that is taken once `footprint` is as well.
+    /// Bytes in use after `footprint` more; an error beyond the hard limit.
     fn needed(&self, footprint: Footprint) -> Result<usize, OutOfMemory> {
         let needed = self.total().saturating_add(footprint.bytes());
         match needed > self.wall {
@@ -122,7 +123,7 @@ impl<'m> Memory<'m> {
         self.peak = self.peak.max(self.total());
     }
 
-    /// The same `count` times over: working memory for each thread.
+    /// Takes `footprint` bytes `count` times: working memory of each thread.
     pub(super) fn take_each(
         &mut self,
         structure: &'static str,
@@ -132,22 +133,22 @@ impl<'m> Memory<'m> {
         (0..count).map(|_| self.take(structure, footprint)).collect()
     }
 
-    /// Bytes that are left of the limit, where there is one.
+    /// Bytes left below the limit; unlimited without one.
     pub(super) fn available(&self) -> usize {
         self.limit.map_or(usize::MAX, |limit| limit.saturating_sub(self.total()))
     }
 
-    /// Whether `bytes` more are within the limit, where there is one.
+    /// Whether `bytes` more stay within the limit.
     pub(super) fn has(&self, bytes: usize) -> bool {
         self.limit.is_none_or(|limit| self.total().saturating_add(bytes) <= limit)
     }
 
-    /// Says that what `structure` took is free again.
+    /// Frees the count of `structure`.
     pub(super) fn give_back(&mut self, structure: &'static str) {
         self.uses.retain(|other| other.structure != structure);
     }
 
-    /// The most bytes that were taken at any time.
+    /// Peak of the bytes in use.
     pub(super) fn peak(&self) -> usize {
         self.peak
     }

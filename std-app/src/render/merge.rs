@@ -1,4 +1,4 @@
-//! Shards of one picture put together: the same bits as one render.
+//! Merging of the shards of a picture, with the bits of a single render.
 
 use super::ErrorEstimate;
 use super::audit::{self, Audited};
@@ -17,35 +17,35 @@ use halflight_core::method::{RenderState, Shard};
 use halflight_core::transport::Counters;
 use std::path::PathBuf;
 
-/// A picture from shards, and what is known of it.
+/// A merged picture with its statistics.
 #[derive(Clone, Debug)]
 pub struct Merged {
     /// The picture.
     pub image: Image,
-    /// Samples of each pixel.
+    /// Samples per pixel.
     pub spp: u32,
-    /// Seconds of rendering of all shards together.
+    /// Seconds of rendering, summed over all shards.
     pub seconds: f64,
-    /// Paths, rays and dropped samples.
+    /// Paths, rays and rejected samples.
     pub counters: Counters,
-    /// Where samples were dropped, the worst first.
+    /// Tiles with rejected samples, most first.
     pub places: Vec<Place>,
-    /// Pixels that are black because all of their samples were dropped.
+    /// Black pixels, whose samples were all rejected.
     pub empty_pixels: u64,
-    /// Whether the method has a bias, as the blur of photons is one. Where nobody looked for it, it is not in the error.
+    /// Whether the method is biased, for instance by photon blur. An unmeasured bias is not in the error.
     pub is_biased: bool,
-    /// The error: estimated from the two half-films, and with the bias where all shards were audited.
+    /// Error from the two half-films, including bias if all shards were audited.
     pub error: Option<ErrorEstimate>,
-    /// Noise and what photons blur, where there are photons and no audit.
+    /// Noise and photon blur, if there are photons and no audit.
     pub blurred: Option<Blurred>,
-    /// What their audits found together.
+    /// Merged result of the shards' audits.
     pub audit: Option<Audited>,
 }
 
 /// Merges the films in `files`, in any order.
 ///
 /// # Errors
-/// Names the file that does not belong to the first one and why, or the shards that are missing or there twice.
+/// Names the first file that does not belong to the first one and why, or missing and repeated shards.
 pub fn merge(files: &[PathBuf]) -> Result<Merged, RenderError> {
     let most = Budget::new(None).limit();
     let films = files.iter().map(|file| Reader::open(file, most)).collect::<Result<Vec<_>, _>>()?;
@@ -66,7 +66,7 @@ pub fn merge(files: &[PathBuf]) -> Result<Merged, RenderError> {
     let is_biased = first.header.method().is_some_and(Method::is_biased);
     let mut lines = Vec::new();
     let needed = RenderState::footprint(width, height).bytes();
-    // The picture, and what tells its error.
+    // The picture, and the data of its error estimate.
     let beside = 64 * width as usize * height as usize;
     if needed.saturating_add(beside) > most {
         return Err(RenderError::Memory { needed: needed.saturating_add(beside), available: most });

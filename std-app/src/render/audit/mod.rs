@@ -1,5 +1,5 @@
-//! The audit of a picture: a few of its pixels are rendered by the unbiased path tracer as well, in step with it. What
-//! both differ by beyond their noise is bias (docs/decisions/0011).
+//! Audit of a picture: the unbiased path tracer renders some of its pixels as well, in step with the picture.
+//! Their difference beyond noise is bias (docs/decisions/0011).
 
 mod choice;
 mod shards;
@@ -22,30 +22,30 @@ use halflight_core::transport::{CausticMerging, Counters, PathIntegrator, path::
 use serde::{Deserialize, Serialize};
 use std::time::Instant;
 
-/// The share of the work of a biased picture that goes into its audit where nothing else is asked for.
+/// Default share of the work that goes into the audit of a biased picture.
 pub(super) const SHARE: f64 = 0.05;
 
-/// Pixels are audited so many samples at a time, which keeps the parts of their halves equal.
+/// Samples of audited pixels per step, a multiple of four for equal parts of both half-films.
 const STEP: u32 = 4;
 
 /// Audited pixels of one task.
 const PIXELS_PER_TASK: usize = 8;
 
-/// Samples of each audited pixel by which it must have seen all light of the picture.
+/// Samples per audited pixel within which audit paths must find all light of the picture.
 const SEEN: f64 = 256.0;
 
-/// Seconds of samples after which the clock, and whoever waits, are asked again.
+/// Longest run of samples in seconds before clock and caller are asked again.
 const LONGEST: f64 = 0.25;
 
-/// Makes the random numbers of the audit others than those of the picture.
+/// Makes the audit's random numbers differ from those of the picture.
 const OTHER_SEED: u32 = 0x5eed_a0d1;
 
-/// Samples of single pixels by the path tracer, joined with photons of caustics if there are any.
+/// Path-traced samples of single pixels, merged with caustic photons if given.
 type Truth<'a> = dyn Fn(Samples, Option<CausticMerging>, &mut Arena, &mut [Pixel]) -> Result<Counters, OutOfMemory>
     + Sync
     + 'a;
 
-/// Samples of the pixels in these columns and rows.
+/// Pixels as column and row, and the range of their samples.
 type Samples<'s> = (&'s [[u32; 2]], Range<u32>);
 
 /// Working memory of a thread.
@@ -53,47 +53,47 @@ fn scratch<F: Features>() -> Footprint {
     PathIntegrator::<F>::scratch_with::<((), CausticMerging), ()>(WAVE)
 }
 
-/// See the file.
+/// An audit in progress.
 pub(super) struct Audit<'a> {
     truth: Box<Truth<'a>>,
-    /// Whose pixels are audited.
+    /// Shard whose pixels are audited.
     shard: Shard,
-    /// Whether work is time. Otherwise it is rays, which are the same each time.
+    /// Whether work is measured in seconds. Otherwise it is counted in rays, which are the same in each run.
     by_clock: bool,
     seed: u32,
     scratch: Vec<Vec<Line>>,
-    /// Of each pixel, where the method knows them, until pixels are chosen.
+    /// Risk of each pixel, if the method knows it, until the pixels are chosen.
     risks: Vec<f32>,
     state: State,
 }
 
-/// All that a film file keeps of an audit.
+/// State of an audit in a film file.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(super) struct State {
-    /// Of the work of picture and audit together.
+    /// Share of the total work of picture and audit.
     share: f64,
     places: Vec<[u32; 2]>,
     shares: Vec<f32>,
-    /// The bits of the audited pixels.
+    /// Bits of the audited pixels.
     pixels: Vec<[u32; size_of::<Pixel>() / 4]>,
     taken: u32,
     rays: u64,
     seconds: f64,
-    /// Whether paths were joined with photons of the picture, whose blur they do not see.
+    /// Whether paths were merged with the picture's photons, whose blur the audit then cannot see.
     #[serde(default)]
     has_photons: bool,
-    /// The share of the picture's light that its paths as good as never find, by a first look with photons.
+    /// Share of the picture's light that audit paths practically never find, by a prepass with photons.
     #[serde(default)]
     unseen: f64,
 }
 
 impl State {
-    /// Whether it is one that was written.
+    /// Whether the lists have equal lengths, as in every state written.
     pub(super) fn is_whole(&self) -> bool {
         self.places.len() == self.pixels.len() && self.places.len() == self.shares.len()
     }
 
-    /// What is known of the bias of `film`, of mean `mean`, whose own noise tells `noise`.
+    /// Estimated bias of `film`, whose mean is `mean` and whose noise is `noise`.
     pub(super) fn verdict(&self, film: &Film, mean: f64, noise: ErrorEstimate) -> Option<Audited> {
         let Self { share, places, shares, pixels, taken, rays, seconds, has_photons, unseen } = self;
         let truth: &[Pixel] = bytemuck::cast_slice(pixels);
@@ -111,14 +111,14 @@ impl State {
     }
 }
 
-/// The share of the work that the audit of a picture has; `None` where there is none.
+/// Share of the work for the audit; `None` without an audit.
 fn share(settings: &Settings, is_biased: bool) -> Option<f64> {
     let share = settings.audit.unwrap_or(if is_biased { SHARE } else { 0.0 });
     (share > 0.0).then_some(share)
 }
 
 impl<'a> Audit<'a> {
-    /// The audit that the settings ask for.
+    /// Sets up the audit that the settings ask for.
     pub(super) fn new<F: Features>(
         stage: &Stage<'a>,
         memory: &mut Memory,
@@ -127,12 +127,12 @@ impl<'a> Audit<'a> {
         let Stage { settings, workers, .. } = *stage;
         let Some(share) = share(settings, method.is_biased()) else { return Ok(None) };
         let mut scratch = memory.take_each("audit", scratch::<F>(), workers.count())?;
-        // The pixels themselves are counted and not taken: they are kept where a film file can find them.
+        // Pixels are counted but not taken here: they stay where film files can find them.
         let pixels = choice::count(settings.width, settings.height);
         memory.set_aside("audit", Footprint::default().slice::<Pixel>(pixels))?;
         let seed = settings.seed ^ OTHER_SEED;
         let tracer = stage.paths::<F>(seed);
-        // Others lend the audit the photons that they have, or find no more than its paths.
+        // Other methods lend the audit their photons, or find no more light than its paths.
         let samples = SEEN * pixels as f64 / (f64::from(settings.width) * f64::from(settings.height));
         let unseen = match method.finds_caustics() {
             true => {
@@ -155,7 +155,7 @@ impl<'a> Audit<'a> {
         }))
     }
 
-    /// Bytes that it is going to take: a method that takes what it can get leaves so many.
+    /// Bytes that the audit will take; methods that take all available memory leave them free.
     pub(super) fn bytes<F: Features>(stage: &Stage, is_biased: bool) -> usize {
         let Stage { settings, workers, lights, .. } = *stage;
         if share(settings, is_biased).is_none() {
@@ -172,25 +172,25 @@ impl<'a> Audit<'a> {
         self.state.places.is_empty()
     }
 
-    /// Chooses its pixels by these risks ([`choice::choose`]).
+    /// Sets the risks for the choice of pixels ([`choice::choose`]).
     pub(super) fn weigh(&mut self, risks: Vec<f32>) {
         self.risks = risks;
     }
 
-    /// What a film file keeps.
+    /// State for a film file.
     pub(super) fn state(&self) -> &State {
         &self.state
     }
 
-    /// Goes on where a film file ended.
+    /// Continues from the state of a film file.
     pub(super) fn resume(&mut self, state: State) {
         self.state = State { share: self.state.share, ..state };
     }
 
-    /// Takes the samples that are due after so many `rays` of the picture, or `seconds` of picture and audit; fewer where
-    /// there is no time for all of them. Pixels are chosen in the first step, by the film. Where the picture has `photons` of
-    /// caustics, paths are joined with the same ones, those of each half with photons that the other half does not know; their
-    /// blur is in both, and not seen.
+    /// Takes the samples that are due after `rays` of the picture, or `seconds` of picture and audit, or
+    /// fewer if time is short. The first step chooses the pixels by the film. With caustic `photons` of the
+    /// picture, paths of each half-film are merged with photons unknown to the other half; their blur is in
+    /// both and stays undetected.
     pub(super) fn step(
         &mut self,
         workers: &Workers,
@@ -215,7 +215,7 @@ impl<'a> Audit<'a> {
                 false => (self.state.rays as f64, per_picture * rays as f64),
             };
             let State { taken, .. } = self.state;
-            // What a sample costs is known better and better.
+            // The cost of a sample is estimated better in each iteration.
             let samples = match taken {
                 0 => STEP,
                 _ => (((due - spent) * f64::from(taken) / spent) as u32).min(3 * taken) / STEP * STEP,
@@ -232,14 +232,15 @@ impl<'a> Audit<'a> {
         }
     }
 
-    /// After its first samples, and as many as `spp` of each pixel of the picture in so many `rays`: where audited pixels are going
-    /// to be noisier than those of the picture, more samples of fewer of them tell more.
+    /// Reduces the number of audited pixels after their first samples, if they will be noisier than the
+    /// picture's: fewer pixels with more samples then estimate the bias better. The picture has taken `spp`
+    /// samples per pixel and `rays` rays.
     pub(super) fn focus(&mut self, audited: &Audited, (rays, spp): (u64, u32)) {
         let State { share, places, shares, taken, rays: own, .. } = &self.state;
         if *taken != STEP || *own == 0 {
             return;
         }
-        // Samples of an audited pixel for each of the picture's.
+        // Samples of an audited pixel per sample of a picture's pixel.
         let rate = share / (1.0 - share) * rays as f64 / f64::from(spp) * f64::from(*taken) / *own as f64;
         let wanted = places.len() as f64 * rate * f64::from(spp) / (f64::from(*taken) * audited.imbalance);
         let many = (wanted as usize).max(choice::ENOUGH);
@@ -252,7 +253,8 @@ impl<'a> Audit<'a> {
         self.state.shares = kept.into_iter().map(|(_, share)| share).collect();
     }
 
-    /// Takes a quarter more samples than there are, whatever is due, some at a time, as long as it `may`; whether it did.
+    /// Takes a quarter more samples in steps while `may` allows the expected seconds; returns whether all
+    /// were taken.
     pub(super) fn go_on(
         &mut self,
         workers: &Workers,
@@ -275,7 +277,7 @@ impl<'a> Audit<'a> {
         Ok(true)
     }
 
-    /// Whether they were taken: not where the render is interrupted.
+    /// Takes `samples` of all audited pixels; returns false if interrupted.
     fn run(
         &mut self,
         workers: &Workers,
@@ -294,7 +296,7 @@ impl<'a> Audit<'a> {
             })?;
         state.rays += counters.all_rays();
         if !all {
-            // All have the same samples, or none of them.
+            // Either all pixels have these samples or none.
             pixels.copy_from_slice(&before);
             return Ok(false);
         }
@@ -303,7 +305,7 @@ impl<'a> Audit<'a> {
         Ok(true)
     }
 
-    /// What is known of the bias of `film`, whose own noise tells `noise`.
+    /// Estimated bias of `film`, whose noise is `noise`.
     pub(super) fn verdict(&self, workers: &Workers, film: &Film, noise: ErrorEstimate) -> Option<Audited> {
         self.state.verdict(film, workers.mean(film)?, noise)
     }

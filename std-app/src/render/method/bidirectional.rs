@@ -1,4 +1,4 @@
-//! Bidirectional path tracing, light tracing, vertex connection and merging for the program.
+//! Bidirectional path tracing, light tracing, and vertex connection and merging in the program.
 
 use super::{Method, Renderer, Stage};
 use crate::render::RenderError;
@@ -11,14 +11,14 @@ use halflight_core::memory::Line;
 use halflight_core::method::Method as _;
 use halflight_core::method::bidirectional::{Bidirectional, BidirectionalSettings};
 
-/// See the file.
+/// One of these methods at work.
 pub(super) struct BidirectionalPaths<'a, F> {
     method: Bidirectional<'a, F>,
     scratch: Vec<Vec<Line>>,
 }
 
 impl<'a, F: Features> BidirectionalPaths<'a, F> {
-    /// By the techniques of `chosen`.
+    /// Sets up the techniques of `chosen`.
     pub(super) fn new(
         stage: &Stage<'a>,
         memory: &mut Memory<'a>,

@@ -1,5 +1,4 @@
-//! Memory of cached pictures beside their records and photons: tables of the strata that may be gathered, working memory
-//! of threads.
+//! Memory of irradiance caching besides records and photons: tables of strata, and working memory of threads.
 
 use super::{Method, Stage};
 use crate::render::audit::Audit;
@@ -9,7 +8,7 @@ use halflight_core::method::caustics;
 use halflight_core::method::irradiance_cache::{CacheSettings, IrradianceCaching};
 use halflight_core::method::record_placement::CacheBuilder;
 
-/// Settings of the caches of a picture, which have room for `fewest` records each.
+/// Settings of a picture's caches with room for at least `fewest` records each.
 pub(super) fn settings<F: Features>(stage: &Stage, fewest: usize) -> CacheSettings {
     let Stage { settings, .. } = *stage;
     CacheSettings {
@@ -18,19 +17,19 @@ pub(super) fn settings<F: Features>(stage: &Stage, fewest: usize) -> CacheSettin
         strata: settings.cache.strata() as usize,
         fewest,
         reserve: Audit::bytes::<F>(stage, Method::IrradianceCache.is_biased()),
-        // Records of a file are good where they are.
+        // Records that go into a file keep their radii.
         widens: settings.save_cache.is_none(),
     }
 }
 
-/// Working memory of a thread, with photons of caustics or without.
+/// Working memory of a thread, with or without caustic photons.
 pub(super) fn scratch<F: Features>(cache: &CacheSettings, has_caustics: bool) -> Footprint {
     let scratch = IrradianceCaching::<F>::scratch(cache);
     if has_caustics { scratch.or(caustics::scratch::<F>()) } else { scratch }
 }
 
-/// Bytes that are to be left when photons of caustics are taken: for the tables, for the fewest records in each cache
-/// and for the audit.
+/// Bytes to leave when caustic photons take memory: for tables, for the fewest records of each cache, and for
+/// the audit.
 pub(super) fn later(cache: &CacheSettings) -> usize {
     let records = CacheBuilder::footprint(cache.fewest).bytes().saturating_mul(2);
     let tables = cache.gathering_footprint().bytes();

@@ -1,29 +1,29 @@
-//! What is asked of irradiance caches, and what became of them.
+//! Settings of irradiance caches, and statistics of their use.
 
 use halflight_core::cache::irradiance::{Metric, metric};
 
 /// How an irradiance cache is filled.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CacheSettings {
-    /// The rule by which records know how far they reach.
+    /// Rule for the radii of records.
     pub metric: Metric,
-    /// Error allowed, in the unit of the metric; `None`: its usual one.
+    /// Allowed error, in the unit of the metric; `None` means the metric's default.
     pub error: Option<f32>,
-    /// Strata along a side of the hemisphere that is gathered: its square is the number of rays of a record. `None`:
+    /// Strata along a side of the hemisphere; a record has as many gather rays as the square. `None` means
     /// [`CacheSettings::STRATA`].
     pub strata: Option<u32>,
 }
 
 impl CacheSettings {
-    /// Strata along a side where nothing else is asked for.
+    /// Default number of strata along a side.
     pub const STRATA: u32 = 16;
 
-    /// Strata along a side that are wanted.
+    /// Strata along a side, by request or default.
     pub fn strata(&self) -> u32 {
         self.strata.unwrap_or(Self::STRATA)
     }
 
-    /// The error allowed.
+    /// Allowed error, by request or default.
     pub fn allowed(&self) -> f32 {
         self.error.unwrap_or(metric::Settings::new(self.metric, 1.0).error)
     }
@@ -35,23 +35,23 @@ impl Default for CacheSettings {
     }
 }
 
-/// What became of the caches.
+/// Statistics of both caches.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct CacheUse {
-    /// Records of both.
+    /// Records of both caches.
     pub records: u64,
-    /// Most records that there was memory for.
+    /// Most records that fit into memory.
     pub capacity: u64,
-    /// Records that found no memory: their surroundings are path traced.
+    /// Records refused for lack of memory; their surroundings are path traced.
     pub refused: u64,
-    /// Records of both that a file had.
+    /// Records of both caches that came from a file.
     pub loaded: u64,
-    /// Places at which light was gathered: as many times the rays of a record.
+    /// Gatherings, each of `rays` gather rays.
     pub gathered: u64,
-    /// Rays of each of them.
+    /// Gather rays of a record.
     pub rays: u32,
-    /// They were left as they were when their part of the time was over, or the render was interrupted.
+    /// Whether filling ended at its deadline or by an interrupt.
     pub is_cut: bool,
-    /// Seconds of filling both.
+    /// Seconds of filling both caches.
     pub seconds: f64,
 }

@@ -1,4 +1,4 @@
-//! Path tracing joined with caustic photons for the program.
+//! Path tracing merged with caustic photons, in the program.
 
 use super::path::Paths;
 use super::photon_view::{self, PhotonView};
@@ -17,12 +17,12 @@ use halflight_core::method::caustics::{
 use halflight_core::method::path::PathTracing;
 use halflight_core::method::{Method as _, PhotonUse};
 
-/// Whether anything could throw a caustic.
+/// Whether the scene can have caustics and photons are enabled.
 pub(super) fn are_possible(stage: &Stage) -> bool {
     stage.settings.caustics && halflight_core::method::caustics::are_possible(stage.scene)
 }
 
-/// Takes the memory, sets the method up, and hands it to `then`.
+/// Allocates memory, sets up the method and calls `then` with it.
 pub(super) fn with<'a, F: Features, T>(
     stage: &Stage<'a>,
     memory: &mut Memory<'a>,
@@ -38,7 +38,7 @@ pub(super) fn with<'a, F: Features, T>(
         allows_photons_alone: settings.method.is_none() && settings.resume.is_none(),
         reserved: Audit::bytes::<F>(stage, Method::Path.is_biased()),
     };
-    // Photons that do not pay leave no memory behind.
+    // Photons that do not pay release their memory.
     let bank = Bank::new();
     let mut own = memory.within(&bank);
     let method = CausticPathTracing::new(&context, paths, settings, &mut own, &mut executor)?;
@@ -61,7 +61,7 @@ pub(super) fn with<'a, F: Features, T>(
     }
 }
 
-/// The last map of `photons`, as the camera sees it.
+/// View of the last map of `photons`.
 pub(super) fn view<F: Features>(
     stage: &Stage,
     photons: &mut CausticPhotons,
@@ -70,7 +70,7 @@ pub(super) fn view<F: Features>(
     Ok(Some(photon_view::look::<F>(stage, None, Some(&map))?))
 }
 
-/// Lends `then` the photons that the picture has now, if there are any.
+/// Calls `then` with the photons that the picture has now, if any.
 pub(super) fn lend(photons: Option<&mut CausticPhotons>, then: &mut Borrower) -> Result<(), RenderError> {
     match photons {
         Some(photons) => photons.lend(then)?,
@@ -78,7 +78,7 @@ pub(super) fn lend(photons: Option<&mut CausticPhotons>, then: &mut Borrower) ->
     }
 }
 
-/// Paths that are joined with photons.
+/// Path tracing merged with photons.
 struct Joined<'a, F> {
     stage: Stage<'a>,
     method: CausticPathTracing<'a, F>,

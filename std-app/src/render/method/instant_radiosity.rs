@@ -1,4 +1,4 @@
-//! Instant radiosity for the program.
+//! Instant radiosity in the program.
 
 use super::{Method, Renderer, Stage, VirtualLightUse};
 use crate::render::audit::Audit;
@@ -11,14 +11,14 @@ use halflight_core::memory::Line;
 use halflight_core::method::Method as _;
 use halflight_core::method::instant_radiosity::InstantRadiosity;
 
-/// See the file.
+/// Instant radiosity at work.
 pub(super) struct VirtualLights<'a, F> {
     method: InstantRadiosity<'a, F>,
     scratch: Vec<Vec<Line>>,
 }
 
 impl<'a, F: Features> VirtualLights<'a, F> {
-    /// By `method`, with the light that the bound cuts or without.
+    /// Sets up `method`, which finds or omits the light that the bound cuts.
     pub(super) fn new(
         stage: &Stage<'a>,
         memory: &mut Memory<'a>,

@@ -1,4 +1,5 @@
-//! Irradiance caching for the program: caustics by photons where a first look says that they pay, files of caches, surveys.
+//! Irradiance caching in the program: caustic photons if a prepass finds that they pay, cache files, and
+//! surveys.
 
 use super::cache_memory;
 use super::cache_settings::CacheUse;
@@ -27,7 +28,7 @@ use halflight_core::method::path::PathTracing;
 use halflight_core::method::{Method as _, PhotonUse};
 use halflight_core::transport::PathIntegrator;
 
-/// Looks for caustics, takes the memory, sets the method up, and hands it to `then`.
+/// Runs the prepass for caustics, allocates memory, sets up the method and calls `then` with it.
 pub(super) fn with<'m, F: Features, T>(
     stage: &Stage<'m>,
     memory: &mut Memory<'m>,
@@ -48,7 +49,7 @@ pub(super) fn with<'m, F: Features, T>(
     done
 }
 
-/// How caustic photons are emitted, if they pay and there is memory for them beside what `cache` needs.
+/// Emission of caustic photons, if they pay and fit into memory besides the needs of `cache`.
 fn find_caustics<'m, F: Features>(
     stage: &Stage<'m>,
     memory: &mut Memory<'m>,
@@ -59,7 +60,7 @@ fn find_caustics<'m, F: Features>(
         return Ok((None, CausticUse::default()));
     }
     let needed = cache_memory::scratch::<F>(cache, true).bytes().saturating_mul(workers.count());
-    // As much for records as for photons.
+    // Memory is shared equally between records and photons.
     let reserved = needed.saturating_add(cache_memory::later(cache));
     let reserved = reserved.saturating_add(least_footprint().bytes());
     let scratch = scratch::<F>();
@@ -83,23 +84,23 @@ fn find_caustics<'m, F: Features>(
     Ok((emission, caustics))
 }
 
-/// What the memory of records of a file is counted as, until caches have them.
+/// Name of the memory of loaded records, until the caches hold them.
 const LOADED: &str = "loaded records";
 
-/// What a file has of caches.
+/// Contents of a cache file.
 struct Loaded {
     header: Header,
     records: [Vec<Record>; 2],
 }
 
 impl Loaded {
-    /// Records that there must be room for in each half.
+    /// Smallest capacity of each cache.
     fn fewest(&self) -> usize {
         self.records.iter().map(Vec::len).max().unwrap_or(0)
     }
 }
 
-/// Takes the memory, sets the method up, and hands it to `then`; with photons of an `emission`, if there is one.
+/// Allocates memory, sets up the method, with photons of `emission` if given, and calls `then` with it.
 fn set_up<'m, F: Features, T>(
     stage: &Stage<'m>,
     memory: &mut Memory<'m>,
@@ -149,34 +150,34 @@ fn set_up<'m, F: Features, T>(
     then(&mut cached, memory)
 }
 
-/// See the file.
+/// Irradiance caching at work.
 struct Cached<'c, 'm, F> {
     method: IrradianceCaching<'m, F>,
     stage: Stage<'c>,
-    /// Photons of caustics, if they pay.
+    /// Caustic photons, if they pay.
     photons: Option<CausticPhotons<'m>>,
     caustics: CausticUse,
     scratch: Vec<Vec<Line>>,
-    /// Points, and memory for gathering there.
+    /// Number of held-out points, and working memory for gathering there.
     survey: Option<(u32, Vec<Vec<Line>>)>,
-    /// What a file of both halves says of them.
+    /// Header for the cache file.
     header: Header,
     view: View,
-    /// What came from a file.
+    /// Counts of the loaded file.
     loaded: [Half; 2],
-    /// Where they are kept.
+    /// File to which caches are written.
     kept: RewrittenFile<'c>,
     /// Gather rays of a record.
     rays: u32,
 }
 
 impl<F: Features> Cached<'_, '_, F> {
-    /// Fills both caches, or goes on with them, and keeps them in their file.
+    /// Fills both caches or continues to, and writes them to their file.
     fn fill(&mut self, crew: &mut Crew) -> Result<(), RenderError> {
         let Self { method, photons: maps, scratch, .. } = self;
         let mut all = true;
         for number in 0..2 {
-            // With a limit of depth gather rays ask for no photons.
+            // With a limited depth gather rays use no photons.
             let asks = !method.is_filled(number) && !method.paths().is_limited();
             let photons = match maps.as_mut().filter(|_| asks) {
                 Some(maps) => {
@@ -206,7 +207,7 @@ impl<F: Features> Cached<'_, '_, F> {
         Ok(())
     }
 
-    /// Writes the file on the way, or what is owed for the last time.
+    /// Writes the file during the render, or at the end if a write is outstanding.
     fn keep(&mut self, last: Option<Patience>) {
         let caches = self.method.caches();
         for ((half, cache), gathered) in self.header.halves.iter_mut().zip(caches).zip(self.method.gathered())
@@ -221,7 +222,7 @@ impl<F: Features> Cached<'_, '_, F> {
 impl<F: Features> Renderer for Cached<'_, '_, F> {
     fn round(&mut self, crew: &mut Crew) -> Result<(), RenderError> {
         if !self.method.is_frozen() {
-            // A film that goes on has the rays of all this already.
+            // A resumed film has counted the rays of filling already.
             let is_resumed = crew.canvas.spp() > 0;
             let counted = crew.canvas.counters;
             self.fill(crew)?;

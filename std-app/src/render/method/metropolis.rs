@@ -1,4 +1,4 @@
-//! Metropolis light transport for the program.
+//! Metropolis light transport in the program.
 
 use super::{Method, Renderer, Stage};
 use crate::render::RenderError;
@@ -11,7 +11,7 @@ use halflight_core::memory::Line;
 use halflight_core::method::Method as _;
 use halflight_core::method::metropolis::{ChainUse, Metropolis};
 
-/// See the file.
+/// Metropolis light transport at work.
 pub(super) struct Chains<'a, F> {
     method: Metropolis<'a, F>,
     scratch: Vec<Vec<Line>>,

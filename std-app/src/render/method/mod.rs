@@ -1,8 +1,8 @@
-//! The methods: ways to make a picture. One file each; this one says what a method is, and sets it up.
+//! Rendering methods, one file each; this file defines the interface and sets methods up.
 //!
-//! A round of a method is made of passes over its structures and of tiles of the picture, all of which the
-//! [`Crew`] runs in parallel ("The unit of work" in docs/architecture.md). To add a method: a variant of [`Method`]
-//! with its words, a file with its [`Renderer`], a line in [`Method::with`].
+//! A round consists of passes over a method's structures and of tiles of the picture, all run in parallel by
+//! the [`Crew`] ("The unit of work" in docs/architecture.md). A new method needs a variant of [`Method`] with
+//! its texts, a file with its [`Renderer`], and a line in [`Method::with`].
 
 mod bidirectional;
 mod cache_memory;
@@ -40,7 +40,7 @@ use halflight_core::method::RenderContext;
 use halflight_core::scene::Scene;
 use halflight_core::transport::{CausticMerging, PathIntegrator, PathSettings};
 
-/// A way to make a picture.
+/// Rendering method.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Method {
     /// Path tracing with next-event estimation and multiple importance sampling.
@@ -51,25 +51,25 @@ pub enum Method {
     PhotonMap,
     /// Stochastic progressive photon mapping.
     ProgressivePhotons,
-    /// Path tracing with splats of light paths.
+    /// Path tracing with splats of light subpaths.
     LightTracing,
     /// Bidirectional path tracing.
     Bidirectional,
     /// Vertex connection and merging.
     VertexMerging,
-    /// Instant radiosity; paths find what its bound cuts.
+    /// Instant radiosity; paths find the light that its bound cuts.
     InstantRadiosity,
-    /// Instant radiosity without what its bound cuts.
+    /// Instant radiosity without the cut light.
     ClampedInstantRadiosity,
     /// Metropolis light transport.
     Metropolis,
-    /// Path tracing that is wrong on purpose.
+    /// Deliberately biased path tracing.
     #[cfg(test)]
     Wrong,
 }
 
 impl Method {
-    /// All of them.
+    /// All methods.
     pub const ALL: [Method; 10] = [
         Method::Path,
         Method::IrradianceCache,
@@ -83,7 +83,7 @@ impl Method {
         Method::Metropolis,
     ];
 
-    /// Its name on the command line, in films and in reports.
+    /// Name on the command line, in films and in reports.
     pub const fn name(self) -> &'static str {
         match self {
             Method::Path => "path",
@@ -101,7 +101,7 @@ impl Method {
         }
     }
 
-    /// What it does, in half a line.
+    /// Description in half a line.
     pub const fn about(self) -> &'static str {
         match self {
             Method::Path => "Path tracing with next-event estimation and multiple importance sampling",
@@ -131,12 +131,13 @@ impl Method {
         }
     }
 
-    /// The method of that name.
+    /// Method with this name.
     pub fn named(name: &str) -> Option<Method> {
         Method::ALL.into_iter().find(|method| method.name() == name)
     }
 
-    /// Whether its pictures converge to another one than that of the scene: no noise of their own tells of that.
+    /// Whether pictures converge to wrong radiance, or are biased until they converge; their noise does not
+    /// reveal that.
     pub const fn is_biased(self) -> bool {
         match self {
             Method::Path
@@ -154,7 +155,7 @@ impl Method {
         }
     }
 
-    /// Whether enough samples bring its pictures as near to that of the scene as anybody wishes.
+    /// Whether the error vanishes as samples increase.
     pub const fn converges(self) -> bool {
         match self {
             Method::Path
@@ -170,13 +171,13 @@ impl Method {
         }
     }
 
-    /// Whether it finds light that path tracing may miss: that of small lamps through mirrors and glass.
+    /// Whether the method finds light that path tracing may miss: caustics of small lamps.
     pub const fn finds_caustics(self) -> bool {
         matches!(self, Method::PhotonMap | Method::ProgressivePhotons | Method::VertexMerging)
     }
 
-    /// Whether samples of pixels far from each other err together, through a structure that they share: their errors
-    /// are independent between even and odd samples then, not between tiles.
+    /// Whether distant pixels share a structure, which correlates their errors: then errors are independent
+    /// between even and odd samples, but not between tiles.
     pub const fn shares(self) -> bool {
         match self {
             Method::Path => false,
@@ -194,7 +195,7 @@ impl Method {
         }
     }
 
-    /// Takes the memory that it needs, sets it up on `stage`, and hands it to `then`.
+    /// Allocates memory, sets up the method on `stage` and calls `then` with it.
     pub(super) fn with<'a, F: Features, T>(
         self,
         stage: &Stage<'a>,
@@ -222,7 +223,7 @@ impl Method {
     }
 }
 
-/// What all methods stand on.
+/// Structures that all methods use.
 #[derive(Clone, Copy)]
 pub(super) struct Stage<'a> {
     pub(super) scene: &'a Scene<'a>,
@@ -233,109 +234,107 @@ pub(super) struct Stage<'a> {
 }
 
 impl<'a> Stage<'a> {
-    /// Paths of the picture, or of one by another `seed`.
+    /// Path tracer of the picture, with another `seed`.
     pub(super) fn paths<F: Features>(&self, seed: u32) -> PathIntegrator<'a, F> {
         let Self { scene, bvh, lights, settings, .. } = *self;
         let paths = PathSettings { seed, ..path_settings(settings) };
         PathIntegrator::new(scene, bvh, lights, paths, settings.level)
     }
 
-    /// The same for methods of the core.
+    /// Context for methods of the core.
     pub(super) fn context(&self) -> RenderContext<'a> {
         let Self { scene, bvh, lights, settings, .. } = *self;
         RenderContext { scene, bvh, lights, settings: path_settings(settings), level: settings.level }
     }
 }
 
-/// What paths do with photons of caustics.
+/// Callback of paths that borrow caustic photons.
 pub(super) type Borrower<'b> = dyn FnMut(Option<CausticMerging>) -> Result<(), RenderError> + 'b;
 
-/// A method at work on one scene. Its structures are its own; the film is the crew's.
+/// A method at work on one scene. It owns its structures; the crew owns the film.
 pub(super) trait Renderer {
-    /// Another method than was thought, where a first look has chosen it.
+    /// Method chosen by a prepass instead of the requested one.
     fn chosen(&self) -> Option<Method> {
         None
     }
 
-    /// One round: brings the tiles of `crew` to their targets, or less where the round is cut.
+    /// One round: brings the tiles of `crew` to their targets, or less if the round is cut.
     ///
-    /// What sample `n` of a pixel sees follows from the scene, the settings, and `n`, and from the weights that
-    /// a film keeps: neither from how samples are cut
-    /// into rounds, nor from threads, nor from what was rendered before a film was resumed. What samples of several
-    /// pixels share is drawn anew, or kept twice, for even and odd `n`: the halves of the film stay independent, and
-    /// their difference tells of all that is random.
+    /// Sample `n` of a pixel is determined by the scene, the settings, `n`, and the weights stored with a
+    /// film. It does not depend on rounds, on threads, or on earlier runs of a resumed film. Structures
+    /// shared by several pixels are drawn anew for even and odd `n`, or exist twice: the half-films stay
+    /// independent, and their difference estimates all noise.
     ///
     /// # Errors
-    /// Memory that does not suffice.
+    /// Insufficient memory.
     fn round(&mut self, crew: &mut Crew) -> Result<(), RenderError>;
 
-    /// Lends `then` the photons of caustics that the picture has now, for paths without records; none where it has none.
+    /// Calls `then` with the current caustic photons of the picture, or with none, for paths without records.
     ///
     /// # Errors
-    /// Those of `then`.
+    /// Errors of `then`.
     fn lend_photons(&mut self, then: &mut Borrower) -> Result<(), RenderError> {
         then(None)
     }
 
-    /// Whether neighbouring pixels share what their paths find.
+    /// Whether neighbouring pixels share paths, and why.
     fn reuse(&self) -> Reuse {
         Reuse::default()
     }
 
-    /// Of each pixel, row by row, how large the square of its bias may be, relative to that of others;
-    /// nothing where it does not know.
+    /// Relative upper estimate of the squared bias of each pixel, row by row; empty if unknown.
     ///
     /// # Errors
-    /// Memory that does not suffice.
+    /// Insufficient memory.
     fn risks(&mut self, _workers: &Workers) -> Result<Vec<f32>, RenderError> {
         Ok(Vec::new())
     }
 
-    /// What its irradiance cache looks like and how wrong it is, where the settings ask for that.
+    /// Survey of the irradiance cache, if the settings ask for one.
     ///
     /// # Errors
-    /// Memory that does not suffice.
+    /// Insufficient memory.
     fn survey(&mut self, _workers: &Workers) -> Result<Option<Survey>, RenderError> {
         Ok(None)
     }
 
-    /// Whether paths are joined with photons of caustics, and what came of it.
+    /// Whether paths are merged with caustic photons, and why.
     fn caustics(&self) -> CausticUse {
         CausticUse::default()
     }
 
-    /// What became of its irradiance cache.
+    /// Statistics of the irradiance cache.
     fn cache(&self) -> Option<CacheUse> {
         None
     }
 
-    /// Writes what it keeps in a file for the last time.
+    /// Writes the method's file for the last time.
     fn finish(&mut self, _patience: Patience) {}
 
-    /// That file.
+    /// The file that the method writes.
     fn kept(&self) -> Option<&RewrittenFile<'_>> {
         None
     }
 
-    /// Its last maps of photons, as the camera sees them.
+    /// Views of its last photon maps.
     ///
     /// # Errors
-    /// Memory that does not suffice.
+    /// Insufficient memory.
     fn photon_view(&mut self) -> Result<Option<PhotonView>, RenderError> {
         Ok(None)
     }
 
-    /// The use of its virtual lights.
+    /// Statistics of virtual lights.
     fn virtual_lights(&self) -> Option<VirtualLightUse> {
         None
     }
 
-    /// Use of its Markov chains.
+    /// Statistics of Markov chains.
     fn chains(&self) -> Option<ChainUse> {
         None
     }
 
-    /// What became of its photons.
+    /// Statistics of photons.
     fn photons(&self) -> Option<PhotonUse> {
         None
     }

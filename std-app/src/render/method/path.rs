@@ -1,4 +1,4 @@
-//! Path tracing for the program.
+//! Path tracing in the program.
 
 use super::{CausticUse, Renderer, Stage};
 use crate::render::crew::Crew;
@@ -10,11 +10,11 @@ use halflight_core::memory::Line;
 use halflight_core::method::Method as _;
 use halflight_core::method::path::PathTracing;
 
-/// See the file.
+/// Path tracing at work.
 pub(super) struct Paths<'a, F> {
     pub(super) method: PathTracing<'a, F>,
     pub(super) scratch: Vec<Vec<Line>>,
-    /// The finding of a prepass of caustic photons, which do not pay.
+    /// Finding of the prepass that rejected caustic photons.
     pub(super) caustics: CausticUse,
 }
 

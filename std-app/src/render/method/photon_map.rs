@@ -1,4 +1,4 @@
-//! Photon mapping in two passes for the program.
+//! Photon mapping in two passes, in the program.
 
 use super::photon_view::{self, PhotonView};
 use super::{Method, Renderer, Stage};
@@ -12,7 +12,7 @@ use halflight_core::memory::Line;
 use halflight_core::method::photon_map::PhotonMapping;
 use halflight_core::method::{Method as _, PhotonUse};
 
-/// See the file.
+/// Photon mapping at work.
 pub(super) struct TwoPasses<'a, F> {
     stage: Stage<'a>,
     method: PhotonMapping<'a, F>,

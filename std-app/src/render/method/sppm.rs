@@ -1,4 +1,4 @@
-//! Stochastic progressive photon mapping for the program.
+//! Stochastic progressive photon mapping in the program.
 
 use super::photon_view::{self, PhotonView};
 use super::{Method, Renderer, Stage};
@@ -12,7 +12,7 @@ use halflight_core::memory::Line;
 use halflight_core::method::sppm::ProgressivePhotonMapping;
 use halflight_core::method::{Method as _, PhotonUse};
 
-/// See the file.
+/// Stochastic progressive photon mapping at work.
 pub(super) struct ProgressivePhotons<'a, F> {
     stage: Stage<'a>,
     method: ProgressivePhotonMapping<'a, F>,

@@ -1,5 +1,5 @@
-//! A method that is wrong on purpose: the right half of the picture is a tenth too bright, as if a cache had irradiance
-//! that is 10 % too large there. No noise of its own tells of it.
+//! A deliberately biased method: the right half of the picture is a tenth too bright, like a cache with 10 %
+//! too much irradiance. Its noise does not reveal the bias.
 
 use super::{Renderer, Stage};
 use crate::render::RenderError;
