@@ -1,4 +1,5 @@
-//! The film: what the samples of every pixel add up to, tile after tile, in two independent halves.
+//! Film: sums of the samples of every pixel, tile after tile, in two independent half-films (half buffers,
+//! Rousselle et al. 2012).
 
 mod pixel;
 mod samples;
@@ -13,8 +14,8 @@ pub use tile::{PIXELS_PER_TILE, PixelSet, REACH, SPAN, TILE, Tile};
 use crate::Rgb;
 use crate::memory::{Arena, Footprint, OutOfMemory};
 
-/// Sums of all pixels. Tile `i` owns the pixels `i * PIXELS_PER_TILE ..`, so that tasks that own tiles write
-/// to slices of their own; pixels of border tiles that lie outside of the picture stay empty.
+/// Sums of all pixels. Tile `i` owns the pixels from `i * PIXELS_PER_TILE` on, so that each task writes to
+/// its own slice. Pixels of border tiles outside the picture stay empty.
 #[derive(Debug)]
 pub struct Film<'m> {
     width: u32,
@@ -28,19 +29,19 @@ impl<'m> Film<'m> {
         Footprint::default().slice::<Pixel>(Tile::count(width, height) * PIXELS_PER_TILE)
     }
 
-    /// A black film.
+    /// Black film.
     pub fn new(width: u32, height: u32, arena: &mut Arena<'m>) -> Result<Self, OutOfMemory> {
         let pixels = arena.slice::<Pixel>(Tile::count(width, height) * PIXELS_PER_TILE)?;
         pixels.fill(Pixel::default());
         Ok(Self { width, height, pixels })
     }
 
-    /// Pixels across.
+    /// Width in pixels.
     pub fn width(&self) -> u32 {
         self.width
     }
 
-    /// Pixels down.
+    /// Height in pixels.
     pub fn height(&self) -> u32 {
         self.height
     }
@@ -50,12 +51,12 @@ impl<'m> Film<'m> {
         self.pixels
     }
 
-    /// All pixels, tile after tile: `chunks_mut(PIXELS_PER_TILE)` are the outputs of the tasks.
+    /// All pixels, tile after tile: `chunks_mut(PIXELS_PER_TILE)` gives the output of each task.
     pub fn pixels_mut(&mut self) -> &mut [Pixel] {
         self.pixels
     }
 
-    /// The pixel in column `x` and row `y`, counted from the upper left; empty outside of the picture.
+    /// Pixel in column `x` and row `y` from the upper left; empty outside the picture.
     pub fn pixel(&self, x: u32, y: u32) -> Pixel {
         if x >= self.width || y >= self.height {
             return Pixel::default();
@@ -64,7 +65,7 @@ impl<'m> Film<'m> {
         self.pixels.get(index).copied().unwrap_or_default()
     }
 
-    /// The mean of all samples of a pixel; black where there are none.
+    /// Mean of all samples of a pixel; black without samples.
     pub fn mean(&self, x: u32, y: u32) -> Rgb {
         self.pixel(x, y).mean()
     }
@@ -113,7 +114,7 @@ mod tests {
     #[test]
     fn blocks_dissolve_into_each_other() {
         let size = [256, 256];
-        // How many pixels of each column of blocks lie beyond its borders.
+        // Number of pixels of each column of blocks that lie beyond their block's borders.
         let block = |place: usize| {
             let tile = place / PIXELS_PER_TILE % 16;
             tile as u32 * 2 + Tile::place(place % PIXELS_PER_TILE).0 / 8
@@ -122,7 +123,7 @@ mod tests {
         for (x, y) in (8..248).flat_map(|x| (0..256).map(move |y| (x, y))) {
             beyond[x as usize % 8] += u32::from(block(Tile::position(size, x, y)) != x / 8);
         }
-        // Of 30 columns of 256 pixels each; within five standard deviations.
+        // 30 columns of 256 pixels each; within five standard deviations.
         for (column, count) in beyond.into_iter().enumerate() {
             let share = f64::from([7, 5, 3, 1, 1, 3, 5, 7][column]) / 16.0;
             let pixels = 30.0 * 256.0;

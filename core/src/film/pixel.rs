@@ -1,16 +1,16 @@
-//! One pixel: precise sums of its even and odd samples, and what is done with samples that are no light.
+//! Pixel: precise sums of its even and odd samples, and rejection of invalid samples.
 //!
-//! Each half keeps its own even and odd samples apart. The halves tell the error of their mean; what the
-//! quarters add is said in [`crate::estimate`].
+//! Each half keeps its own even and odd samples apart. The halves give the error of their mean;
+//! [`crate::estimate`] describes the use of the quarters.
 
 use crate::Rgb;
 use bytemuck::{Pod, Zeroable};
 
-/// 2^96: from here on radiance counts as infinite, so that sums of 2^31 samples are finite.
+/// 2^96. Larger radiance counts as infinite, so that sums of 2^31 samples are finite.
 const BRIGHTEST: f32 = 79_228_162_514_264_337_593_543_950_336.0;
 
-/// The sum of half of the samples, in two parts. Each addition keeps its rounding error (Neumaier 1974), so
-/// that a million samples in f32 are as good as in twice its precision.
+/// Sum of half of the samples, in two parts. Each addition keeps its rounding error (Neumaier 1974), so that
+/// a million samples in f32 are as precise as in f64.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct Half {
@@ -25,7 +25,7 @@ impl Half {
     fn add(&mut self, part: usize, sample: Rgb) {
         let part = part & 1;
         for ((sum, lost), x) in self.sums[part].iter_mut().zip(&mut self.lost).zip(sample.to_array()) {
-            // Knuth's two-sum: exact whichever is larger.
+            // Knuth's two-sum: exact in either order of magnitude.
             let total = *sum + x;
             let back = total - *sum;
             *lost += (*sum - (total - back)) + (x - back);
@@ -39,23 +39,22 @@ impl Half {
         self.counts[0] + self.counts[1]
     }
 
-    /// Their sum.
+    /// Sum of the samples.
     pub fn sum(&self) -> Rgb {
         Rgb::from(self.sums[0]) + Rgb::from(self.sums[1]) + Rgb::from(self.lost)
     }
 
-    /// Their mean; black where there are none.
+    /// Mean of the samples; black without samples.
     pub fn mean(&self) -> Rgb {
         if self.count() == 0 { Rgb::ZERO } else { self.sum() / self.count() as f32 }
     }
 
-    /// By how much that is too bright in the mean of its channels, as far as samples told; negative: too
-    /// dark.
+    /// Mean density bias by the samples that estimate it, averaged over the channels; negative if too dark.
     pub fn blur(&self) -> f32 {
         if self.count() == 0 { 0.0 } else { self.blur / self.count() as f32 }
     }
 
-    /// The means of its own even and odd samples; `None` where there are none.
+    /// Means of its own even and odd samples; `None` if either is empty.
     #[inline]
     pub fn parts(&self) -> Option<[Rgb; 2]> {
         if self.counts.contains(&0) {
@@ -65,7 +64,8 @@ impl Half {
     }
 }
 
-/// The two halves of a pixel: independent pictures, whose difference tells of the error of their mean.
+/// The two halves of a pixel. They are independent, so that their difference estimates the error of their
+/// mean.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct Pixel {
@@ -76,8 +76,9 @@ pub struct Pixel {
 }
 
 impl Pixel {
-    /// Adds the radiance that sample number `index` saw. What is not a non-negative number below 2^96, the
-    /// most that sums can hold, is counted in `dropped` and does not reach the picture. Whether it did.
+    /// Adds the radiance of sample number `index`. Values that are not non-negative and below 2^96, the limit
+    /// of the sums, are counted in `dropped` and left out of the picture. Returns true if the sample was
+    /// added.
     #[inline]
     pub fn add(&mut self, index: u32, radiance: Rgb, dropped: &mut Dropped) -> bool {
         // False for NaN as well.
@@ -91,8 +92,8 @@ impl Pixel {
         is_light
     }
 
-    /// Tells by how much sample number `index`, which was added, is too bright because photons blur. What is
-    /// no number is not counted.
+    /// Adds the estimated density bias of sample number `index`, which has been added before. Values that are
+    /// not finite are ignored.
     #[inline]
     pub fn add_blur(&mut self, index: u32, blur: Rgb) {
         let blur = blur.element_sum() / 3.0;
@@ -107,23 +108,22 @@ impl Pixel {
         self.even.count() + self.odd.count()
     }
 
-    /// The mean of all samples; black where there are none.
+    /// Mean of all samples; black without samples.
     pub fn mean(&self) -> Rgb {
         let count = self.count();
         if count == 0 { Rgb::ZERO } else { (self.even.sum() + self.odd.sum()) / count as f32 }
     }
 
-    /// Estimated variance of [`Pixel::mean`]: what the halves disagree by, with one degree of freedom. 0
-    /// where a half is empty.
+    /// Estimated variance of [`Pixel::mean`] from the difference of the halves, with one degree of freedom. 0
+    /// if a half is empty.
     ///
     /// With independent halves A and B of n_A and n_B samples and variance σ² of one sample, (A − B)² has the
-    /// expectation σ² (1/n_A + 1/n_B), and their common mean the variance σ² / (n_A + n_B).
+    /// expectation σ² (1/n_A + 1/n_B), and their common mean has the variance σ² / (n_A + n_B).
     pub fn variance(&self) -> Rgb {
         self.scaled_variance(1.0)
     }
 
-    /// The same of a picture that is `scale` times as bright, also where it would not be a finite number
-    /// itself.
+    /// [`Pixel::variance`] of a picture that is `scale` times as bright. The unscaled variance may overflow.
     pub(crate) fn scaled_variance(&self, scale: f32) -> Rgb {
         let (even, odd) = (self.even.count() as f32, self.odd.count() as f32);
         if even == 0.0 || odd == 0.0 {
@@ -135,17 +135,18 @@ impl Pixel {
     }
 }
 
-/// Samples that did not reach the picture, by cause.
+/// Rejected samples by cause.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
 #[repr(C)]
 pub struct Dropped {
-    /// A channel was not a number.
+    /// A channel was NaN.
     pub nan: u64,
-    /// A channel was infinite, or as good as: 2^96 and more.
+    /// A channel was infinite, or at least 2^96.
     pub infinite: u64,
     /// A channel was negative.
     pub negative: u64,
-    /// Paths cut at the technical limit of their length; what they saw up to there is in the picture.
+    /// Paths cut at the technical limit of their length. Their contribution up to the limit is in the
+    /// picture.
     pub unfinished: u64,
 }
 
@@ -161,7 +162,7 @@ impl Dropped {
         }
     }
 
-    /// All of them.
+    /// Number of rejected samples of all causes.
     pub fn total(&self) -> u64 {
         self.nan + self.infinite + self.negative + self.unfinished
     }

@@ -1,37 +1,38 @@
-//! Groups of the pixels of a tile, and the circles in them: which pixels share what their paths find.
+//! Groups of the pixels of a tile, and circles within groups: the pixels that share their paths (path reuse,
+//! Bekaert et al. 2002).
 
 use super::tile::{PIXELS_PER_TILE, Tile};
 use crate::sampling::mix;
 
-/// Pixels of a group: two of each 2 × 2 of a block of 8 × 8, drawn by lot.
+/// Pixels of a group: two random ones of each 2 × 2 of a block of 8 × 8.
 pub const GROUP: usize = 32;
 
 /// Groups of a tile.
 pub const GROUPS: usize = PIXELS_PER_TILE / GROUP;
 
-/// Pixels of a circle, whose paths share what they find: half of a group, one of each 2 × 2. Which ones is
-/// drawn by lot for each circle, and again whenever the number of samples has doubled, so that no pattern
-/// shows.
+/// Pixels of a circle, which share their paths: half of a group, one random pixel of each 2 × 2. The choice
+/// changes with the circle and whenever the number of samples has doubled, so that no pattern is visible.
 pub const CIRCLE: usize = GROUP / 2;
 
 /// Circles of a tile.
 pub const CIRCLES: usize = PIXELS_PER_TILE / CIRCLE;
 
-/// Pixels of a block, of groups of its own.
+/// Pixels of a block, which has its own groups.
 const BLOCK: usize = 64;
 
 /// Groups of a block.
 const IN_BLOCK: usize = BLOCK / GROUP;
 
-/// Samples of each half that the first circles last: fewer would break up the nets of their pixels.
+/// Samples of each half that use the first choice. Fewer would break up the low-discrepancy nets of the
+/// pixels.
 const FIRST: u32 = 16;
 
-/// The pixels of each group in their order along the Z-curve, and the group of each pixel.
+/// The pixels of each group in Z-order, and the group of each pixel.
 const LOTS: ([[u8; GROUP]; GROUPS], [u8; PIXELS_PER_TILE]) = {
     let (mut members, mut groups) = ([[0; GROUP]; GROUPS], [0; PIXELS_PER_TILE]);
     let mut quad = 0;
     while quad < PIXELS_PER_TILE / 4 {
-        // The pixel that goes with the first, and which group these two belong to.
+        // The pixel that joins the first pixel's group, and that group.
         let lot = mix(quad as u64 + 1) >> 8;
         let (partner, first) = (1 + (lot >> 1) % 3, lot & 1);
         let (mut i, mut counts) = (0, [0, 0]);
@@ -49,14 +50,13 @@ const LOTS: ([[u8; GROUP]; GROUPS], [u8; PIXELS_PER_TILE]) = {
 };
 
 impl Tile {
-    /// The group of the `i`th pixel.
+    /// Group of the `i`th pixel.
     #[inline]
     pub const fn group(i: usize) -> usize {
         LOTS.1[i % PIXELS_PER_TILE] as usize
     }
 
-    /// The pixels of a circle that take `sample` together, in their order along the Z-curve; `seed` is that
-    /// of the picture.
+    /// The pixels of a circle that share `sample`, in Z-order. `seed` is the seed of the picture.
     #[inline]
     pub fn circle(&self, circle: usize, seed: u32, sample: u32) -> [usize; CIRCLE] {
         let (group, half) = (circle / 2 % GROUPS, circle % 2);

@@ -1,5 +1,4 @@
-//! Splats: light that a light path brings to a pixel of the picture, added up in the order of the tasks that
-//! found it.
+//! Splats: contributions of light paths to pixels, summed in the order of the tasks that found them.
 //!
 //! A task collects its splats in a list and sorts them by strips, runs of pixels of the film. One work item
 //! per strip then adds the splats of task 0, 1, 2 … to its pixels. The order of the additions to a pixel does
@@ -10,17 +9,17 @@ use bytemuck::{Pod, Zeroable};
 /// Strips of a film.
 pub const STRIPS: usize = 64;
 
-/// Light for one pixel.
+/// Contribution to one pixel.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct Splat {
     /// Position of the pixel in the film ([`super::Tile::position`]).
     pub pixel: u32,
-    /// Radiance, the weight included.
+    /// Radiance, including the weight.
     pub radiance: [f32; 3],
 }
 
-/// Start of each strip in a sorted list, and the end of the last.
+/// Start of each strip in a sorted list, and end of the last strip.
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct StripOffsets([u32; STRIPS + 1]);
@@ -31,13 +30,12 @@ impl Default for StripOffsets {
     }
 }
 
-/// Pixels of each strip of a film of `pixels`, the last one perhaps less.
+/// Length of the strips of a film of `pixels`. The last strip may be shorter.
 pub fn strip_length(pixels: usize) -> usize {
     pixels.div_ceil(STRIPS).max(1)
 }
 
-/// Sorts `splats` by the strips of a film of `pixels` into `sorted`, which is as long, keeping the order
-/// within each.
+/// Stable sort of `splats` by the strips of a film of `pixels` into `sorted`, which has the same length.
 pub fn sort_by_strip(splats: &[Splat], pixels: usize, sorted: &mut [Splat]) -> StripOffsets {
     let length = strip_length(pixels);
     let strip = |splat: &Splat| (splat.pixel as usize / length).min(STRIPS - 1);
@@ -57,8 +55,8 @@ pub fn sort_by_strip(splats: &[Splat], pixels: usize, sorted: &mut [Splat]) -> S
     StripOffsets(offsets)
 }
 
-/// Makes of `pixels`, those of strip `strip`, the sums of the splats of all tasks, which are pairs of a
-/// sorted list and its offsets.
+/// Overwrites `pixels`, those of strip `strip`, with the sums of the splats of all tasks. A task is a pair of
+/// a sorted list and its offsets.
 pub fn add_strip<'s>(
     strip: usize,
     length: usize,

@@ -1,26 +1,26 @@
-//! How a picture is cut into tiles, and the order of the pixels within one: the Z-curve, so that any run of
-//! pixels is a compact patch and its camera rays are alike.
+//! Tiles of a picture, and the Z-order of the pixels within a tile: any run of pixels is a compact patch with
+//! coherent camera rays.
 //!
-//! Pixels of a block of 8 × 8 may share their samples, and then have an error in common. A sharp border
-//! between two blocks would show, so blocks dissolve into each other: a pixel changes places with its mirror
-//! image beyond the nearest border of its block, with a probability that falls from a half at the border to
+//! Pixels of a block of 8 × 8 may share their samples, and then have a common error. A sharp border between
+//! two blocks would be visible, so that blocks are dithered into each other: a pixel swaps places with its
+//! mirror image beyond the nearest border of its block. The probability falls from a half at the border to
 //! zero in the middle of the block.
 
 use crate::sampling::mix;
 
-/// Pixels along the side of a tile.
+/// Side of a tile in pixels.
 pub const TILE: u32 = 16;
 
 /// Pixels of a tile.
 pub const PIXELS_PER_TILE: usize = (TILE * TILE) as usize;
 
-/// Pixels along the side of a block.
+/// Side of a block in pixels.
 const BLOCK: u32 = 8;
 
-/// A tile has pixels up to this far outside of its square.
+/// Largest distance in pixels by which a pixel of a tile lies outside its square.
 pub const REACH: u32 = BLOCK / 2;
 
-/// Pixels along the side of the square around a tile that holds all of its pixels.
+/// Side in pixels of the square around a tile that contains all of its pixels.
 pub const SPAN: u32 = TILE + 2 * REACH;
 
 /// One tile of a picture.
@@ -33,7 +33,7 @@ pub struct Tile {
 }
 
 impl Tile {
-    /// Tiles of a picture, those that are cut by its border included.
+    /// Number of tiles of a picture, including those cut by its border.
     pub const fn count(width: u32, height: u32) -> usize {
         width.div_ceil(TILE) as usize * height.div_ceil(TILE) as usize
     }
@@ -44,25 +44,25 @@ impl Tile {
         Self { left: (index % across) as u32 * TILE, top: (index / across) as u32 * TILE, width, height }
     }
 
-    /// Column and row of its first pixel.
+    /// Column and row of the upper left pixel.
     #[inline]
     pub const fn corner(&self) -> [u32; 2] {
         [self.left, self.top]
     }
 
-    /// Column and row of the `i`th place, counted from the upper left of its tile.
+    /// Column and row of the `i`th place, from the upper left of its tile.
     #[inline]
     pub const fn place(i: usize) -> (u32, u32) {
         (even_bits(i as u32), even_bits(i as u32 >> 1))
     }
 
-    /// The inverse of [`Tile::place`].
+    /// Inverse of [`Tile::place`].
     #[inline]
     pub const fn index_of_place(x: u32, y: u32) -> usize {
         (spread(x % TILE) | spread(y % TILE) << 1) as usize
     }
 
-    /// Column and row of the `i`th pixel of the tile, near its `i`th place; `None` outside of the picture.
+    /// Column and row of the `i`th pixel of the tile, near its `i`th place; `None` outside the picture.
     #[inline]
     pub const fn pixel(&self, i: usize) -> Option<(u32, u32)> {
         let (x, y) = self.moved(i);
@@ -76,7 +76,7 @@ impl Tile {
         ((y + REACH - self.top) * SPAN + x + REACH - self.left) as usize
     }
 
-    /// Column and row of the `i`th pixel, which may lie outside of the picture.
+    /// Column and row of the `i`th pixel, which may lie outside the picture.
     const fn moved(&self, i: usize) -> (u32, u32) {
         let (x, y) = Self::place(i);
         let (x, y) = (self.left + x, self.top + y);
@@ -94,14 +94,14 @@ impl Tile {
     }
 }
 
-/// Pixels across all tiles of a picture that is `size` pixels across.
+/// Size in pixels of the tiles that cover `size` pixels.
 #[inline]
 const fn whole(size: u32) -> u32 {
     size.div_ceil(TILE) * TILE
 }
 
-/// The coordinate with which `at` changes places along `line`, or `at` itself; the inverse of itself. `size`
-/// is a multiple of the side of a block.
+/// Coordinate that swaps places with `at` along `line`, or `at` itself. The function is its own inverse.
+/// `size` is a multiple of the side of a block.
 #[inline]
 const fn dissolved(at: u32, line: u32, size: u32) -> u32 {
     let border = (at + REACH) / BLOCK * BLOCK;
@@ -110,13 +110,13 @@ const fn dissolved(at: u32, line: u32, size: u32) -> u32 {
     }
     let mirrored = 2 * border - 1 - at;
     let first = if at < border { at } else { mirrored };
-    // From 0 beside the border to REACH - 1.
+    // From 0 next to the border to REACH - 1.
     let distance = border - 1 - first;
     let lot = (mix((first as u64) << 32 | line as u64) >> 32) as u32 % (4 * REACH);
     if lot < 2 * (REACH - distance) - 1 { mirrored } else { at }
 }
 
-/// Bits 0, 2, 4, 6 of `i`, moved together.
+/// Bits 0, 2, 4, 6 of `i`, compacted.
 #[inline]
 const fn even_bits(i: u32) -> u32 {
     let i = i & 0x55;
@@ -124,19 +124,19 @@ const fn even_bits(i: u32) -> u32 {
     (i | i >> 2) & 0x0f
 }
 
-/// The inverse of [`even_bits`].
+/// Inverse of [`even_bits`].
 #[inline]
 const fn spread(x: u32) -> u32 {
     let x = (x | x << 2) & 0x33;
     (x | x << 1) & 0x55
 }
 
-/// Some pixels of a tile, a bit for each.
+/// Set of pixels of a tile, one bit for each.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct PixelSet([u64; PIXELS_PER_TILE / 64]);
 
 impl PixelSet {
-    /// Whether the `i`th pixel of the tile is one of them.
+    /// True if the set contains the `i`th pixel of the tile.
     #[inline]
     pub fn contains(&self, i: usize) -> bool {
         self.0.get(i / 64).is_some_and(|word| word >> (i % 64) & 1 == 1)
@@ -149,12 +149,12 @@ impl PixelSet {
         }
     }
 
-    /// How many there are.
+    /// Number of pixels in the set.
     pub fn len(&self) -> u32 {
         self.0.iter().map(|word| word.count_ones()).sum()
     }
 
-    /// Whether there is none.
+    /// True if the set is empty.
     pub fn is_empty(&self) -> bool {
         *self == Self::default()
     }

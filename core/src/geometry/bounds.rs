@@ -1,8 +1,8 @@
-//! Axis-aligned boxes. The empty box has its minimum above its maximum.
+//! Axis-aligned bounding box. An empty box has its minimum above its maximum.
 
 use glam::Vec3;
 
-/// An axis-aligned box.
+/// Axis-aligned bounding box.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bounds {
     /// Smallest coordinates.
@@ -12,27 +12,27 @@ pub struct Bounds {
 }
 
 impl Bounds {
-    /// The box that holds nothing.
+    /// Empty box.
     pub const EMPTY: Bounds = Bounds { min: Vec3::INFINITY, max: Vec3::NEG_INFINITY };
 
-    /// The smallest box around `points`.
+    /// Smallest box around `points`.
     pub fn around(points: impl IntoIterator<Item = Vec3>) -> Self {
         points.into_iter().fold(Self::EMPTY, Self::including)
     }
 
-    /// With `point` inside.
+    /// Smallest box around the box and `point`.
     #[inline]
     pub fn including(self, point: Vec3) -> Self {
         Self { min: self.min.min(point), max: self.max.max(point) }
     }
 
-    /// The smallest box around both.
+    /// Smallest box around both boxes.
     #[inline]
     pub fn union(self, other: Self) -> Self {
         Self { min: self.min.min(other.min), max: self.max.max(other.max) }
     }
 
-    /// Edge lengths; zero where the box is empty.
+    /// Edge lengths; zero if the box is empty.
     #[inline]
     pub fn extent(&self) -> Vec3 {
         (self.max - self.min).max(Vec3::ZERO)
@@ -45,18 +45,18 @@ impl Bounds {
         e.x * (e.y + e.z) + e.y * e.z
     }
 
-    /// The middle.
+    /// Centre.
     #[inline]
     pub fn center(&self) -> Vec3 {
         0.5 * self.min + 0.5 * self.max
     }
 
-    /// Length of the diagonal; zero where the box is empty.
+    /// Length of the diagonal; zero if the box is empty.
     pub fn diagonal(&self) -> f32 {
         self.extent().length()
     }
 
-    /// Whether the box holds nothing.
+    /// True if the box is empty.
     pub fn is_empty(&self) -> bool {
         !(self.min.cmple(self.max).all())
     }

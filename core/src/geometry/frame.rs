@@ -1,8 +1,8 @@
-//! Orthonormal frames around a normal.
+//! Orthonormal frame around a normal.
 
 use glam::Vec3;
 
-/// A right-handed orthonormal frame; local `z` is the normal.
+/// Right-handed orthonormal frame; local `z` is the normal.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Frame {
     /// Local x in world coordinates.
@@ -14,8 +14,8 @@ pub struct Frame {
 }
 
 impl Frame {
-    /// A frame around a unit `normal`, continuous but for one direction (Duff et al. 2017,
-    /// "Building an Orthonormal Basis, Revisited").
+    /// Frame around a unit `normal`, continuous except across `normal.z` = 0 (Duff et al. 2017, "Building an
+    /// Orthonormal Basis, Revisited").
     #[inline]
     pub fn from_normal(normal: Vec3) -> Self {
         let sign = 1f32.copysign(normal.z);

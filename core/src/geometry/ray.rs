@@ -1,44 +1,44 @@
-//! Rays and hits in the layout that the SIMD kernels load: 32 and 16 bytes, no padding.
+//! Rays and hits in the memory layout that the SIMD kernels load: 32 and 16 bytes, no padding.
 
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
-/// The half-line `origin + t * direction` for `0 <= t <= t_max`. The direction need not be normalised:
-/// `t` counts in lengths of it.
+/// Half-line `origin + t * direction` for `0 <= t <= t_max`. `t` is in lengths of the direction, which need
+/// not be normalised.
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 #[repr(C, align(32))]
 pub struct Ray {
-    /// Where the ray starts.
+    /// Origin.
     pub origin: [f32; 3],
-    /// The farthest `t` that counts; infinite for a ray without end, negative for a ray that is off.
+    /// Largest `t` of a hit; infinite for an unbounded ray, negative for an inactive ray.
     pub t_max: f32,
-    /// Where it goes.
+    /// Direction.
     pub direction: [f32; 3],
-    /// Carried along and never read by the tracer.
+    /// Number for the caller, never read by the tracer.
     pub tag: u32,
 }
 
 impl Ray {
-    /// A ray without end.
+    /// Unbounded ray.
     pub fn new(origin: Vec3, direction: Vec3) -> Self {
         Self::segment(origin, direction, f32::INFINITY)
     }
 
-    /// A ray that ends at `t_max`.
+    /// Ray that ends at `t_max`.
     pub fn segment(origin: Vec3, direction: Vec3, t_max: f32) -> Self {
         Self { origin: origin.to_array(), t_max, direction: direction.to_array(), tag: 0 }
     }
 
-    /// The point at `t`.
+    /// Point at `t`.
     pub fn at(&self, t: f32) -> Vec3 {
         Vec3::from(self.origin) + t * Vec3::from(self.direction)
     }
 }
 
-/// The `triangle` of a ray that hit nothing.
+/// `triangle` of a ray without a hit.
 pub const MISS: u32 = u32::MAX;
 
-/// Where a ray met a triangle: the point `(1 - u - v) p0 + u p1 + v p2`.
+/// Hit of a ray at the point `(1 - u - v) p0 + u p1 + v p2` of a triangle.
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 #[repr(C, align(16))]
 pub struct Hit {
@@ -56,8 +56,8 @@ impl Hit {
     /// No hit.
     pub const NONE: Hit = Hit { t: f32::INFINITY, u: 0.0, v: 0.0, triangle: MISS };
 
-    /// Becomes `other` where that is nearer, or as near and of a lower index: the order in which hits
-    /// are offered does not matter.
+    /// Becomes `other` if that is nearer, or equally near with a lower index. The order of the calls does not
+    /// matter.
     #[inline(always)]
     pub fn take(&mut self, other: Hit) {
         if other.t < self.t || (other.t == self.t && other.triangle < self.triangle) {
@@ -65,7 +65,7 @@ impl Hit {
         }
     }
 
-    /// Whether a triangle was hit.
+    /// True if a triangle was hit.
     pub fn is_some(&self) -> bool {
         self.triangle != MISS
     }

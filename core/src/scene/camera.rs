@@ -1,14 +1,14 @@
-//! The camera: pinhole or thin lens. Raster coordinates are continuous, x to the right and y down; the
-//! middle of the first pixel is (0.5, 0.5).
+//! Perspective camera: pinhole or thin lens. Raster coordinates are continuous, x to the right and y down;
+//! the centre of the first pixel is (0.5, 0.5).
 
 use crate::geometry::Ray;
 use crate::sampling::warp::concentric_disk;
 use glam::{Vec2, Vec3};
 
-/// A perspective camera. `aperture` 0 is a pinhole.
+/// Perspective camera.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Camera {
-    /// Where it stands.
+    /// Position.
     pub eye: Vec3,
     /// Unit vector to the right of the picture.
     pub right: Vec3,
@@ -20,23 +20,22 @@ pub struct Camera {
     pub tan_half_fov: f32,
     /// Radius of the lens; 0 for a pinhole.
     pub lens_radius: f32,
-    /// Distance along `forward` of what is sharp; of no effect for a pinhole.
+    /// Distance of the plane of focus along `forward`; unused by a pinhole.
     pub focus_distance: f32,
-    /// Where rays start that begin very far from all surfaces; `None` at the eye.
+    /// Start of rays of a camera very far from all surfaces; `None`: rays start at the eye.
     pub start: Option<StartPlane>,
 }
 
-/// A plane before everything that a far camera sees: next to it, coordinates are more precise than at the
-/// eye.
+/// Plane in front of everything that a far camera sees. Coordinates near it are more precise than at the eye.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StartPlane {
-    /// Where the middle of the picture lies on it.
+    /// Point of the plane at the centre of the picture.
     pub anchor: Vec3,
-    /// How deep it is.
+    /// Depth of the plane.
     pub depth: f32,
 }
 
-/// Where the camera sees a point, for light that is traced towards it.
+/// Projection of a point to the picture, for light traced towards the camera.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Projection {
     /// Continuous raster coordinates.
@@ -45,19 +44,19 @@ pub struct Projection {
     pub direction: Vec3,
     /// Distance from the lens to the point.
     pub distance: f32,
-    /// Density in solid angle, seen from the lens, of the rays of one uniformly sampled picture
-    /// (`width * height` pixels of raster area).
+    /// Density in solid angle at the lens of the rays of a uniformly sampled picture (raster area of
+    /// `width * height` pixels).
     pub pdf: f32,
 }
 
 impl Camera {
-    /// A pinhole at `eye` that looks at `target`, with `up` to the top. Directions that do not span a
-    /// frame are replaced by the nearest ones that do.
+    /// Pinhole at `eye` that looks at `target`, with `up` to the top. Directions that do not span a frame are
+    /// replaced by others that do.
     pub fn look_at(eye: Vec3, target: Vec3, up: Vec3, vertical_fov_degrees: f32) -> Self {
         Self::towards(eye, target - eye, up, vertical_fov_degrees)
     }
 
-    /// The same, with the direction from `eye` to the target, of whatever length.
+    /// [`Camera::look_at`] with the direction from `eye` to the target, of any length.
     pub fn towards(eye: Vec3, along: Vec3, up: Vec3, vertical_fov_degrees: f32) -> Self {
         let forward = direction(along).unwrap_or(Vec3::NEG_Z);
         let right = direction(up)
@@ -76,8 +75,8 @@ impl Camera {
         }
     }
 
-    /// The ray through (`x`, `y`) of a picture of `width` by `height` pixels, of unit direction. `lens` in
-    /// [0, 1)² chooses the point of the lens.
+    /// Ray through (`x`, `y`) of a picture of `width` by `height` pixels, with unit direction. `lens` in [0,
+    /// 1)² chooses the point on the lens.
     #[inline]
     pub fn ray(&self, width: u32, height: u32, x: f32, y: f32, lens: [f32; 2]) -> Ray {
         let pixel = 2.0 * self.tan_half_fov / height as f32;
@@ -99,8 +98,8 @@ impl Camera {
         Ray::new(if self.start.is_some() { start(Vec2::ZERO) } else { self.eye }, through.normalize())
     }
 
-    /// The inverse of [`Camera::ray`]: where `point` is seen through the point `lens` of the lens. `None`
-    /// behind the camera; the raster coordinates may lie outside the picture.
+    /// Inverse of [`Camera::ray`]: the projection of `point` through the point `lens` of the lens. `None`
+    /// behind the camera. The raster coordinates may lie outside the picture.
     #[inline]
     pub fn project(&self, width: u32, height: u32, point: Vec3, lens: [f32; 2]) -> Option<Projection> {
         let mut offset = Vec2::ZERO;
@@ -115,7 +114,7 @@ impl Camera {
         if !(depth > 0.0 && distance < f32::INFINITY) {
             return None;
         }
-        // On the plane at depth 1: what is sharp lies where the ray meets the plane of focus.
+        // On the plane at depth 1, by the intersection of the ray with the plane of focus.
         let focus = if self.lens_radius > 0.0 { self.focus_distance } else { 1.0 };
         let at_focus = Vec2::new(beside.dot(self.right), beside.dot(self.up)) / depth * focus + offset;
         let film = at_focus / focus;
@@ -128,18 +127,18 @@ impl Camera {
     }
 }
 
-/// The unit vector along `v`, of whatever length.
+/// Unit vector along `v`, of any length.
 fn direction(v: Vec3) -> Option<Vec3> {
     let size = v.abs().max_element();
     if size > 0.0 && size < f32::INFINITY { (v / size).try_normalize() } else { None }
 }
 
-/// The unit vector along the cross product of two unit vectors, unless they are as good as parallel.
+/// Unit vector along the cross product of two unit vectors, unless they are nearly parallel.
 fn direction_unless_tiny(v: Vec3) -> Option<Vec3> {
     if v.length_squared() > PARALLEL { v.try_normalize() } else { None }
 }
 
-/// Squared sine below which two directions count as parallel: above rounding, far below any camera's.
+/// Squared sine below which two directions count as parallel: above rounding, far below that of any camera.
 const PARALLEL: f32 = 1e-10;
 
 #[cfg(test)]

@@ -1,26 +1,26 @@
-//! Classes of materials, before anything is hit: the classes that a surface may have somewhere. A texture may
-//! hold any value. Answers at a hit are in `bsdf/class.rs`, which names the classes.
+//! Material classes before any hit: the classes that a surface may have at some texture value. The classes
+//! themselves, and those at a hit, are in `bsdf/class.rs`.
 
 use super::{Material, Surface};
 use crate::Rgb;
 
-/// Surfaces below this alpha are smooth. A half-vector of two f32 directions has an error of about 1e-7:
-/// here still a thousandth of the lobe's width.
+/// GGX alpha below which a surface is smooth. The half-vector of two f32 directions has an error of about
+/// 1e-7, which is still a thousandth of the width of this lobe.
 pub(crate) const SMOOTH_ALPHA: f32 = 1e-4;
 
 /// GGX alpha below which a lobe makes caustics.
 pub(crate) const CAUSTIC_ALPHA: f32 = 0.1;
 
-/// The albedo of a base from which on it is diffuse for photons, with a margin for its textures.
+/// Least albedo of a base that is diffuse for photons, with a margin for its textures.
 const LEAST_BASE: f32 = 0.05;
 
 impl Surface {
-    /// Whether it may be diffuse alone, somewhere.
+    /// True if the surface may be purely diffuse somewhere.
     pub fn may_be_diffuse(&self) -> bool {
         matches!(self, Surface::Diffuse { .. } | Surface::Glossy { ior: None, .. })
     }
 
-    /// Whether it may reflect or refract into one direction only, somewhere.
+    /// True if the surface may be perfectly specular somewhere.
     pub fn may_be_smooth(&self) -> bool {
         match self {
             Surface::Diffuse { .. } => false,
@@ -31,7 +31,7 @@ impl Surface {
         }
     }
 
-    /// Whether it may scatter, somewhere, and yet not be diffuse alone.
+    /// True if the surface may have a rough lobe somewhere that is not purely diffuse.
     pub fn may_be_rough(&self) -> bool {
         match self {
             Surface::Diffuse { .. } | Surface::Mirror { .. } => false,
@@ -44,7 +44,7 @@ impl Surface {
 }
 
 impl Material {
-    /// Whether it may make caustics somewhere, in patterns that gather rays would not find.
+    /// True if the material may cast caustics somewhere, in patterns that gather rays would miss.
     pub(crate) fn may_be_caustic_caster(&self) -> bool {
         match &self.surface {
             Surface::Diffuse { .. } => false,
@@ -56,8 +56,8 @@ impl Material {
         }
     }
 
-    /// Whether caustic photons may go on from it, so that they are aimed at it: it is no receiver somewhere,
-    /// however wide its lobe is.
+    /// True if caustic photons may continue from the material, so that they are aimed at it: somewhere it is
+    /// no receiver, at any width of its lobe.
     pub(crate) fn may_pass_caustics(&self) -> bool {
         match &self.surface {
             Surface::Diffuse { .. } => false,

@@ -1,17 +1,18 @@
-//! The camera for a scene that names none: in front of the side of the bounding box that sees the most.
+//! Automatic camera for a scene without one: in front of the side of the bounding box from which the most is
+//! visible.
 
 use super::{Camera, Mesh};
 use crate::geometry::Bounds;
 use glam::{Vec2, Vec3};
 
-/// Vertical field of view in degrees: that of the camera of the measured Cornell box (a lens of 35 mm
-/// over a film of 25 mm).
+/// Vertical field of view in degrees, equal to that of the measured Cornell box (a lens of 35 mm over a film
+/// of 25 mm).
 const FIELD_OF_VIEW: f32 = 39.3;
 
 /// Free space around the box, as a fraction of it.
 const MARGIN: f32 = 0.04;
 
-/// Directions to look along, in order of preference where they see the same, with the up vector of each.
+/// View directions with their up vectors, in order of preference at equal visible area.
 const VIEWS: [(Vec3, Vec3); 6] = [
     (Vec3::NEG_Z, Vec3::Y),
     (Vec3::Z, Vec3::Y),
@@ -21,19 +22,18 @@ const VIEWS: [(Vec3, Vec3); 6] = [
     (Vec3::Y, Vec3::Z),
 ];
 
-/// Pixels across and down of the pictures that views are judged by.
+/// Side in pixels of the pictures that rate the views.
 const GRID: usize = 24;
 
-/// A later view must see this much more than an earlier one.
+/// Factor by which a later view must exceed an earlier one.
 const CLEARLY: f32 = 1.05;
 
-/// What a view along the vertical is worth: people stand.
+/// Weight of a vertical view, because most scenes stand upright.
 const VERTICAL: f32 = 0.6;
 
 impl Camera {
-    /// Frames all of `mesh`, looking along one of the six axis directions: the one from which the largest
-    /// area of surface is visible. An open box is seen through its opening, whichever way its walls are
-    /// wound.
+    /// Camera that frames all of `mesh`, looking along that of the six axis directions from which the largest
+    /// area of surface is visible. An open box is seen through its opening, with either winding of its walls.
     pub fn framing(mesh: &Mesh) -> Camera {
         let bounds =
             Bounds::around(mesh.positions.iter().map(|&p| p.into()).filter(|p: &Vec3| p.is_finite()));
@@ -53,8 +53,8 @@ impl Camera {
     }
 }
 
-/// Area of what `camera`, which stands outside `bounds`, sees first, in squares of their longest edge: a
-/// small depth buffer.
+/// Area visible to `camera`, which is outside `bounds`, in squares of their longest edge, by a small depth
+/// buffer.
 fn visible_area(camera: &Camera, mesh: &Mesh, bounds: &Bounds) -> f32 {
     let size = bounds.extent().max_element().max(f32::MIN_POSITIVE);
     let half = 0.5 * GRID as f32;
@@ -72,7 +72,7 @@ fn visible_area(camera: &Camera, mesh: &Mesh, bounds: &Bounds) -> f32 {
             continue;
         }
         let (low, high) = (p.min(q).min(r).max(Vec2::ZERO), p.max(q).max(r));
-        // Casts saturate; one pixel more than needed is tested and found outside.
+        // Casts saturate. One pixel more than needed is tested and found outside.
         for y in low.y as usize..(high.y as usize + 1).min(GRID) {
             for x in low.x as usize..(high.x as usize + 1).min(GRID) {
                 let pixel = Vec2::new(x as f32 + 0.5, y as f32 + 0.5);
@@ -84,8 +84,8 @@ fn visible_area(camera: &Camera, mesh: &Mesh, bounds: &Bounds) -> f32 {
                 let inverse_depth = (1.0 - u - v) * inverse[0] + u * inverse[1] + v * inverse[2];
                 let place = &mut nearest[y * GRID + x];
                 if inverse_depth > place.0 {
-                    // A pixel of area 1 / focal² at depth 1 shows z³ / height of a plane; of one that is
-                    // seen at a grazing angle no more than ten times its own cross section.
+                    // A pixel of area 1 / focal² at depth 1 shows the area z³ / height of a plane. At grazing
+                    // angles it counts for at most ten times its own cross section.
                     let depth = 1.0 / inverse_depth;
                     *place = (inverse_depth, depth * depth * depth / height.max(0.1 * depth));
                 }
@@ -100,7 +100,7 @@ fn in_front_of(bounds: &Bounds, forward: Vec3, up: Vec3) -> Camera {
     let half = 0.5 * bounds.extent();
     let across = half.dot(camera.right.abs()).max(half.dot(camera.up.abs()));
     let depth = half.dot(forward.abs());
-    // A flat scene seen edge-on still has a distance.
+    // A flat scene seen edge-on still needs a distance.
     let wanted = (across * (1.0 + MARGIN)).max(0.05 * depth).max(f32::MIN_POSITIVE);
     let distance = depth + wanted / camera.tan_half_fov;
     Camera { eye: bounds.center() - distance * forward, focus_distance: distance, ..camera }

@@ -1,11 +1,11 @@
-//! Inputs of materials: constants that a texture may multiply.
+//! Material inputs: constants, optionally multiplied by a texture.
 
 use super::{Scene, TextureId};
 use crate::Rgb;
 use crate::features::Features;
 use glam::{Vec2, Vec4};
 
-/// A colour, multiplied by a texture where there is one.
+/// Colour, optionally multiplied by a texture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ColorInput {
     /// The constant factor.
@@ -14,12 +14,12 @@ pub struct ColorInput {
     pub texture: Option<TextureId>,
 }
 
-/// A number, multiplied by a texture where there is one.
+/// Number, optionally multiplied by a channel of a texture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ScalarInput {
     /// The constant factor.
     pub value: f32,
-    /// The texture, and which of its channels (0 = R … 3 = A).
+    /// The texture and its channel (0 = R … 3 = A).
     pub texture: Option<(TextureId, u8)>,
 }
 
@@ -60,7 +60,7 @@ impl ScalarInput {
     }
 }
 
-/// Linear RGBA of a texture; white where the scene has no such texture.
+/// Linear RGBA of a texture; white if the scene has no such texture.
 #[inline]
 fn texel(scene: &Scene, id: TextureId, uv: Vec2) -> Vec4 {
     scene.textures.get(id.0 as usize).map_or(Vec4::ONE, |texture| texture.lookup(uv).into())

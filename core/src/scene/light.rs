@@ -1,23 +1,23 @@
-//! Lights as the scene file says them: those without surface, and the environment.
+//! Lights of the scene description: lights without surface, and the environment.
 
 use super::TextureId;
 use crate::Rgb;
 use glam::{Mat3, Vec3};
 
-/// A light without surface: a ray cannot hit it, it has to be sampled.
+/// Light without surface, which rays cannot hit and which has to be sampled.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum PointLight {
-    /// Shines alike in all directions.
+    /// Emits equally in all directions.
     Point {
-        /// Where.
+        /// Position.
         position: Vec3,
         /// Radiant intensity, W/sr.
         intensity: Rgb,
     },
-    /// Shines into a cone, full inside `cos_inner` and falling to nothing at `cos_outer`, evenly in
-    /// the angle.
+    /// Emits into a cone: full intensity inside `cos_inner`, falling linearly in the angle to zero at
+    /// `cos_outer`.
     Spot {
-        /// Where.
+        /// Position.
         position: Vec3,
         /// Unit axis of the cone.
         direction: Vec3,
@@ -25,10 +25,10 @@ pub enum PointLight {
         intensity: Rgb,
         /// Cosine of the angle up to which intensity is full.
         cos_inner: f32,
-        /// Cosine of the angle from which it is zero.
+        /// Cosine of the angle from which intensity is zero.
         cos_outer: f32,
     },
-    /// Parallel light from infinitely far.
+    /// Parallel light from infinity.
     Directional {
         /// Unit direction in which the light travels.
         direction: Vec3,
@@ -37,14 +37,14 @@ pub enum PointLight {
     },
 }
 
-/// Light from infinitely far, from all directions.
+/// Light from infinity, from all directions.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Environment {
-    /// Factor on the map, or the radiance where there is none.
+    /// Factor on the map, or the radiance without a map.
     pub radiance: Rgb,
-    /// Latitude-longitude map: row 0 is up (+Y of the map), the azimuth `phi = 2 pi (column + 0.5) / width`
+    /// Latitude-longitude map: row 0 is up (+Y of the map); the azimuth `phi = 2 pi (column + 0.5) / width`
     /// belongs to the direction `(sin theta cos phi, cos theta, sin theta sin phi)` of the map.
     pub map: Option<TextureId>,
-    /// From world directions to the map's.
+    /// Rotation from world directions to those of the map.
     pub to_map: Mat3,
 }

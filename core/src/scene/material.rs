@@ -1,14 +1,14 @@
-//! What a surface does with light, as the scene file says it: inputs that may be textured.
-//! [`crate::bsdf`] turns a material at a hit point into a BSDF.
+//! Materials of the scene description, with inputs that may be textured. [`crate::bsdf`] turns a material at
+//! a hit into a BSDF.
 
 use super::{ColorInput, ScalarInput, TextureId};
 use crate::Rgb;
 
-/// How the surface scatters. `roughness` is GGX alpha in 0 … 1; a textured roughness holds sqrt(alpha),
-/// so its texel is squared after the product.
+/// Scattering model. `roughness` is sqrt(alpha) of GGX in 0 … 1, constant or textured: it is squared after
+/// the product with its texel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Surface {
-    /// Lambert, on both sides.
+    /// Lambertian, on both sides.
     Diffuse {
         /// Albedo, 0 … 1.
         reflectance: ColorInput,
@@ -25,9 +25,9 @@ pub enum Surface {
         /// sqrt(alpha).
         roughness: ScalarInput,
     },
-    /// A specular coat over a diffuse base, fading to metal: what MTL's Kd + Ks and Pm mean.
+    /// Specular coat over a diffuse base, blended with metal: the meaning of MTL's Kd + Ks and Pm.
     Glossy {
-        /// Colour of the base; of the metal where `metallic` is 1.
+        /// Colour of the base, and of the metal if `metallic` is 1.
         base: ColorInput,
         /// Reflectance of the coat at normal incidence.
         specular: ColorInput,
@@ -35,50 +35,50 @@ pub enum Surface {
         roughness: ScalarInput,
         /// 0 coat over base … 1 metal.
         metallic: ScalarInput,
-        /// Index of refraction of a coat that is a dielectric (plastic, varnish): light that the base
-        /// sends back is reflected inside once more. `None`: the base is seen as it is.
+        /// Index of refraction of a dielectric coat (plastic, varnish), inside which light from the base is
+        /// reflected back again. `None`: the coat does not change the light of the base.
         ior: Option<f32>,
     },
-    /// Glass, water: a boundary between two media. Rough where `roughness` > 0.
+    /// Boundary between two media such as air and glass or water. Rough if `roughness` > 0.
     Dielectric {
-        /// Index of refraction inside (behind the front face) over outside.
+        /// Index of refraction inside (behind the front face) over that outside.
         ior: f32,
-        /// Factor on what is transmitted.
+        /// Factor on the transmitted light.
         tint: Rgb,
         /// sqrt(alpha).
         roughness: ScalarInput,
     },
 }
 
-/// A map that bends the shading normal.
+/// Texture that perturbs the shading normal.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum NormalMap {
-    /// Tangent-space normals, RGB in 0 … 1, with a factor on their slopes.
+    /// Tangent-space normals, RGB in 0 … 1, and a factor on their slopes.
     Tangent(TextureId, f32),
-    /// Heights, with the factor that turns them into lengths of a texture-coordinate unit.
+    /// Heights, and the factor that converts them to the unit of texture coordinates.
     Height(TextureId, f32),
 }
 
-/// All that is known of a surface.
+/// Description of a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Material {
-    /// How it scatters.
+    /// Scattering model.
     pub surface: Surface,
     /// Emitted radiance; black for nearly all materials.
     pub emission: ColorInput,
-    /// Whether the back face emits as well.
+    /// True if the back face emits as well.
     pub two_sided: bool,
-    /// Probability that a ray meets the surface at all: cut-out.
+    /// Probability that a ray hits the surface (cut-out).
     pub opacity: ScalarInput,
-    /// Bends the shading normal.
+    /// Perturbation of the shading normal.
     pub normal_map: Option<NormalMap>,
 }
 
 impl Material {
-    /// A grey diffuse surface: what a face without material is made of.
+    /// Grey diffuse surface, for faces without material.
     pub const GREY: Material = Material::diffuse(Rgb::splat(0.5));
 
-    /// A diffuse surface.
+    /// Diffuse surface.
     pub const fn diffuse(reflectance: Rgb) -> Self {
         let none = ColorInput { value: Rgb::ZERO, texture: None };
         Self {
@@ -90,12 +90,12 @@ impl Material {
         }
     }
 
-    /// Whether the material emits light at all.
+    /// True if the material emits light.
     pub fn emits(&self) -> bool {
         self.emission.value.max_element() > 0.0
     }
 
-    /// Whether a ray can pass through by opacity.
+    /// True if a ray may pass through by opacity.
     pub fn has_cutout(&self) -> bool {
         self.opacity.value < 1.0 || self.opacity.texture.is_some()
     }

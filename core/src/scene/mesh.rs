@@ -1,9 +1,9 @@
-//! Indexed triangles. Positions, normals and texture coordinates share one index per vertex.
+//! Indexed triangle mesh. Positions, normals and texture coordinates share one index per vertex.
 
 use bytemuck::{Pod, Zeroable};
 use glam::{Vec2, Vec3};
 
-/// Three vertices, counter-clockwise seen from the front, and what they are made of.
+/// Triangle with counter-clockwise vertices seen from the front, and its material.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
 #[repr(C)]
 pub struct Triangle {
@@ -13,22 +13,22 @@ pub struct Triangle {
     pub material: u32,
 }
 
-/// Borrowed triangles. The loader (or the embedder) vouches for the indices: [`Mesh::validate`] checks them.
+/// Borrowed triangle mesh. Its indices are the responsibility of the caller; [`Mesh::validate`] checks them.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Mesh<'a> {
     /// Vertex positions.
     pub positions: &'a [[f32; 3]],
-    /// Unit shading normals, one for each position, or empty. A zero normal means: shade the face flat.
+    /// Unit shading normals, one for each position, or empty. Faces with a zero normal are shaded flat.
     pub normals: &'a [[f32; 3]],
     /// Texture coordinates, one for each position, or empty. v points up.
     pub texcoords: &'a [[f32; 2]],
-    /// The triangles.
+    /// Triangles.
     pub triangles: &'a [Triangle],
 }
 
 impl<'a> Mesh<'a> {
-    /// Index of the first triangle that refers to a vertex or material that is not there; a mesh whose
-    /// `normals` or `texcoords` are neither empty nor as long as `positions` fails at triangle 0.
+    /// Checks the indices. The error is the index of the first triangle with a vertex or material that does
+    /// not exist, or 0 if `normals` or `texcoords` are neither empty nor as long as `positions`.
     pub fn validate(&self, materials: usize) -> Result<(), usize> {
         let vertices = self.positions.len();
         let fits = |length: usize| length == 0 || length == vertices;
@@ -41,19 +41,19 @@ impl<'a> Mesh<'a> {
         self.triangles.iter().position(broken).map_or(Ok(()), Err)
     }
 
-    /// Corner positions of triangle `index`; zeros where the mesh has no such triangle or vertex.
+    /// Corner positions of triangle `index`; zeros if the triangle or a vertex does not exist.
     #[inline]
     pub fn corners(&self, index: u32) -> [Vec3; 3] {
         self.vertices(index).map(|v| self.positions.get(v as usize).copied().unwrap_or_default().into())
     }
 
-    /// Shading normals at the corners; zeros where there are none.
+    /// Shading normals at the corners; zeros without any.
     #[inline]
     pub fn corner_normals(&self, index: u32) -> [Vec3; 3] {
         self.vertices(index).map(|v| self.normals.get(v as usize).copied().unwrap_or_default().into())
     }
 
-    /// Texture coordinates at the corners; zeros where there are none.
+    /// Texture coordinates at the corners; zeros without any.
     #[inline]
     pub fn corner_texcoords(&self, index: u32) -> [Vec2; 3] {
         self.vertices(index).map(|v| self.texcoords.get(v as usize).copied().unwrap_or_default().into())

@@ -1,5 +1,5 @@
-//! What to render: borrowed views of meshes, materials, textures, lights and the camera.
-//! A scene owns nothing; the app's buffers or a microcontroller's flash do.
+//! Scene description: borrowed views of mesh, materials, textures, lights and camera. A scene owns no memory;
+//! the application's buffers or a microcontroller's flash hold the data.
 
 mod camera;
 mod class;
@@ -20,19 +20,19 @@ pub use mesh::{Mesh, Triangle};
 pub use surface::SurfacePoint;
 pub use texture::{Texels, Texture, TextureId, TextureTransform, Wrap};
 
-/// All that a picture is made of.
+/// Everything that a picture shows.
 #[derive(Clone, Copy, Debug)]
 pub struct Scene<'a> {
-    /// Every triangle, in one mesh, in world space.
+    /// All triangles, in one mesh, in world space.
     pub mesh: Mesh<'a>,
-    /// Referred to by [`Triangle::material`].
+    /// Indexed by [`Triangle::material`].
     pub materials: &'a [Material],
-    /// Referred to by [`TextureId`].
+    /// Indexed by [`TextureId`].
     pub textures: &'a [Texture<'a>],
-    /// Lights without surface: point, spot, directional. Emissive triangles are found through `materials`.
+    /// Lights without surface: point, spot, directional. The `materials` mark emissive triangles.
     pub lights: &'a [PointLight],
-    /// What a ray sees that leaves the scene; `None` is black.
+    /// Radiance of rays that leave the scene; `None` is black.
     pub environment: Option<Environment>,
-    /// Who looks.
+    /// Camera.
     pub camera: Camera,
 }

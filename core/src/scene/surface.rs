@@ -1,49 +1,50 @@
-//! The point where a ray met a triangle: position with a bound of its error, normals, texture coordinates;
-//! and rays that leave it without meeting it again.
+//! Surface interaction at a hit: position with an error bound, normals, texture coordinates, and rays that
+//! leave the surface without hitting it again.
 
 use super::{Material, NormalMap, Scene};
 use crate::features::Features;
 use crate::geometry::{Frame, Hit, Ray};
 use glam::{Vec2, Vec3};
 
-/// What is needed of a surface to shade it. Both normals are on the side of the viewer.
+/// Surface data for shading. Both normals are on the side of the viewer.
 #[derive(Clone, Copy, Debug)]
 pub struct SurfacePoint<'a> {
-    /// Interpolated from the corners, which is more precise than a step along the ray.
+    /// Interpolated from the corners, which is more precise than `ray.at(t)`.
     pub position: Vec3,
-    /// Bound of the distance between `position` and the triangle as the tracer sees it.
+    /// Bound of the distance between `position` and the triangle as the tracer computes it.
     pub error: f32,
     /// Unit normal of the triangle.
     pub geometric_normal: Vec3,
-    /// The shading frame: interpolated normal, normal or bump map. z is never turned away from the viewer.
+    /// Shading frame: interpolated normal, normal or bump map. Its z axis is never turned away from the
+    /// viewer.
     pub frame: Frame,
     /// Texture coordinates; zero in scenes without textures.
     pub uv: Vec2,
-    /// Whether the viewer is on the side from which the triangle winds counter-clockwise.
+    /// True if the viewer is on the side from which the triangle is counter-clockwise.
     pub front: bool,
-    /// What the triangle is made of.
+    /// Material of the triangle.
     pub material: &'a Material,
     /// Index of the triangle.
     pub triangle: u32,
 }
 
-/// The bound of the error counts in this many units in the last place: five roundings of the sum of three
-/// products, as many in the tracer's differences and shears, and one of the step itself, rounded up.
+/// Unit of the error bound, in rounding errors: five for the sum of three products, as many for the tracer's
+/// differences and shears, and one for the offset itself, rounded up.
 const ERROR_UNITS: f32 = 16.0 * 0.5 * f32::EPSILON;
 
-/// The tracer's distances err by the length of a triangle times its slenderness; what is more slender than
-/// this counts as this, so that needles do not push rays far off.
+/// Upper limit of slenderness, so that needles do not move rays too far. The error of the tracer's distances
+/// is the length of a triangle times its slenderness.
 const SLENDEREST: f32 = 16.0;
 
-/// Squares outside of this range lose bits to underflow or overflow.
+/// Squares outside this range lose bits to underflow or overflow.
 const SAFE_SQUARES: core::ops::Range<f32> = 1e-24..1e24;
 
-/// The shading normal is turned until the viewer stands this high above its horizon (a cosine).
+/// Least cosine of the viewer over the horizon of the shading normal, which is turned to reach it.
 const LOWEST_VIEW: f32 = 1e-3;
 
 impl<'a> SurfacePoint<'a> {
-    /// The point of `hit`, seen by `ray`. `None` where the scene has no such triangle or material, or the
-    /// triangle has no area: nothing that the tracer returns.
+    /// Point of `hit`, seen along `ray`. `None` if the scene has no such triangle or material, or the
+    /// triangle has no area: the tracer returns no such hit.
     #[inline]
     pub fn at<F: Features>(scene: &Scene<'a>, ray: &Ray, hit: &Hit) -> Option<Self> {
         let mesh = &scene.mesh;
@@ -56,7 +57,7 @@ impl<'a> SurfacePoint<'a> {
 
         let (e1, e2) = (p1 - p0, p2 - p0);
         let (normal, slenderness) = unit_normal(e1, e2)?;
-        // Scale-free: proportional to the coordinates and to the edges, nothing absolute.
+        // Scale-free: proportional to the coordinates and edges, without absolute terms.
         let coordinates = (w * p0.abs() + u * p1.abs() + v * p2.abs()).max_element();
         let reach = e1.abs().max(e2.abs()).max_element();
         let error = ERROR_UNITS * (coordinates + reach * slenderness.min(SLENDEREST));
@@ -67,7 +68,7 @@ impl<'a> SurfacePoint<'a> {
         let mut shading = normal;
         if !mesh.normals.is_empty() {
             shading = interpolated_normal(mesh.normals, triangle.vertices, [w, u, v]).unwrap_or(normal);
-            // Normals that a file gives the wrong way round still say how the surface bends.
+            // Flipped normals of a file still describe the curvature of the surface.
             if shading.dot(normal) < 0.0 {
                 shading = -shading;
             }
@@ -88,7 +89,7 @@ impl<'a> SurfacePoint<'a> {
         let side = if front { 1.0 } else { -1.0 };
         let geometric_normal = side * normal;
         shading *= side;
-        // Where the interpolated normal looks away from the viewer, it is turned just enough to look back.
+        // An interpolated normal that faces away from the viewer is turned just far enough to face it.
         if bent || !mesh.normals.is_empty() {
             let cos = shading.dot(to_viewer);
             let lowest = LOWEST_VIEW.min(geometric_normal.dot(to_viewer));
@@ -101,35 +102,35 @@ impl<'a> SurfacePoint<'a> {
         Some(Self { position, error, geometric_normal, frame, uv, front, material, triangle: hit.triangle })
     }
 
-    /// Whether a direction, given in the shading frame and in the world, is on the same side of the triangle
-    /// as of its shading normal: no light passes where the two disagree.
+    /// True if a direction, in the shading frame and in the world, is on the same side of the geometric and
+    /// of the shading normal. Otherwise no light passes.
     #[inline]
     pub fn sides_agree(&self, local: Vec3, world: Vec3) -> bool {
         local.z * world.dot(self.geometric_normal) > 0.0
     }
 
-    /// The ray that leaves the surface into `direction`, on the side to which that points.
+    /// Ray that leaves the surface along `direction`, offset to that side.
     #[inline]
     pub fn spawn(&self, direction: Vec3) -> Ray {
         Ray::new(self.origin(direction), direction)
     }
 
-    /// Whether `ray`, which met this point, started on the surface as far as rounding can tell, and leaves
-    /// its front. A camera on a wall stands before it.
+    /// True if `ray`, which hit this point, started at the surface within rounding and leaves its front. A
+    /// camera on a wall is in front of it.
     #[inline]
     pub fn is_left_by(&self, ray: &Ray) -> bool {
         !self.front && Vec3::from(ray.origin).distance(self.position) <= STARTS_HERE * self.error
     }
 
-    /// The ray from here to `target`, a point without extent or one already moved off its surface: `t_max`
-    /// is just below 1 at the target.
+    /// Ray to `target`, a point without extent or one already offset from its surface. Its `t_max` is just
+    /// below 1, the `t` of the target.
     #[inline]
     pub fn spawn_to(&self, target: Vec3) -> Ray {
         let origin = self.origin(target - self.position);
         Ray::segment(origin, target - origin, 1.0 - f32::EPSILON)
     }
 
-    /// `position`, moved off the surface to the side of `direction` by the bound of its error.
+    /// `position`, offset from the surface by its error bound to the side of `direction`.
     #[inline]
     fn origin(&self, direction: Vec3) -> Vec3 {
         let step = self.error.copysign(direction.dot(self.geometric_normal));
@@ -137,8 +138,8 @@ impl<'a> SurfacePoint<'a> {
     }
 }
 
-/// Bounds of the error of a point, within which a ray starts at it: its own, that of the origin, and as much
-/// for a corner, where the ray has left another surface just before.
+/// Distance within which a ray starts at a point, in error bounds: the bound of the point, that of the
+/// origin, and twice as much for a corner, where the ray has just left another surface.
 const STARTS_HERE: f32 = 4.0;
 
 #[inline]
@@ -152,8 +153,8 @@ fn texture_corners(texcoords: &[[f32; 2]], vertices: [u32; 3]) -> [Vec2; 3] {
     vertices.map(|i| texcoords.get(i as usize).copied().unwrap_or_default().into())
 }
 
-/// The unit normal of a triangle with edges `e1` and `e2`, and how slender it is: the square of its length
-/// over twice its area.
+/// Unit normal of a triangle with edges `e1` and `e2`, and its slenderness: the square of its length over
+/// twice its area.
 #[inline(always)]
 fn unit_normal(e1: Vec3, e2: Vec3) -> Option<(Vec3, f32)> {
     let cross = e1.cross(e2);
@@ -165,7 +166,8 @@ fn unit_normal(e1: Vec3, e2: Vec3) -> Option<(Vec3, f32)> {
     rescaled_unit_normal(e1, e2)
 }
 
-/// The same for a very small, very large, very slender or no triangle: in units of its size, twice.
+/// [`unit_normal`] of a very small, very large, very slender or degenerate triangle: rescaled by its size,
+/// twice.
 #[cold]
 fn rescaled_unit_normal(e1: Vec3, e2: Vec3) -> Option<(Vec3, f32)> {
     let size = power_of_two_near(e1.abs().max(e2.abs()).max_element())?;
@@ -177,7 +179,7 @@ fn rescaled_unit_normal(e1: Vec3, e2: Vec3) -> Option<(Vec3, f32)> {
     Some((cross * width * inverse, longest * width * inverse))
 }
 
-/// A power of two whose product with `x` is about 1; exact, so that scaled scenes give the same bits.
+/// Power of two whose product with `x` is about 1. It is exact, so that scaled scenes give the same bits.
 #[inline]
 fn power_of_two_near(x: f32) -> Option<f32> {
     if !(x > 0.0 && x < f32::INFINITY) {
@@ -187,7 +189,7 @@ fn power_of_two_near(x: f32) -> Option<f32> {
     Some(f32::from_bits(((254 - exponent) as u32) << 23))
 }
 
-/// The interpolated normal, unit; `None` where a corner has none or they cancel.
+/// Interpolated unit normal; `None` if a corner has none or if they cancel.
 #[inline]
 fn interpolated_normal(normals: &[[f32; 3]], vertices: [u32; 3], weights: [f32; 3]) -> Option<Vec3> {
     let mut sum = Vec3::ZERO;
@@ -202,8 +204,8 @@ fn interpolated_normal(normals: &[[f32; 3]], vertices: [u32; 3], weights: [f32; 
     SAFE_SQUARES.contains(&square).then(|| sum * (1.0 / libm::sqrtf(square)))
 }
 
-/// The normal that a map makes of `normal`; `edges` and `sides` are two edges of the triangle in space and in
-/// texture coordinates. `None` where the texture coordinates span nothing.
+/// Perturbation of `normal` by a map. `edges` and `sides` are two edges of the triangle in space and in
+/// texture coordinates. `None` if the texture coordinates are degenerate.
 fn mapped_normal(
     scene: &Scene,
     map: NormalMap,
@@ -225,10 +227,10 @@ fn mapped_normal(
             (texture, Vec3::new(-slope.x, -slope.y, 1.0))
         }
     };
-    // Where the texture is mirrored, so are its directions.
+    // A mirrored texture mirrors the directions of its normals.
     let mirrored = Vec2::ONE.copysign(texture.transform.scale);
     let local = Vec3::new(mirrored.x * local.x, mirrored.y * local.y, local.z);
-    // dp/du from the two edges, made orthogonal to the normal; mirrored charts turn the bitangent.
+    // dp/du from the two edges, made orthogonal to the normal. A mirrored chart flips the bitangent.
     let determinant = sides[0].perp_dot(sides[1]);
     let along_u = (edges[0] * sides[1].y - edges[1] * sides[0].y) * 1f32.copysign(determinant);
     let tangent = (along_u - normal.dot(along_u) * normal).try_normalize()?;

@@ -1,5 +1,5 @@
-//! Borrowed texels and how they are looked up: bilinear, wrapped, decoded to linear. No input, however
-//! wild, panics: coordinates that are not finite count as 0, a texture without texels is white.
+//! Texture lookup from borrowed texels: bilinear, wrapped, decoded to linear. No input panics: coordinates
+//! that are not finite count as 0, and a texture without texels is white.
 
 use glam::{Vec2, Vec3, Vec4};
 
@@ -7,39 +7,39 @@ use glam::{Vec2, Vec3, Vec4};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct TextureId(pub u32);
 
-/// The pixels of a texture, row by row from the top.
+/// Texels of a texture, row by row from the top.
 #[derive(Clone, Copy, Debug)]
 pub enum Texels<'a> {
-    /// RGB in the sRGB curve, alpha linear.
+    /// RGB encoded in sRGB, alpha linear.
     Srgb8(&'a [[u8; 4]]),
-    /// Linear numbers, 0 … 255 for 0 … 1.
+    /// Linear values, 0 … 255 for 0 … 1.
     Linear8(&'a [[u8; 4]]),
     /// Linear floats, not limited to 1.
     Float(&'a [[f32; 3]]),
-    /// One number, the same in all four channels.
+    /// One number for all four channels.
     Number(&'a [f32]),
 }
 
-/// What lies beyond the edge.
+/// Lookup beyond the edge.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Wrap {
-    /// The texture again.
+    /// Repeats the texture.
     Repeat,
-    /// Its border.
+    /// Extends the border.
     Clamp,
 }
 
-/// Which place of a texture belongs to texture coordinates `uv`: `scale * uv + offset`.
+/// Map from texture coordinates `uv` of a surface to those of the texture: `scale * uv + offset`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TextureTransform {
     /// Factors on u and v; a negative one mirrors the texture.
     pub scale: Vec2,
-    /// Added after that.
+    /// Added after `scale`.
     pub offset: Vec2,
 }
 
 impl TextureTransform {
-    /// The texture lies as the texture coordinates do.
+    /// Leaves texture coordinates unchanged.
     pub const IDENTITY: Self = Self { scale: Vec2::ONE, offset: Vec2::ZERO };
 
     #[inline]
@@ -48,7 +48,7 @@ impl TextureTransform {
     }
 }
 
-/// A texture: borrowed texels with their size.
+/// Texture: borrowed texels with their size.
 #[derive(Clone, Copy, Debug)]
 pub struct Texture<'a> {
     /// Pixels across.
@@ -57,21 +57,21 @@ pub struct Texture<'a> {
     pub height: u32,
     /// `width * height` texels.
     pub texels: Texels<'a>,
-    /// Beyond the edge.
+    /// Lookup beyond the edge.
     pub wrap: Wrap,
-    /// From the texture coordinates of a surface to those of the texture.
+    /// Map from the texture coordinates of a surface to those of the texture.
     pub transform: TextureTransform,
 }
 
 impl Texture<'_> {
-    /// Linear RGBA at texture coordinates `uv`: bilinear between texel centres, v up. Alpha is 1 where the
+    /// Linear RGBA at texture coordinates `uv`: bilinear between texel centres, v up. Alpha is 1 if the
     /// texels have none.
     #[inline]
     pub fn lookup(&self, uv: Vec2) -> [f32; 4] {
         self.between(self.transform.at(uv))
     }
 
-    /// The same at texture coordinates of its own.
+    /// Linear RGBA at texture coordinates of the texture itself.
     #[inline]
     fn between(&self, uv: Vec2) -> [f32; 4] {
         let (x0, x1, fx) = self.wrap.neighbours(uv.x, self.width);
@@ -83,8 +83,8 @@ impl Texture<'_> {
         upper.lerp(lower, fy).to_array()
     }
 
-    /// Slope (∂/∂u, ∂/∂v) of the red channel at `uv`, per unit of the texture's own coordinates: central
-    /// differences over one texel, hence continuous. For height maps.
+    /// Slope (∂/∂u, ∂/∂v) of the red channel at `uv`, per unit of the texture's own coordinates, for height
+    /// maps. Central differences over one texel make it continuous.
     pub fn gradient(&self, uv: Vec2) -> Vec2 {
         let uv = self.transform.at(uv);
         let size = Vec2::new(self.width as f32, self.height as f32);
@@ -94,12 +94,12 @@ impl Texture<'_> {
             * size
     }
 
-    /// Linear RGBA of the texel in column `x` of row `y` from the top; white where there is none.
+    /// Linear RGBA of the texel in column `x` of row `y` from the top; white if it does not exist.
     pub fn texel_at(&self, x: usize, y: usize) -> [f32; 4] {
         self.texel(y.saturating_mul(self.width as usize).saturating_add(x)).to_array()
     }
 
-    /// The texel at `index`, linear; white where there is none.
+    /// Linear texel at `index`; white if it does not exist.
     #[inline]
     fn texel(&self, index: usize) -> Vec4 {
         match self.texels {
@@ -123,10 +123,10 @@ impl Texture<'_> {
 }
 
 impl Wrap {
-    /// The two texels around coordinate `x` (0 … 1 spans `size` texels) and the weight of the second.
+    /// The two texels around coordinate `x` (0 … 1 spans `size` texels), and the weight of the second.
     #[inline]
     fn neighbours(self, x: f32, size: u32) -> (u32, u32, f32) {
-        // Beyond 2^23 coordinates are whole numbers; NaN fails the comparison as well.
+        // Coordinates beyond 2^23 are whole numbers. NaN fails the comparison as well.
         const WHOLE: f32 = 8_388_608.0;
         let x = if x.abs() < WHOLE { x } else { 0.0 };
         let last = size.saturating_sub(1);
@@ -148,14 +148,14 @@ impl Wrap {
     }
 }
 
-/// The largest whole number not above `x`, for |x| < 2^31: two instructions where `libm` calls a function.
+/// Floor of `x`, for |x| < 2^31: two instructions, whereas `libm` calls a function.
 #[inline]
 fn floor(x: f32) -> f32 {
     let whole = x as i32 as f32;
     if whole > x { whole - 1.0 } else { whole }
 }
 
-/// The sRGB curve (IEC 61966-2-1) of every byte.
+/// sRGB decoding (IEC 61966-2-1) of every byte.
 static SRGB_TO_LINEAR: [f32; 256] = {
     let mut table = [0.0; 256];
     let mut i = 0;
@@ -171,7 +171,7 @@ static SRGB_TO_LINEAR: [f32; 256] = {
     table
 };
 
-/// x^2.4 for `x` in 0.05 … 1, at compile time: the twelfth power of Newton's fifth root.
+/// x^2.4 for `x` in 0.05 … 1, at compile time: the twelfth power of the fifth root by Newton's method.
 const fn power_12_5(x: f64) -> f64 {
     let mut root = 1.0;
     let mut step = 0;
@@ -233,7 +233,7 @@ mod tests {
         let ramp: [[f32; 3]; 32] = core::array::from_fn(|i| [(i % 8) as f32 * 0.5 - (i / 8) as f32; 3]);
         let t = Texture { width: 8, height: 4, texels: Texels::Float(&ramp), ..texture(Wrap::Clamp) };
         let slope = t.gradient(Vec2::new(0.5, 0.5));
-        // Half a unit a texel, 8 texels a unit of u; minus one a row downwards, 4 rows a unit of v.
+        // Half a unit per texel, 8 texels per unit of u; minus one per row downwards, 4 rows per unit of v.
         assert!(slope.distance(Vec2::new(4.0, 4.0)) < 1e-4, "{slope}");
     }
 
