@@ -1,11 +1,11 @@
-//! The audit: what a biased picture is off by, from a few of its pixels that an unbiased estimator renders as
-//! well (docs/decisions/0011).
+//! Audit: the bias of a picture, estimated from a few pixels that an unbiased estimator renders as well
+//! (docs/decisions/0011).
 //!
-//! A and B are a pixel's halves in the picture, U and V those of the audit, all independent of each other. (A
-//! − U) and (B − V) both have the pixel's bias for their mean and share no noise, so their product has the
-//! square of the bias for its mean, whatever the noise of either is. With the mean of both halves in place of
-//! A and B it would be the squared error of the pixel: the difference, ((A − B) / 2)², is the variance that
-//! the picture tells of itself, in all of its pixels instead of a few.
+//! A and B are the halves of a pixel in the picture, U and V its halves in the audit, all independent. (A −
+//! U) and (B − V) both have the bias of the pixel as mean and share no noise, so that their product has the
+//! squared bias as mean, for any noise. With the mean of both halves in place of A and B, the mean would be
+//! the squared error of the pixel. The difference ((A − B) / 2)² is the variance, which the picture itself
+//! provides for all of its pixels instead of a few.
 
 use super::interval::ErrorEstimate;
 use super::metric::{DARK, ROUNDING};
@@ -14,29 +14,29 @@ use crate::Rgb;
 use crate::film::Pixel;
 use libm::{cbrt, fabs, hypot, sqrt};
 
-/// The unknown reference in a denominator comes from the part of the audit that is not in the numerator: what
-/// made a pixel of the picture bright by chance must not make its error small. Where light is rare the part
-/// may lack it, so that the reference is taken for no darker than the filtered picture over this; a pixel
-/// that shines where it should not is off by as much at most.
+/// Divisor of the filtered picture that bounds R in denominators from below. R comes from the part of the
+/// audit that is not in the numerator, so that chance brightness of a pixel does not reduce its error. Where
+/// light is rare this part may lack it, hence the bound. The relative error of a wrongly bright pixel is then
+/// at most this number.
 const DOUBT: f64 = 4.0;
 
-/// The normal distribution lies below this with 95 %.
+/// 95 % quantile of the normal distribution.
 const ONE_SIDED: f64 = 1.644_853_626_951_472_7;
 
-/// What an audited pixel says.
+/// Result of an audited pixel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Finding {
-    /// Estimate of its squared bias over R² + 0.01 m², in the mean of its channels; may be negative.
+    /// Estimate of the squared bias over R² + 0.01 m², averaged over channels; may be negative.
     pub bias: f64,
-    /// By how much it is too bright, over the root of that.
+    /// Excess brightness over the root of R² + 0.01 m².
     pub deviation: f64,
-    /// The variances of the pixel in the picture and in the audit, over that.
+    /// Variances of the pixel in the picture and in the audit, over R² + 0.01 m².
     pub variances: [f64; 2],
 }
 
 impl Finding {
-    /// Of a pixel of the `picture`, its `truth`, and what it is after filtering, in a picture of mean `mean`.
-    /// `None` where the picture has no two samples, or the truth no four.
+    /// Finding of a pixel of the `picture`, its `truth` by the audit, and its `filtered` value, in a picture
+    /// of mean `mean`. `None` if the picture has no two samples, or the audit no four.
     pub fn of(picture: &Pixel, truth: &Pixel, filtered: Rgb, mean: f64) -> Option<Self> {
         if picture.even.count() == 0 || picture.odd.count() == 0 {
             return None;
@@ -52,14 +52,14 @@ impl Finding {
                 let r = truth.max(filtered[c] / DOUBT);
                 1.0 / (r * r + DARK)
             };
-            // Halves know nothing of each other; quarters of one half do, for what one has met the other does
-            // not meet again, and where samples are few a deviation over the other quarter would be below
-            // zero in the mean.
+            // R of the other half: halves are independent, quarters of one half are not, since light met by
+            // one quarter is not met again by the other. With few samples a deviation over the other quarter
+            // would be negative in the mean.
             let halves = [0.5 * (u1[c] + u2[c]), 0.5 * (v1[c] + v2[c])];
             for (half, other) in [(halves[0], halves[1]), (halves[1], halves[0])] {
                 deviation += 0.5 * (both[c] - half) * sqrt(weight(other));
             }
-            // Numerator from one part of the truth, denominator from the other, and the other way round.
+            // Numerator and denominator from different parts of the audit, in both ways.
             for (u, v, other) in [(u1[c], v1[c], u2[c] + v2[c]), (u2[c], v2[c], u1[c] + v1[c])] {
                 let weight = weight(0.5 * other);
                 bias += 0.5 * ((a[c] - u) * (b[c] - v) + (a[c] - v) * (b[c] - u)) * weight;
@@ -72,27 +72,27 @@ impl Finding {
     }
 }
 
-/// The squared bias of a picture in units of relMSE, which its own noise knows nothing of.
+/// Squared bias of a picture in units of relMSE, beside its noise.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BiasEstimate {
-    /// Estimate; below 0 where there is none, or none that is larger than noise.
+    /// Estimate; may be negative if there is no bias above the noise.
     pub relmse: f64,
-    /// Lower end of the interval of 95 %, not below 0.
+    /// Lower end of the 95 % interval, at least 0.
     pub lower: f64,
-    /// Upper end, not below 0.
+    /// Upper end of the 95 % interval, at least 0.
     pub upper: f64,
-    /// The smallest that would have been told from none, at a level of 2.5 %.
+    /// Smallest estimate that is significant at a level of 2.5 %.
     pub detectable: f64,
     /// Standard error of the estimate.
     pub error: f64,
 }
 
 impl BiasEstimate {
-    /// From the findings of all strata, one of each, in an order in which neighbours are alike; with the
-    /// share of the picture that each stands for, over the mean share. `None` for fewer than eight.
+    /// Estimate from the findings of all strata, one per stratum, in an order in which neighbours are
+    /// similar. Each comes with its share of the picture over the mean share. `None` for fewer than eight.
     ///
-    /// What neighbours differ by is taken for chance: too much where strata differ, so that the interval is
-    /// rather too wide than too narrow.
+    /// Differences of neighbours count as chance. This overestimates the variance if strata differ, so that
+    /// the interval is rather too wide than too narrow.
     pub fn of(findings: impl Iterator<Item = (Finding, f64)>) -> Option<Self> {
         let (mut count, mut differences) = (0.0, 0.0);
         let (mut sum, mut squares, mut cubes) = (0.0, 0.0, 0.0);
@@ -111,7 +111,7 @@ impl BiasEstimate {
         if count < 8.0 {
             return None;
         }
-        // A ring, so that each finding is part of two differences.
+        // Circular: each finding is part of two differences.
         differences += (first - last) * (first - last);
         let mean = sum / count;
         let second = squares - sum * mean;
@@ -120,13 +120,13 @@ impl BiasEstimate {
         Some(Self::known(mean, variance, third / (second * sqrt(second)), 0.0))
     }
 
-    /// From an estimate, its variance and how skew its noise is; `unsure` is what else is not known of it, as
-    /// a share of it.
+    /// Estimate with known variance and skewness of its noise; `unsure` is its remaining relative
+    /// uncertainty.
     ///
-    /// Its noise is a sum of products that are as often negative as positive. Over the root of their squares
-    /// such a sum has lighter tails than the normal distribution, however heavy those of the products are
-    /// (Efron 1969): Student's t would be for squares that are not known as well. Where few products have
-    /// most of it, they are rather positive.
+    /// The noise is a sum of products that are as often negative as positive. Divided by the root of their
+    /// sum of squares, such a sum has lighter tails than the normal distribution, for products of any tails
+    /// (Efron 1969). Student's t would apply to less certain squares. If few products dominate, they tend to
+    /// be positive.
     pub(super) fn known(relmse: f64, variance: f64, skewness: f64, unsure: f64) -> Self {
         let error = sqrt(variance).max(ROUNDING * ROUNDING / Z);
         let detectable = error * studentised(skewness);
@@ -134,36 +134,36 @@ impl BiasEstimate {
         Self { relmse, lower: ends(relmse, below)[0], upper: ends(relmse, above)[1], detectable, error }
     }
 
-    /// A lower end that holds however often it is looked at: about four standard errors below.
+    /// Lower end that holds for repeated tests: about four standard errors below the estimate.
     pub fn least(&self) -> f64 {
         (self.relmse - 2.0 * (self.upper - self.relmse)).max(0.0)
     }
 
-    /// Whether there is a bias, at a level of 2.5 %.
+    /// Whether the bias is significant at a level of 2.5 %.
     pub fn is_found(&self) -> bool {
         self.relmse > self.detectable
     }
 }
 
-/// The ends of the interval of 95 % for what is 0 or more, of a normal estimate with this standard error, in
-/// the order of likelihood ratios (Feldman & Cousins 1998): an estimate below 0 does not make it empty, and
-/// where there is nothing it errs in 5 % as everywhere. Their lower end between the one-sided and twice the
-/// two-sided quantile, and their upper end below 0, are within 0.1 standard errors of these; so is what they
-/// hold of 95 %, within 1 %.
+/// 95 % interval of a non-negative quantity from a normal estimate with standard error `error`, in the order
+/// of likelihood ratios (Feldman & Cousins 1998): not empty for an estimate below 0, and wrong in 5 % for any
+/// true value, including 0. This is an approximation: the lower end between the one-sided and twice the
+/// two-sided quantile, and the upper end below 0, are within 0.1 standard errors of theirs, the coverage
+/// within 1 % of 95 %.
 fn ends(estimate: f64, error: f64) -> [f64; 2] {
     let x = estimate / error;
     let lower = (Z * (x - ONE_SIDED) / (2.0 * Z - ONE_SIDED)).max(x - Z).max(0.0);
-    // x + hypot(x, Z), without its cancellation.
+    // x + hypot(x, Z), without cancellation.
     let upper = if x > 0.0 { x + Z } else { Z * Z / (hypot(x, Z) - x) };
     [lower * error, upper * error]
 }
 
-/// An estimated mean is above the true one by less than so many standard errors with 97.5 %. Both are the
-/// larger the further single values lie above, so that it is less for skew ones: Hall 1992, On the removal of
-/// skewness by transformation. `skewness` is the sum of their third moments over the 3/2 power of that of
-/// their second, from −1 to 1.
+/// Number of standard errors that an estimated mean exceeds the true mean by with a probability of 2.5 %
+/// (Hall 1992, On the removal of skewness by transformation). High outliers enlarge both the mean and its
+/// standard error, so that the number falls with skewness. `skewness` is the sum of third moments over the
+/// sum of second moments to the power 3/2, from −1 to 1.
 fn studentised(skewness: f64) -> f64 {
-    // Where all are the same it is what rounding makes of nothing.
+    // For equal findings the skewness is mere rounding.
     let skewness = skewness.clamp(-1.0, 1.0);
     if fabs(skewness) >= 1e-4 {
         3.0 / skewness * (cbrt(1.0 + skewness * (Z - skewness / 6.0)) - 1.0)
@@ -173,11 +173,11 @@ fn studentised(skewness: f64) -> f64 {
 }
 
 impl ErrorEstimate {
-    /// Of noise and bias together: both add up, and so do the squares of how unsure they are. A squared bias
-    /// b counts as b − 2 σ² / b, with the standard error σ, and not at all below the root of that: one
-    /// audited pixel with a firefly is enough for a b of many times the error, and for a σ nearly as large.
-    /// Its lower end has only the bias that is certain by four standard errors: where the audit is much
-    /// noisier than the picture, a bias found by chance, in 2.5 % of pictures, is many times the error.
+    /// Estimate of noise and bias together: both add, and so do their squared uncertainties. A squared bias b
+    /// with standard error σ counts as b − 2 σ² / b, and as 0 for b below √2 σ: one audited pixel with a
+    /// firefly suffices for a b of many times the error, with a σ nearly as large. The lower end includes
+    /// only the bias that is certain by four standard errors: if the audit is much noisier than the picture,
+    /// a bias found by chance, in 2.5 % of pictures, is many times the error.
     pub fn with_bias(self, bias: BiasEstimate) -> Self {
         let error = bias.error;
         let squared = if bias.relmse > 0.0 { bias.relmse - 2.0 * error * error / bias.relmse } else { 0.0 };

@@ -1,11 +1,10 @@
-//! What the photons of a picture blur, as its samples tell: each gathers photons from a disc, and knows what
-//! it would be with a finer one (docs/decisions/0043).
+//! Blur of density estimates in a picture: each sample gathers photons from a disc, and estimates the
+//! difference to a finer disc (docs/decisions/0043).
 //!
-//! Of the halves of a pixel, a and b tell by how much they are too bright, each with noise of its own. So a b
-//! has the squared blur for its mean. Over R² + 0.01 m², with I − a for R, and with I − b for R: beside a
-//! focus a pixel is darker than it looks, by many times; and the other factor does not know what is in the
-//! denominator. R is half of I at least, for where finer discs are noisy one of them says that nothing is
-//! there.
+//! The halves of a pixel estimate its blur as a and b with independent noise, so that a b has the squared
+//! blur as mean. It is divided by R² + 0.01 m², averaged over R = I − a and R = I − b: beside a focus a pixel
+//! is really many times darker than it appears, and each denominator is independent of one factor. R is at
+//! least I / 2, since a noisy finer disc may estimate no light at all.
 
 use super::audit::BiasEstimate;
 use super::metric::DARK;
@@ -13,23 +12,23 @@ use super::tile::{BLOCK, BLOCKS};
 use crate::Rgb;
 use crate::film::{PIXELS_PER_TILE, Pixel};
 
-/// What is not known of blur, as a share of it: finer discs blur as well, at an edge more than is reckoned.
+/// Relative uncertainty of blur: finer discs are blurred as well, at an edge more than assumed.
 const UNSURE: f64 = 0.25;
 
-/// Sums over the pixels of one tile, of squared blur in units of relMSE.
+/// Sums of squared blur over the pixels of one tile, in units of relMSE.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct TileBlur {
     pixels: u64,
     squared: f64,
-    /// Squares of the sums over blocks of (a² − b²) / 2, which varies as a b does and has the mean 0.
+    /// Squared sums over blocks of (a² − b²) / 2, which has the variance of a b and the mean 0.
     squares: f64,
 }
 
 impl TileBlur {
-    /// Of the pixels of one tile of a picture of mean `mean` > 0.
+    /// Sums of the `pixels` of one tile of a picture of mean `mean` > 0.
     pub fn of(pixels: &[Pixel], mean: f64) -> Self {
         let mut sums = Self::default();
-        // Of 4 × 4 neighbours along the Z-curve, which share photons.
+        // Blocks of 4 × 4 neighbours along the Z-curve, which share photons.
         let mut blocks = [0.0; BLOCKS];
         for (i, pixel) in pixels.iter().enumerate().take(PIXELS_PER_TILE) {
             if pixel.even.count() == 0 || pixel.odd.count() == 0 {
@@ -43,7 +42,7 @@ impl TileBlur {
             let colour = pixel.mean().to_array().map(f64::from);
             let sum: f64 = colour.iter().sum();
             let light = sum / (3.0 * mean);
-            // Channels are blurred as they shine.
+            // The blur of a channel is proportional to its radiance.
             let over_square = |blur: f64| {
                 let r = (light - blur).max(0.5 * light);
                 let channel = |shine: f64| shine * shine / (shine * shine * r * r + DARK) / 3.0;
@@ -69,7 +68,7 @@ impl core::ops::AddAssign for TileBlur {
 }
 
 impl BiasEstimate {
-    /// From all tiles of a picture; `None` where no photons blur.
+    /// Blur of all tiles of a picture; `None` without photons.
     pub fn of_blur(tiles: impl Iterator<Item = TileBlur>) -> Option<Self> {
         let mut sum = TileBlur::default();
         tiles.for_each(|tile| sum += tile);
@@ -90,7 +89,8 @@ mod tests {
     use crate::sampling::Random;
     use std::vec::Vec;
 
-    /// Tiles of light 1 that is 0.2 too bright in a quarter of the pixels, as samples say with such noise.
+    /// Tiles of radiance 1, too bright by `blur` in a quarter of the pixels; samples estimate the blur with
+    /// `noise`.
     fn picture(blur: f32, noise: f32, seed: u32) -> Vec<Vec<Pixel>> {
         let pixel = |tile: u32, i: u32| {
             let random = Random::new(seed, tile << 8 | i);
@@ -120,13 +120,13 @@ mod tests {
             assert!(with.is_found(), "{with:?}");
             found += u32::from(estimate(0.0, 0.3, seed).unwrap().is_found());
         }
-        // 95 % of 100, and more, as a quarter is not known; 2.5 % of 100.
+        // 95 % of 100, and more due to the relative uncertainty of a quarter; 2.5 % of 100.
         assert!(held >= 90 && found <= 8, "{held} {found}");
     }
 
     #[test]
     fn dark_pixels_beside_a_focus_count_for_what_they_are() {
-        // Light 0.5 that looks like 1: half of it is blur.
+        // Radiance 0.5 that appears as 1: half of it is blur.
         let mut pixel = Pixel::default();
         for sample in 0..4 {
             pixel.add(sample, Rgb::ONE, &mut Dropped::default());

@@ -1,21 +1,21 @@
-//! Whether a part of a picture is too bright or too dark, from a few of its pixels.
+//! Mean brightness deviation of a part of a picture, from a few of its pixels.
 
 use super::metric::ROUNDING;
 use libm::{erfc, fabs, log, sqrt};
 
-/// By how much a part of a picture is too bright, relative to the truth, in the mean.
+/// Mean excess brightness of a part of a picture, relative to the truth.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Deviation {
-    /// Its estimate; negative: too dark.
+    /// Estimate; negative if too dark.
     pub mean: f64,
-    /// Its standard error.
+    /// Standard error of the estimate.
     pub error: f64,
-    /// From how many pixels.
+    /// Number of pixels.
     pub pixels: u32,
 }
 
 impl Deviation {
-    /// From the deviations of some pixels.
+    /// Deviation from the values of some pixels.
     pub fn of(values: impl Iterator<Item = f64>) -> Self {
         // Welford 1962.
         let (mut pixels, mut mean, mut squares) = (0, 0.0, 0.0);
@@ -31,8 +31,8 @@ impl Deviation {
         Self { mean, error, pixels }
     }
 
-    /// The probability to see as much or more where there is nothing: the two tails of Student's t, after
-    /// Wallace (1959), right to a few hundredths of itself from three degrees of freedom on.
+    /// Probability of at least this deviation by chance: both tails of Student's t after Wallace (1959), with
+    /// a relative error of a few hundredths from three degrees of freedom on.
     pub fn chance(&self) -> f64 {
         if self.pixels < 4 || !self.error.is_finite() {
             return 1.0;
@@ -51,7 +51,7 @@ mod tests {
     #[test]
     fn one_pixel_and_roundings_say_nothing() {
         assert_eq!(Deviation::of([1.0].into_iter()).chance(), 1.0);
-        // Two pictures of the same lamp, added up in another order.
+        // Two pictures of the same lamp, summed in different orders.
         let same = [1e-7, -1e-7, 1e-7, 1e-7].into_iter();
         assert!(Deviation::of(same).chance() > 0.5);
     }

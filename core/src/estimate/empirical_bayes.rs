@@ -1,67 +1,65 @@
-//! What a pixel probably is, learnt from the picture itself (Robbins 1956, "An empirical Bayes approach to
-//! statistics"). Pixels of one class are so much brighter or darker than their neighbours, and their quarters
-//! in such disagreement, to one pair of quarters; how much of that the *other* pair finds is the share of it
-//! that is believed. A firefly that no other sample meets shrinks to its neighbours, a texture stays. What
-//! for: docs/decisions/0035.
+//! Empirical Bayes estimate of pixels from the picture itself (Robbins 1956, "An empirical Bayes approach to
+//! statistics"). A class holds the pixels that, in one pair of their quarters, exceed their neighbours by a
+//! certain factor and disagree by a certain degree. The share of this excess that the *other* pair confirms
+//! is believed. A firefly that no other sample meets shrinks to its neighbours; texture stays. Reasons:
+//! docs/decisions/0035.
 
 use super::metric::DARK;
 use super::tile_statistics::{FAINT, TileStatistics, brightness};
 use crate::film::{Pixel, Tile};
 use glam::Vec4;
 
-/// Octaves of what a pixel has more than its neighbours, over theirs; less than the first is as good as
-/// nothing.
+/// Range of octaves of the excess of a pixel over its neighbours, relative to them; a smaller excess counts
+/// as none.
 const FIRST_OCTAVE: i32 = -5;
 const LAST_OCTAVE: i32 = 18;
 const BRIGHTER: usize = (LAST_OCTAVE - FIRST_OCTAVE + 1) as usize;
 
-/// The octaves below 1: nothing is darker than black.
+/// Number of octaves below 1, for darker pixels: nothing is darker than black.
 const DARKER: usize = -FIRST_OCTAVE as usize;
 
-/// Difference of the two quarters of a pair over their sum, between classes.
+/// Class limits of disagreement: the difference of the two quarters of a pair over their sum.
 const DISAGREEMENT: [f32; 5] = [0.1, 0.25, 0.5, 0.75, 0.9];
 
 const ALIKE: usize = DISAGREEMENT.len() + 1;
 
 const CLASSES: usize = (BRIGHTER + DARKER) * ALIKE;
 
-/// Before anything is learnt a class is known as well as by this many pixels: what is brighter is believed in
-/// half of its octaves, what is darker in full.
+/// Weight of the prior in pixels. The prior believes half of the octaves of an excess, and all of a deficit.
 const PRIOR: f64 = 4.0;
 
-/// A pixel that is darker than its neighbours to one pair may be brighter to the other, where light is rare;
-/// by so many times that at most.
+/// Maximum negative share of a deficit: where light is rare, a pixel darker than its neighbours in one pair
+/// may be brighter in the other.
 const CONTRARY: f64 = 2.0;
 
-/// Variance of what a pixel is, over the square, at most: where light is so rare that it is more, noise is
-/// where light is.
+/// Maximum relative variance of R in a class; beyond it light is so rare that noise is proportional to it.
 const MOST_SPREAD: f64 = 0.1;
 
-/// So many tiles know enough, with twice 16,384 pixels in two hundred classes.
+/// Number of tiles that suffice: twice 16,384 pixels for two hundred classes.
 const ENOUGH: u64 = 64;
 
-/// Sums are whole numbers of these, so that they do not depend on the order of tiles.
+/// Unit of integer sums, which do not depend on the order of tiles.
 const UNIT: f64 = 1.0 / (1 << 20) as f64;
 
-/// What is added up, in units of the middle of a class, is no more than this.
+/// Limit of each summand, in units of the middle of its class.
 const MOST: f64 = 4096.0;
 
-/// Sums over the pixels of one class. x is what a pixel has more than its neighbours, over theirs, in units
-/// of the middle of its class and with the sign that it has to the pair that is asked.
+/// Sums over the pixels of one class. x is the excess of a pixel over its neighbours, relative to them, in
+/// units of the middle of its class, with the sign that it has in the asked pair.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 struct Class {
     pixels: u64,
-    /// x to the pair that is asked.
+    /// x of the asked pair.
     own: i64,
-    /// x to the other pair.
+    /// x of the other pair.
     other: i64,
-    /// x² to the pair that is asked.
+    /// x² of the asked pair.
     own_squared: i64,
-    /// x² by the product of both quarters of the other pair, which are independent.
+    /// x² of the other pair, as the product of its two quarters, which are independent.
     other_squared: i64,
 }
 
-/// What the pixels of a picture that look alike tell of each other.
+/// Sums over classes of similar pixels of a picture.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct BrightnessClasses {
     classes: [Class; CLASSES],
@@ -86,15 +84,15 @@ impl core::ops::AddAssign<&Self> for BrightnessClasses {
 }
 
 impl BrightnessClasses {
-    /// Whether tile number `tile` of `count` is to be asked: all of small pictures, of others as many as know
-    /// enough, spread evenly whatever their width (by multiples of the golden ratio).
+    /// Whether to learn from tile `tile` of `count`: all tiles of small pictures, otherwise [`ENOUGH`] tiles,
+    /// spread evenly by multiples of the golden ratio for any width.
     pub fn asks(tile: usize, count: usize) -> bool {
         let turns = (tile as u32).wrapping_mul(0x9e37_79b9);
         (u64::from(turns) * count as u64) >> 32 < ENOUGH
     }
 
-    /// Learns from the `pixels` of `tile` in a picture of mean `mean` > 0. Pixels whose halves have no two
-    /// samples each are left out.
+    /// Learns from the `pixels` of `tile` in a picture of mean `mean` > 0. Skips pixels whose halves have
+    /// fewer than two samples each.
     pub fn add(&mut self, tile: Tile, pixels: &[Pixel], mean: f64) {
         let seen = TileStatistics::new(tile, pixels, (1.0 / mean) as f32);
         let whole = |value: f64| (value.clamp(-MOST, MOST) / UNIT) as i64;
@@ -118,7 +116,7 @@ impl BrightnessClasses {
         }
     }
 
-    /// What they say that pixels are.
+    /// Shrinkage of the pixels of each class.
     pub fn shrinkage(&self) -> Shrinkage {
         let mut shrinkage =
             Shrinkage { classes: [Believed { share: 0.0, spread: 1.0, doubt: 1.0 }; CLASSES] };
@@ -134,7 +132,7 @@ impl BrightnessClasses {
                 ((libm::sqrt(1.0 + middle) - 1.0) / middle, 0.0, 1.0)
             };
             let believed = ((other + PRIOR * before) / (own + PRIOR)).clamp(least, 1.0);
-            // V is nearly in proportion to R where light is rare, so that the mean of V / R² is that of V
+            // Where light is rare V is nearly proportional to R, so that the mean of V / R² is the mean of V
             // times ⟨R²⟩ / ⟨R⟩⁴.
             let there = 1.0 + sign * middle * believed * own / pixels.max(1.0);
             let spread = middle * middle * (other_squared - believed * believed * own_squared)
@@ -146,49 +144,49 @@ impl BrightnessClasses {
     }
 }
 
-/// How far the pixels of a class are to be believed.
+/// Belief in the pixels of a class.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Believed {
-    /// The share of what they have more or less than their neighbours.
+    /// Share of their excess or deficit that is believed.
     share: f32,
     /// ⟨R²⟩ / ⟨R⟩².
     spread: f32,
-    /// How much of that is what was believed before anything was learnt.
+    /// Weight of the prior in both.
     doubt: f32,
 }
 
-/// How far the pixels of a picture are to be believed.
+/// Belief in the pixels of a picture, by class.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Shrinkage {
     classes: [Believed; CLASSES],
 }
 
 impl Shrinkage {
-    /// What a pixel probably is that `pair` saw, with such neighbours (m = 1).
+    /// Estimate of a pixel of value `pair` with neighbours `around` (m = 1).
     pub(super) fn posterior(&self, pair: Pair, around: &Neighbourhood) -> Posterior {
         let Believed { share, spread, doubt } = self.classes[pair.class(around.more(pair.light))];
-        // Where it is darker in sum and brighter in a channel, a share below zero would lead through black.
+        // If the sum is darker but a channel brighter, a negative share would lead through black.
         let light = (around.light + share * (pair.light - around.light)).max(around.light.min(pair.light));
         Posterior { light, over_square: (light * light + DARK as f32).recip(), spread, share, doubt }
     }
 }
 
-/// What a pixel probably is.
+/// Estimate of a pixel.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Posterior {
     /// R.
     pub(super) light: Vec4,
     /// 1 / (R² + 0.01).
     pub(super) over_square: Vec4,
-    /// By how much the mean of that over what it may be is larger.
+    /// Factor from `over_square` to its mean over the distribution of R.
     pub(super) spread: f32,
-    /// How much is believed of what it has more than its neighbours.
+    /// Share of the excess that is believed.
     pub(super) share: f32,
-    /// How much of that nothing was learnt about.
+    /// Weight of the prior in that share.
     pub(super) doubt: f32,
 }
 
-/// The light of the neighbours of a pixel.
+/// Mean light of the neighbours of a pixel.
 pub(super) struct Neighbourhood {
     light: Vec4,
     brightness: f32,
@@ -201,13 +199,13 @@ impl Neighbourhood {
         Self { light, brightness, reciprocal: (brightness + 3.0 * FAINT).recip() }
     }
 
-    /// What `light` has more, over that of the neighbours.
+    /// Excess of `light` over the neighbours, relative to them.
     fn more(&self, light: Vec4) -> f32 {
         (brightness(light) - self.brightness) * self.reciprocal
     }
 }
 
-/// The middle of what pixels of a class have more or less than their neighbours.
+/// Middle of the excess or deficit of a class.
 fn middle(class: usize) -> f64 {
     let octave = class / ALIKE - if is_darker(class) { BRIGHTER } else { 0 };
     // 2^(octave + 1/2).
@@ -218,12 +216,12 @@ fn is_darker(class: usize) -> bool {
     class / ALIKE >= BRIGHTER
 }
 
-/// A pair of quarters of a pixel, one of each half.
+/// Pair of quarters of a pixel, one from each half.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Pair {
     a: Vec4,
     b: Vec4,
-    /// The mean of both.
+    /// Mean of both quarters.
     light: Vec4,
 }
 
@@ -233,12 +231,12 @@ impl Pair {
         [(a1, b1), (a2, b2)].map(|(a, b)| Self { a, b, light: 0.5 * (a + b) })
     }
 
-    /// Variance of its mean.
+    /// Variance of the mean.
     pub(super) fn noise(&self) -> Vec4 {
         0.25 * (self.a - self.b) * (self.a - self.b)
     }
 
-    /// Its class, where it has that much `more` than its neighbours.
+    /// Class of the pair, given its excess `more` over the neighbours.
     fn class(&self, more: f32) -> usize {
         let exponent = (more.abs().to_bits() >> 23) as i32 - 127;
         let octave = (exponent.clamp(FIRST_OCTAVE, LAST_OCTAVE) - FIRST_OCTAVE) as usize;
@@ -272,7 +270,7 @@ mod tests {
         })
     }
 
-    /// What both pairs of each pixel take R² + 0.01 for, row by row.
+    /// R² + 0.01 as estimated by both pairs of each pixel, row by row.
     fn squares(pixels: &[Pixel; PIXELS_PER_TILE]) -> [[f32; 2]; PIXELS_PER_TILE] {
         let mut alike = BrightnessClasses::default();
         alike.add(ALONE, pixels, 1.0);
@@ -301,7 +299,7 @@ mod tests {
         let texture = |x: u32, y: u32| if (x / 3 + y / 3).is_multiple_of(2) { 0.8 } else { 1.2 };
         let textured = squares(&tile(|x, y, _| texture(x, y)));
         let off = textured.iter().enumerate().map(|(place, [square, _])| {
-            // The same to both pairs. In the corners are classes of few pixels.
+            // Equal in both pairs. The corners belong to classes of few pixels.
             off(*square, texture(place as u32 % TILE, place as u32 / TILE))
         });
         let (mean, most) = (off.clone().sum::<f32>() / 256.0, off.fold(0.0, f32::max));
@@ -312,7 +310,7 @@ mod tests {
     fn a_firefly_is_not_believed_by_the_pair_that_saw_it() {
         let pixels = tile(|x, y, sample| if (x, y, sample) == (8, 5, 3) { 1e4 } else { 1.0 });
         let [first, second] = squares(&pixels)[5 * TILE as usize + 8];
-        // The pair saw 1e4 / 8; nothing is known of such pixels but the prior.
+        // The pair has 1e4 / 8; only the prior is known of such pixels.
         assert!(first.max(second) < 50.0 * 50.0 && first.min(second) < 1.5, "{first} {second}");
     }
 
@@ -327,7 +325,7 @@ mod tests {
     #[test]
     fn coloured_rare_light_does_not_lead_through_black() {
         let mut alike = BrightnessClasses::default();
-        // Dark to one pair, bright to the other: a share below zero is learnt.
+        // Dark in one pair, bright in the other: the learnt share is negative.
         alike.add(
             ALONE,
             &tile(|x, y, sample| if (x + y) % 4 == 0 && sample % 4 < 2 { 4.0 } else { 0.1 }),

@@ -1,34 +1,33 @@
-//! What a pixel probably is, from itself and its neighbours: the filter of Lee (1980, "Digital image
-//! enhancement and noise filtering by use of local statistics"), over one tile. Where the noise explains all
-//! that differs around a pixel its neighbours speak for it; where more differs than noise explains it speaks
-//! for itself. Between both the filter goes by roots, so that what is a hundred times as bright next door
-//! does not drown a dark pixel.
+//! Filter of Lee (1980, "Digital image enhancement and noise filtering by use of local statistics") over one
+//! tile: estimates of pixels from themselves and their neighbours. If noise explains all variation around a
+//! pixel, the neighbours replace it; if the variation is larger, the pixel keeps its value. Between both the
+//! filter interpolates square roots, so that a neighbour a hundred times as bright does not drown a dark
+//! pixel.
 
 use super::tile_statistics::{PLACES, SIDE};
 use crate::Rgb;
 use crate::film::{PIXELS_PER_TILE, Pixel, Tile};
 use glam::Vec4;
 
-/// Neighbours on each side: windows of 5 x 5 pixels, as far as they belong to the tile.
+/// Neighbours on each side: windows of 5 x 5 pixels, clipped to the tile.
 const REACH: usize = 2;
 
-/// What differs around a pixel is taken for noise up to this many times the estimated variance, which is as
-/// uncertain itself: with 1.5 it leaves too much noise.
+/// Multiple of the estimated variance up to which variation counts as noise, since the variance is as
+/// uncertain itself; 1.5 leaves too much noise.
 const NOISE: f32 = 2.0;
 
-/// The likely values of the `pixels` of `tile`, in a picture of mean `mean`: filtered, in the order of the
-/// tile's pixels.
+/// Filtered `pixels` of `tile` in a picture of mean `mean`, in the order of the tile's pixels.
 pub fn filtered(tile: Tile, pixels: &[Pixel], mean: f64) -> [Rgb; PIXELS_PER_TILE] {
     let square = Square::new(tile, pixels, mean);
     core::array::from_fn(|i| square.filtered(tile.index_in_square(i)))
 }
 
-/// The same of the pixel with number `i` alone.
+/// Filtered value of pixel `i` alone.
 pub fn filtered_pixel(tile: Tile, pixels: &[Pixel], mean: f64, i: usize) -> Rgb {
     Square::new(tile, pixels, mean).filtered(tile.index_in_square(i))
 }
 
-/// The square around a tile, row by row: what pixels show and the variance of that.
+/// Square around a tile, row by row: values of pixels and their variances.
 struct Square {
     places: [(Vec4, Vec4); PLACES],
     scale: f32,
@@ -49,8 +48,7 @@ impl Square {
     }
 }
 
-/// What a pixel shows and the variance of that: a colour with a 1 in the fourth place, or all zero where
-/// there is no pixel.
+/// Value of a pixel and its variance: a colour with 1 in the fourth component, or all zero without a pixel.
 fn seen(pixel: &Pixel, scale: f32) -> (Vec4, Vec4) {
     if pixel.count() == 0 {
         return (Vec4::ZERO, Vec4::ZERO);
@@ -58,12 +56,12 @@ fn seen(pixel: &Pixel, scale: f32) -> (Vec4, Vec4) {
     ((scale * pixel.mean()).extend(1.0), pixel.scaled_variance(scale).extend(0.0))
 }
 
-/// Filters the pixel at `place`, where `at` tells what each place shows and the variance of that. A pixel's
-/// own value has its weight only there.
+/// Filters the pixel at `place`; `at` gives the value and variance of each place. The pixel's own value
+/// enters by its weight only.
 fn lee(at: impl Fn(usize) -> (Vec4, Vec4), place: usize) -> Vec4 {
     let (x, y) = (place % SIDE, place / SIDE);
     let (own, own_noise) = at(place);
-    // The sum without the pixel itself: subtracting it would leave nothing but rounding beside a firefly.
+    // Summed without the pixel itself: subtraction would leave mere rounding beside a firefly.
     let (mut others, mut square, mut noise) = (Vec4::ZERO, own * own, own_noise);
     for other in (low(y)..high(y)).flat_map(|row| (low(x)..high(x)).map(move |column| row * SIDE + column)) {
         if other != place {
@@ -80,7 +78,7 @@ fn lee(at: impl Fn(usize) -> (Vec4, Vec4), place: usize) -> Vec4 {
     let mean = (others + own) / count;
     let spread = (square / count - mean * mean).max(Vec4::ZERO);
     let structure = (spread - NOISE * noise / count).max(Vec4::ZERO);
-    // Where nothing differs both are the same.
+    // Without variation both are equal.
     let weight = structure / spread.max(Vec4::splat(f32::MIN_POSITIVE));
     let (others, own) = (root(others / neighbours), root(own));
     let between = others + weight * (own - others);

@@ -1,24 +1,24 @@
-//! The error of a picture, from itself: relMSE and the interval that holds it (docs/decisions/0009, 0035).
+//! Error of a picture from itself: relMSE and its 95 % interval (docs/decisions/0009, 0035).
 //!
-//! The plain algorithm: half-pictures A and B are independent and unbiased, so ((A − B) / 2)² has the
-//! variance of their mean I for its mean; over I² + 0.01 m² its mean over pixels is the relMSE. Departures:
-//! 1. I is not R. Where a sample is far too bright it makes its own denominator large and hides itself; where
-//!    samples missed the light the denominator is too small. So denominators are what pixels that look alike
-//!    are in the mean ([`super::Shrinkage`]), the mean of the quotients by what each pair of quarters says.
-//! 2. What is left of that is seen where nothing hides itself: the variance of one pair over the square of
-//!    what the *other* says is too large, for where light is rare both are. The error is between both: with δ
-//!    the logarithm of their quotient that of the estimate goes up by δ / (1 + 10 δ), and may go up by all of
-//!    δ, or by nothing. It is as uncertain, both ways, as what is added for pixels that may be other than
-//!    they probably are.
-//! 3. The error that this picture has and its estimate differ by the mean of the product of both halves'
-//!    errors, exactly. For a pixel of variance V the product has the variance 4 V², and the estimate squared
-//!    the mean 3 V² (more with heavy tails); Student's t says what it is to know that from few pixels. How
-//!    errors hang together between pixels that share paths, and between those of a region where all is
-//!    shared, is seen in the differences of the halves. Upwards less is in doubt where single samples have
-//!    the noise: the error of a pixel that flashed is hardly more than its variance, if enough of them tell.
-//!    If they are few, the lower end is not above what the error may be if all flashes belonged there.
+//! The plain algorithm: half-films A and B are independent and unbiased, so that ((A − B) / 2)² has the variance
+//! of their mean I as mean; its mean over pixels, over I² + 0.01 m², is the relMSE. Departures:
+//! 1. I is not R. A firefly enlarges its own denominator and hides itself; where samples missed light the
+//!    denominator is too small. Denominators are therefore class means ([`super::Shrinkage`]), and quotients are
+//!    averaged over the denominators of both pairs of quarters.
+//! 2. The remaining error shows if numerator and denominator are independent: the variance of one pair over the
+//!    squared R of the *other* is too large, since where light is rare a large variance meets a small R. The
+//!    error lies in between: with δ the logarithm of their quotient, the logarithm of the estimate rises by
+//!    δ / (1 + 10 δ), with an uncertainty from no rise to all of δ. The correction for pixels whose R is
+//!    uncertain has its own size as uncertainty in both directions.
+//! 3. The error of this picture minus its estimate is exactly the mean product of the errors of both halves. For
+//!    a pixel of variance V the product has the variance 4 V², and the squared estimate the mean 3 V² (more with
+//!    heavy tails). Student's t accounts for few pixels. The correlation of errors between pixels that share
+//!    paths, and within a region where all is shared, shows in the differences of the halves. The upper end is
+//!    nearer if single samples have the noise: the error of a pixel with a firefly hardly exceeds its variance,
+//!    if such pixels are many. If they are few, the lower end is at most the error if all fireflies were
+//!    legitimate light.
 //!
-//! The price: about as much time as a tenth of a sample for each pixel.
+//! The price: about a tenth of the time of a sample per pixel.
 
 use super::TileError;
 use super::student::{NORMAL_95, student_quantile};
@@ -26,8 +26,8 @@ use super::tile::{BLOCK, Parts};
 use crate::film::{CIRCLE, GROUP};
 use libm::{exp, fmax, fmin, hypot, log, sqrt};
 
-/// An estimate of the relMSE with the interval that holds it with 95 % confidence, as far as one picture can
-/// tell: what no sample has met is not in it.
+/// Estimate of the relMSE and its 95 % interval, as far as one picture shows: light that no sample has met is
+/// not included.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ErrorEstimate {
     /// Estimated relMSE.
@@ -38,30 +38,30 @@ pub struct ErrorEstimate {
     pub upper: f64,
 }
 
-/// Where fewer independent pixels have nearly all of the noise, intervals are those of Student's t with as
-/// many degrees of freedom. Where more have it they are those of the normal distribution: squares of heavy
-/// tails are rather too large, and Student's t would be for squares that are as often too small.
+/// Number of independent pixels with nearly all noise below which intervals follow Student's t, with this
+/// many degrees of freedom. Above, they follow the normal distribution: squares of heavy tails tend to be too
+/// large, and Student's t would apply to squares that are as often too small.
 const FEWEST: f64 = 8.0;
 
-/// Where fewer independent pixels than these have nearly all of the noise an interval reaches as far up as
-/// down, and down to where all flashes belong there: so few do not tell how often there are any, nor are
-/// pixels like them known.
+/// Number of independent pixels with nearly all noise below which an interval reaches as far up as down, and
+/// down to the error if all fireflies were legitimate light: so few do not show their frequency, and pixels
+/// like them are unknown.
 const FLASHES: f64 = 4.0;
 
-/// How soon δ is doubted: all of it counts where it is small and both bounds are right to first order, at
-/// most a tenth of the estimate where light is rare.
+/// Factor of the doubt of δ: a small δ counts in full, since both bounds are right to first order; where
+/// light is rare the estimate rises by a tenth at most.
 const DOUBTED: f64 = 10.0;
 
 impl ErrorEstimate {
-    /// From all tiles of a picture whose pixels share nothing, or paths within groups and photons with their
-    /// neighbours; `None` where no pixel has four samples.
+    /// Estimate from all tiles of a picture whose pixels share nothing, or share paths within groups and
+    /// photons with neighbours; `None` if no pixel has four samples.
     pub fn of(tiles: impl Iterator<Item = TileError>) -> Option<Self> {
         let mut sum = TileError::default();
         tiles.for_each(|tile| sum += tile);
         Self::with_shared(&sum, shared(&sum), sum.above)
     }
 
-    /// From the sums over regions, where a method shares between pixels far apart, too.
+    /// Estimate from the sums over regions, for a method that also shares between distant pixels.
     pub fn of_regions(regions: impl Iterator<Item = TileError>) -> Option<Self> {
         let (mut sum, mut parts, mut count) = (TileError::default(), Parts::default(), 0);
         for region in regions.filter(|region| region.values > 0) {
@@ -73,26 +73,26 @@ impl ErrorEstimate {
         Self::with_shared(&sum, shared(&sum) + by_parts(&sum, parts, pixels), f64::INFINITY)
     }
 
-    /// `shared`: by how much what pixels share makes the estimate vary more; `above`: the square of the
-    /// standard error to the upper end, as if they shared nothing, if that is less than to the lower.
+    /// `shared`: factor of the variance of the estimate due to sharing. `above`: squared standard error to
+    /// the upper end as if nothing were shared, if less than to the lower end.
     fn with_shared(sum: &TileError, shared: f64, above: f64) -> Option<Self> {
         let flashes = freedom(sum.squares, sum.fourths) / shared;
         let quantile = if flashes < FEWEST { student_quantile(NORMAL_95, FEWEST) } else { NORMAL_95 };
         Self::with_reach(sum, quantile * sqrt(shared), above, flashes)
     }
 
-    /// `reach`: standard errors from the estimate to an end of its interval, as if pixels were independent;
-    /// `above`: the square of the one to the upper end, if that is less; `flashes`: how many have nearly all
-    /// of the noise.
+    /// `reach`: standard errors from the estimate to an end of its interval, as if pixels were independent.
+    /// `above`: squared standard error to the upper end, if less. `flashes`: number of pixels with nearly all
+    /// noise.
     fn with_reach(sum: &TileError, reach: f64, above: f64, flashes: f64) -> Option<Self> {
         if sum.values == 0 {
             return None;
         }
         if !(sum.halves > 0.0 && sum.parts > 0.0) {
-            // Without noise; unless what there is of it cannot be counted.
+            // No noise, unless the sums overflow.
             return (sum.halves == 0.0).then_some(Self { relmse: 0.0, lower: 0.0, upper: 0.0 });
         }
-        // What a square of an estimate V tells of V² with normal noise.
+        // 4 V² over the mean square of an estimate of V with normal noise, 3 V².
         const OF_SQUARE: f64 = 4.0 / 3.0;
         let below = OF_SQUARE * sum.squares;
         let above = if flashes < FLASHES { below } else { fmin(above, below) };
@@ -112,18 +112,18 @@ impl ErrorEstimate {
     }
 }
 
-/// By how much errors that the pixels of a group share, or those of a block, make the sum of products of both
-/// halves' errors vary more.
+/// Factor of the variance of the sum of products of both halves' errors, due to errors that pixels of a group
+/// or a block share.
 fn shared(sum: &TileError) -> f64 {
-    // A pixel shares each sample with half of its group: ρ² of the pairs that share is four times that of the
-    // mean ρ.
+    // A pixel shares each sample with half of its group: ρ² of the pairs that share is four times the square
+    // of the mean ρ.
     const CIRCLES: f64 = (GROUP - 1) as f64 / (CIRCLE - 1) as f64;
     1.0 + CIRCLES * by_parts(sum, sum.groups, GROUP as f64) + by_parts(sum, sum.blocks, BLOCK as f64)
 }
 
-/// What parts of so many pixels add to it. With the correlation ρ of each two of them, from the squares of
-/// sums over parts and of pixels, it is ρ² Σ V_p V_q / Σ V_p², of all p ≠ q of a part. Estimates have 1 + 2
-/// ρ² times the former and 3 times the latter.
+/// Contribution of `parts` of `pixels` pixels to that factor. With the correlation ρ between pixels, from the
+/// squares of sums over parts and over pixels, it is ρ² Σ V_p V_q / Σ V_p² over all p ≠ q of a part.
+/// Estimates of V have 1 + 2 ρ² times the former sum and 3 times the latter.
 fn by_parts(sum: &TileError, parts: Parts, pixels: f64) -> f64 {
     let others = pixels - 1.0;
     if !(sum.differences > 0.0 && sum.squares > 0.0 && others > 0.0) {
@@ -134,7 +134,7 @@ fn by_parts(sum: &TileError, parts: Parts, pixels: f64) -> f64 {
     rho * rho * fmin(pairs, others)
 }
 
-/// Degrees of freedom of a sum, from the sums of the squares and fourth powers of what is added up.
+/// Degrees of freedom of a sum, from the sums of squares and of fourth powers of its summands.
 fn freedom(squares: f64, fourths: f64) -> f64 {
     if fourths > 0.0 { squares * squares / fourths } else { 1.0 }
 }
@@ -157,8 +157,8 @@ mod tests {
         shared_picture(tiles, samples, noise, 0.0, Tile::group, seed)
     }
 
-    /// The same, where `common` of the variance is noise that the pixels of each `part` of a tile have in
-    /// common.
+    /// A picture in which the fraction `common` of the variance is noise that the pixels of each `part` of a
+    /// tile share.
     fn shared_picture(
         tiles: u32,
         samples: u32,
@@ -196,7 +196,7 @@ mod tests {
         picture.iter().map(|tile| TileError::of(ALONE, tile, mean, &shrinkage)).collect()
     }
 
-    /// The error that a picture of radiance 1 has.
+    /// Error of a picture of radiance 1.
     fn truth(picture: &[Vec<Pixel>]) -> f64 {
         let errors = picture.iter().flatten().map(|pixel| f64::from(pixel.mean().x) - 1.0);
         errors.map(|e| e * e / 1.01).sum::<f64>() / (picture.len() * PIXELS_PER_TILE) as f64
@@ -204,7 +204,7 @@ mod tests {
 
     #[test]
     fn known_noise_is_estimated() {
-        // What pixels share makes the errors of pictures scatter, by twice as much.
+        // Sharing makes the errors of pictures scatter twice as much.
         for (common, tolerance) in [(0.0, 0.12), (0.5, 0.24)] {
             let (mut held, pictures) = (0, 60);
             for seed in 0..pictures {
@@ -222,7 +222,7 @@ mod tests {
 
     #[test]
     fn what_regions_share_is_doubted_and_no_more() {
-        // Where regions share nothing the interval is hardly wider than that of pixels.
+        // Without sharing, the interval of regions is hardly wider than that of pixels.
         let still = errors(&picture(64, 16, 0.5, 1));
         let [alone, together] =
             [ErrorEstimate::of(still.iter().copied()), ErrorEstimate::of_regions(still.into_iter())]
@@ -277,17 +277,17 @@ mod tests {
         let before = estimate(&picture).unwrap();
         picture[2][100].add(16, Rgb::splat(10_000.0), &mut Dropped::default());
         let after = estimate(&picture).unwrap();
-        // What it adds to the picture's 1: 10,000 / 17, squared, over 1024 pixels of three channels each.
+        // Its contribution to the picture's 1: 10,000 / 17, squared, over 1024 pixels of three channels each.
         let truth = (1e4f64 / 17.0).powi(2) / 1.01 / 1024.0;
         assert!(after.relmse > 10.0 * before.relmse, "{before:?} {after:?}");
         assert!(after.lower < truth && truth < after.upper, "{truth} {after:?}");
-        // One flash does not tell how often there are any: as far up as down.
+        // One firefly does not show its frequency: the interval reaches as far up as down.
         assert!(after.upper > 10.0 * after.relmse, "{after:?}");
     }
 
     #[test]
     fn rare_flashes_are_no_more_than_they_add() {
-        // Five flashes or so in a picture have nine tenths of its error.
+        // About five fireflies per picture have nine tenths of its error.
         const FLASH: f32 = 50.0;
         let (chance, pictures) = (3e-4, 60);
         let (mut held, mut narrower) = (0, 0);

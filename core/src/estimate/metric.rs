@@ -1,36 +1,36 @@
-//! Errors of a picture against a reference, in linear radiance: MSE, RMSE and relMSE.
+//! Error metrics of a picture against a reference, in linear radiance: MSE, RMSE and relMSE.
 //!
-//! Sums run in f64 and in the order of the pixels, so that the same pictures give the same bits.
+//! Sums are in f64 and in pixel order, so that equal pictures give equal bits.
 
 use crate::Rgb;
 
-/// Share of the squared mean that keeps relMSE finite where the reference is dark.
+/// Fraction of the squared mean that keeps relMSE finite where the reference is dark.
 pub(super) const DARK: f64 = 0.01;
 
-/// Relative differences of pictures that add up the same light in another order.
+/// Relative difference of pictures that sum the same light in different orders.
 pub(super) const ROUNDING: f64 = 1e-6;
 
-/// How a picture differs from a reference of the same size, over pixels and channels.
+/// Differences of a picture from a reference of equal size, over pixels and channels.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Difference {
     /// Mean of (I − R)².
     pub mse: f64,
-    /// Mean of (I − R)² / (R² + 0.01 m²), m the mean of R. Does not change when all lights are made brighter.
+    /// Mean of (I − R)² / (R² + 0.01 m²), m the mean of R. Independent of the unit of light.
     pub relmse: f64,
     /// Mean of I.
     pub mean: f64,
-    /// Mean of R: the m of the formula.
+    /// Mean of R, the m of relMSE.
     pub reference_mean: f64,
-    /// Pixels that were compared. All means are 0 when there are none.
+    /// Number of pixels compared. All means are 0 if there are none.
     pub pixels: u64,
-    /// Pixels left out because the picture is infinite or not a number there.
+    /// Number of pixels skipped because the picture is not finite.
     pub non_finite: u64,
-    /// Pixels left out because the reference is.
+    /// Number of pixels skipped because the reference is not finite.
     pub reference_non_finite: u64,
 }
 
 impl Difference {
-    /// Compares pixel by pixel; stops at the end of the shorter one.
+    /// Compares pixel by pixel, up to the end of the shorter one.
     pub fn between<I, R>(image: I, reference: R) -> Self
     where
         I: Iterator<Item = Rgb> + Clone,
@@ -56,7 +56,7 @@ impl Difference {
             for (i, r) in channels(i).into_iter().zip(channels(r)) {
                 let squared = (i - r) * (i - r);
                 sum.mse += squared;
-                // 0 / 0, a black pixel of a black reference, is no error.
+                // A black pixel of a black reference, 0 / 0, is no error.
                 sum.relmse += if squared == 0.0 { 0.0 } else { squared / (r * r + floor) };
             }
         }

@@ -1,4 +1,4 @@
-//! What is known of the error of a picture.
+//! Error of a picture: metrics against a reference, and estimates without one.
 
 mod audit;
 mod density_bias;

@@ -5,9 +5,10 @@ use libm::fmax;
 /// Half-width of the central 95 % of the standard normal distribution.
 pub const NORMAL_95: f64 = 1.959_963_984_540_054;
 
-/// Quantile of Student's t with `freedom` degrees, where `z` is the normal quantile of the same probability.
+/// Quantile of Student's t with `freedom` degrees of freedom; `z` is the normal quantile of equal
+/// probability.
 ///
-/// For `z` = [`NORMAL_95`] the error is below 1 % from three degrees on. Fewer than one degree count as one.
+/// The error for `z` = [`NORMAL_95`] is below 1 % from three degrees on. Fewer than one degree count as one.
 pub fn student_quantile(z: f64, freedom: f64) -> f64 {
     let square = z * z;
     let terms = [

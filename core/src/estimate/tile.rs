@@ -1,4 +1,4 @@
-//! What the halves of one tile disagree by: sums from which [`super::ErrorEstimate`] is made.
+//! Sums over the pixels of one tile of the differences of their halves, input of [`super::ErrorEstimate`].
 
 use super::empirical_bayes::{Neighbourhood, Pair, Posterior, Shrinkage};
 use super::metric::DARK;
@@ -6,13 +6,13 @@ use super::tile_statistics::{TileStatistics, brightness};
 use crate::film::{GROUPS, PIXELS_PER_TILE, Pixel, Tile};
 use glam::Vec4;
 
-/// Pixels of a block, 4 × 4 neighbours along the Z-curve, which may share photons.
+/// Pixels per block, 4 × 4 neighbours along the Z-curve, which may share photons.
 pub(super) const BLOCK: usize = 16;
 
-/// Blocks of a tile.
+/// Number of blocks of a tile.
 pub(super) const BLOCKS: usize = PIXELS_PER_TILE / BLOCK;
 
-/// The light of a tile: over all tiles it gives the m of relMSE.
+/// Light of a tile; summed over all tiles it gives the m of relMSE.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct TileLight {
     sum: f64,
@@ -20,7 +20,7 @@ pub struct TileLight {
 }
 
 impl TileLight {
-    /// Of the pixels of one tile.
+    /// Light of the pixels of one tile.
     pub fn of(pixels: &[Pixel]) -> Self {
         let filled = pixels.iter().filter(|pixel| pixel.count() > 0);
         filled.fold(Self::default(), |light, pixel| Self {
@@ -29,7 +29,7 @@ impl TileLight {
         })
     }
 
-    /// The mean over pixels and channels; 0 where there are none.
+    /// Mean over pixels and channels; 0 without pixels.
     pub fn mean(&self) -> f64 {
         self.sum / (3 * self.pixels.max(1)) as f64
     }
@@ -43,52 +43,52 @@ impl core::ops::AddAssign for TileLight {
 }
 
 /// Sums over the pixels and channels of one tile, of squared differences over R² + 0.01 m². A and B are the
-/// means of the halves, A₁, A₂, B₁, B₂ of their parts; the R of each pair, of A₁ and B₁ and of A₂ and B₂, is
-/// what the pair says that the pixel is ([`Shrinkage`]).
+/// means of the halves, A₁, A₂, B₁, B₂ of the quarters. The pairs (A₁, B₁) and (A₂, B₂) each have an estimate
+/// R of the pixel ([`Shrinkage`]).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct TileError {
-    /// Values: three for each pixel.
+    /// Number of values, three per pixel.
     pub(super) values: u64,
-    /// Variance of the picture by (A − B)² over the squares of both R: the mean of both quotients.
+    /// Variance of the picture by (A − B)² over R², averaged over both R.
     pub(super) halves: f64,
-    /// The same, as if what pixels probably are was what they are.
+    /// `halves` if the estimates R were certain.
     pub(super) certain: f64,
-    /// The same, as if pixels were what they look like: a flash hides itself.
+    /// `halves` if R were the value of the pixel itself: a firefly hides itself.
     pub(super) least: f64,
-    /// Squares of that in pixels.
+    /// Sum of the squares of `least` per pixel.
     pub(super) least_squares: f64,
-    /// Variance of the pictures of both pairs over the squares of both R.
+    /// Variance of the pictures of both pairs over R², averaged over both R.
     pub(super) parts: f64,
-    /// The same, each over the square of the other R: numerator and denominator are independent. Too large
-    /// where a pair saw nothing of a light that the other met.
+    /// `parts`, with each variance over the R² of the other pair: numerator and denominator are independent.
+    /// Too large if one pair missed light that the other met.
     pub(super) crossed: f64,
-    /// Squares of the variances of pixels in `halves`.
+    /// Sum of the squares of `halves` per pixel.
     pub(super) squares: f64,
-    /// The squares of those squares.
+    /// Sum of the fourth powers of `halves` per pixel.
     pub(super) fourths: f64,
-    /// Squares of what the errors of pixels may be above their variances ([`above`]).
+    /// Sum of the squared bounds of errors above the variances ([`above`]).
     pub(super) above: f64,
-    /// Sum of (A − B) / R, which hangs together between pixels as the errors do,
+    /// Sum of (A − B) / R, which is correlated between pixels as the errors are.
     pub(super) difference: f64,
-    /// and of its squares in pixels.
+    /// Sum of the squares of `difference` per pixel.
     pub(super) differences: f64,
-    /// Of groups, which may share their paths.
+    /// Sums over groups, which may share paths.
     pub(super) groups: Parts,
-    /// Of blocks of 4 × 4 neighbours, which may share photons.
+    /// Sums over blocks of 4 × 4 neighbours, which may share photons.
     pub(super) blocks: Parts,
 }
 
-/// Sums over parts of a picture whose errors may hang together.
+/// Sums over parts of a picture with correlated errors.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Parts {
-    /// Squares of the sums of (A − B) / R over their pixels.
+    /// Squares of the sums of (A − B) / R over the pixels of a part.
     pub(super) differences: f64,
     /// Squares of the sums of the variances in `halves`.
     pub(super) variances: f64,
 }
 
 impl Parts {
-    /// From both sums of each part.
+    /// Squares of both sums of each part.
     pub(super) fn of<const N: usize>(parts: [[f64; 2]; N]) -> Self {
         let [differences, variances] = [0, 1].map(|i| parts.iter().map(|part| part[i] * part[i]).sum());
         Self { differences, variances }
@@ -103,8 +103,8 @@ impl core::ops::AddAssign for Parts {
 }
 
 impl TileError {
-    /// The error of the `pixels` of `tile` in a picture of mean `mean` > 0, with what its tiles tell of it.
-    /// Pixels whose halves have no two samples each are left out.
+    /// Sums of the `pixels` of `tile` in a picture of mean `mean` > 0. Skips pixels whose halves have fewer
+    /// than two samples each.
     pub fn of(tile: Tile, pixels: &[Pixel], mean: f64, shrinkage: &Shrinkage) -> Self {
         let scale = (1.0 / mean) as f32;
         let seen = TileStatistics::new(tile, pixels, scale);
@@ -147,7 +147,7 @@ impl TileError {
     }
 }
 
-/// Tiles whose errors hang together count as one.
+/// Sums tiles whose errors are correlated to one.
 impl core::ops::AddAssign for TileError {
     fn add_assign(&mut self, other: Self) {
         self.values += other.values;
@@ -167,14 +167,14 @@ impl core::ops::AddAssign for TileError {
     }
 }
 
-/// The square of what the error of a pixel may be above its variance V: 4 V² in the mean, and little where a
-/// single sample has nearly all of V. Such a flash is one too many, and the error is V; or one of the few
-/// that there should be, and it is less. `seen` is the pixel, `around` its neighbours; V and how much more it
-/// would be with the R of the `darker` pair are weighed by `weights`.
+/// Squared bound of the error of a pixel above its variance V: 4 V² in the mean, and little if a single
+/// sample has nearly all of V. Such a firefly is either one too many, and the error is V, or one of the few
+/// that belong there, and the error is less. `seen` is the pixel, `around` its neighbours. V, and its excess
+/// `darker` with the R of the darker pair, are weighted by `weights`.
 ///
-/// With T = (A − R)(B − R) = (I − R)² − V for the difference, and v for what is not known of R: T² + 4 (I −
-/// R)² v, and 4/3 V² for as much as the pixel itself is believed. Where pixels like it are not known, R may
-/// be that of the darker pair.
+/// With the difference T = (A − R)(B − R) = (I − R)² − V and the uncertainty v of R, the bound is T² + 4 (I −
+/// R)² v, and 4/3 V² for the share of the pixel that is believed. For unknown classes, R may be that of the
+/// darker pair.
 fn above(
     [variance, darker]: [f64; 2],
     posterior: [Posterior; 2],
@@ -182,11 +182,11 @@ fn above(
     around: Vec4,
     weights: Vec4,
 ) -> f64 {
-    /// (I − R)² over V at most: more comes from an edge that R does not follow.
+    /// Maximum of (I − R)² over V; more is due to an edge that R does not follow.
     const MOST: f64 = 3.0;
-    /// The mean of T² over 4 V², for normal noise, where that is the most.
+    /// Mean of T² over 4 V² for normal noise, with that maximum.
     const CUT: f64 = 0.563;
-    /// What is believed with 95 % is two standard errors.
+    /// A belief of 95 % is two standard errors.
     const BELIEVED: f64 = 0.25;
     let square = |light: Vec4| total(light * light * weights);
     let light = 0.5 * (posterior[0].light + posterior[1].light);

@@ -1,39 +1,37 @@
-//! What the quarters of the pixels of a tile saw, and what is seen around each pixel: what
-//! [`BrightnessClasses`](super::BrightnessClasses) are told by.
+//! Quarters of the pixels of a tile, and the light around each pixel: input of
+//! [`BrightnessClasses`](super::BrightnessClasses).
 
 use crate::film::{PIXELS_PER_TILE, Pixel, SPAN, Tile};
 use glam::Vec4;
 
-/// Light that is added to that of the neighbours before anything is divided by it, in units of the picture's
-/// mean.
+/// Offset of the light of the neighbours in denominators, in units of the picture's mean.
 pub(super) const FAINT: f32 = 0.01;
 
-/// A neighbour all of whose quarters are this many times as bright as the brightest of a pixel lies beyond an
-/// edge, and says nothing of what the pixel is.
+/// Ratio to the brightest quarter of a pixel. A neighbour with all quarters brighter lies beyond an edge, and
+/// is no evidence for the pixel.
 const SURELY: f32 = 2.0;
 
-/// Pixels along the side of the square around a tile that holds all of its pixels.
+/// Side in pixels of the square around a tile that holds all of its pixels.
 pub(super) const SIDE: usize = SPAN as usize;
 
-/// Places of this square.
+/// Number of places of this square.
 pub(super) const PLACES: usize = SIDE * SIDE;
 
-/// The square around a tile, row by row, of a picture times some scale. Pixels of other tiles are missing.
+/// Square around a tile, row by row, of a picture times a scale. Pixels of other tiles are missing.
 pub(super) struct TileStatistics {
-    /// A₁, A₂, B₁, B₂ of each pixel, the parts of its halves; `None` where one is empty or the pixel is
-    /// missing.
+    /// Quarters A₁, A₂, B₁, B₂ of each pixel; `None` if one is empty or the pixel is missing.
     pub(super) quarters: [Option<[Vec4; 4]>; PLACES],
-    /// The mean light of the eight neighbours of each pixel, as far as they lie in the tile and are not
-    /// surely brighter; its own where there are none.
+    /// Mean light of those of the eight neighbours that lie in the tile and not beyond an edge; the pixel's
+    /// own light if there are none.
     pub(super) around: [Vec4; PLACES],
 }
 
 impl TileStatistics {
-    /// The statistics of the `pixels` of `tile`, times `scale`.
+    /// Statistics of the `pixels` of `tile`, times `scale`.
     pub(super) fn new(tile: Tile, pixels: &[Pixel], scale: f32) -> Self {
         let mut quarters = [None; PLACES];
         let [mut picture, mut around] = [[Vec4::ZERO; PLACES]; 2];
-        // Of the quarters of a pixel, the darkest and the brightest.
+        // Darkest and brightest quarter of each pixel.
         let [mut darkest, mut brightest] = [[0.0f32; PLACES]; 2];
         for (i, pixel) in pixels.iter().enumerate().take(PIXELS_PER_TILE) {
             let (Some([a1, a2]), Some([b1, b2])) = (pixel.even.parts(), pixel.odd.parts()) else { continue };
@@ -63,7 +61,7 @@ impl TileStatistics {
     }
 }
 
-/// Of all channels.
+/// Sum of the channels.
 pub(super) fn brightness(colour: Vec4) -> f32 {
     colour.x + colour.y + colour.z
 }

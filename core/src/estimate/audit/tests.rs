@@ -1,4 +1,4 @@
-//! The bias found by audits of films whose bias is known.
+//! Bias found by audits of films of known bias.
 
 use super::*;
 use crate::estimate::Deviation;
@@ -7,7 +7,7 @@ use crate::sampling::Random;
 use libm::log;
 use std::vec::Vec;
 
-/// A pixel of `light` and uniform noise of ± 1 a sample.
+/// A pixel of `light` with uniform noise of ± 1 per sample.
 fn pixel(light: f32, samples: u32, random: Random) -> Pixel {
     let mut pixel = Pixel::default();
     for sample in 0..samples {
@@ -18,7 +18,7 @@ fn pixel(light: f32, samples: u32, random: Random) -> Pixel {
     pixel
 }
 
-/// Findings of `count` pixels of light 2 in a picture of mean 2, `bias` too bright.
+/// Findings of `count` pixels of radiance 2, too bright by `bias`, in a picture of mean 2.
 fn findings(count: u32, bias: f32, seed: u32) -> Vec<Finding> {
     let of = |i: u32| {
         let picture = pixel(2.0 + bias, 8, Random::new(seed, 2 * i));
@@ -34,7 +34,7 @@ fn estimate(findings: &[Finding]) -> BiasEstimate {
 
 #[test]
 fn what_is_not_there_is_found_as_often_as_said_in_skew_findings() {
-    // A product of two values above −1, each −log of what is random: 1 in the mean.
+    // Product of two values above −1, each −log of a random number: 1 in the mean.
     let (runs, count) = (4000, 256);
     let found = |sign: f64| {
         let run = |run| {
@@ -106,7 +106,7 @@ fn no_bias_is_found_where_there_is_none() {
 
 #[test]
 fn what_quarters_know_of_each_other_is_no_deviation() {
-    // Each quarter of a half has as much too much as the other has too little.
+    // In each half, the excess of one quarter equals the deficit of the other.
     for signs in [[0.9, 0.9], [0.9, -0.9], [-0.9, 0.5]] {
         let mut truth = Pixel::default();
         for (sample, half) in [0, 1, 0, 1].into_iter().enumerate() {
@@ -126,7 +126,7 @@ fn what_quarters_know_of_each_other_is_no_deviation() {
 fn both_variances_are_known() {
     let findings = findings(1000, 0.0, 9);
     let mean = |of: usize| findings.iter().map(|finding| finding.variances[of]).sum::<f64>() / 1000.0;
-    // A third for a sample, over 2² + 0.01 · 2²; means of squares of 1000 pixels of three channels.
+    // Variance of a third per sample, over 2² + 0.01 · 2²; means of squares of 1000 pixels of three channels.
     for (found, samples) in [(mean(0), 8.0), (mean(1), 16.0)] {
         let expected = 1.0 / 3.0 / samples / 4.04;
         assert!((found / expected - 1.0).abs() < 0.12, "{found} {expected}");
@@ -138,7 +138,7 @@ fn the_sum_of_noise_and_no_bias_errs_hardly_more_often_than_each() {
     let (mut missed, runs) = (0, 100_000);
     let random = Random::new(1, 2);
     for run in 0..runs {
-        // Box and Muller. The noise is 1, and known to a tenth; the audit knows a bias to 1.
+        // Box and Muller. The noise is 1, known to a tenth; the standard error of the audit is 1.
         let [radius, angle] = [0, 1].map(|i| f64::from(random.single(2 * run + i)));
         let (sine, cosine) = libm::sincos(core::f64::consts::TAU * angle);
         let radius = sqrt(-2.0 * log(1.0 - radius));
@@ -147,8 +147,7 @@ fn the_sum_of_noise_and_no_bias_errs_hardly_more_often_than_each() {
         let sum = noise.with_bias(BiasEstimate::known(radius * cosine, 1.0, 0.0, 0.0));
         missed += u32::from(!(sum.lower..=sum.upper).contains(&1.0));
     }
-    // 6.1 %; it would be 7.1 % with the lower end that likelihood ratios give the bias. One standard
-    // error is 0.08 %.
+    // 6.1 %; 7.1 % with the lower end of the bias by likelihood ratios. One standard error is 0.08 %.
     assert!(missed * 1000 < runs * 65, "{missed} of {runs}");
 }
 
@@ -161,7 +160,7 @@ fn a_bias_found_by_chance_leaves_the_lower_end_to_noise() {
             assert!(sum.lower <= noise.relmse, "{found} standard errors of {error}: {sum:?}");
             assert!(sum.upper >= noise.upper + found * error);
         }
-        // Twenty standard errors are no chance.
+        // Twenty standard errors are not chance.
         let sum = noise.with_bias(BiasEstimate::known(20.0 * error, error * error, 0.0, 0.0));
         assert!(sum.lower > 15.0 * error, "{sum:?}");
     }
@@ -177,7 +176,7 @@ fn the_interval_holds_the_bias() {
         held += u32::from((bias.lower..=bias.upper).contains(&truth));
         sum += bias.relmse;
     }
-    // The noise of a denominator makes its inverse larger by three times its square, 3 %; what is left is
+    // The noise of a denominator enlarges its inverse by three times its relative variance, 3 %; the rest is
     // chance.
     let mean = sum / f64::from(runs);
     assert!((0.93..1.13).contains(&(mean / truth)), "{mean} {truth}");
@@ -188,7 +187,7 @@ fn the_interval_holds_the_bias() {
 #[test]
 fn intervals_hold_what_is_nothing_or_something() {
     for truth in [0.0f64, 0.1, 0.3, 0.5, 0.75, 1.0, 1.25, 1.5, 1.75, 2.0, 3.0, 5.0] {
-        // Simpson's rule would not see the ends; a step of a thousandth is as good as they are.
+        // Simpson's rule would miss the ends; a step of a thousandth is as precise as they are.
         let held = |x: &f64| {
             let [lower, upper] = ends(3.0 * x, 3.0);
             (lower..=upper).contains(&(3.0 * truth))
