@@ -1,4 +1,4 @@
-//! State of a picture after each round. Comparison with a reference is no part of rendering, so it pauses the
+//! History of a picture: its state after each round. Comparison with a reference is no part of rendering, so it pauses the
 //! clock.
 
 use super::ErrorEstimate;
@@ -17,8 +17,7 @@ pub struct Round {
     pub spp: u32,
     /// Rays of every kind.
     pub rays: u64,
-    /// Estimated error: of the last round, and of earlier rounds after an eighth more samples each, sixteen
-    /// more, or twice as many.
+    /// Estimated error, of the last round and of each round at which an estimate was due.
     pub error: Option<ErrorEstimate>,
     /// Error against the reference, if there is one.
     pub reference: Option<Against>,

@@ -1,8 +1,9 @@
-//! Runs the core's passes: memory, threads, rounds, stop rules. [`render`] is all that a program needs.
+//! Program side of a render: memory, threads, rounds and stop rules around the passes of the core. [`render`]
+//! is the entry point.
 //!
-//! A picture is made in rounds; a round adds the same number of samples to every pixel. How the samples are
-//! cut into rounds, and how many threads there are, leaves the bits of the picture as they are; so does an end in the
-//! middle, where the film is kept in a file and the render resumed from it.
+//! A picture is made in rounds; each round adds the same number of samples to every pixel. The bits of the
+//! picture depend neither on the division into rounds nor on the number of threads, nor on an interruption
+//! after which the render is resumed from its film file.
 
 mod audit;
 mod blurred;
@@ -66,78 +67,77 @@ use halflight_core::transport::Counters;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// How to render.
+/// Settings of a render.
 #[derive(Clone, Debug)]
 pub struct Settings {
-    /// How to make the picture; `None`: what fits the scene.
+    /// Method; `None` chooses one that fits the scene.
     pub method: Option<Method>,
     /// Pixels across.
     pub width: u32,
     /// Pixels down.
     pub height: u32,
-    /// Another seed, another picture of the same thing.
+    /// Seed of all random numbers.
     pub seed: u32,
-    /// The largest number of segments of a path; 1 is light that is seen directly. `None`: no limit.
+    /// Most segments of a path; 1 is directly visible light. `None`: no limit.
     pub max_depth: Option<u32>,
-    /// Whether neighbouring pixels share what their paths find; `None`: where a look at a few tiles says that it
-    /// pays.
+    /// Whether neighbouring pixels share paths; `None`: as the pilot on a few tiles decides.
     pub reuse: Option<bool>,
-    /// Whether paths are joined with photons of caustics, where a first look finds any.
+    /// Whether paths are merged with caustic photons if a prepass finds that they pay.
     pub caustics: bool,
-    /// How an irradiance cache is filled, where the method has one.
+    /// Settings of irradiance caches.
     pub cache: CacheSettings,
-    /// How photons are used, where the method has any.
+    /// Settings of photons.
     pub photons: PhotonSettings,
-    /// Counts of the techniques of bidirectional methods.
+    /// Sample counts of the techniques of bidirectional methods.
     pub bidirectional: BidirectionalSettings,
-    /// How virtual lights are used, where the method has any.
+    /// Settings of virtual lights.
     pub virtual_lights: VirtualLightSettings,
-    /// Choices of Metropolis light transport.
+    /// Settings of Metropolis light transport.
     pub metropolis: MetropolisSettings,
-    /// Whether maps of photons are looked at in the end, for a report. The time that this takes does not count.
+    /// Whether photon maps are rendered at the end for a report, outside the measured time.
     pub photon_view: bool,
-    /// Whether the environment is sampled through windows that a first look finds; `None` where it is to tell.
+    /// Whether the environment is sampled through windows that a prepass finds; `None`: as the prepass
+    /// decides.
     pub windows: Option<bool>,
-    /// Number of threads; `None`: as many as the machine runs at once.
+    /// Number of threads; `None`: all of the machine.
     pub threads: Option<usize>,
-    /// Most bytes that the scene and all structures may take together; `None`: no limit.
+    /// Memory limit in bytes for the scene and all structures; `None`: no limit.
     pub memory: Option<usize>,
-    /// The instruction set of the kernels.
+    /// Instruction set of the kernels.
     pub level: Level,
-    /// When to stop.
+    /// Stop rules.
     pub stop: Stop,
-    /// What the picture should be, of the same size: each round is compared with it, and the time that this
-    /// takes does not count.
+    /// Reference of the same size, with which each round is compared, outside the measured time.
     pub reference: Option<Arc<Image>>,
-    /// The share of the work that goes into an audit of the picture, between 0, no audit, and 1. `None`: a twentieth
-    /// where the method is biased. Not with shards.
+    /// Share of the work that goes into the audit, from 0 (no audit) to 1. `None`: 0.05 if the method is
+    /// biased.
     pub audit: Option<f64>,
-    /// Which part of the picture to render.
+    /// Part of the picture to render.
     pub shard: Shard,
-    /// Where to keep the film while it grows.
+    /// Film file to write during the render.
     pub checkpoint: Option<Checkpoint>,
-    /// A film to go on with: a checkpoint of the same picture.
+    /// Film file to resume: a checkpoint of the same picture.
     pub resume: Option<PathBuf>,
-    /// A file of irradiance caches to begin with: of the same scene and settings, of any view.
+    /// Irradiance cache file to begin with: of the same scene and settings, for any view.
     pub load_cache: Option<PathBuf>,
-    /// Where to keep the irradiance caches when they are filled.
+    /// Irradiance cache file to write after filling.
     pub save_cache: Option<PathBuf>,
-    /// About how many points the irradiance caches are held against exact values at, after the render; `None`: no
-    /// survey.
+    /// Approximate number of held-out points at which irradiance caches are compared with exact values after
+    /// the render; `None`: no survey.
     pub survey: Option<u32>,
 }
 
-/// A film file that is written every so often, and at the end. The time that this takes does not count.
+/// A film file written at intervals and at the end, outside the measured time.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Checkpoint {
     /// The file.
     pub path: PathBuf,
-    /// Seconds from one to the next.
+    /// Seconds between writes.
     pub every: f64,
 }
 
 impl Checkpoint {
-    /// Seconds between checkpoints where nothing else is asked for.
+    /// Default of [`Checkpoint::every`], seconds.
     pub const EVERY: f64 = 60.0;
 }
 
@@ -174,20 +174,20 @@ impl Default for Settings {
     }
 }
 
-/// What is known while a picture is made, after each round, and while its audit goes on alone.
+/// State of a render, after each round and while its audit continues alone.
 #[derive(Clone, Debug)]
 pub struct Progress {
     /// Seconds of rendering so far.
     pub seconds: f64,
-    /// Seconds that are left, if all goes on as before. `None` where nothing is known yet.
+    /// Estimated seconds left; `None` if unknown.
     pub seconds_left: Option<f64>,
-    /// Samples of each pixel so far.
+    /// Samples per pixel so far.
     pub spp: u32,
     /// Rounds so far.
     pub rounds: u32,
     /// The error so far.
     pub error: Option<ErrorEstimate>,
-    /// A failed write of a film or a cache, once for each file: the render goes on, and tries again.
+    /// A failed write of a film or a cache, reported once per file: the render continues and retries.
     pub unsaved: Option<FileError>,
 }
 
@@ -198,38 +198,38 @@ pub enum Ending {
     Done,
     /// The interrupt flag was raised: the picture is valid, with fewer samples.
     Interrupted,
-    /// The error that was asked for is out of reach: the bias alone is larger, and more samples leave it as it is.
+    /// The requested error is out of reach: bias alone, which samples do not reduce, exceeds it.
     Biased,
-    /// The error that was asked for is out of reach: noise that all samples share, as that of records, stays above it.
+    /// The requested error is out of reach: noise shared by all samples, such as that of records, exceeds it.
     NoiseFloor,
 }
 
-/// Seconds of wall-clock time.
+/// Times in seconds of wall-clock time.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Seconds {
-    /// Building the hierarchy and the light structures.
+    /// Building the BVH and the light structures.
     pub build: f64,
-    /// Tracing paths, before a resumption too; without comparisons with a reference, checkpoints and calls of
+    /// Tracing paths, including earlier runs of a resumed film, without comparisons, checkpoints and
     /// `progress`.
     pub render: f64,
-    /// Tracing photons and building their maps, a part of that; not before a resumption.
+    /// Photon tracing and building of photon maps, part of `render`; without earlier runs.
     pub photons: f64,
-    /// Estimating the noise, a part of that; not before a resumption.
+    /// Noise estimation, part of `render`; without earlier runs.
     pub estimate: f64,
 }
 
-/// A picture and all that is known of it.
+/// A picture with its statistics.
 #[derive(Clone, Debug)]
 pub struct RenderResult {
-    /// How it was made.
+    /// The method that made it.
     pub method: Method,
     /// The picture.
     pub image: Image,
-    /// Samples of each pixel; of the least sampled one where the last round was cut.
+    /// Samples per pixel; those of the least sampled pixel if the last round was cut.
     pub spp: u32,
-    /// Rounds begun, those before a resumption included.
+    /// Rounds begun, earlier runs included.
     pub rounds: u32,
-    /// What was known after each of them.
+    /// State after each round.
     pub history: Vec<Round>,
     /// Estimated variance of the mean of each pixel and channel, from the two half-films.
     pub variance: Image,
@@ -237,47 +237,46 @@ pub struct RenderResult {
     pub samples: Vec<u32>,
     /// Threads used.
     pub threads: usize,
-    /// Where the time went.
+    /// Times of the phases.
     pub seconds: Seconds,
-    /// Paths, rays and dropped samples.
+    /// Paths, rays and rejected samples.
     pub counters: Counters,
-    /// Whether pixels shared what their paths found, and why.
+    /// Whether neighbouring pixels shared paths, and why.
     pub reuse: Reuse,
-    /// Whether paths were joined with photons of caustics, and why.
+    /// Whether paths were merged with caustic photons, and why.
     pub caustics: CausticUse,
-    /// What became of the irradiance cache, where the method has one.
+    /// Statistics of the irradiance cache, if the method has one.
     pub cache: Option<CacheUse>,
-    /// What the irradiance cache looks like and how wrong it is, where that was asked for, the method has one and there
-    /// is memory for it.
+    /// Survey of the irradiance cache, if requested, if the method has one and memory suffices.
     pub survey: Option<Survey>,
-    /// Use of Markov chains, where the method has any.
+    /// Statistics of Markov chains, if the method has any.
     pub chains: Option<ChainUse>,
-    /// What became of photons, where the method has any.
+    /// Statistics of photons, if the method has any.
     pub photons: Option<PhotonUse>,
-    /// The use of virtual lights, where the method has any.
+    /// Statistics of virtual lights, if the method has any.
     pub virtual_lights: Option<VirtualLightUse>,
-    /// The last maps of photons as the camera sees them, where that was asked for.
+    /// Views of the last photon maps, if requested.
     pub photon_view: Option<PhotonView>,
-    /// Whether the sky was sampled through windows.
+    /// Whether the sky was sampled through windows, and why.
     pub windows: WindowUse,
-    /// Where samples were dropped, the worst first.
+    /// Tiles with rejected samples, most first.
     pub places: Vec<Place>,
-    /// Pixels that are black because all of their samples were dropped.
+    /// Black pixels, whose samples were all rejected.
     pub empty_pixels: u64,
-    /// Pixels that had no sample yet when the render was ended, and show what is around them.
+    /// Pixels without samples at an early end, filled from their surroundings.
     pub filled_pixels: u64,
-    /// The error, estimated from the two half-films, and from the audit where there is one or from what photons blur; `None` for
-    /// fewer than four samples, and for a black picture.
+    /// Error from the two half-films, plus bias by the audit or photon blur; `None` with fewer than four
+    /// samples or for a black picture.
     pub error: Option<ErrorEstimate>,
-    /// Noise and what photons blur, where there are photons and no audit.
+    /// Noise and photon blur, if there are photons and no audit.
     pub blurred: Option<Blurred>,
-    /// What the audit has found.
+    /// Result of the audit.
     pub audit: Option<Audited>,
-    /// Bytes of each structure, while paths are traced.
+    /// Bytes of each structure while paths are traced.
     pub memory: Vec<MemoryUse>,
-    /// The most bytes at any time: building the hierarchy takes more than keeping it.
+    /// Peak of memory in bytes; building the BVH takes more than keeping it.
     pub memory_peak: usize,
-    /// Films and caches whose last write failed. The files hold the last whole version.
+    /// Files whose last write failed; they hold the last complete version.
     pub unsaved: Vec<FileError>,
     /// Why rendering ended.
     pub ending: Ending,
@@ -285,19 +284,19 @@ pub struct RenderResult {
     pub stop_rule: Option<StopRule>,
 }
 
-/// Whether a film or a cache will find its way to `path`: the folder is there and takes files.
+/// Checks that a film or cache file can be created at `path`.
 ///
 /// # Errors
-/// Names the file and why not.
+/// Names the file and the reason.
 pub fn check_writable(path: &Path) -> Result<(), FileError> {
     sealed::check_writable(path)
 }
 
-/// Pixels that a picture may have.
+/// Most pixels of a picture.
 const MOST_PIXELS: u64 = 1 << 28;
 
-/// Renders `scene` until a rule of `settings.stop` holds or `interrupt` is raised. `progress` is called
-/// after each round, on the calling thread; the time that it takes does not count.
+/// Renders `scene` until a rule of `settings.stop` holds or `interrupt` is raised. The calling thread calls
+/// `progress` after each round, outside the measured time.
 pub fn render(
     scene: &Scene,
     settings: &Settings,

@@ -23,10 +23,10 @@ use std::time::Instant;
 /// Seconds after which a thread checks the clock and the interrupt flag.
 const STEP_SECONDS: f64 = 0.01;
 
-/// Samples of a tile that fill a wave: steps are multiples of it where time allows.
+/// Samples of a tile that fill a wave; steps are multiples of it if time allows.
 const FULL_STEP: u32 = 8;
 
-/// Seconds reserved for an estimate of the error, per pixel and thread, before the first has been timed.
+/// Seconds per pixel and thread reserved for an error estimate before one has been timed.
 const ESTIMATING: f64 = 1e-7;
 
 /// A picture to be rendered.
@@ -40,12 +40,12 @@ pub(super) struct Picture<'a> {
     pub(super) clock: Clock,
     pub(super) progress: &'a mut dyn FnMut(&Progress),
     pub(super) interrupt: &'a AtomicBool,
-    /// Stands in for a picture without samples.
+    /// Path tracing of single pixels for a picture without samples.
     pub(super) sketch: &'a Sketch<'a>,
 }
 
 impl Picture<'_> {
-    /// Renders until a stop rule holds. The caller adds the seconds and the memory of what it has built.
+    /// Renders until a stop rule holds. The caller adds times and memory of the structures that it built.
     pub(super) fn render(self, renderer: &mut dyn Renderer) -> Result<RenderResult, RenderError> {
         let mut render = Progressive::new(self)?;
         while let Some(plan) = render.plan() {
@@ -66,12 +66,12 @@ struct Progressive<'a> {
     reference: Option<Reference<'a>>,
     /// The last estimate of the error.
     latest: Option<ErrorEstimate>,
-    /// The last estimate with its parts, if the last round had one.
+    /// Parts of the last estimate, if the last round had one.
     report: Option<ErrorReport>,
-    /// Seconds of the last estimate, and of all.
+    /// Seconds of the last estimate, and of all estimates.
     estimating: f64,
     estimated: f64,
-    /// The film file, and when it was written last.
+    /// The film file, and the time of its last write.
     kept: RewrittenFile<'a>,
     saved: Instant,
     began: Instant,
@@ -118,12 +118,12 @@ impl<'a> Progressive<'a> {
         })
     }
 
-    /// The next round; `None` where a stop rule holds.
+    /// The next round; `None` if a stop rule holds.
     fn plan(&self) -> Option<Plan> {
         self.rounds.next(self.picture.clock.seconds(), self.estimating)
     }
 
-    /// Adds samples, estimates the error where that is due, writes the film file, and reports progress.
+    /// Adds samples, estimates the error if due, writes the film file and reports progress.
     fn round(&mut self, plan: &Plan, renderer: &mut dyn Renderer) -> Result<(), RenderError> {
         self.add_samples(plan, renderer)?;
         self.report = None;
@@ -189,7 +189,7 @@ impl<'a> Progressive<'a> {
         Ok(self.latest)
     }
 
-    /// Takes the audit's samples that are due.
+    /// Takes the samples of the audit that are due.
     fn step_audit(&mut self, renderer: &mut dyn Renderer) -> Result<(), RenderError> {
         let Picture { stage: Stage { settings, workers, .. }, state, audit, clock, .. } = &mut self.picture;
         let Some(audit) = audit else { return Ok(()) };
@@ -201,8 +201,8 @@ impl<'a> Progressive<'a> {
         renderer.lend_photons(&mut |photons| audit.step(workers, &state.film, photons, work, left))
     }
 
-    /// Focuses the audit after its first samples, and goes on with it alone where it alone keeps the picture from its
-    /// end.
+    /// Focuses the audit after its first samples, and continues the audit alone if only the bias estimate is
+    /// still too uncertain.
     fn extend_audit(
         &mut self,
         report: ErrorReport,
@@ -241,7 +241,7 @@ impl<'a> Progressive<'a> {
         Ok(report)
     }
 
-    /// Writes the film file: on the way, or with the `last` patience at the end.
+    /// Writes the film file, during the render or at the end with patience `last`.
     fn write_film(&mut self, seconds: f64, last: Option<Patience>) {
         let Picture { state, audit, identity, clock, .. } = &mut self.picture;
         let (kept, rounds, history) = (&mut self.kept, &self.rounds, &self.history);
@@ -257,7 +257,7 @@ impl<'a> Progressive<'a> {
         });
     }
 
-    /// Whether the rounds end although no stop rule holds. A first round that was cut would be cut again.
+    /// Whether rounds end although no stop rule holds. A first round that was cut would be cut again.
     fn is_ended(&self, plan: &Plan) -> bool {
         self.lost.is_some() || self.rounds.spp() == 0 || self.is_interrupted() && !plan.first
     }
@@ -266,13 +266,14 @@ impl<'a> Progressive<'a> {
         self.picture.interrupt.load(Ordering::Relaxed)
     }
 
-    /// Writes the files for the last time, takes the last samples of the audit, and makes the result.
+    /// Writes the files for the last time, takes the last samples of the audit, and returns the result.
     fn finish(mut self, renderer: &mut dyn Renderer) -> Result<RenderResult, RenderError> {
         let interrupted = self.is_interrupted();
         let patience = Patience { since: self.began, interrupt: self.picture.interrupt };
         let is_known = self.history.last().is_some_and(|last| last.error.is_some());
         let is_open = self.picture.audit.is_some() && !(interrupted || is_known);
-        // A shard is merged with the last samples of its audit. A render that is resumed would not take them here.
+        // The film of a shard is written after the last audit samples, which belong to the merged audit.
+        // Otherwise the film is written before them, so that a resumed render takes the same samples.
         let is_last = !is_open || self.picture.stage.settings.shard == Shard::WHOLE;
         let seconds = self.picture.clock.seconds();
         self.write_film(seconds, is_last.then_some(patience));
@@ -322,7 +323,7 @@ impl<'a> Progressive<'a> {
             reuse: renderer.reuse(),
             caustics: renderer.caustics(),
             cache: renderer.cache(),
-            // The picture is there: a report for which there is no memory is left out.
+            // A report that does not fit into memory is omitted: the picture is complete.
             survey: if interrupted { None } else { renderer.survey(workers).unwrap_or_default() },
             chains: renderer.chains(),
             photons: renderer.photons(),
@@ -349,7 +350,7 @@ impl<'a> Progressive<'a> {
     }
 }
 
-/// Samples of a tile between two looks at the clock.
+/// Samples of a tile between two checks of the clock.
 fn step(plan: &Plan, tiles: usize, threads: usize) -> u32 {
     let Some(each) = plan.each else { return FULL_STEP };
     let tile = each * threads as f64 / tiles.max(1) as f64;
@@ -357,10 +358,10 @@ fn step(plan: &Plan, tiles: usize, threads: usize) -> u32 {
     if step >= FULL_STEP { step / FULL_STEP * FULL_STEP } else { step.max(1) }
 }
 
-/// The picture of `state`, its gaps filled, and how many pixels were gaps: those of tiles that were not reached.
+/// Picture of `state` with filled gaps, and the number of pixels in tiles without samples.
 fn without_gaps(state: &RenderState, sketch: &Sketch, workers: &Workers) -> (Image, u64) {
     let mut image = image(&state.film);
-    // A shard has gaps that others fill.
+    // Other shards fill the gaps of a shard.
     if state.shard != Shard::WHOLE || !state.samples.contains(&0) {
         return (image, 0);
     }

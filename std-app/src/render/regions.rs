@@ -1,14 +1,14 @@
-//! Regions of a picture within which errors may hang together, where a method shares between pixels far apart. The error
-//! itself comes from independent halves whatever is shared between pixels; only how sure it is follows from the regions.
+//! Regions of a picture within which errors correlate if a method shares structures between distant pixels.
+//! The error comes from independent half-films in any case; regions determine only its interval.
 
 use halflight_core::estimate::{ErrorEstimate, TileError};
 use halflight_core::film::TILE;
 
-/// Regions along each side of a picture, at most: enough to tell how far their errors hang together, so large that what is
-/// shared is mostly shared within them.
+/// Most regions along each side: enough to estimate the interval, and large enough that shared structures lie
+/// mostly within one region.
 const SIDE: usize = 8;
 
-/// The error of a picture `width` pixels across from all of its tiles.
+/// Error of a picture `width` pixels across from all of its tiles.
 pub(super) fn estimate(tiles: &[TileError], width: u32, shares: bool) -> Option<ErrorEstimate> {
     if shares {
         ErrorEstimate::of_regions(merged(tiles, width).into_iter())
@@ -17,7 +17,7 @@ pub(super) fn estimate(tiles: &[TileError], width: u32, shares: bool) -> Option<
     }
 }
 
-/// The sums of tiles over regions of tiles.
+/// Sums of tiles over regions.
 fn merged(tiles: &[TileError], width: u32) -> Vec<TileError> {
     let across = (width.div_ceil(TILE) as usize).max(1);
     let down = tiles.len().div_ceil(across);
@@ -51,7 +51,7 @@ mod tests {
             alike.add(tile, &pixels, 3.0);
             TileError::of(tile, &pixels, 3.0, &alike.shrinkage())
         };
-        // 20 x 5 tiles are 7 x 2 regions of 3 x 3.
+        // 20 x 5 tiles give 7 x 2 regions of 3 x 3.
         let tiles: Vec<_> = (0..100).map(tile).collect();
         assert_eq!(merged(&tiles, 320).len(), 14);
         let [alone, together] = [false, true].map(|shares| estimate(&tiles, 320, shares).unwrap());

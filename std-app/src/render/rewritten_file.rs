@@ -1,16 +1,16 @@
-//! A file that is rewritten during a render and at its end: the film of a checkpoint, irradiance caches. A write
-//! that fails leaves the last complete file; the next write tries again.
+//! A file rewritten during a render and at its end: film checkpoints and irradiance caches. A failed write
+//! leaves the last complete file, and the next write retries.
 
 use super::FileError;
 use crate::save::{Destination, Patience};
 use core::cell::Cell;
 use std::path::Path;
 
-/// A file that is rewritten; none without a path.
+/// A rewritten file; inactive without a path.
 #[derive(Default)]
 pub(super) struct RewrittenFile<'a> {
     path: Option<&'a Path>,
-    /// Whether it is a pipe or device, which cannot be replaced: only the last write goes there.
+    /// Whether it is a pipe or device, which cannot be replaced and receives only the last write.
     is_stream: bool,
     /// Whether the file is older than the state of the render.
     is_owed: bool,
@@ -19,7 +19,7 @@ pub(super) struct RewrittenFile<'a> {
 }
 
 impl<'a> RewrittenFile<'a> {
-    /// At `path`.
+    /// A file at `path`.
     pub(super) fn in_file(path: Option<&'a Path>) -> Self {
         let is_stream =
             path.is_some_and(|path| Destination::of(path).is_ok_and(|destination| destination.is_stream()));
@@ -35,7 +35,7 @@ impl<'a> RewrittenFile<'a> {
         }
     }
 
-    /// Writes during the render; with the `last` patience only if the write before failed or was postponed.
+    /// Writes during the render; with the `last` patience only after a failed or postponed write.
     pub(super) fn keep(
         &mut self,
         last: Option<Patience>,
@@ -48,7 +48,7 @@ impl<'a> RewrittenFile<'a> {
         }
     }
 
-    /// Writes at the end, whatever was written before.
+    /// Writes at the end unconditionally.
     pub(super) fn finish(
         &mut self,
         patience: Patience,
@@ -58,7 +58,7 @@ impl<'a> RewrittenFile<'a> {
         self.is_owed = self.failed.is_some();
     }
 
-    /// Why the last write failed, on the first call.
+    /// Why the last write failed; on the first call only.
     pub(super) fn new_failure(&self) -> Option<FileError> {
         let failed = self.failed.clone();
         failed.filter(|_| !self.is_known.replace(true))

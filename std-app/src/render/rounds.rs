@@ -1,28 +1,27 @@
-//! How many samples the next round takes, and whether there is one: the stop rules.
+//! Rounds of a picture: number of samples of the next round, and the stop rules.
 
 use super::{Audited, ErrorEstimate, Progress};
 use serde::{Deserialize, Serialize};
 
-/// When to stop: the first rule that holds. Without any rule, [`Stop::DEFAULT_SPP`] samples.
+/// Stop rules; the first that holds ends the render. Without rules: [`Stop::DEFAULT_SPP`] samples.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Stop {
     /// Samples per pixel.
     pub spp: Option<u32>,
     /// Seconds of rendering.
     pub seconds: Option<f64>,
-    /// relMSE: the upper end of its interval is not above this.
+    /// Upper end of the interval of relMSE.
     pub error: Option<f64>,
 }
 
 impl Stop {
-    /// Samples per pixel where no rule is given.
+    /// Samples per pixel without rules.
     pub const DEFAULT_SPP: u32 = 256;
 
-    /// The end of a picture for which a user of the command line gave no rule: an error that the eye does not
-    /// see, or a minute.
+    /// Default rules of the command line: an error below the threshold of visibility, or a minute.
     pub const SENSIBLE: Self = Self { spp: None, seconds: Some(60.0), error: Some(1e-3) };
 
-    /// Samples per pixel at most, where there is a limit.
+    /// Largest number of samples per pixel, if limited.
     pub(super) fn most_samples(&self) -> Option<u32> {
         if *self == Self::default() { Some(Self::DEFAULT_SPP) } else { self.spp }
     }
@@ -39,28 +38,29 @@ pub enum StopRule {
     Error,
 }
 
-/// Samples that a pixel can have at most: the sampler's points repeat after 2^32, and a half must count.
+/// Largest number of samples per pixel: the sampler repeats after 2^32 points, and the counter of a half-film
+/// must not overflow.
 const MOST_SAMPLES: u32 = 1 << 30;
 
-/// A round should be no longer than this many seconds, so that progress is seen and flags are heeded.
+/// Longest round in seconds, for regular progress and quick reaction to interrupts.
 const LONGEST_ROUND: f64 = 0.5;
 
-/// The error is estimated from this many samples on: one for each quarter of the film.
+/// Samples at the first error estimate: one for each quarter of the film.
 const FIRST_ESTIMATE: u32 = 4;
 
-/// Where no error is to stop the render estimates after the first are at multiples of so many samples.
+/// Without an error target, later estimates come at multiples of this number of samples.
 const SELDOM: u32 = 16;
 
-/// Below this many samples an error estimate is too vague to stop on.
+/// Fewest samples at which an error estimate may end a render.
 pub(super) const FEWEST_FOR_ERROR: u32 = 16;
 
-/// Noise is shared by all samples where it has become so many times what one over their number leaves of earlier noise.
+/// Noise is shared by all samples once it exceeds 1/n extrapolation of earlier noise by this factor.
 const SHARED: f64 = 2.0;
 
-/// Below this many samples of each audited pixel its light is too rarely seen to end a render for its bias.
+/// Fewest samples per audited pixel at which bias may end a render: below, some light is rarely sampled.
 pub(super) const FEWEST_FOR_BIAS: u32 = 64;
 
-/// The part of the error asked for that the picture's own noise may be, where its audit goes on alone.
+/// Largest ratio of noise to the requested error while the audit continues alone.
 const ENOUGH: f64 = 0.5;
 
 /// The rounds of a picture.
@@ -68,19 +68,19 @@ pub(super) struct Rounds {
     stop: Stop,
     spp: u32,
     count: u32,
-    /// Samples at which the error is estimated next. They follow from samples and estimates alone, not from the clock:
-    /// a picture that stops by its error has the same bits each time.
+    /// Samples at the next error estimate. They follow from samples and estimates alone, not from the clock:
+    /// a picture that stops by its error has the same bits in each run.
     next_estimate: u32,
-    /// The last of these estimates, and at how many samples.
+    /// Number of samples and error of the last of these estimates.
     decision: Option<(u32, ErrorEstimate)>,
-    /// The first noise that is clear enough to compare later noise with, and at how many samples.
+    /// Number of samples and noise of the first estimate that is precise enough for comparison.
     first_noise: Option<(u32, f64)>,
-    /// Where this run began: samples and seconds.
+    /// Samples and seconds at the start of this run.
     began: (u32, f64),
     seconds: f64,
 }
 
-/// When the error was estimated last, and when it is next.
+/// State of error estimation: last and next estimate.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct Estimates {
     next: u32,
@@ -88,16 +88,17 @@ pub(super) struct Estimates {
     first_noise: Option<(u32, f64)>,
 }
 
-/// What a round is to do.
+/// Plan of a round.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Plan {
-    /// Samples that each pixel has in the end.
+    /// Samples per pixel at its end.
     pub(super) target: u32,
-    /// Seconds on the clock at which it is cut, whatever pixels have by then.
+    /// Clock reading in seconds at which the round is cut.
     pub(super) deadline: Option<f64>,
-    /// Whether it is done whatever happens, so that every pixel has something to show.
+    /// Whether it is the first round, which is completed even past the deadline, so that every pixel has a
+    /// sample.
     pub(super) first: bool,
-    /// Seconds that a sample of each pixel takes, where that is known.
+    /// Seconds per sample of all pixels, if known.
     pub(super) each: Option<f64>,
 }
 
@@ -116,7 +117,7 @@ impl Rounds {
         }
     }
 
-    /// Goes on after `count` rounds that gave each pixel `spp` samples in `seconds`.
+    /// Continues after `count` rounds that took `spp` samples per pixel in `seconds`.
     pub(super) fn resumed(self, spp: u32, count: u32, seconds: f64, estimates: Estimates) -> Self {
         let Estimates { next, last, first_noise } = estimates;
         Self {
@@ -131,31 +132,31 @@ impl Rounds {
         }
     }
 
-    /// Samples of each pixel; of the least sampled one after a round that was cut.
+    /// Samples per pixel; those of the least sampled pixel after a cut round.
     pub(super) fn spp(&self) -> u32 {
         self.spp
     }
 
-    /// Rounds that were begun.
+    /// Rounds begun.
     pub(super) fn count(&self) -> u32 {
         self.count
     }
 
-    /// What a render that goes on later must know.
+    /// State for a resumed render.
     pub(super) fn estimates(&self) -> Estimates {
         let last = self.decision.map(|(spp, error)| (spp, [error.relmse, error.lower, error.upper]));
         Estimates { next: self.next_estimate, last, first_noise: self.first_noise }
     }
 
-    /// Whether it is time to estimate the error.
+    /// Whether an error estimate is due.
     pub(super) fn estimate_is_due(&self) -> bool {
         self.spp >= self.next_estimate
     }
 
-    /// Takes note of an estimate, which takes as long as a tenth of a sample, or a quarter where samples are cheap. The next is
-    /// due after an eighth more samples, but at the next multiple of sixteen at least; where the error is to stop the render, when it can be
-    /// reached at the earliest (errors fall with the square of the samples at best, and intervals become narrower), after a
-    /// thirty-second at least and twice as many at most.
+    /// Records an estimate, which costs a tenth of a sample, or a quarter of a cheap one. The next estimate
+    /// is due after an eighth more samples, at a multiple of sixteen. With an error target it is due when the
+    /// target can be reached at the earliest, since errors fall at best with the squared number of samples
+    /// while intervals narrow: after 1/32 more samples at least, and twice as many at most.
     pub(super) fn estimated(&mut self, error: Option<ErrorEstimate>) {
         let spp = self.spp;
         let next = match (self.stop.error, error) {
@@ -169,8 +170,8 @@ impl Rounds {
         self.decision = error.map(|error| (spp, error));
     }
 
-    /// What to do at `seconds`; `None` when it is time to stop. Rounds double the samples until they last long enough.
-    /// `reserve` seconds are needed after the last one.
+    /// Next round at `seconds`, `None` if a stop rule holds. Rounds double the samples until they last long
+    /// enough; `reserve` seconds stay free at the end.
     pub(super) fn next(&self, seconds: f64, reserve: f64) -> Option<Plan> {
         let most = self.stop.spp.unwrap_or(MOST_SAMPLES).clamp(1, MOST_SAMPLES);
         if self.spp >= most || self.error_reached() {
@@ -191,25 +192,25 @@ impl Rounds {
             }
         }
         let target = self.spp.saturating_add(samples.max(1)).min(most);
-        // Not past the next estimate.
+        // Up to the next estimate at most.
         let target = if self.spp < self.next_estimate { target.min(self.next_estimate) } else { target };
         Some(Plan { target, deadline: deadline.filter(|_| !first), first, each })
     }
 
-    /// Takes note of a round, after which the least sampled pixel has `spp` samples, at `seconds`.
+    /// Records a round after which the least sampled pixel has `spp` samples, at `seconds`.
     pub(super) fn completed(&mut self, spp: u32, seconds: f64) {
         self.spp = spp;
         self.seconds = seconds;
         self.count += 1;
     }
 
-    /// What is told of the picture meanwhile, at `seconds`.
+    /// Progress to report at `seconds`.
     pub(super) fn progress(&self, seconds: f64, error: Option<ErrorEstimate>) -> Progress {
         let seconds_left = self.seconds_left(seconds, error);
         Progress { seconds, seconds_left, spp: self.spp, rounds: self.count, error, unsaved: None }
     }
 
-    /// Seconds until the first rule holds, if all goes on as before: errors fall like one over the samples.
+    /// Estimated seconds until the first rule holds: errors fall with 1 over the number of samples.
     fn seconds_left(&self, seconds: f64, error: Option<ErrorEstimate>) -> Option<f64> {
         let by_samples =
             self.stop.spp.map(|spp| seconds * (f64::from(spp) / f64::from(self.spp.max(1)) - 1.0));
@@ -221,22 +222,22 @@ impl Rounds {
         [by_samples, by_time, by_error].into_iter().flatten().reduce(f64::min).map(|left| left.max(0.0))
     }
 
-    /// Whether samples of the picture are enough for the error that was asked for, and those of the audit are not: its pixels
-    /// are noisier than the picture's, and what they leave open is more than half of it.
+    /// Whether only the audit keeps the render from its end: its pixels are noisier than the picture's, and
+    /// its uncertainty is more than half of the requested error.
     pub(super) fn waits_for(&self, audited: &Audited) -> bool {
         let Some(wanted) = self.stop.error.filter(|_| self.spp >= FEWEST_FOR_ERROR) else { return false };
         let is_open = audited.bias.least() <= wanted && audited.total.upper > wanted;
         is_open && audited.noise.upper <= ENOUGH * wanted && audited.imbalance > 1.0
     }
 
-    /// Whether the error that was asked for is less than the bias, as far as enough samples tell.
+    /// Whether the bias exceeds the requested error, judged by enough samples.
     pub(super) fn is_out_of_reach(&self, audited: &Audited) -> bool {
         let enough = self.spp >= FEWEST_FOR_ERROR && audited.samples >= FEWEST_FOR_BIAS;
         enough && !audited.is_blind && self.stop.error.is_some_and(|wanted| audited.bias.least() > wanted)
     }
 
-    /// Whether `noise` that all samples share stays above the error that was asked for. Noise falls as a + b/n with n samples;
-    /// a shows when even its lower end is far above what b/n would have left, and samples reach no less.
+    /// Whether `noise` shared by all samples stays above the requested error. Noise falls as a + b/n with n
+    /// samples; a is significant if the lower end of noise is far above the extrapolated b/n.
     pub(super) fn has_floor(&mut self, noise: ErrorEstimate) -> bool {
         let Some(wanted) = self.stop.error.filter(|_| self.spp >= FEWEST_FOR_ERROR) else { return false };
         let (before, was) = *self.first_noise.get_or_insert((self.spp, noise.upper));
@@ -244,7 +245,7 @@ impl Rounds {
         noise.lower * m > SHARED * was * n && noise.upper * m - was * n > wanted * (m - n)
     }
 
-    /// The rule that holds. The clock is not asked: without another rule it is time.
+    /// The rule that holds. The clock is not read: without another rule it is time.
     pub(super) fn rule(&self) -> StopRule {
         match self.stop.spp {
             _ if self.error_reached() => StopRule::Error,
@@ -263,7 +264,7 @@ impl Rounds {
 mod tests {
     use super::*;
 
-    /// Runs rounds with a picture that takes `each` seconds a sample; returns (spp, seconds).
+    /// Runs rounds of a picture that takes `each` seconds per sample; returns (spp, seconds).
     fn run(stop: Stop, each: f64) -> (u32, f64) {
         let mut rounds = Rounds::new(stop);
         let mut clock = 0.0;

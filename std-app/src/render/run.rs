@@ -1,4 +1,4 @@
-//! One render from the first structure to the last round.
+//! A render from its first structure to its last round.
 
 use super::audit::Audit;
 use super::deadline::Deadline;
@@ -22,7 +22,7 @@ use halflight_core::scene::Scene;
 use halflight_core::transport::{PathSettings, UNLIMITED};
 use std::time::Instant;
 
-/// A render to be compiled for the features of its scene.
+/// A render, to be compiled for the features of its scene.
 pub(super) struct Render<'a> {
     pub(super) scene: &'a Scene<'a>,
     pub(super) settings: &'a Settings,
@@ -37,13 +37,13 @@ impl WithFeatures for Render<'_> {
     fn run<F: Features>(self) -> Self::Out {
         let Render { scene, settings, method, progress, interrupt } = self;
         let (width, height) = (settings.width, settings.height);
-        // What is of something else should not cost the time of building.
+        // Files of another scene are refused before any structure is built.
         let bank = Bank::new();
         let mut memory = Memory::new(scene, settings, &bank);
         let most = memory.for_file();
         let cache = cache_file::open(scene, settings, most)?.map(|file| file.header.fingerprint());
         let resumed = settings.resume.as_deref().map(|file| Reader::open(file, most)).transpose()?;
-        // What a first look has chosen is in the film.
+        // A film file holds the method that a prepass chose.
         let chosen = |method: &Method| *method == Method::ProgressivePhotons;
         let of_film = resumed.as_ref().and_then(|film| film.header.method()).filter(chosen);
         let method = if settings.method.is_some() { method } else { of_film.unwrap_or(method) };
@@ -56,11 +56,11 @@ impl WithFeatures for Render<'_> {
 
         let workers = Workers::new(settings.threads)?;
         let build_start = Instant::now();
-        // First, for the working memory of its build is free again for the others.
+        // The BVH comes first: its build needs working memory that later structures reuse.
         let mut bvh_lines = Pages::default();
         let bvh = build_bvh(scene, settings.level, &workers, &mut memory, &mut bvh_lines)?;
         let mut film_lines = memory.take("film", RenderState::footprint(width, height))?;
-        // What comes out is counted from the beginning, and taken in the end.
+        // Output images are counted now and allocated at the end.
         let pixels = width as usize * height as usize;
         let picture = Footprint::default().slice::<[f32; 3]>(pixels).slice::<[f32; 3]>(pixels);
         memory.set_aside("picture", picture.slice::<u32>(pixels))?;
@@ -104,13 +104,13 @@ impl WithFeatures for Render<'_> {
     }
 }
 
-/// What paths are told, whatever the method.
+/// Path settings common to all methods.
 pub(super) fn path_settings(settings: &Settings) -> PathSettings {
     let Settings { width, height, seed, max_depth, .. } = *settings;
     PathSettings { width, height, seed, max_depth: max_depth.unwrap_or(UNLIMITED) }
 }
 
-/// The hierarchy, built on all cores, then moved out of the working memory of its build into `lines`.
+/// BVH, built on all cores, then moved from its working memory into `lines`.
 pub(super) fn build_bvh<'m>(
     scene: &Scene,
     level: Level,

@@ -1,5 +1,5 @@
-//! Studies of the irradiance cache: what each error metric makes of the same number of records, against irradiance that
-//! is gathered at points of the picture that no cache has seen.
+//! Studies of irradiance caching: errors of each metric at the same number of records, at held-out points of
+//! the picture.
 
 use super::held_out::{EXACT, Point, held_out, luminance};
 use super::memory::{Bank, Memory};
@@ -19,59 +19,60 @@ use halflight_core::method::record_placement::{CacheBuilder, RecordPlacement, st
 use halflight_core::scene::Scene;
 use halflight_core::transport::PathIntegrator;
 
-/// What to study.
+/// Parameters of a study.
 #[derive(Clone, Debug)]
 pub struct IrradianceStudy {
-    /// The metrics.
+    /// Error metrics to compare.
     pub metrics: Vec<Metric>,
-    /// Records that each is to make do with.
+    /// Number of records for each metric.
     pub records: u64,
-    /// Points at which the irradiance is held against the exact one, about.
+    /// Approximate number of held-out points.
     pub points: u32,
-    /// Whether caches are filled in passes, each with half of the radii of the one before (Křivánek et al. 2006, §5).
+    /// Whether caches are filled in passes, each with half the radii of the previous pass (Křivánek et al.
+    /// 2006, §5).
     pub progressive: bool,
 }
 
-/// What came of a metric.
+/// Result for one metric.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MetricError {
     /// The metric.
     pub metric: Metric,
-    /// The error that it was to allow, in its unit, for so many records.
+    /// Allowed error in the metric's unit that gives this number of records.
     pub error: f32,
     /// Records.
     pub records: u64,
-    /// Root mean square of the error of the indirect irradiance (luminance), over its mean; what the noise of the exact
-    /// one adds to it is taken off.
+    /// Root mean squared error of indirect luminance over its mean, without the noise of the exact values.
     pub rmse: f64,
-    /// That noise, over the mean.
+    /// Noise of the exact values, over the mean.
     pub noise: f64,
-    /// The error, relative to the irradiance or a tenth of its mean, that one point of a hundred exceeds.
+    /// 99th percentile of the error, relative to the irradiance or at least a tenth of its mean.
     pub worst: f64,
-    /// Share of the points that records reach; the errors are of these.
+    /// Share of points within reach of records; errors refer to these points.
     pub reached: f64,
-    /// Mean of the errors that records predict at the points, over the irradiance.
+    /// Mean predicted relative error at the points.
     pub predicted: f64,
-    /// Mean of the errors over the irradiance (or a tenth of its mean).
+    /// Mean error, relative to the irradiance or at least a tenth of its mean.
     pub achieved: f64,
 }
 
-/// Records are as many as asked for within this share.
+/// Relative tolerance of the number of records.
 const TOLERANCE: f64 = 0.02;
 
-/// Attempts at that: near the end it is chance whether one more record fits, by some hundredths of few hundred records.
+/// Most attempts. Near the end chance decides about single records, which are some hundredths of a few
+/// hundred.
 const ATTEMPTS: usize = 20;
 
-/// The longest step of an attempt, as the logarithm of the error: to a hundred times as much.
+/// Longest step of an attempt in the logarithm of the error: a factor of a hundred.
 const FARTHEST: f64 = 4.605;
 
 /// Passes of a progressive filling.
 const PASSES: i32 = 3;
 
-/// Gatherings at a point of comparison.
+/// Gatherings at each held-out point.
 const REPEATS: u32 = 4;
 
-/// Runs `study` on the picture of `settings`; `tell` hears of each metric when it is done.
+/// Runs `study` on the picture of `settings` and calls `tell` after each metric.
 pub fn study_irradiance(
     scene: &Scene,
     settings: &Settings,
@@ -124,7 +125,7 @@ impl WithFeatures for Study<'_> {
             loop {
                 let mut builder = CacheBuilder::new(&bvh.bounds(), capacity, 0, &mut arena(&mut lines))?;
                 for pass in (0..if study.progressive { PASSES } else { 1 }).rev() {
-                    // Radii are in proportion to the error, or to its fourth root.
+                    // Radii are proportional to the error or to its fourth root.
                     let wider = 2f32.powi(pass);
                     let looser = if metric.takes_distances() { wider } else { wider.powi(4) };
                     let mut placement = RecordPlacement {
@@ -136,7 +137,7 @@ impl WithFeatures for Study<'_> {
                         size,
                         step: &mut *step,
                     };
-                    // Nothing ends it early.
+                    // This executor never ends early.
                     let _ = placement.fill(&mut builder, &mut executor)?;
                     if pass > 0 {
                         builder.tighten(0.5);
@@ -157,7 +158,7 @@ fn arena(lines: &mut [Line]) -> Arena<'_> {
     Arena::new(bytemuck::cast_slice_mut(lines))
 }
 
-/// Holds a cache against what is known.
+/// Compares a cache with the exact values.
 fn judge(metric: Metric, error: f32, cache: &IrradianceCache, points: &[Point]) -> MetricError {
     let mean = points.iter().map(|point| point.exact).sum::<f64>() / points.len().max(1) as f64;
     let (mut squares, mut variance, mut predicted, mut relative) = (0.0, 0.0, 0.0, Vec::new());
@@ -188,13 +189,13 @@ fn judge(metric: Metric, error: f32, cache: &IrradianceCache, points: &[Point]) 
     }
 }
 
-/// The search for the error that makes so many records: straight lines on logarithmic axes, kept between what was too
-/// many and what was too few.
+/// Search for the error that gives the wanted number of records: linear interpolation on logarithmic axes
+/// between the last errors with too many and with too few records.
 struct Search {
     wanted: f64,
     error: f32,
     attempts: usize,
-    /// Errors, as logarithms, that made too many and too few records, with the logarithm of how many.
+    /// Logarithms of error and number of records for the last attempts with too many and too few records.
     too_many: Option<[f64; 2]>,
     too_few: Option<[f64; 2]>,
 }
@@ -204,7 +205,7 @@ impl Search {
         Self { wanted: wanted.max(1) as f64, error, attempts: 0, too_many: None, too_few: None }
     }
 
-    /// Takes note that the error made so many records; whether that will do, or has to.
+    /// Records that the error gave this number of records; returns whether the search is over.
     fn is_done(&mut self, records: u64) -> bool {
         self.attempts += 1;
         let records = records.max(1) as f64;
@@ -223,8 +224,8 @@ impl Search {
                 let share = ((many - wanted) / (many - few)).clamp(0.1, 0.9);
                 a + share * (b - a)
             }
-            // Areas of supports grow with the square of the radius, or with the root of the error; far away that may
-            // not hold.
+            // Areas of records grow with the squared radius, or with the square root of the error; far away
+            // this may fail.
             _ => here[0] + (2.0 * (here[1] - wanted)).clamp(-FARTHEST, FARTHEST),
         };
         self.error = next.exp() as f32;

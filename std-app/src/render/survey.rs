@@ -1,5 +1,5 @@
-//! A survey of the irradiance caches of a picture: where their records are and how far they reach, what error they
-//! predict, and what error they have at points that no record was made for.
+//! Survey of a picture's irradiance caches: positions and radii of records, their predicted error, and their
+//! error at held-out points.
 
 use super::RenderError;
 use super::held_out::{Point, held_out, luminance, stride};
@@ -13,88 +13,89 @@ use halflight_core::transport::cached::placement::{PIXELS, ProgressiveOrder, Via
 use halflight_core::transport::{Counters, PathIntegrator};
 use std::time::Instant;
 
-/// Maps have no more pixels than this.
+/// Most pixels of the maps.
 const MOST_PIXELS: u64 = 1 << 21;
 
-/// Seconds that a survey may always take.
+/// Seconds that a survey may take in any case.
 const SHORT: f64 = 10.0;
 
-/// Pixels of which the risk is known, at most: those of larger pictures have that of a neighbour.
+/// Most pixels with an own risk; in larger pictures neighbours share one.
 const MOST_RISKS: u64 = 1 << 16;
 
-/// Gatherings at a point of comparison.
+/// Gatherings at each held-out point.
 const REPEATS: u32 = 2;
 
-/// Errors are relative to the irradiance, or to this share of its mean where it is darker.
+/// Errors are relative to the irradiance, but at least to this share of its mean.
 const DARK: f64 = 0.1;
 
-/// Half of the width of a rim that is drawn, and the radius of a record's middle, in pixels.
+/// Half width of a drawn rim and radius of a drawn record, in pixels.
 const RIM: f32 = 0.6;
 const MIDDLE: f32 = 1.6;
 
-/// What of a record of the cache of even samples is at a pixel.
+/// Part of a record of the even samples' cache that a pixel shows.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Mark {
     /// Nothing.
     #[default]
     None,
-    /// The rim of what it covers.
+    /// Rim of its validity ellipse.
     Rim,
-    /// Its place.
+    /// Its position.
     Record,
 }
 
-/// What is known at a pixel of a map.
+/// Survey of one pixel.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Look {
-    /// Geometric mean of the radii of the records that speak there, in pixels; 0 where there are none.
+    /// Geometric mean of the radii of the records used there, in pixels; 0 without records.
     pub radius: f32,
-    /// Relative error that they predict.
+    /// Relative error predicted by these records.
     pub predicted: f32,
-    /// What is drawn there.
+    /// Drawn mark.
     pub mark: Mark,
 }
 
-/// What is known at a point that no record was made for.
+/// Comparison at a held-out point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Check {
     /// Column and row.
     pub pixel: [u32; 2],
-    /// By how much the mean of both caches is too bright, relative to the irradiance, or to a tenth of its mean.
+    /// Error of the mean of both caches, relative to the irradiance or at least a tenth of its mean; positive
+    /// if too bright.
     pub error: f32,
-    /// What the records predict of its magnitude.
+    /// Magnitude of the relative error that records predict.
     pub predicted: f32,
 }
 
-/// See the file.
+/// Survey of both caches.
 #[derive(Clone, Debug)]
 pub struct Survey {
-    /// Pixels of the picture along the side of one of the maps.
+    /// Side in pixels of the square that a map pixel represents.
     pub step: u32,
-    /// Pixels of the maps, across.
+    /// Pixels across in the maps.
     pub width: u32,
-    /// The maps, row by row.
+    /// Maps, row by row.
     pub looks: Vec<Look>,
-    /// Pixels along the side of the square that stands for a check.
+    /// Side in pixels of the square that a check represents.
     pub square: u32,
-    /// The points where records reach.
+    /// Checks at the points within reach of records.
     pub checks: Vec<Check>,
-    /// Points in all.
+    /// Number of held-out points.
     pub points: u64,
-    /// Mean of what records predict at the points.
+    /// Mean predicted error at the points.
     pub predicted: f64,
-    /// Mean magnitude of the errors, which has the noise of what they are compared with in it.
+    /// Mean magnitude of the errors, which includes the noise of the exact values.
     pub achieved: f64,
-    /// Root mean square of the relative error, without that noise.
+    /// Root mean squared relative error without this noise.
     pub rms: f64,
-    /// Root mean square of that noise.
+    /// Root mean square of this noise.
     pub noise: f64,
-    /// Seconds that the survey took.
+    /// Seconds of the survey.
     pub seconds: f64,
 }
 
-/// Looks at all pixels, and gathers at about `points` of them; `None` where the render is interrupted, or
-/// has had so many `seconds` and this takes longer.
+/// Surveys all pixels and gathers at about `points` of them. `None` if interrupted, or if it takes longer
+/// than the render's limit of `seconds`.
 pub(super) fn survey<F: Features>(
     tracer: &PathIntegrator<F>,
     caches: [&IrradianceCache; 2],
@@ -155,9 +156,8 @@ pub(super) fn survey<F: Features>(
     }))
 }
 
-/// Of each pixel, row by row, the variance of what records say at the place that it shows, over the square of
-/// that: where they say different things, one of them is wrong. 0 where none speaks; nothing where it was
-/// interrupted. Of large pictures some pixels stand for their neighbours.
+/// Relative variance of record values at each pixel, row by row: where records disagree, some are wrong. 0
+/// without records; empty if interrupted. In large pictures neighbours share a value.
 pub(super) fn risks<F: Features>(
     tracer: &PathIntegrator<F>,
     caches: [&IrradianceCache; 2],
@@ -197,7 +197,7 @@ pub(super) fn risks<F: Features>(
     Ok(risks)
 }
 
-/// What records of both caches say at a place in the mean, and the variance of that.
+/// Weighted mean of the values of both caches' records at a point, and their variance.
 fn said_at(place: &GatherPoint, caches: [&IrradianceCache; 2]) -> [f32; 2] {
     let (mut sum, mut squares, mut weights) = (0.0, 0.0, 0.0);
     for cache in caches {
@@ -236,7 +236,7 @@ fn look_at(place: &GatherPoint, caches: [&IrradianceCache; 2], step: u32) -> Loo
     Look { radius: if radius.is_finite() { radius.exp() } else { 0.0 }, predicted, mark }
 }
 
-/// Means over the records that speak for a place, by their weights; not a number where there are none.
+/// Weighted means over the records used at a point; NaN without records.
 pub(super) fn means(
     place: &GatherPoint,
     caches: [&IrradianceCache; 2],
@@ -253,8 +253,8 @@ pub(super) fn means(
     sums.map(|sum| sum / weights)
 }
 
-/// What both caches say at a point, and the variance of the relative error by the noise of `exact`; `None` where no
-/// record reaches.
+/// Comparison at a point, and the variance of its relative error by the noise of `exact`; `None` without
+/// records.
 fn check(point: &Point, mean: f64, caches: [&IrradianceCache; 2]) -> Option<(Check, f64)> {
     let Point { place, pixel, exact, variance } = point;
     let said = caches.map(|cache| cache.at(&place.asker()));

@@ -1,4 +1,4 @@
-//! The executor of the program: threads, which the clock and interrupts end.
+//! Executor of the program: a thread pool that ends at deadlines and interrupts.
 
 use super::crew::Crew;
 use super::deadline::Deadline;
@@ -9,12 +9,12 @@ use halflight_core::transport::Counters;
 use std::sync::Mutex;
 use std::time::Instant;
 
-/// When passes end.
+/// End of a pass.
 #[derive(Clone, Copy)]
 pub(super) enum End {
-    /// Passes before the picture: some seconds after the end of the render.
+    /// Prepasses: some seconds after the end of the render.
     Prepass,
-    /// The first round: some seconds later still, so that every pixel has a sample.
+    /// First round: some seconds later still, so that every pixel has a sample.
     FirstRound(Option<Instant>),
     /// Every other round: at its deadline and when the user interrupts.
     Round(Option<Instant>),
@@ -38,7 +38,7 @@ impl End {
     }
 }
 
-/// Runs passes on all threads, each with scratch memory of its own.
+/// Runs passes on all threads, each with its own scratch memory.
 pub(super) struct Threads<'t> {
     workers: &'t Workers<'t>,
     scratch: &'t mut [Vec<Line>],
@@ -51,12 +51,12 @@ impl<'t> Threads<'t> {
         Self { workers, scratch, end: End::Prepass }
     }
 
-    /// The same for passes that end at `end`.
+    /// For passes that end at `end`.
     pub(super) fn until(self, end: End) -> Self {
         Self { end, ..self }
     }
 
-    /// Takes tasks from `queue` on all threads until it is empty or the end has come.
+    /// Runs tasks from `queue` on all threads until the queue is empty or the end has come.
     fn run<P: Send>(
         &mut self,
         queue: impl Iterator<Item = (usize, P)> + Send,
@@ -145,7 +145,7 @@ impl Crew<'_, '_> {
     }
 }
 
-/// The items in an order that jumps about by the golden ratio.
+/// The items in steps of the golden ratio, so that successive items are far apart.
 fn scattered<T>(items: Vec<T>) -> Vec<T> {
     let count = items.len();
     let mut step = (count as f64 * 0.618_034) as usize;

@@ -1,23 +1,22 @@
-//! Renders that take turns, round by round, so that each meets the same machine: what slows it down for a while
-//! slows down all of them.
+//! Renders that alternate by rounds, so that disturbances of the machine affect all of them alike.
 
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 
-/// Whose turn it is: that of the render with the least time so far, the first of those.
+/// Scheduler of the renders: the render with the least time so far is next, ties by index.
 pub struct Turns {
-    /// Seconds of rendering of each; infinite where it is over.
+    /// Seconds of each render so far; infinite when it is over.
     seconds: Mutex<Vec<f64>>,
     changed: Condvar,
 }
 
-/// The part of one render; over when dropped.
+/// Handle of one render, which is over when dropped.
 pub struct Turn<'t> {
     turns: &'t Turns,
     index: usize,
 }
 
 impl Turns {
-    /// For `count` renders, all of which have to join.
+    /// For `count` renders, all of which must join.
     pub fn new(count: usize) -> Self {
         Self { seconds: Mutex::new(vec![0.0; count]), changed: Condvar::new() }
     }
@@ -40,7 +39,7 @@ impl Turns {
 }
 
 impl Turn<'_> {
-    /// Says that the render has had `seconds`, and waits for its next turn.
+    /// Reports the seconds of this render so far, and waits for its next turn.
     pub fn pass(&self, seconds: f64) {
         let mut all = self.turns.set(self.index, seconds);
         while next(&all) != Some(self.index) {
@@ -75,7 +74,7 @@ mod tests {
                     let turn = turns.join(index);
                     for round in 1..=4 {
                         order.lock().unwrap().push(index);
-                        // The second takes twice as long.
+                        // The second render takes twice as long.
                         turn.pass(f64::from(round) * if index == 1 { 2.0 } else { 1.0 });
                     }
                 });

@@ -9,18 +9,19 @@ use halflight_core::light::LightSampler;
 use halflight_core::method::environment_visibility::{footprint, learn as learn_visibility, scratch};
 use halflight_core::transport::{PathIntegrator, WindowGain, path::WAVE};
 
-/// Whether the sky is sampled through windows.
+/// Use of environment visibility.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct WindowUse {
-    /// Whether it is.
+    /// Whether the sky is sampled through windows.
     pub used: bool,
-    /// What that does to the variance of its light; `None` where nobody looked.
+    /// Effect on the variance of its light; `None` without a prepass.
     pub gain: Option<WindowGain>,
-    /// There was no memory to look.
+    /// Whether memory for the prepass was lacking.
     pub lacks_memory: bool,
 }
 
-/// The lights of `stage`, with the visibility of the environment where there is one and that pays or is wanted.
+/// Lights of `stage`, with environment visibility if there is an environment and visibility pays or is
+/// requested.
 pub(super) fn learn<'a, F: Features>(
     stage: &Stage<'a>,
     memory: &mut Memory<'a>,
@@ -30,7 +31,7 @@ pub(super) fn learn<'a, F: Features>(
     if wanted == Some(false) || lights.environment_is_constant().is_none() {
         return Ok((*lights, WindowUse::default()));
     }
-    // It is for speed alone: without memory for it, and for paths at the same time, the picture is made without.
+    // Visibility only saves time: it is skipped if its tables and the memory of paths do not both fit.
     let each = scratch::<F>().and(PathIntegrator::<F>::scratch(WAVE)).bytes();
     let all = footprint().bytes().saturating_add(each.saturating_mul(workers.count()));
     if wanted.is_none() && !memory.has(all) {

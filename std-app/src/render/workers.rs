@@ -1,4 +1,4 @@
-//! The threads: each takes the next task when it is done with one, and has working memory of its own.
+//! Thread pool: each thread takes the next task when it is free, and has its own working memory.
 
 use super::deadline::Deadline;
 use super::{RenderError, regions};
@@ -15,22 +15,22 @@ use rayon::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use std::sync::Mutex;
 
-/// A task of a pass: its number, working memory, its piece of the output.
+/// Task of a pass: its number, working memory, and part of the output.
 pub(super) type Task<'t, T> =
     dyn Fn(usize, &mut Arena, &mut [T]) -> Result<Counters, OutOfMemory> + Sync + 't;
 
 /// A pool of threads.
 pub(super) struct Workers<'w> {
-    /// When their passes must end.
+    /// End of its passes.
     pub(super) deadline: Deadline<'w>,
-    /// The pool, and forks on it.
+    /// Pool, and fork-join on it.
     pub(super) fork: Fork,
     /// Seconds of each phase of the render.
     phases: Mutex<Vec<(&'static str, f64)>>,
 }
 
 impl<'w> Workers<'w> {
-    /// `threads` threads; as many as the machine runs at once where `None`.
+    /// A pool of `threads` threads; `None`: all of the machine.
     pub(super) fn new(threads: Option<usize>) -> Result<Self, RenderError> {
         let pool = ThreadPoolBuilder::new().num_threads(threads.unwrap_or(0)).build();
         let phases = Mutex::default();
@@ -38,12 +38,12 @@ impl<'w> Workers<'w> {
             .map_err(|error| RenderError::Threads(error.to_string()))
     }
 
-    /// The same, whose passes end at `deadline`.
+    /// A pool whose passes end at `deadline`.
     pub(super) fn ending_at(self, deadline: Deadline<'w>) -> Self {
         Self { deadline, ..self }
     }
 
-    /// Adds to the `seconds` of a phase.
+    /// Adds `seconds` to a phase.
     pub(super) fn spent(&self, phase: &'static str, seconds: f64) {
         let mut phases = self.phases.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
         match phases.iter_mut().find(|(other, _)| *other == phase) {
@@ -58,12 +58,12 @@ impl<'w> Workers<'w> {
         phases.iter().find(|(other, _)| *other == phase).map_or(0.0, |(_, seconds)| *seconds)
     }
 
-    /// How many there are.
+    /// Number of threads.
     pub(super) fn count(&self) -> usize {
         self.fork.0.current_num_threads()
     }
 
-    /// Builds the hierarchy over `mesh` on all threads.
+    /// Builds the BVH of `mesh` on all threads.
     pub(super) fn build_bvh<'m>(
         &self,
         mesh: &Mesh,
@@ -73,7 +73,7 @@ impl<'w> Workers<'w> {
         self.fork.0.install(|| Bvh::build_with(mesh, arena, level, &self.fork))
     }
 
-    /// What the tiles of `film` tell of its error; `None` for a black picture.
+    /// Error sums of the tiles of `film`; `None` for a black picture.
     fn errors(&self, film: &Film) -> Option<Vec<TileError>> {
         let mean = self.mean(film)?;
         let tiles = film.pixels().par_chunks(PIXELS_PER_TILE);
@@ -97,7 +97,7 @@ impl<'w> Workers<'w> {
         }))
     }
 
-    /// What photons blur of `film`; `None` where there are none.
+    /// Bias of `film` by photon blur; `None` without photons.
     pub(super) fn blur(&self, film: &Film) -> Option<BiasEstimate> {
         let mean = self.mean(film)?;
         let tiles = film.pixels().par_chunks(PIXELS_PER_TILE);
@@ -105,7 +105,7 @@ impl<'w> Workers<'w> {
         BiasEstimate::of_blur(tiles.into_iter())
     }
 
-    /// The mean radiance of `film`; `None` where it is black.
+    /// Mean radiance of `film`; `None` if black.
     pub(super) fn mean(&self, film: &Film) -> Option<f64> {
         let tiles = film.pixels().par_chunks(PIXELS_PER_TILE);
         let mut light = TileLight::default();
@@ -117,7 +117,7 @@ impl<'w> Workers<'w> {
         Some(light.mean()).filter(|mean| *mean > 0.0)
     }
 
-    /// Runs `work` once on every thread, each with working memory of its own.
+    /// Runs `work` once on every thread, each with its own working memory.
     pub(super) fn on_all<T: Send>(
         &self,
         scratch: &mut [Vec<Line>],
@@ -127,8 +127,8 @@ impl<'w> Workers<'w> {
         self.fork.0.install(|| scratch.par_iter_mut().with_max_len(1).map(one).collect())
     }
 
-    /// A pass: task `i` writes to the `i`th piece of `size` values of `out`. Returns what they counted, and whether all
-    /// of them ran before it `is_over`.
+    /// A pass: task `i` writes to the `i`th part of `out`, of `size` values. Returns the counters, and
+    /// whether all tasks ran before `is_over`.
     pub(super) fn pass<T: Send>(
         &self,
         out: &mut [T],
@@ -159,7 +159,7 @@ impl<'w> Workers<'w> {
         Ok((counters, done == tasks))
     }
 
-    /// The error of `film`; `None` for fewer than four samples as well.
+    /// Error of `film`; `None` with fewer than four samples or for a black picture.
     pub(super) fn estimate(&self, film: &Film, shares: bool) -> Option<ErrorEstimate> {
         regions::estimate(&self.errors(film)?, film.width(), shares)
     }
@@ -179,7 +179,7 @@ mod tests {
     use super::*;
     use halflight_core::scene::Triangle;
 
-    /// The bytes of the hierarchy over a wavy sheet of 2 * `side`² triangles.
+    /// Bytes of the BVH of a wavy sheet of 2 * `side`² triangles.
     fn built(side: u32, threads: usize) -> Vec<u8> {
         let places = (0..=side).flat_map(|y| (0..=side).map(move |x| (x as f32, y as f32)));
         let positions: Vec<[f32; 3]> = places.map(|(x, y)| [x, y, (0.1 * x).sin() * y.sqrt()]).collect();

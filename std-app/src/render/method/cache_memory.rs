@@ -17,7 +17,7 @@ pub(super) fn settings<F: Features>(stage: &Stage, fewest: usize) -> CacheSettin
         strata: settings.cache.strata() as usize,
         fewest,
         reserve: Audit::bytes::<F>(stage, Method::IrradianceCache.is_biased()),
-        // Records that go into a file keep their radii.
+        // Records saved to a file keep their validity radii.
         widens: settings.save_cache.is_none(),
     }
 }

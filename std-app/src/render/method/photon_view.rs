@@ -1,5 +1,5 @@
-//! Pictures of photon maps for a report: where photons lie, how dense they are, how far an estimate must reach, and how
-//! many of them lie where the camera sees them.
+//! Pictures of photon maps for a report: positions and density of photons, radii of density estimates, and
+//! the share of photons that the camera sees.
 
 use super::Stage;
 use halflight_core::bsdf::Features;
@@ -8,43 +8,43 @@ use halflight_core::memory::{Arena, Line, OutOfMemory};
 use halflight_core::photon::{Kernel, Neighbours, PhotonMap};
 use halflight_core::scene::SurfacePoint;
 
-/// The last maps, as the camera sees them.
+/// Last photon maps, seen by the camera.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct PhotonView {
-    /// Pixels across; all pictures have the same size.
+    /// Pixels across, the same in all pictures.
     pub width: u32,
-    /// Of all photons, or of those that were reflected, where there is such a map.
+    /// Global map: all photons, or only reflected ones.
     pub global: Option<MapView>,
-    /// Of caustics.
+    /// Caustic map.
     pub caustic: Option<MapView>,
 }
 
-/// One map, as the camera sees it.
+/// A photon map seen by the camera.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct MapView {
-    /// Photons seen in each pixel.
+    /// Visible photons per pixel.
     pub positions: Vec<f32>,
-    /// Photons per area, 1/m², from the nearest [`NEAREST`].
+    /// Photons per area in 1/m², from the nearest [`NEAREST`].
     pub density: Vec<f32>,
-    /// Radius of the disc of those.
+    /// Radius of the disc of these photons.
     pub radius: Vec<f32>,
-    /// Share of the photons that the camera sees, directly.
+    /// Share of the photons that the camera sees directly.
     pub seen: f64,
 }
 
-/// Photons that a density is estimated from.
+/// Photons in a density estimate.
 const NEAREST: usize = 64;
 
 /// Most pixels across and down.
 const MOST_PIXELS: u32 = 256;
 
-/// Most photons that are looked at.
+/// Most photons that are tested.
 const MOST_PHOTONS: usize = 1 << 18;
 
-/// How much nearer than a photon something must be to hide it, relative.
+/// Relative tolerance of distance in the visibility test of a photon.
 const BEFORE: f32 = 1e-3;
 
-/// Looks at the maps of `stage`.
+/// Renders the views of both maps.
 pub(super) fn look<F: Features>(
     stage: &Stage,
     global: Option<&PhotonMap>,
@@ -81,7 +81,7 @@ fn look_at<F: Features>(
             && at.raster.y >= 0.0
             && at.raster.x < width as f32
             && at.raster.y < height as f32;
-        // Its surface must face the camera as well.
+        // The photon's surface must face the camera.
         if !is_inside || at.direction.dot(photon.normal()) >= 0.0 {
             continue;
         }
@@ -102,7 +102,7 @@ fn look_at<F: Features>(
     let farthest = bvh.bounds().diagonal();
     for pixel in 0..pixels as u32 {
         let (x, y) = (pixel % width, pixel / width);
-        // Black from here on: nobody waits for it any more.
+        // Interrupted: the remaining pixels stay black.
         if x == 0 && stage.workers.deadline.is_interrupted() {
             break;
         }

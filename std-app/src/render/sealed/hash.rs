@@ -1,8 +1,8 @@
-//! 64 bits of bytes: the checksum of film files and the fingerprint of scenes. Against accidents, not against malice.
+//! 64-bit hash: checksum of film files and fingerprint of scenes. Detects accidents, not manipulation.
 
 use halflight_core::sampling::mix;
 
-/// A hash over sections of bytes, whose lengths count.
+/// Hash over sections of bytes and their lengths.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(in crate::render) struct Hash(u64);
 
@@ -17,13 +17,13 @@ impl Hash {
         self.word(u64::from_le_bytes(last));
     }
 
-    /// What it comes to.
+    /// The hash value.
     pub(in crate::render) fn value(self) -> u64 {
         self.0
     }
 
     fn word(&mut self, word: u64) {
-        // A zero word would leave a zero hash as it is.
+        // A zero word would not change a zero hash.
         self.0 = mix(self.0 ^ word).wrapping_add(0x9e37_79b9_7f4a_7c15);
     }
 }

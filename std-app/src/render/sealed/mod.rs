@@ -1,8 +1,8 @@
-//! Sealed files, which films and caches are kept in: a name and a version, a header in JSON, sections of bytes, and a
+//! Sealed files, the container of films and caches: name and version, JSON header, sections of bytes, and a
 //! checksum over all of it (docs/film-file.md).
 //!
-//! They are written as all files are (`save::file`): whenever the program is killed, the old file or the new one is
-//! there, whole.
+//! Files are replaced atomically (`save::file`): a killed program leaves either the old or the new file,
+//! complete.
 
 mod hash;
 
@@ -17,19 +17,19 @@ use std::fs::File;
 use std::io::{self, BufReader, Read, Write};
 use std::path::{Path, PathBuf};
 
-/// What is in a file.
+/// Kind of a file.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Kind {
-    /// The first bytes.
+    /// First bytes of the file.
     pub(super) magic: [u8; 6],
-    /// Of the format.
+    /// Version of the format.
     pub(super) version: u8,
-    /// In a word.
+    /// Name for messages.
     pub(super) name: &'static str,
 }
 
 impl Kind {
-    /// The first bytes, the version, and a word that tells the order of bytes.
+    /// First bytes, version, and a word that shows the byte order.
     fn opening(&self) -> [u8; 12] {
         let mut opening = [0; 12];
         opening[..6].copy_from_slice(&self.magic);
@@ -39,7 +39,7 @@ impl Kind {
     }
 }
 
-/// Bytes that a header takes once it is read, for each of its own: numbers of one digit take most.
+/// Memory per byte of a header's JSON text; lists of one-digit numbers need most.
 const HEADER: usize = 24;
 
 /// A file that is being written.
@@ -49,14 +49,14 @@ pub(super) struct Writer<'w> {
 }
 
 impl Writer<'_> {
-    /// A section.
+    /// Adds a section.
     pub(super) fn put(&mut self, bytes: &[u8]) -> io::Result<()> {
         self.hash.section(bytes);
         self.file.write_all(bytes)
     }
 }
 
-/// Writes a file of `kind` to `path`, whole or not at all: `header`, and what `sections` puts after it.
+/// Writes a file of `kind` to `path`, completely or not at all: `header`, then `sections`.
 pub(super) fn write(
     path: &Path,
     kind: &Kind,
@@ -77,24 +77,24 @@ pub(super) fn write(
     written.map_err(|error| FileError::new(path, not_written(&error)))
 }
 
-/// Whether a file will find its way to `path`: the folder is there and takes files.
+/// Checks that a file can be created at `path`.
 pub(super) fn check_writable(path: &Path) -> Result<(), FileError> {
     check_destination(path).map_err(|why| FileError::new(path, why))
 }
 
-/// A file whose header has been read, and whose sections are to be.
+/// A file after its header was read.
 pub(super) struct Reader<'r> {
     path: PathBuf,
     file: Box<dyn Read + 'r>,
     /// Bytes of the whole file.
     length: u64,
-    /// Bytes of memory that may be taken.
+    /// Memory limit in bytes.
     most: usize,
     hash: Hash,
 }
 
 impl<'r> Reader<'r> {
-    /// Opens the file of `kind` at `path` and reads its header, in no more than `most` bytes.
+    /// Opens the file of `kind` at `path` and reads its header, within `most` bytes.
     pub(super) fn open<H: DeserializeOwned>(
         path: &Path,
         kind: &Kind,
@@ -105,7 +105,7 @@ impl<'r> Reader<'r> {
         Self::read(path, kind, (Box::new(BufReader::with_capacity(1 << 16, file)), length), most)
     }
 
-    /// The same of `length` bytes from anywhere; `path` is what errors name.
+    /// As [`Reader::open`], from any source of `length` bytes; errors name `path`.
     pub(super) fn read<H: DeserializeOwned>(
         path: &Path,
         kind: &Kind,
@@ -138,8 +138,8 @@ impl<'r> Reader<'r> {
         Ok((reader, header))
     }
 
-    /// Refuses a file that says that it has `count` things more, of at least a byte each, and is shorter than that, or
-    /// has no memory for them, `size` bytes each.
+    /// Refuses a file that claims `count` more items of at least one byte each, if the file is shorter or if
+    /// items of `size` bytes exceed the memory limit.
     pub(super) fn expect(&self, count: u64, size: usize) -> Result<(), FileError> {
         if count > self.length {
             return Err(self.damage("it is too short"));
@@ -152,14 +152,14 @@ impl<'r> Reader<'r> {
         Ok(())
     }
 
-    /// The next section, of as many bytes.
+    /// Reads the next section into `bytes`.
     pub(super) fn get(&mut self, bytes: &mut [u8]) -> Result<(), FileError> {
         self.file.read_exact(bytes).map_err(|error| FileError::io(&self.path, &error))?;
         self.hash.section(bytes);
         Ok(())
     }
 
-    /// The end: the checksum, and nothing after it.
+    /// Verifies the checksum and the end of the file.
     pub(super) fn finish(mut self) -> Result<(), FileError> {
         let mut sum = [0; 8];
         self.file.read_exact(&mut sum).map_err(|error| FileError::io(&self.path, &error))?;
@@ -170,17 +170,17 @@ impl<'r> Reader<'r> {
         Ok(())
     }
 
-    /// Where the file is.
+    /// Path of the file.
     pub(super) fn path(&self) -> &Path {
         &self.path
     }
 
-    /// Why the file is not used.
+    /// An error for a file that cannot be used.
     pub(super) fn refusal(&self, reason: impl Into<String>) -> FileError {
         FileError::new(&self.path, reason)
     }
 
-    /// The same of a file that is not as it was written.
+    /// An error for a damaged file.
     pub(super) fn damage(&self, what: impl core::fmt::Display) -> FileError {
         self.refusal(format!("is damaged: {what}"))
     }
