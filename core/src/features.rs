@@ -1,7 +1,7 @@
-//! What a scene needs of the shading code, as constants: every branch for a feature that the census does
-//! not find is removed at compile time.
+//! Features of the shading code as constants: branches for features that the census excludes are removed at
+//! compile time.
 
-/// Which kinds of shading a build of a method can meet. The code of an absent one is not compiled in.
+/// Kinds of shading that a build of a method supports. Code of the others is not compiled.
 pub trait Features: Copy + Send + Sync + 'static {
     /// Colours and numbers may come from textures.
     const TEXTURES: bool;
@@ -15,7 +15,7 @@ pub trait Features: Copy + Send + Sync + 'static {
     const CUTOUT: bool;
 }
 
-/// Exactly the features whose parameter is `true`.
+/// Set of exactly the features whose parameter is `true`.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Only<
     const TEXTURES: bool,
@@ -40,15 +40,15 @@ impl<
     const CUTOUT: bool = CUTOUT;
 }
 
-/// Every feature on: right for any scene.
+/// All features: correct for any scene.
 pub type All = Only<true, true, true, true, true>;
-/// Diffuse surfaces of one colour each.
+/// Diffuse surfaces of uniform colour.
 pub type DiffuseOnly = Only<false, false, false, false, false>;
 /// Diffuse surfaces with textures.
 pub type DiffuseTextured = Only<true, false, false, false, false>;
-/// Everything that reflects, of one colour each: no glass, no textures.
+/// Opaque surfaces of uniform colour: no glass, no textures.
 pub type OpaquePlain = Only<false, true, false, false, false>;
-/// Everything that reflects, with every kind of texture: no glass.
+/// Opaque surfaces with every kind of texture: no glass.
 pub type Opaque = Only<true, true, false, true, true>;
-/// Every surface, no texture of any kind.
+/// All surfaces, without textures.
 pub type Plain = Only<false, true, true, false, false>;

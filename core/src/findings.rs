@@ -3,13 +3,13 @@
 //! A method pushes one [`Finding`] for each of its parts. JSON, report page and summary print the list
 //! without knowing the method.
 
-/// Values of a finding, at most.
+/// Largest number of values of a finding.
 const MAX_VALUES: usize = 12;
 
-/// Findings of a list, at most.
+/// Largest number of findings of a list.
 const MAX_FINDINGS: usize = 8;
 
-/// Whether a part of a method was used.
+/// Use of a part of a method.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Decision {
     /// Used in full.
@@ -52,7 +52,7 @@ pub enum Value {
 pub struct Finding {
     /// Part of the method in snake case, as `caustic_photons`; a JSON key, unique in a list.
     pub topic: &'static str,
-    /// Whether the part was used.
+    /// Use of the part.
     pub decision: Decision,
     /// Reason of the decision: a phrase without a full stop, or empty.
     pub reason: &'static str,

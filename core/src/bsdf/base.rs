@@ -1,5 +1,4 @@
-//! The diffuse part of a surface, and how the light that it sends back depends on where it goes: by the share
-//! that passes the coat, which is known for any direction.
+//! Diffuse base of a surface, and the directional dependence of its light by the transmittance of the coat.
 
 use super::albedo::{self, SchlickAlbedo};
 use super::{Bsdf, coated};
@@ -7,20 +6,20 @@ use crate::Rgb;
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
-/// What is on top of a diffuse surface.
+/// Coat over a diffuse base.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub(crate) struct Cover {
-    /// Of Schlick's coat, reflectance at normal incidence.
+    /// Reflectance of Schlick's coat at normal incidence.
     specular: [f32; 3],
     /// GGX alpha.
     alpha: f32,
-    /// Of a dielectric coat, the index of refraction; zero elsewhere.
+    /// Index of refraction of a dielectric coat; zero for others.
     eta: f32,
 }
 
 impl Cover {
-    /// Nothing on top: what leaves is alike in all directions.
+    /// No coat: the reflected radiance is the same in all directions.
     pub(crate) const NONE: Cover = Cover { specular: [0.0; 3], alpha: 0.0, eta: 0.0 };
 
     pub(super) fn dielectric(alpha: f32, eta: f32) -> Self {
@@ -31,7 +30,7 @@ impl Cover {
         Self { alpha, specular: specular.to_array(), ..Self::NONE }
     }
 
-    /// T: the share of the light from the base that leaves at the cosine `c`, up to a factor.
+    /// Transmittance T at the cosine `c` for light from the base, up to a factor.
     #[inline]
     pub(crate) fn transmittance(&self, c: f32) -> Rgb {
         if self.eta > 0.0 {
@@ -45,7 +44,7 @@ impl Cover {
 }
 
 impl Bsdf {
-    /// What covers the diffuse part; `None` where there is no such part.
+    /// Coat over the diffuse base; `None` without a base.
     #[inline]
     pub(crate) fn cover(&self) -> Option<Cover> {
         match self {
@@ -56,7 +55,7 @@ impl Bsdf {
         }
     }
 
-    /// The part of `f`, which is f(wo, wi) |cos θ_i|, that the diffuse part reflects: 0 … 1.
+    /// Fraction of `f`, which is f(wo, wi) |cos θ_i|, that the base reflects: 0 … 1.
     #[inline]
     pub(crate) fn base_part(&self, wo: Vec3, wi: Vec3, f: Rgb) -> Rgb {
         let base = match self {

@@ -1,10 +1,10 @@
-//! A rough or smooth coat over a diffuse base: what the coat does not reflect, on the way in and on the way
-//! out, meets the base (Ashikhmin et al. 2000, §2.4; Kelemen and Szirmay-Kalos 2001):
+//! Rough or smooth coat over a diffuse base. The base receives the light that the coat transmits on the way
+//! in and on the way out (Ashikhmin et al. 2000, §2.4; Kelemen and Szirmay-Kalos 2001):
 //!
 //! f = D G F / (4 cos θ_o cos θ_i) + base · T(θ_o) T(θ_i) / π
 //!
-//! Symmetric in the directions, hence reciprocal. [`super::Glossy`] and [`super::Plastic`] say what F, T and
-//! base are, and why no energy is gained.
+//! The model is symmetric in the directions, hence reciprocal. [`super::Glossy`] and [`super::Plastic`]
+//! define F, T and base, and show that energy is conserved.
 
 use super::BsdfSample;
 use super::conductor::half_cosine;
@@ -14,27 +14,28 @@ use crate::sampling::warp::cosine_hemisphere;
 use core::f32::consts::FRAC_1_PI;
 use glam::Vec3;
 
-/// How much more a direction from the coat is worth than one from the base. Shadow rays find the lamps that
-/// the base reflects; those that show in the coat it has to find alone. In a room whose floor mirrors its
-/// windows 2 takes a seventh off the variance of the floor and 3.5 a fifth.
+/// Weight of the coat over the base in the choice of the lobe. Light samples find the emitters that the base
+/// reflects, whereas the coat has to find its reflections alone. In a room whose floor mirrors its windows a
+/// weight of 2 lowers the variance of the floor by a seventh, 3.5 by a fifth.
 const ALONE: f32 = 2.0;
 
-/// A kind of coat.
+/// Model of a coat.
 pub(super) trait Coat {
     /// GGX alpha; 0 is smooth.
     fn alpha(&self) -> f32;
     /// F: reflectance of a microfacet at the cosine `c`.
     fn reflectance(&self, c: f32) -> Rgb;
-    /// T: the share of light from a direction of cosine `c` that passes the coat.
+    /// T: transmittance at the cosine `c`.
     fn transmittance(&self, c: f32) -> Rgb;
-    /// What the coat reflects of light from `c`. An estimate.
+    /// Directional albedo of the coat at the cosine `c`, an estimate.
     fn specular_albedo(&self, c: f32) -> Rgb;
     /// Factor of the base.
     fn base(&self) -> Rgb;
-    /// ∫ 2c T(c) dc: how much of the light that leaves the base evenly gets out. An estimate.
+    /// ∫ 2c T(c) dc: mean transmittance for uniform light from the base, an estimate.
     fn mean_transmittance(&self) -> Rgb;
 
-    /// Probability of the coat's lobe: its part of the energy that leaves to `wo`, weighted by [`ALONE`].
+    /// Probability of the coat's lobe: its share of the energy that leaves towards `wo`, with the weight
+    /// [`ALONE`].
     #[inline]
     fn coat_probability(&self, c: f32, transmittance: Rgb) -> f32 {
         let coat = ALONE * self.specular_albedo(c).element_sum();
@@ -43,15 +44,15 @@ pub(super) trait Coat {
     }
 }
 
-/// Whether the peak of the coat outshines a diffuse surface: of GGX at normal incidence that is F / (4 π α²),
-/// here to a quarter of a white one's 1 / π.
+/// True if the peak of the coat is brighter than a quarter of a white diffuse surface (1 / π). At normal
+/// incidence the peak of GGX is F / (4 π α²).
 #[inline]
 pub(super) fn is_narrow(coat: &impl Coat) -> bool {
     coat.alpha() * coat.alpha() < coat.reflectance(1.0).max_element()
 }
 
-/// As [`sample`], by base or coat alone: weight and density are of that one, with the probability of its
-/// choice. Whether it was the coat.
+/// [`sample`] of base or coat alone. Weight and density are those of the chosen lobe, including the
+/// probability of the choice. The flag is true for the coat.
 #[inline]
 pub(super) fn sample_apart(coat: &impl Coat, wo: Vec3, u: [f32; 3]) -> Option<(BsdfSample, bool)> {
     let transmittance_o = coat.transmittance(wo.z);
@@ -65,7 +66,7 @@ pub(super) fn sample_apart(coat: &impl Coat, wo: Vec3, u: [f32; 3]) -> Option<(B
     (pdf > 0.0).then(|| (BsdfSample::reflection(wi, value / pdf, pdf), is_coat))
 }
 
-/// As [`evaluate`], of the base and of the coat, which is rough.
+/// [`evaluate`] of the base and of the rough coat, each alone.
 #[inline]
 pub(super) fn evaluate_apart(coat: &impl Coat, wo: Vec3, wi: Vec3) -> [(Rgb, f32); 2] {
     if !(wi.z > 0.0) {
@@ -110,7 +111,7 @@ pub(super) fn evaluate(coat: &impl Coat, wo: Vec3, wi: Vec3) -> (Rgb, f32) {
     both_lobes(coat, wo, wi, transmittance_o, coat.coat_probability(wo.z, transmittance_o))
 }
 
-/// The part of f cos θ_i that the base reflects.
+/// f cos θ_i of the base.
 #[inline]
 pub(super) fn of_base(coat: &impl Coat, wo: Vec3, wi: Vec3) -> Rgb {
     coat.base() * coat.transmittance(wo.z) * coat.transmittance(wi.z) * (wi.z.max(0.0) * FRAC_1_PI)
@@ -125,7 +126,7 @@ fn weighted(coat: &impl Coat, wo: Vec3, wi: Vec3, transmittance_o: Rgb, p: f32) 
     (pdf > 0.0).then(|| BsdfSample::reflection(wi, value / pdf, pdf))
 }
 
-/// f cos θ_i and the density, of base and rough coat together.
+/// f cos θ_i and density of base and rough coat together.
 #[inline]
 fn both_lobes(coat: &impl Coat, wo: Vec3, wi: Vec3, transmittance_o: Rgb, p: f32) -> (Rgb, f32) {
     let value = value(coat, wo, wi, transmittance_o);
@@ -136,7 +137,7 @@ fn both_lobes(coat: &impl Coat, wo: Vec3, wi: Vec3, transmittance_o: Rgb, p: f32
     (value, base_pdf + p * Ggx::new(coat.alpha()).reflection_density(wo, wo + wi))
 }
 
-/// f cos θ_i of base and rough coat together, for `wi` above the surface; T(θ_o) is known.
+/// f cos θ_i of base and rough coat together, for `wi` above the surface and known T(θ_o).
 #[inline]
 pub(super) fn value(coat: &impl Coat, wo: Vec3, wi: Vec3, transmittance_o: Rgb) -> Rgb {
     let base = base_value(coat, wi, transmittance_o);

@@ -1,11 +1,12 @@
-//! Metal: GGX microfacets that reflect by Schlick's approximation; a coloured mirror where smooth.
+//! Metal: GGX microfacets with Schlick's Fresnel term; a coloured mirror if smooth.
 
 use super::ggx::Ggx;
 use super::{BsdfSample, fresnel};
 use crate::Rgb;
 use glam::Vec3;
 
-/// A metal, smooth or rough. Light that bounces between microfacets is lost, as in the usual model.
+/// Metal, smooth or rough. Light that bounces between microfacets is lost, as usual in single-scattering
+/// models.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Conductor {
     /// Reflectance at normal incidence, 0 … 1.

@@ -1,15 +1,15 @@
-//! The smooth boundary between two media: Fresnel's share is reflected, the rest refracted by Snell's law.
+//! Smooth dielectric boundary: Fresnel reflection, and refraction by Snell's law.
 
 use super::{BsdfSample, fresnel, sqrt};
 use crate::Rgb;
 use glam::Vec3;
 
-/// Glass, water, seen from one of its sides.
+/// Smooth glass or water, seen from one side.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Dielectric {
-    /// Index of refraction beyond the surface over that on the side of the viewer.
+    /// Index of refraction on the far side over that on the viewer's side.
     pub eta: f32,
-    /// Factor on what is transmitted, 0 … 1.
+    /// Factor on the transmitted light, 0 … 1.
     pub tint: Rgb,
 }
 
@@ -36,7 +36,7 @@ impl Dielectric {
     }
 }
 
-/// The share of samples to spend on reflection: by the energy that each side carries.
+/// Probability of reflection, in proportion to the energy of each side.
 #[inline]
 pub(super) fn reflection_probability(reflectance: f32, tint: Rgb) -> f32 {
     let transmitted = (1.0 - reflectance) * tint.element_sum() * (1.0 / 3.0);
@@ -44,14 +44,14 @@ pub(super) fn reflection_probability(reflectance: f32, tint: Rgb) -> f32 {
     if sum > 0.0 { reflectance / sum } else { 1.0 }
 }
 
-/// `wo` refracted at a microfacet of normal `m`, c = wo·m > 0, into the medium of relative index `eta`
-/// (Walter et al. 2007, eq. 40). The caller has ruled out total reflection.
+/// Refraction of `wo` at a microfacet of normal `m`, c = wo·m > 0, into the medium of relative index `eta`
+/// (Walter et al. 2007, eq. 40). The caller excludes total reflection.
 #[inline]
 pub(super) fn refract(wo: Vec3, m: Vec3, c: f32, eta: f32) -> Vec3 {
     if eta == 1.0 {
         return -wo;
     }
-    // g = eta cos θ_t, as in `fresnel::dielectric`, so that both agree on where total reflection begins.
+    // g = eta cos θ_t, as in `fresnel::dielectric`, so that both agree on the onset of total reflection.
     let g = sqrt(((eta - 1.0) * (eta + 1.0) + c * c).max(0.0));
     ((c - g) * m - wo) / eta
 }

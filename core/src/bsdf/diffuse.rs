@@ -1,4 +1,4 @@
-//! Lambert's surface: f = ρ/π.
+//! Lambertian surface: f = ρ/π.
 
 use super::BsdfSample;
 use crate::Rgb;
@@ -6,7 +6,7 @@ use crate::sampling::warp::cosine_hemisphere;
 use core::f32::consts::FRAC_1_PI;
 use glam::Vec3;
 
-/// Scatters evenly into the hemisphere of the viewer.
+/// Scatters uniformly into the hemisphere of the viewer.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Diffuse {
     /// Albedo ρ, 0 … 1.
@@ -17,7 +17,7 @@ impl Diffuse {
     #[inline]
     pub(super) fn sample(&self, u: [f32; 2]) -> Option<BsdfSample> {
         let direction = cosine_hemisphere(u);
-        // The very rim of the hemisphere has no density.
+        // The density is zero at the rim of the hemisphere.
         (direction.z > 0.0)
             .then(|| BsdfSample::reflection(direction, self.reflectance, direction.z * FRAC_1_PI))
     }

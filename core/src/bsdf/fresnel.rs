@@ -1,11 +1,10 @@
-//! Fresnel's equations for a dielectric boundary, and Schlick's approximation for the rest.
+//! Fresnel equations of a dielectric boundary, and Schlick's approximation.
 
 use super::sqrt;
 use crate::Rgb;
 
 /// Reflectance of unpolarised light at a boundary of relative index `eta` = n_t / n_i, for the cosine of
-/// incidence `c` > 0; 1 where everything is reflected inside. (Cook and Torrance 1982, eq. 16, with
-/// g = eta cos θ_t.)
+/// incidence `c` > 0; 1 at total internal reflection. (Cook and Torrance 1982, eq. 16, with g = eta cos θ_t.)
 #[inline]
 pub fn dielectric(c: f32, eta: f32) -> f32 {
     // (eta - 1)(eta + 1) keeps the digits that eta² - 1 loses near 1.
@@ -16,7 +15,7 @@ pub fn dielectric(c: f32, eta: f32) -> f32 {
     between(c, sqrt(g2), eta)
 }
 
-/// The same where g = eta cos θ_t is known: no cancellation near the edge of total reflection.
+/// [`dielectric`] for known g = eta cos θ_t: without cancellation near the onset of total reflection.
 #[inline]
 pub fn between(c: f32, g: f32, eta: f32) -> f32 {
     let r_s = (c - g) / (c + g);
@@ -33,7 +32,7 @@ pub fn schlick_weight(c: f32) -> f32 {
     m2 * m2 * m
 }
 
-/// Schlick 1994, eq. 24: from `f0` at normal incidence to white at grazing incidence.
+/// Schlick 1994, eq. 24: `f0` at normal incidence, white at grazing incidence.
 #[inline]
 pub fn schlick(f0: Rgb, c: f32) -> Rgb {
     f0 + (Rgb::ONE - f0) * schlick_weight(c)
@@ -46,8 +45,8 @@ pub fn normal_incidence(eta: f32) -> f32 {
     r * r
 }
 
-/// Mean over the hemisphere, weighted by the cosine, of [`dielectric`] for `eta` >= 1: a polynomial in the
-/// amplitude (η - 1)/(η + 1), right to 6e-4 up to η = 10 (the exact integral needs logarithms).
+/// Cosine-weighted mean of [`dielectric`] over the hemisphere for `eta` >= 1: a polynomial in the amplitude
+/// (η - 1)/(η + 1), with error at most 6e-4 up to η = 10 (the exact integral needs logarithms).
 #[inline]
 pub fn mean_external_reflectance(eta: f32) -> f32 {
     let r = (eta - 1.0) / (eta + 1.0);
@@ -63,7 +62,7 @@ mod tests {
     fn known_values() {
         assert!((dielectric(1.0, 1.5) - 0.04).abs() < 1e-7);
         assert_eq!(dielectric(0.3, 1.0), 0.0);
-        // Brewster's angle of glass: only r_s is left, ((1 - 2.25) / (1 + 2.25))².
+        // Brewster's angle of glass: only r_s remains, ((1 - 2.25) / (1 + 2.25))².
         let brewster = 1.0 / (1.0f32 + 2.25).sqrt();
         assert!((dielectric(brewster, 1.5) - 0.5 * (1.25f32 / 3.25).powi(2)).abs() < 1e-6);
         // From inside beyond the critical angle, sin θ = 1/1.5.

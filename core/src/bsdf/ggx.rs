@@ -1,15 +1,15 @@
-//! The GGX microfacet distribution (Trowbridge and Reitz 1975; Walter et al. 2007): density, Smith's
-//! masking and shadowing, and normals sampled as the viewer sees them.
+//! GGX microfacet distribution (Trowbridge and Reitz 1975; Walter et al. 2007): density, Smith's masking and
+//! shadowing, and sampling of visible normals.
 //!
-//! Half-vectors come unnormalised and D is written in their squared coordinates: the tangent of a lobe of
-//! alpha 1e-4 is lost in 1 - z², not in x² + y².
+//! Half-vectors are not normalised, and D is written in their squared coordinates: 1 - z² loses the tangent
+//! of a lobe of alpha 1e-4, x² + y² keeps it.
 
 use super::sqrt;
 use crate::sampling::sin_cos_turns;
 use core::f32::consts::FRAC_1_PI;
 use glam::Vec3;
 
-/// The distribution of microfacet normals of roughness `alpha`.
+/// Distribution of microfacet normals of roughness `alpha`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ggx {
     alpha2: f32,
@@ -22,7 +22,7 @@ impl Ggx {
         Self { alpha2: alpha * alpha }
     }
 
-    /// D(m), per solid angle, of the normal along `m` of any length (Walter 2007, eq. 33).
+    /// D(m) per solid angle at the normal along `m`, of any length (Walter 2007, eq. 33).
     #[inline]
     pub fn density(&self, m: Vec3) -> f32 {
         let (xy2, z2) = (m.x * m.x + m.y * m.y, m.z * m.z);
@@ -31,64 +31,64 @@ impl Ggx {
         self.alpha2 * FRAC_1_PI * q * q
     }
 
-    /// sqrt(α² sin²θ + cos²θ): length of the stretched direction. Smith's Λ = (this / |cos θ| - 1) / 2.
+    /// sqrt(α² sin²θ + cos²θ): length of the stretched direction. Smith's Λ = (length / |cos θ| - 1) / 2.
     #[inline]
     fn stretch(&self, v: Vec3) -> f32 {
         sqrt(self.alpha2 * (v.x * v.x + v.y * v.y) + v.z * v.z)
     }
 
-    /// Smith's masking G1 = 1 / (1 + Λ) of one direction on either side (Walter 2007, eq. 34).
+    /// Smith's masking G1 = 1 / (1 + Λ) of a direction on either side (Walter 2007, eq. 34).
     #[inline]
     pub fn masking(&self, v: Vec3) -> f32 {
         let c = v.z.abs();
         2.0 * c / (c + self.stretch(v))
     }
 
-    /// G / (4 cos θ_o cos θ_i) of a reflection, masking and shadowing independent (Walter 2007, eq. 23), as
-    /// in the renderers that published scenes were made for. Correlating them by height (Heitz 2014, eq. 99)
+    /// G / (4 cos θ_o cos θ_i) of a reflection, with independent masking and shadowing (Walter 2007, eq. 23),
+    /// as in the renderers for which published scenes were made. Height correlation (Heitz 2014, eq. 99)
     /// would return a little more at grazing angles.
     #[inline]
     pub fn visibility(&self, wo: Vec3, wi: Vec3) -> f32 {
         1.0 / ((wo.z + self.stretch(wo)) * (wi.z + self.stretch(wi)))
     }
 
-    /// A normal of density D(m) G1(wo) (wo·m)⁺ / cos θ_o: visible normals by spherical caps
-    /// (Dupuy and Benyoub 2023, listing 3).
+    /// Samples a normal with density D(m) G1(wo) (wo·m)⁺ / cos θ_o: visible normals by spherical caps (Dupuy
+    /// and Benyoub 2023, listing 3).
     #[inline]
     pub fn sample_visible(&self, wo: Vec3, u: [f32; 2]) -> Vec3 {
         self.sample_cap(wo, u, 1.0).normalize()
     }
 
-    /// The density of [`Ggx::sample_visible`]; `m` of any length, `c` = wo·m / |m|.
+    /// Density of [`Ggx::sample_visible`]; `m` of any length, `c` = wo·m / |m|.
     #[inline]
     pub fn visible_density(&self, wo: Vec3, m: Vec3, c: f32) -> f32 {
         2.0 * self.density(m) * c.max(0.0) / (wo.z + self.stretch(wo))
     }
 
-    /// The reflection of `wo` at a visible normal, chosen among those that reflect above the horizon as far
-    /// as a cap can tell (Eto and Tokuyoshi 2023, listing 1). May still point below.
+    /// Samples the reflection of `wo` at a visible normal, from a cap without most normals that reflect below
+    /// the horizon (Eto and Tokuyoshi 2023, listing 1). The direction may still point below.
     #[inline]
     pub fn sample_reflection(&self, wo: Vec3, u: [f32; 2]) -> Vec3 {
         let m = self.sample_cap(wo, u, self.cap_bound(wo));
-        // Reflected at m of any length: one division in place of a root and a division.
+        // Reflection at m of any length: one division in place of a root and a division.
         (2.0 * wo.dot(m) / m.length_squared()) * m - wo
     }
 
-    /// The density of [`Ggx::sample_reflection`] in solid angle of `wi`; `h` = wo + wi (eq. 8).
+    /// Density of [`Ggx::sample_reflection`] in solid angle of `wi`; `h` = wo + wi (eq. 8).
     #[inline]
     pub fn reflection_density(&self, wo: Vec3, h: Vec3) -> f32 {
         0.5 * self.density(h) / (self.cap_bound(wo) * wo.z + self.stretch(wo))
     }
 
-    /// G |cos θ_i| D / (4 cos θ_o cos θ_i) over the density of [`Ggx::sample_reflection`]: D cancels, what is
-    /// left lies in 0 … 1.
+    /// G |cos θ_i| D / (4 cos θ_o cos θ_i) over the density of [`Ggx::sample_reflection`]. D cancels, and the
+    /// result is in 0 … 1.
     #[inline]
     pub fn reflection_weight(&self, wo: Vec3, wi: Vec3) -> f32 {
         let stretch = self.stretch(wo);
         self.masking(wi) * (self.cap_bound(wo) * wo.z + stretch) / (wo.z + stretch)
     }
 
-    /// k of Eto and Tokuyoshi (2023, eq. 5): by how much the cap's lower bound rises.
+    /// k of Eto and Tokuyoshi (2023, eq. 5): factor on the lower bound of the cap.
     #[inline]
     fn cap_bound(&self, wo: Vec3) -> f32 {
         let s = 1.0 + sqrt(wo.x * wo.x + wo.y * wo.y);
@@ -96,8 +96,8 @@ impl Ggx {
         (1.0 - self.alpha2) * s2 / (s2 + self.alpha2 * wo.z * wo.z)
     }
 
-    /// A normal, not normalised: a point of the cap z > -k z_o of the unit sphere in stretched space, plus
-    /// the stretched viewer.
+    /// Samples a normal, not normalised: a point of the cap z > -k z_o of the unit sphere in stretched space,
+    /// plus the stretched viewer.
     #[inline]
     fn sample_cap(&self, wo: Vec3, u: [f32; 2], k: f32) -> Vec3 {
         let alpha = sqrt(self.alpha2);

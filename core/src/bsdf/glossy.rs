@@ -1,9 +1,10 @@
-//! What MTL's Kd + Ks and Pm mean: a coat of Schlick's reflectance over a diffuse base, fading to metal.
+//! Coat with Schlick's reflectance over a diffuse base, blended with metal: the meaning of MTL's Kd + Ks and
+//! Pm.
 //!
-//! With E the directional albedo of the coat and Ē its mean, T = 1 - E and base = colour / (1 - Ē): the base
-//! returns colour · (1 - E(θ_o)), so coat and base together return at most E + (1 - E) = 1 for every colour
-//! up to white (Kelemen and Szirmay-Kalos 2001, eq. 5; Kulla and Conty 2017). The mix with metal is a
-//! weighted mean of two such surfaces.
+//! With E the directional albedo of the coat and Ē its mean, T = 1 - E and base = colour / (1 - Ē). The base
+//! returns colour · (1 - E(θ_o)), so that coat and base together return at most E + (1 - E) = 1 for every
+//! colour up to white (Kelemen and Szirmay-Kalos 2001, eq. 5; Kulla and Conty 2017). The blend with metal is
+//! a weighted mean of two such surfaces.
 
 use super::Cover;
 use super::albedo::SchlickAlbedo;
@@ -11,21 +12,21 @@ use super::coated::Coat;
 use super::{fresnel, range::unit};
 use crate::Rgb;
 
-/// A coat over a base, mixed with metal. See the module.
+/// Coat over a base, blended with metal. See the module.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Glossy {
-    /// Colour of the base, over the mean transmittance of the coat, times 1 - metallic.
+    /// Colour of the base over the mean transmittance of the coat, times 1 - metallic.
     base: Rgb,
     /// Reflectance of the coat at normal incidence.
     specular: Rgb,
-    /// Of coat and metal mixed: Schlick's formula is linear in it.
+    /// Reflectance at normal incidence of the blend of coat and metal. Schlick's formula is linear in it.
     f0: Rgb,
     /// GGX alpha; 0 is smooth.
     alpha: f32,
 }
 
-/// Less than this passes the coat at grazing angles only: what the base would add there is noise, and is
-/// lost.
+/// Least mean transmittance. A smaller one passes the coat at grazing angles only, where the base would add
+/// noise; that energy is lost.
 const LEAST_MEAN: f32 = 0.02;
 
 impl Glossy {

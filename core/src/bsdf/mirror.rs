@@ -1,10 +1,10 @@
-//! The perfect mirror.
+//! Perfect mirror.
 
 use super::BsdfSample;
 use crate::Rgb;
 use glam::Vec3;
 
-/// Reflects into one direction, with the same colour from every angle.
+/// Reflects into one direction, with the same reflectance at every angle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Mirror {
     /// Reflectance, 0 … 1.

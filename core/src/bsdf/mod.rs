@@ -1,9 +1,9 @@
-//! How light scatters at a point: one file per kind behind the closed enum [`Bsdf`].
+//! BSDF at a point: one file per model behind the closed enum [`Bsdf`].
 //!
-//! Directions are local: z is the shading normal on the side of the viewer, `wo` looks to the viewer and
-//! `wi` to where the light comes from; both point away from the surface. What is transmitted is radiance,
-//! so it carries the factor (n_o/n_i)² (Veach 1997, §5.2); [`BsdfSample::eta`] takes it back where
-//! something else, a photon's power, is carried.
+//! Directions are local and point away from the surface: z is the shading normal on the side of the viewer,
+//! `wo` points to the viewer and `wi` to the origin of the light. Transmission is that of radiance and
+//! includes the factor (n_o/n_i)² (Veach 1997, §5.2). [`BsdfSample::eta`] removes the factor for other
+//! quantities, such as the power of photons.
 
 #![allow(clippy::neg_cmp_op_on_partial_ord, reason = "!(x > 0) is meant: it catches NaN as well")]
 
@@ -36,16 +36,16 @@ pub use rough_dielectric::RoughDielectric;
 use crate::Rgb;
 use glam::Vec3;
 
-/// A material at a hit point: textures looked up, indices turned to the side of the viewer.
+/// Material at a hit: textures looked up, indices of refraction relative to the side of the viewer.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Bsdf {
-    /// Lambert.
+    /// Lambertian.
     Diffuse(Diffuse),
     /// Perfect mirror.
     Mirror(Mirror),
     /// Metal, smooth or rough.
     Conductor(Conductor),
-    /// Coat over a base by Schlick's formula.
+    /// Coat with Schlick's reflectance over a base.
     Glossy(Glossy),
     /// Dielectric coat over a base.
     Plastic(Plastic),
@@ -55,20 +55,20 @@ pub enum Bsdf {
     RoughDielectric(RoughDielectric),
 }
 
-/// A direction that [`Bsdf::sample`] chose.
+/// Sample of [`Bsdf::sample`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BsdfSample {
     /// Unit direction, local.
     pub direction: Vec3,
-    /// f |cos| / pdf, the factor on the path's throughput.
+    /// f |cos| / pdf, a factor of the path's throughput.
     pub weight: Rgb,
-    /// Density in solid angle, of all lobes together; the probability of the choice where `delta`.
+    /// Density in solid angle over all lobes; the probability of the choice if `delta`.
     pub pdf: f32,
-    /// The direction was the only one possible: no other technique can find it.
+    /// True for a delta lobe, which no other technique can find.
     pub delta: bool,
-    /// The direction leads to the other side of the surface.
+    /// True if the direction leads to the other side of the surface.
     pub transmitted: bool,
-    /// Index of refraction on the side of `direction` over that of the viewer; 1 where reflected.
+    /// Index of refraction on the side of `direction` over that of the viewer; 1 for reflection.
     pub eta: f32,
 }
 
@@ -85,19 +85,19 @@ impl BsdfSample {
     }
 }
 
-/// A material as it is seen from somewhere: what is the same for all light is worked out.
+/// BSDF for a fixed viewer, with everything precomputed that does not depend on the light.
 #[derive(Clone, Copy)]
 pub(crate) struct Seen<'b> {
     bsdf: &'b Bsdf,
     wo: Vec3,
     /// T(θ_o) of a coat.
     transmittance: Rgb,
-    /// By its base alone.
+    /// True to leave out the coat.
     base_alone: bool,
 }
 
 impl Seen<'_> {
-    /// What [`Bsdf::evaluate`] has as f(wo, wi) |cos θ_i|, to the bit.
+    /// f(wo, wi) |cos θ_i|, equal to [`Bsdf::evaluate`] to the bit.
     #[inline]
     pub(crate) fn value<F: Features>(&self, wi: Vec3) -> Rgb {
         let Self { bsdf, wo, transmittance, base_alone } = *self;
@@ -113,8 +113,8 @@ impl Seen<'_> {
 }
 
 impl Bsdf {
-    /// Chooses where the light that leaves to `wo` (`wo.z` > 0) came from; `u` in [0, 1), `u[2]` picks the
-    /// lobe. `None`: absorbed.
+    /// Samples the direction from which light that leaves towards `wo` (`wo.z` > 0) came; `u` in [0, 1),
+    /// `u[2]` chooses the lobe. `None`: absorbed.
     #[inline]
     pub fn sample<F: Features>(&self, wo: Vec3, u: [f32; 3]) -> Option<BsdfSample> {
         let wo = above_horizon(wo);
@@ -130,8 +130,7 @@ impl Bsdf {
         }
     }
 
-    /// f(wo, wi) |cos θ_i| and the density with which [`Bsdf::sample`] chooses `wi`. Zeros for directions
-    /// that only a delta lobe connects.
+    /// f(wo, wi) |cos θ_i|, and the density of [`Bsdf::sample`] at `wi`. Zeros for delta lobes.
     #[inline]
     pub fn evaluate<F: Features>(&self, wo: Vec3, wi: Vec3) -> (Rgb, f32) {
         let wo = above_horizon(wo);
@@ -145,7 +144,7 @@ impl Bsdf {
         }
     }
 
-    /// As it is seen from `wo`, by light from many directions.
+    /// BSDF for the viewer at `wo`, for light from many directions.
     #[inline]
     pub(crate) fn seen<F: Features>(&self, wo: Vec3) -> Seen<'_> {
         let wo = above_horizon(wo);
@@ -157,14 +156,14 @@ impl Bsdf {
         Seen { bsdf: self, wo, transmittance, base_alone: false }
     }
 
-    /// The same without the coat, if `base_alone`.
+    /// [`Bsdf::seen`] without the coat if `base_alone`.
     #[inline]
     pub(crate) fn seen_apart<F: Features>(&self, wo: Vec3, base_alone: bool) -> Seen<'_> {
         Seen { base_alone, ..self.seen::<F>(wo) }
     }
 
-    /// As [`Bsdf::sample`] of a surface with a rough coat, by its base or its coat alone: weight and density
-    /// are of that one, with the probability of its choice. Whether it was the coat.
+    /// [`Bsdf::sample`] of the base or the rough coat alone. Weight and density are those of the chosen lobe,
+    /// including the probability of the choice. The flag is true for the coat.
     #[inline]
     pub(crate) fn sample_apart<F: Features>(&self, wo: Vec3, u: [f32; 3]) -> Option<(BsdfSample, bool)> {
         let wo = above_horizon(wo);
@@ -175,7 +174,7 @@ impl Bsdf {
         }
     }
 
-    /// As [`Bsdf::evaluate`] of a surface with a rough coat: of its base, and of its coat.
+    /// [`Bsdf::evaluate`] of the base and of the rough coat, each alone.
     #[inline]
     pub(crate) fn evaluate_apart<F: Features>(&self, wo: Vec3, wi: Vec3) -> [(Rgb, f32); 2] {
         let wo = above_horizon(wo);
@@ -186,7 +185,7 @@ impl Bsdf {
         }
     }
 
-    /// Whether it has a coat, rough or smooth, whose peak outshines a diffuse surface.
+    /// True for a coat, rough or smooth, whose peak is brighter than a quarter of a white diffuse surface.
     #[inline]
     pub(crate) fn has_narrow_coat(&self) -> bool {
         match self {
@@ -196,7 +195,7 @@ impl Bsdf {
         }
     }
 
-    /// Whether it has a coat that is not smooth.
+    /// True for a coat that is not smooth.
     #[inline]
     pub(crate) fn has_rough_coat(&self) -> bool {
         match self {
@@ -206,7 +205,7 @@ impl Bsdf {
         }
     }
 
-    /// Whether every lobe is a delta lobe: to connect it to a light is in vain.
+    /// True if every lobe is a delta lobe: light samples contribute nothing.
     #[inline]
     pub fn is_delta(&self) -> bool {
         match self {
@@ -218,7 +217,7 @@ impl Bsdf {
         }
     }
 
-    /// The colour of what is scattered evenly; black where all is glossy.
+    /// Albedo of the diffuse component; black without one.
     #[inline]
     pub(crate) fn base(&self) -> Rgb {
         match self {
@@ -229,24 +228,25 @@ impl Bsdf {
         }
     }
 
-    /// Whether light passes to the other side.
+    /// True if light passes to the other side.
     #[inline]
     pub fn transmits(&self) -> bool {
         matches!(self, Bsdf::Dielectric(_) | Bsdf::RoughDielectric(_))
     }
 }
 
-// A hit carries one through the shading stages: keep it within a cache line.
+// Every hit carries a BSDF through the shading stages: it must fit into a cache line.
 const _: () = assert!(size_of::<Bsdf>() <= 64);
 
-/// `wo` no nearer to the horizon than directions in f32 are known: the squares of half-vectors stay normal.
+/// `wo` raised above the horizon by the resolution of f32 directions, so that squares of half-vectors are
+/// normal floats.
 #[inline]
 fn above_horizon(wo: Vec3) -> Vec3 {
     const RESOLUTION: f32 = 1e-7;
     Vec3::new(wo.x, wo.y, wo.z.max(RESOLUTION))
 }
 
-/// Square root, correctly rounded: one instruction where the processor has one.
+/// Correctly rounded square root: one instruction if the processor has it.
 #[inline]
 fn sqrt(x: f32) -> f32 {
     libm::sqrtf(x)

@@ -1,11 +1,11 @@
-//! A dielectric coat over a diffuse base: plastic, varnish, glazed tiles. Light that the base sends back is
-//! reflected inside the coat, meets the base again, and so on; the series has the sum
+//! Dielectric coat over a diffuse base: plastic, varnish, glazed tiles. Light from the base is reflected
+//! inside the coat and returns to the base repeatedly; the sum of the series is
 //!
 //! base = colour / (1 - colour · R_i) / η²
 //!
 //! with R_i the mean internal reflectance: 1 - R_i = (1 - R_e) / η² by reciprocity. (The model of Mitsuba's
-//! `plastic` and `roughplastic` with `nonlinear` set.) Smooth, a white base returns exactly the T(θ_o)
-//! that reached it; rough, less, as every model of one bounce between microfacets does.
+//! `plastic` and `roughplastic` with `nonlinear` set.) If smooth, a white base returns exactly the T(θ_o)
+//! that reached it. If rough, it returns less, as in every model of one bounce between microfacets.
 
 use super::Cover;
 use super::albedo::{self, SchlickAlbedo};
@@ -14,7 +14,7 @@ use super::fresnel;
 use super::range::{GREATEST_INDEX, unit};
 use crate::Rgb;
 
-/// A dielectric coat over a diffuse base, mixed with metal. See the module.
+/// Dielectric coat over a diffuse base, blended with metal. See the module.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Plastic {
     /// Factor of the base; includes 1 - metallic.
@@ -28,13 +28,13 @@ pub struct Plastic {
     alpha: f32,
     /// Index of refraction of the coat, at least 1.
     eta: f32,
-    /// Reflectance of the coat at normal incidence by `eta` alone.
+    /// Reflectance of the coat at normal incidence, from `eta` alone.
     f0: f32,
 }
 
 impl Plastic {
-    /// From the base's colour, the coat's reflectance at normal incidence (what it would have by `eta`, times
-    /// a tint), alpha as in [`super::Conductor`], `metallic` 0 … 1, the index of refraction.
+    /// From the colour of the base, the coat's reflectance at normal incidence (that of `eta` times a tint),
+    /// alpha as in [`super::Conductor`], `metallic` 0 … 1, and the index of refraction.
     #[inline]
     pub fn new(color: Rgb, specular: Rgb, alpha: f32, metallic: f32, eta: f32) -> Self {
         let metallic = unit(metallic);
@@ -93,7 +93,7 @@ impl Coat for Plastic {
         if self.alpha == 0.0 {
             return self.reflectance(c);
         }
-        // Schlick's albedo serves for the dielectric coat too.
+        // The albedo tables of Schlick's coat also serve the dielectric coat.
         let of = SchlickAlbedo::directional(c, self.alpha);
         self.mix(of.edge + self.f0 * (of.white - of.edge), of.edge)
     }

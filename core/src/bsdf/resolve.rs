@@ -1,4 +1,4 @@
-//! From a material of the scene to the BSDF of a hit: textures are looked up, numbers brought into range.
+//! BSDF of a hit from a material of the scene: looks up textures and clamps parameters.
 
 use super::range::{GREATEST_INDEX, unit, unit_rgb};
 use super::{Bsdf, Conductor, Dielectric, Diffuse, Features, Glossy, Mirror, Plastic, RoughDielectric};
@@ -7,7 +7,7 @@ use crate::scene::{ColorInput, Material, SMOOTH_ALPHA, ScalarInput, Scene, Surfa
 use glam::Vec2;
 
 impl Bsdf {
-    /// What `material` does with light at texture coordinates `uv`, seen from its front or its back.
+    /// BSDF of `material` at texture coordinates `uv`, seen from its front or its back.
     #[inline]
     pub fn at<F: Features>(scene: &Scene, material: &Material, uv: Vec2, front: bool) -> Bsdf {
         let color = |input: &ColorInput| unit_rgb(input.at::<F>(scene, uv));
@@ -34,13 +34,13 @@ impl Bsdf {
             Surface::Dielectric { ior, tint, roughness } if F::DIELECTRIC => {
                 dielectric(*ior, front, unit_rgb(*tint), alpha(roughness))
             }
-            // A feature that the census did not find: nothing comes back.
+            // A feature that the census has excluded: black.
             _ => Bsdf::Diffuse(Diffuse { reflectance: Rgb::ZERO }),
         }
     }
 }
 
-/// GGX alpha of a roughness; 0 where the lobe is too narrow for its width to matter.
+/// GGX alpha of a roughness; 0 if the lobe is too narrow for its width to matter.
 #[inline]
 fn alpha(roughness: f32) -> f32 {
     let alpha = unit(roughness * roughness);
@@ -52,7 +52,7 @@ fn dielectric(ior: f32, front: bool, tint: Rgb, alpha: f32) -> Bsdf {
     let ior =
         if ior > 0.0 && ior.is_finite() { ior.clamp(1.0 / GREATEST_INDEX, GREATEST_INDEX) } else { 1.0 };
     let eta = if front { ior } else { 1.0 / ior };
-    // A rough boundary scatters what it transmits by alpha (eta - 1) only.
+    // A rough boundary scatters transmitted light only by alpha (eta - 1).
     if alpha * (eta - 1.0).abs() < MIN_SCATTER {
         Bsdf::Dielectric(Dielectric { eta, tint })
     } else {
@@ -60,6 +60,6 @@ fn dielectric(ior: f32, front: bool, tint: Rgb, alpha: f32) -> Bsdf {
     }
 }
 
-/// The narrowest lobe of transmitted light that still counts as rough: its half-vector is a difference
-/// whose error, 1e-7, must be small against it.
+/// Narrowest lobe of transmitted light that counts as rough. Its half-vector is a difference whose error,
+/// 1e-7, must be small against the width.
 const MIN_SCATTER: f32 = 1e-5;

@@ -1,4 +1,4 @@
-//! The rough boundary between two media: GGX microfacets, each a smooth dielectric (Walter et al. 2007).
+//! Rough dielectric boundary: GGX microfacets, each a smooth dielectric (Walter et al. 2007).
 
 use super::dielectric::{reflection_probability, refract};
 use super::ggx::Ggx;
@@ -6,18 +6,18 @@ use super::{BsdfSample, fresnel};
 use crate::Rgb;
 use glam::Vec3;
 
-/// Frosted glass, seen from one of its sides. Masking and shadowing are independent.
+/// Rough glass, seen from one side. Masking and shadowing are independent.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RoughDielectric {
-    /// Index of refraction beyond the surface over that on the side of the viewer; not 1.
+    /// Index of refraction on the far side over that on the viewer's side; not 1.
     pub eta: f32,
     /// GGX alpha.
     pub alpha: f32,
-    /// Factor on what is transmitted, 0 … 1.
+    /// Factor on the transmitted light, 0 … 1.
     pub tint: Rgb,
 }
 
-/// Bound of the rounding in a sum of two unit vectors.
+/// Bound of the rounding error in a sum of two unit vectors.
 const ROUNDING: f32 = 4.0 * f32::EPSILON;
 
 impl RoughDielectric {
@@ -68,8 +68,8 @@ impl RoughDielectric {
             let lobe = ggx.density(h) * ggx.visibility(wo, wi) * wi.z;
             return (Rgb::splat(reflectance * lobe), p * ggx.visible_density(wo, h, c) / (4.0 * c));
         }
-        // The normal that refracts wo to wi (Walter 2007, eq. 16) points to where the index is lower; turned
-        // to the viewer. One in the surface may seem to be below it.
+        // The normal that refracts wo to wi (Walter 2007, eq. 16) points to the side of the lower index; here
+        // it is turned to the viewer. By rounding, a normal in the surface may seem to be below it.
         let h = (wo + self.eta * wi) * 1f32.copysign(1.0 - self.eta);
         if h.z < -ROUNDING {
             return (Rgb::ZERO, 0.0);
@@ -83,7 +83,7 @@ impl RoughDielectric {
         let reflectance = fresnel::between(c, self.eta * c_i, self.eta);
         let p = reflection_probability(reflectance, self.tint);
         let density = ggx.visible_density(wo, h, c) * self.refraction_jacobian(c, c_i);
-        // Walter 2007, eq. 21, over eta²: radiance.
+        // Walter 2007, eq. 21, over eta² for radiance.
         let transmitted = (1.0 - reflectance) * ggx.masking(wi) * density / (self.eta * self.eta);
         (self.tint * transmitted, (1.0 - p) * density)
     }
@@ -91,7 +91,7 @@ impl RoughDielectric {
     /// Solid angle of normals per solid angle of refracted directions (Walter 2007, eq. 17).
     #[inline]
     fn refraction_jacobian(&self, c: f32, c_i: f32) -> f32 {
-        // η c_i - c without its cancellation where η is near 1: (η c_i)² - c² = η² - 1.
+        // η c_i - c without cancellation for η near 1: (η c_i)² - c² = η² - 1.
         let sum = (self.eta - 1.0) * (self.eta + 1.0) / (self.eta * c_i + c);
         self.eta * self.eta * c_i / (sum * sum)
     }

@@ -1,13 +1,13 @@
-//! The count: one walk over the triangles, nothing allocated.
+//! Census of a scene, counted in one loop over the triangles without allocation.
 
 use crate::geometry::Bounds;
 use crate::scene::{ColorInput, Material, PointLight, ScalarInput, Scene, Surface};
 use glam::Vec3;
 
-/// How many of each kind of surface.
+/// Number of triangles of each kind of surface.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Kinds {
-    /// Lambert.
+    /// Lambertian.
     pub diffuse: u64,
     /// Perfect mirrors.
     pub mirror: u64,
@@ -21,40 +21,40 @@ pub struct Kinds {
     pub rough_dielectric: u64,
 }
 
-/// What lights from infinitely far.
+/// Kind of light from infinity.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum EnvironmentKind {
     /// Nothing.
     #[default]
     None,
-    /// The same radiance from everywhere.
+    /// The same radiance from all directions.
     Constant,
     /// A map.
     Map,
 }
 
-/// What the triangles, materials and lights of a scene are. Materials count where a triangle has them.
+/// Counts of the triangles, materials and lights of a scene.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Census {
     /// All triangles.
     pub triangles: u64,
-    /// Triangles without area: never hit.
+    /// Triangles without area, which are never hit.
     pub degenerate: u64,
     /// Materials of the scene, used or not.
     pub materials: u64,
     /// Triangles by kind of surface.
     pub surfaces: Kinds,
-    /// Triangles whose material looks into a texture.
+    /// Triangles whose material uses a texture.
     pub textured: u64,
     /// Triangles with a normal or bump map.
     pub normal_mapped: u64,
-    /// Triangles with holes or translucency by opacity.
+    /// Triangles with an opacity below one.
     pub cutout: u64,
-    /// Triangles that reflect or refract into one direction only: what caustics come from.
+    /// Triangles of perfectly specular materials, which cast caustics.
     pub specular: u64,
     /// Triangles that emit.
     pub emissive: u64,
-    /// Of those, triangles that emit to one side where nothing is.
+    /// Emissive triangles with nothing on the side to which they emit.
     pub emitters_facing_nothing: u64,
     /// Point lights.
     pub point_lights: u64,
@@ -62,16 +62,16 @@ pub struct Census {
     pub spot_lights: u64,
     /// Directional lights.
     pub directional_lights: u64,
-    /// Light from infinitely far.
+    /// Light from infinity.
     pub environment: EnvironmentKind,
     /// Textures of the scene, used or not.
     pub textures: u64,
-    /// Whether the camera has a lens.
+    /// True if the camera has a lens.
     pub thin_lens: bool,
 }
 
 impl Census {
-    /// Counts.
+    /// Census of `scene`.
     pub fn of(scene: &Scene) -> Census {
         let mut census = Census {
             triangles: scene.mesh.triangles.len() as u64,
@@ -133,7 +133,7 @@ impl Census {
         self.specular += u64::from(specular);
         if material.emits() {
             self.emissive += 1;
-            // The farthest that anything reaches into the half-space that the triangle shines into.
+            // Farthest corner of the scene's bounds in the half-space into which the triangle emits.
             let farthest = Vec3::select(normal.cmpgt(Vec3::ZERO), bounds.max, bounds.min);
             let sees = |p: Vec3| normal.dot(p - a) > FLAT * normal.length() * bounds.diagonal();
             let lonely = !material.two_sided && !sees(farthest) && !sees(eye);
@@ -141,14 +141,14 @@ impl Census {
         }
     }
 
-    /// Lights of any kind that the picture can get its light from.
+    /// True if the scene has lights of any kind.
     pub fn has_light(&self) -> bool {
         self.emissive + self.point_lights + self.spot_lights + self.directional_lights > 0
             || self.environment != EnvironmentKind::None
     }
 }
 
-/// Height over a plane, in sizes of the scene, that counts as lying in it.
+/// Height above a plane, in diagonals of the scene, within which a point counts as on the plane.
 const FLAT: f32 = 1e-5;
 
 fn has_texture(material: &Material) -> bool {

@@ -1,4 +1,4 @@
-//! What a scene holds, counted once, and the plan that follows from it: which code, which structures.
+//! Census: counts of what a scene contains, and the plan that chooses the code for it.
 
 mod count;
 mod plan;

@@ -1,34 +1,35 @@
-//! The plan: the smallest build of the method that holds all the scene has, and what it leaves out.
+//! Render plan: the smallest build of the method with all features of the scene, and the features that it
+//! leaves out.
 
 use super::{Census, EnvironmentKind};
 use crate::bsdf::{All, DiffuseOnly, DiffuseTextured, Features, Opaque, OpaquePlain, Plain};
 
-/// The builds of a method, smallest first.
+/// Builds of a method, smallest first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FeatureSet {
-    /// Diffuse surfaces of one colour each.
+    /// Diffuse surfaces of uniform colour.
     DiffuseOnly,
     /// Diffuse surfaces with textures.
     DiffuseTextured,
-    /// All that reflects, of one colour each.
+    /// Opaque surfaces of uniform colour.
     OpaquePlain,
-    /// All that reflects, with every kind of texture.
+    /// Opaque surfaces with every kind of texture.
     Opaque,
-    /// Every surface, no texture of any kind.
+    /// All surfaces, without textures.
     Plain,
     /// Everything.
     All,
 }
 
-/// Work that is compiled once for each [`FeatureSet`].
+/// Generic work, compiled once for each [`FeatureSet`].
 pub trait WithFeatures {
-    /// What it returns.
+    /// Result of the work.
     type Out;
-    /// The work.
+    /// Runs the work.
     fn run<F: Features>(self) -> Self::Out;
 }
 
-/// What a build can do: the constants of its [`Features`].
+/// Constants of [`Features`] as values.
 #[derive(Clone, Copy)]
 struct Able {
     textures: bool,
@@ -76,7 +77,7 @@ impl FeatureSet {
         }
     }
 
-    /// Its name in reports.
+    /// Name in reports.
     pub const fn name(self) -> &'static str {
         match self {
             FeatureSet::DiffuseOnly => "diffuse",
@@ -89,18 +90,18 @@ impl FeatureSet {
     }
 }
 
-/// How a scene is going to be rendered.
+/// Choice of method and build for a scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Plan {
     /// Name of the method.
     pub method: &'static str,
-    /// Which build of it.
+    /// Build of the method.
     pub features: FeatureSet,
     left_out: [Option<(&'static str, &'static str)>; 8],
 }
 
 impl Census {
-    /// What to render with, and what that can do without.
+    /// Plan for the scene of this census.
     pub fn plan(&self) -> Plan {
         Plan::new(self)
     }
@@ -135,7 +136,7 @@ impl Plan {
         Plan { method: "path", features, left_out }
     }
 
-    /// What is left out and why.
+    /// Features left out, each with its reason.
     pub fn left_out(&self) -> impl Iterator<Item = (&'static str, &'static str)> + '_ {
         self.left_out.iter().copied().flatten()
     }

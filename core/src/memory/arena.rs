@@ -1,23 +1,23 @@
-//! A bump allocator over bytes that the caller owns. It hands out typed slices and never frees:
-//! whoever owns the bytes decides how long everything in them lives.
+//! Arena (bump allocator) over bytes of the caller. It hands out typed slices and never frees: the owner of
+//! the bytes decides how long their contents live.
 
 use bytemuck::{AnyBitPattern, NoUninit, Pod, Zeroable};
 use core::fmt;
 
-/// Every slice starts at a multiple of this many bytes: a cache line, and an AVX-512 register.
+/// Alignment in bytes of every slice: a cache line, and an AVX-512 register.
 pub const ALIGNMENT: usize = 64;
 
-/// One aligned cache line. A `static` array or a `Vec` of lines is memory that an [`Arena`] uses whole.
+/// One aligned cache line. An [`Arena`] wastes no byte of an array or `Vec` of lines.
 #[derive(Clone, Copy, Pod, Zeroable)]
 #[repr(C, align(64))]
 pub struct Line(pub [u8; ALIGNMENT]);
 
-/// The arena is too small: how many bytes were asked for, and how many were left.
+/// Error of an arena that is too small.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct OutOfMemory {
-    /// Bytes that the structure needs, its padding included. `usize::MAX` where it cannot be counted.
+    /// Bytes that the structure needs, including padding; `usize::MAX` if the number overflows.
     pub needed: usize,
-    /// Bytes that were left in the arena.
+    /// Bytes left in the arena.
     pub available: usize,
 }
 
@@ -29,7 +29,7 @@ impl fmt::Display for OutOfMemory {
 
 impl core::error::Error for OutOfMemory {}
 
-/// A bump allocator over borrowed bytes.
+/// Arena (bump allocator) over borrowed bytes.
 ///
 /// ```
 /// use halflight_core::memory::{Arena, Line};
@@ -44,8 +44,8 @@ pub struct Arena<'m> {
 }
 
 impl<'m> Arena<'m> {
-    /// An arena over `bytes`. Bytes before the first multiple of [`ALIGNMENT`] stay unused, so that a
-    /// [`Footprint`](super::Footprint) holds exactly for memory made of [`Line`]s.
+    /// Arena over `bytes`. Bytes before the first multiple of [`ALIGNMENT`] stay unused. A
+    /// [`Footprint`](super::Footprint) is therefore exact for memory made of [`Line`]s.
     pub fn new(bytes: &'m mut [u8]) -> Self {
         let skip = bytes.as_ptr().align_offset(ALIGNMENT).min(bytes.len());
         Self { rest: &mut bytes[skip..] }
@@ -56,8 +56,8 @@ impl<'m> Arena<'m> {
         self.rest.len()
     }
 
-    /// A slice of `count` values, zero or left over from an earlier use of the bytes: the caller
-    /// overwrites it. Takes `size_of::<T>() * count` bytes rounded up to [`ALIGNMENT`].
+    /// Slice of `count` values, zero or left over from an earlier use of the bytes, for the caller to
+    /// overwrite. Takes `size_of::<T>() * count` bytes rounded up to [`ALIGNMENT`].
     ///
     /// # Errors
     /// [`OutOfMemory`] when that is more than is left; the arena is unchanged.
@@ -75,14 +75,14 @@ impl<'m> Arena<'m> {
         bytemuck::try_cast_slice_mut(&mut taken[..count * size_of::<T>()]).map_err(|_| failed(padded))
     }
 
-    /// Lends the unused bytes as a second arena: what is built there is gone when the loan ends.
-    /// For working memory that is needed during a build and not after it.
+    /// Lends the unused bytes as a second arena, for working memory of a build. Its contents are lost when
+    /// the loan ends.
     pub fn scratch(&mut self) -> Arena<'_> {
         Arena { rest: self.rest }
     }
 }
 
-/// Bytes of `count` values of `T`, rounded up to [`ALIGNMENT`]; `None` where they cannot be counted.
+/// Bytes of `count` values of `T`, rounded up to [`ALIGNMENT`]; `None` on overflow.
 pub(super) const fn padded_bytes<T>(count: usize) -> Option<usize> {
     match count.checked_mul(size_of::<T>()) {
         Some(bytes) => bytes.checked_next_multiple_of(ALIGNMENT),

@@ -1,4 +1,4 @@
-//! How many bytes a structure takes, counted before it is built, slice by slice as the arena will.
+//! Footprint of a structure in bytes of an arena, computed before it is built, slice by slice.
 
 use super::arena::padded_bytes;
 
@@ -16,7 +16,7 @@ pub struct Footprint {
 }
 
 impl Footprint {
-    /// With a slice of `count` values of `T` more, as [`Arena::slice`](super::Arena::slice) takes it.
+    /// Adds a slice of `count` values of `T`, as [`Arena::slice`](super::Arena::slice) takes it.
     pub const fn slice<T>(self, count: usize) -> Self {
         let more = match padded_bytes::<T>(count) {
             Some(bytes) => bytes,
@@ -25,12 +25,12 @@ impl Footprint {
         Self { bytes: self.bytes.saturating_add(more) }
     }
 
-    /// Both structures, one after the other.
+    /// Sum of two structures that live at the same time.
     pub const fn and(self, other: Footprint) -> Self {
         Self { bytes: self.bytes.saturating_add(other.bytes) }
     }
 
-    /// The larger of the two: for working memory that is used in turn.
+    /// Maximum of two structures, for working memory used in turn.
     pub const fn or(self, other: Footprint) -> Self {
         if self.bytes > other.bytes { self } else { other }
     }

@@ -1,4 +1,4 @@
-//! The caller's memory: an arena over borrowed bytes, and footprints that say beforehand how many.
+//! Memory of the caller: arenas over borrowed bytes, and footprints known before they are filled.
 
 mod arena;
 mod footprint;

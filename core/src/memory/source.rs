@@ -1,23 +1,22 @@
-//! Memory that a method takes from its caller piece by piece, as large as the scene turns out to need.
+//! Memory source of a method: the caller's memory in pieces of sizes that depend on the scene.
 
 use super::{Arena, Footprint, OutOfMemory};
 
 /// A supply of memory that lives as long as the picture. Each piece has a name for reports.
 pub trait MemorySource<'m> {
-    /// Bytes that may still be taken: the limit of structures that can be smaller. `usize::MAX` without a
-    /// limit.
+    /// Bytes that may still be taken, which limit structures of variable size. `usize::MAX` without a limit.
     fn available(&self) -> usize;
 
     /// Memory of `footprint` bytes.
     ///
     /// # Errors
-    /// [`OutOfMemory`] where there is less.
+    /// [`OutOfMemory`] if less is left.
     fn take(&mut self, structure: &'static str, footprint: Footprint) -> Result<Arena<'m>, OutOfMemory>;
 
     /// Runs `work` with memory of `footprint` bytes that is free again afterwards.
     ///
     /// # Errors
-    /// [`OutOfMemory`] where there is less; the errors of `work`.
+    /// [`OutOfMemory`] if less is left; the errors of `work`.
     fn lend<T>(
         &mut self,
         structure: &'static str,
@@ -25,13 +24,13 @@ pub trait MemorySource<'m> {
         work: impl FnOnce(&mut Self, &mut Arena) -> Result<T, OutOfMemory>,
     ) -> Result<T, OutOfMemory>;
 
-    /// Whether `footprint` bytes may still be taken.
+    /// True if `footprint` bytes may still be taken.
     fn has(&self, footprint: Footprint) -> bool {
         footprint.bytes() <= self.available()
     }
 }
 
-/// Pieces of a buffer that are free at the same time.
+/// Largest number of free pieces of a buffer.
 const PIECES: usize = 8;
 
 /// A source over one buffer, such as a `static` of a microcontroller.
@@ -40,14 +39,14 @@ pub struct Buffer<'m> {
 }
 
 impl<'m> Buffer<'m> {
-    /// All of `bytes` are free.
+    /// Buffer whose `bytes` are all free.
     pub fn new(bytes: &'m mut [u8]) -> Self {
         let mut free: [&'m mut [u8]; PIECES] = Default::default();
         free[0] = bytes;
         Self { free }
     }
 
-    /// Cuts `footprint` bytes off the smallest free piece that has them.
+    /// Cuts `footprint` bytes off the smallest free piece that is large enough.
     fn cut(&mut self, footprint: Footprint) -> Result<&'m mut [u8], OutOfMemory> {
         let available = self.available();
         let aligned = |piece: &[u8]| piece.as_ptr().align_offset(super::ALIGNMENT).min(piece.len());
@@ -81,7 +80,7 @@ impl<'m> MemorySource<'m> for Buffer<'m> {
     ) -> Result<T, OutOfMemory> {
         let bytes = self.cut(footprint)?;
         let done = work(self, &mut Arena::new(bytes));
-        // An empty piece takes the bytes back; with none left they stay unused.
+        // An empty piece takes the bytes back. Without one they stay unused.
         if let Some(piece) = self.free.iter_mut().find(|piece| piece.is_empty()) {
             *piece = bytes;
         }

@@ -1,21 +1,21 @@
-//! The integrals behind the tables, in f64 by Gauss-Legendre over the cap of visible normals and midpoints
-//! around it: independent of the code that renders.
+//! Integrals of the albedo tables, in f64: Gauss-Legendre quadrature over the cap of visible normals and
+//! midpoints around it, independent of the code that renders.
 
 use super::*;
 use std::prelude::v1::*;
 use std::{format, println};
 
-/// Nodes over the height of the cap, and over half a turn around it (the integrands are symmetric).
+/// Nodes over the height of the cap, and over half a turn around it, because the integrands are symmetric.
 const HEIGHTS: usize = 96;
 const TURNS: usize = 48;
-/// One unit for rounding, one for the quadrature at grazing angles and at the edge of total reflection.
+/// One unit for rounding, one for the quadrature at grazing angles and at the onset of total reflection.
 const TOLERANCE: i16 = 2;
-/// No table has a node at grazing incidence itself: the same offset as Mitsuba's.
+/// Least cosine of a node, as in Mitsuba: no table has a node at exactly grazing incidence.
 const GRAZING: f64 = 1e-6;
 
 type Row = [i16; COSINES];
 
-/// Everything in `data.rs`.
+/// All tables of `data.rs`.
 struct Tables {
     white: [Row; ROUGHNESSES],
     edge: [Row; ROUGHNESSES],
@@ -73,7 +73,7 @@ fn smooth(c: f64, eta: f64) -> f64 {
     1.0 - fresnel(c.max(GRAZING), eta)
 }
 
-/// The exact reflectance of a dielectric boundary, from Snell's law.
+/// Exact Fresnel reflectance of a dielectric boundary, by Snell's law.
 fn fresnel(c: f64, eta: f64) -> f64 {
     let sin2_t = (1.0 - c * c) / (eta * eta);
     if sin2_t >= 1.0 {
@@ -95,7 +95,7 @@ fn shadowing(c: f64, alpha: f64) -> f64 {
     1.0 / (1.0 + lambda(c, alpha))
 }
 
-/// Mean of `f(viewer, normal)` over the normals that are visible from the cosine `c`.
+/// Mean of `f(viewer, normal)` over the normals visible from the cosine `c`.
 fn over_visible_normals(nodes: &Nodes, c: f64, alpha: f64, f: &dyn Fn([f64; 3], [f64; 3]) -> f64) -> f64 {
     let c = c.max(GRAZING);
     let wo = [(1.0 - c * c).max(0.0).sqrt(), 0.0, c];
@@ -119,7 +119,7 @@ fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
-/// Directional albedo of microfacets of Fresnel term `f`.
+/// Directional albedo of microfacets with Fresnel term `f`.
 fn reflectance(nodes: &Nodes, c: f64, alpha: f64, f: &dyn Fn(f64) -> f64) -> f64 {
     over_visible_normals(nodes, c, alpha, &|wo, m| {
         let c = dot(wo, m);
@@ -137,7 +137,7 @@ fn transmittance(nodes: &Nodes, c: f64, alpha: f64, eta: f64) -> f64 {
     })
 }
 
-/// Mean internal reflectance, averaged as Mitsuba 3 does: 64 cosines, both ends with full weight.
+/// Mean internal reflectance, averaged as in Mitsuba 3: 64 cosines, both ends with full weight.
 fn internal(nodes: &Nodes, alpha: f64, eta: f64) -> f64 {
     let sum: f64 = (0..64)
         .map(|i| (f64::from(i) / 63.0).max(GRAZING))
@@ -183,7 +183,7 @@ fn the_tables_hold_the_integrals() {
     close("INTERNAL", data::INTERNAL.as_flattened(), t.internal.as_flattened());
 }
 
-/// `cargo test --release -p halflight-core print_the_tables -- --ignored --nocapture` writes `data.rs`.
+/// Prints `data.rs`: `cargo test --release -p halflight-core print_the_tables -- --ignored --nocapture`.
 #[test]
 #[ignore = "prints data.rs"]
 fn print_the_tables() {

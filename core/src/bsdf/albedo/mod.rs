@@ -1,8 +1,8 @@
-//! How much a GGX coat reflects in all and lets through: integrals without closed form, as small tables.
+//! Albedo tables: directional albedo and transmittance of a GGX coat, integrals without closed form.
 //!
-//! What is stored is the difference of a rough coat to the smooth one, which has a closed form, in steps of
-//! [`STEP`], over sqrt(cos θ), sqrt(alpha) and the amplitude r = (η - 1)/(η + 1). `derive.rs` integrates it
-//! all again in f64: its tests hold the tables to the integrals and print them anew.
+//! The tables store the difference of a rough coat from the smooth coat, which has a closed form, in steps of
+//! [`STEP`], over sqrt(cos θ), sqrt(alpha) and the amplitude r = (η - 1)/(η + 1). `derive.rs` computes the
+//! integrals in f64; its tests compare the tables with them and can print new tables.
 
 mod data;
 #[cfg(test)]
@@ -11,21 +11,21 @@ mod derive;
 use super::range::unit;
 use super::{fresnel, sqrt};
 
-/// The unit of the tables.
+/// Unit of the tables.
 const STEP: f32 = 1e-4;
-/// Nodes over sqrt(cos θ), 0 … 1.
+/// Number of nodes over sqrt(cos θ), 0 … 1.
 const COSINES: usize = 16;
-/// Nodes over sqrt(alpha), 0 … 1.
+/// Number of nodes over sqrt(alpha), 0 … 1.
 const ROUGHNESSES: usize = 12;
-/// Nodes over r, 0 … [`LAST_AMPLITUDE`].
+/// Number of nodes over r, 0 … [`LAST_AMPLITUDE`].
 const AMPLITUDES: usize = 9;
-/// η = 9; coats beyond take its difference.
+/// Largest r, at η = 9. Coats beyond use its difference.
 const LAST_AMPLITUDE: f32 = 0.8;
 
-/// Along one axis of a table: the node below, and how far to the next.
+/// Position on an axis of a table: the node below, and the fraction of the distance to the next node.
 type Place = (usize, f32);
 
-/// `x` in 0 … 1 among `nodes` nodes.
+/// Position of `x` in 0 … 1 among `nodes` nodes.
 #[inline]
 fn place(x: f32, nodes: usize) -> Place {
     let at = unit(x) * (nodes - 1) as f32;
@@ -33,8 +33,8 @@ fn place(x: f32, nodes: usize) -> Place {
     (below, at - below as f32)
 }
 
-/// Where `alpha` lies among the roughnesses. The differences begin with alpha², the fourth power of the
-/// axis: so does the way from the smooth coat to the first node.
+/// Position of `alpha` among the roughnesses. The differences grow as alpha², the fourth power of the axis,
+/// and so does the interpolation between the smooth coat and the first node.
 #[inline]
 fn roughness(alpha: f32) -> Place {
     match place(sqrt(alpha), ROUGHNESSES) {
@@ -48,22 +48,22 @@ fn lerp(a: f32, b: f32, t: f32) -> f32 {
     a + (b - a) * t
 }
 
-/// In units of [`STEP`].
+/// Interpolated value of a row, in units of [`STEP`].
 #[inline]
 fn along<const N: usize>(row: &[i16; N], (i, t): Place) -> f32 {
     let at = |i: usize| row.get(i).copied().map_or(0.0, f32::from);
     lerp(at(i), at(i + 1), t)
 }
 
-/// In units of [`STEP`].
+/// Interpolated value of a table, in units of [`STEP`].
 #[inline]
 fn across<const N: usize, const M: usize>(table: &[[i16; N]; M], (j, s): Place, place: Place) -> f32 {
     let at = |j: usize| table.get(j).map_or(0.0, |row| along(row, place));
     lerp(at(j), at(j + 1), s)
 }
 
-/// What a coat of Schlick's reflectance reflects of light from a direction: `white` where F is 1, `edge`
-/// where F is (1 - c)^5; hence F0 · (white - edge) + edge for any F0.
+/// Directional albedo of a coat with Schlick's reflectance: `white` for F = 1, `edge` for F = (1 - c)^5. For
+/// any F0 it is F0 · (white - edge) + edge.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct SchlickAlbedo {
     pub(super) white: f32,
@@ -71,7 +71,7 @@ pub(super) struct SchlickAlbedo {
 }
 
 impl SchlickAlbedo {
-    /// From the cosine `c` at a coat of GGX `alpha`; exact for the smooth coat, alpha 0.
+    /// Albedo at the cosine `c` of a coat of GGX `alpha`; exact for the smooth coat, alpha 0.
     #[inline]
     pub(super) fn directional(c: f32, alpha: f32) -> Self {
         let smooth = fresnel::schlick_weight(c);
@@ -85,10 +85,10 @@ impl SchlickAlbedo {
         }
     }
 
-    /// Mean over the hemisphere, weighted by the cosine.
+    /// Cosine-weighted mean over the hemisphere.
     #[inline]
     pub(super) fn mean(alpha: f32) -> Self {
-        /// Of (1 - c)^5.
+        /// Mean of (1 - c)^5.
         const SMOOTH: f32 = 1.0 / 21.0;
         if alpha == 0.0 {
             return Self { white: 1.0, edge: SMOOTH };
@@ -100,15 +100,15 @@ impl SchlickAlbedo {
         }
     }
 
-    /// Of a coat that reflects `f0` at normal incidence.
+    /// Albedo of a coat with reflectance `f0` at normal incidence.
     #[inline]
     pub(super) fn of(&self, f0: crate::Rgb) -> crate::Rgb {
         f0 * (self.white - self.edge) + crate::Rgb::splat(self.edge)
     }
 }
 
-/// The share of light from the cosine `c` that passes a dielectric coat of index `eta` >= 1; exact for the
-/// smooth one, alpha 0.
+/// Transmittance at the cosine `c` of a dielectric coat of index `eta` >= 1; exact for the smooth coat, alpha
+/// 0.
 #[inline]
 pub(super) fn transmittance(c: f32, alpha: f32, eta: f32) -> f32 {
     let smooth = 1.0 - fresnel::dielectric(c, eta);
@@ -121,9 +121,9 @@ pub(super) fn transmittance(c: f32, alpha: f32, eta: f32) -> f32 {
     unit(smooth + STEP * lerp(table(k), table(k + 1), t))
 }
 
-/// The share of light evenly incident from inside that a dielectric coat sends back. For rough coats it is
-/// the one-bounce reflectance, averaged over 64 cosines as Mitsuba's `roughplastic` does (1.6 % below the
-/// integral), so that pictures agree; it errs to the dark side.
+/// Internal reflectance of a dielectric coat for uniform incident light. For rough coats it is the one-bounce
+/// reflectance, averaged over 64 cosines as in Mitsuba's `roughplastic` (1.6 % below the integral), so that
+/// pictures agree. The error makes surfaces darker.
 #[inline]
 pub(super) fn internal_reflectance(alpha: f32, eta: f32) -> f32 {
     let smooth = 1.0 - (1.0 - fresnel::mean_external_reflectance(eta)) / (eta * eta);
