@@ -1,5 +1,4 @@
-//! `render --audit`: what it says, and that it changes neither the picture nor what comes after an
-//! interruption.
+//! `render --audit`: its output, and the independence of the picture and of resumed renders from it.
 
 use crate::support::Folder;
 
@@ -20,7 +19,7 @@ fn an_audit_says_what_it_knows() {
     assert!(bias["detectable"].as_f64() > Some(0.0) && bias["found"].is_boolean());
     let detectable = bias["detectable"].as_f64().unwrap();
     let [bias, noise] = [bias, &error["noise"]].map(|part| part["relmse"].as_f64().unwrap());
-    // A bias that is not sure counts for less (docs/decisions/0011).
+    // An uncertain bias counts for less (docs/decisions/0011).
     let sure = if bias > 0.0 { (bias - detectable * detectable / (4.0 * bias)).max(0.0) } else { 0.0 };
     assert!((error["relmse"].as_f64().unwrap() - noise - sure).abs() < 1e-12, "{bias} {detectable}");
     let page = std::fs::read_to_string(folder.path("r/index.html")).unwrap();

@@ -1,15 +1,15 @@
-//! Whether photons are taken where they are worth it, whatever a look happens to see.
+//! Caustic photons are used whenever they pay, whatever samples the prepass draws.
 
 use crate::support::Folder;
 
-/// A room, of which all light but a glance at the lamp itself comes through the glass around that.
+/// A room lit through the glass around its lamp alone; only the lamp itself is also visible directly.
 const ROOM: &str = "mtllib room.mtl\n\
     v -2 0 -2\nv 2 0 -2\nv 2 0 2\nv -2 0 2\nv -2 3 -2\nv 2 3 -2\nv 2 3 2\nv -2 3 2\n\
     usemtl wall\nf 1 4 3 2\nf 5 6 7 8\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\n";
 const WALL: &str = "newmtl wall\nKd 0.6 0.6 0.6\n";
 
-/// Of some samples none meets the lamp by way of the glass, and the next one shines as bright as all that
-/// they have seen.
+/// With some seeds no sample hits the lamp through the glass, until one adds as much light as all samples
+/// before.
 #[test]
 fn a_lamp_in_glass_is_for_photons_by_any_seed() {
     let folder = Folder::new("bulb");

@@ -1,4 +1,4 @@
-//! The command line as a contract: the program as scripts and people run it.
+//! The command line as a contract, tested by running the program.
 
 use crate::support::Folder;
 use halflight::save::{Image, read, write};
@@ -147,7 +147,7 @@ fn a_report_is_a_page_a_curve_and_the_same_object() {
     assert_eq!(files(&folder.path("out")), 3);
     assert_eq!(object["made"]["command"][1], "render");
 
-    // Again into the same folder; and of what has no error to draw.
+    // A second report in the same folder, and a report of a picture without an error to draw.
     folder.object("render scene.obj -o a.png --size 3x5 --spp 1 --report out --json");
     folder.object(
         "render scene.obj -o a.png --size 1x1 --spp 4 --eye 0,50,0 --look-at 0,90,1 --report out --json",
@@ -275,7 +275,7 @@ fn an_interrupt_saves_what_there_is_and_exits_with_3() {
     let mut command = folder.command("render scene.obj -o a.png --size 64x64 --time 1h --json");
     let child = command.stdout(Stdio::piped()).stderr(Stdio::null()).spawn().unwrap();
     std::thread::sleep(core::time::Duration::from_secs(2));
-    // Of the shell's own: not every machine has the program.
+    // By the shell's built-in command: not every machine has the program `kill`.
     let kill = format!("kill -INT {}", child.id());
     assert!(Command::new("sh").args(["-c", &kill]).status().unwrap().success());
     let output = child.wait_with_output().unwrap();
@@ -302,7 +302,7 @@ fn bench_rays_measures_the_cornell_box() {
     assert_eq!(object["hits"]["primary"], object["rays"]["diffuse"], "one bounce from each hit");
     assert_eq!(files(&folder.0), 2, "nothing is written");
 
-    // Neither is a multiple of a tile.
+    // Neither side is a multiple of a tile.
     let object = folder.object(&format!("bench rays {cornell} --size 37x21 --simd baseline --json"));
     assert_eq!((&object["width"], &object["height"]), (&37.into(), &21.into()));
     assert_eq!(object["rays"]["primary"], 37 * 21);

@@ -1,5 +1,4 @@
-//! The program as scripts and people run it: each test starts it as a process of its own, in a folder of its
-//! own.
+//! Tests of the program as a process: each test starts it in a folder of its own.
 
 mod audit;
 mod caustics;

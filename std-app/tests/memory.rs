@@ -1,5 +1,5 @@
-//! `--memory` is a wall from the first byte read: the process itself is held to a limit, and whatever a file
-//! says of its size, the program ends in words, within seconds.
+//! `--memory` limits the process from the first byte that it reads. Whatever size a file claims, the program
+//! ends with a message within seconds.
 
 use crate::support::Folder;
 use core::time::Duration;
@@ -9,9 +9,9 @@ use std::io::Cursor;
 use std::process::{Command, Output, Stdio};
 use std::time::Instant;
 
-/// Address space of the process in KiB: what the program maps before it reads anything, and `--memory`.
+/// Address space of the process in KiB: mappings made before reading, plus `--memory`.
 const ADDRESSES: u32 = 700 << 10;
-/// Generous: what is tested is that nobody decodes first and asks later.
+/// Generous: a failing program would decode a picture before checking its size.
 const DEADLINE: Duration = Duration::from_secs(30);
 
 fn write(folder: &Folder, name: &str, bytes: impl AsRef<[u8]>) {
@@ -36,7 +36,7 @@ fn held(folder: &Folder, arguments: &str) -> Output {
     output
 }
 
-/// What is said by a run that ends with `code`.
+/// Messages of a run that ends with exit code `code`.
 fn said(folder: &Folder, arguments: &str, code: i32) -> String {
     let output = held(folder, arguments);
     let said = String::from_utf8_lossy(&output.stderr).into_owned();
@@ -44,7 +44,7 @@ fn said(folder: &Folder, arguments: &str, code: i32) -> String {
     said
 }
 
-/// Pictures of few bytes that take, or say that they take, much more than 32 MB.
+/// Small picture files that need, or claim to need, much more than 32 MB.
 fn bombs() -> Vec<(&'static str, Vec<u8>)> {
     let encoded = |picture: DynamicImage, format| {
         let mut bytes = Cursor::new(Vec::new());
@@ -64,7 +64,7 @@ fn bombs() -> Vec<(&'static str, Vec<u8>)> {
     let mut hdr = b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 16000 +X 16000\n".to_vec();
     hdr.extend(vec![0; 100_000]);
     let mut tiff = encoded(grey(1), ImageFormat::Tiff);
-    // Width and height are tags 256 and 257, of one short or long.
+    // Width and height are tags 256 and 257, each with one short or long value.
     for tag in [256u16, 257] {
         let entry = |bytes: &[u8]| bytes[..2] == tag.to_le_bytes() && bytes[4..8] == 1u32.to_le_bytes();
         let at = tiff.windows(12).position(entry).unwrap();
@@ -98,7 +98,7 @@ fn pictures_say_what_they_take_before_they_take_it() {
         );
         assert!(said(&folder, &format!("render sky.toml {flags}"), 2).contains(name), "{name}");
         assert!(said(&folder, &format!("render scene.obj {flags} --reference {name}"), 2).contains(name));
-        // Without a flag, by the limit of the process.
+        // Without a flag the limit of the process applies.
         let output = held(&folder, &format!("compare {name} {name}"));
         let words = String::from_utf8_lossy(&output.stderr);
         assert!(output.status.code() == Some(0) || words.contains(name), "{words}");

@@ -1,4 +1,5 @@
-//! Files that a command writes: never those that it reads, never the same one twice, and each for itself.
+//! Output files of a command: never one of its inputs, never one file twice, and independent of each other's
+//! failures.
 
 use crate::support::Folder;
 use halflight::save::{Image, read, write};
@@ -6,7 +7,7 @@ use std::fs;
 use std::path::Path;
 use std::process::{Command, Output};
 
-/// A folder with a scene that names everything that a scene can name.
+/// A folder with a scene that names every kind of file that a scene can name.
 fn furnished(name: &str) -> Folder {
     let folder = Folder::new(name);
     let picture = Image { width: 8, height: 8, pixels: vec![[0.5; 3]; 64] };
@@ -22,7 +23,7 @@ fn furnished(name: &str) -> Folder {
     folder
 }
 
-/// Every file of a folder with what is in it; devices are left out.
+/// All files of a folder with their contents, except devices.
 fn contents(folder: &Path) -> Vec<(String, Vec<u8>)> {
     let mut all = Vec::new();
     for path in fs::read_dir(folder).unwrap().flatten().map(|entry| entry.path()) {
@@ -94,7 +95,7 @@ fn links_are_what_they_lead_to() {
         assert!(before == contents(&folder.0), "{arguments} has changed something");
     }
 
-    // One that leads to nothing yet is written through, one in a circle is an error.
+    // A link to a missing file is written through; a cycle of links is an error.
     fs::create_dir(folder.path("sub")).unwrap();
     symlink("sub/new.film", folder.path("c.film")).unwrap();
     symlink("sub/new.png", folder.path("new.png")).unwrap();
@@ -111,7 +112,7 @@ fn links_are_what_they_lead_to() {
         let said = folder.refused(&format!("render scene.obj {SMALL} -o {output}"));
         assert!(said.contains(why), "{said}");
     }
-    // Two names, one file that is not there yet.
+    // Two names of one file that does not exist yet.
     let said = folder.refused(&format!("render scene.obj {SMALL} -o a.pfm -o b.png"));
     assert!(said.contains("a.pfm (-o)") && said.contains("b.png (-o)"), "{said}");
 }
@@ -149,13 +150,13 @@ fn a_report_takes_the_place_of_reports_alone() {
         assert_eq!(fs::read_to_string(folder.path(file)).unwrap(), text);
     }
     assert!(!folder.path("a.png").exists());
-    // Those of a race and of a render replace each other.
+    // Reports of a race and of a render replace each other.
     folder.object("race scene.obj --methods path --time 100ms --size 8x8 --report ours --json");
     folder.object(&format!("render scene.obj {SMALL} -o a.png --report ours --json"));
     folder.object("race scene.obj --methods path --time 100ms --size 8x8 --report ours --json");
 }
 
-/// Runs `script` with `$H` for the program.
+/// Runs `script`, in which `$H` is the program.
 fn shell(folder: &Folder, script: &str) -> Output {
     let mut shell = Command::new("sh");
     shell.current_dir(&folder.0).env("H", env!("CARGO_BIN_EXE_halflight")).args(["-c", script]);
@@ -181,7 +182,7 @@ fn one_output_that_fails_leaves_all_others() {
     assert_eq!(output.status.code(), Some(2));
     assert!(folder.path("d.png").exists() && String::from_utf8_lossy(&output.stdout).contains("relMSE"));
 
-    // A limit of 20 kB for each file: the float picture has 49.
+    // A limit of 20 kB per file; the float picture has 49 kB.
     let script =
         "ulimit -f 40; exec $H render scene.obj --size 64x64 --spp 4 -o a.pfm -o c.png --checkpoint c.film";
     let output = shell(&folder, script);
@@ -191,7 +192,7 @@ fn one_output_that_fails_leaves_all_others() {
     assert!(read(&folder.path("c.png")).is_ok());
     assert!(!folder.path("a.pfm").exists() && !folder.path("c.film").exists());
 
-    // The same of caches: 512 bytes, which the picture does not need.
+    // A limit of 512 bytes per file, which suffices for the picture but not for the cache.
     let script = "ulimit -f 1; exec $H render scene.obj --spp 1 --method irradiance-cache \
         -o tiny.png --size 8x8 --save-cache c.cache";
     let output = shell(&folder, script);
@@ -233,7 +234,7 @@ fn results_that_are_lost_are_a_failure_in_every_command() {
 fn readers_that_are_gone_change_nothing() {
     use std::process::Stdio;
     let folder = Folder::new("gone");
-    // A material that is missing, for a note.
+    // A missing material, which gives a note.
     fs::write(folder.path("grey.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl none\nf 1 2 3\n").unwrap();
     write(&folder.path("r.pfm"), &Image::black(8, 8)).unwrap();
     for (command, code) in [
@@ -260,7 +261,7 @@ fn readers_that_are_gone_change_nothing() {
         }
     }
     assert!(read(&folder.path("a.png")).is_ok());
-    // Notes to a full disk are lost, and that is all.
+    // Notes to a full disk are lost without an error.
     #[cfg(target_os = "linux")]
     assert_eq!(shell(&folder, "$H info grey.obj 2> /dev/full").status.code(), Some(0));
 }
@@ -279,7 +280,7 @@ fn standard_output_may_be_where_the_picture_goes() {
     assert_eq!(read(&folder.path("file.pfm")).unwrap().pixels.len(), 64);
     let said = folder.refused(&format!("render scene.obj {SMALL} -o out.pfm --json"));
     assert!(said.contains("--json"), "{said}");
-    // A redirection is an output, too.
+    // A redirection counts as an output.
     let output = shell(&folder, &format!("$H render scene.obj {SMALL} -o b.png --json > b.png"));
     assert_eq!(output.status.code(), Some(2));
     assert!(String::from_utf8_lossy(&output.stderr).contains("standard output"));

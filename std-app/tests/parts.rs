@@ -1,5 +1,5 @@
-//! Renders in parts: killed and resumed, cut into shards and merged; the same bits, or a refusal with a
-//! reason. And renders that end by time or error.
+//! Renders in parts: killed and resumed, or divided into shards and merged, with the same bits or a refusal
+//! with its reason; and renders that end by time or error.
 
 use crate::support::Folder;
 use core::time::Duration;
@@ -9,14 +9,13 @@ use std::path::Path;
 use std::process::Stdio;
 use std::time::Instant;
 
-/// Seconds by which a render may be late. More than the 50 ms of an idle machine: other tests run at the same
-/// time.
+/// Seconds by which a render may be late. An idle machine needs 50 ms, but other tests run at the same time.
 const LATE: f64 = 0.25;
 
-/// Renders of which one has to be on time, on a machine that does other things.
+/// Renders of which at least one must be on time, on a busy machine.
 const ATTEMPTS: u32 = 4;
 
-/// Times that a render is killed.
+/// Number of kills of a render.
 const KILLS: u32 = 50;
 
 /// Kills a render again and again, each time resuming from the last checkpoint.
@@ -59,16 +58,16 @@ fn a_finished_film_goes_on_to_more_samples() {
     let folder = Folder::new("more");
     folder.object("render scene.obj --size 33x20 --spp 40 -o whole.pfm --json");
     let first = folder.object("render scene.obj --size 33x20 --spp 13 -o a.pfm --checkpoint film --json");
-    // A time that no clock can tell does not end it.
+    // A time beyond the range of the clock is no limit.
     let second = folder
         .object("render scene.obj --size 33x20 --spp 40 --time 1e300 --checkpoint b --checkpoint-every 1e300 -o b.pfm --resume film --json");
     assert!(fs::read(folder.path("whole.pfm")).unwrap() == fs::read(folder.path("b.pfm")).unwrap());
     assert_eq!((first["paths"].as_u64(), second["paths"].as_u64()), (Some(33 * 20 * 13), Some(33 * 20 * 40)));
-    // Up to the last round: what comes after it is not in the film.
+    // Up to the last round: later seconds are not in the film.
     let rounds = first["history"].as_array().unwrap();
     let before = rounds.last().unwrap()["seconds"].as_f64().unwrap();
     assert!(second["seconds"]["render"].as_f64().unwrap() > before, "the time before counts");
-    // Nothing to do: the picture of the film.
+    // Samples reached already: the picture is that of the film.
     let same = folder.object("render scene.obj --size 33x20 --spp 5 -o c.pfm --resume film --json");
     assert_eq!(same["spp"], 13);
     assert!(fs::read(folder.path("a.pfm")).unwrap() == fs::read(folder.path("c.pfm")).unwrap());
@@ -110,7 +109,7 @@ fn shards_merge_to_the_bits_of_one_render() {
 #[test]
 fn a_merged_picture_knows_what_its_samples_share() {
     let folder = Folder::new("shared");
-    // Photons reach pixels far apart: their errors hang together, whoever renders them.
+    // Photons correlate the errors of distant pixels, also across shards.
     let caustic = Path::new(env!("CARGO_MANIFEST_DIR")).join("../scenes/caustic/caustic.toml");
     let render =
         |scene: &str, method: &str| format!("render {scene} --size 64x64 --spp 8 --method {method} --json");
@@ -137,7 +136,7 @@ fn a_merged_picture_knows_what_its_samples_share() {
             assert!(said.contains(&format!("{words}\n")), "{said}");
         }
     }
-    // Audited, they know their bias too.
+    // Audited shards also have a bias estimate.
     for shard in 1..=2 {
         let render = render("scene.obj", "sppm");
         folder.object(&format!("{render} --shard {shard}/2 --checkpoint {shard}.film"));
@@ -166,7 +165,7 @@ fn caches_are_made_again_as_they_were() {
     let bits = |name: &str| read(&folder.path(name)).unwrap();
     assert_eq!(bits("whole.exr"), bits("resumed.exr"));
     assert_eq!(bits("whole.exr"), bits("merged.exr"));
-    // What was learned before the first sample was learned again, and counts once.
+    // Prepasses are repeated on resumption, and their rays count once.
     for key in ["rays", "shadow_rays", "paths", "error"] {
         assert_eq!(whole[key], resumed[key], "{key}");
     }
@@ -241,7 +240,7 @@ fn the_error_is_reached_with_the_same_bits_however_fast() {
     let upper = one["error"]["interval"][1].as_f64().unwrap();
     assert!(upper <= 1e-4 && upper > 0.0, "{upper}");
     render("many", 5, "--checkpoint film");
-    // A film that has reached the error is done.
+    // A film that has reached the error target is done.
     render("again", 2, "--resume film");
     let bytes = |name| fs::read(folder.path(name)).unwrap();
     assert!(bytes("one.pfm") == bytes("many.pfm") && bytes("one.pfm") == bytes("again.pfm"));
@@ -250,7 +249,7 @@ fn the_error_is_reached_with_the_same_bits_however_fast() {
 #[test]
 fn what_is_dropped_is_told_with_its_place() {
     let folder = Folder::new("ledger");
-    // The camera is in a cube of glass of high index: total reflection keeps most of its paths there.
+    // The camera is in a cube of dense glass: total reflection keeps most of its paths there.
     let mut obj = fs::read_to_string(folder.path("scene.obj")).unwrap();
     for i in 0..8 {
         let at = |bit: u32, middle: f64| if i >> bit & 1 == 0 { middle - 0.5 } else { middle + 0.5 };
@@ -271,7 +270,7 @@ fn what_is_dropped_is_told_with_its_place() {
     assert_eq!(places.iter().map(|place| place["unfinished"].as_u64().unwrap()).sum::<u64>(), total);
     assert!(places[0]["unfinished"].as_u64() >= places[1]["unfinished"].as_u64());
     assert_eq!((&places[0]["width"], &places[0]["height"]), (&16.into(), &16.into()));
-    // Samples of such paths count with the light that was found before.
+    // Samples of unfinished paths count with the light found so far.
     assert_eq!(dropped["empty_pixels"].as_u64(), Some(0));
     let picture = read(&folder.path("a.pfm")).unwrap();
     assert!(picture.pixels.iter().flatten().all(|value| value.is_finite()));

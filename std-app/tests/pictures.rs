@@ -1,5 +1,5 @@
-//! One reader of pictures: what one command reads the others read as well, and nothing that is repaired or
-//! left out goes without a word.
+//! One reader of pictures for all commands: each command reads the same formats, and reports every repair and
+//! omission.
 
 use crate::support::Folder;
 use halflight::picture;
@@ -8,18 +8,18 @@ use image::{DynamicImage, ImageBuffer, ImageFormat};
 use std::io::Cursor;
 use std::path::Path;
 
-/// The colour of pictures of floats, and that of pictures of bytes: sRGB 188 137 99 is 0.503 0.251 0.125.
+/// Colour of float pictures, and of byte pictures: sRGB 188 137 99 is 0.503 0.251 0.125.
 const COLOUR: [f32; 3] = [0.5, 0.25, 0.125];
 const BYTES: [u8; 3] = [188, 137, 99];
 
-/// Two steps of 8 bits in the sRGB curve at the darkest channel, relative: JPEG is off by as much.
+/// Two steps of 8 bits in the sRGB curve at the darkest channel, relative: the error of JPEG.
 const TOLERANCE: f64 = 0.03;
 
 fn write(folder: &Folder, name: &str, bytes: impl AsRef<[u8]>) {
     std::fs::write(folder.path(name), bytes).unwrap();
 }
 
-/// A scene that shows nothing but its sky.
+/// A scene that shows only its sky.
 fn sky(folder: &Folder, map: &str) {
     let scene = format!(
         "[[mesh]]\nfile = \"scene.obj\"\n[camera]\neye = [0, 9, 0]\nlook_at = [0, 19, 0.1]\n\
@@ -49,7 +49,7 @@ fn constant(rgba: [u8; 4]) -> DynamicImage {
     DynamicImage::ImageRgba8(ImageBuffer::from_fn(16, 8, |_, _| image::Rgba(rgba)))
 }
 
-/// The same picture in every format, and its names.
+/// One picture in every format, with file names.
 fn formats() -> Vec<(&'static str, Vec<u8>)> {
     let floats = Image { width: 16, height: 8, pixels: vec![COLOUR; 128] };
     let [r, g, b] = BYTES;
@@ -128,7 +128,7 @@ fn alpha_of_every_format_cuts_out() {
         write(&folder, "quad.mtl", format!("newmtl a\nKd 0 0 0\nmap_d {name}\n"));
         let object = folder.object("render scene.toml --size 16x16 --spp 256 --threads 1 --json -o out.pfm");
         let found = object["mean_radiance"][0].as_f64().unwrap();
-        // A black square is there with probability 64 / 255; 65536 samples, five standard deviations.
+        // A black square is opaque with probability 64 / 255; 65536 samples, five standard deviations.
         assert!((found - (1.0 - 64.0 / 255.0)).abs() < 0.009, "{name}: {found}");
     }
 }
@@ -167,7 +167,7 @@ fn what_the_scene_file_names_is_refused_where_it_cannot_be_read() {
         let said = folder.refused(&format!("render map.toml {RENDER} -o out.pfm"));
         assert!(said.contains(name), "{said}");
         assert!(folder.refused(&format!("compare {name} {name}")).contains(name));
-        // What an MTL names is noted.
+        // Unreadable maps of an MTL give a note.
         write(&folder, "scene.mtl", format!("newmtl floor\nmap_Kd {name}\nnewmtl lamp\nKe 1 1 1\n"));
         let output = folder.run(&format!("render scene.obj {RENDER} -o out.pfm"));
         let said = String::from_utf8_lossy(&output.stderr);

@@ -1,4 +1,4 @@
-//! Outputs that are no files, and files that stop being writable while a picture grows.
+//! Outputs to pipes, and files that become unwritable during a render.
 
 use crate::support::Folder;
 use core::time::Duration;
@@ -11,14 +11,14 @@ use std::process::{Child, Command, Output, Stdio};
 use std::thread::{JoinHandle, sleep, spawn};
 use std::time::Instant;
 
-/// A pipe with a name.
+/// A named pipe.
 fn pipe(folder: &Folder, name: &str) -> PathBuf {
     let path = folder.path(name);
     assert!(Command::new("mkfifo").arg(&path).status().unwrap().success());
     path
 }
 
-/// All that comes out of a pipe, by a reader that comes after `delay`.
+/// All bytes of a pipe, read by a thread that starts after `delay` milliseconds.
 fn reader(path: PathBuf, delay: u64) -> JoinHandle<Vec<u8>> {
     spawn(move || {
         sleep(Duration::from_millis(delay));
@@ -28,7 +28,7 @@ fn reader(path: PathBuf, delay: u64) -> JoinHandle<Vec<u8>> {
     })
 }
 
-/// Ends a program by a signal: not every machine has the program for it, but the shell has.
+/// Sends a signal by the shell's built-in command: not every machine has the program `kill`.
 fn signal(child: &Child, name: &str) {
     let kill = format!("kill -{name} {}", child.id());
     assert!(Command::new("sh").args(["-c", &kill]).status().unwrap().success());
@@ -42,7 +42,7 @@ fn words(output: &Output) -> String {
 fn pipes_get_what_they_are_named_for() {
     let folder = Folder::new("pipes");
     let picture = reader(pipe(&folder, "a.png"), 0);
-    // Late, but before the end of patience.
+    // Late, but before the longest wait is over.
     let film = reader(pipe(&folder, "film"), 1000);
     let cache = reader(pipe(&folder, "cache"), 0);
     folder.object(
@@ -93,7 +93,7 @@ fn a_reader_that_stops_reading_can_be_given_up() {
     let path = pipe(&folder, "a.pfm");
     let mut command = folder.command("render scene.obj --size 256x256 --spp 1 -o a.pfm -o b.png");
     let child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
-    // It waits here until the pipe is opened for writing, at the end of the render.
+    // The open blocks until the render opens the pipe for writing, at its end.
     let _stalled = File::open(path).unwrap();
     sleep(Duration::from_secs(1));
     signal(&child, "TERM");
@@ -115,7 +115,7 @@ fn a_reader_that_leaves_is_named() {
     assert!(read(&folder.path("b.png")).is_ok());
 }
 
-/// A render of about three seconds whose checkpoints go to a folder that is gone after one.
+/// A render of about three seconds whose folder of checkpoints vanishes after the first write.
 fn without_its_folder(folder: &Folder, arguments: &str, comes_back: bool) -> Output {
     fs::create_dir(folder.path("sub")).unwrap();
     let mut command = folder.command(&format!("render scene.obj -o a.png --json --size 32x32 {arguments}"));
@@ -160,7 +160,7 @@ fn signals_while_files_are_written_leave_them_whole() {
         let named: String = outputs.iter().map(|output| format!(" -o {output}")).collect();
         let mut command = folder.command(&format!("render scene.obj --size 1024x1024 --spp 1{named}"));
         let child = command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
-        // The first of them is being written, or about to be.
+        // The first file is being written, or about to be.
         let begins = |entry: fs::DirEntry| {
             let is_first = entry.file_name().to_string_lossy().contains("a.exr");
             is_first && entry.metadata().is_ok_and(|data| data.len() > 0)

@@ -6,8 +6,8 @@ use super::geometry::{Placed, bounds};
 use super::transform::SceneTransform;
 use glam::DVec3;
 
-/// Extent of the scene over that of the detail above which the detail decides: f32 would round it to a
-/// thousandth.
+/// Ratio of the extents of scene and detail above which the detail decides. f32 would round the detail to a
+/// thousandth of its size.
 const FAR: f64 = 8192.0;
 
 /// Largest extent over the detail: squares of areas stay finite.

@@ -9,25 +9,25 @@ use halflight_core::sampling::mix;
 use halflight_core::scene::{Material, Surface};
 use rayon::prelude::*;
 
-/// Bytes for each byte of text: itself, decoded, cleaned, and spare capacity.
+/// Bytes per byte of text: the text itself, decoded, cleaned, and spare capacity.
 const TEXT: usize = 4;
-/// For each `v`, `vt` and `vn`, in each of the workers.
+/// Bytes per `v`, `vt` and `vn` statement, in each worker.
 const VERTEX: usize = 80;
-/// Workers that read an OBJ file, each a megabyte of faces or more.
+/// Workers that read an OBJ file; each reads at least a megabyte of faces.
 const WORKERS: usize = 4;
-/// For each corner of a face: read, as an index, and in a triangle.
+/// Bytes per corner of a face: as read, as an index, and in a triangle.
 const CORNER: usize = 50;
-/// For each corner that is a vertex of its own.
+/// Bytes per corner that becomes a vertex of its own.
 const UNIQUE: usize = 130;
-/// For each run of faces of a material.
+/// Bytes per run of faces of one material.
 const RUN: usize = 700;
-/// For each line that may have a note of its own.
+/// Bytes per line that may have its own note.
 const NOTE: usize = 300;
-/// For each material: as written, as used, and in the core.
+/// Bytes per material: as written, as used, and in the core.
 const MATERIAL: usize = 4096;
-/// For each byte of a scene file; values of two characters take most.
+/// Bytes per byte of a scene file; values of two characters need most.
 const SCENE_FILE: usize = 220;
-/// For each piece of a triangle that is cut: four corners and two triangles that may be lamps.
+/// Bytes per piece of a cut triangle: four corners, and two triangles that may emit.
 const PIECE: usize = 860;
 
 /// Counts of an OBJ file: vertices, corners of faces, corners with negative indices, runs, other lines.

@@ -83,7 +83,7 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<LoadedScene, LoadError
     }
 }
 
-/// Reads a text file; `estimate` gives the memory that parsing it takes.
+/// Reads a text file; `estimate` returns the memory that parsing needs.
 fn read(path: &Path, budget: &Budget, estimate: fn(&[u8]) -> usize) -> Result<Vec<u8>, LoadError> {
     let bytes = memory::read_file(path, budget.left()).map_err(|error| {
         let help = match error.kind() {
@@ -110,9 +110,9 @@ struct SceneBuilder {
     /// Index into `objs` of each OBJ file; a file is read once, however often it is placed.
     obj_numbers: HashMap<PathBuf, usize>,
     materials: Vec<MtlMaterial>,
-    /// By OBJ file (`None` for materials of the scene file) and name.
+    /// Index of each material by OBJ file (`None`: the scene file) and name.
     material_numbers: HashMap<(Option<usize>, Name), u32>,
-    /// Changes of the scene file, by name of the material.
+    /// Changes by the scene file, by name of the material.
     overrides: BTreeMap<String, MaterialChange>,
     used_overrides: BTreeSet<String>,
     lookup: Lookup,

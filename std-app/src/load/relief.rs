@@ -13,7 +13,7 @@ const NEARLY_ALL: f32 = 0.95;
 /// Kinds of relief map.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Relief {
-    /// Grey everywhere; directions are not.
+    /// Grey everywhere, which maps of directions are not.
     Heights,
     /// Unit vectors around the third axis.
     Normals,

@@ -1,5 +1,6 @@
-//! Cutting of large triangles. The detail of the scene is at the origin ([`super::fit`]), and a piece is not
-//! much larger than its distance from it, so points on a piece are as precise as their distance requires.
+//! Cutting of large triangles. The detail of the scene is at the origin ([`super::fit`]), and no piece is
+//! much larger than its distance from the detail. Points on a piece then are as precise as their distance
+//! requires.
 //!
 //! The planes x, y, z = ±16 · 4^k cut every triangle that crosses them. The cut of an edge depends only on
 //! its ends and the plane, so neighbours agree to the bit and no gap opens.

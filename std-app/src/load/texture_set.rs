@@ -1,5 +1,5 @@
-//! Textures of a scene: each picture is decoded once and has a view for each use: as colours or numbers,
-//! repeated or clamped.
+//! Textures of a scene. Each picture is decoded once and has a view per use: colours or numbers, repeated or
+//! clamped.
 
 use super::error::LoadError;
 use super::map::{Map, MapOptions};

@@ -52,7 +52,7 @@ impl SceneTransform {
         user * self.factor()
     }
 
-    /// The factor on radiant intensities (W/sr) that keeps irradiances: that of lengths, squared.
+    /// Factor on radiant intensities (W/sr) that keeps irradiances: the squared factor on lengths.
     pub fn intensity_factor(&self) -> f64 {
         self.factor() * self.factor()
     }

@@ -1,5 +1,5 @@
-//! History of a picture: its state after each round. Comparison with a reference is no part of rendering, so it pauses the
-//! clock.
+//! History of a picture: its state after each round. Comparison with a reference is no part of rendering, so
+//! it pauses the clock.
 
 use super::ErrorEstimate;
 use crate::compare::Observer;

@@ -32,7 +32,7 @@ impl Destination {
     /// Resolves the links of `path`; the target need not exist.
     ///
     /// # Errors
-    /// A circle of links, or an error of the system.
+    /// A cycle of links, or an error of the system.
     pub fn of(path: &Path) -> io::Result<Self> {
         let mut path = path.to_owned();
         for _ in 0..MOST_LINKS {

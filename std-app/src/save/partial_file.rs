@@ -19,7 +19,8 @@ fn partial_files() -> MutexGuard<'static, Vec<PathBuf>> {
 pub(super) struct PartialFile(PathBuf);
 
 impl PartialFile {
-    /// Creates an empty file in the folder of `target`; removes that of a killed process of the same number.
+    /// Creates an empty file in the folder of `target`, and removes the file of a killed process with the
+    /// same number.
     pub(super) fn create(target: &Path) -> io::Result<(Self, File)> {
         let mut name = OsString::from(".");
         name.push(target.file_name().unwrap_or_default());
@@ -43,7 +44,7 @@ impl PartialFile {
 impl Drop for PartialFile {
     fn drop(&mut self) {
         partial_files().retain(|path| *path != self.0);
-        // It is renamed, or incomplete.
+        // The file was renamed or is incomplete.
         let _ = fs::remove_file(&self.0);
     }
 }

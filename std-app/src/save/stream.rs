@@ -1,5 +1,5 @@
 //! Writing to pipes and devices. Opening a pipe without a reader blocks, and so does writing to a stopped
-//! reader, so a thread of its own does both; it is abandoned after a timeout.
+//! reader, so a separate thread does both and is abandoned after a timeout.
 
 use super::destination::Destination;
 use core::sync::atomic::{AtomicBool, AtomicUsize, Ordering};

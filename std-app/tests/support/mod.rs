@@ -1,4 +1,4 @@
-//! What tests of the program share: a folder with a scene, and ways to run the program in it.
+//! Shared parts of tests of the program: a folder with a scene, and functions that run the program in it.
 
 use serde_json::Value;
 use std::path::PathBuf;
@@ -10,7 +10,7 @@ const SCENE: &str = "mtllib scene.mtl\n\
     usemtl floor\nf 4 3 2 1\nusemtl lamp\nf 5 6 7 8\n";
 const MATERIALS: &str = "newmtl floor\nKd 0.5 0.5 0.5\nnewmtl lamp\nKd 0 0 0\nKe 1 1 1\n";
 
-/// A folder of its own for each test, with the scene in it; gone when the test ends well.
+/// A folder for one test with the scene in it, removed if the test passes.
 pub(crate) struct Folder(pub(crate) PathBuf);
 
 impl Folder {
@@ -36,7 +36,7 @@ impl Folder {
         self.command(arguments).output().unwrap()
     }
 
-    /// Runs what must succeed, and returns the object that it prints.
+    /// Runs a command that must succeed, and returns the JSON object that it prints.
     pub(crate) fn object(&self, arguments: &str) -> Value {
         let output = self.run(arguments);
         let said = String::from_utf8_lossy(&output.stderr);
@@ -44,7 +44,7 @@ impl Folder {
         serde_json::from_slice(&output.stdout).unwrap()
     }
 
-    /// Runs what must be refused with exit code 2, and returns what is said.
+    /// Runs a command that must be refused with exit code 2, and returns its messages.
     pub(crate) fn refused(&self, arguments: &str) -> String {
         let output = self.run(arguments);
         let said = String::from_utf8(output.stderr).unwrap();

@@ -84,7 +84,7 @@ pub(super) fn clean(file: &Path, text: &[u8], line: u32, counts: [Counts; 2]) ->
 
 struct Cleaner<'a> {
     indices: Indices<'a>,
-    /// Of the current face.
+    /// Corners of the current face.
     corners: Vec<[usize; 3]>,
     piece: Piece,
 }

@@ -64,7 +64,7 @@ pub fn parse(bytes: Vec<u8>, file: &Path) -> Result<Obj, LoadError> {
     total.into_iter().try_for_each(|count| super::count_vertices(file, count))?;
     let clean = |(text, line, before)| clean::clean(file, text, line, [before, total]);
     let pieces: Vec<Result<Piece, LoadError>> = jobs.into_par_iter().map(clean).collect();
-    // The first error in the order of the file counts, whichever thread is first.
+    // The first error in the order of the file is reported, whichever thread finishes first.
     let mut pieces = pieces.into_iter().collect::<Result<Vec<_>, _>>()?;
 
     let mut obj = Obj::default();

@@ -1,6 +1,6 @@
 //! The scene file: TOML that places meshes and adds materials, camera, lights, environment and settings, as
-//! described in `docs/scene-file.md`. Errors have line and column; that of an unknown key lists the valid
-//! ones.
+//! described in `docs/scene-file.md`. Errors have line and column. The error for an unknown key lists the
+//! valid keys.
 
 mod light;
 mod material;
@@ -61,9 +61,9 @@ pub struct MeshEntry {
     /// One factor or three.
     #[serde(default)]
     pub scale: Factors,
-    /// Around an axis through the origin.
+    /// Rotation around an axis through the origin.
     pub rotate: Option<Rotation>,
-    /// In units of the scene.
+    /// Translation in units of the scene.
     #[serde(default)]
     pub translate: [Number; 3],
     /// Three or four rows of four, instead of scale, rotation and translation.

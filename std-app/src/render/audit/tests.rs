@@ -141,7 +141,7 @@ fn the_share_of_the_work_is_kept() {
     let by_rays = picture(Settings { stop, audit: Some(0.05), ..settings(Method::Path, 0, 3, 0.05) });
     let exact = by_rays.audit.unwrap().rays as f64 / by_rays.counters.all_rays() as f64;
     assert!((0.045..0.0535).contains(&exact), "{exact}");
-    // By the clock, on a busy machine: only the order of magnitude.
+    // Measured by the clock on a busy machine: only the order of magnitude.
     assert!((0.01..0.25).contains(&(audit.rays as f64 / rays)), "{audit:?}");
 }
 

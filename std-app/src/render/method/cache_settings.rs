@@ -2,7 +2,7 @@
 
 use halflight_core::cache::irradiance::{Metric, metric};
 
-/// How an irradiance cache is filled.
+/// Settings for filling an irradiance cache.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CacheSettings {
     /// Rule for the radii of records.

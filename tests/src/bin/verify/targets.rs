@@ -19,7 +19,7 @@ struct Build {
     simd: Option<bool>,
 }
 
-/// How to run a build.
+/// Ways to run a build.
 enum Run {
     /// On this machine.
     Here,
