@@ -1,5 +1,5 @@
-//! Lanes of the build target, through `wide`: SSE2, AVX (where the build says so), NEON, simd128 or
-//! plain scalar code. Sixteen lanes are two registers of eight.
+//! Lanes of the build target, through `wide`: SSE2, AVX (if the build enables it), NEON, simd128 or scalar
+//! code. Sixteen lanes are two registers of eight.
 
 use crate::kernels::push::{keep, push};
 use crate::lanes::{EXPONENT, Lanes, Mask, Simd};
@@ -7,7 +7,7 @@ use crate::stack::Stack;
 use core::ops::{Add, BitAnd, BitOr, Div, Mul, Neg, Not, Sub};
 use wide::f32x8;
 
-/// The token of the baseline: every processor of the build target has it.
+/// Token of the baseline level, which every processor of the build target has.
 #[derive(Clone, Copy, Debug)]
 pub struct Baseline;
 
@@ -15,7 +15,7 @@ pub struct Baseline;
 #[derive(Clone, Copy)]
 pub struct F8(f32x8);
 
-/// The mask of [`F8`]: all bits of a lane, or none.
+/// Mask of [`F8`]: all bits of a lane, or none.
 #[derive(Clone, Copy)]
 pub struct M8(f32x8);
 
@@ -87,7 +87,7 @@ impl Lanes for F8 {
     }
     #[inline(always)]
     fn product(self, other: Self) -> (Self, Self) {
-        // Dekker 1971: halves of twelve bits, of which all products are exact.
+        // Dekker 1971: halves of twelve bits, whose products are exact.
         let split = |x: Self| {
             let shifted = x * F8(f32x8::splat(4097.0));
             let high = shifted - (shifted - x);
@@ -236,7 +236,7 @@ pub(crate) fn halves(values: &[f32; 16]) -> (&[f32; 8], &[f32; 8]) {
     (low.first_chunk().unwrap_or(&[0.0; 8]), high.first_chunk().unwrap_or(&[0.0; 8]))
 }
 
-/// Whether `load8x9` with these arguments stays inside `length` values.
+/// True if `load8x9` with these arguments stays within `length` values.
 #[inline(always)]
 pub(crate) fn fits8x9(length: usize, start: usize, stride: usize) -> bool {
     stride <= 8 && start <= length && length - start >= 9 * stride + 8
@@ -300,7 +300,7 @@ impl Simd for Baseline {
     }
     #[inline(always)]
     fn field16(self, words: &[u32; 16], from: u32, width: u32) -> Pair<F8> {
-        // Signed, because that is what SSE2 converts.
+        // Signed, because SSE2 converts signed integers only.
         self.load16(&words.map(|word| ((word >> from) & ((1 << width) - 1)) as i32 as f32))
     }
     #[inline(always)]
@@ -344,7 +344,7 @@ impl Simd for Baseline {
     }
 }
 
-/// The floats at the starts of nine runs, coordinates in the order of `axes`; `None` where not all are there.
+/// First floats of nine runs, coordinates in the order of `axes`; `None` if they do not all exist.
 #[inline(always)]
 pub(crate) fn gather9(
     values: &[f32],

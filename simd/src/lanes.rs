@@ -1,8 +1,8 @@
-//! The lane trait: only the operations that the kernels use, and the token that makes lanes.
+//! Traits of lanes: the operations that the kernels use, and the token that makes lanes.
 //!
-//! No operation here fuses or reduces: each lane does what the scalar operation does, to the bit, on
-//! every level. What a kernel does with them is therefore the same everywhere. A single f32 is lanes as
-//! well, so that a kernel of pure arithmetic is its own scalar reference.
+//! The arithmetic neither fuses nor reduces: each lane computes the scalar operation, to the bit, on every
+//! level, so that a kernel gives the same result everywhere. A single f32 also implements lanes, so that a
+//! kernel of pure arithmetic is its own scalar reference.
 
 use crate::stack::Stack;
 use core::ops::{Add, BitAnd, BitOr, Div, Mul, Neg, Not, Sub};
@@ -12,7 +12,7 @@ pub trait Mask: Copy + BitAnd<Output = Self> + BitOr<Output = Self> + Not<Output
     /// Bit `i` is lane `i`.
     fn bits(self) -> u32;
 
-    /// Whether any lane is set.
+    /// True if any lane is set.
     #[inline(always)]
     fn any(self) -> bool {
         self.bits() != 0
@@ -25,23 +25,23 @@ pub trait Lanes:
 {
     /// `[f32; N]`.
     type Array: Copy;
-    /// What comparisons give.
+    /// Result of comparisons.
     type Mask: Mask;
-    /// How many lanes.
+    /// Number of lanes.
     const N: usize;
 
-    /// Lane by lane the smaller; unspecified which where a lane is NaN.
+    /// Smaller value of each lane; either if one is NaN.
     fn min(self, other: Self) -> Self;
-    /// Lane by lane the larger; unspecified which where a lane is NaN.
+    /// Larger value of each lane; either if one is NaN.
     fn max(self, other: Self) -> Self;
-    /// Lane by lane without sign.
+    /// Magnitude of each lane.
     fn abs(self) -> Self;
-    /// Lane by lane the square root, correctly rounded.
+    /// Correctly rounded square root of each lane.
     fn sqrt(self) -> Self;
-    /// Lane by lane the largest power of two not above the magnitude, of a normal number; of smaller ones zero.
+    /// Largest power of two not above the magnitude of each lane; zero for denormals.
     fn power_of_two(self) -> Self;
-    /// The product as rounded, and what the rounding took from it: their sum is exact where the magnitudes of both
-    /// factors are zero or 1e-14 to 1e30, and of the product 1e-30 to 1e38.
+    /// Rounded product and its rounding error. Their sum is exact if the magnitudes of both factors are zero
+    /// or 1e-14 to 1e30, and that of the product 1e-30 to 1e38.
     fn product(self, other: Self) -> (Self, Self);
     /// `self < other`.
     fn lt(self, other: Self) -> Self::Mask;
@@ -49,13 +49,13 @@ pub trait Lanes:
     fn le(self, other: Self) -> Self::Mask;
     /// `self == other`.
     fn eq(self, other: Self) -> Self::Mask;
-    /// Bits of the lanes with a minus sign, zeros and NaN included.
+    /// Mask of the lanes with a minus sign, zeros and NaN included.
     fn signs(self) -> u32;
-    /// `self` where `mask` is set, `other` elsewhere.
+    /// `self` in lanes where `mask` is set, `other` elsewhere.
     fn select(self, mask: Self::Mask, other: Self) -> Self;
-    /// The largest lane; unspecified where a lane is NaN.
+    /// Largest lane; unspecified with NaN.
     fn largest(self) -> f32;
-    /// The smallest lane; unspecified where a lane is NaN.
+    /// Smallest lane; unspecified with NaN.
     #[inline(always)]
     fn smallest(self) -> f32 {
         -(-self).largest()
@@ -137,19 +137,19 @@ impl Lanes for f32 {
     }
 }
 
-/// The bits of an exponent.
+/// Bits of the exponent.
 pub(crate) const EXPONENT: u32 = 0x7f80_0000;
 
-/// Proof that the processor has a level, and the only maker of its lanes.
+/// Token that proves the level of the processor and is the only way to make its lanes.
 pub trait Simd: Copy {
     /// Eight lanes.
     type F8: Lanes<Array = [f32; 8]>;
     /// Sixteen lanes.
     type F16: Lanes<Array = [f32; 16]>;
 
-    /// All lanes the same.
+    /// The value in all lanes.
     fn splat8(self, value: f32) -> Self::F8;
-    /// All lanes the same.
+    /// The value in all lanes.
     fn splat16(self, value: f32) -> Self::F16;
     /// Lanes from memory.
     fn load8(self, values: &[f32; 8]) -> Self::F8;
@@ -157,17 +157,17 @@ pub trait Simd: Copy {
     fn load16(self, values: &[f32; 16]) -> Self::F16;
     /// Lanes `i < n` set.
     fn first8(self, n: u32) -> <Self::F8 as Lanes>::Mask;
-    /// A mask from its bits.
+    /// Mask from its bits.
     fn mask16(self, bits: u32) -> <Self::F16 as Lanes>::Mask;
 
-    /// Of the lanes named by the nibbles of `order`, lowest nibble first, puts those with `entry <= exit` on the
-    /// stack. Lanes are named by the low three bits of a nibble. Nothing happens where there is no room for eight.
+    /// Pushes the lanes with `entry <= exit`, in the order of the nibbles of `order`, lowest nibble first.
+    /// The low three bits of a nibble are the lane. Does nothing without room for eight.
     fn push8(self, order: u32, entry: Self::F8, exit: Self::F8, items: &[f32; 8], stack: &mut Stack);
 
-    /// The same in the order of the lanes; the entries on the stack are unspecified.
+    /// [`Simd::push8`] in the order of the lanes; the entries on the stack are unspecified.
     fn push8_unordered(self, entry: Self::F8, exit: Self::F8, items: &[f32; 8], stack: &mut Stack);
 
-    /// Takes all that is entered beyond `limit` off the stack.
+    /// Removes all items whose entry is beyond `limit`.
     fn keep(self, limit: f32, stack: &mut Stack);
 
     /// Sixteen records of eight floats, as eight registers of sixteen: register `k` holds float `k` of each.
@@ -203,32 +203,31 @@ pub trait Simd: Copy {
         records
     }
 
-    /// Of sixteen lanes the `wanted` ones, one after the other from the start of `out`; what follows them there is
-    /// unspecified.
+    /// Packs the `wanted` lanes to the start of `out`; the rest of `out` is unspecified.
     fn pack16(self, wanted: <Self::F16 as Lanes>::Mask, lanes: Self::F16, out: &mut [f32; 16]);
 
     /// `first + i` in lane `i`, as the bits of a float.
     fn numbers16(self, first: u32) -> Self::F16;
 
-    /// Of each word the `width` (below 25) bits from bit `from` on, as a number.
+    /// Value of the `width` (below 25) bits of each word from bit `from` on.
     fn field16(self, words: &[u32; 16], from: u32, width: u32) -> Self::F16;
 
-    /// Lane by lane the lane of `table` that the whole part of `which`, 0 to 15, names.
+    /// Lanes of `table`, indexed by the integer part of `which`, 0 to 15.
     fn pick16(self, table: Self::F16, which: Self::F16) -> Self::F16;
 
     /// Bytes as numbers.
     fn bytes16(self, bytes: &[u8; 16]) -> Self::F16;
 
-    /// Two to the power of `e - 127`, where `e` are the highest eight bits of each word; zero where they are zero.
+    /// 2^(`e` - 127) with `e` the highest eight bits of each word; zero if they are zero.
     fn powers16(self, words: &[u32; 16]) -> Self::F16;
 
-    /// Asks for the four cache lines from `items[index]` on, or from `values[index]` on where `second`. Only a hint:
-    /// an index beyond the end is harmless, and which of the two it is costs no branch.
+    /// Prefetches the four cache lines from `items[index]` on, or from `values[index]` on if `second`. Only a
+    /// hint: an index beyond the end is harmless. The choice between both costs no branch.
     fn prefetch<T>(self, items: &[T], values: &[f32], second: bool, index: usize);
 
-    /// Three corners by three coordinates from nine runs of `stride` floats at `values[start..]`, run `3 c + k`
-    /// holding coordinate `k` of corner `c`; coordinates in the order of `axes` (each below 3). `None` where
-    /// eight floats from the start of a run are not all in the slice.
+    /// Three corners by three coordinates from nine runs of `stride` floats at `values[start..]`. Run
+    /// `3 c + k` holds coordinate `k` of corner `c`; coordinates in the order of `axes` (each below 3).
+    /// `None` if eight floats from the start of a run are not all in the slice.
     fn load8x9(
         self,
         values: &[f32],
@@ -237,7 +236,7 @@ pub trait Simd: Copy {
         axes: [usize; 3],
     ) -> Option<[[Self::F8; 3]; 3]>;
 
-    /// One of the triangles of [`Simd::load8x9`] in all of sixteen lanes: the floats at the start of its runs.
+    /// First triangle of [`Simd::load8x9`] in all of sixteen lanes: the floats at the start of its runs.
     fn splat16x9(
         self,
         values: &[f32],

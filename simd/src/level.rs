@@ -1,13 +1,13 @@
-//! The instruction sets a kernel can be compiled for, and which of them this processor has.
+//! SIMD levels: the instruction sets that kernels are compiled for, and their detection.
 //!
-//! A level is a value: detected once, capped at will, passed down. Nothing here is global.
+//! A level is a value: detected once, capped if wanted, passed down. Nothing is global.
 
 use crate::{Baseline, Simd};
 
-/// A tier of SIMD instructions. Ordered: a higher tier holds all of the lower ones.
+/// Tier of SIMD instructions. A higher tier contains all lower ones.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug, Hash)]
 pub enum Tier {
-    /// What the build target guarantees: SSE2, NEON, simd128 or plain scalar code, through `wide`.
+    /// Instructions of the build target: SSE2, NEON, simd128 or scalar code, through `wide`.
     Baseline,
     /// x86-64-v3: AVX2, FMA, F16C, BMI1/2, LZCNT, MOVBE, POPCNT.
     Avx2,
@@ -19,7 +19,7 @@ impl Tier {
     /// All tiers, lowest first.
     pub const ALL: [Tier; 3] = [Tier::Baseline, Tier::Avx2, Tier::Avx512];
 
-    /// Its name on the command line.
+    /// Name on the command line.
     pub const fn name(self) -> &'static str {
         match self {
             Tier::Baseline => "baseline",
@@ -28,33 +28,34 @@ impl Tier {
         }
     }
 
-    /// The tier of that name.
+    /// Tier of that name.
     pub fn named(name: &str) -> Option<Tier> {
         Tier::ALL.into_iter().find(|tier| tier.name() == name)
     }
 }
 
-/// A tier that this processor is known to have. Cannot be made otherwise than by [`Level::detect`],
-/// by [`Level::BASELINE`], or lower from higher.
+/// Tier that this processor is known to have. Its only sources are [`Level::detect`], [`Level::BASELINE`],
+/// and a higher level.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug, Hash)]
 pub struct Level(Tier);
 
-/// Work to be compiled once per level and run by [`Level::dispatch`].
+/// Work that is compiled once per level and run by [`Level::dispatch`].
 ///
-/// `run` must be `#[inline(always)]`, and so must all that it calls in its hot part: what is not
-/// inlined is compiled for the baseline.
+/// `run` and everything that it calls in its hot part must be `#[inline(always)]`: functions that are not
+/// inlined are compiled for the baseline.
 pub trait Kernel {
-    /// What it returns.
+    /// Result.
     type Out;
-    /// The work, with the lanes that `simd` makes.
+    /// Runs the work with lanes made by `simd`.
     fn run<S: Simd>(self, simd: S) -> Self::Out;
 }
 
 impl Level {
-    /// What every processor of the build target has.
+    /// Level that every processor of the build target has.
     pub const BASELINE: Level = Level(Tier::Baseline);
 
-    /// The highest level of this processor. Without the feature `std`: what the build target guarantees.
+    /// Highest level of this processor; without the feature `std` the highest that the build target
+    /// guarantees.
     pub fn detect() -> Level {
         #[cfg(target_arch = "x86_64")]
         {
@@ -68,7 +69,7 @@ impl Level {
         Level::BASELINE
     }
 
-    /// This level, or `cap` where that is lower.
+    /// This level, or `cap` if that is lower.
     pub fn capped(self, cap: Tier) -> Level {
         Level(self.0.min(cap))
     }
@@ -78,12 +79,12 @@ impl Level {
         Tier::ALL.into_iter().filter(move |&tier| tier <= self.0).map(Level)
     }
 
-    /// Its tier.
+    /// Tier.
     pub const fn tier(self) -> Tier {
         self.0
     }
 
-    /// Its name on the command line.
+    /// Name on the command line.
     pub const fn name(self) -> &'static str {
         self.0.name()
     }

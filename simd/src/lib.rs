@@ -1,10 +1,10 @@
 //! SIMD lanes, run-time levels and batch kernels.
 //!
-//! The only crate of the project with `unsafe`: everything above it forbids it. A kernel is written
-//! once, generic over a [`Simd`] token, and entered once per batch through [`Level::dispatch`]: that
-//! call holds the only `#[target_feature]` functions, so everything inlined below it is compiled for
-//! the level. The lanes of a level can only be made from its token, and the token only by `dispatch`:
-//! safe code cannot execute an instruction that the processor lacks.
+//! This is the only crate of the project with `unsafe`; all others forbid it. A kernel is written once,
+//! generic over a [`Simd`] token, and entered once per batch through [`Level::dispatch`]. That call holds the
+//! only `#[target_feature]` functions, so that everything inlined below it is compiled for the level. The
+//! lanes of a level can only be made from its token, and the token only by `dispatch`: safe code cannot
+//! execute an instruction that the processor lacks.
 #![no_std]
 
 #[cfg(any(test, feature = "std"))]

@@ -1,40 +1,40 @@
-//! The stack of a traversal: what was put aside, and where the ray enters it.
+//! Traversal stack: items, each with the distance at which the ray enters it.
 
 use core::mem::MaybeUninit;
 
-/// Most items on a stack.
+/// Largest number of items on a stack.
 pub const STACK: usize = 704;
 
-/// A traversal stack. Making one touches none of its memory.
+/// Traversal stack. Its construction touches none of its memory.
 #[derive(Clone, Debug)]
 pub struct Stack {
     pub(crate) items: MaybeUninit<[u32; STACK]>,
     pub(crate) entries: MaybeUninit<[f32; STACK]>,
-    /// All items and entries below are written; at most [`STACK`].
+    /// Number of items. All items and entries below it are written; at most [`STACK`].
     pub(crate) height: usize,
 }
 
 impl Stack {
-    /// Empty.
+    /// Empty stack.
     #[inline(always)]
     pub const fn new() -> Self {
         Self { items: MaybeUninit::uninit(), entries: MaybeUninit::uninit(), height: 0 }
     }
 
-    /// How many items there are.
+    /// Number of items.
     #[inline(always)]
     pub fn height(&self) -> usize {
         self.height
     }
 
-    /// Nothing but `item`, with the entry zero.
+    /// Leaves only `item`, with entry zero.
     #[inline(always)]
     pub fn restart(&mut self, item: u32) {
         self.height = 0;
         self.push_if(true, item, 0.0);
     }
 
-    /// Puts an item on top if it is `wanted`. Nothing happens to a full stack.
+    /// Pushes an item if it is `wanted`. Does nothing on a full stack.
     #[inline(always)]
     pub fn push_if(&mut self, wanted: bool, item: u32, entry: f32) {
         if self.height < STACK {
@@ -47,7 +47,7 @@ impl Stack {
         }
     }
 
-    /// Takes the item on top.
+    /// Pops the top item.
     #[inline(always)]
     pub fn pop(&mut self) -> Option<u32> {
         self.height = self.height.checked_sub(1)?;
@@ -55,7 +55,7 @@ impl Stack {
         Some(unsafe { self.items.as_ptr().cast::<u32>().add(self.height).read() })
     }
 
-    /// The item and entry at `at`, counted from the bottom.
+    /// Item and entry at `at`, counted from the bottom.
     #[inline(always)]
     pub fn get(&self, at: usize) -> Option<(u32, f32)> {
         // SAFETY: what is below the height was written.
@@ -67,7 +67,7 @@ impl Stack {
         })
     }
 
-    /// Forgets all but the `height` lowest.
+    /// Removes all but the `height` lowest items.
     #[inline(always)]
     pub fn truncate(&mut self, height: usize) {
         self.height = self.height.min(height);
@@ -80,11 +80,11 @@ impl Default for Stack {
     }
 }
 
-/// Memory for `N` stacks, untouched: a stack is large, and to make many by value would copy them all.
+/// Uninitialised memory for `N` stacks: a stack is large, and making many by value would copy them all.
 pub struct StackMemory<const N: usize>(MaybeUninit<[Stack; N]>);
 
 impl<const N: usize> StackMemory<N> {
-    /// Untouched memory.
+    /// Uninitialised memory.
     #[inline(always)]
     pub const fn new() -> Self {
         Self(MaybeUninit::uninit())
@@ -95,7 +95,7 @@ impl<const N: usize> StackMemory<N> {
     pub fn stacks(&mut self) -> &mut [Stack; N] {
         let first = self.0.as_mut_ptr().cast::<Stack>();
         for i in 0..N {
-            // Volatile: plain writes the compiler makes one of the whole memory, 180 kB for 32 stacks.
+            // Volatile: the compiler merges plain writes into one of the whole memory, 180 kB for 32 stacks.
             // SAFETY: stack `i` is inside, and a height may be written over whatever is there.
             unsafe { (&raw mut (*first.add(i)).height).write_volatile(0) };
         }

@@ -1,9 +1,9 @@
-//! Walker's alias table: a discrete distribution sampled in constant time.
+//! Alias table (Walker 1977): a discrete distribution sampled in constant time.
 
 use crate::memory::{Arena, Footprint, OutOfMemory};
 use bytemuck::{Pod, Zeroable};
 
-/// One bin: `keep` of 2^32 stays here, the rest goes to `alias`.
+/// Bin: `keep` of 2^32 selects its own item, the rest selects `alias`.
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct AliasEntry {
@@ -12,7 +12,7 @@ pub struct AliasEntry {
     pdf: f32,
 }
 
-/// Items in proportion to their weights.
+/// Distribution over items in proportion to their weights.
 #[derive(Clone, Copy, Debug)]
 pub struct AliasTable<'m> {
     entries: &'m [AliasEntry],
@@ -24,12 +24,12 @@ impl<'m> AliasTable<'m> {
         Footprint::default().slice::<AliasEntry>(count)
     }
 
-    /// A table of `count` items. Weights that are negative or not finite count as zero; where all are
-    /// zero, all items are alike.
+    /// Table of `count` items. Weights that are negative or not finite count as zero; if all are zero, the
+    /// distribution is uniform.
     ///
-    /// Two sweeping hands fill the bins without a work list (Hübschle-Schneider and Sanders 2019, "Parallel
-    /// Weighted Random Sampling", PSA): `light` walks over the items below the average, `heavy` over the
-    /// others, and what is left of the heavy one is carried.
+    /// Two sweeps fill the bins without a work list (Hübschle-Schneider and Sanders 2019, "Parallel Weighted
+    /// Random Sampling", PSA): `light` advances over the items below the average, `heavy` over the others,
+    /// and the remainder of the heavy item is carried.
     pub fn build(
         count: usize,
         weight: impl Fn(usize) -> f32,
@@ -63,7 +63,7 @@ impl<'m> AliasTable<'m> {
                 left += scaled(following) - 1.0;
             }
         }
-        // Rounding can leave a light item over: it is one of no weight, or within rounding of the average.
+        // Rounding can leave a light item over: its weight is zero, or within rounding of the average.
         while let (Some(l), true) = (light, total > 0.0) {
             if scaled(l) == 0.0 {
                 let any = (0..count).find(|&i| scaled(i) > 0.0).unwrap_or(l);
@@ -74,8 +74,8 @@ impl<'m> AliasTable<'m> {
         Ok(Self { entries })
     }
 
-    /// An item for `u` in [0, 1), its probability, and a fresh number in [0, 1) made of what is left of `u`.
-    /// `None` from an empty table.
+    /// Samples an item at `u` in [0, 1). Returns the item, its probability, and the remainder of `u` rescaled
+    /// to [0, 1). `None` from an empty table.
     #[inline]
     pub fn sample(&self, u: f32) -> Option<(usize, f32, f32)> {
         let scaled = u * self.entries.len() as f32;
@@ -91,7 +91,7 @@ impl<'m> AliasTable<'m> {
         Some((item, self.pdf(item), rest))
     }
 
-    /// The probability of `item`; zero where there is none such.
+    /// Probability of `item`; zero if it does not exist.
     #[inline]
     pub fn pdf(&self, item: usize) -> f32 {
         self.entries.get(item).map_or(0.0, |e| e.pdf)
@@ -100,7 +100,7 @@ impl<'m> AliasTable<'m> {
 
 const TWO_POW_32: f32 = 4_294_967_296.0;
 
-/// A number of 0 … 1 in units of 2^-32.
+/// Number of 0 … 1 in units of 2^-32.
 fn fraction(x: f64) -> u32 {
     (x * f64::from(TWO_POW_32)) as u32
 }

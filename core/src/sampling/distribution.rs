@@ -1,36 +1,36 @@
-//! A piecewise constant density over the unit square, given by weights on a grid: rows by their sums, then
-//! the cell in the row. Cumulative sums are 32-bit integers, so that the density is exactly what is sampled;
-//! a coarse index into each says where to look (Chen and Asau 1974), so that a sample costs two or three
-//! lines of memory however large the grid is.
+//! Piecewise constant density over the unit square, by weights on a grid: a row is chosen by its sum, then a
+//! cell of the row. Cumulative sums are 32-bit integers, so that the density is exactly that of the samples.
+//! A coarse index into each (Chen and Asau 1974) gives the start of the search, so that a sample reads two or
+//! three cache lines at any size of the grid.
 
 use crate::memory::{Arena, Footprint, OutOfMemory};
 
-/// Probabilities of cells, in the arena's memory.
+/// Probabilities of cells, in memory of the arena.
 #[derive(Clone, Copy, Debug)]
 pub struct Distribution2d<'m> {
     width: usize,
     height: usize,
-    /// For each row the ends of its cells, in 2^-32 of the row; the last end is `u32::MAX`.
+    /// Ends of the cells of each row, in 2^-32 of the row; the last end is `u32::MAX`.
     cells: &'m [u32],
     /// Ends of the rows.
     rows: &'m [u32],
-    /// For each row, where to look for its cells: see [`index`].
+    /// For each row an index of its cells: see [`index`].
     cell_index: &'m [u32],
-    /// Where to look for rows.
+    /// Index of the rows.
     row_index: &'m [u32],
 }
 
-/// Bins for each entry of an index.
+/// Bins per entry of an index.
 const BINS_PER_ENTRY: usize = 8;
 
-/// A sampled cell and where in it.
+/// Sampled cell and position in it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cell {
     /// Column.
     pub x: u32,
     /// Row.
     pub y: u32,
-    /// Place in the cell, [0, 1)².
+    /// Position in the cell, [0, 1)².
     pub offset: [f32; 2],
     /// Density over the unit square; its integral is 1.
     pub pdf: f32,
@@ -46,8 +46,8 @@ impl<'m> Distribution2d<'m> {
             .slice::<u32>(entries(height))
     }
 
-    /// From `weight(x, y)`, called once for each cell. Weights that are negative or not finite count as
-    /// zero; where all are zero, all cells are alike.
+    /// Distribution by `weight(x, y)`, called once for each cell. Weights that are negative or not finite
+    /// count as zero; if all are zero, the distribution is uniform.
     pub fn build(
         width: usize,
         height: usize,
@@ -77,7 +77,7 @@ impl<'m> Distribution2d<'m> {
         Ok(Self { width, height, cells, rows, cell_index, row_index })
     }
 
-    /// The cell at `u`, monotone in both coordinates. `None` where there are no cells.
+    /// Samples the cell at `u`, monotonically in both coordinates. `None` without cells.
     #[inline]
     pub fn sample(&self, u: [f32; 2]) -> Option<Cell> {
         let (y, v, row_probability) = pick(self.rows, self.row_index, u[1])?;
@@ -88,22 +88,22 @@ impl<'m> Distribution2d<'m> {
         Some(Cell { x: x as u32, y: y as u32, offset: [u, v], pdf })
     }
 
-    /// The density over the unit square in cell (x, y); zero outside.
+    /// Density over the unit square in cell (x, y); zero outside.
     #[inline]
     pub fn pdf(&self, x: usize, y: usize) -> f32 {
         let probability = probability(self.rows, y) * probability(self.row(y), x);
         probability * (self.width as f32 * self.height as f32)
     }
 
-    /// The density over the unit square at a point of [0, 1]².
+    /// Density over the unit square at a point of [0, 1]².
     #[inline]
     pub fn pdf_at(&self, [u, v]: [f32; 2]) -> f32 {
         let cell = |x: f32, count: usize| ((x * count as f32) as usize).min(count.saturating_sub(1));
         self.pdf(cell(u, self.width), cell(v, self.height))
     }
 
-    /// The `u` that [`Distribution2d::sample`] takes to a point of [0, 1]², and the density there. `None`
-    /// where it takes none there.
+    /// Inverse of [`Distribution2d::sample`]: the `u` of a point of [0, 1]², and the density there. `None` if
+    /// the density is zero.
     #[inline]
     pub fn invert(&self, [x, y]: [f32; 2]) -> Option<([f32; 2], f32)> {
         let (y, v, row_probability) = unpick(self.rows, y * self.height as f32)?;
@@ -111,7 +111,7 @@ impl<'m> Distribution2d<'m> {
         Some(([u, v], row_probability * cell_probability * (self.width as f32 * self.height as f32)))
     }
 
-    /// Edges of a cell in the unit square.
+    /// Edge lengths of a cell in the unit square.
     #[inline]
     pub fn cell_size(&self) -> [f32; 2] {
         [1.0 / self.width as f32, 1.0 / self.height as f32]
@@ -124,7 +124,7 @@ impl<'m> Distribution2d<'m> {
     }
 }
 
-/// Turns weights (as bits of floats) into cumulative sums in units of 2^-32 of their total. Returns the
+/// Converts weights (as bits of floats) to cumulative sums in units of 2^-32 of their total. Returns the
 /// total.
 fn accumulate(weights: &mut [u32]) -> f64 {
     let total: f64 = weights.iter().map(|&w| f64::from(f32::from_bits(w))).sum();
@@ -139,20 +139,19 @@ fn accumulate(weights: &mut [u32]) -> f64 {
         sum += weight;
         *w = (sum * scale + 0.5) as u32;
     }
-    // All that rounding left over belongs to the last cell that has weight; casts have saturated the rest.
+    // The last cell with weight takes the remainder of rounding. Casts have saturated the other ends.
     for w in weights.iter_mut().skip(last_with_weight) {
         *w = u32::MAX;
     }
     total
 }
 
-/// Entries of an index of `bins` bins.
+/// Number of entries of an index of `bins` bins.
 const fn entries(bins: usize) -> usize {
     bins.div_ceil(BINS_PER_ENTRY)
 }
 
-/// Fills `places`: entry e is the first bin whose end lies beyond e/n of the whole, n being the number of
-/// entries.
+/// Fills `places`: entry e of n is the first bin whose end is beyond e/n of the total.
 fn index(ends: &[u32], places: &mut [u32]) {
     let mut bin = 0;
     let count = places.len() as u64;
@@ -165,7 +164,7 @@ fn index(ends: &[u32], places: &mut [u32]) {
     }
 }
 
-/// Start and end of bin `i`, the end of the last one being 2^32.
+/// Start and end of bin `i`; the end of the last bin is 2^32.
 #[inline]
 fn interval(ends: &[u32], i: usize) -> Option<(u64, u64)> {
     let end = *ends.get(i)?;
@@ -179,8 +178,8 @@ fn probability(ends: &[u32], i: usize) -> f32 {
     interval(ends, i).map_or(0.0, |(start, end)| (end - start) as f32 / 4_294_967_296.0)
 }
 
-/// The bin that holds place `x` in bins, the `u` at which [`pick`] finds that place, and the bin's
-/// probability.
+/// Bin at position `x` in units of bins, the `u` of [`pick`] for that position, and the probability of the
+/// bin.
 #[inline]
 fn unpick(ends: &[u32], x: f32) -> Option<(usize, f32, f32)> {
     let i = (x as usize).min(ends.len().saturating_sub(1));
@@ -190,7 +189,7 @@ fn unpick(ends: &[u32], x: f32) -> Option<(usize, f32, f32)> {
     (width > 0.0).then_some((i, u.min(super::ONE_MINUS_EPSILON), width / 4_294_967_296.0))
 }
 
-/// The bin at `u`, where in it, and its probability.
+/// Bin at `u`, position in it, and its probability.
 #[inline]
 fn pick(ends: &[u32], places: &[u32], u: f32) -> Option<(usize, f32, f32)> {
     // 24 bits of u: at most 2^32 - 256, below the last end.
@@ -217,7 +216,7 @@ mod tests {
         let bytes = Distribution2d::footprint(width, height).bytes();
         let mut lines = std::vec![Line([0; 64]); bytes / 64];
         let mut arena = Arena::new(bytemuck::cast_slice_mut(&mut lines));
-        // A row of nothing, and cells of nothing in the others.
+        // A row of zeros, and cells of zero in the other rows.
         let weight = |x: usize, y: usize| if y == 3 { 0.0 } else { (x * y % 5) as f32 };
         let distribution =
             Distribution2d::build(width, height, weight, &mut arena).expect("it is the footprint");
@@ -228,7 +227,7 @@ mod tests {
             let at = [(cell.x as f32 + cell.offset[0]) / 13.0, (cell.y as f32 + cell.offset[1]) / 7.0];
             let (back, pdf) = distribution.invert(at).expect("it was sampled");
             let near = |a: f32, b: f32| (a - b).abs() < 1e-4;
-            // At a border rounding may lead to the cell beside, of another density.
+            // At a border rounding may lead to the neighbouring cell, which has another density.
             let inside = cell.offset.iter().all(|x| (0.001..0.999).contains(x));
             assert!(!inside || near(back[0], u[0]) && near(back[1], u[1]), "{u:?} {back:?}");
             assert!(!inside || near(pdf, cell.pdf), "{u:?} {pdf} {}", cell.pdf);

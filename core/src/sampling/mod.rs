@@ -1,6 +1,5 @@
-//! Where random numbers come from and what they are bent into: Owen-scrambled Sobol' streams, a hash for
-//! decisions outside them, mutations of primary sample space, warps of the unit square, and discrete
-//! distributions in arena memory.
+//! Sampling: Owen-scrambled Sobol' streams, hashed random numbers, mutations of primary sample space, warps
+//! of the unit square, and discrete distributions in arena memory.
 
 mod alias;
 mod distribution;
@@ -19,11 +18,11 @@ pub use primary_sample::Mutation;
 pub use sobol::Sampler;
 pub use trigonometry::sin_cos_turns;
 
-/// A 32-bit fraction as a float in [0, 1): the upper 24 bits, so that 1 is never reached.
+/// Float in [0, 1) from a 32-bit fraction: the upper 24 bits, so that 1 is never reached.
 #[inline]
 pub const fn unit_float(bits: u32) -> f32 {
     (bits >> 8) as f32 * (1.0 / (1u32 << 24) as f32)
 }
 
-/// The largest float below 1.
+/// Largest float below 1.
 pub const ONE_MINUS_EPSILON: f32 = 1.0 - f32::EPSILON / 2.0;

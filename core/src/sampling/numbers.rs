@@ -1,15 +1,15 @@
-//! Random numbers of a light path: numbers in [0, 1) by the names of their dimensions. Those of a [`Sampler`]
-//! are points of a sequence; those of Markov chains are a [`Mutation`](super::Mutation) away from a point.
+//! Random numbers of a light path by dimension. A [`Sampler`] gives points of a sequence; a Markov chain
+//! gives points that differ by a [`Mutation`](super::Mutation).
 
 use super::Sampler;
 
-/// Numbers in [0, 1). A dimension gives the same ones whenever it is asked, by pairs or one alone, of which
-/// the one is the first of the pair.
+/// Numbers in [0, 1). A dimension gives the same numbers at every call; [`Numbers::single`] is the first of
+/// the pair.
 pub trait Numbers {
     /// One number.
     fn single(&self, dimension: u32) -> f32;
 
-    /// Two.
+    /// Two numbers.
     fn pair(&self, dimension: u32) -> [f32; 2];
 }
 

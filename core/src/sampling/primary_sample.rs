@@ -1,36 +1,37 @@
-//! Mutations of primary sample space (Kelemen et al. 2002): a light path is a point of the unit cube, the
-//! random numbers that make it, and a Markov chain moves that point.
+//! Mutations of primary sample space (Kelemen et al. 2002). The random numbers of a light path are a point of
+//! the unit cube, and a Markov chain moves that point.
 //!
-//! A large step draws all numbers anew. A small step changes each by a distance between s and s / 64,
-//! distributed evenly over its logarithm, up or down alike and around the ends of the unit interval. Both are
-//! as likely as their reverse, so that a proposal is accepted with min(1, f(v) / f(u)).
+//! A large step draws all numbers anew. A small step changes each number by a distance between s / 64 and s,
+//! uniformly distributed on a logarithmic scale, up or down with equal probability, and wraps at the ends of
+//! the unit interval. Both are as likely as their reverse, so that the acceptance probability is min(1, f(v)
+//! / f(u)).
 //!
-//! A departure from the paper: s is not fixed, but drawn for each small step from 1/512 to 1/8, evenly over
-//! its logarithm. No single size suits a large lamp and a small one.
+//! Departure from the paper: s is drawn for each small step, log-uniformly from 1/512 to 1/8. No fixed size
+//! suits both large and small emitters.
 //!
-//! A third kind of step draws some numbers anew and keeps the others: a tail of a subpath, for instance. It
-//! is as likely as its reverse as long as the choice of those numbers does not depend on them.
+//! A third kind of step draws some numbers anew and keeps the others, for instance a tail of a subpath. It is
+//! as likely as its reverse if the choice of the numbers does not depend on their values.
 //!
-//! A mutation follows from its key and number alone.
+//! A mutation is determined by its key and number.
 
 use super::{ONE_MINUS_EPSILON, Random};
 
-/// The largest change of a number by a small step.
+/// Largest change of a number by a small step.
 const LARGEST: f32 = 0.125;
 
-/// The range of step sizes, and of changes within a step, as a binary logarithm.
+/// Range of step sizes, and of changes within a step, in octaves.
 const OCTAVES: f32 = 6.0;
 
-/// The range of changes of wide slots.
+/// Range of changes of wide slots, in octaves.
 const WIDE_OCTAVES: f32 = 1.0;
 
-/// Counters of the step's own random numbers; slots of points are far below.
+/// Counters of the step's own random numbers, far above the slots of points.
 const SIZE: u32 = u32::MAX;
 const KIND: u32 = u32::MAX - 1;
 const ACCEPTANCE: u32 = u32::MAX - 2;
 const CHOICE: u32 = u32::MAX - 3;
 
-/// One step from a point of primary sample space.
+/// Step from a point of primary sample space.
 #[derive(Clone, Copy, Debug)]
 pub struct Mutation {
     random: Random,
@@ -42,7 +43,7 @@ impl Mutation {
         Self { random: Random::new(key, number) }
     }
 
-    /// The number in [0, 1) that decides which kind of step it is.
+    /// Number in [0, 1) that decides the kind of step.
     pub fn kind(&self) -> f32 {
         self.random.single(KIND)
     }
@@ -52,24 +53,24 @@ impl Mutation {
         [self.random.single(CHOICE), self.random.single(CHOICE - 1)]
     }
 
-    /// The number in [0, 1) that decides whether the proposal is accepted.
+    /// Number in [0, 1) that decides the acceptance of the proposal.
     pub fn acceptance(&self) -> f32 {
         self.random.single(ACCEPTANCE)
     }
 
-    /// Its random numbers, by the slots of a point. Numbers that a point does not store are drawn from here.
+    /// Random numbers of the step by the slots of a point, also for numbers that the point does not store.
     pub fn random(&self) -> Random {
         self.random
     }
 
-    /// A step that draws all numbers for which `is_new` anew, in [0, 1).
+    /// Draws the numbers for which `is_new` anew, in [0, 1), and copies the others.
     pub fn renew(&self, point: &[f32], proposal: &mut [f32], is_new: impl Fn(usize) -> bool) {
         for (slot, (proposed, u)) in proposal.iter_mut().zip(point).enumerate() {
             *proposed = if is_new(slot) { self.random.single(slot as u32) } else { *u };
         }
     }
 
-    /// A small step. Those of the first `wide` slots are of the whole size.
+    /// Small step. The first `wide` slots change by at least half the size of the step.
     pub fn perturb(&self, point: &[f32], proposal: &mut [f32], wide: usize) {
         let slots = proposal.iter_mut().zip(0..);
         let size = LARGEST * power_of_two(-OCTAVES * self.random.single(SIZE));
@@ -78,7 +79,7 @@ impl Mutation {
             let chance = (bits >> 8) as f32 * (1.0 / (1u32 << 24) as f32);
             let octaves = if (slot as usize) < wide { WIDE_OCTAVES } else { OCTAVES };
             let change = size * power_of_two(-octaves * chance);
-            // The lowest bit is not in the chance.
+            // The lowest bit is not part of `chance`.
             let moved = if bits & 1 == 0 { u + change } else { u - change };
             let wrapped = moved + f32::from(u8::from(moved < 0.0)) - f32::from(u8::from(moved >= 1.0));
             *proposed = wrapped.clamp(0.0, ONE_MINUS_EPSILON);
@@ -86,7 +87,7 @@ impl Mutation {
     }
 }
 
-/// About 2^x for x in [-64, 0], within 0.02 %: the size of a step needs no more.
+/// Approximation of 2^x for x in [-64, 0] within 0.02 %, enough for the size of a step.
 fn power_of_two(x: f32) -> f32 {
     let whole = (x + 64.0) as i32 - 64;
     let rest = x - whole as f32;
@@ -98,7 +99,7 @@ fn power_of_two(x: f32) -> f32 {
 mod tests {
     use super::*;
 
-    /// The proposal for `u` in slot `slot` of a step that is small.
+    /// Proposal for `u` in slot `slot` of a small step.
     fn small(key: u32, number: u32, u: f32, slot: usize) -> f32 {
         let mut proposal = [0.0; 8];
         Mutation::new(key, number).perturb(&[u; 8], &mut proposal, 0);
@@ -127,7 +128,7 @@ mod tests {
             let change = (small(9, number, 0.5, 3) - 0.5).abs() / LARGEST;
             octaves[(-change.log2()).clamp(0.0, 11.9) as usize] += 1;
         }
-        // The sum of two even distributions over six octaves: a triangle.
+        // The sum of two uniform distributions over six octaves: a triangle.
         for (octave, &count) in octaves.iter().enumerate() {
             let expected = 20_000.0 / 36.0 * (6.0 - (octave as f64 - 5.5).abs());
             assert!((f64::from(count) - expected).abs() < 5.0 * expected.sqrt() + 5.0, "{octaves:?}");
@@ -136,7 +137,7 @@ mod tests {
 
     #[test]
     fn a_chain_that_accepts_all_steps_is_uniform() {
-        // Chi-squared with 15 degrees of freedom over independent chains; 37.7 is the level of 0.1 %.
+        // Chi-squared with 15 degrees of freedom over independent chains; 37.7 is the 0.1 % level.
         let mut bins = [0u32; 16];
         for chain in 0..4000 {
             let mut point = [0.3, 0.99];

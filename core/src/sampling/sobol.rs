@@ -1,30 +1,31 @@
 //! Owen-scrambled Sobol' points by hashing (Burley 2020, "Practical Hash-based Owen Scrambling").
 //!
-//! A pair of dimensions is the (0,2)-sequence of Sobol' dimensions 0 and 1. For each pair the sample index
-//! is shuffled by an Owen scramble of its own (which keeps every aligned power-of-two block together, so
-//! every power-of-two prefix stays a net), then both coordinates are Owen-scrambled. Pairs are thereby
-//! independent of each other (padding), and there are as many as anybody asks for.
+//! A pair of dimensions is the (0,2)-sequence of Sobol' dimensions 0 and 1. For each pair the sample index is
+//! shuffled by an Owen scramble of its own, which permutes every aligned power-of-two block within itself, so
+//! that every power-of-two prefix stays a net. Both coordinates are then Owen-scrambled. Pairs are thus
+//! independent of each other (padding), and their number is unlimited.
 //!
-//! Even and odd samples of a pixel come from two such sequences with keys of their own: independent
-//! replicates, without which the error of their mean could not be estimated (docs/decisions/0009).
+//! Even and odd samples of a pixel come from two such sequences with different keys: independent replicates,
+//! which the estimate of their mean's error requires (docs/decisions/0009).
 //!
 //! Departures from the paper:
-//! 1. The Laine-Karras hash has Vegdahl's constants (2021, "Building a Better LK Hash"), which come closer
-//!    to a true Owen scramble.
-//! 2. The hash works on reversed bits. Dimension 0 of Sobol' is the reversed index, dimension 1 the Pascal
-//!    matrix mod 2 times it; both are wanted reversed, so neither reversal is done (five shift-xor steps
-//!    make the matrix product, Ahmed 2024, "An Implementation Algorithm of 2D Sobol Sequence").
-//! 3. Four dimensions can be asked for at once (`quad`): two (0,2)-sequences that are stratified jointly
-//!    as well. At 16, 64 and 256 samples their projections are better than those of Sobol' dimensions
-//!    0 to 3 with the direction numbers of Joe and Kuo 2008, whose last two are no (0,2)-sequence.
+//! 1. The Laine-Karras hash has Vegdahl's constants (2021, "Building a Better LK Hash"), which approximate a
+//!    true Owen scramble more closely.
+//! 2. The hash works on reversed bits. Dimension 0 of Sobol' is the reversed index, dimension 1 the product
+//!    of the Pascal matrix mod 2 with it. The hash needs both reversed, so that neither reversal is done.
+//!    Five shift-xor steps compute the matrix product (Ahmed 2024, "An Implementation Algorithm of 2D Sobol
+//!    Sequence").
+//! 3. `quad` gives four dimensions at once: two (0,2)-sequences that are also stratified jointly. At 16, 64
+//!    and 256 samples their projections are better than those of Sobol' dimensions 0 to 3 with the direction
+//!    numbers of Joe and Kuo 2008, whose last two are no (0,2)-sequence.
 //!
-//! Integers only, up to the last conversion: the same bits on every machine.
+//! Everything before the last conversion is integer arithmetic: the same bits on every machine.
 
 use super::hash::{GOLDEN, mix};
 use super::unit_float;
 
-/// The streams of one sample of one pixel. Dimensions are names: the same one always gives the same
-/// numbers, and any two are independent. 2^32 samples of pixels below 2^31.
+/// Random numbers of one sample of one pixel, by dimension. A dimension always gives the same numbers, and
+/// different dimensions are independent. Up to 2^32 samples of pixels below 2^31.
 ///
 /// ```
 /// use halflight_core::sampling::Sampler;
@@ -39,14 +40,14 @@ pub struct Sampler {
 }
 
 impl Sampler {
-    /// Sample number `sample` of `pixel` in the picture of `seed`: even ones are the points of replicate 0,
-    /// odd ones those of replicate 1.
+    /// Sample number `sample` of `pixel` in the picture of `seed`. Even samples are the points of replicate
+    /// 0, odd samples those of replicate 1.
     #[inline]
     pub const fn new(seed: u32, pixel: u32, sample: u32) -> Self {
         Self::replicate(seed, pixel, sample & 1, sample >> 1)
     }
 
-    /// Point number `index` of a sequence, 0 or 1, of `pixel` in the picture of `seed`. The two are
+    /// Point number `index` of replicate 0 or 1 of `pixel` in the picture of `seed`. The replicates are
     /// independent.
     #[inline]
     pub const fn replicate(seed: u32, pixel: u32, replicate: u32, index: u32) -> Self {
@@ -54,14 +55,15 @@ impl Sampler {
         Self { key: mix(place.wrapping_add(GOLDEN)), reversed_index: index.reverse_bits() }
     }
 
-    /// One number in [0, 1): every power-of-two prefix of a replicate has one in each of its equal parts.
+    /// Number in [0, 1). Every power-of-two prefix of a replicate has one number in each of its equal
+    /// intervals.
     #[inline]
     pub fn single(&self, dimension: u32) -> f32 {
         let keys = self.keys(dimension);
         unit_float(owen(self.shuffled_index(keys), (keys >> 32) as u32))
     }
 
-    /// A point of [0, 1)²: every power-of-two prefix of a replicate is a (0,2)-net.
+    /// Point of [0, 1)². Every power-of-two prefix of a replicate is a (0,2)-net.
     #[inline]
     pub fn pair(&self, dimension: u32) -> [f32; 2] {
         let keys = self.keys(dimension);
@@ -71,8 +73,8 @@ impl Sampler {
         [unit_float(x), unit_float(y)]
     }
 
-    /// A point of [0, 1)⁴: both halves are (0,2)-sequences over a replicate, and all four numbers together
-    /// fill space more evenly than two independent pairs.
+    /// Point of [0, 1)⁴. Both halves are (0,2)-sequences over a replicate, and all four numbers together fill
+    /// space more evenly than two independent pairs.
     #[inline]
     pub fn quad(&self, dimension: u32) -> [f32; 4] {
         let keys = self.keys(dimension);
@@ -99,13 +101,13 @@ impl Sampler {
     }
 }
 
-/// Owen-scrambles a number that is given with its bits reversed, and turns it around.
+/// Owen-scrambles a number given with its bits reversed, and reverses them.
 #[inline]
 const fn owen(reversed: u32, key: u32) -> u32 {
     laine_karras(reversed, key).reverse_bits()
 }
 
-/// A hash in which a bit depends on itself and lower bits only: on reversed bits, an Owen scramble.
+/// Hash in which a bit depends on itself and lower bits only: on reversed bits, an Owen scramble.
 #[inline]
 const fn laine_karras(mut x: u32, key: u32) -> u32 {
     x ^= x.wrapping_mul(0x3d20_adea);
@@ -115,13 +117,13 @@ const fn laine_karras(mut x: u32, key: u32) -> u32 {
     x ^ x.wrapping_mul(0x53a2_2864)
 }
 
-/// The key of the second coordinate, out of bits of both halves.
+/// Key of the second coordinate, from bits of both halves.
 #[inline]
 const fn second_key(keys: u64) -> u32 {
     (keys.wrapping_mul(0xd6e8_feb8_6659_fd93) >> 32) as u32
 }
 
-/// The Pascal matrix mod 2 times `index`: Sobol' dimension 1 with its bits reversed.
+/// Product of the Pascal matrix mod 2 with `index`: Sobol' dimension 1 with its bits reversed.
 #[inline]
 const fn pascal(mut index: u32) -> u32 {
     index ^= index >> 16;
@@ -131,10 +133,10 @@ const fn pascal(mut index: u32) -> u32 {
     index ^ ((index >> 1) & 0x5555_5555)
 }
 
-/// Columns of the upper unitriangular matrix that turns the index of the first pair of a quad into that of
-/// the second. It permutes every aligned power-of-two block in itself, so the second pair is a
+/// Columns of the upper unitriangular matrix that maps the index of the first pair of a quad to that of the
+/// second. The map permutes every aligned power-of-two block within itself, so that the second pair is a
 /// (0,2)-sequence like the first. The columns were found by a beam search, block size by block size, for
-/// small t of all projections that mix both pairs; those after the fifteenth are random.
+/// small t of all projections that mix both pairs. Those after the fifteenth are random.
 const SECOND_PAIR: [u32; 32] = [
     0x0000_0001,
     0x0000_0002,
@@ -170,7 +172,7 @@ const SECOND_PAIR: [u32; 32] = [
     0xa82b_3d3a,
 ];
 
-/// For each nibble of an index the sum of its columns.
+/// Sum of the columns for each value of each nibble of an index.
 static SECOND_PAIR_SUMS: [[u32; 16]; 8] = {
     let mut sums = [[0u32; 16]; 8];
     let mut i = 0;
@@ -184,7 +186,7 @@ static SECOND_PAIR_SUMS: [[u32; 16]; 8] = {
     sums
 };
 
-/// The index of the second pair of a quad.
+/// Index of the second pair of a quad.
 #[inline]
 fn second_pair(index: u32) -> u32 {
     let mut sum = 0;

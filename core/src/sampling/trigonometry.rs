@@ -1,5 +1,5 @@
-//! Sine and cosine where the angle is known to lie in one turn: polynomials in f32, the same bits on every
-//! target and several times faster than a general routine.
+//! Sine and cosine of an angle within one turn: polynomials in f32, with the same bits on every target and
+//! several times faster than a general routine.
 
 use core::f32::consts::FRAC_PI_2;
 

@@ -1,12 +1,12 @@
-//! Warps of the unit square to the shapes of light transport, each with the density of what it makes.
-//! Continuous and of low distortion, so that the stratification of the square survives.
+//! Warps of the unit square to the domains of light transport, with their densities. They are continuous and
+//! of low distortion, so that the stratification of the square is preserved.
 
 use super::ONE_MINUS_EPSILON;
 use super::trigonometry::{sin_cos_octant, sin_cos_turns};
 use core::f32::consts::{FRAC_1_PI, FRAC_PI_4, TAU};
 use glam::{Vec2, Vec3};
 
-/// A point of the unit disk, uniform (Shirley and Chiu 1997, concentric map). Density 1/π.
+/// Uniform point of the unit disk (Shirley and Chiu 1997, concentric map). Density 1/π.
 #[inline]
 pub fn concentric_disk(u: [f32; 2]) -> Vec2 {
     let (x, y) = (2.0 * u[0] - 1.0, 2.0 * u[1] - 1.0);
@@ -19,7 +19,7 @@ pub fn concentric_disk(u: [f32; 2]) -> Vec2 {
     if steep { radius * Vec2::new(sin, cos) } else { radius * Vec2::new(cos, sin) }
 }
 
-/// The point of the square that [`concentric_disk`] takes to `point`.
+/// Inverse of [`concentric_disk`].
 #[inline]
 pub fn concentric_square(point: Vec2) -> [f32; 2] {
     let steep = point.y.abs() > point.x.abs();
@@ -33,8 +33,8 @@ pub fn concentric_square(point: Vec2) -> [f32; 2] {
     [x, y].map(|at| (0.5 * (at + 1.0)).clamp(0.0, ONE_MINUS_EPSILON))
 }
 
-/// A direction of the upper hemisphere with density [`cosine_hemisphere_pdf`]. Never in the horizon, where
-/// that is zero: z² is at least the rounding of 1 - x² - y².
+/// Direction of the upper hemisphere with density [`cosine_hemisphere_pdf`]. Never on the horizon, where the
+/// density is zero: z² is at least the rounding of 1 - x² - y².
 #[inline]
 pub fn cosine_hemisphere(u: [f32; 2]) -> Vec3 {
     const LEAST: f32 = f32::EPSILON / 2.0;
@@ -48,7 +48,7 @@ pub fn cosine_hemisphere_pdf(cos: f32) -> f32 {
     cos.max(0.0) * FRAC_1_PI
 }
 
-/// A uniform direction. Density 1 / 4π.
+/// Uniform direction. Density 1 / 4π.
 #[inline]
 pub fn uniform_sphere(u: [f32; 2]) -> Vec3 {
     let z = 1.0 - 2.0 * u[0];
@@ -57,7 +57,7 @@ pub fn uniform_sphere(u: [f32; 2]) -> Vec3 {
     Vec3::new(radius * cos, radius * sin, z)
 }
 
-/// The `u` that [`uniform_sphere`] takes to a unit direction.
+/// Inverse of [`uniform_sphere`] for a unit direction.
 #[inline]
 pub fn uniform_sphere_square(direction: Vec3) -> [f32; 2] {
     let turns = libm::atan2f(direction.y, direction.x) / TAU;
@@ -67,8 +67,8 @@ pub fn uniform_sphere_square(direction: Vec3) -> [f32; 2] {
 /// Density of [`uniform_sphere`].
 pub const UNIFORM_SPHERE_PDF: f32 = 0.25 * FRAC_1_PI;
 
-/// A uniform direction of the cone around +z; `one_minus_cos` is 1 − the cosine of its half-angle, which
-/// keeps its precision where the cone is narrow. Density [`uniform_cone_pdf`].
+/// Uniform direction of the cone around +z. `one_minus_cos` is 1 − the cosine of its half-angle, which keeps
+/// its precision for narrow cones. Density [`uniform_cone_pdf`].
 #[inline]
 pub fn uniform_cone(u: [f32; 2], one_minus_cos: f32) -> Vec3 {
     let h = u[0] * one_minus_cos;

@@ -1,38 +1,39 @@
-//! One ray against eight boxes, sixteen rays against one box: the slab test (Kay, Kajiya 1986).
+//! Slab test (Kay, Kajiya 1986): one ray against eight boxes, sixteen rays against one box.
 //!
-//! Plainly: per axis the ray is inside the slab from `(lo - o) / d` to `(hi - o) / d`; it meets the box
-//! where the latest entry is not after the earliest exit. Departures from that:
-//! 1. The division is a product with the reciprocal, clamped to finite values; so no `0 * inf`.
-//! 2. Which plane is the near one is known from the direction's sign, once per ray.
-//! 3. The exit is lengthened by [`ROBUST`], the rounding of both products: no box is missed whose
-//!    triangle is hit (Ize 2013, "Robust BVH Ray Traversal"). The price: a few boxes too many.
+//! On each axis the ray is inside the slab from `(lo - o) / d` to `(hi - o) / d`. The ray meets the box if
+//! the latest entry is not after the earliest exit. Departures:
+//! 1. The division is a product with the reciprocal, clamped to finite values, so that `0 * inf` never
+//!    occurs.
+//! 2. The sign of the direction determines the near plane, once per ray.
+//! 3. The exit is lengthened by [`ROBUST`], the rounding of both products: no box is missed whose triangle is
+//!    hit (Ize 2013, "Robust BVH Ray Traversal"). The cost: a few boxes too many.
 //!
 //! An empty box has `lo = +inf`, `hi = -inf` and is never met.
 
 use super::safe_reciprocal;
 use crate::lanes::{Lanes, Mask, Simd};
 
-/// 1 + 2 gamma(3), what the roundings of subtraction, reciprocal and product can amount to, and as much again
-/// for the roundings of the distance of a hit, with which entries are compared.
+/// 1 + 2 gamma(3): the roundings of subtraction, reciprocal and product, and as much again for the roundings
+/// of the distance of a hit, which is compared with entries.
 pub const ROBUST: f32 = 1.000_001;
 
-/// Planes of eight boxes: rows `[lo x, hi x, lo y, hi y, lo z, hi z]`, each for the eight boxes.
-/// Two more rows are the caller's: eight rows make any row index safe by a mask.
+/// Planes of eight boxes: rows `[lo x, hi x, lo y, hi y, lo z, hi z]`, each for the eight boxes. The other
+/// two rows belong to the caller: with eight rows a mask makes any row index safe.
 pub type Boxes8 = [[f32; 8]; 8];
 
-/// A ray as the slab test wants it.
+/// Ray prepared for the slab test.
 #[derive(Clone, Copy, Debug)]
 pub struct SlabRay {
-    /// Where the ray starts.
+    /// Origin.
     pub origin: [f32; 3],
-    /// Clamped reciprocals of its direction.
+    /// Clamped reciprocals of the direction.
     pub reciprocal: [f32; 3],
     /// Row of the near plane in [`Boxes8`], per axis; the far plane is `row ^ 1`.
     pub near: [usize; 3],
 }
 
 impl SlabRay {
-    /// From a ray of finite origin and direction.
+    /// Prepares a ray of finite origin and direction.
     #[inline(always)]
     pub fn new(origin: [f32; 3], direction: [f32; 3]) -> Self {
         let reciprocal = direction.map(safe_reciprocal);
@@ -40,7 +41,7 @@ impl SlabRay {
         Self { origin, reciprocal, near }
     }
 
-    /// Scalar reference: entry distance into box `i`, where the ray meets it before `t_max`.
+    /// Scalar reference: entry distance into box `i`, if the ray meets it before `t_max`.
     pub fn enters(&self, boxes: &Boxes8, i: usize, t_max: f32) -> Option<f32> {
         let (mut entry, mut exit) = (0.0f32, t_max);
         for axis in 0..3 {
@@ -68,24 +69,25 @@ impl<S: Simd> SlabRay8<S> {
         Self::towards(simd, ray.origin, ray.reciprocal, (x & 1) | (y & 1) << 1 | (z & 1) << 2)
     }
 
-    /// From an origin, clamped reciprocals, and the signs of the direction as bits of `octant`.
+    /// Prepares a ray from its origin, clamped reciprocals, and the signs of the direction as bits of
+    /// `octant`.
     #[inline(always)]
     pub fn towards(simd: S, origin: [f32; 3], reciprocal: [f32; 3], octant: usize) -> Self {
         Self { origin: splat3(simd, origin), reciprocal: splat3(simd, reciprocal), octant }
     }
 
-    /// Entry distances into eight boxes, and the bits of those that are met before `t_max`.
+    /// Entry distances into eight boxes, and the mask of those met before `t_max`.
     #[inline(always)]
     pub fn enters(&self, simd: S, boxes: &Boxes8, t_max: f32) -> (S::F8, u32) {
         let (entry, exit) = self.interval(simd, boxes, t_max);
         (entry, entry.le(exit).bits())
     }
 
-    /// Entry and (lengthened) exit distances of eight boxes; a box is met where `entry <= exit`.
+    /// Entry and lengthened exit distances of eight boxes. The ray meets a box if `entry <= exit`.
     #[inline(always)]
     pub fn interval(&self, simd: S, boxes: &Boxes8, t_max: f32) -> (S::F8, S::F8) {
         let planes: &[f32; 64] = boxes.as_flattened().first_chunk().unwrap_or(&[0.0; 64]);
-        // The near plane of an axis stands one row further where the direction is negative.
+        // The near plane of an axis is one row further if the direction is negative.
         let [x, y, z] = [(self.octant << 3) & 8, (self.octant << 2) & 8, (self.octant << 1) & 8];
         let entry = self.at(simd, planes, x, 0).max(self.at(simd, planes, 16 + y, 1));
         let entry = entry.max(self.at(simd, planes, 32 + z, 2).max(simd.splat8(0.0)));
@@ -94,7 +96,7 @@ impl<S: Simd> SlabRay8<S> {
         (entry, exit * simd.splat8(ROBUST))
     }
 
-    /// Where the ray crosses the planes from index `first` on.
+    /// Distances to the planes from index `first` on.
     #[inline(always)]
     fn at(&self, simd: S, planes: &[f32; 64], first: usize, axis: usize) -> S::F8 {
         let row = planes.get(first..).and_then(|rest| rest.first_chunk()).unwrap_or(&[0.0; 8]);
@@ -102,25 +104,25 @@ impl<S: Simd> SlabRay8<S> {
     }
 }
 
-/// Sixteen rays as the slab test wants them, of which all directions have the same signs.
+/// Sixteen rays prepared for the slab test, with the same signs of direction.
 #[derive(Clone, Copy)]
 pub struct SlabRays16<S: Simd> {
-    /// Where they start, per axis.
+    /// Origins, per axis.
     pub origin: [S::F16; 3],
-    /// Clamped reciprocals of their directions, per axis.
+    /// Clamped reciprocals of the directions, per axis.
     pub reciprocal: [S::F16; 3],
     /// Row of the near plane in [`Boxes8`], per axis.
     pub near: [usize; 3],
 }
 
 impl<S: Simd> SlabRays16<S> {
-    /// Entry distances of the rays into box `i`, and the bits of those that meet it before `t_max`.
+    /// Entry distances of the rays into box `i`, and the mask of those that meet it before `t_max`.
     #[inline(always)]
     pub fn enters(&self, simd: S, boxes: &Boxes8, i: usize, t_max: S::F16) -> (S::F16, u32) {
         self.enters_moved(simd, &self.moved(simd, boxes, i), t_max)
     }
 
-    /// The near and far planes of box `i`, with the origins at zero: the same for all rays of the same origin.
+    /// Near and far planes of box `i` relative to the origins, equal for all rays of the same origin.
     #[inline(always)]
     pub fn moved(&self, simd: S, boxes: &Boxes8, i: usize) -> [[S::F16; 3]; 2] {
         let [x, y, z] = self.near;
@@ -132,7 +134,7 @@ impl<S: Simd> SlabRays16<S> {
         ]
     }
 
-    /// [`Self::enters`] for what [`Self::moved`] gives.
+    /// [`Self::enters`] for planes of [`Self::moved`].
     #[inline(always)]
     pub fn enters_moved(&self, simd: S, planes: &[[S::F16; 3]; 2], t_max: S::F16) -> (S::F16, u32) {
         let [near, far] = planes;
@@ -143,23 +145,24 @@ impl<S: Simd> SlabRays16<S> {
     }
 }
 
-/// What all rays of a packet have in common: intervals of their origins and reciprocals. A box that the
-/// interval misses is missed by every ray (Wald et al. 2007, "Ray Tracing Deformable Scenes using Dynamic
-/// Bounding Volume Hierarchies", section 4).
+/// Interval of a packet: ranges of the origins and reciprocals of its rays. A box that the interval misses is
+/// missed by every ray (Wald et al. 2007, "Ray Tracing Deformable Scenes using Dynamic Bounding Volume
+/// Hierarchies", section 4).
 #[derive(Clone, Copy, Debug)]
 pub struct SlabInterval {
     /// Row of the near plane in [`Boxes8`], per axis.
     pub near: [usize; 3],
-    /// The origin from which the near plane is nearest.
+    /// Origin from which the near plane is nearest.
     pub entry_origin: [f32; 3],
-    /// The origin from which the far plane is farthest.
+    /// Origin from which the far plane is farthest.
     pub exit_origin: [f32; 3],
     /// Smallest and largest reciprocal.
     pub reciprocal: [[f32; 3]; 2],
 }
 
 impl SlabInterval {
-    /// Of rays whose directions have the signs that `near` says; `[smallest, largest]` of each.
+    /// Interval of rays whose directions have the signs of `near`; `[smallest, largest]` of origins and
+    /// reciprocals.
     #[inline(always)]
     pub fn new(near: [usize; 3], origin: [[f32; 3]; 2], reciprocal: [[f32; 3]; 2]) -> Self {
         let [least, most] = origin;
@@ -197,8 +200,8 @@ impl<S: Simd> SlabInterval8<S> {
         }
     }
 
-    /// Bounds of the entry and (lengthened) exit distances of eight boxes; a box that some ray meets before
-    /// `t_max` has `entry <= exit`.
+    /// Bounds of the entry and lengthened exit distances of eight boxes. If some ray meets a box before
+    /// `t_max`, the box has `entry <= exit`.
     #[inline(always)]
     pub fn interval(&self, simd: S, boxes: &Boxes8, t_max: f32) -> (S::F8, S::F8) {
         let [x, y, z] = self.near;
@@ -209,8 +212,8 @@ impl<S: Simd> SlabInterval8<S> {
         (entry, exit * simd.splat8(ROBUST))
     }
 
-    /// Bits of the triangles that some ray may meet before `t_max`, by their boxes widened by `slack`. The
-    /// triangles stand in `values` as [`super::triangles::ShearRay8::meets`] wants them.
+    /// Mask of the triangles that some ray may meet before `t_max`, by their boxes widened by `slack`. The
+    /// layout of the triangles in `values` is that of [`super::triangles::ShearRay8::meets`].
     #[inline(always)]
     pub fn may_meet(
         &self,

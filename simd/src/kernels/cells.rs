@@ -1,20 +1,21 @@
-//! Derivatives of irradiance from the borders between the strata of a hemisphere.
+//! Derivatives of irradiance from the borders between the strata of a hemisphere (stratum-border
+//! derivatives).
 //!
-//! Plainly: for each border between two neighbours of radiance L₁ and L₂, at inverse distance u, add
-//! (L₁ - L₂) times what the border adds at distance 1, of which the gradient is to be multiplied by u and the
-//! Hessian by u². What a border adds is in tables, so sixteen borders are a load and a few products; the sums are
-//! those of [`super::jumps`]. The price: a copy of each row of strata, channel by channel.
+//! A border between two neighbours of radiance L₁ and L₂ at inverse distance u contributes (L₁ - L₂) times
+//! its derivatives at distance 1, with a factor u for the gradient and u² for the Hessian. Tables hold the
+//! derivatives at distance 1, so that sixteen borders are a load and a few products; the sums are those of
+//! [`super::jumps`]. The cost: a copy of each row of strata, channel by channel.
 
 use super::edge::Flux;
 use super::jumps::{Lanes16, Row, SIDE_MAX, Sums, sixteen};
 use crate::lanes::{Lanes, Simd};
 use crate::level::{Kernel, Level};
 
-/// Sixteen borders at distance 1: gradient x and y, rotation x and y, Hessian xx, xy, yy.
+/// Derivatives of sixteen borders at distance 1: gradient x and y, rotation x and y, Hessian xx, xy, yy.
 pub type Borders = [[f32; 16]; 7];
 
-/// Two inverse distances that differ by less than this factor are of one surface, and what divides them stands
-/// between; where they differ by more the nearer surface ends there.
+/// Two inverse distances that differ by less than this factor belong to one surface, and their border lies
+/// between them. Otherwise the nearer surface ends at the border.
 pub const SAME_SURFACE: f32 = 1.6;
 
 /// Inverse distance of the border between two strata.
@@ -24,8 +25,9 @@ pub fn between<L: Lanes>(all: impl Fn(f32) -> L, u: L, v: L) -> L {
     (all(0.5) * (near + far)).select(near.lt(all(SAME_SURFACE) * far), near)
 }
 
-/// Strata of n × n, row by row, and the tables of their borders: for each row, for each sixteen of its columns,
-/// the borders to the next column, then those to the next row; zero where there is no neighbour.
+/// Strata of n × n, row by row, with the tables of their borders. For each row and each sixteen of its
+/// columns there are two tables, of the borders to the next column and of those to the next row. Entries
+/// without a neighbour are zero.
 #[derive(Clone, Copy, Debug)]
 pub struct Cells<'a> {
     /// Strata along a side, at most [`SIDE_MAX`].
@@ -39,12 +41,12 @@ pub struct Cells<'a> {
 }
 
 impl Cells<'_> {
-    /// The derivatives; what slices too short do not hold counts as nothing.
+    /// Sums of derivatives; data missing from short slices contributes zero.
     pub fn sums(self, level: Level) -> Sums {
         level.dispatch(self)
     }
 
-    /// Scalar reference: border by border. Agrees with [`Cells::sums`] but for the order of the sums.
+    /// Scalar reference, border by border. Equals [`Cells::sums`] except for the order of the sums.
     pub fn reference(self) -> Sums {
         let (n, mut sums) = (self.n.min(SIDE_MAX), Sums::default());
         for (chunk, tables) in self.borders.chunks_exact(2).enumerate() {
@@ -68,7 +70,7 @@ impl Cells<'_> {
         sums
     }
 
-    /// Row `i`, channel by channel: red, green, blue, inverse distance.
+    /// Copies row `i`, channel by channel: red, green, blue, inverse distance.
     #[inline(always)]
     fn row(&self, i: usize, row: &mut [Row; 4]) {
         let [r, g, b, u] = row;

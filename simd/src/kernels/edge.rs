@@ -1,27 +1,28 @@
-//! What one edge of the environment adds to the derivatives of irradiance: an edge of a polygon of radiance 1,
-//! seen from the receiver at the origin with normal +z.
+//! Contribution of one edge of the environment to the derivatives of irradiance: an edge of a polygon of
+//! radiance 1, seen from the receiver at the origin with normal +z.
 //!
-//! Plainly: when the receiver steps aside by dx, a boundary at distance r moves by -dx/r on the sphere of
-//! directions. So the derivatives of ∫ cos dω over the polygon are integrals along its boundary alone, with w the
+//! If the receiver moves by dx, a boundary at distance r moves by -dx/r on the sphere of directions. The
+//! derivatives of ∫ cos dω over the polygon are therefore integrals along its boundary alone, with w the
 //! direction and ν the inward normal of the boundary (Reynolds' transport theorem; x and y only):
 //!
 //!   grad E = ∫ cos ν/r ds,   Hess E = ∫ 4 cos Sym(ν ⊗ w)/r² ds,   n × ∂E/∂n = n × ½ ∫ ν ds.
 //!
-//! An edge is straight in space, from a/u to b/v: unit directions a, b, inverse distances u, v. With θ the angle
-//! between them, s = sin θ, c = cos θ, z = 1 - c, the integrals are made of P = (θ - s c)/s³, Q = (s - θ c)/s³ and
-//! U22 = (θ(1 + 2c²) - 3 s c)/8s⁵. Departures from the textbook (Arvo 1994; Holzschuch, Sillion 1998):
-//! 1. Nothing is divided by s. With k = (θ/s - 1)/z and k₁ = (k - 1/3)/z: P - Q = k, P + Q = (2 + z k)/(2 - z),
-//!    and U22 is a sum of positive terms over (2 - z)².
-//! 2. k₁ is a polynomial in z = |b - a|²/2, and a × b is a × (b - a): an acos, a cosine or a plain product of
-//!    near directions loses as many digits as the angle is small.
+//! An edge is straight in space, from a/u to b/v: unit directions a, b, inverse distances u, v. With θ the
+//! angle between them, s = sin θ, c = cos θ, z = 1 - c, the integrals consist of P = (θ - s c)/s³,
+//! Q = (s - θ c)/s³ and U22 = (θ(1 + 2c²) - 3 s c)/8s⁵. Departures from the textbook (Arvo 1994; Holzschuch,
+//! Sillion 1998):
+//! 1. Nothing is divided by s. With k = (θ/s - 1)/z and k₁ = (k - 1/3)/z: P - Q = k,
+//!    P + Q = (2 + z k)/(2 - z), and U22 is a sum of positive terms over (2 - z)².
+//! 2. k₁ is a polynomial in z = |b - a|²/2, and a × b is a × (b - a). An acos, a cosine or a plain product of
+//!    near directions would lose more digits the smaller the angle.
 //! 3. Distances enter as inverses: a miss is u = 0 and no special case.
 //!
-//! The price: an edge longer than a right angle is beyond the polynomial and must be halved first.
-//! Edges in the horizon add nothing: a polygon may be left open there.
+//! The cost: an edge longer than a right angle is beyond the polynomial and must be halved first. Edges in
+//! the horizon contribute nothing, so that a polygon may be left open there.
 
 use core::ops::{Add, Div, Mul, Sub};
 
-/// k₁(z) for 0 <= z <= 1, lowest power first; relative error 1.2e-7, and it is damped where it is used.
+/// k₁(z) for 0 <= z <= 1, lowest power first. Relative error 1.2e-7, which its use reduces.
 const K1: [f32; 9] = [
     0.133_333_35,
     0.057_140_4,
@@ -34,8 +35,8 @@ const K1: [f32; 9] = [
     0.004_002_603,
 ];
 
-/// What an edge adds per radiance on its left; less the same per radiance on its right.
-/// Of irradiance, which is π for a full hemisphere of radiance 1.
+/// Contribution of an edge to the derivatives of irradiance E per radiance on its left; negated per radiance
+/// on its right. E is π for a full hemisphere of radiance 1.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct Flux<T> {
     /// ∂E/∂x, ∂E/∂y.
@@ -46,15 +47,16 @@ pub struct Flux<T> {
     pub hessian: [T; 3],
 }
 
-/// A number or a register of numbers.
+/// Number or register of numbers.
 pub trait Number:
     Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self>
 {
 }
 impl<T: Copy + Add<Output = T> + Sub<Output = T> + Mul<Output = T> + Div<Output = T>> Number for T {}
 
-/// The edge from `a` to `b` (unit directions, at most a right angle apart) at inverse distances `u` and `v`, with
-/// the polygon on its left as the receiver sees it. `all` makes a number of a constant.
+/// Contribution of the edge from `a` to `b` (unit directions, at most a right angle apart) at inverse
+/// distances `u` and `v`, with the polygon on its left as seen by the receiver. `all` converts a constant to
+/// a number.
 #[inline(always)]
 pub fn flux<T: Number>(all: impl Fn(f32) -> T, a: [T; 3], u: T, b: [T; 3], v: T) -> Flux<T> {
     let [half, two] = [all(0.5), all(2.0)];
@@ -69,13 +71,13 @@ pub fn flux<T: Number>(all: impl Fn(f32) -> T, a: [T; 3], u: T, b: [T; 3], v: T)
     let inverse = all(1.0) / (two - z);
     let sum = (g + all(1.0)) * inverse;
     let (p, q) = (half * (sum + k), half * (sum - k));
-    // U22 = (2/3 (1 + z) + k₁ (3 - 4z + 2z²)) / 8 (2 - z)²; the other two by integration in parts.
+    // U22 = (2/3 (1 + z) + k₁ (3 - 4z + 2z²)) / 8 (2 - z)²; the other two by integration by parts.
     let numerator = all(2.0 / 3.0) * (all(1.0) + z) + k1 * (all(3.0) - z * (all(4.0) - two * z));
     let u22 = all(0.125) * numerator * (inverse * inverse);
     let c = all(1.0) - z;
     let u31 = all(0.25) * q - c * u22;
     let u40 = half * p - u22 - two * c * u31;
-    // a × b, of which the length is s.
+    // a × b, of length s.
     let (cx, cy) = (a[1] * e[2] - a[2] * e[1], a[2] * e[0] - a[0] * e[2]);
 
     let slope = half * (a[2] * (p * u + q * v) + b[2] * (p * v + q * u));
@@ -93,7 +95,7 @@ pub fn flux<T: Number>(all: impl Fn(f32) -> T, a: [T; 3], u: T, b: [T; 3], v: T)
     }
 }
 
-/// Scalar reference, for an edge of any length; zero where its ends are opposite, which is none.
+/// Scalar reference, for an edge of any length; zero if its ends are opposite, which defines no edge.
 pub fn flux_of(a: [f32; 3], u: f32, b: [f32; 3], v: f32) -> Flux<f32> {
     let cos = a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
     if cos >= 0.0 {

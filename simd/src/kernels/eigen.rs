@@ -1,51 +1,54 @@
-//! Eigen decompositions of symmetric 2×2 and 3×3 matrices, a register of them at a time.
+//! Eigendecompositions of symmetric 2×2 and 3×3 matrices, a register of them at a time.
 //!
-//! Plainly, of [a b; b c]: with m = (a + c)/2, d = (a - c)/2, r = √(d² + b²) the values are m ± r. Departures:
-//! 1. The value of larger magnitude, m + sign(m) r, has no cancellation; the other is det/larger (Vieta), and
-//!    det = ac - b² from exact products (after Kahan). The plain formula loses the smaller of values 1 : 10⁷ whole.
-//! 2. All is scaled by a power of two first, so nothing overflows or is lost on the way, denormals included.
-//! 3. The vector of m + r is (d + r, b) or (b, r - d), whichever has no cancellation.
+//! For [a b; b c] with m = (a + c)/2, d = (a - c)/2, r = √(d² + b²) the eigenvalues are m ± r. Departures:
+//! 1. The value of larger magnitude, m + sign(m) r, has no cancellation. The other is det/larger (Vieta),
+//!    with det = ac - b² from exact products (after Kahan). The plain formula loses the smaller of two values
+//!    1 : 10⁷ completely.
+//! 2. Everything is scaled by a power of two first, so that nothing overflows or underflows, denormals
+//!    included.
+//! 3. The eigenvector of m + r is (d + r, b) or (b, r - d), whichever has no cancellation.
 //!
-//! Of 3×3: cyclic Jacobi, four sweeps (Golub, Van Loan). The closed formula by angles and cross products is
-//! faster and returns nonsense where two values meet.
+//! For 3×3: cyclic Jacobi, four sweeps (Golub, Van Loan). The closed formula by angles and cross products is
+//! faster but wrong where two eigenvalues meet.
 //!
-//! The price: no branch at all, so no matrix is cheaper than another; two square roots and three divisions a 2×2.
-//! The smaller value of a 2×2 is to be trusted down to 1e-30 of the larger; both have at most 4 units in the last
-//! place of error, values near the end of f32's range included.
+//! The cost: there is no branch, so that no matrix is cheaper than another; two square roots and three
+//! divisions per 2×2. The smaller value of a 2×2 is accurate down to 1e-30 of the larger. Both have an error
+//! of at most 4 units in the last place, also for values near the end of f32's range.
 
 use crate::lanes::{Lanes, Simd};
 use crate::level::{Kernel, Level};
 
-/// Values and vectors of a symmetric 2×2 matrix.
+/// Eigenvalues and eigenvectors of a symmetric 2×2 matrix.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Eigen2<L> {
-    /// The eigenvalues, the one of larger magnitude first.
+    /// Eigenvalues, that of larger magnitude first.
     pub values: [L; 2],
-    /// Unit eigenvector (x, y) of the first; (-y, x) is the second's.
+    /// Unit eigenvector (x, y) of the first; that of the second is (-y, x).
     pub axis: [L; 2],
 }
 
-/// Values and vectors of a symmetric 3×3 matrix.
+/// Eigenvalues and eigenvectors of a symmetric 3×3 matrix.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Eigen3<L> {
-    /// The eigenvalues, from largest to smallest magnitude.
+    /// Eigenvalues, from largest to smallest magnitude.
     pub values: [L; 3],
-    /// Their unit eigenvectors.
+    /// Unit eigenvectors, in the order of the values.
     pub vectors: [[L; 3]; 3],
 }
 
-/// What the largest entry is scaled to: its square fits, and the squares of all that matter beside it.
+/// Scale of the largest entry: its square is finite, and the squares of all entries that matter are not
+/// denormal.
 const SCALED: f32 = (1u64 << 60) as f32;
-/// 2⁻⁶⁰, the end of what is scaled in one step.
+/// 2⁻⁶⁰, the lower end of the range that is scaled in one step.
 const SMALL: f32 = 1.0 / SCALED;
-/// 2⁹⁰: makes numbers of ordinary size of those below [`SMALL`], denormals included.
+/// 2⁹⁰: brings numbers below [`SMALL`], denormals included, to ordinary size.
 const LIFT: f32 = SCALED * (1u64 << 30) as f32;
-/// Off-diagonal entries below this, scaled, count as zero: less than 2⁻¹¹⁰ of the largest. What is left has
-/// squares of which f32 holds every bit.
+/// Off-diagonal entries below this, after scaling, count as zero: less than 2⁻¹¹⁰ of the largest. f32 holds
+/// every bit of the squares of the others.
 const NEGLIGIBLE: f32 = 1.0 / (1u64 << 50) as f32;
 
-/// Powers of two that bring entries to the order of [`SCALED`], to be multiplied one after the other, and those
-/// that bring them back.
+/// Powers of two that scale entries to the order of [`SCALED`], to be multiplied one after the other, and
+/// those that undo the scaling.
 #[inline(always)]
 fn scales<L: Lanes>(all: impl Fn(f32) -> L, largest: L) -> ([L; 2], [L; 2]) {
     let small = largest.lt(all(SMALL));
@@ -54,8 +57,8 @@ fn scales<L: Lanes>(all: impl Fn(f32) -> L, largest: L) -> ([L; 2], [L; 2]) {
     ([lift, all(SCALED) / power], [power * all(SMALL), all(1.0 / LIFT).select(small, all(1.0))])
 }
 
-/// Decomposes [xx xy; xy yy]; `all` makes lanes of a constant. Values and axes of matrices that are not finite
-/// are anything.
+/// Decomposes [xx xy; xy yy]; `all` converts a constant to lanes. The result for matrices that are not finite
+/// is unspecified.
 #[inline(always)]
 pub fn symmetric2<L: Lanes>(all: impl Fn(f32) -> L + Copy, [xx, xy, yy]: [L; 3]) -> Eigen2<L> {
     let [zero, half, one] = [all(0.0), all(0.5), all(1.0)];
@@ -71,7 +74,8 @@ pub fn symmetric2<L: Lanes>(all: impl Fn(f32) -> L + Copy, [xx, xy, yy]: [L; 3])
     let ((ac, ac_rest), (bb, bb_rest)) = (a.product(c), b.product(b));
     let determinant = (ac - bb) + (ac_rest - bb_rest);
     let small = determinant / one.select(large.eq(zero), large);
-    // The vector of mean + radius; where the mean is negative that is the small value's, a right angle off.
+    // Eigenvector of mean + radius. If the mean is negative that is the smaller value, and the larger is at a
+    // right angle.
     let wide = zero.le(difference);
     let reach = difference.abs() + radius;
     let (x, y) = (reach.select(wide, b), b.select(wide, reach));
@@ -79,14 +83,15 @@ pub fn symmetric2<L: Lanes>(all: impl Fn(f32) -> L + Copy, [xx, xy, yy]: [L; 3])
     let isotropic = reach.eq(zero);
     let (x, y) = (one.select(isotropic, x), zero.select(isotropic, y));
     let inverse = one / (x * x + y * y).sqrt();
-    // Of a diagonal matrix the values stand there, and may be too far apart to have passed through the scale.
+    // The values of a diagonal matrix are its entries, whose ratio may exceed the range of the scaling.
     let (low, high) = (xx.min(yy), xx.max(yy));
     let large = low.select(negative, high).select(diagonal, large * unscale * lower);
     let small = high.select(negative, low).select(diagonal, small * unscale * lower);
     Eigen2 { values: [large, small], axis: [x * inverse, y * inverse] }
 }
 
-/// Decomposes the symmetric matrix of the entries xx, xy, xz, yy, yz, zz, to 5e-7 of its largest value.
+/// Decomposes the symmetric matrix of the entries xx, xy, xz, yy, yz, zz, with error 5e-7 of its largest
+/// value.
 #[inline(always)]
 pub fn symmetric3<L: Lanes>(all: impl Fn(f32) -> L + Copy, entries: [L; 6]) -> Eigen3<L> {
     let [xx, xy, xz, yy, yz, zz] = entries;
@@ -108,8 +113,8 @@ pub fn symmetric3<L: Lanes>(all: impl Fn(f32) -> L + Copy, entries: [L; 6]) -> E
     Eigen3 { values: [xx * unscale * lower, yy * unscale * lower, zz * unscale * lower], vectors: [u, v, w] }
 }
 
-/// What a Jacobi rotation in the plane of axes p and q makes of the entries pp and qq, of those in the third row,
-/// rp and rq, and of the vectors p and q; the entry pq becomes zero.
+/// Jacobi rotation in the plane of axes p and q: updates the entries pp and qq, those of the third row, rp
+/// and rq, and the vectors p and q. The entry pq becomes zero.
 #[inline(always)]
 fn rotated<L: Lanes>(
     all: impl Fn(f32) -> L,
@@ -119,8 +124,8 @@ fn rotated<L: Lanes>(
     [u, v]: [[L; 3]; 2],
 ) -> ([L; 2], [L; 2], [[L; 3]; 2]) {
     let (zero, one) = (all(0.0), all(1.0));
-    // tan of the smaller angle: 2 pq / (difference ± √(difference² + 4 pq²)). Were pq there but not its square, what is
-    // left of the difference could make any angle of it.
+    // tan of the smaller angle: 2 pq / (difference ± √(difference² + 4 pq²)). If the square of pq underflowed
+    // while pq did not, a small difference could give any angle.
     let pq = zero.select(pq.abs().lt(all(NEGLIGIBLE)), pq);
     let (difference, twice) = (qq - pp, pq + pq);
     let root = (difference * difference + twice * twice).sqrt();
@@ -155,11 +160,11 @@ fn sorted<L: Lanes>([x, y]: [L; 2], [u, v]: [[L; 3]; 2]) -> ([L; 2], [[L; 3]; 2]
 
 /// Sixteen 2×2 matrices: entries xx, xy, yy of each.
 pub type Matrices2 = [[f32; 16]; 3];
-/// Their decompositions: larger and smaller value, axis x and y of the larger.
+/// Decompositions of [`Matrices2`]: larger and smaller value, axis x and y of the larger.
 pub type Decomposed2 = [[f32; 16]; 4];
 /// Sixteen 3×3 matrices: entries xx, xy, xz, yy, yz, zz of each.
 pub type Matrices3 = [[f32; 16]; 6];
-/// Their decompositions: the three values, then the vectors of each, coordinate by coordinate.
+/// Decompositions of [`Matrices3`]: the three values, then the vectors of each, coordinate by coordinate.
 pub type Decomposed3 = [[f32; 16]; 12];
 
 /// Decomposes as many batches of 2×2 matrices as both slices hold, by [`symmetric2`].

@@ -1,10 +1,11 @@
-//! Sums over the edges of an environment: what each adds to the derivatives, times the jump of radiance across it.
-//! Sixteen sums side by side on every level, reduced in one order: the same bits everywhere.
+//! Sums of the contributions of edges to the derivatives of irradiance, each times the jump of radiance
+//! across the edge. Every level keeps sixteen sums and reduces them in one order, which gives the same bits
+//! everywhere.
 
 use super::edge::Flux;
 use crate::lanes::Lanes;
 
-/// Shares of red, green and blue in the luminance of linear sRGB (BT.709).
+/// Weights of red, green and blue in the luminance of linear sRGB (BT.709).
 pub const LUMINANCE: [f32; 3] = [0.2126, 0.7152, 0.0722];
 
 /// Derivatives of the irradiance of an environment.
@@ -19,7 +20,7 @@ pub struct Sums {
 }
 
 impl Sums {
-    /// With an edge more, of which the left side is brighter by `jump`. Scalar reference of [`Lanes16::add`].
+    /// Adds an edge whose left side is brighter by `jump`. Scalar reference of [`Lanes16::add`].
     pub fn add(&mut self, jump: [f32; 3], flux: &Flux<f32>) {
         for ((gradient, rotation), jump) in self.gradient.iter_mut().zip(&mut self.rotation).zip(jump) {
             *gradient = [gradient[0] + jump * flux.gradient[0], gradient[1] + jump * flux.gradient[1]];
@@ -41,13 +42,13 @@ pub struct Lanes16<L> {
 }
 
 impl<L: Lanes<Array = [f32; 16]>> Lanes16<L> {
-    /// Nothing summed yet.
+    /// Empty sums.
     #[inline(always)]
     pub fn new(zero: L) -> Self {
         Self { gradient: [[zero; 2]; 3], rotation: [[zero; 2]; 3], hessian: [zero; 3] }
     }
 
-    /// With an edge more in each lane, of which the left side is brighter by `jump`.
+    /// Adds an edge in each lane, whose left side is brighter by `jump`.
     #[inline(always)]
     pub fn add(&mut self, all: impl Fn(f32) -> L, jump: [L; 3], flux: &Flux<L>) {
         for ((gradient, rotation), jump) in self.gradient.iter_mut().zip(&mut self.rotation).zip(jump) {
@@ -61,7 +62,7 @@ impl<L: Lanes<Array = [f32; 16]>> Lanes16<L> {
         }
     }
 
-    /// All lanes together.
+    /// Sums over all lanes.
     #[inline(always)]
     pub fn total(&self) -> Sums {
         let [r, g, b] = self.gradient;
@@ -74,7 +75,7 @@ impl<L: Lanes<Array = [f32; 16]>> Lanes16<L> {
     }
 }
 
-/// The sum of sixteen lanes: halves, quarters, and so on.
+/// Sum of sixteen lanes by repeated halving.
 #[inline(always)]
 fn total<L: Lanes<Array = [f32; 16]>>(lanes: L) -> f32 {
     let mut values = lanes.to_array();
@@ -86,10 +87,10 @@ fn total<L: Lanes<Array = [f32; 16]>>(lanes: L) -> f32 {
     values[0]
 }
 
-/// The most strata along a side.
+/// Largest number of strata along a side.
 pub const SIDE_MAX: usize = 128;
 
-/// A value of each stratum of a row, the first at index 1, and room to read sixteen from any.
+/// One value per stratum of a row, the first at index 1, with room to read sixteen from any index.
 pub(super) type Row = [f32; SIDE_MAX + 32];
 
 /// Sixteen values of a row from `start` on.

@@ -1,33 +1,34 @@
-//! Derivatives of irradiance from the triangulated environment (Schwarzhaupt, Jensen, Jarosz 2012): the samples of
-//! a hemisphere's n × n strata as the vertices of a mesh, each quad of neighbours cut into two triangles.
+//! Derivatives of irradiance from the triangulated environment (Schwarzhaupt, Jensen, Jarosz 2012): the
+//! samples of a hemisphere's n × n strata are the vertices of a mesh, and each quad of neighbours is two
+//! triangles.
 //!
-//! Plainly: give each triangle one radiance, and sum its three edges. Departures from that:
-//! 1. Each edge is summed once, times the jump of radiance from the triangle on its right to that on its left:
-//!    half the work, and what is equal on both sides cancels before anything is computed from it.
-//! 2. The rim. The mesh ends above the horizon, for no sample lies in it. Left open, as in the paper, its rim is
-//!    the boundary of a false light before a black sky. Closed, the rim's triangles reach down to the horizon, in
-//!    which edges add nothing: their edges in the rim are left out, and that is all.
-//! 3. The radiance of a triangle is its farthest vertex's, as in the paper: right where an occluder's edge crosses
-//!    it, and as wrong as any vertex where it is a patch of radiance of one wall. Or the mean of those vertices
-//!    that are about as far as the farthest.
+//! Each triangle has one radiance, and its three edges are summed. Departures:
+//! 1. Each edge is summed once, times the jump of radiance from the triangle on its right to that on its
+//!    left. This is half the work, and equal radiance on both sides cancels before any computation.
+//! 2. The rim. The mesh ends above the horizon, where no sample lies. An open rim, as in the paper, is the
+//!    boundary of a false light against a black sky. The triangles of a closed rim extend to the horizon,
+//!    where edges contribute nothing: edges of the rim are simply left out.
+//! 3. The radiance of a triangle is that of its farthest vertex, as in the paper. This is right where an
+//!    occluder's edge crosses the triangle, and as wrong as any vertex within a patch of radiance of one
+//!    wall. Alternatively the radiance is the mean over the vertices at about the distance of the farthest.
 //!
-//! The price: edges longer than a right angle, which only coarse hemispheres have, leave the lanes one by one.
+//! The cost: edges longer than a right angle, which only coarse hemispheres have, are computed one by one.
 
 use super::edge::{Flux, flux, flux_of};
 use super::jumps::{Lanes16, Row, SIDE_MAX, Sums, sixteen};
 use crate::lanes::{Lanes, Mask, Simd};
 use crate::level::{Kernel, Level};
 
-/// What the triangles of the mesh are like.
+/// Radiance of the mesh's triangles, and its rim.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Rule {
-    /// The farthest vertex's radiance, and an open rim: as in the paper.
+    /// Radiance of the farthest vertex, and an open rim, as in the paper.
     Farthest,
-    /// The mean over the vertices up to [`AS_FAR`] times nearer than the farthest, and a closed rim.
+    /// Mean over the vertices up to [`AS_FAR`] times nearer than the farthest, and a closed rim.
     DepthAware,
 }
 
-/// Vertices of a triangle whose distances differ by less than this factor are of one surface.
+/// Vertices of a triangle whose distances differ by less than this factor belong to one surface.
 pub const AS_FAR: f32 = 1.25;
 
 /// Samples of n × n strata, row by row.
@@ -41,14 +42,14 @@ pub struct Mesh<'a> {
     pub inverse_distance: &'a [f32],
     /// Unit directions.
     pub directions: &'a [[f32; 3]],
-    /// The triangles.
+    /// Rule for the radiance of triangles and the rim.
     pub rule: Rule,
 }
 
-/// A vertex: direction, inverse distance, radiance.
+/// Vertex: direction, inverse distance, radiance.
 type Vertex<L> = ([L; 3], L, [L; 3]);
 
-/// The radiance of the triangle of three vertices.
+/// Radiance of the triangle of three vertices.
 #[inline(always)]
 fn radiance<L: Lanes>(
     all: impl Fn(f32) -> L,
@@ -64,7 +65,7 @@ fn radiance<L: Lanes>(
     let (first, second, third) = (u.le(limit), v.le(limit), w.le(limit));
     let (mut a, mut b, mut c) = (one.select(first, zero), one.select(second, zero), one.select(third, zero));
     match rule {
-        // The first of vertices equally far.
+        // The first of equally distant vertices.
         Rule::Farthest => {
             b = zero.select(first, b);
             c = zero.select(first | second, c);
@@ -78,19 +79,19 @@ fn radiance<L: Lanes>(
 }
 
 impl Mesh<'_> {
-    /// The derivatives; what slices too short do not hold counts as nothing.
+    /// Sums of derivatives; data missing from short slices contributes zero.
     pub fn sums(self, level: Level) -> Sums {
         level.dispatch(self)
     }
 
-    /// The vertex of a stratum.
+    /// Vertex of a stratum.
     fn vertex(&self, i: usize, j: usize) -> Option<Vertex<f32>> {
         let at = (i < self.n && j < self.n).then_some(i * self.n + j)?;
         Some((*self.directions.get(at)?, *self.inverse_distance.get(at)?, *self.radiance.get(at)?))
     }
 
-    /// Scalar reference: triangle by triangle. Agrees with [`Mesh::sums`] but for the order of the sums; the edges
-    /// in the rim of a closed mesh are left out of it.
+    /// Scalar reference, triangle by triangle, without the rim's edges of a closed mesh. Equals
+    /// [`Mesh::sums`] except for the order of the sums.
     pub fn reference(self) -> Sums {
         let (n, mut sums) = (self.n.min(SIDE_MAX), Sums::default());
         for (i, j) in (1..n).flat_map(|i| (1..n).map(move |j| (i - 1, j - 1))) {
@@ -120,7 +121,7 @@ type Vertices = [Row; 7];
 /// Rows of three channels.
 type Triangles = [Row; 3];
 
-/// A row before anything is in it.
+/// Empty row.
 const EMPTY: Row = [0.0; SIDE_MAX + 32];
 
 impl Kernel for Mesh<'_> {
@@ -131,8 +132,8 @@ impl Kernel for Mesh<'_> {
         let n = self.n.min(SIDE_MAX);
         let mut work = Work { simd, sums: Lanes16::new(simd.splat16(0.0)), long: Sums::default() };
         let (mut here, mut above) = ([EMPTY; 7], [EMPTY; 7]);
-        // Triangles of a row of quads: to the right of the diagonal and to its left; and the left ones of the
-        // row below.
+        // Triangles of a row of quads on the right and on the left of the diagonal, and the left triangles of
+        // the row below.
         let (mut right, mut left, mut below) = ([EMPTY; 3], [EMPTY; 3], [EMPTY; 3]);
         let closed = self.rule == Rule::DepthAware;
         self.vertices(0, &mut here);
@@ -142,7 +143,8 @@ impl Kernel for Mesh<'_> {
                 for start in (1..n).step_by(16) {
                     work.triangles(self.rule, [&here, &above], start, [&mut right, &mut left]);
                 }
-                // Beyond its last quad a row has no triangles: black, or as bright as what they would touch.
+                // Beyond its last quad a row has no triangles: radiance is zero, or that of the adjacent
+                // triangle if the rim is closed.
                 for (right, left) in right.iter_mut().zip(&mut left) {
                     right[0] = if closed { left[1] } else { 0.0 };
                     right[n..].fill(0.0);
@@ -158,10 +160,10 @@ impl Kernel for Mesh<'_> {
             }
             for start in (1..n + 1).step_by(16) {
                 let row = [&here, &above];
-                // Bottoms of the quads, from this vertex to the next.
+                // Bottom edges of the quads, from this vertex to the next.
                 work.edges(row[0], start, row[0], start + 1, (&right, start), (&below, start));
                 if i + 1 < n {
-                    // Diagonals, and left sides.
+                    // Diagonals and left edges.
                     work.edges(row[0], start, row[1], start + 1, (&left, start), (&right, start));
                     work.edges(row[0], start, row[1], start, (&right, start - 1), (&left, start));
                 }
@@ -174,7 +176,7 @@ impl Kernel for Mesh<'_> {
 }
 
 impl Mesh<'_> {
-    /// Row `i`, number by number.
+    /// Copies row `i`, number by number.
     #[inline(always)]
     fn vertices(&self, i: usize, rows: &mut Vertices) {
         let [x, y, z, u, r, g, b] = rows;
@@ -189,7 +191,7 @@ impl Mesh<'_> {
 struct Work<S: Simd> {
     simd: S,
     sums: Lanes16<S::F16>,
-    /// Of the edges that are longer than a right angle.
+    /// Sums over edges longer than a right angle.
     long: Sums,
 }
 
@@ -206,7 +208,7 @@ impl<S: Simd> Work<S> {
         (direction, self.load(u, at), [self.load(r, at), self.load(g, at), self.load(b, at)])
     }
 
-    /// Radiance of sixteen quads' triangles, from the quad of the vertices `start` on.
+    /// Radiance of the triangles of sixteen quads, from the quad at vertices `start` on.
     #[inline(always)]
     fn triangles(
         &self,
@@ -222,7 +224,7 @@ impl<S: Simd> Work<S> {
         store(left, start, radiance(all, rule, [&a, &c, &d]));
     }
 
-    /// Adds sixteen edges, from vertices of one row to vertices of another, between triangles on both sides.
+    /// Adds sixteen edges from vertices of one row to vertices of another, with the triangles on both sides.
     #[inline(always)]
     fn edges(
         &mut self,
@@ -257,7 +259,7 @@ impl<S: Simd> Work<S> {
                 }
             }
         }
-        // A long edge is none here.
+        // A long edge becomes an edge of length zero.
         let b = [a[0].select(long, b[0]), a[1].select(long, b[1]), a[2].select(long, b[2])];
         let flux: Flux<S::F16> = flux(all, a, u, b, v);
         self.sums.add(all, jump, &flux);

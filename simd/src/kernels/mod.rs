@@ -1,4 +1,4 @@
-//! Batch kernels of ray traversal, of derivatives of irradiance and of photon maps, each beside its plain scalar
+//! Batch kernels of ray traversal, of derivatives of irradiance and of photon maps, each with a scalar
 //! reference.
 
 pub mod boxes;
@@ -12,11 +12,10 @@ pub mod push;
 pub mod select;
 pub mod triangles;
 
-/// The largest finite reciprocal of a direction: `0 * inf` never reaches a slab test.
+/// Largest finite reciprocal of a direction, so that `0 * inf` never reaches a slab test.
 pub const RECIPROCAL_MAX: f32 = f32::MAX;
 
-/// Reciprocal of a direction component, clamped to finite values; zero counts as positive zero or
-/// negative zero by its sign.
+/// Reciprocal of a component of a direction, clamped to finite values. The sign of a zero is kept.
 #[inline(always)]
 pub fn safe_reciprocal(d: f32) -> f32 {
     (1.0 / d).clamp(-RECIPROCAL_MAX, RECIPROCAL_MAX)

@@ -1,22 +1,23 @@
 //! Squared distances from one place to sixteen points, and to sixteen boxes of points.
 //!
-//! Plainly: the sum of the squares of three differences; for a box, of what is missing to its slab on each axis.
-//! All of it is monotone also when rounded, and done in the same order for both: a box is never farther than a
-//! point in it, to the last bit. So a search that leaves out boxes finds what brute force finds, without a slack.
+//! The distance is the sum of the squares of three differences; for a box, of the distances to its slabs.
+//! Every operation is monotone with rounding and in the same order for both, so that a box is never farther
+//! than a point in it, to the last bit. A search that skips boxes therefore finds the result of brute force,
+//! without a margin.
 
 use crate::lanes::{Lanes, Simd};
 
-/// Planes of sixteen boxes: `[lo x, lo y, lo z, hi x, hi y, hi z]`, each for the sixteen.
+/// Planes of sixteen boxes: rows `[lo x, lo y, lo z, hi x, hi y, hi z]`, each for the sixteen boxes.
 pub type Boxes16 = [[f32; 16]; 6];
 
-/// Scalar reference: the squared distance of two points.
+/// Scalar reference: squared distance of two points.
 #[inline(always)]
 pub fn squared_distance(a: [f32; 3], b: [f32; 3]) -> f32 {
     let [x, y, z] = [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
     (x * x + y * y) + z * z
 }
 
-/// Scalar reference: the squared distance from a point to box `i`.
+/// Scalar reference: squared distance from a point to box `i`.
 #[inline(always)]
 pub fn squared_distance_to_box(point: [f32; 3], boxes: &Boxes16, i: usize) -> f32 {
     let missing = |axis: usize| (boxes[axis][i] - point[axis]).max(point[axis] - boxes[3 + axis][i]).max(0.0);
@@ -24,18 +25,18 @@ pub fn squared_distance_to_box(point: [f32; 3], boxes: &Boxes16, i: usize) -> f3
     (x * x + y * y) + z * z
 }
 
-/// A place in all lanes.
+/// Place in all lanes.
 #[derive(Clone, Copy)]
 pub struct Place16<S: Simd>([S::F16; 3]);
 
 impl<S: Simd> Place16<S> {
-    /// Broadcasts it.
+    /// Broadcasts the place.
     #[inline(always)]
     pub fn new(simd: S, [x, y, z]: [f32; 3]) -> Self {
         Self([simd.splat16(x), simd.splat16(y), simd.splat16(z)])
     }
 
-    /// How far it is from sixteen points along each axis: its coordinates less theirs.
+    /// Difference to sixteen points on each axis: coordinates of the place less those of the points.
     #[inline(always)]
     pub fn less(&self, simd: S, [x, y, z]: [&[f32; 16]; 3]) -> [S::F16; 3] {
         [self.0[0] - simd.load16(x), self.0[1] - simd.load16(y), self.0[2] - simd.load16(z)]
@@ -47,13 +48,13 @@ impl<S: Simd> Place16<S> {
         squared(self.less(simd, points))
     }
 
-    /// Squared distances to sixteen boxes; infinite for those without a point, which have infinite planes.
+    /// Squared distances to sixteen boxes; infinite for empty boxes, which have infinite planes.
     #[inline(always)]
     pub fn squared_distances_to_boxes(&self, simd: S, boxes: &Boxes16) -> S::F16 {
         squared([self.missing(simd, boxes, 0), self.missing(simd, boxes, 1), self.missing(simd, boxes, 2)])
     }
 
-    /// How far it is outside of the boxes along an axis.
+    /// Distance outside the slab of each box on an axis.
     #[inline(always)]
     fn missing(&self, simd: S, boxes: &Boxes16, axis: usize) -> S::F16 {
         let (lo, hi) = (simd.load16(&boxes[axis]), simd.load16(&boxes[3 + axis]));
@@ -61,7 +62,7 @@ impl<S: Simd> Place16<S> {
     }
 }
 
-/// The sum of the squares.
+/// Sum of the squares.
 #[inline(always)]
 pub fn squared<L: Lanes>([x, y, z]: [L; 3]) -> L {
     (x * x + y * y) + z * z

@@ -1,9 +1,9 @@
-//! What happens to the stack of a traversal, item by item: the scalar references of [`crate::Simd::push8`],
-//! [`crate::Simd::push8_unordered`] and [`crate::Simd::keep`], which do the same without a branch.
+//! Stack operations of a traversal, item by item: scalar references of [`crate::Simd::push8`],
+//! [`crate::Simd::push8_unordered`] and [`crate::Simd::keep`], which have no branches.
 
 use crate::stack::{STACK, Stack};
 
-/// Of the lanes named by the nibbles of `order`, lowest nibble first, puts those with `entry <= exit` on the stack.
+/// Pushes the lanes with `entry <= exit`, in the order of the nibbles of `order`, lowest nibble first.
 #[inline(always)]
 pub fn push(order: u32, entry: &[f32; 8], exit: &[f32; 8], items: &[f32; 8], stack: &mut Stack) {
     if stack.height() > STACK - 8 {
@@ -15,7 +15,7 @@ pub fn push(order: u32, entry: &[f32; 8], exit: &[f32; 8], items: &[f32; 8], sta
     }
 }
 
-/// Takes all that is entered beyond `limit` off the stack.
+/// Removes all items whose entry is beyond `limit`.
 #[inline(always)]
 pub fn keep(limit: f32, stack: &mut Stack) {
     let height = stack.height();

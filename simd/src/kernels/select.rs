@@ -1,20 +1,20 @@
-//! The smallest of a list that grows: candidates of a nearest-neighbour search.
+//! Selection of the `k` smallest of a growing list: candidates of a nearest-neighbour search.
 //!
-//! Plainly: keep the `k` smallest under a total order, by value and among equals by number. A heap would do it, a
-//! branch and some swaps for each. Instead:
+//! The order is total, by value and among equals by number. A heap would need a branch and some swaps for
+//! each candidate. Instead:
 //! 1. Candidates are only appended, sixteen lanes packed at a time.
-//! 2. Now and then the list is cut back to `k` by quickselect, a register at a time: what is less than a pivot is
-//!    packed to the front in place, the rest to a spare list, of which only the part still in doubt is looked at
+//! 2. Now and then a quickselect cuts the list back to `k`, a register at a time. Values below a pivot are
+//!    packed to the front in place, the others to a spare list. Only the part that is still undecided is read
 //!    again.
 //!
-//! The price: twice the memory, and a limit that is late by the candidates since the last cut.
+//! The cost: twice the memory, and a limit that lags by the candidates since the last selection.
 
 use crate::lanes::{Lanes, Mask, Simd};
 
-/// Room behind the last candidate that packing sixteen lanes may overwrite.
+/// Room after the last candidate that packing of sixteen lanes may overwrite.
 pub const OVERRUN: usize = 16;
 
-/// Values with their numbers (as bits of floats): the list, and a spare one of the same length.
+/// Values with their numbers (as bits of floats): the list, and a spare list of the same length.
 pub struct Candidates<'a> {
     values: &'a mut [f32],
     numbers: &'a mut [f32],
@@ -24,21 +24,21 @@ pub struct Candidates<'a> {
 }
 
 impl<'a> Candidates<'a> {
-    /// No candidates, in memory for as many as the shortest of the slices holds, less [`OVERRUN`]. What is in
-    /// them is not looked at.
+    /// Empty list with room for the length of the shortest slice less [`OVERRUN`]. Their contents are
+    /// ignored.
     #[inline(always)]
     pub fn new(values: [&'a mut [f32]; 2], numbers: [&'a mut [f32]; 2]) -> Self {
         let ([values, spare_values], [numbers, spare_numbers]) = (values, numbers);
         Self { values, numbers, spare_values, spare_numbers, count: 0 }
     }
 
-    /// How many there are.
+    /// Number of candidates.
     #[inline(always)]
     pub fn count(&self) -> usize {
         self.count
     }
 
-    /// Appends the lanes `wanted`. They are lost where there is no room for sixteen.
+    /// Appends the lanes `wanted`. Without room for sixteen they are lost.
     #[inline(always)]
     pub fn push16<S: Simd>(
         &mut self,
@@ -54,15 +54,15 @@ impl<'a> Candidates<'a> {
         self.count += wanted.bits().count_ones() as usize;
     }
 
-    /// Cuts back to the `k` smallest, in no order. Gives the largest of them, or infinity where there are fewer
-    /// than `k`.
+    /// Cuts the list back to the `k` smallest, in no order. Returns the largest of them, or infinity if there
+    /// are fewer than `k`.
     #[inline(always)]
     pub fn keep_smallest<S: Simd>(&mut self, simd: S, k: usize) -> f32 {
         if self.count < k || k == 0 {
             self.count = self.count.min(k);
             return f32::INFINITY;
         }
-        // Of the list, `kept` are among the smallest for certain, and those up to `end` may be.
+        // The first `kept` are certainly among the smallest, and those up to `end` may be.
         let (mut kept, mut end, mut seed) = (0, self.count, self.count as u32);
         let last = loop {
             if kept + 1 >= k || end <= k {
@@ -77,7 +77,7 @@ impl<'a> Candidates<'a> {
             self.unspare(simd, kept + less, end);
             kept += less;
             if less == 0 {
-                // Nothing is less than the pivot: those equal to it come first.
+                // No value is below the pivot: those equal to it come first.
                 let equal = self.part::<S, true>(simd, kept, end, pivot);
                 if kept + equal >= k {
                     self.lowest_numbers(kept, kept + equal, k);
@@ -91,13 +91,13 @@ impl<'a> Candidates<'a> {
         last
     }
 
-    /// The candidates, as values and the bits of numbers.
+    /// Candidates as values and bits of numbers.
     #[inline(always)]
     pub fn get(&self) -> (&[f32], &[f32]) {
         (self.values.get(..self.count).unwrap_or(&[]), self.numbers.get(..self.count).unwrap_or(&[]))
     }
 
-    /// The end of the selection: either all up to `end` are among the `k` smallest, or one is still wanted.
+    /// End of the selection: either all up to `end` are among the `k` smallest, or exactly one is missing.
     #[inline(always)]
     fn rest<S: Simd>(&mut self, simd: S, kept: usize, end: usize, k: usize) -> f32 {
         if end <= k {
@@ -109,7 +109,7 @@ impl<'a> Candidates<'a> {
         least
     }
 
-    /// The least of the values from `start` to `end`, each multiplied by `sign`, 1 or -1.
+    /// Least of the values from `start` to `end`, each multiplied by `sign`, 1 or -1.
     #[inline(always)]
     fn least<S: Simd>(&self, simd: S, start: usize, end: usize, sign: f32) -> f32 {
         let (none, sign) = (simd.splat16(f32::INFINITY), simd.splat16(sign));
@@ -121,7 +121,7 @@ impl<'a> Candidates<'a> {
         least.smallest()
     }
 
-    /// The middle one of three values from anywhere between `start` and `end`.
+    /// Median of three random values between `start` and `end`.
     #[inline(always)]
     fn pivot(&self, start: usize, end: usize, seed: &mut u32) -> f32 {
         let mut any = || {
@@ -133,8 +133,8 @@ impl<'a> Candidates<'a> {
         a.min(b).max(a.max(b).min(c))
     }
 
-    /// Packs those from `start` to `end` that are less than the pivot, or equal to it where `EQUAL`, to `start`, and
-    /// the rest to the spare list. How many go first.
+    /// Packs the values from `start` to `end` that are below the pivot, or with `EQUAL` at most the pivot, to
+    /// `start`, and the others to the spare list. Returns the number of the first.
     #[inline(always)]
     fn part<S: Simd, const EQUAL: bool>(&mut self, simd: S, start: usize, end: usize, pivot: f32) -> usize {
         let (mut front, mut back) = (start, 0);
@@ -147,7 +147,7 @@ impl<'a> Candidates<'a> {
             let there = first(simd, end - at);
             let goes_first = if EQUAL { values.le(pivot) } else { values.lt(pivot) };
             let (before, behind) = (there & goes_first, there & !goes_first);
-            // What is written to the front has been read: the front is never ahead of `at`.
+            // The front is never ahead of `at`: only values already read are overwritten.
             let (Some(v), Some(n)) = (chunk(self.values, front), chunk(self.numbers, front)) else { break };
             simd.pack16(before, values, v);
             simd.pack16(before, numbers, n);
@@ -162,7 +162,7 @@ impl<'a> Candidates<'a> {
         front - start
     }
 
-    /// Brings the spare list back to where it goes: from `start` to `end`.
+    /// Copies the spare list to `start` … `end`.
     #[inline(always)]
     fn unspare<S: Simd>(&mut self, _: S, start: usize, end: usize) {
         let n = end - start;
@@ -174,7 +174,7 @@ impl<'a> Candidates<'a> {
         }
     }
 
-    /// Of the equal values from `start` to `end`, brings those of the lowest numbers before `k`.
+    /// Moves the lowest numbers of the equal values from `start` to `end` before `k`.
     #[inline(always)]
     fn lowest_numbers(&mut self, start: usize, end: usize, k: usize) {
         if end > k
@@ -221,7 +221,7 @@ mod tests {
                 let mut lanes = [0.0; 16];
                 lanes[..values.len()].copy_from_slice(values);
                 let there = simd.mask16((1u32 << values.len()) - 1);
-                // Numbers fall, so that they are in no order in which ties would come out right by chance.
+                // Numbers descend, so that ties are not in the right order by chance.
                 let numbers = simd.load16(&core::array::from_fn(|lane| {
                     f32::from_bits((self.values.len() - 16 * i).wrapping_sub(lane) as u32)
                 }));

@@ -1,29 +1,29 @@
-//! Watertight ray/triangle tests (Woop, Benthin, Wald 2013, "Watertight Ray/Triangle Intersection"):
-//! the scalar reference, one ray against eight triangles, sixteen rays against one triangle.
+//! Watertight ray/triangle tests (Woop, Benthin, Wald 2013, "Watertight Ray/Triangle Intersection"): the
+//! scalar reference, one ray against eight triangles, sixteen rays against one triangle.
 //!
-//! Plainly: move the origin to zero, shear space so that the ray runs along +z, and take the signed areas
-//! U, V, W of the three edges against the z axis; the ray hits where none has another sign than the rest.
-//! 1. Two triangles that share an edge compute the same area with opposite sign, so no ray slips between:
-//!    nothing is fused, for a fused product difference is not antisymmetric.
+//! The origin is moved to zero and space is sheared so that the ray is the +z axis. U, V, W are the signed
+//! areas of the three edges with the z axis. The ray hits if no two of them have opposite signs.
+//! 1. Two triangles that share an edge compute the same area with opposite sign, so that no ray slips between
+//!    them. Nothing is fused, because a fused difference of products is not antisymmetric.
 //! 2. An area of exactly zero in f32 is computed again in f64, where products of f32 are exact.
 //! 3. All forms do the same operations in the same order: their hits agree to the bit.
 //!
-//! The price: no fused multiply-add, and rays of one packet must agree in their dominant axis.
+//! The cost: no fused multiply-add, and the rays of a packet must agree in their dominant axis.
 
 use crate::lanes::{Lanes, Mask, Simd};
 
-/// The shear that turns a ray into the +z axis.
+/// Shear that maps a ray to the +z axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Shear {
-    /// Axes that become x, y, z: z is where the direction is largest; x and y are swapped where that
-    /// component is negative, to keep the winding.
+    /// Axes that become x, y, z. The direction is largest along z; x and y are swapped if that component is
+    /// negative, to keep the winding.
     pub axes: [usize; 3],
     /// Shear in x and in y, scale of z.
     pub factors: [f32; 3],
 }
 
 impl Shear {
-    /// The shear of a direction that is not zero.
+    /// Shear of a direction that is not zero.
     #[inline(always)]
     pub fn new(d: [f32; 3]) -> Self {
         let z = dominant_axis(d);
@@ -34,17 +34,17 @@ impl Shear {
     }
 }
 
-/// The axis along which `d` is largest in magnitude.
+/// Axis along which `d` is largest in magnitude.
 #[inline(always)]
 pub fn dominant_axis(d: [f32; 3]) -> usize {
     let [x, y, z] = [d[0].abs(), d[1].abs(), d[2].abs()];
-    // Selections, not branches: the directions of bounces are not to be guessed.
+    // Selections, not branches: the directions of bounces are unpredictable.
     let (most, axis) = if x > y { (x, 0) } else { (y, 1) };
     if most > z { axis } else { 2 }
 }
 
-/// Scalar reference: `(t, u, v)` where the ray meets the triangle at `0 <= t <= t_max`, with the
-/// barycentric weights of the second and third corner.
+/// Scalar reference: `(t, u, v)` of the intersection at `0 <= t <= t_max`, with the barycentric weights of
+/// the second and third corner.
 #[inline(always)]
 pub fn intersect(
     origin: [f32; 3],
@@ -75,7 +75,7 @@ pub fn intersect(
     (t >= 0.0 && t <= t_max).then(|| (t, v / det, w / det))
 }
 
-/// What a batch test finds: lanes outside `hits` hold garbage.
+/// Result of a batch test; lanes outside `hits` are unspecified.
 #[derive(Clone, Copy)]
 pub struct Found<L> {
     /// Distance.
@@ -84,39 +84,39 @@ pub struct Found<L> {
     pub u: L,
     /// Barycentric weight of the third corner.
     pub v: L,
-    /// Bits of the lanes that hit.
+    /// Mask of the lanes that hit.
     pub hits: u32,
-    /// Bits of the lanes on an edge in f32: theirs is for the scalar reference to say.
+    /// Mask of the lanes on an edge in f32, which the scalar reference decides.
     pub doubtful: u32,
 }
 
 impl<L: Lanes> Found<L> {
-    /// Nothing found; the lanes are left as they are given.
+    /// No hit; the lanes are unspecified.
     #[inline(always)]
     fn nothing(garbage: L, doubtful: u32) -> Self {
         Self { t: garbage, u: garbage, v: garbage, hits: 0, doubtful }
     }
 }
 
-/// A corner, its coordinates in the order of the axes, moved so that the ray starts at zero.
+/// Corner relative to the origin of the ray, with coordinates in the order of the axes.
 #[inline(always)]
 fn moved<L: Lanes>([x, y, z]: [L; 3], [ox, oy, oz]: [L; 3]) -> [L; 3] {
     [x - ox, y - oy, z - oz]
 }
 
-/// A moved corner sheared so that the ray is the +z axis.
+/// Corner after [`moved`], sheared so that the ray is the +z axis.
 #[inline(always)]
 fn turned<L: Lanes>([x, y, z]: [L; 3], [sx, sy, _]: [L; 3]) -> [L; 3] {
     [x - sx * z, y - sy * z, z]
 }
 
-/// Both.
+/// [`moved`], then [`turned`].
 #[inline(always)]
 fn sheared<L: Lanes>(corner: [L; 3], origin: [L; 3], factors: [L; 3]) -> [L; 3] {
     turned(moved(corner, origin), factors)
 }
 
-/// The test itself, over lanes of triangles or lanes of rays: sheared corners `[x, y, z]` of a, b, c.
+/// The test over lanes of triangles or lanes of rays: sheared corners `[x, y, z]` of a, b, c.
 #[inline(always)]
 fn areas<L: Lanes>(zero: L, sz: L, [a, b, c]: [[L; 3]; 3], t_max: L, wanted: u32) -> Found<L> {
     let u = c[0] * b[1] - c[1] * b[0];
@@ -129,7 +129,7 @@ fn areas<L: Lanes>(zero: L, sz: L, [a, b, c]: [[L; 3]; 3], t_max: L, wanted: u32
     if inside == 0 {
         return Found::nothing(det, 0);
     }
-    // A zero area among those of one sign: u v w = 0 is where one of the extremes is zero.
+    // A zero area among areas of one sign: one of the extremes is zero.
     let doubtful = (low.eq(zero) | high.eq(zero)).bits() & inside;
     let t = ((u * (sz * a[2]) + v * (sz * b[2])) + w * (sz * c[2])) / det;
     let hits = (zero.le(t) & t.le(t_max)).bits() & inside & !doubtful;
@@ -139,29 +139,29 @@ fn areas<L: Lanes>(zero: L, sz: L, [a, b, c]: [[L; 3]; 3], t_max: L, wanted: u32
     Found { t, u: v / det, v: w / det, hits, doubtful }
 }
 
-/// What [`ShearRay8::areas`] finds, with the divisions left to do for the hit that counts.
+/// Result of [`ShearRay8::areas`]. The divisions are left for the hit that counts.
 #[derive(Clone, Copy, Debug)]
 pub struct Areas {
     /// Distance; infinite in lanes that do not hit.
     pub t: [f32; 8],
-    /// Twice the area opposite to the second corner,
+    /// Twice the area opposite to the second corner.
     pub v: [f32; 8],
-    /// to the third,
+    /// Twice the area opposite to the third corner.
     pub w: [f32; 8],
-    /// and of the whole triangle, as the ray sees it.
+    /// Twice the area of the whole triangle, as seen along the ray.
     pub det: [f32; 8],
-    /// Bits of the lanes that hit.
+    /// Mask of the lanes that hit.
     pub hits: u32,
-    /// Bits of the lanes on an edge in f32: theirs is for the scalar reference to say.
+    /// Mask of the lanes on an edge in f32, which the scalar reference decides.
     pub doubtful: u32,
 }
 
 impl Areas {
-    /// Nothing found.
+    /// No hit.
     pub const NONE: Areas =
         Areas { t: [f32::INFINITY; 8], v: [0.0; 8], w: [0.0; 8], det: [0.0; 8], hits: 0, doubtful: 0 };
 
-    /// Bits of the lanes of the nearest hit: one, but where several triangles are hit at the same distance.
+    /// Mask of the nearest hit: one lane, or several at equal distance.
     #[inline(always)]
     pub fn nearest<S: Simd>(&self, simd: S) -> u32 {
         let t = simd.load8(&self.t);
@@ -169,7 +169,7 @@ impl Areas {
     }
 }
 
-/// A ray in all lanes, for tests against eight triangles at once.
+/// Ray in all lanes, for tests against eight triangles at once.
 #[derive(Clone, Copy)]
 pub struct ShearRay8<S: Simd> {
     axes: [usize; 3],
@@ -190,7 +190,7 @@ impl<S: Simd> ShearRay8<S> {
         }
     }
 
-    /// From its origin along the axes, and its factors.
+    /// Ray from its origin along the axes of the shear, and its factors.
     #[inline(always)]
     pub fn along(simd: S, axes: [usize; 3], [ox, oy, oz]: [f32; 3], [sx, sy, sz]: [f32; 3]) -> Self {
         Self {
@@ -200,7 +200,7 @@ impl<S: Simd> ShearRay8<S> {
         }
     }
 
-    /// Like [`Self::meets`], without a branch on what is found.
+    /// [`Self::meets`] without a branch on the result.
     #[inline(always)]
     pub fn areas(&self, simd: S, values: &[f32], start: usize, count: usize, t_max: f32) -> Option<Areas> {
         let corners = simd.load8x9(values, start, count, self.axes)?;
@@ -224,14 +224,14 @@ impl<S: Simd> ShearRay8<S> {
         let doubtful = (inside & edge).bits();
         let met = inside & !edge & zero.le(t) & t.le(simd.splat8(t_max));
         let hits = met.bits();
-        // A doubtful lane may be no hit at all: it must not be the nearest.
+        // A doubtful lane may be no hit and must not be the nearest.
         let t = t.select(met, simd.splat8(f32::INFINITY));
         Some(Areas { t: t.to_array(), v: v.to_array(), w: w.to_array(), det: det.to_array(), hits, doubtful })
     }
 
-    /// Tests the `count` (1 … 8) triangles whose coordinates stand in `values` from `start`, nine runs of
+    /// Tests `count` (1 … 8) triangles. Their coordinates lie in `values` from `start` on, in nine runs of
     /// `count` floats: x of all first corners, y, z, then the second corners, then the third. Eight floats
-    /// must be readable from every run. `None` where they are not.
+    /// must be readable from the start of every run, otherwise the result is `None`.
     #[inline(always)]
     pub fn meets(
         &self,
@@ -256,7 +256,7 @@ impl<S: Simd> ShearRay8<S> {
 /// Sixteen rays of the same [`Shear::axes`], for tests against one triangle at a time.
 #[derive(Clone, Copy)]
 pub struct ShearRays16<S: Simd> {
-    /// Axes that become x, y, z, for all of them.
+    /// Axes that become x, y, z, for all rays.
     pub axes: [usize; 3],
     /// Origins along those axes.
     pub origin: [S::F16; 3],
@@ -265,8 +265,8 @@ pub struct ShearRays16<S: Simd> {
 }
 
 impl<S: Simd> ShearRays16<S> {
-    /// Tests the rays `wanted` against the triangle whose first coordinate stands at `values[start]`, in runs of
-    /// `stride` as [`ShearRay8::meets`] has them. `None` where they leave the slice.
+    /// Tests the rays `wanted` against the triangle whose first coordinate is `values[start]`, in runs of
+    /// `stride` as in [`ShearRay8::meets`]. `None` if a run is not in the slice.
     #[inline(always)]
     pub fn meets(
         &self,
@@ -281,14 +281,14 @@ impl<S: Simd> ShearRays16<S> {
         Some(self.meets_moved(simd, &corners, t_max, wanted))
     }
 
-    /// The corners of that triangle with the origins at zero: the same for all rays of the same origin and axes.
+    /// Corners of that triangle relative to the origins, equal for all rays of the same origin and axes.
     #[inline(always)]
     pub fn moved(&self, simd: S, values: &[f32], start: usize, stride: usize) -> Option<[[S::F16; 3]; 3]> {
         let [a, b, c] = simd.splat16x9(values, start, stride, self.axes)?;
         Some([moved(a, self.origin), moved(b, self.origin), moved(c, self.origin)])
     }
 
-    /// [`Self::meets`] for what [`Self::moved`] gives.
+    /// [`Self::meets`] for corners of [`Self::moved`].
     #[inline(always)]
     pub fn meets_moved(
         &self,

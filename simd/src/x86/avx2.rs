@@ -1,5 +1,5 @@
-//! AVX2 lanes: thin newtypes over `__m256`. They exist only through the token [`Avx2`], and the token
-//! only inside `with_avx2`; that is what every SAFETY line here rests on.
+//! AVX2 lanes: newtypes over `__m256`. They exist only through the token [`Avx2`], and the token only inside
+//! `with_avx2`; every SAFETY line rests on that.
 
 use crate::baseline::{Pair, fits8x9, gather9, halves, splat_corners};
 use crate::lanes::{EXPONENT, Lanes, Mask, Simd};
@@ -262,7 +262,7 @@ impl Simd for Avx2 {
         let first = items.as_ptr().wrapping_add(index).cast::<i8>();
         let other = values.as_ptr().wrapping_add(index).cast::<i8>();
         let start = core::hint::select_unpredictable(second, other, first);
-        // SAFETY: a prefetch has no effect but on the cache, whatever the address.
+        // SAFETY: a prefetch affects only the cache, at any address.
         unsafe {
             _mm_prefetch::<_MM_HINT_T0>(start);
             _mm_prefetch::<_MM_HINT_T0>(start.wrapping_add(64));
@@ -345,7 +345,7 @@ unsafe fn pick8(table: Pair<F8>, which: F8) -> F8 {
         let which = _mm256_cvttps_epi32(which.0);
         let low = _mm256_permutevar8x32_ps(table.0.0, which);
         let high = _mm256_permutevar8x32_ps(table.1.0, which);
-        // Bit 3 says which half.
+        // Bit 3 selects the half.
         F8(_mm256_blendv_ps(low, high, _mm256_castsi256_ps(_mm256_slli_epi32::<28>(which))))
     }
 }
@@ -369,7 +369,7 @@ unsafe fn powers8(words: *const u32) -> F8 {
     }
 }
 
-/// Puts the lanes with `entry <= exit` on the stack, if there is room for eight.
+/// Pushes the lanes with `entry <= exit`, if there is room for eight.
 ///
 /// # Safety
 /// The processor has AVX2.
@@ -384,7 +384,7 @@ unsafe fn push_met(entry: __m256, exit: __m256, items: __m256, stack: &mut Stack
     }
 }
 
-/// Puts the lanes of the set `wanted` on the stack.
+/// Pushes the lanes of the mask `wanted`.
 ///
 /// # Safety
 /// The processor has AVX2, and eight slots from the height on are inside the stack.
@@ -399,7 +399,7 @@ unsafe fn store_packed(wanted: u32, items: __m256, entries: __m256, stack: &mut 
     stack.height += wanted.count_ones() as usize;
 }
 
-/// The lanes of the set `wanted`, lowest first.
+/// Lanes of the mask `wanted`, lowest first.
 ///
 /// # Safety
 /// The processor has AVX2.
@@ -412,7 +412,7 @@ unsafe fn packed(wanted: u32, lanes: __m256) -> __m256 {
     }
 }
 
-/// For each set of lanes the bytes that name them one after the other.
+/// For each mask the indices of its lanes in ascending order, a byte each.
 static PACK: [u64; 256] = {
     let mut table = [0; 256];
     let mut set = 0;

@@ -201,7 +201,7 @@ lanes!(F16, M16, __mmask16, 16, __m512,
     _mm512_min_ps _mm512_max_ps _mm512_cmp_ps_mask _mm512_mask_blend_ps _mm512_storeu_ps _mm512_reduce_max_ps
     _mm512_reduce_min_ps _mm512_movepi32_mask _mm512_castps_si512 _mm512_sqrt_ps _mm512_and_ps _mm512_fmsub_ps);
 
-/// Of records `i`, `i + 4`, `i + 8` and `i + 12` (`i` below 4) the four floats from `from` (0 or 4) on.
+/// The four floats from `from` (0 or 4) on of the records `i`, `i + 4`, `i + 8` and `i + 12` (`i` below 4).
 ///
 /// # Safety
 /// The processor has AVX-512 F and DQ.
@@ -221,7 +221,7 @@ unsafe fn quarters(records: &[[f32; 8]; 16], i: usize, from: usize) -> __m512 {
     }
 }
 
-/// In each quarter of the registers, rows become columns.
+/// Transposes each quarter of the registers.
 ///
 /// # Safety
 /// The processor has AVX-512 F.
@@ -240,7 +240,7 @@ unsafe fn transposed([a, b, c, d]: [__m512; 4]) -> [__m512; 4] {
     }
 }
 
-/// Eight items and entries from the height of the stack on.
+/// Stores eight items and entries from the height of the stack on.
 ///
 /// # Safety
 /// The processor has AVX, and eight slots from the height on are inside the stack.
@@ -413,7 +413,7 @@ impl Simd for Avx512 {
         let first = items.as_ptr().wrapping_add(index).cast::<i8>();
         let other = values.as_ptr().wrapping_add(index).cast::<i8>();
         let start = core::hint::select_unpredictable(second, other, first);
-        // SAFETY: a prefetch has no effect but on the cache, whatever the address.
+        // SAFETY: a prefetch affects only the cache, at any address.
         unsafe {
             _mm_prefetch::<_MM_HINT_T0>(start);
             _mm_prefetch::<_MM_HINT_T0>(start.wrapping_add(64));

@@ -1,4 +1,4 @@
-//! x86-64 above the baseline: which instructions the processor has, and the functions compiled for them.
+//! x86-64 levels above the baseline: detection of instructions, and the functions compiled for them.
 
 mod avx2;
 mod avx512;
@@ -14,12 +14,12 @@ macro_rules! all_detected {
     }};
 }
 
-/// Whether the processor has every feature that [`with_avx2`] enables.
+/// True if the processor has every feature that [`with_avx2`] enables.
 pub(crate) fn has_avx2() -> bool {
     all_detected!("avx2", "fma", "f16c", "bmi1", "bmi2", "lzcnt", "movbe", "popcnt")
 }
 
-/// Whether the processor has every feature that [`with_avx512`] enables.
+/// True if the processor has every feature that [`with_avx512`] enables.
 pub(crate) fn has_avx512() -> bool {
     has_avx2() && all_detected!("avx512f", "avx512vl", "avx512dq", "avx512bw", "avx512cd")
 }

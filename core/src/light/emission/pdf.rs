@@ -24,19 +24,19 @@ pub(crate) enum LightType {
 }
 
 impl LightSampler<'_> {
-    /// Density of emissive `triangle` at `place` in unit direction `way`, per m² sr of étendue.
+    /// Index of the emitter that contains `triangle`.
     pub(crate) fn emitter_index(&self, triangle: u32) -> Option<u32> {
         self.emitter_of(triangle).map(|(index, _)| index as u32)
     }
 
-    /// Density of emitter `index` at `place` in unit direction `way`, per m² sr of étendue.
+    /// Index of the environment in the order of emission, the last of all lights.
     pub(crate) fn environment_index(&self) -> u32 {
         (self.near() + self.distant.len()) as u32
     }
 }
 
 impl EmissionSampler<'_> {
-    /// Density of the environment in unit `direction` from `position`, per m² sr of étendue.
+    /// Density of emissive `triangle` at `place` in unit direction `way`, per m² sr of étendue.
     pub(crate) fn density_of_surface(
         &self,
         scene: &Scene,
@@ -49,7 +49,7 @@ impl EmissionSampler<'_> {
             .map_or(0.0, |(index, _)| self.density_of_emitter(scene, lights, index, (place, way)))
     }
 
-    /// Density of a light without extent at `position`, per m² of surface that faces it.
+    /// Density of emitter `index` at `place` in unit direction `way`, per m² sr of étendue.
     pub(crate) fn density_of_emitter(
         &self,
         scene: &Scene,
@@ -62,7 +62,7 @@ impl EmissionSampler<'_> {
         self.density(scene, lights, index, way, place) * FRAC_1_PI / (emitter.area * sides)
     }
 
-    /// Density of the light of `sample`, drawn at `position`, in the unit of its [`LightType`].
+    /// Density of the environment in unit `direction` from `position`, per m² sr of étendue.
     pub(crate) fn density_of_sky(
         &self,
         scene: &Scene,
@@ -80,7 +80,7 @@ impl EmissionSampler<'_> {
         }
     }
 
-    /// Type of `light`, in the order of emission.
+    /// Density of a light without extent at `position`, per m² of surface that faces it.
     pub(crate) fn density_of_choice(
         &self,
         scene: &Scene,
@@ -103,7 +103,8 @@ impl EmissionSampler<'_> {
         self.density(scene, lights, index, way.normalize_or_zero(), on) * density
     }
 
-    /// Density per area of the disc through which infinite light enters.
+    /// Density of the light of `sample`, drawn at `position`: per m² sr of étendue, for a delta light per m²
+    /// of surface that faces it.
     pub(crate) fn density_of_sample(
         &self,
         scene: &Scene,
@@ -122,7 +123,7 @@ impl EmissionSampler<'_> {
         }
     }
 
-    /// How light `light`, in the order of the table, is found.
+    /// Type of `light`, in the order of emission.
     pub(crate) fn found(&self, lights: &LightSampler, light: u32) -> LightType {
         let index = light as usize;
         if index < lights.emitters.len() {
@@ -134,7 +135,7 @@ impl EmissionSampler<'_> {
         }
     }
 
-    /// Per area of the disc through which light from infinitely far is sent.
+    /// Density per area of the disc through which infinite light enters.
     fn per_disc(&self) -> f32 {
         1.0 / (PI * self.radius * self.radius)
     }

@@ -1,16 +1,18 @@
-//! Edges against the boundary integrals themselves by quadrature in f64, against the textbook's form factors, and
-//! at every level against the single lane. The rows are the configurations that break the textbook's formulas.
+//! Edges against quadrature of the boundary integrals in f64 and against the textbook's form factors, and
+//! every level against the scalar reference. The rows are configurations in which the textbook's formulas
+//! fail.
 
 use super::*;
 use crate::{Kernel, Lanes, Level, Simd};
 use core::f64::consts::PI;
 use std::vec::Vec;
 
-/// Root mean square of the errors of a row's triangles, relative to that of what is wanted.
+/// Root mean square error of a row's triangles, relative to that of the expected values.
 const TOLERANCE: f64 = 1e-5;
-/// Below this angle (radians) a triangle's edges cancel so far that the rounding of its directions shows:
+/// Angle (radians) below which a triangle's edges cancel so far that the rounding of its directions
+/// dominates:
 const NARROW: f64 = 0.02;
-/// at most so many times eps over the angle.
+/// then the error is at most this times eps over the angle.
 const ROUNDING: f64 = 10.0;
 /// Triangles of a row.
 const COUNT: usize = 300;
@@ -32,7 +34,7 @@ fn unit(a: Wide) -> Wide {
     a.map(|x| x / length)
 }
 
-/// Nodes and weights of Gauss and Legendre on [0, 1], by Newton's method.
+/// Nodes and weights of Gauss-Legendre quadrature on [0, 1], by Newton's method.
 fn gauss(n: usize) -> Vec<(f64, f64)> {
     (1..=n)
         .map(|i| {
@@ -52,7 +54,7 @@ fn gauss(n: usize) -> Vec<(f64, f64)> {
         .collect()
 }
 
-/// The integrals of the module's head along one edge.
+/// The integrals of the module's documentation along one edge.
 fn integrated(nodes: &[(f64, f64)], (a, u): Corner, (b, v): Corner) -> Flux<f64> {
     let (a, b, u, v) = (unit(a.map(f64::from)), unit(b.map(f64::from)), f64::from(u), f64::from(v));
     let normal = cross(a, b);
@@ -119,14 +121,14 @@ impl Random {
         low + (high - low) * self.unit()
     }
 
-    /// A direction not nearer than `low` to the horizon, by its cosine.
+    /// Random direction whose cosine with the normal is from `low` to `high`.
     fn direction(&mut self, low: f64, high: f64) -> Wide {
         let (z, phi) = (self.between(low, high), self.between(0.0, 2.0 * PI));
         let r = (1.0 - z * z).sqrt();
         [r * phi.cos(), r * phi.sin(), z]
     }
 
-    /// A counter-clockwise triangle about `angle` wide around a direction, at these distances.
+    /// Counter-clockwise triangle about `angle` wide around a direction, at these distances.
     fn triangle(&mut self, centre: Wide, angle: f64, distances: [f64; 3]) -> [Corner; 3] {
         let x = unit(cross(centre, [0.3, 0.5, 0.8]));
         let y = cross(centre, x);
@@ -144,7 +146,7 @@ fn corner(direction: Wide, distance: f64) -> Corner {
     (direction.map(|x| x as f32), (1.0 / distance) as f32)
 }
 
-/// A name, the triangles' angle, and how to make one.
+/// Name, angle of the triangles, and generator.
 type Row = (&'static str, f64, fn(&mut Random) -> [Corner; 3]);
 
 const ROWS: [Row; 11] = [
@@ -237,13 +239,13 @@ fn derivatives_are_those_of_lamberts_formula() {
     let quad = [[0.5, -0.2, 1.0], [1.5, 0.1, 1.3], [1.2, 1.4, 2.0], [0.1, 0.9, 1.6]];
     let turned = |tilt: f64| {
         quad.map(|[x, y, z]| {
-            // The receiver turns by -tilt about y: what it sees turns by tilt.
+            // The receiver turns by -tilt about y: its view turns by tilt.
             let (sin, cos) = tilt.sin_cos();
             [x * cos + z * sin, y, z * cos - x * sin]
         })
     };
     let moved = |x: f64, y: f64| lambert(&quad.map(|p| [p[0] - x, p[1] - y, p[2]]));
-    // Of central differences and of the polynomial.
+    // Error of central differences and of the polynomial.
     const TOLERANCE: f64 = 1e-6;
     const STEP: f64 = 1e-3;
     let corners: Vec<(Wide, f64)> = quad.iter().map(|&p| (unit(p), 1.0 / dot(p, p).sqrt())).collect();
@@ -290,7 +292,7 @@ fn the_horizon_adds_nothing() {
     assert_eq!(found, Flux::default());
 }
 
-/// Sixteen edges, one a lane.
+/// Sixteen edges, one per lane.
 struct Sixteen<'a>(&'a [(Corner, Corner); 16]);
 
 impl Kernel for Sixteen<'_> {

@@ -1,12 +1,12 @@
-//! Eigenvalues against f64 (exact enough: of stiff matrices the small one by the exact determinant), for every
-//! class of matrix that hurts; and every level against the single lane, to the bit.
+//! Eigenvalues against f64 for every class of difficult matrix, and every level against the scalar reference,
+//! to the bit. For stiff matrices f64 gives the small value by the exact determinant.
 
 use super::*;
 use std::vec::Vec;
 
-/// Matrices of each class.
+/// Matrices per class.
 const COUNT: usize = 4096;
-/// What both eigenvalues may be off, in units in the last place (2⁻²³ of the value).
+/// Largest error of both eigenvalues, in units in the last place (2⁻²³ of the value).
 const ULPS: f64 = 4.0;
 
 /// xorshift64*.
@@ -24,7 +24,7 @@ impl Random {
         2.0 * self.unit() - 1.0
     }
 
-    /// A rotated matrix of these eigenvalues.
+    /// Rotated matrix with these eigenvalues.
     fn turned(&mut self, [l, m]: [f64; 2]) -> [f32; 3] {
         let (sin, cos) = (core::f64::consts::TAU * self.unit()).sin_cos();
         [l * cos * cos + m * sin * sin, (l - m) * sin * cos, l * sin * sin + m * cos * cos].map(|x| x as f32)
@@ -70,13 +70,13 @@ const CLASSES: [Class; 14] = [
     }),
 ];
 
-/// a b exactly, as two f64. (The factors are f32 or their sums, far from the ends of f64.)
+/// Exact product a b as two f64. (The factors are f32 or their sums, far from the limits of f64.)
 fn product(a: f64, b: f64) -> (f64, f64) {
     let p = a * b;
     (p, a.mul_add(b, -p))
 }
 
-/// The eigenvalues of the stored matrix in f64, larger magnitude first.
+/// Eigenvalues of the stored matrix in f64, larger magnitude first.
 fn exact([a, b, c]: [f32; 3]) -> [f64; 2] {
     let [a, b, c] = [a, b, c].map(f64::from);
     let (mean, radius) = (0.5 * (a + c), (0.5 * (a - c)).hypot(b));
@@ -86,7 +86,7 @@ fn exact([a, b, c]: [f32; 3]) -> [f64; 2] {
     [large, if large == 0.0 { 0.0 } else { determinant / large }]
 }
 
-/// Error in units in the last place of `wanted` as f32 would store it.
+/// Error in units in the last place of `wanted` as f32 stores it.
 fn ulps(found: f32, wanted: f64) -> f64 {
     let unit = (wanted.abs() * f64::from(f32::EPSILON)).max(f64::from(f32::from_bits(1)));
     (f64::from(found) - wanted).abs() / unit
@@ -104,7 +104,8 @@ fn both_values_of_every_class_are_exact_to_four_units() {
                 worst[k] = worst[k].max(ulps(found, wanted));
                 assert!(worst[k] <= ULPS, "{name}: {matrix:?} has {wanted:e}, not {found:e}");
             }
-            // A v - λ v, of the norm of A; the rounding of v alone makes half a unit of each coordinate.
+            // A v - λ v relative to the norm of A. The rounding of v alone contributes half a unit of each
+            // coordinate.
             let ([a, b, c], [x, y]) = (matrix.map(f64::from), found.axis.map(f64::from));
             let value = exact(matrix)[0];
             let residual = (a * x + b * y - value * x).hypot(b * x + c * y - value * y);
@@ -122,11 +123,11 @@ fn known_matrices() {
     assert_eq!(of([2.0, 1.0, 2.0]).values, [3.0, 1.0]);
     let half = core::f32::consts::FRAC_1_SQRT_2;
     assert_eq!(of([2.0, 1.0, 2.0]).axis, [half, half]);
-    // A saddle, and its negative: the axis follows the magnitude, not the sign.
+    // A saddle and its negative: the axis follows the magnitude, not the sign.
     assert_eq!(of([-3.0, 0.0, 1.0]), Eigen2 { values: [-3.0, 1.0], axis: [-1.0, 0.0] });
     assert_eq!(of([1.0, 0.0, -3.0]), Eigen2 { values: [-3.0, 1.0], axis: [-0.0, 1.0] });
     assert_eq!(of([0.0; 3]), Eigen2 { values: [0.0; 2], axis: [1.0, 0.0] });
-    // Where both are as large, value and axis still belong together.
+    // With equal magnitudes, value and axis still belong together.
     assert_eq!(of([-12.0, 0.0, 12.0]), Eigen2 { values: [12.0, -12.0], axis: [0.0, 1.0] });
     assert_eq!(of([12.0, 0.0, -12.0]), Eigen2 { values: [12.0, -12.0], axis: [1.0, 0.0] });
     // Variation along one axis only.
@@ -136,7 +137,7 @@ fn known_matrices() {
 #[test]
 fn jacobi_finds_known_values_and_orthogonal_vectors() {
     let mut random = Random(2);
-    // Of the largest value: what four sweeps reach.
+    // Error relative to the largest value after four sweeps.
     const TOLERANCE: f64 = 6e-7;
     let scales = [1.0, 1e-42, 1e-30, 1e38];
     let ratios =
@@ -151,12 +152,12 @@ fn jacobi_finds_known_values_and_orthogonal_vectors() {
                 };
                 let matrix = [entry(0, 0), entry(0, 1), entry(0, 2), entry(1, 1), entry(1, 2), entry(2, 2)];
                 let found = symmetric3(|x| x, matrix);
-                // Rounding the entries moves the values by half a denormal of each.
+                // Rounding of the entries moves the values by half a denormal of each.
                 let tolerance = TOLERANCE * scale + 3.0 * f64::from(f32::from_bits(1));
                 let mut wanted = values;
                 wanted.sort_by(|a, b| b.abs().total_cmp(&a.abs()));
                 for (found, wanted) in found.values.iter().zip(wanted) {
-                    // Values of one magnitude may come in either order.
+                    // Values of equal magnitude may come in either order.
                     let off = (f64::from(found.abs()) - (scale * wanted).abs()).abs();
                     assert!(off <= tolerance, "{found:e} for {:e} of {matrix:?}", scale * wanted);
                 }

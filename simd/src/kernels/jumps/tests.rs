@@ -1,5 +1,5 @@
-//! Whole hemispheres by both kernels over edges: every level gives the same bits, agrees with the scalar reference,
-//! and with the same sums in f64.
+//! Whole hemispheres by both kernels over edges: all levels give the same bits, and agree with the scalar
+//! reference and with sums in f64.
 
 use super::*;
 use crate::Level;
@@ -9,9 +9,9 @@ use crate::kernels::mesh::{AS_FAR, Mesh, Rule};
 use core::f64::consts::{FRAC_PI_4, TAU};
 use std::vec::Vec;
 
-/// Of a hemisphere's gradient, rotation or Hessian, in the norm.
+/// Largest error of a hemisphere's gradient, rotation or Hessian, relative to its norm.
 const TOLERANCE: f64 = 1e-5;
-/// Between orders of summing, of the sum of all magnitudes.
+/// Largest difference between orders of summation, relative to the sum of all magnitudes.
 const ORDER: f64 = 1e-6;
 
 /// xorshift64*.
@@ -63,7 +63,7 @@ impl View {
             inverse.push((1.0 / distance) as f32);
             directions.push(w.map(|x| x as f32));
         }
-        // Any tables will do; these are of the size that borders have.
+        // Arbitrary tables, of the size of actual borders.
         let mut borders = std::vec![[[0.0; 16]; 7]; 2 * n * n.div_ceil(16)];
         for (at, table) in borders.iter_mut().enumerate() {
             let (i, first, below) = (at / 2 / n.div_ceil(16), 16 * (at / 2 % n.div_ceil(16)), at % 2 == 1);
@@ -88,7 +88,7 @@ impl View {
     }
 }
 
-/// Sums in f64, and of the magnitudes of all that is summed: gradient, rotation, Hessian.
+/// Sums in f64, and sums of the magnitudes of all terms: gradient, rotation, Hessian.
 #[derive(Default)]
 struct Wide {
     sums: [f64; 15],
@@ -113,7 +113,7 @@ impl Wide {
         }
     }
 
-    /// Distances of `found`, and the norms of what is here, for gradient, rotation and Hessian.
+    /// Distance of `found` from these sums and norm of these sums, for gradient, rotation and Hessian.
     fn beside(&self, found: &Sums) -> [(f64, f64); 3] {
         let mut off = [(0.0, 0.0); 3];
         for (found, (wanted, kind)) in list(found).into_iter().zip(self.sums.iter().zip(KINDS)) {
@@ -124,7 +124,7 @@ impl Wide {
     }
 }
 
-/// Which numbers of [`list`] are of the gradient, the rotation, the Hessian.
+/// Kind of each number of [`list`]: 0 gradient, 1 rotation, 2 Hessian.
 const KINDS: [usize; 15] = [0, 0, 1, 1, 0, 0, 1, 1, 0, 0, 1, 1, 2, 2, 2];
 
 fn list(sums: &Sums) -> [f32; 15] {
@@ -169,7 +169,7 @@ fn mesh_in_f64(view: &View, rule: Rule) -> Wide {
     wide
 }
 
-/// The borders in f64.
+/// Borders in f64.
 fn cells_in_f64(view: &View) -> Wide {
     let (n, mut wide) = (view.n, Wide::default());
     for (i, j, below) in (0..n * n).flat_map(|at| [(at / n, at % n, 0), (at / n, at % n, 1)]) {
@@ -188,7 +188,7 @@ fn cells_in_f64(view: &View) -> Wide {
     wide
 }
 
-/// All levels to the bit, and near the scalar reference and the sums in f64.
+/// Compares all levels to the bit, and the result with the scalar reference and the sums in f64.
 fn check(name: &str, wide: &Wide, reference: &Sums, of: impl Fn(Level) -> Sums) {
     let found = of(Level::BASELINE);
     for level in Level::detect().and_below() {
