@@ -1,5 +1,5 @@
-//! Bidirectional path tracing as a whole: the wavefront and its running sums against the densities of the
-//! textbook.
+//! Bidirectional path tracing as a whole: the wavefront with its running MIS sums against the textbook, which
+//! computes the densities of all techniques.
 
 use glam::Vec3;
 use halflight_core::bsdf::All;
@@ -21,19 +21,19 @@ use halflight_tests::scenes::{
     room_with_lamp, varnished,
 };
 
-/// Pixels across and down, and light paths of a sample.
+/// Pixels across and down; then light paths per sample.
 const SIZE: u32 = 16;
 const LIGHT_PATHS: usize = 512;
 
-/// Differences that rounding makes, relative.
+/// Relative tolerance of rounding.
 const ROUNDING: f32 = 1e-4;
 
-/// What was compared.
+/// Statistics of a comparison.
 #[derive(Clone, Copy, Debug, Default)]
 struct Compared {
-    /// Pixels and splats.
+    /// Number of pixels and splats.
     values: usize,
-    /// Those that differ by more than rounding.
+    /// Values that differ by more than [`ROUNDING`].
     wrong: usize,
     worst: f32,
 }
@@ -47,14 +47,14 @@ impl Compared {
     }
 }
 
-/// Samples of the picture.
+/// Samples per pixel.
 const SAMPLES: u32 = 2;
 
-/// The choices of the textbook, in place of those that the wavefront has.
+/// Change of the textbook's sample counts and merge radii, which otherwise equal those of the wavefront.
 type Change = fn(&mut Counts, &mut Option<MergeRadii>);
 
-/// The wavefront, with `connections` of each vertex and with weights that know of merges within a radius in
-/// pixels, and the textbook with its choices changed.
+/// Compares the wavefront with the textbook after `change`. Each vertex has `connections` connections, and MIS
+/// weights include merges within `merge_radius` pixels.
 fn compare(scene: &Scene, connections: u32, merge_radius: Option<f64>, change: Change) -> Compared {
     with_structures(scene, |bvh, lights| {
         let settings = PathSettings { width: SIZE, height: SIZE, seed: 7, max_depth: 10 };
@@ -132,7 +132,7 @@ fn compare(scene: &Scene, connections: u32, merge_radius: Option<f64>, change: C
     })
 }
 
-/// Scenes with all kinds of lights and surfaces, a lens, cut-outs, and normals of corners.
+/// Scenes with all kinds of lights and surfaces, a lens, cut-outs and vertex normals.
 fn scenes() -> [(&'static str, SceneBuffers); 8] {
     let with = |mut buffers: SceneBuffers, light: PointLight| {
         buffers.lights.push(light);
@@ -165,7 +165,7 @@ fn running_sums_weigh_paths_as_all_densities_do() {
     for (name, buffers) in scenes() {
         for (connections, radius) in [(0, None), (2, None), (2, Some(3.0))] {
             let compared = compare(&buffers.scene(), connections, radius, |_, _| ());
-            // Directions over short segments, and narrow lobes, are rounded more.
+            // Short segments and narrow lobes magnify rounding.
             let Compared { values, wrong, worst } = compared;
             assert!(values > 700 && wrong <= values / 100 && worst < 1e-3, "{name} {radius:?} {compared:?}");
         }

@@ -1,6 +1,6 @@
-//! Lookup of the files that statements name. Names come from other machines: with their folders, with
-//! backslashes, in another case or encoding. The exact name is tried first, then each tail of the path, the
-//! longest first, then the same without regard to case and encoding if exactly one file matches.
+//! Lookup of the files that statements name. Names come from other machines: with other folders, with
+//! backslashes, in another case or encoding. The exact name is tried first, then each tail of the path from
+//! the longest on, then both without regard to case and encoding if exactly one file matches.
 
 use super::name::{folded, path, shown};
 use std::collections::{BTreeSet, HashMap};
@@ -12,7 +12,7 @@ const LONGEST_NAME: usize = 4096;
 /// Parts of a path that are tried, from its end.
 const MOST_PARTS: usize = 64;
 
-/// Result of a lookup. Numbers are those of the names.
+/// Result of a lookup, with the index of the matching name.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum Found {
     /// A file of exactly this name.

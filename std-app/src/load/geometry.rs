@@ -121,8 +121,8 @@ pub(super) fn pieces(parts: &[Placed], fit: &Fit) -> f64 {
 const DEFORMED: (f64, &str) =
     (1e-5, "triangle smaller than 1e-5 of its distance from the detail: rounding deforms it");
 
-/// The same of scenes without large surroundings, whose files often have small triangles that nobody sees: these are
-/// smaller than the spacing of coordinates.
+/// Threshold for scenes without large surroundings, below the spacing of coordinates. Files often contain
+/// small triangles that nobody sees.
 const COLLAPSED: (f64, &str) =
     (1e-7, "triangle smaller than 1e-7 of its distance from the middle of the scene: rounding deforms it");
 
