@@ -1,4 +1,4 @@
-//! Light that is computed at a few points and reused at many.
+//! Caches of light: computed at few points and reused at many.
 
 pub mod irradiance;
 mod octree;

@@ -1,9 +1,9 @@
-//! An octree over the supports of records. Each record is linked from the cells that its box touches, at the
-//! depth where cells are just larger than the box, or deeper where memory allows more links. A point thus
-//! finds all records that reach it on one way down (Ward, Rubinstein and Clear 1988, section 3, with boxes in
-//! place of spheres).
+//! Octree over the supports of records. Each record is linked from the cells that its box touches, at the
+//! depth where cells are just larger than the box, or deeper if memory allows more links. A point finds all
+//! records that reach it in one descent (Ward, Rubinstein and Clear 1988, section 3, with boxes in place of
+//! spheres).
 //!
-//! Supports may shrink later but never grow: the tree then finds more records than reach a point, never
+//! Supports may shrink later but never grow: a descent then finds more records than reach a point, never
 //! fewer.
 
 use crate::geometry::Bounds;
@@ -11,46 +11,47 @@ use crate::memory::{Arena, Footprint, OutOfMemory};
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
-/// Points that may go down the tree together.
+/// Maximum number of points that descend together.
 pub const POINTS: usize = 16;
 
-/// The deepest level: cells are counted in `1 << DEPTH` along a side.
+/// Depth of the deepest level, with `1 << DEPTH` cells along a side.
 const DEPTH: u32 = 16;
 
-/// A box no larger than a cell touches this many at most.
+/// Maximum number of cells that a box no larger than a cell touches.
 const CELLS: usize = 8;
 
-/// Links of a record: from these, and from the one that its center lies in.
+/// Links of a record: from these cells, and from the cell of its centre.
 const LINKS: usize = CELLS + 1;
 
-/// A record may be linked this many levels deeper if there is memory: points then find fewer records in vain.
+/// Maximum number of levels that a record is linked deeper if memory allows; points then find fewer records
+/// in vain.
 const FINER: u32 = 2;
 
-/// The most cells that it is linked from then.
+/// Maximum number of cells of such a record.
 const MOST_CELLS: usize = 128;
 
-/// Nodes for each record. When they run out, records are linked higher up: they are found more often than
-/// necessary, never less.
+/// Nodes per record. If nodes run out, records are linked higher up: they are found more often than
+/// necessary, never less often.
 const NODES_PER_RECORD: usize = 3;
 
-/// Nodes for the first few records: a record makes a whole way down.
+/// Nodes for the first few records: one record makes a whole descent.
 const FIRST_NODES: usize = 1 + CELLS * DEPTH as usize;
 
-/// Columns, rows and layers from the lowest corner of the root.
+/// Column, row and layer from the lowest corner of the root.
 type Cell = [u32; 3];
 
-/// Children by octant, and the first links of the lists of records that touch the cell and of those whose
-/// centers lie in it; 0 where there is none.
+/// Children by octant, and the first links of two lists: of records that touch the cell, and of records with
+/// their centre in it. 0 if there is none.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C)]
 struct Node {
     children: [u32; 8],
-    /// One more than the index of a link.
+    /// Index of a link plus one.
     first: u32,
     home: u32,
 }
 
-/// A record in a cell, and the next in that cell.
+/// Record in a cell, and its successor in the list of that cell.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C)]
 struct Link {
@@ -58,17 +59,17 @@ struct Link {
     next: u32,
 }
 
-/// What is done with the records that points find together.
+/// Action at records that several points find together.
 pub(super) trait Visit {
-    /// Such a record, for these of the points, bit by bit.
+    /// Called with a record and the bit set of points that find it.
     fn visit(&mut self, record: u32, points: u32);
 }
 
-/// See the file.
+/// Octree over the supports of records.
 #[derive(Debug)]
 pub(super) struct Octree<'m> {
     min: Vec3,
-    /// Length of the sides of the root.
+    /// Side of the root.
     size: f32,
     nodes: &'m mut [Node],
     used_nodes: usize,
@@ -77,12 +78,12 @@ pub(super) struct Octree<'m> {
 }
 
 impl<'m> Octree<'m> {
-    /// Bytes for `records` records.
+    /// Footprint of a tree of `records` records.
     pub(super) fn footprint(records: usize) -> Footprint {
         Footprint::default().slice::<Node>(nodes(records)).slice::<Link>(records.saturating_mul(LINKS))
     }
 
-    /// An empty tree around `bounds`.
+    /// Empty tree over `bounds`.
     pub(super) fn new(bounds: &Bounds, records: usize, arena: &mut Arena<'m>) -> Result<Self, OutOfMemory> {
         let nodes = arena.slice(nodes(records))?;
         let links = arena.slice(records.saturating_mul(LINKS))?;
@@ -93,7 +94,7 @@ impl<'m> Octree<'m> {
         Ok(tree)
     }
 
-    /// Forgets all records.
+    /// Removes all records.
     pub(super) fn clear(&mut self) {
         if let Some(root) = self.nodes.first_mut() {
             *root = Node::default();
@@ -101,11 +102,11 @@ impl<'m> Octree<'m> {
         (self.used_nodes, self.used_links) = (1, 0);
     }
 
-    /// The deepest cell of a point; of the nearest point of the root where that is outside.
+    /// Deepest cell of a point; for a point outside the root, the nearest cell.
     #[inline]
     fn cell(&self, point: Vec3) -> Cell {
         let scaled = (point - self.min) * ((1u32 << DEPTH) as f32 / self.size);
-        // Floats that are negative or not a number become 0.
+        // Casts turn negative floats and NaN into 0.
         scaled.to_array().map(|x| (x as u32).min((1 << DEPTH) - 1))
     }
 
@@ -114,11 +115,12 @@ impl<'m> Octree<'m> {
         self.links.len() - self.used_links >= LINKS
     }
 
-    /// Links `record`, whose support lies within `extent` of `center`, from all cells that it touches: such
-    /// as are larger than the box, or a quarter of that where links are left for `others` records more.
+    /// Links `record`, whose support lies within `extent` of `center`, from all cells that it touches. The
+    /// cells are larger than the box, or up to [`FINER`] levels deeper if links for `others` more records
+    /// remain.
     pub(super) fn insert(&mut self, record: u32, center: Vec3, extent: Vec3, others: usize) {
         let (low, high) = (self.cell(center - extent), self.cell(center + extent));
-        // The deepest level at which the box touches no more than two cells along each side.
+        // Deepest level at which the box touches at most two cells along each side.
         let mut level = DEPTH;
         let touches = |level: u32, i: usize| (high[i] >> (DEPTH - level)) - (low[i] >> (DEPTH - level));
         while level > 0 && (0..3).any(|i| touches(level, i) > 1) {
@@ -128,7 +130,7 @@ impl<'m> Octree<'m> {
         let spare = self.links.len().saturating_sub(taken);
         for finer in (level + 1..=DEPTH.min(level + FINER)).rev() {
             let cells = (0..3).map(|i| touches(finer, i) as usize + 1).product::<usize>();
-            // Of each level the way down has no more nodes than there are cells.
+            // Per level, the descent has at most as many nodes as there are cells.
             if cells <= spare.min(MOST_CELLS)
                 && self.used_nodes + CELLS * level as usize + 2 * cells <= self.nodes.len()
             {
@@ -136,7 +138,7 @@ impl<'m> Octree<'m> {
                 break;
             }
         }
-        // Where nodes may run out on the way down, one link has to do: two on the same way would count twice.
+        // If nodes may run out on the descent, use one link: two links on one descent would count twice.
         if self.used_nodes + CELLS * level as usize > self.nodes.len() {
             while level > 0 && (0..3).any(|i| touches(level, i) > 0) {
                 level -= 1;
@@ -184,7 +186,7 @@ impl<'m> Octree<'m> {
         }
     }
 
-    /// Calls `visit` with the records whose boxes the cell of `point` touches, each once, until it says no.
+    /// Calls `visit` once with each record whose box touches the cell of `point`, until it returns false.
     #[inline]
     pub(super) fn at(&self, point: Vec3, mut visit: impl FnMut(u32) -> bool) {
         let cell = self.cell(point);
@@ -207,8 +209,8 @@ impl<'m> Octree<'m> {
         }
     }
 
-    /// Of sixteen points, coordinate by coordinate, the `wanted` ones (bit by bit) find what each finds by
-    /// [`Octree::at`], in the same order; those that are in the same cells together.
+    /// Finds the records of [`Octree::at`] for the `wanted` ones (bit set) of sixteen points, in equal order;
+    /// points in the same cells descend together.
     #[inline(always)]
     pub(super) fn at_all<V: Visit>(&self, points: &[[f32; POINTS]; 3], wanted: u32, visitor: &mut V) {
         let [x, y, z] = points;
@@ -216,7 +218,7 @@ impl<'m> Octree<'m> {
         for (cell, ((&x, &y), &z)) in cells.iter_mut().zip(x.iter().zip(y).zip(z)) {
             *cell = self.cell(Vec3::new(x, y, z));
         }
-        // Groups of points, and the node and the depth to which they have come: none of them is in two.
+        // Disjoint groups of points, each with its node and depth.
         let mut open = [(0u32, DEPTH, 0u32); POINTS];
         open[0].2 = wanted;
         let mut count = usize::from(wanted != 0);
@@ -224,7 +226,7 @@ impl<'m> Octree<'m> {
             count -= 1;
             let Some(&(mut node, mut depth, group)) = open.get(count) else { return };
             let first = cells[group.trailing_zeros() as usize % POINTS];
-            // Down to this depth they are in the same cells.
+            // Down to this depth the points are in the same cells.
             let mut different = 0;
             for (i, cell) in cells.iter().enumerate() {
                 let here = (cell[0] ^ first[0]) | (cell[1] ^ first[1]) | (cell[2] ^ first[2]);
@@ -266,11 +268,11 @@ impl<'m> Octree<'m> {
         }
     }
 
-    /// Calls `visit` with all records whose centers lie in the box around `center`, and with some more; each
-    /// once.
+    /// Calls `visit` once with each record whose centre lies in the box around `center`, and with some
+    /// others.
     pub(super) fn around(&self, center: Vec3, extent: f32, mut visit: impl FnMut(u32)) {
         let (low, high) = (self.cell(center - extent), self.cell(center + extent));
-        // Nodes to visit: index, level, cell. A level leaves seven open at most.
+        // Stack of nodes: index, level, cell. A level leaves at most seven.
         let mut open = [(0u32, 0u32, [0u32; 3]); 7 * DEPTH as usize + 1];
         let mut count = 1;
         while count > 0 {
@@ -302,18 +304,18 @@ impl<'m> Octree<'m> {
     }
 }
 
-/// Nodes for so many records.
+/// Number of nodes for `records` records.
 fn nodes(records: usize) -> usize {
     if records == 0 { 0 } else { records.saturating_mul(NODES_PER_RECORD).saturating_add(FIRST_NODES) }
 }
 
-/// Which child of the node `depth` levels above the deepest holds a cell.
+/// Octant of `cell` in its ancestor `depth` + 1 levels up.
 #[inline]
 fn octant([x, y, z]: Cell, depth: u32) -> usize {
     ((x >> depth & 1) | (y >> depth & 1) << 1 | (z >> depth & 1) << 2) as usize
 }
 
-/// Where in its parent a child lies.
+/// Position of a child in its parent.
 #[inline]
 fn corner(child: u32) -> Cell {
     [child & 1, child >> 1 & 1, child >> 2 & 1]
@@ -331,7 +333,7 @@ mod tests {
         Vec3::new(random.single(3 * i), random.single(3 * i + 1), random.single(3 * i + 2))
     }
 
-    /// Boxes of very different sizes, some of them partly outside.
+    /// Boxes of very different sizes, some partly outside the root.
     fn boxes(count: u32) -> Vec<(Vec3, Vec3)> {
         let random = Random::new(1, 2);
         let size = |i| 0.7 * libm::powf(random.single(7_000_000 + i), 6.0);
@@ -343,7 +345,7 @@ mod tests {
         (point - center).abs().cmple(extent).all()
     }
 
-    /// A tree that has memory for `capacity` records and gets all of `boxes`.
+    /// Tree with memory for `capacity` records that receives all of `boxes`.
     fn with_tree(boxes: &[(Vec3, Vec3)], capacity: usize, nodes: usize, check: impl Fn(&Octree)) {
         let bounds = Bounds { min: Vec3::ZERO, max: Vec3::new(1.0, 0.9, 0.5) };
         let mut lines = vec![Line([0xff; 64]); Octree::footprint(capacity).bytes() / 64];

@@ -1,4 +1,4 @@
-//! The irradiance that a record says of points, one or sixteen at a time, and its weight there.
+//! Extrapolated irradiance and weight of a record at one or sixteen points.
 
 use super::lanes::{One, Query, QueryPoint, RecordWeight, Width};
 use super::record::{FINE, Record, SECTORS, sector};
@@ -6,42 +6,41 @@ use crate::Rgb;
 use glam::Vec3;
 use halflight_simd::{Lanes, Mask, dot};
 
-/// A point lies in front of a record, and does not use it, if it is this far below the mean of both tangent
-/// planes, in radii: light that the record sees from above may be hidden from it.
+/// Depth below the mean of both tangent planes, in radii, beyond which a point lies in front of a record and
+/// does not use it: light that the record sees from above may be hidden there.
 const IN_FRONT: f32 = 0.05;
 
-/// Extrapolation stays within these factors of what was gathered.
+/// Limits of extrapolation, in factors of the gathered irradiance.
 const LEAST_FACTOR: f32 = 0.05;
 const GREATEST_FACTOR: f32 = 20.0;
 
-/// The least relative variance of a record. A record without noise would otherwise silence all others.
+/// Minimum relative variance of a record; one without noise would suppress all others.
 const LEAST_NOISE: f32 = 1e-6;
 
 impl Record {
-    /// The irradiance that this record extrapolates to `point`, and its weight w_i > 0 (equations 12 to 14 of
-    /// the paper). `least_cos` is the cosine of the greatest deviation of the normal. `None` outside the
-    /// support.
+    /// Irradiance that this record extrapolates to `point`, and its weight w_i > 0 (equations 12 to 14 of the
+    /// paper). `least_cos` is the cosine of the maximum angle between normals. `None` outside the support.
     #[inline]
     pub fn at(&self, point: &QueryPoint, least_cos: f32) -> Option<(Rgb, f32)> {
         let (is_valid, weight) = self.weigh(One, &Query::of(point), least_cos, self.overlap);
         is_valid.then(|| (Rgb::from(self.extrapolate(One, &weight)), weight.weight))
     }
 
-    /// Whether it covers the point.
+    /// Whether the record covers the point.
     #[inline]
     pub fn covers(&self, point: &QueryPoint, least_cos: f32) -> bool {
         self.weigh(One, &Query::of(point), least_cos, 1.0).0
     }
 
-    /// How far away the records must be allowed to be that the point hears for this one to be heard, where
-    /// something may hang too close over it for that; 0 where nothing does.
+    /// Distance to the point, if an overhang may be so close above the point that the record is invalid
+    /// there; otherwise 0.
     #[inline]
     pub(super) fn exposed(&self, point: &QueryPoint) -> f32 {
         let place = self.along_axes(point.position - Vec3::from(self.position));
         libm::sqrtf(self.square_exposed(One, place.to_array()))
     }
 
-    /// The square of that, of points at `place` along its axes.
+    /// Square of [`Self::exposed`] for points at `place` along the axes.
     #[inline(always)]
     pub(super) fn square_exposed<W: Width>(&self, width: W, place: [W::L; 2]) -> W::L {
         let free = width.pick(&self.free, sector(width, place));
@@ -52,7 +51,7 @@ impl Record {
         square.max(width.all(least * least)).select(is_exposed, width.all(0.0))
     }
 
-    /// Which of the points lie in a support of so many radii, and with what weight.
+    /// Mask of the points within a support scaled by `overlap`, and their weights.
     #[inline(always)]
     pub(super) fn weigh<W: Width>(
         &self,
@@ -81,9 +80,9 @@ impl Record {
         let across = [all(across.x), all(across.y), all(across.z)];
         let (x, y, z) = (dot(offset, axis), dot(offset, across), dot(offset, normal));
         let [u, v, w] = [x * all(1.0 / (r1 * overlap)), y * all(1.0 / farthest), z * all(1.0 / r1)];
-        // A support without extent holds nothing: the square is no number there.
+        // A support without extent contains no point: the square is NaN.
         let square = dot([u, v, w], [u, v, w]);
-        // Half of the sum of both normals, along the offset.
+        // Offset along half of the sum of both normals.
         let height = all(0.5) * (dot(offset, query.normal) + z);
         let is_valid = near & square.lt(one) & !height.lt(all(-IN_FRONT * r1));
         weight.place = [x, y];
@@ -98,8 +97,8 @@ impl Record {
         (is_valid, weight)
     }
 
-    /// Variance of E_i over its variance at the given squared distance in radii, to which the error of
-    /// extrapolation adds. Weights ∝ inverse variance combine records that differ. 1 if the metric does not
+    /// Variance of E_i over the variance at the squared distance `square` in radii, which includes the error
+    /// of extrapolation. Weights ∝ inverse variance combine contradicting records. 1 if the metric does not
     /// compare neighbours.
     #[inline(always)]
     fn inverse_variance<W: Width>(&self, width: W, square: W::L) -> W::L {
@@ -111,7 +110,7 @@ impl Record {
         noise / (noise + missed * missed)
     }
 
-    /// E_i + ∇E_i · Δx + Δxᵀ H Δx / 2 + ∇_n E_i · (n_i × n), within limits; of each channel.
+    /// E_i + ∇E_i · Δx + Δxᵀ H Δx / 2 + ∇_n E_i · (n_i × n), within limits, per channel.
     #[inline(always)]
     pub(super) fn extrapolate<W: Width>(&self, width: W, weight: &RecordWeight<W::L>) -> [W::L; 3] {
         let [x, y] = weight.place;
@@ -129,19 +128,19 @@ impl Record {
         channels
     }
 
-    /// The axis along which the radius is R2.
+    /// Axis of the radius R2.
     #[inline(always)]
     fn across(&self) -> Vec3 {
         Vec3::from(self.normal).cross(Vec3::from(self.axis))
     }
 
-    /// Whether there is a wall anywhere within its support.
+    /// Whether any sector has a wall within the support.
     #[inline(always)]
     fn is_fenced(&self) -> bool {
         self.fence != [u8::MAX; SECTORS]
     }
 
-    /// Whether a wall stands between the record and points at `place` along its axes.
+    /// Whether a wall separates points at `place` along the axes from the record.
     #[inline(always)]
     fn is_fenced_off<W: Width>(&self, width: W, place: [W::L; 2]) -> <W::L as Lanes>::Mask {
         let free = width.pick(&self.fence, sector(width, place));
@@ -150,7 +149,7 @@ impl Record {
         free.lt(width.all(f32::from(u8::MAX))) & (distance * distance).lt(x * x + y * y)
     }
 
-    /// Whether nothing hangs close over any point in its support.
+    /// Whether no overhang is close above any point of the support.
     #[inline(always)]
     pub(super) fn is_free(&self) -> bool {
         self.free == [u8::MAX; SECTORS]
@@ -171,7 +170,7 @@ mod tests {
         assert!((e.x - 2.25).abs() < 1e-6 && (w - 0.5).abs() < 1e-6, "{e} {w}");
         let (e, w) = record().at(&QueryPoint::open(Vec3::new(0.0, 1.0, 0.0), Vec3::Z), LEAST_COS).unwrap();
         assert!((e.x - 1.0).abs() < 1e-6 && (w - 0.5).abs() < 1e-6, "{e} {w}");
-        // Turned about x by 0.1: n_i × n = (sin, 0, 0) reversed; about y: along the second axis.
+        // Turned about x by 0.1: n_i × n is (sin, 0, 0) reversed; about y: along the second axis.
         let normal = Vec3::new(0.1f32.sin(), 0.0, 0.1f32.cos());
         let (e, w) = record().at(&QueryPoint::open(Vec3::ZERO, normal), LEAST_COS).unwrap();
         assert!((e.x - (2.0 + 3.0 * 0.1f32.sin())).abs() < 1e-6, "{e}");
@@ -257,7 +256,7 @@ mod tests {
         assert!(!record.is_free() && exposed(&record, 0.4, 0.05) == 0.0);
         assert!((exposed(&record, 0.8, 0.08) - 0.8f32.hypot(0.08)).abs() < 1e-6);
         assert_eq!((exposed(&record, 0.0, 0.9), exposed(&record, -0.9, 0.1)), (0.0, 0.0));
-        // Around the circle, and no farther.
+        // Beyond the whole circle, no further.
         record.note_overhang([-1, 40], 0.0);
         assert_eq!(record.free, [0; SECTORS]);
         assert_eq!(record.farthest(), f32::INFINITY);

@@ -1,5 +1,5 @@
-//! The gather rays of one point: radiance and distance for each stratum of the hemisphere, in the frame of
-//! the normal (+z).
+//! Gather rays of one point: radiance and distance per stratum of the hemisphere, in the frame of the normal
+//! (+z).
 
 use crate::Rgb;
 use crate::light::luminance;
@@ -7,9 +7,9 @@ use core::f32::consts::PI;
 
 pub use halflight_simd::kernels::jumps::SIDE_MAX;
 
-/// N × N strata of the concentric map (Shirley and Chiu 1997), so of equal shares of irradiance. Row-major:
-/// the stratum of row i and column j holds the directions that the map makes of the square
-/// [j/N, (j+1)/N] × [i/N, (i+1)/N], of which one was traced.
+/// N × N strata of the concentric map (Shirley and Chiu 1997), each with an equal share of irradiance.
+/// Row-major: the stratum of row i and column j holds the directions mapped from the square [j/N, (j+1)/N] ×
+/// [i/N, (i+1)/N], of which one was traced.
 #[derive(Clone, Copy, Debug)]
 pub struct Hemisphere<'a> {
     n: usize,
@@ -20,10 +20,9 @@ pub struct Hemisphere<'a> {
 }
 
 impl<'a> Hemisphere<'a> {
-    /// From n² strata: incident radiance, 1/distance of what is seen (0 where nothing is) and the direction
-    /// that was traced (unit, local: z is the cosine). `None` where n is not in 1 ..= [`SIDE_MAX`] or a slice
-    /// does not hold n² values. What they hold is not checked: a value that is not finite spoils the
-    /// derivatives, no more.
+    /// Hemisphere of n² strata: incident radiance, 1/distance of the hit (0 without a hit), and traced
+    /// direction (unit, local: z is the cosine). `None` if n is not in 1 ..= [`SIDE_MAX`] or a slice does not
+    /// have n² values. Values are not checked: one that is not finite only spoils the derivatives.
     pub fn new(
         n: usize,
         radiance: &'a [[f32; 3]],
@@ -35,13 +34,13 @@ impl<'a> Hemisphere<'a> {
         fits.then_some(Self { n, radiance, inverse_distance, directions, normals: None })
     }
 
-    /// With the unit normals (local frame, either side) of what is seen, anything where nothing is: only the
-    /// Hessians that do not know of occlusion need them. `None` where these are not n².
+    /// This hemisphere with the unit normals of the hits (local frame, either side; any value without a hit),
+    /// which only Hessians without occlusion need. `None` if there are not n² of them.
     pub fn with_normals(self, normals: &'a [[f32; 3]]) -> Option<Self> {
         (normals.len() == self.radiance.len()).then_some(Self { normals: Some(normals), ..self })
     }
 
-    /// Strata along a side.
+    /// Number of strata along a side.
     pub fn n(&self) -> usize {
         self.n
     }
@@ -51,7 +50,7 @@ impl<'a> Hemisphere<'a> {
         self.radiance
     }
 
-    /// 1/distance of each stratum, 0 where nothing is hit.
+    /// 1/distance of each stratum, 0 without a hit.
     pub fn inverse_distance(&self) -> &'a [f32] {
         self.inverse_distance
     }
@@ -61,12 +60,12 @@ impl<'a> Hemisphere<'a> {
         self.directions
     }
 
-    /// Normals of what is seen, where they are known.
+    /// Normals of the hits, if known.
     pub fn normals(&self) -> Option<&'a [[f32; 3]]> {
         self.normals
     }
 
-    /// Irradiance: π/N² Σ L, for the strata have equal shares of it. In rows, so that rounding stays small.
+    /// Irradiance π/N² Σ L, since strata have equal shares. Summed by rows for small rounding errors.
     pub fn irradiance(&self) -> Rgb {
         let rows = self.radiance.chunks_exact(self.n);
         let sum: Rgb = rows.map(|row| row.iter().map(|&l| Rgb::from(l)).sum::<Rgb>()).sum();
@@ -74,15 +73,14 @@ impl<'a> Hemisphere<'a> {
     }
 
     /// Variance of the luminance of [`Hemisphere::irradiance`], estimated from second differences along the
-    /// rows: what changes evenly from one stratum to the next is no noise. A pattern finer than the strata
-    /// is.
+    /// rows: a linear change between strata is no noise, a pattern finer than the strata is.
     pub fn variance(&self) -> f32 {
         let [squares, count] = second_differences(self.radiance, self.n);
         let strata = (self.n * self.n) as f32;
         squares * (PI * PI / (6.0 * strata * count))
     }
 
-    /// What the distances say.
+    /// Statistics of the distances.
     pub(super) fn distances(&self) -> Distances {
         let (mut sum, mut squares, mut largest) = (0.0, 0.0, 0.0f32);
         for row in self.inverse_distance.chunks_exact(self.n) {
@@ -99,8 +97,8 @@ impl<'a> Hemisphere<'a> {
     }
 }
 
-/// The squares of second differences of luminance along rows of `side` values, summed; and how many there
-/// are. Where values are independent their mean is six times the variance of each.
+/// Sum of the squared second differences of luminance along rows of `side` values, and their number. For
+/// independent values their mean is six times the variance of a value.
 fn second_differences(values: &[[f32; 3]], side: usize) -> [f32; 2] {
     let (mut squares, mut count) = (0.0, 0usize);
     for row in values.chunks_exact(side.max(1)) {
@@ -129,8 +127,8 @@ mod tests {
     use crate::sampling::Random;
     use std::vec;
 
-    /// Radiances that are even on [0, 1] have a variance of 1/12; what rises evenly along the rows has none.
-    /// The estimate of 4096 strata is good to 10 %, four of its standard deviations.
+    /// Radiances uniform on [0, 1] have a variance of 1/12; a linear rise along the rows has none. The
+    /// estimate from 4096 strata is good to 10 %, four of its standard deviations.
     #[test]
     fn the_variance_is_that_of_the_noise() {
         const N: usize = 64;

@@ -1,32 +1,32 @@
-//! Query points, one or sixteen at a time. The evaluation of a record is written once for both, so the scalar
-//! form is the reference of the lanes, and the bits are equal.
+//! Query points, one or sixteen at a time. The evaluation of a record is generic over both, so that the
+//! scalar form is the reference of the lanes and gives equal bits.
 
 use glam::Vec3;
 use halflight_simd::{Lanes, Simd};
 
-/// Points, and the unit normals of their surfaces, coordinate by coordinate.
+/// Positions and unit surface normals of points, by coordinate.
 #[derive(Clone, Copy)]
 pub(super) struct Query<L> {
     pub(super) position: [L; 3],
     pub(super) normal: [L; 3],
-    /// Records that are farther along the surface are not heard.
+    /// Maximum distance along the surface of valid records.
     pub(super) within: L,
 }
 
-/// A point that asks.
+/// Point of a query.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct QueryPoint {
-    /// Where it is.
+    /// Position of the point.
     pub position: Vec3,
-    /// Unit normal of its surface.
+    /// Unit surface normal.
     pub normal: Vec3,
-    /// Records that are farther than this along the surface are not heard, for something hangs close over it:
-    /// [`super::CLOSE`] times as far as that is high. Infinite where nobody has looked up from there.
+    /// Maximum distance along the surface of valid records, due to an overhang: [`super::CLOSE`] times its
+    /// height. Infinite if the height is unknown.
     pub within: f32,
 }
 
 impl QueryPoint {
-    /// Of which nobody knows what hangs over it.
+    /// Point below an overhang of unknown height.
     pub fn open(position: Vec3, normal: Vec3) -> Self {
         Self { position, normal, within: f32::INFINITY }
     }
@@ -40,23 +40,23 @@ impl Query<f32> {
     }
 }
 
-/// What a record needs to know of points that are in its support.
+/// Evaluation of a record at points in its support.
 #[derive(Clone, Copy)]
 pub(super) struct RecordWeight<L> {
-    /// Where they lie along its axes.
+    /// Positions along the axes of the record.
     pub(super) place: [L; 2],
-    /// Its normal times theirs, along its axes.
+    /// Cross product of its normal and theirs, along its axes.
     pub(super) turned: [L; 2],
-    /// w_i.
+    /// Weight w_i.
     pub(super) weight: L,
 }
 
-/// How many points there are, and what makes lanes for them.
+/// Number of points, and constructors of their lanes.
 pub(super) trait Width: Copy {
     type L: Lanes;
-    /// All lanes the same.
+    /// All lanes set to `value`.
     fn all(self, value: f32) -> Self::L;
-    /// Of `table` the bytes that whole parts name, as numbers.
+    /// Bytes of `table` at the whole parts of `which`, as numbers.
     fn pick(self, table: &[u8; 16], which: Self::L) -> Self::L;
 }
 

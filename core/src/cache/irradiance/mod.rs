@@ -1,6 +1,6 @@
-//! Irradiance caching. A [`Hemisphere`] holds the gather rays of one point, [`derivatives`] the change of
-//! its irradiance with position and normal, a [`Metric`] and [`validity`](mod@validity) the region in which
-//! it may be reused. A [`Record`] keeps all this; the [`IrradianceCache`] holds the records.
+//! Irradiance caching. A [`Hemisphere`] holds the gather rays of one point; [`derivatives`] estimate the
+//! change of its irradiance with position and normal; a [`Metric`] and [`validity`](mod@validity) give the
+//! region of reuse. A [`Record`] stores all of these; the [`IrradianceCache`] stores the records.
 
 pub mod derivatives;
 mod evaluate;

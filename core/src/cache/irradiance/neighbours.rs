@@ -1,5 +1,5 @@
-//! Neighbouring records correct each other. If one contradicts the other beyond their noise, the radii of
-//! both shrink, and no radius is much larger than that of a neighbour.
+//! Mutual correction of neighbouring records: radii of records that contradict each other beyond their noise
+//! shrink, and no radius is much larger than that of a neighbour.
 
 use super::lanes::QueryPoint;
 use super::record::Record;
@@ -8,31 +8,31 @@ use crate::cache::octree::Octree;
 use crate::light::luminance;
 use glam::Vec3;
 
-/// Records of surfaces that face the same way to within 60 degrees clamp each other.
+/// Minimum cosine of the normals of records that clamp each other, 60 degrees.
 const ALIKE: f32 = 0.5;
 
-/// Standard deviations of noise within which records that disagree may both be right.
+/// Standard deviations of noise within which contradicting records may both be right.
 const EXCUSED: f32 = 3.0;
 
-/// The variance of a gradient over that of the irradiance and the mean of 1/t².
+/// Variance of a gradient over the product of the irradiance's variance and the mean of 1/t².
 const STEEP: f32 = 16.0;
 
-/// Neighbours that a new record is compared with.
+/// Maximum number of neighbours to which a new record is compared.
 const MOST_COMPARED: usize = 32;
 
-/// The records of a cache, and the tree that finds them.
+/// Records of a cache, and the octree over them.
 pub(super) struct Neighbours<'a, 'm> {
     pub(super) records: &'a mut [Record],
     pub(super) tree: &'a Octree<'m>,
-    /// Cosine of the greatest deviation of normals.
+    /// Cosine of the maximum angle between normals.
     pub(super) least_cos: f32,
 }
 
 impl Neighbours<'_, '_> {
     /// Compares the extrapolations of a new record and its neighbours. A hemisphere does not show, for
-    /// example, a surface that comes into sight a step farther; a neighbour does. If one record contradicts
-    /// the other beyond their noise, the difference is taken for a curvature: both radii become those of this
-    /// curvature, and the record that was wrong gets less weight.
+    /// example, a surface that comes into sight a step farther; a neighbour does. A contradiction beyond
+    /// noise counts as curvature: both radii shrink to those of this curvature, and the wrong record gets
+    /// less weight.
     pub(super) fn compare(&mut self, new: &mut Record) {
         if new.allowed <= 0.0 {
             return;
@@ -41,7 +41,7 @@ impl Neighbours<'_, '_> {
         let mut found = [(0u32, [0.0f32; 2]); MOST_COMPARED];
         let mut count = 0;
         let (records, least_cos) = (&*self.records, self.least_cos);
-        // What another says of its place, and what it says of that of another.
+        // Curvatures of the errors of the new record and of the other.
         let mut note = |index: u32, curvatures: [f32; 2]| {
             if curvatures != [0.0; 2]
                 && let Some(slot) = found.get_mut(count)
@@ -73,9 +73,9 @@ impl Neighbours<'_, '_> {
         }
     }
 
-    /// Neighbour clamping (Křivánek et al. 2006, section 4): whatever limits the radius of one record is
-    /// farther from the other by their distance, so no radius exceeds that of a neighbour plus the distance
-    /// to it. All records that may clamp the new one or be clamped by it are visited.
+    /// Neighbour clamping (Křivánek et al. 2006, section 4): what limits the radius of one record is farther
+    /// from another by at most their distance, so that no radius exceeds that of a neighbour plus the
+    /// distance to it. Visits all records that may clamp the new one or be clamped by it.
     pub(super) fn clamp(&mut self, new: &mut Record) {
         let (position, normal) = (Vec3::from(new.position), Vec3::from(new.normal));
         let records = &*self.records;
@@ -91,7 +91,7 @@ impl Neighbours<'_, '_> {
         self.clamp_around(position, normal, least);
     }
 
-    /// Clamps all records by one of that radius.
+    /// Clamps all records around `position` by a record of `radius` there.
     fn clamp_around(&mut self, position: Vec3, normal: Vec3, radius: f32) {
         let records = &mut *self.records;
         self.tree.at(position, |index| {
@@ -106,22 +106,22 @@ impl Neighbours<'_, '_> {
 }
 
 impl Record {
-    /// The distance to a place, where that is on a surface that faces the same way.
+    /// Distance to `position`, if a surface there has a similar normal.
     fn distance_to(&self, position: Vec3, normal: Vec3) -> Option<f32> {
         let alike = normal.dot(Vec3::from(self.normal)) > ALIKE;
         alike.then(|| position.distance(Vec3::from(self.position)))
     }
 
-    /// The curvature, relative to the irradiance, that explains the error of this record at the position of
-    /// `other`. Zero if there is no error, or if noise or the radii of both explain it.
+    /// Curvature, relative to the irradiance, that explains the error of this record at the position of
+    /// `other`. Zero without error, or if noise or the radii of both explain it.
     fn misses(&self, other: &Record, least_cos: f32) -> f32 {
         let (place, normal) = (Vec3::from(other.position), Vec3::from(other.normal));
-        // An overhang close to the other has confined it.
+        // The boundary of `other` reflects a close overhang.
         let point = QueryPoint { position: place, normal, within: other.farthest() };
         let Some((said, _)) = self.at(&point, least_cos) else { return 0.0 };
         let (here, there) = (luminance(self.irradiance.into()), luminance(other.irradiance.into()));
         let square = place.distance_squared(self.position.into());
-        // The gradient has noise too.
+        // The gradient is noisy as well.
         let noise =
             there * there * other.noise + here * here * self.noise * (1.0 + STEEP * self.nearness * square);
         let excess = (there - luminance(said)).abs() - EXCUSED * libm::sqrtf(noise);
@@ -130,13 +130,13 @@ impl Record {
         if excess > 0.0 && shrinks { curvature } else { 0.0 }
     }
 
-    /// Takes note of a curvature that its extrapolation missed.
+    /// Raises the error by a curvature that the extrapolation missed.
     fn learn(&mut self, curvature: f32) {
         let [r1, r2] = self.radii;
         self.error = self.error.max(curvature * (r1 * r1 + r2 * r2) / 8.0);
     }
 
-    /// Scales the radii, and the error allowed by the fourth power of that.
+    /// Scales the radii by `share`, and the allowed error by its fourth power.
     pub(super) fn scale_radii(&mut self, share: f32) {
         let square = share * share;
         self.allowed *= square * square;
@@ -144,17 +144,17 @@ impl Record {
         self.shrink(share * self.radii[0]);
     }
 
-    /// Makes the support smaller in both directions, so that R1 is not above `radius`.
+    /// Scales the support so that R1 is at most `radius`.
     fn shrink(&mut self, radius: f32) {
         let [r1, r2] = self.radii;
         if radius < r1 {
             let share = radius / r1;
-            // Rounding does not make the longer the shorter.
+            // Rounding must not make the longer radius the shorter.
             self.radii = [radius, (r2 * share).max(radius)];
             if radius <= self.least {
                 self.overlap = self.overlap.min(1.0);
             }
-            // The mean of a square over the ellipse.
+            // Mean of a square over the ellipse.
             self.error *= share * share;
         }
     }

@@ -1,10 +1,9 @@
-//! Look-ups of sixteen points at once. Neighbours in a picture are reached by the same records, so they
-//! descend the octree together while they are in the same cells, and each record is read once for all of
-//! them.
+//! Lookup of sixteen points at once. Neighbouring pixels need the same records, so that their points descend
+//! the octree together while they are in equal cells, and each record is read once for all of them.
 //!
-//! Plainly: [`IrradianceCache::at`] for each point. A point meets the same records in the same order, and the
-//! lanes do the same arithmetic: the bits are equal. The price: a point that is alone in its cells pays for
-//! sixteen lanes.
+//! The plain algorithm is [`IrradianceCache::at`] for each point. A point meets equal records in equal order,
+//! and the lanes do equal arithmetic: the bits are equal. The price: a point alone in its cells costs sixteen
+//! lanes.
 
 use super::lanes::{Query, QueryPoint, Sixteen};
 use super::record::Record;
@@ -13,13 +12,13 @@ use crate::cache::octree::{POINTS, Visit};
 use crate::{Level, Rgb};
 use halflight_simd::{Kernel, Lanes, Mask, Simd};
 
-/// Points, and the unit normals of their surfaces.
+/// Sixteen query points, by coordinate.
 #[derive(Clone, Copy, Debug)]
 pub struct Points {
     position: [[f32; POINTS]; 3],
     normal: [[f32; POINTS]; 3],
     within: [f32; POINTS],
-    /// Bit `i`: there is a point `i`.
+    /// Bit set of the points in use.
     wanted: u32,
 }
 
@@ -32,7 +31,7 @@ impl Points {
         wanted: 0,
     };
 
-    /// Makes it point `i`, of [`POINTS`].
+    /// Sets point `i`, of [`POINTS`].
     #[inline]
     pub fn set(&mut self, i: usize, point: &QueryPoint) {
         let i = i % POINTS;
@@ -46,9 +45,9 @@ impl Points {
 }
 
 impl IrradianceCache<'_> {
-    /// What is known at each of `points`: [`IrradianceCache::at`], to the bit. `known` keeps its other
-    /// entries. And of each how far the farthest is of the records that speak for it where something may hang
-    /// too close over it for that; 0 where nothing does.
+    /// Writes [`IrradianceCache::at`] of each of `points` to `known`, equal to the bit; other entries remain.
+    /// Returns for each point the distance to the farthest valid record that an overhang may make invalid; 0
+    /// if there is none.
     pub fn at_all(
         &self,
         level: Level,
@@ -73,8 +72,9 @@ impl IrradianceCache<'_> {
     }
 }
 
-/// The sums over all records: of the irradiance of each channel, of what shines, of weights; and the greatest
-/// square of the distance to those of points over which something may hang.
+/// Query of sixteen points. Its result is, over all valid records, the weighted sums of irradiance per
+/// channel and of `shining`, the sum of weights, and the maximum squared distance to records that an overhang
+/// may make invalid.
 struct Ask<'a> {
     cache: &'a IrradianceCache<'a>,
     points: &'a Points,
@@ -108,7 +108,7 @@ impl Kernel for Ask<'_> {
     }
 }
 
-/// What has been asked, and what records have said of it so far.
+/// Sums of a query over the records so far.
 struct Sums<'a, S: Simd> {
     simd: S,
     records: &'a [Record],
@@ -153,19 +153,19 @@ mod tests {
 
     const RECORDS: u32 = 500;
 
-    /// Somewhere in the unit cube: one of the floors at z = 0, 1/2 and 1.
+    /// Point on one of the floors at z = 0, 1/2 and 1 of the unit cube.
     fn place(random: &Random, i: u32) -> Vec3 {
         let [x, y, z] = [0, 1, 2].map(|k| random.single(3 * i + k));
         Vec3::new(x, y, libm::floorf(3.0 * z) * 0.5)
     }
 
-    /// Up to a tenth from upright.
+    /// Normal with up to a tenth in x and y.
     fn normal(random: &Random, i: u32) -> Vec3 {
         let [x, y] = [0, 1].map(|k| 0.2 * (random.single(2 * i + k) - 0.5));
         Vec3::new(x, y, 1.0).normalize()
     }
 
-    /// Of all sizes, fenced here and there, some of which weigh by what they know of themselves.
+    /// Records of all sizes, some with walls, some with weights by variance.
     fn record(i: u32) -> Record {
         let random = Random::new(7, i);
         let number = |k: u32| random.single(1000 + k);
@@ -193,7 +193,8 @@ mod tests {
         }
     }
 
-    /// What is known of `points` at all levels: of each as of it alone. How many are known.
+    /// Compares the lookup of `points` at all levels with that of each point alone. Returns the number of
+    /// known points.
     #[track_caller]
     fn check(cache: &IrradianceCache, points: &[QueryPoint]) -> usize {
         let mut query = Points::NONE;
@@ -225,15 +226,14 @@ mod tests {
         let random = Random::new(5, 5);
         let mut known = 0;
         for i in 0..500u32 {
-            // Neighbours, and points that have nothing to do with each other; also fewer than sixteen, and
-            // none.
+            // Neighbours, and unrelated points; also fewer than sixteen, and none.
             let size = if i % 2 == 0 { 0.02 } else { 1.0 };
             let middle = place(&random, i);
             let points: vec::Vec<_> = (0..(i as usize * 7 % 17) as u32)
                 .map(|k| {
                     let beside = place(&random, 10_000 + 16 * i + k);
                     let position = middle + size * Vec3::new(beside.x - middle.x, beside.y - middle.y, 0.0);
-                    // Beneath something here and there.
+                    // Some points are below an overhang.
                     let within = if k % 3 == 0 { 0.1 * random.single(50_000 + i) } else { f32::INFINITY };
                     QueryPoint { position, normal: normal(&random, 90_000 + 16 * i + k), within }
                 })

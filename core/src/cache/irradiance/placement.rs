@@ -1,6 +1,5 @@
-//! All metrics with as many records, on the floor of rooms where its irradiance is known: records are
-//! gathered in random order wherever none reaches yet, and what is interpolated of them is held against the
-//! truth.
+//! Comparison of metrics with equal numbers of records, on the floor of rooms with known irradiance: records
+//! are gathered in random order wherever none is valid, and interpolation is compared with the truth.
 
 use super::rooms::{Gather, LIGHT, OPEN, Random, Room, SHADOW, WALLS, with_tables};
 use super::{Derivatives, IrradianceCache, Metric, QueryPoint, Record, metric, validity};
@@ -12,18 +11,18 @@ use glam::Vec3;
 use std::vec::Vec;
 use std::{println, vec};
 
-/// Points of the floor along a side: where records may stand, and where the error is taken.
+/// Points along a side of the floor, both for records and for errors.
 const SIDE: usize = 56;
-/// Strata of a gathering along a side.
+/// Strata along a side of a gather.
 const STRATA: usize = 32;
 const CAPACITY: usize = 2000;
 
-/// Points, true irradiance, and what each metric knows of each of them.
+/// Points of the floor, true irradiance, and derivatives per metric and point.
 struct Floor {
     points: Vec<Vec3>,
     truth: Vec<f64>,
     derivatives: Vec<Vec<Derivatives>>,
-    /// Of each place: the variance of its irradiance by noise, over its square.
+    /// Variance of the irradiance by noise over its square, per point.
     noise: Vec<f32>,
     order: Vec<usize>,
 }
@@ -58,8 +57,8 @@ impl Floor {
         }
     }
 
-    /// Records and root mean square error of all points, relative to the mean, where records are gathered for
-    /// `error`.
+    /// Number of records gathered for `error`, and root mean square error over all points, relative to the
+    /// mean.
     fn cached(&self, metric: Metric, derivatives: &[Derivatives], error: f32) -> (usize, f64) {
         let bounds = Bounds { min: Vec3::ZERO, max: Vec3::ONE };
         let mut lines = vec![Line([0; 64]); IrradianceCache::footprint(CAPACITY).bytes() / 64];
@@ -67,7 +66,7 @@ impl Floor {
         let mut cache = IrradianceCache::new(&bounds, CAPACITY, &mut arena).unwrap();
         let settings =
             metric::Settings { error, least: 0.002, most: 0.6, ..metric::Settings::new(metric, 1.0) };
-        // Local axes are the world's.
+        // Local axes equal the world axes.
         let frame = Frame { tangent: Vec3::X, bitangent: Vec3::Y, normal: Vec3::Z };
         for &i in &self.order {
             if !cache.covers(&QueryPoint::open(self.points[i], Vec3::Z)) {
@@ -88,7 +87,7 @@ impl Floor {
         (cache.records().len(), (squares / count).sqrt() / (sum / count))
     }
 
-    /// The error with about `count` records: the allowed error is found by bisection.
+    /// Error with about `count` records; the allowed error is found by bisection.
     fn with_records(&self, metric: Metric, derivatives: &[Derivatives], count: usize) -> (usize, f64) {
         let (mut low, mut high) = (1e-8f32, 10.0f32);
         for _ in 0..18 {
@@ -118,7 +117,7 @@ fn halflight_is_ahead_of_the_occlusion_hessian_with_as_many_records() {
             }
             let gain = errors[0].1 / errors[1].1;
             println!("{name:7}{count:4}  gain {gain:.2}");
-            // 1.39 to 3.0 was measured.
+            // Measured: 1.39 to 3.0.
             assert!(gain > 1.3, "{name}, {count} records: only {gain}");
         }
     }

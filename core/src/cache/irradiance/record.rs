@@ -1,8 +1,8 @@
-//! One place where the indirect irradiance is known: how it changes around, and how far that may be trusted.
+//! Irradiance record: irradiance at one point, its derivatives, and its region of validity.
 //!
-//! A record covers an ellipsoid: the two radii R1 ≤ R2 that an error metric gives along the surface, and R1
-//! across it (Schwarzhaupt, Jensen and Jarosz 2012, §5). Its support may be wider, by the overlap that the
-//! metric allows. A fence cuts out of both what lies behind a wall.
+//! A record covers an ellipsoid with the radii R1 ≤ R2 of an error metric along the surface, and R1 across it
+//! (Schwarzhaupt, Jensen and Jarosz 2012, §5). Its support may be wider, by the overlap that the metric allows. A
+//! boundary excludes points behind walls from both.
 
 use super::lanes::{One, Width};
 use super::{Derivatives, Validity};
@@ -12,53 +12,54 @@ use bytemuck::{Pod, Zeroable};
 use glam::{Vec2, Vec3};
 use halflight_simd::Lanes;
 
-/// Azimuths for each of which a record knows how far it is to the next wall.
+/// Number of azimuthal sectors of a record's boundary.
 pub const SECTORS: usize = 16;
 
-/// Overlap over the cube root of the relative noise, and the largest overlap. These give the least error in
+/// Overlap over the cube root of the relative noise, and maximum overlap. These values minimise the error in
 /// the Cornell box with 4096 rays and 500 to 5000 records.
 const NOISE_TO_OVERLAP: f32 = 8.0;
 const MOST_OVERLAP: f32 = 2.0;
 
-/// The part of the error predicted by the Hessian that remains where several records overlap, and its upper
-/// limit: extrapolation is clamped.
+/// Fraction of the error predicted by the Hessian that remains where several records overlap, and maximum of
+/// the error before this factor, since extrapolation is clamped.
 const MISSED: f32 = 0.5;
 const MOST_MISSED: f32 = 0.3;
 
-/// A point beneath something hears no record that is farther than this many times the height of what hangs
-/// over it: light changes there over as little as that.
+/// Maximum distance of a valid record from a point below an overhang, over the height of the overhang, since
+/// light changes over such a distance there.
 pub const CLOSE: f32 = 2.0;
 
-/// It hears none whose least radius is more than one part in this many of that: such a record is too coarse.
+/// Ratio of that distance to the largest minimum radius of a valid record; larger records are too coarse.
 pub const FINE: f32 = 4.0;
 
-/// See the file.
+/// Irradiance record; see the file.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[repr(C, align(16))]
 pub struct Record {
-    // What decides whether it speaks for a point comes first, in one line of memory.
-    /// x_i.
+    // The fields that decide validity come first, in one cache line.
+    /// Position x_i.
     pub position: [f32; 3],
     /// Radii of the support over those of the record.
     pub overlap: f32,
-    /// n_i, unit: the shading normal.
+    /// Unit shading normal n_i.
     pub normal: [f32; 3],
-    /// Error allowed over its support, relative to E_i: an integral over an area, m². Zero where it does not
-    /// learn from its neighbours.
+    /// Allowed error over the support, relative to E_i, as an integral over area in m². Zero if neighbours do
+    /// not correct the record.
     pub allowed: f32,
-    /// Unit tangent along which the radius is R1; along the normal times it it is R2.
+    /// Unit tangent with radius R1; the normal times this axis has R2.
     pub axis: [f32; 3],
-    /// Mean relative error of extrapolation over the radii, as its metric predicts or its neighbours show.
+    /// Mean relative error of extrapolation within the radii, as predicted by the metric or shown by
+    /// neighbours.
     pub error: f32,
-    /// R1 ≤ R2: what it covers.
+    /// Radii R1 ≤ R2 of the covered region.
     pub radii: [f32; 2],
-    /// Variance of E_i (luminance) by the noise of its rays, over its square.
+    /// Variance of the luminance of E_i due to ray noise, over its square.
     pub noise: f32,
-    /// What the fence counts in: the longer radius of the support as it was at first.
+    /// Unit of the boundary: the longer radius of the initial support.
     pub reach: f32,
-    /// How far it is to a wall in each sector, in 255ths of `reach`; 255: as far as it reaches.
+    /// Distance to the nearest wall per sector, in 255ths of `reach`; 255 if there is none within `reach`.
     pub fence: [u8; SECTORS],
-    /// E_i in W/m², without what emitters send directly.
+    /// E_i in W/m², without direct light of emitters.
     pub irradiance: [f32; 3],
     /// ∇E_i of each channel along the two axes, in W/m² per unit of length.
     pub gradient: [[f32; 2]; 3],
@@ -66,20 +67,20 @@ pub struct Record {
     pub rotation: [[f32; 2]; 3],
     /// Half of the second derivatives of E along the two axes, over E.
     pub bend: [f32; 2],
-    /// Share of the strata in which light shines directly.
+    /// Fraction of strata that see emitters or the environment directly.
     pub shining: f32,
     /// Mean of 1/t² over the strata, in 1/m².
     pub nearness: f32,
-    /// The least that R1 may be, m, whatever neighbours say.
+    /// Minimum of R1 in m, whatever neighbours show.
     pub least: f32,
-    /// How far nothing hangs so close over points in each sector that they must not hear it, as the fence
-    /// counts.
+    /// Distance per sector, in 255ths of `reach`, up to which no overhang is so close above a point that the
+    /// record is invalid there.
     pub free: [u8; SECTORS],
 }
 
 impl Record {
-    /// The record of `derivatives` at `position` with tangent frame `frame`, valid within `reach`. Gradients
-    /// are limited so that no channel falls below zero within the support.
+    /// Record of `derivatives` at `position` with tangent frame `frame`, valid within `reach`. Gradients are
+    /// limited so that no channel becomes negative within the support.
     pub fn new(position: Vec3, frame: &Frame, derivatives: &Derivatives, reach: &Validity) -> Self {
         let axis = reach.axis;
         let along = |v: Vec2| Vec2::new(v.dot(axis), axis.perp_dot(v));
@@ -91,7 +92,7 @@ impl Record {
         };
         let irradiance = derivatives.irradiance.to_array();
         let gradient = [0, 1, 2].map(|i| limited(along(derivatives.gradient[i]), irradiance[i]).to_array());
-        // The mean of (x² l1 + y² l2) / 2 over the ellipse.
+        // Mean of (x² l1 + y² l2) / 2 over the ellipse.
         let error = (radii * radii).dot(Vec2::from(reach.curvature)) / 8.0;
         Self {
             position: position.to_array(),
@@ -127,8 +128,8 @@ impl Record {
         }
     }
 
-    /// The same of radii so many times as large, over which light changes by as much. What hangs over it is
-    /// to be looked for.
+    /// Record with radii scaled by `factor`, over which light changes by as much. Overhangs have to be found
+    /// anew.
     pub fn widened(&self, factor: f32) -> Self {
         let narrow = |free: u8| if free == u8::MAX { free } else { (f32::from(free) / factor) as u8 };
         Self {
@@ -143,36 +144,36 @@ impl Record {
         }
     }
 
-    /// The magnitude of the relative error that is expected on average where this record speaks: by its
-    /// noise, of which that of its neighbours takes away as much as supports overlap, and by extrapolation. A
-    /// normal deviate of variance 1 has the magnitude √(2/π).
+    /// Expected mean magnitude of the relative error where this record is valid: noise, averaged over
+    /// overlapping records, and extrapolation error. A normal deviate of variance 1 has the mean magnitude
+    /// √(2/π).
     pub fn predicted(&self) -> f32 {
         let missed = MISSED * self.error.min(MOST_MISSED);
         let variance = self.noise / (self.overlap * self.overlap) + missed * missed;
         libm::sqrtf(core::f32::consts::FRAC_2_PI * variance)
     }
 
-    /// Position and gradient are given in these axes: R1, R2, normal.
+    /// Offset along the axes of position and gradient: R1, R2, normal.
     #[inline]
     pub(super) fn local(&self, offset: Vec3) -> Vec3 {
         let [first, second] = self.axes();
         Vec3::new(offset.dot(first), offset.dot(second), offset.dot(self.normal.into()))
     }
 
-    /// The two axes of the tangent plane, R1 and R2.
+    /// Both axes of the tangent plane, of R1 and R2.
     #[inline]
     pub(crate) fn axes(&self) -> [Vec3; 2] {
         let axis = Vec3::from(self.axis);
         [axis, Vec3::from(self.normal).cross(axis)]
     }
 
-    /// How far a point is, in radii: 1 on the rim of what the record covers.
+    /// Distance of a point in radii; 1 on the border of the covered region.
     pub fn radii_to(&self, position: Vec3) -> f32 {
         let [r1, r2] = self.radii;
         (self.local(position - Vec3::from(self.position)) / Vec3::new(r1, r2, r1)).length()
     }
 
-    /// Half of the edges of the box around the support.
+    /// Half edges of the bounding box of the support.
     pub fn extent(&self) -> Vec3 {
         let (axis, normal) = (Vec3::from(self.axis), Vec3::from(self.normal));
         let [r1, r2] = self.radii;
@@ -181,8 +182,8 @@ impl Record {
         Vec3::new(libm::sqrtf(square.x), libm::sqrtf(square.y), libm::sqrtf(square.z))
     }
 
-    /// Notes that something hangs over the sectors from `first` to `last`, which count on around the circle,
-    /// so close that points at more than `distance` may not hear this record.
+    /// Stores an overhang above the sectors `first` to `last`, which may exceed 16 around the circle; it may
+    /// invalidate this record at points farther than `distance`.
     pub fn note_overhang(&mut self, [first, last]: [i32; 2], distance: f32) {
         let share = (distance / self.reach).clamp(0.0, 1.0);
         for sector in first..=last.min(first + SECTORS as i32 - 1) {
@@ -192,7 +193,7 @@ impl Record {
         }
     }
 
-    /// The farthest point that it speaks for, by its fence.
+    /// Maximum distance of valid points by the boundary.
     pub fn farthest(&self) -> f32 {
         match self.fence.iter().max() {
             Some(&most) if most < u8::MAX => f32::from(most) * (self.reach / f32::from(u8::MAX)),
@@ -200,13 +201,13 @@ impl Record {
         }
     }
 
-    /// It speaks for nothing that is farther than `distance`, in whatever direction.
+    /// Limits the boundary to `distance` in all directions.
     pub fn confine(&mut self, distance: f32) {
         let share = (distance / self.reach).clamp(0.0, 1.0);
         self.fence = self.fence.map(|free| free.min((share * 255.0) as u8));
     }
 
-    /// Notes a wall at `distance` from the record, in the direction of `place` along its axes.
+    /// Stores a wall at `distance` from the record, in the direction of `place` along its axes.
     pub fn fence_off(&mut self, place: Vec2, distance: f32) {
         let share = (distance / self.reach).clamp(0.0, 1.0);
         if let Some(fence) = self.fence.get_mut(sector(One, place.to_array()) as usize) {
@@ -214,20 +215,20 @@ impl Record {
         }
     }
 
-    /// A direction of the world along the two axes.
+    /// A world direction along both axes.
     pub fn along_axes(&self, direction: Vec3) -> Vec2 {
         self.local(direction).truncate()
     }
 
-    /// The sector in the direction of `place` along a record's axes, as [`Record::towards`] takes it: the
-    /// fraction says where in it.
+    /// Sector in the direction of `place` along a record's axes, the inverse of [`Record::towards`]; the
+    /// fraction is the position within the sector.
     pub fn sector(place: Vec2) -> f32 {
         sector(One, place.to_array())
     }
 
-    /// The direction of the middle of a sector, in the world; not of unit length.
+    /// Direction of `sector` along the axes and in world space, not normalised.
     pub fn towards(&self, sector: f32) -> (Vec2, Vec3) {
-        // The inverse of `sector`: a walk around the diamond |x| + |y| = 1.
+        // Inverse of `sector`: a position on the diamond |x| + |y| = 1.
         let angle = sector * (4.0 / SECTORS as f32);
         let x = if angle < 2.0 { 1.0 - angle } else { angle - 3.0 };
         let y = (1.0 - x.abs()).copysign(2.0 - angle);
@@ -236,7 +237,7 @@ impl Record {
     }
 }
 
-/// The sector of a direction, as the whole part: an angle of four quadrants, linear along |x| + |y| = 1.
+/// Sector of a direction, in the whole part: an angle of four quadrants, linear along |x| + |y| = 1.
 #[inline(always)]
 pub(super) fn sector<W: Width>(width: W, [x, y]: [W::L; 2]) -> W::L {
     let x = x / (x.abs() + y.abs()).max(width.all(f32::MIN_POSITIVE));
@@ -248,7 +249,7 @@ pub(super) fn sector<W: Width>(width: W, [x, y]: [W::L; 2]) -> W::L {
 pub(super) mod tests {
     use super::*;
 
-    /// A record of unequal derivatives and radii, which nothing confines.
+    /// Record of unequal derivatives and radii, without walls or overhangs.
     pub(in crate::cache::irradiance) fn record() -> Record {
         Record {
             normal: [0.0, 0.0, 1.0],
@@ -274,7 +275,7 @@ pub(super) mod tests {
             record.overlap
         };
         assert_eq!((overlap(0.0, 1.0), overlap(1.0, 1.0), overlap(1.0, 0.0)), (1.0, MOST_OVERLAP, 1.0));
-        // 0.008 is the cube of 0.2.
+        // 0.008 is 0.2 cubed.
         assert!((overlap(0.008 * 0.008, 1.0) - 0.2 * NOISE_TO_OVERLAP).abs() < 1e-5);
         assert_eq!(overlap(f32::MAX, 1.0), MOST_OVERLAP);
     }

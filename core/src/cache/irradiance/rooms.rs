@@ -1,7 +1,6 @@
-//! Rooms of which the irradiance of the floor is exact, for the tests of what is estimated: a unit room of
-//! six walls, lit by any of them or by a patch of its ceiling, with or without a square in the air.
-//! Irradiance is Lambert's formula over the walls, of which the square takes away its shadow by exact
-//! clipping; its derivatives are central differences of that in f64.
+//! Test rooms with exact irradiance on the floor: a unit room of six walls, lit by any of them or by a patch
+//! of its ceiling, with or without a square in the air. Irradiance is Lambert's formula over the walls, minus
+//! the exactly clipped shadow of the square; derivatives are its central differences in f64.
 
 use super::derivatives::CellFlux;
 use super::hemisphere::Hemisphere;
@@ -23,18 +22,18 @@ fn dot(a: Point, b: Point) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
-/// A convex polygon and its radiance; counter-clockwise as the floor sees it.
+/// Convex polygon and its radiance; counter-clockwise as seen from the floor.
 struct Emitter {
     corners: Vec<Point>,
     radiance: f64,
 }
 
-/// Irradiance at the origin of normal +z from a polygon of radiance 1 above it.
+/// Irradiance at the origin, with normal +z, from a polygon of radiance 1 above it.
 fn lambert(corners: &[Point]) -> f64 {
     lambert_of(corners, [0.0, 0.0, 1.0])
 }
 
-/// The same for another normal.
+/// Irradiance at the origin, with normal `n`.
 fn lambert_of(corners: &[Point], n: Point) -> f64 {
     let next = corners.iter().cycle().skip(1);
     let edges = corners.iter().zip(next).map(|(&a, &b)| {
@@ -45,7 +44,7 @@ fn lambert_of(corners: &[Point], n: Point) -> f64 {
     edges.sum()
 }
 
-/// The part of a polygon above a plane through the eye (Sutherland, Hodgman).
+/// Part of a polygon above a plane through the origin (Sutherland, Hodgman).
 fn above(polygon: &[Point], plane: Point) -> Vec<Point> {
     let next = polygon.iter().cycle().skip(1);
     let mut clipped = Vec::new();
@@ -62,21 +61,21 @@ fn above(polygon: &[Point], plane: Point) -> Vec<Point> {
     clipped
 }
 
-/// The part of a polygon that is seen through another.
+/// Part of a polygon seen through `window`.
 fn through(polygon: &[Point], window: &[Point]) -> Vec<Point> {
     let next = window.iter().cycle().skip(1);
     window.iter().zip(next).fold(polygon.to_vec(), |polygon, (&a, &b)| above(&polygon, cross(a, b)))
 }
 
-/// A unit room, seen from its floor.
+/// Unit room, seen from its floor.
 #[derive(Clone, Copy)]
 pub(super) struct Room {
     /// Radiance of the walls x = 0, x = 1, y = 0, y = 1, and of the ceiling.
     pub(super) walls: [f64; 5],
     /// A square of the ceiling: lowest corner, side, radiance.
     pub(super) patch: Option<([f64; 2], f64, f64)>,
-    /// A square in the air, parallel to the floor and askew: middle, side, radiance. (Were it in line with
-    /// the walls, its edges would pass before theirs all at once, and the irradiance would have kinks.)
+    /// A square in the air, parallel to the floor and rotated: centre, side, radiance. (Aligned with the
+    /// walls, its edges would cross theirs all at once, and the irradiance would have kinks.)
     pub(super) square: Option<(Point, f64, f64)>,
 }
 
@@ -97,7 +96,7 @@ impl Room {
         if let Some(([x, y], side, radiance)) = self.patch {
             emitters.push(Emitter { corners: flat([x, y, 1.0], side), radiance: radiance - ceiling });
         }
-        // Whatever the order above: counter-clockwise from the middle of the floor.
+        // Orients all polygons counter-clockwise as seen from the middle of the floor.
         for emitter in &mut emitters {
             let seen: Vec<Point> = emitter.corners.iter().map(|&p| sub(p, [0.5, 0.5, 0.0])).collect();
             if lambert(&seen) < 0.0 {
@@ -112,7 +111,7 @@ impl Room {
         self.irradiance_of(place, [0.0, 0.0, 1.0])
     }
 
-    /// The same of a receiver of another normal; the floor is black.
+    /// Exact irradiance of a receiver with normal `n`; the floor is black.
     pub(super) fn irradiance_of(&self, [x, y]: [f64; 2], n: Point) -> f64 {
         let seen = |corners: &[Point]| corners.iter().map(|&p| sub(p, [x, y, 0.0])).collect::<Vec<_>>();
         let lambert = |corners: &[Point]| lambert_of(&above(corners, n), n);
@@ -139,7 +138,7 @@ impl Room {
         ]
     }
 
-    /// Radiance, distance and normal of what is seen from the floor.
+    /// Radiance, distance and normal of the hit of direction `w` from the floor.
     pub(super) fn look(&self, [x, y]: [f64; 2], w: Point) -> (f64, f64, Point) {
         let inside = |low: [f64; 2], side: f64, t: f64| {
             let at = [x + t * w[0] - low[0], y + t * w[1] - low[1]];
@@ -173,7 +172,7 @@ fn flat([x, y, z]: Point, side: f64) -> Vec<Point> {
     vec![[x, y, z], [x + side, y, z], [x + side, y + side, z], [x, y + side, z]]
 }
 
-/// By how much the square is askew, radians.
+/// Rotation of the square, radians.
 const SKEW: f64 = 0.4;
 
 fn askew([x, y, z]: Point, side: f64) -> Vec<Point> {
@@ -194,7 +193,7 @@ impl Random {
     }
 }
 
-/// What a gather sees.
+/// Gather results.
 pub(super) struct Gather {
     n: usize,
     radiance: Vec<[f32; 3]>,
@@ -232,11 +231,11 @@ pub(super) fn with_tables<T>(n: usize, work: impl FnOnce(&CellFlux) -> T) -> T {
 
 const SQUARE: (Point, f64, f64) = ([0.45, 0.5, 0.4], 0.3, 0.0);
 
-/// One radiance, and a black square.
+/// Walls of equal radiance, and a black square.
 pub(super) const SHADOW: Room = Room { walls: [1.0; 5], patch: None, square: Some(SQUARE) };
 /// Walls of different radiance, and a square.
 pub(super) const WALLS: Room = Room { walls: [1.0, 0.2, 0.5, 0.8, 0.3], patch: None, square: Some(SQUARE) };
-/// Without the square.
+/// The room `WALLS` without the square.
 pub(super) const OPEN: Room = Room { square: None, ..WALLS };
 /// A small bright patch of the ceiling.
 pub(super) const LIGHT: Room = Room { walls: [0.1; 5], patch: Some(([0.6, 0.55], 0.2, 10.0)), square: None };

@@ -1,4 +1,4 @@
-//! The cache: records, the octree that finds them, and what they say together of the irradiance at a point.
+//! Irradiance cache: records, an octree over their supports, and interpolation.
 
 use super::lanes::QueryPoint;
 use super::neighbours::Neighbours;
@@ -9,37 +9,37 @@ use crate::geometry::Bounds;
 use crate::memory::{Arena, Footprint, OutOfMemory};
 use glam::Vec3;
 
-/// Normals that deviate by more than this many radians are not served: what rises over the turned horizon was
-/// not sampled (Schwarzhaupt et al. 2012, §4.3).
+/// Maximum angle in radians between the normals of a point and a valid record: light beyond the turned
+/// horizon was not sampled (Schwarzhaupt et al. 2012, §4.3).
 pub const GREATEST_DEVIATION: f32 = 0.2;
 
-/// What a cache knows of a point.
+/// Interpolated values of a cache at a point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CachedIrradiance {
-    /// Irradiance without what emitters send directly, in W/m².
+    /// Irradiance without direct light of emitters, in W/m².
     pub irradiance: Rgb,
-    /// Share of the hemisphere, weighted by cosines, in which light shines directly.
+    /// Cosine-weighted fraction of the hemisphere that sees emitters or the environment directly.
     pub shining: f32,
 }
 
-/// Records in the caller's memory. Frozen while pictures are made; grows by [`IrradianceCache::insert`].
+/// Records in the caller's memory. Frozen during rendering; grows by [`IrradianceCache::insert`].
 #[derive(Debug)]
 pub struct IrradianceCache<'m> {
     records: &'m mut [Record],
     used: usize,
     tree: Octree<'m>,
     least_cos: f32,
-    /// Records that there was no memory for.
+    /// Number of records rejected for lack of memory.
     refused: u64,
 }
 
 impl<'m> IrradianceCache<'m> {
-    /// Bytes for `capacity` records.
+    /// Footprint of `capacity` records.
     pub fn footprint(capacity: usize) -> Footprint {
         Footprint::default().slice::<Record>(capacity).and(Octree::footprint(capacity))
     }
 
-    /// How many records fit into `bytes`.
+    /// Number of records that fit into `bytes`.
     pub fn capacity_of(bytes: usize) -> usize {
         let each = Self::footprint(1 << 20).bytes() >> 20;
         let mut capacity = bytes / each.max(1);
@@ -49,22 +49,22 @@ impl<'m> IrradianceCache<'m> {
         capacity
     }
 
-    /// An empty cache of a scene within `bounds`, with memory for `capacity` records.
+    /// Empty cache of a scene within `bounds`, with memory for `capacity` records.
     ///
     /// # Errors
-    /// [`OutOfMemory`] where the arena has less than [`IrradianceCache::footprint`].
+    /// [`OutOfMemory`] if the arena has less than [`IrradianceCache::footprint`].
     pub fn new(bounds: &Bounds, capacity: usize, arena: &mut Arena<'m>) -> Result<Self, OutOfMemory> {
         let records = arena.slice(capacity)?;
         let tree = Octree::new(bounds, capacity, arena)?;
         Ok(Self { records, used: 0, tree, least_cos: libm::cosf(GREATEST_DEVIATION), refused: 0 })
     }
 
-    /// The records, in the order in which they came.
+    /// Records in order of insertion.
     pub fn records(&self) -> &[Record] {
         self.records.get(..self.used).unwrap_or_default()
     }
 
-    /// The most records that there is memory for.
+    /// Maximum number of records.
     pub fn capacity(&self) -> usize {
         self.records.len()
     }
@@ -74,12 +74,12 @@ impl<'m> IrradianceCache<'m> {
         self.used == self.records.len()
     }
 
-    /// Records that came when the cache was full, and were lost.
+    /// Number of records rejected because the cache was full.
     pub fn refused(&self) -> u64 {
         self.refused
     }
 
-    /// What is known at `point`; `None` where no record reaches.
+    /// Interpolated irradiance at `point`; `None` without a valid record.
     ///
     /// E = Σ w_i (E_i + ∇E_i · Δx_i + ∇_n E_i · (n_i × n)) / Σ w_i (Schwarzhaupt et al. 2012, equation 12),
     /// with the second order where a metric has it.
@@ -99,8 +99,8 @@ impl<'m> IrradianceCache<'m> {
         (weights > 0.0).then(|| CachedIrradiance { irradiance: sum / weights, shining: shining / weights })
     }
 
-    /// What one of the records says that [`IrradianceCache::at`] asks: enough where many points are averaged.
-    /// And as [`IrradianceCache::at_all`] has it, how far that record is.
+    /// Irradiance from the first valid record, without interpolation, and the distance of that record as in
+    /// [`IrradianceCache::at_all`]. Good enough for gather rays, whose values are averaged.
     #[inline]
     pub fn first_valid(&self, point: &QueryPoint) -> Option<(CachedIrradiance, f32)> {
         let mut found = None;
@@ -116,13 +116,13 @@ impl<'m> IrradianceCache<'m> {
         found
     }
 
-    /// The octree, the records, and the cosine of the greatest deviation of a normal.
+    /// Octree, records, and cosine of the maximum angle between normals.
     #[inline]
     pub(super) fn parts(&self) -> (&Octree<'m>, &[Record], f32) {
         (&self.tree, self.records(), self.least_cos)
     }
 
-    /// Calls `visit` with the records that speak for a point, and their weights.
+    /// Calls `visit` with each record that is valid at a point, and its weight.
     pub fn visit(&self, point: &QueryPoint, mut visit: impl FnMut(&Record, f32)) {
         self.tree.at(point.position, |index| {
             if let Some(record) = self.records.get(index as usize)
@@ -134,7 +134,7 @@ impl<'m> IrradianceCache<'m> {
         });
     }
 
-    /// Calls `visit` with the irradiance that each valid record extrapolates to a point, and with its weight.
+    /// Calls `visit` with the irradiance that each valid record extrapolates to a point, and its weight.
     pub fn visit_values(&self, point: &QueryPoint, mut visit: impl FnMut(Rgb, f32)) {
         self.tree.at(point.position, |index| {
             if let Some(record) = self.records.get(index as usize)
@@ -146,8 +146,8 @@ impl<'m> IrradianceCache<'m> {
         });
     }
 
-    /// Whether some record covers the point: one that must be heard, whatever hangs over it, where nobody has
-    /// looked up from there.
+    /// Whether a record covers the point. If the height of overhangs above the point is unknown (`within` is
+    /// infinite), the record must be valid for any height.
     #[inline]
     pub fn covers(&self, point: &QueryPoint) -> bool {
         let mut covered = false;
@@ -160,8 +160,8 @@ impl<'m> IrradianceCache<'m> {
         covered
     }
 
-    /// Adds a record, after it and its neighbours have learnt from each other and clamped each other. Whether
-    /// there was memory for it.
+    /// Inserts a record, after it and its neighbours have been compared and clamped. Returns whether there
+    /// was memory.
     pub fn insert(&mut self, mut record: Record) -> bool {
         if self.is_full() {
             self.refused += 1;
@@ -184,13 +184,13 @@ impl<'m> IrradianceCache<'m> {
         true
     }
 
-    /// The records, to be changed where they are. [`IrradianceCache::rebuild`] is to follow where one becomes
+    /// Records for changes in place, to be followed by [`IrradianceCache::rebuild`] if a record becomes
     /// wider.
     pub fn records_mut(&mut self) -> &mut [Record] {
         self.records.get_mut(..self.used).unwrap_or_default()
     }
 
-    /// Keeps the records of these numbers, in their order.
+    /// Keeps the records for which `is_kept` holds, in order.
     pub fn retain(&mut self, is_kept: impl Fn(usize) -> bool) {
         let mut kept = 0;
         for index in (0..self.used).filter(|&index| is_kept(index)) {
@@ -201,21 +201,21 @@ impl<'m> IrradianceCache<'m> {
         self.rebuild();
     }
 
-    /// Makes all radii smaller by a factor, as for an error allowed that is smaller by its fourth power. What
-    /// records then no longer cover is to be filled again.
+    /// Scales all radii by `share`, as for an allowed error scaled by its fourth power. Uncovered areas have
+    /// to be filled again.
     pub fn scale_radii(&mut self, share: f32) {
         self.records.iter_mut().take(self.used).for_each(|record| record.scale_radii(share));
         self.rebuild();
     }
 
-    /// Links all records anew, by their supports as they are now: what was clamped is found less often. The
-    /// order in which a place finds its records, and so the last bit of what they say, then follows from the
+    /// Links all records anew by their present supports, so that clamped records are found less often. The
+    /// order in which a point finds its records, and with it the last bit of the result, then depends on the
     /// records alone.
     pub fn rebuild(&mut self) {
         self.link(self.used);
     }
 
-    /// The same, with memory left for so many records in all.
+    /// Links all records, with links reserved for `expected` records in total.
     fn link(&mut self, expected: usize) {
         let expected = expected.min(self.capacity());
         let Self { records, used, tree, .. } = self;
@@ -226,8 +226,8 @@ impl<'m> IrradianceCache<'m> {
         }
     }
 
-    /// Takes over `records`, those of another cache of the same scene, as they are; what was here is gone. As
-    /// many as there is memory for; the others are refused.
+    /// Replaces the content by `records` of another cache of the same scene, as they are. Records beyond the
+    /// capacity are rejected.
     pub fn restore(&mut self, records: &[Record]) {
         self.used = records.len().min(self.records.len());
         self.refused = (records.len() - self.used) as u64;
@@ -255,7 +255,7 @@ mod tests {
         then(&mut IrradianceCache::new(&BOUNDS, capacity, &mut arena).unwrap())
     }
 
-    /// On the plane z = 1/2, where E = 1 + x in red, 2 in the other channels.
+    /// Record on the plane z = 1/2, where E = 1 + x in red, 2 in the other channels.
     fn record(x: f32, y: f32, radius: f32) -> Record {
         Record {
             position: [x, y, 0.5],
@@ -339,8 +339,8 @@ mod tests {
         });
     }
 
-    /// E = 1 and 1.5 at a distance of 0.1: a curvature of 2 · 0.5 / 0.1² over 1.5. Excused if the noise is a
-    /// quarter of each, for their difference is then no more than three deviations.
+    /// E = 1 and 1.5 at a distance of 0.1: a curvature of 2 · 0.5 / 0.1² over 1.5. With a relative noise of a
+    /// quarter each, the difference is within three standard deviations.
     #[test]
     fn records_that_disagree_shrink_unless_noise_is_an_excuse() {
         let pair = |noise| {

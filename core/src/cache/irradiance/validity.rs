@@ -1,4 +1,4 @@
-//! The ellipse of validity of a record: from its derivatives to two radii, by the rule of a metric.
+//! Validity ellipse of a record: two radii from its derivatives, by an error metric.
 
 use super::derivatives::{Derivatives, Hessian};
 use super::metric::{Metric, Settings};
@@ -6,47 +6,44 @@ use core::f32::consts::PI;
 use glam::Vec2;
 use halflight_simd::kernels::eigen::{Eigen2, symmetric2};
 
-/// The region in which a record may be used.
+/// Region in which a record may be used.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Validity {
-    /// Unit direction of the shorter radius, in the tangent frame; the longer stands at right angles.
+    /// Unit direction of the shorter radius, in the tangent frame; the longer radius is perpendicular.
     pub axis: Vec2,
-    /// The shorter and the longer radius, m.
+    /// Shorter and longer radius, m.
     pub radii: [f32; 2],
-    /// How much farther than the radii the record still has weight where others reach: 1, or more to average
-    /// over more of them.
+    /// Radii of the support over the radii of the region: 1, or more to average over more records.
     pub overlap: f32,
-    /// Second derivatives along the axes to extrapolate by, of the irradiance relative to itself, so that at
-    /// (x, y) along them it is (x² bend₀ + y² bend₁)/2 of it more. Zero where the rule extrapolates to first
-    /// order.
+    /// Second derivatives along the axes for extrapolation, relative to the irradiance: at (x, y) along the
+    /// axes it changes by (x² bend₀ + y² bend₁)/2. Zero if the metric extrapolates to first order.
     pub bend: [f32; 2],
-    /// By what the gradients are to be multiplied, so that extrapolation within the reach takes the
-    /// irradiance (luminance) neither below zero nor above its double. 1 where the metric's own radii hold.
+    /// Factor of the gradients that keeps the extrapolated luminance between zero and twice the irradiance
+    /// within the radii. 1 if the radii are the metric's own.
     pub gradient_scale: f32,
-    /// Curvatures along the axes that the radii were made for: at (x, y) along them the error of
-    /// extrapolation is expected to be (x² curvature₀ + y² curvature₁)/2 of the irradiance. Zero where the
-    /// rule knows none.
+    /// Curvatures along the axes behind the radii: at (x, y) along the axes the expected relative error of
+    /// extrapolation is (x² curvature₀ + y² curvature₁)/2. Zero if the metric has none.
     pub curvature: [f32; 2],
-    /// Error allowed over the reach, an integral over its area, m²: where neighbours show that it is more,
-    /// the reach is to shrink. Zero where the metric does not ask them.
+    /// Allowed error over the region, an integral over area, m²; the region shrinks if neighbours show a
+    /// larger error. Zero if the metric does not compare neighbours.
     pub allowed: f32,
-    /// The least that it may shrink to, m.
+    /// Minimum radius, m.
     pub least: f32,
 }
 
-/// How far [`Metric::Halflight`] averages, in radii, where nothing is known of the noise of a record.
+/// Overlap of [`Metric::Halflight`] in radii, if the noise of a record is unknown.
 const OVERLAP: f32 = 1.5;
 
-/// The reach of a record of these derivatives, which should be those of [`Metric::derivatives`].
+/// Region of a record with these derivatives, which should be those of [`Metric::derivatives`].
 ///
-/// Of [`Metric::Halflight`] a place gets a record where it is in the radii of none, and is interpolated of
-/// all within [`OVERLAP`] times their radii: twice as many, whose independent errors average out. That is not
-/// to be had to first order, for the error of extrapolation grows with the square of the distance; but the
-/// Hessian is known, and is added to it.
+/// With [`Metric::Halflight`] a point outside the radii of all records gets a record, and a point is
+/// interpolated from all records within [`OVERLAP`] times their radii: twice as many, whose independent
+/// errors average out. To first order this would fail, since the error of extrapolation is quadratic in
+/// distance; but the Hessian is known and included in the extrapolation.
 pub fn validity(settings: &Settings, derivatives: &Derivatives) -> Validity {
     let irradiance = derivatives.luminance();
     let slope = derivatives.luminance_gradient().length();
-    // A black or a broken record has no gradient to speak of.
+    // A black or invalid record has no meaningful gradient.
     let lit = irradiance > 0.0 && irradiance.is_finite() && slope.is_finite();
     let flat = if lit && slope > 0.0 { irradiance / slope } else { f32::INFINITY };
     let circle = |distance: f32| (Bent::default(), [settings.error * distance; 2]);
@@ -58,7 +55,7 @@ pub fn validity(settings: &Settings, derivatives: &Derivatives) -> Validity {
             let bent = curvatures(settings, derivatives, lit);
             let allowed = settings.error * settings.extent * settings.extent;
             let [short, long] = bent.curvature.map(|l| radius(allowed, l));
-            // What the Hessian cannot see (a radiance edge behind an occluder's) the gradient may.
+            // The gradient may show what the Hessian cannot: a radiance edge behind an occluder's edge.
             let bound = if settings.metric == Metric::Halflight { flat } else { f32::INFINITY };
             (bent, [short.min(bound), long])
         }
@@ -66,11 +63,11 @@ pub fn validity(settings: &Settings, derivatives: &Derivatives) -> Validity {
     let Bent { axis, curvature, signed } = bent;
     let wanted = radii;
     let radii = clamped(settings, radii);
-    // Where radii are larger than wanted, for they are the least, light changes over them by what it would
-    // over those: a pixel does not show more, and what a border has so near says nothing of the other side.
+    // Radii enlarged to the minimum keep the change of light over the wanted radii: a pixel shows no more,
+    // and derivatives due to such a near border say nothing about its other side.
     let shares =
         [0, 1].map(|k: usize| if wanted[k] < radii[k] { (wanted[k] / radii[k]).max(0.0) } else { 1.0 });
-    // An extrapolation reaches |∇E · dx|, largest at the rim of the ellipse.
+    // Extrapolation changes by |∇E · dx|, at most on the rim of the ellipse.
     let gradient = derivatives.luminance_gradient();
     let rise = Vec2::new(radii[0] * gradient.dot(axis), radii[1] * gradient.dot(axis.perp())).length();
     let gradient_scale = match lit {
@@ -81,8 +78,8 @@ pub fn validity(settings: &Settings, derivatives: &Derivatives) -> Validity {
     let second = lit && settings.metric == Metric::Halflight;
     let overlap = if settings.metric == Metric::Halflight { OVERLAP } else { 1.0 };
     let bend = [0, 1].map(|k| {
-        // Where radii are larger than the curvature allows, the second order is to change it by no more than
-        // all.
+        // Where radii exceed those of the curvature, the second order changes the irradiance by at most its
+        // own value.
         let most = 2.0 / (overlap * radii[k] * overlap * radii[k]);
         let bend = shares[k] * shares[k] * signed[k] / irradiance;
         if second && bend.is_finite() { bend.max(-most).min(most) } else { 0.0 }
@@ -91,19 +88,18 @@ pub fn validity(settings: &Settings, derivatives: &Derivatives) -> Validity {
     Validity { axis, radii, overlap, bend, gradient_scale, curvature, allowed, least: settings.least }
 }
 
-/// R = (4 ε/π|l|)^¼: how far a record of curvature `l`, relative to its irradiance, makes the error
-/// `allowed`.
+/// R = (4 ε/π|l|)^¼: radius at which a record of relative curvature `l` has the error `allowed`.
 pub(super) fn radius(allowed: f32, l: f32) -> f32 {
     libm::sqrtf(libm::sqrtf(4.0 / PI * allowed / l))
 }
 
-/// Eigenvalues of a Hessian and what they come to.
+/// Eigenvalues of a Hessian, and curvatures derived from them.
 struct Bent {
-    /// Axis of the larger.
+    /// Axis of the larger eigenvalue.
     axis: Vec2,
-    /// Magnitudes relative to the irradiance, the larger first, with the metric's rules applied.
+    /// Magnitudes relative to the irradiance, the larger first, by the rules of the metric.
     curvature: [f32; 2],
-    /// As they are.
+    /// Signed eigenvalues.
     signed: [f32; 2],
 }
 
@@ -113,15 +109,15 @@ impl Default for Bent {
     }
 }
 
-/// Relative curvatures of the irradiance along the axes, the larger first, by the Hessian and the metric's
-/// rules.
+/// Relative curvatures of the irradiance along the axes, the larger first, from the Hessian by the rules of
+/// the metric.
 fn curvatures(settings: &Settings, derivatives: &Derivatives, lit: bool) -> Bent {
     let irradiance = derivatives.luminance();
     let against = settings.against.unwrap_or(irradiance);
     match settings.metric {
-        // Radiance 1 everywhere: irradiance π, whatever there is.
+        // Radiance 1 everywhere: irradiance π in any scene.
         Metric::GeometricHessian => relative(derivatives.hessian, PI),
-        // All radiances raised by 1 % of E, or where all is black to 1.
+        // Radiances raised by 1 % of E, or to 1 if all are black.
         Metric::OcclusionHessian if lit => {
             relative(derivatives.hessian + derivatives.open_hessian * (0.01 * irradiance), against)
         }
@@ -133,7 +129,7 @@ fn curvatures(settings: &Settings, derivatives: &Derivatives, lit: bool) -> Bent
             let floor = settings.floor * near;
             match lit && large.is_finite() {
                 true => Bent { curvature: [large + floor, small + floor], ..bent },
-                // Whatever comes into sight there, the distances bound how fast.
+                // The distances bound how fast light may come into sight.
                 false => Bent { curvature: [near; 2], ..Bent::default() },
             }
         }
@@ -141,8 +137,8 @@ fn curvatures(settings: &Settings, derivatives: &Derivatives, lit: bool) -> Bent
     }
 }
 
-/// Axis and magnitudes of the eigenvalues of `hessian`/`irradiance`. Where nothing is bent, nothing is bent
-/// relative to nothing either.
+/// Axis and magnitudes of the eigenvalues of `hessian`/`irradiance`. A zero eigenvalue is zero relative to
+/// any irradiance.
 fn relative(hessian: Hessian, irradiance: f32) -> Bent {
     let Eigen2 { values, axis } = symmetric2(|x| x, [hessian.xx, hessian.xy, hessian.yy]);
     let axis = Vec2::from(axis);
@@ -150,8 +146,8 @@ fn relative(hessian: Hessian, irradiance: f32) -> Bent {
     Bent { axis: if axis.is_finite() { axis } else { Vec2::X }, curvature, signed: values }
 }
 
-/// Radii within the limits: the longer at most `aspect` times the shorter, then both from `least` to `most`;
-/// what is no number is `least`.
+/// Radii within limits: the longer at most `aspect` times the shorter, then both from `least` to `most`; NaN
+/// becomes `least`.
 fn clamped(settings: &Settings, [short, long]: [f32; 2]) -> [f32; 2] {
     let short = if short.is_nan() { 0.0 } else { short };
     let long = long.max(short).min(settings.aspect.max(1.0) * short);
@@ -163,7 +159,7 @@ mod tests {
     use super::*;
     use crate::Rgb;
 
-    /// Roundings of roots and products.
+    /// Rounding of roots and products.
     const TOLERANCE: f32 = 1e-6;
 
     fn record(hessian: [f32; 3], gradient: Vec2) -> Derivatives {
@@ -212,12 +208,12 @@ mod tests {
         near(validity(&wide, &record).radii[1], 1.5 * radius);
         let circle = Settings { aspect: 0.0, ..wide };
         near(validity(&circle, &record).radii[1], radius);
-        // An absolute error: against 8 the curvatures are a quarter, and the radii √2 longer.
+        // Absolute error: against 8 the curvatures are a quarter, and the radii √2 longer.
         let absolute = Settings { against: Some(8.0), ..settings(Metric::OcclusionHessian) };
         near(validity(&absolute, &record).radii[0], core::f32::consts::SQRT_2 * radius);
     }
 
-    /// The integral of ½|l₁x² + l₂y²| over a circle of both radii equal is what was allowed.
+    /// The integral of ½|l₁x² + l₂y²| over a circle with both curvatures equal is the allowed error.
     #[test]
     fn the_error_over_the_reach_is_the_error_allowed() {
         let settings = settings(Metric::OcclusionHessian);
@@ -235,26 +231,26 @@ mod tests {
             }
         }
         let allowed = f64::from(settings.error * settings.extent * settings.extent);
-        // The circle of a million pixels.
+        // Area of a circle by a million points.
         assert!((integral / allowed - 1.0).abs() < 2e-3, "{integral} {allowed}");
     }
 
     #[test]
     fn halflight_has_a_floor_and_a_bound() {
-        // Nothing is bent: 0.01 <u²> = 0.0025 stands for the curvature.
+        // Zero Hessian: 0.01 <u²> = 0.0025 replaces the curvature.
         let flat = validity(&settings(Metric::Halflight), &record([0.0; 3], Vec2::ZERO));
         let radius = (0.16 / PI / 0.0025f32).powf(0.25);
         near(flat.radii[0], radius);
         near(flat.radii[1], radius);
         assert_eq!((flat.overlap, flat.bend), (OVERLAP, [0.0; 2]));
-        // A saddle is extrapolated by what it is bent: -4 and 0.25 of 2.
+        // A saddle is extrapolated by its curvatures: -4 and 0.25 over 2.
         let saddle = validity(&settings(Metric::Halflight), &record([0.25, 0.0, -4.0], Vec2::ZERO));
         assert_eq!((saddle.bend, saddle.axis.abs()), ([-2.0, 0.125], Vec2::Y));
         assert_eq!(
             validity(&settings(Metric::OcclusionHessian), &record([1.0; 3], Vec2::ZERO)).bend,
             [0.0; 2]
         );
-        // A steep slope: E/|∇E| = 0.5 is less.
+        // A steep gradient: E/|∇E| = 0.5 is smaller.
         let steep = validity(&settings(Metric::Halflight), &record([0.0; 3], Vec2::new(0.0, 4.0)));
         near(steep.radii[0], 0.5);
         near(steep.radii[1], 1.0);
@@ -315,7 +311,7 @@ mod tests {
         }
     }
 
-    /// A scene in millimetres: all lengths times 1000, gradients and Hessians less accordingly.
+    /// A scene in other units: lengths times 1024, gradients and Hessians scaled accordingly.
     #[test]
     fn a_scene_of_another_size_has_radii_of_that_size() {
         const SIZE: f32 = 1024.0;

@@ -1,15 +1,15 @@
-//! Derivatives from the borders between strata: the default.
+//! Derivatives from strata borders, the default estimator.
 //!
-//! The strata of the concentric map never move; what they see does. Between two of radiance L₁ and L₂ runs
-//! the boundary of a surface, which belongs to the nearer of both and moves with its inverse distance u. By
-//! the boundary integrals of [`halflight_simd::kernels::edge`], with u the same at both ends of a border,
+//! The strata of the concentric map are fixed; their content moves. Between two strata of radiance L₁ and L₂
+//! runs the boundary of a surface, which belongs to the nearer of both and moves with its inverse distance u.
+//! The boundary integrals of [`halflight_simd::kernels::edge`], with equal u at both ends of a border, give
 //!
 //!   grad E = Σ (L₁ - L₂) u g,   Hess E = Σ (L₁ - L₂) u² h,   grad_n E = Σ (L₁ - L₂) r,
 //!
-//! where g, h, r depend on the border alone: tables. No triangulation, so no diagonal and no rule for the
-//! radiance of a triangle; no open rim, for the rim of the hemisphere lies in the horizon, where nothing
-//! flows; and all of it is of the same strata as the unbiased E. With polar strata the first sum is Ward and
-//! Heckbert's (1992).
+//! Here g, h, r depend on the border alone and are tabulated. Without triangulation there is no choice of
+//! diagonals and no rule for the radiance of a triangle. There is no open rim either, since the rim of the
+//! hemisphere lies in the horizon, where the flux is zero. All sums use the strata of the unbiased E. With
+//! polar strata the first sum is that of Ward and Heckbert (1992).
 
 use super::Derivatives;
 use crate::Level;
@@ -19,19 +19,19 @@ use crate::sampling::warp::concentric_disk;
 use halflight_simd::kernels::cells::{Borders, Cells};
 use halflight_simd::kernels::edge::{Flux, flux_of};
 
-/// Pieces of a border, which is no great circle but the map's image of a segment.
+/// Pieces of a border, since the map's image of a segment is no great circle.
 const PIECES: usize = 4;
 
-/// The tables of N × N strata, and the estimator over them.
+/// Tables of N × N strata, and the estimator over them.
 #[derive(Clone, Copy, Debug)]
 pub struct CellFlux<'m> {
     n: usize,
-    /// For each row, for each sixteen of its columns: borders to the next column, borders to the next row.
+    /// For each row, for each sixteen columns: borders to the next column, borders to the next row.
     borders: &'m [Borders],
 }
 
 impl<'m> CellFlux<'m> {
-    /// Bytes of the tables for n × n strata.
+    /// Footprint of the tables for n × n strata.
     pub fn footprint(n: usize) -> Footprint {
         Footprint::default().slice::<Borders>(2 * n.saturating_mul(n.div_ceil(16)))
     }
@@ -39,7 +39,7 @@ impl<'m> CellFlux<'m> {
     /// Builds the tables for n × n strata.
     ///
     /// # Errors
-    /// [`OutOfMemory`] where the arena has less than the footprint, or n is not in 1 ..= [`SIDE_MAX`].
+    /// [`OutOfMemory`] if the arena has less than the footprint, or n is not in 1 ..= [`SIDE_MAX`].
     pub fn build(n: usize, arena: &mut Arena<'m>) -> Result<Self, OutOfMemory> {
         if !(1..=SIDE_MAX).contains(&n) {
             return Err(OutOfMemory { needed: usize::MAX, available: arena.available() });
@@ -66,12 +66,12 @@ impl<'m> CellFlux<'m> {
         Ok(Self { n, borders })
     }
 
-    /// Strata along a side.
+    /// Number of strata along a side.
     pub fn n(&self) -> usize {
         self.n
     }
 
-    /// Irradiance and all its derivatives. `None` where the hemisphere has another number of strata.
+    /// Irradiance and all its derivatives. `None` if the hemisphere has another number of strata.
     pub fn derivatives(&self, level: Level, hemisphere: &Hemisphere) -> Option<Derivatives> {
         (hemisphere.n() == self.n).then(|| {
             let cells = Cells {
@@ -85,7 +85,7 @@ impl<'m> CellFlux<'m> {
     }
 }
 
-/// What the border between two corners of the grid adds, at distance 1.
+/// Contribution of the border between two corners of the grid, at distance 1.
 fn border(n: usize, [from, to]: [[usize; 2]; 2]) -> Flux<f32> {
     let along = |piece: usize| {
         let at = |k: usize| (from[k] * (PIECES - piece) + to[k] * piece) as f32 / (n * PIECES) as f32;
@@ -94,7 +94,8 @@ fn border(n: usize, [from, to]: [[usize; 2]; 2]) -> Flux<f32> {
     (0..PIECES).fold(Flux::default(), |sum, piece| sum + flux_of(along(piece), 1.0, along(piece + 1), 1.0))
 }
 
-/// The direction that the concentric map makes of a point of the unit square, without loss near the horizon.
+/// Direction that the concentric map assigns to a point of the unit square, without loss of precision near
+/// the horizon.
 fn direction(u: [f32; 2]) -> [f32; 3] {
     let disk = concentric_disk(u);
     let radius = (2.0 * u[0] - 1.0).abs().max((2.0 * u[1] - 1.0).abs());
@@ -129,7 +130,7 @@ mod tests {
         }
     }
 
-    /// A room of one radiance is the same from everywhere, whatever its walls.
+    /// A room of one radiance looks alike from everywhere, with any walls.
     #[test]
     fn one_radiance_has_no_derivatives() {
         let n = 16;
@@ -145,7 +146,7 @@ mod tests {
         assert_eq!(found.min_distance, 0.2);
     }
 
-    /// The sky of radiance 1 + s · w: its rotational gradient is n × ∫ s · w w dω = n × 2π/3 s, and its
+    /// A sky of radiance 1 + s · w has the rotational gradient n × ∫ s · w w dω = n × 2π/3 s and the
     /// irradiance 2π/3 s_z + π; a sky does not move.
     #[test]
     fn a_sky_with_a_slope_turns_and_does_not_move() {

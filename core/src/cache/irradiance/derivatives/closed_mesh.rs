@@ -1,7 +1,7 @@
-//! Derivatives from the triangulated environment with both of its defects cured: the triangles of the rim
-//! reach down to the horizon, so that a room of one radiance is flat; and where no occluder's edge crosses a
-//! triangle, it has the mean of its vertices' radiances and not one of them. Costs more than the borders of
-//! strata and is no better: another way to the same numbers.
+//! Derivatives from a closed triangulated environment, without two defects of the paper's: triangles of the
+//! rim extend to the horizon, so that a room of one radiance has zero derivatives; and a triangle that no
+//! occluder's edge crosses has the mean of its vertices' radiances instead of one of them. It costs more than
+//! strata borders without being more precise, and serves as a comparison.
 
 use super::Derivatives;
 use crate::Level;

@@ -1,7 +1,8 @@
-//! How irradiance changes when the receiver steps aside or turns: gradients and Hessian from one hemisphere.
+//! Derivatives of irradiance for translation and rotation of the receiver: gradients and Hessian from one
+//! hemisphere.
 //!
-//! [`CellFlux`] is what to use. [`mod@triangulated`], [`mod@closed_mesh`], [`mod@ward_heckbert`] and
-//! [`mod@unoccluded`] are other answers to the same question, to be compared with; each names its paper.
+//! [`CellFlux`] is the default. [`mod@triangulated`], [`mod@closed_mesh`], [`mod@ward_heckbert`] and
+//! [`mod@unoccluded`] are alternatives for comparison; each names its paper.
 
 mod cell_flux;
 mod closed_mesh;
@@ -23,11 +24,10 @@ use core::ops::{Add, Mul};
 use glam::Vec2;
 use halflight_simd::kernels::jumps::Sums;
 
-/// Irradiance and its derivatives at a place, in the tangent frame of its normal. A derivative by a length in
-/// m.
+/// Irradiance and its derivatives at a point, in the tangent frame of its normal. Lengths are in m.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Derivatives {
-    /// E, of which a hemisphere of radiance 1 makes π.
+    /// E; a hemisphere of radiance 1 has E = π.
     pub irradiance: Rgb,
     /// (∂E/∂x, ∂E/∂y) per channel: E(x + dx) = E + gradient · dx.
     pub gradient: [Vec2; 3],
@@ -35,18 +35,18 @@ pub struct Derivatives {
     pub rotation: [Vec2; 3],
     /// Second derivatives of the luminance of E.
     pub hessian: Hessian,
-    /// The same of the estimator's environment with radiance 1 everywhere: zero where that is closed, as
-    /// every environment is but the triangulated one of the paper.
+    /// Hessian of the estimator's environment with radiance 1 everywhere: zero if the environment is closed,
+    /// as in all estimators except the triangulation of the paper.
     pub open_hessian: Hessian,
     /// Mean of 1/t² over the strata, 1/m².
     pub mean_square_inverse_distance: f32,
-    /// Harmonic mean of the distances (Ward 1988), m; infinite where nothing is seen.
+    /// Harmonic mean of the distances (Ward 1988), m; infinite without hits.
     pub harmonic_mean_distance: f32,
-    /// The least distance, m; infinite where nothing is seen.
+    /// Minimum distance, m; infinite without hits.
     pub min_distance: f32,
 }
 
-/// A symmetric 2×2 matrix.
+/// Symmetric 2×2 matrix.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Hessian {
     /// ∂²/∂x².
@@ -83,7 +83,7 @@ impl Derivatives {
         Vec2::new(of(0), of(1))
     }
 
-    /// From the hemisphere and the sums over the edges of its environment.
+    /// Derivatives from the hemisphere and the sums over the edges of its environment.
     fn of(hemisphere: &Hemisphere, sums: &Sums) -> Self {
         let distances = hemisphere.distances();
         Self {
@@ -99,8 +99,8 @@ impl Derivatives {
     }
 }
 
-/// The rotational gradient by the samples themselves (Ward, Heckbert 1992): π/N² Σ L (n × w)/cos, with the
-/// cosine kept above 0.05, for near the horizon it has no bound.
+/// Rotational gradient by samples (Ward, Heckbert 1992): π/N² Σ L (n × w)/cos. The cosine is at least 0.05,
+/// since the term is unbounded near the horizon.
 fn rotation_by_samples(hemisphere: &Hemisphere) -> [Vec2; 3] {
     const LOW: f32 = 0.05;
     let share = PI / (hemisphere.n() * hemisphere.n()) as f32;

@@ -1,4 +1,4 @@
-//! Estimated derivatives beside the true ones, in rooms where these are known.
+//! Estimated and true derivatives in rooms with known irradiance.
 
 use super::*;
 use crate::Level;
@@ -16,8 +16,8 @@ fn five(found: &Derivatives) -> [f64; 5] {
 
 const RECEIVERS: usize = 40;
 
-/// Root mean square of the errors of gradient and Hessian over receivers on the floor, relative to that of
-/// the truth, for each estimator.
+/// Root mean square errors of gradient and Hessian over receivers on the floor, relative to the root mean
+/// square of the truth, for each estimator.
 fn errors<const M: usize>(
     room: &Room,
     n: usize,
@@ -43,7 +43,7 @@ fn errors<const M: usize>(
     off.map(|off| [(off[0] / size[0]).sqrt(), (off[1] / size[1]).sqrt()])
 }
 
-/// The four estimators of gradient and Hessian, and the one without occlusion.
+/// Four estimators of gradient and Hessian, and the one without occlusion.
 fn all(tables: &CellFlux, hemisphere: &Hemisphere) -> [[f64; 5]; 5] {
     let (level, unoccluded) = (Level::detect(), unoccluded(hemisphere).unwrap());
     let (g, h) = (unoccluded.gradient[1], unoccluded.radiometric);
@@ -56,14 +56,14 @@ fn all(tables: &CellFlux, hemisphere: &Hemisphere) -> [[f64; 5]; 5] {
     ]
 }
 
-/// Room, strata along a side, and the most that gradient and Hessian of closed mesh and of borders of strata
-/// may be off: a third above what was measured.
+/// Room, strata along a side, and maximum errors of gradient and Hessian for the closed mesh and for strata
+/// borders: a third above measured values.
 type Expected = (&'static str, Room, usize, [[f64; 2]; 2]);
 
 const EXPECTED: [Expected; 8] = [
     ("shadow", SHADOW, 16, [[0.76, 0.69], [0.22, 0.28]]),
     ("shadow", SHADOW, 64, [[0.20, 0.16], [0.04, 0.055]]),
-    // The Hessian before a background that changes is not to be had from one hemisphere.
+    // One hemisphere does not determine the Hessian before a background that changes.
     ("walls", WALLS, 16, [[0.3, 1.0], [0.25, 1.0]]),
     ("walls", WALLS, 64, [[0.08, 0.6], [0.06, 0.6]]),
     ("open", OPEN, 16, [[0.2, 0.37], [0.23, 0.4]]),
@@ -80,11 +80,12 @@ fn estimates_beside_the_truth() {
         for (found, most) in [closed, cells].as_flattened().iter().zip(expected.as_flattened()) {
             assert!(found < most, "{name} {n}: {found} of {most}");
         }
-        // Borders are never worse than Ward and Heckbert's, and the open mesh is never as good.
+        // Strata borders are never worse than Ward and Heckbert's gradients, and the open mesh is never as
+        // good.
         assert!(cells[0] < 1.05 * ward[0] && cells[0] < paper[0], "{name} {n}: {cells:?} {ward:?} {paper:?}");
         assert!(cells[1] < 0.5 * paper[1], "{name} {n}: {cells:?} {paper:?}");
         if room.square.is_some() {
-            // What does not know of occlusion does not converge to the truth.
+            // Without occlusion the estimate does not converge to the truth.
             assert!(blind[0] > 0.1 && (n == 16 || blind[1] > 0.3), "{name} {n}: {blind:?}");
         } else if n == 64 {
             assert!(blind[0] < 0.09 && blind[1] < 0.08, "{name} {n}: {blind:?}");
@@ -92,7 +93,8 @@ fn estimates_beside_the_truth() {
     }
 }
 
-/// A room of one radiance: flat to all but the open mesh, which says itself by how much it is not.
+/// A room of one radiance has zero derivatives in all estimators except the open mesh, which reports its own
+/// error.
 #[test]
 fn one_radiance_is_flat_but_to_the_open_mesh() {
     let room = Room { square: None, ..SHADOW };
@@ -107,8 +109,7 @@ fn one_radiance_is_flat_but_to_the_open_mesh() {
     for (found, rim) in [open.hessian.xx, open.hessian.xy, open.hessian.yy].iter().zip([xx, xy, yy]) {
         assert!((found - rim).abs() < 1e-5 * xx.abs().max(yy.abs()), "{open:?}");
     }
-    // Nor is it to what does not know of occlusion, but for its noise; the sum of magnitudes is something
-    // else.
+    // Without occlusion the derivatives are zero up to noise; the sum of magnitudes is not.
     let Unoccluded { radiometric, geometric, .. } = unoccluded(&hemisphere).unwrap();
     assert!(geometric.xx + geometric.yy > 4.0 * (radiometric.xx + radiometric.yy).abs(), "{geometric:?}");
     assert!(geometric.xx * geometric.yy > geometric.xy * geometric.xy, "{geometric:?} is not positive");
@@ -150,11 +151,11 @@ fn rotational_gradients_turn_the_receiver() {
     });
     let [cells, closed, samples] = off.map(|off| (off / size).sqrt());
     println!("rotation: {cells:.4} {closed:.4} {samples:.4}");
-    // A third above what was measured.
+    // A third above measured values.
     assert!(cells < 0.007 && closed < 0.15 && samples < 0.06, "{cells} {closed} {samples}");
 }
 
-/// Microseconds of each way on this machine, tables excluded; to be run in release.
+/// Prints microseconds per estimator on this machine, without tables; to be run in release.
 #[test]
 #[ignore = "prints times"]
 fn print_times() {

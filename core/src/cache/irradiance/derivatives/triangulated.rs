@@ -1,10 +1,10 @@
 //! Derivatives from the triangulated environment of Schwarzhaupt, Jensen and Jarosz (2012), as printed: each
-//! quad of neighbouring samples is two triangles of their farthest vertex's radiance, and the mesh ends at
-//! the outermost samples. For comparison, and as an oracle of the others.
+//! quad of neighbouring samples is two triangles with the radiance of the farthest vertex, and the mesh ends
+//! at the outermost samples. For comparison, and as an oracle of the other estimators.
 //!
-//! That open rim is the boundary of a false light before a black sky: a room of radiance 1 does not come out
-//! flat. [`Derivatives::open_hessian`] says by how much, which is what the paper's rules for black
-//! surroundings rest on.
+//! The open rim acts as the boundary of a light before a black sky: a room of radiance 1 has a nonzero
+//! Hessian. [`Derivatives::open_hessian`] is this Hessian, the basis of the paper's rules for black
+//! surroundings.
 
 use super::{Derivatives, Hessian, rotation_by_samples};
 use crate::Level;
@@ -13,8 +13,8 @@ use core::ops::Add;
 use halflight_simd::kernels::edge::{Flux, flux_of};
 use halflight_simd::kernels::mesh::{Mesh, Rule};
 
-/// Irradiance and all its derivatives; the rotational gradient by samples, for the mesh lacks what is near
-/// the horizon.
+/// Irradiance and all its derivatives; the rotational gradient by samples, since the mesh does not reach the
+/// horizon.
 pub fn triangulated(level: Level, hemisphere: &Hemisphere) -> Derivatives {
     let mesh = Mesh {
         n: hemisphere.n(),
@@ -29,8 +29,7 @@ pub fn triangulated(level: Level, hemisphere: &Hemisphere) -> Derivatives {
     found
 }
 
-/// The Hessian of the mesh with radiance 1 everywhere: all that does not cancel is its rim,
-/// counter-clockwise.
+/// Hessian of the mesh with radiance 1 everywhere: all edges except the rim cancel. Counter-clockwise.
 fn rim(hemisphere: &Hemisphere) -> Hessian {
     let n = hemisphere.n();
     let last = n - 1;

@@ -1,15 +1,15 @@
-//! Derivatives that do not know of occlusion (Jarosz et al. 2012): each sample as a small patch of a surface
-//! that stays in sight. For comparison; they need the normals of what is seen.
+//! Derivatives without occlusion (Jarosz et al. 2012): each sample is a small surface patch that stays
+//! visible. For comparison; they need the normals of the hits.
 //!
 //! Irradiance is ∫ L K dA with K = -(n·d)(m·d)/|d|⁴, d from the receiver to a patch of normal m. With w =
 //! d/r,
 //!
 //!   grad K = K (4 w - m/(m·w))/r,   Hess K = K (24 w wᵀ - 4 I - 4 (w mᵀ + m wᵀ)/(m·w))/r²   (x and y only),
 //!
-//! so with strata of equal irradiance each derivative is π/N² Σ L times a bracket. At a grazing hit 1/(m·w)
-//! has no bound: it is kept to [`GRAZING`]. With L = 1 the second sum is zero in every closed room, whatever
-//! it looks like; so the geometric Hessian is the sum of the magnitudes, |H| with the absolute eigenvalues of
-//! each patch: the bound of what radiances between 0 and 1 may do. (The paper was not at hand; this is our
+//! so that with strata of equal irradiance each derivative is π/N² Σ L times a bracket. At a grazing hit
+//! 1/(m·w) is unbounded, so that |m·w| is at least [`GRAZING`]. With L = 1 the second sum is zero in any
+//! closed room. The geometric Hessian is therefore the sum of magnitudes, |H| with the absolute eigenvalues
+//! of each patch: a bound for all radiances between 0 and 1. (The paper was not at hand; this is our
 //! reading.)
 
 use super::Hessian;
@@ -19,21 +19,21 @@ use core::f32::consts::PI;
 use glam::{Vec2, Vec3};
 use halflight_simd::kernels::eigen::{Eigen2, symmetric2};
 
-/// The least |m·w| that is divided by.
+/// Minimum of |m·w| in denominators.
 pub const GRAZING: f32 = 0.05;
 
-/// What can be said without occlusion.
+/// Derivatives without occlusion.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Unoccluded {
     /// Gradient of the irradiance, per channel.
     pub gradient: [Vec2; 3],
-    /// Hessian of its luminance.
+    /// Hessian of the luminance.
     pub radiometric: Hessian,
-    /// Sum of the magnitudes of all patches' Hessians, at radiance 1: irradiance π.
+    /// Sum of the magnitudes of the Hessians of all patches, for radiance 1: irradiance π.
     pub geometric: Hessian,
 }
 
-/// Gradient and both Hessians; `None` where the hemisphere has no normals.
+/// Gradient and both Hessians; `None` without normals.
 pub fn unoccluded(hemisphere: &Hemisphere) -> Option<Unoccluded> {
     let (normals, n) = (hemisphere.normals()?, hemisphere.n());
     let share = PI / (n * n) as f32;
@@ -62,7 +62,7 @@ pub fn unoccluded(hemisphere: &Hemisphere) -> Option<Unoccluded> {
     Some(found)
 }
 
-/// The matrix of the same axes and the absolute values.
+/// Matrix with equal axes and the absolute eigenvalues.
 fn magnitude(hessian: Hessian) -> Hessian {
     let Eigen2 { values: [large, small], axis: [x, y] } =
         symmetric2(|x| x, [hessian.xx, hessian.xy, hessian.yy]);

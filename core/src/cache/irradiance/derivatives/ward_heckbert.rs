@@ -1,6 +1,6 @@
-//! Gradients as of Ward and Heckbert (1992), carried over from polar strata to those of the concentric map: a
-//! border between strata moves with the nearer of both, and is as long and as high as at its middle. No
-//! second order. For comparison.
+//! Gradients of Ward and Heckbert (1992), transferred from polar strata to those of the concentric map: a
+//! border between strata moves with the nearer of both, and has the length and height of its midpoint. First
+//! order only. For comparison.
 
 use super::{Derivatives, rotation_by_samples};
 use crate::Rgb;
@@ -23,7 +23,7 @@ pub fn ward_heckbert(hemisphere: &Hemisphere) -> Derivatives {
         let (Some((l, u)), Some((m, v))) = (stratum(here.0, here.1), stratum(there.0, there.1)) else {
             return;
         };
-        // cos of the middle, times length times normal.
+        // Cosine of the midpoint, times length, times normal.
         let border = 0.5 * (a.z + b.z) * a.cross(b).truncate();
         for (sum, jump) in gradient.iter_mut().zip((l - m).to_array()) {
             *sum += jump * u.max(v) * border;
