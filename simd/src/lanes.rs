@@ -236,7 +236,7 @@ pub trait Simd: Copy {
         axes: [usize; 3],
     ) -> Option<[[Self::F8; 3]; 3]>;
 
-    /// First triangle of [`Simd::load8x9`] in all of sixteen lanes: the floats at the start of its runs.
+    /// One triangle of [`Simd::load8x9`] in all of sixteen lanes: the first float of each run.
     fn splat16x9(
         self,
         values: &[f32],

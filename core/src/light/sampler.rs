@@ -387,7 +387,7 @@ fn sample_emitter(
     Some(LightSample { distance, target: Some(target), ..LightSample::far(direction, radiance, pdf, 0) })
 }
 
-/// True if light from `direction` reaches the front of a surface with `normal`.
+/// True if light from `direction` reaches the front of a surface with `normal`, or if `normal` is zero.
 #[inline]
 fn faces(normal: Vec3, direction: Vec3) -> bool {
     normal == Vec3::ZERO || normal.dot(direction) > 0.0

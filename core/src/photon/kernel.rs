@@ -5,7 +5,7 @@ use glam::Vec3;
 /// Weight of a photon by its distance d from the centre of a disc of radius r. Its mean over the disc is one.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Kernel {
-    /// 1.
+    /// Weight 1 everywhere.
     Constant,
     /// 3 (1 - d / r).
     Cone,

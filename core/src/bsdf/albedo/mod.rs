@@ -107,8 +107,8 @@ impl SchlickAlbedo {
     }
 }
 
-/// Transmittance at the cosine `c` of a dielectric coat of index `eta` >= 1; exact for the smooth coat, alpha
-/// 0.
+/// Transmittance at the cosine `c` of a dielectric coat of index `eta` >= 1; exact for alpha 0, the smooth
+/// coat.
 #[inline]
 pub(super) fn transmittance(c: f32, alpha: f32, eta: f32) -> f32 {
     let smooth = 1.0 - fresnel::dielectric(c, eta);

@@ -82,7 +82,7 @@ impl<'m> GuideStats<'m> {
     }
 
     /// Sends a share of the photons of all light evenly over the cells of each light, by the light's total
-    /// benefit. Few photons taught the single cells.
+    /// benefit. The benefit of a single cell rests on few photons.
     pub fn even_out(&mut self, emission: &EmissionSampler) {
         let of_light = (self.side * self.side).max(1);
         let lights = self.aimed.chunks_mut(of_light).zip(self.learned.chunks(of_light));

@@ -195,8 +195,8 @@ impl Kernel for Follow<'_> {
     }
 }
 
-/// Prefix sums of `weights`, in ascending order. Sums differ where the weight is not zero and rounding does
-/// not swallow it; a weight of zero leaves the sum unchanged.
+/// Prefix sums of `weights`, in ascending order. A sum exceeds the previous sum if its weight is not zero
+/// and survives rounding; a weight of zero leaves the sum unchanged.
 #[inline(always)]
 fn ends(&[a, b, c, d, e, f, g, h]: &[f32; GROUPS]) -> [f32; GROUPS] {
     let two = a + b;

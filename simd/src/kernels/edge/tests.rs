@@ -10,9 +10,9 @@ use std::vec::Vec;
 /// Root mean square error of a row's triangles, relative to that of the expected values.
 const TOLERANCE: f64 = 1e-5;
 /// Angle (radians) below which a triangle's edges cancel so far that the rounding of its directions
-/// dominates:
+/// dominates.
 const NARROW: f64 = 0.02;
-/// then the error is at most this times eps over the angle.
+/// Largest error of triangles narrower than `NARROW`, in units of eps over the angle.
 const ROUNDING: f64 = 10.0;
 /// Triangles of a row.
 const COUNT: usize = 300;
