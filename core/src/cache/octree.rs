@@ -110,7 +110,7 @@ impl<'m> Octree<'m> {
         scaled.to_array().map(|x| (x as u32).min((1 << DEPTH) - 1))
     }
 
-    /// Whether there is memory for the links of another record.
+    /// True if there is memory for the links of another record.
     pub(super) fn has_room(&self) -> bool {
         self.links.len() - self.used_links >= LINKS
     }

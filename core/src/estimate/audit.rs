@@ -139,7 +139,7 @@ impl BiasEstimate {
         (self.relmse - 2.0 * (self.upper - self.relmse)).max(0.0)
     }
 
-    /// Whether the bias is significant at a level of 2.5 %.
+    /// True if the bias is significant at a level of 2.5 %.
     pub fn is_found(&self) -> bool {
         self.relmse > self.detectable
     }

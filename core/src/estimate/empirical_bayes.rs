@@ -84,7 +84,7 @@ impl core::ops::AddAssign<&Self> for BrightnessClasses {
 }
 
 impl BrightnessClasses {
-    /// Whether to learn from tile `tile` of `count`: all tiles of small pictures, otherwise [`ENOUGH`] tiles,
+    /// True for each tile `tile` of `count` to learn from: all of small pictures, otherwise 64 tiles,
     /// spread evenly by multiples of the golden ratio for any width.
     pub fn asks(tile: usize, count: usize) -> bool {
         let turns = (tile as u32).wrapping_mul(0x9e37_79b9);
@@ -132,7 +132,7 @@ impl BrightnessClasses {
                 ((libm::sqrt(1.0 + middle) - 1.0) / middle, 0.0, 1.0)
             };
             let believed = ((other + PRIOR * before) / (own + PRIOR)).clamp(least, 1.0);
-            // Where light is rare V is nearly proportional to R, so that the mean of V / R² is the mean of V
+            // V of rare light is nearly proportional to R, so that the mean of V / R² is the mean of V
             // times ⟨R²⟩ / ⟨R⟩⁴.
             let there = 1.0 + sign * middle * believed * own / pixels.max(1.0);
             let spread = middle * middle * (other_squared - believed * believed * own_squared)

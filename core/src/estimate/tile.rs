@@ -147,7 +147,7 @@ impl TileError {
     }
 }
 
-/// Sums tiles whose errors are correlated to one.
+/// Sum over tiles; a region of tiles with correlated errors is such a sum.
 impl core::ops::AddAssign for TileError {
     fn add_assign(&mut self, other: Self) {
         self.values += other.values;

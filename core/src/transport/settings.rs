@@ -20,7 +20,7 @@ pub struct PathSettings {
 }
 
 impl PathSettings {
-    /// Whether the depth of paths is limited.
+    /// True if the depth of paths is limited.
     pub fn is_limited(&self) -> bool {
         self.max_depth != UNLIMITED
     }

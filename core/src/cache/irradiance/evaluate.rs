@@ -26,7 +26,7 @@ impl Record {
         is_valid.then(|| (Rgb::from(self.extrapolate(One, &weight)), weight.weight))
     }
 
-    /// Whether the record covers the point.
+    /// True if the record covers the point.
     #[inline]
     pub fn covers(&self, point: &QueryPoint, least_cos: f32) -> bool {
         self.weigh(One, &Query::of(point), least_cos, 1.0).0
@@ -134,13 +134,13 @@ impl Record {
         Vec3::from(self.normal).cross(Vec3::from(self.axis))
     }
 
-    /// Whether any sector has a wall within the support.
+    /// True if any sector has a wall within the support.
     #[inline(always)]
     fn is_fenced(&self) -> bool {
         self.fence != [u8::MAX; SECTORS]
     }
 
-    /// Whether a wall separates points at `place` along the axes from the record.
+    /// True for points at `place` along the axes that a wall separates from the record.
     #[inline(always)]
     fn is_fenced_off<W: Width>(&self, width: W, place: [W::L; 2]) -> <W::L as Lanes>::Mask {
         let free = width.pick(&self.fence, sector(width, place));
@@ -149,7 +149,7 @@ impl Record {
         free.lt(width.all(f32::from(u8::MAX))) & (distance * distance).lt(x * x + y * y)
     }
 
-    /// Whether no overhang is close above any point of the support.
+    /// True if no overhang is close above any point of the support.
     #[inline(always)]
     pub(super) fn is_free(&self) -> bool {
         self.free == [u8::MAX; SECTORS]

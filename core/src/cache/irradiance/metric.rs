@@ -60,12 +60,12 @@ impl Metric {
         Metric::ALL.into_iter().find(|metric| metric.name() == name)
     }
 
-    /// Whether the allowed error is a radius over a distance.
+    /// True if the allowed error is a radius over a distance.
     pub const fn takes_distances(self) -> bool {
         matches!(self, Metric::SplitSphere | Metric::BoundedSplitSphere | Metric::MinDistance)
     }
 
-    /// Whether the metric needs the normals of the hits.
+    /// True if the metric needs the normals of the hits.
     pub const fn takes_normals(self) -> bool {
         matches!(self, Metric::RadiometricHessian | Metric::GeometricHessian)
     }

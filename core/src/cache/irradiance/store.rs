@@ -69,7 +69,7 @@ impl<'m> IrradianceCache<'m> {
         self.records.len()
     }
 
-    /// Whether there is no memory for another record.
+    /// True if there is no memory for another record.
     pub fn is_full(&self) -> bool {
         self.used == self.records.len()
     }
@@ -146,7 +146,7 @@ impl<'m> IrradianceCache<'m> {
         });
     }
 
-    /// Whether a record covers the point. If the height of overhangs above the point is unknown (`within` is
+    /// True if a record covers the point. If the height of overhangs above the point is unknown (`within` is
     /// infinite), the record must be valid for any height.
     #[inline]
     pub fn covers(&self, point: &QueryPoint) -> bool {

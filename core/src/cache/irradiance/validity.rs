@@ -78,8 +78,7 @@ pub fn validity(settings: &Settings, derivatives: &Derivatives) -> Validity {
     let second = lit && settings.metric == Metric::Halflight;
     let overlap = if settings.metric == Metric::Halflight { OVERLAP } else { 1.0 };
     let bend = [0, 1].map(|k| {
-        // Where radii exceed those of the curvature, the second order changes the irradiance by at most its
-        // own value.
+        // Radii may exceed those of the curvature: the second order changes the irradiance by at most itself.
         let most = 2.0 / (overlap * radii[k] * overlap * radii[k]);
         let bend = shares[k] * shares[k] * signed[k] / irradiance;
         if second && bend.is_finite() { bend.max(-most).min(most) } else { 0.0 }

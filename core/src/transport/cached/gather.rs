@@ -59,7 +59,7 @@ impl GatherPoint {
         within: f32::INFINITY,
     };
 
-    /// Whether this is a point.
+    /// True if this is a point.
     pub fn is_some(&self) -> bool {
         self.triangle != MISS
     }
@@ -87,7 +87,7 @@ impl GatherPoint {
         QueryPoint { position: self.position(), normal: self.normal(), within: self.within }
     }
 
-    /// Whether an overhang is so close that records with radii of `pixels` pixels are too coarse.
+    /// True if an overhang is so close that records with radii of `pixels` pixels are too coarse.
     pub fn is_confined(&self, pixels: f32) -> bool {
         self.within < FINE * pixels * self.pixel
     }

@@ -80,7 +80,7 @@ fn headroom<F: Features>(context: &SceneContext<F>, probe: &Probe) -> f32 {
     hanging.map(|hit| hit.t).fold(f32::INFINITY, f32::min)
 }
 
-/// Whether `hit` is an overhang above a surface with this `normal`, and occludes light. Glass and cut-outs do
+/// True if `hit` is an overhang above a surface with this `normal`, and occludes light. Glass and cut-outs do
 /// not.
 fn hangs<F>(context: &SceneContext<F>, hit: &Hit, normal: Vec3) -> bool {
     let mesh = &context.scene.mesh;

@@ -112,7 +112,7 @@ impl<F: Features, E: Estimator<F>> PathIntegrator<'_, F, E> {
         }
     }
 
-    /// Whether the scene may have rough surfaces.
+    /// True if the scene may have rough surfaces.
     pub fn has_rough_surfaces(&self) -> bool {
         self.context.scene.materials.iter().any(|material| material.surface.may_be_rough())
     }

@@ -31,11 +31,11 @@ pub struct Rest {
     pub(in crate::transport) wide: Option<Components>,
     /// Classes behind a mirror or a narrow coat.
     pub(in crate::transport) narrow: Components,
-    /// Whether the estimator supplies direct light, except through a narrow coat.
+    /// True if the estimator supplies direct light, except through a narrow coat.
     pub(in crate::transport) is_lit: bool,
     /// Number of light samples of next-event estimation.
     pub(in crate::transport) light_samples: u32,
-    /// Whether next-event estimation finds all of the rest, so that the path ends.
+    /// True if next-event estimation finds all of the rest, so that the path ends.
     pub(in crate::transport) ends: bool,
 }
 
@@ -81,7 +81,7 @@ pub trait Estimator<F: Features>: Copy + Send + Sync {
     type State: Pod;
     /// Result of the lookup for a vertex.
     type Found: Copy + Default;
-    /// Whether the estimator supplies light of the bases of narrow coats only, so that these coats are
+    /// True if the estimator supplies light of the bases of narrow coats only, so that these coats are
     /// sampled separately.
     const SEPARATES_COATS: bool = false;
 

@@ -95,7 +95,7 @@ impl<'a, F: Features, E: Estimator<F>, R: Sharing> PathIntegrator<'a, F, E, R> {
         PathIntegrator { context, settings, estimator, sharing }
     }
 
-    /// Whether the depth of paths is limited.
+    /// True if the depth of paths is limited.
     pub fn is_limited(&self) -> bool {
         self.settings.is_limited()
     }

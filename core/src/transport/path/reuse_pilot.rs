@@ -91,7 +91,7 @@ impl Pilot {
         (self.rays + if shared { self.connections } else { 0.0 }) / self.samples.max(1.0)
     }
 
-    /// Whether sharing pays.
+    /// True if sharing pays.
     pub fn pays(&self) -> bool {
         self.gain() > self.cost()
     }

@@ -11,13 +11,13 @@ use crate::transport::walk::context::SceneContext;
 use crate::transport::wavefront::{PathState, Wavefront};
 use bytemuck::{Pod, Zeroable};
 
-/// Sharing rule of the light of paths. By default each pixel receives the light of its own path.
+/// Sharing rule of the light of paths. Each pixel receives the light of its own path by default.
 pub trait Sharing: Copy + Send + Sync {
     /// State per path.
     type State: Pod;
     /// Pair of paths, one of which receives light of the other.
     type Pair: Pod;
-    /// Whether the pixels of a circle are sampled together.
+    /// True if the pixels of a circle are sampled together.
     const IN_CIRCLES: bool = false;
 
     /// State at the start of a path. All paths of a circle have the same number `circle`.
@@ -34,7 +34,7 @@ pub trait Sharing: Copy + Send + Sync {
     #[inline]
     fn arrive(_state: &mut Self::State, _point: &SurfacePoint, _bsdf: &Bsdf, _path: &mut PathState) {}
 
-    /// Whether an estimator may connect the current vertex of the path.
+    /// True if an estimator may connect the current vertex of the path.
     #[inline]
     fn may_connect(_state: &Self::State) -> bool {
         true

@@ -85,7 +85,7 @@ impl View {
         Self { eye: camera.eye, axis, cos, sin: libm::sqrtf((1.0 - cos * cos).max(0.0)) }
     }
 
-    /// Whether the sphere overlaps the cone.
+    /// True if the sphere overlaps the cone.
     fn meets(&self, center: Vec3, radius: f32) -> bool {
         let to = center - self.eye;
         let distance = to.length();
@@ -144,7 +144,7 @@ pub(in crate::transport) fn outlined(
     pixels
 }
 
-/// Whether [`outlined`] has the pixel in column `x` and row `y`.
+/// True if [`outlined`] has the pixel in column `x` and row `y`.
 pub(in crate::transport) fn is_outlined(
     scene: &Scene,
     lights: &LightSampler,

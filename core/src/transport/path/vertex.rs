@@ -30,7 +30,7 @@ pub struct PathVertex<'v, 'a> {
     pub(in crate::transport) travelled: f32,
     /// β, the throughput of the path so far.
     pub(in crate::transport) throughput: Rgb,
-    /// Whether an estimator supplies light of the base only, so that the narrow coat is sampled separately.
+    /// True if an estimator supplies light of the base only, so that the narrow coat is sampled separately.
     pub(in crate::transport) apart: bool,
     /// Classes of light that the path had to find on its last segment.
     pub(in crate::transport) came: Components,

@@ -48,7 +48,7 @@ pub struct PhotonLight<'a> {
     map: &'a PhotonMap<'a>,
     discs: RadiusSchedule,
     kernel: Kernel,
-    /// Whether most discs hold no photon, so that a disc is first tested for photons.
+    /// True if most discs hold no photon, so that a disc is first tested for photons.
     is_sparse: bool,
     /// Number of photons that a disc needs.
     enough: f32,

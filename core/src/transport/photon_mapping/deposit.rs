@@ -37,7 +37,7 @@ pub enum PhotonFilter {
 }
 
 impl PhotonFilter {
-    /// Whether the path stores a photon at `vertex`.
+    /// True if the path stores a photon at `vertex`.
     #[inline]
     pub(in crate::transport) fn leaves(self, state: &LightPathState, vertex: &Vertex) -> bool {
         vertex.bsdf.stores_photons()

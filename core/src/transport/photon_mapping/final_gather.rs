@@ -236,7 +236,7 @@ impl<'a, F: Features> PathIntegrator<'a, F> {
     }
 }
 
-/// Whether a material of `scene` may cast caustics.
+/// True if a material of `scene` may cast caustics.
 pub fn may_have_caustics(scene: &Scene) -> bool {
     scene.materials.iter().any(Material::may_be_caustic_caster)
 }

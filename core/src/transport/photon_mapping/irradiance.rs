@@ -98,7 +98,7 @@ impl<'a> PrecomputedIrradiance<'a> {
         Photon::new(place, tells, normal, density.radiance)
     }
 
-    /// Whether the light of the nearest photons on `disc` is even around its centre.
+    /// True if the light of the nearest photons on `disc` is even around its centre.
     fn is_even(&self, disc: &QueryDisc, neighbours: &Neighbours) -> bool {
         let (mut sum, mut moment) = (0.0, Vec3::ZERO);
         for photon in neighbours.iter().filter_map(|(index, _)| self.global.get(index)) {

@@ -29,7 +29,7 @@ pub struct VisiblePointSampler {
     frame: [u32; 2],
     /// Distance between rays, in pixels.
     step: u32,
-    /// Whether the points are the hits of gather rays from the visible points.
+    /// True if the points are the hits of gather rays from the visible points.
     gathers: bool,
 }
 
@@ -151,7 +151,7 @@ impl<'a> VisiblePoints<'a> {
         Self { map, reach: Reach::Everywhere(radius), level }
     }
 
-    /// Whether a photon at `place`, on a surface with this `normal`, is visible.
+    /// True if a photon at `place`, on a surface with this `normal`, is visible.
     pub(in crate::transport) fn shows(&self, place: Vec3, normal: Vec3) -> bool {
         let radius = match self.reach {
             Reach::RadiusSchedule(discs) => discs.radius(place),

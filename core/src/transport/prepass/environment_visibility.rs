@@ -89,7 +89,7 @@ impl WindowGain {
         if self.after > 0.0 { (self.before / self.after) as f32 } else { 1.0 }
     }
 
-    /// Whether the environment should be sampled by visibility tables.
+    /// True if the environment should be sampled by visibility tables.
     pub fn pays(&self) -> bool {
         self.before > LEAST_GAIN * self.after
     }

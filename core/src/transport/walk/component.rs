@@ -53,13 +53,13 @@ impl Components {
         Self(self.0 & other.0)
     }
 
-    /// Whether the path ends at `bsdf`, because the set holds no light that `bsdf` reflects or transmits.
+    /// True if the path ends at `bsdf`, because the set holds no light that `bsdf` reflects or transmits.
     #[inline]
     pub(in crate::transport) fn ends_at(self, bsdf: &Bsdf) -> bool {
         !self.has(if bsdf.is_delta() { SPECULAR } else { ROUGH })
     }
 
-    /// Whether the set holds light that non-specular surfaces reflect.
+    /// True if the set holds light that non-specular surfaces reflect.
     #[inline]
     pub(in crate::transport) fn goes_on_from_rough(self) -> bool {
         self.has(ROUGH)
@@ -71,25 +71,25 @@ impl Components {
         if self.has(BEHIND_SPECULAR) && bsdf.is_delta() { self } else { Self::ALL }
     }
 
-    /// Whether the set holds light of the environment.
+    /// True if the set holds light of the environment.
     #[inline]
     pub(in crate::transport) fn has_environment(self) -> bool {
         self.has(ENVIRONMENT)
     }
 
-    /// Whether the set holds emission of surfaces.
+    /// True if the set holds emission of surfaces.
     #[inline]
     pub(in crate::transport) fn has_emission(self) -> bool {
         self.has(EMISSION)
     }
 
-    /// Whether photons supply the caustics.
+    /// True if photons supply the caustics.
     #[inline]
     pub(in crate::transport) fn leaves_caustics(self) -> bool {
         self == Self::NO_CAUSTIC || self == Self::BEHIND_MIRROR
     }
 
-    /// Whether the path may end in a photon map.
+    /// True if the path may end in a photon map.
     #[inline]
     pub(in crate::transport) fn is_gathered(self) -> bool {
         self.has(GATHERED)

@@ -22,9 +22,9 @@ pub struct SceneContext<'a, F> {
     pub lights: &'a LightSampler<'a>,
     /// Highest instruction set to use.
     pub level: Level,
-    /// Whether a surface may have an opacity below 1, so that shadow rays continue behind a hit.
+    /// True if a surface may have an opacity below 1, so that shadow rays continue behind a hit.
     pub(in crate::transport) has_cutouts: bool,
-    /// Whether a surface may reflect or refract in a single direction only.
+    /// True if a surface may reflect or refract in a single direction only.
     pub(in crate::transport) has_mirrors: bool,
     features: PhantomData<F>,
 }
@@ -85,7 +85,7 @@ impl<'a, F: Features> SceneContext<'a, F> {
         Bsdf::at::<F>(self.scene, point.material, point.uv, point.front)
     }
 
-    /// Whether photons are stored only on the bases of narrow coats ([`Bsdf::is_varnished`]), whose coats are
+    /// True if photons are stored only on the bases of narrow coats ([`Bsdf::is_varnished`]), whose coats are
     /// then sampled separately. Paths that leave by a coat have to find all light; they cannot find point and
     /// directional lights behind mirrors and smooth glass.
     #[inline]
@@ -93,7 +93,7 @@ impl<'a, F: Features> SceneContext<'a, F> {
         !(self.has_mirrors && self.lights.have_deltas())
     }
 
-    /// Whether a ray from triangle `left` skips `point`: a cut-out whose opacity does not exceed `random`
+    /// True if a ray from triangle `left` skips `point`: a cut-out whose opacity does not exceed `random`
     /// (evaluated for cut-outs only), or the ray's own triangle, hit by rounding.
     #[inline]
     pub(in crate::transport) fn is_passed(

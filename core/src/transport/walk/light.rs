@@ -111,7 +111,7 @@ impl Vertex<'_> {
 pub(in crate::transport) struct Continuation {
     /// Upper bound of the continuation probability.
     pub most: f32,
-    /// Whether the path survives only if it scatters by a delta function or by a coat alone.
+    /// True if the path survives only if it scatters by a delta function or by a coat alone.
     pub mirrored: bool,
 }
 
@@ -130,7 +130,7 @@ pub(in crate::transport) trait Visitor {
         counters: &mut Counters,
     ) -> Option<Continuation>;
 
-    /// Whether the path samples the base or the coat of `vertex` separately.
+    /// True if the path samples the base or the coat of `vertex` separately.
     #[inline]
     fn is_apart(&self, _state: &LightPathState, _vertex: &Vertex) -> bool {
         false

@@ -54,7 +54,7 @@ pub(in crate::transport) struct ChainLink<'p> {
     /// Local direction on the side of the BSDF.
     pub(in crate::transport) near: Vec3,
     pub(in crate::transport) far: Vec3,
-    /// Whether only the coat scatters.
+    /// True if only the coat scatters.
     pub(in crate::transport) coat_alone: bool,
 }
 

@@ -14,7 +14,7 @@ pub(in crate::transport) const MAX_VERTICES: u32 = 1 << 13;
 /// much of the light. A light guide has a hundred reflections.
 const TRAPPED_FROM: u32 = 256;
 
-/// Whether a path is cut, and so unfinished, at the vertex that ends segment `segments` and that it leaves by
+/// True if a path is cut, and so unfinished, at the vertex that ends segment `segments` and that it leaves by
 /// `sample` of `bsdf`.
 #[inline]
 pub(in crate::transport) fn is_cut(segments: u32, bsdf: &Bsdf, sample: &BsdfSample) -> bool {
