@@ -158,9 +158,9 @@ fn ends(estimate: f64, error: f64) -> [f64; 2] {
     [lower * error, upper * error]
 }
 
-/// Number of standard errors that an estimated mean exceeds the true mean by with a probability of 2.5 %
-/// (Hall 1992, On the removal of skewness by transformation). High outliers enlarge both the mean and its
-/// standard error, so that the number falls with skewness. `skewness` is the sum of third moments over the
+/// 97.5 % quantile of the error of an estimated mean, in standard errors (Hall 1992, On the removal of
+/// skewness by transformation). High outliers enlarge both the mean and its standard error, so that the
+/// quantile falls with skewness. `skewness` is the sum of third moments over the
 /// sum of second moments to the power 3/2, from −1 to 1.
 fn studentised(skewness: f64) -> f64 {
     // For equal findings the skewness is mere rounding.

@@ -1,22 +1,22 @@
 //! Error of a picture from itself: relMSE and its 95 % interval (docs/decisions/0009, 0035).
 //!
-//! The plain algorithm: half-films A and B are independent and unbiased, so that ((A − B) / 2)² has the variance
-//! of their mean I as mean; its mean over pixels, over I² + 0.01 m², is the relMSE. Departures:
+//! The plain algorithm: half-films A and B are independent and unbiased, so that ((A − B) / 2)² has the
+//! variance of their mean I as mean; its mean over pixels, over I² + 0.01 m², is the relMSE. Departures:
 //! 1. I is not R. A firefly enlarges its own denominator and hides itself; where samples missed light the
-//!    denominator is too small. Denominators are therefore class means ([`super::Shrinkage`]), and quotients are
-//!    averaged over the denominators of both pairs of quarters.
-//! 2. The remaining error shows if numerator and denominator are independent: the variance of one pair over the
-//!    squared R of the *other* is too large, since where light is rare a large variance meets a small R. The
-//!    error lies in between: with δ the logarithm of their quotient, the logarithm of the estimate rises by
-//!    δ / (1 + 10 δ), with an uncertainty from no rise to all of δ. The correction for pixels whose R is
+//!    denominator is too small. Denominators are therefore class means ([`super::Shrinkage`]), and quotients
+//!    are averaged over the denominators of both pairs of quarters.
+//! 2. The remaining error shows if numerator and denominator are independent: the variance of one pair over
+//!    the squared R of the *other* is too large, since where light is rare a large variance meets a small R.
+//!    The error lies in between: with δ the logarithm of their quotient, the logarithm of the estimate rises
+//!    by δ / (1 + 10 δ), with an uncertainty from no rise to all of δ. The correction for pixels whose R is
 //!    uncertain has its own size as uncertainty in both directions.
-//! 3. The error of this picture minus its estimate is exactly the mean product of the errors of both halves. For
-//!    a pixel of variance V the product has the variance 4 V², and the squared estimate the mean 3 V² (more with
-//!    heavy tails). Student's t accounts for few pixels. The correlation of errors between pixels that share
-//!    paths, and within a region where all is shared, shows in the differences of the halves. The upper end is
-//!    nearer if single samples have the noise: the error of a pixel with a firefly hardly exceeds its variance,
-//!    if such pixels are many. If they are few, the lower end is at most the error if all fireflies were
-//!    legitimate light.
+//! 3. The error of this picture minus its estimate is exactly the mean product of the errors of both halves.
+//!    For a pixel of variance V the product has the variance 4 V², and the squared estimate the mean 3 V²
+//!    (more with heavy tails). Student's t accounts for few pixels. The correlation of errors between pixels
+//!    that share paths, and within a region where all is shared, shows in the differences of the halves. The
+//!    upper end is nearer if single samples have the noise: the error of a pixel with a firefly hardly
+//!    exceeds its variance, if such pixels are many. If they are few, the lower end is at most the error if
+//!    all fireflies were legitimate light.
 //!
 //! The price: about a tenth of the time of a sample per pixel.
 

@@ -1,8 +1,8 @@
 //! Irradiance record: irradiance at one point, its derivatives, and its region of validity.
 //!
 //! A record covers an ellipsoid with the radii R1 ≤ R2 of an error metric along the surface, and R1 across it
-//! (Schwarzhaupt, Jensen and Jarosz 2012, §5). Its support may be wider, by the overlap that the metric allows. A
-//! boundary excludes points behind walls from both.
+//! (Schwarzhaupt, Jensen and Jarosz 2012, §5). Its support may be wider, by the overlap that the metric
+//! allows. A boundary excludes points behind walls from both.
 
 use super::lanes::{One, Width};
 use super::{Derivatives, Validity};

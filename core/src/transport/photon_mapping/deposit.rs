@@ -4,9 +4,9 @@
 //! shadow rays find direct light; all light; or caustics alone. `walk/light.rs` traces the paths.
 //!
 //! Departures from the plain algorithm:
-//! 1. After a photon is stored, the continuation probability is at most [`MAX_CONTINUATION`]. A path then stores
-//!    at most five photons on average in any scene, so that [`ROOM`] for a task is enough: an overflow is 14
-//!    standard deviations above the mean, more survivals than any sequence of random numbers contains.
+//! 1. After a photon is stored, the continuation probability is at most [`MAX_CONTINUATION`]. A path then
+//!    stores at most five photons on average in any scene, so that [`ROOM`] for a task is enough: an overflow
+//!    is 14 standard deviations above the mean, more survivals than any sequence of random numbers contains.
 //! 2. The price: on surfaces of higher albedo, photons differ in power.
 
 use crate::bsdf::Features;

@@ -175,7 +175,7 @@ impl PhotonMaps<'_> {
         let PathVertex { point, ref bsdf, wo, came, segments, distance, travelled, .. } = *vertex;
         let is_limited = settings.is_limited();
         let turns = vertex.sampler.single(dimension::PROBES + segments);
-        // A path that may end in the map keeps this right behind the vertex.
+        // A path that may end in the map still may after this vertex.
         let all = Rest::of(if came.is_gathered() { Components::GATHERED } else { Components::ALL });
         if !bsdf.gathers_photons(context.separates_coats()) {
             if came.leaves_caustics() && bsdf.is_caustic_caster() {

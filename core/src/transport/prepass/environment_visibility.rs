@@ -1,10 +1,10 @@
-//! Prepass that learns the [`EnvironmentVisibility`]: the part of the environment that each place of the scene
-//! sees. The environment is then sampled by these tables.
+//! Prepass that learns the [`EnvironmentVisibility`]: the part of the environment that each place of the
+//! scene sees. The environment is then sampled by these tables.
 //!
 //! 1. A few camera paths over the whole picture store a vertex at each scattering surface.
 //! 2. Vertices are sorted by place: a cell of a grid and the side that the surface faces.
-//! 3. Rays go from the vertices of each place, in turn, to the bins of the environment: one to every other bin,
-//!    then several to each bin near visible light.
+//! 3. Rays go from the vertices of each place, in turn, to the bins of the environment: one to every other
+//!    bin, then several to each bin near visible light.
 //!
 //! Visibility tables pay if most of the environment is hidden, as in a room, and cost a little otherwise. The
 //! same rays estimate the gain.

@@ -66,7 +66,7 @@ pub(in crate::transport) struct LightPathState {
     /// Root of the sum of squared pdfs of the techniques of path tracing, over the pdf of the technique of
     /// `chain`: 1 if that is the only technique, 0 if there is none.
     pub others: f32,
-    /// 1 if the last surface scatters by a delta function only; for bidirectional paths, also if narrowly.
+    /// 1 if the last surface is purely specular; for bidirectional paths, also if it scatters narrowly.
     pub mirrored: u32,
     /// Product of the continuation probabilities so far.
     survived: f32,
