@@ -10,7 +10,7 @@ use bytemuck::{Pod, Zeroable};
 const BRIGHTEST: f32 = 79_228_162_514_264_337_593_543_950_336.0;
 
 /// Sum of half of the samples, in two parts. Each addition keeps its rounding error (Neumaier 1974), so that
-/// a million samples in f32 are as precise as in f64.
+/// a million samples in f32 are as precise as with twice the bits.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct Half {
@@ -25,7 +25,7 @@ impl Half {
     fn add(&mut self, part: usize, sample: Rgb) {
         let part = part & 1;
         for ((sum, lost), x) in self.sums[part].iter_mut().zip(&mut self.lost).zip(sample.to_array()) {
-            // Knuth's two-sum: exact in either order of magnitude.
+            // Knuth's two-sum: exact whichever operand is larger.
             let total = *sum + x;
             let back = total - *sum;
             *lost += (*sum - (total - back)) + (x - back);

@@ -28,12 +28,12 @@ pub struct SurfacePoint<'a> {
     pub triangle: u32,
 }
 
-/// Unit of the error bound, in rounding errors: five for the sum of three products, as many for the tracer's
-/// differences and shears, and one for the offset itself, rounded up.
+/// Relative error bound, 16 half units in the last place: five roundings of the sum of three products, as many
+/// of the tracer's differences and shears, and one of the offset itself, rounded up.
 const ERROR_UNITS: f32 = 16.0 * 0.5 * f32::EPSILON;
 
 /// Upper limit of slenderness, so that needles do not move rays too far. The error of the tracer's distances
-/// is the length of a triangle times its slenderness.
+/// grows with the length of a triangle times its slenderness.
 const SLENDEREST: f32 = 16.0;
 
 /// Squares outside this range lose bits to underflow or overflow.
