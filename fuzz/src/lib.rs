@@ -2,10 +2,12 @@
 //! panics on an error and otherwise returns.
 #![forbid(unsafe_code)]
 
+pub mod bidirectional;
 pub mod bsdf;
 pub mod bvh;
 #[cfg(feature = "app")]
 pub mod cache_file;
+pub mod chains;
 pub mod derivatives;
 #[cfg(feature = "app")]
 pub mod image_input;
@@ -19,9 +21,11 @@ mod numbers;
 pub mod obj;
 pub mod photons;
 pub mod records;
+mod rooms;
 pub mod sampling;
 #[cfg(feature = "app")]
 pub mod scene_file;
+pub mod splats;
 
 /// A fuzz target: name and function.
 pub struct Target {
@@ -33,10 +37,12 @@ pub struct Target {
 
 /// Every target.
 pub const TARGETS: &[Target] = &[
+    Target { name: "bidirectional", run: bidirectional::run },
     Target { name: "bsdf", run: bsdf::run },
     Target { name: "bvh", run: bvh::run },
     #[cfg(feature = "app")]
     Target { name: "cache_file", run: cache_file::run },
+    Target { name: "chains", run: chains::run },
     Target { name: "derivatives", run: derivatives::run },
     #[cfg(feature = "app")]
     Target { name: "image_input", run: image_input::run },
@@ -52,4 +58,5 @@ pub const TARGETS: &[Target] = &[
     Target { name: "sampling", run: sampling::run },
     #[cfg(feature = "app")]
     Target { name: "scene_file", run: scene_file::run },
+    Target { name: "splats", run: splats::run },
 ];

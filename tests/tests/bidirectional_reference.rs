@@ -41,6 +41,7 @@ struct Compared {
 impl Compared {
     fn add(&mut self, found: Rgb, expected: Rgb) {
         self.values += 1;
+        assert!(found.is_finite() && expected.is_finite());
         let error = (found - expected).abs().max_element() / expected.max_element().max(1e-6);
         self.worst = self.worst.max(error);
         self.wrong += usize::from(error > ROUNDING);

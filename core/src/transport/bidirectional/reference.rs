@@ -109,7 +109,8 @@ impl<'a> Reference<'a> {
         let radiance = light.power[count - 1] * value * (pixels * geometry * weight);
         let target = lens_point(camera, lens, point.position, &seen);
         let radiance = context.transmit(point.spawn_to(target), radiance, &mut 0)?;
-        (radiance.max_element() > 0.0).then_some((raster.map(|at| at as u32), radiance))
+        (radiance.max_element() > 0.0 && radiance.is_finite())
+            .then_some((raster.map(|at| at as u32), radiance))
     }
 
     /// The light of sample `sample` of the pixel in column `x` and row `y`, without splats: by hits, light
@@ -217,7 +218,8 @@ impl<'a> Reference<'a> {
         };
         let weight = Path::joined(end, &[], vertices, lens).map_or(0.0, |path| self.weight(&path, 1));
         let arrives = throughput * value * light.radiance * (weight / light.pdf);
-        shadow_ray(point, &light).and_then(|ray| context.transmit(ray, arrives, &mut 0)).unwrap_or_default()
+        let arrives = shadow_ray(point, &light).and_then(|ray| context.transmit(ray, arrives, &mut 0));
+        arrives.filter(|light| light.is_finite()).unwrap_or_default()
     }
 
     fn connections(
@@ -235,7 +237,7 @@ impl<'a> Reference<'a> {
             self.connection(here, vertices, paths.get(path)?, end)
         };
         let sum: Rgb = (0..count).filter_map(one).sum();
-        sum * (stored.len() as f32 / count as f32)
+        sum * (stored.len() as f32 / count.max(1) as f32)
     }
 
     /// The connection of the camera's `vertices` with the `count`th vertex of a light path.
@@ -268,7 +270,7 @@ impl<'a> Reference<'a> {
         let geometry = cos(to_light) / cos(back) / other.position.distance_squared(point.position);
         let arrives = throughput * at_camera * light.power[count - 1] * at_light * (geometry * weight);
         let target = other.spawn(-to_light).origin;
-        context.transmit(point.spawn_to(target.into()), arrives, &mut 0)
+        context.transmit(point.spawn_to(target.into()), arrives, &mut 0).filter(|light| light.is_finite())
     }
 }
 
