@@ -1,5 +1,5 @@
-//! The store of light vertices, their splats and their photons, in any room: as many as a textbook follows one by
-//! one, and pixels and splats that are numbers; the light of both is the same.
+//! Light vertices, splats and photons of bidirectional path tracing in any room: as many vertices as the
+//! textbook stores, no NaN in pixels and splats, and equal sums of light.
 
 use crate::rooms::{arena, level, lines, with_room};
 use arbitrary::{Result, Unstructured};
@@ -16,7 +16,7 @@ use halflight_core::transport::bidirectional::vertex::LightVertex;
 use halflight_core::transport::{RadiusSchedule, SceneContext};
 use halflight_core::{Level, Rgb};
 
-/// Light paths of a sample at most.
+/// Most light paths of a sample.
 const PATHS: usize = 64;
 
 /// One input.
@@ -75,7 +75,7 @@ fn attempt(input: &mut Unstructured) -> Result<()> {
         let total = |film: &[[f32; 3]]| film.iter().map(|light| f64::from(light[1])).sum::<f64>();
         same(total(&film), total(&expected));
 
-        // Photons of merges.
+        // Photons for merging.
         let mut memory = lines(Photons::footprint(vertices.len().max(1)));
         let mut photons =
             Photons::new(vertices.len().max(1), &mut arena(&mut memory)).expect("it was granted");
@@ -105,7 +105,7 @@ fn attempt(input: &mut Unstructured) -> Result<()> {
             let radiance = reference.radiance([x, y], sample, &paths, (stored, connections));
             known = known.zip(radiance).map(|(known, radiance)| known + f64::from(radiance.y));
         }
-        // The textbook gathers no photons, and leaves out paths whose normals depend on their direction.
+        // The textbook merges no photons, and leaves out paths whose normals depend on their direction.
         if let (Some(known), true) = (known, radii.is_none()) {
             same(light, known);
         }
@@ -113,7 +113,7 @@ fn attempt(input: &mut Unstructured) -> Result<()> {
     })
 }
 
-/// Both sums of light agree, but for what rounding does to directions over short ways.
+/// Asserts equal sums of light, up to the rounding of directions over short segments.
 fn same(found: f64, expected: f64) {
     assert!((found - expected).abs() <= 2e-2 * expected.max(1e-20), "{found}, the textbook's {expected}");
 }

@@ -1,5 +1,5 @@
-//! Chains of Metropolis light transport in any room, of either kind of points: every mutation is worth one visit,
-//! starts are where cumulated densities say, and no splat leaves the film.
+//! Markov chains of Metropolis light transport in any room, in both primary sample spaces: each mutation adds
+//! luminance 1, starts follow cumulated densities, and no splat leaves the film.
 
 use crate::rooms::{arena, level, lines, with_room};
 use arbitrary::{Result, Unstructured};
@@ -12,7 +12,7 @@ use halflight_core::transport::metropolis::look::{CANDIDATES, Lengths, Look};
 use halflight_core::transport::metropolis::split::{MAX_SEGMENTS, Split};
 use halflight_core::transport::metropolis::target::{PrimarySpace, Target};
 
-/// Chains, and mutations of each, at most.
+/// Most chains, and most mutations of each.
 const CHAINS: usize = 40;
 const MUTATIONS: usize = 12;
 
@@ -38,7 +38,7 @@ fn attempt(input: &mut Unstructured) -> Result<()> {
             _ => (PrimarySpace::PathTracing, u32::MAX),
         };
         let threshold = [0.0, 0.5, 2.0, f32::INFINITY][usize::from(threshold % 4)];
-        // Without levels every pixel counts the same.
+        // Without levels all pixels have equal weight.
         let split = Split { levels: &[], threshold, max_segments };
         let target = Target::<All>::new(context, &emission, settings, split, space);
         let weights = input.arbitrary::<[u8; 4]>()?;
@@ -75,7 +75,7 @@ fn attempt(input: &mut Unstructured) -> Result<()> {
     })
 }
 
-/// Starts rise, none has no density, and each is chosen as often as its density says, rounded up or down.
+/// Asserts that starts ascend, have a density, and occur in proportion to it, rounded up or down.
 fn check_starts(densities: &[f32], starts: &[u32]) {
     assert!(starts.is_sorted(), "{starts:?}");
     let total: f64 = densities.iter().map(|&density| f64::from(density)).sum();

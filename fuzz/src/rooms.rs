@@ -1,4 +1,4 @@
-//! Small rooms of any surfaces and lights, for targets that trace paths.
+//! Small rooms with any surfaces and lights, for targets that trace paths.
 
 use arbitrary::{Result, Unstructured};
 use glam::{Mat3, Vec3};
@@ -9,7 +9,7 @@ use halflight_core::scene::{Camera, Environment, Material, Mesh, PointLight, Sce
 use halflight_core::transport::PathSettings;
 use halflight_core::{Level, Rgb};
 
-/// Calls `work` with a room, its structures, and settings of a small picture.
+/// Calls `work` with a room, its structures, and the settings of a small picture.
 pub(crate) fn with_room(
     input: &mut Unstructured,
     work: impl FnOnce(&mut Unstructured, &Scene, &Bvh, &LightSampler, PathSettings) -> Result<()>,
@@ -61,12 +61,12 @@ pub(crate) fn with_room(
     work(input, &scene, &bvh, &lights, settings)
 }
 
-/// The highest instruction set, or the lowest.
+/// The highest or the lowest instruction set.
 pub(crate) fn level(input: &mut Unstructured) -> Result<Level> {
     Ok(if input.arbitrary()? { Level::detect() } else { Level::BASELINE })
 }
 
-/// Memory of `footprint`, not empty.
+/// Memory of `footprint`, filled with a pattern.
 pub(crate) fn lines(footprint: Footprint) -> Vec<Line> {
     vec![Line([0x5a; 64]); footprint.bytes() / 64]
 }
@@ -82,7 +82,7 @@ fn place(input: &mut Unstructured) -> Result<[f32; 3]> {
 }
 
 fn light(input: &mut Unstructured) -> Result<PointLight> {
-    // Not in the plane of a surface, where the light on it would be infinite.
+    // Off the planes of surfaces, where the irradiance would be infinite.
     let (position, towards) = (Vec3::from(place(input)?) + 0.0131, Vec3::from(place(input)?));
     let direction = (towards - position).normalize_or(Vec3::NEG_Y);
     let intensity = Rgb::splat([1.0, 0.0, 1e10, 1e-10][usize::from(input.arbitrary::<u8>()? % 4)]);

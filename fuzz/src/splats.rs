@@ -1,5 +1,5 @@
-//! Splats of any tasks on a film of any size, in strips: the same bits as one list after the other; those beyond
-//! the film are lost, and no others.
+//! Splats of any tasks on a film of any size, added in strips: the bits of one sequential list. Only splats
+//! beyond the film are lost.
 
 use crate::numbers::coordinate;
 use arbitrary::{Result, Unstructured};
@@ -38,7 +38,7 @@ fn attempt(input: &mut Unstructured) -> Result<()> {
     for (strip, pixels) in found.chunks_mut(length).enumerate() {
         add_strip(strip, length, sorted.iter().map(|list| &list[..]).zip(&offsets), pixels);
     }
-    // Any NaN is as good as another.
+    // All NaNs count as equal.
     let same = |a: f32, b: f32| a.to_bits() == b.to_bits() || a.is_nan() && b.is_nan();
     let mut values = found.iter().flatten().zip(expected.iter().flatten());
     assert!(values.all(|(a, b)| same(*a, *b)), "{pixels} pixels");

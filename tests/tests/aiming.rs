@@ -1,4 +1,4 @@
-//! Emission guiding of photons where few lights reach visible surfaces. The table compares the radiance of
+//! Emission guiding of photons if few lights reach visible surfaces. The table compares the radiance of
 //! these scenes with path tracing.
 
 use crate::table::scenes::{rooms, rooms_with_balls};

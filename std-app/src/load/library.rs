@@ -1,5 +1,5 @@
 //! Material libraries of an OBJ file: lookup of their files, and of the material of a `usemtl`. Libraries are
-//! searched in the order of their statements, materials in that of the file; the first match counts.
+//! searched in the order of their statements, materials in the order of the file; the first match is used.
 
 use super::files::{Found, Lookup};
 use super::mtl::{self, MtlMaterial};

@@ -59,7 +59,7 @@ use texcoords::Texcoords;
 pub struct LoadOptions {
     /// Whether to decode textures; without them, materials have their constant values.
     pub textures: bool,
-    /// Memory limit in bytes, temporary memory included; `None`: four fifths of that of the machine.
+    /// Memory limit in bytes, temporary memory included; `None`: 80 % of the machine's memory.
     pub memory: Option<usize>,
 }
 

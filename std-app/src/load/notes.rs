@@ -21,7 +21,7 @@ pub struct Notes {
 }
 
 impl Notes {
-    /// An empty list; `file` is that of the lines given to [`Notes::at`].
+    /// An empty list; lines given to [`Notes::at`] belong to `file`.
     pub fn of(file: impl Into<String>) -> Self {
         Self { file: file.into(), ..Self::default() }
     }

@@ -36,7 +36,7 @@ pub struct LoadedScene {
     pub view: Option<View>,
     /// Settings of the scene file.
     pub settings: RenderSettings,
-    /// Transform from the coordinates of the file to those of the buffers.
+    /// Transform from file coordinates to buffer coordinates.
     pub transform: SceneTransform,
     /// All existing files that the scene names: itself, meshes, materials and pictures, unreadable ones
     /// included.

@@ -1,4 +1,4 @@
-//! Transform from the coordinates of the files to those of the core: centred on the scene and scaled by a
+//! Transform from file coordinates to core coordinates: centred on the scene and scaled by a
 //! power of two, so that coordinates are about 1. The factor is exact: a scene scaled by a power of two gives
 //! the same bits.
 

@@ -8,7 +8,7 @@ use std::time::Instant;
 pub(super) struct Round {
     /// Samples per pixel at the end of the round.
     pub(super) target: u32,
-    /// Samples of a tile after which a thread looks at the clock and at the interrupt flag.
+    /// Samples of a tile between checks of the clock and the interrupt flag.
     pub(super) step: u32,
     /// When the round ends early.
     pub(super) deadline: Option<Instant>,

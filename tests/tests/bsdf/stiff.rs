@@ -71,7 +71,7 @@ fn everything() -> Vec<(String, Bsdf)> {
 }
 
 /// Largest weight of a sample. Models of one lobe weigh at most 1. With two lobes, samples of one may carry
-/// the energy of the other; and the coat is sampled twice as often as its energy asks, which doubles the
+/// the energy of the other; and the coat is sampled twice as often as its energy requires, which doubles the
 /// weight of rare samples of the base.
 const GREATEST_WEIGHT: f32 = 8.0;
 

@@ -14,7 +14,7 @@ pub(super) type Counts = [usize; 3];
 /// Index of a texture coordinate or normal that a corner does not have.
 const ABSENT: usize = 0;
 
-/// Statements that follow those of the file: texture coordinate and normal of corners that have none. A zero
+/// Statements appended to the file: texture coordinate and normal of corners that lack them. A zero
 /// normal means flat shading.
 pub(super) const DEFAULTS: &[u8] = b"vt 0 0\nvn 0 0 0\n";
 

@@ -31,7 +31,7 @@ const DEFAULT_MIRROR: f64 = 0.5;
 pub struct MaterialEntry {
     /// Kind of a new material.
     pub kind: Option<MaterialKind>,
-    /// Diffuse reflectance, or that of the metal (`Kd`).
+    /// Reflectance of a diffuse surface or of a metal (`Kd`).
     pub color: Option<Colour>,
     /// Texture of `color` (`map_Kd`).
     pub color_map: Option<Spanned<String>>,

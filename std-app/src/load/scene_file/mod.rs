@@ -37,7 +37,7 @@ pub struct SceneFile {
     /// `[[mesh]]`: meshes and their placement.
     #[serde(default)]
     pub mesh: Vec<MeshEntry>,
-    /// `[material.NAME]`: new materials, and changes to those of the meshes.
+    /// `[material.NAME]`: new materials, and changes to materials of the meshes.
     #[serde(default)]
     pub material: BTreeMap<String, Spanned<MaterialEntry>>,
     /// `[camera]`.
@@ -87,7 +87,7 @@ pub struct CameraEntry {
     /// Radius of the lens; 0 is a pinhole.
     #[serde(default)]
     pub lens_radius: NotNegative,
-    /// Distance of the plane in focus; by default that of `look_at`.
+    /// Distance of the plane in focus; by default the distance of `look_at`.
     pub focus_distance: Option<Positive>,
 }
 

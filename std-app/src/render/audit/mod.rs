@@ -34,7 +34,7 @@ const PIXELS_PER_TASK: usize = 8;
 /// Samples per audited pixel within which audit paths must find all light of the picture.
 const SEEN: f64 = 256.0;
 
-/// Longest run of samples in seconds before clock and caller are asked again.
+/// Longest run of samples, seconds, between checks of the clock and calls of `may`.
 const LONGEST: f64 = 0.25;
 
 /// Makes the audit's random numbers differ from those of the picture.
