@@ -2,7 +2,7 @@
 
 use crate::support::Folder;
 
-/// A room lit through the glass around its lamp alone; only the lamp itself is also visible directly.
+/// A room in which all light that reaches surfaces passes the glass ball around the lamp.
 const ROOM: &str = "mtllib room.mtl\n\
     v -2 0 -2\nv 2 0 -2\nv 2 0 2\nv -2 0 2\nv -2 3 -2\nv 2 3 -2\nv 2 3 2\nv -2 3 2\n\
     usemtl wall\nf 1 4 3 2\nf 5 6 7 8\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\n";

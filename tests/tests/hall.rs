@@ -14,7 +14,7 @@ const HEIGHT: f32 = 8.0;
 /// samples.
 const MOST: f64 = 1.25;
 
-/// `count` x `count` lamps under the ceiling, each of side 2.1 / `count`.
+/// `count` x `count` lamps under the ceiling, each of side 4.2 / `count`.
 fn hall(count: u32) -> SceneBuffers {
     let camera = Camera::look_at(Vec3::new(20.0, 2.5, 27.0), Vec3::new(20.0, 1.2, 19.0), Vec3::Y, 50.0);
     let mut buffers = SceneBuffers::new(camera);

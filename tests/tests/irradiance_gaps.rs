@@ -107,7 +107,7 @@ fn slots(gap: f32) -> [Slot; 3] {
     [picture, bench, board]
 }
 
-/// Slots as in [`slots`] and a wardrobe beside a wall, seen from about one gap's width.
+/// Slots as in [`slots`] and a wardrobe beside a wall, seen along the gap from 0.05 + 4 `gap` away.
 fn slots_from_near(gap: f32) -> [Slot; 4] {
     let away = 0.05 + 4.0 * gap;
     let above = |share: f32| 0.5 * gap + share * away;
