@@ -21,7 +21,7 @@ pub fn render(
     try_render(scene, method, size, spp, change).expect("it can be rendered")
 }
 
-/// As [`render`], with errors returned.
+/// As [`render()`], with errors returned.
 pub fn try_render(
     scene: &Scene,
     method: Method,
