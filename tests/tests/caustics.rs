@@ -268,7 +268,7 @@ fn photons_fit_the_memory_and_their_lack_is_reported() {
         result.memory.iter().find(|one| one.structure == "photons").map_or(0, |one| one.bytes)
     };
     // Environment visibility tables give up their memory before photons do.
-    let limited = |bytes| path(&scene, 16, |s| (s.windows, s.memory) = (Some(false), bytes));
+    let limited = |bytes| path(&scene, 16, |s| (s.environment_visibility, s.memory) = (Some(false), bytes));
     let whole = limited(None);
     assert_eq!(map(&whole).given, map(&whole).wanted);
     let enough = limited(Some(whole.memory_peak));
@@ -282,7 +282,10 @@ fn photons_fit_the_memory_and_their_lack_is_reported() {
 
     let none = limited(Some(whole.memory_peak - bytes(&whole)));
     assert!(none.caustics.lacks_memory && none.photons.is_none());
-    assert_eq!(none.image, path(&scene, 16, |s| (s.windows, s.caustics) = (Some(false), false)).image);
+    assert_eq!(
+        none.image,
+        path(&scene, 16, |s| (s.environment_visibility, s.caustics) = (Some(false), false)).image
+    );
 }
 
 #[test]

@@ -4,7 +4,7 @@
 //! The unit square that samples the environment is divided into bins of equal power. Each place, a cell of a
 //! grid and the axis that its surface faces most, has a table of the probabilities of the bins. The table
 //! warps the square monotonically in both coordinates, which preserves stratification.
-//! [`crate::transport::Outlook`] learns the tables. Estimates are unbiased with any table.
+//! [`crate::transport::VisibilityPrepass`] learns the tables. Estimates are unbiased with any table.
 
 use crate::geometry::Bounds;
 use crate::memory::{Arena, Footprint, OutOfMemory};
@@ -214,11 +214,11 @@ pub struct EnvironmentVisibility<'m> {
 
 impl<'m> EnvironmentVisibility<'m> {
     /// Largest number of tables.
-    pub const MOST: usize = 2048;
+    pub const MAX_TABLES: usize = 2048;
 
     /// Bytes of all tables and their indices.
     pub fn footprint() -> Footprint {
-        Footprint::default().slice::<u16>(CELLS * SIDES).slice::<VisibilityTable>(Self::MOST)
+        Footprint::default().slice::<u16>(CELLS * SIDES).slice::<VisibilityTable>(Self::MAX_TABLES)
     }
 
     /// Memory for [`EnvironmentVisibility::new`], to be filled: table numbers by place, all zero, and tables.
@@ -228,7 +228,7 @@ impl<'m> EnvironmentVisibility<'m> {
     pub fn memory(arena: &mut Arena<'m>) -> Result<(&'m mut [u16], &'m mut [VisibilityTable]), OutOfMemory> {
         let slots: &mut [u16] = arena.slice(CELLS * SIDES)?;
         slots.fill(0);
-        Ok((slots, arena.slice(Self::MOST)?))
+        Ok((slots, arena.slice(Self::MAX_TABLES)?))
     }
 
     /// Tables in memory of [`EnvironmentVisibility::memory`].

@@ -7,7 +7,7 @@ use super::executor::Executor;
 use crate::bsdf::Features;
 use crate::light::{EnvironmentVisibility, LightSampler};
 use crate::memory::{Footprint, MemorySource, OutOfMemory};
-use crate::transport::{Counters, Outlook, PathIntegrator, WindowGain};
+use crate::transport::{Counters, PathIntegrator, VisibilityGain, VisibilityPrepass};
 
 /// Bytes that [`learn`] takes.
 pub fn footprint() -> Footprint {
@@ -16,11 +16,11 @@ pub fn footprint() -> Footprint {
 
 /// Working memory of a worker.
 pub fn scratch<F: Features>() -> Footprint {
-    PathIntegrator::<F>::learn_scratch()
+    PathIntegrator::<F>::learn_table_scratch()
 }
 
 fn working() -> Footprint {
-    Outlook::footprint().slice::<WindowGain>(EnvironmentVisibility::MOST)
+    VisibilityPrepass::footprint().slice::<VisibilityGain>(EnvironmentVisibility::MAX_TABLES)
 }
 
 /// Learns the visibility of the environment of `context`, and returns its lights with it where that pays or is
@@ -33,39 +33,39 @@ pub fn learn<'a, F: Features>(
     wanted: Option<bool>,
     memory: &mut impl MemorySource<'a>,
     executor: &mut impl Executor,
-) -> Result<(LightSampler<'a>, Option<WindowGain>), OutOfMemory> {
+) -> Result<(LightSampler<'a>, Option<VisibilityGain>), OutOfMemory> {
     let lights = context.lights;
     if lights.environment_is_constant().is_none() {
         return Ok((*lights, None));
     }
     let integrator = context.integrator::<F>();
     memory.lend("look at the sky", working(), |memory, working| {
-        let mut outlook = Outlook::new(working)?;
-        let gains = working.slice::<WindowGain>(EnvironmentVisibility::MOST)?;
+        let mut prepass = VisibilityPrepass::new(working)?;
+        let gains = working.slice::<VisibilityGain>(EnvironmentVisibility::MAX_TABLES)?;
         let mut kept = memory.take("windows", EnvironmentVisibility::footprint())?;
         let (slots, tables) = EnvironmentVisibility::memory(&mut kept)?;
 
-        let passed = executor.pass(outlook.parts(), |_, (task, part), _| {
-            integrator.look(task, part);
+        let passed = executor.pass(prepass.parts(), |_, (task, part), _| {
+            integrator.store_vertices(task, part);
             Ok(Counters::default())
         })?;
         // A place that was not looked at may see anything.
         if !passed.is_complete {
             return Ok((*lights, None));
         }
-        integrator.aim_at_sky(&mut outlook);
-        let Some((grid, count)) = outlook.settle(slots) else {
-            return Ok((*lights, Some(WindowGain::default())));
+        integrator.write_bin_directions(&mut prepass);
+        let Some((grid, count)) = prepass.assign_tables(slots) else {
+            return Ok((*lights, Some(VisibilityGain::default())));
         };
         let pieces = tables.iter_mut().zip(gains.iter_mut()).take(count);
         let passed = executor.pass(pieces, |number, (table, gain), worker| {
-            *gain = integrator.learn(&outlook, number, count, &mut worker.scratch, table)?;
+            *gain = integrator.learn_table(&prepass, number, count, &mut worker.scratch, table)?;
             Ok(Counters::default())
         })?;
         if !passed.is_complete {
             return Ok((*lights, None));
         }
-        let mut gain = WindowGain::default();
+        let mut gain = VisibilityGain::default();
         gains.iter().take(count).for_each(|other| gain += *other);
         let tables = tables.get(..count).unwrap_or_default();
         let visibility =

@@ -26,6 +26,6 @@ pub use path::reuse_pilot::Pilot;
 pub use path::{Estimator, PathIntegrator, PathReuse, Sharing};
 pub use photon_mapping::density::PhotonLight;
 pub use photon_mapping::radius::RadiusSchedule;
-pub use prepass::environment_visibility::{Outlook, Vertex, WindowGain};
+pub use prepass::environment_visibility::{VisibilityGain, VisibilityPrepass, VisibilityVertex};
 pub use settings::{Counters, PathSettings, UNLIMITED};
 pub use walk::context::SceneContext;

@@ -210,7 +210,7 @@ impl MethodArgs {
             max_depth: self.max_depth.or(settings.max_depth),
             reuse: When::forced(self.reuse),
             caustics: !matches!(self.caustics, Some(Caustics::Off)),
-            windows: When::forced(self.windows),
+            environment_visibility: When::forced(self.windows),
             cache: CacheSettings {
                 metric: self.cache_metric.unwrap_or(settings.cache.metric),
                 error: self.cache_error.map(|error| error as f32),

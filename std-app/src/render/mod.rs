@@ -10,6 +10,7 @@ mod blurred;
 mod cache_file;
 mod crew;
 mod deadline;
+mod environment_visibility;
 mod error;
 mod error_report;
 mod film_file;
@@ -31,12 +32,12 @@ mod study;
 mod survey;
 mod threads;
 mod turns;
-mod windows;
 mod workers;
 
 pub use audit::{Audited, Region};
 pub use blurred::Blurred;
 pub use cache_file::inspect as inspect_cache;
+pub use environment_visibility::VisibilityUse;
 pub use error::{FileError, RenderError};
 pub use halflight_core::estimate::{BiasEstimate, Deviation, ErrorEstimate};
 pub use halflight_core::method::bidirectional::BidirectionalSettings;
@@ -55,7 +56,6 @@ pub use rounds::{Stop, StopRule};
 pub use study::{IrradianceStudy, MetricError, study_irradiance};
 pub use survey::{Check, Look, Mark, Survey};
 pub use turns::{Turn, Turns};
-pub use windows::WindowUse;
 
 use crate::save::Image;
 use core::sync::atomic::AtomicBool;
@@ -96,9 +96,9 @@ pub struct Settings {
     pub metropolis: MetropolisSettings,
     /// Whether photon maps are rendered at the end for a report, outside the measured time.
     pub photon_view: bool,
-    /// Whether the environment is sampled through windows that a prepass finds; `None`: as the prepass
+    /// Whether the environment is sampled by visibility tables, which a prepass learns; `None`: as the prepass
     /// decides.
-    pub windows: Option<bool>,
+    pub environment_visibility: Option<bool>,
     /// Number of threads; `None`: all of the machine.
     pub threads: Option<usize>,
     /// Memory limit in bytes for the scene and all structures; `None`: no limit.
@@ -157,7 +157,7 @@ impl Default for Settings {
             virtual_lights: VirtualLightSettings::default(),
             metropolis: MetropolisSettings::default(),
             photon_view: false,
-            windows: None,
+            environment_visibility: None,
             threads: None,
             memory: None,
             level: Level::detect(),
@@ -257,8 +257,8 @@ pub struct RenderResult {
     pub virtual_lights: Option<VirtualLightUse>,
     /// Views of the last photon maps, if requested.
     pub photon_view: Option<PhotonView>,
-    /// Whether the sky was sampled through windows, and why.
-    pub windows: WindowUse,
+    /// Use of environment visibility, and why.
+    pub environment_visibility: VisibilityUse,
     /// Tiles with rejected samples, most first.
     pub places: Vec<Place>,
     /// Black pixels, whose samples were all rejected.

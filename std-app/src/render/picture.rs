@@ -11,7 +11,7 @@ use super::method::{Method, Renderer, Stage};
 use super::rewritten_file::RewrittenFile;
 use super::rounds::{Plan, Rounds};
 use super::workers::Workers;
-use super::{Ending, ErrorEstimate, Progress, RenderError, RenderResult, Seconds, WindowUse};
+use super::{Ending, ErrorEstimate, Progress, RenderError, RenderResult, Seconds, VisibilityUse};
 use crate::save::{Image, Patience};
 use core::sync::atomic::{AtomicBool, Ordering};
 use core::time::Duration;
@@ -329,7 +329,7 @@ impl<'a> Progressive<'a> {
             photons: renderer.photons(),
             virtual_lights: renderer.virtual_lights(),
             photon_view: if is_viewed { renderer.photon_view().unwrap_or_default() } else { None },
-            windows: WindowUse::default(),
+            environment_visibility: VisibilityUse::default(),
             places: ledger::places(state.dropped, settings.width, settings.height),
             empty_pixels: empty_pixels(film, |task| state.shard.owns(task) && state.samples[task] > 0),
             filled_pixels,

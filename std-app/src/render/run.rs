@@ -8,7 +8,9 @@ use super::memory::{Bank, Memory};
 use super::method::{Method, Stage};
 use super::picture::Picture;
 use super::workers::Workers;
-use super::{Progress, RenderError, RenderResult, Seconds, Settings, cache_file, gaps, windows};
+use super::{
+    Progress, RenderError, RenderResult, Seconds, Settings, cache_file, environment_visibility, gaps,
+};
 use crate::pages::Pages;
 use core::sync::atomic::AtomicBool;
 use halflight_core::Level;
@@ -77,7 +79,7 @@ impl WithFeatures for Render<'_> {
         let mut film_arena = Arena::new(bytemuck::cast_slice_mut(&mut film_lines));
         let state = RenderState::new(width, height, settings.shard, &mut film_arena)?;
         let plain = Stage { scene, bvh: &bvh, lights: &lights, settings, workers: &workers };
-        let (lights, windows) = windows::learn::<F>(&plain, &mut memory)?;
+        let (lights, visibility) = environment_visibility::learn::<F>(&plain, &mut memory)?;
         let stage = Stage { scene, bvh: &bvh, lights: &lights, settings, workers: &workers };
         let plain = stage.paths::<F>(settings.seed);
         let sketch = |workers: &Workers| gaps::sketch(&plain, [width, height], workers);
@@ -99,7 +101,13 @@ impl WithFeatures for Render<'_> {
             };
             let done = picture.render(renderer)?;
             let seconds = Seconds { build, ..done.seconds };
-            Ok(RenderResult { memory: memory.uses(), memory_peak: memory.peak(), seconds, windows, ..done })
+            Ok(RenderResult {
+                memory: memory.uses(),
+                memory_peak: memory.peak(),
+                seconds,
+                environment_visibility: visibility,
+                ..done
+            })
         })
     }
 }

@@ -3,7 +3,7 @@
 use super::Run;
 use crate::render::{
     CacheUse, CausticUse, ChainUse, MapUse, Method, PhotonUse, Reuse, Settings, Survey, VirtualLightUse,
-    WindowUse,
+    VisibilityUse,
 };
 use halflight_core::findings::Decision::{LeftOut, Limited, Used};
 use halflight_core::findings::{Finding, Findings, Value};
@@ -13,7 +13,7 @@ pub(super) fn of(run: &Run) -> Findings {
     let (result, settings) = (run.result, run.settings);
     let photons = result.photons.unwrap_or_default();
     let mut findings = Findings::default();
-    findings.extend(environment_visibility(&result.windows));
+    findings.extend(environment_visibility(&result.environment_visibility));
     findings.extend(path_reuse(&result.reuse));
     findings.extend(result.cache.map(|cache| irradiance_cache(&cache, settings)));
     findings.extend(result.survey.as_ref().map(cache_survey));
@@ -26,13 +26,13 @@ pub(super) fn of(run: &Run) -> Findings {
     findings
 }
 
-fn environment_visibility(windows: &WindowUse) -> Option<Finding> {
+fn environment_visibility(visibility: &VisibilityUse) -> Option<Finding> {
     let finding = |decision, reason| Finding::new("environment_visibility", decision, reason);
-    if windows.lacks_memory {
+    if visibility.lacks_memory {
         return Some(finding(LeftOut, "not enough memory: sky light may be noisier"));
     }
-    let gain = Value::Number(windows.gain?.factor().into());
-    let finding = match windows.used {
+    let gain = Value::Number(visibility.gain?.factor().into());
+    let finding = match visibility.used {
         true => finding(Used, "the environment is sampled by its visibility"),
         false => finding(LeftOut, "most of the environment is visible from everywhere"),
     };

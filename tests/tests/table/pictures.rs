@@ -78,7 +78,8 @@ impl Reference {
         let one = |seed| {
             let plain = |settings: &mut Settings| {
                 settings.seed = 0x0eff_0000 + seed;
-                (settings.reuse, settings.caustics, settings.windows) = (Some(false), false, Some(false));
+                (settings.reuse, settings.caustics, settings.environment_visibility) =
+                    (Some(false), false, Some(false));
             };
             picture(scene, Method::Path, sizes().reference_spp, plain).image
         };

@@ -32,18 +32,18 @@ const VERTICES: usize = 3;
 const SURFACES: usize = 8;
 
 /// Minimum number of vertices of a place with a table.
-const FEWEST: usize = 4;
+const MIN_VERTICES: usize = 4;
 
 /// Number of rays to the environment: per pixel; range of the total; maximum per bin of a table.
 const RAYS_PER_PIXEL: usize = 64;
 const RAYS: core::ops::Range<usize> = 1 << 18..1 << 22;
-const PASSES: usize = 4;
+const MAX_PASSES: usize = 4;
 
 /// Number of bins of a table.
 const BINS: usize = size_of::<Bins>() / size_of::<f32>();
 
 /// Minimum factor by which the variance of environment light has to fall.
-const LEAST_GAIN: f64 = 1.25;
+const MIN_GAIN: f64 = 1.25;
 
 /// Seed of the prepass, distinct from the seed of the picture: tables must be independent of the samples that
 /// use them.
@@ -52,7 +52,7 @@ const STREAM: u32 = 0x6c00_7517;
 /// Scattering vertex of a path. All normals are on the side of the viewer.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C)]
-pub struct Vertex {
+pub struct VisibilityVertex {
     position: [f32; 3],
     /// Error bound of `position`.
     error: f32,
@@ -65,11 +65,11 @@ pub struct Vertex {
 }
 
 /// Place of a missing vertex.
-const NOWHERE: u32 = u32::MAX;
+const NO_PLACE: u32 = u32::MAX;
 
 /// Vertices of the prepass, and their range for each place with a table.
-pub struct Outlook<'m> {
-    vertices: &'m mut [Vertex],
+pub struct VisibilityPrepass<'m> {
+    vertices: &'m mut [VisibilityVertex],
     ranges: &'m mut [[u32; 2]],
     /// For each pass, the direction to each bin of the environment, common to all places.
     directions: &'m mut [[f32; 3]],
@@ -78,12 +78,12 @@ pub struct Outlook<'m> {
 /// Variance of environment light without and with visibility tables, summed over places.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[repr(C)]
-pub struct WindowGain {
+pub struct VisibilityGain {
     before: f64,
     after: f64,
 }
 
-impl WindowGain {
+impl VisibilityGain {
     /// Factor by which the variance falls.
     pub fn factor(&self) -> f32 {
         if self.after > 0.0 { (self.before / self.after) as f32 } else { 1.0 }
@@ -91,55 +91,55 @@ impl WindowGain {
 
     /// True if the environment should be sampled by visibility tables.
     pub fn pays(&self) -> bool {
-        self.before > LEAST_GAIN * self.after
+        self.before > MIN_GAIN * self.after
     }
 }
 
-impl core::ops::AddAssign for WindowGain {
+impl core::ops::AddAssign for VisibilityGain {
     fn add_assign(&mut self, other: Self) {
         self.before += other.before;
         self.after += other.after;
     }
 }
 
-impl<'m> Outlook<'m> {
-    /// Footprint of [`Outlook::new`].
+impl<'m> VisibilityPrepass<'m> {
+    /// Footprint of [`VisibilityPrepass::new`].
     pub fn footprint() -> Footprint {
         Footprint::default()
-            .slice::<Vertex>(TASKS * PATHS.end * VERTICES)
-            .slice::<[u32; 2]>(EnvironmentVisibility::MOST)
-            .slice::<[f32; 3]>(PASSES * BINS)
+            .slice::<VisibilityVertex>(TASKS * PATHS.end * VERTICES)
+            .slice::<[u32; 2]>(EnvironmentVisibility::MAX_TABLES)
+            .slice::<[f32; 3]>(MAX_PASSES * BINS)
     }
 
-    /// Outlook without vertices.
+    /// Prepass without vertices.
     ///
     /// # Errors
-    /// [`OutOfMemory`] if the arena has less than [`Outlook::footprint`].
+    /// [`OutOfMemory`] if the arena has less than [`VisibilityPrepass::footprint`].
     pub fn new(arena: &mut Arena<'m>) -> Result<Self, OutOfMemory> {
         let vertices = arena.slice(TASKS * PATHS.end * VERTICES)?;
-        let ranges = arena.slice(EnvironmentVisibility::MOST)?;
-        Ok(Self { vertices, ranges, directions: arena.slice(PASSES * BINS)? })
+        let ranges = arena.slice(EnvironmentVisibility::MAX_TABLES)?;
+        Ok(Self { vertices, ranges, directions: arena.slice(MAX_PASSES * BINS)? })
     }
 
-    /// Memory of each task, to be filled by [`PathIntegrator::look`].
-    pub fn parts(&mut self) -> impl Iterator<Item = (usize, &mut [Vertex])> {
+    /// Memory of each task, to be filled by [`PathIntegrator::store_vertices`].
+    pub fn parts(&mut self) -> impl Iterator<Item = (usize, &mut [VisibilityVertex])> {
         self.vertices.chunks_mut(PATHS.end * VERTICES).enumerate()
     }
 
     /// Sorts the vertices by place and numbers the tables in `slots`. Returns the grid of places and the
     /// number of tables.
-    pub fn settle(&mut self, slots: &mut [u16]) -> Option<(VisibilityGrid, usize)> {
-        let seen = || self.vertices.iter().filter(|vertex| vertex.place != NOWHERE);
+    pub fn assign_tables(&mut self, slots: &mut [u16]) -> Option<(VisibilityGrid, usize)> {
+        let seen = || self.vertices.iter().filter(|vertex| vertex.place != NO_PLACE);
         let grid = VisibilityGrid::over(&Bounds::around(seen().map(|vertex| vertex.position.into())))?;
         for (index, vertex) in self.vertices.iter_mut().enumerate() {
             vertex.index = index as u32;
-            if vertex.place != NOWHERE {
+            if vertex.place != NO_PLACE {
                 let place = grid.place(vertex.position.into(), vertex.normal.into());
-                vertex.place = place.map_or(NOWHERE, |place| place as u32);
+                vertex.place = place.map_or(NO_PLACE, |place| place as u32);
             }
         }
         self.vertices.sort_unstable_by_key(|vertex| (vertex.place, vertex.index));
-        let mut fewest = FEWEST;
+        let mut fewest = MIN_VERTICES;
         while self.places().filter(|range| range.len() >= fewest).count() > self.ranges.len() {
             fewest *= 2;
         }
@@ -162,45 +162,45 @@ impl<'m> Outlook<'m> {
         Some((grid, count))
     }
 
-    fn places(&self) -> impl Iterator<Item = &[Vertex]> {
-        self.vertices.chunk_by(|a, b| a.place == b.place).filter(|place| place[0].place != NOWHERE)
+    fn places(&self) -> impl Iterator<Item = &[VisibilityVertex]> {
+        self.vertices.chunk_by(|a, b| a.place == b.place).filter(|place| place[0].place != NO_PLACE)
     }
 
-    fn of_window(&self, window: usize) -> &[Vertex] {
-        let [start, end] = self.ranges.get(window).copied().unwrap_or_default();
+    fn vertices_of(&self, table: usize) -> &[VisibilityVertex] {
+        let [start, end] = self.ranges.get(table).copied().unwrap_or_default();
         self.vertices.get(start as usize..end as usize).unwrap_or(&[])
     }
 }
 
 /// Rays from one place to the environment, at most one per bin. The tag of a ray is its bin.
-struct Glances<'m> {
+struct EnvironmentRays<'m> {
     rays: &'m mut [Ray],
     cosines: &'m mut [f32],
     hits: &'m mut [Hit],
     count: usize,
 }
 
-impl<'m> Glances<'m> {
+impl<'m> EnvironmentRays<'m> {
     fn new(arena: &mut Arena<'m>) -> Result<Self, OutOfMemory> {
         let (rays, cosines) = (arena.slice(BINS)?, arena.slice(BINS)?);
         Ok(Self { rays, cosines, hits: arena.slice(BINS)?, count: 0 })
     }
 
     /// Makes one ray to each of `bins` above the horizon, from the `vertices` in turn.
-    fn ask(
+    fn generate(
         &mut self,
         bins: impl Iterator<Item = usize>,
         pass: usize,
-        outlook: &Outlook,
-        vertices: &[Vertex],
+        prepass: &VisibilityPrepass,
+        vertices: &[VisibilityVertex],
     ) {
         self.count = 0;
         for bin in bins {
-            let index = (bin * PASSES + pass) as u32;
+            let index = (bin * MAX_PASSES + pass) as u32;
             // Golden-ratio stride, which spreads neighbouring bins over the vertices.
             let pick = (u64::from(index.wrapping_mul(0x9e37_79b9)) * vertices.len() as u64) >> 32;
             let Some(vertex) = vertices.get(pick as usize) else { continue };
-            let Some(&direction) = outlook.directions.get(pass * BINS + bin) else { continue };
+            let Some(&direction) = prepass.directions.get(pass * BINS + bin) else { continue };
             let (direction, normal) = (Vec3::from(direction), Vec3::from(vertex.geometric_normal));
             let cosine = direction.dot(vertex.normal.into());
             if cosine > 0.0 && direction.dot(normal) > 0.0 {
@@ -214,9 +214,9 @@ impl<'m> Glances<'m> {
 }
 
 impl<F: Features> PathIntegrator<'_, F> {
-    /// Stores the vertices of task `task` in its part of the [`Outlook`].
-    pub fn look(&self, task: usize, part: &mut [Vertex]) {
-        part.fill(Vertex { place: NOWHERE, ..Vertex::default() });
+    /// Stores the vertices of task `task` in its part of the [`VisibilityPrepass`].
+    pub fn store_vertices(&self, task: usize, part: &mut [VisibilityVertex]) {
+        part.fill(VisibilityVertex { place: NO_PLACE, ..VisibilityVertex::default() });
         let crate::transport::PathSettings { width, height, seed, .. } = self.settings;
         let pixels = width as usize * height as usize;
         let paths = (pixels / 4 / TASKS).clamp(PATHS.start, PATHS.end);
@@ -230,7 +230,7 @@ impl<F: Features> PathIntegrator<'_, F> {
     }
 
     /// Follows one path until all `vertices` are filled or the path ends.
-    fn follow(&self, ray: Ray, sampler: &Sampler, vertices: &mut [Vertex]) {
+    fn follow(&self, ray: Ray, sampler: &Sampler, vertices: &mut [VisibilityVertex]) {
         let (context, counters) = (self.context, &mut Counters::default());
         let mut segment = Segment::first(ray);
         let mut free = vertices.iter_mut();
@@ -240,7 +240,7 @@ impl<F: Features> PathIntegrator<'_, F> {
             let bsdf = self.context.bsdf_at(&point);
             if !bsdf.is_delta() {
                 let Some(vertex) = free.next() else { return };
-                *vertex = Vertex {
+                *vertex = VisibilityVertex {
                     position: point.position.to_array(),
                     error: point.error,
                     geometric_normal: point.geometric_normal.to_array(),
@@ -261,9 +261,9 @@ impl<F: Features> PathIntegrator<'_, F> {
         }
     }
 
-    /// Writes the directions to the bins of the environment, which the scene must have, into `outlook`.
-    pub fn aim_at_sky(&self, outlook: &mut Outlook) {
-        for (i, direction) in outlook.directions.iter_mut().enumerate() {
+    /// Writes the directions to the bins of the environment, which the scene must have, into `prepass`.
+    pub fn write_bin_directions(&self, prepass: &mut VisibilityPrepass) {
+        for (i, direction) in prepass.directions.iter_mut().enumerate() {
             let (bin, pass) = (i % BINS, i / BINS);
             let offset = Sampler::new(self.settings.seed ^ STREAM, 1 + bin as u32, pass as u32).pair(0);
             let at = self
@@ -274,56 +274,61 @@ impl<F: Features> PathIntegrator<'_, F> {
         }
     }
 
-    /// Scratch memory of [`PathIntegrator::learn`].
-    pub fn learn_scratch() -> Footprint {
+    /// Scratch memory of [`PathIntegrator::learn_table`].
+    pub fn learn_table_scratch() -> Footprint {
         Footprint::default().slice::<Ray>(BINS).slice::<f32>(BINS).slice::<Hit>(BINS)
     }
 
     /// Learns table `number` of `count`. Returns its variances, weighted by the number of vertices.
     ///
     /// # Errors
-    /// [`OutOfMemory`] if `scratch` has less than [`PathIntegrator::learn_scratch`] bytes.
-    pub fn learn(
+    /// [`OutOfMemory`] if `scratch` has less than [`PathIntegrator::learn_table_scratch`] bytes.
+    pub fn learn_table(
         &self,
-        outlook: &Outlook,
+        prepass: &VisibilityPrepass,
         number: usize,
         count: usize,
         scratch: &mut Arena,
-        window: &mut VisibilityTable,
-    ) -> Result<WindowGain, OutOfMemory> {
+        table: &mut VisibilityTable,
+    ) -> Result<VisibilityGain, OutOfMemory> {
         let mut arena = scratch.scratch();
-        let mut glances = Glances::new(&mut arena)?;
-        let vertices = outlook.of_window(number);
+        let mut batch = EnvironmentRays::new(&mut arena)?;
+        let vertices = prepass.vertices_of(number);
 
         // One ray to every other bin also stands for the neighbouring bins. Bins near visible light get more
         // rays.
         let mut squares: Bins = [0.0; _];
-        glances.ask((0..squares.len()).filter(|&bin| VisibilityTable::is_black(bin)), 0, outlook, vertices);
-        self.send(&mut glances, |bin, light| squares[bin] = light);
+        batch.generate(
+            (0..squares.len()).filter(|&bin| VisibilityTable::is_black(bin)),
+            0,
+            prepass,
+            vertices,
+        );
+        self.trace_environment_rays(&mut batch, |bin, light| squares[bin] = light);
         let near = VisibilityTable::smoothed(&VisibilityTable::smoothed(&squares));
         let open = || (0..near.len()).filter(|&bin| near[bin] > 0.0);
 
         let pixels = self.settings.width as usize * self.settings.height as usize;
         let all = (RAYS_PER_PIXEL * pixels).clamp(RAYS.start, RAYS.end);
-        let passes = (all / count.max(1) / open().count().max(1)).clamp(1, PASSES);
+        let passes = (all / count.max(1) / open().count().max(1)).clamp(1, MAX_PASSES);
         let mut sums: Bins = [0.0; _];
         squares.fill(0.0);
         for pass in 0..passes {
-            glances.ask(open(), pass, outlook, vertices);
-            self.send(&mut glances, |bin, light| {
+            batch.generate(open(), pass, prepass, vertices);
+            self.trace_environment_rays(&mut batch, |bin, light| {
                 sums[bin] += light / passes as f32;
                 squares[bin] += light * light / passes as f32;
             });
         }
         let smooth = VisibilityTable::smoothed(&squares);
         let shares = smooth.map(libm::sqrtf);
-        *window = VisibilityTable::new(&shares);
+        *table = VisibilityTable::new(&shares);
 
         let bins = sums.len() as f64;
         let mean = |values: &Bins| values.iter().map(|&x| f64::from(x)).sum::<f64>() / bins;
         let seen = mean(&sums);
         if seen <= 0.0 {
-            return Ok(WindowGain::default());
+            return Ok(VisibilityGain::default());
         }
         // Second moments of the light in units of the environment's mean; `relative` divides by the squared
         // light.
@@ -333,20 +338,20 @@ impl<F: Features> PathIntegrator<'_, F> {
         let moment = |(&square, &share): (&f32, &f32)| f64::from(square) / f64::from(share);
         let after = smooth.iter().zip(&shares).map(moment).sum::<f64>() / bins / bins;
         let relative = |moment: f64| vertices.len() as f64 * (moment / seen / seen - 1.0).max(0.0);
-        Ok(WindowGain { before: relative(before), after: relative(after) })
+        Ok(VisibilityGain { before: relative(before), after: relative(after) })
     }
 
-    /// Traces all rays of `glances`, and calls `tell` with the bin and with transmittance times cosine.
-    fn send(&self, glances: &mut Glances, mut tell: impl FnMut(usize, f32)) {
-        let (rays, hits) = (&glances.rays[..glances.count], &mut glances.hits[..glances.count]);
+    /// Traces all rays of `batch`, and calls `add` with the bin and with transmittance times cosine.
+    fn trace_environment_rays(&self, batch: &mut EnvironmentRays, mut add: impl FnMut(usize, f32)) {
+        let (rays, hits) = (&batch.rays[..batch.count], &mut batch.hits[..batch.count]);
         self.context.nearest_batch(rays, Coherence::Incoherent, hits);
-        for ((ray, cosine), hit) in rays.iter().zip(&*glances.cosines).zip(&*hits) {
-            tell(ray.tag as usize, cosine * self.arriving(ray, hit));
+        for ((ray, cosine), hit) in rays.iter().zip(&*batch.cosines).zip(&*hits) {
+            add(ray.tag as usize, cosine * self.transmittance_to_environment(ray, hit));
         }
     }
 
     /// Transmittance along `ray`, whose first hit is `hit`.
-    fn arriving(&self, ray: &Ray, hit: &Hit) -> f32 {
+    fn transmittance_to_environment(&self, ray: &Ray, hit: &Hit) -> f32 {
         if !hit.is_some() {
             return 1.0;
         }

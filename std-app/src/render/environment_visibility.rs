@@ -7,15 +7,15 @@ use super::threads::Threads;
 use halflight_core::bsdf::Features;
 use halflight_core::light::LightSampler;
 use halflight_core::method::environment_visibility::{footprint, learn as learn_visibility, scratch};
-use halflight_core::transport::{PathIntegrator, WindowGain, path::WAVE};
+use halflight_core::transport::{PathIntegrator, VisibilityGain, path::WAVE};
 
 /// Use of environment visibility.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct WindowUse {
-    /// Whether the sky is sampled through windows.
+pub struct VisibilityUse {
+    /// Whether the environment is sampled by visibility tables.
     pub used: bool,
     /// Effect on the variance of its light; `None` without a prepass.
-    pub gain: Option<WindowGain>,
+    pub gain: Option<VisibilityGain>,
     /// Whether memory for the prepass was lacking.
     pub lacks_memory: bool,
 }
@@ -25,17 +25,17 @@ pub struct WindowUse {
 pub(super) fn learn<'a, F: Features>(
     stage: &Stage<'a>,
     memory: &mut Memory<'a>,
-) -> Result<(LightSampler<'a>, WindowUse), RenderError> {
+) -> Result<(LightSampler<'a>, VisibilityUse), RenderError> {
     let Stage { lights, settings, workers, .. } = *stage;
-    let wanted = settings.windows;
+    let wanted = settings.environment_visibility;
     if wanted == Some(false) || lights.environment_is_constant().is_none() {
-        return Ok((*lights, WindowUse::default()));
+        return Ok((*lights, VisibilityUse::default()));
     }
     // Visibility only saves time: it is skipped if its tables and the memory of paths do not both fit.
     let each = scratch::<F>().and(PathIntegrator::<F>::scratch(WAVE)).bytes();
     let all = footprint().bytes().saturating_add(each.saturating_mul(workers.count()));
     if wanted.is_none() && !memory.has(all) {
-        return Ok((*lights, WindowUse { lacks_memory: true, ..WindowUse::default() }));
+        return Ok((*lights, VisibilityUse { lacks_memory: true, ..VisibilityUse::default() }));
     }
     let mut scratch = memory.take_each("look at the sky", scratch::<F>(), workers.count())?;
     let mut executor = Threads::new(workers, &mut scratch);
@@ -45,5 +45,5 @@ pub(super) fn learn<'a, F: Features>(
     if !used {
         memory.give_back("windows");
     }
-    Ok((lights, WindowUse { used, gain, lacks_memory: false }))
+    Ok((lights, VisibilityUse { used, gain, lacks_memory: false }))
 }

@@ -36,9 +36,9 @@ fn assert_unbiased(name: &str, scene: &Scene, max_depth: Option<u32>) {
     let pictures = |windows: bool, first: u32| -> Vec<Vec<f64>> {
         let one = |seed| {
             let result = render(scene, 16, |s| {
-                (s.seed, s.windows, s.max_depth) = (first + seed, Some(windows), max_depth);
+                (s.seed, s.environment_visibility, s.max_depth) = (first + seed, Some(windows), max_depth);
             });
-            assert_eq!(result.windows.used, windows);
+            assert_eq!(result.environment_visibility.used, windows);
             assert_eq!(result.counters.dropped.total(), 0);
             blocks(&result.image.pixels, SIZE, 8)
         };
@@ -68,10 +68,11 @@ fn a_room_has_less_noise_through_its_windows() {
         [("constant", with_constant(room_with_window())), ("sun", with_sky(room_with_window()))]
     {
         let scene = buffers.textured(&SKY);
-        let with_windows = |windows| render(&scene, 64, |s| (s.windows, s.max_depth) = (windows, Some(2)));
+        let with_windows =
+            |windows| render(&scene, 64, |s| (s.environment_visibility, s.max_depth) = (windows, Some(2)));
         let (with, without) = (noise(&with_windows(Some(true))), noise(&with_windows(Some(false))));
         assert!(with < 0.7 * without, "{name}: {with}, {without}");
-        assert!(with_windows(None).windows.used, "{name}: windows pay");
+        assert!(with_windows(None).environment_visibility.used, "{name}: windows pay");
     }
 }
 
@@ -83,7 +84,8 @@ fn under_an_open_sky_nothing_is_changed() {
     buffers.square(Vec3::ZERO, Vec3::Y, 10.0, grey);
     let buffers = with_constant(buffers);
     let scene = buffers.scene();
-    let (auto, off) = (render(&scene, 4, |_| ()), render(&scene, 4, |s| s.windows = Some(false)));
-    assert!(!auto.windows.used && auto.windows.gain.is_some());
+    let (auto, off) =
+        (render(&scene, 4, |_| ()), render(&scene, 4, |s| s.environment_visibility = Some(false)));
+    assert!(!auto.environment_visibility.used && auto.environment_visibility.gain.is_some());
     assert_eq!(auto.image, off.image);
 }
