@@ -41,30 +41,31 @@ pub struct ClearanceQuery {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Clearance {
     /// True if something may rise above the plane.
-    pub rises: bool,
+    pub has_wall: bool,
     /// True if something may overhang the place. The query then ends early, and the other results are
     /// incomplete.
-    pub hangs: bool,
+    pub has_overhang: bool,
     /// Bit i: the surface continues at point i.
     pub surface: u32,
 }
 
 impl Clearance {
     /// Nothing rises, and the surface continues at all points.
-    pub const OPEN: Clearance = Clearance { rises: false, hangs: false, surface: (1 << POINTS) - 1 };
+    pub const OPEN: Clearance =
+        Clearance { has_wall: false, has_overhang: false, surface: (1 << POINTS) - 1 };
 }
 
 impl Bvh<'_> {
     /// Clearance around `query`.
     pub fn clearance(&self, query: &ClearanceQuery) -> Clearance {
         let (lo, hi) = (query.place - Vec3::splat(query.reach), query.place + Vec3::splat(query.reach));
-        let mut clearance = Clearance { rises: false, hangs: false, surface: 0 };
+        let mut clearance = Clearance { has_wall: false, has_overhang: false, surface: 0 };
         let is_whole = self.overlapping(lo, hi, |corners| {
             query.meet(corners, &mut clearance);
-            !clearance.hangs
+            !clearance.has_overhang
         });
         if !is_whole {
-            (clearance.rises, clearance.hangs) = (true, true);
+            (clearance.has_wall, clearance.has_overhang) = (true, true);
         }
         clearance
     }
@@ -136,11 +137,11 @@ impl ClearanceQuery {
         // A NaN coordinate counts as rising.
         let is_low = |corner: Vec3| corner.z <= 0.0;
         if !(is_low(a) && is_low(b) && is_low(c)) {
-            clearance.rises = true;
+            clearance.has_wall = true;
             let normal = (b - a).cross(c - a);
             let is_steep = normal.z.abs() < STEEPEST * normal.length();
             let passes_below = normal.dot(a) / normal.z <= STEP * self.reach;
-            clearance.hangs |= !(is_steep || passes_below);
+            clearance.has_overhang |= !(is_steep || passes_below);
             return;
         }
         // Twice the signed areas of a point with the sides, as linear functions of the point. They weight the

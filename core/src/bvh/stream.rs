@@ -7,7 +7,7 @@
 //! 1. A mask holds the rays that do the same step next. The branch predictor misses the end of a mask, not
 //!    every step.
 //! 2. Stack entries need no test when popped: a new best hit has removed all that are farther.
-//! 3. Rays are prepared in a loop of their own, [`AHEAD`] at a time.
+//! 3. Rays are prepared in a loop of their own, [`PREFETCH_DISTANCE`] at a time.
 //! 4. Any-hit rays visit children of the least cost per area first ([`super::collapse`] orders the children
 //!    so). Near boxes first was slower.
 
@@ -26,7 +26,7 @@ use halflight_simd::{Simd, Stack, StackMemory};
 const SLOTS: usize = if cfg!(target_pointer_width = "64") { 32 } else { 4 };
 
 /// Rays prepared at a time.
-const AHEAD: usize = 64;
+const PREFETCH_DISTANCE: usize = 64;
 
 /// A ray in flight.
 #[derive(Clone, Copy)]
@@ -47,7 +47,7 @@ const DONE: Child = Child::NONE;
 struct Queue<'a, I> {
     rays: &'a [Ray],
     indices: I,
-    ahead: [TraversalRay; AHEAD],
+    ahead: [TraversalRay; PREFETCH_DISTANCE],
     count: usize,
     taken: usize,
 }
@@ -69,10 +69,10 @@ impl<I: Iterator<Item = u32>> Queue<'_, I> {
     #[inline(always)]
     fn fill(&mut self) {
         (self.count, self.taken) = (0, 0);
-        while self.count < AHEAD {
+        while self.count < PREFETCH_DISTANCE {
             let Some(index) = self.indices.next() else { return };
             let Some(ray) = self.rays.get(index as usize) else { continue };
-            self.ahead[self.count & (AHEAD - 1)] = TraversalRay::new(ray, index);
+            self.ahead[self.count & (PREFETCH_DISTANCE - 1)] = TraversalRay::new(ray, index);
             self.count += traceable(ray) as usize;
         }
     }
@@ -90,7 +90,8 @@ pub(super) fn trace<S: Simd, T: Sink, const ANY: bool>(
     if bvh.nodes.is_empty() {
         return;
     }
-    let mut queue = Queue { rays, indices, ahead: [TraversalRay::NONE; AHEAD], count: 0, taken: 0 };
+    let mut queue =
+        Queue { rays, indices, ahead: [TraversalRay::NONE; PREFETCH_DISTANCE], count: 0, taken: 0 };
     let mut slots = [Slot::EMPTY; SLOTS];
     let mut memory = StackMemory::<SLOTS>::new();
     let stacks = memory.stacks();

@@ -304,14 +304,14 @@ fn what_a_survey_is_sure_of_rays_find() {
             let query = ClearanceQuery { place, frame, reach: radius, points, depth: 0.3 * radius };
             let clearance = bvh.clearance(&query);
             let level = Level::detect();
-            low += u32::from(!clearance.rises);
-            for _ in 0..if clearance.rises { 0 } else { 16 } {
+            low += u32::from(!clearance.has_wall);
+            for _ in 0..if clearance.has_wall { 0 } else { 16 } {
                 let local = random.point(2.0).with_z(random.unit());
                 let way = radius / 3f32.sqrt() * frame.to_world(local.normalize());
                 assert!(!bvh.occluded(level, &Ray::segment(place, way, 1.0)), "{query:?} {way}");
             }
-            unhung += u32::from(clearance.rises && !clearance.hangs);
-            for _ in 0..if clearance.hangs { 0 } else { 16 } {
+            unhung += u32::from(clearance.has_wall && !clearance.has_overhang);
+            for _ in 0..if clearance.has_overhang { 0 } else { 16 } {
                 let local = random.point(2.0).with_z(1.0).normalize();
                 let way = radius / 3f32.sqrt() * frame.to_world(local);
                 let hit = bvh.nearest(level, &Ray::segment(place, way, 1.0));
@@ -353,6 +353,6 @@ fn on_a_floor_of_many_triangles_a_survey_sees_it_all_but_at_the_edge_and_under_a
         bvh.clearance(&ClearanceQuery { place, frame, reach: 1.0, points, depth: 0.1 })
     };
     assert_eq!(look(5.3), Clearance::OPEN);
-    assert_eq!(look(7.3), Clearance { rises: false, hangs: false, surface: 0xaa });
-    assert!([2.7, 1.3].map(look).iter().all(|clearance| clearance.rises && !clearance.hangs));
+    assert_eq!(look(7.3), Clearance { has_wall: false, has_overhang: false, surface: 0xaa });
+    assert!([2.7, 1.3].map(look).iter().all(|clearance| clearance.has_wall && !clearance.has_overhang));
 }

@@ -78,7 +78,10 @@ impl<'m> PhotonMapStore<'m> {
     /// None: a map that was built fits.
     pub fn map(&mut self) -> Result<Option<PhotonMap<'_>>, OutOfMemory> {
         let Self { arena, built } = self;
-        built.as_ref().map(|(count, shape)| PhotonMap::again(shape, *count, &mut arena.scratch())).transpose()
+        built
+            .as_ref()
+            .map(|(count, shape)| PhotonMap::from_shape(shape, *count, &mut arena.scratch()))
+            .transpose()
     }
 }
 

@@ -154,5 +154,5 @@ pub(super) fn progressive<'a>(
     samples: u32,
 ) -> PhotonLight<'a> {
     let enough = ENOUGH * RadiusSchedule::shrinkage(samples);
-    PhotonLight::new(map, radii.after(FIRST_RADIUS, samples)).with_enough(enough as f32)
+    PhotonLight::new(map, radii.after(FIRST_RADIUS, samples)).with_min_photons(enough as f32)
 }

@@ -15,7 +15,7 @@ const ROUNDING: f32 = 1.0 + 8.0 * f32::EPSILON;
 const TINY: f32 = f32::MIN_POSITIVE;
 
 /// The nearest photons of each place, in Morton order.
-pub(super) struct Searches<'a, 'm, 'n, F> {
+pub(super) struct NearestBatch<'a, 'm, 'n, F> {
     pub map: &'a PhotonMap<'m>,
     pub places: &'a [Vec3],
     pub squared_radius: f32,
@@ -24,7 +24,7 @@ pub(super) struct Searches<'a, 'm, 'n, F> {
     pub each: F,
 }
 
-impl<F: FnMut(usize, &Neighbours)> Kernel for Searches<'_, '_, '_, F> {
+impl<F: FnMut(usize, &Neighbours)> Kernel for NearestBatch<'_, '_, '_, F> {
     type Out = ();
 
     #[inline(always)]
@@ -35,7 +35,7 @@ impl<F: FnMut(usize, &Neighbours)> Kernel for Searches<'_, '_, '_, F> {
         for next in morton::along(map, self.places.iter().copied(), self.order) {
             let index = next.index as usize;
             let Some(place) = self.places.get(index) else { continue };
-            let place = map.space.enter(place.to_array());
+            let place = map.space.to_map(place.to_array());
             // Triangle inequality: the k photons of the previous search are no farther from here than this.
             let near = last.map_or(f32::MAX, |(last, distance)| {
                 let way = Vec3::from_array(last).distance(Vec3::from_array(place));
@@ -52,7 +52,7 @@ impl<F: FnMut(usize, &Neighbours)> Kernel for Searches<'_, '_, '_, F> {
 }
 
 /// Density estimates at discs in Morton order, with one response for all.
-pub(super) struct Gathers<'a, 'm, R> {
+pub(super) struct GatherBatch<'a, 'm, R> {
     pub map: &'a PhotonMap<'m>,
     pub discs: &'a [QueryDisc],
     pub response: &'a R,
@@ -60,7 +60,7 @@ pub(super) struct Gathers<'a, 'm, R> {
     pub densities: &'a mut [Density],
 }
 
-impl<R: Response> Kernel for Gathers<'_, '_, R> {
+impl<R: Response> Kernel for GatherBatch<'_, '_, R> {
     type Out = ();
 
     #[inline(always)]

@@ -1,14 +1,14 @@
 //! Brute-force reference of the searches, for tests: it visits every photon of a map.
 
-use super::{ALIKE, Density, FLATNESS, Kernel, PhotonMap, QueryDisc, Response, layout::LEAF};
+use super::{Density, FLATNESS, Kernel, MIN_NORMAL_COSINE, PhotonMap, QueryDisc, Response, layout::LEAF};
 use core::f32::consts::PI;
 use glam::Vec3;
 use halflight_simd::kernels::points::squared_distance;
 
 /// Index and squared distance, in units of the map, of every photon within `radius` of `place`.
 pub fn within(map: &PhotonMap, place: Vec3, radius: f32) -> impl Iterator<Item = (u32, f32)> {
-    let place = map.space.enter(place.to_array());
-    let squared_radius = map.space.squared(radius).unwrap_or(-1.0);
+    let place = map.space.to_map(place.to_array());
+    let squared_radius = map.space.squared_to_map(radius).unwrap_or(-1.0);
     let map = *map;
     let all = (0..map.count).map(move |i| {
         let photon = map.leaves.get(i / LEAF).map(|leaf| leaf.photon(i % LEAF).position);
@@ -20,18 +20,19 @@ pub fn within(map: &PhotonMap, place: Vec3, radius: f32) -> impl Iterator<Item =
 /// Reference of [`PhotonMap::gather`]: the same photons, summed in another order.
 pub fn gather<R: Response>(map: &PhotonMap, disc: &QueryDisc, response: &R) -> Density {
     let mut density = Density::default();
-    let squared_radius = map.space.squared(disc.radius).unwrap_or(0.0);
+    let squared_radius = map.space.squared_to_map(disc.radius).unwrap_or(0.0);
     if !(squared_radius > 0.0 && squared_radius < f32::MAX) {
         return density;
     }
-    let place = Vec3::from_array(map.space.enter(disc.place.to_array()));
+    let place = Vec3::from_array(map.space.to_map(disc.place.to_array()));
     let thickness = FLATNESS * libm::sqrtf(squared_radius);
     for (index, distance) in within(map, disc.place, disc.radius) {
         let leaf = map.leaves.get(index as usize / LEAF);
         let Some(photon) = leaf.map(|leaf| leaf.photon(index as usize % LEAF)) else { continue };
         let along = photon.normal_in_steps().dot(disc.normal);
         let flat = (place - photon.position()).dot(disc.normal).abs() <= thickness;
-        let alike = photon.normal_in_steps().length_squared() * (ALIKE * ALIKE) <= along * along;
+        let alike = photon.normal_in_steps().length_squared() * (MIN_NORMAL_COSINE * MIN_NORMAL_COSINE)
+            <= along * along;
         if flat && alike && along > 0.0 && photon.direction_in_steps().dot(disc.normal) > 0.0 {
             let arrives = photon.power() * response.of(photon.direction());
             let weight = |squared_radius: f32| {

@@ -21,7 +21,7 @@ pub(super) fn build<'m, J: ForkJoin>(
 ) -> PhotonMap<'m> {
     let photons: &mut [Photon] = bytemuck::cast_slice_mut(leaves);
     let offered = count.min(photons.len());
-    let (kept, space) = admit(&mut photons[..offered]);
+    let (kept, space) = keep_finite(&mut photons[..offered]);
     let photons = &mut photons[..kept];
     let levels = Levels::of(kept.div_ceil(LEAF));
     if let Some(top) = levels.count.checked_sub(1) {
@@ -36,7 +36,7 @@ pub(super) fn build<'m, J: ForkJoin>(
 }
 
 /// Moves the photons of finite places to the front, in units of the map. Returns their number.
-fn admit(photons: &mut [Photon]) -> (usize, Space) {
+fn keep_finite(photons: &mut [Photon]) -> (usize, Space) {
     let (mut kept, mut largest) = (0, 0.0f32);
     for i in 0..photons.len() {
         let position = photons[i].position();
@@ -49,7 +49,7 @@ fn admit(photons: &mut [Photon]) -> (usize, Space) {
     let space = Space::of(largest);
     for photon in &mut photons[..kept] {
         let position = photon.position;
-        photon.position = space.enter(position);
+        photon.position = space.to_map(position);
     }
     (kept, space)
 }

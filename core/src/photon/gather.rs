@@ -14,8 +14,8 @@
 //! (`docs/decisions/0043-density-bias.md`).
 
 use super::PhotonMap;
-use super::fence::{Fence, splat};
 use super::kernel::{Kernel, QueryDisc};
+use super::kernel_boundary::{KernelBoundary, splat};
 use super::layout::{HALVES, Leaf};
 use super::range::{Visit, leaves_within};
 use super::record::{DIRECTION_BITS, DIRECTION_STEPS, NORMAL_STEPS, POWER_BITS};
@@ -30,10 +30,10 @@ use halflight_simd::{Kernel as SimdKernel, Lanes, Mask, Simd, dot};
 pub const FLATNESS: f32 = 0.2;
 
 /// Cosine of the largest angle between the normals of a disc and of a photon in it.
-pub const ALIKE: f32 = 0.7;
+pub const MIN_NORMAL_COSINE: f32 = 0.7;
 
 /// Number of finer discs, each of half the radius of the previous one.
-pub const FINER: usize = 3;
+pub const FINER_DISCS: usize = 3;
 
 /// Response of a surface to light from a direction: its BSDF towards the camera, without a cosine.
 pub trait Response {
@@ -66,22 +66,22 @@ pub struct Density {
     /// Response times power per area: W/(m² sr), or W/m² for a response of 1.
     pub radiance: Rgb,
     /// Estimates of the finer discs: less blur, more noise.
-    pub finer: [Rgb; FINER],
+    pub finer: [Rgb; FINER_DISCS],
     /// Number of photons on the disc.
     pub photons: u32,
 }
 
 impl Density {
-    /// Radiance of the finest disc that has `enough` photons, assuming even density, and of the disc of half
-    /// its radius. For the finest disc the second value is extrapolated: blur falls with the square of the
-    /// radius.
+    /// Radiance of the finest disc that has at least `min_photons` photons, assuming even density, and of the
+    /// disc of half its radius. For the finest disc the second value is extrapolated: blur falls with the
+    /// square of the radius.
     #[inline]
-    pub fn of_enough(&self, enough: f32) -> [Rgb; 2] {
+    pub fn of_finest_disc(&self, min_photons: f32) -> [Rgb; 2] {
         let (mut chosen, mut photons) = (self.radiance, self.photons as f32);
         let mut wider = chosen;
         for finer in self.finer {
             photons *= 0.25;
-            if photons < enough {
+            if photons < min_photons {
                 return [chosen, finer];
             }
             (wider, chosen) = (chosen, finer);
@@ -94,7 +94,7 @@ impl Density {
 pub(super) struct Gather<'a, 'm, R> {
     pub map: &'a PhotonMap<'m>,
     pub disc: &'a QueryDisc,
-    pub fence: Option<&'a Fence>,
+    pub boundary: Option<&'a KernelBoundary>,
     pub response: &'a R,
 }
 
@@ -103,7 +103,7 @@ impl<R: Response> SimdKernel for Gather<'_, '_, R> {
 
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) -> Density {
-        gather(simd, self.map, self.disc, self.fence, self.response)
+        gather(simd, self.map, self.disc, self.boundary, self.response)
     }
 }
 
@@ -113,35 +113,35 @@ pub(super) fn gather<S: Simd, R: Response>(
     simd: S,
     map: &PhotonMap,
     disc: &QueryDisc,
-    fence: Option<&Fence>,
+    boundary: Option<&KernelBoundary>,
     response: &R,
 ) -> Density {
-    let Some(test) = DiscTest::new(simd, map, disc, fence) else { return Density::default() };
+    let Some(test) = DiscTest::new(simd, map, disc, boundary) else { return Density::default() };
     let DiscTest { place, squared_radius, .. } = test;
     let mut sum = Sum {
         test,
-        disc: Weighed::new(simd, squared_radius, disc.kernel),
+        disc: KernelSum::new(simd, squared_radius, disc.kernel),
         finer: [
-            Weighed::new(simd, squared_radius / 4.0, disc.kernel),
-            Weighed::new(simd, squared_radius / 16.0, disc.kernel),
-            Weighed::new(simd, squared_radius / 64.0, disc.kernel),
+            KernelSum::new(simd, squared_radius / 4.0, disc.kernel),
+            KernelSum::new(simd, squared_radius / 16.0, disc.kernel),
+            KernelSum::new(simd, squared_radius / 64.0, disc.kernel),
         ],
         response,
     };
     leaves_within(simd, map, &place, squared_radius, &mut sum);
-    let radiance = sum.disc.density((disc, 1.0), fence, response);
-    let mut density = Density { radiance, finer: [Rgb::ZERO; FINER], photons: sum.disc.photons };
+    let radiance = sum.disc.density((disc, 1.0), boundary, response);
+    let mut density = Density { radiance, finer: [Rgb::ZERO; FINER_DISCS], photons: sum.disc.photons };
     let mut part = 1.0;
     for (finer, radiance) in sum.finer.iter().zip(&mut density.finer) {
         part *= 0.5;
-        *radiance = finer.density((disc, part), fence, response);
+        *radiance = finer.density((disc, part), boundary, response);
     }
     density
 }
 
 /// Sum in the order of the lanes, which has the same bits at every level.
 #[inline(always)]
-fn added(lanes: [f32; 16]) -> f32 {
+fn sum_of_lanes(lanes: [f32; 16]) -> f32 {
     lanes.iter().fold(0.0, |sum, lane| sum + lane)
 }
 
@@ -152,7 +152,7 @@ pub(super) struct DiscTest<'a, S: Simd> {
     limit: S::F16,
     normal: [S::F16; 3],
     thickness: S::F16,
-    fence: Option<&'a Fence>,
+    boundary: Option<&'a KernelBoundary>,
 }
 
 /// Squared distances to the centre of a disc, directions of arrival, and mask of the photons that count.
@@ -161,15 +161,20 @@ type OnDisc<S> = (<S as Simd>::F16, [<S as Simd>::F16; 3], <<S as Simd>::F16 as 
 impl<'a, S: Simd> DiscTest<'a, S> {
     /// Test for photons of `map`; `None` if the radius is not finite and positive.
     #[inline(always)]
-    pub(super) fn new(simd: S, map: &PhotonMap, disc: &QueryDisc, fence: Option<&'a Fence>) -> Option<Self> {
-        let squared_radius = map.space.squared(disc.radius).unwrap_or(-1.0);
+    pub(super) fn new(
+        simd: S,
+        map: &PhotonMap,
+        disc: &QueryDisc,
+        boundary: Option<&'a KernelBoundary>,
+    ) -> Option<Self> {
+        let squared_radius = map.space.squared_to_map(disc.radius).unwrap_or(-1.0);
         (squared_radius > 0.0 && squared_radius < f32::MAX).then(|| Self {
-            place: Place16::new(simd, map.space.enter(disc.place.to_array())),
+            place: Place16::new(simd, map.space.to_map(disc.place.to_array())),
             squared_radius,
             limit: simd.splat16(squared_radius),
             normal: splat(simd, disc.normal),
             thickness: simd.splat16(FLATNESS * libm::sqrtf(squared_radius)),
-            fence,
+            boundary,
         })
     }
 
@@ -189,15 +194,16 @@ impl<'a, S: Simd> DiscTest<'a, S> {
         let (a, b) = (simd.bytes16(&a[half % HALVES]), simd.bytes16(&b[half % HALVES]));
         let surface = unfolded(simd, a, b, NORMAL_STEPS);
         let along = dot(surface, self.normal);
-        let alike = zero.lt(along) & (squared(surface) * simd.splat16(ALIKE * ALIKE)).le(along * along);
+        let alike = zero.lt(along)
+            & (squared(surface) * simd.splat16(MIN_NORMAL_COSINE * MIN_NORMAL_COSINE)).le(along * along);
 
         let light = &leaf.light[half % HALVES];
         let u = simd.field16(light, 0, DIRECTION_BITS);
         let v = simd.field16(light, DIRECTION_BITS, DIRECTION_BITS);
         let came = unfolded(simd, u, v, DIRECTION_STEPS);
         let counted = in_disc & alike & zero.lt(dot(came, self.normal));
-        let counted = match self.fence {
-            Some(fence) => counted & fence.sees(simd, offset, distance, self.squared_radius),
+        let counted = match self.boundary {
+            Some(boundary) => counted & boundary.contains(simd, offset, distance, self.squared_radius),
             None => counted,
         };
         counted.any().then_some((distance, came, counted))
@@ -207,13 +213,13 @@ impl<'a, S: Simd> DiscTest<'a, S> {
 /// Sums of one density estimate, in lanes.
 struct Sum<'a, S: Simd, R> {
     test: DiscTest<'a, S>,
-    disc: Weighed<S>,
-    finer: [Weighed<S>; FINER],
+    disc: KernelSum<S>,
+    finer: [KernelSum<S>; FINER_DISCS],
     response: &'a R,
 }
 
 /// Kernel-weighted sum over the photons of one disc.
-struct Weighed<S: Simd> {
+struct KernelSum<S: Simd> {
     /// Squared radius.
     limit: S::F16,
     /// One over the squared radius.
@@ -278,7 +284,7 @@ struct Photons16<S: Simd> {
     came: [S::F16; 3],
 }
 
-impl<S: Simd> Weighed<S> {
+impl<S: Simd> KernelSum<S> {
     /// Empty sum of a disc of this squared radius.
     #[inline(always)]
     fn new(simd: S, squared_radius: f32, kernel: Kernel) -> Self {
@@ -303,7 +309,7 @@ impl<S: Simd> Weighed<S> {
     ) {
         let mut bits = counted.bits();
         self.photons += bits.count_ones();
-        let weight = nearness(simd, self.kernel, photons.distance * self.reciprocal) * photons.scale;
+        let weight = kernel_weight(simd, self.kernel, photons.distance * self.reciprocal) * photons.scale;
         let weight = weight.select(counted, simd.splat16(0.0));
         let [red, green, blue] = photons.power;
         let (red, green, blue) = (red * weight, green * weight, blue * weight);
@@ -328,16 +334,17 @@ impl<S: Simd> Weighed<S> {
     fn density<R: Response>(
         &self,
         (disc, part): (&QueryDisc, f32),
-        fence: Option<&Fence>,
+        boundary: Option<&KernelBoundary>,
         response: &R,
     ) -> Rgb {
         if self.photons == 0 {
             return Rgb::ZERO;
         }
         let [r, g, b] = self.lanes;
-        let total = Rgb::new(added(r.to_array()), added(g.to_array()), added(b.to_array()));
+        let total =
+            Rgb::new(sum_of_lanes(r.to_array()), sum_of_lanes(g.to_array()), sum_of_lanes(b.to_array()));
         let responded = if R::UNIFORM { total * response.of(disc.normal) } else { self.singles };
-        let seen = fence.map_or(1.0, |fence| fence.share(disc.kernel, part));
+        let seen = boundary.map_or(1.0, |boundary| boundary.visible_fraction(disc.kernel, part));
         let radius = part * disc.radius;
         let per_area = if seen > 0.0 { 1.0 / (PI * seen * radius) / radius } else { 0.0 };
         responded * per_area
@@ -346,7 +353,7 @@ impl<S: Simd> Weighed<S> {
 
 /// Kernel weights by squared distance, in squared radii.
 #[inline(always)]
-pub(super) fn nearness<S: Simd>(simd: S, kernel: Kernel, squared: S::F16) -> S::F16 {
+pub(super) fn kernel_weight<S: Simd>(simd: S, kernel: Kernel, squared: S::F16) -> S::F16 {
     let one = simd.splat16(1.0);
     // Rounding must not make a weight negative.
     let squared = squared.min(one);

@@ -8,9 +8,9 @@
 mod batch;
 pub mod brute;
 mod build;
-mod fence;
 mod gather;
 mod kernel;
+mod kernel_boundary;
 mod layout;
 mod morton;
 mod nearest;
@@ -19,9 +19,9 @@ mod record;
 mod space;
 mod tagged;
 
-pub use fence::{Fence, PROBES};
-pub use gather::{ALIKE, Density, FINER, FLATNESS, Response, Uniform};
+pub use gather::{Density, FINER_DISCS, FLATNESS, MIN_NORMAL_COSINE, Response, Uniform};
 pub use kernel::{Kernel, QueryDisc};
+pub use kernel_boundary::{KernelBoundary, PROBES};
 pub use morton::QueryOrder;
 pub use nearest::Neighbours;
 pub use record::Photon;
@@ -98,7 +98,7 @@ pub struct MapShape {
 }
 
 impl<'m> PhotonMap<'m> {
-    /// Shape of this map, for [`PhotonMap::again`].
+    /// Shape of this map, for [`PhotonMap::from_shape`].
     pub fn shape(&self) -> MapShape {
         let Self { levels, count, refused, space, .. } = *self;
         MapShape { levels, count, refused, space }
@@ -109,7 +109,7 @@ impl<'m> PhotonMap<'m> {
     ///
     /// # Errors
     /// [`OutOfMemory`] when the arena is smaller than [`Photons::footprint`], or than the shape.
-    pub fn again(shape: &MapShape, capacity: usize, arena: &mut Arena<'m>) -> Result<Self, OutOfMemory> {
+    pub fn from_shape(shape: &MapShape, capacity: usize, arena: &mut Arena<'m>) -> Result<Self, OutOfMemory> {
         let available = arena.available();
         let short = OutOfMemory { needed: usize::MAX, available };
         let Photons { leaves, nodes, .. } = Photons::new(capacity, arena)?;
@@ -142,15 +142,15 @@ impl PhotonMap<'_> {
         let index = index as usize;
         let leaf = self.leaves.get(index / LEAF).filter(|_| index < self.count)?;
         let photon = leaf.photon(index % LEAF);
-        Some(Photon { position: self.space.leave(photon.position), ..photon })
+        Some(Photon { position: self.space.to_scene(photon.position), ..photon })
     }
 
     /// Finds the photons nearest to `place` within `radius`, at most the `k` of `neighbours`. The radius may
     /// be infinite. A negative or NaN radius and a NaN place find nothing.
     pub fn nearest(&self, level: Level, place: Vec3, radius: f32, neighbours: &mut Neighbours) {
-        let place = self.space.enter(place.to_array());
+        let place = self.space.to_map(place.to_array());
         // No photon has a negative squared distance.
-        let squared_radius = self.space.squared(radius).unwrap_or(-1.0);
+        let squared_radius = self.space.squared_to_map(radius).unwrap_or(-1.0);
         level.dispatch(nearest::Search { map: self, place, squared_radius, neighbours });
     }
 
@@ -179,26 +179,26 @@ impl PhotonMap<'_> {
     /// Finds all photons within `radius` of `place` and returns their number. `found` receives their indices
     /// in ascending order, as far as there is room; its remaining elements are unspecified.
     pub fn within(&self, level: Level, place: Vec3, radius: f32, found: &mut [u32]) -> usize {
-        let place = self.space.enter(place.to_array());
-        let Some(squared_radius) = self.space.squared(radius) else { return 0 };
+        let place = self.space.to_map(place.to_array());
+        let Some(squared_radius) = self.space.squared_to_map(radius) else { return 0 };
         level.dispatch(range::Range { map: self, place, squared_radius, found })
     }
 
     /// Density of photons on a disc, each weighted with the response of the surface.
     pub fn gather<R: Response>(&self, level: Level, disc: &QueryDisc, response: &R) -> Density {
-        level.dispatch(gather::Gather { map: self, disc, fence: None, response })
+        level.dispatch(gather::Gather { map: self, disc, boundary: None, response })
     }
 
-    /// Density over the part of the disc that is visible by `fence`.
+    /// Density over the part of the disc that is visible by `boundary`.
     pub fn gather_within<R: Response>(
         &self,
         level: Level,
         disc: &QueryDisc,
-        fence: &Fence,
+        boundary: &KernelBoundary,
         response: &R,
     ) -> Density {
-        let fence = Some(fence).filter(|fence| !fence.is_open());
-        level.dispatch(gather::Gather { map: self, disc, fence, response })
+        let boundary = Some(boundary).filter(|boundary| !boundary.is_open());
+        level.dispatch(gather::Gather { map: self, disc, boundary, response })
     }
 
     /// Calls `each` for every photon on the visible part of a disc, with its tag and two kernel weights per
@@ -207,11 +207,11 @@ impl PhotonMap<'_> {
         &self,
         level: Level,
         disc: &QueryDisc,
-        fence: Option<&Fence>,
+        boundary: Option<&KernelBoundary>,
         each: impl FnMut(u32, [f32; 2]),
     ) {
-        let fence = fence.filter(|fence| !fence.is_open());
-        level.dispatch(tagged::TaggedPhotons { map: self, disc, fence, each });
+        let boundary = boundary.filter(|boundary| !boundary.is_open());
+        level.dispatch(tagged::TaggedPhotons { map: self, disc, boundary, each });
     }
 
     /// [`PhotonMap::nearest`] for many places, in Morton order. `each` receives the index of a place and its
@@ -225,8 +225,8 @@ impl PhotonMap<'_> {
         neighbours: &mut Neighbours,
         each: impl FnMut(usize, &Neighbours),
     ) {
-        let squared_radius = self.space.squared(radius).unwrap_or(-1.0);
-        level.dispatch(batch::Searches { map: self, places, squared_radius, order, neighbours, each });
+        let squared_radius = self.space.squared_to_map(radius).unwrap_or(-1.0);
+        level.dispatch(batch::NearestBatch { map: self, places, squared_radius, order, neighbours, each });
     }
 
     /// [`PhotonMap::gather`] for many discs, in Morton order. `order` is working memory, one element for each
@@ -239,7 +239,7 @@ impl PhotonMap<'_> {
         order: &mut [QueryOrder],
         densities: &mut [Density],
     ) {
-        level.dispatch(batch::Gathers { map: self, discs, response, order, densities });
+        level.dispatch(batch::GatherBatch { map: self, discs, response, order, densities });
     }
 
     /// Lower and upper corner of the bounding box of the photons, in units of the map; empty without photons.

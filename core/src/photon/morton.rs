@@ -30,7 +30,7 @@ pub(super) fn along<'t>(
     let count = places.len().min(order.len());
     let order = &mut order[..count];
     for (index, (next, place)) in order.iter_mut().zip(places).enumerate() {
-        let place = map.space.enter(place.to_array());
+        let place = map.space.to_map(place.to_array());
         let cell = [0, 1, 2].map(|axis| {
             // The cast saturates, so that every place, NaN included, falls into a cell.
             ((place[axis] - lo[axis]) / (hi[axis] - lo[axis]) * cells) as u32

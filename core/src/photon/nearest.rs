@@ -15,13 +15,13 @@ use halflight_simd::{Kernel, Lanes, Mask, Simd};
 
 /// Number of candidates that starts a selection of `k`. A larger number means fewer selections, but later
 /// pruning.
-const fn patience(k: usize) -> usize {
+const fn selection_threshold(k: usize) -> usize {
     k.saturating_add(k / 4).saturating_add(8)
 }
 
 /// Room for candidates of `k` photons: a leaf more than the number that starts a selection.
-const fn room(k: usize) -> usize {
-    patience(k).saturating_add(LEAF + OVERRUN)
+const fn candidate_capacity(k: usize) -> usize {
+    selection_threshold(k).saturating_add(LEAF + OVERRUN)
 }
 
 /// The `k` nearest photons of a search, and its working memory.
@@ -39,7 +39,7 @@ pub struct Neighbours<'m> {
 impl<'m> Neighbours<'m> {
     /// Bytes for searches of the `k` nearest.
     pub fn footprint(k: usize) -> Footprint {
-        let one = Footprint::default().slice::<f32>(room(k));
+        let one = Footprint::default().slice::<f32>(candidate_capacity(k));
         one.and(one).and(one).and(one)
     }
 
@@ -48,7 +48,7 @@ impl<'m> Neighbours<'m> {
     /// # Errors
     /// [`OutOfMemory`] when the arena is smaller than [`Neighbours::footprint`].
     pub fn new(k: usize, arena: &mut Arena<'m>) -> Result<Self, OutOfMemory> {
-        let mut slice = || arena.slice(room(k));
+        let mut slice = || arena.slice(candidate_capacity(k));
         let (values, numbers) = ([slice()?, slice()?], [slice()?, slice()?]);
         Ok(Self { k, values, numbers, count: 0, limit: f32::INFINITY, space: super::space::Space::of(0.0) })
     }
@@ -66,7 +66,7 @@ impl<'m> Neighbours<'m> {
     /// Indices in the map and squared distances of the photons found, in no order.
     pub fn iter(&self) -> impl Iterator<Item = (u32, f32)> + '_ {
         let found = self.values[0].iter().zip(self.numbers[0].iter()).take(self.count);
-        found.map(|(&value, number)| (number.to_bits(), self.space.leave_squared(value)))
+        found.map(|(&value, number)| (number.to_bits(), self.space.squared_to_scene(value)))
     }
 
     /// Squared distance of the k-th photon in units of the map; infinite if fewer than `k` were found.
@@ -76,7 +76,7 @@ impl<'m> Neighbours<'m> {
 
     /// Squared distance of the k-th photon; infinite if fewer were found.
     pub fn squared_radius(&self) -> f32 {
-        self.space.leave_squared(self.limit)
+        self.space.squared_to_scene(self.limit)
     }
 }
 
@@ -193,7 +193,7 @@ impl<S: Simd> Walk<'_, '_, S> {
                 self.candidates.push16(simd, near, distances, numbers);
             }
         }
-        if self.candidates.count() >= patience(self.k) {
+        if self.candidates.count() >= selection_threshold(self.k) {
             let last = self.candidates.keep_smallest(simd, self.k);
             self.limit = self.limit.min(last);
         }

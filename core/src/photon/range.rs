@@ -12,7 +12,7 @@ pub(super) trait Visit<S: Simd> {
 }
 
 /// Number of leaves that are prefetched ahead of the visited leaf.
-const AHEAD: usize = 4;
+const PREFETCH_DISTANCE: usize = 4;
 
 /// Calls `visitor` with every leaf that has a box within the finite squared radius of a place.
 #[inline(always)]
@@ -26,20 +26,20 @@ pub(super) fn leaves_within<S: Simd>(
     let Some(top) = map.levels.count.checked_sub(1) else { return };
     let mut walk = Walk::new(simd, map, place, squared_radius, top);
     // Ring of leaves whose prefetch is under way.
-    let mut ring = [0; AHEAD];
+    let mut ring = [0; PREFETCH_DISTANCE];
     let (mut put, mut taken) = (0, 0);
     loop {
         if let Some(at) = walk.next(simd) {
             prefetch(simd, map, at);
-            ring[put % AHEAD] = at;
+            ring[put % PREFETCH_DISTANCE] = at;
             put += 1;
-            if put - taken < AHEAD {
+            if put - taken < PREFETCH_DISTANCE {
                 continue;
             }
         } else if taken == put {
             return;
         }
-        let at = ring[taken % AHEAD];
+        let at = ring[taken % PREFETCH_DISTANCE];
         taken += 1;
         let Some(leaf) = map.leaves.get(at) else { return };
         visitor.leaf(simd, at, leaf);

@@ -2,9 +2,9 @@
 //! weight.
 
 use super::PhotonMap;
-use super::fence::Fence;
-use super::gather::{DiscTest, nearness};
+use super::gather::{DiscTest, kernel_weight};
 use super::kernel::QueryDisc;
+use super::kernel_boundary::KernelBoundary;
 use super::layout::{HALVES, Leaf};
 use super::range::{Visit, leaves_within};
 use core::f32::consts::PI;
@@ -14,7 +14,7 @@ use halflight_simd::{Kernel, Lanes, Mask, Simd};
 pub(super) struct TaggedPhotons<'a, 'm, E> {
     pub map: &'a PhotonMap<'m>,
     pub disc: &'a QueryDisc,
-    pub fence: Option<&'a Fence>,
+    pub boundary: Option<&'a KernelBoundary>,
     pub each: E,
 }
 
@@ -23,12 +23,12 @@ impl<E: FnMut(u32, [f32; 2])> Kernel for TaggedPhotons<'_, '_, E> {
 
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) {
-        let Self { map, disc, fence, each } = self;
-        let Some(test) = DiscTest::new(simd, map, disc, fence) else { return };
+        let Self { map, disc, boundary, each } = self;
+        let Some(test) = DiscTest::new(simd, map, disc, boundary) else { return };
         let place = test.place;
         let squared_radius = test.squared_radius;
         let kernel = |part: f32| {
-            let seen = fence.map_or(1.0, |fence| fence.share(disc.kernel, part));
+            let seen = boundary.map_or(1.0, |boundary| boundary.visible_fraction(disc.kernel, part));
             let (radius, squared) = (part * disc.radius, part * part * squared_radius);
             let per_area = if seen > 0.0 { 1.0 / (PI * seen * radius) / radius } else { 0.0 };
             PartOfDisc {
@@ -67,7 +67,7 @@ impl<S: Simd, E: FnMut(u32, [f32; 2])> Visit<S> for List<'_, S, E> {
             let Some((distance, _, counted)) = self.test.photons(simd, leaf, half) else { continue };
             let [whole, finer] = &self.parts;
             let weight = |part: &PartOfDisc<S>| {
-                let weight = nearness(simd, self.kernel, distance * part.reciprocal) * part.per_area;
+                let weight = kernel_weight(simd, self.kernel, distance * part.reciprocal) * part.per_area;
                 weight.select(distance.le(part.limit), simd.splat16(0.0)).to_array()
             };
             let (whole, finer, mut bits) = (weight(whole), weight(finer), counted.bits());

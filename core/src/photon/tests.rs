@@ -67,7 +67,7 @@ fn check_searches(map: &PhotonMap, place: Vec3, radius: f32) {
             assert_eq!(found, indices, "{level:?} k {k} of {} at {place} within {radius}", map.len());
             let last =
                 if k > 0 && expected.len() == k { f32::from_bits(expected[k - 1].0) } else { f32::INFINITY };
-            assert_eq!(neighbours.squared_radius(), map.space.leave_squared(last));
+            assert_eq!(neighbours.squared_radius(), map.space.squared_to_scene(last));
         }
         let all: Vec<_> = brute::within(map, place, radius).map(|(i, _)| i).collect();
         for room in [all.len(), 0, all.len() / 2, all.len() + 40] {
@@ -274,7 +274,7 @@ fn what_is_gathered_is_what_brute_force_gathers() {
 }
 
 /// Radiance of a disc and of its finer discs.
-fn radiances(density: Density) -> [Rgb; 1 + FINER] {
+fn radiances(density: Density) -> [Rgb; 1 + FINER_DISCS] {
     let [half, quarter, eighth] = density.finer;
     [density.radiance, half, quarter, eighth]
 }
@@ -290,8 +290,8 @@ fn the_finest_disc_is_chosen_that_has_enough_photons() {
         (512, [eighth, Rgb::splat(4.25)]),
     ] {
         let density = Density { radiance: whole, finer: [half, quarter, eighth], photons };
-        assert_eq!(density.of_enough(8.0), expected, "{photons}");
-        assert_eq!(density.of_enough(f32::INFINITY), [whole, half]);
+        assert_eq!(density.of_finest_disc(8.0), expected, "{photons}");
+        assert_eq!(density.of_finest_disc(f32::INFINITY), [whole, half]);
     }
 }
 
@@ -429,7 +429,7 @@ fn the_map_is_the_same_on_any_number_of_threads() {
 }
 
 #[test]
-fn a_fence_leaves_out_what_is_behind_it_and_makes_up_for_it() {
+fn a_boundary_leaves_out_what_is_behind_it_and_makes_up_for_it() {
     let mut random = Random(61);
     let count = 400_000;
     let places: Vec<_> = (0..count).map(|_| random.point().with_z(0.0)).collect();
@@ -439,26 +439,30 @@ fn a_fence_leaves_out_what_is_behind_it_and_makes_up_for_it() {
             let level = Level::detect();
             let open = map.gather(level, &disc, &Uniform(Rgb::ONE));
             // A wall at x = 0.55 ends the probes that hit it.
-            let frame = Fence::frame(Vec3::Z, 0.2);
-            let fence = Fence::new(
+            let frame = KernelBoundary::frame(Vec3::Z, 0.2);
+            let boundary = KernelBoundary::new(
                 &frame,
-                Fence::WAYS.map(|way| {
+                KernelBoundary::PROBE_DIRECTIONS.map(|way| {
                     let x = frame.to_world(way.extend(0.0)).x;
                     if x > 0.0 { 0.05 / x / 0.2 } else { f32::INFINITY }
                 }),
             );
-            let fenced = map.gather_within(level, &disc, &fence, &Uniform(Rgb::ONE));
-            assert!(fenced.photons < open.photons * 9 / 10, "{fenced:?} {open:?}");
+            let bounded = map.gather_within(level, &disc, &boundary, &Uniform(Rgb::ONE));
+            assert!(bounded.photons < open.photons * 9 / 10, "{bounded:?} {open:?}");
             // A third of the photons is missing: 2.5 % is four standard deviations.
-            assert!((fenced.radiance / count as f32 - 1.0).abs().max_element() < 0.025, "{fenced:?}");
+            assert!((bounded.radiance / count as f32 - 1.0).abs().max_element() < 0.025, "{bounded:?}");
             // All photons that count lie before the wall: removing those behind it changes nothing.
             let before: Vec<_> = places.iter().copied().filter(|place| place.x <= 0.55).collect();
             with_map(&before, |map| {
-                let alone = map.gather_within(level, &disc, &fence, &Uniform(Rgb::ONE));
-                assert_eq!(alone.photons, fenced.photons);
+                let alone = map.gather_within(level, &disc, &boundary, &Uniform(Rgb::ONE));
+                assert_eq!(alone.photons, bounded.photons);
             });
             for level in Level::detect().and_below() {
-                assert_eq!(map.gather_within(level, &disc, &fence, &Uniform(Rgb::ONE)), fenced, "{level:?}");
+                assert_eq!(
+                    map.gather_within(level, &disc, &boundary, &Uniform(Rgb::ONE)),
+                    bounded,
+                    "{level:?}"
+                );
             }
         }
     });

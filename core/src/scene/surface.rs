@@ -28,8 +28,8 @@ pub struct SurfacePoint<'a> {
     pub triangle: u32,
 }
 
-/// Relative error bound, 16 half units in the last place: five roundings of the sum of three products, as many
-/// of the tracer's differences and shears, and one of the offset itself, rounded up.
+/// Relative error bound, 16 half units in the last place: five roundings of the sum of three products, as
+/// many of the tracer's differences and shears, and one of the offset itself, rounded up.
 const ERROR_UNITS: f32 = 16.0 * 0.5 * f32::EPSILON;
 
 /// Upper limit of slenderness, so that needles do not move rays too far. The error of the tracer's distances

@@ -9,13 +9,13 @@
 
 use crate::Rgb;
 use crate::bsdf::Features;
-use crate::photon::{Fence, Kernel, QueryDisc};
+use crate::photon::{Kernel, KernelBoundary, QueryDisc};
 use crate::transport::bidirectional::camera_path::{CameraPath, Vertex};
 use crate::transport::bidirectional::camera_paths::CameraPaths;
 use crate::transport::bidirectional::merge_photons::Merging;
 use crate::transport::bidirectional::mis::weight_of_merge;
 use crate::transport::bidirectional::vertex::{LightVertex, scattering};
-use crate::transport::photon_mapping::density::{GRAZING, fence};
+use crate::transport::photon_mapping::density::{GRAZING, kernel_boundary};
 use crate::transport::walk::dimension;
 use glam::Vec3;
 
@@ -40,9 +40,9 @@ impl<F: Features> CameraPaths<'_, F> {
         }
         let origin = point.position + point.error * point.geometric_normal;
         let turns = sampler.single(dimension::PROBES + path.segments);
-        let fence = fence(self.context.bvh, self.context.level, (origin, true), &disc, turns);
-        if !fence.is_open() {
-            density = self.density(path, vertex, (&disc, Some(&fence)));
+        let boundary = kernel_boundary(self.context.bvh, self.context.level, (origin, true), &disc, turns);
+        if !boundary.is_open() {
+            density = self.density(path, vertex, (&disc, Some(&boundary)));
         }
         // Both paths have met the cut-out, which the light passes but once.
         let opacity = self.context.opacity_at(point);
@@ -56,11 +56,11 @@ impl<F: Features> CameraPaths<'_, F> {
         &self,
         path: &CameraPath,
         vertex: &Vertex,
-        (disc, fence): (&QueryDisc, Option<&Fence>),
+        (disc, boundary): (&QueryDisc, Option<&KernelBoundary>),
     ) -> [Rgb; 2] {
         let mut sums = [Rgb::ZERO; 2];
         let Some(Merging { photons, vertices, .. }) = self.merging else { return sums };
-        photons.tagged_within(self.context.level, disc, fence, |tag, weights| {
+        photons.tagged_within(self.context.level, disc, boundary, |tag, weights| {
             let light =
                 vertices.get(tag as usize).map_or(Rgb::ZERO, |light| self.merged(path, vertex, light));
             sums = [sums[0] + light * weights[0], sums[1] + light * weights[1]];

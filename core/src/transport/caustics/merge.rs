@@ -51,7 +51,7 @@ use crate::transport::path::PathIntegrator;
 use crate::transport::path::estimator::{EmissionHit, Estimator, KnownLight, Rest};
 use crate::transport::path::sharing::Sharing;
 use crate::transport::path::vertex::PathVertex;
-use crate::transport::photon_mapping::density::{Gathered, Light, reflected};
+use crate::transport::photon_mapping::density::{Light, RadianceEstimate, reflected};
 use crate::transport::photon_mapping::radius::RadiusSchedule;
 use crate::transport::settings::PathSettings;
 use crate::transport::walk::context::SceneContext;
@@ -196,10 +196,10 @@ impl<'a> CausticMerging<'a> {
         (point, bsdf): (&SurfacePoint, &Bsdf),
         (wo, travelled): (Vec3, f32),
         turns: impl FnOnce() -> f32,
-    ) -> Gathered {
+    ) -> RadianceEstimate {
         let map = self.maps[sample as usize & 1];
         if map.is_empty() || !bsdf.is_receiver() {
-            return Gathered::default();
+            return RadianceEstimate::default();
         }
         let disc = QueryDisc {
             place: point.position,
@@ -210,9 +210,9 @@ impl<'a> CausticMerging<'a> {
         // Most places have no photon near them, and need not look for walls.
         let density = map.gather(context.level, &disc, &Uniform(Rgb::ONE));
         if density.photons == 0 {
-            return Gathered::default();
+            return RadianceEstimate::default();
         }
-        let light = Light { map, is_caustic: true, enough: f32::INFINITY };
+        let light = Light { map, is_caustic: true, min_photons: f32::INFINITY };
         reflected(light, context, (&disc, Some(density)), (point, bsdf), wo, turns())
     }
 }
@@ -301,7 +301,9 @@ impl<F: Features> Estimator<F> for CausticMerging<'_> {
         }
         state.left_coat = u32::from(coat_alone);
         state.ratio = match state.ratio {
-            _ if is_rough && state.here != Progress::NEVER => -self.discs.reach(point.position, self.paths),
+            _ if is_rough && state.here != Progress::NEVER => {
+                -self.discs.merge_factor(point.position, self.paths)
+            }
             _ if is_rough => 0.0,
             ratio if ratio == 0.0 || !self.may_come_by(bsdf, ratio) => 0.0,
             ratio => {

@@ -207,7 +207,7 @@ impl<'a, F: Features> CausticPhotonTracer<'a, F> {
 
     /// The share that photons have in the light of this path at `place`.
     fn share(&self, state: &LightPathState, place: Vec3) -> CausticShare {
-        let ratio = state.others / (self.discs.reach(place, self.flight.paths as f32) * state.chain);
+        let ratio = state.others / (self.discs.merge_factor(place, self.flight.paths as f32) * state.chain);
         let weight = merging_weight(ratio);
         // Zero over zero: without any other technique photons have it all.
         let weight = if state.others == 0.0 { 1.0 } else { weight };

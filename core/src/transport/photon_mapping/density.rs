@@ -4,7 +4,7 @@ use crate::bsdf::{Bsdf, Features};
 use crate::bvh::Bvh;
 use crate::bvh::clearance::{Clearance, ClearanceQuery};
 use crate::geometry::Ray;
-use crate::photon::{Density, FLATNESS, Fence, Kernel, PROBES, PhotonMap, QueryDisc, Uniform};
+use crate::photon::{Density, FLATNESS, Kernel, KernelBoundary, PROBES, PhotonMap, QueryDisc, Uniform};
 use crate::scene::SurfacePoint;
 use crate::transport::path::PathIntegrator;
 use crate::transport::path::estimator::{Estimator, KnownLight, Rest};
@@ -23,10 +23,10 @@ pub(in crate::transport) const GRAZING: f32 = 0.01;
 
 /// Slope of the probes for walls. Lower obstacles are steps, not walls, and a surface that bends less is no
 /// wall either.
-const LIFT: f32 = 0.1;
+const PROBE_SLOPE: f32 = 0.1;
 
 /// Directions of probes for overhangs: up, and at 45 degrees to four sides.
-const UPWARDS: [Vec3; 5] = {
+const OVERHANG_DIRECTIONS: [Vec3; 5] = {
     const D: f32 = core::f32::consts::FRAC_1_SQRT_2;
     let way = Vec3::new;
     [Vec3::Z, way(D, 0.0, D), way(0.0, D, D), way(-D, 0.0, D), way(0.0, -D, D)]
@@ -34,13 +34,13 @@ const UPWARDS: [Vec3; 5] = {
 
 /// Minimum radius of a disc under an overhang, as a fraction of its radius; with less, a photon would be a
 /// firefly.
-const LOWEST: f32 = 0.125;
+const MIN_OVERHANG_RADIUS: f32 = 0.125;
 
 /// Fraction of the way to a wall at which the surface is tested.
-const BEFORE: f32 = 0.99;
+const EDGE_TEST_FRACTION: f32 = 0.99;
 
 /// Bisection steps to the edge of a surface: precision is a sixteenth of the radius.
-const HALVINGS: u32 = 4;
+const BISECTIONS: u32 = 4;
 
 /// Photon map as an estimator of camera paths.
 #[derive(Clone, Copy)]
@@ -51,13 +51,13 @@ pub struct PhotonLight<'a> {
     /// True if most discs hold no photon, so that a disc is first tested for photons.
     is_sparse: bool,
     /// Number of photons that a disc needs.
-    enough: f32,
+    min_photons: f32,
 }
 
 impl<'a> PhotonLight<'a> {
     /// Photon map with density estimates over `discs`.
     pub fn new(map: &'a PhotonMap<'a>, discs: RadiusSchedule) -> Self {
-        Self { map, discs, kernel: Kernel::default(), is_sparse: false, enough: f32::INFINITY }
+        Self { map, discs, kernel: Kernel::default(), is_sparse: false, min_photons: f32::INFINITY }
     }
 
     /// This map with another `kernel`.
@@ -65,10 +65,10 @@ impl<'a> PhotonLight<'a> {
         Self { kernel, ..self }
     }
 
-    /// This map with discs no wider than `enough` evenly spread photons require; an eighth of the radius may
+    /// This map with discs no wider than `min_photons` evenly spread photons require; an eighth of the radius may
     /// do where photons are dense.
-    pub fn with_enough(self, enough: f32) -> Self {
-        Self { enough, ..self }
+    pub fn with_min_photons(self, min_photons: f32) -> Self {
+        Self { min_photons, ..self }
     }
 
     /// This map for caustics, which lie on few surfaces.
@@ -77,7 +77,7 @@ impl<'a> PhotonLight<'a> {
     }
 
     /// Radiance of reflected light from `point` to `wo`, at the end of a path of length `travelled` from the
-    /// camera; `None` if surfaces like `bsdf` store no photons. `turns`, from 0 to 1, rotates the probes for
+    /// camera; `None` if surfaces like `bsdf` store no photons. `rotation`, from 0 to 1, rotates the probes for
     /// walls, which are not counted as rays.
     #[inline]
     pub(in crate::transport) fn reflected<F: Features>(
@@ -85,8 +85,8 @@ impl<'a> PhotonLight<'a> {
         context: &SceneContext<F>,
         (point, bsdf): (&SurfacePoint, &Bsdf),
         (wo, travelled): (Vec3, f32),
-        turns: f32,
-    ) -> Option<Gathered> {
+        rotation: f32,
+    ) -> Option<RadianceEstimate> {
         if !bsdf.gathers_photons(context.separates_coats()) {
             return None;
         }
@@ -98,10 +98,10 @@ impl<'a> PhotonLight<'a> {
         };
         let density = self.is_sparse.then(|| self.map.gather(context.level, &disc, &Uniform(Rgb::ONE)));
         if density.is_some_and(|density| density.photons == 0) {
-            return Some(Gathered::default());
+            return Some(RadianceEstimate::default());
         }
-        let light = Light { map: self.map, is_caustic: self.is_sparse, enough: self.enough };
-        Some(reflected(light, context, (&disc, density), (point, bsdf), wo, turns))
+        let light = Light { map: self.map, is_caustic: self.is_sparse, min_photons: self.min_photons };
+        Some(reflected(light, context, (&disc, density), (point, bsdf), wo, rotation))
     }
 }
 
@@ -125,9 +125,9 @@ impl<F: Features> Estimator<F> for PhotonLight<'_> {
         if vertex.segments > 1 && settings.is_limited() {
             return rest;
         }
-        let turns = vertex.sampler.single(dimension::PROBES + vertex.segments);
+        let rotation = vertex.sampler.single(dimension::PROBES + vertex.segments);
         let from = (vertex.wo, vertex.travelled);
-        let reflected = self.reflected(context, (vertex.point, &vertex.bsdf), from, turns);
+        let reflected = self.reflected(context, (vertex.point, &vertex.bsdf), from, rotation);
         add(reflected.unwrap_or_default().known(vertex));
         if reflected.is_some() {
             rest.wide = Some(Components::EMITTED);
@@ -146,23 +146,23 @@ impl<'a, F: Features> PathIntegrator<'a, F> {
 
 /// Radiance of a density estimate.
 #[derive(Clone, Copy, Debug, Default)]
-pub(in crate::transport) struct Gathered {
+pub(in crate::transport) struct RadianceEstimate {
     pub(in crate::transport) light: Rgb,
     /// Expected blur: the difference to a disc of half the radius, times 4/3, since in smooth light the finer
     /// disc has a quarter of the blur.
     pub(in crate::transport) blur: Rgb,
 }
 
-impl Gathered {
+impl RadianceEstimate {
     /// Light for the estimator at `vertex`.
     #[inline]
     pub(in crate::transport) fn known(self, vertex: &PathVertex) -> KnownLight {
         KnownLight { contribution: vertex.throughput * self.light, blur: self.blur }
     }
 
-    /// Density estimate over the smallest disc of `enough` photons.
-    fn of(density: Density, enough: f32, response: Rgb) -> Self {
-        let [chosen, finer] = density.of_enough(enough);
+    /// Density estimate over the smallest disc of `min_photons` photons.
+    fn of(density: Density, min_photons: f32, response: Rgb) -> Self {
+        let [chosen, finer] = density.of_finest_disc(min_photons);
         Self { light: chosen * response, blur: (chosen - finer) * (4.0 / 3.0) * response }
     }
 }
@@ -174,30 +174,30 @@ pub(in crate::transport) struct Light<'a> {
     pub(in crate::transport) map: &'a PhotonMap<'a>,
     pub(in crate::transport) is_caustic: bool,
     /// Number of photons above which discs are narrowed.
-    pub(in crate::transport) enough: f32,
+    pub(in crate::transport) min_photons: f32,
 }
 
 /// Radiance from `point` to `wo` of the photons on the visible part of `disc`; `all` is their density without
 /// regard to visibility, if known. If the BSDF `is_varnished`, light of its base alone.
 #[inline]
 pub(in crate::transport) fn reflected<F: Features>(
-    Light { map, is_caustic, enough }: Light,
+    Light { map, is_caustic, min_photons }: Light,
     context: &SceneContext<F>,
     (disc, all): (&QueryDisc, Option<Density>),
     (point, bsdf): (&SurfacePoint, &Bsdf),
     wo: Vec3,
-    turns: f32,
-) -> Gathered {
+    rotation: f32,
+) -> RadianceEstimate {
     let origin = point.position + point.error * point.geometric_normal;
-    let fence = fence(context.bvh, context.level, (origin, is_caustic), disc, turns);
+    let boundary = kernel_boundary(context.bvh, context.level, (origin, is_caustic), disc, rotation);
     let is_flat = point.frame.normal == point.geometric_normal;
     if let (Bsdf::Diffuse(diffuse), true) = (bsdf, is_flat) {
         let response = diffuse.reflectance * FRAC_1_PI;
         return match all {
-            Some(all) if fence.is_open() => Gathered::of(all, enough, response),
-            _ => Gathered::of(
-                map.gather_within(context.level, disc, &fence, &Uniform(response)),
-                enough,
+            Some(all) if boundary.is_open() => RadianceEstimate::of(all, min_photons, response),
+            _ => RadianceEstimate::of(
+                map.gather_within(context.level, disc, &boundary, &Uniform(response)),
+                min_photons,
                 Rgb::ONE,
             ),
         };
@@ -211,79 +211,79 @@ pub(in crate::transport) fn reflected<F: Features>(
         }
         seen.value::<F>(wi) / from.dot(point.geometric_normal).abs().max(GRAZING)
     };
-    Gathered::of(map.gather_within(context.level, disc, &fence, &response), enough, Rgb::ONE)
+    RadianceEstimate::of(map.gather_within(context.level, disc, &boundary, &response), min_photons, Rgb::ONE)
 }
 
 /// Kernel boundary on `disc`: walls and edges by probes from `origin`, just above its centre; and overhangs,
 /// except for caustics.
-pub(in crate::transport) fn fence(
+pub(in crate::transport) fn kernel_boundary(
     bvh: &Bvh,
     level: Level,
     (origin, is_caustic): (Vec3, bool),
     disc: &QueryDisc,
-    turns: f32,
-) -> Fence {
-    let frame = Fence::frame(disc.normal, turns);
+    rotation: f32,
+) -> KernelBoundary {
+    let frame = KernelBoundary::frame(disc.normal, rotation);
     let radius = disc.radius;
     // Without a surface within the thickness of the disc there are no photons and no area.
     let depth = FLATNESS * radius;
-    let reach = Fence::FARTHEST * radius;
+    let reach = KernelBoundary::PROBE_LENGTH * radius;
     // Most discs are unobstructed, which one clearance query proves.
     let query = ClearanceQuery {
         place: origin,
         frame,
-        reach: (1.0 + LIFT) * reach,
+        reach: (1.0 + PROBE_SLOPE) * reach,
         points: [
-            Fence::WAYS.map(|way| BEFORE * reach * way.x),
-            Fence::WAYS.map(|way| BEFORE * reach * way.y),
+            KernelBoundary::PROBE_DIRECTIONS.map(|way| EDGE_TEST_FRACTION * reach * way.x),
+            KernelBoundary::PROBE_DIRECTIONS.map(|way| EDGE_TEST_FRACTION * reach * way.y),
         ],
         depth,
     };
     let clearance = bvh.clearance(&query);
     if clearance == Clearance::OPEN {
-        return Fence::open(&frame);
+        return KernelBoundary::open(&frame);
     }
-    let mut shares = [f32::INFINITY; PROBES];
-    for (i, share) in shares.iter_mut().enumerate() {
-        let way = frame.to_world(Fence::WAYS[i].extend(0.0));
-        if clearance.rises {
+    let mut lengths = [f32::INFINITY; PROBES];
+    for (i, length) in lengths.iter_mut().enumerate() {
+        let way = frame.to_world(KernelBoundary::PROBE_DIRECTIONS[i].extend(0.0));
+        if clearance.has_wall {
             // One by one: for eight rays the setup of a batch costs more than it gains.
-            let hit = bvh.nearest(level, &Ray::segment(origin, way + LIFT * disc.normal, reach));
+            let hit = bvh.nearest(level, &Ray::segment(origin, way + PROBE_SLOPE * disc.normal, reach));
             if hit.is_some() {
-                *share = hit.t / radius;
+                *length = hit.t / radius;
             }
         }
-        if share.is_infinite() && clearance.surface >> i & 1 != 0 {
+        if length.is_infinite() && clearance.surface >> i & 1 != 0 {
             continue;
         }
-        let is_there = |share: f32| {
-            let above = origin + share * radius * way + depth * disc.normal;
+        let has_surface = |length: f32| {
+            let above = origin + length * radius * way + depth * disc.normal;
             bvh.occluded(level, &Ray::segment(above, -disc.normal, 2.0 * depth))
         };
-        let farthest = share.min(Fence::FARTHEST);
-        if is_there(BEFORE * farthest) {
+        let farthest = length.min(KernelBoundary::PROBE_LENGTH);
+        if has_surface(EDGE_TEST_FRACTION * farthest) {
             continue;
         }
         let (mut low, mut high) = (0.0, farthest);
-        for _ in 0..HALVINGS {
+        for _ in 0..BISECTIONS {
             let middle = 0.5 * (low + high);
-            if is_there(middle) {
+            if has_surface(middle) {
                 low = middle;
             } else {
                 high = middle;
             }
         }
-        *share = 0.5 * (low + high);
+        *length = 0.5 * (low + high);
     }
-    if clearance.hangs && !is_caustic {
+    if clearance.has_overhang && !is_caustic {
         // Under an overhang lower than the disc is wide, light changes over a distance of its height.
-        for way in UPWARDS {
+        for way in OVERHANG_DIRECTIONS {
             let hit = bvh.nearest(level, &Ray::segment(origin, frame.to_world(way), radius / way.z));
             if hit.is_some() {
-                let height = (hit.t * way.z / radius).max(LOWEST);
-                shares.iter_mut().for_each(|share| *share = share.min(height));
+                let height = (hit.t * way.z / radius).max(MIN_OVERHANG_RADIUS);
+                lengths.iter_mut().for_each(|length| *length = length.min(height));
             }
         }
     }
-    Fence::new(&frame, shares)
+    KernelBoundary::new(&frame, lengths)
 }

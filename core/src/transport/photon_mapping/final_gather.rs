@@ -18,12 +18,12 @@ use crate::bvh::Bvh;
 use crate::geometry::Ray;
 use crate::light::luminance;
 use crate::memory::{Arena, Line};
-use crate::photon::{ALIKE, FLATNESS, Kernel, Neighbours, Photon, PhotonMap, QueryDisc};
+use crate::photon::{FLATNESS, Kernel, MIN_NORMAL_COSINE, Neighbours, Photon, PhotonMap, QueryDisc};
 use crate::scene::{Material, Scene, SurfacePoint};
 use crate::transport::path::PathIntegrator;
 use crate::transport::path::estimator::{Estimator, KnownLight, Rest};
 use crate::transport::path::vertex::PathVertex;
-use crate::transport::photon_mapping::density::{Gathered, Light, PhotonLight, reflected};
+use crate::transport::photon_mapping::density::{Light, PhotonLight, RadianceEstimate, reflected};
 use crate::transport::photon_mapping::irradiance::ABOVE;
 pub use crate::transport::photon_mapping::irradiance::{IRRADIANCES, PrecomputedIrradiance, STRIDE};
 use crate::transport::settings::PathSettings;
@@ -73,14 +73,14 @@ impl<'a> GlobalMapLookup<'a> {
     }
 
     /// Radiance of light from `point`, the hit of a gather ray of length `distance`, to `wo`, except by a
-    /// narrow coat. `None` if the map is unreliable. `turns`, from 0 to 1, rotates the probes for walls.
+    /// narrow coat. `None` if the map is unreliable. `rotation`, from 0 to 1, rotates the probes for walls.
     pub(in crate::transport) fn reflected<F: Features>(
         &self,
         context: &SceneContext<F>,
         (point, bsdf): (&SurfacePoint, &Bsdf),
         wo: Vec3,
         distance: f32,
-        turns: f32,
+        rotation: f32,
     ) -> Option<Rgb> {
         let (irradiance, radius) = self.irradiance((context.bvh, context.level), point, distance)?;
         if let Bsdf::Diffuse(diffuse) = bsdf {
@@ -88,8 +88,8 @@ impl<'a> GlobalMapLookup<'a> {
         }
         let (place, normal) = (point.position, point.geometric_normal);
         let disc = QueryDisc { place, normal, radius: radius.min(self.farthest), kernel: self.kernel };
-        let light = Light { map: self.global, is_caustic: false, enough: f32::INFINITY };
-        Some(reflected(light, context, (&disc, None), (point, bsdf), wo, turns).light)
+        let light = Light { map: self.global, is_caustic: false, min_photons: f32::INFINITY };
+        Some(reflected(light, context, (&disc, None), (point, bsdf), wo, rotation).light)
     }
 
     /// Irradiance at `point`, the hit of a gather ray of length `distance`, and the radius of its discs.
@@ -128,7 +128,8 @@ impl<'a> GlobalMapLookup<'a> {
         for (slot, (index, squared)) in alike.iter_mut().zip(neighbours.iter()) {
             let Some(photon) = self.irradiances.get(index) else { continue };
             let offset = photon.position() - point.position;
-            if photon.normal().dot(normal) < ALIKE || offset.dot(normal).abs() > FLATNESS * radius {
+            if photon.normal().dot(normal) < MIN_NORMAL_COSINE || offset.dot(normal).abs() > FLATNESS * radius
+            {
                 continue;
             }
             count += 1.0;
@@ -171,37 +172,37 @@ impl PhotonMaps<'_> {
         &self,
         (context, settings): (&SceneContext<F>, &PathSettings),
         vertex: &PathVertex,
-    ) -> (Gathered, Rest) {
+    ) -> (RadianceEstimate, Rest) {
         let PathVertex { point, ref bsdf, wo, came, segments, distance, travelled, .. } = *vertex;
         let is_limited = settings.is_limited();
-        let turns = vertex.sampler.single(dimension::PROBES + segments);
+        let rotation = vertex.sampler.single(dimension::PROBES + segments);
         // A path that may end in the map still may after this vertex.
         let all = Rest::of(if came.is_gathered() { Components::GATHERED } else { Components::ALL });
         if !bsdf.gathers_photons(context.separates_coats()) {
             if came.leaves_caustics() && bsdf.is_caustic_caster() {
                 let rest = Rest { is_lit: true, ..Rest::of(Components::BEHIND_MIRROR) };
-                return (Gathered::default(), rest);
+                return (RadianceEstimate::default(), rest);
             }
-            return (Gathered::default(), all);
+            return (RadianceEstimate::default(), all);
         }
         if came.is_gathered()
             && (!is_limited || segments == 2)
-            && let Some(light) = self.global.reflected(context, (point, bsdf), wo, distance, turns)
+            && let Some(light) = self.global.reflected(context, (point, bsdf), wo, distance, rotation)
         {
             let rest = Rest { wide: None, is_lit: true, ..all };
-            return (Gathered { light, ..Gathered::default() }, rest);
+            return (RadianceEstimate { light, ..RadianceEstimate::default() }, rest);
         }
         if is_limited && segments > 1 {
-            return (Gathered::default(), Rest::of(Components::ALL));
+            return (RadianceEstimate::default(), Rest::of(Components::ALL));
         }
         match &self.caustic {
             Some(caustic) => {
                 let travelled = if came.is_gathered() { 0.0 } else { travelled };
-                let gathered = caustic.reflected(context, (point, bsdf), (wo, travelled), turns);
+                let gathered = caustic.reflected(context, (point, bsdf), (wo, travelled), rotation);
                 let rest = Rest { wide: Some(Components::NO_CAUSTIC), ..all };
                 (gathered.unwrap_or_default(), rest)
             }
-            None => (Gathered::default(), Rest { wide: Some(Components::GATHERED), ..all }),
+            None => (RadianceEstimate::default(), Rest { wide: Some(Components::GATHERED), ..all }),
         }
     }
 }

@@ -4,9 +4,9 @@
 use crate::bvh::Bvh;
 use crate::light::luminance;
 use crate::memory::{Arena, Footprint, OutOfMemory};
-use crate::photon::{ALIKE, Kernel, Neighbours, Photon, PhotonMap, QueryDisc, Uniform};
+use crate::photon::{Kernel, MIN_NORMAL_COSINE, Neighbours, Photon, PhotonMap, QueryDisc, Uniform};
 use crate::sampling::mix;
-use crate::transport::photon_mapping::density::fence;
+use crate::transport::photon_mapping::density::kernel_boundary;
 use crate::transport::settings::Counters;
 use crate::{Level, Rgb};
 use glam::Vec3;
@@ -84,17 +84,18 @@ impl<'a> PrecomputedIrradiance<'a> {
         let (disc, factor) =
             self.global.disc_of_nearest(self.level, (place, normal), self.farthest, self.kernel, neighbours);
         let above = ABOVE * disc.radius + 16.0 * f32::EPSILON * place.abs().max_element();
-        let turns = (mix(index as u64) >> 40) as f32 / (1u64 << 24) as f32;
-        let fence = fence(self.bvh, self.level, (place + above * normal, false), &disc, turns);
-        if fence.share(self.kernel, 1.0) < LEAST_SEEN {
+        let rotation = (mix(index as u64) >> 40) as f32 / (1u64 << 24) as f32;
+        let boundary =
+            kernel_boundary(self.bvh, self.level, (place + above * normal, false), &disc, rotation);
+        if boundary.visible_fraction(self.kernel, 1.0) < LEAST_SEEN {
             return Photon::NONE;
         }
-        if fence.is_open() && !self.is_even(&disc, neighbours) {
+        if boundary.is_open() && !self.is_even(&disc, neighbours) {
             return Photon::NONE;
         }
         let response = Uniform(Rgb::splat(factor));
-        let density = self.global.gather_within(self.level, &disc, &fence, &response);
-        let tells = if fence.is_open() { normal } else { -normal };
+        let density = self.global.gather_within(self.level, &disc, &boundary, &response);
+        let tells = if boundary.is_open() { normal } else { -normal };
         Photon::new(place, tells, normal, density.radiance)
     }
 
@@ -102,7 +103,7 @@ impl<'a> PrecomputedIrradiance<'a> {
     fn is_even(&self, disc: &QueryDisc, neighbours: &Neighbours) -> bool {
         let (mut sum, mut moment) = (0.0, Vec3::ZERO);
         for photon in neighbours.iter().filter_map(|(index, _)| self.global.get(index)) {
-            if photon.normal().dot(disc.normal) >= ALIKE {
+            if photon.normal().dot(disc.normal) >= MIN_NORMAL_COSINE {
                 let power = luminance(photon.power());
                 sum += power;
                 moment += power * (photon.position() - disc.place);

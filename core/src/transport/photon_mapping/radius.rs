@@ -8,15 +8,16 @@ use core::f32::consts::PI;
 use glam::Vec3;
 
 /// Minimum camera distance of radii, since a surface in a mirror may lie near the camera: the lesser of
-/// [`NEAREST`] diagonals of the scene and [`NEAREST_SEEN`] times the distance of the nearest visible surface.
-const NEAREST: f32 = 0.05;
-const NEAREST_SEEN: f32 = 0.5;
+/// [`MIN_DISTANCE_IN_DIAGONALS`] diagonals of the scene and [`MIN_DISTANCE_OF_VISIBLE`] times the distance of
+/// the nearest visible surface.
+const MIN_DISTANCE_IN_DIAGONALS: f32 = 0.05;
+const MIN_DISTANCE_OF_VISIBLE: f32 = 0.5;
 
 /// Fraction of the scene's diagonal below which a surface is the one that the camera lies on.
-const STANDS_ON: f32 = 1e-6;
+const CONTACT: f32 = 1e-6;
 
 /// Number of rays across and down that search for the nearest visible surface.
-const GLANCES: u32 = 32;
+const RAYS_PER_SIDE: u32 = 32;
 
 /// Shrinkage exponent a: with 2/3 both variance and squared bias fall as n^(-2/3).
 const ALPHA: f64 = 2.0 / 3.0;
@@ -35,16 +36,17 @@ impl RadiusSchedule {
     pub fn new((scene, bvh): (&Scene, &Bvh), frame: [u32; 2], level: Level) -> Self {
         let camera = &scene.camera;
         let mut seen = f32::INFINITY;
-        for i in 0..GLANCES * GLANCES {
-            let at = |i: u32, pixels: u32| (i as f32 + 0.5) * pixels as f32 / GLANCES as f32;
-            let (x, y) = (at(i % GLANCES, frame[0]), at(i / GLANCES, frame[1]));
+        for i in 0..RAYS_PER_SIDE * RAYS_PER_SIDE {
+            let at = |i: u32, pixels: u32| (i as f32 + 0.5) * pixels as f32 / RAYS_PER_SIDE as f32;
+            let (x, y) = (at(i % RAYS_PER_SIDE, frame[0]), at(i / RAYS_PER_SIDE, frame[1]));
             let ray = camera.ray(frame[0], frame[1], x, y, [0.5; 2]);
             let hit = bvh.nearest(level, &ray);
             let distance = hit.t * Vec3::from(ray.direction).length();
-            let stands_on = distance < STANDS_ON * bvh.bounds().diagonal();
+            let stands_on = distance < CONTACT * bvh.bounds().diagonal();
             seen = if hit.is_some() && !stands_on { seen.min(distance) } else { seen };
         }
-        let nearest = (NEAREST * bvh.bounds().diagonal()).min(NEAREST_SEEN * seen);
+        let nearest =
+            (MIN_DISTANCE_IN_DIAGONALS * bvh.bounds().diagonal()).min(MIN_DISTANCE_OF_VISIBLE * seen);
         let radius = 2.0 * camera.tan_half_fov / frame[1].max(1) as f32;
         Self { eye: camera.eye, radius, nearest }
     }
@@ -81,7 +83,7 @@ impl RadiusSchedule {
 
     /// π² r² N: R of a path without vertices in between, for emission with a density of one.
     #[inline]
-    pub(in crate::transport) fn reach(&self, place: Vec3, paths: f32) -> f32 {
+    pub(in crate::transport) fn merge_factor(&self, place: Vec3, paths: f32) -> f32 {
         let radius = PI * self.radius(place);
         radius * radius * paths
     }
