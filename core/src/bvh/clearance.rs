@@ -15,7 +15,7 @@ use glam::Vec3;
 pub const POINTS: usize = 8;
 
 /// Size of the traversal stack. If it overflows, the surroundings count as closed.
-const WAITING: usize = 64;
+const STACK_SIZE: usize = 64;
 
 /// An overhang has a plane at least `STEP` times the reach above the point, and the cosine of its slope is at
 /// least `STEEPEST`: at most sixty degrees. The planes of a surface that bends upwards pass below.
@@ -74,7 +74,7 @@ impl Bvh<'_> {
     /// `false` if the stack overflows, so that triangles are missing.
     #[inline(always)]
     pub(crate) fn overlapping(&self, lo: Vec3, hi: Vec3, mut visit: impl FnMut([Vec3; 3]) -> bool) -> bool {
-        let mut waiting = [0u32; WAITING];
+        let mut waiting = [0u32; STACK_SIZE];
         let mut count = 1usize;
         let (mut goes_on, mut is_whole) = (true, true);
         while let Some(&index) = count.checked_sub(1).and_then(|last| waiting.get(last)) {

@@ -5,36 +5,36 @@ use crate::sampling::mix;
 use glam::Vec3;
 
 /// Slots of the hash table, a power of two.
-const PLACES: usize = 1 << 13;
+const SLOTS: usize = 1 << 13;
 
-/// Slots that an edge may use. An edge that finds all of them taken counts as a border.
-const TRIES: u64 = 64;
+/// Slots that an edge may use (linear probing). An edge that finds all of them taken counts as a border.
+const MAX_PROBES: u64 = 64;
 
 /// Bits of a slot that count modulo their range: up for an edge, down for its reverse.
 const COUNTER: u32 = 7;
 
 /// Hash table of edges, with the number of occurrences of each less those of its reverse. The key is a hash
 /// of both ends. A collision may drop a border now and then, which costs only noise.
-pub(super) struct Edges([u32; PLACES]);
+pub(super) struct Edges([u32; SLOTS]);
 
 impl Edges {
     pub(super) const fn new() -> Self {
-        Self([0; PLACES])
+        Self([0; SLOTS])
     }
 
     /// Adds an edge of a triangle seen from a `side`, a number.
     pub(super) fn add(&mut self, edge: [Vec3; 2], side: u64) {
         let (key, step) = key(edge, side);
-        let free = places(key).find(|place| self.0[*place] == 0 || self.0[*place] & !COUNTER == key);
-        if let Some(place) = free {
-            self.0[place] = key | (self.0[place].wrapping_add(step) & COUNTER);
+        let free = slots(key).find(|slot| self.0[*slot] == 0 || self.0[*slot] & !COUNTER == key);
+        if let Some(slot) = free {
+            self.0[slot] = key | (self.0[slot].wrapping_add(step) & COUNTER);
         }
     }
 
     /// True if the edge is a border of that side.
     pub(super) fn is_border(&self, edge: [Vec3; 2], side: u64) -> bool {
         let (key, _) = key(edge, side);
-        let known = places(key).map(|place| self.0[place]).find(|known| known & !COUNTER == key);
+        let known = slots(key).map(|slot| self.0[slot]).find(|known| known & !COUNTER == key);
         known.is_none_or(|known| known & COUNTER != 0)
     }
 }
@@ -50,9 +50,9 @@ fn key([a, b]: [Vec3; 2], side: u64) -> (u32, u32) {
     (key, if a < b { 1 } else { COUNTER })
 }
 
-fn places(key: u32) -> impl Iterator<Item = usize> {
+fn slots(key: u32) -> impl Iterator<Item = usize> {
     let first = mix(u64::from(key));
-    (0..TRIES).map(move |n| (first.wrapping_add(n) % PLACES as u64) as usize)
+    (0..MAX_PROBES).map(move |n| (first.wrapping_add(n) % SLOTS as u64) as usize)
 }
 
 #[cfg(test)]
@@ -84,9 +84,9 @@ mod tests {
     fn too_many_edges_are_borders() {
         let mut edges = Edges::new();
         let edge = |i: u32| [Vec3::splat(i as f32), Vec3::X];
-        for i in 0..4 * PLACES as u32 {
+        for i in 0..4 * SLOTS as u32 {
             edges.add(edge(i), 1);
         }
-        assert!((0..4 * PLACES as u32).all(|i| edges.is_border(edge(i), 1)));
+        assert!((0..4 * SLOTS as u32).all(|i| edges.is_border(edge(i), 1)));
     }
 }

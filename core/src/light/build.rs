@@ -11,7 +11,7 @@ use crate::sampling::AliasTable;
 use crate::scene::{PointLight, Scene};
 
 /// Least weight of a light relative to the strongest: no light that emits is ever left out.
-const LEAST_POWER: f64 = 1e-30;
+const MIN_POWER: f64 = 1e-30;
 
 /// Numbers of lights in [`LightSampler::build`].
 #[derive(Clone, Copy, Default)]
@@ -76,13 +76,13 @@ impl<'m> LightSampler<'m> {
         let sides = |e: &Emitter| if e.is_two_sided() { 2.0 } else { 1.0 };
         let area_powers = kept.iter().map(|e| mean_luminance(scene, e) * f64::from(e.area) * sides(e));
         // A light that emits in all directions counts as a ball, which shows a quarter of its area.
-        let all_around = |light| if place_of(scene, light).1.is_all() { 4.0 } else { 1.0 };
+        let all_around = |light| if bounds_of(scene, light).1.is_all() { 4.0 } else { 1.0 };
         let point_powers = points.iter().map(|&light| strength_of(scene, light) * all_around(light));
         let unit = area_powers.clone().chain(point_powers.clone()).fold(0.0, f64::max);
         let unit = if unit > 0.0 { unit } else { 1.0 };
-        let relative = |power: f64| (power / unit).max(LEAST_POWER) as f32;
+        let relative = |power: f64| (power / unit).max(MIN_POWER) as f32;
         let emitters = kept.iter().map(|e| (Bounds::around(e.corners()), e.cone()));
-        let without_surface = points.iter().map(|&light| place_of(scene, light));
+        let without_surface = points.iter().map(|&light| bounds_of(scene, light));
         for (i, ((slot, (bounds, cone)), power)) in items
             .iter_mut()
             .zip(emitters.chain(without_surface))
@@ -143,7 +143,7 @@ fn strength_of(scene: &Scene, light: u32) -> f64 {
     scene.lights.get(light as usize).map_or(0.0, strength)
 }
 
-fn place_of(scene: &Scene, light: u32) -> (Bounds, Cone) {
+fn bounds_of(scene: &Scene, light: u32) -> (Bounds, Cone) {
     match scene.lights.get(light as usize) {
         Some(PointLight::Point { position, .. }) => (Bounds::around([*position]), Cone::ALL),
         Some(PointLight::Spot { position, direction, cos_outer, .. }) => (

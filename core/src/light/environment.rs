@@ -17,7 +17,7 @@ impl Environment {
     #[inline]
     pub fn radiance(&self, scene: &Scene, direction: Vec3) -> Rgb {
         match self.texture(scene) {
-            Some(texture) => self.looked_up(texture, square(self.to_map * direction)),
+            Some(texture) => self.lookup(texture, square(self.to_map * direction)),
             None => self.radiance,
         }
     }
@@ -31,7 +31,7 @@ impl Environment {
     /// Radiance at (azimuth, polar angle) as fractions of the map. Between a pole and the centres of its
     /// nearest row the value of that row is kept, because interpolation would mix in the other pole.
     #[inline]
-    fn looked_up(&self, texture: &Texture, at: Vec2) -> Rgb {
+    fn lookup(&self, texture: &Texture, at: Vec2) -> Rgb {
         let half_row = 0.5 / texture.height as f32;
         let texel = texture.lookup(Vec2::new(at.x, 1.0 - at.y.clamp(half_row, 1.0 - half_row)));
         self.radiance * Rgb::new(texel[0], texel[1], texel[2])
@@ -47,19 +47,19 @@ fn square(d: Vec3) -> Vec2 {
 }
 
 /// Number of cells beyond which the density does not fit into the second-level cache.
-const MANY_CELLS: usize = 1 << 16;
+const MAX_CACHED_CELLS: usize = 1 << 16;
 
 /// Largest increase of the light's second moment by larger cells.
-const LOSS: f64 = 0.02;
+const MAX_LOSS: f64 = 0.02;
 
 /// Texels along a side of a cell of the density: as many as lose next to nothing. A density that stays in the
 /// cache is several times as fast. A sky may have large cells, a sky with a sun may not.
 fn block(texture: &Texture) -> usize {
     let (width, height) = (texture.width as usize, texture.height as usize);
     let mut block = 1;
-    while width * height / (block * block) > MANY_CELLS {
+    while width * height / (block * block) > MAX_CACHED_CELLS {
         let next = 2 * block;
-        if !width.is_multiple_of(next) || !height.is_multiple_of(next) || loss(texture, next) > LOSS {
+        if !width.is_multiple_of(next) || !height.is_multiple_of(next) || loss(texture, next) > MAX_LOSS {
             break;
         }
         block = next;
@@ -129,7 +129,7 @@ impl<'m> EnvironmentSampler<'m> {
             let quarters = [(-0.25, -0.25), (0.25, -0.25), (-0.25, 0.25), (0.25, 0.25)];
             let value = |(dx, dy)| {
                 let at = (center + Vec2::new(dx, dy)) * texel;
-                super::luminance(environment.looked_up(texture, at))
+                super::luminance(environment.lookup(texture, at))
             };
             let mean = 0.25 * quarters.into_iter().map(value).sum::<f32>();
             let sine = sin_cos_turns(0.5 * center.y * texel.y).0;

@@ -16,7 +16,7 @@ use crate::{Level, Rgb};
 use glam::Vec3;
 
 /// Least probability of each kind of light that exists.
-const FLOOR: f32 = 0.1;
+const MIN_PROBABILITY: f32 = 0.1;
 
 /// Sample of a light: a direction from which light may come.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -77,7 +77,7 @@ pub struct LightSampler<'m> {
 }
 
 /// Probability of each kind of light.
-struct Shares {
+struct KindProbabilities {
     tree: f32,
     environment: f32,
     distant: f32,
@@ -150,7 +150,7 @@ impl<'m> LightSampler<'m> {
         u: [f32; 3],
         warped: Option<WarpedSample>,
     ) -> Option<(LightSample, bool)> {
-        let shares = self.shares(position, normal);
+        let shares = self.kind_probabilities(position, normal);
         let [u0, u1, choice] = u;
         if choice < shares.tree {
             let rescaled = (choice / shares.tree).min(ONE_MINUS_EPSILON);
@@ -202,7 +202,7 @@ impl<'m> LightSampler<'m> {
         if pdf <= 0.0 || !faces(normal, direction) {
             return 0.0;
         }
-        let share = self.shares(position, normal).tree;
+        let share = self.kind_probabilities(position, normal).tree;
         pdf * share * self.tree.pdf(position, normal, index as u32)
     }
 
@@ -253,7 +253,7 @@ impl<'m> LightSampler<'m> {
     }
 
     /// True if there are point or directional lights, which no path hits.
-    pub(crate) fn have_deltas(&self) -> bool {
+    pub(crate) fn has_delta_lights(&self) -> bool {
         !self.points.is_empty() || !self.distant.is_empty()
     }
 
@@ -273,7 +273,7 @@ impl<'m> LightSampler<'m> {
     /// Probability that [`LightSampler::sample`] chooses the delta light `light`, in the order of emission.
     pub(crate) fn probability(&self, light: u32, position: Vec3, normal: Vec3) -> f32 {
         let index = light as usize;
-        let shares = self.shares(position, normal);
+        let shares = self.kind_probabilities(position, normal);
         match index.checked_sub(self.in_tree()) {
             None => shares.tree * self.tree.pdf(position, normal, light),
             Some(distant) => shares.distant * self.distant_table.pdf(distant),
@@ -289,7 +289,7 @@ impl<'m> LightSampler<'m> {
                     Some(table) => sampler.pdf_through(environment, table, direction),
                     None => sampler.pdf(environment, normal, direction),
                 };
-                self.shares(position, normal).environment * pdf
+                self.kind_probabilities(position, normal).environment * pdf
             }
             _ => 0.0,
         }
@@ -297,17 +297,17 @@ impl<'m> LightSampler<'m> {
 
     /// True with more than one light; otherwise `u[2]` of [`LightSampler::sample`] is unused.
     #[inline]
-    pub fn have_choice(&self) -> bool {
+    pub fn has_many_lights(&self) -> bool {
         self.count() > 1
     }
 
     /// Number of lights of all kinds, in the order of emission.
     pub(super) fn count(&self) -> usize {
-        self.near() + self.distant.len() + usize::from(self.environment.is_some())
+        self.finite_count() + self.distant.len() + usize::from(self.environment.is_some())
     }
 
     /// Number of lights at finite places.
-    pub(super) fn near(&self) -> usize {
+    pub(super) fn finite_count(&self) -> usize {
         self.in_tree()
     }
 
@@ -317,10 +317,10 @@ impl<'m> LightSampler<'m> {
 
     /// Probabilities of the kinds at a point. With a single kind nothing is computed.
     #[inline]
-    fn shares(&self, position: Vec3, normal: Vec3) -> Shares {
+    fn kind_probabilities(&self, position: Vec3, normal: Vec3) -> KindProbabilities {
         let (sky, sun) = (self.environment_weight, self.distant_weight);
         if sky + sun == 0.0 {
-            return Shares { tree: 1.0, environment: 0.0, distant: 0.0 };
+            return KindProbabilities { tree: 1.0, environment: 0.0, distant: 0.0 };
         }
         let near = if self.in_tree() == 0 { 0.0 } else { self.tree.importance(position, normal) };
         let kinds = [near, sky, sun].map(|weight| if weight > 0.0 { 1.0 } else { 0.0 });
@@ -328,10 +328,11 @@ impl<'m> LightSampler<'m> {
         // Divided before the sum, because three large floats may overflow.
         let largest = near.max(sky).max(sun);
         let relative = [near, sky, sun].map(|weight| weight / largest);
-        let by_weight = (1.0 - FLOOR * count) / (relative[0] + relative[1] + relative[2]);
-        let share =
-            |i: usize| if count == 1.0 { kinds[i] } else { kinds[i] * FLOOR + by_weight * relative[i] };
-        Shares { tree: share(0), environment: share(1), distant: share(2) }
+        let by_weight = (1.0 - MIN_PROBABILITY * count) / (relative[0] + relative[1] + relative[2]);
+        let share = |i: usize| {
+            if count == 1.0 { kinds[i] } else { kinds[i] * MIN_PROBABILITY + by_weight * relative[i] }
+        };
+        KindProbabilities { tree: share(0), environment: share(1), distant: share(2) }
     }
 
     fn sample_point(&self, scene: &Scene, light: u32, from: Vec3, probability: f32) -> Option<LightSample> {

@@ -98,7 +98,7 @@ impl<'m> EmissionGuide<'m> {
         let mut arena = memory.take("emission", kept)?;
         let mut guide = Self::by_power(context, &mut arena)?;
         let stats = if is_caustic {
-            GuideStats::aimed(scene, lights, &guide.emission, &mut arena)?.map(GuideStats::alone)
+            GuideStats::aimed(scene, lights, &guide.emission, &mut arena)?.map(GuideStats::with_bounded_power)
         } else {
             Some(GuideStats::of_all(lights, &mut arena)?)
         };
@@ -140,7 +140,7 @@ impl<'m> EmissionGuide<'m> {
         let teach = |stats: &mut GuideStats, pilot: &Pilot| {
             pilot.useful().for_each(|(cell, power)| stats.learn(cell, power));
             if !is_caustic {
-                stats.even_out(&by_power);
+                stats.average_per_light(&by_power);
             }
         };
         let mut seen = 0;

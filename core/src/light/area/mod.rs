@@ -67,7 +67,7 @@ impl Emitter {
         let pair = if pairs { Self::parallelogram(mesh, index) } else { None };
         let (corners, shape, turns) = match pair {
             Some((first, second, shape)) => {
-                (rotated(mesh.corners(index), first), shape, first << 2 | second << 4)
+                (rotate_corners(mesh.corners(index), first), shape, first << 2 | second << 4)
             }
             None => (mesh.corners(index), Shape::Triangle, 0),
         };
@@ -100,9 +100,9 @@ impl Emitter {
     fn parallelogram(mesh: &Mesh, index: u32) -> Option<(u32, u32, Shape)> {
         let (first, second) = (mesh.corners(index), mesh.corners(index.checked_add(1)?));
         for turn in 0..3 {
-            let [o, a, b] = rotated(first, turn);
+            let [o, a, b] = rotate_corners(first, turn);
             for other in 0..3 {
-                let [c, d, e] = rotated(second, other);
+                let [c, d, e] = rotate_corners(second, other);
                 let (u, v) = (a - o, b - o);
                 let tolerance = SHAPE_TOLERANCE * u.length().min(v.length());
                 // The shared edge runs a → b in one triangle and b → a in the other.
@@ -124,9 +124,9 @@ impl Emitter {
 
     /// Edges between corners of the mesh, equal to the bit to those of neighbouring lights.
     pub(super) fn border(&self, mesh: &Mesh) -> impl Iterator<Item = [Vec3; 2]> + use<> {
-        let [o, a, b] = rotated(mesh.corners(self.triangle), self.flags >> 2 & 3);
+        let [o, a, b] = rotate_corners(mesh.corners(self.triangle), self.flags >> 2 & 3);
         let (last, count) = match self.is_pair() {
-            true => (rotated(mesh.corners(self.triangle + 1), self.flags >> 4 & 3)[0], 4),
+            true => (rotate_corners(mesh.corners(self.triangle + 1), self.flags >> 4 & 3)[0], 4),
             false => (b, 3),
         };
         [[o, a], [a, last], [last, if count == 4 { b } else { o }], [b, o]].into_iter().take(count)
@@ -252,17 +252,17 @@ impl Emitter {
         let [o, u, v] = [self.origin, self.edges[0], self.edges[1]].map(Vec3::from);
         let position = o + a * u + b * v;
         if self.shape() == Shape::Triangle || a + b <= 1.0 {
-            let weights = unrotated([1.0 - a - b, a, b], self.flags >> 2 & 3);
+            let weights = unrotate_corners([1.0 - a - b, a, b], self.flags >> 2 & 3);
             return Place { position, triangle: self.triangle, barycentric: [weights[1], weights[2]] };
         }
         // The second half is relative to its unshared corner, with the edges reversed.
-        let weights = unrotated([a + b - 1.0, 1.0 - a, 1.0 - b], self.flags >> 4 & 3);
+        let weights = unrotate_corners([a + b - 1.0, 1.0 - a, 1.0 - b], self.flags >> 4 & 3);
         Place { position, triangle: self.triangle + 1, barycentric: [weights[1], weights[2]] }
     }
 }
 
 /// Rotates corner `turn` to the front.
-fn rotated<T: Copy>(c: [T; 3], turn: u32) -> [T; 3] {
+fn rotate_corners<T: Copy>(c: [T; 3], turn: u32) -> [T; 3] {
     match turn {
         0 => c,
         1 => [c[1], c[2], c[0]],
@@ -270,9 +270,9 @@ fn rotated<T: Copy>(c: [T; 3], turn: u32) -> [T; 3] {
     }
 }
 
-/// Inverse of [`rotated`].
+/// Inverse of [`rotate_corners`].
 #[inline]
-fn unrotated<T: Copy>(c: [T; 3], turn: u32) -> [T; 3] {
+fn unrotate_corners<T: Copy>(c: [T; 3], turn: u32) -> [T; 3] {
     match turn {
         0 => c,
         1 => [c[2], c[0], c[1]],

@@ -41,7 +41,7 @@ impl<'m> EmissionGuide<'m> {
     }
 
     /// Samples a light and one of its cells.
-    pub(super) fn pick(&self, choice: f32) -> Option<GuideSample> {
+    pub(super) fn sample(&self, choice: f32) -> Option<GuideSample> {
         let (cell, _, _) = self.table.sample(choice)?;
         let (light, own) = (cell / self.cells(), cell % self.cells());
         let side = self.side;

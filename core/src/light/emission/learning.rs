@@ -15,8 +15,8 @@ use crate::scene::{Material, Scene};
 use glam::Vec3;
 
 /// Largest number of cells along a side of a light's square, and of all cells together with many lights.
-const MOST_SIDE: usize = 64;
-const MOST_CELLS: usize = 1 << 16;
+const MAX_SIDE: usize = 64;
+const MAX_CELLS: usize = 1 << 16;
 
 /// Shares of emission: by power over all cells, and towards casters. The rest follows the learned benefit.
 const DEFENSIVE: f32 = 0.1;
@@ -25,27 +25,27 @@ const AIMED: f32 = 0.2;
 /// Shares of emission for photons of all light: by power, so that no photon has more than four times the mean
 /// power; and evenly over the cells of each light by its total benefit.
 const DEFENSIVE_OF_ALL: f32 = 0.25;
-const EVENLY_OF_ALL: f32 = 0.25;
+const UNIFORM_OF_ALL: f32 = 0.25;
 
 /// Largest number of cells for photons of all light: few, so that each is learned from many photons.
 const CELLS_OF_ALL: usize = 1 << 10;
 
 /// Weight of the benefit of each neighbouring cell.
-const BESIDE: f32 = 0.125;
+const NEIGHBOUR_WEIGHT: f32 = 0.125;
 
 /// Target points on casters: over all lights together, at most for each light, and at least for each of its
 /// cells. With thousands of lights each has only a few cells.
-const AIMS: usize = 1 << 17;
-const MOST_AIMS: usize = 1 << 14;
-const FEWEST_AIMS: usize = 2;
+const TARGETS: usize = 1 << 17;
+const MAX_TARGETS: usize = 1 << 14;
+const MIN_TARGETS: usize = 2;
 
 /// Cells around the cell of a target point that count as aimed at.
-const AROUND: isize = 1;
+const TARGET_MARGIN: isize = 1;
 
 /// Benefit of the cells of all lights, while it is being learned.
 pub struct GuideStats<'m> {
-    /// 1 for cells that lead to casters; with [`GuideStats::even_out`] the total benefit of the light over
-    /// its power.
+    /// 1 for cells that lead to casters; with [`GuideStats::average_per_light`] the total benefit of the
+    /// light over its power.
     aimed: &'m mut [f32],
     /// Sum of the benefit of photons.
     learned: &'m mut [f32],
@@ -64,8 +64,8 @@ impl<'m> GuideStats<'m> {
     /// Bytes of [`GuideStats::of_all`] together with [`GuideStats::guide`].
     pub fn footprint_of_all(lights: &LightSampler) -> Footprint {
         let cells = Self::cells_of_all(lights);
-        let worth = Footprint::default().slice::<f32>(cells).slice::<f32>(cells);
-        worth.and(AliasTable::footprint(cells))
+        let stats = Footprint::default().slice::<f32>(cells).slice::<f32>(cells);
+        stats.and(AliasTable::footprint(cells))
     }
 
     /// Statistics for photons of all light. The guide follows power until something is learned.
@@ -78,18 +78,18 @@ impl<'m> GuideStats<'m> {
         aimed.fill(0.0);
         learned.fill(0.0);
         let side = side(lights.count(), CELLS_OF_ALL);
-        Ok(Self { aimed, learned, side, shares: [DEFENSIVE_OF_ALL, EVENLY_OF_ALL] })
+        Ok(Self { aimed, learned, side, shares: [DEFENSIVE_OF_ALL, UNIFORM_OF_ALL] })
     }
 
     /// Sends a share of the photons of all light evenly over the cells of each light, by the light's total
     /// benefit. The benefit of a single cell rests on few photons.
-    pub fn even_out(&mut self, emission: &EmissionSampler) {
+    pub fn average_per_light(&mut self, emission: &EmissionSampler) {
         let of_light = (self.side * self.side).max(1);
         let lights = self.aimed.chunks_mut(of_light).zip(self.learned.chunks(of_light));
         for (light, (aimed, learned)) in lights.enumerate() {
             // [`GuideStats::guide`] multiplies by power again.
-            let worth = learned.iter().sum::<f32>() / emission.table.pdf(light);
-            aimed.fill(if worth.is_finite() { worth } else { 0.0 });
+            let benefit = learned.iter().sum::<f32>() / emission.table.pdf(light);
+            aimed.fill(if benefit.is_finite() { benefit } else { 0.0 });
         }
     }
 
@@ -109,22 +109,22 @@ impl<'m> GuideStats<'m> {
         emission: &EmissionSampler,
         arena: &mut Arena<'m>,
     ) -> Result<Option<Self>, OutOfMemory> {
-        let side = side(lights.count(), MOST_CELLS);
+        let side = side(lights.count(), MAX_CELLS);
         let cells = cells(lights);
         let (aimed, learned) = (arena.slice::<f32>(cells)?, arena.slice::<f32>(cells)?);
         aimed.fill(0.0);
         learned.fill(0.0);
-        let lots = lights.count().max(1);
-        let points = (AIMS / lots).clamp(FEWEST_AIMS * side * side, MOST_AIMS);
+        let light_count = lights.count().max(1);
+        let points = (TARGETS / light_count).clamp(MIN_TARGETS * side * side, MAX_TARGETS);
         let mut any = false;
-        throwing_points(scene, points, |number, point| {
+        for_each_caster_point(scene, points, |number, point| {
             for light in 0..lights.count() {
                 let sampler = Sampler::new(0x6775_6964, light as u32, number);
                 let Some([u, v]) = emission.aim(scene, lights, light, point, &sampler) else { continue };
                 any = true;
                 let middle = [u, v].map(|u| (u * side as f32) as isize);
-                for y in middle[1] - AROUND..=middle[1] + AROUND {
-                    for x in middle[0] - AROUND..=middle[0] + AROUND {
+                for y in middle[1] - TARGET_MARGIN..=middle[1] + TARGET_MARGIN {
+                    for x in middle[0] - TARGET_MARGIN..=middle[0] + TARGET_MARGIN {
                         let inside = (0..side as isize).contains(&x) && (0..side as isize).contains(&y);
                         let index = light * side * side + (y * side as isize + x).unsigned_abs();
                         if let Some(cell) = aimed.get_mut(index).filter(|_| inside) {
@@ -139,20 +139,15 @@ impl<'m> GuideStats<'m> {
 
     /// Statistics for photons that alone carry their light, without other paths: the share by power is that
     /// of photons of all light, so that no photon has more than four times the mean power.
-    pub fn alone(self) -> Self {
+    pub fn with_bounded_power(self) -> Self {
         Self { shares: [DEFENSIVE_OF_ALL, AIMED], ..self }
     }
 
-    /// Adds the benefit `worth` of a photon from `cell`.
-    pub fn learn(&mut self, cell: u32, worth: f32) {
-        if let Some(slot) = self.learned.get_mut(cell as usize).filter(|_| worth.is_finite()) {
-            *slot += worth;
+    /// Adds the `benefit` of a photon from `cell`.
+    pub fn learn(&mut self, cell: u32, benefit: f32) {
+        if let Some(slot) = self.learned.get_mut(cell as usize).filter(|_| benefit.is_finite()) {
+            *slot += benefit;
         }
-    }
-
-    /// True if any photon had a benefit.
-    pub fn is_any(&self) -> bool {
-        self.learned.iter().any(|&worth| worth > 0.0)
     }
 
     /// `emission` with a guide by the benefit so far. `arena` needs [`GuideStats::guide_footprint`].
@@ -172,7 +167,7 @@ impl<'m> GuideStats<'m> {
             if total > 0.0 { (1.0 / total) as f32 } else { 0.0 }
         };
         let aimed = |i: usize| self.aimed.get(i).map_or(0.0, |aimed| aimed * power(i));
-        let learned = |i: usize| self.spread(i);
+        let learned = |i: usize| self.smoothed(i);
         let (per_aimed, per_learned) = (sum(&aimed), sum(&learned));
         let [nowhere, aimed_at] = self.shares;
         let seen = if per_learned > 0.0 { 1.0 - nowhere - aimed_at } else { 0.0 };
@@ -183,7 +178,7 @@ impl<'m> GuideStats<'m> {
     }
 
     /// Benefit of cell `i` and part of that of its neighbours: few photons show only part of what is useful.
-    fn spread(&self, i: usize) -> f32 {
+    fn smoothed(&self, i: usize) -> f32 {
         let side = self.side;
         let of_light = side * side;
         let (first, own) = (i / of_light * of_light, i % of_light);
@@ -192,7 +187,7 @@ impl<'m> GuideStats<'m> {
         let mut sum = 0.0;
         for v in y.saturating_sub(1)..(y + 2).min(side) {
             for u in x.saturating_sub(1)..(x + 2).min(side) {
-                let own = if (u, v) == (x, y) { 1.0 } else { BESIDE };
+                let own = if (u, v) == (x, y) { 1.0 } else { NEIGHBOUR_WEIGHT };
                 sum += own * learned(first + v * side + u);
             }
         }
@@ -207,7 +202,7 @@ impl<'m> GuideStats<'m> {
 
 /// Cells along a side for this number of lights, with at most `most` cells in all.
 fn side(lights: usize, most: usize) -> usize {
-    let mut side = MOST_SIDE;
+    let mut side = MAX_SIDE;
     while side > 1 && lights.saturating_mul(side * side) > most {
         side /= 2;
     }
@@ -215,24 +210,24 @@ fn side(lights: usize, most: usize) -> usize {
 }
 
 fn cells(lights: &LightSampler) -> usize {
-    let side = side(lights.count(), MOST_CELLS);
+    let side = side(lights.count(), MAX_CELLS);
     lights.count() * side * side
 }
 
-/// Calls `show` with about `count` points, evenly spread over all surfaces that cast caustics.
-fn throwing_points(scene: &Scene, count: usize, mut show: impl FnMut(u32, Vec3)) {
+/// Calls `visit` with about `count` points, evenly spread over all surfaces that cast caustics.
+fn for_each_caster_point(scene: &Scene, count: usize, mut visit: impl FnMut(u32, Vec3)) {
     let area = |index: u32| {
         let [a, b, c] = scene.mesh.corners(index);
         let area = 0.5 * f64::from((b - a).cross(c - a).length());
         if area.is_finite() { area } else { 0.0 }
     };
-    let throwing = |index: &u32| {
+    let is_caster = |index: &u32| {
         let triangle = scene.mesh.triangles.get(*index as usize);
         triangle
             .and_then(|t| scene.materials.get(t.material as usize))
             .is_some_and(Material::may_pass_caustics)
     };
-    let triangles = || (0..scene.mesh.triangles.len() as u32).filter(throwing);
+    let triangles = || (0..scene.mesh.triangles.len() as u32).filter(is_caster);
     let step = triangles().map(area).sum::<f64>() / count as f64;
     if step <= 0.0 || step.is_nan() {
         return;
@@ -245,7 +240,7 @@ fn throwing_points(scene: &Scene, count: usize, mut show: impl FnMut(u32, Vec3))
             passed -= step;
             let at = Sampler::new(0x6169_6d73, 0, number).pair(0);
             let (u, v) = crate::sampling::warp::uniform_triangle(at);
-            show(number, a + u * (b - a) + v * (c - a));
+            visit(number, a + u * (b - a) + v * (c - a));
             number += 1;
         }
     }

@@ -101,16 +101,16 @@ impl<'m> EmissionSampler<'m> {
         let (mut place, mut direction) = (numbers.pair(PLACE), numbers.pair(DIRECTION));
         let GuideSample { light, cell, square } = match &self.guide {
             None => GuideSample { light: self.table.sample(choice)?.0, ..GuideSample::default() },
-            Some(guide) => guide.pick(choice)?,
+            Some(guide) => guide.sample(choice)?,
         };
         // The guide controls the direction of light from finite places, and the entry point of light from
         // infinity.
-        let aiming = if light < lights.near() { &mut direction } else { &mut place };
+        let aiming = if light < lights.finite_count() { &mut direction } else { &mut place };
         *aiming = square.map_or(*aiming, |square| square.at(*aiming));
         let square = square.map(|_| *aiming);
         let emitted = if let Some(emitter) = lights.emitters.get(light) {
             from_surface(scene, emitter, place, direction)
-        } else if light < lights.near() + lights.distant.len() {
+        } else if light < lights.finite_count() + lights.distant.len() {
             self.without_surface(lights.without_surface(scene, light)?, place, direction)
         } else {
             let (environment, sky) = (scene.environment.as_ref()?, lights.environment.as_ref()?);

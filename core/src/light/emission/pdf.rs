@@ -31,7 +31,7 @@ impl LightSampler<'_> {
 
     /// Index of the environment in the order of emission, the last of all lights.
     pub(crate) fn environment_index(&self) -> u32 {
-        (self.near() + self.distant.len()) as u32
+        (self.finite_count() + self.distant.len()) as u32
     }
 }
 
@@ -63,7 +63,7 @@ impl EmissionSampler<'_> {
     }
 
     /// Density of the environment in unit `direction` from `position`, per m² sr of étendue.
-    pub(crate) fn density_of_sky(
+    pub(crate) fn density_of_environment(
         &self,
         scene: &Scene,
         lights: &LightSampler,
@@ -72,7 +72,7 @@ impl EmissionSampler<'_> {
     ) -> f32 {
         match (&lights.environment, &scene.environment) {
             (Some(sampler), Some(environment)) => {
-                let index = lights.near() + lights.distant.len();
+                let index = lights.finite_count() + lights.distant.len();
                 let density = self.density(scene, lights, index, -direction, position);
                 density * sampler.pdf(environment, Vec3::ZERO, direction) * self.per_disc()
             }
@@ -81,7 +81,7 @@ impl EmissionSampler<'_> {
     }
 
     /// Density of a light without extent at `position`, per m² of surface that faces it.
-    pub(crate) fn density_of_choice(
+    pub(crate) fn density_of_delta(
         &self,
         scene: &Scene,
         lights: &LightSampler,
@@ -113,22 +113,22 @@ impl EmissionSampler<'_> {
         position: Vec3,
     ) -> f32 {
         let (light, direction) = (sample.light, sample.direction);
-        match self.found(lights, light) {
+        match self.light_type(lights, light) {
             LightType::Area => {
                 let place = position + sample.distance * direction;
                 self.density_of_emitter(scene, lights, light as usize, (place, -direction))
             }
-            LightType::Infinite => self.density_of_sky(scene, lights, direction, position),
-            LightType::Delta => self.density_of_choice(scene, lights, light, position),
+            LightType::Infinite => self.density_of_environment(scene, lights, direction, position),
+            LightType::Delta => self.density_of_delta(scene, lights, light, position),
         }
     }
 
     /// Type of `light`, in the order of emission.
-    pub(crate) fn found(&self, lights: &LightSampler, light: u32) -> LightType {
+    pub(crate) fn light_type(&self, lights: &LightSampler, light: u32) -> LightType {
         let index = light as usize;
         if index < lights.emitters.len() {
             LightType::Area
-        } else if index < lights.near() + lights.distant.len() {
+        } else if index < lights.finite_count() + lights.distant.len() {
             LightType::Delta
         } else {
             LightType::Infinite

@@ -2,7 +2,7 @@
 //! node.
 
 use super::importance::{GROUPS, LightBounds};
-use super::{LEAF, LEVELS, Node, Tree, WAITING};
+use super::{LEAF, LEVELS, Node, STACK_SIZE, Tree};
 use crate::Level;
 use crate::geometry::{Bounds, Cone};
 use bytemuck::{Pod, Zeroable};
@@ -40,7 +40,7 @@ impl<'m> Tree<'m> {
     pub(in crate::light) fn build(items: &mut [Item], nodes: &'m mut [Node], trails: &'m mut [u64]) -> Self {
         let whole = items.iter().fold(Sum::NONE, |sum, item| sum.and(Sum::of(item)));
         let whole = if items.is_empty() { LightBounds::default() } else { whole.group(items) };
-        let mut stack = [Work::default(); WAITING];
+        let mut stack = [Work::default(); STACK_SIZE];
         let mut waiting = usize::from(items.len() > 1);
         let mut free = waiting;
         stack[0] = Work { end: items.len(), ..Work::default() };

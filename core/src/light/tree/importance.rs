@@ -10,7 +10,7 @@ use glam::Vec3;
 use halflight_simd::{Lanes, Simd, dot};
 
 /// Upper limit of importances, so that their sums stay finite at a point on a light.
-const LARGEST: f32 = 1e30;
+const MAX_IMPORTANCE: f32 = 1e30;
 
 /// Coefficient k of the approximation (µ + √(µ² + k σ²)) / 2 to the mean of max(cos, 0) for cosines of mean µ
 /// and variance σ². Exact for all directions at once, and for a hemisphere seen from its side.
@@ -21,10 +21,10 @@ const CLAMPED: f32 = 0.75;
 const SPREAD: f32 = 0.14;
 
 /// Mean of max(cos, 0) over all directions, for lights that emit in all directions.
-const ALL_AROUND: f32 = 0.25;
+const OMNIDIRECTIONAL: f32 = 0.25;
 
 /// Lower limit of a cosine, as a fraction of its largest possible value.
-const LEAST: f32 = 0.1;
+const MIN_COSINE: f32 = 0.1;
 
 /// Groups that are evaluated at once.
 pub(super) const GROUPS: usize = 8;
@@ -122,7 +122,7 @@ impl LightBounds8 {
 #[inline(always)]
 fn importance<L: Lanes>(all: impl Fn(f32) -> L, group: &LightBounds<L>, point: Vec3, normal: Vec3) -> L {
     let (zero, one) = (all(0.0), all(1.0));
-    let parts = [zero, all(0.5), all(LEAST)];
+    let parts = [zero, all(0.5), all(MIN_COSINE)];
     let [cx, cy, cz] = group.center;
     let to_light = [cx - all(point.x), cy - all(point.y), cz - all(point.z)];
     let (square, distance2) = (group.radius * group.radius, dot(to_light, to_light));
@@ -144,7 +144,7 @@ fn importance<L: Lanes>(all: impl Fn(f32) -> L, group: &LightBounds<L>, point: V
     let across = all(0.5) * (one - mean * mean - along);
     let variance = all(CLAMPED) * (along * cos * cos + across * sin * sin) + spread * sin * sin;
     let shone = facing(mean * cos, variance, most, parts);
-    let shone = shone.select(all(-1.0).lt(group.cos_cone), all(ALL_AROUND));
+    let shone = shone.select(all(-1.0).lt(group.cos_cone), all(OMNIDIRECTIONAL));
     let mut strength = group.power * inverse * inverse * shone;
     if normal != Vec3::ZERO {
         let cos = dot(direction, [all(normal.x), all(normal.y), all(normal.z)]);
@@ -152,10 +152,10 @@ fn importance<L: Lanes>(all: impl Fn(f32) -> L, group: &LightBounds<L>, point: V
         strength = strength * facing(cos, spread, most, parts);
     }
     // Inside the sphere lights may lie in any direction.
-    let within = all(ALL_AROUND) * group.power / square.max(all(f32::MIN_POSITIVE));
+    let within = all(OMNIDIRECTIONAL) * group.power / square.max(all(f32::MIN_POSITIVE));
     let strength = within.select(distance2.le(square), strength);
     // Comparison with NaN is false: a NaN point receives no light.
-    strength.min(all(LARGEST)).select(zero.lt(strength), zero)
+    strength.min(all(MAX_IMPORTANCE)).select(zero.lt(strength), zero)
 }
 
 /// Mean of the positive part of cosines of this mean and variance, whose largest is `most`. No closure: one
@@ -236,7 +236,7 @@ mod tests {
             for (slot, group) in wanted.iter_mut().zip(&all).take(count) {
                 *slot = group.importance(point, normal);
             }
-            assert!(wanted.iter().all(|value| (0.0..=LARGEST).contains(value)), "{wanted:?}");
+            assert!(wanted.iter().all(|value| (0.0..=MAX_IMPORTANCE).contains(value)), "{wanted:?}");
             for level in Level::detect().and_below() {
                 let found = level.dispatch(Weigh(&groups, point, normal));
                 assert_eq!(found.map(f32::to_bits), wanted.map(f32::to_bits), "{case} {}", level.name());

@@ -31,7 +31,7 @@ const LEVELS: u32 = GROUPS.trailing_zeros();
 
 /// Largest number of nodes on the stack of a visit to all. A path has at most 21 nodes, by the bits of a
 /// trail.
-const WAITING: usize = 1 + (u64::BITS / LEVELS) as usize * (GROUPS - 1);
+const STACK_SIZE: usize = 1 + (u64::BITS / LEVELS) as usize * (GROUPS - 1);
 
 /// Tree over lights, built from [`Item`]s and indexed by their `light`.
 #[derive(Clone, Copy, Debug)]
@@ -73,7 +73,7 @@ impl<'m> Tree<'m> {
         match self.trails.len() {
             0 => None,
             1 => Some((0, 1.0, u)),
-            _ => self.level.dispatch(Choose { nodes: self.nodes, point, normal, u }),
+            _ => self.level.dispatch(SampleKernel { nodes: self.nodes, point, normal, u }),
         }
     }
 
@@ -83,7 +83,7 @@ impl<'m> Tree<'m> {
         match self.trails.get(light as usize) {
             None => 0.0,
             Some(_) if self.nodes.is_empty() => 1.0,
-            Some(&trail) => self.level.dispatch(Follow { nodes: self.nodes, point, normal, trail }),
+            Some(&trail) => self.level.dispatch(PdfKernel { nodes: self.nodes, point, normal, trail }),
         }
     }
 
@@ -97,7 +97,7 @@ impl<'m> Tree<'m> {
         if self.nodes.is_empty() {
             return each(0);
         }
-        let mut stack = [0u32; WAITING];
+        let mut stack = [0u32; STACK_SIZE];
         let mut waiting = 1;
         while let Some(next) = usize::checked_sub(waiting, 1) {
             waiting = next;
@@ -125,14 +125,14 @@ fn most_nodes(lights: usize) -> usize {
 }
 
 /// Kernel of [`Tree::sample`].
-struct Choose<'t> {
+struct SampleKernel<'t> {
     nodes: &'t [Node],
     point: Vec3,
     normal: Vec3,
     u: f32,
 }
 
-impl Kernel for Choose<'_> {
+impl Kernel for SampleKernel<'_> {
     type Out = Option<(u32, f32, f32)>;
 
     #[inline(always)]
@@ -164,14 +164,14 @@ impl Kernel for Choose<'_> {
 }
 
 /// Kernel of [`Tree::pdf`].
-struct Follow<'t> {
+struct PdfKernel<'t> {
     nodes: &'t [Node],
     point: Vec3,
     normal: Vec3,
     trail: u64,
 }
 
-impl Kernel for Follow<'_> {
+impl Kernel for PdfKernel<'_> {
     type Out = f32;
 
     #[inline(always)]

@@ -29,7 +29,7 @@ pub(in crate::transport) fn sums_from_light<F: Features>(
 ) -> Sums {
     let (scene, lights, position) = (context.scene, context.lights, end.point.position);
     let normal = normal_for_lights(end.point, end.bsdf);
-    let kind = emission.found(lights, light);
+    let kind = emission.light_type(lights, light);
     let (pdf_light, density) = match kind {
         LightType::Area => {
             let triangle = lights.triangle_of(light).unwrap_or_default();
@@ -39,11 +39,11 @@ pub(in crate::transport) fn sums_from_light<F: Features>(
         }
         LightType::Infinite => (
             lights.pdf_escape(scene, position, normal, to_light),
-            emission.density_of_sky(scene, lights, to_light, position),
+            emission.density_of_environment(scene, lights, to_light, position),
         ),
         LightType::Delta => (
             lights.probability(light, position, normal),
-            emission.density_of_choice(scene, lights, light, position),
+            emission.density_of_delta(scene, lights, light, position),
         ),
     };
     let sums = Sums::at_light(counts, pdf_light, density, end.cos, kind != LightType::Delta);

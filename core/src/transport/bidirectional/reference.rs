@@ -295,7 +295,7 @@ impl<'a> Reference<'a> {
 
     /// How light `index` is found by camera paths.
     fn kind(&self, index: u32) -> LightType {
-        self.emission.found(self.context.lights, index)
+        self.emission.light_type(self.context.lights, index)
     }
 
     /// η at a vertex, and the way by which light comes there from one that `is_narrow`.

@@ -36,7 +36,7 @@ impl<F: Features> CameraPaths<'_, F> {
             let pdf = (path.pdf < f32::INFINITY).then_some(path.pdf);
             let pdf_light = context.lights.pdf_escape(context.scene, position, normal, direction);
             let density = match counts.light_paths > 0.0 {
-                true => emission.density_of_sky(context.scene, context.lights, direction, position),
+                true => emission.density_of_environment(context.scene, context.lights, direction, position),
                 false => 0.0,
             };
             weight = weight_of_hit(counts, &path.sums(), pdf, pdf_light, density);

@@ -257,7 +257,7 @@ impl<F: Features> Estimator<F> for CausticMerging<'_> {
         let SceneContext { scene, lights, .. } = *context;
         self.beside_photons(weight, state.ratio_to_light(), || match hit {
             EmissionHit::Environment { direction, position } => {
-                self.emission.density_of_sky(scene, lights, direction, position)
+                self.emission.density_of_environment(scene, lights, direction, position)
             }
             EmissionHit::Surface { triangle, position, direction } => {
                 self.emission.density_of_surface(scene, lights, triangle, (position, direction))

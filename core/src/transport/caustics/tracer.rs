@@ -223,7 +223,7 @@ impl<'a, F: Features> CausticPhotonTracer<'a, F> {
         let position = point.position;
         let with = |chosen: f32| back.map_or(0.0, |back| chosen / back);
         let by_chance = |chosen: f32| libm::sqrtf(1.0 + with(chosen) * with(chosen));
-        match emission.found(lights, state.light) {
+        match emission.light_type(lights, state.light) {
             LightType::Area => {
                 let from = (state.origin.into(), -to_light);
                 let density = emission.density_of_emitter(scene, lights, state.light as usize, from);
@@ -237,7 +237,7 @@ impl<'a, F: Features> CausticPhotonTracer<'a, F> {
                 (density, by_chance(chosen))
             }
             LightType::Infinite => {
-                let density = emission.density_of_sky(scene, lights, to_light, position);
+                let density = emission.density_of_environment(scene, lights, to_light, position);
                 let chosen = match back {
                     Some(_) => lights.pdf_escape(scene, position, normal, to_light),
                     None => 0.0,
@@ -245,7 +245,7 @@ impl<'a, F: Features> CausticPhotonTracer<'a, F> {
                 (density, by_chance(chosen))
             }
             LightType::Delta => {
-                let density = emission.density_of_choice(scene, lights, state.light, position);
+                let density = emission.density_of_delta(scene, lights, state.light, position);
                 (density, with(lights.probability(state.light, position, normal)))
             }
         }

@@ -34,7 +34,7 @@ impl SetOutput {
 /// Whether some caustics are found by light paths alone: those of lights without extent by mirrors and smooth
 /// glass.
 pub fn has_hidden_caustics<F: Features>(context: &SceneContext<F>) -> bool {
-    context.has_mirrors && context.lights.have_deltas()
+    context.has_mirrors && context.lights.has_delta_lights()
 }
 
 /// Traces light paths.
@@ -121,7 +121,7 @@ impl<F: Features> Visitor for Writer<'_, F> {
         // Mirrors and smooth glass alone have led it here.
         let is_hidden = state.mirrored == 1
             && !vertex.bsdf.is_delta()
-            && emission.found(context.lights, state.light) == LightType::Delta;
+            && emission.light_type(context.lights, state.light) == LightType::Delta;
         if is_hidden && let Some(caustics) = &mut self.caustics {
             let _ = caustics.add((context, settings), state, vertex);
         }

@@ -27,7 +27,7 @@ impl<F: Features> Walk<'_, F> {
         let densities = || {
             let (position, normal) = (Vec3::from(subpath.position), Vec3::from(subpath.normal));
             let density = match self.has_light_paths() {
-                true => emission.density_of_sky(scene, lights, direction, position),
+                true => emission.density_of_environment(scene, lights, direction, position),
                 false => 0.0,
             };
             (lights.pdf_escape(scene, position, normal, direction), density)

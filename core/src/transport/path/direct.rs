@@ -48,7 +48,7 @@ impl<F: Features, E: Estimator<F>, R: Sharing> PathIntegrator<'_, F, E, R> {
             };
             let [u, v] = sampler.pair(vertex.first + dimension::LIGHT);
             let warped = table.map(|table| table.warp([u, v]));
-            let choice = if lights.have_choice() {
+            let choice = if lights.has_many_lights() {
                 sampler.single(vertex.first + dimension::LIGHT_CHOICE)
             } else {
                 0.0

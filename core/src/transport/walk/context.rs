@@ -90,7 +90,7 @@ impl<'a, F: Features> SceneContext<'a, F> {
     /// directional lights behind mirrors and smooth glass.
     #[inline]
     pub(in crate::transport) fn separates_coats(&self) -> bool {
-        !(self.has_mirrors && self.lights.have_deltas())
+        !(self.has_mirrors && self.lights.has_delta_lights())
     }
 
     /// True if a ray from triangle `left` skips `point`: a cut-out whose opacity does not exceed `random`

@@ -298,11 +298,11 @@ impl Reference<'_> {
                 [f64::from(density), f64::from(pdf) * cos / squared, cos]
             }
             LightType::Infinite => {
-                let density = emission.density_of_sky(scene, lights, way, from);
+                let density = emission.density_of_environment(scene, lights, way, from);
                 [f64::from(density), f64::from(lights.pdf_escape(scene, from, normal, way)), 1.0]
             }
             LightType::Delta => {
-                let density = emission.density_of_choice(scene, lights, index, from);
+                let density = emission.density_of_delta(scene, lights, index, from);
                 [f64::from(density), f64::from(lights.probability(index, from, normal)), 1.0]
             }
         };
