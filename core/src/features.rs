@@ -46,9 +46,5 @@ pub type All = Only<true, true, true, true, true>;
 pub type DiffuseOnly = Only<false, false, false, false, false>;
 /// Diffuse surfaces with textures.
 pub type DiffuseTextured = Only<true, false, false, false, false>;
-/// Opaque surfaces of uniform colour: no glass, no textures.
-pub type OpaquePlain = Only<false, true, false, false, false>;
 /// Opaque surfaces with every kind of texture: no glass.
 pub type Opaque = Only<true, true, false, true, true>;
-/// All surfaces, without textures.
-pub type Plain = Only<false, true, true, false, false>;

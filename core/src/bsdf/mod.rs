@@ -23,7 +23,7 @@ mod range;
 mod resolve;
 mod rough_dielectric;
 
-pub use crate::features::{All, DiffuseOnly, DiffuseTextured, Features, Only, Opaque, OpaquePlain, Plain};
+pub use crate::features::{All, DiffuseOnly, DiffuseTextured, Features, Only, Opaque};
 pub(crate) use base::Cover;
 pub use conductor::Conductor;
 pub use dielectric::Dielectric;

@@ -2,21 +2,15 @@
 //! leaves out.
 
 use super::{Census, EnvironmentKind};
-use crate::bsdf::{All, DiffuseOnly, DiffuseTextured, Features, Opaque, OpaquePlain, Plain};
+use crate::bsdf::{All, DiffuseTextured, Features, Opaque};
 
 /// Builds of a method, smallest first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FeatureSet {
-    /// Diffuse surfaces of uniform colour.
-    DiffuseOnly,
-    /// Diffuse surfaces with textures.
-    DiffuseTextured,
-    /// Opaque surfaces of uniform colour.
-    OpaquePlain,
-    /// Opaque surfaces with every kind of texture.
+    /// Diffuse surfaces.
+    Diffuse,
+    /// Opaque surfaces.
     Opaque,
-    /// All surfaces, without textures.
-    Plain,
     /// Everything.
     All,
 }
@@ -56,23 +50,13 @@ impl WithFeatures for AbilitiesOf {
 }
 
 impl FeatureSet {
-    const SMALLEST_FIRST: [FeatureSet; 6] = [
-        FeatureSet::DiffuseOnly,
-        FeatureSet::DiffuseTextured,
-        FeatureSet::OpaquePlain,
-        FeatureSet::Opaque,
-        FeatureSet::Plain,
-        FeatureSet::All,
-    ];
+    const SMALLEST_FIRST: [FeatureSet; 3] = [FeatureSet::Diffuse, FeatureSet::Opaque, FeatureSet::All];
 
     /// Runs `work` in the build for this set.
     pub fn dispatch<W: WithFeatures>(self, work: W) -> W::Out {
         match self {
-            FeatureSet::DiffuseOnly => work.run::<DiffuseOnly>(),
-            FeatureSet::DiffuseTextured => work.run::<DiffuseTextured>(),
-            FeatureSet::OpaquePlain => work.run::<OpaquePlain>(),
+            FeatureSet::Diffuse => work.run::<DiffuseTextured>(),
             FeatureSet::Opaque => work.run::<Opaque>(),
-            FeatureSet::Plain => work.run::<Plain>(),
             FeatureSet::All => work.run::<All>(),
         }
     }
@@ -80,11 +64,8 @@ impl FeatureSet {
     /// Name in reports.
     pub const fn name(self) -> &'static str {
         match self {
-            FeatureSet::DiffuseOnly => "diffuse",
-            FeatureSet::DiffuseTextured => "diffuse, textured",
-            FeatureSet::OpaquePlain => "opaque",
-            FeatureSet::Opaque => "opaque, textured",
-            FeatureSet::Plain => "all surfaces",
+            FeatureSet::Diffuse => "diffuse",
+            FeatureSet::Opaque => "opaque",
             FeatureSet::All => "all",
         }
     }
@@ -97,7 +78,7 @@ pub struct Plan {
     pub method: &'static str,
     /// Build of the method.
     pub features: FeatureSet,
-    left_out: [Option<(&'static str, &'static str)>; 8],
+    left_out: [Option<(&'static str, &'static str)>; 7],
 }
 
 impl Census {
@@ -124,7 +105,6 @@ impl Plan {
         let able = features.dispatch(AbilitiesOf);
         let out = |absent: bool, what, why| absent.then_some((what, why));
         let left_out = [
-            out(!able.textures, "texture lookup", "no surface has a texture"),
             out(!able.glossy, "specular and glossy reflection", "no mirror, metal or coated surface"),
             out(!able.dielectric, "refraction", "no glass or water"),
             out(!able.normal_maps, "normal and bump mapping", "no normal or bump map"),

@@ -75,7 +75,7 @@ impl<'a> SurfacePoint<'a> {
         }
         let mut uv = Vec2::ZERO;
         let mut bent = false;
-        if F::TEXTURES || F::NORMAL_MAPS || F::CUTOUT {
+        if (F::TEXTURES || F::NORMAL_MAPS || F::CUTOUT) && !scene.textures.is_empty() {
             let t = texture_corners(mesh.texcoords, triangle.vertices);
             uv = w * t[0] + u * t[1] + v * t[2];
             if F::NORMAL_MAPS

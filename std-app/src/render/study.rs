@@ -9,9 +9,8 @@ use super::threads::{End, Threads};
 use super::workers::Workers;
 use super::{RenderError, Settings};
 use crate::pages::Pages;
-use halflight_core::bsdf::Features;
+use halflight_core::bsdf::{All, Features};
 use halflight_core::cache::irradiance::{CellFlux, IrradianceCache, Metric, metric};
-use halflight_core::census::{Census, WithFeatures};
 use halflight_core::light::LightSampler;
 use halflight_core::memory::{Arena, Line};
 use halflight_core::method::irradiance_cache::LEAST_PIXELS;
@@ -79,7 +78,8 @@ pub fn study_irradiance(
     study: &IrradianceStudy,
     tell: &mut dyn FnMut(&MetricError),
 ) -> Result<(), RenderError> {
-    Census::of(scene).plan().features.dispatch(Study { scene, settings, study, tell })
+    // One build suffices for a study.
+    Study { scene, settings, study, tell }.run::<All>()
 }
 
 struct Study<'a> {
@@ -89,10 +89,8 @@ struct Study<'a> {
     tell: &'a mut dyn FnMut(&MetricError),
 }
 
-impl WithFeatures for Study<'_> {
-    type Out = Result<(), RenderError>;
-
-    fn run<F: Features>(self) -> Self::Out {
+impl Study<'_> {
+    fn run<F: Features>(self) -> Result<(), RenderError> {
         let Study { scene, settings, study, tell } = self;
         let workers = Workers::new(settings.threads)?;
         let bank = Bank::new();
