@@ -6,9 +6,13 @@ mod room;
 
 use halflight_core::bsdf::DiffuseOnly;
 use halflight_core::bvh::Bvh;
+use halflight_core::cache::irradiance::Metric;
 use halflight_core::light::LightSampler;
 use halflight_core::memory::{Arena, Buffer, Line, OutOfMemory};
 use halflight_core::method::bidirectional::{Bidirectional, BidirectionalSettings};
+use halflight_core::method::instant_radiosity::{InstantRadiosity, VirtualLightSettings};
+use halflight_core::method::irradiance_cache::{CacheSettings, IrradianceCaching};
+use halflight_core::method::metropolis::{Metropolis, MetropolisSettings};
 use halflight_core::method::path::PathTracing;
 use halflight_core::method::photon_map::PhotonMapping;
 use halflight_core::method::sppm::ProgressivePhotonMapping;
@@ -19,7 +23,8 @@ use halflight_core::{Level, Rgb};
 /// Pixels across and down.
 pub const SIZE: usize = 32;
 /// Methods, those that need least memory first.
-pub const METHODS: [&str; 6] = ["path", "light", "sppm", "bdpt", "photon-map", "vcm"];
+pub const METHODS: [&str; 9] =
+    ["path", "light", "sppm", "bdpt", "photon-map", "vcm", "instant-radiosity", "mlt", "irradiance-cache"];
 /// Cache lines that all structures of any method take together.
 pub const LINES: usize = 1 << 16;
 /// Bytes of working memory at most.
@@ -52,6 +57,16 @@ pub fn render(
     let mut executor = Loop::new(arena.slice(scratch)?);
     let mut buffer = Buffer::new(arena.slice(arena.available())?);
     let (memory, loops) = (&mut buffer, &mut executor);
+    let cache = CacheSettings {
+        metric: Metric::Halflight,
+        error: 1e-3,
+        strata: 8,
+        fewest: 256,
+        reserve: 0,
+        widens: true,
+    };
+    let lights = VirtualLightSettings { light_paths: Some(1024), connections: None };
+    let chains = MetropolisSettings::default();
     match method {
         0 => run(PathTracing::<DiffuseOnly>::new(&context, Some(false), loops)?, &mut state, loops)?,
         2 => run(
@@ -60,6 +75,13 @@ pub fn render(
             loops,
         )?,
         4 => run(PhotonMapping::<DiffuseOnly>::new(&context, photons, 0, memory, loops)?, &mut state, loops)?,
+        6 => run(
+            InstantRadiosity::<DiffuseOnly>::new(&context, &lights, (false, Some(false)), memory, loops, 0)?,
+            &mut state,
+            loops,
+        )?,
+        7 => run(Metropolis::<DiffuseOnly>::new(&context, &chains, memory, loops, 0)?, &mut state, loops)?,
+        8 => run(IrradianceCaching::<DiffuseOnly>::new(&context, &cache, memory)?, &mut state, loops)?,
         _ => run(Bidirectional::<DiffuseOnly>::new(&context, &counts, memory, loops, 0)?, &mut state, loops)?,
     }
     for (i, pixel) in pixels.iter_mut().enumerate() {
