@@ -1,13 +1,18 @@
-//! Tests of the program as a process: each test starts it in a folder of its own.
+//! Tests of the program as a process, each in a folder of its own, and of the library by its public functions.
 
 mod audit;
+mod bench;
 mod caustics;
 mod cli;
+mod compare;
+mod loading;
 #[cfg(target_os = "linux")]
 mod memory;
 mod outputs;
 mod parts;
+mod picture_files;
 mod pictures;
 #[cfg(unix)]
 mod pipes;
 mod support;
+mod turns;

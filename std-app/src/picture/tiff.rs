@@ -71,37 +71,3 @@ fn grey_floats(bytes: &[u8]) -> Result<Option<(u32, u32, usize)>, PictureError> 
     plausible(width as usize, height as usize, bytes.len(), PIXELS_PER_BYTE)?;
     Ok(Some((width, height, channels)))
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use std::path::Path;
-    use tiff::encoder::{TiffEncoder, colortype};
-
-    #[test]
-    fn grey_and_rgb_floats_are_linear() {
-        let mut bytes = Cursor::new(Vec::new());
-        let mut encoder = TiffEncoder::new(&mut bytes).unwrap();
-        encoder.write_image::<colortype::Gray32Float>(2, 1, &[0.25, -7.5]).unwrap();
-        let picture = super::super::decode(bytes.get_ref(), Path::new("a"), 1 << 22).unwrap();
-        let expected = Samples::Floats { rgb: vec![[0.25; 3], [-7.5; 3]], alpha: vec![] };
-        assert_eq!((picture.width, picture.height, picture.samples), (2, 1, expected));
-
-        let mut bytes = Cursor::new(Vec::new());
-        let mut encoder = TiffEncoder::new(&mut bytes).unwrap();
-        encoder.write_image::<colortype::RGB32Float>(1, 1, &[0.25, 9.0, 3.0]).unwrap();
-        let picture = super::super::decode(bytes.get_ref(), Path::new("a"), 1 << 22).unwrap();
-        assert_eq!(picture.samples, Samples::Floats { rgb: vec![[0.25, 9.0, 3.0]], alpha: vec![] });
-    }
-
-    #[test]
-    fn truncated_files_are_refused() {
-        let mut bytes = Cursor::new(Vec::new());
-        let mut encoder = TiffEncoder::new(&mut bytes).unwrap();
-        encoder.write_image::<colortype::Gray32Float>(8, 8, &[0.5; 64]).unwrap();
-        let bytes = bytes.into_inner();
-        for length in (0..bytes.len()).step_by(7) {
-            assert!(super::super::decode(&bytes[..length], Path::new("a"), 1 << 22).is_err(), "{length}");
-        }
-    }
-}

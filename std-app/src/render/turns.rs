@@ -58,28 +58,3 @@ fn next(seconds: &[f64]) -> Option<usize> {
     let running = seconds.iter().enumerate().filter(|(_, seconds)| seconds.is_finite());
     running.min_by(|a, b| a.1.total_cmp(b.1)).map(|(index, _)| index)
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn one_at_a_time_and_the_slow_ones_less_often() {
-        let turns = Turns::new(3);
-        let order = Mutex::new(Vec::new());
-        std::thread::scope(|scope| {
-            for index in (0..3).rev() {
-                let (turns, order) = (&turns, &order);
-                scope.spawn(move || {
-                    let turn = turns.join(index);
-                    for round in 1..=4 {
-                        order.lock().unwrap().push(index);
-                        // The second render takes twice as long.
-                        turn.pass(f64::from(round) * if index == 1 { 2.0 } else { 1.0 });
-                    }
-                });
-            }
-        });
-        assert_eq!(*order.lock().unwrap(), [0, 1, 2, 0, 2, 0, 1, 2, 0, 2, 1, 1]);
-    }
-}

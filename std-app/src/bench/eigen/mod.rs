@@ -116,17 +116,3 @@ impl Entry for Ours {
         black_box(&self.large);
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn every_level_is_measured() {
-        for level in Level::detect().and_below() {
-            let report = run(level);
-            assert_eq!(report.level, level);
-            assert!(report.ours.sym2 > 0.0 && report.ours.sym3 > 0.0, "{report:?}");
-        }
-    }
-}
