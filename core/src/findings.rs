@@ -56,13 +56,15 @@ pub struct Finding {
     pub decision: Decision,
     /// Reason of the decision: a phrase without a full stop, or empty.
     pub reason: &'static str,
+    /// Phase of the executor whose time is that of the part.
+    pub phase: Option<&'static str>,
     values: [Option<(&'static str, Value)>; MAX_VALUES],
 }
 
 impl Finding {
     /// Finding without values.
     pub const fn new(topic: &'static str, decision: Decision, reason: &'static str) -> Self {
-        Self { topic, decision, reason, values: [None; MAX_VALUES] }
+        Self { topic, decision, reason, phase: None, values: [None; MAX_VALUES] }
     }
 
     /// This finding with one more value; `name` in snake case. A thirteenth value is ignored.
@@ -86,6 +88,20 @@ impl Finding {
         self.with_some(name, (count > 0).then_some(Value::Count(count)))
     }
 
+    /// This finding of a part whose work is the executor's `phase`.
+    pub const fn timed(self, phase: &'static str) -> Self {
+        Self { phase: Some(phase), ..self }
+    }
+
+    /// Number of the value `name`; `None` without such a value or if it is a name.
+    pub fn number(&self, name: &str) -> Option<f64> {
+        match self.values().find(|(other, _)| *other == name)?.1 {
+            Value::Count(count) => Some(count as f64),
+            Value::Seconds(value) | Value::Fraction(value) | Value::Number(value) => Some(value),
+            Value::Name(_) => None,
+        }
+    }
+
     /// Names and values in order.
     pub fn values(&self) -> impl Iterator<Item = (&'static str, Value)> {
         self.values.iter().flatten().copied()
@@ -104,15 +120,43 @@ impl Findings {
         }
     }
 
+    /// Finding on a part of the method.
+    pub fn get(&self, topic: &str) -> Option<&Finding> {
+        self.iter().find(|finding| finding.topic == topic)
+    }
+
+    /// These findings and others.
+    pub fn and<I: IntoIterator<Item = Finding>>(mut self, others: I) -> Self {
+        self.extend(others);
+        self
+    }
+
     /// Findings in order.
     pub fn iter(&self) -> impl Iterator<Item = &Finding> {
         self.0.iter().flatten()
     }
 }
 
+impl From<Finding> for Findings {
+    fn from(finding: Finding) -> Self {
+        let mut findings = Self::default();
+        findings.push(finding);
+        findings
+    }
+}
+
 impl Extend<Finding> for Findings {
     fn extend<I: IntoIterator<Item = Finding>>(&mut self, findings: I) {
         findings.into_iter().for_each(|finding| self.push(finding));
+    }
+}
+
+impl IntoIterator for Findings {
+    type Item = Finding;
+    type IntoIter = core::iter::Flatten<core::array::IntoIter<Option<Finding>, MAX_FINDINGS>>;
+
+    fn into_iter(self) -> Self::IntoIter {
+        self.0.into_iter().flatten()
     }
 }
 
@@ -135,5 +179,18 @@ mod tests {
         let mut list = Findings::default();
         list.extend(topics.map(|topic| Finding::new(topic, Decision::LeftOut, "")));
         assert!(list.iter().map(|finding| finding.topic).eq(topics.into_iter().take(MAX_FINDINGS)));
+    }
+
+    #[test]
+    fn values_are_found_by_topic_and_name() {
+        let finding = Finding::new("photon_maps", Decision::Used, "").timed("photons");
+        let mut list = Findings::default();
+        list.push(finding.with_count("maps", 6).with("kernel", Value::Name("cone")));
+        let found = list.get("photon_maps").unwrap();
+        assert_eq!(
+            (found.phase, found.number("maps"), found.number("kernel")),
+            (Some("photons"), Some(6.0), None)
+        );
+        assert!(list.get("caustic_photons").is_none() && found.number("seconds").is_none());
     }
 }

@@ -4,6 +4,7 @@ use crate::statistics;
 use core::sync::atomic::AtomicBool;
 use halflight::render::{self, Method, RenderError, RenderResult, Settings, Stop};
 use halflight::save::Image;
+use halflight_core::findings::Finding;
 use halflight_core::scene::Scene;
 
 /// A square picture of `size` pixels across with `spp` samples, not audited; `change` edits the settings
@@ -39,6 +40,22 @@ pub fn try_render(
 /// Whether the render had memory for photons.
 pub fn has_photons(result: &RenderResult) -> bool {
     result.memory.iter().any(|one| one.structure == "photons" && one.bytes > 0)
+}
+
+/// Finding on a part of the method.
+pub fn finding<'r>(result: &'r RenderResult, topic: &str) -> &'r Finding {
+    result.findings.get(topic).unwrap_or_else(|| panic!("no {topic} among {:?}", result.findings))
+}
+
+/// Number of a finding; 0 if it is left out.
+pub fn number(result: &RenderResult, topic: &str, name: &str) -> f64 {
+    finding(result, topic).number(name).unwrap_or_default()
+}
+
+/// Whether the lack of memory has left caustic photons out.
+pub fn caustics_lack_memory(result: &RenderResult) -> bool {
+    let caustics = result.findings.get("caustic_photons");
+    caustics.is_some_and(|finding| finding.reason.starts_with("not enough memory: caustics"))
 }
 
 /// Means of green over blocks of 4 × 4 pixels, which quarters the noise.

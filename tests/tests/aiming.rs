@@ -2,19 +2,18 @@
 //! these scenes with path tracing.
 
 use crate::table::scenes::{rooms, rooms_with_balls};
-use halflight::render::{MapUse, Method, PhotonUse, RenderResult};
-use halflight_tests::render::render;
+use halflight::render::{Method, RenderResult};
+use halflight_tests::render::{finding, render};
 use halflight_tests::scenes::cornell_box;
 
 const METHODS: [Method; 2] = [Method::PhotonMap, Method::ProgressivePhotons];
 
-fn photons(result: &RenderResult) -> PhotonUse {
-    result.photons.unwrap()
+/// Fractions of light paths whose photons are useful: with guided emission, and without.
+fn useful(result: &RenderResult, topic: &str) -> [Option<f64>; 2] {
+    ["useful_light_paths", "useful_without_guiding"].map(|name| finding(result, topic).number(name))
 }
 
-fn all(result: &RenderResult) -> MapUse {
-    photons(result).global.unwrap()
-}
+const ALL: &str = "global_photons";
 
 #[test]
 fn unseen_lights_emit_few_photons() {
@@ -23,7 +22,7 @@ fn unseen_lights_emit_few_photons() {
         let scene = buffers.scene();
         for method in METHODS {
             let found = render(&scene, method, 48, 8, |_| ());
-            let MapUse { seen, by_power, .. } = all(&found);
+            let [seen, by_power] = useful(&found, ALL);
             // Guiding gives the one visible lamp of `count` three quarters of the photons and its share of
             // the rest.
             let (seen, by_power) = (seen.unwrap(), by_power.unwrap());
@@ -36,7 +35,7 @@ fn unseen_lights_emit_few_photons() {
 fn caustic_photons_are_guided_to_visible_casters() {
     let buffers = rooms_with_balls();
     let found = render(&buffers.scene(), Method::PhotonMap, 48, 8, |_| ());
-    let MapUse { seen, by_power, .. } = photons(&found).caustic.unwrap();
+    let [seen, by_power] = useful(&found, "caustic_photons");
     let (seen, by_power) = (seen.unwrap(), by_power.unwrap());
     assert!(by_power < 0.01 && seen > 100.0 * by_power, "{by_power} {seen}");
 }
@@ -45,8 +44,8 @@ fn caustic_photons_are_guided_to_visible_casters() {
 fn visible_lights_emit_by_their_power() {
     for (buffers, count) in [(cornell_box(), "one room"), (rooms(1), "one lamp")] {
         for method in METHODS {
-            let found = all(&render(&buffers.scene(), method, 64, 2, |_| ()));
-            assert!(found.by_power.is_none() && found.seen > Some(0.3), "{count}: {found:?}");
+            let [seen, by_power] = useful(&render(&buffers.scene(), method, 64, 2, |_| ()), ALL);
+            assert!(by_power.is_none() && seen > Some(0.3), "{count}: {seen:?} {by_power:?}");
         }
     }
 }
@@ -60,7 +59,7 @@ fn without_memory_for_guiding_lights_emit_by_their_power() {
         let bytes = whole.memory.iter().find(|one| one.structure == "photons").map_or(0, |one| one.bytes);
         let limit = whole.memory_peak - bytes * 9 / 10;
         let found = render(&scene, method, 64, 8, |s| s.memory = Some(limit));
-        assert!(all(&found).by_power.is_none() && all(&whole).by_power.is_some());
+        assert!(useful(&found, ALL)[1].is_none() && useful(&whole, ALL)[1].is_some());
         assert!(found.memory_peak <= limit);
         let deviation = found.image.mean()[1] / whole.image.mean()[1] - 1.0;
         assert!(deviation.abs() < 0.05, "{deviation}");

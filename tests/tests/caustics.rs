@@ -7,6 +7,7 @@ use halflight::render::{Checkpoint, Method, RenderResult, Settings};
 use halflight_core::bsdf::All;
 use halflight_core::bvh::Bvh;
 use halflight_core::film::Film;
+use halflight_core::findings::Decision;
 use halflight_core::light::{EmissionSampler, GuideStats, LightSampler};
 use halflight_core::memory::Arena;
 use halflight_core::photon::{Photon, Photons};
@@ -17,7 +18,7 @@ use halflight_core::transport::photon_mapping::deposit::{PhotonFilter, PhotonTra
 use halflight_core::transport::{CausticMerging, PathIntegrator, PathSettings, RadiusSchedule, UNLIMITED};
 use halflight_core::{Level, Rgb};
 use halflight_tests::memory::TestArena;
-use halflight_tests::render::{has_photons, render};
+use halflight_tests::render::{caustics_lack_memory, finding, has_photons, render};
 use halflight_tests::scenes::{
     SceneBuffers, constant_environment, cornell_box, emitter, everything, glass, in_a_room, lamp_before,
     lamp_over_ball, metal, varnished,
@@ -256,32 +257,35 @@ fn photons_can_be_turned_off() {
     let buffers = everything_by_a_mirror();
     let scene = buffers.scene();
     let [on, off] = [true, false].map(|caustics| path(&scene, 3, |s| s.caustics = caustics));
-    assert!(has_photons(&on) && !has_photons(&off) && off.image != on.image, "{:?}", on.caustics);
+    assert!(has_photons(&on) && !has_photons(&off) && off.image != on.image, "{:?}", on.findings);
 }
 
 #[test]
 fn photons_fit_the_memory_and_their_lack_is_reported() {
     let buffers = everything_by_a_mirror();
     let scene = buffers.scene();
-    let map = |result: &RenderResult| result.photons.unwrap().caustic.unwrap();
+    let map = |result: &RenderResult| *finding(result, "caustic_photons");
+    let number = |result: &RenderResult, name: &str| map(result).number(name).unwrap();
     let bytes = |result: &RenderResult| {
         result.memory.iter().find(|one| one.structure == "photons").map_or(0, |one| one.bytes)
     };
     // Environment visibility tables give up their memory before photons do.
     let limited = |bytes| path(&scene, 16, |s| (s.environment_visibility, s.memory) = (Some(false), bytes));
     let whole = limited(None);
-    assert_eq!(map(&whole).given, map(&whole).wanted);
+    assert_eq!(map(&whole).decision, Decision::Used);
     let enough = limited(Some(whole.memory_peak));
-    assert!(20 * map(&enough).given >= 19 * map(&whole).wanted, "{:?}", map(&enough));
+    let share = |name| map(&enough).number(name).unwrap_or(1.0);
+    let (given, wanted) = (share("light_paths_per_map"), share("light_paths_wanted"));
+    assert!(20.0 * given >= 19.0 * wanted, "{:?}", map(&enough));
 
     let limit = whole.memory_peak - bytes(&whole) * 9 / 10;
     let tenth = limited(Some(limit));
     assert!(tenth.memory_peak <= limit && bytes(&tenth) > bytes(&whole) / 20);
-    assert!(map(&tenth).wanted == map(&whole).wanted && 10 * map(&tenth).given <= map(&whole).wanted);
-    assert!(map(&tenth).shot < map(&whole).shot);
+    assert!(10.0 * number(&tenth, "light_paths_per_map") <= number(&tenth, "light_paths_wanted"));
+    assert!(number(&tenth, "light_paths") < number(&whole, "light_paths"));
 
     let none = limited(Some(whole.memory_peak - bytes(&whole)));
-    assert!(none.caustics.lacks_memory && none.photons.is_none());
+    assert!(caustics_lack_memory(&none) && none.findings.get("photon_maps").is_none());
     assert_eq!(
         none.image,
         path(&scene, 16, |s| (s.environment_visibility, s.caustics) = (Some(false), false)).image
@@ -311,6 +315,12 @@ fn without_caustics_photons_leave_the_bits_alone() {
     }
 }
 
+/// Fraction of the light that caustic photons carry by a pilot.
+fn share(result: &RenderResult) -> f64 {
+    let photons = result.findings.get("caustic_photons");
+    photons.and_then(|photons| photons.number("share_of_light")).unwrap_or_default()
+}
+
 #[test]
 fn sppm_is_chosen_where_all_light_is_caustics() {
     let glass = Surface::Dielectric { ior: 1.5, tint: Rgb::ONE, roughness: 0.0.into() };
@@ -321,7 +331,7 @@ fn sppm_is_chosen_where_all_light_is_caustics() {
         })
     };
     let some = auto(&lamp_over_ball(glass, 2.0), 1, |_| ());
-    assert!(some.method == Method::Path && some.caustics.share < Some(0.5), "{:?}", some.caustics);
+    assert!(some.method == Method::Path && share(&some) < 0.5, "{:?}", some.findings);
 
     let camera = Camera::look_at(Vec3::new(0.0, 2.0, 3.5), Vec3::new(0.0, 0.3, 0.0), Vec3::Y, 40.0);
     let mut all = SceneBuffers::new(camera);
@@ -335,7 +345,7 @@ fn sppm_is_chosen_where_all_light_is_caustics() {
     let chosen = auto(&all, 64, |_| ());
     assert_eq!(chosen.method, Method::ProgressivePhotons);
     let asked = path(&all.scene(), 64, |_| ());
-    assert!(asked.method == Method::Path && asked.caustics.share > Some(0.9), "{:?}", asked.caustics);
+    assert!(asked.method == Method::Path && share(&asked) > 0.9, "{:?}", asked.findings);
     for (a, b) in chosen.image.mean().into_iter().zip(asked.image.mean()) {
         assert!((a / b - 1.0).abs() < 0.02, "{a} {b}");
     }
@@ -373,8 +383,8 @@ fn path_tracing_is_chosen_where_few_photons_reach_the_picture() {
     buffers.cuboid(Vec3::new(-0.3, 1.9, -0.3), Vec3::new(0.3, 1.95, 0.3), false, pane);
     buffers.lights.push(PointLight::Directional { direction: Vec3::NEG_Y, irradiance: Rgb::ONE });
     let picture = render(&buffers.scene(), Method::Path, 32, 4, |s| s.method = None);
-    assert!(picture.caustics.share > Some(0.9), "{:?}", picture.caustics);
-    assert!(picture.method == Method::Path && picture.caustics.used);
+    assert!(share(&picture) > 0.9, "{:?}", picture.findings);
+    assert!(picture.method == Method::Path && has_photons(&picture));
 }
 
 /// A hall with fifty lamps. A wall hides all but one of them from a mirror of side `side` on the floor.

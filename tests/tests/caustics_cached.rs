@@ -4,8 +4,11 @@
 use halflight::render::{Method, RenderResult, Settings};
 use halflight_core::cache::irradiance::Metric;
 use halflight_core::scene::Scene;
-use halflight_tests::render::{difference, has_photons, render, try_render};
+use halflight_tests::render::{caustics_lack_memory, difference, has_photons, number, render, try_render};
 use halflight_tests::scenes::{SceneBuffers, glass, in_a_room, lamp_before, lamp_over_ball, metal};
+
+/// Topic of the finding on caches.
+const CACHE: &str = "irradiance_cache";
 
 fn path(scene: &Scene, spp: u32, change: impl FnOnce(&mut Settings)) -> RenderResult {
     render(scene, Method::Path, 40, spp, change)
@@ -25,8 +28,12 @@ fn have_no_light_in_common(name: &str, buffers: &SceneBuffers, spp: u32, change:
     let scene = buffers.scene();
     let truth = path(&scene, 256, change);
     let joined = cached(&scene, spp, change);
-    println!("{name}: {:?}", joined.cache);
-    assert!(has_photons(&joined) && joined.cache.unwrap().records > 100, "{name}: {:?}", joined.caustics);
+    println!("{name}: {:?}", joined.findings);
+    assert!(
+        has_photons(&joined) && number(&joined, CACHE, "records") > 100.0,
+        "{name}: {:?}",
+        joined.findings
+    );
     for (a, b) in joined.image.mean().into_iter().zip(truth.image.mean()) {
         assert!((a / b - 1.0).abs() < 0.005, "{name}: {a} {b}");
     }
@@ -48,7 +55,7 @@ fn loaded_records_leave_the_bits_and_photons_can_be_turned_off() {
     let scene = buffers.scene();
     let records = std::env::temp_dir().join(format!("{}-cached-caustics.records", std::process::id()));
     let one = cached(&scene, 3, |s| s.save_cache = Some(records.clone()));
-    assert!(has_photons(&one), "{:?}", one.caustics);
+    assert!(has_photons(&one), "{:?}", one.findings);
     assert_eq!(cached(&scene, 3, |s| s.load_cache = Some(records.clone())).image, one.image);
     let off = cached(&scene, 3, |s| s.caustics = false);
     assert!(!has_photons(&off) && off.image != one.image);
@@ -66,10 +73,10 @@ fn photons_beside_records_fit_the_memory() {
     let lacking = loop {
         let joined = limited(Some(limit), true);
         assert!(joined.memory_peak <= limit);
-        if joined.caustics.lacks_memory {
+        if caustics_lack_memory(&joined) {
             break joined;
         }
-        assert!(has_photons(&joined) && joined.cache.unwrap().records > 0);
+        assert!(has_photons(&joined) && number(&joined, CACHE, "records") > 0.0);
         limit = limit * 3 / 4;
     };
     assert!(lacking.image == limited(Some(limit), false).image);
@@ -94,9 +101,9 @@ fn photons_leave_enough_memory_for_records() {
     let mut limit = enough;
     loop {
         let [off, joined] = [false, true].map(|caustics| limited(Some(limit), caustics).unwrap());
-        let [without, beside] = [&off, &joined].map(|result| result.cache.unwrap().capacity);
-        if !joined.caustics.lacks_memory {
-            assert!(has_photons(&joined) && 4 * beside > without);
+        let [without, beside] = [&off, &joined].map(|result| number(result, CACHE, "capacity"));
+        if !caustics_lack_memory(&joined) {
+            assert!(has_photons(&joined) && 4.0 * beside > without);
             break;
         }
         assert_eq!(joined.image, off.image);

@@ -3,10 +3,11 @@
 
 use core::sync::atomic::AtomicBool;
 use glam::Vec3;
-use halflight::render::{CacheUse, Checkpoint, Ending, Mark, Method, RenderResult, Settings};
+use halflight::render::{Checkpoint, Ending, Mark, Method, RenderResult, Settings};
 use halflight_core::Rgb;
+use halflight_core::findings::{Decision, Value};
 use halflight_core::scene::{Material, Scene};
-use halflight_tests::render::{blocks, difference, render};
+use halflight_tests::render::{blocks, difference, finding, number, render};
 use halflight_tests::scenes::{SceneBuffers, cornell_box, emitter};
 use std::path::Path;
 
@@ -20,16 +21,22 @@ fn cached(scene: &Scene, size: u32, spp: u32, change: impl FnOnce(&mut Settings)
     })
 }
 
-fn cache(result: &RenderResult) -> CacheUse {
-    CacheUse { seconds: 0.0, ..result.cache.unwrap() }
+/// Decision and numbers of the caches, except seconds.
+fn cache(result: &RenderResult) -> (Decision, Vec<(&'static str, Value)>) {
+    let found = finding(result, "irradiance_cache");
+    (found.decision, found.values().filter(|(name, _)| *name != "seconds").collect())
+}
+
+fn count(result: &RenderResult, name: &str) -> f64 {
+    number(result, "irradiance_cache", name)
 }
 
 #[test]
 fn direct_light_needs_no_records() {
     let buffers = cornell_box();
-    let records = |depth| cache(&cached(&buffers.scene(), 32, 1, |s| s.max_depth = Some(depth))).records;
-    assert_eq!(records(2), 0);
-    assert!(records(3) > 50);
+    let records = |depth| count(&cached(&buffers.scene(), 32, 1, |s| s.max_depth = Some(depth)), "records");
+    assert_eq!(records(2), 0.0);
+    assert!(records(3) > 50.0);
 }
 
 #[test]
@@ -40,12 +47,12 @@ fn filling_a_cache_ends_at_the_deadline() {
     // Without time, the one sample that every picture has is path traced.
     let timed = |seconds: f64| cached(&scene, 64, 64, |s| s.stop.seconds = Some(seconds));
     let none = timed(0.0);
-    assert_eq!((none.spp, cache(&none)), (1, CacheUse { records: 0, is_cut: true, ..cache(&none) }));
+    assert_eq!((none.spp, count(&none, "records"), cache(&none).0), (1, 0.0, Decision::Limited));
     assert!(difference(&none.image, &path.image) < 0.4);
     // A generous time limit gives the bits of a render without limit.
     let (long, unlimited) = (timed(1e6), cached(&scene, 64, 64, |_| ()));
     assert!(long.image == unlimited.image && cache(&long) == cache(&unlimited));
-    assert!(!cache(&long).is_cut);
+    assert_eq!(cache(&long).0, Decision::Used);
 }
 
 #[test]
@@ -54,7 +61,7 @@ fn records_have_256_rays_by_default() {
     let of = |strata| cached(&scene.scene(), 32, 4, |s| s.cache.strata = strata);
     let (usual, asked, more) = (of(None), of(Some(16)), of(Some(24)));
     assert!(usual.image == asked.image && cache(&usual) == cache(&asked));
-    assert_eq!([&usual, &more].map(|result| cache(result).rays), [256, 576]);
+    assert_eq!([&usual, &more].map(|result| count(result, "rays_per_record")), [256.0, 576.0]);
 }
 
 #[test]
@@ -64,7 +71,7 @@ fn filling_a_cache_ends_at_an_interrupt() {
         Settings { method: Some(Method::IrradianceCache), width: 64, height: 64, ..Settings::default() };
     let result =
         halflight::render::render(&buffers.scene(), &settings, &mut |_| (), &AtomicBool::new(true)).unwrap();
-    assert_eq!((result.spp, result.ending, cache(&result).records), (1, Ending::Interrupted, 0));
+    assert_eq!((result.spp, result.ending, count(&result, "records")), (1, Ending::Interrupted, 0.0));
 }
 
 #[test]
@@ -97,7 +104,7 @@ fn records_do_not_depend_on_the_unit_of_length() {
         let mut buffers = cornell_box();
         buffers.positions.iter_mut().for_each(|p| *p = p.map(|x| x * unit));
         buffers.camera.eye *= unit;
-        cached(&buffers.scene(), 64, 1, |_| ()).cache.unwrap().records as f64
+        count(&cached(&buffers.scene(), 64, 1, |_| ()), "records")
     };
     let metres = records(1.0);
     for unit in [1e-3, 1e3, 0.37] {
@@ -112,7 +119,7 @@ fn a_large_ground_leaves_a_room_its_records() {
         let mut buffers = cornell_box();
         let black = buffers.material(Material::diffuse(Rgb::ZERO));
         buffers.square(Vec3::new(0.0, -0.5 * size, 0.0), Vec3::Y, size, black);
-        cached(&buffers.scene(), 64, 1, |_| ()).cache.unwrap().records as f64
+        count(&cached(&buffers.scene(), 64, 1, |_| ()), "records")
     };
     let alone = records(0.1);
     for size in [30.0, 3000.0] {
@@ -133,8 +140,8 @@ fn without_memory_for_records_the_rest_is_path_traced() {
             s.memory = Some((total - caches + left).max(whole.memory_peak - caches));
             s.threads = Some(whole.threads);
         });
-        let (used, all) = (tiny.cache.unwrap(), whole.cache.unwrap());
-        assert!(used.capacity < all.records && used.records <= used.capacity, "{used:?}");
+        let (records, capacity) = (count(&tiny, "records"), count(&tiny, "capacity"));
+        assert!(capacity < count(&whole, "records") && records <= capacity, "{records} of {capacity}");
         for (a, b) in tiny.image.mean().into_iter().zip(whole.image.mean()) {
             assert!((a / b - 1.0).abs() < 0.02, "{a} {b}");
         }

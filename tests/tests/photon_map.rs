@@ -1,12 +1,13 @@
 //! Photon mapping in two passes: kernels and maps, light through a slit, and reduced memory.
 
 use halflight::load::{self, LoadOptions};
-use halflight::render::{Method, PhotonUse, RenderResult, Settings};
+use halflight::render::{Method, RenderResult, Settings};
 use halflight::save::Image;
 use halflight_core::Rgb;
+use halflight_core::findings::Decision;
 use halflight_core::photon::Kernel;
 use halflight_core::scene::{Scene, Surface};
-use halflight_tests::render::render;
+use halflight_tests::render::{finding, number, render};
 use halflight_tests::scenes::{cornell_box, lamp_before};
 use std::path::Path;
 
@@ -56,18 +57,14 @@ fn light_through_a_slit_is_that_of_the_path_tracer() {
 fn a_caustic_has_a_map_of_its_own() {
     let buffers = lamp_before(Surface::Mirror { reflectance: Rgb::splat(0.9).into() }, 0.6);
     let found = mapped(&buffers.scene(), 32, 8, |_| ());
-    let caustic = found.photons.unwrap().caustic.unwrap();
-    assert!(caustic.stored > caustic.shot / 10, "{caustic:?}");
-}
-
-fn used(result: &RenderResult) -> PhotonUse {
-    result.photons.unwrap()
+    let [stored, shot] = ["photons", "light_paths"].map(|name| number(&found, "caustic_photons", name));
+    assert!(stored > shot / 10.0, "{:?}", found.findings);
 }
 
 #[test]
 fn two_maps_are_made_for_each_eight_samples() {
     let buffers = cornell_box();
-    assert_eq!(used(&mapped(&buffers.scene(), 16, 20, |_| ())).maps, 6);
+    assert_eq!(number(&mapped(&buffers.scene(), 16, 20, |_| ()), "photon_maps", "maps"), 6.0);
 }
 
 #[test]
@@ -83,9 +80,10 @@ fn a_tenth_of_the_memory_holds_a_tenth_of_the_photons() {
         s.photons.global = Some(1 << 17);
         s.memory = Some(limit);
     });
-    let (all, few) = (used(&whole).global.unwrap(), used(&tenth).global.unwrap());
-    assert_eq!(all.wanted, all.given);
-    assert!(few.wanted == all.wanted && few.given <= few.wanted / 10 && few.given > few.wanted / 20);
+    assert_eq!(finding(&whole, "global_photons").decision, Decision::Used);
+    let [given, wanted] =
+        ["light_paths_per_map", "light_paths_wanted"].map(|name| number(&tenth, "global_photons", name));
+    assert!(given <= wanted / 10.0 && given > wanted / 20.0, "{given} of {wanted}");
     assert!(tenth.memory_peak <= limit && bytes(&tenth) <= bytes(&whole) / 10);
     assert!(deviation(&tenth.image, &whole.image).abs() < 2.0 * BIAS);
 }

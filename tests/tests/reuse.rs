@@ -5,10 +5,12 @@ use glam::Vec3;
 use halflight::render::{self, RenderResult, Settings, Stop};
 use halflight_core::bsdf::All;
 use halflight_core::film::Film;
+use halflight_core::findings::Decision;
 use halflight_core::scene::{Material, Scene, Surface};
 use halflight_core::transport::{PathIntegrator, PathReuse, PathSettings, UNLIMITED};
 use halflight_core::{Level, Rgb};
 use halflight_tests::memory::{TestArena, with_structures};
+use halflight_tests::render::{finding, number};
 use halflight_tests::scenes::{SceneBuffers, cornell_box, emitter, everything};
 use halflight_tests::statistics::{agree, blocks};
 
@@ -183,14 +185,16 @@ fn bits_do_not_depend_on_waves_or_rounds() {
 fn reuse_is_chosen_where_it_pays() {
     let buffers = cornell_box();
     let scene = buffers.scene();
-    let indirect = render(&scene, 4, |_| ()).reuse;
-    assert!(indirect.used && indirect.pilot.is_some_and(|pilot| pilot.gain() > 3.0));
+    let indirect = render(&scene, 4, |_| ());
+    let decision = |result| finding(result, "path_reuse").decision;
+    let gain = |result| number(result, "path_reuse", "gain");
+    assert!(decision(&indirect) == Decision::Used && gain(&indirect) > 3.0);
     // Direct light alone cannot be shared.
-    let direct = render(&scene, 4, |s| s.max_depth = Some(2)).reuse;
-    assert!(!direct.used && direct.pilot.is_some_and(|pilot| pilot.gain() == 1.0));
+    let direct = render(&scene, 4, |s| s.max_depth = Some(2));
+    assert!(decision(&direct) == Decision::LeftOut && gain(&direct) == 1.0);
     // An explicit setting needs no pilot.
-    let asked = render(&scene, 4, |s| s.reuse = Some(false)).reuse;
-    assert!(!asked.used && asked.pilot.is_none());
+    let asked = render(&scene, 4, |s| s.reuse = Some(false));
+    assert!(asked.findings.get("path_reuse").is_none());
 }
 
 /// Luminance of pictures of `seeds` seeds, and their mean.

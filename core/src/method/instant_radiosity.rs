@@ -11,6 +11,8 @@ use super::splats::{add_splats, splats_of_tile};
 use super::{Method, RenderContext, Round};
 use crate::bsdf::Features;
 use crate::film::{PIXELS_PER_TILE, Pixel, Splat, Tile};
+use crate::findings::Decision::{LeftOut, Limited, Used};
+use crate::findings::{Finding, Findings, Value};
 use crate::light::{EmissionSampler, luminance};
 use crate::memory::{Arena, Footprint, MemorySource, OutOfMemory};
 use crate::transport::instant_radiosity::light_pass::{
@@ -306,6 +308,31 @@ fn slice<'a, T: Pod>(
     Ok(slice)
 }
 
+impl VirtualLightUse {
+    /// Finding on virtual lights, and on the light that the bound cuts if that is left out.
+    fn findings(&self, has_reuse: bool) -> [Option<Finding>; 2] {
+        let (decision, reason) = match has_reuse {
+            _ if self.given < self.wanted => (Limited, "not enough memory: the picture is noisier"),
+            _ if self.area == 0.0 => (LeftOut, "a pilot found none: paths find all light"),
+            true => (Used, "they light the second vertex of paths, whose light neighbouring pixels share"),
+            false => (Used, "they light the first rough vertex of paths"),
+        };
+        let limited = |paths: u32| (decision == Limited).then_some(Value::Count(paths.into()));
+        let lights = Finding::new("virtual_lights", decision, reason)
+            .with("light_paths", Value::Count(self.light_paths))
+            .with("virtual_lights", Value::Count(self.lights))
+            .with("connections", Value::Count(self.connections.into()))
+            .with("lit_area", Value::Number(self.area.into()))
+            .with_some("light_paths_given", limited(self.given))
+            .with_some("light_paths_wanted", limited(self.wanted));
+        let cut = self.cut.map(|share| {
+            let reason = "the bound of the geometry term cuts it, in corners most";
+            Finding::new("cut_light", LeftOut, reason).with("share_of_light", Value::Fraction(share))
+        });
+        [Some(lights), cut]
+    }
+}
+
 impl<F: Features> Method for InstantRadiosity<'_, F> {
     fn round<E: Executor>(&mut self, round: &mut Round<E>) -> Result<(), OutOfMemory> {
         while let Some(sample) = round.next_sample() {
@@ -328,5 +355,11 @@ impl<F: Features> Method for InstantRadiosity<'_, F> {
             })?;
         }
         Ok(())
+    }
+
+    fn findings(&self) -> Findings {
+        let reuse = self.reuse();
+        let lights = self.used().findings(reuse.used);
+        Findings::default().and(reuse.finding()).and(lights.into_iter().flatten())
     }
 }

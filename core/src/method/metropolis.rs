@@ -12,6 +12,7 @@ use super::splats::{add_splats, splats_of_tile};
 use super::{Method, RenderContext, Round};
 use crate::bsdf::Features;
 use crate::film::{PIXELS_PER_TILE, Pixel, Splat, Tile};
+use crate::findings::Findings;
 use crate::light::{EmissionSampler, luminance};
 use crate::memory::{Arena, Footprint, MemorySource, OutOfMemory};
 use crate::transport::Counters;
@@ -372,6 +373,10 @@ impl<F: Features> Method for Metropolis<'_, F> {
             })?;
         }
         Ok(())
+    }
+
+    fn findings(&self) -> Findings {
+        Findings::from(self.chains().finding())
     }
 }
 

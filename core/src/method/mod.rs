@@ -32,8 +32,10 @@ pub use round::{RenderState, Round, Shard};
 use crate::Level;
 use crate::bsdf::Features;
 use crate::bvh::Bvh;
+use crate::findings::Findings;
 use crate::light::LightSampler;
 use crate::memory::OutOfMemory;
+use crate::photon::PhotonMap;
 use crate::scene::Scene;
 use crate::transport::{PathIntegrator, PathSettings, RadiusSchedule, SceneContext};
 
@@ -75,6 +77,15 @@ impl<'a> RenderContext<'a> {
     }
 }
 
+/// The last photon maps of a method.
+#[derive(Default)]
+pub struct LastMaps<'a> {
+    /// Photons of reflected light or of all light.
+    pub global: Option<PhotonMap<'a>>,
+    /// Photons of caustics.
+    pub caustic: Option<PhotonMap<'a>>,
+}
+
 /// A method at work on one scene.
 ///
 /// Sample `n` of a pixel follows from the scene, the settings and `n`: neither from the division of samples
@@ -86,6 +97,19 @@ pub trait Method {
     /// # Errors
     /// [`OutOfMemory`] where the scratch of the executor is too small.
     fn round<E: Executor>(&mut self, round: &mut Round<E>) -> Result<(), OutOfMemory>;
+
+    /// Decisions and numbers of its parts, for reports.
+    fn findings(&self) -> Findings {
+        Findings::default()
+    }
+
+    /// Its last photon maps, if it has some.
+    ///
+    /// # Errors
+    /// Those of [`PhotonMapStore::map`].
+    fn last_maps(&mut self) -> Result<LastMaps<'_>, OutOfMemory> {
+        Ok(LastMaps::default())
+    }
 }
 
 #[cfg(test)]

@@ -4,6 +4,8 @@
 use super::executor::Executor;
 use super::{Method, RenderContext, Round, pilot};
 use crate::bsdf::Features;
+use crate::findings::Decision::{LeftOut, Used};
+use crate::findings::{Finding, Findings, Value};
 use crate::memory::{Footprint, OutOfMemory};
 use crate::transport::{PathIntegrator, PathReuse, Pilot, path::WAVE};
 
@@ -14,6 +16,21 @@ pub struct Reuse {
     pub used: bool,
     /// Samples of a few tiles with reuse and without; `None` where the caller has decided.
     pub pilot: Option<Pilot>,
+}
+
+impl Reuse {
+    /// Finding on path reuse; `None` where the caller left it out.
+    pub fn finding(&self) -> Option<Finding> {
+        let Some(pilot) = self.pilot else {
+            return self.used.then_some(Finding::new("path_reuse", Used, "requested"));
+        };
+        let finding = match self.used {
+            true => Finding::new("path_reuse", Used, "it pays by a pilot"),
+            false => Finding::new("path_reuse", LeftOut, "it costs more than it gains by a pilot"),
+        };
+        let [gain, cost] = [pilot.gain(), pilot.cost()].map(|value| Value::Number(value.into()));
+        Some(finding.with("gain", gain).with("cost", cost))
+    }
 }
 
 /// Path tracing of one picture.
@@ -110,5 +127,9 @@ impl<F: Features> Method for PathTracing<'_, F> {
         round.tiles(u32::MAX, |tile, samples, scratch, pixels| {
             integrator.run(tile, samples, WAVE, scratch, pixels)
         })
+    }
+
+    fn findings(&self) -> Findings {
+        Findings::default().and(self.reuse.finding())
     }
 }

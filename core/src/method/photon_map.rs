@@ -13,8 +13,10 @@ use super::emission_guide::{EmissionGuide, GuideSettings, Target};
 use super::executor::Executor;
 use super::photons::{PhotonSettings, PhotonUse};
 use super::sppm::{FIRST_RADIUS, progressive};
-use super::{Method, PhotonMapStore, RenderContext, Round};
+use super::{LastMaps, Method, PhotonMapStore, RenderContext, Round};
 use crate::bsdf::Features;
+use crate::findings::Decision::LeftOut;
+use crate::findings::{Finding, Findings};
 use crate::memory::{Footprint, MemorySource, OutOfMemory};
 use crate::photon::{Kernel, PhotonMap};
 use crate::transport::photon_mapping::deposit::{
@@ -180,17 +182,6 @@ impl<'a, F: Features> PhotonMapping<'a, F> {
         self.used
     }
 
-    /// The last global map and its caustic map, unless there are none.
-    ///
-    /// # Errors
-    /// Those of [`PhotonMapStore::map`].
-    pub fn maps(&mut self) -> Result<Option<(PhotonMap<'_>, Option<PhotonMap<'_>>)>, OutOfMemory> {
-        // Those of odd samples are made last.
-        let [even, odd] = &mut self.halves;
-        let last = if odd.number.is_some() { odd } else { even };
-        Ok(last.built()?.map(|Built { global, caustic, .. }| (global, caustic)))
-    }
-
     /// The first pass: the maps of number `number`, unless they are there. Returns whether they are complete.
     fn make_maps<E: Executor>(
         &mut self,
@@ -260,5 +251,26 @@ impl<F: Features> Method for PhotonMapping<'_, F> {
             })?;
         }
         Ok(())
+    }
+
+    fn findings(&self) -> Findings {
+        let caustic = self
+            .used
+            .caustic
+            .map_or(Finding::new("caustic_photons", LeftOut, "no surface is specular enough"), |map| {
+                map.finding("caustic_photons")
+            });
+        self.used.findings().and([caustic])
+    }
+
+    fn last_maps(&mut self) -> Result<LastMaps<'_>, OutOfMemory> {
+        // Those of odd samples are made last.
+        let [even, odd] = &mut self.halves;
+        let last = if odd.number.is_some() { odd } else { even };
+        let built = last.built()?;
+        Ok(built.map_or_else(LastMaps::default, |Built { global, caustic, .. }| LastMaps {
+            global: Some(global),
+            caustic,
+        }))
     }
 }

@@ -1,5 +1,7 @@
 //! Settings and statistics of methods with photon maps.
 
+use crate::findings::Decision::{Limited, Used};
+use crate::findings::{Finding, Findings, Value};
 use crate::photon::Kernel;
 use crate::transport::photon_mapping::deposit::PATHS;
 
@@ -44,6 +46,23 @@ impl MapUse {
         self.shot += paths as u64;
         self.stored += stored as u64;
     }
+
+    /// Finding on maps of this kind.
+    pub fn finding(&self, topic: &'static str) -> Finding {
+        let (decision, reason) = match self.given < self.wanted {
+            true => (Limited, "not enough memory: the picture is noisier"),
+            false if self.by_power.is_some() => (Used, "emission is guided to the view"),
+            false => (Used, ""),
+        };
+        let limited = |paths: u64| (decision == Limited).then_some(Value::Count(paths));
+        Finding::new(topic, decision, reason)
+            .with("light_paths", Value::Count(self.shot))
+            .with("photons", Value::Count(self.stored))
+            .with_some("light_paths_per_map", limited(self.given))
+            .with_some("light_paths_wanted", limited(self.wanted))
+            .with_some("useful_light_paths", self.seen.map(Value::Fraction))
+            .with_some("useful_without_guiding", self.by_power.map(Value::Fraction))
+    }
 }
 
 /// All photon maps of a picture.
@@ -57,4 +76,16 @@ pub struct PhotonUse {
     pub caustic: Option<MapUse>,
     /// Precomputed irradiances.
     pub irradiances: u64,
+}
+
+impl PhotonUse {
+    /// Findings on the maps and on those of all light.
+    pub fn findings(&self) -> Findings {
+        let mut findings = Findings::default();
+        let maps =
+            Finding::new("photon_maps", Used, "").timed("photons").with("maps", Value::Count(self.maps));
+        findings.extend((self.maps > 0).then_some(maps.with_count("irradiances", self.irradiances)));
+        findings.extend(self.global.map(|map| map.finding("global_photons")));
+        findings
+    }
 }

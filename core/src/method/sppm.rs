@@ -13,8 +13,9 @@
 use super::emission_guide::{EmissionGuide, GuideSettings, Target};
 use super::executor::Executor;
 use super::photons::{PhotonSettings, PhotonUse};
-use super::{Method, PhotonMapStore, RenderContext, Round};
+use super::{LastMaps, Method, PhotonMapStore, RenderContext, Round};
 use crate::bsdf::Features;
+use crate::findings::Findings;
 use crate::memory::{Footprint, MemorySource, OutOfMemory};
 use crate::photon::{Kernel, PhotonMap};
 use crate::transport::photon_mapping::deposit::{
@@ -94,14 +95,6 @@ impl<'a, F: Features> ProgressivePhotonMapping<'a, F> {
         self.used
     }
 
-    /// The map of the last sample, unless there is none.
-    ///
-    /// # Errors
-    /// Those of [`PhotonMapStore::map`].
-    pub fn map(&mut self) -> Result<Option<PhotonMap<'_>>, OutOfMemory> {
-        self.photons.map()
-    }
-
     /// Traces the photons of `sample`, unless a round that ended early has left them. Returns whether they are there.
     fn trace_photons<E: Executor>(&mut self, sample: u32, round: &mut Round<E>) -> Result<bool, OutOfMemory> {
         if self.sample == Some(sample) {
@@ -144,6 +137,14 @@ impl<F: Features> Method for ProgressivePhotonMapping<'_, F> {
             })?;
         }
         Ok(())
+    }
+
+    fn findings(&self) -> Findings {
+        self.used.findings()
+    }
+
+    fn last_maps(&mut self) -> Result<LastMaps<'_>, OutOfMemory> {
+        Ok(LastMaps { global: self.photons.map()?, caustic: None })
     }
 }
 

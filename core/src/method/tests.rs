@@ -118,7 +118,7 @@ fn two_passes(
     let settings = PhotonSettings { global: Some(1), caustic: Some(1), ..PhotonSettings::default() };
     let mut method = TwoPasses::new(context, settings, 0, &mut buffer, &mut executor)?;
     let pixels = film(context, &mut executor, division, |round| method.round(round))?;
-    assert!(method.maps()?.is_none_or(|(global, _)| !global.is_empty()));
+    assert!(method.last_maps()?.global.is_none_or(|global| !global.is_empty()));
     Ok((pixels, method.photons()))
 }
 

@@ -53,7 +53,8 @@ pub(super) fn text(run: &Run, report: Option<&Path>) -> String {
         settings.level.name(),
     ));
     lines.extend(
-        run.findings()
+        result
+            .findings
             .iter()
             .zip(["method "].into_iter().chain(core::iter::repeat("       ")))
             .map(|(finding, label)| format!("{label}{}", self::finding(finding))),

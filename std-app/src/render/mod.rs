@@ -37,21 +37,17 @@ mod workers;
 pub use audit::{Audited, Region};
 pub use blurred::Blurred;
 pub use cache_file::inspect as inspect_cache;
-pub use environment_visibility::VisibilityUse;
 pub use error::{FileError, RenderError};
 pub use halflight_core::estimate::{BiasEstimate, Deviation, ErrorEstimate};
+pub use halflight_core::method::Shard;
 pub use halflight_core::method::bidirectional::BidirectionalSettings;
 pub use halflight_core::method::instant_radiosity::VirtualLightSettings;
 pub use halflight_core::method::metropolis::{MetropolisSettings, PrimarySpace};
-pub use halflight_core::method::{Shard, path::Reuse};
 pub use history::{Against, Round};
 pub use ledger::Place;
 pub use memory::MemoryUse;
 pub use merge::{Merged, merge};
-pub use method::{
-    CacheSettings, CacheUse, CausticUse, ChainUse, MapUse, MapView, Method, PhotonSettings, PhotonUse,
-    PhotonView, VirtualLightUse,
-};
+pub use method::{CacheSettings, MapView, Method, PhotonSettings, PhotonView};
 pub use rounds::{Stop, StopRule};
 pub use study::{IrradianceStudy, MetricError, study_irradiance};
 pub use survey::{Check, Look, Mark, Survey};
@@ -62,6 +58,7 @@ use core::sync::atomic::AtomicBool;
 use halflight_core::Level;
 use halflight_core::census::Census;
 use halflight_core::film::Tile;
+use halflight_core::findings::Findings;
 use halflight_core::scene::Scene;
 use halflight_core::transport::Counters;
 use std::path::{Path, PathBuf};
@@ -212,8 +209,6 @@ pub struct Seconds {
     /// Tracing paths, including earlier runs of a resumed film, without comparisons, checkpoints and
     /// `progress`.
     pub render: f64,
-    /// Photon tracing and building of photon maps, part of `render`; without earlier runs.
-    pub photons: f64,
     /// Noise estimation, part of `render`; without earlier runs.
     pub estimate: f64,
 }
@@ -241,24 +236,12 @@ pub struct RenderResult {
     pub seconds: Seconds,
     /// Paths, rays and rejected samples.
     pub counters: Counters,
-    /// Whether neighbouring pixels shared paths, and why.
-    pub reuse: Reuse,
-    /// Whether paths were merged with caustic photons, and why.
-    pub caustics: CausticUse,
-    /// Statistics of the irradiance cache, if the method has one.
-    pub cache: Option<CacheUse>,
+    /// Decisions and numbers of the parts of the method.
+    pub findings: Findings,
     /// Survey of the irradiance cache, if requested, if the method has one and memory suffices.
     pub survey: Option<Survey>,
-    /// Statistics of Markov chains, if the method has any.
-    pub chains: Option<ChainUse>,
-    /// Statistics of photons, if the method has any.
-    pub photons: Option<PhotonUse>,
-    /// Statistics of virtual lights, if the method has any.
-    pub virtual_lights: Option<VirtualLightUse>,
     /// Views of the last photon maps, if requested.
     pub photon_view: Option<PhotonView>,
-    /// Use of environment visibility, and why.
-    pub environment_visibility: VisibilityUse,
     /// Tiles with rejected samples, most first.
     pub places: Vec<Place>,
     /// Black pixels, whose samples were all rejected.

@@ -10,12 +10,14 @@ use super::ledger::{self, empty_pixels};
 use super::method::{Method, Renderer, Stage};
 use super::rewritten_file::RewrittenFile;
 use super::rounds::{Plan, Rounds};
+use super::survey::Survey;
 use super::workers::Workers;
-use super::{Ending, ErrorEstimate, Progress, RenderError, RenderResult, Seconds, VisibilityUse};
+use super::{Ending, ErrorEstimate, Progress, RenderError, RenderResult, Seconds};
 use crate::save::{Image, Patience};
 use core::sync::atomic::{AtomicBool, Ordering};
 use core::time::Duration;
 use halflight_core::film::{Film, Pixel};
+use halflight_core::findings::{Findings, Value};
 use halflight_core::method::{RenderState, Shard};
 use std::path::Path;
 use std::time::Instant;
@@ -300,7 +302,7 @@ impl<'a> Progressive<'a> {
     ) -> Result<RenderResult, RenderError> {
         let Picture { method, stage, state, clock, sketch, .. } = &self.picture;
         let Stage { settings, workers, .. } = *stage;
-        let (render, photons) = (clock.seconds(), workers.seconds_of("photons"));
+        let render = clock.seconds();
         let error = report.error();
         if let Some(last) = self.history.last_mut() {
             last.error = error;
@@ -309,6 +311,12 @@ impl<'a> Progressive<'a> {
         let (image, filled_pixels) = without_gaps(state, sketch, workers);
         let ending = if interrupted { Ending::Interrupted } else { self.lost.unwrap_or(Ending::Done) };
         let is_viewed = settings.photon_view && !interrupted;
+        // A report that does not fit into memory is omitted: the picture is complete.
+        let survey = if interrupted { None } else { renderer.survey(workers).unwrap_or_default() };
+        let findings = Findings::default().and(renderer.findings().into_iter().map(|finding| {
+            let seconds = finding.phase.map(|phase| Value::Seconds(workers.seconds_of(phase)));
+            finding.with_some("seconds", seconds)
+        }));
         Ok(RenderResult {
             method: *method,
             image,
@@ -318,18 +326,11 @@ impl<'a> Progressive<'a> {
             variance: map(film, |pixel| pixel.variance().to_array()),
             samples: by_rows(film).map(|pixel| pixel.count()).collect(),
             threads: workers.count(),
-            seconds: Seconds { build: 0.0, render, photons, estimate: self.estimated },
+            seconds: Seconds { build: 0.0, render, estimate: self.estimated },
             counters: state.counters,
-            reuse: renderer.reuse(),
-            caustics: renderer.caustics(),
-            cache: renderer.cache(),
-            // A report that does not fit into memory is omitted: the picture is complete.
-            survey: if interrupted { None } else { renderer.survey(workers).unwrap_or_default() },
-            chains: renderer.chains(),
-            photons: renderer.photons(),
-            virtual_lights: renderer.virtual_lights(),
+            findings: findings.and(survey.as_ref().map(Survey::finding)),
+            survey,
             photon_view: if is_viewed { renderer.photon_view().unwrap_or_default() } else { None },
-            environment_visibility: VisibilityUse::default(),
             places: ledger::places(state.dropped, settings.width, settings.height),
             empty_pixels: empty_pixels(film, |task| state.shard.owns(task) && state.samples[task] > 0),
             filled_pixels,

@@ -17,6 +17,7 @@ use halflight_core::Level;
 use halflight_core::bsdf::Features;
 use halflight_core::bvh::Bvh;
 use halflight_core::census::WithFeatures;
+use halflight_core::findings::Findings;
 use halflight_core::light::LightSampler;
 use halflight_core::memory::{Arena, Footprint};
 use halflight_core::method::RenderState;
@@ -84,7 +85,7 @@ impl WithFeatures for Render<'_> {
         let plain = stage.paths::<F>(settings.seed);
         let sketch = |workers: &Workers| gaps::sketch(&plain, [width, height], workers);
         method.with::<F, _>(&stage, &mut memory, |renderer, memory| {
-            let method = renderer.chosen().unwrap_or(method);
+            let method = renderer.chosen();
             let identity = identity(method);
             let audit = Audit::new::<F>(&stage, memory, method)?;
             let picture = Picture {
@@ -101,13 +102,8 @@ impl WithFeatures for Render<'_> {
             };
             let done = picture.render(renderer)?;
             let seconds = Seconds { build, ..done.seconds };
-            Ok(RenderResult {
-                memory: memory.uses(),
-                memory_peak: memory.peak(),
-                seconds,
-                environment_visibility: visibility,
-                ..done
-            })
+            let findings = Findings::default().and(visibility).and(done.findings);
+            Ok(RenderResult { memory: memory.uses(), memory_peak: memory.peak(), seconds, findings, ..done })
         })
     }
 }

@@ -7,6 +7,8 @@ use super::threads::{End, Threads};
 use core::time::Duration;
 use halflight_core::bsdf::Features;
 use halflight_core::cache::irradiance::{IrradianceCache, Record};
+use halflight_core::findings::Decision::Used;
+use halflight_core::findings::{Finding, Value};
 use halflight_core::method::Executor;
 use halflight_core::transport::cached::gather::GatherPoint;
 use halflight_core::transport::cached::placement::{PIXELS, ProgressiveOrder, Via};
@@ -92,6 +94,28 @@ pub struct Survey {
     pub noise: f64,
     /// Seconds of the survey.
     pub seconds: f64,
+}
+
+impl Survey {
+    /// Finding on the errors of records.
+    pub(super) fn finding(&self) -> Finding {
+        let Survey { predicted, achieved, .. } = *self;
+        let reason = match predicted / achieved.max(f64::MIN_POSITIVE) {
+            _ if self.checks.is_empty() => "no record covers a test point",
+            0.0 => "the metric predicts no error",
+            ratio if ratio > 2.0 => "the error is less than half of the prediction",
+            ratio if ratio < 0.5 => "the error is more than twice the prediction",
+            _ => "the error is within a factor of two of the prediction",
+        };
+        Finding::new("cache_survey", Used, reason)
+            .with("points", Value::Count(self.points))
+            .with("covered", Value::Fraction(self.checks.len() as f64 / self.points.max(1) as f64))
+            .with("predicted", Value::Fraction(predicted))
+            .with("achieved", Value::Fraction(achieved))
+            .with("rms", Value::Fraction(self.rms))
+            .with("noise", Value::Fraction(self.noise))
+            .with("seconds", Value::Seconds(self.seconds))
+    }
 }
 
 /// Surveys all pixels and gathers at about `points` of them. `None` if interrupted, or if it takes longer

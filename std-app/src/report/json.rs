@@ -53,7 +53,7 @@ pub(super) fn run(run: &Run) -> Value {
         "filled_pixels": result.filled_pixels,
         "memory": memory.collect::<Map<_, _>>(),
         "memory_peak": result.memory_peak,
-        "findings": findings(&run.findings()),
+        "findings": findings(&result.findings),
         "left_out": left_out_array(plan.left_out()),
         "outputs": run.outputs,
         "checkpoint": settings.checkpoint.as_ref().map(|checkpoint| &checkpoint.path),

@@ -3,7 +3,6 @@
 
 mod census;
 mod curve;
-mod findings;
 mod fit;
 mod folder;
 mod json;
@@ -22,7 +21,7 @@ use crate::compare::Comparison;
 use crate::render::{RenderResult, Settings};
 use crate::save::Image;
 use halflight_core::census::Census;
-use halflight_core::findings::Findings;
+use halflight_core::findings::Decision;
 use halflight_core::scene::Scene;
 use serde_json::Value;
 use std::path::PathBuf;
@@ -55,21 +54,21 @@ pub struct Run<'a> {
 pub type Files = Vec<(&'static str, Vec<u8>)>;
 
 impl Run<'_> {
-    /// Decisions and numbers of the method.
-    pub fn findings(&self) -> Findings {
-        findings::of(self)
-    }
-
     /// Reason why the audit may be wrong; `None` if path tracing can be trusted.
     pub fn doubt(&self) -> Option<&'static str> {
         let audit = self.result.audit.as_ref();
         if audit.is_some_and(|audit| audit.is_blind) {
             return Some("the bias is unknown: path tracing cannot sample much of the light");
         }
-        let by_photons = self.result.method.finds_caustics() && Census::of(self.scene).specular > 0;
-        let alone = audit.is_none_or(|audit| !audit.has_photons);
-        (by_photons || self.result.caustics.used && alone)
-            .then_some("path tracing, the judge, may miss light through mirrors and glass")
+        let has_doubt = match self.result.method.finds_caustics() {
+            true => Census::of(self.scene).specular > 0,
+            false => {
+                let photons = self.result.findings.get("caustic_photons");
+                let has_photons = photons.is_some_and(|finding| finding.decision != Decision::LeftOut);
+                has_photons && audit.is_none_or(|audit| !audit.has_photons)
+            }
+        };
+        has_doubt.then_some("path tracing, the judge, may miss light through mirrors and glass")
     }
 
     /// Object of `--json` (docs/cli.md).

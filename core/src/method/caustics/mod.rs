@@ -15,9 +15,11 @@ pub use photons::{CausticPhotons, RecordPhotons};
 pub use prepass::{Decision, Prepass, prepass, unseen, unseen_footprint};
 
 use super::path::{PathTracing, Reuse};
-use super::{Executor, Method, PhotonUse, RenderContext, Round};
+use super::{Executor, LastMaps, Method, PhotonUse, RenderContext, Round};
 use crate::bsdf::Features;
 use crate::census::Census;
+use crate::findings::Decision::LeftOut;
+use crate::findings::{Finding, Findings, Value};
 use crate::memory::{Footprint, MemorySource, OutOfMemory};
 use crate::scene::Scene;
 use crate::transport::caustics::tracer::CausticPhotonTracer;
@@ -48,6 +50,22 @@ pub struct CausticUse {
     pub share: Option<f64>,
     /// There was not enough memory for a prepass.
     pub lacks_memory: bool,
+}
+
+impl CausticUse {
+    /// Findings on caustic photons and their maps, whose statistics are `photons`.
+    pub fn findings(&self, photons: Option<PhotonUse>) -> Findings {
+        let photons = photons.unwrap_or_default();
+        let left_out = |reason| Some(Finding::new("caustic_photons", LeftOut, reason));
+        let finding = match (self.lacks_memory, self.used, self.share) {
+            (true, ..) => left_out("not enough memory: caustics may be missing or noisy"),
+            (_, true, _) => Some(photons.caustic.unwrap_or_default().finding("caustic_photons")),
+            (.., Some(_)) => left_out("they carry too little light by a pilot"),
+            (.., None) => None,
+        };
+        let share = self.share.map(Value::Fraction);
+        photons.findings().and(finding.map(|finding| finding.with_some("share_of_light", share)))
+    }
 }
 
 /// Path tracing of one picture, with caustic photons where they pay.
@@ -89,6 +107,11 @@ impl<'a, F: Features> CausticPathTracing<'a, F> {
         Ok(Some(method))
     }
 
+    /// `paths` alone, after the `finding` of a prepass.
+    pub fn without_photons(paths: PathTracing<'a, F>, finding: CausticUse) -> Self {
+        Self { paths, photons: None, finding: CausticUse { used: false, ..finding } }
+    }
+
     /// Whether photons are used, and why.
     pub fn finding(&self) -> CausticUse {
         self.finding
@@ -119,5 +142,14 @@ impl<F: Features> Method for CausticPathTracing<'_, F> {
                 None => photons.round(self.paths.integrator(), round),
             },
         }
+    }
+
+    fn findings(&self) -> Findings {
+        Findings::default().and(self.reuse().finding()).and(self.finding.findings(self.statistics()))
+    }
+
+    fn last_maps(&mut self) -> Result<LastMaps<'_>, OutOfMemory> {
+        let caustic = self.photons.as_mut().map_or(Ok(None), CausticPhotons::last_map)?;
+        Ok(LastMaps { global: None, caustic })
     }
 }

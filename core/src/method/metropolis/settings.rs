@@ -1,6 +1,8 @@
 //! Choices of Metropolis light transport, and the use of its chains.
 
 use super::PrimarySpace;
+use crate::findings::Decision::{LeftOut, Used};
+use crate::findings::{Finding, Value};
 
 /// Choices of Metropolis light transport.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -35,4 +37,24 @@ pub struct ChainUse {
     pub share: f64,
     /// Relative standard deviation of that share's mean over the samples; 0 of one sample.
     pub share_error: f64,
+}
+
+impl ChainUse {
+    /// Finding on the chains.
+    pub fn finding(&self) -> Finding {
+        let (decision, reason) = match self.share {
+            0.0 => (LeftOut, "path tracing finds all light well"),
+            _ => (Used, "light that path tracing finds badly is found by Markov chains"),
+        };
+        let [small, large, subpath] = self.accepted;
+        Finding::new("markov_chains", decision, reason)
+            .with("chains", Value::Count(self.chains.into()))
+            .with("mutations_per_chain", Value::Count(self.mutations.into()))
+            .with("independent_points", Value::Count(self.candidates.into()))
+            .with("accepted_small_steps", Value::Fraction(small))
+            .with("accepted_large_steps", Value::Fraction(large))
+            .with("accepted_subpath_steps", Value::Fraction(subpath))
+            .with("share_of_light", Value::Fraction(self.share))
+            .with("share_error", Value::Fraction(self.share_error))
+    }
 }

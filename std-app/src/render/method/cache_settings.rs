@@ -1,4 +1,4 @@
-//! Settings of irradiance caches, and statistics of their use.
+//! Settings of irradiance caches.
 
 use halflight_core::cache::irradiance::{Metric, metric};
 
@@ -33,25 +33,4 @@ impl Default for CacheSettings {
     fn default() -> Self {
         Self { metric: Metric::Halflight, error: None, strata: None }
     }
-}
-
-/// Statistics of both caches.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct CacheUse {
-    /// Records of both caches.
-    pub records: u64,
-    /// Most records that fit into memory.
-    pub capacity: u64,
-    /// Records refused for lack of memory; their surroundings are path traced.
-    pub refused: u64,
-    /// Records of both caches that came from a file.
-    pub loaded: u64,
-    /// Gatherings, each of `rays` gather rays.
-    pub gathered: u64,
-    /// Gather rays of a record.
-    pub rays: u32,
-    /// Whether filling ended at its deadline or by an interrupt.
-    pub is_cut: bool,
-    /// Seconds of filling both caches.
-    pub seconds: f64,
 }

@@ -2,10 +2,9 @@
 //! surveys.
 
 use super::cache_memory;
-use super::cache_settings::CacheUse;
 use super::caustics;
-use super::photon_view::PhotonView;
-use super::{Borrower, Renderer, Stage};
+use super::photon_view::{self, PhotonView};
+use super::{Borrower, Method, Renderer, Stage};
 use crate::render::RenderError;
 use crate::render::cache_file::{self, Half, Header, Reader, View};
 use crate::render::crew::Crew;
@@ -18,6 +17,8 @@ use crate::render::workers::Workers;
 use crate::save::Patience;
 use halflight_core::bsdf::Features;
 use halflight_core::cache::irradiance::{IrradianceCache, Record};
+use halflight_core::findings::Decision::{Limited, Used};
+use halflight_core::findings::{Finding, Findings, Value};
 use halflight_core::memory::{Footprint, Line};
 use halflight_core::method::caustics::{
     CausticEmission, CausticPhotons, CausticSettings, CausticUse, Decision, Prepass, least_footprint,
@@ -25,7 +26,7 @@ use halflight_core::method::caustics::{
 };
 use halflight_core::method::irradiance_cache::{CacheSettings, IrradianceCaching};
 use halflight_core::method::path::PathTracing;
-use halflight_core::method::{Method as _, PhotonUse};
+use halflight_core::method::{LastMaps, Method as _};
 use halflight_core::transport::PathIntegrator;
 
 /// Runs the prepass for caustics, allocates memory, sets up the method and calls `then` with it.
@@ -207,6 +208,31 @@ impl<F: Features> Cached<'_, '_, F> {
         Ok(())
     }
 
+    /// Finding on the caches.
+    fn finding(&self) -> Finding {
+        let settings = &self.stage.settings.cache;
+        let caches = self.method.caches();
+        let sum = |of: fn(&IrradianceCache) -> u64| caches.iter().map(|cache| of(cache)).sum::<u64>();
+        let both = |halves: [u32; 2]| halves.into_iter().map(u64::from).sum::<u64>();
+        let refused = sum(|cache| cache.refused());
+        let (decision, reason) = match (self.method.is_cut(), refused) {
+            (true, _) => (Limited, "filling was cut short: other points are path traced"),
+            (false, 1..) => (Limited, "not enough memory: other points are path traced"),
+            (false, 0) => (Used, "indirect light of diffuse surfaces is interpolated"),
+        };
+        let gathered = both(self.method.gathered()) - both(self.loaded.map(|half| half.gathered));
+        Finding::new("irradiance_cache", decision, reason)
+            .timed("cache")
+            .with("metric", Value::Name(settings.metric.name()))
+            .with("error", Value::Number(settings.allowed().into()))
+            .with("rays_per_record", Value::Count(self.rays.into()))
+            .with("records", Value::Count(sum(|cache| cache.records().len() as u64)))
+            .with("capacity", Value::Count(sum(|cache| cache.capacity() as u64)))
+            .with("gathered", Value::Count(gathered))
+            .with_count("loaded", both(self.loaded.map(|half| half.records)))
+            .with_count("refused", refused)
+    }
+
     /// Writes the file during the render, or at the end if a write is outstanding.
     fn keep(&mut self, last: Option<Patience>) {
         let caches = self.method.caches();
@@ -220,6 +246,10 @@ impl<F: Features> Cached<'_, '_, F> {
 }
 
 impl<F: Features> Renderer for Cached<'_, '_, F> {
+    fn chosen(&self) -> Method {
+        Method::IrradianceCache
+    }
+
     fn round(&mut self, crew: &mut Crew) -> Result<(), RenderError> {
         if !self.method.is_frozen() {
             // A resumed film has counted the rays of filling already.
@@ -263,22 +293,6 @@ impl<F: Features> Renderer for Cached<'_, '_, F> {
         survey::survey(self.method.paths(), caches, size, (*points, settings.stop.seconds), executor)
     }
 
-    fn cache(&self) -> Option<CacheUse> {
-        let caches = self.method.caches();
-        let sum = |of: fn(&IrradianceCache) -> u64| caches.iter().map(|cache| of(cache)).sum();
-        let both = |halves: [u32; 2]| halves.into_iter().map(u64::from).sum::<u64>();
-        Some(CacheUse {
-            records: sum(|cache| cache.records().len() as u64),
-            capacity: sum(|cache| cache.capacity() as u64),
-            refused: sum(|cache| cache.refused()),
-            loaded: both(self.loaded.map(|half| half.records)),
-            gathered: both(self.method.gathered()) - both(self.loaded.map(|half| half.gathered)),
-            rays: self.rays,
-            is_cut: self.method.is_cut(),
-            seconds: self.stage.workers.seconds_of("cache"),
-        })
-    }
-
     fn finish(&mut self, patience: Patience) {
         self.keep(Some(patience));
     }
@@ -287,16 +301,14 @@ impl<F: Features> Renderer for Cached<'_, '_, F> {
         Some(&self.kept)
     }
 
-    fn caustics(&self) -> CausticUse {
-        self.caustics
-    }
-
     fn photon_view(&mut self) -> Result<Option<PhotonView>, RenderError> {
-        let Self { stage, photons, .. } = self;
-        photons.as_mut().map_or(Ok(None), |photons| caustics::view::<F>(stage, photons))
+        let Some(photons) = &mut self.photons else { return Ok(None) };
+        let maps = LastMaps { global: None, caustic: photons.last_map()? };
+        Ok(photon_view::look::<F>(&self.stage, &maps)?)
     }
 
-    fn photons(&self) -> Option<PhotonUse> {
-        self.photons.as_ref().map(|photons| photons.statistics())
+    fn findings(&self) -> Findings {
+        let photons = self.photons.as_ref().map(|photons| photons.statistics());
+        Findings::from(self.finding()).and(self.caustics.findings(photons))
     }
 }

@@ -4,25 +4,17 @@
 //! the [`Crew`] ("The unit of work" in docs/architecture.md). A new method needs a variant of [`Method`] with
 //! its texts, a file with its [`Renderer`], and a line in [`Method::with`].
 
-mod bidirectional;
+mod adapter;
 mod cache_memory;
 mod cache_settings;
 mod caustics;
-mod instant_radiosity;
 mod irradiance_cache;
-mod metropolis;
-mod path;
-mod photon_map;
 mod photon_view;
-mod sppm;
 #[cfg(test)]
 mod wrong;
 
-pub use cache_settings::{CacheSettings, CacheUse};
-pub use halflight_core::method::caustics::CausticUse;
-pub use halflight_core::method::instant_radiosity::VirtualLightUse;
-pub use halflight_core::method::metropolis::ChainUse;
-pub use halflight_core::method::{MapUse, PhotonSettings, PhotonUse};
+pub use cache_settings::CacheSettings;
+pub use halflight_core::method::PhotonSettings;
 pub use photon_view::{MapView, PhotonView};
 
 use super::crew::Crew;
@@ -31,12 +23,20 @@ use super::rewritten_file::RewrittenFile;
 use super::run::path_settings;
 use super::survey::Survey;
 use super::workers::Workers;
-use super::{RenderError, Reuse, Settings};
+use super::{RenderError, Settings};
 use crate::save::Patience;
+use adapter::Adapter;
 use halflight_core::bsdf::Features;
 use halflight_core::bvh::Bvh;
+use halflight_core::findings::Findings;
 use halflight_core::light::LightSampler;
 use halflight_core::method::RenderContext;
+use halflight_core::method::bidirectional::{Bidirectional, BidirectionalSettings};
+use halflight_core::method::instant_radiosity::InstantRadiosity;
+use halflight_core::method::metropolis::Metropolis;
+use halflight_core::method::path::PathTracing;
+use halflight_core::method::photon_map::PhotonMapping;
+use halflight_core::method::sppm::ProgressivePhotonMapping;
 use halflight_core::scene::Scene;
 use halflight_core::transport::{CausticMerging, PathIntegrator, PathSettings};
 
@@ -202,25 +202,79 @@ impl Method {
         memory: &mut Memory<'a>,
         then: impl FnOnce(&mut dyn Renderer, &mut Memory) -> Result<T, RenderError>,
     ) -> Result<T, RenderError> {
+        let (context, settings) = (&stage.context(), stage.settings);
         match self {
             Method::Path if caustics::are_possible(stage) => caustics::with::<F, T>(stage, memory, then),
-            Method::Path => then(&mut path::Paths::<F>::new(stage, memory)?, memory),
-            Method::IrradianceCache => irradiance_cache::with::<F, T>(stage, memory, then),
-            Method::PhotonMap => then(&mut photon_map::TwoPasses::<F>::new(stage, memory)?, memory),
-            Method::ProgressivePhotons => {
-                then(&mut sppm::ProgressivePhotons::<F>::new(stage, memory)?, memory)
+            Method::Path => {
+                let scratch = (self, PathTracing::<F>::scratch());
+                let mut paths = Adapter::<F, _>::new(stage, memory, scratch, |_, executor, _| {
+                    PathTracing::<F>::new(context, settings.reuse, executor)
+                })?;
+                then(&mut paths, memory)
             }
+            Method::IrradianceCache => irradiance_cache::with::<F, T>(stage, memory, then),
+            Method::PhotonMap => {
+                let scratch = (self, PhotonMapping::<F>::scratch());
+                let mut maps = Adapter::<F, _>::new(stage, memory, scratch, |memory, executor, reserve| {
+                    PhotonMapping::<F>::new(context, settings.photons, reserve, memory, executor)
+                })?;
+                then(&mut maps, memory)
+            }
+            Method::ProgressivePhotons => then(&mut progressive_photons::<F>(stage, memory)?, memory),
             Method::LightTracing | Method::Bidirectional | Method::VertexMerging => {
-                then(&mut bidirectional::BidirectionalPaths::<F>::new(stage, memory, self)?, memory)
+                let techniques = self.techniques(settings.bidirectional);
+                let scratch = (self, Bidirectional::<F>::scratch(&techniques));
+                let mut paths = Adapter::<F, _>::new(stage, memory, scratch, |memory, executor, reserve| {
+                    Bidirectional::<F>::new(context, &techniques, memory, executor, reserve)
+                })?;
+                then(&mut paths, memory)
             }
             Method::InstantRadiosity | Method::ClampedInstantRadiosity => {
-                then(&mut instant_radiosity::VirtualLights::<F>::new(stage, memory, self)?, memory)
+                let form = (self == Method::ClampedInstantRadiosity, settings.reuse);
+                let scratch = (self, InstantRadiosity::<F>::scratch());
+                let mut lights =
+                    Adapter::<F, _>::new(stage, memory, scratch, |memory, executor, reserve| {
+                        let settings = &settings.virtual_lights;
+                        InstantRadiosity::<F>::new(context, settings, form, memory, executor, reserve)
+                    })?;
+                then(&mut lights, memory)
             }
-            Method::Metropolis => then(&mut metropolis::Chains::<F>::new(stage, memory)?, memory),
+            Method::Metropolis => {
+                let scratch = (self, Metropolis::<F>::scratch());
+                let mut chains =
+                    Adapter::<F, _>::new(stage, memory, scratch, |memory, executor, reserve| {
+                        Metropolis::<F>::new(context, &settings.metropolis, memory, executor, reserve)
+                    })?;
+                then(&mut chains, memory)
+            }
             #[cfg(test)]
             Method::Wrong => then(&mut wrong::Wrong::<F>::new(stage, memory)?, memory),
         }
     }
+
+    /// Techniques of a bidirectional method.
+    fn techniques(self, settings: BidirectionalSettings) -> BidirectionalSettings {
+        match self {
+            Method::LightTracing => BidirectionalSettings {
+                light_paths: settings.light_paths,
+                ..BidirectionalSettings::LIGHT_TRACING
+            },
+            Method::Bidirectional => BidirectionalSettings { merging: Some(false), ..settings },
+            _ => settings,
+        }
+    }
+}
+
+/// Stochastic progressive photon mapping on `stage`.
+fn progressive_photons<'a, F: Features>(
+    stage: &Stage<'a>,
+    memory: &mut Memory<'a>,
+) -> Result<Adapter<'a, F, ProgressivePhotonMapping<'a, F>>, RenderError> {
+    let scratch = (Method::ProgressivePhotons, ProgressivePhotonMapping::<F>::scratch());
+    Adapter::new(stage, memory, scratch, |memory, executor, reserve| {
+        let (context, settings) = (stage.context(), stage.settings.photons);
+        ProgressivePhotonMapping::new(&context, settings, reserve, memory, executor)
+    })
 }
 
 /// Structures that all methods use.
@@ -253,10 +307,8 @@ pub(super) type Borrower<'b> = dyn FnMut(Option<CausticMerging>) -> Result<(), R
 
 /// A method at work on one scene. It owns its structures; the crew owns the film.
 pub(super) trait Renderer {
-    /// Method chosen by a prepass instead of the requested one.
-    fn chosen(&self) -> Option<Method> {
-        None
-    }
+    /// The method; a prepass may have chosen another one than the settings.
+    fn chosen(&self) -> Method;
 
     /// One round: brings the tiles of `crew` to their targets, or less if the round is cut.
     ///
@@ -277,11 +329,6 @@ pub(super) trait Renderer {
         then(None)
     }
 
-    /// Whether neighbouring pixels share paths, and why.
-    fn reuse(&self) -> Reuse {
-        Reuse::default()
-    }
-
     /// Relative upper estimate of the squared bias of each pixel, row by row; empty if unknown.
     ///
     /// # Errors
@@ -296,16 +343,6 @@ pub(super) trait Renderer {
     /// Insufficient memory.
     fn survey(&mut self, _workers: &Workers) -> Result<Option<Survey>, RenderError> {
         Ok(None)
-    }
-
-    /// Whether paths are merged with caustic photons, and why.
-    fn caustics(&self) -> CausticUse {
-        CausticUse::default()
-    }
-
-    /// Statistics of the irradiance cache.
-    fn cache(&self) -> Option<CacheUse> {
-        None
     }
 
     /// Writes the method's file for the last time.
@@ -324,18 +361,6 @@ pub(super) trait Renderer {
         Ok(None)
     }
 
-    /// Statistics of virtual lights.
-    fn virtual_lights(&self) -> Option<VirtualLightUse> {
-        None
-    }
-
-    /// Statistics of Markov chains.
-    fn chains(&self) -> Option<ChainUse> {
-        None
-    }
-
-    /// Statistics of photons.
-    fn photons(&self) -> Option<PhotonUse> {
-        None
-    }
+    /// Decisions and numbers of its parts.
+    fn findings(&self) -> Findings;
 }

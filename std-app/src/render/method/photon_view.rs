@@ -5,6 +5,7 @@ use super::Stage;
 use halflight_core::bsdf::Features;
 use halflight_core::geometry::Ray;
 use halflight_core::memory::{Arena, Line, OutOfMemory};
+use halflight_core::method::LastMaps;
 use halflight_core::photon::{Kernel, Neighbours, PhotonMap};
 use halflight_core::scene::SurfacePoint;
 
@@ -44,22 +45,21 @@ const MOST_PHOTONS: usize = 1 << 18;
 /// Relative tolerance of distance in the visibility test of a photon.
 const BEFORE: f32 = 1e-3;
 
-/// Renders the views of both maps.
-pub(super) fn look<F: Features>(
-    stage: &Stage,
-    global: Option<&PhotonMap>,
-    caustic: Option<&PhotonMap>,
-) -> Result<PhotonView, OutOfMemory> {
+/// Views of the maps of `stage`; `None` without maps.
+pub(super) fn look<F: Features>(stage: &Stage, maps: &LastMaps) -> Result<Option<PhotonView>, OutOfMemory> {
+    if maps.global.is_none() && maps.caustic.is_none() {
+        return Ok(None);
+    }
     let Stage { settings, .. } = *stage;
     let (width, height) = (settings.width, settings.height);
     let factor = width.max(height).div_ceil(MOST_PIXELS);
     let size = [width.div_ceil(factor), height.div_ceil(factor)];
     let of = |map: &PhotonMap| look_at::<F>(stage, map, size);
-    Ok(PhotonView {
+    Ok(Some(PhotonView {
         width: size[0],
-        global: global.map(of).transpose()?,
-        caustic: caustic.map(of).transpose()?,
-    })
+        global: maps.global.as_ref().map(of).transpose()?,
+        caustic: maps.caustic.as_ref().map(of).transpose()?,
+    }))
 }
 
 fn look_at<F: Features>(

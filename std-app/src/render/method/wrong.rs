@@ -1,13 +1,14 @@
 //! A deliberately biased method: the right half of the picture is a tenth too bright, like a cache with 10 %
 //! too much irradiance. Its noise does not reveal the bias.
 
-use super::{Renderer, Stage};
+use super::{Method, Renderer, Stage};
 use crate::render::RenderError;
 use crate::render::crew::Crew;
 use crate::render::memory::Memory;
 use core::ops::Range;
 use halflight_core::bsdf::Features;
 use halflight_core::film::{Dropped, PIXELS_PER_TILE, Pixel, Tile};
+use halflight_core::findings::Findings;
 use halflight_core::memory::{Arena, Line};
 use halflight_core::transport::{Counters, PathIntegrator, path::WAVE};
 
@@ -29,6 +30,14 @@ impl<'a, F: Features> Wrong<'a, F> {
 }
 
 impl<F: Features> Renderer for Wrong<'_, F> {
+    fn chosen(&self) -> Method {
+        Method::Wrong
+    }
+
+    fn findings(&self) -> Findings {
+        Findings::default()
+    }
+
     fn round(&mut self, crew: &mut Crew) -> Result<(), RenderError> {
         let Self { tracer, scratch, size: [width, height] } = self;
         let sample = |task: usize, samples: Range<u32>, arena: &mut Arena, pixels: &mut [Pixel]| {

@@ -121,7 +121,7 @@ pub(super) fn resources(run: &Run) -> Markup {
 
 /// Section of findings: decisions and numbers of the method.
 pub(super) fn findings(run: &Run) -> Markup {
-    let findings = run.findings();
+    let findings = &run.result.findings;
     html! {
         @if findings.iter().next().is_some() {
             section {
