@@ -147,9 +147,9 @@ fn calibrate(file: &Path, wanted: &Wanted) {
 /// times as large for that: 2.25 of its own, and a quarter of 27 times as much. Not where no blur is found, which is less than that.
 fn sharpened(many: RenderResult, few: impl FnOnce() -> RenderResult) -> Image {
     let mut image = many.image;
-    if many.blurred.is_some_and(|blurred| blurred.blur.is_found()) {
+    if many.noise_and_blur.is_some_and(|noise_and_blur| noise_and_blur.blur.is_significant()) {
         let few = few();
-        assert!(few.blurred.is_some(), "a reference of fewer samples has photons as well");
+        assert!(few.noise_and_blur.is_some(), "a reference of fewer samples has photons as well");
         for (value, blurred) in
             image.pixels.as_flattened_mut().iter_mut().zip(few.image.pixels.as_flattened())
         {

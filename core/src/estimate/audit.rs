@@ -8,7 +8,7 @@
 //! provides for all of its pixels instead of a few.
 
 use super::interval::ErrorEstimate;
-use super::metric::{DARK, ROUNDING};
+use super::metric::{RELMSE_OFFSET, ROUNDING};
 use super::student::NORMAL_95 as Z;
 use crate::Rgb;
 use crate::film::Pixel;
@@ -18,14 +18,14 @@ use libm::{cbrt, fabs, hypot, sqrt};
 /// audit that is not in the numerator, so that chance brightness of a pixel does not reduce its error. Where
 /// light is rare this part may lack it, hence the bound. The relative error of a wrongly bright pixel is then
 /// at most this number.
-const DOUBT: f64 = 4.0;
+const FILTERED_DIVISOR: f64 = 4.0;
 
 /// 95 % quantile of the normal distribution.
-const ONE_SIDED: f64 = 1.644_853_626_951_472_7;
+const NORMAL_95_ONE_SIDED: f64 = 1.644_853_626_951_472_7;
 
 /// Result of an audited pixel.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Finding {
+pub struct PixelBias {
     /// Estimate of the squared bias over R² + 0.01 m², averaged over channels; may be negative.
     pub bias: f64,
     /// Excess brightness over the root of R² + 0.01 m².
@@ -34,8 +34,8 @@ pub struct Finding {
     pub variances: [f64; 2],
 }
 
-impl Finding {
-    /// Finding of a pixel of the `picture`, its `truth` by the audit, and its `filtered` value, in a picture
+impl PixelBias {
+    /// Bias of a pixel of the `picture`, its `truth` by the audit, and its `filtered` value, in a picture
     /// of mean `mean`. `None` if the picture has no two samples, or the audit no four.
     pub fn of(picture: &Pixel, truth: &Pixel, filtered: Rgb, mean: f64) -> Option<Self> {
         if picture.even.count() == 0 || picture.odd.count() == 0 {
@@ -49,8 +49,8 @@ impl Finding {
         let (mut bias, mut deviation, mut variances) = (0.0, 0.0, [0.0; 2]);
         for c in 0..3 {
             let weight = |truth: f64| {
-                let r = truth.max(filtered[c] / DOUBT);
-                1.0 / (r * r + DARK)
+                let r = truth.max(filtered[c] / FILTERED_DIVISOR);
+                1.0 / (r * r + RELMSE_OFFSET)
             };
             // R of the other half: halves are independent, quarters of one half are not, since light met by
             // one quarter is not met again by the other. With few samples a deviation over the other quarter
@@ -93,7 +93,7 @@ impl BiasEstimate {
     ///
     /// Differences of neighbours count as chance. This overestimates the variance if strata differ, so that
     /// the interval is rather too wide than too narrow.
-    pub fn of(findings: impl Iterator<Item = (Finding, f64)>) -> Option<Self> {
+    pub fn of(findings: impl Iterator<Item = (PixelBias, f64)>) -> Option<Self> {
         let (mut count, mut differences) = (0.0, 0.0);
         let (mut sum, mut squares, mut cubes) = (0.0, 0.0, 0.0);
         let mut ends = None;
@@ -117,7 +117,7 @@ impl BiasEstimate {
         let second = squares - sum * mean;
         let third = cubes - mean * (3.0 * squares - 2.0 * sum * mean);
         let variance = differences / (2.0 * count * count);
-        Some(Self::known(mean, variance, third / (second * sqrt(second)), 0.0))
+        Some(Self::from_moments(mean, variance, third / (second * sqrt(second)), 0.0))
     }
 
     /// Estimate with known variance and skewness of its noise; `unsure` is its remaining relative
@@ -127,11 +127,17 @@ impl BiasEstimate {
     /// sum of squares, such a sum has lighter tails than the normal distribution, for products of any tails
     /// (Efron 1969). Student's t would apply to less certain squares. If few products dominate, they tend to
     /// be positive.
-    pub(super) fn known(relmse: f64, variance: f64, skewness: f64, unsure: f64) -> Self {
+    pub(super) fn from_moments(relmse: f64, variance: f64, skewness: f64, unsure: f64) -> Self {
         let error = sqrt(variance).max(ROUNDING * ROUNDING / Z);
         let detectable = error * studentised(skewness);
         let [below, above] = [detectable / Z, error].map(|error| hypot(error, unsure * relmse / Z));
-        Self { relmse, lower: ends(relmse, below)[0], upper: ends(relmse, above)[1], detectable, error }
+        Self {
+            relmse,
+            lower: confidence_interval(relmse, below)[0],
+            upper: confidence_interval(relmse, above)[1],
+            detectable,
+            error,
+        }
     }
 
     /// Lower end that holds for repeated tests: about four standard errors below the estimate.
@@ -140,7 +146,7 @@ impl BiasEstimate {
     }
 
     /// True if the bias is significant at a level of 2.5 %.
-    pub fn is_found(&self) -> bool {
+    pub fn is_significant(&self) -> bool {
         self.relmse > self.detectable
     }
 }
@@ -150,9 +156,9 @@ impl BiasEstimate {
 /// true value, including 0. This is an approximation: the lower end between the one-sided and twice the
 /// two-sided quantile, and the upper end below 0, are within 0.1 standard errors of theirs, the coverage
 /// within 1 % of 95 %.
-fn ends(estimate: f64, error: f64) -> [f64; 2] {
+fn confidence_interval(estimate: f64, error: f64) -> [f64; 2] {
     let x = estimate / error;
-    let lower = (Z * (x - ONE_SIDED) / (2.0 * Z - ONE_SIDED)).max(x - Z).max(0.0);
+    let lower = (Z * (x - NORMAL_95_ONE_SIDED) / (2.0 * Z - NORMAL_95_ONE_SIDED)).max(x - Z).max(0.0);
     // x + hypot(x, Z), without cancellation.
     let upper = if x > 0.0 { x + Z } else { Z * Z / (hypot(x, Z) - x) };
     [lower * error, upper * error]

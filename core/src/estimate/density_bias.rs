@@ -7,13 +7,13 @@
 //! least I / 2, since a noisy finer disc may estimate no light at all.
 
 use super::audit::BiasEstimate;
-use super::metric::DARK;
+use super::metric::RELMSE_OFFSET;
 use super::tile::{BLOCK, BLOCKS};
 use crate::Rgb;
 use crate::film::{PIXELS_PER_TILE, Pixel};
 
 /// Relative uncertainty of blur: finer discs are blurred as well, at an edge more than assumed.
-const UNSURE: f64 = 0.25;
+const RELATIVE_UNCERTAINTY: f64 = 0.25;
 
 /// Sums of squared blur over the pixels of one tile, in units of relMSE.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -45,7 +45,7 @@ impl TileBlur {
             // The blur of a channel is proportional to its radiance.
             let over_square = |blur: f64| {
                 let r = (light - blur).max(0.5 * light);
-                let channel = |shine: f64| shine * shine / (shine * shine * r * r + DARK) / 3.0;
+                let channel = |shine: f64| shine * shine / (shine * shine * r * r + RELMSE_OFFSET) / 3.0;
                 colour.iter().map(|channel_of| channel(3.0 * channel_of / sum)).sum::<f64>()
             };
             let weight = 0.5 * (over_square(a) + over_square(b));
@@ -77,7 +77,7 @@ impl BiasEstimate {
             return None;
         }
         let count = pixels as f64;
-        Some(Self::known(squared / count, squares / (count * count), 0.0, UNSURE))
+        Some(Self::from_moments(squared / count, squares / (count * count), 0.0, RELATIVE_UNCERTAINTY))
     }
 }
 
@@ -117,8 +117,8 @@ mod tests {
         for seed in 0..runs {
             let with = estimate(0.2, 0.3, seed).unwrap();
             held += u32::from((with.lower..=with.upper).contains(&truth));
-            assert!(with.is_found(), "{with:?}");
-            found += u32::from(estimate(0.0, 0.3, seed).unwrap().is_found());
+            assert!(with.is_significant(), "{with:?}");
+            found += u32::from(estimate(0.0, 0.3, seed).unwrap().is_significant());
         }
         // 95 % of 100, and more due to the relative uncertainty of a quarter; 2.5 % of 100.
         assert!(held >= 90 && found <= 8, "{held} {found}");
@@ -152,7 +152,7 @@ mod tests {
     #[test]
     fn what_is_not_known_of_blur_reaches_both_ways() {
         let noise = ErrorEstimate { relmse: 1e-4, lower: 0.9e-4, upper: 1.1e-4 };
-        let blur = BiasEstimate::known(5e-3, 1e-10, 0.0, UNSURE);
+        let blur = BiasEstimate::from_moments(5e-3, 1e-10, 0.0, RELATIVE_UNCERTAINTY);
         let sum = noise.with_bias(blur);
         assert!(sum.lower < 1e-4 + 0.8 * 5e-3 && sum.upper > 1e-4 + 1.2 * 5e-3, "{sum:?}");
     }

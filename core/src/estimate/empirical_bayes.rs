@@ -4,8 +4,8 @@
 //! is believed. A firefly that no other sample meets shrinks to its neighbours; texture stays. Reasons:
 //! docs/decisions/0035.
 
-use super::metric::DARK;
-use super::tile_statistics::{FAINT, TileStatistics, brightness};
+use super::metric::RELMSE_OFFSET;
+use super::tile_statistics::{DARK_OFFSET, TileStatistics, brightness};
 use crate::film::{Pixel, Tile};
 use glam::Vec4;
 
@@ -21,28 +21,28 @@ const DARKER: usize = -FIRST_OCTAVE as usize;
 /// Class limits of disagreement: the difference of the two quarters of a pair over their sum.
 const DISAGREEMENT: [f32; 5] = [0.1, 0.25, 0.5, 0.75, 0.9];
 
-const ALIKE: usize = DISAGREEMENT.len() + 1;
+const DISAGREEMENT_CLASSES: usize = DISAGREEMENT.len() + 1;
 
-const CLASSES: usize = (BRIGHTER + DARKER) * ALIKE;
+const CLASSES: usize = (BRIGHTER + DARKER) * DISAGREEMENT_CLASSES;
 
 /// Weight of the prior in pixels. The prior believes half of the octaves of an excess, and all of a deficit.
-const PRIOR: f64 = 4.0;
+const PRIOR_PIXELS: f64 = 4.0;
 
 /// Maximum negative share of a deficit: where light is rare, a pixel darker than its neighbours in one pair
 /// may be brighter in the other.
-const CONTRARY: f64 = 2.0;
+const MAX_CONTRARY_SHARE: f64 = 2.0;
 
 /// Maximum relative variance of R in a class; beyond it light is so rare that noise is proportional to it.
-const MOST_SPREAD: f64 = 0.1;
+const MAX_RELATIVE_VARIANCE: f64 = 0.1;
 
 /// Number of tiles that suffice: twice 16,384 pixels for two hundred classes.
-const ENOUGH: u64 = 64;
+const MAX_TILES: u64 = 64;
 
 /// Unit of integer sums, which do not depend on the order of tiles.
-const UNIT: f64 = 1.0 / (1 << 20) as f64;
+const FIXED_POINT_UNIT: f64 = 1.0 / (1 << 20) as f64;
 
 /// Limit of each summand, in units of the middle of its class.
-const MOST: f64 = 4096.0;
+const MAX_SUMMAND: f64 = 4096.0;
 
 /// Sums over the pixels of one class. x is the excess of a pixel over its neighbours, relative to them, in
 /// units of the middle of its class, with the sign that it has in the asked pair.
@@ -86,25 +86,25 @@ impl core::ops::AddAssign<&Self> for BrightnessClasses {
 impl BrightnessClasses {
     /// True for each tile `tile` of `count` to learn from: all of small pictures, otherwise 64 tiles,
     /// spread evenly by multiples of the golden ratio for any width.
-    pub fn asks(tile: usize, count: usize) -> bool {
-        let turns = (tile as u32).wrapping_mul(0x9e37_79b9);
-        (u64::from(turns) * count as u64) >> 32 < ENOUGH
+    pub fn uses_tile(tile: usize, count: usize) -> bool {
+        let golden = (tile as u32).wrapping_mul(0x9e37_79b9);
+        (u64::from(golden) * count as u64) >> 32 < MAX_TILES
     }
 
     /// Learns from the `pixels` of `tile` in a picture of mean `mean` > 0. Skips pixels whose halves have
     /// fewer than two samples each.
     pub fn add(&mut self, tile: Tile, pixels: &[Pixel], mean: f64) {
         let seen = TileStatistics::new(tile, pixels, (1.0 / mean) as f32);
-        let whole = |value: f64| (value.clamp(-MOST, MOST) / UNIT) as i64;
+        let whole = |value: f64| (value.clamp(-MAX_SUMMAND, MAX_SUMMAND) / FIXED_POINT_UNIT) as i64;
         for (quarters, around) in seen.quarters.iter().zip(&seen.around) {
             let Some(quarters) = quarters else { continue };
             let ([first, second], around) = (Pair::both(*quarters), Neighbourhood::new(*around));
             for (asked, other) in [(first, second), (second, first)] {
-                let more = around.more(asked.light);
-                let class = asked.class(more);
-                let unit = f64::from(more.signum()) / middle(class);
+                let excess = around.excess(asked.light);
+                let class = asked.class(excess);
+                let unit = f64::from(excess.signum()) / middle(class);
                 let [own, x, a, b] =
-                    [more, around.more(other.light), around.more(other.a), around.more(other.b)]
+                    [excess, around.excess(other.light), around.excess(other.a), around.excess(other.b)]
                         .map(|x| f64::from(x) * unit);
                 let class = &mut self.classes[class];
                 class.pixels += 1;
@@ -119,26 +119,30 @@ impl BrightnessClasses {
     /// Shrinkage of the pixels of each class.
     pub fn shrinkage(&self) -> Shrinkage {
         let mut shrinkage =
-            Shrinkage { classes: [Believed { share: 0.0, spread: 1.0, doubt: 1.0 }; CLASSES] };
+            Shrinkage { classes: [ClassShrinkage { share: 0.0, spread: 1.0, prior_weight: 1.0 }; CLASSES] };
         for (class, (Class { pixels, own, other, own_squared, other_squared }, out)) in
             self.classes.into_iter().zip(&mut shrinkage.classes).enumerate()
         {
             let [own, other, own_squared, other_squared] =
-                [own, other, own_squared, other_squared].map(|sum| sum as f64 * UNIT);
+                [own, other, own_squared, other_squared].map(|sum| sum as f64 * FIXED_POINT_UNIT);
             let (middle, pixels) = (middle(class), pixels as f64);
             let (before, least, sign) = if is_darker(class) {
-                (1.0, -CONTRARY, -1.0)
+                (1.0, -MAX_CONTRARY_SHARE, -1.0)
             } else {
                 ((libm::sqrt(1.0 + middle) - 1.0) / middle, 0.0, 1.0)
             };
-            let believed = ((other + PRIOR * before) / (own + PRIOR)).clamp(least, 1.0);
+            let believed = ((other + PRIOR_PIXELS * before) / (own + PRIOR_PIXELS)).clamp(least, 1.0);
             // V of rare light is nearly proportional to R, so that the mean of V / R² is the mean of V
             // times ⟨R²⟩ / ⟨R⟩⁴.
             let there = 1.0 + sign * middle * believed * own / pixels.max(1.0);
             let spread = middle * middle * (other_squared - believed * believed * own_squared)
-                / ((pixels + PRIOR) * there * there);
-            let spread = 1.0 + spread.clamp(0.0, MOST_SPREAD) as f32;
-            *out = Believed { share: believed as f32, spread, doubt: (PRIOR / (pixels + PRIOR)) as f32 };
+                / ((pixels + PRIOR_PIXELS) * there * there);
+            let spread = 1.0 + spread.clamp(0.0, MAX_RELATIVE_VARIANCE) as f32;
+            *out = ClassShrinkage {
+                share: believed as f32,
+                spread,
+                prior_weight: (PRIOR_PIXELS / (pixels + PRIOR_PIXELS)) as f32,
+            };
         }
         shrinkage
     }
@@ -146,28 +150,35 @@ impl BrightnessClasses {
 
 /// Belief in the pixels of a class.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Believed {
+struct ClassShrinkage {
     /// Share of their excess or deficit that is believed.
     share: f32,
     /// ⟨R²⟩ / ⟨R⟩².
     spread: f32,
     /// Weight of the prior in both.
-    doubt: f32,
+    prior_weight: f32,
 }
 
 /// Belief in the pixels of a picture, by class.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Shrinkage {
-    classes: [Believed; CLASSES],
+    classes: [ClassShrinkage; CLASSES],
 }
 
 impl Shrinkage {
     /// Estimate of a pixel of value `pair` with neighbours `around` (m = 1).
     pub(super) fn posterior(&self, pair: Pair, around: &Neighbourhood) -> Posterior {
-        let Believed { share, spread, doubt } = self.classes[pair.class(around.more(pair.light))];
+        let ClassShrinkage { share, spread, prior_weight } =
+            self.classes[pair.class(around.excess(pair.light))];
         // If the sum is darker but a channel brighter, a negative share would lead through black.
         let light = (around.light + share * (pair.light - around.light)).max(around.light.min(pair.light));
-        Posterior { light, over_square: (light * light + DARK as f32).recip(), spread, share, doubt }
+        Posterior {
+            light,
+            over_square: (light * light + RELMSE_OFFSET as f32).recip(),
+            spread,
+            share,
+            prior_weight,
+        }
     }
 }
 
@@ -183,7 +194,7 @@ pub(super) struct Posterior {
     /// Share of the excess that is believed.
     pub(super) share: f32,
     /// Weight of the prior in that share.
-    pub(super) doubt: f32,
+    pub(super) prior_weight: f32,
 }
 
 /// Mean light of the neighbours of a pixel.
@@ -196,24 +207,24 @@ pub(super) struct Neighbourhood {
 impl Neighbourhood {
     pub(super) fn new(light: Vec4) -> Self {
         let brightness = brightness(light);
-        Self { light, brightness, reciprocal: (brightness + 3.0 * FAINT).recip() }
+        Self { light, brightness, reciprocal: (brightness + 3.0 * DARK_OFFSET).recip() }
     }
 
     /// Excess of `light` over the neighbours, relative to them.
-    fn more(&self, light: Vec4) -> f32 {
+    fn excess(&self, light: Vec4) -> f32 {
         (brightness(light) - self.brightness) * self.reciprocal
     }
 }
 
 /// Middle of the excess or deficit of a class.
 fn middle(class: usize) -> f64 {
-    let octave = class / ALIKE - if is_darker(class) { BRIGHTER } else { 0 };
+    let octave = class / DISAGREEMENT_CLASSES - if is_darker(class) { BRIGHTER } else { 0 };
     // 2^(octave + 1/2).
     f64::from_bits(((octave as i32 + FIRST_OCTAVE + 1023) as u64) << 52) * core::f64::consts::SQRT_2
 }
 
 fn is_darker(class: usize) -> bool {
-    class / ALIKE >= BRIGHTER
+    class / DISAGREEMENT_CLASSES >= BRIGHTER
 }
 
 /// Pair of quarters of a pixel, one from each half.
@@ -236,14 +247,15 @@ impl Pair {
         0.25 * (self.a - self.b) * (self.a - self.b)
     }
 
-    /// Class of the pair, given its excess `more` over the neighbours.
-    fn class(&self, more: f32) -> usize {
-        let exponent = (more.abs().to_bits() >> 23) as i32 - 127;
+    /// Class of the pair, given its `excess` over the neighbours.
+    fn class(&self, excess: f32) -> usize {
+        let exponent = (excess.abs().to_bits() >> 23) as i32 - 127;
         let octave = (exponent.clamp(FIRST_OCTAVE, LAST_OCTAVE) - FIRST_OCTAVE) as usize;
-        let octave = if more < 0.0 { BRIGHTER + octave.min(DARKER - 1) } else { octave };
+        let octave = if excess < 0.0 { BRIGHTER + octave.min(DARKER - 1) } else { octave };
         let difference = brightness(self.a - self.b).abs();
-        let sum = 2.0 * brightness(self.light) + 3.0 * FAINT;
-        octave * ALIKE + DISAGREEMENT.iter().filter(|least| difference >= **least * sum).count()
+        let sum = 2.0 * brightness(self.light) + 3.0 * DARK_OFFSET;
+        octave * DISAGREEMENT_CLASSES
+            + DISAGREEMENT.iter().filter(|least| difference >= **least * sum).count()
     }
 }
 
@@ -336,8 +348,9 @@ mod tests {
         let around = Vec4::new(1.0, 1.0, 0.1, 0.0);
         let light = Vec4::new(0.1, 0.1, 1.0, 0.0);
         for believed in [-2.0, -0.3, 0.0, 1.0] {
-            let shrinkage =
-                Shrinkage { classes: [Believed { share: believed, spread: 1.0, doubt: 0.0 }; CLASSES] };
+            let shrinkage = Shrinkage {
+                classes: [ClassShrinkage { share: believed, spread: 1.0, prior_weight: 0.0 }; CLASSES],
+            };
             let pair = Pair { a: light, b: light, light };
             let weight = shrinkage.posterior(pair, &Neighbourhood::new(around)).over_square;
             assert!(weight.truncate().max_element() <= 1.0 / (0.1f32.powi(2) + 0.01) * 1.0001, "{weight}");
@@ -347,8 +360,9 @@ mod tests {
     #[test]
     fn tiles_are_asked_all_over_the_picture() {
         for (across, down) in [(8, 16), (16, 16), (45, 21), (63, 63), (64, 48), (240, 135)] {
-            let asked: Vec<_> =
-                (0..across * down).filter(|tile| BrightnessClasses::asks(*tile, across * down)).collect();
+            let asked: Vec<_> = (0..across * down)
+                .filter(|tile| BrightnessClasses::uses_tile(*tile, across * down))
+                .collect();
             assert!((64..=67).contains(&asked.len()), "{across} x {down}: {}", asked.len());
             let distinct = |place: &dyn Fn(usize) -> usize| {
                 let mut places: Vec<_> = asked.iter().map(|tile| place(*tile)).collect();
@@ -362,7 +376,7 @@ mod tests {
                 "{across} x {down}: {columns}, {rows}"
             );
         }
-        assert!((0..64).all(|tile| BrightnessClasses::asks(tile, 64)));
+        assert!((0..64).all(|tile| BrightnessClasses::uses_tile(tile, 64)));
     }
 
     #[test]

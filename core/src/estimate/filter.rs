@@ -4,17 +4,17 @@
 //! filter interpolates square roots, so that a neighbour a hundred times as bright does not drown a dark
 //! pixel.
 
-use super::tile_statistics::{PLACES, SIDE};
+use super::tile_statistics::{SIDE, SQUARE_PIXELS};
 use crate::Rgb;
 use crate::film::{PIXELS_PER_TILE, Pixel, Tile};
 use glam::Vec4;
 
 /// Neighbours on each side: windows of 5 x 5 pixels, clipped to the tile.
-const REACH: usize = 2;
+const RADIUS: usize = 2;
 
 /// Multiple of the estimated variance up to which variation counts as noise, since the variance is as
 /// uncertain itself; 1.5 leaves too much noise.
-const NOISE: f32 = 2.0;
+const NOISE_FACTOR: f32 = 2.0;
 
 /// Filtered `pixels` of `tile` in a picture of mean `mean`, in the order of the tile's pixels.
 pub fn filtered(tile: Tile, pixels: &[Pixel], mean: f64) -> [Rgb; PIXELS_PER_TILE] {
@@ -29,16 +29,16 @@ pub fn filtered_pixel(tile: Tile, pixels: &[Pixel], mean: f64, i: usize) -> Rgb 
 
 /// Square around a tile, row by row: values of pixels and their variances.
 struct Square {
-    places: [(Vec4, Vec4); PLACES],
+    places: [(Vec4, Vec4); SQUARE_PIXELS],
     scale: f32,
 }
 
 impl Square {
     fn new(tile: Tile, pixels: &[Pixel], mean: f64) -> Self {
         let scale = (1.0 / mean) as f32;
-        let mut places = [(Vec4::ZERO, Vec4::ZERO); PLACES];
+        let mut places = [(Vec4::ZERO, Vec4::ZERO); SQUARE_PIXELS];
         for (i, pixel) in pixels.iter().enumerate().take(PIXELS_PER_TILE) {
-            places[tile.index_in_square(i)] = seen(pixel, scale);
+            places[tile.index_in_square(i)] = value_and_variance(pixel, scale);
         }
         Self { places, scale }
     }
@@ -49,7 +49,7 @@ impl Square {
 }
 
 /// Value of a pixel and its variance: a colour with 1 in the fourth component, or all zero without a pixel.
-fn seen(pixel: &Pixel, scale: f32) -> (Vec4, Vec4) {
+fn value_and_variance(pixel: &Pixel, scale: f32) -> (Vec4, Vec4) {
     if pixel.count() == 0 {
         return (Vec4::ZERO, Vec4::ZERO);
     }
@@ -77,24 +77,24 @@ fn lee(at: impl Fn(usize) -> (Vec4, Vec4), place: usize) -> Vec4 {
     }
     let mean = (others + own) / count;
     let spread = (square / count - mean * mean).max(Vec4::ZERO);
-    let structure = (spread - NOISE * noise / count).max(Vec4::ZERO);
+    let structure = (spread - NOISE_FACTOR * noise / count).max(Vec4::ZERO);
     // Without variation both are equal.
     let weight = structure / spread.max(Vec4::splat(f32::MIN_POSITIVE));
-    let (others, own) = (root(others / neighbours), root(own));
+    let (others, own) = (square_root(others / neighbours), square_root(own));
     let between = others + weight * (own - others);
     between * between
 }
 
-fn root(v: Vec4) -> Vec4 {
+fn square_root(v: Vec4) -> Vec4 {
     Vec4::from_array(v.to_array().map(libm::sqrtf))
 }
 
 fn low(x: usize) -> usize {
-    x.saturating_sub(REACH)
+    x.saturating_sub(RADIUS)
 }
 
 fn high(x: usize) -> usize {
-    (x + REACH + 1).min(SIDE)
+    (x + RADIUS + 1).min(SIDE)
 }
 
 #[cfg(test)]
@@ -102,7 +102,7 @@ mod tests {
     use super::*;
     use crate::film::Dropped;
 
-    fn filter(value: impl Fn(usize, usize) -> f32, variance: f32) -> [Vec4; PLACES] {
+    fn filter(value: impl Fn(usize, usize) -> f32, variance: f32) -> [Vec4; SQUARE_PIXELS] {
         let picture = |place| Vec4::new(value(place % SIDE, place / SIDE), 0.5, 0.0, 1.0);
         core::array::from_fn(|place| lee(|place| (picture(place), Vec4::splat(variance)), place))
     }

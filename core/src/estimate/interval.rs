@@ -41,16 +41,16 @@ pub struct ErrorEstimate {
 /// Number of independent pixels with nearly all noise below which intervals follow Student's t, with this
 /// many degrees of freedom. Above, they follow the normal distribution: squares of heavy tails tend to be too
 /// large, and Student's t would apply to squares that are as often too small.
-const FEWEST: f64 = 8.0;
+const MIN_FREEDOM: f64 = 8.0;
 
 /// Number of independent pixels with nearly all noise below which an interval reaches as far up as down, and
 /// down to the error if all fireflies were legitimate light: so few do not show their frequency, and pixels
 /// like them are unknown.
-const FLASHES: f64 = 4.0;
+const FEW_FIREFLIES: f64 = 4.0;
 
 /// Factor of the doubt of δ: a small δ counts in full, since both bounds are right to first order; where
 /// light is rare the estimate rises by a tenth at most.
-const DOUBTED: f64 = 10.0;
+const DELTA_DAMPING: f64 = 10.0;
 
 impl ErrorEstimate {
     /// Estimate from all tiles of a picture whose pixels share nothing, or share paths within groups and
@@ -70,21 +70,22 @@ impl ErrorEstimate {
             count += 1;
         }
         let pixels = (sum.values / 3) as f64 / f64::from(count.max(1));
-        Self::with_shared(&sum, shared(&sum) + by_parts(&sum, parts, pixels), f64::INFINITY)
+        Self::with_shared(&sum, shared(&sum) + sharing_factor(&sum, parts, pixels), f64::INFINITY)
     }
 
     /// `shared`: factor of the variance of the estimate due to sharing. `above`: squared standard error to
     /// the upper end as if nothing were shared, if less than to the lower end.
     fn with_shared(sum: &TileError, shared: f64, above: f64) -> Option<Self> {
-        let flashes = freedom(sum.squares, sum.fourths) / shared;
-        let quantile = if flashes < FEWEST { student_quantile(NORMAL_95, FEWEST) } else { NORMAL_95 };
-        Self::with_reach(sum, quantile * sqrt(shared), above, flashes)
+        let fireflies = degrees_of_freedom(sum.squares, sum.fourths) / shared;
+        let quantile =
+            if fireflies < MIN_FREEDOM { student_quantile(NORMAL_95, MIN_FREEDOM) } else { NORMAL_95 };
+        Self::with_half_width(sum, quantile * sqrt(shared), above, fireflies)
     }
 
-    /// `reach`: standard errors from the estimate to an end of its interval, as if pixels were independent.
-    /// `above`: squared standard error to the upper end, if less. `flashes`: number of pixels with nearly all
-    /// noise.
-    fn with_reach(sum: &TileError, reach: f64, above: f64, flashes: f64) -> Option<Self> {
+    /// `half_width`: standard errors from the estimate to an end of its interval, as if pixels were
+    /// independent. `above`: squared standard error to the upper end, if less. `fireflies`: number of pixels
+    /// with nearly all noise.
+    fn with_half_width(sum: &TileError, half_width: f64, above: f64, fireflies: f64) -> Option<Self> {
         if sum.values == 0 {
             return None;
         }
@@ -95,18 +96,18 @@ impl ErrorEstimate {
         // 4 V² over the mean square of an estimate of V with normal noise, 3 V².
         const OF_SQUARE: f64 = 4.0 / 3.0;
         let below = OF_SQUARE * sum.squares;
-        let above = if flashes < FLASHES { below } else { fmin(above, below) };
+        let above = if fireflies < FEW_FIREFLIES { below } else { fmin(above, below) };
         let certain = fmax(log(sum.halves / sum.certain), 0.0);
-        let doubt = |square: f64| hypot(reach * sqrt(square) / sum.halves, certain);
+        let doubt = |square: f64| hypot(half_width * sqrt(square) / sum.halves, certain);
         let plain = sum.halves / sum.values as f64;
         let delta = fmax(log(sum.crossed / sum.parts), 0.0);
-        let added = delta / (1.0 + DOUBTED * delta);
+        let added = delta / (1.0 + DELTA_DAMPING * delta);
         let relmse = plain * exp(added);
         let upper = relmse * exp(hypot(doubt(above), delta - added));
         let mut lower = plain / exp(doubt(below));
-        if flashes < FLASHES {
+        if fireflies < FEW_FIREFLIES {
             let least = sum.least / sum.values as f64;
-            lower = fmin(lower, least / exp(reach * sqrt(OF_SQUARE * sum.least_squares) / sum.least));
+            lower = fmin(lower, least / exp(half_width * sqrt(OF_SQUARE * sum.least_squares) / sum.least));
         }
         Some(Self { relmse, lower, upper }).filter(|estimate| estimate.upper.is_finite())
     }
@@ -118,13 +119,14 @@ fn shared(sum: &TileError) -> f64 {
     // A pixel shares each sample with half of its group: ρ² of the pairs that share is four times the square
     // of the mean ρ.
     const CIRCLES: f64 = (GROUP - 1) as f64 / (CIRCLE - 1) as f64;
-    1.0 + CIRCLES * by_parts(sum, sum.groups, GROUP as f64) + by_parts(sum, sum.blocks, BLOCK as f64)
+    1.0 + CIRCLES * sharing_factor(sum, sum.groups, GROUP as f64)
+        + sharing_factor(sum, sum.blocks, BLOCK as f64)
 }
 
 /// Contribution of `parts` of `pixels` pixels to that factor. With the correlation ρ between pixels, from the
 /// squares of sums over parts and over pixels, it is ρ² Σ V_p V_q / Σ V_p² over all p ≠ q of a part.
 /// Estimates of V have 1 + 2 ρ² times the former sum and 3 times the latter.
-fn by_parts(sum: &TileError, parts: Parts, pixels: f64) -> f64 {
+fn sharing_factor(sum: &TileError, parts: Parts, pixels: f64) -> f64 {
     let others = pixels - 1.0;
     if !(sum.differences > 0.0 && sum.squares > 0.0 && others > 0.0) {
         return 0.0;
@@ -135,7 +137,7 @@ fn by_parts(sum: &TileError, parts: Parts, pixels: f64) -> f64 {
 }
 
 /// Degrees of freedom of a sum, from the sums of squares and of fourth powers of its summands.
-fn freedom(squares: f64, fourths: f64) -> f64 {
+fn degrees_of_freedom(squares: f64, fourths: f64) -> f64 {
     if fourths > 0.0 { squares * squares / fourths } else { 1.0 }
 }
 
@@ -288,7 +290,7 @@ mod tests {
     #[test]
     fn rare_flashes_are_no_more_than_they_add() {
         // About five fireflies per picture have nine tenths of its error.
-        const FLASH: f32 = 50.0;
+        const FIREFLY: f32 = 50.0;
         let (chance, pictures) = (3e-4, 60);
         let (mut held, mut narrower) = (0, 0);
         for seed in 0..pictures {
@@ -298,7 +300,7 @@ mod tests {
                     let mut pixel = Pixel::default();
                     for sample in 0..16 {
                         let [noise, flash] = [0, 1].map(|kind| random.single(2 * sample + kind));
-                        let value = if flash < chance { FLASH } else { 0.5 + noise };
+                        let value = if flash < chance { FIREFLY } else { 0.5 + noise };
                         pixel.add(sample, Rgb::splat(value), &mut Dropped::default());
                     }
                     pixel
@@ -306,7 +308,7 @@ mod tests {
             };
             let picture: Vec<Vec<Pixel>> = (0..4).map(|i| tile(i).collect()).collect();
             let found = estimate(&picture).unwrap();
-            let truth = f64::from(1.0 - chance + chance * FLASH);
+            let truth = f64::from(1.0 - chance + chance * FIREFLY);
             let errors = picture.iter().flatten().map(|pixel| f64::from(pixel.mean().x) - truth);
             let error = errors.map(|e| e * e / (1.01 * truth * truth)).sum::<f64>() / 1024.0;
             held += u32::from((found.lower..=found.upper).contains(&error));

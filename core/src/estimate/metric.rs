@@ -5,7 +5,7 @@
 use crate::Rgb;
 
 /// Fraction of the squared mean that keeps relMSE finite where the reference is dark.
-pub(super) const DARK: f64 = 0.01;
+pub(super) const RELMSE_OFFSET: f64 = 0.01;
 
 /// Relative difference of pictures that sum the same light in different orders.
 pub(super) const ROUNDING: f64 = 1e-6;
@@ -50,7 +50,7 @@ impl Difference {
         sum.mean /= values;
         sum.reference_mean /= values;
 
-        let floor = DARK * sum.reference_mean * sum.reference_mean;
+        let floor = RELMSE_OFFSET * sum.reference_mean * sum.reference_mean;
         let finite = image.zip(reference).filter(|(i, r)| i.is_finite() && r.is_finite());
         for (i, r) in finite {
             for (i, r) in channels(i).into_iter().zip(channels(r)) {

@@ -11,7 +11,7 @@ mod student;
 mod tile;
 mod tile_statistics;
 
-pub use audit::{BiasEstimate, Finding};
+pub use audit::{BiasEstimate, PixelBias};
 pub use density_bias::TileBlur;
 pub use deviation::Deviation;
 pub use empirical_bayes::{BrightnessClasses, Shrinkage};

@@ -1,7 +1,7 @@
 //! Sums over the pixels of one tile of the differences of their halves, input of [`super::ErrorEstimate`].
 
 use super::empirical_bayes::{Neighbourhood, Pair, Posterior, Shrinkage};
-use super::metric::DARK;
+use super::metric::RELMSE_OFFSET;
 use super::tile_statistics::{TileStatistics, brightness};
 use crate::film::{GROUPS, PIXELS_PER_TILE, Pixel, Tile};
 use glam::Vec4;
@@ -128,7 +128,7 @@ impl TileError {
             sums.fourths += squared * squared;
             let darker = total(noise * (by[0].max(by[1]) - by_both));
             let (seen, around) = (0.25 * (a1 + a2 + b1 + b2), seen.around[place]);
-            let least = total(noise / (seen * seen + DARK as f32));
+            let least = total(noise / (seen * seen + RELMSE_OFFSET as f32));
             sums.least += least;
             sums.least_squares += least * least;
             sums.above += above([variance, darker], posterior, seen, around, by_both);
@@ -183,19 +183,19 @@ fn above(
     weights: Vec4,
 ) -> f64 {
     /// Maximum of (I − R)² over V; more is due to an edge that R does not follow.
-    const MOST: f64 = 3.0;
+    const MAX_DISTANCE: f64 = 3.0;
     /// Mean of T² over 4 V² for normal noise, with that maximum.
-    const CUT: f64 = 0.563;
+    const MEAN_SQUARE: f64 = 0.563;
     /// A belief of 95 % is two standard errors.
     const BELIEVED: f64 = 0.25;
     let square = |light: Vec4| total(light * light * weights);
     let light = 0.5 * (posterior[0].light + posterior[1].light);
     let share = f64::from(0.5 * (posterior[0].share + posterior[1].share)).clamp(0.0, 1.0);
-    let distance = square(seen - light).min(MOST * variance);
+    let distance = square(seen - light).min(MAX_DISTANCE * variance);
     let unknown = square(light - around).min(share * variance);
     let difference = distance - variance;
-    let darker = f64::from(posterior[0].doubt.max(posterior[1].doubt)) * darker;
-    (1.0 - share) / CUT * difference * difference
+    let darker = f64::from(posterior[0].prior_weight.max(posterior[1].prior_weight)) * darker;
+    (1.0 - share) / MEAN_SQUARE * difference * difference
         + 4.0 / 3.0 * share * share * variance * variance
         + 4.0 * distance * unknown
         + BELIEVED * darker * darker

@@ -51,7 +51,7 @@ impl Merge {
             "shadow_rays": counters.shadow_rays,
             "paths": counters.paths,
             "mean_radiance": merged.image.mean(),
-            "error": error_object(merged.error, merged.blurred, merged.audit.as_ref()),
+            "error": error_object(merged.error, merged.noise_and_blur, merged.audit.as_ref()),
             "may_be_biased": merged.is_biased,
             "dropped": dropped_object(&counters.dropped, &merged.places, merged.empty_pixels),
             "outputs": saved,
@@ -65,7 +65,7 @@ fn text(merged: &Merged, saved: &[&PathBuf]) -> String {
     lines.push(format!("image  {width}x{height}, {} samples per pixel", merged.spp));
     match &merged.audit {
         Some(audit) => lines.extend(summary::audited(audit)),
-        None => lines.extend(summary::estimate(merged.error, merged.blurred, merged.is_biased)),
+        None => lines.extend(summary::estimate(merged.error, merged.noise_and_blur, merged.is_biased)),
     }
     lines.extend(dropped::text(&merged.counters, &merged.places, merged.empty_pixels));
     lines.join("\n")

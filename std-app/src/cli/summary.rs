@@ -2,7 +2,7 @@
 
 use super::compare as comparing;
 use super::dropped;
-use halflight::render::{Audited, BiasEstimate, Blurred, Ending, ErrorEstimate, Stop, StopRule};
+use halflight::render::{Audited, BiasEstimate, Ending, ErrorEstimate, NoiseAndBlur, Stop, StopRule};
 use halflight::report::Run;
 use halflight::report::quantity::{plural, readable_bytes, readable_name, readable_seconds, readable_value};
 use halflight_core::findings::{Finding, Value};
@@ -17,7 +17,7 @@ pub(super) fn text(run: &Run, report: Option<&Path>) -> String {
     let (width, height, samples) = (settings.width, settings.height, plural(result.spp.into(), "sample"));
     lines.push(format!("image  {width}x{height}, {samples} per pixel{early}"));
     match &result.audit {
-        None => lines.extend(estimate(result.error, result.blurred, result.method.is_biased())),
+        None => lines.extend(estimate(result.error, result.noise_and_blur, result.method.is_biased())),
         Some(audit) => {
             lines.extend(audited(audit));
             let doubt = run.doubt().filter(|_| audit.is_biased());
@@ -131,7 +131,7 @@ pub(super) fn audited(audit: &Audited) -> Vec<String> {
 /// Lines of an error without an audit; `is_biased` if the method may have a bias.
 pub(super) fn estimate(
     estimate: Option<ErrorEstimate>,
-    blurred: Option<Blurred>,
+    noise_and_blur: Option<NoiseAndBlur>,
     is_biased: bool,
 ) -> Vec<String> {
     let Some(estimate) = estimate else {
@@ -139,8 +139,8 @@ pub(super) fn estimate(
     };
     let error = error(&estimate);
     let bias = if is_biased { "; other bias is not included" } else { "" };
-    match blurred {
-        Some(Blurred { noise, blur, .. }) => {
+    match noise_and_blur {
+        Some(NoiseAndBlur { noise, blur, .. }) => {
             vec![format!("{error}, noise and blur of photons{bias}"), parts(&noise, "blur", &blur)]
         }
         None => vec![format!("{error}, noise alone{}", bias.replace("other bias", "bias"))],

@@ -2,7 +2,7 @@
 
 use super::audit::{Audit, Audited};
 use super::workers::Workers;
-use super::{Blurred, ErrorEstimate};
+use super::{ErrorEstimate, NoiseAndBlur};
 use halflight_core::method::RenderState;
 
 /// Error of a picture in its parts.
@@ -12,7 +12,7 @@ pub(super) struct ErrorReport {
     /// Noise and bias, if there is an audit.
     pub(super) audited: Option<Audited>,
     /// Noise and blur, if there are photons and no audit.
-    pub(super) blurred: Option<Blurred>,
+    pub(super) noise_and_blur: Option<NoiseAndBlur>,
 }
 
 impl ErrorReport {
@@ -40,18 +40,18 @@ impl ErrorReport {
         let mut audited = noise.and_then(audit);
         // An audit without photons measures the blur as well, unless it is blind.
         let is_seen = audited.as_ref().is_some_and(|audited| !audited.has_photons && !audited.is_blind);
-        let mut blurred = if is_seen { None } else { Blurred::of(workers, &state.film, noise) };
+        let mut noise_and_blur = if is_seen { None } else { NoiseAndBlur::of(workers, &state.film, noise) };
         if let Some(audited) = &mut audited
-            && let Some(blurred) = blurred.take()
+            && let Some(noise_and_blur) = noise_and_blur.take()
         {
-            audited.total = audited.total.with_bias(blurred.blur);
+            audited.total = audited.total.with_bias(noise_and_blur.blur);
         }
-        Self { noise, audited, blurred }
+        Self { noise, audited, noise_and_blur }
     }
 
     /// Estimate with all parts.
     pub(super) fn error(&self) -> Option<ErrorEstimate> {
         let audited = self.audited.as_ref().map(|audited| audited.total);
-        audited.or(self.blurred.map(|blurred| blurred.total)).or(self.noise)
+        audited.or(self.noise_and_blur.map(|noise_and_blur| noise_and_blur.total)).or(self.noise)
     }
 }

@@ -2,12 +2,12 @@
 
 use super::ErrorEstimate;
 use super::audit::{self, Audited};
-use super::blurred::Blurred;
 use super::error::{FileError, RenderError};
 use super::error_report::ErrorReport;
 use super::film_file::Reader;
 use super::ledger::{self, Place, empty_pixels};
 use super::method::Method;
+use super::noise_and_blur::NoiseAndBlur;
 use super::picture::image;
 use super::workers::Workers;
 use crate::memory::Budget;
@@ -37,7 +37,7 @@ pub struct Merged {
     /// Error from the two half-films, including bias if all shards were audited.
     pub error: Option<ErrorEstimate>,
     /// Noise and photon blur, if there are photons and no audit.
-    pub blurred: Option<Blurred>,
+    pub noise_and_blur: Option<NoiseAndBlur>,
     /// Merged result of the shards' audits.
     pub audit: Option<Audited>,
 }
@@ -97,7 +97,7 @@ pub fn merge(files: &[PathBuf]) -> Result<Merged, RenderError> {
         places: ledger::places(state.dropped, width, height),
         empty_pixels: empty_pixels(&state.film, |_| true),
         error: report.error(),
-        blurred: report.blurred,
+        noise_and_blur: report.noise_and_blur,
         audit: report.audited,
         is_biased,
     })

@@ -6,7 +6,6 @@
 //! after which the render is resumed from its film file.
 
 mod audit;
-mod blurred;
 mod cache_file;
 mod crew;
 mod deadline;
@@ -22,6 +21,7 @@ mod ledger;
 mod memory;
 mod merge;
 mod method;
+mod noise_and_blur;
 mod picture;
 mod regions;
 mod rewritten_file;
@@ -35,7 +35,6 @@ mod turns;
 mod workers;
 
 pub use audit::{Audited, Region};
-pub use blurred::Blurred;
 pub use cache_file::inspect as inspect_cache;
 pub use error::{FileError, RenderError};
 pub use halflight_core::estimate::{BiasEstimate, Deviation, ErrorEstimate};
@@ -48,6 +47,7 @@ pub use ledger::Place;
 pub use memory::MemoryUse;
 pub use merge::{Merged, merge};
 pub use method::{CacheSettings, MapView, Method, PhotonSettings, PhotonView};
+pub use noise_and_blur::NoiseAndBlur;
 pub use rounds::{Stop, StopRule};
 pub use study::{IrradianceStudy, MetricError, study_irradiance};
 pub use survey::{Check, Look, Mark, Survey};
@@ -252,7 +252,7 @@ pub struct RenderResult {
     /// samples or for a black picture.
     pub error: Option<ErrorEstimate>,
     /// Noise and photon blur, if there are photons and no audit.
-    pub blurred: Option<Blurred>,
+    pub noise_and_blur: Option<NoiseAndBlur>,
     /// Result of the audit.
     pub audit: Option<Audited>,
     /// Bytes of each structure while paths are traced.

@@ -335,7 +335,7 @@ impl<'a> Progressive<'a> {
             empty_pixels: empty_pixels(film, |task| state.shard.owns(task) && state.samples[task] > 0),
             filled_pixels,
             error,
-            blurred: report.blurred,
+            noise_and_blur: report.noise_and_blur,
             audit: report.audited,
             memory: Vec::new(),
             memory_peak: 0,

@@ -88,7 +88,8 @@ impl<'w> Workers<'w> {
         };
         let count = tiles.len();
         Some(self.fork.0.install(|| {
-            let asked = tiles.clone().enumerate().filter(|(tile, _)| BrightnessClasses::asks(*tile, count));
+            let asked =
+                tiles.clone().enumerate().filter(|(tile, _)| BrightnessClasses::uses_tile(*tile, count));
             let alike =
                 asked.fold(BrightnessClasses::default, learn).reduce(BrightnessClasses::default, both);
             let shrinkage = alike.shrinkage();

@@ -3,8 +3,8 @@
 use super::{Provenance, Race, Run};
 use crate::compare::Comparison;
 use crate::render::{
-    Against, Audited, Blurred, Deviation, Ending, ErrorEstimate, Place, Region, RenderResult, Round, Shard,
-    StopRule,
+    Against, Audited, Deviation, Ending, ErrorEstimate, NoiseAndBlur, Place, Region, RenderResult, Round,
+    Shard, StopRule,
 };
 use halflight_core::film::Dropped;
 use halflight_core::findings::{Findings, Value as FindingValue};
@@ -118,16 +118,16 @@ fn made(provenance: &Provenance) -> Value {
 
 /// Error against the reference, with the estimate in `estimate`; without a reference the estimate.
 fn error(run: &Run) -> Value {
-    let RenderResult { error: estimate, blurred, audit, .. } = run.result;
-    let (blurred, audit) = (*blurred, audit.as_ref());
+    let RenderResult { error: estimate, noise_and_blur, audit, .. } = run.result;
+    let (noise_and_blur, audit) = (*noise_and_blur, audit.as_ref());
     let mut error = match run.comparison {
-        None => error_object(*estimate, blurred, audit),
+        None => error_object(*estimate, noise_and_blur, audit),
         Some(comparison) => {
             let mut error = comparison_object(comparison);
             error["interval"] = Value::Null;
             error["against"] = "reference".into();
             error["estimate"] = estimate_object(*estimate);
-            with_bias(error, blurred, audit)
+            with_bias(error, noise_and_blur, audit)
         }
     };
     if audit.is_some() {
@@ -139,14 +139,14 @@ fn error(run: &Run) -> Value {
 /// Object of an estimate, with the blur of photons or the result of an audit.
 pub fn error_object(
     error: Option<ErrorEstimate>,
-    blurred: Option<Blurred>,
+    noise_and_blur: Option<NoiseAndBlur>,
     audit: Option<&Audited>,
 ) -> Value {
-    with_bias(estimate_object(error), blurred, audit)
+    with_bias(estimate_object(error), noise_and_blur, audit)
 }
 
-fn with_bias(mut object: Value, blurred: Option<Blurred>, audit: Option<&Audited>) -> Value {
-    if let Some(Blurred { noise, blur, .. }) = blurred {
+fn with_bias(mut object: Value, noise_and_blur: Option<NoiseAndBlur>, audit: Option<&Audited>) -> Value {
+    if let Some(NoiseAndBlur { noise, blur, .. }) = noise_and_blur {
         object["noise"] = estimate_object(Some(noise));
         object["blur"] = json!({ "relmse": blur.relmse, "interval": [blur.lower, blur.upper] });
     }

@@ -19,16 +19,16 @@ fn pixel(light: f32, samples: u32, random: Random) -> Pixel {
 }
 
 /// Findings of `count` pixels of radiance 2, too bright by `bias`, in a picture of mean 2.
-fn findings(count: u32, bias: f32, seed: u32) -> Vec<Finding> {
+fn findings(count: u32, bias: f32, seed: u32) -> Vec<PixelBias> {
     let of = |i: u32| {
         let picture = pixel(2.0 + bias, 8, Random::new(seed, 2 * i));
         let truth = pixel(2.0, 16, Random::new(seed, 2 * i + 1));
-        Finding::of(&picture, &truth, Rgb::splat(2.0 + bias), 2.0).unwrap()
+        PixelBias::of(&picture, &truth, Rgb::splat(2.0 + bias), 2.0).unwrap()
     };
     (0..count).map(of).collect()
 }
 
-fn estimate(findings: &[Finding]) -> BiasEstimate {
+fn estimate(findings: &[PixelBias]) -> BiasEstimate {
     BiasEstimate::of(findings.iter().map(|finding| (*finding, 1.0))).unwrap()
 }
 
@@ -42,8 +42,9 @@ fn what_is_not_there_is_found_as_often_as_said_in_skew_findings() {
             let value = |i: u32| {
                 (0..2).map(|half| -log(1.0 - f64::from(random.single(2 * i + half)))).product::<f64>()
             };
-            let finding = |i| Finding { bias: sign * (value(i) - 1.0), deviation: 0.0, variances: [0.0; 2] };
-            BiasEstimate::of((0..count).map(|i| (finding(i), 1.0))).unwrap().is_found()
+            let finding =
+                |i| PixelBias { bias: sign * (value(i) - 1.0), deviation: 0.0, variances: [0.0; 2] };
+            BiasEstimate::of((0..count).map(|i| (finding(i), 1.0))).unwrap().is_significant()
         };
         (0..runs).filter(|i| run(*i)).count() as f64 / f64::from(runs)
     };
@@ -55,37 +56,40 @@ fn what_is_not_there_is_found_as_often_as_said_in_skew_findings() {
 #[test]
 fn what_all_findings_agree_on_is_found() {
     for bias in [0.1, 1e-3, 3.3e5] {
-        let finding = Finding { bias, deviation: 0.0, variances: [0.0; 2] };
+        let finding = PixelBias { bias, deviation: 0.0, variances: [0.0; 2] };
         let of = |sign: f64| {
-            let finding = Finding { bias: sign * bias, ..finding };
+            let finding = PixelBias { bias: sign * bias, ..finding };
             BiasEstimate::of((0..256).map(|_| (finding, 1.0))).unwrap()
         };
         assert!(
-            of(1.0).is_found() && of(1.0).detectable > 0.0 && of(1.0).lower > 0.99 * bias,
+            of(1.0).is_significant() && of(1.0).detectable > 0.0 && of(1.0).lower > 0.99 * bias,
             "{:?}",
             of(1.0)
         );
-        assert!(!of(-1.0).is_found() && of(-1.0).upper >= 0.0, "{:?}", of(-1.0));
+        assert!(!of(-1.0).is_significant() && of(-1.0).upper >= 0.0, "{:?}", of(-1.0));
     }
 }
 
 #[test]
 fn one_firefly_is_no_bias_wherever_it_is() {
     for place in [0, 1, 128, 255] {
-        let finding =
-            |i| Finding { bias: if i == place { 200.0 } else { 0.01 }, deviation: 0.0, variances: [0.0; 2] };
+        let finding = |i| PixelBias {
+            bias: if i == place { 200.0 } else { 0.01 },
+            deviation: 0.0,
+            variances: [0.0; 2],
+        };
         let bias = BiasEstimate::of((0..256).map(|i| (finding(i), 1.0))).unwrap();
-        assert!(bias.relmse > 0.7 && !bias.is_found(), "{place} {bias:?}");
+        assert!(bias.relmse > 0.7 && !bias.is_significant(), "{place} {bias:?}");
     }
 }
 
 #[test]
 fn what_is_certain_of_a_bias_is_nothing_below_four_standard_errors() {
     for relmse in [-1e9, -10.0, -2.0, -0.5, 0.0, 0.5, 2.0, 3.9] {
-        assert_eq!(BiasEstimate::known(relmse, 1.0, 0.0, 0.0).least(), 0.0, "{relmse}");
+        assert_eq!(BiasEstimate::from_moments(relmse, 1.0, 0.0, 0.0).least(), 0.0, "{relmse}");
     }
     for relmse in [4.0, 10.0, 1e9] {
-        let least = BiasEstimate::known(relmse, 1.0, 0.0, 0.0).least();
+        let least = BiasEstimate::from_moments(relmse, 1.0, 0.0, 0.0).least();
         assert!((least - (relmse - 2.0 * Z)).abs() < 1e-9 * relmse, "{relmse} {least}");
     }
 }
@@ -95,7 +99,7 @@ fn no_bias_is_found_where_there_is_none() {
     let (mut found, mut strange, runs) = (0, 0, 400);
     for seed in 0..runs {
         let findings = findings(64, 0.0, seed);
-        found += u32::from(estimate(&findings).is_found());
+        found += u32::from(estimate(&findings).is_significant());
         let deviation = Deviation::of(findings.iter().map(|finding| finding.deviation));
         strange += u32::from(deviation.chance() < 0.05);
     }
@@ -117,7 +121,7 @@ fn what_quarters_know_of_each_other_is_no_deviation() {
         for sample in 0..2 {
             picture.add(sample, Rgb::ONE, &mut Dropped::default());
         }
-        let finding = Finding::of(&picture, &truth, Rgb::ONE, 1.0).unwrap();
+        let finding = PixelBias::of(&picture, &truth, Rgb::ONE, 1.0).unwrap();
         assert!(finding.deviation.abs() < 1e-6, "{finding:?}");
     }
 }
@@ -144,7 +148,7 @@ fn the_sum_of_noise_and_no_bias_errs_hardly_more_often_than_each() {
         let radius = sqrt(-2.0 * log(1.0 - radius));
         let relmse = 1.0 + 0.1 * radius * sine;
         let noise = ErrorEstimate { relmse, lower: relmse - 0.1 * Z, upper: relmse + 0.1 * Z };
-        let sum = noise.with_bias(BiasEstimate::known(radius * cosine, 1.0, 0.0, 0.0));
+        let sum = noise.with_bias(BiasEstimate::from_moments(radius * cosine, 1.0, 0.0, 0.0));
         missed += u32::from(!(sum.lower..=sum.upper).contains(&1.0));
     }
     // 6.1 %; 7.1 % with the lower end of the bias by likelihood ratios. One standard error is 0.08 %.
@@ -156,12 +160,12 @@ fn a_bias_found_by_chance_leaves_the_lower_end_to_noise() {
     let noise = ErrorEstimate { relmse: 1.0, lower: 0.9, upper: 1.1 };
     for error in [1.0, 10.0, 1e3] {
         for found in [0.0, 1.0, 2.4, 3.0, 3.9] {
-            let sum = noise.with_bias(BiasEstimate::known(found * error, error * error, 0.0, 0.0));
+            let sum = noise.with_bias(BiasEstimate::from_moments(found * error, error * error, 0.0, 0.0));
             assert!(sum.lower <= noise.relmse, "{found} standard errors of {error}: {sum:?}");
             assert!(sum.upper >= noise.upper + found * error);
         }
         // Twenty standard errors are not chance.
-        let sum = noise.with_bias(BiasEstimate::known(20.0 * error, error * error, 0.0, 0.0));
+        let sum = noise.with_bias(BiasEstimate::from_moments(20.0 * error, error * error, 0.0, 0.0));
         assert!(sum.lower > 15.0 * error, "{sum:?}");
     }
 }
@@ -189,20 +193,20 @@ fn intervals_hold_what_is_nothing_or_something() {
     for truth in [0.0f64, 0.1, 0.3, 0.5, 0.75, 1.0, 1.25, 1.5, 1.75, 2.0, 3.0, 5.0] {
         // Simpson's rule would miss the ends; a step of a thousandth is as precise as they are.
         let held = |x: &f64| {
-            let [lower, upper] = ends(3.0 * x, 3.0);
+            let [lower, upper] = confidence_interval(3.0 * x, 3.0);
             (lower..=upper).contains(&(3.0 * truth))
         };
         let density = |x: f64| (-0.5 * (x - truth).powi(2)).exp() / core::f64::consts::TAU.sqrt();
         let share: f64 = (-8000..12000).map(|i| f64::from(i) * 1e-3).filter(held).map(density).sum();
         assert!((share * 1e-3 - 0.955).abs() < 0.008, "{truth}: {share}");
     }
-    assert!(ends(-30.0, 1.0)[1] > 0.0);
+    assert!(confidence_interval(-30.0, 1.0)[1] > 0.0);
 }
 
 #[test]
 fn a_leak_does_not_hide_behind_its_own_brightness() {
     let (picture, truth) = (pixel(40.0, 8, Random::new(0, 0)), pixel(2.0, 400, Random::new(0, 1)));
-    let finding = Finding::of(&picture, &truth, Rgb::splat(40.0), 2.0).unwrap();
+    let finding = PixelBias::of(&picture, &truth, Rgb::splat(40.0), 2.0).unwrap();
     // (40 − 2)² over (40 / 4)² instead of 40².
     assert!(finding.bias > 14.0 && finding.deviation > 3.5, "{finding:?}");
 }
@@ -211,5 +215,5 @@ fn a_leak_does_not_hide_behind_its_own_brightness() {
 fn too_little_to_say_anything() {
     assert!(BiasEstimate::of([].into_iter()).is_none());
     let truth = pixel(2.0, 3, Random::new(0, 1));
-    assert!(Finding::of(&pixel(2.0, 8, Random::new(0, 0)), &truth, Rgb::ONE, 1.0).is_none());
+    assert!(PixelBias::of(&pixel(2.0, 8, Random::new(0, 0)), &truth, Rgb::ONE, 1.0).is_none());
 }

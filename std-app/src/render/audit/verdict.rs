@@ -2,7 +2,7 @@
 
 use super::choice::Grid;
 use crate::render::ErrorEstimate;
-use halflight_core::estimate::{BiasEstimate, Deviation, Finding, filtered_pixel};
+use halflight_core::estimate::{BiasEstimate, Deviation, PixelBias, filtered_pixel};
 use halflight_core::film::{Film, PIXELS_PER_TILE, Pixel, Tile};
 
 /// Significance level of regions and whole picture together: one false alarm in 40 pictures.
@@ -64,10 +64,10 @@ pub struct Region {
 impl Audited {
     /// Whether a bias is significant. Unbiased pictures are reported biased in at most 5 % of cases.
     pub fn is_biased(&self) -> bool {
-        let is_found = self.bias.is_found()
+        let is_significant = self.bias.is_significant()
             || self.whole_is_biased()
             || self.regions.iter().any(|region| region.is_biased);
-        is_found && !self.is_blind
+        is_significant && !self.is_blind
     }
 
     /// Result for audit paths that miss a share `unseen` of the picture's light. If that share is not
@@ -91,21 +91,21 @@ pub(super) fn findings(
     mean: f64,
     places: &[[u32; 2]],
     truth: &[Pixel],
-) -> Vec<(usize, Finding)> {
+) -> Vec<(usize, PixelBias)> {
     let finding = |(index, (place, truth)): (usize, (&[u32; 2], &Pixel))| {
         let position = Tile::position([film.width(), film.height()], place[0], place[1]);
         let (task, number) = (position / PIXELS_PER_TILE, position % PIXELS_PER_TILE);
         let tile = Tile::new(film.width(), film.height(), task);
         let pixels = film.pixels().chunks(PIXELS_PER_TILE).nth(task)?;
         let colour = filtered_pixel(tile, pixels, mean, number);
-        Some((index, Finding::of(pixels.get(number)?, truth, colour, mean)?))
+        Some((index, PixelBias::of(pixels.get(number)?, truth, colour, mean)?))
     };
     places.iter().zip(truth).enumerate().filter_map(finding).collect()
 }
 
 /// Result without the costs of the audit; `None` with too few findings.
 pub(super) fn verdict(
-    findings: &[(usize, Finding)],
+    findings: &[(usize, PixelBias)],
     shares: &[f32],
     places: &[[u32; 2]],
     grid: Grid,
@@ -173,7 +173,7 @@ mod tests {
     #[test]
     fn one_firefly_of_an_audit_is_doubted() {
         let noise = ErrorEstimate { relmse: 0.01, lower: 0.008, upper: 0.013 };
-        let finding = |bias: f64| (Finding { bias, deviation: 0.0, variances: [0.0; 2] }, 1.0);
+        let finding = |bias: f64| (PixelBias { bias, deviation: 0.0, variances: [0.0; 2] }, 1.0);
         let others = (0..255).map(|i| finding(if i % 2 == 0 { 0.01 } else { -0.01 }));
         let bias = BiasEstimate::of(others.chain([finding(200.0)])).unwrap();
         assert!(bias.relmse > 0.7, "{bias:?}");

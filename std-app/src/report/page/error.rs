@@ -25,7 +25,7 @@ pub(super) fn lead(run: &Run) -> Markup {
     };
     let source = match run.result {
         RenderResult { audit: Some(_), .. } => "noise and audit",
-        RenderResult { blurred: Some(_), .. } => "noise and blur of photons",
+        RenderResult { noise_and_blur: Some(_), .. } => "noise and blur of photons",
         _ => "noise",
     };
     match (run.comparison, run.result.error) {

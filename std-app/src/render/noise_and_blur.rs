@@ -6,7 +6,7 @@ use halflight_core::film::Film;
 
 /// Noise and blur of a picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Blurred {
+pub struct NoiseAndBlur {
     /// Noise of the picture, from its half-films.
     pub noise: ErrorEstimate,
     /// Squared bias by photon blur, estimated from the samples.
@@ -15,7 +15,7 @@ pub struct Blurred {
     pub total: ErrorEstimate,
 }
 
-impl Blurred {
+impl NoiseAndBlur {
     /// Error of `film` with known noise; `None` without blur.
     pub(super) fn of(workers: &Workers, film: &Film, noise: Option<ErrorEstimate>) -> Option<Self> {
         let (noise, blur) = noise.zip(workers.blur(film))?;
