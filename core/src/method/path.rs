@@ -86,7 +86,7 @@ impl<'a, F: Features> PathTracing<'a, F> {
     /// Its path tracer with reuse, where pixels reuse paths.
     pub fn reusing(&self) -> Option<PathIntegrator<'a, F, (), PathReuse>> {
         let mean = self.mean.unwrap_or_default();
-        self.reuse.used.then(|| self.integrator.with_reuse().with_flashes(mean))
+        self.reuse.used.then(|| self.integrator.with_reuse().with_firefly_limit(mean))
     }
 
     /// Whether pixels reuse paths, and why.

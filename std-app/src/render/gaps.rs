@@ -44,7 +44,7 @@ pub(super) fn sketch<F: Features>(
         for places in places.chunks(WAVE * workers.count()) {
             let mut found = vec![Pixel::default(); places.len()];
             let task = |task: usize, arena: &mut Arena, out: &mut [Pixel]| {
-                tracer.probe(&places[task * WAVE..][..out.len()], 0..1, WAVE, arena, out)
+                tracer.sample_pixels(&places[task * WAVE..][..out.len()], 0..1, WAVE, arena, out)
             };
             let done = workers.pass(&mut found, WAVE, &mut scratch, &|| Instant::now() >= end, &task);
             if !done.is_ok_and(|(_, all)| all) {

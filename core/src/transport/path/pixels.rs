@@ -3,7 +3,7 @@
 use super::PathIntegrator;
 use super::estimator::Estimator;
 use super::sharing::PathWave;
-use super::silhouette::is_outlined;
+use super::silhouette::is_on_silhouette;
 use crate::Rgb;
 use crate::bsdf::Features;
 use crate::film::Pixel;
@@ -17,7 +17,7 @@ impl<F: Features, E: Estimator<F>> PathIntegrator<'_, F, E> {
     ///
     /// # Errors
     /// [`OutOfMemory`] if `scratch` has less than [`PathIntegrator::scratch_with`] bytes.
-    pub fn probe(
+    pub fn sample_pixels(
         &self,
         pixels: &[[u32; 2]],
         samples: Range<u32>,
@@ -34,20 +34,21 @@ impl<F: Features, E: Estimator<F>> PathIntegrator<'_, F, E> {
             .flat_map(|(place, pixel)| samples.clone().map(move |sample| (place as u32, *pixel, sample)));
         let mut all = all.peekable();
         // One bit for each of the first 64 pixels; the others take no extra rays for lamps.
-        let outlined = pixels.iter().take(u64::BITS as usize).enumerate().fold(0, |bits, (place, pixel)| {
-            let is = is_outlined(self.context.scene, self.context.lights, &self.settings, *pixel);
-            bits | u64::from(is) << place
-        });
-        let outlined = |place: u32| u64::checked_shr(outlined, place).unwrap_or(0) & 1 == 1;
+        let silhouette_pixels =
+            pixels.iter().take(u64::BITS as usize).enumerate().fold(0, |bits, (place, pixel)| {
+                let is = is_on_silhouette(self.context.scene, self.context.lights, &self.settings, *pixel);
+                bits | u64::from(is) << place
+            });
+        let on_silhouette = |place: u32| u64::checked_shr(silhouette_pixels, place).unwrap_or(0) & 1 == 1;
         while all.peek().is_some() {
             let mut count = 0;
             for (place, pixel, sample) in all.by_ref().take(wave.wave.paths.len()) {
-                self.begin_path(&mut wave, count, (pixel, place, sample), outlined(place), 0);
+                self.begin_path(&mut wave, count, (pixel, place, sample), on_silhouette(place), 0);
                 count += 1;
             }
             counters.paths += count as u64;
             self.advance(&mut wave, count, &mut counters);
-            self.trace_lamps(outlined, &mut wave.wave, count, &mut counters);
+            self.trace_silhouettes(on_silhouette, &mut wave.wave, count, &mut counters);
             for i in 0..count {
                 let path = wave.wave.paths[i];
                 if let Some(pixel) = out.get_mut(path.place as usize) {

@@ -1,7 +1,7 @@
 //! Textbook path tracer: one path and one ray at a time, in the order of the theory.
 //! [`crate::transport::path`] is tested against it.
 
-use super::silhouette::{self, is_outlined};
+use super::silhouette::{self, is_on_silhouette};
 use crate::bsdf::{All, Bsdf, Diffuse};
 use crate::bvh::Bvh;
 use crate::geometry::{MISS, Ray};
@@ -35,12 +35,12 @@ pub fn radiance(
     let ray = scene.camera.ray(width, height, x as f32 + dx, y as f32 + dy, lens);
 
     // Extra rays cover the lamps at pixels on their borders.
-    let is_outlined = is_outlined(scene, lights, settings, [x, y]);
+    let is_on_silhouette = is_on_silhouette(scene, lights, settings, [x, y]);
     let (from, normal) = (Vec3::ZERO, Vec3::ZERO);
     let start = Start { ray, from, normal, pdf: f32::INFINITY, triangle: MISS, segments: 1 };
-    let radiance = follow(&context, &sampler, max_depth, is_outlined, start);
+    let radiance = follow(&context, &sampler, max_depth, is_on_silhouette, start);
     let mut lamps = Rgb::ZERO;
-    if is_outlined {
+    if is_on_silhouette {
         for ray in silhouette::rays(scene, settings, [x, y], sample) {
             let hit = context.nearest(&ray);
             lamps += silhouette::emission(&context, ray, hit);
@@ -129,12 +129,12 @@ impl Start {
     }
 }
 
-/// Radiance along the ray of `start`; if `is_outlined`, without emission of the first surface.
+/// Radiance along the ray of `start`; if `is_on_silhouette`, without emission of the first surface.
 fn follow(
     context: &SceneContext<All>,
     sampler: &Sampler,
     max_depth: u32,
-    is_outlined: bool,
+    is_on_silhouette: bool,
     mut start: Start,
 ) -> Rgb {
     let (mut radiance, mut throughput) = (Rgb::ZERO, Rgb::ONE); // L, β
@@ -160,7 +160,7 @@ fn follow(
             crossings += 1;
             continue;
         }
-        if !(is_outlined && segments == 1) {
+        if !(is_on_silhouette && segments == 1) {
             let (seen, weight) = start.emission(context, &point, direction);
             radiance += throughput * seen * weight;
         }

@@ -33,12 +33,12 @@ use crate::transport::wavefront::{PathState, Wavefront};
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
-/// Firefly limit of sample n over the mean radiance of the picture and over (n + [`BEFORE_FLASHES`]). A
+/// Firefly limit of sample n over the mean radiance of the picture and over (n + [`FIREFLY_OFFSET`]). A
 /// sixteenth of 4 n, averaged over n samples, is a quarter of the mean.
-const FLASH: f32 = 4.0;
+const FIREFLY_FACTOR: f32 = 4.0;
 
 /// Offset of the sample number: with few samples fireflies hardly stand out from noise.
-const BEFORE_FLASHES: u32 = 16;
+const FIREFLY_OFFSET: u32 = 16;
 
 /// Coat over the diffuse part of y. Only light of the base is shared, whose radiance towards x_i follows from
 /// that towards x_j by the transmittances. Light that the coat reflects stays with the path that found it.
@@ -68,36 +68,37 @@ pub struct ReuseState {
     circle: u32,
     /// Segments up to x. With a limit of depth only paths of equal `segments` share.
     segments: u16,
-    /// Stage of the path: [`ALONE`], [`LEAVING`], [`TAKING`], [`OFFERING`], [`LIT`] or [`BEHIND`].
+    /// Stage of the path: [`BEFORE_X`], [`LEFT_X`], [`RECEIVING`], [`AT_Y`], [`AT_COATED_Y`] or
+    /// [`BEHIND_COATED_Y`].
     stage: u16,
     coated: Coated,
 }
 
 /// The path has not hit a diffuse point yet.
-const ALONE: u16 = 0;
+const BEFORE_X: u16 = 0;
 /// The path has left x; its next surface is unknown.
-const LEAVING: u16 = 1;
+const LEFT_X: u16 = 1;
 /// The surface after x cannot be shared, but the path receives shares of others.
-const TAKING: u16 = 2;
+const RECEIVING: u16 = 2;
 /// The path has hit y and gathers L.
-const OFFERING: u16 = 3;
+const AT_Y: u16 = 3;
 /// The path has hit a coated y; its radiance since then is of the light sample.
-const LIT: u16 = 4;
+const AT_COATED_Y: u16 = 4;
 /// The path has left a coated y; its radiance since then comes from behind y.
-const BEHIND: u16 = 5;
+const BEHIND_COATED_Y: u16 = 5;
 
 impl ReuseState {
     /// Called when the path scatters at a diffuse `point`, which becomes x if the path has none. Returns
     /// whether it became x; the path must then survive, if it carries any `throughput`.
     #[inline]
     fn leave(&mut self, point: &SurfacePoint, throughput: Rgb, segments: u32) -> bool {
-        if self.stage != ALONE || throughput == Rgb::ZERO {
+        if self.stage != BEFORE_X || throughput == Rgb::ZERO {
             return false;
         }
         self.x = ConnectionVertex::of(point);
         self.throughput = throughput.to_array();
         self.segments = segments as u16;
-        self.stage = LEAVING;
+        self.stage = LEFT_X;
         true
     }
 
@@ -105,49 +106,49 @@ impl ReuseState {
     /// becomes y, and the path gathers light for its circle, with throughput 1.
     #[inline]
     fn arrive(&mut self, point: &SurfacePoint, cover: Option<Cover>, path: &mut PathState) {
-        if self.stage != LEAVING {
+        if self.stage != LEFT_X {
             return;
         }
         self.y = ConnectionVertex::of(point);
         let density = density(&self.x, &self.y);
         match cover {
             Some(cover) if density > 0.0 && density < f32::INFINITY => {
-                self.stage = if cover == Cover::NONE { OFFERING } else { LIT };
+                self.stage = if cover == Cover::NONE { AT_Y } else { AT_COATED_Y };
                 self.coated = Coated { cover, ..Coated::default() };
                 self.radiance = core::mem::take(&mut path.radiance);
                 path.throughput = [1.0; 3];
             }
-            _ => self.stage = TAKING,
+            _ => self.stage = RECEIVING,
         }
     }
 
     /// Called after the path has left y: its radiance so far is of the light sample.
     #[inline]
     fn go_behind(&mut self, path: &mut PathState) {
-        if self.stage == LIT {
-            self.divide(self.coated.of_light, path);
-            self.stage = BEHIND;
+        if self.stage == AT_COATED_Y {
+            self.split_base_and_coat(self.coated.of_light, path);
+            self.stage = BEHIND_COATED_Y;
         }
     }
 
-    /// Called after the path has ended: its offer is its radiance, less the part that belongs to it alone.
+    /// Called after the path has ended: it offers its radiance, less the part that belongs to it alone.
     #[inline]
     fn finish(&mut self, path: &mut PathState) {
         match self.stage {
-            LIT => self.divide(self.coated.of_light, path),
-            BEHIND => self.divide(self.coated.of_path, path),
+            AT_COATED_Y => self.split_base_and_coat(self.coated.of_light, path),
+            BEHIND_COATED_Y => self.split_base_and_coat(self.coated.of_path, path),
             _ => return,
         }
         path.radiance = core::mem::take(&mut self.coated.base);
-        self.stage = OFFERING;
+        self.stage = AT_Y;
     }
 
     /// Divides the radiance of the path between base and coat.
-    fn divide(&mut self, part: [f32; 3], path: &mut PathState) {
+    fn split_base_and_coat(&mut self, part: [f32; 3], path: &mut PathState) {
         let light = Rgb::from(core::mem::take(&mut path.radiance));
         let base = light * Rgb::from(part);
         self.coated.base = (Rgb::from(self.coated.base) + base).to_array();
-        self.take(1.0, light - base);
+        self.receive(1.0, light - base);
     }
 
     /// Transmittance T of the coat of y towards `x`.
@@ -159,23 +160,23 @@ impl ReuseState {
     }
 
     /// Radiance of the sample without sharing; valid before shares are distributed.
-    pub(super) fn alone(&self, path: &PathState) -> Rgb {
-        let worth = if self.stage >= OFFERING { Rgb::from(self.throughput) } else { Rgb::ONE };
-        Rgb::from(self.radiance) + worth * (Rgb::from(path.radiance) + Rgb::from(self.coated.base))
+    pub(super) fn unshared_radiance(&self, path: &PathState) -> Rgb {
+        let throughput = if self.stage >= AT_Y { Rgb::from(self.throughput) } else { Rgb::ONE };
+        Rgb::from(self.radiance) + throughput * (Rgb::from(path.radiance) + Rgb::from(self.coated.base))
     }
 
     #[inline]
-    fn take(&mut self, share: f32, light: Rgb) {
+    fn receive(&mut self, share: f32, light: Rgb) {
         self.radiance = (Rgb::from(self.radiance) + share * (Rgb::from(self.throughput) * light)).to_array();
     }
 }
 
-/// Pair of paths: `taking` might have hit the point y of `offering`.
+/// Pair of paths: `target` might have hit the point y of `source`.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C)]
 pub struct Connection {
-    offering: u32,
-    taking: u32,
+    source: u32,
+    target: u32,
     /// V g.
     density: f32,
 }
@@ -184,7 +185,7 @@ pub struct Connection {
 #[derive(Clone, Copy, Debug)]
 pub struct PathReuse {
     /// Radiance over the sample number, above which a sample is shared in part only.
-    flash: f32,
+    firefly_limit: f32,
 }
 
 impl Sharing for PathReuse {
@@ -211,19 +212,19 @@ impl Sharing for PathReuse {
     /// is not common to light from several directions.
     #[inline]
     fn may_connect(state: &ReuseState) -> bool {
-        state.stage == OFFERING || state.stage == BEHIND
+        state.stage == AT_Y || state.stage == BEHIND_COATED_Y
     }
 
     #[inline]
     fn sample_light(state: &mut ReuseState, base: impl FnOnce() -> Rgb) {
-        if state.stage == LIT {
+        if state.stage == AT_COATED_Y {
             state.coated.of_light = base().to_array();
         }
     }
 
     #[inline]
     fn sample_bsdf(state: &mut ReuseState, base: impl FnOnce() -> Rgb) {
-        if state.stage == LIT {
+        if state.stage == AT_COATED_Y {
             state.coated.of_path = base().to_array();
         }
     }
@@ -239,14 +240,14 @@ impl Sharing for PathReuse {
     }
 
     #[inline]
-    fn worth(state: &ReuseState, throughput: Rgb) -> Rgb {
-        if state.stage >= OFFERING { throughput * Rgb::from(state.throughput) } else { throughput }
+    fn throughput(state: &ReuseState, throughput: Rgb) -> Rgb {
+        if state.stage >= AT_Y { throughput * Rgb::from(state.throughput) } else { throughput }
     }
 
     #[inline]
-    fn keep(state: &mut ReuseState, path: &mut PathState, light: Rgb) {
-        if state.stage >= OFFERING {
-            state.take(1.0, light);
+    fn add_own(state: &mut ReuseState, path: &mut PathState, light: Rgb) {
+        if state.stage >= AT_Y {
+            state.receive(1.0, light);
         } else {
             path.add(light);
         }
@@ -254,11 +255,11 @@ impl Sharing for PathReuse {
 
     #[inline]
     fn radiance(state: &ReuseState, path: &PathState) -> Rgb {
-        let own = if state.stage >= OFFERING { Rgb::ZERO } else { Rgb::from(path.radiance) };
+        let own = if state.stage >= AT_Y { Rgb::ZERO } else { Rgb::from(path.radiance) };
         own + Rgb::from(state.radiance)
     }
 
-    fn share<F: Features, S>(
+    fn distribute<F: Features, S>(
         &self,
         (context, is_limited): (&SceneContext<F>, bool),
         PathWave { wave, memory }: &mut PathWave<S, Self>,
@@ -273,24 +274,24 @@ impl Sharing for PathReuse {
             if j >= circle.end {
                 circle = j..end_of_circle(&memory.shared[..count], j);
             }
-            let offer = memory.shared[j];
-            if offer.stage != OFFERING {
+            let source = memory.shared[j];
+            if source.stage != AT_Y {
                 continue;
             }
             if pairs + CIRCLE > memory.pairs.len() {
-                self.divide(context, wave, memory, (pairs, rays), counters);
+                self.distribute_pairs(context, wave, memory, (pairs, rays), counters);
                 (pairs, rays) = (0, 0);
             }
             for k in circle.clone() {
-                let taker = &memory.shared[k];
-                if taker.stage == ALONE || (is_limited && taker.segments != offer.segments) {
+                let target = &memory.shared[k];
+                if target.stage == BEFORE_X || (is_limited && target.segments != source.segments) {
                     continue;
                 }
-                let density = density(&taker.x, &offer.y);
+                let density = density(&target.x, &source.y);
                 if density > 0.0 && density < f32::INFINITY {
-                    memory.pairs[pairs] = Connection { offering: j as u32, taking: k as u32, density };
+                    memory.pairs[pairs] = Connection { source: j as u32, target: k as u32, density };
                     if k != j {
-                        wave.shadow_rays[rays] = Ray { tag: pairs as u32, ..offer.y.ray_to(&taker.x) };
+                        wave.shadow_rays[rays] = Ray { tag: pairs as u32, ..source.y.ray_to(&target.x) };
                         wave.shadow_light[rays] = [density; 3];
                         rays += 1;
                     }
@@ -298,13 +299,13 @@ impl Sharing for PathReuse {
                 }
             }
         }
-        self.divide(context, wave, memory, (pairs, rays), counters);
+        self.distribute_pairs(context, wave, memory, (pairs, rays), counters);
     }
 }
 
 impl PathReuse {
     /// Traces the first `rays` connections of the first `pairs` pairs and distributes the shares.
-    fn divide<F: Features, S>(
+    fn distribute_pairs<F: Features, S>(
         &self,
         context: &SceneContext<F>,
         wave: &mut Wavefront,
@@ -312,44 +313,44 @@ impl PathReuse {
         (pairs, rays): (usize, usize),
         counters: &mut Counters,
     ) {
-        see(context, wave, memory.pairs, rays, counters);
+        trace_connections(context, wave, memory.pairs, rays, counters);
         let PathMemory { shared, pairs: all, .. } = memory;
         let mut rest = &all[..pairs];
         while let Some(first) = rest.first() {
-            let count = rest.iter().take_while(|pair| pair.offering == first.offering).count();
-            let (takers, others) = rest.split_at(count);
+            let count = rest.iter().take_while(|pair| pair.source == first.source).count();
+            let (targets, others) = rest.split_at(count);
             rest = others;
-            let path = wave.paths[first.offering as usize];
+            let path = wave.paths[first.source as usize];
             let light = Rgb::from(path.radiance);
             if light == Rgb::ZERO {
                 continue;
             }
             // Light that is not finite stays in one pixel, where it is counted.
             if !light.is_finite() {
-                shared[first.offering as usize].take(1.0, light);
+                shared[first.source as usize].receive(1.0, light);
                 continue;
             }
-            let total: f32 = takers.iter().map(|pair| pair.density).sum();
-            let offer = shared[first.offering as usize];
-            let coated = offer.coated.cover != Cover::NONE;
-            let here = if coated { offer.transmittance(&offer.x) } else { Rgb::ONE };
+            let total: f32 = targets.iter().map(|pair| pair.density).sum();
+            let source = shared[first.source as usize];
+            let coated = source.coated.cover != Cover::NONE;
+            let here = if coated { source.transmittance(&source.x) } else { Rgb::ONE };
             let base = Rgb::select(here.cmpgt(Rgb::ZERO), light / here, Rgb::ZERO);
-            let most = self.flash * (BEFORE_FLASHES + path.sample) as f32;
+            let most = self.firefly_limit * (FIREFLY_OFFSET + path.sample) as f32;
             let part = (most / base.max_element()).min(1.0);
             if part < 1.0 {
-                shared[first.offering as usize].take(1.0 - part, light);
+                shared[first.source as usize].receive(1.0 - part, light);
             }
-            for pair in takers.iter().filter(|pair| pair.density > 0.0) {
-                let taker = &mut shared[pair.taking as usize];
-                let there = if coated { offer.transmittance(&taker.x) } else { Rgb::ONE };
-                taker.take(part * pair.density / total, base * there);
+            for pair in targets.iter().filter(|pair| pair.density > 0.0) {
+                let target = &mut shared[pair.target as usize];
+                let there = if coated { source.transmittance(&target.x) } else { Rgb::ONE };
+                target.receive(part * pair.density / total, base * there);
             }
         }
     }
 }
 
 /// Multiplies the densities of `pairs` by the transmittance V of the first `rays` rays between them.
-fn see<F: Features>(
+fn trace_connections<F: Features>(
     context: &SceneContext<F>,
     wave: &mut Wavefront,
     pairs: &mut [Connection],
@@ -374,15 +375,15 @@ fn end_of_circle(states: &[ReuseState], first: usize) -> usize {
 impl<'a, F: Features, E: Estimator<F>, R: Sharing> PathIntegrator<'a, F, E, R> {
     /// This path tracer with path reuse: pixels of a circle share the light that their paths find.
     pub fn with_reuse(&self) -> PathIntegrator<'a, F, E, PathReuse> {
-        self.with_sharing(PathReuse { flash: f32::INFINITY })
+        self.with_sharing(PathReuse { firefly_limit: f32::INFINITY })
     }
 }
 
 impl<F: Features, E: Estimator<F>> PathIntegrator<'_, F, E, PathReuse> {
     /// This path tracer with a firefly limit: samples much brighter than the `mean` radiance of the picture
     /// are shared in part only.
-    pub fn with_flashes(&self, mean: f32) -> Self {
-        let flash = if mean > 0.0 { FLASH * mean } else { f32::INFINITY };
-        Self { sharing: PathReuse { flash }, ..*self }
+    pub fn with_firefly_limit(&self, mean: f32) -> Self {
+        let firefly_limit = if mean > 0.0 { FIREFLY_FACTOR * mean } else { f32::INFINITY };
+        Self { sharing: PathReuse { firefly_limit }, ..*self }
     }
 }

@@ -132,7 +132,7 @@ impl<F: Features, E: Estimator<F>> PathIntegrator<'_, F, E> {
     /// # Errors
     /// As [`PathIntegrator::pilot_mean`].
     pub fn pilot_rest(&self, task: usize, wave: usize, scratch: &mut Arena) -> Result<f32, OutOfMemory> {
-        self.mean_of(Some(Components::UNSEEN), task, wave, scratch)
+        self.mean_of(Some(Components::WITHOUT_VISIBLE_EMITTERS), task, wave, scratch)
     }
 
     /// Mean radiance of the classes `components`, or of all light.
@@ -175,7 +175,7 @@ impl<F: Features, E: Estimator<F>> PathIntegrator<'_, F, E> {
         wave: usize,
         scratch: &mut Arena,
     ) -> Result<Pilot, OutOfMemory> {
-        let sharing = self.with_reuse().with_flashes(mean);
+        let sharing = self.with_reuse().with_firefly_limit(mean);
         let connection = if self.context.has_cutouts { CONNECTION_THROUGH_CUTOUTS } else { CONNECTION };
         let mut arena = scratch.scratch();
         let mut wave = PathWave::<E::State, PathReuse>::new(wave, &mut arena)?;
@@ -193,11 +193,11 @@ impl<F: Features, E: Estimator<F>> PathIntegrator<'_, F, E> {
             pilot.rays += (counters.rays + counters.shadow_rays) as f64;
             // The throughput of an ended path is free: it holds the radiance without sharing.
             for (path, state) in wave.wave.paths.iter_mut().zip(&*wave.memory.shared).take(count) {
-                path.throughput = state.alone(path).to_array();
+                path.throughput = state.unshared_radiance(path).to_array();
             }
             let before = counters.shadow_rays;
             let context = (&self.context, self.is_limited());
-            sharing.sharing.share(context, &mut wave, count, &mut counters);
+            sharing.sharing.distribute(context, &mut wave, count, &mut counters);
             pilot.connections += f64::from(connection) * (counters.shadow_rays - before) as f64;
             pilot.samples += count as f64;
             pilot.compare(&wave, count, mean);

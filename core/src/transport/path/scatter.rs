@@ -42,8 +42,9 @@ impl<F: Features, E: Estimator<F>, R: Sharing> PathIntegrator<'_, F, E, R> {
             return None;
         }
         path.eta_squared *= sample.eta * sample.eta;
-        let worth = R::worth(shared, throughput) * path.eta_squared;
-        let continuation_probability = if survives { 1.0 } else { continuation_probability(segments, worth) };
+        let pixel_throughput = R::throughput(shared, throughput) * path.eta_squared;
+        let continuation_probability =
+            if survives { 1.0 } else { continuation_probability(segments, pixel_throughput) };
         if continuation_probability < 1.0 {
             if sampler.single(first + dimension::ROULETTE) >= continuation_probability {
                 return None;

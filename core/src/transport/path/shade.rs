@@ -227,8 +227,8 @@ impl<'a, F: Features, E: Estimator<F>, R: Sharing> PathIntegrator<'a, F, E, R> {
     ) -> Rest {
         let mut add = |KnownLight { contribution, blur }: KnownLight| {
             // Not shared: other paths look up the data structure at their own vertices.
-            R::keep(shared, path, contribution);
-            path.blur = (Rgb::from(path.blur) + R::worth(shared, vertex.throughput) * blur).to_array();
+            R::add_own(shared, path, contribution);
+            path.blur = (Rgb::from(path.blur) + R::throughput(shared, vertex.throughput) * blur).to_array();
         };
         self.estimator.at_vertex((&self.context, &self.settings), vertex, state, found, &mut add)
     }

@@ -61,17 +61,17 @@ pub trait Sharing: Copy + Send + Sync {
 
     /// Factor from radiance to the pixel for a path of `throughput`.
     #[inline]
-    fn worth(_state: &Self::State, throughput: Rgb) -> Rgb {
+    fn throughput(_state: &Self::State, throughput: Rgb) -> Rgb {
         throughput
     }
 
     /// Adds `light` to the pixel of `path` alone.
     #[inline]
-    fn keep(_state: &mut Self::State, path: &mut PathState, light: Rgb) {
+    fn add_own(_state: &mut Self::State, path: &mut PathState, light: Rgb) {
         path.add(light);
     }
 
-    /// Radiance of the sample, valid after [`Sharing::share`].
+    /// Radiance of the sample, valid after [`Sharing::distribute`].
     #[inline]
     fn radiance(_state: &Self::State, path: &PathState) -> Rgb {
         Rgb::from(path.radiance)
@@ -80,7 +80,7 @@ pub trait Sharing: Copy + Send + Sync {
     /// Distributes the light of the first `count` paths, which have ended, among pixels. If depth
     /// `is_limited`, only paths of equal length share.
     #[inline]
-    fn share<F: Features, S>(
+    fn distribute<F: Features, S>(
         &self,
         (_context, _is_limited): (&SceneContext<F>, bool),
         _wave: &mut PathWave<S, Self>,

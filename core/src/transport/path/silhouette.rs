@@ -25,17 +25,17 @@ use glam::{Vec2, Vec3};
 
 /// Camera rays per sample; a power of two, so that their positions in the pixel form a net. They take about
 /// as long as two samples, in one pixel of a hundred.
-const RAYS: u32 = 32;
+const RAYS_PER_SAMPLE: u32 = 32;
 
 /// Maximum number of lamp triangles in view of a tile. With more, the triangles are smaller than pixels, and
 /// testing all borders would take too long.
-const MOST_LAMPS: usize = 4096;
+const MAX_EMITTERS: usize = 4096;
 
 /// Distance in pixels within which a border counts as seen; exceeds rounding.
 const MARGIN: f32 = 0.01;
 
 /// Near plane of a border that starts behind the camera, as a fraction of the border's maximum depth.
-const NEAR: f32 = 1e-3;
+const NEAR_PLANE: f32 = 1e-3;
 
 /// Set of pixels of the square around a tile: one bit per column for each row.
 type Rows = [u32; SPAN as usize];
@@ -64,14 +64,14 @@ fn add(pixels: &mut Rows, a: Vec2, b: Vec2) {
 }
 
 /// Cone around the view of a tile.
-struct View {
+struct TileCone {
     eye: Vec3,
     axis: Vec3,
     cos: f32,
     sin: f32,
 }
 
-impl View {
+impl TileCone {
     fn of(camera: &Camera, settings: &PathSettings, tile: Tile) -> Self {
         let direction = |[x, y]: [f32; 2]| -> Vec3 {
             camera.ray(settings.width, settings.height, x, y, [0.0; 2]).direction.into()
@@ -100,7 +100,7 @@ impl View {
 
 /// Pixels of a tile that see the border of a lamp, without regard to occlusion. Empty with a lens or with
 /// cut-outs, where borders are not sharp.
-pub(in crate::transport) fn outlined(
+pub(in crate::transport) fn silhouette_pixels(
     scene: &Scene,
     lights: &LightSampler,
     settings: &PathSettings,
@@ -116,12 +116,12 @@ pub(in crate::transport) fn outlined(
         let seen = camera.project(settings.width, settings.height, point, [0.0; 2])?;
         Some(seen.raster - corner)
     };
-    let view = View::of(camera, settings, tile);
+    let view = TileCone::of(camera, settings, tile);
     let meets = |center, radius| view.meets(center, radius);
-    lights.borders(&scene.mesh, camera.eye, MOST_LAMPS, meets, |[a, b]| {
+    lights.borders(&scene.mesh, camera.eye, MAX_EMITTERS, meets, |[a, b]| {
         // Clips the part behind the camera.
         let [near, far] = [a, b].map(|point| (point - camera.eye).dot(camera.forward));
-        let least = NEAR * near.max(far);
+        let least = NEAR_PLANE * near.max(far);
         let cut = |point: Vec3, depth: f32, other: Vec3, beyond: f32| {
             if depth < least { point + (other - point) * ((least - depth) / (beyond - depth)) } else { point }
         };
@@ -144,8 +144,8 @@ pub(in crate::transport) fn outlined(
     pixels
 }
 
-/// True if [`outlined`] has the pixel in column `x` and row `y`.
-pub(in crate::transport) fn is_outlined(
+/// True if [`silhouette_pixels`] has the pixel in column `x` and row `y`.
+pub(in crate::transport) fn is_on_silhouette(
     scene: &Scene,
     lights: &LightSampler,
     settings: &PathSettings,
@@ -153,7 +153,7 @@ pub(in crate::transport) fn is_outlined(
 ) -> bool {
     let position = Tile::position([settings.width, settings.height], x, y);
     let tile = Tile::new(settings.width, settings.height, position / PIXELS_PER_TILE);
-    outlined(scene, lights, settings, tile).contains(position % PIXELS_PER_TILE)
+    silhouette_pixels(scene, lights, settings, tile).contains(position % PIXELS_PER_TILE)
 }
 
 /// Extra rays of one sample of the pixel in column `x` and row `y`.
@@ -165,10 +165,10 @@ pub(in crate::transport) fn rays(
 ) -> impl Iterator<Item = Ray> {
     let PathSettings { width, height, seed, .. } = *settings;
     let camera = scene.camera;
-    (0..RAYS).map(move |n| {
-        let index = (sample >> 1).wrapping_mul(RAYS).wrapping_add(n);
+    (0..RAYS_PER_SAMPLE).map(move |n| {
+        let index = (sample >> 1).wrapping_mul(RAYS_PER_SAMPLE).wrapping_add(n);
         let sampler = Sampler::replicate(seed, y * width + x, sample & 1, index);
-        let [dx, dy] = sampler.pair(dimension::OUTLINE);
+        let [dx, dy] = sampler.pair(dimension::SILHOUETTE);
         camera.ray(width, height, x as f32 + dx, y as f32 + dy, [0.0; 2])
     })
 }
@@ -187,7 +187,7 @@ pub(in crate::transport) fn emission<F: Features>(
             let emits = point.material.emits();
             let light =
                 if emits { emitted(context.scene, hit.triangle, point.uv, point.front) } else { Rgb::ZERO };
-            return light / RAYS as f32;
+            return light / RAYS_PER_SAMPLE as f32;
         }
         left = hit.triangle;
         ray = point.spawn(ray.direction.into());
@@ -198,10 +198,10 @@ pub(in crate::transport) fn emission<F: Features>(
 
 impl<F: Features, E: Estimator<F>, R: Sharing> PathIntegrator<'_, F, E, R> {
     /// Sets `wave.shadow_light` of the first `count` paths to the emission of lamps in their pixels, or to
-    /// zero if the place of the pixel is not `outlined`.
-    pub(super) fn trace_lamps(
+    /// zero if the place of the pixel is not `on_silhouette`.
+    pub(super) fn trace_silhouettes(
         &self,
-        mut outlined: impl FnMut(u32) -> bool,
+        mut on_silhouette: impl FnMut(u32) -> bool,
         wave: &mut Wavefront,
         count: usize,
         counters: &mut Counters,
@@ -210,7 +210,7 @@ impl<F: Features, E: Estimator<F>, R: Sharing> PathIntegrator<'_, F, E, R> {
         for i in 0..count {
             wave.shadow_light[i] = [0.0; 3];
             let path = wave.paths[i];
-            if !outlined(path.place) {
+            if !on_silhouette(path.place) {
                 continue;
             }
             let place = [path.pixel % self.settings.width, path.pixel / self.settings.width];

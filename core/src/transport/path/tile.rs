@@ -7,7 +7,7 @@ use super::PathIntegrator;
 use super::estimator::Estimator;
 use super::sharing::PathWave;
 use super::sharing::Sharing;
-use super::silhouette::outlined;
+use super::silhouette::silhouette_pixels;
 use crate::Rgb;
 use crate::bsdf::Features;
 use crate::film::{CIRCLE, CIRCLES, PIXELS_PER_TILE, Pixel, PixelSet, Tile};
@@ -26,12 +26,12 @@ pub(in crate::transport) struct TileSampler {
     /// Next circle of the layer, or next pixel without path reuse.
     next: usize,
     /// Pixels whose camera paths leave direct emission to extra rays.
-    outlined: PixelSet,
+    silhouette_pixels: PixelSet,
 }
 
 impl TileSampler {
     pub(in crate::transport) fn new(tile: Tile, samples: Range<u32>) -> Self {
-        Self { tile, left: samples, next: 0, outlined: PixelSet::default() }
+        Self { tile, left: samples, next: 0, silhouette_pixels: PixelSet::default() }
     }
 
     /// Next of the `count` parts of a layer, and its sample number.
@@ -66,9 +66,10 @@ impl<F: Features, E: Estimator<F>, R: Sharing> PathIntegrator<'_, F, E, R> {
         // At most the number of paths, since the memory of a wave is cleared.
         let most = samples.len().saturating_mul(PIXELS_PER_TILE);
         let mut places = TileSampler::new(tile, samples);
-        places.outlined = outlined(self.context.scene, self.context.lights, &self.settings, tile);
+        places.silhouette_pixels =
+            silhouette_pixels(self.context.scene, self.context.lights, &self.settings, tile);
         let mut wave = PathWave::<E::State, R>::new(wave.min(most), &mut arena)?;
-        let has_outlines = !places.outlined.is_empty();
+        let has_outlines = !places.silhouette_pixels.is_empty();
         loop {
             let count = self.start(&mut places, &mut wave);
             if count == 0 {
@@ -76,10 +77,10 @@ impl<F: Features, E: Estimator<F>, R: Sharing> PathIntegrator<'_, F, E, R> {
             }
             counters.paths += count as u64;
             self.advance(&mut wave, count, &mut counters);
-            self.sharing.share((&self.context, self.is_limited()), &mut wave, count, &mut counters);
+            self.sharing.distribute((&self.context, self.is_limited()), &mut wave, count, &mut counters);
             if has_outlines {
-                let outlined = |place| places.outlined.contains(place as usize);
-                self.trace_lamps(outlined, &mut wave.wave, count, &mut counters);
+                let on_silhouette = |place| places.silhouette_pixels.contains(place as usize);
+                self.trace_silhouettes(on_silhouette, &mut wave.wave, count, &mut counters);
             }
             for i in 0..count {
                 let path = wave.wave.paths[i];
@@ -136,7 +137,7 @@ impl<F: Features, E: Estimator<F>, R: Sharing> PathIntegrator<'_, F, E, R> {
             wave,
             *count,
             ([x, y], place as u32, sample),
-            places.outlined.contains(place),
+            places.silhouette_pixels.contains(place),
             circle,
         );
         *count += 1;
@@ -149,13 +150,13 @@ impl<F: Features, E: Estimator<F>, R: Sharing> PathIntegrator<'_, F, E, R> {
         wave: &mut PathWave<E::State, R>,
         index: usize,
         ([x, y], place, sample): ([u32; 2], u32, u32),
-        is_outlined: bool,
+        is_on_silhouette: bool,
         circle: u32,
     ) {
         let PathSettings { width, seed, .. } = self.settings;
         let pixel = y * width + x;
         let ray = self.camera_ray([x, y], &Sampler::new(seed, pixel, sample));
-        let components = if is_outlined { Components::BESIDE_LAMP } else { Components::ALL };
+        let components = if is_on_silhouette { Components::WITHOUT_EMISSION } else { Components::ALL };
         wave.wave.rays[index] = Ray { tag: index as u32, ..ray };
         wave.wave.paths[index] = PathState::new(pixel, place, sample, components);
         wave.begin(index, circle);

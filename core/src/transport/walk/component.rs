@@ -40,9 +40,10 @@ impl Components {
     /// All light, with photon maps: the path may end at the next surface with a diffuse part.
     pub(in crate::transport) const GATHERED: Self = Self(Self::ALL.0 | GATHERED);
     /// All light except the emission of the lamp on a camera ray, for which the pixel has separate rays.
-    pub(in crate::transport) const BESIDE_LAMP: Self = Self(Self::ALL.0 & !EMISSION);
+    pub(in crate::transport) const WITHOUT_EMISSION: Self = Self(Self::ALL.0 & !EMISSION);
     /// All light except emitters that the camera sees, directly or by specular surfaces.
-    pub(in crate::transport) const UNSEEN: Self = Self(SPECULAR | ROUGH | CAUSTIC | BEHIND_SPECULAR);
+    pub(in crate::transport) const WITHOUT_VISIBLE_EMITTERS: Self =
+        Self(SPECULAR | ROUGH | CAUSTIC | BEHIND_SPECULAR);
 
     const fn has(self, class: u32) -> bool {
         self.0 & class != 0

@@ -18,7 +18,7 @@ pub(in crate::transport) const fn opacity(segments: u32, crossings: u32) -> u32 
 /// Rotation of the wall probes at the vertex that ends segment `n`: `PROBES + n`.
 pub(in crate::transport) const PROBES: u32 = 1 << 30;
 /// Position in the pixel of rays for the emission of lamps alone.
-pub(in crate::transport) const OUTLINE: u32 = 1 << 29;
+pub(in crate::transport) const SILHOUETTE: u32 = 1 << 29;
 
 /// Choice of light vertices at the vertex that ends segment `n`: `CONNECTION + n`.
 pub(in crate::transport) const CONNECTION: u32 = 1 << 28;

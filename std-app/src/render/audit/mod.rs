@@ -143,8 +143,10 @@ impl<'a> Audit<'a> {
         };
         Ok(Some(Self {
             truth: Box::new(move |(places, samples), photons, arena, out| match photons {
-                Some(photons) => tracer.with_caustics(photons).probe(places, samples, WAVE, arena, out),
-                None => tracer.probe(places, samples, WAVE, arena, out),
+                Some(photons) => {
+                    tracer.with_caustics(photons).sample_pixels(places, samples, WAVE, arena, out)
+                }
+                None => tracer.sample_pixels(places, samples, WAVE, arena, out),
             }),
             shard: settings.shard,
             by_clock: settings.stop.error.is_none(),
