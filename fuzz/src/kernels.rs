@@ -67,14 +67,14 @@ struct Work {
     corners: [[[f32; 3]; 3]; 8],
 }
 
-/// Distances, with a bit for each lane that hits; `doubtful` lanes lie on an edge and are left to the
+/// Distances, with a bit for each lane that hits; `on_edge` lanes lie on an edge and are left to the
 /// reference.
 struct Seen<const N: usize> {
     t: [f32; N],
     u: [f32; N],
     v: [f32; N],
     hits: u32,
-    doubtful: u32,
+    on_edge: u32,
 }
 
 /// Results: the first ray against all items, and all rays against the first box and triangle.
@@ -106,7 +106,7 @@ impl Kernel for &Work {
         let areas = ShearRay8::along(simd, shear.axes, shear.axes.map(|k| self.origins[0][k]), shear.factors);
         let areas = areas.areas(simd, &values, 0, self.count, self.t_max);
         let areas = areas.expect("eight floats can be read from every run");
-        assert_eq!((areas.hits, areas.doubtful), (found.hits, found.doubtful));
+        assert_eq!((areas.hits, areas.on_edge), (found.hits, found.on_edge));
         for i in (0..8).filter(|i| areas.hits >> i & 1 == 0) {
             assert_eq!(areas.t[i], f32::INFINITY, "a lane that does not hit is never the nearest");
         }
@@ -136,7 +136,7 @@ impl Kernel for &Work {
                 u: found.u.to_array(),
                 v: found.v.to_array(),
                 hits: found.hits,
-                doubtful: found.doubtful,
+                on_edge: found.on_edge,
             },
             rays_box: (rays_entry.to_array(), rays_bits),
             rays_triangle: Seen {
@@ -144,7 +144,7 @@ impl Kernel for &Work {
                 u: all.u.to_array(),
                 v: all.v.to_array(),
                 hits: all.hits,
-                doubtful: all.doubtful,
+                on_edge: all.on_edge,
             },
         }
     }
@@ -163,7 +163,7 @@ impl Work {
                 self.met(level, triangle, 0, &answers.triangles, triangle);
             } else {
                 assert_eq!(
-                    (answers.triangles.hits | answers.triangles.doubtful) >> triangle & 1,
+                    (answers.triangles.hits | answers.triangles.on_edge) >> triangle & 1,
                     0,
                     "{level:?}"
                 );
@@ -183,8 +183,8 @@ impl Work {
     }
 
     fn met<const N: usize>(&self, level: Level, triangle: usize, ray: usize, seen: &Seen<N>, lane: usize) {
-        if seen.doubtful >> lane & 1 == 1 {
-            return assert_eq!(seen.hits >> lane & 1, 0, "a doubtful lane is no hit: {level:?} {self:?}");
+        if seen.on_edge >> lane & 1 == 1 {
+            return assert_eq!(seen.hits >> lane & 1, 0, "a lane on an edge is no hit: {level:?} {self:?}");
         }
         let shear = Shear::new(self.direction);
         let reference = intersect(self.origins[ray], &shear, self.t_max, self.corners[triangle]);

@@ -46,9 +46,9 @@ fn attempt(input: &mut Unstructured) -> Result<()> {
         let normal = normal(input)?;
         let beneath = input.arbitrary::<u8>()? < 64;
         let within = if beneath { 0.3 * fraction(input)? } else { f32::INFINITY };
-        let asker = QueryPoint { position, normal, within };
-        points.set(i, &asker);
-        *wanted = cache.at(&asker);
+        let query = QueryPoint { position, normal, within };
+        points.set(i, &query);
+        *wanted = cache.at(&query);
     }
     for level in Level::detect().and_below() {
         let mut known = [None; POINTS];
@@ -81,7 +81,7 @@ fn record(input: &mut Unstructured) -> Result<Record> {
     let (bend, [noise, error], [allowed, shining]) = (pair()?, pair()?, pair()?);
     let irradiance = within(input)?;
     let mut sectors = || if input.arbitrary()? { input.arbitrary() } else { Ok([u8::MAX; SECTORS]) };
-    let (fence, free): ([u8; SECTORS], [u8; SECTORS]) = (sectors()?, sectors()?);
+    let (boundary, free): ([u8; SECTORS], [u8; SECTORS]) = (sectors()?, sectors()?);
     let radii = [r1, r1 * (1.0 + longer)];
     Ok(Record {
         position: within(input)?.to_array(),
@@ -98,7 +98,7 @@ fn record(input: &mut Unstructured) -> Result<Record> {
         error: error.abs(),
         allowed: 1e-3 * allowed.max(0.0),
         shining: shining.abs(),
-        fence,
+        boundary,
         free,
         ..Record::default()
     })

@@ -12,7 +12,7 @@ use crate::scene::CAUSTIC_ALPHA;
 
 /// Least albedo of a base that counts as diffuse. Below it the coat reflects nearly everything, and photons
 /// would make fireflies.
-const BASE: f32 = 0.02;
+const MIN_BASE_ALBEDO: f32 = 0.02;
 
 impl Bsdf {
     /// True if photons are stored on the surface: it has a diffuse component, or a wide coat over one. A
@@ -25,7 +25,7 @@ impl Bsdf {
     /// True if it has a diffuse component of at least this albedo.
     #[inline]
     pub(crate) fn has_diffuse(&self) -> bool {
-        matches!(self, Bsdf::Diffuse(_)) || self.base().max_element() >= BASE
+        matches!(self, Bsdf::Diffuse(_)) || self.base().max_element() >= MIN_BASE_ALBEDO
     }
 
     /// True if it ends a caustic: photons count here, and the light that it scatters is no caustic.

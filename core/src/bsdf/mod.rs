@@ -87,7 +87,7 @@ impl BsdfSample {
 
 /// BSDF for a fixed viewer, with everything precomputed that does not depend on the light.
 #[derive(Clone, Copy)]
-pub(crate) struct Seen<'b> {
+pub(crate) struct BsdfView<'b> {
     bsdf: &'b Bsdf,
     wo: Vec3,
     /// T(θ_o) of a coat.
@@ -96,7 +96,7 @@ pub(crate) struct Seen<'b> {
     base_alone: bool,
 }
 
-impl Seen<'_> {
+impl BsdfView<'_> {
     /// f(wo, wi) |cos θ_i|, equal to [`Bsdf::evaluate`] to the bit.
     #[inline]
     pub(crate) fn value<F: Features>(&self, wi: Vec3) -> Rgb {
@@ -146,20 +146,20 @@ impl Bsdf {
 
     /// BSDF for the viewer at `wo`, for light from many directions.
     #[inline]
-    pub(crate) fn seen<F: Features>(&self, wo: Vec3) -> Seen<'_> {
+    pub(crate) fn view<F: Features>(&self, wo: Vec3) -> BsdfView<'_> {
         let wo = above_horizon(wo);
         let transmittance = match self {
             Bsdf::Glossy(b) if F::GLOSSY => coated::Coat::transmittance(b, wo.z),
             Bsdf::Plastic(b) if F::GLOSSY => coated::Coat::transmittance(b, wo.z),
             _ => Rgb::ONE,
         };
-        Seen { bsdf: self, wo, transmittance, base_alone: false }
+        BsdfView { bsdf: self, wo, transmittance, base_alone: false }
     }
 
-    /// [`Bsdf::seen`] without the coat if `base_alone`.
+    /// [`Bsdf::view`] without the coat if `base_alone`.
     #[inline]
-    pub(crate) fn seen_apart<F: Features>(&self, wo: Vec3, base_alone: bool) -> Seen<'_> {
-        Seen { base_alone, ..self.seen::<F>(wo) }
+    pub(crate) fn view_apart<F: Features>(&self, wo: Vec3, base_alone: bool) -> BsdfView<'_> {
+        BsdfView { base_alone, ..self.view::<F>(wo) }
     }
 
     /// [`Bsdf::sample`] of the base or the rough coat alone. Weight and density are those of the chosen lobe,
@@ -273,7 +273,7 @@ mod tests {
                 Bsdf::Plastic(Plastic::new(colour, coat, alpha, b, 1.5)),
             ];
             for bsdf in kinds {
-                assert_eq!(bsdf.seen::<All>(wo).value::<All>(wi), bsdf.evaluate::<All>(wo, wi).0, "{bsdf:?}");
+                assert_eq!(bsdf.view::<All>(wo).value::<All>(wi), bsdf.evaluate::<All>(wo, wi).0, "{bsdf:?}");
             }
         }
     }

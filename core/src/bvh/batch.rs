@@ -33,7 +33,7 @@ const TILE: usize = RAYS_MAX;
 const PACKET_MIN: usize = 12;
 
 /// Room for rays that wait for the stream.
-const ALONE: usize = 512;
+const STREAM_SIZE: usize = 512;
 
 /// Kernel for a batch that comes tile by tile. Rays of a tile that share a class make a packet; the others go
 /// to the stream.
@@ -49,7 +49,7 @@ impl Kernel for Tiles<'_, '_> {
     #[inline(always)]
     fn run<S: Simd>(mut self, simd: S) {
         let mut stack = Stack::new();
-        let mut alone = ([0u32; ALONE], 0);
+        let mut pending = ([0u32; STREAM_SIZE], 0);
         let mut tiles = self.rays.chunks(TILE);
         let mut base = 0;
         loop {
@@ -72,17 +72,17 @@ impl Kernel for Tiles<'_, '_> {
                         packet.trace(simd, self.bvh, &mut stack, &mut self.sink);
                     } else {
                         for &i in order {
-                            alone.0[alone.1 & (ALONE - 1)] = base + u32::from(i);
-                            alone.1 += 1;
+                            pending.0[pending.1 & (STREAM_SIZE - 1)] = base + u32::from(i);
+                            pending.1 += 1;
                         }
                     }
                 }
                 base += rays.len() as u32;
             }
-            if alone.1 > ALONE - TILE || (tile.is_none() && alone.1 > 0) {
-                let indices = alone.0.iter().take(alone.1).copied();
+            if pending.1 > STREAM_SIZE - TILE || (tile.is_none() && pending.1 > 0) {
+                let indices = pending.0.iter().take(pending.1).copied();
                 stream::trace::<S, _, false>(simd, self.bvh, self.rays, indices, &mut self.sink);
-                alone.1 = 0;
+                pending.1 = 0;
             }
             if tile.is_none() {
                 return;

@@ -43,41 +43,27 @@ pub(super) fn take<S: Simd>(
             best.take(Hit { t: areas.t[i], u: areas.v[i] / det, v: areas.w[i] / det, triangle });
         }
     }
-    if areas.doubtful != 0 {
-        take_doubtful(bvh, ray, first, ids, areas.doubtful, best);
+    if areas.on_edge != 0 {
+        take_on_edge(bvh, ray, first, ids, areas.on_edge, best);
     }
 }
 
-/// True if the ray meets one of the `doubtful` triangles, on whose edge it lies in f32.
-pub(super) fn meets_doubtful(bvh: &Bvh, ray: &TraversalRay, leaf: Child, doubtful: u32) -> bool {
+/// True if the ray meets one of the `on_edge` triangles, on whose edge it lies in f32.
+pub(super) fn meets_on_edge(bvh: &Bvh, ray: &TraversalRay, leaf: Child, on_edge: u32) -> bool {
     let (first, count) = leaf.triangles();
     let mut best = Hit::NONE;
-    take_doubtful(
-        bvh,
-        ray,
-        first,
-        bvh.triangles.get(first..first + count).unwrap_or(&[]),
-        doubtful,
-        &mut best,
-    );
+    take_on_edge(bvh, ray, first, bvh.triangles.get(first..first + count).unwrap_or(&[]), on_edge, &mut best);
     best.is_some()
 }
 
-/// Tests the `doubtful` triangles by the scalar reference.
+/// Tests the `on_edge` triangles by the scalar reference.
 #[cold]
-fn take_doubtful(
-    bvh: &Bvh,
-    ray: &TraversalRay,
-    first: usize,
-    ids: &[u32],
-    mut doubtful: u32,
-    best: &mut Hit,
-) {
+fn take_on_edge(bvh: &Bvh, ray: &TraversalRay, first: usize, ids: &[u32], mut on_edge: u32, best: &mut Hit) {
     let count = ids.len();
     let runs = bvh.coordinates.get(9 * first..9 * (first + count)).unwrap_or(&[]);
-    while doubtful != 0 {
-        let i = doubtful.trailing_zeros() as usize & 7;
-        doubtful &= doubtful - 1;
+    while on_edge != 0 {
+        let i = on_edge.trailing_zeros() as usize & 7;
+        on_edge &= on_edge - 1;
         let limit = if best.triangle == MISS { ray.t_max } else { best.t };
         if let Some(&triangle) = ids.get(i)
             && let Some((t, u, v)) = intersect(ray.origin, &ray.shear(), limit, corners_of(runs, count, i))

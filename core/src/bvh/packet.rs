@@ -307,12 +307,12 @@ impl<S: Simd> Walk<'_, S> {
                     corners = moved;
                 }
                 let found = lane.shear.meets_moved(simd, &corners, lane.t, met);
-                if found.hits | found.doubtful != 0 {
+                if found.hits | found.on_edge != 0 {
                     let mut hits = take(simd, lane, &found, id);
-                    if found.doubtful != 0 {
+                    if found.on_edge != 0 {
                         let order = self.order.get(16 * k..).unwrap_or(&[]);
                         let corners = corners_of(runs, count, i);
-                        hits |= take_doubtful(simd, lane, found.doubtful, id, corners, self.rays, order);
+                        hits |= take_on_edge(simd, lane, found.on_edge, id, corners, self.rays, order);
                     }
                     lane.found |= hits;
                     taken |= hits != 0;
@@ -344,12 +344,12 @@ fn take<S: Simd>(simd: S, lane: &mut Lane16<S>, found: &Found<S::F16>, id: u32) 
     hits
 }
 
-/// Tests the `doubtful` rays, which lie on an edge in f32, by the scalar reference.
+/// Tests the `on_edge` rays, which lie on an edge in f32, by the scalar reference.
 #[cold]
-fn take_doubtful<S: Simd>(
+fn take_on_edge<S: Simd>(
     simd: S,
     lane: &mut Lane16<S>,
-    mut doubtful: u32,
+    mut on_edge: u32,
     id: u32,
     corners: [[f32; 3]; 3],
     rays: &[Ray],
@@ -358,9 +358,9 @@ fn take_doubtful<S: Simd>(
     let (mut t, mut u, mut v, mut ids) =
         (lane.t.to_array(), lane.u.to_array(), lane.v.to_array(), lane.triangle.to_array());
     let mut hits = 0;
-    while doubtful != 0 {
-        let l = doubtful.trailing_zeros() as usize & 15;
-        doubtful &= doubtful - 1;
+    while on_edge != 0 {
+        let l = on_edge.trailing_zeros() as usize & 15;
+        on_edge &= on_edge - 1;
         let Some(ray) = order.get(l).and_then(|&i| rays.get(usize::from(i))) else { continue };
         let mut best = Hit { t: t[l], u: u[l], v: v[l], triangle: ids[l].to_bits() };
         let before = best;

@@ -13,7 +13,7 @@
 
 use super::Bvh;
 use super::layout::Child;
-use super::leaf::{meets_doubtful, take};
+use super::leaf::{meets_on_edge, take};
 use super::query::Sink;
 use super::traversal_ray::{TraversalRay, traceable};
 use crate::geometry::{Hit, Ray};
@@ -150,8 +150,8 @@ pub(super) fn trace<S: Simd, T: Sink, const ANY: bool>(
             };
             if ANY {
                 let mut any = areas.hits != 0;
-                if areas.doubtful != 0 {
-                    any |= meets_doubtful(bvh, ray, leaf, areas.doubtful);
+                if areas.on_edge != 0 {
+                    any |= meets_on_edge(bvh, ray, leaf, areas.on_edge);
                 }
                 // Hits are unpredictable: no branch.
                 hit.triangle = select_unpredictable(any, 0, hit.triangle);
@@ -159,7 +159,7 @@ pub(super) fn trace<S: Simd, T: Sink, const ANY: bool>(
                 next[i] = take_next::<S, ANY>(simd, bvh, stack);
             } else {
                 found[i] = areas;
-                met |= ((areas.hits | areas.doubtful != 0) as u32) << i;
+                met |= ((areas.hits | areas.on_edge != 0) as u32) << i;
             }
         }
         if ANY {

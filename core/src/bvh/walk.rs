@@ -37,7 +37,7 @@ pub(super) fn trace<S: Simd, const ANY: bool>(simd: S, bvh: &Bvh, ray: &Ray) -> 
         } else {
             let (first, count) = child.triangles();
             let Some(areas) = shear.areas(simd, bvh.coordinates, 9 * first, count, ray.t_max) else { break };
-            if areas.hits | areas.doubtful != 0 {
+            if areas.hits | areas.on_edge != 0 {
                 take(simd, bvh, &ray, child, &areas, &mut best);
                 if best.is_some() {
                     if ANY {

@@ -25,10 +25,10 @@ const LINKS: usize = CELLS + 1;
 
 /// Maximum number of levels that a record is linked deeper if memory allows; points then find fewer records
 /// in vain.
-const FINER: u32 = 2;
+const EXTRA_LEVELS: u32 = 2;
 
 /// Maximum number of cells of such a record.
-const MOST_CELLS: usize = 128;
+const MAX_CELLS: usize = 128;
 
 /// Nodes per record. If nodes run out, records are linked higher up: they are found more often than
 /// necessary, never less often.
@@ -116,8 +116,8 @@ impl<'m> Octree<'m> {
     }
 
     /// Links `record`, whose support lies within `extent` of `center`, from all cells that it touches. The
-    /// cells are larger than the box, or up to [`FINER`] levels deeper if links for `others` more records
-    /// remain.
+    /// cells are larger than the box, or up to [`EXTRA_LEVELS`] levels deeper if links for `others` more
+    /// records remain.
     pub(super) fn insert(&mut self, record: u32, center: Vec3, extent: Vec3, others: usize) {
         let (low, high) = (self.cell(center - extent), self.cell(center + extent));
         // Deepest level at which the box touches at most two cells along each side.
@@ -128,10 +128,10 @@ impl<'m> Octree<'m> {
         }
         let taken = self.used_links.saturating_add(others.saturating_mul(LINKS)).saturating_add(1);
         let spare = self.links.len().saturating_sub(taken);
-        for finer in (level + 1..=DEPTH.min(level + FINER)).rev() {
+        for finer in (level + 1..=DEPTH.min(level + EXTRA_LEVELS)).rev() {
             let cells = (0..3).map(|i| touches(finer, i) as usize + 1).product::<usize>();
             // Per level, the descent has at most as many nodes as there are cells.
-            if cells <= spare.min(MOST_CELLS)
+            if cells <= spare.min(MAX_CELLS)
                 && self.used_nodes + CELLS * level as usize + 2 * cells <= self.nodes.len()
             {
                 level = finer;

@@ -6,7 +6,7 @@ use glam::Vec3;
 
 /// Number of triangles of each kind of surface.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Kinds {
+pub struct SurfaceKinds {
     /// Lambertian.
     pub diffuse: u64,
     /// Perfect mirrors.
@@ -43,7 +43,7 @@ pub struct Census {
     /// Materials of the scene, used or not.
     pub materials: u64,
     /// Triangles by kind of surface.
-    pub surfaces: Kinds,
+    pub surfaces: SurfaceKinds,
     /// Triangles whose material uses a texture.
     pub textured: u64,
     /// Triangles with a normal or bump map.

@@ -3,5 +3,5 @@
 mod count;
 mod plan;
 
-pub use count::{Census, EnvironmentKind, Kinds};
+pub use count::{Census, EnvironmentKind, SurfaceKinds};
 pub use plan::{FeatureSet, Plan, WithFeatures};

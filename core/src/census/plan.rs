@@ -25,7 +25,7 @@ pub trait WithFeatures {
 
 /// Constants of [`Features`] as values.
 #[derive(Clone, Copy)]
-struct Able {
+struct FeatureFlags {
     textures: bool,
     glossy: bool,
     dielectric: bool,
@@ -33,13 +33,13 @@ struct Able {
     cutout: bool,
 }
 
-struct AbilitiesOf;
+struct FlagsOfBuild;
 
-impl WithFeatures for AbilitiesOf {
-    type Out = Able;
+impl WithFeatures for FlagsOfBuild {
+    type Out = FeatureFlags;
 
-    fn run<F: Features>(self) -> Able {
-        Able {
+    fn run<F: Features>(self) -> FeatureFlags {
+        FeatureFlags {
             textures: F::TEXTURES,
             glossy: F::GLOSSY,
             dielectric: F::DIELECTRIC,
@@ -91,7 +91,7 @@ impl Census {
 impl Plan {
     fn new(census: &Census) -> Plan {
         let kinds = &census.surfaces;
-        let needed = Able {
+        let needed = FeatureFlags {
             textures: census.textured > 0,
             glossy: kinds.mirror + kinds.conductor + kinds.glossy > 0,
             dielectric: kinds.dielectric + kinds.rough_dielectric > 0,
@@ -100,15 +100,15 @@ impl Plan {
         };
         let features = FeatureSet::SMALLEST_FIRST
             .into_iter()
-            .find(|set| set.dispatch(AbilitiesOf).covers(&needed))
+            .find(|set| set.dispatch(FlagsOfBuild).covers(&needed))
             .unwrap_or(FeatureSet::All);
-        let able = features.dispatch(AbilitiesOf);
+        let flags = features.dispatch(FlagsOfBuild);
         let out = |absent: bool, what, why| absent.then_some((what, why));
         let left_out = [
-            out(!able.glossy, "specular and glossy reflection", "no mirror, metal or coated surface"),
-            out(!able.dielectric, "refraction", "no glass or water"),
-            out(!able.normal_maps, "normal and bump mapping", "no normal or bump map"),
-            out(!able.cutout, "cut-out opacity", "every surface is opaque"),
+            out(!flags.glossy, "specular and glossy reflection", "no mirror, metal or coated surface"),
+            out(!flags.dielectric, "refraction", "no glass or water"),
+            out(!flags.normal_maps, "normal and bump mapping", "no normal or bump map"),
+            out(!flags.cutout, "cut-out opacity", "every surface is opaque"),
             out(census.environment != EnvironmentKind::Map, "environment map sampling", "no environment map"),
             out(!census.thin_lens, "lens sampling", "the camera is a pinhole"),
             out(!census.has_light(), "light sampling", "the scene has no light"),
@@ -122,9 +122,9 @@ impl Plan {
     }
 }
 
-impl Able {
-    fn covers(&self, needed: &Able) -> bool {
-        let has = |able: bool, needed: bool| able || !needed;
+impl FeatureFlags {
+    fn covers(&self, needed: &FeatureFlags) -> bool {
+        let has = |flags: bool, needed: bool| flags || !needed;
         has(self.textures, needed.textures)
             && has(self.glossy, needed.glossy)
             && has(self.dielectric, needed.dielectric)

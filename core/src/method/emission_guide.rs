@@ -247,7 +247,7 @@ impl<'p, 'a> Pilot<'p, 'a> {
         powers.fill(0.0);
         let pieces = cells.chunks_mut(PATHS).zip(powers.chunks_mut(PATHS));
         let passed = executor.pass(pieces, |task, (cells, powers), worker| {
-            tracer.look((task, FIRST_MAP + number), *points, &mut worker.scratch, &mut |photon| {
+            tracer.trace_visible((task, FIRST_MAP + number), *points, &mut worker.scratch, &mut |photon| {
                 // All photons of a path come from one cell.
                 if let (Some(cell), Some(power)) = (cells.get_mut(photon.path), powers.get_mut(photon.path)) {
                     *cell = photon.cell;

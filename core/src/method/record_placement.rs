@@ -172,7 +172,7 @@ impl<'m> CacheBuilder<'m> {
 
     /// Whether nothing is to be gathered at `point`, for records of at least `least_pixels` pixels.
     fn is_served(&self, point: &GatherPoint, least_pixels: f32) -> bool {
-        self.cache.is_full() || point.is_confined(least_pixels) || self.cache.covers(&point.asker())
+        self.cache.is_full() || point.is_confined(least_pixels) || self.cache.covers(&point.query())
     }
 
     /// Commits the record of `point`.
@@ -344,7 +344,7 @@ impl<F: Features> RecordPlacement<'_, '_, F> {
             let mut counters = Counters::default();
             integrator.places(&order, first + (task * PIXELS) as u64, target, points, &mut counters);
             leave_out(points);
-            integrator.look_up(points, &mut counters);
+            integrator.measure_overhangs(points, &mut counters);
             leave_out(points);
             Ok(counters)
         })?;

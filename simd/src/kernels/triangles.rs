@@ -87,14 +87,14 @@ pub struct Found<L> {
     /// Mask of the lanes that hit.
     pub hits: u32,
     /// Mask of the lanes on an edge in f32, which the scalar reference decides.
-    pub doubtful: u32,
+    pub on_edge: u32,
 }
 
 impl<L: Lanes> Found<L> {
     /// No hit; the lanes are unspecified.
     #[inline(always)]
-    fn nothing(garbage: L, doubtful: u32) -> Self {
-        Self { t: garbage, u: garbage, v: garbage, hits: 0, doubtful }
+    fn nothing(garbage: L, on_edge: u32) -> Self {
+        Self { t: garbage, u: garbage, v: garbage, hits: 0, on_edge }
     }
 }
 
@@ -130,13 +130,13 @@ fn areas<L: Lanes>(zero: L, sz: L, [a, b, c]: [[L; 3]; 3], t_max: L, wanted: u32
         return Found::nothing(det, 0);
     }
     // A zero area among areas of one sign: one of the extremes is zero.
-    let doubtful = (low.eq(zero) | high.eq(zero)).bits() & inside;
+    let on_edge = (low.eq(zero) | high.eq(zero)).bits() & inside;
     let t = ((u * (sz * a[2]) + v * (sz * b[2])) + w * (sz * c[2])) / det;
-    let hits = (zero.le(t) & t.le(t_max)).bits() & inside & !doubtful;
+    let hits = (zero.le(t) & t.le(t_max)).bits() & inside & !on_edge;
     if hits == 0 {
-        return Found::nothing(det, doubtful);
+        return Found::nothing(det, on_edge);
     }
-    Found { t, u: v / det, v: w / det, hits, doubtful }
+    Found { t, u: v / det, v: w / det, hits, on_edge }
 }
 
 /// Result of [`ShearRay8::areas`]. The divisions are left for the hit that counts.
@@ -153,13 +153,13 @@ pub struct Areas {
     /// Mask of the lanes that hit.
     pub hits: u32,
     /// Mask of the lanes on an edge in f32, which the scalar reference decides.
-    pub doubtful: u32,
+    pub on_edge: u32,
 }
 
 impl Areas {
     /// No hit.
     pub const NONE: Areas =
-        Areas { t: [f32::INFINITY; 8], v: [0.0; 8], w: [0.0; 8], det: [0.0; 8], hits: 0, doubtful: 0 };
+        Areas { t: [f32::INFINITY; 8], v: [0.0; 8], w: [0.0; 8], det: [0.0; 8], hits: 0, on_edge: 0 };
 
     /// Mask of the nearest hit: one lane, or several at equal distance.
     #[inline(always)]
@@ -221,12 +221,12 @@ impl<S: Simd> ShearRay8<S> {
         let edge = low.eq(zero) | high.eq(zero);
         let t = ((u * (sz * a[2]) + v * (sz * b[2])) + w * (sz * c[2])) / det;
         let inside = inside & simd.first8(count as u32);
-        let doubtful = (inside & edge).bits();
+        let on_edge = (inside & edge).bits();
         let met = inside & !edge & zero.le(t) & t.le(simd.splat8(t_max));
         let hits = met.bits();
-        // A doubtful lane may be no hit and must not be the nearest.
+        // A lane on an edge may be no hit and must not be the nearest.
         let t = t.select(met, simd.splat8(f32::INFINITY));
-        Some(Areas { t: t.to_array(), v: v.to_array(), w: w.to_array(), det: det.to_array(), hits, doubtful })
+        Some(Areas { t: t.to_array(), v: v.to_array(), w: w.to_array(), det: det.to_array(), hits, on_edge })
     }
 
     /// Tests `count` (1 … 8) triangles. Their coordinates lie in `values` from `start` on, in nine runs of

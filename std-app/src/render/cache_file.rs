@@ -257,7 +257,7 @@ mod tests {
             overlap: 1.5,
             reach: 0.3,
             error: f32::INFINITY,
-            fence: [7; SECTORS],
+            boundary: [7; SECTORS],
             ..Record::default()
         }
     }

@@ -51,7 +51,7 @@ pub(super) fn held_out<F: Features>(
     let passed = executor.pass(places.chunks_mut(PIXELS), |task, out, _| {
         let mut counters = Counters::default();
         tracer.places(&order, (task * PIXELS) as u64, (SAMPLE, Via::Specular), out, &mut counters);
-        tracer.look_up(out, &mut counters);
+        tracer.measure_overhangs(out, &mut counters);
         Ok(counters)
     })?;
     if !passed.is_complete {

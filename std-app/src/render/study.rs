@@ -161,7 +161,7 @@ fn judge(metric: Metric, error: f32, cache: &IrradianceCache, points: &[Point]) 
     let mean = points.iter().map(|point| point.exact).sum::<f64>() / points.len().max(1) as f64;
     let (mut squares, mut variance, mut predicted, mut relative) = (0.0, 0.0, 0.0, Vec::new());
     for Point { place, exact, variance: noise, .. } in points {
-        let Some(found) = cache.at(&place.asker()) else { continue };
+        let Some(found) = cache.at(&place.query()) else { continue };
         let difference = luminance(found.irradiance) - exact;
         squares += difference * difference - noise;
         variance += noise;

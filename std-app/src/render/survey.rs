@@ -140,7 +140,7 @@ pub(super) fn survey<F: Features>(
     let passed = executor.pass(found.chunks_mut(PIXELS), |task, out, _| {
         let (mut counters, mut places) = (Counters::default(), [GatherPoint::NONE; PIXELS]);
         tracer.places(&order, (task * PIXELS) as u64, (0, Via::Specular), &mut places, &mut counters);
-        tracer.look_up(&mut places, &mut counters);
+        tracer.measure_overhangs(&mut places, &mut counters);
         for (look, place) in out.iter_mut().zip(&places).filter(|(_, place)| place.is_some()) {
             *look = look_at(place, caches, step);
         }
@@ -225,7 +225,7 @@ pub(super) fn risks<F: Features>(
 fn said_at(place: &GatherPoint, caches: [&IrradianceCache; 2]) -> [f32; 2] {
     let (mut sum, mut squares, mut weights) = (0.0, 0.0, 0.0);
     for cache in caches {
-        cache.visit_values(&place.asker(), |said, weight| {
+        cache.visit_values(&place.query(), |said, weight| {
             let said = luminance(said) as f32;
             sum += weight * said;
             squares += weight * said * said;
@@ -243,7 +243,7 @@ fn look_at(place: &GatherPoint, caches: [&IrradianceCache; 2], step: u32) -> Loo
     let (position, pixel) = (place.position(), place.pixel() * step as f32);
     let mut mark = Mark::None;
     let [even, _] = caches;
-    even.visit(&place.asker(), |record, _| {
+    even.visit(&place.query(), |record, _| {
         let [r1, r2] = record.radii;
         let distance = position.distance(record.position.into());
         if distance < MIDDLE * pixel {
@@ -268,7 +268,7 @@ pub(super) fn means(
 ) -> [f32; 2] {
     let (mut sums, mut weights) = ([0.0; 2], 0.0);
     for cache in caches {
-        cache.visit(&place.asker(), |record, weight| {
+        cache.visit(&place.query(), |record, weight| {
             let values = of(record);
             sums.iter_mut().zip(values).for_each(|(sum, value)| *sum += weight * value);
             weights += weight;
@@ -281,7 +281,7 @@ pub(super) fn means(
 /// records.
 fn check(point: &Point, mean: f64, caches: [&IrradianceCache; 2]) -> Option<(Check, f64)> {
     let Point { place, pixel, exact, variance } = point;
-    let said = caches.map(|cache| cache.at(&place.asker()));
+    let said = caches.map(|cache| cache.at(&place.query()));
     let said: Vec<f64> = said.into_iter().flatten().map(|said| luminance(said.irradiance)).collect();
     if said.is_empty() {
         return None;

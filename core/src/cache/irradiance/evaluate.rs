@@ -1,7 +1,7 @@
 //! Extrapolated irradiance and weight of a record at one or sixteen points.
 
 use super::lanes::{One, Query, QueryPoint, RecordWeight, Width};
-use super::record::{FINE, Record, SECTORS, sector};
+use super::record::{OVERHANG_RADIUS_FACTOR, Record, SECTORS, sector};
 use crate::Rgb;
 use glam::Vec3;
 use halflight_simd::{Lanes, Mask, dot};
@@ -46,7 +46,7 @@ impl Record {
         let free = width.pick(&self.free, sector(width, place));
         let distance = free * width.all(self.reach / f32::from(u8::MAX));
         let [x, y] = place;
-        let (square, least) = (x * x + y * y, FINE * self.least);
+        let (square, least) = (x * x + y * y, OVERHANG_RADIUS_FACTOR * self.least);
         let is_exposed = free.lt(width.all(f32::from(u8::MAX))) & (distance * distance).lt(square);
         square.max(width.all(least * least)).select(is_exposed, width.all(0.0))
     }
@@ -86,7 +86,7 @@ impl Record {
         let height = all(0.5) * (dot(offset, query.normal) + z);
         let is_valid = near & square.lt(one) & !height.lt(all(-IN_FRONT * r1));
         weight.place = [x, y];
-        let least = (x * x + y * y).sqrt().max(all(FINE * self.least));
+        let least = (x * x + y * y).sqrt().max(all(OVERHANG_RADIUS_FACTOR * self.least));
         let is_valid = is_valid & !query.within.lt(least);
         let is_valid =
             if self.is_fenced() { is_valid & !self.is_fenced_off(width, weight.place) } else { is_valid };
@@ -137,13 +137,13 @@ impl Record {
     /// True if any sector has a wall within the support.
     #[inline(always)]
     fn is_fenced(&self) -> bool {
-        self.fence != [u8::MAX; SECTORS]
+        self.boundary != [u8::MAX; SECTORS]
     }
 
     /// True for points at `place` along the axes that a wall separates from the record.
     #[inline(always)]
     fn is_fenced_off<W: Width>(&self, width: W, place: [W::L; 2]) -> <W::L as Lanes>::Mask {
-        let free = width.pick(&self.fence, sector(width, place));
+        let free = width.pick(&self.boundary, sector(width, place));
         let distance = free * width.all(self.reach / f32::from(u8::MAX));
         let [x, y] = place;
         free.lt(width.all(f32::from(u8::MAX))) & (distance * distance).lt(x * x + y * y)
@@ -224,7 +224,7 @@ mod tests {
             assert!((Record::sector(place) - (i as f32 + 0.5)).abs() < 1e-5);
             assert!(place.extend(0.0).distance(world) < 1e-6);
         }
-        record.fence_off(Vec2::new(0.0, 1.0), 0.5);
+        record.limit_boundary(Vec2::new(0.0, 1.0), 0.5);
         let at = |x, y| record.at(&QueryPoint::open(Vec3::new(x, y, 0.0), Vec3::Z), LEAST_COS).is_some();
         assert!(at(0.01, 0.49) && !at(0.01, 0.51) && at(-0.01, 0.51) && at(0.01, -0.51) && at(0.51, 0.0));
         let bounds = record.extent();
@@ -240,7 +240,10 @@ mod tests {
         let fine = record();
         assert!(at(&fine, 0.5, f32::INFINITY) && at(&fine, 0.5, 0.51) && !at(&fine, 0.5, 0.49));
         let coarse = Record { least: 0.1, ..fine };
-        assert!(at(&coarse, 0.1, FINE * 0.101) && !at(&coarse, 0.1, FINE * 0.099));
+        assert!(
+            at(&coarse, 0.1, OVERHANG_RADIUS_FACTOR * 0.101)
+                && !at(&coarse, 0.1, OVERHANG_RADIUS_FACTOR * 0.099)
+        );
         assert!(at(&coarse, 0.5, f32::INFINITY));
     }
 
@@ -252,12 +255,12 @@ mod tests {
         };
         assert!(record.is_free() && exposed(&record, 0.9, 0.0) == 0.0);
         let sector = Record::sector(Vec2::new(0.9, 0.1)) as i32;
-        record.note_overhang([sector, sector], 0.5);
+        record.add_overhang([sector, sector], 0.5);
         assert!(!record.is_free() && exposed(&record, 0.4, 0.05) == 0.0);
         assert!((exposed(&record, 0.8, 0.08) - 0.8f32.hypot(0.08)).abs() < 1e-6);
         assert_eq!((exposed(&record, 0.0, 0.9), exposed(&record, -0.9, 0.1)), (0.0, 0.0));
         // Beyond the whole circle, no further.
-        record.note_overhang([-1, 40], 0.0);
+        record.add_overhang([-1, 40], 0.0);
         assert_eq!(record.free, [0; SECTORS]);
         assert_eq!(record.farthest(), f32::INFINITY);
         record.confine(0.5);

@@ -20,8 +20,8 @@ pub struct QueryPoint {
     pub position: Vec3,
     /// Unit surface normal.
     pub normal: Vec3,
-    /// Maximum distance along the surface of valid records, due to an overhang: [`super::CLOSE`] times its
-    /// height. Infinite if the height is unknown.
+    /// Maximum distance along the surface of valid records, due to an overhang:
+    /// [`super::OVERHANG_DISTANCE_FACTOR`] times its height. Infinite if the height is unknown.
     pub within: f32,
 }
 

@@ -19,7 +19,7 @@ pub use hemisphere::{Hemisphere, SIDE_MAX};
 pub use lanes::QueryPoint;
 pub use metric::Metric;
 pub use packet::Points;
-pub use record::{CLOSE, FINE, Record, SECTORS};
+pub use record::{OVERHANG_DISTANCE_FACTOR, OVERHANG_RADIUS_FACTOR, Record, SECTORS};
 pub use store::{CachedIrradiance, GREATEST_DEVIATION, IrradianceCache};
 pub use validity::{Validity, validity};
 

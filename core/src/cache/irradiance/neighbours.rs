@@ -9,16 +9,16 @@ use crate::light::luminance;
 use glam::Vec3;
 
 /// Minimum cosine of the normals of records that clamp each other, 60 degrees.
-const ALIKE: f32 = 0.5;
+const MIN_NORMAL_COSINE: f32 = 0.5;
 
 /// Standard deviations of noise within which contradicting records may both be right.
-const EXCUSED: f32 = 3.0;
+const NOISE_DEVIATIONS: f32 = 3.0;
 
 /// Variance of a gradient over the product of the irradiance's variance and the mean of 1/t².
-const STEEP: f32 = 16.0;
+const GRADIENT_VARIANCE: f32 = 16.0;
 
 /// Maximum number of neighbours to which a new record is compared.
-const MOST_COMPARED: usize = 32;
+const MAX_COMPARED: usize = 32;
 
 /// Records of a cache, and the octree over them.
 pub(super) struct Neighbours<'a, 'm> {
@@ -38,7 +38,7 @@ impl Neighbours<'_, '_> {
             return;
         }
         let position = Vec3::from(new.position);
-        let mut found = [(0u32, [0.0f32; 2]); MOST_COMPARED];
+        let mut found = [(0u32, [0.0f32; 2]); MAX_COMPARED];
         let mut count = 0;
         let (records, least_cos) = (&*self.records, self.least_cos);
         // Curvatures of the errors of the new record and of the other.
@@ -49,23 +49,23 @@ impl Neighbours<'_, '_> {
                 *slot = (index, curvatures);
                 count += 1;
             }
-            count < MOST_COMPARED
+            count < MAX_COMPARED
         };
         let this = *new;
         self.tree.at(position, |index| {
             let other = records.get(index as usize);
-            note(index, [0.0, other.map_or(0.0, |other| other.misses(&this, least_cos))])
+            note(index, [0.0, other.map_or(0.0, |other| other.contradiction(&this, least_cos))])
         });
         self.tree.around(position, new.extent().max_element(), |index| {
             let other = records.get(index as usize);
-            note(index, [other.map_or(0.0, |other| this.misses(other, least_cos)), 0.0]);
+            note(index, [other.map_or(0.0, |other| this.contradiction(other, least_cos)), 0.0]);
         });
         for &(index, [of_new, of_other]) in found.iter().take(count) {
             let radius = radius(new.allowed, of_new.max(of_other));
-            new.learn(of_new);
+            new.raise_error(of_new);
             new.shrink(radius.max(new.least));
             if let Some(other) = self.records.get_mut(index as usize) {
-                other.learn(of_other);
+                other.raise_error(of_other);
                 other.shrink(radius.max(other.least));
                 let (position, normal, radius) = (other.position.into(), other.normal.into(), other.radii[0]);
                 self.clamp_around(position, normal, radius);
@@ -108,13 +108,13 @@ impl Neighbours<'_, '_> {
 impl Record {
     /// Distance to `position`, if a surface there has a similar normal.
     fn distance_to(&self, position: Vec3, normal: Vec3) -> Option<f32> {
-        let alike = normal.dot(Vec3::from(self.normal)) > ALIKE;
+        let alike = normal.dot(Vec3::from(self.normal)) > MIN_NORMAL_COSINE;
         alike.then(|| position.distance(Vec3::from(self.position)))
     }
 
     /// Curvature, relative to the irradiance, that explains the error of this record at the position of
     /// `other`. Zero without error, or if noise or the radii of both explain it.
-    fn misses(&self, other: &Record, least_cos: f32) -> f32 {
+    fn contradiction(&self, other: &Record, least_cos: f32) -> f32 {
         let (place, normal) = (Vec3::from(other.position), Vec3::from(other.normal));
         // The boundary of `other` reflects a close overhang.
         let point = QueryPoint { position: place, normal, within: other.farthest() };
@@ -122,16 +122,19 @@ impl Record {
         let (here, there) = (luminance(self.irradiance.into()), luminance(other.irradiance.into()));
         let square = place.distance_squared(self.position.into());
         // The gradient is noisy as well.
-        let noise =
-            there * there * other.noise + here * here * self.noise * (1.0 + STEEP * self.nearness * square);
-        let excess = (there - luminance(said)).abs() - EXCUSED * libm::sqrtf(noise);
+        let noise = there * there * other.noise
+            + here
+                * here
+                * self.noise
+                * (1.0 + GRADIENT_VARIANCE * self.mean_square_inverse_distance * square);
+        let excess = (there - luminance(said)).abs() - NOISE_DEVIATIONS * libm::sqrtf(noise);
         let curvature = 2.0 * excess / (square * here.max(there));
         let shrinks = radius(self.allowed, curvature) < self.radii[0].max(other.radii[0]);
         if excess > 0.0 && shrinks { curvature } else { 0.0 }
     }
 
     /// Raises the error by a curvature that the extrapolation missed.
-    fn learn(&mut self, curvature: f32) {
+    fn raise_error(&mut self, curvature: f32) {
         let [r1, r2] = self.radii;
         self.error = self.error.max(curvature * (r1 * r1 + r2 * r2) / 8.0);
     }

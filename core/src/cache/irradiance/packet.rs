@@ -57,7 +57,8 @@ impl IrradianceCache<'_> {
         if points.wanted == 0 {
             return [0.0; POINTS];
         }
-        let [red, green, blue, shining, weights, exposed] = level.dispatch(Ask { cache: self, points });
+        let [red, green, blue, shining, weights, exposed] =
+            level.dispatch(PacketQuery { cache: self, points });
         let mut left = points.wanted;
         while left != 0 {
             let i = left.trailing_zeros() as usize % POINTS;
@@ -75,12 +76,12 @@ impl IrradianceCache<'_> {
 /// Query of sixteen points. Its result is, over all valid records, the weighted sums of irradiance per
 /// channel and of `shining`, the sum of weights, and the maximum squared distance to records that an overhang
 /// may make invalid.
-struct Ask<'a> {
+struct PacketQuery<'a> {
     cache: &'a IrradianceCache<'a>,
     points: &'a Points,
 }
 
-impl Kernel for Ask<'_> {
+impl Kernel for PacketQuery<'_> {
     type Out = [[f32; POINTS]; 6];
 
     #[inline(always)]
@@ -186,7 +187,7 @@ mod tests {
             noise: 0.01 * number(13),
             error: number(14),
             shining: number(15),
-            fence: core::array::from_fn(|k| if number(16) < 0.3 { 255 } else { (200 + 4 * k) as u8 }),
+            boundary: core::array::from_fn(|k| if number(16) < 0.3 { 255 } else { (200 + 4 * k) as u8 }),
             free: core::array::from_fn(|k| if number(17) < 0.3 { 255 } else { (100 + 4 * k) as u8 }),
             least: 0.01 * number(18),
             ..Record::default()

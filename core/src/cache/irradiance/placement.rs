@@ -72,7 +72,7 @@ impl Floor {
             if !cache.covers(&QueryPoint::open(self.points[i], Vec3::Z)) {
                 let reach = validity(&settings, &derivatives[i]);
                 let mut record = Record::new(self.points[i], &frame, &derivatives[i], &reach);
-                record.note_noise(self.noise[i]);
+                record.set_noise(self.noise[i]);
                 cache.insert(record);
             }
         }

@@ -18,19 +18,19 @@ pub const SECTORS: usize = 16;
 /// Overlap over the cube root of the relative noise, and maximum overlap. These values minimise the error in
 /// the Cornell box with 4096 rays and 500 to 5000 records.
 const NOISE_TO_OVERLAP: f32 = 8.0;
-const MOST_OVERLAP: f32 = 2.0;
+const MAX_OVERLAP: f32 = 2.0;
 
 /// Fraction of the error predicted by the Hessian that remains where several records overlap, and maximum of
 /// the error before this factor, since extrapolation is clamped.
-const MISSED: f32 = 0.5;
-const MOST_MISSED: f32 = 0.3;
+const OVERLAP_ERROR_FRACTION: f32 = 0.5;
+const MAX_EXTRAPOLATION_ERROR: f32 = 0.3;
 
 /// Maximum distance of a valid record from a point below an overhang, over the height of the overhang, since
 /// light changes over such a distance there.
-pub const CLOSE: f32 = 2.0;
+pub const OVERHANG_DISTANCE_FACTOR: f32 = 2.0;
 
 /// Ratio of that distance to the largest minimum radius of a valid record; larger records are too coarse.
-pub const FINE: f32 = 4.0;
+pub const OVERHANG_RADIUS_FACTOR: f32 = 4.0;
 
 /// Irradiance record; see the file.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
@@ -58,7 +58,7 @@ pub struct Record {
     /// Unit of the boundary: the longer radius of the initial support.
     pub reach: f32,
     /// Distance to the nearest wall per sector, in 255ths of `reach`; 255 if there is none within `reach`.
-    pub fence: [u8; SECTORS],
+    pub boundary: [u8; SECTORS],
     /// E_i in W/m², without direct light of emitters.
     pub irradiance: [f32; 3],
     /// ∇E_i of each channel along the two axes, in W/m² per unit of length.
@@ -70,7 +70,7 @@ pub struct Record {
     /// Fraction of strata that see emitters or the environment directly.
     pub shining: f32,
     /// Mean of 1/t² over the strata, in 1/m².
-    pub nearness: f32,
+    pub mean_square_inverse_distance: f32,
     /// Minimum of R1 in m, whatever neighbours show.
     pub least: f32,
     /// Distance per sector, in 255ths of `reach`, up to which no overhang is so close above a point that the
@@ -108,10 +108,10 @@ impl Record {
             error,
             shining: 0.0,
             noise: 0.0,
-            nearness: derivatives.mean_square_inverse_distance,
+            mean_square_inverse_distance: derivatives.mean_square_inverse_distance,
             allowed: reach.allowed,
             least: reach.least,
-            fence: [u8::MAX; SECTORS],
+            boundary: [u8::MAX; SECTORS],
             free: [u8::MAX; SECTORS],
         }
     }
@@ -119,10 +119,10 @@ impl Record {
     /// Sets the relative variance of E_i. If supports may overlap, the overlap s follows from it: averaging
     /// over s radii leaves a noise of σ/s and an extrapolation error ∝ s², so the optimal s is ∝ σ^⅓. Records
     /// clamped to the minimum radius do not overlap.
-    pub fn note_noise(&mut self, noise: f32) {
+    pub fn set_noise(&mut self, noise: f32) {
         self.noise = noise;
         if self.allowed > 0.0 {
-            let wanted = (NOISE_TO_OVERLAP * libm::cbrtf(libm::sqrtf(noise))).clamp(1.0, MOST_OVERLAP);
+            let wanted = (NOISE_TO_OVERLAP * libm::cbrtf(libm::sqrtf(noise))).clamp(1.0, MAX_OVERLAP);
             self.overlap = if self.radii[0] > self.least { wanted } else { 1.0 };
             self.reach = self.radii[1] * self.overlap;
         }
@@ -135,7 +135,7 @@ impl Record {
         Self {
             radii: self.radii.map(|radius| factor * radius),
             reach: factor * self.reach,
-            fence: self.fence.map(narrow),
+            boundary: self.boundary.map(narrow),
             free: [u8::MAX; SECTORS],
             gradient: self.gradient.map(|channel| channel.map(|slope| slope / factor)),
             bend: self.bend.map(|bend| bend / (factor * factor)),
@@ -148,7 +148,7 @@ impl Record {
     /// overlapping records, and extrapolation error. A normal deviate of variance 1 has the mean magnitude
     /// √(2/π).
     pub fn predicted(&self) -> f32 {
-        let missed = MISSED * self.error.min(MOST_MISSED);
+        let missed = OVERLAP_ERROR_FRACTION * self.error.min(MAX_EXTRAPOLATION_ERROR);
         let variance = self.noise / (self.overlap * self.overlap) + missed * missed;
         libm::sqrtf(core::f32::consts::FRAC_2_PI * variance)
     }
@@ -184,7 +184,7 @@ impl Record {
 
     /// Stores an overhang above the sectors `first` to `last`, which may exceed 16 around the circle; it may
     /// invalidate this record at points farther than `distance`.
-    pub fn note_overhang(&mut self, [first, last]: [i32; 2], distance: f32) {
+    pub fn add_overhang(&mut self, [first, last]: [i32; 2], distance: f32) {
         let share = (distance / self.reach).clamp(0.0, 1.0);
         for sector in first..=last.min(first + SECTORS as i32 - 1) {
             if let Some(free) = self.free.get_mut(sector.rem_euclid(SECTORS as i32) as usize) {
@@ -195,7 +195,7 @@ impl Record {
 
     /// Maximum distance of valid points by the boundary.
     pub fn farthest(&self) -> f32 {
-        match self.fence.iter().max() {
+        match self.boundary.iter().max() {
             Some(&most) if most < u8::MAX => f32::from(most) * (self.reach / f32::from(u8::MAX)),
             _ => f32::INFINITY,
         }
@@ -204,14 +204,14 @@ impl Record {
     /// Limits the boundary to `distance` in all directions.
     pub fn confine(&mut self, distance: f32) {
         let share = (distance / self.reach).clamp(0.0, 1.0);
-        self.fence = self.fence.map(|free| free.min((share * 255.0) as u8));
+        self.boundary = self.boundary.map(|free| free.min((share * 255.0) as u8));
     }
 
     /// Stores a wall at `distance` from the record, in the direction of `place` along its axes.
-    pub fn fence_off(&mut self, place: Vec2, distance: f32) {
+    pub fn limit_boundary(&mut self, place: Vec2, distance: f32) {
         let share = (distance / self.reach).clamp(0.0, 1.0);
-        if let Some(fence) = self.fence.get_mut(sector(One, place.to_array()) as usize) {
-            *fence = (*fence).min((share * 255.0) as u8);
+        if let Some(boundary) = self.boundary.get_mut(sector(One, place.to_array()) as usize) {
+            *boundary = (*boundary).min((share * 255.0) as u8);
         }
     }
 
@@ -260,7 +260,7 @@ pub(super) mod tests {
             radii: [1.0, 2.0],
             overlap: 1.0,
             reach: 2.0,
-            fence: [u8::MAX; SECTORS],
+            boundary: [u8::MAX; SECTORS],
             free: [u8::MAX; SECTORS],
             ..Record::default()
         }
@@ -270,14 +270,14 @@ pub(super) mod tests {
     fn the_noisier_a_record_the_wider_its_support() {
         let overlap = |noise, allowed| {
             let mut record = Record { allowed, ..record() };
-            record.note_noise(noise);
+            record.set_noise(noise);
             assert_eq!(record.reach, record.radii[1] * record.overlap);
             record.overlap
         };
-        assert_eq!((overlap(0.0, 1.0), overlap(1.0, 1.0), overlap(1.0, 0.0)), (1.0, MOST_OVERLAP, 1.0));
+        assert_eq!((overlap(0.0, 1.0), overlap(1.0, 1.0), overlap(1.0, 0.0)), (1.0, MAX_OVERLAP, 1.0));
         // 0.008 is 0.2 cubed.
         assert!((overlap(0.008 * 0.008, 1.0) - 0.2 * NOISE_TO_OVERLAP).abs() < 1e-5);
-        assert_eq!(overlap(f32::MAX, 1.0), MOST_OVERLAP);
+        assert_eq!(overlap(f32::MAX, 1.0), MAX_OVERLAP);
     }
 
     #[test]

@@ -266,7 +266,7 @@ mod tests {
             radii: [radius, 1.5 * radius],
             overlap: 1.0,
             reach: 1.5 * radius,
-            fence: [u8::MAX; SECTORS],
+            boundary: [u8::MAX; SECTORS],
             free: [u8::MAX; SECTORS],
             ..Record::default()
         }

@@ -46,21 +46,21 @@ pub fn validity(settings: &Settings, derivatives: &Derivatives) -> Validity {
     // A black or invalid record has no meaningful gradient.
     let lit = irradiance > 0.0 && irradiance.is_finite() && slope.is_finite();
     let flat = if lit && slope > 0.0 { irradiance / slope } else { f32::INFINITY };
-    let circle = |distance: f32| (Bent::default(), [settings.error * distance; 2]);
-    let (bent, radii) = match settings.metric {
+    let circle = |distance: f32| (PrincipalCurvatures::default(), [settings.error * distance; 2]);
+    let (principal, radii) = match settings.metric {
         Metric::SplitSphere => circle(derivatives.harmonic_mean_distance),
         Metric::BoundedSplitSphere => circle(derivatives.harmonic_mean_distance.min(flat)),
         Metric::MinDistance => circle(derivatives.min_distance),
         _ => {
-            let bent = curvatures(settings, derivatives, lit);
+            let principal = curvatures(settings, derivatives, lit);
             let allowed = settings.error * settings.extent * settings.extent;
-            let [short, long] = bent.curvature.map(|l| radius(allowed, l));
+            let [short, long] = principal.curvature.map(|l| radius(allowed, l));
             // The gradient may show what the Hessian cannot: a radiance edge behind an occluder's edge.
             let bound = if settings.metric == Metric::Halflight { flat } else { f32::INFINITY };
-            (bent, [short.min(bound), long])
+            (principal, [short.min(bound), long])
         }
     };
-    let Bent { axis, curvature, signed } = bent;
+    let PrincipalCurvatures { axis, curvature, signed } = principal;
     let wanted = radii;
     let radii = clamped(settings, radii);
     // Radii enlarged to the minimum keep the change of light over the wanted radii: a pixel shows no more,
@@ -93,7 +93,7 @@ pub(super) fn radius(allowed: f32, l: f32) -> f32 {
 }
 
 /// Eigenvalues of a Hessian, and curvatures derived from them.
-struct Bent {
+struct PrincipalCurvatures {
     /// Axis of the larger eigenvalue.
     axis: Vec2,
     /// Magnitudes relative to the irradiance, the larger first, by the rules of the metric.
@@ -102,7 +102,7 @@ struct Bent {
     signed: [f32; 2],
 }
 
-impl Default for Bent {
+impl Default for PrincipalCurvatures {
     fn default() -> Self {
         Self { axis: Vec2::X, curvature: [0.0; 2], signed: [0.0; 2] }
     }
@@ -110,7 +110,7 @@ impl Default for Bent {
 
 /// Relative curvatures of the irradiance along the axes, the larger first, from the Hessian by the rules of
 /// the metric.
-fn curvatures(settings: &Settings, derivatives: &Derivatives, lit: bool) -> Bent {
+fn curvatures(settings: &Settings, derivatives: &Derivatives, lit: bool) -> PrincipalCurvatures {
     let irradiance = derivatives.luminance();
     let against = settings.against.unwrap_or(irradiance);
     match settings.metric {
@@ -123,13 +123,13 @@ fn curvatures(settings: &Settings, derivatives: &Derivatives, lit: bool) -> Bent
         Metric::OcclusionHessian => relative(derivatives.open_hessian, PI),
         Metric::Halflight => {
             let near = derivatives.mean_square_inverse_distance;
-            let bent = relative(derivatives.hessian, against);
-            let [large, small] = bent.curvature;
+            let principal = relative(derivatives.hessian, against);
+            let [large, small] = principal.curvature;
             let floor = settings.floor * near;
             match lit && large.is_finite() {
-                true => Bent { curvature: [large + floor, small + floor], ..bent },
+                true => PrincipalCurvatures { curvature: [large + floor, small + floor], ..principal },
                 // The distances bound how fast light may come into sight.
-                false => Bent { curvature: [near; 2], ..Bent::default() },
+                false => PrincipalCurvatures { curvature: [near; 2], ..PrincipalCurvatures::default() },
             }
         }
         _ => relative(derivatives.hessian, against),
@@ -138,11 +138,11 @@ fn curvatures(settings: &Settings, derivatives: &Derivatives, lit: bool) -> Bent
 
 /// Axis and magnitudes of the eigenvalues of `hessian`/`irradiance`. A zero eigenvalue is zero relative to
 /// any irradiance.
-fn relative(hessian: Hessian, irradiance: f32) -> Bent {
+fn relative(hessian: Hessian, irradiance: f32) -> PrincipalCurvatures {
     let Eigen2 { values, axis } = symmetric2(|x| x, [hessian.xx, hessian.xy, hessian.yy]);
     let axis = Vec2::from(axis);
     let curvature = values.map(|l| if l == 0.0 { 0.0 } else { l.abs() / irradiance });
-    Bent { axis: if axis.is_finite() { axis } else { Vec2::X }, curvature, signed: values }
+    PrincipalCurvatures { axis: if axis.is_finite() { axis } else { Vec2::X }, curvature, signed: values }
 }
 
 /// Radii within limits: the longer at most `aspect` times the shorter, then both from `least` to `most`; NaN

@@ -22,16 +22,16 @@ const SECOND_SLOPE: f32 = 0.12;
 
 /// Slope below which hits of gather rays cover so little of the hemisphere that gradient and Hessian do not
 /// account for the area beneath.
-const LOW: f32 = 0.5;
+const MAX_SLOPE: f32 = 0.5;
 
 /// A hit below this fraction of the wall distance beside it is an overhang: walls do not come nearer between
 /// two rays of a ring.
-const NEARER: f32 = 0.95;
+const WALL_FRACTION: f32 = 0.95;
 
 impl<F: Features, E: Estimator<F>> PathIntegrator<'_, F, E> {
     /// Finds walls around a record at `place` by rays, and overhangs around it from the hits of its `strata`,
     /// which are local to `frame`.
-    pub(in crate::transport) fn fence(
+    pub(in crate::transport) fn find_boundary(
         &self,
         record: &mut Record,
         place: &GatherPoint,
@@ -39,15 +39,16 @@ impl<F: Features, E: Estimator<F>> PathIntegrator<'_, F, E> {
         strata: &HemisphereSamples,
         counters: &mut Counters,
     ) {
-        let walls = self.fence_along(record, place, counters);
+        let walls = self.find_walls(record, place, counters);
         for (&direction, &inverse) in strata.directions.iter().zip(&*strata.inverse_distance) {
             let direction = Vec3::from(direction);
             let along = direction.truncate().length();
             // Lower rays may hit the surface's own curvature; the surface itself has distance 0.
-            let hangs = (SLOPE * along..LOW * along).contains(&direction.z) && inverse.is_finite();
-            if hangs && along < record.reach * inverse {
+            let is_overhang =
+                (SLOPE * along..MAX_SLOPE * along).contains(&direction.z) && inverse.is_finite();
+            if is_overhang && along < record.reach * inverse {
                 let towards = record.along_axes(frame.to_world(direction));
-                hang(record, &walls, towards, along / inverse);
+                limit_at_overhang(record, &walls, towards, along / inverse);
             }
         }
     }
@@ -62,13 +63,13 @@ impl<F: Features, E: Estimator<F>> PathIntegrator<'_, F, E> {
         counters: &mut Counters,
     ) -> Record {
         let mut wide = record.widened(factor);
-        self.fence_along(&mut wide, place, counters);
-        self.note_overhangs(&mut wide, place);
+        self.find_walls(&mut wide, place, counters);
+        self.add_overhangs(&mut wide, place);
         wide
     }
 
     /// Finds walls by rays along the surface and returns the distance per ray.
-    fn fence_along(&self, record: &mut Record, place: &GatherPoint, counters: &mut Counters) -> [f32; RING] {
+    fn find_walls(&self, record: &mut Record, place: &GatherPoint, counters: &mut Counters) -> [f32; RING] {
         let origin = place.position() + place.error * Vec3::from(place.geometric_normal);
         let rays: [Ray; 2 * RING] = core::array::from_fn(|i| {
             let along = record.towards(azimuth(i)).1.normalize_or_zero();
@@ -87,9 +88,9 @@ impl<F: Features, E: Estimator<F>> PathIntegrator<'_, F, E> {
             match walls.get_mut(i) {
                 Some(wall) => {
                     *wall = hit.t;
-                    record.fence_off(towards, hit.t);
+                    record.limit_boundary(towards, hit.t);
                 }
-                None => hang(record, &walls, towards, hit.t),
+                None => limit_at_overhang(record, &walls, towards, hit.t),
             }
         }
         walls
@@ -103,10 +104,10 @@ fn azimuth(i: usize) -> f32 {
 
 /// Limits the record at `distance` in the direction `towards`, if that is nearer than the walls hit by the
 /// adjacent rays of the first ring.
-fn hang(record: &mut Record, walls: &[f32; RING], towards: Vec2, distance: f32) {
+fn limit_at_overhang(record: &mut Record, walls: &[f32; RING], towards: Vec2, distance: f32) {
     let after = (Record::sector(towards) * RAYS_PER_SECTOR as f32 + 0.5) as usize;
     let wall = walls[(after + RING - 1) % RING].min(walls[after % RING]);
-    if distance < NEARER * wall {
-        record.fence_off(towards, distance);
+    if distance < WALL_FRACTION * wall {
+        record.limit_boundary(towards, distance);
     }
 }

@@ -7,7 +7,9 @@
 
 use crate::bsdf::Features;
 use crate::bvh::Coherence;
-use crate::cache::irradiance::{CellFlux, FINE, Hemisphere, QueryPoint, Record, metric, validity};
+use crate::cache::irradiance::{
+    CellFlux, Hemisphere, OVERHANG_RADIUS_FACTOR, QueryPoint, Record, metric, validity,
+};
 use crate::geometry::{Frame, Hit, MISS, Ray};
 use crate::memory::{Arena, Footprint, OutOfMemory};
 use crate::sampling::Sampler;
@@ -83,13 +85,13 @@ impl GatherPoint {
     }
 
     /// Query of this point to a cache.
-    pub fn asker(&self) -> QueryPoint {
+    pub fn query(&self) -> QueryPoint {
         QueryPoint { position: self.position(), normal: self.normal(), within: self.within }
     }
 
     /// True if an overhang is so close that records with radii of `pixels` pixels are too coarse.
     pub fn is_confined(&self, pixels: f32) -> bool {
-        self.within < FINE * pixels * self.pixel
+        self.within < OVERHANG_RADIUS_FACTOR * pixels * self.pixel
     }
 
     /// Shading normal.
@@ -206,7 +208,7 @@ impl<F: Features, E: Estimator<F>> PathIntegrator<'_, F, E> {
         while first < n * n {
             let count = (n * n - first).min(wave.wave.paths.len());
             for i in 0..count {
-                let (ray, path) = self.aim(place, &frame, number, first + i, &mut strata);
+                let (ray, path) = self.generate_gather_ray(place, &frame, number, first + i, &mut strata);
                 wave.wave.rays[i] = Ray { tag: i as u32, ..ray };
                 wave.wave.paths[i] = path;
                 wave.begin(i, 0);
@@ -215,7 +217,7 @@ impl<F: Features, E: Estimator<F>> PathIntegrator<'_, F, E> {
             let coherence = if n >= NARROW { Coherence::Coherent } else { Coherence::Incoherent };
             wave.wave.trace(&self.context, count, coherence, counters);
             for (path, hit) in wave.wave.paths.iter().zip(&*wave.wave.hits).take(count) {
-                self.note(path.place as usize, hit, &frame, &mut strata);
+                self.store_hit(path.place as usize, hit, &frame, &mut strata);
             }
             self.trace_to_end(&mut wave, count, counters);
             for path in wave.wave.paths.iter().take(count) {
@@ -237,15 +239,15 @@ impl<F: Features, E: Estimator<F>> PathIntegrator<'_, F, E> {
         let reach = validity(&settings, &derivatives);
         let mut record = Record::new(place.position(), &frame, &derivatives, &reach);
         let luminance = derivatives.luminance();
-        record.note_noise(if luminance > 0.0 { variance / (luminance * luminance) } else { 0.0 });
+        record.set_noise(if luminance > 0.0 { variance / (luminance * luminance) } else { 0.0 });
         record.shining = strata.shining as f32 / (n * n) as f32;
-        self.fence(&mut record, place, &frame, &strata, counters);
-        self.note_overhangs(&mut record, place);
+        self.find_boundary(&mut record, place, &frame, &strata, counters);
+        self.add_overhangs(&mut record, place);
         Ok(Some(record))
     }
 
     /// Ray `i` of a gather, and its path.
-    fn aim(
+    fn generate_gather_ray(
         &self,
         place: &GatherPoint,
         frame: &Frame,
@@ -267,7 +269,7 @@ impl<F: Features, E: Estimator<F>> PathIntegrator<'_, F, E> {
     }
 
     /// Stores distance, emission and normal of the hit of a stratum.
-    fn note(&self, stratum: usize, hit: &Hit, frame: &Frame, strata: &mut HemisphereSamples) {
+    fn store_hit(&self, stratum: usize, hit: &Hit, frame: &Frame, strata: &mut HemisphereSamples) {
         if let Some(slot) = strata.inverse_distance.get_mut(stratum) {
             *slot = 1.0 / hit.t;
         }

@@ -6,7 +6,7 @@
 
 use crate::bsdf::Features;
 use crate::bvh::Coherence;
-use crate::cache::irradiance::{CLOSE, FINE, Record, SECTORS};
+use crate::cache::irradiance::{OVERHANG_DISTANCE_FACTOR, OVERHANG_RADIUS_FACTOR, Record, SECTORS};
 use crate::geometry::{Frame, Hit, Ray};
 use crate::scene::{Surface, SurfacePoint};
 use crate::transport::cached::gather::GatherPoint;
@@ -17,27 +17,27 @@ use crate::transport::wavefront::BLOCK;
 use glam::{Vec2, Vec3};
 
 /// Maximum distance to records, in diagonals of the scene.
-const MOST: f32 = 0.25;
+const MAX_DISTANCE: f32 = 0.25;
 
 /// Directions of the upward probes: along the normal, and at 45 degrees to four sides.
-const WAYS: usize = 5;
-const TILTS: [[f32; 2]; WAYS] = [[0.0, 0.0], [1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]];
+const PROBES: usize = 5;
+const PROBE_TILTS: [[f32; 2]; PROBES] = [[0.0, 0.0], [1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]];
 
 /// Minimum cosine of an overhang's normal to the surface normal, 60 degrees; a steeper hit is a wall.
-const STEEPEST: f32 = 0.5;
+const MIN_OVERHANG_COSINE: f32 = 0.5;
 
-/// Minimum cosine of an overhang's plane to the normal of a record. It is lower than [`STEEPEST`], since the
-/// normals of a record and of a query point differ.
-const STEEP: f32 = 0.25;
+/// Minimum cosine of an overhang's plane to the normal of a record. It is lower than [`MIN_OVERHANG_COSINE`],
+/// since the normals of a record and of a query point differ.
+const MIN_PLANE_COSINE: f32 = 0.25;
 
 /// Maximum rise of an overhang's plane from the record to its hit, over the height there. A surface that
 /// curves upwards, with heights quadratic in the distance, has a ratio of 2.
-const BENDS: f32 = 1.8;
+const MAX_RISE: f32 = 1.8;
 
 /// Height below which a triangle belongs to the surface itself: in error bounds of its points, and as a
 /// fraction of the reach.
-const FLAT: f32 = 4.0;
-const FLATTEST: f32 = 2.5e-5;
+const FLAT_IN_ERRORS: f32 = 4.0;
+const FLAT_IN_REACH: f32 = 2.5e-5;
 
 /// Origin, axis and length of upward probes.
 #[derive(Clone, Copy)]
@@ -58,37 +58,41 @@ pub(super) fn within<F: Features>(
     let mut within = [f32::INFINITY; BLOCK];
     for ((within, point), exposed) in within.iter_mut().zip(points).zip(exposed) {
         if let Some(point) = point.filter(|_| *exposed > 0.0) {
-            counters.rays += WAYS as u64;
+            counters.rays += PROBES as u64;
             let normal = point.geometric_normal;
             let origin = point.position + point.error * normal;
-            *within = CLOSE * headroom(context, &Probe { origin, normal, length: exposed / CLOSE });
+            *within = OVERHANG_DISTANCE_FACTOR
+                * overhang_distance(
+                    context,
+                    &Probe { origin, normal, length: exposed / OVERHANG_DISTANCE_FACTOR },
+                );
         }
     }
     within
 }
 
 /// Distance to an overhang that occludes light; infinite if it exceeds the length of the probe.
-fn headroom<F: Features>(context: &SceneContext<F>, probe: &Probe) -> f32 {
+fn overhang_distance<F: Features>(context: &SceneContext<F>, probe: &Probe) -> f32 {
     let frame = Frame::from_normal(probe.normal);
-    let rays = TILTS.map(|[x, y]| {
+    let rays = PROBE_TILTS.map(|[x, y]| {
         let direction = frame.to_world(Vec3::new(x, y, 1.0)).normalize_or_zero();
         Ray::segment(probe.origin, direction, probe.length)
     });
-    let mut hits = [Hit::NONE; WAYS];
+    let mut hits = [Hit::NONE; PROBES];
     context.nearest_batch(&rays, Coherence::Incoherent, &mut hits);
-    let hanging = hits.iter().filter(|hit| hangs(context, hit, probe.normal));
+    let hanging = hits.iter().filter(|hit| is_overhang(context, hit, probe.normal));
     hanging.map(|hit| hit.t).fold(f32::INFINITY, f32::min)
 }
 
 /// True if `hit` is an overhang above a surface with this `normal`, and occludes light. Glass and cut-outs do
 /// not.
-fn hangs<F>(context: &SceneContext<F>, hit: &Hit, normal: Vec3) -> bool {
+fn is_overhang<F>(context: &SceneContext<F>, hit: &Hit, normal: Vec3) -> bool {
     let mesh = &context.scene.mesh;
     let Some(triangle) = mesh.triangles.get(hit.triangle as usize) else { return false };
     let [a, b, c] = mesh.corners(hit.triangle);
     let cos = (b - a).cross(c - a).normalize_or_zero().dot(normal);
     let material = context.scene.materials.get(triangle.material as usize);
-    cos.abs() > STEEPEST
+    cos.abs() > MIN_OVERHANG_COSINE
         && material.is_some_and(|material| {
             !matches!(material.surface, Surface::Dielectric { .. }) && !material.has_cutout()
         })
@@ -96,30 +100,30 @@ fn hangs<F>(context: &SceneContext<F>, hit: &Hit, normal: Vec3) -> bool {
 
 impl<F: Features, E: Estimator<F>> PathIntegrator<'_, F, E> {
     /// Measures the height of overhangs above each of `places`, up to the maximum distance to records.
-    pub fn look_up(&self, places: &mut [GatherPoint], counters: &mut Counters) {
-        let length = MOST * self.context.bvh.bounds().diagonal();
+    pub fn measure_overhangs(&self, places: &mut [GatherPoint], counters: &mut Counters) {
+        let length = MAX_DISTANCE * self.context.bvh.bounds().diagonal();
         for place in places.iter_mut().filter(|place| place.is_some()) {
-            counters.rays += WAYS as u64;
+            counters.rays += PROBES as u64;
             let normal = Vec3::from(place.geometric_normal);
             let origin = place.position() + place.error * normal;
-            let headroom = headroom(&self.context, &Probe { origin, normal, length });
-            place.within = (CLOSE * headroom).min(f32::MAX);
+            let overhang_distance = overhang_distance(&self.context, &Probe { origin, normal, length });
+            place.within = (OVERHANG_DISTANCE_FACTOR * overhang_distance).min(f32::MAX);
         }
     }
 
     /// Stores the overhangs above the support of a record at `place`, and above the place itself.
-    pub(in crate::transport) fn note_overhangs(&self, record: &mut Record, place: &GatherPoint) {
+    pub(in crate::transport) fn add_overhangs(&self, record: &mut Record, place: &GatherPoint) {
         record.confine(place.within);
-        let least = FINE * record.least;
+        let least = OVERHANG_RADIUS_FACTOR * record.least;
         // Higher overhangs do not matter; a tilted probe may hit one outside by as much as this height.
-        let height = record.reach.max(least) / CLOSE;
+        let height = record.reach.max(least) / OVERHANG_DISTANCE_FACTOR;
         let reach = record.reach + height;
         let (middle, normal) = (place.position(), Vec3::from(place.geometric_normal));
         let along = (Vec3::ONE - normal * normal).max(Vec3::ZERO).to_array().map(libm::sqrtf);
         let half = reach * Vec3::from(along) + 0.5 * height * normal.abs();
         let center = middle + 0.5 * height * normal;
         let [first, second] = record.axes();
-        let flat = FLAT * place.error.max(FLATTEST * reach);
+        let flat = FLAT_IN_ERRORS * place.error.max(FLAT_IN_REACH * reach);
         let mut noted = *record;
         let (lo, hi) = (center - half, center + half);
         let is_whole = self.context.bvh.overlapping(lo, hi, |corners| {
@@ -136,8 +140,12 @@ impl<F: Features, E: Estimator<F>> PathIntegrator<'_, F, E> {
             let local = |i: usize| Vec3::new(offsets[i].dot(first), offsets[i].dot(second), heights[i]);
             if let Some(overhang) = Overhang::of([0, 1, 2].map(local), reach, flat) {
                 let Overhang { sectors, from, height } = overhang;
-                let close = if CLOSE * height < least { 0.0 } else { CLOSE * height };
-                noted.note_overhang(sectors, close.max(from - height));
+                let close = if OVERHANG_DISTANCE_FACTOR * height < least {
+                    0.0
+                } else {
+                    OVERHANG_DISTANCE_FACTOR * height
+                };
+                noted.add_overhang(sectors, close.max(from - height));
             }
             true
         });
@@ -168,14 +176,14 @@ impl Overhang {
             return None;
         }
         let normal = (b - a).cross(c - a);
-        let is_steep = normal.z.abs() <= STEEP * normal.length();
+        let is_steep = normal.z.abs() <= MIN_PLANE_COSINE * normal.length();
         if is_steep {
             return None;
         }
         // Height of the triangle's plane above the centre, and its slope.
         let (middle, slope) = (normal.dot(a) / normal.z, normal.truncate().length() / normal.z.abs());
         let height = lowest.z.max(middle - reach * slope).max(0.0);
-        let bends = middle <= 0.0 && height - middle >= BENDS * height;
+        let bends = middle <= 0.0 && height - middle >= MAX_RISE * height;
         if bends {
             return None;
         }

@@ -65,8 +65,8 @@ impl<'a> PhotonLight<'a> {
         Self { kernel, ..self }
     }
 
-    /// This map with discs no wider than `min_photons` evenly spread photons require; an eighth of the radius may
-    /// do where photons are dense.
+    /// This map with discs no wider than `min_photons` evenly spread photons require; an eighth of the radius
+    /// may do where photons are dense.
     pub fn with_min_photons(self, min_photons: f32) -> Self {
         Self { min_photons, ..self }
     }
@@ -77,8 +77,8 @@ impl<'a> PhotonLight<'a> {
     }
 
     /// Radiance of reflected light from `point` to `wo`, at the end of a path of length `travelled` from the
-    /// camera; `None` if surfaces like `bsdf` store no photons. `rotation`, from 0 to 1, rotates the probes for
-    /// walls, which are not counted as rays.
+    /// camera; `None` if surfaces like `bsdf` store no photons. `rotation`, from 0 to 1, rotates the
+    /// probes for walls, which are not counted as rays.
     #[inline]
     pub(in crate::transport) fn reflected<F: Features>(
         &self,
@@ -202,7 +202,7 @@ pub(in crate::transport) fn reflected<F: Features>(
             ),
         };
     }
-    let seen = bsdf.seen_apart::<F>(wo, bsdf.is_varnished(context.separates_coats()));
+    let seen = bsdf.view_apart::<F>(wo, bsdf.is_varnished(context.separates_coats()));
     // The power of a photon includes the cosine to the triangle's normal, hence the division.
     let response = |from: Vec3| {
         let wi = point.frame.to_local(from);

@@ -39,7 +39,7 @@ pub enum PhotonFilter {
 impl PhotonFilter {
     /// True if the path stores a photon at `vertex`.
     #[inline]
-    pub(in crate::transport) fn leaves(self, state: &LightPathState, vertex: &Vertex) -> bool {
+    pub(in crate::transport) fn stores(self, state: &LightPathState, vertex: &Vertex) -> bool {
         vertex.bsdf.stores_photons()
             && match self {
                 PhotonFilter::All => true,
@@ -49,10 +49,10 @@ impl PhotonFilter {
 
     /// Continuation of the path behind `vertex`.
     #[inline]
-    pub(in crate::transport) fn onward(self, vertex: &Vertex, leaves: bool) -> Option<Continuation> {
+    pub(in crate::transport) fn continuation(self, vertex: &Vertex, stores: bool) -> Option<Continuation> {
         let ends = self == PhotonFilter::Caustic
             && (vertex.bsdf.stores_photons() || !vertex.bsdf.is_caustic_caster());
-        (!ends).then_some(Continuation { most: if leaves { MAX_CONTINUATION } else { 1.0 }, mirrored: false })
+        (!ends).then_some(Continuation { most: if stores { MAX_CONTINUATION } else { 1.0 }, mirrored: false })
     }
 }
 
@@ -126,9 +126,9 @@ impl<'a, F: Features> PhotonTracer<'a, F> {
         scratch: &mut Arena,
         out: &mut [Photon],
     ) -> Result<Counters, OutOfMemory> {
-        let mut leaver = Depositor { keep: self.keep, pile: PhotonBuffer::new(out) };
-        let counters = self.flight.follow(task, map, scratch, &mut leaver)?;
-        leaver.pile.finish();
+        let mut depositor = Depositor { keep: self.keep, buffer: PhotonBuffer::new(out) };
+        let counters = self.flight.follow(task, map, scratch, &mut depositor)?;
+        depositor.buffer.finish();
         Ok(counters)
     }
 
@@ -136,12 +136,12 @@ impl<'a, F: Features> PhotonTracer<'a, F> {
     ///
     /// # Errors
     /// Errors of [`PhotonTracer::run`].
-    pub fn look(
+    pub fn trace_visible(
         &self,
         (task, map): (usize, u32),
         sight: VisiblePoints,
         scratch: &mut Arena,
-        seen: &mut dyn FnMut(Seen),
+        seen: &mut dyn FnMut(VisiblePhoton),
     ) -> Result<Counters, OutOfMemory> {
         self.flight.follow(task, map, scratch, &mut VisibilityCounter { keep: self.keep, sight, seen })
     }
@@ -149,7 +149,7 @@ impl<'a, F: Features> PhotonTracer<'a, F> {
 
 /// Photon near a visible point.
 #[derive(Clone, Copy, Debug)]
-pub struct Seen {
+pub struct VisiblePhoton {
     /// Index of its path in the task.
     pub path: usize,
     /// Cell of the emission guide.
@@ -162,7 +162,7 @@ pub struct Seen {
 struct VisibilityCounter<'s> {
     keep: PhotonFilter,
     sight: VisiblePoints<'s>,
-    seen: &'s mut dyn FnMut(Seen),
+    seen: &'s mut dyn FnMut(VisiblePhoton),
 }
 
 impl Visitor for VisibilityCounter<'_> {
@@ -175,19 +175,19 @@ impl Visitor for VisibilityCounter<'_> {
         vertex: &Vertex,
         _: &mut Counters,
     ) -> Option<Continuation> {
-        let leaves = self.keep.leaves(state, vertex);
-        if leaves && self.sight.shows(vertex.point.position, vertex.point.geometric_normal) {
+        let stores = self.keep.stores(state, vertex);
+        if stores && self.sight.contains(vertex.point.position, vertex.point.geometric_normal) {
             let power = luminance(Rgb::from(state.power));
-            (self.seen)(Seen { path: state.number as usize % PATHS, cell: state.cell, power });
+            (self.seen)(VisiblePhoton { path: state.number as usize % PATHS, cell: state.cell, power });
         }
-        self.keep.onward(vertex, leaves)
+        self.keep.continuation(vertex, stores)
     }
 }
 
 /// Visitor that stores the selected photons.
 pub(in crate::transport) struct Depositor<'p> {
     keep: PhotonFilter,
-    pile: PhotonBuffer<'p>,
+    buffer: PhotonBuffer<'p>,
 }
 
 impl Visitor for Depositor<'_> {
@@ -200,13 +200,13 @@ impl Visitor for Depositor<'_> {
         vertex: &Vertex,
         counters: &mut Counters,
     ) -> Option<Continuation> {
-        let leaves = self.keep.leaves(state, vertex);
-        if leaves {
+        let stores = self.keep.stores(state, vertex);
+        if stores {
             let power = Rgb::from(state.power);
             if power.max_element() > 0.0 {
-                self.pile.leave(vertex.photon(power), counters);
+                self.buffer.leave(vertex.photon(power), counters);
             }
         }
-        self.keep.onward(vertex, leaves)
+        self.keep.continuation(vertex, stores)
     }
 }

@@ -24,7 +24,7 @@ use crate::transport::path::PathIntegrator;
 use crate::transport::path::estimator::{Estimator, KnownLight, Rest};
 use crate::transport::path::vertex::PathVertex;
 use crate::transport::photon_mapping::density::{Light, PhotonLight, RadianceEstimate, reflected};
-use crate::transport::photon_mapping::irradiance::ABOVE;
+use crate::transport::photon_mapping::irradiance::TEST_HEIGHT;
 pub use crate::transport::photon_mapping::irradiance::{IRRADIANCES, PrecomputedIrradiance, STRIDE};
 use crate::transport::settings::PathSettings;
 use crate::transport::walk::component::Components;
@@ -116,7 +116,7 @@ impl<'a> GlobalMapLookup<'a> {
             let is_open = photon.direction().dot(photon.normal()) >= 0.0;
             is_open || {
                 let from = point.position + point.error * normal;
-                let above = ABOVE * radius + 16.0 * f32::EPSILON * from.abs().max_element();
+                let above = TEST_HEIGHT * radius + 16.0 * f32::EPSILON * from.abs().max_element();
                 let to = photon.position() + above * photon.normal();
                 let way = Ray::segment(from + above * normal, to - from - above * normal, 1.0);
                 !bvh.occluded(level, &way)

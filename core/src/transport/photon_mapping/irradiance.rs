@@ -22,13 +22,13 @@ const NEAREST: usize = 64;
 
 /// Maximum distance of the light's centroid of these photons from the centre of their disc, in radii. In even
 /// light one of a hundred exceeds it by chance; at a straight edge of light it is 0.42.
-const EVEN: f32 = 0.2;
+const MAX_CENTROID_OFFSET: f32 = 0.2;
 
 /// Minimum visible fraction of a disc: in a slit, a few photons would stand for all of it.
-const LEAST_SEEN: f32 = 0.1;
+const MIN_VISIBLE_FRACTION: f32 = 0.1;
 
 /// Height of the visibility test above the surface, in radii of the disc; lower obstacles are no walls.
-pub(super) const ABOVE: f32 = 1e-3;
+pub(super) const TEST_HEIGHT: f32 = 1e-3;
 
 /// Precomputation of irradiance at photons: a pass of tasks of [`IRRADIANCES`].
 #[derive(Clone, Copy)]
@@ -83,11 +83,11 @@ impl<'a> PrecomputedIrradiance<'a> {
         let (place, normal) = (photon.position(), photon.normal());
         let (disc, factor) =
             self.global.disc_of_nearest(self.level, (place, normal), self.farthest, self.kernel, neighbours);
-        let above = ABOVE * disc.radius + 16.0 * f32::EPSILON * place.abs().max_element();
+        let above = TEST_HEIGHT * disc.radius + 16.0 * f32::EPSILON * place.abs().max_element();
         let rotation = (mix(index as u64) >> 40) as f32 / (1u64 << 24) as f32;
         let boundary =
             kernel_boundary(self.bvh, self.level, (place + above * normal, false), &disc, rotation);
-        if boundary.visible_fraction(self.kernel, 1.0) < LEAST_SEEN {
+        if boundary.visible_fraction(self.kernel, 1.0) < MIN_VISIBLE_FRACTION {
             return Photon::NONE;
         }
         if boundary.is_open() && !self.is_even(&disc, neighbours) {
@@ -95,8 +95,8 @@ impl<'a> PrecomputedIrradiance<'a> {
         }
         let response = Uniform(Rgb::splat(factor));
         let density = self.global.gather_within(self.level, &disc, &boundary, &response);
-        let tells = if boundary.is_open() { normal } else { -normal };
-        Photon::new(place, tells, normal, density.radiance)
+        let direction = if boundary.is_open() { normal } else { -normal };
+        Photon::new(place, direction, normal, density.radiance)
     }
 
     /// True if the light of the nearest photons on `disc` is even around its centre.
@@ -109,6 +109,6 @@ impl<'a> PrecomputedIrradiance<'a> {
                 moment += power * (photon.position() - disc.place);
             }
         }
-        moment.length() <= EVEN * disc.radius * sum
+        moment.length() <= MAX_CENTROID_OFFSET * disc.radius * sum
     }
 }

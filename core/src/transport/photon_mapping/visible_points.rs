@@ -15,13 +15,13 @@ use core::mem;
 use glam::Vec3;
 
 /// Maximum number of camera rays.
-const MOST_RAYS: u32 = 1 << 14;
+const MAX_RAYS: u32 = 1 << 14;
 
 /// Maximum number of specular surfaces on a camera ray.
-const MOST_MIRRORS: u32 = 16;
+const MAX_MIRRORS: u32 = 16;
 
 /// Radius around a visible point, in distances between two rays.
-const REACH: f32 = 1.5;
+const RADIUS_IN_STEPS: f32 = 1.5;
 
 /// Raster of camera rays that find visible points.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -41,7 +41,7 @@ impl VisiblePointSampler {
     pub fn new(frame: [u32; 2]) -> Self {
         let across = |step: u32| frame.map(|pixels| u64::from(pixels.div_ceil(step)));
         let mut step = 1;
-        while across(step)[0] * across(step)[1] > u64::from(MOST_RAYS) {
+        while across(step)[0] * across(step)[1] > u64::from(MAX_RAYS) {
             step += 1;
         }
         Self { frame, step, gathers: false }
@@ -93,7 +93,7 @@ impl VisiblePointSampler {
         let (x, y) = (at(number % across, u, width), at(number / across, v, height));
         let mut segment = Segment::first(context.scene.camera.ray(width, height, x, y, [0.5; 2]));
         let mut gathers = self.gathers;
-        for segments in 1..=MOST_MIRRORS + 1 {
+        for segments in 1..=MAX_MIRRORS + 1 {
             let opacity = |n| sampler.single(dimension::CROSSING + n);
             let (hit, point) = context.next_surface(&mut segment, opacity, counters)?;
             let direction = Vec3::from(segment.ray.direction).normalize_or_zero();
@@ -118,15 +118,15 @@ impl VisiblePointSampler {
 #[derive(Clone, Copy)]
 pub struct VisiblePoints<'a> {
     map: &'a PhotonMap<'a>,
-    reach: Reach,
+    radius: VisibleRadius,
     level: Level,
 }
 
 /// Radius around a visible point.
 #[derive(Clone, Copy)]
-enum Reach {
-    RadiusSchedule(RadiusSchedule),
-    Everywhere(f32),
+enum VisibleRadius {
+    Schedule(RadiusSchedule),
+    Constant(f32),
 }
 
 impl<'a> VisiblePoints<'a> {
@@ -141,21 +141,23 @@ impl<'a> VisiblePoints<'a> {
     ) -> Self {
         Self {
             map,
-            reach: Reach::RadiusSchedule(discs.of_pixels(pixels.max(REACH * raster.step as f32))),
+            radius: VisibleRadius::Schedule(
+                discs.of_pixels(pixels.max(RADIUS_IN_STEPS * raster.step as f32)),
+            ),
             level,
         }
     }
 
     /// Visible points `map` with a constant `radius`.
     pub fn within(map: &'a PhotonMap<'a>, radius: f32, level: Level) -> Self {
-        Self { map, reach: Reach::Everywhere(radius), level }
+        Self { map, radius: VisibleRadius::Constant(radius), level }
     }
 
     /// True if a photon at `place`, on a surface with this `normal`, is visible.
-    pub(in crate::transport) fn shows(&self, place: Vec3, normal: Vec3) -> bool {
-        let radius = match self.reach {
-            Reach::RadiusSchedule(discs) => discs.radius(place),
-            Reach::Everywhere(radius) => radius,
+    pub(in crate::transport) fn contains(&self, place: Vec3, normal: Vec3) -> bool {
+        let radius = match self.radius {
+            VisibleRadius::Schedule(discs) => discs.radius(place),
+            VisibleRadius::Constant(radius) => radius,
         };
         let disc = QueryDisc { place, normal, radius, kernel: Kernel::Constant };
         self.map.gather(self.level, &disc, &Uniform(Rgb::ONE)).photons > 0
