@@ -22,7 +22,7 @@ use halflight_core::{Level, Rgb};
 
 /// Pixels across and down.
 pub const SIZE: usize = 32;
-/// Methods, those that need least memory first.
+/// Methods by their names on the command line.
 pub const METHODS: [&str; 9] =
     ["path", "light", "sppm", "bdpt", "photon-map", "vcm", "instant-radiosity", "mlt", "irradiance-cache"];
 /// Cache lines that all structures of any method take together.

@@ -5,6 +5,7 @@ mod bench;
 mod caustics;
 mod cli;
 mod compare;
+mod fair_schedule;
 mod loading;
 #[cfg(target_os = "linux")]
 mod memory;
@@ -15,4 +16,3 @@ mod pictures;
 #[cfg(unix)]
 mod pipes;
 mod support;
-mod turns;

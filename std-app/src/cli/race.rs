@@ -12,7 +12,7 @@ use clap::Args;
 use core::sync::atomic::Ordering;
 use halflight::compare::{Comparison, compare};
 use halflight::load;
-use halflight::render::{self, Progress, RenderResult, Settings, Stop, Turns};
+use halflight::render::{self, FairSchedule, Progress, RenderResult, Settings, Stop};
 use halflight::report::{self, Provenance, Run, quantity::readable_seconds};
 use halflight_core::scene::Scene;
 use std::panic::resume_unwind;
@@ -108,10 +108,10 @@ impl Race {
 
     /// Pictures of all methods, rendered in turns.
     fn renders(&self, scene: &Scene, settings: &[Settings]) -> Result<Vec<Done>, Failure> {
-        let turns = Turns::new(settings.len());
+        let schedule = FairSchedule::new(settings.len());
         let reporter = Mutex::new(ProgressReporter::new());
         let render = |index: usize| {
-            let turn = turns.join(index);
+            let turn = schedule.join(index);
             let progress = &mut |progress: &Progress| {
                 let mut reporter = reporter.lock().unwrap_or_else(PoisonError::into_inner);
                 reporter.report(&self.methods[index].name, progress);

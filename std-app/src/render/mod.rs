@@ -7,11 +7,11 @@
 
 mod audit;
 mod cache_file;
-mod crew;
 mod deadline;
 mod environment_visibility;
 mod error;
 mod error_report;
+mod fair_schedule;
 mod film_file;
 mod fingerprint;
 mod gaps;
@@ -31,12 +31,12 @@ mod sealed;
 mod study;
 mod survey;
 mod threads;
-mod turns;
 mod workers;
 
 pub use audit::{Audited, Region};
 pub use cache_file::inspect as inspect_cache;
 pub use error::{FileError, RenderError};
+pub use fair_schedule::{FairSchedule, Turn};
 pub use halflight_core::estimate::{BiasEstimate, Deviation, ErrorEstimate};
 pub use halflight_core::method::Shard;
 pub use halflight_core::method::bidirectional::BidirectionalSettings;
@@ -51,7 +51,6 @@ pub use noise_and_blur::NoiseAndBlur;
 pub use rounds::{Stop, StopRule};
 pub use study::{IrradianceStudy, MetricError, study_irradiance};
 pub use survey::{Check, Look, Mark, Survey};
-pub use turns::{Turn, Turns};
 
 use crate::save::Image;
 use core::sync::atomic::AtomicBool;

@@ -1,7 +1,6 @@
 //! The rounds of a picture, from the first sample to the last estimate.
 
 use super::audit::Audit;
-use super::crew::{self, Crew};
 use super::error_report::ErrorReport;
 use super::film_file::{self, Header, Identity, Reader};
 use super::gaps::{self, Sketch};
@@ -11,6 +10,7 @@ use super::method::{Method, Renderer, Stage};
 use super::rewritten_file::RewrittenFile;
 use super::rounds::{Plan, Rounds};
 use super::survey::Survey;
+use super::threads::{RoundLimits, ThreadedRound};
 use super::workers::Workers;
 use super::{Ending, ErrorEstimate, Progress, RenderError, RenderResult, Seconds};
 use crate::save::{Image, Patience};
@@ -156,13 +156,13 @@ impl<'a> Progressive<'a> {
         // A time beyond the range of the clock is no deadline.
         let later = |at: f64| Duration::try_from_secs_f64((at - now).max(0.0)).ok();
         let deadline = plan.deadline.and_then(later).and_then(|later| Instant::now().checked_add(later));
-        let round = crew::Round {
+        let limits = RoundLimits {
             target: plan.target,
             step: step(plan, state.tiles(), workers.count()),
             deadline,
             is_first: plan.first,
         };
-        renderer.round(&mut Crew { workers, round: &round, canvas: state })?;
+        renderer.round(&mut ThreadedRound { workers, limits: &limits, state })?;
         self.rounds.completed(state.spp().min(plan.target), clock.seconds());
         Ok(())
     }

@@ -1,10 +1,9 @@
 //! Executor of the program: a thread pool that ends at deadlines and interrupts.
 
-use super::crew::Crew;
 use super::deadline::Deadline;
 use super::workers::{Fork, Workers};
 use halflight_core::memory::{Line, OutOfMemory};
-use halflight_core::method::{Executor, Passed, Round, Worker};
+use halflight_core::method::{Executor, Passed, RenderState, Round, Worker};
 use halflight_core::transport::Counters;
 use std::sync::Mutex;
 use std::time::Instant;
@@ -131,17 +130,37 @@ impl Executor for Threads<'_> {
     }
 }
 
-impl Crew<'_, '_> {
+/// Samples and end of a round.
+pub(super) struct RoundLimits {
+    /// Samples per pixel at the end of the round.
+    pub(super) target: u32,
+    /// Samples of a tile between checks of the clock and the interrupt flag.
+    pub(super) step: u32,
+    /// End of a round that is cut.
+    pub(super) deadline: Option<Instant>,
+    /// Whether it is the first, which an interruption ends later than others.
+    pub(super) is_first: bool,
+}
+
+/// A round on all threads, and the film that it adds to.
+pub(super) struct ThreadedRound<'r, 'm> {
+    pub(super) workers: &'r Workers<'r>,
+    pub(super) limits: &'r RoundLimits,
+    pub(super) state: &'r mut RenderState<'m>,
+}
+
+impl ThreadedRound<'_, '_> {
     /// Runs `work` on this round with `scratch` memory for each thread.
-    pub(super) fn round<T>(
+    pub(super) fn run<T>(
         &mut self,
         scratch: &mut [Vec<Line>],
         work: impl FnOnce(&mut Round<Threads>) -> Result<T, OutOfMemory>,
     ) -> Result<T, OutOfMemory> {
-        let Crew { workers, round, canvas } = self;
-        let end = if round.is_first { End::FirstRound(round.deadline) } else { End::Round(round.deadline) };
+        let Self { workers, limits, state } = self;
+        let end =
+            if limits.is_first { End::FirstRound(limits.deadline) } else { End::Round(limits.deadline) };
         let mut executor = Threads::new(workers, scratch).until(end);
-        work(&mut Round { executor: &mut executor, state: canvas, target: round.target, step: round.step })
+        work(&mut Round { executor: &mut executor, state, target: limits.target, step: limits.step })
     }
 }
 

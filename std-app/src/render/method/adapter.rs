@@ -4,9 +4,8 @@ use super::photon_view::{self, PhotonView};
 use super::{Method, Renderer, Stage};
 use crate::render::RenderError;
 use crate::render::audit::Audit;
-use crate::render::crew::Crew;
 use crate::render::memory::Memory;
-use crate::render::threads::Threads;
+use crate::render::threads::{ThreadedRound, Threads};
 use core::marker::PhantomData;
 use halflight_core::bsdf::Features;
 use halflight_core::findings::Findings;
@@ -47,8 +46,8 @@ impl<F: Features, M: method::Method> Renderer for Adapter<'_, F, M> {
         self.chosen
     }
 
-    fn round(&mut self, crew: &mut Crew) -> Result<(), RenderError> {
-        Ok(crew.round(&mut self.scratch, |round| self.method.round(round))?)
+    fn round(&mut self, round: &mut ThreadedRound) -> Result<(), RenderError> {
+        Ok(round.run(&mut self.scratch, |round| self.method.round(round))?)
     }
 
     fn photon_view(&mut self) -> Result<Option<PhotonView>, RenderError> {

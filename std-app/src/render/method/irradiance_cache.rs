@@ -7,12 +7,11 @@ use super::photon_view::{self, PhotonView};
 use super::{Borrower, Method, Renderer, Stage};
 use crate::render::RenderError;
 use crate::render::cache_file::{self, Half, Header, Reader, View};
-use crate::render::crew::Crew;
 use crate::render::held_out::EXACT;
 use crate::render::memory::{Bank, Memory};
 use crate::render::rewritten_file::RewrittenFile;
 use crate::render::survey::{self, Survey};
-use crate::render::threads::{End, Threads};
+use crate::render::threads::{End, ThreadedRound, Threads};
 use crate::render::workers::Workers;
 use crate::save::Patience;
 use halflight_core::bsdf::Features;
@@ -174,7 +173,7 @@ struct Cached<'c, 'm, F> {
 
 impl<F: Features> Cached<'_, '_, F> {
     /// Fills both caches or continues to, and writes them to their file.
-    fn fill(&mut self, crew: &mut Crew) -> Result<(), RenderError> {
+    fn fill(&mut self, round: &mut ThreadedRound) -> Result<(), RenderError> {
         let Self { method, photons: maps, scratch, .. } = self;
         let mut all = true;
         for number in 0..2 {
@@ -182,7 +181,7 @@ impl<F: Features> Cached<'_, '_, F> {
             let asks = !method.is_filled(number) && !method.paths().is_limited();
             let photons = match maps.as_mut().filter(|_| asks) {
                 Some(maps) => {
-                    match crew.round(scratch, |round| maps.for_records::<F, _>(number as u32, round))? {
+                    match round.run(scratch, |round| maps.for_records::<F, _>(number as u32, round))? {
                         Some(photons) => Some(photons),
                         None => {
                             all = false;
@@ -193,7 +192,7 @@ impl<F: Features> Cached<'_, '_, F> {
                 None => None,
             };
             let merging = photons.as_ref().map(|photons| photons.merging());
-            all = crew.round(scratch, |round| method.fill(number, merging, round))?;
+            all = round.run(scratch, |round| method.fill(number, merging, round))?;
             if !all {
                 break;
             }
@@ -250,21 +249,21 @@ impl<F: Features> Renderer for Cached<'_, '_, F> {
         Method::IrradianceCache
     }
 
-    fn round(&mut self, crew: &mut Crew) -> Result<(), RenderError> {
+    fn round(&mut self, round: &mut ThreadedRound) -> Result<(), RenderError> {
         if !self.method.is_frozen() {
             // A resumed film has counted the rays of filling already.
-            let is_resumed = crew.canvas.spp() > 0;
-            let counted = crew.canvas.counters;
-            self.fill(crew)?;
+            let is_resumed = round.state.spp() > 0;
+            let counted = round.state.counters;
+            self.fill(round)?;
             if !self.method.is_frozen() {
                 return Ok(());
             }
             if is_resumed {
-                crew.canvas.counters = counted;
+                round.state.counters = counted;
             }
         }
         let Self { method, photons, scratch, .. } = self;
-        Ok(crew.round(scratch, |round| match photons {
+        Ok(round.run(scratch, |round| match photons {
             Some(photons) => photons.round(&method.cached_paths(), round),
             None => method.round(round),
         })?)

@@ -1,8 +1,8 @@
-//! Rendering methods, one file each; this file defines the interface and sets methods up.
+//! Rendering methods: names, properties, interface and setup.
 //!
-//! A round consists of passes over a method's structures and of tiles of the picture, all run in parallel by
-//! the [`Crew`] ("The unit of work" in docs/architecture.md). A new method needs a variant of [`Method`] with
-//! its texts, a file with its [`Renderer`], and a line in [`Method::with`].
+//! A round consists of passes over a method's structures and of tiles of the picture, all run in parallel
+//! ("The unit of work" in docs/architecture.md). A new method needs a variant of [`Method`] with its texts and
+//! a line in [`Method::with`].
 
 mod adapter;
 mod cache_memory;
@@ -17,11 +17,11 @@ pub use cache_settings::CacheSettings;
 pub use halflight_core::method::PhotonSettings;
 pub use photon_view::{MapView, PhotonView};
 
-use super::crew::Crew;
 use super::memory::Memory;
 use super::rewritten_file::RewrittenFile;
 use super::run::path_settings;
 use super::survey::Survey;
+use super::threads::ThreadedRound;
 use super::workers::Workers;
 use super::{RenderError, Settings};
 use crate::save::Patience;
@@ -305,12 +305,12 @@ impl<'a> Stage<'a> {
 /// Callback of paths that borrow caustic photons.
 pub(super) type Borrower<'b> = dyn FnMut(Option<CausticMerging>) -> Result<(), RenderError> + 'b;
 
-/// A method at work on one scene. It owns its structures; the crew owns the film.
+/// A method at work on one scene. It owns its structures, but not the film.
 pub(super) trait Renderer {
     /// The method; a prepass may have chosen another one than the settings.
     fn chosen(&self) -> Method;
 
-    /// One round: brings the tiles of `crew` to their targets, or less if the round is cut.
+    /// One round: brings the tiles of the film to the target, or less if the round is cut.
     ///
     /// Sample `n` of a pixel is determined by the scene, the settings, `n`, and the weights stored with a
     /// film. It does not depend on rounds, on threads, or on earlier runs of a resumed film. Structures
@@ -319,7 +319,7 @@ pub(super) trait Renderer {
     ///
     /// # Errors
     /// Insufficient memory.
-    fn round(&mut self, crew: &mut Crew) -> Result<(), RenderError>;
+    fn round(&mut self, round: &mut ThreadedRound) -> Result<(), RenderError>;
 
     /// Calls `then` with the current caustic photons of the picture, or with none, for paths without records.
     ///

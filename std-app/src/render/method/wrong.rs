@@ -3,8 +3,8 @@
 
 use super::{Method, Renderer, Stage};
 use crate::render::RenderError;
-use crate::render::crew::Crew;
 use crate::render::memory::Memory;
+use crate::render::threads::ThreadedRound;
 use core::ops::Range;
 use halflight_core::bsdf::Features;
 use halflight_core::film::{Dropped, PIXELS_PER_TILE, Pixel, Tile};
@@ -38,7 +38,7 @@ impl<F: Features> Renderer for Wrong<'_, F> {
         Findings::default()
     }
 
-    fn round(&mut self, crew: &mut Crew) -> Result<(), RenderError> {
+    fn round(&mut self, round: &mut ThreadedRound) -> Result<(), RenderError> {
         let Self { tracer, scratch, size: [width, height] } = self;
         let sample = |task: usize, samples: Range<u32>, arena: &mut Arena, pixels: &mut [Pixel]| {
             let tile = Tile::new(*width, *height, task);
@@ -55,6 +55,6 @@ impl<F: Features> Renderer for Wrong<'_, F> {
             }
             Ok(counters)
         };
-        Ok(crew.round(scratch, |round| round.tiles(u32::MAX, sample))?)
+        Ok(round.run(scratch, |round| round.tiles(u32::MAX, sample))?)
     }
 }

@@ -3,7 +3,7 @@
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 
 /// Scheduler of the renders: the render with the least time so far is next, ties by index.
-pub struct Turns {
+pub struct FairSchedule {
     /// Seconds of each render so far; infinite when it is over.
     seconds: Mutex<Vec<f64>>,
     changed: Condvar,
@@ -11,11 +11,11 @@ pub struct Turns {
 
 /// Handle of one render, which is over when dropped.
 pub struct Turn<'t> {
-    turns: &'t Turns,
+    schedule: &'t FairSchedule,
     index: usize,
 }
 
-impl Turns {
+impl FairSchedule {
     /// For `count` renders, all of which must join.
     pub fn new(count: usize) -> Self {
         Self { seconds: Mutex::new(vec![0.0; count]), changed: Condvar::new() }
@@ -23,7 +23,7 @@ impl Turns {
 
     /// Waits for the first turn of render `index`.
     pub fn join(&self, index: usize) -> Turn<'_> {
-        let turn = Turn { turns: self, index };
+        let turn = Turn { schedule: self, index };
         turn.pass(0.0);
         turn
     }
@@ -41,16 +41,16 @@ impl Turns {
 impl Turn<'_> {
     /// Reports the seconds of this render so far, and waits for its next turn.
     pub fn pass(&self, seconds: f64) {
-        let mut all = self.turns.set(self.index, seconds);
+        let mut all = self.schedule.set(self.index, seconds);
         while next(&all) != Some(self.index) {
-            all = self.turns.changed.wait(all).unwrap_or_else(PoisonError::into_inner);
+            all = self.schedule.changed.wait(all).unwrap_or_else(PoisonError::into_inner);
         }
     }
 }
 
 impl Drop for Turn<'_> {
     fn drop(&mut self) {
-        drop(self.turns.set(self.index, f64::INFINITY));
+        drop(self.schedule.set(self.index, f64::INFINITY));
     }
 }
 

@@ -1,17 +1,17 @@
 //! Order of the renders of a race.
 
-use halflight::render::Turns;
+use halflight::render::FairSchedule;
 use std::sync::Mutex;
 
 #[test]
 fn one_at_a_time_and_the_slow_ones_less_often() {
-    let turns = Turns::new(3);
+    let schedule = FairSchedule::new(3);
     let order = Mutex::new(Vec::new());
     std::thread::scope(|scope| {
         for index in (0..3).rev() {
-            let (turns, order) = (&turns, &order);
+            let (schedule, order) = (&schedule, &order);
             scope.spawn(move || {
-                let turn = turns.join(index);
+                let turn = schedule.join(index);
                 for round in 1..=4 {
                     order.lock().unwrap().push(index);
                     // The second render takes twice as long.
