@@ -3,6 +3,7 @@
 
 use super::executor::{Executor, Passed};
 use crate::bsdf::Features;
+use crate::bvh::ForkJoin;
 use crate::memory::{Arena, Footprint, MemorySource, OutOfMemory};
 use crate::photon::{MapShape, Photon, PhotonMap, Photons};
 use crate::transport::Counters;
@@ -48,10 +49,13 @@ impl<'m> PhotonMapStore<'m> {
         self.built = None;
         let mut photons = Photons::new(count, &mut self.arena.scratch())?;
         let pieces = photons.as_mut_slice().chunks_mut(piece.max(1));
-        let passed =
+        let mut passed =
             executor.pass(pieces, |number, photons, worker| write(number, &mut worker.scratch, photons))?;
         if passed.is_complete {
-            self.built = Some((count, photons.build_with(count, executor.fork()).shape()));
+            let fork = executor.fork();
+            let shape = photons.build_with(count, fork).shape();
+            passed.is_complete = !fork.is_over();
+            self.built = passed.is_complete.then_some((count, shape));
         }
         Ok(passed)
     }

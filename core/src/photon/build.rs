@@ -56,6 +56,10 @@ fn keep_finite(photons: &mut [Photon]) -> (usize, Space) {
 
 /// Orders the photons under a node of `level`.
 fn order<J: ForkJoin>(photons: &mut [Photon], level: usize, join: &J) {
+    let parallel = photons.len() >= PARALLEL_MIN;
+    if parallel && join.is_over() {
+        return;
+    }
     let child = LEAF * WIDTH.pow(level as u32);
     if photons.len() > child {
         // All children except the last are full. The left half of the children goes left.
@@ -66,7 +70,6 @@ fn order<J: ForkJoin>(photons: &mut [Photon], level: usize, join: &J) {
             1 => halve::<1>(photons, middle),
             _ => halve::<2>(photons, middle),
         }
-        let parallel = photons.len() >= PARALLEL_MIN;
         let (left, right) = photons.split_at_mut(middle);
         if parallel {
             join.join(|| order(left, level, join), || order(right, level, join));
@@ -111,6 +114,9 @@ fn widest_axis(photons: &[Photon]) -> usize {
 /// Transposes the leaves of `count` photons from rows to columns and writes their boxes into `nodes`, the
 /// level above.
 fn next<J: ForkJoin>(leaves: &mut [Leaf], count: usize, nodes: &mut [Node], join: &J) {
+    if count > PARALLEL_MIN && join.is_over() {
+        return;
+    }
     if count > PARALLEL_MIN && nodes.len() > 1 {
         let half = nodes.len() / 2;
         let middle = half * WIDTH;

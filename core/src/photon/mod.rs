@@ -72,6 +72,7 @@ impl<'m> Photons<'m> {
     }
 
     /// Builds the map over the first `count` photons on the cores of `join`; same bits as [`Photons::build`].
+    /// The map is of no use where [`ForkJoin::is_over`] ends the build early.
     pub fn build_with<J: ForkJoin>(self, count: usize, join: &J) -> PhotonMap<'m> {
         build::build(self.leaves, count.min(self.capacity), self.nodes, join)
     }

@@ -2,6 +2,7 @@
 
 use super::deadline::Deadline;
 use super::workers::{Fork, Workers};
+use halflight_core::bvh::ForkJoin;
 use halflight_core::memory::{Line, OutOfMemory};
 use halflight_core::method::{Executor, Passed, RenderState, Round, Worker};
 use halflight_core::transport::Counters;
@@ -37,22 +38,40 @@ impl End {
     }
 }
 
+/// Forks of builds, which end as passes do.
+pub(super) struct Branches<'t> {
+    fork: &'t Fork,
+    deadline: &'t Deadline<'t>,
+    end: End,
+}
+
+impl ForkJoin for Branches<'_> {
+    fn join(&self, a: impl FnOnce() + Send, b: impl FnOnce() + Send) {
+        self.fork.join(a, b);
+    }
+
+    fn is_over(&self) -> bool {
+        self.end.is_over(self.deadline)
+    }
+}
+
 /// Runs passes on all threads, each with its own scratch memory.
 pub(super) struct Threads<'t> {
     workers: &'t Workers<'t>,
     scratch: &'t mut [Vec<Line>],
-    end: End,
+    branches: Branches<'t>,
 }
 
 impl<'t> Threads<'t> {
     /// For passes before or beside the picture.
     pub(super) fn new(workers: &'t Workers<'t>, scratch: &'t mut [Vec<Line>]) -> Self {
-        Self { workers, scratch, end: End::Prepass }
+        let branches = Branches { fork: &workers.fork, deadline: &workers.deadline, end: End::Prepass };
+        Self { workers, scratch, branches }
     }
 
     /// For passes that end at `end`.
     pub(super) fn until(self, end: End) -> Self {
-        Self { end, ..self }
+        Self { branches: Branches { end, ..self.branches }, ..self }
     }
 
     /// Runs tasks from `queue` on all threads until the queue is empty or the end has come.
@@ -61,12 +80,12 @@ impl<'t> Threads<'t> {
         queue: impl Iterator<Item = (usize, P)> + Send,
         task: impl Fn(usize, P, &mut Worker) -> Result<Counters, OutOfMemory> + Sync,
     ) -> Result<Passed, OutOfMemory> {
-        let Self { workers, scratch, end } = self;
-        let (deadline, end) = (&workers.deadline, *end);
+        let Self { workers, scratch, branches } = self;
+        let branches = &*branches;
         let queue = Mutex::new(queue);
         let next = || queue.lock().unwrap_or_else(|poisoned| poisoned.into_inner()).next();
         let passed = workers.on_all(scratch, |arena| {
-            let is_over = || end.is_over(deadline);
+            let is_over = || branches.is_over();
             let mut worker = Worker::new(arena.scratch(), &is_over);
             let mut counters = Counters::default();
             while let Some((number, piece)) = next() {
@@ -86,8 +105,8 @@ impl<'t> Threads<'t> {
     }
 }
 
-impl Executor for Threads<'_> {
-    type Fork = Fork;
+impl<'t> Executor for Threads<'t> {
+    type Fork = Branches<'t>;
 
     fn pass<P, T>(&mut self, pieces: P, task: T) -> Result<Passed, OutOfMemory>
     where
@@ -106,19 +125,19 @@ impl Executor for Threads<'_> {
     }
 
     fn is_over(&self) -> bool {
-        self.end.is_over(&self.workers.deadline)
+        self.branches.is_over()
     }
 
-    fn fork(&self) -> &Fork {
-        &self.workers.fork
+    fn fork(&self) -> &Branches<'t> {
+        &self.branches
     }
 
     fn within<T>(&mut self, fraction: f32, work: impl FnOnce(&mut Self) -> T) -> T {
-        let before = self.end;
+        let before = self.branches.end;
         let deadlines = [self.workers.deadline.after(fraction), before.deadline()];
-        self.end = End::Round(deadlines.into_iter().flatten().min());
+        self.branches.end = End::Round(deadlines.into_iter().flatten().min());
         let done = work(self);
-        self.end = before;
+        self.branches.end = before;
         done
     }
 
@@ -183,7 +202,12 @@ fn greatest_common_divisor(a: usize, b: usize) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use core::sync::atomic::AtomicBool;
+    use core::sync::atomic::{AtomicBool, Ordering};
+    use glam::Vec3;
+    use halflight_core::Rgb;
+    use halflight_core::memory::Arena;
+    use halflight_core::method::PhotonMapStore;
+    use halflight_core::photon::Photon;
 
     #[test]
     fn scattering_keeps_every_item() {
@@ -222,7 +246,30 @@ mod tests {
         };
         assert!(!executor.within(0.0, is_complete) && executor.within(0.5, is_complete));
         assert!(is_complete(&mut executor));
-        flag.store(true, core::sync::atomic::Ordering::Relaxed);
+        flag.store(true, Ordering::Relaxed);
         assert!(!is_complete(&mut executor) && executor.is_over());
+    }
+
+    #[test]
+    fn an_interrupt_ends_the_build_of_a_photon_map() {
+        let flag = AtomicBool::new(false);
+        let workers = Workers::new(Some(2)).unwrap().ending_at(Deadline::until(&flag));
+        let mut scratch = vec![vec![]; 2];
+        let mut executor = Threads::new(&workers, &mut scratch).until(End::Round(None));
+        let (count, piece) = (1 << 15, 1 << 10);
+        let mut lines = vec![Line([0; 64]); PhotonMapStore::footprint(count).bytes() / 64];
+        let mut store = PhotonMapStore::over(Arena::new(bytemuck::cast_slice_mut(&mut lines)));
+        for interrupted_by in [None, Some(count / piece - 1)] {
+            let passed = store.fill(&mut executor, (count, piece), |number, _, photons| {
+                photons.fill(Photon::new(Vec3::splat(number as f32), Vec3::Z, Vec3::Z, Rgb::ONE));
+                if interrupted_by == Some(number) {
+                    flag.store(true, Ordering::Relaxed);
+                }
+                Ok(Counters::default())
+            });
+            let is_complete = interrupted_by.is_none();
+            assert_eq!(passed.unwrap().is_complete, is_complete);
+            assert_eq!(store.map().unwrap().is_some(), is_complete);
+        }
     }
 }
