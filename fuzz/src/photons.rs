@@ -6,7 +6,7 @@ use arbitrary::{Result, Unstructured};
 use glam::Vec3;
 use halflight_core::memory::{Arena, Footprint, Line};
 use halflight_core::photon::{
-    Density, Kernel, Neighbours, Photon, PhotonMap, Photons, QueryDisc, QueryOrder, Response, Uniform, brute,
+    DensityEstimate, Kernel, Neighbours, Photon, PhotonMap, Photons, QueryDisc, QueryOrder, Response, Uniform, brute,
 };
 use halflight_core::{Level, Rgb};
 
@@ -125,7 +125,7 @@ fn same<R: Response>(map: &PhotonMap, level: Level, disc: &QueryDisc, response: 
     let (found, expected) = (map.gather(level, disc, response), brute::gather(map, disc, response));
     assert_eq!(found.photons, expected.photons, "{level:?} {disc:?}");
     let baseline = map.gather(Level::BASELINE, disc, response);
-    let radiances = |density: Density| [density.radiance].into_iter().chain(density.finer);
+    let radiances = |density: DensityEstimate| [density.radiance].into_iter().chain(density.finer);
     for ((found, expected), baseline) in radiances(found).zip(radiances(expected)).zip(radiances(baseline)) {
         if expected.is_finite() {
             let error = (found - expected).abs();

@@ -9,7 +9,7 @@ use glam::Vec3;
 /// Coat over a diffuse base.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[repr(C)]
-pub(crate) struct Cover {
+pub(crate) struct CoatTransmittance {
     /// Reflectance of Schlick's coat at normal incidence.
     specular: [f32; 3],
     /// GGX alpha.
@@ -18,9 +18,9 @@ pub(crate) struct Cover {
     eta: f32,
 }
 
-impl Cover {
+impl CoatTransmittance {
     /// No coat: the reflected radiance is the same in all directions.
-    pub(crate) const NONE: Cover = Cover { specular: [0.0; 3], alpha: 0.0, eta: 0.0 };
+    pub(crate) const NONE: CoatTransmittance = CoatTransmittance { specular: [0.0; 3], alpha: 0.0, eta: 0.0 };
 
     pub(super) fn dielectric(alpha: f32, eta: f32) -> Self {
         Self { alpha, eta, ..Self::NONE }
@@ -46,11 +46,11 @@ impl Cover {
 impl Bsdf {
     /// Coat over the diffuse base; `None` without a base.
     #[inline]
-    pub(crate) fn cover(&self) -> Option<Cover> {
+    pub(crate) fn coat_transmittance(&self) -> Option<CoatTransmittance> {
         match self {
-            Bsdf::Diffuse(_) => Some(Cover::NONE),
-            Bsdf::Glossy(b) => b.cover(),
-            Bsdf::Plastic(b) => b.cover(),
+            Bsdf::Diffuse(_) => Some(CoatTransmittance::NONE),
+            Bsdf::Glossy(b) => b.coat_transmittance(),
+            Bsdf::Plastic(b) => b.coat_transmittance(),
             _ => None,
         }
     }

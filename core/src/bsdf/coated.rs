@@ -17,7 +17,7 @@ use glam::Vec3;
 /// Weight of the coat over the base in the choice of the lobe. Light samples find the emitters that the base
 /// reflects, whereas the coat has to find its reflections alone. In a room whose floor mirrors its windows a
 /// weight of 2 lowers the variance of the floor by a seventh, 3.5 by a fifth.
-const ALONE: f32 = 2.0;
+const COAT_WEIGHT: f32 = 2.0;
 
 /// Model of a coat.
 pub(super) trait Coat {
@@ -35,10 +35,10 @@ pub(super) trait Coat {
     fn mean_transmittance(&self) -> Rgb;
 
     /// Probability of the coat's lobe: its share of the energy that leaves towards `wo`, with the weight
-    /// [`ALONE`].
+    /// [`COAT_WEIGHT`].
     #[inline]
     fn coat_probability(&self, c: f32, transmittance: Rgb) -> f32 {
-        let coat = ALONE * self.specular_albedo(c).element_sum();
+        let coat = COAT_WEIGHT * self.specular_albedo(c).element_sum();
         let base = (self.base() * transmittance * self.mean_transmittance()).element_sum();
         if base > 0.0 { (coat / (coat + base)).clamp(0.0, 1.0) } else { 1.0 }
     }

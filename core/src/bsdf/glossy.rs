@@ -6,7 +6,7 @@
 //! colour up to white (Kelemen and Szirmay-Kalos 2001, eq. 5; Kulla and Conty 2017). The blend with metal is
 //! a weighted mean of two such surfaces.
 
-use super::Cover;
+use super::CoatTransmittance;
 use super::albedo::SchlickAlbedo;
 use super::coated::Coat;
 use super::{fresnel, range::unit};
@@ -48,8 +48,8 @@ impl Glossy {
         self.alpha
     }
 
-    pub(super) fn cover(&self) -> Option<Cover> {
-        (self.base != Rgb::ZERO).then(|| Cover::schlick(self.alpha, self.specular))
+    pub(super) fn coat_transmittance(&self) -> Option<CoatTransmittance> {
+        (self.base != Rgb::ZERO).then(|| CoatTransmittance::schlick(self.alpha, self.specular))
     }
 
     pub(super) fn is_delta(&self) -> bool {

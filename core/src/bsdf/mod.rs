@@ -24,7 +24,7 @@ mod resolve;
 mod rough_dielectric;
 
 pub use crate::features::{All, DiffuseOnly, DiffuseTextured, Features, Only, Opaque};
-pub(crate) use base::Cover;
+pub(crate) use base::CoatTransmittance;
 pub use conductor::Conductor;
 pub use dielectric::Dielectric;
 pub use diffuse::Diffuse;

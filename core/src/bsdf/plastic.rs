@@ -7,11 +7,11 @@
 //! `plastic` and `roughplastic` with `nonlinear` set.) If smooth, a white base returns exactly the T(θ_o)
 //! that reached it. If rough, it returns less, as in every model of one bounce between microfacets.
 
-use super::Cover;
+use super::CoatTransmittance;
 use super::albedo::{self, SchlickAlbedo};
 use super::coated::Coat;
 use super::fresnel;
-use super::range::{GREATEST_INDEX, unit};
+use super::range::{MAX_INDEX, unit};
 use crate::Rgb;
 
 /// Dielectric coat over a diffuse base, blended with metal. See the module.
@@ -38,7 +38,7 @@ impl Plastic {
     #[inline]
     pub fn new(color: Rgb, specular: Rgb, alpha: f32, metallic: f32, eta: f32) -> Self {
         let metallic = unit(metallic);
-        let eta = if eta.is_finite() { eta.clamp(1.0, GREATEST_INDEX) } else { 1.0 };
+        let eta = if eta.is_finite() { eta.clamp(1.0, MAX_INDEX) } else { 1.0 };
         let f0 = fresnel::normal_incidence(eta);
         let tint = if f0 > 0.0 { (specular / f0).min(Rgb::ONE) } else { Rgb::ONE };
         let internal = albedo::internal_reflectance(alpha, eta);
@@ -58,8 +58,8 @@ impl Plastic {
         self.alpha
     }
 
-    pub(super) fn cover(&self) -> Option<Cover> {
-        (self.base != Rgb::ZERO).then(|| Cover::dielectric(self.alpha, self.eta))
+    pub(super) fn coat_transmittance(&self) -> Option<CoatTransmittance> {
+        (self.base != Rgb::ZERO).then(|| CoatTransmittance::dielectric(self.alpha, self.eta))
     }
 
     pub(super) fn is_delta(&self) -> bool {

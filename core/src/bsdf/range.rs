@@ -5,7 +5,7 @@ use glam::Vec3;
 
 /// Largest index of refraction, above that of all transparent materials. Beyond it, refraction from inside
 /// amplifies the rounding of directions.
-pub(super) const GREATEST_INDEX: f32 = 20.0;
+pub(super) const MAX_INDEX: f32 = 20.0;
 
 /// `x` clamped to 0 … 1; NaN becomes 0.
 #[inline]

@@ -1,6 +1,6 @@
 //! BSDF of a hit from a material of the scene: looks up textures and clamps parameters.
 
-use super::range::{GREATEST_INDEX, unit, unit_rgb};
+use super::range::{MAX_INDEX, unit, unit_rgb};
 use super::{Bsdf, Conductor, Dielectric, Diffuse, Features, Glossy, Mirror, Plastic, RoughDielectric};
 use crate::Rgb;
 use crate::scene::{ColorInput, Material, SMOOTH_ALPHA, ScalarInput, Scene, Surface};
@@ -49,8 +49,7 @@ fn alpha(roughness: f32) -> f32 {
 
 #[inline]
 fn dielectric(ior: f32, front: bool, tint: Rgb, alpha: f32) -> Bsdf {
-    let ior =
-        if ior > 0.0 && ior.is_finite() { ior.clamp(1.0 / GREATEST_INDEX, GREATEST_INDEX) } else { 1.0 };
+    let ior = if ior > 0.0 && ior.is_finite() { ior.clamp(1.0 / MAX_INDEX, MAX_INDEX) } else { 1.0 };
     let eta = if front { ior } else { 1.0 / ior };
     // A rough boundary scatters transmitted light only by alpha (eta - 1).
     if alpha * (eta - 1.0).abs() < MIN_SCATTER {

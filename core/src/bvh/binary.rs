@@ -61,7 +61,7 @@ pub(super) const fn nodes_of(references: usize) -> usize {
 const PARALLEL_MIN: usize = 4096;
 
 /// Depth from which ranges are halved by count, which ends within 28 more levels.
-const HALVE_FROM: usize = DEPTH_MAX - 32;
+const HALVING_DEPTH: usize = DEPTH_MAX - 32;
 
 /// Sorts `references` and fills `nodes`, which has the length of [`nodes_of`].
 pub(super) fn build<J: ForkJoin>(
@@ -89,7 +89,7 @@ impl<J: ForkJoin> Division<'_, J> {
             return;
         }
         let (mid, left, right) =
-            if depth < HALVE_FROM { divide(self.level, references, extent) } else { halve(references) };
+            if depth < HALVING_DEPTH { divide(self.level, references, extent) } else { halve(references) };
         let (left_references, right_references) = references.split_at_mut(mid);
         let (left_nodes, right_nodes) = below.split_at_mut(nodes_of(mid).min(below.len()));
         let mut on_the_left = || self.subtree(left_references, left_nodes, &left, depth + 1);

@@ -17,10 +17,11 @@ pub const POINTS: usize = 8;
 /// Size of the traversal stack. If it overflows, the surroundings count as closed.
 const STACK_SIZE: usize = 64;
 
-/// An overhang has a plane at least `STEP` times the reach above the point, and the cosine of its slope is at
-/// least `STEEPEST`: at most sixty degrees. The planes of a surface that bends upwards pass below.
-const STEP: f32 = 0.01;
-const STEEPEST: f32 = 0.5;
+/// An overhang has a plane at least `MIN_OVERHANG_HEIGHT` times the reach above the point, and the cosine of
+/// its slope is at least `MIN_OVERHANG_COSINE`: at most sixty degrees. The planes of a surface that bends
+/// upwards pass below.
+const MIN_OVERHANG_HEIGHT: f32 = 0.01;
+const MIN_OVERHANG_COSINE: f32 = 0.5;
 
 /// Region and points of a clearance query.
 #[derive(Clone, Copy, Debug)]
@@ -139,8 +140,8 @@ impl ClearanceQuery {
         if !(is_low(a) && is_low(b) && is_low(c)) {
             clearance.has_wall = true;
             let normal = (b - a).cross(c - a);
-            let is_steep = normal.z.abs() < STEEPEST * normal.length();
-            let passes_below = normal.dot(a) / normal.z <= STEP * self.reach;
+            let is_steep = normal.z.abs() < MIN_OVERHANG_COSINE * normal.length();
+            let passes_below = normal.dot(a) / normal.z <= MIN_OVERHANG_HEIGHT * self.reach;
             clearance.has_overhang |= !(is_steep || passes_below);
             return;
         }

@@ -19,7 +19,7 @@ const ROWS: usize = 32;
 pub type Bins = [f32; COLUMNS * ROWS];
 
 /// Share of samples that is uniform over all bins, because the prepass may have missed light.
-const DEFENCE: f32 = 0.1;
+const DEFENSIVE_SHARE: f32 = 0.1;
 
 /// Density over the unit square for one place.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
@@ -60,8 +60,8 @@ impl VisibilityTable {
         let count = bins.len() as f32;
         let finite = |x: f32| if x > 0.0 && x < f32::INFINITY { x } else { 0.0 };
         let sum: f32 = bins.iter().map(|&x| finite(x)).sum();
-        let share = if sum > 0.0 && sum < f32::INFINITY { (1.0 - DEFENCE) / sum } else { 0.0 };
-        let rest = if share > 0.0 { DEFENCE / count } else { 1.0 / count };
+        let share = if sum > 0.0 && sum < f32::INFINITY { (1.0 - DEFENSIVE_SHARE) / sum } else { 0.0 };
+        let rest = if share > 0.0 { DEFENSIVE_SHARE / count } else { 1.0 / count };
         bins.map(|x| rest + share * finite(x))
     }
 
@@ -161,7 +161,7 @@ pub struct VisibilityGrid {
 }
 
 /// Cells along the longest side, unless the grid exceeds `CELLS`.
-const LONGEST: f32 = 24.0;
+const CELLS_ALONG_LONGEST: f32 = 24.0;
 const CELLS: usize = 4096;
 /// Sides ±x, ±y, ±z that a surface may face.
 const SIDES: usize = 6;
@@ -174,7 +174,7 @@ impl VisibilityGrid {
         if !(longest > 0.0 && longest < f32::INFINITY && origin.is_finite()) {
             return None;
         }
-        let mut along = LONGEST;
+        let mut along = CELLS_ALONG_LONGEST;
         loop {
             let counts = (size / longest * along).to_array().map(|n| n as u32 + 1);
             let cells: u32 = counts.iter().product();
@@ -283,7 +283,7 @@ mod tests {
         let table = table();
         let all = (0..COLUMNS * ROWS).map(|bin| table.density(VisibilityTable::place(bin, [0.5; 2])));
         assert!((all.clone().sum::<f32>() / (COLUMNS * ROWS) as f32 - 1.0).abs() < 1e-5);
-        assert!(all.fold(f32::INFINITY, f32::min) > 0.5 * DEFENCE);
+        assert!(all.fold(f32::INFINITY, f32::min) > 0.5 * DEFENSIVE_SHARE);
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! Batches of searches in Morton order, each bounded by the result of the previous search.
 
 use super::PhotonMap;
-use super::gather::{Density, Response, gather};
+use super::gather::{DensityEstimate, Response, gather};
 use super::kernel::QueryDisc;
 use super::morton::{self, QueryOrder};
 use super::nearest::{Neighbours, search};
@@ -57,7 +57,7 @@ pub(super) struct GatherBatch<'a, 'm, R> {
     pub discs: &'a [QueryDisc],
     pub response: &'a R,
     pub order: &'a mut [QueryOrder],
-    pub densities: &'a mut [Density],
+    pub densities: &'a mut [DensityEstimate],
 }
 
 impl<R: Response> Kernel for GatherBatch<'_, '_, R> {

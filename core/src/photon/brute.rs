@@ -1,6 +1,8 @@
 //! Brute-force reference of the searches, for tests: it visits every photon of a map.
 
-use super::{Density, FLATNESS, Kernel, MIN_NORMAL_COSINE, PhotonMap, QueryDisc, Response, layout::LEAF};
+use super::{
+    DensityEstimate, FLATNESS, Kernel, MIN_NORMAL_COSINE, PhotonMap, QueryDisc, Response, layout::LEAF,
+};
 use core::f32::consts::PI;
 use glam::Vec3;
 use halflight_simd::kernels::points::squared_distance;
@@ -18,8 +20,8 @@ pub fn within(map: &PhotonMap, place: Vec3, radius: f32) -> impl Iterator<Item =
 }
 
 /// Reference of [`PhotonMap::gather`]: the same photons, summed in another order.
-pub fn gather<R: Response>(map: &PhotonMap, disc: &QueryDisc, response: &R) -> Density {
-    let mut density = Density::default();
+pub fn gather<R: Response>(map: &PhotonMap, disc: &QueryDisc, response: &R) -> DensityEstimate {
+    let mut density = DensityEstimate::default();
     let squared_radius = map.space.squared_to_map(disc.radius).unwrap_or(0.0);
     if !(squared_radius > 0.0 && squared_radius < f32::MAX) {
         return density;

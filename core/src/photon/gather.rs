@@ -62,7 +62,7 @@ impl Response for Uniform {
 
 /// Result of a density estimate.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Density {
+pub struct DensityEstimate {
     /// Response times power per area: W/(m² sr), or W/m² for a response of 1.
     pub radiance: Rgb,
     /// Estimates of the finer discs: less blur, more noise.
@@ -71,7 +71,7 @@ pub struct Density {
     pub photons: u32,
 }
 
-impl Density {
+impl DensityEstimate {
     /// Radiance of the finest disc that has at least `min_photons` photons, assuming even density, and of the
     /// disc of half its radius. For the finest disc the second value is extrapolated: blur falls with the
     /// square of the radius.
@@ -99,10 +99,10 @@ pub(super) struct Gather<'a, 'm, R> {
 }
 
 impl<R: Response> SimdKernel for Gather<'_, '_, R> {
-    type Out = Density;
+    type Out = DensityEstimate;
 
     #[inline(always)]
-    fn run<S: Simd>(self, simd: S) -> Density {
+    fn run<S: Simd>(self, simd: S) -> DensityEstimate {
         gather(simd, self.map, self.disc, self.boundary, self.response)
     }
 }
@@ -115,8 +115,8 @@ pub(super) fn gather<S: Simd, R: Response>(
     disc: &QueryDisc,
     boundary: Option<&KernelBoundary>,
     response: &R,
-) -> Density {
-    let Some(test) = DiscTest::new(simd, map, disc, boundary) else { return Density::default() };
+) -> DensityEstimate {
+    let Some(test) = DiscTest::new(simd, map, disc, boundary) else { return DensityEstimate::default() };
     let DiscTest { place, squared_radius, .. } = test;
     let mut sum = Sum {
         test,
@@ -130,7 +130,8 @@ pub(super) fn gather<S: Simd, R: Response>(
     };
     leaves_within(simd, map, &place, squared_radius, &mut sum);
     let radiance = sum.disc.density((disc, 1.0), boundary, response);
-    let mut density = Density { radiance, finer: [Rgb::ZERO; FINER_DISCS], photons: sum.disc.photons };
+    let mut density =
+        DensityEstimate { radiance, finer: [Rgb::ZERO; FINER_DISCS], photons: sum.disc.photons };
     let mut part = 1.0;
     for (finer, radiance) in sum.finer.iter().zip(&mut density.finer) {
         part *= 0.5;

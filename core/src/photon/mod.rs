@@ -19,7 +19,7 @@ mod record;
 mod space;
 mod tagged;
 
-pub use gather::{Density, FINER_DISCS, FLATNESS, MIN_NORMAL_COSINE, Response, Uniform};
+pub use gather::{DensityEstimate, FINER_DISCS, FLATNESS, MIN_NORMAL_COSINE, Response, Uniform};
 pub use kernel::{Kernel, QueryDisc};
 pub use kernel_boundary::{KernelBoundary, PROBES};
 pub use morton::QueryOrder;
@@ -186,7 +186,7 @@ impl PhotonMap<'_> {
     }
 
     /// Density of photons on a disc, each weighted with the response of the surface.
-    pub fn gather<R: Response>(&self, level: Level, disc: &QueryDisc, response: &R) -> Density {
+    pub fn gather<R: Response>(&self, level: Level, disc: &QueryDisc, response: &R) -> DensityEstimate {
         level.dispatch(gather::Gather { map: self, disc, boundary: None, response })
     }
 
@@ -197,7 +197,7 @@ impl PhotonMap<'_> {
         disc: &QueryDisc,
         boundary: &KernelBoundary,
         response: &R,
-    ) -> Density {
+    ) -> DensityEstimate {
         let boundary = Some(boundary).filter(|boundary| !boundary.is_open());
         level.dispatch(gather::Gather { map: self, disc, boundary, response })
     }
@@ -238,7 +238,7 @@ impl PhotonMap<'_> {
         discs: &[QueryDisc],
         response: &R,
         order: &mut [QueryOrder],
-        densities: &mut [Density],
+        densities: &mut [DensityEstimate],
     ) {
         level.dispatch(batch::GatherBatch { map: self, discs, response, order, densities });
     }

@@ -266,15 +266,15 @@ fn what_is_gathered_is_what_brute_force_gathers() {
         let disc = QueryDisc { place: Vec3::ONE, normal: Vec3::Z, radius: 1.0, kernel: Kernel::Cone };
         for radius in [0.0, -1.0, f32::NAN, f32::INFINITY] {
             let found = map.gather(Level::detect(), &QueryDisc { radius, ..disc }, &Uniform(Rgb::ONE));
-            assert_eq!(found, Density::default());
+            assert_eq!(found, DensityEstimate::default());
         }
         let odd = QueryDisc { normal: Vec3::NAN, ..disc };
-        assert_eq!(map.gather(Level::detect(), &odd, &Uniform(Rgb::ONE)), Density::default());
+        assert_eq!(map.gather(Level::detect(), &odd, &Uniform(Rgb::ONE)), DensityEstimate::default());
     });
 }
 
 /// Radiance of a disc and of its finer discs.
-fn radiances(density: Density) -> [Rgb; 1 + FINER_DISCS] {
+fn radiances(density: DensityEstimate) -> [Rgb; 1 + FINER_DISCS] {
     let [half, quarter, eighth] = density.finer;
     [density.radiance, half, quarter, eighth]
 }
@@ -289,7 +289,7 @@ fn the_finest_disc_is_chosen_that_has_enough_photons() {
         (128, [quarter, eighth]),
         (512, [eighth, Rgb::splat(4.25)]),
     ] {
-        let density = Density { radiance: whole, finer: [half, quarter, eighth], photons };
+        let density = DensityEstimate { radiance: whole, finer: [half, quarter, eighth], photons };
         assert_eq!(density.of_finest_disc(8.0), expected, "{photons}");
         assert_eq!(density.of_finest_disc(f32::INFINITY), [whole, half]);
     }
@@ -387,11 +387,12 @@ fn batches_find_what_single_searches_find() {
             };
             let discs: Vec<_> = asked.iter().map(disc).collect();
             let mut order = vec![QueryOrder::default(); discs.len()];
-            let mut densities = vec![Density::default(); discs.len()];
+            let mut densities = vec![DensityEstimate::default(); discs.len()];
             map.gather_batch(level, &discs, &Uniform(Rgb::ONE), &mut order, &mut densities);
             for (disc, density) in discs.iter().zip(&densities) {
-                let bits =
-                    |density: Density| (density.radiance.to_array().map(f32::to_bits), density.photons);
+                let bits = |density: DensityEstimate| {
+                    (density.radiance.to_array().map(f32::to_bits), density.photons)
+                };
                 assert_eq!(bits(*density), bits(map.gather(level, disc, &Uniform(Rgb::ONE))), "{name}");
             }
         });

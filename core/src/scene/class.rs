@@ -12,7 +12,7 @@ pub(crate) const SMOOTH_ALPHA: f32 = 1e-4;
 pub(crate) const CAUSTIC_ALPHA: f32 = 0.1;
 
 /// Least albedo of a base that is diffuse for photons, with a margin for its textures.
-const LEAST_BASE: f32 = 0.05;
+const MIN_BASE_ALBEDO: f32 = 0.05;
 
 impl Surface {
     /// True if the surface may be purely diffuse somewhere.
@@ -66,7 +66,7 @@ impl Material {
                 // Without a base it reflects specularly, as far as is known without its textures.
                 let base =
                     if metallic.texture.is_some() { Rgb::ZERO } else { base.value * (1.0 - metallic.value) };
-                self.surface.may_be_smooth() || base.max_element() < LEAST_BASE
+                self.surface.may_be_smooth() || base.max_element() < MIN_BASE_ALBEDO
             }
         }
     }

@@ -26,10 +26,10 @@ const VIEWS: [(Vec3, Vec3); 6] = [
 const GRID: usize = 24;
 
 /// Factor by which a later view must exceed an earlier one.
-const CLEARLY: f32 = 1.05;
+const PREFERENCE_FACTOR: f32 = 1.05;
 
 /// Weight of a vertical view, because most scenes stand upright.
-const VERTICAL: f32 = 0.6;
+const VERTICAL_WEIGHT: f32 = 0.6;
 
 impl Camera {
     /// Camera that frames all of `mesh`, looking along that of the six axis directions from which the largest
@@ -43,9 +43,9 @@ impl Camera {
         let mut best = (0.0, in_front_of(&bounds, VIEWS[0].0, VIEWS[0].1));
         for (forward, up) in VIEWS {
             let camera = in_front_of(&bounds, forward, up);
-            let worth = if forward.y == 0.0 { 1.0 } else { VERTICAL };
-            let seen = worth * visible_area(&camera, mesh, &bounds);
-            if seen > CLEARLY * best.0 {
+            let weight = if forward.y == 0.0 { 1.0 } else { VERTICAL_WEIGHT };
+            let seen = weight * visible_area(&camera, mesh, &bounds);
+            if seen > PREFERENCE_FACTOR * best.0 {
                 best = (seen, camera);
             }
         }

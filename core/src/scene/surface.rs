@@ -34,13 +34,13 @@ const ERROR_UNITS: f32 = 16.0 * 0.5 * f32::EPSILON;
 
 /// Upper limit of slenderness, so that needles do not move rays too far. The error of the tracer's distances
 /// grows with the length of a triangle times its slenderness.
-const SLENDEREST: f32 = 16.0;
+const MAX_SLENDERNESS: f32 = 16.0;
 
 /// Squares outside this range lose bits to underflow or overflow.
 const SAFE_SQUARES: core::ops::Range<f32> = 1e-24..1e24;
 
 /// Least cosine of the viewer over the horizon of the shading normal, which is turned to reach it.
-const LOWEST_VIEW: f32 = 1e-3;
+const MIN_VIEW_COSINE: f32 = 1e-3;
 
 impl<'a> SurfacePoint<'a> {
     /// Point of `hit`, seen along `ray`. `None` if the scene has no such triangle or material, or the
@@ -60,7 +60,7 @@ impl<'a> SurfacePoint<'a> {
         // Scale-free: proportional to the coordinates and edges, without absolute terms.
         let coordinates = (w * p0.abs() + u * p1.abs() + v * p2.abs()).max_element();
         let reach = e1.abs().max(e2.abs()).max_element();
-        let error = ERROR_UNITS * (coordinates + reach * slenderness.min(SLENDEREST));
+        let error = ERROR_UNITS * (coordinates + reach * slenderness.min(MAX_SLENDERNESS));
 
         let to_viewer = -Vec3::from(ray.direction);
         let front = normal.dot(to_viewer) >= 0.0;
@@ -92,7 +92,7 @@ impl<'a> SurfacePoint<'a> {
         // An interpolated normal that faces away from the viewer is turned just far enough to face it.
         if bent || !mesh.normals.is_empty() {
             let cos = shading.dot(to_viewer);
-            let lowest = LOWEST_VIEW.min(geometric_normal.dot(to_viewer));
+            let lowest = MIN_VIEW_COSINE.min(geometric_normal.dot(to_viewer));
             if cos < lowest {
                 let turned = shading + (lowest - cos) * to_viewer;
                 shading = turned.try_normalize().unwrap_or(geometric_normal);

@@ -34,7 +34,7 @@ const PLACE: u32 = 1;
 const DIRECTION: u32 = 2;
 
 /// Factor on the radius of the bounding sphere, so that rounding leaves nothing outside.
-const AROUND: f32 = 1.0 + 1e-5;
+const SPHERE_MARGIN: f32 = 1.0 + 1e-5;
 
 /// Photon that leaves a light.
 #[derive(Clone, Copy, Debug)]
@@ -82,7 +82,7 @@ impl<'m> EmissionSampler<'m> {
     ) -> Result<Self, OutOfMemory> {
         let empty = bounds.is_empty();
         let (center, diagonal) = if empty { (Vec3::ZERO, 0.0) } else { (bounds.center(), bounds.diagonal()) };
-        let radius = 0.5 * diagonal * AROUND;
+        let radius = 0.5 * diagonal * SPHERE_MARGIN;
         let power = |i| power(scene, lights, radius, i);
         let largest = (0..lights.count()).map(power).fold(0.0, f64::max);
         // Relative to the largest, to fit into f32.

@@ -22,7 +22,7 @@ use super::connection::{ConnectionVertex, density};
 use super::estimator::Estimator;
 use super::sharing::{PathMemory, PathWave, Sharing};
 use crate::Rgb;
-use crate::bsdf::{Bsdf, Cover, Features};
+use crate::bsdf::{Bsdf, CoatTransmittance, Features};
 use crate::film::CIRCLE;
 use crate::geometry::Ray;
 use crate::scene::SurfacePoint;
@@ -45,7 +45,7 @@ const FIREFLY_OFFSET: u32 = 16;
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C)]
 struct Coated {
-    cover: Cover,
+    coat: CoatTransmittance,
     /// Fraction of the base in the reflected light of the light sample at y.
     of_light: [f32; 3],
     /// Fraction of the base in the reflected light that the path finds behind y.
@@ -105,16 +105,16 @@ impl ReuseState {
     /// Called before the path scatters at the surface after x. If other paths can connect to this surface, it
     /// becomes y, and the path gathers light for its circle, with throughput 1.
     #[inline]
-    fn arrive(&mut self, point: &SurfacePoint, cover: Option<Cover>, path: &mut PathState) {
+    fn arrive(&mut self, point: &SurfacePoint, coat: Option<CoatTransmittance>, path: &mut PathState) {
         if self.stage != LEFT_X {
             return;
         }
         self.y = ConnectionVertex::of(point);
         let density = density(&self.x, &self.y);
-        match cover {
-            Some(cover) if density > 0.0 && density < f32::INFINITY => {
-                self.stage = if cover == Cover::NONE { AT_Y } else { AT_COATED_Y };
-                self.coated = Coated { cover, ..Coated::default() };
+        match coat {
+            Some(coat) if density > 0.0 && density < f32::INFINITY => {
+                self.stage = if coat == CoatTransmittance::NONE { AT_Y } else { AT_COATED_Y };
+                self.coated = Coated { coat, ..Coated::default() };
                 self.radiance = core::mem::take(&mut path.radiance);
                 path.throughput = [1.0; 3];
             }
@@ -156,7 +156,7 @@ impl ReuseState {
     fn transmittance(&self, x: &ConnectionVertex) -> Rgb {
         let to_x = Vec3::from(x.position) - Vec3::from(self.y.position);
         let cosine = to_x.dot(self.y.normal.into()) / to_x.length();
-        self.coated.cover.transmittance(cosine.clamp(0.0, 1.0))
+        self.coated.coat.transmittance(cosine.clamp(0.0, 1.0))
     }
 
     /// Radiance of the sample without sharing; valid before shares are distributed.
@@ -205,7 +205,7 @@ impl Sharing for PathReuse {
 
     #[inline]
     fn arrive(state: &mut ReuseState, point: &SurfacePoint, bsdf: &Bsdf, path: &mut PathState) {
-        state.arrive(point, bsdf.cover(), path);
+        state.arrive(point, bsdf.coat_transmittance(), path);
     }
 
     /// Light behind x is shared, except at a coated y before the path has left it: the fraction of the base
@@ -332,7 +332,7 @@ impl PathReuse {
             }
             let total: f32 = targets.iter().map(|pair| pair.density).sum();
             let source = shared[first.source as usize];
-            let coated = source.coated.cover != Cover::NONE;
+            let coated = source.coated.coat != CoatTransmittance::NONE;
             let here = if coated { source.transmittance(&source.x) } else { Rgb::ONE };
             let base = Rgb::select(here.cmpgt(Rgb::ZERO), light / here, Rgb::ZERO);
             let most = self.firefly_limit * (FIREFLY_OFFSET + path.sample) as f32;

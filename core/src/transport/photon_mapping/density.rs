@@ -4,7 +4,9 @@ use crate::bsdf::{Bsdf, Features};
 use crate::bvh::Bvh;
 use crate::bvh::clearance::{Clearance, ClearanceQuery};
 use crate::geometry::Ray;
-use crate::photon::{Density, FLATNESS, Kernel, KernelBoundary, PROBES, PhotonMap, QueryDisc, Uniform};
+use crate::photon::{
+    DensityEstimate, FLATNESS, Kernel, KernelBoundary, PROBES, PhotonMap, QueryDisc, Uniform,
+};
 use crate::scene::SurfacePoint;
 use crate::transport::path::PathIntegrator;
 use crate::transport::path::estimator::{Estimator, KnownLight, Rest};
@@ -161,7 +163,7 @@ impl RadianceEstimate {
     }
 
     /// Density estimate over the smallest disc of `min_photons` photons.
-    fn of(density: Density, min_photons: f32, response: Rgb) -> Self {
+    fn of(density: DensityEstimate, min_photons: f32, response: Rgb) -> Self {
         let [chosen, finer] = density.of_finest_disc(min_photons);
         Self { light: chosen * response, blur: (chosen - finer) * (4.0 / 3.0) * response }
     }
@@ -183,7 +185,7 @@ pub(in crate::transport) struct Light<'a> {
 pub(in crate::transport) fn reflected<F: Features>(
     Light { map, is_caustic, min_photons }: Light,
     context: &SceneContext<F>,
-    (disc, all): (&QueryDisc, Option<Density>),
+    (disc, all): (&QueryDisc, Option<DensityEstimate>),
     (point, bsdf): (&SurfacePoint, &Bsdf),
     wo: Vec3,
     rotation: f32,

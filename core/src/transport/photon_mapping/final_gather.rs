@@ -35,21 +35,21 @@ use core::f32::consts::{FRAC_1_PI, SQRT_2};
 use glam::Vec3;
 
 /// Number of nearest irradiances. Their distance measures the blur of the map: the photons of an estimate
-/// reach [`BLUR`] times as far.
-const CHOICE: usize = 8;
+/// reach [`BLUR_RADIUS_FACTOR`] times as far.
+const NEAREST_IRRADIANCES: usize = 8;
 
-/// sqrt(NEAREST / (CHOICE · STRIDE)), since photons lie on surfaces.
-const BLUR: f32 = SQRT_2;
+/// sqrt(NEAREST / (NEAREST_IRRADIANCES · STRIDE)), since photons lie on surfaces.
+const BLUR_RADIUS_FACTOR: f32 = SQRT_2;
 
 /// Minimum length of a gather ray that ends in the map, in radii of the discs at its hit.
-const SHORTEST: f32 = 1.5;
+const MIN_RAY_LENGTH: f32 = 1.5;
 
 /// Maximum distance of the centroid of these irradiances from the centre of their disc, in radii. In even
 /// light one of thirteen exceeds it by chance; at a straight edge of light it is 0.42.
-const EVEN: f32 = 0.4;
+const MAX_CENTROID_OFFSET: f32 = 0.4;
 
-/// Stack memory of a lookup, in lines: [`Neighbours::footprint`] of [`CHOICE`].
-const LINES: usize = 32;
+/// Stack memory of a lookup, in lines: [`Neighbours::footprint`] of [`NEAREST_IRRADIANCES`].
+const LOOKUP_LINES: usize = 32;
 
 /// Global photon map for gather rays.
 #[derive(Clone, Copy)]
@@ -101,16 +101,17 @@ impl<'a> GlobalMapLookup<'a> {
         distance: f32,
     ) -> Option<(Rgb, f32)> {
         // Limits the search radius: beyond it the ray would be too short.
-        let within = self.farthest.min(distance / (SHORTEST * BLUR));
-        let mut lines = [Line([0; 64]); LINES];
+        let within = self.farthest.min(distance / (MIN_RAY_LENGTH * BLUR_RADIUS_FACTOR));
+        let mut lines = [Line([0; 64]); LOOKUP_LINES];
         let mut neighbours =
-            Neighbours::new(CHOICE, &mut Arena::new(bytemuck::cast_slice_mut(&mut lines))).ok()?;
+            Neighbours::new(NEAREST_IRRADIANCES, &mut Arena::new(bytemuck::cast_slice_mut(&mut lines)))
+                .ok()?;
         self.irradiances.nearest(level, point.position, within, &mut neighbours);
         let squared = neighbours.squared_radius();
         if squared.is_infinite() {
             return None;
         }
-        let radius = BLUR * libm::sqrtf(squared);
+        let radius = BLUR_RADIUS_FACTOR * libm::sqrtf(squared);
         let normal = point.geometric_normal;
         let is_seen = |photon: &Photon| {
             let is_open = photon.direction().dot(photon.normal()) >= 0.0;
@@ -122,7 +123,7 @@ impl<'a> GlobalMapLookup<'a> {
                 !bvh.occluded(level, &way)
             }
         };
-        let mut alike = [None; CHOICE];
+        let mut alike = [None; NEAREST_IRRADIANCES];
         let mut nearest: Option<(Photon, (f32, u32))> = None;
         let (mut count, mut moment) = (0.0, Vec3::ZERO);
         for (slot, (index, squared)) in alike.iter_mut().zip(neighbours.iter()) {
@@ -140,7 +141,8 @@ impl<'a> GlobalMapLookup<'a> {
             }
         }
         // Beside a bright spot all irradiances belong to the spot.
-        let is_even = moment.length_squared() <= EVEN * EVEN * count * count * squared;
+        let is_even =
+            moment.length_squared() <= MAX_CENTROID_OFFSET * MAX_CENTROID_OFFSET * count * count * squared;
         let (_, (_, nearest)) = nearest.filter(|(photon, _)| is_even && is_seen(photon))?;
         let (mut sum, mut weights) = (Rgb::ZERO, 0.0);
         for (photon, _) in

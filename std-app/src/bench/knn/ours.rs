@@ -6,7 +6,7 @@ use glam::Vec3;
 use halflight_core::bvh::ForkJoin;
 use halflight_core::memory::{Arena, Footprint, Line, OutOfMemory};
 use halflight_core::photon::{
-    Density, Kernel, Neighbours, Photon, PhotonMap, Photons, QueryDisc, QueryOrder, Uniform,
+    DensityEstimate, Kernel, Neighbours, Photon, PhotonMap, Photons, QueryDisc, QueryOrder, Uniform,
 };
 use halflight_core::{Level, Rgb};
 
@@ -104,7 +104,7 @@ impl Searcher for Batched<'_> {
             }
             Task::Gather { radius } => {
                 let discs: Vec<QueryDisc> = queries.iter().map(|query| disc(query, radius)).collect();
-                let mut densities = vec![Density::default(); discs.len()];
+                let mut densities = vec![DensityEstimate::default(); discs.len()];
                 self.map.gather_batch(self.level, &discs, &Uniform(Rgb::ONE), &mut order, &mut densities);
                 found = densities.iter().map(|density| u64::from(density.photons)).sum();
             }
