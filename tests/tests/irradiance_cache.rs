@@ -156,10 +156,10 @@ fn a_survey_reports_places_and_errors_of_records() {
     let done = cached(&scene, 64, 2, |s| s.survey = Some(60));
     assert_eq!((plain.image.pixels, plain.survey.is_none()), (done.image.pixels, true));
     let survey = done.survey.unwrap();
-    assert_eq!((survey.step, survey.width, survey.looks.len()), (1, 64, 64 * 64));
+    assert_eq!((survey.step, survey.width, survey.pixels.len()), (1, 64, 64 * 64));
     assert!(survey.points >= 40 && survey.checks.len() as u64 <= survey.points);
-    let served = survey.looks.iter().filter(|look| look.radius > 0.0).count();
-    assert!(served > 3000 && survey.looks.iter().filter(|look| look.mark == Mark::Record).count() > 50);
+    let served = survey.pixels.iter().filter(|pixel| pixel.radius > 0.0).count();
+    assert!(served > 3000 && survey.pixels.iter().filter(|pixel| pixel.mark == Mark::Record).count() > 50);
     // 256 gather rays: a few percent of noise per record. Overlapping records halve it.
     assert!(survey.achieved > 1e-4 && survey.achieved < 0.1, "{}", survey.achieved);
     assert!(survey.predicted > 1e-4 && survey.predicted < 1.0, "{}", survey.predicted);

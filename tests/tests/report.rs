@@ -4,7 +4,7 @@
 use core::sync::atomic::AtomicBool;
 use halflight::compare::compare;
 use halflight::load::{self, LoadOptions, LoadedScene};
-use halflight::render::{Place, RenderResult, Settings, Stop, render};
+use halflight::render::{RejectedTile, RenderResult, Settings, Stop, render};
 use halflight::report::{Provenance, Race, RaceEntry, Run};
 use halflight::save::to_srgb;
 use halflight_core::film::Dropped;
@@ -182,7 +182,7 @@ fn dropped_samples_have_counts_causes_and_tiles() {
     assert!(run_page(&loaded, &settings, &result).contains("samples was dropped"));
     let dropped = Dropped { nan: 3, unfinished: 40_000, ..Dropped::default() };
     result.counters.dropped = dropped;
-    result.places = vec![Place { x: 16, y: 0, width: 8, height: 16, dropped }];
+    result.rejected_tiles = vec![RejectedTile { x: 16, y: 0, width: 8, height: 16, dropped }];
     result.empty_pixels = 2;
     let page = run_page(&loaded, &settings, &result);
     for words in [

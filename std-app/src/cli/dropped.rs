@@ -1,11 +1,11 @@
 //! Rejected samples as lines of a summary.
 
-use halflight::render::Place;
+use halflight::render::RejectedTile;
 use halflight::report::quantity::plural;
 use halflight_core::transport::Counters;
 
 /// Lines with causes and the worst tile; none if no sample was rejected.
-pub(super) fn text(counters: &Counters, tiles: &[Place], empty_pixels: u64) -> Vec<String> {
+pub(super) fn text(counters: &Counters, tiles: &[RejectedTile], empty_pixels: u64) -> Vec<String> {
     let dropped = &counters.dropped;
     if dropped.total() == 0 {
         return Vec::new();

@@ -53,7 +53,7 @@ impl Merge {
             "mean_radiance": merged.image.mean(),
             "error": error_object(merged.error, merged.noise_and_blur, merged.audit.as_ref()),
             "may_be_biased": merged.is_biased,
-            "dropped": dropped_object(&counters.dropped, &merged.places, merged.empty_pixels),
+            "dropped": dropped_object(&counters.dropped, &merged.rejected_tiles, merged.empty_pixels),
             "outputs": saved,
         })
     }
@@ -67,6 +67,6 @@ fn text(merged: &Merged, saved: &[&PathBuf]) -> String {
         Some(audit) => lines.extend(summary::audited(audit)),
         None => lines.extend(summary::estimate(merged.error, merged.noise_and_blur, merged.is_biased)),
     }
-    lines.extend(dropped::text(&merged.counters, &merged.places, merged.empty_pixels));
+    lines.extend(dropped::text(&merged.counters, &merged.rejected_tiles, merged.empty_pixels));
     lines.join("\n")
 }

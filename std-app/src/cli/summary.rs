@@ -64,7 +64,7 @@ pub(super) fn text(run: &Run, report: Option<&Path>) -> String {
         readable_bytes(result.memory.iter().map(|part| part.bytes).sum()),
         readable_bytes(result.memory_peak),
     ));
-    lines.extend(dropped::text(&result.counters, &result.places, result.empty_pixels));
+    lines.extend(dropped::text(&result.counters, &result.rejected_tiles, result.empty_pixels));
     if result.filled_pixels > 0 {
         let pixels = plural(result.filled_pixels, "pixel");
         lines.push(format!("       {pixels} without a sample show the mean of their neighbours"));

@@ -11,7 +11,7 @@ use halflight_core::transport::PathIntegrator;
 use std::time::Instant;
 
 /// Time for path tracing if there is no sample.
-const SKETCHING: Duration = Duration::from_secs(1);
+const SKETCH_TIME: Duration = Duration::from_secs(1);
 
 /// Paths per wave of a thread, each of another pixel.
 const WAVE: usize = 64;
@@ -28,7 +28,7 @@ pub(super) fn sketch<F: Features>(
     size: [u32; 2],
     workers: &Workers,
 ) -> Vec<([u32; 2], [f32; 3])> {
-    let end = Instant::now() + SKETCHING;
+    let end = Instant::now() + SKETCH_TIME;
     let count = PathIntegrator::<F>::scratch(WAVE).bytes().div_ceil(size_of::<Line>());
     let mut scratch = vec![vec![Line([0; 64]); count]; workers.count()];
     let mut all = Vec::new();

@@ -5,10 +5,10 @@ use super::audit::{self, Audited};
 use super::error::{FileError, RenderError};
 use super::error_report::ErrorReport;
 use super::film_file::Reader;
-use super::ledger::{self, Place, empty_pixels};
 use super::method::Method;
 use super::noise_and_blur::NoiseAndBlur;
 use super::picture::image;
+use super::rejected_tiles::{self, RejectedTile, empty_pixels};
 use super::workers::Workers;
 use crate::memory::Budget;
 use crate::save::Image;
@@ -29,7 +29,7 @@ pub struct Merged {
     /// Paths, rays and rejected samples.
     pub counters: Counters,
     /// Tiles with rejected samples, most first.
-    pub places: Vec<Place>,
+    pub rejected_tiles: Vec<RejectedTile>,
     /// Black pixels, whose samples were all rejected.
     pub empty_pixels: u64,
     /// Whether the method is biased, for instance by photon blur. An unmeasured bias is not in the error.
@@ -94,7 +94,7 @@ pub fn merge(files: &[PathBuf]) -> Result<Merged, RenderError> {
         spp,
         seconds,
         counters: state.counters,
-        places: ledger::places(state.dropped, width, height),
+        rejected_tiles: rejected_tiles::rejected_tiles(state.dropped, width, height),
         empty_pixels: empty_pixels(&state.film, |_| true),
         error: report.error(),
         noise_and_blur: report.noise_and_blur,

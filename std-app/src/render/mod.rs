@@ -17,13 +17,13 @@ mod fingerprint;
 mod gaps;
 mod held_out;
 mod history;
-mod ledger;
 mod memory;
 mod merge;
 mod method;
 mod noise_and_blur;
 mod picture;
 mod regions;
+mod rejected_tiles;
 mod rewritten_file;
 mod rounds;
 mod run;
@@ -43,14 +43,14 @@ pub use halflight_core::method::bidirectional::BidirectionalSettings;
 pub use halflight_core::method::instant_radiosity::VirtualLightSettings;
 pub use halflight_core::method::metropolis::{MetropolisSettings, PrimarySpace};
 pub use history::{Against, Round};
-pub use ledger::Place;
 pub use memory::MemoryUse;
 pub use merge::{Merged, merge};
 pub use method::{CacheSettings, MapView, Method, PhotonSettings, PhotonView};
 pub use noise_and_blur::NoiseAndBlur;
+pub use rejected_tiles::RejectedTile;
 pub use rounds::{Stop, StopRule};
 pub use study::{IrradianceStudy, MetricError, study_irradiance};
-pub use survey::{Check, Look, Mark, Survey};
+pub use survey::{Check, Mark, Survey, SurveyPixel};
 
 use crate::save::Image;
 use core::sync::atomic::AtomicBool;
@@ -242,7 +242,7 @@ pub struct RenderResult {
     /// Views of the last photon maps, if requested.
     pub photon_view: Option<PhotonView>,
     /// Tiles with rejected samples, most first.
-    pub places: Vec<Place>,
+    pub rejected_tiles: Vec<RejectedTile>,
     /// Black pixels, whose samples were all rejected.
     pub empty_pixels: u64,
     /// Pixels without samples at an early end, filled from their surroundings.

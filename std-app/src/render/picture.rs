@@ -5,8 +5,8 @@ use super::error_report::ErrorReport;
 use super::film_file::{self, Header, Identity, Reader};
 use super::gaps::{self, Sketch};
 use super::history::{Clock, Reference, Round};
-use super::ledger::{self, empty_pixels};
 use super::method::{Method, Renderer, Stage};
+use super::rejected_tiles::{self, empty_pixels};
 use super::rewritten_file::RewrittenFile;
 use super::rounds::{Plan, Rounds};
 use super::survey::Survey;
@@ -331,7 +331,7 @@ impl<'a> Progressive<'a> {
             findings: findings.and(survey.as_ref().map(Survey::finding)),
             survey,
             photon_view: if is_viewed { renderer.photon_view().unwrap_or_default() } else { None },
-            places: ledger::places(state.dropped, settings.width, settings.height),
+            rejected_tiles: rejected_tiles::rejected_tiles(state.dropped, settings.width, settings.height),
             empty_pixels: empty_pixels(film, |task| state.shard.owns(task) && state.samples[task] > 0),
             filled_pixels,
             error,

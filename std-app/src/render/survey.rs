@@ -19,7 +19,7 @@ use std::time::Instant;
 const MOST_PIXELS: u64 = 1 << 21;
 
 /// Seconds that a survey may take in any case.
-const SHORT: f64 = 10.0;
+const MIN_SECONDS: f64 = 10.0;
 
 /// Most pixels with an own risk; in larger pictures neighbours share one.
 const MOST_RISKS: u64 = 1 << 16;
@@ -28,11 +28,11 @@ const MOST_RISKS: u64 = 1 << 16;
 const REPEATS: u32 = 2;
 
 /// Errors are relative to the irradiance, but at least to this share of its mean.
-const DARK: f64 = 0.1;
+const MIN_IRRADIANCE: f64 = 0.1;
 
 /// Half width of a drawn rim and radius of a drawn record, in pixels.
-const RIM: f32 = 0.6;
-const MIDDLE: f32 = 1.6;
+const RIM_HALF_WIDTH: f32 = 0.6;
+const RECORD_RADIUS: f32 = 1.6;
 
 /// Part of a record of the even samples' cache that a pixel shows.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -48,7 +48,7 @@ pub enum Mark {
 
 /// Survey of one pixel.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Look {
+pub struct SurveyPixel {
     /// Geometric mean of the radii of the records used there, in pixels; 0 without records.
     pub radius: f32,
     /// Relative error predicted by these records.
@@ -77,7 +77,7 @@ pub struct Survey {
     /// Pixels across in the maps.
     pub width: u32,
     /// Maps, row by row.
-    pub looks: Vec<Look>,
+    pub pixels: Vec<SurveyPixel>,
     /// Side in pixels of the square that a check represents.
     pub square: u32,
     /// Checks at the points within reach of records.
@@ -128,7 +128,7 @@ pub(super) fn survey<F: Features>(
     executor: Threads,
 ) -> Result<Option<Survey>, RenderError> {
     let start = Instant::now();
-    let limit = seconds.and_then(|seconds| Duration::try_from_secs_f64(seconds.max(SHORT)).ok());
+    let limit = seconds.and_then(|seconds| Duration::try_from_secs_f64(seconds.max(MIN_SECONDS)).ok());
     let mut executor = executor.until(End::Round(limit.and_then(|limit| start.checked_add(limit))));
     let [width, height] = size;
     let mut step = 1;
@@ -136,13 +136,13 @@ pub(super) fn survey<F: Features>(
         step *= 2;
     }
     let order = ProgressiveOrder::new(width, height, step);
-    let mut found = vec![Look::default(); order.len() as usize];
+    let mut found = vec![SurveyPixel::default(); order.len() as usize];
     let passed = executor.pass(found.chunks_mut(PIXELS), |task, out, _| {
         let (mut counters, mut places) = (Counters::default(), [GatherPoint::NONE; PIXELS]);
         tracer.places(&order, (task * PIXELS) as u64, (0, Via::Specular), &mut places, &mut counters);
         tracer.measure_overhangs(&mut places, &mut counters);
-        for (look, place) in out.iter_mut().zip(&places).filter(|(_, place)| place.is_some()) {
-            *look = look_at(place, caches, step);
+        for (surveyed, place) in out.iter_mut().zip(&places).filter(|(_, place)| place.is_some()) {
+            *surveyed = survey_pixel(place, caches, step);
         }
         Ok(counters)
     })?;
@@ -150,10 +150,10 @@ pub(super) fn survey<F: Features>(
         return Ok(None);
     }
     let (columns, rows) = (width.div_ceil(step), height.div_ceil(step));
-    let mut looks = vec![Look::default(); columns as usize * rows as usize];
-    for (i, look) in found.into_iter().enumerate() {
+    let mut pixels = vec![SurveyPixel::default(); columns as usize * rows as usize];
+    for (i, surveyed) in found.into_iter().enumerate() {
         if let Some((x, y)) = order.pixel(i as u64) {
-            looks[(y / step * columns + x / step) as usize] = look;
+            pixels[(y / step * columns + x / step) as usize] = surveyed;
         }
     }
 
@@ -168,7 +168,7 @@ pub(super) fn survey<F: Features>(
     Ok(Some(Survey {
         step,
         width: columns,
-        looks,
+        pixels,
         square: stride(size, points_asked[0]),
         points: points.len() as u64,
         predicted: average(&|(check, _)| check.predicted.into()),
@@ -199,36 +199,36 @@ pub(super) fn risks<F: Features>(
         let (mut counters, mut places) = (Counters::default(), [GatherPoint::NONE; PIXELS]);
         tracer.places(&order, (task * PIXELS) as u64, (0, Via::Specular), &mut places, &mut counters);
         for (out, place) in out.iter_mut().zip(&places).filter(|(_, place)| place.is_some()) {
-            *out = said_at(place, caches);
+            *out = record_mean_and_variance(place, caches);
         }
         Ok(counters)
     })?;
     if !passed.is_complete {
         return Ok(Vec::new());
     }
-    let known = || found.iter().filter(|[said, _]| *said > 0.0);
-    let mean = known().map(|[said, _]| f64::from(*said)).sum::<f64>() / known().count().max(1) as f64;
-    let dark = ((DARK * mean).powi(2)) as f32;
+    let known = || found.iter().filter(|[value, _]| *value > 0.0);
+    let mean = known().map(|[value, _]| f64::from(*value)).sum::<f64>() / known().count().max(1) as f64;
+    let dark = ((MIN_IRRADIANCE * mean).powi(2)) as f32;
     let mut risks = vec![0.0; width as usize * height as usize];
-    for (i, [said, variance]) in found.into_iter().enumerate() {
-        let Some((x, y)) = order.pixel(i as u64).filter(|_| said > 0.0) else { continue };
+    for (i, [value, variance]) in found.into_iter().enumerate() {
+        let Some((x, y)) = order.pixel(i as u64).filter(|_| value > 0.0) else { continue };
         for row in y..(y + step).min(height) {
             let first = row as usize * width as usize;
             let end = (x + step).min(width) as usize;
-            risks[first + x as usize..first + end].fill(variance / (said * said + dark));
+            risks[first + x as usize..first + end].fill(variance / (value * value + dark));
         }
     }
     Ok(risks)
 }
 
 /// Weighted mean of the values of both caches' records at a point, and their variance.
-fn said_at(place: &GatherPoint, caches: [&IrradianceCache; 2]) -> [f32; 2] {
+fn record_mean_and_variance(place: &GatherPoint, caches: [&IrradianceCache; 2]) -> [f32; 2] {
     let (mut sum, mut squares, mut weights) = (0.0, 0.0, 0.0);
     for cache in caches {
-        cache.visit_values(&place.query(), |said, weight| {
-            let said = luminance(said) as f32;
-            sum += weight * said;
-            squares += weight * said * said;
+        cache.visit_values(&place.query(), |value, weight| {
+            let value = luminance(value) as f32;
+            sum += weight * value;
+            squares += weight * value * value;
             weights += weight;
         });
     }
@@ -239,17 +239,17 @@ fn said_at(place: &GatherPoint, caches: [&IrradianceCache; 2]) -> [f32; 2] {
     [mean, (squares / weights - mean * mean).max(0.0)]
 }
 
-fn look_at(place: &GatherPoint, caches: [&IrradianceCache; 2], step: u32) -> Look {
+fn survey_pixel(place: &GatherPoint, caches: [&IrradianceCache; 2], step: u32) -> SurveyPixel {
     let (position, pixel) = (place.position(), place.pixel() * step as f32);
     let mut mark = Mark::None;
     let [even, _] = caches;
     even.visit(&place.query(), |record, _| {
         let [r1, r2] = record.radii;
         let distance = position.distance(record.position.into());
-        if distance < MIDDLE * pixel {
+        if distance < RECORD_RADIUS * pixel {
             mark = Mark::Record;
         } else if mark == Mark::None
-            && (record.radii_to(position) - 1.0).abs() * (r1 * r2).sqrt() < RIM * pixel
+            && (record.radii_to(position) - 1.0).abs() * (r1 * r2).sqrt() < RIM_HALF_WIDTH * pixel
         {
             mark = Mark::Rim;
         }
@@ -257,7 +257,7 @@ fn look_at(place: &GatherPoint, caches: [&IrradianceCache; 2], step: u32) -> Loo
     let radius =
         |record: &Record| (record.radii[0] * record.radii[1] / (place.pixel() * place.pixel())).sqrt();
     let [radius, predicted] = means(place, caches, |record| [radius(record).ln(), record.predicted()]);
-    Look { radius: if radius.is_finite() { radius.exp() } else { 0.0 }, predicted, mark }
+    SurveyPixel { radius: if radius.is_finite() { radius.exp() } else { 0.0 }, predicted, mark }
 }
 
 /// Weighted means over the records used at a point; NaN without records.
@@ -281,13 +281,13 @@ pub(super) fn means(
 /// records.
 fn check(point: &Point, mean: f64, caches: [&IrradianceCache; 2]) -> Option<(Check, f64)> {
     let Point { place, pixel, exact, variance } = point;
-    let said = caches.map(|cache| cache.at(&place.query()));
-    let said: Vec<f64> = said.into_iter().flatten().map(|said| luminance(said.irradiance)).collect();
-    if said.is_empty() {
+    let value = caches.map(|cache| cache.at(&place.query()));
+    let value: Vec<f64> = value.into_iter().flatten().map(|value| luminance(value.irradiance)).collect();
+    if value.is_empty() {
         return None;
     }
-    let found = said.iter().sum::<f64>() / said.len() as f64;
-    let against = exact.max(DARK * mean).max(f64::MIN_POSITIVE);
+    let found = value.iter().sum::<f64>() / value.len() as f64;
+    let against = exact.max(MIN_IRRADIANCE * mean).max(f64::MIN_POSITIVE);
     let [predicted, _] = means(place, caches, |record| [record.predicted(), 0.0]);
     let error = ((found - exact) / against) as f32;
     Some((Check { pixel: *pixel, error, predicted }, variance / (against * against)))

@@ -3,8 +3,8 @@
 use super::{Provenance, Race, Run};
 use crate::compare::Comparison;
 use crate::render::{
-    Against, Audited, Deviation, Ending, ErrorEstimate, NoiseAndBlur, Place, Region, RenderResult, Round,
-    Shard, StopRule,
+    Against, Audited, Deviation, Ending, ErrorEstimate, NoiseAndBlur, Region, RejectedTile, RenderResult,
+    Round, Shard, StopRule,
 };
 use halflight_core::film::Dropped;
 use halflight_core::findings::{Findings, Value as FindingValue};
@@ -49,7 +49,7 @@ pub(super) fn run(run: &Run) -> Value {
         "mean_radiance": result.image.mean(),
         "error": error(run),
         "history": result.history.iter().map(round).collect::<Value>(),
-        "dropped": dropped_object(&result.counters.dropped, &result.places, result.empty_pixels),
+        "dropped": dropped_object(&result.counters.dropped, &result.rejected_tiles, result.empty_pixels),
         "filled_pixels": result.filled_pixels,
         "memory": memory.collect::<Map<_, _>>(),
         "memory_peak": result.memory_peak,
@@ -235,8 +235,8 @@ pub fn comparison_object(comparison: &Comparison) -> Value {
 const MAX_TILES: usize = 64;
 
 /// Object `dropped`: rejected samples by cause, and the worst tiles.
-pub fn dropped_object(dropped: &Dropped, tiles: &[Place], empty_pixels: u64) -> Value {
-    let tile = |tile: &Place| {
+pub fn dropped_object(dropped: &Dropped, tiles: &[RejectedTile], empty_pixels: u64) -> Value {
+    let tile = |tile: &RejectedTile| {
         let mut object = causes(&tile.dropped);
         for (name, value) in [("x", tile.x), ("y", tile.y), ("width", tile.width), ("height", tile.height)] {
             object[name] = value.into();

@@ -51,7 +51,7 @@ impl<F: Features, M: method::Method> Renderer for Adapter<'_, F, M> {
     }
 
     fn photon_view(&mut self) -> Result<Option<PhotonView>, RenderError> {
-        Ok(photon_view::look::<F>(&self.stage, &self.method.last_maps()?)?)
+        Ok(photon_view::render::<F>(&self.stage, &self.method.last_maps()?)?)
     }
 
     fn findings(&self) -> Findings {

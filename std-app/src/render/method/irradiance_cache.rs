@@ -303,7 +303,7 @@ impl<F: Features> Renderer for Cached<'_, '_, F> {
     fn photon_view(&mut self) -> Result<Option<PhotonView>, RenderError> {
         let Some(photons) = &mut self.photons else { return Ok(None) };
         let maps = LastMaps { global: None, caustic: photons.last_map()? };
-        Ok(photon_view::look::<F>(&self.stage, &maps)?)
+        Ok(photon_view::render::<F>(&self.stage, &maps)?)
     }
 
     fn findings(&self) -> Findings {

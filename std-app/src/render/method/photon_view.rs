@@ -43,10 +43,10 @@ const MOST_PIXELS: u32 = 256;
 const MOST_PHOTONS: usize = 1 << 18;
 
 /// Relative tolerance of distance in the visibility test of a photon.
-const BEFORE: f32 = 1e-3;
+const DISTANCE_TOLERANCE: f32 = 1e-3;
 
 /// Views of the maps of `stage`; `None` without maps.
-pub(super) fn look<F: Features>(stage: &Stage, maps: &LastMaps) -> Result<Option<PhotonView>, OutOfMemory> {
+pub(super) fn render<F: Features>(stage: &Stage, maps: &LastMaps) -> Result<Option<PhotonView>, OutOfMemory> {
     if maps.global.is_none() && maps.caustic.is_none() {
         return Ok(None);
     }
@@ -54,7 +54,7 @@ pub(super) fn look<F: Features>(stage: &Stage, maps: &LastMaps) -> Result<Option
     let (width, height) = (settings.width, settings.height);
     let factor = width.max(height).div_ceil(MOST_PIXELS);
     let size = [width.div_ceil(factor), height.div_ceil(factor)];
-    let of = |map: &PhotonMap| look_at::<F>(stage, map, size);
+    let of = |map: &PhotonMap| map_view::<F>(stage, map, size);
     Ok(Some(PhotonView {
         width: size[0],
         global: maps.global.as_ref().map(of).transpose()?,
@@ -62,7 +62,7 @@ pub(super) fn look<F: Features>(stage: &Stage, maps: &LastMaps) -> Result<Option
     }))
 }
 
-fn look_at<F: Features>(
+fn map_view<F: Features>(
     stage: &Stage,
     map: &PhotonMap,
     [width, height]: [u32; 2],
@@ -73,9 +73,9 @@ fn look_at<F: Features>(
     let mut view = MapView { positions: vec![0.0; pixels], ..MapView::default() };
 
     let every = map.len().div_ceil(MOST_PHOTONS).max(1);
-    let (mut looked_at, mut seen) = (0u32, 0u32);
+    let (mut tested, mut seen) = (0u32, 0u32);
     for photon in (0..map.len()).step_by(every).filter_map(|index| map.get(index as u32)) {
-        looked_at += 1;
+        tested += 1;
         let Some(at) = camera.project(width, height, photon.position(), [0.5; 2]) else { continue };
         let is_inside = at.raster.x >= 0.0
             && at.raster.y >= 0.0
@@ -86,7 +86,8 @@ fn look_at<F: Features>(
             continue;
         }
         let origin = photon.position() - at.distance * at.direction;
-        if bvh.occluded(level, &Ray::segment(origin, at.direction, (1.0 - BEFORE) * at.distance)) {
+        if bvh.occluded(level, &Ray::segment(origin, at.direction, (1.0 - DISTANCE_TOLERANCE) * at.distance))
+        {
             continue;
         }
         seen += 1;
@@ -95,7 +96,7 @@ fn look_at<F: Features>(
             *count += every as f32;
         }
     }
-    view.seen = f64::from(seen) / f64::from(looked_at.max(1));
+    view.seen = f64::from(seen) / f64::from(tested.max(1));
 
     let mut lines = vec![Line([0; 64]); Neighbours::footprint(NEAREST).bytes() / size_of::<Line>()];
     let mut neighbours = Neighbours::new(NEAREST, &mut Arena::new(bytemuck::cast_slice_mut(&mut lines)))?;

@@ -3,7 +3,7 @@
 use super::map::{Map, difference};
 use super::picture::{img, reduced};
 use crate::compare::Shown;
-use crate::render::{Check, Look, Mark, Survey};
+use crate::render::{Check, Mark, Survey, SurveyPixel};
 use crate::report::Run;
 use crate::report::quantity::plural;
 use crate::save::{Image, from_srgb};
@@ -19,21 +19,21 @@ const DIMMED: f32 = 0.4;
 /// Section of the survey; empty without one.
 pub(super) fn section(run: &Run) -> Markup {
     let Some(survey) = &run.result.survey else { return html! {} };
-    let map = |value: fn(&Look) -> f32| Map {
+    let map = |value: fn(&SurveyPixel) -> f32| Map {
         width: survey.width,
-        values: survey.looks.iter().map(value).collect(),
+        values: survey.pixels.iter().map(value).collect(),
     };
     html! {
         section {
             h2 { "Records of the irradiance cache" }
             div.maps {
                 (records(run, survey))
-                (map(|look| look.radius).figure(
+                (map(|pixel| pixel.radius).figure(
                     "Radii",
                     "Mean validity radius of the records at a pixel, in pixels. Black pixels have no record \
                     and are path traced.",
                 ))
-                (map(|look| look.predicted).figure(
+                (map(|pixel| pixel.predicted).figure(
                     "Predicted error",
                     "Error that the records predict, relative to the irradiance.",
                 ))
@@ -63,12 +63,12 @@ fn records(run: &Run, survey: &Survey) -> Markup {
         let (x, y) = ((x * survey.step).min(image.width - 1), (y * survey.step).min(image.height - 1));
         image.pixels[(y * image.width + x) as usize].map(|value| DIMMED * value.clamp(0.0, 1.0))
     };
-    let pixels = survey.looks.iter().zip(0..).map(|(look, i)| match look.mark {
+    let pixels = survey.pixels.iter().zip(0..).map(|(pixel, i)| match pixel.mark {
         Mark::None => below(i % survey.width, i / survey.width),
         Mark::Rim => BORDER.map(from_srgb),
         Mark::Record => CENTRE.map(from_srgb),
     });
-    let height = survey.looks.len() as u32 / survey.width.max(1);
+    let height = survey.pixels.len() as u32 / survey.width.max(1);
     let drawn = Image { width: survey.width, height, pixels: pixels.collect() };
     html! {
         figure {

@@ -1,6 +1,6 @@
 //! Sections and elements that the pages of renders and races share.
 
-use crate::render::Place;
+use crate::render::RejectedTile;
 use crate::report::quantity::{
     grouped, percent, plural, readable_bytes, readable_name, readable_seconds, readable_value,
 };
@@ -178,8 +178,8 @@ pub(super) fn dropped(run: &Run) -> Markup {
     ];
     let fraction = |count: u64| percent(count as f64 / paths.max(1) as f64);
     let causes = causes.map(|(cause, count)| vec![cause.into(), grouped(count), fraction(count)]);
-    let all = &run.result.places;
-    let tile = |tile: &Place| {
+    let all = &run.result.rejected_tiles;
+    let tile = |tile: &RejectedTile| {
         let (right, bottom) = (tile.x + tile.width - 1, tile.y + tile.height - 1);
         let name = format!("columns {} to {right}, rows {} to {bottom}", tile.x, tile.y);
         vec![name, grouped(tile.dropped.total())]

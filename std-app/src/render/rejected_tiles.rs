@@ -4,7 +4,7 @@ use halflight_core::film::{Dropped, Film, TILE, Tile};
 
 /// A tile with rejected samples, smaller at the borders of the picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Place {
+pub struct RejectedTile {
     /// Column of its upper left pixel.
     pub x: u32,
     /// Row of its upper left pixel.
@@ -18,15 +18,15 @@ pub struct Place {
 }
 
 /// The tiles of a picture that have rejected samples, those with the most first.
-pub(super) fn places(dropped: &[Dropped], width: u32, height: u32) -> Vec<Place> {
+pub(super) fn rejected_tiles(dropped: &[Dropped], width: u32, height: u32) -> Vec<RejectedTile> {
     let of_tile = |(task, &dropped): (usize, &Dropped)| {
         let [x, y] = Tile::new(width, height, task).corner();
-        Some(Place { x, y, width: TILE.min(width - x), height: TILE.min(height - y), dropped })
+        Some(RejectedTile { x, y, width: TILE.min(width - x), height: TILE.min(height - y), dropped })
     };
     let some = dropped.iter().enumerate().filter(|(_, dropped)| dropped.total() > 0);
-    let mut places: Vec<Place> = some.filter_map(of_tile).collect();
-    places.sort_by_key(|place| core::cmp::Reverse(place.dropped.total()));
-    places
+    let mut tiles: Vec<RejectedTile> = some.filter_map(of_tile).collect();
+    tiles.sort_by_key(|tile| core::cmp::Reverse(tile.dropped.total()));
+    tiles
 }
 
 /// Pixels of the tiles in `tasks` without samples, because all were rejected.
@@ -48,9 +48,9 @@ mod tests {
         let nan = |count| Dropped { nan: count, ..Dropped::default() };
         let dropped = [0, 6, 0, 0, 0, 3].map(nan);
         // 40 x 20 pixels are 3 x 2 tiles.
-        let places = places(&dropped, 40, 20);
-        assert_eq!(places.len(), 2);
-        assert_eq!(places[0], Place { x: 16, y: 0, width: 16, height: 16, dropped: nan(6) });
-        assert_eq!(places[1], Place { x: 32, y: 16, width: 8, height: 4, dropped: nan(3) });
+        let tiles = rejected_tiles(&dropped, 40, 20);
+        assert_eq!(tiles.len(), 2);
+        assert_eq!(tiles[0], RejectedTile { x: 16, y: 0, width: 16, height: 16, dropped: nan(6) });
+        assert_eq!(tiles[1], RejectedTile { x: 32, y: 16, width: 8, height: 4, dropped: nan(3) });
     }
 }
