@@ -26,7 +26,7 @@ pub(super) struct Memory<'m> {
     /// Requested limit; near it, optional structures are smaller.
     limit: Option<usize>,
     /// Hard limit. Without a requested limit it depends on the machine, and must influence nothing else.
-    wall: usize,
+    hard_limit: usize,
     uses: Vec<MemoryUse>,
     peak: usize,
 }
@@ -35,13 +35,13 @@ impl<'m> Memory<'m> {
     /// Counts as taken: the buffers of `scene`, and the reference with the memory of comparisons.
     pub(super) fn new(scene: &Scene, settings: &Settings, bank: &'m Bank) -> Self {
         let limit = settings.memory;
-        let wall = Budget::new(limit).limit();
+        let hard_limit = Budget::new(limit).limit();
         let mut uses = vec![MemoryUse { structure: "scene", bytes: scene_bytes(scene) }];
         if let Some(reference) = &settings.reference {
             let bytes = size_of_val(&reference.pixels[..]) + working_bytes(reference);
             uses.push(MemoryUse { structure: "reference", bytes });
         }
-        let mut memory = Self { bank, limit, wall, uses, peak: 0 };
+        let mut memory = Self { bank, limit, hard_limit, uses, peak: 0 };
         memory.peak = memory.total();
         memory
     }
@@ -58,7 +58,7 @@ impl<'m> Memory<'m> {
 
     /// Bytes available for reading a file.
     pub(super) fn for_file(&self) -> usize {
-        self.wall.saturating_sub(self.total())
+        self.hard_limit.saturating_sub(self.total())
     }
 
     /// Takes `footprint` bytes for `structure`.
@@ -108,8 +108,8 @@ impl<'m> Memory<'m> {
     /// Bytes in use after `footprint` more; an error beyond the hard limit.
     fn needed(&self, footprint: Footprint) -> Result<usize, OutOfMemory> {
         let needed = self.total().saturating_add(footprint.bytes());
-        match needed > self.wall {
-            true => Err(OutOfMemory { needed, available: self.wall }),
+        match needed > self.hard_limit {
+            true => Err(OutOfMemory { needed, available: self.hard_limit }),
             false => Ok(needed),
         }
     }

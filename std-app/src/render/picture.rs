@@ -198,7 +198,7 @@ impl<'a> Progressive<'a> {
         let left = settings.stop.seconds.map(|limit| limit - self.estimating - clock.seconds());
         let work = (state.counters.all_rays(), clock.seconds());
         if audit.is_open() {
-            audit.weigh(renderer.risks(workers)?);
+            audit.set_risks(renderer.risks(workers)?);
         }
         renderer.lend_photons(&mut |photons| audit.step(workers, &state.film, photons, work, left))
     }
@@ -214,7 +214,7 @@ impl<'a> Progressive<'a> {
         let (Stage { settings, workers, .. }, rounds) = (*stage, &self.rounds);
         let Some(audit) = audit else { return Ok(report) };
         if let Some(audited) = &report.audited {
-            audit.focus(audited, (state.counters.all_rays(), rounds.spp()));
+            audit.reduce_pixels(audited, (state.counters.all_rays(), rounds.spp()));
         }
         if settings.audit.is_some() {
             return Ok(report);
@@ -231,7 +231,7 @@ impl<'a> Progressive<'a> {
         while report.audited.as_ref().is_some_and(|audited| rounds.waits_for(audited)) {
             let mut went = false;
             renderer.lend_photons(&mut |photons| {
-                went = audit.go_on(workers, photons, &mut may)?;
+                went = audit.extend(workers, photons, &mut may)?;
                 Ok(())
             })?;
             if !went {

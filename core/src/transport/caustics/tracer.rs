@@ -129,7 +129,7 @@ impl<'a, F: Features> CausticPhotonTracer<'a, F> {
         out: &mut [Photon],
     ) -> Result<Counters, OutOfMemory> {
         let mut pile = PhotonBuffer::new(out);
-        let leave = |_: &LightPathState, photon, _, counters: &mut Counters| pile.leave(photon, counters);
+        let leave = |_: &LightPathState, photon, _, counters: &mut Counters| pile.push(photon, counters);
         let counters = self.flight.follow(
             task,
             map,

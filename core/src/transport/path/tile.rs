@@ -22,7 +22,7 @@ use core::ops::Range;
 /// Remaining samples of a tile.
 pub(in crate::transport) struct TileSampler {
     tile: Tile,
-    left: Range<u32>,
+    remaining: Range<u32>,
     /// Next circle of the layer, or next pixel without path reuse.
     next: usize,
     /// Pixels whose camera paths leave direct emission to extra rays.
@@ -31,19 +31,19 @@ pub(in crate::transport) struct TileSampler {
 
 impl TileSampler {
     pub(in crate::transport) fn new(tile: Tile, samples: Range<u32>) -> Self {
-        Self { tile, left: samples, next: 0, silhouette_pixels: PixelSet::default() }
+        Self { tile, remaining: samples, next: 0, silhouette_pixels: PixelSet::default() }
     }
 
     /// Next of the `count` parts of a layer, and its sample number.
     fn next_of(&mut self, count: usize) -> Option<(usize, u32)> {
         if self.next == count {
-            (self.next, self.left.start) = (0, self.left.start.saturating_add(1));
+            (self.next, self.remaining.start) = (0, self.remaining.start.saturating_add(1));
         }
-        if self.left.is_empty() {
+        if self.remaining.is_empty() {
             return None;
         }
         self.next += 1;
-        Some((self.next - 1, self.left.start))
+        Some((self.next - 1, self.remaining.start))
     }
 }
 
@@ -65,27 +65,27 @@ impl<F: Features, E: Estimator<F>, R: Sharing> PathIntegrator<'_, F, E, R> {
         let mut counters = Counters::default();
         // At most the number of paths, since the memory of a wave is cleared.
         let most = samples.len().saturating_mul(PIXELS_PER_TILE);
-        let mut places = TileSampler::new(tile, samples);
-        places.silhouette_pixels =
+        let mut sampler = TileSampler::new(tile, samples);
+        sampler.silhouette_pixels =
             silhouette_pixels(self.context.scene, self.context.lights, &self.settings, tile);
         let mut wave = PathWave::<E::State, R>::new(wave.min(most), &mut arena)?;
-        let has_outlines = !places.silhouette_pixels.is_empty();
+        let has_silhouette = !sampler.silhouette_pixels.is_empty();
         loop {
-            let count = self.start(&mut places, &mut wave);
+            let count = self.start(&mut sampler, &mut wave);
             if count == 0 {
                 return Ok(counters);
             }
             counters.paths += count as u64;
             self.advance(&mut wave, count, &mut counters);
             self.sharing.distribute((&self.context, self.is_limited()), &mut wave, count, &mut counters);
-            if has_outlines {
-                let on_silhouette = |place| places.silhouette_pixels.contains(place as usize);
+            if has_silhouette {
+                let on_silhouette = |place| sampler.silhouette_pixels.contains(place as usize);
                 self.trace_silhouettes(on_silhouette, &mut wave.wave, count, &mut counters);
             }
             for i in 0..count {
                 let path = wave.wave.paths[i];
-                let lamps = if has_outlines { Rgb::from(wave.wave.shadow_light[i]) } else { Rgb::ZERO };
-                let radiance = wave.radiance(i) + lamps + self.estimator.splat(path.place);
+                let emission = if has_silhouette { Rgb::from(wave.wave.shadow_light[i]) } else { Rgb::ZERO };
+                let radiance = wave.radiance(i) + emission + self.estimator.splat(path.place);
                 let Some(pixel) = out.get_mut(path.place as usize) else { continue };
                 if pixel.add(path.sample, radiance, &mut counters.dropped) {
                     pixel.add_blur(path.sample, Rgb::from(path.blur));
@@ -97,27 +97,27 @@ impl<F: Features, E: Estimator<F>, R: Sharing> PathIntegrator<'_, F, E, R> {
     /// Fills the wave with camera rays and returns their number. With path reuse no circle is cut.
     pub(in crate::transport) fn start(
         &self,
-        places: &mut TileSampler,
+        sampler: &mut TileSampler,
         wave: &mut PathWave<E::State, R>,
     ) -> usize {
         let mut count = 0;
         let capacity = wave.wave.paths.len();
         if R::IN_CIRCLES {
             while count + CIRCLE <= capacity
-                && let Some((circle, sample)) = places.next_of(CIRCLES)
+                && let Some((circle, sample)) = sampler.next_of(CIRCLES)
             {
                 // Distinct for all circles in a wave.
                 let number = sample.wrapping_mul(CIRCLES as u32) + circle as u32;
-                for place in places.tile.circle(circle, self.settings.seed, sample) {
-                    self.begin(places, (place, sample), number, wave, &mut count);
+                for place in sampler.tile.circle(circle, self.settings.seed, sample) {
+                    self.begin(sampler, (place, sample), number, wave, &mut count);
                 }
             }
             return count;
         }
         while count < capacity
-            && let Some((place, sample)) = places.next_of(PIXELS_PER_TILE)
+            && let Some((place, sample)) = sampler.next_of(PIXELS_PER_TILE)
         {
-            self.begin(places, (place, sample), 0, wave, &mut count);
+            self.begin(sampler, (place, sample), 0, wave, &mut count);
         }
         count
     }
@@ -126,18 +126,18 @@ impl<F: Features, E: Estimator<F>, R: Sharing> PathIntegrator<'_, F, E, R> {
     #[inline]
     fn begin(
         &self,
-        places: &TileSampler,
+        sampler: &TileSampler,
         (place, sample): (usize, u32),
         circle: u32,
         wave: &mut PathWave<E::State, R>,
         count: &mut usize,
     ) {
-        let Some((x, y)) = places.tile.pixel(place) else { return };
+        let Some((x, y)) = sampler.tile.pixel(place) else { return };
         self.begin_path(
             wave,
             *count,
             ([x, y], place as u32, sample),
-            places.silhouette_pixels.contains(place),
+            sampler.silhouette_pixels.contains(place),
             circle,
         );
         *count += 1;

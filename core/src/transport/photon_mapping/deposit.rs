@@ -204,7 +204,7 @@ impl Visitor for Depositor<'_> {
         if stores {
             let power = Rgb::from(state.power);
             if power.max_element() > 0.0 {
-                self.buffer.leave(vertex.photon(power), counters);
+                self.buffer.push(vertex.photon(power), counters);
             }
         }
         self.keep.continuation(vertex, stores)

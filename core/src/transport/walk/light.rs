@@ -35,7 +35,7 @@ pub(in crate::transport) const MAX_CONTINUATION: f32 = 0.8;
 const SCATTERING: u32 = 0;
 const LOBE: u32 = 1;
 const ROULETTE: u32 = 2;
-const OWN: u32 = 3;
+const VISITOR: u32 = 3;
 
 /// State of one light subpath between two vertices.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
@@ -90,12 +90,12 @@ pub(in crate::transport) struct Vertex<'v> {
 impl Vertex<'_> {
     /// Random number of the visitor.
     pub(in crate::transport) fn own(&self) -> f32 {
-        self.numbers.single(self.first + OWN)
+        self.numbers.single(self.first + VISITOR)
     }
 
     /// Two random numbers of the visitor.
     pub(in crate::transport) fn own_pair(&self) -> [f32; 2] {
-        self.numbers.pair(self.first + OWN)
+        self.numbers.pair(self.first + VISITOR)
     }
 
     /// Photon of light that arrives with `power`. A camera path at a cut-out sees the light on its solid
@@ -319,7 +319,7 @@ impl<'p> PhotonBuffer<'p> {
         Self { photons, count: 0 }
     }
 
-    pub(in crate::transport) fn leave(&mut self, photon: Photon, counters: &mut Counters) {
+    pub(in crate::transport) fn push(&mut self, photon: Photon, counters: &mut Counters) {
         match self.photons.get_mut(self.count) {
             Some(slot) => {
                 *slot = photon;

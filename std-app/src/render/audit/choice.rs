@@ -13,22 +13,23 @@ use halflight_core::film::{Film, PIXELS_PER_TILE, Tile};
 use halflight_core::sampling::Random;
 
 /// Fewest audited pixels, if the picture has as many.
-const FEWEST: usize = 256;
+const MIN_PIXELS: usize = 256;
 
 /// Most audited pixels.
-const MOST: usize = 8192;
+const MAX_PIXELS: usize = 8192;
 
 /// Fewest audited pixels of a region, enough for a mean deviation with a standard error.
-const PER_REGION: usize = 12;
+const PIXELS_PER_REGION: usize = 12;
 
 /// Most regions along each side.
-const SIDE: u32 = 8;
+const MAX_REGIONS_PER_SIDE: u32 = 8;
 
 /// Audited pixels that suffice for all regions.
-pub(super) const ENOUGH: usize = PER_REGION * (SIDE * SIDE) as usize;
+pub(super) const SUFFICIENT_PIXELS: usize =
+    PIXELS_PER_REGION * (MAX_REGIONS_PER_SIDE * MAX_REGIONS_PER_SIDE) as usize;
 
 /// Largest ratio of a pixel's probability to the usual one.
-const RISKIEST: f64 = 16.0;
+const MAX_RISK_RATIO: f64 = 16.0;
 
 /// Regions of a picture: a grid of `side` x `side`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -40,7 +41,10 @@ pub(super) struct Grid {
 impl Grid {
     /// The grid for `pixels` audited pixels.
     pub(super) fn new(size: [u32; 2], pixels: usize) -> Self {
-        let side = ((pixels / PER_REGION).isqrt() as u32).clamp(1, SIDE).min(size[0]).min(size[1]);
+        let side = ((pixels / PIXELS_PER_REGION).isqrt() as u32)
+            .clamp(1, MAX_REGIONS_PER_SIDE)
+            .min(size[0])
+            .min(size[1]);
         Self { size, side }
     }
 
@@ -62,7 +66,7 @@ impl Grid {
 
 /// Number of audited pixels of a picture.
 pub(super) fn count(width: u32, height: u32) -> usize {
-    Tile::count(width, height).clamp(FEWEST, MOST).min(width as usize * height as usize)
+    Tile::count(width, height).clamp(MIN_PIXELS, MAX_PIXELS).min(width as usize * height as usize)
 }
 
 /// Audited pixels of a shard, in the order of strata, each with its share of the picture relative to the mean
@@ -84,10 +88,10 @@ pub(super) fn choose(
     let risks: Vec<f32> =
         order.iter().map(|pixel| risks.get(place(*pixel)).copied().unwrap_or(0.0)).collect();
     // Limited so that no pixel fills a stratum alone.
-    let chances = chances(&risks, RISKIEST.min(order.len() as f64 / strata as f64));
+    let probabilities = probabilities(&risks, MAX_RISK_RATIO.min(order.len() as f64 / strata as f64));
     let mut sums = vec![0.0];
-    sums.extend(chances.iter().scan(0.0, |sum, chance| {
-        *sum += chance;
+    sums.extend(probabilities.iter().scan(0.0, |sum, probability| {
+        *sum += probability;
         Some(*sum)
     }));
     let all = sums.last().copied().unwrap_or(0.0);
@@ -101,13 +105,13 @@ pub(super) fn choose(
         let size = sums[end] - sums[first];
         let at = sums[first] + f64::from(random.single(number)) * size;
         let pick = (sums.partition_point(|sum| *sum <= at) - 1).clamp(first, end - 1);
-        (order[pick], (size / chances[pick] * strata as f64 / order.len() as f64) as f32)
+        (order[pick], (size / probabilities[pick] * strata as f64 / order.len() as f64) as f32)
     };
     (0..strata).map(stratum).unzip()
 }
 
 /// Relative probabilities of pixels: risk over the median of all known risks, clamped to 1 … `most`.
-fn chances(risks: &[f32], most: f64) -> Vec<f64> {
+fn probabilities(risks: &[f32], most: f64) -> Vec<f64> {
     let mut known: Vec<f32> = risks.iter().copied().filter(|risk| *risk > 0.0 && risk.is_finite()).collect();
     if known.is_empty() {
         return vec![1.0; risks.len()];

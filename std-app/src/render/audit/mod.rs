@@ -32,16 +32,16 @@ const STEP: u32 = 4;
 const PIXELS_PER_TASK: usize = 8;
 
 /// Samples per audited pixel within which audit paths must find all light of the picture.
-const SEEN: f64 = 256.0;
+const VISIBILITY_SAMPLES: f64 = 256.0;
 
 /// Longest run of samples, seconds, between checks of the clock and calls of `may`.
-const LONGEST: f64 = 0.25;
+const MAX_RUN_SECONDS: f64 = 0.25;
 
 /// Makes the audit's random numbers differ from those of the picture.
-const OTHER_SEED: u32 = 0x5eed_a0d1;
+const AUDIT_SEED: u32 = 0x5eed_a0d1;
 
 /// Path-traced samples of single pixels, merged with caustic photons if given.
-type Truth<'a> = dyn Fn(Samples, Option<CausticMerging>, &mut Arena, &mut [Pixel]) -> Result<Counters, OutOfMemory>
+type PixelTracer<'a> = dyn Fn(Samples, Option<CausticMerging>, &mut Arena, &mut [Pixel]) -> Result<Counters, OutOfMemory>
     + Sync
     + 'a;
 
@@ -55,7 +55,7 @@ fn scratch<F: Features>() -> Footprint {
 
 /// An audit in progress.
 pub(super) struct Audit<'a> {
-    truth: Box<Truth<'a>>,
+    truth: Box<PixelTracer<'a>>,
     /// Shard whose pixels are audited.
     shard: Shard,
     /// Whether work is measured in seconds. Otherwise it is counted in rays, which are the same in each run.
@@ -99,7 +99,8 @@ impl State {
         let truth: &[Pixel] = bytemuck::cast_slice(pixels);
         let grid = Grid::new([film.width(), film.height()], places.len());
         let findings = verdict::findings(film, mean, places, truth);
-        let audited = verdict::verdict(&findings, shares, places, grid, noise)?.by_a_judge_without(*unseen);
+        let audited =
+            verdict::verdict(&findings, shares, places, grid, noise)?.without_bias_if_unseen(*unseen);
         Some(Audited {
             share: *share,
             samples: *taken,
@@ -130,10 +131,11 @@ impl<'a> Audit<'a> {
         // Pixels are counted but not taken here: they stay where film files can find them.
         let pixels = choice::count(settings.width, settings.height);
         memory.set_aside("audit", Footprint::default().slice::<Pixel>(pixels))?;
-        let seed = settings.seed ^ OTHER_SEED;
+        let seed = settings.seed ^ AUDIT_SEED;
         let tracer = stage.paths::<F>(seed);
         // Other methods lend the audit their photons, or find no more light than its paths.
-        let samples = SEEN * pixels as f64 / (f64::from(settings.width) * f64::from(settings.height));
+        let samples =
+            VISIBILITY_SAMPLES * pixels as f64 / (f64::from(settings.width) * f64::from(settings.height));
         let unseen = match method.finds_caustics() {
             true => {
                 let mut executor = Threads::new(workers, &mut scratch);
@@ -175,7 +177,7 @@ impl<'a> Audit<'a> {
     }
 
     /// Sets the risks for the choice of pixels ([`choice::choose`]).
-    pub(super) fn weigh(&mut self, risks: Vec<f32>) {
+    pub(super) fn set_risks(&mut self, risks: Vec<f32>) {
         self.risks = risks;
     }
 
@@ -237,7 +239,7 @@ impl<'a> Audit<'a> {
     /// Reduces the number of audited pixels after their first samples, if they will be noisier than the
     /// picture's: fewer pixels with more samples then estimate the bias better. The picture has taken `spp`
     /// samples per pixel and `rays` rays.
-    pub(super) fn focus(&mut self, audited: &Audited, (rays, spp): (u64, u32)) {
+    pub(super) fn reduce_pixels(&mut self, audited: &Audited, (rays, spp): (u64, u32)) {
         let State { share, places, shares, taken, rays: own, .. } = &self.state;
         if *taken != STEP || *own == 0 {
             return;
@@ -245,7 +247,7 @@ impl<'a> Audit<'a> {
         // Samples of an audited pixel per sample of a picture's pixel.
         let rate = share / (1.0 - share) * rays as f64 / f64::from(spp) * f64::from(*taken) / *own as f64;
         let wanted = places.len() as f64 * rate * f64::from(spp) / (f64::from(*taken) * audited.imbalance);
-        let many = (wanted as usize).max(choice::ENOUGH);
+        let many = (wanted as usize).max(choice::SUFFICIENT_PIXELS);
         if many >= places.len() {
             return;
         }
@@ -257,7 +259,7 @@ impl<'a> Audit<'a> {
 
     /// Takes a quarter more samples in steps while `may` allows the expected seconds; returns whether all
     /// were taken.
-    pub(super) fn go_on(
+    pub(super) fn extend(
         &mut self,
         workers: &Workers,
         photons: Option<CausticMerging>,
@@ -266,7 +268,7 @@ impl<'a> Audit<'a> {
         let end = (self.state.taken + self.state.taken / 4).next_multiple_of(STEP);
         while self.state.taken < end {
             let each = self.state.seconds / f64::from(self.state.taken.max(1));
-            let samples = ((LONGEST / each) as u32 / STEP * STEP).clamp(STEP, end - self.state.taken);
+            let samples = ((MAX_RUN_SECONDS / each) as u32 / STEP * STEP).clamp(STEP, end - self.state.taken);
             if !may(each * f64::from(samples)) {
                 return Ok(false);
             }

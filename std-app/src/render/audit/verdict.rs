@@ -9,7 +9,7 @@ use halflight_core::film::{Film, PIXELS_PER_TILE, Pixel, Tile};
 const LEVEL: f64 = 0.025;
 
 /// Share of the picture's light below which audit paths may miss light and still judge it.
-const MOST_UNSEEN: f64 = 0.01;
+const MAX_UNSEEN: f64 = 0.01;
 
 /// Result of an audit.
 #[derive(Clone, Debug, PartialEq)]
@@ -72,9 +72,9 @@ impl Audited {
 
     /// Result for audit paths that miss a share `unseen` of the picture's light. If that share is not
     /// negligible, a picture brighter than the audit may be right, whereas a darker one is certainly wrong.
-    pub(super) fn by_a_judge_without(self, unseen: f64) -> Self {
+    pub(super) fn without_bias_if_unseen(self, unseen: f64) -> Self {
         let Deviation { mean, error, .. } = self.whole;
-        let is_blind = unseen >= MOST_UNSEEN && mean > -2.0 * error;
+        let is_blind = unseen >= MAX_UNSEEN && mean > -2.0 * error;
         let total = if is_blind { self.noise } else { self.total };
         Self { unseen, is_blind, total, ..self }
     }
