@@ -17,7 +17,7 @@ pub(in crate::render) struct Identity {
     max_depth: Option<u32>,
     /// Requested choices; their outcome follows from the scene.
     reuse: Option<bool>,
-    environment_visibility: Option<bool>,
+    windows: Option<bool>,
     /// Settings of the method.
     settings: String,
     /// Fingerprint of the scene's content.
@@ -64,7 +64,7 @@ impl Identity {
             seed: paths.seed,
             max_depth: settings.max_depth,
             reuse: settings.reuse,
-            environment_visibility: settings.environment_visibility,
+            windows: settings.environment_visibility,
             settings: format!("{paths:?}{cache}{caustics}"),
             scene: fingerprint::scene(scene),
             camera: fingerprint::camera(&scene.camera),
@@ -88,7 +88,7 @@ impl Identity {
             .or(said("seed ", self.seed.to_string(), other.seed.to_string()))
             .or(said("max-depth ", depth(self.max_depth), depth(other.max_depth)))
             .or(said("reuse ", choice(self.reuse), choice(other.reuse)))
-            .or(said("windows ", choice(self.environment_visibility), choice(other.environment_visibility)))
+            .or(said("windows ", choice(self.windows), choice(other.windows)))
             .or((self.scene != other.scene)
                 .then(|| "of another scene, or the scene has changed since".into()))
             .or((self.camera != other.camera).then(|| "seen by another camera".into()))
