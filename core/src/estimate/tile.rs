@@ -57,6 +57,8 @@ pub struct TileError {
     pub(super) least: f64,
     /// Sum of the squares of `least` per pixel.
     pub(super) least_squares: f64,
+    /// Decrease of `halves` with the R of the brighter pair alone: the other may have missed light.
+    pub(super) unseen: f64,
     /// Variance of the pictures of both pairs over R², averaged over both R.
     pub(super) parts: f64,
     /// `parts`, with each variance over the R² of the other pair: numerator and denominator are independent.
@@ -131,6 +133,7 @@ impl TileError {
             let least = total(noise / (seen * seen + RELMSE_OFFSET as f32));
             sums.least += least;
             sums.least_squares += least * least;
+            sums.unseen += total(noise * (by_both - by[0].min(by[1])));
             sums.above += above([variance, darker], posterior, seen, around, by_both);
             sums.parts += total((first + second) * by_both * 0.5);
             sums.crossed += total(0.5 * (first * by[1] + second * by[0]));
@@ -155,6 +158,7 @@ impl core::ops::AddAssign for TileError {
         self.certain += other.certain;
         self.least += other.least;
         self.least_squares += other.least_squares;
+        self.unseen += other.unseen;
         self.parts += other.parts;
         self.crossed += other.crossed;
         self.squares += other.squares;
