@@ -71,7 +71,7 @@ pub trait Executor {
     fn fork(&self) -> &Self::Fork;
 
     /// Runs `work` that the picture can do without: passes in it end early, after a `fraction` (0 to 1) of the time
-    /// that the picture has in all. Without a clock it runs to its end.
+    /// that the picture has left. Without a clock it runs to its end.
     fn within<T>(&mut self, _fraction: f32, work: impl FnOnce(&mut Self) -> T) -> T {
         work(self)
     }

@@ -23,8 +23,8 @@ const FEWEST_RECORDS: usize = 4096;
 /// Least radius of a record in pixels: pixels that placement looks at and that are neighbours share it.
 pub const LEAST_PIXELS: f32 = 2.0;
 
-/// The fraction of the time of a picture in which each cache is to be filled. What no record reaches by then is path
-/// traced.
+/// The fraction of the time that is left before both caches are filled in which each is to be filled: both are cut alike.
+/// What no record reaches by then is path traced.
 const TIME: f32 = 0.25;
 
 /// Strata along a side behind rough surfaces are half as many, in multiples of this.
@@ -194,7 +194,7 @@ impl<'a, F: Features> IrradianceCaching<'a, F> {
         };
         let Round { executor, state, .. } = round;
         let Passed { counters, is_complete } = executor.timed("cache", |executor| {
-            let fraction = TIME * (number as f32 + 1.0);
+            let fraction = TIME / (1.0 - TIME * number as f32);
             executor.within(fraction, |executor| placement.fill(builder, executor))
         })?;
         state.counters += counters;

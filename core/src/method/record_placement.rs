@@ -34,9 +34,8 @@ const FEWEST_POINTS: usize = 8;
 const MOST_POINTS: usize = 32;
 const POINTS_PER_RECORD: usize = 4;
 
-/// The records of a cache that had no time become wider by this factor until they serve this share of the picture, or
-/// are this many times as wide.
-const WIDER: f32 = 1.3;
+/// The records of a cache that had no time become wider, at most this many times, until they serve this share of what
+/// such records could serve.
 const WIDEST: f32 = 6.0;
 const NEARLY_ALL: f64 = 0.98;
 
@@ -270,8 +269,8 @@ impl<F: Features> RecordPlacement<'_, '_, F> {
         Ok(Passed { counters, is_complete: true })
     }
 
-    /// Makes all records wider, by the same factor, until they serve nearly all that the camera sees or are
-    /// [`WIDEST`] times as wide. A cache that had no time is coarse everywhere rather than good in places.
+    /// Makes all records wider, by the same factor, so that they serve nearly all of what the camera sees that records of
+    /// [`WIDEST`] times the width could serve. A cache that had no time is coarse everywhere rather than good in places.
     ///
     /// # Errors
     /// Those of [`Executor::pass`].
@@ -281,49 +280,55 @@ impl<F: Features> RecordPlacement<'_, '_, F> {
         executor: &mut impl Executor,
     ) -> Result<Passed, OutOfMemory> {
         let mut counters = Counters::default();
-        let mut factor = 1.0;
-        while factor < WIDEST
-            && !builder.cache.records().is_empty()
-            && self.served(builder, executor, &mut counters)?.is_some_and(|served| served < NEARLY_ALL)
-        {
-            factor *= WIDER;
-            let integrator = self.integrator;
-            let records = builder.cache.records_mut().iter_mut().zip(&*builder.points);
-            let passed = executor.pass(records, |_, (record, point), _| {
-                let mut counters = Counters::default();
-                if point.is_some() {
-                    *record = integrator.widened(record, point, WIDER, &mut counters);
-                }
-                Ok(counters)
-            })?;
-            builder.cache.rebuild();
-            counters += passed.counters;
-            if !passed.is_complete {
-                return Ok(Passed { counters, is_complete: false });
-            }
+        let factor = self.widening(builder, executor, &mut counters)?;
+        if factor <= 1.0 {
+            return Ok(Passed { counters, is_complete: true });
         }
-        Ok(Passed { counters, is_complete: true })
+        let integrator = self.integrator;
+        let records = builder.cache.records_mut().iter_mut().zip(&*builder.points);
+        let passed = executor.pass(records, |_, (record, point), _| {
+            let mut counters = Counters::default();
+            if point.is_some() {
+                *record = integrator.widened(record, point, factor, &mut counters);
+            }
+            Ok(counters)
+        })?;
+        builder.cache.rebuild();
+        counters += passed.counters;
+        Ok(Passed { counters, ..passed })
+    }
+
+    /// The factor of [`RecordPlacement::widen`], by the last step of the order; 1 where the executor ends it early.
+    fn widening(
+        &mut self,
+        builder: &CacheBuilder,
+        executor: &mut impl Executor,
+        counters: &mut Counters,
+    ) -> Result<f32, OutOfMemory> {
+        let first = self.order().len().saturating_sub(STEP as u64);
+        let target = (builder.index, Via::Specular);
+        let least_pixels = self.least_pixels;
+        let is_open = move |point: &GatherPoint| !point.is_confined(least_pixels);
+        let Some(count) = self.look(first, target, &is_open, executor, counters)? else { return Ok(1.0) };
+        let points = self.step.get(..count).unwrap_or_default();
+        let mut factors = [f32::INFINITY; STEP];
+        let tasks = points.chunks(PIXELS).zip(factors.chunks_mut(PIXELS));
+        let passed = executor.pass(tasks, |_, (points, factors), _| {
+            for (point, factor) in points.iter().zip(factors) {
+                *factor = builder.cache.widening(&point.query(), WIDEST).unwrap_or(f32::INFINITY);
+            }
+            Ok(Counters::default())
+        })?;
+        let reached = retain(&mut factors, |factor| factor.is_finite());
+        let factors = factors.get_mut(..reached).unwrap_or_default();
+        factors.sort_unstable_by(f32::total_cmp);
+        let nearly_all = factors.get((NEARLY_ALL * reached as f64) as usize);
+        Ok(nearly_all.copied().filter(|_| passed.is_complete).unwrap_or(1.0))
     }
 
     fn order(&self) -> ProgressiveOrder {
         let [width, height] = self.size;
         ProgressiveOrder::new(width, height, STRIDE)
-    }
-
-    /// The share of the points that the camera sees which records serve, by the last step of the order; `None` where
-    /// the executor ends it early, or the camera sees none.
-    fn served(
-        &mut self,
-        builder: &CacheBuilder,
-        executor: &mut impl Executor,
-        counters: &mut Counters,
-    ) -> Result<Option<f64>, OutOfMemory> {
-        let first = self.order().len().saturating_sub(STEP as u64);
-        let target = (builder.index, Via::Specular);
-        let Some(count) = self.look(first, target, &|_| true, executor, counters)? else { return Ok(None) };
-        let points = self.step.get(..count).unwrap_or_default();
-        let served = points.iter().filter(|point| builder.is_served(point, self.least_pixels)).count();
-        Ok((count > 0).then(|| served as f64 / count as f64))
     }
 
     /// Finds the points of the step that begins with pixel `first` of the order, as far as they are wanted, and returns

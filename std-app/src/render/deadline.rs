@@ -17,8 +17,6 @@ const FIRST_SAMPLE_GRACE: Duration = Duration::from_secs(5);
 pub(super) struct Deadline<'w> {
     interrupt: Option<&'w AtomicBool>,
     deadline: Option<Instant>,
-    /// Start of the render and its limit in seconds.
-    limit: Option<(Instant, f64)>,
     /// Time at which the interruption was noticed.
     noticed: OnceLock<Instant>,
 }
@@ -33,14 +31,14 @@ impl<'w> Deadline<'w> {
     pub(super) fn within(self, seconds: Option<f64>) -> Self {
         let later = |seconds: f64| Duration::try_from_secs_f64(seconds.max(0.0)).ok();
         let deadline = seconds.and_then(later).and_then(|later| Instant::now().checked_add(later));
-        let limit = seconds.map(|seconds| (Instant::now(), seconds.max(0.0)));
-        Self { deadline, limit, ..self }
+        Self { deadline, ..self }
     }
 
-    /// End of a `fraction` of the render's time limit; `None` without a limit.
+    /// End of a `fraction`, 0 to 1, of the time that is left; `None` without a limit.
     pub(super) fn after(&self, fraction: f32) -> Option<Instant> {
-        let (start, seconds) = self.limit?;
-        start.checked_add(Duration::try_from_secs_f64(f64::from(fraction) * seconds).ok()?)
+        let now = Instant::now();
+        let left = self.deadline?.saturating_duration_since(now);
+        now.checked_add(left.mul_f32(fraction.clamp(0.0, 1.0)))
     }
 
     /// Whether the interrupt flag is raised.
@@ -93,5 +91,17 @@ mod tests {
         let timed = Deadline { deadline: Some(ago(FIRST_SAMPLE_GRACE)), ..Deadline::default() };
         assert!(timed.is_over() && timed.is_late());
         assert!(!Deadline::default().within(Some(1e300)).is_over());
+    }
+
+    #[test]
+    fn a_fraction_is_one_of_the_time_that_is_left() {
+        let left = |deadline: &Deadline, fraction| {
+            deadline.after(fraction).map(|end| end.saturating_duration_since(Instant::now()).as_secs_f64())
+        };
+        let hour = Deadline::default().within(Some(3600.0));
+        let [quarter, half] = [0.25, 0.5].map(|fraction| left(&hour, fraction).unwrap());
+        assert!((800.0..=900.0).contains(&quarter) && (1700.0..=1800.0).contains(&half), "{quarter} {half}");
+        let past = Deadline { deadline: Some(Instant::now()), ..Deadline::default() };
+        assert_eq!((left(&past, 0.5), left(&Deadline::default(), 0.5)), (Some(0.0), None));
     }
 }

@@ -17,6 +17,9 @@ const GREATEST_FACTOR: f32 = 20.0;
 /// Minimum relative variance of a record; one without noise would suppress all others.
 const LEAST_NOISE: f32 = 1e-6;
 
+/// Factor on the distance to a point, since a point on the rim of a record is outside.
+const BEYOND: f32 = 1.001;
+
 impl Record {
     /// Irradiance that this record extrapolates to `point`, and its weight w_i > 0 (equations 12 to 14 of the
     /// paper). `least_cos` is the cosine of the maximum angle between normals. `None` outside the support.
@@ -30,6 +33,15 @@ impl Record {
     #[inline]
     pub fn covers(&self, point: &QueryPoint, least_cos: f32) -> bool {
         self.weigh(One, &Query::of(point), least_cos, 1.0).0
+    }
+
+    /// Factor by which the record has to be widened to cover `point`; `None` above `most`, or if no factor does.
+    pub(super) fn widening(&self, point: &QueryPoint, least_cos: f32, most: f32) -> Option<f32> {
+        if point.normal.dot(self.normal.into()) <= least_cos {
+            return None;
+        }
+        let factor = (BEYOND * self.radii_to(point.position)).max(1.0);
+        (factor <= most && self.widened(factor).covers(point, least_cos)).then_some(factor)
     }
 
     /// Distance to the point, if an overhang may be so close above the point that the record is invalid

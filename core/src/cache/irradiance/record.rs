@@ -128,15 +128,15 @@ impl Record {
         }
     }
 
-    /// Record with radii scaled by `factor`, over which light changes by as much. Overhangs have to be found
-    /// anew.
+    /// Record with radii scaled by `factor`, at least 1, over which light changes by as much. Walls beyond its
+    /// former reach have to be found; any point there may be under an overhang.
     pub fn widened(&self, factor: f32) -> Self {
-        let narrow = |free: u8| if free == u8::MAX { free } else { (f32::from(free) / factor) as u8 };
+        let narrow = |free: u8| (f32::from(free) / factor) as u8;
         Self {
             radii: self.radii.map(|radius| factor * radius),
             reach: factor * self.reach,
-            boundary: self.boundary.map(narrow),
-            free: [u8::MAX; SECTORS],
+            boundary: self.boundary.map(|free| if free == u8::MAX { free } else { narrow(free) }),
+            free: self.free.map(narrow),
             gradient: self.gradient.map(|channel| channel.map(|slope| slope / factor)),
             bend: self.bend.map(|bend| bend / (factor * factor)),
             error: factor * factor * self.error,
@@ -278,6 +278,16 @@ pub(super) mod tests {
         // 0.008 is 0.2 cubed.
         assert!((overlap(0.008 * 0.008, 1.0) - 0.2 * NOISE_TO_OVERLAP).abs() < 1e-5);
         assert_eq!(overlap(f32::MAX, 1.0), MAX_OVERLAP);
+    }
+
+    #[test]
+    fn beyond_its_old_reach_something_may_hang_over_a_wide_record() {
+        let mut near = record();
+        near.boundary[3] = 100;
+        let wide = near.widened(2.0);
+        assert_eq!((wide.radii, wide.reach, wide.gradient[0]), ([2.0, 4.0], 4.0, [0.25, -0.5]));
+        // The same distances, in 255ths of the reach.
+        assert_eq!((wide.boundary[3], wide.boundary[0], wide.free), (50, u8::MAX, [127; SECTORS]));
     }
 
     #[test]

@@ -184,6 +184,14 @@ impl<'m> IrradianceCache<'m> {
         true
     }
 
+    /// Factor by which the nearest record, in radii, has to be widened to cover `point`; `None` above `most`.
+    pub fn widening(&self, point: &QueryPoint, most: f32) -> Option<f32> {
+        let nearest = |least: Option<f32>, record: &Record| {
+            record.widening(point, self.least_cos, least.unwrap_or(most)).or(least)
+        };
+        self.records().iter().fold(None, nearest)
+    }
+
     /// Records for changes in place, to be followed by [`IrradianceCache::rebuild`] if a record becomes
     /// wider.
     pub fn records_mut(&mut self) -> &mut [Record] {
@@ -308,6 +316,29 @@ mod tests {
                 assert_eq!(cache.at(&QueryPoint::open(Vec3::new(x, y, 0.5), Vec3::NEG_Z)), None);
                 assert_eq!(cache.at(&QueryPoint::open(Vec3::new(x, y, 0.9), Vec3::Z)), None);
             }
+        });
+    }
+
+    #[test]
+    fn a_gap_is_covered_once_the_nearest_record_in_radii_is_wide_enough() {
+        with_cache(2, |cache| {
+            cache.insert(record(0.2, 0.5, 0.05));
+            cache.insert(record(0.8, 0.5, 0.1));
+            let (gap, turned) = (Vec3::new(0.5, 0.5, 0.5), Vec3::X);
+            // 0.3 is 6 radii of the first record and 3 of the second.
+            let factor = cache.widening(&QueryPoint::open(gap, Vec3::Z), 6.0).unwrap();
+            assert!((3.0..3.01).contains(&factor), "{factor}");
+            assert_eq!(cache.widening(&QueryPoint::open(gap, Vec3::Z), 2.9), None);
+            assert_eq!(cache.widening(&QueryPoint::open(gap, turned), 6.0), None);
+            let covered = QueryPoint::open(Vec3::new(0.75, 0.5, 0.5), Vec3::Z);
+            assert_eq!(cache.widening(&covered, 6.0), Some(1.0));
+            let wide = |cache: &mut IrradianceCache, factor| {
+                cache.records_mut().iter_mut().for_each(|record| *record = record.widened(factor));
+                cache.rebuild();
+                // From there somebody has looked up.
+                cache.covers(&QueryPoint { within: f32::MAX, ..QueryPoint::open(gap, Vec3::Z) })
+            };
+            assert!(!wide(cache, 0.99 * factor) && wide(cache, 1.02));
         });
     }
 

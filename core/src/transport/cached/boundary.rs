@@ -53,8 +53,8 @@ impl<F: Features, E: Estimator<F>> PathIntegrator<'_, F, E> {
         }
     }
 
-    /// The record of `place` with radii, and search for walls and overhangs, scaled by `factor`; light
-    /// changes over the larger support by as much as before.
+    /// The record of `place` with radii, and search for walls, scaled by `factor`; light changes over the larger
+    /// support by as much as before. Points beyond the former support look for overhangs themselves.
     pub fn widened(
         &self,
         record: &Record,
@@ -64,7 +64,6 @@ impl<F: Features, E: Estimator<F>> PathIntegrator<'_, F, E> {
     ) -> Record {
         let mut wide = record.widened(factor);
         self.find_walls(&mut wide, place, counters);
-        self.add_overhangs(&mut wide, place);
         wide
     }
 
