@@ -38,7 +38,7 @@ impl Bsdf {
     /// In a narrow coat a photon would be a firefly. `apart` says whether that is possible: it requires that
     /// paths can hit every light.
     #[inline]
-    pub(crate) fn is_varnished(&self, apart: bool) -> bool {
+    pub(crate) fn gathers_photons_on_base(&self, apart: bool) -> bool {
         apart && self.has_rough_coat() && self.has_narrow_coat() && self.has_diffuse()
     }
 

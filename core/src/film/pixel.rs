@@ -7,7 +7,7 @@ use crate::Rgb;
 use bytemuck::{Pod, Zeroable};
 
 /// 2^96. Larger radiance counts as infinite, so that sums of 2^31 samples are finite.
-const BRIGHTEST: f32 = 79_228_162_514_264_337_593_543_950_336.0;
+const MAX_RADIANCE: f32 = 79_228_162_514_264_337_593_543_950_336.0;
 
 /// Sum of half of the samples, in two parts. Each addition keeps its rounding error (Neumaier 1974), so that
 /// a million samples in f32 are as precise as with twice the bits.
@@ -82,7 +82,7 @@ impl Pixel {
     #[inline]
     pub fn add(&mut self, index: u32, radiance: Rgb, dropped: &mut Dropped) -> bool {
         // False for NaN as well.
-        let is_light = radiance.cmpge(Rgb::ZERO).all() && radiance.cmplt(Rgb::splat(BRIGHTEST)).all();
+        let is_light = radiance.cmpge(Rgb::ZERO).all() && radiance.cmplt(Rgb::splat(MAX_RADIANCE)).all();
         if is_light {
             let half = if index & 1 == 0 { &mut self.even } else { &mut self.odd };
             half.add((index >> 1) as usize, radiance);
@@ -97,7 +97,7 @@ impl Pixel {
     #[inline]
     pub fn add_blur(&mut self, index: u32, blur: Rgb) {
         let blur = blur.element_sum() / 3.0;
-        if blur.abs() < BRIGHTEST {
+        if blur.abs() < MAX_RADIANCE {
             let half = if index & 1 == 0 { &mut self.even } else { &mut self.odd };
             half.blur += blur;
         }
@@ -155,7 +155,7 @@ impl Dropped {
     fn record(&mut self, radiance: Rgb) {
         if radiance.is_nan() {
             self.nan += 1;
-        } else if radiance.cmpge(Rgb::splat(BRIGHTEST)).any() || !radiance.is_finite() {
+        } else if radiance.cmpge(Rgb::splat(MAX_RADIANCE)).any() || !radiance.is_finite() {
             self.infinite += 1;
         } else {
             self.negative += 1;

@@ -25,10 +25,10 @@ const IN_BLOCK: usize = BLOCK / GROUP;
 
 /// Samples of each half that use the first choice. Fewer would break up the low-discrepancy nets of the
 /// pixels.
-const FIRST: u32 = 16;
+const FIRST_CHOICE_SAMPLES: u32 = 16;
 
 /// The pixels of each group in Z-order, and the group of each pixel.
-const LOTS: ([[u8; GROUP]; GROUPS], [u8; PIXELS_PER_TILE]) = {
+const GROUP_TABLES: ([[u8; GROUP]; GROUPS], [u8; PIXELS_PER_TILE]) = {
     let (mut members, mut groups) = ([[0; GROUP]; GROUPS], [0; PIXELS_PER_TILE]);
     let mut quad = 0;
     while quad < PIXELS_PER_TILE / 4 {
@@ -53,18 +53,19 @@ impl Tile {
     /// Group of the `i`th pixel.
     #[inline]
     pub const fn group(i: usize) -> usize {
-        LOTS.1[i % PIXELS_PER_TILE] as usize
+        GROUP_TABLES.1[i % PIXELS_PER_TILE] as usize
     }
 
     /// The pixels of a circle that share `sample`, in Z-order. `seed` is the seed of the picture.
     #[inline]
     pub fn circle(&self, circle: usize, seed: u32, sample: u32) -> [usize; CIRCLE] {
         let (group, half) = (circle / 2 % GROUPS, circle % 2);
-        let round = u32::BITS - (sample >> 1).checked_div(FIRST).unwrap_or_default().leading_zeros();
+        let round =
+            u32::BITS - (sample >> 1).checked_div(FIRST_CHOICE_SAMPLES).unwrap_or_default().leading_zeros();
         let [x, y] = self.corner();
         let place = u64::from(seed) << 32 | u64::from(x ^ y.rotate_left(16));
         let lots = mix(mix(place) ^ (u64::from(round) << 8 | group as u64));
-        core::array::from_fn(|i| LOTS.0[group][(2 * i + (lots >> i & 1) as usize) ^ half] as usize)
+        core::array::from_fn(|i| GROUP_TABLES.0[group][(2 * i + (lots >> i & 1) as usize) ^ half] as usize)
     }
 }
 
@@ -97,8 +98,8 @@ mod tests {
             core::array::from_fn(|i| Tile::new(64, 64, task).circle(i, 0, sample))
         };
         let first = circles(0, 0);
-        assert_eq!(circles(0, 2 * FIRST - 1), first);
-        let later = [2, 4, 8, 16].map(|n| circles(0, n * FIRST));
+        assert_eq!(circles(0, 2 * FIRST_CHOICE_SAMPLES - 1), first);
+        let later = [2, 4, 8, 16].map(|n| circles(0, n * FIRST_CHOICE_SAMPLES));
         assert!(later.iter().all(|later| *later != first) && later[0] != later[1]);
         assert_ne!(circles(1, 0), first);
     }

@@ -241,9 +241,9 @@ impl<'a, F: Features> CameraPaths<'a, F> {
         }
         let point = self.context.surface_at(ray, hit)?;
         let opacity = || sampler.single(dimension::opacity(path.segments, path.crossings));
-        let is_passed = self.context.is_passed(&point, hit, path.triangle, opacity)
+        let is_skipped = self.context.is_skipped(&point, hit, path.triangle, opacity)
             || path.segments == 1 && point.is_left_by(ray);
-        if is_passed {
+        if is_skipped {
             if path.crossings >= MAX_CROSSINGS {
                 counters.dropped.unfinished += 1;
                 return None;

@@ -209,7 +209,7 @@ impl<F: Features> Writer<'_, F> {
             return None;
         }
         let (camera, point) = (&self.context.scene.camera, vertex.point);
-        let lens = if camera.lens_radius > 0.0 { vertex.own_pair() } else { [0.5; 2] };
+        let lens = if camera.lens_radius > 0.0 { vertex.visitor_pair() } else { [0.5; 2] };
         let seen = camera.project(width, height, point.position, lens)?;
         let is_inside = seen.raster.cmpge(glam::Vec2::ZERO).all()
             && seen.raster.x < width as f32

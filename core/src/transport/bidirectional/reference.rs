@@ -146,7 +146,8 @@ impl<'a> Reference<'a> {
             }
             let Some(point) = context.surface_at(&ray, &hit) else { break };
             let opacity = || sampler.single(dimension::opacity(segments, crossings));
-            if context.is_passed(&point, &hit, triangle, opacity) || segments == 1 && point.is_left_by(&ray) {
+            if context.is_skipped(&point, &hit, triangle, opacity) || segments == 1 && point.is_left_by(&ray)
+            {
                 if crossings >= MAX_CROSSINGS {
                     break;
                 }

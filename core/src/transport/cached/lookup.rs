@@ -70,7 +70,7 @@ impl CacheView<'_> {
 fn sample_of(wave: &Wavefront, ray: usize, point: &SurfacePoint, settings: &PathSettings) -> Option<u32> {
     let path = wave.paths.get(wave.rays.get(ray)?.tag as usize)?;
     let asks = point.material.surface.may_be_diffuse()
-        && path.components.goes_on_from_rough()
+        && path.components.has_rough()
         && u32::from(path.segments) < settings.max_depth
         // Records do not store their distance from the camera.
         && (path.segments == 1 || !settings.is_limited());

@@ -269,7 +269,7 @@ impl CausticShare {
 
     /// What is left of the power of a path with a photon at `vertex`; `None` where that is not left.
     fn kept(&self, vertex: &Vertex) -> Option<f32> {
-        (vertex.own() < self.chance).then(|| self.weight / self.chance)
+        (vertex.visitor_number() < self.chance).then(|| self.weight / self.chance)
     }
 }
 
@@ -333,7 +333,8 @@ impl<F: Features, L: FnMut(&LightPathState, Photon, CausticShare, &mut Counters)
     /// Straight from a light no photon goes on by a rough coat: paths find that light.
     #[inline]
     fn is_apart(&self, state: &LightPathState, vertex: &Vertex) -> bool {
-        state.segments > 1 && vertex.bsdf.is_varnished(self.shooter.flight.context.separates_coats())
+        state.segments > 1
+            && vertex.bsdf.gathers_photons_on_base(self.shooter.flight.context.separates_coats())
     }
 
     /// Takes note of what a surface does with the densities of both ways, at the first of a path also of how

@@ -194,9 +194,9 @@ impl<'a, F: Features> Walk<'a, F> {
         let Some(point) = self.context.surface_at(ray, hit) else { return Met::Lost };
         // Scattered at or passed before.
         let surfaces = subpath.segments - 1 + subpath.crossings;
-        let is_passed = self.context.is_passed(&point, hit, subpath.triangle, || opacity(surfaces))
+        let is_skipped = self.context.is_skipped(&point, hit, subpath.triangle, || opacity(surfaces))
             || at_lens && subpath.segments == 1 && point.is_left_by(ray);
-        if !is_passed {
+        if !is_skipped {
             return Met::Surface(point);
         }
         if subpath.crossings >= MAX_CROSSINGS {

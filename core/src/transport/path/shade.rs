@@ -130,9 +130,9 @@ impl<'a, F: Features, E: Estimator<F>, R: Sharing> PathIntegrator<'a, F, E, R> {
         // A camera on a surface does not see the back of that surface.
         let opacity = || sampler.single(dimension::opacity(segments, u32::from(path.crossings)));
         if segments == 1 && point.is_left_by(ray)
-            || self.context.is_passed(point, hit, path.triangle, opacity)
+            || self.context.is_skipped(point, hit, path.triangle, opacity)
         {
-            return Err(path.cross(point.spawn(direction), hit.triangle, counters));
+            return Err(path.skip_surface(point.spawn(direction), hit.triangle, counters));
         }
         self.emission(path, state, point, direction);
         if segments >= self.settings.max_depth {
@@ -167,7 +167,9 @@ impl<'a, F: Features, E: Estimator<F>, R: Sharing> PathIntegrator<'a, F, E, R> {
             distance,
             travelled: path.travelled + distance,
             throughput: path.throughput.into(),
-            apart: F::GLOSSY && E::SEPARATES_COATS && bsdf.is_varnished(self.context.separates_coats()),
+            apart: F::GLOSSY
+                && E::SEPARATES_COATS
+                && bsdf.gathers_photons_on_base(self.context.separates_coats()),
             came: path.components,
             rest: path.components.behind(&bsdf),
             bsdf,

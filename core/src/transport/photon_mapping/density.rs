@@ -180,7 +180,7 @@ pub(in crate::transport) struct Light<'a> {
 }
 
 /// Radiance from `point` to `wo` of the photons on the visible part of `disc`; `all` is their density without
-/// regard to visibility, if known. If the BSDF `is_varnished`, light of its base alone.
+/// regard to visibility, if known. If the BSDF `gathers_photons_on_base`, light of its base alone.
 #[inline]
 pub(in crate::transport) fn reflected<F: Features>(
     Light { map, is_caustic, min_photons }: Light,
@@ -204,7 +204,7 @@ pub(in crate::transport) fn reflected<F: Features>(
             ),
         };
     }
-    let seen = bsdf.view_apart::<F>(wo, bsdf.is_varnished(context.separates_coats()));
+    let seen = bsdf.view_apart::<F>(wo, bsdf.gathers_photons_on_base(context.separates_coats()));
     // The power of a photon includes the cosine to the triangle's normal, hence the division.
     let response = |from: Vec3| {
         let wi = point.frame.to_local(from);

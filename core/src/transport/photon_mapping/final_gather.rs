@@ -179,15 +179,15 @@ impl PhotonMaps<'_> {
         let is_limited = settings.is_limited();
         let rotation = vertex.sampler.single(dimension::PROBES + segments);
         // A path that may end in the map still may after this vertex.
-        let all = Rest::of(if came.is_gathered() { Components::GATHERED } else { Components::ALL });
+        let all = Rest::of(if came.may_end_in_photon_map() { Components::GATHERED } else { Components::ALL });
         if !bsdf.gathers_photons(context.separates_coats()) {
-            if came.leaves_caustics() && bsdf.is_caustic_caster() {
+            if came.excludes_caustics() && bsdf.is_caustic_caster() {
                 let rest = Rest { is_lit: true, ..Rest::of(Components::BEHIND_MIRROR) };
                 return (RadianceEstimate::default(), rest);
             }
             return (RadianceEstimate::default(), all);
         }
-        if came.is_gathered()
+        if came.may_end_in_photon_map()
             && (!is_limited || segments == 2)
             && let Some(light) = self.global.reflected(context, (point, bsdf), wo, distance, rotation)
         {
@@ -199,7 +199,7 @@ impl PhotonMaps<'_> {
         }
         match &self.caustic {
             Some(caustic) => {
-                let travelled = if came.is_gathered() { 0.0 } else { travelled };
+                let travelled = if came.may_end_in_photon_map() { 0.0 } else { travelled };
                 let gathered = caustic.reflected(context, (point, bsdf), (wo, travelled), rotation);
                 let rest = Rest { wide: Some(Components::NO_CAUSTIC), ..all };
                 (gathered.unwrap_or_default(), rest)

@@ -62,7 +62,7 @@ impl Components {
 
     /// True if the set holds light that non-specular surfaces reflect.
     #[inline]
-    pub(in crate::transport) fn goes_on_from_rough(self) -> bool {
+    pub(in crate::transport) fn has_rough(self) -> bool {
         self.has(ROUGH)
     }
 
@@ -86,13 +86,13 @@ impl Components {
 
     /// True if photons supply the caustics.
     #[inline]
-    pub(in crate::transport) fn leaves_caustics(self) -> bool {
+    pub(in crate::transport) fn excludes_caustics(self) -> bool {
         self == Self::NO_CAUSTIC || self == Self::BEHIND_MIRROR
     }
 
     /// True if the path may end in a photon map.
     #[inline]
-    pub(in crate::transport) fn is_gathered(self) -> bool {
+    pub(in crate::transport) fn may_end_in_photon_map(self) -> bool {
         self.has(GATHERED)
     }
 }

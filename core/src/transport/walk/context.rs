@@ -85,9 +85,9 @@ impl<'a, F: Features> SceneContext<'a, F> {
         Bsdf::at::<F>(self.scene, point.material, point.uv, point.front)
     }
 
-    /// True if photons are stored only on the bases of narrow coats ([`Bsdf::is_varnished`]), whose coats are
-    /// then sampled separately. Paths that leave by a coat have to find all light; they cannot find point and
-    /// directional lights behind mirrors and smooth glass.
+    /// True if photons are stored only on the bases of narrow coats ([`Bsdf::gathers_photons_on_base`]),
+    /// whose coats are then sampled separately. Paths that leave by a coat have to find all light; they cannot
+    /// find point and directional lights behind mirrors and smooth glass.
     #[inline]
     pub(in crate::transport) fn separates_coats(&self) -> bool {
         !(self.has_mirrors && self.lights.has_delta_lights())
@@ -96,7 +96,7 @@ impl<'a, F: Features> SceneContext<'a, F> {
     /// True if a ray from triangle `left` skips `point`: a cut-out whose opacity does not exceed `random`
     /// (evaluated for cut-outs only), or the ray's own triangle, hit by rounding.
     #[inline]
-    pub(in crate::transport) fn is_passed(
+    pub(in crate::transport) fn is_skipped(
         &self,
         point: &SurfacePoint,
         hit: &Hit,
@@ -136,7 +136,7 @@ impl<'a, F: Features> SceneContext<'a, F> {
         loop {
             let point = self.surface_at(&segment.ray, &hit)?;
             let (surfaces, length) = (segment.surfaces, segment.length + hit.t);
-            if !self.is_passed(&point, &hit, segment.triangle, || random(surfaces)) {
+            if !self.is_skipped(&point, &hit, segment.triangle, || random(surfaces)) {
                 segment.length = length;
                 return Some((hit, point));
             }

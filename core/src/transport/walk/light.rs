@@ -89,12 +89,12 @@ pub(in crate::transport) struct Vertex<'v> {
 
 impl Vertex<'_> {
     /// Random number of the visitor.
-    pub(in crate::transport) fn own(&self) -> f32 {
+    pub(in crate::transport) fn visitor_number(&self) -> f32 {
         self.numbers.single(self.first + VISITOR)
     }
 
     /// Two random numbers of the visitor.
-    pub(in crate::transport) fn own_pair(&self) -> [f32; 2] {
+    pub(in crate::transport) fn visitor_pair(&self) -> [f32; 2] {
         self.numbers.pair(self.first + VISITOR)
     }
 
@@ -241,7 +241,7 @@ impl<F: Features> LightWalk<'_, F> {
         let point = self.context.surface_at(ray, hit)?;
         let direction = Vec3::from(ray.direction);
         let opacity = || numbers.single(dimension::opacity(state.segments, state.crossings));
-        if self.context.is_passed(&point, hit, state.triangle, opacity) {
+        if self.context.is_skipped(&point, hit, state.triangle, opacity) {
             if state.crossings >= MAX_CROSSINGS {
                 counters.dropped.unfinished += 1;
                 return None;

@@ -71,7 +71,7 @@ impl PathState {
 
     /// Continues with `next` behind the skipped `triangle`. `None` after [`MAX_CROSSINGS`] skipped surfaces.
     #[cold]
-    pub(in crate::transport) fn cross(
+    pub(in crate::transport) fn skip_surface(
         &mut self,
         next: Ray,
         triangle: u32,

@@ -96,7 +96,7 @@ impl Visitor for Recorder<'_, '_> {
         let [u, v] = vertex.barycentric;
         let slot = path.vertices.get_mut(count - 1)?;
         *slot = PathVertex::at(point, &Hit { t: 0.0, u, v, triangle: point.triangle });
-        (path.power[count - 1], path.lens[count - 1]) = (state.power.into(), vertex.own_pair());
+        (path.power[count - 1], path.lens[count - 1]) = (state.power.into(), vertex.visitor_pair());
         path.count = count;
         if !bsdf.is_delta() {
             *self.stored.get_mut(self.count)? = (state.number as usize, count);
