@@ -86,8 +86,8 @@ impl<'a, F: Features> SceneContext<'a, F> {
     }
 
     /// True if photons are stored only on the bases of narrow coats ([`Bsdf::gathers_photons_on_base`]),
-    /// whose coats are then sampled separately. Paths that leave by a coat have to find all light; they cannot
-    /// find point and directional lights behind mirrors and smooth glass.
+    /// whose coats are then sampled separately. Paths that leave by a coat have to find all light; they
+    /// cannot find point and directional lights behind mirrors and smooth glass.
     #[inline]
     pub(in crate::transport) fn separates_coats(&self) -> bool {
         !(self.has_mirrors && self.lights.has_delta_lights())
