@@ -1,6 +1,7 @@
 //! The command line as a contract, tested by running the program.
 
 use crate::support::Folder;
+use halflight::render::Method;
 use halflight::save::{Image, read, write};
 use serde_json::Value;
 use std::path::Path;
@@ -181,6 +182,20 @@ fn a_race_tells_who_is_ahead() {
         folder.run("race scene.obj --methods path,auto --time 200ms --size 16x16 --reference r.exr").stdout;
     let text = String::from_utf8(text).unwrap();
     assert!(text.contains("against the reference") && text.contains("efficiency"), "{text}");
+}
+
+#[test]
+fn every_method_races() {
+    let folder = Folder::new("race-all");
+    let methods = Method::ALL.map(Method::name);
+    let list = methods.join(",");
+    let object = folder.object(&format!("race scene.obj --methods {list} --time 100ms --size 8x8 --json"));
+    let rows = object["methods"].as_array().unwrap();
+    assert_eq!(rows.len(), methods.len());
+    for (row, name) in rows.iter().zip(methods) {
+        assert_eq!(row["name"], name);
+        assert!(row["spp"].as_u64().unwrap() > 0 && row["filled_pixels"] == 0, "{row}");
+    }
 }
 
 #[test]
