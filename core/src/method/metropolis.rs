@@ -13,7 +13,7 @@ use super::{Method, RenderContext, Round};
 use crate::bsdf::Features;
 use crate::film::{PIXELS_PER_TILE, Pixel, Splat, Tile};
 use crate::findings::Findings;
-use crate::light::{EmissionSampler, luminance};
+use crate::light::EmissionSampler;
 use crate::memory::{Arena, Footprint, MemorySource, OutOfMemory};
 use crate::transport::Counters;
 use crate::transport::metropolis::chain::{Chains, ChainsOutput, Steps, room};
@@ -22,33 +22,15 @@ use crate::transport::metropolis::look::{CANDIDATES, Lengths, Look};
 use crate::transport::metropolis::paths::Paths;
 use crate::transport::metropolis::split::{CELL, MAX_SEGMENTS, Split};
 use crate::transport::metropolis::target::Target;
-use core::ops::Range;
 
+mod pilot;
+mod plan;
 mod settings;
 
 pub use crate::transport::metropolis::target::PrimarySpace;
 pub use settings::{ChainUse, MetropolisSettings};
 
-/// One of this number of points that are evaluated for a sample is independent.
-const INDEPENDENT: usize = 4;
-
-/// Chains that a sample has at least, while each has [`SHORTEST`] mutations; and mutations of a chain.
-const FEWEST_CHAINS: usize = 64;
-const SHORTEST: usize = 16;
-const LONGEST: usize = 256;
-
-/// Independent points of a sample at least.
-const FEWEST_CANDIDATES: usize = 64;
-
-/// Number of the first pass of the pilot.
-const PILOT: u32 = 1 << 30;
-
-/// Points of the pilot, and its passes at most.
-const PILOT_POINTS: usize = 1 << 17;
-const MOST_PASSES: usize = 32;
-
-/// Least level of a pixel, relative to the mean of the picture.
-const LEAST_LEVEL: f32 = 0.1;
+use plan::{LONGEST, Plan};
 
 /// Sums over samples, for [`ChainUse`].
 #[derive(Clone, Copy, Default)]
@@ -58,46 +40,6 @@ struct Totals {
     squares: f64,
     proposed: [u64; 3],
     accepted: [u64; 3],
-}
-
-/// Sizes of a sample.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct Plan {
-    candidates: usize,
-    chains: usize,
-    mutations: usize,
-}
-
-impl Plan {
-    /// For `budget` points.
-    fn new(budget: usize) -> Self {
-        let visits = budget - budget / INDEPENDENT;
-        let mutations = (visits / FEWEST_CHAINS).clamp(SHORTEST, LONGEST);
-        let chains = visits.div_ceil(mutations).max(1);
-        Self { candidates: (budget / INDEPENDENT).max(FEWEST_CANDIDATES), chains, mutations }
-    }
-
-    fn tasks(&self) -> usize {
-        self.chains.div_ceil(LANES)
-    }
-
-    fn footprint(&self) -> Footprint {
-        Footprint::default()
-            .slice::<f32>(self.candidates)
-            .slice::<u32>(self.chains)
-            .slice::<Splat>(self.tasks() * room(self.mutations))
-            .slice::<ChainsOutput>(self.tasks())
-    }
-
-    /// As large as `bytes` allow, with one task at least.
-    fn within(self, bytes: usize) -> Self {
-        let mut plan = self;
-        while plan.footprint().bytes() > bytes && plan.tasks() > 1 {
-            plan.chains = (plan.tasks() - 1) * LANES;
-            plan.candidates = plan.candidates.min((plan.chains * plan.mutations).div_ceil(INDEPENDENT - 1));
-        }
-        plan
-    }
 }
 
 /// A picture by Metropolis light transport.
@@ -184,99 +126,19 @@ impl<'a, F: Features> Metropolis<'a, F> {
         Paths::new(context.scene_context(), emission, context.settings, *split)
     }
 
-    /// Whether there is light that chains could find.
+    /// Whether there is light that chains could find, and time for them.
     fn is_needed(&self) -> bool {
-        !self.context.lights.is_empty() && self.context.settings.max_depth >= self.lengths.first()
-    }
-
-    /// Finds a rough picture, and how much light paths of each length bring to chains.
-    fn pilot(
-        &mut self,
-        levels: &'a mut [f32],
-        threshold: f32,
-        executor: &mut impl Executor,
-    ) -> Result<(), OutOfMemory> {
-        if !self.is_needed() {
-            return Ok(());
-        }
-        let points = self.plan.candidates + self.plan.chains * self.plan.mutations;
-        let passes = (PILOT_POINTS / points).clamp(1, MOST_PASSES) as u32;
-        self.lengths = Lengths::new(self.target().lengths(), |_| 1.0);
-        self.measure_lengths(PILOT..PILOT + passes, executor)?;
-        levels.fill(0.0);
-        for sample in PILOT + passes..PILOT + 2 * passes {
-            if self.chain_pass(sample, executor)?.is_none() {
-                return Ok(());
-            }
-            let cells = levels.iter_mut().zip(self.picture.chunks(CELL));
-            cells.for_each(|(level, cell)| *level += cell.iter().map(|&c| luminance(c.into())).sum::<f32>());
-        }
-        if !self.measure_levels(levels, passes as f32, executor)? {
-            return Ok(());
-        }
-        self.split = Split { levels, threshold, ..self.split };
-        self.measure_lengths(PILOT + 2 * passes..PILOT + 3 * passes, executor)?;
-        self.totals = Totals::default();
-        Ok(())
-    }
-
-    /// Makes of `levels`, the light of `passes` passes of chains in each cell, its mean radiance with the
-    /// light that is not for chains. Whether the executor was not over.
-    fn measure_levels(
-        &self,
-        levels: &mut [f32],
-        passes: f32,
-        executor: &mut impl Executor,
-    ) -> Result<bool, OutOfMemory> {
-        let paths = self.paths();
-        let cells = levels.chunks_mut(PIXELS_PER_TILE / CELL);
-        let rough = executor.pass(cells, |tile, levels, worker| {
-            let mut arena = worker.scratch.scratch();
-            let pixels: &mut [Pixel] = arena.slice(PIXELS_PER_TILE)?;
-            pixels.fill(Pixel::default());
-            let counters = paths.run(tile, PILOT..PILOT + 1, &[], &mut arena, pixels)?;
-            for (level, pixels) in levels.iter_mut().zip(pixels.chunks(CELL)) {
-                let seen = pixels.iter().filter(|pixel| pixel.count() > 0);
-                let sum: f32 = seen.clone().map(|pixel| luminance(pixel.mean())).sum();
-                *level = (*level / passes + sum) / seen.count().max(1) as f32;
-            }
-            Ok(counters)
-        })?;
-        let mean = levels.iter().sum::<f32>() / levels.len() as f32;
-        let least = if mean > 0.0 { LEAST_LEVEL * mean } else { 1.0 };
-        levels.iter_mut().for_each(|level| *level = level.max(least));
-        Ok(rough.is_complete)
-    }
-
-    /// Sets the probabilities of lengths by the independent points of `samples`.
-    fn measure_lengths(
-        &mut self,
-        samples: Range<u32>,
-        executor: &mut impl Executor,
-    ) -> Result<(), OutOfMemory> {
-        let mut sums = [0.0; MAX_SEGMENTS as usize + 1];
-        for sample in samples {
-            if self.look(sample, executor)?.is_none() {
-                return Ok(());
-            }
-            let look = Look::new(self.target(), self.lengths, self.context.settings.seed, sample);
-            for (&density, candidate) in self.densities.iter().zip(0..) {
-                if let Some(sum) = sums.get_mut(look.length(candidate).0 as usize) {
-                    *sum += f64::from(density);
-                }
-            }
-        }
-        self.lengths = Lengths::new(self.target().lengths(), |segments| sums[segments as usize]);
-        Ok(())
+        let Self { context, lengths, plan, .. } = self;
+        plan.chains > 0 && !context.lights.is_empty() && context.settings.max_depth >= lengths.first()
     }
 
     /// Evaluates the independent points of a sample. The work; `None` where the executor is over.
     fn look(&mut self, sample: u32, executor: &mut impl Executor) -> Result<Option<Counters>, OutOfMemory> {
         let densities = core::mem::take(&mut self.densities);
         let look = Look::new(self.target(), self.lengths, self.context.settings.seed, sample);
-        let passed = executor.pass(densities.chunks_mut(CANDIDATES), |task, densities, worker| {
-            look.run(task, &mut worker.scratch, densities)
-        });
+        let points = densities[..self.plan.candidates].chunks_mut(CANDIDATES);
+        let passed =
+            executor.pass(points, |task, densities, worker| look.run(task, &mut worker.scratch, densities));
         self.densities = densities;
         let Passed { counters, is_complete } = passed?;
         Ok(is_complete.then_some(counters))
@@ -295,6 +157,8 @@ impl<'a, F: Features> Metropolis<'a, F> {
         let Some(mut counters) = self.look(sample, executor)? else { return Ok(None) };
         let Self { context, emission, split, space, lengths, plan, .. } = *self;
         let Self { densities, starts, splats, outputs, picture, .. } = self;
+        let (densities, starts) = (&densities[..plan.candidates], &mut starts[..plan.chains]);
+        let outputs = &mut outputs[..plan.tasks()];
         let (pixels, seed) = (picture.len(), context.settings.seed);
         let target = Target::<F>::new(context.scene_context(), &emission, context.settings, split, space);
         let look = Look::new(target, lengths, seed, sample);
@@ -316,7 +180,7 @@ impl<'a, F: Features> Metropolis<'a, F> {
             return Ok(None);
         }
         counters += passed.counters;
-        let (splats, outputs) = (&**splats, &**outputs);
+        let (splats, outputs) = (&**splats, &*outputs);
         outputs.iter().for_each(|output| self.totals.count(&output.steps));
         let lists = splats.chunks(room).zip(outputs.iter().map(|output| &output.offsets));
         Ok(add_splats(executor, picture, lists)?.then_some(counters))

@@ -8,9 +8,12 @@ use std::time::Instant;
 /// Time after the end that prepasses may take: the picture gains by them, and most take less.
 const PREPASS_GRACE: Duration = Duration::from_secs(2);
 
-/// Time after the end that the first sample of each pixel may take, with its preparation. A picture of ordinary
-/// size takes less; a larger one is cut then, and its gaps are filled (`gaps.rs`).
+/// Time after the end that the first sample of each pixel may take, with its preparation.
 const FIRST_SAMPLE_GRACE: Duration = Duration::from_secs(5);
+
+/// Time after the end, and after their start, that the samples of tiles may take of it. A picture of ordinary size
+/// takes less; a larger one is cut then, and its gaps are filled (`gaps.rs`).
+const TILES_GRACE: Duration = Duration::from_millis(500);
 
 /// A time limit, an interrupt flag, or both; by default the render never ends.
 #[derive(Default)]
@@ -60,6 +63,11 @@ impl<'w> Deadline<'w> {
         self.has_ended_for(FIRST_SAMPLE_GRACE)
     }
 
+    /// Whether the first samples of tiles, begun at `start`, are to end.
+    pub(super) fn ends_samples_since(&self, start: Instant) -> bool {
+        start.elapsed() >= TILES_GRACE && self.has_ended_for(TILES_GRACE)
+    }
+
     fn has_ended_for(&self, time: Duration) -> bool {
         self.is_interrupted();
         let ends = [self.deadline, self.noticed.get().copied()];
@@ -90,6 +98,9 @@ mod tests {
         assert!(noticed(ago(FIRST_SAMPLE_GRACE)).is_late());
         let timed = Deadline { deadline: Some(ago(FIRST_SAMPLE_GRACE)), ..Deadline::default() };
         assert!(timed.is_over() && timed.is_late());
+        let timed = Deadline { deadline: Some(ago(TILES_GRACE)), ..Deadline::default() };
+        assert!(timed.ends_samples_since(ago(TILES_GRACE)) && !timed.ends_samples_since(Instant::now()));
+        assert!(!Deadline::default().ends_samples_since(ago(TILES_GRACE)));
         assert!(!Deadline::default().within(Some(1e300)).is_over());
     }
 

@@ -16,6 +16,9 @@ pub(super) enum End {
     Prepass,
     /// First round: some seconds later still, so that every pixel has a sample.
     FirstRound(Option<Instant>),
+    /// Samples of tiles in it, from their start on: they have some time of their own. Where they are cut, every tile
+    /// has its chance, and gaps are filled (`gaps.rs`).
+    FirstSamples(Option<Instant>, Instant),
     /// Every other round: at its deadline and when the user interrupts.
     Round(Option<Instant>),
 }
@@ -26,6 +29,9 @@ impl End {
         match self {
             End::Prepass => render.is_over(),
             End::FirstRound(deadline) => render.is_late() || is_past(deadline),
+            End::FirstSamples(deadline, start) => {
+                render.is_late() || is_past(deadline) || render.ends_samples_since(start)
+            }
             End::Round(deadline) => render.is_interrupted() || is_past(deadline),
         }
     }
@@ -33,7 +39,7 @@ impl End {
     fn deadline(self) -> Option<Instant> {
         match self {
             End::Prepass => None,
-            End::FirstRound(deadline) | End::Round(deadline) => deadline,
+            End::FirstRound(deadline) | End::FirstSamples(deadline, _) | End::Round(deadline) => deadline,
         }
     }
 }
@@ -121,6 +127,10 @@ impl<'t> Executor for Threads<'t> {
         P: Iterator<Item: Send> + Send,
         T: Fn(usize, P::Item, &mut Worker) -> Result<Counters, OutOfMemory> + Sync,
     {
+        // What follows in the round ends with them.
+        if let End::FirstRound(deadline) = self.branches.end {
+            self.branches.end = End::FirstSamples(deadline, Instant::now());
+        }
         self.run(scattered(pieces.enumerate().collect()).into_iter(), task)
     }
 

@@ -8,6 +8,7 @@ use crate::memory::{Buffer, Footprint, OutOfMemory};
 use crate::method::path::PathTracing;
 use crate::method::tests::{film, lines, with_room};
 use crate::method::{Loop, Method, RenderContext};
+use core::sync::atomic::{AtomicU32, Ordering};
 use std::vec::Vec;
 
 /// Enough for the pictures here.
@@ -95,13 +96,32 @@ fn any_division_of_light_and_any_space_have_the_mean_of_path_tracing() {
 }
 
 #[test]
+fn without_time_for_the_pilot_there_are_paths_alone() {
+    with_room(|context| {
+        let (mut memory, mut scratch) = (lines(PLENTY), lines(Metropolis::<All>::scratch().bytes()));
+        let mut buffer = Buffer::new(bytemuck::cast_slice_mut(&mut memory));
+        let asked = AtomicU32::new(0);
+        let is_over = || asked.fetch_add(1, Ordering::Relaxed) == 0;
+        let mut executor = Loop::new(bytemuck::cast_slice_mut(&mut scratch)).until(&is_over);
+        let settings = MetropolisSettings::default();
+        let mut method = Metropolis::<All>::new(context, &settings, &mut buffer, &mut executor, 0).unwrap();
+        let pixels = film(context, &mut executor, [3, 3, 8], |round| method.round(round)).unwrap();
+        assert_eq!(method.chains().chains, 0);
+        assert!(pixels.iter().filter(|pixel| pixel.mean().min_element() > 0.0).count() > 200);
+    });
+}
+
+#[test]
 fn a_sample_is_as_large_as_its_budget_and_shrinks_to_the_memory() {
     for budget in [1, 100, 400, 1 << 12, 1 << 18, 1 << 24] {
         let plan = Plan::new(budget);
-        let points = plan.candidates + plan.chains * plan.mutations;
+        let points = plan.points();
         assert!(budget < 1 << 12 || points.abs_diff(budget) <= budget / 16, "{plan:?}");
         let bytes = plan.footprint().bytes();
         assert_eq!(plan.within(bytes), plan);
+        let half = plan.at_most(points / 2);
+        assert!(half.points() <= points / 2 || half.chains == 1, "{half:?}");
+        assert_eq!(plan.at_most(points), plan);
         let less = plan.within(bytes / 3);
         assert!(less.footprint().bytes() <= bytes / 3 || less.tasks() == 1, "{less:?}");
         assert!(less.candidates > 0 && less.chains > 0);
