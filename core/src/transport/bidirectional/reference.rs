@@ -162,8 +162,7 @@ impl<'a> Reference<'a> {
             if segments >= max_depth {
                 break;
             }
-            let bsdf = context.bsdf_at(&point);
-            let wo = point.frame.to_local(-direction);
+            let (bsdf, wo) = (context.bsdf_at(&point), point.frame.to_local(-direction));
             if is_bent(&point, wo) {
                 return None;
             }
