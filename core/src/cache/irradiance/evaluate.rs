@@ -35,7 +35,8 @@ impl Record {
         self.weigh(One, &Query::of(point), least_cos, 1.0).0
     }
 
-    /// Factor by which the record has to be widened to cover `point`; `None` above `most`, or if no factor does.
+    /// Factor by which the record has to be widened to cover `point`; `None` above `most`, or if no factor
+    /// does.
     pub(super) fn widening(&self, point: &QueryPoint, least_cos: f32, most: f32) -> Option<f32> {
         if point.normal.dot(self.normal.into()) <= least_cos {
             return None;

@@ -128,8 +128,8 @@ impl Record {
         }
     }
 
-    /// Record with radii scaled by `factor`, at least 1, over which light changes by as much. Walls beyond its
-    /// former reach have to be found; any point there may be under an overhang.
+    /// Record with radii scaled by `factor`, at least 1, over which light changes by as much. Walls beyond
+    /// its former reach have to be found; any point there may be under an overhang.
     pub fn widened(&self, factor: f32) -> Self {
         let narrow = |free: u8| (f32::from(free) / factor) as u8;
         Self {

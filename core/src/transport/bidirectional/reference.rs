@@ -185,12 +185,10 @@ impl<'a> Reference<'a> {
             throughput *= sample.weight;
             eta_squared *= sample.eta * sample.eta;
             let survival = continuation_probability(segments, throughput * eta_squared);
-            if survival < 1.0 {
-                if sampler.single(first + dimension::ROULETTE) >= survival {
-                    break;
-                }
-                throughput /= survival;
+            if sampler.single(first + dimension::ROULETTE) >= survival {
+                break;
             }
+            throughput /= survival;
             vertices[segments as usize - 1].leave(&sample, 1.0 / sample.eta);
             (ray, triangle, segments) = (point.spawn(towards), hit.triangle, segments + 1);
         }

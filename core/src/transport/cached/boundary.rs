@@ -53,8 +53,8 @@ impl<F: Features, E: Estimator<F>> PathIntegrator<'_, F, E> {
         }
     }
 
-    /// The record of `place` with radii, and search for walls, scaled by `factor`; light changes over the larger
-    /// support by as much as before. Points beyond the former support look for overhangs themselves.
+    /// The record of `place` with radii, and search for walls, scaled by `factor`; light changes over the
+    /// larger support by as much as before. Points beyond the former support look for overhangs themselves.
     pub fn widened(
         &self,
         record: &Record,
