@@ -2,7 +2,7 @@
 //! splatted where the camera sees them (Veach 1997, section 10.2; Dutré et al. 1993).
 
 use crate::Rgb;
-use crate::bsdf::{BsdfSample, Features};
+use crate::bsdf::{Bsdf, BsdfSample, Features};
 use crate::film::{Splat, StripOffsets, Tile, sort_by_strip};
 use crate::geometry::{Hit, Ray};
 use crate::light::EmissionSampler;
@@ -263,6 +263,11 @@ impl<F: Features> Writer<'_, F> {
     }
 }
 
+/// The way a light path goes on from `bsdf`: mirrors and dielectrics store nothing, and have no limit.
+pub(super) fn continuation(bsdf: &Bsdf) -> Continuation {
+    Continuation { most: if bsdf.is_delta() { 1.0 } else { MAX_CONTINUATION }, mirrored: false }
+}
+
 fn sums(state: &LightPathState) -> Sums {
     Sums { last: state.last, rest: state.rest, merge: state.merge }
 }
@@ -307,7 +312,7 @@ impl<F: Features> Visitor for Writer<'_, F> {
             }
             let _ = self.splat(state, vertex, cos_in);
         }
-        Some(Continuation { most: MAX_CONTINUATION, mirrored: false })
+        Some(continuation(vertex.bsdf))
     }
 
     fn leave(

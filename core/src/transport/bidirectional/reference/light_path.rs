@@ -6,10 +6,10 @@ use crate::Rgb;
 use crate::bsdf::BsdfSample;
 use crate::geometry::Hit;
 use crate::light::LightType;
-use crate::transport::bidirectional::light_pass::{DIMENSIONS, SEED};
+use crate::transport::bidirectional::light_pass::{DIMENSIONS, SEED, continuation};
 use crate::transport::bidirectional::vertex::is_bent;
 use crate::transport::settings::Counters;
-use crate::transport::walk::light::{Continuation, LightPathState, MAX_CONTINUATION, Vertex, Visitor};
+use crate::transport::walk::light::{Continuation, LightPathState, Vertex, Visitor};
 use glam::Vec3;
 
 /// A light path: where it starts, and its vertices.
@@ -102,7 +102,7 @@ impl Visitor for Recorder<'_, '_> {
             *self.stored.get_mut(self.count)? = (state.number as usize, count);
             self.count += 1;
         }
-        Some(Continuation { most: MAX_CONTINUATION, mirrored: false })
+        Some(continuation(vertex.bsdf))
     }
 
     fn leave(&self, state: &mut LightPathState, _: &Vertex, _: Vec3, (sample, _): (&BsdfSample, bool)) {
