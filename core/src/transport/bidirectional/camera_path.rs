@@ -66,6 +66,11 @@ impl CameraPath {
     pub(super) fn sums(&self) -> Sums {
         Sums { last: self.last, rest: self.rest, merge: self.merge }
     }
+
+    /// Sums for a light at the end of the segment. No light path splats direct light.
+    pub(super) fn sums_of_hit(&self) -> Sums {
+        if self.segments == 2 { Sums::default() } else { self.sums() }
+    }
 }
 
 /// A vertex that a path has arrived at.

@@ -82,7 +82,7 @@ impl<'a> Reference<'a> {
     /// The splat of the `count`th vertex of a light path: its raster column and row, and its radiance.
     pub fn splat(&self, light: &LightPath, count: usize) -> Option<([u32; 2], Rgb)> {
         let Self { context, settings: PathSettings { width, height, max_depth, .. }, .. } = *self;
-        if count as u32 + 1 > max_depth {
+        if count == 1 || count as u32 + 1 > max_depth {
             return None;
         }
         let vertices = light.vertices.get(..count)?;

@@ -39,7 +39,7 @@ impl<F: Features> CameraPaths<'_, F> {
                 true => emission.density_of_environment(context.scene, context.lights, direction, position),
                 false => 0.0,
             };
-            weight = weight_of_hit(counts, &path.sums(), pdf, pdf_light, density);
+            weight = weight_of_hit(counts, &path.sums_of_hit(), pdf, pdf_light, density);
         }
         path.add(Rgb::from(path.throughput) * radiance * weight);
     }
@@ -63,7 +63,7 @@ impl<F: Features> CameraPaths<'_, F> {
                 true => emission.density_of_surface(scene, lights, hit.triangle, from),
                 false => 0.0,
             };
-            weight = weight_of_hit(counts, &path.sums(), pdf, pdf_light, density);
+            weight = weight_of_hit(counts, &path.sums_of_hit(), pdf, pdf_light, density);
         }
         path.add(Rgb::from(path.throughput) * radiance * weight);
     }
@@ -95,7 +95,7 @@ impl<F: Features> CameraPaths<'_, F> {
         let pdf = if light.delta { 0.0 } else { pdf };
         let mut emitted = (0.0, 0.0);
         let mut density = 0.0;
-        if counts.light_paths > 0.0 && !vertex.is_bent {
+        if counts.light_paths > 0.0 && path.segments > 1 && !vertex.is_bent {
             let cos = light.direction.dot(point.geometric_normal).abs();
             emitted = (cos, reverse_pdf(context, (point, bsdf), wo, wi));
             density = emission.density_of_sample(scene, lights, &light, point.position);

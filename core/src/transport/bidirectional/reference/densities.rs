@@ -244,6 +244,7 @@ impl Reference<'_> {
             all[i + 1] = match i {
                 _ if is_delta(i) || is_delta(i + 1) => 0.0,
                 0 => f64::from(counts.light_samples) * light_sample * by_camera(1),
+                _ if i + 1 == k && k == 2 => 0.0,
                 _ if i + 1 == k => f64::from(counts.light_paths) * by_light(i),
                 _ => f64::from(counts.connections) * by_light(i) * by_camera(i + 1),
             };
