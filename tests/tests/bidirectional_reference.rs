@@ -168,7 +168,7 @@ fn running_sums_weigh_paths_as_all_densities_do() {
             let compared = compare(&buffers.scene(), connections, radius, |_, _| ());
             // Short segments and narrow lobes magnify rounding.
             let Compared { values, wrong, worst } = compared;
-            assert!(values > 700 && wrong <= values / 100 && worst < 1e-3, "{name} {radius:?} {compared:?}");
+            assert!(values > 600 && wrong <= values / 100 && worst < 1e-3, "{name} {radius:?} {compared:?}");
         }
     }
 }

@@ -13,8 +13,8 @@ use super::executor::{Executor, Passed};
 use super::splats::{add_splats, splats_of_tile};
 use super::{Method, PhotonMapStore, RenderContext, Round, caustics};
 use crate::bsdf::Features;
-use crate::film::{PIXELS_PER_TILE, Splat, Tile};
-use crate::light::EmissionSampler;
+use crate::film::{PIXELS_PER_TILE, Pixel, Splat, Tile};
+use crate::light::{EmissionSampler, luminance};
 use crate::memory::{Footprint, MemorySource, OutOfMemory};
 use crate::transport::bidirectional::camera_paths::{CameraPaths, Connections};
 use crate::transport::bidirectional::light_pass::{LightPass, ROOM, TaskOutput};
@@ -30,8 +30,15 @@ const PIXELS_PER_LIGHT_PATH: usize = 2;
 /// Light paths of a sample at most.
 const MOST_TASKS: usize = 1024;
 
-/// Radius of merges of the first sample, in pixels.
-const FIRST_RADIUS: f64 = 3.0;
+/// Radius of merges of the first sample, in pixels: at least, and at most where they bring nearly all light.
+const FIRST_RADIUS: f64 = 1.25;
+const WIDEST_RADIUS: f64 = 4.0;
+
+/// Ratio of the light of merges and splats to all other from which on radii grow.
+const WIDENING_RATIO: f64 = 0.8;
+
+/// Tiles that show this ratio.
+const PILOT_TILES: usize = 16;
 
 /// Photons that a task brings to the map.
 const PIECE: usize = 4096;
@@ -84,20 +91,23 @@ pub struct Bidirectional<'a, F> {
 /// Radii of one pixel, and photons of a sample.
 struct VertexMerging<'a> {
     radii: RadiusSchedule,
+    /// Radius for the first sample, pixels.
+    first_radius: f64,
     photons: PhotonMapStore<'a>,
 }
 
 impl VertexMerging<'_> {
     /// Radii of `sample`, which has `light_paths`; those of the pilot are the first.
     fn radii(&self, sample: u32, light_paths: f32) -> MergeRadii {
-        MergeRadii { radii: self.radii.after(FIRST_RADIUS, sample % PILOT / 2), light_paths }
+        MergeRadii { radii: self.radii.after(self.first_radius, sample % PILOT / 2), light_paths }
     }
 }
 
 impl<'a, F: Features> Bidirectional<'a, F> {
     /// Working memory of a worker.
     pub fn scratch(settings: &BidirectionalSettings) -> Footprint {
-        LightPass::<F>::scratch().or(CameraPaths::<F>::scratch(settings.connections))
+        let paths = CameraPaths::<F>::scratch(settings.connections);
+        LightPass::<F>::scratch().or(paths.slice::<Pixel>(2 * PIXELS_PER_TILE))
     }
 
     /// Memory of `tasks` of light paths, with room for `vertices`.
@@ -135,7 +145,7 @@ impl<'a, F: Features> Bidirectional<'a, F> {
             Self::footprint(tasks, stored(tasks)).bytes() + photons
         };
         let guide = GuideSettings {
-            filter: PhotonFilter::Reflected,
+            filter: if merges { PhotonFilter::Caustic } else { PhotonFilter::Reflected },
             max_depth: paths.max_depth,
             target: Target::Visible(FIRST_RADIUS as f32),
             reserve: others.saturating_add(bytes(1)),
@@ -149,9 +159,11 @@ impl<'a, F: Features> Bidirectional<'a, F> {
         let stored = stored(tasks);
         let mut arena = memory.take("light paths", Self::footprint(tasks, stored))?;
         let merging = match merges && tasks > 0 {
-            true => {
-                Some(VertexMerging { radii: context.radii(), photons: PhotonMapStore::new(stored, memory)? })
-            }
+            true => Some(VertexMerging {
+                radii: context.radii(),
+                first_radius: FIRST_RADIUS,
+                photons: PhotonMapStore::new(stored, memory)?,
+            }),
             false => None,
         };
         let mut method = Self {
@@ -171,7 +183,61 @@ impl<'a, F: Features> Bidirectional<'a, F> {
         if method.connections > 0 && tasks > 0 {
             method.measure(executor)?;
         }
+        if method.merging.is_some() {
+            method.widen(executor)?;
+        }
         Ok(method)
+    }
+
+    /// Widens merges where light paths bring most of the light: photons are most of the noise there.
+    fn widen(&mut self, executor: &mut impl Executor) -> Result<(), OutOfMemory> {
+        let Some((stored, _)) = self.light_pass(PILOT + 1, executor)? else { return Ok(()) };
+        let share = self.share_of_light_paths(stored, executor)?;
+        if let Some(merging) = &mut self.merging {
+            let widened = FIRST_RADIUS * share / (WIDENING_RATIO * (1.0 - share));
+            merging.first_radius = widened.clamp(FIRST_RADIUS, WIDEST_RADIUS);
+        }
+        Ok(())
+    }
+
+    /// Mean fraction of a pixel's light that merges and splats bring, on a few tiles, by the `stored` vertices of
+    /// the pilot.
+    fn share_of_light_paths(
+        &mut self,
+        stored: usize,
+        executor: &mut impl Executor,
+    ) -> Result<f64, OutOfMemory> {
+        let Self { context, emission, counts, connections, vertices, picture, merging, .. } = self;
+        let Some(merging) = merging else { return Ok(0.0) };
+        let radii = merging.radii(PILOT, counts.light_paths);
+        let Some(photons) = &merging.photons.map()? else { return Ok(0.0) };
+        let vertices = &vertices[..stored];
+        let connections = Connections { vertices, count: *connections };
+        let (scene, settings) = (context.scene_context::<F>(), context.settings);
+        let paths = CameraPaths::new(scene, emission, settings, *counts, connections);
+        let paths_with = |vertices| paths.with_merging(Some(Merging { photons, vertices, radii }));
+        // A merge with a vertex that is not there brings nothing.
+        let (all, others) = (paths_with(vertices), paths_with(&[]));
+        let mut shares = [(0.0, 0u32); PILOT_TILES];
+        let tiles = Tile::count(settings.width, settings.height);
+        let _ = executor.pass(shares.iter_mut().take(tiles), |number, share, worker| {
+            let tile = number * tiles / PILOT_TILES.min(tiles);
+            let mut arena = worker.scratch.scratch();
+            let pixels: &mut [Pixel] = arena.slice(2 * PIXELS_PER_TILE)?;
+            pixels.fill(Pixel::default());
+            let (of_all, of_others) = pixels.split_at_mut(PIXELS_PER_TILE);
+            let mut counters = all.run(tile, 0..1, splats_of_tile(picture, tile), &mut arena, of_all)?;
+            counters += others.run(tile, 0..1, &[], &mut arena, of_others)?;
+            for (all, others) in of_all.iter().zip(of_others) {
+                let [all, others] = [all, others].map(|pixel| f64::from(luminance(pixel.even.sum())));
+                if all > 0.0 {
+                    *share = (share.0 + (1.0 - others / all).max(0.0), share.1 + 1);
+                }
+            }
+            Ok(counters)
+        })?;
+        let (sum, pixels) = shares.iter().fold((0.0, 0), |sum, of| (sum.0 + of.0, sum.1 + of.1));
+        Ok(sum / f64::from(pixels.max(1)))
     }
 
     /// Measures the mean number of vertices of a pass, M̄, and fixes the count of connections by it: C L /

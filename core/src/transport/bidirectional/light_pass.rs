@@ -205,7 +205,7 @@ impl<F: Features> Writer<'_, F> {
     /// Sends a shadow ray from the vertex to the lens, if the picture has a pixel there.
     fn splat(&mut self, state: &LightPathState, vertex: &Vertex, cos_in: f32) -> Option<()> {
         let PathSettings { width, height, max_depth, .. } = self.settings;
-        // Light samples find direct light with less noise than Poisson's.
+        // Light samples find direct light with less noise.
         if state.segments == 1 || state.segments + 1 > max_depth {
             return None;
         }
