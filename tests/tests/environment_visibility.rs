@@ -7,7 +7,6 @@ use glam::Vec3;
 use halflight::render::{self, RenderResult, Settings, Stop};
 use halflight_core::findings::Decision;
 use halflight_core::scene::{Camera, Material, Scene};
-use halflight_tests::render::number;
 use halflight_tests::scenes::{SceneBuffers, constant_environment};
 use halflight_tests::statistics::{agree, blocks};
 
@@ -94,6 +93,10 @@ fn under_an_open_sky_nothing_is_changed() {
     let scene = buffers.scene();
     let (auto, off) =
         (render(&scene, 4, |_| ()), render(&scene, 4, |s| s.environment_visibility = Some(false)));
-    assert!(!has_windows(&auto) && number(&auto, "environment_visibility", "gain") > 0.0);
+    let visibility = auto.findings.get("environment_visibility").unwrap();
+    assert!(
+        visibility.decision == Decision::LeftOut && visibility.number("gain").is_some(),
+        "{visibility:?}"
+    );
     assert_eq!(auto.image, off.image);
 }

@@ -41,17 +41,10 @@ fn light_leaves_glass_before_the_limit_of_bounces_and_cut_paths_are_counted() {
         } else {
             assert!((found / known - 1.0).abs() < 0.03, "{}: {found}, not {known}", method.name());
         }
-        // Russian roulette ends light subpaths of bidirectional methods long before the limit, and subpaths
-        // of chains are short.
-        let has_roulette = matches!(
-            method,
-            Method::LightTracing
-                | Method::Bidirectional
-                | Method::VertexMerging
-                | Method::Metropolis
-                | Method::InstantRadiosity
-                | Method::ClampedInstantRadiosity
-        );
+        // Russian roulette ends light subpaths of virtual lights long before the limit, and subpaths of chains
+        // are short.
+        let has_roulette =
+            matches!(method, Method::Metropolis | Method::InstantRadiosity | Method::ClampedInstantRadiosity);
         assert_eq!(result.counters.dropped.unfinished > 0, !has_roulette, "{}", method.name());
     }
 }
