@@ -166,7 +166,7 @@ fn running_sums_weigh_paths_as_all_densities_do() {
     for (name, buffers) in scenes() {
         for (connections, radius) in [(0, None), (2, None), (2, Some(3.0))] {
             let compared = compare(&buffers.scene(), connections, radius, |_, _| ());
-            // All 512 pixels, and splats. Short segments and narrow lobes magnify rounding.
+            // All pixels of two samples, and splats. Short segments and narrow lobes magnify rounding.
             let Compared { values, wrong, worst } = compared;
             assert!(values > 512 && wrong <= values / 100 && worst < 1e-3, "{name} {radius:?} {compared:?}");
         }
