@@ -19,6 +19,9 @@ const PILOT_POINTS: usize = 1 << 17;
 const MOST_PASSES: usize = 32;
 const PILOT_PIXELS: usize = 1 << 18;
 
+/// Points of a pilot where there is no time for more: it may end after the picture's time.
+const SHORT_PILOT_POINTS: usize = PILOT_POINTS / 16;
+
 /// Fractions of the picture's time after which the pilot ends, and the points that tell what a sample costs.
 const PILOT_TIME: f32 = 0.4;
 const MEASURED_TIME: f32 = 0.6;
@@ -43,27 +46,43 @@ impl<'a, F: Features> Metropolis<'a, F> {
         }
         let whole = self.plan;
         self.plan = whole.at_most(PILOT_POINTS);
-        let is_complete = executor.within(PILOT_TIME, |executor| self.learn(levels, threshold, executor))?;
-        self.plan = match is_complete {
-            true if self.plan == whole => whole,
-            true => executor.within(MEASURED_TIME, |executor| self.affordable(whole, executor))?,
-            false => Plan { chains: 0, ..whole },
-        };
+        let mut passes = self.passes(PILOT_POINTS);
+        let is_complete = executor.within(PILOT_TIME, |executor| self.learn(levels, passes, executor))?;
+        let mut is_known = is_complete;
         if !is_complete {
+            self.plan = whole.at_most(SHORT_PILOT_POINTS);
+            passes = self.passes(SHORT_PILOT_POINTS);
+            is_known = self.learn(levels, passes, executor)?;
+        }
+        if is_known {
+            self.split = Split { levels, threshold, ..self.split };
+            is_known = self.measure_lengths(PILOT + 2 * passes..PILOT + 3 * passes, executor)?;
+        }
+        if !is_known {
+            self.plan.chains = 0;
             self.split.threshold = f32::INFINITY;
+        } else if is_complete {
+            self.plan = match self.plan == whole {
+                true => whole,
+                false => executor.within(MEASURED_TIME, |executor| self.affordable(whole, executor))?,
+            };
         }
         self.totals = super::Totals::default();
         Ok(())
     }
 
-    /// The passes of the pilot. Whether the executor was not over.
+    /// Passes of a pilot of `points`.
+    fn passes(&self, points: usize) -> u32 {
+        (points / self.plan.points()).clamp(1, MOST_PASSES) as u32
+    }
+
+    /// The rough picture by `passes` of chains of all lengths. Whether the executor was not over.
     fn learn(
         &mut self,
-        levels: &'a mut [f32],
-        threshold: f32,
+        levels: &mut [f32],
+        passes: u32,
         executor: &mut impl Executor,
     ) -> Result<bool, OutOfMemory> {
-        let passes = (PILOT_POINTS / self.plan.points()).clamp(1, MOST_PASSES) as u32;
         self.lengths = Lengths::new(self.target().lengths(), |_| 1.0);
         if !self.measure_lengths(PILOT..PILOT + passes, executor)? {
             return Ok(false);
@@ -76,11 +95,7 @@ impl<'a, F: Features> Metropolis<'a, F> {
             let cells = levels.iter_mut().zip(self.picture.chunks(CELL));
             cells.for_each(|(level, cell)| *level += cell.iter().map(|&c| luminance(c.into())).sum::<f32>());
         }
-        if !self.measure_levels(levels, passes as f32, executor)? {
-            return Ok(false);
-        }
-        self.split = Split { levels, threshold, ..self.split };
-        self.measure_lengths(PILOT + 2 * passes..PILOT + 3 * passes, executor)
+        self.measure_levels(levels, passes as f32, executor)
     }
 
     /// The part of a `whole` sample that takes about as long as the executor had for this.
