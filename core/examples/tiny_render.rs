@@ -50,7 +50,7 @@ pub fn render(
     let photons = PhotonSettings { global: Some(paths), ..PhotonSettings::default() };
     let counts = BidirectionalSettings {
         light_paths: Some(1024),
-        connections: u32::from(method >= 3),
+        connections: Some(u32::from(method >= 3)),
         merging: Some(method == 5),
     };
     let scratch = (arena.available() * 5 / 8).min(SCRATCH) / 64 * 64;

@@ -2,9 +2,10 @@
 
 use crate::statistics;
 use core::sync::atomic::AtomicBool;
-use halflight::render::{self, Method, RenderError, RenderResult, Settings, Stop};
+use halflight::render::{self, BidirectionalSettings, Method, RenderError, RenderResult, Settings, Stop};
 use halflight::save::Image;
 use halflight_core::findings::Finding;
+use halflight_core::method::caustics;
 use halflight_core::scene::Scene;
 
 /// A square picture of `size` pixels across with `spp` samples, not audited; `change` edits the settings
@@ -34,7 +35,19 @@ pub fn try_render(
     let (method, audit) = (Some(method), Some(0.0));
     let mut settings = Settings { method, width: size, height: size, stop, audit, ..Settings::default() };
     change(&mut settings);
+    if settings.bidirectional == BidirectionalSettings::default() {
+        settings.bidirectional = all_techniques(scene, &settings);
+    }
     render::render(scene, &settings, &mut |_| (), &AtomicBool::new(false))
+}
+
+/// Counts by which bidirectional methods use all of their techniques: a pilot leaves them out in most of the scenes
+/// here.
+fn all_techniques(scene: &Scene, settings: &Settings) -> BidirectionalSettings {
+    let merging = settings.method == Some(Method::VertexMerging) && caustics::are_possible(scene);
+    let pixels = settings.width * settings.height;
+    let light_paths = if merging { pixels } else { pixels / 2 };
+    BidirectionalSettings { light_paths: Some(light_paths), connections: Some(1), merging: Some(merging) }
 }
 
 /// Whether the render had memory for photons.

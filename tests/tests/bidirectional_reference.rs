@@ -66,7 +66,7 @@ fn compare(scene: &Scene, connections: u32, merge_radius: Option<f64>, change: C
         let counts = Counts { light_paths, connections: 0.4 * connections as f32, light_samples: 1.0 };
         let radii = merge_radius.map(|pixels| {
             let radii = RadiusSchedule::new((scene, bvh), [SIZE; 2], Level::detect());
-            MergeRadii { radii: radii.after(pixels, 0), light_paths }
+            MergeRadii { radii: radii.after(pixels, 0), light_paths, emphasis: 1.0 }
         });
         let (mut of_reference, mut radii_of_reference) = (counts, radii);
         change(&mut of_reference, &mut radii_of_reference);

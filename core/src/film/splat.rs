@@ -30,6 +30,13 @@ impl Default for StripOffsets {
     }
 }
 
+impl StripOffsets {
+    /// Splats of the list.
+    pub fn count(&self) -> usize {
+        self.0[STRIPS] as usize
+    }
+}
+
 /// Length of the strips of a film of `pixels`. The last strip may be shorter.
 pub fn strip_length(pixels: usize) -> usize {
     pixels.div_ceil(STRIPS).max(1)

@@ -31,7 +31,7 @@ const PIXELS_PER_LIGHT_PATH: usize = 2;
 const MOST_TASKS: usize = 1024;
 
 /// Radius of merges of the first sample, in pixels: at least, and at most where they bring nearly all light.
-const FIRST_RADIUS: f64 = 1.25;
+pub(in crate::method) const FIRST_RADIUS: f64 = 1.25;
 const WIDEST_RADIUS: f64 = 4.0;
 
 /// Ratio of the light of merges and splats to all other from which on radii grow.
@@ -47,25 +47,28 @@ const PIECE: usize = 4096;
 const PILOT: u32 = 1 << 30;
 
 /// How often each technique is used.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct BidirectionalSettings {
     /// Light paths for each sample of the picture, in tasks of 1024; `None`: half as many as pixels, or as
     /// many where vertices are merged.
     pub light_paths: Option<u32>,
-    /// Light vertices that a camera vertex is connected to; 0 is light tracing.
-    pub connections: u32,
+    /// Light vertices that a camera vertex is connected to; 0 is light tracing. `None`: 1.
+    pub connections: Option<u32>,
     /// Whether vertices are merged; `None`: where the scene has caustics.
     pub merging: Option<bool>,
 }
 
 impl BidirectionalSettings {
     /// Light tracing: neither connections nor merges.
-    pub const LIGHT_TRACING: Self = Self { light_paths: None, connections: 0, merging: Some(false) };
-}
+    pub const LIGHT_TRACING: Self = Self { light_paths: None, connections: Some(0), merging: Some(false) };
 
-impl Default for BidirectionalSettings {
-    fn default() -> Self {
-        Self { light_paths: None, connections: 1, merging: None }
+    /// Whether nothing is left open.
+    pub fn is_complete(&self) -> bool {
+        self.light_paths.is_some() && self.connections.is_some() && self.merging.is_some()
+    }
+
+    fn connections(&self) -> u32 {
+        self.connections.unwrap_or(1)
     }
 }
 
@@ -99,14 +102,15 @@ struct VertexMerging<'a> {
 impl VertexMerging<'_> {
     /// Radii of `sample`, which has `light_paths`; those of the pilot are the first.
     fn radii(&self, sample: u32, light_paths: f32) -> MergeRadii {
-        MergeRadii { radii: self.radii.after(self.first_radius, sample % PILOT / 2), light_paths }
+        let radii = self.radii.after(self.first_radius, sample % PILOT / 2);
+        MergeRadii { radii, light_paths, emphasis: 1.0 }
     }
 }
 
 impl<'a, F: Features> Bidirectional<'a, F> {
     /// Working memory of a worker.
     pub fn scratch(settings: &BidirectionalSettings) -> Footprint {
-        let paths = CameraPaths::<F>::scratch(settings.connections);
+        let paths = CameraPaths::<F>::scratch(settings.connections());
         LightPass::<F>::scratch().or(paths.slice::<Pixel>(2 * PIXELS_PER_TILE))
     }
 
@@ -138,19 +142,14 @@ impl<'a, F: Features> Bidirectional<'a, F> {
         let pixels_per_path = if merges { 1 } else { PIXELS_PER_LIGHT_PATH };
         let wanted = settings.light_paths.map_or(context.pixels() / pixels_per_path, |paths| paths as usize);
         let wanted = if lights.is_empty() { 0 } else { wanted.div_ceil(PATHS).clamp(1, MOST_TASKS) };
-        let has_vertices = settings.connections > 0 || merges;
+        let has_vertices = settings.connections() > 0 || merges;
         let stored = |tasks: usize| if has_vertices { tasks * ROOM } else { 0 };
         let bytes = |tasks: usize| {
             let photons = if merges { PhotonMapStore::footprint(tasks * ROOM).bytes() } else { 0 };
             Self::footprint(tasks, stored(tasks)).bytes() + photons
         };
-        let guide = GuideSettings {
-            filter: if merges { PhotonFilter::Caustic } else { PhotonFilter::Reflected },
-            max_depth: paths.max_depth,
-            target: Target::Visible(FIRST_RADIUS as f32),
-            reserve: others.saturating_add(bytes(1)),
-        };
-        let emission = EmissionGuide::learn::<F>(context, guide, memory, executor)?.emission;
+        let reserve = others.saturating_add(bytes(1));
+        let emission = Self::emission(context, (merges, reserve), memory, executor)?;
         let available = memory.available().saturating_sub(others);
         let mut tasks = wanted.min(available / bytes(1)).max(wanted.min(1));
         while tasks > 1 && bytes(tasks) > available {
@@ -170,7 +169,7 @@ impl<'a, F: Features> Bidirectional<'a, F> {
             context: *context,
             emission,
             counts: Counts { light_paths: (tasks * PATHS) as f32, connections: 0.0, light_samples: 1.0 },
-            connections: settings.connections,
+            connections: settings.connections(),
             merging,
             vertices: arena.slice(stored)?,
             splats: arena.slice(tasks * ROOM)?,
@@ -238,6 +237,26 @@ impl<'a, F: Features> Bidirectional<'a, F> {
         })?;
         let (sum, pixels) = shares.iter().fold((0.0, 0), |sum, of| (sum.0 + of.0, sum.1 + of.1));
         Ok(sum / f64::from(pixels.max(1)))
+    }
+
+    /// The emission of light paths, guided to visible surfaces, or to caustics where vertices are merged,
+    /// leaving `reserve` bytes.
+    ///
+    /// # Errors
+    /// [`OutOfMemory`] where `memory` is too small for lights by power, or the executor's scratch for light paths.
+    pub fn emission(
+        context: &RenderContext,
+        (merges, reserve): (bool, usize),
+        memory: &mut impl MemorySource<'a>,
+        executor: &mut impl Executor,
+    ) -> Result<EmissionSampler<'a>, OutOfMemory> {
+        let guide = GuideSettings {
+            filter: if merges { PhotonFilter::Caustic } else { PhotonFilter::Reflected },
+            max_depth: context.settings.max_depth,
+            target: Target::Visible(FIRST_RADIUS as f32),
+            reserve,
+        };
+        Ok(EmissionGuide::learn::<F>(context, guide, memory, executor)?.emission)
     }
 
     /// Measures the mean number of vertices of a pass, M̄, and fixes the count of connections by it: C L /

@@ -8,6 +8,7 @@ pub mod bidirectional;
 pub mod caustics;
 #[cfg(test)]
 mod closed_box;
+pub mod counts;
 pub mod emission_guide;
 pub mod environment_visibility;
 pub mod executor;

@@ -256,7 +256,8 @@ fn bidirectional(
 #[test]
 fn bidirectional_paths_do_not_depend_on_rounds_or_steps_and_need_memory() {
     with_room(|context| {
-        let settings = BidirectionalSettings { light_paths: Some(1), connections: 2, merging: Some(true) };
+        let settings =
+            BidirectionalSettings { light_paths: Some(1), connections: Some(2), merging: Some(true) };
         let scratch = Bidirectional::<All>::scratch(&settings);
         let pixels = bidirectional(context, (PLENTY, scratch), &settings, [3, 3, 8]).unwrap();
         assert!(pixels.iter().filter(|pixel| pixel.mean().min_element() > 0.0).count() > 200);
@@ -283,8 +284,8 @@ fn any_counts_of_techniques_have_the_mean_of_path_tracing() {
         let pixels = film(context, &mut executor, [1024, 1024, 8], |round| method.round(round)).unwrap();
         let (expected, deviation) = mean(&pixels);
         for (light_paths, connections) in [(1, 0), (1, 1), (1, 4), (4096, 1)] {
-            let settings =
-                BidirectionalSettings { light_paths: Some(light_paths), connections, merging: Some(false) };
+            let (light_paths, connections) = (Some(light_paths), Some(connections));
+            let settings = BidirectionalSettings { light_paths, connections, merging: Some(false) };
             let scratch = Bidirectional::<All>::scratch(&settings);
             let pixels = bidirectional(context, (PLENTY, scratch), &settings, [1024, 1024, 8]).unwrap();
             let (found, other) = mean(&pixels);

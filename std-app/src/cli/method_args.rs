@@ -96,15 +96,17 @@ pub(super) struct MethodArgs {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1 << 28),
         help_heading = "Photons")]
     caustic_photons: Option<u32>,
-    /// Light paths per sample of the picture [default: pixels / 2; instant radiosity: pixels / 16]
+    /// Light paths per sample of the picture [default: bdpt and vcm: by a pilot; light: pixels / 2; instant
+    /// radiosity: pixels / 16]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1 << 20),
         help_heading = "Light paths")]
     light_paths: Option<u32>,
-    /// Light vertices that a camera vertex is connected to [default: 1; instant radiosity: 4, or 2 with reuse]
+    /// Light vertices that a camera vertex is connected to [default: by a pilot; instant radiosity: 4, or 2
+    /// with reuse]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=64),
         help_heading = "Light paths")]
     connections: Option<u32>,
-    /// Merging with vcm [default: where the scene has caustics]
+    /// Merging with vcm [default: auto]
     #[arg(long, value_name = "WHEN", help_heading = "Light paths")]
     merging: Option<When>,
     /// Kind of the points of Markov chains with mlt [default: multiplexed]
@@ -219,7 +221,7 @@ impl MethodArgs {
             photons: PhotonSettings { kernel, global: self.global_photons, caustic: self.caustic_photons },
             bidirectional: BidirectionalSettings {
                 light_paths: self.light_paths,
-                connections: self.connections.unwrap_or(BidirectionalSettings::default().connections),
+                connections: self.connections,
                 merging: When::forced(self.merging),
             },
             virtual_lights: VirtualLightSettings {

@@ -40,6 +40,7 @@ pub use fair_schedule::{FairSchedule, Turn};
 pub use halflight_core::estimate::{BiasEstimate, Deviation, ErrorEstimate};
 pub use halflight_core::method::Shard;
 pub use halflight_core::method::bidirectional::BidirectionalSettings;
+pub use halflight_core::method::counts::Choice;
 pub use halflight_core::method::instant_radiosity::VirtualLightSettings;
 pub use halflight_core::method::metropolis::{MetropolisSettings, PrimarySpace};
 pub use history::{Against, Round};

@@ -7,7 +7,7 @@ use crate::render::{
     Round, Shard, StopRule,
 };
 use halflight_core::film::Dropped;
-use halflight_core::findings::{Findings, Value as FindingValue};
+use halflight_core::findings::{Decision, Findings, Value as FindingValue};
 use serde_json::{Map, Value, json};
 
 /// Object of a render.
@@ -54,7 +54,7 @@ pub(super) fn run(run: &Run) -> Value {
         "memory": memory.collect::<Map<_, _>>(),
         "memory_peak": result.memory_peak,
         "findings": findings(&result.findings),
-        "left_out": left_out_array(plan.left_out()),
+        "left_out": left_out_array(plan.left_out().chain(techniques_left_out(&result.findings))),
         "outputs": run.outputs,
         "checkpoint": settings.checkpoint.as_ref().map(|checkpoint| &checkpoint.path),
         "shard": (shard != Shard::WHOLE).then(|| [shard.index + 1, shard.count]),
@@ -79,7 +79,14 @@ fn findings(findings: &Findings) -> Value {
     findings.iter().map(object).collect::<Map<_, _>>().into()
 }
 
-/// Array `left_out`: features that a scene does not need, with reasons.
+/// Techniques that a pilot of counts has left out, with reasons.
+fn techniques_left_out(findings: &Findings) -> impl Iterator<Item = (&'static str, &'static str)> {
+    let is_technique = |topic| ["light_paths", "connections", "merging"].contains(&topic);
+    let left_out = findings.iter().filter(|finding| finding.decision == Decision::LeftOut);
+    left_out.filter(move |finding| is_technique(finding.topic)).map(|finding| (finding.topic, finding.reason))
+}
+
+/// Array `left_out`: features and techniques that a picture does not need, with reasons.
 pub fn left_out_array<'a>(features: impl Iterator<Item = (&'a str, &'a str)>) -> Value {
     features.map(|(what, why)| json!({ "what": what, "why": why })).collect()
 }

@@ -10,12 +10,13 @@ pub(super) enum Arrival {
 }
 
 impl Arrival {
-    /// From a vertex that `is_narrow`, or at this squared distance, to one with a count of merges η: about
-    /// there merges and connections are as good as each other. `None` where light is not merged.
-    pub(super) fn of(is_narrow: bool, squared: f32, count: f32) -> Option<Self> {
+    /// From a vertex that `is_narrow`, or at this squared distance, to one with a count of merges η, by
+    /// `MergeRadii::near`: about there merges and connections are as good as each other. `None` where light
+    /// is not merged.
+    pub(super) fn of(is_narrow: bool, squared: f32, near: f32) -> Option<Self> {
         match is_narrow {
             true => Some(Arrival::Narrow),
-            false => (squared < count).then_some(Arrival::Near),
+            false => (squared < near).then_some(Arrival::Near),
         }
     }
 

@@ -5,6 +5,7 @@ use crate::bsdf::Bsdf;
 use crate::geometry::Ray;
 use crate::sampling::Sampler;
 use crate::scene::SurfacePoint;
+use crate::transport::bidirectional::contribution::{Class, Contribution};
 use crate::transport::bidirectional::mis::Sums;
 use crate::transport::walk::visibility::ShadowRays;
 use bytemuck::{Pod, Zeroable};
@@ -90,17 +91,58 @@ pub(super) struct Vertex<'v> {
     pub(super) sampler: Sampler,
 }
 
+/// The bit of a shadow ray's tag that says that it belongs to a connection.
+const CONNECTION: u32 = 1 << 31;
+
 /// Shadow rays of a wave, whose tag is the index of their path.
 pub(super) struct Queue<'w> {
     pub(super) shadows: ShadowRays<'w>,
     pub(super) count: usize,
+    /// For the pilot of counts.
+    pub(super) recorder: Option<Recorder<'w>>,
 }
 
 impl Queue<'_> {
-    pub(super) fn push(&mut self, path: u32, ray: Ray, light: Rgb) {
+    pub(super) fn push(&mut self, class: Class, path: u32, ray: Ray, light: Rgb) {
         let slots = (self.shadows.rays.get_mut(self.count), self.shadows.light.get_mut(self.count));
         if let (Some(slot), Some(arrives)) = slots {
-            (*slot, *arrives) = (Ray { tag: path, ..ray }, light.to_array());
+            let tag = if class == Class::Connections { path | CONNECTION } else { path };
+            if let Some(recorder) = &mut self.recorder {
+                recorder.connections += u64::from(class == Class::Connections);
+            }
+            (*slot, *arrives) = (Ray { tag, ..ray }, light.to_array());
+            self.count += 1;
+        }
+    }
+
+    /// The path and the class of a shadow ray by its `tag`.
+    pub(super) fn of_tag(tag: u32) -> (usize, Class) {
+        let class = if tag & CONNECTION == 0 { Class::Paths } else { Class::Connections };
+        ((tag & !CONNECTION) as usize, class)
+    }
+
+    /// Records what `path` has got since it had `before`.
+    pub(super) fn record(&mut self, class: Class, path: &CameraPath, before: [f32; 3]) {
+        if let Some(recorder) = &mut self.recorder {
+            recorder.push(class, path.place, Rgb::from(path.radiance) - Rgb::from(before));
+        }
+    }
+}
+
+/// A list of contributions.
+pub(super) struct Recorder<'w> {
+    pub(super) list: &'w mut [Contribution],
+    pub(super) count: usize,
+    /// Shadow rays of connections.
+    pub(super) connections: u64,
+}
+
+impl Recorder<'_> {
+    /// Appends `light` of pixel `place`; none where it is zero or the list is full.
+    pub(super) fn push(&mut self, class: Class, place: u32, light: Rgb) {
+        let value = light.element_sum() / 3.0;
+        if let Some(slot) = self.list.get_mut(self.count).filter(|_| value > 0.0) {
+            *slot = Contribution::new(class, place, value);
             self.count += 1;
         }
     }

@@ -3,7 +3,7 @@
 //! so that the tracer sees batches of rays.
 
 use crate::Rgb;
-use crate::bsdf::{Bsdf, BsdfSample, Features};
+use crate::bsdf::{Bsdf, Features};
 use crate::bvh::Coherence;
 use crate::film::{PIXELS_PER_TILE, Pixel, Tile};
 use crate::geometry::{Hit, MISS, Ray};
@@ -12,15 +12,16 @@ use crate::memory::{Arena, Footprint, OutOfMemory};
 use crate::sampling::Sampler;
 use crate::scene::SurfacePoint;
 use crate::transport::bidirectional::arrival::Arrival;
-use crate::transport::bidirectional::camera_path::{CameraPath, Queue, Vertex};
+use crate::transport::bidirectional::camera_path::{CameraPath, Queue, Recorder, Vertex};
+use crate::transport::bidirectional::contribution::{Class, Contribution};
 use crate::transport::bidirectional::ends::{End, sums_from_camera};
 use crate::transport::bidirectional::merge_photons::Merging;
 use crate::transport::bidirectional::mis::{Counts, Sums};
-use crate::transport::bidirectional::vertex::{LightVertex, is_bent, normal_for_lights, reverse_pdf};
+use crate::transport::bidirectional::vertex::{LightVertex, is_bent};
 use crate::transport::settings::{Counters, PathSettings};
 use crate::transport::walk::context::SceneContext;
 use crate::transport::walk::dimension;
-use crate::transport::walk::termination::{MAX_CROSSINGS, continuation_probability, is_cut};
+use crate::transport::walk::termination::MAX_CROSSINGS;
 use crate::transport::walk::visibility::ShadowRays;
 use core::ops::Range;
 use glam::Vec3;
@@ -43,6 +44,16 @@ pub struct CameraPaths<'a, F> {
     pub(super) counts: Counts,
     pub(super) connections: Connections<'a>,
     pub(super) merging: Option<Merging<'a>>,
+}
+
+/// What was recorded of a sample of a tile.
+pub struct Recorded {
+    /// Contributions in the list.
+    pub contributions: usize,
+    /// Shadow rays of connections.
+    pub connections: u64,
+    /// All work.
+    pub counters: Counters,
 }
 
 /// The paths of a tile that advance together.
@@ -100,6 +111,47 @@ impl<'a, F: Features> CameraPaths<'a, F> {
         scratch: &mut Arena,
         out: &mut [Pixel],
     ) -> Result<Counters, OutOfMemory> {
+        let (_, counters) = self.each_sample(tile, samples, scratch, None, |sample, paths, counters| {
+            for path in paths {
+                let splat = splats.get(path.place as usize).copied().unwrap_or_default();
+                if let Some(pixel) = out.get_mut(path.place as usize) {
+                    let radiance = Rgb::from(path.radiance) + Rgb::from(splat);
+                    if pixel.add(sample, radiance, &mut counters.dropped) {
+                        pixel.add_blur(sample, Rgb::from(path.blur));
+                    }
+                }
+            }
+        })?;
+        Ok(counters)
+    }
+
+    /// Contributions of sample number `sample` to tile `tile`, into `list`.
+    ///
+    /// # Errors
+    /// [`OutOfMemory`] where `scratch` has less than [`CameraPaths::scratch`].
+    pub fn contributions(
+        &self,
+        tile: usize,
+        sample: u32,
+        list: &mut [Contribution],
+        scratch: &mut Arena,
+    ) -> Result<Recorded, OutOfMemory> {
+        let recorder = Some(Recorder { list, count: 0, connections: 0 });
+        let samples = sample..sample + 1;
+        let (recorder, counters) = self.each_sample(tile, samples, scratch, recorder, |_, _, _| ())?;
+        let (contributions, connections) = recorder.map_or((0, 0), |list| (list.count, list.connections));
+        Ok(Recorded { contributions, connections, counters })
+    }
+
+    /// Traces the paths of `samples` of tile `tile`, and calls `done` with those of each sample.
+    fn each_sample<'w>(
+        &self,
+        tile: usize,
+        samples: Range<u32>,
+        scratch: &'w mut Arena,
+        recorder: Option<Recorder<'w>>,
+        mut done: impl FnMut(u32, &[CameraPath], &mut Counters),
+    ) -> Result<(Option<Recorder<'w>>, Counters), OutOfMemory> {
         let mut arena = scratch.scratch();
         let paths: &mut [CameraPath] = arena.slice(PIXELS_PER_TILE)?;
         let rays: &mut [Ray] = arena.slice(PIXELS_PER_TILE)?;
@@ -115,6 +167,7 @@ impl<'a, F: Features> CameraPaths<'a, F> {
                 hidden: arena.slice(shadows)?,
             },
             count: 0,
+            recorder,
         };
         let tile = Tile::new(self.settings.width, self.settings.height, tile);
         let mut counters = Counters::default();
@@ -129,17 +182,9 @@ impl<'a, F: Features> CameraPaths<'a, F> {
                 drawn: &mut *drawn,
             };
             self.trace(sample, &tile, wave, count, &mut queue, &mut counters);
-            for path in &paths[..count] {
-                let splat = splats.get(path.place as usize).copied().unwrap_or_default();
-                if let Some(pixel) = out.get_mut(path.place as usize) {
-                    let radiance = Rgb::from(path.radiance) + Rgb::from(splat);
-                    if pixel.add(sample, radiance, &mut counters.dropped) {
-                        pixel.add_blur(sample, Rgb::from(path.blur));
-                    }
-                }
-            }
+            done(sample, &paths[..count], &mut counters);
         }
-        Ok(counters)
+        Ok((queue.recorder, counters))
     }
 
     /// Fills `paths` and `rays` with those of the camera; returns how many.
@@ -213,10 +258,13 @@ impl<'a, F: Features> CameraPaths<'a, F> {
                 }
             }
             active = left;
-            let Queue { shadows, count } = queue;
+            let Queue { shadows, count, recorder } = queue;
             let arrive = |ray: &Ray, light: Rgb| {
-                if let Some(path) = paths.get_mut(ray.tag as usize) {
-                    path.add(light);
+                let (path, class) = Queue::of_tag(ray.tag);
+                let Some(path) = paths.get_mut(path) else { return };
+                path.add(light);
+                if let Some(recorder) = recorder {
+                    recorder.push(class, path.place, light);
                 }
             };
             let rays = &mut counters.shadow_rays;
@@ -235,8 +283,10 @@ impl<'a, F: Features> CameraPaths<'a, F> {
         counters: &mut Counters,
     ) -> Option<Ray> {
         let direction = Vec3::from(ray.direction);
+        let before = path.radiance;
         if !hit.is_some() {
             self.escape(path, direction);
+            queue.record(Class::Paths, path, before);
             return None;
         }
         let point = self.context.surface_at(ray, hit)?;
@@ -253,6 +303,7 @@ impl<'a, F: Features> CameraPaths<'a, F> {
             return Some(point.spawn(direction));
         }
         self.emission(path, &point, hit, direction);
+        queue.record(Class::Paths, path, before);
         path.travelled += hit.t;
         if path.segments >= self.settings.max_depth {
             return None;
@@ -267,7 +318,9 @@ impl<'a, F: Features> CameraPaths<'a, F> {
             _ => 0.0,
         };
         let vertex = Vertex { point: &point, bsdf: &bsdf, wo, sums, is_first_rough, merge, is_bent, sampler };
+        let before = path.radiance;
         self.merge(path, &vertex);
+        queue.record(Class::Merges, path, before);
         if !bsdf.is_delta() {
             self.light_sample(path, &vertex, ray.tag, queue);
             if !is_bent {
@@ -277,6 +330,11 @@ impl<'a, F: Features> CameraPaths<'a, F> {
         self.scatter(path, &vertex, hit, direction, counters)
     }
 
+    /// The squared distance within which a rough vertex is near one with this count of merges.
+    pub(super) fn near(&self, count: f32) -> f32 {
+        self.merging.map_or(0.0, |merging| merging.radii.near(count))
+    }
+
     /// Sums where the path arrives at `point`.
     fn arrive(&self, path: &CameraPath, point: &SurfacePoint, bsdf: &Bsdf, direction: Vec3) -> Sums {
         let cos = direction.dot(point.geometric_normal).abs();
@@ -284,75 +342,12 @@ impl<'a, F: Features> CameraPaths<'a, F> {
         if path.segments > 1 {
             let squared = point.position.distance_squared(path.position.into());
             let sums = path.sums().arrive(squared, cos, is_delta);
-            let arrival = Arrival::of(bsdf.is_caustic_caster(), squared, path.merge_count);
+            let arrival = Arrival::of(bsdf.is_caustic_caster(), squared, self.near(path.merge_count));
             // The segment is that behind the vertex of the merge.
             let is_merged = arrival.is_some_and(|arrival| arrival.is_merged(path.segments - 1));
             return if is_merged { sums.with_merge() } else { sums };
         }
         let PathSettings { width, height, .. } = self.settings;
         sums_from_camera(&self.context, &self.counts, [width, height], path.lens, End { point, bsdf, cos })
-    }
-
-    /// The path goes on where the BSDF sends it.
-    fn scatter(
-        &self,
-        path: &mut CameraPath,
-        vertex: &Vertex,
-        hit: &Hit,
-        direction: Vec3,
-        counters: &mut Counters,
-    ) -> Option<Ray> {
-        let Vertex { point, bsdf, wo, sampler, .. } = *vertex;
-        let [u, v] = dimension::scattering(&sampler, path.segments);
-        let first = dimension::vertex(path.segments);
-        let lobe = sampler.single(first + dimension::LOBE);
-        let sample = bsdf.sample::<F>(wo, [u, v, lobe])?;
-        let towards = point.frame.to_world(sample.direction);
-        if !point.sides_agree(sample.direction, towards) {
-            return None;
-        }
-        let mut throughput = Rgb::from(path.throughput) * sample.weight;
-        path.eta_squared *= sample.eta * sample.eta;
-        let probability = continuation_probability(path.segments, throughput * path.eta_squared);
-        if probability < 1.0 {
-            if sampler.single(first + dimension::ROULETTE) >= probability {
-                return None;
-            }
-            throughput /= probability;
-        }
-        if is_cut(path.segments, bsdf, &sample) {
-            counters.dropped.unfinished += 1;
-            return None;
-        }
-        if throughput == Rgb::ZERO {
-            return None;
-        }
-        let sums = self.leave(vertex, &sample, (direction, towards));
-        (path.last, path.rest, path.merge) = (sums.last, sums.rest, sums.merge);
-        path.merge_count = if sample.delta { 0.0 } else { vertex.merge };
-        path.has_rough |= u32::from(!bsdf.is_caustic_caster() && !sample.delta);
-        path.throughput = throughput.to_array();
-        path.pdf = if sample.delta { f32::INFINITY } else { sample.pdf };
-        path.position = point.position.to_array();
-        path.normal = normal_for_lights(point, bsdf).to_array();
-        path.triangle = hit.triangle;
-        path.segments += 1;
-        Some(point.spawn(towards))
-    }
-
-    /// Sums after scattering at `vertex`.
-    fn leave(&self, vertex: &Vertex, sample: &BsdfSample, (from, towards): (Vec3, Vec3)) -> Sums {
-        let Vertex { point, bsdf, wo, sums, merge, is_bent, .. } = *vertex;
-        if is_bent {
-            return Sums::default();
-        }
-        let cos_in = from.dot(point.geometric_normal).abs();
-        if sample.delta {
-            return sums.with_merge().scatter_delta(cos_in, sample.eta);
-        }
-        let cos_out = towards.dot(point.geometric_normal).abs();
-        let reverse = reverse_pdf(&self.context, (point, bsdf), wo, sample.direction);
-        let merge = (!bsdf.is_caustic_caster()).then_some(merge);
-        sums.scatter(&self.counts, sample.pdf, reverse, cos_out, merge)
     }
 }

@@ -57,6 +57,8 @@ pub struct LightPass<'a, F> {
     settings: PathSettings,
     counts: Counts,
     merging: Option<MergeRadii>,
+    /// Light paths of the pass.
+    paths: u32,
 }
 
 impl<'a, F: Features> LightPass<'a, F> {
@@ -68,7 +70,12 @@ impl<'a, F: Features> LightPass<'a, F> {
         counts: Counts,
         merging: Option<MergeRadii>,
     ) -> Self {
-        Self { context, emission, settings, counts, merging }
+        Self { context, emission, settings, counts, merging, paths: counts.light_paths as u32 }
+    }
+
+    /// The same paths with the weights of other counts.
+    pub fn weighted_by(self, counts: Counts, merging: Option<MergeRadii>) -> Self {
+        Self { counts, merging, ..self }
     }
 
     /// Working memory of a task.
@@ -94,7 +101,7 @@ impl<'a, F: Features> LightPass<'a, F> {
         splats: &mut [Splat],
         output: &mut TaskOutput,
     ) -> Result<Counters, OutOfMemory> {
-        let Self { context, emission, settings, counts, merging } = *self;
+        let Self { context, emission, settings, counts, merging, paths } = *self;
         let mut arena = scratch.scratch();
         let mut writer = Writer {
             context,
@@ -114,8 +121,8 @@ impl<'a, F: Features> LightPass<'a, F> {
             },
             pending: 0,
         };
-        let (paths, max_depth) = (counts.light_paths as u32, settings.max_depth);
-        let walk = LightWalk { context, emission, seed: settings.seed, paths, max_depth };
+        let (seed, max_depth) = (settings.seed, settings.max_depth);
+        let walk = LightWalk { context, emission, seed, paths, max_depth };
         let mut counters = walk.follow(task, sample, &mut arena, &mut writer)?;
         writer.trace(&mut counters);
         let pixels = Tile::count(settings.width, settings.height) * crate::film::PIXELS_PER_TILE;
@@ -128,7 +135,7 @@ impl<'a, F: Features> LightPass<'a, F> {
 
     /// Tasks of a pass.
     pub fn tasks(&self) -> usize {
-        (self.counts.light_paths as usize).div_ceil(PATHS)
+        (self.paths as usize).div_ceil(PATHS)
     }
 }
 
@@ -168,12 +175,13 @@ impl<F: Features> Writer<'_, F> {
             return None;
         }
         let position = vertex.point.position;
-        let count = self.merging.map_or(0.0, |radii| radii.count(vertex.bsdf, position));
+        let Some(radii) = self.merging else { return Some((0.0, None)) };
+        let count = radii.count(vertex.bsdf, position);
         if count == 0.0 || state.segments == 1 {
             return Some((0.0, None));
         }
         let squared = position.distance_squared(state.position.into());
-        let arrival = Arrival::of(state.mirrored == 1, squared, count);
+        let arrival = Arrival::of(state.mirrored == 1, squared, radii.near(count));
         Some((if arrival.is_some() { count } else { 0.0 }, arrival))
     }
 

@@ -14,6 +14,8 @@ pub struct MergeRadii {
     pub radii: RadiusSchedule,
     /// Light paths of the sample.
     pub light_paths: f32,
+    /// Factor of η where a pilot asks for its weight; else 1.
+    pub emphasis: f32,
 }
 
 impl MergeRadii {
@@ -24,7 +26,12 @@ impl MergeRadii {
             return 0.0;
         }
         let radius = self.radii.radius(position);
-        self.light_paths * PI * radius * radius
+        self.emphasis * self.light_paths * PI * radius * radius
+    }
+
+    /// The squared distance within which a rough vertex is near, where merges count η.
+    pub(super) fn near(&self, count: f32) -> f32 {
+        count / self.emphasis
     }
 }
 

@@ -9,11 +9,13 @@
 mod arrival;
 mod camera_path;
 pub mod camera_paths;
+pub mod contribution;
 pub(in crate::transport) mod ends;
 pub mod light_pass;
 pub mod merge_photons;
 mod merging;
 pub mod mis;
 pub mod reference;
+mod scattering;
 mod techniques;
 pub mod vertex;

@@ -10,6 +10,7 @@ use crate::scene::SurfacePoint;
 use crate::transport::bidirectional::arrival::Arrival;
 use crate::transport::bidirectional::camera_path::{CameraPath, Queue, Vertex};
 use crate::transport::bidirectional::camera_paths::{CameraPaths, Connections};
+use crate::transport::bidirectional::contribution::Class;
 use crate::transport::bidirectional::mis::{
     End, weight_of_connection, weight_of_hit, weight_of_light_sample,
 };
@@ -102,7 +103,7 @@ impl<F: Features> CameraPaths<'_, F> {
         }
         let weight = weight_of_light_sample(counts, &sums, (pdf, light.pdf), density, emitted);
         let radiance = Rgb::from(path.throughput) * value * light.radiance * (weight / light.pdf);
-        queue.push(tag, shadow_ray(point, &light)?, radiance);
+        queue.push(Class::Paths, tag, shadow_ray(point, &light)?, radiance);
         Some(())
     }
 
@@ -129,7 +130,7 @@ impl<F: Features> CameraPaths<'_, F> {
         let each = self.connections.vertices.len() as f32 / self.connections.count as f32;
         for light in drawn {
             if let Some((ray, radiance)) = self.connection(path, vertex, light) {
-                queue.push(tag, ray, radiance * each);
+                queue.push(Class::Connections, tag, ray, radiance * each);
             }
         }
     }
@@ -168,7 +169,7 @@ impl<F: Features> CameraPaths<'_, F> {
         // The one merge of the path: at this vertex, or on the side of the light.
         let is_narrow = other_bsdf.is_caustic_caster();
         let Scattering { to_light: pdf, to_camera: reverse, .. } = at_camera;
-        let arrival = Arrival::of(is_narrow, squared, merge);
+        let arrival = Arrival::of(is_narrow, squared, self.near(merge));
         let is_merged = arrival.is_some_and(|arrival| arrival.is_merged(path.segments));
         let merge = if is_merged { merge } else { 0.0 };
         let camera_end = End { sums, pdf, reverse, cos: cos_camera, merge };

@@ -53,7 +53,9 @@ impl Identity {
         if let Some(Method::Metropolis) = Method::named(method) {
             cache += &format!(", {:?}", settings.metropolis);
         }
-        let may_join = [Method::Path, Method::IrradianceCache].map(Method::name).contains(&method);
+        // Bidirectional methods fall back to paths.
+        let joining = [Method::Path, Method::IrradianceCache, Method::Bidirectional, Method::VertexMerging];
+        let may_join = joining.map(Method::name).contains(&method);
         let joined = may_join && settings.caustics;
         let caustics = if joined { ", caustics" } else { "" };
         Self {

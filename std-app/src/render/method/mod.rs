@@ -5,6 +5,7 @@
 //! a line in [`Method::with`].
 
 mod adapter;
+mod bidirectional;
 mod cache_memory;
 mod cache_settings;
 mod caustics;
@@ -31,7 +32,6 @@ use halflight_core::bvh::Bvh;
 use halflight_core::findings::Findings;
 use halflight_core::light::LightSampler;
 use halflight_core::method::RenderContext;
-use halflight_core::method::bidirectional::{Bidirectional, BidirectionalSettings};
 use halflight_core::method::instant_radiosity::InstantRadiosity;
 use halflight_core::method::metropolis::Metropolis;
 use halflight_core::method::path::PathTracing;
@@ -204,14 +204,7 @@ impl Method {
     ) -> Result<T, RenderError> {
         let (context, settings) = (&stage.context(), stage.settings);
         match self {
-            Method::Path if caustics::are_possible(stage) => caustics::with::<F, T>(stage, memory, then),
-            Method::Path => {
-                let scratch = (self, PathTracing::<F>::scratch());
-                let mut paths = Adapter::<F, _>::new(stage, memory, scratch, |_, executor, _| {
-                    PathTracing::<F>::new(context, settings.reuse, executor)
-                })?;
-                then(&mut paths, memory)
-            }
+            Method::Path => path_tracing::<F, T>(stage, memory, then),
             Method::IrradianceCache => irradiance_cache::with::<F, T>(stage, memory, then),
             Method::PhotonMap => {
                 let scratch = (self, PhotonMapping::<F>::scratch());
@@ -222,12 +215,7 @@ impl Method {
             }
             Method::ProgressivePhotons => then(&mut progressive_photons::<F>(stage, memory)?, memory),
             Method::LightTracing | Method::Bidirectional | Method::VertexMerging => {
-                let techniques = self.techniques(settings.bidirectional);
-                let scratch = (self, Bidirectional::<F>::scratch(&techniques));
-                let mut paths = Adapter::<F, _>::new(stage, memory, scratch, |memory, executor, reserve| {
-                    Bidirectional::<F>::new(context, &techniques, memory, executor, reserve)
-                })?;
-                then(&mut paths, memory)
+                bidirectional::with::<F, T>(stage, memory, self, then)
             }
             Method::InstantRadiosity | Method::ClampedInstantRadiosity => {
                 let form = (self == Method::ClampedInstantRadiosity, settings.reuse);
@@ -251,18 +239,22 @@ impl Method {
             Method::Wrong => then(&mut wrong::Wrong::<F>::new(stage, memory)?, memory),
         }
     }
+}
 
-    /// Techniques of a bidirectional method.
-    fn techniques(self, settings: BidirectionalSettings) -> BidirectionalSettings {
-        match self {
-            Method::LightTracing => BidirectionalSettings {
-                light_paths: settings.light_paths,
-                ..BidirectionalSettings::LIGHT_TRACING
-            },
-            Method::Bidirectional => BidirectionalSettings { merging: Some(false), ..settings },
-            _ => settings,
-        }
+/// Path tracing on `stage` with all of its means.
+fn path_tracing<'a, F: Features, T>(
+    stage: &Stage<'a>,
+    memory: &mut Memory<'a>,
+    then: impl FnOnce(&mut dyn Renderer, &mut Memory) -> Result<T, RenderError>,
+) -> Result<T, RenderError> {
+    if caustics::are_possible(stage) {
+        return caustics::with::<F, T>(stage, memory, then);
     }
+    let scratch = (Method::Path, PathTracing::<F>::scratch());
+    let mut paths = Adapter::<F, _>::new(stage, memory, scratch, |_, executor, _| {
+        PathTracing::<F>::new(&stage.context(), stage.settings.reuse, executor)
+    })?;
+    then(&mut paths, memory)
 }
 
 /// Stochastic progressive photon mapping on `stage`.

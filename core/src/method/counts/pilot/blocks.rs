@@ -1,0 +1,117 @@
+//! Sums of the pilot over blocks of pixels: noise and work of all candidates.
+
+use super::{BLOCK, Block, CONNECTIONS, Found, LEAST_VARIANCE, LIST, PART, Pilot, WEIGHTINGS, Weighting};
+use crate::Rgb;
+use crate::bsdf::Features;
+use crate::film::PIXELS_PER_TILE;
+use crate::method::counts::prediction::{CANDIDATES, Reweighted, Weighed, Work};
+use crate::transport::Counters;
+use crate::transport::bidirectional::contribution::{Class, Contribution};
+use crate::transport::bidirectional::light_pass::PATHS;
+
+impl<F: Features> Pilot<'_, '_, F> {
+    /// Adds camera paths of a sample to the `blocks` and sums of their tile. The variance is that of pairs
+    /// of samples, except that the squares of contributions are those expected. Those of merges stay as
+    /// they are: the photons of a disc are no independent samples.
+    pub(super) fn add_camera_paths(
+        &self,
+        weighed: &[Weighed],
+        (sample, sums): (u32, &mut [f32]),
+        blocks: &mut [Block],
+    ) {
+        let sign = if sample == 0 { 1.0 } else { -1.0 };
+        for weighed in weighed {
+            let block = &mut blocks[weighed.place() / BLOCK];
+            block.light += PART * weighed.value();
+            block.merged += if weighed.is_merge() { PART * weighed.value() } else { 0.0 };
+        }
+        for (i, (candidate, sums)) in self.candidates.iter().zip(sums.chunks_mut(PIXELS_PER_TILE)).enumerate()
+        {
+            let ratios = candidate.ratios(&self.counts);
+            for weighed in weighed {
+                let Reweighted { value, square } = weighed.with(&ratios);
+                let block = &mut blocks[weighed.place() / BLOCK];
+                let is_sum = weighed.is_merge() && candidate.merging;
+                block.variance[i] += if is_sum { 0.0 } else { PART * (square - value * value) };
+                block.square[i] += PART * square;
+                sums[weighed.place()] += sign * value;
+            }
+        }
+    }
+
+    /// Adds splat number `index` of all weightings, if it is in `tile`.
+    pub(super) fn add_splat(
+        &self,
+        tile: usize,
+        weightings: &[Weighting; WEIGHTINGS],
+        index: usize,
+        blocks: &mut [Block],
+    ) {
+        let splat = weightings[0].splats[index];
+        let place = (splat.pixel as usize).wrapping_sub(tile * PIXELS_PER_TILE);
+        if place >= PIXELS_PER_TILE {
+            return;
+        }
+        let value = |weighting: usize| {
+            let other = weightings[weighting].splats[index];
+            let is_same = other.pixel == splat.pixel;
+            is_same.then(|| Rgb::from(other.radiance).element_sum() / 3.0)
+        };
+        let (Some(base), Some(a), Some(b), Some(c)) = (value(0), value(1), value(2), value(3)) else {
+            return;
+        };
+        let weighed = Weighed::new(Contribution::new(Class::Splats, place as u32, base), [a, b, c]);
+        let block = &mut blocks[place / BLOCK];
+        block.light += PART * base;
+        for (i, candidate) in self.candidates.iter().enumerate() {
+            let square = PART * weighed.with(&candidate.ratios(&self.counts)).square;
+            block.variance[i] += square;
+            block.square[i] += square;
+        }
+    }
+
+    pub(super) fn sum(&self, blocks: &[Block], light: &Counters, camera: &Counters) -> Found {
+        let of = |value: &dyn Fn(&Block) -> f32| blocks.iter().map(value).sum::<f32>();
+        let pixels = of(&|block| block.pixels);
+        let mean = of(&|block| block.light) / pixels;
+        let relative = |block: &Block| {
+            let level = block.light / block.pixels;
+            let scale = level * level + 0.01 * mean * mean;
+            if block.pixels > 0.0 && scale > 0.0 { 1.0 / (pixels * scale) } else { 0.0 }
+        };
+        let mut noise = [0.0; CANDIDATES];
+        for (i, noise) in noise.iter_mut().enumerate() {
+            let variance = of(&|block| relative(block) * block.variance[i]);
+            let square = of(&|block| relative(block) * block.square[i]);
+            *noise = variance.max(LEAST_VARIANCE * square);
+        }
+        let samples = pixels / PART;
+        let connections = of(&|block| block.connections);
+        let light_paths = (self.tasks * PATHS) as f32 / PART;
+        let work = Work {
+            camera_rays: camera.rays as f32 / samples,
+            light_samples: (camera.shadow_rays as f32 - connections).max(0.0) / samples,
+            connections: connections / (CONNECTIONS as f32 * samples),
+            light_rays: light.rays as f32 / light_paths,
+            splats: light.shadow_rays as f32 / light_paths,
+        };
+        let merged = of(&|block| block.merged) / of(&|block| block.light).max(f32::MIN_POSITIVE);
+        Found { noise, work, merged }
+    }
+}
+
+/// The first `count` contributions of all lists, with shares.
+pub(super) fn weigh<'w>(lists: &[Contribution], count: usize, weighed: &'w mut [Weighed]) -> &'w [Weighed] {
+    let mut same = 0;
+    for (i, out) in weighed.iter_mut().enumerate().take(count) {
+        let base = lists[i];
+        let doubled = [1, 2, 3].map(|weighting| lists[weighting * LIST + i]);
+        // A weight that is rounded to zero shifts the rest of its list.
+        if doubled.iter().any(|other| !other.is_same(&base)) {
+            break;
+        }
+        *out = Weighed::new(base, doubled.map(|other| other.value));
+        same = i + 1;
+    }
+    &weighed[..same]
+}

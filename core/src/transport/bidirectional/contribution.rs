@@ -1,0 +1,55 @@
+//! Contributions of single techniques to a pixel, as a pilot records them.
+
+use bytemuck::{Pod, Zeroable};
+
+/// Techniques whose counts are chosen together.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Class {
+    /// Camera paths: emission that they hit, and light samples.
+    Paths,
+    /// Splats of light vertices.
+    Splats,
+    /// Connections to light vertices.
+    Connections,
+    /// Merges with photons.
+    Merges,
+}
+
+/// Number of classes.
+pub const CLASSES: usize = 4;
+
+impl Class {
+    const ALL: [Self; CLASSES] = [Self::Paths, Self::Splats, Self::Connections, Self::Merges];
+}
+
+/// What one sample of a technique has brought to a pixel, its weight included.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub struct Contribution {
+    /// Pixel of the tile, and class.
+    key: u32,
+    /// Mean radiance of the channels.
+    pub value: f32,
+}
+
+impl Contribution {
+    /// Of a technique of `class` to pixel number `place` of the tile, below 2²⁴.
+    pub fn new(class: Class, place: u32, value: f32) -> Self {
+        Self { key: place | (class as u32) << 24, value }
+    }
+
+    /// Pixel of the tile.
+    pub fn place(&self) -> usize {
+        (self.key & 0x00ff_ffff) as usize
+    }
+
+    /// Class of the technique.
+    pub fn class(&self) -> Class {
+        Class::ALL[(self.key >> 24) as usize % CLASSES]
+    }
+
+    /// Whether both are of one sample of one technique, if they have the same position in their lists.
+    pub fn is_same(&self, other: &Self) -> bool {
+        self.key == other.key
+    }
+}
