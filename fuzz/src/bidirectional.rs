@@ -40,7 +40,8 @@ fn attempt(input: &mut Unstructured) -> Result<()> {
         };
         let size = [settings.width, settings.height];
         let radii = RadiusSchedule::new((scene, bvh), size, Level::BASELINE).after(3.0, sample % 1024);
-        let radii = (merges % 2 > 0).then_some(MergeRadii { radii, light_paths: counts.light_paths });
+        let radii =
+            (merges % 2 > 0).then_some(MergeRadii { radii, light_paths: counts.light_paths, emphasis: 1.0 });
 
         let mut vertices = vec![LightVertex::default(); ROOM];
         let (mut splats, mut output) = (vec![Splat::default(); ROOM], TaskOutput::default());

@@ -6,7 +6,8 @@ use arbitrary::{Result, Unstructured};
 use glam::Vec3;
 use halflight_core::memory::{Arena, Footprint, Line};
 use halflight_core::photon::{
-    DensityEstimate, Kernel, Neighbours, Photon, PhotonMap, Photons, QueryDisc, QueryOrder, Response, Uniform, brute,
+    DensityEstimate, Kernel, Neighbours, Photon, PhotonMap, Photons, QueryDisc, QueryOrder, Response,
+    Uniform, brute,
 };
 use halflight_core::{Level, Rgb};
 
