@@ -27,7 +27,7 @@ pub fn run(data: &[u8]) {
 fn attempt(input: &mut Unstructured) -> Result<()> {
     with_room(input, |input, scene, bvh, lights, settings| {
         let [count, connections, merges] = input.arbitrary::<[u8; 3]>()?;
-        let (sample, light_paths) = (input.arbitrary::<u32>()?, 1 + usize::from(count) % PATHS);
+        let (sample, light_paths) = (input.arbitrary::<u32>()? % (1 << 30), 1 + usize::from(count) % PATHS);
         let connections = u32::from(connections % 4);
         let context = SceneContext::<All>::new(scene, bvh, lights, level(input)?);
         let mut memory = lines(EmissionSampler::footprint(lights));
