@@ -5,7 +5,7 @@ use crate::table::scenes::glass_cube;
 use core::sync::atomic::AtomicBool;
 use core::time::Duration;
 use glam::Vec3;
-use halflight::render::{self, BidirectionalSettings, Ending, Method, RenderResult, Settings, Stop};
+use halflight::render::{self, Ending, Method, RenderResult, Settings, Stop};
 use halflight_core::Rgb;
 use halflight_core::scene::{Camera, Material};
 use halflight_tests::scenes::{SceneBuffers, emitter};
@@ -19,16 +19,9 @@ const DEADLINE: Duration = Duration::from_secs(120);
 fn light_leaves_glass_before_the_limit_of_bounces_and_cut_paths_are_counted() {
     // The floor beside the cube, out of reach of light that total reflection traps.
     let render = |method: Method, depth: Option<u32>, seed: u32| {
-        let stop = Stop { spp: Some(32), ..Stop::default() };
-        let (method, audit) = (Some(method), Some(0.0));
-        let settings = Settings { method, width: 48, height: 48, stop, audit, ..Settings::default() };
-        // All techniques: the pilot of counts leaves light paths out.
-        let merging = method == Some(Method::VertexMerging);
-        let light_paths = Some(if merging { 48 * 48 } else { 48 * 24 });
-        let (connections, merging) = (Some(1), Some(merging));
-        let bidirectional = BidirectionalSettings { light_paths, connections, merging };
-        let settings = Settings { max_depth: depth, seed, bidirectional, ..settings };
-        render::render(&glass_cube(false).scene(), &settings, &mut |_| (), &AtomicBool::new(false)).unwrap()
+        halflight_tests::render::render(&glass_cube(false).scene(), method, 48, 32, |settings| {
+            (settings.max_depth, settings.seed) = (depth, seed);
+        })
     };
     // Columns and rows that show the floor alone.
     let floor = |result: &RenderResult| {
@@ -46,8 +39,8 @@ fn light_leaves_glass_before_the_limit_of_bounces_and_cut_paths_are_counted() {
         } else {
             assert!((found / known - 1.0).abs() < 0.03, "{}: {found}, not {known}", method.name());
         }
-        // Russian roulette ends light subpaths of virtual lights long before the limit, and subpaths of chains
-        // are short.
+        // Russian roulette ends light subpaths of virtual lights long before the limit, and subpaths of
+        // chains are short.
         let has_roulette =
             matches!(method, Method::Metropolis | Method::InstantRadiosity | Method::ClampedInstantRadiosity);
         assert_eq!(result.counters.dropped.unfinished > 0, !has_roulette, "{}", method.name());

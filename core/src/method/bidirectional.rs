@@ -11,7 +11,7 @@
 use super::emission_guide::{EmissionGuide, GuideSettings, Target};
 use super::executor::{Executor, Passed};
 use super::splats::{add_splats, splats_of_tile};
-use super::{Method, PhotonMapStore, RenderContext, Round, caustics};
+use super::{Method, PhotonMapStore, RenderContext, Round, caustics, light_vertices};
 use crate::bsdf::Features;
 use crate::film::{PIXELS_PER_TILE, Pixel, Splat, Tile};
 use crate::light::{EmissionSampler, luminance};
@@ -39,9 +39,6 @@ const WIDENING_RATIO: f64 = 0.8;
 
 /// Tiles that show this ratio.
 const PILOT_TILES: usize = 16;
-
-/// Photons that a task brings to the map.
-const PIECE: usize = 4096;
 
 /// Number of the pass that measures how many vertices light paths have.
 const PILOT: u32 = 1 << 30;
@@ -199,8 +196,8 @@ impl<'a, F: Features> Bidirectional<'a, F> {
         Ok(())
     }
 
-    /// Mean fraction of a pixel's light that merges and splats bring, on a few tiles, by the `stored` vertices of
-    /// the pilot.
+    /// Mean fraction of a pixel's light that merges and splats bring, on a few tiles, by the `stored`
+    /// vertices of the pilot.
     fn share_of_light_paths(
         &mut self,
         stored: usize,
@@ -243,7 +240,8 @@ impl<'a, F: Features> Bidirectional<'a, F> {
     /// leaving `reserve` bytes.
     ///
     /// # Errors
-    /// [`OutOfMemory`] where `memory` is too small for lights by power, or the executor's scratch for light paths.
+    /// [`OutOfMemory`] where `memory` is too small for lights by power, or the executor's scratch
+    /// for light paths.
     pub fn emission(
         context: &RenderContext,
         (merges, reserve): (bool, usize),
@@ -298,28 +296,11 @@ impl<'a, F: Features> Bidirectional<'a, F> {
         if !add_splats(executor, picture, lists)? {
             return Ok(None);
         }
-        // The vertices of all tasks, one after the other.
-        let mut stored = 0;
-        for (task, output) in outputs.iter().enumerate() {
-            let first = task * ROOM;
-            let count = output.vertices as usize;
-            if count > 0 {
-                vertices.copy_within(first..first + count, stored);
-            }
-            stored += count;
-        }
-        if let Some(VertexMerging { photons, .. }) = merging {
-            let vertices = &vertices[..stored];
-            let passed = photons.fill(executor, (stored, PIECE), |piece, _, photons| {
-                let rest = vertices.get(piece * PIECE..).unwrap_or_default();
-                for (i, (photon, vertex)) in photons.iter_mut().zip(rest).enumerate() {
-                    *photon = vertex.photon(&scene, (piece * PIECE + i) as u32);
-                }
-                Ok(Counters::default())
-            })?;
-            if !passed.is_complete {
-                return Ok(None);
-            }
+        let stored = light_vertices::compact(vertices, outputs);
+        if let Some(VertexMerging { photons, .. }) = merging
+            && !light_vertices::map(photons, executor, &scene, &vertices[..stored])?.is_complete
+        {
+            return Ok(None);
         }
         Ok(Some((stored, counters)))
     }

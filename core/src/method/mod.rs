@@ -14,6 +14,7 @@ pub mod environment_visibility;
 pub mod executor;
 pub mod instant_radiosity;
 pub mod irradiance_cache;
+mod light_vertices;
 pub mod metropolis;
 pub mod path;
 pub mod photon_map;

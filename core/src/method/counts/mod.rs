@@ -1,6 +1,6 @@
 //! Counts of techniques that suit a picture, down to none: path tracing alone.
 //!
-//! What the scene rules out comes first. Then a [`pilot`] predicts noise × work of all candidates, in rays
+//! The scene itself rules some out. Then a [`pilot`] predicts noise × work of all candidates, in rays
 //! rather than seconds, so that the choice follows from scene, settings and seed alone. Path tracing has
 //! its own means beside it, path reuse and caustic photons, whose pilots are asked before light paths are
 //! chosen.

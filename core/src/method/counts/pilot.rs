@@ -15,7 +15,7 @@ use crate::light::EmissionSampler;
 use crate::memory::{Arena, Footprint, MemorySource, OutOfMemory};
 use crate::method::bidirectional::FIRST_RADIUS;
 use crate::method::executor::{Executor, Passed, Worker};
-use crate::method::{PhotonMapStore, RenderContext};
+use crate::method::{PhotonMapStore, RenderContext, light_vertices};
 use crate::photon::PhotonMap;
 use crate::transport::bidirectional::camera_paths::{CameraPaths, Connections};
 use crate::transport::bidirectional::contribution::Contribution;
@@ -55,7 +55,7 @@ const SUMS: usize = CANDIDATES * PIXELS_PER_TILE;
 /// Least variance relative to the second moment: the estimate of the variance is noisy.
 const LEAST_VARIANCE: f32 = 0.05;
 
-/// What a pilot has found.
+/// Result of a pilot.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Found {
     /// Relative variance of a sample of a pixel with the counts of each candidate, in their order.
@@ -108,7 +108,7 @@ fn small(settings: PathSettings) -> PathSettings {
     PathSettings { width: scaled(width), height: scaled(height), seed: !seed, ..settings }
 }
 
-/// Bytes of a pilot with `tasks` of light paths in a picture of so many `tiles`.
+/// Bytes of a pilot with `tasks` of light paths in a picture of `tiles`.
 fn footprint(tasks: usize, tiles: usize, merging: bool) -> Footprint {
     let mut footprint = Footprint::default().slice::<Block>(tiles * BLOCKS).slice::<f32>(tiles * SUMS);
     for _ in 0..WEIGHTINGS {
@@ -176,20 +176,18 @@ impl<F: Features> Pilot<'_, '_, F> {
         let radii =
             MergeRadii { radii: self.context.radii().after(FIRST_RADIUS, 0), light_paths, emphasis: 1.0 };
         let counts = Counts { light_paths, connections: 1.0, light_samples: 1.0 };
-        let mut weightings = [(); WEIGHTINGS].map(|()| None);
-        for weighting in &mut weightings {
-            *weighting = Some(Weighting {
+        let mut weighting = || -> Result<_, OutOfMemory> {
+            Ok(Weighting {
                 counts,
                 radii: merging.then_some(radii),
                 vertices: arena.slice(self.tasks * ROOM)?,
                 splats: arena.slice(self.tasks * ROOM)?,
                 outputs: arena.slice(self.tasks)?,
                 stored: 0,
-            });
-        }
-        let [Some(mut base), Some(mut splats), Some(mut connections), Some(mut merges)] = weightings else {
-            return Ok(None);
+            })
         };
+        let [mut base, mut splats, mut connections, mut merges] =
+            [weighting()?, weighting()?, weighting()?, weighting()?];
         // The mean number of vertices, by which a connection counts.
         if self.light_pass(0, &mut base, executor)?.is_none() {
             return Ok(None);
@@ -202,12 +200,15 @@ impl<F: Features> Pilot<'_, '_, F> {
         let mut weightings = [base, splats, connections, merges];
         let (mut light, mut camera) = (Counters::default(), Counters::default());
         let mut store = PhotonMapStore::over(arena.scratch());
+        let scene = self.context.scene_context::<F>();
         for sample in 0..SAMPLES {
             for (i, weighting) in weightings.iter_mut().enumerate() {
                 let Some(counters) = self.light_pass(sample, weighting, executor)? else { return Ok(None) };
                 light += if i == 0 { counters } else { Counters::default() };
             }
-            if merging && !self.photons(&weightings[0], &mut store, executor)? {
+            // All weightings have the same vertices, and photons.
+            let base = &weightings[0].vertices[..weightings[0].stored];
+            if merging && !light_vertices::map(&mut store, executor, &scene, base)?.is_complete {
                 return Ok(None);
             }
             let (map, weightings) = (store.map()?, &weightings);
@@ -241,32 +242,8 @@ impl<F: Features> Pilot<'_, '_, F> {
             executor.pass(tasks, |task, ((vertices, splats), output), worker| {
                 pass.run((task, sample), &mut worker.scratch, vertices, splats, output)
             })?;
-        *stored = 0;
-        for (task, output) in outputs.iter().enumerate() {
-            let (first, count) = (task * ROOM, output.vertices as usize);
-            vertices.copy_within(first..first + count, *stored);
-            *stored += count;
-        }
+        *stored = light_vertices::compact(vertices, outputs);
         Ok(is_complete.then_some(counters))
-    }
-
-    /// The map of the photons of `base`, which are those of all weightings. Returns whether it is there.
-    fn photons(
-        &self,
-        base: &Weighting,
-        store: &mut PhotonMapStore,
-        executor: &mut impl Executor,
-    ) -> Result<bool, OutOfMemory> {
-        let scene = self.context.scene_context::<F>();
-        let vertices = &base.vertices[..base.stored];
-        let passed = store.fill(executor, (base.stored, ROOM), |piece, _, photons| {
-            let rest = vertices.get(piece * ROOM..).unwrap_or_default();
-            for (i, (photon, vertex)) in photons.iter_mut().zip(rest).enumerate() {
-                *photon = vertex.photon(&scene, (piece * ROOM + i) as u32);
-            }
-            Ok(Counters::default())
-        })?;
-        Ok(passed.is_complete)
     }
 
     /// One sample of a tile, into its blocks and sums. The work of one weighting.

@@ -3,7 +3,7 @@
 //!
 //! With the balance heuristic a sample brings v = f / Σ n p, whatever technique has found it. With counts
 //! n′ it would bring v / r, where r = Σ w n′ / n and w is the share of a technique in the sum. Samples with
-//! counts n tell the second moment for all n′ at once:
+//! counts n give the second moment for all n′ at once:
 //!
 //! E′ [Σ v′²] = E [Σ v² / r].
 //!
