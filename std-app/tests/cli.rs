@@ -127,6 +127,8 @@ fn a_render_without_a_stop_rule_ends_by_its_error_and_says_so() {
     assert!(object["error"]["interval"][1].as_f64().unwrap() <= 1e-3, "{}", object["error"]);
     let output = folder.run("render scene.obj --size 16x16");
     assert!(String::from_utf8(output.stdout).unwrap().contains("ended at relMSE 1e-3, the default"));
+    let output = folder.run("render scene.obj --size 16x16 --error 0.001 --time 60s");
+    assert!(!String::from_utf8(output.stdout).unwrap().contains("default"), "the rules were given");
 
     assert_eq!(folder.object("render scene.obj --size 16x16 --spp 4 --json")["stop_rule"], "spp");
     let object = folder.object("render scene.obj --size 64x64 --time 0.2s --json");

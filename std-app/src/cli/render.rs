@@ -36,8 +36,8 @@ pub(super) struct Render {
     #[command(flatten)]
     picture: PictureArgs,
 
-    /// Samples per pixel. Without --spp, --time and --error a render ends at relMSE 1e-3 or after 60 s; a shard
-    /// has 256 samples
+    /// Samples per pixel. Without --spp, --time and --error a render ends at relMSE 1e-3 or after 60 s; a
+    /// shard has 256 samples
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1 << 30),
         display_order = 4)]
     spp: Option<u32>,
@@ -94,7 +94,7 @@ impl Render {
         loaded.files.iter().try_for_each(|file| outputs.protect(file))?;
         loaded.repairs.iter().for_each(print_note);
         self.check_method(&loaded)?;
-        let stop = self.stop(&loaded)?;
+        let (stop, by_default) = self.stop(&loaded)?;
         let settings = self.picture.settings(&loaded, self.method, &self.method_args, stop, reference)?;
         let every = self.checkpoint_every.unwrap_or(Checkpoint::EVERY);
         let settings = Settings {
@@ -134,11 +134,14 @@ impl Render {
             provenance: &Provenance::here(),
         };
         let reported = self.report.as_deref().filter(|folder| outputs.save_report(folder, &run.files()));
-        let results = if self.json { run.object().to_string() } else { summary::text(&run, reported) };
+        let results = match self.json {
+            true => run.object().to_string(),
+            false => summary::text(&run, reported, by_default),
+        };
         let code = match result.ending {
             Ending::Done => ExitCode::SUCCESS,
             // The user asked for no error that could be missed.
-            Ending::Biased | Ending::NoiseFloor if settings.stop == Stop::SENSIBLE => ExitCode::SUCCESS,
+            Ending::Biased | Ending::NoiseFloor if by_default => ExitCode::SUCCESS,
             Ending::Interrupted | Ending::Biased | Ending::NoiseFloor => ExitCode::from(3),
         };
         Ok(outputs.end(&results, code))
@@ -182,18 +185,19 @@ impl Render {
         }
     }
 
-    fn stop(&self, loaded: &LoadedScene) -> Result<Stop, Failure> {
+    /// When to stop, and whether that is the default: neither flags nor scene file have a rule.
+    fn stop(&self, loaded: &LoadedScene) -> Result<(Stop, bool), Failure> {
         let file = &loaded.settings;
         let flags = Stop { spp: self.spp, seconds: self.time, error: self.error };
         let rules = Stop { spp: file.spp, seconds: file.time, error: file.error };
         let stop = if flags == Stop::default() { rules } else { flags };
         if stop == Stop::default() && self.shard.is_none() {
-            return Ok(Stop::SENSIBLE);
+            return Ok((Stop::SENSIBLE, true));
         }
         if self.shard.is_some() && (stop.seconds.is_some() || stop.error.is_some()) {
             let why = "the scene file stops by time or error, but shards must have the same samples";
             return Err(Failure::new(format!("{}: {why}", self.scene.display())).advice("add --spp N"));
         }
-        Ok(stop)
+        Ok((stop, false))
     }
 }

@@ -2,14 +2,14 @@
 
 use super::compare as comparing;
 use super::dropped;
-use halflight::render::{Audited, BiasEstimate, Ending, ErrorEstimate, NoiseAndBlur, Stop, StopRule};
+use halflight::render::{Audited, BiasEstimate, Ending, ErrorEstimate, NoiseAndBlur, StopRule};
 use halflight::report::Run;
 use halflight::report::quantity::{plural, readable_bytes, readable_name, readable_seconds, readable_value};
 use halflight_core::findings::{Finding, Value};
 use std::path::Path;
 
-/// Lines of `run`; `report` is the folder of its report.
-pub(super) fn text(run: &Run, report: Option<&Path>) -> String {
+/// Lines of `run`; `report` is the folder of its report. `by_default` is true if the user gave no stop rule.
+pub(super) fn text(run: &Run, report: Option<&Path>, by_default: bool) -> String {
     let (result, settings) = (run.result, run.settings);
     let mut lines: Vec<_> = run.outputs.iter().map(|output| format!("saved  {}", output.display())).collect();
     lines.extend(report.map(|folder| format!("report {}", folder.join("index.html").display())));
@@ -33,7 +33,7 @@ pub(super) fn text(run: &Run, report: Option<&Path>) -> String {
             "       noise that all samples share exceeds relMSE {error}: more samples do not help; for an \
             irradiance cache more --cache-rays do"
         )),
-        (_, Some(rule)) if settings.stop == Stop::SENSIBLE => {
+        (_, Some(rule)) if by_default => {
             let end = if rule == StopRule::Error { "at relMSE 1e-3" } else { "after 60 s" };
             Some(format!("       ended {end}, the default; --spp, --time or --error set another end"))
         }
