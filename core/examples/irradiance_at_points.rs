@@ -1,5 +1,5 @@
-//! Irradiance at given points, as light maps want it: the mean of what path tracing finds at each point, and its
-//! standard error. All structures are in one buffer.
+//! Irradiance at given points, as light maps want it: the mean of what path tracing finds at each point, and
+//! its standard error. All structures are in one buffer.
 #[path = "room/mod.rs"]
 mod room;
 

@@ -1,5 +1,6 @@
-//! Derivatives of irradiance alone: gradient and Hessian from the radiances and distances that gather rays of a point have
-//! found (Schwarzhaupt, Jensen, Jarosz 2012, occlusion-aware), and the eigen decomposition that bounds a record.
+//! Derivatives of irradiance alone: gradient and Hessian from the radiances and distances that gather rays of
+//! a point have found (Schwarzhaupt, Jensen, Jarosz 2012, occlusion-aware), and the eigen decomposition that
+//! bounds a record.
 use halflight_core::Level;
 use halflight_core::cache::irradiance::{CellFlux, Hemisphere, Metric, metric, validity};
 use halflight_core::memory::{Arena, Line, OutOfMemory};

@@ -1,5 +1,5 @@
-//! Photon search alone: a kd-tree over points with a power, the nearest of them, and the density of power around a
-//! place. No heap, and nothing of the renderer.
+//! Photon search alone: a kd-tree over points with a power, the nearest of them, and the density of power
+//! around a place. No heap, and nothing of the renderer.
 use glam::Vec3;
 use halflight_core::memory::{Arena, Footprint, Line, OutOfMemory};
 use halflight_core::photon::{Kernel, Neighbours, Photon, Photons, QueryDisc, Uniform};

@@ -1,6 +1,6 @@
-//! A small picture by every method in one buffer, such as a `static` of a microcontroller: no heap, no threads, and no
-//! operating system but for the printing. `cargo verify targets` runs this very file without libc, as WebAssembly and
-//! for Cortex-M: same bits everywhere.
+//! A small picture by every method in one buffer, such as a `static` of a microcontroller: no heap, no
+//! threads, and no operating system but for the printing. `cargo verify targets` runs this very file without
+//! libc, as WebAssembly and for Cortex-M: same bits everywhere.
 #[path = "room/mod.rs"]
 mod room;
 
@@ -30,7 +30,8 @@ pub const LINES: usize = 1 << 16;
 /// Bytes of working memory at most.
 const SCRATCH: usize = 640 << 10;
 
-/// Renders the room by method number `method` into `pixels`, row by row from the top, all structures in `memory`.
+/// Renders the room by method number `method` into `pixels`, row by row from the top, all structures in
+/// `memory`.
 pub fn render(
     method: usize,
     memory: &mut [Line],

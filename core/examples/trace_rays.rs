@@ -1,4 +1,5 @@
-//! Ray tracing alone: a hierarchy over a mesh, nearest hits of a batch of rays, and rays towards the sun. No heap.
+//! Ray tracing alone: a hierarchy over a mesh, nearest hits of a batch of rays, and rays towards the sun. No
+//! heap.
 use core::array;
 use glam::Vec3;
 use halflight_core::bsdf::DiffuseOnly;

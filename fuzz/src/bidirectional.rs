@@ -1,6 +1,6 @@
 //! Light vertices, splats and photons of bidirectional path tracing in any room: as many vertices as the
-//! textbook stores, no NaN in pixels and splats, and equal sums of splats. Light of camera paths is compared in
-//! `tests/tests/bidirectional_reference.rs` alone: an input exists in which the two differ, see issue 40.
+//! textbook stores, no NaN in pixels and splats, and equal sums of splats. Light of camera paths is compared
+//! in `tests/tests/bidirectional_reference.rs` alone: an input exists in which the two differ, see issue 40.
 
 use crate::rooms::{arena, level, lines, with_room};
 use arbitrary::{Result, Unstructured};

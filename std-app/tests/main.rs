@@ -1,4 +1,5 @@
-//! Tests of the program as a process, each in a folder of its own, and of the library by its public functions.
+//! Tests of the program as a process, each in a folder of its own, and of the library by its public
+//! functions.
 
 mod audit;
 mod bench;

@@ -1,10 +1,11 @@
-//! Does the interval hold the error, and does a render that stops by its error have it? Renders scenes with many
-//! seeds until they say that they have the error asked for; each round is compared with a reference of many times the
-//! samples, whose own noise is taken off, and what photons blur in it. Prints the tables of docs/validation.md:
+//! Does the interval hold the error, and does a render that stops by its error have it? Renders scenes with
+//! many seeds until they say that they have the error asked for; each round is compared with a reference of
+//! many times the samples, whose own noise is taken off, and what photons blur in it. Prints the tables of
+//! docs/validation.md:
 //!
-//! `cargo run --release -p halflight-tests --example calibration -- [--renders 40] [--size 64] [--error 0.001]
-//! [--spp 4096] [--times 100] [--method path] [--audit 0.05] [SCENE…]`, of our own scenes by name or of any scene file.
-//! `--error 0` goes on to the last sample, also where a method's bias is found.
+//! `cargo run --release -p halflight-tests --example calibration -- [--renders 40] [--size 64] [--error
+//! 0.001] [--spp 4096] [--times 100] [--method path] [--audit 0.05] [SCENE…]`, of our own scenes by name or
+//! of any scene file. `--error 0` goes on to the last sample, also where a method's bias is found.
 
 use core::sync::atomic::AtomicBool;
 use halflight::load::{self, LoadOptions};
@@ -142,9 +143,10 @@ fn calibrate(file: &Path, wanted: &Wanted) {
     );
 }
 
-/// What photons blur falls with the third root of the samples: a picture of fewer samples is blurred three times as much,
-/// and half of the difference to it is taken off (docs/validation.md, the slope of progressive photon mapping). Its noise is nine
-/// times as large for that: 2.25 of its own, and a quarter of 27 times as much. Not where no blur is found, which is less than that.
+/// What photons blur falls with the third root of the samples: a picture of fewer samples is blurred three
+/// times as much, and half of the difference to it is taken off (docs/validation.md, the slope of progressive
+/// photon mapping). Its noise is nine times as large for that: 2.25 of its own, and a quarter of 27 times as
+/// much. Not where no blur is found, which is less than that.
 fn sharpened(many: RenderResult, few: impl FnOnce() -> RenderResult) -> Image {
     let mut image = many.image;
     if many.noise_and_blur.is_some_and(|noise_and_blur| noise_and_blur.blur.is_significant()) {

@@ -1,9 +1,11 @@
-//! Sharing of paths between pixels: its gain, and whether its error looks like that of independent pixels. Prints for each
-//! scene and number of samples, with pictures of many seeds:
+//! Sharing of paths between pixels: its gain, and whether its error looks like that of independent pixels.
+//! Prints for each scene and number of samples, with pictures of many seeds:
 //!
-//! - the relMSE without and with sharing, and the gain 1 / (relMSE · processor seconds) of the latter over the former;
-//! - within blocks of 8 × 8 smooth pixels, the variance of the means of the four sublattices of pixels with the same
-//!   (x mod 2, y mod 2), and of the sixteen with the same (x mod 4, y mod 4), over that of independent pixels: 1 for those.
+//! - the relMSE without and with sharing, and the gain 1 / (relMSE · processor seconds) of the latter over
+//!   the former;
+//! - within blocks of 8 × 8 smooth pixels, the variance of the means of the four sublattices of pixels with
+//!   the same (x mod 2, y mod 2), and of the sixteen with the same (x mod 4, y mod 4), over that of
+//!   independent pixels: 1 for those.
 //!
 //! `cargo run --release -p halflight-tests --example lattice -- [--renders 8] [--size 128] [--spp 16,64]
 //! SCENE…`, scene files. Processor seconds are read from /proc, with one thread for each render.
@@ -106,8 +108,8 @@ fn relmse(pictures: &[Vec<f64>]) -> f64 {
     squares.sum::<f64>() / ((pictures.len() - 1) * mean.len()) as f64
 }
 
-/// The variance between the means of the `side`² sublattices of smooth blocks, over that of as many independent pixels;
-/// and how many blocks there are.
+/// The variance between the means of the `side`² sublattices of smooth blocks, over that of as many
+/// independent pixels; and how many blocks there are.
 fn scatter(pictures: &[Vec<f64>], width: usize, side: usize) -> (f64, usize) {
     let mean = mean_of(pictures);
     let (mut ratios, mut count) = (0.0, 0);

@@ -41,8 +41,8 @@ pub fn try_render(
     render::render(scene, &settings, &mut |_| (), &AtomicBool::new(false))
 }
 
-/// Counts by which bidirectional methods use all of their techniques: a pilot leaves them out in most of the scenes
-/// here.
+/// Counts by which bidirectional methods use all of their techniques: a pilot leaves them out in most of the
+/// scenes here.
 fn all_techniques(scene: &Scene, settings: &Settings) -> BidirectionalSettings {
     let merging = settings.method == Some(Method::VertexMerging) && caustics::are_possible(scene);
     let pixels = settings.width * settings.height;

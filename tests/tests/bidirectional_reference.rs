@@ -54,8 +54,8 @@ const SAMPLES: u32 = 2;
 /// Change of the textbook's sample counts and merge radii, which otherwise equal those of the wavefront.
 type Change = fn(&mut Counts, &mut Option<MergeRadii>);
 
-/// Compares the wavefront with the textbook after `change`. Each vertex has `connections` connections, and MIS
-/// weights include merges within `merge_radius` pixels.
+/// Compares the wavefront with the textbook after `change`. Each vertex has `connections` connections, and
+/// MIS weights include merges within `merge_radius` pixels.
 fn compare(scene: &Scene, connections: u32, merge_radius: Option<f64>, change: Change) -> Compared {
     with_structures(scene, |bvh, lights| {
         let settings = PathSettings { width: SIZE, height: SIZE, seed: 7, max_depth: 10 };

@@ -1,5 +1,5 @@
-//! Emission guide: lights and directions are chosen by what earlier photons brought to visible surfaces (Peter and
-//! Pietrek 1998), in cells of primary sample space (Grittmann et al. 2018).
+//! Emission guide: lights and directions are chosen by what earlier photons brought to visible surfaces
+//! (Peter and Pietrek 1998), in cells of primary sample space (Grittmann et al. 2018).
 //!
 //! 1. Camera rays find visible points; for final gathering, points that light those.
 //! 2. A pilot traces light paths and counts those that leave photons near these points.
@@ -15,19 +15,20 @@ use crate::memory::{Arena, Footprint, MemorySource, OutOfMemory};
 use crate::transport::photon_mapping::deposit::{PATHS, PhotonFilter, PhotonTracer, PhotonTracerSettings};
 use crate::transport::photon_mapping::visible_points::{VisiblePointSampler, VisiblePoints};
 
-/// Light paths of each pilot, the map that those of the first belong to, which no sample has, and the most pilots
-/// after it.
+/// Light paths of each pilot, the map that those of the first belong to, which no sample has, and the most
+/// pilots after it.
 const PILOT: usize = 16 * PATHS;
 const FIRST_MAP: u32 = 0x7fff_fff0;
 const MOST_PILOTS: u32 = 3;
 
-/// The fraction of light paths that reach visible points from which on power is good enough; the fewest paths to
-/// begin with, and the fewest of all pilots that the guide is learned from.
+/// The fraction of light paths that reach visible points from which on power is good enough; the fewest paths
+/// to begin with, and the fewest of all pilots that the guide is learned from.
 const MOST_SEEN: f64 = 0.5;
 const FEWEST_TO_BEGIN: usize = 8;
 const FEWEST_SEEN: usize = 512;
 
-/// The highest variance of light at visible points with the guide, relative to that without, at which guiding pays.
+/// The highest variance of light at visible points with the guide, relative to that without, at which guiding
+/// pays.
 const LESS: f64 = 0.5;
 
 /// Photons that a guide is for.
@@ -73,7 +74,8 @@ impl<'m> EmissionGuide<'m> {
     /// Learns where photons are used in the picture of `context`.
     ///
     /// # Errors
-    /// [`OutOfMemory`] where `memory` is too small for lights by power, or the executor's scratch for light paths.
+    /// [`OutOfMemory`] where `memory` is too small for lights by power, or the executor's scratch
+    /// for light paths.
     pub fn learn<F: Features>(
         context: &RenderContext,
         settings: GuideSettings,

@@ -1,5 +1,5 @@
-//! Environment visibility: before the picture, some paths and rays learn which part of the environment each place
-//! sees, and the environment is then sampled by it, where that reduces variance
+//! Environment visibility: before the picture, some paths and rays learn which part of the environment each
+//! place sees, and the environment is then sampled by it, where that reduces variance
 //! (`transport/prepass/environment_visibility.rs`).
 
 use super::RenderContext;
@@ -23,8 +23,8 @@ fn working() -> Footprint {
     VisibilityPrepass::footprint().slice::<VisibilityGain>(EnvironmentVisibility::MAX_TABLES)
 }
 
-/// Learns the visibility of the environment of `context`, and returns its lights with it where that pays or is
-/// `wanted`. The gain is `None` where the executor ended early or there is no environment.
+/// Learns the visibility of the environment of `context`, and returns its lights with it where that pays or
+/// is `wanted`. The gain is `None` where the executor ended early or there is no environment.
 ///
 /// # Errors
 /// [`OutOfMemory`] where `memory` has less than [`footprint`] bytes, or the executor less than [`scratch`].

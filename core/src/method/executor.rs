@@ -1,7 +1,7 @@
 //! Execution of tasks by the caller: threads on a computer, a loop on a microcontroller.
 //!
-//! A method is a sequence of passes. The tasks of a pass are independent: each writes to a piece of memory of its own
-//! and reads what earlier passes have left. The result has the same bits for any number of threads.
+//! A method is a sequence of passes. The tasks of a pass are independent: each writes to a piece of memory of
+//! its own and reads what earlier passes have left. The result has the same bits for any number of threads.
 
 use crate::bvh::ForkJoin;
 use crate::memory::{Arena, OutOfMemory};
@@ -51,8 +51,8 @@ pub trait Executor {
         P: Iterator<Item: Send> + Send,
         T: Fn(usize, P::Item, &mut Worker) -> Result<Counters, OutOfMemory> + Sync;
 
-    /// As [`Executor::pass`], in an order in which the tasks that ran before an early end are spread evenly. The
-    /// numbers of the tasks are those of the pieces.
+    /// As [`Executor::pass`], in an order in which the tasks that ran before an early end are spread evenly.
+    /// The numbers of the tasks are those of the pieces.
     ///
     /// # Errors
     /// Those of [`Executor::pass`].
@@ -70,8 +70,8 @@ pub trait Executor {
     /// Forks, for builds that divide themselves.
     fn fork(&self) -> &Self::Fork;
 
-    /// Runs `work` that the picture can do without: passes in it end early, after a `fraction` (0 to 1) of the time
-    /// that the picture has left. Without a clock it runs to its end.
+    /// Runs `work` that the picture can do without: passes in it end early, after a `fraction` (0 to 1) of
+    /// the time that the picture has left. Without a clock it runs to its end.
     fn within<T>(&mut self, _fraction: f32, work: impl FnOnce(&mut Self) -> T) -> T {
         work(self)
     }

@@ -1,9 +1,9 @@
-//! Irradiance caching (Ward, Rubinstein and Clear 1988): the indirect light of diffuse surfaces is gathered at few points
-//! and interpolated between them. Paths find all other light.
+//! Irradiance caching (Ward, Rubinstein and Clear 1988): the indirect light of diffuse surfaces is gathered
+//! at few points and interpolated between them. Paths find all other light.
 //!
-//! One cache serves the even samples, another the odd ones, and each is filled without the other: the difference of
-//! the halves of the film shows the errors of records too. First both caches are filled, then they are frozen. Paths go
-//! on where no record is valid.
+//! One cache serves the even samples, another the odd ones, and each is filled without the other: the
+//! difference of the halves of the film shows the errors of records too. First both caches are filled, then
+//! they are frozen. Paths go on where no record is valid.
 
 use super::executor::{Executor, Passed};
 use super::record_placement::{CacheBuilder, RecordPlacement, step_footprint, step_points};
@@ -23,8 +23,8 @@ const FEWEST_RECORDS: usize = 4096;
 /// Least radius of a record in pixels: pixels that placement looks at and that are neighbours share it.
 pub const LEAST_PIXELS: f32 = 2.0;
 
-/// The fraction of the time that is left before both caches are filled in which each is to be filled: both are cut alike.
-/// What no record reaches by then is path traced.
+/// The fraction of the time that is left before both caches are filled in which each is to be filled: both
+/// are cut alike. Points that no record reaches by then are path traced.
 const TIME: f32 = 0.25;
 
 /// Strata along a side behind rough surfaces are half as many, in multiples of this.
@@ -124,7 +124,8 @@ impl<'a, F: Features> IrradianceCaching<'a, F> {
         Ok(method)
     }
 
-    /// Begins with the records of other caches of the scene, for which light was gathered at `gathered` points.
+    /// Begins with the records of other caches of the scene, for which light was gathered at `gathered`
+    /// points.
     pub fn restore(&mut self, records: [&[Record]; 2], gathered: [u32; 2]) {
         for ((builder, records), gathered) in self.builders.iter_mut().zip(records).zip(gathered) {
             builder.restore(records, gathered);
@@ -171,8 +172,8 @@ impl<'a, F: Features> IrradianceCaching<'a, F> {
         self.builders.get(number).is_none_or(CacheBuilder::is_finished)
     }
 
-    /// Fills cache `number`, 0 or 1, or goes on with it. Gather rays end in `photons`, which paths of limited depth
-    /// must not ask for. Returns whether that is done.
+    /// Fills cache `number`, 0 or 1, or goes on with it. Gather rays end in `photons`, which paths of limited
+    /// depth must not ask for. Returns whether that is done.
     ///
     /// # Errors
     /// [`OutOfMemory`] where the executor's scratch is too small.
@@ -260,8 +261,8 @@ mod tests {
         all.and(caches).and(caches).bytes() / 64
     }
 
-    /// Renders in `lines` lines of memory, in rounds to these numbers of samples, `step` samples of a tile at a time.
-    /// Returns the mean radiance of each pixel, and the number of records.
+    /// Renders in `lines` lines of memory, in rounds to these numbers of samples, `step` samples of a tile at
+    /// a time. Returns the mean radiance of each pixel, and the number of records.
     fn render(
         materials: [Material; 4],
         lines: usize,

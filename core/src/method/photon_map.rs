@@ -1,13 +1,13 @@
 //! Photon mapping in two passes (Jensen 1996; 2001, chapters 9 and 10):
 //!
-//! 1. Photons are traced into a global map, and those of caustics into a map of their own. Irradiances are precomputed
-//!    at photons of the global map (Christensen 1999).
-//! 2. Camera paths sample direct light, take caustics from the caustic map, and end gather rays in the global map
-//!    (`transport/photon_mapping/final_gather.rs`).
+//! 1. Photons are traced into a global map, and those of caustics into a map of their own. Irradiances are
+//!    precomputed at photons of the global map (Christensen 1999).
+//! 2. Camera paths sample direct light, take caustics from the caustic map, and end gather rays in the global
+//!    map (`transport/photon_mapping/final_gather.rs`).
 //!
-//! Photons are traced anew for every [`GROUP`] of samples, into maps of the even and maps of the odd samples: the
-//! halves of the film are independent. Discs of caustics shrink from group to group as those of `sppm`; the blur of
-//! the global map stays, behind a bounce.
+//! Photons are traced anew for every [`GROUP`] of samples, into maps of the even and maps of the odd samples:
+//! the halves of the film are independent. Discs of caustics shrink from group to group as those of `sppm`;
+//! the blur of the global map stays, behind a bounce.
 
 use super::emission_guide::{EmissionGuide, GuideSettings, Target};
 use super::executor::Executor;
@@ -123,7 +123,8 @@ impl<'a, F: Features> PhotonMapping<'a, F> {
     /// Photon mapping of `context`. Maps are as large as `memory` allows, of which `reserve` bytes stay free.
     ///
     /// # Errors
-    /// [`OutOfMemory`] where `memory` is too small for the smallest maps, or the executor's scratch for a task.
+    /// [`OutOfMemory`] where `memory` is too small for the smallest maps, or the executor's scratch
+    /// for a task.
     pub fn new(
         context: &RenderContext<'a>,
         settings: PhotonSettings,

@@ -1,5 +1,5 @@
-//! Photon maps in memory of the caller: filled in one pass, built in place, and made anew in the same bytes for later
-//! samples.
+//! Photon maps in memory of the caller: filled in one pass, built in place, and made anew in the same bytes
+//! for later samples.
 
 use super::executor::{Executor, Passed};
 use crate::bsdf::Features;
@@ -35,8 +35,8 @@ impl<'m> PhotonMapStore<'m> {
         Self { arena, built: None }
     }
 
-    /// Makes a map of `count` photons: `write` fills each `piece` of them, by number. The map is there if the pass is
-    /// complete; the one before is gone.
+    /// Makes a map of `count` photons: `write` fills each `piece` of them, by number. The map is there if the
+    /// pass is complete; the one before is gone.
     ///
     /// # Errors
     /// [`OutOfMemory`] where the store has less than [`PhotonMapStore::footprint`] bytes; those of `write`.
@@ -89,7 +89,8 @@ impl<'m> PhotonMapStore<'m> {
     }
 }
 
-/// Maps of the even and of the odd samples, which have nothing in common: the halves of the film stay independent.
+/// Maps of the even and of the odd samples, which have nothing in common: the halves of the film stay
+/// independent.
 pub struct PhotonMapPair<'m> {
     /// Of even samples.
     pub even: PhotonMapStore<'m>,

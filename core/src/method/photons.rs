@@ -27,8 +27,8 @@ pub struct MapUse {
     pub shot: u64,
     /// Photons that they left.
     pub stored: u64,
-    /// Fraction of light paths whose photons reach visible surfaces, or those that light them, by a pilot; `None`
-    /// without a pilot.
+    /// Fraction of light paths whose photons reach visible surfaces, or those that light them, by a pilot;
+    /// `None` without a pilot.
     pub seen: Option<f64>,
     /// The same with lights chosen by power; `None` where they are.
     pub by_power: Option<f64>,

@@ -1,9 +1,10 @@
-//! Placement of the records of an irradiance cache, from coarse to fine (Krivanek, Bouatouch, Pattanaik and Zara 2006,
-//! section 5).
+//! Placement of the records of an irradiance cache, from coarse to fine (Krivanek, Bouatouch, Pattanaik and
+//! Zara 2006, section 5).
 //!
-//! The pixels of the picture come in an order that is spread evenly from its first pixel on. Where no record is valid,
-//! light is gathered, and the new records are committed in the order of their pixels. Sweeps are repeated: first for
-//! diffuse points that are seen directly or through mirrors and glass, then for those behind rough surfaces.
+//! The pixels of the picture come in an order that is spread evenly from its first pixel on. Where no record
+//! is valid, light is gathered, and the new records are committed in the order of their pixels. Sweeps are
+//! repeated: first for diffuse points that are seen directly or through mirrors and glass, then for those
+//! behind rough surfaces.
 
 use super::executor::{Executor, Passed};
 use crate::bsdf::Features;
@@ -20,22 +21,23 @@ const STRIDE: u32 = 2;
 /// Pixels of a step: those of 16 tasks of [`PIXELS`].
 const STEP: usize = 16 * PIXELS;
 
-/// Records shrink when their neighbours clamp them, so sweeps are repeated, at most this many times, or until a sweep
-/// adds less than one record in [`FEW`]. Behind rough surfaces each sweep sees other points.
+/// Records shrink when their neighbours clamp them, so sweeps are repeated, at most this many times, or until
+/// a sweep adds less than one record in [`FEW`]. Behind rough surfaces each sweep sees other points.
 const SWEEPS: u32 = 4;
 const FEW: usize = 50;
 
-/// The first gather rays end in no record, so they are long. After the first sweep the records that took more rays than
-/// this for each path, over the median, are gathered again.
+/// The first gather rays end in no record, so they are long. After the first sweep the records that took more
+/// rays than this for each path, over the median, are gathered again.
 const LONG: f32 = 1.3;
 
-/// Gather points between two commits: a part of the records, within these limits. The first records soon serve others.
+/// Gather points between two commits: a part of the records, within these limits. The first records soon
+/// serve others.
 const FEWEST_POINTS: usize = 8;
 const MOST_POINTS: usize = 32;
 const POINTS_PER_RECORD: usize = 4;
 
-/// The records of a cache that had no time become wider, at most this many times, until they serve this share of what
-/// such records could serve.
+/// The records of a cache that had no time become wider, at most this many times, until they serve this share
+/// of what such records could serve.
 const WIDEST: f32 = 6.0;
 const NEARLY_ALL: f64 = 0.98;
 
@@ -139,7 +141,8 @@ impl<'m> CacheBuilder<'m> {
         })
     }
 
-    /// Ends a sweep: another one follows, or the first for points behind rough surfaces, if the scene has any.
+    /// Ends a sweep: another one follows, or the first for points behind rough surfaces, if the scene has
+    /// any.
     fn end_sweep(&mut self, has_rough: bool) {
         (self.next, self.sweeps) = (0, self.sweeps + 1);
         let is_first = self.via == Some(Via::Specular) && self.sweeps == 1;
@@ -155,8 +158,8 @@ impl<'m> CacheBuilder<'m> {
         }
     }
 
-    /// Forgets the records whose gather rays were long. Their rays decide and not their light, so that no light is
-    /// preferred.
+    /// Forgets the records whose gather rays were long. Their rays decide and not their light, so that no
+    /// light is preferred.
     fn forget_long(&mut self) {
         let Self { cache, restored, efforts, points, .. } = self;
         let count = cache.records().len();
@@ -188,7 +191,8 @@ impl<'m> CacheBuilder<'m> {
 /// The value in the middle of positive `values`, the upper one of two; `None` of none.
 fn median(values: &[f32]) -> Option<f32> {
     let below = |bits: u32| values.iter().filter(|value| value.to_bits() < bits).count();
-    // Positive floats are ordered as their bits: the largest number with no more than half of the values below it.
+    // Positive floats are ordered as their bits: the largest number with no more than half of the values
+    // below it.
     let largest = (0..31).rev().fold(0, |bits, bit| {
         let more = bits | 1 << bit;
         if below(more) <= values.len() / 2 { more } else { bits }
@@ -215,7 +219,8 @@ pub struct RecordPlacement<'p, 'a, F> {
     pub integrator: &'p PathIntegrator<'a, F>,
     /// Photons of caustics that gather rays merge with. Paths of limited depth must not have any.
     pub photons: Option<CausticMerging<'p>>,
-    /// Tables of the strata of records that are seen, and of those behind rough surfaces, of which a pixel sees the mean.
+    /// Tables of the strata of records that are seen, and of those behind rough surfaces, of which a pixel
+    /// sees the mean.
     pub flux: [&'p CellFlux<'p>; 2],
     /// How far records are valid.
     pub metric: metric::Settings,
@@ -269,8 +274,9 @@ impl<F: Features> RecordPlacement<'_, '_, F> {
         Ok(Passed { counters, is_complete: true })
     }
 
-    /// Makes all records wider, by the same factor, so that they serve nearly all of what the camera sees that records of
-    /// [`WIDEST`] times the width could serve. A cache that had no time is coarse everywhere rather than good in places.
+    /// Makes all records wider, by the same factor, so that they serve nearly all of what the camera sees
+    /// that records of [`WIDEST`] times the width could serve. A cache that had no time is coarse everywhere
+    /// rather than good in places.
     ///
     /// # Errors
     /// Those of [`Executor::pass`].
@@ -298,7 +304,8 @@ impl<F: Features> RecordPlacement<'_, '_, F> {
         Ok(Passed { counters, ..passed })
     }
 
-    /// The factor of [`RecordPlacement::widen`], by the last step of the order; 1 where the executor ends it early.
+    /// The factor of [`RecordPlacement::widen`], by the last step of the order; 1 where the executor ends it
+    /// early.
     fn widening(
         &mut self,
         builder: &CacheBuilder,
@@ -331,8 +338,8 @@ impl<F: Features> RecordPlacement<'_, '_, F> {
         ProgressiveOrder::new(width, height, STRIDE)
     }
 
-    /// Finds the points of the step that begins with pixel `first` of the order, as far as they are wanted, and returns
-    /// their number; `None` where the executor ends it early.
+    /// Finds the points of the step that begins with pixel `first` of the order, as far as they are wanted,
+    /// and returns their number; `None` where the executor ends it early.
     fn look(
         &mut self,
         first: u64,
@@ -357,8 +364,8 @@ impl<F: Features> RecordPlacement<'_, '_, F> {
         Ok(passed.is_complete.then(|| retain(self.step, GatherPoint::is_some)))
     }
 
-    /// Gathers at these points of the step, at most [`MOST_POINTS`], and commits the records in their order. Returns
-    /// whether that is done.
+    /// Gathers at these points of the step, at most [`MOST_POINTS`], and commits the records in their order.
+    /// Returns whether that is done.
     fn gather(
         &self,
         points: core::ops::Range<usize>,

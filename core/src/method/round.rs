@@ -6,8 +6,8 @@ use crate::memory::{Arena, Footprint, OutOfMemory};
 use crate::transport::Counters;
 use core::ops::Range;
 
-/// A part of a picture: every `count`th tile from tile `index` on. The shards of a picture are rendered apart and merged
-/// to the same bits as one render.
+/// A part of a picture: every `count`th tile from tile `index` on. The shards of a picture are rendered apart
+/// and merged to the same bits as one render.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Shard {
     /// Number of the part, from 0.
@@ -74,7 +74,8 @@ impl<'m> RenderState<'m> {
     }
 }
 
-/// A round of a render: it brings every pixel to the same number of samples, unless its executor ends it early.
+/// A round of a render: it brings every pixel to the same number of samples, unless its executor ends it
+/// early.
 pub struct Round<'r, 'm, E> {
     /// Runs the tasks.
     pub executor: &'r mut E,
@@ -87,8 +88,8 @@ pub struct Round<'r, 'm, E> {
 }
 
 impl<E: Executor> Round<'_, '_, E> {
-    /// Number of the next sample of the least sampled pixel; `None` at the end of the round. For methods that build
-    /// something anew before a sample.
+    /// Number of the next sample of the least sampled pixel; `None` at the end of the round. For methods that
+    /// build something anew before a sample.
     pub fn next_sample(&self) -> Option<u32> {
         let spp = self.state.spp();
         (spp < self.target && !self.executor.is_over()).then_some(spp)
@@ -113,8 +114,8 @@ impl<E: Executor> Round<'_, '_, E> {
         passed.is_complete
     }
 
-    /// Brings every tile of the shard to `end` samples per pixel, or to the round's target if that is less. `sample`
-    /// adds a range of samples to the pixels of the tile of that number.
+    /// Brings every tile of the shard to `end` samples per pixel, or to the round's target if that is less.
+    /// `sample` adds a range of samples to the pixels of the tile of that number.
     ///
     /// # Errors
     /// The first [`OutOfMemory`] of `sample`.
@@ -157,7 +158,8 @@ mod tests {
     use core::sync::atomic::{AtomicU32, Ordering};
     use std::vec;
 
-    /// Runs `work` on a round of 40 × 40 pixels, 9 tiles, to `target` samples, whose executor ends after `most` questions.
+    /// Runs `work` on a round of 40 × 40 pixels, 9 tiles, to `target` samples, whose executor ends after
+    /// `most` questions.
     fn round(target: u32, most: u32, work: impl FnOnce(&mut Round<Loop>)) {
         let mut lines = vec![Line([0; 64]); RenderState::footprint(40, 40).bytes() / 64];
         let mut arena = Arena::new(bytemuck::cast_slice_mut(&mut lines));

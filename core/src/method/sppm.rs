@@ -1,14 +1,14 @@
-//! Stochastic progressive photon mapping (Hachisuka and Jensen 2009), with the radii of Knaus and Zwicker (2011). For
-//! each sample of the picture:
+//! Stochastic progressive photon mapping (Hachisuka and Jensen 2009), with the radii of Knaus and Zwicker
+//! (2011). For each sample of the picture:
 //!
 //! 1. photons are traced and built into a map;
-//! 2. camera paths end at their first vertex with a diffuse part, with the reflected light that the photons in a disc
-//!    around it give;
-//! 3. the radius of the disc shrinks, such that noise and blur both vanish: r² (i + 1) = r² (i) (i + a) / (i + 1),
-//!    a = 2/3.
+//! 2. camera paths end at their first vertex with a diffuse part, with the reflected light that the photons
+//!    in a disc around it give;
+//! 3. the radius of the disc shrinks, such that noise and blur both vanish: r² (i + 1) = r² (i) (i + a) / (i
+//!    + 1), a = 2/3.
 //!
-//! Pixels keep nothing except their sums, and memory does not grow with samples. Even and odd samples count their
-//! radii apart: the halves of the film are two independent pictures.
+//! Pixels keep nothing except their sums, and memory does not grow with samples. Even and odd samples count
+//! their radii apart: the halves of the film are two independent pictures.
 
 use super::emission_guide::{EmissionGuide, GuideSettings, Target};
 use super::executor::Executor;
@@ -54,11 +54,12 @@ impl<'a, F: Features> ProgressivePhotonMapping<'a, F> {
         PathIntegrator::<F>::scratch(WAVE).or(PhotonTracer::<F>::scratch())
     }
 
-    /// Progressive photon mapping of `context`. Maps are as large as `memory` allows, of which `reserve` bytes stay
-    /// free.
+    /// Progressive photon mapping of `context`. Maps are as large as `memory` allows, of which `reserve`
+    /// bytes stay free.
     ///
     /// # Errors
-    /// [`OutOfMemory`] where `memory` is too small for the smallest map, or the executor's scratch for a task.
+    /// [`OutOfMemory`] where `memory` is too small for the smallest map, or the executor's scratch
+    /// for a task.
     pub fn new(
         context: &RenderContext<'a>,
         settings: PhotonSettings,
@@ -95,7 +96,8 @@ impl<'a, F: Features> ProgressivePhotonMapping<'a, F> {
         self.used
     }
 
-    /// Traces the photons of `sample`, unless a round that ended early has left them. Returns whether they are there.
+    /// Traces the photons of `sample`, unless a round that ended early has left them. Returns whether they
+    /// are there.
     fn trace_photons<E: Executor>(&mut self, sample: u32, round: &mut Round<E>) -> Result<bool, OutOfMemory> {
         if self.sample == Some(sample) {
             return Ok(true);

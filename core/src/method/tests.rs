@@ -1,5 +1,5 @@
-//! Methods on one small scene: the same picture for any division into rounds and steps, from one buffer; and errors,
-//! not panics, where memory is short.
+//! Methods on one small scene: the same picture for any division into rounds and steps, from one buffer; and
+//! errors, not panics, where memory is short.
 
 use super::bidirectional::{Bidirectional, BidirectionalSettings};
 use super::environment_visibility;
@@ -151,7 +151,8 @@ fn two_passes_do_not_depend_on_rounds_or_steps() {
         let memory = (PLENTY, TwoPasses::scratch());
         let (pixels, used) = two_passes(context, memory, [9, 9, 8]).unwrap();
         assert!(pixels.iter().filter(|pixel| pixel.mean().min_element() > 0.0).count() > 200);
-        // Two groups of samples, each with maps for both halves; a round that begins within a group finds them.
+        // Two groups of samples, each with maps for both halves; a round that begins within a group finds
+        // them.
         assert!(used.maps == 4 && used.irradiances > 0, "{used:?}");
         assert!(used.caustic.is_some_and(|caustic| caustic.stored > 0), "{used:?}");
         for division in [[9, 1, 1], [9, 4, 3]] {

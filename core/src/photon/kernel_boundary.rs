@@ -17,8 +17,8 @@ use halflight_simd::{Lanes, Mask, Simd, dot};
 /// Number of probes, and of sectors between them.
 pub const PROBES: usize = 8;
 
-/// Cosine of half the angle between two probes. A straight wall that neither probe meets before length d is at
-/// least this times d away between them.
+/// Cosine of half the angle between two probes. A straight wall that neither probe meets before length d is
+/// at least this times d away between them.
 const HALF_ANGLE_COSINE: f32 = 0.923_879_5;
 
 /// The sectors in the coordinates (u, v) of the disc: u < 0, v < 0, |u| < |v|.

@@ -38,8 +38,9 @@ impl Photon {
     /// Photon without a position, which maps reject.
     pub const NONE: Photon = Photon { position: [f32::NAN; 3], light: 0, power: 0, normal: [0; 2] };
 
-    /// Photon of `power` (W per channel) from `direction`, which points away from the surface. Negative and NaN
-    /// channels count as zero, and so does a power below 1e-35 W. `direction` and `normal` may have any length.
+    /// Photon of `power` (W per channel) from `direction`, which points away from the surface. Negative and
+    /// NaN channels count as zero, and so does a power below 1e-35 W. `direction` and `normal` may have any
+    /// length.
     pub fn new(position: Vec3, direction: Vec3, normal: Vec3, power: Rgb) -> Self {
         let [u, v] = octahedral(direction, DIRECTION_STEPS);
         let [a, b] = octahedral(normal, NORMAL_STEPS);

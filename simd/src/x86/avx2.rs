@@ -202,8 +202,8 @@ impl Simd for Avx2 {
     fn keep(self, limit: f32, stack: &mut Stack) {
         const { assert!(STACK.is_multiple_of(8)) };
         let height = core::mem::take(&mut stack.height);
-        // SAFETY: the token proves the level; eight slots from `at` are inside the stack, those below the former
-        // height were written, and what is stored goes where it was read or below.
+        // SAFETY: the token proves the level; eight slots from `at` are inside the stack, those below the
+        // former height were written, and what is stored goes where it was read or below.
         unsafe {
             let limit = _mm256_set1_ps(limit);
             for at in (0..height).step_by(8) {

@@ -11,8 +11,8 @@ const PREPASS_GRACE: Duration = Duration::from_secs(2);
 /// Time after the end that the first sample of each pixel may take, with its preparation.
 const FIRST_SAMPLE_GRACE: Duration = Duration::from_secs(5);
 
-/// Time after the end, and after their start, that the samples of tiles may take of it. A picture of ordinary size
-/// takes less; a larger one is cut then, and its gaps are filled (`gaps.rs`).
+/// Time after the end, and after their start, that the samples of tiles may take of it. A picture of ordinary
+/// size takes less; a larger one is cut then, and its gaps are filled (`gaps.rs`).
 const TILES_GRACE: Duration = Duration::from_millis(500);
 
 /// A time limit, an interrupt flag, or both; by default the render never ends.

@@ -93,8 +93,8 @@ pub struct Settings {
     pub metropolis: MetropolisSettings,
     /// Whether photon maps are rendered at the end for a report, outside the measured time.
     pub photon_view: bool,
-    /// Whether the environment is sampled by visibility tables, which a prepass learns; `None`: as the prepass
-    /// decides.
+    /// Whether the environment is sampled by visibility tables, which a prepass learns; `None`: as the
+    /// prepass decides.
     pub environment_visibility: Option<bool>,
     /// Number of threads; `None`: all of the machine.
     pub threads: Option<usize>,

@@ -16,8 +16,8 @@ pub(super) enum End {
     Prepass,
     /// First round: some seconds later still, so that every pixel has a sample.
     FirstRound(Option<Instant>),
-    /// Samples of tiles in it, from their start on: they have some time of their own. Where they are cut, every tile
-    /// has its chance, and gaps are filled (`gaps.rs`).
+    /// Samples of tiles in it, from their start on: they have some time of their own. Where they are cut,
+    /// every tile has its chance, and gaps are filled (`gaps.rs`).
     FirstSamples(Option<Instant>, Instant),
     /// Every other round: at its deadline and when the user interrupts.
     Round(Option<Instant>),
@@ -127,7 +127,7 @@ impl<'t> Executor for Threads<'t> {
         P: Iterator<Item: Send> + Send,
         T: Fn(usize, P::Item, &mut Worker) -> Result<Counters, OutOfMemory> + Sync,
     {
-        // What follows in the round ends with them.
+        // The rest of the round ends with them.
         if let End::FirstRound(deadline) = self.branches.end {
             self.branches.end = End::FirstSamples(deadline, Instant::now());
         }

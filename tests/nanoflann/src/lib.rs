@@ -30,13 +30,14 @@ impl<'p> Tree<'p> {
         if points.is_empty() {
             return None;
         }
-        // SAFETY: the shim reads `points.len()` points from there, now and as long as the tree is kept, which is no
-        // longer than they are borrowed.
+        // SAFETY: the shim reads `points.len()` points from there, now and as long as the tree is kept, which
+        // is no longer than they are borrowed.
         let tree = unsafe { halflight_nanoflann_build(points.as_ptr(), points.len()) };
         NonNull::new(tree).map(|tree| Self { tree, points: PhantomData })
     }
 
-    /// Finds the `k` nearest points of `place` with a squared distance below `squared_radius`: how many there are.
+    /// Finds the `k` nearest points of `place` with a squared distance below `squared_radius`: how many there
+    /// are.
     pub fn nearest(&mut self, place: [f32; 3], k: usize, squared_radius: f32) -> usize {
         if k == 0 {
             return 0;

@@ -1,7 +1,7 @@
 //! The benefit of caustic photons, from the light paths of a prepass.
 //!
-//! Photons pay in two cases: they carry much of the light; or they carry a little of it that path tracing finds so
-//! rarely that it would be most of the noise, such as the caustic of a small glass in a large room.
+//! Photons pay in two cases: they carry much of the light; or they carry a little of it that path tracing
+//! finds so rarely that it would be most of the noise, such as the caustic of a small glass in a large room.
 
 use crate::transport::Pilot;
 use crate::transport::caustics::tracer::{BLOCKS, GuideSample};
@@ -10,23 +10,25 @@ use core::f64::consts::PI;
 /// Least fraction of the picture's light for which photons pay, of light that path tracing finds badly.
 const LEAST_SHARE: f64 = 3.5e-2;
 
-/// Least relative variance of that light by path tracing alone, over that of all other light, for which photons pay
-/// as well, and the fraction of light paths that the camera must see then: few photons are noise too.
+/// Least relative variance of that light by path tracing alone, over that of all other light, for which
+/// photons pay as well, and the fraction of light paths that the camera must see then: few photons are noise
+/// too.
 const LEAST_NOISE: f64 = 0.5;
 const LEAST_VISIBLE: f64 = 0.2;
 
-/// The parts of these limits from which on a first test is undecided. The test finds a half to twice the share, and a
-/// tenth of the visible paths as long as it has not learned which of many lights matter; half of that once more, as its
-/// sample is small.
+/// The parts of these limits from which on a first test is undecided. The test finds a half to twice the
+/// share, and a tenth of the visible paths as long as it has not learned which of many lights matter; half of
+/// that once more, as its sample is small.
 const DOUBT_SHARE: f64 = 0.25;
 const DOUBT_VISIBLE: f64 = 0.0625;
 
-/// Samples of a picture, and how often its paths must find light for this light to be noise. Light that is found less
-/// often is missing.
+/// Samples of a picture, and how often its paths must find light for this light to be noise. Light that is
+/// found less often is missing.
 const SAMPLES: f64 = 64.0;
 const LEAST_HITS: f64 = 4.0;
 
-/// Fraction of the picture's light from which on photons stay because path tracing never finds it. No pilot sees it.
+/// Fraction of the picture's light from which on photons stay because path tracing never finds it. No pilot
+/// sees it.
 const MOST_MISSING: f64 = 5e-3;
 
 /// Samples of a pilot. It does not see light that is found less often.
@@ -35,8 +37,8 @@ const PILOT_SAMPLES: f64 = 4.0 * 16.0 * 1024.0;
 /// Work of a path that gathers photons, relative to one that does not, for the same rays.
 const GATHERING: f64 = 1.3;
 
-/// Largest photon budget, relative to the usual one; and the ratio of the photons' light to all other from which on the
-/// budget grows.
+/// Largest photon budget, relative to the usual one; and the ratio of the photons' light to all other from
+/// which on the budget grows.
 const MOST_BUDGET: f64 = 4.0;
 const BUDGET_RATIO: f64 = 0.4;
 
@@ -77,8 +79,9 @@ pub(super) fn visible(found: &[GuideSample]) -> f64 {
     found.iter().filter(|path| path.light > 0.0).count() as f64 / found.len().max(1) as f64
 }
 
-/// Mean radiance that the light paths `found` bring to a picture of so many `pixels`, in discs of `radius` pixels, and
-/// that path tracing with `samples` of each pixel finds less often than `least` times in all. Sorts `found`.
+/// Mean radiance that the light paths `found` bring to a picture of so many `pixels`, in discs of `radius`
+/// pixels, and that path tracing with `samples` of each pixel finds less often than `least` times in all.
+/// Sorts `found`.
 pub(super) fn missing(
     found: &mut [GuideSample],
     radius: f64,
@@ -97,7 +100,8 @@ pub(super) fn missing(
     missing
 }
 
-/// Sorts `found` by the radiance of a hit; those that the camera sees. The order does not depend on that of `found`.
+/// Sorts `found` by the radiance of a hit; those that the camera sees. The order does not depend on that of
+/// `found`.
 fn brightest_first(found: &mut [GuideSample]) -> impl Iterator<Item = &GuideSample> {
     found.sort_unstable_by(|a, b| {
         let flash = b.flash.total_cmp(&a.flash).then(b.light.total_cmp(&a.light));
@@ -107,8 +111,8 @@ fn brightest_first(found: &mut [GuideSample]) -> impl Iterator<Item = &GuideSamp
 }
 
 impl Benefit {
-    /// By the light paths `found`, in discs of `radius` pixels, for a picture of so many `pixels` in which all other
-    /// light has a `mean` radiance. Sorts `found`.
+    /// By the light paths `found`, in discs of `radius` pixels, for a picture of so many `pixels` in which
+    /// all other light has a `mean` radiance. Sorts `found`.
     pub(super) fn new(found: &mut [GuideSample], radius: f64, pixels: f64, mean: f64) -> Self {
         // Power over the area of a disc, on a diffuse surface of albedo 0.5.
         let worth = found.iter().map(|path| f64::from(path.worth)).sum::<f64>();
@@ -149,9 +153,9 @@ impl Benefit {
         Self { share, visible, noise, rare, missing, mean }
     }
 
-    /// The photon budget, relative to the usual one. The relative variance of photons is that of the few photons of a
-    /// disc, and counts by the square of their share: the best number of light paths grows with the ratio of their
-    /// light to the other.
+    /// The photon budget, relative to the usual one. The relative variance of photons is that of the few
+    /// photons of a disc, and counts by the square of their share: the best number of light paths grows with
+    /// the ratio of their light to the other.
     pub(super) fn photon_budget(&self) -> f64 {
         (self.share / (BUDGET_RATIO * (1.0 - self.share))).clamp(1.0, MOST_BUDGET)
     }
@@ -175,7 +179,8 @@ impl Benefit {
         self.noise >= LEAST_NOISE * noise
     }
 
-    /// Variance and work of path tracing alone, whose `pilot` ran with path reuse or not, for a comparison with photons.
+    /// Variance and work of path tracing alone, whose `pilot` ran with path reuse or not, for a comparison
+    /// with photons.
     pub(super) fn path_tracing(&self, pilot: &Pilot, has_reuse: bool) -> PathTracingCost {
         // Light that is never found is not noise: without photons the picture would lack it.
         let rare = if self.missing >= MOST_MISSING { f64::INFINITY } else { self.rare };
@@ -193,8 +198,8 @@ pub(super) struct PathTracingCost {
 }
 
 impl PathTracingCost {
-    /// Whether the variance times the work is larger than that of paths with photons, by their `pilot`, whose light
-    /// paths take `light_rays` for each sample of a pixel.
+    /// Whether the variance times the work is larger than that of paths with photons, by their `pilot`, whose
+    /// light paths take `light_rays` for each sample of a pixel.
     pub(super) fn exceeds(&self, pilot: &Pilot, has_reuse: bool, light_rays: f64) -> bool {
         let work = GATHERING * pilot.work(has_reuse) + light_rays;
         pilot.scatter(has_reuse) * work < self.scatter * self.work

@@ -1,7 +1,8 @@
 //! Path tracing joined with caustic photons by vertex merging (Georgiev et al. 2012).
 //!
-//! A prepass learns where photons should go, and whether they pay; if not, the picture is path traced alone, with the
-//! same bits as without a prepass. An irradiance cache uses the same photons for its picture and its records.
+//! A prepass learns where photons should go, and whether they pay; if not, the picture is path traced alone,
+//! with the same bits as without a prepass. An irradiance cache uses the same photons for its picture and its
+//! records.
 
 mod benefit;
 mod emission;
@@ -45,8 +46,8 @@ pub fn are_possible(scene: &Scene) -> bool {
 pub struct CausticUse {
     /// They were.
     pub used: bool,
-    /// Estimated fraction of the picture's light that photons carry and path tracing finds badly; `None` without a
-    /// prepass.
+    /// Estimated fraction of the picture's light that photons carry and path tracing finds badly; `None`
+    /// without a prepass.
     pub share: Option<f64>,
     /// There was not enough memory for a prepass.
     pub lacks_memory: bool,
@@ -76,8 +77,8 @@ pub struct CausticPathTracing<'a, F> {
 }
 
 impl<'a, F: Features> CausticPathTracing<'a, F> {
-    /// `paths` joined with photons if a prepass finds that they pay. `None` if photons should carry all of the light,
-    /// by [`Decision::ProgressivePhotons`].
+    /// `paths` joined with photons if a prepass finds that they pay. `None` if photons should carry all of
+    /// the light, by [`Decision::ProgressivePhotons`].
     ///
     /// # Errors
     /// [`OutOfMemory`] where the executor's scratch is smaller than [`scratch`].

@@ -1,5 +1,5 @@
-//! The prepass of caustic photons: light paths aimed at all mirrors and dielectrics teach the emission guide which of
-//! them the camera sees, and show whether photons pay.
+//! The prepass of caustic photons: light paths aimed at all mirrors and dielectrics teach the emission guide
+//! which of them the camera sees, and show whether photons pay.
 
 use super::benefit::{Benefit, missing, visible};
 use super::emission::{CausticEmission, CausticSettings, FIRST_RADIUS, least_footprint, photon_tracer};
@@ -12,8 +12,8 @@ use crate::photon::Photons;
 use crate::transport::caustics::tracer::{GuideSample, PATHS};
 use crate::transport::{CausticMerging, RadiusSchedule};
 
-/// Light paths of the first test, which ends the prepass where there is next to nothing to find, and of each later
-/// step; where memory is short, fewer, but no fewer than those of the test.
+/// Light paths of the first test, which ends the prepass where there is next to nothing to find, and of each
+/// later step; where memory is short, fewer, but no fewer than those of the test.
 const FIRST_TEST: usize = 4 * PATHS;
 const STEP: usize = 32 * PATHS;
 
@@ -23,8 +23,9 @@ const LEARNED_MAP: u32 = 1;
 const BY_POWER_MAP: u32 = 2;
 const AUDIT_MAP: u32 = 0x7fff_ff00;
 
-/// Fraction of the picture's light from which on photons may carry all of it: path tracing finds next to none. The
-/// photons of that method are not aimed: so many of them must be visible, relative to those that are.
+/// Fraction of the picture's light from which on photons may carry all of it: path tracing finds next to
+/// none. The photons of that method are not aimed: so many of them must be visible, relative to those that
+/// are.
 const MOST_SHARE: f64 = 0.75;
 const LEAST_BY_POWER: f64 = 0.25;
 
@@ -48,8 +49,8 @@ pub enum Decision<'a> {
 pub struct Prepass<'a> {
     /// Choice for the picture.
     pub decision: Decision<'a>,
-    /// Estimated fraction of the picture's light that photons carry and path tracing finds badly; `None` if there was
-    /// not enough memory.
+    /// Estimated fraction of the picture's light that photons carry and path tracing finds badly; `None` if
+    /// there was not enough memory.
     pub share: Option<f64>,
     /// There was not enough memory for a prepass.
     pub lacks_memory: bool,
@@ -164,7 +165,8 @@ impl<F: Features, E: Executor> Learning<'_, '_, F, E> {
         Ok(if self.pays(&benefit)? { Learned::Photons(stats, benefit) } else { Learned::Paths })
     }
 
-    /// The benefit by the first `count` light paths, in a picture in which all other light has a `mean` radiance.
+    /// The benefit by the first `count` light paths, in a picture in which all other light has a `mean`
+    /// radiance.
     fn benefit(&mut self, count: usize, mean: f32) -> Benefit {
         let LightPaths { context, found, .. } = &mut self.light_paths;
         let found = found.get_mut(..count).unwrap_or_default();
@@ -173,8 +175,9 @@ impl<F: Features, E: Executor> Learning<'_, '_, F, E> {
         benefit
     }
 
-    /// Mean radiance of light that photons of `sampler` do not carry. It is not that of the picture: a visible lamp, or
-    /// a path that meets one through glass, may be nearly all of that, or be absent by chance.
+    /// Mean radiance of light that photons of `sampler` do not carry. It is not that of the picture: a
+    /// visible lamp, or a path that meets one through glass, may be nearly all of that, or be absent by
+    /// chance.
     fn other_light(&mut self, sampler: &EmissionSampler) -> Result<f32, OutOfMemory> {
         let LightPaths { radii, beside_records, ref found, ref mut executor, .. } = self.light_paths;
         // Weights alone: an empty map adds no light.
@@ -204,8 +207,8 @@ struct LightPaths<'p, E> {
 }
 
 impl<E: Executor> LightPaths<'_, E> {
-    /// Replaces what was found by `count` light paths of `sampler`, those of a `map`. If the executor ends early, the
-    /// paths that are missing found nothing.
+    /// Replaces what was found by `count` light paths of `sampler`, those of a `map`. If the executor ends
+    /// early, the paths that are missing found nothing.
     fn trace<F: Features>(
         &mut self,
         sampler: &EmissionSampler,
@@ -231,8 +234,9 @@ pub fn unseen_footprint(lights: &LightSampler) -> Footprint {
     EmissionSampler::footprint(lights).slice::<GuideSample>(STEP)
 }
 
-/// Estimated fraction of the picture's light that photons find and path tracing with `samples` of each pixel hardly ever
-/// does: that of very small lights by mirrors and dielectrics. `None` if it is zero, or without memory.
+/// Estimated fraction of the picture's light that photons find and path tracing with `samples` of each pixel
+/// hardly ever does: that of very small lights by mirrors and dielectrics. `None` if it is zero, or without
+/// memory.
 ///
 /// # Errors
 /// [`OutOfMemory`] where the executor's scratch is smaller than [`scratch`](super::scratch).

@@ -1,5 +1,5 @@
-//! A room that a spot light lights by way of a mirror: photons pay, whatever the rounds; with little memory the room is
-//! path traced alone.
+//! A room that a spot light lights by way of a mirror: photons pay, whatever the rounds; with little memory
+//! the room is path traced alone.
 
 use super::{CausticPathTracing, CausticSettings, CausticUse, scratch, unseen, unseen_footprint};
 use crate::Rgb;

@@ -22,7 +22,8 @@ const PILOT_PIXELS: usize = 1 << 18;
 /// Points of a pilot where there is no time for more: it may end after the picture's time.
 const SHORT_PILOT_POINTS: usize = PILOT_POINTS / 16;
 
-/// Fractions of the picture's time after which the pilot ends, and the points that tell what a sample costs.
+/// Fractions of the picture's time after which the pilot ends, and the points that measure the cost of a
+/// sample.
 const PILOT_TIME: f32 = 0.4;
 const MEASURED_TIME: f32 = 0.6;
 
@@ -33,8 +34,8 @@ const CELLS: usize = PIXELS_PER_TILE / CELL;
 const LEAST_LEVEL: f32 = 0.1;
 
 impl<'a, F: Features> Metropolis<'a, F> {
-    /// Finds a rough picture, how much light paths of each length bring to chains, and how many chains there is
-    /// time for in a sample. Where there is no time for that, path tracing has all light that it can find.
+    /// Finds a rough picture, how much light paths of each length bring to chains, and how many chains there
+    /// is time for in a sample. Where there is no time for that, path tracing has all light that it can find.
     pub(super) fn pilot(
         &mut self,
         levels: &'a mut [f32],
@@ -110,8 +111,8 @@ impl<'a, F: Features> Metropolis<'a, F> {
     }
 
     /// Makes of `levels`, the light of `passes` passes of chains in each cell, its mean radiance with the
-    /// light that is not for chains. In large pictures a run of tiles has one level, by the paths of its first
-    /// tile. Whether the executor was not over.
+    /// light that is not for chains. In large pictures a run of tiles has one level, by the paths of its
+    /// first tile. Whether the executor was not over.
     fn measure_levels(
         &self,
         levels: &mut [f32],

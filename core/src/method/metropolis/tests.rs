@@ -1,4 +1,5 @@
-//! The mean of path tracing for every choice; the same bits for any division into rounds; errors where memory is short.
+//! The mean of path tracing for every choice; the same bits for any division into rounds; errors where memory
+//! is short.
 
 use super::{ChainUse, Metropolis, MetropolisSettings, Plan, PrimarySpace};
 use crate::Rgb;

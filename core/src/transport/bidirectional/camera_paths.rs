@@ -46,7 +46,7 @@ pub struct CameraPaths<'a, F> {
     pub(super) merging: Option<Merging<'a>>,
 }
 
-/// What was recorded of a sample of a tile.
+/// Counts of a recorded sample of a tile.
 pub struct Recorded {
     /// Contributions in the list.
     pub contributions: usize,
@@ -78,7 +78,7 @@ impl<'a, F: Features> CameraPaths<'a, F> {
         Self { context, emission, settings, counts, connections, merging: None }
     }
 
-    /// The same, merged with photons.
+    /// Camera paths that are merged with photons as well.
     pub fn with_merging(self, merging: Option<Merging<'a>>) -> Self {
         Self { merging, ..self }
     }

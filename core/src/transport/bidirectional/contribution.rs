@@ -22,7 +22,7 @@ impl Class {
     const ALL: [Self; CLASSES] = [Self::Paths, Self::Splats, Self::Connections, Self::Merges];
 }
 
-/// What one sample of a technique has brought to a pixel, its weight included.
+/// Light of one sample of a technique in a pixel, its weight included.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct Contribution {
@@ -33,7 +33,7 @@ pub struct Contribution {
 }
 
 impl Contribution {
-    /// Of a technique of `class` to pixel number `place` of the tile, below 2²⁴.
+    /// Contribution of a technique of `class` to pixel number `place` of the tile, below 2²⁴.
     pub fn new(class: Class, place: u32, value: f32) -> Self {
         Self { key: place | (class as u32) << 24, value }
     }

@@ -1,8 +1,8 @@
 //! Rendering methods: names, properties, interface and setup.
 //!
 //! A round consists of passes over a method's structures and of tiles of the picture, all run in parallel
-//! ("The unit of work" in docs/architecture.md). A new method needs a variant of [`Method`] with its texts and
-//! a line in [`Method::with`].
+//! ("The unit of work" in docs/architecture.md). A new method needs a variant of [`Method`] with its texts
+//! and a line in [`Method::with`].
 
 mod adapter;
 mod bidirectional;

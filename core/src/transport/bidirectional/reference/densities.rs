@@ -18,7 +18,7 @@ type Techniques = [f64; MOST_SEGMENTS + 2];
 /// Number of the merge among them.
 const MERGE: usize = MOST_SEGMENTS + 1;
 
-/// Where a path begins.
+/// Start of a path.
 #[derive(Clone, Copy, Default)]
 pub(super) struct Light {
     /// Number of the light.
@@ -75,8 +75,8 @@ pub(super) struct Path {
 }
 
 impl Path {
-    /// Of the vertices of a light subpath, and those of a camera subpath from the lens on, whose ends are
-    /// connected: neither end is left by a delta lobe. `None` where they are too many.
+    /// Path of the vertices of a light subpath, and those of a camera subpath from the lens on, whose ends
+    /// are connected: neither end is left by a delta lobe. `None` where they are too many.
     pub(super) fn joined(
         light: Light,
         from_light: &[PathVertex],
@@ -219,7 +219,7 @@ impl Reference<'_> {
             let back = if b == k { pixel } else { at[b].pdf[1] };
             let cos_a = if a == 0 { cos_light } else { at[a].cos[1] };
             let cos_b = if b == k { 1.0 } else { at[b].cos[0] };
-            // Of an environment the first measure is that of directions.
+            // The first measure of an environment is that of directions.
             let squared = match a {
                 0 if path.light.position.is_none() => 1.0,
                 _ if b == k => lens_squared,
