@@ -40,7 +40,9 @@ pub(crate) fn with_room(
     let lights = (0..lights % 4).map(|_| light(input)).collect::<Result<Vec<_>>>()?;
     let radiance = Rgb::splat(0.5);
     let environment = (sky & 1 > 0).then_some(Environment { radiance, map: None, to_map: Mat3::IDENTITY });
-    let mut camera = Camera::look_at(Vec3::from(place(input)?), Vec3::from(place(input)?), Vec3::Y, 70.0);
+    // Off the planes of surfaces, in which the textbook has no density of a splat.
+    let eye = Vec3::from(place(input)?) + Vec3::new(0.0077, 0.0029, 0.0113);
+    let mut camera = Camera::look_at(eye, Vec3::from(place(input)?), Vec3::Y, 70.0);
     if sky & 2 > 0 {
         camera.lens_radius = 0.1;
     }
@@ -81,9 +83,12 @@ fn place(input: &mut Unstructured) -> Result<[f32; 3]> {
     Ok(input.arbitrary::<[u8; 3]>()?.map(|x| f32::from(x % 32) / 12.0 - 0.3))
 }
 
+/// Offset of lights from the grid of corners, in no direction that two corners have.
+const OFF_PLANES: Vec3 = Vec3::new(0.0131, 0.0177, 0.0073);
+
 fn light(input: &mut Unstructured) -> Result<PointLight> {
     // Off the planes of surfaces, where the irradiance would be infinite.
-    let (position, towards) = (Vec3::from(place(input)?) + 0.0131, Vec3::from(place(input)?));
+    let (position, towards) = (Vec3::from(place(input)?) + OFF_PLANES, Vec3::from(place(input)?));
     let direction = (towards - position).normalize_or(Vec3::NEG_Y);
     let intensity = Rgb::splat([1.0, 0.0, 1e10, 1e-10][usize::from(input.arbitrary::<u8>()? % 4)]);
     Ok(match input.arbitrary::<u8>()? % 3 {
