@@ -1,5 +1,5 @@
-//! Batch kernels of ray traversal, of derivatives of irradiance and of photon maps, each with a scalar
-//! reference.
+//! Batch kernels of ray traversal, of coefficients and derivatives of incident light, and of photon maps, each
+//! with a scalar reference.
 
 pub mod boxes;
 pub mod cells;
@@ -7,6 +7,7 @@ pub mod edge;
 pub mod eigen;
 pub mod jumps;
 pub mod mesh;
+pub mod outer;
 pub mod points;
 pub mod push;
 pub mod select;
