@@ -2,3 +2,4 @@
 
 pub mod irradiance;
 mod octree;
+pub mod radiance;
