@@ -2,7 +2,7 @@
 
 use super::RenderError;
 use super::memory::Memory;
-use super::method::Stage;
+use super::method::RenderSetup;
 use super::threads::Threads;
 use halflight_core::bsdf::Features;
 use halflight_core::findings::Decision::{LeftOut, Used};
@@ -11,13 +11,13 @@ use halflight_core::light::LightSampler;
 use halflight_core::method::environment_visibility::{footprint, learn as learn_visibility, scratch};
 use halflight_core::transport::{PathIntegrator, path::WAVE};
 
-/// Lights of `stage`, with environment visibility if there is an environment and visibility pays or is
+/// Lights of `setup`, with environment visibility if there is an environment and visibility pays or is
 /// requested.
 pub(super) fn learn<'a, F: Features>(
-    stage: &Stage<'a>,
+    setup: &RenderSetup<'a>,
     memory: &mut Memory<'a>,
 ) -> Result<(LightSampler<'a>, Option<Finding>), RenderError> {
-    let Stage { lights, settings, workers, .. } = *stage;
+    let RenderSetup { lights, settings, workers, .. } = *setup;
     let wanted = settings.environment_visibility;
     if wanted == Some(false) || lights.environment_is_constant().is_none() {
         return Ok((*lights, None));
@@ -31,7 +31,7 @@ pub(super) fn learn<'a, F: Features>(
     }
     let mut scratch = memory.take_each("look at the sky", scratch::<F>(), workers.count())?;
     let mut executor = Threads::new(workers, &mut scratch);
-    let (lights, gain) = learn_visibility::<F>(&stage.context(), wanted, memory, &mut executor)?;
+    let (lights, gain) = learn_visibility::<F>(&setup.context(), wanted, memory, &mut executor)?;
     memory.give_back("look at the sky");
     let used = lights.has_visibility();
     if !used {

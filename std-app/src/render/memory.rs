@@ -46,14 +46,14 @@ impl<'m> Memory<'m> {
         memory
     }
 
-    /// The same accounts for memory of another `bank`, until [`Memory::rejoin`].
-    pub(super) fn within<'n>(&mut self, bank: &'n Bank) -> Memory<'n> {
-        Memory { bank, uses: core::mem::take(&mut self.uses), ..*self }
+    /// Memory of another `bank`, counted from the bytes in use.
+    pub(super) fn within<'n>(&self, bank: &'n Bank) -> Memory<'n> {
+        Memory { bank, uses: self.uses.clone(), ..*self }
     }
 
-    /// Takes over the counts of memory from [`Memory::within`].
-    pub(super) fn rejoin(&mut self, other: Memory) {
-        (self.uses, self.peak) = (other.uses, other.peak);
+    /// Takes over the peak of memory from [`Memory::within`], whose bank is to be dropped.
+    pub(super) fn release(&mut self, other: &Memory) {
+        self.peak = self.peak.max(other.peak);
     }
 
     /// Bytes available for reading a file.
@@ -74,8 +74,7 @@ impl<'m> Memory<'m> {
         let needed = self.needed(footprint)?;
         let count = footprint.bytes().div_ceil(ALIGNMENT);
         let mut lines = Vec::new();
-        let failed = |_| OutOfMemory { needed, available: self.total() };
-        lines.try_reserve_exact(count).map_err(failed)?;
+        lines.try_reserve_exact(count).map_err(|_| self.refusal(needed))?;
         lines.resize(count, Line([0; ALIGNMENT]));
         self.count(structure, footprint);
         Ok(lines)
@@ -99,8 +98,7 @@ impl<'m> Memory<'m> {
         footprint: Footprint,
     ) -> Result<Pages, RenderError> {
         let needed = self.needed(footprint)?;
-        let failed = |_| RenderError::Memory { needed, available: self.total() };
-        let pages = Pages::new(footprint).map_err(failed)?;
+        let pages = Pages::new(footprint).map_err(|_| self.refusal(needed))?;
         self.count(structure, footprint);
         Ok(pages)
     }
@@ -112,6 +110,11 @@ impl<'m> Memory<'m> {
             true => Err(OutOfMemory { needed, available: self.hard_limit }),
             false => Ok(needed),
         }
+    }
+
+    /// Error of a system that refuses memory: the bytes that it has given are all that are available.
+    fn refusal(&self, needed: usize) -> OutOfMemory {
+        OutOfMemory { needed, available: self.total() }
     }
 
     fn count(&mut self, structure: &'static str, footprint: Footprint) {
@@ -203,4 +206,39 @@ fn scene_bytes(scene: &Scene) -> usize {
         + size_of_val(scene.materials)
         + size_of_val(scene.lights)
         + textures.sum::<usize>()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn memory(bank: &Bank, limit: usize) -> Memory<'_> {
+        Memory { bank, limit: Some(limit), hard_limit: limit, uses: Vec::new(), peak: 0 }
+    }
+
+    #[test]
+    fn an_error_compares_all_bytes_needed_with_the_limit_or_with_the_bytes_that_the_system_gave() {
+        let (bank, bytes) = (Bank::new(), |bytes| Footprint::default().slice::<u8>(bytes));
+        let mut memory = memory(&bank, 1 << 62);
+        memory.take("film", bytes(1 << 20)).unwrap();
+        let beyond = RenderError::Memory { needed: (1 << 20) + (1 << 62), available: 1 << 62 };
+        assert_eq!(memory.take("lights", bytes(1 << 62)).err(), Some(beyond));
+        let refused = RenderError::Memory { needed: (1 << 20) + (1 << 61), available: 1 << 20 };
+        assert_eq!(memory.take("lights", bytes(1 << 61)).err().as_ref(), Some(&refused));
+        assert_eq!(memory.take_pages("bvh", bytes(1 << 61)).err().as_ref(), Some(&refused));
+        assert_eq!((memory.total(), memory.peak()), (1 << 20, 1 << 20));
+    }
+
+    #[test]
+    fn released_memory_is_in_the_peak_alone() {
+        let (bank, bytes) = (Bank::new(), |bytes| Footprint::default().slice::<u8>(bytes));
+        let mut memory = memory(&bank, 1 << 30);
+        memory.take("film", bytes(64)).unwrap();
+        let own = Bank::new();
+        let mut other = memory.within(&own);
+        other.take("photons", bytes(128)).unwrap();
+        assert_eq!(other.available(), (1 << 30) - 192);
+        memory.release(&other);
+        assert_eq!((memory.available(), memory.peak()), ((1 << 30) - 64, 192));
+    }
 }

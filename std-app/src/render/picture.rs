@@ -5,7 +5,7 @@ use super::error_report::ErrorReport;
 use super::film_file::{self, Header, Identity, Reader};
 use super::gaps::{self, Sketch};
 use super::history::{Clock, Reference, Round};
-use super::method::{Method, Renderer, Stage};
+use super::method::{Method, RenderSetup, Renderer};
 use super::rejected_tiles::{self, empty_pixels};
 use super::rewritten_file::RewrittenFile;
 use super::rounds::{Plan, Rounds};
@@ -34,7 +34,7 @@ const ESTIMATING: f64 = 1e-7;
 /// A picture to be rendered.
 pub(super) struct Picture<'a> {
     pub(super) method: Method,
-    pub(super) stage: Stage<'a>,
+    pub(super) setup: RenderSetup<'a>,
     pub(super) state: RenderState<'a>,
     pub(super) audit: Option<Audit<'a>>,
     pub(super) identity: Identity,
@@ -83,8 +83,8 @@ struct Progressive<'a> {
 
 impl<'a> Progressive<'a> {
     fn new(mut picture: Picture<'a>) -> Result<Self, RenderError> {
-        let Picture { method, stage, state, audit, resumed, clock, .. } = &mut picture;
-        let settings = stage.settings;
+        let Picture { method, setup, state, audit, resumed, clock, .. } = &mut picture;
+        let settings = setup.settings;
         state.is_correlated = method.shares();
         let (rounds, history) = match resumed.take() {
             None => (Rounds::new(settings.stop), Vec::new()),
@@ -103,7 +103,7 @@ impl<'a> Progressive<'a> {
         let pixels = f64::from(settings.width) * f64::from(settings.height);
         let latest = history.iter().rev().find_map(|round| round.error);
         let file = settings.checkpoint.as_ref().map(|checkpoint| checkpoint.path.as_path());
-        let estimating = ESTIMATING * pixels / stage.workers.count() as f64;
+        let estimating = ESTIMATING * pixels / setup.workers.count() as f64;
         Ok(Self {
             picture,
             rounds,
@@ -133,12 +133,12 @@ impl<'a> Progressive<'a> {
             true => self.estimate(renderer)?,
             false => None,
         };
-        let Picture { stage, state, clock, .. } = &mut self.picture;
+        let Picture { setup, state, clock, .. } = &mut self.picture;
         let (seconds, spp) = (clock.seconds(), self.rounds.spp());
         let reference = self.reference.as_ref().map(|r| clock.pause(|| r.compare(&image(&state.film))));
         self.history.push(Round { seconds, spp, rays: state.counters.all_rays(), error, reference });
         let is_due = |every: f64| self.saved.elapsed().as_secs_f64() >= every;
-        let checkpoint = stage.settings.checkpoint.as_ref();
+        let checkpoint = setup.settings.checkpoint.as_ref();
         if plan.first || checkpoint.is_some_and(|checkpoint| is_due(checkpoint.every)) {
             self.write_film(seconds, None);
             self.saved = Instant::now();
@@ -151,7 +151,7 @@ impl<'a> Progressive<'a> {
     }
 
     fn add_samples(&mut self, plan: &Plan, renderer: &mut dyn Renderer) -> Result<(), RenderError> {
-        let Picture { stage: Stage { workers, .. }, state, clock, .. } = &mut self.picture;
+        let Picture { setup: RenderSetup { workers, .. }, state, clock, .. } = &mut self.picture;
         let now = clock.seconds();
         // A time beyond the range of the clock is no deadline.
         let later = |at: f64| Duration::try_from_secs_f64((at - now).max(0.0)).ok();
@@ -171,8 +171,8 @@ impl<'a> Progressive<'a> {
     fn estimate(&mut self, renderer: &mut dyn Renderer) -> Result<Option<ErrorEstimate>, RenderError> {
         self.step_audit(renderer)?;
         let start = Instant::now();
-        let Picture { stage, state, audit, .. } = &mut self.picture;
-        let mut report = ErrorReport::new(stage.workers, state, audit.as_ref());
+        let Picture { setup, state, audit, .. } = &mut self.picture;
+        let mut report = ErrorReport::new(setup.workers, state, audit.as_ref());
         self.estimating = start.elapsed().as_secs_f64();
         self.estimated += self.estimating;
         report = self.extend_audit(report, renderer)?;
@@ -193,7 +193,8 @@ impl<'a> Progressive<'a> {
 
     /// Takes the samples of the audit that are due.
     fn step_audit(&mut self, renderer: &mut dyn Renderer) -> Result<(), RenderError> {
-        let Picture { stage: Stage { settings, workers, .. }, state, audit, clock, .. } = &mut self.picture;
+        let Picture { setup: RenderSetup { settings, workers, .. }, state, audit, clock, .. } =
+            &mut self.picture;
         let Some(audit) = audit else { return Ok(()) };
         let left = settings.stop.seconds.map(|limit| limit - self.estimating - clock.seconds());
         let work = (state.counters.all_rays(), clock.seconds());
@@ -210,8 +211,8 @@ impl<'a> Progressive<'a> {
         report: ErrorReport,
         renderer: &mut dyn Renderer,
     ) -> Result<ErrorReport, RenderError> {
-        let Picture { stage, state, audit, clock, progress, interrupt, .. } = &mut self.picture;
-        let (Stage { settings, workers, .. }, rounds) = (*stage, &self.rounds);
+        let Picture { setup, state, audit, clock, progress, interrupt, .. } = &mut self.picture;
+        let (RenderSetup { settings, workers, .. }, rounds) = (*setup, &self.rounds);
         let Some(audit) = audit else { return Ok(report) };
         if let Some(audited) = &report.audited {
             audit.reduce_pixels(audited, (state.counters.all_rays(), rounds.spp()));
@@ -276,7 +277,7 @@ impl<'a> Progressive<'a> {
         let is_open = self.picture.audit.is_some() && !(interrupted || is_known);
         // The film of a shard is written after the last audit samples, which belong to the merged audit.
         // Otherwise the film is written before them, so that a resumed render takes the same samples.
-        let is_last = !is_open || self.picture.stage.settings.shard == Shard::WHOLE;
+        let is_last = !is_open || self.picture.setup.settings.shard == Shard::WHOLE;
         let seconds = self.picture.clock.seconds();
         self.write_film(seconds, is_last.then_some(patience));
         self.picture.clock.pause(|| renderer.finish(patience));
@@ -287,9 +288,9 @@ impl<'a> Progressive<'a> {
             self.write_film(self.picture.clock.seconds(), Some(patience));
         }
         let start = Instant::now();
-        let Picture { stage, state, audit, .. } = &self.picture;
+        let Picture { setup, state, audit, .. } = &self.picture;
         let report =
-            self.report.take().unwrap_or_else(|| ErrorReport::new(stage.workers, state, audit.as_ref()));
+            self.report.take().unwrap_or_else(|| ErrorReport::new(setup.workers, state, audit.as_ref()));
         self.estimated += start.elapsed().as_secs_f64();
         self.result(report, renderer, interrupted)
     }
@@ -300,8 +301,8 @@ impl<'a> Progressive<'a> {
         renderer: &mut dyn Renderer,
         interrupted: bool,
     ) -> Result<RenderResult, RenderError> {
-        let Picture { method, stage, state, clock, sketch, .. } = &self.picture;
-        let Stage { settings, workers, .. } = *stage;
+        let Picture { method, setup, state, clock, sketch, .. } = &self.picture;
+        let RenderSetup { settings, workers, .. } = *setup;
         let render = clock.seconds();
         let error = report.error();
         if let Some(last) = self.history.last_mut() {

@@ -5,7 +5,7 @@ use super::deadline::Deadline;
 use super::film_file::{Identity, Reader};
 use super::history::Clock;
 use super::memory::{Bank, Memory};
-use super::method::{Method, Stage};
+use super::method::{self, Attempt, Method, Plan, RenderSetup};
 use super::picture::Picture;
 use super::workers::Workers;
 use super::{
@@ -50,9 +50,8 @@ impl WithFeatures for Render<'_> {
         let chosen = |method: &Method| *method == Method::ProgressivePhotons;
         let of_film = resumed.as_ref().and_then(|film| film.header.method()).filter(chosen);
         let method = if settings.method.is_some() { method } else { of_film.unwrap_or(method) };
-        let identity = |method: Method| {
-            Identity::of(scene, method.name(), &path_settings(settings), settings, cache.clone())
-        };
+        let identity =
+            |method: Method| Identity::of(scene, method, &path_settings(settings), settings, cache.clone());
         if let Some(film) = &resumed {
             film.check(&identity(method), settings.shard)?;
         }
@@ -79,32 +78,47 @@ impl WithFeatures for Render<'_> {
         let workers = workers.ending_at(Deadline::until(interrupt).within(left));
         let mut film_arena = Arena::new(bytemuck::cast_slice_mut(&mut film_lines));
         let state = RenderState::new(width, height, settings.shard, &mut film_arena)?;
-        let plain = Stage { scene, bvh: &bvh, lights: &lights, settings, workers: &workers };
+        let plain = RenderSetup { scene, bvh: &bvh, lights: &lights, settings, workers: &workers };
         let (lights, visibility) = environment_visibility::learn::<F>(&plain, &mut memory)?;
-        let stage = Stage { scene, bvh: &bvh, lights: &lights, settings, workers: &workers };
-        let plain = stage.paths::<F>(settings.seed);
+        let setup = RenderSetup { scene, bvh: &bvh, lights: &lights, settings, workers: &workers };
+        let plain = setup.paths::<F>(settings.seed);
         let sketch = |workers: &Workers| gaps::sketch(&plain, [width, height], workers);
-        method.with::<F, _>(&stage, &mut memory, |renderer, memory| {
+        let mut plan = Plan::from(method);
+        loop {
+            let bank = Bank::new();
+            let mut own = memory.within(&bank);
+            let mut renderer = match method::set_up::<F>(plan, &setup, &mut own)? {
+                Attempt::Ready(renderer) => renderer,
+                Attempt::Instead(better) => {
+                    memory.release(&own);
+                    plan = better;
+                    continue;
+                }
+            };
             let method = renderer.chosen();
-            let identity = identity(method);
-            let audit = Audit::new::<F>(&stage, memory, method)?;
             let picture = Picture {
                 method,
-                stage,
+                setup,
                 state,
-                audit,
-                identity,
+                audit: Audit::new::<F>(&setup, &mut own, method)?,
+                identity: identity(method),
                 resumed,
                 clock,
                 sketch: &sketch,
                 progress,
                 interrupt,
             };
-            let done = picture.render(renderer)?;
+            let done = picture.render(&mut *renderer)?;
             let seconds = Seconds { build, ..done.seconds };
             let findings = Findings::default().and(visibility).and(done.findings);
-            Ok(RenderResult { memory: memory.uses(), memory_peak: memory.peak(), seconds, findings, ..done })
-        })
+            return Ok(RenderResult {
+                memory: own.uses(),
+                memory_peak: own.peak(),
+                seconds,
+                findings,
+                ..done
+            });
+        }
     }
 }
 

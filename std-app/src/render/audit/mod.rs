@@ -8,7 +8,7 @@ mod verdict;
 pub use verdict::{Audited, Region};
 
 use super::memory::Memory;
-use super::method::{Method, Stage};
+use super::method::{Method, RenderSetup};
 use super::threads::Threads;
 use super::workers::Workers;
 use super::{ErrorEstimate, RenderError, Settings, Shard};
@@ -121,25 +121,25 @@ fn share(settings: &Settings, is_biased: bool) -> Option<f64> {
 impl<'a> Audit<'a> {
     /// Sets up the audit that the settings ask for.
     pub(super) fn new<F: Features>(
-        stage: &Stage<'a>,
+        setup: &RenderSetup<'a>,
         memory: &mut Memory,
         method: Method,
     ) -> Result<Option<Self>, RenderError> {
-        let Stage { settings, workers, .. } = *stage;
+        let RenderSetup { settings, workers, .. } = *setup;
         let Some(share) = share(settings, method.is_biased()) else { return Ok(None) };
         let mut scratch = memory.take_each("audit", scratch::<F>(), workers.count())?;
         // Pixels are counted but not taken here: they stay where film files can find them.
         let pixels = choice::count(settings.width, settings.height);
         memory.set_aside("audit", Footprint::default().slice::<Pixel>(pixels))?;
         let seed = settings.seed ^ AUDIT_SEED;
-        let tracer = stage.paths::<F>(seed);
+        let tracer = setup.paths::<F>(seed);
         // Other methods lend the audit their photons, or find no more light than its paths.
         let samples =
             VISIBILITY_SAMPLES * pixels as f64 / (f64::from(settings.width) * f64::from(settings.height));
         let unseen = match method.finds_caustics() {
             true => {
                 let mut executor = Threads::new(workers, &mut scratch);
-                unseen::<F>(&stage.context(), samples, memory, &mut executor)?.unwrap_or(0.0)
+                unseen::<F>(&setup.context(), samples, memory, &mut executor)?.unwrap_or(0.0)
             }
             false => 0.0,
         };
@@ -160,8 +160,8 @@ impl<'a> Audit<'a> {
     }
 
     /// Bytes that the audit will take; methods that take all available memory leave them free.
-    pub(super) fn bytes<F: Features>(stage: &Stage, is_biased: bool) -> usize {
-        let Stage { settings, workers, lights, .. } = *stage;
+    pub(super) fn bytes<F: Features>(setup: &RenderSetup, is_biased: bool) -> usize {
+        let RenderSetup { settings, workers, lights, .. } = *setup;
         if share(settings, is_biased).is_none() {
             return 0;
         }

@@ -29,45 +29,27 @@ impl Identity {
     /// Identity of a render; `loaded` is the fingerprint of the cache it begins with.
     pub(in crate::render) fn of(
         scene: &Scene,
-        method: &str,
+        method: Method,
         paths: &PathSettings,
         settings: &Settings,
         loaded: Option<String>,
     ) -> Self {
-        let cached = method == Method::IrradianceCache.name();
-        let mut cache = if cached { format!(", {:?}", settings.cache) } else { String::new() };
+        let mut own = method.own_settings(settings);
         if let Some(loaded) = loaded {
-            cache += &format!(", loaded {loaded}");
+            own += &format!(", loaded {loaded}");
         }
-        if let Some(Method::PhotonMap | Method::ProgressivePhotons) = Method::named(method) {
-            cache += &format!(", {:?}", settings.photons);
-        }
-        if let Some(Method::LightTracing | Method::Bidirectional | Method::VertexMerging) =
-            Method::named(method)
-        {
-            cache += &format!(", {:?}", settings.bidirectional);
-        }
-        if let Some(Method::InstantRadiosity | Method::ClampedInstantRadiosity) = Method::named(method) {
-            cache += &format!(", {:?}", settings.virtual_lights);
-        }
-        if let Some(Method::Metropolis) = Method::named(method) {
-            cache += &format!(", {:?}", settings.metropolis);
-        }
-        // Bidirectional methods fall back to paths.
-        let joining = [Method::Path, Method::IrradianceCache, Method::Bidirectional, Method::VertexMerging];
-        let may_join = joining.map(Method::name).contains(&method);
-        let joined = may_join && settings.caustics;
+        let joined = settings.caustics && method.may_join_caustics();
         let caustics = if joined { ", caustics" } else { "" };
         Self {
             version: env!("CARGO_PKG_VERSION").into(),
-            method: method.into(),
+            method: method.name().into(),
             width: paths.width,
             height: paths.height,
             seed: paths.seed,
             max_depth: settings.max_depth,
             reuse: settings.reuse,
             windows: settings.environment_visibility,
-            settings: format!("{paths:?}{cache}{caustics}"),
+            settings: format!("{paths:?}{own}{caustics}"),
             scene: fingerprint::scene(scene),
             camera: fingerprint::camera(&scene.camera),
         }

@@ -1,7 +1,7 @@
 //! A method of the core on the threads of the program.
 
 use super::photon_view::{self, PhotonView};
-use super::{Method, Renderer, Stage};
+use super::{Method, RenderSetup, Renderer};
 use crate::render::RenderError;
 use crate::render::audit::Audit;
 use crate::render::memory::Memory;
@@ -14,7 +14,7 @@ use halflight_core::method;
 
 /// A method with working memory for each thread.
 pub(super) struct Adapter<'a, F, M> {
-    stage: Stage<'a>,
+    setup: RenderSetup<'a>,
     method: M,
     scratch: Vec<Vec<Line>>,
     chosen: Method,
@@ -22,22 +22,29 @@ pub(super) struct Adapter<'a, F, M> {
 }
 
 impl<'a, F: Features, M: method::Method> Adapter<'a, F, M> {
-    /// The method that `new` makes with `scratch` for each thread, beside the bytes that the audit will take.
-    pub(super) fn new(
-        stage: &Stage<'a>,
+    /// The method that `new` makes with `scratch` for each thread, besides the bytes that the audit will take.
+    pub(super) fn boxed<'s: 'a>(
+        setup: &RenderSetup<'s>,
         memory: &mut Memory<'a>,
         (chosen, scratch): (Method, Footprint),
         new: impl FnOnce(&mut Memory<'a>, &mut Threads, usize) -> Result<M, OutOfMemory>,
-    ) -> Result<Self, RenderError> {
-        let mut scratch = memory.take_each("paths", scratch, stage.workers.count())?;
-        let reserve = Audit::bytes::<F>(stage, chosen.is_biased());
-        let method = new(memory, &mut Threads::new(stage.workers, &mut scratch), reserve)?;
-        Ok(Self::with(stage, (chosen, scratch), method))
+    ) -> Result<Box<dyn Renderer + 'a>, RenderError>
+    where
+        M: 'a,
+    {
+        let mut scratch = memory.take_each("paths", scratch, setup.workers.count())?;
+        let reserve = Audit::bytes::<F>(setup, chosen.is_biased());
+        let method = new(memory, &mut Threads::new(setup.workers, &mut scratch), reserve)?;
+        Ok(Box::new(Self::with(setup, (chosen, scratch), method)))
     }
 
     /// A method that is set up.
-    pub(super) fn with(stage: &Stage<'a>, (chosen, scratch): (Method, Vec<Vec<Line>>), method: M) -> Self {
-        Self { stage: *stage, method, scratch, chosen, features: PhantomData }
+    pub(super) fn with(
+        setup: &RenderSetup<'a>,
+        (chosen, scratch): (Method, Vec<Vec<Line>>),
+        method: M,
+    ) -> Self {
+        Self { setup: *setup, method, scratch, chosen, features: PhantomData }
     }
 }
 
@@ -51,7 +58,7 @@ impl<F: Features, M: method::Method> Renderer for Adapter<'_, F, M> {
     }
 
     fn photon_view(&mut self) -> Result<Option<PhotonView>, RenderError> {
-        Ok(photon_view::render::<F>(&self.stage, &self.method.last_maps()?)?)
+        Ok(photon_view::render::<F>(&self.setup, &self.method.last_maps()?)?)
     }
 
     fn findings(&self) -> Findings {

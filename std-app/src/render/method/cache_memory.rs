@@ -1,6 +1,6 @@
 //! Memory of irradiance caching besides records and photons: tables of strata, and working memory of threads.
 
-use super::{Method, Stage};
+use super::{Method, RenderSetup};
 use crate::render::audit::Audit;
 use halflight_core::bsdf::Features;
 use halflight_core::memory::Footprint;
@@ -9,14 +9,14 @@ use halflight_core::method::irradiance_cache::{CacheSettings, IrradianceCaching}
 use halflight_core::method::record_placement::CacheBuilder;
 
 /// Settings of a picture's caches with room for at least `fewest` records each.
-pub(super) fn settings<F: Features>(stage: &Stage, fewest: usize) -> CacheSettings {
-    let Stage { settings, .. } = *stage;
+pub(super) fn settings<F: Features>(setup: &RenderSetup, fewest: usize) -> CacheSettings {
+    let RenderSetup { settings, .. } = *setup;
     CacheSettings {
         metric: settings.cache.metric,
         error: settings.cache.allowed(),
         strata: settings.cache.strata() as usize,
         fewest,
-        reserve: Audit::bytes::<F>(stage, Method::IrradianceCache.is_biased()),
+        reserve: Audit::bytes::<F>(setup, Method::IrradianceCache.is_biased()),
         // Records saved to a file keep their validity radii.
         widens: settings.save_cache.is_none(),
     }

@@ -2,13 +2,13 @@
 //! surveys.
 
 use super::cache_memory;
-use super::caustics;
+use super::path;
 use super::photon_view::{self, PhotonView};
-use super::{Borrower, Method, Renderer, Stage};
+use super::{Borrower, Method, RenderSetup, Renderer};
 use crate::render::RenderError;
 use crate::render::cache_file::{self, Half, Header, Reader, View};
 use crate::render::held_out::EXACT;
-use crate::render::memory::{Bank, Memory};
+use crate::render::memory::Memory;
 use crate::render::rewritten_file::RewrittenFile;
 use crate::render::survey::{self, Survey};
 use crate::render::threads::{End, ThreadedRound, Threads};
@@ -28,35 +28,14 @@ use halflight_core::method::path::PathTracing;
 use halflight_core::method::{LastMaps, Method as _};
 use halflight_core::transport::PathIntegrator;
 
-/// Runs the prepass for caustics, allocates memory, sets up the method and calls `then` with it.
-pub(super) fn with<'m, F: Features, T>(
-    stage: &Stage<'m>,
-    memory: &mut Memory<'m>,
-    then: impl FnOnce(&mut dyn Renderer, &mut Memory) -> Result<T, RenderError>,
-) -> Result<T, RenderError> {
-    let Stage { scene, settings, .. } = *stage;
-    let file = cache_file::open(scene, settings, memory.for_file())?;
-    let header = file.as_ref().map_or_else(|| Header::new(scene, settings), |file| file.header.clone());
-    let bytes = Footprint::default().slice::<Record>(header.records());
-    memory.set_aside(LOADED, bytes)?;
-    let loaded = Loaded { header, records: file.map(Reader::records).transpose()?.unwrap_or_default() };
-    let cache = cache_memory::settings::<F>(stage, loaded.fewest());
-    let bank = Bank::new();
-    let mut own = memory.within(&bank);
-    let found = find_caustics::<F>(stage, &mut own, &cache)?;
-    let done = set_up::<F, T>(stage, &mut own, (loaded, &cache), found, then);
-    memory.rejoin(own);
-    done
-}
-
 /// Emission of caustic photons, if they pay and fit into memory besides the needs of `cache`.
 fn find_caustics<'m, F: Features>(
-    stage: &Stage<'m>,
+    setup: &RenderSetup<'m>,
     memory: &mut Memory<'m>,
     cache: &CacheSettings,
 ) -> Result<(Option<CausticEmission<'m>>, CausticUse), RenderError> {
-    let Stage { workers, .. } = *stage;
-    if !caustics::are_possible(stage) {
+    let RenderSetup { workers, .. } = *setup;
+    if !path::are_possible(setup) {
         return Ok((None, CausticUse::default()));
     }
     let needed = cache_memory::scratch::<F>(cache, true).bytes().saturating_mul(workers.count());
@@ -68,7 +47,7 @@ fn find_caustics<'m, F: Features>(
         return Ok((None, CausticUse { lacks_memory: true, ..CausticUse::default() }));
     }
     let mut scratch = memory.take_each("paths", scratch, workers.count())?;
-    let context = stage.context();
+    let context = setup.context();
     let mut paths = PathTracing::<F>::plain(&context);
     let settings = CausticSettings { beside_records: true, allows_photons_alone: false, reserved };
     let mut executor = Threads::new(workers, &mut scratch);
@@ -87,73 +66,10 @@ fn find_caustics<'m, F: Features>(
 /// Name of the memory of loaded records, until the caches hold them.
 const LOADED: &str = "loaded records";
 
-/// Contents of a cache file.
-struct Loaded {
-    header: Header,
-    records: [Vec<Record>; 2],
-}
-
-impl Loaded {
-    /// Smallest capacity of each cache.
-    fn fewest(&self) -> usize {
-        self.records.iter().map(Vec::len).max().unwrap_or(0)
-    }
-}
-
-/// Allocates memory, sets up the method, with photons of `emission` if given, and calls `then` with it.
-fn set_up<'m, F: Features, T>(
-    stage: &Stage<'m>,
-    memory: &mut Memory<'m>,
-    (loaded, cache): (Loaded, &CacheSettings),
-    (emission, caustics): (Option<CausticEmission<'m>>, CausticUse),
-    then: impl FnOnce(&mut dyn Renderer, &mut Memory) -> Result<T, RenderError>,
-) -> Result<T, RenderError> {
-    let Stage { scene, settings, workers, .. } = *stage;
-    let scratch = cache_memory::scratch::<F>(cache, emission.is_some());
-    let scratch = memory.take_each("paths", scratch, workers.count())?;
-    let photons = match emission {
-        Some(emission) => {
-            let reserved = cache_memory::later(cache);
-            let settings = CausticSettings { beside_records: true, allows_photons_alone: false, reserved };
-            CausticPhotons::new(&stage.context(), emission, settings, memory)?
-        }
-        None => None,
-    };
-    let mut method = IrradianceCaching::<F>::new(&stage.context(), cache, memory)?;
-    let exact = PathIntegrator::<F>::gather_scratch(EXACT);
-    let needed = (exact.bytes() * workers.count()).saturating_add(cache.reserve);
-    let survey = match settings.survey.filter(|_| memory.has(needed)) {
-        Some(points) => Some((points, memory.take_each("survey", exact, workers.count())?)),
-        None => None,
-    };
-    let Loaded { header, records } = loaded;
-    let view = View::of(scene, settings);
-    method.restore(records.each_ref().map(|records| &records[..]), header.halves.map(|half| half.gathered));
-    if header.serves(&view) {
-        method.finish();
-    }
-    drop(records);
-    memory.give_back(LOADED);
-    let mut cached = Cached {
-        method,
-        stage: *stage,
-        photons,
-        caustics,
-        scratch,
-        survey,
-        view,
-        loaded: header.halves,
-        header,
-        kept: RewrittenFile::in_file(settings.save_cache.as_deref()),
-        rays: cache.strata.pow(2) as u32,
-    };
-    then(&mut cached, memory)
-}
-
 /// Irradiance caching at work.
-struct Cached<'c, 'm, F> {
+pub(super) struct Cached<'m, F> {
     method: IrradianceCaching<'m, F>,
-    stage: Stage<'c>,
+    setup: RenderSetup<'m>,
     /// Caustic photons, if they pay.
     photons: Option<CausticPhotons<'m>>,
     caustics: CausticUse,
@@ -166,12 +82,64 @@ struct Cached<'c, 'm, F> {
     /// Counts of the loaded file.
     loaded: [Half; 2],
     /// File to which caches are written.
-    kept: RewrittenFile<'c>,
+    kept: RewrittenFile<'m>,
     /// Gather rays of a record.
     rays: u32,
 }
 
-impl<F: Features> Cached<'_, '_, F> {
+impl<'m, F: Features> Cached<'m, F> {
+    /// Runs the prepass for caustics, allocates memory and sets up the method.
+    pub(super) fn new(setup: &RenderSetup<'m>, memory: &mut Memory<'m>) -> Result<Self, RenderError> {
+        let RenderSetup { scene, settings, workers, .. } = *setup;
+        let file = cache_file::open(scene, settings, memory.for_file())?;
+        let header = file.as_ref().map_or_else(|| Header::new(scene, settings), |file| file.header.clone());
+        let bytes = Footprint::default().slice::<Record>(header.records());
+        memory.set_aside(LOADED, bytes)?;
+        let loaded = file.map(Reader::records).transpose()?.unwrap_or_default();
+        let fewest = loaded.iter().map(Vec::len).max().unwrap_or(0);
+        let cache = cache_memory::settings::<F>(setup, fewest);
+        let (emission, caustics) = find_caustics::<F>(setup, memory, &cache)?;
+        let scratch = cache_memory::scratch::<F>(&cache, emission.is_some());
+        let scratch = memory.take_each("paths", scratch, workers.count())?;
+        let photons = match emission {
+            Some(emission) => {
+                let reserved = cache_memory::later(&cache);
+                let settings =
+                    CausticSettings { beside_records: true, allows_photons_alone: false, reserved };
+                CausticPhotons::new(&setup.context(), emission, settings, memory)?
+            }
+            None => None,
+        };
+        let mut method = IrradianceCaching::<F>::new(&setup.context(), &cache, memory)?;
+        let exact = PathIntegrator::<F>::gather_scratch(EXACT);
+        let needed = (exact.bytes() * workers.count()).saturating_add(cache.reserve);
+        let survey = match settings.survey.filter(|_| memory.has(needed)) {
+            Some(points) => Some((points, memory.take_each("survey", exact, workers.count())?)),
+            None => None,
+        };
+        let view = View::of(scene, settings);
+        let gathered = header.halves.map(|half| half.gathered);
+        method.restore(loaded.each_ref().map(|records| &records[..]), gathered);
+        if header.serves(&view) {
+            method.finish();
+        }
+        drop(loaded);
+        memory.give_back(LOADED);
+        Ok(Self {
+            method,
+            setup: *setup,
+            photons,
+            caustics,
+            scratch,
+            survey,
+            view,
+            loaded: header.halves,
+            header,
+            kept: RewrittenFile::in_file(settings.save_cache.as_deref()),
+            rays: cache.strata.pow(2) as u32,
+        })
+    }
+
     /// Fills both caches or continues to, and writes them to their file.
     fn fill(&mut self, round: &mut ThreadedRound) -> Result<(), RenderError> {
         let Self { method, photons: maps, scratch, .. } = self;
@@ -209,7 +177,7 @@ impl<F: Features> Cached<'_, '_, F> {
 
     /// Finding on the caches.
     fn finding(&self) -> Finding {
-        let settings = &self.stage.settings.cache;
+        let settings = &self.setup.settings.cache;
         let caches = self.method.caches();
         let sum = |of: fn(&IrradianceCache) -> u64| caches.iter().map(|cache| of(cache)).sum::<u64>();
         let both = |halves: [u32; 2]| halves.into_iter().map(u64::from).sum::<u64>();
@@ -244,7 +212,7 @@ impl<F: Features> Cached<'_, '_, F> {
     }
 }
 
-impl<F: Features> Renderer for Cached<'_, '_, F> {
+impl<F: Features> Renderer for Cached<'_, F> {
     fn chosen(&self) -> Method {
         Method::IrradianceCache
     }
@@ -270,11 +238,11 @@ impl<F: Features> Renderer for Cached<'_, '_, F> {
     }
 
     fn lend_photons(&mut self, then: &mut Borrower) -> Result<(), RenderError> {
-        caustics::lend(self.photons.as_mut(), then)
+        path::lend(self.photons.as_mut(), then)
     }
 
     fn risks(&mut self, workers: &Workers) -> Result<Vec<f32>, RenderError> {
-        let settings = self.stage.settings;
+        let settings = self.setup.settings;
         let size = [settings.width, settings.height];
         let mut executor = Threads::new(workers, &mut self.scratch).until(End::Round(None));
         survey::risks(self.method.paths(), self.method.caches(), size, &mut executor)
@@ -286,7 +254,7 @@ impl<F: Features> Renderer for Cached<'_, '_, F> {
         if caches.iter().all(|cache| cache.records().is_empty()) {
             return Ok(None);
         }
-        let settings = self.stage.settings;
+        let settings = self.setup.settings;
         let size = [settings.width, settings.height];
         let executor = Threads::new(workers, scratch);
         survey::survey(self.method.paths(), caches, size, (*points, settings.stop.seconds), executor)
@@ -303,7 +271,7 @@ impl<F: Features> Renderer for Cached<'_, '_, F> {
     fn photon_view(&mut self) -> Result<Option<PhotonView>, RenderError> {
         let Some(photons) = &mut self.photons else { return Ok(None) };
         let maps = LastMaps { global: None, caustic: photons.last_map()? };
-        Ok(photon_view::render::<F>(&self.stage, &maps)?)
+        Ok(photon_view::render::<F>(&self.setup, &maps)?)
     }
 
     fn findings(&self) -> Findings {

@@ -1,7 +1,7 @@
 //! Pictures of photon maps for a report: positions and density of photons, radii of density estimates, and
 //! the share of photons that the camera sees.
 
-use super::Stage;
+use super::RenderSetup;
 use halflight_core::bsdf::Features;
 use halflight_core::geometry::Ray;
 use halflight_core::memory::{Arena, Line, OutOfMemory};
@@ -45,16 +45,19 @@ const MOST_PHOTONS: usize = 1 << 18;
 /// Relative tolerance of distance in the visibility test of a photon.
 const DISTANCE_TOLERANCE: f32 = 1e-3;
 
-/// Views of the maps of `stage`; `None` without maps.
-pub(super) fn render<F: Features>(stage: &Stage, maps: &LastMaps) -> Result<Option<PhotonView>, OutOfMemory> {
+/// Views of the maps of `setup`; `None` without maps.
+pub(super) fn render<F: Features>(
+    setup: &RenderSetup,
+    maps: &LastMaps,
+) -> Result<Option<PhotonView>, OutOfMemory> {
     if maps.global.is_none() && maps.caustic.is_none() {
         return Ok(None);
     }
-    let Stage { settings, .. } = *stage;
+    let RenderSetup { settings, .. } = *setup;
     let (width, height) = (settings.width, settings.height);
     let factor = width.max(height).div_ceil(MOST_PIXELS);
     let size = [width.div_ceil(factor), height.div_ceil(factor)];
-    let of = |map: &PhotonMap| map_view::<F>(stage, map, size);
+    let of = |map: &PhotonMap| map_view::<F>(setup, map, size);
     Ok(Some(PhotonView {
         width: size[0],
         global: maps.global.as_ref().map(of).transpose()?,
@@ -63,11 +66,11 @@ pub(super) fn render<F: Features>(stage: &Stage, maps: &LastMaps) -> Result<Opti
 }
 
 fn map_view<F: Features>(
-    stage: &Stage,
+    setup: &RenderSetup,
     map: &PhotonMap,
     [width, height]: [u32; 2],
 ) -> Result<MapView, OutOfMemory> {
-    let Stage { scene, bvh, settings, .. } = *stage;
+    let RenderSetup { scene, bvh, settings, .. } = *setup;
     let (camera, level) = (&scene.camera, settings.level);
     let pixels = width as usize * height as usize;
     let mut view = MapView { positions: vec![0.0; pixels], ..MapView::default() };
@@ -104,7 +107,7 @@ fn map_view<F: Features>(
     for pixel in 0..pixels as u32 {
         let (x, y) = (pixel % width, pixel / width);
         // Interrupted: the remaining pixels stay black.
-        if x == 0 && stage.workers.deadline.is_interrupted() {
+        if x == 0 && setup.workers.deadline.is_interrupted() {
             break;
         }
         let ray = camera.ray(width, height, x as f32 + 0.5, y as f32 + 0.5, [0.5; 2]);

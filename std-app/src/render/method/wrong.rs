@@ -1,7 +1,7 @@
 //! A deliberately biased method: the right half of the picture is a tenth too bright, like a cache with 10 %
 //! too much irradiance. Its noise does not reveal the bias.
 
-use super::{Method, Renderer, Stage};
+use super::{Method, RenderSetup, Renderer};
 use crate::render::RenderError;
 use crate::render::memory::Memory;
 use crate::render::threads::ThreadedRound;
@@ -21,10 +21,10 @@ pub(super) struct Wrong<'a, F> {
 }
 
 impl<'a, F: Features> Wrong<'a, F> {
-    pub(super) fn new(stage: &Stage<'a>, memory: &mut Memory) -> Result<Self, RenderError> {
-        let Stage { settings, workers, .. } = *stage;
+    pub(super) fn new(setup: &RenderSetup<'a>, memory: &mut Memory) -> Result<Self, RenderError> {
+        let RenderSetup { settings, workers, .. } = *setup;
         let scratch = memory.take_each("paths", PathIntegrator::<F>::scratch(WAVE), workers.count())?;
-        let tracer = stage.paths::<F>(settings.seed);
+        let tracer = setup.paths::<F>(settings.seed);
         Ok(Self { tracer, scratch, size: [settings.width, settings.height] })
     }
 }
