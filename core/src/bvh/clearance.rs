@@ -56,25 +56,48 @@ impl Clearance {
         Clearance { has_wall: false, has_overhang: false, surface: (1 << POINTS) - 1 };
 }
 
+/// Visitor of the triangles in a box.
+pub(crate) trait BoxVisitor {
+    /// Whether the triangles in a node, whose box is from the first to the second of its `corners`, matter.
+    #[inline]
+    fn enters(&self, _corners: &impl Fn() -> [Vec3; 2]) -> bool {
+        true
+    }
+
+    /// Visits a triangle. Returns whether others are still of interest.
+    fn visit(&mut self, corners: [Vec3; 3]) -> bool;
+}
+
+/// Visitor of a clearance query.
+struct Surroundings<'q> {
+    query: &'q ClearanceQuery,
+    clearance: &'q mut Clearance,
+}
+
+impl BoxVisitor for Surroundings<'_> {
+    #[inline]
+    fn visit(&mut self, corners: [Vec3; 3]) -> bool {
+        self.query.meet(corners, self.clearance);
+        !self.clearance.has_overhang
+    }
+}
+
 impl Bvh<'_> {
     /// Clearance around `query`.
     pub fn clearance(&self, query: &ClearanceQuery) -> Clearance {
         let (lo, hi) = (query.place - Vec3::splat(query.reach), query.place + Vec3::splat(query.reach));
         let mut clearance = Clearance { has_wall: false, has_overhang: false, surface: 0 };
-        let is_whole = self.overlapping(lo, hi, |corners| {
-            query.meet(corners, &mut clearance);
-            !clearance.has_overhang
-        });
-        if !is_whole {
+        let mut surroundings = Surroundings { query, clearance: &mut clearance };
+        if !self.overlapping(lo, hi, &mut surroundings) {
             (clearance.has_wall, clearance.has_overhang) = (true, true);
         }
         clearance
     }
 
-    /// Calls `visit` with the triangles of leaves that overlap a box, until it returns `false`. Returns
-    /// `false` if the stack overflows, so that triangles are missing.
+    /// Passes the triangles of leaves that overlap the box from `lo` to `hi` to `visitor`. Returns `false` if
+    /// the stack overflows, so that triangles are missing.
     #[inline(always)]
-    pub(crate) fn overlapping(&self, lo: Vec3, hi: Vec3, mut visit: impl FnMut([Vec3; 3]) -> bool) -> bool {
+    pub(crate) fn overlapping(&self, lo: Vec3, hi: Vec3, visitor: &mut impl BoxVisitor) -> bool {
         let mut waiting = [0u32; STACK_SIZE];
         let mut count = 1usize;
         let (mut goes_on, mut is_whole) = (true, true);
@@ -83,13 +106,17 @@ impl Bvh<'_> {
             let Some(node) = self.nodes.get(index as usize) else { break };
             let mut met = overlapping(node, lo, hi);
             while met != 0 {
-                let child = node.child(met.trailing_zeros() as usize);
+                let lane = met.trailing_zeros() as usize;
+                let child = node.child(lane);
                 met &= met - 1;
+                if !visitor.enters(&|| node.corners(lane)) {
+                    continue;
+                }
                 if child.is_leaf() {
                     let (first, of) = child.triangles();
                     let runs = self.coordinates.get(9 * first..9 * (first + of)).unwrap_or(&[]);
                     for i in 0..of {
-                        goes_on &= visit(corners_of(runs, of, i).map(Vec3::from));
+                        goes_on &= visitor.visit(corners_of(runs, of, i).map(Vec3::from));
                     }
                 } else if let Some(slot) = waiting.get_mut(count) {
                     *slot = child.0;

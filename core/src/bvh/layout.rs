@@ -2,6 +2,7 @@
 //! leaf lie in runs, so that one load fills a register and no lane is padded.
 
 use bytemuck::{Pod, Zeroable};
+use glam::Vec3;
 use halflight_simd::kernels::boxes::Boxes8;
 
 /// Largest number of triangles in a leaf: one register.
@@ -62,6 +63,12 @@ impl Node {
             }
             self.rows[7][octant] = f32::from_bits(packed);
         }
+    }
+
+    /// Least and greatest corner of a child's box.
+    #[inline(always)]
+    pub(super) fn corners(&self, i: usize) -> [Vec3; 2] {
+        [0, 1].map(|end| Vec3::from([0, 2, 4].map(|axis| self.rows[axis + end][i & 7])))
     }
 
     #[inline(always)]

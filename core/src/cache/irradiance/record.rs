@@ -185,12 +185,18 @@ impl Record {
     /// Stores an overhang above the sectors `first` to `last`, which may exceed 16 around the circle; it may
     /// invalidate this record at points farther than `distance`.
     pub fn add_overhang(&mut self, [first, last]: [i32; 2], distance: f32) {
-        let share = (distance / self.reach).clamp(0.0, 1.0);
+        let share = self.share(distance);
         for sector in first..=last.min(first + SECTORS as i32 - 1) {
             if let Some(free) = self.free.get_mut(sector.rem_euclid(SECTORS as i32) as usize) {
-                *free = (*free).min((share * 255.0) as u8);
+                *free = (*free).min(share);
             }
         }
+    }
+
+    /// A distance as it is stored: a fraction of the reach.
+    #[inline]
+    pub(crate) fn share(&self, distance: f32) -> u8 {
+        ((distance / self.reach).clamp(0.0, 1.0) * 255.0) as u8
     }
 
     /// Maximum distance of valid points by the boundary.
@@ -203,15 +209,15 @@ impl Record {
 
     /// Limits the boundary to `distance` in all directions.
     pub fn confine(&mut self, distance: f32) {
-        let share = (distance / self.reach).clamp(0.0, 1.0);
-        self.boundary = self.boundary.map(|free| free.min((share * 255.0) as u8));
+        let share = self.share(distance);
+        self.boundary = self.boundary.map(|free| free.min(share));
     }
 
     /// Stores a wall at `distance` from the record, in the direction of `place` along its axes.
     pub fn limit_boundary(&mut self, place: Vec2, distance: f32) {
-        let share = (distance / self.reach).clamp(0.0, 1.0);
+        let share = self.share(distance);
         if let Some(boundary) = self.boundary.get_mut(sector(One, place.to_array()) as usize) {
-            *boundary = (*boundary).min((share * 255.0) as u8);
+            *boundary = (*boundary).min(share);
         }
     }
 

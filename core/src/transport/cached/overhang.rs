@@ -5,7 +5,8 @@
 //! once.
 
 use crate::bsdf::Features;
-use crate::bvh::Coherence;
+use crate::bvh::clearance::BoxVisitor;
+use crate::bvh::{Bvh, Coherence};
 use crate::cache::irradiance::{OVERHANG_DISTANCE_FACTOR, OVERHANG_RADIUS_FACTOR, Record, SECTORS};
 use crate::geometry::{Frame, Hit, Ray};
 use crate::scene::{Surface, SurfacePoint};
@@ -33,6 +34,9 @@ const MIN_PLANE_COSINE: f32 = 0.25;
 /// Maximum rise of an overhang's plane from the record to its hit, over the height there. A surface that
 /// curves upwards, with heights quadratic in the distance, has a ratio of 2.
 const MAX_RISE: f32 = 1.8;
+
+/// Parts of the region above a record that are searched one after the other.
+const SEARCHES: [f32; 3] = [0.1, 0.4, 1.0];
 
 /// Height below which a triangle belongs to the surface itself: in error bounds of its points, and as a
 /// fraction of the reach.
@@ -124,36 +128,120 @@ impl<F: Features, E: Estimator<F>> PathIntegrator<'_, F, E> {
         let center = middle + 0.5 * height * normal;
         let [first, second] = record.axes();
         let flat = FLAT_IN_ERRORS * place.error.max(FLAT_IN_REACH * reach);
-        let mut noted = *record;
-        let (lo, hi) = (center - half, center + half);
-        let is_whole = self.context.bvh.overlapping(lo, hi, |corners| {
-            let [a, b, c] = corners;
-            if a.max(b).max(c).cmplt(lo).any() || a.min(b).min(c).cmpgt(hi).any() {
-                return true;
-            }
-            let offsets = corners.map(|corner| corner - middle);
-            let heights = offsets.map(|offset| offset.dot(normal));
-            // Most triangles near a record belong to the surface itself.
-            if heights.iter().all(|height| *height <= flat) {
-                return true;
-            }
-            let local = |i: usize| Vec3::new(offsets[i].dot(first), offsets[i].dot(second), heights[i]);
-            if let Some(overhang) = Overhang::of([0, 1, 2].map(local), reach, flat) {
-                let Overhang { sectors, from, height } = overhang;
-                let close = if OVERHANG_DISTANCE_FACTOR * height < least {
-                    0.0
-                } else {
-                    OVERHANG_DISTANCE_FACTOR * height
-                };
-                noted.add_overhang(sectors, close.max(from - height));
-            }
-            true
+        let axes = [first, second, normal];
+        let mut search = Search { record: *record, middle, axes, flat, reach, least, bounds: [middle; 2] };
+        search.run(self.context.bvh, center, half);
+        *record = search.record;
+    }
+}
+
+/// Search for overhangs above the support of a record.
+struct Search {
+    /// The record, with the overhangs that were found.
+    record: Record,
+    middle: Vec3,
+    /// Axes of the record and the normal of the surface.
+    axes: [Vec3; 3],
+    /// Height up to which triangles belong to the surface.
+    flat: f32,
+    reach: f32,
+    /// Distance up to which overhangs do not matter.
+    least: f32,
+    /// Least and greatest corner of the box that is searched.
+    bounds: [Vec3; 2],
+}
+
+impl Search {
+    /// Searches the box around `center` with edges of twice `half`.
+    fn run(&mut self, bvh: &Bvh, center: Vec3, half: Vec3) {
+        // Close overhangs come first: many others do not matter then.
+        let is_whole = SEARCHES.into_iter().all(|part| {
+            self.bounds = [center - part * half, center + part * half];
+            bvh.overlapping(self.bounds[0], self.bounds[1], self)
         });
         if !is_whole {
-            noted.free = [0; SECTORS];
+            self.record.free = [0; SECTORS];
         }
-        *record = noted;
     }
+
+    /// Distance from which on an overhang at `height` may invalidate the record.
+    fn exposed(&self, height: f32) -> f32 {
+        let exposed = OVERHANG_DISTANCE_FACTOR * height;
+        if exposed < self.least { 0.0 } else { exposed }
+    }
+
+    /// Lower bound of the distance passed to [`Record::add_overhang`] for a triangle at `from` or farther, at
+    /// `height` or higher: the least of max(exposed(h), from − h) over h ≥ `height`.
+    fn nearest(&self, from: f32, height: f32) -> f32 {
+        let rising = OVERHANG_DISTANCE_FACTOR / (1.0 + OVERHANG_DISTANCE_FACTOR) * from;
+        let rising = rising.max(OVERHANG_DISTANCE_FACTOR * height);
+        let low = self.least / OVERHANG_DISTANCE_FACTOR;
+        // Rounding must not raise the bound.
+        0.999 * if height < low { rising.min((from - low).max(0.0)) } else { rising }
+    }
+}
+
+impl BoxVisitor for Search {
+    #[inline]
+    fn enters(&self, corners: &impl Fn() -> [Vec3; 2]) -> bool {
+        let [lo, hi] = corners();
+        let (center, half) = (0.5 * (lo + hi) - self.middle, 0.5 * (hi - lo));
+        let center = Vec3::from(self.axes.map(|axis| center.dot(axis)));
+        let half = 1.001 * Vec3::from(self.axes.map(|axis| half.dot(axis.abs())));
+        let (lo, hi) = (center - half, center + half);
+        if hi.z <= 0.5 * self.flat {
+            return false;
+        }
+        let outside = lo.max(-hi).truncate();
+        let from = outside.max(Vec2::ZERO).length();
+        let share = self.record.share(self.nearest(from, lo.z.max(0.0)));
+        let free = &self.record.free;
+        // A triangle that reaches beyond the disc may have a plane above all of it.
+        let is_beyond = lo.abs().max(hi.abs()).truncate().length() > self.reach;
+        if is_beyond || from <= 2.0 * hi.z {
+            return free.iter().any(|free| *free > share);
+        }
+        let [first, last] =
+            sectors([lo.truncate(), hi.truncate(), Vec2::new(lo.x, hi.y), Vec2::new(hi.x, lo.y)]);
+        (first..=last.min(first + SECTORS as i32 - 1)).any(|sector| {
+            free.get(sector.rem_euclid(SECTORS as i32) as usize).is_some_and(|free| *free > share)
+        })
+    }
+
+    #[inline]
+    fn visit(&mut self, corners: [Vec3; 3]) -> bool {
+        let [a, b, c] = corners;
+        let [lo, hi] = self.bounds;
+        if a.max(b).max(c).cmplt(lo).any() || a.min(b).min(c).cmpgt(hi).any() {
+            return true;
+        }
+        let offsets = corners.map(|corner| corner - self.middle);
+        let heights = offsets.map(|offset| offset.dot(self.axes[2]));
+        // Most triangles near a record belong to the surface itself.
+        if heights.iter().all(|height| *height <= self.flat) {
+            return true;
+        }
+        let [first, second, _] = self.axes;
+        let local = |i: usize| Vec3::new(offsets[i].dot(first), offsets[i].dot(second), heights[i]);
+        if let Some(overhang) = Overhang::of([0, 1, 2].map(local), self.reach, self.flat) {
+            let Overhang { sectors, from, height } = overhang;
+            self.record.add_overhang(sectors, self.exposed(height).max(from - height));
+        }
+        true
+    }
+}
+
+/// First and last sector that a convex figure with these corners, which does not contain the origin, lies in
+/// or beside: a tilted probe hits at most the adjacent sector. Sectors beyond 16 are those around the circle.
+fn sectors<const N: usize>(corners: [Vec2; N]) -> [i32; 2] {
+    let sectors = corners.map(Record::sector);
+    // No two corners are half a circle apart.
+    let half = SECTORS as f32 / 2.0;
+    let turn = |to: f32| (to - sectors[0] + 3.0 * half) % (2.0 * half) - half;
+    let turns = sectors.map(turn);
+    let (low, high) =
+        turns.iter().fold((0.0f32, 0.0f32), |(low, high), turn| (low.min(*turn), high.max(*turn)));
+    [libm::floorf(sectors[0] + low) as i32 - 1, libm::floorf(sectors[0] + high) as i32 + 1]
 }
 
 /// Triangle above a disc.
@@ -192,13 +280,7 @@ impl Overhang {
         if from <= 2.0 * height {
             return Some(Self { sectors: [0, SECTORS as i32 - 1], from, height });
         }
-        // The origin is outside: no two corners are half a circle apart.
-        let [first, second, third] = flat.map(Record::sector);
-        let half = SECTORS as f32 / 2.0;
-        let turn = |to: f32| (to - first + 3.0 * half) % (2.0 * half) - half;
-        let (low, high) = (turn(second).min(turn(third)).min(0.0), turn(second).max(turn(third)).max(0.0));
-        // A tilted probe hits at most the adjacent sector.
-        let sectors = [libm::floorf(first + low) as i32 - 1, libm::floorf(first + high) as i32 + 1];
+        let sectors = sectors(flat);
         Some(Self { sectors, from, height })
     }
 }
@@ -217,4 +299,61 @@ fn distance(corners: [Vec2; 3]) -> f32 {
         (p + share * along).length()
     };
     sides.map(to).into_iter().fold(f32::INFINITY, f32::min)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::memory::{Arena, Line};
+    use crate::sampling::Random;
+    use crate::scene::{Mesh, Triangle};
+    use bytemuck::Zeroable;
+    use std::vec;
+    use std::vec::Vec;
+
+    #[test]
+    fn boxes_that_the_search_does_not_enter_hold_no_overhang_that_matters() {
+        let random = Random::new(3, 0);
+        let unit = |i: usize| random.single(i as u32);
+        let point = |i: usize| Vec3::new(unit(3 * i), unit(3 * i + 1), unit(3 * i + 2)) - 0.5;
+        // Small triangles, large ones, and a layer close above the floor.
+        let positions: Vec<[f32; 3]> = (0..3000)
+            .flat_map(|i| {
+                let size = if i % 50 == 0 { 2.0 } else { 0.2 };
+                let low = if i % 3 == 0 { 0.05 } else { 1.0 };
+                let middle = 10.0 * point(4 * i) * Vec3::new(1.0, 1.0, low);
+                [1, 2, 3].map(|k| (middle + size * point(4 * i + k)).to_array())
+            })
+            .collect();
+        let triangles: Vec<Triangle> =
+            (0..3000).map(|i| Triangle { vertices: [3 * i, 3 * i + 1, 3 * i + 2], material: 0 }).collect();
+        let mesh = Mesh { positions: &positions, normals: &[], texcoords: &[], triangles: &triangles };
+        let mut lines = vec![Line([0; 64]); Bvh::footprint(triangles.len()).bytes() / 64];
+        let mut arena = Arena::new(bytemuck::cast_slice_mut(&mut lines));
+        let bvh = Bvh::build(&mesh, &mut arena).unwrap();
+        let mut confined = 0;
+        for i in 0..200 {
+            let reach = 0.2 + 4.0 * unit(i);
+            let (normal, axis) = (Vec3::Z, Vec3::X);
+            let record = Record {
+                normal: normal.to_array(),
+                axis: axis.to_array(),
+                reach: 0.7 * reach,
+                free: [u8::MAX; SECTORS],
+                ..Record::zeroed()
+            };
+            let middle = 8.0 * point(20_000 + i) * Vec3::new(1.0, 1.0, if i % 2 == 0 { 0.0 } else { 1.0 });
+            let axes = [axis, Vec3::Y, normal];
+            let (least, flat, bounds) = (0.3 * unit(300 + i), 1e-3 * reach, [middle; 2]);
+            let search = || Search { record, middle, axes, flat, reach, least, bounds };
+            let (center, half) = (middle + 0.15 * reach * normal, reach * Vec3::new(1.0, 1.0, 0.15));
+            let (mut all, mut pruned) = (search(), search());
+            all.bounds = [center - half, center + half];
+            (0..triangles.len() as u32).for_each(|i| _ = all.visit(mesh.corners(i)));
+            pruned.run(&bvh, center, half);
+            assert_eq!(all.record.free, pruned.record.free, "{i}");
+            confined += u32::from(pruned.record.free.iter().any(|free| *free < u8::MAX));
+        }
+        assert!((50..200).contains(&confined), "{confined}");
+    }
 }
